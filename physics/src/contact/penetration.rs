@@ -1,0 +1,46 @@
+//! Depth of garment vertices inside a body.
+
+use crate::query::{Distance, Surface};
+use rayon::prelude::*;
+
+/// How deep the vertices of a garment lie inside a body, by the closest point of its surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Penetration {
+    /// Vertices looked at.
+    pub vertices: usize,
+    /// Vertices with a negative gap.
+    pub inside: usize,
+    /// Vertices deeper than the given threshold.
+    pub deep: usize,
+    /// Largest depth (m), 0 when no vertex is inside.
+    pub max_depth: f64,
+}
+
+/// Counts the vertices of `positions` inside `body`, and those deeper than `deep_threshold` (m).
+pub fn penetration(body: &Surface<f64>, positions: &[[f64; 3]], deep_threshold: f64) -> Penetration {
+    let gaps: Vec<f64> =
+        positions.par_iter().with_min_len(256).map(|&p| body.gap(p, Distance::ClosestPoint).gap).collect();
+    Penetration {
+        vertices: positions.len(),
+        inside: gaps.iter().filter(|g| **g < 0.0).count(),
+        deep: gaps.iter().filter(|g| **g < -deep_threshold).count(),
+        max_depth: gaps.iter().fold(0.0, |deepest, g| f64::max(deepest, -g)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::shapes::icosphere;
+    use std::sync::Arc;
+
+    #[test]
+    fn points_inside_a_sphere_are_counted_with_their_depth() {
+        let sphere = icosphere(1.0, 4);
+        let body = Surface::new(sphere.positions().to_vec(), Arc::from(sphere.faces().to_vec()));
+        let points = [[0.0, 0.0, 0.0], [0.0, 0.9, 0.0], [1.5, 0.0, 0.0], [0.0, 0.0, -0.995]];
+        let p = penetration(&body, &points, 0.05);
+        assert_eq!((p.vertices, p.inside, p.deep), (4, 3, 2));
+        assert!((p.max_depth - 1.0).abs() < 0.01, "{p:?}");
+    }
+}

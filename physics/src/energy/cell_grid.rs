@@ -1,0 +1,123 @@
+//! Points sorted into cells, for sums over all pairs within a radius.
+
+use crate::real::Real;
+use crate::vec3::{is_finite, to_f64};
+
+/// Cells per radius: smaller cells fit the sphere better and cost more look-ups.
+const CELLS_PER_RADIUS: i64 = 2;
+
+/// Points sorted by cell. Cells are kept as a sorted list, not as an array: one vertex far away costs nothing.
+pub(crate) struct CellGrid<T> {
+    /// Original index of every sorted point; points that are not finite are left out.
+    pub(crate) order: Vec<u32>,
+    pub(crate) points: Vec<[T; 3]>,
+    /// Key and first point of every occupied cell, ascending; the end of the last cell follows.
+    cells: Vec<(u64, u32)>,
+    end: u32,
+}
+
+/// Bits per axis of a cell key.
+const KEY_BITS: u32 = 21;
+
+/// Rows start here, so that the neighbours of the first cell have keys too.
+const KEY_MARGIN: i64 = CELLS_PER_RADIUS;
+
+impl<T: Real> CellGrid<T> {
+    /// Cells of `radius / 2`: a finer grid fits the sphere better and costs more look-ups.
+    pub(crate) fn new(positions: &[[T; 3]], radius: f64) -> Self {
+        let mut low = [f64::INFINITY; 3];
+        for p in positions.iter().filter(|p| is_finite(**p)) {
+            low = std::array::from_fn(|k| low[k].min(p[k].to_f64()));
+        }
+        let per_metre = CELLS_PER_RADIUS as f64 / radius;
+        // Beyond 2 million cells along an axis, points share the last cell: slower, still right.
+        let last = (1i64 << KEY_BITS) - 1 - 2 * KEY_MARGIN;
+        let mut keyed: Vec<(u64, u32)> = positions
+            .iter()
+            .enumerate()
+            .filter(|(_, p)| is_finite(**p))
+            .map(|(v, p)| {
+                let p = to_f64(*p);
+                let cell = std::array::from_fn(|k| {
+                    KEY_MARGIN + (((p[k] - low[k]) * per_metre) as i64).clamp(0, last)
+                });
+                (key(cell), v as u32)
+            })
+            .collect();
+        keyed.sort_unstable();
+        let mut cells: Vec<(u64, u32)> = Vec::new();
+        for (k, &(key, _)) in keyed.iter().enumerate() {
+            if cells.last().is_none_or(|&(last, _)| last != key) {
+                cells.push((key, k as u32));
+            }
+        }
+        let order: Vec<u32> = keyed.iter().map(|&(_, v)| v).collect();
+        let points = order.iter().map(|&v| positions[v as usize]).collect();
+        Self { order, points, cells, end: keyed.len() as u32 }
+    }
+
+    fn start(&self, cell: usize) -> usize {
+        self.cells.get(cell).map_or(self.end, |&(_, start)| start) as usize
+    }
+
+    /// Number of occupied cells.
+    pub(crate) fn cell_count(&self) -> usize {
+        self.cells.len()
+    }
+
+    /// The sorted points of a cell.
+    pub(crate) fn range(&self, cell: usize) -> std::ops::Range<usize> {
+        self.start(cell)..self.start(cell + 1)
+    }
+
+    /// Calls `visit` with the points of the cells around `cell`, in order; a row of cells along x is one range.
+    pub(crate) fn for_each_range_around(&self, cell: usize, mut visit: impl FnMut(std::ops::Range<usize>)) {
+        let mask = (1i64 << KEY_BITS) - 1;
+        let key_here = self.cells[cell].0 as i64;
+        let [x, y, z] = [key_here & mask, (key_here >> KEY_BITS) & mask, key_here >> (2 * KEY_BITS)];
+        let reach = CELLS_PER_RADIUS;
+        for dz in -reach..=reach {
+            for dy in -reach..=reach {
+                let (first, last) = (key([x - reach, y + dy, z + dz]), key([x + reach, y + dy, z + dz]));
+                let from = self.cells.partition_point(|&(k, _)| k < first);
+                let to = from + self.cells[from..].iter().take_while(|&&(k, _)| k <= last).count();
+                if from < to {
+                    visit(self.start(from)..self.start(to));
+                }
+            }
+        }
+    }
+}
+
+/// Cells in rows along x, rows in layers along y. Coordinates are within `KEY_MARGIN` of a valid cell, hence not negative.
+fn key([x, y, z]: [i64; 3]) -> u64 {
+    ((z << (2 * KEY_BITS)) | (y << KEY_BITS) | x) as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::shapes;
+    use crate::vec3;
+
+    #[test]
+    fn every_point_within_the_radius_is_among_the_candidates() {
+        let radius = 0.1;
+        let mut points = shapes::irregular_grid(0.5, 0.6, 12, 14, 0.3, 1).positions().to_vec();
+        // Far outliers, one of them beyond the last cell, and one that is nowhere.
+        points.extend([[-3.0, 2.0, 40.0], [1e9, 0.0, 0.0], [1e9, 0.05, 0.0], [f64::NAN, 0.0, 0.0]]);
+        let grid = CellGrid::new(&points, radius);
+        assert_eq!(grid.order.len(), points.len() - 1);
+        for cell in 0..grid.cell_count() {
+            let mut around = Vec::new();
+            grid.for_each_range_around(cell, |range| around.extend_from_slice(&grid.order[range]));
+            for p in &grid.points[grid.range(cell)] {
+                for (v, q) in points.iter().enumerate() {
+                    let close = vec3::distance_squared(*p, *q) < radius * radius;
+                    let found = around.iter().filter(|&&c| c as usize == v).count();
+                    assert!(found <= 1 && (found == 1 || !close), "{v} {found}");
+                }
+            }
+        }
+    }
+}

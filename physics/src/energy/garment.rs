@@ -1,0 +1,112 @@
+//! Everything about one garment that its positions do not change.
+
+use std::fmt::Debug;
+
+use super::bending::Bending;
+use super::body_collision::BodyCollision;
+use super::gravity::Gravity;
+use super::holding::Holding;
+use super::layer_collision::InnerSurface;
+use super::repulsion::Repulsion;
+use super::strain::Strain;
+use super::{EnergyError, EnergySettings, Term, Weighted};
+use crate::mesh::{Topology, TriMesh};
+use crate::query::Gap;
+use crate::real::Real;
+
+/// One garment at one moment, as its energies see it.
+#[derive(Debug, Clone, Copy)]
+pub struct GarmentState<'a, T> {
+    /// Posed positions `[V, 3]` [m].
+    pub posed: &'a [[T; 3]],
+    /// Canonical positions, before skinning `[V, 3]` [m].
+    pub canonical: &'a [[T; 3]],
+    /// Canonical positions that the holding energy measures against `[V, 3]` [m].
+    pub holding_reference: &'a [[T; 3]],
+    /// Signed distance of every posed vertex to the body `[V]`; empty when no active term needs it.
+    pub gaps: &'a [Gap<T>],
+    /// Constants of the scene.
+    pub settings: &'a EnergySettings,
+}
+
+/// An energy of one garment.
+pub trait GarmentTerm<T>: Debug + Send + Sync {
+    /// Its raw value; adds `weight·∂E/∂positions` to the target, positions being canonical or posed as
+    /// [`Term::is_canonical`] says.
+    fn evaluate(&self, state: &GarmentState<'_, T>, target: Option<Weighted<'_, T>>) -> f64;
+}
+
+/// The energies of one garment, ready to be evaluated at any positions. Made once per garment and shared by `Arc`.
+#[derive(Debug)]
+pub struct GarmentEnergies<T: Real> {
+    vertex_count: usize,
+    inner_surface: InnerSurface,
+    terms: Vec<(Term, Box<dyn GarmentTerm<T>>)>,
+}
+
+impl<T: Real> GarmentEnergies<T> {
+    /// Prepares the energies of a garment with rest shape `rest`; `holding`: whether it hangs from nothing and is held.
+    ///
+    /// # Errors
+    /// [`EnergyError::Setting`] for a setting out of range, [`EnergyError::TopologyMismatch`] for the topology of another
+    /// mesh, [`EnergyError::NoArea`] for a mesh whose faces all have zero area. Single faces without area are fine.
+    pub fn new(
+        rest: &TriMesh,
+        topology: &Topology,
+        settings: &EnergySettings,
+        holding: bool,
+    ) -> Result<Self, EnergyError> {
+        settings.check()?;
+        let vertex_count = rest.vertex_count();
+        if topology.vertex_count() != vertex_count {
+            return Err(EnergyError::TopologyMismatch {
+                topology: topology.vertex_count(),
+                mesh: vertex_count,
+            });
+        }
+        let area = rest.area();
+        if !(area.is_finite() && area > 0.0) {
+            return Err(EnergyError::NoArea { faces: rest.face_count() });
+        }
+        let material = &settings.material;
+        let median_edge = rest.median_edge_length();
+        let repulsion = Repulsion::new(
+            topology,
+            settings.repulsion_radius,
+            settings.repulsion_normalised,
+            settings.repulsion_subset,
+        );
+        let bending =
+            Bending::with_median_edge(rest, &topology.hinges, material.bending_stiffness, median_edge);
+        let mut terms: Vec<(Term, Box<dyn GarmentTerm<T>>)> = vec![
+            (Term::Strain, Box::new(Strain::with_median_edge(rest, material, median_edge))),
+            (Term::Bending, Box::new(bending)),
+            (Term::Gravity, Box::new(Gravity::new(rest, material, settings.gravity_acceleration))),
+            (Term::BodyCollision, Box::new(BodyCollision)),
+            (Term::Repulsion, Box::new(repulsion)),
+        ];
+        if holding {
+            terms.push((Term::Holding, Box::new(Holding::new(rest, settings.holding_fraction))));
+        }
+        Ok(Self { vertex_count, inner_surface: InnerSurface::with_median_edge(rest, median_edge), terms })
+    }
+
+    /// Number of vertices.
+    pub fn vertex_count(&self) -> usize {
+        self.vertex_count
+    }
+
+    /// Whether the garment is held.
+    pub fn has_holding(&self) -> bool {
+        self.terms.iter().any(|(term, _)| *term == Term::Holding)
+    }
+
+    /// The energies of this garment, in the order of [`Term::ALL`].
+    pub fn terms(&self) -> impl Iterator<Item = (Term, &dyn GarmentTerm<T>)> {
+        self.terms.iter().map(|(term, energy)| (*term, energy.as_ref()))
+    }
+
+    pub(super) fn inner_surface(&self) -> &InnerSurface {
+        &self.inner_surface
+    }
+}

@@ -1,0 +1,46 @@
+//! The eight energies that train the networks, each a plain function of positions with a hand-derived gradient.
+//!
+//! | term | acts on | formula (sum over) |
+//! |---|---|---|
+//! | [`strain`] | posed garment | `area·thickness·(λ/2 tr(G)² + μ tr(G²))` (triangles) |
+//! | [`bending`] | posed garment | `k/2·α²` (interior edges) |
+//! | [`gravity`] | posed garment | `m·g·y` (vertices) |
+//! | [`body_collision`] | posed garment, body | `max(ε − d, 0)³` (vertices) |
+//! | [`repulsion`] | posed garment | `−log d²` (close vertex pairs that share no edge), over `N` |
+//! | [`holding`] | canonical garment | `(y − y_ref)²` (top tenth of the vertices) |
+//! | [`layer_collision`] | two posed garments | `max(ε − d, 0)³` (outer vertices, distance to the inner garment) |
+//! | [`layer_distance`] | two posed garments, body | `max(d_inner − d_outer, 0)³` (pairs over one body vertex) |
+//!
+//! Weights never live in a term: [`SceneEnergy`] multiplies them in. Elements are evaluated in `f64` whatever the scalar of
+//! the positions (only the pair loop of the repulsion works in the caller's scalar), sums are `f64` and run in a fixed
+//! order, and every vertex gathers its own gradient: results are bit-identical for any number of threads.
+//!
+//! A ninth term is one new file, one line in [`Term::ALL`] and one line where [`GarmentEnergies`] (or, for a pair of
+//! garments, [`SceneEnergy`]) lists what it evaluates; the finite-difference test walks the list.
+
+pub mod bending;
+pub mod body_collision;
+mod cell_grid;
+mod elements;
+mod error;
+mod garment;
+pub mod gravity;
+pub mod holding;
+pub mod layer_collision;
+pub mod layer_distance;
+mod material;
+pub mod repulsion;
+mod scene;
+mod settings;
+pub mod strain;
+mod term;
+#[cfg(test)]
+pub(crate) mod tests;
+
+pub use elements::Weighted;
+pub use error::EnergyError;
+pub use garment::{GarmentEnergies, GarmentState, GarmentTerm};
+pub use material::Material;
+pub use scene::{SceneEnergy, SceneGarment, SceneLayers, SceneValue};
+pub use settings::{EnergySettings, LayerGate};
+pub use term::{Term, TermMap};

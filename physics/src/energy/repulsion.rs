@@ -1,0 +1,305 @@
+//! Repulsion: vertices of one garment that come close repel each other (paper, equation for L_r).
+//!
+//! `Σ −log d²` over unordered pairs of vertices that no edge joins and that are closer than a radius. The paper's weights
+//! and magnitudes need this sum divided by the number of vertices, which is the default; the printed form is a switch.
+//!
+//! **Near d = 0** the logarithm has no value. Below [`CONTACT_DISTANCE`] it continues as the line in `d²` that touches it
+//! there, `−log δ² + 1 − d²/δ²`: continuously differentiable, bounded, gradient at most `2/δ`; two vertices at one point
+//! have no direction to part in and get none from each other. **At the radius** the printed term jumps from 4.6 to 0; this
+//! is kept, and the gradient is that of the pairs inside.
+//!
+//! **No all-pairs work.** Vertices are sorted into cells of half the radius; the vertices of one cell share one list of
+//! candidates, which the inner loop runs through in fixed lanes. The logarithm is taken of products of up to 32 squared
+//! distances. Pairs joined by an edge are not looked for inside that loop but subtracted after it.
+
+use rayon::prelude::*;
+
+use super::cell_grid::CellGrid;
+use super::elements::GRAIN;
+use super::{GarmentState, GarmentTerm, Weighted};
+use crate::mesh::Topology;
+use crate::mesh::shapes::SplitMix;
+use crate::real::Real;
+use crate::vec3::{accumulate, axpy, from_f64, scale, sub, zero};
+
+/// δ [m]: below this distance, a fifth of the cloth's thickness, the logarithm continues as a line in `d²`.
+pub const CONTACT_DISTANCE: f64 = 1e-4;
+
+/// Candidates per step of the inner loop.
+const LANES: usize = 8;
+
+/// Steps after which the products of squared distances are turned into logarithms: four squares of at least δ² = 1e-8 stay
+/// above the smallest normal `f32`.
+const STEPS_PER_LOGARITHM: usize = 4;
+
+/// Seed of the random subset; fixed, so that the energy is a function of positions alone.
+const SUBSET_SEED: u64 = 0x5eed_0fc1_07c0_4b05;
+
+/// The repulsion energy of one garment.
+#[derive(Debug, Clone)]
+pub struct Repulsion {
+    radius: f64,
+    /// Factor on the sum over unordered pairs.
+    factor: f64,
+    pairs: Pairs,
+}
+
+#[derive(Debug, Clone)]
+enum Pairs {
+    /// All close pairs; per vertex those that do not count: itself and its neighbours.
+    All { excluded: Rows },
+    /// A fixed random sample; per vertex its partners, whichever of the two drew the other. A pair drawn twice counts twice.
+    Subset { partners: Rows },
+}
+
+/// Compressed rows of vertex indices.
+#[derive(Debug, Clone)]
+struct Rows {
+    offsets: Vec<u32>,
+    vertices: Vec<u32>,
+}
+
+impl Rows {
+    fn from_fn<I: IntoIterator<Item = u32>>(count: usize, row: impl Fn(usize) -> I) -> Self {
+        let (mut offsets, mut vertices) = (Vec::with_capacity(count + 1), Vec::new());
+        offsets.push(0);
+        for v in 0..count {
+            vertices.extend(row(v));
+            offsets.push(vertices.len() as u32);
+        }
+        Self { offsets, vertices }
+    }
+
+    #[inline(always)]
+    fn row(&self, v: usize) -> &[u32] {
+        &self.vertices[self.offsets[v] as usize..self.offsets[v + 1] as usize]
+    }
+}
+
+impl Repulsion {
+    /// Prepares the energy of a garment. `radius` [m]; `normalised`: divide by the number of vertices; `subset`: this many
+    /// random partners per vertex instead of all pairs, an unbiased estimate of their sum.
+    pub fn new(topology: &Topology, radius: f64, normalised: bool, subset: Option<usize>) -> Self {
+        let count = topology.vertex_count();
+        let mut factor = if normalised { 1.0 / count.max(1) as f64 } else { 1.0 };
+        let pairs = match subset {
+            // As many partners as there are others: nothing is saved.
+            Some(size) if size + 1 < count => {
+                // Each of the N−1 ordered partners of a vertex is drawn `size/(N−1)` times on average, and each unordered
+                // pair can be drawn from both ends.
+                factor *= (count - 1) as f64 / (2 * size) as f64;
+                Pairs::Subset { partners: draw_partners(topology, size) }
+            }
+            _ => {
+                let excluded = Rows::from_fn(count, |v| topology.ring(v).iter().copied().chain([v as u32]));
+                Pairs::All { excluded }
+            }
+        };
+        Self { radius, factor, pairs }
+    }
+
+    /// Energy at `positions` `[V, 3]` [m]; adds its weighted gradient to `target`. A vertex that is not finite repels
+    /// nothing.
+    pub fn evaluate<T: Real>(&self, positions: &[[T; 3]], target: Option<Weighted<'_, T>>) -> f64 {
+        let kernel = Kernel::<T>::new(self.radius);
+        let (twice, responses) = match &self.pairs {
+            Pairs::All { excluded } => all_pairs(positions, excluded, kernel),
+            Pairs::Subset { partners } => sampled_pairs(positions, partners, kernel),
+        };
+        if let Some(target) = target {
+            let weight = T::from_f64(target.weight * self.factor);
+            for (v, pull) in responses {
+                axpy(&mut target.gradient[v as usize], weight, pull);
+            }
+        }
+        // Every pair was met from both ends.
+        0.5 * self.factor * twice
+    }
+}
+
+impl<T: Real> GarmentTerm<T> for Repulsion {
+    fn evaluate(&self, state: &GarmentState<'_, T>, target: Option<Weighted<'_, T>>) -> f64 {
+        self.evaluate(state.posed, target)
+    }
+}
+
+fn draw_partners(topology: &Topology, size: usize) -> Rows {
+    let count = topology.vertex_count();
+    let mut random = SplitMix::new(SUBSET_SEED);
+    let mut lists: Vec<Vec<u32>> = vec![Vec::with_capacity(2 * size); count];
+    for v in 0..count {
+        for _ in 0..size {
+            // Uniform over the others: multiply-shift keeps the bias below 2⁻³².
+            let draw = ((u128::from(random.next_u64()) * (count - 1) as u128) >> 64) as usize;
+            let partner = if draw < v { draw } else { draw + 1 };
+            if !topology.are_adjacent(v as u32, partner as u32) {
+                lists[v].push(partner as u32);
+                lists[partner].push(v as u32);
+            }
+        }
+    }
+    for list in &mut lists {
+        list.sort_unstable();
+    }
+    Rows::from_fn(count, |v| lists[v].to_vec())
+}
+
+/// The pair energy in the caller's scalar.
+#[derive(Debug, Clone, Copy)]
+struct Kernel<T> {
+    radius: f64,
+    radius_squared: T,
+    contact_squared: T,
+}
+
+/// What one vertex collects from its partners: `Σ −log d²`, and the derivative with respect to its position.
+type VertexResponse<T> = (f64, [T; 3]);
+
+impl<T: Real> Kernel<T> {
+    fn new(radius: f64) -> Self {
+        Self {
+            radius,
+            radius_squared: T::from_f64(radius * radius),
+            contact_squared: T::from_f64(CONTACT_DISTANCE * CONTACT_DISTANCE),
+        }
+    }
+
+    /// One pair: energy and derivative with respect to `p`.
+    #[inline(always)]
+    fn pair(&self, p: [T; 3], q: [T; 3]) -> Option<VertexResponse<T>> {
+        let offset = sub(p, q);
+        let squared = crate::vec3::norm_squared(offset);
+        if squared >= self.radius_squared || squared.is_nan() {
+            return None;
+        }
+        let guarded = squared.max(self.contact_squared);
+        let excess = (guarded - squared).to_f64() / self.contact_squared.to_f64();
+        let energy = excess - guarded.to_f64().ln();
+        Some((energy, scale(offset, T::from_f64(-2.0) / guarded)))
+    }
+
+    /// All candidates, whose number is a multiple of [`LANES`], at once.
+    #[inline(always)]
+    fn candidates(&self, p: [T; 3], candidates: &Candidates<T>) -> VertexResponse<T> {
+        let mut pull = [[T::zero(); LANES]; 3];
+        let mut excess = [T::zero(); LANES];
+        let mut product = [T::one(); LANES];
+        let mut energy = 0.0;
+        let (xs, _) = candidates.x.as_chunks::<LANES>();
+        let (ys, _) = candidates.y.as_chunks::<LANES>();
+        let (zs, _) = candidates.z.as_chunks::<LANES>();
+        for (step, ((x, y), z)) in xs.iter().zip(ys).zip(zs).enumerate() {
+            for lane in 0..LANES {
+                let (dx, dy, dz) = (p[0] - x[lane], p[1] - y[lane], p[2] - z[lane]);
+                let squared = dx * dx + dy * dy + dz * dz;
+                let inside = squared < self.radius_squared;
+                let guarded = if squared > self.contact_squared { squared } else { self.contact_squared };
+                let inverse = guarded.recip();
+                let inverse = if inside { inverse } else { T::zero() };
+                pull[0][lane] += dx * inverse;
+                pull[1][lane] += dy * inverse;
+                pull[2][lane] += dz * inverse;
+                product[lane] *= if inside { guarded } else { T::one() };
+                excess[lane] += if inside { guarded - squared } else { T::zero() };
+            }
+            if step % STEPS_PER_LOGARITHM == STEPS_PER_LOGARITHM - 1 {
+                energy -= logarithm_of_product(product);
+                product = [T::one(); LANES];
+            }
+        }
+        energy -= logarithm_of_product(product);
+        let sum = |lanes: [T; LANES]| lanes.into_iter().map(Real::to_f64).sum::<f64>();
+        energy += sum(excess) / self.contact_squared.to_f64();
+        (energy, from_f64(pull.map(|lanes| -2.0 * sum(lanes))))
+    }
+}
+
+/// `log Π` of lanes that are each at least 1e-32: 1e-256 for eight.
+#[inline(always)]
+fn logarithm_of_product<T: Real>(product: [T; LANES]) -> f64 {
+    product.into_iter().map(Real::to_f64).product::<f64>().ln()
+}
+
+/// Coordinates of the vertices around a cell, padded with far points to a multiple of [`LANES`].
+#[derive(Debug, Default)]
+struct Candidates<T> {
+    x: Vec<T>,
+    y: Vec<T>,
+    z: Vec<T>,
+}
+
+impl<T: Real> Candidates<T> {
+    fn clear(&mut self) {
+        self.x.clear();
+        self.y.clear();
+        self.z.clear();
+    }
+
+    fn extend(&mut self, points: &[[T; 3]]) {
+        self.x.extend(points.iter().map(|p| p[0]));
+        self.y.extend(points.iter().map(|p| p[1]));
+        self.z.extend(points.iter().map(|p| p[2]));
+    }
+
+    fn pad(&mut self) {
+        // Finite, so that its offset times a zero weight is zero; its square is infinite or nearly so, hence outside.
+        let far = T::max_value().sqrt();
+        let padded = self.x.len().next_multiple_of(LANES);
+        self.x.resize(padded, far);
+        self.y.resize(padded, far);
+        self.z.resize(padded, far);
+    }
+}
+
+/// Twice the sum over close pairs and, per vertex, its derivative.
+fn all_pairs<T: Real>(positions: &[[T; 3]], excluded: &Rows, kernel: Kernel<T>) -> (f64, Vec<(u32, [T; 3])>) {
+    let grid = CellGrid::new(positions, kernel.radius);
+    let per_cell: Vec<Vec<VertexResponse<T>>> = (0..grid.cell_count())
+        .into_par_iter()
+        .map_init(Candidates::default, |candidates, cell| {
+            candidates.clear();
+            grid.for_each_range_around(cell, |range| candidates.extend(&grid.points[range]));
+            candidates.pad();
+            grid.range(cell)
+                .map(|k| {
+                    let p = grid.points[k];
+                    let (mut energy, mut pull) = kernel.candidates(p, candidates);
+                    for &v in excluded.row(grid.order[k] as usize) {
+                        if let Some((e, g)) = kernel.pair(p, positions[v as usize]) {
+                            energy -= e;
+                            pull = sub(pull, g);
+                        }
+                    }
+                    (energy, pull)
+                })
+                .collect()
+        })
+        .collect();
+    let responses = per_cell.iter().flatten();
+    let twice = responses.clone().map(|(energy, _)| energy).sum();
+    (twice, grid.order.iter().copied().zip(responses.map(|(_, pull)| *pull)).collect())
+}
+
+/// The same over the drawn pairs.
+fn sampled_pairs<T: Real>(
+    positions: &[[T; 3]],
+    partners: &Rows,
+    kernel: Kernel<T>,
+) -> (f64, Vec<(u32, [T; 3])>) {
+    let responses: Vec<VertexResponse<T>> = (0..positions.len())
+        .into_par_iter()
+        .with_min_len(GRAIN / 8)
+        .map(|v| {
+            let (mut energy, mut pull) = (0.0, zero());
+            for &partner in partners.row(v) {
+                if let Some((e, g)) = kernel.pair(positions[v], positions[partner as usize]) {
+                    energy += e;
+                    accumulate(&mut pull, g);
+                }
+            }
+            (energy, pull)
+        })
+        .collect();
+    let twice = responses.iter().map(|(energy, _)| energy).sum();
+    (twice, responses.into_iter().enumerate().map(|(v, (_, pull))| (v as u32, pull)).collect())
+}

@@ -1,0 +1,134 @@
+//! The switches and constants of the energies.
+
+use super::{EnergyError, Material};
+use crate::query::Distance;
+
+/// Which outer vertices take part in the layer collision.
+///
+/// As printed, the paper's term has no cut-off: past an open hem the nearest inner vertex lies sideways, and the distance
+/// along its normal is meaningless. The gate keeps vertices that have inner cloth under them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LayerGate {
+    /// Largest offset along the inner surface, in median edge lengths of the inner garment at rest.
+    pub tangential_edges: f64,
+    /// Largest |d| [m].
+    pub depth: f64,
+}
+
+impl Default for LayerGate {
+    fn default() -> Self {
+        Self { tangential_edges: 0.75, depth: 0.05 }
+    }
+}
+
+/// Everything that the energies leave open, apart from their weights.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EnergySettings {
+    /// The cloth of all garments.
+    pub material: Material,
+    /// Margin ε between garment and body [m]; paper: 0.002.
+    pub body_collision_epsilon: f64,
+    /// Margin ε between two garments [m]; paper: 0.002.
+    pub layer_collision_epsilon: f64,
+    /// How the distance to the body is measured; paper: nearest vertex.
+    pub distance: Distance,
+    /// Vertices of one garment repel each other below this distance [m]; paper: 0.1.
+    pub repulsion_radius: f64,
+    /// Whether the repulsion is divided by the number of vertices, which the paper's magnitudes need; off: as printed.
+    pub repulsion_normalised: bool,
+    /// Random partners per vertex instead of all close pairs: an unbiased estimate of the same sum over a subset that is
+    /// drawn once, from a fixed seed. `None` (default): all pairs.
+    pub repulsion_subset: Option<usize>,
+    /// Gravitational acceleration [m/s²], along −y.
+    pub gravity_acceleration: f64,
+    /// Which outer vertices the layer collision counts; `None`: all, as printed in the paper.
+    pub layer_gate: Option<LayerGate>,
+    /// The layer distance counts vertices closer to the body than this [m]; paper: 0.1.
+    pub layer_distance_radius: f64,
+    /// Share of the vertices, highest at rest first, that the holding energy holds; paper: 0.1.
+    pub holding_fraction: f64,
+}
+
+impl Default for EnergySettings {
+    fn default() -> Self {
+        Self {
+            material: Material::default(),
+            body_collision_epsilon: 0.002,
+            layer_collision_epsilon: 0.002,
+            distance: Distance::NearestVertex,
+            repulsion_radius: 0.1,
+            repulsion_normalised: true,
+            repulsion_subset: None,
+            gravity_acceleration: 9.81,
+            layer_gate: Some(LayerGate::default()),
+            layer_distance_radius: 0.1,
+            holding_fraction: 0.1,
+        }
+    }
+}
+
+impl EnergySettings {
+    /// The paper's printed form of every term (repulsion over `N`, which its magnitudes need): what a score reports.
+    pub fn printed() -> Self {
+        Self { layer_gate: None, ..Self::default() }
+    }
+
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// [`EnergyError::Setting`] names the first that is out of range.
+    pub fn check(&self) -> Result<(), EnergyError> {
+        let gate = self.layer_gate.unwrap_or_default();
+        let not_negative = [
+            ("material.density", self.material.density),
+            ("material.mu", self.material.mu),
+            ("material.lambda", self.material.lambda),
+            ("material.bending_stiffness", self.material.bending_stiffness),
+            ("body_collision_epsilon", self.body_collision_epsilon),
+            ("layer_collision_epsilon", self.layer_collision_epsilon),
+            ("gravity_acceleration", self.gravity_acceleration),
+            ("layer_distance_radius", self.layer_distance_radius),
+        ];
+        for (setting, value) in not_negative {
+            if !(value.is_finite() && value >= 0.0) {
+                return Err(EnergyError::Setting { setting, value, expected: "finite and not negative" });
+            }
+        }
+        let positive = [
+            ("material.thickness", self.material.thickness),
+            ("repulsion_radius", self.repulsion_radius),
+            ("layer_gate.tangential_edges", gate.tangential_edges),
+            ("layer_gate.depth", gate.depth),
+        ];
+        for (setting, value) in positive {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(EnergyError::Setting { setting, value, expected: "finite and greater than 0" });
+            }
+        }
+        if !(0.0..=1.0).contains(&self.holding_fraction) {
+            let (setting, value) = ("holding_fraction", self.holding_fraction);
+            return Err(EnergyError::Setting { setting, value, expected: "between 0 and 1" });
+        }
+        if self.repulsion_subset == Some(0) {
+            let expected = "at least 1 partner per vertex, or left out for all pairs";
+            return Err(EnergyError::Setting { setting: "repulsion_subset", value: 0.0, expected });
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_is_valid_and_bad_values_are_named() {
+        assert_eq!(EnergySettings::default().check(), Ok(()));
+        let bad = EnergySettings { repulsion_radius: f64::NAN, ..EnergySettings::default() };
+        assert!(matches!(bad.check(), Err(EnergyError::Setting { setting: "repulsion_radius", .. })));
+        let bad = EnergySettings { holding_fraction: 1.5, ..EnergySettings::default() };
+        assert!(matches!(bad.check(), Err(EnergyError::Setting { setting: "holding_fraction", .. })));
+        let bad = EnergySettings { repulsion_subset: Some(0), ..EnergySettings::default() };
+        assert!(matches!(bad.check(), Err(EnergyError::Setting { setting: "repulsion_subset", .. })));
+    }
+}

@@ -1,0 +1,132 @@
+//! Strain: the Saint Venant–Kirchhoff membrane energy (paper, equation for L_s).
+//!
+//! `Σ area·thickness·(λ/2 tr(G)² + μ tr(G²))` over triangles, with Green's strain `G = ½(FᵀF − I)` and the deformation
+//! gradient `F` from the rest triangle to the deformed one. A polynomial in the positions: inverted and collapsed triangles
+//! need no special care.
+//!
+//! **Degenerate rest triangles.** `F` divides by the height of the rest triangle, so a needle would be a spring of
+//! unbounded stiffness. Its height is therefore taken as at least [`NEEDLE_RATIO`] of its longest edge, and that edge as at
+//! least [`NEEDLE_RATIO`] of the garment's median edge, while the volume stays the true one: a triangle without area has no
+//! energy. To remain at rest in its rest shape all the same, such a triangle measures `G = ½(FᵀF − F₀ᵀF₀)`, `F₀` being
+//! its `F` in the rest shape; for every other triangle `F₀ᵀF₀ = I`.
+
+use super::elements::{Incidence, Response, sum_elements};
+use super::{GarmentState, GarmentTerm, Material, Weighted};
+use crate::mesh::TriMesh;
+use crate::real::Real;
+use crate::vec3::{add, add_scaled, dot, norm, scale, sub, to_f64};
+
+/// Rest triangles flatter than this ratio of height to longest edge are measured as if they had it.
+pub const NEEDLE_RATIO: f64 = 1e-2;
+
+/// The strain energy of one garment.
+#[derive(Debug, Clone)]
+pub struct Strain {
+    mu: f64,
+    lambda: f64,
+    triangles: Vec<RestTriangle>,
+    incidence: Incidence,
+}
+
+/// A rest triangle in a frame whose first axis is its longest edge, corner 0 → corner 1.
+#[derive(Debug, Clone, Copy)]
+struct RestTriangle {
+    /// The face's vertices, turned so that the longest edge comes first.
+    corners: [u32; 3],
+    /// Area × thickness [m³].
+    volume: f64,
+    /// The upper triangle `(0,0), (0,1), (1,1)` of the inverse of the 2×2 matrix of rest edges [1/m].
+    inverse: [f64; 3],
+    /// `F₀ᵀF₀`: entries 11, 12, 22.
+    metric: [f64; 3],
+}
+
+impl RestTriangle {
+    fn new(positions: &[[f64; 3]], face: [u32; 3], thickness: f64, median_edge: f64) -> Self {
+        let length = |k: usize| norm(sub(positions[face[(k + 1) % 3] as usize], positions[face[k] as usize]));
+        let lengths = [length(0), length(1), length(2)];
+        let first = (0..3).max_by(|&a, &b| lengths[a].total_cmp(&lengths[b])).unwrap_or(0);
+        let corners = [0, 1, 2].map(|k| face[(first + k) % 3]);
+        let [a, b, c] = corners.map(|v| positions[v as usize]);
+        let (base, side) = (sub(b, a), sub(c, a));
+        let area = 0.5 * norm(crate::vec3::cross(base, side));
+
+        let true_length = lengths[first];
+        let along = if true_length > 0.0 { dot(side, base) / true_length } else { 0.0 };
+        let true_height = if true_length > 0.0 { 2.0 * area / true_length } else { 0.0 };
+        let length = true_length.max(NEEDLE_RATIO * median_edge);
+        let height = true_height.max(NEEDLE_RATIO * length);
+
+        let mut triangle = Self {
+            corners,
+            volume: area * thickness,
+            inverse: [1.0 / length, -along / (length * height), 1.0 / height],
+            metric: [1.0, 0.0, 1.0],
+        };
+        if length > true_length || height > true_height {
+            let [f1, f2] = triangle.deformation_gradient(base, side);
+            triangle.metric = [dot(f1, f1), dot(f1, f2), dot(f2, f2)];
+        }
+        triangle
+    }
+
+    /// The two columns of `F` for deformed edges 0 → 1 and 0 → 2.
+    #[inline(always)]
+    fn deformation_gradient(&self, base: [f64; 3], side: [f64; 3]) -> [[f64; 3]; 2] {
+        let [i00, i01, i11] = self.inverse;
+        [scale(base, i00), add_scaled(scale(base, i01), i11, side)]
+    }
+
+    #[inline(always)]
+    fn response<T: Real>(&self, positions: &[[T; 3]], mu: f64, lambda: f64) -> Response<T, 3> {
+        let [a, b, c] = self.corners.map(|v| to_f64(positions[v as usize]));
+        let [f1, f2] = self.deformation_gradient(sub(b, a), sub(c, a));
+        let g11 = 0.5 * (dot(f1, f1) - self.metric[0]);
+        let g12 = 0.5 * (dot(f1, f2) - self.metric[1]);
+        let g22 = 0.5 * (dot(f2, f2) - self.metric[2]);
+        let trace = g11 + g22;
+        let density = 0.5 * lambda * trace * trace + mu * (g11 * g11 + 2.0 * g12 * g12 + g22 * g22);
+
+        // ∂E/∂F = volume·F·S with the second Piola–Kirchhoff stress S = λ tr(G) I + 2μ G; F is linear in the edges.
+        let s11 = self.volume * (lambda * trace + 2.0 * mu * g11);
+        let s12 = self.volume * 2.0 * mu * g12;
+        let s22 = self.volume * (lambda * trace + 2.0 * mu * g22);
+        let p1 = add_scaled(scale(f1, s11), s12, f2);
+        let p2 = add_scaled(scale(f1, s12), s22, f2);
+        let [i00, i01, i11] = self.inverse;
+        let at_b = add_scaled(scale(p1, i00), i01, p2);
+        let at_c = scale(p2, i11);
+        let at_a = scale(add(at_b, at_c), -1.0);
+        Response { energy: self.volume * density, gradient: [at_a, at_b, at_c].map(crate::vec3::from_f64) }
+    }
+}
+
+impl Strain {
+    /// Prepares the energy of a garment with rest shape `rest`.
+    pub fn new(rest: &TriMesh, material: &Material) -> Self {
+        Self::with_median_edge(rest, material, rest.median_edge_length())
+    }
+
+    pub(super) fn with_median_edge(rest: &TriMesh, material: &Material, median_edge: f64) -> Self {
+        let triangles: Vec<RestTriangle> = rest
+            .faces()
+            .iter()
+            .map(|&face| RestTriangle::new(rest.positions(), face, material.thickness, median_edge))
+            .collect();
+        let corners: Vec<[u32; 3]> = triangles.iter().map(|t| t.corners).collect();
+        let incidence = Incidence::new(rest.vertex_count(), &corners);
+        Self { mu: material.mu, lambda: material.lambda, triangles, incidence }
+    }
+
+    /// Energy [J] at `positions` `[V, 3]` [m]; adds its weighted gradient to `target`.
+    pub fn evaluate<T: Real>(&self, positions: &[[T; 3]], target: Option<Weighted<'_, T>>) -> f64 {
+        let element = |t: usize| self.triangles[t].response(positions, self.mu, self.lambda);
+        sum_elements(self.triangles.len(), &self.incidence, element, target)
+    }
+}
+
+impl<T: Real> GarmentTerm<T> for Strain {
+    fn evaluate(&self, state: &GarmentState<'_, T>, target: Option<Weighted<'_, T>>) -> f64 {
+        self.evaluate(state.posed, target)
+    }
+}

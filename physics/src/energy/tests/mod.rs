@@ -1,0 +1,8 @@
+//! What all energies must hold. Every test here walks [`super::Term::ALL`] or names the terms it is about.
+
+mod brute_force;
+mod determinism;
+mod finite_differences;
+mod hard_cases;
+mod invariance;
+pub(crate) mod scenes;

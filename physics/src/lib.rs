@@ -1,0 +1,30 @@
+//! Meshes, surface operators, closest-point queries and the physical energies of learned garment draping.
+//!
+//! The crate knows no files and no networks. Everything is SI (metres, kilograms, seconds, joules), positions are
+//! `[T; 3]` with `T` either `f32` or `f64` (trait [`Real`]), and every sum has a fixed order, so that results do not
+//! depend on the number of threads.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`mesh`] | validated triangle mesh, normals, topology, analytic test shapes |
+//! | [`operators`] | the DiffusionNet precompute: mass, Laplacian, gradients, eigenbasis |
+//! | [`energy`] | the eight energies, their gradients, and the weighted sum over a scene |
+//! | [`contact`] | penetration of the body, order of layers |
+//! | [`query`] | nearest vertex and closest surface point, accelerated, with brute-force oracles |
+//! | `autodiff` | the energies as one differentiable burn operation (feature `autodiff`) |
+
+#[cfg(feature = "autodiff")]
+pub mod autodiff;
+pub mod contact;
+pub mod energy;
+pub mod mesh;
+pub mod operators;
+pub mod query;
+pub mod real;
+pub mod vec3;
+
+pub use energy::{EnergyError, EnergySettings, GarmentEnergies, SceneEnergy, SceneValue, Term, TermMap};
+pub use mesh::{Hinge, MeshError, Topology, TriMesh, vertex_normals};
+pub use operators::{OperatorError, SurfaceOperators};
+pub use query::{Distance, Gap, Surface, VertexIndex};
+pub use real::Real;

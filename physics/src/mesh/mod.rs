@@ -1,0 +1,10 @@
+//! Triangle meshes: validated storage, normals, topology, and analytic shapes for tests.
+
+mod normals;
+pub mod shapes;
+mod topology;
+mod tri_mesh;
+
+pub use normals::{face_normal_area, vertex_normals};
+pub use topology::{Hinge, Topology};
+pub use tri_mesh::{MeshError, TriMesh};

@@ -1,0 +1,121 @@
+//! Sparse matrices in compressed rows.
+
+/// A sparse matrix in compressed-row form; within a row, columns ascend and are unique.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SparseMatrix {
+    columns_count: usize,
+    offsets: Vec<u32>,
+    columns: Vec<u32>,
+    values: Vec<f64>,
+}
+
+impl SparseMatrix {
+    /// Builds from `(row, column, value)` entries; entries at the same place are summed in the order given.
+    ///
+    /// # Panics
+    /// If an entry lies outside `rows × columns_count`.
+    pub fn from_triplets(rows: usize, columns_count: usize, mut triplets: Vec<(u32, u32, f64)>) -> Self {
+        // A stable sort keeps the order of summation, hence every bit of the result.
+        triplets.sort_by_key(|&(row, column, _)| (row, column));
+        let mut offsets = vec![0u32; rows + 1];
+        let mut columns: Vec<u32> = Vec::with_capacity(triplets.len());
+        let mut values: Vec<f64> = Vec::with_capacity(triplets.len());
+        let mut last = None;
+        for (row, column, value) in triplets {
+            assert!((row as usize) < rows && (column as usize) < columns_count, "entry outside the matrix");
+            if last == Some((row, column)) {
+                if let Some(sum) = values.last_mut() {
+                    *sum += value;
+                }
+            } else {
+                columns.push(column);
+                values.push(value);
+                offsets[row as usize + 1] += 1;
+                last = Some((row, column));
+            }
+        }
+        for row in 0..rows {
+            offsets[row + 1] += offsets[row];
+        }
+        Self { columns_count, offsets, columns, values }
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.offsets.len() - 1
+    }
+
+    /// Number of columns.
+    pub fn columns(&self) -> usize {
+        self.columns_count
+    }
+
+    /// Number of stored entries.
+    pub fn entry_count(&self) -> usize {
+        self.values.len()
+    }
+
+    /// Column indices and values of one row.
+    pub fn row(&self, row: usize) -> (&[u32], &[f64]) {
+        let range = self.offsets[row] as usize..self.offsets[row + 1] as usize;
+        (&self.columns[range.clone()], &self.values[range])
+    }
+
+    /// The entry at `(row, column)`, zero where none is stored.
+    pub fn get(&self, row: usize, column: u32) -> f64 {
+        let (columns, values) = self.row(row);
+        columns.binary_search(&column).map_or(0.0, |at| values[at])
+    }
+
+    /// The product with a vector of `columns()` values.
+    pub fn apply(&self, x: &[f64]) -> Vec<f64> {
+        self.apply_columns(x, 1)
+    }
+
+    /// The product with a dense row-major matrix `[columns(), width]`; `[rows(), width]` row-major.
+    pub fn apply_columns(&self, x: &[f64], width: usize) -> Vec<f64> {
+        let mut result = vec![0.0; self.rows() * width];
+        if width == 0 {
+            return result;
+        }
+        for (row, out) in result.chunks_exact_mut(width).enumerate() {
+            let (columns, values) = self.row(row);
+            for (&column, &value) in columns.iter().zip(values) {
+                let from = &x[column as usize * width..][..width];
+                for (o, &f) in out.iter_mut().zip(from) {
+                    *o += value * f;
+                }
+            }
+        }
+        result
+    }
+
+    pub(super) fn offsets(&self) -> &[u32] {
+        &self.offsets
+    }
+
+    pub(super) fn column_indices(&self) -> &[u32] {
+        &self.columns
+    }
+
+    pub(super) fn values(&self) -> &[f64] {
+        &self.values
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn triplets_are_summed_and_sorted() {
+        let matrix =
+            SparseMatrix::from_triplets(3, 2, vec![(2, 1, 4.0), (0, 1, 1.0), (0, 0, 2.0), (2, 1, -1.5)]);
+        assert_eq!((matrix.rows(), matrix.columns(), matrix.entry_count()), (3, 2, 3));
+        assert_eq!(matrix.row(0), (&[0, 1][..], &[2.0, 1.0][..]));
+        assert_eq!(matrix.row(1).0.len(), 0);
+        assert_eq!((matrix.get(2, 1), matrix.get(2, 0)), (2.5, 0.0));
+        assert_eq!(matrix.apply(&[10.0, 100.0]), [120.0, 0.0, 250.0]);
+        assert_eq!(matrix.apply_columns(&[1.0, 0.0, 0.0, 1.0], 2), [2.0, 1.0, 0.0, 0.0, 0.0, 2.5]);
+    }
+}

@@ -1,0 +1,98 @@
+//! The same queries without an accelerator, in O(V) or O(F) each: the oracles that the fast ones are tested against.
+
+use crate::query::closest_point::{closest_on_triangle, pseudo_normals};
+use crate::query::{Distance, Gap};
+use crate::real::Real;
+use crate::vec3;
+
+/// Index and squared distance of the nearest point; the lowest index of several equally near. `(u32::MAX, ∞)` for no points.
+pub fn nearest<T: Real>(points: &[[T; 3]], p: [T; 3]) -> (u32, T) {
+    let mut best = (u32::MAX, T::infinity());
+    for (index, point) in points.iter().enumerate() {
+        let distance = vec3::distance_squared(*point, p);
+        if distance < best.1 {
+            best = (index as u32, distance);
+        }
+    }
+    best
+}
+
+/// Indices of the points at most `radius` from `p`, ascending.
+pub fn within<T: Real>(points: &[[T; 3]], p: [T; 3], radius: T) -> Vec<u32> {
+    (0..points.len() as u32)
+        .filter(|&i| vec3::distance_squared(points[i as usize], p) <= radius * radius)
+        .collect()
+}
+
+/// Distance (m) from `p` to the closest point of any triangle; infinite without a face.
+pub fn distance_to_surface(positions: &[[f64; 3]], faces: &[[u32; 3]], p: [f64; 3]) -> f64 {
+    faces
+        .iter()
+        .map(|face| closest_on_triangle(p, face.map(|v| positions[v as usize])).distance_squared)
+        .fold(f64::INFINITY, f64::min)
+        .sqrt()
+}
+
+/// Generalised winding number of a surface about `p`: the sum of the signed solid angles of its triangles over 4π (Van
+/// Oosterom and Strackee 1983). 1 inside a closed surface and 0 outside; independent of every closest point and normal.
+pub fn winding_number(positions: &[[f64; 3]], faces: &[[u32; 3]], p: [f64; 3]) -> f64 {
+    let solid_angle: f64 = faces
+        .iter()
+        .map(|face| {
+            let [a, b, c] = face.map(|v| vec3::sub(positions[v as usize], p));
+            let (la, lb, lc) = (vec3::norm(a), vec3::norm(b), vec3::norm(c));
+            let numerator = vec3::dot(a, vec3::cross(b, c));
+            let denominator =
+                la * lb * lc + vec3::dot(a, b) * lc + vec3::dot(b, c) * la + vec3::dot(c, a) * lb;
+            2.0 * numerator.atan2(denominator)
+        })
+        .sum();
+    solid_angle / (4.0 * std::f64::consts::PI)
+}
+
+/// [`crate::Surface::gap`] by exhaustive search (in `f64`; `normals` are area-weighted vertex normals).
+///
+/// # Panics
+/// If the surface has no vertex, or no face under [`Distance::ClosestPoint`].
+pub fn gap(
+    positions: &[[f64; 3]],
+    faces: &[[u32; 3]],
+    normals: &[[f64; 3]],
+    p: [f64; 3],
+    distance: Distance,
+) -> Gap<f64> {
+    match distance {
+        Distance::NearestVertex => {
+            let (vertex, _) = nearest(positions, p);
+            let (position, normal) = (positions[vertex as usize], normals[vertex as usize]);
+            Gap { gap: vec3::dot(vec3::sub(p, position), normal), gradient: normal, vertex }
+        }
+        Distance::ClosestPoint => {
+            let (at_vertex, at_edge) = pseudo_normals(positions, faces);
+            let (index, found) = faces
+                .iter()
+                .map(|face| closest_on_triangle(p, face.map(|v| positions[v as usize])))
+                .enumerate()
+                .min_by(|a, b| a.1.distance_squared.total_cmp(&b.1.distance_squared))
+                .expect("a surface has faces");
+            let face = faces[index];
+            let normal = match found.feature {
+                super::Feature::Vertex(corner) => at_vertex[face[corner] as usize],
+                super::Feature::Edge(edge) => at_edge[index][edge],
+                super::Feature::Face => {
+                    let [a, b, c] = face.map(|v| positions[v as usize]);
+                    vec3::normalized(vec3::cross(vec3::sub(b, a), vec3::sub(c, a)))
+                }
+            };
+            let offset = vec3::sub(p, found.position);
+            let sign = if vec3::dot(offset, normal) < 0.0 { -1.0 } else { 1.0 };
+            let corner =
+                (0..3).max_by(|&i, &j| found.barycentric[i].total_cmp(&found.barycentric[j])).unwrap_or(0);
+            Gap {
+                gap: sign * found.distance_squared.sqrt(),
+                gradient: vec3::scale(vec3::normalized(offset), sign),
+                vertex: face[corner],
+            }
+        }
+    }
+}

@@ -1,0 +1,377 @@
+//! Closest point on a triangle surface with its pseudo-normal, on a bounding-volume tree.
+//!
+//! The angle-weighted pseudo-normal gives the right sign of the distance wherever the closest point lies: inside a face, on
+//! an edge or at a vertex (Bærentzen and Aanæs, "Signed distance computation using the angle weighted pseudonormal", IEEE
+//! TVCG 2005). All of it is `f64`, whatever the caller's scalar: the sign must not depend on rounding.
+
+use std::collections::HashMap;
+
+use parry3d_f64::bounding_volume::Aabb;
+use parry3d_f64::math::Vector;
+use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
+
+use crate::vec3;
+
+/// Part of a triangle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Feature {
+    /// Corner 0, 1 or 2.
+    Vertex(usize),
+    /// Edge `e` from corner `e` to corner `(e + 1) % 3`.
+    Edge(usize),
+    /// The inside of the triangle.
+    Face,
+}
+
+/// The point of a surface closest to a query point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfacePoint {
+    /// Where it is (m).
+    pub position: [f64; 3],
+    /// Squared distance from the query point (m²).
+    pub distance_squared: f64,
+    /// The face it lies on; one of them when it lies on an edge or a vertex.
+    pub face: u32,
+    /// Barycentric coordinates in that face; non-negative, sum 1.
+    pub barycentric: [f64; 3],
+    /// Unit pseudo-normal of the feature it lies on; zero where every incident face has no area.
+    pub normal: [f64; 3],
+}
+
+/// Accelerated closest-point queries on one fixed surface.
+pub struct ClosestPoint {
+    positions: Vec<[f64; 3]>,
+    faces: Vec<[u32; 3]>,
+    bvh: Bvh,
+    vertex_normals: Vec<[f64; 3]>,
+    /// Pseudo-normals of a face's three edges.
+    edge_normals: Vec<[[f64; 3]; 3]>,
+}
+
+impl std::fmt::Debug for ClosestPoint {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("ClosestPoint")
+            .field("vertices", &self.positions.len())
+            .field("faces", &self.faces.len())
+            .finish_non_exhaustive()
+    }
+}
+
+impl ClosestPoint {
+    /// Builds the tree and the pseudo-normals. `positions` `[V, 3]` (m), `faces` `[F, 3]` with every index below `V`.
+    ///
+    /// Faces with a corner that is not finite are left out: nothing is ever closest to them.
+    pub fn new(positions: Vec<[f64; 3]>, faces: &[[u32; 3]]) -> Self {
+        let faces: Vec<[u32; 3]> = faces
+            .iter()
+            .copied()
+            .filter(|face| face.iter().all(|&v| vec3::is_finite(positions[v as usize])))
+            .collect();
+        let boxes: Vec<Aabb> = faces
+            .iter()
+            .map(|face| {
+                let corners = face.map(|v| Vector::from_array(positions[v as usize]));
+                Aabb::new(
+                    corners[0].min(corners[1]).min(corners[2]),
+                    corners[0].max(corners[1]).max(corners[2]),
+                )
+            })
+            .collect();
+        let bvh = Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes);
+        let (vertex_normals, edge_normals) = pseudo_normals(&positions, &faces);
+        Self { positions, faces, bvh, vertex_normals, edge_normals }
+    }
+
+    /// The closest point of the surface; `None` for a query that is not finite or a surface without a face.
+    pub fn project(&self, p: [f64; 3]) -> Option<SurfacePoint> {
+        if !vec3::is_finite(p) {
+            return None;
+        }
+        let (face, _) = self.bvh.find_best(
+            f64::MAX,
+            |node, _| box_distance_squared(p, node.mins().to_array(), node.maxs().to_array()),
+            |face, _| Some(closest_on_triangle(p, self.corners(face)).distance_squared),
+        )?;
+        let found = closest_on_triangle(p, self.corners(face));
+        Some(SurfacePoint {
+            position: found.position,
+            distance_squared: found.distance_squared,
+            face,
+            barycentric: found.barycentric,
+            normal: self.feature_normal(face, found.feature),
+        })
+    }
+
+    /// Vertex indices of a face as numbered in [`SurfacePoint::face`].
+    pub fn face(&self, face: u32) -> [u32; 3] {
+        self.faces[face as usize]
+    }
+
+    fn corners(&self, face: u32) -> [[f64; 3]; 3] {
+        self.faces[face as usize].map(|v| self.positions[v as usize])
+    }
+
+    fn feature_normal(&self, face: u32, feature: Feature) -> [f64; 3] {
+        let corners = self.faces[face as usize];
+        match feature {
+            Feature::Vertex(corner) => self.vertex_normals[corners[corner] as usize],
+            Feature::Edge(edge) => self.edge_normals[face as usize][edge],
+            Feature::Face => {
+                let [a, b, c] = self.corners(face);
+                vec3::normalized(vec3::cross(vec3::sub(b, a), vec3::sub(c, a)))
+            }
+        }
+    }
+}
+
+/// What [`closest_on_triangle`] found.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct TrianglePoint {
+    pub position: [f64; 3],
+    pub distance_squared: f64,
+    pub barycentric: [f64; 3],
+    pub feature: Feature,
+}
+
+/// Closest point of a triangle by Voronoi regions (Ericson, *Real-Time Collision Detection*, §5.1.5).
+///
+/// The region tests divide by the area; a triangle thinner than 1e-12 of its length is measured as its three edges instead,
+/// which is exact for it.
+pub(super) fn closest_on_triangle(p: [f64; 3], [a, b, c]: [[f64; 3]; 3]) -> TrianglePoint {
+    let (ab, ac, bc) = (vec3::sub(b, a), vec3::sub(c, a), vec3::sub(c, b));
+    let longest = vec3::norm_squared(ab).max(vec3::norm_squared(ac)).max(vec3::norm_squared(bc));
+    if vec3::norm_squared(vec3::cross(ab, ac)) <= 1e-24 * longest * longest {
+        return closest_on_edges(p, [a, b, c]);
+    }
+    let at = |barycentric: [f64; 3], feature| {
+        let position =
+            std::array::from_fn(|k| a[k] * barycentric[0] + b[k] * barycentric[1] + c[k] * barycentric[2]);
+        TrianglePoint {
+            position,
+            distance_squared: vec3::distance_squared(p, position),
+            barycentric,
+            feature,
+        }
+    };
+    let ap = vec3::sub(p, a);
+    let (d1, d2) = (vec3::dot(ab, ap), vec3::dot(ac, ap));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return at([1.0, 0.0, 0.0], Feature::Vertex(0));
+    }
+    let bp = vec3::sub(p, b);
+    let (d3, d4) = (vec3::dot(ab, bp), vec3::dot(ac, bp));
+    if d3 >= 0.0 && d4 <= d3 {
+        return at([0.0, 1.0, 0.0], Feature::Vertex(1));
+    }
+    let vc = d1 * d4 - d3 * d2;
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        let t = d1 / (d1 - d3);
+        return at([1.0 - t, t, 0.0], Feature::Edge(0));
+    }
+    let cp = vec3::sub(p, c);
+    let (d5, d6) = (vec3::dot(ab, cp), vec3::dot(ac, cp));
+    if d6 >= 0.0 && d5 <= d6 {
+        return at([0.0, 0.0, 1.0], Feature::Vertex(2));
+    }
+    let vb = d5 * d2 - d1 * d6;
+    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        let t = d2 / (d2 - d6);
+        return at([1.0 - t, 0.0, t], Feature::Edge(2));
+    }
+    let va = d3 * d6 - d5 * d4;
+    if va <= 0.0 && d4 >= d3 && d5 >= d6 {
+        let t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+        return at([0.0, 1.0 - t, t], Feature::Edge(1));
+    }
+    let sum = va + vb + vc;
+    let (v, w) = (vb / sum, vc / sum);
+    at([1.0 - v - w, v, w], Feature::Face)
+}
+
+/// Closest point of the three edges; safe for edges of length zero.
+fn closest_on_edges(p: [f64; 3], corners: [[f64; 3]; 3]) -> TrianglePoint {
+    let mut best: Option<TrianglePoint> = None;
+    for edge in 0..3 {
+        let next = (edge + 1) % 3;
+        let along = vec3::sub(corners[next], corners[edge]);
+        let length_squared = vec3::norm_squared(along);
+        let t = if length_squared > 0.0 {
+            (vec3::dot(vec3::sub(p, corners[edge]), along) / length_squared).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
+        let position = vec3::add_scaled(corners[edge], t, along);
+        let distance_squared = vec3::distance_squared(p, position);
+        if best.is_none_or(|b| distance_squared < b.distance_squared) {
+            let mut barycentric = [0.0; 3];
+            barycentric[edge] = 1.0 - t;
+            barycentric[next] = t;
+            let feature = match t {
+                0.0 => Feature::Vertex(edge),
+                1.0 => Feature::Vertex(next),
+                _ => Feature::Edge(edge),
+            };
+            best = Some(TrianglePoint { position, distance_squared, barycentric, feature });
+        }
+    }
+    best.unwrap_or(TrianglePoint {
+        position: corners[0],
+        distance_squared: vec3::distance_squared(p, corners[0]),
+        barycentric: [1.0, 0.0, 0.0],
+        feature: Feature::Vertex(0),
+    })
+}
+
+/// Angle-weighted vertex normals `[V]` and, per face, the normals of its edges: the sum of the unit normals of all faces that
+/// share the edge. A sum that vanishes on an edge is replaced by that of its ends.
+pub(super) fn pseudo_normals(
+    positions: &[[f64; 3]],
+    faces: &[[u32; 3]],
+) -> (Vec<[f64; 3]>, Vec<[[f64; 3]; 3]>) {
+    let key = |a: u32, b: u32| (a.min(b), a.max(b));
+    let mut at_vertex = vec![[0.0; 3]; positions.len()];
+    let mut at_edge: HashMap<(u32, u32), [f64; 3]> = HashMap::with_capacity(2 * faces.len());
+    for face in faces {
+        let [a, b, c] = face.map(|v| positions[v as usize]);
+        let normal = vec3::normalized(vec3::cross(vec3::sub(b, a), vec3::sub(c, a)));
+        for corner in 0..3 {
+            let [here, next, previous] = [0, 1, 2].map(|step| face[(corner + step) % 3]);
+            let along = vec3::sub(positions[next as usize], positions[here as usize]);
+            let back = vec3::sub(positions[previous as usize], positions[here as usize]);
+            let angle = vec3::norm(vec3::cross(along, back)).atan2(vec3::dot(along, back));
+            vec3::axpy(&mut at_vertex[here as usize], angle, normal);
+            vec3::accumulate(at_edge.entry(key(here, next)).or_insert([0.0; 3]), normal);
+        }
+    }
+    for normal in &mut at_vertex {
+        *normal = vec3::normalized(*normal);
+    }
+    let edge_normals = faces
+        .iter()
+        .map(|face| {
+            std::array::from_fn(|edge| {
+                let (from, to) = (face[edge], face[(edge + 1) % 3]);
+                let normal = vec3::normalized(at_edge.get(&key(from, to)).copied().unwrap_or([0.0; 3]));
+                if normal == [0.0; 3] {
+                    vec3::normalized(vec3::add(at_vertex[from as usize], at_vertex[to as usize]))
+                } else {
+                    normal
+                }
+            })
+        })
+        .collect();
+    (at_vertex, edge_normals)
+}
+
+fn box_distance_squared(p: [f64; 3], low: [f64; 3], high: [f64; 3]) -> f64 {
+    vec3::norm_squared(std::array::from_fn(|k| (low[k] - p[k]).max(p[k] - high[k]).max(0.0)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::TriMesh;
+    use crate::mesh::shapes::{self, SplitMix};
+    use crate::query::brute_force;
+
+    fn queries(count: usize, extent: f64, seed: u64) -> Vec<[f64; 3]> {
+        let mut random = SplitMix::new(seed);
+        (0..count).map(|_| std::array::from_fn(|_| extent * random.symmetric())).collect()
+    }
+
+    /// A closed surface with sharp convex and concave edges: vertex and edge signs need the pseudo-normal here.
+    fn spiky() -> TriMesh {
+        let sphere = shapes::icosphere(0.5, 2);
+        let mut at = 0usize;
+        let positions = sphere
+            .positions()
+            .iter()
+            .map(|p| {
+                at += 1;
+                vec3::scale(*p, if at.is_multiple_of(3) { 1.7 } else { 0.7 })
+            })
+            .collect();
+        sphere.with_positions(positions).unwrap()
+    }
+
+    #[test]
+    fn distance_equals_brute_force() {
+        for mesh in [spiky(), shapes::tube(0.3, 0.8, 14, 9), shapes::irregular_grid(1.0, 1.0, 9, 9, 0.4, 3)] {
+            let closest = ClosestPoint::new(mesh.positions().to_vec(), mesh.faces());
+            for p in queries(300, 1.0, 7) {
+                let found = closest.project(p).unwrap();
+                let expected = brute_force::distance_to_surface(mesh.positions(), mesh.faces(), p);
+                assert!((found.distance_squared.sqrt() - expected).abs() < 1e-12);
+                // The barycentric coordinates are those of the position.
+                let corners = closest.face(found.face).map(|v| mesh.positions()[v as usize]);
+                let rebuilt =
+                    (0..3).fold([0.0; 3], |sum, k| vec3::add_scaled(sum, found.barycentric[k], corners[k]));
+                assert!(vec3::distance_squared(rebuilt, found.position) < 1e-24);
+                assert!((found.barycentric.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+                assert!(found.barycentric.iter().all(|&w| w >= -1e-12));
+            }
+        }
+    }
+
+    #[test]
+    fn closest_point_on_a_triangle_beats_a_dense_sampling() {
+        let mut random = SplitMix::new(21);
+        let mut vector = || std::array::from_fn::<f64, 3, _>(|_| random.symmetric());
+        for _ in 0..200 {
+            let (p, triangle) = (vector(), [vector(), vector(), vector()]);
+            let found = closest_on_triangle(p, triangle).distance_squared;
+            let mut best = f64::INFINITY;
+            for i in 0..=60 {
+                for j in 0..=60 - i {
+                    let (u, v) = (f64::from(i) / 60.0, f64::from(j) / 60.0);
+                    let sample = (0..3)
+                        .fold([0.0; 3], |sum, k| vec3::add_scaled(sum, [1.0 - u - v, u, v][k], triangle[k]));
+                    best = best.min(vec3::distance_squared(p, sample));
+                }
+            }
+            assert!(found <= best + 1e-12 && found.sqrt() > best.sqrt() - 0.1);
+        }
+    }
+
+    #[test]
+    fn degenerate_triangles_are_measured_as_their_edges() {
+        let p = [0.3, 0.4, 0.0];
+        for (triangle, expected) in [
+            ([[0.0; 3]; 3], 0.5),
+            ([[0.0; 3], [0.0; 3], [1.0, 0.0, 0.0]], 0.4),
+            ([[0.0; 3], [1.0, 0.0, 0.0], [0.25, 0.0, 0.0]], 0.4),
+            ([[1.0, 0.0, 0.0], [0.9, 0.0, 0.0], [0.0; 3]], 0.4),
+            ([[0.0; 3], [1.0, 0.0, 0.0], [0.5, 1e-14, 0.0]], 0.4),
+        ] {
+            let found = closest_on_triangle(p, triangle);
+            assert!((found.distance_squared.sqrt() - expected).abs() < 1e-12);
+            assert!((found.barycentric.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn sign_agrees_with_the_winding_number_on_a_spiky_closed_surface() {
+        let mesh = spiky();
+        let closest = ClosestPoint::new(mesh.positions().to_vec(), mesh.faces());
+        let mut inside_count = 0;
+        for p in queries(2000, 0.9, 4) {
+            let found = closest.project(p).unwrap();
+            let inside = brute_force::winding_number(mesh.positions(), mesh.faces(), p) > 0.5;
+            let below = vec3::dot(vec3::sub(p, found.position), found.normal) < 0.0;
+            assert_eq!(below, inside, "at {p:?}");
+            inside_count += usize::from(inside);
+        }
+        assert!((100..1900).contains(&inside_count));
+    }
+
+    #[test]
+    fn surfaces_with_broken_parts_still_answer() {
+        let positions = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0; 3], [0.0; 3], [f64::NAN; 3]];
+        let closest = ClosestPoint::new(positions, &[[0, 3, 4], [0, 1, 5], [0, 1, 2]]);
+        let found = closest.project([0.2, 0.2, -0.3]).unwrap();
+        assert!((found.distance_squared.sqrt() - 0.3).abs() < 1e-12);
+        assert_eq!(closest.face(found.face), [0, 1, 2]);
+        assert_eq!(closest.project([f64::NAN, 0.0, 0.0]), None);
+        assert!(ClosestPoint::new(vec![[0.0; 3]], &[]).project([0.0; 3]).is_none());
+    }
+}

@@ -1,0 +1,10 @@
+//! Distance queries: nearest vertex (kd-tree), closest surface point (bounding-volume tree), and their oracles.
+
+pub mod brute_force;
+mod closest_point;
+mod closest_vertex;
+mod surface;
+
+pub use closest_point::{ClosestPoint, Feature, SurfacePoint};
+pub use closest_vertex::{KdScalar, VertexIndex};
+pub use surface::{Distance, Gap, Surface};

@@ -1,0 +1,233 @@
+//! A posed surface that other things keep their distance from.
+
+use std::sync::{Arc, OnceLock};
+
+use crate::mesh::{TriMesh, vertex_normals};
+use crate::query::{ClosestPoint, SurfacePoint, VertexIndex};
+use crate::real::Real;
+use crate::vec3;
+
+/// How the signed distance to a surface is measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Distance {
+    /// `(p − x_b)·n_b` with the nearest vertex `b` and its area-weighted normal: the paper's form. Cheap; its sign can be
+    /// wrong where vertices are sparse against the curvature.
+    #[default]
+    NearestVertex,
+    /// The distance to the closest surface point, signed by the angle-weighted pseudo-normal there.
+    ClosestPoint,
+}
+
+/// A signed distance and its derivative.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gap<T> {
+    /// Signed distance (m), positive outside.
+    pub gap: T,
+    /// `∂gap/∂p` with the surface fixed.
+    pub gradient: [T; 3],
+    /// The nearest vertex ([`Distance::NearestVertex`]) or the corner of the closest face that weighs most in the closest
+    /// point ([`Distance::ClosestPoint`]).
+    pub vertex: u32,
+}
+
+/// Below this distance (m) the direction from the closest point is rounding, and the pseudo-normal replaces it.
+const CONTACT_DISTANCE: f64 = 1e-10;
+
+/// A fixed surface in one pose: the body, or a garment as another garment sees it.
+///
+/// Its vertex index and its closest-point tree are each built at first use. Share it by `Arc`.
+#[derive(Debug)]
+pub struct Surface<T: Real> {
+    /// Vertex positions `[V, 3]` (m).
+    pub positions: Vec<[T; 3]>,
+    /// Faces `[F, 3]`, counter-clockwise seen from outside.
+    pub faces: Arc<[[u32; 3]]>,
+    /// Area-weighted unit vertex normals `[V, 3]`; zero where undefined.
+    pub normals: Vec<[T; 3]>,
+    vertex_index: OnceLock<VertexIndex<T>>,
+    closest_point: OnceLock<ClosestPoint>,
+}
+
+impl<T: Real> Surface<T> {
+    /// Wraps a posed surface. Every index in `faces` must be below the number of positions, as a [`TriMesh`] guarantees.
+    pub fn new(positions: Vec<[T; 3]>, faces: Arc<[[u32; 3]]>) -> Self {
+        let normals = vertex_normals(&positions, &faces);
+        Self { positions, faces, normals, vertex_index: OnceLock::new(), closest_point: OnceLock::new() }
+    }
+
+    /// The surface of a mesh.
+    pub fn from_mesh(mesh: &TriMesh) -> Self {
+        let positions = mesh.positions().iter().map(|p| vec3::from_f64(*p)).collect();
+        Self::new(positions, mesh.faces().into())
+    }
+
+    /// The kd-tree over the vertices.
+    pub fn vertex_index(&self) -> &VertexIndex<T> {
+        self.vertex_index.get_or_init(|| VertexIndex::new(&self.positions))
+    }
+
+    /// The closest-point tree over the faces.
+    pub fn closest_point(&self) -> &ClosestPoint {
+        self.closest_point.get_or_init(|| {
+            ClosestPoint::new(self.positions.iter().map(|p| vec3::to_f64(*p)).collect(), &self.faces)
+        })
+    }
+
+    /// Index of the vertex nearest to `p`; the lowest of several equally near.
+    pub fn nearest_vertex(&self, p: [T; 3]) -> u32 {
+        self.vertex_index().nearest(p).0
+    }
+
+    /// The surface point closest to `p`; `None` if `p` is not finite.
+    pub fn project(&self, p: [T; 3]) -> Option<SurfacePoint> {
+        self.closest_point().project(vec3::to_f64(p))
+    }
+
+    /// Signed distance of `p` with its gradient. All NaN for a `p` that is not finite.
+    pub fn gap(&self, p: [T; 3], distance: Distance) -> Gap<T> {
+        match distance {
+            Distance::NearestVertex => self.nearest_vertex_gap(p),
+            Distance::ClosestPoint => self.closest_point_gap(p),
+        }
+    }
+
+    /// The paper's form: `(p − x_b)·n_b`, gradient `n_b`.
+    fn nearest_vertex_gap(&self, p: [T; 3]) -> Gap<T> {
+        let vertex = self.nearest_vertex(p);
+        let (Some(&position), Some(&normal)) =
+            (self.positions.get(vertex as usize), self.normals.get(vertex as usize))
+        else {
+            return not_a_gap();
+        };
+        Gap { gap: vec3::dot(vec3::sub(p, position), normal), gradient: normal, vertex }
+    }
+
+    fn closest_point_gap(&self, p: [T; 3]) -> Gap<T> {
+        let Some(found) = self.project(p) else { return not_a_gap() };
+        let offset = vec3::sub(vec3::to_f64(p), found.position);
+        let length = found.distance_squared.sqrt();
+        let sign = if vec3::dot(offset, found.normal) < 0.0 { -1.0 } else { 1.0 };
+        let gradient =
+            if length > CONTACT_DISTANCE { vec3::scale(offset, sign / length) } else { found.normal };
+        let corners = self.closest_point().face(found.face);
+        let [a, b, c] = found.barycentric;
+        let vertex = if a >= b && a >= c {
+            corners[0]
+        } else if b >= c {
+            corners[1]
+        } else {
+            corners[2]
+        };
+        Gap { gap: T::from_f64(sign * length), gradient: vec3::from_f64(gradient), vertex }
+    }
+}
+
+fn not_a_gap<T: Real>() -> Gap<T> {
+    Gap { gap: T::nan(), gradient: [T::nan(); 3], vertex: 0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::shapes::{self, SplitMix};
+    use crate::query::brute_force;
+
+    fn queries(count: usize, extent: f64, seed: u64) -> Vec<[f64; 3]> {
+        let mut random = SplitMix::new(seed);
+        (0..count).map(|_| std::array::from_fn(|_| extent * random.symmetric())).collect()
+    }
+
+    #[test]
+    fn gap_equals_brute_force() {
+        let meshes = [shapes::icosphere(0.5, 3), shapes::tube(0.3, 0.7, 20, 12), shapes::tetrahedron()];
+        for mesh in meshes {
+            let surface = Surface::<f64>::from_mesh(&mesh);
+            for p in queries(400, 0.9, 2) {
+                for distance in [Distance::NearestVertex, Distance::ClosestPoint] {
+                    let expected =
+                        brute_force::gap(mesh.positions(), mesh.faces(), &surface.normals, p, distance);
+                    let found = surface.gap(p, distance);
+                    assert!((found.gap - expected.gap).abs() < 1e-12);
+                    assert!(vec3::distance_squared(found.gradient, expected.gradient) < 1e-20);
+                }
+                let vertex = surface.gap(p, Distance::NearestVertex).vertex;
+                assert_eq!(vertex, brute_force::nearest(mesh.positions(), p).0);
+            }
+        }
+    }
+
+    #[test]
+    fn gap_of_a_sphere_is_the_distance_to_it() {
+        let surface = Surface::<f64>::from_mesh(&shapes::icosphere(0.5, 4));
+        for p in queries(300, 0.8, 3) {
+            let exact = vec3::norm(p) - 0.5;
+            assert!((surface.gap(p, Distance::ClosestPoint).gap - exact).abs() < 2e-3);
+        }
+    }
+
+    #[test]
+    fn gradient_is_the_central_difference_of_the_gap() {
+        let step = 1e-6;
+        for mesh in [shapes::icosphere(0.5, 2), shapes::tube(0.3, 0.7, 11, 6)] {
+            let surface = Surface::<f64>::from_mesh(&mesh);
+            for distance in [Distance::NearestVertex, Distance::ClosestPoint] {
+                let mut checked = 0;
+                for p in queries(200, 0.9, 5) {
+                    let here = surface.gap(p, distance);
+                    let moved: Vec<Gap<f64>> = (0..6)
+                        .map(|k| {
+                            let mut q = p;
+                            q[k / 2] += if k % 2 == 0 { step } else { -step };
+                            surface.gap(q, distance)
+                        })
+                        .collect();
+                    // The distance has kinks where the nearest feature changes; there it has no derivative.
+                    if moved.iter().any(|g| g.vertex != here.vertex || g.gap.signum() != here.gap.signum()) {
+                        continue;
+                    }
+                    for k in 0..3 {
+                        let difference = (moved[2 * k].gap - moved[2 * k + 1].gap) / (2.0 * step);
+                        assert!((difference - here.gradient[k]).abs() < 1e-4, "{distance:?} at {p:?}");
+                    }
+                    checked += 1;
+                }
+                assert!(checked > 150);
+            }
+        }
+    }
+
+    #[test]
+    fn on_the_surface_the_gradient_is_the_pseudo_normal() {
+        let mesh = shapes::icosphere(0.5, 2);
+        let surface = Surface::<f64>::from_mesh(&mesh);
+        for (vertex, p) in mesh.positions().iter().enumerate() {
+            let gap = surface.gap(*p, Distance::ClosestPoint);
+            assert!(gap.gap.abs() < 1e-12);
+            assert_eq!(gap.vertex as usize, vertex);
+            assert!((vec3::norm(gap.gradient) - 1.0).abs() < 1e-12);
+            assert!(vec3::dot(gap.gradient, *p) > 0.49);
+        }
+    }
+
+    #[test]
+    fn open_surface_has_two_sides() {
+        let surface = Surface::<f32>::from_mesh(&shapes::grid(1.0, 1.0, 5, 5));
+        for distance in [Distance::NearestVertex, Distance::ClosestPoint] {
+            assert!((surface.gap([0.43, 0.57, 0.1], distance).gap - 0.1).abs() < 1e-6);
+            assert!((surface.gap([0.43, 0.57, -0.1], distance).gap + 0.1).abs() < 1e-6);
+        }
+        // Beyond the border the distance is to the border, with the side of its face.
+        let beyond = surface.gap([-0.3, 0.5, -0.4], Distance::ClosestPoint);
+        assert!((beyond.gap + 0.5).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_point_that_is_not_finite_gives_nan_and_no_panic() {
+        let surface = Surface::<f32>::from_mesh(&shapes::tetrahedron());
+        for distance in [Distance::NearestVertex, Distance::ClosestPoint] {
+            let gap = surface.gap([f32::NAN, 0.0, 0.0], distance);
+            assert!(gap.gap.is_nan());
+            assert!((gap.vertex as usize) < surface.positions.len());
+        }
+    }
+}
