@@ -1,0 +1,282 @@
+//! A garment bound to the zero body: initial skin weights and shape displacements taken from the nearest body vertex.
+//!
+//! The paper (§Method, draping) takes the weights of the nearest body vertex. Taken raw they jump from leg to leg, so both
+//! quantities may be smoothed over the garment by averaging with the one-ring.
+
+use super::body::Body;
+use super::category::Category;
+use super::garment::Garment;
+use clothcombo_physics::mesh::Topology;
+use clothcombo_physics::query::VertexIndex;
+
+/// How a garment is bound.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BindingSettings {
+    /// Averaging steps for garments that follow one limb each.
+    pub smoothing_iterations: usize,
+    /// Averaging steps for skirts and dresses, which span both legs.
+    pub skirt_smoothing_iterations: usize,
+    /// Smooth at all; off is the paper's nearest vertex.
+    pub smooth: bool,
+    /// Take shape displacements as well; off leaves them zero (the paper's form).
+    pub shape_transfer: bool,
+}
+
+impl Default for BindingSettings {
+    fn default() -> Self {
+        Self { smoothing_iterations: 30, skirt_smoothing_iterations: 100, smooth: true, shape_transfer: true }
+    }
+}
+
+/// What a garment vertex takes from the body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Binding {
+    /// `[V × J]` row-major, each row summing to one.
+    pub skin_weights: Vec<f32>,
+    /// `[V × 3 × K]` row-major, metres per unit of shape.
+    pub shape_directions: Vec<f32>,
+}
+
+impl Binding {
+    /// Binds a garment that lies on the zero body.
+    pub fn new(garment: &Garment, body: &Body, settings: &BindingSettings) -> Self {
+        let (joints, width) = (body.joint_count(), 3 * body.shape_count);
+        let nearest = nearest_body_vertices(garment, body);
+        // Most joints (fingers, face) have no weight on a garment: smooth only the columns in use.
+        let mut used: Vec<u16> =
+            nearest.iter().flat_map(|v| body.skin_weights.row(*v).0.iter().copied()).collect();
+        used.sort_unstable();
+        used.dedup();
+        let mut column_of = vec![usize::MAX; joints];
+        used.iter().enumerate().for_each(|(c, j)| column_of[usize::from(*j)] = c);
+
+        let shape_width = if settings.shape_transfer { width } else { 0 };
+        let columns = used.len() + shape_width;
+        let mut values = vec![0.0f32; nearest.len() * columns];
+        for (row, v) in values.chunks_exact_mut(columns.max(1)).zip(&nearest) {
+            let (row_joints, weights) = body.skin_weights.row(*v);
+            for (j, w) in row_joints.iter().zip(weights) {
+                row[column_of[usize::from(*j)]] += w;
+            }
+            row[used.len()..].copy_from_slice(&body.shape_directions[v * width..v * width + shape_width]);
+        }
+        if settings.smooth {
+            let iterations = if garment.category.hangs_between_legs() {
+                settings.skirt_smoothing_iterations
+            } else {
+                settings.smoothing_iterations
+            };
+            smooth(&mut values, columns, &Topology::new(&garment.rest), iterations);
+        }
+
+        let mut skin_weights = vec![0.0; nearest.len() * joints];
+        let mut shape_directions = vec![0.0; nearest.len() * width];
+        for (i, row) in values.chunks_exact(columns.max(1)).enumerate() {
+            let sum: f32 = row[..used.len()].iter().sum();
+            for (c, j) in used.iter().enumerate() {
+                skin_weights[i * joints + usize::from(*j)] = row[c] / sum;
+            }
+            shape_directions[i * width..i * width + shape_width].copy_from_slice(&row[used.len()..]);
+        }
+        Self { skin_weights, shape_directions }
+    }
+
+    /// Displacement of every garment vertex [m] for shape `beta` (a short one is continued with zeros).
+    pub fn shape_displacement(&self, beta: &[f64], shape_count: usize) -> Vec<[f64; 3]> {
+        if shape_count == 0 {
+            return Vec::new();
+        }
+        self.shape_directions
+            .chunks_exact(3 * shape_count)
+            .map(|rows| {
+                std::array::from_fn(|a| {
+                    let row = &rows[a * shape_count..(a + 1) * shape_count];
+                    row.iter().zip(beta).map(|(d, b)| f64::from(*d) * b).sum()
+                })
+            })
+            .collect()
+    }
+}
+
+/// Which side of the body a vertex of the lower body belongs to.
+const LEG_JOINTS: [&[&str]; 2] = [
+    &["left_hip", "left_knee", "left_ankle", "left_foot"],
+    &["right_hip", "right_knee", "right_ankle", "right_foot"],
+];
+
+/// Nearest body vertex of each garment vertex. A trouser leg looks only at its own leg (and the trunk): at the inner
+/// thigh the other leg can be nearer.
+fn nearest_body_vertices(garment: &Garment, body: &Body) -> Vec<usize> {
+    let points = garment.rest.positions();
+    let all = VertexIndex::new(&body.template);
+    let crotch_side = |leg: usize| {
+        let names: Vec<usize> = LEG_JOINTS[leg]
+            .iter()
+            .filter_map(|n| body.joint_names.iter().position(|name| name == n))
+            .collect();
+        let of_leg = |v: &usize| {
+            let (joints, weights) = body.skin_weights.row(*v);
+            let share: f32 = joints
+                .iter()
+                .zip(weights)
+                .filter(|(j, _)| names.contains(&usize::from(**j)))
+                .map(|(_, w)| w)
+                .sum();
+            share > 0.5
+        };
+        (0..body.vertex_count()).filter(of_leg).collect::<Vec<usize>>()
+    };
+    if garment.category != Category::Trousers {
+        return points.iter().map(|p| all.nearest(*p).0 as usize).collect();
+    }
+    // Body without the other leg: [for left garment vertices, for right ones].
+    let legs = [crotch_side(0), crotch_side(1)];
+    let without_other: [(Vec<usize>, VertexIndex<f64>); 2] = std::array::from_fn(|side| {
+        let mut keep = vec![true; body.vertex_count()];
+        legs[1 - side].iter().for_each(|v| keep[*v] = false);
+        let kept: Vec<usize> = (0..keep.len()).filter(|v| keep[*v]).collect();
+        let positions: Vec<[f64; 3]> = kept.iter().map(|v| body.template[*v]).collect();
+        (kept, VertexIndex::new(&positions))
+    });
+    points
+        .iter()
+        .map(|p| {
+            let (kept, index) = &without_other[usize::from(p[0] < 0.0)];
+            kept.get(index.nearest(*p).0 as usize).copied().unwrap_or(0)
+        })
+        .collect()
+}
+
+/// `iterations` times: every row half way towards the mean of its one-ring. Rows only mix along edges of the garment.
+fn smooth(values: &mut Vec<f32>, columns: usize, topology: &Topology, iterations: usize) {
+    let mut next = values.clone();
+    for _ in 0..iterations {
+        for (v, row) in next.chunks_exact_mut(columns.max(1)).enumerate() {
+            let ring = topology.ring(v);
+            let own = &values[v * columns..(v + 1) * columns];
+            row.copy_from_slice(own);
+            if ring.is_empty() {
+                continue;
+            }
+            row.iter_mut().for_each(|x| *x *= 0.5);
+            let share = 0.5 / ring.len() as f32;
+            for n in ring {
+                let other = &values[*n as usize * columns..(*n as usize + 1) * columns];
+                row.iter_mut().zip(other).for_each(|(x, o)| *x += share * o);
+            }
+        }
+        std::mem::swap(values, &mut next);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::provenance::Provenance;
+    use super::*;
+    use crate::generate::mannequin;
+    use clothcombo_physics::TriMesh;
+    use clothcombo_physics::mesh::shapes::{tube, union};
+
+    /// A vertical tube around a point, from `top` down.
+    fn tube_at(x: f64, z: f64, top: f64, height: f64, radius: f64) -> TriMesh {
+        let mesh = tube(radius, height, 24, 12);
+        let highest = mesh.positions().iter().map(|p| p[1]).fold(f64::MIN, f64::max);
+        let moved = mesh.positions().iter().map(|p| [p[0] + x, p[1] - highest + top, p[2] + z]).collect();
+        mesh.with_positions(moved).unwrap()
+    }
+
+    fn garment(rest: TriMesh, category: Category) -> Garment {
+        Garment { name: "g".into(), category, rest, holding: false, source: Provenance::default() }
+    }
+
+    #[test]
+    fn weights_are_a_partition_of_unity_smoothed_or_not() {
+        let body = mannequin();
+        let skirt = garment(tube_at(0.0, 0.0, 0.05, 0.5, 0.25), Category::Skirt);
+        for smooth in [false, true] {
+            let binding =
+                Binding::new(&skirt, &body, &BindingSettings { smooth, ..BindingSettings::default() });
+            for row in binding.skin_weights.chunks_exact(body.joint_count()) {
+                assert!((row.iter().sum::<f32>() - 1.0).abs() < 1e-5);
+                assert!(row.iter().all(|w| *w >= 0.0));
+            }
+        }
+    }
+
+    #[test]
+    fn without_smoothing_a_vertex_takes_the_nearest_body_vertex_as_it_is() {
+        let body = mannequin();
+        let shirt = garment(tube_at(0.0, 0.0, 0.3, 0.25, 0.2), Category::Top);
+        let plain = BindingSettings { smooth: false, ..BindingSettings::default() };
+        let binding = Binding::new(&shirt, &body, &plain);
+        let dense = body.skin_weights.to_dense(body.joint_count());
+        let (j, k) = (body.joint_count(), body.shape_count);
+        for (i, p) in shirt.rest.positions().iter().enumerate() {
+            let distance = |q: &[f64; 3]| (0..3).map(|a| (p[a] - q[a]).powi(2)).sum::<f64>();
+            let nearest = body.template.iter().map(&distance).fold(f64::MAX, f64::min);
+            let fits = (0..body.vertex_count()).any(|v| {
+                distance(&body.template[v]) == nearest
+                    && binding.skin_weights[i * j..(i + 1) * j]
+                        .iter()
+                        .zip(&dense[v * j..])
+                        .all(|(a, b)| (a - b).abs() < 1e-6)
+                    && binding.shape_directions[i * 3 * k..(i + 1) * 3 * k]
+                        == body.shape_directions[v * 3 * k..(v + 1) * 3 * k]
+            });
+            assert!(fits, "vertex {i}");
+        }
+        let untransferred = Binding::new(&shirt, &body, &BindingSettings { shape_transfer: false, ..plain });
+        assert!(untransferred.shape_directions.iter().all(|d| *d == 0.0));
+        assert_eq!(untransferred.shape_directions.len(), binding.shape_directions.len());
+    }
+
+    #[test]
+    fn smoothing_evens_out_within_a_piece_and_does_not_reach_another() {
+        let body = mannequin();
+        let knee = body.joint_template[4];
+        let left = tube_at(knee[0], knee[2], knee[1] + 0.15, 0.3, 0.09);
+        let right = tube_at(-knee[0], knee[2], knee[1] + 0.15, 0.3, 0.09);
+        let both = garment(union(&[&left, &right]), Category::Trousers);
+        let settings = BindingSettings { smoothing_iterations: 500, ..BindingSettings::default() };
+        let binding = Binding::new(&both, &body, &settings);
+        let alone = Binding::new(&garment(left.clone(), Category::Trousers), &body, &settings);
+        let n = left.vertex_count() * body.joint_count();
+        assert_eq!(binding.skin_weights[..n], alone.skin_weights);
+        // Each leg keeps its own leg, even after many iterations.
+        for (i, row) in binding.skin_weights.chunks_exact(body.joint_count()).enumerate() {
+            let other = if i < left.vertex_count() { [2, 5, 8, 11] } else { [1, 4, 7, 10] };
+            assert!(other.iter().map(|j| row[*j]).sum::<f32>() < 1e-3);
+        }
+        // Smoother: the largest difference along an edge drops.
+        let roughness = |b: &Binding| {
+            let j = body.joint_count();
+            Topology::new(&left)
+                .edges
+                .iter()
+                .flat_map(|[a, c]| (0..j).map(move |q| (*a as usize * j + q, *c as usize * j + q)))
+                .map(|(a, c)| (b.skin_weights[a] - b.skin_weights[c]).abs())
+                .fold(0.0, f32::max)
+        };
+        let raw = Binding::new(
+            &garment(left.clone(), Category::Trousers),
+            &body,
+            &BindingSettings { smooth: false, ..settings.clone() },
+        );
+        assert!(roughness(&alone) < 0.5 * roughness(&raw));
+    }
+
+    #[test]
+    fn shape_displacement_is_linear_in_beta() {
+        let body = mannequin();
+        let top = garment(tube_at(0.0, 0.0, 0.3, 0.2, 0.2), Category::Top);
+        let binding = Binding::new(&top, &body, &BindingSettings::default());
+        let k = body.shape_count;
+        let one = binding.shape_displacement(&[1.0, 0.5], k);
+        let two = binding.shape_displacement(&[2.0, 1.0], k);
+        assert_eq!(one.len(), top.rest.vertex_count());
+        assert!(one.iter().flatten().any(|x| x.abs() > 1e-4));
+        for (a, b) in one.iter().flatten().zip(two.iter().flatten()) {
+            assert!((2.0 * a - b).abs() < 1e-9);
+        }
+    }
+}

@@ -1,0 +1,609 @@
+//! A parametric body with linear blend skinning in the form of SMPL, SMPL-H and SMPL-X.
+//!
+//! Loper et al., "SMPL: A Skinned Multi-Person Linear Model", 2015: `v = T + S·β (+ P·(R − I))`, joints linear in β, then
+//! linear blend skinning. Here every body stands with its pelvis joint at the origin *for every shape*: the pelvis of the
+//! template and of each shape direction is subtracted when the body is made, which moves SMPL bodies by a translation.
+
+use super::pose::Pose;
+use super::rotation::{self, Matrix3, matrix_from_axis_angle};
+use super::skeleton;
+use super::skin_weights::SparseSkinWeights;
+use clothcombo_physics::mesh::TriMesh;
+use rayon::prelude::*;
+use std::sync::Arc;
+use thiserror::Error;
+
+/// Why a body cannot be made or posed.
+#[derive(Debug, Error)]
+pub enum BodyError {
+    /// An array does not have the length the others ask for.
+    #[error("body '{body}': {part} has {found} numbers, expected {expected} ({layout})")]
+    Shape {
+        /// Body name.
+        body: String,
+        /// Which array.
+        part: &'static str,
+        /// What its layout should be.
+        layout: &'static str,
+        /// Its length.
+        found: usize,
+        /// The length it should have.
+        expected: usize,
+    },
+    /// A number is NaN or infinite.
+    #[error("body '{body}': {part} holds a non-finite number at position {index}")]
+    NonFinite {
+        /// Body name.
+        body: String,
+        /// Which array.
+        part: &'static str,
+        /// Flat position in it.
+        index: usize,
+    },
+    /// The joints are not a tree with parents first.
+    #[error(
+        "body '{body}': joint {joint} has parent {parent:?}; joint 0 must be the only root and parents must come first"
+    )]
+    Tree {
+        /// Body name.
+        body: String,
+        /// The joint.
+        joint: usize,
+        /// Its parent.
+        parent: Option<usize>,
+    },
+    /// A vertex has no usable skin weights.
+    #[error("body '{body}': skin weights of vertex {vertex} {problem}")]
+    Weights {
+        /// Body name.
+        body: String,
+        /// The vertex.
+        vertex: usize,
+        /// What is wrong.
+        problem: String,
+    },
+    /// The surface is not a mesh.
+    #[error("body '{body}': {message}")]
+    Mesh {
+        /// Body name.
+        body: String,
+        /// What the mesh check said.
+        message: String,
+    },
+    /// More shape numbers than the body has components.
+    #[error("{given} shape numbers for body '{body}', which has {available} shape components")]
+    TooManyShapeNumbers {
+        /// Body name.
+        body: String,
+        /// How many were given.
+        given: usize,
+        /// How many there are.
+        available: usize,
+    },
+    /// More pose rotations than the body has joints.
+    #[error("{given} joint rotations for body '{body}', which has {available} joints")]
+    TooManyJoints {
+        /// Body name.
+        body: String,
+        /// How many were given.
+        given: usize,
+        /// How many there are.
+        available: usize,
+    },
+}
+
+/// Everything a body is made of; see [`Body`] for shapes and units.
+#[derive(Clone, Debug)]
+pub struct BodyParts {
+    /// Name used in messages and reports.
+    pub name: String,
+    /// Triangles.
+    pub faces: Arc<[[u32; 3]]>,
+    /// Vertices of the mean body in T-pose [m].
+    pub template: Vec<[f64; 3]>,
+    /// `[V × 3 × K]` row-major.
+    pub shape_directions: Vec<f32>,
+    /// K.
+    pub shape_count: usize,
+    /// Joints of the mean body [m].
+    pub joint_template: Vec<[f64; 3]>,
+    /// `[J × 3 × K]` row-major.
+    pub joint_shape_directions: Vec<f64>,
+    /// `[V × 3 × 9(J−1)]` row-major, if the body has pose-corrective blend shapes.
+    pub pose_directions: Option<Vec<f32>>,
+    /// Skin weights of every vertex.
+    pub skin_weights: SparseSkinWeights,
+    /// Parent of each joint.
+    pub parents: Vec<Option<usize>>,
+    /// Name of each joint.
+    pub joint_names: Vec<String>,
+}
+
+/// A parametric body: V vertices, J joints, K shape components.
+#[derive(Clone, Debug)]
+pub struct Body {
+    /// Name used in messages and reports.
+    pub name: String,
+    /// Triangles.
+    pub faces: Arc<[[u32; 3]]>,
+    /// Vertices of the mean ("zero") body in T-pose [m], pelvis at the origin.
+    pub template: Vec<[f64; 3]>,
+    /// Displacement per unit of each shape component [m], `[V × 3 × K]` row-major.
+    pub shape_directions: Vec<f32>,
+    /// Number of shape components K.
+    pub shape_count: usize,
+    /// Joints of the zero body [m]; joint 0 is the origin.
+    pub joint_template: Vec<[f64; 3]>,
+    /// Displacement of the joints per unit of each shape component [m], `[J × 3 × K]` row-major; zero for joint 0.
+    pub joint_shape_directions: Vec<f64>,
+    /// Pose-corrective displacements [m] per entry of `(R_1 … R_{J−1}) − I`, `[V × 3 × 9(J−1)]` row-major.
+    pub pose_directions: Option<Vec<f32>>,
+    /// Skin weights, sparse, each row summing to one.
+    pub skin_weights: SparseSkinWeights,
+    /// Parent of each joint; `None` only for joint 0.
+    pub parents: Vec<Option<usize>>,
+    /// Name of each joint.
+    pub joint_names: Vec<String>,
+    zero_body: TriMesh,
+}
+
+/// Vertices and joints of a shaped body in T-pose [m].
+#[derive(Clone, Debug)]
+pub struct ShapedBody {
+    /// Vertices.
+    pub positions: Vec<[f64; 3]>,
+    /// Joints.
+    pub joints: Vec<[f64; 3]>,
+}
+
+/// A shaped and posed body [m].
+#[derive(Clone, Debug)]
+pub struct PosedBody {
+    /// Vertices.
+    pub positions: Vec<[f64; 3]>,
+    /// Per joint the 3×4 transform that carries a point of the shaped T-pose body to the posed body.
+    pub bones: Vec<[[f64; 4]; 3]>,
+    /// Joints after posing.
+    pub joints: Vec<[f64; 3]>,
+}
+
+impl Body {
+    /// Checks the parts against each other, and moves the body so that its pelvis (joint 0) is at the origin for every shape.
+    ///
+    /// # Errors
+    /// [`BodyError`] naming the array, joint or vertex that is wrong.
+    pub fn new(parts: BodyParts) -> Result<Self, BodyError> {
+        let BodyParts {
+            name,
+            faces,
+            mut template,
+            mut shape_directions,
+            shape_count,
+            mut joint_template,
+            mut joint_shape_directions,
+            pose_directions,
+            skin_weights,
+            parents,
+            joint_names,
+        } = parts;
+        let (vertices, joints, k) = (template.len(), joint_template.len(), shape_count);
+        let check = |part, layout, found: usize, expected: usize| {
+            let body = name.clone();
+            if found == expected {
+                Ok(())
+            } else {
+                Err(BodyError::Shape { body, part, layout, found, expected })
+            }
+        };
+        check("the joint tree", "[J], J >= 1", parents.len(), joints.max(1))?;
+        check("the list of joint names", "[J]", joint_names.len(), joints)?;
+        check("the shape directions", "[V, 3, K]", shape_directions.len(), vertices * 3 * k)?;
+        check("the joint shape directions", "[J, 3, K]", joint_shape_directions.len(), joints * 3 * k)?;
+        check("the skin weights", "[V, J]", skin_weights.vertex_count(), vertices)?;
+        if let Some(p) = &pose_directions {
+            check("the pose directions", "[V, 3, 9(J-1)]", p.len(), vertices * 27 * (joints - 1))?;
+        }
+        let finite = |part, position: Option<usize>| match position {
+            Some(index) => Err(BodyError::NonFinite { body: name.clone(), part, index }),
+            None => Ok(()),
+        };
+        finite("the template", template.as_flattened().iter().position(|x| !x.is_finite()))?;
+        finite("the joint template", joint_template.as_flattened().iter().position(|x| !x.is_finite()))?;
+        finite("the shape directions", shape_directions.iter().position(|x| !x.is_finite()))?;
+        finite("the joint shape directions", joint_shape_directions.iter().position(|x| !x.is_finite()))?;
+        if let Some(p) = &pose_directions {
+            finite("the pose directions", p.iter().position(|x| !x.is_finite()))?;
+        }
+        for (joint, parent) in parents.iter().enumerate() {
+            if (joint == 0) != parent.is_none() || parent.is_some_and(|p| p >= joint) {
+                return Err(BodyError::Tree { body: name, joint, parent: *parent });
+            }
+        }
+        for vertex in 0..vertices {
+            let (row_joints, row) = skin_weights.row(vertex);
+            let sum: f32 = row.iter().sum();
+            let problem = if row.is_empty() || sum.is_nan() || (sum - 1.0).abs() > 1e-3 {
+                format!("sum to {sum} instead of 1")
+            } else if let Some(j) = row_joints.iter().find(|j| usize::from(**j) >= joints) {
+                format!("name joint {j} of {joints}")
+            } else {
+                continue;
+            };
+            return Err(BodyError::Weights { body: name, vertex, problem });
+        }
+
+        // Pelvis to the origin: of the template, and of every shape direction.
+        let pelvis = joint_template[0];
+        for p in template.iter_mut().chain(&mut joint_template) {
+            for a in 0..3 {
+                p[a] -= pelvis[a];
+            }
+        }
+        let pelvis_directions = joint_shape_directions[..3 * k].to_vec();
+        if k > 0 && pelvis_directions.iter().any(|x| *x != 0.0) {
+            for row in shape_directions.chunks_exact_mut(3 * k) {
+                row.iter_mut().zip(&pelvis_directions).for_each(|(x, p)| *x = (f64::from(*x) - p) as f32);
+            }
+            for row in joint_shape_directions.chunks_exact_mut(3 * k) {
+                row.iter_mut().zip(&pelvis_directions).for_each(|(x, p)| *x -= p);
+            }
+        }
+        let zero_body = TriMesh::new(template.clone(), faces.to_vec())
+            .map_err(|e| BodyError::Mesh { body: name.clone(), message: e.to_string() })?;
+        Ok(Self {
+            name,
+            faces,
+            template,
+            shape_directions,
+            shape_count,
+            joint_template,
+            joint_shape_directions,
+            pose_directions,
+            skin_weights,
+            parents,
+            joint_names,
+            zero_body,
+        })
+    }
+
+    /// Number of vertices V.
+    pub fn vertex_count(&self) -> usize {
+        self.template.len()
+    }
+
+    /// Number of joints J.
+    pub fn joint_count(&self) -> usize {
+        self.joint_template.len()
+    }
+
+    /// The body of shape `beta` in T-pose; a short `beta` is continued with zeros.
+    ///
+    /// # Errors
+    /// [`BodyError::TooManyShapeNumbers`] if `beta` is longer than K.
+    pub fn shaped(&self, beta: &[f64]) -> Result<ShapedBody, BodyError> {
+        let k = self.shape_count;
+        if beta.len() > k {
+            let body = self.name.clone();
+            return Err(BodyError::TooManyShapeNumbers { body, given: beta.len(), available: k });
+        }
+        if beta.iter().all(|b| *b == 0.0) {
+            return Ok(ShapedBody { positions: self.template.clone(), joints: self.joint_template.clone() });
+        }
+        let positions = self
+            .template
+            .par_iter()
+            .with_min_len(1024)
+            .zip(self.shape_directions.par_chunks_exact(3 * k))
+            .map(|(p, directions)| {
+                std::array::from_fn(|a| {
+                    let row = &directions[a * k..a * k + beta.len()];
+                    p[a] + row.iter().zip(beta).map(|(d, b)| f64::from(*d) * b).sum::<f64>()
+                })
+            })
+            .collect();
+        let joints = (self.joint_template.iter().zip(self.joint_shape_directions.chunks_exact(3 * k)))
+            .map(|(p, directions)| {
+                std::array::from_fn(|a| {
+                    p[a] + directions[a * k..].iter().zip(beta).map(|(d, b)| d * b).sum::<f64>()
+                })
+            })
+            .collect();
+        Ok(ShapedBody { positions, joints })
+    }
+
+    /// World transform of every joint relative to the T-pose, as 3×4 matrices `[R | t]`. The root turns about joint 0 and
+    /// does not translate. Rotations the pose does not have are identities; those past J are ignored.
+    pub fn bone_transforms(&self, joints: &[[f64; 3]], pose: &Pose) -> Vec<[[f64; 4]; 3]> {
+        let mut rotations: Vec<Matrix3> = Vec::with_capacity(joints.len());
+        let mut places: Vec<[f64; 3]> = Vec::with_capacity(joints.len());
+        for (j, joint) in joints.iter().enumerate() {
+            let local = matrix_from_axis_angle(pose.rotation(j));
+            match self.parents.get(j).copied().flatten() {
+                Some(p) => {
+                    let offset = std::array::from_fn(|a| joint[a] - joints[p][a]);
+                    let turned = rotation::apply(&rotations[p], offset);
+                    places.push(std::array::from_fn(|a| places[p][a] + turned[a]));
+                    rotations.push(rotation::product(&rotations[p], &local));
+                }
+                None => {
+                    places.push(*joint);
+                    rotations.push(local);
+                }
+            }
+        }
+        (0..joints.len())
+            .map(|j| {
+                let moved = rotation::apply(&rotations[j], joints[j]);
+                std::array::from_fn(|a| {
+                    let r = rotations[j][a];
+                    [r[0], r[1], r[2], places[j][a] - moved[a]]
+                })
+            })
+            .collect()
+    }
+
+    /// The body of shape `beta` in `pose`: shape, pose correctives, linear blend skinning.
+    ///
+    /// # Errors
+    /// [`BodyError`] if `beta` or `pose` is longer than the body allows.
+    pub fn posed(&self, beta: &[f64], pose: &Pose) -> Result<PosedBody, BodyError> {
+        if pose.rotations.len() > self.joint_count() {
+            let (body, given) = (self.name.clone(), pose.rotations.len());
+            return Err(BodyError::TooManyJoints { body, given, available: self.joint_count() });
+        }
+        let ShapedBody { mut positions, joints } = self.shaped(beta)?;
+        self.add_pose_correctives(&mut positions, pose);
+        let bones = self.bone_transforms(&joints, pose);
+        let positions = (0..positions.len())
+            .into_par_iter()
+            .with_min_len(1024)
+            .map(|v| {
+                let (row_joints, weights) = self.skin_weights.row(v);
+                skin(
+                    positions[v],
+                    row_joints.iter().zip(weights).map(|(j, w)| (&bones[usize::from(*j)], f64::from(*w))),
+                )
+            })
+            .collect();
+        let joints = joints.iter().zip(&bones).map(|(p, b)| transform(b, *p)).collect();
+        Ok(PosedBody { positions, bones, joints })
+    }
+
+    fn add_pose_correctives(&self, positions: &mut [[f64; 3]], pose: &Pose) {
+        let Some(directions) = &self.pose_directions else { return };
+        let columns = 9 * (self.joint_count() - 1);
+        // Only the joints that are turned contribute: (first column, nine entries of R − I).
+        let features: Vec<(usize, [f32; 9])> = (1..pose.rotations.len())
+            .filter(|j| pose.rotations[*j] != [0.0; 3])
+            .map(|j| {
+                let m = matrix_from_axis_angle(pose.rotations[j]);
+                (
+                    9 * (j - 1),
+                    std::array::from_fn(|i| (m[i / 3][i % 3] - rotation::IDENTITY[i / 3][i % 3]) as f32),
+                )
+            })
+            .collect();
+        if features.is_empty() {
+            return;
+        }
+        positions.par_iter_mut().with_min_len(256).enumerate().for_each(|(v, p)| {
+            for a in 0..3 {
+                let row = &directions[(3 * v + a) * columns..(3 * v + a + 1) * columns];
+                p[a] += features
+                    .iter()
+                    .map(|(start, f)| {
+                        let block = &row[*start..*start + 9];
+                        f64::from(block.iter().zip(f).map(|(d, x)| d * x).sum::<f32>())
+                    })
+                    .sum::<f64>();
+            }
+        });
+    }
+
+    /// The mean body in T-pose as a mesh.
+    pub fn zero_body(&self) -> TriMesh {
+        self.zero_body.clone()
+    }
+
+    /// Height of the collarbone of the zero body [m]: the mean of the two collar joints, or, for a skeleton without them,
+    /// 18 % of the pelvis-to-top length below the top.
+    pub fn collarbone_height(&self) -> f64 {
+        let collars: Vec<f64> = ["left_collar", "right_collar"]
+            .iter()
+            .filter_map(|n| self.joint_names.iter().position(|name| name == n).or(skeleton::joint_index(n)))
+            .filter_map(|j| self.joint_template.get(j).map(|p| p[1]))
+            .collect();
+        if collars.is_empty() {
+            let top = self.template.iter().map(|p| p[1]).fold(0.0, f64::max);
+            return 0.82 * top;
+        }
+        collars.iter().sum::<f64>() / collars.len() as f64
+    }
+}
+
+/// Weighted sum of bone transforms applied to `p`.
+pub fn skin<'a>(p: [f64; 3], bones: impl Iterator<Item = (&'a [[f64; 4]; 3], f64)>) -> [f64; 3] {
+    let mut blended = [[0.0; 4]; 3];
+    for (bone, w) in bones {
+        for a in 0..3 {
+            for b in 0..4 {
+                blended[a][b] += w * bone[a][b];
+            }
+        }
+    }
+    transform(&blended, p)
+}
+
+/// A 3×4 affine transform applied to a point.
+pub fn transform(m: &[[f64; 4]; 3], p: [f64; 3]) -> [f64; 3] {
+    m.map(|row| row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + row[3])
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+
+    /// A random body of `joints` joints in a chain with two branches, off the origin, with all features.
+    pub(crate) fn random_parts(joints: usize, seed: u64) -> BodyParts {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        let (vertices, k) = (40, 3);
+        let template = (0..vertices).map(|_| std::array::from_fn(|_| rng.random_range(-1.0..1.0))).collect();
+        let rows: Vec<Vec<(u16, f32)>> = (0..vertices)
+            .map(|_| {
+                (0..3).map(|_| (rng.random_range(0..joints as u16), rng.random_range(0.1..1.0))).collect()
+            })
+            .collect();
+        BodyParts {
+            name: "test".into(),
+            faces: (0..vertices as u32 - 2).map(|i| [i, i + 1, i + 2]).collect(),
+            template,
+            shape_directions: (0..vertices * 3 * k).map(|_| rng.random_range(-0.1..0.1)).collect(),
+            shape_count: k,
+            joint_template: (0..joints)
+                .map(|_| std::array::from_fn(|_| rng.random_range(-1.0..1.0)))
+                .collect(),
+            joint_shape_directions: (0..joints * 3 * k).map(|_| rng.random_range(-0.1..0.1)).collect(),
+            pose_directions: Some(
+                (0..vertices * 27 * (joints - 1)).map(|_| rng.random_range(-0.01..0.01)).collect(),
+            ),
+            skin_weights: SparseSkinWeights::from_rows(rows),
+            parents: (0..joints).map(|j| if j == 0 { None } else { Some((j - 1) / 2) }).collect(),
+            joint_names: skeleton::joint_names(joints),
+        }
+    }
+
+    fn random_pose(joints: usize, seed: u64) -> Pose {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        Pose {
+            rotations: (0..joints).map(|_| std::array::from_fn(|_| rng.random_range(-1.0..1.0))).collect(),
+        }
+    }
+
+    fn largest_distance(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
+        assert_eq!(a.len(), b.len());
+        a.as_flattened().iter().zip(b.as_flattened()).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn the_pelvis_is_at_the_origin_for_every_shape() {
+        let body = Body::new(random_parts(7, 1)).unwrap();
+        for beta in [&[][..], &[1.0], &[0.5, -2.0, 1.5]] {
+            let shaped = body.shaped(beta).unwrap();
+            assert!(shaped.joints[0].iter().all(|x| x.abs() < 1e-7));
+        }
+    }
+
+    #[test]
+    fn the_t_pose_is_the_shaped_body_and_the_zero_body_the_template() {
+        let body = Body::new(random_parts(7, 2)).unwrap();
+        let beta = [0.3, -0.7];
+        let posed = body.posed(&beta, &Pose::t_pose(7)).unwrap();
+        assert!(largest_distance(&posed.positions, &body.shaped(&beta).unwrap().positions) < 1e-6);
+        let zero = body.posed(&[], &Pose::t_pose(3)).unwrap();
+        assert!(largest_distance(&zero.positions, &body.template) < 1e-6);
+        assert_eq!(body.zero_body().positions(), body.template);
+    }
+
+    #[test]
+    fn turning_the_root_turns_the_body_rigidly_about_the_pelvis() {
+        let body = Body::new(random_parts(7, 3)).unwrap();
+        let mut pose = random_pose(7, 4);
+        pose.rotations[0] = [0.0; 3];
+        let still = body.posed(&[0.5], &pose).unwrap();
+        pose.rotations[0] = [0.4, -1.1, 0.7];
+        let turned = body.posed(&[0.5], &pose).unwrap();
+        let r = matrix_from_axis_angle(pose.rotations[0]);
+        let expected: Vec<[f64; 3]> = still.positions.iter().map(|p| rotation::apply(&r, *p)).collect();
+        assert!(largest_distance(&turned.positions, &expected) < 1e-6);
+        let joints: Vec<[f64; 3]> = still.joints.iter().map(|p| rotation::apply(&r, *p)).collect();
+        assert!(largest_distance(&turned.joints, &joints) < 1e-6);
+    }
+
+    /// The textbook formulas with dense matrices, one vertex at a time.
+    #[test]
+    fn posing_agrees_with_a_plain_evaluation() {
+        let parts = random_parts(7, 5);
+        let body = Body::new(parts.clone()).unwrap();
+        let (beta, pose) = ([0.2, -0.4, 1.1], random_pose(7, 6));
+        let posed = body.posed(&beta, &pose).unwrap();
+        let k = parts.shape_count;
+        let shaped = |p: &[f64; 3], row: &dyn Fn(usize, usize) -> f64| -> [f64; 3] {
+            std::array::from_fn(|a| p[a] + (0..k).map(|c| row(a, c) * beta[c]).sum::<f64>())
+        };
+        let joints: Vec<[f64; 3]> = (0..7)
+            .map(|j| {
+                shaped(&parts.joint_template[j], &|a, c| parts.joint_shape_directions[(3 * j + a) * k + c])
+            })
+            .collect();
+        // World transforms as products of 4×4 matrices down the tree.
+        type M4 = [[f64; 4]; 4];
+        let product = |a: &M4, b: &M4| -> M4 {
+            std::array::from_fn(|i| std::array::from_fn(|j| (0..4).map(|l| a[i][l] * b[l][j]).sum()))
+        };
+        let mut world: Vec<M4> = Vec::new();
+        for j in 0..7 {
+            let r = matrix_from_axis_angle(pose.rotations[j]);
+            let parent = parts.parents[j];
+            let offset: [f64; 3] =
+                std::array::from_fn(|a| joints[j][a] - parent.map_or(0.0, |p| joints[p][a]));
+            let local: M4 = std::array::from_fn(|i| {
+                std::array::from_fn(|c| match (i, c) {
+                    (3, 3) => 1.0,
+                    (3, _) => 0.0,
+                    (_, 3) => offset[i],
+                    _ => r[i][c],
+                })
+            });
+            world.push(parent.map_or(local, |p| product(&world[p], &local)));
+        }
+        let pose_directions = parts.pose_directions.unwrap();
+        for v in 0..parts.template.len() {
+            let mut p =
+                shaped(&parts.template[v], &|a, c| f64::from(parts.shape_directions[(3 * v + a) * k + c]));
+            for j in 1..7 {
+                let r = matrix_from_axis_angle(pose.rotations[j]);
+                for e in 0..9 {
+                    let feature = r[e / 3][e % 3] - f64::from(u8::from(e % 4 == 0));
+                    for a in 0..3 {
+                        p[a] += feature * f64::from(pose_directions[(3 * v + a) * 54 + 9 * (j - 1) + e]);
+                    }
+                }
+            }
+            let (row_joints, weights) = parts.skin_weights.row(v);
+            let mut sum = [0.0; 3];
+            for (j, w) in row_joints.iter().zip(weights) {
+                let j = usize::from(*j);
+                for a in 0..3 {
+                    let moved =
+                        (0..3).map(|b| world[j][a][b] * (p[b] - joints[j][b])).sum::<f64>() + world[j][a][3];
+                    // The pelvis of the shaped body stays where it is; this body has it at the origin.
+                    sum[a] += f64::from(*w) * (moved - joints[0][a]);
+                }
+            }
+            for a in 0..3 {
+                assert!((posed.positions[v][a] - sum[a]).abs() < 2e-6, "vertex {v}");
+            }
+        }
+    }
+
+    #[test]
+    fn wrong_parts_are_named() {
+        let wrong = |change: &dyn Fn(&mut BodyParts)| {
+            let mut parts = random_parts(7, 7);
+            change(&mut parts);
+            Body::new(parts).unwrap_err().to_string()
+        };
+        assert!(wrong(&|p| p.shape_count = 4).contains("shape directions"));
+        assert!(wrong(&|p| p.template[3][1] = f64::NAN).contains("position 10"));
+        assert!(wrong(&|p| p.parents[2] = Some(5)).contains("joint 2"));
+        assert!(wrong(&|p| p.parents[2] = None).contains("joint 2"));
+        assert!(
+            wrong(&|p| p.skin_weights = SparseSkinWeights::from_dense(&[0.0; 280], 7)).contains("vertex 0")
+        );
+        assert!(wrong(&|p| p.faces = vec![[0, 1, 40]].into()).contains("'test'"));
+        let body = Body::new(random_parts(7, 8)).unwrap();
+        assert!(body.shaped(&[0.0; 4]).unwrap_err().to_string().contains("3 shape components"));
+        assert!(body.posed(&[], &Pose::t_pose(8)).unwrap_err().to_string().contains("7 joints"));
+    }
+}

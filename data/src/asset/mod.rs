@@ -1,0 +1,24 @@
+//! What a scene is made of: bodies, poses, motions and garments, all in metres, radians, y up, facing +z.
+
+pub mod binding;
+pub mod body;
+pub mod body_file;
+pub mod category;
+pub mod garment;
+pub mod motion;
+pub mod pose;
+pub mod provenance;
+pub mod rotation;
+pub mod skeleton;
+pub mod skin_weights;
+
+pub use binding::{Binding, BindingSettings};
+pub use body::{Body, BodyError, BodyParts, PosedBody, ShapedBody};
+pub use body_file::BodyFileSettings;
+pub use category::Category;
+pub use garment::Garment;
+pub use motion::Motion;
+pub use pose::Pose;
+pub use provenance::Provenance;
+pub use skeleton::{BODY_JOINT_COUNT, BODY_JOINT_NAMES, BODY_JOINT_PARENTS};
+pub use skin_weights::SparseSkinWeights;

@@ -1,0 +1,302 @@
+//! A folder of garments: OBJ files at rest on the zero body, with an optional manifest `garments.toml`.
+//!
+//! ```toml
+//! [[garment]]
+//! file = "Tank_Top_01.obj"   # relative to the folder; the only required key
+//! name = "Tank_Top_01"       # default: the file's name
+//! category = "top"           # dress | top | t_shirt | open_shirt | skirt | trousers; default: guessed from the shape
+//! layer = [1, 3]             # between which layers it is worn
+//! holding = true             # default: the collarbone rule
+//! source = "…"
+//! author = "…"
+//! licence = "CC0-1.0"
+//! ```
+//! Without a manifest every OBJ in the folder is a garment.
+
+use crate::asset::{Body, Category, Garment, Provenance};
+use crate::format::atomic;
+use crate::format::obj::{self, ObjError};
+use serde::{Deserialize, Serialize};
+use std::collections::HashSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Name of the manifest in a garment folder.
+pub const MANIFEST: &str = "garments.toml";
+
+/// Why a garment folder cannot be used.
+#[derive(Debug, Error)]
+pub enum GarmentFolderError {
+    /// The folder or manifest cannot be read or written.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// File or folder.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The manifest is not as it should be; the message shows line and column.
+    #[error("{}: {message}", path.display())]
+    Manifest {
+        /// The manifest.
+        path: PathBuf,
+        /// What the TOML reader said.
+        message: String,
+    },
+    /// A manifest entry is wrong.
+    #[error("{}: garment {entry} ('{file}'): {message}", path.display())]
+    Entry {
+        /// The manifest.
+        path: PathBuf,
+        /// Number of the entry, from 1.
+        entry: usize,
+        /// Its file.
+        file: String,
+        /// What is wrong.
+        message: String,
+    },
+    /// No garment in it.
+    #[error("{}: no garments; put OBJ files there, or list them in {MANIFEST}", path.display())]
+    Empty {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A mesh is unusable.
+    #[error(transparent)]
+    Obj(#[from] ObjError),
+}
+
+/// A garment of a folder with its layer hint.
+#[derive(Clone, Debug)]
+pub struct FolderGarment {
+    /// The garment.
+    pub garment: Garment,
+    /// Lowest and highest layer it is worn in, if the manifest says so.
+    pub layer: Option<[u32; 2]>,
+    /// Its mesh file.
+    pub path: PathBuf,
+}
+
+#[derive(Debug, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Manifest {
+    #[serde(default)]
+    garment: Vec<Entry>,
+}
+
+#[derive(Debug, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Entry {
+    file: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    name: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    category: Option<Category>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    layer: Option<[u32; 2]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    holding: Option<bool>,
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    source: String,
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    author: String,
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    licence: String,
+}
+
+/// Reads all garments of a folder, in manifest order or, without a manifest, sorted by file name. `body` is needed for the
+/// guesses: category and the collarbone rule.
+///
+/// # Errors
+/// [`GarmentFolderError`] naming folder, manifest entry, or OBJ file and line.
+pub fn load_garment_folder(folder: &Path, body: &Body) -> Result<Vec<FolderGarment>, GarmentFolderError> {
+    let manifest_path = folder.join(MANIFEST);
+    let manifest = match fs::read_to_string(&manifest_path) {
+        Ok(text) => toml::from_str(&text).map_err(|e| GarmentFolderError::Manifest {
+            path: manifest_path.clone(),
+            message: e.to_string().trim_end().to_string(),
+        })?,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Manifest {
+            garment: list_obj_files(folder)?
+                .into_iter()
+                .map(|file| Entry { file, ..Entry::default() })
+                .collect(),
+        },
+        Err(source) => return Err(GarmentFolderError::Io { path: manifest_path, source }),
+    };
+    if manifest.garment.is_empty() {
+        return Err(GarmentFolderError::Empty { path: folder.into() });
+    }
+    let mut names = HashSet::new();
+    let mut garments = Vec::with_capacity(manifest.garment.len());
+    for (number, entry) in manifest.garment.into_iter().enumerate() {
+        let wrong = |message: String| GarmentFolderError::Entry {
+            path: manifest_path.clone(),
+            entry: number + 1,
+            file: entry.file.clone(),
+            message,
+        };
+        let path = folder.join(&entry.file);
+        if !path.is_file() {
+            return Err(wrong("there is no such file in the folder".into()));
+        }
+        if let Some([low, high]) = entry.layer
+            && low > high
+        {
+            return Err(wrong(format!("layer = [{low}, {high}] should be [lowest, highest]")));
+        }
+        let stem = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+        let name = entry.name.clone().unwrap_or(stem);
+        if !names.insert(name.clone()) {
+            return Err(wrong(format!("the name '{name}' is used twice")));
+        }
+        let rest = obj::load(&path)?;
+        let category = entry.category.unwrap_or_else(|| Category::guess(&rest, body));
+        let holding = entry.holding.unwrap_or_else(|| Garment::needs_holding(&rest, body));
+        let source = Provenance { source: entry.source, author: entry.author, licence: entry.licence };
+        garments.push(FolderGarment {
+            garment: Garment { name, category, rest, holding, source },
+            layer: entry.layer,
+            path,
+        });
+    }
+    Ok(garments)
+}
+
+fn list_obj_files(folder: &Path) -> Result<Vec<String>, GarmentFolderError> {
+    let failed = |source| GarmentFolderError::Io { path: folder.into(), source };
+    let mut files = Vec::new();
+    for entry in fs::read_dir(folder).map_err(failed)? {
+        let path = entry.map_err(failed)?.path();
+        let is_obj = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"));
+        if let Some(name) = path.file_name().and_then(|n| n.to_str()).filter(|_| is_obj) {
+            files.push(name.to_string());
+        }
+    }
+    files.sort();
+    Ok(files)
+}
+
+/// Writes garments as `<name>.obj` and a manifest; the manifest comes last, so that a folder with one is complete. Returns the
+/// files written.
+///
+/// # Errors
+/// If a file cannot be written.
+pub fn save_garment_folder(
+    folder: &Path,
+    garments: &[FolderGarment],
+) -> Result<Vec<PathBuf>, GarmentFolderError> {
+    let mut written = Vec::new();
+    let mut manifest = Manifest::default();
+    for FolderGarment { garment, layer, .. } in garments {
+        let file = format!("{}.obj", garment.name);
+        let Provenance { source, author, licence } = garment.source.clone();
+        let comments = [
+            format!("{} ({}), metres, y up, on the zero body in T-pose", garment.name, garment.category),
+            format!("source: {source}"),
+            format!("author: {author}"),
+            format!("licence: {licence}"),
+        ];
+        let path = folder.join(&file);
+        obj::save(&path, garment.rest.positions(), garment.rest.faces(), &comments)?;
+        written.push(path);
+        manifest.garment.push(Entry {
+            file,
+            name: Some(garment.name.clone()),
+            category: Some(garment.category),
+            layer: *layer,
+            holding: Some(garment.holding),
+            source,
+            author,
+            licence,
+        });
+    }
+    let path = folder.join(MANIFEST);
+    let text = toml::to_string(&manifest)
+        .map_err(|e| GarmentFolderError::Manifest { path: path.clone(), message: e.to_string() })?;
+    atomic::write(&path, text.as_bytes())
+        .map_err(|source| GarmentFolderError::Io { path: path.clone(), source })?;
+    written.push(path);
+    Ok(written)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::generate::mannequin;
+    use clothcombo_physics::mesh::shapes::tube;
+
+    fn folder_with(files: &[(&str, &str)]) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, text) in files {
+            fs::write(folder.path().join(name), text).unwrap();
+        }
+        folder
+    }
+
+    const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+
+    #[test]
+    fn saved_garments_load_again_with_everything() {
+        let body = mannequin();
+        let source = Provenance { source: "s".into(), author: "a \"b\"".into(), licence: "CC0-1.0".into() };
+        let garment = Garment {
+            name: "ring".into(),
+            category: Category::Skirt,
+            rest: tube(0.2, 0.3, 16, 4),
+            holding: true,
+            source,
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let saved = FolderGarment { garment, layer: Some([1, 3]), path: PathBuf::new() };
+        let written = save_garment_folder(folder.path(), std::slice::from_ref(&saved)).unwrap();
+        assert_eq!(written.len(), 2);
+        let loaded = load_garment_folder(folder.path(), &body).unwrap();
+        let [one] = &loaded[..] else { panic!() };
+        assert_eq!((one.layer, &one.garment.source), (saved.layer, &saved.garment.source));
+        assert_eq!((one.garment.category, one.garment.holding), (Category::Skirt, true));
+        assert_eq!(one.garment.rest.faces(), saved.garment.rest.faces());
+        for (a, b) in
+            one.garment.rest.positions().iter().flatten().zip(saved.garment.rest.positions().iter().flatten())
+        {
+            assert!((a - b).abs() < 1e-7);
+        }
+    }
+
+    #[test]
+    fn without_a_manifest_every_obj_is_a_garment() {
+        let folder = folder_with(&[("b.obj", TRIANGLE), ("a.OBJ", TRIANGLE), ("notes.txt", "x")]);
+        let names: Vec<String> = load_garment_folder(folder.path(), &mannequin())
+            .unwrap()
+            .into_iter()
+            .map(|g| g.garment.name)
+            .collect();
+        assert_eq!(names, ["a", "b"]);
+    }
+
+    #[test]
+    fn each_mistake_is_named_with_its_place() {
+        let body = mannequin();
+        let entry = "[[garment]]\nfile = \"a.obj\"\n";
+        for (manifest, parts) in [
+            (format!("{entry}colour = \"red\"\n"), ["garments.toml", "line 3", "`colour`"]),
+            (format!("{entry}category = \"socks\"\n"), ["garments.toml", "line 3", "open_shirt"]),
+            ("[[garment]]\nfile = \"none.obj\"\n".into(), ["garments.toml", "none.obj", "garment 1"]),
+            (format!("{entry}{entry}"), ["garment 2", "'a'", "twice"]),
+            (format!("{entry}layer = [3, 1]\n"), ["garment 1", "[3, 1]", "lowest"]),
+            (String::new(), ["no garments", "OBJ", "garments.toml"]),
+        ] {
+            let folder = folder_with(&[("a.obj", TRIANGLE), (MANIFEST, &manifest)]);
+            let message = load_garment_folder(folder.path(), &body).unwrap_err().to_string();
+            assert!(parts.iter().all(|p| message.contains(p)), "{message}");
+        }
+        let folder = folder_with(&[("a.obj", "v 0 0 0\nv 1 0 0\nv 0 nan 0\nf 1 2 3\n")]);
+        let message = load_garment_folder(folder.path(), &body).unwrap_err().to_string();
+        assert!(message.contains("a.obj:3:"), "{message}");
+        let empty = folder_with(&[]);
+        assert!(matches!(load_garment_folder(empty.path(), &body), Err(GarmentFolderError::Empty { .. })));
+        let missing = load_garment_folder(&empty.path().join("x"), &body).unwrap_err();
+        assert!(matches!(missing, GarmentFolderError::Io { .. }));
+    }
+}

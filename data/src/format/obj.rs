@@ -1,0 +1,286 @@
+//! Wavefront OBJ: vertices, polygons and groups; texture coordinates, normals and materials are read over.
+//!
+//! Own parser, because a message must name the line: the usual libraries report neither it nor the offending index.
+
+use super::atomic;
+use clothcombo_physics::mesh::{MeshError, TriMesh};
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Why an OBJ file cannot be used.
+#[derive(Debug, Error)]
+pub enum ObjError {
+    /// The file cannot be read or written.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A line is wrong.
+    #[error("{}:{line}: {message}", path.display())]
+    Line {
+        /// The file.
+        path: PathBuf,
+        /// The line, from 1.
+        line: usize,
+        /// What is wrong with it.
+        message: String,
+    },
+    /// No faces.
+    #[error("{}: no faces; a point cloud is not a garment or body", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Not a valid triangle mesh.
+    #[error("{}: {source}", path.display())]
+    Mesh {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        source: MeshError,
+    },
+}
+
+/// An OBJ file: positions as written, polygons with three or more corners, and the group each polygon is in.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ObjMesh {
+    /// Vertex positions.
+    pub positions: Vec<[f64; 3]>,
+    /// Corners of each polygon, 0-based.
+    pub polygons: Vec<Vec<u32>>,
+    /// Names of all groups in order of first appearance; the first is the unnamed one before any `g` line.
+    pub groups: Vec<String>,
+    /// Group of each polygon.
+    pub group_of_polygon: Vec<u32>,
+}
+
+impl ObjMesh {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// [`ObjError`] naming file and line.
+    pub fn load(path: &Path) -> Result<Self, ObjError> {
+        let bytes = fs::read(path).map_err(|source| ObjError::Io { path: path.into(), source })?;
+        // Names and comments may be in any encoding; numbers are ASCII.
+        Self::parse(&String::from_utf8_lossy(&bytes), path)
+    }
+
+    /// Parses OBJ text; `path` is for messages only.
+    ///
+    /// # Errors
+    /// [`ObjError`] naming file and line.
+    pub fn parse(text: &str, path: &Path) -> Result<Self, ObjError> {
+        let mut mesh = Self { groups: vec![String::new()], ..Self::default() };
+        let mut lines_of_polygons = Vec::new();
+        let mut group = 0;
+        for (number, line) in text.lines().enumerate() {
+            let line = line.split('#').next().unwrap_or_default();
+            let mut words = line.split_ascii_whitespace();
+            let wrong = |message: String| ObjError::Line { path: path.into(), line: number + 1, message };
+            match words.next() {
+                Some("v") => mesh.positions.push(vertex(words).map_err(wrong)?),
+                Some("f") => {
+                    let polygon: Result<Vec<u32>, String> =
+                        words.map(|word| corner(word, mesh.positions.len())).collect();
+                    let polygon = polygon.map_err(&wrong)?;
+                    if polygon.len() < 3 {
+                        return Err(wrong(format!(
+                            "a face needs at least 3 corners, this one has {}",
+                            polygon.len()
+                        )));
+                    }
+                    mesh.polygons.push(polygon);
+                    mesh.group_of_polygon.push(group);
+                    lines_of_polygons.push(number + 1);
+                }
+                Some("g") => {
+                    let name = words.collect::<Vec<_>>().join(" ");
+                    group = match mesh.groups.iter().position(|g| *g == name) {
+                        Some(known) => known as u32,
+                        None => {
+                            mesh.groups.push(name);
+                            mesh.groups.len() as u32 - 1
+                        }
+                    };
+                }
+                _ => {}
+            }
+        }
+        // Faces may come before their vertices, so the range is checked at the end.
+        let count = mesh.positions.len();
+        for (polygon, line) in mesh.polygons.iter().zip(lines_of_polygons) {
+            let wrong = |message: String| ObjError::Line { path: path.into(), line, message };
+            if let Some(index) = polygon.iter().find(|i| **i as usize >= count) {
+                let index = u64::from(*index) + 1;
+                return Err(wrong(format!("face names vertex {index}, but the file has {count} vertices")));
+            }
+            if polygon.iter().enumerate().any(|(i, a)| polygon[..i].contains(a)) {
+                return Err(wrong(
+                    "face names the same vertex twice; weld or remove such faces first".into(),
+                ));
+            }
+        }
+        if mesh.polygons.is_empty() {
+            return Err(ObjError::Empty { path: path.into() });
+        }
+        Ok(mesh)
+    }
+
+    /// Polygons as triangle fans from their first corner.
+    pub fn triangles(&self) -> Vec<[u32; 3]> {
+        self.polygons.iter().flat_map(|p| fan(p)).collect()
+    }
+
+    /// The triangles of one group.
+    pub fn group_triangles(&self, group: &str) -> Vec<[u32; 3]> {
+        let Some(index) = self.groups.iter().position(|g| g == group) else { return Vec::new() };
+        let of_group =
+            self.polygons.iter().zip(&self.group_of_polygon).filter(|(_, g)| **g as usize == index);
+        of_group.flat_map(|(p, _)| fan(p)).collect()
+    }
+
+    /// The vertices of one group, ascending, each once.
+    pub fn group_vertices(&self, group: &str) -> Vec<u32> {
+        let mut vertices = self.group_triangles(group).concat();
+        vertices.sort_unstable();
+        vertices.dedup();
+        vertices
+    }
+
+    /// The whole file as a triangle mesh; `path` is for messages only.
+    ///
+    /// # Errors
+    /// [`ObjError::Mesh`] if it is not a valid one.
+    pub fn to_tri_mesh(&self, path: &Path) -> Result<TriMesh, ObjError> {
+        TriMesh::new(self.positions.clone(), self.triangles())
+            .map_err(|source| ObjError::Mesh { path: path.into(), source })
+    }
+}
+
+fn fan(polygon: &[u32]) -> impl Iterator<Item = [u32; 3]> + '_ {
+    polygon[1..].windows(2).map(|w| [polygon[0], w[0], w[1]])
+}
+
+fn vertex<'a>(mut words: impl Iterator<Item = &'a str>) -> Result<[f64; 3], String> {
+    let mut position = [0.0f64; 3];
+    for (axis, x) in position.iter_mut().enumerate() {
+        let word =
+            words.next().ok_or_else(|| format!("a vertex needs 3 coordinates, this one has {axis}"))?;
+        *x = word.parse().map_err(|_| format!("'{word}' is not a number"))?;
+        if !x.is_finite() {
+            return Err(format!("vertex coordinate '{word}' is not finite"));
+        }
+    }
+    Ok(position)
+}
+
+/// `12`, `12/3`, `12//4` or `-1` as a 0-based vertex index.
+fn corner(word: &str, vertices_so_far: usize) -> Result<u32, String> {
+    let number = word.split('/').next().unwrap_or_default();
+    let index: i64 = number.parse().map_err(|_| format!("'{word}' is not a face corner"))?;
+    let zero_based = match index {
+        0 => return Err("face names vertex 0, but OBJ counts from 1".into()),
+        i if i < 0 => i.checked_add(vertices_so_far as i64).unwrap_or(-1),
+        i => i - 1,
+    };
+    u32::try_from(zero_based).map_err(|_| {
+        format!("face names vertex {index}, but there are {vertices_so_far} vertices before this line")
+    })
+}
+
+/// Reads an OBJ file as a triangle mesh.
+///
+/// # Errors
+/// [`ObjError`] naming file and line.
+pub fn load(path: &Path) -> Result<TriMesh, ObjError> {
+    ObjMesh::load(path)?.to_tri_mesh(path)
+}
+
+/// Writes a mesh as OBJ, whole or not at all; `comments` become leading `#` lines. Coordinates keep 0.1 µm.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn save(
+    path: &Path,
+    positions: &[[f64; 3]],
+    faces: &[[u32; 3]],
+    comments: &[String],
+) -> Result<(), ObjError> {
+    let mut text = String::new();
+    for comment in comments {
+        for line in comment.lines() {
+            let _ = writeln!(text, "# {line}");
+        }
+    }
+    for [x, y, z] in positions {
+        let _ = writeln!(text, "v {x:.7} {y:.7} {z:.7}");
+    }
+    for f in faces {
+        let _ = writeln!(text, "f {} {} {}", u64::from(f[0]) + 1, u64::from(f[1]) + 1, u64::from(f[2]) + 1);
+    }
+    atomic::write(path, text.as_bytes()).map_err(|source| ObjError::Io { path: path.into(), source })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<ObjMesh, String> {
+        ObjMesh::parse(text, Path::new("shirt.obj")).map_err(|e| e.to_string())
+    }
+
+    const SQUARE: &str = "# a square\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+
+    #[test]
+    fn reads_quads_groups_and_relative_indices() {
+        let mesh = parse(&format!(
+            "{SQUARE}g front\nf 1/1 2/2 3/3 4/4\ng back\nf -1//1 -2//1 -3//1\ng front\nf 1 2 4\n"
+        ));
+        let mesh = mesh.unwrap();
+        assert_eq!(mesh.triangles(), [[0, 1, 2], [0, 2, 3], [3, 2, 1], [0, 1, 3]]);
+        assert_eq!(mesh.group_triangles("front"), [[0, 1, 2], [0, 2, 3], [0, 1, 3]]);
+        assert_eq!(mesh.group_vertices("back"), [1, 2, 3]);
+        assert_eq!(mesh.to_tri_mesh(Path::new("x")).unwrap().face_count(), 4);
+    }
+
+    #[test]
+    fn names_the_line_of_each_defect() {
+        let cases = [
+            ("v 0 nan 0\nf 1 1 1\n", 1, "not finite"),
+            (&format!("{SQUARE}v 0 inf 0\n"), 6, "not finite"),
+            (&format!("{SQUARE}v 1 2\n"), 6, "3 coordinates"),
+            (&format!("{SQUARE}v 1 2 x\n"), 6, "'x' is not a number"),
+            (&format!("{SQUARE}\nf 1 2 9\n"), 7, "vertex 9, but the file has 4"),
+            (&format!("{SQUARE}f 1 2 -5\n"), 6, "vertex -5"),
+            (&format!("{SQUARE}f 0 1 2\n"), 6, "counts from 1"),
+            (&format!("{SQUARE}f 1 2\n"), 6, "at least 3"),
+            (&format!("{SQUARE}f 1 2 3\nf 1 2 2\n"), 7, "same vertex twice"),
+            (&format!("{SQUARE}f 1 2 99999999999999999999\n"), 6, "not a face corner"),
+        ];
+        for (text, line, part) in cases {
+            let message = parse(text).unwrap_err();
+            assert!(
+                message.starts_with(&format!("shirt.obj:{line}:")) && message.contains(part),
+                "{message}"
+            );
+        }
+        assert!(parse(SQUARE).unwrap_err().contains("no faces"));
+    }
+
+    #[test]
+    fn what_is_saved_loads_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a/b.obj");
+        let positions = vec![[0.125, -1.5, 3.0], [1.0, 0.0, 0.25], [0.0, 1.0, 0.0]];
+        save(&path, &positions, &[[0, 1, 2]], &["two\nlines".into()]).unwrap();
+        let mesh = load(&path).unwrap();
+        assert_eq!(mesh.positions(), positions);
+        assert_eq!(mesh.faces(), [[0, 1, 2]]);
+        assert_eq!(fs::read_dir(path.parent().unwrap()).unwrap().count(), 1);
+    }
+}

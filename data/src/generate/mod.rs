@@ -1,0 +1,13 @@
+//! Data without downloads: a mannequin, garments for any body, and poses within the limits of human joints.
+
+mod field;
+pub mod garment;
+mod isosurface;
+pub mod mannequin;
+pub mod pose;
+pub(crate) mod remesh;
+pub(crate) mod sheet;
+
+pub use garment::{GarmentError, GarmentGenerator, GarmentQuality, GarmentSettings, generate_garment};
+pub use mannequin::mannequin;
+pub use pose::{PoseAugmentation, PoseSampler};

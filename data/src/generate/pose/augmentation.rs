@@ -1,0 +1,122 @@
+//! Variations of recorded poses: a thin collection of motion becomes a dense one.
+
+use super::limits::{JOINT_LIMITS, other_side};
+use crate::asset::{BODY_JOINT_COUNT, Pose};
+use rand::{Rng, RngExt};
+use rand_distr::{Distribution, StandardNormal};
+
+/// How poses are varied for training. The defaults gave the best results on held-out motion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PoseAugmentation {
+    /// Probability of mirroring left and right. Default 0.5.
+    pub mirror: f64,
+    /// Probability of taking the legs or the arms from another pose. Default 0.5.
+    pub limb_swap: f64,
+    /// Range of the factor on each joint's angle, the pelvis excepted. Default 0.7–1.15.
+    pub scale: [f64; 2],
+    /// Standard deviation of the noise on each component, the pelvis excepted, in degrees. Default 3.5.
+    pub noise_degrees: f64,
+}
+
+impl Default for PoseAugmentation {
+    fn default() -> Self {
+        Self { mirror: 0.5, limb_swap: 0.5, scale: [0.7, 1.15], noise_degrees: 3.5 }
+    }
+}
+
+const LEGS: [usize; 8] = [1, 2, 4, 5, 7, 8, 10, 11];
+const ARMS: [usize; 8] = [13, 14, 16, 17, 18, 19, 20, 21];
+
+impl PoseAugmentation {
+    /// No change at all.
+    pub fn none() -> Self {
+        Self { mirror: 0.0, limb_swap: 0.0, scale: [1.0, 1.0], noise_degrees: 0.0 }
+    }
+
+    /// A variation of the body joints of `pose`, with limbs perhaps from `other`. Noise and scale carry no component beyond
+    /// its joint limit, or beyond the recorded value where the recording itself exceeds the limit. Joints past
+    /// the 22 body joints are mirrored but otherwise kept.
+    pub fn apply<R: Rng + ?Sized>(&self, pose: &Pose, other: &Pose, rng: &mut R) -> Pose {
+        let mirrored =
+            |pose: &Pose, draw: f64| if draw < self.mirror { pose.mirrored() } else { pose.clone() };
+        // The number of draws does not depend on their outcome, so that streams stay aligned.
+        let draws: [f64; 4] = std::array::from_fn(|_| rng.random::<f64>());
+        let mut result = mirrored(pose, draws[0]);
+        let other = mirrored(other, draws[1]);
+        if draws[2] < self.limb_swap {
+            let limbs = if draws[3] < 0.5 { LEGS } else { ARMS };
+            for joint in limbs {
+                if joint < result.rotations.len() {
+                    result.rotations[joint] = other.rotation(joint);
+                }
+            }
+        }
+        let noise = self.noise_degrees.to_radians();
+        for (joint, rotation) in result.rotations.iter_mut().enumerate().take(BODY_JOINT_COUNT).skip(1) {
+            let factor = self.scale[0] + (self.scale[1] - self.scale[0]) * rng.random::<f64>();
+            let limits = JOINT_LIMITS[joint];
+            for axis in 0..3 {
+                let jitter: f64 = StandardNormal.sample(rng);
+                let recorded = rotation[axis];
+                let low = limits.low[axis].to_radians().min(recorded);
+                let high = limits.high[axis].to_radians().max(recorded);
+                rotation[axis] = (factor * recorded + noise * jitter).clamp(low, high);
+            }
+        }
+        debug_assert!((0..BODY_JOINT_COUNT).all(|j| other_side(other_side(j)) == j));
+        result
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{PoseSampler, is_within_limits};
+    use super::*;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    fn poses(seed: u64) -> (Pose, Pose, ChaCha8Rng) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let sampler = PoseSampler::default();
+        (sampler.sample(&mut rng), sampler.sample(&mut rng), rng)
+    }
+
+    #[test]
+    fn nothing_switched_on_changes_nothing() {
+        let (a, b, mut rng) = poses(1);
+        assert_eq!(PoseAugmentation::none().apply(&a, &b, &mut rng), a);
+    }
+
+    #[test]
+    fn each_part_does_what_it_says() {
+        let (a, b, mut rng) = poses(2);
+        let mirror = PoseAugmentation { mirror: 1.0, ..PoseAugmentation::none() };
+        assert_eq!(mirror.apply(&a, &b, &mut rng), a.mirrored());
+        let swap = PoseAugmentation { limb_swap: 1.0, ..PoseAugmentation::none() };
+        for _ in 0..20 {
+            let mixed = swap.apply(&a, &b, &mut rng);
+            let from_b: Vec<usize> = (0..22).filter(|j| mixed.rotations[*j] == b.rotations[*j]).collect();
+            assert!(from_b == LEGS || from_b == ARMS, "{from_b:?}");
+            assert!((0..22).all(|j| from_b.contains(&j) || mixed.rotations[j] == a.rotations[j]));
+        }
+        let scale = PoseAugmentation { scale: [0.7, 0.7], ..PoseAugmentation::none() };
+        let scaled = scale.apply(&a, &b, &mut rng);
+        assert_eq!(scaled.rotations[0], a.rotations[0]);
+        for j in 1..22 {
+            assert!((0..3).all(|k| (scaled.rotations[j][k] - 0.7 * a.rotations[j][k]).abs() < 1e-12));
+        }
+    }
+
+    #[test]
+    fn defaults_keep_limits_and_are_reproducible() {
+        let augmentation = PoseAugmentation::default();
+        for seed in 0..50 {
+            let (a, b, mut rng) = poses(seed);
+            let mut again = rng.clone();
+            let varied = augmentation.apply(&a, &b, &mut rng);
+            assert_eq!(varied, augmentation.apply(&a, &b, &mut again));
+            assert!(is_within_limits(&varied));
+            assert_ne!(varied, a);
+        }
+    }
+}

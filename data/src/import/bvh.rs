@@ -1,0 +1,411 @@
+//! Motion capture in BVH form, retargeted to the 22 SMPL body joints.
+//!
+//! World rotations are carried over, not local ones, so that the skeletons need not share a tree: for joint j, `W_j = B_j · A_j`
+//! with `B_j` the BVH joint's world rotation and `A_j` the smallest rotation that takes the body's bone in T-pose to the
+//! BVH bone at rest. Skeletons whose rest pose has hanging arms thus come out right.
+
+use super::{Progress, Summary};
+use crate::asset::rotation::{
+    IDENTITY, Matrix3, apply, axis_angle_from_matrix, between, matrix_from_axis_angle, product, transpose,
+};
+use crate::asset::skeleton::{BODY_JOINT_COUNT, BODY_JOINT_PARENTS};
+use crate::asset::{Body, Motion, Pose, Provenance, motion::MotionError};
+use crate::format::{Bvh, BvhError};
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Why BVH files cannot be imported.
+#[derive(Debug, Error)]
+pub enum BvhImportError {
+    /// No input.
+    #[error("no BVH files given")]
+    NoInput,
+    /// None of the inputs could be used.
+    #[error("none of the {count} BVH files could be used; the first, {first}: {reason}")]
+    NothingUsable {
+        /// How many were given.
+        count: usize,
+        /// The first of them.
+        first: String,
+        /// Its problem.
+        reason: String,
+    },
+    /// A result cannot be written.
+    #[error(transparent)]
+    Motion(#[from] MotionError),
+    /// The body lacks joints.
+    #[error("body '{body}' has {joints} joints; retargeting needs the {BODY_JOINT_COUNT} SMPL body joints")]
+    Body {
+        /// The body.
+        body: String,
+        /// How many joints it has.
+        joints: usize,
+    },
+}
+
+/// How motion is imported.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BvhImportSettings {
+    /// Every n-th frame is kept, with the n that comes nearest to this rate [frames/s].
+    pub frame_rate: f64,
+    /// Drop a first frame that jumps to the second one by more than this angle [rad] and by more than ten times the usual
+    /// step: some collections insert a T-pose there.
+    pub inserted_frame_angle: f64,
+}
+
+impl Default for BvhImportSettings {
+    fn default() -> Self {
+        Self { frame_rate: 60.0, inserted_frame_angle: 0.2 }
+    }
+}
+
+/// A skeleton naming: the BVH joint for each of the 22 body joints, empty where there is none (it then follows its parent).
+struct Naming {
+    name: &'static str,
+    joints: [&'static str; BODY_JOINT_COUNT],
+    provenance: fn() -> Provenance,
+}
+
+#[rustfmt::skip]
+const NAMINGS: [Naming; 3] = [
+    Naming {
+        name: "CMU",
+        joints: [
+            "Hips", "LeftUpLeg", "RightUpLeg", "LowerBack", "LeftLeg", "RightLeg", "Spine", "LeftFoot", "RightFoot",
+            "Spine1", "LeftToeBase", "RightToeBase", "Neck", "LeftShoulder", "RightShoulder", "Head", "LeftArm",
+            "RightArm", "LeftForeArm", "RightForeArm", "LeftHand", "RightHand",
+        ],
+        provenance: || Provenance {
+            source: "CMU Graphics Lab Motion Capture Database (BVH conversion), as in Debian assimp-testmodels".into(),
+            author: "Carnegie Mellon University".into(),
+            licence: "CMU: free for research and commercial use".into(),
+        },
+    },
+    Naming {
+        name: "Boxing",
+        joints: [
+            "Hips", "LeftHip", "RightHip", "Ab", "LeftKnee", "RightKnee", "", "LeftAnkle", "RightAnkle", "Chest",
+            "LeftToes", "RightToes", "Neck", "LeftCollar", "RightCollar", "Head", "LeftShoulder", "RightShoulder",
+            "LeftElbow", "RightElbow", "LeftWrist", "RightWrist",
+        ],
+        provenance: || Provenance {
+            source: "Debian assimp-testmodels (BVH/Boxing_Toes.bvh)".into(),
+            author: "assimp contributors".into(),
+            licence: "BSD-3-Clause".into(),
+        },
+    },
+    Naming {
+        name: "mocapbank",
+        joints: [
+            "Hips", "LeftHip", "RightHip", "Chest", "LeftKnee", "RightKnee", "", "LeftAnkle", "RightAnkle", "Chest2",
+            "LeftToe", "RightToe", "Neck", "LeftCollar", "RightCollar", "Head", "LeftShoulder", "RightShoulder",
+            "LeftElbow", "RightElbow", "LeftWrist", "RightWrist",
+        ],
+        provenance: || Provenance {
+            source: "Rust crate bvh_anim 0.4.0 (data/test_mocapbank.bvh)".into(),
+            author: "mocapbank; bvh_anim contributors".into(),
+            licence: "MIT".into(),
+        },
+    },
+];
+
+/// The next joint along the limb, which fixes the bone's direction. Collars are left out on purpose: their rest directions
+/// differ by convention, not by pose.
+const LIMB: [(usize, usize); 10] =
+    [(1, 4), (2, 5), (4, 7), (5, 8), (7, 10), (8, 11), (16, 18), (17, 19), (18, 20), (19, 21)];
+
+/// Joints at the end of a limb have no bone of their own and keep the alignment of the bone before.
+const LIMB_ENDS: [usize; 4] = [10, 11, 20, 21];
+
+const TOES: [usize; 2] = [10, 11];
+
+/// Maps a file's joints to the body joints.
+fn naming_of(bvh: &Bvh) -> Option<(&'static Naming, [Option<usize>; BODY_JOINT_COUNT])> {
+    NAMINGS.iter().find_map(|naming| {
+        let map = naming.joints.map(|name| bvh.joint(name));
+        // Toes are often missing; they then follow the ankle.
+        let complete = (0..BODY_JOINT_COUNT)
+            .all(|j| map[j].is_some() || naming.joints[j].is_empty() || TOES.contains(&j));
+        complete.then_some((naming, map))
+    })
+}
+
+/// Retargets every frame of `bvh` to the 22 body joints of a skeleton whose T-pose joints are `joints`.
+///
+/// Returns `None` if the file's joint names are not known.
+pub fn retarget(bvh: &Bvh, joints: &[[f64; 3]]) -> Option<Vec<Pose>> {
+    let (_, map) = naming_of(bvh)?;
+    let rest = bvh.rest_positions();
+    let bone = |points: &[[f64; 3]], from: usize, to: usize| -> [f64; 3] {
+        std::array::from_fn(|a| points[to][a] - points[from][a])
+    };
+    // A file whose rest skeleton faces elsewhere: turn the body there first. Small asymmetries of a scanned skeleton are not
+    // a facing.
+    let facing = match (map[1], map[2]) {
+        (Some(left), Some(right)) => {
+            let side = bone(&rest, right, left);
+            let yaw = (-side[2]).atan2(side[0]);
+            if yaw.abs() < 0.35 { IDENTITY } else { matrix_from_axis_angle([0.0, yaw, 0.0]) }
+        }
+        _ => IDENTITY,
+    };
+    let mut align = [facing; BODY_JOINT_COUNT];
+    for (joint, next) in LIMB {
+        if let (Some(from), Some(to)) = (map[joint], map[next]) {
+            let direction = apply(&facing, bone(joints, joint, next));
+            align[joint] = product(&between(direction, bone(&rest, from, to)), &facing);
+        }
+    }
+    for end in LIMB_ENDS {
+        if let Some(parent) = BODY_JOINT_PARENTS[end] {
+            align[end] = align[parent];
+        }
+    }
+    let frames = 0..bvh.frame_count();
+    Some(
+        frames
+            .map(|frame| {
+                let source = bvh.world_rotations(frame);
+                let mut world = [IDENTITY; BODY_JOINT_COUNT];
+                let rotations = (0..BODY_JOINT_COUNT)
+                    .map(|j| {
+                        let parent: Matrix3 = BODY_JOINT_PARENTS[j].map_or(IDENTITY, |p| world[p]);
+                        world[j] = map[j].map_or(parent, |b| product(&source[b], &align[j]));
+                        axis_angle_from_matrix(&product(&transpose(&parent), &world[j]))
+                    })
+                    .collect();
+                Pose { rotations }
+            })
+            .collect(),
+    )
+}
+
+/// Largest angle by which any joint but the root turns between two poses [rad].
+fn largest_turn(a: &Pose, b: &Pose) -> f64 {
+    a.rotations.iter().zip(&b.rotations).skip(1).fold(0.0, |largest, (x, y)| {
+        let turn = product(&transpose(&matrix_from_axis_angle(*x)), &matrix_from_axis_angle(*y));
+        f64::max(largest, axis_angle_from_matrix(&turn).iter().map(|x| x * x).sum::<f64>().sqrt())
+    })
+}
+
+/// Whether the first frame does not belong to the motion.
+fn first_frame_is_inserted(poses: &[Pose], settings: &BvhImportSettings) -> bool {
+    if poses.len() < 3 {
+        return false;
+    }
+    let mut steps: Vec<f64> =
+        poses.windows(2).skip(1).take(200).map(|w| largest_turn(&w[0], &w[1])).collect();
+    steps.sort_by(f64::total_cmp);
+    let jump = largest_turn(&poses[0], &poses[1]);
+    jump > settings.inserted_frame_angle && jump > 10.0 * steps[steps.len() / 2]
+}
+
+/// Imports BVH files as motion npz files in the folder `out`, retargeted to `body`. Files that cannot be used are skipped with
+/// their reason.
+///
+/// # Errors
+/// If no file can be used, or a result cannot be written.
+pub fn import_bvh(
+    files: &[PathBuf],
+    body: &Body,
+    out: &Path,
+    settings: &BvhImportSettings,
+    progress: Progress<'_>,
+) -> Result<Summary, BvhImportError> {
+    if files.is_empty() {
+        return Err(BvhImportError::NoInput);
+    }
+    if body.joint_count() < BODY_JOINT_COUNT {
+        return Err(BvhImportError::Body { body: body.name.clone(), joints: body.joint_count() });
+    }
+    let mut summary = Summary::default();
+    let mut total = 0;
+    for (i, file) in files.iter().enumerate() {
+        let shown = file.display().to_string();
+        progress("retargeting", i, files.len());
+        match import_file(file, body, settings) {
+            Ok((motion, note)) => {
+                let path = out.join(format!("{}.npz", motion.name));
+                motion.save(&path)?;
+                total += motion.poses.len();
+                summary.taken.push((motion.name.clone(), note));
+                summary.written.push(path);
+            }
+            Err(reason) => summary.skipped.push((shown, reason)),
+        }
+    }
+    progress("retargeting", files.len(), files.len());
+    match summary.skipped.first() {
+        Some((first, reason)) if summary.taken.is_empty() => Err(BvhImportError::NothingUsable {
+            count: files.len(),
+            first: first.clone(),
+            reason: reason.clone(),
+        }),
+        _ => {
+            summary.notes.push(format!("{total} frames in {} clips", summary.taken.len()));
+            Ok(summary)
+        }
+    }
+}
+
+fn import_file(file: &Path, body: &Body, settings: &BvhImportSettings) -> Result<(Motion, String), String> {
+    let bvh = Bvh::load(file).map_err(|e: BvhError| e.to_string())?;
+    let (Some(mut poses), Some((naming, _))) = (retarget(&bvh, &body.joint_template), naming_of(&bvh)) else {
+        let known: Vec<&str> = NAMINGS.iter().map(|n| n.name).collect();
+        let names: Vec<&str> = bvh.joints.iter().take(6).map(|j| j.name.as_str()).collect();
+        return Err(format!(
+            "joint names {}… follow none of the known skeletons ({})",
+            names.join(", "),
+            known.join(", ")
+        ));
+    };
+    let mut note = String::new();
+    if first_frame_is_inserted(&poses, settings) {
+        poses.remove(0);
+        note.push_str("; dropped frame 0, which jumps to frame 1");
+    }
+    let rate = 1.0 / bvh.frame_time;
+    let step = (rate / settings.frame_rate.max(1e-6)).round().clamp(1.0, 1e6) as usize;
+    let poses: Vec<Pose> = poses.into_iter().step_by(step).collect();
+    let name = file.file_stem().map_or_else(|| "motion".into(), |s| s.to_string_lossy().into_owned());
+    let note = format!(
+        "{} skeleton, {} of {} frames at {rate:.0} frames/s (every {step}.){note}",
+        naming.name,
+        poses.len(),
+        bvh.frame_count()
+    );
+    Ok((Motion { name, frame_rate: rate / step as f64, poses, source: (naming.provenance)() }, note))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fmt::Write as _;
+
+    /// A mocapbank-like skeleton whose rest joints are `rest` (body order), with the given local rotations in degrees
+    /// (z, x, y order) per body joint in each frame.
+    fn synthetic(rest: &[[f64; 3]], frames: &[[[f64; 3]; BODY_JOINT_COUNT]]) -> String {
+        let names = NAMINGS[0].joints;
+        fn joint(text: &mut String, names: &[&str], rest: &[[f64; 3]], j: usize, order: &mut Vec<usize>) {
+            order.push(j);
+            let parent = BODY_JOINT_PARENTS[j].map_or([0.0; 3], |p| rest[p]);
+            let kind = if j == 0 { "ROOT" } else { "JOINT" };
+            let _ = writeln!(
+                text,
+                "{kind} {}\n{{\nOFFSET {} {} {}\nCHANNELS 3 Zrotation Xrotation Yrotation",
+                names[j],
+                rest[j][0] - parent[0],
+                rest[j][1] - parent[1],
+                rest[j][2] - parent[2]
+            );
+            for c in (0..BODY_JOINT_COUNT).filter(|c| BODY_JOINT_PARENTS[*c] == Some(j)) {
+                joint(text, names, rest, c, order);
+            }
+            text.push_str("}\n");
+        }
+        let (mut text, mut order) = ("HIERARCHY\n".to_string(), Vec::new());
+        joint(&mut text, &names, rest, 0, &mut order);
+        let _ = writeln!(text, "MOTION\nFrames: {}\nFrame Time: 0.01", frames.len());
+        for frame in frames {
+            for j in &order {
+                let _ = write!(text, "{} {} {} ", frame[*j][0], frame[*j][1], frame[*j][2]);
+            }
+            text.push('\n');
+        }
+        text
+    }
+
+    fn t_pose_joints() -> Vec<[f64; 3]> {
+        let mut joints = vec![[0.0; 3]; BODY_JOINT_COUNT];
+        for (j, offset) in [
+            (1, [0.1, -0.08, 0.0]),
+            (2, [-0.1, -0.08, 0.0]),
+            (3, [0.0, 0.1, 0.0]),
+            (4, [0.02, -0.4, 0.0]),
+            (5, [-0.02, -0.4, 0.0]),
+            (6, [0.0, 0.15, 0.0]),
+            (7, [0.0, -0.4, -0.03]),
+            (8, [0.0, -0.4, -0.03]),
+            (9, [0.0, 0.1, 0.0]),
+            (10, [0.03, -0.05, 0.12]),
+            (11, [-0.03, -0.05, 0.12]),
+            (12, [0.0, 0.2, 0.0]),
+            (13, [0.07, 0.12, 0.0]),
+            (14, [-0.07, 0.12, 0.0]),
+            (15, [0.0, 0.1, 0.02]),
+            (16, [0.1, 0.03, 0.0]),
+            (17, [-0.1, 0.03, 0.0]),
+            (18, [0.27, 0.0, 0.0]),
+            (19, [-0.27, 0.0, 0.0]),
+            (20, [0.25, 0.0, 0.0]),
+            (21, [-0.25, 0.0, 0.0]),
+        ] {
+            let parent = joints[BODY_JOINT_PARENTS[j].unwrap()];
+            joints[j] = std::array::from_fn(|a| parent[a] + offset[a]);
+        }
+        joints
+    }
+
+    #[test]
+    fn identity_motion_on_the_same_skeleton_is_the_t_pose_and_local_rotations_pass_through() {
+        let joints = t_pose_joints();
+        let mut turned = [[0.0; 3]; BODY_JOINT_COUNT];
+        turned[18] = [0.0, 0.0, 60.0];
+        turned[4] = [0.0, 40.0, 0.0];
+        let text = synthetic(&joints, &[[[0.0; 3]; BODY_JOINT_COUNT], turned]);
+        let bvh = Bvh::parse(&text, Path::new("t.bvh")).unwrap();
+        let poses = retarget(&bvh, &joints).unwrap();
+        assert!(poses[0].rotations.iter().flatten().all(|x| x.abs() < 1e-9), "{:?}", poses[0]);
+        for (j, r) in poses[1].rotations.iter().enumerate() {
+            let expected = match j {
+                18 => [0.0, 60f64.to_radians(), 0.0],
+                4 => [40f64.to_radians(), 0.0, 0.0],
+                _ => [0.0; 3],
+            };
+            assert!(r.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9), "{j}: {r:?}");
+        }
+    }
+
+    #[test]
+    fn a_skeleton_with_hanging_arms_at_rest_gives_hanging_arms_with_straight_wrists() {
+        let joints = t_pose_joints();
+        let mut hanging = joints.clone();
+        for (shoulder, elbow, wrist) in [(16, 18, 20), (17, 19, 21)] {
+            hanging[elbow] = std::array::from_fn(|a| hanging[shoulder][a] + [0.0, -0.27, 0.0][a]);
+            hanging[wrist] = std::array::from_fn(|a| hanging[elbow][a] + [0.0, -0.25, 0.0][a]);
+        }
+        let text = synthetic(&hanging, &[[[0.0; 3]; BODY_JOINT_COUNT]]);
+        let poses = retarget(&Bvh::parse(&text, Path::new("t.bvh")).unwrap(), &joints).unwrap();
+        let down = apply(&matrix_from_axis_angle(poses[0].rotations[16]), [1.0, 0.0, 0.0]);
+        assert!((down[1] + 1.0).abs() < 1e-9);
+        for j in [18, 19, 20, 21] {
+            assert!(poses[0].rotations[j].iter().all(|x| x.abs() < 1e-9), "{j}: {:?}", poses[0].rotations[j]);
+        }
+    }
+
+    #[test]
+    fn a_skeleton_that_faces_backwards_at_rest_still_stands_in_t_pose() {
+        let joints = t_pose_joints();
+        let back: Vec<[f64; 3]> = joints.iter().map(|p| [-p[0], p[1], -p[2]]).collect();
+        let text = synthetic(&back, &[[[0.0; 3]; BODY_JOINT_COUNT]]);
+        let poses = retarget(&Bvh::parse(&text, Path::new("t.bvh")).unwrap(), &joints).unwrap();
+        let (rest, yaw) = poses[0].without_heading();
+        assert!((yaw.abs() - std::f64::consts::PI).abs() < 1e-9);
+        assert!(rest.rotations.iter().flatten().all(|x| x.abs() < 1e-9));
+    }
+
+    #[test]
+    fn an_inserted_first_frame_is_found_and_a_smooth_start_is_not() {
+        let pose = |angle: f64| {
+            let mut pose = Pose::t_pose(22);
+            pose.rotations[16] = [0.0, 0.0, angle];
+            pose
+        };
+        let smooth: Vec<Pose> = (0..50).map(|i| pose(1.0 + 0.01 * i as f64)).collect();
+        let settings = BvhImportSettings::default();
+        assert!(!first_frame_is_inserted(&smooth, &settings));
+        let mut inserted = smooth.clone();
+        inserted.insert(0, pose(0.0));
+        assert!(first_frame_is_inserted(&inserted, &settings));
+    }
+}

@@ -1,0 +1,9 @@
+//! Bodies, garments, poses and the files they come in.
+//!
+//! No networks here. Units are SI, y is up, the body faces +z with its left towards +x and its pelvis at the origin.
+
+pub mod asset;
+pub mod dataset;
+pub mod format;
+pub mod import;
+pub mod generate;

