@@ -1,0 +1,178 @@
+//! Times of the networks, forward and with the backward pass, and of the fused operations beside burn's own.
+//!
+//! `cargo bench -p clothcombo-model --features flex [-- FILTER]`; `RAYON_NUM_THREADS` sets the threads.
+
+use std::hint::black_box;
+use std::time::Duration;
+
+use burn::module::Module;
+use burn::tensor::{Device, Distribution, Tensor};
+use clothcombo_model::ops::{Activation, activate_residual, sine_modulation};
+use clothcombo_model::{
+    BodyTensors, ClothCombo, Dimensions, GarmentArrays, GarmentTensors, ModelConfig, OutfitTensors,
+};
+use criterion::{BenchmarkId, Criterion};
+
+const DIMENSIONS: Dimensions = Dimensions { joints: 22, shape: 16, pose: 132 };
+
+fn random(count: usize, range: f32) -> Vec<f32> {
+    let mut state = 1u32;
+    let mut next = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 8) as f32 / (1 << 24) as f32
+    };
+    (0..count).map(|_| range * (2.0 * next() - 1.0)).collect()
+}
+
+fn garment(vertices: usize, eigen: usize, device: &Device) -> GarmentTensors {
+    let basis = random(vertices * eigen, 2.0);
+    let arrays = GarmentArrays {
+        rest: &random(vertices * 3, 0.6),
+        mass: &vec![1.0 / vertices as f64; vertices],
+        eigenvalues: &(0..eigen).map(|i| 15.0 * i as f64).collect::<Vec<_>>(),
+        eigenvectors: &basis,
+        gradient_x_basis: &basis,
+        gradient_y_basis: &basis,
+        skin_weights: &vec![1.0 / DIMENSIONS.joints as f32; vertices * DIMENSIONS.joints],
+    };
+    GarmentTensors::new(&arrays, DIMENSIONS.joints, device).expect("consistent sizes")
+}
+
+fn config(width: usize, eigen_count: usize, diffusion_blocks: usize) -> ModelConfig {
+    let skinning_width = width.min(128);
+    let (embedding, diffusion_width, siren_width) = (width, width, width);
+    ModelConfig {
+        width,
+        embedding,
+        diffusion_blocks,
+        diffusion_width,
+        eigen_count,
+        siren_width,
+        skinning_width,
+        ..ModelConfig::default()
+    }
+}
+
+fn networks(criterion: &mut Criterion, vertices: usize, config: &ModelConfig) {
+    let device = device();
+    device.seed(1);
+    let model = ClothCombo::new(config, &DIMENSIONS, &device).expect("valid sizes");
+    let bone = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
+    let body = BodyTensors::new(
+        &random(DIMENSIONS.shape, 2.0),
+        &random(DIMENSIONS.pose, 1.0),
+        &vec![bone; DIMENSIONS.joints],
+        &DIMENSIONS,
+        &device,
+    )
+    .expect("consistent sizes");
+    let one = garment(vertices, config.eigen_count, &device);
+    let name = format!("width {} vertices {vertices}", config.width);
+    let mut group = criterion.benchmark_group(&name);
+    group.sample_size(15).measurement_time(Duration::from_secs(2)).warm_up_time(Duration::from_millis(500));
+
+    let plain = model.valid();
+    group.bench_function("encode forward", |bencher| {
+        bencher.iter(|| black_box(plain.encode(&one).vertex.into_data()));
+    });
+    group.bench_function("encode forward+backward", |bencher| {
+        bencher.iter(|| black_box(model.encode(&one).vertex.sum().backward()));
+    });
+    for count in [1, 3] {
+        let garments = vec![&one; count];
+        let outfit = OutfitTensors::new(&garments, &OutfitTensors::all_pairs(count)).expect("valid outfit");
+        let start = || outfit.rest.clone();
+        let embedded: Vec<_> = (0..count).map(|_| plain.encode(&one)).collect();
+        let packed = plain.pack(&outfit, &embedded).expect("matching");
+        let packed = plain.prepare_untangling(&outfit, packed);
+        let single = plain.drape_single(&outfit, &packed, &body, start());
+        group.bench_function(BenchmarkId::new("drape_single forward (packed)", count), |bencher| {
+            bencher
+                .iter(|| black_box(plain.drape_single(&outfit, &packed, &body, start()).posed.into_data()));
+        });
+        group.bench_function(BenchmarkId::new("pack+drape_single forward+backward", count), |bencher| {
+            bencher.iter(|| {
+                let packed = model.pack(&outfit, &embedded).expect("matching");
+                black_box(model.drape_single(&outfit, &packed, &body, start()).posed.sum().backward())
+            });
+        });
+        if count > 1 {
+            group.bench_function(BenchmarkId::new("untangle forward (packed)", count), |bencher| {
+                bencher
+                    .iter(|| black_box(plain.untangle(&outfit, &packed, &single, &body).posed.into_data()));
+            });
+            group.bench_function(BenchmarkId::new("untangle forward+backward (frozen)", count), |bencher| {
+                bencher.iter(|| {
+                    let packed = model.prepare_untangling(&outfit, packed.clone());
+                    black_box(model.untangle(&outfit, &packed, &single, &body).posed.sum().backward())
+                });
+            });
+        }
+        group.bench_function(BenchmarkId::new("end to end forward+backward", count), |bencher| {
+            bencher.iter(|| {
+                let embedded: Vec<_> = (0..count).map(|_| model.encode(&one)).collect();
+                let packed = model.pack(&outfit, &embedded).expect("matching");
+                let single = model.drape_single(&outfit, &packed, &body, start());
+                black_box(model.untangle(&outfit, &packed, &single, &body).posed.sum().backward())
+            });
+        });
+    }
+    group.finish();
+}
+
+fn operations(criterion: &mut Criterion) {
+    let device = device();
+    for (rows, columns) in [(1_100, 64), (1_100, 128), (8_000, 64), (8_000, 128), (8_000, 512)] {
+        let tensor = |rows: usize| {
+            Tensor::<2>::random([rows, columns], Distribution::Normal(0.0, 1.0), &device).require_grad()
+        };
+        let (input, bias, gate) = (tensor(rows), tensor(1), tensor(rows));
+        let mut group = criterion.benchmark_group(format!("operation {rows}x{columns}"));
+        group
+            .sample_size(10)
+            .measurement_time(Duration::from_secs(1))
+            .warm_up_time(Duration::from_millis(200));
+        group.bench_function("sine modulation, fused", |bencher| {
+            bencher.iter(|| {
+                black_box(sine_modulation(input.clone(), bias.clone(), gate.clone(), 1.0).sum().backward())
+            });
+        });
+        group.bench_function("sine modulation, composed", |bencher| {
+            bencher
+                .iter(|| black_box(((input.clone() + bias.clone()).sin() * gate.clone()).sum().backward()));
+        });
+        group.bench_function("gelu, fused", |bencher| {
+            bencher.iter(|| {
+                let output = activate_residual(Activation::Gelu, input.clone(), bias.clone(), gate.clone());
+                black_box(output.sum().backward())
+            });
+        });
+        group.bench_function("gelu, composed", |bencher| {
+            bencher.iter(|| {
+                let sum = input.clone() + bias.clone();
+                let output = burn::tensor::activation::gelu(sum) + gate.clone();
+                black_box(output.sum().backward())
+            });
+        });
+        group.finish();
+    }
+}
+
+fn device() -> Device {
+    #[cfg(feature = "flex")]
+    let device = Device::flex();
+    #[cfg(not(feature = "flex"))]
+    let device = Device::default();
+    device.autodiff()
+}
+
+fn main() {
+    let mut criterion = Criterion::default().configure_from_args();
+    operations(&mut criterion);
+    networks(&mut criterion, 1_100, &config(64, 48, 4));
+    networks(&mut criterion, 2_000, &config(128, 64, 4));
+    if std::env::var_os("CLOTHCOMBO_BENCH_PAPER").is_some() {
+        networks(&mut criterion, 8_000, &config(512, 128, 8));
+    }
+    criterion.final_summary();
+}

@@ -1,0 +1,92 @@
+//! One DiffusionNet block: diffusion, gradient features, MLP, residual.
+
+use burn::module::{Module, Param};
+use burn::tensor::{Device, Tensor};
+
+use super::{ComplexMixing, SpectralDiffusion};
+use crate::linear::{Linear, fan_in_bound, uniform_parameter};
+use crate::ops::{Activation, activate, activate_residual, activate_sum, gradient_features};
+use crate::tensors::GarmentTensors;
+
+/// The block's MLP on [x, x_diff, gradient features]: two hidden ReLU layers and a linear output, all as wide as the block.
+///
+/// Parameters: `input`, `diffused`, `gradient` (each `[C,C]`: the thirds of the first layer's weight), `bias` `[C]`, `hidden`
+/// and `output` (each `weight`, `bias`).
+#[derive(Module, Debug)]
+pub struct BlockMlp {
+    /// First layer, part that acts on the block's input x.
+    pub input: Param<Tensor<2>>,
+    /// First layer, part that acts on x_diff.
+    pub diffused: Param<Tensor<2>>,
+    /// First layer, part that acts on the gradient features.
+    pub gradient: Param<Tensor<2>>,
+    /// Bias of the first layer.
+    pub bias: Param<Tensor<1>>,
+    /// Second hidden layer.
+    pub hidden: Linear,
+    /// Output layer.
+    pub output: Linear,
+}
+
+impl BlockMlp {
+    fn new(width: usize, device: &Device) -> Self {
+        let bound = fan_in_bound(3 * width);
+        let square = || uniform_parameter([width, width], bound, device);
+        Self {
+            input: square(),
+            diffused: square(),
+            gradient: square(),
+            bias: uniform_parameter([width], bound, device),
+            hidden: Linear::new(width, width, device),
+            output: Linear::new(width, width, device),
+        }
+    }
+}
+
+/// One block, C channels in and out.
+///
+/// Parameters: `diffusion.time`, `mixing` (see [`ComplexMixing`]), `mlp` (see [`BlockMlp`]).
+#[derive(Module, Debug)]
+pub struct DiffusionBlock {
+    /// Diffusion times.
+    pub diffusion: SpectralDiffusion,
+    /// Mixing of the gradients.
+    pub mixing: ComplexMixing,
+    /// Pointwise network.
+    pub mlp: BlockMlp,
+}
+
+impl DiffusionBlock {
+    pub(crate) fn new(width: usize, device: &Device) -> Self {
+        Self {
+            diffusion: SpectralDiffusion::new(width, device),
+            mixing: ComplexMixing::new(width, device),
+            mlp: BlockMlp::new(width, device),
+        }
+    }
+
+    /// `[V,C]` → `[V,C]`.
+    pub fn forward(&self, features: Tensor<2>, garment: &GarmentTensors) -> Tensor<2> {
+        let coefficients = garment.projection.clone().matmul(features.clone());
+        let coefficients = self.diffusion.diffuse(coefficients, garment.decay.clone());
+
+        // c and its two mixtures, expanded to both gradient axes of all vertices by one product.
+        let real = coefficients.clone().matmul(self.mixing.real.val());
+        let imaginary = coefficients.clone().matmul(self.mixing.imaginary.val());
+        let mixed = Tensor::cat(vec![coefficients.clone(), real, imaginary], 1);
+        let gradient = gradient_features(garment.gradient_basis.clone().matmul(mixed));
+
+        let hidden = activate_sum(
+            Activation::Relu,
+            [
+                features.clone().matmul(self.mlp.input.val()),
+                garment.basis.clone().matmul(coefficients.matmul(self.mlp.diffused.val())),
+                gradient.matmul(self.mlp.gradient.val()),
+            ],
+            self.mlp.bias.val().unsqueeze(),
+        );
+        let hidden = activate(Activation::Relu, self.mlp.hidden.product(hidden), self.mlp.hidden.bias_row());
+        let output = &self.mlp.output;
+        activate_residual(Activation::Identity, output.product(hidden), output.bias_row(), features)
+    }
+}

@@ -1,0 +1,101 @@
+use super::*;
+use crate::testing::{
+    HostGarment, assert_close, assert_gradients_close, change_parameter, device, parameter_gradients, seeded,
+    weighting,
+};
+
+fn net(width: usize) -> DiffusionNet {
+    let device = device();
+    let mut net = seeded(5, |device| DiffusionNet::new(3, width, 6, device));
+    // Away from the starting times, so that diffusion matters.
+    for (index, block) in net.blocks.iter_mut().enumerate() {
+        let times = (0..width).map(|channel| 0.002 * (channel + index) as f32 - 0.001).collect::<Vec<_>>();
+        let times = Tensor::from_floats(times.as_slice(), &device);
+        block.diffusion.time = crate::linear::parameter(times);
+    }
+    net
+}
+
+fn loss(output: Tensor<2>) -> Tensor<1> {
+    let weights = weighting(output.dims(), &output.device());
+    (output * weights).sum()
+}
+
+#[test]
+fn fast_form_equals_the_published_one_in_values_and_gradients() {
+    let garment = HostGarment::random(150, 20, &[true], 1).tensors(&device());
+    let net = net(12);
+    let (fast, plain) = (net.forward(&garment), plain::forward(&net, &garment));
+    assert_close(&fast.clone().inner(), &plain.clone().inner(), 1e-5);
+    let fast = parameter_gradients(&net, loss(fast));
+    let plain = parameter_gradients(&net, loss(plain));
+    assert!(plain.iter().all(|(_, gradient)| !gradient.is_empty()));
+    assert_gradients_close(&fast, &plain, 1e-5);
+}
+
+#[test]
+fn features_follow_a_permutation_of_the_vertices() {
+    let host = HostGarment::random(90, 10, &[true], 2);
+    let order: Vec<usize> = (0..90).map(|i| i * 37 % 90).collect();
+    let net = net(8).valid();
+    let device = device().inner();
+    let original = net.forward(&host.tensors(&device));
+    let permuted = net.forward(&host.permuted(&order).tensors(&device));
+    let order: Vec<i32> = order.iter().map(|&i| i as i32).collect();
+    let expected = original.select(0, Tensor::from_data(order.as_slice(), &device));
+    assert_close(&permuted, &expected, 1e-5);
+}
+
+#[test]
+fn gradients_match_finite_differences() {
+    let garment = HostGarment::random(60, 12, &[true], 3).tensors(&device());
+    let net = net(6);
+    let gradients = parameter_gradients(&net, loss(net.forward(&garment)));
+    let parameters = [
+        "first.weight",
+        "blocks.0.diffusion.time",
+        "blocks.1.mixing.real",
+        "blocks.1.mixing.imaginary",
+        "blocks.0.mlp.diffused",
+        "blocks.2.mlp.gradient",
+        "blocks.2.mlp.output.bias",
+        "last.weight",
+    ];
+    for name in parameters {
+        let (_, gradient) = gradients.iter().find(|(found, _)| found == name).expect("documented name");
+        let index = (0..gradient.len()).max_by(|&a, &b| gradient[a].abs().total_cmp(&gradient[b].abs()));
+        let index = index.expect("not empty");
+        let step = if name.ends_with("time") { 1e-4 } else { 2e-3 };
+        let value = |change: f32| -> f64 {
+            let changed = change_parameter(net.clone(), name, index, change).valid();
+            f64::from(loss(changed.forward(&garment)).into_scalar::<f32>())
+        };
+        let slope = (value(step) - value(-step)) / f64::from(2.0 * step);
+        let found = f64::from(gradient[index]);
+        assert!((slope - found).abs() < 2e-2 * found.abs(), "{name}[{index}]: {found} {slope}");
+    }
+}
+
+#[test]
+fn a_time_at_its_lower_bound_still_learns() {
+    let device = device();
+    let garment = HostGarment::random(60, 12, &[true], 4).tensors(&device);
+    let net = seeded(6, |device| DiffusionNet::new(1, 6, 6, device));
+    let gradients = parameter_gradients(&net, loss(net.forward(&garment)));
+    let (_, time) = gradients.iter().find(|(name, _)| name == "blocks.0.diffusion.time").expect("name");
+    assert!(time.iter().any(|gradient| gradient.abs() > 0.0));
+    let times = net.blocks[0].diffusion.times().inner();
+    assert!(crate::testing::values(&times).iter().all(|&time| time == 1e-8));
+}
+
+/// Diffusion of an eigenvector multiplies it with e^{−λt}.
+#[test]
+fn diffusion_damps_each_eigenvector_by_its_eigenvalue() {
+    let device = device().inner();
+    let mut diffusion = SpectralDiffusion::new(2, &device);
+    diffusion.time = crate::linear::parameter(Tensor::from_floats([0.1, 0.5], &device));
+    let decay = Tensor::<2>::from_floats([[0.0], [-2.0], [-7.0]], &device);
+    let damped = diffusion.diffuse(Tensor::ones([3, 2], &device), decay);
+    let expected = [[1.0, 1.0], [(-0.2f32).exp(), (-1.0f32).exp()], [(-0.7f32).exp(), (-3.5f32).exp()]];
+    assert_close(&damped, &Tensor::from_floats(expected, &device), 1e-6);
+}

@@ -1,0 +1,70 @@
+//! Single-garment draping: F_s (body and garment to the draping embedding) and D_s (coordinates to a displacement).
+
+use burn::module::Module;
+use burn::tensor::{Device, Tensor};
+
+use crate::config::{Dimensions, ModelConfig};
+use crate::mlp::ResidualMlp;
+use crate::ops::Segments;
+use crate::siren::{ModulatedSiren, SirenSizes};
+use crate::tensors::BodyTensors;
+
+/// F_s and D_s.
+///
+/// Parameters: `embedding` (F_s, see [`ResidualMlp`]), `displacement` (D_s, see [`ModulatedSiren`]).
+#[derive(Module, Debug)]
+pub struct Draping {
+    /// F_s: (z̄_v, β, θ) → z_s.
+    pub embedding: ResidualMlp,
+    /// D_s: (x, [z_s, z_v]) → Δx_s.
+    pub displacement: ModulatedSiren,
+    #[module(skip)]
+    scale: f64,
+}
+
+impl Draping {
+    pub(crate) fn new(config: &ModelConfig, dimensions: &Dimensions, device: &Device) -> Self {
+        let inputs = config.embedding + dimensions.shape + dimensions.pose;
+        let (width, hidden) = (config.width, config.mlp_layers - 1);
+        let sizes = SirenSizes {
+            layers: config.siren_layers,
+            width: config.siren_width,
+            garment_latent: config.width,
+            vertex_latent: config.embedding,
+            omega_first: config.omega_first,
+            omega_hidden: config.omega_hidden,
+        };
+        Self {
+            embedding: ResidualMlp::new(inputs, width, hidden, width, device),
+            displacement: ModulatedSiren::new(&sizes, device),
+            scale: config.displacement_scale,
+        }
+    }
+
+    /// Draping embeddings z_s `[M,width]` of garments with embeddings z̄_v `[M,d]` on one body.
+    pub fn embed(&self, garments: Tensor<2>, body: &BodyTensors) -> Tensor<2> {
+        let count = garments.dims()[0];
+        let on_every_row = |row: &Tensor<2>| {
+            let [_, columns] = row.dims();
+            row.clone().expand([count, columns])
+        };
+        self.embedding
+            .forward(Tensor::cat(vec![garments, on_every_row(&body.shape), on_every_row(&body.pose)], 1))
+    }
+
+    /// The part of D_s that depends on the vertex embedding z_v `[ΣV,d]` only.
+    pub fn vertex_product(&self, vertex: Tensor<2>) -> Tensor<2> {
+        self.displacement.modulator.vertex_product(vertex)
+    }
+
+    /// Displacements Δx_s `[ΣV,3]` in metres.
+    pub fn displace(
+        &self,
+        rest: Tensor<2>,
+        vertex_product: Tensor<2>,
+        draping: Tensor<2>,
+        segments: &Segments,
+    ) -> Tensor<2> {
+        self.displacement.forward(rest, vertex_product, draping, segments) * self.scale
+    }
+}

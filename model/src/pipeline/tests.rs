@@ -1,0 +1,341 @@
+use super::*;
+use crate::linear_blend_skinning;
+use crate::testing::{
+    HostGarment, assert_close, assert_gradients_close, change_parameter, device, parameter_gradients, seeded,
+    uniform, values, weighting,
+};
+use burn::module::{Module, ModuleVisitor};
+
+const DIMENSIONS: Dimensions = Dimensions { joints: 5, shape: 4, pose: 6 };
+
+fn config() -> ModelConfig {
+    ModelConfig {
+        width: 12,
+        embedding: 10,
+        diffusion_blocks: 2,
+        diffusion_width: 8,
+        eigen_count: 9,
+        siren_layers: 3,
+        siren_width: 14,
+        skinning_width: 11,
+        // Large, so that every network shows in the output.
+        displacement_scale: 1.0,
+        untangling_scale: 1.0,
+        skinning_scale: 0.5,
+        ..ModelConfig::default()
+    }
+}
+
+struct Scene {
+    model: ClothCombo,
+    garments: Vec<GarmentTensors>,
+    outfit: OutfitTensors,
+    body: BodyTensors,
+}
+
+fn bones(shift: f64) -> Vec<[[f64; 4]; 3]> {
+    (0..DIMENSIONS.joints)
+        .map(|joint| {
+            let (sine, cosine) = (0.3 * joint as f64 + shift).sin_cos();
+            [[cosine, -sine, 0.0, 0.1], [sine, cosine, 0.0, 0.05 * joint as f64], [0.0, 0.0, 1.0, -0.2]]
+        })
+        .collect()
+}
+
+fn body(shift: f64) -> BodyTensors {
+    let shape: Vec<f32> = (0..DIMENSIONS.shape).map(|i| i as f32 - 1.5 + shift as f32).collect();
+    let pose: Vec<f32> = (0..DIMENSIONS.pose).map(|i| 0.2 * i as f32 - 0.5 + shift as f32).collect();
+    BodyTensors::new(&shape, &pose, &bones(shift), &DIMENSIONS, &device()).expect("valid body")
+}
+
+fn model(seed: u64) -> ClothCombo {
+    seeded(seed, |device| ClothCombo::new(&config(), &DIMENSIONS, device).expect("valid sizes"))
+}
+
+fn scene(contacts: &[(usize, usize)]) -> Scene {
+    let device = device();
+    let used =
+        [[true, true, false, true, false], [true, true, true, true, true], [false, true, false, false, true]];
+    let garments: Vec<GarmentTensors> = used
+        .iter()
+        .zip([41, 30, 55])
+        .enumerate()
+        .map(|(index, (used, vertices))| {
+            HostGarment::random(vertices, 9, used, index as u64).tensors(&device)
+        })
+        .collect();
+    let outfit = OutfitTensors::new(&garments.iter().collect::<Vec<_>>(), contacts).expect("valid outfit");
+    Scene { model: model(3), garments, outfit, body: body(0.0) }
+}
+
+impl Scene {
+    fn embeddings(&self, model: &ClothCombo) -> Embeddings {
+        let garments: Vec<_> = self.garments.iter().map(|garment| model.encode(garment)).collect();
+        model.pack(&self.outfit, &garments).expect("matching embeddings")
+    }
+
+    fn drape(&self, model: &ClothCombo) -> (SingleDrape, LayeredDrape) {
+        let embeddings = self.embeddings(model);
+        let single = model.drape_single(&self.outfit, &embeddings, &self.body, self.outfit.rest.clone());
+        let layered = model.untangle(&self.outfit, &embeddings, &single, &self.body);
+        (single, layered)
+    }
+
+    fn loss(&self, model: &ClothCombo) -> Tensor<1> {
+        loss(self.drape(model).1.posed)
+    }
+}
+
+fn loss(positions: Tensor<2>) -> Tensor<1> {
+    let weights = weighting(positions.dims(), &positions.device());
+    (positions * weights).sum()
+}
+
+#[test]
+fn every_parameter_gets_a_gradient_and_it_matches_finite_differences() {
+    let scene = scene(&OutfitTensors::all_pairs(3));
+    let gradients = parameter_gradients(&scene.model, scene.loss(&scene.model));
+    for (name, gradient) in &gradients {
+        assert!(gradient.iter().any(|value| *value != 0.0), "{name} has no gradient");
+        assert!(gradient.iter().all(|value| value.is_finite()), "{name}");
+    }
+    let parameters = [
+        "garment_encoder.diffusion_net.last.weight",
+        "draping.embedding.hidden.3.weight",
+        "draping.displacement.modulator.garment",
+        "skinning.coordinate",
+        "skinning.output.bias",
+        "untangling.force.first.weight",
+        "untangling.displacement.modulator.vertex",
+        "untangling.displacement.output.weight",
+    ];
+    for name in parameters {
+        let (_, gradient) = gradients.iter().find(|(found, _)| found == name).expect("documented name");
+        let index = (0..gradient.len()).max_by(|&a, &b| gradient[a].abs().total_cmp(&gradient[b].abs()));
+        let index = index.expect("not empty");
+        let value = |change: f32| -> f64 {
+            let changed = change_parameter(scene.model.clone(), name, index, change).valid();
+            let posed = scene.drape(&changed).1.posed;
+            let weights = values(&weighting(posed.dims(), &posed.device()));
+            values(&posed).iter().zip(weights).map(|(p, w)| f64::from(*p) * f64::from(w)).sum()
+        };
+        // Short steps lose digits of f32, long ones cross kinks of the gates: one of them must fit.
+        let found = f64::from(gradient[index]);
+        let slope = |step: f32| (value(step) - value(-step)) / f64::from(2.0 * step);
+        let slopes = [1e-4, 5e-4, 2e-3].map(slope);
+        let fits = slopes.iter().any(|slope| (slope - found).abs() < 2e-2 * found.abs());
+        assert!(fits, "{name}[{index}]: {found} {slopes:?}");
+    }
+}
+
+#[test]
+fn a_packed_outfit_drapes_as_its_garments_alone() {
+    let scene = scene(&[]);
+    let model = scene.model.valid();
+    let (single, _) = scene.drape(&model);
+    for (garment, range) in scene.garments.iter().zip(scene.outfit.ranges()) {
+        let outfit = OutfitTensors::new(&[garment], &[]).expect("one garment");
+        let embeddings = model.pack(&outfit, &[model.encode(garment)]).expect("matching");
+        let alone = model.drape_single(&outfit, &embeddings, &scene.body, outfit.rest.clone());
+        let rows = |packed: &Tensor<2>| packed.clone().narrow(0, range.start, range.len());
+        assert_close(&rows(&single.posed), &alone.posed, 1e-5);
+        assert_close(&rows(&single.canonical), &alone.canonical, 1e-5);
+        assert_close(&rows(&single.skin_weights), &alone.skin_weights, 1e-5);
+    }
+}
+
+#[test]
+fn skin_weights_sum_to_one_and_stay_on_each_garments_joints() {
+    let scene = scene(&[]);
+    let (single, _) = scene.drape(&scene.model.valid());
+    let sums = single.skin_weights.clone().sum_dim(1);
+    assert_close(&sums, &sums.ones_like(), 1e-5);
+    for (garment, range) in scene.garments.iter().zip(scene.outfit.ranges()) {
+        let weights = single.skin_weights.clone().narrow(0, range.start, range.len());
+        let outside = weights.clone() * (garment.joint_mask.clone() * -1.0 + 1.0);
+        assert_eq!(values(&outside).iter().filter(|value| **value != 0.0).count(), 0);
+        let moved = weights - garment.skin_weights.clone();
+        assert!(values(&moved).iter().any(|value| value.abs() > 1e-3), "the correction does nothing");
+    }
+}
+
+#[test]
+fn garments_that_touch_nothing_do_not_move_and_others_do() {
+    let scene = scene(&[(0, 2)]);
+    let (single, layered) = scene.drape(&scene.model.valid());
+    let moved = values(&(layered.canonical - single.canonical));
+    let ranges = scene.outfit.ranges();
+    let of = |garment: usize| &moved[3 * ranges[garment].start..3 * ranges[garment].end];
+    assert!(of(1).iter().all(|value| *value == 0.0));
+    assert!(of(0).iter().any(|value| value.abs() > 1e-5) && of(2).iter().any(|value| value.abs() > 1e-5));
+}
+
+#[test]
+fn without_contact_the_single_drape_is_returned_and_untangling_gets_no_gradient() {
+    let scene = scene(&[]);
+    let (single, layered) = scene.drape(&scene.model);
+    assert_eq!(values(&single.posed.inner()), values(&layered.posed.clone().inner()));
+    let gradients = parameter_gradients(&scene.model, loss(layered.posed));
+    for (name, gradient) in gradients {
+        assert_eq!(gradient.is_empty(), name.starts_with("untangling"), "{name}");
+    }
+}
+
+/// The force sums by loops over ordered pairs.
+#[test]
+fn forces_follow_the_layer_order() {
+    let scene = scene(&[(0, 1), (2, 1)]);
+    let model = scene.model.valid();
+    let (single, layered) = scene.drape(&model);
+    let embedding = |garment: usize| single.draping_embedding.clone().narrow(0, garment, 1);
+    let force =
+        |i: usize, j: usize| model.untangling.force.forward(Tensor::cat(vec![embedding(i), embedding(j)], 1));
+    let zero = || embedding(0).zeros_like();
+    let latent = Tensor::cat(
+        vec![
+            Tensor::cat(vec![zero(), force(0, 1), embedding(0)], 1),
+            Tensor::cat(vec![force(1, 0), force(1, 2), embedding(1)], 1),
+            Tensor::cat(vec![force(2, 1), zero(), embedding(2)], 1),
+        ],
+        0,
+    );
+    let embeddings = scene.embeddings(&model);
+    let product = model.untangling.vertex_product(embeddings.vertex);
+    let displacement = model.untangling.displacement.forward(
+        single.canonical.clone(),
+        product,
+        latent,
+        &scene.outfit.segments,
+    );
+    assert_close(&layered.canonical, &(single.canonical + displacement * config().untangling_scale), 1e-5);
+}
+
+#[test]
+fn a_frozen_first_stage_trains_the_untangling_alone_with_the_same_gradient() {
+    let scene = scene(&OutfitTensors::all_pairs(3));
+    let expected = parameter_gradients(&scene.model.untangling, scene.loss(&scene.model));
+    let frozen = scene.model.valid();
+    let embeddings = scene.embeddings(&frozen);
+    let single = frozen.drape_single(&scene.outfit, &embeddings, &scene.body, scene.outfit.rest.clone());
+    let embeddings = scene.model.prepare_untangling(&scene.outfit, embeddings);
+    let layered = scene.model.untangle(&scene.outfit, &embeddings, &single, &scene.body);
+    let found = parameter_gradients(&scene.model.untangling, loss(layered.posed));
+    assert_gradients_close(&found, &expected, 1e-5);
+}
+
+#[test]
+fn scenes_that_share_embeddings_add_up() {
+    let scene = scene(&OutfitTensors::all_pairs(3));
+    let bodies = [body(0.0), body(0.4)];
+    let drape = |embeddings: &Embeddings, body: &BodyTensors| {
+        let single = scene.model.drape_single(&scene.outfit, embeddings, body, scene.outfit.rest.clone());
+        loss(scene.model.untangle(&scene.outfit, embeddings, &single, body).posed)
+    };
+    let shared = scene.model.prepare_untangling(&scene.outfit, scene.embeddings(&scene.model));
+    let together = drape(&shared, &bodies[0]) + drape(&shared, &bodies[1]);
+    let together = parameter_gradients(&scene.model, together);
+    let apart =
+        bodies.map(|body| parameter_gradients(&scene.model, drape(&scene.embeddings(&scene.model), &body)));
+    let [first, second] = apart;
+    let sum: Vec<_> = first
+        .into_iter()
+        .zip(second)
+        .map(|((name, a), (_, b))| (name, a.iter().zip(&b).map(|(a, b)| a + b).collect()))
+        .collect();
+    assert_gradients_close(&together, &sum, 2e-5);
+}
+
+#[test]
+fn the_seed_fixes_every_weight() {
+    let make = |seed: u64, disturb: bool| {
+        seeded(seed, |device| {
+            let model = ClothCombo::new(&config(), &DIMENSIONS, device).expect("valid sizes");
+            if disturb {
+                // A draw after construction must not reach the weights.
+                let _ = Tensor::<1>::random([7], burn::tensor::Distribution::Default, device).into_data();
+            }
+            weights(&model)
+        })
+    };
+    assert_eq!(make(7, false), make(7, true));
+    assert_ne!(make(7, false), make(8, false));
+}
+
+fn weights(model: &ClothCombo) -> Vec<Vec<f32>> {
+    struct Collect(Vec<Vec<f32>>);
+    impl ModuleVisitor for Collect {
+        fn visit_float<const D: usize>(&mut self, parameter: &Param<Tensor<D>>) {
+            self.0.push(parameter.val().into_data().try_to_vec().expect("f32"));
+        }
+    }
+    let mut collect = Collect(Vec::new());
+    model.visit(&mut collect);
+    collect.0
+}
+
+#[test]
+fn clamping_keeps_parameter_identities_and_gradients() {
+    let model = model(4);
+    let name = "garment_encoder.diffusion_net.blocks.0.diffusion.time";
+    let model = change_parameter(model, name, 1, -0.5);
+    let before = model.garment_encoder.diffusion_net.blocks[0].diffusion.time.id;
+    let model = model.clamp_diffusion_times();
+    let time = &model.garment_encoder.diffusion_net.blocks[0].diffusion.time;
+    assert_eq!(time.id, before);
+    assert!(time.val().is_require_grad());
+    let time: Vec<f32> = time.val().into_data().try_to_vec().expect("f32");
+    assert_eq!(time, vec![1e-8; time.len()]);
+}
+
+#[test]
+fn skinning_with_identity_and_with_one_rigid_transform() {
+    let device = device().inner();
+    let points = uniform(20, 3, 1.0, 1, &device);
+    let weights = uniform(20, 3, 0.45, 2, &device) + 0.55;
+    let weights = weights.clone() / weights.sum_dim(1);
+    let repeat = |bone: [f32; 12]| Tensor::<2>::from_floats([bone, bone, bone], &device);
+    let identity = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+    assert_close(&linear_blend_skinning(points.clone(), weights.clone(), repeat(identity)), &points, 1e-6);
+    // A quarter turn about z and a shift.
+    let turn = [0.0, -1.0, 0.0, 0.5, 1.0, 0.0, 0.0, -0.25, 0.0, 0.0, 1.0, 2.0];
+    let found = values(&linear_blend_skinning(points.clone(), weights, repeat(turn)));
+    for (found, point) in found.chunks_exact(3).zip(values(&points).chunks_exact(3)) {
+        let expected = [0.5 - point[1], point[0] - 0.25, point[2] + 2.0];
+        for axis in 0..3 {
+            assert!((found[axis] - expected[axis]).abs() < 1e-5);
+        }
+    }
+}
+
+#[test]
+fn wrong_sizes_are_named() {
+    let device = device();
+    let host = HostGarment::random(8, 4, &[true, true], 0);
+    let mut arrays = host.arrays();
+    arrays.rest = &arrays.rest[..3];
+    let error = GarmentTensors::new(&arrays, 2, &device).expect_err("too short");
+    assert_eq!(error.to_string(), "rest positions has 3 elements, expected 24 ([V,3], V = number of masses)");
+
+    let mut bad = vec![0.0f32; 24];
+    bad[5] = f32::NAN;
+    let mut arrays = host.arrays();
+    arrays.rest = &bad;
+    let error = GarmentTensors::new(&arrays, 2, &device).expect_err("NaN");
+    assert!(matches!(error, ModelError::NotFinite { array: "rest positions", index: 5, .. }));
+
+    let mut arrays = host.arrays();
+    let massless = vec![0.0; 8];
+    arrays.mass = &massless;
+    assert!(matches!(GarmentTensors::new(&arrays, 2, &device), Err(ModelError::NoMass { .. })));
+
+    assert!(matches!(OutfitTensors::new(&[], &[]), Err(ModelError::Outfit { .. })));
+    let garment = host.tensors(&device);
+    assert!(matches!(OutfitTensors::new(&[&garment], &[(0, 1)]), Err(ModelError::Outfit { garment: 1, .. })));
+    assert!(matches!(OutfitTensors::new(&[&garment], &[(0, 0)]), Err(ModelError::Outfit { .. })));
+    assert!(BodyTensors::new(&[0.0; 3], &[0.0; 6], &bones(0.0), &DIMENSIONS, &device).is_err());
+    let config = ModelConfig { width: 0, ..config() };
+    assert!(matches!(
+        ClothCombo::new(&config, &DIMENSIONS, &device),
+        Err(ModelError::Config { key: "width", .. })
+    ));
+}

@@ -1,0 +1,71 @@
+//! Skinning network S: a correction of the skin weights.
+
+use burn::module::{Module, Param};
+use burn::tensor::{Device, Tensor};
+
+use crate::config::{Dimensions, ModelConfig};
+use crate::linear::{Linear, fan_in_bound, uniform_parameter};
+use crate::mlp::residual_pairs;
+use crate::ops::{Activation, segment_activate, skin_correction};
+use crate::tensors::OutfitTensors;
+
+/// S: (x, z_s, z_v) → ΔW.
+///
+/// Parameters: `coordinate` `[3,w]`, `garment` `[width,w]`, `vertex` `[d,w]` (parts of the first layer's weight that act on
+/// x, z_s and z_v), `bias` `[w]`, `hidden.{0…}` and `output` (each `weight`, `bias`).
+#[derive(Module, Debug)]
+pub struct Skinning {
+    /// First layer, part that acts on the rest position x.
+    pub coordinate: Param<Tensor<2>>,
+    /// First layer, part that acts on the draping embedding z_s.
+    pub garment: Param<Tensor<2>>,
+    /// First layer, part that acts on the vertex embedding z_v.
+    pub vertex: Param<Tensor<2>>,
+    /// Bias of the first layer.
+    pub bias: Param<Tensor<1>>,
+    /// Further hidden layers.
+    pub hidden: Vec<Linear>,
+    /// One value per joint.
+    pub output: Linear,
+    #[module(skip)]
+    scale: f64,
+    #[module(skip)]
+    zero_sum: bool,
+}
+
+impl Skinning {
+    pub(crate) fn new(config: &ModelConfig, dimensions: &Dimensions, device: &Device) -> Self {
+        let width = config.skinning_width;
+        let bound = fan_in_bound(3 + config.width + config.embedding);
+        Self {
+            coordinate: uniform_parameter([3, width], bound, device),
+            garment: uniform_parameter([config.width, width], bound, device),
+            vertex: uniform_parameter([config.embedding, width], bound, device),
+            bias: uniform_parameter([width], bound, device),
+            hidden: (1..config.skinning_layers).map(|_| Linear::new(width, width, device)).collect(),
+            output: Linear::new(width, dimensions.joints, device),
+            scale: config.skinning_scale,
+            zero_sum: config.zero_sum_skinning,
+        }
+    }
+
+    /// The part of the first layer that depends on the vertices only `[ΣV,w]`.
+    pub fn vertex_product(&self, rest: Tensor<2>, vertex: Tensor<2>) -> Tensor<2> {
+        rest.matmul(self.coordinate.val()) + vertex.matmul(self.vertex.val())
+    }
+
+    /// Skin weights W + ΔW `[ΣV,J]`; ΔW is zero outside each garment's joints.
+    pub fn weights(
+        &self,
+        outfit: &OutfitTensors,
+        vertex_product: Tensor<2>,
+        draping: Tensor<2>,
+    ) -> Tensor<2> {
+        let segments = &outfit.segments;
+        let rows = draping.matmul(self.garment.val()) + self.bias.val().unsqueeze();
+        let features = segment_activate(Activation::Gelu, vertex_product, rows, segments);
+        let raw = self.output.forward(residual_pairs(&self.hidden, features));
+        let (weights, mask) = (outfit.skin_weights.clone(), outfit.joint_mask.clone());
+        skin_correction(weights, raw, mask, segments, self.scale, self.zero_sum)
+    }
+}

@@ -1,0 +1,175 @@
+//! The garments worn together, packed into one set of tensors.
+
+use std::ops::Range;
+
+use burn::tensor::Tensor;
+
+use super::{GarmentTensors, matrix};
+use crate::error::ModelError;
+use crate::ops::Segments;
+
+/// Which garments press on which: one row per ordered pair of garments that can touch.
+#[derive(Clone, Debug)]
+pub(crate) struct ForceEdges {
+    /// One-hot receiver i of every edge `[E,M]`.
+    pub receiver: Tensor<2>,
+    /// One-hot sender j of every edge `[E,M]`.
+    pub sender: Tensor<2>,
+    /// Adds up edges whose sender lies below the receiver, j < i `[M,E]`.
+    pub from_below: Tensor<2>,
+    /// Adds up edges whose sender lies above the receiver, j > i `[M,E]`.
+    pub from_above: Tensor<2>,
+    /// One for every vertex of a garment with an edge, zero elsewhere `[ΣV,1]`; absent if every garment has one.
+    pub touched: Option<Tensor<2>>,
+}
+
+/// M garments, inner to outer, packed along the vertices (ΣV of them).
+#[derive(Clone, Debug)]
+pub struct OutfitTensors {
+    /// Rest positions `[ΣV,3]` in metres: the coordinates the networks see.
+    pub rest: Tensor<2>,
+    /// Initial skin weights `[ΣV,J]`.
+    pub skin_weights: Tensor<2>,
+    /// Active joints of each garment, 0 or 1 `[M,J]`.
+    pub joint_mask: Tensor<2>,
+    pub(crate) segments: Segments,
+    pub(crate) edges: Option<ForceEdges>,
+}
+
+impl OutfitTensors {
+    /// Packs garments, inner to outer.
+    ///
+    /// `contacts` lists the unordered pairs (a, b) of garments that can touch; repeated pairs count once.
+    ///
+    /// # Errors
+    /// No garment at all, garments with different numbers of joints, or a pair that names a garment that is not there
+    /// or twice the same.
+    pub fn new(garments: &[&GarmentTensors], contacts: &[(usize, usize)]) -> Result<Self, ModelError> {
+        let Some(first) = garments.first() else {
+            return Err(ModelError::Outfit {
+                garment: 0,
+                reason: "an outfit needs at least one garment".into(),
+            });
+        };
+        for (garment, tensors) in garments.iter().enumerate() {
+            if tensors.joint_count() != first.joint_count() {
+                let reason =
+                    format!("{} joints, the innermost has {}", tensors.joint_count(), first.joint_count());
+                return Err(ModelError::Outfit { garment, reason });
+            }
+        }
+        let count = garments.len();
+        let mut pairs = Vec::with_capacity(contacts.len());
+        for &(a, b) in contacts {
+            let highest = a.max(b);
+            if highest >= count || a == b {
+                let reason = format!("contact ({a}, {b}) needs two different garments below {count}");
+                return Err(ModelError::Outfit { garment: highest, reason });
+            }
+            pairs.push((a.min(b), highest));
+        }
+        pairs.sort_unstable();
+        pairs.dedup();
+
+        let device = first.rest.device();
+        let segments = Segments::new(garments.iter().map(|garment| garment.vertex_count()));
+        let edges = ForceEdges::new(&pairs, &segments, &device);
+        Ok(Self {
+            rest: stack(garments, |garment| &garment.rest),
+            skin_weights: stack(garments, |garment| &garment.skin_weights),
+            joint_mask: stack(garments, |garment| &garment.joint_mask),
+            segments,
+            edges,
+        })
+    }
+
+    /// Every pair of `count` garments: the contacts of an outfit about which nothing is known.
+    pub fn all_pairs(count: usize) -> Vec<(usize, usize)> {
+        (0..count).flat_map(|a| (a + 1..count).map(move |b| (a, b))).collect()
+    }
+
+    /// Number of garments M.
+    pub fn garment_count(&self) -> usize {
+        self.segments.count()
+    }
+
+    /// Number of vertices of all garments, ΣV.
+    pub fn vertex_count(&self) -> usize {
+        self.segments.rows()
+    }
+
+    /// Rows of each garment in the packed tensors.
+    pub fn ranges(&self) -> Vec<Range<usize>> {
+        self.segments.ranges()
+    }
+
+    /// How the packed rows belong to the garments.
+    pub fn segments(&self) -> &Segments {
+        &self.segments
+    }
+
+    /// Whether any two garments can touch, so that untangling has something to do.
+    pub fn has_contacts(&self) -> bool {
+        self.edges.is_some()
+    }
+}
+
+impl ForceEdges {
+    fn new(pairs: &[(usize, usize)], segments: &Segments, device: &burn::tensor::Device) -> Option<Self> {
+        if pairs.is_empty() {
+            return None;
+        }
+        let garments = segments.count();
+        // (receiver, sender), both directions of every contact.
+        let edges: Vec<(usize, usize)> = pairs.iter().flat_map(|&(a, b)| [(a, b), (b, a)]).collect();
+        let one_hot = |rows: usize, columns: usize, ones: &mut dyn Iterator<Item = (usize, usize)>| {
+            let mut values = vec![0.0_f32; rows * columns];
+            for (row, column) in ones {
+                values[row * columns + column] = 1.0;
+            }
+            matrix(values, rows, columns, device)
+        };
+        let count = edges.len();
+        let numbered = || edges.iter().copied().enumerate();
+        let receiver = one_hot(count, garments, &mut numbered().map(|(edge, (i, _))| (edge, i)));
+        let sender = one_hot(count, garments, &mut numbered().map(|(edge, (_, j))| (edge, j)));
+        let from_below = one_hot(
+            garments,
+            count,
+            &mut numbered().filter(|(_, (i, j))| j < i).map(|(edge, (i, _))| (i, edge)),
+        );
+        let from_above = one_hot(
+            garments,
+            count,
+            &mut numbered().filter(|(_, (i, j))| j > i).map(|(edge, (i, _))| (i, edge)),
+        );
+        let mut has_edge = vec![false; garments];
+        for &(receiver, _) in &edges {
+            has_edge[receiver] = true;
+        }
+        let touched = (!has_edge.iter().all(|&edge| edge)).then(|| {
+            let mut rows = vec![0.0_f32; segments.rows()];
+            for (range, _) in segments.ranges().into_iter().zip(&has_edge).filter(|(_, edge)| **edge) {
+                rows[range].fill(1.0);
+            }
+            matrix(rows, segments.rows(), 1, device)
+        });
+        Some(Self { receiver, sender, from_below, from_above, touched })
+    }
+}
+
+/// Concatenates one tensor of every garment along the rows; a lone garment's tensor is shared, not copied.
+pub(crate) fn stack(
+    garments: &[&GarmentTensors],
+    field: impl Fn(&GarmentTensors) -> &Tensor<2>,
+) -> Tensor<2> {
+    stack_rows(garments.iter().map(|garment| field(garment).clone()).collect())
+}
+
+/// Concatenates along the rows; a lone tensor is returned as it is.
+pub(crate) fn stack_rows(mut tensors: Vec<Tensor<2>>) -> Tensor<2> {
+    match tensors.len() {
+        1 => tensors.remove(0),
+        _ => Tensor::cat(tensors, 0),
+    }
+}

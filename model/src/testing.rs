@@ -1,0 +1,241 @@
+//! What the tests of this crate share.
+
+use std::sync::{Mutex, PoisonError};
+
+use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
+use burn::tensor::{Device, Gradients, Tensor, TensorData};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use crate::tensors::{GarmentArrays, GarmentTensors};
+
+/// The autodiff device the tests run on.
+pub(crate) fn device() -> Device {
+    #[cfg(feature = "flex")]
+    let device = Device::flex();
+    #[cfg(all(not(feature = "flex"), feature = "ndarray"))]
+    #[allow(deprecated)]
+    let device = Device::ndarray();
+    #[cfg(all(not(feature = "flex"), not(feature = "ndarray")))]
+    let device = Device::default();
+    device.autodiff()
+}
+
+/// The elements of a tensor.
+pub(crate) fn values(tensor: &Tensor<2>) -> Vec<f32> {
+    tensor.to_data().try_to_vec().expect("f32")
+}
+
+/// Largest difference of two tensors over the largest element of the second.
+pub(crate) fn relative_difference(found: &Tensor<2>, expected: &Tensor<2>) -> f64 {
+    assert_eq!(found.dims(), expected.dims());
+    let (found, expected) = (values(found), values(expected));
+    let scale = expected.iter().fold(0.0f64, |scale, value| scale.max(f64::from(value.abs())));
+    let difference = found.iter().zip(&expected).map(|(a, b)| f64::from((a - b).abs()));
+    difference.fold(0.0, |worst, value| if value.is_nan() { f64::INFINITY } else { f64::max(worst, value) })
+        / scale.max(1e-12)
+}
+
+/// Fails if two tensors differ by more than `tolerance` of the largest element.
+#[track_caller]
+pub(crate) fn assert_close(found: &Tensor<2>, expected: &Tensor<2>, tolerance: f64) {
+    let difference = relative_difference(found, expected);
+    assert!(difference <= tolerance, "relative difference {difference:e} > {tolerance:e}");
+}
+
+/// Output of a function and the gradients of all its inputs under a fixed random weighting of the output.
+pub(crate) fn gradients_of(
+    inputs: &[Tensor<2>],
+    function: impl Fn(Vec<Tensor<2>>) -> Tensor<2>,
+) -> (Tensor<2>, Vec<Tensor<2>>) {
+    let inputs: Vec<_> = inputs.iter().map(|input| input.clone().detach().require_grad()).collect();
+    let output = function(inputs.clone());
+    let weights = weighting(output.dims(), &output.device());
+    let gradients = (output.clone() * weights).sum().backward();
+    let gradients = inputs.iter().map(|input| match input.grad(&gradients) {
+        Some(gradient) => gradient,
+        None => input.clone().inner().zeros_like(),
+    });
+    (output.inner(), gradients.collect())
+}
+
+/// The same irregular weights for the same shape.
+pub(crate) fn weighting([rows, columns]: [usize; 2], device: &Device) -> Tensor<2> {
+    let values: Vec<f32> = (0..rows * columns).map(|i| ((i * 37 % 101) as f32 / 50.0) - 1.0).collect();
+    Tensor::<1>::from_floats(values.as_slice(), &device.clone().inner()).reshape([rows, columns])
+}
+
+/// Uniform values in ±`range`, the same for the same arguments.
+pub(crate) fn uniform(rows: usize, columns: usize, range: f32, seed: u64, device: &Device) -> Tensor<2> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let values: Vec<f32> = (0..rows * columns).map(|_| rng.random_range(-range..range)).collect();
+    Tensor::from_data(TensorData::new(values, [rows, columns]), &device.clone().inner())
+}
+
+/// Makes something from device random numbers; burn's generator is one for the process, hence one at a time.
+pub(crate) fn seeded<T>(seed: u64, make: impl FnOnce(&Device) -> T) -> T {
+    static GENERATOR: Mutex<()> = Mutex::new(());
+    let _lock = GENERATOR.lock().unwrap_or_else(PoisonError::into_inner);
+    let device = device();
+    device.seed(seed);
+    make(&device)
+}
+
+/// A garment with `vertices` vertices and `eigen` eigenpairs of plausible size; algebra does not ask for more.
+pub(crate) struct HostGarment {
+    rest: Vec<f32>,
+    mass: Vec<f64>,
+    eigenvalues: Vec<f64>,
+    eigenvectors: Vec<f32>,
+    gradient_x: Vec<f32>,
+    gradient_y: Vec<f32>,
+    skin_weights: Vec<f32>,
+    joints: usize,
+}
+
+impl HostGarment {
+    /// Only joints with `used[j]` carry weight.
+    pub(crate) fn random(vertices: usize, eigen: usize, used: &[bool], seed: u64) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut draw = |count: usize, low: f32, high: f32| -> Vec<f32> {
+            (0..count).map(|_| rng.random_range(low..high)).collect()
+        };
+        let mass: Vec<f64> = draw(vertices, 1e-4, 3e-4).into_iter().map(f64::from).collect();
+        let size = 1.0 / (mass.iter().sum::<f64>().sqrt() as f32);
+        let mut skin_weights = draw(vertices * used.len(), 0.1, 1.0);
+        for row in skin_weights.chunks_exact_mut(used.len()) {
+            for (weight, used) in row.iter_mut().zip(used) {
+                if !used {
+                    *weight = 0.0;
+                }
+            }
+            let sum: f32 = row.iter().sum();
+            row.iter_mut().for_each(|weight| *weight /= sum);
+        }
+        Self {
+            rest: draw(vertices * 3, -0.6, 0.6),
+            mass,
+            eigenvalues: (0..eigen).map(|i| 15.0 * i as f64).collect(),
+            eigenvectors: draw(vertices * eigen, -size, size),
+            gradient_x: draw(vertices * eigen, -10.0 * size, 10.0 * size),
+            gradient_y: draw(vertices * eigen, -10.0 * size, 10.0 * size),
+            skin_weights,
+            joints: used.len(),
+        }
+    }
+
+    /// The garment with its vertices in the given order.
+    pub(crate) fn permuted(&self, order: &[usize]) -> Self {
+        fn rows<T: Copy>(values: &[T], order: &[usize]) -> Vec<T> {
+            let columns = values.len() / order.len();
+            order.iter().flat_map(|&row| values[row * columns..(row + 1) * columns].iter().copied()).collect()
+        }
+        Self {
+            rest: rows(&self.rest, order),
+            mass: rows(&self.mass, order),
+            eigenvalues: self.eigenvalues.clone(),
+            eigenvectors: rows(&self.eigenvectors, order),
+            gradient_x: rows(&self.gradient_x, order),
+            gradient_y: rows(&self.gradient_y, order),
+            skin_weights: rows(&self.skin_weights, order),
+            joints: self.joints,
+        }
+    }
+
+    pub(crate) fn arrays(&self) -> GarmentArrays<'_> {
+        GarmentArrays {
+            rest: &self.rest,
+            mass: &self.mass,
+            eigenvalues: &self.eigenvalues,
+            eigenvectors: &self.eigenvectors,
+            gradient_x_basis: &self.gradient_x,
+            gradient_y_basis: &self.gradient_y,
+            skin_weights: &self.skin_weights,
+        }
+    }
+
+    pub(crate) fn tensors(&self, device: &Device) -> GarmentTensors {
+        GarmentTensors::new(&self.arrays(), self.joints, device).expect("valid arrays")
+    }
+}
+
+/// Gradients of every parameter of a module under one loss, in visit order, with their names.
+pub(crate) fn parameter_gradients<M: Module>(module: &M, loss: Tensor<1>) -> Vec<(String, Vec<f32>)> {
+    struct Collect<'a> {
+        gradients: &'a Gradients,
+        path: Vec<String>,
+        found: Vec<(String, Vec<f32>)>,
+    }
+    impl ModuleVisitor for Collect<'_> {
+        fn enter_module(&mut self, name: &str, _: &str) {
+            self.path.push(name.to_owned());
+        }
+        fn exit_module(&mut self, _: &str, _: &str) {
+            self.path.pop();
+        }
+        fn visit_float<const D: usize>(&mut self, parameter: &Param<Tensor<D>>) {
+            let gradient = parameter.val().grad(self.gradients);
+            let gradient = gradient.map_or_else(Vec::new, |g| g.into_data().try_to_vec().expect("f32"));
+            self.found.push((self.path.join("."), gradient));
+        }
+    }
+    let gradients = loss.backward();
+    let mut collect = Collect { gradients: &gradients, path: Vec::new(), found: Vec::new() };
+    module.visit(&mut collect);
+    collect.found
+}
+
+/// Fails unless both lists name the same parameters and every gradient agrees to `tolerance` of its largest element.
+#[track_caller]
+pub(crate) fn assert_gradients_close(
+    found: &[(String, Vec<f32>)],
+    expected: &[(String, Vec<f32>)],
+    tolerance: f32,
+) {
+    assert_eq!(found.len(), expected.len());
+    for ((name, found), (other, expected)) in found.iter().zip(expected) {
+        assert_eq!((name, found.len()), (other, expected.len()));
+        let scale = expected.iter().fold(1e-12f32, |scale, value| scale.max(value.abs()));
+        for (found, expected) in found.iter().zip(expected) {
+            assert!(
+                (found - expected).abs() <= tolerance * scale,
+                "{name}: {found} {expected} (scale {scale})"
+            );
+        }
+    }
+}
+
+/// Replaces one element of the parameter called `name` by `change(element)`.
+pub(crate) fn change_parameter<M: Module>(module: M, name: &str, index: usize, change: f32) -> M {
+    struct Change<'a> {
+        name: &'a str,
+        path: Vec<String>,
+        index: usize,
+        change: f32,
+        done: bool,
+    }
+    impl ModuleMapper for Change<'_> {
+        fn enter_module(&mut self, name: &str, _: &str) {
+            self.path.push(name.to_owned());
+        }
+        fn exit_module(&mut self, _: &str, _: &str) {
+            self.path.pop();
+        }
+        fn map_float<const D: usize>(&mut self, parameter: Param<Tensor<D>>) -> Param<Tensor<D>> {
+            if self.path.join(".") != self.name {
+                return parameter;
+            }
+            self.done = true;
+            let (id, value, mapper) = parameter.consume();
+            let (shape, device) = (value.shape(), value.device());
+            let mut values: Vec<f32> = value.inner().into_data().try_to_vec().expect("f32");
+            values[self.index] += self.change;
+            let value = Tensor::from_data(TensorData::new(values, shape), &device);
+            Param::from_mapped_value(id, value.require_grad(), mapper)
+        }
+    }
+    let mut mapper = Change { name, path: Vec::new(), index, change, done: false };
+    let module = module.map(&mut mapper);
+    assert!(mapper.done, "no parameter is called {name}");
+    module
+}
