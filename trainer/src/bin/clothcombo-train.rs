@@ -1,0 +1,11 @@
+//! Trains the networks: `clothcombo-train --config configs/smoke.toml`.
+
+use clap::Parser;
+use clothcombo_trainer::cli;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let arguments = cli::train::Arguments::parse();
+    cli::start_logging(arguments.log_level());
+    cli::exit_code(cli::train::run(&arguments))
+}

@@ -1,0 +1,29 @@
+//! Everything around training: making and importing data.
+
+use clap::{Parser, Subcommand};
+use clothcombo_trainer::cli;
+use std::process::ExitCode;
+
+/// Learned draping of multi-layered clothing: data in, garments on bodies out.
+#[derive(Parser)]
+#[command(version, about, after_help = "Train with clothcombo-train. Every verb has its own --help with examples.")]
+struct Arguments {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Subcommand)]
+enum Verb {
+    Generate(cli::generate::Arguments),
+    #[command(subcommand)]
+    Import(cli::import::Source),
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    cli::start_logging("info");
+    cli::exit_code(match &arguments.verb {
+        Verb::Generate(arguments) => cli::generate::run(arguments),
+        Verb::Import(source) => cli::import::run(source),
+    })
+}

@@ -1,0 +1,26 @@
+//! The command lines of the two programs.
+
+pub mod generate;
+pub mod import;
+pub mod train;
+
+use miette::Report;
+use tracing_subscriber::EnvFilter;
+
+/// Log lines on stderr; `RUST_LOG` overrides `default`.
+pub fn start_logging(default: &str) {
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(default));
+    // A second call (tests run several sessions in one process) keeps the first subscriber.
+    let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).try_init();
+}
+
+/// Exit code of a program that ended with `result`; an error is printed once, with its place and hint.
+pub fn exit_code(result: Result<(), Report>) -> std::process::ExitCode {
+    match result {
+        Ok(()) => std::process::ExitCode::SUCCESS,
+        Err(report) => {
+            eprintln!("{report:?}");
+            std::process::ExitCode::FAILURE
+        }
+    }
+}

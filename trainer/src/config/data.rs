@@ -1,0 +1,180 @@
+//! Where bodies, garments and poses come from, and the state the networks start from.
+
+use clothcombo_data::asset::Category;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// Body, garments, poses.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DataConfig {
+    /// `"mannequin"` (built in), or the path of a body model in SMPL / SMPL-H / SMPL-X npz form.
+    #[serde(default = "mannequin")]
+    pub body: String,
+    /// Shape components used; 0 takes all the body has.
+    #[serde(default)]
+    pub shape_components: usize,
+    /// Every shape component is drawn uniformly from this range.
+    #[serde(default = "shape_range")]
+    pub shape_range: [f64; 2],
+    /// Sources of garments, all used together.
+    pub garments: Vec<GarmentSource>,
+    /// Garments of these names are never trained on.
+    #[serde(default)]
+    pub held_out_garments: Vec<String>,
+    /// Garments with more vertices than this are refused before training.
+    #[serde(default = "max_vertices")]
+    pub max_vertices: usize,
+    /// Poses.
+    #[serde(default)]
+    pub poses: PoseConfig,
+    /// Folder of the operator cache; empty keeps operators in memory only.
+    #[serde(default)]
+    pub cache: Option<PathBuf>,
+}
+
+fn mannequin() -> String {
+    "mannequin".into()
+}
+fn shape_range() -> [f64; 2] {
+    [-2.0, 2.0]
+}
+fn max_vertices() -> usize {
+    20_000
+}
+
+/// One source of garments: a folder, or the generator.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GarmentSource {
+    /// Folder of OBJ garments with an optional `garments.toml`.
+    #[serde(default)]
+    pub folder: Option<PathBuf>,
+    /// Garments made by the built-in generator.
+    #[serde(default)]
+    pub generate: Option<GenerateConfig>,
+}
+
+/// Settings of the built-in generator.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GenerateConfig {
+    /// Number of garments; categories are taken in turn.
+    pub count: usize,
+    /// First seed; garment i uses seed + i.
+    #[serde(default)]
+    pub seed: u64,
+    /// Categories, taken in turn.
+    #[serde(default = "all_categories")]
+    pub categories: Vec<Category>,
+    /// Vertices per garment, about.
+    #[serde(default = "thousand")]
+    pub vertices: usize,
+}
+
+fn all_categories() -> Vec<Category> {
+    Category::ALL.to_vec()
+}
+fn thousand() -> usize {
+    1000
+}
+
+/// How a pose enters the networks.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PoseEncoding {
+    /// Rotation matrix minus identity, 9 numbers per joint: continuous, as in SMPL's pose feature.
+    #[default]
+    RotationMatrix,
+    /// Axis times angle, 3 numbers per joint (the paper's θ).
+    AxisAngle,
+}
+
+/// Poses and their augmentation.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PoseConfig {
+    /// Folder of motion npz files; without it poses are drawn within joint limits.
+    pub motions: Option<PathBuf>,
+    /// Clips whose name contains one of these are never trained on: validation on unseen motion.
+    pub held_out_clips: Vec<String>,
+    /// Share of every other clip that is never trained on, in blocks spread over the clip: validation on the trained
+    /// kinds of motion.
+    pub held_out_share: f64,
+    /// Length of such a block [s]; long against the time in which a pose changes.
+    pub held_out_block: f64,
+    /// Mirror, exchange of limbs between frames, scaling of joints, noise.
+    pub augmentation: bool,
+    /// Encoding of the pose as network input.
+    pub encoding: PoseEncoding,
+    /// Turn every pose to face +z: gravity and contact are blind to heading. Off feeds the full root rotation.
+    pub remove_heading: bool,
+}
+
+impl Default for PoseConfig {
+    fn default() -> Self {
+        Self {
+            motions: None,
+            held_out_clips: Vec::new(),
+            held_out_share: 0.1,
+            held_out_block: 2.0,
+            augmentation: true,
+            encoding: PoseEncoding::RotationMatrix,
+            remove_heading: true,
+        }
+    }
+}
+
+/// The state the networks displace: the paper's is the rest garment with the nearest body vertex's skin weights.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct StartConfig {
+    /// Smooth the initial skin weights over the garment.
+    pub smooth_weights: bool,
+    /// Laplacian iterations.
+    pub smoothing_iterations: usize,
+    /// Laplacian iterations for skirts and dresses, which span the gap between the legs.
+    pub skirt_smoothing_iterations: usize,
+    /// Add the body's smoothed shape displacement to the rest garment before draping.
+    pub shape_transfer: bool,
+}
+
+impl Default for StartConfig {
+    fn default() -> Self {
+        Self {
+            smooth_weights: true,
+            smoothing_iterations: 30,
+            skirt_smoothing_iterations: 100,
+            shape_transfer: true,
+        }
+    }
+}
+
+impl DataConfig {
+    /// What is inconsistent, as (place, what, hint).
+    pub(crate) fn problem(&self) -> Option<(String, String, String)> {
+        let says = |p: &str, w: &str, h: &str| Some((p.into(), w.into(), h.into()));
+        let [low, high] = self.shape_range;
+        if !(low.is_finite() && high.is_finite() && low <= high) {
+            return says("data.shape_range", "is not a range [low, high]", "the paper uses [-2.0, 2.0]");
+        }
+        if !(self.poses.held_out_share > 0.0 && self.poses.held_out_share < 1.0) {
+            return says("data.poses.held_out_share", "is not a share between 0 and 1", "for example 0.1");
+        }
+        if !(self.poses.held_out_block.is_finite() && self.poses.held_out_block > 0.0) {
+            return says("data.poses.held_out_block", "is not a positive time", "for example 2.0 seconds");
+        }
+        for (i, source) in self.garments.iter().enumerate() {
+            if let Some(g) = &source.generate
+                && (g.count == 0 || g.categories.is_empty() || g.vertices < 50)
+            {
+                return Some((
+                    format!("data.garments[{i}].generate"),
+                    "needs count ≥ 1, at least one category, and at least 50 vertices".into(),
+                    "for example { count = 12, vertices = 1000 }".into(),
+                ));
+            }
+        }
+        None
+    }
+}

@@ -1,0 +1,183 @@
+//! Reading a configuration: file, then `--set` overrides, then consistency; errors show the place.
+
+use super::Config;
+use miette::{Diagnostic, NamedSource, SourceSpan};
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Why a configuration cannot be used.
+#[derive(Debug, Error, Diagnostic)]
+pub enum ConfigError {
+    /// The file cannot be read.
+    #[error("cannot read the configuration {}: {reason}", path.display())]
+    #[diagnostic(help("pass an existing file with --config, for example configs/smoke.toml"))]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        reason: std::io::Error,
+    },
+    /// The file is not valid.
+    #[error("{message}")]
+    #[diagnostic(help("every key and its meaning is documented in trainer/src/config; configs/smoke.toml is a short example"))]
+    Invalid {
+        /// What is wrong.
+        message: String,
+        /// The file's text.
+        #[source_code]
+        source_code: NamedSource<String>,
+        /// Where.
+        #[label("here")]
+        span: Option<SourceSpan>,
+    },
+    /// An override is not valid.
+    #[error("--set {setting}: {message}")]
+    #[diagnostic(help("write --set section.key=value, for example --set stages.0.steps=100 or --set losses.strain.weight=2.0"))]
+    BadOverride {
+        /// The override as given.
+        setting: String,
+        /// What is wrong.
+        message: String,
+    },
+    /// Values contradict each other.
+    #[error("{place} {what} ({})", path.display())]
+    Inconsistent {
+        /// The file.
+        path: PathBuf,
+        /// The key.
+        place: String,
+        /// What is wrong.
+        what: String,
+        /// How to mend it.
+        #[help]
+        hint: String,
+    },
+}
+
+/// Reads `path`, applies `overrides` (`a.b=value`; list elements by index) in order, and checks the result.
+///
+/// # Errors
+/// [`ConfigError`] names the line of the file, or the override, at fault.
+pub fn load(path: &Path, overrides: &[String]) -> Result<Config, ConfigError> {
+    let text = std::fs::read_to_string(path)
+        .map_err(|reason| ConfigError::Unreadable { path: path.to_owned(), reason })?;
+    let invalid = |error: toml::de::Error| ConfigError::Invalid {
+        message: error.message().to_owned(),
+        span: error.span().map(SourceSpan::from),
+        source_code: NamedSource::new(path.display().to_string(), text.clone()).with_language("toml"),
+    };
+    let mut config: Config = toml::from_str(&text).map_err(invalid)?;
+    if !overrides.is_empty() {
+        let mut tree: toml::Value = toml::Value::try_from(&config).map_err(|e| ConfigError::BadOverride {
+            setting: String::new(),
+            message: e.to_string(),
+        })?;
+        for setting in overrides {
+            let bad = |message: String| ConfigError::BadOverride { setting: setting.clone(), message };
+            apply(&mut tree, setting).map_err(bad)?;
+            config = tree.clone().try_into().map_err(|e: toml::de::Error| bad(e.message().to_owned()))?;
+        }
+    }
+    match config.problem() {
+        None => Ok(config),
+        Some((place, what, hint)) => {
+            Err(ConfigError::Inconsistent { path: path.to_owned(), place, what, hint })
+        }
+    }
+}
+
+/// The configuration as TOML text, every value spelled out.
+///
+/// # Errors
+/// When a value has no TOML form (an integer beyond 2⁶³).
+pub fn to_toml(config: &Config) -> Result<String, toml::ser::Error> {
+    toml::to_string_pretty(config)
+}
+
+fn apply(tree: &mut toml::Value, setting: &str) -> Result<(), String> {
+    let (key, value) = setting.split_once('=').ok_or("there is no '='")?;
+    // A bare word is a string: `--set data.body=body.npz` needs no quotes.
+    let value = toml::from_str::<toml::Table>(&format!("v = {value}"))
+        .ok()
+        .and_then(|mut t| t.remove("v"))
+        .unwrap_or_else(|| toml::Value::String(value.to_owned()));
+    let mut node = tree;
+    let mut parts = key.trim().split('.').peekable();
+    while let Some(part) = parts.next() {
+        let last = parts.peek().is_none();
+        node = match node {
+            toml::Value::Table(table) => {
+                if last {
+                    table.insert(part.to_owned(), value);
+                    return Ok(());
+                }
+                table.entry(part).or_insert_with(|| toml::Value::Table(toml::Table::new()))
+            }
+            toml::Value::Array(list) => {
+                let count = list.len();
+                let index: usize = part.parse().map_err(|_| format!("`{part}` is not the index of a list element"))?;
+                let element = list.get_mut(index).ok_or(format!("element {index} does not exist, there are {count}"))?;
+                if last {
+                    *element = value;
+                    return Ok(());
+                }
+                element
+            }
+            _ => return Err(format!("`{part}` is below a plain value")),
+        };
+    }
+    Err("the key is empty".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SMALL: &str = "seed = 1\n[data]\n[[data.garments]]\ngenerate = { count = 2 }\n[[stages]]\nname = \"single\"\ntrains = \"single\"\nsteps = 10\n";
+
+    fn written(text: &str) -> tempfile::NamedTempFile {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), text).unwrap();
+        file
+    }
+
+    #[test]
+    fn overrides_reach_lists_and_tables() {
+        let f = written(SMALL);
+        let c = load(
+            f.path(),
+            &["stages.0.steps=7".into(), "losses.strain.weight=2".into(), "data.body=some.npz".into()],
+        )
+        .unwrap();
+        assert_eq!((c.stages[0].steps, c.losses.strain.weight.at(0.0)), (7, 2.0));
+        assert_eq!(c.data.body, "some.npz");
+    }
+
+    #[test]
+    fn resolved_text_reads_back_to_the_same_text() {
+        let f = written(SMALL);
+        let text = to_toml(&load(f.path(), &[]).unwrap()).unwrap();
+        let g = written(&text);
+        assert_eq!(to_toml(&load(g.path(), &[]).unwrap()).unwrap(), text);
+    }
+
+    #[test]
+    fn an_unknown_key_shows_its_place_and_the_valid_names() {
+        let f = written(&SMALL.replace("steps = 10", "step = 10"));
+        match load(f.path(), &[]).unwrap_err() {
+            ConfigError::Invalid { message, span, .. } => {
+                assert!(message.contains("step") && message.contains("learning_rate"), "{message}");
+                assert!(span.is_some());
+            }
+            other => panic!("{other}"),
+        }
+        let e = load(written(SMALL).path(), &["losses.strian.weight=1".into()]).unwrap_err();
+        assert!(e.to_string().contains("strian"), "{e}");
+    }
+
+    #[test]
+    fn contradictions_are_named() {
+        let f = written(&SMALL.replace("steps = 10", "steps = 10\nlayers = [1, 3]"));
+        assert!(load(f.path(), &[]).unwrap_err().to_string().contains("stages[0].layers"));
+    }
+}

@@ -1,0 +1,253 @@
+//! The eight losses: weights and the switches between the paper's printed form and the measured better one.
+
+use super::ramp::Ramp;
+use clothcombo_physics::energy::{EnergySettings, LayerGate, Material, Term};
+use clothcombo_physics::query::Distance;
+use serde::{Deserialize, Serialize};
+
+/// Which distance to the body the collision and distance losses use.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DistanceMode {
+    /// Offset from the nearest body vertex along its normal (the paper's).
+    #[default]
+    NearestVertex,
+    /// Signed distance to the closest surface point with pseudo-normals: exact, slower.
+    ClosestPoint,
+}
+
+impl From<DistanceMode> for Distance {
+    fn from(mode: DistanceMode) -> Self {
+        match mode {
+            DistanceMode::NearestVertex => Distance::NearestVertex,
+            DistanceMode::ClosestPoint => Distance::ClosestPoint,
+        }
+    }
+}
+
+/// A loss with nothing but a weight.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlainLoss {
+    /// Factor on the raw value.
+    pub weight: Ramp,
+}
+
+/// Body collision, Σ max(ε − d, 0)³.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct BodyCollisionLoss {
+    /// Factor on the raw value [1/m³ · J].
+    pub weight: Ramp,
+    /// Distance to the body that a vertex should keep [m].
+    pub epsilon: f64,
+    /// How the distance is measured.
+    pub distance: DistanceMode,
+}
+
+impl Default for BodyCollisionLoss {
+    fn default() -> Self {
+        Self { weight: 250.0.into(), epsilon: 0.005, distance: DistanceMode::NearestVertex }
+    }
+}
+
+/// Repulsion between near vertices of one garment that share no edge.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RepulsionLoss {
+    /// Factor on the raw value.
+    pub weight: Ramp,
+    /// Pairs farther apart than this do not repel [m].
+    pub radius: f64,
+    /// Divide the printed double sum by the vertex count.
+    pub per_vertex: bool,
+    /// Random partners per vertex (unbiased estimate); 0 takes every pair.
+    pub subset: usize,
+}
+
+impl Default for RepulsionLoss {
+    fn default() -> Self {
+        Self { weight: 0.001.into(), radius: 0.1, per_vertex: true, subset: 16 }
+    }
+}
+
+/// Holding, Σ H (Δy)².
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct HoldingLoss {
+    /// Factor on the raw value.
+    pub weight: Ramp,
+    /// Share of the vertices, from the top, that are held.
+    pub fraction: f64,
+    /// Measure the displacement from the shape-transferred start instead of the rest garment: a waistband should
+    /// follow a taller body.
+    pub relative: bool,
+}
+
+impl Default for HoldingLoss {
+    fn default() -> Self {
+        Self { weight: 100.0.into(), fraction: 0.1, relative: true }
+    }
+}
+
+/// Collision between layers.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LayerCollisionLoss {
+    /// Factor on the raw value.
+    pub weight: Ramp,
+    /// Gap that an outer vertex should keep to the inner garment [m].
+    pub epsilon: f64,
+    /// Count a pair only when it is really one above the other; the printed form explodes past an open hem.
+    pub gated: bool,
+    /// Largest tangential offset of a counted pair, in median edge lengths of the inner garment.
+    pub gate_tangential_edges: f64,
+    /// Largest distance of a counted pair [m].
+    pub gate_depth: f64,
+}
+
+impl Default for LayerCollisionLoss {
+    fn default() -> Self {
+        Self {
+            weight: 250.0.into(),
+            epsilon: 0.002,
+            gated: true,
+            gate_tangential_edges: 0.75,
+            gate_depth: 0.05,
+        }
+    }
+}
+
+/// Distance order between layers over the same body vertex.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LayerDistanceLoss {
+    /// Factor on the raw value.
+    pub weight: Ramp,
+    /// Vertices farther than this from the body do not count [m].
+    pub radius: f64,
+}
+
+impl Default for LayerDistanceLoss {
+    fn default() -> Self {
+        Self { weight: 25000.0.into(), radius: 0.1 }
+    }
+}
+
+/// Cloth material; defaults reproduce the paper's magnitudes.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct MaterialConfig {
+    /// Thickness [m].
+    pub thickness: f64,
+    /// Density [kg/m³].
+    pub density: f64,
+    /// First Lamé constant λ [Pa].
+    pub lambda: f64,
+    /// Second Lamé constant μ [Pa].
+    pub mu: f64,
+    /// Bending stiffness k [J].
+    pub bending_stiffness: f64,
+}
+
+impl Default for MaterialConfig {
+    fn default() -> Self {
+        let m = Material::default();
+        Self {
+            thickness: m.thickness,
+            density: m.density,
+            lambda: m.lambda,
+            mu: m.mu,
+            bending_stiffness: m.bending_stiffness,
+        }
+    }
+}
+
+/// All losses of one run. The key of each table is the name of its energy.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LossesConfig {
+    /// Collision and layer-collision weights are multiplied by this over the garment's vertex count: the sums run over
+    /// vertices and the paper's weights belong to about 8,000 of them. 0 switches it off.
+    pub reference_vertices: f64,
+    /// StVK strain.
+    pub strain: PlainLoss,
+    /// Bending.
+    pub bending: PlainLoss,
+    /// Gravity.
+    pub gravity: PlainLoss,
+    /// Collision with the body.
+    pub body_collision: BodyCollisionLoss,
+    /// Repulsion inside a garment.
+    pub repulsion: RepulsionLoss,
+    /// Holding of waistbands.
+    pub holding: HoldingLoss,
+    /// Collision between layers.
+    pub layer_collision: LayerCollisionLoss,
+    /// Distance order between layers.
+    pub layer_distance: LayerDistanceLoss,
+    /// Cloth material.
+    pub material: MaterialConfig,
+}
+
+impl Default for LossesConfig {
+    fn default() -> Self {
+        let plain = |w: f64| PlainLoss { weight: w.into() };
+        Self {
+            reference_vertices: 8000.0,
+            strain: plain(1.0),
+            bending: plain(5.0),
+            gravity: plain(1.0),
+            body_collision: BodyCollisionLoss::default(),
+            repulsion: RepulsionLoss::default(),
+            holding: HoldingLoss::default(),
+            layer_collision: LayerCollisionLoss::default(),
+            layer_distance: LayerDistanceLoss::default(),
+            material: MaterialConfig::default(),
+        }
+    }
+}
+
+impl LossesConfig {
+    /// The weight of `term` over the run, before the vertex-count scaling.
+    pub fn weight(&self, term: Term) -> &Ramp {
+        match term {
+            Term::Strain => &self.strain.weight,
+            Term::Bending => &self.bending.weight,
+            Term::Gravity => &self.gravity.weight,
+            Term::BodyCollision => &self.body_collision.weight,
+            Term::Repulsion => &self.repulsion.weight,
+            Term::Holding => &self.holding.weight,
+            Term::LayerCollision => &self.layer_collision.weight,
+            Term::LayerDistance => &self.layer_distance.weight,
+        }
+    }
+
+    /// The settings the energies are evaluated with.
+    pub fn energy_settings(&self) -> EnergySettings {
+        let m = &self.material;
+        let gate = &self.layer_collision;
+        EnergySettings {
+            material: Material {
+                thickness: m.thickness,
+                density: m.density,
+                lambda: m.lambda,
+                mu: m.mu,
+                bending_stiffness: m.bending_stiffness,
+            },
+            body_collision_epsilon: self.body_collision.epsilon,
+            layer_collision_epsilon: gate.epsilon,
+            distance: self.body_collision.distance.into(),
+            repulsion_radius: self.repulsion.radius,
+            repulsion_normalised: self.repulsion.per_vertex,
+            repulsion_subset: (self.repulsion.subset > 0).then_some(self.repulsion.subset),
+            layer_gate: gate.gated.then_some(LayerGate {
+                tangential_edges: gate.gate_tangential_edges,
+                depth: gate.gate_depth,
+            }),
+            layer_distance_radius: self.layer_distance.radius,
+            holding_fraction: self.holding.fraction,
+            ..EnergySettings::default()
+        }
+    }
+}

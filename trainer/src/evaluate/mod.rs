@@ -1,0 +1,9 @@
+//! Scores of draped scenes: what the losses say, and what a stranger would count.
+
+mod report;
+mod score;
+mod validation;
+
+pub use report::{GroupReport, MethodScore, Spread, ValidationReport};
+pub use score::{Draped, SceneScore, score_scene};
+pub use validation::{Method, ValidationSet};

@@ -1,0 +1,71 @@
+//! The score of one draped scene.
+
+use crate::scene::{Library, PreparedScene};
+use clothcombo_physics::contact::{OrderViolations, Penetration, order_violations, penetration};
+use clothcombo_physics::energy::{Term, TermMap};
+use clothcombo_physics::query::Surface;
+
+/// Vertices deeper than this inside the body count as visibly wrong [m].
+pub const DEEP: f64 = 0.005;
+
+/// Positions of all garments of a scene on its first body, packed inner → outer.
+#[derive(Clone, Debug)]
+pub struct Draped {
+    /// Before skinning (T-pose), `[ΣV, 3]`.
+    pub canonical: Vec<[f32; 3]>,
+    /// After skinning, `[ΣV, 3]`.
+    pub posed: Vec<[f32; 3]>,
+}
+
+/// What one draped scene scores.
+#[derive(Clone, Debug, Default)]
+pub struct SceneScore {
+    /// Raw energies summed over garments and pairs.
+    pub raw: TermMap<f64>,
+    /// The same, weighted.
+    pub weighted: TermMap<f64>,
+    /// Weighted sum.
+    pub total: f64,
+    /// Garment vertices inside the body, by closest surface point.
+    pub penetration: Penetration,
+    /// Wrong-side vertices over all pairs of layers that can touch.
+    pub order: OrderViolations,
+}
+
+/// Scores `draped` on the first body of `scene`, whose surface in f64 is `body`.
+pub fn score_scene(
+    library: &Library,
+    scene: &PreparedScene,
+    body: &Surface<f64>,
+    draped: &Draped,
+) -> SceneScore {
+    let energy = &scene.bodies[0].energy;
+    let value = energy.evaluate(&draped.posed, &draped.canonical);
+    let mut score = SceneScore { total: value.total, ..SceneScore::default() };
+    let weights = energy.garments.iter().map(|g| &g.weights).chain(energy.layers.iter().map(|l| &l.weights));
+    for (raw, weights) in value.garments.iter().chain(&value.layers).zip(weights) {
+        for term in Term::ALL {
+            if let Some(v) = raw[term] {
+                score.raw[term] += v;
+                score.weighted[term] += v * weights[term];
+            }
+        }
+    }
+    let positions: Vec<[f64; 3]> = draped.posed.iter().map(|p| p.map(f64::from)).collect();
+    score.penetration = penetration(body, &positions, DEEP);
+
+    let mut parts = Vec::with_capacity(scene.garments.len());
+    let mut rest = positions.as_slice();
+    for &g in &scene.garments {
+        let (part, tail) = rest.split_at(library.garments[g].vertex_count());
+        parts.push(part);
+        rest = tail;
+    }
+    for &(inner, outer) in &scene.contacts {
+        let faces = library.garments[scene.garments[inner]].garment.rest.faces();
+        let pair = order_violations(parts[inner], faces, parts[outer]);
+        score.order.counted += pair.counted;
+        score.order.violations += pair.violations;
+    }
+    score
+}

@@ -1,0 +1,103 @@
+//! What the training loop says while it runs. The loop knows no progress bar, file or picture: observers do.
+
+use crate::evaluate::ValidationReport;
+use clothcombo_physics::energy::Term;
+use miette::Report;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// One optimiser step, as it stands in `metrics.jsonl`.
+#[derive(Clone, Debug, Serialize)]
+pub struct StepRecord {
+    /// Steps done, this one included (the first step is 1).
+    pub step: u64,
+    /// Name of the stage.
+    pub stage: String,
+    /// Garments in the scene.
+    pub layers: usize,
+    /// Share of the full pose.
+    pub pose_scale: f64,
+    /// Weighted sum that was minimised, mean over the step's bodies.
+    pub loss: f64,
+    /// Raw energies, summed over garments or pairs, mean over the step's bodies; terms that were not evaluated are
+    /// left out.
+    pub raw: BTreeMap<&'static str, f64>,
+    /// The same, times their weights.
+    pub weighted: BTreeMap<&'static str, f64>,
+    /// Global norm of the gradient before clipping.
+    pub grad_norm: f64,
+    /// Adam's step size.
+    pub lr: f64,
+    /// Wall-clock time of the step [s].
+    pub seconds: f64,
+    /// Part of `seconds` spent waiting for the scene to be prepared [s].
+    pub wait_seconds: f64,
+}
+
+impl StepRecord {
+    /// Names of all terms, in the order pictures show them.
+    pub fn term_names() -> impl Iterator<Item = &'static str> {
+        Term::ALL.into_iter().map(|t| t.name())
+    }
+}
+
+/// Something that happened in a run.
+pub enum TrainEvent<'a> {
+    /// Training begins or continues.
+    Started {
+        /// Steps already done.
+        step: u64,
+        /// Steps of the whole run.
+        total_steps: u64,
+    },
+    /// A stage begins.
+    StageStarted {
+        /// Name.
+        name: &'a str,
+        /// First step.
+        step: u64,
+        /// Number of steps.
+        steps: u64,
+    },
+    /// A step was done.
+    Step(&'a StepRecord),
+    /// The validation scenes were scored.
+    Validated {
+        /// Steps done.
+        step: u64,
+        /// The scores.
+        report: &'a ValidationReport,
+    },
+    /// A checkpoint is complete on disk.
+    CheckpointSaved {
+        /// Steps done.
+        step: u64,
+        /// Its folder.
+        path: &'a Path,
+    },
+    /// A sample picture was written.
+    SampleDrawn {
+        /// The file.
+        path: &'a Path,
+    },
+    /// The user asked to stop; a checkpoint has been saved.
+    Interrupted {
+        /// Steps done.
+        step: u64,
+    },
+    /// All steps are done.
+    Finished {
+        /// Steps done.
+        step: u64,
+    },
+}
+
+/// Receives every event of a run, in order.
+pub trait Observer {
+    /// Takes note of `event`.
+    ///
+    /// # Errors
+    /// When something cannot be written; the run then ends with this error.
+    fn observe(&mut self, event: &TrainEvent) -> Result<(), Report>;
+}

@@ -1,0 +1,20 @@
+//! The training framework: configuration, objective, schedule, loop, checkpoints, evaluation, and the two programs.
+
+pub mod checkpoint;
+pub mod cli;
+pub mod config;
+pub mod device;
+pub mod drape;
+pub mod evaluate;
+pub mod event;
+pub mod learner;
+pub mod objective;
+pub mod observer;
+pub mod picture;
+pub mod run_dir;
+pub mod samples;
+pub mod scene;
+pub mod schedule;
+pub mod session;
+pub mod stop;
+pub mod train_loop;

@@ -1,0 +1,74 @@
+//! `metrics.jsonl` and `validation.jsonl`: one JSON object per line, flushed with every checkpoint.
+
+use crate::event::{Observer, TrainEvent};
+use crate::run_dir::{RunDir, truncate_log};
+use miette::{IntoDiagnostic, Report, WrapErr};
+use serde_json::json;
+use std::fs::{File, OpenOptions};
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// Writes the logs of a run.
+pub struct MetricsObserver {
+    metrics: Log,
+    validation: Log,
+    every: u64,
+}
+
+struct Log {
+    path: PathBuf,
+    file: BufWriter<File>,
+}
+
+impl Log {
+    /// Opens for appending after dropping lines later than `step`.
+    fn open(path: &Path, step: u64) -> Result<Self, Report> {
+        let opened = truncate_log(path, step)
+            .and_then(|()| OpenOptions::new().create(true).append(true).open(path))
+            .into_diagnostic()
+            .wrap_err_with(|| format!("cannot write {}", path.display()))?;
+        Ok(Self { path: path.to_owned(), file: BufWriter::new(opened) })
+    }
+
+    fn line(&mut self, value: &impl serde::Serialize) -> Result<(), Report> {
+        let write = |file: &mut BufWriter<File>| -> std::io::Result<()> {
+            serde_json::to_writer(&mut *file, value)?;
+            file.write_all(b"\n")
+        };
+        write(&mut self.file).into_diagnostic().wrap_err_with(|| format!("cannot write {}", self.path.display()))
+    }
+
+    fn flush(&mut self) -> Result<(), Report> {
+        self.file.flush().into_diagnostic().wrap_err_with(|| format!("cannot write {}", self.path.display()))
+    }
+}
+
+impl MetricsObserver {
+    /// Continues the logs of `run` after `step`; every `every`-th step is logged.
+    ///
+    /// # Errors
+    /// When a log cannot be written.
+    pub fn new(run: &RunDir, step: u64, every: u64) -> Result<Self, Report> {
+        Ok(Self {
+            metrics: Log::open(&run.metrics(), step)?,
+            validation: Log::open(&run.validation(), step)?,
+            every,
+        })
+    }
+}
+
+impl Observer for MetricsObserver {
+    fn observe(&mut self, event: &TrainEvent) -> Result<(), Report> {
+        match event {
+            TrainEvent::Step(record) if record.step % self.every == 0 => self.metrics.line(record),
+            TrainEvent::Validated { step, report } => {
+                self.validation.line(&json!({ "step": step, "groups": report.groups }))?;
+                self.validation.flush()
+            }
+            TrainEvent::CheckpointSaved { .. }
+            | TrainEvent::Interrupted { .. }
+            | TrainEvent::Finished { .. } => self.metrics.flush(),
+            _ => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! The progress bar: stage, steps per second, time left, loss. Without a terminal, a line now and then.
+
+use crate::event::{Observer, TrainEvent};
+use indicatif::{ProgressBar, ProgressStyle};
+use miette::Report;
+use std::io::IsTerminal;
+use std::time::{Duration, Instant};
+
+/// Seconds between lines when there is no terminal to draw on.
+const PLAIN_INTERVAL: Duration = Duration::from_secs(15);
+
+/// Shows a run on stderr.
+pub struct ProgressObserver {
+    bar: Option<ProgressBar>,
+    terminal: bool,
+    started_at: u64,
+    total: u64,
+    stage: String,
+    smoothed_loss: f64,
+    start: Instant,
+    last_line: Instant,
+}
+
+impl Default for ProgressObserver {
+    fn default() -> Self {
+        Self {
+            bar: None,
+            terminal: std::io::stderr().is_terminal(),
+            started_at: 0,
+            total: 0,
+            stage: String::new(),
+            smoothed_loss: f64::NAN,
+            start: Instant::now(),
+            last_line: Instant::now(),
+        }
+    }
+}
+
+impl ProgressObserver {
+    /// Prints `text` above the bar.
+    fn say(&self, text: &str) {
+        match &self.bar {
+            Some(bar) => bar.println(text),
+            None => eprintln!("{text}"),
+        }
+    }
+
+    fn plain_line(&mut self, step: u64) {
+        if self.last_line.elapsed() < PLAIN_INTERVAL {
+            return;
+        }
+        self.last_line = Instant::now();
+        let per_second = (step - self.started_at) as f64 / self.start.elapsed().as_secs_f64();
+        let left = Duration::from_secs_f64((self.total - step) as f64 / per_second.max(1e-9));
+        eprintln!(
+            "{} · step {step}/{} · {per_second:.1} steps/s · {} left · loss {:.3}",
+            self.stage,
+            self.total,
+            indicatif::HumanDuration(left),
+            self.smoothed_loss
+        );
+    }
+}
+
+impl Observer for ProgressObserver {
+    fn observe(&mut self, event: &TrainEvent) -> Result<(), Report> {
+        match event {
+            TrainEvent::Started { step, total_steps } => {
+                (self.started_at, self.total) = (*step, *total_steps);
+                (self.start, self.last_line) = (Instant::now(), Instant::now());
+                if self.terminal {
+                    let style = ProgressStyle::with_template(
+                        "{prefix:.bold} {wide_bar} {pos}/{len} · {per_sec} · {eta} left · {msg}",
+                    )
+                    .expect("the template is valid");
+                    let bar = ProgressBar::new(*total_steps).with_style(style).with_position(*step);
+                    bar.reset_eta();
+                    self.bar = Some(bar);
+                }
+            }
+            TrainEvent::StageStarted { name, step, steps } => {
+                self.stage = (*name).to_owned();
+                self.say(&format!("stage {name}: {steps} steps from step {step}"));
+                if let Some(bar) = &self.bar {
+                    bar.set_prefix((*name).to_owned());
+                }
+            }
+            TrainEvent::Step(record) => {
+                self.smoothed_loss = match self.smoothed_loss.is_finite() {
+                    true => self.smoothed_loss + 0.02 * (record.loss - self.smoothed_loss),
+                    false => record.loss,
+                };
+                match &self.bar {
+                    Some(bar) => {
+                        bar.set_message(format!("loss {:.3}", self.smoothed_loss));
+                        bar.set_position(record.step);
+                    }
+                    None => self.plain_line(record.step),
+                }
+            }
+            TrainEvent::Validated { step, report } => {
+                self.say(&format!("validation after step {step}\n{report}"));
+            }
+            TrainEvent::CheckpointSaved { path, .. } => {
+                if !self.terminal {
+                    self.say(&format!("checkpoint {}", path.display()));
+                }
+            }
+            TrainEvent::SampleDrawn { path } => self.say(&format!("picture {}", path.display())),
+            TrainEvent::Interrupted { step } => {
+                self.say(&format!("stopped after step {step}; continue with --resume"));
+                if let Some(bar) = self.bar.take() {
+                    bar.abandon();
+                }
+            }
+            TrainEvent::Finished { step } => {
+                if let Some(bar) = self.bar.take() {
+                    bar.finish();
+                }
+                eprintln!("finished after step {step} in {:.0} s", self.start.elapsed().as_secs_f64());
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,75 @@
+//! The sample picture of a run: validation scenes before and after the networks, front and back.
+
+use crate::drape::Networks;
+use crate::evaluate::{Draped, ValidationSet};
+use crate::picture::{
+    BODY_COLOUR, Figure, LegendEntry, Sheet, SheetRow, View, layer_colour, render, save_png,
+};
+use crate::scene::{Library, PreparedScene, ValidationGroup};
+use miette::{IntoDiagnostic, Report};
+use std::path::Path;
+
+/// Width and height of one picture [pixels].
+const CELL: [u32; 2] = [300, 460];
+
+/// Draws `count` single and `count` layered validation scenes, evenly chosen, to `path`.
+///
+/// # Errors
+/// When a scene cannot be draped or the picture not written.
+pub fn draw(
+    library: &Library,
+    validation: &ValidationSet,
+    networks: &Networks,
+    count: usize,
+    path: &Path,
+) -> Result<(), Report> {
+    let mut rows = Vec::new();
+    for group in [ValidationGroup::Single, ValidationGroup::Layered] {
+        let scenes = validation.scenes(group);
+        let count = count.min(scenes.len());
+        for i in 0..count {
+            rows.push(row(library, networks, scenes[i * scenes.len() / count])?);
+        }
+    }
+    let heading = |m: &str, v: &str| format!("{m}, {v}");
+    let columns = ["LBS", "network"].iter().flat_map(|m| ["front", "back"].map(|v| heading(m, v))).collect();
+    let sheet = Sheet { title: String::new(), columns, rows };
+    save_png(&sheet.compose(), path).into_diagnostic()
+}
+
+fn row(library: &Library, networks: &Networks, scene: &PreparedScene) -> Result<SheetRow, Report> {
+    let names: Vec<&str> =
+        scene.garments.iter().map(|&g| library.garments[g].garment.name.as_str()).collect();
+    let skinned = networks.skin(scene).into_diagnostic()?;
+    let draped = networks.drape(scene).into_diagnostic()?.layered;
+    let cells = [&skinned, &draped]
+        .into_iter()
+        .flat_map(|d| [View::Front, View::Back].map(|view| cell(library, scene, d, view)))
+        .collect();
+    let legend = names
+        .iter()
+        .enumerate()
+        .map(|(i, name)| LegendEntry { colour: layer_colour(i), name: (*name).to_owned() })
+        .collect();
+    Ok(SheetRow { label: format!("{} garment(s), inner to outer", names.len()), legend, cells })
+}
+
+fn cell(library: &Library, scene: &PreparedScene, draped: &Draped, view: View) -> image::RgbImage {
+    let wide = |p: &[[f32; 3]]| p.iter().map(|p| p.map(f64::from)).collect::<Vec<_>>();
+    let body = &scene.bodies[0].energy.body;
+    let body_positions = wide(&body.positions);
+    let positions = wide(&draped.posed);
+    let mut figures =
+        vec![Figure { positions: &body_positions, faces: &body.faces, colour: BODY_COLOUR }];
+    let mut first = 0;
+    for (layer, &g) in scene.garments.iter().enumerate() {
+        let garment = &library.garments[g];
+        figures.push(Figure {
+            positions: &positions[first..first + garment.vertex_count()],
+            faces: garment.garment.rest.faces(),
+            colour: layer_colour(layer),
+        });
+        first += garment.vertex_count();
+    }
+    render(&figures, view, CELL)
+}

@@ -1,0 +1,75 @@
+//! The joints a wardrobe needs: those that carry any garment. Hands, feet and face never enter the networks.
+
+use clothcombo_data::asset::{Binding, Body};
+
+/// Joints with weight on at least one garment, in body order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ActiveJoints {
+    /// Indices into the body's joints, ascending.
+    pub indices: Vec<usize>,
+    body_joints: usize,
+}
+
+/// Below this weight on every vertex of every garment a joint is dropped; what remains is renormalised.
+const NEGLIGIBLE: f32 = 1e-3;
+
+impl ActiveJoints {
+    /// Collects the joints used by `bindings`.
+    pub fn new<'a>(body: &Body, bindings: impl IntoIterator<Item = &'a Binding>) -> Self {
+        let joints = body.joint_names.len();
+        let mut largest = vec![0f32; joints];
+        for binding in bindings {
+            for row in binding.skin_weights.chunks_exact(joints) {
+                for (l, w) in largest.iter_mut().zip(row) {
+                    *l = l.max(*w);
+                }
+            }
+        }
+        let indices = (0..joints).filter(|&j| largest[j] > NEGLIGIBLE).collect();
+        Self { indices, body_joints: joints }
+    }
+
+    /// The active joints named in `names` (as stored with a checkpoint), or the first name the body lacks.
+    pub fn from_names(body: &Body, names: &[String]) -> Result<Self, String> {
+        let find = |n: &String| body.joint_names.iter().position(|j| j == n).ok_or_else(|| n.clone());
+        let indices = names.iter().map(find).collect::<Result<_, _>>()?;
+        Ok(Self { indices, body_joints: body.joint_names.len() })
+    }
+
+    /// Number of active joints.
+    pub fn len(&self) -> usize {
+        self.indices.len()
+    }
+
+    /// Whether no joint is active.
+    pub fn is_empty(&self) -> bool {
+        self.indices.is_empty()
+    }
+
+    /// Columns of the active joints of dense `[V, all joints]` weights, rows renormalised to sum 1.
+    pub fn restrict(&self, weights: &[f32]) -> Vec<f32> {
+        let mut out = Vec::with_capacity(weights.len() / self.body_joints * self.len());
+        for row in weights.chunks_exact(self.body_joints) {
+            let sum: f32 = self.indices.iter().map(|&j| row[j]).sum();
+            // A vertex bound to dropped joints only (it carries no visible weight elsewhere) follows the first one.
+            match sum > 0.0 {
+                true => out.extend(self.indices.iter().map(|&j| row[j] / sum)),
+                false => out.extend((0..self.len()).map(|k| if k == 0 { 1.0 } else { 0.0 })),
+            }
+        }
+        out
+    }
+
+    /// 1 for every active joint with weight on some vertex of `restricted` `[V, active]`, else 0.
+    pub fn mask(&self, restricted: &[f32]) -> Vec<f32> {
+        let mut mask = vec![0f32; self.len()];
+        for row in restricted.chunks_exact(self.len()) {
+            for (m, w) in mask.iter_mut().zip(row) {
+                if *w > NEGLIGIBLE {
+                    *m = 1.0;
+                }
+            }
+        }
+        mask
+    }
+}

@@ -1,0 +1,132 @@
+//! Which garments, body shapes and poses a step uses: a pure function of the seed and the step.
+//!
+//! Every step reads its own stream of the generator, so nothing has to be stored to resume, and drawing ahead on
+//! another thread changes nothing.
+
+use super::library::Library;
+use super::poses::Unseen;
+use crate::config::{StageConfig, ValidationConfig};
+use clothcombo_data::asset::Pose;
+use rand::RngExt;
+use rand::SeedableRng;
+use rand::seq::index;
+use rand_chacha::ChaCha8Rng;
+
+/// One body of a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BodyDraw {
+    /// Shape parameters β.
+    pub shape: Vec<f64>,
+    /// Pose θ, heading removed.
+    pub pose: Pose,
+}
+
+/// Garments from the innermost to the outermost, and the bodies they are draped on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneDraw {
+    /// Indices into the library, inner → outer.
+    pub garments: Vec<usize>,
+    /// Bodies.
+    pub bodies: Vec<BodyDraw>,
+}
+
+/// The part of the schedule a draw depends on.
+#[derive(Clone, Copy, Debug)]
+pub struct Plan<'a> {
+    /// The stage.
+    pub stage: &'a StageConfig,
+    /// Fraction of the stage done, 0–1.
+    pub progress: f64,
+}
+
+/// Streams from here on belong to validation; training uses the step number.
+const VALIDATION_STREAM: u64 = 1 << 62;
+
+fn generator(seed: u64, stream: u64) -> ChaCha8Rng {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    rng.set_stream(stream);
+    rng
+}
+
+fn garments(pool: &[usize], count: usize, rng: &mut ChaCha8Rng) -> Vec<usize> {
+    if count <= pool.len() {
+        index::sample(rng, pool.len(), count).into_iter().map(|i| pool[i]).collect()
+    } else {
+        (0..count).map(|_| pool[rng.random_range(0..pool.len())]).collect()
+    }
+}
+
+fn shape(library: &Library, rng: &mut ChaCha8Rng) -> Vec<f64> {
+    let [low, high] = library.shape_range;
+    (0..library.shape_count).map(|_| low + (high - low) * rng.random::<f64>()).collect()
+}
+
+/// The scene of training step `step`.
+pub fn draw_training(library: &Library, seed: u64, step: u64, plan: Plan) -> SceneDraw {
+    let mut rng = generator(seed, step);
+    let [low, high] = plan.stage.layers;
+    let layers = rng.random_range(low..=high);
+    let garments = garments(&library.training, layers, &mut rng);
+    let scale = plan.stage.pose_scale.at(plan.progress);
+    let bodies = (0..plan.stage.scenes_per_step)
+        .map(|_| BodyDraw {
+            shape: shape(library, &mut rng),
+            pose: library.poses.draw_training(scale, &mut rng),
+        })
+        .collect();
+    SceneDraw { garments, bodies }
+}
+
+/// What a validation scene is drawn for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ValidationGroup {
+    /// One garment, held-out poses of the trained clips.
+    Single,
+    /// One garment, clips never trained on.
+    UnseenMotion,
+    /// Several layers, held-out poses of the trained clips.
+    Layered,
+}
+
+impl ValidationGroup {
+    /// All groups, in the order they are scored.
+    pub const ALL: [Self; 3] = [Self::Single, Self::UnseenMotion, Self::Layered];
+
+    /// Name in tables and logs.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Single => "single garments",
+            Self::UnseenMotion => "single garments, unseen clips",
+            Self::Layered => "layered outfits",
+        }
+    }
+}
+
+/// The fixed validation scenes of `group`; trained garments in turn, layer counts in turn.
+pub fn draw_validation(
+    library: &Library,
+    seed: u64,
+    config: &ValidationConfig,
+    group: ValidationGroup,
+) -> Vec<SceneDraw> {
+    let (count, unseen) = match group {
+        ValidationGroup::Single => (config.single_scenes, Unseen::Poses),
+        ValidationGroup::UnseenMotion if !library.poses.has_unseen_clips() => (0, Unseen::Clips),
+        ValidationGroup::UnseenMotion => (config.unseen_scenes, Unseen::Clips),
+        ValidationGroup::Layered => (config.layered_scenes, Unseen::Poses),
+    };
+    (0..count)
+        .map(|i| {
+            let mut rng = generator(seed, VALIDATION_STREAM + ((group as u64) << 32) + i as u64);
+            let garments = match group {
+                ValidationGroup::Layered => {
+                    let [low, high] = config.layers;
+                    garments(&library.training, low + i % (high - low + 1), &mut rng)
+                }
+                _ => vec![library.training[i % library.training.len()]],
+            };
+            let pose = library.poses.draw_held_out(unseen, &mut rng);
+            SceneDraw { garments, bodies: vec![BodyDraw { shape: shape(library, &mut rng), pose }] }
+        })
+        .collect()
+}

@@ -1,0 +1,67 @@
+//! The training loop, top to bottom.
+
+use crate::event::{Observer, TrainEvent};
+use crate::scene::Prefetch;
+use crate::session::Session;
+use crate::stop::StopFlag;
+use miette::{IntoDiagnostic, Report, WrapErr, miette};
+use std::time::Instant;
+
+/// Scenes prepared in advance.
+const SCENES_AHEAD: usize = 4;
+
+/// Trains from the session's step to the end of the schedule, or until `stop` is requested.
+///
+/// # Errors
+/// When something cannot be written, or the numbers stop being finite.
+pub fn train(
+    session: &mut Session,
+    observers: &mut [Box<dyn Observer>],
+    stop: &StopFlag,
+) -> Result<(), Report> {
+    let mut tell = |event: &TrainEvent| observers.iter_mut().try_for_each(|o| o.observe(event));
+    let schedule = session.schedule().clone();
+    let output = session.config().output.clone();
+    let validate_every = session.config().validation.every;
+    let first_step = session.step();
+    let total_steps = schedule.total_steps();
+
+    tell(&TrainEvent::Started { step: first_step, total_steps })?;
+    if first_step == 0 {
+        tell(&TrainEvent::Validated { step: 0, report: &session.validate()? })?;
+    }
+    let scenes =
+        Prefetch::start(session.library().clone(), session.shared_config(), first_step, SCENES_AHEAD)
+            .into_diagnostic()
+            .wrap_err("cannot start the thread that prepares scenes")?;
+
+    for step in first_step..total_steps {
+        let at = schedule.at(step);
+        if at.first_of_stage || step == first_step {
+            let stage = &schedule.stages()[at.stage];
+            tell(&TrainEvent::StageStarted { name: &stage.name, step, steps: stage.steps })?;
+        }
+        let start = Instant::now();
+        let scene = scenes.next_scene().ok_or_else(|| miette!("the thread that prepares scenes ended early"))?;
+        let waited = start.elapsed();
+        let record = session.step_on(&scene, &at, start, waited)?;
+        tell(&TrainEvent::Step(&record))?;
+
+        let done = step + 1;
+        let due = |every: u64| every > 0 && done % every == 0;
+        if at.last_of_stage || due(validate_every) {
+            tell(&TrainEvent::Validated { step: done, report: &session.validate()? })?;
+        }
+        if at.last_of_stage || due(output.sample_every) {
+            tell(&TrainEvent::SampleDrawn { path: &session.draw_sample()? })?;
+        }
+        let stopping = stop.requested();
+        if at.last_of_stage || due(output.checkpoint_every) || stopping {
+            tell(&TrainEvent::CheckpointSaved { step: done, path: &session.save()? })?;
+        }
+        if stopping && done < total_steps {
+            return tell(&TrainEvent::Interrupted { step: done });
+        }
+    }
+    tell(&TrainEvent::Finished { step: total_steps })
+}
