@@ -60,16 +60,26 @@ impl RunDir {
     /// # Errors
     /// When the folder already holds a run or cannot be written.
     pub fn create(root: &Path, config: &Config) -> Result<Self, RunDirError> {
+        Self::refuse_occupied(root)?;
         let run = Self { root: root.to_owned() };
-        if run.config().exists() {
-            return Err(RunDirError::Occupied { path: root.to_owned() });
-        }
         for folder in [run.checkpoints(), run.samples()] {
             fs::create_dir_all(&folder).map_err(|reason| RunDirError::Io { path: folder, reason })?;
         }
         let text = to_toml(config).map_err(|e| io_error(&run.config(), io::Error::other(e)))?;
         write_atomic(&run.config(), text.as_bytes()).map_err(|e| io_error(&run.config(), e))?;
         Ok(run)
+    }
+
+    /// Checks that no run lives in `root`.
+    ///
+    /// # Errors
+    /// When one does.
+    pub fn refuse_occupied(root: &Path) -> Result<(), RunDirError> {
+        let run = Self { root: root.to_owned() };
+        if run.config().exists() {
+            return Err(RunDirError::Occupied { path: root.to_owned() });
+        }
+        Ok(())
     }
 
     /// Opens an existing run to continue it with `config`.

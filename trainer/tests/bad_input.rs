@@ -46,7 +46,7 @@ impl Case {
     }
 }
 
-const GENERATED: &str = "generate = { count = 1, vertices = 150, categories = [\"top\"] }";
+const GENERATED: &str = "generate = { count = 1, vertices = 200, categories = [\"top\"] }";
 
 #[test]
 fn unknown_config_key() {
@@ -86,7 +86,7 @@ fn empty_garment_folder() {
     let case = Case::new();
     std::fs::create_dir(case.folder.path().join("empty")).unwrap();
     case.config("mannequin", &format!("folder = \"{}\"", case.path("empty")));
-    case.must_fail(&[], &["empty", ".obj"]);
+    case.must_fail(&[], &["empty", "OBJ files"]);
 }
 
 #[test]

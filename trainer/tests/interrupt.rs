@@ -8,7 +8,7 @@ const LONG: &str = r#"
 seed = 1
 [data]
 [[data.garments]]
-generate = { count = 2, vertices = 150, categories = ["top", "skirt"] }
+generate = { count = 2, vertices = 200, categories = ["top", "skirt"] }
 [model]
 width = 8
 embedding = 8

@@ -1,5 +1,8 @@
 //! Which backend runs which form of the fused operations.
 
+// burn deprecates its ndarray backend but still ships it, and users ask for it.
+#![cfg_attr(feature = "ndarray", allow(deprecated))]
+
 #[cfg(any(feature = "wgpu", feature = "cuda"))]
 use burn::backend::Cube;
 #[cfg(feature = "flex")]

@@ -155,9 +155,12 @@ mod flex {
     }
 }
 
+// burn deprecates the backend but still ships it, and users ask for it.
 #[cfg(feature = "ndarray")]
+#[allow(deprecated)]
 mod ndarray {
     use burn::backend::NdArray;
+    use burn::backend::ops::FloatTensorOps;
 
     use super::*;
 
@@ -174,7 +177,7 @@ mod ndarray {
             let columns = tensor.shape()[1];
             let data = burn::backend::read_sync(Self::float_into_data(tensor));
             // Reading host memory cannot fail, and the caller has checked the element type.
-            let values = data.ok().and_then(|data| data.into_vec::<f32>().ok()).unwrap_or_default();
+            let values = data.ok().and_then(|data| data.try_into_vec::<f32>().ok()).unwrap_or_default();
             Copied { values, columns }
         }
 

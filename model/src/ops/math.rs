@@ -109,9 +109,9 @@ pub(super) fn tanh(x: f32) -> f32 {
         .mul_add(square, 6.372_619_3e-4)
         .mul_add(square, 4.893_524_6e-3);
     let denominator = 1.198_258_4e-6_f32
-        .mul_add(square, 1.185_347_05e-4)
+        .mul_add(square, 1.185_347e-4)
         .mul_add(square, 2.268_434_6e-3)
-        .mul_add(square, 4.893_525_2e-3);
+        .mul_add(square, 4.893_525e-3);
     clamped * numerator / denominator
 }
 

@@ -4,7 +4,7 @@ use crate::scene::load_body;
 use clap::Parser;
 use clothcombo_data::asset::Category;
 use clothcombo_data::dataset::{FolderGarment, save_garment_folder};
-use clothcombo_data::generate::{GarmentSettings, generate_garment};
+use clothcombo_data::generate::{GarmentGenerator, GarmentSettings};
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, Report, miette};
 use rayon::prelude::*;
@@ -52,11 +52,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let settings = GarmentSettings { target_vertices: arguments.vertices, ..GarmentSettings::default() };
     let style = ProgressStyle::with_template("garments {bar:40} {pos}/{len} · {eta} left").into_diagnostic()?;
     let bar = ProgressBar::new(arguments.count as u64).with_style(style);
+    let generator = GarmentGenerator::new(&body).into_diagnostic()?;
     let garments = (0..arguments.count)
         .into_par_iter()
         .map(|i| {
-            let made = generate_garment(
-                &body,
+            let made = generator.generate(
                 categories[i % categories.len()],
                 arguments.seed.wrapping_add(i as u64),
                 &settings,

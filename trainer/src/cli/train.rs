@@ -79,11 +79,15 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         Some(dir) => dir.clone(),
         None => default_run_dir(&file, arguments.resume),
     };
-    // The library is loaded before the run folder is made: wrong data leaves nothing behind.
+    // What is wrong with the folder is said before minutes are spent on data; wrong data leaves no folder behind.
+    let existing = match arguments.resume {
+        true => Some(RunDir::resume(&root, &config)?),
+        false => RunDir::refuse_occupied(&root).map(|()| None)?,
+    };
     let library = Arc::new(load_library(&config, arguments.quiet)?);
-    let run = match arguments.resume {
-        true => RunDir::resume(&root, &config)?,
-        false => RunDir::create(&root, &config)?,
+    let run = match existing {
+        Some(run) => run,
+        None => RunDir::create(&root, &config)?,
     };
     if !arguments.quiet {
         eprintln!("run folder {}", run.root().display());

@@ -166,11 +166,11 @@ impl DataConfig {
         }
         for (i, source) in self.garments.iter().enumerate() {
             if let Some(g) = &source.generate
-                && (g.count == 0 || g.categories.is_empty() || g.vertices < 50)
+                && (g.count == 0 || g.categories.is_empty() || !(200..=50_000).contains(&g.vertices))
             {
                 return Some((
                     format!("data.garments[{i}].generate"),
-                    "needs count ≥ 1, at least one category, and at least 50 vertices".into(),
+                    "needs count ≥ 1, at least one category, and 200 to 50000 vertices".into(),
                     "for example { count = 12, vertices = 1000 }".into(),
                 ));
             }

@@ -5,7 +5,7 @@ use super::poses::PoseLibrary;
 use crate::config::{Config, GarmentSource};
 use clothcombo_data::asset::{Binding, BindingSettings, Body, BodyFileSettings, Garment};
 use clothcombo_data::dataset::load_garment_folder;
-use clothcombo_data::generate::{GarmentSettings, generate_garment, mannequin};
+use clothcombo_data::generate::{GarmentGenerator, GarmentSettings, mannequin};
 use clothcombo_physics::energy::GarmentEnergies;
 use clothcombo_physics::mesh::{Topology, TriMesh};
 use clothcombo_physics::operators::SurfaceOperators;
@@ -280,12 +280,13 @@ fn read_source(source: &GarmentSource, body: &Body) -> Result<Vec<Garment>, Libr
     }
     let Some(generate) = &source.generate else { return Ok(Vec::new()) };
     let settings = GarmentSettings { target_vertices: generate.vertices, ..GarmentSettings::default() };
+    let generator = GarmentGenerator::new(body).map_err(LibraryError::data)?;
     (0..generate.count)
         .into_par_iter()
         .map(|i| {
             let category = generate.categories[i % generate.categories.len()];
-            let seed = generate.seed + i as u64;
-            generate_garment(body, category, seed, &settings).map_err(LibraryError::data)
+            let seed = generate.seed.wrapping_add(i as u64);
+            generator.generate(category, seed, &settings).map_err(LibraryError::data)
         })
         .collect()
 }

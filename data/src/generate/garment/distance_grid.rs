@@ -1,7 +1,7 @@
 //! Signed distance to a closed body surface on a regular grid.
 //!
 //! The generator asks for the distance to the body a million times per garment; a grid answers in constant time. Node
-//! values are exact next to the surface, right to about a millimetre within a band outside it, and constant beyond.
+//! values are exact within 2 cm of the surface, right to about a millimetre within a wider band, and constant beyond.
 //! The inside is what rays in two of three axis directions call inside, so that a small hole in a scanned body costs
 //! nothing.
 
@@ -37,7 +37,7 @@ impl DistanceGrid {
         let mut front = VecDeque::new();
         for f in 0..faces.len() {
             let triangle = corners(f);
-            let range = node_range(&lattice, &triangle, 1.0);
+            let range = node_range(&lattice, &triangle, 2.0);
             for k in range[2].clone() {
                 for j in range[1].clone() {
                     for i in range[0].clone() {
@@ -165,7 +165,7 @@ fn votes(lattice: &Lattice, positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Vec<u
         }
         let stride = [1, lattice.nodes[0], lattice.nodes[0] * lattice.nodes[1]][axis];
         for at in 0..parity.len() {
-            if (at / stride) % lattice.nodes[axis] != 0 {
+            if !(at / stride).is_multiple_of(lattice.nodes[axis]) {
                 parity[at] ^= parity[at - stride];
             }
             votes[at] += u8::from(parity[at]);

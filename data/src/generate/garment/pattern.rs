@@ -307,9 +307,11 @@ fn upper(pattern: &mut Pattern, category: Category, rng: &mut ChaCha8Rng, edge_l
                         widest = widest.max(if s > shoulder_x + 0.03 { r * 0.8 } else { 0.0 });
                     }
                     let along = ((s - shoulder_x) / (cuff - shoulder_x).max(0.05)).clamp(0.0, 1.0);
-                    let round = r + sleeve_hang * (widest - r).max(0.0);
+                    // Fades out over the shoulder, which would otherwise carry a puff.
+                    let out = smooth_step(shoulder_x - 0.03, shoulder_x + 0.09, s);
+                    let round = r + out * sleeve_hang * (widest - r).max(0.0);
                     let armhole = armhole_extra * smooth_step(shoulder_x + 0.10, shoulder_x, s);
-                    round + sleeve_ease + flare * along + armhole
+                    round + (1.4 * out - 0.4) * sleeve_ease + flare * along + out * armhole
                 });
                 pattern.sleeves.push((tube, side));
                 let height = mark.shoulder[1];
