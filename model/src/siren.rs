@@ -127,6 +127,9 @@ pub struct ModulatedSiren {
 
 impl ModulatedSiren {
     /// SIREN initialisation (Sitzmann et al.): U(±1/in) for the first layer, U(±√(6/in)/w0) for the others.
+    ///
+    /// The output bias starts at zero: drawn, it would shift every garment by centimetres before training has begun,
+    /// while the gates make the rest of an untrained network nearly vanish.
     pub fn new(sizes: &SirenSizes, device: &Device) -> Self {
         let modulator = Modulator::new(sizes, device);
         let hidden_bound = (6.0 / sizes.width as f64).sqrt() / sizes.omega_hidden;
@@ -139,7 +142,10 @@ impl ModulatedSiren {
         Self {
             modulator,
             sine,
-            output: Linear::uniform(sizes.width, 3, hidden_bound, device),
+            output: Linear {
+                weight: uniform_parameter([sizes.width, 3], hidden_bound, device),
+                bias: parameter(Tensor::zeros([3], device)),
+            },
             omega_first: sizes.omega_first,
             omega_hidden: sizes.omega_hidden,
         }

@@ -122,9 +122,10 @@ impl Checkpoint {
 
         let _ = fs::remove_dir_all(&temporary); // a leftover of an interrupted save
         fs::create_dir_all(&temporary).map_err(io_failed)?;
+        // A single entry: burn keeps metadata in a hash map, whose order would make equal models differ as files.
         let mut exchange = SafetensorsStore::from_file(temporary.join(MODEL_EXCHANGE))
-            .metadata("format", "clothcombo")
-            .metadata("step", state.step.to_string());
+            .clear_metadata()
+            .metadata("clothcombo_step", state.step.to_string());
         model.save_into(&mut exchange).map_err(|e| failed(e.to_string()))?;
         model.clone().into_record().save(temporary.join(MODEL_EXACT)).map_err(|e| failed(e.to_string()))?;
         optimizer.save(temporary.join(OPTIMIZER)).map_err(|e| failed(e.to_string()))?;

@@ -73,6 +73,7 @@ impl Arguments {
 /// # Errors
 /// One report that names the file, key or garment at fault and how to mend it.
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
+    let stop = StopFlag::on_signals().into_diagnostic().wrap_err("cannot listen for Ctrl-C")?;
     let file = arguments.config_file()?;
     let config = load(&file, &arguments.overrides)?;
     let root = match &arguments.run_dir {
@@ -105,7 +106,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     if !arguments.quiet {
         observers.push(Box::new(ProgressObserver::default()));
     }
-    let stop = StopFlag::on_signals().into_diagnostic().wrap_err("cannot listen for Ctrl-C")?;
     train(&mut session, &mut observers, &stop)
 }
 
