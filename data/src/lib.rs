@@ -5,5 +5,5 @@
 pub mod asset;
 pub mod dataset;
 pub mod format;
-pub mod import;
 pub mod generate;
+pub mod import;

@@ -41,7 +41,9 @@ pub enum CheckpointError {
     },
     /// There is no checkpoint.
     #[error("{} holds no checkpoint", path.display())]
-    #[diagnostic(help("pass a run folder, its checkpoints folder, or one checkpoint folder such as RUN/checkpoints/step-00001000"))]
+    #[diagnostic(help(
+        "pass a run folder, its checkpoints folder, or one checkpoint folder such as RUN/checkpoints/step-00001000"
+    ))]
     Missing {
         /// Where it was looked for.
         path: PathBuf,
@@ -200,8 +202,7 @@ impl Checkpoint {
     /// When the stored parameters do not fit the configuration.
     pub fn model(&self, config: &Config, device: &Device) -> Result<ClothCombo, CheckpointError> {
         let unusable = |reason: String| CheckpointError::Unusable { path: self.path.clone(), reason };
-        let record =
-            ModuleRecord::load(self.path.join(MODEL_EXACT)).map_err(|e| unusable(e.to_string()))?;
+        let record = ModuleRecord::load(self.path.join(MODEL_EXACT)).map_err(|e| unusable(e.to_string()))?;
         ClothCombo::new(&config.model, &self.state.dimensions(), device)
             .map_err(|e| unusable(e.to_string()))?
             .try_load_record(record)

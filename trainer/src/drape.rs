@@ -4,8 +4,8 @@ use crate::evaluate::Draped;
 use crate::scene::{Library, LibraryGarment, PreparedBody, PreparedScene};
 use burn::tensor::{Device, Tensor, TensorData};
 use clothcombo_model::{
-    BodyTensors, ClothCombo, Dimensions, Embeddings, GarmentArrays, GarmentEmbedding, GarmentTensors, ModelError,
-    OutfitTensors, linear_blend_skinning,
+    BodyTensors, ClothCombo, Dimensions, Embeddings, GarmentArrays, GarmentEmbedding, GarmentTensors,
+    ModelError, OutfitTensors, linear_blend_skinning,
 };
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -25,8 +25,7 @@ impl WardrobeTensors {
     pub fn new(library: &Library, dimensions: Dimensions, device: &Device) -> Result<Self, ModelError> {
         let device = device.clone().inner();
         let upload = |g: &LibraryGarment| {
-            let rest: Vec<f32> =
-                g.garment.rest.positions().iter().flatten().map(|v| *v as f32).collect();
+            let rest: Vec<f32> = g.garment.rest.positions().iter().flatten().map(|v| *v as f32).collect();
             let o = &g.operators;
             GarmentTensors::new(
                 &GarmentArrays {
@@ -65,8 +64,7 @@ impl WardrobeTensors {
     /// # Errors
     /// When its numbers are not finite.
     pub fn body(&self, body: &PreparedBody) -> Result<(BodyTensors, Tensor<2>), ModelError> {
-        let tensors =
-            BodyTensors::new(&body.shape, &body.pose, &body.bones, &self.dimensions, &self.device)?;
+        let tensors = BodyTensors::new(&body.shape, &body.pose, &body.bones, &self.dimensions, &self.device)?;
         let start = TensorData::new(body.start.as_flattened().to_vec(), [body.start.len(), 3]);
         Ok((tensors, Tensor::from_data(start, &self.device)))
     }

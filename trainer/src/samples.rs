@@ -59,8 +59,7 @@ fn cell(library: &Library, scene: &PreparedScene, draped: &Draped, view: View) -
     let body = &scene.bodies[0].energy.body;
     let body_positions = wide(&body.positions);
     let positions = wide(&draped.posed);
-    let mut figures =
-        vec![Figure { positions: &body_positions, faces: &body.faces, colour: BODY_COLOUR }];
+    let mut figures = vec![Figure { positions: &body_positions, faces: &body.faces, colour: BODY_COLOUR }];
     let mut first = 0;
     for (layer, &g) in scene.garments.iter().enumerate() {
         let garment = &library.garments[g];

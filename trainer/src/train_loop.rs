@@ -42,7 +42,8 @@ pub fn train(
             tell(&TrainEvent::StageStarted { name: &stage.name, step, steps: stage.steps })?;
         }
         let start = Instant::now();
-        let scene = scenes.next_scene().ok_or_else(|| miette!("the thread that prepares scenes ended early"))?;
+        let scene =
+            scenes.next_scene().ok_or_else(|| miette!("the thread that prepares scenes ended early"))?;
         let waited = start.elapsed();
         let record = session.step_on(&scene, &at, start, waited)?;
         tell(&TrainEvent::Step(&record))?;

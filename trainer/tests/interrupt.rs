@@ -41,7 +41,8 @@ fn start(config: &Path, run: &Path, resume: bool) -> Child {
 /// Waits until the run has taken its initial validation, then asks it to stop; returns its exit code.
 fn stop_when_running(mut child: Child, run: &Path) -> Option<i32> {
     let deadline = Instant::now() + Duration::from_secs(60);
-    while !run.join("validation.jsonl").exists() || std::fs::metadata(run.join("validation.jsonl")).unwrap().len() == 0
+    while !run.join("validation.jsonl").exists()
+        || std::fs::metadata(run.join("validation.jsonl")).unwrap().len() == 0
     {
         assert!(Instant::now() < deadline, "the run did not begin");
         assert!(child.try_wait().unwrap().is_none(), "the run ended by itself");

@@ -25,11 +25,7 @@ impl OrderViolations {
 }
 
 /// Counts the vertices of `outer` on the wrong side of the inner garment (its positions and faces).
-pub fn order_violations(
-    inner: &[[f64; 3]],
-    inner_faces: &[[u32; 3]],
-    outer: &[[f64; 3]],
-) -> OrderViolations {
+pub fn order_violations(inner: &[[f64; 3]], inner_faces: &[[u32; 3]], outer: &[[f64; 3]]) -> OrderViolations {
     let normals = vertex_normals(inner, inner_faces);
     let index = VertexIndex::new(inner);
     let (counted, violations) = outer

@@ -6,7 +6,11 @@ use std::process::ExitCode;
 
 /// Learned draping of multi-layered clothing: data in, garments on bodies out.
 #[derive(Parser)]
-#[command(version, about, after_help = "Train with clothcombo-train. Every verb has its own --help with examples.")]
+#[command(
+    version,
+    about,
+    after_help = "Train with clothcombo-train. Every verb has its own --help with examples."
+)]
 struct Arguments {
     #[command(subcommand)]
     verb: Verb,

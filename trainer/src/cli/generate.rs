@@ -12,7 +12,9 @@ use std::path::PathBuf;
 
 /// Makes garments that fit a body: OBJ files with a garments.toml
 #[derive(Parser)]
-#[command(after_help = "Example:\n  clothcombo generate --count 48 --seed 7 --body datasets/open/body.npz -o datasets/generated")]
+#[command(
+    after_help = "Example:\n  clothcombo generate --count 48 --seed 7 --body datasets/open/body.npz -o datasets/generated"
+)]
 pub struct Arguments {
     /// Number of garments
     #[arg(long, default_value_t = 12)]
@@ -50,7 +52,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let categories =
         if arguments.categories.is_empty() { Category::ALL.to_vec() } else { arguments.categories.clone() };
     let settings = GarmentSettings { target_vertices: arguments.vertices, ..GarmentSettings::default() };
-    let style = ProgressStyle::with_template("garments {bar:40} {pos}/{len} · {eta} left").into_diagnostic()?;
+    let style =
+        ProgressStyle::with_template("garments {bar:40} {pos}/{len} · {eta} left").into_diagnostic()?;
     let bar = ProgressBar::new(arguments.count as u64).with_style(style);
     let generator = GarmentGenerator::new(&body).into_diagnostic()?;
     let garments = (0..arguments.count)

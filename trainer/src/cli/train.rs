@@ -141,9 +141,8 @@ fn load_library(config: &Config, quiet: bool) -> Result<Library, Report> {
 /// `runs/NAME`, or the first free `runs/NAME-2`, `-3`, …; when resuming, the last existing one.
 fn default_run_dir(config: &Path, resume: bool) -> PathBuf {
     let name = config.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let candidate = |i: usize| {
-        Path::new("runs").join(if i == 1 { name.clone() } else { format!("{name}-{i}") })
-    };
+    let candidate =
+        |i: usize| Path::new("runs").join(if i == 1 { name.clone() } else { format!("{name}-{i}") });
     let free = (1..).find(|&i| !candidate(i).join("config.toml").exists()).unwrap_or(1);
     candidate(if resume { free.max(2) - 1 } else { free })
 }

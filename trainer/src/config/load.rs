@@ -19,7 +19,9 @@ pub enum ConfigError {
     },
     /// The file is not valid.
     #[error("{message}")]
-    #[diagnostic(help("every key and its meaning is documented in trainer/src/config; configs/smoke.toml is a short example"))]
+    #[diagnostic(help(
+        "every key and its meaning is documented in trainer/src/config; configs/smoke.toml is a short example"
+    ))]
     Invalid {
         /// What is wrong.
         message: String,
@@ -32,7 +34,9 @@ pub enum ConfigError {
     },
     /// An override is not valid.
     #[error("--set {setting}: {message}")]
-    #[diagnostic(help("write --set section.key=value, for example --set stages.0.steps=100 or --set losses.strain.weight=2.0"))]
+    #[diagnostic(help(
+        "write --set section.key=value, for example --set stages.0.steps=100 or --set losses.strain.weight=2.0"
+    ))]
     BadOverride {
         /// The override as given.
         setting: String,
@@ -68,10 +72,8 @@ pub fn load(path: &Path, overrides: &[String]) -> Result<Config, ConfigError> {
     };
     let mut config: Config = toml::from_str(&text).map_err(invalid)?;
     if !overrides.is_empty() {
-        let mut tree: toml::Value = toml::Value::try_from(&config).map_err(|e| ConfigError::BadOverride {
-            setting: String::new(),
-            message: e.to_string(),
-        })?;
+        let mut tree: toml::Value = toml::Value::try_from(&config)
+            .map_err(|e| ConfigError::BadOverride { setting: String::new(), message: e.to_string() })?;
         for setting in overrides {
             let bad = |message: String| ConfigError::BadOverride { setting: setting.clone(), message };
             apply(&mut tree, setting).map_err(bad)?;
@@ -115,8 +117,11 @@ fn apply(tree: &mut toml::Value, setting: &str) -> Result<(), String> {
             }
             toml::Value::Array(list) => {
                 let count = list.len();
-                let index: usize = part.parse().map_err(|_| format!("`{part}` is not the index of a list element"))?;
-                let element = list.get_mut(index).ok_or(format!("element {index} does not exist, there are {count}"))?;
+                let index: usize =
+                    part.parse().map_err(|_| format!("`{part}` is not the index of a list element"))?;
+                let element = list
+                    .get_mut(index)
+                    .ok_or(format!("element {index} does not exist, there are {count}"))?;
                 if last {
                     *element = value;
                     return Ok(());

@@ -107,7 +107,13 @@ pub struct OutputConfig {
 
 impl Default for OutputConfig {
     fn default() -> Self {
-        Self { checkpoint_every: 1000, keep_checkpoints: 3, sample_every: 0, sample_scenes: 4, metrics_every: 1 }
+        Self {
+            checkpoint_every: 1000,
+            keep_checkpoints: 3,
+            sample_every: 0,
+            sample_scenes: 4,
+            metrics_every: 1,
+        }
     }
 }
 
@@ -150,17 +156,34 @@ impl Config {
                 ));
             }
         }
-        if self.output.checkpoint_every == 0 || self.output.keep_checkpoints == 0 || self.output.metrics_every == 0 {
-            return at("output", "checkpoint_every, keep_checkpoints and metrics_every must be at least 1", "use 1 or more");
+        if self.output.checkpoint_every == 0
+            || self.output.keep_checkpoints == 0
+            || self.output.metrics_every == 0
+        {
+            return at(
+                "output",
+                "checkpoint_every, keep_checkpoints and metrics_every must be at least 1",
+                "use 1 or more",
+            );
         }
         let optimizer = &self.optimizer;
-        if !(0.0..1.0).contains(&optimizer.beta_1) || !(0.0..1.0).contains(&optimizer.beta_2) || optimizer.epsilon <= 0.0
+        if !(0.0..1.0).contains(&optimizer.beta_1)
+            || !(0.0..1.0).contains(&optimizer.beta_2)
+            || optimizer.epsilon <= 0.0
         {
-            return at("optimizer", "beta_1 and beta_2 lie in [0, 1), epsilon is positive", "use 0.9, 0.999, 1e-8");
+            return at(
+                "optimizer",
+                "beta_1 and beta_2 lie in [0, 1), epsilon is positive",
+                "use 0.9, 0.999, 1e-8",
+            );
         }
         self.data.problem().or_else(|| {
             let error = self.model.validate().err()?;
-            Some(("model".into(), error.to_string(), "configs/smoke.toml and paper.toml show usable sizes".into()))
+            Some((
+                "model".into(),
+                error.to_string(),
+                "configs/smoke.toml and paper.toml show usable sizes".into(),
+            ))
         })
     }
 }

@@ -62,7 +62,11 @@ impl StageConfig {
         } else if low == 0 || low > high {
             says("layers", "is not a range [fewest, most] of at least one layer", "for example [1, 6]")
         } else if self.trains == Trains::Single && high > 1 {
-            says("layers", "single-garment training has one layer", "use layers = [1, 1], or trains = \"all\"")
+            says(
+                "layers",
+                "single-garment training has one layer",
+                "use layers = [1, 1], or trains = \"all\"",
+            )
         } else if self.trains == Trains::Untangling && low < 2 {
             says("layers", "one garment alone has nothing to untangle", "use at least 2 layers")
         } else if self.scenes_per_step == 0 {

@@ -55,8 +55,7 @@ impl MethodScore {
     pub fn new(method: &'static str, scenes: &[SceneScore]) -> Self {
         let over = |f: &dyn Fn(&SceneScore) -> f64| Spread::of(scenes.iter().map(f).collect());
         let share = |part: &dyn Fn(&SceneScore) -> usize, whole: &dyn Fn(&SceneScore) -> usize| {
-            let (p, w): (usize, usize) =
-                scenes.iter().fold((0, 0), |a, s| (a.0 + part(s), a.1 + whole(s)));
+            let (p, w): (usize, usize) = scenes.iter().fold((0, 0), |a, s| (a.0 + part(s), a.1 + whole(s)));
             if w == 0 { 0.0 } else { p as f64 / w as f64 }
         };
         Self {

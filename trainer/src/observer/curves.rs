@@ -81,7 +81,9 @@ impl CurvesObserver {
         if let Some(first) = lines(read(run.validation()).into_diagnostic()?).first() {
             for group in first["groups"].as_array().into_iter().flatten() {
                 let Some(methods) = group["methods"].as_array() else { continue };
-                let Some(baseline) = methods.iter().find(|m| m["method"] == BASELINE.name()) else { continue };
+                let Some(baseline) = methods.iter().find(|m| m["method"] == BASELINE.name()) else {
+                    continue;
+                };
                 for name in terms_of(group["group"].as_str().unwrap_or_default()) {
                     if let Some(v) = baseline["raw"][name]["mean"].as_f64() {
                         self.baselines.insert(name, v);

@@ -35,7 +35,9 @@ impl Log {
             serde_json::to_writer(&mut *file, value)?;
             file.write_all(b"\n")
         };
-        write(&mut self.file).into_diagnostic().wrap_err_with(|| format!("cannot write {}", self.path.display()))
+        write(&mut self.file)
+            .into_diagnostic()
+            .wrap_err_with(|| format!("cannot write {}", self.path.display()))
     }
 
     fn flush(&mut self) -> Result<(), Report> {

@@ -58,7 +58,9 @@ pub enum LibraryError {
     },
     /// One side of the pose split is empty.
     #[error("{}: {train} frames to train on and {held_out} held out", folder.display())]
-    #[diagnostic(help("both must be positive: change data.poses.held_out_clips, held_out_share or held_out_block"))]
+    #[diagnostic(help(
+        "both must be positive: change data.poses.held_out_clips, held_out_share or held_out_block"
+    ))]
     EmptySplit {
         /// The motion folder.
         folder: PathBuf,
@@ -221,8 +223,7 @@ impl Library {
             smooth: start.smooth_weights,
             shape_transfer: start.shape_transfer,
         };
-        let bindings: Vec<Binding> =
-            garments.par_iter().map(|g| Binding::new(g, &body, &settings)).collect();
+        let bindings: Vec<Binding> = garments.par_iter().map(|g| Binding::new(g, &body, &settings)).collect();
         let joints = ActiveJoints::new(&body, &bindings);
 
         let done = AtomicUsize::new(0);
