@@ -28,7 +28,8 @@ pub fn draw(
         let scenes = validation.scenes(group);
         let count = count.min(scenes.len());
         for i in 0..count {
-            rows.push(row(library, networks, scenes[i * scenes.len() / count])?);
+            // One further in each part: layer counts come in turn, and equal strides would always meet the same one.
+            rows.push(row(library, networks, scenes[(i * scenes.len() / count + i) % scenes.len()])?);
         }
     }
     let heading = |m: &str, v: &str| format!("{m}, {v}");
@@ -51,7 +52,11 @@ fn row(library: &Library, networks: &Networks, scene: &PreparedScene) -> Result<
         .enumerate()
         .map(|(i, name)| LegendEntry { colour: layer_colour(i), name: (*name).to_owned() })
         .collect();
-    Ok(SheetRow { label: format!("{} garment(s), inner to outer", names.len()), legend, cells })
+    let label = match names.len() {
+        1 => "1 garment".to_owned(),
+        several => format!("{several} garments, inner to outer"),
+    };
+    Ok(SheetRow { label, legend, cells })
 }
 
 fn cell(library: &Library, scene: &PreparedScene, draped: &Draped, view: View) -> image::RgbImage {

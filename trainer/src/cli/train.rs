@@ -121,7 +121,7 @@ fn load_library(config: &Config, quiet: bool) -> Result<Library, Report> {
     bar.finish_and_clear();
     if !quiet {
         eprintln!(
-            "body {} · {} garments ({} held out) · {} joints · {} shape components{}",
+            "body: {} · {} garments ({} held out) · {} joints · {} shape components{}",
             library.body.name,
             library.garments.len(),
             library.held_out.len(),
