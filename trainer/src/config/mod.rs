@@ -178,6 +178,9 @@ impl Config {
             );
         }
         self.data.problem().or_else(|| {
+            if let Err(error) = self.losses.energy_settings().check() {
+                return Some(("losses".into(), error.to_string(), "configs/paper.toml shows every value".into()));
+            }
             let error = self.model.validate().err()?;
             Some((
                 "model".into(),

@@ -119,7 +119,10 @@ impl<'de> Deserialize<'de> for Ramp {
                 f.write_str("a number or a ramp { from, to, start, end, shape }")
             }
             fn visit_f64<E: de::Error>(self, v: f64) -> Result<Ramp, E> {
-                Ok(Ramp::constant(v))
+                match Ramp::constant(v).problem() {
+                    Some(problem) => Err(E::custom(problem)),
+                    None => Ok(Ramp::constant(v)),
+                }
             }
             fn visit_i64<E: de::Error>(self, v: i64) -> Result<Ramp, E> {
                 Ok(Ramp::constant(v as f64))
@@ -171,5 +174,6 @@ mod tests {
         assert!(e.unwrap_err().to_string().contains("`end` comes before `start`"));
         let e = toml::from_str::<Holder>("weight = { from = 1.0, too = 2.0 }");
         assert!(e.unwrap_err().to_string().contains("too"));
+        assert!(toml::from_str::<Holder>("weight = nan").unwrap_err().to_string().contains("finite"));
     }
 }

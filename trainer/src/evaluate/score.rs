@@ -40,14 +40,16 @@ pub fn score_scene(
     draped: &Draped,
 ) -> SceneScore {
     let energy = &scene.bodies[0].energy;
-    let value = energy.evaluate(&draped.posed, &draped.canonical);
-    let mut score = SceneScore { total: value.total, ..SceneScore::default() };
+    // Terms of weight 0 are scored as well: an ablation wants to see what it left out.
+    let value = energy.raw(&draped.posed, &draped.canonical);
+    let mut score = SceneScore::default();
     let weights = energy.garments.iter().map(|g| &g.weights).chain(energy.layers.iter().map(|l| &l.weights));
     for (raw, weights) in value.garments.iter().chain(&value.layers).zip(weights) {
         for term in Term::ALL {
             if let Some(v) = raw[term] {
                 score.raw[term] += v;
                 score.weighted[term] += v * weights[term];
+                score.total += v * weights[term];
             }
         }
     }
