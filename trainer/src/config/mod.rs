@@ -179,7 +179,11 @@ impl Config {
         }
         self.data.problem().or_else(|| {
             if let Err(error) = self.losses.energy_settings().check() {
-                return Some(("losses".into(), error.to_string(), "configs/paper.toml shows every value".into()));
+                return Some((
+                    "losses".into(),
+                    error.to_string(),
+                    "configs/paper.toml shows every value".into(),
+                ));
             }
             let error = self.model.validate().err()?;
             Some((
