@@ -3,12 +3,14 @@
 //! The forward pass reads the positions back to the host, evaluates value and gradient there together, and keeps the gradient;
 //! the backward pass scales it. On a device without autodiff no gradient is computed.
 
+// burn marks its ndarray backend as succeeded by flex; users may still choose it.
+#![cfg_attr(feature = "ndarray", allow(deprecated))]
+
 #[cfg(any(feature = "wgpu", feature = "cuda"))]
 use burn::backend::Cube;
 #[cfg(feature = "flex")]
 use burn::backend::Flex;
 #[cfg(feature = "ndarray")]
-#[allow(deprecated)]
 use burn::backend::NdArray;
 use burn::backend::autodiff::checkpoint::base::Checkpointer;
 use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
