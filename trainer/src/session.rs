@@ -114,11 +114,6 @@ impl Session {
     pub fn library(&self) -> &Arc<Library> {
         &self.library
     }
-    /// The networks.
-    pub fn model(&self) -> &ClothCombo {
-        self.learner.model()
-    }
-
     /// One optimiser step on `scene`, started at `start` after waiting `waited` for it.
     ///
     /// # Errors

@@ -28,9 +28,6 @@ pub struct DataConfig {
     /// Poses.
     #[serde(default)]
     pub poses: PoseConfig,
-    /// Folder of the operator cache; empty keeps operators in memory only.
-    #[serde(default)]
-    pub cache: Option<PathBuf>,
 }
 
 fn mannequin() -> String {

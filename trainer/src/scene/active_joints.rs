@@ -29,13 +29,6 @@ impl ActiveJoints {
         Self { indices, body_joints: joints }
     }
 
-    /// The active joints named in `names` (as stored with a checkpoint), or the first name the body lacks.
-    pub fn from_names(body: &Body, names: &[String]) -> Result<Self, String> {
-        let find = |n: &String| body.joint_names.iter().position(|j| j == n).ok_or_else(|| n.clone());
-        let indices = names.iter().map(find).collect::<Result<_, _>>()?;
-        Ok(Self { indices, body_joints: body.joint_names.len() })
-    }
-
     /// Number of active joints.
     pub fn len(&self) -> usize {
         self.indices.len()

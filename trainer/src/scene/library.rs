@@ -3,7 +3,7 @@
 use super::active_joints::ActiveJoints;
 use super::poses::PoseLibrary;
 use crate::config::{Config, GarmentSource};
-use clothcombo_data::asset::{Binding, BindingSettings, Body, BodyFileSettings, Garment};
+use clothcombo_data::asset::{BODY_JOINT_COUNT, Binding, BindingSettings, Body, BodyFileSettings, Garment};
 use clothcombo_data::dataset::load_garment_folder;
 use clothcombo_data::generate::{GarmentGenerator, GarmentSettings, mannequin};
 use clothcombo_physics::energy::GarmentEnergies;
@@ -68,6 +68,17 @@ pub enum LibraryError {
         train: usize,
         /// Held-out frames.
         held_out: usize,
+    },
+    /// The skeleton is too small for the poses.
+    #[error("body {name} has {joints} joints, poses turn the {BODY_JOINT_COUNT} body joints of SMPL")]
+    #[diagnostic(help(
+        "use a body whose first joints are SMPL's: SMPL, SMPL-H, SMPL-X, or one imported by `clothcombo import`"
+    ))]
+    FewJoints {
+        /// The body.
+        name: String,
+        /// Its joints.
+        joints: usize,
     },
     /// More shape components are asked for than the body has.
     #[error("data.shape_components = {asked}, but the body has {available}")]
@@ -203,6 +214,9 @@ impl Library {
         garments: Vec<Garment>,
         progress: &(dyn Fn(usize, usize, &str) + Sync),
     ) -> Result<Self, LibraryError> {
+        if body.joint_count() < BODY_JOINT_COUNT {
+            return Err(LibraryError::FewJoints { name: body.name.clone(), joints: body.joint_count() });
+        }
         let limit = config.data.max_vertices;
         if let Some(g) = garments.iter().find(|g| g.rest.vertex_count() > limit) {
             let vertices = g.rest.vertex_count();

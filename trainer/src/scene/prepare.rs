@@ -30,8 +30,6 @@ pub struct PreparedScene {
     pub contacts: Vec<(usize, usize)>,
     /// Bodies.
     pub bodies: Vec<PreparedBody>,
-    /// The draw it came from.
-    pub draw: SceneDraw,
 }
 
 /// Two garments whose rest bounding boxes are farther apart than this never interact [m].
@@ -95,7 +93,7 @@ pub fn prepare(
             }
         })
         .collect();
-    PreparedScene { garments: draw.garments.clone(), contacts, bodies, draw }
+    PreparedScene { garments: draw.garments, contacts, bodies }
 }
 
 fn contacts(library: &Library, garments: &[usize]) -> Vec<(usize, usize)> {
