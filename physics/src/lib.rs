@@ -9,7 +9,7 @@
 //! | [`mesh`] | validated triangle mesh, normals, topology, analytic test shapes |
 //! | [`operators`] | the DiffusionNet precompute: mass, Laplacian, gradients, eigenbasis |
 //! | [`energy`] | the eight energies, their gradients, and the weighted sum over a scene |
-//! | [`contact`] | penetration of the body, order of layers |
+//! | [`contact`] | penetration of the body, order of layers, exact intersections and their contours |
 //! | [`query`] | nearest vertex and closest surface point, accelerated, with brute-force oracles |
 //! | `autodiff` | the energies as one differentiable burn operation (feature `autodiff`) |
 

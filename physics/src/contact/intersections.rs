@@ -1,0 +1,162 @@
+//! Which triangles of two meshes, or of one mesh with itself, intersect: a bounding-volume tree proposes, exact predicates
+//! decide.
+
+use parry3d_f64::bounding_volume::{Aabb, BoundingVolume};
+use parry3d_f64::math::Vector;
+use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhNode, BvhWorkspace};
+use rayon::prelude::*;
+
+use super::triangle_pair::{Triangle, corners, has_area, mesh_triangles_intersect, triangles_intersect};
+
+/// A mesh in a state, ready for intersection tests: positions `[V, 3]` (m), faces `[F, 3]`, and a tree over the faces.
+///
+/// Faces that are no triangle take part in nothing: an index out of range, a corner that is not finite, or no area (corners
+/// exactly on one line, such as repeated positions).
+pub struct TriangleTree<'a> {
+    positions: &'a [[f64; 3]],
+    faces: &'a [[u32; 3]],
+    bvh: Bvh,
+    /// Leaf of the tree → face.
+    kept: Vec<u32>,
+}
+
+impl std::fmt::Debug for TriangleTree<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("TriangleTree")
+            .field("faces", &self.faces.len())
+            .field("skipped", &self.skipped())
+            .finish_non_exhaustive()
+    }
+}
+
+impl<'a> TriangleTree<'a> {
+    /// Builds the tree in O(F log F).
+    pub fn new(positions: &'a [[f64; 3]], faces: &'a [[u32; 3]]) -> Self {
+        Self::of_faces_in(positions, faces, None)
+    }
+
+    /// Only the faces whose box meets `region`, where one is given.
+    fn of_faces_in(positions: &'a [[f64; 3]], faces: &'a [[u32; 3]], region: Option<Aabb>) -> Self {
+        let (kept, boxes): (Vec<u32>, Vec<Aabb>) = triangle_boxes(positions, faces)
+            .into_iter()
+            .filter(|(_, bounds)| region.is_none_or(|region| region.intersects(bounds)))
+            .unzip();
+        Self { positions, faces, bvh: Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes), kept }
+    }
+
+    /// Faces left out because they are no triangle.
+    pub fn skipped(&self) -> usize {
+        self.faces.len() - self.kept.len()
+    }
+
+    /// Pairs (face of `self`, face of `other`) that share a point, in ascending order. The meshes are taken for strangers:
+    /// equal indices mean nothing.
+    pub fn pairs_with(&self, other: &TriangleTree) -> Vec<(u32, u32)> {
+        if self.bvh.is_empty() || other.bvh.is_empty() {
+            return Vec::new();
+        }
+        decided(self.candidates(other), |(a, b)| {
+            self.triangle(a).zip(other.triangle(b)).is_some_and(|(a, b)| triangles_intersect(&a, &b))
+        })
+    }
+
+    /// Pairs of different faces of this mesh, smaller index first, that intersect beyond the vertices they share (see
+    /// [`mesh_triangles_intersect`]), in ascending order.
+    pub fn self_pairs(&self) -> Vec<(u32, u32)> {
+        let mut candidates = Vec::new();
+        self.bvh.traverse_bvtt_single_tree::<false>(&mut BvhWorkspace::default(), &mut |a, b| {
+            let (a, b) = (self.kept[a as usize], self.kept[b as usize]);
+            candidates.push((a.min(b), a.max(b)));
+        });
+        decided(candidates, |(a, b)| mesh_triangles_intersect(self.positions, self.face(a), self.face(b)))
+    }
+
+    /// Pairs of faces whose boxes meet, in no particular order.
+    fn candidates(&self, other: &TriangleTree) -> Vec<(u32, u32)> {
+        self.bvh
+            .leaf_pairs(&other.bvh, |a, b| a.intersects(b))
+            .map(|(a, b)| (self.kept[a as usize], other.kept[b as usize]))
+            .collect()
+    }
+
+    #[cfg(test)]
+    pub(super) fn candidate_count(&self, other: &TriangleTree) -> usize {
+        self.candidates(other).len()
+    }
+
+    /// Pairs of one face of another mesh, with its box and index there, and the faces of this mesh that share a point with it.
+    fn faces_meeting(
+        &self,
+        positions: &[[f64; 3]],
+        face: [u32; 3],
+        bounds: Aabb,
+        index: u32,
+    ) -> impl Iterator<Item = (u32, u32)> {
+        let triangle = corners(positions, face);
+        let probe = BvhNode::leaf(bounds, index);
+        self.bvh.leaves(move |node| node.intersects(&probe)).filter_map(move |leaf| {
+            let other = self.kept[leaf as usize];
+            let meet = triangle.zip(self.triangle(other)).is_some_and(|(a, b)| triangles_intersect(&a, &b));
+            meet.then_some((index, other))
+        })
+    }
+
+    /// Corner indices of a face of the tree.
+    pub(super) fn face(&self, face: u32) -> [u32; 3] {
+        self.faces.get(face as usize).copied().unwrap_or([u32::MAX; 3])
+    }
+
+    /// Corners of a face of the tree.
+    pub(super) fn triangle(&self, face: u32) -> Option<Triangle> {
+        corners(self.positions, self.face(face))
+    }
+}
+
+/// Pairs (face of `a`, face of `b`) that share a point, in ascending order; the same for any number of threads.
+///
+/// Positions in metres; see [`TriangleTree`] for faces that are left out, and for a tree to keep where one mesh meets several.
+/// Give the smaller mesh first: only the part of the second within its box is looked at.
+pub fn triangle_pairs(
+    a_positions: &[[f64; 3]],
+    a_faces: &[[u32; 3]],
+    b_positions: &[[f64; 3]],
+    b_faces: &[[u32; 3]],
+) -> Vec<(u32, u32)> {
+    // A garment covers part of a body: the rest of the body needs no tree, and the garment, asked once, needs none at all.
+    let boxes = triangle_boxes(a_positions, a_faces);
+    let Some(region) = boxes.iter().map(|(_, bounds)| *bounds).reduce(|a, b| a.merged(&b)) else {
+        return Vec::new();
+    };
+    let b = TriangleTree::of_faces_in(b_positions, b_faces, Some(region));
+    let mut pairs: Vec<(u32, u32)> = boxes
+        .par_iter()
+        .with_min_len(256)
+        .flat_map_iter(|&(face, bounds)| b.faces_meeting(a_positions, a_faces[face as usize], bounds, face))
+        .collect();
+    pairs.sort_unstable();
+    pairs
+}
+
+/// Pairs of faces of one mesh that intersect beyond the vertices they share: [`TriangleTree::self_pairs`].
+pub fn self_triangle_pairs(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Vec<(u32, u32)> {
+    TriangleTree::new(positions, faces).self_pairs()
+}
+
+/// Every face that is a triangle, with its box.
+fn triangle_boxes(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Vec<(u32, Aabb)> {
+    (0u32..)
+        .zip(faces)
+        .filter_map(|(index, &face)| {
+            let [a, b, c] = corners(positions, face).filter(has_area)?.map(Vector::from_array);
+            Some((index, Aabb::new(a.min(b).min(c), a.max(b).max(c))))
+        })
+        .collect()
+}
+
+/// Those of `candidates` that `intersect`, in ascending order.
+fn decided(candidates: Vec<(u32, u32)>, intersect: impl Fn((u32, u32)) -> bool + Sync) -> Vec<(u32, u32)> {
+    let mut pairs: Vec<(u32, u32)> =
+        candidates.into_par_iter().with_min_len(1024).filter(|&pair| intersect(pair)).collect();
+    pairs.sort_unstable();
+    pairs
+}
