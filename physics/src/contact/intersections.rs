@@ -79,11 +79,6 @@ impl<'a> TriangleTree<'a> {
             .collect()
     }
 
-    #[cfg(test)]
-    pub(super) fn candidate_count(&self, other: &TriangleTree) -> usize {
-        self.candidates(other).len()
-    }
-
     /// Pairs of one face of another mesh, with its box and index there, and the faces of this mesh that share a point with it.
     fn faces_meeting(
         &self,

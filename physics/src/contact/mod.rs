@@ -8,8 +8,6 @@ mod penetration;
 mod report;
 #[cfg(test)]
 mod tests;
-#[cfg(test)]
-mod timing;
 mod triangle_pair;
 
 pub use contours::{Contour, contours, self_contours};
