@@ -3,6 +3,7 @@
 //! No networks here. Units are SI, y is up, the body faces +z with its left towards +x and its pelvis at the origin.
 
 pub mod asset;
+pub mod cache;
 pub mod dataset;
 pub mod format;
 pub mod generate;

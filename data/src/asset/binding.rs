@@ -81,6 +81,15 @@ impl Binding {
         Self { skin_weights, shape_directions }
     }
 
+    /// The largest weight of every joint over the garment, `[J]`.
+    pub fn largest_weights(&self, joints: usize) -> Vec<f32> {
+        let mut largest = vec![0f32; joints];
+        for row in self.skin_weights.chunks_exact(joints) {
+            largest.iter_mut().zip(row).for_each(|(l, w)| *l = l.max(*w));
+        }
+        largest
+    }
+
     /// Displacement of every garment vertex [m] for shape `beta` (a short one is continued with zeros).
     pub fn shape_displacement(&self, beta: &[f64], shape_count: usize) -> Vec<[f64; 3]> {
         if shape_count == 0 {

@@ -16,6 +16,7 @@
 use crate::asset::{Body, Category, Garment, Provenance};
 use crate::format::atomic;
 use crate::format::obj::{self, ObjError};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
 use std::fs;
@@ -105,12 +106,53 @@ struct Entry {
     licence: String,
 }
 
+/// A garment of a folder, listed but not yet read.
+#[derive(Clone, Debug)]
+pub struct ListedGarment {
+    /// Its mesh file.
+    pub path: PathBuf,
+    /// Its name, unique within the folder.
+    pub name: String,
+    /// Its category, if the manifest says so.
+    pub category: Option<Category>,
+    /// Whether it is held, if the manifest says so.
+    pub holding: Option<bool>,
+    /// Lowest and highest layer it is worn in, if the manifest says so.
+    pub layer: Option<[u32; 2]>,
+    /// Where it comes from.
+    pub source: Provenance,
+}
+
+impl ListedGarment {
+    /// Reads the mesh. `body` is needed for the guesses: category and the collarbone rule.
+    ///
+    /// # Errors
+    /// [`ObjError`] naming file and line.
+    pub fn load(&self, body: &Body) -> Result<FolderGarment, ObjError> {
+        let rest = obj::load(&self.path)?;
+        let category = self.category.unwrap_or_else(|| Category::guess(&rest, body));
+        let holding = self.holding.unwrap_or_else(|| Garment::needs_holding(&rest, body));
+        let garment =
+            Garment { name: self.name.clone(), category, rest, holding, source: self.source.clone() };
+        Ok(FolderGarment { garment, layer: self.layer, path: self.path.clone() })
+    }
+}
+
 /// Reads all garments of a folder, in manifest order or, without a manifest, sorted by file name. `body` is needed for the
 /// guesses: category and the collarbone rule.
 ///
 /// # Errors
 /// [`GarmentFolderError`] naming folder, manifest entry, or OBJ file and line.
 pub fn load_garment_folder(folder: &Path, body: &Body) -> Result<Vec<FolderGarment>, GarmentFolderError> {
+    let listed = list_garment_folder(folder)?;
+    Ok(listed.par_iter().map(|garment| garment.load(body)).collect::<Result<_, _>>()?)
+}
+
+/// Lists the garments of a folder without reading their meshes.
+///
+/// # Errors
+/// [`GarmentFolderError`] naming folder or manifest entry.
+pub fn list_garment_folder(folder: &Path) -> Result<Vec<ListedGarment>, GarmentFolderError> {
     let manifest_path = folder.join(MANIFEST);
     let manifest = match fs::read_to_string(&manifest_path) {
         Ok(text) => toml::from_str(&text).map_err(|e| GarmentFolderError::Manifest {
@@ -151,14 +193,13 @@ pub fn load_garment_folder(folder: &Path, body: &Body) -> Result<Vec<FolderGarme
         if !names.insert(name.clone()) {
             return Err(wrong(format!("the name '{name}' is used twice")));
         }
-        let rest = obj::load(&path)?;
-        let category = entry.category.unwrap_or_else(|| Category::guess(&rest, body));
-        let holding = entry.holding.unwrap_or_else(|| Garment::needs_holding(&rest, body));
-        let source = Provenance { source: entry.source, author: entry.author, licence: entry.licence };
-        garments.push(FolderGarment {
-            garment: Garment { name, category, rest, holding, source },
-            layer: entry.layer,
+        garments.push(ListedGarment {
             path,
+            name,
+            category: entry.category,
+            holding: entry.holding,
+            layer: entry.layer,
+            source: Provenance { source: entry.source, author: entry.author, licence: entry.licence },
         });
     }
     Ok(garments)

@@ -21,6 +21,7 @@ enum Verb {
     Generate(cli::generate::Arguments),
     #[command(subcommand)]
     Import(cli::import::Source),
+    Prepare(cli::prepare::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -29,5 +30,6 @@ fn main() -> ExitCode {
     cli::exit_code(match &arguments.verb {
         Verb::Generate(arguments) => cli::generate::run(arguments),
         Verb::Import(source) => cli::import::run(source),
+        Verb::Prepare(arguments) => cli::prepare::run(arguments),
     })
 }

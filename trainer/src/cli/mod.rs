@@ -2,6 +2,7 @@
 
 pub mod generate;
 pub mod import;
+pub mod prepare;
 pub mod train;
 
 use miette::Report;

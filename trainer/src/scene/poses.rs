@@ -1,6 +1,6 @@
 //! Poses for training and validation: frames of motion clips, or the sampler within joint limits.
 
-use super::library::LibraryError;
+use super::error::LibraryError;
 use crate::config::{PoseConfig, PoseEncoding};
 use clothcombo_data::asset::rotation::matrix_from_axis_angle;
 use clothcombo_data::asset::{Motion, Pose};
@@ -28,6 +28,8 @@ struct Frames {
     train: Vec<Pose>,
     held_out: Vec<Pose>,
     unseen: Vec<Pose>,
+    training_clips: Vec<String>,
+    unseen_clips: Vec<String>,
 }
 
 /// Which poses a validation scene draws from.
@@ -73,6 +75,14 @@ impl PoseLibrary {
         match &self.source {
             Source::Frames(f) => Some([f.train.len(), f.held_out.len(), f.unseen.len()]),
             Source::Sampler(_) => None,
+        }
+    }
+
+    /// Names of the clips trained on, and of those never trained on.
+    pub fn clips(&self) -> [&[String]; 2] {
+        match &self.source {
+            Source::Frames(f) => [&f.training_clips, &f.unseen_clips],
+            Source::Sampler(_) => [&[], &[]],
         }
     }
 
@@ -155,8 +165,10 @@ fn split(clips: &[Motion], config: &PoseConfig) -> Frames {
     for clip in clips {
         if config.held_out_clips.iter().any(|name| clip.name.contains(name.as_str())) {
             frames.unseen.extend_from_slice(&clip.poses);
+            frames.unseen_clips.push(clip.name.clone());
             continue;
         }
+        frames.training_clips.push(clip.name.clone());
         let block = ((config.held_out_block * clip.frame_rate).round() as usize).max(1);
         for (i, poses) in clip.poses.chunks(block).enumerate() {
             let part = if i % group == group / 2 { &mut frames.held_out } else { &mut frames.train };
