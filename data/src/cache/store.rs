@@ -237,7 +237,7 @@ mod tests {
             }
         });
         let left: Vec<_> =
-            walk(folder.path()).into_iter().filter(|p| p.to_string_lossy().contains(".tmp")).collect();
+            walk(folder.path()).into_iter().filter(|p| p.extension().is_some_and(|e| e == "tmp")).collect();
         assert!(left.is_empty(), "{left:?}");
     }
 
