@@ -9,8 +9,11 @@
 //! is kept, and the gradient is that of the pairs inside.
 //!
 //! **No all-pairs work.** Vertices are sorted into cells of half the radius; the vertices of one cell share one list of
-//! candidates, which the inner loop runs through in fixed lanes. The logarithm is taken of products of up to 32 squared
-//! distances. Pairs joined by an edge are not looked for inside that loop but subtracted after it.
+//! candidates, which the inner loop runs through in fixed lanes, with the widest vectors the processor has (the operations
+//! and their order are the same for all of them, and so are the results). `Σ log d²` is the logarithm of a product, kept as
+//! mantissa and exponent: one logarithm per vertex. Pairs joined by an edge are not looked for inside that loop but
+//! subtracted after it. What grows is the number of pairs within the radius: at a fixed edge length it is proportional to
+//! `N`, for a fixed garment that is resolved more finely to `N²`; the random subset is proportional to `N` always.
 
 use rayon::prelude::*;
 
@@ -26,11 +29,11 @@ use crate::vec3::{accumulate, axpy, from_f64, scale, sub, zero};
 pub const CONTACT_DISTANCE: f64 = 1e-4;
 
 /// Candidates per step of the inner loop.
-const LANES: usize = 8;
+const LANES: usize = 16;
 
-/// Steps after which the products of squared distances are turned into logarithms: four squares of at least δ² = 1e-8 stay
-/// above the smallest normal `f32`.
-const STEPS_PER_LOGARITHM: usize = 4;
+/// Steps after which products of squared distances move to `f64`: four squares of at least δ² = 1e-8 stay above the smallest
+/// normal `f32`, and so do four of at most 1, or of a radius below 1e4 m, below the largest.
+const STEPS_PER_PRODUCT: usize = 4;
 
 /// Seed of the random subset; fixed, so that the energy is a function of positions alone.
 const SUBSET_SEED: u64 = 0x5eed_0fc1_07c0_4b05;
@@ -178,13 +181,29 @@ impl<T: Real> Kernel<T> {
         Some((energy, scale(offset, T::from_f64(-2.0) / guarded)))
     }
 
+    /// What every one of `points` collects from all candidates.
+    fn all(&self, points: &[[T; 3]], candidates: &Candidates<T>) -> Vec<VertexResponse<T>> {
+        let mut responses = Vec::with_capacity(points.len());
+        // Compiled once per vector width and chosen at run time.
+        pulp::Arch::new().dispatch(
+            #[inline(always)]
+            || {
+                responses.extend(points.iter().map(
+                    #[inline(always)]
+                    |p| self.candidates(*p, candidates),
+                ))
+            },
+        );
+        responses
+    }
+
     /// All candidates, whose number is a multiple of [`LANES`], at once.
     #[inline(always)]
     fn candidates(&self, p: [T; 3], candidates: &Candidates<T>) -> VertexResponse<T> {
         let mut pull = [[T::zero(); LANES]; 3];
         let mut excess = [T::zero(); LANES];
         let mut product = [T::one(); LANES];
-        let mut energy = 0.0;
+        let mut logarithm = ProductLogarithm::new();
         let (xs, _) = candidates.x.as_chunks::<LANES>();
         let (ys, _) = candidates.y.as_chunks::<LANES>();
         let (zs, _) = candidates.z.as_chunks::<LANES>();
@@ -202,22 +221,54 @@ impl<T: Real> Kernel<T> {
                 product[lane] *= if inside { guarded } else { T::one() };
                 excess[lane] += if inside { guarded - squared } else { T::zero() };
             }
-            if step % STEPS_PER_LOGARITHM == STEPS_PER_LOGARITHM - 1 {
-                energy -= logarithm_of_product(product);
+            if step % STEPS_PER_PRODUCT == STEPS_PER_PRODUCT - 1 {
+                logarithm.multiply(product);
                 product = [T::one(); LANES];
             }
         }
-        energy -= logarithm_of_product(product);
+        logarithm.multiply(product);
         let sum = |lanes: [T; LANES]| lanes.into_iter().map(Real::to_f64).sum::<f64>();
-        energy += sum(excess) / self.contact_squared.to_f64();
+        let energy = sum(excess) / self.contact_squared.to_f64() - logarithm.value();
         (energy, from_f64(pull.map(|lanes| -2.0 * sum(lanes))))
     }
 }
 
-/// `log Π` of lanes that are each at least 1e-32: 1e-256 for eight.
-#[inline(always)]
-fn logarithm_of_product<T: Real>(product: [T; LANES]) -> f64 {
-    product.into_iter().map(Real::to_f64).product::<f64>().ln()
+/// `log Π x` over many positive factors in lanes, without a logarithm per factor.
+struct ProductLogarithm {
+    /// Each in [1, 2).
+    mantissas: [f64; LANES],
+    /// Sum of the biased exponents that were split off.
+    exponents: [u64; LANES],
+    count: u64,
+}
+
+impl ProductLogarithm {
+    const MANTISSA_BITS: u32 = f64::MANTISSA_DIGITS - 1;
+    const BIAS: u64 = f64::MAX_EXP as u64 - 1;
+
+    #[inline(always)]
+    fn new() -> Self {
+        Self { mantissas: [1.0; LANES], exponents: [0; LANES], count: 0 }
+    }
+
+    /// Factors must be positive and normal `f64` that stay normal when doubled.
+    #[inline(always)]
+    fn multiply<T: Real>(&mut self, factors: [T; LANES]) {
+        for lane in 0..LANES {
+            let bits = (self.mantissas[lane] * factors[lane].to_f64()).to_bits();
+            self.exponents[lane] += bits >> Self::MANTISSA_BITS;
+            let mantissa = bits & ((1 << Self::MANTISSA_BITS) - 1);
+            self.mantissas[lane] = f64::from_bits(mantissa | (Self::BIAS << Self::MANTISSA_BITS));
+        }
+        self.count += LANES as u64;
+    }
+
+    #[inline(always)]
+    fn value(&self) -> f64 {
+        // The product of sixteen mantissas is below 2¹⁶.
+        let exponent = self.exponents.iter().sum::<u64>() as i64 - (self.count * Self::BIAS) as i64;
+        exponent as f64 * std::f64::consts::LN_2 + self.mantissas.iter().product::<f64>().ln()
+    }
 }
 
 /// Coordinates of the vertices around a cell, padded with far points to a multiple of [`LANES`].
@@ -260,19 +311,17 @@ fn all_pairs<T: Real>(positions: &[[T; 3]], excluded: &Rows, kernel: Kernel<T>) 
             candidates.clear();
             grid.for_each_range_around(cell, |range| candidates.extend(&grid.points[range]));
             candidates.pad();
-            grid.range(cell)
-                .map(|k| {
-                    let p = grid.points[k];
-                    let (mut energy, mut pull) = kernel.candidates(p, candidates);
-                    for &v in excluded.row(grid.order[k] as usize) {
-                        if let Some((e, g)) = kernel.pair(p, positions[v as usize]) {
-                            energy -= e;
-                            pull = sub(pull, g);
-                        }
+            let points = &grid.points[grid.range(cell)];
+            let mut responses = kernel.all(points, candidates);
+            for ((k, &p), (energy, pull)) in grid.range(cell).zip(points).zip(&mut responses) {
+                for &v in excluded.row(grid.order[k] as usize) {
+                    if let Some((e, g)) = kernel.pair(p, positions[v as usize]) {
+                        *energy -= e;
+                        *pull = sub(*pull, g);
                     }
-                    (energy, pull)
-                })
-                .collect()
+                }
+            }
+            responses
         })
         .collect();
     let responses = per_cell.iter().flatten();
