@@ -2,8 +2,8 @@
 //!
 //! `cargo run --release -p clothcombo-physics --example energy_times -- --sizes 5000,50000 --growth area --subset 16`
 //! (`RAYON_NUM_THREADS` sets the threads). `--export FOLDER` writes the meshes of the scenes as raw little-endian arrays for
-//! `scripts/bench_energies_torch.py` instead. `--best` prints shortest times instead of medians, for a
-//! machine that has other work.
+//! `scripts/bench_energies_torch.py` instead. `--processor-time` sums the time that all threads
+//! ran, for a machine that has other work.
 
 #[path = "../benches/scenes/mod.rs"]
 mod scenes;
@@ -22,10 +22,10 @@ struct Options {
     subset: Option<usize>,
     export: Option<String>,
     seconds: f64,
-    best: bool,
+    processor_time: bool,
 }
 
-const USAGE: &str = "usage: energy_times [--sizes N,N,…] [--growth area|edge] [--subset K] [--seconds S] [--best] [--export FOLDER]";
+const USAGE: &str = "usage: energy_times [--sizes N,N,…] [--growth area|edge] [--subset K] [--seconds S] [--processor-time] [--export FOLDER]";
 
 fn options() -> Result<Options, Box<dyn Error>> {
     let mut options = Options {
@@ -34,7 +34,7 @@ fn options() -> Result<Options, Box<dyn Error>> {
         subset: None,
         export: None,
         seconds: 0.5,
-        best: false,
+        processor_time: false,
     };
     let mut arguments = std::env::args().skip(1);
     while let Some(name) = arguments.next() {
@@ -52,7 +52,7 @@ fn options() -> Result<Options, Box<dyn Error>> {
             }
             "--subset" => options.subset = Some(value()?.parse()?),
             "--seconds" => options.seconds = value()?.parse()?,
-            "--best" => options.best = true,
+            "--processor-time" => options.processor_time = true,
             "--export" => options.export = Some(value()?),
             _ => return Err(format!("unknown option {name}\n{USAGE}").into()),
         }
@@ -60,17 +60,31 @@ fn options() -> Result<Options, Box<dyn Error>> {
     Ok(options)
 }
 
-/// Median time [ms] of `run` over about `seconds`, at least 5 times, after one run to warm up; with `best` the shortest.
+/// Median time [ms] of `run` over about `seconds`, at least 5 times, after one run to warm up; with `processor_time` of
+/// the time that this process had a processor, which other work on the machine hardly changes.
 fn time_ms<R>(options: &Options, mut run: impl FnMut() -> R) -> f64 {
     black_box(run());
     let (start, mut times) = (Instant::now(), Vec::new());
     while times.len() < 5 || start.elapsed() < Duration::from_secs_f64(options.seconds) {
-        let before = Instant::now();
+        let (before, busy_before) = (Instant::now(), options.processor_time.then(processor_ms));
         black_box(run());
-        times.push(before.elapsed().as_secs_f64() * 1e3);
+        times.push(match busy_before {
+            Some(busy_before) => processor_ms() - busy_before,
+            None => before.elapsed().as_secs_f64() * 1e3,
+        });
     }
     times.sort_by(f64::total_cmp);
-    times[if options.best { 0 } else { times.len() / 2 }]
+    times[times.len() / 2]
+}
+
+/// Time [ms] that the threads of this process have run; NaN where the system does not tell.
+fn processor_ms() -> f64 {
+    let Ok(threads) = std::fs::read_dir("/proc/self/task") else { return f64::NAN };
+    let run_time = |thread: std::fs::DirEntry| {
+        let line = std::fs::read_to_string(thread.path().join("schedstat")).ok()?;
+        line.split(' ').next()?.parse::<f64>().ok()
+    };
+    1e-6 * threads.flatten().filter_map(run_time).sum::<f64>()
 }
 
 fn report(name: &str, scene: &Scene, terms: &[Term], options: &Options) {

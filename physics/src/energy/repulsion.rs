@@ -19,21 +19,14 @@ use rayon::prelude::*;
 
 use super::cell_grid::CellGrid;
 use super::elements::GRAIN;
+use super::pair_kernel::{Candidates, Kernel, VertexResponse};
 use super::{GarmentState, GarmentTerm, Weighted};
 use crate::mesh::Topology;
 use crate::mesh::shapes::SplitMix;
 use crate::real::Real;
-use crate::vec3::{accumulate, axpy, from_f64, scale, sub, zero};
+use crate::vec3::{axpy, sub};
 
-/// δ [m]: below this distance, a fifth of the cloth's thickness, the logarithm continues as a line in `d²`.
-pub const CONTACT_DISTANCE: f64 = 1e-4;
-
-/// Candidates per step of the inner loop.
-const LANES: usize = 16;
-
-/// Steps after which products of squared distances move to `f64`: four squares of at least δ² = 1e-8 stay above the smallest
-/// normal `f32`, and so do four of at most 1, or of a radius below 1e4 m, below the largest.
-const STEPS_PER_PRODUCT: usize = 4;
+pub use super::pair_kernel::CONTACT_DISTANCE;
 
 /// Seed of the random subset; fixed, so that the energy is a function of positions alone.
 const SUBSET_SEED: u64 = 0x5eed_0fc1_07c0_4b05;
@@ -147,161 +140,6 @@ fn draw_partners(topology: &Topology, size: usize) -> Rows {
     Rows::from_fn(count, |v| lists[v].to_vec())
 }
 
-/// The pair energy in the caller's scalar.
-#[derive(Debug, Clone, Copy)]
-struct Kernel<T> {
-    radius: f64,
-    radius_squared: T,
-    contact_squared: T,
-}
-
-/// What one vertex collects from its partners: `Σ −log d²`, and the derivative with respect to its position.
-type VertexResponse<T> = (f64, [T; 3]);
-
-impl<T: Real> Kernel<T> {
-    fn new(radius: f64) -> Self {
-        Self {
-            radius,
-            radius_squared: T::from_f64(radius * radius),
-            contact_squared: T::from_f64(CONTACT_DISTANCE * CONTACT_DISTANCE),
-        }
-    }
-
-    /// One pair: energy and derivative with respect to `p`.
-    #[inline(always)]
-    fn pair(&self, p: [T; 3], q: [T; 3]) -> Option<VertexResponse<T>> {
-        let offset = sub(p, q);
-        let squared = crate::vec3::norm_squared(offset);
-        if squared >= self.radius_squared || squared.is_nan() {
-            return None;
-        }
-        let guarded = squared.max(self.contact_squared);
-        let excess = (guarded - squared).to_f64() / self.contact_squared.to_f64();
-        let energy = excess - guarded.to_f64().ln();
-        Some((energy, scale(offset, T::from_f64(-2.0) / guarded)))
-    }
-
-    /// What every one of `points` collects from all candidates.
-    fn all(&self, points: &[[T; 3]], candidates: &Candidates<T>) -> Vec<VertexResponse<T>> {
-        let mut responses = Vec::with_capacity(points.len());
-        // Compiled once per vector width and chosen at run time.
-        pulp::Arch::new().dispatch(
-            #[inline(always)]
-            || {
-                responses.extend(points.iter().map(
-                    #[inline(always)]
-                    |p| self.candidates(*p, candidates),
-                ))
-            },
-        );
-        responses
-    }
-
-    /// All candidates, whose number is a multiple of [`LANES`], at once.
-    #[inline(always)]
-    fn candidates(&self, p: [T; 3], candidates: &Candidates<T>) -> VertexResponse<T> {
-        let mut pull = [[T::zero(); LANES]; 3];
-        let mut excess = [T::zero(); LANES];
-        let mut product = [T::one(); LANES];
-        let mut logarithm = ProductLogarithm::new();
-        let (xs, _) = candidates.x.as_chunks::<LANES>();
-        let (ys, _) = candidates.y.as_chunks::<LANES>();
-        let (zs, _) = candidates.z.as_chunks::<LANES>();
-        for (step, ((x, y), z)) in xs.iter().zip(ys).zip(zs).enumerate() {
-            for lane in 0..LANES {
-                let (dx, dy, dz) = (p[0] - x[lane], p[1] - y[lane], p[2] - z[lane]);
-                let squared = dx * dx + dy * dy + dz * dz;
-                let inside = squared < self.radius_squared;
-                let guarded = if squared > self.contact_squared { squared } else { self.contact_squared };
-                let inverse = guarded.recip();
-                let inverse = if inside { inverse } else { T::zero() };
-                pull[0][lane] += dx * inverse;
-                pull[1][lane] += dy * inverse;
-                pull[2][lane] += dz * inverse;
-                product[lane] *= if inside { guarded } else { T::one() };
-                excess[lane] += if inside { guarded - squared } else { T::zero() };
-            }
-            if step % STEPS_PER_PRODUCT == STEPS_PER_PRODUCT - 1 {
-                logarithm.multiply(product);
-                product = [T::one(); LANES];
-            }
-        }
-        logarithm.multiply(product);
-        let sum = |lanes: [T; LANES]| lanes.into_iter().map(Real::to_f64).sum::<f64>();
-        let energy = sum(excess) / self.contact_squared.to_f64() - logarithm.value();
-        (energy, from_f64(pull.map(|lanes| -2.0 * sum(lanes))))
-    }
-}
-
-/// `log Π x` over many positive factors in lanes, without a logarithm per factor.
-struct ProductLogarithm {
-    /// Each in [1, 2).
-    mantissas: [f64; LANES],
-    /// Sum of the biased exponents that were split off.
-    exponents: [u64; LANES],
-    count: u64,
-}
-
-impl ProductLogarithm {
-    const MANTISSA_BITS: u32 = f64::MANTISSA_DIGITS - 1;
-    const BIAS: u64 = f64::MAX_EXP as u64 - 1;
-
-    #[inline(always)]
-    fn new() -> Self {
-        Self { mantissas: [1.0; LANES], exponents: [0; LANES], count: 0 }
-    }
-
-    /// Factors must be positive and normal `f64` that stay normal when doubled.
-    #[inline(always)]
-    fn multiply<T: Real>(&mut self, factors: [T; LANES]) {
-        for lane in 0..LANES {
-            let bits = (self.mantissas[lane] * factors[lane].to_f64()).to_bits();
-            self.exponents[lane] += bits >> Self::MANTISSA_BITS;
-            let mantissa = bits & ((1 << Self::MANTISSA_BITS) - 1);
-            self.mantissas[lane] = f64::from_bits(mantissa | (Self::BIAS << Self::MANTISSA_BITS));
-        }
-        self.count += LANES as u64;
-    }
-
-    #[inline(always)]
-    fn value(&self) -> f64 {
-        // The product of sixteen mantissas is below 2¹⁶.
-        let exponent = self.exponents.iter().sum::<u64>() as i64 - (self.count * Self::BIAS) as i64;
-        exponent as f64 * std::f64::consts::LN_2 + self.mantissas.iter().product::<f64>().ln()
-    }
-}
-
-/// Coordinates of the vertices around a cell, padded with far points to a multiple of [`LANES`].
-#[derive(Debug, Default)]
-struct Candidates<T> {
-    x: Vec<T>,
-    y: Vec<T>,
-    z: Vec<T>,
-}
-
-impl<T: Real> Candidates<T> {
-    fn clear(&mut self) {
-        self.x.clear();
-        self.y.clear();
-        self.z.clear();
-    }
-
-    fn extend(&mut self, points: &[[T; 3]]) {
-        self.x.extend(points.iter().map(|p| p[0]));
-        self.y.extend(points.iter().map(|p| p[1]));
-        self.z.extend(points.iter().map(|p| p[2]));
-    }
-
-    fn pad(&mut self) {
-        // Finite, so that its offset times a zero weight is zero; its square is infinite or nearly so, hence outside.
-        let far = T::max_value().sqrt();
-        let padded = self.x.len().next_multiple_of(LANES);
-        self.x.resize(padded, far);
-        self.y.resize(padded, far);
-        self.z.resize(padded, far);
-    }
-}
-
 /// Twice the sum over close pairs and, per vertex, its derivative.
 fn all_pairs<T: Real>(positions: &[[T; 3]], excluded: &Rows, kernel: Kernel<T>) -> (f64, Vec<(u32, [T; 3])>) {
     let grid = CellGrid::new(positions, kernel.radius);
@@ -309,17 +147,15 @@ fn all_pairs<T: Real>(positions: &[[T; 3]], excluded: &Rows, kernel: Kernel<T>) 
         .into_par_iter()
         .map_init(Candidates::default, |candidates, cell| {
             candidates.clear();
-            grid.for_each_range_around(cell, |range| candidates.extend(&grid.points[range]));
+            grid.for_each_range_around(cell, |range| candidates.extend(&grid.axes, range));
             candidates.pad();
             let points = &grid.points[grid.range(cell)];
             let mut responses = kernel.all(points, candidates);
             for ((k, &p), (energy, pull)) in grid.range(cell).zip(points).zip(&mut responses) {
-                for &v in excluded.row(grid.order[k] as usize) {
-                    if let Some((e, g)) = kernel.pair(p, positions[v as usize]) {
-                        *energy -= e;
-                        *pull = sub(*pull, g);
-                    }
-                }
+                let neighbours = excluded.row(grid.order[k] as usize);
+                let (e, g) = kernel.few(p, neighbours.iter().map(|&v| positions[v as usize]));
+                *energy -= e;
+                *pull = sub(*pull, g);
             }
             responses
         })
@@ -338,16 +174,7 @@ fn sampled_pairs<T: Real>(
     let responses: Vec<VertexResponse<T>> = (0..positions.len())
         .into_par_iter()
         .with_min_len(GRAIN / 8)
-        .map(|v| {
-            let (mut energy, mut pull) = (0.0, zero());
-            for &partner in partners.row(v) {
-                if let Some((e, g)) = kernel.pair(positions[v], positions[partner as usize]) {
-                    energy += e;
-                    accumulate(&mut pull, g);
-                }
-            }
-            (energy, pull)
-        })
+        .map(|v| kernel.few(positions[v], partners.row(v).iter().map(|&partner| positions[partner as usize])))
         .collect();
     let twice = responses.iter().map(|(energy, _)| energy).sum();
     (twice, responses.into_iter().enumerate().map(|(v, (_, pull))| (v as u32, pull)).collect())

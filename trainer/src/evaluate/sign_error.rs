@@ -97,9 +97,7 @@ impl SignErrors {
     pub fn sum(parts: &[Self]) -> Self {
         let mut sum = Self::default();
         for part in parts {
-            for (sum, part) in
-                [(&mut sum.apart, &part.apart), (&mut sum.overlapping, &part.overlapping)]
-            {
+            for (sum, part) in [(&mut sum.apart, &part.apart), (&mut sum.overlapping, &part.overlapping)] {
                 sum.points += part.points;
                 sum.inside += part.inside;
                 sum.nearest_vertex.add(&part.nearest_vertex);

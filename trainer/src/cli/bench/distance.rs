@@ -68,8 +68,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     }
     groups.extend(hard_poses().into_iter().map(|(name, pose)| (name.to_owned(), vec![pose])));
 
-    let style =
-        ProgressStyle::with_template("poses {bar:40} {pos}/{len} · {eta} left").into_diagnostic()?;
+    let style = ProgressStyle::with_template("poses {bar:40} {pos}/{len} · {eta} left").into_diagnostic()?;
     let total = groups.iter().map(|(_, poses)| poses.len()).sum::<usize>();
     let bar = ProgressBar::new(total as u64).with_style(style);
     let mut rows = Vec::with_capacity(groups.len());
