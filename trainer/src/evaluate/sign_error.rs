@@ -173,7 +173,7 @@ fn surface_sign_errors(
     let surface = Surface::<f32>::new(positions, Arc::from(faces));
     let points = points_near(&exact, faces, settings);
     let mut errors = SignErrors { poses: 1, ..SignErrors::default() };
-    let mut timed = |distance| {
+    let timed = |distance| {
         surface.gap(points[0], distance); // Trees are built at first use.
         let start = Instant::now();
         let gaps: Vec<f32> = points.iter().map(|p| surface.gap(*p, distance).gap).collect();

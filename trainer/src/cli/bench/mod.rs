@@ -8,6 +8,7 @@ use miette::Report;
 /// Measures how far results can be trusted
 #[derive(Subcommand)]
 pub enum Bench {
+    /// How often the sign of the distance to the body is wrong, by nearest vertex and by closest surface point
     Distance(distance::Arguments),
 }
 
