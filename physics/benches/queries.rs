@@ -8,8 +8,8 @@ mod scenes;
 use std::hint::black_box;
 use std::time::Duration;
 
-use clothcombo_physics::contact::{mesh_triangles_intersect, triangle_pairs, triangles_intersect};
-use clothcombo_physics::query::{Distance, brute_force, winding_number};
+use clothcombo_physics::contact::{triangle_pairs, triangles_intersect};
+use clothcombo_physics::query::{Distance, brute_force};
 use clothcombo_physics::{Surface, TriMesh};
 use criterion::{BenchmarkId, Criterion};
 use scenes::Growth;

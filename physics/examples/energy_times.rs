@@ -1,6 +1,6 @@
 //! Times of all energies, one line per term and size, tab-separated.
 //!
-//! `cargo run --release -p clothcombo-physics --example energy_times -- --sizes 5000,50000 --growth area --subset 16`
+//! `cargo run --release --example energy_times -- --sizes 5000,50000 --growth area --subset 16`
 //! (`RAYON_NUM_THREADS` sets the threads). `--export FOLDER` writes the meshes of the scenes as raw little-endian arrays for
 //! `scripts/bench_energies_torch.py` instead. `--processor-time` sums the time that all threads
 //! ran, for a machine that has other work.

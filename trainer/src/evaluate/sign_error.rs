@@ -84,7 +84,7 @@ pub struct SignErrors {
     pub poses: usize,
     /// Near surface that is the body's outside.
     pub apart: RegionErrors,
-    /// Near surface that lies inside another part of the body, or inside two parts at once.
+    /// Near surface that lies inside another part of the body or is turned inside out, or inside two parts at once.
     pub overlapping: RegionErrors,
     /// Mean time of 1,000 nearest-vertex queries, on one thread [ms].
     pub nearest_vertex_ms: f64,
@@ -202,7 +202,9 @@ fn surface_sign_errors(
     let under_surface = winding_numbers(&exact, faces, &under_surface);
     for i in 0..points.len() {
         let is_inside = turns[i] > 0.5;
-        let overlaps = turns[i].max(under_vertex[i]).max(under_surface[i]) > 1.5;
+        // Right under a proper piece of outside the body is entered exactly once.
+        let is_outside = |under: f64| (under - 1.0).abs() < 0.5;
+        let overlaps = turns[i] > 1.5 || !is_outside(under_vertex[i]) || !is_outside(under_surface[i]);
         let region = if overlaps { &mut errors.overlapping } else { &mut errors.apart };
         let distance = f64::from(closest[i].abs());
         region.points += 1;
