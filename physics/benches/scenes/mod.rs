@@ -164,12 +164,11 @@ impl Scene {
             .map(|(energies, dressed)| SceneGarment {
                 energies: energies.clone(),
                 holding_reference: narrowed(dressed.rest.positions()),
-                weights: weights.clone(),
+                weights,
             })
             .collect();
-        let layers = (1..self.energies.len())
-            .map(|outer| SceneLayers { inner: outer - 1, outer, weights: weights.clone() })
-            .collect();
+        let layers =
+            (1..self.energies.len()).map(|outer| SceneLayers { inner: outer - 1, outer, weights }).collect();
         SceneEnergy { body: self.body.clone(), garments, layers, settings: self.settings }
     }
 }

@@ -8,7 +8,7 @@
 //! have no direction to part in and get none from each other. **At the radius** the printed term jumps from 4.6 to 0; this
 //! is kept, and the gradient is that of the pairs inside.
 //!
-//! **No all-pairs work.** Vertices are sorted into cells of half the radius; the vertices of one cell share one list of
+//! **No all-pairs work.** Vertices are sorted into cells of half or a quarter of the radius; those of one cell share a list of
 //! candidates, which the inner loop runs through in fixed lanes, with the widest vectors the processor has (the operations
 //! and their order are the same for all of them, and so are the results). `Σ log d²` is the logarithm of a product, kept as
 //! mantissa and exponent: one logarithm per vertex. Pairs joined by an edge are not looked for inside that loop but
