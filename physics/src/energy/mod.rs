@@ -29,6 +29,7 @@ pub mod holding;
 pub mod layer_collision;
 pub mod layer_distance;
 mod material;
+mod pair_kernel;
 pub mod repulsion;
 mod scene;
 mod settings;
