@@ -1,4 +1,4 @@
-//! Everything around training: making and importing data.
+//! Everything around training: making and importing data, scoring drapes.
 
 use clap::{Parser, Subcommand};
 use clothcombo_trainer::cli;
@@ -21,6 +21,7 @@ enum Verb {
     Generate(cli::generate::Arguments),
     #[command(subcommand)]
     Import(cli::import::Source),
+    Score(cli::score::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -29,5 +30,6 @@ fn main() -> ExitCode {
     cli::exit_code(match &arguments.verb {
         Verb::Generate(arguments) => cli::generate::run(arguments),
         Verb::Import(source) => cli::import::run(source),
+        Verb::Score(arguments) => cli::score::run(arguments),
     })
 }

@@ -2,6 +2,7 @@
 
 pub mod generate;
 pub mod import;
+pub mod score;
 pub mod train;
 
 use miette::Report;
