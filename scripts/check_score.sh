@@ -71,7 +71,7 @@ check dress Boxing_Toes 1500 1.5,-1,0.5 F_Dress_01
 check tee 01_03 2000 -1.5,1 short_tail_camo_tee
 check jeans Boxing_Toes 400 -1,0.5 Tightjeans
 check skirt test_mocapbank 300 2,-2 miniskirt
-check tunic 01_03 700 0.5,0.5 Asymmetric_Tunic
+check tunic 01_03 700 0.5,0.5 Asymmetric_Tunic_and_Sash
 check layers Boxing_Toes 900 1,-0.5 ShortJeans Tank_Top_01 Coat
 
 if [ ${#failed[@]} -gt 0 ]; then

@@ -79,10 +79,15 @@ def dot(a, b):
     return (a * b).sum(-1)
 
 
+def squared_distances(points, among):
+    """All of them, [N, M]; coordinate by coordinate, because differences of squares would cancel."""
+    return sum((points[:, k, None] - among[:, k]) ** 2 for k in range(3))
+
+
 def nearest(points, among):
     """For each point, the index of the nearest of `among`, the lowest of equals."""
-    found = [((p[:, None] - among) ** 2).sum(-1).argmin(1) for p in np.array_split(points, len(points) // 64 + 1)]
-    return np.concatenate(found)
+    blocks = np.array_split(points, len(points) // 64 + 1)
+    return np.concatenate([squared_distances(block, among).argmin(1) for block in blocks])
 
 
 def strain(rest, x):
@@ -151,7 +156,7 @@ def repulsion(rest, x):
     edges, energy, block = rest.edges(), 0.0, 256
     for start in range(0, len(x), block):
         rows = np.arange(start, min(start + block, len(x)))
-        squared = ((x[rows, None] - x[None]) ** 2).sum(-1)
+        squared = squared_distances(x[rows], x)
         counts = (squared < REPULSION_RADIUS**2) & (np.arange(len(x)) > rows[:, None])
         here = edges[(edges[:, 0] >= start) & (edges[:, 0] < start + block)]
         counts[here[:, 0] - start, here[:, 1]] = False

@@ -74,7 +74,9 @@ fn run(arguments: &Arguments) -> Result<(), Report> {
             }
         };
         let draped = binding.skinned(&canonical, &posed.bones);
-        for (folder, positions) in [("rest", rest), ("canonical", &canonical), ("draped", &draped)] {
+        for (folder, positions) in
+            [("rest", rest), ("canonical", canonical.as_slice()), ("draped", draped.as_slice())]
+        {
             // Garments under CC BY ask for their author's name wherever they go.
             let note = format!("{}: {} {}", garment.name, garment.source.author, garment.source.licence);
             write(&format!("{folder}/{}.obj", garment.name), positions, garment.rest.faces(), &note)?;
@@ -93,7 +95,9 @@ fn named_garments(config: &Config, body: &Body, names: &[String]) -> Result<Vec<
     let find = |name: &String| {
         let known = || all.iter().map(|g| g.name.as_str()).collect::<Vec<_>>().join(", ");
         let found = all.iter().find(|g| g.name == *name).cloned();
-        found.ok_or_else(|| miette!(help = "the garments are: {}", known(), "no garment is called {name:?}"))
+        found.ok_or_else(|| {
+            miette!(help = format!("the garments are: {}", known()), "no garment is called {name:?}")
+        })
     };
     names.iter().map(find).collect()
 }
@@ -110,7 +114,7 @@ fn pose(config: &Config, arguments: &Arguments) -> Result<Pose, Report> {
     let clips = load_motion_folder(folder).into_diagnostic()?;
     let Some(clip) = clips.iter().find(|clip| clip.name == *name) else {
         let known = clips.iter().map(|clip| clip.name.as_str()).collect::<Vec<_>>().join(", ");
-        return Err(miette!(help = "the clips are: {known}", "no motion is called {name:?}"));
+        return Err(miette!(help = format!("the clips are: {known}"), "no motion is called {name:?}"));
     };
     let Some(pose) = clip.poses.get(arguments.frame) else {
         let (frame, count) = (arguments.frame, clip.poses.len());

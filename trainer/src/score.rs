@@ -176,35 +176,39 @@ pub fn score(
         garments.iter().map(|g| TriangleTree::new(g.positions, g.rest.faces())).collect();
     let intersections = IntersectionReport::new(&body_tree, &trees);
 
-    let garment_scores = garments.iter().enumerate().map(|(i, garment)| {
-        let inside = penetration_by(&surface, garment.positions, 0.0, distance.into());
-        Ok(GarmentScore {
-            name: garment.name.to_owned(),
-            vertices: garment.rest.vertex_count(),
-            triangles: garment.rest.face_count(),
-            raw: named(garment.name, &value.garments[i], |_| 1.0)?,
-            weighted: named(garment.name, &value.garments[i], |term| weights.garments[i][term])?,
-            penetration: PenetrationScore {
-                vertices_inside: inside.inside as f64 / inside.vertices as f64,
-                max_depth_mm: 1e3 * inside.max_depth,
-                body_triangle_pairs: intersections.garment_body[i].pairs,
-                self_triangle_pairs: intersections.garment_self[i].pairs,
-            },
-        })
-    });
-    let layer_scores = value.layers.iter().zip(&intersections.garment_garment).map(|(raw, crossing)| {
-        let &LayerIntersections { inner, outer, intersections } = crossing;
-        let [under, over] = [&garments[inner], &garments[outer]];
-        let raw = named(&format!("{} under {}", under.name, over.name), raw, |_| 1.0)?;
-        Ok(LayerScore {
-            inner,
-            outer,
-            layer_collision: raw[Term::LayerCollision.name()],
-            layer_distance: raw[Term::LayerDistance.name()],
-            triangle_pairs: intersections.pairs,
-            order_violations: order_violations(under.positions, under.rest.faces(), over.positions).share(),
-        })
-    });
+    let garment_scores =
+        garments.iter().enumerate().map(|(i, garment)| -> Result<GarmentScore, ScoreError> {
+            let inside = penetration_by(&surface, garment.positions, 0.0, distance.into());
+            Ok(GarmentScore {
+                name: garment.name.to_owned(),
+                vertices: garment.rest.vertex_count(),
+                triangles: garment.rest.face_count(),
+                raw: named(garment.name, &value.garments[i], |_| 1.0)?,
+                weighted: named(garment.name, &value.garments[i], |term| weights.garments[i][term])?,
+                penetration: PenetrationScore {
+                    vertices_inside: inside.inside as f64 / inside.vertices as f64,
+                    max_depth_mm: 1e3 * inside.max_depth,
+                    body_triangle_pairs: intersections.garment_body[i].pairs,
+                    self_triangle_pairs: intersections.garment_self[i].pairs,
+                },
+            })
+        });
+    let crossings = intersections.garment_garment.iter();
+    let layer_scores =
+        value.layers.iter().zip(crossings).map(|(raw, crossing)| -> Result<LayerScore, ScoreError> {
+            let &LayerIntersections { inner, outer, intersections } = crossing;
+            let [under, over] = [&garments[inner], &garments[outer]];
+            let raw = named(&format!("{} under {}", under.name, over.name), raw, |_| 1.0)?;
+            Ok(LayerScore {
+                inner,
+                outer,
+                layer_collision: raw[Term::LayerCollision.name()],
+                layer_distance: raw[Term::LayerDistance.name()],
+                triangle_pairs: intersections.pairs,
+                order_violations: order_violations(under.positions, under.rest.faces(), over.positions)
+                    .share(),
+            })
+        });
     Ok(Score {
         settings: ScoreSettings { epsilon_mm: 1e3 * settings.body_collision_epsilon, distance },
         body: BodyScore { self_triangle_pairs: intersections.body_self.pairs },
@@ -235,9 +239,9 @@ fn scene_garment(
     garment
         .rest
         .with_positions(garment.positions.to_vec())
-        .map_err(|source| ScoreError::Positions { garment: name(), source })?;
+        .map_err(|reason| ScoreError::Positions { garment: name(), reason })?;
     let energies = GarmentEnergies::new(garment.rest, &Topology::new(garment.rest), settings, false)
-        .map_err(|source| ScoreError::Energy { garment: name(), source })?;
+        .map_err(|reason| ScoreError::Energy { garment: name(), reason })?;
     Ok(SceneGarment { energies: Arc::new(energies), holding_reference: Vec::new(), weights })
 }
 

@@ -69,7 +69,7 @@ impl Case {
     /// Scores the tee; must exit with 1, print nothing on stdout and one message that holds every one of `words`.
     fn must_fail(&self, rest: &[&str], draped: &[&str], words: &[&str]) {
         let output = self.command(rest, draped, &[]).output().unwrap();
-        let message = String::from_utf8_lossy(&output.stderr).replace("\n  │ ", "");
+        let message = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{message}");
         assert!(output.stdout.is_empty());
         assert!(!message.contains("panicked") && message.matches('×').count() == 1, "{message}");
@@ -108,7 +108,7 @@ fn json_has_the_documented_shape_and_quads_are_scored() {
             assert!(garment["raw"][term].is_f64() && garment["weighted"][term].is_f64(), "{term}");
         }
     }
-    assert_eq!(garments[0]["raw"]["strain"], 0.0);
+    assert!(garments[0]["raw"]["strain"].as_f64().unwrap() < 1e-20);
     let layers = score["layers"].as_array().unwrap();
     assert_eq!(layers.len(), 1);
     assert_eq!(

@@ -99,7 +99,7 @@ fn tables(score: &Score) -> String {
         .collect();
     let mut text = [table(&RAW, &raw), table(&WEIGHTED, &weighted), table(&CONTACT, &contact)].join("\n");
     if !layers.is_empty() {
-        text = text + "\n" + &table(&LAYERS, &layers);
+        text += &format!("\n{}", table(&LAYERS, &layers));
     }
     let distance = match score.settings.distance {
         ScoreDistance::NearestVertex => "the nearest vertex",

@@ -11,9 +11,13 @@ use thiserror::Error;
 #[derive(Debug, Error, Diagnostic)]
 pub enum ScoreError {
     /// A mesh file is missing or wrong; the message names file and line.
-    #[error(transparent)]
+    // Not a `source`: its text would be printed twice.
+    #[error("{reason}")]
     #[diagnostic(help("every mesh is an OBJ file of triangles, quads or polygons, in metres"))]
-    File(#[from] ObjError),
+    File {
+        /// What the reader said.
+        reason: ObjError,
+    },
     /// Every garment needs both its files.
     #[error("{rest} rest meshes (--rest) but {draped} draped meshes (--draped)")]
     #[diagnostic(help("give each garment once in both lists, from the body outwards"))]
@@ -62,20 +66,20 @@ pub enum ScoreError {
         draped_face: [u32; 3],
     },
     /// Positions that are not those of the garment.
-    #[error("garment '{garment}': {source}")]
+    #[error("garment '{garment}': {reason}")]
     Positions {
         /// Its name.
         garment: String,
         /// What is wrong with them.
-        source: MeshError,
+        reason: MeshError,
     },
     /// A garment without energies.
-    #[error("garment '{garment}': {source}")]
+    #[error("garment '{garment}': {reason}")]
     Energy {
         /// Its name.
         garment: String,
         /// Why.
-        source: EnergyError,
+        reason: EnergyError,
     },
     /// A value beyond what a number can hold.
     #[error("'{of}' has a {term} of {value}")]
@@ -88,6 +92,12 @@ pub enum ScoreError {
         /// What it came to.
         value: f64,
     },
+}
+
+impl From<ObjError> for ScoreError {
+    fn from(reason: ObjError) -> Self {
+        ScoreError::File { reason }
+    }
 }
 
 /// A mesh file and what it holds, for messages.

@@ -4,7 +4,7 @@ use super::*;
 use clothcombo_physics::mesh::shapes::{icosphere, mapped, tube, union};
 use std::path::Path;
 
-/// A ball as body; two sleeves around it, the outer one first through the ball's top.
+/// A ball as body; two sleeves around it, the outer one with room between.
 fn scene() -> (TriMesh, TriMesh, TriMesh) {
     let sleeve = |radius: f64| mapped(&tube(radius, 0.8, 40, 16), |[x, y, z]| [x, y - 0.4, z]);
     (icosphere(0.3, 4), sleeve(0.305), sleeve(0.33))
@@ -58,7 +58,7 @@ fn a_lifted_body_crosses_the_sleeve_and_is_measured_in_millimetres() {
         let score = score(&moved, &[draped("a", &inner)], distance).unwrap();
         let found = score.garments[0].penetration;
         assert!((found.max_depth_mm - 15.0).abs() < 2.0, "{found:?}");
-        assert!(found.vertices_inside > 0.05 && found.vertices_inside < 0.5);
+        assert!(found.vertices_inside > 0.03 && found.vertices_inside < 0.5);
         assert!(found.body_triangle_pairs > 20);
     }
 }
