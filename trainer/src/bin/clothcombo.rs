@@ -1,4 +1,4 @@
-//! Everything around training: making and importing data.
+//! Everything around training: making and importing data, scoring drapes.
 
 use clap::{Parser, Subcommand};
 use clothcombo_trainer::cli;
@@ -24,6 +24,7 @@ enum Verb {
     #[command(subcommand)]
     Import(cli::import::Source),
     Prepare(cli::prepare::Arguments),
+    Score(cli::score::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -34,5 +35,6 @@ fn main() -> ExitCode {
         Verb::Generate(arguments) => cli::generate::run(arguments),
         Verb::Import(source) => cli::import::run(source),
         Verb::Prepare(arguments) => cli::prepare::run(arguments),
+        Verb::Score(arguments) => cli::score::run(arguments),
     })
 }

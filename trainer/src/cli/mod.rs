@@ -4,6 +4,7 @@ pub mod bench;
 pub mod generate;
 pub mod import;
 pub mod prepare;
+pub mod score;
 pub mod train;
 
 use miette::Report;
