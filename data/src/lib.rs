@@ -6,4 +6,5 @@ pub mod asset;
 pub mod dataset;
 pub mod format;
 pub mod generate;
+pub mod hard_cases;
 pub mod import;

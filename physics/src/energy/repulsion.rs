@@ -148,6 +148,8 @@ fn draw_partners(topology: &Topology, size: usize) -> Rows {
 #[derive(Debug, Clone, Copy)]
 struct Kernel<T> {
     radius: f64,
+    /// Every pair has at least this energy; negative, hence no bound to use, for a radius above 1 m.
+    least_energy: f64,
     radius_squared: T,
     contact_squared: T,
 }
@@ -159,6 +161,7 @@ impl<T: Real> Kernel<T> {
     fn new(radius: f64) -> Self {
         Self {
             radius,
+            least_energy: -2.0 * radius.ln(),
             radius_squared: T::from_f64(radius * radius),
             contact_squared: T::from_f64(CONTACT_DISTANCE * CONTACT_DISTANCE),
         }
@@ -270,7 +273,8 @@ fn all_pairs<T: Real>(positions: &[[T; 3]], excluded: &Rows, kernel: Kernel<T>) 
                             pull = sub(pull, g);
                         }
                     }
-                    (energy, pull)
+                    // Less than half a pair: no pair at all, and what is left is the rounding of those subtracted.
+                    if energy.abs() < 0.5 * kernel.least_energy { (0.0, zero()) } else { (energy, pull) }
                 })
                 .collect()
         })

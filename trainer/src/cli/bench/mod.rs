@@ -1,0 +1,23 @@
+//! `clothcombo bench`: measurements that a user can repeat.
+
+pub mod stability;
+
+use clap::Subcommand;
+use miette::Report;
+
+/// Measures what the documentation claims
+#[derive(Subcommand)]
+pub enum Bench {
+    /// Every energy on every hard case: finite, bounded, a true gradient, the same in both precisions
+    Stability(stability::Arguments),
+}
+
+/// Runs the bench.
+///
+/// # Errors
+/// When an input cannot be read or a promise does not hold.
+pub fn run(bench: &Bench) -> Result<(), Report> {
+    match bench {
+        Bench::Stability(arguments) => stability::run(arguments),
+    }
+}
