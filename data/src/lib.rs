@@ -7,4 +7,5 @@ pub mod cache;
 pub mod dataset;
 pub mod format;
 pub mod generate;
+pub mod hard_cases;
 pub mod import;

@@ -24,6 +24,8 @@ mod cell_grid;
 mod elements;
 mod error;
 mod garment;
+pub mod gradient_bound;
+pub mod gradient_check;
 pub mod gravity;
 pub mod holding;
 pub mod layer_collision;

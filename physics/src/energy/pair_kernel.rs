@@ -19,6 +19,8 @@ const STEPS_PER_PRODUCT: usize = 4;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Kernel<T> {
     pub radius: f64,
+    /// Every pair has at least this energy; negative, hence no bound to use, for a radius above 1 m.
+    pub least_energy: f64,
     radius_squared: T,
     contact_squared: T,
 }
@@ -43,6 +45,7 @@ impl<T: Real> Kernel<T> {
     pub fn new(radius: f64) -> Self {
         Self {
             radius,
+            least_energy: -2.0 * radius.ln(),
             radius_squared: T::from_f64(radius * radius),
             contact_squared: T::from_f64(CONTACT_DISTANCE * CONTACT_DISTANCE),
         }

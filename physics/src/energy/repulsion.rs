@@ -156,6 +156,10 @@ fn all_pairs<T: Real>(positions: &[[T; 3]], excluded: &Rows, kernel: Kernel<T>) 
                 let (e, g) = kernel.few(p, neighbours.iter().map(|&v| positions[v as usize]));
                 *energy -= e;
                 *pull = sub(*pull, g);
+                // Less than half a pair: no pair at all, and what is left is the rounding of those subtracted.
+                if energy.abs() < 0.5 * kernel.least_energy {
+                    (*energy, *pull) = (0.0, zero());
+                }
             }
             responses
         })

@@ -1,4 +1,4 @@
-//! Everything around training: making and importing data, scoring drapes.
+//! Everything around training: making and importing data, scoring drapes, measuring.
 
 use clap::{Parser, Subcommand};
 use clothcombo_trainer::cli;
