@@ -131,6 +131,31 @@ impl NpzFile {
         self.archive.index_for_name(&npyz::npz::file_name_from_array_name(key)).is_some()
     }
 
+    /// Whether the array of that name is an object array, that is, a Python pickle; reads its header only.
+    pub fn is_pickled(&mut self, key: &str) -> bool {
+        let Some(index) = self.archive.index_for_name(&npyz::npz::file_name_from_array_name(key)) else {
+            return false;
+        };
+        let header = self.archive.by_index(index).ok().and_then(|mut member| read_header(&mut member).ok());
+        header.is_some_and(|h| matches!(h.dtype(), DType::Plain(kind) if kind.uses_pickled_array()))
+    }
+
+    /// The shape of an array; reads its header only.
+    ///
+    /// # Errors
+    /// [`NpzError`] naming file and key.
+    pub fn shape(&mut self, key: &str) -> Result<Vec<usize>, NpzError> {
+        let Some(index) = self.archive.index_for_name(&npyz::npz::file_name_from_array_name(key)) else {
+            let (key, hint) = (key.into(), String::new());
+            return Err(NpzError::Missing { path: self.path.clone(), key, hint, present: self.keys() });
+        };
+        let header = (self.archive.by_index(index).map_err(|e| e.to_string()))
+            .and_then(|mut member| read_header(&mut member).map_err(|e| e.to_string()));
+        let shape =
+            header.map(|h| h.shape().iter().map(|n| usize::try_from(*n).unwrap_or(usize::MAX)).collect());
+        shape.map_err(|reason| NpzError::Damaged { path: self.path.clone(), key: key.into(), reason })
+    }
+
     /// A numeric or boolean array, converted to `f64`. `hint` says what kind of file was expected, should the key be missing.
     ///
     /// # Errors
@@ -190,7 +215,7 @@ impl NpzFile {
             return Err(NpzError::Missing { path: self.path.clone(), key, hint, present: self.keys() });
         };
         let mut member = self.archive.by_index(index).map_err(|e| damaged(e.to_string()))?;
-        let header = NpyHeader::from_reader(&mut member).map_err(|e| damaged(e.to_string()))?;
+        let header = read_header(&mut member).map_err(|e| damaged(e.to_string()))?;
         let DType::Plain(kind) = header.dtype() else {
             return Err(NpzError::Kind {
                 path: self.path.clone(),
@@ -212,6 +237,7 @@ impl NpzFile {
         let shape = shape.ok_or_else(|| damaged("shape does not fit in memory".into()))?;
         let count =
             shape.iter().try_fold(1usize, |a, n| a.checked_mul(*n)).and_then(|n| n.checked_mul(width));
+        let count = count.filter(|n| *n / width.max(1) <= LARGEST_ARRAY);
         let count = count.ok_or_else(|| damaged(format!("shape {shape:?} does not fit in memory")))?;
         // Grows with what is there, so that a lying header cannot reserve memory.
         let mut bytes = Vec::new();
@@ -240,6 +266,36 @@ impl NpzFile {
     }
 }
 
+/// More numbers than any model or motion holds (SMPL-X's largest array has 15 million); a deflated file of a few kilobytes
+/// can claim any size.
+const LARGEST_ARRAY: usize = 1 << 26;
+
+/// The header of an `.npy` member. Its text is looked at before it is parsed: it cannot be long or deeply nested, or else it
+/// exhausts memory or stack.
+fn read_header(member: &mut impl Read) -> std::io::Result<NpyHeader> {
+    const LONGEST: usize = 1 << 16;
+    const MOST_BRACKETS: usize = 64;
+    let invalid = |reason: &str| std::io::Error::new(std::io::ErrorKind::InvalidData, reason.to_string());
+    let mut start = [0u8; 12];
+    member.read_exact(&mut start[..10])?;
+    let mut length = usize::from(u16::from_le_bytes([start[8], start[9]]));
+    let mut known = 10;
+    if start[6] > 1 {
+        member.read_exact(&mut start[10..])?;
+        length = u32::from_le_bytes([start[8], start[9], start[10], start[11]]) as usize;
+        known = 12;
+    }
+    if !start.starts_with(b"\x93NUMPY") || length > LONGEST {
+        return Err(invalid("it is not a NumPy array"));
+    }
+    let mut bytes = start[..known].to_vec();
+    member.take(length as u64).read_to_end(&mut bytes)?;
+    if bytes.iter().filter(|b| matches!(b, b'(' | b'[' | b'{')).count() > MOST_BRACKETS {
+        return Err(invalid("its header is too deeply nested"));
+    }
+    NpyHeader::from_reader(&bytes[..])
+}
+
 /// The conversion of one little-endian cell, zero-padded to eight bytes.
 fn number_reader(kind: TypeChar, width: usize) -> Option<fn([u8; 8]) -> f64> {
     Some(match (kind, width) {
@@ -257,7 +313,7 @@ fn number_reader(kind: TypeChar, width: usize) -> Option<fn([u8; 8]) -> f64> {
 }
 
 /// IEEE 754 binary16.
-fn half_to_f64(bits: u16) -> f64 {
+pub(super) fn half_to_f64(bits: u16) -> f64 {
     let sign = if bits & 0x8000 == 0 { 1.0 } else { -1.0 };
     let (exponent, fraction) = (i32::from(bits >> 10 & 0x1f), f64::from(bits & 0x3ff));
     match exponent {
@@ -269,7 +325,12 @@ fn half_to_f64(bits: u16) -> f64 {
 }
 
 fn to_row_major<T: Clone>(data: Vec<T>, shape: &[usize], order: Order) -> Vec<T> {
-    if order == Order::C || shape.len() < 2 || data.is_empty() {
+    if order == Order::C { data } else { row_major_from_fortran(data, shape) }
+}
+
+/// Reorders an array whose first axis is the fastest.
+pub(super) fn row_major_from_fortran<T: Clone>(data: Vec<T>, shape: &[usize]) -> Vec<T> {
+    if shape.len() < 2 || data.is_empty() {
         return data;
     }
     // Walk the row-major positions; the first axis has stride one in Fortran order.
