@@ -221,7 +221,7 @@ impl Body {
         }
         for vertex in 0..vertices {
             let (row_joints, row) = skin_weights.row(vertex);
-            let sum: f32 = row.iter().sum();
+            let sum = row.iter().fold(0.0f32, |sum, w| sum + w);
             let problem = if row.is_empty() || sum.is_nan() || (sum - 1.0).abs() > 1e-3 {
                 format!("sum to {sum} instead of 1")
             } else if let Some(j) = row_joints.iter().find(|j| usize::from(**j) >= joints) {

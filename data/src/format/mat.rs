@@ -126,13 +126,10 @@ impl MatFile {
         if bytes.starts_with(b"\x89HDF") || bytes.starts_with(b"MATLAB 7.3") {
             return Err(not("it is a version 7.3 file, that is HDF5; save it again with -v7"));
         }
-        if bytes.len() < HEADER {
-            return Err(not(&format!("{} bytes are less than its header", bytes.len())));
-        }
-        let big = match &bytes[126..128] {
-            b"IM" => false,
-            b"MI" => true,
-            _ => return Err(not("no byte-order mark; level-4 files must be saved again with -v7")),
+        let big = match bytes.get(126..HEADER) {
+            Some(b"IM") => false,
+            Some(b"MI") => true,
+            _ => return Err(not("it has no level-5 header; a level-4 file must be saved again with -v7")),
         };
         let mut budget = LARGEST;
         let mut file = Self::default();
@@ -358,5 +355,8 @@ fn text(kind: u32, data: &[u8], big: bool, shape: &[usize]) -> Result<String, St
         return Ok(characters.into_iter().collect());
     }
     let line = |row: usize| characters[row..].iter().step_by(rows).collect::<String>();
-    Ok((0..rows).map(|row| line(row).trim_end().to_string()).collect::<Vec<_>>().join("\n"))
+    Ok((0..rows)
+        .map(|row| line(row).trim_end_matches([' ', '\0']).to_string())
+        .collect::<Vec<_>>()
+        .join("\n"))
 }
