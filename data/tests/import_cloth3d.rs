@@ -246,11 +246,11 @@ fn point_caches_are_exact_and_their_size_is_checked() {
     let whole = fs::read(&path).unwrap();
     for (at, bytes, part) in [
         (0, &b"POINTCACHE3\0"[..], "not a point cache"),
-        (12, &[2, 0, 0, 0], "version is 2"),
-        (16, &[0xff; 4], "-1 points"),
-        (16, &[0xff, 0xff, 0xff, 0x7f], "2147483647 points"),
-        (28, &[0; 4], "0 frames"),
-        (32 + 6 * 3, &[0, 0x7c], "frame 0, point 3 is not finite"),
+        (12, &[2, 0, 0, 0][..], "version is 2"),
+        (16, &[0xff; 4][..], "-1 points"),
+        (16, &[0xff, 0xff, 0xff, 0x7f][..], "2147483647 points"),
+        (28, &[0; 4][..], "0 frames"),
+        (32 + 6 * 3, &[0, 0x7c][..], "frame 0, point 3 is not finite"),
     ] {
         let mut bad = whole.clone();
         bad[at..at + bytes.len()].copy_from_slice(bytes);

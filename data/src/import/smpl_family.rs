@@ -5,7 +5,7 @@
 use super::{Progress, Summary};
 use crate::asset::body_file::{BodyFileError, BodyFileSettings, shape_part};
 use crate::asset::{Body, Provenance};
-use crate::format::{NpzError, NpzFile};
+use crate::format::NpzFile;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -194,11 +194,5 @@ fn provenance(file: &mut NpzFile, model: Option<&Model>, input: &Path) -> Proven
             licence: m.licence.into(),
         },
         None => Provenance { source: name, ..Provenance::default() },
-    }
-}
-
-impl From<NpzError> for SmplFamilyError {
-    fn from(error: NpzError) -> Self {
-        Self::Body(error.into())
     }
 }
