@@ -390,7 +390,7 @@ def write_cloth3d():
     shape = np.round(rng.normal(0, 1, 10), 3)
     body = rest(neutral, shape, -2.1)
     write_obj(path("cloth3d", "00002", "Trousers.obj"), body[trousers], trousers_quads)
-    write_pc16(path("cloth3d", "00002", "Trousers.pc16"), rng.normal(0, 0.5, (1, len(trousers), 3)), keep=1000)
+    write_pc16(path("cloth3d", "00002", "Trousers.pc16"), rng.normal(0, 0.5, (1, len(trousers), 3)), keep=600)
     with open(path("cloth3d", "00002", "Top.obj"), "w") as f:
         f.write("v 0 0 0\nv 1 0 zero\n")
     save_mat(path("cloth3d", "00002", "info.mat"), {
