@@ -2,9 +2,13 @@
 
 pub mod atomic;
 pub mod bvh;
+pub mod mat;
 pub mod npz;
 pub mod obj;
+pub mod pc16;
 
 pub use bvh::{Bvh, BvhError};
+pub use mat::{MatError, MatFile, MatValue};
 pub use npz::{Array, NpzError, NpzFile, NpzWriter};
 pub use obj::{ObjError, ObjMesh};
+pub use pc16::{PointCache, PointCacheError};
