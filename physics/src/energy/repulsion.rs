@@ -24,7 +24,7 @@ use super::{GarmentState, GarmentTerm, Weighted};
 use crate::mesh::Topology;
 use crate::mesh::shapes::SplitMix;
 use crate::real::Real;
-use crate::vec3::{axpy, sub};
+use crate::vec3::{axpy, sub, zero};
 
 pub use super::pair_kernel::CONTACT_DISTANCE;
 
