@@ -20,6 +20,8 @@ struct Arguments {
 enum Verb {
     Generate(cli::generate::Arguments),
     #[command(subcommand)]
+    Bench(cli::bench::Bench),
+    #[command(subcommand)]
     Import(cli::import::Source),
 }
 
@@ -28,6 +30,7 @@ fn main() -> ExitCode {
     cli::start_logging("info");
     cli::exit_code(match &arguments.verb {
         Verb::Generate(arguments) => cli::generate::run(arguments),
+        Verb::Bench(bench) => cli::bench::run(bench),
         Verb::Import(source) => cli::import::run(source),
     })
 }

@@ -1,8 +1,10 @@
 //! The command lines of the two programs.
 
+pub mod bench;
 pub mod generate;
 pub mod import;
 pub mod train;
+mod wardrobe_sheet;
 
 use miette::Report;
 use tracing_subscriber::EnvFilter;

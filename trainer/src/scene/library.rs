@@ -227,7 +227,7 @@ impl Library {
             asked if asked <= body.shape_count => asked,
             asked => return Err(LibraryError::ShapeComponents { asked, available: body.shape_count }),
         };
-        let poses = PoseLibrary::new(&config.data.poses)?;
+        let poses = PoseLibrary::new(&config.data.poses, &body)?;
         let (training, held_out) = split(&garments, &config.data.held_out_garments)?;
 
         let start = &config.start;

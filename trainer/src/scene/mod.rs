@@ -10,6 +10,6 @@ mod prepare;
 pub use active_joints::ActiveJoints;
 pub use draw::{BodyDraw, Plan, SceneDraw, ValidationGroup, draw_training, draw_validation};
 pub use library::{Library, LibraryError, LibraryGarment, load_body};
-pub use poses::{PoseLibrary, Unseen};
+pub use poses::{PoseLibrary, SelfIntersecting, Unseen};
 pub use prefetch::Prefetch;
 pub use prepare::{PreparedBody, PreparedScene, prepare};
