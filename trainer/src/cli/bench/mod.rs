@@ -1,6 +1,7 @@
 //! `clothcombo bench`: measurements that a user can repeat.
 
 pub mod generator;
+pub mod poses;
 
 use clap::Subcommand;
 use miette::Report;
@@ -10,6 +11,8 @@ use miette::Report;
 pub enum Bench {
     /// The generator's promises over many garments, with the failure rate and the time
     Generator(generator::Arguments),
+    /// Self-intersections of posed bodies, their share and the cost of finding them
+    Poses(poses::Arguments),
 }
 
 /// Runs the bench.
@@ -19,5 +22,6 @@ pub enum Bench {
 pub fn run(bench: &Bench) -> Result<(), Report> {
     match bench {
         Bench::Generator(arguments) => generator::run(arguments),
+        Bench::Poses(arguments) => poses::run(arguments),
     }
 }
