@@ -83,12 +83,13 @@ pub struct FolderGarment {
 #[serde(deny_unknown_fields)]
 struct Manifest {
     #[serde(default)]
-    garment: Vec<Entry>,
+    garment: Vec<ManifestEntry>,
 }
 
-#[derive(Debug, Default, Serialize, Deserialize)]
+/// One garment as the manifest lists it.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Entry {
+pub struct ManifestEntry {
     file: String,
     #[serde(skip_serializing_if = "Option::is_none")]
     name: Option<String>,
@@ -155,14 +156,11 @@ pub fn load_garment_folder(folder: &Path, body: &Body) -> Result<Vec<FolderGarme
 pub fn list_garment_folder(folder: &Path) -> Result<Vec<ListedGarment>, GarmentFolderError> {
     let manifest_path = folder.join(MANIFEST);
     let manifest = match fs::read_to_string(&manifest_path) {
-        Ok(text) => toml::from_str(&text).map_err(|e| GarmentFolderError::Manifest {
-            path: manifest_path.clone(),
-            message: e.to_string().trim_end().to_string(),
-        })?,
+        Ok(text) => manifest_from(&manifest_path, &text)?,
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => Manifest {
             garment: list_obj_files(folder)?
                 .into_iter()
-                .map(|file| Entry { file, ..Entry::default() })
+                .map(|file| ManifestEntry { file, ..ManifestEntry::default() })
                 .collect(),
         },
         Err(source) => return Err(GarmentFolderError::Io { path: manifest_path, source }),
@@ -219,6 +217,79 @@ fn list_obj_files(folder: &Path) -> Result<Vec<String>, GarmentFolderError> {
     Ok(files)
 }
 
+impl ManifestEntry {
+    /// The entry of a garment whose file is `<name>.obj`.
+    pub fn of(FolderGarment { garment, layer, .. }: &FolderGarment) -> Self {
+        let Provenance { source, author, licence } = garment.source.clone();
+        Self {
+            file: format!("{}.obj", garment.name),
+            name: Some(garment.name.clone()),
+            category: Some(garment.category),
+            layer: *layer,
+            holding: Some(garment.holding),
+            source,
+            author,
+            licence,
+        }
+    }
+
+    /// The garment's file, relative to the folder.
+    pub fn file(&self) -> &str {
+        &self.file
+    }
+}
+
+/// The entries of a folder's manifest; none where it has no manifest.
+///
+/// # Errors
+/// [`GarmentFolderError`] if there is one that cannot be read.
+pub fn read_manifest(folder: &Path) -> Result<Vec<ManifestEntry>, GarmentFolderError> {
+    let path = folder.join(MANIFEST);
+    match fs::read_to_string(&path) {
+        Ok(text) => Ok(manifest_from(&path, &text)?.garment),
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(Vec::new()),
+        Err(source) => Err(GarmentFolderError::Io { path, source }),
+    }
+}
+
+fn manifest_from(path: &Path, text: &str) -> Result<Manifest, GarmentFolderError> {
+    toml::from_str(text).map_err(|e| GarmentFolderError::Manifest {
+        path: path.into(),
+        message: e.to_string().trim_end().to_string(),
+    })
+}
+
+/// Writes one garment as `<name>.obj` and returns its manifest entry, for [`save_manifest`]: for more garments than fit in
+/// memory. The file appears whole or not at all.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn save_garment(folder: &Path, garment: &FolderGarment) -> Result<ManifestEntry, GarmentFolderError> {
+    let entry = ManifestEntry::of(garment);
+    let Garment { name, category, rest, .. } = &garment.garment;
+    let comments = [
+        format!("{name} ({category}), metres, y up, on the zero body in T-pose"),
+        format!("source: {}", entry.source),
+        format!("author: {}", entry.author),
+        format!("licence: {}", entry.licence),
+    ];
+    obj::save(&folder.join(&entry.file), rest.positions(), rest.faces(), &comments)?;
+    Ok(entry)
+}
+
+/// Writes the manifest of a folder and returns its path.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn save_manifest(folder: &Path, entries: Vec<ManifestEntry>) -> Result<PathBuf, GarmentFolderError> {
+    let path = folder.join(MANIFEST);
+    let text = toml::to_string(&Manifest { garment: entries })
+        .map_err(|e| GarmentFolderError::Manifest { path: path.clone(), message: e.to_string() })?;
+    atomic::write(&path, text.as_bytes())
+        .map_err(|source| GarmentFolderError::Io { path: path.clone(), source })?;
+    Ok(path)
+}
+
 /// Writes garments as `<name>.obj` and a manifest; the manifest comes last, so that a folder with one is complete. Returns the
 /// files written.
 ///
@@ -228,37 +299,9 @@ pub fn save_garment_folder(
     folder: &Path,
     garments: &[FolderGarment],
 ) -> Result<Vec<PathBuf>, GarmentFolderError> {
-    let mut written = Vec::new();
-    let mut manifest = Manifest::default();
-    for FolderGarment { garment, layer, .. } in garments {
-        let file = format!("{}.obj", garment.name);
-        let Provenance { source, author, licence } = garment.source.clone();
-        let comments = [
-            format!("{} ({}), metres, y up, on the zero body in T-pose", garment.name, garment.category),
-            format!("source: {source}"),
-            format!("author: {author}"),
-            format!("licence: {licence}"),
-        ];
-        let path = folder.join(&file);
-        obj::save(&path, garment.rest.positions(), garment.rest.faces(), &comments)?;
-        written.push(path);
-        manifest.garment.push(Entry {
-            file,
-            name: Some(garment.name.clone()),
-            category: Some(garment.category),
-            layer: *layer,
-            holding: Some(garment.holding),
-            source,
-            author,
-            licence,
-        });
-    }
-    let path = folder.join(MANIFEST);
-    let text = toml::to_string(&manifest)
-        .map_err(|e| GarmentFolderError::Manifest { path: path.clone(), message: e.to_string() })?;
-    atomic::write(&path, text.as_bytes())
-        .map_err(|source| GarmentFolderError::Io { path: path.clone(), source })?;
-    written.push(path);
+    let entries = garments.iter().map(|g| save_garment(folder, g)).collect::<Result<Vec<_>, _>>()?;
+    let mut written: Vec<PathBuf> = entries.iter().map(|e| folder.join(&e.file)).collect();
+    written.push(save_manifest(folder, entries)?);
     Ok(written)
 }
 

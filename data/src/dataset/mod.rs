@@ -4,7 +4,7 @@ pub mod garment_folder;
 pub mod motion_folder;
 
 pub use garment_folder::{
-    FolderGarment, GarmentFolderError, ListedGarment, list_garment_folder, load_garment_folder,
-    save_garment_folder,
+    FolderGarment, GarmentFolderError, ListedGarment, ManifestEntry, list_garment_folder,
+    load_garment_folder, read_manifest, save_garment, save_garment_folder, save_manifest,
 };
 pub use motion_folder::{MotionFolderError, load_motion_folder};

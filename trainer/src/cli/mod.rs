@@ -6,6 +6,7 @@ pub mod import;
 pub mod prepare;
 pub mod score;
 pub mod train;
+mod wardrobe_sheet;
 
 use miette::Report;
 use tracing_subscriber::EnvFilter;

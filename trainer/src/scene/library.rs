@@ -62,7 +62,7 @@ impl Library {
             asked if asked <= body.shape_count => asked,
             asked => return Err(LibraryError::ShapeComponents { asked, available: body.shape_count }),
         };
-        let poses = PoseLibrary::new(&config.data.poses)?;
+        let poses = PoseLibrary::new(&config.data.poses, &body)?;
         let wardrobe = Wardrobe::load(config, body.clone(), progress)?;
         let names: Vec<&str> = (0..wardrobe.len()).map(|i| wardrobe.card(i).name.as_str()).collect();
         let split = GarmentSplit::new(&names, &config.data)?;

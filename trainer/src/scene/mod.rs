@@ -18,7 +18,7 @@ pub use draw::{BodyDraw, Plan, SceneDraw, ValidationGroup, draw_training, draw_v
 pub use error::LibraryError;
 pub use garment::LibraryGarment;
 pub use library::{Library, load_body};
-pub use poses::{PoseLibrary, Unseen};
+pub use poses::{PoseLibrary, SelfIntersecting, Unseen};
 pub use prefetch::Prefetch;
 pub use prepare::{PreparedBody, PreparedScene, prepare};
 pub use recent::Recent;
