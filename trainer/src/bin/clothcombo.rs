@@ -22,8 +22,6 @@ enum Verb {
     Bench(cli::bench::Bench),
     Generate(cli::generate::Arguments),
     #[command(subcommand)]
-    Bench(cli::bench::Bench),
-    #[command(subcommand)]
     Import(cli::import::Source),
     Prepare(cli::prepare::Arguments),
     Score(cli::score::Arguments),
@@ -35,7 +33,6 @@ fn main() -> ExitCode {
     cli::exit_code(match &arguments.verb {
         Verb::Bench(bench) => cli::bench::run(bench),
         Verb::Generate(arguments) => cli::generate::run(arguments),
-        Verb::Bench(bench) => cli::bench::run(bench),
         Verb::Import(source) => cli::import::run(source),
         Verb::Prepare(arguments) => cli::prepare::run(arguments),
         Verb::Score(arguments) => cli::score::run(arguments),
