@@ -44,7 +44,7 @@ else
 fi
 
 cd "$root"
-cargo build --quiet --release -p clothcombo-trainer --bin clothcombo --example pose_garments
+cargo build --quiet --release --bin clothcombo --example pose_garments
 target=${CARGO_TARGET_DIR:-target}
 sed "s|datasets/open|$data|" configs/open.toml >"$work/config.toml"
 

@@ -130,8 +130,12 @@ fn truncated_and_absent_motions_are_refused() {
     assert!(files_in(folder.path()).is_empty());
     let empty = tempfile::tempdir().unwrap();
     for input in [empty.path().to_path_buf(), empty.path().join("nowhere")] {
-        let result =
-            import_amass(&[input.clone()], folder.path(), &AmassSettings::default(), &mut no_progress());
+        let result = import_amass(
+            std::slice::from_ref(&input),
+            folder.path(),
+            &AmassSettings::default(),
+            &mut no_progress(),
+        );
         assert!(result.unwrap_err().to_string().contains(&input.display().to_string()));
     }
 }

@@ -64,10 +64,10 @@ fn generated_and_hand_made_garments_train_together() {
         .arg(&garments)
         .assert()
         .success();
-    // Making garments into the same folder again must not overwrite them.
+    // Other garments of the same names must not overwrite them.
     Command::cargo_bin("clothcombo")
         .unwrap()
-        .args(["generate", "--count", "1", "-o"])
+        .args(["generate", "--count", "1", "--vertices", "300", "--categories", "top,skirt", "-o"])
         .arg(&garments)
         .assert()
         .code(1);

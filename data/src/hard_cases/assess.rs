@@ -64,17 +64,18 @@ impl TermReport {
         if !self.finite {
             return Some("not finite".into());
         }
-        // Negated, so that a NaN is a fault.
-        if !(self.largest_gradient <= self.gradient_bound) {
+        // A NaN is never within a limit, hence a fault.
+        let within = |value: f64, limit: f64| value <= limit;
+        if !within(self.largest_gradient, self.gradient_bound) {
             return Some(format!(
                 "gradient {:.3e} above its bound {:.3e}",
                 self.largest_gradient, self.gradient_bound
             ));
         }
-        if !(self.gradient_error <= TOLERANCE) {
+        if !within(self.gradient_error, TOLERANCE) {
             return Some(format!("gradient off its difference quotients by {:.1e}", self.gradient_error));
         }
-        if !(self.f32_relative() <= SINGLE_PRECISION) && !self.cancels() {
+        if !within(self.f32_relative(), SINGLE_PRECISION) && !self.cancels() {
             return Some(format!("f32 off by {:.1e}", self.f32_relative()));
         }
         None

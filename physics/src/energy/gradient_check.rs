@@ -222,11 +222,12 @@ fn lines(gradient: &[[f64; 3]], settings: &GradientCheck, random: &mut SplitMix)
         let mut vertices: Vec<usize> = if gradient.len() <= 8 * MOVED_VERTICES {
             (0..gradient.len()).collect()
         } else {
-            let alive_or_any =
-                |k: usize, below: &mut dyn FnMut(usize) -> usize| match alive.is_empty() || k % 2 == 0 {
-                    true => below(gradient.len()),
-                    false => alive[below(alive.len())] / 3,
-                };
+            let alive_or_any = |k: usize, below: &mut dyn FnMut(usize) -> usize| match alive.is_empty()
+                || k.is_multiple_of(2)
+            {
+                true => below(gradient.len()),
+                false => alive[below(alive.len())] / 3,
+            };
             (0..MOVED_VERTICES).map(|k| alive_or_any(k, &mut below)).collect()
         };
         vertices.sort_unstable();

@@ -59,6 +59,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let body = load_body(&arguments.body, 0)?;
     let order = Order::new(arguments, &body)?;
     let folder = &arguments.output;
+    // Before anything is made: a folder that holds other garments stays as it is.
+    (0..arguments.count as u64).try_for_each(|i| order.check(arguments.start.wrapping_add(i)))?;
     let mut entries = read_manifest(folder).into_diagnostic()?;
     let listed: HashSet<String> = entries.iter().map(|e| e.file().to_string()).collect();
     let style =
@@ -148,12 +150,21 @@ impl<'a> Order<'a> {
         self.folder.join(format!("{}.obj", GarmentGenerator::name(category, seed)))
     }
 
+    /// Refuses a folder in which another garment has the name of garment `index`.
+    fn check(&self, index: u64) -> Result<(), Report> {
+        let (category, seed) = self.category_and_seed(index);
+        let path = self.path(category, seed);
+        match path.exists() {
+            true => check_source(&path, &self.generator.provenance(seed, &self.settings).source),
+            false => Ok(()),
+        }
+    }
+
     /// Makes garment `index` unless it is there.
     fn fill(&self, index: u64, listed: &HashSet<String>) -> Result<Made, Report> {
         let (category, seed) = self.category_and_seed(index);
         let path = self.path(category, seed);
         if path.exists() {
-            check_source(&path, &self.generator.provenance(seed, &self.settings).source)?;
             if path.file_name().is_some_and(|name| listed.contains(&*name.to_string_lossy())) {
                 return Ok(Made::Listed);
             }

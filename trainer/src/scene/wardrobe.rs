@@ -48,7 +48,7 @@ pub struct Wardrobe {
 
 enum Store {
     Kept { garments: Vec<Arc<LibraryGarment>>, operators: Vec<Arc<SurfaceOperators>> },
-    Streamed(Streamed),
+    Streamed(Box<Streamed>),
 }
 
 /// What a garment's records are stored under.
@@ -102,13 +102,13 @@ impl Wardrobe {
         let joints = ActiveJoints::new(&recipe.body, looks.iter().map(|l| l.largest_weights.as_slice()));
         let cards = looks.iter().map(|l| l.card.clone()).collect();
         let store = match cache {
-            Some(cache) => Store::Streamed(Streamed {
+            Some(cache) => Store::Streamed(Box::new(Streamed {
                 cache,
                 keys: looks.iter().filter_map(|l| l.keys).collect(),
                 recent: Mutex::new(Recent::new(config.data.memory_limit())),
                 origins,
                 recipe,
-            }),
+            })),
             None => {
                 let parts =
                     looks.into_par_iter().filter_map(|l| l.kept).map(|(garment, binding, operators)| {
