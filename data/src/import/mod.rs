@@ -5,7 +5,6 @@ pub mod bvh;
 mod finish;
 mod helper_garments;
 pub mod makehuman;
-mod push_out;
 mod reference_surface;
 mod sheet_repair;
 
