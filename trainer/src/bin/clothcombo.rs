@@ -18,6 +18,8 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Verb {
+    Check(cli::check::Arguments),
+    Fit(cli::fit::Arguments),
     Generate(cli::generate::Arguments),
     #[command(subcommand)]
     Import(cli::import::Source),
@@ -27,6 +29,8 @@ fn main() -> ExitCode {
     let arguments = Arguments::parse();
     cli::start_logging("info");
     cli::exit_code(match &arguments.verb {
+        Verb::Check(arguments) => cli::check::run(arguments),
+        Verb::Fit(arguments) => cli::fit::run(arguments),
         Verb::Generate(arguments) => cli::generate::run(arguments),
         Verb::Import(source) => cli::import::run(source),
     })

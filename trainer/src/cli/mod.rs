@@ -1,5 +1,7 @@
 //! The command lines of the two programs.
 
+pub mod check;
+pub mod fit;
 pub mod generate;
 pub mod import;
 pub mod train;
