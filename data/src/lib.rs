@@ -3,9 +3,11 @@
 //! No networks here. Units are SI, y is up, the body faces +z with its left towards +x and its pelvis at the origin.
 
 pub mod asset;
+pub mod cache;
 pub mod check;
 pub mod dataset;
 pub mod fit;
 pub mod format;
 pub mod generate;
+pub mod hard_cases;
 pub mod import;

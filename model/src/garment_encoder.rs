@@ -26,6 +26,12 @@ pub struct GarmentEmbedding {
 }
 
 impl GarmentEmbedding {
+    /// About how much memory it takes [bytes].
+    pub fn bytes(&self) -> usize {
+        let [vertices, width] = self.vertex.dims();
+        4 * width * (vertices + 1)
+    }
+
     /// The same embedding cut from its graph and from autodiff.
     pub fn inner(self) -> Self {
         Self { vertex: self.vertex.inner(), garment: self.garment.inner() }

@@ -10,11 +10,12 @@
 //! Scenes are a function of seed and step, so no generator state has to be stored.
 
 use crate::config::{Config, ConfigError, load, to_toml};
-use crate::run_dir::{RunDir, write_atomic};
+use crate::run_dir::RunDir;
 use burn::module::Module;
 use burn::optim::ModuleOptimizer;
 use burn::store::{ModuleRecord, ModuleSnapshot, SafetensorsStore};
 use burn::tensor::Device;
+use clothcombo_data::format::atomic;
 use clothcombo_model::{ClothCombo, Dimensions};
 use miette::Diagnostic;
 use serde::{Deserialize, Serialize};
@@ -147,7 +148,7 @@ impl Checkpoint {
         }
         fs::rename(&temporary, &path).map_err(io_failed)?;
         File::open(run.checkpoints()).and_then(|d| d.sync_all()).map_err(io_failed)?;
-        write_atomic(&run.checkpoints().join("latest"), name.as_bytes()).map_err(io_failed)?;
+        atomic::write(&run.checkpoints().join("latest"), name.as_bytes()).map_err(io_failed)?;
         prune(&run.checkpoints(), &name, keep).map_err(io_failed)?;
         Ok(Self { path, state })
     }

@@ -1,62 +1,100 @@
 //! The networks at inference: a prepared scene in, positions on the host out.
 
 use crate::evaluate::Draped;
-use crate::scene::{Library, LibraryGarment, PreparedBody, PreparedScene};
+use crate::scene::{Library, LibraryError, LibraryGarment, PreparedBody, PreparedScene, Recent};
 use burn::tensor::{Device, Tensor, TensorData};
 use clothcombo_model::{
     BodyTensors, ClothCombo, Dimensions, Embeddings, GarmentArrays, GarmentEmbedding, GarmentTensors,
     ModelError, OutfitTensors, linear_blend_skinning,
 };
+use miette::Diagnostic;
 use std::cell::RefCell;
-use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+use thiserror::Error;
 
-/// The constant tensors of a wardrobe on one device.
+/// Why a scene cannot be draped.
+#[derive(Debug, Error, Diagnostic)]
+pub enum DrapeError {
+    /// A garment cannot be read.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Library(#[from] LibraryError),
+    /// The networks do not take it.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+}
+
+/// The constant tensors of a wardrobe on one device, made when a garment is first drawn.
 pub struct WardrobeTensors {
-    garments: Vec<GarmentTensors>,
+    library: Arc<Library>,
+    garments: Mutex<Recent<GarmentTensors>>,
     dimensions: Dimensions,
     device: Device,
 }
 
 impl WardrobeTensors {
-    /// Uploads every garment of `library`.
-    ///
-    /// # Errors
-    /// When a garment's numbers are not finite.
-    pub fn new(library: &Library, dimensions: Dimensions, device: &Device) -> Result<Self, ModelError> {
-        let device = device.clone().inner();
-        let upload = |g: &LibraryGarment| {
-            let rest: Vec<f32> = g.garment.rest.positions().iter().flatten().map(|v| *v as f32).collect();
-            let o = &g.operators;
-            GarmentTensors::new(
-                &GarmentArrays {
-                    rest: &rest,
-                    mass: &o.mass,
-                    eigenvalues: &o.eigenvalues,
-                    eigenvectors: &o.eigenvectors,
-                    gradient_x_basis: &o.gradient_x_basis,
-                    gradient_y_basis: &o.gradient_y_basis,
-                    skin_weights: &g.skin_weights,
-                },
-                dimensions.joints,
-                &device,
-            )
-        };
-        let garments = library.garments.iter().map(upload).collect::<Result<_, _>>()?;
-        Ok(Self { garments, dimensions, device })
+    /// For the garments of `library`.
+    pub fn new(library: Arc<Library>, dimensions: Dimensions, device: &Device) -> Self {
+        let garments = Mutex::new(Recent::new(library.memory_limit));
+        Self { library, garments, dimensions, device: device.clone().inner() }
     }
 
-    /// One garment.
-    pub fn garment(&self, index: usize) -> &GarmentTensors {
-        &self.garments[index]
+    /// The data the tensors are made from.
+    pub fn library(&self) -> &Library {
+        &self.library
+    }
+
+    /// The tensors of one garment.
+    ///
+    /// # Errors
+    /// When its operators cannot be read or its numbers are not finite.
+    pub fn garment(&self, index: usize, garment: &LibraryGarment) -> Result<GarmentTensors, DrapeError> {
+        let recent = || self.garments.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(tensors) = recent().get(index) {
+            return Ok(tensors);
+        }
+        let rest: Vec<f32> = garment.garment.rest.positions().iter().flatten().map(|v| *v as f32).collect();
+        let operators = self.library.wardrobe.operators(index)?;
+        let tensors = GarmentTensors::new(
+            &GarmentArrays {
+                rest: &rest,
+                mass: &operators.mass,
+                eigenvalues: &operators.eigenvalues,
+                eigenvectors: &operators.eigenvectors,
+                gradient_x_basis: &operators.gradient_x_basis,
+                gradient_y_basis: &operators.gradient_y_basis,
+                skin_weights: &garment.skin_weights,
+            },
+            self.dimensions.joints,
+            &self.device,
+        )?;
+        // Φ, ΦᵀM and both gradient products, and the skin weights.
+        let bytes = 4 * (4 * operators.eigenvectors.len() + garment.skin_weights.len());
+        recent().insert(index, tensors.clone(), bytes);
+        Ok(tensors)
+    }
+
+    /// Makes the tensors of the scene's garments, so that a step on another thread finds them.
+    ///
+    /// # Errors
+    /// As [`garment`](Self::garment).
+    pub fn warm(&self, scene: &PreparedScene) -> Result<(), DrapeError> {
+        scene.garments.iter().zip(&scene.worn).try_for_each(|(&g, worn)| self.garment(g, worn).map(|_| ()))
     }
 
     /// The outfit of a scene.
     ///
     /// # Errors
-    /// When the scene has no garment.
-    pub fn outfit(&self, scene: &PreparedScene) -> Result<OutfitTensors, ModelError> {
-        let garments: Vec<_> = scene.garments.iter().map(|&g| &self.garments[g]).collect();
-        OutfitTensors::new(&garments, &scene.contacts)
+    /// When the scene has no garment, or one cannot be read.
+    pub fn outfit(&self, scene: &PreparedScene) -> Result<OutfitTensors, DrapeError> {
+        let garments = scene.garments.iter().zip(&scene.worn).map(|(&g, worn)| self.garment(g, worn));
+        let garments = garments.collect::<Result<Vec<_>, _>>()?;
+        Ok(OutfitTensors::new(&garments.iter().collect::<Vec<_>>(), &scene.contacts)?)
+    }
+
+    /// An empty store of embeddings for [`embed`](Self::embed).
+    pub fn embeddings(&self) -> Recent<GarmentEmbedding> {
+        Recent::new(self.library.memory_limit)
     }
 
     /// One body of a scene, and the start positions of the garments on it `[ΣV, 3]`.
@@ -79,13 +117,21 @@ impl WardrobeTensors {
         model: &ClothCombo,
         scene: &PreparedScene,
         outfit: &OutfitTensors,
-        known: &mut HashMap<usize, GarmentEmbedding>,
-    ) -> Result<Embeddings, ModelError> {
+        known: &mut Recent<GarmentEmbedding>,
+    ) -> Result<Embeddings, DrapeError> {
         let mut packed = Vec::with_capacity(scene.garments.len());
-        for &g in &scene.garments {
-            packed.push(known.entry(g).or_insert_with(|| model.encode(&self.garments[g])).clone());
+        for (&g, worn) in scene.garments.iter().zip(&scene.worn) {
+            let embedding = match known.get(g) {
+                Some(embedding) => embedding,
+                None => {
+                    let embedding = model.encode(&self.garment(g, worn)?);
+                    known.insert(g, embedding.clone(), embedding.bytes());
+                    embedding
+                }
+            };
+            packed.push(embedding);
         }
-        model.pack(outfit, &packed)
+        Ok(model.pack(outfit, &packed)?)
     }
 }
 
@@ -93,7 +139,7 @@ impl WardrobeTensors {
 pub struct Networks<'a> {
     model: ClothCombo,
     tensors: &'a WardrobeTensors,
-    embeddings: RefCell<HashMap<usize, GarmentEmbedding>>,
+    embeddings: RefCell<Recent<GarmentEmbedding>>,
 }
 
 /// What the networks make of a scene's first body.
@@ -107,14 +153,14 @@ pub struct NetworkDrape {
 impl<'a> Networks<'a> {
     /// Wraps a model without automatic differentiation.
     pub fn new(model: ClothCombo, tensors: &'a WardrobeTensors) -> Self {
-        Self { model, tensors, embeddings: RefCell::default() }
+        Self { model, tensors, embeddings: RefCell::new(tensors.embeddings()) }
     }
 
     /// Drapes the garments of `scene` on its first body.
     ///
     /// # Errors
     /// When the scene's numbers are not finite.
-    pub fn drape(&self, scene: &PreparedScene) -> Result<NetworkDrape, ModelError> {
+    pub fn drape(&self, scene: &PreparedScene) -> Result<NetworkDrape, DrapeError> {
         let outfit = self.tensors.outfit(scene)?;
         let embeddings =
             self.tensors.embed(&self.model, scene, &outfit, &mut self.embeddings.borrow_mut())?;
@@ -131,7 +177,7 @@ impl<'a> Networks<'a> {
     ///
     /// # Errors
     /// When the scene's numbers are not finite.
-    pub fn skin(&self, scene: &PreparedScene) -> Result<Draped, ModelError> {
+    pub fn skin(&self, scene: &PreparedScene) -> Result<Draped, DrapeError> {
         let (_, start) = self.tensors.body(&scene.bodies[0])?;
         self.skin_from(scene, start)
     }
@@ -140,12 +186,12 @@ impl<'a> Networks<'a> {
     ///
     /// # Errors
     /// When the scene's numbers are not finite.
-    pub fn skin_rest(&self, scene: &PreparedScene) -> Result<Draped, ModelError> {
+    pub fn skin_rest(&self, scene: &PreparedScene) -> Result<Draped, DrapeError> {
         let rest = self.tensors.outfit(scene)?.rest;
         self.skin_from(scene, rest)
     }
 
-    fn skin_from(&self, scene: &PreparedScene, start: Tensor<2>) -> Result<Draped, ModelError> {
+    fn skin_from(&self, scene: &PreparedScene, start: Tensor<2>) -> Result<Draped, DrapeError> {
         let outfit = self.tensors.outfit(scene)?;
         let (body, _) = self.tensors.body(&scene.bodies[0])?;
         let posed = linear_blend_skinning(start.clone(), outfit.skin_weights, body.bones);

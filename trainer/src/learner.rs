@@ -1,14 +1,13 @@
 //! Networks and optimiser: one step on one prepared scene.
 
 use crate::config::{OptimizerConfig, Trains};
-use crate::drape::WardrobeTensors;
-use crate::scene::PreparedScene;
+use crate::drape::{DrapeError, WardrobeTensors};
+use crate::scene::{PreparedScene, Recent};
 use burn::module::Module;
 use burn::optim::{AdamConfig, GradientsParams, ModuleOptimizer};
 use burn::tensor::Tensor;
-use clothcombo_model::{ClothCombo, GarmentEmbedding, ModelError, clip_global_norm, global_norm};
+use clothcombo_model::{ClothCombo, GarmentEmbedding, clip_global_norm, global_norm};
 use clothcombo_physics::autodiff::{SceneLossOutput, scene_loss};
-use std::collections::HashMap;
 
 /// Trains the networks.
 pub struct Learner {
@@ -21,7 +20,7 @@ pub struct Learner {
 /// The first stage while it is not trained, with the embeddings it made.
 struct Frozen {
     model: ClothCombo,
-    embeddings: HashMap<usize, GarmentEmbedding>,
+    embeddings: Recent<GarmentEmbedding>,
 }
 
 /// What a step found.
@@ -71,7 +70,7 @@ impl Learner {
         scene: &PreparedScene,
         trains: Trains,
         learning_rate: f64,
-    ) -> Result<StepOutcome, ModelError> {
+    ) -> Result<StepOutcome, DrapeError> {
         let (loss, scenes) = self.forward(tensors, scene, trains)?;
         let mean = scenes.iter().map(|s| s.value().total).sum::<f64>() / scenes.len() as f64;
         let mut outcome = StepOutcome { loss: mean, scenes, gradient_norm: 0.0, skipped: false };
@@ -97,16 +96,16 @@ impl Learner {
         tensors: &WardrobeTensors,
         scene: &PreparedScene,
         trains: Trains,
-    ) -> Result<(Option<Tensor<1>>, Vec<SceneLossOutput>), ModelError> {
+    ) -> Result<(Option<Tensor<1>>, Vec<SceneLossOutput>), DrapeError> {
         let outfit = tensors.outfit(scene)?;
         if trains != Trains::Untangling {
             self.frozen = None;
         } else if self.frozen.is_none() {
-            self.frozen = Some(Frozen { model: self.model.valid(), embeddings: HashMap::new() });
+            self.frozen = Some(Frozen { model: self.model.valid(), embeddings: tensors.embeddings() });
         }
         let (first_stage, embeddings) = match &mut self.frozen {
             Some(f) => (&f.model, tensors.embed(&f.model, scene, &outfit, &mut f.embeddings)?),
-            None => (&self.model, tensors.embed(&self.model, scene, &outfit, &mut HashMap::new())?),
+            None => (&self.model, tensors.embed(&self.model, scene, &outfit, &mut tensors.embeddings())?),
         };
         let embeddings = match trains {
             Trains::Single => embeddings,

@@ -15,6 +15,7 @@ pub mod run_dir;
 pub mod samples;
 pub mod scene;
 pub mod schedule;
+pub mod score;
 pub mod session;
 pub mod stop;
 pub mod train_loop;

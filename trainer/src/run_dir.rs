@@ -1,9 +1,11 @@
 //! The folder of a run: where everything lies, created whole or not at all.
 
 use crate::config::{Config, ConfigError, load, to_toml};
+use crate::scene::SplitNames;
+use clothcombo_data::format::atomic;
 use miette::Diagnostic;
 use std::fs;
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -66,7 +68,7 @@ impl RunDir {
             fs::create_dir_all(&folder).map_err(|reason| RunDirError::Io { path: folder, reason })?;
         }
         let text = to_toml(config).map_err(|e| io_error(&run.config(), io::Error::other(e)))?;
-        write_atomic(&run.config(), text.as_bytes()).map_err(|e| io_error(&run.config(), e))?;
+        atomic::write(&run.config(), text.as_bytes()).map_err(|e| io_error(&run.config(), e))?;
         Ok(run)
     }
 
@@ -97,6 +99,16 @@ impl RunDir {
             return Err(RunDirError::ConfigChanged { path: run.config(), keys });
         }
         Ok(run)
+    }
+
+    /// Writes which garments and clips are for what.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn write_split(&self, split: &SplitNames) -> Result<(), RunDirError> {
+        let path = self.root.join("split.json");
+        let text = serde_json::to_vec_pretty(split).map_err(|e| io_error(&path, e.into()))?;
+        atomic::write(&path, &text).map_err(|e| io_error(&path, e))
     }
 
     /// The folder itself.
@@ -137,20 +149,6 @@ fn io_error(path: &Path, reason: io::Error) -> RunDirError {
     RunDirError::Io { path: path.to_owned(), reason }
 }
 
-/// Writes `bytes` to a temporary neighbour, syncs it and renames it over `path`.
-///
-/// # Errors
-/// The file system's; `path` then still holds what it held.
-pub fn write_atomic(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(".tmp");
-    let temporary = path.with_file_name(name);
-    let mut file = fs::File::create(&temporary)?;
-    file.write_all(bytes)?;
-    file.sync_all()?;
-    fs::rename(&temporary, path)
-}
-
 /// Keeps the lines of a JSON-lines file whose `"step"` is at most `step`: what was logged after the checkpoint that a
 /// run continues from will be logged again.
 ///
@@ -170,7 +168,7 @@ pub fn truncate_log(path: &Path, step: u64) -> io::Result<()> {
     };
     let mut out: String = text.lines().filter(kept).flat_map(|l| [l, "\n"]).collect();
     out.shrink_to_fit();
-    write_atomic(path, out.as_bytes())
+    atomic::write(path, out.as_bytes())
 }
 
 /// Keys whose values differ, as dotted paths. What only concerns output may change between sessions.
@@ -196,6 +194,9 @@ fn differing_keys(a: &Config, b: &Config) -> Vec<String> {
     let value = |c: &Config| {
         let mut c = c.clone();
         c.output = crate::config::OutputConfig::default();
+        // Where things are kept changes no result.
+        c.data.cache = crate::config::CacheConfig::default();
+        c.data.memory_mib = 1;
         toml::Value::try_from(c).ok()
     };
     let mut out = Vec::new();

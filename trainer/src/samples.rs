@@ -25,11 +25,12 @@ pub fn draw(
 ) -> Result<(), Report> {
     let mut rows = Vec::new();
     for group in [ValidationGroup::Single, ValidationGroup::Layered] {
-        let scenes = validation.scenes(group);
-        let count = count.min(scenes.len());
+        let draws = validation.draws(group);
+        let count = count.min(draws.len());
         for i in 0..count {
             // One further in each part: layer counts come in turn, and equal strides would always meet the same one.
-            rows.push(row(library, networks, scenes[(i * scenes.len() / count + i) % scenes.len()])?);
+            let draw = &draws[(i * draws.len() / count + i) % draws.len()];
+            rows.push(row(networks, &validation.prepare(library, draw)?)?);
         }
     }
     let heading = |m: &str, v: &str| format!("{m}, {v}");
@@ -38,14 +39,13 @@ pub fn draw(
     save_png(&sheet.compose(), path).into_diagnostic()
 }
 
-fn row(library: &Library, networks: &Networks, scene: &PreparedScene) -> Result<SheetRow, Report> {
-    let names: Vec<&str> =
-        scene.garments.iter().map(|&g| library.garments[g].garment.name.as_str()).collect();
-    let skinned = networks.skin(scene).into_diagnostic()?;
-    let draped = networks.drape(scene).into_diagnostic()?.layered;
+fn row(networks: &Networks, scene: &PreparedScene) -> Result<SheetRow, Report> {
+    let names: Vec<&str> = scene.worn.iter().map(|g| g.garment.name.as_str()).collect();
+    let skinned = networks.skin(scene)?;
+    let draped = networks.drape(scene)?.layered;
     let cells = [&skinned, &draped]
         .into_iter()
-        .flat_map(|d| [View::Front, View::Back].map(|view| cell(library, scene, d, view)))
+        .flat_map(|d| [View::Front, View::Back].map(|view| cell(scene, d, view)))
         .collect();
     let legend = names
         .iter()
@@ -59,15 +59,14 @@ fn row(library: &Library, networks: &Networks, scene: &PreparedScene) -> Result<
     Ok(SheetRow { label, legend, cells })
 }
 
-fn cell(library: &Library, scene: &PreparedScene, draped: &Draped, view: View) -> image::RgbImage {
+fn cell(scene: &PreparedScene, draped: &Draped, view: View) -> image::RgbImage {
     let wide = |p: &[[f32; 3]]| p.iter().map(|p| p.map(f64::from)).collect::<Vec<_>>();
     let body = &scene.bodies[0].energy.body;
     let body_positions = wide(&body.positions);
     let positions = wide(&draped.posed);
     let mut figures = vec![Figure { positions: &body_positions, faces: &body.faces, colour: BODY_COLOUR }];
     let mut first = 0;
-    for (layer, &g) in scene.garments.iter().enumerate() {
-        let garment = &library.garments[g];
+    for (layer, garment) in scene.worn.iter().enumerate() {
         figures.push(Figure {
             positions: &positions[first..first + garment.vertex_count()],
             faces: garment.garment.rest.faces(),

@@ -29,7 +29,7 @@ pub struct Session {
     config: Arc<Config>,
     library: Arc<Library>,
     schedule: Schedule,
-    tensors: WardrobeTensors,
+    tensors: Arc<WardrobeTensors>,
     validation: ValidationSet,
     learner: Learner,
     step: u64,
@@ -87,7 +87,7 @@ impl Session {
         learner: Learner,
         step: u64,
     ) -> Result<Self, Report> {
-        let tensors = WardrobeTensors::new(&library, dimensions(&library), device).into_diagnostic()?;
+        let tensors = Arc::new(WardrobeTensors::new(library.clone(), dimensions(&library), device));
         let validation = ValidationSet::new(&library, &config);
         let schedule = Schedule::new(&config);
         let config = Arc::new(config);
@@ -114,6 +114,10 @@ impl Session {
     pub fn library(&self) -> &Arc<Library> {
         &self.library
     }
+    /// The constant tensors of the wardrobe.
+    pub fn tensors(&self) -> &Arc<WardrobeTensors> {
+        &self.tensors
+    }
     /// One optimiser step on `scene`, started at `start` after waiting `waited` for it.
     ///
     /// # Errors
@@ -129,7 +133,7 @@ impl Session {
         let outcome = self
             .learner
             .step(&self.tensors, scene, stage.trains, at.learning_rate)
-            .into_diagnostic()
+            .map_err(Report::new)
             .wrap_err_with(|| format!("step {}", self.step + 1))?;
         self.step += 1;
         self.guard(&outcome)?;
@@ -171,7 +175,7 @@ impl Session {
     /// # Errors
     /// When a scene cannot be draped.
     pub fn validate(&self) -> Result<ValidationReport, Report> {
-        self.validation.score(&self.library, &self.networks()).into_diagnostic()
+        Ok(self.validation.score(&self.library, &self.networks())?)
     }
 
     /// Draws the sample picture of the current step and returns its path.
@@ -212,7 +216,7 @@ fn dimensions(library: &Library) -> Dimensions {
 
 fn state(library: &Library, step: u64) -> CheckpointState {
     let joints: Vec<String> =
-        library.joints.indices.iter().map(|&j| library.body.joint_names[j].clone()).collect();
+        library.joints().indices.iter().map(|&j| library.body.joint_names[j].clone()).collect();
     let pose_features = joints.len() * library.poses.features_per_joint();
     CheckpointState::new(step, joints, library.shape_count, pose_features)
 }

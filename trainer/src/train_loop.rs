@@ -31,7 +31,7 @@ pub fn train(
         tell(&TrainEvent::Validated { step: 0, report: &session.validate()? })?;
     }
     let scenes =
-        Prefetch::start(session.library().clone(), session.shared_config(), first_step, SCENES_AHEAD)
+        Prefetch::start(session.tensors().clone(), session.shared_config(), first_step, SCENES_AHEAD)
             .into_diagnostic()
             .wrap_err("cannot start the thread that prepares scenes")?;
 
@@ -43,7 +43,7 @@ pub fn train(
         }
         let start = Instant::now();
         let scene =
-            scenes.next_scene().ok_or_else(|| miette!("the thread that prepares scenes ended early"))?;
+            scenes.next_scene().ok_or_else(|| miette!("the thread that prepares scenes ended early"))??;
         let waited = start.elapsed();
         let record = session.step_on(&scene, &at, start, waited)?;
         tell(&TrainEvent::Step(&record))?;

@@ -3,7 +3,7 @@
 //! The paper (§Method, draping) takes the weights of the nearest body vertex. Taken raw they jump from leg to leg, so both
 //! quantities may be smoothed over the garment by averaging with the one-ring.
 
-use super::body::Body;
+use super::body::{Body, skin};
 use super::category::Category;
 use super::garment::Garment;
 use clothcombo_physics::mesh::Topology;
@@ -81,6 +81,15 @@ impl Binding {
         Self { skin_weights, shape_directions }
     }
 
+    /// The largest weight of every joint over the garment, `[J]`.
+    pub fn largest_weights(&self, joints: usize) -> Vec<f32> {
+        let mut largest = vec![0f32; joints];
+        for row in self.skin_weights.chunks_exact(joints) {
+            largest.iter_mut().zip(row).for_each(|(l, w)| *l = l.max(*w));
+        }
+        largest
+    }
+
     /// Displacement of every garment vertex [m] for shape `beta` (a short one is continued with zeros).
     pub fn shape_displacement(&self, beta: &[f64], shape_count: usize) -> Vec<[f64; 3]> {
         if shape_count == 0 {
@@ -94,6 +103,17 @@ impl Binding {
                     row.iter().zip(beta).map(|(d, b)| f64::from(*d) * b).sum()
                 })
             })
+            .collect()
+    }
+
+    /// Linear blend skinning of canonical `positions` `[V, 3]` (rest, or rest plus a displacement) by the bone transforms of
+    /// a posed body ([`Body::posed`]), `[V, 3]` [m].
+    pub fn skinned(&self, positions: &[[f64; 3]], bones: &[[[f64; 4]; 3]]) -> Vec<[f64; 3]> {
+        let rows = self.skin_weights.chunks_exact(bones.len().max(1));
+        positions
+            .iter()
+            .zip(rows)
+            .map(|(p, row)| skin(*p, bones.iter().zip(row).map(|(bone, w)| (bone, f64::from(*w)))))
             .collect()
     }
 }
@@ -171,6 +191,7 @@ fn smooth(values: &mut Vec<f32>, columns: usize, topology: &Topology, iterations
 
 #[cfg(test)]
 mod tests {
+    use super::super::pose::Pose;
     use super::super::provenance::Provenance;
     use super::*;
     use crate::generate::mannequin;
@@ -200,6 +221,26 @@ mod tests {
                 assert!((row.iter().sum::<f32>() - 1.0).abs() < 1e-5);
                 assert!(row.iter().all(|w| *w >= 0.0));
             }
+        }
+    }
+
+    #[test]
+    fn a_garment_on_the_skin_moves_with_the_body() {
+        let body = mannequin();
+        // A garment that is a piece of the body's own surface has its weights and shape displacements.
+        let shirt = garment(body.zero_body(), Category::Top);
+        let plain = BindingSettings { smooth: false, ..BindingSettings::default() };
+        let binding = Binding::new(&shirt, &body, &plain);
+        let mut pose = Pose::t_pose(body.joint_count());
+        pose.rotations[1] = [-0.9, 0.2, 0.1];
+        pose.rotations[16] = [0.3, -0.2, -1.1];
+        let beta = vec![0.7; body.shape_count];
+        let posed = body.posed(&beta, &pose).unwrap();
+        let moved = binding.shape_displacement(&beta, body.shape_count);
+        let start: Vec<_> =
+            body.template.iter().zip(moved).map(|(p, d)| std::array::from_fn(|a| p[a] + d[a])).collect();
+        for (a, b) in binding.skinned(&start, &posed.bones).iter().zip(&posed.positions) {
+            assert!((0..3).all(|k| (a[k] - b[k]).abs() < 1e-5), "{a:?} {b:?}");
         }
     }
 

@@ -55,11 +55,12 @@ impl Default for BodyFileSettings {
 
 const HINT: &str = "a body is an SMPL, SMPL-H or SMPL-X npz with v_template, f, shapedirs, weights, kintree_table and J_regressor";
 
-/// How many of SMPL-X's `shapedirs` are body shape; the rest are facial expression, which clothes do not see.
-fn shape_part(joints: usize, components: usize) -> usize {
+/// How many of SMPL-X's `shapedirs` are body shape; the rest are facial expression, which clothes do not see. Files with
+/// joint directions are those written here (`ours`), where every component is shape.
+pub(crate) fn shape_part(joints: usize, components: usize, ours: bool) -> usize {
     match (joints, components) {
-        (55, 400) => 300,
-        (55, 20) => 10,
+        (55, 400) if !ours => 300,
+        (55, 20) if !ours => 10,
         _ => components,
     }
 }
@@ -99,7 +100,8 @@ impl Body {
                 ));
             }
         };
-        let shape_count = shape_part(joints, components).min(settings.shape_components);
+        let ours = file.contains("J_shapedirs");
+        let shape_count = shape_part(joints, components, ours).min(settings.shape_components);
         let shape_directions = first_columns(&directions.data, components, shape_count);
 
         let weights = file.numbers_f32("weights", HINT)?;

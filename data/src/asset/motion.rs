@@ -58,6 +58,14 @@ impl Motion {
     /// # Errors
     /// [`MotionError`] naming file, key or frame.
     pub fn load(path: &Path) -> Result<Self, MotionError> {
+        Self::load_with_columns(path).map(|(motion, _)| motion)
+    }
+
+    /// As [`Self::load`], with the number of columns of `poses`, which tells the layouts apart.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn load_with_columns(path: &Path) -> Result<(Self, usize), MotionError> {
         let mut file = NpzFile::open(path)?;
         let poses = file.numbers("poses", HINT)?;
         let columns = match poses.shape[..] {
@@ -92,7 +100,7 @@ impl Motion {
         };
         let source = Provenance { source: text("source"), author: text("author"), licence: text("licence") };
         let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-        Ok(Self { name, frame_rate, poses: frames, source })
+        Ok((Self { name, frame_rate, poses: frames, source }, columns))
     }
 
     /// Writes the motion npz.

@@ -24,7 +24,8 @@ impl SparseSkinWeights {
                 }
             }
             let sum: f64 = sparse.weights[start..].iter().map(|w| f64::from(*w)).sum();
-            if sum > 0.0 {
+            // Rows that are normalised already stay as they are, bit for bit, so that saved weights load unchanged.
+            if sum > 0.0 && (sum - 1.0).abs() > 1e-6 {
                 for w in &mut sparse.weights[start..] {
                     *w = (f64::from(*w) / sum) as f32;
                 }

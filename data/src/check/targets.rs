@@ -101,7 +101,7 @@ fn visit(folder: &Path, depth: usize, targets: &mut Vec<Target>) {
     if has_manifest {
         match read_entries(folder) {
             Ok(entries) => targets.extend(entries.into_iter().map(|entry| {
-                let path = folder.join(&entry.file);
+                let path = folder.join(entry.file());
                 if path.is_file() {
                     let (category, layer, holding) = (entry.category, entry.layer, entry.holding);
                     Target::Garment { path, entry: ManifestHints { category, layer, holding } }

@@ -17,6 +17,7 @@ use crate::asset::{Body, Category, Garment, Provenance};
 use crate::format::atomic;
 use crate::format::mesh::{MeshFileError, is_mesh_path, load_tri_mesh};
 use crate::format::obj::{self, ObjError};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
 use std::fs;
@@ -86,22 +87,22 @@ pub struct FolderGarment {
 #[serde(deny_unknown_fields)]
 struct Manifest {
     #[serde(default)]
-    garment: Vec<Entry>,
+    garment: Vec<ManifestEntry>,
 }
 
-/// One garment of a manifest.
+/// One garment as the manifest lists it.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Entry {
-    pub file: String,
+pub struct ManifestEntry {
+    file: String,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub name: Option<String>,
+    name: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub category: Option<Category>,
+    pub(crate) category: Option<Category>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub layer: Option<[u32; 2]>,
+    pub(crate) layer: Option<[u32; 2]>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub holding: Option<bool>,
+    pub(crate) holding: Option<bool>,
     #[serde(default, skip_serializing_if = "String::is_empty")]
     source: String,
     #[serde(default, skip_serializing_if = "String::is_empty")]
@@ -110,12 +111,53 @@ pub(crate) struct Entry {
     licence: String,
 }
 
+/// A garment of a folder, listed but not yet read.
+#[derive(Clone, Debug)]
+pub struct ListedGarment {
+    /// Its mesh file.
+    pub path: PathBuf,
+    /// Its name, unique within the folder.
+    pub name: String,
+    /// Its category, if the manifest says so.
+    pub category: Option<Category>,
+    /// Whether it is held, if the manifest says so.
+    pub holding: Option<bool>,
+    /// Lowest and highest layer it is worn in, if the manifest says so.
+    pub layer: Option<[u32; 2]>,
+    /// Where it comes from.
+    pub source: Provenance,
+}
+
+impl ListedGarment {
+    /// Reads the mesh. `body` is needed for the guesses: category and the collarbone rule.
+    ///
+    /// # Errors
+    /// [`MeshFileError`] naming file and line or element.
+    pub fn load(&self, body: &Body) -> Result<FolderGarment, MeshFileError> {
+        let rest = load_tri_mesh(&self.path)?;
+        let category = self.category.unwrap_or_else(|| Category::guess(&rest, body));
+        let holding = self.holding.unwrap_or_else(|| Garment::needs_holding(&rest, body));
+        let garment =
+            Garment { name: self.name.clone(), category, rest, holding, source: self.source.clone() };
+        Ok(FolderGarment { garment, layer: self.layer, path: self.path.clone() })
+    }
+}
+
 /// Reads all garments of a folder, in manifest order or, without a manifest, sorted by file name. `body` is needed for the
 /// guesses: category and the collarbone rule.
 ///
 /// # Errors
 /// [`GarmentFolderError`] naming folder, manifest entry, or mesh file and line or element.
 pub fn load_garment_folder(folder: &Path, body: &Body) -> Result<Vec<FolderGarment>, GarmentFolderError> {
+    let listed = list_garment_folder(folder)?;
+    Ok(listed.par_iter().map(|garment| garment.load(body)).collect::<Result<_, _>>()?)
+}
+
+/// Lists the garments of a folder without reading their meshes.
+///
+/// # Errors
+/// [`GarmentFolderError`] naming folder or manifest entry.
+pub fn list_garment_folder(folder: &Path) -> Result<Vec<ListedGarment>, GarmentFolderError> {
     let manifest_path = folder.join(MANIFEST);
     let entries = read_entries(folder)?;
     let mut names = HashSet::new();
@@ -141,33 +183,27 @@ pub fn load_garment_folder(folder: &Path, body: &Body) -> Result<Vec<FolderGarme
         if !names.insert(name.clone()) {
             return Err(wrong(format!("the name '{name}' is used twice")));
         }
-        let rest = load_tri_mesh(&path)?;
-        let category = entry.category.unwrap_or_else(|| Category::guess(&rest, body));
-        let holding = entry.holding.unwrap_or_else(|| Garment::needs_holding(&rest, body));
-        let source = Provenance { source: entry.source, author: entry.author, licence: entry.licence };
-        garments.push(FolderGarment {
-            garment: Garment { name, category, rest, holding, source },
-            layer: entry.layer,
+        garments.push(ListedGarment {
             path,
+            name,
+            category: entry.category,
+            holding: entry.holding,
+            layer: entry.layer,
+            source: Provenance { source: entry.source, author: entry.author, licence: entry.licence },
         });
     }
     Ok(garments)
 }
 
 /// What the manifest lists or, without one, every mesh file of the folder; at least one.
-pub(crate) fn read_entries(folder: &Path) -> Result<Vec<Entry>, GarmentFolderError> {
+pub(crate) fn read_entries(folder: &Path) -> Result<Vec<ManifestEntry>, GarmentFolderError> {
     let path = folder.join(MANIFEST);
     let entries = match fs::read_to_string(&path) {
-        Ok(text) => {
-            let manifest: Manifest = toml::from_str(&text).map_err(|e| GarmentFolderError::Manifest {
-                path,
-                message: e.to_string().trim_end().to_string(),
-            })?;
-            manifest.garment
-        }
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
-            list_mesh_files(folder)?.into_iter().map(|file| Entry { file, ..Entry::default() }).collect()
-        }
+        Ok(text) => manifest_from(&path, &text)?.garment,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => list_mesh_files(folder)?
+            .into_iter()
+            .map(|file| ManifestEntry { file, ..ManifestEntry::default() })
+            .collect(),
         Err(source) => return Err(GarmentFolderError::Io { path, source }),
     };
     if entries.is_empty() {
@@ -189,6 +225,79 @@ fn list_mesh_files(folder: &Path) -> Result<Vec<String>, GarmentFolderError> {
     Ok(files)
 }
 
+impl ManifestEntry {
+    /// The entry of a garment whose file is `<name>.obj`.
+    pub fn of(FolderGarment { garment, layer, .. }: &FolderGarment) -> Self {
+        let Provenance { source, author, licence } = garment.source.clone();
+        Self {
+            file: format!("{}.obj", garment.name),
+            name: Some(garment.name.clone()),
+            category: Some(garment.category),
+            layer: *layer,
+            holding: Some(garment.holding),
+            source,
+            author,
+            licence,
+        }
+    }
+
+    /// The garment's file, relative to the folder.
+    pub fn file(&self) -> &str {
+        &self.file
+    }
+}
+
+/// The entries of a folder's manifest; none where it has no manifest.
+///
+/// # Errors
+/// [`GarmentFolderError`] if there is one that cannot be read.
+pub fn read_manifest(folder: &Path) -> Result<Vec<ManifestEntry>, GarmentFolderError> {
+    let path = folder.join(MANIFEST);
+    match fs::read_to_string(&path) {
+        Ok(text) => Ok(manifest_from(&path, &text)?.garment),
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(Vec::new()),
+        Err(source) => Err(GarmentFolderError::Io { path, source }),
+    }
+}
+
+fn manifest_from(path: &Path, text: &str) -> Result<Manifest, GarmentFolderError> {
+    toml::from_str(text).map_err(|e| GarmentFolderError::Manifest {
+        path: path.into(),
+        message: e.to_string().trim_end().to_string(),
+    })
+}
+
+/// Writes one garment as `<name>.obj` and returns its manifest entry, for [`save_manifest`]: for more garments than fit in
+/// memory. The file appears whole or not at all.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn save_garment(folder: &Path, garment: &FolderGarment) -> Result<ManifestEntry, GarmentFolderError> {
+    let entry = ManifestEntry::of(garment);
+    let Garment { name, category, rest, .. } = &garment.garment;
+    let comments = [
+        format!("{name} ({category}), metres, y up, on the zero body in T-pose"),
+        format!("source: {}", entry.source),
+        format!("author: {}", entry.author),
+        format!("licence: {}", entry.licence),
+    ];
+    obj::save(&folder.join(&entry.file), rest.positions(), rest.faces(), &comments)?;
+    Ok(entry)
+}
+
+/// Writes the manifest of a folder and returns its path.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn save_manifest(folder: &Path, entries: Vec<ManifestEntry>) -> Result<PathBuf, GarmentFolderError> {
+    let path = folder.join(MANIFEST);
+    let text = toml::to_string(&Manifest { garment: entries })
+        .map_err(|e| GarmentFolderError::Manifest { path: path.clone(), message: e.to_string() })?;
+    atomic::write(&path, text.as_bytes())
+        .map_err(|source| GarmentFolderError::Io { path: path.clone(), source })?;
+    Ok(path)
+}
+
 /// Writes garments as `<name>.obj` and a manifest; the manifest comes last, so that a folder with one is complete. Returns the
 /// files written.
 ///
@@ -198,37 +307,9 @@ pub fn save_garment_folder(
     folder: &Path,
     garments: &[FolderGarment],
 ) -> Result<Vec<PathBuf>, GarmentFolderError> {
-    let mut written = Vec::new();
-    let mut manifest = Manifest::default();
-    for FolderGarment { garment, layer, .. } in garments {
-        let file = format!("{}.obj", garment.name);
-        let Provenance { source, author, licence } = garment.source.clone();
-        let comments = [
-            format!("{} ({}), metres, y up, on the zero body in T-pose", garment.name, garment.category),
-            format!("source: {source}"),
-            format!("author: {author}"),
-            format!("licence: {licence}"),
-        ];
-        let path = folder.join(&file);
-        obj::save(&path, garment.rest.positions(), garment.rest.faces(), &comments)?;
-        written.push(path);
-        manifest.garment.push(Entry {
-            file,
-            name: Some(garment.name.clone()),
-            category: Some(garment.category),
-            layer: *layer,
-            holding: Some(garment.holding),
-            source,
-            author,
-            licence,
-        });
-    }
-    let path = folder.join(MANIFEST);
-    let text = toml::to_string(&manifest)
-        .map_err(|e| GarmentFolderError::Manifest { path: path.clone(), message: e.to_string() })?;
-    atomic::write(&path, text.as_bytes())
-        .map_err(|source| GarmentFolderError::Io { path: path.clone(), source })?;
-    written.push(path);
+    let entries = garments.iter().map(|g| save_garment(folder, g)).collect::<Result<Vec<_>, _>>()?;
+    let mut written: Vec<PathBuf> = entries.iter().map(|e| folder.join(&e.file)).collect();
+    written.push(save_manifest(folder, entries)?);
     Ok(written)
 }
 

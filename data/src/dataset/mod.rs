@@ -3,5 +3,8 @@
 pub mod garment_folder;
 pub mod motion_folder;
 
-pub use garment_folder::{FolderGarment, GarmentFolderError, load_garment_folder, save_garment_folder};
+pub use garment_folder::{
+    FolderGarment, GarmentFolderError, ListedGarment, ManifestEntry, list_garment_folder,
+    load_garment_folder, read_manifest, save_garment, save_garment_folder, save_manifest,
+};
 pub use motion_folder::{MotionFolderError, load_motion_folder};

@@ -2,6 +2,7 @@
 
 use std::ffi::OsString;
 use std::fs;
+use std::hash::{BuildHasher, RandomState};
 use std::io;
 use std::path::Path;
 
@@ -15,7 +16,8 @@ pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
         fs::create_dir_all(parent)?;
     }
     let mut name: OsString = path.file_name().unwrap_or_default().into();
-    name.push(format!(".{}.tmp", std::process::id()));
+    // Random, not the process number: several threads, processes or machines may be writing the same file.
+    name.push(format!(".{:016x}.tmp", RandomState::new().hash_one(0)));
     let temporary = path.with_file_name(name);
     let written = (|| {
         let mut file = fs::File::create(&temporary)?;

@@ -131,6 +131,31 @@ impl NpzFile {
         self.archive.index_for_name(&npyz::npz::file_name_from_array_name(key)).is_some()
     }
 
+    /// Whether the array of that name is an object array, that is, a Python pickle; reads its header only.
+    pub fn is_pickled(&mut self, key: &str) -> bool {
+        let Some(index) = self.archive.index_for_name(&npyz::npz::file_name_from_array_name(key)) else {
+            return false;
+        };
+        let header = self.archive.by_index(index).ok().and_then(|mut member| read_header(&mut member).ok());
+        header.is_some_and(|h| matches!(h.dtype(), DType::Plain(kind) if kind.uses_pickled_array()))
+    }
+
+    /// The shape of an array; reads its header only.
+    ///
+    /// # Errors
+    /// [`NpzError`] naming file and key.
+    pub fn shape(&mut self, key: &str) -> Result<Vec<usize>, NpzError> {
+        let Some(index) = self.archive.index_for_name(&npyz::npz::file_name_from_array_name(key)) else {
+            let (key, hint) = (key.into(), String::new());
+            return Err(NpzError::Missing { path: self.path.clone(), key, hint, present: self.keys() });
+        };
+        let header = (self.archive.by_index(index).map_err(|e| e.to_string()))
+            .and_then(|mut member| read_header(&mut member).map_err(|e| e.to_string()));
+        let shape =
+            header.map(|h| h.shape().iter().map(|n| usize::try_from(*n).unwrap_or(usize::MAX)).collect());
+        shape.map_err(|reason| NpzError::Damaged { path: self.path.clone(), key: key.into(), reason })
+    }
+
     /// A numeric or boolean array, converted to `f64`. `hint` says what kind of file was expected, should the key be missing.
     ///
     /// # Errors
@@ -190,7 +215,7 @@ impl NpzFile {
             return Err(NpzError::Missing { path: self.path.clone(), key, hint, present: self.keys() });
         };
         let mut member = self.archive.by_index(index).map_err(|e| damaged(e.to_string()))?;
-        let header = NpyHeader::from_reader(&mut member).map_err(|e| damaged(e.to_string()))?;
+        let header = read_header(&mut member).map_err(|e| damaged(e.to_string()))?;
         let DType::Plain(kind) = header.dtype() else {
             return Err(NpzError::Kind {
                 path: self.path.clone(),
@@ -212,6 +237,7 @@ impl NpzFile {
         let shape = shape.ok_or_else(|| damaged("shape does not fit in memory".into()))?;
         let count =
             shape.iter().try_fold(1usize, |a, n| a.checked_mul(*n)).and_then(|n| n.checked_mul(width));
+        let count = count.filter(|n| *n / width.max(1) <= LARGEST_ARRAY);
         let count = count.ok_or_else(|| damaged(format!("shape {shape:?} does not fit in memory")))?;
         // Grows with what is there, so that a lying header cannot reserve memory.
         let mut bytes = Vec::new();
@@ -240,6 +266,36 @@ impl NpzFile {
     }
 }
 
+/// More numbers than any model or motion holds (SMPL-X's largest array has 15 million); a deflated file of a few kilobytes
+/// can claim any size.
+const LARGEST_ARRAY: usize = 1 << 26;
+
+/// The header of an `.npy` member. Its text is looked at before it is parsed: it cannot be long or deeply nested, or else it
+/// exhausts memory or stack.
+fn read_header(member: &mut impl Read) -> std::io::Result<NpyHeader> {
+    const LONGEST: usize = 1 << 16;
+    const MOST_BRACKETS: usize = 64;
+    let invalid = |reason: &str| std::io::Error::new(std::io::ErrorKind::InvalidData, reason.to_string());
+    let mut start = [0u8; 12];
+    member.read_exact(&mut start[..10])?;
+    let mut length = usize::from(u16::from_le_bytes([start[8], start[9]]));
+    let mut known = 10;
+    if start[6] > 1 {
+        member.read_exact(&mut start[10..])?;
+        length = u32::from_le_bytes([start[8], start[9], start[10], start[11]]) as usize;
+        known = 12;
+    }
+    if !start.starts_with(b"\x93NUMPY") || length > LONGEST {
+        return Err(invalid("it is not a NumPy array"));
+    }
+    let mut bytes = start[..known].to_vec();
+    member.take(length as u64).read_to_end(&mut bytes)?;
+    if bytes.iter().filter(|b| matches!(b, b'(' | b'[' | b'{')).count() > MOST_BRACKETS {
+        return Err(invalid("its header is too deeply nested"));
+    }
+    NpyHeader::from_reader(&bytes[..])
+}
+
 /// The conversion of one little-endian cell, zero-padded to eight bytes.
 fn number_reader(kind: TypeChar, width: usize) -> Option<fn([u8; 8]) -> f64> {
     Some(match (kind, width) {
@@ -257,7 +313,7 @@ fn number_reader(kind: TypeChar, width: usize) -> Option<fn([u8; 8]) -> f64> {
 }
 
 /// IEEE 754 binary16.
-fn half_to_f64(bits: u16) -> f64 {
+pub(super) fn half_to_f64(bits: u16) -> f64 {
     let sign = if bits & 0x8000 == 0 { 1.0 } else { -1.0 };
     let (exponent, fraction) = (i32::from(bits >> 10 & 0x1f), f64::from(bits & 0x3ff));
     match exponent {
@@ -269,7 +325,12 @@ fn half_to_f64(bits: u16) -> f64 {
 }
 
 fn to_row_major<T: Clone>(data: Vec<T>, shape: &[usize], order: Order) -> Vec<T> {
-    if order == Order::C || shape.len() < 2 || data.is_empty() {
+    if order == Order::C { data } else { row_major_from_fortran(data, shape) }
+}
+
+/// Reorders an array whose first axis is the fastest.
+pub(super) fn row_major_from_fortran<T: Clone>(data: Vec<T>, shape: &[usize]) -> Vec<T> {
+    if shape.len() < 2 || data.is_empty() {
         return data;
     }
     // Walk the row-major positions; the first axis has stride one in Fortran order.
@@ -391,148 +452,4 @@ impl NpzWriter {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// An `.npy` file as NumPy writes it, header version 1.
-    fn npy(kind: &str, fortran: bool, shape: &str, data: &[u8]) -> Vec<u8> {
-        let order = if fortran { "True" } else { "False" };
-        let mut header = format!("{{'descr': '{kind}', 'fortran_order': {order}, 'shape': {shape}, }}");
-        while !(10 + header.len() + 1).is_multiple_of(64) {
-            header.push(' ');
-        }
-        header.push('\n');
-        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
-        bytes.extend((header.len() as u16).to_le_bytes());
-        bytes.extend(header.as_bytes());
-        bytes.extend(data);
-        bytes
-    }
-
-    fn archive(method: CompressionMethod, members: &[(&str, Vec<u8>)]) -> (tempfile::TempDir, PathBuf) {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.npz");
-        let mut zip = ZipWriter::new(File::create(&path).unwrap());
-        for (name, bytes) in members {
-            let options = SimpleFileOptions::default().compression_method(method);
-            zip.start_file(format!("{name}.npy"), options).unwrap();
-            zip.write_all(bytes).unwrap();
-        }
-        zip.finish().unwrap();
-        (folder, path)
-    }
-
-    #[test]
-    fn reads_every_width_order_and_byte_order_stored_and_deflated() {
-        // The matrix [[1, 2, 3], [4, 5, 6]].
-        let c = [1u8, 2, 3, 4, 5, 6];
-        let f = [1u8, 4, 2, 5, 3, 6];
-        let wide = |values: &[u8], convert: &dyn Fn(u8) -> Vec<u8>| {
-            values.iter().flat_map(|x| convert(*x)).collect::<Vec<u8>>()
-        };
-        let cases: Vec<(&str, bool, Vec<u8>)> = vec![
-            ("|i1", false, c.to_vec()),
-            ("|u1", true, f.to_vec()),
-            ("<i2", true, wide(&f, &|x| i16::from(x).to_le_bytes().to_vec())),
-            (">u4", false, wide(&c, &|x| u32::from(x).to_be_bytes().to_vec())),
-            ("<i8", false, wide(&c, &|x| i64::from(x).to_le_bytes().to_vec())),
-            ("<f4", true, wide(&f, &|x| f32::from(x).to_le_bytes().to_vec())),
-            (">f8", true, wide(&f, &|x| f64::from(x).to_be_bytes().to_vec())),
-            ("<f8", false, wide(&c, &|x| f64::from(x).to_le_bytes().to_vec())),
-        ];
-        for method in [CompressionMethod::Stored, CompressionMethod::Deflated] {
-            for (kind, fortran, data) in &cases {
-                let (_folder, path) = archive(method, &[("m", npy(kind, *fortran, "(2, 3)", data))]);
-                let array = NpzFile::open(&path).unwrap().numbers("m", "").unwrap();
-                assert_eq!(
-                    array,
-                    Array { shape: vec![2, 3], data: vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0] },
-                    "{kind}"
-                );
-            }
-        }
-    }
-
-    #[test]
-    fn fortran_order_holds_in_three_dimensions() {
-        // Element (i, j, k) of shape (2, 3, 4) has the value 100 i + 10 j + k.
-        let mut data = Vec::new();
-        for k in 0..4 {
-            for j in 0..3 {
-                for i in 0..2 {
-                    data.extend(((100 * i + 10 * j + k) as f32).to_le_bytes());
-                }
-            }
-        }
-        let (_folder, path) =
-            archive(CompressionMethod::Deflated, &[("a", npy("<f4", true, "(2, 3, 4)", &data))]);
-        let array = NpzFile::open(&path).unwrap().numbers_f32("a", "").unwrap();
-        for (at, x) in array.data.iter().enumerate() {
-            assert_eq!(*x, (100 * (at / 12) + 10 * (at / 4 % 3) + at % 4) as f32);
-        }
-    }
-
-    #[test]
-    fn half_floats_have_their_ieee_values() {
-        for (bits, value) in [
-            (0x3c00, 1.0),
-            (0xc000, -2.0),
-            (0x3555, 0.333251953125),
-            (0x0001, 2f64.powi(-24)),
-            (0x7bff, 65504.0),
-        ] {
-            assert_eq!(half_to_f64(bits), value);
-        }
-        assert!(half_to_f64(0x7c00).is_infinite() && half_to_f64(0x7e00).is_nan());
-    }
-
-    #[test]
-    fn writer_and_reader_agree() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("w.npz");
-        let mut npz = NpzWriter::new();
-        npz.f32("a", &[2, 2], &[1.0, 2.0, 3.0, 4.0]).f64("s", &[], &[2.5]).u32("u", &[3], &[0, 7, u32::MAX]);
-        npz.i64("i", &[1], &[-9]).strings("t", &[2], &["ab", "Zoë"]).f64("e", &[0, 3], &[]);
-        npz.save(&path).unwrap();
-        let mut file = NpzFile::open(&path).unwrap();
-        assert_eq!(file.keys(), ["a", "e", "i", "s", "t", "u"]);
-        assert_eq!(
-            file.numbers("a", "").unwrap(),
-            Array { shape: vec![2, 2], data: vec![1.0, 2.0, 3.0, 4.0] }
-        );
-        assert_eq!(file.numbers("s", "").unwrap(), Array { shape: vec![], data: vec![2.5] });
-        assert_eq!(file.numbers("u", "").unwrap().data, [0.0, 7.0, f64::from(u32::MAX)]);
-        assert_eq!(file.numbers("i", "").unwrap().data, [-9.0]);
-        assert_eq!(file.strings("t", "").unwrap().data, ["ab", "Zoë"]);
-        assert_eq!(file.numbers("e", "").unwrap().shape, [0, 3]);
-        let mut wrong = NpzWriter::new();
-        wrong.f32("a", &[3], &[1.0]);
-        assert!(wrong.save(&path).unwrap_err().to_string().contains("1 values for shape [3]"));
-    }
-
-    #[test]
-    fn pickles_are_listed_but_never_read_and_damage_is_named() {
-        let members = [
-            ("joint2num", npy("|O", false, "()", b"\x80\x04}.")),
-            ("short", npy("<f8", false, "(4,)", &[0; 16])),
-            ("huge", npy("<f8", false, "(4611686018427387904, 4)", &[0; 16])),
-            ("text", npy("<U2", false, "(1,)", &[97, 0, 0, 0, 0, 0, 0, 0])),
-            ("bytes", npy("|S6", false, "()", b"female")),
-            ("junk", b"not an array".to_vec()),
-        ];
-        let (_folder, path) = archive(CompressionMethod::Stored, &members);
-        let mut file = NpzFile::open(&path).unwrap();
-        let message = file.numbers("joint2num", "").unwrap_err().to_string();
-        assert!(message.contains("pickle") && message.contains("joint2num"), "{message}");
-        assert!(file.numbers("short", "").unwrap_err().to_string().contains("truncated: 16 of 32"));
-        assert!(file.numbers("huge", "").is_err());
-        assert!(file.numbers("text", "").unwrap_err().to_string().contains("<U2"));
-        assert!(file.numbers("junk", "").unwrap_err().to_string().contains("'junk'"));
-        assert_eq!(file.strings("text", "").unwrap().data, ["a"]);
-        assert_eq!(file.strings("bytes", "").unwrap().data, ["female"]);
-        let missing = file.numbers("v_template", "a body is …").unwrap_err().to_string();
-        assert!(
-            missing.contains("'v_template'") && missing.contains("a body is …") && missing.contains("short")
-        );
-    }
-}
+mod tests;

@@ -4,10 +4,14 @@ mod field;
 pub mod garment;
 mod isosurface;
 pub mod mannequin;
+mod parts;
 pub mod pose;
 pub(crate) mod remesh;
 pub(crate) mod sheet;
 
-pub use garment::{GarmentError, GarmentGenerator, GarmentQuality, GarmentSettings, generate_garment};
+pub use garment::{
+    GarmentDesign, GarmentError, GarmentGenerator, GarmentQuality, GarmentSettings, GeneratedGarment, Survey,
+    generate_garment,
+};
 pub use mannequin::mannequin;
-pub use pose::{PoseAugmentation, PoseSampler};
+pub use pose::{PoseAugmentation, PoseSampler, SelfContact};

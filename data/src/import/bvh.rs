@@ -1,47 +1,15 @@
 //! Motion capture in BVH form, retargeted to the 22 SMPL body joints.
 //!
-//! World rotations are carried over, not local ones, so that the skeletons need not share a tree: for joint j, `W_j = B_j · A_j`
-//! with `B_j` the BVH joint's world rotation and `A_j` the smallest rotation that takes the body's bone in T-pose to the
-//! BVH bone at rest. Skeletons whose rest pose has hanging arms thus come out right.
+//! The skeletons known are those of the collections named in `NAMINGS`; see [`super::retarget`] for how they are matched.
 
+use super::motions::{Clip, MotionImportError, named, require_body_joints, stem, write_motions};
+use super::retarget::Retarget;
+use super::thinning::{Thinned, Thinning, largest_turn, thin};
 use super::{Progress, Summary};
-use crate::asset::rotation::{
-    IDENTITY, Matrix3, apply, axis_angle_from_matrix, between, matrix_from_axis_angle, product, transpose,
-};
-use crate::asset::skeleton::{BODY_JOINT_COUNT, BODY_JOINT_PARENTS};
-use crate::asset::{Body, Motion, Pose, Provenance, motion::MotionError};
+use crate::asset::skeleton::BODY_JOINT_COUNT;
+use crate::asset::{Body, Motion, Pose, Provenance};
 use crate::format::{Bvh, BvhError};
 use std::path::{Path, PathBuf};
-use thiserror::Error;
-
-/// Why BVH files cannot be imported.
-#[derive(Debug, Error)]
-pub enum BvhImportError {
-    /// No input.
-    #[error("no BVH files given")]
-    NoInput,
-    /// None of the inputs could be used.
-    #[error("none of the {count} BVH files could be used; the first, {first}: {reason}")]
-    NothingUsable {
-        /// How many were given.
-        count: usize,
-        /// The first of them.
-        first: String,
-        /// Its problem.
-        reason: String,
-    },
-    /// A result cannot be written.
-    #[error(transparent)]
-    Motion(#[from] MotionError),
-    /// The body lacks joints.
-    #[error("body '{body}' has {joints} joints; retargeting needs the {BODY_JOINT_COUNT} SMPL body joints")]
-    Body {
-        /// The body.
-        body: String,
-        /// How many joints it has.
-        joints: usize,
-    },
-}
 
 /// How motion is imported.
 #[derive(Clone, Debug, PartialEq)]
@@ -109,14 +77,6 @@ const NAMINGS: [Naming; 3] = [
     },
 ];
 
-/// The next joint along the limb, which fixes the bone's direction. Collars are left out on purpose: their rest directions
-/// differ by convention, not by pose.
-const LIMB: [(usize, usize); 10] =
-    [(1, 4), (2, 5), (4, 7), (5, 8), (7, 10), (8, 11), (16, 18), (17, 19), (18, 20), (19, 21)];
-
-/// Joints at the end of a limb have no bone of their own and keep the alignment of the bone before.
-const LIMB_ENDS: [usize; 4] = [10, 11, 20, 21];
-
 const TOES: [usize; 2] = [10, 11];
 
 /// Maps a file's joints to the body joints.
@@ -135,57 +95,8 @@ fn naming_of(bvh: &Bvh) -> Option<(&'static Naming, [Option<usize>; BODY_JOINT_C
 /// Returns `None` if the file's joint names are not known.
 pub fn retarget(bvh: &Bvh, joints: &[[f64; 3]]) -> Option<Vec<Pose>> {
     let (_, map) = naming_of(bvh)?;
-    let rest = bvh.rest_positions();
-    let bone = |points: &[[f64; 3]], from: usize, to: usize| -> [f64; 3] {
-        std::array::from_fn(|a| points[to][a] - points[from][a])
-    };
-    // A file whose rest skeleton faces elsewhere: turn the body there first. Small asymmetries of a scanned skeleton are not
-    // a facing.
-    let facing = match (map[1], map[2]) {
-        (Some(left), Some(right)) => {
-            let side = bone(&rest, right, left);
-            let yaw = (-side[2]).atan2(side[0]);
-            if yaw.abs() < 0.35 { IDENTITY } else { matrix_from_axis_angle([0.0, yaw, 0.0]) }
-        }
-        _ => IDENTITY,
-    };
-    let mut align = [facing; BODY_JOINT_COUNT];
-    for (joint, next) in LIMB {
-        if let (Some(from), Some(to)) = (map[joint], map[next]) {
-            let direction = apply(&facing, bone(joints, joint, next));
-            align[joint] = product(&between(direction, bone(&rest, from, to)), &facing);
-        }
-    }
-    for end in LIMB_ENDS {
-        if let Some(parent) = BODY_JOINT_PARENTS[end] {
-            align[end] = align[parent];
-        }
-    }
-    let frames = 0..bvh.frame_count();
-    Some(
-        frames
-            .map(|frame| {
-                let source = bvh.world_rotations(frame);
-                let mut world = [IDENTITY; BODY_JOINT_COUNT];
-                let rotations = (0..BODY_JOINT_COUNT)
-                    .map(|j| {
-                        let parent: Matrix3 = BODY_JOINT_PARENTS[j].map_or(IDENTITY, |p| world[p]);
-                        world[j] = map[j].map_or(parent, |b| product(&source[b], &align[j]));
-                        axis_angle_from_matrix(&product(&transpose(&parent), &world[j]))
-                    })
-                    .collect();
-                Pose { rotations }
-            })
-            .collect(),
-    )
-}
-
-/// Largest angle by which any joint but the root turns between two poses [rad].
-fn largest_turn(a: &Pose, b: &Pose) -> f64 {
-    a.rotations.iter().zip(&b.rotations).skip(1).fold(0.0, |largest, (x, y)| {
-        let turn = product(&transpose(&matrix_from_axis_angle(*x)), &matrix_from_axis_angle(*y));
-        f64::max(largest, axis_angle_from_matrix(&turn).iter().map(|x| x * x).sum::<f64>().sqrt())
-    })
+    let retarget = Retarget::new(map, &bvh.rest_positions(), joints);
+    Some((0..bvh.frame_count()).map(|frame| retarget.pose(&bvh.world_rotations(frame))).collect())
 }
 
 /// Whether the first frame does not belong to the motion.
@@ -194,9 +105,9 @@ fn first_frame_is_inserted(poses: &[Pose], settings: &BvhImportSettings) -> bool
         return false;
     }
     let mut steps: Vec<f64> =
-        poses.windows(2).skip(1).take(200).map(|w| largest_turn(&w[0], &w[1])).collect();
+        poses.windows(2).skip(1).take(200).map(|w| largest_turn(&w[0], &w[1], 1)).collect();
     steps.sort_by(f64::total_cmp);
-    let jump = largest_turn(&poses[0], &poses[1]);
+    let jump = largest_turn(&poses[0], &poses[1], 1);
     jump > settings.inserted_frame_angle && jump > 10.0 * steps[steps.len() / 2]
 }
 
@@ -211,44 +122,17 @@ pub fn import_bvh(
     out: &Path,
     settings: &BvhImportSettings,
     progress: Progress<'_>,
-) -> Result<Summary, BvhImportError> {
+) -> Result<Summary, MotionImportError> {
+    const EXPECTED: &str = "BVH files";
     if files.is_empty() {
-        return Err(BvhImportError::NoInput);
+        return Err(MotionImportError::NoInput { where_: String::new(), expected: EXPECTED });
     }
-    if body.joint_count() < BODY_JOINT_COUNT {
-        return Err(BvhImportError::Body { body: body.name.clone(), joints: body.joint_count() });
-    }
-    let mut summary = Summary::default();
-    let mut total = 0;
-    for (i, file) in files.iter().enumerate() {
-        let shown = file.display().to_string();
-        progress("retargeting", i, files.len());
-        match import_file(file, body, settings) {
-            Ok((motion, note)) => {
-                let path = out.join(format!("{}.npz", motion.name));
-                motion.save(&path)?;
-                total += motion.poses.len();
-                summary.taken.push((motion.name.clone(), note));
-                summary.written.push(path);
-            }
-            Err(reason) => summary.skipped.push((shown, reason)),
-        }
-    }
-    progress("retargeting", files.len(), files.len());
-    match summary.skipped.first() {
-        Some((first, reason)) if summary.taken.is_empty() => Err(BvhImportError::NothingUsable {
-            count: files.len(),
-            first: first.clone(),
-            reason: reason.clone(),
-        }),
-        _ => {
-            summary.notes.push(format!("{total} frames in {} clips", summary.taken.len()));
-            Ok(summary)
-        }
-    }
+    require_body_joints(body)?;
+    let inputs = named(files.iter().map(|f| (f.clone(), stem(f))));
+    write_motions(&inputs, out, EXPECTED, &|file| import_file(file, body, settings), progress)
 }
 
-fn import_file(file: &Path, body: &Body, settings: &BvhImportSettings) -> Result<(Motion, String), String> {
+fn import_file(file: &Path, body: &Body, settings: &BvhImportSettings) -> Result<Clip, String> {
     let bvh = Bvh::load(file).map_err(|e: BvhError| e.to_string())?;
     let (Some(mut poses), Some((naming, _))) = (retarget(&bvh, &body.joint_template), naming_of(&bvh)) else {
         let known: Vec<&str> = NAMINGS.iter().map(|n| n.name).collect();
@@ -265,21 +149,25 @@ fn import_file(file: &Path, body: &Body, settings: &BvhImportSettings) -> Result
         note.push_str("; dropped frame 0, which jumps to frame 1");
     }
     let rate = 1.0 / bvh.frame_time;
-    let step = (rate / settings.frame_rate.max(1e-6)).round().clamp(1.0, 1e6) as usize;
-    let poses: Vec<Pose> = poses.into_iter().step_by(step).collect();
-    let name = file.file_stem().map_or_else(|| "motion".into(), |s| s.to_string_lossy().into_owned());
+    let thinning = Thinning { frame_rate: settings.frame_rate, static_threshold: 0.0 };
+    let thinned = thin(poses, rate, &thinning);
     let note = format!(
-        "{} skeleton, {} of {} frames at {rate:.0} frames/s (every {step}.){note}",
+        "{} skeleton, {} of {} frames at {rate:.0} frames/s (every {}.){note}",
         naming.name,
-        poses.len(),
-        bvh.frame_count()
+        thinned.poses.len(),
+        bvh.frame_count(),
+        thinned.step
     );
-    Ok((Motion { name, frame_rate: rate / step as f64, poses, source: (naming.provenance)() }, note))
+    let Thinned { poses, frame_rate, .. } = thinned;
+    let motion = Motion { name: String::new(), frame_rate, poses, source: (naming.provenance)() };
+    Ok(Clip { motion, subject: String::new(), note })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::asset::rotation::{apply, matrix_from_axis_angle};
+    use crate::asset::skeleton::BODY_JOINT_PARENTS;
     use std::fmt::Write as _;
 
     /// A mocapbank-like skeleton whose rest joints are `rest` (body order), with the given local rotations in degrees

@@ -13,6 +13,6 @@ mod triangle_pair;
 pub use contours::{Contour, contours, self_contours};
 pub use intersections::{TriangleTree, self_triangle_pairs, triangle_pairs};
 pub use order::{ORDER_RADIUS, OrderViolations, order_violations};
-pub use penetration::{Penetration, penetration};
+pub use penetration::{Penetration, penetration, penetration_by};
 pub use report::{IntersectionReport, Intersections, LayerIntersections};
 pub use triangle_pair::{Triangle, intersection_segment, mesh_triangles_intersect, triangles_intersect};

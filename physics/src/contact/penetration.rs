@@ -3,7 +3,7 @@
 use crate::query::{Distance, Surface};
 use rayon::prelude::*;
 
-/// How deep the vertices of a garment lie inside a body, by the closest point of its surface.
+/// How deep the vertices of a garment lie inside a body.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Penetration {
     /// Vertices looked at.
@@ -16,10 +16,20 @@ pub struct Penetration {
     pub max_depth: f64,
 }
 
-/// Counts the vertices of `positions` inside `body`, and those deeper than `deep_threshold` (m).
+/// Counts the vertices of `positions` inside `body`, and those deeper than `deep_threshold` (m), by the closest point of its
+/// surface.
 pub fn penetration(body: &Surface<f64>, positions: &[[f64; 3]], deep_threshold: f64) -> Penetration {
-    let gaps: Vec<f64> =
-        positions.par_iter().with_min_len(256).map(|&p| body.gap(p, Distance::ClosestPoint).gap).collect();
+    penetration_by(body, positions, deep_threshold, Distance::ClosestPoint)
+}
+
+/// The same by the given distance.
+pub fn penetration_by(
+    body: &Surface<f64>,
+    positions: &[[f64; 3]],
+    deep_threshold: f64,
+    distance: Distance,
+) -> Penetration {
+    let gaps: Vec<f64> = positions.par_iter().with_min_len(256).map(|&p| body.gap(p, distance).gap).collect();
     Penetration {
         vertices: positions.len(),
         inside: gaps.iter().filter(|g| **g < 0.0).count(),

@@ -72,6 +72,11 @@ impl InnerSurface {
         Self { faces, incidence, collapse_squared, median_edge }
     }
 
+    /// Median edge of the rest shape [m].
+    pub(super) fn median_edge(&self) -> f64 {
+        self.median_edge
+    }
+
     /// Prepares the garment at `positions` `[V, 3]` [m] for queries.
     pub fn posed<T: Real>(&self, positions: &[[T; 3]]) -> PosedInner<T> {
         PosedInner {

@@ -8,29 +8,25 @@
 //! have no direction to part in and get none from each other. **At the radius** the printed term jumps from 4.6 to 0; this
 //! is kept, and the gradient is that of the pairs inside.
 //!
-//! **No all-pairs work.** Vertices are sorted into cells of half the radius; the vertices of one cell share one list of
-//! candidates, which the inner loop runs through in fixed lanes. The logarithm is taken of products of up to 32 squared
-//! distances. Pairs joined by an edge are not looked for inside that loop but subtracted after it.
+//! **No all-pairs work.** Vertices are sorted into cells of half or a quarter of the radius; those of one cell share a list of
+//! candidates, which the inner loop runs through in fixed lanes, with the widest vectors the processor has (the operations
+//! and their order are the same for all of them, and so are the results). `Σ log d²` is the logarithm of a product, kept as
+//! mantissa and exponent: one logarithm per vertex. Pairs joined by an edge are not looked for inside that loop but
+//! subtracted after it. What grows is the number of pairs within the radius: at a fixed edge length it is proportional to
+//! `N`, for a fixed garment that is resolved more finely to `N²`; the random subset is proportional to `N` always.
 
 use rayon::prelude::*;
 
 use super::cell_grid::CellGrid;
 use super::elements::GRAIN;
+use super::pair_kernel::{Candidates, Kernel, VertexResponse};
 use super::{GarmentState, GarmentTerm, Weighted};
 use crate::mesh::Topology;
 use crate::mesh::shapes::SplitMix;
 use crate::real::Real;
-use crate::vec3::{accumulate, axpy, from_f64, scale, sub, zero};
+use crate::vec3::{axpy, sub, zero};
 
-/// δ [m]: below this distance, a fifth of the cloth's thickness, the logarithm continues as a line in `d²`.
-pub const CONTACT_DISTANCE: f64 = 1e-4;
-
-/// Candidates per step of the inner loop.
-const LANES: usize = 8;
-
-/// Steps after which the products of squared distances are turned into logarithms: four squares of at least δ² = 1e-8 stay
-/// above the smallest normal `f32`.
-const STEPS_PER_LOGARITHM: usize = 4;
+pub use super::pair_kernel::CONTACT_DISTANCE;
 
 /// Seed of the random subset; fixed, so that the energy is a function of positions alone.
 const SUBSET_SEED: u64 = 0x5eed_0fc1_07c0_4b05;
@@ -144,113 +140,6 @@ fn draw_partners(topology: &Topology, size: usize) -> Rows {
     Rows::from_fn(count, |v| lists[v].to_vec())
 }
 
-/// The pair energy in the caller's scalar.
-#[derive(Debug, Clone, Copy)]
-struct Kernel<T> {
-    radius: f64,
-    radius_squared: T,
-    contact_squared: T,
-}
-
-/// What one vertex collects from its partners: `Σ −log d²`, and the derivative with respect to its position.
-type VertexResponse<T> = (f64, [T; 3]);
-
-impl<T: Real> Kernel<T> {
-    fn new(radius: f64) -> Self {
-        Self {
-            radius,
-            radius_squared: T::from_f64(radius * radius),
-            contact_squared: T::from_f64(CONTACT_DISTANCE * CONTACT_DISTANCE),
-        }
-    }
-
-    /// One pair: energy and derivative with respect to `p`.
-    #[inline(always)]
-    fn pair(&self, p: [T; 3], q: [T; 3]) -> Option<VertexResponse<T>> {
-        let offset = sub(p, q);
-        let squared = crate::vec3::norm_squared(offset);
-        if squared >= self.radius_squared || squared.is_nan() {
-            return None;
-        }
-        let guarded = squared.max(self.contact_squared);
-        let excess = (guarded - squared).to_f64() / self.contact_squared.to_f64();
-        let energy = excess - guarded.to_f64().ln();
-        Some((energy, scale(offset, T::from_f64(-2.0) / guarded)))
-    }
-
-    /// All candidates, whose number is a multiple of [`LANES`], at once.
-    #[inline(always)]
-    fn candidates(&self, p: [T; 3], candidates: &Candidates<T>) -> VertexResponse<T> {
-        let mut pull = [[T::zero(); LANES]; 3];
-        let mut excess = [T::zero(); LANES];
-        let mut product = [T::one(); LANES];
-        let mut energy = 0.0;
-        let (xs, _) = candidates.x.as_chunks::<LANES>();
-        let (ys, _) = candidates.y.as_chunks::<LANES>();
-        let (zs, _) = candidates.z.as_chunks::<LANES>();
-        for (step, ((x, y), z)) in xs.iter().zip(ys).zip(zs).enumerate() {
-            for lane in 0..LANES {
-                let (dx, dy, dz) = (p[0] - x[lane], p[1] - y[lane], p[2] - z[lane]);
-                let squared = dx * dx + dy * dy + dz * dz;
-                let inside = squared < self.radius_squared;
-                let guarded = if squared > self.contact_squared { squared } else { self.contact_squared };
-                let inverse = guarded.recip();
-                let inverse = if inside { inverse } else { T::zero() };
-                pull[0][lane] += dx * inverse;
-                pull[1][lane] += dy * inverse;
-                pull[2][lane] += dz * inverse;
-                product[lane] *= if inside { guarded } else { T::one() };
-                excess[lane] += if inside { guarded - squared } else { T::zero() };
-            }
-            if step % STEPS_PER_LOGARITHM == STEPS_PER_LOGARITHM - 1 {
-                energy -= logarithm_of_product(product);
-                product = [T::one(); LANES];
-            }
-        }
-        energy -= logarithm_of_product(product);
-        let sum = |lanes: [T; LANES]| lanes.into_iter().map(Real::to_f64).sum::<f64>();
-        energy += sum(excess) / self.contact_squared.to_f64();
-        (energy, from_f64(pull.map(|lanes| -2.0 * sum(lanes))))
-    }
-}
-
-/// `log Π` of lanes that are each at least 1e-32: 1e-256 for eight.
-#[inline(always)]
-fn logarithm_of_product<T: Real>(product: [T; LANES]) -> f64 {
-    product.into_iter().map(Real::to_f64).product::<f64>().ln()
-}
-
-/// Coordinates of the vertices around a cell, padded with far points to a multiple of [`LANES`].
-#[derive(Debug, Default)]
-struct Candidates<T> {
-    x: Vec<T>,
-    y: Vec<T>,
-    z: Vec<T>,
-}
-
-impl<T: Real> Candidates<T> {
-    fn clear(&mut self) {
-        self.x.clear();
-        self.y.clear();
-        self.z.clear();
-    }
-
-    fn extend(&mut self, points: &[[T; 3]]) {
-        self.x.extend(points.iter().map(|p| p[0]));
-        self.y.extend(points.iter().map(|p| p[1]));
-        self.z.extend(points.iter().map(|p| p[2]));
-    }
-
-    fn pad(&mut self) {
-        // Finite, so that its offset times a zero weight is zero; its square is infinite or nearly so, hence outside.
-        let far = T::max_value().sqrt();
-        let padded = self.x.len().next_multiple_of(LANES);
-        self.x.resize(padded, far);
-        self.y.resize(padded, far);
-        self.z.resize(padded, far);
-    }
-}
-
 /// Twice the sum over close pairs and, per vertex, its derivative.
 fn all_pairs<T: Real>(positions: &[[T; 3]], excluded: &Rows, kernel: Kernel<T>) -> (f64, Vec<(u32, [T; 3])>) {
     let grid = CellGrid::new(positions, kernel.radius);
@@ -258,21 +147,21 @@ fn all_pairs<T: Real>(positions: &[[T; 3]], excluded: &Rows, kernel: Kernel<T>) 
         .into_par_iter()
         .map_init(Candidates::default, |candidates, cell| {
             candidates.clear();
-            grid.for_each_range_around(cell, |range| candidates.extend(&grid.points[range]));
+            grid.for_each_range_around(cell, |range| candidates.extend(&grid.axes, range));
             candidates.pad();
-            grid.range(cell)
-                .map(|k| {
-                    let p = grid.points[k];
-                    let (mut energy, mut pull) = kernel.candidates(p, candidates);
-                    for &v in excluded.row(grid.order[k] as usize) {
-                        if let Some((e, g)) = kernel.pair(p, positions[v as usize]) {
-                            energy -= e;
-                            pull = sub(pull, g);
-                        }
-                    }
-                    (energy, pull)
-                })
-                .collect()
+            let points = &grid.points[grid.range(cell)];
+            let mut responses = kernel.all(points, candidates);
+            for ((k, &p), (energy, pull)) in grid.range(cell).zip(points).zip(&mut responses) {
+                let neighbours = excluded.row(grid.order[k] as usize);
+                let (e, g) = kernel.few(p, neighbours.iter().map(|&v| positions[v as usize]));
+                *energy -= e;
+                *pull = sub(*pull, g);
+                // Less than half a pair: no pair at all, and what is left is the rounding of those subtracted.
+                if energy.abs() < 0.5 * kernel.least_energy {
+                    (*energy, *pull) = (0.0, zero());
+                }
+            }
+            responses
         })
         .collect();
     let responses = per_cell.iter().flatten();
@@ -289,16 +178,7 @@ fn sampled_pairs<T: Real>(
     let responses: Vec<VertexResponse<T>> = (0..positions.len())
         .into_par_iter()
         .with_min_len(GRAIN / 8)
-        .map(|v| {
-            let (mut energy, mut pull) = (0.0, zero());
-            for &partner in partners.row(v) {
-                if let Some((e, g)) = kernel.pair(positions[v], positions[partner as usize]) {
-                    energy += e;
-                    accumulate(&mut pull, g);
-                }
-            }
-            (energy, pull)
-        })
+        .map(|v| kernel.few(positions[v], partners.row(v).iter().map(|&partner| positions[partner as usize])))
         .collect();
     let twice = responses.iter().map(|(energy, _)| energy).sum();
     (twice, responses.into_iter().enumerate().map(|(v, (_, pull))| (v as u32, pull)).collect())

@@ -5,6 +5,8 @@ use crate::query::{Distance, Gap};
 use crate::real::Real;
 use crate::vec3;
 
+pub use crate::query::winding_number::winding_number;
+
 /// Index and squared distance of the nearest point; the lowest index of several equally near. `(u32::MAX, ∞)` for no points.
 pub fn nearest<T: Real>(points: &[[T; 3]], p: [T; 3]) -> (u32, T) {
     let mut best = (u32::MAX, T::infinity());
@@ -31,23 +33,6 @@ pub fn distance_to_surface(positions: &[[f64; 3]], faces: &[[u32; 3]], p: [f64; 
         .map(|face| closest_on_triangle(p, face.map(|v| positions[v as usize])).distance_squared)
         .fold(f64::INFINITY, f64::min)
         .sqrt()
-}
-
-/// Generalised winding number of a surface about `p`: the sum of the signed solid angles of its triangles over 4π (Van
-/// Oosterom and Strackee 1983). 1 inside a closed surface and 0 outside; independent of every closest point and normal.
-pub fn winding_number(positions: &[[f64; 3]], faces: &[[u32; 3]], p: [f64; 3]) -> f64 {
-    let solid_angle: f64 = faces
-        .iter()
-        .map(|face| {
-            let [a, b, c] = face.map(|v| vec3::sub(positions[v as usize], p));
-            let (la, lb, lc) = (vec3::norm(a), vec3::norm(b), vec3::norm(c));
-            let numerator = vec3::dot(a, vec3::cross(b, c));
-            let denominator =
-                la * lb * lc + vec3::dot(a, b) * lc + vec3::dot(b, c) * la + vec3::dot(c, a) * lb;
-            2.0 * numerator.atan2(denominator)
-        })
-        .sum();
-    solid_angle / (4.0 * std::f64::consts::PI)
 }
 
 /// [`crate::Surface::gap`] by exhaustive search (in `f64`; `normals` are area-weighted vertex normals).

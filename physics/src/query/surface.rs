@@ -33,6 +33,9 @@ pub struct Gap<T> {
 /// Below this distance (m) the direction from the closest point is rounding, and the pseudo-normal replaces it.
 const CONTACT_DISTANCE: f64 = 1e-10;
 
+/// Spacing of the numbers at a query point (m) above which nearest vertices are found in `f64`.
+const FAR_SPACING: f64 = 1e-4;
+
 /// A fixed surface in one pose: the body, or a garment as another garment sees it.
 ///
 /// Its vertex index and its closest-point tree are each built at first use. Share it by `Arc`.
@@ -74,8 +77,28 @@ impl<T: Real> Surface<T> {
     }
 
     /// Index of the vertex nearest to `p`; the lowest of several equally near.
+    ///
+    /// Squared distances of a far point are so large that rounding makes vertices of the front and of the back equally near,
+    /// and the side of the surface a matter of chance. Where `T` no longer resolves [`FAR_SPACING`], a kilometre away for
+    /// `f32`, all vertices are compared in `f64`: slow, and only ever needed by a garment that has exploded.
     pub fn nearest_vertex(&self, p: [T; 3]) -> u32 {
+        let farthest = p.iter().fold(0.0, |m: f64, x| m.max(Real::to_f64(*x).abs()));
+        if vec3::is_finite(p) && farthest * T::epsilon().to_f64() > FAR_SPACING {
+            return self.nearest_vertex_from_afar(vec3::to_f64(p));
+        }
         self.vertex_index().nearest(p).0
+    }
+
+    #[cold]
+    fn nearest_vertex_from_afar(&self, p: [f64; 3]) -> u32 {
+        // |x − p|² − |p|² orders the vertices alike and keeps their differences.
+        let key = |x: &[T; 3]| {
+            let x = vec3::to_f64(*x);
+            let key = vec3::norm_squared(x) - 2.0 * vec3::dot(x, p);
+            if key.is_nan() { f64::INFINITY } else { key }
+        };
+        let keys = self.positions.iter().map(key).enumerate();
+        keys.fold((0, f64::INFINITY), |best, (i, key)| if key < best.1 { (i, key) } else { best }).0 as u32
     }
 
     /// The surface point closest to `p`; `None` if `p` is not finite.
@@ -206,6 +229,20 @@ mod tests {
             assert_eq!(gap.vertex as usize, vertex);
             assert!((vec3::norm(gap.gradient) - 1.0).abs() < 1e-12);
             assert!(vec3::dot(gap.gradient, *p) > 0.49);
+        }
+    }
+
+    #[test]
+    fn from_afar_both_precisions_see_the_same_vertex_and_side() {
+        let mesh = shapes::icosphere(0.5, 3);
+        let (single, double) = (Surface::<f32>::from_mesh(&mesh), Surface::<f64>::from_mesh(&mesh));
+        for p in queries(50, 1.0, 7) {
+            for distance in [1e2, 1e4, 1e6, 1e9] {
+                let far = vec3::from_f64::<f32>(vec3::scale(p, distance));
+                let gap = single.gap(far, Distance::NearestVertex).gap;
+                let expected = double.gap(vec3::to_f64(far), Distance::NearestVertex).gap;
+                assert!((f64::from(gap) / expected - 1.0).abs() < 1e-5, "{gap} {expected}");
+            }
         }
     }
 

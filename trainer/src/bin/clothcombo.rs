@@ -1,4 +1,4 @@
-//! Everything around training: making and importing data.
+//! Everything around training: making and importing data, scoring drapes, measuring.
 
 use clap::{Parser, Subcommand};
 use clothcombo_trainer::cli;
@@ -22,7 +22,11 @@ enum Verb {
     Fit(cli::fit::Arguments),
     Generate(cli::generate::Arguments),
     #[command(subcommand)]
+    Bench(cli::bench::Bench),
+    #[command(subcommand)]
     Import(cli::import::Source),
+    Prepare(cli::prepare::Arguments),
+    Score(cli::score::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -32,6 +36,9 @@ fn main() -> ExitCode {
         Verb::Check(arguments) => cli::check::run(arguments),
         Verb::Fit(arguments) => cli::fit::run(arguments),
         Verb::Generate(arguments) => cli::generate::run(arguments),
+        Verb::Bench(bench) => cli::bench::run(bench),
         Verb::Import(source) => cli::import::run(source),
+        Verb::Prepare(arguments) => cli::prepare::run(arguments),
+        Verb::Score(arguments) => cli::score::run(arguments),
     })
 }

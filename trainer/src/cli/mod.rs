@@ -1,10 +1,14 @@
 //! The command lines of the two programs.
 
+pub mod bench;
 pub mod check;
 pub mod fit;
 pub mod generate;
 pub mod import;
+pub mod prepare;
+pub mod score;
 pub mod train;
+mod wardrobe_sheet;
 
 use miette::Report;
 use tracing_subscriber::EnvFilter;

@@ -90,6 +90,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         Some(run) => run,
         None => RunDir::create(&root, &config)?,
     };
+    run.write_split(&library.split_names())?;
     if !arguments.quiet {
         eprintln!("run folder {}", run.root().display());
     }
@@ -109,10 +110,15 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     train(&mut session, &mut observers, &stop)
 }
 
-fn load_library(config: &Config, quiet: bool) -> Result<Library, Report> {
+/// The bar shown while garments are prepared.
+pub(crate) fn garment_progress(quiet: bool) -> ProgressBar {
     let style = ProgressStyle::with_template("preparing garments {bar:30} {pos}/{len} {msg}")
         .expect("the template is valid");
-    let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(0).with_style(style) };
+    if quiet { ProgressBar::hidden() } else { ProgressBar::new(0).with_style(style) }
+}
+
+fn load_library(config: &Config, quiet: bool) -> Result<Library, Report> {
+    let bar = garment_progress(quiet);
     let library = Library::load(config, &|done, total, name| {
         bar.set_length(total as u64);
         bar.set_position(done as u64);
@@ -121,11 +127,11 @@ fn load_library(config: &Config, quiet: bool) -> Result<Library, Report> {
     bar.finish_and_clear();
     if !quiet {
         eprintln!(
-            "body: {} · {} garments ({} held out) · {} joints · {} shape components{}",
+            "body: {} · {} garments ({} not trained on) · {} joints · {} shape components{}",
             library.body.name,
-            library.garments.len(),
-            library.held_out.len(),
-            library.joints.len(),
+            library.wardrobe.len(),
+            library.wardrobe.len() - library.split.training.len(),
+            library.joints().len(),
             library.shape_count,
             match library.poses.frame_counts() {
                 Some([train, held_out, unseen]) => {

@@ -1,6 +1,8 @@
 //! Where bodies, garments and poses come from, and the state the networks start from.
 
+use crate::scene::LibraryError;
 use clothcombo_data::asset::Category;
+use clothcombo_data::cache::ArrayCache;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -19,9 +21,20 @@ pub struct DataConfig {
     pub shape_range: [f64; 2],
     /// Sources of garments, all used together.
     pub garments: Vec<GarmentSource>,
-    /// Garments of these names are never trained on.
+    /// Garments of these names are never trained on, nor validated on during the run: they are for the final test.
     #[serde(default)]
     pub held_out_garments: Vec<String>,
+    /// Shares of the other garments that are not trained on.
+    #[serde(default)]
+    pub split: SplitConfig,
+    /// Where what is expensive to compute from a garment is kept between runs; without a folder it is computed at every
+    /// start and kept in memory.
+    #[serde(default)]
+    pub cache: CacheConfig,
+    /// Memory for garments that are streamed from the cache [MiB], spent twice: for the host's share (meshes, energies) and
+    /// for the device's (operators as tensors). More only saves reading.
+    #[serde(default = "memory_mib")]
+    pub memory_mib: usize,
     /// Garments with more vertices than this are refused before training.
     #[serde(default = "max_vertices")]
     pub max_vertices: usize,
@@ -38,6 +51,36 @@ fn shape_range() -> [f64; 2] {
 }
 fn max_vertices() -> usize {
     20_000
+}
+fn memory_mib() -> usize {
+    1024
+}
+
+/// Shares of the garments that are not trained on. A garment goes by the hash of its name: it stays where it is when others
+/// are added.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SplitConfig {
+    /// Share that is scored during the run but never trained on.
+    pub validation: f64,
+    /// Share that is neither trained on nor scored during the run.
+    pub test: f64,
+}
+
+/// The store of operators and bindings, shared by any number of runs and machines.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct CacheConfig {
+    /// Folder, made if needed; none keeps everything in memory.
+    pub folder: Option<PathBuf>,
+    /// Largest size of the folder [GiB]; a garment of 8,000 vertices takes about 14 MiB with 128 eigenvectors.
+    pub limit_gib: f64,
+}
+
+impl Default for CacheConfig {
+    fn default() -> Self {
+        Self { folder: None, limit_gib: 100.0 }
+    }
 }
 
 /// One source of garments: a folder, or the generator.
@@ -100,8 +143,12 @@ pub struct PoseConfig {
     pub held_out_share: f64,
     /// Length of such a block [s]; long against the time in which a pose changes.
     pub held_out_block: f64,
-    /// Mirror, exchange of limbs between frames, scaling of joints, noise.
+    /// Mirror, interpolation between frames of any clips, exchange of limbs between frames, scaling of joints, noise.
     pub augmentation: bool,
+    /// Training poses in which far-apart parts of the body run through each other are drawn again: the most length [m]
+    /// of the curves of intersection that is let pass. 0.1 leaves a hand that brushes a thigh and takes out a forearm
+    /// in the belly, where no garment can be draped. 10 or more looks at no pose and costs nothing.
+    pub max_self_intersection: f64,
     /// Encoding of the pose as network input.
     pub encoding: PoseEncoding,
     /// Turn every pose to face +z: gravity and contact are blind to heading. Off feeds the full root rotation.
@@ -116,6 +163,7 @@ impl Default for PoseConfig {
             held_out_share: 0.1,
             held_out_block: 2.0,
             augmentation: true,
+            max_self_intersection: 0.1,
             encoding: PoseEncoding::RotationMatrix,
             remove_heading: true,
         }
@@ -148,6 +196,24 @@ impl Default for StartConfig {
 }
 
 impl DataConfig {
+    /// Memory for garments that can be read again [bytes]; those of a run without a cache cannot.
+    pub(crate) fn memory_limit(&self) -> usize {
+        match self.cache.folder {
+            Some(_) => self.memory_mib.saturating_mul(1 << 20),
+            None => usize::MAX,
+        }
+    }
+
+    /// The cache of the run, if it has one.
+    ///
+    /// # Errors
+    /// When the folder cannot be used.
+    pub(crate) fn open_cache(&self) -> Result<Option<ArrayCache>, LibraryError> {
+        let limit = (self.cache.limit_gib * f64::from(1 << 30)) as u64;
+        let open = |folder: &PathBuf| ArrayCache::open(folder, limit).map_err(LibraryError::data);
+        self.cache.folder.as_ref().map(open).transpose()
+    }
+
     /// What is inconsistent, as (place, what, hint).
     pub(crate) fn problem(&self) -> Option<(String, String, String)> {
         let says = |p: &str, w: &str, h: &str| Some((p.into(), w.into(), h.into()));
@@ -155,11 +221,32 @@ impl DataConfig {
         if !(low.is_finite() && high.is_finite() && low <= high) {
             return says("data.shape_range", "is not a range [low, high]", "the paper uses [-2.0, 2.0]");
         }
+        let SplitConfig { validation, test } = self.split;
+        if !(validation >= 0.0 && test >= 0.0 && validation + test < 1.0) {
+            return says(
+                "data.split",
+                "is not two shares that leave something to train on",
+                "for example 0.1 and 0.1",
+            );
+        }
+        if !(self.cache.limit_gib.is_finite() && self.cache.limit_gib > 0.0) {
+            return says("data.cache.limit_gib", "is not a positive size", "for example 100.0");
+        }
+        if self.memory_mib == 0 {
+            return says("data.memory_mib", "must be at least 1", "for example 1024");
+        }
         if !(self.poses.held_out_share > 0.0 && self.poses.held_out_share < 1.0) {
             return says("data.poses.held_out_share", "is not a share between 0 and 1", "for example 0.1");
         }
         if !(self.poses.held_out_block.is_finite() && self.poses.held_out_block > 0.0) {
             return says("data.poses.held_out_block", "is not a positive time", "for example 2.0 seconds");
+        }
+        if self.poses.max_self_intersection.is_nan() || self.poses.max_self_intersection < 0.0 {
+            return says(
+                "data.poses.max_self_intersection",
+                "is not a length in metres",
+                "for example 0.1; 10 lets every pose pass",
+            );
         }
         for (i, source) in self.garments.iter().enumerate() {
             if let Some(g) = &source.generate

@@ -8,7 +8,10 @@ mod losses;
 mod ramp;
 mod stages;
 
-pub use data::{DataConfig, GarmentSource, GenerateConfig, PoseConfig, PoseEncoding, StartConfig};
+pub use data::{
+    CacheConfig, DataConfig, GarmentSource, GenerateConfig, PoseConfig, PoseEncoding, SplitConfig,
+    StartConfig,
+};
 pub use load::{ConfigError, load, to_toml};
 pub use losses::{DistanceMode, LossesConfig};
 pub use ramp::{Ramp, RampShape};
@@ -75,6 +78,8 @@ pub struct ValidationConfig {
     pub single_scenes: usize,
     /// Scenes of one garment on motion clips never trained on (data.poses.held_out_clips).
     pub unseen_scenes: usize,
+    /// Scenes of one garment never trained on (data.split.validation), in held-out poses.
+    pub unseen_garment_scenes: usize,
     /// Scenes of several layers.
     pub layered_scenes: usize,
     /// Fewest and most layers of the layered scenes.
@@ -85,7 +90,14 @@ pub struct ValidationConfig {
 
 impl Default for ValidationConfig {
     fn default() -> Self {
-        Self { single_scenes: 48, unseen_scenes: 24, layered_scenes: 16, layers: [2, 4], every: 0 }
+        Self {
+            single_scenes: 48,
+            unseen_scenes: 24,
+            unseen_garment_scenes: 24,
+            layered_scenes: 16,
+            layers: [2, 4],
+            every: 0,
+        }
     }
 }
 

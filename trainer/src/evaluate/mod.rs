@@ -2,8 +2,10 @@
 
 mod report;
 mod score;
+mod sign_error;
 mod validation;
 
 pub use report::{GroupReport, MethodScore, Spread, ValidationReport};
 pub use score::{Draped, SceneScore, score_scene};
+pub use sign_error::{RegionErrors, SignErrorSettings, SignErrors, WrongSigns, hard_poses, sign_errors};
 pub use validation::{Method, ValidationSet};

@@ -1,6 +1,6 @@
 //! The score of one draped scene.
 
-use crate::scene::{Library, PreparedScene};
+use crate::scene::PreparedScene;
 use clothcombo_physics::contact::{OrderViolations, Penetration, order_violations, penetration};
 use clothcombo_physics::energy::{Term, TermMap};
 use clothcombo_physics::query::Surface;
@@ -33,12 +33,7 @@ pub struct SceneScore {
 }
 
 /// Scores `draped` on the first body of `scene`, whose surface in f64 is `body`.
-pub fn score_scene(
-    library: &Library,
-    scene: &PreparedScene,
-    body: &Surface<f64>,
-    draped: &Draped,
-) -> SceneScore {
+pub fn score_scene(scene: &PreparedScene, body: &Surface<f64>, draped: &Draped) -> SceneScore {
     let energy = &scene.bodies[0].energy;
     // Terms of weight 0 are scored as well: an ablation wants to see what it left out.
     let value = energy.raw(&draped.posed, &draped.canonical);
@@ -58,13 +53,13 @@ pub fn score_scene(
 
     let mut parts = Vec::with_capacity(scene.garments.len());
     let mut rest = positions.as_slice();
-    for &g in &scene.garments {
-        let (part, tail) = rest.split_at(library.garments[g].vertex_count());
+    for garment in &scene.worn {
+        let (part, tail) = rest.split_at(garment.vertex_count());
         parts.push(part);
         rest = tail;
     }
     for &(inner, outer) in &scene.contacts {
-        let faces = library.garments[scene.garments[inner]].garment.rest.faces();
+        let faces = scene.worn[inner].garment.rest.faces();
         let pair = order_violations(parts[inner], faces, parts[outer]);
         score.order.counted += pair.counted;
         score.order.violations += pair.violations;

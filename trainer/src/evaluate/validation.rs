@@ -1,11 +1,12 @@
-//! The fixed validation scenes: prepared once, scored for every method.
+//! The fixed validation scenes, scored for every method.
 
 use super::report::{GroupReport, MethodScore, ValidationReport};
 use super::score::{Draped, SceneScore, score_scene};
-use crate::config::Config;
-use crate::drape::Networks;
-use crate::scene::{Library, PreparedScene, ValidationGroup, draw_validation, prepare};
-use clothcombo_model::ModelError;
+use crate::config::{Config, LossesConfig};
+use crate::drape::{DrapeError, Networks};
+use crate::scene::{
+    Library, LibraryError, PreparedScene, SceneDraw, ValidationGroup, draw_validation, prepare,
+};
 use clothcombo_physics::query::Surface;
 use rayon::prelude::*;
 
@@ -34,52 +35,47 @@ impl Method {
     }
 }
 
-/// A prepared scene and its body in f64, ready for exact distances.
-struct ValidationScene {
-    scene: PreparedScene,
-    body: Surface<f64>,
-}
-
-/// All validation scenes.
+/// All validation scenes, as draws: they are prepared when they are scored, so that a large wardrobe need not be in memory.
 pub struct ValidationSet {
-    groups: Vec<(ValidationGroup, Vec<ValidationScene>)>,
+    groups: Vec<(ValidationGroup, Vec<SceneDraw>)>,
+    losses: LossesConfig,
     shape_transfer: bool,
 }
 
+/// Scenes prepared at a time: enough to keep every core busy.
+const CHUNK: usize = 16;
+
 impl ValidationSet {
-    /// Draws and prepares the scenes of `config`; losses have their final weights.
+    /// Draws the scenes of `config`; losses have their final weights.
     pub fn new(library: &Library, config: &Config) -> Self {
-        let prepared = |group| {
-            draw_validation(library, config.seed, &config.validation, group)
-                .into_par_iter()
-                .map(|draw| {
-                    let scene = prepare(library, &config.losses, draw, 1.0);
-                    let body = &scene.bodies[0].energy.body;
-                    let positions = body.positions.iter().map(|p| p.map(f64::from)).collect();
-                    let body = Surface::new(positions, body.faces.clone());
-                    ValidationScene { scene, body }
-                })
-                .collect::<Vec<_>>()
-        };
-        let groups = ValidationGroup::ALL.map(|group| (group, prepared(group)));
+        let groups = ValidationGroup::ALL
+            .map(|group| (group, draw_validation(library, config.seed, &config.validation, group)));
         Self {
             groups: groups.into_iter().filter(|(_, scenes)| !scenes.is_empty()).collect(),
+            losses: config.losses.clone(),
             shape_transfer: config.start.shape_transfer,
         }
     }
 
     /// The scenes of `group`.
-    pub fn scenes(&self, group: ValidationGroup) -> Vec<&PreparedScene> {
-        let of_group = self.groups.iter().filter(|(g, _)| *g == group);
-        of_group.flat_map(|(_, scenes)| scenes.iter().map(|s| &s.scene)).collect()
+    pub fn draws(&self, group: ValidationGroup) -> &[SceneDraw] {
+        self.groups.iter().find(|(g, _)| *g == group).map_or(&[], |(_, draws)| draws)
+    }
+
+    /// Prepares a scene with the losses' final weights.
+    ///
+    /// # Errors
+    /// When a garment cannot be read.
+    pub fn prepare(&self, library: &Library, draw: &SceneDraw) -> Result<PreparedScene, LibraryError> {
+        prepare(library, &self.losses, draw.clone(), 1.0)
     }
 
     /// Scores skinning and `networks` on every scene.
     ///
     /// # Errors
     /// When a scene cannot be draped.
-    pub fn score(&self, library: &Library, networks: &Networks) -> Result<ValidationReport, ModelError> {
-        let groups = self.groups.iter().map(|(group, scenes)| {
+    pub fn score(&self, library: &Library, networks: &Networks) -> Result<ValidationReport, DrapeError> {
+        let groups = self.groups.iter().map(|(group, draws)| {
             let mut methods = vec![Method::StartSkinning];
             if self.shape_transfer {
                 methods.insert(0, Method::RestSkinning);
@@ -88,32 +84,44 @@ impl ValidationSet {
                 methods.push(Method::Single);
             }
             methods.push(Method::Network);
-            score_group(library, networks, *group, scenes, &methods)
+            self.score_group(library, networks, *group, draws, &methods)
         });
         Ok(ValidationReport { groups: groups.collect::<Result<_, _>>()? })
     }
+
+    fn score_group(
+        &self,
+        library: &Library,
+        networks: &Networks,
+        group: ValidationGroup,
+        draws: &[SceneDraw],
+        methods: &[Method],
+    ) -> Result<GroupReport, DrapeError> {
+        let mut scores: Vec<Vec<SceneScore>> = vec![Vec::with_capacity(draws.len()); methods.len()];
+        for chunk in draws.chunks(CHUNK) {
+            let scenes: Vec<_> = chunk.par_iter().map(|draw| self.prepare(library, draw)).collect();
+            for scene in scenes {
+                let scene = scene?;
+                let body = exact_body(&scene);
+                let network = networks.drape(&scene)?;
+                for (method, scores) in methods.iter().zip(&mut scores) {
+                    let draped: &Draped = match method {
+                        Method::RestSkinning => &networks.skin_rest(&scene)?,
+                        Method::StartSkinning => &networks.skin(&scene)?,
+                        Method::Single => &network.single,
+                        Method::Network => &network.layered,
+                    };
+                    scores.push(score_scene(&scene, &body, draped));
+                }
+            }
+        }
+        let methods = methods.iter().zip(&scores).map(|(m, s)| MethodScore::new(m.name(), s)).collect();
+        Ok(GroupReport { group: group.name(), scenes: draws.len(), methods })
+    }
 }
 
-fn score_group(
-    library: &Library,
-    networks: &Networks,
-    group: ValidationGroup,
-    scenes: &[ValidationScene],
-    methods: &[Method],
-) -> Result<GroupReport, ModelError> {
-    let mut scores: Vec<Vec<SceneScore>> = vec![Vec::with_capacity(scenes.len()); methods.len()];
-    for ValidationScene { scene, body } in scenes {
-        let network = networks.drape(scene)?;
-        for (method, scores) in methods.iter().zip(&mut scores) {
-            let draped: &Draped = match method {
-                Method::RestSkinning => &networks.skin_rest(scene)?,
-                Method::StartSkinning => &networks.skin(scene)?,
-                Method::Single => &network.single,
-                Method::Network => &network.layered,
-            };
-            scores.push(score_scene(library, scene, body, draped));
-        }
-    }
-    let methods = methods.iter().zip(&scores).map(|(m, s)| MethodScore::new(m.name(), s)).collect();
-    Ok(GroupReport { group: group.name(), scenes: scenes.len(), methods })
+/// The first body of a scene in f64, for exact distances.
+fn exact_body(scene: &PreparedScene) -> Surface<f64> {
+    let body = &scene.bodies[0].energy.body;
+    Surface::new(body.positions.iter().map(|p| p.map(f64::from)).collect(), body.faces.clone())
 }

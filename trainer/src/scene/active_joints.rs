@@ -1,6 +1,6 @@
 //! The joints a wardrobe needs: those that carry any garment. Hands, feet and face never enter the networks.
 
-use clothcombo_data::asset::{Binding, Body};
+use clothcombo_data::asset::Body;
 
 /// Joints with weight on at least one garment, in body order.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,16 +14,13 @@ pub struct ActiveJoints {
 const NEGLIGIBLE: f32 = 1e-3;
 
 impl ActiveJoints {
-    /// Collects the joints used by `bindings`.
-    pub fn new<'a>(body: &Body, bindings: impl IntoIterator<Item = &'a Binding>) -> Self {
+    /// Collects the joints in use from the largest weight of every joint on each garment
+    /// ([`Binding::largest_weights`](clothcombo_data::asset::Binding::largest_weights)).
+    pub fn new<'a>(body: &Body, garments: impl IntoIterator<Item = &'a [f32]>) -> Self {
         let joints = body.joint_names.len();
         let mut largest = vec![0f32; joints];
-        for binding in bindings {
-            for row in binding.skin_weights.chunks_exact(joints) {
-                for (l, w) in largest.iter_mut().zip(row) {
-                    *l = l.max(*w);
-                }
-            }
+        for garment in garments {
+            largest.iter_mut().zip(garment).for_each(|(l, w)| *l = l.max(*w));
         }
         let indices = (0..joints).filter(|&j| largest[j] > NEGLIGIBLE).collect();
         Self { indices, body_joints: joints }

@@ -66,7 +66,7 @@ pub fn draw_training(library: &Library, seed: u64, step: u64, plan: Plan) -> Sce
     let mut rng = generator(seed, step);
     let [low, high] = plan.stage.layers;
     let layers = rng.random_range(low..=high);
-    let garments = garments(&library.training, layers, &mut rng);
+    let garments = garments(&library.split.training, layers, &mut rng);
     let scale = plan.stage.pose_scale.at(plan.progress);
     let bodies = (0..plan.stage.scenes_per_step)
         .map(|_| BodyDraw {
@@ -84,19 +84,32 @@ pub enum ValidationGroup {
     Single,
     /// One garment, clips never trained on.
     UnseenMotion,
+    /// One garment never trained on, held-out poses of the trained clips.
+    UnseenGarment,
     /// Several layers, held-out poses of the trained clips.
     Layered,
 }
 
 impl ValidationGroup {
     /// All groups, in the order they are scored.
-    pub const ALL: [Self; 3] = [Self::Single, Self::UnseenMotion, Self::Layered];
+    pub const ALL: [Self; 4] = [Self::Single, Self::UnseenMotion, Self::UnseenGarment, Self::Layered];
+
+    /// Its block of random streams; numbers stay with their group, so that a new group changes no other group's scenes.
+    fn stream(self) -> u64 {
+        match self {
+            Self::Single => 0,
+            Self::UnseenMotion => 1,
+            Self::Layered => 2,
+            Self::UnseenGarment => 3,
+        }
+    }
 
     /// Name in tables and logs.
     pub fn name(self) -> &'static str {
         match self {
             Self::Single => "single garments",
             Self::UnseenMotion => "single garments, unseen clips",
+            Self::UnseenGarment => "single garments, never trained on",
             Self::Layered => "layered outfits",
         }
     }
@@ -113,17 +126,22 @@ pub fn draw_validation(
         ValidationGroup::Single => (config.single_scenes, Unseen::Poses),
         ValidationGroup::UnseenMotion if !library.poses.has_unseen_clips() => (0, Unseen::Clips),
         ValidationGroup::UnseenMotion => (config.unseen_scenes, Unseen::Clips),
+        ValidationGroup::UnseenGarment if library.split.validation.is_empty() => (0, Unseen::Poses),
+        ValidationGroup::UnseenGarment => (config.unseen_garment_scenes, Unseen::Poses),
         ValidationGroup::Layered => (config.layered_scenes, Unseen::Poses),
     };
     (0..count)
         .map(|i| {
-            let mut rng = generator(seed, VALIDATION_STREAM + ((group as u64) << 32) + i as u64);
+            let mut rng = generator(seed, VALIDATION_STREAM + (group.stream() << 32) + i as u64);
             let garments = match group {
                 ValidationGroup::Layered => {
                     let [low, high] = config.layers;
-                    garments(&library.training, low + i % (high - low + 1), &mut rng)
+                    garments(&library.split.training, low + i % (high - low + 1), &mut rng)
                 }
-                _ => vec![library.training[i % library.training.len()]],
+                ValidationGroup::UnseenGarment => {
+                    vec![library.split.validation[i % library.split.validation.len()]]
+                }
+                _ => vec![library.split.training[i % library.split.training.len()]],
             };
             let pose = library.poses.draw_held_out(unseen, &mut rng);
             SceneDraw { garments, bodies: vec![BodyDraw { shape: shape(library, &mut rng), pose }] }

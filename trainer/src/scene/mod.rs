@@ -2,14 +2,25 @@
 
 mod active_joints;
 mod draw;
+mod error;
+mod garment;
 mod library;
+mod origin;
 mod poses;
 mod prefetch;
 mod prepare;
+mod recent;
+mod split;
+mod wardrobe;
 
 pub use active_joints::ActiveJoints;
 pub use draw::{BodyDraw, Plan, SceneDraw, ValidationGroup, draw_training, draw_validation};
-pub use library::{Library, LibraryError, LibraryGarment, load_body};
-pub use poses::{PoseLibrary, Unseen};
+pub use error::LibraryError;
+pub use garment::LibraryGarment;
+pub use library::{Library, load_body};
+pub use poses::{PoseLibrary, SelfIntersecting, Unseen};
 pub use prefetch::Prefetch;
 pub use prepare::{PreparedBody, PreparedScene, prepare};
+pub use recent::Recent;
+pub use split::{GarmentSplit, SplitNames};
+pub use wardrobe::{Card, Wardrobe};

@@ -1,21 +1,53 @@
 //! Poses for training and validation: frames of motion clips, or the sampler within joint limits.
 
-use super::library::LibraryError;
+use super::error::LibraryError;
 use crate::config::{PoseConfig, PoseEncoding};
 use clothcombo_data::asset::rotation::matrix_from_axis_angle;
-use clothcombo_data::asset::{Motion, Pose};
+use clothcombo_data::asset::{Body, Motion, Pose};
 use clothcombo_data::dataset::load_motion_folder;
-use clothcombo_data::generate::{PoseAugmentation, PoseSampler};
-use rand::RngExt;
+use clothcombo_data::generate::{PoseAugmentation, PoseSampler, SelfContact};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use std::sync::Arc;
 
 /// All poses of a run, split by clip.
 pub struct PoseLibrary {
     source: Source,
     augmentation: Option<PoseAugmentation>,
+    filter: Option<Filter>,
+    self_intersecting: Option<SelfIntersecting>,
     encoding: PoseEncoding,
     remove_heading: bool,
 }
+
+/// Keeps bodies that run through themselves out of training.
+struct Filter {
+    body: Arc<Body>,
+    contact: SelfContact,
+    /// Longest curves of intersection that pass [m].
+    limit: f64,
+}
+
+/// Self-intersections among training poses as they are drawn, before the filter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SelfIntersecting {
+    /// Poses looked at.
+    pub poses: usize,
+    /// Share in which far-apart parts of the body intersect at all, 0–1.
+    pub touching: f64,
+    /// Share above the limit, which is drawn again, 0–1.
+    pub above_limit: f64,
+    /// The limit [m].
+    pub limit: f64,
+}
+
+/// From this limit on nothing is filtered [m].
+const NO_FILTER: f64 = 10.0;
+/// Poses drawn before the least self-intersecting one is taken as it is.
+const DRAWS: usize = 8;
+/// Poses drawn to report the share of self-intersecting ones.
+const REPORTED_POSES: usize = 64;
 
 enum Source {
     Frames(Frames),
@@ -28,6 +60,8 @@ struct Frames {
     train: Vec<Pose>,
     held_out: Vec<Pose>,
     unseen: Vec<Pose>,
+    training_clips: Vec<String>,
+    unseen_clips: Vec<String>,
 }
 
 /// Which poses a validation scene draws from.
@@ -40,11 +74,12 @@ pub enum Unseen {
 }
 
 impl PoseLibrary {
-    /// Reads the motions and splits them; without a motion folder poses are sampled.
+    /// Reads the motions and splits them; without a motion folder poses are sampled. Self-intersections are judged on `body`
+    /// of mean shape.
     ///
     /// # Errors
     /// When the folder cannot be read or one of the two parts is empty.
-    pub fn new(config: &PoseConfig) -> Result<Self, LibraryError> {
+    pub fn new(config: &PoseConfig, body: &Arc<Body>) -> Result<Self, LibraryError> {
         let source = match &config.motions {
             None => Source::Sampler(PoseSampler::default()),
             Some(folder) => {
@@ -60,11 +95,50 @@ impl PoseLibrary {
                 Source::Frames(frames)
             }
         };
-        Ok(Self {
+        let limit = config.max_self_intersection;
+        let filter = (limit < NO_FILTER).then(|| Filter {
+            body: body.clone(),
+            contact: SelfContact::new(body),
+            limit,
+        });
+        let mut library = Self {
             source,
             augmentation: config.augmentation.then(PoseAugmentation::default),
+            filter,
+            self_intersecting: None,
             encoding: config.encoding,
             remove_heading: config.remove_heading,
+        };
+        library.self_intersecting = library.survey_self_intersections();
+        if let Some(s) = &library.self_intersecting {
+            tracing::info!(
+                "self-intersecting bodies: {:.0} % of {} training poses, {:.0} % above {} m and drawn again",
+                100.0 * s.touching,
+                s.poses,
+                100.0 * s.above_limit,
+                s.limit
+            );
+        }
+        Ok(library)
+    }
+
+    /// How many training poses intersect themselves before the filter; none where nothing is filtered.
+    pub fn self_intersecting(&self) -> Option<SelfIntersecting> {
+        self.self_intersecting
+    }
+
+    fn survey_self_intersections(&self) -> Option<SelfIntersecting> {
+        let filter = self.filter.as_ref()?;
+        let lengths: Vec<f64> = (0..REPORTED_POSES as u64)
+            .into_par_iter()
+            .map(|i| filter.measure(&self.draw_unfiltered(1.0, &mut ChaCha8Rng::seed_from_u64(i))))
+            .collect();
+        let share = |limit: f64| lengths.iter().filter(|l| **l > limit).count() as f64 / lengths.len() as f64;
+        Some(SelfIntersecting {
+            poses: lengths.len(),
+            touching: share(0.0),
+            above_limit: share(filter.limit),
+            limit: filter.limit,
         })
     }
 
@@ -76,13 +150,39 @@ impl PoseLibrary {
         }
     }
 
+    /// Names of the clips trained on, and of those never trained on.
+    pub fn clips(&self) -> [&[String]; 2] {
+        match &self.source {
+            Source::Frames(f) => [&f.training_clips, &f.unseen_clips],
+            Source::Sampler(_) => [&[], &[]],
+        }
+    }
+
     /// Whether there are clips that are never trained on.
     pub fn has_unseen_clips(&self) -> bool {
         self.frame_counts().is_some_and(|[_, _, unseen]| unseen > 0)
     }
 
-    /// A pose for training, augmented, scaled by the progressive schedule, heading removed.
+    /// A pose for training, augmented, scaled by the progressive schedule, heading removed. A pose that intersects itself
+    /// beyond the limit is drawn again; if many in a row do, the least intersecting of them is taken.
     pub fn draw_training(&self, scale: f64, rng: &mut ChaCha8Rng) -> Pose {
+        let mut pose = self.draw_unfiltered(scale, rng);
+        let Some(filter) = &self.filter else { return pose };
+        let mut length = filter.measure(&pose);
+        for _ in 1..DRAWS {
+            if length <= filter.limit {
+                break;
+            }
+            let other = self.draw_unfiltered(scale, rng);
+            let other_length = filter.measure(&other);
+            if other_length < length {
+                (pose, length) = (other, other_length);
+            }
+        }
+        pose
+    }
+
+    fn draw_unfiltered(&self, scale: f64, rng: &mut ChaCha8Rng) -> Pose {
         let pose = match &self.source {
             Source::Sampler(sampler) => sampler.sample(rng),
             Source::Frames(Frames { train, .. }) => {
@@ -148,6 +248,14 @@ impl PoseLibrary {
     }
 }
 
+impl Filter {
+    /// Length of the curves of self-intersection [m].
+    fn measure(&self, pose: &Pose) -> f64 {
+        // Only a pose longer than the body's joint list is refused, and those joints are left out.
+        self.contact.of_pose(&self.body, pose).unwrap_or(0.0)
+    }
+}
+
 /// Every clip is cut into blocks; one block in every `1 / held_out_share`, in the middle of its group, is held out.
 fn split(clips: &[Motion], config: &PoseConfig) -> Frames {
     let mut frames = Frames::default();
@@ -155,8 +263,10 @@ fn split(clips: &[Motion], config: &PoseConfig) -> Frames {
     for clip in clips {
         if config.held_out_clips.iter().any(|name| clip.name.contains(name.as_str())) {
             frames.unseen.extend_from_slice(&clip.poses);
+            frames.unseen_clips.push(clip.name.clone());
             continue;
         }
+        frames.training_clips.push(clip.name.clone());
         let block = ((config.held_out_block * clip.frame_rate).round() as usize).max(1);
         for (i, poses) in clip.poses.chunks(block).enumerate() {
             let part = if i % group == group / 2 { &mut frames.held_out } else { &mut frames.train };
@@ -164,4 +274,39 @@ fn split(clips: &[Motion], config: &PoseConfig) -> Frames {
         }
     }
     frames
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clothcombo_data::generate::mannequin;
+
+    fn library(max_self_intersection: f64) -> PoseLibrary {
+        let config = PoseConfig { max_self_intersection, ..PoseConfig::default() };
+        PoseLibrary::new(&config, &Arc::new(mannequin())).unwrap()
+    }
+
+    #[test]
+    fn training_poses_that_run_through_themselves_are_drawn_again() {
+        let body = mannequin();
+        let contact = SelfContact::new(&body);
+        let limit = 0.02;
+        let (filtered, free) = (library(limit), library(NO_FILTER));
+        assert!(free.self_intersecting().is_none());
+        let report = filtered.self_intersecting().unwrap();
+        assert!(report.above_limit > 0.0 && report.above_limit <= report.touching, "{report:?}");
+        let draw =
+            |library: &PoseLibrary, seed| library.draw_training(1.0, &mut ChaCha8Rng::seed_from_u64(seed));
+        let length = |pose: &Pose| contact.of_pose(&body, pose).unwrap();
+        let mut replaced = 0;
+        for seed in 0..60 {
+            let (kept, any) = (draw(&filtered, seed), draw(&free, seed));
+            assert_eq!(kept, draw(&filtered, seed));
+            assert!(length(&kept) <= limit, "seed {seed}");
+            // What passes is not touched.
+            assert_eq!(kept == any, length(&any) <= limit);
+            replaced += usize::from(kept != any);
+        }
+        assert!(replaced > 0);
+    }
 }

@@ -1,6 +1,8 @@
 //! Turns a draw into numbers: posed body, bone transforms, start positions, and the scene's energies.
 
 use super::draw::SceneDraw;
+use super::error::LibraryError;
+use super::garment::LibraryGarment;
 use super::library::Library;
 use crate::config::LossesConfig;
 use crate::objective::scene_weights;
@@ -24,8 +26,10 @@ pub struct PreparedBody {
 
 /// A scene ready for a step.
 pub struct PreparedScene {
-    /// Indices into the library, inner → outer.
+    /// Indices into the wardrobe, inner → outer.
     pub garments: Vec<usize>,
+    /// The garments themselves.
+    pub worn: Vec<Arc<LibraryGarment>>,
     /// Pairs (inner, outer) of positions in `garments` that can touch.
     pub contacts: Vec<(usize, usize)>,
     /// Bodies.
@@ -36,13 +40,17 @@ pub struct PreparedScene {
 const CONTACT_MARGIN: f64 = 0.05;
 
 /// Prepares `draw`; loss weights are taken at `run_progress`.
+///
+/// # Errors
+/// [`LibraryError`] when a garment cannot be read.
 pub fn prepare(
     library: &Library,
     losses: &LossesConfig,
     draw: SceneDraw,
     run_progress: f64,
-) -> PreparedScene {
-    let garments: Vec<_> = draw.garments.iter().map(|&g| &library.garments[g]).collect();
+) -> Result<PreparedScene, LibraryError> {
+    let garments =
+        draw.garments.iter().map(|&g| library.wardrobe.garment(g)).collect::<Result<Vec<_>, _>>()?;
     let contacts = contacts(library, &draw.garments);
     let bodies = draw
         .bodies
@@ -56,7 +64,7 @@ pub fn prepare(
                 posed.positions.iter().map(|p| p.map(|v| v as f32)).collect(),
                 library.body.faces.clone(),
             );
-            let bones = library.joints.indices.iter().map(|&j| posed.bones[j]);
+            let bones = library.joints().indices.iter().map(|&j| posed.bones[j]);
             let starts: Vec<Vec<[f32; 3]>> =
                 garments.iter().map(|g| g.start_positions(&body.shape)).collect();
             let counts: Vec<usize> = garments.iter().map(|g| g.vertex_count()).collect();
@@ -81,7 +89,7 @@ pub fn prepare(
                 .collect();
             PreparedBody {
                 shape: body.shape.iter().map(|v| *v as f32).collect(),
-                pose: library.poses.features(&body.pose, &library.joints.indices),
+                pose: library.poses.features(&body.pose, &library.joints().indices),
                 bones: bones.collect(),
                 start: starts.concat(),
                 energy: Arc::new(SceneEnergy {
@@ -93,11 +101,11 @@ pub fn prepare(
             }
         })
         .collect();
-    PreparedScene { garments: draw.garments, contacts, bodies }
+    Ok(PreparedScene { garments: draw.garments, worn: garments, contacts, bodies })
 }
 
 fn contacts(library: &Library, garments: &[usize]) -> Vec<(usize, usize)> {
-    let boxes: Vec<_> = library.rest_meshes(garments).iter().map(|m| m.bounds()).collect();
+    let boxes: Vec<_> = garments.iter().map(|&g| library.wardrobe.card(g).bounds).collect();
     let touch = |a: usize, b: usize| {
         (0..3).all(|k| {
             boxes[a].0[k] - CONTACT_MARGIN <= boxes[b].1[k] && boxes[b].0[k] - CONTACT_MARGIN <= boxes[a].1[k]

@@ -4,6 +4,7 @@ use super::GarmentError;
 use super::distance_grid::DistanceGrid;
 use super::tube::Tube;
 use crate::asset::{BODY_JOINT_COUNT, Body};
+use crate::generate::parts::dominant_joints;
 use clothcombo_physics::query::Surface;
 
 /// Heights and widths of the zero body [m].
@@ -58,7 +59,7 @@ impl BodyFit {
                 "its joints are not in a T-pose in metres with y up and the left arm along +x".to_string(),
             ));
         }
-        let owner = owners(body);
+        let owner = dominant_joints(body);
         let points = |joints: &[usize]| -> Vec<[f64; 3]> {
             body.template.iter().zip(&owner).filter(|(_, j)| joints.contains(j)).map(|(p, _)| *p).collect()
         };
@@ -154,23 +155,4 @@ impl BodyFit {
         let bin = at as usize;
         self.shoulder_line[bin] + at.fract() * (self.shoulder_line[bin + 1] - self.shoulder_line[bin])
     }
-}
-
-/// The body joint with the largest weight per vertex; hand, jaw and eye joints count as their ancestor.
-fn owners(body: &Body) -> Vec<usize> {
-    (0..body.vertex_count())
-        .map(|v| {
-            let (joints, weights) = body.skin_weights.row(v);
-            let heaviest =
-                joints.iter().zip(weights).max_by(|a, b| a.1.total_cmp(b.1)).map_or(0, |(j, _)| *j);
-            let mut joint = usize::from(heaviest);
-            while joint >= BODY_JOINT_COUNT {
-                match body.parents.get(joint).copied().flatten() {
-                    Some(parent) => joint = parent,
-                    None => return 0,
-                }
-            }
-            joint
-        })
-        .collect()
 }

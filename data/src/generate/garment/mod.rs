@@ -1,4 +1,5 @@
-//! A wardrobe for any body: random garments of six categories, cut and meshed for the body that shall wear them.
+//! A wardrobe for any body: garments of six categories, designed by documented parameters or by chance, cut and meshed for the
+//! body that shall wear them.
 //!
 //! Every garment is made the same way. A smooth solid around the body — hanging tubes around trunk, sleeves and legs, united with an
 //! offset of the body itself — is polygonised, opened along cut surfaces (hem, cuffs, neckline, armholes, placket), and remeshed
@@ -6,11 +7,15 @@
 //! is thus part of the construction, hems are exact, and the random lattice, sizing and design make every
 //! triangulation a different one.
 
+mod design;
 mod distance_grid;
 mod fit;
 mod pattern;
 mod quality;
+mod survey;
 mod tube;
+mod upper;
+mod wardrobe;
 
 use super::field;
 use super::isosurface::{Lattice, extract};
@@ -18,6 +23,7 @@ use super::remesh::{Quality, Target, remesh};
 use super::sheet::{LabelledTriangles, Sheet};
 use crate::asset::{Body, Category, Garment, Provenance};
 use clothcombo_physics::TriMesh;
+use clothcombo_physics::contact::TriangleTree;
 use clothcombo_physics::vec3::{dot, norm};
 use fit::BodyFit;
 use pattern::Pattern;
@@ -25,7 +31,12 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use thiserror::Error;
 
+pub use design::{
+    FlareDesign, Front, GarmentDesign, Neckline, PleatDesign, SkirtDesign, SleeveDesign, TrousersDesign,
+    UpperDesign,
+};
 pub use quality::GarmentQuality;
+pub use survey::{CategorySurvey, Survey};
 
 /// How garments are generated.
 #[derive(Debug, Clone, PartialEq)]
@@ -97,7 +108,21 @@ pub enum GarmentError {
 #[derive(Debug)]
 pub struct GarmentGenerator<'a> {
     body: &'a Body,
+    /// Tells bodies of the same name apart.
+    body_hash: String,
     fit: BodyFit,
+    tree: TriangleTree<'a>,
+}
+
+/// A garment with the story of its making.
+#[derive(Debug, Clone)]
+pub struct GeneratedGarment {
+    /// The garment.
+    pub garment: Garment,
+    /// Its design.
+    pub design: GarmentDesign,
+    /// What was wrong with the designs tried before it; none of them was kept.
+    pub rejected: Vec<String>,
 }
 
 /// One garment for `body`, the same for the same seed and settings. For many garments keep a [`GarmentGenerator`], which
@@ -120,11 +145,18 @@ impl<'a> GarmentGenerator<'a> {
     /// # Errors
     /// [`GarmentError::UnsuitableBody`] if it has no T-pose with the SMPL body joints.
     pub fn new(body: &'a Body) -> Result<Self, GarmentError> {
-        Ok(Self { body, fit: BodyFit::new(body)? })
+        let fit = BodyFit::new(body)?;
+        let mut hasher = blake3::Hasher::new();
+        body.template.as_flattened().iter().for_each(|x| {
+            hasher.update(&x.to_le_bytes());
+        });
+        let body_hash = hasher.finalize().to_hex()[..8].to_string();
+        Ok(Self { body, body_hash, fit, tree: TriangleTree::new(&body.template, &body.faces) })
     }
 
-    /// One garment at rest on the zero body: an orientable manifold with boundary, one component, faces outward, wholly
-    /// outside the body, edges within 0.4–2.5 of their median, angles of at least 15°.
+    /// One garment of random design at rest on the zero body: an orientable manifold with boundary, one component, faces
+    /// outward, wholly outside the body (exact test) and free of self-intersections, edges within 0.4–2.5 of their
+    /// median, angles of at least 15°. A design that misses one of these is replaced by another one of the same seed.
     ///
     /// # Errors
     /// [`GarmentError::Setting`] and [`GarmentError::Exhausted`].
@@ -134,42 +166,94 @@ impl<'a> GarmentGenerator<'a> {
         seed: u64,
         settings: &GarmentSettings,
     ) -> Result<Garment, GarmentError> {
-        settings.check()?;
-        let mut last = String::new();
-        for attempt in 0..settings.attempts {
-            match self.attempt(category, seed, attempt as u64, settings) {
-                Ok(rest) => {
-                    let holding = Garment::needs_holding(&rest, self.body);
-                    let source = Provenance {
-                        source: format!("generated for {} from seed {seed}", self.body.name),
-                        author: "ClothCombo-rs".to_string(),
-                        licence: "CC0-1.0".to_string(),
-                    };
-                    return Ok(Garment {
-                        name: format!("{category}_{seed:06}"),
-                        category,
-                        rest,
-                        holding,
-                        source,
-                    });
-                }
-                Err(reason) => last = reason,
-            }
-        }
-        Err(GarmentError::Exhausted { category, seed, attempts: settings.attempts, last })
+        Ok(self.generate_traced(category, seed, settings)?.garment)
     }
 
-    /// One design; the error says which check it failed.
-    pub(crate) fn attempt(
+    /// As [`Self::generate`], with the design and the rejected attempts.
+    ///
+    /// # Errors
+    /// As [`Self::generate`].
+    pub fn generate_traced(
         &self,
         category: Category,
+        seed: u64,
+        settings: &GarmentSettings,
+    ) -> Result<GeneratedGarment, GarmentError> {
+        settings.check()?;
+        let mut rejected = Vec::new();
+        for attempt in 0..settings.attempts as u64 {
+            let design = GarmentDesign::random(category, &mut stream(seed, category, attempt, 0));
+            match self.attempt(&design, seed, attempt, settings) {
+                Ok(rest) => {
+                    return Ok(GeneratedGarment {
+                        garment: self.garment(category, seed, settings, rest),
+                        design,
+                        rejected,
+                    });
+                }
+                Err(reason) => rejected.push(reason),
+            }
+        }
+        Err(exhausted(category, seed, rejected))
+    }
+
+    /// A garment of the given design, with the promises of [`Self::generate`]. The seed decides about the mesh; other
+    /// triangulations are tried where one misses a promise.
+    ///
+    /// # Errors
+    /// [`GarmentError::Setting`], and [`GarmentError::Exhausted`] for a design that does not work on this body.
+    pub fn make(
+        &self,
+        design: &GarmentDesign,
+        seed: u64,
+        settings: &GarmentSettings,
+    ) -> Result<Garment, GarmentError> {
+        settings.check()?;
+        let mut rejected = Vec::new();
+        for attempt in 0..settings.attempts as u64 {
+            match self.attempt(design, seed, attempt, settings) {
+                Ok(rest) => return Ok(self.garment(design.category(), seed, settings, rest)),
+                Err(reason) => rejected.push(reason),
+            }
+        }
+        Err(exhausted(design.category(), seed, rejected))
+    }
+
+    /// The name of the garment of a seed.
+    pub fn name(category: Category, seed: u64) -> String {
+        format!("{category}_{seed:06}")
+    }
+
+    /// Where the garment of a seed comes from: says which body, seed and settings make the same garment again.
+    pub fn provenance(&self, seed: u64, settings: &GarmentSettings) -> Provenance {
+        let (name, hash, vertices) = (&self.body.name, &self.body_hash, settings.target_vertices);
+        Provenance {
+            source: format!("generated for {name} ({hash}) from seed {seed}, about {vertices} vertices"),
+            author: "ClothCombo-rs".to_string(),
+            licence: "CC0-1.0".to_string(),
+        }
+    }
+
+    fn garment(&self, category: Category, seed: u64, settings: &GarmentSettings, rest: TriMesh) -> Garment {
+        Garment {
+            name: Self::name(category, seed),
+            category,
+            holding: Garment::needs_holding(&rest, self.body),
+            rest,
+            source: self.provenance(seed, settings),
+        }
+    }
+
+    /// One mesh of a design; the error says which check it failed.
+    fn attempt(
+        &self,
+        design: &GarmentDesign,
         seed: u64,
         attempt: u64,
         settings: &GarmentSettings,
     ) -> Result<TriMesh, String> {
-        // Streams keep categories and attempts of one seed independent of each other.
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        rng.set_stream(attempt * 16 + category as u64);
+        let category = design.category();
+        let mut rng = stream(seed, category, attempt, 1);
         let spread = settings.resolution_spread;
         let vertices = settings.target_vertices as f64 * (1.0 + spread * rng.random_range(-1.0..1.0));
         // A first guess of the edge length from a typical area; the real area is known after the cut.
@@ -180,7 +264,7 @@ impl<'a> GarmentGenerator<'a> {
             _ => 0.8,
         };
         let guess = edge_length(area, vertices);
-        let pattern = pattern::design(&self.fit, category, &mut rng, guess, settings.clearance);
+        let pattern = Pattern::new(&self.fit, design, guess, settings.clearance);
 
         let step = (0.6 * guess).clamp(0.008, 0.018);
         let mut low = pattern.bounds[0];
@@ -217,19 +301,34 @@ impl<'a> GarmentGenerator<'a> {
         remesh(&mut sheet, &target, 6, limits);
         let (positions, faces) = sheet.compact();
         let rest = TriMesh::new(positions, faces).map_err(|e| format!("is no mesh: {e}"))?;
-        let measured = GarmentQuality::measure(&rest, &self.fit.surface);
-        measured.check(&limits, pattern.openings)?;
+        self.quality(&rest).check(&limits, pattern.openings)?;
         Ok(rest)
     }
 
     /// Measures a mesh against the promises of the generator.
     pub fn quality(&self, rest: &TriMesh) -> GarmentQuality {
-        GarmentQuality::measure(rest, &self.fit.surface)
+        GarmentQuality::measure(rest, &self.fit.surface, &self.tree)
     }
 }
 
+/// Random numbers of one attempt; streams keep categories, attempts and purposes of one seed independent of each other.
+fn stream(seed: u64, category: Category, attempt: u64, purpose: u64) -> ChaCha8Rng {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    rng.set_stream((attempt * 2 + purpose) * 16 + category as u64);
+    rng
+}
+
+fn exhausted(category: Category, seed: u64, mut rejected: Vec<String>) -> GarmentError {
+    let attempts = rejected.len();
+    GarmentError::Exhausted { category, seed, attempts, last: rejected.pop().unwrap_or_default() }
+}
+
 impl GarmentSettings {
-    fn check(&self) -> Result<(), GarmentError> {
+    /// Whether every setting is in its range.
+    ///
+    /// # Errors
+    /// [`GarmentError::Setting`] names the first that is not.
+    pub fn check(&self) -> Result<(), GarmentError> {
         let fail = |setting, value: String, expected| Err(GarmentError::Setting { setting, value, expected });
         if !(200..=50_000).contains(&self.target_vertices) {
             return fail("target_vertices", self.target_vertices.to_string(), "200 to 50000");
@@ -314,6 +413,7 @@ fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::asset::BodyParts;
     use crate::generate::mannequin;
     use std::collections::HashSet;
 
@@ -332,7 +432,7 @@ mod tests {
             quality.edge_ratio
         );
         assert!(quality.least_gap >= 0.003, "{name}: {}", quality.least_gap);
-        assert_eq!(quality.intersecting_faces, 0, "{name}");
+        assert_eq!((quality.body_triangle_pairs, quality.self_triangle_pairs), (0, 0), "{name}");
         assert!(quality.outward > 0.6, "{name}: {}", quality.outward);
     }
 
@@ -413,6 +513,139 @@ mod tests {
                 assert!(left == 0 || left == hem.len());
             }
         }
+    }
+
+    /// The mannequin of another build on the skeleton of SMPL-X, fingers and face without skin of their own.
+    fn smplx_shaped() -> Body {
+        let mannequin = mannequin();
+        let shape: Vec<f64> =
+            (0..mannequin.shape_count).map(|k| if k % 2 == 0 { 1.2 } else { -0.8 }).collect();
+        let shaped = mannequin.shaped(&shape).unwrap();
+        let mut joints = shaped.joints;
+        let mut parents = mannequin.parents.clone();
+        for (joint, parent) in (22..25).map(|j| (j, 15)).chain((25..55).map(|j| (j, 20 + (j - 25) / 15))) {
+            parents.push(Some(parent));
+            joints.push(joints[parent]);
+            assert_eq!(joints.len(), joint + 1);
+        }
+        Body::new(BodyParts {
+            name: "smplx".into(),
+            faces: mannequin.faces.clone(),
+            template: shaped.positions,
+            shape_directions: Vec::new(),
+            shape_count: 0,
+            joint_template: joints,
+            joint_shape_directions: Vec::new(),
+            pose_directions: None,
+            skin_weights: mannequin.skin_weights.clone(),
+            parents,
+            joint_names: crate::asset::skeleton::joint_names(55),
+        })
+        .unwrap()
+    }
+
+    #[test]
+    fn garments_of_every_category_keep_the_promises_on_two_bodies() {
+        let settings = GarmentSettings { target_vertices: 500, ..GarmentSettings::default() };
+        for (body, count) in [(mannequin(), 18), (smplx_shaped(), 12)] {
+            let generator = GarmentGenerator::new(&body).unwrap();
+            let calls = std::sync::atomic::AtomicUsize::new(0);
+            let progress = || {
+                calls.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+            };
+            let survey = Survey::new(&generator, count, 300, &settings, &progress).unwrap();
+            assert!(survey.keeps_promises(), "{survey}");
+            assert_eq!((survey.asked(), survey.failure_rate()), (count, 0.0), "{survey}");
+            assert_eq!(calls.into_inner(), count);
+            assert!(survey.categories.iter().all(|c| c.asked == count / 6 && c.failed == 0));
+        }
+    }
+
+    #[test]
+    fn a_given_design_is_followed() {
+        let body = mannequin();
+        let generator = GarmentGenerator::new(&body).unwrap();
+        let settings = GarmentSettings { target_vertices: 900, ..GarmentSettings::default() };
+        let make = |design: &GarmentDesign| generator.make(design, 3, &settings).unwrap().rest;
+        let mut skirt = SkirtDesign {
+            rise: 0.5,
+            length: 1.4,
+            ease: 0.01,
+            hang: 0.8,
+            skirt: FlareDesign { flare: 0.2, pleats: None },
+            rim_tilt: 0.0,
+            hem_tilt: 0.0,
+        };
+        let plain = make(&GarmentDesign::Skirt(skirt.clone()));
+        let mark = generator.fit.landmarks;
+        let hem = mark.crotch + 0.4 * (mark.ankle - mark.crotch);
+        assert!((plain.bounds().0[1] - hem).abs() < 2e-3);
+        // Pleats swing the radius of the hem around; without them it changes slowly.
+        let turns = |rest: &TriMesh| {
+            let topology = clothcombo_physics::Topology::new(rest);
+            let curve = topology
+                .boundary_loops
+                .iter()
+                .find(|curve| curve.iter().all(|v| rest.positions()[*v as usize][1] < hem + 0.01))
+                .unwrap();
+            let radii: Vec<f64> = curve
+                .iter()
+                .map(|v| rest.positions()[*v as usize])
+                .map(|p| p[0].hypot(p[2] - generator.fit.column.centre(hem)[0]))
+                .collect();
+            let rises = |i: usize| radii[(i + 1) % radii.len()] > radii[i];
+            (0..radii.len()).filter(|i| rises(*i) != rises((i + 1) % radii.len())).count()
+        };
+        skirt.skirt.pleats = Some(PleatDesign { count: 10, depth: 0.2, formed: 0.3, phase: 0.0 });
+        let pleated = make(&GarmentDesign::Skirt(skirt.clone()));
+        assert!(turns(&pleated) >= 16 && turns(&plain) < 16, "{} {}", turns(&pleated), turns(&plain));
+        assert!(pleated.area() > 1.03 * plain.area());
+
+        // A cuff is narrower than the same sleeve left open; a placket opens the front below the neckline.
+        let upper = |cuff: f64, front: Front| {
+            GarmentDesign::Upper(UpperDesign {
+                category: Category::TShirt,
+                length: 0.6,
+                looseness: 0.6,
+                hang: 0.6,
+                skirt: FlareDesign { flare: 0.0, pleats: None },
+                hem_tilt: 0.0,
+                neckline: Neckline::Neck {
+                    width: 0.03,
+                    depth: 0.02,
+                    depth_back: 0.0,
+                    power: 2.0,
+                    armhole: 0.9,
+                    armhole_drop: 0.02,
+                },
+                sleeves: Some(SleeveDesign {
+                    length: 0.9,
+                    ease: 0.004,
+                    hang: 0.8,
+                    flare: 0.01,
+                    armhole: 0.0,
+                    tilt: 0.0,
+                    cuff,
+                }),
+                front,
+            })
+        };
+        let end = mark.shoulder[0] + 0.9 * (mark.wrist - mark.shoulder[0]);
+        let height_of_end = |rest: &TriMesh| {
+            let ends = rest.positions().iter().filter(|p| p[0] > end - 2e-3).map(|p| p[1]);
+            let (low, high) = ends.fold((f64::MAX, f64::MIN), |(l, h), y| (l.min(y), h.max(y)));
+            high - low
+        };
+        let (open, cuffed) = (
+            make(&upper(0.0, Front::Closed)),
+            make(&upper(1.0, Front::Placket { length: 0.15, half_width: 0.015 })),
+        );
+        assert!(height_of_end(&cuffed) < height_of_end(&open) - 0.015);
+        let in_front = |rest: &TriMesh| {
+            let chest = rest.positions().iter().filter(|p| p[2] > mark.neck[2] && p[1] > mark.armpit);
+            chest.map(|p| p[0].abs()).fold(f64::MAX, f64::min)
+        };
+        assert!(in_front(&open) < 0.013 && in_front(&cuffed) > 0.013);
     }
 
     #[test]

@@ -127,8 +127,12 @@ impl Tube {
 
     /// Radius at `s` in the direction of `(u, v)` from the centre.
     pub fn radius(&self, s: f64, u: f64, v: f64) -> f64 {
+        self.radius_at(s, v.atan2(u))
+    }
+
+    fn radius_at(&self, s: f64, angle: f64) -> f64 {
         let (k, t) = self.locate(s);
-        let turn = v.atan2(u) / std::f64::consts::TAU * DIRECTIONS as f64;
+        let turn = angle / std::f64::consts::TAU * DIRECTIONS as f64;
         let turn = if turn < 0.0 { turn + DIRECTIONS as f64 } else { turn };
         let i = turn as usize % DIRECTIONS;
         let j = (i + 1) % DIRECTIONS;
@@ -140,10 +144,18 @@ impl Tube {
 
     /// Distance-like value to the tube's side [m], negative inside; the ends are open.
     pub fn value(&self, p: [f64; 3]) -> f64 {
+        self.value_of_wider(p, |_, _, _| 0.0)
+    }
+
+    /// As [`Self::value`] for a tube whose radius at `(s, direction angle, own radius)` is larger by `extra`: for detail that the
+    /// stored directions are too few for.
+    pub fn value_of_wider(&self, p: [f64; 3], extra: impl Fn(f64, f64, f64) -> f64) -> f64 {
         let (s, u, v) = self.coordinates(p);
         let [cu, cv] = self.centre(s);
         let (du, dv) = (u - cu, v - cv);
-        du.hypot(dv) - self.radius(s, du, dv)
+        let angle = dv.atan2(du);
+        let radius = self.radius_at(s, angle);
+        du.hypot(dv) - radius - extra(s, angle, radius)
     }
 
     /// Replaces every radius by `outline(s, direction angle, radius)`.
@@ -152,6 +164,17 @@ impl Tube {
             let s = self.position(k);
             for i in 0..DIRECTIONS {
                 self.radii[k][i] = outline(s, angle(i), self.radii[k][i]);
+            }
+        }
+        self
+    }
+
+    /// Replaces every radius by `outline(s, radius, radius of other)`; `other` has the same slices.
+    pub fn map_with(mut self, other: &Self, outline: impl Fn(f64, f64, f64) -> f64) -> Self {
+        for k in 0..self.radii.len() {
+            let s = self.position(k);
+            for (radius, limb) in self.radii[k].iter_mut().zip(&other.radii[k]) {
+                *radius = outline(s, *radius, *limb);
             }
         }
         self

@@ -1,15 +1,22 @@
 //! Variations of recorded poses: a thin collection of motion becomes a dense one.
 
 use super::limits::{JOINT_LIMITS, other_side};
+use crate::asset::rotation::{
+    axis_angle_from_quaternion, quaternion_conjugate, quaternion_from_axis_angle, quaternion_product,
+};
 use crate::asset::{BODY_JOINT_COUNT, Pose};
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
 
-/// How poses are varied for training. The defaults gave the best results on held-out motion.
+/// How poses are varied for training. The defaults gave the best results on held-out motion; interpolation was not part of
+/// that comparison.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PoseAugmentation {
     /// Probability of mirroring left and right. Default 0.5.
     pub mirror: f64,
+    /// Probability of going a random part of the way to another pose, perhaps of another clip: fills the gaps between
+    /// recordings. Default 0.25.
+    pub interpolation: f64,
     /// Probability of taking the legs or the arms from another pose. Default 0.5.
     pub limb_swap: f64,
     /// Range of the factor on each joint's angle, the pelvis excepted. Default 0.7–1.15.
@@ -20,7 +27,7 @@ pub struct PoseAugmentation {
 
 impl Default for PoseAugmentation {
     fn default() -> Self {
-        Self { mirror: 0.5, limb_swap: 0.5, scale: [0.7, 1.15], noise_degrees: 3.5 }
+        Self { mirror: 0.5, interpolation: 0.25, limb_swap: 0.5, scale: [0.7, 1.15], noise_degrees: 3.5 }
     }
 }
 
@@ -30,19 +37,22 @@ const ARMS: [usize; 8] = [13, 14, 16, 17, 18, 19, 20, 21];
 impl PoseAugmentation {
     /// No change at all.
     pub fn none() -> Self {
-        Self { mirror: 0.0, limb_swap: 0.0, scale: [1.0, 1.0], noise_degrees: 0.0 }
+        Self { mirror: 0.0, interpolation: 0.0, limb_swap: 0.0, scale: [1.0, 1.0], noise_degrees: 0.0 }
     }
 
-    /// A variation of the body joints of `pose`, with limbs perhaps from `other`. Noise and scale carry no component beyond
+    /// A variation of the body joints of `pose`, perhaps on the way to `other` or with limbs from it. Noise and scale carry no component beyond
     /// its joint limit, or beyond the recorded value where the recording itself exceeds the limit. Joints past
     /// the 22 body joints are mirrored but otherwise kept.
     pub fn apply<R: Rng + ?Sized>(&self, pose: &Pose, other: &Pose, rng: &mut R) -> Pose {
         let mirrored =
             |pose: &Pose, draw: f64| if draw < self.mirror { pose.mirrored() } else { pose.clone() };
         // The number of draws does not depend on their outcome, so that streams stay aligned.
-        let draws: [f64; 4] = std::array::from_fn(|_| rng.random::<f64>());
+        let draws: [f64; 6] = std::array::from_fn(|_| rng.random::<f64>());
         let mut result = mirrored(pose, draws[0]);
         let other = mirrored(other, draws[1]);
+        if draws[4] < self.interpolation {
+            result = between(&result, &other, draws[5]);
+        }
         if draws[2] < self.limb_swap {
             let limbs = if draws[3] < 0.5 { LEGS } else { ARMS };
             for joint in limbs {
@@ -68,10 +78,32 @@ impl PoseAugmentation {
     }
 }
 
+/// The pose at `share` of the way from `a` to `b`. Joint vectors are mixed linearly, so that poses within the limits, which are
+/// boxes, stay within them; the root, which may face anywhere, turns the short way.
+fn between(a: &Pose, b: &Pose, share: f64) -> Pose {
+    let mut result = a.clone();
+    for (joint, rotation) in result.rotations.iter_mut().enumerate() {
+        let other = b.rotation(joint);
+        if joint == 0 {
+            let from = quaternion_from_axis_angle(*rotation);
+            let step = axis_angle_from_quaternion(quaternion_product(
+                quaternion_conjugate(from),
+                quaternion_from_axis_angle(other),
+            ));
+            let part = quaternion_from_axis_angle(step.map(|x| share * x));
+            *rotation = axis_angle_from_quaternion(quaternion_product(from, part));
+        } else {
+            *rotation = std::array::from_fn(|x| rotation[x] + share * (other[x] - rotation[x]));
+        }
+    }
+    result
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::{PoseSampler, is_within_limits};
     use super::*;
+    use crate::asset::rotation::matrix_from_axis_angle;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
@@ -105,6 +137,40 @@ mod tests {
         for j in 1..22 {
             assert!((0..3).all(|k| (scaled.rotations[j][k] - 0.7 * a.rotations[j][k]).abs() < 1e-12));
         }
+    }
+
+    #[test]
+    fn interpolation_runs_from_one_pose_to_the_other_within_the_limits() {
+        let sampler = PoseSampler { random_heading: true, ..PoseSampler::default() };
+        for seed in 0..40 {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let (a, b) = (sampler.sample(&mut rng), sampler.sample(&mut rng));
+            let close = |p: &Pose, q: &Pose| {
+                p.rotations.iter().zip(&q.rotations).all(|(p, q)| {
+                    let (p, q) = (matrix_from_axis_angle(*p), matrix_from_axis_angle(*q));
+                    p.as_flattened().iter().zip(q.as_flattened()).all(|(x, y)| (x - y).abs() < 1e-9)
+                })
+            };
+            assert!(close(&between(&a, &b, 0.0), &a) && close(&between(&a, &b, 1.0), &b));
+            let middle = between(&a, &b, 0.5);
+            assert!(close(&middle, &between(&b, &a, 0.5)));
+            assert!((1..22).all(|j| {
+                (0..3).all(|x| {
+                    (2.0 * middle.rotations[j][x] - a.rotations[j][x] - b.rotations[j][x]).abs() < 1e-12
+                })
+            }));
+            assert!(is_within_limits(&Pose { rotations: [&[[0.0; 3]], &middle.rotations[1..]].concat() }));
+            // The root is as far from both ends.
+            let angle = |p: &Pose| {
+                let ends = [p, &middle].map(|p| quaternion_from_axis_angle(p.rotations[0]));
+                quaternion_product(quaternion_conjugate(ends[0]), ends[1])[0].abs()
+            };
+            assert!((angle(&a) - angle(&b)).abs() < 1e-9);
+        }
+        let (a, b, mut rng) = poses(9);
+        let always = PoseAugmentation { interpolation: 1.0, ..PoseAugmentation::none() };
+        let varied = always.apply(&a, &b, &mut rng);
+        assert!(varied != a && varied != b);
     }
 
     #[test]

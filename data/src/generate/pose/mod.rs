@@ -3,7 +3,9 @@
 mod augmentation;
 mod limits;
 mod sampler;
+mod self_contact;
 
 pub use augmentation::PoseAugmentation;
 pub use limits::{JOINT_LIMITS, JointLimits, is_within_limits, limited};
 pub use sampler::PoseSampler;
+pub use self_contact::SelfContact;

@@ -186,3 +186,11 @@ fn inconsistent_scenes_are_refused() {
     let made = GarmentEnergies::<f32>::new(&line, &Topology::new(&line), &settings, false);
     assert!(matches!(made, Err(EnergyError::NoArea { .. })));
 }
+
+#[test]
+fn a_diverged_garment_shows_as_nan_and_does_not_panic() {
+    let mut scene = scene::<f32>(EnergySettings::default(), paper_weights(), 1);
+    scene.posed[5] = [f32::NAN, 0.0, 0.0];
+    scene.posed[9] = [f32::INFINITY, 0.0, 0.0];
+    assert!(scene.energy.evaluate(&scene.posed, &scene.canonical).total.is_nan());
+}

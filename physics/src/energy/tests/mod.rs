@@ -3,6 +3,5 @@
 mod brute_force;
 mod determinism;
 mod finite_differences;
-mod hard_cases;
 mod invariance;
 pub(crate) mod scenes;

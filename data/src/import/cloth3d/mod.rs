@@ -1,0 +1,387 @@
+//! CLOTH3D and CLOTH3D++ sample folders: garments on the zero body, poses as motions, and what was simulated.
+//!
+//! Bertiche et al., "CLOTH3D: Clothed 3D Humans", 2020. A folder holds `info.mat`, a rest mesh `<Garment>.obj` for every key of its
+//! `outfit`, and the simulated vertices `<Garment>.pc16`. The rest meshes stand in a z-up world, turned by `zrot`, on an SMPL body
+//! of the sample's gender and shape with its legs apart and its root joint at the origin; here they are brought to the zero
+//! body in T-pose.
+
+mod info;
+mod manifest;
+mod unpose;
+
+pub use info::{Gender, OutfitItem, SampleInfo};
+pub use unpose::{Unposing, upright};
+
+use super::amass::turn_root_to_y_up;
+use super::motions::{Clip, Input, MotionImportError, write_motions};
+use super::thinning::{Thinned, Thinning, thin};
+use super::{Progress, Summary};
+use crate::asset::{BindingSettings, Body, Category, Garment, Motion, Provenance};
+use crate::dataset::garment_folder::{FolderGarment, GarmentFolderError, save_garment_folder};
+use crate::fit::contact;
+use crate::format::{NpzError, NpzWriter, PointCache, obj};
+use clothcombo_physics::query::Surface;
+use manifest::{GarmentEntry, SampleEntry};
+use std::fs;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Why CLOTH3D samples cannot be imported at all. What is wrong with a single one stands in the summary.
+#[derive(Debug, Error)]
+pub enum Cloth3dError {
+    /// A folder cannot be read, or a file not be written.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// File or folder.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// No sample.
+    #[error("{}: no CLOTH3D sample; a sample folder holds info.mat", inputs.join(", "))]
+    NoSample {
+        /// The folders given.
+        inputs: Vec<String>,
+    },
+    /// No garment could be used.
+    #[error("no garment of {samples} samples could be used; the first, {first}: {reason}")]
+    NothingUsable {
+        /// How many samples there were.
+        samples: usize,
+        /// The first thing skipped.
+        first: String,
+        /// Its problem.
+        reason: String,
+    },
+    /// A gendered body is another mesh than the target.
+    #[error(
+        "body '{body}' is not the same mesh as body '{target}'; give the files of one model, for example three of SMPL's"
+    )]
+    Bodies {
+        /// The gendered body.
+        body: String,
+        /// The target.
+        target: String,
+    },
+    /// The garments cannot be written.
+    #[error(transparent)]
+    Folder(#[from] GarmentFolderError),
+    /// The motions cannot be written.
+    #[error(transparent)]
+    Motions(#[from] MotionImportError),
+    /// A sequence cannot be written.
+    #[error(transparent)]
+    Npz(#[from] NpzError),
+}
+
+/// The bodies involved: SMPL or SMPL-H, because the samples' shape numbers are SMPL's.
+#[derive(Clone, Copy, Debug)]
+pub struct Cloth3dBodies<'a> {
+    /// The body the garments are for; they end on its zero body.
+    pub target: &'a Body,
+    /// The body of female samples; the target, if there is none.
+    pub female: Option<&'a Body>,
+    /// The body of male samples; the target, if there is none.
+    pub male: Option<&'a Body>,
+}
+
+/// How samples are imported.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cloth3dSettings {
+    /// How garments are bound to the body for being unposed.
+    pub binding: BindingSettings,
+    /// Which frames of the motions are kept.
+    pub thinning: Thinning,
+    /// Convert the point caches as well.
+    pub caches: bool,
+}
+
+impl Default for Cloth3dSettings {
+    fn default() -> Self {
+        let thinning = Thinning { frame_rate: FRAME_RATE, static_threshold: 0.5f64.to_radians() };
+        Self { binding: BindingSettings::default(), thinning, caches: false }
+    }
+}
+
+/// Of the simulations [frames/s].
+const FRAME_RATE: f64 = 30.0;
+const LICENCE: &str = "CLOTH3D terms of use (non-commercial research)";
+const AUTHOR: &str = "Bertiche, Madadi, Escalera (CLOTH3D)";
+
+struct Sample {
+    name: String,
+    folder: PathBuf,
+}
+
+/// Imports samples to `out`: `garments/*.obj` with `garments.toml`, `motions/*.npz` with `motions.toml`, `cloth3d.toml` with what the
+/// samples say of themselves, and, if asked for, `sequences/*.npz`. `inputs` are sample folders, or folders of them.
+///
+/// # Errors
+/// [`Cloth3dError`] if there is no sample, none of its garments can be used, or a result cannot be written.
+pub fn import_cloth3d(
+    inputs: &[PathBuf],
+    bodies: &Cloth3dBodies<'_>,
+    out: &Path,
+    settings: &Cloth3dSettings,
+    progress: Progress<'_>,
+) -> Result<Summary, Cloth3dError> {
+    let target = bodies.target;
+    for body in bodies.female.iter().chain(&bodies.male) {
+        if body.vertex_count() != target.vertex_count() || body.faces != target.faces {
+            return Err(Cloth3dError::Bodies { body: body.name.clone(), target: target.name.clone() });
+        }
+    }
+    let samples = find_samples(inputs)?;
+    if samples.is_empty() {
+        let inputs = inputs.iter().map(|i| i.display().to_string()).collect();
+        return Err(Cloth3dError::NoSample { inputs });
+    }
+    let mut summary = Summary { notes: assumptions(bodies), ..Summary::default() };
+    let surface = Surface::new(target.template.clone(), target.faces.clone());
+    let (mut garments, mut entries) = (Vec::new(), Vec::new());
+    for (done, sample) in samples.iter().enumerate() {
+        progress("unposing garments", done, samples.len());
+        match import_sample(sample, bodies, &surface, out, settings, &mut garments, &mut summary)? {
+            Ok(entry) => entries.push(entry),
+            Err(reason) => summary.skipped.push((sample.folder.display().to_string(), reason)),
+        }
+    }
+    progress("unposing garments", samples.len(), samples.len());
+    if garments.is_empty() {
+        let (first, reason) = summary.skipped.first().cloned().unwrap_or_default();
+        return Err(Cloth3dError::NothingUsable { samples: samples.len(), first, reason });
+    }
+    summary.written.extend(save_garment_folder(&out.join("garments"), &garments)?);
+    let clips: Vec<Input> = (samples.iter())
+        .filter(|s| entries.iter().any(|e| e.name == s.name))
+        .map(|s| Input { path: s.folder.join("info.mat"), name: s.name.clone() })
+        .collect();
+    let import = |path: &Path| motion(path, settings);
+    let motions = write_motions(&clips, &out.join("motions"), "info.mat files", &import, progress)?;
+    summary.taken.extend(motions.taken.into_iter().map(|(name, note)| (format!("motion {name}"), note)));
+    summary.skipped.extend(motions.skipped);
+    summary.notes.extend(motions.notes);
+    summary.written.extend(motions.written);
+    let path = out.join("cloth3d.toml");
+    manifest::write(&path, entries).map_err(|source| Cloth3dError::Io { path: path.clone(), source })?;
+    summary.written.push(path);
+    Ok(summary)
+}
+
+/// What is taken for granted about the bodies, in words.
+fn assumptions(bodies: &Cloth3dBodies<'_>) -> Vec<String> {
+    let target = bodies.target;
+    let mut notes =
+        vec![format!("garments lie on the zero body '{}' in T-pose, pelvis at the origin", target.name)];
+    for (gender, body) in [("female", bodies.female), ("male", bodies.male)] {
+        notes.push(match body {
+            Some(body) => format!("{gender} samples were unposed with body '{}'", body.name),
+            None => format!(
+                "{gender} samples were unposed with the target body itself; --{gender} FILE with the SMPL model of that gender is \
+                 more exact"
+            ),
+        });
+    }
+    if !has_smpl_shape(target) {
+        notes.push(format!(
+            "the samples' shape numbers are SMPL's and mean nothing to body '{}' ({} joints): they were not applied, so garments \
+             may stand off or cut in by centimetres",
+            target.name,
+            target.joint_count()
+        ));
+    }
+    notes
+}
+
+/// SMPL and SMPL-H share their shape space.
+fn has_smpl_shape(body: &Body) -> bool {
+    matches!(body.joint_count(), 24 | 52)
+}
+
+fn find_samples(inputs: &[PathBuf]) -> Result<Vec<Sample>, Cloth3dError> {
+    let mut folders = Vec::new();
+    for input in inputs {
+        if input.join("info.mat").is_file() {
+            folders.push(input.clone());
+            continue;
+        }
+        let failed = |source| Cloth3dError::Io { path: input.clone(), source };
+        let mut below = Vec::new();
+        for entry in fs::read_dir(input).map_err(failed)? {
+            let folder = entry.map_err(failed)?.path();
+            if folder.join("info.mat").is_file() {
+                below.push(folder);
+            }
+        }
+        below.sort();
+        folders.extend(below);
+    }
+    let named = super::motions::named(folders.into_iter().map(|folder| {
+        let full = fs::canonicalize(&folder).unwrap_or_else(|_| folder.clone());
+        let name = full.file_name().map_or_else(|| "sample".into(), |n| n.to_string_lossy().into_owned());
+        (folder, name)
+    }));
+    Ok(named.into_iter().map(|Input { path, name }| Sample { name, folder: path }).collect())
+}
+
+/// The garments of one sample; the inner error is the reason to skip it as a whole.
+fn import_sample(
+    sample: &Sample,
+    bodies: &Cloth3dBodies<'_>,
+    surface: &Surface<f64>,
+    out: &Path,
+    settings: &Cloth3dSettings,
+    garments: &mut Vec<FolderGarment>,
+    summary: &mut Summary,
+) -> Result<Result<SampleEntry, String>, Cloth3dError> {
+    let info = match SampleInfo::load(&sample.folder.join("info.mat")) {
+        Ok(info) => info,
+        Err(reason) => return Ok(Err(reason)),
+    };
+    let of_gender = match info.gender {
+        Gender::Female => bodies.female,
+        Gender::Male => bodies.male,
+    };
+    let body = of_gender.unwrap_or(bodies.target);
+    let known = if has_smpl_shape(body) { info.shape.len().min(body.shape_count) } else { 0 };
+    let unposing = match Unposing::new(body, &info.shape[..known], bodies.target) {
+        Ok(unposing) => unposing,
+        Err(reason) => return Ok(Err(reason)),
+    };
+    let mut entry = SampleEntry::new(&sample.name, &info);
+    for item in &info.outfit {
+        let mesh_path = sample.folder.join(format!("{}.obj", item.name));
+        match unposed_garment(sample, &info, item, &mesh_path, &unposing, bodies.target, settings) {
+            Ok(garment) => {
+                let inside = contact(garment.rest.positions(), surface).inside;
+                summary.taken.push((garment.name.clone(), about(&garment, item, inside)));
+                let (frames, sequence) = if settings.caches {
+                    convert_cache(sample, item, &garment, out, summary)?
+                } else {
+                    (None, None)
+                };
+                entry.garment.push(GarmentEntry {
+                    name: item.name.clone(),
+                    file: format!("garments/{}.obj", garment.name),
+                    category: garment.category,
+                    fabric: item.fabric.clone(),
+                    simulated_frames: frames,
+                    sequence,
+                });
+                let path = PathBuf::from(format!("{}.obj", garment.name));
+                garments.push(FolderGarment { garment, layer: None, path });
+            }
+            Err(reason) => summary.skipped.push((mesh_path.display().to_string(), reason)),
+        }
+    }
+    Ok(Ok(entry))
+}
+
+fn about(garment: &Garment, item: &OutfitItem, inside: usize) -> String {
+    let fabric = if item.fabric.is_empty() { "fabric not stated" } else { &item.fabric };
+    format!(
+        "{}, {} vertices, {} triangles, {fabric}, {inside} vertices inside the body",
+        garment.category,
+        garment.rest.vertex_count(),
+        garment.rest.face_count()
+    )
+}
+
+fn unposed_garment(
+    sample: &Sample,
+    info: &SampleInfo,
+    item: &OutfitItem,
+    path: &Path,
+    unposing: &Unposing,
+    target: &Body,
+    settings: &Cloth3dSettings,
+) -> Result<Garment, String> {
+    let mesh = obj::load(path).map_err(|e| e.to_string())?;
+    let mut positions = mesh.positions().to_vec();
+    upright(&mut positions, info.zrot);
+    let mesh = mesh.with_positions(positions).map_err(|e| e.to_string())?;
+    let category = category(&item.name).unwrap_or_else(|| Category::guess(&mesh, target));
+    let positions = unposing.apply(&mesh, category, &settings.binding)?;
+    let rest = mesh.with_positions(positions).map_err(|e| e.to_string())?;
+    // Shirts that open in front have no name of their own.
+    let category = match category {
+        Category::Top | Category::TShirt if Category::guess(&rest, target) == Category::OpenShirt => {
+            Category::OpenShirt
+        }
+        known => known,
+    };
+    Ok(Garment {
+        name: format!("{}_{}", sample.name, item.name),
+        category,
+        holding: Garment::needs_holding(&rest, target),
+        rest,
+        source: provenance(&format!("{}, {}", sample.name, item.name)),
+    })
+}
+
+fn category(name: &str) -> Option<Category> {
+    Some(match name.to_ascii_lowercase().as_str() {
+        "top" => Category::Top,
+        "tshirt" | "t-shirt" | "t_shirt" => Category::TShirt,
+        "openshirt" | "open_shirt" => Category::OpenShirt,
+        "trousers" | "jumpsuit" => Category::Trousers,
+        "skirt" => Category::Skirt,
+        "dress" => Category::Dress,
+        _ => return None,
+    })
+}
+
+fn provenance(what: &str) -> Provenance {
+    Provenance { source: format!("CLOTH3D sample {what}"), author: AUTHOR.into(), licence: LICENCE.into() }
+}
+
+/// Converts one point cache: number of frames, and the file written. A cache that cannot be used is skipped; the garment is not.
+fn convert_cache(
+    sample: &Sample,
+    item: &OutfitItem,
+    garment: &Garment,
+    out: &Path,
+    summary: &mut Summary,
+) -> Result<(Option<usize>, Option<String>), Cloth3dError> {
+    let path = sample.folder.join(format!("{}.pc16", item.name));
+    let mut skip = |reason: String| summary.skipped.push((path.display().to_string(), reason));
+    let cache = match PointCache::load(&path) {
+        Ok(cache) => cache,
+        Err(e) => {
+            skip(e.to_string());
+            return Ok((None, None));
+        }
+    };
+    let vertices = garment.rest.vertex_count();
+    if cache.point_count != vertices {
+        skip(format!("{} points, but the garment has {vertices} vertices", cache.point_count));
+        return Ok((None, None));
+    }
+    // z up to y up; exact.
+    let positions: Vec<f32> = cache.positions.iter().flat_map(|[x, y, z]| [*x, *z, -*y]).collect();
+    let file = format!("sequences/{}.npz", garment.name);
+    let mut npz = NpzWriter::new();
+    npz.f32("positions", &[cache.frame_count(), vertices, 3], &positions)
+        .u32("f", &[garment.rest.face_count(), 3], garment.rest.faces().as_flattened())
+        .f64("frame_rate", &[], &[FRAME_RATE])
+        .strings("source", &[], &[&garment.source.source])
+        .strings("author", &[], &[&garment.source.author])
+        .strings("licence", &[], &[&garment.source.licence]);
+    npz.save(&out.join(&file))?;
+    summary.written.push(out.join(&file));
+    Ok((Some(cache.frame_count()), Some(file)))
+}
+
+/// The poses of a sample as a motion.
+fn motion(info_mat: &Path, settings: &Cloth3dSettings) -> Result<Clip, String> {
+    let info = SampleInfo::load(info_mat)?;
+    let mut poses = info.poses;
+    let count = poses.len();
+    poses.iter_mut().for_each(turn_root_to_y_up);
+    let Thinned { poses, frame_rate, step, static_frames } = thin(poses, FRAME_RATE, &settings.thinning);
+    let note = format!("{} of {count} frames (every {step}., {static_frames} static)", poses.len());
+    let folder = info_mat.parent().and_then(Path::file_name).map(|f| f.to_string_lossy().into_owned());
+    let source = provenance(&folder.unwrap_or_default());
+    let motion = Motion { name: String::new(), frame_rate, poses, source };
+    Ok(Clip { motion, subject: info.gender.name().into(), note })
+}

@@ -1,0 +1,262 @@
+//! DeepMimic motion text (`humanoid3d_*.txt`), retargeted to the 22 SMPL body joints.
+//!
+//! Peng et al., "DeepMimic", 2018. JSON with `Frames`, rows of 44: duration [s], root position, root rotation, then the joints of
+//! `ROW` relative to their parents: quaternions `w x y z`, and angles about z for knees and elbows. The character stands in y
+//! up, faces +x with its left towards −z, and rests with hanging arms.
+
+use super::motions::{Clip, MotionImportError, named, require_body_joints, stem, write_motions};
+use super::retarget::{JointMap, Retarget};
+use super::thinning::{Thinned, Thinning, thin};
+use super::{Progress, Summary};
+use crate::asset::rotation::{Matrix3, axis_angle_from_quaternion, matrix_from_axis_angle, product};
+use crate::asset::{Body, Motion, Provenance};
+use serde::Deserialize;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// How DeepMimic motions are imported.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DeepMimicSettings {
+    /// Which frames are kept.
+    pub thinning: Thinning,
+    /// Where the clips come from; the text itself does not say.
+    pub provenance: Provenance,
+}
+
+impl Default for DeepMimicSettings {
+    fn default() -> Self {
+        let provenance = Provenance { source: "DeepMimic motion text".into(), ..Provenance::default() };
+        Self { thinning: Thinning { frame_rate: 60.0, static_threshold: 0.0 }, provenance }
+    }
+}
+
+const COLUMNS: usize = 44;
+/// Column of the root's rotation.
+const ROOT: usize = 4;
+const EXPECTED: &str = "DeepMimic motions";
+
+/// Joints after the root: first column, whether it is an angle about z instead of a quaternion, and the parent
+/// (0 the root, n the n-th joint of this table).
+const ROW: [(usize, bool, usize); 12] = [
+    (8, false, 0),  // 1 chest
+    (12, false, 1), // 2 neck
+    (16, false, 0), // 3 right hip
+    (20, true, 3),  // 4 right knee
+    (21, false, 4), // 5 right ankle
+    (25, false, 1), // 6 right shoulder
+    (29, true, 6),  // 7 right elbow
+    (30, false, 0), // 8 left hip
+    (34, true, 8),  // 9 left knee
+    (35, false, 9), // 10 left ankle
+    (39, false, 1), // 11 left shoulder
+    (43, true, 11), // 12 left elbow
+];
+
+/// Joints that follow others: the lower spine (a third and two thirds of the chest's bend, which one joint of the character
+/// stands for), and half of the neck's.
+const SPINE: [usize; 2] = [13, 14];
+const NECK: usize = 15;
+/// Wrists do not turn against the forearm; they are needed for its direction.
+const WRISTS: [usize; 2] = [16, 17];
+const JOINTS: usize = 18;
+
+/// The character's joints at rest [m], in its own frame; only the limbs' directions matter.
+fn rest_positions() -> [[f64; 3]; JOINTS] {
+    const SHOULDER: [f64; 3] = [-0.024, 0.4797, 0.1831];
+    let mut rest = [[0.0; 3]; JOINTS];
+    rest[1] = [0.0, 0.2362, 0.0];
+    rest[2] = [0.0, 0.4601, 0.0];
+    for (side, hip, shoulder, wrist) in [(1.0, 3, 6, WRISTS[1]), (-1.0, 8, 11, WRISTS[0])] {
+        rest[hip] = [0.0, 0.0, side * 0.0849];
+        rest[hip + 1] = [0.0, -0.4215, side * 0.0849];
+        rest[hip + 2] = [0.0, -0.8314, side * 0.0849];
+        rest[shoulder] = [SHOULDER[0], SHOULDER[1], side * SHOULDER[2]];
+        rest[shoulder + 1] = [SHOULDER[0], SHOULDER[1] - 0.2748, side * SHOULDER[2]];
+        rest[wrist] = [SHOULDER[0], SHOULDER[1] - 0.5337, side * SHOULDER[2]];
+    }
+    rest
+}
+
+#[rustfmt::skip]
+const MAP: JointMap = [
+    Some(0), Some(8), Some(3), Some(SPINE[0]), Some(9), Some(4), Some(SPINE[1]), Some(10), Some(5), Some(1),
+    None, None, Some(NECK), None, None, Some(2), Some(11), Some(6), Some(12), Some(7), Some(WRISTS[0]), Some(WRISTS[1]),
+];
+
+/// World rotations of all joints in one row.
+fn world_rotations(row: &[f64]) -> [Matrix3; JOINTS] {
+    let turn = |column: usize| -> [f64; 3] {
+        axis_angle_from_quaternion([row[column], row[column + 1], row[column + 2], row[column + 3]])
+    };
+    let root = matrix_from_axis_angle(turn(ROOT));
+    let mut world = [root; JOINTS];
+    for (i, (column, hinge, parent)) in ROW.into_iter().enumerate() {
+        let local = if hinge { [0.0, 0.0, row[column]] } else { turn(column) };
+        world[i + 1] = product(&world[parent], &matrix_from_axis_angle(local));
+    }
+    let share = |column: usize, part: f64| matrix_from_axis_angle(turn(column).map(|x| x * part));
+    for (n, joint) in SPINE.into_iter().enumerate() {
+        world[joint] = product(&root, &share(ROW[0].0, (n + 1) as f64 / 3.0));
+    }
+    world[NECK] = product(&world[1], &share(ROW[1].0, 0.5));
+    world[WRISTS[0]] = world[12];
+    world[WRISTS[1]] = world[7];
+    world
+}
+
+#[derive(Deserialize)]
+struct Text {
+    #[serde(rename = "Frames")]
+    frames: Vec<Vec<f64>>,
+}
+
+/// The rows of a motion text, checked.
+fn parse(text: &str) -> Result<Vec<Vec<f64>>, String> {
+    let Text { frames } =
+        serde_json::from_str(text).map_err(|e| format!("not a DeepMimic motion (JSON with Frames): {e}"))?;
+    for (number, row) in frames.iter().enumerate() {
+        if row.len() != COLUMNS {
+            return Err(format!("frame {number} has {} numbers; a humanoid's row has {COLUMNS}", row.len()));
+        }
+        if let Some(column) = row.iter().position(|x| !x.is_finite()) {
+            return Err(format!("frame {number}, number {column} is not finite"));
+        }
+        let quaternions = ROW.iter().filter(|(_, hinge, _)| !hinge).map(|(column, _, _)| *column);
+        for column in quaternions.chain([ROOT]) {
+            let length = row[column..column + 4].iter().map(|x| x * x).sum::<f64>().sqrt();
+            if (length - 1.0).abs() > 0.05 {
+                return Err(format!(
+                    "frame {number}: numbers {column} to {} are no unit quaternion",
+                    column + 3
+                ));
+            }
+        }
+    }
+    if frames.is_empty() {
+        return Err("it has no frames".into());
+    }
+    Ok(frames)
+}
+
+/// Frames per second: the median duration counts, because the last frame's is often zero.
+fn frame_rate(frames: &[Vec<f64>]) -> Result<f64, String> {
+    let mut durations: Vec<f64> = frames.iter().map(|row| row[0]).filter(|d| *d > 0.0).collect();
+    durations.sort_by(f64::total_cmp);
+    match durations.get(durations.len() / 2) {
+        Some(d) if *d < 10.0 => Ok(1.0 / d),
+        _ => Err("no frame has a duration between 0 and 10 s".into()),
+    }
+}
+
+/// Imports DeepMimic motion texts as motion npz files in the folder `out`, retargeted to `body`. Files that cannot be used are
+/// skipped with their reason.
+///
+/// # Errors
+/// If no file can be used, or a result cannot be written.
+pub fn import_deepmimic(
+    files: &[PathBuf],
+    body: &Body,
+    out: &Path,
+    settings: &DeepMimicSettings,
+    progress: Progress<'_>,
+) -> Result<Summary, MotionImportError> {
+    if files.is_empty() {
+        return Err(MotionImportError::NoInput { where_: String::new(), expected: EXPECTED });
+    }
+    require_body_joints(body)?;
+    let retarget = Retarget::new(MAP, &rest_positions(), &body.joint_template);
+    let inputs = named(files.iter().map(|f| (f.clone(), stem(f))));
+    let import = |file: &Path| -> Result<Clip, String> {
+        let bytes = fs::read(file).map_err(|e| e.to_string())?;
+        let frames = parse(&String::from_utf8_lossy(&bytes))?;
+        let rate = frame_rate(&frames)?;
+        let poses = frames.iter().map(|row| retarget.pose(&world_rotations(row))).collect();
+        let Thinned { poses, frame_rate, step, static_frames } = thin(poses, rate, &settings.thinning);
+        let note = format!(
+            "DeepMimic humanoid, {} of {} frames at {rate:.1} frames/s (every {step}., {static_frames} static)",
+            poses.len(),
+            frames.len()
+        );
+        let mut source = settings.provenance.clone();
+        source.source = format!("{} ({})", source.source, stem(file));
+        let motion = Motion { name: String::new(), frame_rate, poses, source };
+        Ok(Clip { motion, subject: String::new(), note })
+    };
+    write_motions(&inputs, out, EXPECTED, &import, progress)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::asset::Pose;
+    use crate::generate::mannequin;
+
+    fn rest_row() -> Vec<f64> {
+        let mut row = vec![0.0; COLUMNS];
+        row[0] = 1.0 / 30.0;
+        row[ROOT] = 1.0;
+        ROW.iter().filter(|(_, hinge, _)| !hinge).for_each(|(column, _, _)| row[*column] = 1.0);
+        row
+    }
+
+    /// Joints of the mannequin in the pose of a row, seen by someone facing as the character does: (forward, up, left).
+    fn joints(row: &[f64]) -> Vec<[f64; 3]> {
+        let body = mannequin();
+        let retarget = Retarget::new(MAP, &rest_positions(), &body.joint_template);
+        let pose: Pose = retarget.pose(&world_rotations(row));
+        body.posed(&[], &pose).unwrap().joints.iter().map(|p| [p[0], p[1], -p[2]]).collect()
+    }
+
+    #[test]
+    fn at_rest_the_body_stands_facing_plus_x_with_hanging_arms() {
+        let j = joints(&rest_row());
+        assert!(j[7][1] < -0.5 && j[15][1] > 0.3, "feet {:?} head {:?}", j[7], j[15]);
+        // Left is left, toes point forward.
+        assert!(j[1][2] > 0.02 && j[2][2] < -0.02 && j[16][2] > 0.1);
+        assert!(j[10][0] > j[7][0] + 0.05);
+        for (shoulder, wrist) in [(16, 20), (17, 21)] {
+            let arm: [f64; 3] = std::array::from_fn(|a| j[wrist][a] - j[shoulder][a]);
+            assert!(arm[1] < -0.3 && arm[0].abs() < 0.02 && arm[2].abs() < 0.02, "{arm:?}");
+        }
+    }
+
+    #[test]
+    fn knees_bend_backwards_elbows_forwards_and_the_chest_over_three_joints() {
+        let mut row = rest_row();
+        (row[20], row[34]) = (-1.2, -0.8);
+        (row[29], row[43]) = (1.0, 0.5);
+        let j = joints(&row);
+        // The heel goes back, each by its own angle.
+        assert!(j[8][0] - j[5][0] < -0.25 && j[7][0] - j[4][0] < -0.15 && j[8][0] < j[7][0]);
+        // The hand comes forward.
+        assert!(j[21][0] - j[19][0] > 0.15 && j[20][0] - j[18][0] > 0.05);
+
+        let mut row = rest_row();
+        // A bow: about +z is backwards for who faces +x, so a negative angle.
+        let half: f64 = -0.45;
+        (row[8], row[11]) = (half.cos(), half.sin());
+        let body = mannequin();
+        let pose = Retarget::new(MAP, &rest_positions(), &body.joint_template).pose(&world_rotations(&row));
+        for joint in [3, 6, 9] {
+            let r = pose.rotations[joint];
+            assert!((r[0] - 0.3).abs() < 1e-9 && r[1].abs() < 1e-9 && r[2].abs() < 1e-9, "{joint}: {r:?}");
+        }
+        assert!(joints(&row)[15][0] > 0.2);
+    }
+
+    #[test]
+    fn what_is_not_a_humanoid_motion_is_refused_with_the_frame() {
+        let text = |row: &[f64]| format!("{{\"Loop\": \"wrap\", \"Frames\": [{:?}, {:?}]}}", rest_row(), row);
+        assert_eq!(parse(&text(&rest_row())).unwrap().len(), 2);
+        assert!(parse(&text(&[0.0; 20])).unwrap_err().contains("frame 1 has 20 numbers"));
+        let mut row = rest_row();
+        row[13] = 0.7;
+        assert!(parse(&text(&row)).unwrap_err().contains("frame 1: numbers 12 to 15"));
+        assert!(parse("{\"Frames\": []}").unwrap_err().contains("no frames"));
+        for bad in ["", "[1, 2]", "{\"Frames\": [[1, \"x\"]]}", &text(&rest_row())[..200]] {
+            assert!(parse(bad).unwrap_err().contains("line 1"), "{bad}");
+        }
+        assert!(frame_rate(&[vec![0.0]]).is_err());
+        assert!((frame_rate(&[vec![0.05], vec![0.05], vec![0.0]]).unwrap() - 20.0).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,176 @@
+//! How large the gradient of each term can be at a vertex, whatever the shape: the promise behind "bounded".
+//!
+//! Every bound is a closed formula in the size of the scene and the constants of the regularisation, derived from the
+//! triangle inequality; none divides by a deformed length, area or distance, so that no degenerate shape can make it infinite.
+//! They are worst cases and often loose. `ℓ` is the longest deformed edge around the vertex, `D` the largest distance of
+//! a vertex from what it is measured against.
+//!
+//! | term | bound on `|∂E/∂x_v|` | why |
+//! |---|---|---|
+//! | strain | `Σ_T 2V·S·(λ√2 + 2μ)·(S² + M)·√3/h` | `‖P‖ ≤ ‖F‖·‖S‖`, with `‖F‖ ≤ S = √6·ℓ/h`, and `h` the height of the rest triangle, which the regularisation keeps above 1e-2 of its longest edge; `M` is the norm of the rest metric |
+//! | bending | `Σ_H 20·k·ℓ/τ` | `|∂α/∂c|·φ ≤ ℓ/2τ` and `|∂φ/∂c| ≤ 0.65·ℓ/τ` for `φ = s²/(s² + τ²)`, `α ≤ π`; the ends of the edge carry up to four times that |
+//! | gravity | `m_v·g` | it is that everywhere |
+//! | body collision | `3(ε + D)²` | unit normals, `d ≥ −D` |
+//! | repulsion | `2(N − 1)·factor/δ` | a pair pulls with at most `2/δ`; over `N` vertices the default is below `2/δ` for any garment |
+//! | holding | `2·max|y − y_ref|` | a parabola |
+//! | layer collision | `3M(ε + D)²·(1 + 3·n·ℓ·D/τ)` | `M` outer vertices at most share an inner one, whose normal turns by at most `ℓ/τ` per face |
+//! | layer distance | `3M(r + D)²` | `d_inner < r`, `d_outer ≥ −D`, `M` vertices at most per bucket |
+
+use super::bending;
+use super::strain::NEEDLE_RATIO;
+use super::{EnergySettings, SceneEnergy, Term, layer_collision, repulsion};
+use crate::mesh::{Topology, TriMesh};
+use crate::real::Real;
+use crate::vec3::{distance_squared, norm, sub, to_f64};
+
+/// Room for rounding in `f32`.
+const ROUNDING: f64 = 1.001;
+
+/// A bound on every entry of the gradient of `term` (weight 1) in `scene`, whose garments have the rest shapes `rest`, at
+/// `posed` and `canonical` (`[ΣV, 3]` [m]); see the module for the formulas. NaN if a position is not finite.
+///
+/// # Panics
+/// If `rest` has not one mesh per garment, or the positions are not those of the scene.
+pub fn gradient_bound<T: Real>(
+    scene: &SceneEnergy<T>,
+    rest: &[&TriMesh],
+    term: Term,
+    posed: &[[T; 3]],
+    canonical: &[[T; 3]],
+) -> f64 {
+    assert_eq!(rest.len(), scene.garments.len(), "one rest mesh per garment");
+    let mut garments = Vec::with_capacity(rest.len());
+    let mut start = 0;
+    for (mesh, garment) in rest.iter().zip(&scene.garments) {
+        let range = start..start + mesh.vertex_count();
+        start = range.end;
+        garments.push(Deformed {
+            rest: mesh,
+            median_edge: mesh.median_edge_length(),
+            posed: posed[range.clone()].iter().map(|p| to_f64(*p)).collect(),
+            canonical: canonical[range].iter().map(|p| to_f64(*p)).collect(),
+            reference: garment.holding_reference.iter().map(|p| to_f64(*p)).collect(),
+        });
+    }
+    let settings = &scene.settings;
+    let of_garments = |bound: &dyn Fn(&Deformed<'_>) -> f64| garments.iter().map(bound).fold(0.0, f64::max);
+    let to_body = |g: &Deformed<'_>| {
+        let distance = |p: &[f64; 3]| {
+            let p = crate::vec3::from_f64::<T>(*p);
+            let nearest = scene.body.positions.get(scene.body.nearest_vertex(p) as usize);
+            nearest.map_or(0.0, |q| distance_squared(to_f64(p), to_f64(*q)).sqrt())
+        };
+        g.posed.iter().map(distance).fold(0.0, f64::max)
+    };
+    // A garment may be the inner one of some pairs and the outer one of others: their gradients add up.
+    let over_pairs = |bound: &dyn Fn(&Deformed<'_>, &Deformed<'_>) -> f64| {
+        scene.layers.iter().map(|pair| bound(&garments[pair.inner], &garments[pair.outer])).sum::<f64>()
+    };
+    let bound = match term {
+        Term::Strain => of_garments(&|g| g.strain(settings)),
+        Term::Bending => of_garments(&|g| g.bending(settings)),
+        Term::Gravity => of_garments(&|g| g.gravity(settings)),
+        Term::BodyCollision => of_garments(&|g| 3.0 * (settings.body_collision_epsilon + to_body(g)).powi(2)),
+        Term::Repulsion => of_garments(&|g| {
+            let count = g.rest.vertex_count() as f64;
+            let factor = if settings.repulsion_normalised { 1.0 / count } else { 1.0 };
+            2.0 * (count - 1.0) * factor / repulsion::CONTACT_DISTANCE
+        }),
+        Term::Holding => of_garments(&|g| g.holding()),
+        Term::LayerCollision => over_pairs(&|inner, outer| inner.layer_collision(outer, settings)),
+        Term::LayerDistance => {
+            let depths: Vec<f64> = garments.iter().map(to_body).collect();
+            let deepest = depths.iter().fold(0.0, |m: f64, d| m.max(*d));
+            let reach = settings.layer_distance_radius + deepest;
+            over_pairs(&|inner, outer| 3.0 * inner.posed.len().max(outer.posed.len()) as f64 * reach * reach)
+        }
+    };
+    ROUNDING * bound
+}
+
+/// A garment at rest and deformed.
+struct Deformed<'a> {
+    rest: &'a TriMesh,
+    median_edge: f64,
+    posed: Vec<[f64; 3]>,
+    canonical: Vec<[f64; 3]>,
+    reference: Vec<[f64; 3]>,
+}
+
+impl Deformed<'_> {
+    fn distance(&self, a: u32, b: u32) -> f64 {
+        norm(sub(self.posed[a as usize], self.posed[b as usize]))
+    }
+
+    /// Longest deformed edge of a face.
+    fn longest(&self, face: u32) -> f64 {
+        let [a, b, c] = self.rest.faces()[face as usize];
+        self.distance(a, b).max(self.distance(b, c)).max(self.distance(c, a))
+    }
+
+    /// The largest sum over the elements at one vertex.
+    fn largest_sum<const N: usize>(&self, elements: impl Iterator<Item = ([u32; N], f64)>) -> f64 {
+        let mut sums = vec![0.0; self.rest.vertex_count()];
+        for (vertices, bound) in elements {
+            vertices.iter().for_each(|v| sums[*v as usize] += bound);
+        }
+        sums.into_iter().fold(0.0, f64::max)
+    }
+
+    fn strain(&self, settings: &EnergySettings) -> f64 {
+        let material = &settings.material;
+        let stiffness = material.lambda * 2f64.sqrt() + 2.0 * material.mu;
+        let faces = self.rest.faces().iter().enumerate().map(|(f, face)| {
+            let [a, b, c] = self.rest.corners(f);
+            let length = norm(sub(b, a)).max(norm(sub(c, b))).max(norm(sub(a, c)));
+            let area = self.rest.face_area(f);
+            let regular = length.max(NEEDLE_RATIO * self.median_edge);
+            let true_height = if length > 0.0 { 2.0 * area / length } else { 0.0 };
+            let height = true_height.max(NEEDLE_RATIO * regular);
+            let stretch = 6f64.sqrt() * self.longest(f as u32) / height;
+            let metric = 6f64.sqrt() * length / height;
+            let strain = stretch * stretch + metric * metric + 2.0;
+            let volume = area * material.thickness;
+            (*face, 2.0 * volume * stretch * stiffness * strain * 3f64.sqrt() / height)
+        });
+        self.largest_sum(faces)
+    }
+
+    fn bending(&self, settings: &EnergySettings) -> f64 {
+        let floor = bending::COLLAPSE_FLOOR * self.median_edge * self.median_edge;
+        let collapse = |f: u32| (bending::COLLAPSE_RATIO * 2.0 * self.rest.face_area(f as usize)).max(floor);
+        let topology = Topology::new(self.rest);
+        let hinges = topology.hinges.iter().map(|h| {
+            let length = self.longest(h.faces[0]).max(self.longest(h.faces[1]));
+            let collapse = collapse(h.faces[0]).min(collapse(h.faces[1]));
+            let bound = 20.0 * settings.material.bending_stiffness * length / collapse;
+            ([h.edge[0], h.edge[1], h.opposite[0], h.opposite[1]], bound)
+        });
+        self.largest_sum(hinges)
+    }
+
+    fn gravity(&self, settings: &EnergySettings) -> f64 {
+        let weight = settings.material.thickness * settings.material.density * settings.gravity_acceleration;
+        let faces = self.rest.faces().iter().enumerate();
+        self.largest_sum(faces.map(|(f, face)| (*face, self.rest.face_area(f) * weight / 3.0)))
+    }
+
+    fn holding(&self) -> f64 {
+        let raised = self.canonical.iter().zip(&self.reference).map(|(p, q)| (p[1] - q[1]).abs());
+        2.0 * raised.fold(0.0, f64::max)
+    }
+
+    /// As the inner garment under `outer`.
+    fn layer_collision(&self, outer: &Self, settings: &EnergySettings) -> f64 {
+        let aside = |gate: super::LayerGate| (gate.tangential_edges * self.median_edge).hypot(gate.depth);
+        let index = crate::query::VertexIndex::new(&self.posed);
+        let distance = |p: &[f64; 3]| norm(sub(*p, self.posed[index.nearest(*p).0 as usize]));
+        let farthest = outer.posed.iter().map(distance).fold(0.0, f64::max);
+        let reach = settings.layer_gate.map_or(farthest, |gate| farthest.min(aside(gate)));
+        let floor = layer_collision::COLLAPSE_FLOOR * self.median_edge * self.median_edge;
+        let longest = (0..self.rest.face_count() as u32).map(|f| self.longest(f)).fold(0.0, f64::max);
+        let turning = self.rest.faces().iter().map(|face| (*face, 3.0 * longest * reach / floor));
+        let push = 3.0 * (settings.layer_collision_epsilon + reach).powi(2);
+        outer.posed.len() as f64 * push * (1.0 + self.largest_sum(turning))
+    }
+}

@@ -1,0 +1,111 @@
+//! A wardrobe streamed from the cache trains to the same bits as one kept in memory, whatever happens to the cache.
+
+use clothcombo_tests::tiny_config;
+use clothcombo_trainer::config::Config;
+use clothcombo_trainer::device::Backend;
+use clothcombo_trainer::run_dir::RunDir;
+use clothcombo_trainer::scene::{Library, Wardrobe, load_body};
+use clothcombo_trainer::session::Session;
+use clothcombo_trainer::stop::StopFlag;
+use clothcombo_trainer::train_loop::train;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Trains and returns the final parameters.
+fn trained(config: &Config, library: Library, folder: &Path) -> Vec<u8> {
+    let device = Backend::preferred().device();
+    let run = RunDir::create(folder, config).unwrap();
+    let mut session = Session::new(run, config.clone(), Arc::new(library), &device).unwrap();
+    train(&mut session, &mut [], &StopFlag::default()).unwrap();
+    fs::read(folder.join("checkpoints/step-00000060/model.safetensors")).unwrap()
+}
+
+fn records(cache: &Path) -> Vec<PathBuf> {
+    let shelves = fs::read_dir(cache).unwrap().map(|s| s.unwrap().path());
+    let mut files: Vec<_> =
+        shelves.flat_map(|s| fs::read_dir(s).unwrap().map(|f| f.unwrap().path())).collect();
+    files.sort();
+    files
+}
+
+fn streamed(folder: &Path) -> Config {
+    let cache = format!("data.cache.folder={:?}", folder.join("cache"));
+    let mut config = tiny_config(folder, &[&cache]);
+    config.data.memory_mib = 0; // only the last garment stays: the others are read again whenever they are drawn
+    config
+}
+
+fn load(config: &Config) -> Library {
+    Library::load(config, &|_, _, _| {}).unwrap()
+}
+
+#[test]
+fn streaming_changes_no_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let kept = tiny_config(folder.path(), &[]);
+    let config = streamed(folder.path());
+    let expected = trained(&kept, load(&kept), &folder.path().join("kept"));
+
+    assert!(trained(&config, load(&config), &folder.path().join("streamed")) == expected);
+    assert_eq!(
+        records(&folder.path().join("cache")).len(),
+        6,
+        "operators and binding of each of three garments"
+    );
+
+    // A second run finds everything, although every other record is damaged or gone.
+    for (i, record) in records(&folder.path().join("cache")).iter().enumerate() {
+        match i % 3 {
+            0 => fs::remove_file(record).unwrap(),
+            1 => {
+                let mut bytes = fs::read(record).unwrap();
+                let middle = bytes.len() / 2;
+                bytes[middle] ^= 0xff;
+                fs::write(record, bytes).unwrap();
+            }
+            _ => {}
+        }
+    }
+    assert!(trained(&config, load(&config), &folder.path().join("again")) == expected);
+}
+
+#[test]
+fn records_that_vanish_during_a_run_are_made_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let kept = tiny_config(folder.path(), &[]);
+    let config = streamed(folder.path());
+    let expected = trained(&kept, load(&kept), &folder.path().join("kept"));
+    let library = load(&config);
+    fs::remove_dir_all(folder.path().join("cache")).unwrap();
+    assert!(trained(&config, library, &folder.path().join("streamed")) == expected);
+}
+
+#[test]
+fn shards_prepare_everything_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = streamed(folder.path());
+    let body = Arc::new(load_body("mannequin", 0).unwrap());
+    let prepare = |shard| Wardrobe::prepare(&config, body.clone(), shard, &|_, _, _| {}).unwrap();
+    assert_eq!((prepare([0, 2]).0, prepare([1, 2]).0), (2, 1));
+    let first: Vec<_> = records(&folder.path().join("cache"))
+        .iter()
+        .map(|r| fs::metadata(r).unwrap().modified().unwrap())
+        .collect();
+    assert_eq!(first.len(), 6);
+    assert_eq!(prepare([0, 1]).0, 3);
+    let second: Vec<_> = records(&folder.path().join("cache"))
+        .iter()
+        .map(|r| fs::metadata(r).unwrap().modified().unwrap())
+        .collect();
+    assert_eq!(first, second, "what is there is left alone");
+}
+
+#[test]
+fn a_full_cache_is_one_clear_message() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut config = streamed(folder.path());
+    config.data.cache.limit_gib = 1e-5;
+    let error = Library::load(&config, &|_, _, _| {}).err().unwrap().to_string();
+    assert!(error.contains("limit") && error.contains("raise the limit"), "{error}");
+}

@@ -1,0 +1,35 @@
+//! `clothcombo bench`: measurements that a user can repeat.
+
+pub mod distance;
+pub mod generator;
+pub mod poses;
+pub mod stability;
+
+use clap::Subcommand;
+use miette::Report;
+
+/// Measures what the documentation claims
+#[derive(Subcommand)]
+pub enum Bench {
+    /// How often the sign of the distance to the body is wrong, by nearest vertex and by closest surface point
+    Distance(distance::Arguments),
+    /// Every energy on every hard case: finite, bounded, a true gradient, the same in both precisions
+    Stability(stability::Arguments),
+    /// The generator's promises over many garments, with the failure rate and the time
+    Generator(generator::Arguments),
+    /// Self-intersections of posed bodies, their share and the cost of finding them
+    Poses(poses::Arguments),
+}
+
+/// Runs the bench.
+///
+/// # Errors
+/// When an input cannot be read or a promise does not hold.
+pub fn run(bench: &Bench) -> Result<(), Report> {
+    match bench {
+        Bench::Distance(arguments) => distance::run(arguments),
+        Bench::Stability(arguments) => stability::run(arguments),
+        Bench::Generator(arguments) => generator::run(arguments),
+        Bench::Poses(arguments) => poses::run(arguments),
+    }
+}

@@ -1,0 +1,80 @@
+//! `clothcombo prepare`: fills the cache of a configuration before training.
+
+use crate::cli::train::garment_progress;
+use crate::config::load;
+use crate::scene::{Wardrobe, load_body};
+use clap::Parser;
+use miette::Report;
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::sync::Arc;
+
+/// Computes operators and bindings of all garments of a configuration into its cache (data.cache.folder)
+#[derive(Parser)]
+#[command(after_help = "Examples:\n  clothcombo prepare --config configs/open.toml --set \
+        data.cache.folder=\"datasets/cache/prepared\"\n  clothcombo prepare --config big.toml --shard 0/4    # one of four \
+        machines over one folder\n\n\
+        Safe to stop, to repeat and to run on many machines at once: records appear whole, those there are left alone.")]
+pub struct Arguments {
+    /// Configuration file (TOML)
+    #[arg(long, value_name = "FILE")]
+    config: PathBuf,
+    /// Overrides one value; repeatable
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
+    /// Part i of n (from 0): every n-th garment
+    #[arg(long, value_name = "i/n", default_value = "0/1")]
+    shard: Shard,
+    /// No progress, only errors
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+/// Part `0` of `1` parts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Shard([usize; 2]);
+
+impl FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
+        match numbers {
+            Some((part, of)) if part < of => Ok(Self([part, of])),
+            _ => Err("not a part i/n with i from 0 to n − 1, for example 0/4".into()),
+        }
+    }
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// When the configuration or a garment is wrong, or the cache cannot be written.
+pub fn run(arguments: &Arguments) -> Result<(), Report> {
+    let config = load(&arguments.config, &arguments.overrides)?;
+    let body = Arc::new(load_body(&config.data.body, config.data.shape_components)?);
+    let bar = garment_progress(arguments.quiet);
+    let (garments, bytes) = Wardrobe::prepare(&config, body, arguments.shard.0, &|done, total, name| {
+        bar.set_length(total as u64);
+        bar.set_position(done as u64);
+        bar.set_message(name.to_owned());
+    })?;
+    bar.finish_and_clear();
+    if !arguments.quiet {
+        eprintln!("{garments} garments prepared · {:.1} MiB in the cache", bytes as f64 / f64::from(1 << 20));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shards_are_read_and_nonsense_is_refused() {
+        assert_eq!("1/4".parse(), Ok(Shard([1, 4])));
+        for bad in ["4/4", "1", "a/b", "-1/2", "0/0"] {
+            assert!(bad.parse::<Shard>().is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,180 @@
+//! `clothcombo score`: anyone's draped meshes, measured.
+
+use crate::score::{MeshFiles, Score, ScoreDistance, TermValues, score_files};
+use clap::Parser;
+use miette::{IntoDiagnostic, Report};
+use std::io::{ErrorKind, Write};
+use std::path::PathBuf;
+
+/// Scores draped garments: energies in the paper's printed form, penetration, exact intersections, layer order
+#[derive(Parser)]
+#[command(
+    after_help = "Files are OBJ meshes in metres, y up; quads and polygons are cut into triangles. A draped mesh has the\n\
+                  vertices and faces of its rest mesh.\n\n\
+                  Example (inner to outer):\n  clothcombo score --body body.obj --rest rest/tee.obj rest/coat.obj \
+                  --draped draped/tee.obj draped/coat.obj --json"
+)]
+pub struct Arguments {
+    /// The posed body
+    #[arg(long, value_name = "OBJ")]
+    body: PathBuf,
+    /// Rest meshes, innermost first
+    #[arg(long, num_args = 1.., required = true, value_name = "OBJ")]
+    rest: Vec<PathBuf>,
+    /// Draped meshes, in the same order
+    #[arg(long, num_args = 1.., required = true, value_name = "OBJ")]
+    draped: Vec<PathBuf>,
+    /// Distances to the closest point of the body's surface instead of its nearest vertex
+    #[arg(long)]
+    surface: bool,
+    /// Print JSON instead of tables
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// When a file cannot be read, or meshes do not fit together.
+pub fn run(arguments: &Arguments) -> Result<(), Report> {
+    let files = MeshFiles { body: &arguments.body, rest: &arguments.rest, draped: &arguments.draped };
+    let distance = if arguments.surface { ScoreDistance::Surface } else { ScoreDistance::NearestVertex };
+    let score = score_files(&files, distance)?;
+    let text = if arguments.json {
+        serde_json::to_string_pretty(&score).into_diagnostic()? + "\n"
+    } else {
+        tables(&score)
+    };
+    match std::io::stdout().write_all(text.as_bytes()) {
+        // Whoever reads the output has seen enough.
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
+        written => written.into_diagnostic(),
+    }
+}
+
+/// Terms of one garment, in the order of the columns.
+const TERMS: [&str; 5] = ["strain", "bending", "gravity", "body_collision", "repulsion"];
+
+const RAW: [&str; 6] = ["raw", "strain [J]", "bending [J]", "gravity [J]", "collision [m³]", "repulsion [1]"];
+const WEIGHTED: [&str; 7] = ["weighted [J]", "strain", "bending", "gravity", "collision", "repulsion", "sum"];
+const CONTACT: [&str; 7] =
+    ["contact", "vertices", "triangles", "inside [%]", "depth [mm]", "body pairs", "self pairs"];
+const LAYERS: [&str; 5] = ["layers", "collision [m³]", "distance [m³]", "pairs", "wrong side [%]"];
+
+fn tables(score: &Score) -> String {
+    let garments = || score.garments.iter();
+    let mut raw: Vec<_> = garments().map(|g| term_row(&g.name, &g.raw, false)).collect();
+    let mut weighted: Vec<_> = garments().map(|g| term_row(&g.name, &g.weighted, true)).collect();
+    if score.garments.len() > 1 {
+        raw.push(term_row("all", &sum(garments().map(|g| &g.raw)), false));
+        weighted.push(term_row("all", &sum(garments().map(|g| &g.weighted)), true));
+    }
+    let contact: Vec<_> = garments()
+        .map(|g| {
+            let found = &g.penetration;
+            vec![
+                g.name.clone(),
+                g.vertices.to_string(),
+                g.triangles.to_string(),
+                format!("{:.2}", 100.0 * found.vertices_inside),
+                format!("{:.2}", found.max_depth_mm),
+                found.body_triangle_pairs.to_string(),
+                found.self_triangle_pairs.to_string(),
+            ]
+        })
+        .collect();
+    let name = |i: usize| &score.garments[i].name;
+    let layers: Vec<_> = score
+        .layers
+        .iter()
+        .map(|layer| {
+            vec![
+                format!("{} under {}", name(layer.inner), name(layer.outer)),
+                number(layer.layer_collision),
+                number(layer.layer_distance),
+                layer.triangle_pairs.to_string(),
+                format!("{:.2}", 100.0 * layer.order_violations),
+            ]
+        })
+        .collect();
+    let mut text = [table(&RAW, &raw), table(&WEIGHTED, &weighted), table(&CONTACT, &contact)].join("\n");
+    if !layers.is_empty() {
+        text += &format!("\n{}", table(&LAYERS, &layers));
+    }
+    let distance = match score.settings.distance {
+        ScoreDistance::NearestVertex => "the nearest vertex",
+        ScoreDistance::Surface => "the closest surface point",
+    };
+    text + &format!(
+        "\nε {} mm; distances to {distance} of the body; body with itself: {} pairs, counted against no garment\n",
+        score.settings.epsilon_mm, score.body.self_triangle_pairs
+    )
+}
+
+fn sum<'a>(of: impl Iterator<Item = &'a TermValues>) -> TermValues {
+    let mut sums = TermValues::new();
+    for (term, value) in of.flatten() {
+        *sums.entry(term.clone()).or_default() += value;
+    }
+    sums
+}
+
+fn term_row(name: &str, values: &TermValues, with_sum: bool) -> Vec<String> {
+    let value = |term: &&str| values.get(*term).map_or_else(String::new, |v| number(*v));
+    let sum = with_sum.then(|| number(values.values().sum()));
+    [name.to_owned()].into_iter().chain(TERMS.iter().map(value)).chain(sum).collect()
+}
+
+/// Four significant digits.
+fn number(value: f64) -> String {
+    match value.abs() {
+        0.0 => "0".to_owned(),
+        size if (1e-3..1e5).contains(&size) => {
+            let decimals = (3 - size.log10().floor() as i32).max(0) as usize;
+            format!("{value:.decimals$}")
+        }
+        _ => format!("{value:.3e}"),
+    }
+}
+
+/// Rows under a heading: the first column to the left, the others to the right.
+fn table(head: &[&str], rows: &[Vec<String>]) -> String {
+    let head: Vec<String> = head.iter().map(|cell| (*cell).to_owned()).collect();
+    let lines = || [&head].into_iter().chain(rows);
+    let width = |column: usize| lines().map(|row| row[column].chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..head.len()).map(width).collect();
+    let mut text = String::new();
+    for line in lines() {
+        for (column, (cell, width)) in line.iter().zip(&widths).enumerate() {
+            text += &if column == 0 { format!("{cell:<width$}") } else { format!("  {cell:>width$}") };
+        }
+        text.push('\n');
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_keep_four_digits() {
+        for (value, text) in [
+            (0.0, "0"),
+            (-0.46312, "-0.4631"),
+            (12345.6, "12346"),
+            (2.17749, "2.177"),
+            (1.5e-9, "1.500e-9"),
+            (0.001, "0.001000"),
+        ] {
+            assert_eq!(number(value), text);
+        }
+    }
+
+    #[test]
+    fn columns_are_aligned() {
+        let owned = |row: &[&str]| row.iter().map(|c| (*c).to_owned()).collect::<Vec<_>>();
+        let text = table(&["raw", "ε [mm]"], &[owned(&["a long name", "1"]), owned(&["b", "12345678"])]);
+        assert_eq!(text, "raw            ε [mm]\na long name         1\nb            12345678\n");
+    }
+}

@@ -1,0 +1,337 @@
+//! All garments of a run, in memory or streamed from the cache.
+//!
+//! Without a cache everything is computed at the start and kept. With one, what is expensive is computed once and stored;
+//! a run keeps the garments it used last, within `data.memory_mib`, and reads the others again when a scene draws them:
+//! a wardrobe may be many times larger than memory, and the results are the same to the bit.
+
+use super::active_joints::ActiveJoints;
+use super::error::LibraryError;
+use super::garment::LibraryGarment;
+use super::origin::{Maker, Origin};
+use super::recent::Recent;
+use crate::config::Config;
+use clothcombo_data::asset::{Binding, BindingSettings, Body, Category, Garment, Provenance};
+use clothcombo_data::cache::{
+    ArrayCache, Key, binding_key, body_key, get_binding, get_largest_weights, get_operators, mesh_key,
+    operators_key, put_binding, put_operators,
+};
+use clothcombo_physics::energy::{EnergySettings, GarmentEnergies};
+use clothcombo_physics::mesh::{Topology, TriMesh};
+use clothcombo_physics::operators::SurfaceOperators;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// What is known of every garment without reading it.
+#[derive(Clone, Debug)]
+pub struct Card {
+    /// Name, unique within a source.
+    pub name: String,
+    /// Category.
+    pub category: Category,
+    /// Whether the holding loss keeps its upper rim in place.
+    pub holding: bool,
+    /// Where it comes from.
+    pub source: Provenance,
+    /// Number of vertices.
+    pub vertices: usize,
+    /// Lowest and highest corner of the rest mesh [m].
+    pub bounds: ([f64; 3], [f64; 3]),
+}
+
+/// All garments of a run.
+pub struct Wardrobe {
+    cards: Vec<Card>,
+    joints: ActiveJoints,
+    store: Store,
+}
+
+enum Store {
+    Kept { garments: Vec<Arc<LibraryGarment>>, operators: Vec<Arc<SurfaceOperators>> },
+    Streamed(Streamed),
+}
+
+/// What a garment's records are stored under.
+#[derive(Clone, Copy)]
+struct Keys {
+    binding: Key,
+    operators: Key,
+}
+
+struct Streamed {
+    cache: ArrayCache,
+    keys: Vec<Keys>,
+    recent: Mutex<Recent<Arc<LibraryGarment>>>,
+    origins: Vec<Origin>,
+    recipe: Recipe,
+}
+
+/// How a rest mesh becomes a [`LibraryGarment`].
+#[derive(Clone)]
+struct Recipe {
+    body: Arc<Body>,
+    binding: BindingSettings,
+    energy: EnergySettings,
+    eigen_count: usize,
+}
+
+/// What the first pass over a garment leaves.
+struct FirstLook {
+    card: Card,
+    largest_weights: Vec<f32>,
+    kept: Option<(Garment, Binding, SurfaceOperators)>,
+    keys: Option<Keys>,
+}
+
+impl Wardrobe {
+    /// Reads or makes all garments `config` names, and computes what the cache does not hold.
+    /// `progress(done, total, name)` is called per garment.
+    ///
+    /// # Errors
+    /// [`LibraryError`] names the file or garment at fault.
+    pub fn load(
+        config: &Config,
+        body: Arc<Body>,
+        progress: &(dyn Fn(usize, usize, &str) + Sync),
+    ) -> Result<Self, LibraryError> {
+        let origins = Origin::list(&config.data.garments)?;
+        let recipe = Recipe::new(config, body);
+        let cache = config.data.open_cache()?;
+        let looks = first_look(&origins, &recipe, cache.as_ref(), config.data.max_vertices, progress)?;
+
+        let joints = ActiveJoints::new(&recipe.body, looks.iter().map(|l| l.largest_weights.as_slice()));
+        let cards = looks.iter().map(|l| l.card.clone()).collect();
+        let store = match cache {
+            Some(cache) => Store::Streamed(Streamed {
+                cache,
+                keys: looks.iter().filter_map(|l| l.keys).collect(),
+                recent: Mutex::new(Recent::new(config.data.memory_limit())),
+                origins,
+                recipe,
+            }),
+            None => {
+                let parts =
+                    looks.into_par_iter().filter_map(|l| l.kept).map(|(garment, binding, operators)| {
+                        let garment = recipe.finish(garment, binding, &joints)?;
+                        Ok((Arc::new(garment), Arc::new(operators)))
+                    });
+                let (garments, operators) =
+                    parts.collect::<Result<Vec<_>, LibraryError>>()?.into_iter().unzip();
+                Store::Kept { garments, operators }
+            }
+        };
+        Ok(Self { cards, joints, store })
+    }
+
+    /// Computes and stores what the cache of `config` does not hold of every `of`-th garment from garment `part` on, so
+    /// that several processes or machines may share the work. Doing it again costs only the reading of the garments.
+    /// Returns the number of garments looked at and the bytes in the cache.
+    ///
+    /// # Errors
+    /// [`LibraryError`] names the file or garment at fault, or the missing setting.
+    pub fn prepare(
+        config: &Config,
+        body: Arc<Body>,
+        [part, of]: [usize; 2],
+        progress: &(dyn Fn(usize, usize, &str) + Sync),
+    ) -> Result<(usize, u64), LibraryError> {
+        let cache = config.data.open_cache()?.ok_or(LibraryError::NoCache)?;
+        let origins: Vec<_> =
+            Origin::list(&config.data.garments)?.into_iter().skip(part).step_by(of.max(1)).collect();
+        let recipe = Recipe::new(config, body);
+        first_look(&origins, &recipe, Some(&cache), config.data.max_vertices, progress)?;
+        Ok((origins.len(), cache.used()))
+    }
+
+    /// Number of garments.
+    pub fn len(&self) -> usize {
+        self.cards.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.cards.is_empty()
+    }
+
+    /// What is known of garment `index` without reading it.
+    pub fn card(&self, index: usize) -> &Card {
+        &self.cards[index]
+    }
+
+    /// Joints that carry any garment.
+    pub fn joints(&self) -> &ActiveJoints {
+        &self.joints
+    }
+
+    /// Garment `index`.
+    ///
+    /// # Errors
+    /// [`LibraryError`] when its records vanished from the cache and it cannot be made again.
+    pub fn garment(&self, index: usize) -> Result<Arc<LibraryGarment>, LibraryError> {
+        let streamed = match &self.store {
+            Store::Kept { garments, .. } => return Ok(garments[index].clone()),
+            Store::Streamed(streamed) => streamed,
+        };
+        let recent = || streamed.recent.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(garment) = recent().get(index) {
+            return Ok(garment);
+        }
+        let garment = Arc::new(streamed.read(index, &self.cards[index], &self.joints)?);
+        recent().insert(index, garment.clone(), garment.bytes());
+        Ok(garment)
+    }
+
+    /// DiffusionNet's operators of garment `index`.
+    ///
+    /// # Errors
+    /// As [`garment`](Self::garment).
+    pub fn operators(&self, index: usize) -> Result<Arc<SurfaceOperators>, LibraryError> {
+        match &self.store {
+            Store::Kept { operators, .. } => Ok(operators[index].clone()),
+            Store::Streamed(streamed) => {
+                if let Some(operators) = get_operators(&streamed.cache, streamed.keys[index].operators) {
+                    return Ok(Arc::new(operators));
+                }
+                streamed.restore(index)?;
+                let again = get_operators(&streamed.cache, streamed.keys[index].operators);
+                again.map(Arc::new).ok_or_else(|| streamed.lost(&self.cards[index]))
+            }
+        }
+    }
+}
+
+impl Streamed {
+    fn read(&self, index: usize, card: &Card, joints: &ActiveJoints) -> Result<LibraryGarment, LibraryError> {
+        let get = || get_binding(&self.cache, self.keys[index].binding, self.recipe.body.joint_count());
+        let (rest, binding) = match get() {
+            Some(found) => found,
+            None => {
+                self.restore(index)?;
+                get().ok_or_else(|| self.lost(card))?
+            }
+        };
+        let Card { name, category, holding, source, .. } = card.clone();
+        self.recipe.finish(Garment { name, category, rest, holding, source }, binding, joints)
+    }
+
+    /// Computes the records of a garment again that were there at the start of the run and no longer are.
+    fn restore(&self, index: usize) -> Result<(), LibraryError> {
+        tracing::warn!(cache = %self.cache.root().display(), "a record vanished during the run, computed anew");
+        let origin = std::slice::from_ref(&self.origins[index]);
+        first_look(origin, &self.recipe, Some(&self.cache), usize::MAX, &|_, _, _| {}).map(|_| ())
+    }
+
+    fn lost(&self, card: &Card) -> LibraryError {
+        LibraryError::Vanished { name: card.name.clone(), cache: self.cache.root().into() }
+    }
+}
+
+impl Recipe {
+    fn new(config: &Config, body: Arc<Body>) -> Self {
+        let start = &config.start;
+        Self {
+            body,
+            binding: BindingSettings {
+                smoothing_iterations: start.smoothing_iterations,
+                skirt_smoothing_iterations: start.skirt_smoothing_iterations,
+                smooth: start.smooth_weights,
+                shape_transfer: start.shape_transfer,
+            },
+            energy: config.losses.energy_settings(),
+            eigen_count: config.model.eigen_count,
+        }
+    }
+
+    fn operators(&self, name: &str, rest: &TriMesh) -> Result<SurfaceOperators, LibraryError> {
+        SurfaceOperators::new(rest, self.eigen_count)
+            .map_err(|e| LibraryError::Garment { name: name.to_owned(), reason: e.to_string() })
+    }
+
+    fn finish(
+        &self,
+        garment: Garment,
+        binding: Binding,
+        joints: &ActiveJoints,
+    ) -> Result<LibraryGarment, LibraryError> {
+        let topology = Topology::new(&garment.rest);
+        let energies = GarmentEnergies::new(&garment.rest, &topology, &self.energy, garment.holding)
+            .map_err(|e| LibraryError::Garment { name: garment.name.clone(), reason: e.to_string() })?;
+        let skin_weights = joints.restrict(&binding.skin_weights);
+        Ok(LibraryGarment {
+            joint_mask: joints.mask(&skin_weights),
+            skin_weights,
+            shape_stride: self.body.shape_count,
+            shape_directions: binding.shape_directions,
+            energies: Arc::new(energies),
+            garment,
+        })
+    }
+}
+
+/// Makes every garment once: what is missing is computed, and stored or kept.
+fn first_look(
+    origins: &[Origin],
+    recipe: &Recipe,
+    cache: Option<&ArrayCache>,
+    max_vertices: usize,
+    progress: &(dyn Fn(usize, usize, &str) + Sync),
+) -> Result<Vec<FirstLook>, LibraryError> {
+    let maker = Maker::new(&recipe.body, origins)?;
+    let body = cache.map(|_| body_key(&recipe.body));
+    let done = AtomicUsize::new(0);
+    let look = |origin: &Origin| {
+        let garment = maker.make(origin)?;
+        let vertices = garment.rest.vertex_count();
+        if vertices > max_vertices {
+            return Err(LibraryError::TooLarge { name: garment.name, vertices, limit: max_vertices });
+        }
+        let card = Card {
+            name: garment.name.clone(),
+            category: garment.category,
+            holding: garment.holding,
+            source: garment.source.clone(),
+            vertices,
+            bounds: garment.rest.bounds(),
+        };
+        let look = match (cache, body) {
+            (Some(cache), Some(body)) => stored(card, &garment, recipe, cache, body)?,
+            _ => {
+                let binding = Binding::new(&garment, &recipe.body, &recipe.binding);
+                let operators = recipe.operators(&garment.name, &garment.rest)?;
+                let largest_weights = binding.largest_weights(recipe.body.joint_count());
+                FirstLook { card, largest_weights, kept: Some((garment, binding, operators)), keys: None }
+            }
+        };
+        progress(done.fetch_add(1, Ordering::Relaxed) + 1, origins.len(), &look.card.name);
+        Ok(look)
+    };
+    origins.par_iter().map(look).collect()
+}
+
+fn stored(
+    card: Card,
+    garment: &Garment,
+    recipe: &Recipe,
+    cache: &ArrayCache,
+    body: Key,
+) -> Result<FirstLook, LibraryError> {
+    let joints = recipe.body.joint_count();
+    let mesh = mesh_key(&garment.rest);
+    let keys = Keys {
+        binding: binding_key(mesh, body, garment.category, &recipe.binding),
+        operators: operators_key(mesh, recipe.eigen_count),
+    };
+    let largest_weights = match get_largest_weights(cache, keys.binding) {
+        Some(largest) if largest.len() == joints => largest,
+        _ => {
+            let binding = Binding::new(garment, &recipe.body, &recipe.binding);
+            put_binding(cache, keys.binding, &garment.rest, &binding, joints).map_err(LibraryError::data)?;
+            binding.largest_weights(joints)
+        }
+    };
+    if !cache.contains(keys.operators) {
+        let operators = recipe.operators(&garment.name, &garment.rest)?;
+        put_operators(cache, keys.operators, &operators).map_err(LibraryError::data)?;
+    }
+    Ok(FirstLook { card, largest_weights, kept: None, keys: Some(keys) })
+}

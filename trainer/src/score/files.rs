@@ -1,0 +1,58 @@
+//! Meshes to be scored, from files of any mesh format.
+
+use super::{DrapedGarment, MeshSize, Score, ScoreDistance, ScoreError, score};
+use clothcombo_data::format::load_tri_mesh;
+use clothcombo_physics::mesh::TriMesh;
+use std::path::{Path, PathBuf};
+
+/// The files of a scene; polygons are cut into triangles.
+#[derive(Clone, Copy, Debug)]
+pub struct MeshFiles<'a> {
+    /// The posed body.
+    pub body: &'a Path,
+    /// Rest meshes, innermost first.
+    pub rest: &'a [PathBuf],
+    /// Draped meshes of the same vertices and faces, in the same order.
+    pub draped: &'a [PathBuf],
+}
+
+/// Scores the meshes of `files`; a garment is named after its draped file.
+///
+/// # Errors
+/// [`ScoreError`] naming file and line, or the two files that do not fit together.
+pub fn score_files(files: &MeshFiles, distance: ScoreDistance) -> Result<Score, ScoreError> {
+    let MeshFiles { body, rest, draped } = *files;
+    if rest.len() != draped.len() {
+        return Err(ScoreError::FileCounts { rest: rest.len(), draped: draped.len() });
+    }
+    let body = load_tri_mesh(body)?;
+    let loaded = rest.iter().zip(draped).map(|(rest, draped)| load_garment(rest, draped));
+    let loaded = loaded.collect::<Result<Vec<_>, _>>()?;
+    let garments: Vec<DrapedGarment> = loaded
+        .iter()
+        .map(|(name, rest, draped)| DrapedGarment { name, rest, positions: draped.positions() })
+        .collect();
+    score(&body, &garments, distance)
+}
+
+/// Name, rest mesh and draped mesh of a garment, which have the same faces.
+fn load_garment(rest_path: &Path, draped_path: &Path) -> Result<(String, TriMesh, TriMesh), ScoreError> {
+    let (rest, draped) = (load_tri_mesh(rest_path)?, load_tri_mesh(draped_path)?);
+    let size = |path: &Path, mesh: &TriMesh| MeshSize {
+        path: path.to_owned(),
+        vertices: mesh.vertex_count(),
+        triangles: mesh.face_count(),
+    };
+    let sizes = || (size(rest_path, &rest), size(draped_path, &draped));
+    if (rest.vertex_count(), rest.face_count()) != (draped.vertex_count(), draped.face_count()) {
+        let (rest, draped) = sizes();
+        return Err(ScoreError::Size { rest, draped });
+    }
+    if let Some(face) = (0..rest.face_count()).find(|&f| rest.faces()[f] != draped.faces()[f]) {
+        let [rest_face, draped_face] = [&rest, &draped].map(|mesh| mesh.faces()[face]);
+        let (rest, draped) = sizes();
+        return Err(ScoreError::Faces { face, rest, rest_face, draped, draped_face });
+    }
+    let name = draped_path.file_stem().unwrap_or(draped_path.as_os_str()).to_string_lossy().into_owned();
+    Ok((name, rest, draped))
+}

@@ -1,0 +1,97 @@
+//! The score against scenes whose answer is known.
+
+use super::*;
+use clothcombo_physics::mesh::shapes::{icosphere, mapped, tube, union};
+use std::path::Path;
+
+/// A ball as body; two sleeves around it, the outer one with room between.
+fn scene() -> (TriMesh, TriMesh, TriMesh) {
+    let sleeve = |radius: f64| mapped(&tube(radius, 0.8, 40, 16), |[x, y, z]| [x, y - 0.4, z]);
+    (icosphere(0.3, 4), sleeve(0.305), sleeve(0.33))
+}
+
+fn draped<'a>(name: &'a str, mesh: &'a TriMesh) -> DrapedGarment<'a> {
+    DrapedGarment { name, rest: mesh, positions: mesh.positions() }
+}
+
+#[test]
+fn weights_are_the_papers() {
+    let (body, inner, _) = scene();
+    let score = score(&body, &[draped("a", &inner)], ScoreDistance::NearestVertex).unwrap();
+    let garment = &score.garments[0];
+    let paper = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/paper.toml");
+    let paper = crate::config::load(&paper, &[]).unwrap().losses;
+    assert_eq!(garment.raw.len(), 5);
+    for (name, raw) in &garment.raw {
+        let weight = paper.weight(Term::from_name(name).unwrap()).at(1.0);
+        assert!((garment.weighted[name] - weight * raw).abs() <= 1e-15 * raw.abs(), "{name}");
+    }
+}
+
+#[test]
+fn a_garment_at_rest_over_its_body_has_no_strain_and_crosses_nothing() {
+    let (body, inner, outer) = scene();
+    let garments = [draped("inner", &inner), draped("outer", &outer)];
+    let right = score(&body, &garments, ScoreDistance::Surface).unwrap();
+    for garment in &right.garments {
+        assert!(garment.raw["strain"].abs() < 1e-20);
+        assert_eq!(garment.raw["body_collision"], 0.0);
+        assert_eq!(garment.penetration.body_triangle_pairs, 0);
+        assert_eq!(garment.penetration.vertices_inside, 0.0);
+    }
+    let layer = right.layers[0];
+    assert_eq!((layer.inner, layer.outer, layer.triangle_pairs, layer.order_violations), (0, 1, 0, 0.0));
+    assert_eq!((layer.layer_collision, layer.layer_distance), (0.0, 0.0));
+
+    // The same in the wrong order: every vertex that has the other garment beside it is on the wrong side.
+    let wrong = score(&body, &[garments[1], garments[0]], ScoreDistance::Surface).unwrap();
+    assert!(wrong.layers[0].order_violations > 0.99, "{:?}", wrong.layers);
+    assert!(wrong.layers[0].layer_collision > 0.0 && wrong.layers[0].layer_distance > 0.0);
+    assert_eq!(wrong.garments[0].raw, right.garments[1].raw);
+}
+
+#[test]
+fn a_lifted_body_crosses_the_sleeve_and_is_measured_in_millimetres() {
+    let (body, inner, _) = scene();
+    let moved = mapped(&body, |[x, y, z]| [x + 0.02, y, z]);
+    for distance in [ScoreDistance::NearestVertex, ScoreDistance::Surface] {
+        let score = score(&moved, &[draped("a", &inner)], distance).unwrap();
+        let found = score.garments[0].penetration;
+        assert!((found.max_depth_mm - 15.0).abs() < 2.0, "{found:?}");
+        assert!(found.vertices_inside > 0.03 && found.vertices_inside < 0.5);
+        assert!(found.body_triangle_pairs > 20);
+    }
+}
+
+#[test]
+fn stray_vertices_of_the_body_change_nothing_and_its_own_crossings_are_apart() {
+    let (body, inner, _) = scene();
+    let garments = [draped("a", &inner)];
+    let plain = score(&body, &garments, ScoreDistance::NearestVertex).unwrap();
+    let mut positions = body.positions().to_vec();
+    positions.splice(0..0, inner.positions().iter().copied());
+    let first = inner.vertex_count() as u32;
+    let faces = body.faces().iter().map(|f| f.map(|v| v + first)).collect();
+    let stray = TriMesh::new(positions, faces).unwrap();
+    assert_eq!(score(&stray, &garments, ScoreDistance::NearestVertex).unwrap(), plain);
+
+    let second = mapped(&body, |[x, y, z]| [x, y + 0.55, z + 0.001]);
+    let twice = score(&union(&[&body, &second]), &garments, ScoreDistance::Surface).unwrap();
+    assert!(twice.body.self_triangle_pairs > 0);
+    assert_eq!(twice.garments[0].penetration.self_triangle_pairs, 0);
+}
+
+#[test]
+fn what_cannot_be_scored_is_named() {
+    let (body, inner, _) = scene();
+    let short = DrapedGarment { positions: &inner.positions()[1..], ..draped("tee", &inner) };
+    let error = score(&body, &[short], ScoreDistance::default()).unwrap_err();
+    assert!(matches!(error, ScoreError::Positions { .. }) && error.to_string().contains("tee"));
+    let flat = mapped(&inner, |_| [0.0; 3]);
+    let error = score(&body, &[draped("flat", &flat)], ScoreDistance::default()).unwrap_err();
+    assert!(matches!(error, ScoreError::Energy { .. }) && error.to_string().contains("flat"));
+    let huge = mapped(&inner, |p| p.map(|x| 1e160 * x));
+    let far = DrapedGarment { positions: huge.positions(), ..draped("huge", &inner) };
+    let error = score(&body, &[far], ScoreDistance::default()).unwrap_err();
+    assert!(matches!(error, ScoreError::Overflow { .. }), "{error}");
+}
