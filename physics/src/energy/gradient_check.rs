@@ -398,13 +398,14 @@ mod tests {
         let good = report(f64::exp, f64::exp, 0.4);
         assert!(good.passes() && good.kinks == 0 && good.error < 1e-8, "{good:?}");
         let off = report(f64::exp, |x| x.exp() * (1.0 + 5e-6), 0.4);
-        assert!(!off.passes() && off.error < 2e-5 && off.kinks == 0, "{off:?}");
+        // A line along all 18 coordinates at once adds up their errors: √18 times 5e-6.
+        assert!(!off.passes() && off.error < 2.5e-5 && off.kinks == 0, "{off:?}");
     }
 
     #[test]
     fn a_steep_function_is_resolved_by_its_own_scale() {
-        let width = 1e-6;
-        let good = report(|x| (x / 1e-6).atan(), |x| width / (width * width + x * x), 0.0);
+        const WIDTH: f64 = 1e-6;
+        let good = report(|x| (x / WIDTH).atan(), |x| WIDTH / (WIDTH * WIDTH + x * x), 0.0);
         assert!(good.passes(), "{good:?}");
     }
 

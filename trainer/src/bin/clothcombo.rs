@@ -22,8 +22,6 @@ enum Verb {
     Fit(cli::fit::Arguments),
     Generate(cli::generate::Arguments),
     #[command(subcommand)]
-    Bench(cli::bench::Bench),
-    #[command(subcommand)]
     Import(cli::import::Source),
     Prepare(cli::prepare::Arguments),
     Score(cli::score::Arguments),
@@ -36,7 +34,6 @@ fn main() -> ExitCode {
         Verb::Check(arguments) => cli::check::run(arguments),
         Verb::Fit(arguments) => cli::fit::run(arguments),
         Verb::Generate(arguments) => cli::generate::run(arguments),
-        Verb::Bench(bench) => cli::bench::run(bench),
         Verb::Import(source) => cli::import::run(source),
         Verb::Prepare(arguments) => cli::prepare::run(arguments),
         Verb::Score(arguments) => cli::score::run(arguments),

@@ -4,13 +4,14 @@ use crate::config::PoseConfig;
 use crate::evaluate::{RegionErrors, SignErrorSettings, SignErrors, WrongSigns, hard_poses, sign_errors};
 use crate::scene::{PoseLibrary, Unseen, load_body};
 use clap::Parser;
-use clothcombo_data::asset::{BODY_JOINT_COUNT, Pose};
+use clothcombo_data::asset::{BODY_JOINT_COUNT, Body, Pose};
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, Report, miette};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// How often the sign of the distance to the body is wrong, by nearest vertex and by closest surface point
 #[derive(Parser)]
@@ -59,8 +60,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     if !(arguments.band.is_finite() && arguments.band > 0.0) {
         return Err(miette!(help = "the default is 0.05", "--band {} is not a distance", arguments.band));
     }
-    let body = load_body(&arguments.body, 0)?;
-    let drawn = draw(arguments)?;
+    let body = Arc::new(load_body(&arguments.body, 0)?);
+    let drawn = draw(arguments, &body)?;
     let mut groups = vec![("T-pose".to_owned(), vec![Pose::t_pose(BODY_JOINT_COUNT)])];
     if !drawn.is_empty() {
         let source = if arguments.motions.is_some() { "held-out motion" } else { "sampled poses" };
@@ -94,9 +95,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     Ok(())
 }
 
-fn draw(arguments: &Arguments) -> Result<Vec<Pose>, Report> {
+fn draw(arguments: &Arguments, body: &Arc<Body>) -> Result<Vec<Pose>, Report> {
     let config = PoseConfig { motions: arguments.motions.clone(), ..PoseConfig::default() };
-    let library = PoseLibrary::new(&config)?;
+    let library = PoseLibrary::new(&config, body)?;
     let mut rng = ChaCha8Rng::seed_from_u64(arguments.seed);
     Ok((0..arguments.poses).map(|_| library.draw_held_out(Unseen::Poses, &mut rng)).collect())
 }
