@@ -18,6 +18,8 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Verb {
+    #[command(subcommand)]
+    Bench(cli::bench::Bench),
     Check(cli::check::Arguments),
     Fit(cli::fit::Arguments),
     Generate(cli::generate::Arguments),
@@ -31,6 +33,7 @@ fn main() -> ExitCode {
     let arguments = Arguments::parse();
     cli::start_logging("info");
     cli::exit_code(match &arguments.verb {
+        Verb::Bench(bench) => cli::bench::run(bench),
         Verb::Check(arguments) => cli::check::run(arguments),
         Verb::Fit(arguments) => cli::fit::run(arguments),
         Verb::Generate(arguments) => cli::generate::run(arguments),
