@@ -4,7 +4,9 @@
 
 pub mod asset;
 pub mod cache;
+pub mod check;
 pub mod dataset;
+pub mod fit;
 pub mod format;
 pub mod generate;
 pub mod hard_cases;

@@ -1,4 +1,4 @@
-//! A folder of garments: OBJ files at rest on the zero body, with an optional manifest `garments.toml`.
+//! A folder of garments: OBJ, PLY, STL or glTF files at rest on the zero body, with an optional manifest `garments.toml`.
 //!
 //! ```toml
 //! [[garment]]
@@ -11,10 +11,11 @@
 //! author = "…"
 //! licence = "CC0-1.0"
 //! ```
-//! Without a manifest every OBJ in the folder is a garment.
+//! Without a manifest every mesh file in the folder is a garment.
 
 use crate::asset::{Body, Category, Garment, Provenance};
 use crate::format::atomic;
+use crate::format::mesh::{MeshFileError, is_mesh_path, load_tri_mesh};
 use crate::format::obj::{self, ObjError};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -58,12 +59,15 @@ pub enum GarmentFolderError {
         message: String,
     },
     /// No garment in it.
-    #[error("{}: no garments; put OBJ files there, or list them in {MANIFEST}", path.display())]
+    #[error("{}: no garments; put OBJ, PLY, STL or glTF files there, or list them in {MANIFEST}", path.display())]
     Empty {
         /// The folder.
         path: PathBuf,
     },
     /// A mesh is unusable.
+    #[error(transparent)]
+    Mesh(#[from] MeshFileError),
+    /// A mesh cannot be written.
     #[error(transparent)]
     Obj(#[from] ObjError),
 }
@@ -94,11 +98,11 @@ pub struct ManifestEntry {
     #[serde(skip_serializing_if = "Option::is_none")]
     name: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    category: Option<Category>,
+    pub(crate) category: Option<Category>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    layer: Option<[u32; 2]>,
+    pub(crate) layer: Option<[u32; 2]>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    holding: Option<bool>,
+    pub(crate) holding: Option<bool>,
     #[serde(default, skip_serializing_if = "String::is_empty")]
     source: String,
     #[serde(default, skip_serializing_if = "String::is_empty")]
@@ -128,9 +132,9 @@ impl ListedGarment {
     /// Reads the mesh. `body` is needed for the guesses: category and the collarbone rule.
     ///
     /// # Errors
-    /// [`ObjError`] naming file and line.
-    pub fn load(&self, body: &Body) -> Result<FolderGarment, ObjError> {
-        let rest = obj::load(&self.path)?;
+    /// [`MeshFileError`] naming file and line or element.
+    pub fn load(&self, body: &Body) -> Result<FolderGarment, MeshFileError> {
+        let rest = load_tri_mesh(&self.path)?;
         let category = self.category.unwrap_or_else(|| Category::guess(&rest, body));
         let holding = self.holding.unwrap_or_else(|| Garment::needs_holding(&rest, body));
         let garment =
@@ -143,7 +147,7 @@ impl ListedGarment {
 /// guesses: category and the collarbone rule.
 ///
 /// # Errors
-/// [`GarmentFolderError`] naming folder, manifest entry, or OBJ file and line.
+/// [`GarmentFolderError`] naming folder, manifest entry, or mesh file and line or element.
 pub fn load_garment_folder(folder: &Path, body: &Body) -> Result<Vec<FolderGarment>, GarmentFolderError> {
     let listed = list_garment_folder(folder)?;
     Ok(listed.par_iter().map(|garment| garment.load(body)).collect::<Result<_, _>>()?)
@@ -155,22 +159,10 @@ pub fn load_garment_folder(folder: &Path, body: &Body) -> Result<Vec<FolderGarme
 /// [`GarmentFolderError`] naming folder or manifest entry.
 pub fn list_garment_folder(folder: &Path) -> Result<Vec<ListedGarment>, GarmentFolderError> {
     let manifest_path = folder.join(MANIFEST);
-    let manifest = match fs::read_to_string(&manifest_path) {
-        Ok(text) => manifest_from(&manifest_path, &text)?,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Manifest {
-            garment: list_obj_files(folder)?
-                .into_iter()
-                .map(|file| ManifestEntry { file, ..ManifestEntry::default() })
-                .collect(),
-        },
-        Err(source) => return Err(GarmentFolderError::Io { path: manifest_path, source }),
-    };
-    if manifest.garment.is_empty() {
-        return Err(GarmentFolderError::Empty { path: folder.into() });
-    }
+    let entries = read_entries(folder)?;
     let mut names = HashSet::new();
-    let mut garments = Vec::with_capacity(manifest.garment.len());
-    for (number, entry) in manifest.garment.into_iter().enumerate() {
+    let mut garments = Vec::with_capacity(entries.len());
+    for (number, entry) in entries.into_iter().enumerate() {
         let wrong = |message: String| GarmentFolderError::Entry {
             path: manifest_path.clone(),
             entry: number + 1,
@@ -203,13 +195,29 @@ pub fn list_garment_folder(folder: &Path) -> Result<Vec<ListedGarment>, GarmentF
     Ok(garments)
 }
 
-fn list_obj_files(folder: &Path) -> Result<Vec<String>, GarmentFolderError> {
+/// What the manifest lists or, without one, every mesh file of the folder; at least one.
+pub(crate) fn read_entries(folder: &Path) -> Result<Vec<ManifestEntry>, GarmentFolderError> {
+    let path = folder.join(MANIFEST);
+    let entries = match fs::read_to_string(&path) {
+        Ok(text) => manifest_from(&path, &text)?.garment,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => list_mesh_files(folder)?
+            .into_iter()
+            .map(|file| ManifestEntry { file, ..ManifestEntry::default() })
+            .collect(),
+        Err(source) => return Err(GarmentFolderError::Io { path, source }),
+    };
+    if entries.is_empty() {
+        return Err(GarmentFolderError::Empty { path: folder.into() });
+    }
+    Ok(entries)
+}
+
+fn list_mesh_files(folder: &Path) -> Result<Vec<String>, GarmentFolderError> {
     let failed = |source| GarmentFolderError::Io { path: folder.into(), source };
     let mut files = Vec::new();
     for entry in fs::read_dir(folder).map_err(failed)? {
         let path = entry.map_err(failed)?.path();
-        let is_obj = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"));
-        if let Some(name) = path.file_name().and_then(|n| n.to_str()).filter(|_| is_obj) {
+        if let Some(name) = path.file_name().and_then(|n| n.to_str()).filter(|_| is_mesh_path(&path)) {
             files.push(name.to_string());
         }
     }
@@ -319,6 +327,8 @@ mod tests {
         folder
     }
 
+    const PLY: &str = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+        element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 1 0 0 0 1 0 3 0 1 2\n";
     const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
     #[test]
@@ -349,14 +359,15 @@ mod tests {
     }
 
     #[test]
-    fn without_a_manifest_every_obj_is_a_garment() {
-        let folder = folder_with(&[("b.obj", TRIANGLE), ("a.OBJ", TRIANGLE), ("notes.txt", "x")]);
+    fn without_a_manifest_every_mesh_is_a_garment() {
+        let folder =
+            folder_with(&[("b.obj", TRIANGLE), ("a.OBJ", TRIANGLE), ("c.ply", PLY), ("notes.txt", "x")]);
         let names: Vec<String> = load_garment_folder(folder.path(), &mannequin())
             .unwrap()
             .into_iter()
             .map(|g| g.garment.name)
             .collect();
-        assert_eq!(names, ["a", "b"]);
+        assert_eq!(names, ["a", "b", "c"]);
     }
 
     #[test]

@@ -3,9 +3,10 @@
 //! Own parser, because a message must name the line: the usual libraries report neither it nor the offending index.
 
 use super::atomic;
-use clothcombo_physics::mesh::{MeshError, TriMesh};
+use super::mesh::{MeshFileError, PolygonMesh, check_count, fan, read_limited};
+use clothcombo_physics::mesh::TriMesh;
+use std::collections::HashMap;
 use std::fmt::Write as _;
-use std::fs;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -36,14 +37,6 @@ pub enum ObjError {
         /// The file.
         path: PathBuf,
     },
-    /// Not a valid triangle mesh.
-    #[error("{}: {source}", path.display())]
-    Mesh {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        source: MeshError,
-    },
 }
 
 /// An OBJ file: positions as written, polygons with three or more corners, and the group each polygon is in.
@@ -57,34 +50,30 @@ pub struct ObjMesh {
     pub groups: Vec<String>,
     /// Group of each polygon.
     pub group_of_polygon: Vec<u32>,
+    /// Line of each polygon, from 1.
+    pub lines: Vec<u32>,
 }
 
 impl ObjMesh {
-    /// Reads a file.
-    ///
-    /// # Errors
-    /// [`ObjError`] naming file and line.
-    pub fn load(path: &Path) -> Result<Self, ObjError> {
-        let bytes = fs::read(path).map_err(|source| ObjError::Io { path: path.into(), source })?;
-        // Names and comments may be in any encoding; numbers are ASCII.
-        Self::parse(&String::from_utf8_lossy(&bytes), path)
-    }
-
-    /// Parses OBJ text; `path` is for messages only.
+    /// Parses OBJ text; `path` is for messages only. A face may name one vertex twice.
     ///
     /// # Errors
     /// [`ObjError`] naming file and line.
     pub fn parse(text: &str, path: &Path) -> Result<Self, ObjError> {
         let mut mesh = Self { groups: vec![String::new()], ..Self::default() };
-        let mut lines_of_polygons = Vec::new();
         let mut group = 0;
+        let mut number_of_group = HashMap::from([(String::new(), 0)]);
         for (number, line) in text.lines().enumerate() {
             let line = line.split('#').next().unwrap_or_default();
             let mut words = line.split_ascii_whitespace();
             let wrong = |message: String| ObjError::Line { path: path.into(), line: number + 1, message };
             match words.next() {
-                Some("v") => mesh.positions.push(vertex(words).map_err(wrong)?),
+                Some("v") => {
+                    check_count("vertices", mesh.positions.len() + 1).map_err(wrong)?;
+                    mesh.positions.push(vertex(words).map_err(wrong)?);
+                }
                 Some("f") => {
+                    check_count("faces", mesh.polygons.len() + 1).map_err(&wrong)?;
                     let polygon: Result<Vec<u32>, String> =
                         words.map(|word| corner(word, mesh.positions.len())).collect();
                     let polygon = polygon.map_err(&wrong)?;
@@ -96,33 +85,25 @@ impl ObjMesh {
                     }
                     mesh.polygons.push(polygon);
                     mesh.group_of_polygon.push(group);
-                    lines_of_polygons.push(number + 1);
+                    mesh.lines.push(number as u32 + 1);
                 }
                 Some("g") => {
                     let name = words.collect::<Vec<_>>().join(" ");
-                    group = match mesh.groups.iter().position(|g| *g == name) {
-                        Some(known) => known as u32,
-                        None => {
-                            mesh.groups.push(name);
-                            mesh.groups.len() as u32 - 1
-                        }
-                    };
+                    group = *number_of_group.entry(name).or_insert_with_key(|name| {
+                        mesh.groups.push(name.clone());
+                        mesh.groups.len() as u32 - 1
+                    });
                 }
                 _ => {}
             }
         }
         // Faces may come before their vertices, so the range is checked at the end.
         let count = mesh.positions.len();
-        for (polygon, line) in mesh.polygons.iter().zip(lines_of_polygons) {
-            let wrong = |message: String| ObjError::Line { path: path.into(), line, message };
+        for (polygon, line) in mesh.polygons.iter().zip(&mesh.lines) {
+            let wrong = |message: String| ObjError::Line { path: path.into(), line: *line as usize, message };
             if let Some(index) = polygon.iter().find(|i| **i as usize >= count) {
                 let index = u64::from(*index) + 1;
                 return Err(wrong(format!("face names vertex {index}, but the file has {count} vertices")));
-            }
-            if polygon.iter().enumerate().any(|(i, a)| polygon[..i].contains(a)) {
-                return Err(wrong(
-                    "face names the same vertex twice; weld or remove such faces first".into(),
-                ));
             }
         }
         if mesh.polygons.is_empty() {
@@ -152,18 +133,18 @@ impl ObjMesh {
         vertices
     }
 
-    /// The whole file as a triangle mesh; `path` is for messages only.
-    ///
-    /// # Errors
-    /// [`ObjError::Mesh`] if it is not a valid one.
-    pub fn to_tri_mesh(&self, path: &Path) -> Result<TriMesh, ObjError> {
-        TriMesh::new(self.positions.clone(), self.triangles())
-            .map_err(|source| ObjError::Mesh { path: path.into(), source })
+    /// Positions and polygons without the groups.
+    pub fn into_polygon_mesh(self) -> PolygonMesh {
+        let mut mesh = PolygonMesh::with_positions(self.positions);
+        mesh.lines = self.lines;
+        self.polygons.iter().for_each(|p| mesh.push(p));
+        mesh
     }
 }
 
-fn fan(polygon: &[u32]) -> impl Iterator<Item = [u32; 3]> + '_ {
-    polygon[1..].windows(2).map(|w| [polygon[0], w[0], w[1]])
+/// Parses an OBJ file in memory. Names and comments may be in any encoding; numbers are ASCII.
+pub(super) fn parse_bytes(bytes: &[u8], path: &Path) -> Result<ObjMesh, ObjError> {
+    ObjMesh::parse(&String::from_utf8_lossy(bytes), path)
 }
 
 fn vertex<'a>(mut words: impl Iterator<Item = &'a str>) -> Result<[f64; 3], String> {
@@ -196,9 +177,9 @@ fn corner(word: &str, vertices_so_far: usize) -> Result<u32, String> {
 /// Reads an OBJ file as a triangle mesh.
 ///
 /// # Errors
-/// [`ObjError`] naming file and line.
-pub fn load(path: &Path) -> Result<TriMesh, ObjError> {
-    ObjMesh::load(path)?.to_tri_mesh(path)
+/// [`MeshFileError`] naming file and line.
+pub fn load(path: &Path) -> Result<TriMesh, MeshFileError> {
+    parse_bytes(&read_limited(path)?, path)?.into_polygon_mesh().to_tri_mesh(path)
 }
 
 /// Writes a mesh as OBJ, whole or not at all; `comments` become leading `#` lines. Coordinates keep 0.1 µm.
@@ -229,6 +210,7 @@ pub fn save(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
 
     fn parse(text: &str) -> Result<ObjMesh, String> {
         ObjMesh::parse(text, Path::new("shirt.obj")).map_err(|e| e.to_string())
@@ -245,7 +227,7 @@ mod tests {
         assert_eq!(mesh.triangles(), [[0, 1, 2], [0, 2, 3], [3, 2, 1], [0, 1, 3]]);
         assert_eq!(mesh.group_triangles("front"), [[0, 1, 2], [0, 2, 3], [0, 1, 3]]);
         assert_eq!(mesh.group_vertices("back"), [1, 2, 3]);
-        assert_eq!(mesh.to_tri_mesh(Path::new("x")).unwrap().face_count(), 4);
+        assert_eq!(mesh.into_polygon_mesh().to_tri_mesh(Path::new("x")).unwrap().face_count(), 4);
     }
 
     #[test]
@@ -259,7 +241,6 @@ mod tests {
             (&format!("{SQUARE}f 1 2 -5\n"), 6, "vertex -5"),
             (&format!("{SQUARE}f 0 1 2\n"), 6, "counts from 1"),
             (&format!("{SQUARE}f 1 2\n"), 6, "at least 3"),
-            (&format!("{SQUARE}f 1 2 3\nf 1 2 2\n"), 7, "same vertex twice"),
             (&format!("{SQUARE}f 1 2 99999999999999999999\n"), 6, "not a face corner"),
         ];
         for (text, line, part) in cases {
@@ -270,6 +251,9 @@ mod tests {
             );
         }
         assert!(parse(SQUARE).unwrap_err().contains("no faces"));
+        let collapsed = parse(&format!("{SQUARE}f 1 2 3\nf 1 2 2\n")).unwrap().into_polygon_mesh();
+        let message = collapsed.to_tri_mesh(Path::new("shirt.obj")).unwrap_err().to_string();
+        assert!(message.starts_with("shirt.obj:7: face 2 names vertex 2 twice"), "{message}");
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! The last steps of an imported garment: even triangles, outside the body, checked.
 
-use super::push_out::{Contact, contact, push_out};
 use super::reference_surface::ReferenceSurface;
 use super::sheet_repair::boundary_loops;
+use crate::fit::{Contact, contact, push_out};
 use crate::generate::remesh::{Quality, remesh};
 use crate::generate::sheet::{LabelledTriangles, Sheet, smallest_sine};
 use clothcombo_physics::query::Surface;
@@ -31,6 +31,9 @@ impl GarmentResolution {
         (area / (self.vertices.max(3) as f64 * 0.75f64.sqrt())).sqrt().clamp(shortest, longest.max(shortest))
     }
 }
+
+/// Least distance between a garment vertex and the body at rest [m].
+const CLEARANCE: f64 = 0.004;
 
 /// Triangle limits a finished garment has to keep.
 const QUALITY: Quality = Quality { angle: 15.0, edge_ratio: [0.4, 2.5] };
@@ -98,12 +101,12 @@ pub(super) fn finish(
     };
     let (mut positions, faces) = even(sheet, 8);
     let before = contact(&positions, body);
-    push_out(&mut positions, &faces, body);
+    push_out(&mut positions, &faces, body, CLEARANCE);
     // Pushing squeezes some triangles and removes steps of the rim: once more on the pushed sheet.
     let mut pushed = LabelledTriangles { labels: vec![0; positions.len()], positions, faces };
     label_rim(&mut pushed, 0, edge);
     let (mut positions, faces) = even(pushed, 4);
-    push_out(&mut positions, &faces, body);
+    push_out(&mut positions, &faces, body, CLEARANCE);
     let after = contact(&positions, body);
     if after.inside > 0 || after.least_gap < 0.0005 {
         return Err(format!(

@@ -2,8 +2,8 @@
 //! `helper-skirt` hangs from the waist to the floor. Both are CC0.
 
 use super::finish::{GarmentResolution, finish};
-use super::push_out::{Contact, one_rings};
 use crate::asset::{Body, Category};
+use crate::fit::{Contact, one_rings};
 use crate::generate::sheet::LabelledTriangles;
 use clothcombo_physics::query::{Distance, Surface};
 use clothcombo_physics::vec3::{add, add_scaled, normalized, scale};

@@ -9,7 +9,6 @@ mod finish;
 mod helper_garments;
 pub mod makehuman;
 pub mod motions;
-mod push_out;
 mod reference_surface;
 pub mod retarget;
 mod sheet_repair;

@@ -1,37 +1,23 @@
 //! Polygon soup of a game asset → one oriented manifold sheet, or the reason why not.
 
 use super::reference_surface::boundary_edges;
+use crate::fit::{SplitSheet, clean_faces, join_faces, orient, outwardness, split_fans, weld};
 use crate::generate::sheet::LabelledTriangles;
-use clothcombo_physics::query::{Distance, Surface};
-use clothcombo_physics::vec3::{add, cross, dot, norm, norm_squared, normalized, scale, sub};
+use clothcombo_physics::query::Surface;
+use clothcombo_physics::vec3::{add, norm, scale, sub};
 use std::collections::{HashMap, VecDeque};
 
 /// Vertices closer than this are one [m].
 const WELD_DISTANCE: f64 = 1e-4;
+
+/// Faces of less than half this area [m²] are dropped.
+const LEAST_CROSS: f64 = 1e-10;
 
 /// Holes with a shorter rim are filled [m]: button holes and modelling slips.
 const SMALL_HOLE: f64 = 0.06;
 
 /// What was changed, in words.
 pub(super) type Repairs = Vec<String>;
-
-/// Triangulated polygons: quads by the diagonal that leaves the larger smallest angle, others as fans.
-pub(super) fn triangulate(positions: &[[f64; 3]], polygons: &[Vec<u32>]) -> Vec<[u32; 3]> {
-    use crate::generate::sheet::smallest_sine;
-    let sine = |f: [u32; 3]| smallest_sine(f.map(|v| positions[v as usize]));
-    let mut faces = Vec::with_capacity(2 * polygons.len());
-    for polygon in polygons {
-        match polygon[..] {
-            [a, b, c, d] => {
-                let (one, two) = ([[a, b, c], [a, c, d]], [[a, b, d], [b, c, d]]);
-                let worst = |pair: [[u32; 3]; 2]| sine(pair[0]).min(sine(pair[1]));
-                faces.extend(if worst(one) >= worst(two) { one } else { two });
-            }
-            _ => faces.extend(polygon[1..].windows(2).map(|w| [polygon[0], w[0], w[1]])),
-        }
-    }
-    faces
-}
 
 /// Welds, drops degenerate and repeated faces, cuts at non-manifold edges, orients outward, removes linings folded to the
 /// inside, keeps the largest piece, fills small holes.
@@ -41,13 +27,26 @@ pub(super) fn repair(
     body: &Surface<f64>,
 ) -> Result<(LabelledTriangles, Repairs), String> {
     let mut repairs = Repairs::new();
-    let (positions, mut faces) = weld(positions, faces, &mut repairs);
+    let mut repaired = |count: usize, text: String| {
+        if count > 0 {
+            repairs.push(text);
+        }
+    };
+    let welded = weld(positions, WELD_DISTANCE);
+    repaired(welded.merged.len(), format!("welded {} vertices", welded.merged.len()));
+    let renumbered: Vec<[u32; 3]> = faces.iter().map(|f| f.map(|v| welded.number[v as usize])).collect();
+    let clean = clean_faces(&welded.positions, &renumbered, LEAST_CROSS);
+    let dropped = clean.degenerate.len() + clean.repeated.len();
+    repaired(dropped, format!("dropped {dropped} degenerate or repeated faces"));
+    let mut faces: Vec<[u32; 3]> = clean.kept.iter().map(|f| renumbered[*f as usize]).collect();
     if faces.is_empty() {
         return Err("no face has an area".into());
     }
-    let adjacency = join_faces(&positions, &faces, &mut repairs);
-    orient(&mut faces, &adjacency, &mut repairs);
-    let mut sheet = split_fans(&positions, &faces, &adjacency);
+    let (joined, crowded) = join_faces(&welded.positions, &faces);
+    repaired(crowded.len(), format!("cut at {} non-manifold edges", crowded.len()));
+    let turned = orient(&mut faces, &joined).len();
+    repaired(turned, format!("turned {turned} faces"));
+    let mut sheet = unlabelled(split_fans(&welded.positions, &faces, &joined));
     sheet = outermost_piece(sheet, &mut repairs)?;
     turn_outward(&mut sheet, body);
     if boundary_edges(&sheet.faces).is_empty() {
@@ -61,185 +60,12 @@ pub(super) fn repair(
     Ok((sheet, repairs))
 }
 
-fn weld(positions: &[[f64; 3]], faces: &[[u32; 3]], repairs: &mut Repairs) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
-    let cell = |p: [f64; 3]| p.map(|x| (x / WELD_DISTANCE).floor() as i64);
-    let mut grid: HashMap<[i64; 3], Vec<u32>> = HashMap::new();
-    let mut merged: Vec<[f64; 3]> = Vec::new();
-    let number: Vec<u32> = positions
-        .iter()
-        .map(|p| {
-            let c = cell(*p);
-            let mut near = None;
-            'search: for dx in -1..=1 {
-                for dy in -1..=1 {
-                    for dz in -1..=1 {
-                        for v in grid.get(&[c[0] + dx, c[1] + dy, c[2] + dz]).into_iter().flatten() {
-                            if norm_squared(sub(merged[*v as usize], *p)) < WELD_DISTANCE * WELD_DISTANCE {
-                                near = Some(*v);
-                                break 'search;
-                            }
-                        }
-                    }
-                }
-            }
-            near.unwrap_or_else(|| {
-                merged.push(*p);
-                grid.entry(c).or_default().push(merged.len() as u32 - 1);
-                merged.len() as u32 - 1
-            })
-        })
-        .collect();
-    if merged.len() < positions.len() {
-        repairs.push(format!("welded {} vertices", positions.len() - merged.len()));
+fn unlabelled(sheet: SplitSheet) -> LabelledTriangles {
+    LabelledTriangles {
+        labels: vec![0; sheet.positions.len()],
+        positions: sheet.positions,
+        faces: sheet.faces,
     }
-    let mut seen = std::collections::HashSet::new();
-    let kept: Vec<[u32; 3]> = faces
-        .iter()
-        .map(|f| f.map(|v| number[v as usize]))
-        .filter(|f| {
-            let [a, b, c] = f.map(|v| merged[v as usize]);
-            let mut key = *f;
-            key.sort_unstable();
-            f[0] != f[1]
-                && f[1] != f[2]
-                && f[0] != f[2]
-                && norm(cross(sub(b, a), sub(c, a))) > 1e-10
-                && seen.insert(key)
-        })
-        .collect();
-    if kept.len() < faces.len() {
-        repairs.push(format!("dropped {} degenerate or repeated faces", faces.len() - kept.len()));
-    }
-    (merged, kept)
-}
-
-/// Per face and side the face joined there. Where more than two faces meet, the two that continue each other most smoothly
-/// stay joined and the others become edges of their own.
-fn join_faces(positions: &[[f64; 3]], faces: &[[u32; 3]], repairs: &mut Repairs) -> Vec<[Option<u32>; 3]> {
-    let mut sides: HashMap<[u32; 2], Vec<(u32, usize)>> = HashMap::new();
-    for (f, face) in faces.iter().enumerate() {
-        for i in 0..3 {
-            let (a, b) = (face[i], face[(i + 1) % 3]);
-            sides.entry([a.min(b), a.max(b)]).or_default().push((f as u32, i));
-        }
-    }
-    let mut edges: Vec<_> = sides.into_iter().collect();
-    edges.sort_unstable_by_key(|(e, _)| *e);
-    let mut joined = vec![[None; 3]; faces.len()];
-    let mut crowded = 0;
-    for ([a, b], uses) in edges {
-        if uses.len() < 2 {
-            continue;
-        }
-        // Direction from the edge into each face; two faces continue each other when these are opposite.
-        let axis = normalized(sub(positions[b as usize], positions[a as usize]));
-        let into = |f: u32| {
-            let face = faces[f as usize];
-            let c = face[0] ^ face[1] ^ face[2] ^ a ^ b;
-            let d = sub(positions[c as usize], positions[a as usize]);
-            normalized(sub(d, scale(axis, dot(d, axis))))
-        };
-        let mut best = (f64::MAX, 0, 1);
-        for i in 0..uses.len() {
-            for j in i + 1..uses.len() {
-                let fold = dot(into(uses[i].0), into(uses[j].0));
-                if fold < best.0 {
-                    best = (fold, i, j);
-                }
-            }
-        }
-        crowded += usize::from(uses.len() > 2);
-        let ((f, i), (g, j)) = (uses[best.1], uses[best.2]);
-        joined[f as usize][i] = Some(g);
-        joined[g as usize][j] = Some(f);
-    }
-    if crowded > 0 {
-        repairs.push(format!("cut at {crowded} non-manifold edges"));
-    }
-    joined
-}
-
-/// Gives all faces of a piece one orientation, that of the majority of its area being unknown here.
-fn orient(faces: &mut [[u32; 3]], joined: &[[Option<u32>; 3]], repairs: &mut Repairs) {
-    let mut state = vec![0u8; faces.len()];
-    let mut flipped = 0;
-    let original: Vec<[u32; 3]> = faces.to_vec();
-    for seed in 0..faces.len() {
-        if state[seed] != 0 {
-            continue;
-        }
-        state[seed] = 1;
-        let mut piece = vec![seed];
-        let mut queue = VecDeque::from([seed]);
-        while let Some(f) = queue.pop_front() {
-            for i in 0..3 {
-                let Some(g) = joined[f][i].map(|g| g as usize) else { continue };
-                if state[g] != 0 {
-                    continue;
-                }
-                let (a, b) = (original[f][i], original[f][(i + 1) % 3]);
-                let same_way = (0..3).any(|j| original[g][j] == a && original[g][(j + 1) % 3] == b);
-                state[g] = if same_way { 3 - state[f] } else { state[f] };
-                piece.push(g);
-                queue.push_back(g);
-            }
-        }
-        // Turn the smaller part.
-        let turned = piece.iter().filter(|f| state[**f] == 2).count();
-        let turn = if 2 * turned > piece.len() { 1 } else { 2 };
-        for f in piece {
-            if state[f] == turn {
-                faces[f].swap(1, 2);
-                flipped += 1;
-            }
-        }
-    }
-    if flipped > 0 {
-        repairs.push(format!("turned {flipped} faces"));
-    }
-}
-
-/// One vertex per fan of joined faces, so that pieces meeting at an edge or a vertex come apart. Edges whose faces still run
-/// the same way (a Möbius band) are left cut.
-fn split_fans(positions: &[[f64; 3]], faces: &[[u32; 3]], joined: &[[Option<u32>; 3]]) -> LabelledTriangles {
-    // Union-find over face corners.
-    let mut root: Vec<u32> = (0..3 * faces.len() as u32).collect();
-    fn find(root: &mut [u32], mut v: u32) -> u32 {
-        while root[v as usize] != v {
-            root[v as usize] = root[root[v as usize] as usize];
-            v = root[v as usize];
-        }
-        v
-    }
-    let corner = |f: usize, v: u32| (0..3).find(|i| faces[f][*i] == v).map(|i| 3 * f as u32 + i as u32);
-    for f in 0..faces.len() {
-        for g in joined[f].iter().flatten().map(|g| *g as usize).filter(|g| *g > f) {
-            let shared: Vec<u32> = faces[f].iter().copied().filter(|v| faces[g].contains(v)).collect();
-            let [a, b] = shared[..] else { continue };
-            let runs = |face: [u32; 3]| (0..3).any(|i| face[i] == a && face[(i + 1) % 3] == b);
-            if runs(faces[f]) == runs(faces[g]) {
-                continue;
-            }
-            for v in [a, b] {
-                if let (Some(p), Some(q)) = (corner(f, v), corner(g, v)) {
-                    let (p, q) = (find(&mut root, p), find(&mut root, q));
-                    root[p.max(q) as usize] = p.min(q);
-                }
-            }
-        }
-    }
-    let mut sheet = LabelledTriangles::default();
-    let mut number = HashMap::new();
-    for (f, face) in faces.iter().enumerate() {
-        sheet.faces.push(std::array::from_fn(|i| {
-            *number.entry(find(&mut root, (3 * f + i) as u32)).or_insert_with(|| {
-                sheet.positions.push(positions[face[i] as usize]);
-                sheet.positions.len() as u32 - 1
-            })
-        }));
-    }
-    sheet.labels = vec![0; sheet.positions.len()];
-    sheet
 }
 
 /// The largest piece, if the others are trimmings.
@@ -261,23 +87,8 @@ fn outermost_piece(sheet: LabelledTriangles, repairs: &mut Repairs) -> Result<La
     Ok(largest)
 }
 
-/// Area-weighted direction of every face against the direction away from the body, in [−1, 1].
-fn outwardness(sheet: &LabelledTriangles, body: &Surface<f64>) -> Vec<(f64, f64)> {
-    sheet
-        .faces
-        .iter()
-        .map(|f| {
-            let [a, b, c] = f.map(|v| sheet.positions[v as usize]);
-            let normal = cross(sub(b, a), sub(c, a));
-            let centre = scale(add(add(a, b), c), 1.0 / 3.0);
-            let away = body.gap(centre, Distance::ClosestPoint).gradient;
-            (dot(normalized(normal), away), 0.5 * norm(normal))
-        })
-        .collect()
-}
-
 fn turn_outward(sheet: &mut LabelledTriangles, body: &Surface<f64>) {
-    let sum: f64 = outwardness(sheet, body).iter().map(|(d, area)| d * area).sum();
+    let sum: f64 = outwardness(&sheet.positions, &sheet.faces, body).iter().map(|(d, area)| d * area).sum();
     if sum < 0.0 {
         sheet.faces.iter_mut().for_each(|f| f.swap(1, 2));
     }
@@ -289,7 +100,7 @@ fn open_shell(
     body: &Surface<f64>,
     repairs: &mut Repairs,
 ) -> Result<(), String> {
-    let facing = outwardness(sheet, body);
+    let facing = outwardness(&sheet.positions, &sheet.faces, body);
     let total = sheet.area();
     let faces = sheet.faces.iter().zip(&facing).filter(|(_, (d, _))| *d > 0.0).map(|(f, _)| *f).collect();
     let outside =
@@ -310,7 +121,7 @@ fn peel_lining(
     body: &Surface<f64>,
     repairs: &mut Repairs,
 ) -> Result<(), String> {
-    let facing = outwardness(sheet, body);
+    let facing = outwardness(&sheet.positions, &sheet.faces, body);
     let total: f64 = facing.iter().map(|(_, a)| a).sum();
     let mut of_edge: HashMap<[u32; 2], Vec<u32>> = HashMap::new();
     for (f, face) in sheet.faces.iter().enumerate() {
@@ -349,8 +160,8 @@ fn peel_lining(
     let faces = sheet.faces.iter().zip(&gone).filter(|(_, g)| !**g).map(|(f, _)| *f).collect();
     let rest = LabelledTriangles { positions: sheet.positions.clone(), labels: sheet.labels.clone(), faces };
     // Removing faces may leave vertices that two fans share.
-    let joined = join_faces(&rest.positions, &rest.faces, &mut Repairs::new());
-    *sheet = split_fans(&rest.positions, &rest.faces, &joined).largest_component();
+    let (joined, _) = join_faces(&rest.positions, &rest.faces);
+    *sheet = unlabelled(split_fans(&rest.positions, &rest.faces, &joined)).largest_component();
     repairs.push(format!(
         "removed {:.0} % of the area that was folded to the inside",
         100.0 * (1.0 - sheet.area() / total)
@@ -433,7 +244,8 @@ mod tests {
         let flipped: Vec<[u32; 3]> = mesh.faces().iter().map(|f| [f[0], f[2], f[1]]).collect();
         for faces in [mesh.faces(), &flipped] {
             let (sheet, _) = run(mesh.positions(), faces).unwrap();
-            let out: f64 = outwardness(&sheet, &ball()).iter().map(|(d, a)| d * a).sum();
+            let out: f64 =
+                outwardness(&sheet.positions, &sheet.faces, &ball()).iter().map(|(d, a)| d * a).sum();
             assert!(out > 0.0);
         }
     }
@@ -480,10 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn quads_take_the_better_diagonal_and_small_holes_are_filled() {
-        let positions = [[0.0, 0.0, 0.0], [1.0, -0.2, 0.0], [3.0, 0.0, 0.0], [1.0, 0.2, 0.0]];
-        let faces = triangulate(&positions, &[vec![0, 1, 2, 3]]);
-        assert_eq!(faces, [[0, 1, 3], [1, 2, 3]]);
+    fn small_holes_are_filled() {
         let mesh = tube(0.2, 0.3, 96, 24);
         let faces: Vec<[u32; 3]> =
             mesh.faces().iter().enumerate().filter(|(n, _)| *n != 500).map(|(_, f)| *f).collect();

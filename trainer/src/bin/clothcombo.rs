@@ -20,6 +20,8 @@ struct Arguments {
 enum Verb {
     #[command(subcommand)]
     Bench(cli::bench::Bench),
+    Check(cli::check::Arguments),
+    Fit(cli::fit::Arguments),
     Generate(cli::generate::Arguments),
     #[command(subcommand)]
     Import(cli::import::Source),
@@ -32,6 +34,8 @@ fn main() -> ExitCode {
     cli::start_logging("info");
     cli::exit_code(match &arguments.verb {
         Verb::Bench(bench) => cli::bench::run(bench),
+        Verb::Check(arguments) => cli::check::run(arguments),
+        Verb::Fit(arguments) => cli::fit::run(arguments),
         Verb::Generate(arguments) => cli::generate::run(arguments),
         Verb::Import(source) => cli::import::run(source),
         Verb::Prepare(arguments) => cli::prepare::run(arguments),

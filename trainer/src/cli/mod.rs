@@ -1,6 +1,8 @@
 //! The command lines of the two programs.
 
 pub mod bench;
+pub mod check;
+pub mod fit;
 pub mod generate;
 pub mod import;
 pub mod prepare;

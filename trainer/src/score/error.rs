@@ -1,6 +1,6 @@
 //! What can be wrong with meshes to be scored.
 
-use clothcombo_data::format::obj::ObjError;
+use clothcombo_data::format::MeshFileError;
 use clothcombo_physics::energy::EnergyError;
 use clothcombo_physics::mesh::MeshError;
 use miette::Diagnostic;
@@ -13,10 +13,12 @@ pub enum ScoreError {
     /// A mesh file is missing or wrong; the message names file and line.
     // Not a `source`: its text would be printed twice.
     #[error("{reason}")]
-    #[diagnostic(help("every mesh is an OBJ file of triangles, quads or polygons, in metres"))]
+    #[diagnostic(help(
+        "every mesh is an OBJ, PLY, STL or glTF file of triangles, quads or polygons, in metres"
+    ))]
     File {
         /// What the reader said.
-        reason: ObjError,
+        reason: MeshFileError,
     },
     /// Every garment needs both its files.
     #[error("{rest} rest meshes (--rest) but {draped} draped meshes (--draped)")]
@@ -94,8 +96,8 @@ pub enum ScoreError {
     },
 }
 
-impl From<ObjError> for ScoreError {
-    fn from(reason: ObjError) -> Self {
+impl From<MeshFileError> for ScoreError {
+    fn from(reason: MeshFileError) -> Self {
         ScoreError::File { reason }
     }
 }

@@ -1,7 +1,7 @@
-//! Meshes to be scored, from OBJ files.
+//! Meshes to be scored, from files of any mesh format.
 
 use super::{DrapedGarment, MeshSize, Score, ScoreDistance, ScoreError, score};
-use clothcombo_data::format::obj;
+use clothcombo_data::format::load_tri_mesh;
 use clothcombo_physics::mesh::TriMesh;
 use std::path::{Path, PathBuf};
 
@@ -25,7 +25,7 @@ pub fn score_files(files: &MeshFiles, distance: ScoreDistance) -> Result<Score, 
     if rest.len() != draped.len() {
         return Err(ScoreError::FileCounts { rest: rest.len(), draped: draped.len() });
     }
-    let body = obj::load(body)?;
+    let body = load_tri_mesh(body)?;
     let loaded = rest.iter().zip(draped).map(|(rest, draped)| load_garment(rest, draped));
     let loaded = loaded.collect::<Result<Vec<_>, _>>()?;
     let garments: Vec<DrapedGarment> = loaded
@@ -37,7 +37,7 @@ pub fn score_files(files: &MeshFiles, distance: ScoreDistance) -> Result<Score, 
 
 /// Name, rest mesh and draped mesh of a garment, which have the same faces.
 fn load_garment(rest_path: &Path, draped_path: &Path) -> Result<(String, TriMesh, TriMesh), ScoreError> {
-    let (rest, draped) = (obj::load(rest_path)?, obj::load(draped_path)?);
+    let (rest, draped) = (load_tri_mesh(rest_path)?, load_tri_mesh(draped_path)?);
     let size = |path: &Path, mesh: &TriMesh| MeshSize {
         path: path.to_owned(),
         vertices: mesh.vertex_count(),

@@ -14,11 +14,11 @@ pub use unpose::{Unposing, upright};
 
 use super::amass::turn_root_to_y_up;
 use super::motions::{Clip, Input, MotionImportError, write_motions};
-use super::push_out::contact;
 use super::thinning::{Thinned, Thinning, thin};
 use super::{Progress, Summary};
 use crate::asset::{BindingSettings, Body, Category, Garment, Motion, Provenance};
 use crate::dataset::garment_folder::{FolderGarment, GarmentFolderError, save_garment_folder};
+use crate::fit::contact;
 use crate::format::{NpzError, NpzWriter, PointCache, obj};
 use clothcombo_physics::query::Surface;
 use manifest::{GarmentEntry, SampleEntry};

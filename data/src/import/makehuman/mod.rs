@@ -9,11 +9,11 @@ mod proxy;
 use super::anny::{AnnyError, AnnySettings, BaseModel};
 use super::finish::{GarmentResolution, finish, label_rim};
 use super::helper_garments::cut_helpers;
-use super::push_out::Contact;
-use super::sheet_repair::{self, triangulate};
+use super::sheet_repair;
 use super::{Progress, Summary};
 use crate::asset::{Body, Category, Garment, Provenance};
 use crate::dataset::garment_folder::{FolderGarment, GarmentFolderError, save_garment_folder};
+use crate::fit::{Contact, triangulate, worn_where};
 use crate::generate::sheet::LabelledTriangles;
 use archive::read_proxies;
 use clothcombo_physics::TriMesh;
@@ -151,8 +151,9 @@ fn import_proxy(
     let refuse = |reason: String| (name.clone(), reason);
     let licence = proxy.open_licence().map_err(refuse)?;
     let positions = proxy.positions(&model.mean_positions).map_err(refuse)?;
-    worn_where(&positions, body).map_err(refuse)?;
-    let faces = triangulate(&positions, &proxy.polygons);
+    worn_where(&positions, body)
+        .map_err(|place| refuse(format!("not one of the six garment categories: {place}")))?;
+    let (faces, _) = triangulate(&positions, proxy.polygons.iter().map(Vec::as_slice));
     let (mut sheet, mut repairs) = sheet_repair::repair(&positions, &faces, surface).map_err(refuse)?;
     let edge = settings.resolution.edge_for(sheet.area());
     label_rim(&mut sheet, 2, edge);
@@ -233,21 +234,4 @@ fn helper_garments(
         progress("cutting helper garments", done + 1, total);
     }
     taken
-}
-
-/// Refuses what does not clothe the trunk or the hips.
-fn worn_where(positions: &[[f64; 3]], body: &Body) -> Result<(), String> {
-    let joint = |j: usize| body.joint_template.get(j).copied().unwrap_or([0.0; 3]);
-    let (neck, knee, shoulder) = (joint(12), joint(4), joint(16));
-    let all = |test: &dyn Fn(&[f64; 3]) -> bool| positions.iter().all(test);
-    let outcome = if all(&|p| p[1] > neck[1]) {
-        "worn on the head"
-    } else if all(&|p| p[1] < knee[1]) {
-        "worn on the feet"
-    } else if all(&|p| p[0].abs() > shoulder[0]) {
-        "worn on the arms only"
-    } else {
-        return Ok(());
-    };
-    Err(format!("not one of the six garment categories: {outcome}"))
 }

@@ -4,19 +4,16 @@ use clothcombo_physics::query::{Distance, Surface};
 use clothcombo_physics::vec3::{add, add_scaled, scale};
 use rayon::prelude::*;
 
-/// Least distance between a garment vertex and the body at rest [m].
-pub(super) const CLEARANCE: f64 = 0.004;
-
 /// How far inside, how often.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Contact {
+pub(crate) struct Contact {
     /// Vertices inside the body.
     pub inside: usize,
     /// Smallest gap of a vertex [m].
     pub least_gap: f64,
 }
 
-pub(super) fn contact(positions: &[[f64; 3]], body: &Surface<f64>) -> Contact {
+pub(crate) fn contact(positions: &[[f64; 3]], body: &Surface<f64>) -> Contact {
     let gaps: Vec<f64> = positions.par_iter().map(|p| body.gap(*p, Distance::ClosestPoint).gap).collect();
     Contact {
         inside: gaps.iter().filter(|g| **g < 0.0).count(),
@@ -24,20 +21,20 @@ pub(super) fn contact(positions: &[[f64; 3]], body: &Surface<f64>) -> Contact {
     }
 }
 
-/// Pushes vertices along the body's normal until every vertex is `CLEARANCE` away and no face centre touches the body. The
+/// Pushes vertices along the body's normal until every vertex is `clearance` [m] away and no face centre touches the body. The
 /// displacement is smoothed over the garment, so that its neighbourhood comes along instead of leaving a dent.
-pub(super) fn push_out(positions: &mut [[f64; 3]], faces: &[[u32; 3]], body: &Surface<f64>) {
+pub(crate) fn push_out(positions: &mut [[f64; 3]], faces: &[[u32; 3]], body: &Surface<f64>, clearance: f64) {
     let rings = one_rings(positions.len(), faces);
     const ROUNDS: usize = 40;
     for round in 0..ROUNDS {
         let mut displacement: Vec<[f64; 3]> =
-            positions.par_iter().map(|p| missing(*p, CLEARANCE, body)).collect();
+            positions.par_iter().map(|p| missing(*p, clearance, body)).collect();
         // Face centres: a large triangle can cut a bulge while its corners are outside.
         let centres: Vec<[f64; 3]> = faces
             .par_iter()
             .map(|f| {
                 let [a, b, c] = f.map(|v| positions[v as usize]);
-                missing(scale(add(add(a, b), c), 1.0 / 3.0), 0.6 * CLEARANCE, body)
+                missing(scale(add(add(a, b), c), 1.0 / 3.0), 0.6 * clearance, body)
             })
             .collect();
         for (f, d) in faces.iter().zip(centres) {
@@ -91,7 +88,7 @@ fn missing(p: [f64; 3], clearance: f64, body: &Surface<f64>) -> [f64; 3] {
     if gap.gap < clearance { scale(gap.gradient, clearance * 1.02 - gap.gap) } else { [0.0; 3] }
 }
 
-pub(super) fn one_rings(vertices: usize, faces: &[[u32; 3]]) -> Vec<Vec<u32>> {
+pub(crate) fn one_rings(vertices: usize, faces: &[[u32; 3]]) -> Vec<Vec<u32>> {
     let mut rings: Vec<Vec<u32>> = vec![Vec::new(); vertices];
     for f in faces {
         for i in 0..3 {
@@ -108,6 +105,8 @@ pub(super) fn one_rings(vertices: usize, faces: &[[u32; 3]]) -> Vec<Vec<u32>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const CLEARANCE: f64 = 0.004;
     use clothcombo_physics::mesh::shapes::{icosphere, tube};
 
     #[test]
@@ -116,7 +115,7 @@ mod tests {
         let belt = tube(0.199, 0.2, 48, 16);
         let mut positions = belt.positions().to_vec();
         assert!(contact(&positions, &ball).inside > 0);
-        push_out(&mut positions, belt.faces(), &ball);
+        push_out(&mut positions, belt.faces(), &ball, CLEARANCE);
         let after = contact(&positions, &ball);
         assert_eq!(after.inside, 0);
         assert!(after.least_gap > 0.9 * CLEARANCE, "{after:?}");
@@ -126,7 +125,7 @@ mod tests {
 
         let far = tube(0.5, 0.2, 16, 4);
         let mut same = far.positions().to_vec();
-        push_out(&mut same, far.faces(), &ball);
+        push_out(&mut same, far.faces(), &ball, CLEARANCE);
         assert_eq!(same, far.positions());
     }
 }

@@ -1,0 +1,88 @@
+//! A body file.
+
+use super::FileCheck;
+use crate::asset::{BODY_JOINT_COUNT, Body, BodyFileSettings};
+use crate::format::NpzFile;
+use clothcombo_physics::Topology;
+use serde::Serialize;
+use std::path::Path;
+
+/// Measurements of a body file.
+#[derive(Clone, Debug, Serialize)]
+pub struct BodyCheck {
+    /// Vertices.
+    pub vertices: usize,
+    /// Triangles.
+    pub triangles: usize,
+    /// Joints.
+    pub joints: usize,
+    /// Shape components.
+    pub shape_components: usize,
+    /// Whether it has pose-corrective blend shapes.
+    pub pose_correctives: bool,
+    /// Height of the zero body [m].
+    pub height: f64,
+    /// Smallest and largest sum of the skin weights of a vertex, as written in the file.
+    pub weight_sums: [f64; 2],
+    /// Connected components of the surface.
+    pub components: usize,
+    /// Boundary curves of the surface; a whole body has none.
+    pub boundary_loops: usize,
+    /// Edges with three or more triangles.
+    pub non_manifold_edges: usize,
+}
+
+pub(super) fn check(path: &Path, npz: &mut NpzFile) -> FileCheck {
+    let body = match Body::load(path, &BodyFileSettings { shape_components: usize::MAX }) {
+        Ok(body) => body,
+        Err(e) => return FileCheck::unusable(path, e),
+    };
+    // The loader normalises each row: the sums are those of the file.
+    let weights = match npz.numbers_f32("weights", "") {
+        Ok(weights) => weights.data,
+        Err(e) => return FileCheck::unusable(path, e),
+    };
+    let sums = weights
+        .chunks_exact(body.joint_count().max(1))
+        .map(|row| row.iter().map(|w| f64::from(*w)).sum::<f64>());
+    let weight_sums = sums.fold([f64::MAX, f64::MIN], |[low, high], s| [low.min(s), high.max(s)]);
+    let mesh = body.zero_body();
+    let topology = Topology::new(&mesh);
+    let (low, high) = mesh.bounds();
+    let mut file = FileCheck::new(path);
+    let check = BodyCheck {
+        vertices: body.vertex_count(),
+        triangles: body.faces.len(),
+        joints: body.joint_count(),
+        shape_components: body.shape_count,
+        pose_correctives: body.pose_directions.is_some(),
+        height: high[1] - low[1],
+        weight_sums,
+        components: topology.component_count - topology.unreferenced.len(),
+        boundary_loops: topology.boundary_loops.len(),
+        non_manifold_edges: topology.non_manifold_edges.len(),
+    };
+    if check.joints < BODY_JOINT_COUNT {
+        file.unusable = Some(format!(
+            "{}: {} joints; poses turn the {BODY_JOINT_COUNT} body joints of SMPL",
+            path.display(),
+            check.joints
+        ));
+    }
+    if weight_sums.iter().any(|s| (s - 1.0).abs() > 1e-3) {
+        let [low, high] = weight_sums;
+        file.warnings
+            .push(format!("skin weights sum to {low:.4}–{high:.4} instead of 1; they are normalised"));
+    }
+    if !(0.4..=2.8).contains(&check.height) {
+        file.warnings.push(format!("{:.2} m high: are the units metres and y up?", check.height));
+    }
+    if check.boundary_loops > 0 {
+        file.warnings.push(format!("{} holes in the surface", check.boundary_loops));
+    }
+    if check.non_manifold_edges > 0 {
+        file.warnings.push(format!("{} non-manifold edges", check.non_manifold_edges));
+    }
+    file.body = Some(check);
+    file
+}

@@ -1,0 +1,130 @@
+//! A garment file: the mesh, what it is, and how it lies on the body.
+
+use super::FileCheck;
+use super::measures::MeshMeasures;
+use super::targets::ManifestHints;
+use crate::asset::{Body, Category, Garment};
+use crate::format::load_tri_mesh;
+use clothcombo_physics::Topology;
+use clothcombo_physics::contact::{self_triangle_pairs, triangle_pairs};
+use clothcombo_physics::query::{Distance, Surface};
+use rayon::prelude::*;
+use serde::Serialize;
+use std::path::Path;
+
+/// A garment farther from the body than this is not on it [m].
+const OFF_BODY: f64 = 0.1;
+
+/// Measurements of a garment file.
+#[derive(Clone, Debug, Serialize)]
+pub struct GarmentCheck {
+    /// The mesh and its defects.
+    pub mesh: MeshMeasures,
+    /// Category, of the manifest or guessed.
+    pub category: Category,
+    /// Whether the category is a guess.
+    pub category_guessed: bool,
+    /// Lowest and highest layer, of the manifest or guessed.
+    pub layer: [u32; 2],
+    /// Whether the layer is a guess.
+    pub layer_guessed: bool,
+    /// Whether its rim is held: by the manifest, or because it lies wholly below the collarbone.
+    pub holding: bool,
+    /// Least signed distance of a vertex to the body at rest [mm], negative inside.
+    pub distance_min_mm: f64,
+    /// Median distance [mm].
+    pub distance_median_mm: f64,
+    /// Vertices inside the body.
+    pub inside: usize,
+    /// Garment and body triangles that intersect (exact).
+    pub body_triangle_pairs: usize,
+    /// Triangles that intersect each other (exact).
+    pub self_triangle_pairs: usize,
+}
+
+/// The layers a garment is worn in, from its median distance to the body [m]: what lies closer than 8 mm goes under everything,
+/// what lies farther than 20 mm, or is open in front, over something.
+pub fn layer_guess(median_distance: f64, category: Category) -> [u32; 2] {
+    let lowest = match median_distance {
+        d if d < 0.008 => 1,
+        d if d < 0.02 => 2,
+        _ => 3,
+    };
+    let lowest = if category == Category::OpenShirt { lowest.max(2) } else { lowest };
+    [lowest, lowest + 1]
+}
+
+pub(super) fn check(path: &Path, hints: &ManifestHints, body: &Body, surface: &Surface<f64>) -> FileCheck {
+    let mesh = match load_tri_mesh(path) {
+        Ok(mesh) => mesh,
+        Err(e) => return FileCheck::unusable(path, e),
+    };
+    let area = mesh.area();
+    if !(area > 0.0 && area.is_finite()) {
+        return FileCheck::unusable(
+            path,
+            format!("{}: no area: all {} triangles are collapsed", path.display(), mesh.face_count()),
+        );
+    }
+    let topology = Topology::new(&mesh);
+    let mut gaps: Vec<f64> = mesh
+        .positions()
+        .par_iter()
+        .with_min_len(256)
+        .map(|p| surface.gap(*p, Distance::ClosestPoint).gap)
+        .collect();
+    gaps.sort_by(f64::total_cmp);
+    let median = gaps[gaps.len() / 2];
+    let category = hints.category.unwrap_or_else(|| Category::guess(&mesh, body));
+    let garment = GarmentCheck {
+        mesh: MeshMeasures::new(&mesh, &topology),
+        category,
+        category_guessed: hints.category.is_none(),
+        layer: hints.layer.unwrap_or_else(|| layer_guess(median, category)),
+        layer_guessed: hints.layer.is_none(),
+        holding: hints.holding.unwrap_or_else(|| Garment::needs_holding(&mesh, body)),
+        distance_min_mm: 1e3 * gaps[0],
+        distance_median_mm: 1e3 * median,
+        inside: gaps.iter().filter(|g| **g < 0.0).count(),
+        body_triangle_pairs: triangle_pairs(
+            mesh.positions(),
+            mesh.faces(),
+            &surface.positions,
+            &surface.faces,
+        )
+        .len(),
+        self_triangle_pairs: self_triangle_pairs(mesh.positions(), mesh.faces()).len(),
+    };
+    let mut file = FileCheck::new(path);
+    file.warnings = warnings(&garment, body);
+    file.garment = Some(garment);
+    file
+}
+
+fn warnings(garment: &GarmentCheck, body: &Body) -> Vec<String> {
+    let mut warnings: Vec<String> =
+        garment.mesh.defects.counts().into_iter().map(|(n, name)| format!("{n} {name}")).collect();
+    if garment.mesh.boundary_loops == 0 {
+        warnings.push("closed: a garment has openings".into());
+    }
+    if garment.distance_min_mm > 1e3 * OFF_BODY {
+        warnings.push(format!(
+            "not on body '{}': {:.0} mm away; `clothcombo fit` moves, scales and turns it",
+            body.name, garment.distance_min_mm
+        ));
+    } else if 2 * garment.inside > garment.mesh.vertices {
+        warnings.push(format!(
+            "mostly inside body '{}': wrong unit or body? `clothcombo fit` finds out",
+            body.name
+        ));
+    } else if garment.inside > 0 || garment.body_triangle_pairs > 0 {
+        warnings.push(format!(
+            "{} vertices inside the body at rest, {} triangle pairs",
+            garment.inside, garment.body_triangle_pairs
+        ));
+    }
+    if garment.self_triangle_pairs > 0 {
+        warnings.push(format!("{} triangle pairs with itself", garment.self_triangle_pairs));
+    }
+    warnings
+}

@@ -1,0 +1,110 @@
+//! Is this file usable, and what is it like: garments, bodies, motions.
+//!
+//! A file is unusable when training would refuse it; everything else worth knowing is a warning.
+
+mod body;
+mod garment;
+pub(crate) mod measures;
+mod motion;
+mod targets;
+
+pub use body::BodyCheck;
+pub use garment::{GarmentCheck, layer_guess};
+pub use measures::{MeshDefects, MeshMeasures};
+pub use motion::MotionCheck;
+pub use targets::{ManifestHints, Target, find_targets};
+
+use crate::asset::Body;
+use crate::format::NpzFile;
+use clothcombo_physics::Surface;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// What was found out about one file.
+#[derive(Clone, Debug, Serialize)]
+pub struct FileCheck {
+    /// The file.
+    pub path: PathBuf,
+    /// Why it cannot be used, if so.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unusable: Option<String>,
+    /// What should be looked at.
+    pub warnings: Vec<String>,
+    /// If it is a garment.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub garment: Option<GarmentCheck>,
+    /// If it is a body.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub body: Option<BodyCheck>,
+    /// If it is a motion.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub motion: Option<MotionCheck>,
+}
+
+impl FileCheck {
+    fn new(path: &Path) -> Self {
+        Self {
+            path: path.into(),
+            unusable: None,
+            warnings: Vec::new(),
+            garment: None,
+            body: None,
+            motion: None,
+        }
+    }
+
+    fn unusable(path: &Path, reason: impl ToString) -> Self {
+        Self { unusable: Some(reason.to_string()), ..Self::new(path) }
+    }
+}
+
+/// Checks files against one body.
+#[derive(Debug)]
+pub struct Checker {
+    body: Body,
+    surface: Surface<f64>,
+}
+
+impl Checker {
+    /// Garments are measured against the zero body of `body`.
+    pub fn new(body: Body) -> Self {
+        let surface = Surface::new(body.template.clone(), body.faces.clone());
+        // Built once here, not by the first of many threads.
+        surface.closest_point();
+        Self { body, surface }
+    }
+
+    /// Checks one file.
+    pub fn check(&self, target: &Target) -> FileCheck {
+        match target {
+            Target::Garment { path, entry } => garment::check(path, entry, &self.body, &self.surface),
+            Target::Npz { path } => check_npz(path),
+            Target::Unusable { path, reason } => FileCheck::unusable(path, reason),
+        }
+    }
+}
+
+fn check_npz(path: &Path) -> FileCheck {
+    let mut file = match NpzFile::open(path) {
+        Ok(file) => file,
+        Err(e) => return FileCheck::unusable(path, e),
+    };
+    if file.contains("v_template") {
+        body::check(path, &mut file)
+    } else if file.contains("poses") {
+        motion::check(path)
+    } else {
+        FileCheck::unusable(
+            path,
+            format!("{}: neither a body (no key 'v_template') nor a motion (no key 'poses')", path.display()),
+        )
+    }
+}
+
+/// Whether a file is a body npz, by its keys.
+pub fn is_body_file(path: &Path) -> bool {
+    NpzFile::open(path).is_ok_and(|file| file.contains("v_template"))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,79 @@
+//! A motion file.
+
+use super::FileCheck;
+use crate::asset::{BODY_JOINT_NAMES, Motion};
+use crate::generate::pose::JOINT_LIMITS;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Measurements of a motion file.
+#[derive(Clone, Debug, Serialize)]
+pub struct MotionCheck {
+    /// Frames.
+    pub frames: usize,
+    /// Frames per second.
+    pub frame_rate: f64,
+    /// Duration [s].
+    pub duration: f64,
+    /// Frames in which a joint is outside its range of motion by more than a degree.
+    pub frames_outside_limits: usize,
+    /// Frames outside the range of motion, by joint.
+    pub joints_outside_limits: BTreeMap<String, usize>,
+    /// Largest excess over a limit [degrees].
+    pub largest_excess_degrees: f64,
+}
+
+/// Recorded motion exceeds the limits of single angles by tens of degrees in a frame or other; no joint does by this much
+/// [degrees].
+const IMPOSSIBLE: f64 = 90.0;
+
+/// Excess over a limit that is measurement noise [degrees].
+const TOLERANCE: f64 = 1.0;
+
+pub(super) fn check(path: &Path) -> FileCheck {
+    // NaN, wrong shapes and rates are refused here, with frame and joint.
+    let motion = match Motion::load(path) {
+        Ok(motion) => motion,
+        Err(e) => return FileCheck::unusable(path, e),
+    };
+    if motion.poses.is_empty() {
+        return FileCheck::unusable(path, format!("{}: no frames", path.display()));
+    }
+    let mut check = MotionCheck {
+        frames: motion.poses.len(),
+        frame_rate: motion.frame_rate,
+        duration: motion.poses.len() as f64 / motion.frame_rate,
+        frames_outside_limits: 0,
+        joints_outside_limits: BTreeMap::new(),
+        largest_excess_degrees: 0.0,
+    };
+    for pose in &motion.poses {
+        let mut outside = false;
+        // The heading of the pelvis is free, and falls and floor poses turn it any way.
+        for joint in 1..JOINT_LIMITS.len() {
+            let (rotation, limits) = (pose.rotation(joint), &JOINT_LIMITS[joint]);
+            let excess = (0..3)
+                .map(|a| {
+                    let angle = rotation[a].to_degrees();
+                    (limits.low[a] - angle).max(angle - limits.high[a])
+                })
+                .fold(0.0, f64::max);
+            check.largest_excess_degrees = check.largest_excess_degrees.max(excess);
+            if excess > TOLERANCE {
+                outside = true;
+                *check.joints_outside_limits.entry(BODY_JOINT_NAMES[joint].to_string()).or_default() += 1;
+            }
+        }
+        check.frames_outside_limits += usize::from(outside);
+    }
+    let mut file = FileCheck::new(path);
+    if check.largest_excess_degrees > IMPOSSIBLE {
+        file.warnings.push(format!(
+            "joints turn up to {:.0}° beyond their range: other axes, or angles in degrees?",
+            check.largest_excess_degrees
+        ));
+    }
+    file.motion = Some(check);
+    file
+}

@@ -1,0 +1,126 @@
+//! Which files a list of paths means.
+
+use crate::asset::Category;
+use crate::dataset::garment_folder::{MANIFEST, read_entries};
+use crate::format::mesh::is_mesh_path;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Folders are followed this deep.
+const MAX_DEPTH: usize = 12;
+
+/// What a manifest says about a garment; nothing without one.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ManifestHints {
+    /// Category.
+    pub category: Option<Category>,
+    /// Lowest and highest layer.
+    pub layer: Option<[u32; 2]>,
+    /// Whether it is held.
+    pub holding: Option<bool>,
+}
+
+/// A file to check.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Target {
+    /// A mesh, and what its manifest says.
+    Garment {
+        /// The file.
+        path: PathBuf,
+        /// From `garments.toml`.
+        entry: ManifestHints,
+    },
+    /// A body or a motion.
+    Npz {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Something that is known to be wrong before it is opened.
+    Unusable {
+        /// The file or folder.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+}
+
+impl Target {
+    /// The file.
+    pub fn path(&self) -> &Path {
+        match self {
+            Self::Garment { path, .. } | Self::Npz { path } | Self::Unusable { path, .. } => path,
+        }
+    }
+}
+
+/// All meshes and npz files of `paths`: files as they are, folders with everything below them, sorted by name. In a folder with a
+/// `garments.toml` the meshes are those it lists.
+pub fn find_targets(paths: &[PathBuf]) -> Vec<Target> {
+    let mut targets = Vec::new();
+    for path in paths {
+        match fs::metadata(path) {
+            Ok(m) if m.is_dir() => {
+                let before = targets.len();
+                visit(path, 0, &mut targets);
+                if targets.len() == before {
+                    let reason = format!("{}: no garments, bodies or motions in it", path.display());
+                    targets.push(Target::Unusable { path: path.clone(), reason });
+                }
+            }
+            Ok(_) => targets.push(file_target(path).unwrap_or_else(|| Target::Unusable {
+                path: path.clone(),
+                reason: format!(
+                    "{}: no known kind of file; garments are .obj, .ply, .stl, .gltf or .glb, bodies and motions .npz",
+                    path.display()
+                ),
+            })),
+            Err(e) => {
+                targets.push(Target::Unusable { path: path.clone(), reason: format!("{}: {e}", path.display()) });
+            }
+        }
+    }
+    targets
+}
+
+fn file_target(path: &Path) -> Option<Target> {
+    if is_mesh_path(path) {
+        return Some(Target::Garment { path: path.into(), entry: ManifestHints::default() });
+    }
+    let is_npz = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npz"));
+    is_npz.then(|| Target::Npz { path: path.into() })
+}
+
+fn visit(folder: &Path, depth: usize, targets: &mut Vec<Target>) {
+    let wrong = |reason: String| Target::Unusable { path: folder.into(), reason };
+    let mut children: Vec<PathBuf> = match fs::read_dir(folder) {
+        Ok(entries) => entries.filter_map(|e| Some(e.ok()?.path())).collect(),
+        Err(e) => return targets.push(wrong(format!("{}: {e}", folder.display()))),
+    };
+    children.sort();
+    let has_manifest = folder.join(MANIFEST).exists();
+    if has_manifest {
+        match read_entries(folder) {
+            Ok(entries) => targets.extend(entries.into_iter().map(|entry| {
+                let path = folder.join(entry.file());
+                if path.is_file() {
+                    let (category, layer, holding) = (entry.category, entry.layer, entry.holding);
+                    Target::Garment { path, entry: ManifestHints { category, layer, holding } }
+                } else {
+                    let reason =
+                        format!("{}: {MANIFEST} lists it, but there is no such file", path.display());
+                    Target::Unusable { path, reason }
+                }
+            })),
+            Err(e) => targets.push(Target::Unusable { path: folder.join(MANIFEST), reason: e.to_string() }),
+        }
+    }
+    for child in children {
+        if child.is_dir() {
+            if depth < MAX_DEPTH {
+                visit(&child, depth + 1, targets);
+            }
+        } else if !(has_manifest && is_mesh_path(&child)) {
+            targets.extend(file_target(&child));
+        }
+    }
+}

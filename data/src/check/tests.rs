@@ -1,0 +1,81 @@
+use super::*;
+use crate::asset::{Category, Garment, Motion, Pose, Provenance};
+use crate::dataset::{FolderGarment, save_garment_folder};
+use crate::format::obj;
+use crate::generate::{GarmentGenerator, GarmentSettings, mannequin};
+use std::fs;
+
+fn by_name<'a>(files: &'a [FileCheck], name: &str) -> &'a FileCheck {
+    files.iter().find(|f| f.path.ends_with(name)).unwrap()
+}
+
+#[test]
+fn a_dataset_with_good_and_bad_files_is_told_apart() {
+    let body = mannequin();
+    let settings = GarmentSettings { target_vertices: 400, ..GarmentSettings::default() };
+    let generator = GarmentGenerator::new(&body).unwrap();
+    let garments: Vec<FolderGarment> = [Category::Skirt, Category::TShirt]
+        .into_iter()
+        .map(|category| FolderGarment {
+            garment: generator.generate(category, 1, &settings).unwrap(),
+            layer: Some([2, 3]),
+            path: PathBuf::new(),
+        })
+        .collect();
+    let skirt: &Garment = &garments[0].garment;
+    let folder = tempfile::tempdir().unwrap();
+    let listed = folder.path().join("listed");
+    save_garment_folder(&listed, &garments).unwrap();
+    fs::write(listed.join("unlisted.obj"), "not read").unwrap();
+    let loose = folder.path().join("loose");
+    let inside: Vec<[f64; 3]> =
+        skirt.rest.positions().iter().map(|p| [0.8 * p[0], p[1], 0.8 * p[2]]).collect();
+    obj::save(&loose.join("tight.obj"), &inside, skirt.rest.faces(), &[]).unwrap();
+    let far: Vec<[f64; 3]> = skirt.rest.positions().iter().map(|p| p.map(|x| 100.0 * x)).collect();
+    obj::save(&loose.join("centimetres.obj"), &far, skirt.rest.faces(), &[]).unwrap();
+    fs::write(loose.join("broken.stl"), "solid\nfacet\n vertex 0 0 z\n").unwrap();
+    body.save(&folder.path().join("body.npz"), &Provenance::default()).unwrap();
+    let mut poses = vec![Pose::t_pose(22); 4];
+    poses[3].rotations[4] = [-1.0, 0.0, 0.0];
+    let motion = Motion { name: String::new(), frame_rate: 2.0, poses, source: Provenance::default() };
+    motion.save(&folder.path().join("motions/knee.npz")).unwrap();
+    fs::write(folder.path().join("motions/cut.npz"), b"PK").unwrap();
+
+    let targets = find_targets(&[folder.path().to_path_buf(), folder.path().join("missing")]);
+    let checker = Checker::new(body);
+    let files: Vec<FileCheck> = targets.iter().map(|t| checker.check(t)).collect();
+    let unusable: Vec<&str> = files
+        .iter()
+        .filter(|f| f.unusable.is_some())
+        .map(|f| f.path.file_name().unwrap().to_str().unwrap())
+        .collect();
+    assert_eq!(unusable, ["broken.stl", "cut.npz", "missing"]);
+    assert!(!files.iter().any(|f| f.path.ends_with("unlisted.obj")));
+
+    let good = by_name(&files, &format!("{}.obj", skirt.name));
+    let check = good.garment.as_ref().unwrap();
+    assert!(good.warnings.is_empty(), "{:?}", good.warnings);
+    assert_eq!((check.category, check.category_guessed), (Category::Skirt, false));
+    assert_eq!((check.layer, check.holding), ([2, 3], skirt.holding));
+    assert_eq!((check.inside, check.body_triangle_pairs, check.mesh.components), (0, 0, 1));
+    assert!(check.distance_min_mm > 3.0 && check.distance_median_mm > check.distance_min_mm);
+    let tight = by_name(&files, "tight.obj").garment.as_ref().unwrap();
+    assert!(tight.inside > 0 && tight.body_triangle_pairs > 0 && tight.category_guessed);
+    assert!(by_name(&files, "centimetres.obj").warnings.iter().any(|w| w.contains("clothcombo fit")));
+
+    let body = by_name(&files, "body.npz").body.as_ref().unwrap();
+    assert_eq!((body.joints, body.components, body.boundary_loops), (checker.body.joint_count(), 1, 0));
+    assert!(body.weight_sums.iter().all(|s| (s - 1.0).abs() < 1e-5));
+    let knee = by_name(&files, "knee.npz").motion.as_ref().unwrap();
+    assert_eq!((knee.frames, knee.frames_outside_limits, knee.duration), (4, 1, 2.0));
+    assert_eq!(knee.joints_outside_limits.get("left_knee"), Some(&1));
+    assert!((knee.largest_excess_degrees - 57.3).abs() < 0.1);
+    assert!(serde_json::to_string(&files).unwrap().contains("\"distance_median_mm\""));
+}
+
+#[test]
+fn layers_are_guessed_from_the_distance() {
+    assert_eq!(layer_guess(0.004, Category::Top), [1, 2]);
+    assert_eq!(layer_guess(0.004, Category::OpenShirt), [2, 3]);
+    assert_eq!(layer_guess(0.05, Category::Dress), [3, 4]);
+}

@@ -1,0 +1,144 @@
+//! Bodies with lowered arms, and garments back from there to the T-pose.
+
+use crate::asset::{Binding, BindingSettings, Body, Category, Garment, Pose, Provenance, body};
+use clothcombo_physics::TriMesh;
+use clothcombo_physics::query::Surface;
+
+/// The zero body with its arms this far below the horizontal.
+#[derive(Debug)]
+pub(super) struct ArmPose {
+    pub degrees: f64,
+    pub pose: Pose,
+    pub positions: Vec<[f64; 3]>,
+    pub surface: Surface<f64>,
+}
+
+/// Names of the joints that lower the arms.
+const SHOULDERS: [&str; 2] = ["left_shoulder", "right_shoulder"];
+
+fn shoulders(body: &Body) -> Option<[usize; 2]> {
+    let index = |name: &str| body.joint_names.iter().position(|n| n == name);
+    Some([index(SHOULDERS[0])?, index(SHOULDERS[1])?])
+}
+
+impl ArmPose {
+    /// Turns both shoulders about the axis through the body; a body without shoulders stays as it is.
+    pub fn new(body: &Body, degrees: f64) -> Self {
+        let mut pose = Pose::t_pose(body.joint_count());
+        let mut positions = body.template.clone();
+        if let Some([left, right]) = shoulders(body).filter(|_| degrees != 0.0) {
+            pose.rotations[left] = [0.0, 0.0, -degrees.to_radians()];
+            pose.rotations[right] = [0.0, 0.0, degrees.to_radians()];
+            // The pose has exactly the body's joints and no shape numbers: nothing to refuse.
+            if let Ok(posed) = body.posed(&[], &pose) {
+                positions = posed.positions;
+            }
+        }
+        let surface = Surface::new(positions.clone(), body.faces.clone());
+        Self { degrees, pose, positions, surface }
+    }
+
+    /// Carries a garment on this body to the zero body: inverts the linear blend skinning of its binding. The binding depends
+    /// on where the garment ends up, so it is first taken on the posed body and then twice on the result.
+    pub fn to_t_pose(
+        &self,
+        positions: &[[f64; 3]],
+        faces: &[[u32; 3]],
+        category: Option<Category>,
+        body: &Body,
+    ) -> Result<Vec<[f64; 3]>, String> {
+        if self.degrees == 0.0 {
+            return Ok(positions.to_vec());
+        }
+        // Shapes are not needed here, and copying them would cost more than everything else.
+        let mut bare = body.clone();
+        (bare.shape_directions, bare.shape_count, bare.pose_directions) = (Vec::new(), 0, None);
+        let mut posed = bare.clone();
+        posed.template = self.positions.clone();
+        let bones = body.bone_transforms(&body.joint_template, &self.pose);
+        let settings = BindingSettings { shape_transfer: false, ..BindingSettings::default() };
+        let mut rest = positions.to_vec();
+        for round in 0..3 {
+            let mesh = TriMesh::new(rest, faces.to_vec()).map_err(|e| e.to_string())?;
+            let category = category.unwrap_or_else(|| Category::guess(&mesh, body));
+            let garment = Garment {
+                name: String::new(),
+                category,
+                rest: mesh,
+                holding: false,
+                source: Provenance::default(),
+            };
+            let binding = Binding::new(&garment, if round == 0 { &posed } else { &bare }, &settings);
+            rest = positions
+                .iter()
+                .zip(binding.skin_weights.chunks_exact(body.joint_count()))
+                .map(|(p, weights)| unskin(*p, weights, &bones))
+                .collect::<Option<_>>()
+                .ok_or("the arms cannot be raised: a blended bone transform has no inverse")?;
+        }
+        Ok(rest)
+    }
+}
+
+/// Inverse of the blended transform applied to `p`.
+fn unskin(p: [f64; 3], weights: &[f32], bones: &[[[f64; 4]; 3]]) -> Option<[f64; 3]> {
+    let mut m = [[0.0; 4]; 3];
+    for (bone, w) in bones.iter().zip(weights).filter(|(_, w)| **w != 0.0) {
+        for a in 0..3 {
+            for b in 0..4 {
+                m[a][b] += f64::from(*w) * bone[a][b];
+            }
+        }
+    }
+    let cofactor = |r: usize, c: usize| {
+        let (r1, r2, c1, c2) = ((r + 1) % 3, (r + 2) % 3, (c + 1) % 3, (c + 2) % 3);
+        m[r1][c1] * m[r2][c2] - m[r1][c2] * m[r2][c1]
+    };
+    let determinant: f64 = (0..3).map(|c| m[0][c] * cofactor(0, c)).sum();
+    if determinant.abs() < 1e-3 {
+        return None;
+    }
+    let d: [f64; 3] = std::array::from_fn(|a| p[a] - m[a][3]);
+    let inverse: [[f64; 4]; 3] = std::array::from_fn(|r| {
+        std::array::from_fn(|c| if c < 3 { cofactor(c, r) / determinant } else { 0.0 })
+    });
+    Some(body::transform(&inverse, d))
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::asset::body::skin;
+    use crate::generate::{GarmentGenerator, GarmentSettings, mannequin};
+
+    /// A generated shirt skinned to lowered arms the way it would be draped.
+    pub(crate) fn lowered(garment: &Garment, body: &Body, degrees: f64) -> Vec<[f64; 3]> {
+        let pose = ArmPose::new(body, degrees).pose;
+        let bones = body.bone_transforms(&body.joint_template, &pose);
+        let binding = Binding::new(garment, body, &BindingSettings::default());
+        (garment.rest.positions().iter().zip(binding.skin_weights.chunks_exact(body.joint_count())))
+            .map(|(p, w)| skin(*p, bones.iter().zip(w).map(|(b, w)| (b, f64::from(*w)))))
+            .collect()
+    }
+
+    #[test]
+    fn sleeves_come_back_from_an_a_pose() {
+        let body = mannequin();
+        let settings = GarmentSettings { target_vertices: 700, ..GarmentSettings::default() };
+        let shirt = GarmentGenerator::new(&body).unwrap().generate(Category::TShirt, 3, &settings).unwrap();
+        let arms = ArmPose::new(&body, 40.0);
+        let posed = lowered(&shirt, &body, 40.0);
+        let back = arms.to_t_pose(&posed, shirt.rest.faces(), Some(shirt.category), &body).unwrap();
+        let mut errors: Vec<f64> = back
+            .iter()
+            .zip(shirt.rest.positions())
+            .map(|(a, b)| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt())
+            .collect();
+        errors.sort_by(f64::total_cmp);
+        let moved =
+            posed.iter().zip(shirt.rest.positions()).filter(|(a, b)| (a[1] - b[1]).abs() > 0.02).count();
+        assert!(moved > 50, "{moved}");
+        assert!(errors[errors.len() / 2] < 5e-4, "median {}", errors[errors.len() / 2]);
+        assert!(errors[errors.len() * 95 / 100] < 5e-3, "p95 {}", errors[errors.len() * 95 / 100]);
+    }
+}

@@ -1,0 +1,203 @@
+//! How a file's coordinates become the body's: unit, up axis, facing, origin.
+
+use crate::asset::rotation::{self, Matrix3};
+use clothcombo_physics::vec3::{add, scale};
+use serde::Serialize;
+use std::fmt;
+use std::str::FromStr;
+
+/// Length unit of a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Unit {
+    /// Metre.
+    M,
+    /// Decimetre.
+    Dm,
+    /// Centimetre.
+    Cm,
+    /// Millimetre.
+    Mm,
+    /// Inch.
+    Inch,
+}
+
+impl Unit {
+    /// All units.
+    pub const ALL: [Self; 5] = [Self::M, Self::Dm, Self::Cm, Self::Mm, Self::Inch];
+
+    /// Metres per unit.
+    pub fn metres(self) -> f64 {
+        match self {
+            Self::M => 1.0,
+            Self::Dm => 0.1,
+            Self::Cm => 0.01,
+            Self::Mm => 0.001,
+            Self::Inch => 0.0254,
+        }
+    }
+
+    /// `m`, `dm`, `cm`, `mm` or `inch`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::M => "m",
+            Self::Dm => "dm",
+            Self::Cm => "cm",
+            Self::Mm => "mm",
+            Self::Inch => "inch",
+        }
+    }
+}
+
+/// The axis of a file that points up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum UpAxis {
+    /// As here.
+    Y,
+    /// As in Blender, 3ds Max and CAD programs; −y faces forward.
+    Z,
+    /// Seen in some scanners' files.
+    X,
+}
+
+impl UpAxis {
+    /// All of them, the usual ones first.
+    pub const ALL: [Self; 3] = [Self::Y, Self::Z, Self::X];
+
+    /// The rotation that turns this axis up.
+    pub fn to_y_up(self) -> Matrix3 {
+        match self {
+            Self::Y => rotation::IDENTITY,
+            Self::Z => [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]],
+            Self::X => [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
+        }
+    }
+
+    /// `y`, `z` or `x`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Y => "y",
+            Self::Z => "z",
+            Self::X => "x",
+        }
+    }
+}
+
+macro_rules! named {
+    ($kind:ty, $what:literal) => {
+        impl fmt::Display for $kind {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str(self.name())
+            }
+        }
+
+        impl FromStr for $kind {
+            type Err = String;
+
+            fn from_str(text: &str) -> Result<Self, Self::Err> {
+                Self::ALL.into_iter().find(|x| x.name() == text).ok_or_else(|| {
+                    let names: Vec<&str> = Self::ALL.iter().map(|x| x.name()).collect();
+                    format!("'{text}' is no {}; known are {}", $what, names.join(", "))
+                })
+            }
+        }
+    };
+}
+
+named!(Unit, "unit");
+named!(UpAxis, "up axis");
+
+/// Where the origin of the file was taken to be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Origin {
+    /// At the pelvis joint, as here.
+    Pelvis,
+    /// On the floor below the pelvis.
+    Floor,
+    /// Nowhere on the body: the garment was moved to where it fits.
+    Elsewhere,
+}
+
+/// The similarity that brings a file onto the body: `p ↦ metres · R · p + translation`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Placement {
+    /// Unit of the file.
+    pub unit: Unit,
+    /// Up axis of the file.
+    pub up: UpAxis,
+    /// Turn about the vertical after the up axis [degrees]: 0, 90, 180 or 270.
+    pub facing_degrees: u16,
+    /// Where the file's origin is.
+    pub origin: Origin,
+    /// Translation after scaling and turning [m].
+    pub translation: [f64; 3],
+    /// How far the arms of the garment hang below the horizontal [degrees]; 0 is a T-pose.
+    pub arm_angle_degrees: f64,
+}
+
+impl Placement {
+    /// The turn without scale and translation.
+    pub fn turn(&self) -> Matrix3 {
+        let (s, c) = match self.facing_degrees {
+            90 => (1.0, 0.0),
+            180 => (0.0, -1.0),
+            270 => (-1.0, 0.0),
+            _ => (0.0, 1.0),
+        };
+        rotation::product(&[[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]], &self.up.to_y_up())
+    }
+
+    /// All points moved onto the body (still in the garment's arm pose).
+    pub fn apply(&self, positions: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        let (turn, metres) = (self.turn(), self.unit.metres());
+        positions.iter().map(|p| add(scale(rotation::apply(&turn, *p), metres), self.translation)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_turn_is_a_rotation_that_puts_the_up_axis_up() {
+        for up in UpAxis::ALL {
+            for facing_degrees in [0, 90, 180, 270] {
+                let placement = Placement {
+                    unit: Unit::Cm,
+                    up,
+                    facing_degrees,
+                    origin: Origin::Pelvis,
+                    translation: [0.0; 3],
+                    arm_angle_degrees: 0.0,
+                };
+                let m = placement.turn();
+                let square = rotation::product(&m, &rotation::transpose(&m));
+                assert_eq!(square, rotation::IDENTITY);
+                let determinant: f64 = (0..3)
+                    .map(|i| {
+                        m[0][i]
+                            * (m[1][(i + 1) % 3] * m[2][(i + 2) % 3] - m[1][(i + 2) % 3] * m[2][(i + 1) % 3])
+                    })
+                    .sum();
+                assert_eq!(determinant, 1.0);
+                let axis = match up {
+                    UpAxis::X => [100.0, 0.0, 0.0],
+                    UpAxis::Y => [0.0, 100.0, 0.0],
+                    UpAxis::Z => [0.0, 0.0, 100.0],
+                };
+                assert_eq!(placement.apply(&[axis]), [[0.0, 1.0, 0.0]]);
+            }
+        }
+    }
+
+    #[test]
+    fn names_parse_back() {
+        for unit in Unit::ALL {
+            assert_eq!(unit.name().parse(), Ok(unit));
+        }
+        assert!("furlong".parse::<Unit>().unwrap_err().contains("inch"));
+        assert_eq!("z".parse(), Ok(UpAxis::Z));
+    }
+}

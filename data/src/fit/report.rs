@@ -1,0 +1,258 @@
+//! What fitting assumed and changed, element by element.
+
+use super::placement::{Origin, Placement};
+use super::search::Sitting;
+use crate::asset::Category;
+use crate::check::MeshMeasures;
+use serde::Serialize;
+use std::fmt;
+
+/// A kind of repair.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RepairKind {
+    /// Vertices no face uses, or only faces that were dropped, were left out.
+    DroppedIsolatedVertices,
+    /// Vertices at the place of another one became that one.
+    WeldedVertices,
+    /// Faces with more than three corners were cut into triangles.
+    TriangulatedFaces,
+    /// Faces without area were dropped.
+    DroppedDegenerateFaces,
+    /// Faces with the corners of an earlier one were dropped.
+    DroppedRepeatedFaces,
+    /// Edges with more than two faces were cut so that at most two stay joined.
+    CutNonManifoldEdges,
+    /// Vertices where pieces touch without an edge were given to each piece.
+    SplitVertices,
+    /// Edges were cut because the surface has only one side (a Möbius band).
+    CutOneSidedEdges,
+    /// Faces were turned, to agree with their neighbours and to face away from the body.
+    TurnedFaces,
+    /// Vertices were moved out of the body, or away from it to the least distance.
+    PushedOut,
+}
+
+impl RepairKind {
+    fn text(self) -> &'static str {
+        match self {
+            Self::DroppedIsolatedVertices => "dropped isolated vertices",
+            Self::WeldedVertices => "welded duplicate vertices",
+            Self::TriangulatedFaces => "triangulated faces",
+            Self::DroppedDegenerateFaces => "dropped degenerate faces",
+            Self::DroppedRepeatedFaces => "dropped repeated faces",
+            Self::CutNonManifoldEdges => "cut non-manifold edges",
+            Self::SplitVertices => "split vertices that only touch",
+            Self::CutOneSidedEdges => "cut edges of a one-sided surface",
+            Self::TurnedFaces => "turned faces",
+            Self::PushedOut => "pushed vertices out of the body",
+        }
+    }
+}
+
+/// Elements of the file, counted from 0 in the order the file has them.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Elements {
+    /// Vertices.
+    Vertices(Vec<u32>),
+    /// Faces (polygons).
+    Faces(Vec<u32>),
+    /// Edges, by their vertices.
+    Edges(Vec<[u32; 2]>),
+}
+
+impl Elements {
+    /// How many.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Vertices(list) | Self::Faces(list) => list.len(),
+            Self::Edges(list) => list.len(),
+        }
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+impl fmt::Display for Elements {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        const SHOWN: usize = 8;
+        let (what, shown): (_, Vec<String>) = match self {
+            Self::Vertices(list) => ("vertex", list.iter().take(SHOWN).map(u32::to_string).collect()),
+            Self::Faces(list) => ("face", list.iter().take(SHOWN).map(u32::to_string).collect()),
+            Self::Edges(list) => ("edge", list.iter().take(SHOWN).map(|[a, b]| format!("{a}–{b}")).collect()),
+        };
+        write!(f, "{what} {}", shown.join(", "))?;
+        match self.len() {
+            n if n > SHOWN => write!(f, " and {} more", n - SHOWN),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// One repair.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Repair {
+    /// What was done.
+    pub kind: RepairKind,
+    /// To how many elements.
+    pub count: usize,
+    /// To which.
+    pub elements: Elements,
+}
+
+/// A connected piece of the fitted garment.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Piece {
+    /// Vertices.
+    pub vertices: usize,
+    /// Triangles.
+    pub triangles: usize,
+    /// Area [m²].
+    pub area: f64,
+    /// Boundary curves; none means a closed piece, such as a button.
+    pub boundary_loops: usize,
+}
+
+/// Where the fitted garment and the body meet.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct BodyContact {
+    /// Vertices inside the body before pushing out.
+    pub inside_before: usize,
+    /// Deepest of them [mm].
+    pub depth_before_mm: f64,
+    /// Vertices inside the body after it.
+    pub inside_after: usize,
+    /// Least distance of a vertex to the body after it [mm].
+    pub least_distance_mm: f64,
+    /// Largest move of a vertex [mm].
+    pub largest_move_mm: f64,
+    /// Garment and body triangles that intersect afterwards (exact).
+    pub body_triangle_pairs: usize,
+    /// Triangles of the garment that intersect each other (exact).
+    pub self_triangle_pairs: usize,
+}
+
+/// Everything that was assumed, repaired and measured.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FitReport {
+    /// Vertices in the file.
+    pub file_vertices: usize,
+    /// Faces in the file.
+    pub file_faces: usize,
+    /// Unit, axes, origin and arm pose.
+    pub placement: Placement,
+    /// How the garment sat there before anything was pushed.
+    pub sitting: Sitting,
+    /// All repairs, in the order they were made.
+    pub repairs: Vec<Repair>,
+    /// Edges that still have more than two faces, by vertices of the file.
+    pub unrepaired_edges: Vec<[u32; 2]>,
+    /// Connected pieces, the largest first.
+    pub pieces: Vec<Piece>,
+    /// Category, given or guessed from the shape.
+    pub category: Category,
+    /// Whether it lies wholly below the collarbone, so that its rim is held.
+    pub holding: bool,
+    /// The fitted mesh.
+    pub mesh: MeshMeasures,
+    /// Contact with the body.
+    pub contact: BodyContact,
+}
+
+impl FitReport {
+    /// The assumptions in words, one a line.
+    pub fn assumptions(&self) -> Vec<String> {
+        let p = &self.placement;
+        let [x, y, z] = p.translation.map(|t| 1e3 * t);
+        let origin = match p.origin {
+            Origin::Pelvis => "the file's origin is the pelvis of the body".to_string(),
+            Origin::Floor => {
+                format!("the file's origin is on the floor below the pelvis (moved by {y:.0} mm)")
+            }
+            Origin::Elsewhere => {
+                format!(
+                    "the file's origin is not the body's: moved by {x:.0}, {y:.0}, {z:.0} mm to where it fits"
+                )
+            }
+        };
+        let arms = match p.arm_angle_degrees {
+            0.0 => "T-pose".to_string(),
+            a => format!("A-pose: the arms hang {a:.0}° below the horizontal; raised to the T-pose"),
+        };
+        let facing = match p.facing_degrees {
+            0 => "front".to_string(),
+            turn => format!("turned by {turn}° about the vertical"),
+        };
+        vec![
+            format!("unit {} (1 = {} m)", p.unit, p.unit.metres()),
+            format!("up axis {}, {facing}", p.up),
+            origin,
+            arms,
+            format!("category {}", self.category),
+        ]
+    }
+}
+
+impl fmt::Display for FitReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "read      {} vertices, {} faces", self.file_vertices, self.file_faces)?;
+        for line in self.assumptions() {
+            writeln!(f, "assumed   {line}")?;
+        }
+        writeln!(
+            f,
+            "sits      {:.1} mm from the body on average, {:.1} % of it inside, cloth in {:.0} % of the directions around the trunk",
+            1e3 * self.sitting.mean_distance,
+            100.0 * self.sitting.inside,
+            100.0 * self.sitting.wrap
+        )?;
+        if self.repairs.is_empty() {
+            writeln!(f, "repaired  nothing")?;
+        }
+        for repair in &self.repairs {
+            writeln!(f, "repaired  {}: {} ({})", repair.kind.text(), repair.count, repair.elements)?;
+        }
+        for [a, b] in &self.unrepaired_edges {
+            writeln!(f, "warning   edge {a}–{b} still has more than two faces")?;
+        }
+        for (number, piece) in self.pieces.iter().enumerate() {
+            writeln!(
+                f,
+                "piece {number:<3} {} vertices, {} triangles, {:.4} m², {}",
+                piece.vertices,
+                piece.triangles,
+                piece.area,
+                match piece.boundary_loops {
+                    0 => "closed".into(),
+                    1 => "1 boundary loop".into(),
+                    n => format!("{n} boundary loops"),
+                }
+            )?;
+        }
+        let (m, c) = (&self.mesh, &self.contact);
+        writeln!(
+            f,
+            "result    {} vertices, {} triangles, edges {:.1} mm ({:.1}–{:.1})",
+            m.vertices, m.triangles, m.edge_median_mm, m.edge_min_mm, m.edge_max_mm
+        )?;
+        for (count, name) in m.defects.counts() {
+            writeln!(f, "warning   {count} {name} remain")?;
+        }
+        writeln!(
+            f,
+            "contact   {} vertices were inside the body (up to {:.1} mm); now {}, closest {:.1} mm, {} triangle pairs with the \
+             body, {} with itself",
+            c.inside_before,
+            c.depth_before_mm,
+            c.inside_after,
+            c.least_distance_mm,
+            c.body_triangle_pairs,
+            c.self_triangle_pairs
+        )?;
+        write!(f, "holding   {}", if self.holding { "yes: it lies below the collarbone" } else { "no" })
+    }
+}

@@ -1,0 +1,224 @@
+//! The bytes behind glTF accessors: the binary chunk, `data:` URIs, files beside the document.
+
+use super::super::mesh::{check_count, read_limited};
+use super::document::{Accessor, Document};
+use std::borrow::Cow;
+use std::path::{Component, Path, PathBuf};
+
+/// Component types of the specification.
+const U8: u32 = 5121;
+const U16: u32 = 5123;
+const U32: u32 = 5125;
+const F32: u32 = 5126;
+
+/// Buffers of a document, loaded when first asked for.
+pub(super) struct Buffers<'a> {
+    chunk: Option<&'a [u8]>,
+    folder: PathBuf,
+    loaded: Vec<Option<Cow<'a, [u8]>>>,
+}
+
+impl<'a> Buffers<'a> {
+    pub fn new(document: &Document, chunk: Option<&'a [u8]>, folder: &Path) -> Self {
+        let loaded = document.buffers.iter().map(|_| None).collect();
+        Self { chunk, folder: folder.into(), loaded }
+    }
+
+    /// A VEC3 of floats.
+    pub fn positions(&mut self, document: &Document, accessor: usize) -> Result<Vec<[f64; 3]>, String> {
+        let item = get_accessor(document, accessor)?;
+        if item.component_type != F32 || item.kind != "VEC3" {
+            return Err(format!("accessor {accessor} is no VEC3 of floats, as positions must be"));
+        }
+        check_count("vertices", item.count)?;
+        let mut positions = Vec::new();
+        self.for_each(document, accessor, item, 12, |raw| {
+            positions.push(std::array::from_fn(|a| {
+                f64::from(f32::from_le_bytes([raw[4 * a], raw[4 * a + 1], raw[4 * a + 2], raw[4 * a + 3]]))
+            }));
+        })?;
+        Ok(positions)
+    }
+
+    /// A SCALAR of unsigned integers.
+    pub fn indices(&mut self, document: &Document, accessor: usize) -> Result<Vec<u32>, String> {
+        let item = get_accessor(document, accessor)?;
+        let size = match (item.component_type, item.kind.as_str()) {
+            (U8, "SCALAR") => 1,
+            (U16, "SCALAR") => 2,
+            (U32, "SCALAR") => 4,
+            _ => {
+                return Err(format!(
+                    "accessor {accessor} is no SCALAR of unsigned integers, as indices must be"
+                ));
+            }
+        };
+        let mut indices = Vec::new();
+        self.for_each(document, accessor, item, size, |raw| {
+            indices.push(match raw {
+                [a] => u32::from(*a),
+                [a, b] => u32::from(u16::from_le_bytes([*a, *b])),
+                [a, b, c, d] => u32::from_le_bytes([*a, *b, *c, *d]),
+                _ => 0,
+            });
+        })?;
+        Ok(indices)
+    }
+
+    /// Hands over every item of an accessor, `size` bytes each, after checking that all of them are there.
+    fn for_each(
+        &mut self,
+        document: &Document,
+        number: usize,
+        accessor: &Accessor,
+        size: usize,
+        mut visit: impl FnMut(&[u8]),
+    ) -> Result<(), String> {
+        if accessor.sparse.is_some() {
+            return Err(format!("accessor {number} is sparse; export the mesh without sparse accessors"));
+        }
+        let view_index = accessor
+            .buffer_view
+            .ok_or_else(|| format!("accessor {number} has no buffer view; compressed meshes are not read"))?;
+        let view = (document.buffer_views.get(view_index))
+            .ok_or_else(|| format!("accessor {number} names buffer view {view_index}, which is not there"))?;
+        let stride = view.byte_stride.unwrap_or(size);
+        if stride < size || stride > 4096 {
+            return Err(format!(
+                "buffer view {view_index} has a stride of {stride} bytes for items of {size}"
+            ));
+        }
+        if accessor.count == 0 {
+            return Ok(());
+        }
+        let needed = (accessor.count - 1)
+            .checked_mul(stride)
+            .and_then(|n| n.checked_add(size))
+            .and_then(|n| n.checked_add(accessor.byte_offset));
+        let bytes = self.buffer(document, view.buffer)?;
+        let view_bytes = view.byte_offset.checked_add(view.byte_length);
+        let view_bytes = view_bytes.and_then(|end| bytes.get(view.byte_offset..end)).ok_or_else(|| {
+            format!("buffer view {view_index} reaches past the {} bytes of its buffer", bytes.len())
+        })?;
+        match needed {
+            Some(needed) if needed <= view_bytes.len() => {}
+            _ => {
+                return Err(format!(
+                    "accessor {number} has {} items, more than buffer view {view_index} ({} bytes) holds",
+                    accessor.count,
+                    view_bytes.len()
+                ));
+            }
+        }
+        for i in 0..accessor.count {
+            let start = accessor.byte_offset + i * stride;
+            visit(&view_bytes[start..start + size]);
+        }
+        Ok(())
+    }
+
+    fn buffer(&mut self, document: &Document, index: usize) -> Result<&[u8], String> {
+        let buffer = document.buffers.get(index).ok_or_else(|| format!("buffer {index} is not there"))?;
+        if self.loaded[index].is_none() {
+            self.loaded[index] = Some(match &buffer.uri {
+                None => {
+                    Cow::Borrowed(self.chunk.ok_or("a buffer without uri needs the binary chunk of a .glb")?)
+                }
+                Some(uri) => match uri.strip_prefix("data:") {
+                    Some(data) => Cow::Owned(decode_data_uri(data, index)?),
+                    None => Cow::Owned(self.external(uri)?),
+                },
+            });
+        }
+        let bytes = self.loaded[index].as_deref().unwrap_or_default();
+        bytes.get(..buffer.byte_length).ok_or_else(|| {
+            format!("buffer {index} should have {} bytes, but has {}", buffer.byte_length, bytes.len())
+        })
+    }
+
+    /// A file in the folder of the document, or below it: a document must not reach elsewhere.
+    fn external(&self, uri: &str) -> Result<Vec<u8>, String> {
+        let name = percent_decoded(uri);
+        let relative = Path::new(&name);
+        let stays = relative.components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
+        if name.contains("://") || !stays {
+            return Err(format!("buffer '{uri}' is no file beside the document"));
+        }
+        read_limited(&self.folder.join(relative)).map_err(|e| format!("buffer {e}"))
+    }
+}
+
+fn get_accessor(document: &Document, index: usize) -> Result<&Accessor, String> {
+    document.accessors.get(index).ok_or_else(|| format!("accessor {index} is not there"))
+}
+
+fn decode_data_uri(data: &str, index: usize) -> Result<Vec<u8>, String> {
+    let encoded = data.split_once(";base64,").map(|(_, e)| e);
+    encoded
+        .and_then(decode_base64)
+        .ok_or_else(|| format!("buffer {index} is a data URI that is not valid base64"))
+}
+
+/// Base64 of RFC 4648, with or without padding.
+fn decode_base64(text: &str) -> Option<Vec<u8>> {
+    let text = text.trim_end_matches('=').as_bytes();
+    let mut bytes = Vec::with_capacity(text.len() / 4 * 3 + 2);
+    for group in text.chunks(4) {
+        let mut bits = 0u32;
+        for c in group {
+            let value = match c {
+                b'A'..=b'Z' => c - b'A',
+                b'a'..=b'z' => c - b'a' + 26,
+                b'0'..=b'9' => c - b'0' + 52,
+                b'+' => 62,
+                b'/' => 63,
+                _ => return None,
+            };
+            bits = bits << 6 | u32::from(value);
+        }
+        match group.len() {
+            4 => bytes.extend(&bits.to_be_bytes()[1..]),
+            3 => bytes.extend(&(bits >> 2).to_be_bytes()[2..]),
+            2 => bytes.push((bits >> 4) as u8),
+            _ => return None,
+        }
+    }
+    Some(bytes)
+}
+
+fn percent_decoded(uri: &str) -> String {
+    let raw = uri.as_bytes();
+    let mut decoded = Vec::with_capacity(raw.len());
+    let mut i = 0;
+    while i < raw.len() {
+        let hex = |b: u8| char::from(b).to_digit(16);
+        match (raw[i], raw.get(i + 1).and_then(|b| hex(*b)), raw.get(i + 2).and_then(|b| hex(*b))) {
+            (b'%', Some(high), Some(low)) => {
+                decoded.push((16 * high + low) as u8);
+                i += 3;
+            }
+            (byte, ..) => {
+                decoded.push(byte);
+                i += 1;
+            }
+        }
+    }
+    String::from_utf8_lossy(&decoded).into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn base64_and_percent_codes_decode() {
+        for (text, bytes) in
+            [("", &b""[..]), ("Zg==", b"f"), ("Zm8=", b"fo"), ("Zm9v", b"foo"), ("Zm9vYg", b"foob")]
+        {
+            assert_eq!(decode_base64(text).as_deref(), Some(bytes));
+        }
+        assert_eq!(decode_base64("+/8="), Some(vec![0xfb, 0xff]));
+        assert!(decode_base64("Zm9v!").is_none() && decode_base64("Z").is_none());
+        assert_eq!(percent_decoded("a%20b%2"), "a b%2");
+    }
+}

@@ -1,0 +1,114 @@
+use super::*;
+use std::fs;
+
+/// Four corners of a unit square and indices of two triangles, padded to whole words.
+fn payload() -> Vec<u8> {
+    let mut bytes = Vec::new();
+    for p in [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]] {
+        p.iter().for_each(|x| bytes.extend(x.to_le_bytes()));
+    }
+    // Triangles as u8 at 48, strip as u16 at 56, fan as u32 at 64.
+    bytes.extend([0u8, 1, 2, 0, 2, 3, 0, 0]);
+    [0u16, 1, 3, 2].iter().for_each(|i| bytes.extend(i.to_le_bytes()));
+    [0u32, 1, 2, 3].iter().for_each(|i| bytes.extend(i.to_le_bytes()));
+    bytes
+}
+
+fn document(buffer: &str) -> String {
+    format!(
+        r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0,2]}}],
+        "nodes":[{{"children":[1],"translation":[0,0,5],"rotation":[0,0,0.7071067811865476,0.7071067811865476],"scale":[2,2,2]}},
+                 {{"mesh":0}},
+                 {{"mesh":1,"matrix":[-1,0,0,0, 0,1,0,0, 0,0,1,0, 10,0,0,1]}}],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1}},{{"attributes":{{"POSITION":0}},"indices":2,"mode":5}}]}},
+                  {{"primitives":[{{"attributes":{{"POSITION":0}},"indices":3,"mode":6}},{{"attributes":{{"POSITION":0}},"mode":1}}]}}],
+        "accessors":[{{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3"}},
+                     {{"bufferView":1,"componentType":5121,"count":6,"type":"SCALAR"}},
+                     {{"bufferView":1,"byteOffset":8,"componentType":5123,"count":4,"type":"SCALAR"}},
+                     {{"bufferView":1,"byteOffset":16,"componentType":5125,"count":4,"type":"SCALAR"}}],
+        "bufferViews":[{{"buffer":0,"byteLength":48}},{{"buffer":0,"byteOffset":48,"byteLength":32}}],
+        "buffers":[{{{buffer}"byteLength":80}}]}}"#
+    )
+}
+
+fn glb(json: &str, binary: &[u8]) -> Vec<u8> {
+    let mut json = json.as_bytes().to_vec();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let mut bytes = b"glTF".to_vec();
+    bytes.extend(2u32.to_le_bytes());
+    bytes.extend((12 + 8 + json.len() as u32 + 8 + binary.len() as u32).to_le_bytes());
+    for (kind, chunk) in [(0x4E4F_534Au32, &json[..]), (0x004E_4942, binary)] {
+        bytes.extend((chunk.len() as u32).to_le_bytes());
+        bytes.extend(kind.to_le_bytes());
+        bytes.extend(chunk);
+    }
+    bytes
+}
+
+fn base64(bytes: &[u8]) -> String {
+    const LETTERS: &[u8] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut text = String::new();
+    for group in bytes.chunks(3) {
+        let word = (0..3).fold(0u32, |w, i| w << 8 | u32::from(group.get(i).copied().unwrap_or(0)));
+        for i in 0..4 {
+            let letter = LETTERS[(word >> (18 - 6 * i) & 63) as usize];
+            text.push(if i <= group.len() { letter as char } else { '=' });
+        }
+    }
+    text
+}
+
+#[test]
+fn embedded_external_and_binary_buffers_give_the_same_placed_triangles() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("shirt.gltf");
+    fs::write(folder.path().join("its data.bin"), payload()).unwrap();
+    let external = parse(document(r#""uri":"its%20data.bin","#).as_bytes(), &path).unwrap();
+    let uri = format!(r#""uri":"data:application/octet-stream;base64,{}","#, base64(&payload()));
+    let embedded = parse(document(&uri).as_bytes(), &path).unwrap();
+    let binary = parse(&glb(&document(""), &payload()), &path).unwrap();
+    assert_eq!(external, embedded);
+    assert_eq!(external, binary);
+
+    // The first mesh: vertices once for its two primitives, turned by 90°, doubled, moved.
+    assert_eq!(external.positions.len(), 8);
+    for (p, q) in external.positions.iter().zip([[0., 0., 5.], [0., 2., 5.], [-2., 2., 5.], [-2., 0., 5.]]) {
+        assert!((0..3).all(|a| (p[a] - q[a]).abs() < 1e-12), "{p:?}");
+    }
+    // The second one is mirrored: x → 10 − x, corners in the other order.
+    assert_eq!(external.positions[4..6], [[10., 0., 0.], [9., 0., 0.]]);
+    let triangles: Vec<&[u32]> = external.polygons().collect();
+    let expected: [[u32; 3]; 6] = [[0, 1, 2], [0, 2, 3], [0, 1, 3], [3, 1, 2], [4, 6, 5], [4, 7, 6]];
+    assert_eq!(triangles, expected);
+}
+
+#[test]
+fn what_is_wrong_is_named() {
+    let message = |json: String| parse(&glb(&json, &payload()), Path::new("a/x.glb")).unwrap_err();
+    let whole = document("");
+    for (from, to, part) in [
+        (r#""count":4,"type":"VEC3""#, r#""count":5,"type":"VEC3""#, "accessor 0 has 5 items"),
+        (r#""count":6"#, r#""count":18446744073709551615"#, "accessor 1 has 18446744073709551615 items"),
+        (r#""count":6"#, r#""count":5"#, "5 indices do not make whole triangles"),
+        (r#""byteOffset":16"#, r#""byteOffset":18446744073709551615"#, "accessor 3"),
+        (r#""byteOffset":48,"byteLength":32"#, r#""byteOffset":48,"byteLength":99"#, "past the 80 bytes"),
+        (r#""byteLength":80"#, r#""byteLength":81"#, "should have 81 bytes, but has 80"),
+        (r#""count":6,"#, r#""count":6,"sparse":{"count":1},"#, "accessor 1 is sparse"),
+        (r#""componentType":5126"#, r#""componentType":5123"#, "no VEC3 of floats"),
+        (r#""scale":[2,2,2]"#, r#""scale":[2,2]"#, "glTF JSON"),
+        (r#"{"mesh":0}"#, r#"{"mesh":7}"#, "mesh 7 of 2"),
+        (r#"{"mesh":0}"#, r#"{"mesh":0,"children":[0]}"#, "reached twice"),
+        (r#""mode":6"#, r#""mode":9"#, "mode 9"),
+        (r#""asset""#, r#""extensionsRequired":["KHR_draco_mesh_compression"],"asset""#, "draco"),
+        (r#"{"byteLength":80}"#, r#"{"uri":"../secret.bin","byteLength":80}"#, "beside the document"),
+        (r#"{"byteLength":80}"#, r#"{"uri":"none.bin","byteLength":80}"#, "none.bin"),
+        (r#"{"byteLength":80}"#, r#"{"uri":"data:;base64,!!","byteLength":80}"#, "base64"),
+    ] {
+        assert!(whole.contains(from), "{from}");
+        let message = message(whole.replacen(from, to, 1));
+        assert!(message.contains(part), "{message}");
+    }
+    let bytes = glb(&whole, &payload());
+    assert!(parse(&bytes[..bytes.len() - 1], Path::new("x")).unwrap_err().contains("truncated"));
+    assert!(parse(b"{}", Path::new("x")).unwrap().positions.is_empty());
+}

@@ -1,0 +1,187 @@
+//! `clothcombo check`: every file of a dataset, in one table.
+
+use crate::scene::load_body;
+use clap::Parser;
+use clothcombo_data::check::{Checker, FileCheck, GarmentCheck, Target, find_targets, is_body_file};
+use indicatif::{ProgressBar, ProgressStyle};
+use miette::{IntoDiagnostic, Report, miette};
+use rayon::prelude::*;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Checks garments, bodies and motions; exits 1 if a file is unusable
+#[derive(Parser)]
+#[command(
+    after_help = "Examples:\n  clothcombo check datasets/open\n  clothcombo check my_garments --body body.npz --json\n\n\
+        Garments are measured on the zero body of --body; without it on the one body among the files, else on the mannequin.\n\
+        Category, layer and holding in brackets are guesses; layer N+ means layer N or the next one up."
+)]
+pub struct Arguments {
+    /// Files and folders; folders are searched through, garments.toml is obeyed
+    #[arg(required = true)]
+    paths: Vec<PathBuf>,
+    /// Body the garments lie on: "mannequin" or a body npz
+    #[arg(long)]
+    body: Option<String>,
+    /// Print JSON instead of tables; elements are counted from 0
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Output<'a> {
+    body: &'a str,
+    unusable: usize,
+    files: &'a [FileCheck],
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// When the body cannot be read, or any file is unusable; each is named.
+pub fn run(arguments: &Arguments) -> Result<(), Report> {
+    let targets = find_targets(&arguments.paths);
+    let body_name = arguments.body.clone().unwrap_or_else(|| only_body(&targets));
+    let checker = Checker::new(load_body(&body_name, 0)?);
+    let style =
+        ProgressStyle::with_template("checking {bar:40} {pos}/{len} · {eta} left").into_diagnostic()?;
+    let bar = ProgressBar::new(targets.len() as u64).with_style(style);
+    let files: Vec<FileCheck> = targets
+        .par_iter()
+        .map(|target| {
+            let file = checker.check(target);
+            bar.inc(1);
+            file
+        })
+        .collect();
+    bar.finish_and_clear();
+    let unusable: Vec<&FileCheck> = files.iter().filter(|f| f.unusable.is_some()).collect();
+    if arguments.json {
+        let output = Output { body: &body_name, unusable: unusable.len(), files: &files };
+        println!("{}", serde_json::to_string_pretty(&output).into_diagnostic()?);
+    } else {
+        print_tables(&files, &body_name);
+    }
+    if unusable.is_empty() {
+        return Ok(());
+    }
+    let reasons: Vec<&str> = unusable.iter().filter_map(|f| f.unusable.as_deref()).collect();
+    Err(miette!(
+        help = "`clothcombo fit` repairs garments; other files must be exported or downloaded again",
+        "{} of {} files are unusable\n{}",
+        unusable.len(),
+        files.len(),
+        reasons.join("\n")
+    ))
+}
+
+/// The one body among the files, else the mannequin.
+fn only_body(targets: &[Target]) -> String {
+    let npz = targets.iter().filter_map(|t| match t {
+        Target::Npz { path } if is_body_file(path) => Some(path.display().to_string()),
+        _ => None,
+    });
+    let bodies: Vec<String> = npz.collect();
+    match &bodies[..] {
+        [one] => one.clone(),
+        _ => "mannequin".into(),
+    }
+}
+
+fn print_tables(files: &[FileCheck], body: &str) {
+    let name = |f: &FileCheck| f.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let width = files.iter().map(|f| name(f).chars().count()).max().unwrap_or(0).clamp(12, 40);
+    if files.iter().any(|f| f.garment.is_some()) {
+        println!(
+            "{:<width$} {:>7} {:>7} {:>3} {:>3} {:>19} {:>13} {:>5} {:>5} {:>8} {:>8} {:>6} {:>6} {:>6}  defects",
+            "garment",
+            "verts",
+            "tris",
+            "pcs",
+            "rim",
+            "edge mm (min–max)",
+            "category",
+            "layer",
+            "held",
+            "min mm",
+            "mid mm",
+            "inside",
+            "body×",
+            "self×"
+        );
+    }
+    for file in files {
+        if let Some(garment) = &file.garment {
+            println!("{:<width$} {}", name(file), garment_row(garment));
+        }
+    }
+    for file in files {
+        if let Some(b) = &file.body {
+            println!(
+                "body {}: {} vertices, {} triangles, {} joints, {} shape components, {:.2} m, skin weights sum to {:.4}–{:.4}",
+                name(file),
+                b.vertices,
+                b.triangles,
+                b.joints,
+                b.shape_components,
+                b.height,
+                b.weight_sums[0],
+                b.weight_sums[1]
+            );
+        }
+        if let Some(m) = &file.motion {
+            println!(
+                "motion {}: {} frames at {:.1}/s = {:.1} s, {} frames outside joint limits (by up to {:.0}°)",
+                name(file),
+                m.frames,
+                m.frame_rate,
+                m.duration,
+                m.frames_outside_limits,
+                m.largest_excess_degrees
+            );
+        }
+    }
+    for file in files {
+        for warning in &file.warnings {
+            println!("warning {}: {warning}", name(file));
+        }
+        if let Some(reason) = &file.unusable {
+            println!("unusable {reason}");
+        }
+    }
+    let warned = files.iter().filter(|f| f.unusable.is_none() && !f.warnings.is_empty()).count();
+    let unusable = files.iter().filter(|f| f.unusable.is_some()).count();
+    println!(
+        "{} files against body '{body}': {} usable, {warned} of them with warnings, {unusable} unusable",
+        files.len(),
+        files.len() - unusable
+    );
+}
+
+fn garment_row(g: &GarmentCheck) -> String {
+    let guess = |text: String, guessed: bool| if guessed { format!("({text})") } else { text };
+    let layer = match g.layer {
+        [low, high] if high == low + 1 => format!("{low}+"),
+        [low, high] if high == low => format!("{low}"),
+        [low, high] => format!("{low}–{high}"),
+    };
+    let m = &g.mesh;
+    let defects: usize = m.defects.counts().iter().map(|(n, _)| n).sum();
+    format!(
+        "{:>7} {:>7} {:>3} {:>3} {:>19} {:>13} {:>5} {:>5} {:>8.1} {:>8.1} {:>6} {:>6} {:>6}  {}",
+        m.vertices,
+        m.triangles,
+        m.components,
+        m.boundary_loops,
+        format!("{:.1} ({:.1}–{:.1})", m.edge_median_mm, m.edge_min_mm, m.edge_max_mm),
+        guess(g.category.to_string(), g.category_guessed),
+        guess(layer, g.layer_guessed),
+        if g.holding { "yes" } else { "no" },
+        g.distance_min_mm,
+        g.distance_median_mm,
+        g.inside,
+        g.body_triangle_pairs,
+        g.self_triangle_pairs,
+        defects
+    )
+}
