@@ -18,6 +18,8 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Verb {
+    #[command(subcommand)]
+    Bench(cli::bench::Bench),
     Generate(cli::generate::Arguments),
     #[command(subcommand)]
     Import(cli::import::Source),
@@ -27,6 +29,7 @@ fn main() -> ExitCode {
     let arguments = Arguments::parse();
     cli::start_logging("info");
     cli::exit_code(match &arguments.verb {
+        Verb::Bench(bench) => cli::bench::run(bench),
         Verb::Generate(arguments) => cli::generate::run(arguments),
         Verb::Import(source) => cli::import::run(source),
     })

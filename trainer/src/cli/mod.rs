@@ -1,5 +1,6 @@
 //! The command lines of the two programs.
 
+pub mod bench;
 pub mod generate;
 pub mod import;
 pub mod train;

@@ -1,0 +1,161 @@
+//! The minimisation loop.
+
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+use super::lbfgs::{Memory, product};
+use super::line_search::{Trial, search};
+use super::preconditioner::Preconditioner;
+use super::problem::{norm, relative};
+use super::{EquilibriumError, Problem, Progress, Solution, SolverSettings, Step, Stop};
+use crate::vec3::{add_scaled, distance_squared, is_finite, norm_squared, sub};
+
+/// A state of the search.
+struct State {
+    positions: Vec<[f64; 3]>,
+    energy: f64,
+    gradient: Vec<[f64; 3]>,
+}
+
+/// Lowers the energy of `problem` from posed positions `start` `[ΣV, 3]` [m] until it cannot or may not be lowered any
+/// more; [`Solution::stop`] says which. `observer` sees the start and every accepted step, and can end the search.
+///
+/// The result is a function of its arguments alone, whatever the number of threads, unless time or the observer end it.
+///
+/// # Errors
+/// [`EquilibriumError`] for settings out of range and for a start that is not finite or has another number of vertices.
+pub fn solve(
+    problem: &Problem<'_>,
+    start: &[[f64; 3]],
+    settings: &SolverSettings,
+    observer: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
+) -> Result<Solution, EquilibriumError> {
+    settings.check()?;
+    let clock = Instant::now();
+    let mut state = first_state(problem, start)?;
+    let mut step = Step {
+        iteration: 0,
+        energy: state.energy,
+        gradient_norm: norm(&state.gradient),
+        displacement: 0.0,
+        evaluations: 1,
+        milliseconds: 0.0,
+    };
+    let mut force_scale = problem.force_scale(start);
+    let mut preconditioner: Option<Preconditioner> = None;
+    let mut memory = Memory::new(settings.memory);
+    let mut age = 0;
+    let mut history = Vec::new();
+
+    let stop = loop {
+        step.milliseconds = 1e3 * clock.elapsed().as_secs_f64();
+        history.push(step);
+        if observer(&Progress { step: &step, positions: &state.positions }).is_break() {
+            break Stop::Cancelled;
+        }
+        // The scale is measured anew only where the old one would do: it falls together with the gradient.
+        if relative(step.gradient_norm, force_scale) <= settings.tolerance {
+            force_scale = problem.force_scale(&state.positions);
+            if relative(step.gradient_norm, force_scale) <= settings.tolerance {
+                break Stop::Converged;
+            }
+        }
+        if let Some(bound) = settings.escape_distance {
+            let is_far = |(p, q): (&[f64; 3], &[f64; 3])| distance_squared(*p, *q) > bound * bound;
+            if state.positions.iter().zip(start).any(is_far) {
+                break Stop::Escaped;
+            }
+        }
+        if step.iteration >= settings.iterations {
+            break Stop::Iterations;
+        }
+        if settings.time.is_some_and(|limit| clock.elapsed() >= limit) {
+            break Stop::Time;
+        }
+
+        let preconditioner = preconditioner.get_or_insert_with(|| {
+            age = settings.refactorise_every;
+            Preconditioner::new(problem, start)
+        });
+        let next = loop {
+            if age >= settings.refactorise_every {
+                preconditioner.refresh(problem, &state.positions);
+                age = 0;
+            }
+            let found = advance(problem, &state, &memory, preconditioner, settings, &mut step.evaluations);
+            if found.is_some() || (age == 0 && memory.is_empty()) {
+                break found;
+            }
+            memory.clear();
+            age = settings.refactorise_every;
+        };
+        let Some(next) = next else { break Stop::Stalled };
+        age += 1;
+        let difference = |a: &[[f64; 3]], b: &[[f64; 3]]| -> Vec<[f64; 3]> {
+            a.iter().zip(b).map(|(a, b)| sub(*a, *b)).collect()
+        };
+        let moved = difference(&next.positions, &state.positions);
+        step = Step {
+            iteration: step.iteration + 1,
+            energy: next.energy,
+            gradient_norm: norm(&next.gradient),
+            displacement: longest(&moved),
+            ..step
+        };
+        memory.push(moved, difference(&next.gradient, &state.gradient));
+        state = next;
+    };
+    let relative_gradient = relative(step.gradient_norm, problem.force_scale(&state.positions));
+    let factorisations = preconditioner.map_or(0, |p| p.factorisations);
+    Ok(Solution { positions: state.positions, stop, relative_gradient, history, factorisations })
+}
+
+fn first_state(problem: &Problem<'_>, start: &[[f64; 3]]) -> Result<State, EquilibriumError> {
+    let (expected, found) = (problem.vertex_count(), start.len());
+    if expected != found {
+        return Err(EquilibriumError::Count { what: "start positions", expected, found });
+    }
+    if let Some(vertex) = start.iter().position(|p| !is_finite(*p)) {
+        return Err(EquilibriumError::StartPosition { vertex });
+    }
+    let (energy, gradient) = problem.value_and_gradient(start);
+    if !(energy.is_finite() && gradient.iter().all(|g| is_finite(*g))) {
+        return Err(EquilibriumError::StartEnergy);
+    }
+    Ok(State { positions: start.to_vec(), energy, gradient })
+}
+
+/// One step downhill; `None` if there is none along the direction of `memory`.
+fn advance(
+    problem: &Problem<'_>,
+    state: &State,
+    memory: &Memory,
+    preconditioner: &Preconditioner,
+    settings: &SolverSettings,
+    evaluations: &mut usize,
+) -> Option<State> {
+    let direction = memory.direction(&state.gradient, |q| preconditioner.apply(q));
+    let slope = product(&direction, &state.gradient);
+    let reach = longest(&direction);
+    if !(slope < 0.0 && reach.is_finite()) {
+        return None;
+    }
+    let evaluate = |length: f64| {
+        *evaluations += 1;
+        let positions: Vec<[f64; 3]> =
+            state.positions.iter().zip(&direction).map(|(p, d)| add_scaled(*p, length, *d)).collect();
+        let (energy, gradient) = problem.value_and_gradient(&positions);
+        Trial {
+            value: energy,
+            slope: product(&direction, &gradient),
+            state: State { positions, energy, gradient },
+        }
+    };
+    let (_, trial) = search(state.energy, slope, settings.step_bound / reach, evaluate)?;
+    trial.state.gradient.iter().all(|g| is_finite(*g)).then_some(trial.state)
+}
+
+/// The longest of vectors.
+fn longest(x: &[[f64; 3]]) -> f64 {
+    x.iter().map(|x| norm_squared(*x)).fold(0.0, f64::max).sqrt()
+}
