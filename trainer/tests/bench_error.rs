@@ -52,11 +52,19 @@ fn check(report: &Value, methods: &[&str]) {
             assert!(excess > 0.0 && (energy - lowest - excess).abs() < 1e-9 * energy.abs().max(1.0), "{m}");
             assert!(m["distance_mm"].as_f64().unwrap() > 0.0);
         }
-        assert!((scene["methods"][1]["excess_percent"].as_f64().unwrap() - 100.0).abs() < 1e-6 || methods.len() > 2);
+        assert!(
+            (scene["methods"][1]["excess_percent"].as_f64().unwrap() - 100.0).abs() < 1e-6
+                || methods.len() > 2
+        );
         let gradient = reference["relative_gradient"].as_f64().unwrap();
-        assert_eq!(reference["stop"] == "converged", gradient <= report["tolerance"].as_f64().unwrap(), "{reference}");
+        assert_eq!(
+            reference["stop"] == "converged",
+            gradient <= report["tolerance"].as_f64().unwrap(),
+            "{reference}"
+        );
     }
-    let converged = scenes.iter().filter(|s| s["runs"][s["reference"].as_u64().unwrap() as usize]["stop"] == "converged");
+    let converged =
+        scenes.iter().filter(|s| s["runs"][s["reference"].as_u64().unwrap() as usize]["stop"] == "converged");
     assert_eq!(converged.count() as u64, report["solver"]["converged"].as_u64().unwrap());
 }
 

@@ -13,8 +13,8 @@
 //! 1e-6 squared median edges). A triangle at rest loses 1e-8 of its energy, one without area all of it, and the gradient is
 //! bounded and still the exact derivative.
 
-use super::elements::{Incidence, Response, sum_elements};
 use super::curvature::outer;
+use super::elements::{Incidence, Response, sum_elements};
 use super::{CurvatureSink, GarmentState, GarmentTerm, Weighted};
 use crate::mesh::{Hinge, TriMesh};
 use crate::real::Real;

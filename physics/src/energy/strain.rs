@@ -128,7 +128,8 @@ impl RestTriangle {
                 let (trace_k, trace_l) = (add(d11[k], d22[k]), add(d11[l], d22[l]));
                 let block = std::array::from_fn(|r| {
                     std::array::from_fn(|s| {
-                        let shear = d11[k][r] * d11[l][s] + 2.0 * d12[k][r] * d12[l][s] + d22[k][r] * d22[l][s];
+                        let shear =
+                            d11[k][r] * d11[l][s] + 2.0 * d12[k][r] * d12[l][s] + d22[k][r] * d22[l][s];
                         let elastic = lambda * trace_k[r] * trace_l[s] + 2.0 * mu * shear;
                         self.volume * (elastic + if r == s { tension } else { 0.0 })
                     })

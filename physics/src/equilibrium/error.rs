@@ -13,7 +13,9 @@ pub enum EquilibriumError {
     Energy(#[from] EnergyError),
 
     /// A list does not have one entry per vertex.
-    #[error("the scene has {expected} vertices, but there are {found} {what}; hint: garments are packed in order")]
+    #[error(
+        "the scene has {expected} vertices, but there are {found} {what}; hint: garments are packed in order"
+    )]
     Count {
         /// What the list holds.
         what: &'static str,

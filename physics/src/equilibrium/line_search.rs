@@ -56,11 +56,11 @@ pub(super) fn search<S>(
             continue;
         }
         let steep = trial.slope < SLOPE * slope;
+        if !steep || length >= longest {
+            return Some((length, trial));
+        }
         if best.as_ref().is_none_or(|(_, b)| trial.value <= b.value) {
             best = Some((length, trial));
-        }
-        if !steep || length >= longest {
-            return best;
         }
         low = length;
         length = if high.is_finite() { 0.5 * (low + high) } else { (2.0 * length).min(longest) };

@@ -65,7 +65,8 @@ impl Preconditioner {
         problem.curvature(posed, &mut Blocks(self));
         self.usable = false;
         let rows = self.matrix.rows();
-        let diagonal: Vec<usize> = (0..rows).map(|row| self.slot(row / 3, row / 3, row % 3) + row % 3).collect();
+        let diagonal: Vec<usize> =
+            (0..rows).map(|row| self.slot(row / 3, row / 3, row % 3) + row % 3).collect();
         let mean = diagonal.iter().map(|&at| self.matrix.values_mut()[at]).sum::<f64>() / rows.max(1) as f64;
         let Some(factor) = &mut self.factor else { return };
         if !(mean > 0.0 && mean.is_finite()) {

@@ -230,7 +230,8 @@ pub fn converged(run: &SolverRun) -> bool {
 }
 
 fn mean_distance(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
-    let sum: f64 = a.iter().zip(b).map(|(a, b)| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()).sum();
+    let sum: f64 =
+        a.iter().zip(b).map(|(a, b)| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()).sum();
     sum / a.len().max(1) as f64
 }
 

@@ -65,6 +65,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let settings = SolverSettings {
         iterations: arguments.iterations,
         tolerance: arguments.tolerance,
+        refactorise_every: std::env::var("CC_R").ok().and_then(|v| v.parse().ok()).unwrap_or(10), // TEMP
+        memory: std::env::var("CC_M").ok().and_then(|v| v.parse().ok()).unwrap_or(20),            // TEMP
         ..SolverSettings::default()
     };
     settings.check().into_diagnostic()?;
@@ -95,7 +97,8 @@ fn configuration(arguments: &Arguments, checkpoint: Option<&Checkpoint>) -> Resu
 }
 
 fn load_library(config: &Config) -> Result<Library, Report> {
-    let style = ProgressStyle::with_template("preparing garments {bar:30} {pos}/{len} {msg}").into_diagnostic()?;
+    let style =
+        ProgressStyle::with_template("preparing garments {bar:30} {pos}/{len} {msg}").into_diagnostic()?;
     let bar = ProgressBar::new(0).with_style(style);
     let library = Library::load(config, &|done, total, name| {
         bar.set_length(total as u64);
@@ -147,13 +150,25 @@ fn solve_all(
     networks: &[Option<Draped>],
     settings: &SolverSettings,
 ) -> Result<Vec<SceneError>, Report> {
-    let style = ProgressStyle::with_template("scenes {bar:30} {pos}/{len} · {eta} left · {msg}").into_diagnostic()?;
+    let style =
+        ProgressStyle::with_template("scenes {bar:30} {pos}/{len} · {eta} left · {msg}").into_diagnostic()?;
     let bar = ProgressBar::new(scenes.len() as u64).with_style(style);
     let solve_one = |i: usize| -> Result<SceneError, Report> {
         let scene = ReferenceScene::new(library, &config.losses, &scenes[i]).into_diagnostic()?;
         let name = scene.garments.join(", ");
         let result = scene_error(i, &scene, networks[i].as_ref(), settings, &mut |progress| {
             let step = progress.step;
+            if std::env::var_os("CC_T").is_some() {
+                eprintln!(
+                    "TRACE {i} {} {:.9} {:.3e} {:.2e} {} {:.0}",
+                    step.iteration,
+                    step.energy,
+                    step.gradient_norm,
+                    step.displacement,
+                    step.evaluations,
+                    step.milliseconds
+                ); // TEMP
+            }
             bar.set_message(format!("{name}: iteration {}, {:.4} J", step.iteration, step.energy));
             ControlFlow::Continue(())
         });
@@ -262,7 +277,8 @@ fn print_tables(errors: &[SceneError], settings: &SolverSettings) {
         );
     }
     println!("\n{:<30}{:>12}{:>12}{:>12}", format!("{} scenes", errors.len()), "mean", "median", "95 %");
-    let line = |what: String, s: Spread| println!("{what:<30}{:>12.4}{:>12.4}{:>12.4}", s.mean, s.median, s.p95);
+    let line =
+        |what: String, s: Spread| println!("{what:<30}{:>12.4}{:>12.4}{:>12.4}", s.mean, s.median, s.p95);
     for name in &names {
         line(format!("{name}: excess [J]"), spread(errors, name, |m| m.excess));
         if *name != LBS {
@@ -270,7 +286,10 @@ fn print_tables(errors: &[SceneError], settings: &SolverSettings) {
         }
         line(format!("{name}: distance [mm]"), spread(errors, name, |m| m.distance_mm));
     }
-    line("solver: steps".into(), Spread::of(errors.iter().map(|e| e.reference_run().iterations as f64).collect()));
+    line(
+        "solver: steps".into(),
+        Spread::of(errors.iter().map(|e| e.reference_run().iterations as f64).collect()),
+    );
     line("solver: seconds".into(), Spread::of(errors.iter().map(|e| e.reference_run().seconds).collect()));
     let reached = errors.iter().filter(|e| converged(e.reference_run())).count();
     println!(

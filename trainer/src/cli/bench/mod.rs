@@ -8,6 +8,7 @@ use miette::Report;
 /// Measures error, speed and stability
 #[derive(Subcommand)]
 pub enum Bench {
+    /// Energy above the equilibrium and distance to it, for skinning and a trained network, on random scenes
     Error(error::Arguments),
 }
 
