@@ -9,7 +9,7 @@ const CONFIG: &str = r#"
 seed = 4
 [data]
 [[data.garments]]
-generate = { count = 2, seed = 5, vertices = 150, categories = ["t_shirt", "skirt"] }
+generate = { count = 2, seed = 5, vertices = 200, categories = ["t_shirt", "skirt"] }
 [model]
 width = 8
 embedding = 8

@@ -65,8 +65,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let settings = SolverSettings {
         iterations: arguments.iterations,
         tolerance: arguments.tolerance,
-        refactorise_every: std::env::var("CC_R").ok().and_then(|v| v.parse().ok()).unwrap_or(10), // TEMP
-        memory: std::env::var("CC_M").ok().and_then(|v| v.parse().ok()).unwrap_or(20),            // TEMP
         ..SolverSettings::default()
     };
     settings.check().into_diagnostic()?;
@@ -158,17 +156,6 @@ fn solve_all(
         let name = scene.garments.join(", ");
         let result = scene_error(i, &scene, networks[i].as_ref(), settings, &mut |progress| {
             let step = progress.step;
-            if std::env::var_os("CC_T").is_some() {
-                eprintln!(
-                    "TRACE {i} {} {:.9} {:.3e} {:.2e} {} {:.0}",
-                    step.iteration,
-                    step.energy,
-                    step.gradient_norm,
-                    step.displacement,
-                    step.evaluations,
-                    step.milliseconds
-                ); // TEMP
-            }
             bar.set_message(format!("{name}: iteration {}, {:.4} J", step.iteration, step.energy));
             ControlFlow::Continue(())
         });
