@@ -25,11 +25,14 @@
 //! **Kinks and jumps.** The printed repulsion jumps where a pair reaches its radius, a wall for any line search:
 //! [`EnergySettings::repulsion_continuous`](crate::energy::EnergySettings::repulsion_continuous) has the same forces
 //! without it. The nearest-vertex distance jumps where the nearest vertex changes;
-//! [`Distance::ClosestPoint`](crate::query::Distance::ClosestPoint) is continuous except where the body intersects itself.
-//! Nearest features are looked up anew in every evaluation, nothing is frozen. Where a vertex rests against a kink or a
-//! jump the gradient cannot vanish, and the solver stops as [`Stop::Stalled`].
+//! [`Distance::ClosestPoint`](crate::query::Distance::ClosestPoint) is continuous except where the body intersects itself,
+//! and has a kink where two parts of the body are equally near. Nearest features are looked up anew in every evaluation,
+//! nothing is frozen. At a vertex that rests on a kink, the gradient in the relative gradient is the subgradient of
+//! smallest norm: no gradient vanishes there. Against a jump nothing can be balanced, and the solver stops as
+//! [`Stop::Stalled`].
 
 mod error;
+mod kinks;
 mod lbfgs;
 mod line_search;
 mod preconditioner;

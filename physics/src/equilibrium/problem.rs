@@ -1,6 +1,7 @@
 //! The energy of a scene as a function of posed positions alone.
 
 use super::EquilibriumError;
+use super::kinks::remove_balanced;
 use crate::energy::{CurvatureSink, SceneEnergy, Term, TermMap};
 use crate::vec3::{accumulate, cross, dot, norm_squared, scale, sub};
 
@@ -92,7 +93,15 @@ impl<'a> Problem<'a> {
     /// # Panics
     /// As [`value`](Self::value).
     pub fn relative_gradient(&self, posed: &[[f64; 3]]) -> f64 {
-        relative(norm(&self.value_and_gradient(posed).1), self.force_scale(posed))
+        let (_, gradient) = self.value_and_gradient(posed);
+        relative(self.unbalanced_norm(posed, &gradient), self.force_scale(posed))
+    }
+
+    /// Norm of `gradient`, which is that at `posed`, without what balances at kinks.
+    pub(super) fn unbalanced_norm(&self, posed: &[[f64; 3]], gradient: &[[f64; 3]]) -> f64 {
+        let mut gradient = gradient.to_vec();
+        remove_balanced(self.energy, posed, &mut gradient);
+        norm(&gradient)
     }
 
     /// Passes a positive semidefinite approximation of the Hessian with respect to posed positions to `sink`.

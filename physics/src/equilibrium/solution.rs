@@ -11,8 +11,9 @@ pub enum Stop {
     Iterations,
     /// The time was used up.
     Time,
-    /// No step along the descent direction lowers the energy, even with a fresh preconditioner and an empty memory: some
-    /// vertices rest against a kink or a jump of the energy.
+    /// No step along the descent direction lowers the energy, even with a fresh preconditioner and an empty memory, or
+    /// the last 60 steps together gained less than a millionth of what all gained: some vertices rest against a jump of
+    /// the energy, or creep along kinks.
     Stalled,
     /// A vertex went farther from its start than allowed: nothing holds that part of the garment.
     Escaped,

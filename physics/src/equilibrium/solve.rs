@@ -10,6 +10,15 @@ use super::problem::{norm, relative};
 use super::{EquilibriumError, Problem, Progress, Solution, SolverSettings, Step, Stop};
 use crate::vec3::{add_scaled, distance_squared, is_finite, norm_squared, sub};
 
+/// Iterations between two looks at the kinks, which cost some distance queries per vertex in contact.
+const KINKS_EVERY: usize = 10;
+
+/// Progress is judged over this many iterations.
+const WINDOW: usize = 60;
+
+/// Less than this share of all that was gained, gained over [`WINDOW`] iterations, is no progress.
+const LEAST_GAIN: f64 = 1e-6;
+
 /// A state of the search.
 struct State {
     positions: Vec<[f64; 3]>,
@@ -53,12 +62,19 @@ pub fn solve(
         if observer(&Progress { step: &step, positions: &state.positions }).is_break() {
             break Stop::Cancelled;
         }
+        let mut residual = step.gradient_norm;
+        if step.iteration % KINKS_EVERY == 0 && step.iteration > 0 {
+            residual = problem.unbalanced_norm(&state.positions, &state.gradient);
+        }
         // The scale is measured anew only where the old one would do: it falls together with the gradient.
-        if relative(step.gradient_norm, force_scale) <= settings.tolerance {
+        if relative(residual, force_scale) <= settings.tolerance {
             force_scale = problem.force_scale(&state.positions);
-            if relative(step.gradient_norm, force_scale) <= settings.tolerance {
+            if relative(residual, force_scale) <= settings.tolerance {
                 break Stop::Converged;
             }
+        }
+        if !is_progressing(&history) {
+            break Stop::Stalled;
         }
         if let Some(bound) = settings.escape_distance {
             let is_far = |(p, q): (&[f64; 3], &[f64; 3])| distance_squared(*p, *q) > bound * bound;
@@ -105,7 +121,8 @@ pub fn solve(
         memory.push(moved, difference(&next.gradient, &state.gradient));
         state = next;
     };
-    let relative_gradient = relative(step.gradient_norm, problem.force_scale(&state.positions));
+    let residual = problem.unbalanced_norm(&state.positions, &state.gradient);
+    let relative_gradient = relative(residual, problem.force_scale(&state.positions));
     let factorisations = preconditioner.map_or(0, |p| p.factorisations);
     Ok(Solution { positions: state.positions, stop, relative_gradient, history, factorisations })
 }
@@ -153,6 +170,14 @@ fn advance(
     };
     let (_, trial) = search(state.energy, slope, settings.step_bound / reach, evaluate)?;
     trial.state.gradient.iter().all(|g| is_finite(*g)).then_some(trial.state)
+}
+
+/// Whether the last [`WINDOW`] iterations gained a share of the energy that is worth while.
+fn is_progressing(history: &[Step]) -> bool {
+    let Some(earlier) = history.len().checked_sub(WINDOW + 1) else { return true };
+    let energy = |i: usize| history[i].energy;
+    let last = history.len() - 1;
+    energy(earlier) - energy(last) > LEAST_GAIN * (energy(0) - energy(last))
 }
 
 /// The longest of vectors.
