@@ -7,7 +7,7 @@ use super::EquilibriumError;
 /// Settings of [`super::solve`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SolverSettings {
-    /// Converged at or below this relative gradient (see [`super`]); 0 never converges.
+    /// Converged at or below this relative gradient (see [`super`]).
     pub tolerance: f64,
     /// Most iterations: accepted steps.
     pub iterations: usize,

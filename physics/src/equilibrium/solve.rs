@@ -10,8 +10,9 @@ use super::problem::{norm, relative};
 use super::{EquilibriumError, Problem, Progress, Solution, SolverSettings, Step, Stop};
 use crate::vec3::{add_scaled, distance_squared, is_finite, norm_squared, sub};
 
-/// Iterations between two looks at the kinks, which cost some distance queries per vertex in contact.
-const KINKS_EVERY: usize = 10;
+/// Iterations between two looks at the kinks, which cost some distance queries per vertex in contact, and at the scale of
+/// the forces, which costs an evaluation.
+const LOOK_EVERY: usize = 10;
 
 /// Progress is judged over this many iterations.
 const WINDOW: usize = 60;
@@ -63,10 +64,11 @@ pub fn solve(
             break Stop::Cancelled;
         }
         let mut residual = step.gradient_norm;
-        if step.iteration % KINKS_EVERY == 0 && step.iteration > 0 {
+        if step.iteration % LOOK_EVERY == 0 && step.iteration > 0 {
             residual = problem.unbalanced_norm(&state.positions, &state.gradient);
+            force_scale = problem.force_scale(&state.positions);
         }
-        // The scale is measured anew only where the old one would do: it falls together with the gradient.
+        // The scale of some iterations ago is only believed when it says no.
         if relative(residual, force_scale) <= settings.tolerance {
             force_scale = problem.force_scale(&state.positions);
             if relative(residual, force_scale) <= settings.tolerance {
@@ -123,6 +125,8 @@ pub fn solve(
     };
     let residual = problem.unbalanced_norm(&state.positions, &state.gradient);
     let relative_gradient = relative(residual, problem.force_scale(&state.positions));
+    let exhausted = matches!(stop, Stop::Stalled | Stop::Iterations | Stop::Time);
+    let stop = if exhausted && relative_gradient <= settings.tolerance { Stop::Converged } else { stop };
     let factorisations = preconditioner.map_or(0, |p| p.factorisations);
     Ok(Solution { positions: state.positions, stop, relative_gradient, history, factorisations })
 }
