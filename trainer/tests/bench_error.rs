@@ -72,7 +72,8 @@ fn check(report: &Value, methods: &[&str]) {
 fn skinning_and_a_network_are_measured_against_the_minimum() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("tiny.toml"), CONFIG).unwrap();
-    let output = bench(&["--config", "tiny.toml", "--json"], folder.path()).output().unwrap();
+    let output =
+        bench(&["--config", "tiny.toml", "--iterations", "150", "--json"], folder.path()).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     check(&serde_json::from_slice(&output.stdout).unwrap(), &["LBS of rest", "LBS"]);
 
@@ -82,7 +83,8 @@ fn skinning_and_a_network_are_measured_against_the_minimum() {
         .args(["--config", "tiny.toml", "--run-dir", "run", "--quiet"])
         .assert()
         .success();
-    let output = bench(&["--checkpoint", "run", "--json"], folder.path()).output().unwrap();
+    let output =
+        bench(&["--checkpoint", "run", "--iterations", "150", "--json"], folder.path()).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     check(&report, &["LBS of rest", "LBS", "network"]);
