@@ -67,16 +67,8 @@ impl ClosestPoint {
             .copied()
             .filter(|face| face.iter().all(|&v| vec3::is_finite(positions[v as usize])))
             .collect();
-        let boxes: Vec<Aabb> = faces
-            .iter()
-            .map(|face| {
-                let corners = face.map(|v| Vector::from_array(positions[v as usize]));
-                Aabb::new(
-                    corners[0].min(corners[1]).min(corners[2]),
-                    corners[0].max(corners[1]).max(corners[2]),
-                )
-            })
-            .collect();
+        let boxes: Vec<Aabb> =
+            faces.iter().map(|face| triangle_box(face.map(|v| positions[v as usize]))).collect();
         let bvh = Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes);
         let (vertex_normals, edge_normals) = pseudo_normals(&positions, &faces);
         Self { positions, faces, bvh, vertex_normals, edge_normals }
@@ -261,6 +253,12 @@ pub(super) fn pseudo_normals(
         })
         .collect();
     (at_vertex, edge_normals)
+}
+
+/// The smallest box around a triangle.
+pub(super) fn triangle_box(corners: [[f64; 3]; 3]) -> Aabb {
+    let [a, b, c] = corners.map(Vector::from_array);
+    Aabb::new(a.min(b).min(c), a.max(b).max(c))
 }
 
 fn box_distance_squared(p: [f64; 3], low: [f64; 3], high: [f64; 3]) -> f64 {

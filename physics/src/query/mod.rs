@@ -4,7 +4,9 @@ pub mod brute_force;
 mod closest_point;
 mod closest_vertex;
 mod surface;
+mod union;
 
 pub use closest_point::{ClosestPoint, Feature, SurfacePoint};
 pub use closest_vertex::{KdScalar, VertexIndex};
 pub use surface::{Distance, Gap, Surface};
+pub use union::UnionDistance;

@@ -41,7 +41,7 @@ pub struct ReferenceScene {
 /// The settings the reference is measured with: those of training, with exact distances and all pairs.
 pub fn reference_settings(losses: &LossesConfig) -> EnergySettings {
     EnergySettings {
-        distance: Distance::ClosestPoint,
+        distance: Distance::Union,
         repulsion_subset: None,
         repulsion_continuous: true,
         ..losses.energy_settings()
