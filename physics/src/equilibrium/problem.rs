@@ -1,7 +1,7 @@
 //! The energy of a scene as a function of posed positions alone.
 
 use super::EquilibriumError;
-use super::kinks::remove_balanced;
+use super::kinks::{self, Kink};
 use crate::energy::{CurvatureSink, SceneEnergy, Term, TermMap};
 use crate::vec3::{accumulate, cross, dot, norm_squared, scale, sub};
 
@@ -100,8 +100,26 @@ impl<'a> Problem<'a> {
     /// Norm of `gradient`, which is that at `posed`, without what balances at kinks.
     pub(super) fn unbalanced_norm(&self, posed: &[[f64; 3]], gradient: &[[f64; 3]]) -> f64 {
         let mut gradient = gradient.to_vec();
-        remove_balanced(self.energy, posed, &mut gradient);
+        kinks::balance(&self.kinks(posed, &gradient, 0.0), &mut gradient);
         norm(&gradient)
+    }
+
+    /// Vertices that rest on a kink, see [`kinks::kinks`].
+    pub(super) fn kinks(&self, posed: &[[f64; 3]], gradient: &[[f64; 3]], least: f64) -> Vec<Kink> {
+        kinks::kinks(self.energy, posed, gradient, least)
+    }
+
+    /// Positions with the vertices that are driven against a kink on it; `None` if there is no such vertex.
+    pub(super) fn onto_kinks(
+        &self,
+        posed: &[[f64; 3]],
+        gradient: &[[f64; 3]],
+        least: f64,
+    ) -> Option<Vec<[f64; 3]>> {
+        let moved = kinks::onto_kinks(self.energy, posed, gradient, least);
+        let mut positions = posed.to_vec();
+        moved.iter().for_each(|(v, p)| positions[*v] = *p);
+        (!moved.is_empty()).then_some(positions)
     }
 
     /// Passes a positive semidefinite approximation of the Hessian with respect to posed positions to `sink`.

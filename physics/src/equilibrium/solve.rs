@@ -3,6 +3,7 @@
 use std::ops::ControlFlow;
 use std::time::Instant;
 
+use super::kinks::{Kink, balance, project};
 use super::lbfgs::{Memory, product};
 use super::line_search::{Trial, search};
 use super::preconditioner::Preconditioner;
@@ -13,6 +14,9 @@ use crate::vec3::{add_scaled, distance_squared, is_finite, norm_squared, sub};
 /// Iterations between two looks at the kinks, which cost some distance queries per vertex in contact, and at the scale of
 /// the forces, which costs an evaluation.
 const LOOK_EVERY: usize = 10;
+
+/// The iteration from which on vertices are kept on kinks: before, they only pass.
+const FIRST_LOOK: usize = 10;
 
 /// Progress is judged over this many iterations.
 const WINDOW: usize = 60;
@@ -55,6 +59,9 @@ pub fn solve(
     let mut preconditioner: Option<Preconditioner> = None;
     let mut memory = Memory::new(settings.memory);
     let mut age = 0;
+    let mut kinks: Vec<Kink> = Vec::new();
+    // The last step, and the gradient before it.
+    let mut last: Option<(Vec<[f64; 3]>, Vec<[f64; 3]>)> = None;
     let mut history = Vec::new();
 
     let stop = loop {
@@ -63,10 +70,37 @@ pub fn solve(
         if observer(&Progress { step: &step, positions: &state.positions }).is_break() {
             break Stop::Cancelled;
         }
-        let mut residual = step.gradient_norm;
         if step.iteration % LOOK_EVERY == 0 && step.iteration > 0 {
-            residual = problem.unbalanced_norm(&state.positions, &state.gradient);
             force_scale = problem.force_scale(&state.positions);
+        }
+        // Vertices of a smaller gradient than this may all be wrong together.
+        let least = 0.1 * settings.tolerance * force_scale / (state.positions.len() as f64).sqrt();
+        if step.iteration >= FIRST_LOOK {
+            let put = put_on_kinks(problem, &mut state, least);
+            step.evaluations += put.evaluations;
+            if put.lowered {
+                step.energy = state.energy;
+                step.gradient_norm = norm(&state.gradient);
+                if let Some(last) = history.last_mut() {
+                    *last = step;
+                }
+            }
+            if std::env::var("CC_TRACE").is_ok() {
+                eprintln!(
+                    "it {} E {:.10} g {:.3e} put {:?}",
+                    step.iteration, step.energy, step.gradient_norm, put
+                );
+            }
+            kinks = problem.kinks(&state.positions, &state.gradient, least);
+        }
+        let mut balanced = state.gradient.clone();
+        balance(&kinks, &mut balanced);
+        let residual = norm(&balanced);
+        if let Some((moved, before)) = last.take() {
+            memory.push(moved, difference(&balanced, &before));
+        }
+        if std::env::var("CC_TRACE").is_ok() {
+            eprintln!("   kinks {} rel {:.3e}", kinks.len(), relative(residual, force_scale));
         }
         // The scale of some iterations ago is only believed when it says no.
         if relative(residual, force_scale) <= settings.tolerance {
@@ -100,18 +134,29 @@ pub fn solve(
                 preconditioner.refresh(problem, &state.positions);
                 age = 0;
             }
-            let found = advance(problem, &state, &memory, preconditioner, settings, &mut step.evaluations);
-            if found.is_some() || (age == 0 && memory.is_empty()) {
+            let found = advance(
+                problem,
+                &state,
+                &balanced,
+                &kinks,
+                &memory,
+                preconditioner,
+                settings,
+                &mut step.evaluations,
+            );
+            if found.is_some() || (age == 0 && memory.is_empty() && kinks.is_empty()) {
                 break found;
+            }
+            if age == 0 && memory.is_empty() {
+                // The model of the kinks was wrong somewhere: once without.
+                kinks.clear();
+                balanced.clone_from(&state.gradient);
             }
             memory.clear();
             age = settings.refactorise_every;
         };
         let Some(next) = next else { break Stop::Stalled };
         age += 1;
-        let difference = |a: &[[f64; 3]], b: &[[f64; 3]]| -> Vec<[f64; 3]> {
-            a.iter().zip(b).map(|(a, b)| sub(*a, *b)).collect()
-        };
         let moved = difference(&next.positions, &state.positions);
         step = Step {
             iteration: step.iteration + 1,
@@ -120,7 +165,7 @@ pub fn solve(
             displacement: longest(&moved),
             ..step
         };
-        memory.push(moved, difference(&next.gradient, &state.gradient));
+        last = Some((moved, balanced));
         state = next;
     };
     let residual = problem.unbalanced_norm(&state.positions, &state.gradient);
@@ -146,17 +191,46 @@ fn first_state(problem: &Problem<'_>, start: &[[f64; 3]]) -> Result<State, Equil
     Ok(State { positions: start.to_vec(), energy, gradient })
 }
 
+fn difference(a: &[[f64; 3]], b: &[[f64; 3]]) -> Vec<[f64; 3]> {
+    a.iter().zip(b).map(|(a, b)| sub(*a, *b)).collect()
+}
+
+/// What [`put_on_kinks`] did.
+#[derive(Debug)]
+struct Put {
+    lowered: bool,
+    evaluations: usize,
+}
+
+/// Puts vertices that are driven against a kink on it, if that lowers the energy.
+fn put_on_kinks(problem: &Problem<'_>, state: &mut State, least: f64) -> Put {
+    let Some(positions) = problem.onto_kinks(&state.positions, &state.gradient, least) else {
+        return Put { lowered: false, evaluations: 0 };
+    };
+    let (energy, gradient) = problem.value_and_gradient(&positions);
+    let lowered = energy < state.energy && gradient.iter().all(|g| is_finite(*g));
+    if lowered {
+        *state = State { positions, energy, gradient };
+    }
+    Put { lowered, evaluations: 1 }
+}
+
 /// One step downhill; `None` if there is none along the direction of `memory`.
 fn advance(
     problem: &Problem<'_>,
     state: &State,
+    balanced: &[[f64; 3]],
+    kinks: &[Kink],
     memory: &Memory,
     preconditioner: &Preconditioner,
     settings: &SolverSettings,
     evaluations: &mut usize,
 ) -> Option<State> {
-    let direction = memory.direction(&state.gradient, |q| preconditioner.apply(q));
-    let slope = product(&direction, &state.gradient);
+    let mut along = balanced.to_vec();
+    project(kinks, &mut along);
+    let mut direction = memory.direction(&along, |q| preconditioner.apply(q));
+    project(kinks, &mut direction);
+    let slope = product(&direction, balanced);
     let reach = longest(&direction);
     if !(slope < 0.0 && reach.is_finite()) {
         return None;

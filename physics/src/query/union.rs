@@ -243,13 +243,14 @@ mod tests {
         for p in points(300, 11) {
             // Along a line from p to the centre.
             let line: Vec<[f64; 3]> = (0..=400).map(|i| scale(p, 1.0 - f64::from(i) / 400.0)).collect();
-            let gaps = |distance| line.iter().map(move |q| surface_gap(&surface, *q, distance));
+            let gaps =
+                |distance| -> Vec<f64> { line.iter().map(|q| surface.gap(*q, distance).gap).collect() };
             let step = vec3::norm(p) / 400.0 + 1e-12;
-            let all: Vec<f64> = gaps(Distance::Union).collect();
+            let all = gaps(Distance::Union);
             assert!(all.windows(2).all(|w| (w[1] - w[0]).abs() <= step), "a jump towards {p:?}");
             let inside = brute_force::winding_number(mesh.positions(), mesh.faces(), p) > 0.5;
             assert_eq!(all[0] < 0.0, inside);
-            let closest: Vec<f64> = gaps(Distance::ClosestPoint).collect();
+            let closest = gaps(Distance::ClosestPoint);
             jumps_of_the_closest_point += usize::from(closest.windows(2).any(|w| (w[1] - w[0]).abs() > step));
             // Outside, nothing is nearer than the whole surface.
             if !inside {
@@ -258,10 +259,6 @@ mod tests {
             }
         }
         assert!(jumps_of_the_closest_point > 50, "{jumps_of_the_closest_point}");
-    }
-
-    fn surface_gap(surface: &Surface<f64>, p: [f64; 3], distance: Distance) -> f64 {
-        surface.gap(p, distance).gap
     }
 
     #[test]
