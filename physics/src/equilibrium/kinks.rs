@@ -14,7 +14,8 @@
 use rayon::prelude::*;
 
 use crate::energy::{SceneEnergy, Term};
-use crate::vec3::{add, add_scaled, dot, norm, norm_squared, scale, sub};
+use crate::query::closest_on_triangle;
+use crate::vec3::{add, add_scaled, cross, dot, norm, norm_squared, scale, sub};
 
 /// How near a kink has to be [m].
 const RADIUS: f64 = 1e-7;
@@ -41,7 +42,13 @@ const DIRECTIONS: [[f64; 3]; 14] = [
 ];
 
 /// How far the kink that a vertex is driven against may be for the vertex to be put on it [m], nearest first.
-const REACH: [f64; 4] = [1e-6, 1e-5, 1e-4, 5e-4];
+const REACH: [f64; 3] = [1e-6, 1e-5, 1e-4];
+
+/// Distance over which the forces of a single part of the body may turn [m]: they do not by less than reach over this.
+const TURN: f64 = 1e-3;
+
+/// Most parts of the body that are looked at in one kink.
+const MOST_SIDES: usize = 6;
 
 /// Halvings of the way to a kink.
 const HALVINGS: usize = 40;
@@ -54,7 +61,8 @@ pub(super) struct Kink {
     vertex: usize,
     /// The subgradient of smallest norm.
     gradient: [f64; 3],
-    /// Orthonormal directions across the kink, along which its forces differ.
+    /// Orthonormal directions across the kink, along which the forces that balance in it differ; a vertex that is driven
+    /// off the kink to one side has none.
     across: Vec<[f64; 3]>,
 }
 
@@ -82,9 +90,17 @@ pub(super) fn kinks(
             return None;
         }
         let rest = sub(gradient[vertex], here);
-        let smallest = nearest_to_origin(gradient[vertex], &around.map(|f| add(rest, f)));
+        let mut sides = vec![gradient[vertex]];
+        for f in around.map(|f| add(rest, f)) {
+            let is_known = |side: &[f64; 3]| !differ(sub(*side, rest), sub(f, rest));
+            if !sides.iter().any(is_known) && sides.len() < MOST_SIDES {
+                sides.push(f);
+            }
+        }
+        let (smallest, balanced) = nearest_to_origin(&sides);
         let mut across: Vec<[f64; 3]> = Vec::new();
-        for difference in around.into_iter().filter(|f| differ(*f, here)).map(|f| sub(f, here)) {
+        for side in balanced.iter().skip(1) {
+            let difference = sub(*side, balanced[0]);
             let left = across.iter().fold(difference, |x, m| add_scaled(x, -dot(x, *m), *m));
             if norm(left) > INDEPENDENT * norm(difference) {
                 across.push(scale(left, 1.0 / norm(left)));
@@ -112,14 +128,15 @@ pub(super) fn onto_kinks(
         let mut near = 0.0;
         for reach in REACH {
             // The forces turn a little with every step; a kink turns them at once.
-            if !differ(beyond(reach), here) {
+            let is_beyond = |length: f64| differ_by(beyond(length), here, KINK + reach / TURN);
+            if !is_beyond(reach) {
                 near = reach;
                 continue;
             }
             let mut far = reach;
             for _ in 0..HALVINGS {
                 let middle = 0.5 * (near + far);
-                if differ(beyond(middle), here) { far = middle } else { near = middle }
+                if is_beyond(middle) { far = middle } else { near = middle }
             }
             // Beyond the kink, the vertex must be driven back.
             let there = add(sub(gradient[vertex], here), beyond(far + RADIUS));
@@ -162,7 +179,12 @@ fn in_contact<R: Send>(
 
 /// Whether two forces belong to different parts of the body.
 fn differ(a: [f64; 3], b: [f64; 3]) -> bool {
-    norm(sub(a, b)) > KINK * norm(a).max(norm(b))
+    differ_by(a, b, KINK)
+}
+
+/// Whether two forces differ by more than `share` of the larger.
+fn differ_by(a: [f64; 3], b: [f64; 3], share: f64) -> bool {
+    norm(sub(a, b)) > share * norm(a).max(norm(b))
 }
 
 /// Puts the smallest subgradients in the place of the gradients at `kinks`.
@@ -179,20 +201,37 @@ pub(super) fn project(kinks: &[Kink], x: &mut [[f64; 3]]) {
     }
 }
 
-/// The point nearest to the origin in the convex hull of `start` and `points` (Gilbert's algorithm).
-fn nearest_to_origin(start: [f64; 3], points: &[[f64; 3]]) -> [f64; 3] {
-    let mut x = start;
-    for _ in 0..300 {
-        let ahead = points.iter().copied().min_by(|a, b| dot(*a, x).total_cmp(&dot(*b, x)));
-        let Some(p) = ahead else { return x };
-        let step = sub(p, x);
-        let gain = -dot(x, step);
-        if !(gain > 1e-9 * norm_squared(x)) {
-            return x;
+/// The point nearest to the origin in the convex hull of `points`, and those of them whose convex combination it is.
+fn nearest_to_origin(points: &[[f64; 3]]) -> ([f64; 3], Vec<[f64; 3]>) {
+    let n = points.len();
+    let mut best = (points[0], vec![points[0]]);
+    let is_inside = |corners: [[f64; 3]; 4]| {
+        // The origin is on the same side of every face as the corner opposite.
+        (0..4).all(|k| {
+            let [a, b, c, d] = [1, 2, 3, 0].map(|i| corners[(k + i) % 4]);
+            let normal = cross(sub(b, a), sub(c, a));
+            dot(normal, sub(d, a)) * -dot(normal, a) > 0.0
+        })
+    };
+    for i in 0..n {
+        for j in i..n {
+            for k in j..n {
+                let corners = [points[i], points[j], points[k]];
+                let found = closest_on_triangle([0.0; 3], corners);
+                if found.distance_squared < norm_squared(best.0) {
+                    let with_weight = (0..3).filter(|c| found.barycentric[*c] > 0.0);
+                    best = (found.position, with_weight.map(|c| corners[c]).collect());
+                }
+                for l in k + 1..n {
+                    let corners = [points[i], points[j], points[k], points[l]];
+                    if i < j && j < k && is_inside(corners) {
+                        return ([0.0; 3], corners.to_vec());
+                    }
+                }
+            }
         }
-        x = add_scaled(x, (gain / norm_squared(step)).clamp(0.0, 1.0), step);
     }
-    x
+    best
 }
 
 #[cfg(test)]
@@ -203,10 +242,11 @@ mod tests {
     fn the_nearest_point_of_a_hull() {
         // Inside, on a segment, at a corner.
         let inside = [[1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0], [1.0, 1.0, 1.0]];
-        assert!(norm(nearest_to_origin(inside[0], &inside)) < 1e-3);
+        assert_eq!(nearest_to_origin(&inside), ([0.0; 3], inside.to_vec()));
         let segment = [[1.0, 2.0, 0.0], [1.0, -1.0, 0.0]];
-        assert!(norm(sub(nearest_to_origin(segment[0], &segment), [1.0, 0.0, 0.0])) < 1e-6);
+        let (found, of) = nearest_to_origin(&segment);
+        assert!(norm(sub(found, [1.0, 0.0, 0.0])) < 1e-12 && of == segment);
         let corner = [[1.0, 1.0, 0.0], [2.0, 1.0, 0.0], [1.0, 3.0, 0.5]];
-        assert!(norm(sub(nearest_to_origin(corner[1], &corner), corner[0])) < 1e-6);
+        assert_eq!(nearest_to_origin(&corner), (corner[0], vec![corner[0]]));
     }
 }

@@ -118,7 +118,7 @@ impl ClosestPoint {
 
 /// What [`closest_on_triangle`] found.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct TrianglePoint {
+pub(crate) struct TrianglePoint {
     pub position: [f64; 3],
     pub distance_squared: f64,
     pub barycentric: [f64; 3],
@@ -129,7 +129,7 @@ pub(super) struct TrianglePoint {
 ///
 /// The region tests divide by the area; a triangle thinner than 1e-12 of its length is measured as its three edges instead,
 /// which is exact for it.
-pub(super) fn closest_on_triangle(p: [f64; 3], [a, b, c]: [[f64; 3]; 3]) -> TrianglePoint {
+pub(crate) fn closest_on_triangle(p: [f64; 3], [a, b, c]: [[f64; 3]; 3]) -> TrianglePoint {
     let (ab, ac, bc) = (vec3::sub(b, a), vec3::sub(c, a), vec3::sub(c, b));
     let longest = vec3::norm_squared(ab).max(vec3::norm_squared(ac)).max(vec3::norm_squared(bc));
     if vec3::norm_squared(vec3::cross(ab, ac)) <= 1e-24 * longest * longest {

@@ -6,6 +6,7 @@ mod closest_vertex;
 mod surface;
 mod union;
 
+pub(crate) use closest_point::closest_on_triangle;
 pub use closest_point::{ClosestPoint, Feature, SurfacePoint};
 pub use closest_vertex::{KdScalar, VertexIndex};
 pub use surface::{Distance, Gap, Surface};
