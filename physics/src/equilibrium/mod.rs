@@ -24,12 +24,14 @@
 //!
 //! **Kinks and jumps.** The printed repulsion jumps where a pair reaches its radius, a wall for any line search:
 //! [`EnergySettings::repulsion_continuous`](crate::energy::EnergySettings::repulsion_continuous) has the same forces
-//! without it. The nearest-vertex distance jumps where the nearest vertex changes;
-//! [`Distance::ClosestPoint`](crate::query::Distance::ClosestPoint) is continuous except where the body intersects itself,
-//! and has a kink where two parts of the body are equally near. Nearest features are looked up anew in every evaluation,
-//! nothing is frozen. At a vertex that rests on a kink, the gradient in the relative gradient is the subgradient of
-//! smallest norm: no gradient vanishes there. Against a jump nothing can be balanced, and the solver stops as
-//! [`Stop::Stalled`].
+//! without it. The nearest-vertex distance jumps where the nearest vertex changes, and
+//! [`Distance::ClosestPoint`](crate::query::Distance::ClosestPoint) jumps where the body intersects itself;
+//! [`Distance::Union`](crate::query::Distance::Union) is continuous. Against a jump nothing can be balanced: with the other
+//! distances the solver may stop as [`Stop::Stalled`]. Every distance has a kink where two parts of the body are equally near.
+//! Nearest features are looked up anew in every evaluation, nothing is frozen. At a vertex that rests on a kink, the gradient
+//! in the relative gradient is the subgradient of smallest norm: no gradient vanishes there. From the tenth iteration on,
+//! vertices that are driven against a kink are put on it, where that lowers the energy, and steps are projected along the
+//! kinks that their vertices rest on.
 
 mod error;
 mod kinks;

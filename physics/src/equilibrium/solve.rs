@@ -11,8 +11,7 @@ use super::problem::{norm, relative};
 use super::{EquilibriumError, Problem, Progress, Solution, SolverSettings, Step, Stop};
 use crate::vec3::{add_scaled, distance_squared, is_finite, norm_squared, sub};
 
-/// Iterations between two looks at the kinks, which cost some distance queries per vertex in contact, and at the scale of
-/// the forces, which costs an evaluation.
+/// Iterations between two looks at the scale of the forces, which costs an evaluation.
 const LOOK_EVERY: usize = 10;
 
 /// The iteration from which on vertices are kept on kinks: before, they only pass.
@@ -76,20 +75,16 @@ pub fn solve(
         // Vertices of a smaller gradient than this may all be wrong together.
         let least = 0.1 * settings.tolerance * force_scale / (state.positions.len() as f64).sqrt();
         if step.iteration >= FIRST_LOOK {
-            let put = put_on_kinks(problem, &mut state, least);
-            step.evaluations += put.evaluations;
-            if put.lowered {
-                step.energy = state.energy;
-                step.gradient_norm = norm(&state.gradient);
-                if let Some(last) = history.last_mut() {
-                    *last = step;
+            if let Some(positions) = problem.onto_kinks(&state.positions, &state.gradient, least) {
+                let (energy, gradient) = problem.value_and_gradient(&positions);
+                step.evaluations += 1;
+                if energy < state.energy && gradient.iter().all(|g| is_finite(*g)) {
+                    state = State { positions, energy, gradient };
+                    step = Step { energy, gradient_norm: norm(&state.gradient), ..step };
+                    if let Some(entry) = history.last_mut() {
+                        *entry = step;
+                    }
                 }
-            }
-            if std::env::var("CC_TRACE").is_ok() {
-                eprintln!(
-                    "it {} E {:.10} g {:.3e} put {:?}",
-                    step.iteration, step.energy, step.gradient_norm, put
-                );
             }
             kinks = problem.kinks(&state.positions, &state.gradient, least);
         }
@@ -98,9 +93,6 @@ pub fn solve(
         let residual = norm(&balanced);
         if let Some((moved, before)) = last.take() {
             memory.push(moved, difference(&balanced, &before));
-        }
-        if std::env::var("CC_TRACE").is_ok() {
-            eprintln!("   kinks {} rel {:.3e}", kinks.len(), relative(residual, force_scale));
         }
         // The scale of some iterations ago is only believed when it says no.
         if relative(residual, force_scale) <= settings.tolerance {
@@ -134,16 +126,8 @@ pub fn solve(
                 preconditioner.refresh(problem, &state.positions);
                 age = 0;
             }
-            let found = advance(
-                problem,
-                &state,
-                &balanced,
-                &kinks,
-                &memory,
-                preconditioner,
-                settings,
-                &mut step.evaluations,
-            );
+            let model = Model { gradient: &balanced, kinks: &kinks, memory: &memory, preconditioner };
+            let found = advance(problem, &state, &model, settings, &mut step.evaluations);
             if found.is_some() || (age == 0 && memory.is_empty() && kinks.is_empty()) {
                 break found;
             }
@@ -191,46 +175,34 @@ fn first_state(problem: &Problem<'_>, start: &[[f64; 3]]) -> Result<State, Equil
     Ok(State { positions: start.to_vec(), energy, gradient })
 }
 
+/// `a − b`.
 fn difference(a: &[[f64; 3]], b: &[[f64; 3]]) -> Vec<[f64; 3]> {
     a.iter().zip(b).map(|(a, b)| sub(*a, *b)).collect()
 }
 
-/// What [`put_on_kinks`] did.
-#[derive(Debug)]
-struct Put {
-    lowered: bool,
-    evaluations: usize,
+/// What a step is chosen by.
+struct Model<'a> {
+    /// The subgradient of smallest norm.
+    gradient: &'a [[f64; 3]],
+    kinks: &'a [Kink],
+    memory: &'a Memory,
+    preconditioner: &'a Preconditioner,
 }
 
-/// Puts vertices that are driven against a kink on it, if that lowers the energy.
-fn put_on_kinks(problem: &Problem<'_>, state: &mut State, least: f64) -> Put {
-    let Some(positions) = problem.onto_kinks(&state.positions, &state.gradient, least) else {
-        return Put { lowered: false, evaluations: 0 };
-    };
-    let (energy, gradient) = problem.value_and_gradient(&positions);
-    let lowered = energy < state.energy && gradient.iter().all(|g| is_finite(*g));
-    if lowered {
-        *state = State { positions, energy, gradient };
-    }
-    Put { lowered, evaluations: 1 }
-}
-
-/// One step downhill; `None` if there is none along the direction of `memory`.
+/// One step downhill along the kinks of `model`; `None` if there is none along the direction of its memory.
 fn advance(
     problem: &Problem<'_>,
     state: &State,
-    balanced: &[[f64; 3]],
-    kinks: &[Kink],
-    memory: &Memory,
-    preconditioner: &Preconditioner,
+    model: &Model<'_>,
     settings: &SolverSettings,
     evaluations: &mut usize,
 ) -> Option<State> {
-    let mut along = balanced.to_vec();
-    project(kinks, &mut along);
-    let mut direction = memory.direction(&along, |q| preconditioner.apply(q));
-    project(kinks, &mut direction);
-    let slope = product(&direction, balanced);
+    // −P H P g is downhill for every projection P.
+    let mut along = model.gradient.to_vec();
+    project(model.kinks, &mut along);
+    let mut direction = model.memory.direction(&along, |q| model.preconditioner.apply(q));
+    project(model.kinks, &mut direction);
+    let slope = product(&direction, model.gradient);
     let reach = longest(&direction);
     if !(slope < 0.0 && reach.is_finite()) {
         return None;

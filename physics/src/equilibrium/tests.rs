@@ -163,6 +163,28 @@ fn a_skirt_comes_to_rest_on_a_cone() {
 }
 
 #[test]
+fn a_sheet_comes_to_rest_in_a_valley() {
+    // Two slopes meet in a crease: the vertices over it rest on a kink of the distance.
+    let valley = shapes::mapped(&shapes::grid(0.6, 0.6, 12, 12), |[x, y, _]| {
+        [x - 0.3, 0.5 * (x - 0.3).abs(), 0.3 - y]
+    });
+    let flat = shapes::mapped(&shapes::grid(0.1, 0.05, 12, 6), |[x, y, _]| [x - 0.05, 0.0, 0.02 - y]);
+    let rest = jittered(&flat, 0.0005, 3);
+    let mut weights = paper_weights();
+    weights[Term::BodyCollision] = STIFF_CONTACT;
+    weights[Term::Holding] = 0.0;
+    let energy = scene(&rest, &valley, settings(), weights);
+    let problem = Problem::new(&energy, None).unwrap();
+    let start: Vec<_> = rest.positions().iter().map(|[x, y, z]| [*x, y + 0.03, *z]).collect();
+    let solution = run(&problem, &start, &SolverSettings::default());
+    assert_eq!(solution.stop, Stop::Converged, "{:?} {}", solution.last(), solution.relative_gradient);
+    assert_monotone(&solution);
+    // On a kink the gradient itself cannot vanish.
+    let (_, gradient) = problem.value_and_gradient(&solution.positions);
+    assert!(super::problem::norm(&gradient) > 1e-3 * problem.force_scale(&solution.positions));
+}
+
+#[test]
 fn the_number_of_threads_leaves_no_trace() {
     let (energy, rest) = skirt_on_cone(48, 14);
     let problem = Problem::new(&energy, None).unwrap();

@@ -2,9 +2,9 @@
 //!
 //! The reference is the state of lowest energy that the static solver of `clothcombo_physics` finds from linear blend
 //! skinning and, if there are networks, from their drape. All methods are measured by one function of posed positions: the
-//! losses of the configuration with the weights they end with, in f64, with the closest surface point as distance to the
-//! body and all pairs in the repulsion, from which the constant of each pair is taken off
-//! (`EnergySettings::repulsion_continuous`). Training uses cheaper forms of these two.
+//! losses of the configuration with the weights they end with, in f64, with the distance to the outside of the body, whose
+//! parts may intersect when posed (`Distance::Union`), and all pairs in the repulsion, from which the constant of each pair is
+//! taken off (`EnergySettings::repulsion_continuous`). Training uses cheaper forms of these two.
 
 use crate::config::LossesConfig;
 use crate::evaluate::Draped;
