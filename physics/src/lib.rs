@@ -10,6 +10,7 @@
 //! | [`operators`] | the DiffusionNet precompute: mass, Laplacian, gradients, eigenbasis |
 //! | [`energy`] | the eight energies, their gradients, and the weighted sum over a scene |
 //! | [`contact`] | penetration of the body, order of layers, exact intersections and their contours |
+//! | [`equilibrium`] | static drape: direct minimisation of the same energies from any start |
 //! | [`query`] | nearest vertex and closest surface point, accelerated, with brute-force oracles |
 //! | `autodiff` | the energies as one differentiable burn operation (feature `autodiff`) |
 
@@ -17,6 +18,7 @@
 pub mod autodiff;
 pub mod contact;
 pub mod energy;
+pub mod equilibrium;
 pub mod mesh;
 pub mod operators;
 pub mod query;

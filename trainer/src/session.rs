@@ -214,7 +214,8 @@ fn dimensions(library: &Library) -> Dimensions {
     state(library, 0).dimensions()
 }
 
-fn state(library: &Library, step: u64) -> CheckpointState {
+/// What a checkpoint of networks for `library` says about itself at `step`.
+pub(crate) fn state(library: &Library, step: u64) -> CheckpointState {
     let joints: Vec<String> =
         library.joints().indices.iter().map(|&j| library.body.joint_names[j].clone()).collect();
     let pose_features = joints.len() * library.poses.features_per_joint();

@@ -86,7 +86,7 @@ fn empty_garment_folder() {
     let case = Case::new();
     std::fs::create_dir(case.folder.path().join("empty")).unwrap();
     case.config("mannequin", &format!("folder = \"{}\"", case.path("empty")));
-    case.must_fail(&[], &["empty", "OBJ files"]);
+    case.must_fail(&[], &["empty", "no garments", "OBJ"]);
 }
 
 #[test]

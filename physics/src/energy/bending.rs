@@ -13,8 +13,9 @@
 //! 1e-6 squared median edges). A triangle at rest loses 1e-8 of its energy, one without area all of it, and the gradient is
 //! bounded and still the exact derivative.
 
+use super::curvature::outer;
 use super::elements::{Incidence, Response, sum_elements};
-use super::{GarmentState, GarmentTerm, Weighted};
+use super::{CurvatureSink, GarmentState, GarmentTerm, Weighted};
 use crate::mesh::{Hinge, TriMesh};
 use crate::real::Real;
 use crate::vec3::{
@@ -74,6 +75,33 @@ impl<T: Real> GarmentTerm<T> for Bending {
     fn evaluate(&self, state: &GarmentState<'_, T>, target: Option<Weighted<'_, T>>) -> f64 {
         self.evaluate(state.posed, target)
     }
+
+    /// Gauss–Newton: `k ∇α ∇αᵀ`, without the second derivative of the angle, which has either sign.
+    fn curvature(&self, state: &GarmentState<'_, T>, sink: &mut dyn CurvatureSink) {
+        for (hinge, tau) in self.hinges.iter().zip(&self.collapse_squared) {
+            let (gradient, shape) = angle_gradient(hinge.map(|v| to_f64(state.posed[v as usize])), *tau);
+            for k in 0..4 {
+                for l in 0..=k {
+                    let block = outer(self.stiffness * shape, gradient[k], gradient[l]);
+                    sink.add(hinge[k] as usize, hinge[l] as usize, block);
+                }
+            }
+        }
+    }
+}
+
+/// `∂α/∂(a, b, c, d)`, regularised as in [`hinge`], and the scale of the hinge's energy.
+fn angle_gradient([a, b, c, d]: [[f64; 3]; 4], [tau1, tau2]: [f64; 2]) -> ([[f64; 3]; 4], f64) {
+    let (edge, to_c, to_d) = (sub(b, a), sub(c, a), sub(d, a));
+    let (n1, n2) = (cross(edge, to_c), cross(to_d, edge));
+    let (length, direction) = (norm(edge), normalized(edge));
+    let (s1, s2) = (norm_squared(n1), norm_squared(n2));
+    let (inverse1, inverse2) = (reciprocal(s1 + tau1), reciprocal(s2 + tau2));
+    let (at_c, at_d) = (scale(n1, -inverse1), scale(n2, -inverse2));
+    let (g_c, g_d) = (scale(at_c, length), scale(at_d, length));
+    let g_b = neg(add_scaled(scale(at_c, dot(to_c, direction)), dot(to_d, direction), at_d));
+    let g_a = neg(add(g_b, add(g_c, g_d)));
+    ([g_a, g_b, g_c, g_d], s1 * inverse1 * s2 * inverse2)
 }
 
 /// Energy and gradient of the triangles `(a, b, c)` and `(b, a, d)` about the edge `a b`.

@@ -4,7 +4,8 @@
 //! which one). The body is fixed; where the nearest vertex changes, `d` jumps a little, and the gradient is that of the
 //! vertex in use. A body vertex without a normal (no face, or faces that cancel) has no side and takes no part.
 
-use super::{GarmentState, GarmentTerm, Weighted};
+use super::curvature::outer;
+use super::{CurvatureSink, GarmentState, GarmentTerm, Weighted};
 use crate::query::Gap;
 use crate::real::Real;
 use crate::vec3::{scale, to_f64};
@@ -34,5 +35,16 @@ pub fn body_collision<T: Real>(gaps: &[Gap<T>], epsilon: f64, mut target: Option
 impl<T: Real> GarmentTerm<T> for BodyCollision {
     fn evaluate(&self, state: &GarmentState<'_, T>, target: Option<Weighted<'_, T>>) -> f64 {
         body_collision(state.gaps, state.settings.body_collision_epsilon, target)
+    }
+
+    /// `6(ε − d) n nᵀ`: what the penalty has if the surface under the vertex is flat.
+    fn curvature(&self, state: &GarmentState<'_, T>, sink: &mut dyn CurvatureSink) {
+        for (v, gap) in state.gaps.iter().enumerate() {
+            let excess = state.settings.body_collision_epsilon - gap.gap.to_f64();
+            if excess > 0.0 {
+                let normal = to_f64(gap.gradient);
+                sink.add(v, v, outer(6.0 * excess, normal, normal));
+            }
+        }
     }
 }

@@ -9,7 +9,7 @@ use super::holding::Holding;
 use super::layer_collision::InnerSurface;
 use super::repulsion::Repulsion;
 use super::strain::Strain;
-use super::{EnergyError, EnergySettings, Term, Weighted};
+use super::{CurvatureSink, EnergyError, EnergySettings, Term, Weighted};
 use crate::mesh::{Topology, TriMesh};
 use crate::query::Gap;
 use crate::real::Real;
@@ -34,6 +34,10 @@ pub trait GarmentTerm<T>: Debug + Send + Sync {
     /// Its raw value; adds `weight·∂E/∂positions` to the target, positions being canonical or posed as
     /// [`Term::is_canonical`] says.
     fn evaluate(&self, state: &GarmentState<'_, T>, target: Option<Weighted<'_, T>>) -> f64;
+
+    /// Adds a positive semidefinite approximation of its second derivatives; nothing for a term that is linear or whose
+    /// second derivative has either sign everywhere.
+    fn curvature(&self, _state: &GarmentState<'_, T>, _sink: &mut dyn CurvatureSink) {}
 }
 
 /// The energies of one garment, ready to be evaluated at any positions. Made once per garment and shared by `Arc`.
@@ -76,6 +80,7 @@ impl<T: Real> GarmentEnergies<T> {
             settings.repulsion_normalised,
             settings.repulsion_subset,
         );
+        let repulsion = if settings.repulsion_continuous { repulsion.continuous() } else { repulsion };
         let bending =
             Bending::with_median_edge(rest, &topology.hinges, material.bending_stiffness, median_edge);
         let mut terms: Vec<(Term, Box<dyn GarmentTerm<T>>)> = vec![

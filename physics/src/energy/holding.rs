@@ -5,7 +5,7 @@
 //! printed form punishes a garment for following its body. The caller chooses through
 //! [`super::SceneGarment::holding_reference`].
 
-use super::{GarmentState, GarmentTerm, Weighted};
+use super::{CurvatureSink, GarmentState, GarmentTerm, Weighted};
 use crate::mesh::TriMesh;
 use crate::real::Real;
 
@@ -55,6 +55,13 @@ impl Holding {
 impl<T: Real> GarmentTerm<T> for Holding {
     fn evaluate(&self, state: &GarmentState<'_, T>, target: Option<Weighted<'_, T>>) -> f64 {
         self.evaluate(state.canonical, state.holding_reference, target)
+    }
+
+    /// Exact: the energy is quadratic.
+    fn curvature(&self, _state: &GarmentState<'_, T>, sink: &mut dyn CurvatureSink) {
+        for &v in &self.held {
+            sink.add(v as usize, v as usize, [[0.0; 3], [0.0, 2.0, 0.0], [0.0; 3]]);
+        }
     }
 }
 

@@ -21,6 +21,7 @@
 pub mod bending;
 pub mod body_collision;
 mod cell_grid;
+mod curvature;
 mod elements;
 mod error;
 mod garment;
@@ -40,6 +41,7 @@ mod term;
 #[cfg(test)]
 pub(crate) mod tests;
 
+pub use curvature::CurvatureSink;
 pub use elements::Weighted;
 pub use error::EnergyError;
 pub use garment::{GarmentEnergies, GarmentState, GarmentTerm};

@@ -23,6 +23,8 @@ pub(super) struct Kernel<T> {
     pub least_energy: f64,
     radius_squared: T,
     contact_squared: T,
+    /// What `d²` is multiplied with inside the logarithm [1/m²].
+    unit: T,
 }
 
 /// Runs `kernel`, compiled once per vector width, with the widest the processor has. What it calls must be `#[inline(always)]`.
@@ -42,10 +44,12 @@ fn vectorised(kernel: impl FnOnce()) {
 pub(super) type VertexResponse<T> = (f64, [T; 3]);
 
 impl<T: Real> Kernel<T> {
-    pub fn new(radius: f64) -> Self {
+    /// Pairs closer than `radius` [m] count `−log(unit·d²)`.
+    pub fn new(radius: f64, unit: f64) -> Self {
         Self {
             radius,
-            least_energy: -2.0 * radius.ln(),
+            least_energy: -2.0 * radius.ln() - unit.ln(),
+            unit: T::from_f64(unit),
             radius_squared: T::from_f64(radius * radius),
             contact_squared: T::from_f64(CONTACT_DISTANCE * CONTACT_DISTANCE),
         }
@@ -63,7 +67,7 @@ impl<T: Real> Kernel<T> {
             }
             let guarded = squared.max(self.contact_squared);
             energy += (guarded - squared).to_f64() / self.contact_squared.to_f64();
-            product *= guarded.to_f64();
+            product *= (guarded * self.unit).to_f64();
             if !(1e-200..1e200).contains(&product) {
                 energy -= product.ln();
                 product = 1.0;
@@ -108,7 +112,7 @@ impl<T: Real> Kernel<T> {
                 pull[0][lane] += dx * inverse;
                 pull[1][lane] += dy * inverse;
                 pull[2][lane] += dz * inverse;
-                product[lane] *= if inside { guarded } else { T::one() };
+                product[lane] *= if inside { guarded * self.unit } else { T::one() };
                 excess[lane] += if inside { guarded - squared } else { T::zero() };
             }
             if step % STEPS_PER_PRODUCT == STEPS_PER_PRODUCT - 1 {
@@ -205,7 +209,7 @@ mod tests {
 
     #[test]
     fn a_list_gives_the_sum_of_its_pairs() {
-        let kernel = Kernel::<f32>::new(0.1);
+        let kernel = Kernel::<f32>::new(0.1, 1.0);
         let mut points = near(777);
         // Closer than the contact distance, and at the same place.
         points.extend([[2e-5, 0.0, 0.0], [0.0; 3], [5e-5, 5e-5, 0.0]]);

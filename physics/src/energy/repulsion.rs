@@ -6,7 +6,9 @@
 //! **Near d = 0** the logarithm has no value. Below [`CONTACT_DISTANCE`] it continues as the line in `d²` that touches it
 //! there, `−log δ² + 1 − d²/δ²`: continuously differentiable, bounded, gradient at most `2/δ`; two vertices at one point
 //! have no direction to part in and get none from each other. **At the radius** the printed term jumps from 4.6 to 0; this
-//! is kept, and the gradient is that of the pairs inside.
+//! is kept, and the gradient is that of the pairs inside. [`Repulsion::continuous`] drops the jump without touching the
+//! gradient: pairs inside count `−log d²/r²`. Training, which follows gradients, cannot tell the two forms apart; a line
+//! search can, because in the printed form every pair that comes closer than the radius is a wall.
 //!
 //! **No all-pairs work.** Vertices are sorted into cells of half or a quarter of the radius; those of one cell share a list of
 //! candidates, which the inner loop runs through in fixed lanes, with the widest vectors the processor has (the operations
@@ -35,6 +37,8 @@ const SUBSET_SEED: u64 = 0x5eed_0fc1_07c0_4b05;
 #[derive(Debug, Clone)]
 pub struct Repulsion {
     radius: f64,
+    /// Squared lengths are measured in units of one over this [1/m²].
+    unit: f64,
     /// Factor on the sum over unordered pairs.
     factor: f64,
     pairs: Pairs,
@@ -91,13 +95,19 @@ impl Repulsion {
                 Pairs::All { excluded }
             }
         };
-        Self { radius, factor, pairs }
+        Self { radius, unit: 1.0, factor, pairs }
+    }
+
+    /// The same forces from an energy without the jump at the radius: `−log d²/r²` for pairs inside.
+    pub fn continuous(mut self) -> Self {
+        self.unit = 1.0 / (self.radius * self.radius);
+        self
     }
 
     /// Energy at `positions` `[V, 3]` [m]; adds its weighted gradient to `target`. A vertex that is not finite repels
     /// nothing.
     pub fn evaluate<T: Real>(&self, positions: &[[T; 3]], target: Option<Weighted<'_, T>>) -> f64 {
-        let kernel = Kernel::<T>::new(self.radius);
+        let kernel = Kernel::<T>::new(self.radius, self.unit);
         let (twice, responses) = match &self.pairs {
             Pairs::All { excluded } => all_pairs(positions, excluded, kernel),
             Pairs::Subset { partners } => sampled_pairs(positions, partners, kernel),

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use super::curvature::{CurvatureSink, Scaled};
 use super::elements::GRAIN;
 use super::layer_collision::PosedInner;
 use super::layer_distance::{BodyBuckets, LayerGaps, layer_distance};
@@ -163,6 +164,36 @@ impl<T: Real> SceneEnergy<T> {
     pub fn needs_canonical(&self) -> bool {
         let mut terms = self.garments.iter().flat_map(|g| g.energies.terms().map(move |(term, _)| (g, term)));
         terms.any(|(g, term)| term.is_canonical() && g.weights[term] != 0.0)
+    }
+
+    /// A positive semidefinite approximation of the second derivatives of the weighted sum with respect to posed and to
+    /// canonical positions, vertices numbered as in `posed`. Layer terms are left out.
+    ///
+    /// # Panics
+    /// As [`evaluate`](Self::evaluate).
+    pub fn curvature(
+        &self,
+        posed: &[[T; 3]],
+        canonical: &[[T; 3]],
+        posed_sink: &mut dyn CurvatureSink,
+        canonical_sink: &mut dyn CurvatureSink,
+    ) {
+        for (i, (garment, range)) in self.garments.iter().zip(self.ranges()).enumerate() {
+            let offset = range.start;
+            let canonical = canonical.get(range.clone()).unwrap_or(&[]);
+            let shared = self.share(i, &posed[range], canonical, &|_, weight| weight != 0.0);
+            for (term, energy) in garment.energies.terms() {
+                let weight = garment.weights[term];
+                if weight > 0.0 {
+                    let state = shared.state();
+                    if term.is_canonical() {
+                        energy.curvature(&state, &mut Scaled { sink: canonical_sink, offset, weight });
+                    } else {
+                        energy.curvature(&state, &mut Scaled { sink: posed_sink, offset, weight });
+                    }
+                }
+            }
+        }
     }
 
     fn run(

@@ -39,6 +39,9 @@ pub struct EnergySettings {
     /// Random partners per vertex instead of all close pairs: an unbiased estimate of the same sum over a subset that is
     /// drawn once, from a fixed seed. `None` (default): all pairs.
     pub repulsion_subset: Option<usize>,
+    /// The same repulsion forces from an energy without the printed form's jump at the radius: what a solver with a line
+    /// search needs. Off (default): as printed.
+    pub repulsion_continuous: bool,
     /// Gravitational acceleration [m/s²], along −y.
     pub gravity_acceleration: f64,
     /// Which outer vertices the layer collision counts; `None`: all, as printed in the paper.
@@ -59,6 +62,7 @@ impl Default for EnergySettings {
             repulsion_radius: 0.1,
             repulsion_normalised: true,
             repulsion_subset: None,
+            repulsion_continuous: false,
             gravity_acceleration: 9.81,
             layer_gate: Some(LayerGate::default()),
             layer_distance_radius: 0.1,

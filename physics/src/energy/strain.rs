@@ -11,7 +11,7 @@
 //! its `F` in the rest shape; for every other triangle `F₀ᵀF₀ = I`.
 
 use super::elements::{Incidence, Response, sum_elements};
-use super::{GarmentState, GarmentTerm, Material, Weighted};
+use super::{CurvatureSink, GarmentState, GarmentTerm, Material, Weighted};
 use crate::mesh::TriMesh;
 use crate::real::Real;
 use crate::vec3::{add, add_scaled, dot, norm, scale, sub, to_f64};
@@ -101,6 +101,45 @@ impl RestTriangle {
     }
 }
 
+impl RestTriangle {
+    /// See [`GarmentTerm::curvature`] of [`Strain`].
+    fn curvature<T: Real>(&self, positions: &[[T; 3]], mu: f64, lambda: f64, sink: &mut dyn CurvatureSink) {
+        let [a, b, c] = self.corners.map(|v| to_f64(positions[v as usize]));
+        let [f1, f2] = self.deformation_gradient(sub(b, a), sub(c, a));
+        let g11 = 0.5 * (dot(f1, f1) - self.metric[0]);
+        let g12 = 0.5 * (dot(f1, f2) - self.metric[1]);
+        let g22 = 0.5 * (dot(f2, f2) - self.metric[2]);
+        let trace = g11 + g22;
+        let stress = [lambda * trace + 2.0 * mu * g11, 2.0 * mu * g12, lambda * trace + 2.0 * mu * g22];
+        let [s11, s12, s22] = positive_part(stress);
+
+        // Corner k moves column 1 of F by first[k] and column 2 by second[k] times its displacement.
+        let [i00, i01, i11] = self.inverse;
+        let (first, second) = ([-i00, i00, 0.0], [-i01 - i11, i01, i11]);
+        let d11: [[f64; 3]; 3] = std::array::from_fn(|k| scale(f1, first[k]));
+        let d22: [[f64; 3]; 3] = std::array::from_fn(|k| scale(f2, second[k]));
+        let d12: [[f64; 3]; 3] =
+            std::array::from_fn(|k| scale(add_scaled(scale(f2, first[k]), second[k], f1), 0.5));
+        for k in 0..3 {
+            for l in 0..=k {
+                let tension = s11 * first[k] * first[l]
+                    + s12 * (first[k] * second[l] + second[k] * first[l])
+                    + s22 * second[k] * second[l];
+                let (trace_k, trace_l) = (add(d11[k], d22[k]), add(d11[l], d22[l]));
+                let block = std::array::from_fn(|r| {
+                    std::array::from_fn(|s| {
+                        let shear =
+                            d11[k][r] * d11[l][s] + 2.0 * d12[k][r] * d12[l][s] + d22[k][r] * d22[l][s];
+                        let elastic = lambda * trace_k[r] * trace_l[s] + 2.0 * mu * shear;
+                        self.volume * (elastic + if r == s { tension } else { 0.0 })
+                    })
+                });
+                sink.add(self.corners[k] as usize, self.corners[l] as usize, block);
+            }
+        }
+    }
+}
+
 impl Strain {
     /// Prepares the energy of a garment with rest shape `rest`.
     pub fn new(rest: &TriMesh, material: &Material) -> Self {
@@ -129,4 +168,27 @@ impl<T: Real> GarmentTerm<T> for Strain {
     fn evaluate(&self, state: &GarmentState<'_, T>, target: Option<Weighted<'_, T>>) -> f64 {
         self.evaluate(state.posed, target)
     }
+
+    /// Gauss–Newton in `G`, and the part of the stress that pulls: what pushes (compression) has negative curvature.
+    fn curvature(&self, state: &GarmentState<'_, T>, sink: &mut dyn CurvatureSink) {
+        for triangle in &self.triangles {
+            triangle.curvature(state.posed, self.mu, self.lambda, sink);
+        }
+    }
+}
+
+/// The symmetric 2×2 matrix `[a b; b c]` with its negative eigenvalues set to 0.
+fn positive_part([a, b, c]: [f64; 3]) -> [f64; 3] {
+    let (mean, half) = (0.5 * (a + c), 0.5 * (a - c));
+    let radius = half.hypot(b);
+    let (high, low) = (mean + radius, mean - radius);
+    if low >= 0.0 {
+        return [a, b, c];
+    }
+    if high <= 0.0 {
+        return [0.0; 3];
+    }
+    // high·(A − low·I)/(high − low) keeps the eigenvector of `high` alone.
+    let factor = high / (high - low);
+    [factor * (a - low), factor * b, factor * (c - low)]
 }

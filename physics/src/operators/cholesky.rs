@@ -12,7 +12,7 @@ use crate::operators::SparseMatrix;
 /// `A = P L Lᵀ Pᵀ` with a fill-reducing ordering.
 ///
 /// One thread only: garments are prepared side by side, and results must not depend on how many threads there are.
-pub(super) struct Cholesky {
+pub(crate) struct Cholesky {
     symbolic: SymbolicCholesky<u32>,
     values: Vec<f64>,
 }
@@ -20,28 +20,35 @@ pub(super) struct Cholesky {
 impl Cholesky {
     /// Factorises; `None` if the matrix is not positive definite in floating point, or memory ran out.
     pub fn new(matrix: &SparseMatrix) -> Option<Self> {
-        let n = matrix.rows();
-        // Symmetric: compressed rows are compressed columns.
-        let structure =
-            SymbolicSparseColMatRef::new_checked(n, n, matrix.offsets(), None, matrix.column_indices());
+        let mut cholesky = Self::analysed(matrix)?;
+        cholesky.factorise(matrix).then_some(cholesky)
+    }
+
+    /// Chooses the ordering for matrices with the entries of `matrix`, whatever their values, and factorises none yet;
+    /// `None` if memory ran out.
+    pub fn analysed(matrix: &SparseMatrix) -> Option<Self> {
+        let ordering = SymmetricOrdering::Amd;
         let symbolic =
-            factorize_symbolic_cholesky(structure, Side::Lower, SymmetricOrdering::Amd, Default::default())
-                .ok()?;
-        let mut values = vec![0.0; symbolic.len_val()];
-        let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
-        let mut memory = MemBuffer::try_new(scratch).ok()?;
-        symbolic
-            .factorize_numeric_llt(
-                &mut values,
-                SparseColMatRef::new(structure, matrix.values()),
-                Side::Lower,
-                Default::default(),
-                Par::Seq,
-                MemStack::new(&mut memory),
-                Default::default(),
-            )
-            .ok()?;
-        values.iter().all(|v| v.is_finite()).then_some(Self { symbolic, values })
+            factorize_symbolic_cholesky(structure(matrix), Side::Lower, ordering, Default::default()).ok()?;
+        let values = vec![0.0; symbolic.len_val()];
+        Some(Self { symbolic, values })
+    }
+
+    /// Factorises a matrix whose entries are where those of the analysed one are. `false` if it is not positive definite
+    /// in floating point, or memory ran out: then there is nothing to solve with until a later call succeeds.
+    pub fn factorise(&mut self, matrix: &SparseMatrix) -> bool {
+        let scratch = self.symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
+        let Ok(mut memory) = MemBuffer::try_new(scratch) else { return false };
+        let done = self.symbolic.factorize_numeric_llt(
+            &mut self.values,
+            SparseColMatRef::new(structure(matrix), matrix.values()),
+            Side::Lower,
+            Default::default(),
+            Par::Seq,
+            MemStack::new(&mut memory),
+            Default::default(),
+        );
+        done.is_ok() && self.values.iter().all(|v| v.is_finite())
     }
 
     /// Solves for every column of `rhs` `[n, m]` in place.
@@ -55,4 +62,10 @@ impl Cholesky {
             MemStack::new(&mut memory),
         );
     }
+}
+
+/// Symmetric: compressed rows are compressed columns.
+fn structure(matrix: &SparseMatrix) -> SymbolicSparseColMatRef<'_, u32> {
+    let n = matrix.rows();
+    SymbolicSparseColMatRef::new_checked(n, n, matrix.offsets(), None, matrix.column_indices())
 }

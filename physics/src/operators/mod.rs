@@ -1,7 +1,7 @@
 //! The surface operators that DiffusionNet is built on (Sharp et al., "DiffusionNet: Discretization Agnostic Learning on
 //! Surfaces", ACM TOG 2022), computed once per garment in `f64`.
 
-mod cholesky;
+pub(crate) mod cholesky;
 mod eigenbasis;
 mod frames;
 mod gradient;

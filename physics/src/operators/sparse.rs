@@ -101,6 +101,11 @@ impl SparseMatrix {
     pub(super) fn values(&self) -> &[f64] {
         &self.values
     }
+
+    /// The stored entries, row by row; where they are stays as it is.
+    pub(crate) fn values_mut(&mut self) -> &mut [f64] {
+        &mut self.values
+    }
 }
 
 #[cfg(test)]

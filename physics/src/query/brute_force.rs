@@ -38,7 +38,9 @@ pub fn distance_to_surface(positions: &[[f64; 3]], faces: &[[u32; 3]], p: [f64; 
 /// [`crate::Surface::gap`] by exhaustive search (in `f64`; `normals` are area-weighted vertex normals).
 ///
 /// # Panics
-/// If the surface has no vertex, or no face under [`Distance::ClosestPoint`].
+/// If the surface has no vertex, or, but for [`Distance::NearestVertex`], no face.
+///
+/// [`Distance::Union`] is taken for [`Distance::ClosestPoint`]: for surfaces that do not intersect themselves.
 pub fn gap(
     positions: &[[f64; 3]],
     faces: &[[u32; 3]],
@@ -52,7 +54,7 @@ pub fn gap(
             let (position, normal) = (positions[vertex as usize], normals[vertex as usize]);
             Gap { gap: vec3::dot(vec3::sub(p, position), normal), gradient: normal, vertex }
         }
-        Distance::ClosestPoint => {
+        Distance::ClosestPoint | Distance::Union => {
             let (at_vertex, at_edge) = pseudo_normals(positions, faces);
             let (index, found) = faces
                 .iter()

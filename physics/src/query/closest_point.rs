@@ -67,16 +67,8 @@ impl ClosestPoint {
             .copied()
             .filter(|face| face.iter().all(|&v| vec3::is_finite(positions[v as usize])))
             .collect();
-        let boxes: Vec<Aabb> = faces
-            .iter()
-            .map(|face| {
-                let corners = face.map(|v| Vector::from_array(positions[v as usize]));
-                Aabb::new(
-                    corners[0].min(corners[1]).min(corners[2]),
-                    corners[0].max(corners[1]).max(corners[2]),
-                )
-            })
-            .collect();
+        let boxes: Vec<Aabb> =
+            faces.iter().map(|face| triangle_box(face.map(|v| positions[v as usize]))).collect();
         let bvh = Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes);
         let (vertex_normals, edge_normals) = pseudo_normals(&positions, &faces);
         Self { positions, faces, bvh, vertex_normals, edge_normals }
@@ -126,7 +118,7 @@ impl ClosestPoint {
 
 /// What [`closest_on_triangle`] found.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct TrianglePoint {
+pub(crate) struct TrianglePoint {
     pub position: [f64; 3],
     pub distance_squared: f64,
     pub barycentric: [f64; 3],
@@ -137,7 +129,7 @@ pub(super) struct TrianglePoint {
 ///
 /// The region tests divide by the area; a triangle thinner than 1e-12 of its length is measured as its three edges instead,
 /// which is exact for it.
-pub(super) fn closest_on_triangle(p: [f64; 3], [a, b, c]: [[f64; 3]; 3]) -> TrianglePoint {
+pub(crate) fn closest_on_triangle(p: [f64; 3], [a, b, c]: [[f64; 3]; 3]) -> TrianglePoint {
     let (ab, ac, bc) = (vec3::sub(b, a), vec3::sub(c, a), vec3::sub(c, b));
     let longest = vec3::norm_squared(ab).max(vec3::norm_squared(ac)).max(vec3::norm_squared(bc));
     if vec3::norm_squared(vec3::cross(ab, ac)) <= 1e-24 * longest * longest {
@@ -261,6 +253,12 @@ pub(super) fn pseudo_normals(
         })
         .collect();
     (at_vertex, edge_normals)
+}
+
+/// The smallest box around a triangle.
+pub(super) fn triangle_box(corners: [[f64; 3]; 3]) -> Aabb {
+    let [a, b, c] = corners.map(Vector::from_array);
+    Aabb::new(a.min(b).min(c), a.max(b).max(c))
 }
 
 fn box_distance_squared(p: [f64; 3], low: [f64; 3], high: [f64; 3]) -> f64 {

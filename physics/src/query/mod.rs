@@ -4,9 +4,12 @@ pub mod brute_force;
 mod closest_point;
 mod closest_vertex;
 mod surface;
+mod union;
 mod winding_number;
 
+pub(crate) use closest_point::closest_on_triangle;
 pub use closest_point::{ClosestPoint, Feature, SurfacePoint};
 pub use closest_vertex::{KdScalar, VertexIndex};
 pub use surface::{Distance, Gap, Surface};
+pub use union::UnionDistance;
 pub use winding_number::{winding_number, winding_numbers};

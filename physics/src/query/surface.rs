@@ -3,7 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use crate::mesh::{TriMesh, vertex_normals};
-use crate::query::{ClosestPoint, SurfacePoint, VertexIndex};
+use crate::query::{ClosestPoint, SurfacePoint, UnionDistance, VertexIndex};
 use crate::real::Real;
 use crate::vec3;
 
@@ -16,6 +16,9 @@ pub enum Distance {
     NearestVertex,
     /// The distance to the closest surface point, signed by the angle-weighted pseudo-normal there.
     ClosestPoint,
+    /// The distance to the boundary of the union of a closed surface's parts, which may intersect each other; negative
+    /// inside. Continuous everywhere ([`UnionDistance`]). Where nothing intersects it is [`Distance::ClosestPoint`].
+    Union,
 }
 
 /// A signed distance and its derivative.
@@ -38,7 +41,7 @@ const FAR_SPACING: f64 = 1e-4;
 
 /// A fixed surface in one pose: the body, or a garment as another garment sees it.
 ///
-/// Its vertex index and its closest-point tree are each built at first use. Share it by `Arc`.
+/// Its vertex index and its closest-point trees are each built at first use. Share it by `Arc`.
 #[derive(Debug)]
 pub struct Surface<T: Real> {
     /// Vertex positions `[V, 3]` (m).
@@ -49,13 +52,21 @@ pub struct Surface<T: Real> {
     pub normals: Vec<[T; 3]>,
     vertex_index: OnceLock<VertexIndex<T>>,
     closest_point: OnceLock<ClosestPoint>,
+    union_distance: OnceLock<UnionDistance>,
 }
 
 impl<T: Real> Surface<T> {
     /// Wraps a posed surface. Every index in `faces` must be below the number of positions, as a [`TriMesh`] guarantees.
     pub fn new(positions: Vec<[T; 3]>, faces: Arc<[[u32; 3]]>) -> Self {
         let normals = vertex_normals(&positions, &faces);
-        Self { positions, faces, normals, vertex_index: OnceLock::new(), closest_point: OnceLock::new() }
+        Self {
+            positions,
+            faces,
+            normals,
+            vertex_index: OnceLock::new(),
+            closest_point: OnceLock::new(),
+            union_distance: OnceLock::new(),
+        }
     }
 
     /// The surface of a mesh.
@@ -73,6 +84,13 @@ impl<T: Real> Surface<T> {
     pub fn closest_point(&self) -> &ClosestPoint {
         self.closest_point.get_or_init(|| {
             ClosestPoint::new(self.positions.iter().map(|p| vec3::to_f64(*p)).collect(), &self.faces)
+        })
+    }
+
+    /// The closest-point tree over the boundary of the union of its parts.
+    pub fn union_distance(&self) -> &UnionDistance {
+        self.union_distance.get_or_init(|| {
+            UnionDistance::new(self.positions.iter().map(|p| vec3::to_f64(*p)).collect(), &self.faces)
         })
     }
 
@@ -111,6 +129,7 @@ impl<T: Real> Surface<T> {
         match distance {
             Distance::NearestVertex => self.nearest_vertex_gap(p),
             Distance::ClosestPoint => self.closest_point_gap(p),
+            Distance::Union => self.union_gap(p),
         }
     }
 
@@ -127,22 +146,35 @@ impl<T: Real> Surface<T> {
 
     fn closest_point_gap(&self, p: [T; 3]) -> Gap<T> {
         let Some(found) = self.project(p) else { return not_a_gap() };
-        let offset = vec3::sub(vec3::to_f64(p), found.position);
-        let length = found.distance_squared.sqrt();
-        let sign = if vec3::dot(offset, found.normal) < 0.0 { -1.0 } else { 1.0 };
-        let gradient =
-            if length > CONTACT_DISTANCE { vec3::scale(offset, sign / length) } else { found.normal };
-        let corners = self.closest_point().face(found.face);
-        let [a, b, c] = found.barycentric;
-        let vertex = if a >= b && a >= c {
-            corners[0]
-        } else if b >= c {
-            corners[1]
-        } else {
-            corners[2]
-        };
-        Gap { gap: T::from_f64(sign * length), gradient: vec3::from_f64(gradient), vertex }
+        let is_inside = vec3::dot(vec3::sub(vec3::to_f64(p), found.position), found.normal) < 0.0;
+        signed_gap(p, &found, is_inside, self.closest_point())
     }
+
+    fn union_gap(&self, p: [T; 3]) -> Gap<T> {
+        let union = self.union_distance();
+        match union.project(vec3::to_f64(p)) {
+            Some((found, is_inside)) => signed_gap(p, &found, is_inside, union.kept()),
+            None => not_a_gap(),
+        }
+    }
+}
+
+/// The distance from `found`, the point of `tree` closest to `p`, with its sign.
+fn signed_gap<T: Real>(p: [T; 3], found: &SurfacePoint, is_inside: bool, tree: &ClosestPoint) -> Gap<T> {
+    let offset = vec3::sub(vec3::to_f64(p), found.position);
+    let length = found.distance_squared.sqrt();
+    let sign = if is_inside { -1.0 } else { 1.0 };
+    let gradient = if length > CONTACT_DISTANCE { vec3::scale(offset, sign / length) } else { found.normal };
+    let corners = tree.face(found.face);
+    let [a, b, c] = found.barycentric;
+    let vertex = if a >= b && a >= c {
+        corners[0]
+    } else if b >= c {
+        corners[1]
+    } else {
+        corners[2]
+    };
+    Gap { gap: T::from_f64(sign * length), gradient: vec3::from_f64(gradient), vertex }
 }
 
 fn not_a_gap<T: Real>() -> Gap<T> {

@@ -1,6 +1,7 @@
 //! `clothcombo bench`: measurements that a user can repeat.
 
 pub mod distance;
+pub mod error;
 pub mod generator;
 pub mod poses;
 pub mod stability;
@@ -13,6 +14,8 @@ use miette::Report;
 pub enum Bench {
     /// How often the sign of the distance to the body is wrong, by nearest vertex and by closest surface point
     Distance(distance::Arguments),
+    /// Energy above the equilibrium and distance to it, for skinning and a trained network, on random scenes
+    Error(error::Arguments),
     /// Every energy on every hard case: finite, bounded, a true gradient, the same in both precisions
     Stability(stability::Arguments),
     /// The generator's promises over many garments, with the failure rate and the time
@@ -28,6 +31,7 @@ pub enum Bench {
 pub fn run(bench: &Bench) -> Result<(), Report> {
     match bench {
         Bench::Distance(arguments) => distance::run(arguments),
+        Bench::Error(arguments) => error::run(arguments),
         Bench::Stability(arguments) => stability::run(arguments),
         Bench::Generator(arguments) => generator::run(arguments),
         Bench::Poses(arguments) => poses::run(arguments),

@@ -1,0 +1,63 @@
+//! When to stop, and how far to go in one step.
+
+use std::time::Duration;
+
+use super::EquilibriumError;
+
+/// Settings of [`super::solve`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SolverSettings {
+    /// Converged at or below this relative gradient (see [`super`]).
+    pub tolerance: f64,
+    /// Most iterations: accepted steps.
+    pub iterations: usize,
+    /// Most wall time; `None`: no limit. Looked at between iterations.
+    pub time: Option<Duration>,
+    /// No vertex moves farther than this in one step [m]. Default 5 cm: a garment stays in its valley instead of jumping
+    /// through the body.
+    pub step_bound: f64,
+    /// No vertex ends farther than this from its start [m]; `None`: no bound. Where the bound is reached the solver stops
+    /// as [`super::Stop::Escaped`]. Default 1 m: what nothing holds falls for ever.
+    pub escape_distance: Option<f64>,
+    /// Iterations between two factorisations of the preconditioner.
+    pub refactorise_every: usize,
+    /// Pairs of steps and gradient changes that the quasi-Newton matrix remembers.
+    pub memory: usize,
+}
+
+impl Default for SolverSettings {
+    fn default() -> Self {
+        Self {
+            tolerance: 1e-4,
+            iterations: 2000,
+            time: None,
+            step_bound: 0.05,
+            escape_distance: Some(1.0),
+            refactorise_every: 10,
+            memory: 20,
+        }
+    }
+}
+
+impl SolverSettings {
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// [`EquilibriumError::Setting`] names the first that is out of range.
+    pub fn check(&self) -> Result<(), EquilibriumError> {
+        let fail = |setting, value, expected| Err(EquilibriumError::Setting { setting, value, expected });
+        if !(self.tolerance >= 0.0 && self.tolerance.is_finite()) {
+            return fail("tolerance", self.tolerance, "finite and not negative");
+        }
+        let escape = self.escape_distance.unwrap_or(1.0);
+        for (setting, value) in [("step_bound", self.step_bound), ("escape_distance", escape)] {
+            if !(value > 0.0 && value.is_finite()) {
+                return fail(setting, value, "finite and greater than 0");
+            }
+        }
+        if self.refactorise_every == 0 {
+            return fail("refactorise_every", 0.0, "at least 1");
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,384 @@
+//! The solver against analytic answers, a dense oracle, and its own promises.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use super::{EquilibriumError, Problem, Solution, SolverSettings, Stop, Transform, solve};
+use crate::energy::tests::scenes::{jittered, paper_weights};
+use crate::energy::{EnergySettings, GarmentEnergies, SceneEnergy, SceneGarment, Term, TermMap};
+use crate::mesh::{Topology, TriMesh, shapes};
+use crate::query::{Distance, Surface};
+use crate::vec3;
+
+fn settings() -> EnergySettings {
+    EnergySettings {
+        distance: Distance::ClosestPoint,
+        repulsion_continuous: true,
+        ..EnergySettings::default()
+    }
+}
+
+/// One garment on a body.
+fn scene(
+    rest: &TriMesh,
+    body: &TriMesh,
+    settings: EnergySettings,
+    weights: TermMap<f64>,
+) -> SceneEnergy<f64> {
+    let energies = GarmentEnergies::new(rest, &Topology::new(rest), &settings, true).expect("valid garment");
+    let garment =
+        SceneGarment { energies: Arc::new(energies), holding_reference: rest.positions().to_vec(), weights };
+    SceneEnergy {
+        body: Arc::new(Surface::from_mesh(body)),
+        garments: vec![garment],
+        layers: Vec::new(),
+        settings,
+    }
+}
+
+fn weights(of: &[(Term, f64)]) -> TermMap<f64> {
+    let mut map = TermMap::filled(0.0);
+    for (term, weight) in of {
+        map[*term] = *weight;
+    }
+    map
+}
+
+/// A body out of reach.
+fn far_body() -> TriMesh {
+    shapes::mapped(&shapes::icosphere(0.1, 1), |[x, y, z]| [x + 100.0, y, z])
+}
+
+fn run(problem: &Problem<'_>, start: &[[f64; 3]], settings: &SolverSettings) -> Solution {
+    solve(problem, start, settings, &mut |_| ControlFlow::Continue(())).expect("a valid problem")
+}
+
+fn assert_monotone(solution: &Solution) {
+    for pair in solution.history.windows(2) {
+        assert!(pair[1].energy < pair[0].energy, "{pair:?}");
+        assert_eq!(pair[1].iteration, pair[0].iteration + 1);
+    }
+}
+
+/// A skirt that slides down a cone until it is wide enough to carry it, as a problem of every term that a single garment
+/// has. Without friction a sheet would slide off a ball; this cannot.
+fn skirt_on_cone(around: usize, along: usize) -> (SceneEnergy<f64>, TriMesh) {
+    let cone = shapes::mapped(&shapes::tube(1.0, 0.8, 96, 30), |[x, y, z]| {
+        let radius = 0.22 - 0.2 * y;
+        [radius * x, y, radius * z]
+    });
+    let tube = shapes::mapped(&shapes::tube(0.13, 0.15, around, along), |[x, y, z]| [x, y + 0.5, z]);
+    let rest = jittered(&tube, 0.002, 7);
+    let mut weights = paper_weights();
+    weights[Term::BodyCollision] = STIFF_CONTACT;
+    weights[Term::Holding] = 0.0;
+    (scene(&rest, &cone, settings(), weights), rest)
+}
+
+/// Weight of the body collision on the cone [J/m³].
+const STIFF_CONTACT: f64 = 2e4;
+
+#[test]
+fn a_strip_under_its_own_weight_stretches_as_the_material_says() {
+    // Held at the top (with λ = 0 and weightless bending, so that columns of cloth stretch alone).
+    let mut settings = settings();
+    settings.material.lambda = 0.0;
+    settings.material.density = 4260.0;
+    let (height, rows) = (0.5, 40);
+    let rest = shapes::grid(0.1, height, 8, rows);
+    let weights = weights(&[(Term::Strain, 1.0), (Term::Gravity, 1.0), (Term::Holding, 1e7)]);
+    let settings = EnergySettings { holding_fraction: 9.0 / rest.vertex_count() as f64, ..settings };
+    let energy = scene(&rest, &far_body(), settings, weights);
+    let problem = Problem::new(&energy, None).unwrap();
+    let tight = SolverSettings { tolerance: 1e-7, ..SolverSettings::default() };
+    let solution = run(&problem, rest.positions(), &tight);
+    assert_eq!(solution.stop, Stop::Converged, "{}", solution.relative_gradient);
+    assert_monotone(&solution);
+
+    // A column below height y weighs ρtgy per metre of width; its stretch s obeys s·2μt·½(s² − 1) = ρtgy (StVK with λ = 0).
+    let material = settings.material;
+    let stretch = |y: f64| {
+        let load = material.density * settings.gravity_acceleration * y / material.mu;
+        let mut s = 1.0;
+        for _ in 0..60 {
+            s -= (s * s * s - s - load) / (3.0 * s * s - 1.0);
+        }
+        s
+    };
+    let samples = 4000;
+    let length: f64 = (0..samples).map(|i| stretch((i as f64 + 0.5) / samples as f64 * height)).sum::<f64>()
+        * height
+        / samples as f64;
+    let ys = solution.positions.iter().map(|p| p[1]);
+    let found = ys.clone().fold(f64::MIN, f64::max) - ys.fold(f64::MAX, f64::min);
+    assert!(length > 1.03 * height, "the load must be felt: {length}");
+    assert!((found / length - 1.0).abs() < 1e-3, "{found} {length}");
+}
+
+#[test]
+fn a_lone_triangle_finds_its_rest_shape_again() {
+    let rest = TriMesh::new(vec![[0.0; 3], [0.3, 0.0, 0.0], [0.1, 0.25, 0.0]], vec![[0, 1, 2]]).unwrap();
+    let energy = scene(&rest, &far_body(), settings(), weights(&[(Term::Strain, 1.0)]));
+    let problem = Problem::new(&energy, None).unwrap();
+    let start = [[0.02, 0.01, 0.0], [0.45, 0.0, 0.1], [0.0, 0.2, -0.1]];
+    // With a single term the relative gradient is 1 everywhere: only the bound on iterations or a stall can end it.
+    let solution = run(&problem, &start, &SolverSettings { iterations: 60, ..SolverSettings::default() });
+    assert!(solution.energy() < 1e-18 * solution.history[0].energy.max(1.0), "{}", solution.energy());
+    for (i, j) in [(0, 1), (1, 2), (2, 0)] {
+        let length = |p: &[[f64; 3]]| vec3::norm(vec3::sub(p[i], p[j]));
+        assert!((length(&solution.positions) - length(rest.positions())).abs() < 1e-7);
+    }
+}
+
+#[test]
+fn a_skirt_comes_to_rest_on_a_cone() {
+    let (energy, rest) = skirt_on_cone(30, 8);
+    let problem = Problem::new(&energy, None).unwrap();
+    let solution = run(&problem, rest.positions(), &SolverSettings::default());
+    assert_eq!(solution.stop, Stop::Converged, "{:?} {}", solution.last(), solution.relative_gradient);
+    assert!(solution.relative_gradient <= 1e-4);
+    assert!((problem.relative_gradient(&solution.positions) - solution.relative_gradient).abs() < 1e-12);
+    assert_monotone(&solution);
+    assert_eq!(problem.value(&solution.positions), solution.energy());
+    // In equilibrium the cone carries the weight of the skirt, which has come down and is not inside.
+    let material = energy.settings.material;
+    let weight = rest.area() * material.thickness * material.density * energy.settings.gravity_acceleration;
+    let gaps = solution.positions.iter().map(|p| energy.body.gap(*p, Distance::ClosestPoint));
+    let carried: f64 = gaps
+        .clone()
+        .map(|gap| {
+            let excess = (energy.settings.body_collision_epsilon - gap.gap).max(0.0);
+            STIFF_CONTACT * 3.0 * excess * excess * gap.gradient[1]
+        })
+        .sum();
+    assert!((carried / weight - 1.0).abs() < 5e-3, "{carried} {weight}");
+    assert!(gaps.clone().all(|gap| gap.gap > -1e-3));
+    let lowest = |p: &[[f64; 3]]| p.iter().map(|p| p[1]).fold(f64::MAX, f64::min);
+    assert!(lowest(&solution.positions) < lowest(rest.positions()) - 0.02);
+
+    // From the minimum there is nothing to do.
+    let again = run(&problem, &solution.positions, &SolverSettings::default());
+    assert_eq!((again.stop, again.iterations()), (Stop::Converged, 0));
+    assert_eq!(again.positions, solution.positions);
+}
+
+#[test]
+fn a_sheet_comes_to_rest_in_a_valley() {
+    // Two slopes meet in a crease: the vertices over it rest on a kink of the distance.
+    let valley = shapes::mapped(&shapes::grid(0.6, 0.6, 12, 12), |[x, y, _]| {
+        [x - 0.3, 0.5 * (x - 0.3).abs(), 0.3 - y]
+    });
+    let flat = shapes::mapped(&shapes::grid(0.1, 0.05, 12, 6), |[x, y, _]| [x - 0.05, 0.0, 0.02 - y]);
+    let rest = jittered(&flat, 0.0005, 3);
+    let mut weights = paper_weights();
+    weights[Term::BodyCollision] = STIFF_CONTACT;
+    weights[Term::Holding] = 0.0;
+    let energy = scene(&rest, &valley, settings(), weights);
+    let problem = Problem::new(&energy, None).unwrap();
+    let start: Vec<_> = rest.positions().iter().map(|[x, y, z]| [*x, y + 0.03, *z]).collect();
+    let solution = run(&problem, &start, &SolverSettings::default());
+    assert_eq!(solution.stop, Stop::Converged, "{:?} {}", solution.last(), solution.relative_gradient);
+    assert_monotone(&solution);
+    // On a kink the gradient itself cannot vanish.
+    let (_, gradient) = problem.value_and_gradient(&solution.positions);
+    assert!(super::problem::norm(&gradient) > 1e-3 * problem.force_scale(&solution.positions));
+}
+
+#[test]
+fn the_number_of_threads_leaves_no_trace() {
+    let (energy, rest) = skirt_on_cone(48, 14);
+    let problem = Problem::new(&energy, None).unwrap();
+    let settings = SolverSettings { iterations: 25, ..SolverSettings::default() };
+    let with_threads = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        pool.install(|| run(&problem, rest.positions(), &settings))
+    };
+    let one = with_threads(1);
+    assert_eq!(one.iterations(), 25);
+    for threads in [2, 4] {
+        let other = with_threads(threads);
+        assert!(other.positions == one.positions, "{threads} threads");
+        assert_eq!(other.energy().to_bits(), one.energy().to_bits());
+    }
+}
+
+#[test]
+fn a_translated_scene_has_the_translated_answer() {
+    let (energy, rest) = skirt_on_cone(18, 5);
+    // Not along y: heights count from the origin.
+    let shift = [0.5, 0.0, -0.25];
+    let body = Surface::new(
+        energy.body.positions.iter().map(|p| vec3::add(*p, shift)).collect(),
+        energy.body.faces.clone(),
+    );
+    let moved_energy = SceneEnergy { body: Arc::new(body), ..energy.clone() };
+    let moved_start: Vec<_> = rest.positions().iter().map(|p| vec3::add(*p, shift)).collect();
+    let here = run(&Problem::new(&energy, None).unwrap(), rest.positions(), &SolverSettings::default());
+    let there = run(&Problem::new(&moved_energy, None).unwrap(), &moved_start, &SolverSettings::default());
+    assert_eq!((here.stop, there.stop), (Stop::Converged, Stop::Converged));
+    // Rounding may turn the skirt a little on its polygonal cone; the energy hardly knows.
+    let gained = here.history[0].energy - here.energy();
+    assert!((here.energy() - there.energy()).abs() < 1e-3 * gained, "{} {}", here.energy(), there.energy());
+}
+
+#[test]
+fn equals_a_dense_newton_method() {
+    // A small curtain that hangs from its top: every force is smooth, so a dense Newton method converges too.
+    let rest = jittered(&shapes::irregular_grid(0.12, 0.12, 3, 3, 0.2, 8), 0.004, 5);
+    let mut weights = paper_weights();
+    weights[Term::Repulsion] = 0.0;
+    let settings = EnergySettings { holding_fraction: 0.25, ..settings() };
+    let energy = scene(&rest, &far_body(), settings, weights);
+    let problem = Problem::new(&energy, None).unwrap();
+    let tight = SolverSettings { tolerance: 1e-7, ..SolverSettings::default() };
+    let solution = run(&problem, rest.positions(), &tight);
+    assert_eq!(solution.stop, Stop::Converged);
+
+    let oracle = dense_newton(&problem, rest.positions());
+    let (found, expected) = (solution.energy(), problem.value(&oracle));
+    assert!((found - expected).abs() < 1e-9 * expected.abs().max(1e-3), "{found} {expected}");
+}
+
+/// Damped Newton with a dense Hessian from central differences of the gradient.
+fn dense_newton(problem: &Problem<'_>, start: &[[f64; 3]]) -> Vec<[f64; 3]> {
+    use faer::linalg::solvers::Solve;
+    let mut positions = start.to_vec();
+    let n = 3 * positions.len();
+    for _ in 0..200 {
+        let (value, gradient) = problem.value_and_gradient(&positions);
+        let size = gradient.as_flattened().iter().map(|g| g * g).sum::<f64>().sqrt();
+        if size < 1e-11 {
+            break;
+        }
+        let mut hessian = faer::Mat::<f64>::zeros(n, n);
+        for column in 0..n {
+            let step = 1e-6;
+            let at = |sign: f64| {
+                let mut moved = positions.clone();
+                moved.as_flattened_mut()[column] += sign * step;
+                problem.value_and_gradient(&moved).1
+            };
+            let (plus, minus) = (at(1.0), at(-1.0));
+            for row in 0..n {
+                hessian[(row, column)] =
+                    (plus.as_flattened()[row] - minus.as_flattened()[row]) / (2.0 * step);
+            }
+        }
+        let symmetric = faer::Mat::from_fn(n, n, |r, c| 0.5 * (hessian[(r, c)] + hessian[(c, r)]));
+        let lowest = symmetric.self_adjoint_eigenvalues(faer::Side::Lower).expect("finite")[0];
+        let shift = (1e-6 - lowest).max(0.0);
+        let shifted = faer::Mat::from_fn(n, n, |r, c| symmetric[(r, c)] + if r == c { shift } else { 0.0 });
+        let rhs = faer::Mat::from_fn(n, 1, |r, _| -gradient.as_flattened()[r]);
+        let direction = shifted.partial_piv_lu().solve(&rhs);
+        let mut length = 1.0;
+        for _ in 0..60 {
+            let mut moved = positions.clone();
+            for (x, d) in moved.as_flattened_mut().iter_mut().zip(0..n) {
+                *x += length * direction[(d, 0)];
+            }
+            if problem.value(&moved) < value {
+                positions = moved;
+                break;
+            }
+            length *= 0.5;
+        }
+    }
+    positions
+}
+
+#[test]
+fn holding_acts_on_canonical_positions() {
+    // Skinning turns the garment upside down and lifts it: held at its top, that is below when posed.
+    let rest = shapes::grid(0.2, 0.2, 4, 4);
+    let weights = weights(&[(Term::Strain, 1.0), (Term::Gravity, 1.0), (Term::Holding, 1e3)]);
+    let energy = scene(&rest, &far_body(), settings(), weights);
+    let turned: Transform = [[1.0, 0.0, 0.0, 0.1], [0.0, -1.0, 0.0, 0.7], [0.0, 0.0, -1.0, 0.0]];
+    let transforms = vec![turned; rest.vertex_count()];
+    let problem = Problem::new(&energy, Some(&transforms)).unwrap();
+    let start: Vec<_> = rest.positions().iter().map(|[x, y, z]| [x + 0.1, 0.7 - y, -z]).collect();
+    let back = problem.canonical(&start);
+    assert!(back.iter().zip(rest.positions()).all(|(a, b)| vec3::distance_squared(*a, *b) < 1e-28));
+
+    // Gradient against central differences, through the inverse transforms.
+    let moved: Vec<_> = start.iter().map(|[x, y, z]| [*x, y + 0.01 * x, z + 0.02 * y]).collect();
+    let (_, gradient) = problem.value_and_gradient(&moved);
+    for v in [0, 7, 24] {
+        for axis in 0..3 {
+            let at = |step: f64| {
+                let mut p = moved.clone();
+                p[v][axis] += step;
+                problem.value(&p)
+            };
+            let difference = (at(1e-6) - at(-1e-6)) / 2e-6;
+            assert!((difference - gradient[v][axis]).abs() < 1e-6 * (1.0 + difference.abs()), "{v} {axis}");
+        }
+    }
+
+    let singular = vec![[[0.0; 4]; 3]; rest.vertex_count()];
+    assert!(matches!(
+        Problem::new(&energy, Some(&singular)),
+        Err(EquilibriumError::Singular { vertex: 0, .. })
+    ));
+    assert!(matches!(Problem::new(&energy, Some(&transforms[1..])), Err(EquilibriumError::Count { .. })));
+}
+
+#[test]
+fn what_nothing_holds_is_reported_as_escaped() {
+    let rest = shapes::grid(0.1, 0.1, 2, 2);
+    let energy = scene(&rest, &far_body(), settings(), weights(&[(Term::Strain, 1.0), (Term::Gravity, 1.0)]));
+    let problem = Problem::new(&energy, None).unwrap();
+    let solution = run(&problem, rest.positions(), &SolverSettings::default());
+    assert_eq!(solution.stop, Stop::Escaped);
+    let bounded = SolverSettings { escape_distance: None, iterations: 30, ..SolverSettings::default() };
+    let solution = run(&problem, rest.positions(), &bounded);
+    assert_eq!(solution.stop, Stop::Iterations);
+    assert!(solution.history.iter().all(|s| s.displacement <= bounded.step_bound * (1.0 + 1e-12)));
+}
+
+#[test]
+fn bad_input_is_named_and_the_observer_can_stop() {
+    let (energy, rest) = skirt_on_cone(5, 4);
+    let start = rest.positions().to_vec();
+    let problem = Problem::new(&energy, None).unwrap();
+    let go = &mut |_: &super::Progress<'_>| ControlFlow::Continue(());
+    let mut nan = start.clone();
+    nan[3][1] = f64::NAN;
+    let default = SolverSettings::default();
+    let error = solve(&problem, &nan, &default, go).unwrap_err();
+    assert_eq!(error, EquilibriumError::StartPosition { vertex: 3 });
+    let error = solve(&problem, &start[1..], &default, go).unwrap_err();
+    assert!(matches!(error, EquilibriumError::Count { expected: 25, found: 24, .. }));
+    let bad = SolverSettings { step_bound: 0.0, ..default };
+    let error = solve(&problem, &start, &bad, go).unwrap_err();
+    assert!(matches!(error, EquilibriumError::Setting { setting: "step_bound", .. }));
+    let broken = Surface::new(vec![[f64::NAN; 3]; energy.body.positions.len()], energy.body.faces.clone());
+    let broken = SceneEnergy { body: Arc::new(broken), ..energy.clone() };
+    let error = solve(&Problem::new(&broken, None).unwrap(), &start, &default, go).unwrap_err();
+    assert_eq!(error, EquilibriumError::StartEnergy);
+
+    let mut seen = Vec::new();
+    let solution = solve(&problem, &start, &default, &mut |progress| {
+        seen.push(progress.step.energy);
+        if progress.step.iteration == 3 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    })
+    .unwrap();
+    assert_eq!((solution.stop, solution.iterations(), seen.len()), (Stop::Cancelled, 3, 4));
+    let still = SolverSettings { iterations: 0, ..default };
+    assert_eq!(run(&problem, &start, &still).positions, start);
+    let no_time = SolverSettings { time: Some(std::time::Duration::ZERO), ..default };
+    assert_eq!(run(&problem, &start, &no_time).stop, Stop::Time);
+}
+
+#[test]
+fn the_continuous_repulsion_has_the_printed_forces() {
+    let rest = shapes::irregular_grid(0.3, 0.3, 9, 9, 0.3, 2);
+    let posed = jittered(&rest, 0.02, 3);
+    let weights = weights(&[(Term::Repulsion, 1.0)]);
+    let printed = EnergySettings { repulsion_continuous: false, ..settings() };
+    let evaluate = |settings| scene(&rest, &far_body(), settings, weights).evaluate(posed.positions(), &[]);
+    let (a, b) = (evaluate(settings()), evaluate(printed));
+    assert!(a.total > 0.0 && a.total < b.total);
+    for (a, b) in a.posed_gradient.iter().zip(&b.posed_gradient) {
+        assert!(vec3::distance_squared(*a, *b) < 1e-24 * vec3::norm_squared(*b).max(1e-6));
+    }
+}

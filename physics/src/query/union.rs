@@ -1,0 +1,276 @@
+//! Signed distance to the outside of a surface whose parts intersect each other: an arm pressed into a torso.
+//!
+//! There the side that the nearest triangle shows is not the side of the body: a triangle of the torso inside the arm has the
+//! inside of the body on both sides, and the distance signed by its normal jumps where another triangle becomes the nearest.
+//! [`UnionDistance`] leaves out what is buried and takes the sign from the winding number wherever a normal could be wrong. It
+//! is continuous, with slope 1 (1-Lipschitz): the unsigned distance is, and the sign changes only on the boundary of the
+//! union, all of which is among the triangles that are kept.
+//!
+//! **What is buried.** Triangles that intersect others (exact predicates, [`crate::contact`]) form the seams and are kept whole;
+//! they cut the rest into connected pieces, and each piece lies wholly in the boundary of the union or wholly in its inside.
+//! One winding number per piece says which.
+
+use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
+
+use super::closest_point::triangle_box;
+use super::{ClosestPoint, SurfacePoint};
+use crate::contact::self_triangle_pairs;
+use crate::vec3::{self, add, add_scaled, cross, dot, normalized, scale, sub};
+
+/// How far outside a triangle the side of its piece is asked for [m].
+const LOOK_OUT: f64 = 1e-8;
+
+/// Closest-point queries on the boundary of the union of a closed surface's parts.
+#[derive(Debug)]
+pub struct UnionDistance {
+    kept: ClosestPoint,
+    /// Whether the normals at a kept face and its neighbours tell the side.
+    is_sure: Vec<bool>,
+    all: Crossings,
+    buried: usize,
+}
+
+impl UnionDistance {
+    /// `positions` `[V, 3]` (m), `faces` `[F, 3]` of a closed surface, counter-clockwise seen from outside, with every index
+    /// below `V`. On a surface with a border the winding number means nothing at it, and the distance may jump there.
+    pub fn new(positions: Vec<[f64; 3]>, faces: &[[u32; 3]]) -> Self {
+        // As ClosestPoint does, so that faces are numbered alike.
+        let is_whole = |face: &&[u32; 3]| face.iter().all(|&v| vec3::is_finite(positions[v as usize]));
+        let faces: Vec<[u32; 3]> = faces.iter().filter(is_whole).copied().collect();
+        let mut is_seam = vec![false; faces.len()];
+        for (a, b) in self_triangle_pairs(&positions, &faces) {
+            is_seam[a as usize] = true;
+            is_seam[b as usize] = true;
+        }
+        let all = Crossings::new(positions, faces);
+        let is_exposed = exposed(&all, &is_seam);
+        let mut is_sure_vertex = vec![true; all.positions.len()];
+        for (face, _) in all.faces.iter().zip(&is_exposed).filter(|(_, exposed)| !**exposed) {
+            face.iter().for_each(|&v| is_sure_vertex[v as usize] = false);
+        }
+        let kept: Vec<[u32; 3]> =
+            (0..all.faces.len()).filter(|&f| is_exposed[f] || is_seam[f]).map(|f| all.faces[f]).collect();
+        let is_sure = kept.iter().map(|face| face.iter().all(|&v| is_sure_vertex[v as usize])).collect();
+        let buried = all.faces.len() - kept.len();
+        Self { kept: ClosestPoint::new(all.positions.clone(), &kept), is_sure, all, buried }
+    }
+
+    /// Faces that lie in the inside of the union.
+    pub fn buried(&self) -> usize {
+        self.buried
+    }
+
+    /// Queries on the faces that are kept.
+    pub fn kept(&self) -> &ClosestPoint {
+        &self.kept
+    }
+
+    /// The closest point of the kept faces, and whether `p` is inside; `None` for a query that is not finite or a surface
+    /// without a face.
+    pub fn project(&self, p: [f64; 3]) -> Option<(SurfacePoint, bool)> {
+        let found = self.kept.project(p)?;
+        let is_inside = match self.is_sure[found.face as usize] {
+            true => dot(sub(p, found.position), found.normal) < 0.0,
+            false => self.all.winding_number(p) >= 1,
+        };
+        Some((found, is_inside))
+    }
+}
+
+/// Which faces that are no seam have the outside of the union before them and its inside behind them.
+fn exposed(all: &Crossings, is_seam: &[bool]) -> Vec<bool> {
+    let mut edges: Vec<([u32; 2], u32)> = Vec::with_capacity(3 * all.faces.len());
+    for (f, face) in all.faces.iter().enumerate().filter(|(f, _)| !is_seam[*f]) {
+        let ends = [0, 1, 2].map(|e| [face[e], face[(e + 1) % 3]]);
+        edges.extend(ends.map(|[a, b]| ([a.min(b), a.max(b)], f as u32)));
+    }
+    edges.sort_unstable();
+    let mut root: Vec<u32> = (0..all.faces.len() as u32).collect();
+    for pair in edges.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
+        let (a, b) = (find(&mut root, pair[0].1), find(&mut root, pair[1].1));
+        root[a.max(b) as usize] = a.min(b);
+    }
+    let roots: Vec<u32> = (0..all.faces.len() as u32).map(|f| find(&mut root, f)).collect();
+    // The side is asked at the largest face of each piece, where rounding matters least.
+    let area = |f: usize| vec3::norm_squared(all.normal(f));
+    let mut largest: Vec<usize> = (0..all.faces.len()).collect();
+    for f in 0..all.faces.len() {
+        let at = &mut largest[roots[f] as usize];
+        if area(f) > area(*at) {
+            *at = f;
+        }
+    }
+    let is_exposed_piece: Vec<bool> = (0..all.faces.len())
+        .map(|piece| {
+            let [a, b, c] = all.corners(largest[piece]);
+            let centre = scale(add(add(a, b), c), 1.0 / 3.0);
+            let before = add_scaled(centre, LOOK_OUT, normalized(all.normal(largest[piece])));
+            roots[piece] as usize == piece && !is_seam[piece] && all.winding_number(before) == 0
+        })
+        .collect();
+    roots.iter().map(|&piece| is_exposed_piece[piece as usize]).collect()
+}
+
+/// The representative of a face's piece.
+fn find(root: &mut [u32], mut face: u32) -> u32 {
+    while root[face as usize] != face {
+        root[face as usize] = root[root[face as usize] as usize];
+        face = root[face as usize];
+    }
+    face
+}
+
+/// Winding numbers of a closed surface, by the faces that a ray along +x crosses.
+///
+/// Which faces it crosses is decided edge by edge, each with the same numbers from both of its faces: on a closed surface no
+/// crossing is missed or counted twice, whatever the rounding.
+struct Crossings {
+    positions: Vec<[f64; 3]>,
+    faces: Vec<[u32; 3]>,
+    bvh: Bvh,
+}
+
+impl std::fmt::Debug for Crossings {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Crossings").field("faces", &self.faces.len()).finish_non_exhaustive()
+    }
+}
+
+impl Crossings {
+    fn new(positions: Vec<[f64; 3]>, faces: Vec<[u32; 3]>) -> Self {
+        let boxes: Vec<_> =
+            faces.iter().map(|face| triangle_box(face.map(|v| positions[v as usize]))).collect();
+        Self { positions, faces, bvh: Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes) }
+    }
+
+    fn corners(&self, face: usize) -> [[f64; 3]; 3] {
+        self.faces[face].map(|v| self.positions[v as usize])
+    }
+
+    /// Normal, twice the area long.
+    fn normal(&self, face: usize) -> [f64; 3] {
+        let [a, b, c] = self.corners(face);
+        cross(sub(b, a), sub(c, a))
+    }
+
+    fn winding_number(&self, p: [f64; 3]) -> i32 {
+        let meets = |low: [f64; 3], high: [f64; 3]| {
+            high[0] >= p[0] && (1..3).all(|k| low[k] <= p[k] && p[k] <= high[k])
+        };
+        let leaves = self.bvh.leaves(|node| meets(node.mins().to_array(), node.maxs().to_array()));
+        leaves.map(|face| self.crossing(face as usize, p)).sum()
+    }
+
+    /// 1 where the ray from `p` leaves through `face`, −1 where it enters, 0 where it misses.
+    fn crossing(&self, face: usize, p: [f64; 3]) -> i32 {
+        let corners = self.corners(face);
+        // The winding number of the projected triangle: its edges past y = p.y, seen from p.
+        let turns: i32 = (0..3)
+            .map(|e| {
+                let (a, b) = (corners[e], corners[(e + 1) % 3]);
+                match (a[1] <= p[1], b[1] <= p[1]) {
+                    (true, false) => i32::from(is_left(a, b, p)),
+                    (false, true) => -i32::from(is_left(b, a, p)),
+                    _ => 0,
+                }
+            })
+            .sum();
+        if turns == 0 {
+            return 0;
+        }
+        let normal = self.normal(face);
+        let ahead = dot(normal, sub(corners[0], p)) * normal[0] > 0.0;
+        if ahead { turns } else { 0 }
+    }
+}
+
+/// Whether `p` lies left of the line from `a` to `b` in the plane of y and z.
+fn is_left(a: [f64; 3], b: [f64; 3], p: [f64; 3]) -> bool {
+    (b[1] - a[1]) * (p[2] - a[2]) - (p[1] - a[1]) * (b[2] - a[2]) > 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::TriMesh;
+    use crate::mesh::shapes::{self, SplitMix};
+    use crate::query::{Distance, Surface, brute_force};
+
+    fn points(count: usize, seed: u64) -> Vec<[f64; 3]> {
+        let mut random = SplitMix::new(seed);
+        (0..count).map(|_| std::array::from_fn(|_| 0.9 * random.symmetric())).collect()
+    }
+
+    /// Three balls, each in each other, and a small one wholly inside.
+    fn balls() -> TriMesh {
+        let ball = |radius, at: [f64; 3]| shapes::mapped(&shapes::icosphere(radius, 3), |p| vec3::add(p, at));
+        let parts = [
+            ball(0.5, [0.0; 3]),
+            ball(0.4, [0.4, 0.05, 0.02]),
+            ball(0.3, [0.1, 0.5, 0.1]),
+            ball(0.1, [0.1; 3]),
+        ];
+        shapes::union(&parts.each_ref())
+    }
+
+    #[test]
+    fn crossings_give_the_winding_number() {
+        let mesh = balls();
+        let crossings = Crossings::new(mesh.positions().to_vec(), mesh.faces().to_vec());
+        let mut seen = [0; 4];
+        for p in points(500, 3) {
+            let expected = brute_force::winding_number(mesh.positions(), mesh.faces(), p).round() as i32;
+            assert_eq!(crossings.winding_number(p), expected);
+            seen[expected as usize] += 1;
+        }
+        assert!(seen.iter().all(|&n| n > 0), "{seen:?}");
+        // At a vertex of the projection, where every test is a tie.
+        let octahedron = shapes::icosphere(0.5, 0);
+        let crossings = Crossings::new(octahedron.positions().to_vec(), octahedron.faces().to_vec());
+        for p in octahedron.positions() {
+            assert_eq!(crossings.winding_number([-2.0, p[1], p[2]]), 0);
+            assert_eq!(crossings.winding_number([0.01, 0.3 * p[1], 0.3 * p[2]]), 1);
+        }
+    }
+
+    #[test]
+    fn the_distance_is_continuous_and_its_sign_that_of_the_union() {
+        let mesh = balls();
+        let surface = Surface::<f64>::from_mesh(&mesh);
+        let union = UnionDistance::new(mesh.positions().to_vec(), mesh.faces());
+        assert!(union.buried() > 1280, "the small ball and the lenses: {}", union.buried());
+        let mut jumps_of_the_closest_point = 0;
+        for p in points(300, 11) {
+            // Along a line from p to the centre.
+            let line: Vec<[f64; 3]> = (0..=400).map(|i| scale(p, 1.0 - f64::from(i) / 400.0)).collect();
+            let gaps =
+                |distance| -> Vec<f64> { line.iter().map(|q| surface.gap(*q, distance).gap).collect() };
+            let step = vec3::norm(p) / 400.0 + 1e-12;
+            let all = gaps(Distance::Union);
+            assert!(all.windows(2).all(|w| (w[1] - w[0]).abs() <= step), "a jump towards {p:?}");
+            let inside = brute_force::winding_number(mesh.positions(), mesh.faces(), p) > 0.5;
+            assert_eq!(all[0] < 0.0, inside);
+            let closest = gaps(Distance::ClosestPoint);
+            jumps_of_the_closest_point += usize::from(closest.windows(2).any(|w| (w[1] - w[0]).abs() > step));
+            // Outside, nothing is nearer than the whole surface.
+            if !inside {
+                let expected = brute_force::distance_to_surface(mesh.positions(), mesh.faces(), p);
+                assert!((all[0] - expected).abs() < 1e-12);
+            }
+        }
+        assert!(jumps_of_the_closest_point > 50, "{jumps_of_the_closest_point}");
+    }
+
+    #[test]
+    fn without_intersections_nothing_differs() {
+        let mesh = shapes::icosphere(0.5, 3);
+        let surface = Surface::<f64>::from_mesh(&mesh);
+        assert_eq!(surface.union_distance().buried(), 0);
+        for p in points(300, 5) {
+            let (a, b) = (surface.gap(p, Distance::Union), surface.gap(p, Distance::ClosestPoint));
+            assert_eq!((a.gap, a.gradient), (b.gap, b.gradient));
+        }
+        assert!(surface.gap([f64::NAN, 0.0, 0.0], Distance::Union).gap.is_nan());
+        assert!(UnionDistance::new(vec![[0.0; 3]], &[]).project([0.0; 3]).is_none());
+    }
+}

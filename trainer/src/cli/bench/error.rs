@@ -1,0 +1,295 @@
+//! `clothcombo bench error`: how far drapes are from equilibrium.
+
+use crate::checkpoint::Checkpoint;
+use crate::cli::train::garment_progress;
+use crate::config::{Config, ValidationConfig, load};
+use crate::device::Backend;
+use crate::drape::{Networks, WardrobeTensors};
+use crate::evaluate::equilibrium_error::{
+    LBS, MethodError, ReferenceScene, SceneError, converged, scene_error,
+};
+use crate::evaluate::{Draped, Spread};
+use crate::scene::{Library, LibraryError, PreparedScene, ValidationGroup, draw_validation, prepare};
+use crate::session::state;
+use clap::Parser;
+use clothcombo_physics::equilibrium::SolverSettings;
+use indicatif::{ProgressBar, ProgressStyle};
+use miette::{IntoDiagnostic, Report, WrapErr, miette};
+use rand::{SeedableRng, seq::index};
+use rand_chacha::ChaCha8Rng;
+use serde_json::json;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
+
+/// Energy above the equilibrium and distance to it, for skinning and a trained network, on random scenes of one garment
+#[derive(Parser)]
+#[command(after_help = "Examples:\n  clothcombo bench error --config configs/open.toml --scenes 20\n  \
+        clothcombo bench error --checkpoint runs/open --json > error.json")]
+pub struct Arguments {
+    /// Configuration (TOML); default: that of the checkpoint, else configs/open.toml
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Overrides one value of the configuration, for example losses.body_collision.epsilon=0.004; repeatable
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
+    /// Run, checkpoints or checkpoint folder of a trained network; default: skinning alone is measured
+    #[arg(long, value_name = "DIR")]
+    checkpoint: Option<PathBuf>,
+    /// Random scenes: validation draws of trained garments
+    #[arg(long, default_value_t = 20)]
+    scenes: usize,
+    /// Seed of the draws; default: that of the configuration
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Most iterations of the solver per start
+    #[arg(long, default_value_t = SolverSettings::default().iterations)]
+    iterations: usize,
+    /// Relative gradient at which the solver has converged
+    #[arg(long, default_value_t = SolverSettings::default().tolerance)]
+    tolerance: f64,
+    /// Scenes solved at the same time, each on one core; default: all cores
+    #[arg(long)]
+    jobs: Option<usize>,
+    /// Print JSON instead of a table
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// When the configuration, its data or the checkpoint cannot be read, or a scene has no finite energy. A solver that does
+/// not converge is a result, not an error.
+pub fn run(arguments: &Arguments) -> Result<(), Report> {
+    let settings = SolverSettings {
+        iterations: arguments.iterations,
+        tolerance: arguments.tolerance,
+        ..SolverSettings::default()
+    };
+    settings.check().into_diagnostic()?;
+    let checkpoint = arguments.checkpoint.as_deref().map(Checkpoint::open).transpose()?;
+    let config = configuration(arguments, checkpoint.as_ref())?;
+    let library = Arc::new(load_library(&config)?);
+    let scenes = draw_scenes(&library, &config, arguments.scenes, arguments.seed.unwrap_or(config.seed))?;
+    let networks = match &checkpoint {
+        Some(checkpoint) => drape(checkpoint, &config, &library, &scenes)?.into_iter().map(Some).collect(),
+        None => vec![None; scenes.len()],
+    };
+    let errors = solve_all(arguments, &config, &scenes, &networks, &settings)?;
+    if arguments.json {
+        println!("{}", serde_json::to_string_pretty(&summary(&errors, &settings)).into_diagnostic()?);
+    } else {
+        print_tables(&errors, &settings);
+    }
+    Ok(())
+}
+
+fn configuration(arguments: &Arguments, checkpoint: Option<&Checkpoint>) -> Result<Config, Report> {
+    let file = match (&arguments.config, checkpoint) {
+        (Some(file), _) => file.clone(),
+        (None, Some(checkpoint)) => checkpoint.path.join("config.toml"),
+        (None, None) => Path::new("configs").join("open.toml"),
+    };
+    Ok(load(&file, &arguments.overrides)?)
+}
+
+fn load_library(config: &Config) -> Result<Library, Report> {
+    let bar = garment_progress(false);
+    let library = Library::load(config, &|done, total, name| {
+        bar.set_length(total as u64);
+        bar.set_position(done as u64);
+        bar.set_message(name.to_owned());
+    })?;
+    bar.finish_and_clear();
+    Ok(library)
+}
+
+/// Random ones of the single-garment validation scenes: as many as the configuration has, or more if more are asked for.
+fn draw_scenes(
+    library: &Library,
+    config: &Config,
+    count: usize,
+    seed: u64,
+) -> Result<Vec<PreparedScene>, LibraryError> {
+    let pool = config.validation.single_scenes.max(count);
+    let validation = ValidationConfig { single_scenes: pool, ..config.validation.clone() };
+    let draws = draw_validation(library, seed, &validation, ValidationGroup::Single);
+    let chosen = index::sample(&mut ChaCha8Rng::seed_from_u64(seed), pool, count);
+    chosen.into_iter().map(|i| prepare(library, &config.losses, draws[i].clone(), 1.0)).collect()
+}
+
+fn drape(
+    checkpoint: &Checkpoint,
+    config: &Config,
+    library: &Arc<Library>,
+    scenes: &[PreparedScene],
+) -> Result<Vec<Draped>, Report> {
+    let expected = state(library, 0);
+    let found = &checkpoint.state;
+    if (&found.joints, found.shape_count, found.pose_features)
+        != (&expected.joints, expected.shape_count, expected.pose_features)
+    {
+        return Err(miette!(
+            help = "leave out --config to use the checkpoint's own, or restore the data it was trained on",
+            "the data of the configuration does not fit checkpoint {}",
+            checkpoint.path.display()
+        ));
+    }
+    let device = Backend::preferred().device();
+    let tensors = WardrobeTensors::new(library.clone(), found.dimensions(), &device);
+    let networks = Networks::new(checkpoint.model(config, &device)?, &tensors);
+    scenes.iter().map(|scene| Ok(networks.drape(scene)?.layered)).collect()
+}
+
+/// Solves every scene on one core of its own; results are in the order of the scenes.
+fn solve_all(
+    arguments: &Arguments,
+    config: &Config,
+    scenes: &[PreparedScene],
+    networks: &[Option<Draped>],
+    settings: &SolverSettings,
+) -> Result<Vec<SceneError>, Report> {
+    let style =
+        ProgressStyle::with_template("scenes {bar:30} {pos}/{len} · {eta} left · {msg}").into_diagnostic()?;
+    let bar = ProgressBar::new(scenes.len() as u64).with_style(style);
+    let solve_one = |i: usize| -> Result<SceneError, Report> {
+        let scene = ReferenceScene::new(&config.losses, &scenes[i]).into_diagnostic()?;
+        let name = scene.garments.join(", ");
+        let result = scene_error(i, &scene, networks[i].as_ref(), settings, &mut |progress| {
+            let step = progress.step;
+            bar.set_message(format!("{name}: iteration {}, {:.4} J", step.iteration, step.energy));
+            ControlFlow::Continue(())
+        });
+        bar.inc(1);
+        result.into_diagnostic().wrap_err_with(|| format!("scene {i} ({name})"))
+    };
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let jobs = arguments.jobs.unwrap_or(cores).clamp(1, scenes.len().max(1));
+    let next = AtomicUsize::new(0);
+    let results: Mutex<Vec<(usize, Result<SceneError, Report>)>> = Mutex::default();
+    std::thread::scope(|scope| {
+        for _ in 0..jobs {
+            scope.spawn(|| {
+                // A pool of one thread: the energies share their work among the threads of the pool they are called in.
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().into_diagnostic();
+                loop {
+                    let i = next.fetch_add(1, Ordering::Relaxed);
+                    if i >= scenes.len() {
+                        break;
+                    }
+                    let result = match &pool {
+                        Ok(pool) => pool.install(|| solve_one(i)),
+                        Err(error) => Err(miette!("no thread to solve on: {error}")),
+                    };
+                    results.lock().unwrap_or_else(|e| e.into_inner()).push((i, result));
+                }
+            });
+        }
+    });
+    bar.finish_and_clear();
+    let mut results = results.into_inner().unwrap_or_else(|e| e.into_inner());
+    results.sort_by_key(|(i, _)| *i);
+    results.into_iter().map(|(_, result)| result).collect()
+}
+
+/// Names of the methods, the same in every scene.
+fn methods(errors: &[SceneError]) -> Vec<&'static str> {
+    errors.first().map_or(Vec::new(), |e| e.methods.iter().map(|m| m.method).collect())
+}
+
+fn spread(errors: &[SceneError], method: &str, value: impl Fn(&MethodError) -> f64) -> Spread {
+    let of_method = errors.iter().flat_map(|e| e.methods.iter().filter(|m| m.method == method));
+    Spread::of(of_method.map(value).collect())
+}
+
+/// How often each stop reason ended the run that made the reference.
+fn stops(errors: &[SceneError]) -> Vec<(&'static str, usize)> {
+    let mut counts: Vec<(&'static str, usize)> = Vec::new();
+    for error in errors {
+        let stop = error.reference_run().stop;
+        match counts.iter_mut().find(|(name, _)| *name == stop) {
+            Some((_, count)) => *count += 1,
+            None => counts.push((stop, 1)),
+        }
+    }
+    counts
+}
+
+fn summary(errors: &[SceneError], settings: &SolverSettings) -> serde_json::Value {
+    let over = |f: &dyn Fn(&SceneError) -> f64| Spread::of(errors.iter().map(f).collect());
+    let of_method = |method: &'static str| {
+        json!({
+            "method": method,
+            "excess": spread(errors, method, |m| m.excess),
+            "excess_percent": spread(errors, method, |m| m.excess_percent),
+            "distance_mm": spread(errors, method, |m| m.distance_mm),
+        })
+    };
+    json!({
+        "tolerance": settings.tolerance,
+        "iterations": settings.iterations,
+        "scenes": errors,
+        "methods": methods(errors).into_iter().map(of_method).collect::<Vec<_>>(),
+        "solver": {
+            "converged": errors.iter().filter(|e| converged(e.reference_run())).count(),
+            "stops": stops(errors).into_iter().collect::<std::collections::BTreeMap<_, _>>(),
+            "minima_differ": errors.iter().filter(|e| e.minima_differ).count(),
+            "iterations": over(&|e| e.reference_run().iterations as f64),
+            "seconds": over(&|e| e.reference_run().seconds),
+            "relative_gradient": over(&|e| e.reference_run().relative_gradient),
+        },
+    })
+}
+
+fn print_tables(errors: &[SceneError], settings: &SolverSettings) {
+    let names = methods(errors);
+    print!("{:>5} {:<28}{:>9}{:>11}", "scene", "garment", "vertices", "minimum J");
+    for name in &names {
+        print!("{:>14}{:>9}{:>8}", format!("{name} +J"), "%", "mm");
+    }
+    println!("{:>7}{:>9}{:>11}  {:<11}lowest from", "steps", "seconds", "rel. grad", "stop");
+    for e in errors {
+        let run = e.reference_run();
+        print!("{:>5} {:<28}{:>9}{:>11.4}", e.scene, e.garments.join(", "), e.vertices, run.energy);
+        for m in &e.methods {
+            print!("{:>14.4}{:>9.1}{:>8.2}", m.excess, m.excess_percent, m.distance_mm);
+        }
+        println!(
+            "{:>7}{:>9.2}{:>11.1e}  {:<11}{}{}",
+            run.iterations,
+            run.seconds,
+            run.relative_gradient,
+            run.stop,
+            run.start,
+            if e.minima_differ { " (minima differ)" } else { "" }
+        );
+    }
+    println!("\n{:<30}{:>12}{:>12}{:>12}", format!("{} scenes", errors.len()), "mean", "median", "95 %");
+    let line =
+        |what: String, s: Spread| println!("{what:<30}{:>12.4}{:>12.4}{:>12.4}", s.mean, s.median, s.p95);
+    for name in &names {
+        line(format!("{name}: excess [J]"), spread(errors, name, |m| m.excess));
+        if *name != LBS {
+            line(format!("{name}: excess [% of LBS]"), spread(errors, name, |m| m.excess_percent));
+        }
+        line(format!("{name}: distance [mm]"), spread(errors, name, |m| m.distance_mm));
+    }
+    line(
+        "solver: steps".into(),
+        Spread::of(errors.iter().map(|e| e.reference_run().iterations as f64).collect()),
+    );
+    line("solver: seconds".into(), Spread::of(errors.iter().map(|e| e.reference_run().seconds).collect()));
+    let reached = errors.iter().filter(|e| converged(e.reference_run())).count();
+    println!(
+        "\nconverged (relative gradient ≤ {:e}): {reached} of {}; stops: {}",
+        settings.tolerance,
+        errors.len(),
+        stops(errors).iter().map(|(name, count)| format!("{count} {name}")).collect::<Vec<_>>().join(", ")
+    );
+    if names.len() > 2 {
+        let differ = errors.iter().filter(|e| e.minima_differ).count();
+        println!("starts that end in different minima: {differ} of {}", errors.len());
+    }
+}

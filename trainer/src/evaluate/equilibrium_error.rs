@@ -1,0 +1,251 @@
+//! How far a drape is from the equilibrium of its scene: energy above the minimum, and distance to the minimiser.
+//!
+//! The reference is the state of lowest energy that the static solver of `clothcombo_physics` finds from linear blend
+//! skinning and, if there are networks, from their drape. All methods are measured by one function of posed positions: the
+//! losses of the configuration with the weights they end with, in f64, with the distance to the outside of the body, whose
+//! parts may intersect when posed (`Distance::Union`), and all pairs in the repulsion, from which the constant of each pair is
+//! taken off (`EnergySettings::repulsion_continuous`). Training uses cheaper forms of these two.
+
+use crate::config::LossesConfig;
+use crate::evaluate::Draped;
+use crate::scene::PreparedScene;
+use clothcombo_physics::energy::{
+    EnergyError, EnergySettings, GarmentEnergies, SceneEnergy, SceneGarment, SceneLayers,
+};
+use clothcombo_physics::equilibrium::{
+    EquilibriumError, Problem, Progress, Solution, SolverSettings, Stop, Transform, solve,
+};
+use clothcombo_physics::mesh::Topology;
+use clothcombo_physics::query::{Distance, Surface};
+use serde::Serialize;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+/// Two minima are told apart when their energies differ by more than this share of what the solver gained.
+const SAME_MINIMUM: f64 = 1e-3;
+
+/// A scene on its first body in f64, ready to be solved.
+pub struct ReferenceScene {
+    /// Names of the garments, inner → outer.
+    pub garments: Vec<String>,
+    /// Energy of posed positions.
+    pub energy: SceneEnergy<f64>,
+    /// Initial blended skinning transform of every vertex, `[ΣV]`.
+    pub transforms: Vec<Transform>,
+    /// Linear blend skinning of the rest garments, `[ΣV, 3]`.
+    pub skinned_rest: Vec<[f64; 3]>,
+    /// Linear blend skinning of the start state (with shape transfer), `[ΣV, 3]`.
+    pub skinned_start: Vec<[f64; 3]>,
+}
+
+/// The settings the reference is measured with: those of training, with exact distances and all pairs.
+pub fn reference_settings(losses: &LossesConfig) -> EnergySettings {
+    EnergySettings {
+        distance: Distance::Union,
+        repulsion_subset: None,
+        repulsion_continuous: true,
+        ..losses.energy_settings()
+    }
+}
+
+impl ReferenceScene {
+    /// Takes over the body, the weights and the start of `scene`.
+    ///
+    /// # Errors
+    /// When a garment has no energies: it has no area, or a setting is out of range.
+    pub fn new(losses: &LossesConfig, scene: &PreparedScene) -> Result<Self, EnergyError> {
+        let settings = reference_settings(losses);
+        let body = &scene.bodies[0];
+        let wide = |positions: &[[f32; 3]]| -> Vec<[f64; 3]> {
+            positions.iter().map(|p| p.map(f64::from)).collect()
+        };
+        let start = wide(&body.start);
+        let mut rest = Vec::with_capacity(start.len());
+        let (mut garments, mut transforms) = (Vec::new(), Vec::with_capacity(start.len()));
+        for (garment, narrow) in scene.worn.iter().zip(&body.energy.garments) {
+            let mesh = &garment.garment.rest;
+            let energies =
+                GarmentEnergies::new(mesh, &Topology::new(mesh), &settings, garment.garment.holding)?;
+            garments.push(SceneGarment {
+                energies: Arc::new(energies),
+                holding_reference: wide(&narrow.holding_reference),
+                weights: narrow.weights,
+            });
+            rest.extend_from_slice(mesh.positions());
+            let rows = garment.skin_weights.chunks_exact(body.bones.len());
+            transforms.extend(rows.map(|weights| blended(weights, &body.bones)));
+        }
+        let layers = body.energy.layers.iter();
+        let layers =
+            layers.map(|l| SceneLayers { inner: l.inner, outer: l.outer, weights: l.weights }).collect();
+        let surface = &body.energy.body;
+        let skinned = |positions: &[[f64; 3]]| -> Vec<[f64; 3]> {
+            transforms.iter().zip(positions).map(|(t, p)| apply(t, *p)).collect()
+        };
+        Ok(Self {
+            garments: scene.worn.iter().map(|g| g.garment.name.clone()).collect(),
+            energy: SceneEnergy {
+                body: Arc::new(Surface::new(wide(&surface.positions), surface.faces.clone())),
+                garments,
+                layers,
+                settings,
+            },
+            skinned_rest: skinned(&rest),
+            skinned_start: skinned(&start),
+            transforms,
+        })
+    }
+}
+
+/// Energy and distance of one method on one scene.
+#[derive(Clone, Debug, Serialize)]
+pub struct MethodError {
+    /// Name of the method.
+    pub method: &'static str,
+    /// Weighted sum of all energies [J].
+    pub energy: f64,
+    /// Above the reference [J].
+    pub excess: f64,
+    /// The same in percent of what LBS has above the reference.
+    pub excess_percent: f64,
+    /// Mean distance of the vertices to the reference [mm].
+    pub distance_mm: f64,
+}
+
+/// One run of the solver.
+#[derive(Clone, Debug, Serialize)]
+pub struct SolverRun {
+    /// Where it started.
+    pub start: &'static str,
+    /// Energy at the end [J].
+    pub energy: f64,
+    /// Why it stopped there.
+    pub stop: &'static str,
+    /// Relative gradient at the end.
+    pub relative_gradient: f64,
+    /// Gradient at the end over that at the start.
+    pub gradient_ratio: f64,
+    /// Accepted steps.
+    pub iterations: usize,
+    /// Evaluations of value and gradient.
+    pub evaluations: usize,
+    /// Wall time [s].
+    pub seconds: f64,
+}
+
+/// What one scene shows.
+#[derive(Clone, Debug, Serialize)]
+pub struct SceneError {
+    /// Number of the scene.
+    pub scene: usize,
+    /// Garments, inner → outer.
+    pub garments: Vec<String>,
+    /// Their vertices.
+    pub vertices: usize,
+    /// All methods.
+    pub methods: Vec<MethodError>,
+    /// All runs of the solver; the first is from LBS.
+    pub runs: Vec<SolverRun>,
+    /// Which run ended lowest: the reference.
+    pub reference: usize,
+    /// Whether the runs ended in minima of different energy.
+    pub minima_differ: bool,
+}
+
+impl SceneError {
+    /// The run that made the reference.
+    pub fn reference_run(&self) -> &SolverRun {
+        &self.runs[self.reference]
+    }
+}
+
+/// Name of linear blend skinning of the start state in reports.
+pub const LBS: &str = "LBS";
+
+/// Solves `scene` from linear blend skinning and from `network`'s drape, and measures every method against the lower end.
+///
+/// # Errors
+/// When the scene cannot be solved at all: its skinning is singular, or its energy is not finite at a start.
+pub fn scene_error(
+    number: usize,
+    scene: &ReferenceScene,
+    network: Option<&Draped>,
+    settings: &SolverSettings,
+    observer: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
+) -> Result<SceneError, EquilibriumError> {
+    let problem = Problem::new(&scene.energy, Some(&scene.transforms))?;
+    let mut states = vec![("LBS of rest", scene.skinned_rest.clone()), (LBS, scene.skinned_start.clone())];
+    states.extend(network.map(|d| ("network", d.posed.iter().map(|p| p.map(f64::from)).collect())));
+
+    let mut solutions: Vec<(&'static str, Solution)> = Vec::new();
+    for (method, start) in &states[1..] {
+        solutions.push((method, solve(&problem, start, settings, observer)?));
+    }
+    let energies = solutions.iter().map(|(_, s)| s.energy());
+    let (reference, _) =
+        energies.enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).expect("there is a run from LBS");
+    let minimum = &solutions[reference].1;
+    let gained = solutions[0].1.history[0].energy - minimum.energy();
+
+    let measure = |method: &'static str, positions: &[[f64; 3]], energy: f64| {
+        let excess = energy - minimum.energy();
+        let excess_percent = if gained > 0.0 { 100.0 * excess / gained } else { 0.0 };
+        let distance_mm = 1e3 * mean_distance(positions, &minimum.positions);
+        MethodError { method, energy, excess, excess_percent, distance_mm }
+    };
+    let methods = states.iter().map(|(method, p)| measure(method, p, problem.value(p))).collect();
+    let differ = |s: &Solution| s.energy() - minimum.energy() > SAME_MINIMUM * gained;
+    Ok(SceneError {
+        scene: number,
+        garments: scene.garments.clone(),
+        vertices: problem.vertex_count(),
+        methods,
+        minima_differ: solutions.iter().any(|(_, s)| differ(s)),
+        reference,
+        runs: solutions.iter().map(|(start, s)| solver_run(start, s)).collect(),
+    })
+}
+
+fn solver_run(start: &'static str, solution: &Solution) -> SolverRun {
+    let (first, last) = (&solution.history[0], solution.last());
+    SolverRun {
+        start,
+        energy: last.energy,
+        stop: solution.stop.name(),
+        relative_gradient: solution.relative_gradient,
+        gradient_ratio: match first.gradient_norm > 0.0 {
+            true => last.gradient_norm / first.gradient_norm,
+            false => 0.0,
+        },
+        iterations: solution.iterations(),
+        evaluations: last.evaluations,
+        seconds: 1e-3 * last.milliseconds,
+    }
+}
+
+/// Whether a run ended in an equilibrium.
+pub fn converged(run: &SolverRun) -> bool {
+    run.stop == Stop::Converged.name()
+}
+
+fn mean_distance(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
+    let sum: f64 =
+        a.iter().zip(b).map(|(a, b)| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()).sum();
+    sum / a.len().max(1) as f64
+}
+
+fn blended(weights: &[f32], bones: &[Transform]) -> Transform {
+    let mut sum = [[0.0; 4]; 3];
+    for (weight, bone) in weights.iter().zip(bones) {
+        for (row, bone_row) in sum.iter_mut().zip(bone) {
+            for (x, b) in row.iter_mut().zip(bone_row) {
+                *x += f64::from(*weight) * b;
+            }
+        }
+    }
+    sum
+}
+
+fn apply(t: &Transform, p: [f64; 3]) -> [f64; 3] {
+    t.map(|[a, b, c, d]| a * p[0] + b * p[1] + c * p[2] + d)
+}

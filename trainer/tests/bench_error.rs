@@ -1,0 +1,116 @@
+//! `clothcombo bench error` on two scenes of tiny garments, with and without a network.
+
+use assert_cmd::Command;
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+
+const CONFIG: &str = r#"
+seed = 4
+[data]
+[[data.garments]]
+generate = { count = 2, seed = 5, vertices = 200, categories = ["t_shirt", "skirt"] }
+[model]
+width = 8
+embedding = 8
+diffusion_blocks = 1
+diffusion_width = 8
+eigen_count = 8
+mlp_layers = 2
+siren_layers = 2
+siren_width = 8
+skinning_layers = 1
+skinning_width = 8
+[[stages]]
+name = "all"
+trains = "all"
+steps = 2
+[validation]
+single_scenes = 2
+layered_scenes = 0
+[output]
+sample_scenes = 0
+"#;
+
+fn bench(arguments: &[&str], folder: &Path) -> Command {
+    let mut command = Command::cargo_bin("clothcombo").unwrap();
+    command.current_dir(folder).args(["bench", "error", "--scenes", "2"]).args(arguments);
+    command
+}
+
+fn check(report: &Value, methods: &[&str]) {
+    let scenes = report["scenes"].as_array().unwrap();
+    assert_eq!(scenes.len(), 2);
+    for scene in scenes {
+        let found: Vec<&str> =
+            scene["methods"].as_array().unwrap().iter().map(|m| m["method"].as_str().unwrap()).collect();
+        assert_eq!(found, methods);
+        let reference = &scene["runs"][scene["reference"].as_u64().unwrap() as usize];
+        let lowest = reference["energy"].as_f64().unwrap();
+        for m in scene["methods"].as_array().unwrap() {
+            let (energy, excess) = (m["energy"].as_f64().unwrap(), m["excess"].as_f64().unwrap());
+            assert!(excess > 0.0 && (energy - lowest - excess).abs() < 1e-9 * energy.abs().max(1.0), "{m}");
+            assert!(m["distance_mm"].as_f64().unwrap() > 0.0);
+        }
+        assert!(
+            (scene["methods"][1]["excess_percent"].as_f64().unwrap() - 100.0).abs() < 1e-6
+                || methods.len() > 2
+        );
+        let gradient = reference["relative_gradient"].as_f64().unwrap();
+        assert_eq!(
+            reference["stop"] == "converged",
+            gradient <= report["tolerance"].as_f64().unwrap(),
+            "{reference}"
+        );
+    }
+    let converged =
+        scenes.iter().filter(|s| s["runs"][s["reference"].as_u64().unwrap() as usize]["stop"] == "converged");
+    assert_eq!(converged.count() as u64, report["solver"]["converged"].as_u64().unwrap());
+}
+
+#[test]
+fn skinning_and_a_network_are_measured_against_the_minimum() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("tiny.toml"), CONFIG).unwrap();
+    let output =
+        bench(&["--config", "tiny.toml", "--iterations", "150", "--json"], folder.path()).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    check(&serde_json::from_slice(&output.stdout).unwrap(), &["LBS of rest", "LBS"]);
+
+    Command::cargo_bin("clothcombo-train")
+        .unwrap()
+        .current_dir(folder.path())
+        .args(["--config", "tiny.toml", "--run-dir", "run", "--quiet"])
+        .assert()
+        .success();
+    let output =
+        bench(&["--checkpoint", "run", "--iterations", "150", "--json"], folder.path()).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    check(&report, &["LBS of rest", "LBS", "network"]);
+    assert!(report["scenes"].as_array().unwrap().iter().all(|s| s["runs"].as_array().unwrap().len() == 2));
+
+    // One iteration converges nowhere: said in the table, and still a result.
+    let output = bench(&["--config", "tiny.toml", "--iterations", "1"], folder.path()).output().unwrap();
+    assert!(output.status.success());
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(text.contains("0 of 2; stops: 2 iterations"), "{text}");
+}
+
+#[test]
+fn bad_arguments_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("tiny.toml"), CONFIG).unwrap();
+    bench(&["--config", "missing.toml"], folder.path())
+        .assert()
+        .code(1)
+        .stderr(predicates::str::contains("missing.toml"));
+    bench(&["--config", "tiny.toml", "--checkpoint", "nowhere"], folder.path())
+        .assert()
+        .code(1)
+        .stderr(predicates::str::contains("nowhere"));
+    bench(&["--config", "tiny.toml", "--tolerance=-1"], folder.path())
+        .assert()
+        .code(1)
+        .stderr(predicates::str::contains("tolerance"));
+}
