@@ -42,7 +42,10 @@ pub struct Sitting {
 
 impl Sitting {
     fn is_good(&self) -> bool {
-        self.inside < 0.12 && self.wrap >= 0.75 && self.mean_distance < 0.06
+        let is_close = self.inside < 0.12 && self.wrap >= 0.75 && self.mean_distance < 0.06;
+        // A wide skirt is far from the legs, but goes all the way round and is nowhere inside.
+        let is_wide = self.inside < 0.01 && self.wrap == 1.0 && self.mean_distance < 0.25;
+        is_close || is_wide
     }
 }
 

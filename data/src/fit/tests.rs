@@ -4,11 +4,18 @@ use crate::asset::rotation;
 use crate::generate::{GarmentGenerator, GarmentSettings, mannequin};
 use clothcombo_physics::mesh::shapes::{icosphere, tube};
 use clothcombo_physics::query::VertexIndex;
-use clothcombo_physics::vec3::{add, scale};
+use clothcombo_physics::vec3::{add, cross, dot, scale};
 
 fn garment(body: &Body, category: Category, seed: u64) -> Garment {
     let settings = GarmentSettings { target_vertices: 500, ..GarmentSettings::default() };
     GarmentGenerator::new(body).unwrap().generate(category, seed, &settings).unwrap()
+}
+
+/// The longest-sleeved of a few shirts: cap sleeves lie on the shoulder at any angle and are as well worn around the hips.
+fn long_sleeved(body: &Body) -> Garment {
+    let reach = |g: &Garment| g.rest.bounds().1[0];
+    let shirts = (1..=5).map(|seed| garment(body, Category::TShirt, seed));
+    shirts.max_by(|a, b| reach(a).total_cmp(&reach(b))).unwrap()
 }
 
 /// The file that `placement` would bring back to these positions.
@@ -81,7 +88,7 @@ fn every_unit_up_axis_and_facing_is_found_and_the_garment_recovered() {
 #[test]
 fn a_garment_with_its_origin_elsewhere_is_moved_onto_the_body() {
     let body = mannequin();
-    let original = garment(&body, Category::TShirt, 8);
+    let original = long_sleeved(&body);
     let (low, high) = original.rest.bounds();
     let centre = scale(add(low, high), 0.5);
     let centred: Vec<[f64; 3]> =
@@ -148,8 +155,20 @@ fn messy(original: &Garment, body: &Body, degrees: f64) -> Messy {
     let [a, b, c] = original.rest.faces()[0];
     soup(&mut mesh, &[b, c, a]);
     soup(&mut mesh, &[a, b, a]);
-    let edge = hinges[hinges.len() / 2].edge.map(|v| flat[v as usize]);
-    let away = [edge[0][0] * 1.2, edge[0][1] * 1.2, edge[0][2]];
+    // Where the flap stands up most from the cloth: lying flat, it would be as good a neighbour as the cloth itself.
+    let tip = |p: [f64; 3]| [p[0] * 1.2, p[1] * 1.2, p[2]];
+    let standing = |edge: [u32; 2], face: u32| {
+        let [a, b, c] = original.rest.faces()[face as usize].map(|v| flat[v as usize]);
+        let (normal, flap) =
+            (cross(sub(b, a), sub(c, a)), sub(tip(flat[edge[0] as usize]), flat[edge[0] as usize]));
+        dot(normal, flap).abs() / (norm(normal) * norm(flap))
+    };
+    let hinge = hinges
+        .iter()
+        .max_by(|g, h| standing(g.edge, g.faces[0]).total_cmp(&standing(h.edge, h.faces[0])))
+        .unwrap();
+    let edge = hinge.edge.map(|v| flat[v as usize]);
+    let away = tip(edge[0]);
     let base = mesh.positions.len() as u32;
     mesh.positions.extend([edge[0], edge[1], away]);
     mesh.push(&[base, base + 1, base + 2]);
@@ -210,12 +229,7 @@ fn every_repair_is_made_and_reported() {
 #[test]
 fn lowered_arms_are_found_and_raised() {
     let body = mannequin();
-    // Cap sleeves lie on the shoulder at any angle; the longest ones of a few shirts do not.
-    let reach = |g: &Garment| g.rest.bounds().1[0];
-    let original = (1..=5)
-        .map(|seed| garment(&body, Category::TShirt, seed))
-        .max_by(|a, b| reach(a).total_cmp(&reach(b)))
-        .unwrap();
+    let original = long_sleeved(&body);
     for degrees in [25.0, 50.0] {
         let file = messy(&original, &body, degrees).file;
         let fitted = fit(&file, &body, &FitSettings::default()).unwrap();
