@@ -54,7 +54,7 @@ fn streaming_changes_no_bit() {
         "operators and binding of each of three garments"
     );
 
-    // A second run finds everything, although every other record is damaged or gone.
+    // A second run finds everything, although two of three records are damaged or gone.
     for (i, record) in records(&folder.path().join("cache")).iter().enumerate() {
         match i % 3 {
             0 => fs::remove_file(record).unwrap(),

@@ -110,6 +110,18 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     train(&mut session, &mut observers, &stop)
 }
 
+/// Loads the data of `config` under a bar.
+pub(crate) fn load_under_bar(config: &Config, quiet: bool) -> Result<Library, Report> {
+    let bar = garment_progress(quiet);
+    let library = Library::load(config, &|done, total, name| {
+        bar.set_length(total as u64);
+        bar.set_position(done as u64);
+        bar.set_message(name.to_owned());
+    })?;
+    bar.finish_and_clear();
+    Ok(library)
+}
+
 /// The bar shown while garments are prepared.
 pub(crate) fn garment_progress(quiet: bool) -> ProgressBar {
     let style = ProgressStyle::with_template("preparing garments {bar:30} {pos}/{len} {msg}")
@@ -118,13 +130,7 @@ pub(crate) fn garment_progress(quiet: bool) -> ProgressBar {
 }
 
 fn load_library(config: &Config, quiet: bool) -> Result<Library, Report> {
-    let bar = garment_progress(quiet);
-    let library = Library::load(config, &|done, total, name| {
-        bar.set_length(total as u64);
-        bar.set_position(done as u64);
-        bar.set_message(name.to_owned());
-    })?;
-    bar.finish_and_clear();
+    let library = load_under_bar(config, quiet)?;
     if !quiet {
         eprintln!(
             "body: {} · {} garments ({} not trained on) · {} joints · {} shape components{}",

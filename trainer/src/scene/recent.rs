@@ -47,12 +47,6 @@ impl<T: Clone> Recent<T> {
             self.used -= dropped.map_or(0, |e| e.bytes);
         }
     }
-
-    /// Drops everything.
-    pub fn clear(&mut self) {
-        self.entries.clear();
-        self.used = 0;
-    }
 }
 
 #[cfg(test)]

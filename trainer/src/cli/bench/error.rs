@@ -1,7 +1,7 @@
 //! `clothcombo bench error`: how far drapes are from equilibrium.
 
 use crate::checkpoint::Checkpoint;
-use crate::cli::train::garment_progress;
+use crate::cli::train::load_under_bar;
 use crate::config::{Config, ValidationConfig, load};
 use crate::device::Backend;
 use crate::drape::{Networks, WardrobeTensors};
@@ -71,7 +71,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     settings.check().into_diagnostic()?;
     let checkpoint = arguments.checkpoint.as_deref().map(Checkpoint::open).transpose()?;
     let config = configuration(arguments, checkpoint.as_ref())?;
-    let library = Arc::new(load_library(&config)?);
+    let library = Arc::new(load_under_bar(&config, false)?);
     let scenes = draw_scenes(&library, &config, arguments.scenes, arguments.seed.unwrap_or(config.seed))?;
     let networks = match &checkpoint {
         Some(checkpoint) => drape(checkpoint, &config, &library, &scenes)?.into_iter().map(Some).collect(),
@@ -93,17 +93,6 @@ fn configuration(arguments: &Arguments, checkpoint: Option<&Checkpoint>) -> Resu
         (None, None) => Path::new("configs").join("open.toml"),
     };
     Ok(load(&file, &arguments.overrides)?)
-}
-
-fn load_library(config: &Config) -> Result<Library, Report> {
-    let bar = garment_progress(false);
-    let library = Library::load(config, &|done, total, name| {
-        bar.set_length(total as u64);
-        bar.set_position(done as u64);
-        bar.set_message(name.to_owned());
-    })?;
-    bar.finish_and_clear();
-    Ok(library)
 }
 
 /// Random ones of the single-garment validation scenes: as many as the configuration has, or more if more are asked for.
