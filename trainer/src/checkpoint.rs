@@ -95,6 +95,55 @@ const OPTIMIZER: &str = "optimizer.bpk";
 const CONFIG: &str = "config.toml";
 const STATE: &str = "state.json";
 
+/// Trained networks for use, not for training on: `model.safetensors`, `config.toml` and `state.json` of a checkpoint,
+/// whatever else lies beside them. A model that is handed on needs no more than these three files.
+#[derive(Clone, Debug)]
+pub struct TrainedModel {
+    /// Its folder.
+    pub folder: PathBuf,
+    /// What it says about itself.
+    pub state: CheckpointState,
+    /// The configuration it was trained with.
+    pub config: Config,
+}
+
+impl TrainedModel {
+    /// Opens a run, a checkpoints folder, one checkpoint, or a `model.safetensors` with its two companions.
+    ///
+    /// # Errors
+    /// When there is none, or one of the three files is missing, damaged or of another version.
+    pub fn open(path: &Path) -> Result<Self, CheckpointError> {
+        let folder = match path.is_file() {
+            true => path.parent().unwrap_or(Path::new("")).to_owned(),
+            false => Checkpoint::locate(path)?,
+        };
+        let state = read_state(&folder, &[MODEL_EXCHANGE, CONFIG])?;
+        let config = load(&folder.join(CONFIG), &[])?;
+        Ok(Self { folder, state, config })
+    }
+
+    /// The networks, on `device`.
+    ///
+    /// # Errors
+    /// When the stored parameters do not fit the configuration.
+    pub fn networks(&self, device: &Device) -> Result<ClothCombo, CheckpointError> {
+        let unusable = |reason: String| CheckpointError::Unusable { path: self.folder.clone(), reason };
+        let mut model = ClothCombo::new(&self.config.model, &self.state.dimensions(), device)
+            .map_err(|e| unusable(e.to_string()))?;
+        let mut store = SafetensorsStore::from_file(self.folder.join(MODEL_EXCHANGE));
+        let applied = model.load_from(&mut store).map_err(|e| unusable(format!("{MODEL_EXCHANGE}: {e}")))?;
+        match applied.errors.first() {
+            Some(error) => Err(unusable(format!("{MODEL_EXCHANGE}: {error}"))),
+            None => Ok(model),
+        }
+    }
+
+    /// Checksum of the parameters: equal ones make equal embeddings.
+    pub fn checksum(&self) -> &str {
+        self.state.checksums.get(MODEL_EXCHANGE).map_or("", String::as_str)
+    }
+}
+
 /// A whole checkpoint on disk.
 #[derive(Clone, Debug)]
 pub struct Checkpoint {
@@ -158,7 +207,14 @@ impl Checkpoint {
     /// # Errors
     /// When there is none, or it is damaged or of another version.
     pub fn open(path: &Path) -> Result<Self, CheckpointError> {
-        let folder = [path.to_owned(), path.join("checkpoints")]
+        let folder = Self::locate(path)?;
+        let state = read_state(&folder, &[MODEL_EXCHANGE, MODEL_EXACT, OPTIMIZER, CONFIG])?;
+        Ok(Self { path: folder, state })
+    }
+
+    /// The folder of one checkpoint: `path` itself, or the newest one of a run or checkpoints folder.
+    fn locate(path: &Path) -> Result<PathBuf, CheckpointError> {
+        [path.to_owned(), path.join("checkpoints")]
             .into_iter()
             .find_map(|f| match f.join(STATE).exists() {
                 true => Some(f),
@@ -168,25 +224,7 @@ impl Checkpoint {
                     newest.join(STATE).exists().then_some(newest)
                 }
             })
-            .ok_or_else(|| CheckpointError::Missing { path: path.to_owned() })?;
-        let unusable = |reason: String| CheckpointError::Unusable { path: folder.clone(), reason };
-        let text = fs::read_to_string(folder.join(STATE)).map_err(|e| unusable(e.to_string()))?;
-        let version = serde_json::from_str::<serde_json::Value>(&text)
-            .map_err(|e| unusable(format!("{STATE} is damaged: {e}")))?["format"]
-            .as_u64();
-        if version != Some(u64::from(FORMAT)) {
-            let found = version.map_or("no version".to_owned(), |v| format!("version {v}"));
-            return Err(unusable(format!("{STATE} has {found}, this program reads version {FORMAT}")));
-        }
-        let state: CheckpointState =
-            serde_json::from_str(&text).map_err(|e| unusable(format!("{STATE} is damaged: {e}")))?;
-        for file in [MODEL_EXCHANGE, MODEL_EXACT, OPTIMIZER, CONFIG] {
-            let sum = checksum(&folder.join(file)).map_err(|e| unusable(format!("{file}: {e}")))?;
-            if state.checksums.get(file) != Some(&sum) {
-                return Err(unusable(format!("{file} does not match its checksum")));
-            }
-        }
-        Ok(Self { path: folder, state })
+            .ok_or_else(|| CheckpointError::Missing { path: path.to_owned() })
     }
 
     /// The configuration of the run it belongs to.
@@ -226,6 +264,28 @@ impl CheckpointState {
     pub fn new(step: u64, joints: Vec<String>, shape_count: usize, pose_features: usize) -> Self {
         Self { format: FORMAT, step, joints, shape_count, pose_features, checksums: BTreeMap::new() }
     }
+}
+
+/// A checkpoint's `state.json`, after comparing the checksums of `files`.
+fn read_state(folder: &Path, files: &[&str]) -> Result<CheckpointState, CheckpointError> {
+    let unusable = |reason: String| CheckpointError::Unusable { path: folder.to_owned(), reason };
+    let text = fs::read_to_string(folder.join(STATE)).map_err(|e| unusable(e.to_string()))?;
+    let version = serde_json::from_str::<serde_json::Value>(&text)
+        .map_err(|e| unusable(format!("{STATE} is damaged: {e}")))?["format"]
+        .as_u64();
+    if version != Some(u64::from(FORMAT)) {
+        let found = version.map_or("no version".to_owned(), |v| format!("version {v}"));
+        return Err(unusable(format!("{STATE} has {found}, this program reads version {FORMAT}")));
+    }
+    let state: CheckpointState =
+        serde_json::from_str(&text).map_err(|e| unusable(format!("{STATE} is damaged: {e}")))?;
+    for file in files {
+        let sum = checksum(&folder.join(file)).map_err(|e| unusable(format!("{file}: {e}")))?;
+        if state.checksums.get(*file) != Some(&sum) {
+            return Err(unusable(format!("{file} does not match its checksum")));
+        }
+    }
+    Ok(state)
 }
 
 fn checksum(path: &Path) -> io::Result<String> {

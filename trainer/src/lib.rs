@@ -5,6 +5,7 @@ pub mod cli;
 pub mod config;
 pub mod device;
 pub mod drape;
+pub mod draper;
 pub mod evaluate;
 pub mod event;
 pub mod learner;

@@ -21,6 +21,7 @@ enum Verb {
     #[command(subcommand)]
     Bench(cli::bench::Bench),
     Check(cli::check::Arguments),
+    Drape(Box<cli::drape::Arguments>),
     Fit(cli::fit::Arguments),
     Generate(cli::generate::Arguments),
     #[command(subcommand)]
@@ -35,6 +36,7 @@ fn main() -> ExitCode {
     cli::exit_code(match &arguments.verb {
         Verb::Bench(bench) => cli::bench::run(bench),
         Verb::Check(arguments) => cli::check::run(arguments),
+        Verb::Drape(arguments) => cli::drape::run(arguments),
         Verb::Fit(arguments) => cli::fit::run(arguments),
         Verb::Generate(arguments) => cli::generate::run(arguments),
         Verb::Import(source) => cli::import::run(source),

@@ -2,15 +2,18 @@
 
 pub mod bench;
 pub mod check;
+pub mod drape;
 pub mod fit;
 pub mod generate;
 pub mod import;
 pub mod prepare;
 pub mod score;
+mod table;
 pub mod train;
 mod wardrobe_sheet;
 
-use miette::Report;
+use miette::{IntoDiagnostic, Report};
+use std::io::{ErrorKind, Write};
 use tracing_subscriber::EnvFilter;
 
 /// Log lines on stderr; `RUST_LOG` overrides `default`.
@@ -28,5 +31,14 @@ pub fn exit_code(result: Result<(), Report>) -> std::process::ExitCode {
             eprintln!("{report:?}");
             std::process::ExitCode::FAILURE
         }
+    }
+}
+
+/// Prints `text` to stdout.
+pub(crate) fn print_all(text: &str) -> Result<(), Report> {
+    match std::io::stdout().write_all(text.as_bytes()) {
+        // Whoever reads the output has seen enough.
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
+        written => written.into_diagnostic(),
     }
 }
