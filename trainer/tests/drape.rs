@@ -248,6 +248,7 @@ fn a_motion_is_one_animated_scene() {
     let smoothing = &report["smoothing"];
     let sum: u64 = ["whole", "partly", "left"].iter().map(|k| smoothing[k].as_u64().unwrap()).sum();
     assert_eq!(sum, 4);
+    assert!(report["acceleration"]["ratio"].as_f64().is_some_and(|r| r > 0.1 && r < 10.0), "{report}");
 
     let glb = fs::read(out.join("scene.glb")).unwrap();
     let length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;

@@ -45,7 +45,7 @@ pub enum DraperError {
     /// The body the model was trained on is not there.
     #[error("the model was trained on body {body}, which is not there")]
     #[diagnostic(help(
-        "run from the folder it is relative to, put it beside the model as body.npz, or pass --body"
+        "put it beside the model as body.npz, run from the folder its path is relative to, or pass --body"
     ))]
     NoBody {
         /// The path in the model's configuration.
@@ -91,6 +91,18 @@ pub enum DraperError {
         path: PathBuf,
         /// Why.
         reason: FitError,
+    },
+    /// A garment is too fine.
+    #[error(
+        "garment '{name}' has {vertices} vertices, more than {} can be draped at once",
+        super::MAX_VERTICES
+    )]
+    #[diagnostic(help("decimate it first: the networks see no detail of a millimetre"))]
+    TooLarge {
+        /// The garment.
+        name: String,
+        /// Its vertices.
+        vertices: usize,
     },
     /// Too few or too many layers.
     #[error("{count} garments; an outfit has 1 to {most}")]

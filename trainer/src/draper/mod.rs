@@ -20,6 +20,7 @@
 //! and once per machine with a cache; [`Draper::drape`] does what depends on the body: networks, optional refinement,
 //! post-process. The networks see the pose without its heading; positions come back in the frame of the given pose.
 
+mod acceleration;
 mod error;
 mod outfit;
 pub mod output;
@@ -29,9 +30,10 @@ mod shipped;
 mod smooth;
 mod source;
 
+pub use acceleration::{Acceleration, acceleration};
 pub use clothcombo_physics::contact::resolve::Certificate;
 pub use error::DraperError;
-pub use outfit::{MAX_GARMENTS, Outfit, Piece, PieceTimes};
+pub use outfit::{MAX_GARMENTS, MAX_VERTICES, Outfit, Piece, PieceTimes};
 pub use refine::Refinement;
 pub use report::{BodyReport, FrameReport, GarmentReport, ModelReport, Moment, PhaseTimes, Report, Stage};
 pub use shipped::shipped_model;
@@ -388,10 +390,13 @@ fn load_model_body(trained: &TrainedModel, named: Option<&str>) -> Result<Body, 
     let name = match named {
         Some(name) => name.to_owned(),
         None if beside.is_file() => beside.display().to_string(),
-        None if own != "mannequin" && !Path::new(own).exists() => {
-            return Err(DraperError::NoBody { body: own.clone() });
+        None if own == "mannequin" => own.clone(),
+        None => {
+            // A run lies somewhere below the folder its paths are relative to.
+            let places = std::iter::once(Path::new("")).chain(trained.folder.ancestors());
+            let found = places.map(|place| place.join(own)).find(|path| path.is_file());
+            found.ok_or_else(|| DraperError::NoBody { body: own.clone() })?.display().to_string()
         }
-        None => own.clone(),
     };
     Ok(load_body(&name, trained.state.shape_count)?)
 }

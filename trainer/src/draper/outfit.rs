@@ -22,6 +22,9 @@ use std::time::Instant;
 /// Most garments of an outfit.
 pub const MAX_GARMENTS: usize = 12;
 
+/// Most vertices of a garment: at the paper's sizes the operators of one take 2 kB a vertex, its embedding as much.
+pub const MAX_VERTICES: usize = 100_000;
+
 /// Wall time of what depends on the garment alone [ms].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PieceTimes {
@@ -122,6 +125,10 @@ impl KnownGarments {
         let mut names = UniqueNames::default();
         let (mut pieces, mut known) = (Vec::new(), Vec::new());
         for source in garments {
+            let vertices = source.garment.rest.vertex_count();
+            if vertices > MAX_VERTICES {
+                return Err(DraperError::TooLarge { name: source.garment.name, vertices });
+            }
             let name = names.take(&source.garment.name);
             let (found, milliseconds, embedding_known) = self.know(draper, &source)?;
             let (source, worn, rest) = (Arc::new(source), found.worn.clone(), found.rest.clone());

@@ -1,5 +1,6 @@
 //! What a drape reports: `report.json`.
 
+use super::acceleration::{Acceleration, acceleration};
 use super::refine::Refinement;
 use super::{Drape, Draper, DraperError, Outfit, Smoothing};
 use crate::scene::LibraryError;
@@ -164,6 +165,9 @@ pub struct Report {
     /// What temporal smoothing did.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub smoothing: Option<Smoothing>,
+    /// How smoothly a motion moves.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub acceleration: Option<Acceleration>,
     /// Every frame of a motion.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub frames: Vec<FrameReport>,
@@ -224,6 +228,7 @@ impl Report {
             certificate: combined(drapes),
             refinement: first.refinement.clone(),
             smoothing,
+            acceleration: acceleration(drapes, moments),
             frames: frames.collect(),
         })
     }

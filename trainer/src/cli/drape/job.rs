@@ -98,7 +98,7 @@ impl Job {
             let range = scene.frames.unwrap_or(FrameRange { first: 0, end: None });
             let end = range.end.unwrap_or(motion.poses.len());
             if range.first >= motion.poses.len() || end > motion.poses.len() {
-                return Err(no_frame(path, range.first.max(end - 1), motion.poses.len()));
+                return Err(no_frame(path, range.first.max(end.saturating_sub(1)), motion.poses.len()));
             }
             let frames = (range.first..end).step_by(scene.every.unwrap_or(1) as usize);
             let (states, moments) = frames

@@ -49,7 +49,13 @@ pub(super) fn read(file: &Path, scene: &SceneArguments) -> Result<Vec<Job>, Fail
             _ => path.to_owned(),
         };
         let mut own = scene.clone();
+        if entry.pose.is_some() || entry.motion.is_some() {
+            (own.posed, own.t_pose) = (None, None);
+        }
         if let Some(shape) = entry.shape {
+            if own.posed.is_some() {
+                return Err(wrong("a shape beside --posed, which has its own".to_owned()));
+            }
             own.shape = shape;
         }
         match (entry.pose, entry.motion) {
@@ -67,6 +73,9 @@ pub(super) fn read(file: &Path, scene: &SceneArguments) -> Result<Vec<Job>, Fail
             Some(0) => return Err(wrong("every = 0 takes no frame".to_owned())),
             every => every.or(own.every),
         };
+        if own.motion.is_none() && (own.frames.is_some() || entry.every.is_some()) {
+            return Err(wrong("frames of no motion".to_owned()));
+        }
         let garments = entry.garments.iter().map(|g| beside(g)).collect();
         Ok(Job { name, garments, order: entry.order, scene: own })
     });
@@ -121,6 +130,7 @@ mod tests {
             ("[[outfit]]\nname = \"a/b\"\ngarments = [\"a\"]\n", "a/b"),
             ("[[outfit]]\nname = \"a\"\ngarments = []\n[[outfit]]\nname = \"A\"\ngarments = []\n", "twice"),
             ("[[outfit]]\ngarments = []\nframes = \"9..1\"\n", "9..1"),
+            ("[[outfit]]\ngarments = []\nframes = \"0..4\"\n", "no motion"),
             ("[[outfit]]\ngarments = []\npose = \"a\"\nmotion = \"b\"\n", "both"),
             ("outfit = []\n", "no outfit"),
         ] {

@@ -119,6 +119,13 @@ fn certificate(report: &Report) -> String {
             done.radius, done.whole, done.partly, done.left
         );
     }
+    if let Some(found) = &report.acceleration {
+        text += &format!(
+            "\nacceleration of 95 % of the vertices at most {} m/s², {:.2} times that of skinning",
+            number(found.draped_95),
+            found.ratio
+        );
+    }
     if let Some(done) = &report.refinement {
         text += &format!(
             "\nrefined: {} steps ({}), energy {} to {} J, largest move {:.1} mm",

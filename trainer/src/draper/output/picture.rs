@@ -8,6 +8,8 @@ use rayon::prelude::*;
 
 /// Width and height of one view [pixels].
 const CELL: [u32; 2] = [340, 540];
+/// Garments named on one line of the legend.
+const NAMES_PER_LINE: usize = 3;
 /// Rows of a motion's picture.
 const ROWS: usize = 4;
 const VIEWS: [View; 3] = [View::Front, View::Back, View::ThreeQuarter];
@@ -25,22 +27,34 @@ pub(super) fn draw(show: &Show) -> RgbImage {
         .into_par_iter()
         .map(|(frame, view)| cell(show, &show.drapes[frame], view))
         .collect();
-    let legend = || {
-        let entry =
-            |(layer, name): (usize, &str)| LegendEntry { colour: layer_colour(layer), name: name.to_owned() };
-        show.outfit.names().enumerate().map(entry).collect::<Vec<_>>()
-    };
-    let rows =
-        shown.iter().zip(cells.chunks(VIEWS.len())).enumerate().map(|(row, (frame, cells))| SheetRow {
-            label: match show.moments.get(*frame) {
-                Some(moment) => format!("frame {}, {:.2} s", moment.frame, moment.seconds),
-                None => "inner to outer".to_owned(),
-            },
-            legend: if row == 0 { legend() } else { Vec::new() },
-            cells: cells.to_vec(),
-        });
+    let entries: Vec<LegendEntry> = show
+        .outfit
+        .names()
+        .enumerate()
+        .map(|(layer, name)| LegendEntry { colour: layer_colour(layer), name: name.to_owned() })
+        .collect();
+    // Lines of the legend; the last one is that of the first frame.
+    let mut rows: Vec<SheetRow> = entries
+        .chunks(NAMES_PER_LINE)
+        .enumerate()
+        .map(|(line, names)| SheetRow {
+            label: if line == 0 { "inner to outer".to_owned() } else { String::new() },
+            legend: names.to_vec(),
+            cells: Vec::new(),
+        })
+        .collect();
+    for (row, (frame, cells)) in shown.iter().zip(cells.chunks(VIEWS.len())).enumerate() {
+        match (row, show.moments.get(*frame)) {
+            (0, None) => rows.last_mut().into_iter().for_each(|last| last.cells = cells.to_vec()),
+            (_, moment) => rows.push(SheetRow {
+                label: moment.map_or(String::new(), |m| format!("frame {}, {:.2} s", m.frame, m.seconds)),
+                legend: Vec::new(),
+                cells: cells.to_vec(),
+            }),
+        }
+    }
     let columns = VIEWS.iter().map(|view| view.name().to_owned()).collect();
-    Sheet { title: show.title.to_owned(), columns, rows: rows.collect() }.compose()
+    Sheet { title: show.title.to_owned(), columns, rows }.compose()
 }
 
 fn cell(show: &Show, drape: &Drape, view: View) -> RgbImage {
