@@ -345,7 +345,9 @@ fn a_posed_mesh_of_the_body_is_dressed_where_it_stands() {
 fn wrong_input_names_itself_and_leaves_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let out = at(&folder, "out");
-    let with = |arguments: &[&str]| [arguments, &["-o", &out]].concat();
+    fn to<'a>(arguments: &[&'a str], out: &'a str) -> Vec<&'a str> {
+        [arguments, &["-o", out]].concat()
+    }
     let band = at(&folder, "broken.obj");
     fs::write(&band, "v 0 0 0\nv 1 0 nan\nv 0 1 0\nf 1 2 3\n").unwrap();
     let cube = at(&folder, "cube.obj");
@@ -374,21 +376,21 @@ fn wrong_input_names_itself_and_leaves_nothing() {
         ([&["--garments"][..], &many].concat(), vec!["13 garments", "1 to 12"]),
     ];
     for (arguments, words) in cases {
-        let message = failure(&mut drape(&with(&arguments)), 1);
+        let message = failure(&mut drape(&to(&arguments, &out)), 1);
         for word in words {
             assert!(message.contains(word), "{word:?} is missing for {arguments:?} in:\n{message}");
         }
     }
-    failure(&mut drape(&with(&[])), 2);
-    failure(&mut drape(&with(&["--garments", TEE, "--frames", "0..4"])), 2);
-    failure(&mut drape(&with(&["--garments", TEE, "--motion", &motion, "--frames", "4..1"])), 2);
+    failure(&mut drape(&to(&[], &out)), 2);
+    failure(&mut drape(&to(&["--garments", TEE, "--frames", "0..4"], &out)), 2);
+    failure(&mut drape(&to(&["--garments", TEE, "--motion", &motion, "--frames", "4..1"], &out)), 2);
     assert!(!Path::new(&out).exists());
 
     // A folder with something else in it is never touched.
     fs::create_dir(&out).unwrap();
     fs::write(Path::new(&out).join("thesis.tex"), "x").unwrap();
-    assert!(failure(&mut drape(&with(&["--garments", TEE])), 1).contains("not empty"));
-    assert!(failure(&mut drape(&with(&["--garments", TEE, "--replace"])), 1).contains("report.json"));
+    assert!(failure(&mut drape(&to(&["--garments", TEE], &out)), 1).contains("not empty"));
+    assert!(failure(&mut drape(&to(&["--garments", TEE, "--replace"], &out)), 1).contains("report.json"));
     assert_eq!(fs::read_dir(&out).unwrap().count(), 1);
     let left: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
     assert!(left.iter().all(|n| !n.to_string_lossy().ends_with(".tmp")), "{left:?}");

@@ -148,6 +148,8 @@ pub struct Drape {
     pub refinement: Option<Refinement>,
     /// Exact counts of what intersects in the result.
     pub certificate: Certificate,
+    /// The body with its search trees, as long as they are worth their memory.
+    surface: Option<Arc<Surface<f64>>>,
 }
 
 /// A trained model with a body, ready to drape.
@@ -240,6 +242,7 @@ impl Draper {
             None => posed.positions.iter().map(|p| add(*p, body.place)).collect(),
         };
         round(&mut surface);
+        let surface = Arc::new(Surface::new(surface, self.body().faces.clone()));
         let (facing, heading) = body.pose.without_heading();
         let (facing, yaw) = match self.trained.config.data.poses.remove_heading {
             true => (facing, heading),
@@ -273,7 +276,7 @@ impl Draper {
             0 => (network.clone(), None),
             steps => {
                 let mut energy = ReferenceScene::new(&self.trained.config.losses, &scene)?.energy;
-                energy.body = Arc::new(Surface::new(surface.clone(), self.body().faces.clone()));
+                energy.body = surface.clone();
                 let (positions, done) = refine::refine(&energy, &transforms, &network, steps)?;
                 (positions, Some(done))
             }
@@ -284,11 +287,7 @@ impl Draper {
         let parts = outfit.split(&before);
         let (resolved, times) = match self.settings.resolve {
             true => {
-                let done = resolve(
-                    &Surface::new(surface.clone(), self.body().faces.clone()),
-                    &outfit.layers(&parts),
-                    &self.settings.post_process,
-                )?;
+                let done = resolve(&surface, &outfit.layers(&parts), &self.settings.post_process)?;
                 (done.positions, done.garments.iter().map(|g| 1e3 * g.time.as_secs_f64()).collect())
             }
             false => (parts.iter().map(|p| p.to_vec()).collect(), vec![0.0; parts.len()]),
@@ -309,8 +308,15 @@ impl Draper {
                 resolve_ms: times[g],
             })
             .collect();
-        let certificate = Certificate::default();
-        let mut drape = Drape { body: surface, heading, garments, milliseconds, refinement, certificate };
+        let mut drape = Drape {
+            body: surface.positions.clone(),
+            heading,
+            garments,
+            milliseconds,
+            refinement,
+            certificate: Certificate::default(),
+            surface: Some(surface),
+        };
         let clock = Instant::now();
         drape.settle(self, outfit)?;
         drape.milliseconds.certificate = elapsed(clock);
@@ -361,13 +367,23 @@ impl Draper {
 }
 
 impl Drape {
+    /// The body's surface, with its search trees if they were kept.
+    fn surface(&self, draper: &Draper) -> Arc<Surface<f64>> {
+        let make = || Arc::new(Surface::new(self.body.clone(), draper.body().faces.clone()));
+        self.surface.clone().unwrap_or_else(make)
+    }
+
+    /// Drops what can be made again at any time: some megabytes, which add up over the frames of a motion.
+    pub fn slim(&mut self) {
+        self.surface = None;
+    }
+
     /// Brings the positions to what files hold, and counts what intersects there.
     fn settle(&mut self, draper: &Draper, outfit: &Outfit) -> Result<(), DraperError> {
         self.garments.iter_mut().for_each(|garment| round(&mut garment.positions));
         let before: Vec<&[[f64; 3]]> = self.garments.iter().map(|g| g.before.as_slice()).collect();
         let after: Vec<&[[f64; 3]]> = self.garments.iter().map(|g| g.positions.as_slice()).collect();
-        let surface = Surface::new(self.body.clone(), draper.body().faces.clone());
-        let mut certificate = certify(&surface, &outfit.layers(&after))?;
+        let mut certificate = certify(&self.surface(draper), &outfit.layers(&after))?;
         let strain =
             |layers: Vec<Layer>| layers.iter().map(|l| l.garment.strain_energy(l.positions)).sum::<f64>();
         let [before, after] = [before, after].map(|parts| strain(outfit.layers(&parts)));

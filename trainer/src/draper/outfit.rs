@@ -226,9 +226,11 @@ impl KnownGarments {
             ));
         }
         let embedding = draper.model.encode(tensors);
-        let host = |tensor: &Tensor<2>| tensor.clone().into_data().to_vec::<f32>();
-        if let (Ok(vertex), Ok(garment)) = (host(&embedding.vertex), host(&embedding.garment)) {
-            kept(put_embedding(cache, key, &StoredEmbedding { vertex, garment }));
+        let [vertex, garment] =
+            [&embedding.vertex, &embedding.garment].map(|tensor| tensor.clone().into_data());
+        if let (Ok(vertex), Ok(garment)) = (vertex.as_slice::<f32>(), garment.as_slice::<f32>()) {
+            let stored = StoredEmbedding { vertex: vertex.to_vec(), garment: garment.to_vec() };
+            kept(put_embedding(cache, key, &stored));
         }
         Ok((embedding, false))
     }

@@ -252,9 +252,12 @@ fn drape_all(draper: &Draper, outfit: &Outfit, scenes: &Scenes) -> Result<Vec<Dr
         frames => ProgressBar::new(frames as u64).with_style(style),
     };
     let drapes = scenes.states.iter().map(|state| {
-        let drape = draper.drape(outfit, state);
+        let mut drape = draper.drape(outfit, state)?;
+        if scenes.states.len() > 1 {
+            drape.slim();
+        }
         bar.inc(1);
-        drape
+        Ok(drape)
     });
     let drapes = drapes.collect::<Result<Vec<_>, DraperError>>();
     bar.finish_and_clear();

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 /// Width and height of one view [pixels].
 const CELL: [u32; 2] = [340, 540];
-/// Garments named on one line of the legend.
+/// Garments named on one line of the legend, from inner to outer.
 const NAMES_PER_LINE: usize = 3;
 /// Rows of a motion's picture.
 const ROWS: usize = 4;
@@ -36,12 +36,7 @@ pub(super) fn draw(show: &Show) -> RgbImage {
     // Lines of the legend; the last one is that of the first frame.
     let mut rows: Vec<SheetRow> = entries
         .chunks(NAMES_PER_LINE)
-        .enumerate()
-        .map(|(line, names)| SheetRow {
-            label: if line == 0 { "inner to outer".to_owned() } else { String::new() },
-            legend: names.to_vec(),
-            cells: Vec::new(),
-        })
+        .map(|names| SheetRow { label: String::new(), legend: names.to_vec(), cells: Vec::new() })
         .collect();
     for (row, (frame, cells)) in shown.iter().zip(cells.chunks(VIEWS.len())).enumerate() {
         match (row, show.moments.get(*frame)) {

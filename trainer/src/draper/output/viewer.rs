@@ -11,7 +11,6 @@ use super::{OutputError, Show};
 use crate::draper::{Drape, DraperError};
 use crate::picture::{BODY_COLOUR, layer_colour};
 use clothcombo_data::format::atomic;
-use clothcombo_physics::Surface;
 use clothcombo_physics::contact::resolve::{Certificate, Crossed, certify};
 use clothcombo_physics::mesh::vertex_stretch;
 use clothcombo_physics::query::Distance;
@@ -129,7 +128,7 @@ fn stage<'a>(
     garments: Vec<&'a [[f64; 3]]>,
     certificate: Option<&Certificate>,
 ) -> Result<Stage<'a>, DraperError> {
-    let surface = Surface::new(drape.body.clone(), show.draper.body().faces.clone());
+    let surface = drape.surface(show.draper);
     let counted;
     let certificate = match certificate {
         Some(certificate) => certificate,
