@@ -6,6 +6,7 @@ pub mod fit;
 pub mod generate;
 pub mod import;
 pub mod prepare;
+pub mod resolve;
 pub mod score;
 pub mod train;
 mod wardrobe_sheet;
