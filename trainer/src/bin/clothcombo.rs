@@ -27,6 +27,7 @@ enum Verb {
     #[command(subcommand)]
     Import(cli::import::Source),
     Prepare(cli::prepare::Arguments),
+    Resolve(cli::resolve::Arguments),
     Score(cli::score::Arguments),
 }
 
@@ -41,6 +42,7 @@ fn main() -> ExitCode {
         Verb::Generate(arguments) => cli::generate::run(arguments),
         Verb::Import(source) => cli::import::run(source),
         Verb::Prepare(arguments) => cli::prepare::run(arguments),
+        Verb::Resolve(arguments) => cli::resolve::run(arguments),
         Verb::Score(arguments) => cli::score::run(arguments),
     })
 }

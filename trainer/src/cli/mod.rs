@@ -7,6 +7,7 @@ pub mod fit;
 pub mod generate;
 pub mod import;
 pub mod prepare;
+pub mod resolve;
 pub mod score;
 mod table;
 pub mod train;
