@@ -156,7 +156,8 @@ fn as_given(source: &SourceGarment, positions: &[[f64; 3]], comments: &[String])
     let path =
         source.path.as_ref().filter(|p| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")))?;
     let moved = obj::with_positions(&std::fs::read(path).ok()?, positions).ok()?;
-    let mut bytes: Vec<u8> = comments.iter().flat_map(|c| format!("# {c}\n").into_bytes()).collect();
+    let lines = comments.iter().flat_map(|comment| comment.lines());
+    let mut bytes: Vec<u8> = lines.flat_map(|line| format!("# {line}\n").into_bytes()).collect();
     bytes.extend_from_slice(b"# what follows is the file as it was given, with other vertices\n");
     bytes.extend(obj::without_normals(&moved));
     Some(bytes)
