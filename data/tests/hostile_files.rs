@@ -129,7 +129,8 @@ fn smpl_bodies() {
     let seeds = [bytes_of("smplh_tiny.npz"), bytes_of("smplx_tiny.npz")];
     survive("SMPL.npz", &seeds, 0.2..1.0, 64 * MEGABYTE, damaged_npz, |bytes| {
         let settings = BodyFileSettings::default();
-        outcome(import_smpl_family(slot.with(bytes), &slot.out(), &settings, &mut no_progress()))
+        // What it skips are keys that no draped body needs.
+        reason(import_smpl_family(slot.with(bytes), &slot.out(), &settings, &mut no_progress()))
     });
 }
 
@@ -175,7 +176,7 @@ fn simulated_samples() {
     let folder = tempfile::tempdir().unwrap();
     let sample = folder.path().join("00001");
     fs::create_dir(&sample).unwrap();
-    let names = ["Top.obj", "Trousers.obj", "Top.pc16", "Trousers.pc16", "info.mat"];
+    let names = ["Top.obj", "Trousers.obj", "Top.pc16", "info.mat"];
     let whole = names.map(|name| bytes_of(&format!("cloth3d/00001/{name}")));
     let settings = Cloth3dSettings {
         binding: BindingSettings { smooth: false, ..BindingSettings::default() },
