@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Trains under conditions nobody would choose: the smoke configuration at ten times the paper's learning rate or its own,
-# whichever is more, poses exaggerated to 1.2, shapes to ±3. No parameter may ever stop being finite.
+# Trains under conditions nobody would choose: the smoke configuration at ten times the paper's learning rate,
+# poses exaggerated to 1.2, shapes to ±3. No parameter may ever stop being finite.
 #
 #   scripts/soak.sh [STEPS] [RUN]     default: 20000 steps into runs/soak
 #
-# Needs target/release/clothcombo-train and clothcombo. Resumes RUN if it is there. Low priority, one thread; hours.
+# Needs target/release/clothcombo-train (or PROGRAM) and python3. Resumes RUN if it is there. Low priority, one thread; hours.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 steps=${1:-20000}
@@ -20,10 +20,11 @@ settings=(
     --set "data.shape_range=[-3.0, 3.0]" --set "validation.every=$((steps / 10))"
 )
 export RAYON_NUM_THREADS=${RAYON_NUM_THREADS:-1}
+program=${PROGRAM:-target/release/clothcombo-train}
 if [ -d "$run" ]; then
-    nice -n 19 target/release/clothcombo-train --resume "$run"
+    nice -n 19 "$program" --resume "$run"
 else
-    nice -n 19 target/release/clothcombo-train --config configs/smoke.toml --run-dir "$run" "${settings[@]}"
+    nice -n 19 "$program" --config configs/smoke.toml --run-dir "$run" "${settings[@]}"
 fi
 python3 - "$run" <<'PYTHON'
 import json, math, pathlib, struct, sys

@@ -127,10 +127,8 @@ fn files_of_two_whole_checkpoints_do_not_mix() {
     let folder = tempfile::tempdir().unwrap();
     let first = saved(&folder);
     let other = tempfile::tempdir().unwrap();
-    let config = tiny_config(
-        other.path(),
-        &["seed=4", "validation.single_scenes=0", "validation.layered_scenes=0"],
-    );
+    let config =
+        tiny_config(other.path(), &["seed=4", "validation.single_scenes=0", "validation.layered_scenes=0"]);
     let library = Arc::new(Library::load(&config, &|_, _, _| {}).unwrap());
     let run = RunDir::create(&other.path().join("run"), &config).unwrap();
     let second = Session::new(run, config, library, &Backend::preferred().device()).unwrap().save().unwrap();

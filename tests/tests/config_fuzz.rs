@@ -11,10 +11,42 @@ use std::path::Path;
 
 /// What values, keys and lines are replaced with.
 const TOKENS: [&str; 36] = [
-    "0", "-1", "1", "1e308", "-1e-320", "nan", "inf", "-inf", "9223372036854775807", "18446744073709551616", "0.0", "-0.0",
-    "\"\"", "\"single\"", "\"all\"", "\"untangling\"", "[]", "[1, 1]", "[6, 2]", "[0, 0]", "[1, 2, 3]", "{}",
-    "{ from = 0.0, to = 0.0, shape = \"geometric\" }", "{ from = 1.0, to = 2.0, start = 2.0 }", "true", "'", "\"", "[[",
-    "]]", "=", "\u{0}", "🧥", "steps", "stages", "data", "1979-05-27T07:32:00Z",
+    "0",
+    "-1",
+    "1",
+    "1e308",
+    "-1e-320",
+    "nan",
+    "inf",
+    "-inf",
+    "9223372036854775807",
+    "18446744073709551616",
+    "0.0",
+    "-0.0",
+    "\"\"",
+    "\"single\"",
+    "\"all\"",
+    "\"untangling\"",
+    "[]",
+    "[1, 1]",
+    "[6, 2]",
+    "[0, 0]",
+    "[1, 2, 3]",
+    "{}",
+    "{ from = 0.0, to = 0.0, shape = \"geometric\" }",
+    "{ from = 1.0, to = 2.0, start = 2.0 }",
+    "true",
+    "'",
+    "\"",
+    "[[",
+    "]]",
+    "=",
+    "\u{0}",
+    "🧥",
+    "steps",
+    "stages",
+    "data",
+    "1979-05-27T07:32:00Z",
 ];
 
 /// The files that users start from, and one that says everything.
@@ -81,7 +113,8 @@ fn a_damaged_configuration_is_refused_with_a_reason_or_is_a_run() {
             Ok(config) => {
                 valid += 1;
                 let written = to_toml(&config).unwrap_or_else(|e| panic!("{e}\n{text}"));
-                let again = parse(&written, Path::new("again.toml"), &[]).unwrap_or_else(|e| panic!("{e:?}\n{written}"));
+                let again = parse(&written, Path::new("again.toml"), &[])
+                    .unwrap_or_else(|e| panic!("{e:?}\n{written}"));
                 assert_eq!(to_toml(&again).unwrap(), written, "{text}");
                 let schedule = Schedule::new(&config);
                 let total = schedule.total_steps();
@@ -111,8 +144,23 @@ fn overrides_are_refused_with_a_reason_or_taken() {
     let (cases, seed) = fuzz_cases(2000);
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let keys = [
-        "stages.0.steps", "stages.9.steps", "stages.x", "losses.strain.weight", "losses.strian", "", "=", ".", "..", "data",
-        "data.garments.0.generate.count", "model.width", "model.width.x", "seed", "guard.inject", "output", "stages.0",
+        "stages.0.steps",
+        "stages.9.steps",
+        "stages.x",
+        "losses.strain.weight",
+        "losses.strian",
+        "",
+        "=",
+        ".",
+        "..",
+        "data",
+        "data.garments.0.generate.count",
+        "model.width",
+        "model.width.x",
+        "seed",
+        "guard.inject",
+        "output",
+        "stages.0",
     ];
     for _ in 0..cases {
         let key = keys[rng.random_range(0..keys.len())];

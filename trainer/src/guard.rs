@@ -62,7 +62,9 @@ impl Guard {
             self.norms.pop_front();
         }
         match usual {
-            Some(usual) if self.config.spike_factor > 0.0 && gradient_norm > self.config.spike_factor * usual => {
+            Some(usual)
+                if self.config.spike_factor > 0.0 && gradient_norm > self.config.spike_factor * usual =>
+            {
                 Verdict::Spike { usual }
             }
             _ => Verdict::Fine,
@@ -105,6 +107,8 @@ mod tests {
             assert_eq!(guard.watch(step, 1.0 + 0.1 * (step % 5) as f64, false), Verdict::Fine);
         }
         assert_eq!(guard.watch(50, 11.0, false), Verdict::Fine);
-        assert!(matches!(guard.watch(51, 13.0, false), Verdict::Spike { usual } if usual > 1.0 && usual < 1.4));
+        assert!(
+            matches!(guard.watch(51, 13.0, false), Verdict::Spike { usual } if usual > 1.0 && usual < 1.4)
+        );
     }
 }

@@ -14,8 +14,8 @@ use crate::learner::{Learner, StepOutcome, new_optimizer};
 use crate::scene::{BodyDraw, Library, PreparedScene, SceneDraw, prepare};
 use crate::schedule::ScheduleAt;
 use crate::session::dimensions;
-use burn::store::ModuleRecord;
 use burn::module::Module;
+use burn::store::ModuleRecord;
 use burn::tensor::Device;
 use clothcombo_data::asset::Pose;
 use clothcombo_data::format::atomic;
@@ -353,6 +353,9 @@ impl IncidentScene {
                 false => Err(wrong("has a shape or pose that is not finite")),
             }
         });
-        Ok(SceneDraw { garments: garments.collect::<Result<_, _>>()?, bodies: bodies.collect::<Result<_, _>>()? })
+        Ok(SceneDraw {
+            garments: garments.collect::<Result<_, _>>()?,
+            bodies: bodies.collect::<Result<_, _>>()?,
+        })
     }
 }

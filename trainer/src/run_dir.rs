@@ -1,8 +1,8 @@
 //! The folder of a run: where everything lies, created whole or not at all.
 
 use crate::config::{Config, ConfigError, load, to_toml};
-use crate::scene::SplitNames;
 use crate::run_lock::{LockError, RunLock};
+use crate::scene::SplitNames;
 use clothcombo_data::format::atomic;
 use miette::Diagnostic;
 use std::fs;
@@ -52,7 +52,9 @@ pub enum RunDirError {
     },
     /// A key that may change is none that differs.
     #[error("--allow-config-change names {key:?}, which is no key of the configuration")]
-    #[diagnostic(help("keys look like stages, optimizer.clip_norm or stages[0].steps; a section allows all in it"))]
+    #[diagnostic(help(
+        "keys look like stages, optimizer.clip_norm or stages[0].steps; a section allows all in it"
+    ))]
     UnknownKey {
         /// The key as given.
         key: String,
@@ -155,7 +157,9 @@ impl RunDir {
             LockError::Held { owner } => RunDirError::InUse { path: root.to_owned(), owner },
             LockError::Io { path, reason } => RunDirError::Io { path, reason },
         })?;
-        Ok(Self { root: root.to_owned(), _lock: Arc::new(lock) })
+        let run = Self { root: root.to_owned(), _lock: Arc::new(lock) };
+        [run.root.clone(), run.checkpoints(), run.samples(), run.incidents()].iter().for_each(|f| sweep(f));
+        Ok(run)
     }
 
     fn write_config(&self, config: &Config) -> Result<(), RunDirError> {
@@ -221,6 +225,17 @@ impl RunDir {
 
 /// Name of the run's configuration.
 const CONFIG: &str = "config.toml";
+
+/// Removes files of `folder` that a killed process had not finished writing; nobody else writes there now.
+fn sweep(folder: &Path) {
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let is_file = entry.file_type().is_ok_and(|t| t.is_file());
+        if is_file && entry.file_name().to_string_lossy().ends_with(".tmp") {
+            // A leftover costs space and nothing else.
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}
 
 fn io_error(path: &Path, reason: io::Error) -> RunDirError {
     RunDirError::Io { path: path.to_owned(), reason }

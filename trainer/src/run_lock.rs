@@ -56,13 +56,17 @@ impl RunLock {
                 Err(TryLockError::WouldBlock) if attempt == ATTEMPTS => {
                     let mut owner = String::new();
                     let _ = file.read_to_string(&mut owner);
-                    let owner = if owner.trim().is_empty() { "another process".into() } else { owner.trim().into() };
+                    let owner =
+                        if owner.trim().is_empty() { "another process".into() } else { owner.trim().into() };
                     return Err(LockError::Held { owner });
                 }
                 Err(TryLockError::WouldBlock) => std::thread::sleep(Duration::from_millis(50)),
                 Err(TryLockError::Error(e)) => {
                     // Some network file systems know no locks; training there is better than none.
-                    tracing::warn!("{} cannot be locked ({e}): start only one run in the folder", path.display());
+                    tracing::warn!(
+                        "{} cannot be locked ({e}): start only one run in the folder",
+                        path.display()
+                    );
                     break;
                 }
             }

@@ -116,7 +116,8 @@ impl RunSummary {
                     Some((g["group"].as_str()?, methods.last()?, skinning))
                 })
                 .collect();
-            let totals: Vec<f64> = networks.iter().filter_map(|(_, m, _)| m["total"]["mean"].as_f64()).collect();
+            let totals: Vec<f64> =
+                networks.iter().filter_map(|(_, m, _)| m["total"]["mean"].as_f64()).collect();
             let score = totals.iter().sum::<f64>() / totals.len() as f64;
             if step > 0 && score.is_finite() && self.best_score.is_none_or(|best| score < best) {
                 (self.best_step, self.best_score) = (Some(step), Some(score));
@@ -153,8 +154,13 @@ pub fn find_runs(folder: &Path) -> Vec<RunSummary> {
     if let Some(run) = RunSummary::read(folder) {
         return vec![run];
     }
-    let mut paths: Vec<PathBuf> =
-        std::fs::read_dir(folder).into_iter().flatten().flatten().map(|e| e.path()).filter(|p| p.is_dir()).collect();
+    let mut paths: Vec<PathBuf> = std::fs::read_dir(folder)
+        .into_iter()
+        .flatten()
+        .flatten()
+        .map(|e| e.path())
+        .filter(|p| p.is_dir())
+        .collect();
     paths.sort();
     paths.iter().filter_map(|p| RunSummary::read(p)).collect()
 }

@@ -9,7 +9,8 @@ use std::process::Command;
 fn trained(folder: &Path, name: &str) -> std::path::PathBuf {
     let config = tiny(folder, "");
     let run = folder.join(name);
-    assert!(start(&config, &run, 2).status().unwrap().success());
+    let pictures = ["--set", "output.sample_scenes=1"];
+    assert!(start(&config, &run, 2).args(pictures).status().unwrap().success());
     run
 }
 
@@ -44,7 +45,16 @@ fn the_report_is_whole_and_needs_nothing_else() {
     }
 
     // Every figure is there and has a curve through real numbers.
-    let terms = ["strain", "bending", "gravity", "body_collision", "repulsion", "holding", "layer_collision", "layer_distance"];
+    let terms = [
+        "strain",
+        "bending",
+        "gravity",
+        "body_collision",
+        "repulsion",
+        "holding",
+        "layer_collision",
+        "layer_distance",
+    ];
     for id in terms.iter().copied().chain(["loss", "grad_norm", "lr"]) {
         let start = html.find(&format!("<figure id=\"chart-{id}\">")).unwrap_or_else(|| panic!("{id}"));
         let figure = &html[start..start + html[start..].find("</figure>").unwrap()];
@@ -57,7 +67,15 @@ fn the_report_is_whole_and_needs_nothing_else() {
     assert!(html.matches("class=\"part").count() >= 10);
     let picture = html.split("data:image/png;base64,").nth(1).expect("a sample").split('"').next().unwrap();
     assert!(picture.starts_with("iVBORw0KGgo") && picture.len() > 10_000);
-    for words in ["finished", "60 of 60", "CC0-1.0", "siren_width = 16", "Validation after step 60", "LBS of rest", "peak memory"] {
+    for words in [
+        "finished",
+        "60 of 60",
+        "CC0-1.0",
+        "siren_width = 16",
+        "Validation after step 60",
+        "LBS of rest",
+        "peak memory",
+    ] {
         assert!(html.contains(words), "{words}");
     }
     assert!(!html.contains("http-equiv"), "a finished page does not look for news");
@@ -104,7 +122,9 @@ fn away_from_a_terminal_there_are_plain_lines_and_quiet_is_quiet() {
     };
     let plain = run("plain", &[], "warn");
     assert!(!plain.contains('\u{1b}') && !plain.contains('\r'), "{plain:?}");
-    for words in ["run folder", "memory: about", "stage untangling: 20 steps from step 20", "finished after step 60"] {
+    for words in
+        ["run folder", "memory: about", "stage untangling: 20 steps from step 20", "finished after step 60"]
+    {
         assert!(plain.contains(words), "{words}: {plain}");
     }
     assert_eq!(run("quiet", &["--quiet"], "error"), "");
@@ -122,7 +142,14 @@ fn the_schema_is_json_and_the_plan_names_its_stages() {
     let path = config.display().to_string();
     let plan = clothcombo(&["config", "check", &path, "--timed-steps", "2"]);
     let text = String::from_utf8(plan.stdout).unwrap();
-    for words in ["60 steps", "\"untangling\": 20 steps, 20 to 40", "0 → 1 (0–50 %)", "2 to 3", "ms/step", "layer_distance"] {
+    for words in [
+        "60 steps",
+        "\"untangling\": 20 steps, 20 to 40",
+        "0 → 1 (0–50 %)",
+        "2 to 3",
+        "ms/step",
+        "layer_distance",
+    ] {
         assert!(text.contains(words), "{words}: {text}");
     }
     std::fs::write(&config, "seed = 1\nstagse = []\n").unwrap();

@@ -94,6 +94,7 @@ impl Checkpoint {
             atomic::write(&folder.join("best"), name.as_bytes()).map_err(io_failed)?;
         }
         retention::prune(&folder, &config.output, state.step, best).map_err(io_failed)?;
+        tracing::info!("checkpoint {} written", path.display());
         Ok(Self { path, state })
     }
 
@@ -124,7 +125,8 @@ impl Checkpoint {
     fn open_folder(folder: &Path) -> Result<Self, CheckpointError> {
         let unusable = |reason: String| CheckpointError::Unusable { path: folder.to_owned(), reason };
         let bytes = fs::read(folder.join(STATE)).map_err(|e| unusable(format!("{STATE}: {e}")))?;
-        let text = String::from_utf8(bytes).map_err(|_| unusable(format!("{STATE} is damaged: it is no text")))?;
+        let text =
+            String::from_utf8(bytes).map_err(|_| unusable(format!("{STATE} is damaged: it is no text")))?;
         let state = CheckpointState::read(&text).map_err(|what| unusable(format!("{STATE} {what}")))?;
         if let Some(missing) = REQUIRED.iter().find(|f| !state.checksums.contains_key(**f)) {
             return Err(unusable(format!("{STATE} has no checksum of {missing}")));
@@ -172,7 +174,12 @@ impl Checkpoint {
         kept.then(|| self.read_model(AVERAGE, config, device)).transpose()
     }
 
-    fn read_model(&self, file: &str, config: &Config, device: &Device) -> Result<ClothCombo, CheckpointError> {
+    fn read_model(
+        &self,
+        file: &str,
+        config: &Config,
+        device: &Device,
+    ) -> Result<ClothCombo, CheckpointError> {
         let unusable = |reason: String| CheckpointError::Unusable { path: self.path.clone(), reason };
         let record = ModuleRecord::load(self.path.join(file)).map_err(|e| unusable(e.to_string()))?;
         ClothCombo::new(&config.model, &self.state.dimensions(), device)

@@ -92,9 +92,13 @@ impl CheckpointState {
             // A sealed text whose version was damaged has keys that version 1 does not know.
             Some(version) if version == u64::from(UNSEALED) && tree.get("seal").is_none() => {}
             Some(version) => {
-                return Err(format!("has version {version}, this program reads versions {UNSEALED} and {FORMAT}"));
+                return Err(format!(
+                    "has version {version}, this program reads versions {UNSEALED} and {FORMAT}"
+                ));
             }
-            None => return Err(format!("has no version, this program reads versions {UNSEALED} and {FORMAT}")),
+            None => {
+                return Err(format!("has no version, this program reads versions {UNSEALED} and {FORMAT}"));
+            }
         }
         serde_json::from_value(tree).map_err(damaged)
     }

@@ -84,8 +84,13 @@ fn print_plan(config: &Config) {
         println!("  {:<16} {}", term.name(), config.losses.weight(term));
     }
     let o = &config.optimizer;
-    println!("\nAdam {} {} · gradient norm clipped at {} · average of the weights {}", o.beta_1, o.beta_2, o.clip_norm,
-        if o.ema_decay > 0.0 { format!("with decay {}", o.ema_decay) } else { "none".into() });
+    println!(
+        "\nAdam {} {} · gradient norm clipped at {} · average of the weights {}",
+        o.beta_1,
+        o.beta_2,
+        o.clip_norm,
+        if o.ema_decay > 0.0 { format!("with decay {}", o.ema_decay) } else { "none".into() }
+    );
 }
 
 fn trains(trains: Trains) -> &'static str {
@@ -100,7 +105,9 @@ fn layers(stage: &StageConfig) -> String {
     let [low, high] = stage.layers;
     let range = if low == high { format!("{low}") } else { format!("{low} to {high}") };
     match stage.layer_curriculum {
-        c if c > 0.0 && low < high => format!("{range}, the most reached after {:.0} % of the stage", 100.0 * c),
+        c if c > 0.0 && low < high => {
+            format!("{range}, the most reached after {:.0} % of the stage", 100.0 * c)
+        }
         _ => range,
     }
 }
@@ -122,12 +129,25 @@ fn step(stage: &StageConfig) -> String {
 }
 
 fn print_times(config: &Config, times: &[StageTime]) {
-    println!("\nestimated time on this machine ({} timed steps per stage)", times.first().map_or(0, |t| t.steps));
+    println!(
+        "\nestimated time on this machine ({} timed steps per stage)",
+        times.first().map_or(0, |t| t.steps)
+    );
     let mut total = 0.0;
     for (stage, time) in config.stages.iter().zip(times) {
         let seconds = time.seconds_per_step * stage.steps as f64;
         total += seconds;
-        println!("  {:<24} {:>9.1} ms/step {:>14}", stage.name, 1000.0 * time.seconds_per_step, duration(seconds));
+        println!(
+            "  {:<24} {:>9.1} ms/step {:>14}",
+            stage.name,
+            1000.0 * time.seconds_per_step,
+            duration(seconds)
+        );
     }
-    println!("  {:<24} {:>17} {:>14} (validation, pictures and checkpoints not counted)", "all", "", duration(total));
+    println!(
+        "  {:<24} {:>17} {:>14} (validation, pictures and checkpoints not counted)",
+        "together",
+        "",
+        duration(total)
+    );
 }

@@ -7,9 +7,11 @@ use std::path::PathBuf;
 
 /// Compares training runs in a table: state, progress, losses, best validation
 #[derive(Parser)]
-#[command(after_help = "Examples:\n  clothcombo runs\n  clothcombo runs experiments --sort score\n  clothcombo runs --json\n\n\
+#[command(
+    after_help = "Examples:\n  clothcombo runs\n  clothcombo runs experiments --sort score\n  clothcombo runs --json\n\n\
         loss and ms/step are medians of the last 100 logged steps; score is the mean total loss of the networks at the best \
-        validation; strain × compares them with skinning alone at the last one.")]
+        validation; strain × compares them with skinning alone at the last one."
+)]
 pub struct Arguments {
     /// A folder of runs, or one run
     #[arg(value_name = "DIR", default_value = "runs")]
@@ -54,8 +56,19 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let width = runs.iter().map(|r| r.name.chars().count()).max().unwrap_or(0).clamp(3, 32);
     println!(
         "{:<width$} {:<9} {:>17} {:<18} {:>9} {:>8} {:>9} {:>9} {:>8} {:>8} {:>8} {:>7} {:>10}",
-        "run", "state", "step", "stage", "loss", "ms/step", "score", "at step", "strain ×", "inside %", "wrong %",
-        "skipped", "checkpoint"
+        "run",
+        "state",
+        "step",
+        "stage",
+        "loss",
+        "ms/step",
+        "score",
+        "at step",
+        "strain ×",
+        "inside %",
+        "wrong %",
+        "skipped",
+        "checkpoint"
     );
     for run in &runs {
         println!("{}", row(run, width));

@@ -6,7 +6,8 @@ use crate::device::Backend;
 use crate::event::Observer;
 use crate::memory::MemoryEstimate;
 use crate::observer::{
-    CurvesObserver, History, HistoryObserver, MetricsObserver, ProgressObserver, ReportObserver, TensorBoardObserver,
+    CurvesObserver, History, HistoryObserver, MetricsObserver, ProgressObserver, ReportObserver,
+    TensorBoardObserver,
 };
 use crate::report::gibibytes;
 use crate::run_dir::RunDir;

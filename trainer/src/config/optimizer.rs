@@ -42,10 +42,18 @@ impl OptimizerConfig {
             );
         }
         if !(self.clip_norm.is_finite() && self.clip_norm >= 0.0) {
-            return says("optimizer.clip_norm", "is not a norm", "the paper uses 1.0; 0 switches clipping off");
+            return says(
+                "optimizer.clip_norm",
+                "is not a norm",
+                "the paper uses 1.0; 0 switches clipping off",
+            );
         }
         if !(0.0..1.0).contains(&self.ema_decay) {
-            return says("optimizer.ema_decay", "does not lie in [0, 1)", "for example 0.999; 0 keeps no average");
+            return says(
+                "optimizer.ema_decay",
+                "does not lie in [0, 1)",
+                "for example 0.999; 0 keeps no average",
+            );
         }
         None
     }

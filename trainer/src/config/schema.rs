@@ -46,7 +46,14 @@ mod tests {
     #[test]
     fn the_schema_knows_the_keys_that_serde_knows() {
         let text = schema().to_string();
-        for key in ["layer_curriculum", "ema_decay", "spike_factor", "max_self_intersection", "siren_width", "t_shirt"] {
+        for key in [
+            "layer_curriculum",
+            "ema_decay",
+            "spike_factor",
+            "max_self_intersection",
+            "siren_width",
+            "t_shirt",
+        ] {
             assert!(text.contains(key), "{key}");
         }
     }

@@ -126,7 +126,8 @@ impl History {
 /// [`ValidationReport::score`](crate::evaluate::ValidationReport::score) of a line of the log.
 fn score(report: &Value) -> Option<f64> {
     let groups = report["groups"].as_array()?.iter();
-    let totals: Vec<f64> = groups.filter_map(|g| g["methods"].as_array()?.last()?["total"]["mean"].as_f64()).collect();
+    let totals: Vec<f64> =
+        groups.filter_map(|g| g["methods"].as_array()?.last()?["total"]["mean"].as_f64()).collect();
     (!totals.is_empty()).then(|| totals.iter().sum::<f64>() / totals.len() as f64)
 }
 

@@ -91,7 +91,9 @@ impl Observer for ReportObserver {
             TrainEvent::Step(_) if self.every.is_some_and(|every| self.written.elapsed() >= every) => {
                 self.write(RunState::Running)
             }
-            TrainEvent::Validated { .. } | TrainEvent::CheckpointSaved { .. } => self.write(RunState::Running),
+            TrainEvent::Validated { .. } | TrainEvent::CheckpointSaved { .. } => {
+                self.write(RunState::Running)
+            }
             TrainEvent::Interrupted { .. } => self.write(RunState::Interrupted),
             TrainEvent::GaveUp { .. } => self.write(RunState::GaveUp),
             TrainEvent::Finished { .. } => self.write(RunState::Finished),

@@ -168,7 +168,8 @@ impl TensorBoardObserver {
             std::fs::create_dir_all(&folder)?;
             EventFile::begin(BufWriter::new(File::create(&path)?), step + 1)
         };
-        let events = begin().into_diagnostic().wrap_err_with(|| format!("cannot write {}", path.display()))?;
+        let events =
+            begin().into_diagnostic().wrap_err_with(|| format!("cannot write {}", path.display()))?;
         Ok(Self { path, events, every, step })
     }
 

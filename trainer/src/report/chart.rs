@@ -54,8 +54,9 @@ pub fn curve(curve: &Curve, stages: &[StageBoundary], total_steps: f64) -> Strin
         let [[x0, y0], [x1, _]] = [place(0.0, baseline), place(total_steps, baseline)];
         let _ = write!(svg, r#"<path class="baseline" d="M{x0:.1} {y0:.1}H{x1:.1}"/>"#);
     }
-    let _ = write!(svg, r#"<path class="curve" d="{}"/>"#, path(bins.iter().map(|b| place(b.step, b.median))));
-    let latest = bins.last().map_or_else(|| "no data".into(), |b| number_text(b.median, 3));
+    let _ =
+        write!(svg, r#"<path class="curve" d="{}"/>"#, path(bins.iter().map(|b| place(b.step, b.median))));
+    let latest = latest(curve.points).map_or_else(|| "no data".into(), |v| number_text(v, 3));
     let baseline = match curve.baseline {
         Some(value) => format!(r#" <small class="lbs">LBS {}</small>"#, number_text(value, 3)),
         None => String::new(),
@@ -83,10 +84,13 @@ pub fn stacked(
         }
         sums.iter_mut().zip(&layer).for_each(|(sum, b)| sum.median += b.median);
         areas.push((sums.clone(), below));
-        latest.push((*name, layer.last().map_or(0.0, |b| b.median)));
+        latest.push((*name, self::latest(points).unwrap_or(0.0)));
     }
     let top = sums.iter().map(|b| b.median).fold(0.0, f64::max);
-    let (x, y) = (Axis::linear(0.0, total_steps.max(1.0)), Axis::linear(0.0, if top > 0.0 { 1.07 * top } else { 1.0 }));
+    let (x, y) = (
+        Axis::linear(0.0, total_steps.max(1.0)),
+        Axis::linear(0.0, if top > 0.0 { 1.07 * top } else { 1.0 }),
+    );
     let mut svg = frame(&x, &y, stages);
     for (i, (above, below)) in areas.iter().enumerate() {
         let upper = above.iter().map(|b| place(&x, &y, b.step, b.median));
@@ -95,14 +99,19 @@ pub fn stacked(
             false => below.iter().map(|b| place(&x, &y, b.step, b.median)).collect(),
         };
         if !above.is_empty() {
-            let _ = write!(svg, r#"<path class="part{i}" d="{}Z"/>"#, path(upper.chain(lower.into_iter().rev())));
+            let _ =
+                write!(svg, r#"<path class="part{i}" d="{}Z"/>"#, path(upper.chain(lower.into_iter().rev())));
         }
     }
     let legend: String = latest
         .iter()
         .enumerate()
         .map(|(i, (name, value))| {
-            format!(r#"<span class="key"><i class="part{i}"></i>{} {}</span> "#, escape(name), number_text(*value, 3))
+            format!(
+                r#"<span class="key"><i class="part{i}"></i>{} {}</span> "#,
+                escape(name),
+                number_text(*value, 3)
+            )
         })
         .collect();
     figure(id, title, unit, &legend, &svg)
@@ -166,11 +175,21 @@ fn path(points: impl Iterator<Item = [f64; 2]>) -> String {
     out
 }
 
+/// Where the curve is now: the median of its last fortieth, twenty points at least.
+fn latest(points: &[(f64, f64)]) -> Option<f64> {
+    let count = (points.len() / 40).max(20);
+    let last = &points[points.len().saturating_sub(count)..];
+    let mut values: Vec<f64> = last.iter().map(|p| p.1).filter(|v| v.is_finite()).collect();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
 /// The points in up to [`BINS`] equal parts of the run; values that are not finite are left out.
 fn bins(points: &[(f64, f64)], total_steps: f64) -> Vec<Bin> {
     let width = (total_steps / BINS as f64).max(1.0);
     let part = |step: f64| (step / width) as usize;
-    let finite: Vec<(f64, f64)> = points.iter().copied().filter(|p| p.0.is_finite() && p.1.is_finite()).collect();
+    let finite: Vec<(f64, f64)> =
+        points.iter().copied().filter(|p| p.0.is_finite() && p.1.is_finite()).collect();
     finite
         .chunk_by(|a, b| part(a.0) == part(b.0))
         .map(|chunk| {

@@ -93,7 +93,7 @@ impl Page<'_> {
         out.push_str(&self.licence_list());
         let _ = write!(
             out,
-            "<section id=\"config\"><h2>Configuration</h2><details open><summary>every value used</summary><pre>{}</pre></details></section>\n",
+            "<section id=\"config\"><h2>Configuration</h2><details><summary>every value used</summary><pre>{}</pre></details></section>\n",
             escape(self.config)
         );
         out.push_str("</body></html>\n");
@@ -121,11 +121,14 @@ impl Page<'_> {
         tiles.push(("skipped steps", self.history.skipped.len().to_string()));
         tiles.push(("gradient spikes", self.history.spikes.len().to_string()));
         if let Some(peak) = self.peak {
-            let estimated = self.memory.map(|m| format!(" (estimated {})", gibibytes(m.peak))).unwrap_or_default();
+            let estimated =
+                self.memory.map(|m| format!(" (estimated {})", gibibytes(m.peak))).unwrap_or_default();
             tiles.push(("peak memory", format!("{}{estimated}", gibibytes(peak))));
         }
-        let tiles: String =
-            tiles.iter().map(|(name, value)| format!("<div class=\"tile\"><small>{name}</small><b>{value}</b></div>")).collect();
+        let tiles: String = tiles
+            .iter()
+            .map(|(name, value)| format!("<div class=\"tile\"><small>{name}</small><b>{value}</b></div>"))
+            .collect();
         format!(
             "<header><h1>{} <span class=\"state {}\">{}</span></h1><p>as of {}</p>\
                 <div class=\"bar\"><i style=\"width:{percent:.1}%\"></i></div><div class=\"tiles\">{tiles}</div></header>\n",
@@ -165,7 +168,8 @@ impl Page<'_> {
         let milliseconds = |name: &str| -> Vec<(f64, f64)> {
             self.history.points(name).iter().map(|(step, s)| (*step, 1000.0 * s)).collect()
         };
-        let parts = ["wait_seconds", "forward_seconds", "backward_seconds", "update_seconds"].map(milliseconds);
+        let parts =
+            ["wait_seconds", "forward_seconds", "backward_seconds", "update_seconds"].map(milliseconds);
         let rest = milliseconds("seconds").into_iter().enumerate().map(|(i, (step, whole))| {
             let known: f64 = parts.iter().filter_map(|p| Some(p.get(i)?.1)).sum();
             (step, (whole - known).max(0.0))

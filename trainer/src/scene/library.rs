@@ -134,7 +134,13 @@ impl Library {
         for card in (0..self.wardrobe.len()).map(|i| self.wardrobe.card(i)) {
             numbers(&[card.vertices as u64, u64::from(card.holding), card.name.len() as u64]);
             numbers(&card.name.bytes().map(u64::from).collect::<Vec<_>>());
-            numbers(&[card.bounds.0, card.bounds.1].as_flattened().iter().map(|v| v.to_bits()).collect::<Vec<_>>());
+            numbers(
+                &[card.bounds.0, card.bounds.1]
+                    .as_flattened()
+                    .iter()
+                    .map(|v| v.to_bits())
+                    .collect::<Vec<_>>(),
+            );
         }
         numbers(&[self.body.template.len() as u64, self.body.faces.len() as u64, self.shape_count as u64]);
         numbers(&self.body.template.as_flattened().iter().map(|v| v.to_bits()).collect::<Vec<_>>());

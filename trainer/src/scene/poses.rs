@@ -268,7 +268,8 @@ impl Filter {
 
 /// Every clip is cut into blocks; one block in every `1 / held_out_share`, in the middle of its group, is held out.
 fn split(clips: &[Motion], config: &PoseConfig) -> Frames {
-    let mut frames = Frames { sources: clips.iter().map(|c| c.source.clone()).collect(), ..Frames::default() };
+    let mut frames =
+        Frames { sources: clips.iter().map(|c| c.source.clone()).collect(), ..Frames::default() };
     let group = (1.0 / config.held_out_share).round().max(2.0) as usize;
     for clip in clips {
         if config.held_out_clips.iter().any(|name| clip.name.contains(name.as_str())) {

@@ -6,11 +6,12 @@
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-/// Sixty steps in three stages with a checkpoint every five: every network, up to three layers.
+/// Sixty steps in three stages with a checkpoint every ten: every network, up to three layers.
 pub const TINY: &str = r#"
 seed = 3
 [data]
 body = "mannequin"
+poses = { max_self_intersection = 10.0 }
 [[data.garments]]
 generate = { count = 3, seed = 5, vertices = 200, categories = ["t_shirt", "trousers", "skirt"] }
 [model]
@@ -47,8 +48,8 @@ single_scenes = 2
 layered_scenes = 2
 layers = [2, 3]
 [output]
-checkpoint_every = 5
-sample_scenes = 1
+checkpoint_every = 10
+sample_scenes = 0
 "#;
 
 /// The trainer with `arguments`, on `threads` threads, quiet.
