@@ -21,11 +21,15 @@ enum Verb {
     #[command(subcommand)]
     Bench(cli::bench::Bench),
     Check(cli::check::Arguments),
+    #[command(subcommand)]
+    Config(cli::config::Verb),
     Fit(cli::fit::Arguments),
     Generate(cli::generate::Arguments),
     #[command(subcommand)]
     Import(cli::import::Source),
     Prepare(cli::prepare::Arguments),
+    Replay(cli::replay::Arguments),
+    Runs(cli::runs::Arguments),
     Score(cli::score::Arguments),
 }
 
@@ -35,10 +39,13 @@ fn main() -> ExitCode {
     cli::exit_code(match &arguments.verb {
         Verb::Bench(bench) => cli::bench::run(bench),
         Verb::Check(arguments) => cli::check::run(arguments),
+        Verb::Config(verb) => cli::config::run(verb),
         Verb::Fit(arguments) => cli::fit::run(arguments),
         Verb::Generate(arguments) => cli::generate::run(arguments),
         Verb::Import(source) => cli::import::run(source),
         Verb::Prepare(arguments) => cli::prepare::run(arguments),
+        Verb::Replay(arguments) => cli::replay::run(arguments),
+        Verb::Runs(arguments) => cli::runs::run(arguments),
         Verb::Score(arguments) => cli::score::run(arguments),
     })
 }

@@ -1,4 +1,4 @@
-//! `metrics.jsonl` and `validation.jsonl`: one JSON object per line, flushed with every checkpoint.
+//! `metrics.jsonl` and `validation.jsonl`: one JSON object per line, flushed before every checkpoint.
 
 use crate::event::{Observer, TrainEvent};
 use crate::run_dir::{RunDir, truncate_log};
@@ -62,13 +62,16 @@ impl MetricsObserver {
 impl Observer for MetricsObserver {
     fn observe(&mut self, event: &TrainEvent) -> Result<(), Report> {
         match event {
-            TrainEvent::Step(record) if record.step % self.every == 0 => self.metrics.line(record),
+            TrainEvent::Step(record) if record.step % self.every == 0 || record.skipped => {
+                self.metrics.line(record)
+            }
             TrainEvent::Validated { step, report } => {
                 self.validation.line(&json!({ "step": step, "groups": report.groups }))?;
                 self.validation.flush()
             }
-            TrainEvent::CheckpointSaved { .. }
+            TrainEvent::CheckpointDue { .. }
             | TrainEvent::Interrupted { .. }
+            | TrainEvent::GaveUp { .. }
             | TrainEvent::Finished { .. } => self.metrics.flush(),
             _ => Ok(()),
         }

@@ -5,7 +5,7 @@
 //! is not finite, a face that names no vertex) is left out of the picture: a training run must not end because one
 //! of its samples is ugly.
 
-mod axis;
+pub(crate) mod axis;
 mod canvas;
 mod curves;
 mod font;

@@ -26,6 +26,8 @@ pub struct PreparedBody {
 
 /// A scene ready for a step.
 pub struct PreparedScene {
+    /// What was drawn.
+    pub draw: SceneDraw,
     /// Indices into the wardrobe, inner → outer.
     pub garments: Vec<usize>,
     /// The garments themselves.
@@ -101,7 +103,7 @@ pub fn prepare(
             }
         })
         .collect();
-    Ok(PreparedScene { garments: draw.garments, worn: garments, contacts, bodies })
+    Ok(PreparedScene { garments: draw.garments.clone(), draw, worn: garments, contacts, bodies })
 }
 
 fn contacts(library: &Library, garments: &[usize]) -> Vec<(usize, usize)> {
