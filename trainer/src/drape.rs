@@ -7,9 +7,11 @@ use clothcombo_model::{
     BodyTensors, ClothCombo, Dimensions, Embeddings, GarmentArrays, GarmentEmbedding, GarmentTensors,
     ModelError, OutfitTensors, linear_blend_skinning,
 };
+use clothcombo_physics::operators::SurfaceOperators;
 use miette::Diagnostic;
 use std::cell::RefCell;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 use thiserror::Error;
 
 /// Why a scene cannot be draped.
@@ -53,21 +55,8 @@ impl WardrobeTensors {
         if let Some(tensors) = recent().get(index) {
             return Ok(tensors);
         }
-        let rest: Vec<f32> = garment.garment.rest.positions().iter().flatten().map(|v| *v as f32).collect();
         let operators = self.library.wardrobe.operators(index)?;
-        let tensors = GarmentTensors::new(
-            &GarmentArrays {
-                rest: &rest,
-                mass: &operators.mass,
-                eigenvalues: &operators.eigenvalues,
-                eigenvectors: &operators.eigenvectors,
-                gradient_x_basis: &operators.gradient_x_basis,
-                gradient_y_basis: &operators.gradient_y_basis,
-                skin_weights: &garment.skin_weights,
-            },
-            self.dimensions.joints,
-            &self.device,
-        )?;
+        let tensors = garment_tensors(garment, &operators, &self.dimensions, &self.device)?;
         // Φ, ΦᵀM and both gradient products, and the skin weights.
         let bytes = 4 * (4 * operators.eigenvectors.len() + garment.skin_weights.len());
         recent().insert(index, tensors.clone(), bytes);
@@ -102,9 +91,7 @@ impl WardrobeTensors {
     /// # Errors
     /// When its numbers are not finite.
     pub fn body(&self, body: &PreparedBody) -> Result<(BodyTensors, Tensor<2>), ModelError> {
-        let tensors = BodyTensors::new(&body.shape, &body.pose, &body.bones, &self.dimensions, &self.device)?;
-        let start = TensorData::new(body.start.as_flattened().to_vec(), [body.start.len(), 3]);
-        Ok((tensors, Tensor::from_data(start, &self.device)))
+        body_tensors(body, &self.dimensions, &self.device)
     }
 
     /// Embeds each distinct garment of `scene` once and packs them in its order. `known` keeps embeddings between calls;
@@ -133,6 +120,43 @@ impl WardrobeTensors {
         }
         Ok(model.pack(outfit, &packed)?)
     }
+}
+
+/// The constant tensors of one garment.
+///
+/// # Errors
+/// When its numbers are not finite.
+pub fn garment_tensors(
+    garment: &LibraryGarment,
+    operators: &SurfaceOperators,
+    dimensions: &Dimensions,
+    device: &Device,
+) -> Result<GarmentTensors, ModelError> {
+    let rest: Vec<f32> = garment.garment.rest.positions().iter().flatten().map(|v| *v as f32).collect();
+    let arrays = GarmentArrays {
+        rest: &rest,
+        mass: &operators.mass,
+        eigenvalues: &operators.eigenvalues,
+        eigenvectors: &operators.eigenvectors,
+        gradient_x_basis: &operators.gradient_x_basis,
+        gradient_y_basis: &operators.gradient_y_basis,
+        skin_weights: &garment.skin_weights,
+    };
+    GarmentTensors::new(&arrays, dimensions.joints, device)
+}
+
+/// One body of a scene, and the start positions of the garments on it `[ΣV, 3]`.
+///
+/// # Errors
+/// When its numbers are not finite.
+pub fn body_tensors(
+    body: &PreparedBody,
+    dimensions: &Dimensions,
+    device: &Device,
+) -> Result<(BodyTensors, Tensor<2>), ModelError> {
+    let tensors = BodyTensors::new(&body.shape, &body.pose, &body.bones, dimensions, device)?;
+    let start = TensorData::new(body.start.as_flattened().to_vec(), [body.start.len(), 3]);
+    Ok((tensors, Tensor::from_data(start, device)))
 }
 
 /// The networks ready for inference; garments are embedded once.
@@ -165,12 +189,7 @@ impl<'a> Networks<'a> {
         let embeddings =
             self.tensors.embed(&self.model, scene, &outfit, &mut self.embeddings.borrow_mut())?;
         let (body, start) = self.tensors.body(&scene.bodies[0])?;
-        let single = self.model.drape_single(&outfit, &embeddings, &body, start);
-        let layered = self.model.untangle(&outfit, &embeddings, &single, &body);
-        Ok(NetworkDrape {
-            single: draped(single.canonical, single.posed),
-            layered: draped(layered.canonical, layered.posed),
-        })
+        Ok(drape_on(&self.model, &outfit, &embeddings, &body, start).0)
     }
 
     /// Linear blend skinning of the start state, which has learned nothing.
@@ -197,6 +216,25 @@ impl<'a> Networks<'a> {
         let posed = linear_blend_skinning(start.clone(), outfit.skin_weights, body.bones);
         Ok(draped(start, posed))
     }
+}
+
+/// Lets `model` drape an outfit from `start` on one body; also the time of each of the two phases, until their positions
+/// are on the host.
+pub fn drape_on(
+    model: &ClothCombo,
+    outfit: &OutfitTensors,
+    embeddings: &Embeddings,
+    body: &BodyTensors,
+    start: Tensor<2>,
+) -> (NetworkDrape, [Duration; 2]) {
+    let clock = Instant::now();
+    let tensors = model.drape_single(outfit, embeddings, body, start);
+    let single = draped(tensors.canonical.clone(), tensors.posed.clone());
+    let draping = clock.elapsed();
+    let layered = model.untangle(outfit, embeddings, &tensors, body);
+    let layered = draped(layered.canonical, layered.posed);
+    let untangling = clock.elapsed() - draping;
+    (NetworkDrape { single, layered }, [draping, untangling])
 }
 
 fn draped(canonical: Tensor<2>, posed: Tensor<2>) -> Draped {

@@ -6,6 +6,7 @@ pub mod cli;
 pub mod config;
 pub mod device;
 pub mod drape;
+pub mod draper;
 pub mod estimate;
 pub mod evaluate;
 pub mod event;

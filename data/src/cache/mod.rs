@@ -6,11 +6,13 @@
 //! same bytes. Records are memory-mapped and every array is checked against its own hash when it is read.
 
 mod bindings;
+mod embeddings;
 mod operators;
 mod record;
 mod store;
 
 pub use bindings::{binding_key, body_key, get_binding, get_largest_weights, put_binding};
+pub use embeddings::{StoredEmbedding, embedding_key, get_embedding, put_embedding};
 pub use operators::{get_operators, mesh_key, operators_key, put_operators};
 pub use record::{Array, Record, RecordError};
 pub use store::{ArrayCache, CacheError, Key, KeyBuilder};

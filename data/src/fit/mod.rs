@@ -5,11 +5,13 @@
 mod arm_pose;
 mod clean;
 mod manifold;
+mod placed;
 mod placement;
 mod push_out;
 mod report;
 mod search;
 
+pub use placed::is_on_body;
 pub use placement::{Origin, Placement, Unit, UpAxis};
 pub use report::{BodyContact, Elements, FitReport, Piece, Repair, RepairKind};
 pub use search::Sitting;
@@ -120,12 +122,17 @@ pub struct Fitted {
     pub garment: Garment,
     /// What was assumed, repaired and measured.
     pub report: FitReport,
+    /// For every vertex of the file the vertex it became; `None` for one that was dropped. A vertex that was split became
+    /// several, of which this is the first.
+    pub vertex_of_file: Vec<Option<u32>>,
 }
 
 /// Repaired faces in the file's coordinates, each vertex and face with its number in the file.
 struct Repaired {
     positions: Vec<[f64; 3]>,
     vertex_origin: Vec<u32>,
+    /// The other way round: see [`Fitted::vertex_of_file`].
+    vertex_of_file: Vec<Option<u32>>,
     faces: Vec<[u32; 3]>,
     face_origin: Vec<u32>,
     /// Faces turned so far.
@@ -204,7 +211,8 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
         },
     };
     let source = Provenance::default();
-    Ok(Fitted { garment: Garment { name: String::new(), category, rest, holding, source }, report })
+    let garment = Garment { name: String::new(), category, rest, holding, source };
+    Ok(Fitted { garment, report, vertex_of_file: sheet.vertex_of_file })
 }
 
 impl Repaired {
@@ -258,10 +266,15 @@ fn repair(file: &PolygonMesh) -> Result<Repaired, FitError> {
     let split = split_fans(&welded.positions, &faces, &joined);
 
     let file_vertex = |w: u32| used_vertices[welded.origin[w as usize] as usize];
+    let mut first_of_welded = vec![None; welded.positions.len()];
+    for (v, w) in split.origin.iter().enumerate().rev() {
+        first_of_welded[*w as usize] = Some(v as u32);
+    }
     let mut turned = vec![false; faces.len()];
     turned_faces.iter().for_each(|f| turned[*f as usize] = true);
     let mut sheet = Repaired {
         vertex_origin: split.origin.iter().map(|w| file_vertex(*w)).collect(),
+        vertex_of_file: compact.iter().map(|w| first_of_welded.get(*w as usize).copied().flatten()).collect(),
         positions: split.positions,
         faces: split.faces,
         face_origin,

@@ -34,7 +34,8 @@ pub enum RepairKind {
 }
 
 impl RepairKind {
-    fn text(self) -> &'static str {
+    /// In words.
+    pub fn text(self) -> &'static str {
         match self {
             Self::DroppedIsolatedVertices => "dropped isolated vertices",
             Self::WeldedVertices => "welded duplicate vertices",

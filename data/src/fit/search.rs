@@ -336,6 +336,11 @@ impl<'a> Search<'a> {
         (sitting.cost + facing + arms, sitting)
     }
 
+    /// Whether a garment sits well as it stands, on the body with the first of the arm angles.
+    pub(super) fn sits_well(&self, samples: &Samples) -> bool {
+        self.arms.first().is_some_and(|arm| self.sitting(&samples.0, arm).is_good())
+    }
+
     fn sitting(&self, points: &[[f64; 3]], arm: &ArmPose) -> Sitting {
         let n = points.len().max(1) as f64;
         let mut sitting = Sitting::default();

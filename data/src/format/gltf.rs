@@ -6,6 +6,9 @@
 
 mod buffers;
 mod document;
+mod write;
+
+pub use write::{GlbError, SceneMesh, encode_glb, save_glb};
 
 use super::mesh::{PolygonMesh, check_count};
 use crate::asset::body::transform;

@@ -12,6 +12,7 @@ mod ply;
 mod stl;
 
 pub use bvh::{Bvh, BvhError};
+pub use gltf::{GlbError, SceneMesh, encode_glb, save_glb};
 pub use mat::{MatError, MatFile, MatValue};
 pub use mesh::{MeshFileError, MeshFormat, PolygonMesh, load_mesh, load_tri_mesh};
 pub use npz::{Array, NpzError, NpzFile, NpzWriter};

@@ -192,7 +192,20 @@ pub fn save(
     faces: &[[u32; 3]],
     comments: &[String],
 ) -> Result<(), ObjError> {
-    let mut text = String::new();
+    save_polygons(path, positions, faces.iter().map(|f| f.as_slice()), comments)
+}
+
+/// As [`save`], with polygons of any number of corners (0-based).
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn save_polygons<'a>(
+    path: &Path,
+    positions: &[[f64; 3]],
+    polygons: impl IntoIterator<Item = &'a [u32]>,
+    comments: &[String],
+) -> Result<(), ObjError> {
+    let mut text = String::with_capacity(positions.len() * 64);
     for comment in comments {
         for line in comment.lines() {
             let _ = writeln!(text, "# {line}");
@@ -201,8 +214,12 @@ pub fn save(
     for [x, y, z] in positions {
         let _ = writeln!(text, "v {x:.7} {y:.7} {z:.7}");
     }
-    for f in faces {
-        let _ = writeln!(text, "f {} {} {}", u64::from(f[0]) + 1, u64::from(f[1]) + 1, u64::from(f[2]) + 1);
+    for polygon in polygons {
+        text.push('f');
+        for corner in polygon {
+            let _ = write!(text, " {}", u64::from(*corner) + 1);
+        }
+        text.push('\n');
     }
     atomic::write(path, text.as_bytes()).map_err(|source| ObjError::Io { path: path.into(), source })
 }

@@ -60,6 +60,31 @@ impl<'a> TriangleTree<'a> {
         })
     }
 
+    /// Pairs (face of another mesh, face of this one) that share a point, for some `faces` of the other mesh with `positions`
+    /// and `all_faces`; in ascending order.
+    pub(super) fn pairs_of_faces(
+        &self,
+        positions: &[[f64; 3]],
+        all_faces: &[[u32; 3]],
+        faces: &[u32],
+    ) -> Vec<(u32, u32)> {
+        if self.bvh.is_empty() {
+            return Vec::new();
+        }
+        let mut pairs: Vec<(u32, u32)> = faces
+            .par_iter()
+            .with_min_len(256)
+            .flat_map_iter(|&f| {
+                let bounds = triangle_box(positions, all_faces[f as usize]);
+                bounds
+                    .into_iter()
+                    .flat_map(move |bounds| self.faces_meeting(positions, all_faces[f as usize], bounds, f))
+            })
+            .collect();
+        pairs.sort_unstable();
+        pairs
+    }
+
     /// Pairs of different faces of this mesh, smaller index first, that intersect beyond the vertices they share (see
     /// [`mesh_triangles_intersect`]), in ascending order.
     pub fn self_pairs(&self) -> Vec<(u32, u32)> {
@@ -139,13 +164,13 @@ pub fn self_triangle_pairs(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Vec<(u
 
 /// Every face that is a triangle, with its box.
 fn triangle_boxes(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Vec<(u32, Aabb)> {
-    (0u32..)
-        .zip(faces)
-        .filter_map(|(index, &face)| {
-            let [a, b, c] = corners(positions, face).filter(has_area)?.map(Vector::from_array);
-            Some((index, Aabb::new(a.min(b).min(c), a.max(b).max(c))))
-        })
-        .collect()
+    (0u32..).zip(faces).filter_map(|(index, &face)| Some((index, triangle_box(positions, face)?))).collect()
+}
+
+/// The box of a face, if it is a triangle.
+fn triangle_box(positions: &[[f64; 3]], face: [u32; 3]) -> Option<Aabb> {
+    let [a, b, c] = corners(positions, face).filter(has_area)?.map(Vector::from_array);
+    Some(Aabb::new(a.min(b).min(c), a.max(b).max(c)))
 }
 
 /// Those of `candidates` that `intersect`, in ascending order.

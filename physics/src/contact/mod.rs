@@ -6,6 +6,7 @@ mod intersections;
 mod order;
 mod penetration;
 mod report;
+pub mod resolve;
 #[cfg(test)]
 mod tests;
 mod triangle_pair;

@@ -2,9 +2,11 @@
 
 mod normals;
 pub mod shapes;
+mod stretch;
 mod topology;
 mod tri_mesh;
 
 pub use normals::{face_normal_area, vertex_normals};
+pub use stretch::vertex_stretch;
 pub use topology::{Hinge, Topology};
 pub use tri_mesh::{MeshError, TriMesh};

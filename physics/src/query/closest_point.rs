@@ -76,11 +76,16 @@ impl ClosestPoint {
 
     /// The closest point of the surface; `None` for a query that is not finite or a surface without a face.
     pub fn project(&self, p: [f64; 3]) -> Option<SurfacePoint> {
+        self.project_within(p, f64::INFINITY)
+    }
+
+    /// The same, if it is closer than `reach` (m).
+    pub fn project_within(&self, p: [f64; 3], reach: f64) -> Option<SurfacePoint> {
         if !vec3::is_finite(p) {
             return None;
         }
         let (face, _) = self.bvh.find_best(
-            f64::MAX,
+            (reach * reach).min(f64::MAX),
             |node, _| box_distance_squared(p, node.mins().to_array(), node.maxs().to_array()),
             |face, _| Some(closest_on_triangle(p, self.corners(face)).distance_squared),
         )?;

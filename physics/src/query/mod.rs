@@ -11,5 +11,5 @@ pub(crate) use closest_point::closest_on_triangle;
 pub use closest_point::{ClosestPoint, Feature, SurfacePoint};
 pub use closest_vertex::{KdScalar, VertexIndex};
 pub use surface::{Distance, Gap, Surface};
-pub use union::UnionDistance;
+pub use union::{FaceSide, UnionDistance};
 pub use winding_number::{winding_number, winding_numbers};

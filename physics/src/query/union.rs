@@ -20,10 +20,24 @@ use crate::vec3::{self, add, add_scaled, cross, dot, normalized, scale, sub};
 /// How far outside a triangle the side of its piece is asked for [m].
 const LOOK_OUT: f64 = 1e-8;
 
+/// Where a face of a surface lies, seen from the union of the surface's parts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FaceSide {
+    /// On the boundary of the union.
+    Exposed,
+    /// It crosses another face: partly on the boundary, partly inside.
+    Seam,
+    /// Inside another part.
+    Buried,
+}
+
 /// Closest-point queries on the boundary of the union of a closed surface's parts.
 #[derive(Debug)]
 pub struct UnionDistance {
     kept: ClosestPoint,
+    /// Kept face → face, both among those with finite corners.
+    kept_faces: Vec<u32>,
+    sides: Vec<FaceSide>,
     /// Whether the normals at a kept face and its neighbours tell the side.
     is_sure: Vec<bool>,
     all: Crossings,
@@ -48,16 +62,37 @@ impl UnionDistance {
         for (face, _) in all.faces.iter().zip(&is_exposed).filter(|(_, exposed)| !**exposed) {
             face.iter().for_each(|&v| is_sure_vertex[v as usize] = false);
         }
-        let kept: Vec<[u32; 3]> =
-            (0..all.faces.len()).filter(|&f| is_exposed[f] || is_seam[f]).map(|f| all.faces[f]).collect();
+        let sides: Vec<FaceSide> = is_seam
+            .iter()
+            .zip(&is_exposed)
+            .map(|(seam, exposed)| match (seam, exposed) {
+                (true, _) => FaceSide::Seam,
+                (false, true) => FaceSide::Exposed,
+                (false, false) => FaceSide::Buried,
+            })
+            .collect();
+        let kept_faces: Vec<u32> =
+            (0..all.faces.len() as u32).filter(|&f| sides[f as usize] != FaceSide::Buried).collect();
+        let kept: Vec<[u32; 3]> = kept_faces.iter().map(|&f| all.faces[f as usize]).collect();
         let is_sure = kept.iter().map(|face| face.iter().all(|&v| is_sure_vertex[v as usize])).collect();
         let buried = all.faces.len() - kept.len();
-        Self { kept: ClosestPoint::new(all.positions.clone(), &kept), is_sure, all, buried }
+        let tree = ClosestPoint::new(all.positions.clone(), &kept);
+        Self { kept: tree, kept_faces, sides, is_sure, all, buried }
     }
 
     /// Faces that lie in the inside of the union.
     pub fn buried(&self) -> usize {
         self.buried
+    }
+
+    /// Where every face lies; faces with a corner that is not finite are not counted.
+    pub fn sides(&self) -> &[FaceSide] {
+        &self.sides
+    }
+
+    /// The face that [`SurfacePoint::face`] of [`project`](Self::project) means, numbered as in [`sides`](Self::sides).
+    pub fn kept_face(&self, face: u32) -> u32 {
+        self.kept_faces[face as usize]
     }
 
     /// Queries on the faces that are kept.

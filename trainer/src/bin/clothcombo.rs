@@ -23,6 +23,7 @@ enum Verb {
     Check(cli::check::Arguments),
     #[command(subcommand)]
     Config(cli::config::Verb),
+    Drape(Box<cli::drape::Arguments>),
     Fit(cli::fit::Arguments),
     Generate(cli::generate::Arguments),
     #[command(subcommand)]
@@ -40,6 +41,7 @@ fn main() -> ExitCode {
         Verb::Bench(bench) => cli::bench::run(bench),
         Verb::Check(arguments) => cli::check::run(arguments),
         Verb::Config(verb) => cli::config::run(verb),
+        Verb::Drape(arguments) => cli::drape::run(arguments),
         Verb::Fit(arguments) => cli::fit::run(arguments),
         Verb::Generate(arguments) => cli::generate::run(arguments),
         Verb::Import(source) => cli::import::run(source),

@@ -15,9 +15,11 @@
 mod error;
 mod retention;
 mod state;
+mod trained;
 
 pub use error::CheckpointError;
 pub use state::{Best, CheckpointState};
+pub use trained::TrainedModel;
 
 use crate::config::{Config, load, to_toml};
 use crate::run_dir::RunDir;
@@ -104,40 +106,11 @@ impl Checkpoint {
     /// # Errors
     /// When there is none, or it (or all of them) is damaged or of another version.
     pub fn open(path: &Path) -> Result<Self, CheckpointError> {
-        if path.join(STATE).exists() {
-            return Self::open_folder(path);
-        }
-        let mut first_error = None;
-        for folder in [path.to_owned(), path.join("checkpoints")] {
-            for (_, candidate) in retention::list(&folder).into_iter().rev() {
-                match Self::open_folder(&candidate) {
-                    Ok(checkpoint) => return Ok(checkpoint),
-                    Err(error) => {
-                        tracing::warn!("passed over: {error}");
-                        first_error.get_or_insert(error);
-                    }
-                }
-            }
-        }
-        Err(first_error.unwrap_or_else(|| CheckpointError::Missing { path: path.to_owned() }))
-    }
-
-    fn open_folder(folder: &Path) -> Result<Self, CheckpointError> {
-        let unusable = |reason: String| CheckpointError::Unusable { path: folder.to_owned(), reason };
-        let bytes = fs::read(folder.join(STATE)).map_err(|e| unusable(format!("{STATE}: {e}")))?;
-        let text =
-            String::from_utf8(bytes).map_err(|_| unusable(format!("{STATE} is damaged: it is no text")))?;
-        let state = CheckpointState::read(&text).map_err(|what| unusable(format!("{STATE} {what}")))?;
-        if let Some(missing) = REQUIRED.iter().find(|f| !state.checksums.contains_key(**f)) {
-            return Err(unusable(format!("{STATE} has no checksum of {missing}")));
-        }
-        for (file, expected) in &state.checksums {
-            let sum = checksum(&folder.join(file)).map_err(|e| unusable(format!("{file}: {e}")))?;
-            if sum != *expected {
-                return Err(unusable(format!("{file} does not match its checksum")));
-            }
-        }
-        Ok(Self { path: folder.to_owned(), state })
+        newest(path, |folder| {
+            let state = read_state(folder, &REQUIRED)?;
+            state.checksums.keys().try_for_each(|file| verify(folder, &state, file))?;
+            Ok(Self { path: folder.to_owned(), state })
+        })
     }
 
     /// The configuration of the run it belongs to.
@@ -205,6 +178,49 @@ impl Checkpoint {
     pub fn abandon_later(&self, run: &RunDir) -> Result<usize, CheckpointError> {
         retention::abandon_after(&run.checkpoints(), self.state.step)
             .map_err(|e| CheckpointError::Write { path: run.checkpoints(), reason: e.to_string() })
+    }
+}
+
+/// What `open` makes of a checkpoint folder, or of the newest one in a run or checkpoints folder that it accepts.
+fn newest<T>(path: &Path, open: impl Fn(&Path) -> Result<T, CheckpointError>) -> Result<T, CheckpointError> {
+    if path.join(STATE).exists() {
+        return open(path);
+    }
+    let mut first_error = None;
+    for folder in [path.to_owned(), path.join("checkpoints")] {
+        for (_, candidate) in retention::list(&folder).into_iter().rev() {
+            match open(&candidate) {
+                Ok(found) => return Ok(found),
+                Err(error) => {
+                    tracing::warn!("passed over: {error}");
+                    first_error.get_or_insert(error);
+                }
+            }
+        }
+    }
+    Err(first_error.unwrap_or_else(|| CheckpointError::Missing { path: path.to_owned() }))
+}
+
+/// A checkpoint's `state.json`, which must hold the checksums of `required`.
+fn read_state(folder: &Path, required: &[&str]) -> Result<CheckpointState, CheckpointError> {
+    let unusable = |reason: String| CheckpointError::Unusable { path: folder.to_owned(), reason };
+    let bytes = fs::read(folder.join(STATE)).map_err(|e| unusable(format!("{STATE}: {e}")))?;
+    let text =
+        String::from_utf8(bytes).map_err(|_| unusable(format!("{STATE} is damaged: it is no text")))?;
+    let state = CheckpointState::read(&text).map_err(|what| unusable(format!("{STATE} {what}")))?;
+    match required.iter().find(|f| !state.checksums.contains_key(**f)) {
+        Some(missing) => Err(unusable(format!("{STATE} has no checksum of {missing}"))),
+        None => Ok(state),
+    }
+}
+
+/// Compares `file` with its checksum.
+fn verify(folder: &Path, state: &CheckpointState, file: &str) -> Result<(), CheckpointError> {
+    let unusable = |reason: String| CheckpointError::Unusable { path: folder.to_owned(), reason };
+    let sum = checksum(&folder.join(file)).map_err(|e| unusable(format!("{file}: {e}")))?;
+    match state.checksums.get(file) == Some(&sum) {
+        true => Ok(()),
+        false => Err(unusable(format!("{file} does not match its checksum"))),
     }
 }
 

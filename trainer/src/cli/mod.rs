@@ -3,6 +3,7 @@
 pub mod bench;
 pub mod check;
 pub mod config;
+pub mod drape;
 pub mod fit;
 pub mod generate;
 pub mod import;
@@ -10,11 +11,12 @@ pub mod prepare;
 pub mod replay;
 pub mod runs;
 pub mod score;
+mod table;
 pub mod train;
 mod wardrobe_sheet;
 
-use miette::Report;
-use std::io::IsTerminal;
+use miette::{IntoDiagnostic, Report};
+use std::io::{ErrorKind, IsTerminal, Write};
 use tracing_subscriber::EnvFilter;
 
 /// Log lines on stderr; `RUST_LOG` overrides `default`.
@@ -36,5 +38,14 @@ pub fn exit_code(result: Result<(), Report>) -> std::process::ExitCode {
             eprintln!("{report:?}");
             std::process::ExitCode::FAILURE
         }
+    }
+}
+
+/// Prints `text` to stdout.
+pub(crate) fn print_all(text: &str) -> Result<(), Report> {
+    match std::io::stdout().write_all(text.as_bytes()) {
+        // Whoever reads the output has seen enough.
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
+        written => written.into_diagnostic(),
     }
 }

@@ -1,9 +1,9 @@
 //! `clothcombo score`: anyone's draped meshes, measured.
 
+use super::table::{number, table};
 use crate::score::{MeshFiles, Score, ScoreDistance, TermValues, score_files};
 use clap::Parser;
 use miette::{IntoDiagnostic, Report};
-use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
 
 /// Scores draped garments: energies in the paper's printed form, penetration, exact intersections, layer order
@@ -45,11 +45,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     } else {
         tables(&score)
     };
-    match std::io::stdout().write_all(text.as_bytes()) {
-        // Whoever reads the output has seen enough.
-        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
-        written => written.into_diagnostic(),
-    }
+    super::print_all(&text)
 }
 
 /// Terms of one garment, in the order of the columns.
@@ -123,58 +119,4 @@ fn term_row(name: &str, values: &TermValues, with_sum: bool) -> Vec<String> {
     let value = |term: &&str| values.get(*term).map_or_else(String::new, |v| number(*v));
     let sum = with_sum.then(|| number(values.values().sum()));
     [name.to_owned()].into_iter().chain(TERMS.iter().map(value)).chain(sum).collect()
-}
-
-/// Four significant digits.
-fn number(value: f64) -> String {
-    match value.abs() {
-        0.0 => "0".to_owned(),
-        size if (1e-3..1e5).contains(&size) => {
-            let decimals = (3 - size.log10().floor() as i32).max(0) as usize;
-            format!("{value:.decimals$}")
-        }
-        _ => format!("{value:.3e}"),
-    }
-}
-
-/// Rows under a heading: the first column to the left, the others to the right.
-fn table(head: &[&str], rows: &[Vec<String>]) -> String {
-    let head: Vec<String> = head.iter().map(|cell| (*cell).to_owned()).collect();
-    let lines = || [&head].into_iter().chain(rows);
-    let width = |column: usize| lines().map(|row| row[column].chars().count()).max().unwrap_or(0);
-    let widths: Vec<usize> = (0..head.len()).map(width).collect();
-    let mut text = String::new();
-    for line in lines() {
-        for (column, (cell, width)) in line.iter().zip(&widths).enumerate() {
-            text += &if column == 0 { format!("{cell:<width$}") } else { format!("  {cell:>width$}") };
-        }
-        text.push('\n');
-    }
-    text
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_keep_four_digits() {
-        for (value, text) in [
-            (0.0, "0"),
-            (-0.46312, "-0.4631"),
-            (12345.6, "12346"),
-            (2.17749, "2.177"),
-            (1.5e-9, "1.500e-9"),
-            (0.001, "0.001000"),
-        ] {
-            assert_eq!(number(value), text);
-        }
-    }
-
-    #[test]
-    fn columns_are_aligned() {
-        let owned = |row: &[&str]| row.iter().map(|c| (*c).to_owned()).collect::<Vec<_>>();
-        let text = table(&["raw", "ε [mm]"], &[owned(&["a long name", "1"]), owned(&["b", "12345678"])]);
-        assert_eq!(text, "raw            ε [mm]\na long name         1\nb            12345678\n");
-    }
 }

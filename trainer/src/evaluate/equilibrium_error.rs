@@ -61,7 +61,8 @@ impl ReferenceScene {
         };
         let start = wide(&body.start);
         let mut rest = Vec::with_capacity(start.len());
-        let (mut garments, mut transforms) = (Vec::new(), Vec::with_capacity(start.len()));
+        let transforms = skinning_transforms(scene);
+        let mut garments = Vec::new();
         for (garment, narrow) in scene.worn.iter().zip(&body.energy.garments) {
             let mesh = &garment.garment.rest;
             let energies =
@@ -72,8 +73,6 @@ impl ReferenceScene {
                 weights: narrow.weights,
             });
             rest.extend_from_slice(mesh.positions());
-            let rows = garment.skin_weights.chunks_exact(body.bones.len());
-            transforms.extend(rows.map(|weights| blended(weights, &body.bones)));
         }
         let layers = body.energy.layers.iter();
         let layers =
@@ -234,6 +233,13 @@ fn mean_distance(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
     sum / a.len().max(1) as f64
 }
 
+/// Initial blended skinning transform of every vertex of `scene` on its first body, `[ΣV]`.
+pub(crate) fn skinning_transforms(scene: &PreparedScene) -> Vec<Transform> {
+    let bones = &scene.bodies[0].bones;
+    let rows = scene.worn.iter().flat_map(|garment| garment.skin_weights.chunks_exact(bones.len()));
+    rows.map(|weights| blended(weights, bones)).collect()
+}
+
 fn blended(weights: &[f32], bones: &[Transform]) -> Transform {
     let mut sum = [[0.0; 4]; 3];
     for (weight, bone) in weights.iter().zip(bones) {
@@ -246,6 +252,6 @@ fn blended(weights: &[f32], bones: &[Transform]) -> Transform {
     sum
 }
 
-fn apply(t: &Transform, p: [f64; 3]) -> [f64; 3] {
+pub(crate) fn apply(t: &Transform, p: [f64; 3]) -> [f64; 3] {
     t.map(|[a, b, c, d]| a * p[0] + b * p[1] + c * p[2] + d)
 }

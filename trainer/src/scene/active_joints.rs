@@ -26,6 +26,21 @@ impl ActiveJoints {
         Self { indices, body_joints: joints }
     }
 
+    /// The joints of these names, in this order: those that trained networks see.
+    ///
+    /// # Errors
+    /// The names that `body` has no joint of.
+    pub fn named(body: &Body, names: &[String]) -> Result<Self, Vec<String>> {
+        let find =
+            |name: &String| body.joint_names.iter().position(|n| n == name).ok_or_else(|| name.clone());
+        let (found, missing): (Vec<_>, Vec<_>) = names.iter().map(find).partition(Result::is_ok);
+        if !missing.is_empty() {
+            return Err(missing.into_iter().filter_map(Result::err).collect());
+        }
+        let indices = found.into_iter().filter_map(Result::ok).collect();
+        Ok(Self { indices, body_joints: body.joint_names.len() })
+    }
+
     /// Number of active joints.
     pub fn len(&self) -> usize {
         self.indices.len()

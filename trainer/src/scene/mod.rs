@@ -6,10 +6,12 @@ mod error;
 mod garment;
 mod library;
 mod origin;
+mod pose_features;
 mod poses;
 mod prefetch;
 mod prepare;
 mod recent;
+mod recipe;
 mod split;
 mod wardrobe;
 
@@ -18,9 +20,11 @@ pub use draw::{BodyDraw, Plan, SceneDraw, ValidationGroup, draw_training, draw_v
 pub use error::LibraryError;
 pub use garment::LibraryGarment;
 pub use library::{Library, LicenceLine, load_body};
+pub use origin::{Maker, Origin};
 pub use poses::{PoseLibrary, SelfIntersecting, Unseen};
 pub use prefetch::{Prefetch, prepare_step};
-pub use prepare::{PreparedBody, PreparedScene, prepare};
+pub use prepare::{Dresser, PreparedBody, PreparedScene, can_touch, prepare};
 pub use recent::Recent;
+pub use recipe::Recipe;
 pub use split::{GarmentSplit, SplitNames};
 pub use wardrobe::{Card, Wardrobe};

@@ -2,7 +2,6 @@
 
 use super::error::LibraryError;
 use crate::config::{PoseConfig, PoseEncoding};
-use clothcombo_data::asset::rotation::matrix_from_axis_angle;
 use clothcombo_data::asset::{Body, Motion, Pose, Provenance};
 use clothcombo_data::dataset::load_motion_folder;
 use clothcombo_data::generate::{PoseAugmentation, PoseSampler, SelfContact};
@@ -231,30 +230,12 @@ impl PoseLibrary {
 
     /// Numbers per joint of the pose feature.
     pub fn features_per_joint(&self) -> usize {
-        match self.encoding {
-            PoseEncoding::RotationMatrix => 9,
-            PoseEncoding::AxisAngle => 3,
-        }
+        self.encoding.per_joint()
     }
 
     /// Network input of `pose`: the features of `joints`, in order.
     pub fn features(&self, pose: &Pose, joints: &[usize]) -> Vec<f32> {
-        let mut out = Vec::with_capacity(joints.len() * self.features_per_joint());
-        for &j in joints {
-            let rotation = pose.rotation(j);
-            match self.encoding {
-                PoseEncoding::AxisAngle => out.extend(rotation.map(|v| v as f32)),
-                PoseEncoding::RotationMatrix => {
-                    let matrix = matrix_from_axis_angle(rotation);
-                    for (r, row) in matrix.iter().enumerate() {
-                        for (c, v) in row.iter().enumerate() {
-                            out.push((v - if r == c { 1.0 } else { 0.0 }) as f32);
-                        }
-                    }
-                }
-            }
-        }
-        out
+        self.encoding.features(pose, joints)
     }
 }
 

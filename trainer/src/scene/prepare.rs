@@ -1,11 +1,13 @@
 //! Turns a draw into numbers: posed body, bone transforms, start positions, and the scene's energies.
 
-use super::draw::SceneDraw;
+use super::active_joints::ActiveJoints;
+use super::draw::{BodyDraw, SceneDraw};
 use super::error::LibraryError;
 use super::garment::LibraryGarment;
 use super::library::Library;
 use crate::config::LossesConfig;
 use crate::objective::scene_weights;
+use clothcombo_data::asset::{Body, Pose};
 use clothcombo_physics::energy::{SceneEnergy, SceneGarment, SceneLayers};
 use clothcombo_physics::query::Surface;
 use std::sync::Arc;
@@ -53,66 +55,104 @@ pub fn prepare(
 ) -> Result<PreparedScene, LibraryError> {
     let garments =
         draw.garments.iter().map(|&g| library.wardrobe.garment(g)).collect::<Result<Vec<_>, _>>()?;
-    let contacts = contacts(library, &draw.garments);
-    let bodies = draw
-        .bodies
-        .iter()
-        .map(|body| {
-            let posed = library
-                .body
-                .posed(&body.shape, &body.pose)
-                .expect("drawn shapes and poses have the body's own dimensions");
-            let surface = Surface::new(
-                posed.positions.iter().map(|p| p.map(|v| v as f32)).collect(),
-                library.body.faces.clone(),
-            );
-            let bones = library.joints().indices.iter().map(|&j| posed.bones[j]);
-            let starts: Vec<Vec<[f32; 3]>> =
-                garments.iter().map(|g| g.start_positions(&body.shape)).collect();
-            let counts: Vec<usize> = garments.iter().map(|g| g.vertex_count()).collect();
-            let weights = scene_weights(losses, run_progress, &counts, &contacts);
-            let scene_garments = garments
-                .iter()
-                .zip(&starts)
-                .zip(weights.garments)
-                .map(|((g, start), weights)| SceneGarment {
-                    energies: g.energies.clone(),
-                    holding_reference: match losses.holding.relative {
-                        true => start.clone(),
-                        false => g.garment.rest.positions().iter().map(|p| p.map(|v| v as f32)).collect(),
-                    },
-                    weights,
-                })
-                .collect();
-            let layers = contacts
-                .iter()
-                .zip(weights.layers)
-                .map(|(&(inner, outer), weights)| SceneLayers { inner, outer, weights })
-                .collect();
-            PreparedBody {
-                shape: body.shape.iter().map(|v| *v as f32).collect(),
-                pose: library.poses.features(&body.pose, &library.joints().indices),
-                bones: bones.collect(),
-                start: starts.concat(),
-                energy: Arc::new(SceneEnergy {
-                    body: Arc::new(surface),
-                    garments: scene_garments,
-                    layers,
-                    settings: losses.energy_settings(),
-                }),
-            }
-        })
-        .collect();
-    Ok(PreparedScene { garments: draw.garments.clone(), draw, worn: garments, contacts, bodies })
+    let dresser = Dresser {
+        body: &library.body,
+        joints: library.joints(),
+        features: &|pose, joints| library.poses.features(pose, joints),
+        losses,
+    };
+    Ok(dresser.dress(draw.garments, garments, &draw.bodies, run_progress))
 }
 
-fn contacts(library: &Library, garments: &[usize]) -> Vec<(usize, usize)> {
-    let boxes: Vec<_> = garments.iter().map(|&g| library.wardrobe.card(g).bounds).collect();
-    let touch = |a: usize, b: usize| {
-        (0..3).all(|k| {
-            boxes[a].0[k] - CONTACT_MARGIN <= boxes[b].1[k] && boxes[b].0[k] - CONTACT_MARGIN <= boxes[a].1[k]
-        })
-    };
+/// Everything but the garments and the bodies that a scene is prepared with.
+pub struct Dresser<'a> {
+    /// The body model.
+    pub body: &'a Body,
+    /// The joints the networks see.
+    pub joints: &'a ActiveJoints,
+    /// Network input of a pose for some joints.
+    pub features: &'a (dyn Fn(&Pose, &[usize]) -> Vec<f32> + Sync),
+    /// The losses.
+    pub losses: &'a LossesConfig,
+}
+
+impl Dresser<'_> {
+    /// Prepares garments (`numbers` are theirs in a wardrobe) on bodies; loss weights are taken at `run_progress`.
+    ///
+    /// # Panics
+    /// If a shape or pose is longer than the body allows.
+    pub fn dress(
+        &self,
+        numbers: Vec<usize>,
+        worn: Vec<Arc<LibraryGarment>>,
+        bodies: &[BodyDraw],
+        run_progress: f64,
+    ) -> PreparedScene {
+        let contacts = contacts(&worn);
+        let prepared = bodies.iter().map(|body| self.on_body(&worn, &contacts, body, run_progress)).collect();
+        let draw = SceneDraw { garments: numbers.clone(), bodies: bodies.to_vec() };
+        PreparedScene { draw, garments: numbers, worn, contacts, bodies: prepared }
+    }
+
+    fn on_body(
+        &self,
+        garments: &[Arc<LibraryGarment>],
+        contacts: &[(usize, usize)],
+        body: &BodyDraw,
+        run_progress: f64,
+    ) -> PreparedBody {
+        let Self { losses, .. } = self;
+        let posed = self.body.posed(&body.shape, &body.pose);
+        let posed = posed.expect("shapes and poses have the body's own dimensions");
+        let surface = Surface::new(
+            posed.positions.iter().map(|p| p.map(|v| v as f32)).collect(),
+            self.body.faces.clone(),
+        );
+        let bones = self.joints.indices.iter().map(|&j| posed.bones[j]);
+        let starts: Vec<Vec<[f32; 3]>> = garments.iter().map(|g| g.start_positions(&body.shape)).collect();
+        let counts: Vec<usize> = garments.iter().map(|g| g.vertex_count()).collect();
+        let weights = scene_weights(losses, run_progress, &counts, contacts);
+        let scene_garments = garments
+            .iter()
+            .zip(&starts)
+            .zip(weights.garments)
+            .map(|((g, start), weights)| SceneGarment {
+                energies: g.energies.clone(),
+                holding_reference: match losses.holding.relative {
+                    true => start.clone(),
+                    false => g.garment.rest.positions().iter().map(|p| p.map(|v| v as f32)).collect(),
+                },
+                weights,
+            })
+            .collect();
+        let layers = contacts
+            .iter()
+            .zip(weights.layers)
+            .map(|(&(inner, outer), weights)| SceneLayers { inner, outer, weights })
+            .collect();
+        PreparedBody {
+            shape: body.shape.iter().map(|v| *v as f32).collect(),
+            pose: (self.features)(&body.pose, &self.joints.indices),
+            bones: bones.collect(),
+            start: starts.concat(),
+            energy: Arc::new(SceneEnergy {
+                body: Arc::new(surface),
+                garments: scene_garments,
+                layers,
+                settings: losses.energy_settings(),
+            }),
+        }
+    }
+}
+
+/// Pairs of garments that can touch.
+fn contacts(garments: &[Arc<LibraryGarment>]) -> Vec<(usize, usize)> {
     let pairs = (0..garments.len()).flat_map(|i| (i + 1..garments.len()).map(move |j| (i, j)));
-    pairs.filter(|&(i, j)| touch(i, j)).collect()
+    pairs.filter(|&(i, j)| can_touch(&garments[i], &garments[j])).collect()
+}
+
+/// Whether the rest boxes of two garments are near enough for them ever to touch.
+pub fn can_touch(a: &LibraryGarment, b: &LibraryGarment) -> bool {
+    let [(a_low, a_high), (b_low, b_high)] = [a, b].map(|g| g.garment.rest.bounds());
+    (0..3).all(|k| a_low[k] - CONTACT_MARGIN <= b_high[k] && b_low[k] - CONTACT_MARGIN <= a_high[k])
 }

@@ -9,14 +9,13 @@ use super::error::LibraryError;
 use super::garment::LibraryGarment;
 use super::origin::{Maker, Origin};
 use super::recent::Recent;
+use super::recipe::Recipe;
 use crate::config::Config;
-use clothcombo_data::asset::{Binding, BindingSettings, Body, Category, Garment, Provenance};
+use clothcombo_data::asset::{Binding, Body, Category, Garment, Provenance};
 use clothcombo_data::cache::{
     ArrayCache, Key, binding_key, body_key, get_binding, get_largest_weights, get_operators, mesh_key,
     operators_key, put_binding, put_operators,
 };
-use clothcombo_physics::energy::{EnergySettings, GarmentEnergies};
-use clothcombo_physics::mesh::{Topology, TriMesh};
 use clothcombo_physics::operators::SurfaceOperators;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -64,15 +63,6 @@ struct Streamed {
     recent: Mutex<Recent<Arc<LibraryGarment>>>,
     origins: Vec<Origin>,
     recipe: Recipe,
-}
-
-/// How a rest mesh becomes a [`LibraryGarment`].
-#[derive(Clone)]
-struct Recipe {
-    body: Arc<Body>,
-    binding: BindingSettings,
-    energy: EnergySettings,
-    eigen_count: usize,
 }
 
 /// What the first pass over a garment leaves.
@@ -223,48 +213,6 @@ impl Streamed {
 
     fn lost(&self, card: &Card) -> LibraryError {
         LibraryError::Vanished { name: card.name.clone(), cache: self.cache.root().into() }
-    }
-}
-
-impl Recipe {
-    fn new(config: &Config, body: Arc<Body>) -> Self {
-        let start = &config.start;
-        Self {
-            body,
-            binding: BindingSettings {
-                smoothing_iterations: start.smoothing_iterations,
-                skirt_smoothing_iterations: start.skirt_smoothing_iterations,
-                smooth: start.smooth_weights,
-                shape_transfer: start.shape_transfer,
-            },
-            energy: config.losses.energy_settings(),
-            eigen_count: config.model.eigen_count,
-        }
-    }
-
-    fn operators(&self, name: &str, rest: &TriMesh) -> Result<SurfaceOperators, LibraryError> {
-        SurfaceOperators::new(rest, self.eigen_count)
-            .map_err(|e| LibraryError::Garment { name: name.to_owned(), reason: e.to_string() })
-    }
-
-    fn finish(
-        &self,
-        garment: Garment,
-        binding: Binding,
-        joints: &ActiveJoints,
-    ) -> Result<LibraryGarment, LibraryError> {
-        let topology = Topology::new(&garment.rest);
-        let energies = GarmentEnergies::new(&garment.rest, &topology, &self.energy, garment.holding)
-            .map_err(|e| LibraryError::Garment { name: garment.name.clone(), reason: e.to_string() })?;
-        let skin_weights = joints.restrict(&binding.skin_weights);
-        Ok(LibraryGarment {
-            joint_mask: joints.mask(&skin_weights),
-            skin_weights,
-            shape_stride: self.body.shape_count,
-            shape_directions: binding.shape_directions,
-            energies: Arc::new(energies),
-            garment,
-        })
     }
 }
 

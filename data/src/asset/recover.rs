@@ -1,0 +1,352 @@
+//! Shape and pose of a body from a posed mesh of its vertices, with or without the same body in T-pose.
+//!
+//! The shape is the linear least-squares solution on the T-pose (given, or found by undoing the skinning with the bones of the
+//! round before). The bones are found by block coordinate descent on the distance to linear blend skinning: each bone in turn
+//! gets the rotation and translation that fit best what the others leave of its vertices. The rotation of a covariance is
+//! taken by the iteration of Müller, Bender, Chentanez and Macklin, "A robust method to extract the rotational part of
+//! deformations" (MIG 2016).
+
+use super::body::{Body, BodyError, transform, unskin};
+use super::pose::Pose;
+use super::rotation::{Matrix3, apply, axis_angle_from_matrix, matrix_from_axis_angle, product, transpose};
+use clothcombo_physics::vec3::{add, add_scaled, cross, dot, norm, scale, sub};
+use faer::linalg::solvers::Solve;
+use faer::{Mat, Side};
+use thiserror::Error;
+
+/// A mesh whose vertices are farther from the recovered body than this on average is no pose of it [m].
+const FARTHEST: f64 = 0.03;
+/// Rounds over all bones.
+const ROUNDS: usize = 30;
+/// Rounds of shape and bones in turn, where there is no T-pose.
+const OUTER_ROUNDS: usize = 10;
+/// Bones have no say on vertices they carry less of than this.
+const LEAST_WEIGHT: f64 = 0.05;
+/// Weight of small shape numbers against close vertices [m²]: decides only what the vertices leave open.
+const RIDGE: f64 = 1e-7;
+
+/// A body recovered from its vertices.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecoveredBody {
+    /// Shape parameters β `[K]`.
+    pub shape: Vec<f64>,
+    /// Pose θ `[J]`.
+    pub pose: Pose,
+    /// Where its pelvis stands [m].
+    pub place: [f64; 3],
+    /// Mean distance of the recovered vertices to the given ones [m].
+    pub mean_distance: f64,
+}
+
+/// Why no body is recovered.
+#[derive(Debug, Error)]
+pub enum RecoverError {
+    /// Another mesh.
+    #[error("the {which} mesh has {found} vertices, body '{body}' has {expected}")]
+    Vertices {
+        /// Which of the meshes.
+        which: &'static str,
+        /// Its vertices.
+        found: usize,
+        /// The body.
+        body: String,
+        /// Its vertices.
+        expected: usize,
+    },
+    /// A coordinate is NaN or infinite.
+    #[error("vertex {vertex} of the {which} mesh is not finite")]
+    NotFinite {
+        /// Which of the meshes.
+        which: &'static str,
+        /// The vertex.
+        vertex: usize,
+    },
+    /// The vertices are not those of this body.
+    #[error(
+        "no pose of body '{body}' comes near it: the vertices stay {:.0} mm away on average", 1e3 * mean_distance
+    )]
+    Far {
+        /// The body.
+        body: String,
+        /// Mean distance [m].
+        mean_distance: f64,
+    },
+    /// The body cannot take the result.
+    #[error(transparent)]
+    Body(#[from] BodyError),
+}
+
+/// A rigid motion.
+#[derive(Clone, Copy)]
+struct Bone {
+    rotation: Matrix3,
+    translation: [f64; 3],
+}
+
+impl Bone {
+    fn rows(&self) -> [[f64; 4]; 3] {
+        std::array::from_fn(|a| {
+            let [x, y, z] = self.rotation[a];
+            [x, y, z, self.translation[a]]
+        })
+    }
+}
+
+/// Recovers shape and pose from `posed` `[V, 3]` [m]. `t_pose` `[V, 3]` [m] is the same body in T-pose, anywhere, if there is
+/// one.
+///
+/// # Errors
+/// [`RecoverError`] if a mesh is not of this body's vertices, or no pose of the body.
+pub fn recover_body(
+    body: &Body,
+    t_pose: Option<&[[f64; 3]]>,
+    posed: &[[f64; 3]],
+) -> Result<RecoveredBody, RecoverError> {
+    check(body, "posed", posed)?;
+    if let Some(rest) = t_pose {
+        check(body, "T-pose", rest)?;
+    }
+    let mut shape = match t_pose {
+        Some(rest) => fitted_shape(body, rest),
+        None => vec![0.0; body.shape_count],
+    };
+    let mut bones: Option<Vec<Bone>> = None;
+    let rounds = if t_pose.is_some() || body.shape_count == 0 { 1 } else { OUTER_ROUNDS };
+    for round in 0..rounds {
+        let shaped = body.shaped(&shape)?;
+        let found = fitted_bones(body, &shaped.positions, posed, bones.as_deref());
+        if t_pose.is_none() && round + 1 < rounds {
+            shape = fitted_shape(body, &unposed(body, &found, &shaped.positions, posed));
+        }
+        bones = Some(found);
+    }
+    let bones = bones.unwrap_or_default();
+    let pose = Pose {
+        rotations: (0..body.joint_count())
+            .map(|j| match body.parents[j] {
+                Some(parent) => product(&transpose(&bones[parent].rotation), &bones[j].rotation),
+                None => bones[j].rotation,
+            })
+            .map(|local| axis_angle_from_matrix(&local))
+            .collect(),
+    };
+    let model = body.posed(&shape, &pose)?.positions;
+    let count = model.len().max(1) as f64;
+    let sum = posed.iter().zip(&model).fold([0.0; 3], |sum, (p, m)| add(sum, sub(*p, *m)));
+    let place = scale(sum, 1.0 / count);
+    let distances = posed.iter().zip(&model).map(|(p, m)| norm(sub(sub(*p, *m), place)));
+    let mean_distance = distances.sum::<f64>() / count;
+    match mean_distance <= FARTHEST {
+        true => Ok(RecoveredBody { shape, pose, place, mean_distance }),
+        false => Err(RecoverError::Far { body: body.name.clone(), mean_distance }),
+    }
+}
+
+fn check(body: &Body, which: &'static str, positions: &[[f64; 3]]) -> Result<(), RecoverError> {
+    let (found, expected) = (positions.len(), body.vertex_count());
+    if found != expected {
+        return Err(RecoverError::Vertices { which, found, body: body.name.clone(), expected });
+    }
+    match positions.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
+        Some(vertex) => Err(RecoverError::NotFinite { which, vertex }),
+        None => Ok(()),
+    }
+}
+
+/// The shape whose body lies closest to `rest`, wherever that stands.
+fn fitted_shape(body: &Body, rest: &[[f64; 3]]) -> Vec<f64> {
+    let k = body.shape_count;
+    if k == 0 {
+        return Vec::new();
+    }
+    // Unknowns: K shape numbers and a translation. Rows: coordinates.
+    let size = k + 3;
+    let mut gram = vec![vec![0.0; size]; size];
+    let mut right = vec![0.0; size];
+    let mut row = vec![0.0; size];
+    for (v, (p, t)) in rest.iter().zip(&body.template).enumerate() {
+        for a in 0..3 {
+            let directions = &body.shape_directions[(3 * v + a) * k..(3 * v + a + 1) * k];
+            row[..k].iter_mut().zip(directions).for_each(|(r, d)| *r = f64::from(*d));
+            (0..3).for_each(|b| row[k + b] = if a == b { 1.0 } else { 0.0 });
+            for i in 0..size {
+                right[i] += row[i] * (p[a] - t[a]);
+                for j in 0..=i {
+                    gram[i][j] += row[i] * row[j];
+                }
+            }
+        }
+    }
+    for (i, line) in gram.iter_mut().enumerate() {
+        line[i] += RIDGE;
+    }
+    let gram = Mat::from_fn(size, size, |i, j| gram[i.max(j)][i.min(j)]);
+    let Ok(factor) = gram.llt(Side::Lower) else { return vec![0.0; k] };
+    let solution = factor.solve(Mat::from_fn(size, 1, |i, _| right[i]));
+    (0..k).map(|i| solution[(i, 0)]).collect()
+}
+
+/// Bones of linear blend skinning that carry `shaped` closest to `posed`.
+fn fitted_bones(body: &Body, shaped: &[[f64; 3]], posed: &[[f64; 3]], start: Option<&[Bone]>) -> Vec<Bone> {
+    let mut vertices: Vec<Vec<(usize, f64)>> = vec![Vec::new(); body.joint_count()];
+    for v in 0..shaped.len() {
+        let (joints, weights) = body.skin_weights.row(v);
+        for (j, w) in joints.iter().zip(weights).filter(|(_, w)| f64::from(**w) > LEAST_WEIGHT) {
+            vertices[usize::from(*j)].push((v, f64::from(*w)));
+        }
+    }
+    let mut bones: Vec<Bone> = match start {
+        Some(bones) => bones.to_vec(),
+        None => {
+            let mut bones: Vec<Bone> = Vec::with_capacity(body.joint_count());
+            let unmoved =
+                Bone { rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], translation: [0.0; 3] };
+            for j in 0..body.joint_count() {
+                let parent = body.parents[j].map_or(unmoved, |p| bones[p]);
+                let mostly = vertices[j].iter().map(|&(v, w)| (shaped[v], posed[v], w.powi(4)));
+                bones.push(closest_motion(mostly, &parent));
+            }
+            bones
+        }
+    };
+    let mut skinned: Vec<[f64; 3]> = vec![[0.0; 3]; shaped.len()];
+    for (v, s) in skinned.iter_mut().enumerate() {
+        let (joints, weights) = body.skin_weights.row(v);
+        for (j, w) in joints.iter().zip(weights) {
+            *s = add_scaled(*s, f64::from(*w), transform(&bones[usize::from(*j)].rows(), shaped[v]));
+        }
+    }
+    for _ in 0..ROUNDS {
+        for j in 0..bones.len() {
+            if vertices[j].is_empty() {
+                // Nothing shows how it is turned: it goes with its parent.
+                if let Some(parent) = body.parents[j] {
+                    bones[j] = bones[parent];
+                }
+                continue;
+            }
+            let old = bones[j].rows();
+            // What the other bones leave, as if this one carried the vertex alone.
+            let wanted = vertices[j].iter().map(|&(v, w)| {
+                let own = transform(&old, shaped[v]);
+                (shaped[v], add_scaled(own, 1.0 / w, sub(posed[v], skinned[v])), w * w)
+            });
+            let new = closest_motion(wanted, &bones[j]);
+            for &(v, w) in &vertices[j] {
+                let moved = sub(transform(&new.rows(), shaped[v]), transform(&old, shaped[v]));
+                skinned[v] = add_scaled(skinned[v], w, moved);
+            }
+            bones[j] = new;
+        }
+    }
+    bones
+}
+
+/// The rigid motion that carries weighted (from, to) points closest; `start` without points.
+fn closest_motion(points: impl Iterator<Item = ([f64; 3], [f64; 3], f64)> + Clone, start: &Bone) -> Bone {
+    let mut total = 0.0;
+    let (mut from, mut to) = ([0.0; 3], [0.0; 3]);
+    for (p, q, w) in points.clone() {
+        total += w;
+        from = add_scaled(from, w, p);
+        to = add_scaled(to, w, q);
+    }
+    if total <= 0.0 {
+        return *start;
+    }
+    (from, to) = (scale(from, 1.0 / total), scale(to, 1.0 / total));
+    let mut covariance = [[0.0; 3]; 3];
+    for (p, q, w) in points {
+        let (p, q) = (sub(p, from), sub(q, to));
+        for r in 0..3 {
+            for c in 0..3 {
+                covariance[r][c] += w * q[r] * p[c];
+            }
+        }
+    }
+    let rotation = closest_rotation(&covariance, start.rotation);
+    Bone { rotation, translation: sub(to, apply(&rotation, from)) }
+}
+
+/// The rotation R with the largest tr(RᵀA), from a start.
+fn closest_rotation(a: &Matrix3, mut rotation: Matrix3) -> Matrix3 {
+    let column = |m: &Matrix3, c: usize| [m[0][c], m[1][c], m[2][c]];
+    for _ in 0..50 {
+        let (mut turn, mut along) = ([0.0; 3], 0.0);
+        for c in 0..3 {
+            let (r, a) = (column(&rotation, c), column(a, c));
+            turn = add(turn, cross(r, a));
+            along += dot(r, a);
+        }
+        let step = scale(turn, 1.0 / (along.abs() + 1e-15));
+        let length = norm(step);
+        if length < 1e-12 || !length.is_finite() {
+            break;
+        }
+        rotation = product(&matrix_from_axis_angle(step), &rotation);
+    }
+    rotation
+}
+
+/// `posed` brought back to the T-pose; where the skinning cannot be undone, the shaped vertex.
+fn unposed(body: &Body, bones: &[Bone], shaped: &[[f64; 3]], posed: &[[f64; 3]]) -> Vec<[f64; 3]> {
+    let rows: Vec<[[f64; 4]; 3]> = bones.iter().map(Bone::rows).collect();
+    let back = |v: usize| {
+        let (joints, weights) = body.skin_weights.row(v);
+        unskin(posed[v], joints.iter().zip(weights).map(|(j, w)| (&rows[usize::from(*j)], f64::from(*w))))
+    };
+    (0..posed.len()).map(|v| back(v).unwrap_or(shaped[v])).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::generate::{PoseSampler, mannequin};
+    use rand::SeedableRng;
+
+    fn scene(seed: u64) -> (Body, Vec<f64>, Pose) {
+        let body = mannequin();
+        let shape = (0..body.shape_count).map(|k| if k % 2 == 0 { 1.2 } else { -0.7 }).collect();
+        let mut pose = PoseSampler::default().sample(&mut rand_chacha::ChaCha8Rng::seed_from_u64(seed));
+        pose.rotations[0] = [0.2, 1.9, -0.1];
+        (body, shape, pose)
+    }
+
+    #[test]
+    fn a_body_with_its_t_pose_comes_back() {
+        for seed in 0..3 {
+            let (body, shape, pose) = scene(seed);
+            let moved = |p: &[[f64; 3]], by: [f64; 3]| p.iter().map(|x| add(*x, by)).collect::<Vec<_>>();
+            let rest = moved(&body.shaped(&shape).unwrap().positions, [0.5, 1.0, 0.0]);
+            let posed = moved(&body.posed(&shape, &pose).unwrap().positions, [3.0, 0.9, -2.0]);
+            let found = recover_body(&body, Some(&rest), &posed).unwrap();
+            for (a, b) in found.shape.iter().zip(&shape) {
+                assert!((a - b).abs() < 1e-3, "{:?}", found.shape);
+            }
+            assert!(found.mean_distance < 2e-3, "{}", found.mean_distance);
+            assert!(norm(sub(found.place, [3.0, 0.9, -2.0])) < 5e-3, "{:?}", found.place);
+        }
+    }
+
+    #[test]
+    fn without_a_t_pose_the_surface_is_met_within_millimetres() {
+        let (body, shape, pose) = scene(5);
+        let posed = body.posed(&shape, &pose).unwrap().positions;
+        let found = recover_body(&body, None, &posed).unwrap();
+        assert!(found.mean_distance < 5e-3, "{}", found.mean_distance);
+    }
+
+    #[test]
+    fn other_meshes_are_refused() {
+        let body = mannequin();
+        let far: Vec<[f64; 3]> = body.template.iter().map(|p| scale(*p, 4.0)).collect();
+        assert!(matches!(recover_body(&body, None, &far), Err(RecoverError::Far { .. })));
+        let few = &body.template[1..];
+        let message = recover_body(&body, None, few).unwrap_err().to_string();
+        assert!(message.contains("posed mesh has") && message.contains("mannequin"), "{message}");
+        let mut broken = body.template.clone();
+        broken[7][0] = f64::NAN;
+        let message = recover_body(&body, Some(&broken), &body.template).unwrap_err().to_string();
+        assert!(message.contains("vertex 7 of the T-pose mesh"), "{message}");
+    }
+}

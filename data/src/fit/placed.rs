@@ -1,0 +1,42 @@
+//! Does a garment already lie on a body, in metres and T-pose, so that nothing has to be found out?
+
+use super::FitSettings;
+use super::search::{Samples, Search};
+use crate::asset::Body;
+use clothcombo_physics::TriMesh;
+
+/// Whether `mesh`, taken as it stands (metres, y up, pelvis at the origin, arms level), sits on the zero body of `body` as a
+/// garment does: most of it close to the surface or all the way round it, little of it inside. It is the same judgement by
+/// which [`fit`](super::fit) takes a placement.
+pub fn is_on_body(mesh: &TriMesh, body: &Body) -> bool {
+    if mesh.face_count() < super::MIN_TRIANGLES {
+        return false;
+    }
+    let settings = FitSettings { arms_lowered: Some(false), ..FitSettings::default() };
+    let search = Search::new(body, &settings);
+    let samples = Samples::new(mesh.positions(), mesh.faces(), 600);
+    search.sits_well(&samples)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::asset::Category;
+    use crate::generate::{GarmentSettings, generate_garment, mannequin};
+
+    #[test]
+    fn only_the_garment_as_it_was_made_lies_on_the_body() {
+        let body = mannequin();
+        let settings = GarmentSettings { target_vertices: 300, ..GarmentSettings::default() };
+        for category in [Category::TShirt, Category::Skirt, Category::Trousers] {
+            let rest = generate_garment(&body, category, 4, &settings).unwrap().rest;
+            assert!(is_on_body(&rest, &body), "{category}");
+            let changed = |change: fn([f64; 3]) -> [f64; 3]| {
+                rest.with_positions(rest.positions().iter().map(|p| change(*p)).collect()).unwrap()
+            };
+            assert!(!is_on_body(&changed(|p| p.map(|x| 100.0 * x)), &body), "{category} in centimetres");
+            assert!(!is_on_body(&changed(|[x, y, z]| [x, -z, y]), &body), "{category} with z up");
+            assert!(!is_on_body(&changed(|[x, y, z]| [x + 0.6, y, z]), &body), "{category} beside the body");
+        }
+    }
+}

@@ -1,0 +1,404 @@
+//! Writes binary glTF 2.0 (`.glb`): named, coloured meshes, still or moving.
+//!
+//! A motion is a morph-target animation, which needs no skeleton and is read by Blender and the common viewers: the mesh is
+//! the first frame, every further frame is a morph target (its displacements and changes of normal), and a linear sampler
+//! brings the weight of one target after the other to 1, so that between two frames every vertex moves on a straight line.
+//!
+//! Written with `serde_json`, not a glTF crate: the reader beside it has its own document of the few parts a mesh needs, and
+//! the writer needs no more.
+
+use crate::format::atomic;
+use clothcombo_physics::vertex_normals;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Why a scene cannot be written.
+#[derive(Debug, Error)]
+pub enum GlbError {
+    /// The file system refused.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// Frames of different sizes, or another number of them than of times.
+    #[error("mesh '{mesh}' has {found}, expected {expected}")]
+    Frames {
+        /// The mesh.
+        mesh: String,
+        /// What it has.
+        found: String,
+        /// What it should have.
+        expected: String,
+    },
+    /// A position that is not a number.
+    #[error("mesh '{mesh}', frame {frame}: vertex {vertex} is not finite")]
+    NotFinite {
+        /// The mesh.
+        mesh: String,
+        /// The frame.
+        frame: usize,
+        /// The vertex.
+        vertex: usize,
+    },
+    /// The format counts bytes in 32 bits.
+    #[error("the scene takes {bytes} bytes, a .glb holds at most 4 GiB; leave out frames")]
+    TooLarge {
+        /// Its size.
+        bytes: usize,
+    },
+}
+
+/// One mesh of a scene.
+#[derive(Clone, Debug)]
+pub struct SceneMesh<'a> {
+    /// Name of node and mesh.
+    pub name: &'a str,
+    /// Colour (sRGB).
+    pub colour: [u8; 3],
+    /// Triangles `[F, 3]`.
+    pub faces: &'a [[u32; 3]],
+    /// Positions `[V, 3]` [m] of every frame, at least one.
+    pub frames: Vec<&'a [[f64; 3]]>,
+}
+
+/// Writes [`encode_glb`] to `path`, whole or not at all.
+///
+/// # Errors
+/// As [`encode_glb`], or when the file cannot be written.
+pub fn save_glb(path: &Path, meshes: &[SceneMesh], times: &[f64]) -> Result<(), GlbError> {
+    let bytes = encode_glb(meshes, times)?;
+    atomic::write(path, &bytes).map_err(|source| GlbError::Io { path: path.into(), source })
+}
+
+/// The bytes of a `.glb`. `times` [s], ascending, are those of the frames; a single frame needs none.
+///
+/// # Errors
+/// [`GlbError`] naming the mesh that does not fit.
+pub fn encode_glb(meshes: &[SceneMesh], times: &[f64]) -> Result<Vec<u8>, GlbError> {
+    let frames = times.len().max(1);
+    let mut file = File::default();
+    // Every mesh moves by the same weights: one sampler serves all.
+    let sampler = (frames > 1).then(|| file.weights(times));
+    for mesh in meshes {
+        check(mesh, frames)?;
+        file.add(mesh, sampler.is_some());
+    }
+    file.finish(sampler)
+}
+
+fn check(mesh: &SceneMesh, frames: usize) -> Result<(), GlbError> {
+    let wrong = |found: String, expected: String| {
+        Err(GlbError::Frames { mesh: mesh.name.to_owned(), found, expected })
+    };
+    if mesh.frames.len() != frames {
+        return wrong(format!("{} frames", mesh.frames.len()), format!("{frames}"));
+    }
+    let vertices = mesh.frames[0].len();
+    for (frame, positions) in mesh.frames.iter().enumerate() {
+        if positions.len() != vertices {
+            return wrong(format!("{} vertices in frame {frame}", positions.len()), format!("{vertices}"));
+        }
+        if let Some(vertex) = positions.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
+            return Err(GlbError::NotFinite { mesh: mesh.name.to_owned(), frame, vertex });
+        }
+    }
+    if let Some(corner) = mesh.faces.iter().flatten().find(|v| **v as usize >= vertices) {
+        return wrong(format!("a face with vertex {corner}"), format!("vertices below {vertices}"));
+    }
+    Ok(())
+}
+
+const FLOAT: u32 = 5126;
+const UNSIGNED_INT: u32 = 5125;
+/// Buffer view targets.
+const VERTICES: u32 = 34962;
+const INDICES: u32 = 34963;
+
+#[derive(Default)]
+struct File {
+    binary: Vec<u8>,
+    views: Vec<Value>,
+    accessors: Vec<Value>,
+    meshes: Vec<Value>,
+    nodes: Vec<Value>,
+    materials: Vec<Value>,
+}
+
+impl File {
+    fn view(&mut self, bytes: impl IntoIterator<Item = [u8; 4]>, target: Option<u32>) -> usize {
+        let start = self.binary.len();
+        bytes.into_iter().for_each(|word| self.binary.extend_from_slice(&word));
+        let mut view = json!({ "buffer": 0, "byteOffset": start, "byteLength": self.binary.len() - start });
+        if let Some(target) = target {
+            view["target"] = json!(target);
+        }
+        self.views.push(view);
+        self.views.len() - 1
+    }
+
+    fn accessor(&mut self, accessor: Value) -> usize {
+        self.accessors.push(accessor);
+        self.accessors.len() - 1
+    }
+
+    /// Vectors as `f32`; bounds are those of the rounded values, as readers check them.
+    fn vectors(&mut self, values: &[[f32; 3]], bounded: bool) -> usize {
+        let words = values.iter().flatten().map(|x| x.to_le_bytes());
+        let view = self.view(words, Some(VERTICES));
+        let mut accessor =
+            json!({ "bufferView": view, "componentType": FLOAT, "count": values.len(), "type": "VEC3" });
+        if bounded {
+            let bound = |pick: fn(f32, f32) -> f32| -> [f32; 3] {
+                std::array::from_fn(|a| values.iter().map(|v| v[a]).reduce(pick).unwrap_or(0.0))
+            };
+            accessor["min"] = json!(bound(f32::min));
+            accessor["max"] = json!(bound(f32::max));
+        }
+        self.accessor(accessor)
+    }
+
+    fn scalars(&mut self, values: &[f32]) -> usize {
+        let view = self.view(values.iter().map(|x| x.to_le_bytes()), None);
+        let least = values.iter().copied().fold(f32::INFINITY, f32::min);
+        let largest = values.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        self.accessor(json!({
+            "bufferView": view, "componentType": FLOAT, "count": values.len(), "type": "SCALAR",
+            "min": [least], "max": [largest],
+        }))
+    }
+
+    /// Times, and at each of them the weights of all targets: that of its own frame is 1.
+    fn weights(&mut self, times: &[f64]) -> [usize; 2] {
+        let targets = times.len() - 1;
+        let first = times[0];
+        let seconds: Vec<f32> = times.iter().map(|t| (t - first) as f32).collect();
+        let mut weights = vec![0.0f32; times.len() * targets];
+        for frame in 1..times.len() {
+            weights[frame * targets + frame - 1] = 1.0;
+        }
+        [self.scalars(&seconds), self.scalars(&weights)]
+    }
+
+    fn add(&mut self, mesh: &SceneMesh, moves: bool) {
+        let base = narrow(mesh.frames[0]);
+        let base_normals = normals(mesh.frames[0], mesh.faces);
+        let position = self.vectors(&base, true);
+        let normal = self.vectors(&base_normals, false);
+        let indices = self.view(mesh.faces.iter().flatten().map(|v| v.to_le_bytes()), Some(INDICES));
+        let indices = self.accessor(json!({
+            "bufferView": indices, "componentType": UNSIGNED_INT, "count": 3 * mesh.faces.len(), "type": "SCALAR",
+        }));
+        let number = self.meshes.len();
+        let mut primitive = json!({
+            "attributes": { "POSITION": position, "NORMAL": normal }, "indices": indices, "material": number,
+        });
+        let node = json!({ "name": mesh.name, "mesh": number });
+        let mut document = json!({ "name": mesh.name });
+        if moves {
+            let targets: Vec<Value> = mesh.frames[1..]
+                .iter()
+                .map(|frame| {
+                    let position = self.vectors(&differences(&narrow(frame), &base), true);
+                    let turned = differences(&normals(frame, mesh.faces), &base_normals);
+                    json!({ "POSITION": position, "NORMAL": self.vectors(&turned, false) })
+                })
+                .collect();
+            let names: Vec<String> = (1..mesh.frames.len()).map(|f| format!("frame {f}")).collect();
+            document["weights"] = json!(vec![0.0; targets.len()]);
+            document["extras"] = json!({ "targetNames": names });
+            primitive["targets"] = json!(targets);
+        }
+        document["primitives"] = json!([primitive]);
+        self.meshes.push(document);
+        self.nodes.push(node);
+        let [r, g, b] = mesh.colour.map(linear);
+        self.materials.push(json!({
+            "name": mesh.name,
+            "doubleSided": true,
+            "pbrMetallicRoughness": { "baseColorFactor": [r, g, b, 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.9 },
+        }));
+    }
+
+    fn finish(self, sampler: Option<[usize; 2]>) -> Result<Vec<u8>, GlbError> {
+        let count = self.nodes.len();
+        let mut document = json!({
+            "asset": { "version": "2.0", "generator": "ClothCombo-rs" },
+            "scene": 0,
+            "scenes": [{ "name": "drape", "nodes": (0..count).collect::<Vec<_>>() }],
+            "nodes": self.nodes,
+            "meshes": self.meshes,
+            "materials": self.materials,
+            "accessors": self.accessors,
+            "bufferViews": self.views,
+            "buffers": [{ "byteLength": self.binary.len() }],
+        });
+        if let Some([input, output]) = sampler {
+            let channels: Vec<Value> = (0..count)
+                .map(|node| json!({ "sampler": 0, "target": { "node": node, "path": "weights" } }))
+                .collect();
+            document["animations"] = json!([{
+                "name": "motion",
+                "samplers": [{ "input": input, "output": output, "interpolation": "LINEAR" }],
+                "channels": channels,
+            }]);
+        }
+        let mut text = document.to_string().into_bytes();
+        text.resize(text.len().next_multiple_of(4), b' ');
+        let total = 12 + 8 + text.len() + 8 + self.binary.len();
+        let Ok(total_word) = u32::try_from(total) else { return Err(GlbError::TooLarge { bytes: total }) };
+        let mut bytes = Vec::with_capacity(total);
+        bytes.extend_from_slice(b"glTF");
+        for word in [2, total_word, text.len() as u32, 0x4E4F_534A] {
+            bytes.extend_from_slice(&word.to_le_bytes());
+        }
+        bytes.extend_from_slice(&text);
+        for word in [self.binary.len() as u32, 0x004E_4942] {
+            bytes.extend_from_slice(&word.to_le_bytes());
+        }
+        bytes.extend_from_slice(&self.binary);
+        Ok(bytes)
+    }
+}
+
+fn narrow(positions: &[[f64; 3]]) -> Vec<[f32; 3]> {
+    positions.iter().map(|p| p.map(|x| x as f32)).collect()
+}
+
+fn differences(to: &[[f32; 3]], from: &[[f32; 3]]) -> Vec<[f32; 3]> {
+    to.iter().zip(from).map(|(t, f)| std::array::from_fn(|a| t[a] - f[a])).collect()
+}
+
+/// Unit normals; the format allows no other length, so a vertex without one gets up.
+fn normals(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Vec<[f32; 3]> {
+    let of = |n: [f64; 3]| if n == [0.0; 3] { [0.0, 1.0, 0.0] } else { n.map(|x| x as f32) };
+    vertex_normals(positions, faces).into_iter().map(of).collect()
+}
+
+/// sRGB to the linear values glTF wants.
+fn linear(value: u8) -> f32 {
+    let v = f64::from(value) / 255.0;
+    (if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::format::load_mesh;
+    use clothcombo_physics::mesh::shapes::{grid, icosphere};
+
+    fn words(bytes: &[u8], at: usize) -> u32 {
+        u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap())
+    }
+
+    fn document(bytes: &[u8]) -> (Value, &[u8]) {
+        let length = words(bytes, 12) as usize;
+        assert_eq!(words(bytes, 8) as usize, bytes.len());
+        (serde_json::from_slice(&bytes[20..20 + length]).unwrap(), &bytes[28 + length..])
+    }
+
+    /// The floats of accessor `number`, read by the specification's rules.
+    fn floats(document: &Value, binary: &[u8], number: usize) -> Vec<f32> {
+        let accessor = &document["accessors"][number];
+        let view = &document["bufferViews"][accessor["bufferView"].as_u64().unwrap() as usize];
+        let width = if accessor["type"] == "VEC3" { 3 } else { 1 };
+        let start = view["byteOffset"].as_u64().unwrap() as usize;
+        let count = accessor["count"].as_u64().unwrap() as usize * width;
+        assert_eq!(view["byteLength"].as_u64().unwrap() as usize, 4 * count);
+        assert_eq!(start % 4, 0);
+        (0..count).map(|i| f32::from_bits(words(binary, start + 4 * i))).collect()
+    }
+
+    #[test]
+    fn a_still_scene_is_read_back_with_equal_positions() {
+        let (ball, sheet) = (icosphere(0.5, 2), grid(0.3, 0.2, 3, 4));
+        let meshes = [
+            SceneMesh {
+                name: "body",
+                colour: [200, 190, 180],
+                faces: ball.faces(),
+                frames: vec![ball.positions()],
+            },
+            SceneMesh {
+                name: "tee",
+                colour: [10, 20, 200],
+                faces: sheet.faces(),
+                frames: vec![sheet.positions()],
+            },
+        ];
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scene.glb");
+        save_glb(&path, &meshes, &[]).unwrap();
+        let read = load_mesh(&path).unwrap();
+        let written = ball.positions().iter().chain(sheet.positions());
+        assert_eq!(read.positions.len(), ball.vertex_count() + sheet.vertex_count());
+        for (a, b) in read.positions.iter().flatten().zip(written.flatten()) {
+            assert_eq!(*a, f64::from(*b as f32));
+        }
+        let shift = ball.vertex_count() as u32;
+        let faces: Vec<[u32; 3]> =
+            ball.faces().iter().copied().chain(sheet.faces().iter().map(|f| f.map(|v| v + shift))).collect();
+        assert!(read.polygons().zip(&faces).all(|(a, b)| a == b) && read.polygon_count() == faces.len());
+    }
+
+    #[test]
+    fn frames_are_targets_and_each_has_its_moment() {
+        let sheet = grid(0.3, 0.2, 3, 2);
+        let moved = |d: f64| sheet.positions().iter().map(|p| [p[0], p[1] + d, p[2]]).collect::<Vec<_>>();
+        let frames = [moved(0.0), moved(0.25), moved(-0.5)];
+        let mesh = SceneMesh {
+            name: "tee",
+            colour: [255, 0, 0],
+            faces: sheet.faces(),
+            frames: frames.iter().map(|f| f.as_slice()).collect(),
+        };
+        let bytes =
+            encode_glb(&[mesh.clone(), SceneMesh { name: "coat", ..mesh }], &[2.0, 2.5, 3.5]).unwrap();
+        let (document, binary) = document(&bytes);
+        assert_eq!(
+            document["materials"][1]["pbrMetallicRoughness"]["baseColorFactor"],
+            json!([1.0, 0.0, 0.0, 1.0])
+        );
+        let animation = &document["animations"][0];
+        assert_eq!(animation["channels"].as_array().unwrap().len(), 2);
+        let [input, output] =
+            ["input", "output"].map(|k| animation["samplers"][0][k].as_u64().unwrap() as usize);
+        assert_eq!(floats(&document, binary, input), [0.0, 0.5, 1.5]);
+        let weights = floats(&document, binary, output);
+        assert_eq!(weights, [0.0, 0.0, 1.0, 0.0, 0.0, 1.0]);
+        for mesh in 0..2 {
+            let primitive = &document["meshes"][mesh]["primitives"][0];
+            let base =
+                floats(&document, binary, primitive["attributes"]["POSITION"].as_u64().unwrap() as usize);
+            assert_eq!(primitive["targets"].as_array().unwrap().len(), 2);
+            for (frame, expected) in frames.iter().enumerate() {
+                let mut positions = base.clone();
+                for target in 0..2 {
+                    let accessor = primitive["targets"][target]["POSITION"].as_u64().unwrap() as usize;
+                    let delta = floats(&document, binary, accessor);
+                    positions.iter_mut().zip(delta).for_each(|(p, d)| *p += weights[2 * frame + target] * d);
+                }
+                for (p, e) in positions.iter().zip(expected.iter().flatten()) {
+                    assert!((f64::from(*p) - e).abs() < 1e-6);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_does_not_fit_is_named() {
+        let sheet = grid(0.3, 0.2, 2, 2);
+        let mut broken = sheet.positions().to_vec();
+        broken[3][1] = f64::NAN;
+        let mesh = |frames| SceneMesh { name: "tee", colour: [0; 3], faces: sheet.faces(), frames };
+        let whole = sheet.positions();
+        let message = |mesh: SceneMesh, times: &[f64]| encode_glb(&[mesh], times).unwrap_err().to_string();
+        assert!(message(mesh(vec![whole, &broken]), &[0.0, 1.0]).contains("'tee', frame 1: vertex 3"));
+        assert!(message(mesh(vec![whole, &whole[1..]]), &[0.0, 1.0]).contains("8 vertices in frame 1"));
+        assert!(message(mesh(vec![whole]), &[0.0, 1.0]).contains("1 frames"));
+        assert!(message(mesh(vec![&whole[..4]]), &[]).contains("a face with vertex"));
+    }
+}

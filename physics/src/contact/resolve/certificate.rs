@@ -1,0 +1,224 @@
+//! What is left, counted exactly.
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::obstacle::{BodyObstacle, LayerObstacle};
+use super::{Layer, ResolveError, ResolveSettings};
+use crate::contact::triangle_pair::Triangle;
+use crate::contact::{TriangleTree, contours, self_contours};
+use crate::query::Surface;
+use crate::vec3::{add, scale};
+
+/// Proof of the state of dressed garments: every number comes from exact predicates over all pairs of triangles, or (depths)
+/// from the closest surface point of every vertex.
+///
+/// Pairs in pinched regions (where the body lies inside itself: see [`super`]) are in [`pinched`](Self::pinched) and in no
+/// other number.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Certificate {
+    /// Pairs of a garment triangle and a body triangle that share a point.
+    pub body_triangle_pairs: usize,
+    /// Pairs of triangles of two garments that share a point.
+    pub layer_triangle_pairs: usize,
+    /// Pairs of triangles of one garment that share more than their common vertices.
+    pub self_triangle_pairs: usize,
+    /// Length of the curves in which all those pairs cross [mm].
+    pub contour_length_mm: f64,
+    /// Depth of the deepest vertex under the body's surface or under an inner garment [mm]; 0 when there is none.
+    pub max_depth_mm: f64,
+    /// Mean depth of the vertices that lie under one [mm].
+    pub mean_depth_mm: f64,
+    /// Vertices inside the body.
+    pub vertices_inside: usize,
+    /// Share of the vertices over or under an inner garment that lie under it, 0–1, by the closest point of its surface.
+    pub order_violations: f64,
+    /// Rise of the strain energy by the post-process, as a share of the energy before; `None` where there was none before, or
+    /// nothing was done.
+    pub strain_added: Option<f64>,
+    /// Pairs where the body lies inside itself.
+    pub pinched: PinchedPairs,
+    /// Every pair that is left, pinched ones included.
+    pub remaining: Vec<RemainingPair>,
+    /// Per garment, innermost first.
+    pub garments: Vec<GarmentCertificate>,
+}
+
+/// Pairs that no cloth could avoid: where one part of the body lies inside another.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PinchedPairs {
+    /// With the body.
+    pub body_triangle_pairs: usize,
+    /// Of two garments.
+    pub layer_triangle_pairs: usize,
+    /// Of a garment with itself.
+    pub self_triangle_pairs: usize,
+}
+
+/// The share of one garment.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct GarmentCertificate {
+    /// Pairs with the body.
+    pub body_triangle_pairs: usize,
+    /// Pairs with garments under it.
+    pub layer_triangle_pairs: usize,
+    /// Pairs with itself.
+    pub self_triangle_pairs: usize,
+    /// Strain energy [J].
+    pub strain_joule: f64,
+}
+
+/// What a garment triangle crosses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Crossed {
+    /// The body.
+    Body,
+    /// Another garment, by its index.
+    Layer(usize),
+    /// The same garment.
+    Itself,
+}
+
+/// Two triangles that cross. Indices are 0-based.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RemainingPair {
+    /// The garment; of two, the outer one.
+    pub garment: usize,
+    /// Its triangle.
+    pub triangle: usize,
+    /// What it crosses.
+    pub crosses: Crossed,
+    /// The triangle there.
+    pub other_triangle: usize,
+    /// Whether the body lies inside itself there.
+    pub is_pinched: bool,
+}
+
+impl Certificate {
+    /// Pairs that are not pinched.
+    pub fn pairs(&self) -> usize {
+        self.body_triangle_pairs + self.layer_triangle_pairs + self.self_triangle_pairs
+    }
+
+    /// Whether no garment crosses the body or another garment, pinched regions left out.
+    pub fn is_clear(&self) -> bool {
+        self.body_triangle_pairs + self.layer_triangle_pairs == 0
+    }
+
+    /// Notes the strain energy before the post-process [J].
+    pub(super) fn compare_strain(&mut self, before: f64) {
+        let after: f64 = self.garments.iter().map(|g| g.strain_joule).sum();
+        self.strain_added = (before > NO_STRAIN).then(|| after / before - 1.0);
+    }
+}
+
+/// Counts what crosses what. `layers` from the body outwards. The same for any number of threads.
+///
+/// # Errors
+/// When positions do not fit their garment or are not finite, or the body has no surface.
+pub fn certify(body: &Surface<f64>, layers: &[Layer<'_>]) -> Result<Certificate, ResolveError> {
+    super::check(body, layers)?;
+    Ok(certificate(&BodyObstacle::new(body), layers))
+}
+
+/// Less strain energy than this [J] is rounding of a garment in its rest shape.
+const NO_STRAIN: f64 = 1e-9;
+
+/// The distance up to which a vertex counts as over or under an inner garment [m].
+fn order_reach() -> f64 {
+    ResolveSettings::default().reach
+}
+
+pub(super) fn certificate(body: &BodyObstacle<'_>, layers: &[Layer<'_>]) -> Certificate {
+    let mut found = Certificate::default();
+    let mut depths: Vec<f64> = Vec::new();
+    let (mut judged, mut wrong) = (0, 0);
+    let mut inner: Vec<LayerObstacle> = Vec::new();
+    for (index, layer) in layers.iter().enumerate() {
+        let Layer { garment, positions } = *layer;
+        let tree = TriangleTree::new(positions, &garment.faces);
+        let mut own =
+            GarmentCertificate { strain_joule: garment.strain_energy(positions), ..Default::default() };
+
+        let views: Vec<_> = positions.par_iter().with_min_len(128).map(|p| body.look(*p)).collect();
+        let body_planes = views.iter().filter_map(|view| view.and_then(|v| v.plane));
+        let inside = body_planes.filter(|p| p.distance < 0.0).map(|p| -p.distance);
+        depths.extend(inside);
+        found.vertices_inside = depths.len();
+
+        let pairs = tree.pairs_with(&body.tree);
+        let (pinched, pairs): (Vec<_>, Vec<_>) = pairs.into_iter().partition(|&(_, b)| body.is_pinched(b));
+        own.body_triangle_pairs = pairs.len();
+        found.pinched.body_triangle_pairs += pinched.len();
+        found.contour_length_mm += length_mm(&contours(&tree, &body.tree, &pairs));
+        found.list(index, Crossed::Body, &pairs, false);
+        found.list(index, Crossed::Body, &pinched, true);
+
+        let is_pinched = |t: Option<Triangle>| {
+            t.is_some_and(|[a, b, c]| body.is_pinch(scale(add(add(a, b), c), 1.0 / 3.0)))
+        };
+        for (i, under) in inner.iter().enumerate() {
+            let all = tree.pairs_with(&under.tree);
+            let (pinched, pairs): (Vec<_>, Vec<_>) = all
+                .into_iter()
+                .partition(|&(f, g)| is_pinched(tree.triangle(f)) && is_pinched(under.tree.triangle(g)));
+            own.layer_triangle_pairs += pairs.len();
+            found.pinched.layer_triangle_pairs += pinched.len();
+            found.contour_length_mm += length_mm(&contours(&tree, &under.tree, &pairs));
+            found.list(index, Crossed::Layer(i), &pairs, false);
+            found.list(index, Crossed::Layer(i), &pinched, true);
+            let order: Vec<f64> = positions
+                .par_iter()
+                .with_min_len(128)
+                .filter_map(|p| under.look(*p, order_reach(), 0.0).map(|plane| plane.distance))
+                .collect();
+            judged += order.len();
+            let below = order.into_iter().filter(|d| *d < 0.0).map(|d| -d);
+            let before = depths.len();
+            depths.extend(below);
+            wrong += depths.len() - before;
+        }
+
+        let all = tree.self_pairs();
+        let (pinched, pairs): (Vec<_>, Vec<_>) =
+            all.into_iter().partition(|&(f, g)| is_pinched(tree.triangle(f)) && is_pinched(tree.triangle(g)));
+        own.self_triangle_pairs = pairs.len();
+        found.pinched.self_triangle_pairs += pinched.len();
+        found.contour_length_mm += length_mm(&self_contours(&tree, &pairs));
+        found.list(index, Crossed::Itself, &pairs, false);
+        found.list(index, Crossed::Itself, &pinched, true);
+
+        found.body_triangle_pairs += own.body_triangle_pairs;
+        found.layer_triangle_pairs += own.layer_triangle_pairs;
+        found.self_triangle_pairs += own.self_triangle_pairs;
+        found.garments.push(own);
+        if index + 1 < layers.len() {
+            let outward = |v: usize| -> [f64; 3] {
+                views[v].and_then(|view| view.plane).map_or([0.0; 3], |plane| plane.normal)
+            };
+            let facing = super::obstacle::facing(garment, positions, outward);
+            inner.push(LayerObstacle::new(garment, positions, facing));
+        }
+    }
+    found.max_depth_mm = 1e3 * depths.iter().fold(0.0, |a: f64, b| a.max(*b));
+    found.mean_depth_mm = 1e3 * depths.iter().sum::<f64>() / depths.len().max(1) as f64;
+    found.order_violations = wrong as f64 / judged.max(1) as f64;
+    found
+}
+
+impl Certificate {
+    fn list(&mut self, garment: usize, crosses: Crossed, pairs: &[(u32, u32)], is_pinched: bool) {
+        self.remaining.extend(pairs.iter().map(|&(f, g)| RemainingPair {
+            garment,
+            triangle: f as usize,
+            crosses,
+            other_triangle: g as usize,
+            is_pinched,
+        }));
+    }
+}
+
+fn length_mm(contours: &[crate::contact::Contour]) -> f64 {
+    1e3 * contours.iter().map(|c| c.length).sum::<f64>()
+}

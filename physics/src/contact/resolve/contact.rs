@@ -1,0 +1,171 @@
+//! Linear conditions on a garment's vertices, and where two triangles that cross ask for them.
+
+use super::obstacle::Plane;
+use crate::contact::Triangle;
+use crate::vec3::{add_scaled, axpy, cross, dot, norm_squared, normalized, sub};
+
+/// `Σ weight·(vertex·normal) ≥ target` over up to six vertices.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Contact {
+    pub vertices: [u32; 6],
+    pub weights: [f64; 6],
+    pub count: u8,
+    pub normal: [f64; 3],
+    pub target: f64,
+}
+
+impl Contact {
+    /// A vertex on the right side of a plane, `gap` away.
+    pub fn vertex(v: u32, plane: &Plane, gap: f64) -> Self {
+        let mut weights = [0.0; 6];
+        weights[0] = 1.0;
+        Self { vertices: [v; 6], weights, count: 1, normal: plane.normal, target: plane.offset + gap }
+    }
+
+    /// A point of a face, at least `target` along `normal`.
+    pub fn face_point(face: [u32; 3], barycentric: [f64; 3], normal: [f64; 3], target: f64) -> Self {
+        let ([a, b, c], [u, v, w]) = (face, barycentric);
+        Self { vertices: [a, b, c, a, a, a], weights: [u, v, w, 0.0, 0.0, 0.0], count: 3, normal, target }
+    }
+
+    /// A point of face `upper` over a point of face `lower`, at least `gap` along `normal`.
+    pub fn face_points(
+        (upper, at_upper): ([u32; 3], [f64; 3]),
+        (lower, at_lower): ([u32; 3], [f64; 3]),
+        normal: [f64; 3],
+        gap: f64,
+    ) -> Self {
+        let vertices = [upper[0], upper[1], upper[2], lower[0], lower[1], lower[2]];
+        let weights = [at_upper[0], at_upper[1], at_upper[2], -at_lower[0], -at_lower[1], -at_lower[2]];
+        Self { vertices, weights, count: 6, normal, target: gap }
+    }
+
+    pub fn terms(&self) -> impl Iterator<Item = (usize, f64)> {
+        let count = usize::from(self.count);
+        self.vertices[..count].iter().zip(&self.weights[..count]).map(|(v, w)| (*v as usize, *w))
+    }
+
+    /// Moves the vertices that may move by the smallest step that meets the condition; whether one was needed.
+    #[inline]
+    pub fn enforce(&self, positions: &mut [[f64; 3]], may_move: &[bool]) -> bool {
+        let height: f64 = self.terms().map(|(v, w)| w * dot(positions[v], self.normal)).sum();
+        let missing = self.target - height;
+        if missing <= 0.0 {
+            return false;
+        }
+        let compliance: f64 = self.terms().filter(|(v, _)| may_move[*v]).map(|(_, w)| w * w).sum();
+        // A point held by its fixed corners alone would throw the others far away.
+        if compliance < 0.02 {
+            return true;
+        }
+        for (v, w) in self.terms().filter(|(v, _)| may_move[*v]) {
+            axpy(&mut positions[v], w * missing / compliance, self.normal);
+        }
+        true
+    }
+}
+
+/// A corner of the part of one triangle that lies over or under another.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Overlap {
+    /// Its place in the upper triangle.
+    pub at_upper: [f64; 3],
+    /// Its place in the lower triangle, straight below or above.
+    pub at_lower: [f64; 3],
+    /// Height over the lower triangle, negative below [m].
+    pub height: f64,
+}
+
+/// The part of `upper` within the prism over `lower` along the lower triangle's normal. Heights are linear in between: the
+/// triangles are apart if all corners lie over the lower triangle. Empty where the lower triangle has no area.
+pub(super) fn overlap(upper: &Triangle, lower: &Triangle) -> ([f64; 3], Vec<Overlap>) {
+    let normal = normalized(cross(sub(lower[1], lower[0]), sub(lower[2], lower[0])));
+    if normal == [0.0; 3] {
+        return (normal, Vec::new());
+    }
+    // Inward normals of the prism's sides, scaled so that the height over each side is a barycentric coordinate.
+    let sides: [([f64; 3], [f64; 3]); 3] = std::array::from_fn(|k| {
+        let (from, to, opposite) = (lower[(k + 1) % 3], lower[(k + 2) % 3], lower[k]);
+        let inward = cross(normal, sub(to, from));
+        let height = dot(inward, sub(opposite, from));
+        (from, inward.map(|x| x / height))
+    });
+    let mut corners: Vec<[f64; 3]> = vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let place = |at: &[f64; 3]| (0..3).fold([0.0; 3], |sum, k| add_scaled(sum, at[k], upper[k]));
+    for (from, inward) in &sides {
+        let inside: Vec<f64> = corners.iter().map(|at| dot(*inward, sub(place(at), *from))).collect();
+        let mut kept = Vec::with_capacity(corners.len() + 1);
+        for i in 0..corners.len() {
+            let j = (i + 1) % corners.len();
+            if inside[i] >= 0.0 {
+                kept.push(corners[i]);
+            }
+            if (inside[i] >= 0.0) != (inside[j] >= 0.0) {
+                let t = inside[i] / (inside[i] - inside[j]);
+                kept.push(std::array::from_fn(|k| corners[i][k] + t * (corners[j][k] - corners[i][k])));
+            }
+        }
+        corners = kept;
+    }
+    let found = corners
+        .iter()
+        .map(|at| {
+            let p = place(at);
+            let at_lower = sides.map(|(from, inward)| dot(inward, sub(p, from)).clamp(0.0, 1.0));
+            Overlap { at_upper: *at, at_lower, height: dot(normal, sub(p, lower[0])) }
+        })
+        .collect();
+    (normal, found)
+}
+
+/// Whether a triangle is too small to say where it looks.
+pub(super) fn is_tiny(triangle: &Triangle) -> bool {
+    norm_squared(cross(sub(triangle[1], triangle[0]), sub(triangle[2], triangle[0]))) < 1e-24
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::triangles_intersect;
+    use crate::mesh::shapes::SplitMix;
+
+    #[test]
+    fn triangles_that_meet_have_an_overlap_below_and_lifting_it_parts_them() {
+        let mut random = SplitMix::new(5);
+        let mut met = 0;
+        for _ in 0..4000 {
+            let mut triangle =
+                || -> Triangle { std::array::from_fn(|_| std::array::from_fn(|_| random.symmetric())) };
+            let (upper, lower) = (triangle(), triangle());
+            let (normal, found) = overlap(&upper, &lower);
+            let lowest = found.iter().map(|o| o.height).fold(f64::INFINITY, f64::min);
+            if triangles_intersect(&upper, &lower) {
+                met += 1;
+                assert!(lowest <= 1e-9, "{lowest}");
+            }
+            if lowest.is_finite() {
+                let lifted = upper.map(|p| add_scaled(p, 1e-6 - lowest.min(0.0), normal));
+                assert!(!triangles_intersect(&lifted, &lower));
+            }
+            for o in &found {
+                let at =
+                    |t: &Triangle, w: [f64; 3]| (0..3).fold([0.0; 3], |sum, k| add_scaled(sum, w[k], t[k]));
+                let expected = add_scaled(at(&lower, o.at_lower), o.height, normal);
+                assert!(norm_squared(sub(at(&upper, o.at_upper), expected)) < 1e-16);
+            }
+        }
+        assert!(met > 200, "{met}");
+    }
+
+    #[test]
+    fn enforcing_meets_the_condition_and_moves_only_what_may_move() {
+        let mut positions = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let contact = Contact::face_point([0, 1, 2], [0.2, 0.3, 0.5], [0.0, 0.0, 1.0], 0.1);
+        assert!(contact.enforce(&mut positions, &[true, false, true]));
+        assert_eq!(positions[1], [1.0, 0.0, 0.0]);
+        let height = 0.2 * positions[0][2] + 0.5 * positions[2][2];
+        assert!((height - 0.1).abs() < 1e-12);
+        let before = positions.clone();
+        assert!(!contact.enforce(&mut positions, &[true; 3]) || positions != before);
+    }
+}

@@ -1,0 +1,50 @@
+//! Why garments cannot be resolved at all.
+
+use thiserror::Error;
+
+/// What is wrong with the input of [`super::resolve`]. Indices are 0-based. Crossings that stay are a result, not an error.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum ResolveError {
+    /// A setting is out of its range.
+    #[error("resolve setting `{setting}` is {value}; hint: it must be {expected}")]
+    Setting {
+        /// Name of the setting.
+        setting: &'static str,
+        /// Its value.
+        value: f64,
+        /// What is allowed.
+        expected: &'static str,
+    },
+
+    /// Positions of another mesh.
+    #[error(
+        "garment {garment} has {expected} vertices, but there are {found} positions; hint: give positions of its own mesh"
+    )]
+    Count {
+        /// The garment.
+        garment: usize,
+        /// Its vertices.
+        expected: usize,
+        /// Positions given.
+        found: usize,
+    },
+
+    /// A position is NaN, infinite or kilometres away.
+    #[error(
+        "garment {garment}, vertex {vertex} is at [{}, {}, {}]; hint: positions are finite, in metres, within a kilometre of the origin",
+        position[0], position[1], position[2]
+    )]
+    Position {
+        /// The garment.
+        garment: usize,
+        /// The vertex.
+        vertex: usize,
+        /// Where it is.
+        position: [f64; 3],
+    },
+
+    /// The body has nothing to keep a distance from.
+    #[error("the body has no triangle with finite corners; hint: check the body's mesh")]
+    EmptyBody,
+}

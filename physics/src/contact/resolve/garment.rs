@@ -1,0 +1,99 @@
+//! A garment as the post-process sees it: what its positions do not change, and where it is.
+
+use crate::energy::{Material, strain::Strain};
+use crate::mesh::{Topology, TriMesh};
+
+/// Everything about a garment that its positions do not change: made once, used for every frame and body.
+#[derive(Debug)]
+pub struct RestGarment {
+    pub(super) faces: Vec<[u32; 3]>,
+    pub(super) topology: Topology,
+    /// Vertices on an edge with one face.
+    pub(super) is_border: Vec<bool>,
+    /// For every face, which of its edges (corner k → k+1) have no second face: bit k.
+    pub(super) border_edges: Vec<u8>,
+    /// Faces around vertices in compressed rows.
+    face_offsets: Vec<u32>,
+    faces_at: Vec<u32>,
+    strain: Strain,
+}
+
+impl RestGarment {
+    /// From the undeformed garment.
+    pub fn new(rest: &TriMesh) -> Self {
+        let topology = Topology::new(rest);
+        let faces = rest.faces().to_vec();
+        let mut hinged: Vec<[u32; 2]> = topology
+            .hinges
+            .iter()
+            .map(|h| [h.edge[0].min(h.edge[1]), h.edge[0].max(h.edge[1])])
+            .chain(topology.non_manifold_edges.iter().copied())
+            .collect();
+        hinged.sort_unstable();
+        let mut is_border = vec![false; rest.vertex_count()];
+        let border_edges = faces
+            .iter()
+            .map(|face| {
+                (0..3).fold(0u8, |bits, k| {
+                    let (a, b) = (face[k], face[(k + 1) % 3]);
+                    if hinged.binary_search(&[a.min(b), a.max(b)]).is_ok() {
+                        return bits;
+                    }
+                    is_border[a as usize] = true;
+                    is_border[b as usize] = true;
+                    bits | 1 << k
+                })
+            })
+            .collect();
+        let (face_offsets, faces_at) = faces_around(rest.vertex_count(), &faces);
+        let strain = Strain::new(rest, &Material::default());
+        Self { faces, topology, is_border, border_edges, face_offsets, faces_at, strain }
+    }
+
+    /// Number of vertices.
+    pub fn vertex_count(&self) -> usize {
+        self.is_border.len()
+    }
+
+    /// Faces `[F, 3]`.
+    pub fn faces(&self) -> &[[u32; 3]] {
+        &self.faces
+    }
+
+    /// Faces around vertex `v`, ascending.
+    pub(super) fn faces_of(&self, v: u32) -> &[u32] {
+        let v = v as usize;
+        &self.faces_at[self.face_offsets[v] as usize..self.face_offsets[v + 1] as usize]
+    }
+
+    /// Strain energy at `positions` `[V, 3]` [J], of the default material.
+    pub fn strain_energy(&self, positions: &[[f64; 3]]) -> f64 {
+        self.strain.evaluate(positions, None)
+    }
+}
+
+fn faces_around(vertices: usize, faces: &[[u32; 3]]) -> (Vec<u32>, Vec<u32>) {
+    let mut offsets = vec![0u32; vertices + 1];
+    faces.as_flattened().iter().for_each(|&v| offsets[v as usize + 1] += 1);
+    for v in 0..vertices {
+        offsets[v + 1] += offsets[v];
+    }
+    let mut next = offsets.clone();
+    let mut around = vec![0u32; 3 * faces.len()];
+    for (f, face) in (0u32..).zip(faces) {
+        for &v in face {
+            around[next[v as usize] as usize] = f;
+            next[v as usize] += 1;
+        }
+    }
+    (offsets, around)
+}
+
+/// One garment of an outfit.
+#[derive(Debug, Clone, Copy)]
+pub struct Layer<'a> {
+    /// Its constants.
+    pub garment: &'a RestGarment,
+    /// Where it is, `[V, 3]` [m].
+    pub positions: &'a [[f64; 3]],
+}

@@ -1,0 +1,138 @@
+//! The post-process: takes draped garments out of the body and out of each other, and proves what it reached.
+//!
+//! Garments come in their order, innermost first, and are brought to the right side one after the other: of the body, then of
+//! every garment under them. The order of the layers is the sign: *over* is where the inner surface's normal points, away
+//! from the body.
+//!
+//! 1. **Vertices.** The closest point of the body (of the union of its parts, [`crate::query::UnionDistance`]) and of each
+//!    inner garment leaves a vertex a half-space; past a hem there is none.
+//! 2. **Relaxation.** Vertices on the wrong side and their neighbourhood move by a smooth displacement that keeps edge lengths
+//!    and meets every half-space ([`relax`]); everything else keeps its position to the bit.
+//! 3. **Triangles.** Vertices outside are not enough where cloth is coarser than the body. Every pair of triangles that still
+//!    crosses, found exactly, asks the part of the garment's triangle over the other one to lie above it; linear heights make
+//!    that sufficient. Repeated until no pair is left.
+//! 4. **Certificate.** All pairs are counted again, from nothing, by the exact predicates.
+//!
+//! **Pinched regions**, where the body lies inside itself, are told apart by a stated rule: `BodyObstacle`.
+
+mod certificate;
+mod contact;
+mod error;
+mod garment;
+mod obstacle;
+mod relax;
+mod settings;
+#[cfg(test)]
+mod tests;
+mod untangle;
+
+use std::time::{Duration, Instant};
+
+pub use certificate::{Certificate, Crossed, GarmentCertificate, PinchedPairs, RemainingPair, certify};
+pub use error::ResolveError;
+pub use garment::{Layer, RestGarment};
+pub use settings::ResolveSettings;
+
+use crate::query::Surface;
+use crate::vec3;
+use certificate::certificate;
+use obstacle::{BodyObstacle, LayerObstacle, facing};
+use untangle::Untangling;
+
+/// Positions farther from the origin than this are refused [m]: the exact predicates would hold, but no distance would.
+const FARTHEST: f64 = 1e3;
+
+/// Garments that were resolved.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Resolved {
+    /// New positions of every garment, `[V, 3]` [m], in the order given.
+    pub positions: Vec<Vec<[f64; 3]>>,
+    /// What is left.
+    pub certificate: Certificate,
+    /// What was done, per garment.
+    pub garments: Vec<GarmentWork>,
+    /// Time to prepare the body.
+    pub body_time: Duration,
+    /// Time for the certificate.
+    pub certificate_time: Duration,
+}
+
+/// What was done to one garment.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct GarmentWork {
+    /// Rounds of detection and relaxation.
+    pub rounds: usize,
+    /// Vertices that moved.
+    pub moved: usize,
+    /// The largest move [m].
+    pub largest_move: f64,
+    /// Wall time.
+    pub time: Duration,
+}
+
+/// Takes `layers`, innermost first, out of `body` and out of each other. Deterministic for any number of threads (without a
+/// time limit in the settings); a clean input comes back to the bit.
+///
+/// # Errors
+/// When a setting is out of range, positions do not fit their garment or are not finite, or the body has no surface.
+/// Crossings that cannot be mended are no error: the certificate lists them.
+pub fn resolve(
+    body: &Surface<f64>,
+    layers: &[Layer<'_>],
+    settings: &ResolveSettings,
+) -> Result<Resolved, ResolveError> {
+    settings.check()?;
+    check(body, layers)?;
+    let start = Instant::now();
+    let body = BodyObstacle::new(body);
+    let body_time = start.elapsed();
+    // Obstacles borrow the positions of the layers under them, which are final.
+    let positions: Vec<std::sync::OnceLock<Vec<[f64; 3]>>> =
+        layers.iter().map(|_| Default::default()).collect();
+    let mut inner: Vec<LayerObstacle> = Vec::new();
+    let mut garments = Vec::with_capacity(layers.len());
+    for (index, layer) in layers.iter().enumerate() {
+        let start = Instant::now();
+        let mut untangling = Untangling::new(layer.garment, layer.positions, &body, &inner, settings);
+        let work = untangling.run();
+        let (moved, largest_move) = (untangling.moved(), untangling.largest_move());
+        let is_inner = index + 1 < layers.len();
+        let facing = match is_inner {
+            true => facing(layer.garment, &untangling.positions, |v| untangling.outward(v)),
+            false => Vec::new(),
+        };
+        let done = positions[index].get_or_init(|| std::mem::take(&mut untangling.positions));
+        drop(untangling);
+        if is_inner {
+            inner.push(LayerObstacle::new(layer.garment, done, facing));
+        }
+        garments.push(GarmentWork { rounds: work.rounds, moved, largest_move, time: start.elapsed() });
+    }
+    drop(inner);
+    let positions: Vec<Vec<[f64; 3]>> = positions.into_iter().filter_map(|p| p.into_inner()).collect();
+    let start = Instant::now();
+    let resolved: Vec<Layer> =
+        layers.iter().zip(&positions).map(|(l, positions)| Layer { garment: l.garment, positions }).collect();
+    let mut certificate = certificate(&body, &resolved);
+    certificate.compare_strain(layers.iter().map(|l| l.garment.strain_energy(l.positions)).sum());
+    Ok(Resolved { positions, certificate, garments, body_time, certificate_time: start.elapsed() })
+}
+
+/// Whether the input can be worked on.
+fn check(body: &Surface<f64>, layers: &[Layer<'_>]) -> Result<(), ResolveError> {
+    let is_near = |p: &[f64; 3]| vec3::is_finite(*p) && p.iter().all(|x| x.abs() <= FARTHEST);
+    let is_whole = |f: &[u32; 3]| f.iter().all(|&v| body.positions.get(v as usize).is_some_and(is_near));
+    if !body.faces.iter().any(is_whole) {
+        return Err(ResolveError::EmptyBody);
+    }
+    for (garment, layer) in layers.iter().enumerate() {
+        let (expected, found) = (layer.garment.vertex_count(), layer.positions.len());
+        if expected != found {
+            return Err(ResolveError::Count { garment, expected, found });
+        }
+        if let Some(vertex) = layer.positions.iter().position(|p| !is_near(p)) {
+            return Err(ResolveError::Position { garment, vertex, position: layer.positions[vertex] });
+        }
+    }
+    Ok(())
+}

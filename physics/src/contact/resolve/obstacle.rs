@@ -1,0 +1,204 @@
+//! What a garment has to stay outside of: the body, and every garment nearer to it.
+
+use super::RestGarment;
+use crate::contact::TriangleTree;
+use crate::mesh::vertex_normals;
+use crate::query::{ClosestPoint, FaceSide, Surface};
+use crate::vec3::{add_scaled, dot, norm, scale, sub};
+
+/// Below this distance [m] the direction from the closest point is rounding.
+const CONTACT: f64 = 1e-9;
+
+/// The half-space that the surface nearest to a point leaves to it: `normal·x ≥ offset`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Plane {
+    /// Unit normal, away from the obstacle.
+    pub normal: [f64; 3],
+    /// Where the surface is.
+    pub offset: f64,
+    /// Signed distance of the point that asked [m].
+    pub distance: f64,
+    /// Whether it may be violated without being a defect: it only keeps what is there.
+    pub is_held: bool,
+}
+
+impl Plane {
+    fn at(position: [f64; 3], normal: [f64; 3], distance: f64, is_held: bool) -> Self {
+        Self { normal, offset: dot(normal, position), distance, is_held }
+    }
+}
+
+/// What a point knows of the body.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct BodyView {
+    /// Distance to the nearest exposed face, without sign [m].
+    pub far: f64,
+    /// The half-space it must stay in; `None` in a pinched region.
+    pub plane: Option<Plane>,
+}
+
+/// The posed body.
+///
+/// **Pinched regions.** Where one part of the body lies inside another (an arm pressed into the torso), no cloth can be
+/// outside of both. The rule (after Baraff, Witkin and Kass, "Untangling cloth", 2003): faces inside another part of the
+/// body, the seams where parts cross, and the faces next to those are *pinched*. They push nothing, and what crosses them is
+/// counted apart. A vertex inside the body whose nearest face, of all, is pinched is left alone.
+pub(super) struct BodyObstacle<'a> {
+    surface: &'a Surface<f64>,
+    pub tree: TriangleTree<'a>,
+    is_pinched: Vec<bool>,
+    has_pinched: bool,
+    /// Without a border inside and outside are known everywhere.
+    is_closed: bool,
+}
+
+impl<'a> BodyObstacle<'a> {
+    pub fn new(surface: &'a Surface<f64>) -> Self {
+        let faces = &surface.faces;
+        let (tree, is_closed) =
+            rayon::join(|| TriangleTree::new(&surface.positions, faces), || is_closed(faces));
+        let mut is_pinched = vec![false; faces.len()];
+        if is_closed {
+            let sides = surface.union_distance().sides();
+            let mut touched = vec![false; surface.positions.len()];
+            for (face, _) in faces.iter().zip(sides).filter(|(_, side)| **side != FaceSide::Exposed) {
+                face.iter().for_each(|&v| touched[v as usize] = true);
+            }
+            for (pinched, face) in is_pinched.iter_mut().zip(faces.iter()) {
+                *pinched = face.iter().any(|&v| touched[v as usize]);
+            }
+        }
+        let has_pinched = is_pinched.contains(&true);
+        Self { surface, tree, is_pinched, has_pinched, is_closed }
+    }
+
+    /// Whether face `f` is pinched.
+    pub fn is_pinched(&self, f: u32) -> bool {
+        self.is_pinched.get(f as usize).is_some_and(|p| *p)
+    }
+
+    /// Whether the body's face nearest to `p` is pinched.
+    pub fn is_pinch(&self, p: [f64; 3]) -> bool {
+        self.has_pinched && self.surface.project(p).is_some_and(|found| self.is_pinched(found.face))
+    }
+
+    pub fn look(&self, p: [f64; 3]) -> Option<BodyView> {
+        let (found, is_inside, face) = if self.is_closed {
+            let union = self.surface.union_distance();
+            let (found, is_inside) = union.project(p)?;
+            (found, is_inside, union.kept_face(found.face))
+        } else {
+            let found = self.surface.project(p)?;
+            (found, dot(sub(p, found.position), found.normal) < 0.0, found.face)
+        };
+        let far = found.distance_squared.sqrt();
+        let distance = if is_inside { -far } else { far };
+        let direction =
+            if far > CONTACT { scale(sub(p, found.position), distance.signum() / far) } else { found.normal };
+        let is_pinched = self.is_pinched(face);
+        let plane = if is_inside && (is_pinched || self.is_pinch(p)) {
+            None
+        } else {
+            Some(Plane::at(found.position, direction, distance, is_pinched))
+        };
+        Some(BodyView { far, plane })
+    }
+}
+
+/// Whether every edge has two faces.
+fn is_closed(faces: &[[u32; 3]]) -> bool {
+    let mut edges: Vec<[u32; 2]> = faces
+        .iter()
+        .flat_map(|f| (0..3).map(|k| [f[k].min(f[(k + 1) % 3]), f[k].max(f[(k + 1) % 3])]))
+        .collect();
+    edges.sort_unstable();
+    edges.chunk_by(|a, b| a == b).all(|same| same.len() % 2 == 0)
+}
+
+/// A garment that lies under the one being resolved.
+pub(super) struct LayerObstacle<'a> {
+    garment: &'a RestGarment,
+    pub tree: TriangleTree<'a>,
+    closest: ClosestPoint,
+    facing: Vec<f64>,
+    bounds: [[f64; 3]; 2],
+}
+
+impl<'a> LayerObstacle<'a> {
+    /// `facing` as of [`facing`].
+    pub fn new(garment: &'a RestGarment, positions: &'a [[f64; 3]], facing: Vec<f64>) -> Self {
+        let (tree, closest) = rayon::join(
+            || TriangleTree::new(positions, &garment.faces),
+            || ClosestPoint::new(positions.to_vec(), &garment.faces),
+        );
+        Self { garment, tree, closest, facing, bounds: bounds(positions) }
+    }
+
+    /// 1 where face `f` looks away from the body, −1 where the mesh is inside out.
+    pub fn facing(&self, f: u32) -> f64 {
+        self.garment.faces.get(f as usize).map_or(1.0, |face| self.facing[face[0] as usize])
+    }
+
+    /// Whether a box comes closer than `margin` to the garment.
+    pub fn is_near(&self, [low, high]: [[f64; 3]; 2], margin: f64) -> bool {
+        (0..3).all(|k| low[k] - margin <= self.bounds[1][k] && self.bounds[0][k] - margin <= high[k])
+    }
+
+    /// The half-space over the garment at the point nearest to `p`, if it is within `reach` and `p` lies over or under the
+    /// garment and not beside it.
+    pub fn look(&self, p: [f64; 3], reach: f64, gap: f64) -> Option<Plane> {
+        if !self.is_near([p, p], reach) {
+            return None;
+        }
+        let found = self.closest.project_within(p, reach)?;
+        let facing = self.facing(found.face);
+        let normal = scale(found.normal, facing);
+        let offset = sub(p, found.position);
+        let along = dot(offset, normal);
+        let length = found.distance_squared.sqrt();
+        if self.is_at_border(found.face, found.barycentric) {
+            // Past the hem there is nothing to be over; right at it there is.
+            let beside = add_scaled(offset, -along, normal);
+            if norm(beside) > gap.max(0.5 * along.abs()) {
+                return None;
+            }
+            return Some(Plane::at(found.position, normal, along, false));
+        }
+        let distance = if along < 0.0 { -length } else { length };
+        let direction = if length > CONTACT { scale(offset, distance.signum() / length) } else { normal };
+        Some(Plane::at(found.position, direction, distance, false))
+    }
+
+    fn is_at_border(&self, f: u32, barycentric: [f64; 3]) -> bool {
+        let face = self.garment.faces[f as usize];
+        let zero: Vec<usize> = (0..3).filter(|&k| barycentric[k] <= 1e-9).collect();
+        match zero[..] {
+            [] => false,
+            // On the edge opposite to corner k, which starts at corner k + 1.
+            [k] => self.garment.border_edges[f as usize] >> ((k + 1) % 3) & 1 == 1,
+            _ => (0..3).any(|k| barycentric[k] > 0.5 && self.garment.is_border[face[k] as usize]),
+        }
+    }
+}
+
+/// For every vertex 1 or −1: which side of its component looks away from the body, by what most of its vertices say.
+pub(super) fn facing(
+    garment: &RestGarment,
+    positions: &[[f64; 3]],
+    outward: impl Fn(usize) -> [f64; 3],
+) -> Vec<f64> {
+    let normals = vertex_normals(positions, &garment.faces);
+    let component = &garment.topology.component_of_vertex;
+    let mut votes = vec![0.0; garment.topology.component_count];
+    for v in 0..positions.len() {
+        votes[component[v] as usize] += dot(normals[v], outward(v));
+    }
+    component.iter().map(|&c| if votes[c as usize] < 0.0 { -1.0 } else { 1.0 }).collect()
+}
+
+/// Smallest and largest coordinates.
+pub(super) fn bounds(positions: &[[f64; 3]]) -> [[f64; 3]; 2] {
+    positions.iter().fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |[low, high], p| {
+        [std::array::from_fn(|k| low[k].min(p[k])), std::array::from_fn(|k| high[k].max(p[k]))]
+    })
+}

@@ -1,0 +1,75 @@
+//! How far apart, how wide, how often.
+
+use std::time::Duration;
+
+use super::ResolveError;
+
+/// Settings of [`super::resolve`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ResolveSettings {
+    /// Distance from body and inner layers that a vertex gets when it has to move [m]. Default 1 mm.
+    pub gap: f64,
+    /// A vertex has to move where its distance is below this share of `gap`, 0–1. Default 0.25: whatever was resolved once
+    /// stays as it is.
+    pub trigger: f64,
+    /// Rings of neighbours around a violation that move along. Default 8.
+    pub rings: usize,
+    /// Most rounds of detection and relaxation per garment. Default 40; most garments take fewer than ten.
+    pub rounds: usize,
+    /// Sweeps of the relaxation in a round. Default 20.
+    pub sweeps: usize,
+    /// Deepest that an outer vertex may lie below an inner layer and still be brought back over it [m]. Default 5 cm, as far as
+    /// the order of layers is judged.
+    pub reach: f64,
+    /// Whether crossings of a garment with itself are mended where possible. Default yes.
+    pub self_contact: bool,
+    /// Most wall time per garment, looked at between rounds; a limit that is hit makes the result depend on the machine.
+    /// Default none.
+    pub time: Option<Duration>,
+}
+
+impl Default for ResolveSettings {
+    fn default() -> Self {
+        Self {
+            gap: 1e-3,
+            trigger: 0.25,
+            rings: 8,
+            rounds: 40,
+            sweeps: 20,
+            reach: super::super::ORDER_RADIUS,
+            self_contact: true,
+            time: None,
+        }
+    }
+}
+
+impl ResolveSettings {
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// [`ResolveError::Setting`] names the first that is out of range.
+    pub fn check(&self) -> Result<(), ResolveError> {
+        let fail = |setting, value, expected| Err(ResolveError::Setting { setting, value, expected });
+        if !(self.gap > 0.0 && self.gap <= 0.05) {
+            return fail("gap", self.gap, "greater than 0 and at most 0.05 m");
+        }
+        if !(0.0..=1.0).contains(&self.trigger) {
+            return fail("trigger", self.trigger, "between 0 and 1");
+        }
+        if !(self.reach >= 0.0 && self.reach <= 0.5) {
+            return fail("reach", self.reach, "between 0 and 0.5 m");
+        }
+        for (setting, value, most) in
+            [("rings", self.rings, 1000), ("rounds", self.rounds, 10_000), ("sweeps", self.sweeps, 10_000)]
+        {
+            if !(1..=most).contains(&value) {
+                return fail(
+                    setting,
+                    value as f64,
+                    "at least 1 and at most 1000 rings, 10000 rounds or sweeps",
+                );
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,291 @@
+//! `clothcombo drape`: any body, any garments, in order.
+
+mod job;
+mod outfits;
+mod summary;
+
+use crate::device::Backend;
+use crate::draper::output::{Show, Staged, write};
+use crate::draper::{Drape, Draper, DraperError, DraperSettings, Outfit, Report, SourceGarment, smooth};
+use clap::{Parser, ValueEnum};
+use clothcombo_data::format::atomic;
+use clothcombo_physics::contact::resolve::ResolveSettings;
+use indicatif::{ProgressBar, ProgressStyle};
+use job::{Job, Scenes, ordered};
+use miette::{IntoDiagnostic, Report as Failure, WrapErr};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Drapes garments on a body, innermost first: OBJ, GLB, picture, viewer and a report with a certificate
+#[derive(Parser)]
+#[command(after_help = "Examples (garments from the body outwards):\n  \
+        clothcombo drape --checkpoint runs/smoke --garments tee.obj coat.glb -o out\n  \
+        clothcombo drape --garments tee.obj skirt.obj coat.obj --order 1,0,2 --shape 1.5,-0.5 --pose walk.npz:30 -o out\n  \
+        clothcombo drape --garments tee.obj --motion walk.npz --frames 0..120 --smooth -o out\n  \
+        clothcombo drape --outfits wardrobe.toml -o out\n\n\
+        A garment is a mesh file (.obj, .ply, .stl, .gltf, .glb) or the name of one in --dataset or in the model's own data.\n\
+        What does not lie on the body in metres, y up and T-pose is fitted first (see `clothcombo fit`); every repair is in\n\
+        report.json. Outputs keep the vertices and polygons of the given files, in their order.\n\n\
+        --outfits takes a TOML file:\n  \
+        [[outfit]]\n  name = \"monday\"\n  garments = [\"tee.obj\", \"coat.obj\"]\n  shape = [1.0]       # optional, as are pose, \
+        motion, frames, every")]
+pub struct Arguments {
+    /// Run, checkpoint folder or model.safetensors; default: the model in the folder models
+    #[arg(long, value_name = "PATH")]
+    checkpoint: Option<PathBuf>,
+    /// Body: "mannequin" or a body npz; default: the one the model was trained on
+    #[arg(long, value_name = "BODY")]
+    body: Option<String>,
+    #[command(flatten)]
+    scene: job::SceneArguments,
+    /// Garments, innermost first: mesh files or names
+    #[arg(long, num_args = 1.., value_name = "GARMENT", required_unless_present = "outfits", conflicts_with = "outfits")]
+    garments: Vec<String>,
+    /// Wears the garments in another order: their numbers from 0, innermost first
+    #[arg(long, value_delimiter = ',', value_name = "NUMBERS")]
+    order: Option<Vec<usize>>,
+    /// Several outfits in one process, from a TOML file; each garment is embedded once
+    #[arg(long, value_name = "FILE")]
+    outfits: Option<PathBuf>,
+    /// Folder whose garments may be named; repeatable
+    #[arg(long, value_name = "FOLDER")]
+    dataset: Vec<PathBuf>,
+    /// Whether mesh files are fitted to the body
+    #[arg(long, value_enum, default_value_t = Fit::Auto)]
+    fit: Fit,
+    /// Steps of the static solver from the networks' state, at most 5 mm each and 5 cm together
+    #[arg(long, default_value_t = 0, value_name = "STEPS")]
+    refine: usize,
+    /// Leaves out the post-process; the certificate still counts everything
+    #[arg(long)]
+    no_resolve: bool,
+    /// Gap the post-process makes [mm]
+    #[arg(long, default_value_t = 1.0, value_name = "MM")]
+    gap: f64,
+    /// Smooths a motion over this many frames to each side; never makes an intersection
+    #[arg(long, num_args = 0..=1, default_value_t = 0, default_missing_value = "2", value_name = "FRAMES")]
+    smooth: usize,
+    /// Folder that keeps embeddings between runs; default: clothcombo in the user's cache folder
+    #[arg(long, value_name = "FOLDER")]
+    cache: Option<PathBuf>,
+    /// Keeps nothing between runs
+    #[arg(long, conflicts_with = "cache")]
+    no_cache: bool,
+    /// Writes OBJ files of every frame of a motion, not only of the first
+    #[arg(long)]
+    all_frames: bool,
+    /// Replaces the folder of an earlier drape
+    #[arg(long)]
+    replace: bool,
+    /// Prints the report as JSON instead of tables
+    #[arg(long)]
+    json: bool,
+    /// Compute device
+    #[arg(long, value_enum, default_value_t = Backend::preferred())]
+    device: Backend,
+    /// Folder to make
+    #[arg(short, long, value_name = "FOLDER")]
+    output: PathBuf,
+}
+
+/// Whether mesh files are fitted.
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
+enum Fit {
+    /// Those that do not lie on the body as they are, or have defects
+    Auto,
+    /// All
+    Always,
+    /// None: they are taken as they are
+    Never,
+}
+
+impl Fit {
+    fn decided(self) -> Option<bool> {
+        match self {
+            Self::Auto => None,
+            Self::Always => Some(true),
+            Self::Never => Some(false),
+        }
+    }
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// When a file cannot be read or written, or something cannot be draped. Intersections that are left are no error: the
+/// certificate lists them.
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let jobs = jobs(arguments)?;
+    let staged = Staged::new(&arguments.output, arguments.replace)?;
+    let clock = Instant::now();
+    let draper = Draper::load(arguments.checkpoint.as_deref(), &settings(arguments)?)?;
+    let closet = draper.closet(&arguments.dataset)?;
+    tracing::info!(
+        "model {} (step {}), body {}: loaded in {:.1} s",
+        draper.trained().folder.display(),
+        draper.trained().state.step,
+        draper.body().name,
+        clock.elapsed().as_secs_f64()
+    );
+    let clock = Instant::now();
+    let mut reports = Vec::new();
+    for job in &jobs {
+        let find = |name: &String| closet.find(name, draper.body(), arguments.fit.decided());
+        let sources = job.garments.iter().map(find).collect::<Result<Vec<_>, _>>()?;
+        let sources = ordered(sources, job.order.as_deref())?;
+        sources.iter().for_each(tell_repairs);
+        let scenes = job.scenes(&draper)?;
+        let outfit = draper.outfit(sources)?;
+        let folder = match jobs.len() {
+            1 => staged.folder().to_owned(),
+            _ => staged.folder().join(&job.name),
+        };
+        let report = drape_job(arguments, &draper, &outfit, job, &scenes, &folder)
+            .wrap_err_with(|| format!("outfit {}", job.name))?;
+        reports.push((job.name.as_str(), report));
+    }
+    if jobs.len() > 1 {
+        let list: Vec<_> = reports
+            .iter()
+            .map(|(name, r)| json!({ "name": name, "milliseconds": r.milliseconds, "certificate": r.certificate }))
+            .collect();
+        write_json(&staged.folder().join("report.json"), &json!({ "outfits": list }))?;
+    }
+    staged.commit()?;
+    print(arguments, &reports)?;
+    let seconds = clock.elapsed().as_secs_f64();
+    eprintln!("{} draped and written in {seconds:.2} s after loading", arguments.output.display());
+    Ok(())
+}
+
+fn jobs(arguments: &Arguments) -> Result<Vec<Job>, Failure> {
+    match &arguments.outfits {
+        Some(file) => outfits::read(file, &arguments.scene),
+        None => Ok(vec![Job {
+            name: "outfit".to_owned(),
+            garments: arguments.garments.clone(),
+            order: arguments.order.clone(),
+            scene: arguments.scene.clone(),
+        }]),
+    }
+}
+
+fn settings(arguments: &Arguments) -> Result<DraperSettings, Failure> {
+    let post_process = ResolveSettings { gap: 1e-3 * arguments.gap, ..ResolveSettings::default() };
+    post_process.check().into_diagnostic().wrap_err("--gap")?;
+    let cache = match arguments.no_cache {
+        true => None,
+        false => arguments.cache.clone().or_else(user_cache),
+    };
+    Ok(DraperSettings {
+        body: arguments.body.clone(),
+        cache,
+        backend: arguments.device,
+        refine: arguments.refine,
+        resolve: !arguments.no_resolve,
+        post_process,
+        ..DraperSettings::default()
+    })
+}
+
+/// `clothcombo` in the folder for what programs may compute anew.
+fn user_cache() -> Option<PathBuf> {
+    let folder = |variable: &str| std::env::var_os(variable).filter(|v| !v.is_empty()).map(PathBuf::from);
+    let cache = folder("XDG_CACHE_HOME").or_else(|| folder("LOCALAPPDATA"));
+    Some(cache.or_else(|| Some(folder("HOME")?.join(".cache")))?.join("clothcombo"))
+}
+
+fn tell_repairs(source: &SourceGarment) {
+    let Some(fit) = &source.fit else { return };
+    let name = &source.garment.name;
+    tracing::info!("{name} fitted: {}", fit.assumptions().join("; "));
+    for repair in &fit.repairs {
+        tracing::info!("{name} repaired: {} ({})", repair.kind.text(), repair.count);
+    }
+}
+
+fn drape_job(
+    arguments: &Arguments,
+    draper: &Draper,
+    outfit: &Outfit,
+    job: &Job,
+    scenes: &Scenes,
+    folder: &Path,
+) -> Result<Report, Failure> {
+    let mut drapes = drape_all(draper, outfit, scenes)?;
+    let smoothing = match arguments.smooth {
+        radius if radius > 0 && !scenes.moments.is_empty() => {
+            Some(smooth(draper, outfit, &mut drapes, radius)?)
+        }
+        _ => None,
+    };
+    let title = match job.name.as_str() {
+        "outfit" => outfit.names().collect::<Vec<_>>().join(", "),
+        name => name.to_owned(),
+    };
+    let show = Show {
+        draper,
+        outfit,
+        drapes: &drapes,
+        moments: &scenes.moments,
+        title: &title,
+        all_frames: arguments.all_frames,
+    };
+    std::fs::create_dir_all(folder).into_diagnostic()?;
+    let (written, report) = rayon::join(
+        || write(folder, &show),
+        || Report::new(draper, outfit, &drapes, &scenes.moments, scenes.body.clone(), smoothing),
+    );
+    let report = report?;
+    for (file, milliseconds) in written? {
+        tracing::debug!("{file} in {milliseconds:.0} ms");
+    }
+    write_json(&folder.join("report.json"), &report)?;
+    Ok(report)
+}
+
+fn drape_all(draper: &Draper, outfit: &Outfit, scenes: &Scenes) -> Result<Vec<Drape>, Failure> {
+    let style = ProgressStyle::with_template("frames {bar:30} {pos}/{len} · {eta} left").into_diagnostic()?;
+    let bar = match scenes.states.len() {
+        1 => ProgressBar::hidden(),
+        frames => ProgressBar::new(frames as u64).with_style(style),
+    };
+    let drapes = scenes.states.iter().map(|state| {
+        let mut drape = draper.drape(outfit, state)?;
+        if scenes.states.len() > 1 {
+            drape.slim();
+        }
+        bar.inc(1);
+        Ok(drape)
+    });
+    let drapes = drapes.collect::<Result<Vec<_>, DraperError>>();
+    bar.finish_and_clear();
+    Ok(drapes?)
+}
+
+fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(), Failure> {
+    let text = serde_json::to_vec_pretty(value).into_diagnostic()?;
+    atomic::write(path, &text).into_diagnostic().wrap_err_with(|| format!("cannot write {}", path.display()))
+}
+
+fn print(arguments: &Arguments, reports: &[(&str, Report)]) -> Result<(), Failure> {
+    let text = match (arguments.json, reports) {
+        (true, [(_, only)]) => serde_json::to_string_pretty(only).into_diagnostic()? + "\n",
+        (true, several) => {
+            let all: serde_json::Map<_, _> = several
+                .iter()
+                .map(|(name, report)| Ok(((*name).to_owned(), serde_json::to_value(report)?)))
+                .collect::<Result<_, serde_json::Error>>()
+                .into_diagnostic()?;
+            serde_json::to_string_pretty(&all).into_diagnostic()? + "\n"
+        }
+        (false, [(_, only)]) => summary::tables(only),
+        (false, several) => several
+            .iter()
+            .map(|(name, report)| format!("{name}\n{}", summary::tables(report)))
+            .collect::<Vec<_>>()
+            .join("\n"),
+    };
+    super::print_all(&text)
+}

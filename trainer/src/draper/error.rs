@@ -1,0 +1,154 @@
+//! Why something cannot be draped.
+
+use crate::checkpoint::CheckpointError;
+use crate::scene::LibraryError;
+use clothcombo_data::asset::BodyError;
+use clothcombo_data::fit::FitError;
+use clothcombo_model::ModelError;
+use clothcombo_physics::contact::resolve::ResolveError;
+use clothcombo_physics::energy::EnergyError;
+use clothcombo_physics::equilibrium::EquilibriumError;
+use miette::Diagnostic;
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// Why something cannot be draped.
+#[derive(Debug, Error, Diagnostic)]
+pub enum DraperError {
+    /// No model was named and none is shipped.
+    #[error("no trained model: none was named, and there is none in {}", searched.join(", "))]
+    #[diagnostic(help(
+        "train one (clothcombo-train --config configs/smoke.toml takes three minutes) and pass --checkpoint RUN, \
+         or a folder with model.safetensors, config.toml and state.json"
+    ))]
+    NoModel {
+        /// Where it was looked for.
+        searched: Vec<String>,
+    },
+    /// Several models are shipped.
+    #[error("several trained models in {}: {}", folder.display(), names.join(", "))]
+    #[diagnostic(help("name one with --checkpoint, for example --checkpoint {}/{}", folder.display(), names[0]))]
+    SeveralModels {
+        /// The folder.
+        folder: PathBuf,
+        /// Their names.
+        names: Vec<String>,
+    },
+    /// The model cannot be read.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Checkpoint(#[from] CheckpointError),
+    /// Body or garment folder cannot be read, or a garment not be prepared.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Library(#[from] LibraryError),
+    /// The body the model was trained on is not there.
+    #[error("the model was trained on body {body}, which is not there")]
+    #[diagnostic(help(
+        "put it beside the model as body.npz, run from the folder its path is relative to, or pass --body"
+    ))]
+    NoBody {
+        /// The path in the model's configuration.
+        body: String,
+    },
+    /// The body lacks joints the networks were trained on.
+    #[error("body '{body}' has no joint {}", missing.join(", "))]
+    #[diagnostic(help("use the body the model was trained on, or one with joints of the same names"))]
+    Joints {
+        /// The body.
+        body: String,
+        /// Names of the missing joints.
+        missing: Vec<String>,
+    },
+    /// Shape or pose do not fit the body.
+    #[error(transparent)]
+    Body(#[from] BodyError),
+    /// A number in shape or pose is not finite.
+    #[error("the {what} holds a number that is not finite")]
+    NotFinite {
+        /// Shape or pose.
+        what: &'static str,
+    },
+    /// Neither a file nor a known name.
+    #[error("no garment {name:?}: it is no file, and {}", match known.len() {
+        0 => "no folder of garments is known".to_owned(),
+        n => format!("none of the {n} known garments is called that"),
+    })]
+    #[diagnostic(help("{}", known_names(known)))]
+    UnknownGarment {
+        /// What was asked for.
+        name: String,
+        /// Garments known by name.
+        known: Vec<String>,
+    },
+    /// A mesh is no garment of this body.
+    #[error("{}: {reason}", path.display())]
+    #[diagnostic(help(
+        "`clothcombo fit` has settings for unit, axes and arm pose; `clothcombo check` lists defects"
+    ))]
+    Fit {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: FitError,
+    },
+    /// A garment is too fine.
+    #[error(
+        "garment '{name}' has {vertices} vertices, more than {} can be draped at once",
+        super::MAX_VERTICES
+    )]
+    #[diagnostic(help("decimate it first: the networks see no detail of a millimetre"))]
+    TooLarge {
+        /// The garment.
+        name: String,
+        /// Its vertices.
+        vertices: usize,
+    },
+    /// Too few or too many layers.
+    #[error("{count} garments; an outfit has 1 to {most}")]
+    Count {
+        /// Garments given.
+        count: usize,
+        /// Most garments.
+        most: usize,
+    },
+    /// A posed surface with another number of vertices than the body.
+    #[error("the posed body has {found} vertices, body '{body}' has {expected}")]
+    #[diagnostic(help("a posed mesh must have the vertices of the body model, in its order"))]
+    Surface {
+        /// The body model.
+        body: String,
+        /// Vertices given.
+        found: usize,
+        /// Vertices of the model.
+        expected: usize,
+    },
+    /// The networks do not take it.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The networks made something that is no number.
+    #[error("the networks moved garment '{garment}' to a place that is not finite")]
+    #[diagnostic(help("the model is damaged or was trained to divergence; try an earlier checkpoint"))]
+    Diverged {
+        /// The garment.
+        garment: String,
+    },
+    /// A garment without energies.
+    #[error(transparent)]
+    Energy(#[from] EnergyError),
+    /// Refinement failed.
+    #[error("refinement: {0}")]
+    Refine(#[from] EquilibriumError),
+    /// The post-process refused its input.
+    #[error("post-process: {0}")]
+    Resolve(#[from] ResolveError),
+}
+
+fn known_names(known: &[String]) -> String {
+    const SHOWN: usize = 12;
+    match known.len() {
+        0 => "pass a mesh file (.obj, .ply, .stl, .gltf, .glb), or --dataset FOLDER".to_owned(),
+        n if n > SHOWN => format!("for example {}, and {} more", known[..SHOWN].join(", "), n - SHOWN),
+        _ => format!("the garments are: {}", known.join(", ")),
+    }
+}

@@ -1,0 +1,432 @@
+//! Any body, any garments, in order: the trained networks as a library.
+//!
+//! ```no_run
+//! use clothcombo_data::asset::Pose;
+//! use clothcombo_trainer::draper::{BodyState, Draper, DraperSettings};
+//! use std::path::Path;
+//!
+//! let draper = Draper::load(Some(Path::new("runs/smoke")), &DraperSettings::default())?;
+//! let closet = draper.closet(&[])?;
+//! let garments = ["t_shirt_000003", "skirt_000004"].map(|name| closet.find(name, draper.body(), None));
+//! let outfit = draper.outfit(garments.into_iter().collect::<Result<_, _>>()?)?;
+//! let drape = draper.drape(&outfit, &BodyState::new(vec![1.0, -0.5], Pose::t_pose(22)))?;
+//! for (piece, draped) in outfit.pieces.iter().zip(&drape.garments) {
+//!     println!("{}: {} vertices", piece.name, draped.positions.len());
+//! }
+//! # Ok::<(), clothcombo_trainer::draper::DraperError>(())
+//! ```
+//!
+//! [`Draper::outfit`] does what depends on the garments alone (binding, operators, embedding), once per garment and process,
+//! and once per machine with a cache; [`Draper::drape`] does what depends on the body: networks, optional refinement,
+//! post-process. The networks see the pose without its heading; positions come back in the frame of the given pose.
+
+mod acceleration;
+mod error;
+mod outfit;
+pub mod output;
+mod refine;
+mod report;
+mod shipped;
+mod smooth;
+mod source;
+
+pub use acceleration::{Acceleration, acceleration};
+pub use clothcombo_physics::contact::resolve::Certificate;
+pub use error::DraperError;
+pub use outfit::{MAX_GARMENTS, MAX_VERTICES, Outfit, Piece, PieceTimes};
+pub use refine::Refinement;
+pub use report::{BodyReport, FrameReport, GarmentReport, ModelReport, Moment, PhaseTimes, Report, Stage};
+pub use shipped::shipped_model;
+pub use smooth::{Smoothing, smooth};
+pub use source::{Closet, SourceGarment};
+
+use crate::checkpoint::TrainedModel;
+use crate::config::PoseEncoding;
+use crate::device::Backend;
+use crate::drape::{body_tensors, drape_on};
+use crate::evaluate::equilibrium_error::{self, ReferenceScene, skinning_transforms};
+use crate::scene::{ActiveJoints, BodyDraw, Dresser, LibraryError, PreparedScene, Recipe, load_body};
+use burn::tensor::Device;
+use clothcombo_data::asset::rotation::{Matrix3, apply, matrix_from_axis_angle};
+use clothcombo_data::asset::{Body, Pose};
+use clothcombo_data::cache::{ArrayCache, Key, body_key};
+use clothcombo_model::ClothCombo;
+use clothcombo_physics::Surface;
+use clothcombo_physics::contact::resolve::{Layer, ResolveSettings, certify, resolve};
+use clothcombo_physics::equilibrium::Transform;
+use clothcombo_physics::vec3::add;
+use outfit::KnownGarments;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// How a [`Draper`] is set up.
+#[derive(Clone, Debug)]
+pub struct DraperSettings {
+    /// `"mannequin"` or a body npz; default: the body the model was trained on.
+    pub body: Option<String>,
+    /// Folder of the on-disk cache of bindings, operators and embeddings; none computes them anew in every process.
+    pub cache: Option<PathBuf>,
+    /// Largest size of the cache [bytes].
+    pub cache_limit: u64,
+    /// The compute device.
+    pub backend: Backend,
+    /// Steps of the static solver after the networks; 0 switches refinement off.
+    pub refine: usize,
+    /// Whether the post-process resolves what still intersects.
+    pub resolve: bool,
+    /// How it does that.
+    pub post_process: ResolveSettings,
+}
+
+impl Default for DraperSettings {
+    fn default() -> Self {
+        let backend = Backend::preferred();
+        let post_process = ResolveSettings::default();
+        Self {
+            body: None,
+            cache: None,
+            cache_limit: 10 << 30,
+            backend,
+            refine: 0,
+            resolve: true,
+            post_process,
+        }
+    }
+}
+
+/// A body to be dressed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BodyState {
+    /// Shape parameters β; missing ones are 0.
+    pub shape: Vec<f64>,
+    /// Pose θ.
+    pub pose: Pose,
+    /// The posed surface `[V, 3]` [m] that counts for contact, where it is known better than by shape and pose: a scan, or
+    /// another program's correctives.
+    pub surface: Option<Vec<[f64; 3]>>,
+    /// Where its pelvis stands [m]; `surface` is there already.
+    pub place: [f64; 3],
+}
+
+impl BodyState {
+    /// The body model's own surface at this shape and pose.
+    pub fn new(shape: Vec<f64>, pose: Pose) -> Self {
+        Self { shape, pose, surface: None, place: [0.0; 3] }
+    }
+}
+
+/// One garment on one body, vertices as in its [`Piece`].
+#[derive(Clone, Debug)]
+pub struct GarmentDrape {
+    /// Linear blend skinning of the start state, which has learned nothing `[V, 3]` [m].
+    pub skinned: Vec<[f64; 3]>,
+    /// What the networks made of it `[V, 3]` [m].
+    pub network: Vec<[f64; 3]>,
+    /// What came to the post-process: of the networks, or refined `[V, 3]` [m].
+    pub before: Vec<[f64; 3]>,
+    /// The result `[V, 3]` [m].
+    pub positions: Vec<[f64; 3]>,
+    /// Blended skinning transform of every vertex, canonical → posed.
+    pub transforms: Vec<Transform>,
+    /// Wall time of the post-process [ms].
+    pub resolve_ms: f64,
+}
+
+/// An outfit on one body.
+#[derive(Clone, Debug)]
+pub struct Drape {
+    /// The posed body `[V, 3]` [m].
+    pub body: Vec<[f64; 3]>,
+    /// Where it faces: angle about the vertical from +z towards +x [radians].
+    pub heading: f64,
+    /// The garments, inner → outer.
+    pub garments: Vec<GarmentDrape>,
+    /// Wall time of the phases.
+    pub milliseconds: PhaseTimes,
+    /// What the refinement did, if there was one.
+    pub refinement: Option<Refinement>,
+    /// Exact counts of what intersects in the result.
+    pub certificate: Certificate,
+    /// The body with its search trees, as long as they are worth their memory.
+    surface: Option<Arc<Surface<f64>>>,
+}
+
+/// A trained model with a body, ready to drape.
+pub struct Draper {
+    trained: TrainedModel,
+    model: ClothCombo,
+    recipe: Recipe,
+    joints: ActiveJoints,
+    device: Device,
+    settings: DraperSettings,
+    known: KnownGarments,
+}
+
+impl Draper {
+    /// Loads a model (see [`TrainedModel::open`]; without `model` the shipped one) and its body.
+    ///
+    /// # Errors
+    /// When there is no model, it cannot be read, or the body does not have its joints.
+    pub fn load(model: Option<&Path>, settings: &DraperSettings) -> Result<Self, DraperError> {
+        let trained = match model {
+            Some(path) => TrainedModel::open(path)?,
+            None => shipped_model()?,
+        };
+        let body = load_model_body(&trained, settings.body.as_deref())?;
+        let joints = ActiveJoints::named(&body, &trained.state.joints)
+            .map_err(|missing| DraperError::Joints { body: body.name.clone(), missing })?;
+        let device = settings.backend.device();
+        let model = trained.networks(&device)?;
+        let cache = settings.cache.as_deref().map(|folder| ArrayCache::open(folder, settings.cache_limit));
+        let cache = cache.transpose().map_err(LibraryError::data)?;
+        let key: Option<Key> = cache.as_ref().map(|_| body_key(&body));
+        let recipe = Recipe::new(&trained.config, Arc::new(body));
+        let settings = settings.clone();
+        Ok(Self {
+            trained,
+            model,
+            recipe,
+            joints,
+            device,
+            settings,
+            known: KnownGarments::new(cache.zip(key)),
+        })
+    }
+
+    /// The body model.
+    pub fn body(&self) -> &Body {
+        &self.recipe.body
+    }
+
+    /// The trained model.
+    pub fn trained(&self) -> &TrainedModel {
+        &self.trained
+    }
+
+    /// How it was set up.
+    pub fn settings(&self) -> &DraperSettings {
+        &self.settings
+    }
+
+    /// Garments by name: those of `folders`, and those the model was trained on as far as they are there.
+    ///
+    /// # Errors
+    /// When a folder cannot be listed.
+    pub fn closet(&self, folders: &[PathBuf]) -> Result<Closet, DraperError> {
+        Closet::new(folders, &self.trained.config)
+    }
+
+    /// Prepares and embeds garments, innermost first. A garment this draper has met before, by content, costs nothing.
+    ///
+    /// # Errors
+    /// For more garments than an outfit may have, or one that cannot be prepared.
+    pub fn outfit(&self, garments: Vec<SourceGarment>) -> Result<Outfit, DraperError> {
+        self.known.outfit(self, garments)
+    }
+
+    /// Drapes `outfit` on `body`.
+    ///
+    /// # Errors
+    /// When shape or pose do not fit the body model, or the networks diverge.
+    pub fn drape(&self, outfit: &Outfit, body: &BodyState) -> Result<Drape, DraperError> {
+        let mut milliseconds = PhaseTimes::default();
+        let clock = Instant::now();
+        let shape = self.checked_shape(&body.shape)?;
+        if body.pose.rotations.as_flattened().iter().chain(&body.place).any(|x| !x.is_finite()) {
+            return Err(DraperError::NotFinite { what: "pose" });
+        }
+        let posed = self.body().posed(&shape, &body.pose)?;
+        let mut surface = match &body.surface {
+            Some(given) => self.checked_surface(given)?.to_vec(),
+            None => posed.positions.iter().map(|p| add(*p, body.place)).collect(),
+        };
+        round(&mut surface);
+        let surface = Arc::new(Surface::new(surface, self.body().faces.clone()));
+        let (facing, heading) = body.pose.without_heading();
+        let (facing, yaw) = match self.trained.config.data.poses.remove_heading {
+            true => (facing, heading),
+            false => (body.pose.clone(), 0.0),
+        };
+        let scene = self.scene(outfit, BodyDraw { shape, pose: facing });
+        let (tensors, start) = body_tensors(&scene.bodies[0], &self.dimensions(), &self.device)?;
+        milliseconds.posing = elapsed(clock);
+
+        let (drape, [draping, untangling]) =
+            drape_on(&self.model, &outfit.tensors, &outfit.embeddings, &tensors, start);
+        milliseconds.draping = 1e3 * draping.as_secs_f64();
+        milliseconds.untangling = 1e3 * untangling.as_secs_f64();
+
+        // The body may be turned about the vertical: what the networks made turns with it, to where everything else happens.
+        let turn = matrix_from_axis_angle([0.0, yaw, 0.0]);
+        let transforms: Vec<Transform> =
+            skinning_transforms(&scene).iter().map(|t| turned(&turn, t, body.place)).collect();
+        let start = &scene.bodies[0].start;
+        let skinned: Vec<[f64; 3]> = transforms
+            .iter()
+            .zip(start)
+            .map(|(t, p)| equilibrium_error::apply(t, p.map(f64::from)))
+            .collect();
+        let network: Vec<[f64; 3]> =
+            drape.layered.posed.iter().map(|p| add(apply(&turn, p.map(f64::from)), body.place)).collect();
+        outfit.check_finite(&network)?;
+
+        let clock = Instant::now();
+        let (before, refinement) = match self.settings.refine {
+            0 => (network.clone(), None),
+            steps => {
+                let mut energy = ReferenceScene::new(&self.trained.config.losses, &scene)?.energy;
+                energy.body = surface.clone();
+                let (positions, done) = refine::refine(&energy, &transforms, &network, steps)?;
+                (positions, Some(done))
+            }
+        };
+        milliseconds.refine = elapsed(clock);
+
+        let clock = Instant::now();
+        let parts = outfit.split(&before);
+        let (resolved, times) = match self.settings.resolve {
+            true => {
+                let done = resolve(&surface, &outfit.layers(&parts), &self.settings.post_process)?;
+                (done.positions, done.garments.iter().map(|g| 1e3 * g.time.as_secs_f64()).collect())
+            }
+            false => (parts.iter().map(|p| p.to_vec()).collect(), vec![0.0; parts.len()]),
+        };
+        milliseconds.resolve = elapsed(clock);
+
+        let (skinned, network) = (outfit.split(&skinned), outfit.split(&network));
+        let transforms = outfit.split(&transforms);
+        let garments = resolved
+            .into_iter()
+            .enumerate()
+            .map(|(g, positions)| GarmentDrape {
+                skinned: skinned[g].to_vec(),
+                network: network[g].to_vec(),
+                before: parts[g].to_vec(),
+                positions,
+                transforms: transforms[g].to_vec(),
+                resolve_ms: times[g],
+            })
+            .collect();
+        let mut drape = Drape {
+            body: surface.positions.clone(),
+            heading,
+            garments,
+            milliseconds,
+            refinement,
+            certificate: Certificate::default(),
+            surface: Some(surface),
+        };
+        let clock = Instant::now();
+        drape.settle(self, outfit)?;
+        drape.milliseconds.certificate = elapsed(clock);
+        Ok(drape)
+    }
+
+    fn dimensions(&self) -> clothcombo_model::Dimensions {
+        self.trained.state.dimensions()
+    }
+
+    fn scene(&self, outfit: &Outfit, body: BodyDraw) -> PreparedScene {
+        let encoding: PoseEncoding = self.trained.config.data.poses.encoding;
+        let dresser = Dresser {
+            body: self.body(),
+            joints: &self.joints,
+            features: &|pose, joints| encoding.features(pose, joints),
+            losses: &self.trained.config.losses,
+        };
+        let mut scene = dresser.dress((0..outfit.pieces.len()).collect(), outfit.worn(), &[body], 1.0);
+        // A body with fewer components than the networks know has the others at their mean.
+        scene.bodies[0].shape.resize(self.trained.state.shape_count, 0.0);
+        scene
+    }
+
+    fn checked_shape(&self, shape: &[f64]) -> Result<Vec<f64>, DraperError> {
+        if shape.iter().any(|x| !x.is_finite()) {
+            return Err(DraperError::NotFinite { what: "shape" });
+        }
+        let mut shape = shape.to_vec();
+        let count = self.body().shape_count;
+        // Longer ones are refused by the body, by name.
+        if shape.len() < count {
+            shape.resize(count, 0.0);
+        }
+        Ok(shape)
+    }
+
+    fn checked_surface<'a>(&self, surface: &'a [[f64; 3]]) -> Result<&'a [[f64; 3]], DraperError> {
+        let (found, expected) = (surface.len(), self.body().vertex_count());
+        if found != expected {
+            return Err(DraperError::Surface { body: self.body().name.clone(), found, expected });
+        }
+        match surface.as_flattened().iter().all(|x| x.is_finite()) {
+            true => Ok(surface),
+            false => Err(DraperError::NotFinite { what: "posed body" }),
+        }
+    }
+}
+
+impl Drape {
+    /// The body's surface, with its search trees if they were kept.
+    fn surface(&self, draper: &Draper) -> Arc<Surface<f64>> {
+        let make = || Arc::new(Surface::new(self.body.clone(), draper.body().faces.clone()));
+        self.surface.clone().unwrap_or_else(make)
+    }
+
+    /// Drops what can be made again at any time: some megabytes, which add up over the frames of a motion.
+    pub fn slim(&mut self) {
+        self.surface = None;
+    }
+
+    /// Brings the positions to what files hold, and counts what intersects there.
+    fn settle(&mut self, draper: &Draper, outfit: &Outfit) -> Result<(), DraperError> {
+        self.garments.iter_mut().for_each(|garment| round(&mut garment.positions));
+        let before: Vec<&[[f64; 3]]> = self.garments.iter().map(|g| g.before.as_slice()).collect();
+        let after: Vec<&[[f64; 3]]> = self.garments.iter().map(|g| g.positions.as_slice()).collect();
+        let mut certificate = certify(&self.surface(draper), &outfit.layers(&after))?;
+        let strain =
+            |layers: Vec<Layer>| layers.iter().map(|l| l.garment.strain_energy(l.positions)).sum::<f64>();
+        let [before, after] = [before, after].map(|parts| strain(outfit.layers(&parts)));
+        certificate.strain_added = (before > 0.0).then(|| after / before - 1.0);
+        self.certificate = certificate;
+        Ok(())
+    }
+}
+
+/// To the 0.1 µm that OBJ files hold: what is certified is then, to the bit, what is read from them.
+fn round(positions: &mut [[f64; 3]]) {
+    for x in positions.as_flattened_mut() {
+        *x = (*x * 1e7).round() / 1e7;
+    }
+}
+
+fn load_model_body(trained: &TrainedModel, named: Option<&str>) -> Result<Body, DraperError> {
+    let beside = trained.folder.join("body.npz");
+    let own = &trained.config.data.body;
+    let name = match named {
+        Some(name) => name.to_owned(),
+        None if beside.is_file() => beside.display().to_string(),
+        None if own == "mannequin" => own.clone(),
+        None => {
+            // A run lies somewhere below the folder its paths are relative to.
+            let places = std::iter::once(Path::new("")).chain(trained.folder.ancestors());
+            let found = places.map(|place| place.join(own)).find(|path| path.is_file());
+            found.ok_or_else(|| DraperError::NoBody { body: own.clone() })?.display().to_string()
+        }
+    };
+    Ok(load_body(&name, trained.state.shape_count)?)
+}
+
+fn elapsed(clock: Instant) -> f64 {
+    1e3 * clock.elapsed().as_secs_f64()
+}
+
+/// `turn` after `transform`, then a move to `place`.
+fn turned(turn: &Matrix3, transform: &Transform, place: [f64; 3]) -> Transform {
+    std::array::from_fn(|r| {
+        std::array::from_fn(|c| {
+            let value: f64 = (0..3).map(|k| turn[r][k] * transform[k][c]).sum();
+            if c == 3 { value + place[r] } else { value }
+        })
+    })
+}

@@ -1,0 +1,167 @@
+//! Everything a drape leaves on disk, as one folder that appears whole or not at all.
+//!
+//! ```text
+//! OUT/body.obj  OUT/NAME.obj …       the body, and every garment with the vertices and polygons it was given with
+//! OUT/frames/00012/…                 the same for every frame of a motion, if asked for
+//! OUT/scene.glb                      body and garments as named, coloured meshes; a motion as morph targets
+//! OUT/picture.png                    front, back and three-quarter
+//! OUT/viewer.html                    one page without any other file: orbit, layers, frames, heat maps
+//! OUT/report.json                    times, scores before and after the post-process, certificate
+//! ```
+
+mod picture;
+mod staged;
+mod viewer;
+
+pub use staged::Staged;
+
+use super::{Drape, Draper, DraperError, Moment, Outfit};
+use crate::picture::{BODY_COLOUR, PictureError, layer_colour};
+use clothcombo_data::format::obj::{self, ObjError};
+use clothcombo_data::format::{GlbError, SceneMesh, save_glb};
+use miette::Diagnostic;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+use thiserror::Error;
+
+/// Why a drape cannot be written.
+#[derive(Debug, Error, Diagnostic)]
+pub enum OutputError {
+    /// Something else is there.
+    #[error("{} is there and is not empty", path.display())]
+    #[diagnostic(help("choose another folder, or pass --replace if it holds an earlier drape"))]
+    Occupied {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// What is to be replaced is no drape.
+    #[error("{} is no folder that a drape was written to: it has no report.json", path.display())]
+    #[diagnostic(help(
+        "--replace removes the whole folder, and so only takes folders this verb has written"
+    ))]
+    Foreign {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// The path names no folder that could be made.
+    #[error("{} names no new folder", path.display())]
+    #[diagnostic(help("give the folder to be made a name, for example -o {}", path.join("drape").display()))]
+    NoName {
+        /// The path.
+        path: PathBuf,
+    },
+    /// The file system refused.
+    #[error("cannot write {}: {reason}", path.display())]
+    #[diagnostic(help(
+        "check that the folder is writable and the disk is not full; nothing was left behind"
+    ))]
+    Io {
+        /// File or folder.
+        path: PathBuf,
+        /// The system's reason.
+        reason: std::io::Error,
+    },
+    /// An OBJ file.
+    #[error(transparent)]
+    Obj(#[from] ObjError),
+    /// The GLB file.
+    #[error(transparent)]
+    Glb(#[from] GlbError),
+    /// The picture.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
+    /// A state that cannot be measured.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Draper(#[from] DraperError),
+}
+
+/// What is to be shown and written.
+#[derive(Clone, Copy)]
+pub struct Show<'a> {
+    /// What draped it.
+    pub draper: &'a Draper,
+    /// The garments.
+    pub outfit: &'a Outfit,
+    /// One drape, or the frames of a motion.
+    pub drapes: &'a [Drape],
+    /// When the frames are; empty for one drape that is no motion.
+    pub moments: &'a [Moment],
+    /// Headline of picture and viewer.
+    pub title: &'a str,
+    /// Whether every frame of a motion gets its OBJ files, not only the first.
+    pub all_frames: bool,
+}
+
+/// Times of writing [ms], by file.
+pub type WriteTimes = Vec<(&'static str, f64)>;
+
+/// Writes everything but the report into `folder`.
+///
+/// # Errors
+/// When a file cannot be written, or a state cannot be measured for the viewer's heat maps.
+pub fn write(folder: &Path, show: &Show) -> Result<WriteTimes, OutputError> {
+    fn timed<T>(run: impl FnOnce() -> Result<T, OutputError>) -> Result<f64, OutputError> {
+        let clock = Instant::now();
+        run().map(|_| 1e3 * clock.elapsed().as_secs_f64())
+    }
+    let meshes = || timed(|| write_meshes(folder, show));
+    let scene = || timed(|| write_scene(&folder.join("scene.glb"), show));
+    let picture =
+        || timed(|| Ok(crate::picture::save_png(&picture::draw(show), &folder.join("picture.png"))?));
+    let page = || timed(|| viewer::save(&folder.join("viewer.html"), show));
+    let ((meshes, scene), (picture, page)) =
+        rayon::join(|| rayon::join(meshes, scene), || rayon::join(picture, page));
+    Ok(vec![("obj", meshes?), ("glb", scene?), ("picture", picture?), ("viewer", page?)])
+}
+
+fn write_meshes(folder: &Path, show: &Show) -> Result<(), OutputError> {
+    write_frame(folder, show, &show.drapes[0])?;
+    if show.all_frames {
+        for (drape, moment) in show.drapes.iter().zip(show.moments) {
+            write_frame(&folder.join(format!("frames/{:05}", moment.frame)), show, drape)?;
+        }
+    }
+    Ok(())
+}
+
+fn write_frame(folder: &Path, show: &Show, drape: &Drape) -> Result<(), OutputError> {
+    let body = show.draper.body();
+    obj::save(&folder.join("body.obj"), &drape.body, &body.faces, &[format!("body {}", body.name)])?;
+    for (layer, (piece, garment)) in show.outfit.pieces.iter().zip(&drape.garments).enumerate() {
+        let source = &piece.source;
+        let mut comments =
+            vec![format!("{}, layer {layer} (0 = innermost), draped on {}", piece.name, body.name)];
+        let from = &source.garment.source;
+        // Garments under CC BY ask for their author's name wherever they go.
+        for (what, value) in [("source", &from.source), ("author", &from.author), ("licence", &from.licence)]
+        {
+            if !value.is_empty() {
+                comments.push(format!("{what}: {value}"));
+            }
+        }
+        let positions = source.in_given_order(&garment.positions);
+        let path = folder.join(format!("{}.obj", piece.name));
+        obj::save_polygons(&path, &positions, source.given.polygons(), &comments)?;
+    }
+    Ok(())
+}
+
+fn write_scene(path: &Path, show: &Show) -> Result<(), OutputError> {
+    let mut meshes = vec![SceneMesh {
+        name: "body",
+        colour: BODY_COLOUR,
+        faces: &show.draper.body().faces,
+        frames: show.drapes.iter().map(|d| d.body.as_slice()).collect(),
+    }];
+    for (layer, piece) in show.outfit.pieces.iter().enumerate() {
+        meshes.push(SceneMesh {
+            name: &piece.name,
+            colour: layer_colour(layer),
+            faces: piece.worn.garment.rest.faces(),
+            frames: show.drapes.iter().map(|d| d.garments[layer].positions.as_slice()).collect(),
+        });
+    }
+    let times: Vec<f64> = show.moments.iter().map(|m| m.seconds).collect();
+    Ok(save_glb(path, &meshes, &times)?)
+}

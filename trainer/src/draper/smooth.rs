@@ -1,0 +1,194 @@
+//! Temporal smoothing of a motion that never makes an intersection.
+//!
+//! What is smoothed is each vertex's offset from linear blend skinning in the frame of its own skinning transform, so that
+//! cloth that merely follows the body stays as it is. Every smoothed frame is counted exactly; where it crosses more than the
+//! frame as it was, less of the smoothing is applied, and none if need be.
+
+use super::{Drape, Draper, DraperError, Outfit};
+use clothcombo_physics::equilibrium::Transform;
+use clothcombo_physics::vec3::{add, cross, dot, scale, sub};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// Shares of the smoothing that are tried, in this order.
+const SHARES: [f64; 3] = [1.0, 0.5, 0.25];
+
+/// Linear parts with a smaller determinant cannot be undone: there, offsets are smoothed as they stand.
+const SMALLEST_DETERMINANT: f64 = 1e-3;
+
+/// What smoothing did.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Smoothing {
+    /// Frames to each side that are averaged, by binomial weights.
+    pub radius: usize,
+    /// Frames that were smoothed wholly.
+    pub whole: usize,
+    /// Frames that were smoothed in part.
+    pub partly: usize,
+    /// Frames that were left as they were, because smoothing would have made intersections.
+    pub left: usize,
+}
+
+/// Smooths `drapes`, consecutive frames of one motion, over `radius` frames to each side.
+///
+/// # Errors
+/// When a state cannot be counted: a garment has exploded.
+pub fn smooth(
+    draper: &Draper,
+    outfit: &Outfit,
+    drapes: &mut [Drape],
+    radius: usize,
+) -> Result<Smoothing, DraperError> {
+    let mut done = Smoothing { radius, whole: 0, partly: 0, left: 0 };
+    if radius == 0 || drapes.len() < 2 {
+        done.left = drapes.len();
+        return Ok(done);
+    }
+    let offsets: Vec<Vec<Vec<[f64; 3]>>> = drapes.par_iter().map(local_offsets).collect();
+    let weights = binomial(radius);
+    let smoothed: Vec<Option<(usize, Drape)>> = (0..drapes.len())
+        .into_par_iter()
+        .map(|frame| smoothed_frame(draper, outfit, drapes, &offsets, frame, &weights))
+        .collect::<Result<_, _>>()?;
+    for (drape, smoothed) in drapes.iter_mut().zip(smoothed) {
+        match smoothed {
+            Some((share, better)) => {
+                *drape = better;
+                *(if share == 0 { &mut done.whole } else { &mut done.partly }) += 1;
+            }
+            None => done.left += 1,
+        }
+    }
+    Ok(done)
+}
+
+/// The frame with as much smoothing as makes no intersection, and which share that is; `None` for none at all.
+fn smoothed_frame(
+    draper: &Draper,
+    outfit: &Outfit,
+    drapes: &[Drape],
+    offsets: &[Vec<Vec<[f64; 3]>>],
+    frame: usize,
+    weights: &[f64],
+) -> Result<Option<(usize, Drape)>, DraperError> {
+    let drape = &drapes[frame];
+    let wanted: Vec<Vec<[f64; 3]>> = drape
+        .garments
+        .iter()
+        .enumerate()
+        .map(|(g, garment)| {
+            let mean = averaged(offsets, g, frame, weights);
+            let vertices = garment.skinned.iter().zip(&garment.transforms).zip(mean);
+            vertices.map(|((start, transform), offset)| add(*start, out_of(transform, offset))).collect()
+        })
+        .collect();
+    for (number, share) in SHARES.into_iter().enumerate() {
+        let mut candidate = drape.clone();
+        for (garment, wanted) in candidate.garments.iter_mut().zip(&wanted) {
+            let towards = |(p, w): (&[f64; 3], &[f64; 3])| add(*p, scale(sub(*w, *p), share));
+            garment.positions = garment.positions.iter().zip(wanted).map(towards).collect();
+        }
+        candidate.settle(draper, outfit)?;
+        let (now, before) = (&candidate.certificate, &drape.certificate);
+        let is_no_worse = now.body_triangle_pairs <= before.body_triangle_pairs
+            && now.layer_triangle_pairs <= before.layer_triangle_pairs
+            && now.self_triangle_pairs <= before.self_triangle_pairs;
+        if is_no_worse {
+            return Ok(Some((number, candidate)));
+        }
+    }
+    Ok(None)
+}
+
+/// Binomial weights −radius…radius, not yet normalised.
+fn binomial(radius: usize) -> Vec<f64> {
+    let mut row = vec![1.0];
+    for _ in 0..2 * radius {
+        row = std::iter::once(1.0)
+            .chain(row.windows(2).map(|pair| pair[0] + pair[1]))
+            .chain(std::iter::once(1.0))
+            .collect();
+    }
+    row
+}
+
+fn averaged(offsets: &[Vec<Vec<[f64; 3]>>], garment: usize, frame: usize, weights: &[f64]) -> Vec<[f64; 3]> {
+    let radius = weights.len() / 2;
+    let mut sum = vec![[0.0; 3]; offsets[frame][garment].len()];
+    let mut total = 0.0;
+    // Symmetric about the frame also near the ends, so that steady movement stays where it is.
+    let reach = radius.min(frame).min(offsets.len() - 1 - frame);
+    for other in frame - reach..=frame + reach {
+        let weight = weights[radius + other - frame];
+        total += weight;
+        for (sum, offset) in sum.iter_mut().zip(&offsets[other][garment]) {
+            *sum = add(*sum, scale(*offset, weight));
+        }
+    }
+    sum.into_iter().map(|s| scale(s, 1.0 / total)).collect()
+}
+
+/// Offsets from skinning in the frames of the skinning transforms, per garment.
+fn local_offsets(drape: &Drape) -> Vec<Vec<[f64; 3]>> {
+    let of = |garment: &super::GarmentDrape| {
+        let vertices = garment.positions.iter().zip(&garment.skinned).zip(&garment.transforms);
+        vertices.map(|((p, start), transform)| into(transform, sub(*p, *start))).collect()
+    };
+    drape.garments.iter().map(of).collect()
+}
+
+fn columns(t: &Transform) -> [[f64; 3]; 3] {
+    std::array::from_fn(|c| [t[0][c], t[1][c], t[2][c]])
+}
+
+fn is_regular(t: &Transform) -> bool {
+    let [a, b, c] = columns(t);
+    dot(a, cross(b, c)).abs() >= SMALLEST_DETERMINANT
+}
+
+/// `A⁻¹ v` of the linear part A.
+fn into(t: &Transform, v: [f64; 3]) -> [f64; 3] {
+    if !is_regular(t) {
+        return v;
+    }
+    let [a, b, c] = columns(t);
+    let determinant = dot(a, cross(b, c));
+    [dot(v, cross(b, c)), dot(a, cross(v, c)), dot(a, cross(b, v))].map(|x| x / determinant)
+}
+
+/// `A v`.
+fn out_of(t: &Transform, v: [f64; 3]) -> [f64; 3] {
+    if !is_regular(t) {
+        return v;
+    }
+    t.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn local_offsets_come_back_and_weights_are_binomial() {
+        assert_eq!(binomial(2), [1.0, 4.0, 6.0, 4.0, 1.0]);
+        let t = [[0.9, 0.1, -0.2, 3.0], [0.0, 1.1, 0.3, 1.0], [0.2, 0.0, 0.8, -2.0]];
+        let v = [0.3, -0.2, 0.7];
+        for (a, b) in into(&t, out_of(&t, v)).iter().zip(v) {
+            assert!((a - b).abs() < 1e-14);
+        }
+        let flat = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0; 4]];
+        assert_eq!(out_of(&flat, into(&flat, v)), v);
+    }
+
+    #[test]
+    fn steady_movement_stays_and_a_jerk_is_damped() {
+        let line = |f: usize| vec![vec![[f as f64, -2.0 * f as f64, 1.0]]];
+        let mut offsets: Vec<_> = (0..7).map(line).collect();
+        for frame in 0..7 {
+            assert_eq!(averaged(&offsets, 0, frame, &binomial(2)), line(frame)[0]);
+        }
+        offsets[3][0][0][0] += 1.6;
+        let jerk = averaged(&offsets, 0, 3, &binomial(2))[0][0] - 3.0;
+        assert!((jerk - 0.6).abs() < 1e-12, "{jerk}");
+    }
+}

@@ -1,0 +1,435 @@
+//! `clothcombo drape` as a user runs it: a model of a few steps on the mannequin, garments from files and by name, every output
+//! read back.
+
+use assert_cmd::Command;
+use clothcombo_data::asset::{Motion, Pose, Provenance};
+use clothcombo_data::format::{load_mesh, load_tri_mesh, obj};
+use clothcombo_data::generate::mannequin;
+use clothcombo_physics::contact::triangle_pairs;
+use serde_json::Value;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+use tempfile::TempDir;
+
+const CONFIG: &str = r#"
+seed = 1
+[data]
+[[data.garments]]
+generate = { count = 3, seed = 5, vertices = 250, categories = ["t_shirt", "skirt", "top"] }
+[model]
+width = 8
+embedding = 8
+diffusion_blocks = 1
+diffusion_width = 8
+eigen_count = 8
+mlp_layers = 2
+siren_layers = 2
+siren_width = 8
+skinning_layers = 1
+skinning_width = 8
+[[stages]]
+name = "all"
+trains = "all"
+steps = 3
+layers = [2, 3]
+learning_rate = 1e-4
+[validation]
+single_scenes = 1
+layered_scenes = 1
+layers = [2, 2]
+[output]
+sample_scenes = 1
+"#;
+
+/// Names of the garments the model was trained on.
+const TEE: &str = "t_shirt_000005";
+const SKIRT: &str = "skirt_000006";
+
+/// A run of a few steps, made once for all tests.
+fn run_folder() -> &'static Path {
+    static RUN: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
+    let (_, run) = RUN.get_or_init(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let config = folder.path().join("config.toml");
+        fs::write(&config, CONFIG).unwrap();
+        let run = folder.path().join("run");
+        let train = Command::cargo_bin("clothcombo-train")
+            .unwrap()
+            .args(["--quiet", "--config"])
+            .arg(&config)
+            .arg("--run-dir")
+            .arg(&run)
+            .output()
+            .unwrap();
+        assert!(train.status.success(), "{}", String::from_utf8_lossy(&train.stderr));
+        (folder, run)
+    });
+    run
+}
+
+/// `clothcombo drape` with the model; a cache only where a test names one.
+fn drape(arguments: &[&str]) -> Command {
+    let mut command = Command::cargo_bin("clothcombo").unwrap();
+    command.env("NO_COLOR", "1").args(["drape", "--checkpoint"]).arg(run_folder()).args(arguments);
+    if !arguments.contains(&"--cache") {
+        command.arg("--no-cache");
+    }
+    command
+}
+
+/// What a failing command said, on one line.
+fn failure(command: &mut Command, code: i32) -> String {
+    let output = command.output().unwrap();
+    let message = String::from_utf8_lossy(&output.stderr).replace("\n  │ ", "");
+    assert_eq!(output.status.code(), Some(code), "{message}");
+    assert!(!message.contains("panicked"), "{message}");
+    message.split_whitespace().filter(|w| *w != "│").collect::<Vec<_>>().join(" ")
+}
+
+fn report(folder: &Path) -> Value {
+    serde_json::from_slice(&fs::read(folder.join("report.json")).unwrap()).unwrap()
+}
+
+fn at(folder: &TempDir, name: &str) -> String {
+    folder.path().join(name).display().to_string()
+}
+
+/// A motion of the arms coming down while the body turns.
+fn save_motion(path: &Path, frames: usize) {
+    let poses = (0..frames).map(|f| {
+        let share = f as f64 / (frames - 1) as f64;
+        let mut pose = Pose::t_pose(22);
+        pose.rotations[0] = [0.0, 0.8 * share, 0.0];
+        pose.rotations[16] = [0.0, 0.0, -0.9 * share];
+        pose.rotations[17] = [0.0, 0.0, 0.9 * share];
+        pose
+    });
+    let motion = Motion {
+        name: "arms".into(),
+        frame_rate: 10.0,
+        poses: poses.collect(),
+        source: Provenance::default(),
+    };
+    motion.save(path).unwrap();
+}
+
+/// An open tube of quads around the mannequin's waist.
+fn quad_band(path: &Path) {
+    let (around, rows) = (40u32, 9u32);
+    let mut positions = Vec::new();
+    for row in 0..rows {
+        for k in 0..around {
+            let angle = f64::from(k) / f64::from(around) * std::f64::consts::TAU;
+            positions.push([0.22 * angle.sin(), 0.02 + 0.03 * f64::from(row), 0.19 * angle.cos()]);
+        }
+    }
+    let mut quads = Vec::new();
+    for row in 0..rows - 1 {
+        for k in 0..around {
+            let index = |r: u32, k: u32| r * around + k % around;
+            quads.push([index(row, k), index(row, k + 1), index(row + 1, k + 1), index(row + 1, k)]);
+        }
+    }
+    obj::save_polygons(path, &positions, quads.iter().map(|q| q.as_slice()), &[]).unwrap();
+}
+
+#[test]
+fn a_posed_outfit_leaves_every_output_and_each_reads_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let (band, motion, out) = (at(&folder, "band.obj"), at(&folder, "arms.npz"), at(&folder, "out"));
+    quad_band(Path::new(&band));
+    save_motion(Path::new(&motion), 5);
+    let pose = format!("{motion}:4");
+    let arguments = ["--garments", SKIRT, TEE, &band, "--pose", &pose, "--shape", "1.0,-0.5", "-o", &out];
+    let output = drape(&arguments).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let table = String::from_utf8_lossy(&output.stdout);
+    assert!(table.contains("certificate:") && table.contains(TEE) && table.contains("untangling"), "{table}");
+
+    let out = Path::new(&out);
+    let given = load_mesh(Path::new(&band)).unwrap();
+    let draped = load_mesh(&out.join("band.obj")).unwrap();
+    assert_eq!(draped.positions.len(), given.positions.len());
+    assert!(draped.polygons().eq(given.polygons()), "quads stay quads, in their order");
+    assert!(draped.polygons().all(|p| p.len() == 4));
+
+    // The scene holds body and garments at the places of the OBJ files.
+    let body = load_tri_mesh(&out.join("body.obj")).unwrap();
+    let garments: Vec<_> =
+        [SKIRT, TEE, "band"].iter().map(|n| load_tri_mesh(&out.join(format!("{n}.obj"))).unwrap()).collect();
+    let scene = load_mesh(&out.join("scene.glb")).unwrap();
+    let written = body.positions().iter().chain(garments.iter().flat_map(|g| g.positions()));
+    assert_eq!(scene.positions.len(), written.clone().count());
+    for (a, b) in scene.positions.iter().flatten().zip(written.flatten()) {
+        assert_eq!(*a, f64::from(*b as f32));
+    }
+
+    let report = report(out);
+    let names: Vec<_> =
+        report["garments"].as_array().unwrap().iter().map(|g| g["name"].as_str().unwrap()).collect();
+    assert_eq!(names, [SKIRT, TEE, "band"]);
+    for phase in ["embedding", "draping", "untangling", "resolve"] {
+        assert!(report["milliseconds"][phase].as_f64().is_some_and(|ms| ms > 0.0), "{phase}");
+        assert!(report["garments"][0]["milliseconds"][phase].as_f64().is_some_and(f64::is_finite), "{phase}");
+    }
+    for score in ["before", "after"] {
+        assert!(report[score]["garments"][1]["raw"]["strain"].as_f64().is_some_and(f64::is_finite));
+    }
+    // The certificate says of the files what another count says of them.
+    let count = |key: &str| report["certificate"][key].as_u64().unwrap() as usize;
+    let with_body: usize = garments
+        .iter()
+        .map(|g| triangle_pairs(g.positions(), g.faces(), body.positions(), body.faces()).len())
+        .sum();
+    let mut between = 0;
+    for (i, inner) in garments.iter().enumerate() {
+        for outer in &garments[i + 1..] {
+            between +=
+                triangle_pairs(inner.positions(), inner.faces(), outer.positions(), outer.faces()).len();
+        }
+    }
+    let pinched = |key: &str| report["certificate"]["pinched"][key].as_u64().unwrap() as usize;
+    assert_eq!(count("body_triangle_pairs") + pinched("body_triangle_pairs"), with_body);
+    assert_eq!(count("layer_triangle_pairs") + pinched("layer_triangle_pairs"), between);
+    assert_eq!(
+        count("body_triangle_pairs") + count("layer_triangle_pairs"),
+        0,
+        "a mild pose comes out clear"
+    );
+
+    let picture = image::open(out.join("picture.png")).unwrap().to_rgb8();
+    let ground = *picture.get_pixel(1, 1);
+    assert!(picture.pixels().filter(|p| **p != ground).count() > 20_000);
+    let page = fs::read_to_string(out.join("viewer.html")).unwrap();
+    assert!(!page.contains("http:") && !page.contains("https:"), "the page loads nothing");
+    assert!(page.contains(TEE) && page.len() > 200_000);
+    let left: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
+    assert!(left.iter().all(|n| !n.to_string_lossy().ends_with(".tmp")), "{left:?}");
+}
+
+#[test]
+fn the_order_decides_who_wears_what_and_an_embedding_is_made_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let cache = at(&folder, "cache");
+    let run = |order: &str, out: &str| {
+        let out = at(&folder, out);
+        let arguments = ["--garments", TEE, SKIRT, "--order", order, "--cache", &cache, "-o", &out];
+        drape(&arguments).assert().success();
+        report(Path::new(&out))
+    };
+    let (first, second) = (run("1,0", "a"), run("0,1", "b"));
+    let names = |r: &Value| [0, 1].map(|i| r["garments"][i]["name"].as_str().unwrap().to_owned());
+    assert_eq!(names(&first), [SKIRT, TEE]);
+    assert_eq!(names(&second), [TEE, SKIRT]);
+    let known = |r: &Value| [0, 1].map(|i| r["garments"][i]["embedding_known"].as_bool().unwrap());
+    assert_eq!((known(&first), known(&second)), ([false; 2], [true; 2]));
+    // What the cache gives back is what was computed: the same order gives the same bytes.
+    run("1,0", "c");
+    for file in [format!("{TEE}.obj"), format!("{SKIRT}.obj"), "scene.glb".into()] {
+        let [a, c] = ["a", "c"].map(|f| fs::read(folder.path().join(f).join(&file)).unwrap());
+        assert!(a == c, "{file}");
+    }
+}
+
+#[test]
+fn a_motion_is_one_animated_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let (motion, out) = (at(&folder, "arms.npz"), at(&folder, "out"));
+    save_motion(Path::new(&motion), 8);
+    let range = ["--frames", "1..8", "--every", "2", "--smooth", "1", "--all-frames"];
+    let arguments = ["--garments", TEE, "--motion", &motion, "-o", &out];
+    drape(&[&arguments[..], &range[..]].concat()).assert().success();
+    let out = Path::new(&out);
+    let report = report(out);
+    let frames: Vec<_> =
+        report["frames"].as_array().unwrap().iter().map(|f| f["frame"].as_u64().unwrap()).collect();
+    assert_eq!(frames, [1, 3, 5, 7]);
+    let smoothing = &report["smoothing"];
+    let sum: u64 = ["whole", "partly", "left"].iter().map(|k| smoothing[k].as_u64().unwrap()).sum();
+    assert_eq!(sum, 4);
+    assert!(report["acceleration"]["ratio"].as_f64().is_some_and(|r| r > 0.1 && r < 10.0), "{report}");
+
+    let glb = fs::read(out.join("scene.glb")).unwrap();
+    let length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
+    let document: Value = serde_json::from_slice(&glb[20..20 + length]).unwrap();
+    for mesh in document["meshes"].as_array().unwrap() {
+        assert_eq!(mesh["primitives"][0]["targets"].as_array().unwrap().len(), 3);
+    }
+    let input = document["animations"][0]["samplers"][0]["input"].as_u64().unwrap() as usize;
+    assert_eq!(document["accessors"][input]["count"], 4);
+    assert!((document["accessors"][input]["max"][0].as_f64().unwrap() - 0.6).abs() < 1e-6, "0.2 s a frame");
+
+    for frame in [1, 3, 5, 7] {
+        let mesh = load_tri_mesh(&out.join(format!("frames/{frame:05}/{TEE}.obj"))).unwrap();
+        let body = load_tri_mesh(&out.join(format!("frames/{frame:05}/body.obj"))).unwrap();
+        assert!(triangle_pairs(mesh.positions(), mesh.faces(), body.positions(), body.faces()).is_empty());
+    }
+}
+
+#[test]
+fn a_batch_of_outfits_embeds_each_garment_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let (file, out) = (at(&folder, "outfits.toml"), at(&folder, "out"));
+    let text = format!(
+        "[[outfit]]\nname = \"one\"\ngarments = [\"{TEE}\"]\n\
+         [[outfit]]\nname = \"two\"\ngarments = [\"{SKIRT}\", \"{TEE}\"]\nshape = [1.5]\n"
+    );
+    fs::write(&file, text).unwrap();
+    drape(&["--outfits", &file, "-o", &out]).assert().success();
+    let (one, two) = (report(&Path::new(&out).join("one")), report(&Path::new(&out).join("two")));
+    assert_eq!(one["garments"][0]["embedding_known"], false);
+    assert_eq!(two["garments"][0]["embedding_known"], false);
+    assert_eq!(two["garments"][1]["embedding_known"], true);
+    assert_eq!(two["body"]["shape"], serde_json::json!([1.5]));
+    assert_eq!(report(Path::new(&out))["outfits"].as_array().unwrap().len(), 2);
+}
+
+#[test]
+fn a_garment_in_other_units_and_axes_is_fitted_and_comes_back_in_its_own_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = at(&folder, "given");
+    drape(&["--garments", SKIRT, "-o", &out]).assert().success();
+    let skirt = load_tri_mesh(&Path::new(&out).join(format!("{SKIRT}.obj"))).unwrap();
+    // Centimetres, z up, every vertex twice, the second in a face without area.
+    let mut positions: Vec<[f64; 3]> = Vec::new();
+    for [x, y, z] in skirt.positions() {
+        positions.extend([[100.0 * x, -100.0 * z, 100.0 * y]; 2]);
+    }
+    let faces: Vec<Vec<u32>> = skirt
+        .faces()
+        .iter()
+        .map(|f| f.iter().enumerate().map(|(k, v)| 2 * v + k as u32 % 2).collect())
+        .collect();
+    let messy = at(&folder, "messy.obj");
+    obj::save_polygons(Path::new(&messy), &positions, faces.iter().map(|f| f.as_slice()), &[]).unwrap();
+    let out = at(&folder, "out");
+    drape(&["--garments", &messy, "-o", &out]).assert().success();
+    let draped = load_mesh(&Path::new(&out).join("messy.obj")).unwrap();
+    assert_eq!(draped.positions.len(), positions.len());
+    assert!(draped.polygons().eq(faces.iter().map(|f| f.as_slice())));
+    assert!(draped.positions.chunks(2).all(|pair| pair[0] == pair[1]), "welded vertices stay together");
+    let report = report(Path::new(&out));
+    assert_eq!(report["garments"][0]["fit"]["placement"]["unit"], "cm");
+    assert_eq!(report["garments"][0]["fit"]["repairs"][0]["kind"], "welded_vertices");
+}
+
+#[test]
+fn a_posed_mesh_of_the_body_is_dressed_where_it_stands() {
+    let folder = tempfile::tempdir().unwrap();
+    let body = mannequin();
+    let mut pose = Pose::t_pose(22);
+    pose.rotations[0] = [0.0, 2.0, 0.0];
+    pose.rotations[16] = [0.0, 0.0, -0.8];
+    let moved = |p: &[f64; 3]| [p[0] + 4.0, p[1] + 0.9, p[2] - 1.0];
+    let posed: Vec<[f64; 3]> = body.posed(&[0.5], &pose).unwrap().positions.iter().map(moved).collect();
+    let rest = body.shaped(&[0.5]).unwrap().positions;
+    let (posed_file, rest_file, out) = (at(&folder, "posed.obj"), at(&folder, "t.obj"), at(&folder, "out"));
+    obj::save(Path::new(&posed_file), &posed, &body.faces, &[]).unwrap();
+    obj::save(Path::new(&rest_file), &rest, &body.faces, &[]).unwrap();
+    drape(&["--garments", TEE, "--posed", &posed_file, "--t-pose", &rest_file, "-o", &out])
+        .assert()
+        .success();
+    let out = Path::new(&out);
+    let written = load_tri_mesh(&out.join("body.obj")).unwrap();
+    for (a, b) in written.positions().iter().flatten().zip(posed.iter().flatten()) {
+        assert!((a - b).abs() < 1e-6);
+    }
+    let tee = load_tri_mesh(&out.join(format!("{TEE}.obj"))).unwrap();
+    assert!(tee.positions().iter().all(|p| (p[0] - 4.0).abs() < 1.0 && (p[2] + 1.0).abs() < 1.0));
+    assert!(triangle_pairs(tee.positions(), tee.faces(), written.positions(), written.faces()).is_empty());
+    assert!(report(out)["body"]["recovered_within_mm"].as_f64().unwrap() < 3.0);
+}
+
+#[test]
+fn wrong_input_names_itself_and_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = at(&folder, "out");
+    fn to<'a>(arguments: &[&'a str], out: &'a str) -> Vec<&'a str> {
+        [arguments, &["-o", out]].concat()
+    }
+    let band = at(&folder, "broken.obj");
+    fs::write(&band, "v 0 0 0\nv 1 0 nan\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let cube = at(&folder, "cube.obj");
+    fs::write(&cube, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n").unwrap();
+    let motion = at(&folder, "arms.npz");
+    save_motion(Path::new(&motion), 4);
+    let beyond = format!("{motion}:9");
+    let many = vec![TEE; 13];
+    let cases: Vec<(Vec<&str>, Vec<&str>)> = vec![
+        (vec!["--garments", &band], vec!["broken.obj:2:", "not finite"]),
+        (vec!["--garments", &cube], vec!["cube.obj", "triangles"]),
+        (vec!["--garments", "none.obj"], vec!["none.obj"]),
+        (vec!["--garments", "cloak"], vec!["cloak", TEE]),
+        (vec!["--garments", TEE, "--order", "1"], vec!["--order 1", "1 garments"]),
+        (
+            vec!["--garments", TEE, "--shape", "1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1,1"],
+            vec!["17 shape numbers", "mannequin"],
+        ),
+        (vec!["--garments", TEE, "--pose", "none.npz"], vec!["none.npz"]),
+        (vec!["--garments", TEE, "--pose", &beyond], vec!["arms.npz has 4 frames, no frame 9"]),
+        (vec!["--garments", TEE, "--motion", &motion, "--frames", "2..9"], vec!["4 frames"]),
+        (vec!["--garments", TEE, "--posed", &cube], vec!["cube.obj", "4 vertices"]),
+        (vec!["--garments", TEE, "--body", "none.npz"], vec!["none.npz"]),
+        (vec!["--garments", TEE, "--dataset", "none"], vec!["none"]),
+        (vec!["--garments", TEE, "--gap", "-1"], vec!["gap"]),
+        ([&["--garments"][..], &many].concat(), vec!["13 garments", "1 to 12"]),
+    ];
+    for (arguments, words) in cases {
+        let message = failure(&mut drape(&to(&arguments, &out)), 1);
+        for word in words {
+            assert!(message.contains(word), "{word:?} is missing for {arguments:?} in:\n{message}");
+        }
+    }
+    failure(&mut drape(&to(&[], &out)), 2);
+    failure(&mut drape(&to(&["--garments", TEE, "--frames", "0..4"], &out)), 2);
+    failure(&mut drape(&to(&["--garments", TEE, "--motion", &motion, "--frames", "4..1"], &out)), 2);
+    assert!(!Path::new(&out).exists());
+
+    // A folder with something else in it is never touched.
+    fs::create_dir(&out).unwrap();
+    fs::write(Path::new(&out).join("thesis.tex"), "x").unwrap();
+    assert!(failure(&mut drape(&to(&["--garments", TEE], &out)), 1).contains("not empty"));
+    assert!(failure(&mut drape(&to(&["--garments", TEE, "--replace"], &out)), 1).contains("report.json"));
+    assert_eq!(fs::read_dir(&out).unwrap().count(), 1);
+    let left: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
+    assert!(left.iter().all(|n| !n.to_string_lossy().ends_with(".tmp")), "{left:?}");
+}
+
+#[test]
+fn a_model_is_three_files_and_a_damaged_or_missing_one_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let newest = fs::read_to_string(run_folder().join("checkpoints/latest")).unwrap();
+    let checkpoint = run_folder().join("checkpoints").join(newest.trim());
+    let models = folder.path().join("models");
+    let model = models.join("tiny");
+    fs::create_dir_all(&model).unwrap();
+    for file in ["model.safetensors", "config.toml", "state.json"] {
+        fs::copy(checkpoint.join(file), model.join(file)).unwrap();
+    }
+    let run = |arguments: &[&str]| {
+        let mut command = Command::cargo_bin("clothcombo").unwrap();
+        command.env("NO_COLOR", "1").env("CLOTHCOMBO_MODELS", "models").current_dir(folder.path()).args([
+            "drape",
+            "--no-cache",
+            "--garments",
+            TEE,
+        ]);
+        command.args(arguments);
+        command
+    };
+    // The only one in `models` needs no name; its parameters are those of the checkpoint.
+    run(&["-o", "a"]).assert().success();
+    run(&["-o", "b", "--checkpoint", "models/tiny/model.safetensors"]).assert().success();
+    drape(&["--garments", TEE, "-o", &at(&folder, "c")]).assert().success();
+    let read = |name: &str| fs::read(folder.path().join(name).join(format!("{TEE}.obj"))).unwrap();
+    assert!(read("a") == read("b") && read("a") == read("c"));
+
+    let mut bytes = fs::read(model.join("model.safetensors")).unwrap();
+    *bytes.last_mut().unwrap() ^= 1;
+    fs::write(model.join("model.safetensors"), bytes).unwrap();
+    assert!(failure(&mut run(&["-o", "d"]), 1).contains("model.safetensors does not match its checksum"));
+    fs::remove_dir_all(&models).unwrap();
+    let message = failure(&mut run(&["-o", "d"]), 1);
+    assert!(message.contains("no trained model") && message.contains("--checkpoint"), "{message}");
+}
