@@ -10,6 +10,7 @@ mod files;
 mod tests;
 
 pub use error::{MeshSize, ScoreError};
+pub(crate) use files::load_garment;
 pub use files::{MeshFiles, score_files};
 
 use crate::config::LossesConfig;

@@ -224,10 +224,54 @@ pub fn save_polygons<'a>(
     atomic::write(path, text.as_bytes()).map_err(|source| ObjError::Io { path: path.into(), source })
 }
 
+/// The bytes of an OBJ file with other vertex positions: faces, texture coordinates, groups, materials, comments and what
+/// follows a vertex's coordinates (colours) stay as they are. Coordinates are written so that they read back to the bit.
+///
+/// # Errors
+/// The number of vertices in the file, if there are not as many `positions`.
+pub fn with_positions(bytes: &[u8], positions: &[[f64; 3]]) -> Result<Vec<u8>, usize> {
+    let mut out = Vec::with_capacity(bytes.len() + bytes.len() / 4);
+    let mut count = 0;
+    for line in bytes.split_inclusive(|b| *b == b'\n') {
+        let mut words = line.split(|b| b.is_ascii_whitespace()).filter(|word| !word.is_empty());
+        if words.next() != Some(b"v") {
+            out.extend_from_slice(line);
+            continue;
+        }
+        if let Some([x, y, z]) = positions.get(count) {
+            out.extend_from_slice(format!("v {x} {y} {z}").as_bytes());
+        }
+        count += 1;
+        // Behind the third coordinate, the line's end included.
+        let mut rest = line;
+        for _ in 0..4 {
+            let start = rest.iter().position(|b| !b.is_ascii_whitespace()).unwrap_or(rest.len());
+            let length = rest[start..].iter().position(|b| b.is_ascii_whitespace() || *b == b'#');
+            rest = &rest[start + length.unwrap_or(rest.len() - start)..];
+        }
+        out.extend_from_slice(rest);
+    }
+    if count == positions.len() { Ok(out) } else { Err(count) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use std::fs;
+
+    #[test]
+    fn other_positions_leave_the_rest_of_the_file_alone() {
+        let text =
+            "# one\r\n  v 1 2 3 0.5 0.5 0.5 # red\r\nvn 0 0 1\nv 4 5 6#x\nv\t7 8 9\ng a b\nf 1/1 2/2 -1/3\n";
+        let positions = [[0.1, -2e-17, 3.0], [1.0 / 3.0, 0.0, 0.0], [5.0, 6.0, 7.0]];
+        let bytes = with_positions(text.as_bytes(), &positions).unwrap();
+        let new = String::from_utf8(bytes).unwrap();
+        assert!(new.contains(" 0.5 0.5 0.5 # red\r\nvn 0 0 1\n") && new.contains("0 0#x\n"), "{new}");
+        assert!(new.ends_with("g a b\nf 1/1 2/2 -1/3\n"));
+        assert_eq!(parse(&new).unwrap().positions, positions);
+        assert_eq!(parse(&new).unwrap().polygons, [[0, 1, 2]]);
+        assert_eq!(with_positions(text.as_bytes(), &positions[1..]), Err(3));
+    }
 
     fn parse(text: &str) -> Result<ObjMesh, String> {
         ObjMesh::parse(text, Path::new("shirt.obj")).map_err(|e| e.to_string())

@@ -96,6 +96,31 @@ impl<'a> TriangleTree<'a> {
         decided(candidates, |(a, b)| mesh_triangles_intersect(self.positions, self.face(a), self.face(b)))
     }
 
+    /// Those of [`self_pairs`](Self::self_pairs) in which one of `faces` takes part.
+    pub(super) fn self_pairs_of_faces(&self, faces: &[u32]) -> Vec<(u32, u32)> {
+        if self.bvh.is_empty() {
+            return Vec::new();
+        }
+        let mut pairs: Vec<(u32, u32)> = faces
+            .par_iter()
+            .with_min_len(256)
+            .flat_map_iter(|&f| self.faces_meeting_own(f).map(move |g| (f.min(g), f.max(g))))
+            .collect();
+        pairs.sort_unstable();
+        pairs.dedup();
+        pairs
+    }
+
+    /// Faces of this mesh that intersect its face `f`.
+    fn faces_meeting_own(&self, f: u32) -> impl Iterator<Item = u32> {
+        let probe = triangle_box(self.positions, self.face(f)).map(|bounds| BvhNode::leaf(bounds, f));
+        let leaves =
+            probe.into_iter().flat_map(move |probe| self.bvh.leaves(move |node| node.intersects(&probe)));
+        leaves
+            .map(move |leaf| self.kept[leaf as usize])
+            .filter(move |&g| f != g && mesh_triangles_intersect(self.positions, self.face(f), self.face(g)))
+    }
+
     /// Pairs of faces whose boxes meet, in no particular order.
     fn candidates(&self, other: &TriangleTree) -> Vec<(u32, u32)> {
         self.bvh

@@ -30,6 +30,7 @@ enum Verb {
     Import(cli::import::Source),
     Prepare(cli::prepare::Arguments),
     Replay(cli::replay::Arguments),
+    Resolve(cli::resolve::Arguments),
     Runs(cli::runs::Arguments),
     Score(cli::score::Arguments),
 }
@@ -47,6 +48,7 @@ fn main() -> ExitCode {
         Verb::Import(source) => cli::import::run(source),
         Verb::Prepare(arguments) => cli::prepare::run(arguments),
         Verb::Replay(arguments) => cli::replay::run(arguments),
+        Verb::Resolve(arguments) => cli::resolve::run(arguments),
         Verb::Runs(arguments) => cli::runs::run(arguments),
         Verb::Score(arguments) => cli::score::run(arguments),
     })

@@ -9,6 +9,7 @@ pub mod generate;
 pub mod import;
 pub mod prepare;
 pub mod replay;
+pub mod resolve;
 pub mod runs;
 pub mod score;
 mod table;

@@ -1,5 +1,6 @@
 //! Scores of draped scenes: what the losses say, and what a stranger would count.
 
+pub mod certificates;
 pub mod equilibrium_error;
 mod report;
 mod score;

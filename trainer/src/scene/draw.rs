@@ -80,6 +80,19 @@ pub fn draw_training(library: &Library, seed: u64, step: u64, scene: usize, plan
     SceneDraw { garments, bodies }
 }
 
+/// Its block of streams lies behind those of the validation groups.
+const OUTFIT_STREAM: u64 = VALIDATION_STREAM + (16 << 32);
+
+/// Outfit `index`: 1 to `most` garments (one more from each outfit to the next) of the whole wardrobe, held-out ones among
+/// them, in random order, on a body in a pose of a clip never trained on.
+pub fn draw_outfit(library: &Library, seed: u64, index: u64, most: usize) -> SceneDraw {
+    let mut rng = generator(seed, OUTFIT_STREAM + index);
+    let all: Vec<usize> = (0..library.wardrobe.len()).collect();
+    let garments = garments(&all, 1 + index as usize % most.max(1), &mut rng);
+    let pose = library.poses.draw_held_out(Unseen::Clips, &mut rng);
+    SceneDraw { garments, bodies: vec![BodyDraw { shape: shape(library, &mut rng), pose }] }
+}
+
 /// What a validation scene is drawn for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ValidationGroup {

@@ -36,7 +36,10 @@ pub fn score_files(files: &MeshFiles, distance: ScoreDistance) -> Result<Score, 
 }
 
 /// Name, rest mesh and draped mesh of a garment, which have the same faces.
-fn load_garment(rest_path: &Path, draped_path: &Path) -> Result<(String, TriMesh, TriMesh), ScoreError> {
+pub(crate) fn load_garment(
+    rest_path: &Path,
+    draped_path: &Path,
+) -> Result<(String, TriMesh, TriMesh), ScoreError> {
     let (rest, draped) = (load_tri_mesh(rest_path)?, load_tri_mesh(draped_path)?);
     let size = |path: &Path, mesh: &TriMesh| MeshSize {
         path: path.to_owned(),

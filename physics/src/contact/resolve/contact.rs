@@ -22,6 +22,12 @@ impl Contact {
         Self { vertices: [v; 6], weights, count: 1, normal: plane.normal, target: plane.offset + gap }
     }
 
+    /// Vertex `v` over a point of face `lower`, at least `gap` along `normal`.
+    pub fn vertex_over(v: u32, (lower, at_lower): ([u32; 3], [f64; 3]), normal: [f64; 3], gap: f64) -> Self {
+        let weights = [1.0, -at_lower[0], -at_lower[1], -at_lower[2], 0.0, 0.0];
+        Self { vertices: [v, lower[0], lower[1], lower[2], v, v], weights, count: 4, normal, target: gap }
+    }
+
     /// A point of a face, at least `target` along `normal`.
     pub fn face_point(face: [u32; 3], barycentric: [f64; 3], normal: [f64; 3], target: f64) -> Self {
         let ([a, b, c], [u, v, w]) = (face, barycentric);

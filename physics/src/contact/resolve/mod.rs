@@ -4,6 +4,8 @@
 //! every garment under them. The order of the layers is the sign: *over* is where the inner surface's normal points, away
 //! from the body.
 //!
+//! 0. **Giving way.** Where an outer garment lies deep under an inner one, both move: the inner one is pressed towards the body
+//!    as far as there is room, instead of the outer one being blown up over it. Afterwards inner layers stay where they are.
 //! 1. **Vertices.** The closest point of the body (of the union of its parts, [`crate::query::UnionDistance`]) and of each
 //!    inner garment leaves a vertex a half-space; past a hem there is none.
 //! 2. **Relaxation.** Vertices on the wrong side and their neighbourhood move by a smooth displacement that keeps edge lengths
@@ -11,13 +13,16 @@
 //! 3. **Triangles.** Vertices outside are not enough where cloth is coarser than the body. Every pair of triangles that still
 //!    crosses, found exactly, asks the part of the garment's triangle over the other one to lie above it; linear heights make
 //!    that sufficient. Repeated until no pair is left.
-//! 4. **Certificate.** All pairs are counted again, from nothing, by the exact predicates.
+//! 4. **Folds.** Crossings of a garment with itself are parted as far as that is possible without new crossings of the body or
+//!    of another garment.
+//! 5. **Certificate.** All pairs are counted again, from nothing, by the exact predicates.
 //!
 //! **Pinched regions**, where the body lies inside itself, are told apart by a stated rule: `BodyObstacle`.
 
 mod certificate;
 mod contact;
 mod error;
+mod folds;
 mod garment;
 mod obstacle;
 mod relax;
@@ -25,6 +30,7 @@ mod settings;
 #[cfg(test)]
 mod tests;
 mod untangle;
+mod yielding;
 
 use std::time::{Duration, Instant};
 
@@ -38,6 +44,7 @@ use crate::vec3;
 use certificate::certificate;
 use obstacle::{BodyObstacle, LayerObstacle, facing};
 use untangle::Untangling;
+use yielding::give_way;
 
 /// Positions farther from the origin than this are refused [m]: the exact predicates would hold, but no distance would.
 const FARTHEST: f64 = 1e3;
@@ -66,7 +73,7 @@ pub struct GarmentWork {
     pub moved: usize,
     /// The largest move [m].
     pub largest_move: f64,
-    /// Wall time.
+    /// Wall time, with an equal share of what was done for all garments together.
     pub time: Duration,
 }
 
@@ -86,6 +93,9 @@ pub fn resolve(
     let start = Instant::now();
     let body = BodyObstacle::new(body);
     let body_time = start.elapsed();
+    let start = Instant::now();
+    let yielded = give_way(&body, layers, settings);
+    let yield_time = start.elapsed();
     // Obstacles borrow the positions of the layers under them, which are final.
     let positions: Vec<std::sync::OnceLock<Vec<[f64; 3]>>> =
         layers.iter().map(|_| Default::default()).collect();
@@ -93,8 +103,12 @@ pub fn resolve(
     let mut garments = Vec::with_capacity(layers.len());
     for (index, layer) in layers.iter().enumerate() {
         let start = Instant::now();
-        let mut untangling = Untangling::new(layer.garment, layer.positions, &body, &inner, settings);
-        let work = untangling.run();
+        let from = yielded.as_ref().map_or(layer.positions, |all| all[index].as_slice());
+        let mut untangling = Untangling::new(layer, from, &body, &inner, settings);
+        let mut work = untangling.run();
+        if settings.self_contact {
+            work.rounds += untangling.part_folds();
+        }
         let (moved, largest_move) = (untangling.moved(), untangling.largest_move());
         let is_inner = index + 1 < layers.len();
         let facing = match is_inner {
@@ -106,7 +120,12 @@ pub fn resolve(
         if is_inner {
             inner.push(LayerObstacle::new(layer.garment, done, facing));
         }
-        garments.push(GarmentWork { rounds: work.rounds, moved, largest_move, time: start.elapsed() });
+        garments.push(GarmentWork {
+            rounds: work.rounds,
+            moved,
+            largest_move,
+            time: start.elapsed() + yield_time / layers.len() as u32,
+        });
     }
     drop(inner);
     let positions: Vec<Vec<[f64; 3]>> = positions.into_iter().filter_map(|p| p.into_inner()).collect();

@@ -3,7 +3,7 @@
 use super::RestGarment;
 use crate::contact::TriangleTree;
 use crate::mesh::vertex_normals;
-use crate::query::{ClosestPoint, FaceSide, Surface};
+use crate::query::{ClosestPoint, FaceSide, Surface, SurfacePoint};
 use crate::vec3::{add_scaled, dot, norm, scale, sub};
 
 /// Below this distance [m] the direction from the closest point is rounding.
@@ -20,11 +20,15 @@ pub(super) struct Plane {
     pub distance: f64,
     /// Whether it may be violated without being a defect: it only keeps what is there.
     pub is_held: bool,
+    /// The face it comes from, and the place in it.
+    pub face: u32,
+    pub barycentric: [f64; 3],
 }
 
 impl Plane {
-    fn at(position: [f64; 3], normal: [f64; 3], distance: f64, is_held: bool) -> Self {
-        Self { normal, offset: dot(normal, position), distance, is_held }
+    fn at(found: &SurfacePoint, normal: [f64; 3], distance: f64, is_held: bool) -> Self {
+        let offset = dot(normal, found.position);
+        Self { normal, offset, distance, is_held, face: found.face, barycentric: found.barycentric }
     }
 }
 
@@ -99,7 +103,7 @@ impl<'a> BodyObstacle<'a> {
         let plane = if is_inside && (is_pinched || self.is_pinch(p)) {
             None
         } else {
-            Some(Plane::at(found.position, direction, distance, is_pinched))
+            Some(Plane::at(&found, direction, distance, is_pinched))
         };
         Some(BodyView { far, plane })
     }
@@ -162,11 +166,11 @@ impl<'a> LayerObstacle<'a> {
             if norm(beside) > gap.max(0.5 * along.abs()) {
                 return None;
             }
-            return Some(Plane::at(found.position, normal, along, false));
+            return Some(Plane::at(&found, normal, along, false));
         }
         let distance = if along < 0.0 { -length } else { length };
         let direction = if length > CONTACT { scale(offset, distance.signum() / length) } else { normal };
-        Some(Plane::at(found.position, direction, distance, false))
+        Some(Plane::at(&found, direction, distance, false))
     }
 
     fn is_at_border(&self, f: u32, barycentric: [f64; 3]) -> bool {

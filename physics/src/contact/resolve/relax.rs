@@ -14,9 +14,27 @@ const LENGTH_STIFFNESS: f64 = 0.5;
 /// Passes over the contacts alone at the end.
 const LAST_PASSES: usize = 8;
 
+/// Cloth as a graph: one garment, or several side by side.
+pub(super) trait Cloth {
+    /// Number of vertices.
+    fn vertices(&self) -> usize;
+    /// Vertices that share an edge with `v`, ascending.
+    fn ring(&self, v: u32) -> impl ExactSizeIterator<Item = u32>;
+}
+
+impl Cloth for RestGarment {
+    fn vertices(&self) -> usize {
+        self.vertex_count()
+    }
+
+    fn ring(&self, v: u32) -> impl ExactSizeIterator<Item = u32> {
+        self.topology.ring(v as usize).iter().copied()
+    }
+}
+
 /// Vertices within `rings` edges of `seeds`, ascending.
-pub(super) fn neighbourhood(garment: &RestGarment, seeds: &[u32], rings: usize) -> Vec<u32> {
-    let mut is_in = vec![false; garment.vertex_count()];
+pub(super) fn neighbourhood(cloth: &impl Cloth, seeds: &[u32], rings: usize) -> Vec<u32> {
+    let mut is_in = vec![false; cloth.vertices()];
     let mut all: Vec<u32> = Vec::new();
     let mut front: Vec<u32> = Vec::new();
     for &v in seeds {
@@ -27,7 +45,7 @@ pub(super) fn neighbourhood(garment: &RestGarment, seeds: &[u32], rings: usize) 
     for _ in 0..rings {
         let mut next = Vec::new();
         for &v in &front {
-            for &n in garment.topology.ring(v as usize) {
+            for n in cloth.ring(v) {
                 if !std::mem::replace(&mut is_in[n as usize], true) {
                     next.push(n);
                 }
@@ -44,7 +62,7 @@ pub(super) fn neighbourhood(garment: &RestGarment, seeds: &[u32], rings: usize) 
 /// Moves the vertices of `region` until `contacts` are met, by a displacement that is smooth over the garment, keeps the edge
 /// lengths of `input`, and is zero at the region's rim. Gauss–Seidel in a fixed order: smoothing, lengths, contacts.
 pub(super) fn relax(
-    garment: &RestGarment,
+    cloth: &impl Cloth,
     positions: &mut [[f64; 3]],
     input: &[[f64; 3]],
     region: &[u32],
@@ -58,7 +76,7 @@ pub(super) fn relax(
         .iter()
         .flat_map(|&v| {
             let may_move = &may_move;
-            garment.topology.ring(v as usize).iter().filter_map(move |&n| {
+            cloth.ring(v).filter_map(move |n| {
                 let is_mine = n > v || !may_move[n as usize];
                 is_mine.then(|| (v as usize, n as usize, norm(sub(input[v as usize], input[n as usize]))))
             })

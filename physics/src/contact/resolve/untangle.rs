@@ -5,11 +5,12 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use super::contact::{Contact, is_tiny, overlap};
+use super::folds::{Folds, folds};
 use super::obstacle::{BodyObstacle, LayerObstacle, Plane, bounds};
 use super::relax::{neighbourhood, relax};
-use super::{ResolveSettings, RestGarment};
+use super::{Layer, ResolveSettings, RestGarment};
 use crate::contact::TriangleTree;
-use crate::vec3::{distance_squared, sub};
+use crate::vec3::{add, distance_squared, dot, norm, scale, sub};
 
 /// A half-space is remembered for a vertex that is nearer to it than this [m]: smoothing may carry it there.
 const WATCH: f64 = 0.01;
@@ -19,6 +20,9 @@ const LONGEST_STEP: f64 = 0.03;
 const PATIENCE: usize = 8;
 /// Rounds for which the conditions of a crossing hold on: long enough that a mended place is not torn again by its neighbour.
 const REMEMBERED: usize = 8;
+/// Rounds for crossings of a garment with itself, and those without progress before it is left as it is.
+const FOLD_ROUNDS: usize = 20;
+const FOLD_PATIENCE: usize = 4;
 /// Rounds in which vertices that are merely closer than asked for still count.
 const ROUNDS_FOR_GAPS: usize = 4;
 
@@ -60,20 +64,22 @@ pub(super) struct Untangling<'a> {
 type Defects = (usize, usize);
 
 impl<'a> Untangling<'a> {
+    /// From `start`, another state of `layer`.
     pub fn new(
-        garment: &'a RestGarment,
-        input: &'a [[f64; 3]],
+        layer: &Layer<'a>,
+        start: &[[f64; 3]],
         body: &'a BodyObstacle<'a>,
         inner: &'a [LayerObstacle<'a>],
         settings: &'a ResolveSettings,
     ) -> Self {
+        let Layer { garment, positions: input } = *layer;
         let mut untangling = Self {
             garment,
             body,
             inner,
             settings,
             input,
-            positions: input.to_vec(),
+            positions: start.to_vec(),
             surroundings: vec![Surroundings::default(); input.len()],
             is_dirty: vec![true; garment.faces.len()],
             pairs: Vec::new(),
@@ -121,12 +127,87 @@ impl<'a> Untangling<'a> {
                 break;
             }
             work.rounds += 1;
-            self.step(&violated, round);
+            self.step(&violated, round, Folds::default());
         }
         if let Some((_, positions)) = best {
             self.move_to(positions);
+            self.find_pairs();
         }
         work
+    }
+
+    /// Parts crossings of the garment with itself, without new crossings of anything else. Returns the rounds it took.
+    pub fn part_folds(&mut self) -> usize {
+        let start = Instant::now();
+        let all: Vec<u32> = (0..self.garment.faces.len() as u32).collect();
+        let mut folded = self.self_pairs(&all);
+        if folded.is_empty() {
+            return 0;
+        }
+        let others = |s: &Self| s.pairs.len() + s.violated(ROUNDS_FOR_GAPS).len();
+        let allowed = others(self);
+        let mut best: (usize, Vec<[f64; 3]>) = (folded.len(), self.positions.clone());
+        let mut stale = 0;
+        let mut rounds = 0;
+        for round in 0..self.settings.rounds.min(FOLD_ROUNDS) {
+            let is_late = self.settings.time.is_some_and(|limit| start.elapsed() > limit);
+            if (folded.is_empty() && others(self) <= allowed) || stale > FOLD_PATIENCE || is_late {
+                break;
+            }
+            rounds += 1;
+            let found = folds(self.garment, &self.positions, &folded, 0.25 * self.settings.gap);
+            let violated = self.violated(ROUNDS_FOR_GAPS);
+            self.smooth(&found.crumpled);
+            self.step(&violated, round, found);
+            let dirty = self.dirty();
+            self.find_pairs();
+            let is_dirty = |f: &u32| dirty.binary_search(f).is_ok();
+            folded.retain(|(f, g)| !is_dirty(f) && !is_dirty(g));
+            folded.extend(self.self_pairs(&dirty));
+            folded.sort_unstable();
+            folded.dedup();
+            if others(self) <= allowed && folded.len() < best.0 {
+                best = (folded.len(), self.positions.clone());
+                stale = 0;
+            } else {
+                stale += 1;
+            }
+        }
+        self.move_to(best.1);
+        self.find_pairs();
+        rounds
+    }
+
+    /// Crossings of `faces` with any face of the garment, outside of pinched regions.
+    fn self_pairs(&self, faces: &[u32]) -> Vec<(u32, u32)> {
+        let tree = TriangleTree::new(&self.positions, &self.garment.faces);
+        let centre = |f: u32| {
+            let [a, b, c] = self.garment.faces[f as usize].map(|v| self.positions[v as usize]);
+            scale(add(add(a, b), c), 1.0 / 3.0)
+        };
+        let mut pairs = tree.self_pairs_of_faces(faces);
+        pairs.retain(|&(f, g)| !(self.body.is_pinch(centre(f)) && self.body.is_pinch(centre(g))));
+        pairs
+    }
+
+    /// Moves vertices half way to the middle of their neighbours.
+    fn smooth(&mut self, vertices: &[u32]) {
+        let middle = |v: u32| {
+            let ring = self.garment.topology.ring(v as usize);
+            let sum = ring.iter().fold([0.0; 3], |sum, &n| add(sum, self.positions[n as usize]));
+            let own = self.positions[v as usize];
+            if ring.is_empty() { own } else { scale(add(own, scale(sum, 1.0 / ring.len() as f64)), 0.5) }
+        };
+        let smoothed: Vec<[f64; 3]> = vertices.iter().map(|&v| middle(v)).collect();
+        for (&v, p) in vertices.iter().zip(smoothed) {
+            self.positions[v as usize] = p;
+        }
+        self.touch(vertices);
+    }
+
+    /// Faces whose crossings have to be looked for again, ascending.
+    fn dirty(&self) -> Vec<u32> {
+        (0..self.garment.faces.len() as u32).filter(|&f| self.is_dirty[f as usize]).collect()
     }
 
     /// Vertices on the wrong side, or (in the first rounds) too close.
@@ -136,12 +217,14 @@ impl<'a> Untangling<'a> {
         (0..self.surroundings.len() as u32).filter(|&v| is_violated(&self.surroundings[v as usize])).collect()
     }
 
-    fn step(&mut self, violated: &[u32], round: usize) {
+    fn step(&mut self, violated: &[u32], round: usize, folds: Folds) {
         let gap = self.settings.gap * (1.0 + 0.1 * round as f64).min(3.0);
         self.crossings.retain(|(found, _)| found + REMEMBERED > round);
         self.add_crossings(gap, round);
         let faces = self.pairs.iter().flat_map(|&(_, f, _)| self.garment.faces[f as usize]);
-        let seeds: Vec<u32> = violated.iter().copied().chain(faces).collect();
+        let parted = folds.contacts.iter().flat_map(|c| c.vertices);
+        let seeds: Vec<u32> =
+            violated.iter().copied().chain(faces).chain(parted).chain(folds.crumpled).collect();
         let region = neighbourhood(self.garment, &seeds, self.settings.rings);
         let mut contacts: Vec<Contact> = Vec::new();
         for &v in &region {
@@ -152,6 +235,7 @@ impl<'a> Untangling<'a> {
             }
         }
         contacts.extend(self.crossings.iter().map(|(_, contact)| contact));
+        contacts.extend(folds.contacts);
         relax(self.garment, &mut self.positions, self.input, &region, &contacts, self.settings.sweeps);
         self.touch(&region);
     }
@@ -198,8 +282,7 @@ impl<'a> Untangling<'a> {
 
     /// Brings the list of crossings up to date, pinched faces of the body left out.
     fn find_pairs(&mut self) {
-        let dirty: Vec<u32> =
-            (0..self.garment.faces.len() as u32).filter(|&f| self.is_dirty[f as usize]).collect();
+        let dirty = self.dirty();
         self.pairs.retain(|&(_, f, _)| !self.is_dirty[f as usize]);
         let near_body: Vec<u32> = dirty.iter().copied().filter(|&f| self.may_touch_body(f)).collect();
         let faces = &self.garment.faces;
@@ -247,7 +330,7 @@ impl<'a> Untangling<'a> {
             let (normal, corners) = overlap(&upper, &lower);
             for corner in corners.iter().filter(|c| c.height < 0.5 * gap) {
                 // The ground under the corner, as a height along the normal.
-                let ground = crate::vec3::dot(normal, lower[0]);
+                let ground = dot(normal, lower[0]);
                 let target = ground + (0.5 * gap).min(corner.height + LONGEST_STEP);
                 added.push((round, Contact::face_point(face, corner.at_upper, normal, target)));
             }
@@ -257,7 +340,7 @@ impl<'a> Untangling<'a> {
 
     /// Largest move from the input [m].
     pub fn largest_move(&self) -> f64 {
-        let moves = self.positions.iter().zip(self.input).map(|(p, q)| crate::vec3::norm(sub(*p, *q)));
+        let moves = self.positions.iter().zip(self.input).map(|(p, q)| norm(sub(*p, *q)));
         moves.fold(0.0, f64::max)
     }
 

@@ -1,5 +1,6 @@
 //! `clothcombo bench`: measurements that a user can repeat.
 
+pub mod certificate;
 pub mod distance;
 pub mod error;
 pub mod generator;
@@ -12,6 +13,8 @@ use miette::Report;
 /// Measures what the documentation claims
 #[derive(Subcommand)]
 pub enum Bench {
+    /// Random outfits taken out of body and each other: what is left, by exact count, what it changed, how long it took
+    Certificate(certificate::Arguments),
     /// How often the sign of the distance to the body is wrong, by nearest vertex and by closest surface point
     Distance(distance::Arguments),
     /// Energy above the equilibrium and distance to it, for skinning and a trained network, on random scenes
@@ -30,6 +33,7 @@ pub enum Bench {
 /// When an input cannot be read or a promise does not hold.
 pub fn run(bench: &Bench) -> Result<(), Report> {
     match bench {
+        Bench::Certificate(arguments) => certificate::run(arguments),
         Bench::Distance(arguments) => distance::run(arguments),
         Bench::Error(arguments) => error::run(arguments),
         Bench::Stability(arguments) => stability::run(arguments),

@@ -1,0 +1,158 @@
+//! Crossings of a garment with itself: which side of which sheet is the right one, and what that asks for.
+//!
+//! No order of layers says it. As in "Untangling cloth" (Baraff, Witkin and Kass 2003) the curve in which two sheets cross
+//! cuts each of them in two, and the smaller part is the one that went astray. Where one sheet runs into itself next to a
+//! fold, or a fold is crumpled, there are no two sheets; there the cloth is smoothed.
+
+use std::collections::HashMap;
+
+use super::RestGarment;
+use super::contact::{Contact, is_tiny, overlap};
+use crate::vec3::{cross, dot, neg, sub};
+
+/// Rings around a crossing that are counted to tell the smaller side.
+const COUNTED_RINGS: usize = 10;
+
+/// What the crossings of a garment with itself ask for.
+#[derive(Debug, Default)]
+pub(super) struct Folds {
+    /// Conditions that part two sheets.
+    pub contacts: Vec<Contact>,
+    /// Vertices of crumples, to be smoothed.
+    pub crumpled: Vec<u32>,
+}
+
+/// Looks at `pairs` of crossing faces (each ascending) at `positions`; sheets are parted by `gap`.
+pub(super) fn folds(garment: &RestGarment, positions: &[[f64; 3]], pairs: &[(u32, u32)], gap: f64) -> Folds {
+    let mut found = Folds::default();
+    let faces = &garment.faces;
+    let sheets = Sheets::new(garment, pairs);
+    let mut crossings: HashMap<(u32, u32), Vec<(u32, u32)>> = HashMap::new();
+    let mut order: Vec<(u32, u32)> = Vec::new();
+    for &(f, g) in pairs {
+        let (a, b) = (sheets.of(f), sheets.of(g));
+        if a == b {
+            found.crumpled.extend(faces[f as usize].iter().chain(&faces[g as usize]));
+            continue;
+        }
+        let (key, pair) = if a < b { ((a, b), (f, g)) } else { ((b, a), (g, f)) };
+        let known = crossings.entry(key).or_insert_with(|| {
+            order.push(key);
+            Vec::new()
+        });
+        known.push(pair);
+    }
+    for key in order {
+        let pairs = &crossings[&key];
+        let turned: Vec<(u32, u32)> = pairs.iter().map(|&(f, g)| (g, f)).collect();
+        let (one, other) = (vote(garment, positions, pairs), vote(garment, positions, &turned));
+        // The clearer of the two sheets decides.
+        let (pairs, vote) = if one.abs() >= other.abs() { (pairs, one) } else { (&turned, other) };
+        for &(f, g) in pairs {
+            part(garment, positions, (f, g), vote < 0.0, gap, &mut found);
+        }
+    }
+    found.crumpled.sort_unstable();
+    found.crumpled.dedup();
+    found
+}
+
+/// Faces of the crossings that hang together.
+struct Sheets {
+    root_of: HashMap<u32, u32>,
+}
+
+impl Sheets {
+    fn new(garment: &RestGarment, pairs: &[(u32, u32)]) -> Self {
+        let mut all: Vec<u32> = pairs.iter().flat_map(|&(f, g)| [f, g]).collect();
+        all.sort_unstable();
+        all.dedup();
+        let is_in = |f: u32| all.binary_search(&f).is_ok();
+        let mut root_of: HashMap<u32, u32> = HashMap::new();
+        for &start in &all {
+            if root_of.contains_key(&start) {
+                continue;
+            }
+            root_of.insert(start, start);
+            let mut front = vec![start];
+            while let Some(f) = front.pop() {
+                for &v in &garment.faces[f as usize] {
+                    for &next in garment.faces_of(v).iter().filter(|&&next| is_in(next)) {
+                        root_of.entry(next).or_insert_with(|| {
+                            front.push(next);
+                            start
+                        });
+                    }
+                }
+            }
+        }
+        Self { root_of }
+    }
+
+    fn of(&self, f: u32) -> u32 {
+        self.root_of.get(&f).copied().unwrap_or(f)
+    }
+}
+
+/// How clearly the first faces' sheet belongs above (positive) or below the second ones': its vertices above less those below
+/// the curve, as a share, counted ring by ring away from the curve.
+fn vote(garment: &RestGarment, positions: &[[f64; 3]], pairs: &[(u32, u32)]) -> f64 {
+    let mut heights: HashMap<u32, f64> = HashMap::new();
+    let mut front: Vec<u32> = Vec::new();
+    for &(f, g) in pairs {
+        let [a, b, c] = garment.faces[g as usize].map(|v| positions[v as usize]);
+        let normal = cross(sub(b, a), sub(c, a));
+        for &v in &garment.faces[f as usize] {
+            let height = dot(normal, sub(positions[v as usize], a));
+            *heights.entry(v).or_insert_with(|| {
+                front.push(v);
+                0.0
+            }) += height.signum();
+        }
+    }
+    let mut is_above: HashMap<u32, bool> = front.iter().map(|v| (*v, heights[v] >= 0.0)).collect();
+    let mut counts = [0usize; 2];
+    front.iter().for_each(|v| counts[usize::from(is_above[v])] += 1);
+    for _ in 0..COUNTED_RINGS {
+        let mut next = Vec::new();
+        for v in front {
+            let above = is_above[&v];
+            for &n in garment.topology.ring(v as usize) {
+                is_above.entry(n).or_insert_with(|| {
+                    next.push(n);
+                    counts[usize::from(above)] += 1;
+                    above
+                });
+            }
+        }
+        front = next;
+    }
+    (counts[1] as f64 - counts[0] as f64) / (counts[0] + counts[1]).max(1) as f64
+}
+
+/// Face `f` has to lie above face `g`, or below.
+fn part(
+    garment: &RestGarment,
+    positions: &[[f64; 3]],
+    (f, g): (u32, u32),
+    is_below: bool,
+    gap: f64,
+    found: &mut Folds,
+) {
+    let (face, other) = (garment.faces[f as usize], garment.faces[g as usize]);
+    let (upper, lower) = (face.map(|v| positions[v as usize]), other.map(|v| positions[v as usize]));
+    if is_tiny(&lower) {
+        found.crumpled.extend(other);
+        return;
+    }
+    let (normal, corners) = overlap(&upper, &lower);
+    for corner in corners {
+        let sides = ((face, corner.at_upper), (other, corner.at_lower));
+        let contact = match is_below {
+            false if corner.height < gap => Contact::face_points(sides.0, sides.1, normal, gap),
+            true if corner.height > -gap => Contact::face_points(sides.0, sides.1, neg(normal), gap),
+            _ => continue,
+        };
+        found.contacts.push(contact);
+    }
+}

@@ -1,0 +1,329 @@
+//! `clothcombo bench certificate`: the post-process on random outfits.
+
+use crate::checkpoint::Checkpoint;
+use crate::cli::train::load_under_bar;
+use crate::config::{Config, load};
+use crate::device::Backend;
+use crate::drape::{Networks, WardrobeTensors};
+use crate::evaluate::Spread;
+use crate::evaluate::certificates::{DrapedScene, OutfitResult, RestGarments, skinned};
+use crate::scene::{Library, PreparedScene, SceneDraw, draw_outfit, prepare};
+use crate::session::state;
+use clap::Parser;
+use clothcombo_data::format::obj;
+use clothcombo_physics::contact::resolve::ResolveSettings;
+use indicatif::{ProgressBar, ProgressStyle};
+use miette::{IntoDiagnostic, Report, WrapErr, miette};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// The post-process on random outfits: exact pairs before and after, strain added, time
+///
+/// Shapes are drawn from the configuration's range, poses from clips never trained on, 1 to --layers garments of the whole
+/// wardrobe in random order.
+#[derive(Parser)]
+#[command(after_help = "Examples:\n  clothcombo bench certificate --draws 500\n  \
+        clothcombo bench certificate --checkpoint runs/open --json > certificate.json\n  \
+        clothcombo bench certificate --only 17 --meshes /tmp/draw-17\n  \
+        clothcombo bench certificate --draws 24 --orders helper_tee,helper_vest,Coat,helper_shorts")]
+pub struct Arguments {
+    /// Configuration (TOML); default: that of the checkpoint, else configs/open.toml
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Overrides one value of the configuration; repeatable
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
+    /// Run, checkpoints or checkpoint folder of a trained network; default: skinning with shape transfer drapes
+    #[arg(long, value_name = "DIR")]
+    checkpoint: Option<PathBuf>,
+    /// Random outfits
+    #[arg(long, default_value_t = 500)]
+    draws: usize,
+    /// Most garments of an outfit
+    #[arg(long, default_value_t = 6, value_parser = clap::value_parser!(u8).range(1..=12))]
+    layers: u8,
+    /// These garments in every order instead of random ones: draw i wears order i mod n! on the body of draw i / n!
+    #[arg(long, value_delimiter = ',', value_name = "NAME,NAME,…")]
+    orders: Vec<String>,
+    /// Only these draws, by number from 0
+    #[arg(long, value_delimiter = ',')]
+    only: Vec<usize>,
+    /// Seed of the draws; default: that of the configuration
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Smallest gap between a moved garment and what is under it [mm]
+    #[arg(long, default_value_t = 1.0)]
+    gap_mm: f64,
+    /// Writes body and garments (rest, draped, resolved) of every draw as OBJ under this folder
+    #[arg(long, value_name = "DIR")]
+    meshes: Option<PathBuf>,
+    /// Print JSON instead of tables
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// When the configuration, its data or the checkpoint cannot be read. Crossings that stay are a result, not an error.
+pub fn run(arguments: &Arguments) -> Result<(), Report> {
+    let settings = ResolveSettings { gap: 1e-3 * arguments.gap_mm, ..ResolveSettings::default() };
+    settings.check().into_diagnostic()?;
+    let checkpoint = arguments.checkpoint.as_deref().map(Checkpoint::open).transpose()?;
+    let file = match (&arguments.config, &checkpoint) {
+        (Some(file), _) => file.clone(),
+        (None, Some(checkpoint)) => checkpoint.path.join("config.toml"),
+        (None, None) => Path::new("configs").join("open.toml"),
+    };
+    let mut config = load(&file, &arguments.overrides)?;
+    if checkpoint.is_none() {
+        // Nothing but the networks reads the eigenvectors, and most of the preparation is theirs.
+        config.model.eigen_count = 1;
+    }
+    let library = Arc::new(load_under_bar(&config, false)?);
+    let results = measure(arguments, &config, &library, checkpoint.as_ref(), &settings)?;
+    if arguments.json {
+        let summary = json!({
+            "gap_mm": arguments.gap_mm,
+            "drape": if checkpoint.is_some() { "network" } else { "skinning" },
+            "all": summary(&results, |_| true),
+            "wearable": summary(&results, |r| r.is_wearable),
+            "by_layers": (1..=usize::from(arguments.layers))
+                .map(|layers| summary(&results, |r| r.garments.len() == layers))
+                .collect::<Vec<_>>(),
+            "failures": results.iter().filter(|r| !r.after.is_clear()).collect::<Vec<_>>(),
+            "draws": results,
+        });
+        println!("{}", serde_json::to_string_pretty(&summary).into_diagnostic()?);
+    } else {
+        print_tables(&results, usize::from(arguments.layers));
+    }
+    Ok(())
+}
+
+fn measure(
+    arguments: &Arguments,
+    config: &Config,
+    library: &Arc<Library>,
+    checkpoint: Option<&Checkpoint>,
+    settings: &ResolveSettings,
+) -> Result<Vec<OutfitResult>, Report> {
+    let tensors;
+    let networks = match checkpoint {
+        None => None,
+        Some(checkpoint) => {
+            checkpoint_fits(checkpoint, library)?;
+            let device = Backend::preferred().device();
+            tensors = WardrobeTensors::new(library.clone(), checkpoint.state.dimensions(), &device);
+            Some(Networks::new(checkpoint.model(config, &device)?, &tensors))
+        }
+    };
+    let draws: Vec<usize> = match arguments.only.is_empty() {
+        true => (0..arguments.draws).collect(),
+        false => arguments.only.clone(),
+    };
+    let style =
+        ProgressStyle::with_template("outfits {bar:30} {pos}/{len} · {eta} left").into_diagnostic()?;
+    let bar = ProgressBar::new(draws.len() as u64).with_style(style);
+    let orders = orders(library, &arguments.orders)?;
+    let mut garments = RestGarments::default();
+    let mut results = Vec::with_capacity(draws.len());
+    for draw in draws {
+        let seed = arguments.seed.unwrap_or(config.seed);
+        let outfit = match orders.is_empty() {
+            true => draw_outfit(library, seed, draw as u64, usize::from(arguments.layers)),
+            false => {
+                let body = draw_outfit(library, seed, (draw / orders.len()) as u64, 1);
+                SceneDraw { garments: orders[draw % orders.len()].clone(), ..body }
+            }
+        };
+        let scene = prepare(library, &config.losses, outfit, 1.0)?;
+        let packed = match &networks {
+            Some(networks) => networks.drape(&scene)?.layered.posed,
+            None => skinned(&scene),
+        };
+        let draped = DrapedScene::new(&scene, garments.of(&scene), &packed);
+        let (result, resolved) = OutfitResult::new(draw, &scene, &draped, settings)
+            .into_diagnostic()
+            .wrap_err_with(|| format!("draw {draw}"))?;
+        if let Some(folder) = &arguments.meshes {
+            write_meshes(&folder.join(format!("{draw:04}")), &scene, &draped, &resolved.positions)?;
+        }
+        results.push(result);
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    Ok(results)
+}
+
+/// Every order of the garments called `names`; none for no name.
+fn orders(library: &Library, names: &[String]) -> Result<Vec<Vec<usize>>, Report> {
+    if names.len() > 6 {
+        return Err(miette!(help = "give at most six", "{} garments have too many orders", names.len()));
+    }
+    let cards = || (0..library.wardrobe.len()).map(|i| library.wardrobe.card(i).name.as_str());
+    let find = |name: &String| {
+        cards().position(|known| known == name).ok_or_else(|| {
+            let all = cards().collect::<Vec<_>>().join(", ");
+            miette!(help = format!("the garments are: {all}"), "no garment is called {name:?}")
+        })
+    };
+    let garments = names.iter().map(find).collect::<Result<Vec<usize>, Report>>()?;
+    let mut orders = if garments.is_empty() { Vec::new() } else { vec![Vec::new()] };
+    for _ in &garments {
+        orders = orders
+            .iter()
+            .flat_map(|order: &Vec<usize>| {
+                let left = garments.iter().filter(|g| !order.contains(g));
+                left.map(|g| [order.as_slice(), &[*g]].concat()).collect::<Vec<_>>()
+            })
+            .collect();
+    }
+    Ok(orders)
+}
+
+fn checkpoint_fits(checkpoint: &Checkpoint, library: &Library) -> Result<(), Report> {
+    let (expected, found) = (state(library, 0), &checkpoint.state);
+    if (&found.joints, found.shape_count, found.pose_features)
+        == (&expected.joints, expected.shape_count, expected.pose_features)
+    {
+        return Ok(());
+    }
+    Err(miette!(
+        help = "leave out --config to use the checkpoint's own, or restore the data it was trained on",
+        "the data of the configuration does not fit checkpoint {}",
+        checkpoint.path.display()
+    ))
+}
+
+fn write_meshes(
+    folder: &Path,
+    scene: &PreparedScene,
+    draped: &DrapedScene,
+    resolved: &[Vec<[f64; 3]>],
+) -> Result<(), Report> {
+    let save = |file: String, positions: &[[f64; 3]], faces: &[[u32; 3]], note: String| {
+        obj::save(&folder.join(file), positions, faces, &[note]).into_diagnostic()
+    };
+    save("body.obj".into(), &draped.body.positions, &draped.body.faces, "body".into())?;
+    for (i, worn) in scene.worn.iter().enumerate() {
+        let garment = &worn.garment;
+        let states = [
+            ("rest", garment.rest.positions()),
+            ("draped", &draped.positions[i]),
+            ("resolved", &resolved[i]),
+        ];
+        for (state, positions) in states {
+            let note = format!("{}: {} {}", garment.name, garment.source.author, garment.source.licence);
+            save(format!("{state}/{i}-{}.obj", garment.name), positions, garment.rest.faces(), note)?;
+        }
+    }
+    Ok(())
+}
+
+/// Where a share of 500 draws may not hold, every number that stands for the rest.
+fn summary(results: &[OutfitResult], counts: impl Fn(&OutfitResult) -> bool) -> serde_json::Value {
+    let chosen: Vec<&OutfitResult> = results.iter().filter(|r| counts(r)).collect();
+    let share = |holds: &dyn Fn(&OutfitResult) -> bool| {
+        chosen.iter().filter(|r| holds(r)).count() as f64 / chosen.len().max(1) as f64
+    };
+    json!({
+        "draws": chosen.len(),
+        "clear_before": share(&|r| r.before.is_clear()),
+        "clear_after": share(&|r| r.after.is_clear()),
+        "clear_of_self_after": share(&|r| r.after.self_triangle_pairs == 0),
+        "pinched_after": share(&|r| r.after.pinched_pairs > 0),
+        "order_violations_after": spread(&chosen, |r| vec![r.after.order_violations]),
+        "order_violations_by_vertices_after": spread(&chosen, |r| vec![r.after.order_violations_by_vertices]),
+        "strain_added": spread(&chosen, |r| r.strain_added.into_iter().collect()),
+        "milliseconds_per_garment": spread(&chosen, |r| r.milliseconds.clone()),
+        "milliseconds_per_8000_vertices": spread(&chosen, per_8000_vertices),
+        "body_milliseconds": spread(&chosen, |r| vec![r.body_milliseconds]),
+        "certificate_milliseconds": spread(&chosen, |r| vec![r.certificate_milliseconds]),
+    })
+}
+
+fn per_8000_vertices(result: &OutfitResult) -> Vec<f64> {
+    result.milliseconds.iter().zip(&result.vertices).map(|(ms, &v)| ms * 8000.0 / v.max(1) as f64).collect()
+}
+
+fn spread(results: &[&OutfitResult], values: impl Fn(&OutfitResult) -> Vec<f64>) -> Option<Spread> {
+    let all: Vec<f64> = results.iter().flat_map(|r| values(r)).collect();
+    (!all.is_empty()).then(|| Spread::of(all))
+}
+
+fn print_tables(results: &[OutfitResult], layers: usize) {
+    println!(
+        "{:<22}{:>7}{:>9}{:>9}{:>9}{:>10}{:>10}{:>10}{:>9}{:>9}",
+        "outfits",
+        "draws",
+        "clear %",
+        "after %",
+        "self %",
+        "pinched %",
+        "order %",
+        "strain %",
+        "p50 ms",
+        "p95 ms"
+    );
+    let line = |name: String, counts: &dyn Fn(&OutfitResult) -> bool| {
+        let chosen: Vec<&OutfitResult> = results.iter().filter(|r| counts(r)).collect();
+        if chosen.is_empty() {
+            return;
+        }
+        let share = |holds: &dyn Fn(&OutfitResult) -> bool| {
+            100.0 * chosen.iter().filter(|r| holds(r)).count() as f64 / chosen.len() as f64
+        };
+        let strain = spread(&chosen, |r| r.strain_added.into_iter().collect());
+        let time = spread(&chosen, |r| r.milliseconds.clone());
+        let order = spread(&chosen, |r| vec![r.after.order_violations]);
+        println!(
+            "{name:<22}{:>7}{:>9.1}{:>9.1}{:>9.1}{:>10.1}{:>10.3}{:>10.2}{:>9.1}{:>9.1}",
+            chosen.len(),
+            share(&|r| r.before.is_clear()),
+            share(&|r| r.after.is_clear()),
+            share(&|r| r.after.self_triangle_pairs == 0),
+            share(&|r| r.after.pinched_pairs > 0),
+            100.0 * order.map_or(0.0, |s| s.mean),
+            100.0 * strain.map_or(0.0, |s| s.median),
+            time.map_or(0.0, |s| s.median),
+            time.map_or(0.0, |s| s.p95),
+        );
+    };
+    let most = results.iter().map(|r| r.garments.len()).max().unwrap_or(0).max(layers);
+    for count in 1..=most {
+        line(format!("{count} garments"), &|r| r.garments.len() == count);
+    }
+    line("all".into(), &|_| true);
+    line("in a wearable order".into(), &|r| r.is_wearable);
+    let all: Vec<&OutfitResult> = results.iter().collect();
+    for (what, found) in [
+        ("ms per 8,000 vertices", spread(&all, per_8000_vertices)),
+        ("ms for the body", spread(&all, |r| vec![r.body_milliseconds])),
+        ("ms for the certificate", spread(&all, |r| vec![r.certificate_milliseconds])),
+        ("largest move [mm]", spread(&all, |r| vec![r.largest_move_mm])),
+    ] {
+        if let Some(s) = found {
+            println!("{what:<24}p50 {:>8.1}   p95 {:>8.1}", s.median, s.p95);
+        }
+    }
+    let failures: Vec<&OutfitResult> = results.iter().filter(|r| !r.after.is_clear()).collect();
+    if !failures.is_empty() {
+        println!("\nnot clear: pairs with the body, between layers (before → after); pinched; deepest [mm]");
+    }
+    for r in failures {
+        println!(
+            "{:>5}  {:>5} → {:<5}{:>6} → {:<5}{:>6}{:>8.1}  {}{}",
+            r.draw,
+            r.before.body_triangle_pairs,
+            r.after.body_triangle_pairs,
+            r.before.layer_triangle_pairs,
+            r.after.layer_triangle_pairs,
+            r.after.pinched_pairs,
+            r.after.max_depth_mm,
+            r.garments.join(" < "),
+            if r.is_wearable { "" } else { "  (legs over a skirt)" }
+        );
+    }
+}

@@ -1,0 +1,278 @@
+//! `clothcombo resolve`: anyone's garments taken out of anyone's body, and out of each other.
+
+use crate::score::{DrapedGarment, Score, ScoreDistance, ScoreError, load_garment, score};
+use clap::Parser;
+use clothcombo_data::format::{MeshFormat, atomic, load_mesh, load_tri_mesh, obj};
+use clothcombo_physics::contact::resolve::{
+    Certificate, Layer, ResolveSettings, Resolved, RestGarment, certify, resolve,
+};
+use clothcombo_physics::mesh::TriMesh;
+use clothcombo_physics::query::Surface;
+use miette::{IntoDiagnostic, Report, WrapErr, miette};
+use serde::Serialize;
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Takes draped garments out of the body and out of each other, in their order, and proves what it reached
+#[derive(Parser)]
+#[command(
+    after_help = "Files are meshes of any topology in metres, y up (OBJ, PLY, STL, glTF); nothing is trained or fitted. Vertices\n\
+                  move, everything else in an OBJ file stays as it is. What cannot be mended is listed in report.json.\n\n\
+                  Example (inner to outer):\n  clothcombo resolve --body body.obj --garments tee.obj coat.obj -o resolved"
+)]
+pub struct Arguments {
+    /// The posed body
+    #[arg(long, value_name = "MESH")]
+    body: PathBuf,
+    /// Draped garments, innermost first
+    #[arg(long, num_args = 1.., required = true, value_name = "MESH")]
+    garments: Vec<PathBuf>,
+    /// Their rest meshes, in the same order, for strain; default: the garments as they are
+    #[arg(long, num_args = 1.., value_name = "MESH")]
+    rest: Vec<PathBuf>,
+    /// Folder for NAME.obj of every garment and report.json
+    #[arg(short, long, default_value = "resolved")]
+    output: PathBuf,
+    /// Gap that a garment gets where it has to move [mm]
+    #[arg(long, default_value_t = 1.0)]
+    gap_mm: f64,
+    /// Leave crossings of a garment with itself alone
+    #[arg(long)]
+    keep_self: bool,
+    /// Print the report as JSON instead of tables
+    #[arg(long)]
+    json: bool,
+}
+
+/// Everything `report.json` holds.
+#[derive(Serialize)]
+struct ResolveReport {
+    gap_mm: f64,
+    before: Score,
+    after: Score,
+    certificate_before: Certificate,
+    certificate: Certificate,
+    milliseconds: Milliseconds,
+    garments: Vec<GarmentReport>,
+}
+
+#[derive(Serialize)]
+struct Milliseconds {
+    body: f64,
+    resolve: Vec<f64>,
+    certificate: f64,
+}
+
+#[derive(Serialize)]
+struct GarmentReport {
+    name: String,
+    output: PathBuf,
+    rounds: usize,
+    moved_vertices: usize,
+    largest_move_mm: f64,
+}
+
+/// A garment as read.
+struct Garment {
+    path: PathBuf,
+    name: String,
+    rest: TriMesh,
+    draped: TriMesh,
+}
+
+/// Larger bodies than this are not in metres [m].
+const TALLEST: f64 = 20.0;
+
+/// Runs the verb.
+///
+/// # Errors
+/// When a file cannot be read or written, or meshes do not fit together. Crossings that stay are a result, not an error.
+pub fn run(arguments: &Arguments) -> Result<(), Report> {
+    let settings = ResolveSettings {
+        gap: 1e-3 * arguments.gap_mm,
+        self_contact: !arguments.keep_self,
+        ..ResolveSettings::default()
+    };
+    settings.check().into_diagnostic()?;
+    let body = load_body(&arguments.body)?;
+    let garments = load_garments(arguments)?;
+    let surface = Surface::from_mesh(&body);
+    let rest: Vec<RestGarment> = garments.iter().map(|g| RestGarment::new(&g.rest)).collect();
+    let layers: Vec<Layer> = rest
+        .iter()
+        .zip(&garments)
+        .map(|(garment, read)| Layer { garment, positions: read.draped.positions() })
+        .collect();
+    let certificate_before = certify(&surface, &layers).into_diagnostic()?;
+    let resolved = resolve(&surface, &layers, &settings).into_diagnostic()?;
+    let scored = |positions: &dyn Fn(usize) -> Vec<[f64; 3]>| -> Result<Score, Report> {
+        let all: Vec<Vec<[f64; 3]>> = (0..garments.len()).map(positions).collect();
+        let draped: Vec<DrapedGarment> = garments
+            .iter()
+            .zip(&all)
+            .map(|(g, positions)| DrapedGarment { name: &g.name, rest: &g.rest, positions })
+            .collect();
+        Ok(score(&body, &draped, ScoreDistance::Surface)?)
+    };
+    let outputs: Vec<PathBuf> =
+        garments.iter().map(|g| arguments.output.join(format!("{}.obj", g.name))).collect();
+    let ms = |time: std::time::Duration| 1e3 * time.as_secs_f64();
+    let report = ResolveReport {
+        gap_mm: arguments.gap_mm,
+        before: scored(&|i| garments[i].draped.positions().to_vec())?,
+        after: scored(&|i| resolved.positions[i].clone())?,
+        certificate_before,
+        certificate: resolved.certificate.clone(),
+        milliseconds: Milliseconds {
+            body: ms(resolved.body_time),
+            resolve: resolved.garments.iter().map(|g| ms(g.time)).collect(),
+            certificate: ms(resolved.certificate_time),
+        },
+        garments: garments
+            .iter()
+            .zip(&outputs)
+            .zip(&resolved.garments)
+            .map(|((garment, output), work)| GarmentReport {
+                name: garment.name.clone(),
+                output: output.clone(),
+                rounds: work.rounds,
+                moved_vertices: work.moved,
+                largest_move_mm: 1e3 * work.largest_move,
+            })
+            .collect(),
+    };
+    write(arguments, &garments, &outputs, &resolved, &report)?;
+    if arguments.json {
+        println!("{}", serde_json::to_string_pretty(&report).into_diagnostic()?);
+    } else {
+        print!("{}", table(&report));
+    }
+    Ok(())
+}
+
+fn load_body(path: &Path) -> Result<TriMesh, Report> {
+    let body = load_tri_mesh(path).map_err(ScoreError::from)?;
+    let (low, high) = body.bounds();
+    let largest = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
+    if largest > TALLEST {
+        return Err(miette!(
+            help = "scale body and garments to metres (0.01 for centimetres)",
+            "{}: the body measures {largest:.0} from end to end, which is no human body in metres",
+            path.display()
+        ));
+    }
+    Ok(body)
+}
+
+fn load_garments(arguments: &Arguments) -> Result<Vec<Garment>, Report> {
+    let (draped, rest) = (&arguments.garments, &arguments.rest);
+    if !rest.is_empty() && rest.len() != draped.len() {
+        return Err(miette!(
+            help = "give each garment once in both lists, from the body outwards",
+            "{} rest meshes (--rest) but {} garments (--garments)",
+            rest.len(),
+            draped.len()
+        ));
+    }
+    let mut garments: Vec<Garment> = Vec::with_capacity(draped.len());
+    for (i, path) in draped.iter().enumerate() {
+        let (name, rest, draped) = load_garment(rest.get(i).unwrap_or(path), path)?;
+        // Two files of one name from two folders must not overwrite each other.
+        let is_taken = garments.iter().any(|g| g.name == name);
+        let name = if is_taken { format!("{name}-{i}") } else { name };
+        garments.push(Garment { path: path.clone(), name, rest, draped });
+    }
+    Ok(garments)
+}
+
+/// Writes everything, after everything that could fail has been computed.
+fn write(
+    arguments: &Arguments,
+    garments: &[Garment],
+    outputs: &[PathBuf],
+    resolved: &Resolved,
+    report: &ResolveReport,
+) -> Result<(), Report> {
+    let texts = garments.iter().zip(&resolved.positions).map(|(garment, p)| text(garment, p));
+    let texts = texts.collect::<Result<Vec<_>, Report>>()?;
+    let save = |path: &Path, bytes: &[u8]| {
+        atomic::write(path, bytes)
+            .into_diagnostic()
+            .wrap_err_with(|| format!("cannot write {}", path.display()))
+    };
+    outputs.iter().zip(&texts).try_for_each(|(path, text)| save(path, text))?;
+    let json = serde_json::to_string_pretty(report).into_diagnostic()?;
+    save(&arguments.output.join("report.json"), json.as_bytes())
+}
+
+/// The garment's file with new positions; a file of another format becomes an OBJ of its polygons.
+fn text(garment: &Garment, positions: &[[f64; 3]]) -> Result<Vec<u8>, Report> {
+    let path = &garment.path;
+    let bytes = fs::read(path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
+    if MeshFormat::detect(path, &bytes) == Some(MeshFormat::Obj) {
+        return obj::with_positions(&bytes, positions)
+            .map_err(|count| miette!("{} changed while it was read: {count} vertices now", path.display()));
+    }
+    let mut text = String::new();
+    for [x, y, z] in positions {
+        let _ = writeln!(text, "v {x} {y} {z}");
+    }
+    for polygon in load_mesh(path).map_err(ScoreError::from)?.polygons() {
+        text.push('f');
+        polygon.iter().for_each(|v| {
+            let _ = write!(text, " {}", u64::from(*v) + 1);
+        });
+        text.push('\n');
+    }
+    Ok(text.into_bytes())
+}
+
+fn table(report: &ResolveReport) -> String {
+    let (before, after) = (&report.certificate_before, &report.certificate);
+    let mut text = format!("{:<34}{:>12}{:>12}\n", "", "before", "after");
+    let mut line = |what: &str, a: String, b: String| {
+        let _ = writeln!(text, "{what:<34}{a:>12}{b:>12}");
+    };
+    let count = |n: usize| n.to_string();
+    let millimetres = |x: f64| format!("{x:.2}");
+    line("pairs with the body", count(before.body_triangle_pairs), count(after.body_triangle_pairs));
+    line("pairs between garments", count(before.layer_triangle_pairs), count(after.layer_triangle_pairs));
+    line(
+        "pairs of a garment with itself",
+        count(before.self_triangle_pairs),
+        count(after.self_triangle_pairs),
+    );
+    let pinched = |c: &Certificate| {
+        let p = &c.pinched;
+        count(p.body_triangle_pairs + p.layer_triangle_pairs + p.self_triangle_pairs)
+    };
+    line("pairs where the body is pinched", pinched(before), pinched(after));
+    line(
+        "length of the crossings [mm]",
+        millimetres(before.contour_length_mm),
+        millimetres(after.contour_length_mm),
+    );
+    line("deepest vertex [mm]", millimetres(before.max_depth_mm), millimetres(after.max_depth_mm));
+    let percent = |x: f64| format!("{:.3}", 100.0 * x);
+    line(
+        "vertices under an inner layer [%]",
+        percent(before.order_violations),
+        percent(after.order_violations),
+    );
+    let strain = after.strain_added.map_or("-".into(), percent);
+    line("strain added [%]", String::new(), strain);
+    text.push('\n');
+    for (garment, ms) in report.garments.iter().zip(&report.milliseconds.resolve) {
+        let _ = writeln!(
+            text,
+            "{}: {} vertices moved, at most {:.1} mm, {} rounds, {ms:.1} ms → {}",
+            garment.name,
+            garment.moved_vertices,
+            garment.largest_move_mm,
+            garment.rounds,
+            garment.output.display()
+        );
+    }
+    text
+}

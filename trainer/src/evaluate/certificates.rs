@@ -1,0 +1,238 @@
+//! What the post-process makes of random outfits.
+
+use crate::scene::PreparedScene;
+use clothcombo_physics::contact::resolve::{
+    Certificate, Layer, ResolveError, ResolveSettings, Resolved, RestGarment, certify, resolve,
+};
+use clothcombo_physics::contact::{OrderViolations, order_violations};
+use clothcombo_physics::query::Surface;
+use serde::Serialize;
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// The constants of garments that the post-process needs, made once per garment.
+#[derive(Default)]
+pub struct RestGarments {
+    known: HashMap<usize, Arc<RestGarment>>,
+}
+
+impl RestGarments {
+    /// Those of a scene.
+    pub fn of(&mut self, scene: &PreparedScene) -> Vec<Arc<RestGarment>> {
+        let worn = scene.garments.iter().zip(&scene.worn);
+        let known = &mut self.known;
+        worn.map(|(&g, worn)| {
+            known.entry(g).or_insert_with(|| Arc::new(RestGarment::new(&worn.garment.rest))).clone()
+        })
+        .collect()
+    }
+}
+
+/// A scene's body and garments as the post-process takes them.
+pub struct DrapedScene {
+    /// The posed body.
+    pub body: Surface<f64>,
+    /// Constants of the garments, inner → outer.
+    pub garments: Vec<Arc<RestGarment>>,
+    /// Their positions.
+    pub positions: Vec<Vec<[f64; 3]>>,
+}
+
+impl DrapedScene {
+    /// From the packed positions of all garments of `scene` on its first body.
+    pub fn new(scene: &PreparedScene, garments: Vec<Arc<RestGarment>>, packed: &[[f32; 3]]) -> Self {
+        let body = &scene.bodies[0].energy.body;
+        let body =
+            Surface::new(body.positions.iter().map(|p| p.map(f64::from)).collect(), body.faces.clone());
+        let mut rest = packed;
+        let positions = garments
+            .iter()
+            .map(|garment| {
+                let (part, tail) = rest.split_at(garment.vertex_count());
+                rest = tail;
+                part.iter().map(|p| p.map(f64::from)).collect()
+            })
+            .collect();
+        Self { body, garments, positions }
+    }
+
+    fn layers<'a>(&'a self, positions: &'a [Vec<[f64; 3]>]) -> Vec<Layer<'a>> {
+        let pairs = self.garments.iter().zip(positions);
+        pairs.map(|(garment, positions)| Layer { garment, positions }).collect()
+    }
+
+    /// Resolves it.
+    ///
+    /// # Errors
+    /// When it is no valid scene.
+    pub fn resolved(&self, settings: &ResolveSettings) -> Result<Resolved, ResolveError> {
+        resolve(&self.body, &self.layers(&self.positions), settings)
+    }
+
+    /// What crosses before anything is done.
+    ///
+    /// # Errors
+    /// When it is no valid scene.
+    pub fn certificate(&self) -> Result<Certificate, ResolveError> {
+        certify(&self.body, &self.layers(&self.positions))
+    }
+
+    /// Share of wrong-side vertices over all pairs of layers, by the nearest vertex: the definition of the score.
+    pub fn order_by_vertices(&self, positions: &[Vec<[f64; 3]>]) -> f64 {
+        let mut sum = OrderViolations::default();
+        for (outer, over) in positions.iter().enumerate() {
+            for (garment, under) in self.garments.iter().zip(&positions[..outer]) {
+                let pair = order_violations(under, garment.faces(), over);
+                sum.counted += pair.counted;
+                sum.violations += pair.violations;
+            }
+        }
+        sum.share()
+    }
+}
+
+/// Linear blend skinning of the start state on the host, packed: what the networks start from.
+pub fn skinned(scene: &PreparedScene) -> Vec<[f32; 3]> {
+    let body = &scene.bodies[0];
+    let joints = body.bones.len();
+    let mut start = body.start.as_slice();
+    let mut posed = Vec::with_capacity(start.len());
+    for worn in &scene.worn {
+        let (own, tail) = start.split_at(worn.vertex_count());
+        start = tail;
+        for (p, weights) in own.iter().zip(worn.skin_weights.chunks_exact(joints.max(1))) {
+            let p = p.map(f64::from);
+            let mut sum = [0.0; 3];
+            for (bone, w) in body.bones.iter().zip(weights) {
+                for (axis, row) in bone.iter().enumerate() {
+                    sum[axis] += f64::from(*w) * (row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + row[3]);
+                }
+            }
+            posed.push(sum.map(|x| x as f32));
+        }
+    }
+    posed
+}
+
+/// The numbers of a certificate without its list.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Counts {
+    /// Exact pairs with the body.
+    pub body_triangle_pairs: usize,
+    /// Exact pairs of two garments.
+    pub layer_triangle_pairs: usize,
+    /// Exact pairs of a garment with itself.
+    pub self_triangle_pairs: usize,
+    /// Pairs of all kinds where the body lies inside itself.
+    pub pinched_pairs: usize,
+    /// Length of the curves of intersection [mm].
+    pub contour_length_mm: f64,
+    /// Deepest vertex [mm].
+    pub max_depth_mm: f64,
+    /// Share of wrong-side vertices by the closest surface point.
+    pub order_violations: f64,
+    /// Share of wrong-side vertices by the nearest vertex.
+    pub order_violations_by_vertices: f64,
+}
+
+impl Counts {
+    /// Those of `certificate`.
+    pub fn new(certificate: &Certificate, order_violations_by_vertices: f64) -> Self {
+        let pinched = &certificate.pinched;
+        Self {
+            body_triangle_pairs: certificate.body_triangle_pairs,
+            layer_triangle_pairs: certificate.layer_triangle_pairs,
+            self_triangle_pairs: certificate.self_triangle_pairs,
+            pinched_pairs: pinched.body_triangle_pairs
+                + pinched.layer_triangle_pairs
+                + pinched.self_triangle_pairs,
+            contour_length_mm: certificate.contour_length_mm,
+            max_depth_mm: certificate.max_depth_mm,
+            order_violations: certificate.order_violations,
+            order_violations_by_vertices,
+        }
+    }
+
+    /// Whether no garment crosses the body or another garment.
+    pub fn is_clear(&self) -> bool {
+        self.body_triangle_pairs + self.layer_triangle_pairs == 0
+    }
+}
+
+/// One outfit.
+#[derive(Clone, Debug, Serialize)]
+pub struct OutfitResult {
+    /// Number of the draw.
+    pub draw: usize,
+    /// Names, inner → outer.
+    pub garments: Vec<String>,
+    /// Whether the order can be worn: no garment with legs over one that hangs between them.
+    pub is_wearable: bool,
+    /// Vertices per garment.
+    pub vertices: Vec<usize>,
+    /// Before the post-process.
+    pub before: Counts,
+    /// After it.
+    pub after: Counts,
+    /// Rise of the strain energy, as a share; none where there was no strain.
+    pub strain_added: Option<f64>,
+    /// Largest move of a vertex [mm].
+    pub largest_move_mm: f64,
+    /// Share of vertices that moved.
+    pub moved: f64,
+    /// Rounds per garment.
+    pub rounds: Vec<usize>,
+    /// Time per garment [ms].
+    pub milliseconds: Vec<f64>,
+    /// Time to prepare the body, once for all garments [ms].
+    pub body_milliseconds: f64,
+    /// Time of the certificate, once for all garments [ms].
+    pub certificate_milliseconds: f64,
+}
+
+impl OutfitResult {
+    /// Resolves `draped`, a drape of `scene`.
+    ///
+    /// # Errors
+    /// When it is no valid scene.
+    pub fn new(
+        draw: usize,
+        scene: &PreparedScene,
+        draped: &DrapedScene,
+        settings: &ResolveSettings,
+    ) -> Result<(Self, Resolved), ResolveError> {
+        let before = Counts::new(&draped.certificate()?, draped.order_by_vertices(&draped.positions));
+        let resolved = draped.resolved(settings)?;
+        let works = &resolved.garments;
+        let ms = |time: std::time::Duration| 1e3 * time.as_secs_f64();
+        let vertices: Vec<usize> = scene.worn.iter().map(|w| w.vertex_count()).collect();
+        let moved: usize = works.iter().map(|w| w.moved).sum();
+        let result = Self {
+            draw,
+            garments: scene.worn.iter().map(|w| w.garment.name.clone()).collect(),
+            is_wearable: is_wearable(scene),
+            before,
+            after: Counts::new(&resolved.certificate, draped.order_by_vertices(&resolved.positions)),
+            strain_added: resolved.certificate.strain_added,
+            largest_move_mm: 1e3 * works.iter().map(|w| w.largest_move).fold(0.0, f64::max),
+            moved: moved as f64 / vertices.iter().sum::<usize>().max(1) as f64,
+            rounds: works.iter().map(|w| w.rounds).collect(),
+            milliseconds: works.iter().map(|w| ms(w.time)).collect(),
+            body_milliseconds: ms(resolved.body_time),
+            certificate_milliseconds: ms(resolved.certificate_time),
+            vertices,
+        };
+        Ok((result, resolved))
+    }
+}
+
+/// Cloth around each leg cannot lie over cloth that hangs between the legs: they would have to pass through each other at the
+/// crotch.
+fn is_wearable(scene: &PreparedScene) -> bool {
+    use clothcombo_data::asset::Category;
+    let categories: Vec<Category> = scene.worn.iter().map(|w| w.garment.category).collect();
+    (0..categories.len()).all(|outer| {
+        categories[outer] != Category::Trousers
+            || !categories[..outer].iter().any(|inner| inner.hangs_between_legs())
+    })
+}

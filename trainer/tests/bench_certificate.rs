@@ -1,0 +1,50 @@
+//! `clothcombo bench certificate` on a few tiny outfits.
+
+use assert_cmd::Command;
+use serde_json::Value;
+use std::fs;
+
+const CONFIG: &str = r#"
+seed = 4
+[data]
+[[data.garments]]
+generate = { count = 3, seed = 5, vertices = 300, categories = ["t_shirt", "trousers", "skirt"] }
+[[stages]]
+name = "all"
+trains = "all"
+steps = 2
+"#;
+
+#[test]
+fn draws_are_counted_and_failures_listed() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("tiny.toml"), CONFIG).unwrap();
+    let run = |extra: &[&str]| {
+        let mut command = Command::cargo_bin("clothcombo").unwrap();
+        command.current_dir(folder.path()).args(["bench", "certificate", "--config", "tiny.toml"]);
+        command.args(["--layers", "2", "--draws", "4"]).args(extra);
+        command.assert().success().get_output().stdout.clone()
+    };
+    let report: Value = serde_json::from_slice(&run(&["--json"])).unwrap();
+    let draws = report["draws"].as_array().unwrap();
+    assert_eq!((draws.len(), report["all"]["draws"].as_u64()), (4, Some(4)));
+    let clear = |r: &&Value| {
+        r["after"]["body_triangle_pairs"].as_u64().unwrap()
+            + r["after"]["layer_triangle_pairs"].as_u64().unwrap()
+            == 0
+    };
+    let share = draws.iter().filter(clear).count() as f64 / 4.0;
+    assert_eq!(report["all"]["clear_after"].as_f64(), Some(share));
+    assert_eq!(report["failures"].as_array().unwrap().len(), draws.iter().filter(|r| !clear(r)).count());
+    assert_eq!(draws[0]["garments"].as_array().unwrap().len(), 1);
+    assert_eq!(draws[1]["garments"].as_array().unwrap().len(), 2);
+
+    // One draw alone is the same draw, and its meshes can be looked at.
+    let one: Value = serde_json::from_slice(&run(&["--json", "--only", "1", "--meshes", "meshes"])).unwrap();
+    assert_eq!(one["draws"][0]["after"], draws[1]["after"]);
+    for state in ["rest", "draped", "resolved"] {
+        assert_eq!(fs::read_dir(folder.path().join("meshes/0001").join(state)).unwrap().count(), 2);
+    }
+    let table = String::from_utf8(run(&[])).unwrap();
+    assert!(table.contains("clear %") && table.contains("2 garments"), "{table}");
+}

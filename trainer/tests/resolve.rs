@@ -1,0 +1,167 @@
+//! `clothcombo resolve`: what it writes, and what it says to files it cannot use.
+
+use assert_cmd::Command;
+use clothcombo_data::format::{ObjMesh, load_tri_mesh};
+use clothcombo_physics::contact::TriangleTree;
+use clothcombo_physics::mesh::shapes;
+use serde_json::Value;
+use std::fmt::Write as _;
+use std::fs;
+use std::path::PathBuf;
+use tempfile::TempDir;
+
+/// A ball, and two quad tubes around it: the inner one cuts the ball, the outer one lies inside the inner one.
+struct Case {
+    folder: TempDir,
+}
+
+impl Case {
+    fn new() -> Self {
+        let case = Self { folder: tempfile::tempdir().unwrap() };
+        let ball = shapes::icosphere(0.15, 3);
+        let mut text = String::new();
+        ball.positions().iter().for_each(|[x, y, z]| writeln!(text, "v {x} {y} {z}").unwrap());
+        ball.faces().iter().for_each(|f| writeln!(text, "f {} {} {}", f[0] + 1, f[1] + 1, f[2] + 1).unwrap());
+        case.write("body.obj", &text);
+        case.write("tee.obj", &quad_tube(0.149, 40, 12));
+        case.write("coat.obj", &quad_tube(0.1485, 36, 10));
+        case
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        let path = self.path(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, text).unwrap();
+    }
+
+    fn command(&self, garments: &[&str], extra: &[&str]) -> Command {
+        let mut command = Command::cargo_bin("clothcombo").unwrap();
+        command.env("NO_COLOR", "1").current_dir(self.folder.path());
+        command.args(["resolve", "--body", "body.obj", "--garments"]).args(garments).args(extra);
+        command
+    }
+
+    /// Must exit with 1, write nothing and print one message that holds every one of `words`.
+    fn must_fail(&self, garments: &[&str], extra: &[&str], words: &[&str]) {
+        let output = self.command(garments, extra).output().unwrap();
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{message}");
+        assert!(output.stdout.is_empty() && !self.path("resolved").exists());
+        assert!(!message.contains("panicked") && message.matches('×').count() == 1, "{message}");
+        let flat = message.split_whitespace().filter(|w| *w != "│").collect::<Vec<_>>().join(" ");
+        for word in words {
+            assert!(flat.contains(word), "{word:?} is missing in:\n{message}");
+        }
+    }
+}
+
+/// An open tube of quads with a texture coordinate and groups, as other programs write them.
+fn quad_tube(radius: f64, around: usize, along: usize) -> String {
+    let mut text = String::from("# quads\no tube\nmtllib tube.mtl\nvt 0.5 0.5\n");
+    for ring in 0..=along {
+        for step in 0..around {
+            let angle = std::f64::consts::TAU * step as f64 / around as f64;
+            let y = 0.2 * ring as f64 / along as f64 - 0.1;
+            writeln!(text, "v {} {y} {} 1 0 0", radius * angle.sin(), radius * angle.cos()).unwrap();
+        }
+    }
+    for ring in 0..along {
+        writeln!(text, "g ring_{ring}").unwrap();
+        for step in 0..around {
+            let at = |ring: usize, step: usize| ring * around + step % around + 1;
+            let corners = [at(ring, step), at(ring, step + 1), at(ring + 1, step + 1), at(ring + 1, step)];
+            writeln!(text, "f {0}/1 {1}/1 {2}/1 {3}/1", corners[0], corners[1], corners[2], corners[3])
+                .unwrap();
+        }
+    }
+    text
+}
+
+#[test]
+fn what_is_written_is_clear_and_has_the_topology_it_came_with() {
+    let case = Case::new();
+    let output = case.command(&["tee.obj", "coat.obj"], &["-o", "out", "--json"]).assert().success();
+    let report: Value = serde_json::from_slice(&output.get_output().stdout).unwrap();
+    let written: Value = serde_json::from_slice(&fs::read(case.path("out/report.json")).unwrap()).unwrap();
+    assert_eq!(report, written);
+
+    for key in [
+        "body_triangle_pairs",
+        "layer_triangle_pairs",
+        "self_triangle_pairs",
+        "contour_length_mm",
+        "max_depth_mm",
+    ] {
+        assert_eq!(report["certificate"][key].as_f64(), Some(0.0), "{key}");
+    }
+    assert!(report["certificate_before"]["body_triangle_pairs"].as_u64().unwrap() > 0);
+    assert!(report["certificate_before"]["order_violations"].as_f64().unwrap() > 0.9);
+    assert!(report["before"]["garments"][0]["penetration"]["body_triangle_pairs"].as_u64().unwrap() > 0);
+    assert_eq!(report["after"]["garments"][0]["penetration"]["body_triangle_pairs"].as_u64(), Some(0));
+    assert_eq!(report["after"]["layers"][0]["triangle_pairs"].as_u64(), Some(0));
+
+    // The files themselves, counted again.
+    let load = |name: &str| load_tri_mesh(&case.path(name)).unwrap();
+    let meshes = [load("body.obj"), load("out/tee.obj"), load("out/coat.obj")];
+    let trees: Vec<_> = meshes.iter().map(|m| TriangleTree::new(m.positions(), m.faces())).collect();
+    for (i, a) in trees.iter().enumerate() {
+        assert!(trees[i + 1..].iter().all(|b| a.pairs_with(b).is_empty()));
+    }
+    for name in ["tee.obj", "coat.obj"] {
+        let parse = |path: PathBuf| {
+            let text = fs::read_to_string(&path).unwrap();
+            let others: Vec<String> =
+                text.lines().filter(|l| !l.starts_with("v ")).map(str::to_owned).collect();
+            (ObjMesh::parse(&text, &path).unwrap(), others)
+        };
+        let (before, others_before) = parse(case.path(name));
+        let (after, others_after) = parse(case.path("out").join(name));
+        assert_eq!(others_before, others_after);
+        assert_eq!(before.polygons, after.polygons);
+        assert_eq!(before.positions.len(), after.positions.len());
+        assert_ne!(before.positions, after.positions);
+    }
+    // The bottom and top rims lie off the ball, within reach of nothing: a second run changes nothing at all.
+    case.command(&["out/tee.obj", "out/coat.obj"], &["-o", "again"]).assert().success();
+    for name in ["tee.obj", "coat.obj"] {
+        assert_eq!(load(&format!("out/{name}")).positions(), load(&format!("again/{name}")).positions());
+    }
+}
+
+#[test]
+fn strain_is_measured_against_the_rest_meshes() {
+    let case = Case::new();
+    case.write("rest/tee.obj", &quad_tube(0.14, 40, 12));
+    let output = case.command(&["tee.obj"], &["--rest", "rest/tee.obj", "--json"]).assert().success();
+    let report: Value = serde_json::from_slice(&output.get_output().stdout).unwrap();
+    assert!(report["certificate"]["strain_added"].as_f64().is_some(), "{report}");
+    assert!(case.path("resolved/tee.obj").exists());
+}
+
+#[test]
+fn files_that_cannot_be_used_are_named() {
+    let case = Case::new();
+    case.must_fail(&["none.obj"], &[], &["none.obj"]);
+    case.write("short.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n");
+    case.must_fail(&["tee.obj", "short.obj"], &[], &["short.obj:4", "vertex 9"]);
+    case.must_fail(&["tee.obj", "coat.obj"], &["--rest", "tee.obj"], &["1 rest meshes", "2 garments"]);
+    case.must_fail(&["tee.obj"], &["--rest", "coat.obj"], &["tee.obj", "coat.obj", "vertices"]);
+    case.must_fail(&["tee.obj"], &["--gap-mm", "0"], &["gap", "greater than 0"]);
+    let body = fs::read_to_string(case.path("body.obj")).unwrap();
+    let centimetres: String = body
+        .lines()
+        .map(|line| match line.strip_prefix("v ") {
+            Some(numbers) => {
+                let scaled = numbers.split(' ').map(|x| (1e3 * x.parse::<f64>().unwrap()).to_string());
+                format!("v {}\n", scaled.collect::<Vec<_>>().join(" "))
+            }
+            None => format!("{line}\n"),
+        })
+        .collect();
+    case.write("body.obj", &centimetres);
+    case.must_fail(&["tee.obj"], &[], &["body.obj", "metres"]);
+}
