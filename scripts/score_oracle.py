@@ -117,7 +117,7 @@ def strain(rest, x):
 
 
 def bending(rest, x):
-    """Σ k/2·α² over interior edges, each times 1 − (1 − s²/τ²)³, 1 above τ, of its two triangles, s being twice the area."""
+    """Σ k/2·α² over interior edges, each times t²(6 − 8t + 3t²), t = s²/τ² ≤ 1, of its two triangles, s being twice the area."""
     hinges = rest.hinges()
     a, b, c, d = (x[hinges[:, k]] for k in range(4))
     normals = [np.cross(b - a, c - a), np.cross(d - a, b - a)]  # both seen from one side of the sheet
@@ -125,7 +125,8 @@ def bending(rest, x):
     scale = 1.0
     for k, normal in enumerate(normals):
         tau = np.maximum(FOLD * rest_areas[hinges[:, 4 + k]], FOLD_FLOOR * rest.median_edge**2)
-        scale = scale * (1 - (1 - np.minimum(dot(normal, normal) / tau**2, 1)) ** 3)
+        t = np.minimum(dot(normal, normal) / tau**2, 1)
+        scale = scale * t**2 * (6 - 8 * t + 3 * t**2)
     n, m = (normal / np.maximum(length(normal), 1e-300)[:, None] for normal in normals)
     alpha = 2 * np.arctan2(length(n - m), length(n + m))  # unsigned, accurate at 0 and π
     return (BENDING_STIFFNESS / 2 * alpha**2 * scale).sum()

@@ -10,10 +10,10 @@
 //!
 //! **Degenerate triangles** have no normal, and near them the angle turns arbitrarily fast: in a compressed fold, where
 //! triangles collapse, a step of a micrometre turned a hinge over, forces of hundreds of newtons stood against each other, and
-//! no descent settled. Each hinge is therefore scaled by `φ(s²/τ²)` for both of its triangles, `φ(t) = 1 − (1 − t)³` below 1
+//! no descent settled. Each hinge is therefore scaled by `φ(s²/τ²)` for both of its triangles, `φ(t) = t²(6 − 8t + 3t²)` below 1
 //! and 1 above, `s` being twice the deformed area and τ a twentieth of its rest value (at least 1e-3 squared median edges).
-//! A triangle that keeps a twentieth of its area has the printed energy, one without area none, and the gradient is
-//! differentiable, bounded and the exact derivative everywhere.
+//! Both ends of φ are flat: the angle jumps where the area vanishes. A triangle that keeps a twentieth of its area has the
+//! printed energy, one without area none, and the gradient is bounded and the exact derivative everywhere.
 
 use super::curvature::outer;
 use super::elements::{Incidence, Response, sum_elements};
@@ -112,9 +112,9 @@ impl Fade {
         }
         let t = square / tau_squared;
         Self {
-            share: t * (3.0 - t * (3.0 - t)),
-            over_square: (3.0 - t * (3.0 - t)) / tau_squared,
-            slope: 3.0 * (1.0 - t).powi(2) / tau_squared,
+            share: t * t * (6.0 - t * (8.0 - 3.0 * t)),
+            over_square: t * (6.0 - t * (8.0 - 3.0 * t)) / tau_squared,
+            slope: 12.0 * t * (1.0 - t).powi(2) / tau_squared,
         }
     }
 }

@@ -85,7 +85,8 @@ pub(super) fn relax(
     for _ in 0..sweeps {
         for &v in region {
             let moved = |n: u32| sub(positions[n as usize], start[n as usize]);
-            let (count, sum) = cloth.ring(v).fold((0, [0.0; 3]), |(count, sum), n| (count + 1, add(sum, moved(n))));
+            let (count, sum) =
+                cloth.ring(v).fold((0, [0.0; 3]), |(count, sum), n| (count + 1, add(sum, moved(n))));
             let v = v as usize;
             let wanted = add_scaled(start[v], FOLLOW / f64::from(count.max(1)), sum);
             positions[v] = add_scaled(positions[v], OVER, sub(wanted, positions[v]));
