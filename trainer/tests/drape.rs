@@ -114,7 +114,7 @@ fn save_motion(path: &Path, frames: usize) {
     motion.save(path).unwrap();
 }
 
-/// An open tube of quads around the mannequin's waist.
+/// An open tube of quads with texture coordinates and normals around the mannequin's waist.
 fn quad_band(path: &Path) {
     let (around, rows) = (40u32, 9u32);
     let mut positions = Vec::new();
@@ -132,6 +132,18 @@ fn quad_band(path: &Path) {
         }
     }
     obj::save_polygons(path, &positions, quads.iter().map(|q| q.as_slice()), &[]).unwrap();
+    let text = fs::read_to_string(path).unwrap();
+    let mut full = String::from("vt 0.5 0.25\nvn 0 0 1\n");
+    for line in text.lines() {
+        match line.strip_prefix("f ") {
+            Some(corners) => {
+                let corners: Vec<String> = corners.split(' ').map(|c| format!("{c}/1/1")).collect();
+                full += &format!("f {}\n", corners.join(" "));
+            }
+            None => full += &format!("{line}\n"),
+        }
+    }
+    fs::write(path, full).unwrap();
 }
 
 #[test]
@@ -153,6 +165,12 @@ fn a_posed_outfit_leaves_every_output_and_each_reads_back() {
     assert_eq!(draped.positions.len(), given.positions.len());
     assert!(draped.polygons().eq(given.polygons()), "quads stay quads, in their order");
     assert!(draped.polygons().all(|p| p.len() == 4));
+    let text = fs::read_to_string(out.join("band.obj")).unwrap();
+    assert!(
+        text.contains("\nvt 0.5 0.25\n") && text.contains("\nf 1/1 2/1 42/1 41/1\n"),
+        "texture coordinates stay"
+    );
+    assert!(!text.contains("\nvn "), "normals of another shape do not");
 
     // The scene holds body and garments at the places of the OBJ files.
     let body = load_tri_mesh(&out.join("body.obj")).unwrap();

@@ -254,10 +254,46 @@ pub fn with_positions(bytes: &[u8], positions: &[[f64; 3]]) -> Result<Vec<u8>, u
     if count == positions.len() { Ok(out) } else { Err(count) }
 }
 
+/// The bytes of an OBJ file without its normals, which other positions make wrong; programs that read it compute them anew.
+pub fn without_normals(bytes: &[u8]) -> Vec<u8> {
+    let mut out = Vec::with_capacity(bytes.len());
+    for line in bytes.split_inclusive(|b| *b == b'\n') {
+        let mut words = line.split(|b| b.is_ascii_whitespace()).filter(|word| !word.is_empty());
+        match words.next() {
+            Some(b"vn") => {}
+            Some(b"f") => {
+                out.push(b'f');
+                for word in words.take_while(|word| !word.starts_with(b"#")) {
+                    let mut parts = word.split(|b| *b == b'/');
+                    out.push(b' ');
+                    out.extend_from_slice(parts.next().unwrap_or_default());
+                    if let Some(texture) = parts.next().filter(|t| !t.is_empty()) {
+                        out.push(b'/');
+                        out.extend_from_slice(texture);
+                    }
+                }
+                out.push(b'\n');
+            }
+            _ => out.extend_from_slice(line),
+        }
+    }
+    out
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use std::fs;
+
+    #[test]
+    fn without_normals_everything_else_stays() {
+        let text = "v 0 0 0\nvn 0 0 1\nvt 0 1\nusemtl red\nf 1/1/1 2//1 -1/2 4 # seam\r\n  f 1//1 2//1 3//1";
+        let bytes = without_normals(text.as_bytes());
+        assert_eq!(
+            String::from_utf8(bytes).unwrap(),
+            "v 0 0 0\nvt 0 1\nusemtl red\nf 1/1 2 -1/2 4\nf 1 2 3\n"
+        );
+    }
 
     #[test]
     fn other_positions_leave_the_rest_of_the_file_alone() {
