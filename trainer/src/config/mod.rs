@@ -129,7 +129,7 @@ impl Config {
 
 /// Networks that no machine holds, as (place, what, hint): a slip of the finger must not end in an allocation that fails.
 fn model_problem(model: &ModelConfig) -> Option<(String, String, String)> {
-    let widths = [
+    let widths: [(&str, usize, usize); 10] = [
         ("width", model.width, 16_384),
         ("embedding", model.embedding, 16_384),
         ("diffusion_width", model.diffusion_width, 16_384),
