@@ -67,6 +67,7 @@ fn parts_equal_the_whole(overrides: &[&str], stops: &[u64], files: &[&str]) {
     }
     let state = |run: &Path| Checkpoint::open(&run.join("checkpoints/step-00000060")).unwrap().state;
     assert_eq!(state(&whole).best, state(&parts).best);
+    assert_eq!(state(&whole).incidents, state(&parts).incidents);
     assert!(state(&whole).best.is_some());
 }
 

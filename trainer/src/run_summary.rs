@@ -105,7 +105,8 @@ impl RunSummary {
 
     fn read_validations(&mut self, root: &Path) {
         for line in values(&root.join("validation.jsonl")) {
-            let step = line["step"].as_u64().unwrap_or(0);
+            // Before the first step there is nothing to compare.
+            let Some(step) = line["step"].as_u64().filter(|step| *step > 0) else { continue };
             let networks: Vec<(&str, &Value, &Value)> = line["groups"]
                 .as_array()
                 .into_iter()
@@ -119,7 +120,7 @@ impl RunSummary {
             let totals: Vec<f64> =
                 networks.iter().filter_map(|(_, m, _)| m["total"]["mean"].as_f64()).collect();
             let score = totals.iter().sum::<f64>() / totals.len() as f64;
-            if step > 0 && score.is_finite() && self.best_score.is_none_or(|best| score < best) {
+            if score.is_finite() && self.best_score.is_none_or(|best| score < best) {
                 (self.best_step, self.best_score) = (Some(step), Some(score));
             }
             for (group, network, skinning) in networks {

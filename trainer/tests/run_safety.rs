@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{clothcombo, resume, said, start, tiny, trainer};
+use common::{clothcombo, holds, resume, said, start, tiny, trainer};
 use std::path::Path;
 use std::process::{Command, Output};
 use std::time::{Duration, Instant};
@@ -12,7 +12,7 @@ fn must_fail(output: &Output, words: &[&str]) {
     assert_eq!(output.status.code(), Some(1), "{message}");
     assert!(!message.contains("panicked"), "{message}");
     for word in words {
-        assert!(message.contains(word), "{word:?} is missing in: {message}");
+        assert!(holds(&message, word), "{word:?} is missing in: {message}");
     }
 }
 

@@ -196,6 +196,9 @@ impl Default for StartConfig {
     }
 }
 
+/// Garments a generator is asked for at most.
+const MOST_GARMENTS: usize = 1_000_000;
+
 impl DataConfig {
     /// Memory for garments that can be read again [bytes]; those of a run without a cache cannot.
     pub(crate) fn memory_limit(&self) -> usize {
@@ -251,11 +254,14 @@ impl DataConfig {
         }
         for (i, source) in self.garments.iter().enumerate() {
             if let Some(g) = &source.generate
-                && (g.count == 0 || g.categories.is_empty() || !(200..=50_000).contains(&g.vertices))
+                && (g.count == 0
+                    || g.count > MOST_GARMENTS
+                    || g.categories.is_empty()
+                    || !(200..=50_000).contains(&g.vertices))
             {
                 return Some((
                     format!("data.garments[{i}].generate"),
-                    "needs count ≥ 1, at least one category, and 200 to 50000 vertices".into(),
+                    "needs 1 to 1000000 garments, at least one category, and 200 to 50000 vertices".into(),
                     "for example { count = 12, vertices = 1000 }".into(),
                 ));
             }

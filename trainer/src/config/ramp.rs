@@ -75,6 +75,10 @@ impl Ramp {
             Some("`end` comes before `start`")
         } else if self.shape == RampShape::Geometric && !(self.from > 0.0 && self.to > 0.0) {
             Some("a geometric ramp needs positive `from` and `to`")
+        } else if self.shape == RampShape::Geometric && !(self.to / self.from).is_normal() {
+            Some("`from` and `to` of a geometric ramp are too far apart")
+        } else if !(self.to - self.from).is_finite() {
+            Some("`from` and `to` are too far apart")
         } else {
             None
         }

@@ -58,11 +58,11 @@ pub struct StageConfig {
 /// Steps of a stage at most: sums of them must stay countable.
 const MOST_STEPS: u64 = 1_000_000_000_000;
 
-/// Scenes of a step at most.
+/// Outfits of a step, and bodies of an outfit, at most.
 const MOST_SCENES: usize = 1024;
 
 /// Layers of a scene at most; the number of pairs grows with its square.
-const MOST_LAYERS: usize = 32;
+pub(super) const MOST_LAYERS: usize = 32;
 
 fn one_layer() -> [usize; 2] {
     [1, 1]
@@ -119,8 +119,8 @@ impl StageConfig {
             says("layers", "are more garments than anyone wears", "the paper goes up to 6, 32 are allowed")
         } else if !(0.0..=1.0).contains(&self.layer_curriculum) {
             says("layer_curriculum", "is not a fraction of the stage", "for example 0.5; 0 switches it off")
-        } else if self.scenes_per_step == 0 {
-            says("scenes_per_step", "a step needs at least one body", "use 1 or more")
+        } else if self.scenes_per_step == 0 || self.scenes_per_step > MOST_SCENES {
+            says("scenes_per_step", "must lie between 1 and 1024", "1 drapes every outfit on one body")
         } else if self.accumulate == 0 || self.accumulate > MOST_SCENES {
             says("accumulate", "must lie between 1 and 1024", "1 makes an update after every scene")
         } else if self.warm_up_steps > self.steps {
@@ -149,7 +149,9 @@ mod tests {
         let most: Vec<usize> = (0..100).map(|i| s.layers_at(f64::from(i) / 100.0)[1]).collect();
         assert!(most.windows(2).all(|w| w[0] <= w[1]));
         for layers in 2..5 {
-            assert_eq!(most.iter().filter(|m| **m == layers).count(), 20);
+            // A fraction that is no binary number may fall on either side of a boundary.
+            let count = most.iter().filter(|m| **m == layers).count();
+            assert!((19..=21).contains(&count), "{layers}: {count}");
         }
         assert_eq!(stage("layers = [2, 5]").layers_at(0.0), [2, 5]);
     }

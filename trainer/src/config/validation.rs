@@ -1,5 +1,6 @@
 //! What every validation scores.
 
+use super::stages::MOST_LAYERS;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -31,5 +32,25 @@ impl Default for ValidationConfig {
             layers: [2, 4],
             every: 0,
         }
+    }
+}
+
+/// Scenes of a group at most: all of them are drawn before the first is scored.
+const MOST_SCENES: usize = 100_000;
+
+impl ValidationConfig {
+    /// What is inconsistent, as (place, what, hint).
+    pub(super) fn problem(&self) -> Option<(String, String, String)> {
+        let says = |p: &str, w: &str, h: &str| Some((p.into(), w.into(), h.into()));
+        let [low, high] = self.layers;
+        let counts =
+            [self.single_scenes, self.unseen_scenes, self.unseen_garment_scenes, self.layered_scenes];
+        if self.layered_scenes > 0 && !(2 <= low && low <= high && high <= MOST_LAYERS) {
+            return says("validation.layers", "is not a range of at least two layers", "for example [2, 4]");
+        }
+        if counts.iter().any(|count| *count > MOST_SCENES) {
+            return says("validation", "has more than 100,000 scenes of a kind", "some dozens are enough");
+        }
+        None
     }
 }

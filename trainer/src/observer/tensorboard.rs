@@ -118,7 +118,7 @@ impl Message {
     }
 
     fn key(&mut self, field: u64, wire: u64) {
-        self.variable(field << 3 | wire);
+        self.variable((field << 3) | wire);
     }
 
     fn integer(&mut self, field: u64, value: u64) {

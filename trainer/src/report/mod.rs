@@ -77,10 +77,10 @@ impl Page<'_> {
     /// The page.
     pub fn html(&self) -> String {
         let mut out = String::new();
-        let _ = write!(
+        let _ = writeln!(
             out,
             "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
-                <meta name=\"viewport\" content=\"width=device-width\">{}<title>{} – {}</title><style>{STYLE}</style></head>\n<body>\n",
+                <meta name=\"viewport\" content=\"width=device-width\">{}<title>{} – {}</title><style>{STYLE}</style></head>\n<body>",
             // A page that is still being written looks for its next version.
             if self.state == RunState::Running { "<meta http-equiv=\"refresh\" content=\"30\">" } else { "" },
             escape(self.name),
@@ -91,9 +91,9 @@ impl Page<'_> {
         out.push_str(&self.validation());
         out.push_str(&self.samples());
         out.push_str(&self.licence_list());
-        let _ = write!(
+        let _ = writeln!(
             out,
-            "<section id=\"config\"><h2>Configuration</h2><details><summary>every value used</summary><pre>{}</pre></details></section>\n",
+            "<section id=\"config\"><h2>Configuration</h2><details><summary>every value used</summary><pre>{}</pre></details></section>",
             escape(self.config)
         );
         out.push_str("</body></html>\n");
@@ -228,9 +228,9 @@ impl Page<'_> {
             // A picture that was deleted is no reason to have no report.
             let Ok(png) = std::fs::read(path) else { continue };
             let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-            let _ = write!(
+            let _ = writeln!(
                 out,
-                "<figure class=\"sample\"><figcaption>{}</figcaption><img alt=\"{}\" src=\"data:image/png;base64,{}\"></figure>\n",
+                "<figure class=\"sample\"><figcaption>{}</figcaption><img alt=\"{}\" src=\"data:image/png;base64,{}\"></figure>",
                 escape(&name),
                 escape(&name),
                 STANDARD.encode(png)

@@ -76,10 +76,15 @@ pub fn clothcombo(arguments: &[&str]) -> Output {
     command.args(arguments).env("NO_COLOR", "1").stdin(Stdio::null()).output().unwrap()
 }
 
-/// What a program said on stderr, in one line and without the frame that errors are printed in.
+/// What a program said on stderr.
 pub fn said(output: &Output) -> String {
-    let text = String::from_utf8_lossy(&output.stderr).replace("\n  │ ", "");
-    text.split_whitespace().filter(|w| *w != "│").collect::<Vec<_>>().join(" ")
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// Whether `message` holds `words`, wherever its lines are broken: errors are printed to fit a terminal.
+pub fn holds(message: &str, words: &str) -> bool {
+    let squeezed = |text: &str| text.chars().filter(|c| !c.is_whitespace() && *c != '│').collect::<String>();
+    squeezed(message).contains(&squeezed(words))
 }
 
 /// Writes [`TINY`] into `folder`, with `more` appended, and returns the file.
