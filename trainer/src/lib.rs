@@ -1,5 +1,6 @@
 //! The training framework: configuration, objective, schedule, loop, checkpoints, evaluation, and the two programs.
 
+pub mod allocator;
 pub mod checkpoint;
 pub mod cli;
 pub mod config;
@@ -8,6 +9,7 @@ pub mod drape;
 pub mod evaluate;
 pub mod event;
 pub mod learner;
+pub mod measure;
 pub mod objective;
 pub mod observer;
 pub mod picture;
