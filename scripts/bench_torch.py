@@ -30,6 +30,7 @@ import torch
 import torch_losses as losses
 from torch_networks import ClothCombo, read_safetensors
 
+torch.sparse.check_sparse_tensor_invariants.disable()  # said explicitly, which silences a warning
 PARTS = {
     "forward": "forward_ms",
     "forward + backward": "forward_backward_ms",

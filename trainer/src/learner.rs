@@ -4,11 +4,12 @@ use crate::config::{OptimizerConfig, Trains};
 use crate::drape::{DrapeError, WardrobeTensors};
 use crate::scene::{PreparedScene, Recent};
 use burn::module::Module;
-use burn::optim::{AdamConfig, GradientsAccumulator, GradientsParams, ModuleOptimizer};
+use burn::optim::{GradientsAccumulator, GradientsParams, ModuleOptimizer};
 use burn::tensor::Tensor;
-use clothcombo_model::{ClothCombo, GarmentEmbedding, clip_global_norm, global_norm};
+use clothcombo_model::{ClothCombo, FusedAdam, GarmentEmbedding, clip_global_norm, global_norm};
 use clothcombo_physics::autodiff::{SceneLossOutput, scene_loss};
 use std::time::{Duration, Instant};
+use tracing::trace_span;
 
 /// Trains the networks.
 pub struct Learner {
@@ -51,11 +52,7 @@ pub struct StepTimes {
 
 /// The optimiser of a run without any state yet.
 pub fn new_optimizer(config: &OptimizerConfig) -> ModuleOptimizer {
-    AdamConfig::new()
-        .with_beta_1(config.beta_1)
-        .with_beta_2(config.beta_2)
-        .with_epsilon(config.epsilon)
-        .init()
+    FusedAdam { beta_1: config.beta_1, beta_2: config.beta_2, epsilon: config.epsilon }.into()
 }
 
 impl Learner {
@@ -112,7 +109,8 @@ impl Learner {
                 loss = loss * f64::NAN;
             }
             let start = Instant::now();
-            let gradients = GradientsParams::from_grads(loss.backward(), &self.model);
+            let gradients = trace_span!("backward")
+                .in_scope(|| GradientsParams::from_grads(loss.backward(), &self.model));
             match scenes.len() {
                 1 => single = Some(gradients),
                 _ => sum.accumulate(&self.model, gradients),
@@ -125,13 +123,16 @@ impl Learner {
             outcome.skipped = !outcome.loss.is_finite();
             return Ok(outcome);
         }
+        let clipping = trace_span!("clip").entered();
         let norm = match self.clip_norm > 0.0 {
             true => clip_global_norm(&self.model, &mut gradients, self.clip_norm),
             false => global_norm(&self.model, &gradients),
         };
         outcome.gradient_norm = norm.map_or(0.0, |n| n.into_scalar::<f32>() as f64);
+        drop(clipping);
         outcome.skipped = !(outcome.loss.is_finite() && outcome.gradient_norm.is_finite());
         if !outcome.skipped {
+            let _span = trace_span!("optimiser").entered();
             let model = self.optimizer.step(learning_rate, self.model.clone(), gradients);
             self.model = if trains == Trains::Untangling { model } else { model.clamp_diffusion_times() };
         }
@@ -146,7 +147,7 @@ impl Learner {
         scene: &PreparedScene,
         trains: Trains,
     ) -> Result<(Option<Tensor<1>>, Vec<SceneLossOutput>), DrapeError> {
-        let outfit = tensors.outfit(scene)?;
+        let outfit = trace_span!("tensors").in_scope(|| tensors.outfit(scene))?;
         if trains != Trains::Untangling {
             self.frozen = None;
         } else if self.frozen.is_none() {
@@ -162,7 +163,7 @@ impl Learner {
         };
         let mut scenes = Vec::with_capacity(scene.bodies.len());
         for prepared in &scene.bodies {
-            let (body, start) = tensors.body(prepared)?;
+            let (body, start) = trace_span!("tensors").in_scope(|| tensors.body(prepared))?;
             let single = first_stage.drape_single(&outfit, &embeddings, &body, start);
             let (posed, canonical) = match trains {
                 Trains::Single => (single.posed, single.canonical),
@@ -171,7 +172,8 @@ impl Learner {
                     (layered.posed, layered.canonical)
                 }
             };
-            scenes.push(scene_loss(posed, canonical, prepared.energy.clone()));
+            let energy = prepared.energy.clone();
+            scenes.push(trace_span!("energies").in_scope(|| scene_loss(posed, canonical, energy)));
         }
         let depends = trains != Trains::Untangling || outfit.has_contacts();
         let sum = scenes.iter().map(|s| s.loss.clone()).reduce(|a, b| a + b);

@@ -1,5 +1,6 @@
 //! The training framework: configuration, objective, schedule, loop, checkpoints, evaluation, and the two programs.
 
+pub mod allocator;
 pub mod average;
 pub mod checkpoint;
 pub mod cli;
@@ -14,6 +15,7 @@ pub mod exact;
 pub mod guard;
 pub mod incident;
 pub mod learner;
+pub mod measure;
 pub mod memory;
 pub mod objective;
 pub mod observer;

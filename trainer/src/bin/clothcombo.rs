@@ -36,6 +36,7 @@ enum Verb {
 }
 
 fn main() -> ExitCode {
+    clothcombo_trainer::allocator::keep_freed_memory();
     let arguments = Arguments::parse();
     cli::start_logging("info");
     cli::exit_code(match &arguments.verb {
