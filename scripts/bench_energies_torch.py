@@ -1,9 +1,8 @@
 #!/usr/bin/env python3
 """The energies of this project beside the same terms in PyTorch: one Markdown table each for speed and growth.
 
-Called by scripts/bench_energies.sh, which builds the program `energy_times` and exports its scenes. PyTorch is written as a
-paper's authors would write it on a CPU: dense pairwise distances (torch.cdist), gathers over faces and hinges, gradients by
-autograd, f32. Every value is compared with ours (relative 1e-4) before anything is timed, so that equal things are compared.
+Called by scripts/bench_energies.sh, which builds the program `energy_times` and exports its scenes. The PyTorch side is
+torch_losses.py. Every value is compared with ours (relative 1e-4) before anything is timed, so that equal things are compared.
 That check measures distances exactly; cdist's default, a matrix product, is what is timed because it is faster, although in
 f32 it is off by up to 0.3 mm and now and then takes a neighbour for the nearest vertex (--exact-cdist times the exact form).
 Both sides run with the same number of threads, in turn, several rounds; medians are printed.
@@ -15,7 +14,6 @@ PyTorch without a GPU: the Linux wheel of torch 2.15 does not import without its
 """
 
 import argparse
-import math
 import os
 import statistics
 import subprocess
@@ -28,127 +26,34 @@ TERMS = ["strain", "bending", "gravity", "body_collision", "repulsion", "holding
 ALL = "all single-garment terms"
 LAYER_TERMS = ["layer_collision", "layer_distance"]
 TOLERANCE = 1e-4
-EXACT = "donot_use_mm_for_euclid_dist"
 
 
 class Scene:
-    """One exported scene as tensors, with everything that positions do not change computed beforehand, as in ours."""
-
-    THICKNESS, DENSITY, MU, LAMBDA = 4.7e-4, 426.0, 2.36e4, 4.44e4
-    STIFFNESS, GRAVITY, RADIUS, EPSILON = 3.96e-5, 9.81, 0.1, 0.002
+    """One exported scene: two garments and a body."""
 
     def __init__(self, folder, size):
         read = lambda part: np.fromfile(f"{folder}/{size}_{part}.f32", "<f4").reshape(-1, 3)
-        index = lambda part: np.fromfile(f"{folder}/{size}_{part}.u32", "<u4").reshape(-1, 3).astype(np.int64)
+        index = lambda part: np.fromfile(f"{folder}/{size}_{part}.u32", "<u4").reshape(-1, 3)
         rest = read("rest0").astype(np.float64)
-        faces, body_faces = index("faces"), index("body_faces")
-        tensor = torch.from_numpy
-        narrow = lambda a: tensor(np.ascontiguousarray(a, np.float32))
-        self.count = len(rest)
-        self.x, self.outer, self.canonical = map(narrow, (read("posed0"), read("posed1"), read("canonical")))
-        self.rest, self.body = narrow(rest), narrow(read("body"))
-        self.faces = tensor(faces)
-        self.body_normals = normals(self.body, tensor(body_faces))
-
-        a, b, c = (rest[faces[:, k]] for k in range(3))
-        area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
-        first = (b - a) / np.linalg.norm(b - a, axis=1)[:, None]
-        up = (c - a) - np.sum((c - a) * first, 1)[:, None] * first
-        second = up / np.linalg.norm(up, axis=1)[:, None]
-        edges = np.zeros((len(faces), 2, 2))
-        edges[:, 0, 0] = np.sum((b - a) * first, 1)
-        edges[:, 0, 1] = np.sum((c - a) * first, 1)
-        edges[:, 1, 1] = np.sum((c - a) * second, 1)
-        self.inverse = narrow(np.linalg.inv(edges))
-        self.volume = narrow(area * self.THICKNESS)
-        mass = np.zeros(self.count)
-        np.add.at(mass, faces.ravel(), np.repeat(area * self.THICKNESS * self.DENSITY / 3, 3))
-        self.weight = narrow(mass * self.GRAVITY)
-
-        half = {}
-        for face in faces:
-            for k in range(3):
-                half[(face[k], face[(k + 1) % 3])] = face[(k + 2) % 3]
-        self.hinges = tensor(np.array([(p, q, o, half[q, p]) for (p, q), o in half.items() if p < q and (q, p) in half]))
-        pairs = np.array(list(half))
-        apart = torch.ones((self.count, self.count), dtype=torch.bool)
-        apart[pairs[:, 0], pairs[:, 1]] = False
-        apart[pairs[:, 1], pairs[:, 0]] = False
-        apart.fill_diagonal_(False)
-        self.apart = apart
-        unique = np.unique(np.sort(pairs, axis=1), axis=0)
-        lengths = np.sort(np.linalg.norm(rest[unique[:, 0]] - rest[unique[:, 1]], axis=1))
-        self.median_edge = float(lengths[len(lengths) // 2])
-        held = np.argsort(-rest[:, 1], kind="stable")[: math.ceil(0.1 * self.count - 1e-9)]
-        self.held = tensor(held.copy())
-
-    def strain(self, x):
-        a, b, c = (x[self.faces[:, k]] for k in range(3))
-        f = torch.stack([b - a, c - a], dim=2) @ self.inverse
-        g = 0.5 * (f.transpose(1, 2) @ f - torch.eye(2))
-        trace = g[:, 0, 0] + g[:, 1, 1]
-        return (self.volume * (0.5 * self.LAMBDA * trace**2 + self.MU * (g * g).sum((1, 2)))).sum()
-
-    def bending(self, x):
-        a, b, c, d = (x[self.hinges[:, k]] for k in range(4))
-        n1, n2 = torch.linalg.cross(b - a, c - a), torch.linalg.cross(d - a, b - a)
-        edge = (b - a) / (b - a).norm(dim=1, keepdim=True)
-        angle = torch.atan2((torch.linalg.cross(n1, n2) * edge).sum(1), (n1 * n2).sum(1))
-        return 0.5 * self.STIFFNESS * (angle**2).sum()
-
-    def gravity(self, x):
-        return (self.weight * x[:, 1]).sum()
-
-    def gaps(self, x):
-        with torch.no_grad():
-            nearest = torch.cdist(x, self.body, compute_mode=MODE).argmin(1)
-        return ((x - self.body[nearest]) * self.body_normals[nearest]).sum(1), nearest
-
-    def body_collision(self, x):
-        return (torch.relu(self.EPSILON - self.gaps(x)[0]) ** 3).sum()
-
-    def repulsion(self, x):
-        distance = torch.cdist(x, x, compute_mode=MODE)
-        close = (distance < self.RADIUS) & self.apart
-        return -torch.log(torch.where(close, distance, torch.ones(())) ** 2).sum() / (2 * self.count)
-
-    def holding(self, y):
-        return ((y[self.held, 1] - self.rest[self.held, 1]) ** 2).sum()
-
-    def layer_collision(self, x, outer):
-        with torch.no_grad():
-            nearest = torch.cdist(outer, x, compute_mode=MODE).argmin(1)
-        offset, normal = outer - x[nearest], normals(x, self.faces)[nearest]
-        gap = (offset * normal).sum(1)
-        aside = (offset - gap[:, None] * normal).norm(dim=1)
-        counted = (gap.abs() <= 0.05) & (aside <= 0.75 * self.median_edge)
-        return (torch.relu(self.EPSILON - gap)[counted] ** 3).sum()
-
-    def layer_distance(self, x, outer):
-        (inner_gap, inner_vertex), (outer_gap, outer_vertex) = self.gaps(x), self.gaps(outer)
-        near = (inner_gap < self.RADIUS)[:, None] & (outer_gap < self.RADIUS)[None, :]
-        same = (inner_vertex[:, None] == outer_vertex[None, :]) & near
-        return (torch.relu(inner_gap[:, None] - outer_gap[None, :])[same] ** 3).sum()
+        self.x, self.outer, self.canonical = map(losses.narrow, (read("posed0"), read("posed1"), read("canonical")))
+        self.body = losses.Body(read("body"), index("body_faces"))
+        self.garment = losses.Garment(rest, index("faces"), rest)
 
     def run(self, term, gradient):
         """Value of a term; with `gradient`, after its backward pass."""
         x, y, outer = (t.detach().clone().requires_grad_(gradient) for t in (self.x, self.canonical, self.outer))
         with torch.set_grad_enabled(gradient):
             if term == ALL:
-                value = sum(getattr(self, t)(y if t == "holding" else x) for t in TERMS)
-            elif term in LAYER_TERMS:
-                value = getattr(self, term)(x, outer)
+                value = sum(self.garment.term(t, x, y, self.body) for t in TERMS)
+            elif term == "layer_collision":
+                value = losses.layer_collision(self.garment, x, outer)
+            elif term == "layer_distance":
+                value = losses.layer_distance(self.body, x, outer, self.garment.settings["layer_radius"])
             else:
-                value = getattr(self, term)(y if term == "holding" else x)
+                value = self.garment.term(term, x, y, self.body)
             if gradient:
                 value.backward()
         return value.detach().item()
-
-
-def normals(x, faces):
-    a, b, c = (x[faces[:, k]] for k in range(3))
-    summed = torch.zeros_like(x).index_add(0, faces.T.ravel(), torch.linalg.cross(b - a, c - a).repeat(3, 1))
-    return summed / summed.norm(dim=1, keepdim=True).clamp_min(1e-20)
 
 
 def median_ms(run, seconds):
@@ -189,8 +94,7 @@ def exponent(times, sizes):
 
 def compare(options, folder):
     """Our times and PyTorch's in turn."""
-    global MODE
-    timed_mode, MODE = MODE, EXACT
+    losses.set_exact(True)
     sizes = options.torch_sizes
     scenes = {size: Scene(folder, size) for size in sizes}
     for size, scene in scenes.items():
@@ -202,7 +106,7 @@ def compare(options, folder):
                 wrong.append(f"{term} at {size}: PyTorch has {found:.8g}, ours is {expected:.8g}")
         if wrong:
             raise SystemExit("\n".join(wrong))
-    MODE = timed_mode
+    losses.set_exact(options.exact_cdist)
     mine, theirs = [], []
     for _ in range(options.rounds):
         mine.append(ours(options, sizes))
@@ -263,10 +167,10 @@ def main():
     parser.add_argument("--exact-cdist", action="store_true", help="cdist without its matrix product: slower, more exact")
     options = parser.parse_args()
     if not options.no_torch:
-        global torch, MODE
+        global torch, losses
         import torch
+        import torch_losses as losses
 
-        MODE = EXACT if options.exact_cdist else "use_mm_for_euclid_dist_if_necessary"
         torch.set_num_threads(options.threads)
         print(f"PyTorch {torch.__version__}")
         with tempfile.TemporaryDirectory() as folder:

@@ -24,6 +24,7 @@ HELD_SHARE = 0.1
 WEIGHTS = dict(strain=1.0, bending=5.0, gravity=1.0, body_collision=250.0, repulsion=0.001, holding=100.0)
 # Where a formula has no value: see the documentation of each term.
 NEEDLE, CONTACT, COLLAPSE, COLLAPSE_FLOOR = 1e-2, 1e-4, 1e-4, 1e-6
+FOLD, FOLD_FLOOR = 0.05, 1e-3
 
 
 class Mesh:
@@ -116,15 +117,16 @@ def strain(rest, x):
 
 
 def bending(rest, x):
-    """Σ k/2·α² over interior edges, each times s²/(s² + τ²) of its two triangles, s being twice the area."""
+    """Σ k/2·α² over interior edges, each times t²(6 − 8t + 3t²), t = s²/τ² ≤ 1, of its two triangles, s being twice the area."""
     hinges = rest.hinges()
     a, b, c, d = (x[hinges[:, k]] for k in range(4))
     normals = [np.cross(b - a, c - a), np.cross(d - a, b - a)]  # both seen from one side of the sheet
     rest_areas = length(rest.doubled_areas(rest.x))
     scale = 1.0
     for k, normal in enumerate(normals):
-        tau = np.maximum(COLLAPSE * rest_areas[hinges[:, 4 + k]], COLLAPSE_FLOOR * rest.median_edge**2)
-        scale = scale * dot(normal, normal) / (dot(normal, normal) + tau**2)
+        tau = np.maximum(FOLD * rest_areas[hinges[:, 4 + k]], FOLD_FLOOR * rest.median_edge**2)
+        t = np.minimum(dot(normal, normal) / tau**2, 1)
+        scale = scale * t**2 * (6 - 8 * t + 3 * t**2)
     n, m = (normal / np.maximum(length(normal), 1e-300)[:, None] for normal in normals)
     alpha = 2 * np.arctan2(length(n - m), length(n + m))  # unsigned, accurate at 0 and π
     return (BENDING_STIFFNESS / 2 * alpha**2 * scale).sum()

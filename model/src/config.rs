@@ -1,5 +1,6 @@
 //! Sizes of the networks and of the data they are made for.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::ModelError;
@@ -7,7 +8,7 @@ use crate::error::ModelError;
 /// Size and scale of every network; the defaults are the paper's.
 ///
 /// Nothing here depends on the data: see [`Dimensions`] for what does.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ModelConfig {
     /// Width of the draping and force networks `F_s` and `F_f`, and length of the draping embedding `z_s` and of a force `f^ij`.

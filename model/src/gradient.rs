@@ -4,6 +4,8 @@ use burn::module::{Module, ModuleVisitor, Param};
 use burn::optim::GradientsParams;
 use burn::tensor::Tensor;
 
+use crate::ops::{scale_by, squared_norm};
+
 /// Scales all gradients of `module` so that their joint Euclidean norm is at most `max_norm`, and returns the norm before
 /// as a tensor `[1]`, which nobody has to wait for. `None` if no parameter has a gradient.
 ///
@@ -34,11 +36,7 @@ struct SquaredNorms<'a> {
 impl ModuleVisitor for SquaredNorms<'_> {
     fn visit_float<const D: usize>(&mut self, parameter: &Param<Tensor<D>>) {
         if let Some(gradient) = self.gradients.get::<D>(parameter.id) {
-            // Row sums first: one running sum over a large weight would lose digits in f32.
-            let columns = gradient.dims()[D - 1].max(1);
-            let rows = gradient.shape().num_elements() / columns;
-            let squares = gradient.square().reshape([rows, columns]).sum_dim(1);
-            self.parts.push(squares.sum());
+            self.parts.push(squared_norm(gradient));
         }
     }
 }
@@ -51,7 +49,7 @@ struct Scale<'a> {
 impl ModuleVisitor for Scale<'_> {
     fn visit_float<const D: usize>(&mut self, parameter: &Param<Tensor<D>>) {
         if let Some(gradient) = self.gradients.remove::<D>(parameter.id) {
-            self.gradients.register::<D>(parameter.id, gradient * self.factor.clone().unsqueeze());
+            self.gradients.register::<D>(parameter.id, scale_by(gradient, self.factor.clone()));
         }
     }
 }

@@ -13,6 +13,7 @@
 //! tensors. [`ClothCombo`] is the entry point. Networks compute in f32 on any burn device; with an autodiff device every
 //! output is differentiable, with a plain one (or after `valid()`) nothing is recorded.
 
+mod adam;
 mod config;
 pub mod diffusion_net;
 mod draping;
@@ -31,6 +32,7 @@ mod tensors;
 mod testing;
 mod untangling;
 
+pub use adam::FusedAdam;
 pub use config::{Dimensions, ModelConfig};
 pub use draping::Draping;
 pub use error::ModelError;

@@ -1,7 +1,10 @@
 //! The whole of ClothCombo: garments, order, body to draped positions.
+//!
+//! Every part runs in a `tracing` span of its own name, which costs nothing until someone listens.
 
 use burn::module::{Module, ModuleMapper, Param};
 use burn::tensor::{Device, Tensor};
+use tracing::trace_span;
 
 use crate::config::{Dimensions, ModelConfig};
 use crate::diffusion_net::MINIMUM_TIME;
@@ -117,6 +120,7 @@ impl ClothCombo {
 
     /// Embeds one garment (E_c).
     pub fn encode(&self, garment: &GarmentTensors) -> GarmentEmbedding {
+        let _span = trace_span!("embedding").entered();
         self.garment_encoder.forward(garment)
     }
 
@@ -142,6 +146,7 @@ impl ClothCombo {
                 return Err(ModelError::Outfit { garment, reason });
             }
         }
+        let _span = trace_span!("vertex products").entered();
         let vertex = stack_rows(garments.iter().map(|embedding| embedding.vertex.clone()).collect());
         let garment = stack_rows(garments.iter().map(|embedding| embedding.garment.clone()).collect());
         Ok(Embeddings {
@@ -159,6 +164,7 @@ impl ClothCombo {
     /// the trained one. Does nothing for an outfit in which nothing can touch.
     pub fn prepare_untangling(&self, outfit: &OutfitTensors, mut embeddings: Embeddings) -> Embeddings {
         if outfit.has_contacts() {
+            let _span = trace_span!("untangling").entered();
             embeddings.untangling_product = Some(self.untangling.vertex_product(embeddings.vertex.clone()));
         }
         embeddings
@@ -174,6 +180,7 @@ impl ClothCombo {
         body: &BodyTensors,
         start: Tensor<2>,
     ) -> SingleDrape {
+        let span = trace_span!("draping").entered();
         let draping_embedding = self.draping.embed(embeddings.garment.clone(), body);
         let displacement = self.draping.displace(
             outfit.rest.clone(),
@@ -182,6 +189,8 @@ impl ClothCombo {
             &outfit.segments,
         );
         let canonical = displacement + start;
+        drop(span);
+        let _span = trace_span!("skinning").entered();
         let skin_weights =
             self.skinning.weights(outfit, embeddings.skinning_product.clone(), draping_embedding.clone());
         let posed = linear_blend_skinning(canonical.clone(), skin_weights.clone(), body.bones.clone());
@@ -199,6 +208,7 @@ impl ClothCombo {
         single: &SingleDrape,
         body: &BodyTensors,
     ) -> LayeredDrape {
+        let _span = outfit.has_contacts().then(|| trace_span!("untangling").entered());
         let displacement = self.untangling.displace(
             outfit,
             single.canonical.clone(),

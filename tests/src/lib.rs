@@ -56,3 +56,10 @@ pub fn tiny_config(folder: &Path, overrides: &[&str]) -> Config {
     let overrides: Vec<String> = overrides.iter().map(|s| (*s).to_owned()).collect();
     load(&file, &overrides).expect("the fixture is valid")
 }
+
+/// Number of cases and seed of a fuzz test: `few` from seed 1, unless `CLOTHCOMBO_FUZZ_CASES` and `CLOTHCOMBO_FUZZ_SEED` ask
+/// for others.
+pub fn fuzz_cases(few: usize) -> (usize, u64) {
+    let number = |name: &str| std::env::var(name).ok().and_then(|text| text.parse::<u64>().ok());
+    (number("CLOTHCOMBO_FUZZ_CASES").map_or(few, |n| n as usize), number("CLOTHCOMBO_FUZZ_SEED").unwrap_or(1))
+}

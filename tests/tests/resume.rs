@@ -1,6 +1,7 @@
 //! A run that is interrupted and continued equals one that never stopped, bit for bit.
 
 use clothcombo_tests::tiny_config;
+use clothcombo_trainer::checkpoint::Checkpoint;
 use clothcombo_trainer::config::Config;
 use clothcombo_trainer::device::Backend;
 use clothcombo_trainer::event::{Observer, TrainEvent};
@@ -29,8 +30,9 @@ impl Observer for StopAfter {
 fn run(config: &Config, library: &Arc<Library>, folder: &Path, resume: bool, stop_after: Option<u64>) {
     let device = Backend::preferred().device();
     let mut session = if resume {
-        let run = RunDir::resume(folder, config).unwrap();
-        Session::resume(run, config.clone(), library.clone(), &device).unwrap()
+        let run = RunDir::resume(folder, config, &[]).unwrap();
+        let checkpoint = Checkpoint::open(folder).unwrap();
+        Session::resume(run, config.clone(), library.clone(), &device, &checkpoint).unwrap()
     } else {
         let run = RunDir::create(folder, config).unwrap();
         Session::new(run, config.clone(), library.clone(), &device).unwrap()
@@ -43,19 +45,54 @@ fn run(config: &Config, library: &Arc<Library>, folder: &Path, resume: bool, sto
     train(&mut session, &mut observers, &stop).unwrap();
 }
 
-#[test]
-fn thirty_steps_resume_thirty_steps_equal_sixty() {
+fn read(run: &Path, file: &str) -> Vec<u8> {
+    std::fs::read(run.join("checkpoints/step-00000060").join(file)).unwrap()
+}
+
+/// Trains in one go and in parts that end after each of `stops`; the final checkpoints must be the same.
+fn parts_equal_the_whole(overrides: &[&str], stops: &[u64], files: &[&str]) {
     let folder = tempfile::tempdir().unwrap();
-    let config = tiny_config(folder.path(), &[]);
+    let config = tiny_config(folder.path(), overrides);
     let library = Arc::new(Library::load(&config, &|_, _, _| {}).unwrap());
     let (whole, parts) = (folder.path().join("whole"), folder.path().join("parts"));
-
     run(&config, &library, &whole, false, None);
-    // Step 30 lies inside the second stage, whose first stage is frozen: the resumed run must freeze the same weights.
-    run(&config, &library, &parts, false, Some(30));
-    assert!(!parts.join("checkpoints/step-00000060").exists());
+    for (i, stop) in stops.iter().enumerate() {
+        run(&config, &library, &parts, i > 0, Some(*stop));
+        assert!(!parts.join("checkpoints/step-00000060").exists());
+        assert!(parts.join(format!("checkpoints/step-{stop:08}")).exists());
+    }
     run(&config, &library, &parts, true, None);
+    for file in files {
+        assert!(read(&whole, file) == read(&parts, file), "{file} differs");
+    }
+    let state = |run: &Path| Checkpoint::open(&run.join("checkpoints/step-00000060")).unwrap().state;
+    assert_eq!(state(&whole).best, state(&parts).best);
+    assert_eq!(state(&whole).incidents, state(&parts).incidents);
+    assert!(state(&whole).best.is_some());
+}
 
-    let read = |run: &Path| std::fs::read(run.join("checkpoints/step-00000060/model.safetensors")).unwrap();
-    assert!(read(&whole) == read(&parts), "the parameters differ");
+#[test]
+fn stopped_inside_every_stage_and_between_them() {
+    // Step 30 lies inside the second stage, whose first stage is frozen: the resumed run must freeze the same weights.
+    parts_equal_the_whole(&["validation.every=7"], &[11, 20, 30, 40, 53], &["model.safetensors"]);
+}
+
+#[test]
+fn with_an_average_warm_up_a_curriculum_and_several_scenes_a_step() {
+    let overrides = [
+        "optimizer.ema_decay=0.9",
+        "stages.0.warm_up_steps=15",
+        "stages.1.accumulate=2",
+        "stages.2.accumulate=3",
+        "stages.1.layer_curriculum=0.6",
+        "losses.strain.weight={ from = 0.5, to = 2.0, start = 0.2, end = 0.8, shape = \"cosine\" }",
+    ];
+    parts_equal_the_whole(&overrides, &[11, 30, 45], &["model.safetensors"]);
+}
+
+#[test]
+fn skipped_steps_are_remembered() {
+    let overrides =
+        ["guard.inject={ every = 7, what = \"position\" }", "guard.kept_incidents=1", "validation.every=10"];
+    parts_equal_the_whole(&overrides, &[14, 35], &["model.safetensors"]);
 }

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// One optimiser step, as it stands in `metrics.jsonl`.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct StepRecord {
     /// Steps done, this one included (the first step is 1).
     pub step: u64,
@@ -33,6 +33,15 @@ pub struct StepRecord {
     pub seconds: f64,
     /// Part of `seconds` spent waiting for the scene to be prepared [s].
     pub wait_seconds: f64,
+    /// Part of `seconds` spent in networks and energies [s].
+    pub forward_seconds: f64,
+    /// Part of `seconds` spent on gradients [s].
+    pub backward_seconds: f64,
+    /// Part of `seconds` spent on clipping, Adam and the running average [s].
+    pub update_seconds: f64,
+    /// Whether loss or gradient was not finite and the parameters were left alone.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub skipped: bool,
 }
 
 impl StepRecord {
@@ -62,12 +71,35 @@ pub enum TrainEvent<'a> {
     },
     /// A step was done.
     Step(&'a StepRecord),
+    /// A gradient norm was far above the usual one.
+    Spike {
+        /// Steps done.
+        step: u64,
+        /// The norm before clipping.
+        norm: f64,
+        /// Median of the norms before.
+        usual: f64,
+    },
+    /// Loss or gradient was not finite; the parameters were left alone.
+    Skipped {
+        /// Steps done, this one included.
+        step: u64,
+        /// Skipped steps within the guard's window.
+        count: usize,
+        /// The scene as a file that can be replayed, if it was written.
+        file: Option<&'a Path>,
+    },
     /// The validation scenes were scored.
     Validated {
         /// Steps done.
         step: u64,
         /// The scores.
         report: &'a ValidationReport,
+    },
+    /// A checkpoint is about to be written: logs that must reach as far as it are to be flushed now.
+    CheckpointDue {
+        /// Steps done.
+        step: u64,
     },
     /// A checkpoint is complete on disk.
     CheckpointSaved {
@@ -83,6 +115,11 @@ pub enum TrainEvent<'a> {
     },
     /// The user asked to stop; a checkpoint has been saved.
     Interrupted {
+        /// Steps done.
+        step: u64,
+    },
+    /// Too many steps were not finite; the run ends with an error.
+    GaveUp {
         /// Steps done.
         step: u64,
     },

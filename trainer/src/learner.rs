@@ -4,10 +4,12 @@ use crate::config::{OptimizerConfig, Trains};
 use crate::drape::{DrapeError, WardrobeTensors};
 use crate::scene::{PreparedScene, Recent};
 use burn::module::Module;
-use burn::optim::{AdamConfig, GradientsParams, ModuleOptimizer};
+use burn::optim::{GradientsAccumulator, GradientsParams, ModuleOptimizer};
 use burn::tensor::Tensor;
-use clothcombo_model::{ClothCombo, GarmentEmbedding, clip_global_norm, global_norm};
+use clothcombo_model::{ClothCombo, FusedAdam, GarmentEmbedding, clip_global_norm, global_norm};
 use clothcombo_physics::autodiff::{SceneLossOutput, scene_loss};
+use std::time::{Duration, Instant};
+use tracing::trace_span;
 
 /// Trains the networks.
 pub struct Learner {
@@ -25,23 +27,32 @@ struct Frozen {
 
 /// What a step found.
 pub struct StepOutcome {
-    /// Weighted loss, mean over the scene's bodies.
+    /// Weighted loss, mean over the bodies of a scene, mean over the scenes.
     pub loss: f64,
-    /// Energies per body.
-    pub scenes: Vec<SceneLossOutput>,
-    /// Global gradient norm before clipping; 0 when nothing in the scene depends on what is trained.
+    /// Energies per scene and body.
+    pub scenes: Vec<Vec<SceneLossOutput>>,
+    /// Global gradient norm before clipping; 0 when nothing in the scenes depends on what is trained.
     pub gradient_norm: f64,
     /// Whether the parameters were left alone because loss or gradient was not finite.
     pub skipped: bool,
+    /// Where the time went.
+    pub times: StepTimes,
+}
+
+/// Where the time of a step went; honest on backends that compute at once (the CPU ones).
+#[derive(Clone, Copy, Debug, Default)]
+pub struct StepTimes {
+    /// Networks and energies.
+    pub forward: Duration,
+    /// Gradients.
+    pub backward: Duration,
+    /// Clipping, Adam, the running average.
+    pub update: Duration,
 }
 
 /// The optimiser of a run without any state yet.
 pub fn new_optimizer(config: &OptimizerConfig) -> ModuleOptimizer {
-    AdamConfig::new()
-        .with_beta_1(config.beta_1)
-        .with_beta_2(config.beta_2)
-        .with_epsilon(config.epsilon)
-        .init()
+    FusedAdam { beta_1: config.beta_1, beta_2: config.beta_2, epsilon: config.epsilon }.into()
 }
 
 impl Learner {
@@ -60,33 +71,72 @@ impl Learner {
         &self.optimizer
     }
 
-    /// One optimiser step on the bodies of `scene`.
+    /// One optimiser step on the mean loss of `scenes`. `spoil_gradient` makes the gradient NaN, for tests of what happens
+    /// then.
     ///
     /// # Errors
-    /// When the scene's tensors cannot be made.
+    /// When a scene's tensors cannot be made.
     pub fn step(
         &mut self,
         tensors: &WardrobeTensors,
-        scene: &PreparedScene,
+        scenes: &[PreparedScene],
         trains: Trains,
         learning_rate: f64,
+        spoil_gradient: bool,
     ) -> Result<StepOutcome, DrapeError> {
-        let (loss, scenes) = self.forward(tensors, scene, trains)?;
-        let mean = scenes.iter().map(|s| s.value().total).sum::<f64>() / scenes.len() as f64;
-        let mut outcome = StepOutcome { loss: mean, scenes, gradient_norm: 0.0, skipped: false };
-        let Some(loss) = loss else { return Ok(outcome) };
-
-        let mut gradients = GradientsParams::from_grads(loss.backward(), &self.model);
+        let mut outcome = StepOutcome {
+            loss: 0.0,
+            scenes: Vec::with_capacity(scenes.len()),
+            gradient_norm: 0.0,
+            skipped: false,
+            times: StepTimes::default(),
+        };
+        let share = 1.0 / scenes.len() as f64;
+        let mut sum = GradientsAccumulator::<ClothCombo>::new();
+        let mut single = None;
+        for scene in scenes {
+            let start = Instant::now();
+            let (loss, values) = self.forward(tensors, scene, trains)?;
+            let mean = values.iter().map(|s| s.value().total).sum::<f64>() / values.len() as f64;
+            outcome.loss += mean * share;
+            outcome.scenes.push(values);
+            outcome.times.forward += start.elapsed();
+            let Some(mut loss) = loss else { continue };
+            if scenes.len() > 1 {
+                loss = loss * share;
+            }
+            if spoil_gradient {
+                loss = loss * f64::NAN;
+            }
+            let start = Instant::now();
+            let gradients = trace_span!("backward")
+                .in_scope(|| GradientsParams::from_grads(loss.backward(), &self.model));
+            match scenes.len() {
+                1 => single = Some(gradients),
+                _ => sum.accumulate(&self.model, gradients),
+            }
+            outcome.times.backward += start.elapsed();
+        }
+        let start = Instant::now();
+        let mut gradients = single.unwrap_or_else(|| sum.grads());
+        if gradients.is_empty() {
+            outcome.skipped = !outcome.loss.is_finite();
+            return Ok(outcome);
+        }
+        let clipping = trace_span!("clip").entered();
         let norm = match self.clip_norm > 0.0 {
             true => clip_global_norm(&self.model, &mut gradients, self.clip_norm),
             false => global_norm(&self.model, &gradients),
         };
         outcome.gradient_norm = norm.map_or(0.0, |n| n.into_scalar::<f32>() as f64);
+        drop(clipping);
         outcome.skipped = !(outcome.loss.is_finite() && outcome.gradient_norm.is_finite());
         if !outcome.skipped {
+            let _span = trace_span!("optimiser").entered();
             let model = self.optimizer.step(learning_rate, self.model.clone(), gradients);
             self.model = if trains == Trains::Untangling { model } else { model.clamp_diffusion_times() };
         }
+        outcome.times.update = start.elapsed();
         Ok(outcome)
     }
 
@@ -97,7 +147,7 @@ impl Learner {
         scene: &PreparedScene,
         trains: Trains,
     ) -> Result<(Option<Tensor<1>>, Vec<SceneLossOutput>), DrapeError> {
-        let outfit = tensors.outfit(scene)?;
+        let outfit = trace_span!("tensors").in_scope(|| tensors.outfit(scene))?;
         if trains != Trains::Untangling {
             self.frozen = None;
         } else if self.frozen.is_none() {
@@ -113,7 +163,7 @@ impl Learner {
         };
         let mut scenes = Vec::with_capacity(scene.bodies.len());
         for prepared in &scene.bodies {
-            let (body, start) = tensors.body(prepared)?;
+            let (body, start) = trace_span!("tensors").in_scope(|| tensors.body(prepared))?;
             let single = first_stage.drape_single(&outfit, &embeddings, &body, start);
             let (posed, canonical) = match trains {
                 Trains::Single => (single.posed, single.canonical),
@@ -122,7 +172,8 @@ impl Learner {
                     (layered.posed, layered.canonical)
                 }
             };
-            scenes.push(scene_loss(posed, canonical, prepared.energy.clone()));
+            let energy = prepared.energy.clone();
+            scenes.push(trace_span!("energies").in_scope(|| scene_loss(posed, canonical, energy)));
         }
         let depends = trains != Trains::Untangling || outfit.has_contacts();
         let sum = scenes.iter().map(|s| s.loss.clone()).reduce(|a, b| a + b);

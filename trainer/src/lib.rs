@@ -1,18 +1,29 @@
 //! The training framework: configuration, objective, schedule, loop, checkpoints, evaluation, and the two programs.
 
+pub mod allocator;
+pub mod average;
 pub mod checkpoint;
 pub mod cli;
 pub mod config;
 pub mod device;
 pub mod drape;
 pub mod draper;
+pub mod estimate;
 pub mod evaluate;
 pub mod event;
+pub mod exact;
+pub mod guard;
+pub mod incident;
 pub mod learner;
+pub mod measure;
+pub mod memory;
 pub mod objective;
 pub mod observer;
 pub mod picture;
+pub mod report;
 pub mod run_dir;
+pub mod run_lock;
+pub mod run_summary;
 pub mod samples;
 pub mod scene;
 pub mod schedule;

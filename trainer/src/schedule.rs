@@ -68,7 +68,7 @@ impl Schedule {
             last_of_stage: inside + 1 == config.steps,
             stage_progress,
             run_progress: (step as f64 / self.total_steps() as f64).min(1.0),
-            learning_rate: config.learning_rate.at(stage_progress),
+            learning_rate: config.learning_rate_at(inside, stage_progress),
             pose_scale: config.pose_scale.at(stage_progress),
         }
     }

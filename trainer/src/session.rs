@@ -1,11 +1,15 @@
 //! A run in progress: everything the training loop acts on.
 
-use crate::checkpoint::{Checkpoint, CheckpointState};
-use crate::config::Config;
+use crate::average::Average;
+use crate::checkpoint::{Best, Checkpoint, CheckpointState, Snapshot};
+use crate::config::{Config, Injected};
 use crate::drape::{Networks, WardrobeTensors};
 use crate::evaluate::{ValidationReport, ValidationSet};
 use crate::event::StepRecord;
+use crate::guard::{Guard, Verdict};
+use crate::incident::{Circumstances, Incident, spoil_position};
 use crate::learner::{Learner, StepOutcome, new_optimizer};
+use crate::memory::{MemoryEstimate, estimate};
 use crate::run_dir::RunDir;
 use crate::samples;
 use crate::scene::{Library, PreparedScene};
@@ -20,9 +24,6 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Consecutive steps without a finite gradient after which a run gives up.
-const MAX_SKIPPED: u32 = 20;
-
 /// A run in progress.
 pub struct Session {
     run: RunDir,
@@ -32,8 +33,20 @@ pub struct Session {
     tensors: Arc<WardrobeTensors>,
     validation: ValidationSet,
     learner: Learner,
+    average: Option<Average>,
+    guard: Guard,
+    best: Option<Best>,
     step: u64,
-    skipped_in_a_row: u32,
+}
+
+/// What one step left.
+pub struct StepReport {
+    /// Its line in the log.
+    pub record: StepRecord,
+    /// What the guard makes of it.
+    pub verdict: Verdict,
+    /// The scene as a file, if the step was skipped and is one of the first.
+    pub incident: Option<PathBuf>,
 }
 
 impl Session {
@@ -45,53 +58,71 @@ impl Session {
         let device = device.clone().autodiff();
         device.seed(config.seed);
         let model = ClothCombo::new(&config.model, &dimensions(&library), &device).into_diagnostic()?;
+        let average = (config.optimizer.ema_decay > 0.0)
+            .then(|| Average::new(model.valid(), config.optimizer.ema_decay));
         let learner = Learner::new(model, new_optimizer(&config.optimizer), &config.optimizer);
-        Self::with_learner(run, config, library, &device, learner, 0)
+        let start = state(&library, 0);
+        Ok(Self::assemble(run, config, library, &device, learner, average, &start))
     }
 
-    /// The run in `run`, from its newest checkpoint on.
+    /// The run in `run`, from `checkpoint` on.
     ///
     /// # Errors
-    /// When there is no usable checkpoint, or it was made with other data.
+    /// When the checkpoint was made with other data or networks.
     pub fn resume(
         run: RunDir,
         config: Config,
         library: Arc<Library>,
         device: &Device,
+        checkpoint: &Checkpoint,
     ) -> Result<Self, Report> {
         let device = device.clone().autodiff();
-        let checkpoint = Checkpoint::open(run.root())?;
         let expected = state(&library, 0);
         let found = &checkpoint.state;
-        if (&found.joints, found.shape_count, found.pose_features)
-            != (&expected.joints, expected.shape_count, expected.pose_features)
-        {
+        let dimensions = |s: &CheckpointState| (s.joints.clone(), s.shape_count, s.pose_features);
+        let same_data = found.data.is_none() || found.data == expected.data;
+        if dimensions(found) != dimensions(&expected) || !same_data {
             return Err(miette!(
-                help = "the body, garments or motions have changed since the run was started; restore them",
+                help = "the body, garments or motions have changed since the run was started; restore them, or start a new run",
                 "the data no longer fits checkpoint {}",
                 checkpoint.path.display()
             ));
         }
-        let model = checkpoint.model(&config, &device)?;
+        let model = checkpoint.trained_model(&config, &device)?;
+        let average = match config.optimizer.ema_decay {
+            decay if decay > 0.0 => {
+                let kept = checkpoint.average(&config, &device)?;
+                Some(Average::new(kept.unwrap_or_else(|| model.clone()).valid(), decay))
+            }
+            _ => None,
+        };
         let optimizer = checkpoint.optimizer(new_optimizer(&config.optimizer))?;
         let learner = Learner::new(model, optimizer, &config.optimizer);
-        let step = checkpoint.state.step;
-        Self::with_learner(run, config, library, &device, learner, step)
+        Ok(Self::assemble(run, config, library, &device, learner, average, found))
     }
 
-    fn with_learner(
+    fn assemble(
         run: RunDir,
         config: Config,
         library: Arc<Library>,
         device: &Device,
         learner: Learner,
-        step: u64,
-    ) -> Result<Self, Report> {
-        let tensors = Arc::new(WardrobeTensors::new(library.clone(), dimensions(&library), device));
-        let validation = ValidationSet::new(&library, &config);
-        let schedule = Schedule::new(&config);
-        let config = Arc::new(config);
-        Ok(Self { run, config, library, schedule, tensors, validation, learner, step, skipped_in_a_row: 0 })
+        average: Option<Average>,
+        state: &CheckpointState,
+    ) -> Self {
+        Self {
+            tensors: Arc::new(WardrobeTensors::new(library.clone(), dimensions(&library), device)),
+            validation: ValidationSet::new(&library, &config),
+            schedule: Schedule::new(&config),
+            guard: Guard::new(config.guard.clone(), &state.incidents),
+            best: state.best,
+            step: state.step,
+            config: Arc::new(config),
+            run,
+            library,
+            learner,
+            average,
+        }
     }
 
     /// Steps done.
@@ -114,34 +145,52 @@ impl Session {
     pub fn library(&self) -> &Arc<Library> {
         &self.library
     }
+    /// Memory the run is expected to use; `None` where the system does not tell what is in use already.
+    pub fn memory_estimate(&self) -> Option<MemoryEstimate> {
+        estimate(&self.config, &self.library, self.learner.model().num_params())
+    }
     /// The constant tensors of the wardrobe.
     pub fn tensors(&self) -> &Arc<WardrobeTensors> {
         &self.tensors
     }
-    /// One optimiser step on `scene`, started at `start` after waiting `waited` for it.
+    /// One optimiser step on `scenes`, started at `start` after waiting `waited` for them.
     ///
     /// # Errors
-    /// When too many steps in a row had no finite gradient.
+    /// When a scene cannot be computed, or an incident not be written.
     pub fn step_on(
         &mut self,
-        scene: &PreparedScene,
+        mut scenes: Vec<PreparedScene>,
         at: &ScheduleAt,
         start: Instant,
         waited: Duration,
-    ) -> Result<StepRecord, Report> {
-        let stage = self.schedule.stages()[at.stage].clone();
-        let outcome = self
+    ) -> Result<StepReport, Report> {
+        let stage = &self.schedule.stages()[at.stage];
+        let injected = self.config.guard.injected(self.step + 1);
+        if injected == Some(Injected::Position) {
+            spoil_position(&mut scenes);
+        }
+        let spoil = injected == Some(Injected::Gradient);
+        let mut outcome = self
             .learner
-            .step(&self.tensors, scene, stage.trains, at.learning_rate)
+            .step(&self.tensors, &scenes, stage.trains, at.learning_rate, spoil)
             .map_err(Report::new)
             .wrap_err_with(|| format!("step {}", self.step + 1))?;
         self.step += 1;
-        self.guard(&outcome)?;
-        let (raw, weighted) = sums(scene, &outcome);
-        Ok(StepRecord {
+        if let (Some(average), false) = (&mut self.average, outcome.skipped) {
+            let update = Instant::now();
+            average.update(self.learner.model(), self.step);
+            outcome.times.update += update.elapsed();
+        }
+        let verdict = self.guard.watch(self.step, outcome.gradient_norm, outcome.skipped);
+        let incident = match outcome.skipped {
+            true => self.keep_incident(at, injected, &scenes, &outcome)?,
+            false => None,
+        };
+        let (raw, weighted) = sums(&scenes, &outcome);
+        let record = StepRecord {
             step: self.step,
-            stage: stage.name,
-            layers: scene.garments.len(),
+            stage: stage.name.clone(),
+            layers: scenes.iter().map(|s| s.garments.len()).max().unwrap_or(0),
             pose_scale: at.pose_scale,
             loss: outcome.loss,
             raw,
@@ -150,24 +199,57 @@ impl Session {
             lr: at.learning_rate,
             seconds: start.elapsed().as_secs_f64(),
             wait_seconds: waited.as_secs_f64(),
-        })
+            forward_seconds: outcome.times.forward.as_secs_f64(),
+            backward_seconds: outcome.times.backward.as_secs_f64(),
+            update_seconds: outcome.times.update.as_secs_f64(),
+            skipped: outcome.skipped,
+        };
+        Ok(StepReport { record, verdict, incident })
     }
 
-    fn guard(&mut self, outcome: &StepOutcome) -> Result<(), Report> {
-        if !outcome.skipped {
-            self.skipped_in_a_row = 0;
-            return Ok(());
+    /// Writes the scene of a skipped step, unless enough are kept already.
+    fn keep_incident(
+        &self,
+        at: &ScheduleAt,
+        injected: Option<Injected>,
+        scenes: &[PreparedScene],
+        outcome: &StepOutcome,
+    ) -> Result<Option<PathBuf>, Report> {
+        let folder = self.run.incidents();
+        let is_scene = |e: &std::fs::DirEntry| e.path().extension().is_some_and(|x| x == "json");
+        let kept = std::fs::read_dir(&folder).into_iter().flatten().flatten().filter(is_scene).count();
+        // After a resume a step may fail again: the same scene once more.
+        let again = folder.join(format!("step-{}.json", self.step)).exists();
+        if kept >= self.config.guard.kept_incidents && !again {
+            return Ok(None);
         }
-        self.skipped_in_a_row += 1;
-        tracing::warn!(step = self.step, loss = outcome.loss, "loss or gradient is not finite, step skipped");
-        if self.skipped_in_a_row < MAX_SKIPPED {
-            return Ok(());
-        }
-        Err(miette!(
-            help = "continue from the last checkpoint with a lower learning rate",
-            "loss or gradient was not finite in {MAX_SKIPPED} steps in a row, the last one step {}",
+        let around = Circumstances {
+            config: &self.config,
+            library: &self.library,
+            step: self.step,
+            at,
+            injected,
+            model: self.learner.model(),
+        };
+        Ok(Some(Incident::write(&folder, &around, scenes, outcome)?))
+    }
+
+    /// The error of a run that gave up after `count` incidents, pointing to the last checkpoint.
+    pub fn gave_up(&self, count: usize) -> Report {
+        let last = match Checkpoint::open(self.run.root()) {
+            Ok(checkpoint) => format!("the last good checkpoint is {}", checkpoint.path.display()),
+            Err(_) => "no checkpoint had been written yet".into(),
+        };
+        miette!(
+            help = format!(
+                "`clothcombo replay {}/step-N.json` shows the terms at fault; resume from the checkpoint with a lower \
+                    learning rate and --allow-config-change stages",
+                self.run.incidents().display()
+            ),
+            "loss or gradient was not finite in {count} of the last {} steps, the last one step {}; {last}",
+            self.config.guard.window,
             self.step
-        ))
+        )
     }
 
     /// Scores the fixed validation scenes.
@@ -176,6 +258,21 @@ impl Session {
     /// When a scene cannot be draped.
     pub fn validate(&self) -> Result<ValidationReport, Report> {
         Ok(self.validation.score(&self.library, &self.networks())?)
+    }
+
+    /// Takes note of a validation at the current step; whether it is the best so far.
+    pub fn note_validation(&mut self, report: &ValidationReport) -> bool {
+        let Some(score) = report.score() else { return false };
+        if self.best.is_some_and(|best| best.score.0 <= score) {
+            return false;
+        }
+        self.best = Some(Best { step: self.step, score: score.into() });
+        true
+    }
+
+    /// The best validation so far.
+    pub fn best(&self) -> Option<Best> {
+        self.best
     }
 
     /// Draws the sample picture of the current step and returns its path.
@@ -194,23 +291,29 @@ impl Session {
     /// # Errors
     /// When it cannot be written; earlier checkpoints are untouched.
     pub fn save(&self) -> Result<PathBuf, Report> {
-        let checkpoint = Checkpoint::save(
-            &self.run,
-            &self.config,
-            state(&self.library, self.step),
-            self.learner.model(),
-            self.learner.optimizer(),
-            self.config.output.keep_checkpoints,
-        )?;
-        Ok(checkpoint.path)
+        let mut state = state(&self.library, self.step);
+        state.best = self.best;
+        state.incidents = self.guard.incidents();
+        let snapshot = Snapshot {
+            model: self.learner.model(),
+            average: self.average.as_ref().map(Average::model),
+            optimizer: self.learner.optimizer(),
+        };
+        Ok(Checkpoint::save(&self.run, &self.config, state, &snapshot)?.path)
     }
 
+    /// The networks as they are used: averaged, where the run keeps an average.
     fn networks(&self) -> Networks<'_> {
-        Networks::new(self.learner.model().valid(), &self.tensors)
+        let model = match &self.average {
+            Some(average) => average.model().clone(),
+            None => self.learner.model().valid(),
+        };
+        Networks::new(model, &self.tensors)
     }
 }
 
-fn dimensions(library: &Library) -> Dimensions {
+/// Input sizes of networks for `library`.
+pub(crate) fn dimensions(library: &Library) -> Dimensions {
     state(library, 0).dimensions()
 }
 
@@ -219,25 +322,29 @@ pub(crate) fn state(library: &Library, step: u64) -> CheckpointState {
     let joints: Vec<String> =
         library.joints().indices.iter().map(|&j| library.body.joint_names[j].clone()).collect();
     let pose_features = joints.len() * library.poses.features_per_joint();
-    CheckpointState::new(step, joints, library.shape_count, pose_features)
+    let mut state = CheckpointState::new(step, joints, library.shape_count, pose_features);
+    state.data = Some(library.fingerprint());
+    state
 }
 
-/// Raw and weighted energies, summed over garments and pairs, mean over bodies.
+/// Raw and weighted energies, summed over garments and pairs, mean over bodies and scenes.
 fn sums(
-    scene: &PreparedScene,
+    scenes: &[PreparedScene],
     outcome: &StepOutcome,
 ) -> (BTreeMap<&'static str, f64>, BTreeMap<&'static str, f64>) {
     let (mut raw, mut weighted) = (BTreeMap::new(), BTreeMap::new());
-    let share = 1.0 / scene.bodies.len() as f64;
-    for (body, value) in scene.bodies.iter().zip(outcome.scenes.iter().map(|s| s.value())) {
-        let energy = &body.energy;
-        let weights =
-            energy.garments.iter().map(|g| &g.weights).chain(energy.layers.iter().map(|l| &l.weights));
-        for (values, weights) in value.garments.iter().chain(&value.layers).zip(weights) {
-            for term in Term::ALL {
-                if let Some(v) = values[term] {
-                    *raw.entry(term.name()).or_insert(0.0) += v * share;
-                    *weighted.entry(term.name()).or_insert(0.0) += v * weights[term] * share;
+    for (scene, outputs) in scenes.iter().zip(&outcome.scenes) {
+        let share = 1.0 / (scene.bodies.len() * scenes.len()) as f64;
+        for (body, value) in scene.bodies.iter().zip(outputs.iter().map(|s| s.value())) {
+            let energy = &body.energy;
+            let weights =
+                energy.garments.iter().map(|g| &g.weights).chain(energy.layers.iter().map(|l| &l.weights));
+            for (values, weights) in value.garments.iter().chain(&value.layers).zip(weights) {
+                for term in Term::ALL {
+                    if let Some(v) = values[term] {
+                        *raw.entry(term.name()).or_insert(0.0) += v * share;
+                        *weighted.entry(term.name()).or_insert(0.0) += v * weights[term] * share;
+                    }
                 }
             }
         }

@@ -1,14 +1,15 @@
 //! The training loop, top to bottom.
 
 use crate::event::{Observer, TrainEvent};
+use crate::guard::Verdict;
 use crate::scene::Prefetch;
 use crate::session::Session;
 use crate::stop::StopFlag;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use std::time::Instant;
 
-/// Scenes prepared in advance.
-const SCENES_AHEAD: usize = 4;
+/// Steps whose scenes are prepared in advance.
+pub(crate) const SCENES_AHEAD: usize = 4;
 
 /// Trains from the session's step to the end of the schedule, or until `stop` is requested.
 ///
@@ -42,22 +43,39 @@ pub fn train(
             tell(&TrainEvent::StageStarted { name: &stage.name, step, steps: stage.steps })?;
         }
         let start = Instant::now();
-        let scene =
-            scenes.next_scene().ok_or_else(|| miette!("the thread that prepares scenes ended early"))??;
+        let prepared =
+            scenes.next_step().ok_or_else(|| miette!("the thread that prepares scenes ended early"))??;
         let waited = start.elapsed();
-        let record = session.step_on(&scene, &at, start, waited)?;
-        tell(&TrainEvent::Step(&record))?;
+        let report = session.step_on(prepared, &at, start, waited)?;
+        tell(&TrainEvent::Step(&report.record))?;
 
         let done = step + 1;
+        match report.verdict {
+            Verdict::Fine => {}
+            Verdict::Spike { usual } => {
+                tell(&TrainEvent::Spike { step: done, norm: report.record.grad_norm, usual })?;
+            }
+            Verdict::Skipped { count, is_over } => {
+                tell(&TrainEvent::Skipped { step: done, count, file: report.incident.as_deref() })?;
+                if is_over {
+                    tell(&TrainEvent::GaveUp { step: done })?;
+                    return Err(session.gave_up(count));
+                }
+            }
+        }
         let due = |every: u64| every > 0 && done % every == 0;
+        let mut is_best = false;
         if at.last_of_stage || due(validate_every) {
-            tell(&TrainEvent::Validated { step: done, report: &session.validate()? })?;
+            let report = session.validate()?;
+            is_best = session.note_validation(&report) && output.keep_best;
+            tell(&TrainEvent::Validated { step: done, report: &report })?;
         }
         if at.last_of_stage || due(output.sample_every) {
             tell(&TrainEvent::SampleDrawn { path: &session.draw_sample()? })?;
         }
         let stopping = stop.requested();
-        if at.last_of_stage || due(output.checkpoint_every) || stopping {
+        if at.last_of_stage || due(output.checkpoint_every) || is_best || stopping {
+            tell(&TrainEvent::CheckpointDue { step: done })?;
             tell(&TrainEvent::CheckpointSaved { step: done, path: &session.save()? })?;
         }
         if stopping && done < total_steps {

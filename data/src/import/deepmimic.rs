@@ -12,6 +12,7 @@ use crate::asset::rotation::{Matrix3, axis_angle_from_quaternion, matrix_from_ax
 use crate::asset::{Body, Motion, Provenance};
 use serde::Deserialize;
 use std::fs;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 /// How DeepMimic motions are imported.
@@ -34,6 +35,9 @@ const COLUMNS: usize = 44;
 /// Column of the root's rotation.
 const ROOT: usize = 4;
 const EXPECTED: &str = "DeepMimic motions";
+/// Lengths that a quaternion may have: the published clips hold interpolated ones from 0.58 to 1.12, which are normalised, as
+/// DeepMimic itself does.
+const LENGTHS: RangeInclusive<f64> = 0.5..=1.5;
 
 /// Joints after the root: first column, whether it is an angle about z instead of a quaternion, and the parent
 /// (0 the root, n the n-th joint of this table).
@@ -124,9 +128,9 @@ fn parse(text: &str) -> Result<Vec<Vec<f64>>, String> {
         let quaternions = ROW.iter().filter(|(_, hinge, _)| !hinge).map(|(column, _, _)| *column);
         for column in quaternions.chain([ROOT]) {
             let length = row[column..column + 4].iter().map(|x| x * x).sum::<f64>().sqrt();
-            if (length - 1.0).abs() > 0.05 {
+            if !LENGTHS.contains(&length) {
                 return Err(format!(
-                    "frame {number}: numbers {column} to {} are no unit quaternion",
+                    "frame {number}: numbers {column} to {} are no unit quaternion, their length is {length:.3}",
                     column + 3
                 ));
             }
@@ -250,7 +254,7 @@ mod tests {
         assert_eq!(parse(&text(&rest_row())).unwrap().len(), 2);
         assert!(parse(&text(&[0.0; 20])).unwrap_err().contains("frame 1 has 20 numbers"));
         let mut row = rest_row();
-        row[13] = 0.7;
+        row[13] = 1.7;
         assert!(parse(&text(&row)).unwrap_err().contains("frame 1: numbers 12 to 15"));
         assert!(parse("{\"Frames\": []}").unwrap_err().contains("no frames"));
         for bad in ["", "[1, 2]", "{\"Frames\": [[1, \"x\"]]}", &text(&rest_row())[..200]] {

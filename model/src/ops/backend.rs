@@ -14,11 +14,14 @@ use burn::backend::tensor::FloatTensor;
 use burn::backend::{Autodiff, Backend, backend_extension};
 
 use super::activation::{self, Activation, ActivationGradients, Saved};
+use super::adam::{self, AdamFactors};
 use super::segments::SegmentEnds;
 use super::sine_modulation::SineGradients;
 use super::skin_correction::Projection;
 use super::split_columns::ColumnGradients;
-use super::{gradient_features, host, sine_modulation, skin_correction, split_columns, transform_points};
+use super::{
+    gradient_features, host, norm, sine_modulation, skin_correction, split_columns, transform_points,
+};
 
 /// The fused operations as burn dispatches them; the functions of [`super`] are the way to call them.
 #[backend_extension(
@@ -84,6 +87,18 @@ pub(crate) trait FusedOps: Backend {
     fn column_collector(wide: FloatTensor<Self>, gradients: ColumnGradients) -> FloatTensor<Self>;
     /// See [`super::split_columns`].
     fn column_block(wide: FloatTensor<Self>, block: usize, gradients: ColumnGradients) -> FloatTensor<Self>;
+    /// See [`super::adam_step`].
+    fn adam_step(
+        parameter: FloatTensor<Self>,
+        gradient: FloatTensor<Self>,
+        first: FloatTensor<Self>,
+        second: FloatTensor<Self>,
+        factors: AdamFactors,
+    ) -> (FloatTensor<Self>, FloatTensor<Self>, FloatTensor<Self>);
+    /// See [`super::squared_norm`].
+    fn squared_norm(values: FloatTensor<Self>) -> FloatTensor<Self>;
+    /// See [`super::scale_by`].
+    fn scale_by(values: FloatTensor<Self>, factor: FloatTensor<Self>) -> FloatTensor<Self>;
 }
 
 /// Forward and backward passes on plain tensors; the defaults compose a backend's own operations.
@@ -161,6 +176,24 @@ pub(crate) trait Kernels: Backend {
         gradient: FloatTensor<Self>,
     ) -> (FloatTensor<Self>, FloatTensor<Self>) {
         transform_points::backward::<Self>(transforms, points, gradient)
+    }
+
+    fn adam(
+        parameter: FloatTensor<Self>,
+        gradient: FloatTensor<Self>,
+        first: FloatTensor<Self>,
+        second: FloatTensor<Self>,
+        factors: AdamFactors,
+    ) -> adam::Updated<Self> {
+        adam::tensor_form::<Self>(parameter, gradient, first, second, factors)
+    }
+
+    fn sum_of_squares(values: FloatTensor<Self>) -> FloatTensor<Self> {
+        norm::tensor_squared_norm::<Self>(values)
+    }
+
+    fn scale(values: FloatTensor<Self>, factor: FloatTensor<Self>) -> FloatTensor<Self> {
+        norm::tensor_scale_by::<Self>(values, factor)
     }
 }
 
@@ -280,6 +313,36 @@ macro_rules! host_kernels {
                     transform_points::backward::<Self>(transforms, points, gradient)
                 }
             }
+
+            fn adam(
+                mut parameter: FloatTensor<Self>,
+                mut gradient: FloatTensor<Self>,
+                mut first: FloatTensor<Self>,
+                mut second: FloatTensor<Self>,
+                factors: AdamFactors,
+            ) -> adam::Updated<Self> {
+                let moments = [&mut first, &mut second];
+                if adam::host::<Self>(&mut parameter, &mut gradient, moments, factors) {
+                    (parameter, first, second)
+                } else {
+                    adam::tensor_form::<Self>(parameter, gradient, first, second, factors)
+                }
+            }
+
+            fn sum_of_squares(mut values: FloatTensor<Self>) -> FloatTensor<Self> {
+                match norm::host_squared_norm::<Self>(&mut values) {
+                    Some(sum) => sum,
+                    None => norm::tensor_squared_norm::<Self>(values),
+                }
+            }
+
+            fn scale(mut values: FloatTensor<Self>, mut factor: FloatTensor<Self>) -> FloatTensor<Self> {
+                if norm::host_scale_by::<Self>(&mut values, &mut factor) {
+                    values
+                } else {
+                    norm::tensor_scale_by::<Self>(values, factor)
+                }
+            }
         }
     };
 }
@@ -377,6 +440,24 @@ macro_rules! plain_operations {
             ) -> FloatTensor<Self> {
                 split_columns::block::<Self>(wide, block, &gradients)
             }
+
+            fn adam_step(
+                parameter: FloatTensor<Self>,
+                gradient: FloatTensor<Self>,
+                first: FloatTensor<Self>,
+                second: FloatTensor<Self>,
+                factors: AdamFactors,
+            ) -> adam::Updated<Self> {
+                Self::adam(parameter, gradient, first, second, factors)
+            }
+
+            fn squared_norm(values: FloatTensor<Self>) -> FloatTensor<Self> {
+                Self::sum_of_squares(values)
+            }
+
+            fn scale_by(values: FloatTensor<Self>, factor: FloatTensor<Self>) -> FloatTensor<Self> {
+                Self::scale(values, factor)
+            }
         }
     };
 }
@@ -471,5 +552,32 @@ impl<B: Kernels, C: CheckpointStrategy> FusedOps for Autodiff<B, C> {
 
     fn column_block(wide: FloatTensor<Self>, block: usize, gradients: ColumnGradients) -> FloatTensor<Self> {
         split_columns::record_block::<B, C>(wide, block, gradients)
+    }
+
+    // An optimiser works beside the graph: nothing of it is recorded.
+
+    fn adam_step(
+        parameter: FloatTensor<Self>,
+        gradient: FloatTensor<Self>,
+        first: FloatTensor<Self>,
+        second: FloatTensor<Self>,
+        factors: AdamFactors,
+    ) -> (FloatTensor<Self>, FloatTensor<Self>, FloatTensor<Self>) {
+        let plain = |tensor: FloatTensor<Self>| tensor.into_primitive();
+        let (parameter, first, second) =
+            B::adam(plain(parameter), plain(gradient), plain(first), plain(second), factors);
+        (
+            <FloatTensor<Self>>::new(parameter),
+            <FloatTensor<Self>>::new(first),
+            <FloatTensor<Self>>::new(second),
+        )
+    }
+
+    fn squared_norm(values: FloatTensor<Self>) -> FloatTensor<Self> {
+        <FloatTensor<Self>>::new(B::sum_of_squares(values.into_primitive()))
+    }
+
+    fn scale_by(values: FloatTensor<Self>, factor: FloatTensor<Self>) -> FloatTensor<Self> {
+        <FloatTensor<Self>>::new(B::scale(values.into_primitive(), factor.into_primitive()))
     }
 }

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::segments::ranges;
 
 /// Elements one task works on: about a second-level cache, so that small tensors stay on one thread.
-const CHUNK_ELEMENTS: usize = 1 << 14;
+pub(super) const CHUNK_ELEMENTS: usize = 1 << 14;
 
 /// A backend whose tensors can be read in place.
 pub(super) trait HostBackend: Backend {
@@ -22,6 +22,17 @@ pub(super) trait HostBackend: Backend {
 
     /// The rows of a held matrix.
     fn rows(held: &Self::Held) -> Rows<'_>;
+
+    /// All elements of a tensor of any shape in row-major order, which is made so if it is not. `None` if the elements are
+    /// not f32 or the backend does not lend them.
+    fn values(_tensor: &mut FloatTensor<Self>) -> Option<&[f32]> {
+        None
+    }
+
+    /// The same for writing in place; memory that is shared is copied first.
+    fn values_mut(_tensor: &mut FloatTensor<Self>) -> Option<&mut [f32]> {
+        None
+    }
 
     /// A matrix from its elements.
     fn matrix(values: Vec<f32>, columns: usize, device: &Device<Self>) -> FloatTensor<Self> {
@@ -110,7 +121,14 @@ pub(super) fn for_each<T: Send>(tasks: Vec<T>, run: impl Fn(T) + Send + Sync) {
 /// The closure's body must be inlined into the caller: mark it and what it calls `#[inline(always)]`.
 #[inline(always)]
 pub(super) fn vectorised<R>(kernel: impl FnOnce() -> R) -> R {
-    pulp::Arch::new().dispatch(kernel)
+    // Named instruction sets instead of `pulp::Arch::dispatch`, through which a kernel is not inlined and stays narrow.
+    #[cfg(target_arch = "x86_64")]
+    if let Some(simd) = pulp::x86::V4::try_new() {
+        return simd.vectorize(kernel);
+    } else if let Some(simd) = pulp::x86::V3::try_new() {
+        return simd.vectorize(kernel);
+    }
+    kernel()
 }
 
 /// Adds the rows of `partial` (one per chunk) into one row per segment, in chunk order, in f64.
@@ -131,6 +149,18 @@ mod flex {
 
     use super::*;
 
+    /// Where the elements lie once the tensor has been made contiguous; `None` if they are not f32.
+    fn contiguous(tensor: &mut FloatTensor<Flex>) -> Option<Range<usize>> {
+        if tensor.dtype() != DType::F32 {
+            return None;
+        }
+        if !tensor.layout().is_contiguous() {
+            *tensor = tensor.to_contiguous();
+        }
+        let start = tensor.layout().start_offset();
+        Some(start..start + tensor.layout().num_elements())
+    }
+
     impl HostBackend for Flex {
         type Held = FloatTensor<Flex>;
 
@@ -140,6 +170,16 @@ mod flex {
             let contiguous_rows =
                 strides.len() == 2 && (strides[1] == 1 || tensor.layout().shape()[1] == 1) && strides[0] >= 0;
             if contiguous_rows { tensor } else { tensor.to_contiguous() }
+        }
+
+        fn values(tensor: &mut FloatTensor<Self>) -> Option<&[f32]> {
+            let range = contiguous(tensor)?;
+            tensor.storage::<f32>().get(range)
+        }
+
+        fn values_mut(tensor: &mut FloatTensor<Self>) -> Option<&mut [f32]> {
+            let range = contiguous(tensor)?;
+            tensor.storage_mut::<f32>().get_mut(range)
         }
 
         fn rows(held: &Self::Held) -> Rows<'_> {

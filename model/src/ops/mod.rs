@@ -9,10 +9,12 @@
 #![cfg_attr(not(any(feature = "flex", feature = "ndarray")), allow(dead_code, unused_imports))]
 
 mod activation;
+mod adam;
 mod backend;
 mod gradient_features;
 mod host;
 mod math;
+mod norm;
 mod segments;
 mod sine_modulation;
 mod skin_correction;
@@ -26,7 +28,9 @@ mod transform_points;
 pub use activation::{
     Activation, activate, activate_residual, activate_sum, segment_activate, segment_activate_sum,
 };
+pub use adam::{AdamFactors, adam_step};
 pub use gradient_features::gradient_features;
+pub use norm::{scale_by, squared_norm};
 pub use segments::Segments;
 pub use sine_modulation::sine_modulation;
 pub use skin_correction::skin_correction;

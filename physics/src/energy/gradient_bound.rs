@@ -8,7 +8,7 @@
 //! | term | bound on `|∂E/∂x_v|` | why |
 //! |---|---|---|
 //! | strain | `Σ_T 2V·S·(λ√2 + 2μ)·(S² + M)·√3/h` | `‖P‖ ≤ ‖F‖·‖S‖`, with `‖F‖ ≤ S = √6·ℓ/h`, and `h` the height of the rest triangle, which the regularisation keeps above 1e-2 of its longest edge; `M` is the norm of the rest metric |
-//! | bending | `Σ_H 20·k·ℓ/τ` | `|∂α/∂c|·φ ≤ ℓ/2τ` and `|∂φ/∂c| ≤ 0.65·ℓ/τ` for `φ = s²/(s² + τ²)`, `α ≤ π`; the ends of the edge carry up to four times that |
+//! | bending | `Σ_H 58·k·ℓ/τ` | `|∂α/∂c|·φ ≤ 1.1·ℓ/τ` and `|∂φ/∂c| ≤ 2.2·ℓ/τ` for `φ = t²(6 − 8t + 3t²)`, `t = s²/τ²` below τ, `α ≤ π`; the ends of the edge carry up to four times that |
 //! | gravity | `m_v·g` | it is that everywhere |
 //! | body collision | `3(ε + D)²` | unit normals, `d ≥ −D` |
 //! | repulsion | `2(N − 1)·factor/δ` | a pair pulls with at most `2/δ`; over `N` vertices the default is below `2/δ` for any garment |
@@ -143,7 +143,7 @@ impl Deformed<'_> {
         let hinges = topology.hinges.iter().map(|h| {
             let length = self.longest(h.faces[0]).max(self.longest(h.faces[1]));
             let collapse = collapse(h.faces[0]).min(collapse(h.faces[1]));
-            let bound = 20.0 * settings.material.bending_stiffness * length / collapse;
+            let bound = 58.0 * settings.material.bending_stiffness * length / collapse;
             ([h.edge[0], h.edge[1], h.opposite[0], h.opposite[1]], bound)
         });
         self.largest_sum(hinges)

@@ -67,6 +67,11 @@ pub(super) struct Kink {
 }
 
 impl Kink {
+    /// A vertex that is not to move at all.
+    pub(super) fn held(vertex: usize, gradient: [f64; 3]) -> Self {
+        Self { vertex, gradient, across: vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] }
+    }
+
     /// `x` without its part across the kink.
     fn along(&self, x: [f64; 3]) -> [f64; 3] {
         self.across.iter().fold(x, |x, m| add_scaled(x, -dot(x, *m), *m))

@@ -31,8 +31,10 @@
 //! Nearest features are looked up anew in every evaluation, nothing is frozen. At a vertex that rests on a kink, the gradient
 //! in the relative gradient is the subgradient of smallest norm: no gradient vanishes there. From the tenth iteration on,
 //! vertices that are driven against a kink are put on it, where that lowers the energy, and steps are projected along the
-//! kinks that their vertices rest on.
+//! kinks that their vertices rest on. Where a few vertices before a kink make a step short, or allow none, they are held for
+//! one step, so that all others go on.
 
+mod advance;
 mod error;
 mod kinks;
 mod lbfgs;

@@ -3,13 +3,13 @@
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use super::kinks::{Kink, balance, project};
-use super::lbfgs::{Memory, product};
-use super::line_search::{Trial, search};
+use super::advance::{Model, State, advance, longest};
+use super::kinks::{Kink, balance};
+use super::lbfgs::Memory;
 use super::preconditioner::Preconditioner;
 use super::problem::{norm, relative};
 use super::{EquilibriumError, Problem, Progress, Solution, SolverSettings, Step, Stop};
-use crate::vec3::{add_scaled, distance_squared, is_finite, norm_squared, sub};
+use crate::vec3::{distance_squared, is_finite, sub};
 
 /// Iterations between two looks at the scale of the forces, which costs an evaluation.
 const LOOK_EVERY: usize = 10;
@@ -21,14 +21,10 @@ const FIRST_LOOK: usize = 10;
 const WINDOW: usize = 60;
 
 /// Less than this share of all that was gained, gained over [`WINDOW`] iterations, is no progress.
-const LEAST_GAIN: f64 = 1e-6;
+const LEAST_GAIN: f64 = 1e-9;
 
-/// A state of the search.
-struct State {
-    positions: Vec<[f64; 3]>,
-    energy: f64,
-    gradient: Vec<[f64; 3]>,
-}
+/// Most times that vertices are held in one iteration.
+const MOST_HOLDS: usize = 8;
 
 /// Lowers the energy of `problem` from posed positions `start` `[ΣV, 3]` [m] until it cannot or may not be lowered any
 /// more; [`Solution::stop`] says which. `observer` sees the start and every accepted step, and can end the search.
@@ -59,6 +55,8 @@ pub fn solve(
     let mut memory = Memory::new(settings.memory);
     let mut age = 0;
     let mut kinks: Vec<Kink> = Vec::new();
+    // Vertices before kinks that made the last step short.
+    let mut in_the_way: Vec<usize> = Vec::new();
     // The last step, and the gradient before it.
     let mut last: Option<(Vec<[f64; 3]>, Vec<[f64; 3]>)> = None;
     let mut history = Vec::new();
@@ -121,23 +119,37 @@ pub fn solve(
             age = settings.refactorise_every;
             Preconditioner::new(problem, start)
         });
+        // They had the last step, the others have this one.
+        kinks.extend(in_the_way.drain(..).map(|vertex| Kink::held(vertex, balanced[vertex])));
+        let mut holds = 0;
         let next = loop {
             if age >= settings.refactorise_every {
                 preconditioner.refresh(problem, &state.positions);
                 age = 0;
             }
             let model = Model { gradient: &balanced, kinks: &kinks, memory: &memory, preconditioner };
-            let found = advance(problem, &state, &model, settings, &mut step.evaluations);
-            if found.is_some() || (age == 0 && memory.is_empty() && kinks.is_empty()) {
-                break found;
-            }
-            if age == 0 && memory.is_empty() {
+            let blocked = match advance(problem, &state, &model, settings, &mut step.evaluations) {
+                Ok((next, slowed)) => {
+                    in_the_way = slowed;
+                    break Some(next);
+                }
+                Err(blocked) => blocked,
+            };
+            if age > 0 || !memory.is_empty() {
+                memory.clear();
+                age = settings.refactorise_every;
+            } else if !blocked.is_empty() && holds < MOST_HOLDS {
+                // A few vertices before a kink hold up all others: for once without them.
+                kinks.extend(blocked.into_iter().map(|vertex| Kink::held(vertex, balanced[vertex])));
+                holds += 1;
+            } else if holds <= MOST_HOLDS && !kinks.is_empty() {
                 // The model of the kinks was wrong somewhere: once without.
                 kinks.clear();
                 balanced.clone_from(&state.gradient);
+                holds = MOST_HOLDS + 1;
+            } else {
+                break None;
             }
-            memory.clear();
-            age = settings.refactorise_every;
         };
         let Some(next) = next else { break Stop::Stalled };
         age += 1;
@@ -180,57 +192,10 @@ fn difference(a: &[[f64; 3]], b: &[[f64; 3]]) -> Vec<[f64; 3]> {
     a.iter().zip(b).map(|(a, b)| sub(*a, *b)).collect()
 }
 
-/// What a step is chosen by.
-struct Model<'a> {
-    /// The subgradient of smallest norm.
-    gradient: &'a [[f64; 3]],
-    kinks: &'a [Kink],
-    memory: &'a Memory,
-    preconditioner: &'a Preconditioner,
-}
-
-/// One step downhill along the kinks of `model`; `None` if there is none along the direction of its memory.
-fn advance(
-    problem: &Problem<'_>,
-    state: &State,
-    model: &Model<'_>,
-    settings: &SolverSettings,
-    evaluations: &mut usize,
-) -> Option<State> {
-    // −P H P g is downhill for every projection P.
-    let mut along = model.gradient.to_vec();
-    project(model.kinks, &mut along);
-    let mut direction = model.memory.direction(&along, |q| model.preconditioner.apply(q));
-    project(model.kinks, &mut direction);
-    let slope = product(&direction, model.gradient);
-    let reach = longest(&direction);
-    if !(slope < 0.0 && reach.is_finite()) {
-        return None;
-    }
-    let evaluate = |length: f64| {
-        *evaluations += 1;
-        let positions: Vec<[f64; 3]> =
-            state.positions.iter().zip(&direction).map(|(p, d)| add_scaled(*p, length, *d)).collect();
-        let (energy, gradient) = problem.value_and_gradient(&positions);
-        Trial {
-            value: energy,
-            slope: product(&direction, &gradient),
-            state: State { positions, energy, gradient },
-        }
-    };
-    let (_, trial) = search(state.energy, slope, settings.step_bound / reach, evaluate)?;
-    trial.state.gradient.iter().all(|g| is_finite(*g)).then_some(trial.state)
-}
-
 /// Whether the last [`WINDOW`] iterations gained a share of the energy that is worth while.
 fn is_progressing(history: &[Step]) -> bool {
     let Some(earlier) = history.len().checked_sub(WINDOW + 1) else { return true };
     let energy = |i: usize| history[i].energy;
     let last = history.len() - 1;
     energy(earlier) - energy(last) > LEAST_GAIN * (energy(0) - energy(last))
-}
-
-/// The longest of vectors.
-fn longest(x: &[[f64; 3]]) -> f64 {
-    x.iter().map(|x| norm_squared(*x)).fold(0.0, f64::max).sqrt()
 }

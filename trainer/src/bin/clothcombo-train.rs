@@ -5,6 +5,7 @@ use clothcombo_trainer::cli;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
+    clothcombo_trainer::allocator::keep_freed_memory();
     let arguments = cli::train::Arguments::parse();
     cli::start_logging(arguments.log_level());
     cli::exit_code(cli::train::run(&arguments))

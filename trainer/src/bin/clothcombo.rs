@@ -21,28 +21,36 @@ enum Verb {
     #[command(subcommand)]
     Bench(cli::bench::Bench),
     Check(cli::check::Arguments),
+    #[command(subcommand)]
+    Config(cli::config::Verb),
     Drape(Box<cli::drape::Arguments>),
     Fit(cli::fit::Arguments),
     Generate(cli::generate::Arguments),
     #[command(subcommand)]
     Import(cli::import::Source),
     Prepare(cli::prepare::Arguments),
+    Replay(cli::replay::Arguments),
     Resolve(cli::resolve::Arguments),
+    Runs(cli::runs::Arguments),
     Score(cli::score::Arguments),
 }
 
 fn main() -> ExitCode {
+    clothcombo_trainer::allocator::keep_freed_memory();
     let arguments = Arguments::parse();
     cli::start_logging("info");
     cli::exit_code(match &arguments.verb {
         Verb::Bench(bench) => cli::bench::run(bench),
         Verb::Check(arguments) => cli::check::run(arguments),
+        Verb::Config(verb) => cli::config::run(verb),
         Verb::Drape(arguments) => cli::drape::run(arguments),
         Verb::Fit(arguments) => cli::fit::run(arguments),
         Verb::Generate(arguments) => cli::generate::run(arguments),
         Verb::Import(source) => cli::import::run(source),
         Verb::Prepare(arguments) => cli::prepare::run(arguments),
+        Verb::Replay(arguments) => cli::replay::run(arguments),
         Verb::Resolve(arguments) => cli::resolve::run(arguments),
+        Verb::Runs(arguments) => cli::runs::run(arguments),
         Verb::Score(arguments) => cli::score::run(arguments),
     })
 }

@@ -1,9 +1,15 @@
 //! `clothcombo-train`.
 
+use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::config::{Config, load};
 use crate::device::Backend;
 use crate::event::Observer;
-use crate::observer::{CurvesObserver, MetricsObserver, ProgressObserver};
+use crate::memory::MemoryEstimate;
+use crate::observer::{
+    CurvesObserver, History, HistoryObserver, MetricsObserver, ProgressObserver, ReportObserver,
+    TensorBoardObserver,
+};
+use crate::report::gibibytes;
 use crate::run_dir::RunDir;
 use crate::scene::Library;
 use crate::session::Session;
@@ -12,7 +18,9 @@ use crate::train_loop::train;
 use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 use std::sync::Arc;
 
 /// Trains ClothCombo's four networks from a configuration file.
@@ -21,7 +29,9 @@ use std::sync::Arc;
     version,
     after_help = "Examples:\n  clothcombo-train --config configs/smoke.toml\n  \
         clothcombo-train --config configs/open.toml --run-dir runs/wide --set model.width=128\n  \
-        clothcombo-train --run-dir runs/wide --resume\n\n\
+        clothcombo-train --run-dir runs/wide --resume\n  \
+        clothcombo-train --resume runs/wide/checkpoints/step-00004000\n  \
+        clothcombo-train --resume runs/wide --set stages.2.steps=9000 --allow-config-change stages\n\n\
         Ctrl-C or SIGTERM saves a checkpoint and exits 0; a second one ends at once."
 )]
 pub struct Arguments {
@@ -31,13 +41,16 @@ pub struct Arguments {
     /// Overrides one value, for example losses.strain.weight=2.0 or stages.0.steps=500; repeatable
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Continues the run from its newest checkpoint
-    #[arg(long)]
-    resume: bool,
-    /// Folder of the run; default: runs/NAME-OF-CONFIG, numbered when taken
+    /// Continues a run from its newest whole checkpoint, or from the checkpoint PATH; PATH may also be the run folder
+    #[arg(long, value_name = "PATH", num_args = 0..=1)]
+    resume: Option<Option<PathBuf>>,
+    /// With --resume: keys whose values may differ from the run's own, separated by commas; a section allows all in it
+    #[arg(long, value_name = "KEYS", value_delimiter = ',', requires = "resume")]
+    allow_config_change: Vec<String>,
+    /// Folder of the run; default: runs/NAME-OF-CONFIG, numbered when taken, or the folder that PATH lies in
     #[arg(long, value_name = "DIR")]
     run_dir: Option<PathBuf>,
-    /// Compute device
+    /// Compute device; a run continues to the bit only on the device it was started on
     #[arg(long, value_enum, default_value_t = Backend::preferred())]
     device: Backend,
     /// No progress, only errors
@@ -59,13 +72,48 @@ impl Arguments {
         }
     }
 
-    fn config_file(&self) -> Result<PathBuf, Report> {
-        match (&self.config, &self.run_dir, self.resume) {
+    /// The run folder that is named, by --run-dir or by the path of --resume.
+    fn named_run(&self) -> Result<Option<PathBuf>, Report> {
+        let Some(Some(path)) = &self.resume else { return Ok(self.run_dir.clone()) };
+        let run = run_of(path).ok_or_else(|| {
+            miette!(
+                help = "pass a run folder or one of its checkpoints, such as RUN/checkpoints/step-00001000",
+                "--resume {}: that is neither a run nor a checkpoint of one",
+                path.display()
+            )
+        })?;
+        let same = |a: &Path, b: &Path| a.canonicalize().ok() == b.canonicalize().ok();
+        match &self.run_dir {
+            Some(dir) if !same(dir, &run) => Err(miette!(
+                help = "leave --run-dir out: a checkpoint continues the run it belongs to",
+                "--resume {} belongs to {}, not to {}",
+                path.display(),
+                run.display(),
+                dir.display()
+            )),
+            _ => Ok(Some(run)),
+        }
+    }
+
+    fn config_file(&self, run: Option<&Path>) -> Result<PathBuf, Report> {
+        match (&self.config, run, &self.resume) {
             (Some(file), _, _) => Ok(file.clone()),
-            (None, Some(run), true) => Ok(run.join("config.toml")),
+            (None, Some(run), Some(_)) => Ok(run.join("config.toml")),
             _ => Err(miette!(help = "for example --config configs/smoke.toml", "no configuration was given")),
         }
     }
+}
+
+/// The run that `path` is, or that the checkpoint or checkpoints folder `path` belongs to.
+fn run_of(path: &Path) -> Option<PathBuf> {
+    // A checkpoint has a config.toml as well, but only a run has checkpoints.
+    let is_run = |p: &Path| p.join("config.toml").is_file() && p.join("checkpoints").is_dir();
+    // Absolute, so that `step-00001000` alone has parents.
+    let full = path.canonicalize().ok()?;
+    let found = full.ancestors().take(3).position(is_run)?;
+    // In the words of the user where that is possible.
+    let spelled = path.ancestors().nth(found).filter(|p| !p.as_os_str().is_empty() && is_run(p));
+    spelled.map(Path::to_path_buf).or_else(|| full.ancestors().nth(found).map(Path::to_path_buf))
 }
 
 /// Runs the program.
@@ -74,40 +122,104 @@ impl Arguments {
 /// One report that names the file, key or garment at fault and how to mend it.
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let stop = StopFlag::on_signals().into_diagnostic().wrap_err("cannot listen for Ctrl-C")?;
-    let file = arguments.config_file()?;
-    let config = load(&file, &arguments.overrides)?;
-    let root = match &arguments.run_dir {
-        Some(dir) => dir.clone(),
-        None => default_run_dir(&file, arguments.resume),
-    };
+    let named = arguments.named_run()?;
+    let file = arguments.config_file(named.as_deref())?;
+    let root = named.unwrap_or_else(|| default_run_dir(&file, arguments.resume.is_some()));
     // What is wrong with the folder is said before minutes are spent on data; wrong data leaves no folder behind.
-    let existing = match arguments.resume {
-        true => Some(RunDir::resume(&root, &config)?),
-        false => RunDir::refuse_occupied(&root).map(|()| None)?,
+    let config = load(&file, &arguments.overrides)?;
+    let existing = match &arguments.resume {
+        Some(path) => {
+            let run = RunDir::resume(&root, &config, &arguments.allow_config_change)?;
+            Some((run, newest_or_none(path.as_deref().unwrap_or(&root))?))
+        }
+        None => RunDir::refuse_occupied(&root).map(|()| None)?,
     };
     let library = Arc::new(load_library(&config, arguments.quiet)?);
-    let run = match existing {
-        Some(run) => run,
-        None => RunDir::create(&root, &config)?,
+    let device = arguments.device.device();
+    let (run, mut session) = match existing {
+        Some((run, checkpoint)) => {
+            let session = match &checkpoint {
+                Some(c) => Session::resume(run.clone(), config.clone(), library.clone(), &device, c)?,
+                None => Session::new(run.clone(), config.clone(), library.clone(), &device)?,
+            };
+            continue_run(&run, &config, checkpoint.as_ref())?;
+            (run, session)
+        }
+        None => {
+            let run = RunDir::create(&root, &config)?;
+            let session = Session::new(run.clone(), config.clone(), library.clone(), &device)?;
+            (run, session)
+        }
     };
     run.write_split(&library.split_names())?;
+    let memory = session.memory_estimate();
     if !arguments.quiet {
         eprintln!("run folder {}", run.root().display());
+        if let Some(m) = memory {
+            eprintln!(
+                "memory: about {} at the peak ({} in use, {} for the largest scene, {} for parameters)",
+                gibibytes(m.peak),
+                gibibytes(m.start),
+                gibibytes(m.activations),
+                gibibytes(m.parameters)
+            );
+        }
     }
-    let device = arguments.device.device();
-    let mut session = match arguments.resume {
-        true => Session::resume(run.clone(), config.clone(), library, &device)?,
-        false => Session::new(run.clone(), config.clone(), library, &device)?,
-    };
-    let step = session.step();
+    let mut observers = observers(arguments, &run, &config, &library, session.step(), memory)?;
+    train(&mut session, &mut observers, &stop)
+}
+
+/// The checkpoint at `path`, or the newest whole one of the run there; `None` where the run was killed before its first.
+fn newest_or_none(path: &Path) -> Result<Option<Checkpoint>, CheckpointError> {
+    match Checkpoint::open(path) {
+        Ok(checkpoint) => Ok(Some(checkpoint)),
+        Err(CheckpointError::Missing { .. }) => {
+            tracing::warn!("{} holds no checkpoint yet: the run starts anew", path.display());
+            Ok(None)
+        }
+        Err(error) => Err(error),
+    }
+}
+
+/// Makes `config` the run's own and sets aside what the run did after `checkpoint`, telling about both.
+fn continue_run(run: &RunDir, config: &Config, checkpoint: Option<&Checkpoint>) -> Result<(), Report> {
+    let changed = run.adopt_config(config)?;
+    if !changed.is_empty() {
+        tracing::warn!("the run goes on with other values of {}", changed.join(", "));
+    }
+    let abandoned = checkpoint.map_or(Ok(0), |c| c.abandon_later(run))?;
+    if abandoned > 0 {
+        let folder = run.checkpoints();
+        tracing::warn!("{abandoned} later checkpoints are now {}/abandoned-step-…", folder.display());
+    }
+    Ok(())
+}
+
+fn observers(
+    arguments: &Arguments,
+    run: &RunDir,
+    config: &Config,
+    library: &Library,
+    step: u64,
+    memory: Option<MemoryEstimate>,
+) -> Result<Vec<Box<dyn Observer>>, Report> {
+    // First, because it drops the lines after the checkpoint that the run continues from.
+    let metrics = MetricsObserver::new(run, step, config.output.metrics_every)?;
+    let history = Rc::new(RefCell::new(History::read(run)?));
+    let report = ReportObserver::new(run, config, library.licences(), memory, history.clone())?;
     let mut observers: Vec<Box<dyn Observer>> = vec![
-        Box::new(MetricsObserver::new(&run, step, config.output.metrics_every)?),
-        Box::new(CurvesObserver::new(&run, &config)?),
+        Box::new(metrics),
+        Box::new(HistoryObserver(history.clone())),
+        Box::new(CurvesObserver::new(run, config, history)),
     ];
+    if config.output.tensorboard {
+        observers.push(Box::new(TensorBoardObserver::new(run, step, config.output.metrics_every)?));
+    }
+    observers.push(Box::new(report));
     if !arguments.quiet {
         observers.push(Box::new(ProgressObserver::default()));
     }
-    train(&mut session, &mut observers, &stop)
+    Ok(observers)
 }
 
 /// Loads the data of `config` under a bar.

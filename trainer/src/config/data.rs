@@ -3,11 +3,12 @@
 use crate::scene::LibraryError;
 use clothcombo_data::asset::Category;
 use clothcombo_data::cache::ArrayCache;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// Body, garments, poses.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DataConfig {
     /// `"mannequin"` (built in), or the path of a body model in SMPL / SMPL-H / SMPL-X npz form.
@@ -58,7 +59,7 @@ fn memory_mib() -> usize {
 
 /// Shares of the garments that are not trained on. A garment goes by the hash of its name: it stays where it is when others
 /// are added.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SplitConfig {
     /// Share that is scored during the run but never trained on.
@@ -68,7 +69,7 @@ pub struct SplitConfig {
 }
 
 /// The store of operators and bindings, shared by any number of runs and machines.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct CacheConfig {
     /// Folder, made if needed; none keeps everything in memory.
@@ -84,7 +85,7 @@ impl Default for CacheConfig {
 }
 
 /// One source of garments: a folder, or the generator.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GarmentSource {
     /// Folder of OBJ garments with an optional `garments.toml`.
@@ -96,7 +97,7 @@ pub struct GarmentSource {
 }
 
 /// Settings of the built-in generator.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GenerateConfig {
     /// Number of garments; categories are taken in turn.
@@ -120,7 +121,7 @@ fn thousand() -> usize {
 }
 
 /// How a pose enters the networks.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PoseEncoding {
     /// Rotation matrix minus identity, 9 numbers per joint: continuous, as in SMPL's pose feature.
@@ -131,7 +132,7 @@ pub enum PoseEncoding {
 }
 
 /// Poses and their augmentation.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PoseConfig {
     /// Folder of motion npz files; without it poses are drawn within joint limits.
@@ -171,7 +172,7 @@ impl Default for PoseConfig {
 }
 
 /// The state the networks displace: the paper's is the rest garment with the nearest body vertex's skin weights.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct StartConfig {
     /// Smooth the initial skin weights over the garment.
@@ -194,6 +195,9 @@ impl Default for StartConfig {
         }
     }
 }
+
+/// Garments a generator is asked for at most.
+const MOST_GARMENTS: usize = 1_000_000;
 
 impl DataConfig {
     /// Memory for garments that can be read again [bytes]; those of a run without a cache cannot.
@@ -250,11 +254,14 @@ impl DataConfig {
         }
         for (i, source) in self.garments.iter().enumerate() {
             if let Some(g) = &source.generate
-                && (g.count == 0 || g.categories.is_empty() || !(200..=50_000).contains(&g.vertices))
+                && (g.count == 0
+                    || g.count > MOST_GARMENTS
+                    || g.categories.is_empty()
+                    || !(200..=50_000).contains(&g.vertices))
             {
                 return Some((
                     format!("data.garments[{i}].generate"),
-                    "needs count ≥ 1, at least one category, and 200 to 50000 vertices".into(),
+                    "needs 1 to 1000000 garments, at least one category, and 200 to 50000 vertices".into(),
                     "for example { count = 12, vertices = 1000 }".into(),
                 ));
             }

@@ -20,7 +20,7 @@ pub enum ConfigError {
     /// The file is not valid.
     #[error("{message}")]
     #[diagnostic(help(
-        "every key and its meaning is documented in trainer/src/config; configs/smoke.toml is a short example"
+        "`clothcombo config schema` documents every key; configs/smoke.toml is a short example"
     ))]
     Invalid {
         /// What is wrong.
@@ -65,12 +65,20 @@ pub enum ConfigError {
 pub fn load(path: &Path, overrides: &[String]) -> Result<Config, ConfigError> {
     let text = std::fs::read_to_string(path)
         .map_err(|reason| ConfigError::Unreadable { path: path.to_owned(), reason })?;
+    parse(&text, path, overrides)
+}
+
+/// As [`load`], of a text that was read from `path`.
+///
+/// # Errors
+/// As [`load`].
+pub fn parse(text: &str, path: &Path, overrides: &[String]) -> Result<Config, ConfigError> {
     let invalid = |error: toml::de::Error| ConfigError::Invalid {
         message: error.message().to_owned(),
         span: error.span().map(SourceSpan::from),
-        source_code: NamedSource::new(path.display().to_string(), text.clone()).with_language("toml"),
+        source_code: NamedSource::new(path.display().to_string(), text.to_owned()).with_language("toml"),
     };
-    let mut config: Config = toml::from_str(&text).map_err(invalid)?;
+    let mut config: Config = toml::from_str(text).map_err(invalid)?;
     if !overrides.is_empty() {
         let mut tree: toml::Value = toml::Value::try_from(&config)
             .map_err(|e| ConfigError::BadOverride { setting: String::new(), message: e.to_string() })?;

@@ -3,10 +3,11 @@
 use super::ramp::Ramp;
 use clothcombo_physics::energy::{EnergySettings, LayerGate, Material, Term};
 use clothcombo_physics::query::Distance;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Which distance to the body the collision and distance losses use.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum DistanceMode {
     /// Offset from the nearest body vertex along its normal (the paper's).
@@ -26,7 +27,7 @@ impl From<DistanceMode> for Distance {
 }
 
 /// A loss with nothing but a weight.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlainLoss {
     /// Factor on the raw value.
@@ -34,7 +35,7 @@ pub struct PlainLoss {
 }
 
 /// Body collision, Σ max(ε − d, 0)³.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct BodyCollisionLoss {
     /// Factor on the raw value [1/m³ · J].
@@ -52,7 +53,7 @@ impl Default for BodyCollisionLoss {
 }
 
 /// Repulsion between near vertices of one garment that share no edge.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RepulsionLoss {
     /// Factor on the raw value.
@@ -72,7 +73,7 @@ impl Default for RepulsionLoss {
 }
 
 /// Holding, Σ H (Δy)².
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct HoldingLoss {
     /// Factor on the raw value.
@@ -91,7 +92,7 @@ impl Default for HoldingLoss {
 }
 
 /// Collision between layers.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct LayerCollisionLoss {
     /// Factor on the raw value.
@@ -119,7 +120,7 @@ impl Default for LayerCollisionLoss {
 }
 
 /// Distance order between layers over the same body vertex.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct LayerDistanceLoss {
     /// Factor on the raw value.
@@ -135,7 +136,7 @@ impl Default for LayerDistanceLoss {
 }
 
 /// Cloth material; defaults reproduce the paper's magnitudes.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MaterialConfig {
     /// Thickness [m].
@@ -164,7 +165,7 @@ impl Default for MaterialConfig {
 }
 
 /// All losses of one run. The key of each table is the name of its energy.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct LossesConfig {
     /// Collision and layer-collision weights are multiplied by this over the garment's vertex count: the sums run over

@@ -1,11 +1,14 @@
 //! A value that may change during training: a number, or a ramp between two numbers.
 
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{self, MapAccess, Visitor, value::MapAccessDeserializer};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::borrow::Cow;
+use std::f64::consts::PI;
 use std::fmt;
 
 /// How a ramp goes from one value to the other.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RampShape {
     /// Straight line.
@@ -13,6 +16,8 @@ pub enum RampShape {
     Linear,
     /// Equal factors in equal times (both ends must be positive): the usual choice for learning rates.
     Geometric,
+    /// Half a cosine wave: slow at both ends, as learning rates are often decayed.
+    Cosine,
 }
 
 /// `weight = 1.0`, or `weight = { from = 1.0, to = 4.0, start = 0.5, end = 1.0 }`.
@@ -51,6 +56,7 @@ impl Ramp {
         match self.shape {
             RampShape::Linear => self.from + (self.to - self.from) * t,
             RampShape::Geometric => self.from * (self.to / self.from).powf(t),
+            RampShape::Cosine => self.from + (self.to - self.from) * (0.5 - 0.5 * (PI * t).cos()),
         }
     }
 
@@ -69,6 +75,10 @@ impl Ramp {
             Some("`end` comes before `start`")
         } else if self.shape == RampShape::Geometric && !(self.from > 0.0 && self.to > 0.0) {
             Some("a geometric ramp needs positive `from` and `to`")
+        } else if self.shape == RampShape::Geometric && !(self.to / self.from).is_normal() {
+            Some("`from` and `to` of a geometric ramp are too far apart")
+        } else if !(self.to - self.from).is_finite() {
+            Some("`from` and `to` are too far apart")
         } else {
             None
         }
@@ -82,17 +92,53 @@ impl From<f64> for Ramp {
 }
 
 /// The table form, kept apart so that serde derives its field checks.
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct RampTable {
+    /// Value up to `start`.
     from: f64,
+    /// Value from `end` on.
     to: f64,
+    /// Fraction of the span at which the change begins.
     #[serde(default)]
     start: f64,
+    /// Fraction of the span at which the change ends.
     #[serde(default = "one")]
     end: f64,
+    /// Shape of the change.
     #[serde(default)]
     shape: RampShape,
+}
+
+impl JsonSchema for Ramp {
+    fn schema_name() -> Cow<'static, str> {
+        "Ramp".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let table = generator.subschema_for::<RampTable>();
+        json_schema!({
+            "description": "A number, or a ramp between two numbers over a part of the span it lives in: the whole run for \
+                the weight of a loss, the stage for everything inside a stage.",
+            "anyOf": [{ "type": "number" }, table],
+        })
+    }
+}
+
+impl fmt::Display for Ramp {
+    /// `5`, or `0 → 1 (0–40 %)`.
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        if self.from == self.to {
+            return write!(f, "{}", self.from);
+        }
+        let percent = |share: f64| (100.0 * share).round();
+        write!(f, "{} → {} ({}–{} %", self.from, self.to, percent(self.start), percent(self.end))?;
+        match self.shape {
+            RampShape::Linear => write!(f, ")"),
+            RampShape::Geometric => write!(f, ", geometric)"),
+            RampShape::Cosine => write!(f, ", cosine)"),
+        }
+    }
 }
 
 fn one() -> f64 {
@@ -166,6 +212,13 @@ mod tests {
     fn geometric_ramp_has_equal_factors() {
         let r = Ramp { from: 1e-2, to: 1e-4, start: 0.0, end: 1.0, shape: RampShape::Geometric };
         assert!((r.at(0.5) - 1e-3).abs() < 1e-12);
+    }
+
+    #[test]
+    fn cosine_ramp_starts_and_ends_flat() {
+        let r = Ramp { from: 1.0, to: 0.0, start: 0.0, end: 1.0, shape: RampShape::Cosine };
+        assert_eq!((r.at(0.0), r.at(1.0)), (1.0, 0.0));
+        assert!((r.at(0.5) - 0.5).abs() < 1e-12 && r.at(0.1) > 0.97 && r.at(0.9) < 0.03);
     }
 
     #[test]

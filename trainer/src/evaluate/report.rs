@@ -88,6 +88,17 @@ pub struct ValidationReport {
     pub groups: Vec<GroupReport>,
 }
 
+impl ValidationReport {
+    /// One number to compare networks by: mean total loss of the whole network, mean over the groups; less is better.
+    /// `None` without scenes, or where it is not finite.
+    pub fn score(&self) -> Option<f64> {
+        let totals: Vec<f64> =
+            self.groups.iter().filter_map(|g| Some(g.methods.last()?.total.mean)).collect();
+        let score = totals.iter().sum::<f64>() / totals.len() as f64;
+        score.is_finite().then_some(score)
+    }
+}
+
 impl fmt::Display for ValidationReport {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         for group in &self.groups {

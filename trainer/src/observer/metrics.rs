@@ -1,4 +1,5 @@
-//! `metrics.jsonl` and `validation.jsonl`: one JSON object per line, flushed with every checkpoint.
+//! `metrics.jsonl` and `validation.jsonl`: one JSON object per line, flushed before every checkpoint
+//! and every few seconds.
 
 use crate::event::{Observer, TrainEvent};
 use crate::run_dir::{RunDir, truncate_log};
@@ -7,12 +8,17 @@ use serde_json::json;
 use std::fs::{File, OpenOptions};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// How long a line may wait for the disk: whoever watches a run sees it this fresh.
+const FLUSH_EVERY: Duration = Duration::from_secs(10);
 
 /// Writes the logs of a run.
 pub struct MetricsObserver {
     metrics: Log,
     validation: Log,
     every: u64,
+    flushed: Instant,
 }
 
 struct Log {
@@ -55,6 +61,7 @@ impl MetricsObserver {
             metrics: Log::open(&run.metrics(), step)?,
             validation: Log::open(&run.validation(), step)?,
             every,
+            flushed: Instant::now(),
         })
     }
 }
@@ -62,13 +69,21 @@ impl MetricsObserver {
 impl Observer for MetricsObserver {
     fn observe(&mut self, event: &TrainEvent) -> Result<(), Report> {
         match event {
-            TrainEvent::Step(record) if record.step % self.every == 0 => self.metrics.line(record),
+            TrainEvent::Step(record) if record.step % self.every == 0 || record.skipped => {
+                self.metrics.line(record)?;
+                if self.flushed.elapsed() < FLUSH_EVERY {
+                    return Ok(());
+                }
+                self.flushed = Instant::now();
+                self.metrics.flush()
+            }
             TrainEvent::Validated { step, report } => {
                 self.validation.line(&json!({ "step": step, "groups": report.groups }))?;
                 self.validation.flush()
             }
-            TrainEvent::CheckpointSaved { .. }
+            TrainEvent::CheckpointDue { .. }
             | TrainEvent::Interrupted { .. }
+            | TrainEvent::GaveUp { .. }
             | TrainEvent::Finished { .. } => self.metrics.flush(),
             _ => Ok(()),
         }

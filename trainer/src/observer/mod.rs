@@ -1,9 +1,15 @@
 //! Programs' eyes on a run: each observer turns events into one kind of output.
 
 mod curves;
+mod history;
 mod metrics;
 mod progress;
+mod report;
+mod tensorboard;
 
 pub use curves::CurvesObserver;
+pub use history::{History, HistoryObserver, SharedHistory};
 pub use metrics::MetricsObserver;
 pub use progress::ProgressObserver;
+pub use report::ReportObserver;
+pub use tensorboard::{EventFile, TensorBoardObserver};

@@ -101,6 +101,14 @@ impl Observer for ProgressObserver {
             TrainEvent::Validated { step, report } => {
                 self.say(&format!("validation after step {step}\n{report}"));
             }
+            TrainEvent::Spike { step, norm, usual } => {
+                self.say(&format!("step {step}: gradient norm {norm:.3e}, usually {usual:.3e}"));
+            }
+            TrainEvent::Skipped { step, count, file } => {
+                let file = file.map(|f| format!(", scene in {}", f.display())).unwrap_or_default();
+                self.say(&format!("step {step} skipped: loss or gradient not finite ({count} lately){file}"));
+            }
+            TrainEvent::CheckpointDue { .. } => {}
             TrainEvent::CheckpointSaved { path, .. } => {
                 if !self.terminal {
                     self.say(&format!("checkpoint {}", path.display()));
@@ -109,6 +117,11 @@ impl Observer for ProgressObserver {
             TrainEvent::SampleDrawn { path } => self.say(&format!("picture {}", path.display())),
             TrainEvent::Interrupted { step } => {
                 self.say(&format!("stopped after step {step}; continue with --resume"));
+                if let Some(bar) = self.bar.take() {
+                    bar.abandon();
+                }
+            }
+            TrainEvent::GaveUp { .. } => {
                 if let Some(bar) = self.bar.take() {
                     bar.abandon();
                 }

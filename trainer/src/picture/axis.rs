@@ -5,7 +5,7 @@ use std::ops::Range;
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 
 /// Values of larger magnitude are not drawn; their differences and logarithms stay finite without them.
-pub(super) const DRAWABLE_LIMIT: f64 = 1e30;
+pub(crate) const DRAWABLE_LIMIT: f64 = 1e30;
 /// Smallest ratio of largest to smallest value for which a logarithmic axis says more than a linear one.
 const LOG_RATIO: f64 = 3.0;
 /// Decades shown at most below the largest value.
@@ -15,7 +15,7 @@ const MARGIN: f64 = 0.07;
 
 /// An axis over a fixed range.
 #[derive(Clone, Debug)]
-pub(super) struct Axis {
+pub(crate) struct Axis {
     low: f64,
     high: f64,
     is_logarithmic: bool,
@@ -23,14 +23,14 @@ pub(super) struct Axis {
 
 impl Axis {
     /// An axis over exactly this range; a range without extent is widened.
-    pub(super) fn linear(low: f64, high: f64) -> Self {
+    pub(crate) fn linear(low: f64, high: f64) -> Self {
         let (low, high) = widened(low, high);
         Self { low, high, is_logarithmic: false }
     }
 
     /// The axis that shows all `values` with a margin: logarithmic where none is negative and the positive ones spread
     /// over more than a factor of [`LOG_RATIO`], else linear. Zeros then lie on the lower edge.
-    pub(super) fn fitting(values: impl Iterator<Item = f64> + Clone) -> Self {
+    pub(crate) fn fitting(values: impl Iterator<Item = f64> + Clone) -> Self {
         let drawable = values.filter(|value| value.abs() < DRAWABLE_LIMIT);
         let low = drawable.clone().fold(f64::INFINITY, f64::min);
         let high = drawable.clone().fold(f64::NEG_INFINITY, f64::max);
@@ -53,7 +53,7 @@ impl Axis {
     }
 
     /// Position of `value` between the ends (0…1 inside).
-    fn share(&self, value: f64) -> f64 {
+    pub(crate) fn share(&self, value: f64) -> f64 {
         if self.is_logarithmic {
             let low = self.low.log10();
             (value.max(self.low).log10() - low) / (self.high.log10() - low)
@@ -63,12 +63,12 @@ impl Axis {
     }
 
     /// `value`, or the end of the axis beyond which it lies.
-    pub(super) fn clamped(&self, value: f64) -> f64 {
+    pub(crate) fn clamped(&self, value: f64) -> f64 {
         value.clamp(self.low, self.high)
     }
 
     /// At most about `count` round values inside the range, ascending.
-    fn ticks(&self, count: usize) -> Vec<f64> {
+    pub(crate) fn ticks(&self, count: usize) -> Vec<f64> {
         let count = count.clamp(2, 50);
         if !self.is_logarithmic {
             let step = round_step((self.high - self.low) / count as f64);
@@ -116,7 +116,7 @@ fn round_step(step: f64) -> f64 {
 }
 
 /// A number in a few characters: plain where that is short, else with an exponent.
-pub(super) fn number_text(value: f64, digits: usize) -> String {
+pub(crate) fn number_text(value: f64, digits: usize) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }

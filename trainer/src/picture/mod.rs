@@ -5,10 +5,12 @@
 //! is not finite, a face that names no vertex) is left out of the picture: a training run must not end because one
 //! of its samples is ugly.
 
-mod axis;
+pub(crate) mod axis;
+mod bars;
 mod canvas;
 mod curves;
 mod font;
+mod lines;
 mod palette;
 mod render;
 mod save;
@@ -17,8 +19,10 @@ mod sheet;
 
 pub mod camera;
 
+pub use bars::{Bar, draw_bars};
 pub use camera::{Camera, View};
 pub use curves::{Series, StageBoundary, draw_curves};
+pub use lines::{Line, LinePanel, draw_lines};
 pub use palette::{BODY_COLOUR, LAYER_COLOURS, layer_colour};
 pub use render::{Figure, render, render_with_camera};
 pub use save::save_png;

@@ -61,10 +61,13 @@ fn shape(library: &Library, rng: &mut ChaCha8Rng) -> Vec<f64> {
     (0..library.shape_count).map(|_| low + (high - low) * rng.random::<f64>()).collect()
 }
 
-/// The scene of training step `step`.
-pub fn draw_training(library: &Library, seed: u64, step: u64, plan: Plan) -> SceneDraw {
-    let mut rng = generator(seed, step);
-    let [low, high] = plan.stage.layers;
+/// Streams of the further scenes of a step lie this far apart; a run has fewer steps.
+const FURTHER_SCENE: u64 = 1 << 48;
+
+/// Scene number `scene` (from 0) of training step `step`.
+pub fn draw_training(library: &Library, seed: u64, step: u64, scene: usize, plan: Plan) -> SceneDraw {
+    let mut rng = generator(seed, step + scene as u64 * FURTHER_SCENE);
+    let [low, high] = plan.stage.layers_at(plan.progress);
     let layers = rng.random_range(low..=high);
     let garments = garments(&library.split.training, layers, &mut rng);
     let scale = plan.stage.pose_scale.at(plan.progress);

@@ -6,7 +6,8 @@ use super::poses::PoseLibrary;
 use super::split::{GarmentSplit, SplitNames};
 use super::wardrobe::Wardrobe;
 use crate::config::Config;
-use clothcombo_data::asset::{BODY_JOINT_COUNT, Body, BodyFileSettings};
+use clothcombo_data::asset::{BODY_JOINT_COUNT, Body, BodyFileSettings, Provenance};
+use clothcombo_data::format::npz::NpzFile;
 use clothcombo_data::generate::mannequin;
 use std::path::Path;
 use std::sync::Arc;
@@ -15,6 +16,8 @@ use std::sync::Arc;
 pub struct Library {
     /// The body model.
     pub body: Arc<Body>,
+    /// Where the body comes from.
+    pub body_source: Provenance,
     /// All garments, in source order.
     pub wardrobe: Wardrobe,
     /// Which garments are trained on.
@@ -44,6 +47,34 @@ pub fn load_body(name: &str, shape_components: usize) -> Result<Body, LibraryErr
     }
 }
 
+/// Assets of one author under one licence.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LicenceLine {
+    /// `"body"`, `"garment"` or `"motion"`.
+    pub kind: &'static str,
+    /// Author, licence, and the source of the first of them; empty where unknown.
+    pub from: Provenance,
+    /// Number of assets.
+    pub count: usize,
+}
+
+/// What a body file says about where it comes from; empty where it says nothing.
+fn body_source(name: &str) -> Provenance {
+    if name == "mannequin" {
+        return Provenance {
+            source: "built in".into(),
+            author: "ClothCombo-rs".into(),
+            licence: "CC0-1.0".into(),
+        };
+    }
+    let Ok(mut file) = NpzFile::open(Path::new(name)) else { return Provenance::default() };
+    let mut text = |key: &str| {
+        let found = file.strings(key, "").ok().and_then(|array| array.data.into_iter().next());
+        found.unwrap_or_default()
+    };
+    Provenance { source: text("source"), author: text("author"), licence: text("licence") }
+}
+
 impl Library {
     /// Loads and prepares everything `config` names. `progress(done, total, name)` is called per garment.
     ///
@@ -67,6 +98,7 @@ impl Library {
         let names: Vec<&str> = (0..wardrobe.len()).map(|i| wardrobe.card(i).name.as_str()).collect();
         let split = GarmentSplit::new(&names, &config.data)?;
         Ok(Self {
+            body_source: body_source(&config.data.body),
             body,
             wardrobe,
             split,
@@ -88,6 +120,52 @@ impl Library {
             training_clips: training_clips.to_vec(),
             unseen_clips: unseen_clips.to_vec(),
         }
+    }
+
+    /// A fingerprint of what scenes are drawn from: garments (name, size, place), body and poses. Equal data gives equal
+    /// scenes.
+    pub fn fingerprint(&self) -> String {
+        let mut hasher = blake3::Hasher::new();
+        let mut numbers = |values: &[u64]| {
+            values.iter().for_each(|v| {
+                hasher.update(&v.to_le_bytes());
+            });
+        };
+        for card in (0..self.wardrobe.len()).map(|i| self.wardrobe.card(i)) {
+            numbers(&[card.vertices as u64, u64::from(card.holding), card.name.len() as u64]);
+            numbers(&card.name.bytes().map(u64::from).collect::<Vec<_>>());
+            numbers(
+                &[card.bounds.0, card.bounds.1]
+                    .as_flattened()
+                    .iter()
+                    .map(|v| v.to_bits())
+                    .collect::<Vec<_>>(),
+            );
+        }
+        numbers(&[self.body.template.len() as u64, self.body.faces.len() as u64, self.shape_count as u64]);
+        numbers(&self.body.template.as_flattened().iter().map(|v| v.to_bits()).collect::<Vec<_>>());
+        if let Some(frames) = self.poses.frame_counts() {
+            numbers(&frames.map(|f| f as u64));
+        }
+        hasher.finalize().to_hex()[..32].to_owned()
+    }
+
+    /// Under which terms the data may be used: body, garments, motions, one line per author and licence.
+    pub fn licences(&self) -> Vec<LicenceLine> {
+        let mut lines: Vec<LicenceLine> = Vec::new();
+        let mut add = |kind: &'static str, from: &Provenance| {
+            let same = |l: &&mut LicenceLine| {
+                (l.kind, &l.from.author, &l.from.licence) == (kind, &from.author, &from.licence)
+            };
+            match lines.iter_mut().find(same) {
+                Some(line) => line.count += 1,
+                None => lines.push(LicenceLine { kind, from: from.clone(), count: 1 }),
+            }
+        };
+        add("body", &self.body_source);
+        (0..self.wardrobe.len()).for_each(|i| add("garment", &self.wardrobe.card(i).source));
+        self.poses.sources().iter().for_each(|source| add("motion", source));
+        lines
     }
 
     /// Joints the networks see.

@@ -2,7 +2,7 @@
 
 use super::error::LibraryError;
 use crate::config::{PoseConfig, PoseEncoding};
-use clothcombo_data::asset::{Body, Motion, Pose};
+use clothcombo_data::asset::{Body, Motion, Pose, Provenance};
 use clothcombo_data::dataset::load_motion_folder;
 use clothcombo_data::generate::{PoseAugmentation, PoseSampler, SelfContact};
 use rand::{RngExt, SeedableRng};
@@ -61,6 +61,8 @@ struct Frames {
     unseen: Vec<Pose>,
     training_clips: Vec<String>,
     unseen_clips: Vec<String>,
+    /// Where every clip comes from.
+    sources: Vec<Provenance>,
 }
 
 /// Which poses a validation scene draws from.
@@ -157,6 +159,14 @@ impl PoseLibrary {
         }
     }
 
+    /// Where every clip comes from; none when poses are sampled.
+    pub fn sources(&self) -> &[Provenance] {
+        match &self.source {
+            Source::Frames(f) => &f.sources,
+            Source::Sampler(_) => &[],
+        }
+    }
+
     /// Whether there are clips that are never trained on.
     pub fn has_unseen_clips(&self) -> bool {
         self.frame_counts().is_some_and(|[_, _, unseen]| unseen > 0)
@@ -239,7 +249,8 @@ impl Filter {
 
 /// Every clip is cut into blocks; one block in every `1 / held_out_share`, in the middle of its group, is held out.
 fn split(clips: &[Motion], config: &PoseConfig) -> Frames {
-    let mut frames = Frames::default();
+    let mut frames =
+        Frames { sources: clips.iter().map(|c| c.source.clone()).collect(), ..Frames::default() };
     let group = (1.0 / config.held_out_share).round().max(2.0) as usize;
     for clip in clips {
         if config.held_out_clips.iter().any(|name| clip.name.contains(name.as_str())) {

@@ -1,6 +1,8 @@
-//! Prepares the scene of the next step on another thread while this one computes.
+//! Prepares the scenes of the next step on another thread while this one computes.
 
 use super::draw::{Plan, draw_training};
+use super::error::LibraryError;
+use super::library::Library;
 use super::prepare::{PreparedScene, prepare};
 use crate::config::Config;
 use crate::drape::{DrapeError, WardrobeTensors};
@@ -9,14 +11,31 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::thread::JoinHandle;
 
+/// Draws and prepares the scenes of `step`, as its stage asks for.
+///
+/// # Errors
+/// When a garment cannot be read.
+pub fn prepare_step(
+    library: &Library,
+    config: &Config,
+    schedule: &Schedule,
+    step: u64,
+) -> Result<Vec<PreparedScene>, LibraryError> {
+    let at = schedule.at(step);
+    let stage = &config.stages[at.stage];
+    let plan = Plan { stage, progress: at.stage_progress };
+    let draws = (0..stage.accumulate).map(|i| draw_training(library, config.seed, step, i, plan));
+    draws.map(|draw| prepare(library, &config.losses, draw, at.run_progress)).collect()
+}
+
 /// Scenes in step order. Dropping it ends the thread.
 pub struct Prefetch {
-    receiver: Option<Receiver<Result<PreparedScene, DrapeError>>>,
+    receiver: Option<Receiver<Result<Vec<PreparedScene>, DrapeError>>>,
     worker: Option<JoinHandle<()>>,
 }
 
 impl Prefetch {
-    /// Starts preparing from `first_step` on, at most `ahead` scenes in advance.
+    /// Starts preparing from `first_step` on, those of at most `ahead` steps in advance.
     ///
     /// # Errors
     /// When the system refuses another thread.
@@ -31,14 +50,11 @@ impl Prefetch {
             let schedule = Schedule::new(&config);
             let library = tensors.library();
             for step in first_step..schedule.total_steps() {
-                let at = schedule.at(step);
-                let plan = Plan { stage: &config.stages[at.stage], progress: at.stage_progress };
-                let draw = draw_training(library, config.seed, step, plan);
-                let scene = prepare(library, &config.losses, draw, at.run_progress)
+                let scenes = prepare_step(library, &config, &schedule, step)
                     .map_err(DrapeError::from)
-                    .and_then(|scene| tensors.warm(&scene).map(|()| scene));
-                let failed = scene.is_err();
-                if sender.send(scene).is_err() || failed {
+                    .and_then(|scenes| scenes.iter().try_for_each(|s| tensors.warm(s)).map(|()| scenes));
+                let failed = scenes.is_err();
+                if sender.send(scenes).is_err() || failed {
                     return; // the trainer stopped early, or is about to
                 }
             }
@@ -46,8 +62,8 @@ impl Prefetch {
         Ok(Self { receiver: Some(receiver), worker: Some(worker) })
     }
 
-    /// The next scene; `None` after the last step.
-    pub fn next_scene(&self) -> Option<Result<PreparedScene, DrapeError>> {
+    /// The scenes of the next step; `None` after the last step.
+    pub fn next_step(&self) -> Option<Result<Vec<PreparedScene>, DrapeError>> {
         self.receiver.as_ref()?.recv().ok()
     }
 }

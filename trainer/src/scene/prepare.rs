@@ -28,6 +28,8 @@ pub struct PreparedBody {
 
 /// A scene ready for a step.
 pub struct PreparedScene {
+    /// What was drawn.
+    pub draw: SceneDraw,
     /// Indices into the wardrobe, inner → outer.
     pub garments: Vec<usize>,
     /// The garments themselves.
@@ -87,8 +89,9 @@ impl Dresser<'_> {
         run_progress: f64,
     ) -> PreparedScene {
         let contacts = contacts(&worn);
-        let bodies = bodies.iter().map(|body| self.on_body(&worn, &contacts, body, run_progress)).collect();
-        PreparedScene { garments: numbers, worn, contacts, bodies }
+        let prepared = bodies.iter().map(|body| self.on_body(&worn, &contacts, body, run_progress)).collect();
+        let draw = SceneDraw { garments: numbers.clone(), bodies: bodies.to_vec() };
+        PreparedScene { draw, garments: numbers, worn, contacts, bodies: prepared }
     }
 
     fn on_body(

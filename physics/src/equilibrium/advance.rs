@@ -1,0 +1,129 @@
+//! One step of the search, and who stands in its way.
+
+use super::kinks::{Kink, project};
+use super::lbfgs::{Memory, product};
+use super::line_search::{Trial, search};
+use super::preconditioner::Preconditioner;
+use super::{Problem, SolverSettings};
+use crate::vec3::{add_scaled, dot, is_finite, norm_squared, sub};
+
+/// How far ahead the forces are looked at where no step goes downhill [m]: past a kink that is hit at once, and not past much
+/// else.
+const GLANCE: f64 = 1e-6;
+
+/// A shorter step, in units of what the quasi-Newton matrix asks for, is not its curvature's fault.
+const SHORT: f64 = 0.1;
+
+/// At most one in so many vertices is held in its place for the others to move.
+const MOST_HELD: usize = 10;
+
+/// A state of the search.
+pub(super) struct State {
+    /// Posed positions [m].
+    pub positions: Vec<[f64; 3]>,
+    /// Weighted sum of all energies there [J].
+    pub energy: f64,
+    /// Its gradient [N].
+    pub gradient: Vec<[f64; 3]>,
+}
+
+/// What a step is chosen by.
+pub(super) struct Model<'a> {
+    /// The subgradient of smallest norm.
+    pub gradient: &'a [[f64; 3]],
+    /// Where vertices move along, not across.
+    pub kinks: &'a [Kink],
+    /// What the last steps taught.
+    pub memory: &'a Memory,
+    /// What the terms know of the curvature.
+    pub preconditioner: &'a Preconditioner,
+}
+
+/// One step downhill along the kinks of `model`, and the vertices that made it short, if it is; if there is no step along the
+/// direction of its memory, the vertices that stand in the way.
+pub(super) fn advance(
+    problem: &Problem<'_>,
+    state: &State,
+    model: &Model<'_>,
+    settings: &SolverSettings,
+    evaluations: &mut usize,
+) -> Result<(State, Vec<usize>), Vec<usize>> {
+    // −P H P g is downhill for every projection P.
+    let mut along = model.gradient.to_vec();
+    project(model.kinks, &mut along);
+    let mut direction = model.memory.direction(&along, |q| model.preconditioner.apply(q));
+    project(model.kinks, &mut direction);
+    let slope = product(&direction, model.gradient);
+    let reach = longest(&direction);
+    if !(slope < 0.0 && reach.is_finite()) {
+        return Err(Vec::new());
+    }
+    let mut evaluate = |length: f64| {
+        *evaluations += 1;
+        let positions: Vec<[f64; 3]> =
+            state.positions.iter().zip(&direction).map(|(p, d)| add_scaled(*p, length, *d)).collect();
+        let (energy, gradient) = problem.value_and_gradient(&positions);
+        Trial {
+            value: energy,
+            slope: product(&direction, &gradient),
+            state: State { positions, energy, gradient },
+        }
+    };
+    match search(state.energy, slope, settings.step_bound / reach, &mut evaluate) {
+        Some((length, trial)) if trial.state.gradient.iter().all(|g| is_finite(*g)) => {
+            let slowed = match length < SHORT {
+                true => turned_against(&direction, model.gradient, &trial.state.gradient),
+                false => Vec::new(),
+            };
+            Ok((trial.state, slowed))
+        }
+        _ => {
+            let ahead = evaluate(GLANCE / reach).state.gradient;
+            Err(turned_against(&direction, model.gradient, &ahead))
+        }
+    }
+}
+
+/// The vertices whose forces turn most against `direction` between `here` and `ahead`: as many as must be held for the others
+/// to go on downhill.
+fn turned_against(direction: &[[f64; 3]], here: &[[f64; 3]], ahead: &[[f64; 3]]) -> Vec<usize> {
+    let turned = |v: usize| dot(direction[v], sub(ahead[v], here[v]));
+    let mut order: Vec<usize> = (0..direction.len()).filter(|v| turned(*v) > 0.0).collect();
+    order.sort_by(|a, b| turned(*b).total_cmp(&turned(*a)));
+    let mut left = product(direction, ahead);
+    let held = order.iter().take_while(|v| {
+        let needed = left >= 0.0;
+        left -= dot(direction[**v], ahead[**v]);
+        needed
+    });
+    let held: Vec<usize> = held.copied().collect();
+    // Where everything turns, nothing is in the way of the rest.
+    if held.len() > direction.len() / MOST_HELD { Vec::new() } else { held }
+}
+
+/// The longest of vectors.
+pub(super) fn longest(x: &[[f64; 3]]) -> f64 {
+    x.iter().map(|x| norm_squared(*x)).fold(0.0, f64::max).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_vertices_that_turn_against_a_step_are_held_and_no_others() {
+        // Forty vertices fall along x; one is driven back as soon as it moves, another a little less fast.
+        let direction = vec![[1.0, 0.0, 0.0]; 40];
+        let here = vec![[-1.0, 0.0, 0.0]; 40];
+        let mut ahead = here.clone();
+        ahead[7] = [100.0, 0.0, 0.0];
+        ahead[9] = [-0.5, 0.0, 0.0];
+        assert_eq!(turned_against(&direction, &here, &ahead), [7]);
+        // With the second worst the others still go downhill.
+        ahead[9] = [60.0, 0.0, 0.0];
+        assert_eq!(turned_against(&direction, &here, &ahead), [7, 9]);
+        // Nothing turned; everything turned.
+        assert!(turned_against(&direction, &here, &here).is_empty());
+        assert!(turned_against(&direction, &here, &vec![[1.0, 0.0, 0.0]; 40]).is_empty());
+    }
+}

@@ -1,0 +1,14 @@
+#!/usr/bin/env bash
+# The long form of what the tests do briefly: damaged configurations, damaged checkpoints, SIGTERM and SIGKILL at random.
+#
+#   scripts/fuzz.sh [CASES]     default: 200000 configurations, as many as that / 20 checkpoints
+#
+# SEED=n chooses other cases; a failing case prints what it was.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+cases=${1:-200000}
+export CLOTHCOMBO_FUZZ_SEED=${SEED:-1}
+CLOTHCOMBO_FUZZ_CASES=$cases cargo test --release --workspace --test config_fuzz -- --nocapture
+CLOTHCOMBO_FUZZ_CASES=$((cases / 20)) cargo test --release --workspace --test checkpoint -- damaged --nocapture
+scripts/kill_test.sh 20 TERM
+scripts/kill_test.sh 20 KILL

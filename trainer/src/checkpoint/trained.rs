@@ -1,0 +1,61 @@
+//! A trained model, apart from the run that made it.
+
+use super::{CONFIG, CheckpointError, CheckpointState, MODEL_EXCHANGE, newest, read_state, verify};
+use crate::config::{Config, load};
+use burn::store::{ModuleSnapshot, SafetensorsStore};
+use burn::tensor::Device;
+use clothcombo_model::ClothCombo;
+use std::path::{Path, PathBuf};
+
+/// Trained networks for use, not for training on: `model.safetensors`, `config.toml` and `state.json` of a checkpoint,
+/// whatever else lies beside them. A model that is handed on needs no more than these three files.
+#[derive(Clone, Debug)]
+pub struct TrainedModel {
+    /// Its folder.
+    pub folder: PathBuf,
+    /// What it says about itself.
+    pub state: CheckpointState,
+    /// The configuration it was trained with.
+    pub config: Config,
+}
+
+impl TrainedModel {
+    /// Opens a run, a checkpoints folder, one checkpoint, or a `model.safetensors` with its two companions.
+    ///
+    /// # Errors
+    /// When there is none, or one of the three files is missing, damaged or of another version.
+    pub fn open(path: &Path) -> Result<Self, CheckpointError> {
+        let path = match path.is_file() {
+            true => path.parent().unwrap_or(Path::new("")),
+            false => path,
+        };
+        newest(path, |folder| {
+            let files = [MODEL_EXCHANGE, CONFIG];
+            let state = read_state(folder, &files)?;
+            files.iter().try_for_each(|file| verify(folder, &state, file))?;
+            let config = load(&folder.join(CONFIG), &[])?;
+            Ok(Self { folder: folder.to_owned(), state, config })
+        })
+    }
+
+    /// The networks, on `device`.
+    ///
+    /// # Errors
+    /// When the stored parameters do not fit the configuration.
+    pub fn networks(&self, device: &Device) -> Result<ClothCombo, CheckpointError> {
+        let unusable = |reason: String| CheckpointError::Unusable { path: self.folder.clone(), reason };
+        let mut model = ClothCombo::new(&self.config.model, &self.state.dimensions(), device)
+            .map_err(|e| unusable(e.to_string()))?;
+        let mut store = SafetensorsStore::from_file(self.folder.join(MODEL_EXCHANGE));
+        let applied = model.load_from(&mut store).map_err(|e| unusable(format!("{MODEL_EXCHANGE}: {e}")))?;
+        match applied.errors.first() {
+            Some(error) => Err(unusable(format!("{MODEL_EXCHANGE}: {error}"))),
+            None => Ok(model),
+        }
+    }
+
+    /// Checksum of the parameters: equal ones make equal embeddings.
+    pub fn checksum(&self) -> &str {
+        self.state.checksums.get(MODEL_EXCHANGE).map_or("", String::as_str)
+    }
+}

@@ -1,0 +1,174 @@
+//! `clothcombo bench backends`.
+
+use crate::cli::train::load_under_bar;
+use crate::device::Backend;
+use crate::measure::{Case, Subject};
+use clap::{Parser, ValueEnum};
+use clothcombo_model::ClothCombo;
+use miette::{IntoDiagnostic, Report, miette};
+use serde::Serialize;
+use std::sync::Arc;
+
+/// Whether all compute devices of this build agree on loss and gradients, and how fast they are
+#[derive(Parser)]
+#[command(
+    after_help = "Example:\n  cargo run --release --features ndarray --bin clothcombo -- bench backends\n\n\
+        Every device gets the same networks and the same scene. Gradients are compared parameter by parameter, relative to \
+        the norm of the parameter's gradient on the first device."
+)]
+pub struct Arguments {
+    /// Devices to compare with the first of this build; default: all of this build
+    #[arg(long, value_enum, value_delimiter = ',')]
+    devices: Vec<Backend>,
+    /// Width of the networks
+    #[arg(long, default_value_t = 48)]
+    width: usize,
+    /// Garments
+    #[arg(long, default_value_t = 3)]
+    layers: usize,
+    /// Vertices per garment, about
+    #[arg(long, default_value_t = 700)]
+    vertices: usize,
+    /// Time spent on each single measurement [s]
+    #[arg(long, default_value_t = 1.0)]
+    seconds: f64,
+    /// Largest relative difference of the loss
+    #[arg(long, default_value_t = 1e-4)]
+    most_loss: f64,
+    /// Largest relative difference of a parameter's gradient
+    #[arg(long, default_value_t = 1e-3)]
+    most_gradient: f64,
+    /// Print JSON instead of a Markdown table
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct Row {
+    device: String,
+    loss: f64,
+    /// Relative difference to the first device.
+    loss_difference: f64,
+    /// Largest relative difference over the parameters, and whose it is.
+    gradient_difference: f64,
+    parameter: String,
+    forward_ms: f64,
+    step_ms: f64,
+}
+
+/// Runs the bench.
+///
+/// # Errors
+/// When a device fails, or disagrees with the first by more than is asked for.
+pub fn run(arguments: &Arguments) -> Result<(), Report> {
+    let config = Case::new(arguments.width, arguments.layers, arguments.vertices).config()?;
+    let library = Arc::new(load_under_bar(&config, false)?);
+    let subject = |backend: Backend| Subject::new(config.clone(), library.clone(), 0, &backend.device());
+    let first = subject(Backend::preferred())?;
+    let scene = first.scene(0)?;
+    let (loss, gradients) = first.loss_and_gradients(&scene)?;
+    let mut devices = vec![Backend::preferred()];
+    let asked = match arguments.devices.as_slice() {
+        [] => Backend::value_variants(),
+        asked => asked,
+    };
+    devices.extend(asked.iter().filter(|device| **device != Backend::preferred()));
+    let mut rows = Vec::with_capacity(devices.len());
+    for device in devices {
+        eprintln!("measuring {}", name(device));
+        let mut subject = subject(device)?;
+        let same = copy(first.model(), subject.model())?;
+        subject.set_model(same);
+        let (found_loss, found) = subject.loss_and_gradients(&scene)?;
+        let differences = gradients
+            .iter()
+            .zip(&found)
+            .map(|((name, expected), (_, found))| (difference(found, expected), name));
+        let worst = differences.max_by(|a, b| a.0.total_cmp(&b.0));
+        let costs = subject.costs(arguments.seconds)?;
+        rows.push(Row {
+            device: name(device),
+            loss: found_loss,
+            loss_difference: ((found_loss - loss) / loss).abs(),
+            gradient_difference: worst.as_ref().map_or(0.0, |worst| worst.0),
+            parameter: worst.map(|worst| worst.1.clone()).unwrap_or_default(),
+            forward_ms: costs.forward_ms,
+            step_ms: costs.step_ms,
+        });
+    }
+    print(&rows, arguments.json)?;
+    let agrees = |row: &&Row| {
+        row.loss_difference <= arguments.most_loss && row.gradient_difference <= arguments.most_gradient
+    };
+    match rows.iter().find(|row| !agrees(row)) {
+        None => Ok(()),
+        Some(row) => Err(miette!(
+            help = "small networks and scenes agree best: --width 32 --vertices 400",
+            "{} disagrees with {}: loss by {:.2e}, the gradient of {} by {:.2e} (at most {:.0e} and {:.0e})",
+            row.device,
+            rows[0].device,
+            row.loss_difference,
+            row.parameter,
+            row.gradient_difference,
+            arguments.most_loss,
+            arguments.most_gradient
+        )),
+    }
+}
+
+fn name(backend: Backend) -> String {
+    backend.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
+}
+
+/// The networks `of` on the device of `like`.
+fn copy(of: &ClothCombo, like: &ClothCombo) -> Result<ClothCombo, Report> {
+    use burn::module::Module;
+    like.clone().try_load_record(of.clone().into_record()).map_err(|error| miette!("{error}"))
+}
+
+/// Norm of the difference over the norm of `expected`; infinite where the sizes differ.
+fn difference(found: &[f32], expected: &[f32]) -> f64 {
+    if found.len() != expected.len() {
+        return f64::INFINITY;
+    }
+    let norm = |values: &mut dyn Iterator<Item = f64>| values.map(|v| v * v).sum::<f64>().sqrt();
+    let apart = norm(&mut found.iter().zip(expected).map(|(a, b)| f64::from(a - b)));
+    if apart == 0.0 { 0.0 } else { apart / norm(&mut expected.iter().map(|v| f64::from(*v))) }
+}
+
+fn print(rows: &[Row], json: bool) -> Result<(), Report> {
+    if json {
+        println!("{}", serde_json::to_string_pretty(rows).into_diagnostic()?);
+        return Ok(());
+    }
+    println!(
+        "| device | loss | relative difference | largest relative gradient difference | of | forward [ms] | step [ms] |"
+    );
+    println!("|---|---:|---:|---:|---|---:|---:|");
+    for row in rows {
+        println!(
+            "| {} | {:.6} | {:.1e} | {:.1e} | {} | {:.1} | {:.1} |",
+            row.device,
+            row.loss,
+            row.loss_difference,
+            row.gradient_difference,
+            row.parameter,
+            row.forward_ms,
+            row.step_ms
+        );
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn differences_are_relative_and_of_equal_sizes() {
+        assert_eq!(difference(&[3.0, 4.0], &[3.0, 4.0]), 0.0);
+        assert!((difference(&[3.0, 4.5], &[3.0, 4.0]) - 0.1).abs() < 1e-6);
+        assert_eq!(difference(&[1.0], &[1.0, 2.0]), f64::INFINITY);
+        assert_eq!(difference(&[0.0], &[0.0]), 0.0);
+    }
+}

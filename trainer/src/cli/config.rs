@@ -1,0 +1,153 @@
+//! `clothcombo config`: what a configuration may say, and what one comes to.
+
+use crate::cli::train::load_under_bar;
+use crate::config::{Config, StageConfig, Trains, load, schema};
+use crate::device::Backend;
+use crate::estimate::{StageTime, time_stages};
+use crate::report::duration;
+use clap::{Parser, Subcommand};
+use clothcombo_physics::energy::Term;
+use miette::{IntoDiagnostic, Report};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// What a configuration may say, and what one comes to
+#[derive(Subcommand)]
+pub enum Verb {
+    /// Prints the JSON schema of a configuration: every key with meaning, type, unit and default
+    Schema,
+    /// Checks a configuration and prints the resolved plan: stages, schedules, weights, estimated time
+    Check(CheckArguments),
+}
+
+/// Checks a configuration.
+#[derive(Parser)]
+#[command(after_help = "Examples:\n  clothcombo config check configs/smoke.toml\n  \
+        clothcombo config check configs/open.toml --no-timing\n\n\
+        The time is estimated from a few real steps of every stage on this machine, which needs the data; --no-timing looks at \
+        the file alone.")]
+pub struct CheckArguments {
+    /// Configuration file (TOML)
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// Overrides one value; repeatable
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
+    /// Do not load the data and time steps
+    #[arg(long)]
+    no_timing: bool,
+    /// Steps timed per stage
+    #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    timed_steps: u64,
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// When the configuration or, for the time, its data cannot be used.
+pub fn run(verb: &Verb) -> Result<(), Report> {
+    match verb {
+        Verb::Schema => {
+            println!("{}", serde_json::to_string_pretty(&schema()).into_diagnostic()?);
+            Ok(())
+        }
+        Verb::Check(arguments) => check(arguments),
+    }
+}
+
+fn check(arguments: &CheckArguments) -> Result<(), Report> {
+    let config = load(&arguments.file, &arguments.overrides)?;
+    println!("{} is valid: seed {}, {} steps", arguments.file.display(), config.seed, config.total_steps());
+    print_plan(&config);
+    if arguments.no_timing {
+        return Ok(());
+    }
+    let library = Arc::new(load_under_bar(&config, false)?);
+    let times = time_stages(&config, &library, &Backend::preferred().device(), arguments.timed_steps)?;
+    print_times(&config, &times);
+    Ok(())
+}
+
+fn print_plan(config: &Config) {
+    let mut first = 0;
+    for (i, stage) in config.stages.iter().enumerate() {
+        println!("\nstage {i} {:?}: {} steps, {first} to {}", stage.name, stage.steps, first + stage.steps);
+        first += stage.steps;
+        println!("  trains         {}", trains(stage.trains));
+        println!("  layers         {}", layers(stage));
+        println!("  pose scale     {}", stage.pose_scale);
+        println!("  learning rate  {}", rate(stage));
+        println!("  a step         {}", step(stage));
+    }
+    println!("\nweights over the run");
+    for term in Term::ALL {
+        println!("  {:<16} {}", term.name(), config.losses.weight(term));
+    }
+    let o = &config.optimizer;
+    println!(
+        "\nAdam {} {} · gradient norm clipped at {} · average of the weights {}",
+        o.beta_1,
+        o.beta_2,
+        o.clip_norm,
+        if o.ema_decay > 0.0 { format!("with decay {}", o.ema_decay) } else { "none".into() }
+    );
+}
+
+fn trains(trains: Trains) -> &'static str {
+    match trains {
+        Trains::Single => "embedding, draping and skinning",
+        Trains::Untangling => "untangling, on the frozen first stage",
+        Trains::All => "all networks",
+    }
+}
+
+fn layers(stage: &StageConfig) -> String {
+    let [low, high] = stage.layers;
+    let range = if low == high { format!("{low}") } else { format!("{low} to {high}") };
+    match stage.layer_curriculum {
+        c if c > 0.0 && low < high => {
+            format!("{range}, the most reached after {:.0} % of the stage", 100.0 * c)
+        }
+        _ => range,
+    }
+}
+
+fn rate(stage: &StageConfig) -> String {
+    match stage.warm_up_steps {
+        0 => stage.learning_rate.to_string(),
+        steps => format!("{}, warmed up over {steps} steps", stage.learning_rate),
+    }
+}
+
+fn step(stage: &StageConfig) -> String {
+    let plural = |n: usize, one: &str, many: &str| format!("{n} {}", if n == 1 { one } else { many });
+    format!(
+        "{} on {} each",
+        plural(stage.accumulate, "outfit", "outfits"),
+        plural(stage.scenes_per_step, "body", "bodies")
+    )
+}
+
+fn print_times(config: &Config, times: &[StageTime]) {
+    println!(
+        "\nestimated time on this machine ({} timed steps per stage)",
+        times.first().map_or(0, |t| t.steps)
+    );
+    let mut total = 0.0;
+    for (stage, time) in config.stages.iter().zip(times) {
+        let seconds = time.seconds_per_step * stage.steps as f64;
+        total += seconds;
+        println!(
+            "  {:<24} {:>9.1} ms/step {:>14}",
+            stage.name,
+            1000.0 * time.seconds_per_step,
+            duration(seconds)
+        );
+    }
+    println!(
+        "  {:<24} {:>17} {:>14} (validation, pictures and checkpoints not counted)",
+        "together",
+        "",
+        duration(total)
+    );
+}

@@ -1,0 +1,78 @@
+//! `clothcombo replay`: a step whose loss or gradient was not finite, once more.
+
+use crate::cli::train::load_under_bar;
+use crate::device::Backend;
+use crate::exact::Exact;
+use crate::incident::Incident;
+use clap::Parser;
+use miette::{Report, miette};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Computes a step that was skipped (RUN/incidents/step-N.json) again and compares every energy
+#[derive(Parser)]
+#[command(after_help = "Examples:\n  clothcombo replay runs/wide/incidents/step-120.json\n  \
+        clothcombo replay step-120.json --set data.body=elsewhere/body.npz\n\n\
+        The weights lie beside the file (step-120.bpk); the data must be that of the run. Exits 0 if every number comes back \
+        to the bit, 1 if not.")]
+pub struct Arguments {
+    /// The incident
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// Overrides one value of the run's configuration, for data that has moved; repeatable
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
+    /// Compute device
+    #[arg(long, value_enum, default_value_t = Backend::preferred())]
+    device: Backend,
+    /// Every number, not only those that are not finite or differ
+    #[arg(long, short)]
+    all: bool,
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// When the incident or the data cannot be used, or a number does not come back.
+pub fn run(arguments: &Arguments) -> Result<(), Report> {
+    let file = &arguments.file;
+    let incident = Incident::read(file)?;
+    let config = incident.configuration(file, &arguments.overrides)?;
+    let library = Arc::new(load_under_bar(&config, false)?);
+    let again = incident.replay(file, &config, &library, &arguments.device.device())?;
+
+    println!("step {} of stage {:?}, seed {}", incident.step, incident.stage, incident.seed);
+    if let Some(injected) = incident.injected {
+        println!("a test broke it on purpose: {injected:?}");
+    }
+    for (i, scene) in incident.scenes.iter().enumerate() {
+        let names: Vec<&str> = scene.garments.iter().map(|g| g.name.as_str()).collect();
+        println!("scene {i}: {} on {} bodies", names.join(" under "), scene.bodies.len());
+    }
+    let (then, now) = (incident.numbers(), again.numbers());
+    let mut differing = 0;
+    println!("{:<52} {:>22} {:>22}", "", "recorded", "replayed");
+    for ((name, a), (_, b)) in then.iter().zip(&now) {
+        let same = a.same(*b);
+        differing += usize::from(!same);
+        if arguments.all || !same || !a.0.is_finite() {
+            println!("{name:<52} {:>22} {:>22}{}", text(*a), text(*b), if same { "" } else { "  differs" });
+        }
+    }
+    if differing > 0 || then.len() != now.len() {
+        return Err(miette!(
+            help = "another program version, device or data gives other numbers; the scene is the same",
+            "{differing} of {} numbers did not come back to the bit",
+            then.len()
+        ));
+    }
+    println!("all {} numbers came back to the bit", then.len());
+    Ok(())
+}
+
+fn text(value: Exact) -> String {
+    match value.0 {
+        v if v == 0.0 || (1e-4..1e6).contains(&v.abs()) => format!("{v:.9}"),
+        v => format!("{v:.9e}"),
+    }
+}

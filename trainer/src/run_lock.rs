@@ -1,0 +1,105 @@
+//! One process per run folder.
+//!
+//! The system drops the lock when the process ends, however it ends: nothing has to be cleaned up after a `kill -9`.
+
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+const FILE: &str = "lock";
+
+/// Looks at a held lock before it counts as held: a program that only asks whether a run is alive holds it for an instant.
+const ATTEMPTS: u32 = 5;
+
+/// The right to write into a run folder.
+#[derive(Debug)]
+pub struct RunLock {
+    _file: File,
+}
+
+/// Why a folder cannot be locked.
+#[derive(Debug)]
+pub enum LockError {
+    /// Somebody else holds it.
+    Held {
+        /// What the holder wrote about itself.
+        owner: String,
+    },
+    /// The lock file cannot be made.
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// The system's reason.
+        reason: io::Error,
+    },
+}
+
+impl RunLock {
+    /// Locks `root`, which must exist.
+    ///
+    /// # Errors
+    /// When another process holds it, or the file cannot be written.
+    pub fn acquire(root: &Path) -> Result<Self, LockError> {
+        let path = root.join(FILE);
+        let failed = |reason| LockError::Io { path: path.clone(), reason };
+        let mut file = OpenOptions::new()
+            .read(true)
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .open(&path)
+            .map_err(failed)?;
+        for attempt in 1..=ATTEMPTS {
+            match file.try_lock() {
+                Ok(()) => break,
+                Err(TryLockError::WouldBlock) if attempt == ATTEMPTS => {
+                    let mut owner = String::new();
+                    let _ = file.read_to_string(&mut owner);
+                    let owner =
+                        if owner.trim().is_empty() { "another process".into() } else { owner.trim().into() };
+                    return Err(LockError::Held { owner });
+                }
+                Err(TryLockError::WouldBlock) => std::thread::sleep(Duration::from_millis(50)),
+                Err(TryLockError::Error(e)) => {
+                    // Some network file systems know no locks; training there is better than none.
+                    tracing::warn!(
+                        "{} cannot be locked ({e}): start only one run in the folder",
+                        path.display()
+                    );
+                    break;
+                }
+            }
+        }
+        let mut write = || {
+            file.set_len(0)?;
+            file.seek(SeekFrom::Start(0))?;
+            writeln!(file, "process {}", std::process::id())
+        };
+        write().map_err(failed)?;
+        Ok(Self { _file: file })
+    }
+
+    /// Whether some process holds the lock of `root`.
+    pub fn is_held(root: &Path) -> bool {
+        let Ok(file) = File::open(root.join(FILE)) else { return false };
+        matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn held_until_dropped() {
+        let folder = tempfile::tempdir().unwrap();
+        assert!(!RunLock::is_held(folder.path()));
+        let lock = RunLock::acquire(folder.path()).unwrap();
+        assert!(RunLock::is_held(folder.path()));
+        assert!(matches!(RunLock::acquire(folder.path()), Err(LockError::Held { .. })));
+        drop(lock);
+        assert!(!RunLock::is_held(folder.path()));
+        RunLock::acquire(folder.path()).unwrap();
+    }
+}

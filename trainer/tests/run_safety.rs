@@ -1,0 +1,126 @@
+//! What can go wrong around a run folder: one clear message, exit 1, and what was there stays whole.
+
+mod common;
+
+use common::{clothcombo, holds, resume, said, start, tiny, trainer};
+use std::path::Path;
+use std::process::{Command, Output};
+use std::time::{Duration, Instant};
+
+fn must_fail(output: &Output, words: &[&str]) {
+    let message = said(output);
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(!message.contains("panicked"), "{message}");
+    for word in words {
+        assert!(holds(&message, word), "{word:?} is missing in: {message}");
+    }
+}
+
+/// Names and contents of the checkpoints of a run.
+fn checkpoints(run: &Path) -> Vec<(String, Vec<u8>)> {
+    let folders = std::fs::read_dir(run.join("checkpoints")).unwrap().flatten().filter(|e| e.path().is_dir());
+    let mut all: Vec<_> = folders
+        .map(|e| {
+            (e.file_name().to_string_lossy().into_owned(), std::fs::read(e.path().join("model.bpk")).unwrap())
+        })
+        .collect();
+    all.sort();
+    all
+}
+
+#[test]
+fn a_second_run_in_the_same_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = tiny(folder.path(), "");
+    let run = folder.path().join("run");
+    let long = ["--set", "stages.0.steps=1000000"];
+    let mut first = start(&config, &run, 1).args(long).spawn().unwrap();
+    let deadline = Instant::now() + Duration::from_secs(60);
+    while !run.join("checkpoints/latest").exists() {
+        assert!(Instant::now() < deadline && first.try_wait().unwrap().is_none());
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let owner = format!("process {}", first.id());
+    must_fail(&resume(&run, 1).output().unwrap(), &["is in use", &owner, "--run-dir"]);
+    must_fail(&start(&config, &run, 1).args(long).output().unwrap(), &["already holds a run"]);
+    let listed = clothcombo(&["runs", &run.display().to_string()]);
+    assert!(String::from_utf8_lossy(&listed.stdout).contains("running"));
+    first.kill().unwrap();
+    first.wait().unwrap();
+    let listed = clothcombo(&["runs", &run.display().to_string()]);
+    assert!(String::from_utf8_lossy(&listed.stdout).contains("stopped"));
+}
+
+#[test]
+fn a_full_disk_during_a_save() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = tiny(folder.path(), "");
+    let run = folder.path().join("run");
+    assert!(start(&config, &run, 1).status().unwrap().success());
+    let before = checkpoints(&run);
+    // The shell's limit on the size of a file stands in for a disk without space: 128 KiB hold logs, pages and parameters,
+    // not Adam's moments. The signal that comes with it is ignored, as it is where the space runs out.
+    let program = env!("CARGO_BIN_EXE_clothcombo-train");
+    let limited = "trap '' XFSZ; ulimit -f 128; exec \"$@\"";
+    let output = Command::new("bash")
+        .args(["-c", limited, "bash", program, "--quiet", "--resume"])
+        .arg(&run)
+        .args(["--set", "stages.2.steps=25", "--allow-config-change", "stages[2].steps"])
+        .env("NO_COLOR", "1")
+        .output()
+        .unwrap();
+    must_fail(&output, &["cannot write the checkpoint", "step-00000065", "File too large", "untouched"]);
+    assert_eq!(checkpoints(&run), before, "the checkpoints before are intact");
+    let again = resume(&run, 1).output().unwrap();
+    assert!(again.status.success(), "{}", said(&again));
+}
+
+#[test]
+fn a_folder_that_cannot_be_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = tiny(folder.path(), "");
+    // Nobody, not even root, makes folders in /proc.
+    let output = start(&config, Path::new("/proc/run"), 1).output().unwrap();
+    must_fail(&output, &["cannot write /proc/run", "writable"]);
+}
+
+#[test]
+fn a_changed_configuration_and_an_older_checkpoint() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = tiny(folder.path(), "keep_checkpoints = 20\n");
+    let run = folder.path().join("run");
+    assert!(start(&config, &run, 1).status().unwrap().success());
+    let model = std::fs::read(run.join("checkpoints/step-00000060/model.bpk")).unwrap();
+
+    let changed = ["--set", "losses.strain.weight=3.0", "--set", "stages.2.steps=21"];
+    must_fail(
+        &resume(&run, 1).args(changed).output().unwrap(),
+        &["losses.strain.weight", "stages[2].steps", "--allow-config-change"],
+    );
+    let path = run.join("checkpoints/step-00000050").display().to_string();
+    let elsewhere = folder.path().join("elsewhere").display().to_string();
+    must_fail(&trainer(1, &["--resume", &path, "--run-dir", &elsewhere]).output().unwrap(), &["belongs to"]);
+    must_fail(&trainer(1, &["--resume", &elsewhere]).output().unwrap(), &["neither a run nor a checkpoint"]);
+
+    // From the older checkpoint the same steps lead to the same networks; the newer ones were set aside.
+    assert!(trainer(1, &["--resume", &path]).status().unwrap().success());
+    assert!(std::fs::read(run.join("checkpoints/step-00000060/model.bpk")).unwrap() == model);
+    assert!(run.join("checkpoints/abandoned-step-00000060").exists());
+
+    // An allowed change takes effect and is written down.
+    let mut allowed = resume(&run, 1);
+    allowed.args(changed).args(["--allow-config-change", "losses,stages"]);
+    assert!(allowed.status().unwrap().success());
+    assert!(run.join("checkpoints/step-00000061").exists() && run.join("config.before-1.toml").exists());
+    assert!(resume(&run, 1).status().unwrap().success(), "its own configuration is the new one");
+}
+
+#[test]
+fn a_garment_over_the_vertex_limit() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = tiny(folder.path(), "");
+    let run = folder.path().join("run");
+    let output = start(&config, &run, 1).args(["--set", "data.max_vertices=100"]).output().unwrap();
+    must_fail(&output, &["vertices", "data.max_vertices = 100"]);
+    assert!(!run.exists());
+}
