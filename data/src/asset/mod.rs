@@ -21,6 +21,6 @@ pub use garment::Garment;
 pub use motion::Motion;
 pub use pose::Pose;
 pub use provenance::Provenance;
-pub use recover::{RecoverError, RecoveredBody, recover_body};
+pub use recover::{KnownShape, RecoverError, RecoveredBody, recover_body};
 pub use skeleton::{BODY_JOINT_COUNT, BODY_JOINT_NAMES, BODY_JOINT_PARENTS};
 pub use skin_weights::SparseSkinWeights;

@@ -1,12 +1,11 @@
-//! Shape and pose of a body from a posed mesh of its vertices, with or without the same body in T-pose.
+//! Shape and pose of a body from a posed mesh of its vertices and the same body in T-pose.
 //!
-//! The shape is the linear least-squares solution on the T-pose (given, or found by undoing the skinning with the bones of the
-//! round before). The bones are found by block coordinate descent on the distance to linear blend skinning: each bone in turn
+//! The shape is the linear least-squares solution on the T-pose. The bones are found by block coordinate descent on the distance to linear blend skinning: each bone in turn
 //! gets the rotation and translation that fit best what the others leave of its vertices. The rotation of a covariance is
 //! taken by the iteration of Müller, Bender, Chentanez and Macklin, "A robust method to extract the rotational part of
 //! deformations" (MIG 2016).
 
-use super::body::{Body, BodyError, transform, unskin};
+use super::body::{Body, BodyError, transform};
 use super::pose::Pose;
 use super::rotation::{Matrix3, apply, axis_angle_from_matrix, matrix_from_axis_angle, product, transpose};
 use clothcombo_physics::vec3::{add, add_scaled, cross, dot, norm, scale, sub};
@@ -18,8 +17,6 @@ use thiserror::Error;
 const FARTHEST: f64 = 0.03;
 /// Rounds over all bones.
 const ROUNDS: usize = 30;
-/// Rounds of shape and bones in turn, where there is no T-pose.
-const OUTER_ROUNDS: usize = 10;
 /// Bones have no say on vertices they carry less of than this.
 const LEAST_WEIGHT: f64 = 0.05;
 /// Weight of small shape numbers against close vertices [m²]: decides only what the vertices leave open.
@@ -92,35 +89,33 @@ impl Bone {
     }
 }
 
-/// Recovers shape and pose from `posed` `[V, 3]` [m]. `t_pose` `[V, 3]` [m] is the same body in T-pose, anywhere, if there is
-/// one.
+/// What is known of the shape of a body.
+#[derive(Clone, Copy, Debug)]
+pub enum KnownShape<'a> {
+    /// The body in T-pose `[V, 3]` [m], anywhere.
+    TPose(&'a [[f64; 3]]),
+    /// Its shape parameters β.
+    Parameters(&'a [f64]),
+}
+
+/// Recovers shape and pose from `posed` `[V, 3]` [m].
 ///
 /// # Errors
 /// [`RecoverError`] if a mesh is not of this body's vertices, or no pose of the body.
 pub fn recover_body(
     body: &Body,
-    t_pose: Option<&[[f64; 3]]>,
+    known: KnownShape,
     posed: &[[f64; 3]],
 ) -> Result<RecoveredBody, RecoverError> {
     check(body, "posed", posed)?;
-    if let Some(rest) = t_pose {
-        check(body, "T-pose", rest)?;
-    }
-    let mut shape = match t_pose {
-        Some(rest) => fitted_shape(body, rest),
-        None => vec![0.0; body.shape_count],
-    };
-    let mut bones: Option<Vec<Bone>> = None;
-    let rounds = if t_pose.is_some() || body.shape_count == 0 { 1 } else { OUTER_ROUNDS };
-    for round in 0..rounds {
-        let shaped = body.shaped(&shape)?;
-        let found = fitted_bones(body, &shaped.positions, posed, bones.as_deref());
-        if t_pose.is_none() && round + 1 < rounds {
-            shape = fitted_shape(body, &unposed(body, &found, &shaped.positions, posed));
+    let shape = match known {
+        KnownShape::TPose(rest) => {
+            check(body, "T-pose", rest)?;
+            fitted_shape(body, rest)
         }
-        bones = Some(found);
-    }
-    let bones = bones.unwrap_or_default();
+        KnownShape::Parameters(shape) => shape.to_vec(),
+    };
+    let bones = fitted_bones(body, &body.shaped(&shape)?.positions, posed);
     let pose = Pose {
         rotations: (0..body.joint_count())
             .map(|j| match body.parents[j] {
@@ -187,7 +182,7 @@ fn fitted_shape(body: &Body, rest: &[[f64; 3]]) -> Vec<f64> {
 }
 
 /// Bones of linear blend skinning that carry `shaped` closest to `posed`.
-fn fitted_bones(body: &Body, shaped: &[[f64; 3]], posed: &[[f64; 3]], start: Option<&[Bone]>) -> Vec<Bone> {
+fn fitted_bones(body: &Body, shaped: &[[f64; 3]], posed: &[[f64; 3]]) -> Vec<Bone> {
     let mut vertices: Vec<Vec<(usize, f64)>> = vec![Vec::new(); body.joint_count()];
     for v in 0..shaped.len() {
         let (joints, weights) = body.skin_weights.row(v);
@@ -195,20 +190,14 @@ fn fitted_bones(body: &Body, shaped: &[[f64; 3]], posed: &[[f64; 3]], start: Opt
             vertices[usize::from(*j)].push((v, f64::from(*w)));
         }
     }
-    let mut bones: Vec<Bone> = match start {
-        Some(bones) => bones.to_vec(),
-        None => {
-            let mut bones: Vec<Bone> = Vec::with_capacity(body.joint_count());
-            let unmoved =
-                Bone { rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], translation: [0.0; 3] };
-            for j in 0..body.joint_count() {
-                let parent = body.parents[j].map_or(unmoved, |p| bones[p]);
-                let mostly = vertices[j].iter().map(|&(v, w)| (shaped[v], posed[v], w.powi(4)));
-                bones.push(closest_motion(mostly, &parent));
-            }
-            bones
-        }
-    };
+    let mut bones: Vec<Bone> = Vec::with_capacity(body.joint_count());
+    let unmoved =
+        Bone { rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], translation: [0.0; 3] };
+    for j in 0..body.joint_count() {
+        let parent = body.parents[j].map_or(unmoved, |p| bones[p]);
+        let mostly = vertices[j].iter().map(|&(v, w)| (shaped[v], posed[v], w.powi(4)));
+        bones.push(closest_motion(mostly, &parent));
+    }
     let mut skinned: Vec<[f64; 3]> = vec![[0.0; 3]; shaped.len()];
     for (v, s) in skinned.iter_mut().enumerate() {
         let (joints, weights) = body.skin_weights.row(v);
@@ -288,16 +277,6 @@ fn closest_rotation(a: &Matrix3, mut rotation: Matrix3) -> Matrix3 {
     rotation
 }
 
-/// `posed` brought back to the T-pose; where the skinning cannot be undone, the shaped vertex.
-fn unposed(body: &Body, bones: &[Bone], shaped: &[[f64; 3]], posed: &[[f64; 3]]) -> Vec<[f64; 3]> {
-    let rows: Vec<[[f64; 4]; 3]> = bones.iter().map(Bone::rows).collect();
-    let back = |v: usize| {
-        let (joints, weights) = body.skin_weights.row(v);
-        unskin(posed[v], joints.iter().zip(weights).map(|(j, w)| (&rows[usize::from(*j)], f64::from(*w))))
-    };
-    (0..posed.len()).map(|v| back(v).unwrap_or(shaped[v])).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -319,7 +298,7 @@ mod tests {
             let moved = |p: &[[f64; 3]], by: [f64; 3]| p.iter().map(|x| add(*x, by)).collect::<Vec<_>>();
             let rest = moved(&body.shaped(&shape).unwrap().positions, [0.5, 1.0, 0.0]);
             let posed = moved(&body.posed(&shape, &pose).unwrap().positions, [3.0, 0.9, -2.0]);
-            let found = recover_body(&body, Some(&rest), &posed).unwrap();
+            let found = recover_body(&body, KnownShape::TPose(&rest), &posed).unwrap();
             for (a, b) in found.shape.iter().zip(&shape) {
                 assert!((a - b).abs() < 1e-3, "{:?}", found.shape);
             }
@@ -329,24 +308,28 @@ mod tests {
     }
 
     #[test]
-    fn without_a_t_pose_the_surface_is_met_within_millimetres() {
+    fn with_a_known_shape_the_surface_is_met_within_millimetres() {
         let (body, shape, pose) = scene(5);
         let posed = body.posed(&shape, &pose).unwrap().positions;
-        let found = recover_body(&body, None, &posed).unwrap();
-        assert!(found.mean_distance < 5e-3, "{}", found.mean_distance);
+        let found = recover_body(&body, KnownShape::Parameters(&shape), &posed).unwrap();
+        assert!(found.mean_distance < 2e-3 && found.shape == shape, "{}", found.mean_distance);
     }
 
     #[test]
     fn other_meshes_are_refused() {
         let body = mannequin();
         let far: Vec<[f64; 3]> = body.template.iter().map(|p| scale(*p, 4.0)).collect();
-        assert!(matches!(recover_body(&body, None, &far), Err(RecoverError::Far { .. })));
+        assert!(matches!(
+            recover_body(&body, KnownShape::Parameters(&[]), &far),
+            Err(RecoverError::Far { .. })
+        ));
         let few = &body.template[1..];
-        let message = recover_body(&body, None, few).unwrap_err().to_string();
+        let message = recover_body(&body, KnownShape::Parameters(&[]), few).unwrap_err().to_string();
         assert!(message.contains("posed mesh has") && message.contains("mannequin"), "{message}");
         let mut broken = body.template.clone();
         broken[7][0] = f64::NAN;
-        let message = recover_body(&body, Some(&broken), &body.template).unwrap_err().to_string();
+        let message =
+            recover_body(&body, KnownShape::TPose(&broken), &body.template).unwrap_err().to_string();
         assert!(message.contains("vertex 7 of the T-pose mesh"), "{message}");
     }
 }

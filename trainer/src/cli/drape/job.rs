@@ -3,7 +3,7 @@
 use crate::draper::{BodyReport, BodyState, Draper, Moment, SourceGarment};
 use crate::scene::LibraryError;
 use clap::Args;
-use clothcombo_data::asset::{Motion, Pose, recover_body};
+use clothcombo_data::asset::{KnownShape, Motion, Pose, recover_body};
 use clothcombo_data::format::load_mesh;
 use miette::{Report as Failure, miette};
 use std::path::{Path, PathBuf};
@@ -27,11 +27,11 @@ pub(super) struct SceneArguments {
     /// Takes every so-manieth frame of the motion
     #[arg(long, value_name = "N", requires = "motion", value_parser = clap::value_parser!(u32).range(1..))]
     pub every: Option<u32>,
-    /// A mesh of the posed body, with the vertices of the body model: shape and pose are recovered from it
-    #[arg(long, value_name = "MESH", conflicts_with = "shape")]
+    /// A mesh of the posed body, with the vertices of the body model: the pose is recovered from it
+    #[arg(long, value_name = "MESH")]
     pub posed: Option<PathBuf>,
-    /// The same body in T-pose: gives the shape exactly
-    #[arg(long, value_name = "MESH", requires = "posed")]
+    /// The same body in T-pose, from which the shape is recovered; without it, it is that of --shape
+    #[arg(long, value_name = "MESH", requires = "posed", conflicts_with = "shape")]
     pub t_pose: Option<PathBuf>,
 }
 
@@ -113,7 +113,7 @@ impl Job {
             return Ok(Scenes { states, moments, body: report(path.display().to_string()) });
         }
         if let Some(path) = &scene.posed {
-            return posed_body(draper, path, scene.t_pose.as_deref());
+            return posed_body(draper, scene, path);
         }
         let (pose, name) = match &scene.pose {
             None => (Pose::t_pose(0), "T-pose".to_owned()),
@@ -140,14 +140,19 @@ fn one_pose(text: &str) -> Result<Pose, Failure> {
     motion.poses.get(frame).cloned().ok_or_else(|| no_frame(Path::new(path), frame, motion.poses.len()))
 }
 
-fn posed_body(draper: &Draper, posed: &Path, t_pose: Option<&Path>) -> Result<Scenes, Failure> {
+fn posed_body(draper: &Draper, scene: &SceneArguments, posed: &Path) -> Result<Scenes, Failure> {
     let body = draper.body();
     let read = |path: &Path| Ok::<_, Failure>(load_mesh(path).map_err(LibraryError::data)?.positions);
     let surface = read(posed)?;
-    let rest = t_pose.map(read).transpose()?;
-    let found = recover_body(body, rest.as_deref(), &surface).map_err(|e| {
+    let rest = scene.t_pose.as_deref().map(read).transpose()?;
+    let known = match &rest {
+        Some(rest) => KnownShape::TPose(rest),
+        None => KnownShape::Parameters(&scene.shape),
+    };
+    let found = recover_body(body, known, &surface).map_err(|e| {
         miette!(
-            help = "the mesh must be a pose of the body model: the same vertices in the same order, metres, y up",
+            help = "the mesh must be a pose of the body model: the same vertices in the same order, metres, y up; \
+                    and its shape known, by --t-pose or --shape",
             "{}: {e}",
             posed.display()
         )

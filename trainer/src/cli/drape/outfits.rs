@@ -53,8 +53,8 @@ pub(super) fn read(file: &Path, scene: &SceneArguments) -> Result<Vec<Job>, Fail
             (own.posed, own.t_pose) = (None, None);
         }
         if let Some(shape) = entry.shape {
-            if own.posed.is_some() {
-                return Err(wrong("a shape beside --posed, which has its own".to_owned()));
+            if own.t_pose.is_some() {
+                return Err(wrong("a shape beside --t-pose, which has its own".to_owned()));
             }
             own.shape = shape;
         }
