@@ -84,11 +84,11 @@ pub(super) fn relax(
         .collect();
     for _ in 0..sweeps {
         for &v in region {
+            let ring = cloth.ring(v);
+            let share = FOLLOW / ring.len().max(1) as f64;
             let v = v as usize;
-            let ring = garment.topology.ring(v);
-            let sum =
-                ring.iter().fold([0.0; 3], |sum, &n| add(sum, sub(positions[n as usize], start[n as usize])));
-            let wanted = add_scaled(start[v], FOLLOW / ring.len().max(1) as f64, sum);
+            let sum = ring.fold([0.0; 3], |sum, n| add(sum, sub(positions[n as usize], start[n as usize])));
+            let wanted = add_scaled(start[v], share, sum);
             positions[v] = add_scaled(positions[v], OVER, sub(wanted, positions[v]));
         }
         for &(a, b, length) in &edges {
