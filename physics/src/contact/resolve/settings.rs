@@ -14,7 +14,7 @@ pub struct ResolveSettings {
     pub trigger: f64,
     /// Rings of neighbours around a violation that move along. Default 8.
     pub rings: usize,
-    /// Most rounds of detection and relaxation per garment. Default 40; most garments take fewer than ten.
+    /// Most rounds of detection and relaxation per garment. Default 40.
     pub rounds: usize,
     /// Sweeps of the relaxation in a round. Default 20.
     pub sweeps: usize,
