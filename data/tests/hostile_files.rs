@@ -199,6 +199,6 @@ fn simulated_samples() {
         }
         let bodies = Cloth3dBodies { target: &body, female: Some(&body), male: Some(&body) };
         let out = folder.path().join("out");
-        outcome(import_cloth3d(&[sample.clone()], &bodies, &out, &settings, &mut no_progress()))
+        outcome(import_cloth3d(std::slice::from_ref(&sample), &bodies, &out, &settings, &mut no_progress()))
     });
 }

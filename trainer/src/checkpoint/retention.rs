@@ -33,7 +33,7 @@ pub(super) fn list(folder: &Path) -> Vec<(u64, PathBuf)> {
 /// Removes the checkpoints that `output` does not keep; never the one of step `newest`, nor that of step `best`.
 pub(super) fn prune(folder: &Path, output: &OutputConfig, newest: u64, best: Option<u64>) -> io::Result<()> {
     let steps: Vec<u64> = list(folder).into_iter().map(|(step, _)| step).filter(|s| *s <= newest).collect();
-    let for_ever = |step: u64| output.keep_every > 0 && step % output.keep_every == 0;
+    let for_ever = |step: u64| output.keep_every > 0 && step.is_multiple_of(output.keep_every);
     let is_best = |step: u64| output.keep_best && best == Some(step);
     for &step in steps.iter().rev().skip(output.keep_checkpoints.max(1)) {
         if step != newest && !for_ever(step) && !is_best(step) {

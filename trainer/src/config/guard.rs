@@ -53,7 +53,7 @@ pub enum Injected {
 impl GuardConfig {
     /// What is injected into the step that makes `done` steps done.
     pub fn injected(&self, done: u64) -> Option<Injected> {
-        self.inject.filter(|i| i.every > 0 && done % i.every == 0).map(|i| i.what)
+        self.inject.filter(|i| i.every > 0 && done.is_multiple_of(i.every)).map(|i| i.what)
     }
 
     /// What is inconsistent, as (place, what, hint).

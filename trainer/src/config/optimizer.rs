@@ -34,7 +34,7 @@ impl OptimizerConfig {
     pub(super) fn problem(&self) -> Option<(String, String, String)> {
         let says = |p: &str, w: &str, h: &str| Some((p.into(), w.into(), h.into()));
         let decays = (0.0..1.0).contains(&self.beta_1) && (0.0..1.0).contains(&self.beta_2);
-        if !decays || !(self.epsilon.is_finite() && self.epsilon > 0.0) {
+        if !(decays && self.epsilon.is_finite() && self.epsilon > 0.0) {
             return says(
                 "optimizer",
                 "beta_1 and beta_2 lie in [0, 1), epsilon is positive",

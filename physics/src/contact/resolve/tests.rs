@@ -5,6 +5,7 @@ use crate::contact::{mesh_triangles_intersect, triangles_intersect};
 use crate::mesh::TriMesh;
 use crate::mesh::shapes::{self, SplitMix};
 use crate::vec3::{add, add_scaled, norm, scale};
+use std::f64::consts::FRAC_PI_2;
 
 fn moved(mesh: &TriMesh, by: [f64; 3]) -> TriMesh {
     shapes::mapped(mesh, |p| add(p, by))
@@ -180,8 +181,8 @@ fn two_folds_of_one_garment_are_parted() {
     // A sheet folded like a hairpin whose upper half dips through the lower one.
     let fold = shapes::mapped(&shapes::grid(0.4, 0.2, 40, 20), |[x, y, _]| {
         let s = x - 0.2;
-        let angle = (s / 0.012).clamp(-1.5707, 1.5707);
-        let straight = (s.abs() - 0.012 * 1.5707).max(0.0);
+        let angle = (s / 0.012).clamp(-FRAC_PI_2, FRAC_PI_2);
+        let straight = (s.abs() - 0.012 * FRAC_PI_2).max(0.0);
         let dip = 0.018 * (-((straight - 0.09) / 0.02).powi(2) - ((y - 0.1) / 0.03).powi(2)).exp();
         let height = 0.012 * angle.sin() - if s > 0.0 { dip * 1.6 } else { 0.0 };
         [0.012 * angle.cos() - straight, 0.3 + height, y]
