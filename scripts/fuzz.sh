@@ -8,7 +8,7 @@ set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 cases=${1:-200000}
 export CLOTHCOMBO_FUZZ_SEED=${SEED:-1}
-CLOTHCOMBO_FUZZ_CASES=$cases cargo test --release --workspace --test config_fuzz -- --nocapture
-CLOTHCOMBO_FUZZ_CASES=$((cases / 20)) cargo test --release --workspace --test checkpoint -- damaged --nocapture
+CLOTHCOMBO_FUZZ_CASES=$cases cargo test --release --workspace --test contracts config_fuzz:: -- --nocapture
+CLOTHCOMBO_FUZZ_CASES=$((cases / 20)) cargo test --release --workspace --test contracts checkpoint:: -- damaged --nocapture
 scripts/kill_test.sh 20 TERM
 scripts/kill_test.sh 20 KILL

@@ -16,52 +16,8 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
 # Six hundred small steps in three stages with a checkpoint every ten: a good part of the time goes into saves.
-cat > "$work/config.toml" <<'TOML'
-seed = 3
-[data]
-body = "mannequin"
-[[data.garments]]
-generate = { count = 3, seed = 5, vertices = 200, categories = ["t_shirt", "trousers", "skirt"] }
-[model]
-width = 16
-embedding = 16
-diffusion_blocks = 2
-diffusion_width = 16
-eigen_count = 12
-mlp_layers = 4
-siren_layers = 3
-siren_width = 16
-skinning_layers = 2
-skinning_width = 16
-[[stages]]
-name = "single"
-trains = "single"
-steps = 200
-learning_rate = 1e-3
-pose_scale = { from = 0.0, to = 1.0, start = 0.0, end = 0.5 }
-[[stages]]
-name = "untangling"
-trains = "untangling"
-steps = 200
-layers = [2, 3]
-learning_rate = 1e-3
-[[stages]]
-name = "all"
-trains = "all"
-steps = 200
-layers = [1, 3]
-learning_rate = 1e-4
-[optimizer]
-ema_decay = 0.9
-[validation]
-single_scenes = 2
-layered_scenes = 2
-layers = [2, 3]
-every = 70
-[output]
-checkpoint_every = 10
-sample_scenes = 1
-TOML
+run_arguments=(--config tests/fixtures/tiny.toml --set stages.0.steps=200 --set stages.1.steps=200 --set stages.2.steps=200
+    --set optimizer.ema_decay=0.9 --set validation.every=70 --set output.sample_scenes=1)
 
 final=checkpoints/step-00000600
 # The networks and what Adam and the average remember, which the next run would start from.
@@ -69,7 +25,7 @@ digest() { (cd "$1/$final" && sha256sum model.safetensors && sed -n '/"best"/,/}
 milliseconds() { echo $(($(date +%s%N) / 1000000)); }
 
 began=$(milliseconds)
-RAYON_NUM_THREADS=2 "$program" --config "$work/config.toml" --run-dir "$work/whole" --quiet
+RAYON_NUM_THREADS=2 "$program" "${run_arguments[@]}" --run-dir "$work/whole" --quiet
 whole=$(($(milliseconds) - began))
 expected=$(digest "$work/whole")
 echo "left alone: $whole ms, $(echo "$expected" | head -n 1 | cut -c 1-16)"
@@ -88,7 +44,7 @@ for threads in 1 2; do
             if [ -f "$run/config.toml" ]; then
                 arguments=(--resume "$run")
             else
-                arguments=(--config "$work/config.toml" --run-dir "$run")
+                arguments=("${run_arguments[@]}" --run-dir "$run")
             fi
             RAYON_NUM_THREADS=$threads "$program" "${arguments[@]}" --quiet 2>/dev/null &
             child=$!
@@ -104,7 +60,7 @@ for threads in 1 2; do
             fi
         done
         RAYON_NUM_THREADS=$threads "$program" --resume "$run" --quiet 2>/dev/null ||
-            RAYON_NUM_THREADS=$threads "$program" --config "$work/config.toml" --run-dir "$run" --quiet
+            RAYON_NUM_THREADS=$threads "$program" "${run_arguments[@]}" --run-dir "$run" --quiet
         found=$(digest "$run")
         if [ "$found" = "$expected" ]; then result="bit-identical"; else result="DIFFERENT"; failures=$((failures + 1)); fi
         echo "$threads threads, run $number: killed with these checkpoints:${moments:- never}: $result"

@@ -4,56 +4,21 @@ use clothcombo_trainer::config::{Config, load};
 use std::path::Path;
 
 /// A run of a few steps on built-in data: every network, all three stages, up to three layers.
-pub const TINY: &str = r#"
-seed = 3
-[data]
-body = "mannequin"
-[[data.garments]]
-generate = { count = 3, seed = 5, vertices = 200, categories = ["t_shirt", "trousers", "skirt"] }
-[model]
-width = 16
-embedding = 16
-diffusion_blocks = 2
-diffusion_width = 16
-eigen_count = 12
-mlp_layers = 4
-siren_layers = 3
-siren_width = 16
-skinning_layers = 2
-skinning_width = 16
-[[stages]]
-name = "single"
-trains = "single"
-steps = 20
-scenes_per_step = 2
-learning_rate = 1e-3
-pose_scale = { from = 0.0, to = 1.0, start = 0.0, end = 0.5 }
-[[stages]]
-name = "untangling"
-trains = "untangling"
-steps = 20
-layers = [2, 3]
-learning_rate = 1e-3
-[[stages]]
-name = "all"
-trains = "all"
-steps = 20
-layers = [1, 3]
-learning_rate = 1e-4
-[validation]
-single_scenes = 2
-layered_scenes = 2
-layers = [2, 3]
-[output]
-checkpoint_every = 30
-sample_scenes = 1
-"#;
+pub const TINY: &str = include_str!("../fixtures/tiny.toml");
 
-/// [`TINY`] with `overrides`, read as a user's file would be.
+/// What the contract tests have otherwise: two bodies per step, the pose filter, a checkpoint every thirty steps, pictures.
+const CONTRACTS: [&str; 4] = [
+    "stages.0.scenes_per_step=2",
+    "data.poses.max_self_intersection=0.1",
+    "output.checkpoint_every=30",
+    "output.sample_scenes=1",
+];
+
+/// [`TINY`] as the contract tests have it, with `overrides`, read as a user's file would be.
 pub fn tiny_config(folder: &Path, overrides: &[&str]) -> Config {
     let file = folder.join("tiny.toml");
     std::fs::write(&file, TINY).expect("the test folder is writable");
-    let overrides: Vec<String> = overrides.iter().map(|s| (*s).to_owned()).collect();
+    let overrides: Vec<String> = CONTRACTS.iter().chain(overrides).map(|s| (*s).to_owned()).collect();
     load(&file, &overrides).expect("the fixture is valid")
 }
 

@@ -68,7 +68,12 @@ impl WardrobeTensors {
     /// # Errors
     /// As [`garment`](Self::garment).
     pub fn warm(&self, scene: &PreparedScene) -> Result<(), DrapeError> {
-        scene.garments.iter().zip(&scene.worn).try_for_each(|(&g, worn)| self.garment(g, worn).map(|_| ()))
+        scene
+            .draw
+            .garments
+            .iter()
+            .zip(&scene.worn)
+            .try_for_each(|(&g, worn)| self.garment(g, worn).map(|_| ()))
     }
 
     /// The outfit of a scene.
@@ -76,7 +81,7 @@ impl WardrobeTensors {
     /// # Errors
     /// When the scene has no garment, or one cannot be read.
     pub fn outfit(&self, scene: &PreparedScene) -> Result<OutfitTensors, DrapeError> {
-        let garments = scene.garments.iter().zip(&scene.worn).map(|(&g, worn)| self.garment(g, worn));
+        let garments = scene.draw.garments.iter().zip(&scene.worn).map(|(&g, worn)| self.garment(g, worn));
         let garments = garments.collect::<Result<Vec<_>, _>>()?;
         Ok(OutfitTensors::new(&garments.iter().collect::<Vec<_>>(), &scene.contacts)?)
     }
@@ -106,8 +111,8 @@ impl WardrobeTensors {
         outfit: &OutfitTensors,
         known: &mut Recent<GarmentEmbedding>,
     ) -> Result<Embeddings, DrapeError> {
-        let mut packed = Vec::with_capacity(scene.garments.len());
-        for (&g, worn) in scene.garments.iter().zip(&scene.worn) {
+        let mut packed = Vec::with_capacity(scene.worn.len());
+        for (&g, worn) in scene.draw.garments.iter().zip(&scene.worn) {
             let embedding = match known.get(g) {
                 Some(embedding) => embedding,
                 None => {

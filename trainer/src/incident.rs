@@ -305,7 +305,7 @@ fn describe(library: &Library, scenes: &[PreparedScene], outcome: &StepOutcome) 
         Term::ALL.into_iter().filter_map(|t| Some((t.name().to_owned(), Exact(values[t]?)))).collect()
     };
     let of_scene = |(scene, outputs): (&PreparedScene, &Vec<_>)| {
-        let garments = scene.garments.iter().map(|&index| {
+        let garments = scene.draw.garments.iter().map(|&index| {
             let card = library.wardrobe.card(index);
             IncidentGarment { index, name: card.name.clone(), vertices: card.vertices }
         });

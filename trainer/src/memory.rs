@@ -9,7 +9,7 @@ use crate::train_loop::SCENES_AHEAD;
 pub struct Memory {
     /// In use now.
     pub resident: u64,
-    /// Most that was ever in use.
+    /// Most that was ever in use, or since [`Memory::reset_peak`].
     pub peak: u64,
 }
 
@@ -22,6 +22,11 @@ impl Memory {
             Some(line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? * 1024)
         };
         Some(Self { resident: field("VmRSS:")?, peak: field("VmHWM:")? })
+    }
+
+    /// Makes the peak start again from what is in use now. Whether that worked (on Linux it does).
+    pub fn reset_peak() -> bool {
+        std::fs::write("/proc/self/clear_refs", "5").is_ok()
     }
 }
 

@@ -190,7 +190,7 @@ impl Session {
         let record = StepRecord {
             step: self.step,
             stage: stage.name.clone(),
-            layers: scenes.iter().map(|s| s.garments.len()).max().unwrap_or(0),
+            layers: scenes.iter().map(|s| s.draw.garments.len()).max().unwrap_or(0),
             pose_scale: at.pose_scale,
             loss: outcome.loss,
             raw,

@@ -104,6 +104,20 @@ impl<T: Real> SceneEnergy<T> {
         self.garments.iter().map(|g| g.energies.vertex_count()).sum()
     }
 
+    /// The same scene with no other weights than those of `term`; `None` if it has none.
+    pub fn only(&self, term: Term) -> Option<Self> {
+        let mut scene = self.clone();
+        let mut present = false;
+        let garments = scene.garments.iter_mut().map(|g| &mut g.weights);
+        for weights in garments.chain(scene.layers.iter_mut().map(|l| &mut l.weights)) {
+            let weight = weights[term];
+            *weights = TermMap::filled(0.0);
+            weights[term] = weight;
+            present |= weight != 0.0;
+        }
+        present.then_some(scene)
+    }
+
     /// Checks that the parts fit together.
     ///
     /// # Errors

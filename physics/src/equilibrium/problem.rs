@@ -2,7 +2,7 @@
 
 use super::EquilibriumError;
 use super::kinks::{self, Kink};
-use crate::energy::{CurvatureSink, SceneEnergy, Term, TermMap};
+use crate::energy::{CurvatureSink, SceneEnergy, Term};
 use crate::vec3::{accumulate, cross, dot, norm_squared, scale, sub};
 
 /// An affine map `x ↦ A x + t` as the rows of `[A t]`.
@@ -47,7 +47,7 @@ impl<'a> Problem<'a> {
             }
             _ => None,
         };
-        let single_terms = Term::ALL.into_iter().filter_map(|term| only(energy, term)).collect();
+        let single_terms = Term::ALL.into_iter().filter_map(|term| energy.only(term)).collect();
         Ok(Self { energy, inverse, single_terms })
     }
 
@@ -161,21 +161,6 @@ impl CurvatureSink for Collected {
     fn add(&mut self, i: usize, j: usize, block: [[f64; 3]; 3]) {
         self.0.push((i, j, block));
     }
-}
-
-/// The scene with the weights of `term` alone; `None` if it has none.
-fn only(energy: &SceneEnergy<f64>, term: Term) -> Option<SceneEnergy<f64>> {
-    let mut scene = energy.clone();
-    let keep = |weights: &mut TermMap<f64>| {
-        let weight = weights[term];
-        *weights = TermMap::filled(0.0);
-        weights[term] = weight;
-        weight != 0.0
-    };
-    // Counted, not `any`: every weight must be set.
-    let garments = scene.garments.iter_mut().filter_map(|g| keep(&mut g.weights).then_some(())).count();
-    let layers = scene.layers.iter_mut().filter_map(|l| keep(&mut l.weights).then_some(())).count();
-    (garments + layers > 0).then_some(scene)
 }
 
 /// `|g|/scale`, 0 for no force at all.

@@ -121,7 +121,7 @@ pub fn solve(
         });
         // They had the last step, the others have this one.
         kinks.extend(in_the_way.drain(..).map(|vertex| Kink::held(vertex, balanced[vertex])));
-        let mut holds = 0;
+        let (mut holds, mut kinks_were_wrong) = (0, false);
         let next = loop {
             if age >= settings.refactorise_every {
                 preconditioner.refresh(problem, &state.positions);
@@ -138,15 +138,15 @@ pub fn solve(
             if age > 0 || !memory.is_empty() {
                 memory.clear();
                 age = settings.refactorise_every;
-            } else if !blocked.is_empty() && holds < MOST_HOLDS {
+            } else if !blocked.is_empty() && holds < MOST_HOLDS && !kinks_were_wrong {
                 // A few vertices before a kink hold up all others: for once without them.
                 kinks.extend(blocked.into_iter().map(|vertex| Kink::held(vertex, balanced[vertex])));
                 holds += 1;
-            } else if holds <= MOST_HOLDS && !kinks.is_empty() {
+            } else if !kinks.is_empty() && !kinks_were_wrong {
                 // The model of the kinks was wrong somewhere: once without.
                 kinks.clear();
                 balanced.clone_from(&state.gradient);
-                holds = MOST_HOLDS + 1;
+                kinks_were_wrong = true;
             } else {
                 break None;
             }

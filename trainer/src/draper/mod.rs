@@ -45,7 +45,9 @@ use crate::config::PoseEncoding;
 use crate::device::Backend;
 use crate::drape::{body_tensors, drape_on};
 use crate::evaluate::equilibrium_error::{self, ReferenceScene, skinning_transforms};
-use crate::scene::{ActiveJoints, BodyDraw, Dresser, LibraryError, PreparedScene, Recipe, load_body};
+use crate::scene::{
+    ActiveJoints, BodyDraw, Dresser, LibraryError, PreparedScene, Recipe, SceneDraw, load_body,
+};
 use burn::tensor::Device;
 use clothcombo_data::asset::rotation::{Matrix3, apply, matrix_from_axis_angle};
 use clothcombo_data::asset::{Body, Pose};
@@ -335,7 +337,8 @@ impl Draper {
             features: &|pose, joints| encoding.features(pose, joints),
             losses: &self.trained.config.losses,
         };
-        let mut scene = dresser.dress((0..outfit.pieces.len()).collect(), outfit.worn(), &[body], 1.0);
+        let draw = SceneDraw { garments: (0..outfit.pieces.len()).collect(), bodies: vec![body] };
+        let mut scene = dresser.dress(draw, outfit.worn(), 1.0);
         // A body with fewer components than the networks know has the others at their mean.
         scene.bodies[0].shape.resize(self.trained.state.shape_count, 0.0);
         scene

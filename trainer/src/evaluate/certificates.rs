@@ -19,7 +19,7 @@ pub struct RestGarments {
 impl RestGarments {
     /// Those of a scene.
     pub fn of(&mut self, scene: &PreparedScene) -> Vec<Arc<RestGarment>> {
-        let worn = scene.garments.iter().zip(&scene.worn);
+        let worn = scene.draw.garments.iter().zip(&scene.worn);
         let known = &mut self.known;
         worn.map(|(&g, worn)| {
             known.entry(g).or_insert_with(|| Arc::new(RestGarment::new(&worn.garment.rest))).clone()

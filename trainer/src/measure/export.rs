@@ -49,7 +49,7 @@ fn arrays(subject: &Subject, scene: &PreparedScene) -> Result<NpzWriter, Report>
     let bones: Vec<f32> = body.bones.iter().flatten().flatten().map(|v| *v as f32).collect();
     file.f32("bones", &[body.bones.len(), 12], &bones);
     for (layer, ((&index, worn), dressed)) in
-        scene.garments.iter().zip(&scene.worn).zip(&body.energy.garments).enumerate()
+        scene.draw.garments.iter().zip(&scene.worn).zip(&body.energy.garments).enumerate()
     {
         let key = |name: &str| format!("garment{layer}.{name}");
         let rest = &worn.garment.rest;

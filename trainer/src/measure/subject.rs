@@ -1,10 +1,11 @@
 //! A run whose steps are measured.
 
-use super::memory::{peak_memory, reset_peak_memory};
 use super::phases::{OTHER, PHASES, record_phases};
 use crate::config::{Config, Trains};
 use crate::drape::{DrapeError, WardrobeTensors};
+use crate::evaluate::Spread;
 use crate::learner::{Learner, new_optimizer};
+use crate::memory::Memory;
 use crate::scene::{Library, Plan, Prefetch, PreparedScene, Recent, draw_training, prepare};
 use crate::schedule::Schedule;
 use crate::session::state;
@@ -12,7 +13,7 @@ use burn::module::Module;
 use burn::optim::GradientsParams;
 use burn::tensor::{Device, Tensor, TensorData};
 use clothcombo_model::{ClothCombo, Embeddings, GarmentEmbedding, OutfitTensors};
-use clothcombo_physics::energy::{SceneEnergy, Term, TermMap};
+use clothcombo_physics::energy::{SceneEnergy, Term};
 use miette::{IntoDiagnostic, Report, miette};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -73,12 +74,7 @@ pub fn median_ms<R, E>(seconds: f64, mut run: impl FnMut() -> Result<R, E>) -> R
         black_box(run()?);
         times.push(1e3 * before.elapsed().as_secs_f64());
     }
-    Ok(median(&mut times))
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
+    Ok(Spread::of(times).median)
 }
 
 impl Subject {
@@ -184,8 +180,9 @@ impl Subject {
             offset += 1;
             self.scene(offset)
         })?;
-        let phases_ms = PHASES.into_iter().zip(parts.iter_mut().map(|part| median(part))).collect();
-        Ok(Profile { steps, step_ms: median(&mut totals), phases_ms, prepare_ms })
+        let phases_ms =
+            PHASES.into_iter().zip(parts.into_iter().map(|part| Spread::of(part).median)).collect();
+        Ok(Profile { steps, step_ms: Spread::of(totals).median, phases_ms, prepare_ms })
     }
 
     /// Positions of the scene's garments on its first body, posed and canonical, on the device of `model`. Embeddings in
@@ -256,10 +253,10 @@ impl Subject {
         let scenes = [self.scene(0)?];
         let [scene] = &scenes;
         let (trains, rate) = (self.trains(), 1e-4);
-        let reset = reset_peak_memory();
+        let reset = Memory::reset_peak();
         let step_ms =
             median_ms(seconds, || self.learner.step(&self.tensors, &scenes, trains, rate, false).map(drop))?;
-        let peak_mib = peak_memory().filter(|_| reset).map(|bytes| bytes as f64 / f64::from(1 << 20));
+        let peak_mib = Memory::now().filter(|_| reset).map(|memory| memory.peak as f64 / f64::from(1 << 20));
 
         let plain = self.model().valid();
         let read = |positions: [Tensor<2>; 2]| positions.map(Tensor::into_data);
@@ -288,30 +285,12 @@ impl Subject {
         let losses_ms = evaluate(energy)?;
         let mut terms_ms = BTreeMap::new();
         for term in Term::ALL {
-            if let Some(alone) = only(energy, term) {
+            if let Some(alone) = energy.only(term) {
                 terms_ms.insert(term.name(), evaluate(&alone)?);
             }
         }
         Ok(Costs { forward_ms, forward_backward_ms, step_ms, losses_ms, drape_ms, terms_ms, peak_mib })
     }
-}
-
-/// The scene with no other weight than those of `term`; `None` if it has none.
-fn only(energy: &SceneEnergy<f32>, term: Term) -> Option<SceneEnergy<f32>> {
-    let mut energy = energy.clone();
-    let mut present = false;
-    let weights = energy
-        .garments
-        .iter_mut()
-        .map(|garment| &mut garment.weights)
-        .chain(energy.layers.iter_mut().map(|pair| &mut pair.weights));
-    for map in weights {
-        let mut alone = TermMap::<f64>::default();
-        alone[term] = map[term];
-        present |= map[term] != 0.0;
-        *map = alone;
-    }
-    present.then_some(energy)
 }
 
 struct NamedGradients {

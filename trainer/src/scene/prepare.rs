@@ -30,11 +30,9 @@ pub struct PreparedBody {
 pub struct PreparedScene {
     /// What was drawn.
     pub draw: SceneDraw,
-    /// Indices into the wardrobe, inner → outer.
-    pub garments: Vec<usize>,
     /// The garments themselves.
     pub worn: Vec<Arc<LibraryGarment>>,
-    /// Pairs (inner, outer) of positions in `garments` that can touch.
+    /// Pairs (inner, outer) of positions in `worn` that can touch.
     pub contacts: Vec<(usize, usize)>,
     /// Bodies.
     pub bodies: Vec<PreparedBody>,
@@ -61,7 +59,7 @@ pub fn prepare(
         features: &|pose, joints| library.poses.features(pose, joints),
         losses,
     };
-    Ok(dresser.dress(draw.garments, garments, &draw.bodies, run_progress))
+    Ok(dresser.dress(draw, garments, run_progress))
 }
 
 /// Everything but the garments and the bodies that a scene is prepared with.
@@ -77,21 +75,15 @@ pub struct Dresser<'a> {
 }
 
 impl Dresser<'_> {
-    /// Prepares garments (`numbers` are theirs in a wardrobe) on bodies; loss weights are taken at `run_progress`.
+    /// Prepares `draw`, whose garments are `worn`; loss weights are taken at `run_progress`.
     ///
     /// # Panics
     /// If a shape or pose is longer than the body allows.
-    pub fn dress(
-        &self,
-        numbers: Vec<usize>,
-        worn: Vec<Arc<LibraryGarment>>,
-        bodies: &[BodyDraw],
-        run_progress: f64,
-    ) -> PreparedScene {
+    pub fn dress(&self, draw: SceneDraw, worn: Vec<Arc<LibraryGarment>>, run_progress: f64) -> PreparedScene {
         let contacts = contacts(&worn);
-        let prepared = bodies.iter().map(|body| self.on_body(&worn, &contacts, body, run_progress)).collect();
-        let draw = SceneDraw { garments: numbers.clone(), bodies: bodies.to_vec() };
-        PreparedScene { draw, garments: numbers, worn, contacts, bodies: prepared }
+        let bodies =
+            draw.bodies.iter().map(|body| self.on_body(&worn, &contacts, body, run_progress)).collect();
+        PreparedScene { draw, worn, contacts, bodies }
     }
 
     fn on_body(

@@ -196,7 +196,7 @@ fn measure(
             eigen_count,
             bodies,
         }),
-        layers: scene.garments.len(),
+        layers: scene.worn.len(),
         vertices: scene.worn.iter().map(|garment| garment.vertex_count()).sum(),
         parameters: burn::module::Module::num_params(subject.model()),
         profile,

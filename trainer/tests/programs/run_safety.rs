@@ -1,8 +1,6 @@
 //! What can go wrong around a run folder: one clear message, exit 1, and what was there stays whole.
 
-mod common;
-
-use common::{clothcombo, holds, resume, said, start, tiny, trainer};
+use crate::common::{clothcombo, holds, resume, said, start, tiny, trainer};
 use std::path::Path;
 use std::process::{Command, Output};
 use std::time::{Duration, Instant};

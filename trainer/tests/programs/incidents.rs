@@ -1,8 +1,6 @@
 //! A step that is not finite is skipped, written down, and replays; too many end the run.
 
-mod common;
-
-use common::{clothcombo, holds, said, start, tiny};
+use crate::common::{clothcombo, holds, said, start, tiny};
 use std::path::Path;
 
 const TWO: &str = "[guard]\ninject = { every = 25, what = \"WHAT\" }\n";

@@ -1,6 +1,7 @@
 //! A folder of OBJ garments, as a user would bring one: made by `clothcombo generate`, one of them rewritten by hand
 //! with quads and texture coordinates, trained on for a few steps.
 
+use crate::common::with_small_networks;
 use assert_cmd::Command;
 use std::fs;
 
@@ -9,17 +10,6 @@ seed = 1
 [data]
 [[data.garments]]
 folder = "GARMENTS"
-[model]
-width = 8
-embedding = 8
-diffusion_blocks = 1
-diffusion_width = 8
-eigen_count = 8
-mlp_layers = 2
-siren_layers = 2
-siren_width = 8
-skinning_layers = 1
-skinning_width = 8
 [[stages]]
 name = "all"
 trains = "all"
@@ -78,7 +68,8 @@ fn generated_and_hand_made_garments_train_together() {
     fs::write(&manifest, text + "\n[[garment]]\nfile = \"band.obj\"\ncategory = \"skirt\"\n").unwrap();
 
     let config = folder.path().join("config.toml");
-    fs::write(&config, CONFIG.replace("GARMENTS", &garments.display().to_string())).unwrap();
+    fs::write(&config, with_small_networks(&CONFIG.replace("GARMENTS", &garments.display().to_string())))
+        .unwrap();
     let run = folder.path().join("run");
     Command::cargo_bin("clothcombo-train")
         .unwrap()

@@ -1,5 +1,6 @@
 //! `clothcombo bench error` on two scenes of tiny garments, with and without a network.
 
+use crate::common::with_small_networks;
 use assert_cmd::Command;
 use serde_json::Value;
 use std::fs;
@@ -10,17 +11,6 @@ seed = 4
 [data]
 [[data.garments]]
 generate = { count = 2, seed = 5, vertices = 200, categories = ["t_shirt", "skirt"] }
-[model]
-width = 8
-embedding = 8
-diffusion_blocks = 1
-diffusion_width = 8
-eigen_count = 8
-mlp_layers = 2
-siren_layers = 2
-siren_width = 8
-skinning_layers = 1
-skinning_width = 8
 [[stages]]
 name = "all"
 trains = "all"
@@ -71,7 +61,7 @@ fn check(report: &Value, methods: &[&str]) {
 #[test]
 fn skinning_and_a_network_are_measured_against_the_minimum() {
     let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("tiny.toml"), CONFIG).unwrap();
+    fs::write(folder.path().join("tiny.toml"), with_small_networks(CONFIG)).unwrap();
     let output =
         bench(&["--config", "tiny.toml", "--iterations", "150", "--json"], folder.path()).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -100,7 +90,7 @@ fn skinning_and_a_network_are_measured_against_the_minimum() {
 #[test]
 fn bad_arguments_are_refused() {
     let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("tiny.toml"), CONFIG).unwrap();
+    fs::write(folder.path().join("tiny.toml"), with_small_networks(CONFIG)).unwrap();
     bench(&["--config", "missing.toml"], folder.path())
         .assert()
         .code(1)

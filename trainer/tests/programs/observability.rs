@@ -1,8 +1,6 @@
 //! Report, event files, table of runs, and what the programs print.
 
-mod common;
-
-use common::{clothcombo, holds, said, start, tiny};
+use crate::common::{clothcombo, holds, said, start, tiny};
 use std::path::Path;
 use std::process::Command;
 

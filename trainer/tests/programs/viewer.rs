@@ -1,6 +1,7 @@
 //! The viewer in a real browser: it draws, counts what it draws, and asks the network for nothing. Skipped, with a word on
 //! stderr, where no Chromium is installed; `CHROMIUM` names one that is not on the path.
 
+use crate::common::with_small_networks;
 use assert_cmd::Command as Program;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,17 +12,6 @@ seed = 2
 [data]
 [[data.garments]]
 generate = { count = 2, seed = 3, vertices = 250, categories = ["t_shirt", "skirt"] }
-[model]
-width = 8
-embedding = 8
-diffusion_blocks = 1
-diffusion_width = 8
-eigen_count = 8
-mlp_layers = 2
-siren_layers = 2
-siren_width = 8
-skinning_layers = 1
-skinning_width = 8
 [[stages]]
 name = "all"
 trains = "all"
@@ -73,7 +63,7 @@ fn the_viewer_draws_every_layer_and_stage_in_chromium() {
     };
     let folder = tempfile::tempdir().unwrap();
     let config = folder.path().join("config.toml");
-    fs::write(&config, CONFIG).unwrap();
+    fs::write(&config, with_small_networks(CONFIG)).unwrap();
     let (run, out) = (folder.path().join("run"), folder.path().join("out"));
     let train = Program::cargo_bin("clothcombo-train")
         .unwrap()

@@ -1,5 +1,6 @@
 //! SIGTERM saves a checkpoint and exits 0; `--resume` continues from it.
 
+use crate::common::with_small_networks;
 use std::path::Path;
 use std::process::{Child, Command};
 use std::time::{Duration, Instant};
@@ -9,17 +10,6 @@ seed = 1
 [data]
 [[data.garments]]
 generate = { count = 2, vertices = 200, categories = ["top", "skirt"] }
-[model]
-width = 8
-embedding = 8
-diffusion_blocks = 1
-diffusion_width = 8
-eigen_count = 8
-mlp_layers = 2
-siren_layers = 2
-siren_width = 8
-skinning_layers = 1
-skinning_width = 8
 [[stages]]
 name = "single"
 trains = "single"
@@ -63,7 +53,7 @@ fn newest_step(run: &Path) -> u64 {
 fn terminate_saves_and_resume_continues() {
     let folder = tempfile::tempdir().unwrap();
     let config = folder.path().join("long.toml");
-    std::fs::write(&config, LONG).unwrap();
+    std::fs::write(&config, with_small_networks(LONG)).unwrap();
     let run = folder.path().join("run");
 
     assert_eq!(stop_when_running(start(&config, &run, false), &run), Some(0));

@@ -1,6 +1,7 @@
 //! `clothcombo drape` as a user runs it: a model of a few steps on the mannequin, garments from files and by name, every output
 //! read back.
 
+use crate::common::with_small_networks;
 use assert_cmd::Command;
 use clothcombo_data::asset::{Motion, Pose, Provenance};
 use clothcombo_data::format::{load_mesh, load_tri_mesh, obj};
@@ -17,17 +18,6 @@ seed = 1
 [data]
 [[data.garments]]
 generate = { count = 3, seed = 5, vertices = 250, categories = ["t_shirt", "skirt", "top"] }
-[model]
-width = 8
-embedding = 8
-diffusion_blocks = 1
-diffusion_width = 8
-eigen_count = 8
-mlp_layers = 2
-siren_layers = 2
-siren_width = 8
-skinning_layers = 1
-skinning_width = 8
 [[stages]]
 name = "all"
 trains = "all"
@@ -52,7 +42,7 @@ fn run_folder() -> &'static Path {
     let (_, run) = RUN.get_or_init(|| {
         let folder = tempfile::tempdir().unwrap();
         let config = folder.path().join("config.toml");
-        fs::write(&config, CONFIG).unwrap();
+        fs::write(&config, with_small_networks(CONFIG)).unwrap();
         let run = folder.path().join("run");
         let train = Command::cargo_bin("clothcombo-train")
             .unwrap()

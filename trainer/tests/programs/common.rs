@@ -1,56 +1,18 @@
 //! A training run of a second or two, as the program runs it.
 
-// Every test program uses its own part of this.
-#![allow(dead_code)]
-
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
 /// Sixty steps in three stages with a checkpoint every ten: every network, up to three layers.
-pub const TINY: &str = r#"
-seed = 3
-[data]
-body = "mannequin"
-poses = { max_self_intersection = 10.0 }
-[[data.garments]]
-generate = { count = 3, seed = 5, vertices = 200, categories = ["t_shirt", "trousers", "skirt"] }
-[model]
-width = 16
-embedding = 16
-diffusion_blocks = 2
-diffusion_width = 16
-eigen_count = 12
-mlp_layers = 4
-siren_layers = 3
-siren_width = 16
-skinning_layers = 2
-skinning_width = 16
-[[stages]]
-name = "single"
-trains = "single"
-steps = 20
-learning_rate = 1e-3
-pose_scale = { from = 0.0, to = 1.0, start = 0.0, end = 0.5 }
-[[stages]]
-name = "untangling"
-trains = "untangling"
-steps = 20
-layers = [2, 3]
-learning_rate = 1e-3
-[[stages]]
-name = "all"
-trains = "all"
-steps = 20
-layers = [1, 3]
-learning_rate = 1e-4
-[validation]
-single_scenes = 2
-layered_scenes = 2
-layers = [2, 3]
-[output]
-checkpoint_every = 10
-sample_scenes = 0
-"#;
+pub const TINY: &str = include_str!("../../../tests/fixtures/tiny.toml");
+
+/// `config` with networks so small that a step takes milliseconds.
+pub fn with_small_networks(config: &str) -> String {
+    format!(
+        "{config}[model]\nwidth = 8\nembedding = 8\ndiffusion_blocks = 1\ndiffusion_width = 8\neigen_count = 8\nmlp_layers = 2\n\
+         siren_layers = 2\nsiren_width = 8\nskinning_layers = 1\nskinning_width = 8\n"
+    )
+}
 
 /// The trainer with `arguments`, on `threads` threads, quiet.
 pub fn trainer(threads: usize, arguments: &[&str]) -> Command {

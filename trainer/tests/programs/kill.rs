@@ -2,9 +2,7 @@
 //!
 //! `scripts/kill_test.sh` does the same twenty times with one and with two threads.
 
-mod common;
-
-use common::{TINY, resume, start};
+use crate::common::{TINY, resume, start};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::path::Path;

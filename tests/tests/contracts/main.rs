@@ -1,0 +1,9 @@
+//! Contracts between the crates: one binary, because linking burn takes longer than most of these tests.
+
+mod checkpoint;
+mod config_fuzz;
+mod hard_cases;
+mod intersections;
+mod resume;
+mod score_oracle;
+mod streaming;

@@ -1,0 +1,22 @@
+//! The programs as their users run them: one binary, because linking burn takes longer than most of these tests.
+
+mod bad_input;
+mod bench_certificate;
+mod bench_error;
+mod bench_stability;
+mod bench_step;
+mod check;
+mod common;
+mod drape;
+mod fit;
+mod generate;
+mod import_programs;
+mod incidents;
+mod interrupt;
+mod kill;
+mod observability;
+mod own_garments;
+mod resolve;
+mod run_safety;
+mod score;
+mod viewer;
