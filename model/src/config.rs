@@ -43,6 +43,9 @@ pub struct ModelConfig {
     pub skinning_scale: f64,
     /// Keep Σ_j W_j = 1 by removing the mean of ΔW over a garment's joints. `false` is the paper's raw sum.
     pub zero_sum_skinning: bool,
+    /// Hand the vertex embedding `z_v` to `D_s`, `S` and `D_m`. `false` is an ablation of the paper: they see zeros, and the
+    /// garment embedding `z̄_v` alone tells garments apart.
+    pub vertex_embedding: bool,
 }
 
 impl Default for ModelConfig {
@@ -64,6 +67,7 @@ impl Default for ModelConfig {
             untangling_scale: 0.01,
             skinning_scale: 0.01,
             zero_sum_skinning: true,
+            vertex_embedding: true,
         }
     }
 }

@@ -14,6 +14,8 @@ use crate::tensors::GarmentTensors;
 pub struct GarmentEncoder {
     /// The network.
     pub diffusion_net: DiffusionNet,
+    #[module(skip)]
+    has_vertex_embedding: bool,
 }
 
 /// Embedding of one garment.
@@ -41,7 +43,10 @@ impl GarmentEmbedding {
 impl GarmentEncoder {
     pub(crate) fn new(config: &ModelConfig, device: &Device) -> Self {
         let (blocks, width) = (config.diffusion_blocks, config.diffusion_width);
-        Self { diffusion_net: DiffusionNet::new(blocks, width, config.embedding, device) }
+        Self {
+            diffusion_net: DiffusionNet::new(blocks, width, config.embedding, device),
+            has_vertex_embedding: config.vertex_embedding,
+        }
     }
 
     /// Embeds one garment.
@@ -49,6 +54,7 @@ impl GarmentEncoder {
         let vertex = self.diffusion_net.forward(garment);
         // A product with the normalised mass row: a plain sum over thousands of rows would lose digits in f32.
         let mean = garment.mass.clone().matmul(vertex.clone());
+        let vertex = if self.has_vertex_embedding { vertex } else { vertex.zeros_like() };
         GarmentEmbedding { vertex, garment: mean }
     }
 }

@@ -11,7 +11,7 @@ use miette::{Report, miette};
 use std::path::PathBuf;
 
 fn main() -> std::process::ExitCode {
-    cli::start_logging("warn");
+    cli::Verbosity::default().apply("warn");
     cli::exit_code(run())
 }
 

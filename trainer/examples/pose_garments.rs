@@ -42,7 +42,7 @@ struct Arguments {
 
 fn main() -> std::process::ExitCode {
     let arguments = Arguments::parse();
-    cli::start_logging("info");
+    cli::Verbosity::default().apply("info");
     cli::exit_code(run(&arguments))
 }
 

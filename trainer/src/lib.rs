@@ -30,4 +30,5 @@ pub mod schedule;
 pub mod score;
 pub mod session;
 pub mod stop;
+pub mod study;
 pub mod train_loop;

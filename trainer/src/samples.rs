@@ -45,7 +45,7 @@ fn row(networks: &Networks, scene: &PreparedScene) -> Result<SheetRow, Report> {
     let draped = networks.drape(scene)?.layered;
     let cells = [&skinned, &draped]
         .into_iter()
-        .flat_map(|d| [View::Front, View::Back].map(|view| cell(scene, d, view)))
+        .flat_map(|d| [View::Front, View::Back].map(|view| picture_of(scene, d, view)))
         .collect();
     let legend = names
         .iter()
@@ -59,7 +59,8 @@ fn row(networks: &Networks, scene: &PreparedScene) -> Result<SheetRow, Report> {
     Ok(SheetRow { label, legend, cells })
 }
 
-fn cell(scene: &PreparedScene, draped: &Draped, view: View) -> image::RgbImage {
+/// A drape of `scene` on its first body.
+pub(crate) fn picture_of(scene: &PreparedScene, draped: &Draped, view: View) -> image::RgbImage {
     let wide = |p: &[[f32; 3]]| p.iter().map(|p| p.map(f64::from)).collect::<Vec<_>>();
     let body = &scene.bodies[0].energy.body;
     let body_positions = wide(&body.positions);

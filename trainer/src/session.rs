@@ -1,7 +1,7 @@
 //! A run in progress: everything the training loop acts on.
 
 use crate::average::Average;
-use crate::checkpoint::{Best, Checkpoint, CheckpointState, Snapshot};
+use crate::checkpoint::{Best, Checkpoint, CheckpointState, Snapshot, TrainedModel};
 use crate::config::{Config, Injected};
 use crate::drape::{Networks, WardrobeTensors};
 use crate::evaluate::{ValidationReport, ValidationSet};
@@ -20,7 +20,7 @@ use clothcombo_model::{ClothCombo, Dimensions};
 use clothcombo_physics::energy::Term;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -53,11 +53,14 @@ impl Session {
     /// A new run on `device` (named without automatic differentiation).
     ///
     /// # Errors
-    /// When the networks or tensors cannot be made.
+    /// When the networks cannot be made, or the model they start from does not fit.
     pub fn new(run: RunDir, config: Config, library: Arc<Library>, device: &Device) -> Result<Self, Report> {
         let device = device.clone().autodiff();
         device.seed(config.seed);
-        let model = ClothCombo::new(&config.model, &dimensions(&library), &device).into_diagnostic()?;
+        let model = match &config.init_from {
+            None => ClothCombo::new(&config.model, &dimensions(&library), &device).into_diagnostic()?,
+            Some(path) => TrainedModel::open(Path::new(path))?.start_of(&config, &library, &device)?,
+        };
         let average = (config.optimizer.ema_decay > 0.0)
             .then(|| Average::new(model.valid(), config.optimizer.ema_decay));
         let learner = Learner::new(model, new_optimizer(&config.optimizer), &config.optimizer);

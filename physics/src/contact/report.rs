@@ -17,12 +17,14 @@ impl Intersections {
         Self { pairs: pairs.len(), contour_length: contours.iter().map(|c| c.length).sum() }
     }
 
-    fn between(a: &TriangleTree, b: &TriangleTree) -> Self {
+    /// Those of two surfaces. Exact.
+    pub fn between(a: &TriangleTree, b: &TriangleTree) -> Self {
         let pairs = a.pairs_with(b);
         Self::new(&pairs, &contours(a, b, &pairs))
     }
 
-    fn within(mesh: &TriangleTree) -> Self {
+    /// Those of a surface with itself. Exact.
+    pub fn within(mesh: &TriangleTree) -> Self {
         let pairs = mesh.self_pairs();
         Self::new(&pairs, &self_contours(mesh, &pairs))
     }

@@ -4,6 +4,7 @@ mod checkpoint;
 mod config_fuzz;
 mod hard_cases;
 mod intersections;
+mod messy_garments;
 mod resume;
 mod score_oracle;
 mod streaming;

@@ -96,3 +96,31 @@ fn skipped_steps_are_remembered() {
         ["guard.inject={ every = 7, what = \"position\" }", "guard.kept_incidents=1", "validation.every=10"];
     parts_equal_the_whole(&overrides, &[14, 35], &["model.safetensors"]);
 }
+
+#[test]
+fn a_run_starts_from_another_ones_parameters() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = tiny_config(folder.path(), &["stages.0.steps=5"]);
+    let library = Arc::new(Library::load(&config, &|_, _, _| {}).unwrap());
+    let first = folder.path().join("first");
+    run(&config, &library, &first, false, Some(5));
+    // The numbers behind the header, which holds the step as well.
+    let parameters = |checkpoint: &Path| {
+        let bytes = std::fs::read(checkpoint.join("model.safetensors")).unwrap();
+        let header = u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize;
+        bytes[8 + header..].to_vec()
+    };
+
+    let further = |name: &str, overrides: &[&str]| {
+        let init = format!("init_from={:?}", first.display().to_string());
+        let overrides: Vec<&str> = [init.as_str()].into_iter().chain(overrides.iter().copied()).collect();
+        let config = tiny_config(folder.path(), &overrides);
+        let run = RunDir::create(&folder.path().join(name), &config).unwrap();
+        Session::new(run, config, library.clone(), &Backend::preferred().device())
+    };
+    let session = further("second", &["seed=9"]).unwrap();
+    assert!(parameters(&session.save().unwrap()) == parameters(&first.join("checkpoints/step-00000005")));
+
+    let refused = further("third", &["model.width=24"]).err().expect("other sizes do not fit");
+    assert!(refused.to_string().contains("init_from"), "{refused}");
+}

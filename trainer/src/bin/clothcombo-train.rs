@@ -7,6 +7,6 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     clothcombo_trainer::allocator::keep_freed_memory();
     let arguments = cli::train::Arguments::parse();
-    cli::start_logging(arguments.log_level());
+    arguments.verbosity().apply("warn");
     cli::exit_code(cli::train::run(&arguments))
 }

@@ -14,6 +14,8 @@ use std::process::ExitCode;
 struct Arguments {
     #[command(subcommand)]
     verb: Verb,
+    #[command(flatten)]
+    verbosity: cli::Verbosity,
 }
 
 #[derive(Subcommand)]
@@ -24,6 +26,7 @@ enum Verb {
     #[command(subcommand)]
     Config(cli::config::Verb),
     Drape(Box<cli::drape::Arguments>),
+    Eval(cli::eval::Arguments),
     Fit(cli::fit::Arguments),
     Generate(cli::generate::Arguments),
     #[command(subcommand)]
@@ -38,12 +41,13 @@ enum Verb {
 fn main() -> ExitCode {
     clothcombo_trainer::allocator::keep_freed_memory();
     let arguments = Arguments::parse();
-    cli::start_logging("info");
+    arguments.verbosity.apply("info");
     cli::exit_code(match &arguments.verb {
         Verb::Bench(bench) => cli::bench::run(bench),
         Verb::Check(arguments) => cli::check::run(arguments),
         Verb::Config(verb) => cli::config::run(verb),
         Verb::Drape(arguments) => cli::drape::run(arguments),
+        Verb::Eval(arguments) => cli::eval::run(arguments),
         Verb::Fit(arguments) => cli::fit::run(arguments),
         Verb::Generate(arguments) => cli::generate::run(arguments),
         Verb::Import(source) => cli::import::run(source),

@@ -35,6 +35,17 @@ pub enum CheckpointError {
         /// The reason.
         reason: String,
     },
+    /// The model was made for something else.
+    #[error("model {}: {reason}", path.display())]
+    #[diagnostic(help(
+        "use the configuration and the data that the model was trained with, or train another one"
+    ))]
+    Foreign {
+        /// The model.
+        path: PathBuf,
+        /// What differs.
+        reason: String,
+    },
     /// The configuration inside cannot be read.
     #[error(transparent)]
     #[diagnostic(transparent)]

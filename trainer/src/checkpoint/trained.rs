@@ -2,6 +2,8 @@
 
 use super::{CONFIG, CheckpointError, CheckpointState, MODEL_EXCHANGE, newest, read_state, verify};
 use crate::config::{Config, load};
+use crate::scene::Library;
+use crate::session::state;
 use burn::store::{ModuleSnapshot, SafetensorsStore};
 use burn::tensor::Device;
 use clothcombo_model::ClothCombo;
@@ -52,6 +54,52 @@ impl TrainedModel {
             Some(error) => Err(unusable(format!("{MODEL_EXCHANGE}: {error}"))),
             None => Ok(model),
         }
+    }
+
+    /// Whether the networks know what `library` is made of: its joints in their order, shape components and pose features.
+    ///
+    /// # Errors
+    /// Names the model when they do not.
+    pub fn check_fits(&self, library: &Library) -> Result<(), CheckpointError> {
+        let (expected, found) = (state(library, 0), &self.state);
+        let fits = (&found.joints, found.shape_count, found.pose_features)
+            == (&expected.joints, expected.shape_count, expected.pose_features);
+        let reason = || {
+            format!(
+                "it was trained for {} joints, {} shape components and {} pose features, the data has {}, {} and {} (or other \
+                 joints)",
+                found.joints.len(),
+                found.shape_count,
+                found.pose_features,
+                expected.joints.len(),
+                expected.shape_count,
+                expected.pose_features
+            )
+        };
+        if fits {
+            Ok(())
+        } else {
+            Err(CheckpointError::Foreign { path: self.folder.clone(), reason: reason() })
+        }
+    }
+
+    /// The networks as the start of a run of `config` on `library`.
+    ///
+    /// # Errors
+    /// When data or sizes of the networks are not the model's own.
+    pub fn start_of(
+        &self,
+        config: &Config,
+        library: &Library,
+        device: &Device,
+    ) -> Result<ClothCombo, CheckpointError> {
+        self.check_fits(library)?;
+        if self.config.model != config.model {
+            let reason =
+                "its [model] section differs from that of the configuration, which init_from does not allow";
+            return Err(CheckpointError::Foreign { path: self.folder.clone(), reason: reason.into() });
+        }
+        self.networks(device)
     }
 
     /// Checksum of the parameters: equal ones make equal embeddings.

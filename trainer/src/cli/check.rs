@@ -1,9 +1,9 @@
 //! `clothcombo check`: every file of a dataset, in one table.
 
+use crate::cli::verbosity::progress_bar;
 use crate::scene::load_body;
 use clap::Parser;
 use clothcombo_data::check::{Checker, FileCheck, GarmentCheck, Target, find_targets, is_body_file};
-use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, Report, miette};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -43,9 +43,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let targets = find_targets(&arguments.paths);
     let body_name = arguments.body.clone().unwrap_or_else(|| only_body(&targets));
     let checker = Checker::new(load_body(&body_name, 0)?);
-    let style =
-        ProgressStyle::with_template("checking {bar:40} {pos}/{len} · {eta} left").into_diagnostic()?;
-    let bar = ProgressBar::new(targets.len() as u64).with_style(style);
+    let bar = progress_bar(targets.len(), "checking {bar:40} {pos}/{len} · {eta} left");
     let files: Vec<FileCheck> = targets
         .par_iter()
         .map(|target| {

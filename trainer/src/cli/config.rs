@@ -62,7 +62,7 @@ fn check(arguments: &CheckArguments) -> Result<(), Report> {
     if arguments.no_timing {
         return Ok(());
     }
-    let library = Arc::new(load_under_bar(&config, false)?);
+    let library = Arc::new(load_under_bar(&config)?);
     let times = time_stages(&config, &library, &Backend::preferred().device(), arguments.timed_steps)?;
     print_times(&config, &times);
     Ok(())

@@ -1,6 +1,7 @@
 //! `clothcombo generate`: garments from nothing but a body.
 
 use super::wardrobe_sheet::{PER_ROW, wardrobe_sheet};
+use crate::cli::verbosity::{progress_bar, say};
 use crate::picture::save_png;
 use crate::scene::load_body;
 use clap::Parser;
@@ -8,7 +9,6 @@ use clothcombo_data::asset::{Body, Category, Garment};
 use clothcombo_data::dataset::{FolderGarment, ManifestEntry, read_manifest, save_garment, save_manifest};
 use clothcombo_data::format::obj;
 use clothcombo_data::generate::{GarmentGenerator, GarmentSettings};
-use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use rayon::prelude::*;
 use std::collections::HashSet;
@@ -63,9 +63,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     (0..arguments.count as u64).try_for_each(|i| order.check(arguments.start.wrapping_add(i)))?;
     let mut entries = read_manifest(folder).into_diagnostic()?;
     let listed: HashSet<String> = entries.iter().map(|e| e.file().to_string()).collect();
-    let style =
-        ProgressStyle::with_template("garments {bar:40} {pos}/{len} · {eta} left").into_diagnostic()?;
-    let bar = ProgressBar::new(arguments.count as u64).with_style(style);
+    let bar = progress_bar(arguments.count, "garments {bar:40} {pos}/{len} · {eta} left");
     let done: Vec<Made> = (0..arguments.count)
         .into_par_iter()
         .with_max_len(1)
@@ -93,10 +91,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         }
     }
     save_manifest(folder, entries).into_diagnostic()?;
-    eprintln!("{new} garments made, {kept} kept, in {}", folder.display());
+    say(&format!("{new} garments made, {kept} kept, in {}", folder.display()));
     if let Some(path) = &arguments.picture {
         save_png(&wardrobe_sheet(&body, &order.for_picture(arguments)?), path).into_diagnostic()?;
-        eprintln!("picture {}", path.display());
+        say(&format!("picture {}", path.display()));
     }
     match failures.first() {
         None => Ok(()),

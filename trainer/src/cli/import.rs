@@ -1,5 +1,6 @@
 //! `clothcombo import`: other people's files become this project's bodies, garments and motions.
 
+use crate::cli::verbosity::progress_bar;
 use crate::scene::load_body;
 use clap::{Args, Subcommand, ValueEnum};
 use clothcombo_data::asset::{Body, BodyFileSettings, Provenance};
@@ -8,7 +9,6 @@ use clothcombo_data::import::{
     MakeHumanSettings, Summary, Thinning, UpAxis, import_amass, import_anny, import_bvh, import_cloth3d,
     import_deepmimic, import_makehuman, import_smpl_family,
 };
-use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, Report};
 use std::path::PathBuf;
 
@@ -220,8 +220,7 @@ pub struct DeepmimicArguments {
 /// # Errors
 /// When an input cannot be read or an output not be written; the message names the file.
 pub fn run(source: &Source) -> Result<(), Report> {
-    let style = ProgressStyle::with_template("{msg} {bar:40} {pos}/{len}").into_diagnostic()?;
-    let bar = ProgressBar::new(0).with_style(style);
+    let bar = progress_bar(0, "{msg} {bar:40} {pos}/{len}");
     let mut progress = |what: &str, done: usize, total: usize| {
         bar.set_length(total as u64);
         bar.set_position(done as u64);

@@ -4,6 +4,7 @@ pub mod bench;
 pub mod check;
 pub mod config;
 pub mod drape;
+pub mod eval;
 pub mod fit;
 pub mod generate;
 pub mod import;
@@ -14,22 +15,13 @@ pub mod runs;
 pub mod score;
 mod table;
 pub mod train;
+mod verbosity;
 mod wardrobe_sheet;
 
-use miette::{IntoDiagnostic, Report};
-use std::io::{ErrorKind, IsTerminal, Write};
-use tracing_subscriber::EnvFilter;
+pub use verbosity::Verbosity;
 
-/// Log lines on stderr; `RUST_LOG` overrides `default`.
-pub fn start_logging(default: &str) {
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(default));
-    // A second call (tests run several sessions in one process) keeps the first subscriber.
-    let _ = tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_ansi(std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none())
-        .with_writer(std::io::stderr)
-        .try_init();
-}
+use miette::{IntoDiagnostic, Report};
+use std::io::{ErrorKind, Write};
 
 /// Exit code of a program that ended with `result`; an error is printed once, with its place and hint.
 pub fn exit_code(result: Result<(), Report>) -> std::process::ExitCode {

@@ -1,6 +1,7 @@
 //! `clothcombo prepare`: fills the cache of a configuration before training.
 
-use crate::cli::train::garment_progress;
+use crate::cli::train::PREPARING;
+use crate::cli::verbosity::{progress_bar, say};
 use crate::config::load;
 use crate::scene::{Wardrobe, load_body};
 use clap::Parser;
@@ -25,9 +26,6 @@ pub struct Arguments {
     /// Part i of n (from 0): every n-th garment
     #[arg(long, value_name = "i/n", default_value = "0/1")]
     shard: Shard,
-    /// No progress, only errors
-    #[arg(long, short)]
-    quiet: bool,
 }
 
 /// Part `0` of `1` parts.
@@ -53,16 +51,14 @@ impl FromStr for Shard {
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let config = load(&arguments.config, &arguments.overrides)?;
     let body = Arc::new(load_body(&config.data.body, config.data.shape_components)?);
-    let bar = garment_progress(arguments.quiet);
+    let bar = progress_bar(0, PREPARING);
     let (garments, bytes) = Wardrobe::prepare(&config, body, arguments.shard.0, &|done, total, name| {
         bar.set_length(total as u64);
         bar.set_position(done as u64);
         bar.set_message(name.to_owned());
     })?;
     bar.finish_and_clear();
-    if !arguments.quiet {
-        eprintln!("{garments} garments prepared · {:.1} MiB in the cache", bytes as f64 / f64::from(1 << 20));
-    }
+    say(&format!("{garments} garments prepared · {:.1} MiB in the cache", bytes as f64 / f64::from(1 << 20)));
     Ok(())
 }
 

@@ -1,6 +1,7 @@
 //! `clothcombo-train`.
 
 use crate::checkpoint::{Checkpoint, CheckpointError};
+use crate::cli::verbosity::{Verbosity, is_quiet, progress_bar, say};
 use crate::config::{Config, load};
 use crate::device::Backend;
 use crate::event::Observer;
@@ -16,7 +17,6 @@ use crate::session::Session;
 use crate::stop::StopFlag;
 use crate::train_loop::train;
 use clap::Parser;
-use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
@@ -53,23 +53,14 @@ pub struct Arguments {
     /// Compute device; a run continues to the bit only on the device it was started on
     #[arg(long, value_enum, default_value_t = Backend::preferred())]
     device: Backend,
-    /// No progress, only errors
-    #[arg(long, short)]
-    quiet: bool,
-    /// More log lines; twice for debugging
-    #[arg(long, short, action = clap::ArgAction::Count)]
-    verbose: u8,
+    #[command(flatten)]
+    verbosity: Verbosity,
 }
 
 impl Arguments {
-    /// Default log filter for this verbosity.
-    pub fn log_level(&self) -> &'static str {
-        match (self.quiet, self.verbose) {
-            (true, _) => "error",
-            (false, 0) => "warn",
-            (false, 1) => "info,clothcombo_trainer=debug",
-            (false, _) => "debug",
-        }
+    /// How much is said.
+    pub fn verbosity(&self) -> Verbosity {
+        self.verbosity
     }
 
     /// The run folder that is named, by --run-dir or by the path of --resume.
@@ -134,7 +125,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         }
         None => RunDir::refuse_occupied(&root).map(|()| None)?,
     };
-    let library = Arc::new(load_library(&config, arguments.quiet)?);
+    let library = Arc::new(load_library(&config)?);
     let device = arguments.device.device();
     let (run, mut session) = match existing {
         Some((run, checkpoint)) => {
@@ -153,19 +144,19 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     };
     run.write_split(&library.split_names())?;
     let memory = session.memory_estimate();
-    if !arguments.quiet {
-        eprintln!("run folder {}", run.root().display());
+    if !is_quiet() {
+        say(&format!("run folder {}", run.root().display()));
         if let Some(m) = memory {
-            eprintln!(
+            say(&format!(
                 "memory: about {} at the peak ({} in use, {} for the largest scene, {} for parameters)",
                 gibibytes(m.peak),
                 gibibytes(m.start),
                 gibibytes(m.activations),
                 gibibytes(m.parameters)
-            );
+            ));
         }
     }
-    let mut observers = observers(arguments, &run, &config, &library, session.step(), memory)?;
+    let mut observers = observers(&run, &config, &library, session.step(), memory)?;
     train(&mut session, &mut observers, &stop)
 }
 
@@ -196,7 +187,6 @@ fn continue_run(run: &RunDir, config: &Config, checkpoint: Option<&Checkpoint>) 
 }
 
 fn observers(
-    arguments: &Arguments,
     run: &RunDir,
     config: &Config,
     library: &Library,
@@ -216,15 +206,15 @@ fn observers(
         observers.push(Box::new(TensorBoardObserver::new(run, step, config.output.metrics_every)?));
     }
     observers.push(Box::new(report));
-    if !arguments.quiet {
+    if !is_quiet() {
         observers.push(Box::new(ProgressObserver::default()));
     }
     Ok(observers)
 }
 
 /// Loads the data of `config` under a bar.
-pub(crate) fn load_under_bar(config: &Config, quiet: bool) -> Result<Library, Report> {
-    let bar = garment_progress(quiet);
+pub(crate) fn load_under_bar(config: &Config) -> Result<Library, Report> {
+    let bar = progress_bar(0, PREPARING);
     let library = Library::load(config, &|done, total, name| {
         bar.set_length(total as u64);
         bar.set_position(done as u64);
@@ -235,16 +225,12 @@ pub(crate) fn load_under_bar(config: &Config, quiet: bool) -> Result<Library, Re
 }
 
 /// The bar shown while garments are prepared.
-pub(crate) fn garment_progress(quiet: bool) -> ProgressBar {
-    let style = ProgressStyle::with_template("preparing garments {bar:30} {pos}/{len} {msg}")
-        .expect("the template is valid");
-    if quiet { ProgressBar::hidden() } else { ProgressBar::new(0).with_style(style) }
-}
+pub(crate) const PREPARING: &str = "preparing garments {bar:30} {pos}/{len} {msg}";
 
-fn load_library(config: &Config, quiet: bool) -> Result<Library, Report> {
-    let library = load_under_bar(config, quiet)?;
-    if !quiet {
-        eprintln!(
+fn load_library(config: &Config) -> Result<Library, Report> {
+    let library = load_under_bar(config)?;
+    if !is_quiet() {
+        say(&format!(
             "body: {} · {} garments ({} not trained on) · {} joints · {} shape components{}",
             library.body.name,
             library.wardrobe.len(),
@@ -257,7 +243,7 @@ fn load_library(config: &Config, quiet: bool) -> Result<Library, Report> {
                 }
                 None => " · sampled poses".into(),
             }
-        );
+        ));
     }
     Ok(library)
 }

@@ -32,6 +32,17 @@ pub enum ConfigError {
         #[label("here")]
         span: Option<SourceSpan>,
     },
+    /// A configuration that extends another cannot be put together.
+    #[error("{}: {reason}", path.display())]
+    #[diagnostic(help(
+        "extends = \"base.toml\" names another configuration, relative to the folder of this one"
+    ))]
+    BadBase {
+        /// The file that extends another.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
     /// An override is not valid.
     #[error("--set {setting}: {message}")]
     #[diagnostic(help(
@@ -78,7 +89,12 @@ pub fn parse(text: &str, path: &Path, overrides: &[String]) -> Result<Config, Co
         span: error.span().map(SourceSpan::from),
         source_code: NamedSource::new(path.display().to_string(), text.to_owned()).with_language("toml"),
     };
-    let mut config: Config = toml::from_str(text).map_err(invalid)?;
+    let own: toml::Table = toml::from_str(text).map_err(invalid)?;
+    let mut config: Config = match own.contains_key(EXTENDS) {
+        // From the text itself, so that errors show their place.
+        false => toml::from_str(text).map_err(invalid)?,
+        true => extended(own, path, 0)?.try_into().map_err(invalid)?,
+    };
     if !overrides.is_empty() {
         let mut tree: toml::Value = toml::Value::try_from(&config)
             .map_err(|e| ConfigError::BadOverride { setting: String::new(), message: e.to_string() })?;
@@ -92,6 +108,44 @@ pub fn parse(text: &str, path: &Path, overrides: &[String]) -> Result<Config, Co
         None => Ok(config),
         Some((place, what, hint)) => {
             Err(ConfigError::Inconsistent { path: path.to_owned(), place, what, hint })
+        }
+    }
+}
+
+/// Key that names the configuration another one starts from: tables are merged, everything else replaces.
+pub(super) const EXTENDS: &str = "extends";
+/// Longer chains of configurations are taken for a circle.
+const LONGEST_CHAIN: usize = 8;
+
+/// `own`, read from `path`, over the configuration it extends.
+fn extended(mut own: toml::Table, path: &Path, depth: usize) -> Result<toml::Table, ConfigError> {
+    let bad = |reason: String| ConfigError::BadBase { path: path.to_owned(), reason };
+    let name = match own.remove(EXTENDS) {
+        None => return Ok(own),
+        Some(toml::Value::String(name)) => name,
+        Some(other) => return Err(bad(format!("{EXTENDS} is {other}, not the name of a file"))),
+    };
+    if depth == LONGEST_CHAIN {
+        return Err(bad(format!(
+            "extends {name}, the last of {LONGEST_CHAIN} in a row: do they extend each other?"
+        )));
+    }
+    let file = path.parent().unwrap_or(Path::new("")).join(&name);
+    let text = std::fs::read_to_string(&file).map_err(|e| bad(format!("extends {}: {e}", file.display())))?;
+    let base: toml::Table =
+        toml::from_str(&text).map_err(|e| bad(format!("extends {}: {}", file.display(), e.message())))?;
+    let mut whole = extended(base, &file, depth + 1)?;
+    merge(&mut whole, own);
+    Ok(whole)
+}
+
+fn merge(base: &mut toml::Table, over: toml::Table) {
+    for (key, value) in over {
+        match (base.get_mut(&key), value) {
+            (Some(toml::Value::Table(base)), toml::Value::Table(over)) => merge(base, over),
+            (_, value) => {
+                base.insert(key, value);
+            }
         }
     }
 }
@@ -186,6 +240,31 @@ mod tests {
         }
         let e = load(written(SMALL).path(), &["losses.strian.weight=1".into()]).unwrap_err();
         assert!(e.to_string().contains("strian"), "{e}");
+    }
+
+    #[test]
+    fn a_configuration_extends_another() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = |name: &str, text: &str| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, text).unwrap();
+            path
+        };
+        file("base.toml", SMALL);
+        file("middle.toml", "extends = \"base.toml\"\n[losses.strain]\nweight = 3.0\n[model]\nwidth = 9\n");
+        let top = file("top.toml", "extends = \"middle.toml\"\nseed = 5\n[model]\nembedding = 7\n");
+        let c = load(&top, &["losses.bending.weight=2".into()]).unwrap();
+        assert_eq!((c.seed, c.model.width, c.model.embedding, c.stages[0].steps), (5, 9, 7, 10));
+        assert_eq!((c.losses.strain.weight.at(0.0), c.losses.bending.weight.at(0.0)), (3.0, 2.0));
+        for (text, reason) in [
+            ("extends = \"none.toml\"", "none.toml"),
+            ("extends = 3", "not the name of a file"),
+            ("extends = \"wrong.toml\"", "extend each other"),
+            ("extends = \"base.toml\"\nsede = 1", "sede"),
+        ] {
+            let e = load(&file("wrong.toml", text), &[]).unwrap_err();
+            assert!(e.to_string().contains(reason), "{e}");
+        }
     }
 
     #[test]

@@ -37,6 +37,10 @@ use serde::{Deserialize, Serialize};
 pub struct Config {
     /// Everything random follows from this number: the same seed gives the same run, bit for bit. At most 2⁶³ − 1.
     pub seed: u64,
+    /// Run, checkpoint or model folder whose parameters the networks start with, to train a model further on other data or
+    /// another schedule; absent: random ones. Sizes of the networks, body, joints and pose encoding must be its own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub init_from: Option<String>,
     /// Body, garments and poses.
     pub data: DataConfig,
     /// The state the networks start from.

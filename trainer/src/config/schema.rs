@@ -1,10 +1,19 @@
 //! The JSON schema of a configuration, for editors and for reading.
 
 use super::Config;
+use super::load::EXTENDS;
+use serde_json::json;
 
 /// The JSON schema (draft 2020-12) of a configuration file: every key with meaning, type and default.
 pub fn schema() -> serde_json::Value {
-    schemars::schema_for!(Config).to_value()
+    let mut schema = schemars::schema_for!(Config).to_value();
+    // Resolved before a configuration is read, so that the type does not know it.
+    schema["properties"][EXTENDS] = json!({
+        "description": "Another configuration that this one starts from, relative to its folder; keys required below may \
+            then be missing. Tables are merged, everything else replaces.",
+        "type": ["string", "null"],
+    });
+    schema
 }
 
 #[cfg(test)]

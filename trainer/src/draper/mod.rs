@@ -34,7 +34,7 @@ pub use acceleration::{Acceleration, acceleration};
 pub use clothcombo_physics::contact::resolve::Certificate;
 pub use error::DraperError;
 pub use outfit::{MAX_GARMENTS, MAX_VERTICES, Outfit, Piece, PieceTimes};
-pub use refine::Refinement;
+pub use refine::{Refinement, refine};
 pub use report::{BodyReport, FrameReport, GarmentReport, ModelReport, Moment, PhaseTimes, Report, Stage};
 pub use shipped::shipped_model;
 pub use smooth::{Smoothing, smooth};

@@ -227,7 +227,8 @@ pub fn converged(run: &SolverRun) -> bool {
     run.stop == Stop::Converged.name()
 }
 
-fn mean_distance(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
+/// Mean distance of two states of the same vertices [m].
+pub(crate) fn mean_distance(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
     let sum: f64 =
         a.iter().zip(b).map(|(a, b)| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()).sum();
     sum / a.len().max(1) as f64

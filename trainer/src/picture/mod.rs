@@ -25,7 +25,7 @@ pub use curves::{Series, StageBoundary, draw_curves};
 pub use lines::{Line, LinePanel, draw_lines};
 pub use palette::{BODY_COLOUR, LAYER_COLOURS, layer_colour};
 pub use render::{Figure, render, render_with_camera};
-pub use save::save_png;
+pub use save::{png_bytes, save_png};
 pub use sheet::{LegendEntry, Sheet, SheetRow};
 
 use std::path::PathBuf;
@@ -52,10 +52,8 @@ pub enum PictureError {
         path: PathBuf,
     },
     /// The PNG encoder refused the picture.
-    #[error("cannot encode picture {path} of {width}x{height} pixels as PNG: {source}")]
+    #[error("cannot encode a picture of {width}x{height} pixels as PNG: {source}")]
     Encode {
-        /// The picture that was to be written.
-        path: PathBuf,
         /// Width [pixels].
         width: u32,
         /// Height [pixels].

@@ -1,63 +1,43 @@
-//! Writing a picture whole or not at all.
-
-use std::fs::{self, File, OpenOptions};
-use std::io::{BufWriter, Write};
-use std::path::Path;
-use std::sync::atomic::{AtomicU64, Ordering};
-
-use image::codecs::png::PngEncoder;
-use image::{ExtendedColorType, ImageEncoder, RgbImage};
+//! Pictures as PNG, in memory or as a file that appears whole or not at all.
 
 use super::PictureError;
+use clothcombo_data::format::atomic;
+use image::codecs::png::PngEncoder;
+use image::{ExtendedColorType, ImageEncoder, RgbImage};
+use std::path::Path;
 
-/// Distinguishes the temporary files of threads of one process.
-static SAVES: AtomicU64 = AtomicU64::new(0);
-
-/// Writes `picture` as PNG to `path`, which appears whole or not at all: the bytes go to a temporary name in the same
-/// folder, are synced and then renamed, so that a viewer never reads half a picture and a crash leaves the old one.
+/// `picture` as the bytes of a PNG file.
 ///
 /// # Errors
-/// [`PictureError::NoFileName`], [`PictureError::Write`] (missing or read-only folder, full disk; the temporary file
-/// is removed) and [`PictureError::Encode`] (a picture of zero pixels).
-pub fn save_png(picture: &RgbImage, path: &Path) -> Result<(), PictureError> {
-    let name = path.file_name().ok_or_else(|| PictureError::NoFileName { path: path.to_path_buf() })?;
-    let number = SAVES.fetch_add(1, Ordering::Relaxed);
-    let mut temporary_name = std::ffi::OsString::from(".");
-    temporary_name.push(name);
-    temporary_name.push(format!(".{}-{number}.tmp", std::process::id()));
-    let temporary = path.with_file_name(temporary_name);
-
-    let write_error = |source| PictureError::Write { path: path.to_path_buf(), source };
-    let file = OpenOptions::new().write(true).create_new(true).open(&temporary).map_err(write_error)?;
-    let saved = encode(picture, path, file).and_then(|()| fs::rename(&temporary, path).map_err(write_error));
-    if saved.is_err() {
-        // The first error is the one to report; a temporary file that cannot be removed changes nothing about it.
-        let _ = fs::remove_file(&temporary);
-    }
-    saved
+/// [`PictureError::Encode`] for a picture of zero pixels.
+pub fn png_bytes(picture: &RgbImage) -> Result<Vec<u8>, PictureError> {
+    let (width, height) = picture.dimensions();
+    let mut bytes = Vec::new();
+    PngEncoder::new(&mut bytes)
+        .write_image(picture, width, height, ExtendedColorType::Rgb8)
+        .map_err(|source| PictureError::Encode { width, height, source })?;
+    Ok(bytes)
 }
 
-fn encode(picture: &RgbImage, path: &Path, file: File) -> Result<(), PictureError> {
-    let (width, height) = picture.dimensions();
+/// Writes `picture` as PNG to `path`, so that a viewer never reads half a picture and a crash leaves the old one. Missing
+/// folders are made.
+///
+/// # Errors
+/// [`PictureError::NoFileName`], [`PictureError::Write`] (no right to write, full disk) and [`PictureError::Encode`] (a
+/// picture of zero pixels).
+pub fn save_png(picture: &RgbImage, path: &Path) -> Result<(), PictureError> {
+    if path.file_name().is_none() {
+        return Err(PictureError::NoFileName { path: path.to_path_buf() });
+    }
     let write_error = |source| PictureError::Write { path: path.to_path_buf(), source };
-    let mut buffer = BufWriter::new(file);
-    PngEncoder::new(&mut buffer).write_image(picture, width, height, ExtendedColorType::Rgb8).map_err(
-        |source| {
-            match source {
-                // The encoder also reports a picture without pixels as a system error.
-                image::ImageError::IoError(source) if width > 0 && height > 0 => write_error(source),
-                source => PictureError::Encode { path: path.to_path_buf(), width, height, source },
-            }
-        },
-    )?;
-    buffer.flush().map_err(write_error)?;
-    buffer.get_ref().sync_all().map_err(write_error)
+    atomic::write(path, &png_bytes(picture)?).map_err(write_error)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use image::Rgb;
+    use std::fs;
 
     fn file_names(folder: &Path) -> Vec<String> {
         let mut names: Vec<String> = fs::read_dir(folder)
@@ -80,13 +60,14 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_folder_is_named() {
+    fn a_missing_folder_is_made_and_a_file_in_its_place_is_named() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("missing").join("a.png");
-        let error = save_png(&RgbImage::new(2, 2), &path).unwrap_err();
+        save_png(&RgbImage::new(2, 2), &path).unwrap();
+        assert_eq!(file_names(path.parent().unwrap()), ["a.png"]);
+        let error = save_png(&RgbImage::new(2, 2), &path.join("b.png")).unwrap_err();
         assert!(matches!(error, PictureError::Write { .. }));
-        assert!(error.to_string().contains("a.png"), "{error}");
-        assert!(file_names(folder.path()).is_empty());
+        assert!(error.to_string().contains("b.png"), "{error}");
     }
 
     #[test]

@@ -93,6 +93,26 @@ pub fn draw_outfit(library: &Library, seed: u64, index: u64, most: usize) -> Sce
     SceneDraw { garments, bodies: vec![BodyDraw { shape: shape(library, &mut rng), pose }] }
 }
 
+/// Scenes of an evaluation lie behind the outfits; every question has a block of streams of its own.
+const STUDY_STREAM: u64 = VALIDATION_STREAM + (32 << 32);
+
+/// Scene `index` of question number `question` of an evaluation: `layers` garments of `pool` in random order, on a body in a
+/// pose never trained on.
+pub fn draw_study(
+    library: &Library,
+    seed: u64,
+    [question, index]: [usize; 2],
+    pool: &[usize],
+    layers: usize,
+    unseen: Unseen,
+) -> SceneDraw {
+    let mut rng = generator(seed, STUDY_STREAM + ((question as u64) << 32) + index as u64);
+    // The body first: with it, a question asked of two wardrobes is asked on the same bodies.
+    let body =
+        BodyDraw { shape: shape(library, &mut rng), pose: library.poses.draw_held_out(unseen, &mut rng) };
+    SceneDraw { garments: garments(pool, layers, &mut rng), bodies: vec![body] }
+}
+
 /// What a validation scene is drawn for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ValidationGroup {

@@ -16,7 +16,9 @@ mod split;
 mod wardrobe;
 
 pub use active_joints::ActiveJoints;
-pub use draw::{BodyDraw, Plan, SceneDraw, ValidationGroup, draw_outfit, draw_training, draw_validation};
+pub use draw::{
+    BodyDraw, Plan, SceneDraw, ValidationGroup, draw_outfit, draw_study, draw_training, draw_validation,
+};
 pub use error::LibraryError;
 pub use garment::LibraryGarment;
 pub use library::{Library, LicenceLine, load_body};

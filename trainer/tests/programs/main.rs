@@ -8,6 +8,7 @@ mod bench_step;
 mod check;
 mod common;
 mod drape;
+mod eval;
 mod fit;
 mod generate;
 mod import_programs;

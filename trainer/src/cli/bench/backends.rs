@@ -1,6 +1,7 @@
 //! `clothcombo bench backends`.
 
 use crate::cli::train::load_under_bar;
+use crate::cli::verbosity::say;
 use crate::device::Backend;
 use crate::measure::{Case, Subject};
 use clap::{Parser, ValueEnum};
@@ -62,7 +63,7 @@ struct Row {
 /// When a device fails, or disagrees with the first by more than is asked for.
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let config = Case::new(arguments.width, arguments.layers, arguments.vertices).config()?;
-    let library = Arc::new(load_under_bar(&config, false)?);
+    let library = Arc::new(load_under_bar(&config)?);
     let subject = |backend: Backend| Subject::new(config.clone(), library.clone(), 0, &backend.device());
     let first = subject(Backend::preferred())?;
     let scene = first.scene(0)?;
@@ -75,7 +76,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     devices.extend(asked.iter().filter(|device| **device != Backend::preferred()));
     let mut rows = Vec::with_capacity(devices.len());
     for device in devices {
-        eprintln!("measuring {}", name(device));
+        say(&format!("measuring {}", name(device)));
         let mut subject = subject(device)?;
         let same = copy(first.model(), subject.model())?;
         subject.set_model(same);

@@ -2,6 +2,7 @@
 
 use crate::checkpoint::Checkpoint;
 use crate::cli::train::load_under_bar;
+use crate::cli::verbosity::progress_bar;
 use crate::config::{Config, load};
 use crate::device::Backend;
 use crate::drape::{Networks, WardrobeTensors};
@@ -12,7 +13,6 @@ use crate::session::state;
 use clap::Parser;
 use clothcombo_data::format::obj;
 use clothcombo_physics::contact::resolve::ResolveSettings;
-use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -81,7 +81,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         // Nothing but the networks reads the eigenvectors, and most of the preparation is theirs.
         config.model.eigen_count = 1;
     }
-    let library = Arc::new(load_under_bar(&config, false)?);
+    let library = Arc::new(load_under_bar(&config)?);
     let results = measure(arguments, &config, &library, checkpoint.as_ref(), &settings)?;
     if arguments.json {
         let summary = json!({
@@ -123,9 +123,7 @@ fn measure(
         true => (0..arguments.draws).collect(),
         false => arguments.only.clone(),
     };
-    let style =
-        ProgressStyle::with_template("outfits {bar:30} {pos}/{len} · {eta} left").into_diagnostic()?;
-    let bar = ProgressBar::new(draws.len() as u64).with_style(style);
+    let bar = progress_bar(draws.len(), "outfits {bar:30} {pos}/{len} · {eta} left");
     let orders = orders(library, &arguments.orders)?;
     let mut garments = RestGarments::default();
     let mut results = Vec::with_capacity(draws.len());

@@ -1,11 +1,11 @@
 //! `clothcombo bench distance`.
 
+use crate::cli::verbosity::progress_bar;
 use crate::config::PoseConfig;
 use crate::evaluate::{RegionErrors, SignErrorSettings, SignErrors, WrongSigns, hard_poses, sign_errors};
 use crate::scene::{PoseLibrary, Unseen, load_body};
 use clap::Parser;
 use clothcombo_data::asset::{BODY_JOINT_COUNT, Body, Pose};
-use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, Report, miette};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -69,9 +69,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     }
     groups.extend(hard_poses().into_iter().map(|(name, pose)| (name.to_owned(), vec![pose])));
 
-    let style = ProgressStyle::with_template("poses {bar:40} {pos}/{len} · {eta} left").into_diagnostic()?;
     let total = groups.iter().map(|(_, poses)| poses.len()).sum::<usize>();
-    let bar = ProgressBar::new(total as u64).with_style(style);
+    let bar = progress_bar(total, "poses {bar:40} {pos}/{len} · {eta} left");
     let mut rows = Vec::with_capacity(groups.len());
     for (name, poses) in groups {
         let mut parts = Vec::with_capacity(poses.len());

@@ -2,6 +2,7 @@
 
 use crate::checkpoint::Checkpoint;
 use crate::cli::train::load_under_bar;
+use crate::cli::verbosity::progress_bar;
 use crate::config::{Config, ValidationConfig, load};
 use crate::device::Backend;
 use crate::drape::{Networks, WardrobeTensors};
@@ -13,7 +14,6 @@ use crate::scene::{Library, LibraryError, PreparedScene, ValidationGroup, draw_v
 use crate::session::state;
 use clap::Parser;
 use clothcombo_physics::equilibrium::SolverSettings;
-use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use rand::{SeedableRng, seq::index};
 use rand_chacha::ChaCha8Rng;
@@ -71,7 +71,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     settings.check().into_diagnostic()?;
     let checkpoint = arguments.checkpoint.as_deref().map(Checkpoint::open).transpose()?;
     let config = configuration(arguments, checkpoint.as_ref())?;
-    let library = Arc::new(load_under_bar(&config, false)?);
+    let library = Arc::new(load_under_bar(&config)?);
     let scenes = draw_scenes(&library, &config, arguments.scenes, arguments.seed.unwrap_or(config.seed))?;
     let networks = match &checkpoint {
         Some(checkpoint) => drape(checkpoint, &config, &library, &scenes)?.into_iter().map(Some).collect(),
@@ -140,9 +140,7 @@ fn solve_all(
     networks: &[Option<Draped>],
     settings: &SolverSettings,
 ) -> Result<Vec<SceneError>, Report> {
-    let style =
-        ProgressStyle::with_template("scenes {bar:30} {pos}/{len} · {eta} left · {msg}").into_diagnostic()?;
-    let bar = ProgressBar::new(scenes.len() as u64).with_style(style);
+    let bar = progress_bar(scenes.len(), "scenes {bar:30} {pos}/{len} · {eta} left · {msg}");
     let solve_one = |i: usize| -> Result<SceneError, Report> {
         let scene = ReferenceScene::new(&config.losses, &scenes[i]).into_diagnostic()?;
         let name = scene.garments.join(", ");

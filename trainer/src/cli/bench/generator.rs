@@ -1,9 +1,9 @@
 //! `clothcombo bench generator`: the promises of the garment generator over many seeds.
 
+use crate::cli::verbosity::progress_bar;
 use crate::scene::load_body;
 use clap::Parser;
 use clothcombo_data::generate::{GarmentGenerator, GarmentSettings, Survey};
-use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, Report, miette};
 
 /// Makes garments and measures each against the generator's promises
@@ -40,9 +40,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let body = load_body(&arguments.body, 0)?;
     let generator = GarmentGenerator::new(&body).into_diagnostic()?;
     let settings = GarmentSettings { target_vertices: arguments.vertices, ..GarmentSettings::default() };
-    let style =
-        ProgressStyle::with_template("garments {bar:40} {pos}/{len} · {eta} left").into_diagnostic()?;
-    let bar = ProgressBar::new(arguments.count as u64).with_style(style);
+    let bar = progress_bar(arguments.count, "garments {bar:40} {pos}/{len} · {eta} left");
     let survey = Survey::new(&generator, arguments.count, arguments.seed, &settings, &|| bar.inc(1))
         .into_diagnostic()?;
     bar.finish_and_clear();

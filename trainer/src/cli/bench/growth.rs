@@ -1,9 +1,9 @@
 //! `clothcombo bench growth`.
 
+use crate::cli::verbosity::progress_bar;
 use crate::measure::Case;
 use crate::picture::{Line, LinePanel, draw_lines, save_png};
 use clap::Parser;
-use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use serde::Serialize;
 use serde_json::Value;
@@ -88,8 +88,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     for case in sweeps.iter().flat_map(|(_, cases)| cases) {
         case.config()?;
     }
-    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} {msg} · {eta} left").into_diagnostic()?;
-    let bar = ProgressBar::new(sweeps.iter().map(|(_, cases)| cases.len() as u64).sum()).with_style(style);
+    let bar = progress_bar(
+        sweeps.iter().map(|(_, cases)| cases.len()).sum(),
+        "{bar:40} {pos}/{len} {msg} · {eta} left",
+    );
     let mut measured = Vec::with_capacity(sweeps.len());
     for (varied, cases) in sweeps {
         let mut points = Vec::with_capacity(cases.len());

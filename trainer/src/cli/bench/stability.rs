@@ -1,10 +1,10 @@
 //! `clothcombo bench stability`: the hard cases, one row each.
 
+use crate::cli::verbosity::progress_bar;
 use crate::scene::load_body;
 use clap::Args;
 use clothcombo_data::hard_cases::{CaseReport, Expectation, HardCases, Outcome, TermReport};
 use clothcombo_physics::energy::{EnergySettings, Term, TermMap};
-use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, Report, miette};
 use serde_json::{Value, json};
 
@@ -47,8 +47,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let body = load_body(&arguments.body, 0)?;
     let settings = if arguments.printed { EnergySettings::printed() } else { EnergySettings::default() };
     let cases = HardCases::new(&body).into_diagnostic()?;
-    let style = ProgressStyle::with_template("hard cases {bar:40} {pos}/{len} {msg}").into_diagnostic()?;
-    let bar = ProgressBar::new(selected.len() as u64).with_style(style);
+    let bar = progress_bar(selected.len(), "hard cases {bar:40} {pos}/{len} {msg}");
     let reports: Vec<CaseReport> = selected
         .into_iter()
         .map(|case| {

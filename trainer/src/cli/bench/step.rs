@@ -1,6 +1,7 @@
 //! `clothcombo bench step`.
 
 use crate::cli::train::load_under_bar;
+use crate::cli::verbosity::say;
 use crate::config::{Config, load};
 use crate::device::Backend;
 use crate::measure::{Case, Costs, PHASES, Profile, Subject, export};
@@ -136,7 +137,7 @@ fn made_up(arguments: &Arguments) -> Result<Vec<Measured>, Report> {
     let mut measured = Vec::with_capacity(cases.len());
     for case in cases {
         let config = case.config()?;
-        let library = Arc::new(load_under_bar(&config, false)?);
+        let library = Arc::new(load_under_bar(&config)?);
         let mut subject = Subject::new(config, library, 0, &arguments.device.device())?;
         if let Some(folder) = &arguments.export {
             export(&subject, folder)?;
@@ -168,7 +169,7 @@ fn cases(arguments: &Arguments) -> Vec<Case> {
 }
 
 fn stages(arguments: &Arguments, config: Config) -> Result<Vec<Measured>, Report> {
-    let library = Arc::new(load_under_bar(&config, false)?);
+    let library = Arc::new(load_under_bar(&config)?);
     let names: Vec<String> = config.stages.iter().map(|stage| stage.name.clone()).collect();
     let stage = |(index, name): (usize, String)| {
         let mut subject = Subject::new(config.clone(), library.clone(), index, &arguments.device.device())?;
@@ -183,7 +184,7 @@ fn measure(
     case: Option<Case>,
     arguments: &Arguments,
 ) -> Result<Measured, Report> {
-    eprintln!("measuring {name}");
+    say(&format!("measuring {name}"));
     let scene = subject.scene(0)?;
     let costs = subject.costs(arguments.seconds)?;
     let profile = subject.profile(arguments.steps)?;

@@ -3,6 +3,7 @@
 use super::step::short;
 use crate::checkpoint::Checkpoint;
 use crate::cli::train::load_under_bar;
+use crate::cli::verbosity::say;
 use crate::config::{Config, LossesConfig, ValidationConfig, load};
 use crate::device::Backend;
 use crate::drape::{Networks, WardrobeTensors};
@@ -90,7 +91,7 @@ struct LossForm {
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let checkpoint = Checkpoint::open(&arguments.checkpoint[0])?;
     let config = load(&checkpoint.path.join("config.toml"), &[])?;
-    let library = Arc::new(load_under_bar(&config, false)?);
+    let library = Arc::new(load_under_bar(&config)?);
     let scenes = scenes(&library, &config, arguments)?;
     let trained = networks(&checkpoint, &config, &library)?;
 
@@ -106,7 +107,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     )?;
     let mut rows = vec![base.clone()];
     let mut add = |name: &str, k: usize, model: ClothCombo, library: &Arc<Library>| -> Result<(), Report> {
-        eprintln!("measuring {name}");
+        say(&format!("measuring {name}"));
         rows.push(drapes(name, k, model, library, &scenes, Some(&base), arguments.seconds)?);
         Ok(())
     };
@@ -115,7 +116,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     for &count in arguments.eigen_counts.iter().filter(|count| **count != k) {
         let mut other = config.clone();
         other.model.eigen_count = count;
-        let library = Arc::new(load_under_bar(&other, false)?);
+        let library = Arc::new(load_under_bar(&other)?);
         add(&format!("k = {count}"), count, trained.clone(), &library)?;
     }
     for path in &arguments.checkpoint[1..] {
@@ -124,7 +125,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         let own = Config { model: other.model.clone(), ..config.clone() };
         let library = match other.model.eigen_count {
             same if same == k => library.clone(),
-            _ => Arc::new(load_under_bar(&own, false)?),
+            _ => Arc::new(load_under_bar(&own)?),
         };
         let name = format!("{} (width {})", path.display(), other.model.width);
         add(&name, other.model.eigen_count, networks(&checkpoint, &own, &library)?, &library)?;

@@ -4,13 +4,14 @@ mod job;
 mod outfits;
 mod summary;
 
+use crate::cli::verbosity::{progress_bar, say};
 use crate::device::Backend;
 use crate::draper::output::{Show, Staged, write};
 use crate::draper::{Drape, Draper, DraperError, DraperSettings, Outfit, Report, SourceGarment, smooth};
 use clap::{Parser, ValueEnum};
 use clothcombo_data::format::atomic;
 use clothcombo_physics::contact::resolve::ResolveSettings;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use job::{Job, Scenes, ordered};
 use miette::{IntoDiagnostic, Report as Failure, WrapErr};
 use serde_json::json;
@@ -155,7 +156,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     staged.commit()?;
     print(arguments, &reports)?;
     let seconds = clock.elapsed().as_secs_f64();
-    eprintln!("{} draped and written in {seconds:.2} s after loading", arguments.output.display());
+    say(&format!("{} draped and written in {seconds:.2} s after loading", arguments.output.display()));
     Ok(())
 }
 
@@ -246,10 +247,9 @@ fn drape_job(
 }
 
 fn drape_all(draper: &Draper, outfit: &Outfit, scenes: &Scenes) -> Result<Vec<Drape>, Failure> {
-    let style = ProgressStyle::with_template("frames {bar:30} {pos}/{len} · {eta} left").into_diagnostic()?;
     let bar = match scenes.states.len() {
         1 => ProgressBar::hidden(),
-        frames => ProgressBar::new(frames as u64).with_style(style),
+        frames => progress_bar(frames, "frames {bar:30} {pos}/{len} · {eta} left"),
     };
     let drapes = scenes.states.iter().map(|state| {
         let mut drape = draper.drape(outfit, state)?;

@@ -1,0 +1,201 @@
+//! `clothcombo eval`: everything a trained model is judged by, in one report.
+
+use crate::checkpoint::TrainedModel;
+use crate::cli::print_all;
+use crate::cli::train::load_under_bar;
+use crate::cli::verbosity::{progress_bar, say};
+use crate::config::{Config, load};
+use crate::device::Backend;
+use crate::draper::shipped_model;
+use crate::report::html::utc;
+use crate::scene::Library;
+use crate::study::{Other, Page, Sizes, Study, Subject, study};
+use clap::Parser;
+use clothcombo_data::format::atomic;
+use miette::{IntoDiagnostic, Report, WrapErr, miette};
+use serde_json::json;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
+
+/// The paper's tables for a trained model, speed against error, stability, pictures
+///
+/// Writes eval.json, eval.md and report.html, one page that needs no network. Scenes are drawn from the seed: poses and shapes
+/// never trained on, garments never trained on apart from the others.
+#[derive(Parser)]
+#[command(after_help = "Examples:\n  clothcombo eval -o report\n  \
+        clothcombo eval --checkpoint runs/open --quick -o report\n  \
+        clothcombo eval --checkpoint runs/all --ablation \"without z_v=runs/without-z_v\" -o report\n  \
+        clothcombo eval --specific \"only VNeckTop=runs/vnecktop\" -o report")]
+pub struct Arguments {
+    /// Run, checkpoints or model folder; default: the model shipped with the project
+    #[arg(long, value_name = "DIR")]
+    checkpoint: Option<PathBuf>,
+    /// Configuration (TOML) that names data and losses; default: that of the model
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Overrides one value of the configuration; repeatable
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
+    /// Folder of the report; an earlier report in it is replaced
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// A few scenes per question and no gallery: minutes instead of a quarter of an hour
+    #[arg(long)]
+    quick: bool,
+    /// A model trained on the same data with a part left out, for the ablation table; repeatable
+    #[arg(long, value_name = "NAME=DIR", value_parser = named)]
+    ablation: Vec<(String, PathBuf)>,
+    /// A model trained on a single garment of the data, measured on this garment; repeatable
+    #[arg(long, value_name = "NAME=DIR", value_parser = named)]
+    specific: Vec<(String, PathBuf)>,
+    /// Seed of the scenes; default: that of the configuration
+    #[arg(long)]
+    seed: Option<u64>,
+    /// The compute device
+    #[arg(long, value_enum, default_value_t = Backend::preferred())]
+    device: Backend,
+}
+
+fn named(text: &str) -> Result<(String, PathBuf), String> {
+    match text.split_once('=') {
+        Some((name, path)) if !name.is_empty() && !path.is_empty() => Ok((name.to_owned(), path.into())),
+        _ => Err("give a name and a folder: NAME=DIR".to_owned()),
+    }
+}
+
+/// Names of the files that make a report.
+const JSON: &str = "eval.json";
+const MARKDOWN: &str = "eval.md";
+const HTML: &str = "report.html";
+
+/// Runs the verb.
+///
+/// # Errors
+/// When a model or its data cannot be read, models do not fit each other, or the report cannot be written.
+pub fn run(arguments: &Arguments) -> Result<(), Report> {
+    let folder = &arguments.output;
+    check_output(folder)?;
+    let trained = match &arguments.checkpoint {
+        Some(path) => TrainedModel::open(path)?,
+        None => shipped_model()?,
+    };
+    let config = match &arguments.config {
+        Some(file) => load(file, &arguments.overrides)?,
+        None => load(&trained.folder.join("config.toml"), &arguments.overrides)?,
+    };
+    let subject = subject(arguments, &trained, config)?;
+    let ablations = others(arguments, &arguments.ablation, &subject)?;
+    let specific = others(arguments, &arguments.specific, &subject)?;
+    check_specific(&specific, &subject.library)?;
+
+    let sizes = if arguments.quick { Sizes::QUICK } else { Sizes::FULL };
+    let bar = progress_bar(0, "{bar:30} {pos}/{len} · {elapsed} · {msg}");
+    let clock = Instant::now();
+    let found = study(&subject, &ablations, &specific, sizes, &|part, steps| match part {
+        Some(part) => {
+            bar.set_length(steps as u64);
+            bar.set_message(part.to_owned());
+        }
+        None => bar.inc(1),
+    })?;
+    bar.finish_and_clear();
+    let page = page(&trained, &found, clock.elapsed().as_secs_f64())?;
+    write(folder, &found, &page)?;
+    print_all(&format!("{}\n", page.markdown()))?;
+    say(&format!("written: {}", folder.join(HTML).display()));
+    Ok(())
+}
+
+/// Before hours are spent: whether the report can be written where it is wanted.
+fn check_output(folder: &Path) -> Result<(), Report> {
+    let occupied = fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
+    if occupied && !folder.join(JSON).is_file() {
+        return Err(miette!(
+            help = "choose another folder with -o",
+            "{} holds files that are no evaluation",
+            folder.display()
+        ));
+    }
+    fs::create_dir_all(folder).into_diagnostic().wrap_err_with(|| format!("{}", folder.display()))
+}
+
+fn subject(arguments: &Arguments, trained: &TrainedModel, mut config: Config) -> Result<Subject, Report> {
+    config.seed = arguments.seed.unwrap_or(config.seed);
+    let library = Arc::new(load_under_bar(&config)?);
+    Subject::new(trained, config, library, &arguments.device.device())
+}
+
+/// Further models, each with its own data, measured by the losses of `first` on scenes of its seed.
+fn others(arguments: &Arguments, named: &[(String, PathBuf)], first: &Subject) -> Result<Vec<Other>, Report> {
+    let other = |(name, path): &(String, PathBuf)| {
+        let trained = TrainedModel::open(path)?;
+        let mut config = trained.config.clone();
+        config.losses = first.config.losses.clone();
+        config.seed = first.config.seed;
+        let subject = subject(arguments, &trained, config).wrap_err_with(|| name.clone())?;
+        Ok(Other { name: name.clone(), subject })
+    };
+    named.iter().map(other).collect()
+}
+
+fn check_specific(specific: &[Other], library: &Library) -> Result<(), Report> {
+    let knows = |name: &str| (0..library.wardrobe.len()).any(|g| library.wardrobe.card(g).name == name);
+    for other in specific {
+        let wardrobe = &other.subject.library.wardrobe;
+        if let Some(stranger) = (0..wardrobe.len()).map(|g| &wardrobe.card(g).name).find(|name| !knows(name))
+        {
+            return Err(miette!(
+                help = "train the garment-specific model on a garment of the configuration's own data",
+                "{}: the data of the evaluated model has no garment {stranger:?}",
+                other.name
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn page(trained: &TrainedModel, found: &Study, seconds: f64) -> Result<Page, Report> {
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs());
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    Ok(Page {
+        title: format!("Evaluation of {}", trained.folder.display()),
+        facts: vec![
+            ("command", format!("clothcombo {}", arguments.join(" "))),
+            (
+                "model",
+                format!(
+                    "{} after {} steps, width {}",
+                    trained.folder.display(),
+                    trained.state.step,
+                    trained.config.model.width
+                ),
+            ),
+            ("seed", found.seed.to_string()),
+            (
+                "made",
+                format!("{}, in {:.0} s on {} threads", utc(now), seconds, rayon::current_num_threads()),
+            ),
+        ],
+        sections: found.sections()?,
+    })
+}
+
+fn write(folder: &Path, found: &Study, page: &Page) -> Result<(), Report> {
+    let save = |name: &str, bytes: &[u8]| {
+        let path = folder.join(name);
+        atomic::write(&path, bytes)
+            .into_diagnostic()
+            .wrap_err_with(|| format!("cannot write {}", path.display()))
+    };
+    for (name, _, png) in page.sections.iter().flat_map(|section| &section.pictures) {
+        save(name, png)?;
+    }
+    save(MARKDOWN, page.markdown().as_bytes())?;
+    save(HTML, page.html().as_bytes())?;
+    let tables: Vec<_> =
+        page.sections.iter().map(|s| json!({ "title": s.title, "tables": s.tables })).collect();
+    let json = json!({ "facts": page.facts, "study": found, "sections": tables });
+    save(JSON, serde_json::to_string_pretty(&json).into_diagnostic()?.as_bytes())
+}

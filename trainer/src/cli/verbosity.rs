@@ -1,0 +1,62 @@
+//! How much the programs say: the same flags for every verb.
+
+use clap::{ArgAction, Args};
+use indicatif::{ProgressBar, ProgressStyle};
+use std::io::IsTerminal;
+use std::sync::atomic::{AtomicBool, Ordering};
+use tracing_subscriber::EnvFilter;
+
+/// Belongs to the process, like the log.
+static QUIET: AtomicBool = AtomicBool::new(false);
+
+/// How much is said.
+#[derive(Args, Clone, Copy, Debug, Default)]
+pub struct Verbosity {
+    /// No progress, only errors
+    #[arg(long, short, global = true)]
+    quiet: bool,
+    /// More log lines; twice for debugging (RUST_LOG overrides both)
+    #[arg(long, short, global = true, action = ArgAction::Count)]
+    verbose: u8,
+}
+
+impl Verbosity {
+    /// Starts the log on stderr; `usual` is its filter where no flag is given.
+    pub fn apply(self, usual: &str) {
+        QUIET.store(self.quiet, Ordering::Relaxed);
+        let default = match (self.quiet, self.verbose) {
+            (true, _) => "error",
+            (false, 0) => usual,
+            (false, 1) => "info,clothcombo_trainer=debug",
+            (false, _) => "debug",
+        };
+        let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(default));
+        // A second call (tests run several sessions in one process) keeps the first subscriber.
+        let _ = tracing_subscriber::fmt()
+            .with_env_filter(filter)
+            .with_ansi(std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none())
+            .with_writer(std::io::stderr)
+            .try_init();
+    }
+}
+
+/// Whether only errors are to be said.
+pub(crate) fn is_quiet() -> bool {
+    QUIET.load(Ordering::Relaxed)
+}
+
+/// A bar on stderr for `length` steps, none with `--quiet` or off a terminal.
+pub(crate) fn progress_bar(length: usize, template: &str) -> ProgressBar {
+    if is_quiet() {
+        return ProgressBar::hidden();
+    }
+    let style = ProgressStyle::with_template(template).expect("templates of this crate are valid");
+    ProgressBar::new(length as u64).with_style(style)
+}
+
+/// One line on stderr, none with `--quiet`.
+pub(crate) fn say(line: &str) {
+    if !is_quiet() {
+        eprintln!("{line}");
+    }
+}

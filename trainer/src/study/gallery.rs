@@ -1,0 +1,170 @@
+//! Pictures: orders, shapes, poses, growing stacks, different garments over the same ones.
+
+use super::subject::Subject;
+use crate::drape::Networks;
+use crate::evaluate::Draped;
+use crate::evaluate::certificates::{DrapedScene, RestGarments};
+use crate::picture::{LegendEntry, Sheet, SheetRow, View, layer_colour};
+use crate::samples::picture_of;
+use crate::scene::{BodyDraw, SceneDraw, Unseen, draw_study};
+use clothcombo_data::asset::{Category, Pose};
+use clothcombo_physics::contact::resolve::ResolveSettings;
+use image::RgbImage;
+use miette::{IntoDiagnostic, Report};
+
+/// A picture and what it shows.
+pub struct Picture {
+    /// Name of its file, without ending.
+    pub name: &'static str,
+    /// One sentence.
+    pub caption: String,
+    /// The picture.
+    pub image: RgbImage,
+}
+
+/// Number of pictures.
+pub const COUNT: usize = 5;
+/// Columns of a sheet.
+const COLUMNS: usize = 5;
+
+struct Studio<'a> {
+    subject: &'a Subject,
+    networks: Networks<'a>,
+    rest: RestGarments,
+    question: usize,
+}
+
+/// Draws all galleries, garments never trained on where there are some of their kind.
+///
+/// # Errors
+/// When a scene cannot be draped or resolved.
+pub fn draw(subject: &Subject, question: usize, done: &(dyn Fn() + Sync)) -> Result<Vec<Picture>, Report> {
+    let mut studio =
+        Studio { subject, networks: subject.networks(), rest: RestGarments::default(), question };
+    let shirt = |n| subject.pick(&[Category::TShirt, Category::Top], n);
+    let legs = |n| subject.pick(&[Category::Trousers, Category::Skirt], n);
+    let skirt = |n| subject.pick(&[Category::Skirt, Category::Dress], n);
+    let over = |n| subject.pick(&[Category::OpenShirt, Category::Dress], n);
+    let three = [shirt(0), skirt(0), over(0)];
+    let t_pose = Pose::t_pose(subject.library.body.joint_count());
+    let mean = BodyDraw { shape: vec![0.0; subject.library.shape_count], pose: t_pose };
+    let mut pictures = Vec::with_capacity(COUNT);
+    let mut add = |name, caption: &str, image| {
+        pictures.push(Picture { name, caption: caption.to_owned(), image });
+        done();
+    };
+
+    let [a, b, c] = three;
+    let orders = [[a, b, c], [a, c, b], [b, a, c], [b, c, a], [c, a, b]];
+    let cells = orders.map(|order| (order.to_vec(), mean.clone()));
+    let columns = orders.map(|order| {
+        order
+            .map(|g| {
+                if g == a {
+                    "1"
+                } else if g == b {
+                    "2"
+                } else {
+                    "3"
+                }
+            })
+            .join(" < ")
+    });
+    add(
+        "orders",
+        "The same three garments in different orders, inner to outer.",
+        studio.sheet(&cells, &columns)?,
+    );
+
+    let bodies: Vec<BodyDraw> = (0..COLUMNS).map(|i| studio.body(i)).collect();
+    let cells = bodies.iter().map(|b| (three.to_vec(), BodyDraw { pose: mean.pose.clone(), ..b.clone() }));
+    let numbers: Vec<String> = (1..=COLUMNS).map(|i| format!("body {i}")).collect();
+    add(
+        "shapes",
+        "The same outfit on bodies of random shape.",
+        studio.sheet(&cells.collect::<Vec<_>>(), &numbers)?,
+    );
+
+    let cells = bodies.iter().map(|b| (three.to_vec(), BodyDraw { shape: mean.shape.clone(), ..b.clone() }));
+    let numbers: Vec<String> = (1..=COLUMNS).map(|i| format!("pose {i}")).collect();
+    add(
+        "poses",
+        "The same outfit in poses never trained on.",
+        studio.sheet(&cells.collect::<Vec<_>>(), &numbers)?,
+    );
+
+    let stack = [legs(0), shirt(0), skirt(0), over(0), over(1)];
+    let pose = bodies[0].clone();
+    let cells: Vec<_> = (1..=COLUMNS).map(|n| (stack[..n].to_vec(), pose.clone())).collect();
+    let numbers: Vec<String> = (1..=COLUMNS).map(|n| format!("{n} layers")).collect();
+    add("layers", "Garments put on one after the other.", studio.sheet(&cells, &numbers)?);
+
+    let cells: Vec<_> = (0..COLUMNS)
+        .map(|n| {
+            (vec![legs(0), shirt(0), if n % 2 == 0 { over(n / 2) } else { skirt(n / 2) }], bodies[1].clone())
+        })
+        .collect();
+    let numbers: Vec<String> = (1..=COLUMNS).map(|n| format!("outer garment {n}")).collect();
+    add("outer", "Different garments over the same two.", studio.sheet(&cells, &numbers)?);
+    Ok(pictures)
+}
+
+impl Subject {
+    /// The `n`-th garment of the first of `categories` that has one: garments never trained on come first. Garment 0 where
+    /// there is none of them.
+    fn pick(&self, categories: &[Category], n: usize) -> usize {
+        let split = &self.library.split;
+        let all = || split.test.iter().chain(&split.validation).chain(&split.training).copied();
+        let of = |category: &Category| {
+            let wardrobe = &self.library.wardrobe;
+            all().filter(|&g| wardrobe.card(g).category == *category).collect::<Vec<usize>>()
+        };
+        let found = categories.iter().map(of).find(|garments| !garments.is_empty()).unwrap_or_default();
+        found.get(n % found.len().max(1)).copied().unwrap_or(0)
+    }
+}
+
+impl Studio<'_> {
+    fn body(&self, index: usize) -> BodyDraw {
+        let at = [self.question, index];
+        draw_study(&self.subject.library, self.subject.config.seed, at, &[0], 1, Unseen::Poses)
+            .bodies
+            .remove(0)
+    }
+
+    /// Outfits from left to right; seen from the front, then from the back.
+    fn sheet(&mut self, outfits: &[(Vec<usize>, BodyDraw)], columns: &[String]) -> Result<RgbImage, Report> {
+        let mut rows = [View::ThreeQuarter, View::Back]
+            .map(|view| SheetRow { label: view.name().to_owned(), ..SheetRow::default() });
+        for (garments, body) in outfits {
+            let [front, back] = self.views(garments, body)?;
+            rows[0].cells.push(front);
+            rows[1].cells.push(back);
+        }
+        // Colours stand for layers; names are given where they mean the same garments all along.
+        let longest = outfits.iter().map(|(garments, _)| garments).max_by_key(|garments| garments.len());
+        let wardrobe = &self.subject.library.wardrobe;
+        let agrees = |names: &Vec<usize>| outfits.iter().all(|(garments, _)| names.starts_with(garments));
+        rows[0].legend = longest
+            .filter(|garments| agrees(garments))
+            .into_iter()
+            .flatten()
+            .enumerate()
+            .map(|(i, &g)| LegendEntry { colour: layer_colour(i), name: wardrobe.card(g).name.clone() })
+            .collect();
+        Ok(Sheet { title: String::new(), columns: columns.to_vec(), rows: rows.to_vec() }.compose())
+    }
+
+    /// An outfit draped and resolved.
+    fn views(&mut self, garments: &[usize], body: &BodyDraw) -> Result<[RgbImage; 2], Report> {
+        let draw = SceneDraw { garments: garments.to_vec(), bodies: vec![body.clone()] };
+        let scene = self.subject.prepare(draw)?;
+        let draped = self.networks.drape(&scene)?.layered;
+        let resolved = DrapedScene::new(&scene, self.rest.of(&scene), &draped.posed)
+            .resolved(&ResolveSettings::default())
+            .into_diagnostic()?;
+        let posed = resolved.positions.concat().into_iter().map(|p| p.map(|v| v as f32)).collect();
+        let draped = Draped { posed, ..draped };
+        Ok([View::ThreeQuarter, View::Back].map(|view| picture_of(&scene, &draped, view)))
+    }
+}

@@ -1,0 +1,169 @@
+//! Table 3: what several layers cost each garment, and what is on the wrong side before and after the post-process.
+
+use super::estimate::{Estimate, Ratio};
+use super::subject::Subject;
+use super::table::{Table, number, percent};
+use crate::drape::NetworkDrape;
+use crate::evaluate::certificates::{DrapedScene, OutfitResult, RestGarments};
+use crate::scene::{PreparedScene, Unseen, draw_study};
+use clothcombo_physics::contact::resolve::ResolveSettings;
+use clothcombo_physics::energy::Term;
+use miette::{IntoDiagnostic, Report};
+use serde::Serialize;
+
+/// Outfits of one number of layers.
+#[derive(Clone, Debug, Serialize)]
+pub struct LayerCount {
+    /// Number of garments M.
+    pub layers: usize,
+    /// Number of outfits.
+    pub scenes: usize,
+    /// Strain of each layer in the outfit over that of the same garment draped alone, innermost first.
+    pub strain: Vec<Ratio>,
+    /// Median over the outfits of the ratio of each.
+    pub strain_median: Vec<f64>,
+    /// Share of outer vertices on the wrong side, closest surface point: every garment draped alone.
+    pub wrong_side_single: Estimate,
+    /// The same after untangling.
+    pub wrong_side: Estimate,
+    /// The same after the post-process.
+    pub wrong_side_resolved: Estimate,
+    /// Share of outfits without an intersection with the body or between garments, before and after the post-process.
+    pub clear: [f64; 2],
+    /// Rise of the strain energy by the post-process, median share.
+    pub strain_added: f64,
+    /// Exact pairs between garments before the post-process.
+    pub layer_pairs: Estimate,
+    /// Time of the post-process per garment [ms].
+    pub post_ms: Estimate,
+}
+
+/// Drapes `scenes` random outfits of `layers` garments of the whole wardrobe, held-out ones among them, in random order.
+///
+/// # Errors
+/// When a scene cannot be draped or resolved.
+pub fn ask(
+    subject: &Subject,
+    question: usize,
+    layers: usize,
+    scenes: usize,
+    done: &(dyn Fn() + Sync),
+) -> Result<LayerCount, Report> {
+    let all: Vec<usize> = (0..subject.library.wardrobe.len()).collect();
+    let networks = subject.networks();
+    let mut rest = RestGarments::default();
+    let settings = ResolveSettings::default();
+    let (mut single, mut layered) = (vec![Vec::new(); layers], vec![Vec::new(); layers]);
+    let (mut wrong_single, mut results) = (Vec::new(), Vec::new());
+    for index in 0..scenes {
+        let draw =
+            draw_study(&subject.library, subject.config.seed, [question, index], &all, layers, Unseen::Poses);
+        let scene = subject.prepare(draw)?;
+        let drape = networks.drape(&scene)?;
+        for (layer, [alone, worn]) in strains(&scene, &drape).into_iter().enumerate() {
+            single[layer].push(alone);
+            layered[layer].push(worn);
+        }
+        let alone = DrapedScene::new(&scene, rest.of(&scene), &drape.single.posed);
+        wrong_single.push(alone.certificate().into_diagnostic()?.order_violations);
+        let draped = DrapedScene::new(&scene, rest.of(&scene), &drape.layered.posed);
+        results.push(OutfitResult::new(index, &scene, &draped, &settings).into_diagnostic()?.0);
+        done();
+    }
+    let over = |f: &dyn Fn(&OutfitResult) -> f64| Estimate::of(&results.iter().map(f).collect::<Vec<_>>());
+    let clear = |f: &dyn Fn(&OutfitResult) -> bool| {
+        results.iter().filter(|r| f(r)).count() as f64 / results.len().max(1) as f64
+    };
+    let added: Vec<f64> = results.iter().filter_map(|r| r.strain_added).collect();
+    let times: Vec<f64> = results.iter().flat_map(|r| r.milliseconds.clone()).collect();
+    let ratios = |layer: usize| -> Vec<f64> {
+        single[layer].iter().zip(&layered[layer]).map(|(alone, worn)| worn / alone).collect()
+    };
+    Ok(LayerCount {
+        layers,
+        scenes,
+        strain: (0..layers).map(|l| Ratio::of(&layered[l], &single[l])).collect(),
+        strain_median: (0..layers).map(|l| Estimate::of(&ratios(l)).spread.median).collect(),
+        wrong_side_single: Estimate::of(&wrong_single),
+        wrong_side: over(&|r| r.before.order_violations),
+        wrong_side_resolved: over(&|r| r.after.order_violations),
+        clear: [clear(&|r| r.before.is_clear()), clear(&|r| r.after.is_clear())],
+        strain_added: Estimate::of(&added).spread.median,
+        layer_pairs: over(&|r| r.before.layer_triangle_pairs as f64),
+        post_ms: Estimate::of(&times),
+    })
+}
+
+/// Strain of every garment draped alone and in the outfit [J].
+fn strains(scene: &PreparedScene, drape: &NetworkDrape) -> Vec<[f64; 2]> {
+    let energy = &scene.bodies[0].energy;
+    let [single, layered] =
+        [&drape.single, &drape.layered].map(|d| energy.raw(&d.posed, &d.canonical).garments);
+    let strain = |raw: &clothcombo_physics::energy::TermMap<Option<f64>>| raw[Term::Strain].unwrap_or(0.0);
+    single.iter().zip(&layered).map(|(alone, worn)| [strain(alone), strain(worn)]).collect()
+}
+
+/// The paper's Table 3: rows M = 1 to 6.
+const PAPER: [&[f64]; 6] = [
+    &[1.0],
+    &[1.10, 1.29],
+    &[1.16, 1.28, 1.33],
+    &[1.32, 1.47, 1.43, 1.83],
+    &[1.40, 1.63, 1.45, 1.69, 2.07],
+    &[1.61, 1.46, 1.44, 1.63, 1.72, 2.65],
+];
+
+/// As tables.
+pub fn tables(counts: &[LayerCount]) -> Vec<Table> {
+    let most = counts.iter().map(|c| c.layers).max().unwrap_or(0);
+    let numbers: Vec<String> = (1..=most).map(|l| l.to_string()).collect();
+    let head: Vec<&str> = ["layers M"].into_iter().chain(numbers.iter().map(String::as_str)).collect();
+    let filled = |mut row: Vec<String>| {
+        row.resize(most + 1, String::new());
+        row
+    };
+    let mut strain = Table::new("Strain of each layer, innermost first, over the same garment draped alone", &head)
+        .with_note("Ratio of means (median of the ratios); after the networks, before the post-process. More than 6 layers were never trained on.");
+    for count in counts {
+        let cells = count.strain.iter().zip(&count.strain_median);
+        let mut row = vec![format!("M = {}", count.layers)];
+        row.extend(cells.map(|(r, median)| format!("{} ({})", number(r.of_means), number(*median))));
+        strain.rows.push(filled(row));
+        if let Some(paper) = PAPER.get(count.layers - 1) {
+            let mut row = vec![format!("paper, M = {}", count.layers)];
+            row.extend(paper.iter().map(|v| format!("{v:.2}")));
+            strain.rows.push(filled(row));
+        }
+    }
+    let mut order = Table::new(
+        "Order and contact of the layers",
+        &[
+            "layers M",
+            "outfits",
+            "wrong side, each alone [%]",
+            "untangled [%]",
+            "after the post-process [%]",
+            "pairs between garments",
+            "clear before [%]",
+            "clear after [%]",
+            "strain added, median [%]",
+            "post-process per garment [ms], median",
+        ],
+    )
+    .with_note("Wrong side: share of outer vertices within 5 cm of an inner layer that lie under it, by the closest surface point. Clear: no exact pair with the body or between garments, outside of pinched regions.");
+    for c in counts {
+        order.rows.push(vec![
+            format!("M = {}", c.layers),
+            c.scenes.to_string(),
+            percent(c.wrong_side_single.spread.mean),
+            percent(c.wrong_side.spread.mean),
+            percent(c.wrong_side_resolved.spread.mean),
+            number(c.layer_pairs.spread.mean),
+            percent(c.clear[0]),
+            percent(c.clear[1]),
+            percent(c.strain_added),
+            number(c.post_ms.spread.median),
+        ]);
+    }
+    vec![strain, order]
+}
