@@ -194,8 +194,8 @@ const PAPER: [(&str, [&str; 4]); 3] = [
 ];
 
 impl Methods {
-    /// As tables.
-    pub fn tables(&self) -> Vec<Table> {
+    /// As tables; with the paper's numbers where they answer the same question.
+    pub fn tables(&self, with_paper: bool) -> Vec<Table> {
         let mean = |e: &Estimate| {
             format!("{} [{}, {}]", number(e.spread.mean), number(e.interval[0]), number(e.interval[1]))
         };
@@ -238,7 +238,7 @@ impl Methods {
                 .map(|e| format!("{} ({})", number(e.spread.mean), number(e.spread.median)));
             contact.rows.push([vec![name], shares.to_vec(), counts.to_vec()].concat());
         }
-        for (name, values) in PAPER {
+        for (name, values) in PAPER.into_iter().filter(|_| with_paper) {
             let values = values.map(str::to_owned).to_vec();
             means.rows.push([vec![name.to_owned(), "–".to_owned()], values].concat());
         }

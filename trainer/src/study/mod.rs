@@ -263,7 +263,8 @@ impl Study {
             tables,
             pictures: Vec::new(),
         };
-        let methods: Vec<Table> = self.methods.iter().flat_map(Methods::tables).collect();
+        let methods =
+            self.methods.iter().enumerate().flat_map(|(i, methods)| methods.tables(i == 0)).collect();
         let mut sections = vec![
             section(
                 "Networks and skinning (Table 2)",

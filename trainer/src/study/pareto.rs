@@ -303,8 +303,8 @@ impl Pareto {
                 .collect(),
         };
         vec![
-            panel("excess energy [% of LBS of rest] over time [ms]", |p| p.excess_percent.spread.median),
-            panel("distance to the minimiser [mm] over time [ms]", |p| p.distance_mm.spread.median),
+            panel("excess energy [%] over time [ms]", |p| p.excess_percent.spread.median),
+            panel("distance [mm] over time [ms]", |p| p.distance_mm.spread.median),
         ]
     }
 }

@@ -1,6 +1,6 @@
 //! `clothcombo bench error`: how far drapes are from equilibrium.
 
-use crate::checkpoint::Checkpoint;
+use crate::checkpoint::TrainedModel;
 use crate::cli::train::load_under_bar;
 use crate::cli::verbosity::progress_bar;
 use crate::config::{Config, ValidationConfig, load};
@@ -11,7 +11,6 @@ use crate::evaluate::equilibrium_error::{
 };
 use crate::evaluate::{Draped, Spread};
 use crate::scene::{Library, LibraryError, PreparedScene, ValidationGroup, draw_validation, prepare};
-use crate::session::state;
 use clap::Parser;
 use clothcombo_physics::equilibrium::SolverSettings;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
@@ -69,12 +68,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         ..SolverSettings::default()
     };
     settings.check().into_diagnostic()?;
-    let checkpoint = arguments.checkpoint.as_deref().map(Checkpoint::open).transpose()?;
-    let config = configuration(arguments, checkpoint.as_ref())?;
+    let trained = arguments.checkpoint.as_deref().map(TrainedModel::open).transpose()?;
+    let config = configuration(arguments, trained.as_ref())?;
     let library = Arc::new(load_under_bar(&config)?);
     let scenes = draw_scenes(&library, &config, arguments.scenes, arguments.seed.unwrap_or(config.seed))?;
-    let networks = match &checkpoint {
-        Some(checkpoint) => drape(checkpoint, &config, &library, &scenes)?.into_iter().map(Some).collect(),
+    let networks = match &trained {
+        Some(trained) => drape(trained, &library, &scenes)?.into_iter().map(Some).collect(),
         None => vec![None; scenes.len()],
     };
     let errors = solve_all(arguments, &config, &scenes, &networks, &settings)?;
@@ -86,10 +85,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     Ok(())
 }
 
-fn configuration(arguments: &Arguments, checkpoint: Option<&Checkpoint>) -> Result<Config, Report> {
-    let file = match (&arguments.config, checkpoint) {
+fn configuration(arguments: &Arguments, trained: Option<&TrainedModel>) -> Result<Config, Report> {
+    let file = match (&arguments.config, trained) {
         (Some(file), _) => file.clone(),
-        (None, Some(checkpoint)) => checkpoint.path.join("config.toml"),
+        (None, Some(trained)) => trained.folder.join("config.toml"),
         (None, None) => Path::new("configs").join("open.toml"),
     };
     Ok(load(&file, &arguments.overrides)?)
@@ -110,25 +109,14 @@ fn draw_scenes(
 }
 
 fn drape(
-    checkpoint: &Checkpoint,
-    config: &Config,
+    trained: &TrainedModel,
     library: &Arc<Library>,
     scenes: &[PreparedScene],
 ) -> Result<Vec<Draped>, Report> {
-    let expected = state(library, 0);
-    let found = &checkpoint.state;
-    if (&found.joints, found.shape_count, found.pose_features)
-        != (&expected.joints, expected.shape_count, expected.pose_features)
-    {
-        return Err(miette!(
-            help = "leave out --config to use the checkpoint's own, or restore the data it was trained on",
-            "the data of the configuration does not fit checkpoint {}",
-            checkpoint.path.display()
-        ));
-    }
+    trained.check_fits(library)?;
     let device = Backend::preferred().device();
-    let tensors = WardrobeTensors::new(library.clone(), found.dimensions(), &device);
-    let networks = Networks::new(checkpoint.model(config, &device)?, &tensors);
+    let tensors = WardrobeTensors::new(library.clone(), trained.state.dimensions(), &device);
+    let networks = Networks::new(trained.networks(&device)?, &tensors);
     scenes.iter().map(|scene| Ok(networks.drape(scene)?.layered)).collect()
 }
 
