@@ -21,16 +21,18 @@
 
 mod certificate;
 mod contact;
+mod detect;
 mod error;
 mod folds;
 mod garment;
 mod obstacle;
+mod outfit;
+mod over;
 mod relax;
 mod settings;
 #[cfg(test)]
 mod tests;
 mod untangle;
-mod yielding;
 
 use std::time::{Duration, Instant};
 
@@ -42,9 +44,9 @@ pub use settings::ResolveSettings;
 use crate::query::Surface;
 use crate::vec3;
 use certificate::certificate;
-use obstacle::{BodyObstacle, LayerObstacle, facing};
+use obstacle::BodyObstacle;
+use outfit::Outfit;
 use untangle::Untangling;
-use yielding::give_way;
 
 /// Positions farther from the origin than this are refused [m]: the exact predicates would hold, but no distance would.
 const FARTHEST: f64 = 1e3;
@@ -73,7 +75,7 @@ pub struct GarmentWork {
     pub moved: usize,
     /// The largest move [m].
     pub largest_move: f64,
-    /// Wall time, with an equal share of what was done for all garments together.
+    /// Its share, by vertices, of the wall time for all garments together.
     pub time: Duration,
 }
 
@@ -94,41 +96,19 @@ pub fn resolve(
     let body = BodyObstacle::new(body);
     let body_time = start.elapsed();
     let start = Instant::now();
-    let yielded = give_way(&body, layers, settings);
-    let yield_time = start.elapsed();
-    // Obstacles borrow the positions of the layers under them, which are final.
-    let positions: Vec<std::sync::OnceLock<Vec<[f64; 3]>>> =
-        layers.iter().map(|_| Default::default()).collect();
-    let mut inner: Vec<LayerObstacle> = Vec::new();
-    let mut garments = Vec::with_capacity(layers.len());
-    for (index, layer) in layers.iter().enumerate() {
-        let start = Instant::now();
-        let from = yielded.as_ref().map_or(layer.positions, |all| all[index].as_slice());
-        let mut untangling = Untangling::new(layer, from, &body, &inner, settings);
-        let mut work = untangling.run();
-        if settings.self_contact {
-            work.rounds += untangling.part_folds();
-        }
-        let (moved, largest_move) = (untangling.moved(), untangling.largest_move());
-        let is_inner = index + 1 < layers.len();
-        let facing = match is_inner {
-            true => facing(layer.garment, &untangling.positions, |v| untangling.outward(v)),
-            false => Vec::new(),
-        };
-        let done = positions[index].get_or_init(|| std::mem::take(&mut untangling.positions));
-        drop(untangling);
-        if is_inner {
-            inner.push(LayerObstacle::new(layer.garment, done, facing));
-        }
-        garments.push(GarmentWork {
-            rounds: work.rounds,
-            moved,
-            largest_move,
-            time: start.elapsed() + yield_time / layers.len() as u32,
-        });
-    }
-    drop(inner);
-    let positions: Vec<Vec<[f64; 3]>> = positions.into_iter().filter_map(|p| p.into_inner()).collect();
+    let outfit = Outfit::new(layers);
+    let mut untangling = Untangling::new(&outfit, &body, settings);
+    let rounds = untangling.run();
+    let positions: Vec<Vec<[f64; 3]>> =
+        (0..outfit.len()).map(|g| outfit.part(&untangling.positions, g).to_vec()).collect();
+    let time = start.elapsed();
+    let work = |g: usize| GarmentWork {
+        rounds,
+        moved: untangling.moved(g),
+        largest_move: untangling.largest_move(g),
+        time: time.mul_f64(positions[g].len() as f64 / outfit.vertex_count().max(1) as f64),
+    };
+    let garments = (0..outfit.len()).map(work).collect();
     let start = Instant::now();
     let resolved: Vec<Layer> =
         layers.iter().zip(&positions).map(|(l, positions)| Layer { garment: l.garment, positions }).collect();

@@ -21,6 +21,9 @@ pub struct ResolveSettings {
     /// Deepest that an outer vertex may lie below an inner layer and still be brought back over it [m]. Default 5 cm, as far as
     /// the order of layers is judged.
     pub reach: f64,
+    /// Farthest that any vertex may be moved [m]. Default 6 cm: what asks for more (an order that cannot be worn, a part of the
+    /// body inside another one) would tear the garment instead of mending it, and is left and listed.
+    pub farthest: f64,
     /// Whether crossings of a garment with itself are mended where possible. Default yes.
     pub self_contact: bool,
     /// Most wall time per garment, looked at between rounds; a limit that is hit makes the result depend on the machine.
@@ -37,6 +40,7 @@ impl Default for ResolveSettings {
             rounds: 40,
             sweeps: 20,
             reach: super::super::ORDER_RADIUS,
+            farthest: 0.06,
             self_contact: true,
             time: None,
         }
@@ -58,6 +62,9 @@ impl ResolveSettings {
         }
         if !(self.reach >= 0.0 && self.reach <= 0.5) {
             return fail("reach", self.reach, "between 0 and 0.5 m");
+        }
+        if !(self.farthest > 0.0 && self.farthest <= 10.0) {
+            return fail("farthest", self.farthest, "greater than 0 and at most 10 m");
         }
         for (setting, value, most) in
             [("rings", self.rings, 1000), ("rounds", self.rounds, 10_000), ("sweeps", self.sweeps, 10_000)]
