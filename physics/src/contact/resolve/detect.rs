@@ -22,6 +22,7 @@ impl Crossings {
         Self { body: Vec::new(), layers: Vec::new(), own: Vec::new(), is_dirty: vec![true; faces] }
     }
 
+    /// All pairs.
     pub fn count(&self) -> usize {
         self.body.len() + self.layers.len() + self.own.len()
     }
@@ -37,9 +38,8 @@ impl Crossings {
         with_own: bool,
     ) {
         let is_dirty = std::mem::take(&mut self.is_dirty);
-        let dirty = |g: usize| -> Vec<u32> {
-            outfit.faces_of_garment(g).filter(|&f| is_dirty[f as usize]).collect()
-        };
+        let dirty =
+            |g: usize| -> Vec<u32> { outfit.faces_of_garment(g).filter(|&f| is_dirty[f as usize]).collect() };
         let moved: Vec<Vec<u32>> = (0..outfit.len()).map(dirty).collect();
         let is_clean = |f: u32| !is_dirty[f as usize];
         let corners = |f: u32| outfit.faces[f as usize].map(|v| positions[v as usize]);
@@ -52,7 +52,8 @@ impl Crossings {
         // No face reaches farther from a corner than its longest edge.
         let may_touch = |f: &u32| {
             let [a, b, c] = corners(*f);
-            let longest = distance_squared(a, b).max(distance_squared(b, c)).max(distance_squared(c, a)).sqrt();
+            let longest =
+                distance_squared(a, b).max(distance_squared(b, c)).max(distance_squared(c, a)).sqrt();
             outfit.faces[*f as usize].iter().all(|&v| far[v as usize] <= longest * (1.0 + 1e-9))
         };
         let near: Vec<u32> = moved.iter().flatten().copied().filter(may_touch).collect();

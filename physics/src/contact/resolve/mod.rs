@@ -1,20 +1,20 @@
 //! The post-process: takes draped garments out of the body and out of each other, and proves what it reached.
 //!
-//! Garments come in their order, innermost first, and are brought to the right side one after the other: of the body, then of
-//! every garment under them. The order of the layers is the sign: *over* is where the inner surface's normal points, away
-//! from the body.
+//! All garments of an outfit are resolved together, so that an inner one gives way to an outer one.
 //!
-//! 0. **Giving way.** Where an outer garment lies deep under an inner one, both move: the inner one is pressed towards the body
-//!    as far as there is room, instead of the outer one being blown up over it. Afterwards inner layers stay where they are.
-//! 1. **Vertices.** The closest point of the body (of the union of its parts, [`crate::query::UnionDistance`]) and of each
-//!    inner garment leaves a vertex a half-space; past a hem there is none.
-//! 2. **Relaxation.** Vertices on the wrong side and their neighbourhood move by a smooth displacement that keeps edge lengths
-//!    and meets every half-space ([`relax`]); everything else keeps its position to the bit.
-//! 3. **Triangles.** Vertices outside are not enough where cloth is coarser than the body. Every pair of triangles that still
-//!    crosses, found exactly, asks the part of the garment's triangle over the other one to lie above it; linear heights make
-//!    that sufficient. Repeated until no pair is left.
-//! 4. **Folds.** Crossings of a garment with itself are parted as far as that is possible without new crossings of the body or
-//!    of another garment.
+//! 1. **Vertices.** The closest point of the body (of the union of its parts, [`crate::query::UnionDistance`]) leaves a vertex a
+//!    half-space. Along its own direction away from the body it sees the sheets of inner garments, and has to stay over the
+//!    outermost ([`over`]); past a hem there is none.
+//! 2. **Triangles.** Vertices outside are not enough where cloth is coarser than the body. Every pair of triangles that crosses,
+//!    found exactly ([`detect`]), asks the part of one over the other to lie above it; linear heights make that sufficient. Which
+//!    one is above is told by the directions away from the body: the outer garment, or, where two sheets look at each other
+//!    (a sleeve and the side of the chest), each on its own part's side, whichever garments they belong to.
+//! 3. **Folds.** Sheets of one garment that cross and have no such order are parted by what most of their vertices say
+//!    ([`folds`]), crumples are smoothed.
+//! 4. **Relaxation.** Vertices on the wrong side and their neighbourhood move by a displacement from the input that is smooth,
+//!    keeps edge lengths, and meets all conditions as far as no edge is stretched more than allowed ([`relax`]); everything
+//!    else keeps its position to the bit. Conditions of a crossing are kept for good. Repeated until no pair is left or
+//!    nothing gets better; the best state is taken.
 //! 5. **Certificate.** All pairs are counted again, from nothing, by the exact predicates.
 //!
 //! **Pinched regions**, where the body lies inside itself, are told apart by a stated rule: `BodyObstacle`.

@@ -1,9 +1,6 @@
 //! What a garment has to stay outside of: the body, and every garment nearer to it.
 
-use rayon::prelude::*;
-
 use super::RestGarment;
-use super::contact::{along_line, normal_of};
 use crate::contact::TriangleTree;
 use crate::mesh::vertex_normals;
 use crate::query::{ClosestPoint, FaceSide, Surface, SurfacePoint};
@@ -68,19 +65,6 @@ impl<'a> BodyObstacle<'a> {
             for (face, _) in faces.iter().zip(sides).filter(|(_, side)| **side != FaceSide::Exposed) {
                 face.iter().for_each(|&v| touched[v as usize] = true);
             }
-            let room: f64 = std::env::var("ROOM").map_or(0.0, |s| s.parse().unwrap());
-            if room > 0.0 {
-                let cramped: Vec<bool> =
-                    (0..touched.len() as u32).into_par_iter().with_min_len(256).map(|v| is_cramped(surface, &tree, v, room)).collect();
-                touched.iter_mut().zip(cramped).for_each(|(t, c)| *t |= c);
-            }
-            let dilate: f64 = std::env::var("DILATE").map_or(0.0, |s| s.parse().unwrap());
-            if dilate > 0.0 {
-                let mut d: Vec<f64> = touched.iter().map(|t| if *t {0.0} else {f64::INFINITY}).collect();
-                for _ in 0..12 { for f in faces.iter() { for k in 0..3 { let (a,b)=(f[k] as usize,f[(k+1)%3] as usize);
-                    let l = norm(sub(surface.positions[a],surface.positions[b])); d[a]=d[a].min(d[b]+l); d[b]=d[b].min(d[a]+l); } } }
-                touched = d.iter().map(|d| *d<=dilate).collect();
-            }
             for (pinched, face) in is_pinched.iter_mut().zip(faces.iter()) {
                 *pinched = face.iter().any(|&v| touched[v as usize]);
             }
@@ -120,21 +104,6 @@ impl<'a> BodyObstacle<'a> {
         };
         Some(BodyView { far, plane })
     }
-}
-
-/// Whether another part of the body stands less than `room` before vertex `v`.
-fn is_cramped(surface: &Surface<f64>, tree: &TriangleTree<'_>, v: u32, room: f64) -> bool {
-    let (p, away) = (surface.positions[v as usize], surface.normals[v as usize]);
-    let end = add_scaled(p, room, away);
-    let low = std::array::from_fn(|k| p[k].min(end[k]));
-    let high = std::array::from_fn(|k| p[k].max(end[k]));
-    away != [0.0; 3] && tree.faces_in_box(low, high).any(|f| {
-        let Some(triangle) = tree.triangle(f).filter(|_| !surface.faces[f as usize].contains(&v)) else {
-            return false;
-        };
-        dot(normal_of(&triangle), away) < 0.0
-            && along_line(p, away, &triangle).is_some_and(|(along, _)| along > 0.0 && along < room)
-    })
 }
 
 /// Whether every edge has two faces.

@@ -120,7 +120,8 @@ pub(super) enum Order {
 /// on its own part's side, whichever garments they belong to; otherwise the outer garment lies over the inner one, and two
 /// folds of one garment have no order.
 pub(super) fn order(first: [u32; 3], second: [u32; 3], is_outer: bool, outward: &[[f64; 3]]) -> Order {
-    let mean = |face: [u32; 3]| normalized(face.iter().fold([0.0; 3], |sum, &v| add(sum, outward[v as usize])));
+    let mean =
+        |face: [u32; 3]| normalized(face.iter().fold([0.0; 3], |sum, &v| add(sum, outward[v as usize])));
     let (a, b) = (mean(first), mean(second));
     match dot(a, b) {
         _ if a == [0.0; 3] || b == [0.0; 3] => Order::Unknown,
@@ -164,7 +165,11 @@ pub(super) fn part_along(
 /// Directions away from the body of all garments, by packed vertex: their normals on the side that most of `away` (from the
 /// body's surface, zero where unknown) tell for a component, smoothed over wrinkles. Unlike the direction from the nearest
 /// point of the body they do not change where cloth has gone through other cloth towards another part of the body.
-pub(super) fn outward(outfit: &Outfit<'_>, positions: &[[f64; 3]], away: impl Fn(u32) -> [f64; 3]) -> Vec<[f64; 3]> {
+pub(super) fn outward(
+    outfit: &Outfit<'_>,
+    positions: &[[f64; 3]],
+    away: impl Fn(u32) -> [f64; 3],
+) -> Vec<[f64; 3]> {
     let mut all: Vec<[f64; 3]> = Vec::with_capacity(positions.len());
     for g in 0..outfit.len() {
         let (garment, start) = (outfit.layers[g].garment, outfit.vertices(g).start);

@@ -11,9 +11,7 @@ const FOLLOW: f64 = 0.98;
 const OVER: f64 = 1.4;
 /// Share of an edge's change of length that one pass takes back.
 const LENGTH_STIFFNESS: f64 = 0.5;
-/// An edge gets no longer and no shorter than these shares of its length: what asks for more would tear the cloth.
-#[allow(non_snake_case)]
-fn LONGEST() -> f64 { static L: std::sync::LazyLock<f64> = std::sync::LazyLock::new(|| std::env::var("LONGEST").map_or(1.2, |s| s.parse().unwrap())); *L }
+/// An edge gets no shorter than this share of its length.
 const SHORTEST: f64 = 0.6;
 /// Passes over the contacts alone at the end.
 const LAST_PASSES: usize = 8;
@@ -27,6 +25,7 @@ pub(super) fn relax(
     region: &[u32],
     contacts: &[Contact],
     sweeps: usize,
+    stretch: f64,
 ) {
     let mut may_move = vec![false; positions.len()];
     region.iter().for_each(|&v| may_move[v as usize] = true);
@@ -56,7 +55,7 @@ pub(super) fn relax(
             contact.enforce(positions, &may_move);
         }
         for &(a, b, length) in &edges {
-            limit_length(positions, a, b, may_move[b], length);
+            limit_length(positions, (a, b), may_move[b], length, stretch);
         }
     }
     for _ in 0..LAST_PASSES {
@@ -68,17 +67,23 @@ pub(super) fn relax(
             break;
         }
         for &(a, b, length) in &edges {
-            limit_length(positions, a, b, may_move[b], length);
+            limit_length(positions, (a, b), may_move[b], length, stretch);
         }
     }
 }
 
 /// Takes back what an edge is longer or shorter than it may get; `b` may be fixed.
 #[inline]
-fn limit_length(positions: &mut [[f64; 3]], a: usize, b: usize, b_may_move: bool, length: f64) {
+fn limit_length(
+    positions: &mut [[f64; 3]],
+    (a, b): (usize, usize),
+    b_may_move: bool,
+    length: f64,
+    stretch: f64,
+) {
     let along = sub(positions[b], positions[a]);
     let now = norm(along);
-    let allowed = now.clamp(SHORTEST * length, LONGEST() * length);
+    let allowed = now.clamp(SHORTEST * length, stretch * length);
     if now == allowed || now < 1e-12 {
         return;
     }

@@ -20,9 +20,7 @@ const WATCH: f64 = 0.01;
 /// No contact asks for a longer step than this in a round [m].
 const LONGEST_STEP: f64 = 0.02;
 /// Rounds without progress after which an outfit is left as it is.
-const PATIENCE: usize = 6;
-/// Rounds for which the conditions of a crossing hold on: long enough that a mended place is not torn again by its neighbour.
-const REMEMBERED: usize = 6;
+const PATIENCE: usize = 4;
 /// Rounds in which vertices that are merely closer than asked for still count.
 const ROUNDS_FOR_GAPS: usize = 3;
 
@@ -45,12 +43,30 @@ pub(super) struct Untangling<'a> {
     crossings: Crossings,
     /// Crossings of the input's garments with themselves, ascending.
     known_folds: Vec<(u32, u32)>,
-    /// Conditions that crossings of the last rounds asked for, and the round.
-    remembered: Vec<(usize, Contact)>,
+    /// Conditions that all crossings so far asked for: a mended place would be torn again by its neighbours without them.
+    remembered: Vec<Contact>,
 }
 
 /// How wrong a state is: fewer is better, in this order.
 type Defects = (usize, usize);
+
+/// The best state so far.
+#[derive(Default)]
+struct Best {
+    defects: Option<Defects>,
+    positions: Vec<[f64; 3]>,
+    /// Rounds since it was found.
+    stale: usize,
+}
+
+impl Best {
+    fn look(&mut self, defects: Defects, positions: &[[f64; 3]]) {
+        self.stale += 1;
+        if self.defects.is_none_or(|least| defects < least) {
+            *self = Self { defects: Some(defects), positions: positions.to_vec(), stale: 0 };
+        }
+    }
+}
 
 impl<'a> Untangling<'a> {
     pub fn new(outfit: &'a Outfit<'a>, body: &'a BodyObstacle<'a>, settings: &'a ResolveSettings) -> Self {
@@ -81,8 +97,8 @@ impl<'a> Untangling<'a> {
     /// Rounds of detection and relaxation until nothing is wrong or nothing gets better; how many it took.
     pub fn run(&mut self) -> usize {
         let start = Instant::now();
-        let mut best: Option<(Defects, Vec<[f64; 3]>)> = None;
-        let mut stale = 0;
+        let limit = self.settings.time.map(|limit| limit * self.outfit.len() as u32);
+        let mut best = Best::default();
         for round in 0..=self.settings.rounds {
             self.detect();
             if round == 0 {
@@ -93,23 +109,10 @@ impl<'a> Untangling<'a> {
             if !is_violated && self.crossings.count() == 0 {
                 return round;
             }
-            let defects = self.defects();
-            if std::env::var("TRACE").is_ok() {
-                let c = &self.crossings;
-                eprintln!("round {round}: body {} layers {} own {} wrong {} over {} region?", c.body.len(), c.layers.len(), c.own.len(), defects.1, self.over.iter().filter(|o| o.height<0.0).count());
-            }
-            if best.as_ref().is_none_or(|(least, _)| defects < *least) {
-                best = Some((defects, self.positions.clone()));
-                stale = 0;
-            } else {
-                stale += 1;
-            }
-            let limit = self.settings.time.map(|limit| limit * self.outfit.len() as u32);
+            best.look(self.defects(), &self.positions);
             let is_late = limit.is_some_and(|limit| start.elapsed() > limit);
-            if round == self.settings.rounds || stale > PATIENCE || is_late {
-                if let Some((_, positions)) = best {
-                    self.positions = positions;
-                }
+            if round == self.settings.rounds || best.stale > PATIENCE || is_late {
+                self.positions = best.positions;
                 return round;
             }
             self.step(round);
@@ -148,10 +151,8 @@ impl<'a> Untangling<'a> {
     fn step(&mut self, round: usize) {
         let gap = self.settings.gap * (1.0 + 0.1 * round as f64).min(3.0);
         let outfit = self.outfit;
-        self.remembered.retain(|(found, _)| found + REMEMBERED > round);
-        let (mut contacts, crumpled) = self.part_folds(0.25 * gap);
-        let mut seeds: Vec<u32> = contacts.iter().flat_map(|c| c.vertices).chain(crumpled).collect();
-        let mut asked = Vec::new();
+        let (mut asked, crumpled) = self.part_folds(0.25 * gap);
+        let mut seeds: Vec<u32> = asked.iter().flat_map(|c| c.vertices).chain(crumpled).collect();
         for &(f, g) in &self.crossings.layers {
             let (outer, inner) = (outfit.faces[f as usize], outfit.faces[g as usize]);
             seeds.extend(outer.iter().chain(&inner));
@@ -163,7 +164,7 @@ impl<'a> Untangling<'a> {
             seeds.extend(outfit.faces[f as usize]);
             self.part_from_body(f, other, gap, &mut asked);
         }
-        self.remembered.extend(asked.into_iter().map(|contact| (round, contact)));
+        self.remembered.extend(asked);
         let least = self.least(round);
         for o in self.over.iter().filter(|o| o.height < least) {
             seeds.push(o.vertex);
@@ -176,10 +177,11 @@ impl<'a> Untangling<'a> {
         let region = outfit.neighbourhood(&seeds, self.settings.rings);
         let mut is_in = vec![false; self.positions.len()];
         region.iter().for_each(|&v| is_in[v as usize] = true);
+        let mut contacts: Vec<Contact> = Vec::new();
         for o in self.over.iter().filter(|o| is_in[o.vertex as usize]) {
             contacts.push(o.contact(gap.min(o.height + LONGEST_STEP)));
         }
-        contacts.extend(self.remembered.iter().map(|(_, contact)| contact));
+        contacts.extend(&self.remembered);
         // The body last, so that it has the last word.
         for &v in &region {
             let Some(plane) = self.planes[v as usize].filter(|p| p.distance < WATCH) else { continue };
@@ -190,7 +192,8 @@ impl<'a> Untangling<'a> {
                 contacts.push(Contact::vertex(v, &plane, plane.distance + step));
             }
         }
-        relax(outfit, &mut self.positions, &self.shape, &region, &contacts, self.settings.sweeps);
+        let (sweeps, stretch) = (self.settings.sweeps, self.settings.stretch);
+        relax(outfit, &mut self.positions, &self.shape, &region, &contacts, sweeps, stretch);
         self.hold_back(&region);
         self.touch(&region);
     }
@@ -235,7 +238,9 @@ impl<'a> Untangling<'a> {
                 Order::Unknown => folded.push((f, g)),
             }
         }
-        for of_garment in folded.chunk_by(|a, b| self.outfit.garment_of_face(a.0) == self.outfit.garment_of_face(b.0)) {
+        for of_garment in
+            folded.chunk_by(|a, b| self.outfit.garment_of_face(a.0) == self.outfit.garment_of_face(b.0))
+        {
             let g = self.outfit.garment_of_face(of_garment[0].0);
             let (first, start) = (self.outfit.faces_of_garment(g).start, self.outfit.vertices(g).start);
             let had_some = of_garment.iter().any(|pair| self.known_folds.binary_search(pair).is_ok());
@@ -283,7 +288,11 @@ impl<'a> Untangling<'a> {
     fn middle(&self, v: u32, value: impl Fn(u32) -> [f64; 3]) -> [f64; 3] {
         let ring = self.outfit.ring(v);
         let count = ring.len();
-        if count == 0 { value(v) } else { scale(ring.fold([0.0; 3], |sum, n| add(sum, value(n))), 1.0 / count as f64) }
+        if count == 0 {
+            value(v)
+        } else {
+            scale(ring.fold([0.0; 3], |sum, n| add(sum, value(n))), 1.0 / count as f64)
+        }
     }
 
     /// Looks again at vertices that moved, and marks the faces around them.
