@@ -14,7 +14,7 @@ pub struct ResolveSettings {
     pub trigger: f64,
     /// Rings of neighbours around a violation that move along. Default 5.
     pub rings: usize,
-    /// Most rounds of detection and relaxation. Default 40.
+    /// Most rounds of detection and relaxation. Default 16: what is not mended by then hardly ever is.
     pub rounds: usize,
     /// Sweeps of the relaxation in a round. Default 20.
     pub sweeps: usize,
@@ -40,7 +40,7 @@ impl Default for ResolveSettings {
             gap: 1e-3,
             trigger: 0.25,
             rings: 5,
-            rounds: 40,
+            rounds: 16,
             sweeps: 20,
             reach: super::super::ORDER_RADIUS,
             farthest: 0.06,
