@@ -121,6 +121,12 @@ impl<'a> TriangleTree<'a> {
             .filter(move |&g| f != g && mesh_triangles_intersect(self.positions, self.face(f), self.face(g)))
     }
 
+    /// Faces whose box meets the box from `low` to `high`, in no particular order.
+    pub(super) fn faces_in_box(&self, low: [f64; 3], high: [f64; 3]) -> impl Iterator<Item = u32> {
+        let probe = BvhNode::leaf(Aabb::new(Vector::from_array(low), Vector::from_array(high)), 0);
+        self.bvh.leaves(move |node| node.intersects(&probe)).map(|leaf| self.kept[leaf as usize])
+    }
+
     /// Pairs of faces whose boxes meet, in no particular order.
     fn candidates(&self, other: &TriangleTree) -> Vec<(u32, u32)> {
         self.bvh

@@ -46,6 +46,12 @@ impl Contact {
         Self { vertices, weights, count: 6, normal, target: gap }
     }
 
+    /// The same condition on vertices numbered from `start` on.
+    pub fn shifted(mut self, start: u32) -> Self {
+        self.vertices.iter_mut().for_each(|v| *v += start);
+        self
+    }
+
     pub fn terms(&self) -> impl Iterator<Item = (usize, f64)> {
         let count = usize::from(self.count);
         self.vertices[..count].iter().zip(&self.weights[..count]).map(|(v, w)| (*v as usize, *w))
@@ -76,18 +82,23 @@ impl Contact {
 pub(super) struct Overlap {
     /// Its place in the upper triangle.
     pub at_upper: [f64; 3],
-    /// Its place in the lower triangle, straight below or above.
+    /// Its place in the lower triangle, straight below or above along the normal.
     pub at_lower: [f64; 3],
     /// Height over the lower triangle, negative below [m].
     pub height: f64,
 }
 
-/// The part of `upper` within the prism over `lower` along the lower triangle's normal. Heights are linear in between: the
-/// triangles are apart if all corners lie over the lower triangle. Empty where the lower triangle has no area.
-pub(super) fn overlap(upper: &Triangle, lower: &Triangle) -> ([f64; 3], Vec<Overlap>) {
-    let normal = normalized(cross(sub(lower[1], lower[0]), sub(lower[2], lower[0])));
-    if normal == [0.0; 3] {
-        return (normal, Vec::new());
+/// Unit normal; zero where there is no area.
+pub(super) fn normal_of(triangle: &Triangle) -> [f64; 3] {
+    normalized(cross(sub(triangle[1], triangle[0]), sub(triangle[2], triangle[0])))
+}
+
+/// The part of `upper` within the prism over `lower` along the unit vector `normal`. Heights are linear in between: the
+/// triangles are apart if all corners lie over the lower triangle. Empty where the lower triangle is seen edge-on.
+pub(super) fn overlap(upper: &Triangle, lower: &Triangle, normal: [f64; 3]) -> Vec<Overlap> {
+    let area = dot(normal, cross(sub(lower[1], lower[0]), sub(lower[2], lower[0])));
+    if area.abs() < 1e-14 {
+        return Vec::new();
     }
     // Inward normals of the prism's sides, scaled so that the height over each side is a barycentric coordinate.
     let sides: [([f64; 3], [f64; 3]); 3] = std::array::from_fn(|k| {
@@ -113,15 +124,30 @@ pub(super) fn overlap(upper: &Triangle, lower: &Triangle) -> ([f64; 3], Vec<Over
         }
         corners = kept;
     }
-    let found = corners
+    corners
         .iter()
         .map(|at| {
             let p = place(at);
             let at_lower = sides.map(|(from, inward)| dot(inward, sub(p, from)).clamp(0.0, 1.0));
-            Overlap { at_upper: *at, at_lower, height: dot(normal, sub(p, lower[0])) }
+            let below = (0..3).fold([0.0; 3], |sum, k| add_scaled(sum, at_lower[k], lower[k]));
+            Overlap { at_upper: *at, at_lower, height: dot(normal, sub(p, below)) }
         })
-        .collect();
-    (normal, found)
+        .collect()
+}
+
+/// How far from `p` the line along `direction` meets a triangle, and where in it.
+pub(super) fn along_line(p: [f64; 3], direction: [f64; 3], [a, b, c]: &Triangle) -> Option<(f64, [f64; 3])> {
+    let (ab, ac, ap) = (sub(*b, *a), sub(*c, *a), sub(p, *a));
+    let across = cross(direction, ac);
+    let scale_of = dot(ab, across);
+    if scale_of.abs() < 1e-14 {
+        return None;
+    }
+    let v = dot(ap, across) / scale_of;
+    let other = cross(ap, ab);
+    let w = dot(direction, other) / scale_of;
+    let u = 1.0 - v - w;
+    (u >= 0.0 && v >= 0.0 && w >= 0.0).then(|| (dot(ac, other) / scale_of, [u, v, w]))
 }
 
 /// Whether a triangle is too small to say where it looks.
@@ -143,7 +169,8 @@ mod tests {
             let mut triangle =
                 || -> Triangle { std::array::from_fn(|_| std::array::from_fn(|_| random.symmetric())) };
             let (upper, lower) = (triangle(), triangle());
-            let (normal, found) = overlap(&upper, &lower);
+            let normal = normal_of(&lower);
+            let found = overlap(&upper, &lower, normal);
             let lowest = found.iter().map(|o| o.height).fold(f64::INFINITY, f64::min);
             if triangles_intersect(&upper, &lower) {
                 met += 1;

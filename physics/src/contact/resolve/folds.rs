@@ -7,7 +7,7 @@
 use std::collections::HashMap;
 
 use super::RestGarment;
-use super::contact::{Contact, is_tiny, overlap};
+use super::contact::{Contact, is_tiny, normal_of, overlap};
 use crate::vec3::{cross, dot, neg, sub};
 
 /// Rings around a crossing that are counted to tell the smaller side.
@@ -145,8 +145,8 @@ fn part(
         found.crumpled.extend(other);
         return;
     }
-    let (normal, corners) = overlap(&upper, &lower);
-    for corner in corners {
+    let normal = normal_of(&lower);
+    for corner in overlap(&upper, &lower, normal) {
         let sides = ((face, corner.at_upper), (other, corner.at_lower));
         let contact = match is_below {
             false if corner.height < gap => Contact::face_points(sides.0, sides.1, normal, gap),

@@ -1,36 +1,38 @@
 //! The post-process: takes draped garments out of the body and out of each other, and proves what it reached.
 //!
-//! Garments come in their order, innermost first, and are brought to the right side one after the other: of the body, then of
-//! every garment under them. The order of the layers is the sign: *over* is where the inner surface's normal points, away
-//! from the body.
+//! All garments of an outfit are resolved together, so that an inner one gives way to an outer one.
 //!
-//! 0. **Giving way.** Where an outer garment lies deep under an inner one, both move: the inner one is pressed towards the body
-//!    as far as there is room, instead of the outer one being blown up over it. Afterwards inner layers stay where they are.
-//! 1. **Vertices.** The closest point of the body (of the union of its parts, [`crate::query::UnionDistance`]) and of each
-//!    inner garment leaves a vertex a half-space; past a hem there is none.
-//! 2. **Relaxation.** Vertices on the wrong side and their neighbourhood move by a smooth displacement that keeps edge lengths
-//!    and meets every half-space ([`relax`]); everything else keeps its position to the bit.
-//! 3. **Triangles.** Vertices outside are not enough where cloth is coarser than the body. Every pair of triangles that still
-//!    crosses, found exactly, asks the part of the garment's triangle over the other one to lie above it; linear heights make
-//!    that sufficient. Repeated until no pair is left.
-//! 4. **Folds.** Crossings of a garment with itself are parted as far as that is possible without new crossings of the body or
-//!    of another garment.
+//! 1. **Vertices.** The closest point of the body (of the union of its parts, [`crate::query::UnionDistance`]) leaves a vertex a
+//!    half-space. Along its own direction away from the body it sees the sheets of inner garments, and has to stay over the
+//!    outermost ([`over`]); past a hem there is none.
+//! 2. **Triangles.** Vertices outside are not enough where cloth is coarser than the body. Every pair of triangles that crosses,
+//!    found exactly ([`detect`]), asks the part of one over the other to lie above it; linear heights make that sufficient. Which
+//!    one is above is told by the directions away from the body: the outer garment, or, where two sheets look at each other
+//!    (a sleeve and the side of the chest), each on its own part's side, whichever garments they belong to.
+//! 3. **Folds.** Sheets of one garment that cross and have no such order are parted by what most of their vertices say
+//!    ([`folds`]), crumples are smoothed.
+//! 4. **Relaxation.** Vertices on the wrong side and their neighbourhood move by a displacement from the input that is smooth,
+//!    keeps edge lengths, and meets all conditions as far as no edge is stretched more than allowed ([`relax`]); everything
+//!    else keeps its position to the bit. Conditions of a crossing are kept for good. Repeated until no pair is left or
+//!    nothing gets better; the best state is taken.
 //! 5. **Certificate.** All pairs are counted again, from nothing, by the exact predicates.
 //!
 //! **Pinched regions**, where the body lies inside itself, are told apart by a stated rule: `BodyObstacle`.
 
 mod certificate;
 mod contact;
+mod detect;
 mod error;
 mod folds;
 mod garment;
 mod obstacle;
+mod outfit;
+mod over;
 mod relax;
 mod settings;
 #[cfg(test)]
 mod tests;
 mod untangle;
-mod yielding;
 
 use std::time::{Duration, Instant};
 
@@ -42,9 +44,9 @@ pub use settings::ResolveSettings;
 use crate::query::Surface;
 use crate::vec3;
 use certificate::certificate;
-use obstacle::{BodyObstacle, LayerObstacle, facing};
+use obstacle::BodyObstacle;
+use outfit::Outfit;
 use untangle::Untangling;
-use yielding::give_way;
 
 /// Positions farther from the origin than this are refused [m]: the exact predicates would hold, but no distance would.
 const FARTHEST: f64 = 1e3;
@@ -73,7 +75,7 @@ pub struct GarmentWork {
     pub moved: usize,
     /// The largest move [m].
     pub largest_move: f64,
-    /// Wall time, with an equal share of what was done for all garments together.
+    /// Its share, by vertices, of the wall time for all garments together.
     pub time: Duration,
 }
 
@@ -94,41 +96,19 @@ pub fn resolve(
     let body = BodyObstacle::new(body);
     let body_time = start.elapsed();
     let start = Instant::now();
-    let yielded = give_way(&body, layers, settings);
-    let yield_time = start.elapsed();
-    // Obstacles borrow the positions of the layers under them, which are final.
-    let positions: Vec<std::sync::OnceLock<Vec<[f64; 3]>>> =
-        layers.iter().map(|_| Default::default()).collect();
-    let mut inner: Vec<LayerObstacle> = Vec::new();
-    let mut garments = Vec::with_capacity(layers.len());
-    for (index, layer) in layers.iter().enumerate() {
-        let start = Instant::now();
-        let from = yielded.as_ref().map_or(layer.positions, |all| all[index].as_slice());
-        let mut untangling = Untangling::new(layer, from, &body, &inner, settings);
-        let mut work = untangling.run();
-        if settings.self_contact {
-            work.rounds += untangling.part_folds();
-        }
-        let (moved, largest_move) = (untangling.moved(), untangling.largest_move());
-        let is_inner = index + 1 < layers.len();
-        let facing = match is_inner {
-            true => facing(layer.garment, &untangling.positions, |v| untangling.outward(v)),
-            false => Vec::new(),
-        };
-        let done = positions[index].get_or_init(|| std::mem::take(&mut untangling.positions));
-        drop(untangling);
-        if is_inner {
-            inner.push(LayerObstacle::new(layer.garment, done, facing));
-        }
-        garments.push(GarmentWork {
-            rounds: work.rounds,
-            moved,
-            largest_move,
-            time: start.elapsed() + yield_time / layers.len() as u32,
-        });
-    }
-    drop(inner);
-    let positions: Vec<Vec<[f64; 3]>> = positions.into_iter().filter_map(|p| p.into_inner()).collect();
+    let outfit = Outfit::new(layers);
+    let mut untangling = Untangling::new(&outfit, &body, settings);
+    let rounds = untangling.run();
+    let positions: Vec<Vec<[f64; 3]>> =
+        (0..outfit.len()).map(|g| outfit.part(&untangling.positions, g).to_vec()).collect();
+    let time = start.elapsed();
+    let work = |g: usize| GarmentWork {
+        rounds,
+        moved: untangling.moved(g),
+        largest_move: untangling.largest_move(g),
+        time: time.mul_f64(positions[g].len() as f64 / outfit.vertex_count().max(1) as f64),
+    };
+    let garments = (0..outfit.len()).map(work).collect();
     let start = Instant::now();
     let resolved: Vec<Layer> =
         layers.iter().zip(&positions).map(|(l, positions)| Layer { garment: l.garment, positions }).collect();

@@ -20,15 +20,12 @@ pub(super) struct Plane {
     pub distance: f64,
     /// Whether it may be violated without being a defect: it only keeps what is there.
     pub is_held: bool,
-    /// The face it comes from, and the place in it.
-    pub face: u32,
-    pub barycentric: [f64; 3],
 }
 
 impl Plane {
     fn at(found: &SurfacePoint, normal: [f64; 3], distance: f64, is_held: bool) -> Self {
         let offset = dot(normal, found.position);
-        Self { normal, offset, distance, is_held, face: found.face, barycentric: found.barycentric }
+        Self { normal, offset, distance, is_held }
     }
 }
 

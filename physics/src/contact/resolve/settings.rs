@@ -12,18 +12,24 @@ pub struct ResolveSettings {
     /// A vertex has to move where its distance is below this share of `gap`, 0–1. Default 0.25: whatever was resolved once
     /// stays as it is.
     pub trigger: f64,
-    /// Rings of neighbours around a violation that move along. Default 8.
+    /// Rings of neighbours around a violation that move along. Default 5.
     pub rings: usize,
-    /// Most rounds of detection and relaxation per garment. Default 40.
+    /// Most rounds of detection and relaxation. Default 16: what is not mended by then hardly ever is.
     pub rounds: usize,
     /// Sweeps of the relaxation in a round. Default 20.
     pub sweeps: usize,
     /// Deepest that an outer vertex may lie below an inner layer and still be brought back over it [m]. Default 5 cm, as far as
     /// the order of layers is judged.
     pub reach: f64,
+    /// Farthest that any vertex may be moved [m]. Default 6 cm: what asks for more (an order that cannot be worn, a part of the
+    /// body inside another one) would tear the garment instead of mending it, and is left and listed.
+    pub farthest: f64,
+    /// Longest that an edge may get, as a share of its length in the input. Default 1.15: cloth gives a little, and a place that
+    /// asks for more is left and listed instead of torn.
+    pub stretch: f64,
     /// Whether crossings of a garment with itself are mended where possible. Default yes.
     pub self_contact: bool,
-    /// Most wall time per garment, looked at between rounds; a limit that is hit makes the result depend on the machine.
+    /// Most wall time, times the number of garments, looked at between rounds; a limit that is hit makes the result depend on the machine.
     /// Default none.
     pub time: Option<Duration>,
 }
@@ -33,10 +39,12 @@ impl Default for ResolveSettings {
         Self {
             gap: 1e-3,
             trigger: 0.25,
-            rings: 8,
-            rounds: 40,
+            rings: 5,
+            rounds: 16,
             sweeps: 20,
             reach: super::super::ORDER_RADIUS,
+            farthest: 0.06,
+            stretch: 1.15,
             self_contact: true,
             time: None,
         }
@@ -58,6 +66,12 @@ impl ResolveSettings {
         }
         if !(self.reach >= 0.0 && self.reach <= 0.5) {
             return fail("reach", self.reach, "between 0 and 0.5 m");
+        }
+        if !(self.farthest > 0.0 && self.farthest <= 10.0) {
+            return fail("farthest", self.farthest, "greater than 0 and at most 10 m");
+        }
+        if !(self.stretch >= 1.0 && self.stretch <= 100.0) {
+            return fail("stretch", self.stretch, "between 1 and 100");
         }
         for (setting, value, most) in
             [("rings", self.rings, 1000), ("rounds", self.rounds, 10_000), ("sweeps", self.sweeps, 10_000)]

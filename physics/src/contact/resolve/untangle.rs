@@ -1,351 +1,325 @@
-//! Brings one garment to the right side of the body and of the garments under it.
+//! Brings all garments of an outfit to the right side of the body and of each other, together.
 
 use std::time::Instant;
 
 use rayon::prelude::*;
 
-use super::contact::{Contact, is_tiny, overlap};
-use super::folds::{Folds, folds};
-use super::obstacle::{BodyObstacle, LayerObstacle, Plane, bounds};
-use super::relax::{neighbourhood, relax};
-use super::{Layer, ResolveSettings, RestGarment};
+use super::ResolveSettings;
+use super::contact::{Contact, is_tiny, normal_of, overlap};
+use super::detect::Crossings;
+use super::folds::folds;
+use super::obstacle::{BodyObstacle, Plane};
+use super::outfit::Outfit;
+use super::over::{Order, Over, all_over, order, outward, part_along};
+use super::relax::relax;
 use crate::contact::TriangleTree;
-use crate::vec3::{add, distance_squared, dot, norm, scale, sub};
+use crate::vec3::{add, add_scaled, dot, norm, norm_squared, scale, sub};
 
 /// A half-space is remembered for a vertex that is nearer to it than this [m]: smoothing may carry it there.
 const WATCH: f64 = 0.01;
 /// No contact asks for a longer step than this in a round [m].
-const LONGEST_STEP: f64 = 0.03;
-/// Rounds without progress after which a garment is left as it is.
-const PATIENCE: usize = 8;
-/// Rounds for which the conditions of a crossing hold on: long enough that a mended place is not torn again by its neighbour.
-const REMEMBERED: usize = 8;
-/// Rounds for crossings of a garment with itself, and those without progress before it is left as it is.
-const FOLD_ROUNDS: usize = 20;
-const FOLD_PATIENCE: usize = 4;
+const LONGEST_STEP: f64 = 0.02;
+/// Rounds without progress after which an outfit is left as it is.
+const PATIENCE: usize = 4;
 /// Rounds in which vertices that are merely closer than asked for still count.
-const ROUNDS_FOR_GAPS: usize = 4;
+const ROUNDS_FOR_GAPS: usize = 3;
 
-/// What a vertex knows of its surroundings.
-#[derive(Debug, Clone, Default)]
-struct Surroundings {
-    /// Distance to the body's exposed surface, without sign [m].
-    body: f64,
-    /// Direction away from the body; zero where the body is pinched or missing.
-    outward: [f64; 3],
-    planes: Vec<Plane>,
-}
-
-/// What was done to one garment.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Work {
-    pub rounds: usize,
-    pub found_pairs: usize,
-}
-
-/// One garment on its way.
+/// An outfit on its way.
 pub(super) struct Untangling<'a> {
-    garment: &'a RestGarment,
+    outfit: &'a Outfit<'a>,
     body: &'a BodyObstacle<'a>,
-    inner: &'a [LayerObstacle<'a>],
     settings: &'a ResolveSettings,
-    input: &'a [[f64; 3]],
+    input: Vec<[f64; 3]>,
+    /// The shape that displacements are measured from: the input, with its crumples smoothed.
+    shape: Vec<[f64; 3]>,
     pub positions: Vec<[f64; 3]>,
-    surroundings: Vec<Surroundings>,
-    /// Faces whose crossings have to be looked for (again).
-    is_dirty: Vec<bool>,
-    /// (obstacle, face, face of the obstacle): 0 the body, i + 1 inner garment i.
-    pairs: Vec<(usize, u32, u32)>,
-    /// Conditions that crossings of the last rounds asked for, and the round.
-    crossings: Vec<(usize, Contact)>,
+    /// Distance of every vertex to the body's exposed surface, without sign [m].
+    far: Vec<f64>,
+    /// What the body leaves to it; none where the body is pinched.
+    planes: Vec<Option<Plane>>,
+    /// Directions away from the body; zero where there is none.
+    outward: Vec<[f64; 3]>,
+    over: Vec<Over>,
+    crossings: Crossings,
+    /// Crossings of the input's garments with themselves, ascending.
+    known_folds: Vec<(u32, u32)>,
+    /// Conditions that all crossings so far asked for: a mended place would be torn again by its neighbours without them.
+    remembered: Vec<Contact>,
 }
 
 /// How wrong a state is: fewer is better, in this order.
 type Defects = (usize, usize);
 
+/// The best state so far.
+#[derive(Default)]
+struct Best {
+    defects: Option<Defects>,
+    positions: Vec<[f64; 3]>,
+    /// Rounds since it was found.
+    stale: usize,
+}
+
+impl Best {
+    fn look(&mut self, defects: Defects, positions: &[[f64; 3]]) {
+        self.stale += 1;
+        if self.defects.is_none_or(|least| defects < least) {
+            *self = Self { defects: Some(defects), positions: positions.to_vec(), stale: 0 };
+        }
+    }
+}
+
 impl<'a> Untangling<'a> {
-    /// From `start`, another state of `layer`.
-    pub fn new(
-        layer: &Layer<'a>,
-        start: &[[f64; 3]],
-        body: &'a BodyObstacle<'a>,
-        inner: &'a [LayerObstacle<'a>],
-        settings: &'a ResolveSettings,
-    ) -> Self {
-        let Layer { garment, positions: input } = *layer;
+    pub fn new(outfit: &'a Outfit<'a>, body: &'a BodyObstacle<'a>, settings: &'a ResolveSettings) -> Self {
+        let input: Vec<[f64; 3]> = outfit.layers.iter().flat_map(|l| l.positions).copied().collect();
+        let count = input.len();
         let mut untangling = Self {
-            garment,
+            outfit,
             body,
-            inner,
             settings,
+            shape: input.clone(),
+            positions: input.clone(),
             input,
-            positions: start.to_vec(),
-            surroundings: vec![Surroundings::default(); input.len()],
-            is_dirty: vec![true; garment.faces.len()],
-            pairs: Vec::new(),
-            crossings: Vec::new(),
+            far: vec![0.0; count],
+            planes: vec![None; count],
+            outward: vec![[0.0; 3]; count],
+            over: Vec::new(),
+            crossings: Crossings::new(outfit.faces.len()),
+            known_folds: Vec::new(),
+            remembered: Vec::new(),
         };
-        let all: Vec<u32> = (0..input.len() as u32).collect();
-        untangling.look(&all);
+        let all: Vec<u32> = (0..count as u32).collect();
+        untangling.touch(&all);
+        let away = |v: u32| untangling.planes[v as usize].map_or([0.0; 3], |p| p.normal);
+        untangling.outward = outward(outfit, &untangling.positions, away);
         untangling
     }
 
-    /// The direction away from the body at vertex `v`; zero where there is none.
-    pub fn outward(&self, v: usize) -> [f64; 3] {
-        self.surroundings[v].outward
-    }
-
-    /// Rounds of detection and relaxation until nothing is wrong or nothing gets better.
-    pub fn run(&mut self) -> Work {
+    /// Rounds of detection and relaxation until nothing is wrong or nothing gets better; how many it took.
+    pub fn run(&mut self) -> usize {
         let start = Instant::now();
-        let mut work = Work::default();
-        let mut best: Option<(Defects, Vec<[f64; 3]>)> = None;
-        let mut stale = 0;
+        let limit = self.settings.time.map(|limit| limit * self.outfit.len() as u32);
+        let mut best = Best::default();
         for round in 0..=self.settings.rounds {
-            let violated = self.violated(round);
-            let wrong = self.violated(ROUNDS_FOR_GAPS).len();
-            // Crossings of what lies on the wrong side anyway say little.
-            let looks_for_pairs = round > 0 || violated.is_empty();
-            if looks_for_pairs {
-                self.find_pairs();
-                work.found_pairs = work.found_pairs.max(self.pairs.len());
+            self.detect();
+            if round == 0 {
+                self.known_folds.clone_from(&self.crossings.own);
             }
-            if violated.is_empty() && self.pairs.is_empty() {
-                return work;
+            let is_violated = self.planes.iter().flatten().any(|p| self.is_violated(p, round))
+                || self.over.iter().any(|o| o.height < self.least(round));
+            if !is_violated && self.crossings.count() == 0 {
+                return round;
             }
-            if looks_for_pairs {
-                let defects = (self.pairs.len() + wrong, wrong);
-                if best.as_ref().is_none_or(|(least, _)| defects < *least) {
-                    best = Some((defects, self.positions.clone()));
-                    stale = 0;
-                } else {
-                    stale += 1;
-                }
+            best.look(self.defects(), &self.positions);
+            let is_late = limit.is_some_and(|limit| start.elapsed() > limit);
+            if round == self.settings.rounds || best.stale > PATIENCE || is_late {
+                self.positions = best.positions;
+                return round;
             }
-            let is_late = self.settings.time.is_some_and(|limit| start.elapsed() > limit);
-            if round == self.settings.rounds || stale > PATIENCE || is_late {
-                break;
-            }
-            work.rounds += 1;
-            self.step(&violated, round, Folds::default());
+            self.step(round);
         }
-        if let Some((_, positions)) = best {
-            self.move_to(positions);
-            self.find_pairs();
-        }
-        work
+        self.settings.rounds
     }
 
-    /// Parts crossings of the garment with itself, without new crossings of anything else. Returns the rounds it took.
-    pub fn part_folds(&mut self) -> usize {
-        let start = Instant::now();
-        let all: Vec<u32> = (0..self.garment.faces.len() as u32).collect();
-        let mut folded = self.self_pairs(&all);
-        if folded.is_empty() {
-            return 0;
-        }
-        let others = |s: &Self| s.pairs.len() + s.violated(ROUNDS_FOR_GAPS).len();
-        let allowed = others(self);
-        let mut best: (usize, Vec<[f64; 3]>) = (folded.len(), self.positions.clone());
-        let mut stale = 0;
-        let mut rounds = 0;
-        for round in 0..self.settings.rounds.min(FOLD_ROUNDS) {
-            let is_late = self.settings.time.is_some_and(|limit| start.elapsed() > limit);
-            if (folded.is_empty() && others(self) <= allowed) || stale > FOLD_PATIENCE || is_late {
-                break;
-            }
-            rounds += 1;
-            let found = folds(self.garment, &self.positions, &folded, 0.25 * self.settings.gap);
-            let violated = self.violated(ROUNDS_FOR_GAPS);
-            self.smooth(&found.crumpled);
-            self.step(&violated, round, found);
-            let dirty = self.dirty();
-            self.find_pairs();
-            let is_dirty = |f: &u32| dirty.binary_search(f).is_ok();
-            folded.retain(|(f, g)| !is_dirty(f) && !is_dirty(g));
-            folded.extend(self.self_pairs(&dirty));
-            folded.sort_unstable();
-            folded.dedup();
-            if others(self) <= allowed && folded.len() < best.0 {
-                best = (folded.len(), self.positions.clone());
-                stale = 0;
-            } else {
-                stale += 1;
-            }
-        }
-        self.move_to(best.1);
-        self.find_pairs();
-        rounds
+    /// Pairs that are left, and vertices on the wrong side.
+    fn defects(&self) -> Defects {
+        let wrong = self.planes.iter().flatten().filter(|p| self.is_violated(p, ROUNDS_FOR_GAPS)).count()
+            + self.over.iter().filter(|o| o.height < 0.0).count();
+        (self.crossings.count() + wrong, wrong)
     }
 
-    /// Crossings of `faces` with any face of the garment, outside of pinched regions.
-    fn self_pairs(&self, faces: &[u32]) -> Vec<(u32, u32)> {
-        let tree = TriangleTree::new(&self.positions, &self.garment.faces);
-        let centre = |f: u32| {
-            let [a, b, c] = self.garment.faces[f as usize].map(|v| self.positions[v as usize]);
-            scale(add(add(a, b), c), 1.0 / 3.0)
-        };
-        let mut pairs = tree.self_pairs_of_faces(faces);
-        pairs.retain(|&(f, g)| !(self.body.is_pinch(centre(f)) && self.body.is_pinch(centre(g))));
-        pairs
+    /// The distance that counts as too close in a round: what is merely close is left alone after the first ones.
+    fn least(&self, round: usize) -> f64 {
+        if round < ROUNDS_FOR_GAPS { self.settings.trigger * self.settings.gap } else { 0.0 }
     }
 
-    /// Moves vertices half way to the middle of their neighbours.
-    fn smooth(&mut self, vertices: &[u32]) {
-        let middle = |v: u32| {
-            let ring = self.garment.topology.ring(v as usize);
-            let sum = ring.iter().fold([0.0; 3], |sum, &n| add(sum, self.positions[n as usize]));
-            let own = self.positions[v as usize];
-            if ring.is_empty() { own } else { scale(add(own, scale(sum, 1.0 / ring.len() as f64)), 0.5) }
-        };
-        let smoothed: Vec<[f64; 3]> = vertices.iter().map(|&v| middle(v)).collect();
-        for (&v, p) in vertices.iter().zip(smoothed) {
-            self.positions[v as usize] = p;
-        }
-        self.touch(vertices);
+    fn is_violated(&self, plane: &Plane, round: usize) -> bool {
+        !plane.is_held && plane.distance < self.least(round)
     }
 
-    /// Faces whose crossings have to be looked for again, ascending.
-    fn dirty(&self) -> Vec<u32> {
-        (0..self.garment.faces.len() as u32).filter(|&f| self.is_dirty[f as usize]).collect()
+    /// Brings crossings and the order of layers up to date.
+    fn detect(&mut self) {
+        let (outfit, positions) = (self.outfit, &self.positions);
+        let trees: Vec<TriangleTree<'_>> = (0..outfit.len())
+            .into_par_iter()
+            .map(|g| TriangleTree::new(outfit.part(positions, g), &outfit.layers[g].garment.faces))
+            .collect();
+        let reach = (self.settings.reach, WATCH);
+        self.over = all_over(outfit, &trees, positions, &self.outward, reach);
+        self.crossings.update(outfit, self.body, &trees, positions, &self.far, self.settings.self_contact);
     }
 
-    /// Vertices on the wrong side, or (in the first rounds) too close.
-    fn violated(&self, round: usize) -> Vec<u32> {
-        let least = if round < ROUNDS_FOR_GAPS { self.settings.trigger * self.settings.gap } else { 0.0 };
-        let is_violated = |s: &Surroundings| s.planes.iter().any(|p| !p.is_held && p.distance < least);
-        (0..self.surroundings.len() as u32).filter(|&v| is_violated(&self.surroundings[v as usize])).collect()
-    }
-
-    fn step(&mut self, violated: &[u32], round: usize, folds: Folds) {
+    fn step(&mut self, round: usize) {
         let gap = self.settings.gap * (1.0 + 0.1 * round as f64).min(3.0);
-        self.crossings.retain(|(found, _)| found + REMEMBERED > round);
-        self.add_crossings(gap, round);
-        let faces = self.pairs.iter().flat_map(|&(_, f, _)| self.garment.faces[f as usize]);
-        let parted = folds.contacts.iter().flat_map(|c| c.vertices);
-        let seeds: Vec<u32> =
-            violated.iter().copied().chain(faces).chain(parted).chain(folds.crumpled).collect();
-        let region = neighbourhood(self.garment, &seeds, self.settings.rings);
-        let mut contacts: Vec<Contact> = Vec::new();
-        for &v in &region {
-            for plane in &self.surroundings[v as usize].planes {
-                let wanted = if plane.is_held { plane.distance.clamp(0.0, gap) } else { gap };
-                let reachable = wanted.min(plane.distance + LONGEST_STEP);
-                contacts.push(Contact::vertex(v, plane, reachable));
+        let outfit = self.outfit;
+        let (mut asked, crumpled) = self.part_folds(0.25 * gap);
+        let mut seeds: Vec<u32> = asked.iter().flat_map(|c| c.vertices).chain(crumpled).collect();
+        for &(f, g) in &self.crossings.layers {
+            let (outer, inner) = (outfit.faces[f as usize], outfit.faces[g as usize]);
+            seeds.extend(outer.iter().chain(&inner));
+            if let Order::Along(away) = order(outer, inner, true, &self.outward) {
+                part_along(away, outer, inner, &self.positions, 0.5 * gap, LONGEST_STEP, &mut asked);
             }
         }
-        contacts.extend(self.crossings.iter().map(|(_, contact)| contact));
-        contacts.extend(folds.contacts);
-        relax(self.garment, &mut self.positions, self.input, &region, &contacts, self.settings.sweeps);
+        for &(f, other) in &self.crossings.body {
+            seeds.extend(outfit.faces[f as usize]);
+            self.part_from_body(f, other, gap, &mut asked);
+        }
+        self.remembered.extend(asked);
+        let least = self.least(round);
+        for o in self.over.iter().filter(|o| o.height < least) {
+            seeds.push(o.vertex);
+            seeds.extend(o.face);
+        }
+        let violated = (0..self.planes.len() as u32)
+            .filter(|&v| self.planes[v as usize].is_some_and(|p| self.is_violated(&p, round)));
+        seeds.extend(violated);
+
+        let region = outfit.neighbourhood(&seeds, self.settings.rings);
+        let mut is_in = vec![false; self.positions.len()];
+        region.iter().for_each(|&v| is_in[v as usize] = true);
+        let mut contacts: Vec<Contact> = Vec::new();
+        for o in self.over.iter().filter(|o| is_in[o.vertex as usize]) {
+            contacts.push(o.contact(gap.min(o.height + LONGEST_STEP)));
+        }
+        contacts.extend(&self.remembered);
+        // The body last, so that it has the last word.
+        for &v in &region {
+            let Some(plane) = self.planes[v as usize].filter(|p| p.distance < WATCH) else { continue };
+            let wanted = if plane.is_held { plane.distance.clamp(0.0, gap) } else { gap };
+            let step = (wanted - plane.distance).min(LONGEST_STEP);
+            let moved = sub(self.positions[v as usize], self.input[v as usize]);
+            if norm(add_scaled(moved, step, plane.normal)) <= self.settings.farthest {
+                contacts.push(Contact::vertex(v, &plane, plane.distance + step));
+            }
+        }
+        let (sweeps, stretch) = (self.settings.sweeps, self.settings.stretch);
+        relax(outfit, &mut self.positions, &self.shape, &region, &contacts, sweeps, stretch);
+        self.hold_back(&region);
         self.touch(&region);
     }
 
-    /// Faces around moved vertices may cross something else now.
-    fn touch(&mut self, moved: &[u32]) {
-        for &v in moved {
-            for &f in self.garment.faces_of(v) {
-                self.is_dirty[f as usize] = true;
+    /// Takes vertices back that went farther than allowed.
+    fn hold_back(&mut self, region: &[u32]) {
+        for &v in region {
+            let v = v as usize;
+            let moved = sub(self.positions[v], self.input[v]);
+            let most = self.settings.farthest;
+            if norm_squared(moved) > most * most {
+                self.positions[v] = add_scaled(self.input[v], most / norm(moved), moved);
             }
         }
-        self.look(moved);
     }
 
-    /// Takes other positions.
-    fn move_to(&mut self, positions: Vec<[f64; 3]>) {
-        let moved: Vec<u32> = (0..positions.len() as u32)
-            .filter(|&v| positions[v as usize] != self.positions[v as usize])
-            .collect();
-        self.positions = positions;
-        self.touch(&moved);
+    /// The part of a face over a face of the body has to come out of it.
+    fn part_from_body(&self, f: u32, other: u32, gap: f64, found: &mut Vec<Contact>) {
+        let face = self.outfit.faces[f as usize];
+        let upper = face.map(|v| self.positions[v as usize]);
+        let Some(lower) = self.body.tree.triangle(other).filter(|t| !is_tiny(t)) else { return };
+        let normal = normal_of(&lower);
+        // The ground under the corner, as a height along the normal.
+        let ground = dot(normal, lower[0]);
+        for corner in overlap(&upper, &lower, normal).iter().filter(|c| c.height < 0.5 * gap) {
+            let target = ground + (0.5 * gap).min(corner.height + LONGEST_STEP);
+            found.push(Contact::face_point(face, corner.at_upper, normal, target));
+        }
     }
 
-    /// Looks at the surroundings of `vertices`.
-    fn look(&mut self, vertices: &[u32]) {
-        let reach = self.settings.reach;
-        let found: Vec<Surroundings> = vertices
-            .par_iter()
-            .with_min_len(128)
+    /// Conditions that part crossings of garments with themselves, and crumpled vertices, which are smoothed.
+    fn part_folds(&mut self, gap: f64) -> (Vec<Contact>, Vec<u32>) {
+        let (mut contacts, mut crumpled) = (Vec::new(), Vec::new());
+        let own = std::mem::take(&mut self.crossings.own);
+        let mut folded = Vec::new();
+        for &(f, g) in &own {
+            let (one, other) = (self.outfit.faces[f as usize], self.outfit.faces[g as usize]);
+            match order(one, other, false, &self.outward) {
+                Order::Along(away) => {
+                    part_along(away, one, other, &self.positions, gap, LONGEST_STEP, &mut contacts);
+                }
+                Order::Unknown => folded.push((f, g)),
+            }
+        }
+        for of_garment in
+            folded.chunk_by(|a, b| self.outfit.garment_of_face(a.0) == self.outfit.garment_of_face(b.0))
+        {
+            let g = self.outfit.garment_of_face(of_garment[0].0);
+            let (first, start) = (self.outfit.faces_of_garment(g).start, self.outfit.vertices(g).start);
+            let had_some = of_garment.iter().any(|pair| self.known_folds.binary_search(pair).is_ok());
+            let local: Vec<(u32, u32)> = of_garment.iter().map(|(f, g)| (f - first, g - first)).collect();
+            let garment = self.outfit.layers[g].garment;
+            let found = folds(garment, self.outfit.part(&self.positions, g), &local, gap);
+            contacts.extend(found.contacts.into_iter().map(|c| c.shifted(start)));
+            let here: Vec<u32> = found.crumpled.iter().map(|v| v + start).collect();
+            // What the input already had is smoothed for good, what was done to it is taken back.
+            match had_some {
+                true => self.smooth_shape(&here),
+                false => self.smooth_moves(&here),
+            }
+            crumpled.extend(here);
+        }
+        self.crossings.own = own;
+        (contacts, crumpled)
+    }
+
+    /// Moves vertices half way to the middle of their neighbours, and the shape they return to with them.
+    fn smooth_shape(&mut self, vertices: &[u32]) {
+        let moves: Vec<[f64; 3]> = vertices
+            .iter()
             .map(|&v| {
-                let p = self.positions[v as usize];
-                let body = self.body.look(p);
-                let far = body.map_or(f64::INFINITY, |b| b.far);
-                let layers = self.inner.iter().filter_map(|i| i.look(p, reach, self.settings.gap));
-                let plane = body.and_then(|b| b.plane);
-                let planes = plane.into_iter().chain(layers).filter(|p| p.distance < WATCH).collect();
-                Surroundings { body: far, outward: plane.map_or([0.0; 3], |p| p.normal), planes }
+                let own = self.positions[v as usize];
+                scale(sub(self.middle(v, |n| self.positions[n as usize]), own), 0.5)
             })
             .collect();
-        for (&v, found) in vertices.iter().zip(found) {
-            self.surroundings[v as usize] = found;
+        for (&v, by) in vertices.iter().zip(moves) {
+            let v = v as usize;
+            self.positions[v] = add(self.positions[v], by);
+            self.shape[v] = add(self.shape[v], by);
         }
     }
 
-    /// Brings the list of crossings up to date, pinched faces of the body left out.
-    fn find_pairs(&mut self) {
-        let dirty = self.dirty();
-        self.pairs.retain(|&(_, f, _)| !self.is_dirty[f as usize]);
-        let near_body: Vec<u32> = dirty.iter().copied().filter(|&f| self.may_touch_body(f)).collect();
-        let faces = &self.garment.faces;
-        let with_body = self.body.tree.pairs_of_faces(&self.positions, faces, &near_body);
-        let body = self.body;
-        self.pairs
-            .extend(with_body.into_iter().filter(|&(_, b)| !body.is_pinched(b)).map(|(f, b)| (0, f, b)));
-        for (i, inner) in self.inner.iter().enumerate() {
-            if inner.is_near(bounds(&self.positions), 0.0) {
-                let found = inner.tree.pairs_of_faces(&self.positions, faces, &dirty);
-                self.pairs.extend(found.into_iter().map(|(f, b)| (i + 1, f, b)));
+    /// Gives vertices the mean displacement of their neighbours.
+    fn smooth_moves(&mut self, vertices: &[u32]) {
+        let by = |n: u32| sub(self.positions[n as usize], self.shape[n as usize]);
+        let smoothed: Vec<[f64; 3]> = vertices.iter().map(|&v| self.middle(v, by)).collect();
+        for (&v, by) in vertices.iter().zip(smoothed) {
+            self.positions[v as usize] = add(self.shape[v as usize], by);
+        }
+    }
+
+    fn middle(&self, v: u32, value: impl Fn(u32) -> [f64; 3]) -> [f64; 3] {
+        let ring = self.outfit.ring(v);
+        let count = ring.len();
+        if count == 0 {
+            value(v)
+        } else {
+            scale(ring.fold([0.0; 3], |sum, n| add(sum, value(n))), 1.0 / count as f64)
+        }
+    }
+
+    /// Looks again at vertices that moved, and marks the faces around them.
+    fn touch(&mut self, moved: &[u32]) {
+        for &v in moved {
+            for f in self.outfit.faces_at(v) {
+                self.crossings.is_dirty[f as usize] = true;
             }
         }
-        self.pairs.sort_unstable();
-        self.is_dirty.fill(false);
-    }
-
-    /// No face reaches farther from a corner than its longest edge.
-    fn may_touch_body(&self, f: u32) -> bool {
-        let [a, b, c] = self.garment.faces[f as usize].map(|v| self.positions[v as usize]);
-        let longest = distance_squared(a, b).max(distance_squared(b, c)).max(distance_squared(c, a)).sqrt();
-        self.garment.faces[f as usize]
-            .iter()
-            .all(|&v| self.surroundings[v as usize].body <= longest * (1.0 + 1e-9))
-    }
-
-    fn tree_of(&self, obstacle: usize) -> (&TriangleTree<'a>, Option<&LayerObstacle<'a>>) {
-        match obstacle {
-            0 => (&self.body.tree, None),
-            i => (&self.inner[i - 1].tree, Some(&self.inner[i - 1])),
+        let found: Vec<_> =
+            moved.par_iter().with_min_len(128).map(|&v| self.body.look(self.positions[v as usize])).collect();
+        for (&v, view) in moved.iter().zip(found) {
+            let v = v as usize;
+            self.far[v] = view.map_or(f64::INFINITY, |b| b.far);
+            self.planes[v] = view.and_then(|b| b.plane);
         }
     }
 
-    /// For every crossing: the part of the face over the obstacle's face has to come out of it.
-    fn add_crossings(&mut self, gap: f64, round: usize) {
-        let mut added = Vec::new();
-        for &(obstacle, f, other) in &self.pairs {
-            let (tree, layer) = self.tree_of(obstacle);
-            let face = self.garment.faces[f as usize];
-            let upper = face.map(|v| self.positions[v as usize]);
-            let Some(mut lower) = tree.triangle(other).filter(|t| !is_tiny(t)) else { continue };
-            if layer.is_some_and(|l| l.facing(other) < 0.0) {
-                lower.swap(1, 2);
-            }
-            let (normal, corners) = overlap(&upper, &lower);
-            for corner in corners.iter().filter(|c| c.height < 0.5 * gap) {
-                // The ground under the corner, as a height along the normal.
-                let ground = dot(normal, lower[0]);
-                let target = ground + (0.5 * gap).min(corner.height + LONGEST_STEP);
-                added.push((round, Contact::face_point(face, corner.at_upper, normal, target)));
-            }
-        }
-        self.crossings.extend(added);
+    /// Largest move of garment `g` from the input [m].
+    pub fn largest_move(&self, g: usize) -> f64 {
+        let (now, before) = (self.outfit.part(&self.positions, g), self.outfit.part(&self.input, g));
+        now.iter().zip(before).map(|(p, q)| norm(sub(*p, *q))).fold(0.0, f64::max)
     }
 
-    /// Largest move from the input [m].
-    pub fn largest_move(&self) -> f64 {
-        let moves = self.positions.iter().zip(self.input).map(|(p, q)| norm(sub(*p, *q)));
-        moves.fold(0.0, f64::max)
-    }
-
-    /// Vertices that moved.
-    pub fn moved(&self) -> usize {
-        self.positions.iter().zip(self.input).filter(|(p, q)| p != q).count()
+    /// Vertices of garment `g` that moved.
+    pub fn moved(&self, g: usize) -> usize {
+        let (now, before) = (self.outfit.part(&self.positions, g), self.outfit.part(&self.input, g));
+        now.iter().zip(before).filter(|(p, q)| p != q).count()
     }
 }

@@ -1,6 +1,6 @@
 //! `clothcombo bench certificate`: the post-process on random outfits.
 
-use crate::checkpoint::Checkpoint;
+use crate::checkpoint::TrainedModel;
 use crate::cli::train::load_under_bar;
 use crate::cli::verbosity::progress_bar;
 use crate::config::{Config, load};
@@ -34,7 +34,7 @@ pub struct Arguments {
     /// Overrides one value of the configuration; repeatable
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Run, checkpoints or checkpoint folder of a trained network; default: skinning with shape transfer drapes
+    /// Run, checkpoint or folder of a trained model (models/default); default: skinning with shape transfer drapes
     #[arg(long, value_name = "DIR")]
     checkpoint: Option<PathBuf>,
     /// Random outfits
@@ -70,10 +70,10 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let settings = ResolveSettings { gap: 1e-3 * arguments.gap_mm, ..ResolveSettings::default() };
     settings.check().into_diagnostic()?;
-    let checkpoint = arguments.checkpoint.as_deref().map(Checkpoint::open).transpose()?;
+    let checkpoint = arguments.checkpoint.as_deref().map(TrainedModel::open).transpose()?;
     let file = match (&arguments.config, &checkpoint) {
         (Some(file), _) => file.clone(),
-        (None, Some(checkpoint)) => checkpoint.path.join("config.toml"),
+        (None, Some(checkpoint)) => checkpoint.folder.join("config.toml"),
         (None, None) => Path::new("configs").join("open.toml"),
     };
     let mut config = load(&file, &arguments.overrides)?;
@@ -106,7 +106,7 @@ fn measure(
     arguments: &Arguments,
     config: &Config,
     library: &Arc<Library>,
-    checkpoint: Option<&Checkpoint>,
+    checkpoint: Option<&TrainedModel>,
     settings: &ResolveSettings,
 ) -> Result<Vec<OutfitResult>, Report> {
     let tensors;
@@ -116,7 +116,7 @@ fn measure(
             checkpoint_fits(checkpoint, library)?;
             let device = Backend::preferred().device();
             tensors = WardrobeTensors::new(library.clone(), checkpoint.state.dimensions(), &device);
-            Some(Networks::new(checkpoint.model(config, &device)?, &tensors))
+            Some(Networks::new(checkpoint.networks(&device)?, &tensors))
         }
     };
     let draws: Vec<usize> = match arguments.only.is_empty() {
@@ -181,7 +181,7 @@ fn orders(library: &Library, names: &[String]) -> Result<Vec<Vec<usize>>, Report
     Ok(orders)
 }
 
-fn checkpoint_fits(checkpoint: &Checkpoint, library: &Library) -> Result<(), Report> {
+fn checkpoint_fits(checkpoint: &TrainedModel, library: &Library) -> Result<(), Report> {
     let (expected, found) = (state(library, 0), &checkpoint.state);
     if (&found.joints, found.shape_count, found.pose_features)
         == (&expected.joints, expected.shape_count, expected.pose_features)
@@ -191,7 +191,7 @@ fn checkpoint_fits(checkpoint: &Checkpoint, library: &Library) -> Result<(), Rep
     Err(miette!(
         help = "leave out --config to use the checkpoint's own, or restore the data it was trained on",
         "the data of the configuration does not fit checkpoint {}",
-        checkpoint.path.display()
+        checkpoint.folder.display()
     ))
 }
 

@@ -1,0 +1,189 @@
+//! The order of layers, told by the body: along its outward direction an outer garment lies beyond an inner one.
+//!
+//! The closest point of a folded inner garment may lie on the back of a fold, or on the far side of a sleeve, and its normal
+//! then asks for the wrong way. The direction away from the body is the same for all layers over a place, so that every vertex
+//! looks along it: of all sheets of the inner garment there, the outermost counts.
+
+use rayon::prelude::*;
+
+use super::contact::{Contact, along_line, is_tiny, normal_of, overlap};
+use super::obstacle::facing;
+use super::outfit::Outfit;
+use crate::contact::{Triangle, TriangleTree};
+use crate::mesh::vertex_normals;
+use crate::vec3::{add, add_scaled, cross, dot, neg, norm, normalized, scale, sub};
+
+/// A sheet whose own direction away from the body differs more than this from the vertex's (cosine) lies over another part of
+/// the body: a sleeve is not over the side of the chest.
+const SAME_PART: f64 = 0.5;
+/// A sheet steeper than this (cosine between its normal and the direction away from the body) is left along that direction
+/// instead of its normal.
+const STEEP: f64 = 0.5;
+
+/// Two sheets look at each other where their directions away from the body have a cosine below this.
+const FACING: f64 = -0.3;
+/// Rings over which directions are smoothed.
+const SMOOTHED_RINGS: usize = 4;
+
+/// A vertex and the sheet of an inner garment it has to stay over.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Over {
+    pub vertex: u32,
+    /// Packed corners of the inner garment's face, and the place in it.
+    pub face: [u32; 3],
+    pub barycentric: [f64; 3],
+    pub normal: [f64; 3],
+    /// Height over the sheet along `normal`, negative below [m].
+    pub height: f64,
+}
+
+impl Over {
+    pub fn contact(&self, gap: f64) -> Contact {
+        Contact::vertex_over(self.vertex, (self.face, self.barycentric), self.normal, gap)
+    }
+}
+
+/// Every vertex with a sheet of an inner garment less than `reach` above it or less than `watch` below it.
+/// `trees` are those of the garments, `outward` the direction away from the body, zero where there is none.
+pub(super) fn all_over(
+    outfit: &Outfit<'_>,
+    trees: &[TriangleTree<'_>],
+    positions: &[[f64; 3]],
+    outward: &[[f64; 3]],
+    (reach, watch): (f64, f64),
+) -> Vec<Over> {
+    let end = outfit.vertex_count() as u32;
+    (0..outfit.len().saturating_sub(1))
+        .flat_map(|inner| {
+            let outer = outfit.vertices(inner).end..end;
+            outer
+                .into_par_iter()
+                .with_min_len(256)
+                .filter_map(|v| look(outfit, &trees[inner], inner, positions, outward, v, (reach, watch)))
+                .collect::<Vec<_>>()
+        })
+        .collect()
+}
+
+fn look(
+    outfit: &Outfit<'_>,
+    tree: &TriangleTree<'_>,
+    inner: usize,
+    positions: &[[f64; 3]],
+    outward: &[[f64; 3]],
+    vertex: u32,
+    (reach, watch): (f64, f64),
+) -> Option<Over> {
+    let (p, away) = (positions[vertex as usize], outward[vertex as usize]);
+    if away == [0.0; 3] {
+        return None;
+    }
+    let (from, to) = (add_scaled(p, -watch, away), add_scaled(p, reach, away));
+    let low = std::array::from_fn(|k| from[k].min(to[k]));
+    let high = std::array::from_fn(|k| from[k].max(to[k]));
+    let first = outfit.faces_of_garment(inner).start;
+    let mut found: Option<(f64, u32, [f64; 3])> = None;
+    for f in tree.faces_in_box(low, high) {
+        let face = outfit.faces[(first + f) as usize];
+        let sheet = face.iter().fold([0.0; 3], |sum, &v| add(sum, outward[v as usize]));
+        if dot(sheet, away) < SAME_PART * norm(sheet) {
+            continue;
+        }
+        let Some((above, at)) = along_line(p, away, &face.map(|v| positions[v as usize])) else { continue };
+        let is_farther = found.is_none_or(|(most, known, _)| above > most || (above == most && f < known));
+        if (-watch..=reach).contains(&above) && is_farther {
+            found = Some((above, f, at));
+        }
+    }
+    let (above, f, barycentric) = found?;
+    let face = outfit.faces[(first + f) as usize];
+    let [a, b, c] = face.map(|v| positions[v as usize]);
+    let normal = normalized(cross(sub(b, a), sub(c, a)));
+    let slope = dot(normal, away);
+    let normal = match slope {
+        s if s > STEEP => normal,
+        s if s < -STEEP => neg(normal),
+        _ => away,
+    };
+    Some(Over { vertex, face, barycentric, normal, height: -above * dot(normal, away) })
+}
+
+/// How two crossing triangles have to lie, by their directions away from the body.
+pub(super) enum Order {
+    /// The first over the second, along this direction.
+    Along([f64; 3]),
+    /// Nothing says so.
+    Unknown,
+}
+
+/// The order of two triangles that cross. Where they look at each other (a sleeve and the side of the chest) each has to stay
+/// on its own part's side, whichever garments they belong to; otherwise the outer garment lies over the inner one, and two
+/// folds of one garment have no order.
+pub(super) fn order(first: [u32; 3], second: [u32; 3], is_outer: bool, outward: &[[f64; 3]]) -> Order {
+    let mean =
+        |face: [u32; 3]| normalized(face.iter().fold([0.0; 3], |sum, &v| add(sum, outward[v as usize])));
+    let (a, b) = (mean(first), mean(second));
+    match dot(a, b) {
+        _ if a == [0.0; 3] || b == [0.0; 3] => Order::Unknown,
+        c if c < FACING => Order::Along(normalized(sub(b, a))),
+        _ if is_outer => Order::Along(normalized(add(a, b))),
+        _ => Order::Unknown,
+    }
+}
+
+/// What two crossing triangles ask for: the first has to lie `gap` over the second along `away`, as far as they cover each
+/// other.
+pub(super) fn part_along(
+    away: [f64; 3],
+    first: [u32; 3],
+    second: [u32; 3],
+    positions: &[[f64; 3]],
+    gap: f64,
+    longest_step: f64,
+    found: &mut Vec<Contact>,
+) {
+    let upper = first.map(|v| positions[v as usize]);
+    let lower = second.map(|v| positions[v as usize]);
+    if is_tiny(&lower) {
+        return;
+    }
+    let steepness = |t: &Triangle| {
+        let normal = normal_of(t);
+        let slope = dot(normal, away);
+        (slope.abs(), if slope < 0.0 { neg(normal) } else { normal })
+    };
+    // Along the flatter of the two normals, where one is flat: that is the shortest way apart.
+    let (under, over) = (steepness(&lower), steepness(&upper));
+    let flatter = if under.0 >= over.0 { under } else { over };
+    let normal = if flatter.0 > STEEP { flatter.1 } else { away };
+    for corner in overlap(&upper, &lower, normal).iter().filter(|c| c.height < gap) {
+        let target = gap.min(corner.height + longest_step);
+        found.push(Contact::face_points((first, corner.at_upper), (second, corner.at_lower), normal, target));
+    }
+}
+
+/// Directions away from the body of all garments, by packed vertex: their normals on the side that most of `away` (from the
+/// body's surface, zero where unknown) tell for a component, smoothed over wrinkles. Unlike the direction from the nearest
+/// point of the body they do not change where cloth has gone through other cloth towards another part of the body.
+pub(super) fn outward(
+    outfit: &Outfit<'_>,
+    positions: &[[f64; 3]],
+    away: impl Fn(u32) -> [f64; 3],
+) -> Vec<[f64; 3]> {
+    let mut all: Vec<[f64; 3]> = Vec::with_capacity(positions.len());
+    for g in 0..outfit.len() {
+        let (garment, start) = (outfit.layers[g].garment, outfit.vertices(g).start);
+        let own = outfit.part(positions, g);
+        let facing = facing(garment, own, |v| away(start + v as u32));
+        let normals = vertex_normals(own, &garment.faces);
+        all.extend(normals.iter().zip(&facing).map(|(normal, side)| scale(*normal, *side)));
+    }
+    for _ in 0..SMOOTHED_RINGS {
+        all = (0..all.len() as u32)
+            .into_par_iter()
+            .with_min_len(512)
+            .map(|v| normalized(outfit.ring(v).fold(all[v as usize], |sum, n| add(sum, all[n as usize]))))
+            .collect();
+    }
+    all
+}
