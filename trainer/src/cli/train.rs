@@ -1,5 +1,6 @@
 //! `clothcombo-train`.
 
+use super::{exit_code, start_logging};
 use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::config::{Config, load};
 use crate::device::Backend;
@@ -15,11 +16,13 @@ use crate::scene::Library;
 use crate::session::Session;
 use crate::stop::StopFlag;
 use crate::train_loop::train;
+use crate::world::World;
 use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 use std::rc::Rc;
 use std::sync::Arc;
 
@@ -116,11 +119,36 @@ fn run_of(path: &Path) -> Option<PathBuf> {
     spelled.map(Path::to_path_buf).or_else(|| full.ancestors().nth(found).map(Path::to_path_buf))
 }
 
-/// Runs the program.
+/// The whole program, as one of the processes that a launcher may have started.
+pub fn main() -> ExitCode {
+    let world = match World::join() {
+        Ok(world) => Rc::new(world),
+        Err(error) => return exit_code(Err(error.into())),
+    };
+    let mut arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(message) => {
+            if world.leads() {
+                // A closed terminal is no reason to fail differently.
+                let _ = message.print();
+            }
+            return ExitCode::from(u8::try_from(message.exit_code()).unwrap_or(2));
+        }
+    };
+    arguments.quiet |= !world.leads();
+    start_logging(arguments.log_level());
+    match world.conclude(run(&arguments, &world)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(Some(report)) => exit_code(Err(report)),
+        Err(None) => ExitCode::FAILURE,
+    }
+}
+
+/// Trains as one of the processes in `world`, of which only the leader writes and prints.
 ///
 /// # Errors
 /// One report that names the file, key or garment at fault and how to mend it.
-pub fn run(arguments: &Arguments) -> Result<(), Report> {
+fn run(arguments: &Arguments, world: &Rc<World>) -> Result<(), Report> {
     let stop = StopFlag::on_signals().into_diagnostic().wrap_err("cannot listen for Ctrl-C")?;
     let named = arguments.named_run()?;
     let file = arguments.config_file(named.as_deref())?;
@@ -129,32 +157,50 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let config = load(&file, &arguments.overrides)?;
     let existing = match &arguments.resume {
         Some(path) => {
-            let run = RunDir::resume(&root, &config, &arguments.allow_config_change)?;
+            let run = match world.leads() {
+                true => RunDir::resume(&root, &config, &arguments.allow_config_change)?,
+                false => RunDir::follow(&root),
+            };
             Some((run, newest_or_none(path.as_deref().unwrap_or(&root))?))
         }
-        None => RunDir::refuse_occupied(&root).map(|()| None)?,
+        None if world.leads() => RunDir::refuse_occupied(&root).map(|()| None)?,
+        None => None,
     };
     let library = Arc::new(load_library(&config, arguments.quiet)?);
     let device = arguments.device.device();
-    let (run, mut session) = match existing {
+    let (run, session) = match existing {
         Some((run, checkpoint)) => {
             let session = match &checkpoint {
                 Some(c) => Session::resume(run.clone(), config.clone(), library.clone(), &device, c)?,
                 None => Session::new(run.clone(), config.clone(), library.clone(), &device)?,
             };
-            continue_run(&run, &config, checkpoint.as_ref())?;
+            // Everybody has read the checkpoint before the leader moves others aside.
+            world.meet(false)?;
+            if world.leads() {
+                continue_run(&run, &config, checkpoint.as_ref())?;
+            }
             (run, session)
         }
         None => {
-            let run = RunDir::create(&root, &config)?;
+            let run = match world.leads() {
+                true => RunDir::create(&root, &config)?,
+                false => RunDir::follow(&root),
+            };
             let session = Session::new(run.clone(), config.clone(), library.clone(), &device)?;
             (run, session)
         }
     };
+    let mut session = session.shared_in(world.clone())?;
+    if !world.leads() {
+        return train(&mut session, &mut [], &stop);
+    }
     run.write_split(&library.split_names())?;
     let memory = session.memory_estimate();
     if !arguments.quiet {
         eprintln!("run folder {}", run.root().display());
+        if world.is_shared() {
+            eprintln!("{} processes share every step", world.share().size);
+        }
         if let Some(m) = memory {
             eprintln!(
                 "memory: about {} at the peak ({} in use, {} for the largest scene, {} for parameters)",
