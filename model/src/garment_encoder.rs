@@ -5,6 +5,7 @@ use burn::tensor::{Device, Tensor};
 
 use crate::config::ModelConfig;
 use crate::diffusion_net::DiffusionNet;
+use crate::ops::product;
 use crate::tensors::GarmentTensors;
 
 /// E_c, a DiffusionNet on rest positions (no normalisation of the input, as in the paper).
@@ -53,7 +54,7 @@ impl GarmentEncoder {
     pub fn forward(&self, garment: &GarmentTensors) -> GarmentEmbedding {
         let vertex = self.diffusion_net.forward(garment);
         // A product with the normalised mass row: a plain sum over thousands of rows would lose digits in f32.
-        let mean = garment.mass.clone().matmul(vertex.clone());
+        let mean = product(garment.mass.clone(), vertex.clone());
         let vertex = if self.has_vertex_embedding { vertex } else { vertex.zeros_like() };
         GarmentEmbedding { vertex, garment: mean }
     }

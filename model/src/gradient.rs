@@ -2,7 +2,7 @@
 
 use burn::module::{Module, ModuleVisitor, Param};
 use burn::optim::GradientsParams;
-use burn::tensor::Tensor;
+use burn::tensor::{Tensor, TensorData};
 
 use crate::ops::{scale_by, squared_norm};
 
@@ -54,6 +54,66 @@ impl ModuleVisitor for Scale<'_> {
     }
 }
 
+/// All gradients of `module` as one row, to be summed over processes at once: those of every parameter in the order of the
+/// module (zeros where there is none), then for every parameter 1 if it has a gradient and 0 if not.
+pub fn gradient_bucket<M: Module>(module: &M, gradients: &GradientsParams) -> Vec<f32> {
+    let mut pack = Pack { gradients, values: Vec::with_capacity(module.num_params()), present: Vec::new() };
+    module.visit(&mut pack);
+    pack.values.append(&mut pack.present);
+    pack.values
+}
+
+/// The gradients in a [`gradient_bucket`] of `module`, or in a sum of such.
+///
+/// # Panics
+/// If the bucket is of another module.
+pub fn gradients_of_bucket<M: Module>(module: &M, bucket: &[f32]) -> GradientsParams {
+    let (values, present) = bucket.split_at(module.num_params());
+    let mut unpack = Unpack { gradients: GradientsParams::new(), values, present };
+    module.visit(&mut unpack);
+    unpack.gradients
+}
+
+struct Pack<'a> {
+    gradients: &'a GradientsParams,
+    values: Vec<f32>,
+    present: Vec<f32>,
+}
+
+impl ModuleVisitor for Pack<'_> {
+    fn visit_float<const D: usize>(&mut self, parameter: &Param<Tensor<D>>) {
+        let gradient = self.gradients.get::<D>(parameter.id);
+        self.present.push(if gradient.is_some() { 1.0 } else { 0.0 });
+        let end = self.values.len() + parameter.lazy_shape().num_elements();
+        if let Some(gradient) = gradient {
+            let data = gradient.into_data();
+            self.values.extend_from_slice(data.as_slice().expect("gradients are f32"));
+        }
+        self.values.resize(end, 0.0);
+    }
+}
+
+struct Unpack<'a> {
+    gradients: GradientsParams,
+    values: &'a [f32],
+    present: &'a [f32],
+}
+
+impl ModuleVisitor for Unpack<'_> {
+    fn visit_float<const D: usize>(&mut self, parameter: &Param<Tensor<D>>) {
+        let shape = parameter.lazy_shape();
+        let (values, rest) = self.values.split_at(shape.num_elements());
+        self.values = rest;
+        let (present, rest) = self.present.split_at(1);
+        self.present = rest;
+        if present[0] > 0.0 {
+            let data = TensorData::new(values.to_vec(), shape);
+            let gradient = Tensor::<D>::from_data(data, &parameter.lazy_device().without_autodiff());
+            self.gradients.register::<D>(parameter.id, gradient);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -88,5 +148,21 @@ mod tests {
     fn no_gradient_has_no_norm() {
         let layer = seeded(2, |device| Linear::new(3, 2, device));
         assert!(clip_global_norm(&layer, &mut GradientsParams::new(), 1.0).is_none());
+    }
+
+    #[test]
+    fn a_bucket_keeps_every_gradient_and_which_parameters_have_one() {
+        let layer = seeded(3, |device| Linear::new(5, 4, device));
+        let device = layer.weight.val().device();
+        let loss = layer.forward(uniform(6, 5, 1.0, 1, &device)).square().sum();
+        let mut gradients = GradientsParams::from_grads(loss.backward(), &layer);
+        let expected = squares(&layer, &gradients);
+        let bucket = gradient_bucket(&layer, &gradients);
+        assert_eq!(bucket.len(), 5 * 4 + 4 + 2);
+        assert_eq!(squares(&layer, &gradients_of_bucket(&layer, &bucket)), expected);
+
+        gradients.remove::<1>(layer.bias.id);
+        let alone = gradients_of_bucket(&layer, &gradient_bucket(&layer, &gradients));
+        assert!(alone.get::<1>(layer.bias.id).is_none() && alone.get::<2>(layer.weight.id).is_some());
     }
 }

@@ -37,7 +37,7 @@ pub use config::{Dimensions, ModelConfig};
 pub use draping::Draping;
 pub use error::ModelError;
 pub use garment_encoder::{GarmentEmbedding, GarmentEncoder};
-pub use gradient::{clip_global_norm, global_norm};
+pub use gradient::{clip_global_norm, global_norm, gradient_bucket, gradients_of_bucket};
 pub use linear::Linear;
 pub use linear_blend_skinning::linear_blend_skinning;
 pub use mlp::ResidualMlp;

@@ -3,7 +3,7 @@
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Distribution, Tensor};
 
-use crate::ops::{Activation, activate};
+use crate::ops::{Activation, activate, product};
 
 /// `y = x·weight + bias`.
 ///
@@ -32,7 +32,7 @@ impl Linear {
 
     /// The product without the bias.
     pub fn product(&self, input: Tensor<2>) -> Tensor<2> {
-        input.matmul(self.weight.val())
+        product(input, self.weight.val())
     }
 
     /// The bias as a row `[1,out]`.

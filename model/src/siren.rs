@@ -16,7 +16,7 @@ use burn::tensor::{Device, Distribution, Tensor};
 
 use crate::linear::{Linear, fan_in_bound, parameter, uniform_parameter};
 use crate::ops::{
-    Activation, Segments, segment_activate, segment_activate_sum, sine_modulation, split_columns,
+    Activation, Segments, product, segment_activate, segment_activate_sum, sine_modulation, split_columns,
 };
 
 /// Sizes and frequencies of a [`ModulatedSiren`].
@@ -84,22 +84,22 @@ impl Modulator {
 
     /// The part of all gates that depends on the vertices only: `[N, vertex_latent]` → `[N, L·width]`.
     pub fn vertex_product(&self, vertex: Tensor<2>) -> Tensor<2> {
-        vertex.matmul(self.vertex.val())
+        product(vertex, self.vertex.val())
     }
 
     /// The gates m_0 … m_{L−1}, each `[N, width]`.
     fn gates(&self, vertex_product: Tensor<2>, garment: Tensor<2>, segments: &Segments) -> Vec<Tensor<2>> {
         let layers = self.hidden.len() + 1;
-        let rows = garment.matmul(self.garment.val()) + self.bias.val().unsqueeze();
+        let rows = product(garment, self.garment.val()) + self.bias.val().unsqueeze();
         let rows = split_columns(rows, self.width, layers);
         let products = split_columns(vertex_product, self.width, layers);
         let mut gates: Vec<Tensor<2>> = Vec::with_capacity(layers);
-        for (layer, (product, row)) in products.into_iter().zip(rows).enumerate() {
+        for (layer, (fixed, row)) in products.into_iter().zip(rows).enumerate() {
             let gate = match layer.checked_sub(1) {
-                None => segment_activate(Activation::Relu, product, row, segments),
+                None => segment_activate(Activation::Relu, fixed, row, segments),
                 Some(previous) => {
-                    let inner = gates[previous].clone().matmul(self.hidden[previous].val());
-                    segment_activate_sum(Activation::Relu, [inner, product], row, segments)
+                    let inner = product(gates[previous].clone(), self.hidden[previous].val());
+                    segment_activate_sum(Activation::Relu, [inner, fixed], row, segments)
                 }
             };
             gates.push(gate);

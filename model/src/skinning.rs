@@ -6,7 +6,7 @@ use burn::tensor::{Device, Tensor};
 use crate::config::{Dimensions, ModelConfig};
 use crate::linear::{Linear, fan_in_bound, uniform_parameter};
 use crate::mlp::residual_pairs;
-use crate::ops::{Activation, segment_activate, skin_correction};
+use crate::ops::{Activation, product, product_add, segment_activate, skin_correction};
 use crate::tensors::OutfitTensors;
 
 /// S: (x, z_s, z_v) → ΔW.
@@ -51,7 +51,7 @@ impl Skinning {
 
     /// The part of the first layer that depends on the vertices only `[ΣV,w]`.
     pub fn vertex_product(&self, rest: Tensor<2>, vertex: Tensor<2>) -> Tensor<2> {
-        rest.matmul(self.coordinate.val()) + vertex.matmul(self.vertex.val())
+        product_add(rest, self.coordinate.val(), product(vertex, self.vertex.val()))
     }
 
     /// Skin weights W + ΔW `[ΣV,J]`; ΔW is zero outside each garment's joints.
@@ -62,7 +62,7 @@ impl Skinning {
         draping: Tensor<2>,
     ) -> Tensor<2> {
         let segments = &outfit.segments;
-        let rows = draping.matmul(self.garment.val()) + self.bias.val().unsqueeze();
+        let rows = product(draping, self.garment.val()) + self.bias.val().unsqueeze();
         let features = segment_activate(Activation::Gelu, vertex_product, rows, segments);
         let raw = self.output.forward(residual_pairs(&self.hidden, features));
         let (weights, mask) = (outfit.skin_weights.clone(), outfit.joint_mask.clone());

@@ -5,6 +5,7 @@ use burn::tensor::{Device, Tensor};
 
 use crate::config::ModelConfig;
 use crate::mlp::ResidualMlp;
+use crate::ops::product;
 use crate::siren::{ModulatedSiren, SirenSizes};
 use crate::tensors::OutfitTensors;
 
@@ -55,11 +56,11 @@ impl Untangling {
         vertex_product: impl FnOnce() -> Tensor<2>,
     ) -> Option<Tensor<2>> {
         let edges = outfit.edges.as_ref()?;
-        let receiver = edges.receiver.clone().matmul(draping.clone());
-        let sender = edges.sender.clone().matmul(draping.clone());
+        let receiver = product(edges.receiver.clone(), draping.clone());
+        let sender = product(edges.sender.clone(), draping.clone());
         let forces = self.force.forward(Tensor::cat(vec![receiver, sender], 1));
-        let from_below = edges.from_below.clone().matmul(forces.clone());
-        let from_above = edges.from_above.clone().matmul(forces);
+        let from_below = product(edges.from_below.clone(), forces.clone());
+        let from_above = product(edges.from_above.clone(), forces);
         let latent = Tensor::cat(vec![from_below, from_above, draping], 1);
         let values = self.displacement.forward(canonical, vertex_product(), latent, &outfit.segments);
         let displacement = values * self.scale;

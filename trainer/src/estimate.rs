@@ -6,6 +6,7 @@ use crate::learner::{Learner, new_optimizer};
 use crate::scene::{Library, prepare_step};
 use crate::schedule::Schedule;
 use crate::session::dimensions;
+use crate::world::Share;
 use burn::tensor::Device;
 use clothcombo_model::ClothCombo;
 use std::sync::Arc;
@@ -45,7 +46,7 @@ pub fn time_stages(
         for i in 0..=timed {
             let step = first + i.saturating_sub(1) * stage.steps / timed.max(1);
             let start = Instant::now();
-            let scenes = prepare_step(library, config, &schedule, step)?;
+            let scenes = prepare_step(library, config, &schedule, step, Share::WHOLE)?;
             let prepared = Instant::now();
             // A rate of zero would be no step; this one moves nothing that matters.
             learner.step(&tensors, &scenes, stage.trains, 1e-12, false)?;

@@ -25,6 +25,18 @@ struct Frozen {
     embeddings: Recent<GarmentEmbedding>,
 }
 
+/// Loss and gradients of scenes, before the update.
+pub struct Computed {
+    /// Their part of the weighted loss.
+    pub loss: f64,
+    /// Energies per scene and body.
+    pub scenes: Vec<Vec<SceneLossOutput>>,
+    /// Their part of the gradient; empty when nothing in the scenes depends on what is trained.
+    pub gradients: GradientsParams,
+    /// Where the time went.
+    pub times: StepTimes,
+}
+
 /// What a step found.
 pub struct StepOutcome {
     /// Weighted loss, mean over the bodies of a scene, mean over the scenes.
@@ -84,25 +96,39 @@ impl Learner {
         learning_rate: f64,
         spoil_gradient: bool,
     ) -> Result<StepOutcome, DrapeError> {
-        let mut outcome = StepOutcome {
+        let computed = self.compute(tensors, scenes, scenes.len(), trains, spoil_gradient)?;
+        Ok(self.update(computed, trains, learning_rate))
+    }
+
+    /// Loss and gradients of `scenes`, which are some of the `total` scenes of a step.
+    ///
+    /// # Errors
+    /// When a scene's tensors cannot be made.
+    pub fn compute(
+        &mut self,
+        tensors: &WardrobeTensors,
+        scenes: &[PreparedScene],
+        total: usize,
+        trains: Trains,
+        spoil_gradient: bool,
+    ) -> Result<Computed, DrapeError> {
+        let mut computed = Computed {
             loss: 0.0,
             scenes: Vec::with_capacity(scenes.len()),
-            gradient_norm: 0.0,
-            skipped: false,
+            gradients: GradientsParams::new(),
             times: StepTimes::default(),
         };
-        let share = 1.0 / scenes.len() as f64;
+        let share = 1.0 / total as f64;
         let mut sum = GradientsAccumulator::<ClothCombo>::new();
-        let mut single = None;
         for scene in scenes {
             let start = Instant::now();
             let (loss, values) = self.forward(tensors, scene, trains)?;
             let mean = values.iter().map(|s| s.value().total).sum::<f64>() / values.len() as f64;
-            outcome.loss += mean * share;
-            outcome.scenes.push(values);
-            outcome.times.forward += start.elapsed();
+            computed.loss += mean * share;
+            computed.scenes.push(values);
+            computed.times.forward += start.elapsed();
             let Some(mut loss) = loss else { continue };
-            if scenes.len() > 1 {
+            if total > 1 {
                 loss = loss * share;
             }
             if spoil_gradient {
@@ -112,17 +138,25 @@ impl Learner {
             let gradients = trace_span!("backward")
                 .in_scope(|| GradientsParams::from_grads(loss.backward(), &self.model));
             match scenes.len() {
-                1 => single = Some(gradients),
+                1 => computed.gradients = gradients,
                 _ => sum.accumulate(&self.model, gradients),
             }
-            outcome.times.backward += start.elapsed();
+            computed.times.backward += start.elapsed();
+        }
+        if scenes.len() > 1 {
+            computed.gradients = sum.grads();
+        }
+        Ok(computed)
+    }
+
+    /// The optimiser step on gradients of the whole step.
+    pub fn update(&mut self, computed: Computed, trains: Trains, learning_rate: f64) -> StepOutcome {
+        let Computed { loss, scenes, mut gradients, times } = computed;
+        let mut outcome = StepOutcome { loss, scenes, gradient_norm: 0.0, skipped: !loss.is_finite(), times };
+        if gradients.is_empty() {
+            return outcome;
         }
         let start = Instant::now();
-        let mut gradients = single.unwrap_or_else(|| sum.grads());
-        if gradients.is_empty() {
-            outcome.skipped = !outcome.loss.is_finite();
-            return Ok(outcome);
-        }
         let clipping = trace_span!("clip").entered();
         let norm = match self.clip_norm > 0.0 {
             true => clip_global_norm(&self.model, &mut gradients, self.clip_norm),
@@ -137,7 +171,7 @@ impl Learner {
             self.model = if trains == Trains::Untangling { model } else { model.clamp_diffusion_times() };
         }
         outcome.times.update = start.elapsed();
-        Ok(outcome)
+        outcome
     }
 
     /// Mean loss over the bodies, `None` when nothing in it depends on what is trained.

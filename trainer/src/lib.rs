@@ -29,6 +29,8 @@ pub mod scene;
 pub mod schedule;
 pub mod score;
 pub mod session;
+pub mod step_summary;
 pub mod stop;
 pub mod study;
 pub mod train_loop;
+pub mod world;

@@ -78,8 +78,8 @@ pub enum RunDirError {
 #[derive(Clone, Debug)]
 pub struct RunDir {
     root: PathBuf,
-    /// Held as long as any clone lives.
-    _lock: Arc<RunLock>,
+    /// Held as long as any clone lives; a process that follows another holds none.
+    _lock: Option<Arc<RunLock>>,
 }
 
 impl RunDir {
@@ -98,6 +98,11 @@ impl RunDir {
         }
         run.write_config(config)?;
         Ok(run)
+    }
+
+    /// The folder of a run that another process of the same run writes.
+    pub fn follow(root: &Path) -> Self {
+        Self { root: root.to_owned(), _lock: None }
     }
 
     /// Checks that no run lives in `root`.
@@ -157,7 +162,7 @@ impl RunDir {
             LockError::Held { owner } => RunDirError::InUse { path: root.to_owned(), owner },
             LockError::Io { path, reason } => RunDirError::Io { path, reason },
         })?;
-        let run = Self { root: root.to_owned(), _lock: Arc::new(lock) };
+        let run = Self { root: root.to_owned(), _lock: Some(Arc::new(lock)) };
         [run.root.clone(), run.checkpoints(), run.samples(), run.incidents()].iter().for_each(|f| sweep(f));
         Ok(run)
     }

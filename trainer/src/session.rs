@@ -8,19 +8,21 @@ use crate::evaluate::{ValidationReport, ValidationSet};
 use crate::event::StepRecord;
 use crate::guard::{Guard, Verdict};
 use crate::incident::{Circumstances, Incident, spoil_position};
-use crate::learner::{Learner, StepOutcome, new_optimizer};
+use crate::learner::{Computed, Learner, StepOutcome, new_optimizer};
 use crate::memory::{MemoryEstimate, estimate};
 use crate::run_dir::RunDir;
 use crate::samples;
-use crate::scene::{Library, PreparedScene};
+use crate::scene::{Library, PreparedScene, prepare_step};
 use crate::schedule::{Schedule, ScheduleAt};
+use crate::step_summary::StepSummary;
+use crate::stop::StopFlag;
+use crate::world::{Share, World, WorldError};
 use burn::module::Module;
 use burn::tensor::Device;
-use clothcombo_model::{ClothCombo, Dimensions};
-use clothcombo_physics::energy::Term;
+use clothcombo_model::{ClothCombo, Dimensions, gradient_bucket, gradients_of_bucket};
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -37,6 +39,7 @@ pub struct Session {
     guard: Guard,
     best: Option<Best>,
     step: u64,
+    world: Rc<World>,
 }
 
 /// What one step left.
@@ -47,6 +50,8 @@ pub struct StepReport {
     pub verdict: Verdict,
     /// The scene as a file, if the step was skipped and is one of the first.
     pub incident: Option<PathBuf>,
+    /// Whether this or another process was asked to stop.
+    pub stopping: bool,
 }
 
 impl Session {
@@ -125,9 +130,37 @@ impl Session {
             library,
             learner,
             average,
+            world: Rc::default(),
         }
     }
 
+    /// The same run as one of the processes in `world`.
+    ///
+    /// # Errors
+    /// When they cannot share the scenes of every stage equally.
+    pub fn shared_in(mut self, world: Rc<World>) -> Result<Self, WorldError> {
+        let size = world.share().size;
+        match self.schedule.stages().iter().find(|stage| stage.accumulate % size != 0) {
+            Some(stage) => Err(WorldError::UnequalShares {
+                stage: stage.name.clone(),
+                accumulate: stage.accumulate,
+                size,
+            }),
+            None => {
+                self.world = world;
+                Ok(self)
+            }
+        }
+    }
+
+    /// Which scenes of a step this process computes.
+    pub fn share(&self) -> Share {
+        self.world.share()
+    }
+    /// Whether this process writes and prints.
+    pub fn leads(&self) -> bool {
+        self.world.leads()
+    }
     /// Steps done.
     pub fn step(&self) -> u64 {
         self.step
@@ -156,28 +189,32 @@ impl Session {
     pub fn tensors(&self) -> &Arc<WardrobeTensors> {
         &self.tensors
     }
-    /// One optimiser step on `scenes`, started at `start` after waiting `waited` for them.
+    /// One optimiser step on `scenes`, this process's share of the step's, started at `start` after waiting `waited` for
+    /// them.
     ///
     /// # Errors
-    /// When a scene cannot be computed, or an incident not be written.
+    /// When a scene cannot be computed here or in another process, or an incident not be written.
     pub fn step_on(
         &mut self,
         mut scenes: Vec<PreparedScene>,
         at: &ScheduleAt,
         start: Instant,
         waited: Duration,
+        stop: &StopFlag,
     ) -> Result<StepReport, Report> {
+        let mut computed = self.compute(&mut scenes, at, self.step + 1)?;
+        let stopping = self.world.meet(stop.requested())?;
         let stage = &self.schedule.stages()[at.stage];
-        let injected = self.config.guard.injected(self.step + 1);
-        if injected == Some(Injected::Position) {
-            spoil_position(&mut scenes);
+        let mut summary = StepSummary::of(&scenes, computed.loss, &computed.scenes, stage.accumulate);
+        if self.world.is_shared() {
+            let exchange = Instant::now();
+            summary = StepSummary::joined(&self.world.gather(&summary.to_row()));
+            computed.loss = summary.loss;
+            let bucket = gradient_bucket(self.learner.model(), &computed.gradients);
+            computed.gradients = gradients_of_bucket(self.learner.model(), &self.world.sum(bucket));
+            computed.times.update += exchange.elapsed();
         }
-        let spoil = injected == Some(Injected::Gradient);
-        let mut outcome = self
-            .learner
-            .step(&self.tensors, &scenes, stage.trains, at.learning_rate, spoil)
-            .map_err(Report::new)
-            .wrap_err_with(|| format!("step {}", self.step + 1))?;
+        let mut outcome = self.learner.update(computed, stage.trains, at.learning_rate);
         self.step += 1;
         if let (Some(average), false) = (&mut self.average, outcome.skipped) {
             let update = Instant::now();
@@ -185,19 +222,14 @@ impl Session {
             outcome.times.update += update.elapsed();
         }
         let verdict = self.guard.watch(self.step, outcome.gradient_norm, outcome.skipped);
-        let incident = match outcome.skipped {
-            true => self.keep_incident(at, injected, &scenes, &outcome)?,
-            false => None,
-        };
-        let (raw, weighted) = sums(&scenes, &outcome);
         let record = StepRecord {
             step: self.step,
             stage: stage.name.clone(),
-            layers: scenes.iter().map(|s| s.draw.garments.len()).max().unwrap_or(0),
+            layers: summary.layers,
             pose_scale: at.pose_scale,
             loss: outcome.loss,
-            raw,
-            weighted,
+            raw: summary.raw,
+            weighted: summary.weighted,
             grad_norm: outcome.gradient_norm,
             lr: at.learning_rate,
             seconds: start.elapsed().as_secs_f64(),
@@ -207,16 +239,38 @@ impl Session {
             update_seconds: outcome.times.update.as_secs_f64(),
             skipped: outcome.skipped,
         };
-        Ok(StepReport { record, verdict, incident })
+        let incident = match outcome.skipped && self.leads() {
+            true => self.keep_incident(at, scenes, outcome)?,
+            false => None,
+        };
+        Ok(StepReport { record, verdict, incident, stopping })
     }
 
-    /// Writes the scene of a skipped step, unless enough are kept already.
-    fn keep_incident(
-        &self,
+    /// Loss and gradients of `scenes`, some or all of those of `step` (counted from 1).
+    fn compute(
+        &mut self,
+        scenes: &mut [PreparedScene],
         at: &ScheduleAt,
-        injected: Option<Injected>,
-        scenes: &[PreparedScene],
-        outcome: &StepOutcome,
+        step: u64,
+    ) -> Result<Computed, Report> {
+        let stage = &self.schedule.stages()[at.stage];
+        let injected = self.config.guard.injected(step);
+        if injected == Some(Injected::Position) {
+            spoil_position(scenes);
+        }
+        let spoil = injected == Some(Injected::Gradient);
+        self.learner
+            .compute(&self.tensors, scenes, stage.accumulate, stage.trains, spoil)
+            .map_err(Report::new)
+            .wrap_err_with(|| format!("step {step}"))
+    }
+
+    /// Writes the scenes of a skipped step, unless enough are kept already.
+    fn keep_incident(
+        &mut self,
+        at: &ScheduleAt,
+        mut scenes: Vec<PreparedScene>,
+        mut outcome: StepOutcome,
     ) -> Result<Option<PathBuf>, Report> {
         let folder = self.run.incidents();
         let is_scene = |e: &std::fs::DirEntry| e.path().extension().is_some_and(|x| x == "json");
@@ -226,6 +280,13 @@ impl Session {
         if kept >= self.config.guard.kept_incidents && !again {
             return Ok(None);
         }
+        let injected = self.config.guard.injected(self.step);
+        if self.world.is_shared() {
+            // The scene at fault may be another process's: all of them once more, the step having changed nothing.
+            let step = self.step - 1;
+            scenes = prepare_step(&self.library, &self.config, &self.schedule, step, Share::WHOLE)?;
+            outcome = StepOutcome { scenes: self.compute(&mut scenes, at, self.step)?.scenes, ..outcome };
+        }
         let around = Circumstances {
             config: &self.config,
             library: &self.library,
@@ -234,7 +295,7 @@ impl Session {
             injected,
             model: self.learner.model(),
         };
-        Ok(Some(Incident::write(&folder, &around, scenes, outcome)?))
+        Ok(Some(Incident::write(&folder, &around, &scenes, &outcome)?))
     }
 
     /// The error of a run that gave up after `count` incidents, pointing to the last checkpoint.
@@ -328,29 +389,4 @@ pub(crate) fn state(library: &Library, step: u64) -> CheckpointState {
     let mut state = CheckpointState::new(step, joints, library.shape_count, pose_features);
     state.data = Some(library.fingerprint());
     state
-}
-
-/// Raw and weighted energies, summed over garments and pairs, mean over bodies and scenes.
-fn sums(
-    scenes: &[PreparedScene],
-    outcome: &StepOutcome,
-) -> (BTreeMap<&'static str, f64>, BTreeMap<&'static str, f64>) {
-    let (mut raw, mut weighted) = (BTreeMap::new(), BTreeMap::new());
-    for (scene, outputs) in scenes.iter().zip(&outcome.scenes) {
-        let share = 1.0 / (scene.bodies.len() * scenes.len()) as f64;
-        for (body, value) in scene.bodies.iter().zip(outputs.iter().map(|s| s.value())) {
-            let energy = &body.energy;
-            let weights =
-                energy.garments.iter().map(|g| &g.weights).chain(energy.layers.iter().map(|l| &l.weights));
-            for (values, weights) in value.garments.iter().chain(&value.layers).zip(weights) {
-                for term in Term::ALL {
-                    if let Some(v) = values[term] {
-                        *raw.entry(term.name()).or_insert(0.0) += v * share;
-                        *weighted.entry(term.name()).or_insert(0.0) += v * weights[term] * share;
-                    }
-                }
-            }
-        }
-    }
-    (raw, weighted)
 }

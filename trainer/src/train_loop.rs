@@ -11,7 +11,7 @@ use std::time::Instant;
 /// Steps whose scenes are prepared in advance.
 pub(crate) const SCENES_AHEAD: usize = 4;
 
-/// Trains from the session's step to the end of the schedule, or until `stop` is requested.
+/// Trains from the session's step to the end of the schedule, or until `stop` is requested of any process of the run.
 ///
 /// # Errors
 /// When something cannot be written, or the numbers stop being finite.
@@ -28,13 +28,13 @@ pub fn train(
     let total_steps = schedule.total_steps();
 
     tell(&TrainEvent::Started { step: first_step, total_steps })?;
-    if first_step == 0 {
+    if first_step == 0 && session.leads() {
         tell(&TrainEvent::Validated { step: 0, report: &session.validate()? })?;
     }
-    let scenes =
-        Prefetch::start(session.tensors().clone(), session.shared_config(), first_step, SCENES_AHEAD)
-            .into_diagnostic()
-            .wrap_err("cannot start the thread that prepares scenes")?;
+    let (tensors, config) = (session.tensors().clone(), session.shared_config());
+    let scenes = Prefetch::start(tensors, config, first_step, SCENES_AHEAD, session.share())
+        .into_diagnostic()
+        .wrap_err("cannot start the thread that prepares scenes")?;
 
     for step in first_step..total_steps {
         let at = schedule.at(step);
@@ -46,7 +46,7 @@ pub fn train(
         let prepared =
             scenes.next_step().ok_or_else(|| miette!("the thread that prepares scenes ended early"))??;
         let waited = start.elapsed();
-        let report = session.step_on(prepared, &at, start, waited)?;
+        let report = session.step_on(prepared, &at, start, waited, stop)?;
         tell(&TrainEvent::Step(&report.record))?;
 
         let done = step + 1;
@@ -63,20 +63,23 @@ pub fn train(
                 }
             }
         }
+        let stopping = report.stopping;
         let due = |every: u64| every > 0 && done % every == 0;
-        let mut is_best = false;
-        if at.last_of_stage || due(validate_every) {
-            let report = session.validate()?;
-            is_best = session.note_validation(&report) && output.keep_best;
-            tell(&TrainEvent::Validated { step: done, report: &report })?;
-        }
-        if at.last_of_stage || due(output.sample_every) {
-            tell(&TrainEvent::SampleDrawn { path: &session.draw_sample()? })?;
-        }
-        let stopping = stop.requested();
-        if at.last_of_stage || due(output.checkpoint_every) || is_best || stopping {
-            tell(&TrainEvent::CheckpointDue { step: done })?;
-            tell(&TrainEvent::CheckpointSaved { step: done, path: &session.save()? })?;
+        // The others go on to the next step, where they wait for the leader.
+        if session.leads() {
+            let mut is_best = false;
+            if at.last_of_stage || due(validate_every) {
+                let report = session.validate()?;
+                is_best = session.note_validation(&report) && output.keep_best;
+                tell(&TrainEvent::Validated { step: done, report: &report })?;
+            }
+            if at.last_of_stage || due(output.sample_every) {
+                tell(&TrainEvent::SampleDrawn { path: &session.draw_sample()? })?;
+            }
+            if at.last_of_stage || due(output.checkpoint_every) || is_best || stopping {
+                tell(&TrainEvent::CheckpointDue { step: done })?;
+                tell(&TrainEvent::CheckpointSaved { step: done, path: &session.save()? })?;
+            }
         }
         if stopping && done < total_steps {
             return tell(&TrainEvent::Interrupted { step: done });

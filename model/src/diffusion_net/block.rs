@@ -5,7 +5,7 @@ use burn::tensor::{Device, Tensor};
 
 use super::{ComplexMixing, SpectralDiffusion};
 use crate::linear::{Linear, fan_in_bound, uniform_parameter};
-use crate::ops::{Activation, activate, activate_residual, activate_sum, gradient_features};
+use crate::ops::{Activation, activate, activate_residual, gradient_features, product, product_add};
 use crate::tensors::GarmentTensors;
 
 /// The block's MLP on [x, x_diff, gradient features]: two hidden ReLU layers and a linear output, all as wide as the block.
@@ -67,24 +67,21 @@ impl DiffusionBlock {
 
     /// `[V,C]` → `[V,C]`.
     pub fn forward(&self, features: Tensor<2>, garment: &GarmentTensors) -> Tensor<2> {
-        let coefficients = garment.projection.clone().matmul(features.clone());
+        let coefficients = product(garment.projection.clone(), features.clone());
         let coefficients = self.diffusion.diffuse(coefficients, garment.decay.clone());
 
         // c and its two mixtures, expanded to both gradient axes of all vertices by one product.
-        let real = coefficients.clone().matmul(self.mixing.real.val());
-        let imaginary = coefficients.clone().matmul(self.mixing.imaginary.val());
+        let real = product(coefficients.clone(), self.mixing.real.val());
+        let imaginary = product(coefficients.clone(), self.mixing.imaginary.val());
         let mixed = Tensor::cat(vec![coefficients.clone(), real, imaginary], 1);
-        let gradient = gradient_features(garment.gradient_basis.clone().matmul(mixed));
+        let gradient = gradient_features(product(garment.gradient_basis.clone(), mixed));
 
-        let hidden = activate_sum(
-            Activation::Relu,
-            [
-                features.clone().matmul(self.mlp.input.val()),
-                garment.basis.clone().matmul(coefficients.matmul(self.mlp.diffused.val())),
-                gradient.matmul(self.mlp.gradient.val()),
-            ],
-            self.mlp.bias.val().unsqueeze(),
-        );
+        // Three products into one matrix: the first layer on [x, x_diff, gradient features].
+        let sum = product(gradient, self.mlp.gradient.val());
+        let diffused = product(coefficients, self.mlp.diffused.val());
+        let sum = product_add(garment.basis.clone(), diffused, sum);
+        let sum = product_add(features.clone(), self.mlp.input.val(), sum);
+        let hidden = activate(Activation::Relu, sum, self.mlp.bias.val().unsqueeze());
         let hidden = activate(Activation::Relu, self.mlp.hidden.product(hidden), self.mlp.hidden.bias_row());
         let output = &self.mlp.output;
         activate_residual(Activation::Identity, output.product(hidden), output.bias_row(), features)

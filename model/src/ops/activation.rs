@@ -10,7 +10,9 @@ use burn::backend::{Autodiff, Backend, Dispatch, TensorMetadata};
 use burn::tensor::{Shape, Slice, Tensor};
 
 use super::backend::{FusedOps, Kernels};
-use super::host::{Chunk, HostBackend, Rows, chunks, for_each, split_mut, sum_partials, vectorised};
+use super::host::{
+    Chunk, HostBackend, NewValues, Rows, chunks, for_each, part_lengths, split_mut, sum_partials, vectorised,
+};
 use super::math;
 use super::segments::{SegmentEnds, Segments, ranges};
 
@@ -29,20 +31,6 @@ pub enum Activation {
 pub fn activate(activation: Activation, input: Tensor<2>, bias: Tensor<2>) -> Tensor<2> {
     let ends = one_segment(&input);
     dispatch(Dispatch::activate(input.into_dispatch(), bias.into_dispatch(), ends, activation))
-}
-
-/// `activation(a + b + c + bias)`: matrices `[N,C]`, bias `[1,C]`.
-pub fn activate_sum(activation: Activation, terms: [Tensor<2>; 3], bias: Tensor<2>) -> Tensor<2> {
-    let [a, b, c] = terms;
-    let ends = one_segment(&a);
-    dispatch(Dispatch::activate_three(
-        a.into_dispatch(),
-        b.into_dispatch(),
-        c.into_dispatch(),
-        bias.into_dispatch(),
-        ends,
-        activation,
-    ))
 }
 
 /// `activation(input + bias) + residual`: matrices `[N,C]`, bias `[1,C]`.
@@ -104,30 +92,46 @@ pub(super) type ActivationGradients<B> = (FloatTensor<B>, FloatTensor<B>);
 // ---------------------------------------------------------------------------------------------------------- host memory
 
 pub(super) fn host_forward<B: HostBackend>(
-    terms: Vec<FloatTensor<B>>,
+    mut terms: Vec<FloatTensor<B>>,
     rows: FloatTensor<B>,
     residual: Option<FloatTensor<B>>,
     ends: &[usize],
     activation: Activation,
 ) -> FloatTensor<B> {
     let device = rows.device();
+    let mut first = terms.remove(0);
     let terms: Vec<B::Held> = terms.into_iter().map(B::hold).collect();
     let (rows, residual) = (B::hold(rows), residual.map(B::hold));
     let terms: Vec<Rows<'_>> = terms.iter().map(B::rows).collect();
     let (rows, residual) = (B::rows(&rows), residual.as_ref().map(B::rows));
     let columns = rows.columns();
     let chunks = chunks(ends, columns);
-    let mut output = vec![0.0; terms[0].count() * columns];
-    let tasks: Vec<_> = chunks.iter().zip(split_mut(&mut output, &chunks, columns)).collect();
-    for_each(tasks, |(chunk, output)| {
+    let run = |chunk: &Chunk, output: &mut [f32]| {
         vectorised(
             #[inline(always)]
             || forward_chunk(&terms, rows, residual, chunk, output, activation),
         );
+    };
+    if let Some(values) = B::own_values_mut(&mut first) {
+        let tasks: Vec<_> = chunks.iter().zip(split_mut(values, &chunks, columns)).collect();
+        for_each(tasks, |(chunk, values)| run(chunk, values));
+        return first;
+    }
+    let first = B::hold(first);
+    let first = B::rows(&first);
+    let mut output = NewValues::new(first.count() * columns);
+    let tasks: Vec<_> = chunks.iter().zip(output.parts(part_lengths(&chunks, columns))).collect();
+    for_each(tasks, |(chunk, part)| {
+        let output = part.zeroed();
+        for (row, output) in chunk.rows.clone().zip(output.chunks_exact_mut(columns)) {
+            output.copy_from_slice(first.row(row));
+        }
+        run(chunk, output);
     });
-    B::matrix(output, columns, &device)
+    B::matrix(output.finish(), columns, &device)
 }
 
+/// `output`, which holds the first term, becomes the result.
 #[inline(always)]
 fn forward_chunk(
     terms: &[Rows<'_>],
@@ -140,7 +144,10 @@ fn forward_chunk(
     let columns = rows.columns();
     let shared = rows.row(chunk.segment);
     for (row, output) in chunk.rows.clone().zip(output.chunks_exact_mut(columns)) {
-        sum_row(terms, shared, row, output);
+        add(output, shared);
+        for term in terms {
+            add(output, term.row(row));
+        }
         match activation {
             Activation::Identity => {}
             Activation::Relu => map(output, math_relu),
@@ -241,16 +248,17 @@ pub(super) fn host_backward<B: HostBackend>(
         });
         input
     } else {
-        let mut input = vec![0.0; gradient.count() * columns];
-        let parts = split_mut(&mut input, &chunks, columns);
+        let mut input = NewValues::new(gradient.count() * columns);
+        let parts = input.parts(part_lengths(&chunks, columns));
         let tasks: Vec<_> = chunks.iter().zip(parts).zip(sums).collect();
         for_each(tasks, |((chunk, input), sums)| {
+            let input = input.zeroed();
             vectorised(
                 #[inline(always)]
                 || backward_chunk(&terms, rows, gradient, chunk, input, sums, activation),
             );
         });
-        B::matrix(input, columns, &device)
+        B::matrix(input.finish(), columns, &device)
     };
     let sums = sum_partials(&partial, &chunks, columns, ends.len());
     (input, B::matrix(sums, columns, &device))

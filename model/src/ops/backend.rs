@@ -20,7 +20,7 @@ use super::sine_modulation::SineGradients;
 use super::skin_correction::Projection;
 use super::split_columns::ColumnGradients;
 use super::{
-    gradient_features, host, norm, sine_modulation, skin_correction, split_columns, transform_points,
+    gradient_features, host, norm, product, sine_modulation, skin_correction, split_columns, transform_points,
 };
 
 /// The fused operations as burn dispatches them; the functions of [`super`] are the way to call them.
@@ -46,15 +46,6 @@ pub(crate) trait FusedOps: Backend {
         ends: SegmentEnds,
         activation: Activation,
     ) -> FloatTensor<Self>;
-    /// See [`super::activate_sum`].
-    fn activate_three(
-        a: FloatTensor<Self>,
-        b: FloatTensor<Self>,
-        c: FloatTensor<Self>,
-        rows: FloatTensor<Self>,
-        ends: SegmentEnds,
-        activation: Activation,
-    ) -> FloatTensor<Self>;
     /// See [`super::activate_residual`].
     fn activate_residual(
         input: FloatTensor<Self>,
@@ -69,6 +60,14 @@ pub(crate) trait FusedOps: Backend {
         bias: FloatTensor<Self>,
         gate: FloatTensor<Self>,
         omega: f64,
+    ) -> FloatTensor<Self>;
+    /// See [`super::product`].
+    fn product(lhs: FloatTensor<Self>, rhs: FloatTensor<Self>) -> FloatTensor<Self>;
+    /// See [`super::product_add`].
+    fn product_add(
+        lhs: FloatTensor<Self>,
+        rhs: FloatTensor<Self>,
+        addend: FloatTensor<Self>,
     ) -> FloatTensor<Self>;
     /// See [`super::gradient_features`].
     fn gradient_features(mixed: FloatTensor<Self>) -> FloatTensor<Self>;
@@ -141,6 +140,14 @@ pub(crate) trait Kernels: Backend {
         sine_modulation::backward::<Self>(input, bias, gate, gradient, omega)
     }
 
+    fn matrix_product(
+        lhs: FloatTensor<Self>,
+        rhs: FloatTensor<Self>,
+        addend: Option<FloatTensor<Self>>,
+    ) -> FloatTensor<Self> {
+        product::forward::<Self>(lhs, rhs, addend)
+    }
+
     fn gradient_features_forward(mixed: FloatTensor<Self>) -> FloatTensor<Self> {
         gradient_features::forward::<Self>(mixed)
     }
@@ -199,8 +206,16 @@ pub(crate) trait Kernels: Backend {
 
 /// Overrides every kernel with its host form where all arguments are f32.
 macro_rules! host_kernels {
-    ($backend:ident) => {
+    ($backend:ident, $multiply:path) => {
         impl Kernels for $backend {
+            fn matrix_product(
+                lhs: FloatTensor<Self>,
+                rhs: FloatTensor<Self>,
+                addend: Option<FloatTensor<Self>>,
+            ) -> FloatTensor<Self> {
+                $multiply(lhs, rhs, addend)
+            }
+
             fn activation(
                 terms: Vec<FloatTensor<Self>>,
                 rows: FloatTensor<Self>,
@@ -348,9 +363,9 @@ macro_rules! host_kernels {
 }
 
 #[cfg(feature = "flex")]
-host_kernels!(Flex);
+host_kernels!(Flex, product::multiply);
 #[cfg(feature = "ndarray")]
-host_kernels!(NdArray);
+host_kernels!(NdArray, product::forward::<NdArray>);
 #[cfg(any(feature = "wgpu", feature = "cuda"))]
 impl Kernels for Cube {}
 
@@ -377,17 +392,6 @@ macro_rules! plain_operations {
                 Self::activation(vec![a, b], rows, None, &ends, activation)
             }
 
-            fn activate_three(
-                a: FloatTensor<Self>,
-                b: FloatTensor<Self>,
-                c: FloatTensor<Self>,
-                rows: FloatTensor<Self>,
-                ends: SegmentEnds,
-                activation: Activation,
-            ) -> FloatTensor<Self> {
-                Self::activation(vec![a, b, c], rows, None, &ends, activation)
-            }
-
             fn activate_residual(
                 input: FloatTensor<Self>,
                 rows: FloatTensor<Self>,
@@ -405,6 +409,18 @@ macro_rules! plain_operations {
                 omega: f64,
             ) -> FloatTensor<Self> {
                 Self::sine_modulation_forward(input, bias, gate, omega)
+            }
+
+            fn product(lhs: FloatTensor<Self>, rhs: FloatTensor<Self>) -> FloatTensor<Self> {
+                Self::matrix_product(lhs, rhs, None)
+            }
+
+            fn product_add(
+                lhs: FloatTensor<Self>,
+                rhs: FloatTensor<Self>,
+                addend: FloatTensor<Self>,
+            ) -> FloatTensor<Self> {
+                Self::matrix_product(lhs, rhs, Some(addend))
             }
 
             fn gradient_features(mixed: FloatTensor<Self>) -> FloatTensor<Self> {
@@ -492,20 +508,6 @@ impl<B: Kernels, C: CheckpointStrategy> FusedOps for Autodiff<B, C> {
         activation::record::<B, C, 3>([first, second, third], vec![a, b], rows, None, ends, activation)
     }
 
-    fn activate_three(
-        a: FloatTensor<Self>,
-        b: FloatTensor<Self>,
-        c: FloatTensor<Self>,
-        rows: FloatTensor<Self>,
-        ends: SegmentEnds,
-        activation: Activation,
-    ) -> FloatTensor<Self> {
-        let ((a, first), (b, second)) = (a.into_parts(), b.into_parts());
-        let ((c, third), (rows, fourth)) = (c.into_parts(), rows.into_parts());
-        let parents = [first, second, third, fourth];
-        activation::record::<B, C, 4>(parents, vec![a, b, c], rows, None, ends, activation)
-    }
-
     fn activate_residual(
         input: FloatTensor<Self>,
         rows: FloatTensor<Self>,
@@ -525,6 +527,18 @@ impl<B: Kernels, C: CheckpointStrategy> FusedOps for Autodiff<B, C> {
         omega: f64,
     ) -> FloatTensor<Self> {
         sine_modulation::record::<B, C>(input, bias, gate, omega)
+    }
+
+    fn product(lhs: FloatTensor<Self>, rhs: FloatTensor<Self>) -> FloatTensor<Self> {
+        product::record::<B, C>(lhs, rhs)
+    }
+
+    fn product_add(
+        lhs: FloatTensor<Self>,
+        rhs: FloatTensor<Self>,
+        addend: FloatTensor<Self>,
+    ) -> FloatTensor<Self> {
+        product::record_add::<B, C>(lhs, rhs, addend)
     }
 
     fn gradient_features(mixed: FloatTensor<Self>) -> FloatTensor<Self> {

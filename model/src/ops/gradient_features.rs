@@ -8,7 +8,7 @@ use burn::backend::{Autodiff, Backend, Dispatch, TensorMetadata};
 use burn::tensor::{Slice, Tensor};
 
 use super::backend::{FusedOps, Kernels};
-use super::host::{Chunk, HostBackend, Rows, chunks, for_each, split_mut, vectorised};
+use super::host::{Chunk, HostBackend, NewValues, Rows, chunks, for_each, part_lengths, vectorised};
 use super::math::tanh;
 
 /// `[2V,3C]` → `[V,C]`.
@@ -28,15 +28,16 @@ pub(super) fn host_forward<B: HostBackend>(mixed: FloatTensor<B>) -> FloatTensor
     let mixed = B::rows(&mixed);
     let (vertices, width) = (mixed.count() / 2, mixed.columns() / 3);
     let chunks = chunks(&[vertices], width);
-    let mut output = vec![0.0; vertices * width];
-    let tasks: Vec<_> = chunks.iter().zip(split_mut(&mut output, &chunks, width)).collect();
+    let mut output = NewValues::new(vertices * width);
+    let tasks: Vec<_> = chunks.iter().zip(output.parts(part_lengths(&chunks, width))).collect();
     for_each(tasks, |(chunk, output)| {
+        let output = output.zeroed();
         vectorised(
             #[inline(always)]
             || forward_chunk(mixed, vertices, chunk, output),
         );
     });
-    B::matrix(output, width, &device)
+    B::matrix(output.finish(), width, &device)
 }
 
 #[inline(always)]
@@ -72,16 +73,19 @@ pub(super) fn host_backward<B: HostBackend>(
     let vertices = mixed.count() / 2;
     let columns = mixed.columns();
     let chunks = chunks(&[vertices], columns);
-    let mut result = vec![0.0; mixed.count() * columns];
-    let (first, second) = result.split_at_mut(vertices * columns);
-    let axes = split_mut(first, &chunks, columns).into_iter().zip(split_mut(second, &chunks, columns));
-    for_each(chunks.iter().zip(axes).collect(), |(chunk, (first, second)): (&Chunk, _)| {
+    let mut result = NewValues::new(mixed.count() * columns);
+    let lengths = || part_lengths(&chunks, columns);
+    let mut first = result.parts(lengths().chain(lengths()));
+    let second = first.split_off(chunks.len());
+    let tasks: Vec<_> = chunks.iter().zip(first.into_iter().zip(second)).collect();
+    for_each(tasks, |(chunk, (first, second))| {
+        let (first, second) = (first.zeroed(), second.zeroed());
         vectorised(
             #[inline(always)]
             || backward_chunk([mixed, output, gradient], vertices, chunk, first, second),
         );
     });
-    B::matrix(result, columns, &device)
+    B::matrix(result.finish(), columns, &device)
 }
 
 #[inline(always)]

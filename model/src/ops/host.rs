@@ -1,6 +1,8 @@
 //! Tensors in host memory as rows, and parallel loops over fixed chunks of them.
 
+use std::mem::MaybeUninit;
 use std::ops::Range;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use burn::backend::tensor::{Device, FloatTensor};
 use burn::backend::{Backend, TensorMetadata};
@@ -31,6 +33,12 @@ pub(super) trait HostBackend: Backend {
 
     /// The same for writing in place; memory that is shared is copied first.
     fn values_mut(_tensor: &mut FloatTensor<Self>) -> Option<&mut [f32]> {
+        None
+    }
+
+    /// The elements of a matrix whose memory is nobody else's and holds nothing else, for writing in place; `None` if it is
+    /// not so, or they are not f32.
+    fn own_values_mut(_tensor: &mut FloatTensor<Self>) -> Option<&mut [f32]> {
         None
     }
 
@@ -107,6 +115,63 @@ pub(super) fn split_mut<'a>(
     parts
 }
 
+/// Elements of the part of a matrix that belongs to each chunk.
+pub(super) fn part_lengths(chunks: &[Chunk], columns: usize) -> impl Iterator<Item = usize> + '_ {
+    chunks.iter().map(move |chunk| chunk.rows.len() * columns)
+}
+
+/// Elements of a new matrix. Its memory is not zeroed in one pass before the work: the task that computes a part zeroes
+/// that part, in its own cache and beside the others.
+pub(super) struct NewValues {
+    values: Vec<f32>,
+    count: usize,
+    zeroed: AtomicUsize,
+}
+
+/// A run of elements of [`NewValues`].
+pub(super) struct Part<'a> {
+    memory: &'a mut [MaybeUninit<f32>],
+    zeroed: &'a AtomicUsize,
+}
+
+impl NewValues {
+    pub(super) fn new(count: usize) -> Self {
+        Self { values: Vec::with_capacity(count), count, zeroed: AtomicUsize::new(0) }
+    }
+
+    /// Consecutive parts of the given lengths, which must make up all of it.
+    pub(super) fn parts(&mut self, lengths: impl IntoIterator<Item = usize>) -> Vec<Part<'_>> {
+        *self.zeroed.get_mut() = 0;
+        let zeroed = &self.zeroed;
+        let mut memory = &mut self.values.spare_capacity_mut()[..self.count];
+        let next = |length| {
+            let (part, rest) = std::mem::take(&mut memory).split_at_mut(length);
+            memory = rest;
+            Part { memory: part, zeroed }
+        };
+        lengths.into_iter().map(next).collect()
+    }
+
+    /// The elements, once every part has been written.
+    pub(super) fn finish(mut self) -> Vec<f32> {
+        assert_eq!(*self.zeroed.get_mut(), self.count, "every part of a matrix is written");
+        // SAFETY: parts do not overlap and each counts its elements once, when they have been written: all have been.
+        unsafe { self.values.set_len(self.count) };
+        self.values
+    }
+}
+
+impl<'a> Part<'a> {
+    #[inline(always)]
+    pub(super) fn zeroed(self) -> &'a mut [f32] {
+        self.memory.fill(MaybeUninit::new(0.0));
+        self.zeroed.fetch_add(self.memory.len(), Ordering::Relaxed);
+        let length = self.memory.len();
+        // SAFETY: the elements have just been written, and the borrow is the part's own.
+        unsafe { std::slice::from_raw_parts_mut(self.memory.as_mut_ptr().cast::<f32>(), length) }
+    }
+}
+
 /// Runs one task per chunk; a single one stays on this thread.
 pub(super) fn for_each<T: Send>(tasks: Vec<T>, run: impl Fn(T) + Send + Sync) {
     if tasks.len() < 2 {
@@ -180,6 +245,15 @@ mod flex {
         fn values_mut(tensor: &mut FloatTensor<Self>) -> Option<&mut [f32]> {
             let range = contiguous(tensor)?;
             tensor.storage_mut::<f32>().get_mut(range)
+        }
+
+        fn own_values_mut(tensor: &mut FloatTensor<Self>) -> Option<&mut [f32]> {
+            let layout = tensor.layout();
+            let whole = tensor.dtype() == DType::F32 && layout.is_contiguous() && layout.start_offset() == 0;
+            let count = layout.num_elements();
+            (whole && tensor.is_unique())
+                .then(|| tensor.storage_mut::<f32>())
+                .filter(|values| values.len() == count)
         }
 
         fn rows(held: &Self::Held) -> Rows<'_> {

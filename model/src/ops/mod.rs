@@ -15,6 +15,7 @@ mod gradient_features;
 mod host;
 mod math;
 mod norm;
+mod product;
 mod segments;
 mod sine_modulation;
 mod skin_correction;
@@ -25,12 +26,11 @@ pub(crate) mod tensor_form;
 mod tests;
 mod transform_points;
 
-pub use activation::{
-    Activation, activate, activate_residual, activate_sum, segment_activate, segment_activate_sum,
-};
+pub use activation::{Activation, activate, activate_residual, segment_activate, segment_activate_sum};
 pub use adam::{AdamFactors, adam_step};
 pub use gradient_features::gradient_features;
 pub use norm::{scale_by, squared_norm};
+pub use product::{product, product_add};
 pub use segments::Segments;
 pub use sine_modulation::sine_modulation;
 pub use skin_correction::skin_correction;

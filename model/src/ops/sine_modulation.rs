@@ -8,7 +8,9 @@ use burn::backend::{Autodiff, Backend, Dispatch, TensorMetadata};
 use burn::tensor::Tensor;
 
 use super::backend::{FusedOps, Kernels};
-use super::host::{Chunk, HostBackend, Rows, chunks, for_each, split_mut, sum_partials, vectorised};
+use super::host::{
+    Chunk, HostBackend, NewValues, Rows, chunks, for_each, part_lengths, sum_partials, vectorised,
+};
 use super::math::sin_cos;
 
 /// `sin(omega·(input + bias)) ⊙ gate`: input and gate `[N,C]`, bias `[1,C]`.
@@ -40,15 +42,16 @@ pub(super) fn host_forward<B: HostBackend>(
     let (input, bias, gate) = (B::rows(&input), B::rows(&bias).row(0), B::rows(&gate));
     let columns = input.columns();
     let chunks = chunks(&[input.count()], columns);
-    let mut output = vec![0.0; input.count() * columns];
-    let tasks: Vec<_> = chunks.iter().zip(split_mut(&mut output, &chunks, columns)).collect();
+    let mut output = NewValues::new(input.count() * columns);
+    let tasks: Vec<_> = chunks.iter().zip(output.parts(part_lengths(&chunks, columns))).collect();
     for_each(tasks, |(chunk, output)| {
+        let output = output.zeroed();
         vectorised(
             #[inline(always)]
             || forward_chunk(input, bias, gate, omega as f32, chunk, output),
         );
     });
-    B::matrix(output, columns, &device)
+    B::matrix(output.finish(), columns, &device)
 }
 
 #[inline(always)]
@@ -82,16 +85,17 @@ pub(super) fn host_backward<B: HostBackend>(
     let (gate, gradient) = (B::rows(&gate), B::rows(&gradient));
     let columns = input.columns();
     let chunks = chunks(&[input.count()], columns);
-    let mut to_input = vec![0.0; input.count() * columns];
-    let mut to_gate = vec![0.0; input.count() * columns];
+    let mut to_input = NewValues::new(input.count() * columns);
+    let mut to_gate = NewValues::new(input.count() * columns);
     let mut partial = vec![0.0; chunks.len() * columns];
     let tasks: Vec<_> = chunks
         .iter()
-        .zip(split_mut(&mut to_input, &chunks, columns))
-        .zip(split_mut(&mut to_gate, &chunks, columns))
+        .zip(to_input.parts(part_lengths(&chunks, columns)))
+        .zip(to_gate.parts(part_lengths(&chunks, columns)))
         .zip(partial.chunks_exact_mut(columns.max(1)))
         .collect();
     for_each(tasks, |(((chunk, to_input), to_gate), sums)| {
+        let (to_input, to_gate) = (to_input.zeroed(), to_gate.zeroed());
         vectorised(
             #[inline(always)]
             || backward_chunk([input, gate, gradient], bias, omega as f32, chunk, to_input, to_gate, sums),
@@ -99,9 +103,9 @@ pub(super) fn host_backward<B: HostBackend>(
     });
     let to_bias = sum_partials(&partial, &chunks, columns, 1);
     (
-        B::matrix(to_input, columns, &device),
+        B::matrix(to_input.finish(), columns, &device),
         B::matrix(to_bias, columns, &device),
-        B::matrix(to_gate, columns, &device),
+        B::matrix(to_gate.finish(), columns, &device),
     )
 }
 

@@ -9,7 +9,7 @@ use burn::tensor::Tensor;
 
 use super::activation::broadcast_rows;
 use super::backend::{FusedOps, Kernels};
-use super::host::{Chunk, HostBackend, Rows, chunks, for_each, split_mut, vectorised};
+use super::host::{Chunk, HostBackend, NewValues, Rows, chunks, for_each, part_lengths, vectorised};
 use super::segments::{SegmentEnds, Segments};
 
 /// `weights + scale·P(raw)`: weights and raw `[N,J]`, mask `[M,J]` of zeros and ones.
@@ -58,15 +58,16 @@ pub(super) fn host_project<B: HostBackend>(
     let (values, mask, base) = (B::rows(&values), B::rows(&mask), base.as_ref().map(B::rows));
     let joints = values.columns();
     let chunks = chunks(ends, joints);
-    let mut output = vec![0.0; values.count() * joints];
-    let tasks: Vec<_> = chunks.iter().zip(split_mut(&mut output, &chunks, joints)).collect();
+    let mut output = NewValues::new(values.count() * joints);
+    let tasks: Vec<_> = chunks.iter().zip(output.parts(part_lengths(&chunks, joints))).collect();
     for_each(tasks, |(chunk, output)| {
+        let output = output.zeroed();
         vectorised(
             #[inline(always)]
             || project_chunk(values, mask, base, chunk, projection, output),
         );
     });
-    B::matrix(output, joints, &device)
+    B::matrix(output.finish(), joints, &device)
 }
 
 #[inline(always)]

@@ -50,17 +50,44 @@ fn activations_match_the_tensor_form() {
                 |t| tensor_form::apply(activation, t[0].clone() + t[1].clone()),
             );
             compare(
-                &[matrix, matrix, matrix, row],
-                |t| activate_sum(activation, [t[0].clone(), t[1].clone(), t[2].clone()], t[3].clone()),
-                |t| tensor_form::apply(activation, t[0].clone() + t[1].clone() + t[2].clone() + t[3].clone()),
-            );
-            compare(
                 &[matrix, row, matrix],
                 |t| activate_residual(activation, t[0].clone(), t[1].clone(), t[2].clone()),
                 |t| tensor_form::apply(activation, t[0].clone() + t[1].clone()) + t[2].clone(),
             );
         }
     }
+}
+
+#[test]
+fn products_match_the_tensor_form() {
+    for [rows, inner, columns] in [[ROWS, 9, 33], [1, 1, 1], [300, 200, 190]] {
+        compare(
+            &[[rows, inner], [inner, columns]],
+            |t| product(t[0].clone(), t[1].clone()),
+            |t| t[0].clone().matmul(t[1].clone()),
+        );
+        // The sum is held by the test, so that it must be left alone; its gradient is that of the result.
+        compare(
+            &[[rows, inner], [inner, columns], [rows, columns]],
+            |t| product_add(t[0].clone(), t[1].clone(), t[2].clone()),
+            |t| t[0].clone().matmul(t[1].clone()) + t[2].clone(),
+        );
+        // A sum that nobody else holds is added to in place.
+        compare(
+            &[[rows, inner], [inner, columns]],
+            |t| product_add(t[0].clone(), t[1].clone(), product(t[0].clone(), t[1].clone())),
+            |t| t[0].clone().matmul(t[1].clone()) * 2.0,
+        );
+    }
+    // Matrices that lie in memory some other way.
+    compare(
+        &[[9, ROWS], [40, 9]],
+        |t| product(t[0].clone().transpose(), t[1].clone().slice([3..12, 2..7])),
+        |t| t[0].clone().transpose().matmul(t[1].clone().slice([3..12, 2..7])),
+    );
+    let plain = device().inner();
+    let empty = product(Tensor::zeros([4, 0], &plain), Tensor::zeros([0, 2], &plain));
+    assert_close(&empty, &Tensor::zeros([4, 2], &plain), 0.0);
 }
 
 #[test]

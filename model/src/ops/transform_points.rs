@@ -8,7 +8,7 @@ use burn::backend::{Autodiff, Backend, Dispatch, TensorMetadata};
 use burn::tensor::{Slice, Tensor};
 
 use super::backend::{FusedOps, Kernels};
-use super::host::{HostBackend, Rows, chunks, for_each, split_mut, vectorised};
+use super::host::{HostBackend, NewValues, Rows, chunks, for_each, part_lengths, vectorised};
 
 /// `R_n p_n + t_n`: transforms `[N,12]` (the rows of 3×4 matrices [R|t] one after another), points `[N,3]` → `[N,3]`.
 pub fn transform_points(transforms: Tensor<2>, points: Tensor<2>) -> Tensor<2> {
@@ -25,9 +25,10 @@ pub(super) fn host_forward<B: HostBackend>(
     let (transforms, points) = (B::hold(transforms), B::hold(points));
     let (transforms, points) = (B::rows(&transforms), B::rows(&points));
     let chunks = chunks(&[points.count()], 12);
-    let mut output = vec![0.0; points.count() * 3];
-    let tasks: Vec<_> = chunks.iter().zip(split_mut(&mut output, &chunks, 3)).collect();
+    let mut output = NewValues::new(points.count() * 3);
+    let tasks: Vec<_> = chunks.iter().zip(output.parts(part_lengths(&chunks, 3))).collect();
     for_each(tasks, |(chunk, output)| {
+        let output = output.zeroed();
         vectorised(
             #[inline(always)]
             || {
@@ -37,7 +38,7 @@ pub(super) fn host_forward<B: HostBackend>(
             },
         );
     });
-    B::matrix(output, 3, &device)
+    B::matrix(output.finish(), 3, &device)
 }
 
 #[inline(always)]
@@ -57,14 +58,15 @@ pub(super) fn host_backward<B: HostBackend>(
     let (transforms, points, gradient) = (B::hold(transforms), B::hold(points), B::hold(gradient));
     let (transforms, points, gradient) = (B::rows(&transforms), B::rows(&points), B::rows(&gradient));
     let chunks = chunks(&[points.count()], 12);
-    let mut to_transforms = vec![0.0; points.count() * 12];
-    let mut to_points = vec![0.0; points.count() * 3];
+    let mut to_transforms = NewValues::new(points.count() * 12);
+    let mut to_points = NewValues::new(points.count() * 3);
     let tasks: Vec<_> = chunks
         .iter()
-        .zip(split_mut(&mut to_transforms, &chunks, 12))
-        .zip(split_mut(&mut to_points, &chunks, 3))
+        .zip(to_transforms.parts(part_lengths(&chunks, 12)))
+        .zip(to_points.parts(part_lengths(&chunks, 3)))
         .collect();
     for_each(tasks, |((chunk, to_transforms), to_points)| {
+        let (to_transforms, to_points) = (to_transforms.zeroed(), to_points.zeroed());
         vectorised(
             #[inline(always)]
             || {
@@ -79,7 +81,7 @@ pub(super) fn host_backward<B: HostBackend>(
             },
         );
     });
-    (B::matrix(to_transforms, 12, &device), B::matrix(to_points, 3, &device))
+    (B::matrix(to_transforms.finish(), 12, &device), B::matrix(to_points.finish(), 3, &device))
 }
 
 #[inline(always)]

@@ -1,5 +1,6 @@
 //! `clothcombo-train`.
 
+use super::exit_code;
 use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::cli::verbosity::{Verbosity, is_quiet, progress_bar, say};
 use crate::config::{Config, load};
@@ -16,10 +17,12 @@ use crate::scene::Library;
 use crate::session::Session;
 use crate::stop::StopFlag;
 use crate::train_loop::train;
+use crate::world::World;
 use clap::Parser;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 use std::rc::Rc;
 use std::sync::Arc;
 
@@ -58,11 +61,6 @@ pub struct Arguments {
 }
 
 impl Arguments {
-    /// How much is said.
-    pub fn verbosity(&self) -> Verbosity {
-        self.verbosity
-    }
-
     /// The run folder that is named, by --run-dir or by the path of --resume.
     fn named_run(&self) -> Result<Option<PathBuf>, Report> {
         let Some(Some(path)) = &self.resume else { return Ok(self.run_dir.clone()) };
@@ -107,11 +105,35 @@ fn run_of(path: &Path) -> Option<PathBuf> {
     spelled.map(Path::to_path_buf).or_else(|| full.ancestors().nth(found).map(Path::to_path_buf))
 }
 
-/// Runs the program.
+/// The whole program, as one of the processes that a launcher may have started.
+pub fn main() -> ExitCode {
+    let world = match World::join() {
+        Ok(world) => Rc::new(world),
+        Err(error) => return exit_code(Err(error.into())),
+    };
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(message) => {
+            if world.leads() {
+                // A closed terminal is no reason to fail differently.
+                let _ = message.print();
+            }
+            return ExitCode::from(u8::try_from(message.exit_code()).unwrap_or(2));
+        }
+    };
+    arguments.verbosity.or_quiet(!world.leads()).apply("warn");
+    match world.conclude(run(&arguments, &world)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(Some(report)) => exit_code(Err(report)),
+        Err(None) => ExitCode::FAILURE,
+    }
+}
+
+/// Trains as one of the processes in `world`, of which only the leader writes and prints.
 ///
 /// # Errors
 /// One report that names the file, key or garment at fault and how to mend it.
-pub fn run(arguments: &Arguments) -> Result<(), Report> {
+fn run(arguments: &Arguments, world: &Rc<World>) -> Result<(), Report> {
     let stop = StopFlag::on_signals().into_diagnostic().wrap_err("cannot listen for Ctrl-C")?;
     let named = arguments.named_run()?;
     let file = arguments.config_file(named.as_deref())?;
@@ -120,32 +142,50 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let config = load(&file, &arguments.overrides)?;
     let existing = match &arguments.resume {
         Some(path) => {
-            let run = RunDir::resume(&root, &config, &arguments.allow_config_change)?;
+            let run = match world.leads() {
+                true => RunDir::resume(&root, &config, &arguments.allow_config_change)?,
+                false => RunDir::follow(&root),
+            };
             Some((run, newest_or_none(path.as_deref().unwrap_or(&root))?))
         }
-        None => RunDir::refuse_occupied(&root).map(|()| None)?,
+        None if world.leads() => RunDir::refuse_occupied(&root).map(|()| None)?,
+        None => None,
     };
     let library = Arc::new(load_library(&config)?);
     let device = arguments.device.device();
-    let (run, mut session) = match existing {
+    let (run, session) = match existing {
         Some((run, checkpoint)) => {
             let session = match &checkpoint {
                 Some(c) => Session::resume(run.clone(), config.clone(), library.clone(), &device, c)?,
                 None => Session::new(run.clone(), config.clone(), library.clone(), &device)?,
             };
-            continue_run(&run, &config, checkpoint.as_ref())?;
+            // Everybody has read the checkpoint before the leader moves others aside.
+            world.meet(false)?;
+            if world.leads() {
+                continue_run(&run, &config, checkpoint.as_ref())?;
+            }
             (run, session)
         }
         None => {
-            let run = RunDir::create(&root, &config)?;
+            let run = match world.leads() {
+                true => RunDir::create(&root, &config)?,
+                false => RunDir::follow(&root),
+            };
             let session = Session::new(run.clone(), config.clone(), library.clone(), &device)?;
             (run, session)
         }
     };
+    let mut session = session.shared_in(world.clone())?;
+    if !world.leads() {
+        return train(&mut session, &mut [], &stop);
+    }
     run.write_split(&library.split_names())?;
     let memory = session.memory_estimate();
     if !is_quiet() {
         say(&format!("run folder {}", run.root().display()));
+        if world.is_shared() {
+            say(&format!("{} processes share every step", world.share().size));
+        }
         if let Some(m) = memory {
             say(&format!(
                 "memory: about {} at the peak ({} in use, {} for the largest scene, {} for parameters)",

@@ -21,6 +21,11 @@ pub struct Verbosity {
 }
 
 impl Verbosity {
+    /// The same, or quiet.
+    pub fn or_quiet(self, quiet: bool) -> Self {
+        Self { quiet: self.quiet || quiet, ..self }
+    }
+
     /// Starts the log on stderr; `usual` is its filter where no flag is given.
     pub fn apply(self, usual: &str) {
         QUIET.store(self.quiet, Ordering::Relaxed);

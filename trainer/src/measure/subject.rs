@@ -9,6 +9,7 @@ use crate::memory::Memory;
 use crate::scene::{Library, Plan, Prefetch, PreparedScene, Recent, draw_training, prepare};
 use crate::schedule::Schedule;
 use crate::session::state;
+use crate::world::Share;
 use burn::module::Module;
 use burn::optim::GradientsParams;
 use burn::tensor::{Device, Tensor, TensorData};
@@ -148,8 +149,8 @@ impl Subject {
                 WARM_UP + steps
             ));
         }
-        let scenes = Prefetch::start(self.tensors.clone(), self.config.clone(), self.first_step, 4)
-            .into_diagnostic()?;
+        let (tensors, config) = (self.tensors.clone(), self.config.clone());
+        let scenes = Prefetch::start(tensors, config, self.first_step, 4, Share::WHOLE).into_diagnostic()?;
         let mut parts: Vec<Vec<f64>> = vec![Vec::new(); PHASES.len()];
         let mut totals = Vec::new();
         for step in 0..WARM_UP + steps {

@@ -7,11 +7,12 @@ use super::prepare::{PreparedScene, prepare};
 use crate::config::Config;
 use crate::drape::{DrapeError, WardrobeTensors};
 use crate::schedule::Schedule;
+use crate::world::Share;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::thread::JoinHandle;
 
-/// Draws and prepares the scenes of `step`, as its stage asks for.
+/// Draws and prepares the scenes of `step` that are in `share`, as its stage asks for.
 ///
 /// # Errors
 /// When a garment cannot be read.
@@ -20,11 +21,13 @@ pub fn prepare_step(
     config: &Config,
     schedule: &Schedule,
     step: u64,
+    share: Share,
 ) -> Result<Vec<PreparedScene>, LibraryError> {
     let at = schedule.at(step);
     let stage = &config.stages[at.stage];
     let plan = Plan { stage, progress: at.stage_progress };
-    let draws = (0..stage.accumulate).map(|i| draw_training(library, config.seed, step, i, plan));
+    let scenes = (0..stage.accumulate).filter(|scene| share.has(*scene));
+    let draws = scenes.map(|i| draw_training(library, config.seed, step, i, plan));
     draws.map(|draw| prepare(library, &config.losses, draw, at.run_progress)).collect()
 }
 
@@ -35,7 +38,7 @@ pub struct Prefetch {
 }
 
 impl Prefetch {
-    /// Starts preparing from `first_step` on, those of at most `ahead` steps in advance.
+    /// Starts preparing the scenes in `share` from `first_step` on, those of at most `ahead` steps in advance.
     ///
     /// # Errors
     /// When the system refuses another thread.
@@ -44,13 +47,14 @@ impl Prefetch {
         config: Arc<Config>,
         first_step: u64,
         ahead: usize,
+        share: Share,
     ) -> std::io::Result<Self> {
         let (sender, receiver) = sync_channel(ahead.max(1));
         let worker = std::thread::Builder::new().name("prepare-scenes".into()).spawn(move || {
             let schedule = Schedule::new(&config);
             let library = tensors.library();
             for step in first_step..schedule.total_steps() {
-                let scenes = prepare_step(library, &config, &schedule, step)
+                let scenes = prepare_step(library, &config, &schedule, step, share)
                     .map_err(DrapeError::from)
                     .and_then(|scenes| scenes.iter().try_for_each(|s| tensors.warm(s)).map(|()| scenes));
                 let failed = scenes.is_err();
