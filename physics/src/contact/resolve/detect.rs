@@ -24,7 +24,12 @@ impl Crossings {
 
     /// All pairs.
     pub fn count(&self) -> usize {
-        self.body.len() + self.layers.len() + self.own.len()
+        self.between() + self.own.len()
+    }
+
+    /// Pairs with the body and between garments.
+    pub fn between(&self) -> usize {
+        self.body.len() + self.layers.len()
     }
 
     /// Looks at the faces that are dirty. `trees` are those of the garments, `far` the distances of vertices to the body.

@@ -27,6 +27,9 @@ pub struct ResolveSettings {
     /// Longest that an edge may get, as a share of its length in the input. Default 1.15: cloth gives a little, and a place that
     /// asks for more is left and listed instead of torn.
     pub stretch: f64,
+    /// How many times wider both limits are in a second attempt, where few crossings are left; its result is only taken if it
+    /// ends with none. Default 2.5; 1 for no second attempt.
+    pub loosened: f64,
     /// Whether crossings of a garment with itself are mended where possible. Default yes.
     pub self_contact: bool,
     /// Most wall time, times the number of garments, looked at between rounds; a limit that is hit makes the result depend on the machine.
@@ -45,6 +48,7 @@ impl Default for ResolveSettings {
             reach: super::super::ORDER_RADIUS,
             farthest: 0.06,
             stretch: 1.15,
+            loosened: 2.5,
             self_contact: true,
             time: None,
         }
@@ -72,6 +76,9 @@ impl ResolveSettings {
         }
         if !(self.stretch >= 1.0 && self.stretch <= 100.0) {
             return fail("stretch", self.stretch, "between 1 and 100");
+        }
+        if !(self.loosened >= 1.0 && self.loosened <= 100.0) {
+            return fail("loosened", self.loosened, "between 1 and 100");
         }
         for (setting, value, most) in
             [("rings", self.rings, 1000), ("rounds", self.rounds, 10_000), ("sweeps", self.sweeps, 10_000)]

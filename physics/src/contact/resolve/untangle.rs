@@ -21,6 +21,8 @@ const WATCH: f64 = 0.01;
 const LONGEST_STEP: f64 = 0.02;
 /// Rounds without progress after which an outfit is left as it is.
 const PATIENCE: usize = 4;
+/// Few crossings: one of this many of those at first.
+const FEW: usize = 3;
 /// Rounds in which vertices that are merely closer than asked for still count.
 const ROUNDS_FOR_GAPS: usize = 3;
 
@@ -29,6 +31,9 @@ pub(super) struct Untangling<'a> {
     outfit: &'a Outfit<'a>,
     body: &'a BodyObstacle<'a>,
     settings: &'a ResolveSettings,
+    /// Limits of the present attempt, as in the settings.
+    farthest: f64,
+    stretch: f64,
     input: Vec<[f64; 3]>,
     /// The shape that displacements are measured from: the input, with its crumples smoothed.
     shape: Vec<[f64; 3]>,
@@ -76,6 +81,8 @@ impl<'a> Untangling<'a> {
             outfit,
             body,
             settings,
+            farthest: settings.farthest,
+            stretch: settings.stretch,
             shape: input.clone(),
             positions: input.clone(),
             input,
@@ -94,30 +101,53 @@ impl<'a> Untangling<'a> {
         untangling
     }
 
-    /// Rounds of detection and relaxation until nothing is wrong or nothing gets better; how many it took.
+    /// Rounds of detection and relaxation until nothing is wrong or nothing gets better; how many it took. Where few crossings
+    /// are left, a second attempt with wider limits is kept if it ends with none.
     pub fn run(&mut self) -> usize {
         let start = Instant::now();
-        let limit = self.settings.time.map(|limit| limit * self.outfit.len() as u32);
+        self.detect();
+        self.known_folds.clone_from(&self.crossings.own);
+        let before = self.crossings.between();
+        let rounds = self.attempt(start);
+        let left = self.crossings.between();
+        if left == 0 || left > before / FEW || self.settings.loosened <= 1.0 || self.is_late(start) {
+            return rounds;
+        }
+        let (positions, shape) = (self.positions.clone(), self.shape.clone());
+        self.farthest *= self.settings.loosened;
+        self.stretch = 1.0 + (self.stretch - 1.0) * self.settings.loosened;
+        let more = self.attempt(start);
+        if self.crossings.between() > 0 || self.crossings.own.len() > self.known_folds.len() {
+            self.positions = positions;
+            self.shape = shape;
+        }
+        rounds + more
+    }
+
+    /// Rounds within the limits as they are. The crossings are those of the positions afterwards.
+    fn attempt(&mut self, start: Instant) -> usize {
         let mut best = Best::default();
         for round in 0..=self.settings.rounds {
-            self.detect();
-            if round == 0 {
-                self.known_folds.clone_from(&self.crossings.own);
-            }
             let is_violated = self.planes.iter().flatten().any(|p| self.is_violated(p, round))
                 || self.over.iter().any(|o| o.height < self.least(round));
             if !is_violated && self.crossings.count() == 0 {
                 return round;
             }
             best.look(self.defects(), &self.positions);
-            let is_late = limit.is_some_and(|limit| start.elapsed() > limit);
-            if round == self.settings.rounds || best.stale > PATIENCE || is_late {
-                self.positions = best.positions;
+            if round == self.settings.rounds || best.stale > PATIENCE || self.is_late(start) {
+                self.move_to(&best.positions);
+                self.detect();
                 return round;
             }
             self.step(round);
+            self.detect();
         }
         self.settings.rounds
+    }
+
+    fn is_late(&self, start: Instant) -> bool {
+        let limit = self.settings.time.map(|limit| limit * self.outfit.len() as u32);
+        limit.is_some_and(|limit| start.elapsed() > limit)
     }
 
     /// Pairs that are left, and vertices on the wrong side.
@@ -188,11 +218,11 @@ impl<'a> Untangling<'a> {
             let wanted = if plane.is_held { plane.distance.clamp(0.0, gap) } else { gap };
             let step = (wanted - plane.distance).min(LONGEST_STEP);
             let moved = sub(self.positions[v as usize], self.input[v as usize]);
-            if norm(add_scaled(moved, step, plane.normal)) <= self.settings.farthest {
+            if norm(add_scaled(moved, step, plane.normal)) <= self.farthest {
                 contacts.push(Contact::vertex(v, &plane, plane.distance + step));
             }
         }
-        let (sweeps, stretch) = (self.settings.sweeps, self.settings.stretch);
+        let (sweeps, stretch) = (self.settings.sweeps, self.stretch);
         relax(outfit, &mut self.positions, &self.shape, &region, &contacts, sweeps, stretch);
         self.hold_back(&region);
         self.touch(&region);
@@ -203,7 +233,7 @@ impl<'a> Untangling<'a> {
         for &v in region {
             let v = v as usize;
             let moved = sub(self.positions[v], self.input[v]);
-            let most = self.settings.farthest;
+            let most = self.farthest;
             if norm_squared(moved) > most * most {
                 self.positions[v] = add_scaled(self.input[v], most / norm(moved), moved);
             }
@@ -309,6 +339,15 @@ impl<'a> Untangling<'a> {
             self.far[v] = view.map_or(f64::INFINITY, |b| b.far);
             self.planes[v] = view.and_then(|b| b.plane);
         }
+    }
+
+    /// Takes other positions.
+    fn move_to(&mut self, positions: &[[f64; 3]]) {
+        let now = &self.positions;
+        let moved: Vec<u32> =
+            (0..now.len() as u32).filter(|&v| now[v as usize] != positions[v as usize]).collect();
+        self.positions.copy_from_slice(positions);
+        self.touch(&moved);
     }
 
     /// Largest move of garment `g` from the input [m].
