@@ -9,7 +9,6 @@ use crate::drape::{Networks, WardrobeTensors};
 use crate::evaluate::Spread;
 use crate::evaluate::certificates::{DrapedScene, OutfitResult, RestGarments, skinned};
 use crate::scene::{Library, PreparedScene, SceneDraw, draw_outfit, prepare};
-use crate::session::state;
 use clap::Parser;
 use clothcombo_data::format::obj;
 use clothcombo_physics::contact::resolve::ResolveSettings;
@@ -113,7 +112,7 @@ fn measure(
     let networks = match checkpoint {
         None => None,
         Some(checkpoint) => {
-            checkpoint_fits(checkpoint, library)?;
+            checkpoint.check_fits(library)?;
             let device = Backend::preferred().device();
             tensors = WardrobeTensors::new(library.clone(), checkpoint.state.dimensions(), &device);
             Some(Networks::new(checkpoint.networks(&device)?, &tensors))
@@ -179,20 +178,6 @@ fn orders(library: &Library, names: &[String]) -> Result<Vec<Vec<usize>>, Report
             .collect();
     }
     Ok(orders)
-}
-
-fn checkpoint_fits(checkpoint: &TrainedModel, library: &Library) -> Result<(), Report> {
-    let (expected, found) = (state(library, 0), &checkpoint.state);
-    if (&found.joints, found.shape_count, found.pose_features)
-        == (&expected.joints, expected.shape_count, expected.pose_features)
-    {
-        return Ok(());
-    }
-    Err(miette!(
-        help = "leave out --config to use the checkpoint's own, or restore the data it was trained on",
-        "the data of the configuration does not fit checkpoint {}",
-        checkpoint.folder.display()
-    ))
 }
 
 fn write_meshes(

@@ -1,10 +1,10 @@
 //! `clothcombo bench tradeoff`.
 
 use super::step::short;
-use crate::checkpoint::Checkpoint;
+use crate::checkpoint::TrainedModel;
 use crate::cli::train::load_under_bar;
 use crate::cli::verbosity::say;
-use crate::config::{Config, LossesConfig, ValidationConfig, load};
+use crate::config::{Config, LossesConfig, ValidationConfig};
 use crate::device::Backend;
 use crate::drape::{Networks, WardrobeTensors};
 use crate::evaluate::Draped;
@@ -89,11 +89,11 @@ struct LossForm {
 /// # Errors
 /// When a checkpoint or its data cannot be read, or checkpoints do not fit the same data.
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
-    let checkpoint = Checkpoint::open(&arguments.checkpoint[0])?;
-    let config = load(&checkpoint.path.join("config.toml"), &[])?;
+    let first = TrainedModel::open(&arguments.checkpoint[0])?;
+    let config = first.config.clone();
     let library = Arc::new(load_under_bar(&config)?);
     let scenes = scenes(&library, &config, arguments)?;
-    let trained = networks(&checkpoint, &config, &library)?;
+    let trained = networks(&first, &library)?;
 
     let k = config.model.eigen_count;
     let base = drapes(
@@ -120,15 +120,15 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         add(&format!("k = {count}"), count, trained.clone(), &library)?;
     }
     for path in &arguments.checkpoint[1..] {
-        let checkpoint = Checkpoint::open(path)?;
-        let other = load(&checkpoint.path.join("config.toml"), &[])?;
-        let own = Config { model: other.model.clone(), ..config.clone() };
-        let library = match other.model.eigen_count {
+        let other = TrainedModel::open(path)?;
+        let model = &other.config.model;
+        let own = Config { model: model.clone(), ..config.clone() };
+        let library = match model.eigen_count {
             same if same == k => library.clone(),
             _ => Arc::new(load_under_bar(&own)?),
         };
-        let name = format!("{} (width {})", path.display(), other.model.width);
-        add(&name, other.model.eigen_count, networks(&checkpoint, &own, &library)?, &library)?;
+        let name = format!("{} (width {})", path.display(), model.width);
+        add(&name, model.eigen_count, networks(&other, &library)?, &library)?;
     }
     let losses = loss_forms(&config.losses, &scenes, &base.draped, arguments.seconds)?;
     if let Some(path) = &arguments.picture {
@@ -162,18 +162,9 @@ fn scenes(library: &Library, config: &Config, arguments: &Arguments) -> Result<V
     }
 }
 
-fn networks(checkpoint: &Checkpoint, config: &Config, library: &Library) -> Result<ClothCombo, Report> {
-    let (expected, found) = (state(library, 0), &checkpoint.state);
-    if (&found.joints, found.shape_count, found.pose_features)
-        != (&expected.joints, expected.shape_count, expected.pose_features)
-    {
-        return Err(miette!(
-            help = "compare checkpoints that were trained on the same body, garments and motions, and restore these",
-            "the data does not fit checkpoint {}",
-            checkpoint.path.display()
-        ));
-    }
-    Ok(checkpoint.model(config, &Backend::preferred().device())?)
+fn networks(trained: &TrainedModel, library: &Library) -> Result<ClothCombo, Report> {
+    trained.check_fits(library)?;
+    Ok(trained.networks(&Backend::preferred().device())?)
 }
 
 fn drapes(
