@@ -1,7 +1,7 @@
 //! Matrix products written straight into their place.
 //!
 //! burn's flex backend zeroes the memory of every product, copies it to aligned memory, and only then multiplies; for the
-//! narrow matrices of these networks that takes a third of the time of the product itself. Here the same multiplication
+//! narrow matrices of these networks (width 128) that takes a quarter of the time of the multiplication. Here the same one
 //! (crate `gemm`) writes into fresh memory, or adds to a matrix that nobody else holds.
 
 use burn::backend::autodiff::checkpoint::{base::Checkpointer, strategy::CheckpointStrategy};

@@ -39,7 +39,7 @@ pub struct StageConfig {
     #[serde(default = "one")]
     pub scenes_per_step: usize,
     /// Scenes with garments of their own whose gradients are averaged before one update (gradient accumulation). A step
-    /// costs this many times as much and no more memory; the gradient is less noisy.
+    /// costs this many times as much and no more memory; the gradient is less noisy. Processes of one run share the scenes.
     #[serde(default = "one")]
     pub accumulate: usize,
     /// Adam's step size. 1e-4 is the paper's, for networks of width 512; small networks take ten times that.
