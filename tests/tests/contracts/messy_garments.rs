@@ -78,7 +78,8 @@ impl Mesh {
             9 => self.positions[vertex] = self.positions[corners[0] as usize],
             10 => {
                 let last = self.polygons.pop().unwrap_or_default();
-                self.polygons[polygon % self.polygons.len().max(1)].extend(last.first());
+                let count = self.polygons.len().max(1);
+                self.polygons[polygon % count].extend(last.first());
             }
             11 => self.polygons.push(vec![corners[0]; 3]),
             // Stray vertices, a far one, one that is no number.
