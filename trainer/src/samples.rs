@@ -45,7 +45,7 @@ fn row(networks: &Networks, scene: &PreparedScene) -> Result<SheetRow, Report> {
     let draped = networks.drape(scene)?.layered;
     let cells = [&skinned, &draped]
         .into_iter()
-        .flat_map(|d| [View::Front, View::Back].map(|view| picture_of(scene, d, view)))
+        .flat_map(|d| [View::Front, View::Back].map(|view| picture_of(scene, d, view, &layer_colour)))
         .collect();
     let legend = names
         .iter()
@@ -59,8 +59,13 @@ fn row(networks: &Networks, scene: &PreparedScene) -> Result<SheetRow, Report> {
     Ok(SheetRow { label, legend, cells })
 }
 
-/// A drape of `scene` on its first body.
-pub(crate) fn picture_of(scene: &PreparedScene, draped: &Draped, view: View) -> image::RgbImage {
+/// A drape of `scene` on its first body; `colour` of a layer, 0 the innermost.
+pub(crate) fn picture_of(
+    scene: &PreparedScene,
+    draped: &Draped,
+    view: View,
+    colour: &dyn Fn(usize) -> [u8; 3],
+) -> image::RgbImage {
     let wide = |p: &[[f32; 3]]| p.iter().map(|p| p.map(f64::from)).collect::<Vec<_>>();
     let body = &scene.bodies[0].energy.body;
     let body_positions = wide(&body.positions);
@@ -71,7 +76,7 @@ pub(crate) fn picture_of(scene: &PreparedScene, draped: &Draped, view: View) -> 
         figures.push(Figure {
             positions: &positions[first..first + garment.vertex_count()],
             faces: garment.garment.rest.faces(),
-            colour: layer_colour(layer),
+            colour: colour(layer),
         });
         first += garment.vertex_count();
     }

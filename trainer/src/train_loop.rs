@@ -5,6 +5,7 @@ use crate::guard::Verdict;
 use crate::scene::Prefetch;
 use crate::session::Session;
 use crate::stop::StopFlag;
+use crate::world::Share;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use std::time::Instant;
 
@@ -63,7 +64,8 @@ pub fn train(
                 }
             }
         }
-        let stopping = report.stopping;
+        // Alone nobody has to agree: a request that came since counts for this step.
+        let stopping = report.stopping || (session.share() == Share::WHOLE && stop.requested());
         let due = |every: u64| every > 0 && done % every == 0;
         // The others go on to the next step, where they wait for the leader.
         if session.leads() {

@@ -65,7 +65,8 @@ fn gradients_match_finite_differences() {
         let (_, gradient) = gradients.iter().find(|(found, _)| found == name).expect("documented name");
         let index = (0..gradient.len()).max_by(|&a, &b| gradient[a].abs().total_cmp(&gradient[b].abs()));
         let index = index.expect("not empty");
-        let step = if name.ends_with("time") { 1e-4 } else { 2e-3 };
+        // Wide enough that the change of the loss stands out from its rounding in f32.
+        let step = if name.ends_with("time") { 1e-4 } else { 1e-2 };
         let value = |change: f32| -> f64 {
             let changed = change_parameter(net.clone(), name, index, change).valid();
             f64::from(loss(changed.forward(&garment)).into_scalar::<f32>())

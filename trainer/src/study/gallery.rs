@@ -96,7 +96,8 @@ pub fn draw(subject: &Subject, question: usize, done: &(dyn Fn() + Sync)) -> Res
     let stack = [legs(0), shirt(0), skirt(0), over(0), over(1)];
     let pose = bodies[0].clone();
     let cells: Vec<_> = (1..=COLUMNS).map(|n| (stack[..n].to_vec(), pose.clone())).collect();
-    let numbers: Vec<String> = (1..=COLUMNS).map(|n| format!("{n} layers")).collect();
+    let numbers: Vec<String> =
+        (1..=COLUMNS).map(|n| if n == 1 { "1 layer".into() } else { format!("{n} layers") }).collect();
     add("layers", "Garments put on one after the other.", studio.sheet(&cells, &numbers)?);
 
     let cells: Vec<_> = (0..COLUMNS)
@@ -132,21 +133,29 @@ impl Studio<'_> {
             .remove(0)
     }
 
-    /// Outfits from left to right; seen from the front, then from the back.
+    /// Outfits from left to right; seen from the front, then from the back. Where all of them hold the same garments a colour
+    /// stands for a garment, otherwise for a layer.
     fn sheet(&mut self, outfits: &[(Vec<usize>, BodyDraw)], columns: &[String]) -> Result<RgbImage, Report> {
         let mut rows = [View::ThreeQuarter, View::Back]
             .map(|view| SheetRow { label: view.name().to_owned(), ..SheetRow::default() });
+        let longest = outfits.iter().map(|(garments, _)| garments).max_by_key(|garments| garments.len());
+        let same = longest.filter(|all| {
+            outfits.iter().all(|(o, _)| o.len() == all.len() && o.iter().all(|g| all.contains(g)))
+        });
         for (garments, body) in outfits {
-            let [front, back] = self.views(garments, body)?;
+            let place = |layer: usize| {
+                let found = same.and_then(|all| all.iter().position(|g| *g == garments[layer]));
+                layer_colour(found.unwrap_or(layer))
+            };
+            let [front, back] = self.views(garments, body, &place)?;
             rows[0].cells.push(front);
             rows[1].cells.push(back);
         }
-        // Colours stand for layers; names are given where they mean the same garments all along.
-        let longest = outfits.iter().map(|(garments, _)| garments).max_by_key(|garments| garments.len());
+        // Names are given where a colour means the same garment all along.
         let wardrobe = &self.subject.library.wardrobe;
-        let agrees = |names: &Vec<usize>| outfits.iter().all(|(garments, _)| names.starts_with(garments));
+        let grows = |all: &Vec<usize>| outfits.iter().all(|(garments, _)| all.starts_with(garments));
         rows[0].legend = longest
-            .filter(|garments| agrees(garments))
+            .filter(|all| same.is_some() || grows(all))
             .into_iter()
             .flatten()
             .enumerate()
@@ -156,7 +165,12 @@ impl Studio<'_> {
     }
 
     /// An outfit draped and resolved.
-    fn views(&mut self, garments: &[usize], body: &BodyDraw) -> Result<[RgbImage; 2], Report> {
+    fn views(
+        &mut self,
+        garments: &[usize],
+        body: &BodyDraw,
+        colour: &dyn Fn(usize) -> [u8; 3],
+    ) -> Result<[RgbImage; 2], Report> {
         let draw = SceneDraw { garments: garments.to_vec(), bodies: vec![body.clone()] };
         let scene = self.subject.prepare(draw)?;
         let draped = self.networks.drape(&scene)?.layered;
@@ -165,6 +179,6 @@ impl Studio<'_> {
             .into_diagnostic()?;
         let posed = resolved.positions.concat().into_iter().map(|p| p.map(|v| v as f32)).collect();
         let draped = Draped { posed, ..draped };
-        Ok([View::ThreeQuarter, View::Back].map(|view| picture_of(&scene, &draped, view)))
+        Ok([View::ThreeQuarter, View::Back].map(|view| picture_of(&scene, &draped, view, colour)))
     }
 }

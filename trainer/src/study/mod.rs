@@ -303,7 +303,7 @@ impl Study {
         if !self.pictures.is_empty() {
             let mut gallery = section(
                 "Gallery",
-                "After the post-process; colours stand for layers, inner to outer.",
+                "After the post-process. Names in the legend stand for garments, colours without names for layers from inner to outer.",
                 Vec::new(),
             );
             for picture in &self.pictures {

@@ -1,6 +1,7 @@
 //! What a garment has to stay outside of: the body, and every garment nearer to it.
 
 use super::RestGarment;
+use super::contact::{along_line, normal_of};
 use crate::contact::TriangleTree;
 use crate::mesh::vertex_normals;
 use crate::query::{ClosestPoint, FaceSide, Surface, SurfacePoint};
@@ -103,6 +104,28 @@ impl<'a> BodyObstacle<'a> {
             Some(Plane::at(&found, direction, distance, is_pinched))
         };
         Some(BodyView { far, plane })
+    }
+}
+
+impl BodyObstacle<'_> {
+    /// The half-space a point inside the body has to reach by `way` (unit), at most `reach` [m] along it: that of the first
+    /// surface there. `None` where there is none, or where it is pinched.
+    pub fn exit(&self, p: [f64; 3], way: [f64; 3], reach: f64) -> Option<Plane> {
+        let end = add_scaled(p, reach, way);
+        let low = std::array::from_fn(|k| p[k].min(end[k]));
+        let high = std::array::from_fn(|k| p[k].max(end[k]));
+        let leaves = |f: u32| {
+            let triangle = self.tree.triangle(f)?;
+            let normal = normal_of(&triangle);
+            let (far, _) = along_line(p, way, &triangle)?;
+            ((0.0..=reach).contains(&far) && dot(normal, way) > 0.0).then_some((far, f, normal))
+        };
+        let nearest =
+            |a: &(f64, u32, [f64; 3]), b: &(f64, u32, [f64; 3])| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+        let (far, f, normal) = self.tree.faces_in_box(low, high).filter_map(leaves).min_by(nearest)?;
+        let distance = -far * dot(normal, way);
+        let offset = dot(normal, p) - distance;
+        (!self.is_pinched(f)).then_some(Plane { normal, offset, distance, is_held: false })
     }
 }
 

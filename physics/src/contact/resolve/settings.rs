@@ -14,7 +14,7 @@ pub struct ResolveSettings {
     pub trigger: f64,
     /// Rings of neighbours around a violation that move along. Default 5.
     pub rings: usize,
-    /// Most rounds of detection and relaxation. Default 16: what is not mended by then hardly ever is.
+    /// Most rounds of detection and relaxation. Default 24.
     pub rounds: usize,
     /// Sweeps of the relaxation in a round. Default 20.
     pub sweeps: usize,
@@ -27,8 +27,8 @@ pub struct ResolveSettings {
     /// Longest that an edge may get, as a share of its length in the input. Default 1.15: cloth gives a little, and a place that
     /// asks for more is left and listed instead of torn.
     pub stretch: f64,
-    /// How many times wider both limits are in a second attempt, where few crossings are left; its result is only taken if it
-    /// ends with none. Default 2.5; 1 for no second attempt.
+    /// How many times wider both limits are in a second attempt, where crossings are left; its result is only taken if it ends
+    /// with none. Default 6; 1 for no second attempt.
     pub loosened: f64,
     /// Whether crossings of a garment with itself are mended where possible. Default yes.
     pub self_contact: bool,
@@ -43,12 +43,12 @@ impl Default for ResolveSettings {
             gap: 1e-3,
             trigger: 0.25,
             rings: 5,
-            rounds: 16,
+            rounds: 24,
             sweeps: 20,
             reach: super::super::ORDER_RADIUS,
             farthest: 0.06,
             stretch: 1.15,
-            loosened: 2.5,
+            loosened: 6.0,
             self_contact: true,
             time: None,
         }

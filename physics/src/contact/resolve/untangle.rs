@@ -20,9 +20,7 @@ const WATCH: f64 = 0.01;
 /// No contact asks for a longer step than this in a round [m].
 const LONGEST_STEP: f64 = 0.02;
 /// Rounds without progress after which an outfit is left as it is.
-const PATIENCE: usize = 4;
-/// Few crossings: one of this many of those at first.
-const FEW: usize = 3;
+const PATIENCE: usize = 8;
 /// Rounds in which vertices that are merely closer than asked for still count.
 const ROUNDS_FOR_GAPS: usize = 3;
 
@@ -98,19 +96,21 @@ impl<'a> Untangling<'a> {
         untangling.touch(&all);
         let away = |v: u32| untangling.planes[v as usize].map_or([0.0; 3], |p| p.normal);
         untangling.outward = outward(outfit, &untangling.positions, away);
+        // Now that it is known which way is out.
+        let is_inside = |&v: &u32| untangling.planes[v as usize].is_some_and(|p| p.distance < 0.0);
+        let inside: Vec<u32> = all.into_iter().filter(is_inside).collect();
+        untangling.touch(&inside);
         untangling
     }
 
-    /// Rounds of detection and relaxation until nothing is wrong or nothing gets better; how many it took. Where few crossings
+    /// Rounds of detection and relaxation until nothing is wrong or nothing gets better; how many it took. Where crossings
     /// are left, a second attempt with wider limits is kept if it ends with none.
     pub fn run(&mut self) -> usize {
         let start = Instant::now();
         self.detect();
         self.known_folds.clone_from(&self.crossings.own);
-        let before = self.crossings.between();
         let rounds = self.attempt(start);
-        let left = self.crossings.between();
-        if left == 0 || left > before / FEW || self.settings.loosened <= 1.0 || self.is_late(start) {
+        if self.crossings.between() == 0 || self.settings.loosened <= 1.0 || self.is_late(start) {
             return rounds;
         }
         let (positions, shape) = (self.positions.clone(), self.shape.clone());
@@ -246,6 +246,11 @@ impl<'a> Untangling<'a> {
         let upper = face.map(|v| self.positions[v as usize]);
         let Some(lower) = self.body.tree.triangle(other).filter(|t| !is_tiny(t)) else { return };
         let normal = normal_of(&lower);
+        // A face on the other side of the limb asks for the way through it.
+        let away = face.iter().fold([0.0; 3], |sum, &v| add(sum, self.outward[v as usize]));
+        if dot(normal, away) < 0.0 {
+            return;
+        }
         // The ground under the corner, as a height along the normal.
         let ground = dot(normal, lower[0]);
         for corner in overlap(&upper, &lower, normal).iter().filter(|c| c.height < 0.5 * gap) {
@@ -332,12 +337,19 @@ impl<'a> Untangling<'a> {
                 self.crossings.is_dirty[f as usize] = true;
             }
         }
-        let found: Vec<_> =
-            moved.par_iter().with_min_len(128).map(|&v| self.body.look(self.positions[v as usize])).collect();
-        for (&v, view) in moved.iter().zip(found) {
-            let v = v as usize;
-            self.far[v] = view.map_or(f64::INFINITY, |b| b.far);
-            self.planes[v] = view.and_then(|b| b.plane);
+        let look = |&v: &u32| {
+            let (p, away) = (self.positions[v as usize], self.outward[v as usize]);
+            let view = self.body.look(p);
+            let plane = view.and_then(|b| b.plane);
+            // More than half way through a limb the nearest way out is its other side: cloth goes back to its own.
+            let is_through = plane.is_some_and(|plane| plane.distance < 0.0 && dot(plane.normal, away) < 0.0);
+            let own = if is_through { self.body.exit(p, away, self.settings.farthest) } else { None };
+            (view.map_or(f64::INFINITY, |b| b.far), own.or(plane))
+        };
+        let found: Vec<_> = moved.par_iter().with_min_len(128).map(look).collect();
+        for (&v, (far, plane)) in moved.iter().zip(found) {
+            self.far[v as usize] = far;
+            self.planes[v as usize] = plane;
         }
     }
 
