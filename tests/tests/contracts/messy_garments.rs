@@ -59,11 +59,7 @@ impl Mesh {
             3 => {
                 let loose: Vec<[f64; 3]> =
                     self.polygons.iter().flatten().map(|v| self.positions[*v as usize]).collect();
-                let mut next = 0;
-                for v in self.polygons.iter_mut().flatten() {
-                    *v = next;
-                    next += 1;
-                }
+                self.polygons.iter_mut().flatten().zip(0..).for_each(|(v, own)| *v = own);
                 self.positions = loose;
             }
             // Turned faces, missing ones, a fan on an edge, a doubled face, needles, quads, a polygon of one corner thrice.
