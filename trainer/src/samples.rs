@@ -71,14 +71,8 @@ pub(crate) fn picture_of(
     let body_positions = wide(&body.positions);
     let positions = wide(&draped.posed);
     let mut figures = vec![Figure { positions: &body_positions, faces: &body.faces, colour: BODY_COLOUR }];
-    let mut first = 0;
-    for (layer, garment) in scene.worn.iter().enumerate() {
-        figures.push(Figure {
-            positions: &positions[first..first + garment.vertex_count()],
-            faces: garment.garment.rest.faces(),
-            colour: colour(layer),
-        });
-        first += garment.vertex_count();
+    for (layer, (garment, positions)) in scene.worn.iter().zip(scene.parts(&positions)).enumerate() {
+        figures.push(Figure { positions, faces: garment.garment.rest.faces(), colour: colour(layer) });
     }
     render(&figures, view, CELL)
 }

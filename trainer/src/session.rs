@@ -157,10 +157,12 @@ impl Session {
     pub fn share(&self) -> Share {
         self.world.share()
     }
+
     /// Whether this process writes and prints.
     pub fn leads(&self) -> bool {
         self.world.leads()
     }
+
     /// Steps done.
     pub fn step(&self) -> u64 {
         self.step

@@ -66,24 +66,41 @@ impl<T: Target> Target for Unprojected<'_, T> {
     }
 }
 
-fn wanted(sheet: &Sheet, target: &impl Target, a: u32, b: u32) -> f64 {
-    target.edge_length(scale(add(sheet.point(a), sheet.point(b)), 0.5))
+/// Wanted edge length at every vertex. It varies over decimetres, so it is looked up once a pass, not once a question.
+struct Sizing(Vec<f64>);
+
+impl Sizing {
+    fn new(sheet: &Sheet, target: &impl Target) -> Self {
+        Self(sheet.positions.iter().map(|p| target.edge_length(*p)).collect())
+    }
+
+    /// Wanted length of the edge `ab`.
+    fn of(&self, a: u32, b: u32) -> f64 {
+        0.5 * (self.0[a as usize] + self.0[b as usize])
+    }
+
+    /// Length of the edge `ab` relative to the wanted one.
+    fn ratio(&self, sheet: &Sheet, a: u32, b: u32) -> f64 {
+        sheet.length(a, b) / self.of(a, b)
+    }
 }
 
-fn split_edge(sheet: &mut Sheet, target: &impl Target, a: u32, b: u32) -> u32 {
+fn split_edge(sheet: &mut Sheet, target: &impl Target, sizing: &mut Sizing, a: u32, b: u32) -> u32 {
     let middle = scale(add(sheet.point(a), sheet.point(b)), 0.5);
     let v = sheet.split(a, b, middle);
+    sizing.0.push(sizing.of(a, b));
     sheet.positions[v as usize] = target.project(middle, sheet.labels[v as usize]);
     v
 }
 
 fn split_long_edges(sheet: &mut Sheet, target: &impl Target) {
+    let mut sizing = Sizing::new(sheet, target);
     for _ in 0..4 {
         let mut long: Vec<(f64, [u32; 2])> = sheet
             .edges()
             .into_iter()
             .filter_map(|[a, b]| {
-                let ratio = sheet.length(a, b) / wanted(sheet, target, a, b);
+                let ratio = sizing.ratio(sheet, a, b);
                 (ratio > LONG).then_some((ratio, [a, b]))
             })
             .collect();
@@ -93,7 +110,7 @@ fn split_long_edges(sheet: &mut Sheet, target: &impl Target) {
         long.sort_by(|p, q| q.0.total_cmp(&p.0));
         for (_, [a, b]) in long {
             // Faces only shrink while splitting, so the edge is still there; its length has not changed.
-            split_edge(sheet, target, a, b);
+            split_edge(sheet, target, &mut sizing, a, b);
         }
     }
 }
@@ -102,8 +119,8 @@ fn split_long_edges(sheet: &mut Sheet, target: &impl Target) {
 fn try_collapse(
     sheet: &mut Sheet,
     target: &impl Target,
-    a: u32,
-    b: u32,
+    sizing: &Sizing,
+    [a, b]: [u32; 2],
     limit: f64,
     least_angle: f64,
 ) -> bool {
@@ -121,14 +138,13 @@ fn try_collapse(
             .into_iter()
             .flatten();
         for position in candidates {
+            let near = |u: u32, v: u32| {
+                let longest = limit * sizing.of(u, v);
+                norm_squared(sub(sheet.point(u), position)) < longest * longest
+            };
             let fits = |v: u32, other: u32| {
-                sheet.incident(v).iter().all(|f| {
-                    sheet.faces[*f as usize].iter().all(|u| {
-                        *u == v
-                            || *u == other
-                            || norm(sub(sheet.point(*u), position)) < limit * wanted(sheet, target, *u, v)
-                    })
-                })
+                let mut corners = sheet.incident(v).iter().flat_map(|f| sheet.faces[*f as usize]);
+                corners.all(|u| u == v || u == other || near(u, v))
             };
             if fits(gone, kept)
                 && fits(kept, gone)
@@ -159,12 +175,13 @@ fn remove_three_valent(sheet: &mut Sheet) {
 
 fn collapse_short_edges(sheet: &mut Sheet, target: &impl Target) {
     remove_three_valent(sheet);
+    let sizing = Sizing::new(sheet, target);
     for _ in 0..6 {
         let mut short: Vec<(f64, [u32; 2])> = sheet
             .edges()
             .into_iter()
             .filter_map(|[a, b]| {
-                let ratio = sheet.length(a, b) / wanted(sheet, target, a, b);
+                let ratio = sizing.ratio(sheet, a, b);
                 (ratio < SHORT).then_some((ratio, [a, b]))
             })
             .collect();
@@ -173,8 +190,8 @@ fn collapse_short_edges(sheet: &mut Sheet, target: &impl Target) {
         for (_, [a, b]) in short {
             if sheet.is_alive(a)
                 && sheet.is_alive(b)
-                && sheet.length(a, b) < SHORT * wanted(sheet, target, a, b)
-                && try_collapse(sheet, target, a, b, LONG, 8.0)
+                && sizing.ratio(sheet, a, b) < SHORT
+                && try_collapse(sheet, target, &sizing, [a, b], LONG, 8.0)
             {
                 collapsed += 1;
             }
@@ -253,6 +270,7 @@ pub(crate) fn median_edge_length(sheet: &Sheet) -> f64 {
 /// Returns whether there was something to do.
 fn repair(sheet: &mut Sheet, target: &impl Target, quality: Quality) -> bool {
     let median = median_edge_length(sheet);
+    let mut sizing = Sizing::new(sheet, target);
     let sine = (quality.angle * 1.25).to_radians().sin();
     let [low, high] = [quality.edge_ratio[0] * 1.15 * median, quality.edge_ratio[1] / 1.15 * median];
     let mut queue: VecDeque<u32> = (0..sheet.faces.len() as u32).collect();
@@ -276,12 +294,12 @@ fn repair(sheet: &mut Sheet, target: &impl Target, quality: Quality) -> bool {
             continue;
         }
         if (sides[0].0 < low || (thin && sides[0].0 < 0.75 * median))
-            && try_collapse(sheet, target, a, b, 1.6, 12.0)
+            && try_collapse(sheet, target, &sizing, [a, b], 1.6, 12.0)
         {
             continue;
         }
         if sides[2].0 > high || (thin && sides[2].0 > 1.45 * median) {
-            let v = split_edge(sheet, target, c, d);
+            let v = split_edge(sheet, target, &mut sizing, c, d);
             let mut around = Vec::new();
             sheet.neighbours(v, &mut around);
             let spokes: Vec<[u32; 2]> = around.iter().map(|u| [v, *u]).collect();

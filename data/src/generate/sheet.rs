@@ -231,6 +231,10 @@ impl Sheet {
         (faces, count)
     }
 
+    fn are_neighbours(&self, a: u32, b: u32) -> bool {
+        self.incident[a as usize].iter().any(|f| self.faces[*f as usize].contains(&b))
+    }
+
     fn opposite(&self, f: u32, a: u32, b: u32) -> u32 {
         let face = self.faces[f as usize];
         face[0] ^ face[1] ^ face[2] ^ a ^ b
@@ -322,15 +326,17 @@ impl Sheet {
         if label_gone != 0 && (count != 1 || label_gone.count_ones() != 1 || label_gone & label_kept == 0) {
             return false;
         }
-        // Link condition: the only common neighbours are those opposite the edge.
-        let (mut around_gone, mut around_kept) = (Vec::with_capacity(12), Vec::with_capacity(12));
-        self.neighbours(gone, &mut around_gone);
-        self.neighbours(kept, &mut around_kept);
-        if around_gone.iter().filter(|v| around_kept.contains(v)).count() != count {
+        let across = [0, count - 1].map(|i| self.opposite(faces[i], gone, kept));
+        if count == 2 && across[0] == across[1] {
             return false;
         }
-        for &f in &faces[..count] {
-            let c = self.opposite(f, gone, kept);
+        // Link condition: the only common neighbours are those opposite the edge.
+        let ends = [gone, kept, across[0], across[1]];
+        let mut around_gone = self.incident[gone as usize].iter().flat_map(|f| self.faces[*f as usize]);
+        if around_gone.any(|u| !ends.contains(&u) && self.are_neighbours(u, kept)) {
+            return false;
+        }
+        for c in across {
             // The vertex across must keep a proper fan.
             if self.incident[c as usize].len() <= self.least_faces(c) {
                 return false;

@@ -94,6 +94,9 @@ pub struct GarmentSource {
     /// Garments made by the built-in generator.
     #[serde(default)]
     pub generate: Option<GenerateConfig>,
+    /// Of these, only the garments of these names; empty takes all. One name makes a garment-specific model.
+    #[serde(default)]
+    pub only: Vec<String>,
 }
 
 /// Settings of the built-in generator.

@@ -1,5 +1,6 @@
 //! What the post-process makes of random outfits.
 
+use super::equilibrium_error::{apply, skinning_transforms};
 use crate::scene::PreparedScene;
 use clothcombo_physics::contact::resolve::{
     Certificate, Layer, ResolveError, ResolveSettings, Resolved, RestGarment, certify, resolve,
@@ -41,19 +42,9 @@ pub struct DrapedScene {
 impl DrapedScene {
     /// From the packed positions of all garments of `scene` on its first body.
     pub fn new(scene: &PreparedScene, garments: Vec<Arc<RestGarment>>, packed: &[[f32; 3]]) -> Self {
-        let body = &scene.bodies[0].energy.body;
-        let body =
-            Surface::new(body.positions.iter().map(|p| p.map(f64::from)).collect(), body.faces.clone());
-        let mut rest = packed;
-        let positions = garments
-            .iter()
-            .map(|garment| {
-                let (part, tail) = rest.split_at(garment.vertex_count());
-                rest = tail;
-                part.iter().map(|p| p.map(f64::from)).collect()
-            })
-            .collect();
-        Self { body, garments, positions }
+        let wide = |part: &[[f32; 3]]| part.iter().map(|p| p.map(f64::from)).collect();
+        let positions = scene.parts(packed).into_iter().map(wide).collect();
+        Self { body: scene.exact_body(), garments, positions }
     }
 
     fn layers<'a>(&'a self, positions: &'a [Vec<[f64; 3]>]) -> Vec<Layer<'a>> {
@@ -93,25 +84,8 @@ impl DrapedScene {
 
 /// Linear blend skinning of the start state on the host, packed: what the networks start from.
 pub fn skinned(scene: &PreparedScene) -> Vec<[f32; 3]> {
-    let body = &scene.bodies[0];
-    let joints = body.bones.len();
-    let mut start = body.start.as_slice();
-    let mut posed = Vec::with_capacity(start.len());
-    for worn in &scene.worn {
-        let (own, tail) = start.split_at(worn.vertex_count());
-        start = tail;
-        for (p, weights) in own.iter().zip(worn.skin_weights.chunks_exact(joints.max(1))) {
-            let p = p.map(f64::from);
-            let mut sum = [0.0; 3];
-            for (bone, w) in body.bones.iter().zip(weights) {
-                for (axis, row) in bone.iter().enumerate() {
-                    sum[axis] += f64::from(*w) * (row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + row[3]);
-                }
-            }
-            posed.push(sum.map(|x| x as f32));
-        }
-    }
-    posed
+    let start = scene.bodies[0].start.iter().map(|p| p.map(f64::from));
+    skinning_transforms(scene).iter().zip(start).map(|(t, p)| apply(t, p).map(|x| x as f32)).collect()
 }
 
 /// The numbers of a certificate without its list.

@@ -51,13 +51,7 @@ pub fn score_scene(scene: &PreparedScene, body: &Surface<f64>, draped: &Draped) 
     let positions: Vec<[f64; 3]> = draped.posed.iter().map(|p| p.map(f64::from)).collect();
     score.penetration = penetration(body, &positions, DEEP);
 
-    let mut parts = Vec::with_capacity(scene.worn.len());
-    let mut rest = positions.as_slice();
-    for garment in &scene.worn {
-        let (part, tail) = rest.split_at(garment.vertex_count());
-        parts.push(part);
-        rest = tail;
-    }
+    let parts = scene.parts(&positions);
     for &(inner, outer) in &scene.contacts {
         let faces = scene.worn[inner].garment.rest.faces();
         let pair = order_violations(parts[inner], faces, parts[outer]);

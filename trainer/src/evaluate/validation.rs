@@ -7,7 +7,6 @@ use crate::drape::{DrapeError, Networks};
 use crate::scene::{
     Library, LibraryError, PreparedScene, SceneDraw, ValidationGroup, draw_validation, prepare,
 };
-use clothcombo_physics::query::Surface;
 use rayon::prelude::*;
 
 /// What is compared on a scene.
@@ -102,7 +101,7 @@ impl ValidationSet {
             let scenes: Vec<_> = chunk.par_iter().map(|draw| self.prepare(library, draw)).collect();
             for scene in scenes {
                 let scene = scene?;
-                let body = exact_body(&scene);
+                let body = scene.exact_body();
                 let network = networks.drape(&scene)?;
                 for (method, scores) in methods.iter().zip(&mut scores) {
                     let draped: &Draped = match method {
@@ -118,10 +117,4 @@ impl ValidationSet {
         let methods = methods.iter().zip(&scores).map(|(m, s)| MethodScore::new(m.name(), s)).collect();
         Ok(GroupReport { group: group.name(), scenes: draws.len(), methods })
     }
-}
-
-/// The first body of a scene in f64, for exact distances.
-fn exact_body(scene: &PreparedScene) -> Surface<f64> {
-    let body = &scene.bodies[0].energy.body;
-    Surface::new(body.positions.iter().map(|p| p.map(f64::from)).collect(), body.faces.clone())
 }

@@ -62,6 +62,17 @@ pub enum LibraryError {
         /// The existing names.
         available: String,
     },
+    /// A wanted name fits no garment of its source.
+    #[error("data.garments[{source_index}].only names {name:?}, which is no garment of this source")]
+    #[diagnostic(help("the garments are: {available}"))]
+    UnknownOnly {
+        /// Number of the source in the configuration, from 0.
+        source_index: usize,
+        /// The name.
+        name: String,
+        /// The existing names.
+        available: String,
+    },
     /// One side of the pose split is empty.
     #[error("{}: {train} frames to train on and {held_out} held out", folder.display())]
     #[diagnostic(help(

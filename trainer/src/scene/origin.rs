@@ -28,21 +28,40 @@ impl Origin {
     /// [`LibraryError`] naming the folder or manifest entry.
     pub fn list(sources: &[GarmentSource]) -> Result<Vec<Self>, LibraryError> {
         let mut origins = Vec::new();
-        for source in sources {
+        for (source_index, source) in sources.iter().enumerate() {
+            let mut own = Vec::new();
             if let Some(folder) = &source.folder {
                 let listed = list_garment_folder(folder).map_err(LibraryError::data)?;
-                origins.extend(listed.into_iter().map(Origin::File));
+                own.extend(listed.into_iter().map(Origin::File));
             }
-            let Some(generate) = &source.generate else { continue };
-            let settings =
-                GarmentSettings { target_vertices: generate.vertices, ..GarmentSettings::default() };
-            origins.extend((0..generate.count).map(|i| Origin::Generated {
-                category: generate.categories[i % generate.categories.len()],
-                seed: generate.seed.wrapping_add(i as u64),
-                settings: settings.clone(),
-            }));
+            if let Some(generate) = &source.generate {
+                let settings =
+                    GarmentSettings { target_vertices: generate.vertices, ..GarmentSettings::default() };
+                own.extend((0..generate.count).map(|i| Origin::Generated {
+                    category: generate.categories[i % generate.categories.len()],
+                    seed: generate.seed.wrapping_add(i as u64),
+                    settings: settings.clone(),
+                }));
+            }
+            if !source.only.is_empty() {
+                let names: Vec<String> = own.iter().map(Self::name).collect();
+                if let Some(name) = source.only.iter().find(|wanted| !names.contains(wanted)) {
+                    let (name, available) = (name.clone(), names.join(", "));
+                    return Err(LibraryError::UnknownOnly { source_index, name, available });
+                }
+                own.retain(|origin| source.only.contains(&origin.name()));
+            }
+            origins.append(&mut own);
         }
         Ok(origins)
+    }
+
+    /// Name of the garment, unique within a source.
+    fn name(&self) -> String {
+        match self {
+            Self::File(listed) => listed.name.clone(),
+            Self::Generated { category, seed, .. } => GarmentGenerator::name(*category, *seed),
+        }
     }
 }
 
@@ -75,5 +94,30 @@ impl<'a> Maker<'a> {
                 generator.generate(*category, *seed, settings).map_err(LibraryError::data)
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn source(rest: &str) -> GarmentSource {
+        toml::from_str(&format!("generate = {{ count = 6, seed = 4 }}\n{rest}")).unwrap()
+    }
+
+    #[test]
+    fn only_the_named_garments_of_a_source_are_listed() {
+        let names = |sources: &[GarmentSource]| {
+            Origin::list(sources).map(|all| all.iter().map(Origin::name).collect::<Vec<_>>())
+        };
+        let all = names(&[source("")]).unwrap();
+        assert_eq!(all.len(), 6);
+        let wanted = format!("only = [{:?}, {:?}]", all[4], all[1]);
+        let some = names(&[source(&wanted), source("")]).unwrap();
+        assert_eq!(some[..2], [all[1].clone(), all[4].clone()], "in the order of the source");
+        assert_eq!(some[2..], all, "other sources are whole");
+
+        let error = Origin::list(&[source(""), source("only = [\"cape\"]")]).err().unwrap();
+        assert!(error.to_string().contains("data.garments[1].only names \"cape\""), "{error}");
     }
 }

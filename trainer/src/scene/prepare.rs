@@ -38,6 +38,25 @@ pub struct PreparedScene {
     pub bodies: Vec<PreparedBody>,
 }
 
+impl PreparedScene {
+    /// What of `packed`, one value per vertex of all garments inner → outer, belongs to each garment.
+    pub fn parts<'a, T>(&self, packed: &'a [T]) -> Vec<&'a [T]> {
+        let mut rest = packed;
+        let part = |garment: &Arc<LibraryGarment>| {
+            let (own, tail) = rest.split_at(garment.vertex_count());
+            rest = tail;
+            own
+        };
+        self.worn.iter().map(part).collect()
+    }
+
+    /// The first body in f64, for exact distances and intersections.
+    pub fn exact_body(&self) -> Surface<f64> {
+        let body = &self.bodies[0].energy.body;
+        Surface::new(body.positions.iter().map(|p| p.map(f64::from)).collect(), body.faces.clone())
+    }
+}
+
 /// Two garments whose rest bounding boxes are farther apart than this never interact [m].
 const CONTACT_MARGIN: f64 = 0.05;
 

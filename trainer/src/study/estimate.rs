@@ -43,14 +43,13 @@ pub struct Ratio {
 impl Ratio {
     /// Of `above` over `below`, values of the same scenes; not a number where `below` is zero on all of them.
     pub fn of(above: &[f64], below: &[f64]) -> Self {
-        let ratio = |a: f64, b: f64| a / b;
         let sum = |values: &[f64], draw: &[usize]| draw.iter().map(|&i| values[i]).sum::<f64>();
         let all: Vec<usize> = (0..above.len()).collect();
         let medians = [above, below].map(|v| Spread::of(v.to_vec()).median);
         Self {
-            of_means: ratio(sum(above, &all), sum(below, &all)),
-            of_medians: ratio(medians[0], medians[1]),
-            interval: bootstrap(above.len(), |draw| ratio(sum(above, draw), sum(below, draw))),
+            of_means: sum(above, &all) / sum(below, &all),
+            of_medians: medians[0] / medians[1],
+            interval: bootstrap(above.len(), |draw| sum(above, draw) / sum(below, draw)),
         }
     }
 }

@@ -77,26 +77,16 @@ pub struct Witness<'a> {
 impl<'a> Witness<'a> {
     /// Of the first body of `scene`.
     pub fn new(scene: &'a PreparedScene) -> Self {
-        let body = &scene.bodies[0].energy.body;
-        let positions = body.positions.iter().map(|p| p.map(f64::from)).collect();
-        Self { scene, body: Surface::new(positions, body.faces.clone()) }
+        Self { scene, body: scene.exact_body() }
     }
 
     /// Measures a drape of the scene.
     pub fn measure(&self, draped: &Draped) -> Measured {
         let positions: Vec<[f64; 3]> = draped.posed.iter().map(|p| p.map(f64::from)).collect();
         let body = TriangleTree::new(&self.body.positions, &self.body.faces);
-        let mut rest = positions.as_slice();
-        let trees: Vec<TriangleTree> = self
-            .scene
-            .worn
-            .iter()
-            .map(|worn| {
-                let (own, tail) = rest.split_at(worn.vertex_count());
-                rest = tail;
-                TriangleTree::new(own, worn.garment.rest.faces())
-            })
-            .collect();
+        let parts = self.scene.parts(&positions).into_iter().zip(&self.scene.worn);
+        let trees: Vec<TriangleTree> =
+            parts.map(|(part, worn)| TriangleTree::new(part, worn.garment.rest.faces())).collect();
         let pairs = (0..trees.len()).flat_map(|i| (i + 1..trees.len()).map(move |j| (i, j)));
         Measured {
             score: score_scene(self.scene, &self.body, draped),
