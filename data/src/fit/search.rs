@@ -47,6 +47,11 @@ impl Sitting {
         let is_wide = self.inside < 0.01 && self.wrap == 1.0 && self.mean_distance < 0.25;
         is_close || is_wide
     }
+
+    /// Whether the cloth follows the trunk, be it partly inside: made for another body, but no hat and no shoe.
+    fn is_around_trunk(&self) -> bool {
+        self.wrap >= 0.75 && self.mean_distance < 0.02
+    }
 }
 
 /// Sample points of a garment in the file's coordinates, evenly over its area.
@@ -162,9 +167,13 @@ impl<'a> Search<'a> {
         }
         let (mut placement, mut arm, mut sitting) = self.pick(&hypotheses, &coarse, &fine);
         if !sitting.is_good() {
-            self.refuse_hats_and_shoes(&hypotheses, &coarse)?;
+            if !sitting.is_around_trunk() {
+                self.refuse_hats_and_shoes(&hypotheses, &coarse)?;
+            }
             let (moved, moved_arm, moved_sitting) = self.moved(&hypotheses, &coarse, &fine);
-            if moved_sitting.cost < 0.7 * sitting.cost - 0.005 {
+            // The file's own origin is right more often than not; a garment that then sits well is better evidence.
+            let clearly = if moved_sitting.is_good() { 0.8 } else { 0.7 };
+            if moved_sitting.cost < clearly * sitting.cost - 0.005 {
                 (placement, arm, sitting) = (moved, moved_arm, moved_sitting);
             }
         }

@@ -17,7 +17,7 @@ const NARROW: usize = 256;
 const ROWS_PER_PART: usize = 384;
 /// A product of this many terms an element is added up in parts, where the result is small. The parts depend on the
 /// sizes alone, so that the number of threads does not change the sums.
-const TERMS_PER_PART: usize = 1024;
+const TERMS_PER_PART: usize = 512;
 /// Parts of a sum at most.
 const MOST_PARTS: usize = 8;
 
@@ -261,7 +261,7 @@ mod tests {
                     let turned = tensor(&turned, inner, rows).transpose();
                     let sum = tensor(&c, rows, columns);
                     let added = crate::ops::product_add(turned, tensor(&b, inner, columns), sum);
-                    [plain, added].map(|t| t.into_data().to_vec::<f32>().unwrap()).into()
+                    [plain, added].map(|t| t.into_data().try_to_vec::<f32>().unwrap()).into()
                 })
             };
             let found = run(1);
