@@ -3,7 +3,7 @@
 #
 #   scripts/check_backends.sh [FEATURES]        default: ndarray,wgpu
 #
-# Builds in target-gpu, twenty minutes or more on two cores: that is why CI does not run this. wgpu takes the first adapter it finds;
+# Builds in target-gpu, 42 minutes on two busy cores: that is why CI does not run this. wgpu takes the first adapter it finds;
 # without a GPU that may be Mesa's software one (Debian: mesa-vulkan-drivers libvulkan1), where only small sizes are right.
 set -euo pipefail
 cd "$(dirname "$0")/.."

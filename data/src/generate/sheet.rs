@@ -231,6 +231,7 @@ impl Sheet {
         (faces, count)
     }
 
+    /// Whether an edge joins two vertices.
     fn are_neighbours(&self, a: u32, b: u32) -> bool {
         self.incident[a as usize].iter().any(|f| self.faces[*f as usize].contains(&b))
     }
@@ -411,7 +412,7 @@ impl Sheet {
         let [pa, pb, pc, pd] = [a, b, c, d].map(|v| self.point(v));
         let before = smallest_sine([pa, pb, pc]).min(smallest_sine([pb, pa, pd]));
         let after = smallest_sine([pc, pa, pd]).min(smallest_sine([pc, pd, pb]));
-        if c == d || after <= before * (1.0 + gain) || self.edge_faces(c, d).1 != 0 {
+        if c == d || after <= before * (1.0 + gain) || self.are_neighbours(c, d) {
             return false;
         }
         if [a, b].iter().any(|v| self.incident[*v as usize].len() <= self.least_faces(*v)) {

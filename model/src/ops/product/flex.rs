@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use std::mem::MaybeUninit;
 
 /// Multiplications and additions below which a second thread costs more than it saves.
-const PARALLEL_FROM: usize = 96 * 96 * 96;
+const PARALLEL_FROM: usize = 192 * 192 * 192;
 /// Results with more columns are shared out by `gemm` itself, by blocks; narrower ones better by whole rows.
 const NARROW: usize = 256;
 /// Rows that are worth packing the right matrix once more.
@@ -119,15 +119,14 @@ unsafe fn write(
 ) {
     let (lhs, rhs) = (place(lhs), place(rhs));
     let work = rows.saturating_mul(inner).saturating_mul(columns);
-    let threads = rayon::current_num_threads();
     // SAFETY (all branches): the strides are those of the tensors, whose elements all lie in their storage; parts of
     // rows and of terms do not overlap; the rest is promised.
-    if work < PARALLEL_FROM || threads == 1 && inner < 2 * TERMS_PER_PART {
+    if work < PARALLEL_FROM {
         unsafe { one(lhs, rhs, output, [rows, inner, columns], add, Parallelism::None) };
     } else if rows <= NARROW && columns <= NARROW && inner >= 2 * TERMS_PER_PART {
         unsafe { by_terms(lhs, rhs, output, [rows, inner, columns], add) };
-    } else if threads > 1 && columns <= NARROW && rows >= 2 * ROWS_PER_PART {
-        let part = rows.div_ceil(threads).max(ROWS_PER_PART);
+    } else if columns <= NARROW && rows >= 2 * ROWS_PER_PART {
+        let part = rows.div_ceil(rayon::current_num_threads()).max(ROWS_PER_PART);
         let target = Target(output);
         (0..rows.div_ceil(part)).into_par_iter().for_each(|i| {
             let (first, target) = (i * part, &target);
