@@ -12,6 +12,7 @@
 //! | [`contact`] | penetration of the body, order of layers, exact intersections and their contours |
 //! | [`equilibrium`] | static drape: direct minimisation of the same energies from any start |
 //! | [`query`] | nearest vertex and closest surface point, accelerated, with brute-force oracles |
+//! | [`transform`] | affine maps, as skinning blends them |
 //! | `autodiff` | the energies as one differentiable burn operation (feature `autodiff`) |
 
 #[cfg(feature = "autodiff")]
@@ -23,6 +24,7 @@ pub mod mesh;
 pub mod operators;
 pub mod query;
 pub mod real;
+pub mod transform;
 pub mod vec3;
 
 pub use energy::{EnergyError, EnergySettings, GarmentEnergies, SceneEnergy, SceneValue, Term, TermMap};

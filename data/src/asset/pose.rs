@@ -45,6 +45,40 @@ impl Pose {
         (pose, yaw)
     }
 
+    /// The pose on a way from the T-pose, at 0, to this one, at 1, that faces where this one faces all the time.
+    pub fn on_the_way(&self, share: f64) -> Self {
+        if share == 1.0 || self.rotations.is_empty() {
+            return self.clone();
+        }
+        let (rest, yaw) = self.without_heading();
+        let mut pose = rest.scaled(share);
+        let turn = quaternion_from_axis_angle([0.0, yaw, 0.0]);
+        let root = quaternion_product(turn, quaternion_from_axis_angle(pose.rotations[0]));
+        pose.rotations[0] = axis_angle_from_quaternion(root);
+        pose
+    }
+
+    /// The pose at `share` of the way from this one to `other`. Joint vectors are mixed linearly, so that poses within limits
+    /// that are boxes stay within them; the root, which may face anywhere, turns the short way.
+    pub fn between(&self, other: &Self, share: f64) -> Self {
+        let mut result = self.clone();
+        for (joint, rotation) in result.rotations.iter_mut().enumerate() {
+            let other = other.rotation(joint);
+            if joint == 0 {
+                let from = quaternion_from_axis_angle(*rotation);
+                let step = axis_angle_from_quaternion(quaternion_product(
+                    quaternion_conjugate(from),
+                    quaternion_from_axis_angle(other),
+                ));
+                let part = quaternion_from_axis_angle(step.map(|x| share * x));
+                *rotation = axis_angle_from_quaternion(quaternion_product(from, part));
+            } else {
+                *rotation = std::array::from_fn(|x| rotation[x] + share * (other[x] - rotation[x]));
+            }
+        }
+        result
+    }
+
     /// The pose seen in a mirror in the plane x = 0: left and right joints change places.
     pub fn mirrored(&self) -> Self {
         let count = self.rotations.len();
@@ -81,6 +115,23 @@ mod tests {
         assert_eq!(pose.scaled(1.0), pose);
         assert_eq!(pose.scaled(0.0), Pose::t_pose(22).scaled(0.0));
         assert!(pose.scaled(0.0).rotations.iter().flatten().all(|x| *x == 0.0));
+    }
+
+    #[test]
+    fn on_its_way_a_pose_keeps_its_heading() {
+        for seed in 0..20 {
+            let pose = random_pose(seed, 22);
+            let (tilt, yaw) = pose.without_heading();
+            assert_eq!(pose.on_the_way(1.0), pose);
+            for share in [0.0, 0.3, 0.7] {
+                let (now, heading) = pose.on_the_way(share).without_heading();
+                let whole_turns = (heading - yaw) / std::f64::consts::TAU;
+                assert!((whole_turns - whole_turns.round()).abs() < 1e-9, "{heading} {yaw}");
+                let expected = tilt.scaled(share);
+                let pairs = now.rotations.as_flattened().iter().zip(expected.rotations.as_flattened());
+                assert!(pairs.into_iter().all(|(a, b)| (a - b).abs() < 1e-9));
+            }
+        }
     }
 
     #[test]

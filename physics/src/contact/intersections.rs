@@ -32,19 +32,23 @@ impl std::fmt::Debug for TriangleTree<'_> {
 impl<'a> TriangleTree<'a> {
     /// Builds the tree in O(F log F).
     pub fn new(positions: &'a [[f64; 3]], faces: &'a [[u32; 3]]) -> Self {
-        Self::of_faces_in(positions, faces, None)
+        Self::of_part(positions, faces, |_, _| true)
     }
 
-    /// Only the faces whose box meets `region`, where one is given.
-    fn of_faces_in(positions: &'a [[f64; 3]], faces: &'a [[u32; 3]], region: Option<Aabb>) -> Self {
+    /// Of some of the faces, which keep their numbers.
+    pub(super) fn of_part(
+        positions: &'a [[f64; 3]],
+        faces: &'a [[u32; 3]],
+        is_part: impl Fn(u32, &Aabb) -> bool,
+    ) -> Self {
         let (kept, boxes): (Vec<u32>, Vec<Aabb>) = triangle_boxes(positions, faces)
             .into_iter()
-            .filter(|(_, bounds)| region.is_none_or(|region| region.intersects(bounds)))
+            .filter(|(face, bounds)| is_part(*face, bounds))
             .unzip();
         Self { positions, faces, bvh: Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes), kept }
     }
 
-    /// Faces left out because they are no triangle.
+    /// Faces that take part in nothing.
     pub fn skipped(&self) -> usize {
         self.faces.len() - self.kept.len()
     }
@@ -178,7 +182,7 @@ pub fn triangle_pairs(
     let Some(region) = boxes.iter().map(|(_, bounds)| *bounds).reduce(|a, b| a.merged(&b)) else {
         return Vec::new();
     };
-    let b = TriangleTree::of_faces_in(b_positions, b_faces, Some(region));
+    let b = TriangleTree::of_part(b_positions, b_faces, |_, bounds| region.intersects(bounds));
     let mut pairs: Vec<(u32, u32)> = boxes
         .par_iter()
         .with_min_len(256)

@@ -48,7 +48,7 @@ mod solve;
 mod tests;
 
 pub use error::EquilibriumError;
-pub use problem::{Problem, Transform};
+pub use problem::Problem;
 pub use settings::SolverSettings;
 pub use solution::{Progress, Solution, Step, Stop};
 pub use solve::solve;

@@ -3,10 +3,8 @@
 use super::EquilibriumError;
 use super::kinks::{self, Kink};
 use crate::energy::{CurvatureSink, SceneEnergy, Term};
-use crate::vec3::{accumulate, cross, dot, norm_squared, scale, sub};
-
-/// An affine map `x ↦ A x + t` as the rows of `[A t]`.
-pub type Transform = [[f64; 4]; 3];
+use crate::transform::{Transform, apply, apply_transposed, inverse};
+use crate::vec3::{accumulate, norm_squared};
 
 /// Linear parts with a smaller determinant cannot be undone.
 const SMALLEST_DETERMINANT: f64 = 1e-6;
@@ -41,7 +39,8 @@ impl<'a> Problem<'a> {
             }
             Some(transforms) if needed => {
                 let undone = transforms.iter().enumerate().map(|(vertex, t)| {
-                    inverted(t).map_err(|determinant| EquilibriumError::Singular { vertex, determinant })
+                    inverse(t, SMALLEST_DETERMINANT)
+                        .map_err(|determinant| EquilibriumError::Singular { vertex, determinant })
                 });
                 Some(undone.collect::<Result<_, _>>()?)
             }
@@ -130,9 +129,9 @@ impl<'a> Problem<'a> {
             let block = match &self.inverse {
                 // Aᵀ-congruence: rows by the transform of i, columns by that of j.
                 Some(inverse) => {
-                    let right: [[f64; 3]; 3] = block.map(|row| transposed_apply(&inverse[j], row));
+                    let right: [[f64; 3]; 3] = block.map(|row| apply_transposed(&inverse[j], row));
                     let columns: [[f64; 3]; 3] = std::array::from_fn(|c| {
-                        transposed_apply(&inverse[i], [right[0][c], right[1][c], right[2][c]])
+                        apply_transposed(&inverse[i], [right[0][c], right[1][c], right[2][c]])
                     });
                     std::array::from_fn(|r| std::array::from_fn(|c| columns[c][r]))
                 }
@@ -146,7 +145,7 @@ impl<'a> Problem<'a> {
         let value = energy.evaluate(posed, &self.canonical(posed));
         let mut gradient = value.posed_gradient;
         for (v, (sum, g)) in gradient.iter_mut().zip(&value.canonical_gradient).enumerate() {
-            let pulled = self.inverse.as_ref().map_or(*g, |inverse| transposed_apply(&inverse[v], *g));
+            let pulled = self.inverse.as_ref().map_or(*g, |inverse| apply_transposed(&inverse[v], *g));
             accumulate(sum, pulled);
         }
         (value.total, gradient)
@@ -171,28 +170,4 @@ pub(super) fn relative(gradient_norm: f64, scale: f64) -> f64 {
 /// Euclidean norm over all coordinates.
 pub(super) fn norm(x: &[[f64; 3]]) -> f64 {
     x.iter().map(|x| norm_squared(*x)).sum::<f64>().sqrt()
-}
-
-fn apply(t: &Transform, p: [f64; 3]) -> [f64; 3] {
-    t.map(|[a, b, c, d]| a * p[0] + b * p[1] + c * p[2] + d)
-}
-
-/// `Aᵀ g`.
-fn transposed_apply(t: &Transform, g: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|c| t[0][c] * g[0] + t[1][c] * g[1] + t[2][c] * g[2])
-}
-
-/// The inverse map, or the determinant that forbids it.
-fn inverted(t: &Transform) -> Result<Transform, f64> {
-    let [r0, r1, r2] = t.map(|[a, b, c, _]| [a, b, c]);
-    let columns = [cross(r1, r2), cross(r2, r0), cross(r0, r1)];
-    let determinant = dot(r0, columns[0]);
-    if !(determinant.abs() >= SMALLEST_DETERMINANT && determinant.is_finite()) {
-        return Err(determinant);
-    }
-    let columns = columns.map(|c| scale(c, 1.0 / determinant));
-    let rows: [[f64; 3]; 3] = std::array::from_fn(|r| [columns[0][r], columns[1][r], columns[2][r]]);
-    let shift = t.map(|row| row[3]);
-    let back = sub([0.0; 3], rows.map(|row| dot(row, shift)));
-    Ok(std::array::from_fn(|r| [rows[r][0], rows[r][1], rows[r][2], back[r]]))
 }

@@ -3,11 +3,12 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use super::{EquilibriumError, Problem, Solution, SolverSettings, Stop, Transform, solve};
+use super::{EquilibriumError, Problem, Solution, SolverSettings, Stop, solve};
 use crate::energy::tests::scenes::{jittered, paper_weights};
 use crate::energy::{EnergySettings, GarmentEnergies, SceneEnergy, SceneGarment, Term, TermMap};
 use crate::mesh::{Topology, TriMesh, shapes};
 use crate::query::{Distance, Surface};
+use crate::transform::Transform;
 use crate::vec3;
 
 fn settings() -> EnergySettings {

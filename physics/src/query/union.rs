@@ -10,6 +10,8 @@
 //! they cut the rest into connected pieces, and each piece lies wholly in the boundary of the union or wholly in its inside.
 //! One winding number per piece says which.
 
+use std::sync::OnceLock;
+
 use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
 
 use super::closest_point::triangle_box;
@@ -19,6 +21,8 @@ use crate::vec3::{self, add, add_scaled, cross, dot, normalized, scale, sub};
 
 /// How far outside a triangle the side of its piece is asked for [m].
 const LOOK_OUT: f64 = 1e-8;
+/// Questions that are asked of all faces instead of a tree.
+const FEW: usize = 64;
 
 /// Where a face of a surface lies, seen from the union of the surface's parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,8 +38,10 @@ pub enum FaceSide {
 /// Closest-point queries on the boundary of the union of a closed surface's parts.
 #[derive(Debug)]
 pub struct UnionDistance {
-    kept: ClosestPoint,
-    /// Kept face → face, both among those with finite corners.
+    /// Built at first use.
+    kept: OnceLock<ClosestPoint>,
+    kept_corners: Vec<[u32; 3]>,
+    /// Kept face → face.
     kept_faces: Vec<u32>,
     sides: Vec<FaceSide>,
     /// Whether the normals at a kept face and its neighbours tell the side.
@@ -48,36 +54,50 @@ impl UnionDistance {
     /// `positions` `[V, 3]` (m), `faces` `[F, 3]` of a closed surface, counter-clockwise seen from outside, with every index
     /// below `V`. On a surface with a border the winding number means nothing at it, and the distance may jump there.
     pub fn new(positions: Vec<[f64; 3]>, faces: &[[u32; 3]]) -> Self {
-        // As ClosestPoint does, so that faces are numbered alike.
-        let is_whole = |face: &&[u32; 3]| face.iter().all(|&v| vec3::is_finite(positions[v as usize]));
-        let faces: Vec<[u32; 3]> = faces.iter().filter(is_whole).copied().collect();
-        let mut is_seam = vec![false; faces.len()];
-        for (a, b) in self_triangle_pairs(&positions, &faces) {
-            is_seam[a as usize] = true;
-            is_seam[b as usize] = true;
+        let seams = self_triangle_pairs(&positions, faces);
+        Self::of_part(positions, faces, |_| true, &seams)
+    }
+
+    /// The same for queries near some of the faces only: the others are never the closest, but count for what is inside.
+    /// `seams`: the pairs of those faces that intersect, as [`self_triangle_pairs`] finds them.
+    pub fn of_part(
+        positions: Vec<[f64; 3]>,
+        faces: &[[u32; 3]],
+        is_part: impl Fn(u32) -> bool,
+        seams: &[(u32, u32)],
+    ) -> Self {
+        // As ClosestPoint does.
+        let is_whole = |face: &[u32; 3]| face.iter().all(|&v| vec3::is_finite(positions[v as usize]));
+        let part: Vec<u32> =
+            (0..faces.len() as u32).filter(|&f| is_part(f) && is_whole(&faces[f as usize])).collect();
+        let part_faces: Vec<[u32; 3]> = part.iter().map(|&f| faces[f as usize]).collect();
+        let mut crosses = vec![false; faces.len()];
+        for &(a, b) in seams {
+            crosses[a as usize] = true;
+            crosses[b as usize] = true;
         }
-        let all = Crossings::new(positions, faces);
-        let is_exposed = exposed(&all, &is_seam);
+        let is_seam: Vec<bool> = part.iter().map(|&f| crosses[f as usize]).collect();
+        let whole = faces.iter().filter(|face| is_whole(face)).copied().collect();
+        let all = Crossings::new(positions, whole);
+        let is_exposed = exposed(&all, &part_faces, &is_seam);
         let mut is_sure_vertex = vec![true; all.positions.len()];
-        for (face, _) in all.faces.iter().zip(&is_exposed).filter(|(_, exposed)| !**exposed) {
+        for (face, _) in part_faces.iter().zip(&is_exposed).filter(|(_, exposed)| !**exposed) {
             face.iter().for_each(|&v| is_sure_vertex[v as usize] = false);
         }
-        let sides: Vec<FaceSide> = is_seam
-            .iter()
-            .zip(&is_exposed)
-            .map(|(seam, exposed)| match (seam, exposed) {
+        let mut sides = vec![FaceSide::Exposed; faces.len()];
+        for ((&f, seam), exposed) in part.iter().zip(&is_seam).zip(&is_exposed) {
+            sides[f as usize] = match (seam, exposed) {
                 (true, _) => FaceSide::Seam,
                 (false, true) => FaceSide::Exposed,
                 (false, false) => FaceSide::Buried,
-            })
-            .collect();
+            };
+        }
         let kept_faces: Vec<u32> =
-            (0..all.faces.len() as u32).filter(|&f| sides[f as usize] != FaceSide::Buried).collect();
-        let kept: Vec<[u32; 3]> = kept_faces.iter().map(|&f| all.faces[f as usize]).collect();
+            part.iter().copied().filter(|&f| sides[f as usize] != FaceSide::Buried).collect();
+        let kept: Vec<[u32; 3]> = kept_faces.iter().map(|&f| faces[f as usize]).collect();
         let is_sure = kept.iter().map(|face| face.iter().all(|&v| is_sure_vertex[v as usize])).collect();
-        let buried = all.faces.len() - kept.len();
-        let tree = ClosestPoint::new(all.positions.clone(), &kept);
-        Self { kept: tree, kept_faces, sides, is_sure, all, buried }
+        let buried = part.len() - kept.len();
+        Self { kept: OnceLock::new(), kept_corners: kept, kept_faces, sides, is_sure, all, buried }
     }
 
     /// Faces that lie in the inside of the union.
@@ -85,25 +105,30 @@ impl UnionDistance {
         self.buried
     }
 
-    /// Where every face lies; faces with a corner that is not finite are not counted.
+    /// Where every face lies; faces that were left out, or with a corner that is not finite, count as exposed.
     pub fn sides(&self) -> &[FaceSide] {
         &self.sides
     }
 
-    /// The face that [`SurfacePoint::face`] of [`project`](Self::project) means, numbered as in [`sides`](Self::sides).
+    /// The face that [`SurfacePoint::face`] of [`project`](Self::project) means.
     pub fn kept_face(&self, face: u32) -> u32 {
         self.kept_faces[face as usize]
     }
 
+    /// How many parts `p` is inside of, on a closed surface without parts turned inside out.
+    pub fn winding_number(&self, p: [f64; 3]) -> i32 {
+        self.all.winding_number(p)
+    }
+
     /// Queries on the faces that are kept.
     pub fn kept(&self) -> &ClosestPoint {
-        &self.kept
+        self.kept.get_or_init(|| ClosestPoint::new(self.all.positions.clone(), &self.kept_corners))
     }
 
     /// The closest point of the kept faces, and whether `p` is inside; `None` for a query that is not finite or a surface
     /// without a face.
     pub fn project(&self, p: [f64; 3]) -> Option<(SurfacePoint, bool)> {
-        let found = self.kept.project(p)?;
+        let found = self.kept().project(p)?;
         let is_inside = match self.is_sure[found.face as usize] {
             true => dot(sub(p, found.position), found.normal) < 0.0,
             false => self.all.winding_number(p) >= 1,
@@ -112,35 +137,45 @@ impl UnionDistance {
     }
 }
 
-/// Which faces that are no seam have the outside of the union before them and its inside behind them.
-fn exposed(all: &Crossings, is_seam: &[bool]) -> Vec<bool> {
-    let mut edges: Vec<([u32; 2], u32)> = Vec::with_capacity(3 * all.faces.len());
-    for (f, face) in all.faces.iter().enumerate().filter(|(f, _)| !is_seam[*f]) {
+/// Which of some faces that are no seam have the outside of the union before them and its inside behind them.
+fn exposed(all: &Crossings, faces: &[[u32; 3]], is_seam: &[bool]) -> Vec<bool> {
+    let mut edges: Vec<([u32; 2], u32)> = Vec::with_capacity(3 * faces.len());
+    for (f, face) in faces.iter().enumerate().filter(|(f, _)| !is_seam[*f]) {
         let ends = [0, 1, 2].map(|e| [face[e], face[(e + 1) % 3]]);
         edges.extend(ends.map(|[a, b]| ([a.min(b), a.max(b)], f as u32)));
     }
     edges.sort_unstable();
-    let mut root: Vec<u32> = (0..all.faces.len() as u32).collect();
+    let mut root: Vec<u32> = (0..faces.len() as u32).collect();
     for pair in edges.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
         let (a, b) = (find(&mut root, pair[0].1), find(&mut root, pair[1].1));
         root[a.max(b) as usize] = a.min(b);
     }
-    let roots: Vec<u32> = (0..all.faces.len() as u32).map(|f| find(&mut root, f)).collect();
+    let roots: Vec<u32> = (0..faces.len() as u32).map(|f| find(&mut root, f)).collect();
     // The side is asked at the largest face of each piece, where rounding matters least.
-    let area = |f: usize| vec3::norm_squared(all.normal(f));
-    let mut largest: Vec<usize> = (0..all.faces.len()).collect();
-    for f in 0..all.faces.len() {
+    let areas: Vec<f64> = faces.iter().map(|face| vec3::norm_squared(all.normal(*face))).collect();
+    let mut largest: Vec<usize> = (0..faces.len()).collect();
+    for f in 0..faces.len() {
         let at = &mut largest[roots[f] as usize];
-        if area(f) > area(*at) {
+        if areas[f] > areas[*at] {
             *at = f;
         }
     }
-    let is_exposed_piece: Vec<bool> = (0..all.faces.len())
+    let pieces = (0..faces.len()).filter(|&f| roots[f] as usize == f && !is_seam[f]).count();
+    let is_exposed_piece: Vec<bool> = (0..faces.len())
         .map(|piece| {
-            let [a, b, c] = all.corners(largest[piece]);
+            if roots[piece] as usize != piece || is_seam[piece] {
+                return false;
+            }
+            let face = faces[largest[piece]];
+            let [a, b, c] = all.corners(face);
             let centre = scale(add(add(a, b), c), 1.0 / 3.0);
-            let before = add_scaled(centre, LOOK_OUT, normalized(all.normal(largest[piece])));
-            roots[piece] as usize == piece && !is_seam[piece] && all.winding_number(before) == 0
+            let before = add_scaled(centre, LOOK_OUT, normalized(all.normal(face)));
+            // A tree is not worth building for a few questions.
+            let number = match pieces <= FEW {
+                true => all.winding_number_of_all(before),
+                false => all.winding_number(before),
+            };
+            number == 0
         })
         .collect();
     roots.iter().map(|&piece| is_exposed_piece[piece as usize]).collect()
@@ -162,7 +197,8 @@ fn find(root: &mut [u32], mut face: u32) -> u32 {
 struct Crossings {
     positions: Vec<[f64; 3]>,
     faces: Vec<[u32; 3]>,
-    bvh: Bvh,
+    /// Built at first use.
+    bvh: OnceLock<Bvh>,
 }
 
 impl std::fmt::Debug for Crossings {
@@ -173,31 +209,38 @@ impl std::fmt::Debug for Crossings {
 
 impl Crossings {
     fn new(positions: Vec<[f64; 3]>, faces: Vec<[u32; 3]>) -> Self {
-        let boxes: Vec<_> =
-            faces.iter().map(|face| triangle_box(face.map(|v| positions[v as usize]))).collect();
-        Self { positions, faces, bvh: Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes) }
+        Self { positions, faces, bvh: OnceLock::new() }
     }
 
-    fn corners(&self, face: usize) -> [[f64; 3]; 3] {
-        self.faces[face].map(|v| self.positions[v as usize])
+    fn corners(&self, face: [u32; 3]) -> [[f64; 3]; 3] {
+        face.map(|v| self.positions[v as usize])
     }
 
     /// Normal, twice the area long.
-    fn normal(&self, face: usize) -> [f64; 3] {
+    fn normal(&self, face: [u32; 3]) -> [f64; 3] {
         let [a, b, c] = self.corners(face);
         cross(sub(b, a), sub(c, a))
     }
 
     fn winding_number(&self, p: [f64; 3]) -> i32 {
+        let bvh = self.bvh.get_or_init(|| {
+            let boxes: Vec<_> = self.faces.iter().map(|face| triangle_box(self.corners(*face))).collect();
+            Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes)
+        });
         let meets = |low: [f64; 3], high: [f64; 3]| {
             high[0] >= p[0] && (1..3).all(|k| low[k] <= p[k] && p[k] <= high[k])
         };
-        let leaves = self.bvh.leaves(|node| meets(node.mins().to_array(), node.maxs().to_array()));
-        leaves.map(|face| self.crossing(face as usize, p)).sum()
+        let leaves = bvh.leaves(|node| meets(node.mins().to_array(), node.maxs().to_array()));
+        leaves.map(|face| self.crossing(self.faces[face as usize], p)).sum()
+    }
+
+    /// The same without a tree.
+    fn winding_number_of_all(&self, p: [f64; 3]) -> i32 {
+        self.faces.iter().map(|face| self.crossing(*face, p)).sum()
     }
 
     /// 1 where the ray from `p` leaves through `face`, −1 where it enters, 0 where it misses.
-    fn crossing(&self, face: usize, p: [f64; 3]) -> i32 {
+    fn crossing(&self, face: [u32; 3], p: [f64; 3]) -> i32 {
         let corners = self.corners(face);
         // The winding number of the projected triangle: its edges past y = p.y, seen from p.
         let turns: i32 = (0..3)
@@ -257,6 +300,7 @@ mod tests {
         for p in points(500, 3).into_iter().chain([[0.1; 3], [0.12, 0.09, 0.1]]) {
             let expected = brute_force::winding_number(mesh.positions(), mesh.faces(), p).round() as i32;
             assert_eq!(crossings.winding_number(p), expected);
+            assert_eq!(crossings.winding_number_of_all(p), expected);
             seen[expected as usize] += 1;
         }
         assert!(seen.iter().all(|&n| n > 0), "{seen:?}");
@@ -295,6 +339,33 @@ mod tests {
             }
         }
         assert!(jumps_of_the_closest_point > 50, "{jumps_of_the_closest_point}");
+    }
+
+    #[test]
+    fn a_part_answers_as_the_whole_does_near_it() {
+        let mesh = balls();
+        let (positions, faces) = (mesh.positions(), mesh.faces());
+        let whole = UnionDistance::new(positions.to_vec(), faces);
+        let is_part = |f: u32| faces[f as usize].iter().any(|&v| positions[v as usize][0] > 0.1);
+        let seams = self_triangle_pairs(positions, faces);
+        let part = UnionDistance::of_part(positions.to_vec(), faces, is_part, &seams);
+        assert!(part.buried() > 0 && part.buried() < whole.buried());
+        let mut asked = 0;
+        for p in points(400, 17).into_iter().filter(|p| p[0] > 0.2) {
+            let (a, is_inside) = whole.project(p).unwrap();
+            // The part is all there is in reach.
+            if a.distance_squared.sqrt() < p[0] - 0.1 {
+                let (b, is_inside_part) = part.project(p).unwrap();
+                assert_eq!((a.position, is_inside), (b.position, is_inside_part));
+                // Which face may be either of two, on an edge.
+                assert!(is_part(part.kept_face(b.face)));
+                asked += 1;
+            }
+        }
+        assert!(asked > 50, "{asked}");
+        let judged = |f: &u32| is_part(*f) && whole.sides()[*f as usize] == FaceSide::Buried;
+        let buried = (0..faces.len() as u32).filter(judged);
+        assert!(buried.into_iter().all(|f| part.sides()[f as usize] == FaceSide::Buried));
     }
 
     #[test]

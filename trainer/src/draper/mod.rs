@@ -22,6 +22,7 @@
 
 mod acceleration;
 mod error;
+mod networked;
 mod outfit;
 pub mod output;
 mod refine;
@@ -41,22 +42,20 @@ pub use smooth::{Smoothing, smooth};
 pub use source::{Closet, SourceGarment};
 
 use crate::checkpoint::TrainedModel;
-use crate::config::PoseEncoding;
 use crate::device::Backend;
-use crate::drape::{body_tensors, drape_on};
-use crate::evaluate::equilibrium_error::{self, ReferenceScene, skinning_transforms};
-use crate::scene::{
-    ActiveJoints, BodyDraw, Dresser, LibraryError, PreparedScene, Recipe, SceneDraw, load_body,
-};
+use crate::evaluate::equilibrium_error::ReferenceScene;
+use crate::scene::{ActiveJoints, LibraryError, Recipe, load_body};
 use burn::tensor::Device;
-use clothcombo_data::asset::rotation::{Matrix3, apply, matrix_from_axis_angle};
 use clothcombo_data::asset::{Body, Pose};
 use clothcombo_data::cache::{ArrayCache, Key, body_key};
 use clothcombo_model::ClothCombo;
 use clothcombo_physics::Surface;
-use clothcombo_physics::contact::resolve::{Layer, ResolveSettings, certify, resolve};
-use clothcombo_physics::equilibrium::Transform;
-use clothcombo_physics::vec3::add;
+use clothcombo_physics::contact::resolve::{
+    Layer, Reached, ResolveSettings, Resolved, Waypoint, certify, resolve_after, resolve_along,
+};
+use clothcombo_physics::transform::Transform;
+use clothcombo_physics::vec3::{add_scaled, sub};
+use networked::Networked;
 use outfit::KnownGarments;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -232,46 +231,39 @@ impl Draper {
     /// # Errors
     /// When shape or pose do not fit the body model, or the networks diverge.
     pub fn drape(&self, outfit: &Outfit, body: &BodyState) -> Result<Drape, DraperError> {
-        let mut milliseconds = PhaseTimes::default();
-        let clock = Instant::now();
-        let shape = self.checked_shape(&body.shape)?;
-        if body.pose.rotations.as_flattened().iter().chain(&body.place).any(|x| !x.is_finite()) {
-            return Err(DraperError::NotFinite { what: "pose" });
-        }
-        let posed = self.body().posed(&shape, &body.pose)?;
-        let mut surface = match &body.surface {
-            Some(given) => self.checked_surface(given)?.to_vec(),
-            None => posed.positions.iter().map(|p| add(*p, body.place)).collect(),
-        };
-        round(&mut surface);
-        let surface = Arc::new(Surface::new(surface, self.body().faces.clone()));
-        let (facing, heading) = body.pose.without_heading();
-        let (facing, yaw) = match self.trained.config.data.poses.remove_heading {
-            true => (facing, heading),
-            false => (body.pose.clone(), 0.0),
-        };
-        let scene = self.scene(outfit, BodyDraw { shape, pose: facing });
-        let (tensors, start) = body_tensors(&scene.bodies[0], &self.dimensions(), &self.device)?;
-        milliseconds.posing = elapsed(clock);
+        self.drape_frame(outfit, body, None)
+    }
 
-        let (drape, [draping, untangling]) =
-            drape_on(&self.model, &outfit.tensors, &outfit.embeddings, &tensors, start);
-        milliseconds.draping = 1e3 * draping.as_secs_f64();
-        milliseconds.untangling = 1e3 * untangling.as_secs_f64();
+    /// Drapes `outfit` on `body`, the next frame of a motion: the post-process carries on from the frame `before`, on its body,
+    /// where that is clear.
+    ///
+    /// # Errors
+    /// As [`drape`](Self::drape).
+    pub fn drape_after(
+        &self,
+        outfit: &Outfit,
+        body: &BodyState,
+        before: (&BodyState, &Drape),
+    ) -> Result<Drape, DraperError> {
+        self.drape_frame(outfit, body, Some(before))
+    }
 
-        // The body may be turned about the vertical: what the networks made turns with it, to where everything else happens.
-        let turn = matrix_from_axis_angle([0.0, yaw, 0.0]);
-        let transforms: Vec<Transform> =
-            skinning_transforms(&scene).iter().map(|t| turned(&turn, t, body.place)).collect();
-        let start = &scene.bodies[0].start;
-        let skinned: Vec<[f64; 3]> = transforms
-            .iter()
-            .zip(start)
-            .map(|(t, p)| equilibrium_error::apply(t, p.map(f64::from)))
-            .collect();
-        let network: Vec<[f64; 3]> =
-            drape.layered.posed.iter().map(|p| add(apply(&turn, p.map(f64::from)), body.place)).collect();
-        outfit.check_finite(&network)?;
+    fn drape_frame(
+        &self,
+        outfit: &Outfit,
+        body: &BodyState,
+        last: Option<(&BodyState, &Drape)>,
+    ) -> Result<Drape, DraperError> {
+        let Networked {
+            scene,
+            surface,
+            heading,
+            transforms,
+            skinned,
+            network,
+            milliseconds: [posing, draping, untangling],
+        } = self.networked(outfit, body)?;
+        let mut milliseconds = PhaseTimes { posing, draping, untangling, ..PhaseTimes::default() };
 
         let clock = Instant::now();
         let (before, refinement) = match self.settings.refine {
@@ -289,7 +281,12 @@ impl Draper {
         let parts = outfit.split(&before);
         let (resolved, times) = match self.settings.resolve {
             true => {
-                let done = resolve(&surface, &outfit.layers(&parts), &self.settings.post_process)?;
+                let at_the_end = || Waypoint {
+                    body: Surface::new(surface.positions.clone(), surface.faces.clone()),
+                    draped: parts.iter().map(|p| p.to_vec()).collect(),
+                    transforms: transforms.clone(),
+                };
+                let done = self.resolved(outfit, body, last, &surface, &parts, &at_the_end)?;
                 (done.positions, done.garments.iter().map(|g| 1e3 * g.time.as_secs_f64()).collect())
             }
             false => (parts.iter().map(|p| p.to_vec()).collect(), vec![0.0; parts.len()]),
@@ -325,47 +322,38 @@ impl Draper {
         Ok(drape)
     }
 
+    /// The post-process, from the `last` frame on if there is one and it is clear.
+    fn resolved(
+        &self,
+        outfit: &Outfit,
+        body: &BodyState,
+        last: Option<(&BodyState, &Drape)>,
+        surface: &Surface<f64>,
+        parts: &[&[[f64; 3]]],
+        at_the_end: &dyn Fn() -> Waypoint,
+    ) -> Result<Resolved, DraperError> {
+        let (layers, settings) = (outfit.layers(parts), &self.settings.post_process);
+        if let Some((state, drape)) = last.filter(|(_, drape)| drape.certificate.is_clear()) {
+            let between = |share: f64| match share {
+                1.0 => Ok(at_the_end()),
+                _ => {
+                    let place = add_scaled(state.place, share, sub(body.place, state.place));
+                    self.stage(outfit, body, state.pose.between(&body.pose, share), place)
+                }
+            };
+            if let Some(done) = resolve_after(drape.reached(), surface, &layers, settings, between)? {
+                return Ok(done);
+            }
+        }
+        let from_t_pose = |share: f64| match share {
+            1.0 => Ok(at_the_end()),
+            _ => self.stage(outfit, body, body.pose.on_the_way(share), body.place),
+        };
+        resolve_along(surface, &layers, settings, from_t_pose)
+    }
+
     fn dimensions(&self) -> clothcombo_model::Dimensions {
         self.trained.state.dimensions()
-    }
-
-    fn scene(&self, outfit: &Outfit, body: BodyDraw) -> PreparedScene {
-        let encoding: PoseEncoding = self.trained.config.data.poses.encoding;
-        let dresser = Dresser {
-            body: self.body(),
-            joints: &self.joints,
-            features: &|pose, joints| encoding.features(pose, joints),
-            losses: &self.trained.config.losses,
-        };
-        let draw = SceneDraw { garments: (0..outfit.pieces.len()).collect(), bodies: vec![body] };
-        let mut scene = dresser.dress(draw, outfit.worn(), 1.0);
-        // A body with fewer components than the networks know has the others at their mean.
-        scene.bodies[0].shape.resize(self.trained.state.shape_count, 0.0);
-        scene
-    }
-
-    fn checked_shape(&self, shape: &[f64]) -> Result<Vec<f64>, DraperError> {
-        if shape.iter().any(|x| !x.is_finite()) {
-            return Err(DraperError::NotFinite { what: "shape" });
-        }
-        let mut shape = shape.to_vec();
-        let count = self.body().shape_count;
-        // Longer ones are refused by the body, by name.
-        if shape.len() < count {
-            shape.resize(count, 0.0);
-        }
-        Ok(shape)
-    }
-
-    fn checked_surface<'a>(&self, surface: &'a [[f64; 3]]) -> Result<&'a [[f64; 3]], DraperError> {
-        let (found, expected) = (surface.len(), self.body().vertex_count());
-        if found != expected {
-            return Err(DraperError::Surface { body: self.body().name.clone(), found, expected });
-        }
-        match surface.as_flattened().iter().all(|x| x.is_finite()) {
-            true => Ok(surface),
-            false => Err(DraperError::NotFinite { what: "posed body" }),
-        }
     }
 }
 
@@ -374,6 +362,16 @@ impl Drape {
     fn surface(&self, draper: &Draper) -> Arc<Surface<f64>> {
         let make = || Arc::new(Surface::new(self.body.clone(), draper.body().faces.clone()));
         self.surface.clone().unwrap_or_else(make)
+    }
+
+    /// Where the next frame starts.
+    fn reached(&self) -> Reached {
+        let garments = || self.garments.iter();
+        Reached {
+            draped: garments().map(|g| g.before.clone()).collect(),
+            positions: garments().map(|g| g.positions.clone()).collect(),
+            transforms: garments().flat_map(|g| g.transforms.iter().copied()).collect(),
+        }
     }
 
     /// Drops what can be made again at any time: some megabytes, which add up over the frames of a motion.
@@ -422,14 +420,4 @@ fn load_model_body(trained: &TrainedModel, named: Option<&str>) -> Result<Body, 
 
 fn elapsed(clock: Instant) -> f64 {
     1e3 * clock.elapsed().as_secs_f64()
-}
-
-/// `turn` after `transform`, then a move to `place`.
-fn turned(turn: &Matrix3, transform: &Transform, place: [f64; 3]) -> Transform {
-    std::array::from_fn(|r| {
-        std::array::from_fn(|c| {
-            let value: f64 = (0..3).map(|k| turn[r][k] * transform[k][c]).sum();
-            if c == 3 { value + place[r] } else { value }
-        })
-    })
 }

@@ -2,7 +2,8 @@
 
 use super::error::DraperError;
 use clothcombo_physics::energy::SceneEnergy;
-use clothcombo_physics::equilibrium::{Problem, SolverSettings, Transform, solve};
+use clothcombo_physics::equilibrium::{Problem, SolverSettings, solve};
+use clothcombo_physics::transform::Transform;
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 

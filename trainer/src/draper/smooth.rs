@@ -5,16 +5,13 @@
 //! frame as it was, less of the smoothing is applied, and none if need be.
 
 use super::{Drape, Draper, DraperError, Outfit};
-use clothcombo_physics::equilibrium::Transform;
-use clothcombo_physics::vec3::{add, cross, dot, scale, sub};
+use clothcombo_physics::transform::{into_frame, out_of_frame};
+use clothcombo_physics::vec3::{add, scale, sub};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Shares of the smoothing that are tried, in this order.
 const SHARES: [f64; 3] = [1.0, 0.5, 0.25];
-
-/// Linear parts with a smaller determinant cannot be undone: there, offsets are smoothed as they stand.
-const SMALLEST_DETERMINANT: f64 = 1e-3;
 
 /// What smoothing did.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -79,7 +76,9 @@ fn smoothed_frame(
         .map(|(g, garment)| {
             let mean = averaged(offsets, g, frame, weights);
             let vertices = garment.skinned.iter().zip(&garment.transforms).zip(mean);
-            vertices.map(|((start, transform), offset)| add(*start, out_of(transform, offset))).collect()
+            vertices
+                .map(|((start, transform), offset)| add(*start, out_of_frame(transform, offset)))
+                .collect()
         })
         .collect();
     for (number, share) in SHARES.into_iter().enumerate() {
@@ -132,36 +131,9 @@ fn averaged(offsets: &[Vec<Vec<[f64; 3]>>], garment: usize, frame: usize, weight
 fn local_offsets(drape: &Drape) -> Vec<Vec<[f64; 3]>> {
     let of = |garment: &super::GarmentDrape| {
         let vertices = garment.positions.iter().zip(&garment.skinned).zip(&garment.transforms);
-        vertices.map(|((p, start), transform)| into(transform, sub(*p, *start))).collect()
+        vertices.map(|((p, start), transform)| into_frame(transform, sub(*p, *start))).collect()
     };
     drape.garments.iter().map(of).collect()
-}
-
-fn columns(t: &Transform) -> [[f64; 3]; 3] {
-    std::array::from_fn(|c| [t[0][c], t[1][c], t[2][c]])
-}
-
-fn is_regular(t: &Transform) -> bool {
-    let [a, b, c] = columns(t);
-    dot(a, cross(b, c)).abs() >= SMALLEST_DETERMINANT
-}
-
-/// `A⁻¹ v` of the linear part A.
-fn into(t: &Transform, v: [f64; 3]) -> [f64; 3] {
-    if !is_regular(t) {
-        return v;
-    }
-    let [a, b, c] = columns(t);
-    let determinant = dot(a, cross(b, c));
-    [dot(v, cross(b, c)), dot(a, cross(v, c)), dot(a, cross(b, v))].map(|x| x / determinant)
-}
-
-/// `A v`.
-fn out_of(t: &Transform, v: [f64; 3]) -> [f64; 3] {
-    if !is_regular(t) {
-        return v;
-    }
-    t.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
 }
 
 #[cfg(test)]
@@ -169,15 +141,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn local_offsets_come_back_and_weights_are_binomial() {
+    fn weights_are_binomial() {
         assert_eq!(binomial(2), [1.0, 4.0, 6.0, 4.0, 1.0]);
-        let t = [[0.9, 0.1, -0.2, 3.0], [0.0, 1.1, 0.3, 1.0], [0.2, 0.0, 0.8, -2.0]];
-        let v = [0.3, -0.2, 0.7];
-        for (a, b) in into(&t, out_of(&t, v)).iter().zip(v) {
-            assert!((a - b).abs() < 1e-14);
-        }
-        let flat = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0; 4]];
-        assert_eq!(out_of(&flat, into(&flat, v)), v);
     }
 
     #[test]

@@ -1,36 +1,101 @@
 //! What the post-process makes of random outfits.
 
-use super::equilibrium_error::{apply, skinning_transforms};
-use crate::scene::PreparedScene;
+use super::equilibrium_error::skinning_transforms;
+use crate::config::LossesConfig;
+use crate::drape::{DrapeError, Networks};
+use crate::scene::{Library, PreparedScene, prepare};
 use clothcombo_physics::contact::resolve::{
-    Certificate, Layer, ResolveError, ResolveSettings, Resolved, RestGarment, certify, resolve,
+    Certificate, Layer, ResolveError, ResolveSettings, Resolved, RestGarment, Waypoint, certify,
+    resolve_along,
 };
 use clothcombo_physics::contact::{OrderViolations, order_violations};
 use clothcombo_physics::query::Surface;
+use clothcombo_physics::transform::apply;
+use miette::Diagnostic;
 use serde::Serialize;
+use std::cell::RefCell;
 use std::collections::HashMap;
 use std::sync::Arc;
+use thiserror::Error;
 
-/// The constants of garments that the post-process needs, made once per garment.
-#[derive(Default)]
-pub struct RestGarments {
-    known: HashMap<usize, Arc<RestGarment>>,
+/// Why a drape cannot be post-processed.
+#[derive(Debug, Error, Diagnostic)]
+pub enum PostProcessError {
+    /// A pose on the way cannot be draped.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Drape(#[from] DrapeError),
+    /// The drape is no valid scene.
+    #[error(transparent)]
+    Resolve(#[from] ResolveError),
 }
 
-impl RestGarments {
-    /// Those of a scene.
-    pub fn of(&mut self, scene: &PreparedScene) -> Vec<Arc<RestGarment>> {
+/// What the post-process needs besides a drape: the data, who drapes other poses, and constants of garments.
+pub struct Dressing<'a> {
+    library: &'a Library,
+    losses: &'a LossesConfig,
+    networks: Option<&'a Networks<'a>>,
+    known: RefCell<HashMap<usize, Arc<RestGarment>>>,
+}
+
+impl<'a> Dressing<'a> {
+    /// For scenes of `library`, draped by `networks`; without them by skinning.
+    pub fn new(library: &'a Library, losses: &'a LossesConfig, networks: Option<&'a Networks<'a>>) -> Self {
+        Self { library, losses, networks, known: RefCell::default() }
+    }
+
+    /// A drape of `scene` from the packed positions of all garments on its first body.
+    pub fn of<'s>(&'s self, scene: &'s PreparedScene, packed: &[[f32; 3]]) -> DrapedScene<'s> {
+        let mut known = self.known.borrow_mut();
         let worn = scene.draw.garments.iter().zip(&scene.worn);
-        let known = &mut self.known;
-        worn.map(|(&g, worn)| {
+        let rest = worn.map(|(&g, worn)| {
             known.entry(g).or_insert_with(|| Arc::new(RestGarment::new(&worn.garment.rest))).clone()
+        });
+        DrapedScene {
+            dressing: self,
+            scene,
+            body: scene.exact_body(),
+            garments: rest.collect(),
+            positions: wide(scene, packed),
+        }
+    }
+
+    /// Packed positions of `scene` as they are draped.
+    ///
+    /// # Errors
+    /// When the networks do not take it.
+    pub fn drape(&self, scene: &PreparedScene) -> Result<Vec<[f32; 3]>, DrapeError> {
+        match self.networks {
+            Some(networks) => Ok(networks.drape(scene)?.layered.posed),
+            None => Ok(skinned(scene)),
+        }
+    }
+
+    /// `scene` on the way from the T-pose.
+    fn stage(&self, scene: &PreparedScene, share: f64) -> Result<Waypoint, PostProcessError> {
+        let mut draw = scene.draw.clone();
+        for body in &mut draw.bodies {
+            body.pose = body.pose.on_the_way(share);
+        }
+        let scene = prepare(self.library, self.losses, draw, 1.0).map_err(DrapeError::from)?;
+        Ok(Waypoint {
+            body: scene.exact_body(),
+            draped: wide(&scene, &self.drape(&scene)?),
+            transforms: skinning_transforms(&scene),
         })
-        .collect()
     }
 }
 
+/// Packed positions per garment.
+fn wide(scene: &PreparedScene, packed: &[[f32; 3]]) -> Vec<Vec<[f64; 3]>> {
+    let wide = |part: &[[f32; 3]]| part.iter().map(|p| p.map(f64::from)).collect();
+    scene.parts(packed).into_iter().map(wide).collect()
+}
+
 /// A scene's body and garments as the post-process takes them.
-pub struct DrapedScene {
+pub struct DrapedScene<'a> {
+    dressing: &'a Dressing<'a>,
+    scene: &'a PreparedScene,
     /// The posed body.
     pub body: Surface<f64>,
     /// Constants of the garments, inner → outer.
@@ -39,25 +104,19 @@ pub struct DrapedScene {
     pub positions: Vec<Vec<[f64; 3]>>,
 }
 
-impl DrapedScene {
-    /// From the packed positions of all garments of `scene` on its first body.
-    pub fn new(scene: &PreparedScene, garments: Vec<Arc<RestGarment>>, packed: &[[f32; 3]]) -> Self {
-        let wide = |part: &[[f32; 3]]| part.iter().map(|p| p.map(f64::from)).collect();
-        let positions = scene.parts(packed).into_iter().map(wide).collect();
-        Self { body: scene.exact_body(), garments, positions }
-    }
-
+impl DrapedScene<'_> {
     fn layers<'a>(&'a self, positions: &'a [Vec<[f64; 3]>]) -> Vec<Layer<'a>> {
         let pairs = self.garments.iter().zip(positions);
         pairs.map(|(garment, positions)| Layer { garment, positions }).collect()
     }
 
-    /// Resolves it.
+    /// Resolves it, if need be on a way from the T-pose.
     ///
     /// # Errors
-    /// When it is no valid scene.
-    pub fn resolved(&self, settings: &ResolveSettings) -> Result<Resolved, ResolveError> {
-        resolve(&self.body, &self.layers(&self.positions), settings)
+    /// When it is no valid scene, or another pose cannot be draped.
+    pub fn resolved(&self, settings: &ResolveSettings) -> Result<Resolved, PostProcessError> {
+        let stage_at = |share: f64| self.dressing.stage(self.scene, share);
+        resolve_along(&self.body, &self.layers(&self.positions), settings, stage_at)
     }
 
     /// What crosses before anything is done.
@@ -83,7 +142,7 @@ impl DrapedScene {
 }
 
 /// Linear blend skinning of the start state on the host, packed: what the networks start from.
-pub fn skinned(scene: &PreparedScene) -> Vec<[f32; 3]> {
+fn skinned(scene: &PreparedScene) -> Vec<[f32; 3]> {
     let start = scene.bodies[0].start.iter().map(|p| p.map(f64::from));
     skinning_transforms(scene).iter().zip(start).map(|(t, p)| apply(t, p).map(|x| x as f32)).collect()
 }
@@ -154,8 +213,10 @@ pub struct OutfitResult {
     pub largest_move_mm: f64,
     /// Share of vertices that moved.
     pub moved: f64,
-    /// Rounds per garment.
+    /// Rounds per garment, in the last step.
     pub rounds: Vec<usize>,
+    /// Steps from the T-pose that were tried; 0 where the drape could be mended as it was.
+    pub steps: usize,
     /// Time per garment [ms].
     pub milliseconds: Vec<f64>,
     /// Time to prepare the body, once for all garments [ms].
@@ -165,16 +226,16 @@ pub struct OutfitResult {
 }
 
 impl OutfitResult {
-    /// Resolves `draped`, a drape of `scene`.
+    /// Resolves `draped`.
     ///
     /// # Errors
-    /// When it is no valid scene.
+    /// When it is no valid scene, or another pose cannot be draped.
     pub fn new(
         draw: usize,
-        scene: &PreparedScene,
-        draped: &DrapedScene,
+        draped: &DrapedScene<'_>,
         settings: &ResolveSettings,
-    ) -> Result<(Self, Resolved), ResolveError> {
+    ) -> Result<(Self, Resolved), PostProcessError> {
+        let scene = draped.scene;
         let before = Counts::new(&draped.certificate()?, draped.order_by_vertices(&draped.positions));
         let resolved = draped.resolved(settings)?;
         let works = &resolved.garments;
@@ -191,6 +252,7 @@ impl OutfitResult {
             largest_move_mm: 1e3 * works.iter().map(|w| w.largest_move).fold(0.0, f64::max),
             moved: moved as f64 / vertices.iter().sum::<usize>().max(1) as f64,
             rounds: works.iter().map(|w| w.rounds).collect(),
+            steps: resolved.steps,
             milliseconds: works.iter().map(|w| ms(w.time)).collect(),
             body_milliseconds: ms(resolved.body_time),
             certificate_milliseconds: ms(resolved.certificate_time),

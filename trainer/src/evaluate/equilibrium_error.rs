@@ -13,10 +13,11 @@ use clothcombo_physics::energy::{
     EnergyError, EnergySettings, GarmentEnergies, SceneEnergy, SceneGarment, SceneLayers,
 };
 use clothcombo_physics::equilibrium::{
-    EquilibriumError, Problem, Progress, Solution, SolverSettings, Stop, Transform, solve,
+    EquilibriumError, Problem, Progress, Solution, SolverSettings, Stop, solve,
 };
 use clothcombo_physics::mesh::Topology;
 use clothcombo_physics::query::{Distance, Surface};
+use clothcombo_physics::transform::{Transform, apply};
 use serde::Serialize;
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -251,8 +252,4 @@ fn blended(weights: &[f32], bones: &[Transform]) -> Transform {
         }
     }
     sum
-}
-
-pub(crate) fn apply(t: &Transform, p: [f64; 3]) -> [f64; 3] {
-    t.map(|[a, b, c, d]| a * p[0] + b * p[1] + c * p[2] + d)
 }

@@ -3,7 +3,7 @@
 use super::subject::Subject;
 use super::table::{Table, number, percent};
 use crate::drape::DrapeError;
-use crate::evaluate::certificates::{DrapedScene, OutfitResult, RestGarments};
+use crate::evaluate::certificates::{Dressing, OutfitResult};
 use crate::evaluate::hard_poses;
 use crate::scene::{BodyDraw, SceneDraw, Unseen, draw_study};
 use clothcombo_data::asset::Pose;
@@ -93,7 +93,7 @@ fn measure(
     let all: Vec<usize> = (0..subject.library.wardrobe.len()).collect();
     let networks = subject.networks();
     let settings = ResolveSettings::default();
-    let mut rest = RestGarments::default();
+    let dressing = Dressing::new(&subject.library, &subject.config.losses, Some(&networks));
     let (mut ratios, mut depths) = (Vec::new(), Vec::new());
     let mut found = Extreme {
         case: case.name.clone(),
@@ -141,8 +141,8 @@ fn measure(
             .zip(&skinned.posed)
             .map(|(a, b)| (0..3).map(|axis| f64::from(a[axis] - b[axis]).powi(2)).sum::<f64>().sqrt());
         found.farthest_mm = moved.map(|m| 1e3 * m).fold(found.farthest_mm, f64::max);
-        let draped = DrapedScene::new(&scene, rest.of(&scene), &draped.posed);
-        match OutfitResult::new(index, &scene, &draped, &settings) {
+        let draped = dressing.of(&scene, &draped.posed);
+        match OutfitResult::new(index, &draped, &settings) {
             Ok((result, _)) => {
                 found.clear += f64::from(u8::from(result.after.is_clear())) / scenes as f64;
                 depths.push(result.after.max_depth_mm);

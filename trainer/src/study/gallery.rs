@@ -3,14 +3,14 @@
 use super::subject::Subject;
 use crate::drape::Networks;
 use crate::evaluate::Draped;
-use crate::evaluate::certificates::{DrapedScene, RestGarments};
+use crate::evaluate::certificates::Dressing;
 use crate::picture::{LegendEntry, Sheet, SheetRow, View, layer_colour};
 use crate::samples::picture_of;
 use crate::scene::{BodyDraw, SceneDraw, Unseen, draw_study};
 use clothcombo_data::asset::{Category, Pose};
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use image::RgbImage;
-use miette::{IntoDiagnostic, Report};
+use miette::Report;
 
 /// A picture and what it shows.
 pub struct Picture {
@@ -29,8 +29,8 @@ const COLUMNS: usize = 5;
 
 struct Studio<'a> {
     subject: &'a Subject,
-    networks: Networks<'a>,
-    rest: RestGarments,
+    networks: &'a Networks<'a>,
+    dressing: Dressing<'a>,
     question: usize,
 }
 
@@ -39,8 +39,9 @@ struct Studio<'a> {
 /// # Errors
 /// When a scene cannot be draped or resolved.
 pub fn draw(subject: &Subject, question: usize, done: &(dyn Fn() + Sync)) -> Result<Vec<Picture>, Report> {
-    let mut studio =
-        Studio { subject, networks: subject.networks(), rest: RestGarments::default(), question };
+    let networks = &subject.networks();
+    let dressing = Dressing::new(&subject.library, &subject.config.losses, Some(networks));
+    let studio = Studio { subject, networks, dressing, question };
     let shirt = |n| subject.pick(&[Category::TShirt, Category::Top], n);
     let legs = |n| subject.pick(&[Category::Trousers, Category::Skirt], n);
     let skirt = |n| subject.pick(&[Category::Skirt, Category::Dress], n);
@@ -135,7 +136,7 @@ impl Studio<'_> {
 
     /// Outfits from left to right; seen from the front, then from the back. Where all of them hold the same garments a colour
     /// stands for a garment, otherwise for a layer.
-    fn sheet(&mut self, outfits: &[(Vec<usize>, BodyDraw)], columns: &[String]) -> Result<RgbImage, Report> {
+    fn sheet(&self, outfits: &[(Vec<usize>, BodyDraw)], columns: &[String]) -> Result<RgbImage, Report> {
         let mut rows = [View::ThreeQuarter, View::Back]
             .map(|view| SheetRow { label: view.name().to_owned(), ..SheetRow::default() });
         let longest = outfits.iter().map(|(garments, _)| garments).max_by_key(|garments| garments.len());
@@ -166,7 +167,7 @@ impl Studio<'_> {
 
     /// An outfit draped and resolved.
     fn views(
-        &mut self,
+        &self,
         garments: &[usize],
         body: &BodyDraw,
         colour: &dyn Fn(usize) -> [u8; 3],
@@ -174,9 +175,7 @@ impl Studio<'_> {
         let draw = SceneDraw { garments: garments.to_vec(), bodies: vec![body.clone()] };
         let scene = self.subject.prepare(draw)?;
         let draped = self.networks.drape(&scene)?.layered;
-        let resolved = DrapedScene::new(&scene, self.rest.of(&scene), &draped.posed)
-            .resolved(&ResolveSettings::default())
-            .into_diagnostic()?;
+        let resolved = self.dressing.of(&scene, &draped.posed).resolved(&ResolveSettings::default())?;
         let posed = resolved.positions.concat().into_iter().map(|p| p.map(|v| v as f32)).collect();
         let draped = Draped { posed, ..draped };
         Ok([View::ThreeQuarter, View::Back].map(|view| picture_of(&scene, &draped, view, colour)))

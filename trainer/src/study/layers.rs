@@ -4,7 +4,7 @@ use super::estimate::{Estimate, Ratio};
 use super::subject::Subject;
 use super::table::{Table, number, percent};
 use crate::drape::NetworkDrape;
-use crate::evaluate::certificates::{DrapedScene, OutfitResult, RestGarments};
+use crate::evaluate::certificates::{Dressing, OutfitResult};
 use crate::scene::{PreparedScene, Unseen, draw_study};
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use clothcombo_physics::energy::Term;
@@ -51,7 +51,7 @@ pub fn ask(
 ) -> Result<LayerCount, Report> {
     let all: Vec<usize> = (0..subject.library.wardrobe.len()).collect();
     let networks = subject.networks();
-    let mut rest = RestGarments::default();
+    let dressing = Dressing::new(&subject.library, &subject.config.losses, Some(&networks));
     let settings = ResolveSettings::default();
     let (mut single, mut layered) = (vec![Vec::new(); layers], vec![Vec::new(); layers]);
     let (mut wrong_single, mut results) = (Vec::new(), Vec::new());
@@ -64,10 +64,10 @@ pub fn ask(
             single[layer].push(alone);
             layered[layer].push(worn);
         }
-        let alone = DrapedScene::new(&scene, rest.of(&scene), &drape.single.posed);
+        let alone = dressing.of(&scene, &drape.single.posed);
         wrong_single.push(alone.certificate().into_diagnostic()?.order_violations);
-        let draped = DrapedScene::new(&scene, rest.of(&scene), &drape.layered.posed);
-        results.push(OutfitResult::new(index, &scene, &draped, &settings).into_diagnostic()?.0);
+        let draped = dressing.of(&scene, &drape.layered.posed);
+        results.push(OutfitResult::new(index, &draped, &settings)?.0);
         done();
     }
     let over = |f: &dyn Fn(&OutfitResult) -> f64| Estimate::of(&results.iter().map(f).collect::<Vec<_>>());

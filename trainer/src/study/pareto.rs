@@ -4,7 +4,7 @@ use super::estimate::Estimate;
 use super::subject::Subject;
 use super::table::{Table, number};
 use crate::draper::refine;
-use crate::evaluate::certificates::{DrapedScene, RestGarments};
+use crate::evaluate::certificates::Dressing;
 use crate::evaluate::equilibrium_error::{ReferenceScene, mean_distance};
 use crate::measure::median_ms;
 use crate::picture::{Line, LinePanel};
@@ -136,11 +136,11 @@ fn fast_methods(subject: &Subject, scene: &PreparedScene) -> Result<Vec<State>, 
     // The garment is embedded in the first, unmeasured drape, as for the next frame of a motion.
     let network_ms = median_ms(SECONDS, || networks.drape(scene))?;
     let draped = networks.drape(scene)?.layered;
-    let mut rest = RestGarments::default();
-    let before = DrapedScene::new(scene, rest.of(scene), &draped.posed);
+    let dressing = Dressing::new(&subject.library, &subject.config.losses, Some(&networks));
+    let before = dressing.of(scene, &draped.posed);
     let settings = ResolveSettings::default();
-    let post_ms = median_ms(SECONDS, || before.resolved(&settings)).into_diagnostic()?;
-    let mut resolved = before.resolved(&settings).into_diagnostic()?.positions;
+    let post_ms = median_ms(SECONDS, || before.resolved(&settings))?;
+    let mut resolved = before.resolved(&settings)?.positions;
     let resolved = resolved.pop().ok_or_else(|| miette!("a scene without a garment"))?;
     Ok(vec![
         state("LBS of rest", rest_ms, wide(&networks.skin_rest(scene)?.posed)),

@@ -4,7 +4,7 @@ use super::subject::Subject;
 use super::table::{Table, number};
 use crate::drape::drape_on;
 use crate::evaluate::Spread;
-use crate::evaluate::certificates::{DrapedScene, RestGarments};
+use crate::evaluate::certificates::Dressing;
 use crate::scene::{Unseen, draw_study};
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use miette::{IntoDiagnostic, Report};
@@ -48,7 +48,8 @@ pub fn ask(
     done: &(dyn Fn() + Sync),
 ) -> Result<Times, Report> {
     let all: Vec<usize> = (0..subject.library.wardrobe.len()).collect();
-    let mut rest = RestGarments::default();
+    let networks = subject.networks();
+    let dressing = Dressing::new(&subject.library, &subject.config.losses, Some(&networks));
     let mut parts: [Vec<f64>; 5] = Default::default();
     let (mut vertices, mut garments) = (0, 0);
     // The first outfit warms up: buffers, threads, files.
@@ -68,8 +69,8 @@ pub fn ask(
         let embeddings = subject.model.prepare_untangling(&outfit, embeddings);
         let (body, start) = subject.tensors.body(&scene.bodies[0]).into_diagnostic()?;
         let (drape, [draping, untangling]) = drape_on(&subject.model, &outfit, &embeddings, &body, start);
-        let draped = DrapedScene::new(&scene, rest.of(&scene), &drape.layered.posed);
-        let resolved = draped.resolved(&ResolveSettings::default()).into_diagnostic()?;
+        let draped = dressing.of(&scene, &drape.layered.posed);
+        let resolved = draped.resolved(&ResolveSettings::default())?;
         let post: Duration = resolved.garments.iter().map(|g| g.time).sum();
         if index > 0 {
             let times = [embedding, ms(draping), ms(untangling), ms(post), ms(resolved.body_time) * count];

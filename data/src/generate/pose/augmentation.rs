@@ -1,9 +1,6 @@
 //! Variations of recorded poses: a thin collection of motion becomes a dense one.
 
 use super::limits::{JOINT_LIMITS, other_side};
-use crate::asset::rotation::{
-    axis_angle_from_quaternion, quaternion_conjugate, quaternion_from_axis_angle, quaternion_product,
-};
 use crate::asset::{BODY_JOINT_COUNT, Pose};
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
@@ -51,7 +48,7 @@ impl PoseAugmentation {
         let mut result = mirrored(pose, draws[0]);
         let other = mirrored(other, draws[1]);
         if draws[4] < self.interpolation {
-            result = between(&result, &other, draws[5]);
+            result = result.between(&other, draws[5]);
         }
         if draws[2] < self.limb_swap {
             let limbs = if draws[3] < 0.5 { LEGS } else { ARMS };
@@ -78,32 +75,13 @@ impl PoseAugmentation {
     }
 }
 
-/// The pose at `share` of the way from `a` to `b`. Joint vectors are mixed linearly, so that poses within the limits, which are
-/// boxes, stay within them; the root, which may face anywhere, turns the short way.
-fn between(a: &Pose, b: &Pose, share: f64) -> Pose {
-    let mut result = a.clone();
-    for (joint, rotation) in result.rotations.iter_mut().enumerate() {
-        let other = b.rotation(joint);
-        if joint == 0 {
-            let from = quaternion_from_axis_angle(*rotation);
-            let step = axis_angle_from_quaternion(quaternion_product(
-                quaternion_conjugate(from),
-                quaternion_from_axis_angle(other),
-            ));
-            let part = quaternion_from_axis_angle(step.map(|x| share * x));
-            *rotation = axis_angle_from_quaternion(quaternion_product(from, part));
-        } else {
-            *rotation = std::array::from_fn(|x| rotation[x] + share * (other[x] - rotation[x]));
-        }
-    }
-    result
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::{PoseSampler, is_within_limits};
     use super::*;
-    use crate::asset::rotation::matrix_from_axis_angle;
+    use crate::asset::rotation::{
+        matrix_from_axis_angle, quaternion_conjugate, quaternion_from_axis_angle, quaternion_product,
+    };
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
@@ -151,9 +129,9 @@ mod tests {
                     p.as_flattened().iter().zip(q.as_flattened()).all(|(x, y)| (x - y).abs() < 1e-9)
                 })
             };
-            assert!(close(&between(&a, &b, 0.0), &a) && close(&between(&a, &b, 1.0), &b));
-            let middle = between(&a, &b, 0.5);
-            assert!(close(&middle, &between(&b, &a, 0.5)));
+            assert!(close(&a.between(&b, 0.0), &a) && close(&a.between(&b, 1.0), &b));
+            let middle = a.between(&b, 0.5);
+            assert!(close(&middle, &b.between(&a, 0.5)));
             assert!((1..22).all(|j| {
                 (0..3).all(|x| {
                     (2.0 * middle.rotations[j][x] - a.rotations[j][x] - b.rotations[j][x]).abs() < 1e-12

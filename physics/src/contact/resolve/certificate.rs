@@ -3,7 +3,9 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::obstacle::{BodyObstacle, LayerObstacle};
+use super::near::near_cloth;
+use super::obstacle::{BodyObstacle, GaveWay, LayerObstacle};
+use super::relief::Relief;
 use super::{Layer, ResolveError, ResolveSettings};
 use crate::contact::triangle_pair::Triangle;
 use crate::contact::{TriangleTree, contours, self_contours};
@@ -101,9 +103,14 @@ impl Certificate {
         self.body_triangle_pairs + self.layer_triangle_pairs + self.self_triangle_pairs
     }
 
+    /// Pairs with the body and between garments that are not pinched.
+    pub fn between(&self) -> usize {
+        self.body_triangle_pairs + self.layer_triangle_pairs
+    }
+
     /// Whether no garment crosses the body or another garment, pinched regions left out.
     pub fn is_clear(&self) -> bool {
-        self.body_triangle_pairs + self.layer_triangle_pairs == 0
+        self.between() == 0
     }
 
     /// Notes the strain energy before the post-process [J].
@@ -119,7 +126,10 @@ impl Certificate {
 /// When positions do not fit their garment or are not finite, or the body has no surface.
 pub fn certify(body: &Surface<f64>, layers: &[Layer<'_>]) -> Result<Certificate, ResolveError> {
     super::check(body, layers)?;
-    Ok(certificate(&BodyObstacle::new(body), layers))
+    let near = near_cloth(&body.positions, &super::triangles(layers));
+    let relief = Relief::of(body, &near, layers.len());
+    let gave_way = relief.as_ref().map(GaveWay::NotYet);
+    Ok(certificate(&BodyObstacle::new(body, &near, gave_way), layers))
 }
 
 /// Less strain energy than this [J] is rounding of a garment in its rest shape.

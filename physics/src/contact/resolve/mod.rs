@@ -17,18 +17,25 @@
 //!    nothing gets better; the best state is taken.
 //! 5. **Certificate.** All pairs are counted again, from nothing, by the exact predicates.
 //!
-//! **Pinched regions**, where the body lies inside itself, are told apart by a stated rule: `BodyObstacle`.
+//! **Pinched regions**, where the body lies inside itself or leaves no room for cloth, are told apart by a stated rule:
+//! `BodyObstacle`. There the body gives way ([`relief`]).
+//!
+//! **Bent limbs.** Where crossings are left, [`resolve_along`] takes the garments from the T-pose, where their order is plain,
+//! step by step to the pose ([`follow`]).
 
 mod certificate;
 mod contact;
 mod detect;
 mod error;
 mod folds;
+mod follow;
 mod garment;
+mod near;
 mod obstacle;
 mod outfit;
 mod over;
 mod relax;
+mod relief;
 mod settings;
 #[cfg(test)]
 mod tests;
@@ -38,21 +45,24 @@ use std::time::{Duration, Instant};
 
 pub use certificate::{Certificate, Crossed, GarmentCertificate, PinchedPairs, RemainingPair, certify};
 pub use error::ResolveError;
+pub use follow::{Reached, Waypoint, resolve_after, resolve_along};
 pub use garment::{Layer, RestGarment};
 pub use settings::ResolveSettings;
 
 use crate::query::Surface;
 use crate::vec3;
 use certificate::certificate;
-use obstacle::BodyObstacle;
+use near::near_cloth;
+use obstacle::{BodyObstacle, GaveWay};
 use outfit::Outfit;
+use relief::Relief;
 use untangle::Untangling;
 
 /// Positions farther from the origin than this are refused [m]: the exact predicates would hold, but no distance would.
 const FARTHEST: f64 = 1e3;
 
 /// Garments that were resolved.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Resolved {
     /// New positions of every garment, `[V, 3]` [m], in the order given.
     pub positions: Vec<Vec<[f64; 3]>>,
@@ -60,6 +70,8 @@ pub struct Resolved {
     pub certificate: Certificate,
     /// What was done, per garment.
     pub garments: Vec<GarmentWork>,
+    /// Steps from the T-pose that were tried, by [`resolve_along`]; 0 where the drape could be mended as it was.
+    pub steps: usize,
     /// Time to prepare the body.
     pub body_time: Duration,
     /// Time for the certificate.
@@ -79,6 +91,20 @@ pub struct GarmentWork {
     pub time: Duration,
 }
 
+impl Resolved {
+    /// Tells moves and strain from `layers`, and that all of it took `time`.
+    fn compare(&mut self, layers: &[Layer<'_>], time: Duration) {
+        let count: usize = self.positions.iter().map(Vec::len).sum();
+        for ((work, layer), positions) in self.garments.iter_mut().zip(layers).zip(&self.positions) {
+            let moves = layer.positions.iter().zip(positions).map(|(p, q)| vec3::norm(vec3::sub(*q, *p)));
+            work.moved = moves.clone().filter(|m| *m > 0.0).count();
+            work.largest_move = moves.fold(0.0, f64::max);
+            work.time = time.mul_f64(positions.len() as f64 / count.max(1) as f64);
+        }
+        self.certificate.compare_strain(layers.iter().map(|l| l.garment.strain_energy(l.positions)).sum());
+    }
+}
+
 /// Takes `layers`, innermost first, out of `body` and out of each other. Deterministic for any number of threads (without a
 /// time limit in the settings); a clean input comes back to the bit.
 ///
@@ -93,28 +119,48 @@ pub fn resolve(
     settings.check()?;
     check(body, layers)?;
     let start = Instant::now();
-    let body = BodyObstacle::new(body);
+    let near = near_cloth(&body.positions, &triangles(layers));
+    let relief = Relief::of(body, &near, layers.len());
+    let gave_way = relief.as_ref().map(GaveWay::NotYet);
+    let judge = BodyObstacle::new(body, &near, gave_way);
+    let relieved = relief.as_ref().map(|r| r.obstacle(&near));
+    let body = relieved.as_ref().unwrap_or(&judge);
     let body_time = start.elapsed();
     let start = Instant::now();
-    let outfit = Outfit::new(layers);
-    let mut untangling = Untangling::new(&outfit, &body, settings);
-    let rounds = untangling.run();
-    let positions: Vec<Vec<[f64; 3]>> =
-        (0..outfit.len()).map(|g| outfit.part(&untangling.positions, g).to_vec()).collect();
+    let Untangled { positions, rounds, .. } = untangled(body, layers, settings);
     let time = start.elapsed();
-    let work = |g: usize| GarmentWork {
-        rounds,
-        moved: untangling.moved(g),
-        largest_move: untangling.largest_move(g),
-        time: time.mul_f64(positions[g].len() as f64 / outfit.vertex_count().max(1) as f64),
-    };
-    let garments = (0..outfit.len()).map(work).collect();
+    let work = GarmentWork { rounds, ..GarmentWork::default() };
     let start = Instant::now();
     let resolved: Vec<Layer> =
         layers.iter().zip(&positions).map(|(l, positions)| Layer { garment: l.garment, positions }).collect();
-    let mut certificate = certificate(&body, &resolved);
-    certificate.compare_strain(layers.iter().map(|l| l.garment.strain_energy(l.positions)).sum());
-    Ok(Resolved { positions, certificate, garments, body_time, certificate_time: start.elapsed() })
+    let certificate = certificate(&judge, &resolved);
+    let certificate_time = start.elapsed();
+    let garments = vec![work; layers.len()];
+    let mut resolved = Resolved { positions, certificate, garments, steps: 0, body_time, certificate_time };
+    resolved.compare(layers, time);
+    Ok(resolved)
+}
+
+/// What untangling left.
+#[derive(Default)]
+struct Untangled {
+    positions: Vec<Vec<[f64; 3]>>,
+    rounds: usize,
+    /// Pairs with the body and between garments.
+    crossings: usize,
+}
+
+fn untangled(body: &BodyObstacle<'_>, layers: &[Layer<'_>], settings: &ResolveSettings) -> Untangled {
+    let outfit = Outfit::new(layers);
+    let mut untangling = Untangling::new(&outfit, body, settings);
+    let rounds = untangling.run();
+    let positions = (0..outfit.len()).map(|g| outfit.part(&untangling.positions, g).to_vec()).collect();
+    Untangled { positions, rounds, crossings: untangling.crossings() }
+}
+
+/// Positions and faces of every garment.
+fn triangles<'a>(layers: &[Layer<'a>]) -> Vec<(&'a [[f64; 3]], &'a [[u32; 3]])> {
+    layers.iter().map(|l| (l.positions, l.garment.faces.as_slice())).collect()
 }
 
 /// Whether the input can be worked on.

@@ -2,10 +2,12 @@
 
 use super::RestGarment;
 use super::contact::{along_line, normal_of};
+use super::relief::Relief;
 use crate::contact::TriangleTree;
 use crate::mesh::vertex_normals;
-use crate::query::{ClosestPoint, FaceSide, Surface, SurfacePoint};
-use crate::vec3::{add_scaled, dot, norm, scale, sub};
+use crate::query::{ClosestPoint, FaceSide, Surface, SurfacePoint, UnionDistance};
+use crate::vec3::{add_scaled, dot, is_finite, norm, scale, sub};
+use std::sync::OnceLock;
 
 /// Below this distance [m] the direction from the closest point is rounding.
 const CONTACT: f64 = 1e-9;
@@ -39,39 +41,80 @@ pub(super) struct BodyView {
     pub plane: Option<Plane>,
 }
 
-/// The posed body.
+/// The posed body, as far as it is near cloth.
 ///
 /// **Pinched regions.** Where one part of the body lies inside another (an arm pressed into the torso), no cloth can be
 /// outside of both. The rule (after Baraff, Witkin and Kass, "Untangling cloth", 2003): faces inside another part of the
 /// body, the seams where parts cross, and the faces next to those are *pinched*. They push nothing, and what crosses them is
-/// counted apart. A vertex inside the body whose nearest face, of all, is pinched is left alone.
+/// counted apart. A vertex inside the body whose nearest face, of all, is pinched is left alone. To a certificate, faces that
+/// gave way to make room ([`Relief`]) are pinched too.
 pub(super) struct BodyObstacle<'a> {
-    surface: &'a Surface<f64>,
     pub tree: TriangleTree<'a>,
     is_pinched: Vec<bool>,
     has_pinched: bool,
+    /// Faces that are not where they are drawn.
+    gave_way: Vec<bool>,
+    nearest: Nearest,
+    /// All faces near cloth, and which they are; made when it is first asked.
+    all: OnceLock<(ClosestPoint, Vec<u32>)>,
+    surface: &'a Surface<f64>,
+    near: &'a [bool],
+}
+
+/// What a point asks for the surface.
+enum Nearest {
     /// Without a border inside and outside are known everywhere.
-    is_closed: bool,
+    Closed(UnionDistance),
+    Open,
+}
+
+/// What became of the vertices that gave way.
+#[derive(Clone, Copy)]
+pub(super) enum GaveWay<'a> {
+    /// They are where they were: the body as it is drawn, to be judged by.
+    NotYet(&'a Relief),
+    /// They moved: the body that garments have to stay out of.
+    Already(&'a Relief),
 }
 
 impl<'a> BodyObstacle<'a> {
-    pub fn new(surface: &'a Surface<f64>) -> Self {
+    /// `near`: vertices near cloth.
+    pub fn new(surface: &'a Surface<f64>, near: &'a [bool], gave_way: Option<GaveWay<'_>>) -> Self {
         let faces = &surface.faces;
-        let (tree, is_closed) =
-            rayon::join(|| TriangleTree::new(&surface.positions, faces), || is_closed(faces));
-        let mut is_pinched = vec![false; faces.len()];
-        if is_closed {
-            let sides = surface.union_distance().sides();
-            let mut touched = vec![false; surface.positions.len()];
-            for (face, _) in faces.iter().zip(sides).filter(|(_, side)| **side != FaceSide::Exposed) {
+        let is_part = |f: u32| faces[f as usize].iter().any(|&v| near[v as usize]);
+        let tree = TriangleTree::of_part(&surface.positions, faces, |f, _| is_part(f));
+        let nearest = match is_closed(faces) {
+            true => {
+                let seams = tree.self_pairs();
+                let positions = surface.positions.clone();
+                Nearest::Closed(UnionDistance::of_part(positions, faces, is_part, &seams))
+            }
+            false => Nearest::Open,
+        };
+        let touching = |touched: &[bool]| -> Vec<bool> {
+            faces.iter().map(|face| face.iter().any(|&v| touched[v as usize])).collect()
+        };
+        let mut touched = vec![false; surface.positions.len()];
+        if let Nearest::Closed(union) = &nearest {
+            for (face, _) in faces.iter().zip(union.sides()).filter(|(_, side)| **side != FaceSide::Exposed) {
                 face.iter().for_each(|&v| touched[v as usize] = true);
             }
-            for (pinched, face) in is_pinched.iter_mut().zip(faces.iter()) {
-                *pinched = face.iter().any(|&v| touched[v as usize]);
-            }
         }
+        let gave_way = match gave_way {
+            Some(GaveWay::NotYet(relief)) => {
+                touched.copy_from_slice(&relief.pinched);
+                Vec::new()
+            }
+            Some(GaveWay::Already(relief)) => {
+                // Where the body only meets itself because it gave way, it is to be respected as it was.
+                touched.iter_mut().zip(&relief.pinched).for_each(|(touched, was)| *touched &= was);
+                touching(&relief.gave_way)
+            }
+            None => Vec::new(),
+        };
+        let is_pinched = touching(&touched);
         let has_pinched = is_pinched.contains(&true);
-        Self { surface, tree, is_pinched, has_pinched, is_closed }
+        Self { tree, is_pinched, has_pinched, gave_way, nearest, all: OnceLock::new(), surface, near }
     }
 
     /// Whether face `f` is pinched.
@@ -79,19 +122,44 @@ impl<'a> BodyObstacle<'a> {
         self.is_pinched.get(f as usize).is_some_and(|p| *p)
     }
 
-    /// Whether the body's face nearest to `p` is pinched.
-    pub fn is_pinch(&self, p: [f64; 3]) -> bool {
-        self.has_pinched && self.surface.project(p).is_some_and(|found| self.is_pinched(found.face))
+    /// Whether face `f` is not where it is drawn: cloth that crosses it crosses nothing that is seen.
+    pub fn gave_way(&self, f: u32) -> bool {
+        self.gave_way.get(f as usize).is_some_and(|p| *p)
     }
 
+    /// The nearest of all faces near cloth, whatever the side, and its number.
+    fn nearest_of_all(&self, p: [f64; 3]) -> Option<(SurfacePoint, u32)> {
+        let (tree, part) = self.all.get_or_init(|| {
+            let faces = &self.surface.faces;
+            let is_part = |f: &u32| {
+                let face = faces[*f as usize];
+                face.iter().any(|&v| self.near[v as usize])
+                    // As ClosestPoint does.
+                    && face.iter().all(|&v| is_finite(self.surface.positions[v as usize]))
+            };
+            let part: Vec<u32> = (0..faces.len() as u32).filter(is_part).collect();
+            let part_faces: Vec<[u32; 3]> = part.iter().map(|&f| faces[f as usize]).collect();
+            (ClosestPoint::new(self.surface.positions.clone(), &part_faces), part)
+        });
+        tree.project(p).map(|found| (found, part[found.face as usize]))
+    }
+
+    /// Whether the body's face nearest to `p` is pinched.
+    pub fn is_pinch(&self, p: [f64; 3]) -> bool {
+        self.has_pinched && self.nearest_of_all(p).is_some_and(|(_, face)| self.is_pinched(face))
+    }
+
+    /// What the body is to a point; `None` where it is not near cloth.
     pub fn look(&self, p: [f64; 3]) -> Option<BodyView> {
-        let (found, is_inside, face) = if self.is_closed {
-            let union = self.surface.union_distance();
-            let (found, is_inside) = union.project(p)?;
-            (found, is_inside, union.kept_face(found.face))
-        } else {
-            let found = self.surface.project(p)?;
-            (found, dot(sub(p, found.position), found.normal) < 0.0, found.face)
+        let (found, is_inside, face) = match &self.nearest {
+            Nearest::Closed(union) => {
+                let (found, is_inside) = union.project(p)?;
+                (found, is_inside, union.kept_face(found.face))
+            }
+            Nearest::Open => {
+                let (found, face) = self.nearest_of_all(p)?;
+                (found, dot(sub(p, found.position), found.normal) < 0.0, face)
+            }
         };
         let far = found.distance_squared.sqrt();
         let distance = if is_inside { -far } else { far };
@@ -130,7 +198,7 @@ impl BodyObstacle<'_> {
 }
 
 /// Whether every edge has two faces.
-fn is_closed(faces: &[[u32; 3]]) -> bool {
+pub(super) fn is_closed(faces: &[[u32; 3]]) -> bool {
     let mut edges: Vec<[u32; 2]> = faces
         .iter()
         .flat_map(|f| (0..3).map(|k| [f[k].min(f[(k + 1) % 3]), f[k].max(f[(k + 1) % 3])]))

@@ -30,6 +30,9 @@ pub struct ResolveSettings {
     /// How many times wider both limits are in a second attempt, where crossings are left; its result is only taken if it ends
     /// with none. Default 6; 1 for no second attempt.
     pub loosened: f64,
+    /// Whether nothing lies deeper than half a limb, so that the nearest way out is the right one: true for a small step from a
+    /// state without crossings. Default no.
+    pub is_shallow: bool,
     /// Whether crossings of a garment with itself are mended where possible. Default yes.
     pub self_contact: bool,
     /// Most wall time, times the number of garments, looked at between rounds; a limit that is hit makes the result depend on the machine.
@@ -49,6 +52,7 @@ impl Default for ResolveSettings {
             farthest: 0.06,
             stretch: 1.15,
             loosened: 6.0,
+            is_shallow: false,
             self_contact: true,
             time: None,
         }

@@ -118,8 +118,9 @@ impl<'a> Untangling<'a> {
         self.stretch = 1.0 + (self.stretch - 1.0) * self.settings.loosened;
         let more = self.attempt(start);
         if self.crossings.between() > 0 || self.crossings.own.len() > self.known_folds.len() {
-            self.positions = positions;
+            self.move_to(&positions);
             self.shape = shape;
+            self.detect();
         }
         rounds + more
     }
@@ -248,7 +249,10 @@ impl<'a> Untangling<'a> {
         let normal = normal_of(&lower);
         // A face on the other side of the limb asks for the way through it.
         let away = face.iter().fold([0.0; 3], |sum, &v| add(sum, self.outward[v as usize]));
-        if dot(normal, away) < 0.0 {
+        let seen = face.iter().fold([0.0; 3], |sum, &v| {
+            add(sum, self.planes[v as usize].filter(|p| p.distance > 0.0).map_or([0.0; 3], |p| p.normal))
+        });
+        if dot(normal, away) < 0.0 && dot(normal, seen) <= 0.0 {
             return;
         }
         // The ground under the corner, as a height along the normal.
@@ -342,7 +346,8 @@ impl<'a> Untangling<'a> {
             let view = self.body.look(p);
             let plane = view.and_then(|b| b.plane);
             // More than half way through a limb the nearest way out is its other side: cloth goes back to its own.
-            let is_through = plane.is_some_and(|plane| plane.distance < 0.0 && dot(plane.normal, away) < 0.0);
+            let is_through = !self.settings.is_shallow
+                && plane.is_some_and(|plane| plane.distance < 0.0 && dot(plane.normal, away) < 0.0);
             let own = if is_through { self.body.exit(p, away, self.settings.farthest) } else { None };
             (view.map_or(f64::INFINITY, |b| b.far), own.or(plane))
         };
@@ -362,15 +367,9 @@ impl<'a> Untangling<'a> {
         self.touch(&moved);
     }
 
-    /// Largest move of garment `g` from the input [m].
-    pub fn largest_move(&self, g: usize) -> f64 {
-        let (now, before) = (self.outfit.part(&self.positions, g), self.outfit.part(&self.input, g));
-        now.iter().zip(before).map(|(p, q)| norm(sub(*p, *q))).fold(0.0, f64::max)
-    }
-
-    /// Vertices of garment `g` that moved.
-    pub fn moved(&self, g: usize) -> usize {
-        let (now, before) = (self.outfit.part(&self.positions, g), self.outfit.part(&self.input, g));
-        now.iter().zip(before).filter(|(p, q)| p != q).count()
+    /// Pairs between garments, and with the body where it is drawn, that are left.
+    pub fn crossings(&self) -> usize {
+        let is_seen = |&&(_, other): &&(u32, u32)| !self.body.gave_way(other);
+        self.crossings.layers.len() + self.crossings.body.iter().filter(is_seen).count()
     }
 }

@@ -7,7 +7,7 @@ use crate::config::{Config, load};
 use crate::device::Backend;
 use crate::drape::{Networks, WardrobeTensors};
 use crate::evaluate::Spread;
-use crate::evaluate::certificates::{DrapedScene, OutfitResult, RestGarments, skinned};
+use crate::evaluate::certificates::{DrapedScene, Dressing, OutfitResult};
 use crate::scene::{Library, PreparedScene, SceneDraw, draw_outfit, prepare};
 use clap::Parser;
 use clothcombo_data::format::obj;
@@ -124,7 +124,7 @@ fn measure(
     };
     let bar = progress_bar(draws.len(), "outfits {bar:30} {pos}/{len} · {eta} left");
     let orders = orders(library, &arguments.orders)?;
-    let mut garments = RestGarments::default();
+    let dressing = Dressing::new(library, &config.losses, networks.as_ref());
     let mut results = Vec::with_capacity(draws.len());
     for draw in draws {
         let seed = arguments.seed.unwrap_or(config.seed);
@@ -136,14 +136,9 @@ fn measure(
             }
         };
         let scene = prepare(library, &config.losses, outfit, 1.0)?;
-        let packed = match &networks {
-            Some(networks) => networks.drape(&scene)?.layered.posed,
-            None => skinned(&scene),
-        };
-        let draped = DrapedScene::new(&scene, garments.of(&scene), &packed);
-        let (result, resolved) = OutfitResult::new(draw, &scene, &draped, settings)
-            .into_diagnostic()
-            .wrap_err_with(|| format!("draw {draw}"))?;
+        let draped = dressing.of(&scene, &dressing.drape(&scene)?);
+        let (result, resolved) =
+            OutfitResult::new(draw, &draped, settings).wrap_err_with(|| format!("draw {draw}"))?;
         if let Some(folder) = &arguments.meshes {
             write_meshes(&folder.join(format!("{draw:04}")), &scene, &draped, &resolved.positions)?;
         }
@@ -183,7 +178,7 @@ fn orders(library: &Library, names: &[String]) -> Result<Vec<Vec<usize>>, Report
 fn write_meshes(
     folder: &Path,
     scene: &PreparedScene,
-    draped: &DrapedScene,
+    draped: &DrapedScene<'_>,
     resolved: &[Vec<[f64; 3]>],
 ) -> Result<(), Report> {
     let save = |file: String, positions: &[[f64; 3]], faces: &[[u32; 3]], note: String| {

@@ -7,7 +7,7 @@ mod summary;
 use crate::cli::verbosity::{progress_bar, say};
 use crate::device::Backend;
 use crate::draper::output::{Show, Staged, write};
-use crate::draper::{Drape, Draper, DraperError, DraperSettings, Outfit, Report, SourceGarment, smooth};
+use crate::draper::{Drape, Draper, DraperSettings, Outfit, Report, SourceGarment, smooth};
 use clap::{Parser, ValueEnum};
 use clothcombo_data::format::atomic;
 use clothcombo_physics::contact::resolve::ResolveSettings;
@@ -251,17 +251,21 @@ fn drape_all(draper: &Draper, outfit: &Outfit, scenes: &Scenes) -> Result<Vec<Dr
         1 => ProgressBar::hidden(),
         frames => progress_bar(frames, "frames {bar:30} {pos}/{len} · {eta} left"),
     };
-    let drapes = scenes.states.iter().map(|state| {
-        let mut drape = draper.drape(outfit, state)?;
+    let mut drapes: Vec<Drape> = Vec::with_capacity(scenes.states.len());
+    for (frame, state) in scenes.states.iter().enumerate() {
+        let before = drapes.last().map(|drape| (&scenes.states[frame - 1], drape));
+        let mut drape = match before {
+            Some(before) => draper.drape_after(outfit, state, before),
+            None => draper.drape(outfit, state),
+        }?;
         if scenes.states.len() > 1 {
             drape.slim();
         }
+        drapes.push(drape);
         bar.inc(1);
-        Ok(drape)
-    });
-    let drapes = drapes.collect::<Result<Vec<_>, DraperError>>();
+    }
     bar.finish_and_clear();
-    Ok(drapes?)
+    Ok(drapes)
 }
 
 fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(), Failure> {

@@ -1,0 +1,182 @@
+//! Room for cloth where a posed body presses into itself.
+//!
+//! Skinned bodies do not know contact: the upper arm of a hanging arm lies inside the chest, the thigh of a crouching body
+//! inside the belly. No cloth can be outside of both, and where two parts merely touch there is none for it either. Real flesh
+//! gives way. So does this body, in what the garments have to stay out of: both surfaces step back by half of what is missing
+//! for some room between them. Cloth then lies between the two parts, under the skin that is drawn, where nobody sees it.
+
+use rayon::prelude::*;
+
+use super::contact::{along_line, normal_of};
+use super::obstacle::{BodyObstacle, GaveWay, is_closed};
+use crate::contact::TriangleTree;
+use crate::query::{FaceSide, Surface, UnionDistance};
+use crate::vec3::{add_scaled, dot};
+
+/// Distance that two parts of the body that look at each other keep [m], for what straight triangles need to go round a limb…
+const ROOM: f64 = 0.006;
+/// …and for the two sheets of each garment [m].
+const ROOM_PER_GARMENT: f64 = 0.002;
+/// Two surfaces look at each other where their normals have a cosine below this.
+const FACING: f64 = -0.3;
+/// Parts that overlap by more [m] are not parted.
+const DEEPEST: f64 = 0.08;
+/// Farthest that a vertex gives way [m].
+const LONGEST_STEP: f64 = 0.04;
+/// Rings of neighbours that give way along, each half as far.
+const RINGS: usize = 2;
+/// How far outside the surface a vertex is asked whether it is inside another part [m].
+const LOOK_OUT: f64 = 1e-6;
+
+/// A body that has given way.
+pub(super) struct Relief {
+    /// The surface after it.
+    pub surface: Surface<f64>,
+    /// Vertices that gave way.
+    pub gave_way: Vec<bool>,
+    /// Those, and the corners of faces that were inside another part or crossed one before.
+    pub pinched: Vec<bool>,
+}
+
+impl Relief {
+    /// Of a body with its vertices `near` cloth of `garments` garments. `None` where nothing has to give way, or the surface
+    /// is not closed and has no inside.
+    pub fn of(body: &Surface<f64>, near: &[bool], garments: usize) -> Option<Self> {
+        if !is_closed(&body.faces) {
+            return None;
+        }
+        let (steps, mut pinched) = steps(body, near, ROOM + ROOM_PER_GARMENT * garments as f64);
+        if steps.iter().all(|s| *s == 0.0) {
+            return None;
+        }
+        let moved = body.positions.iter().zip(&body.normals).zip(&steps);
+        let positions = moved.map(|((p, n), step)| add_scaled(*p, -step, *n)).collect();
+        let gave_way: Vec<bool> = steps.iter().map(|s| *s > 0.0).collect();
+        pinched.iter_mut().zip(&gave_way).for_each(|(pinched, gave_way)| *pinched |= gave_way);
+        Some(Self { surface: Surface::new(positions, body.faces.clone()), gave_way, pinched })
+    }
+
+    /// What the garments have to stay out of.
+    pub fn obstacle<'a>(&'a self, near: &'a [bool]) -> BodyObstacle<'a> {
+        BodyObstacle::new(&self.surface, near, Some(GaveWay::Already(self)))
+    }
+}
+
+/// How far every vertex steps back, against its normal [m]; only those `near` cloth and around them do. Also the corners of
+/// faces inside another part, or crossing one.
+fn steps(surface: &Surface<f64>, near: &[bool], room: f64) -> (Vec<f64>, Vec<bool>) {
+    let (positions, faces) = (&surface.positions, &surface.faces);
+    let is_part = |f: u32| faces[f as usize].iter().any(|&v| near[v as usize]);
+    let tree = TriangleTree::of_part(positions, faces, |f, _| is_part(f));
+    let union = UnionDistance::of_part(positions.clone(), faces, is_part, &tree.self_pairs());
+    // Whether all, or some, of the faces at a vertex are inside another part.
+    let (mut all_inside, mut some_inside) = (vec![true; positions.len()], vec![false; positions.len()]);
+    for (face, side) in faces.iter().zip(union.sides()) {
+        for &v in face {
+            all_inside[v as usize] &= *side == FaceSide::Buried;
+            some_inside[v as usize] |= *side != FaceSide::Exposed;
+        }
+    }
+    let missing = |v: usize| -> f64 {
+        if !near[v] {
+            return 0.0;
+        }
+        let (p, n) = (positions[v], surface.normals[v]);
+        let is_inside =
+            all_inside[v] || some_inside[v] && union.winding_number(add_scaled(p, LOOK_OUT, n)) >= 1;
+        let reach = if is_inside { -DEEPEST } else { room };
+        let apart = facing_surface(&tree, faces, v as u32, reach, p, n);
+        apart.map_or(0.0, |apart| (0.5 * (room - apart)).clamp(0.0, LONGEST_STEP))
+    };
+    let mut steps: Vec<f64> = (0..positions.len()).into_par_iter().with_min_len(256).map(missing).collect();
+    for _ in 0..RINGS {
+        let before = steps.clone();
+        for face in faces.iter() {
+            let most = face.iter().fold(0.0, |m: f64, &v| m.max(before[v as usize]));
+            face.iter().for_each(|&v| steps[v as usize] = steps[v as usize].max(0.5 * most));
+        }
+    }
+    (steps, some_inside)
+}
+
+/// How far along `n` from vertex `v` at `p` a surface looks back at it, at most `reach` (backwards where that is negative).
+fn facing_surface(
+    tree: &TriangleTree<'_>,
+    faces: &[[u32; 3]],
+    v: u32,
+    reach: f64,
+    p: [f64; 3],
+    n: [f64; 3],
+) -> Option<f64> {
+    let end = add_scaled(p, reach, n);
+    let low = std::array::from_fn(|k| p[k].min(end[k]));
+    let high = std::array::from_fn(|k| p[k].max(end[k]));
+    let looks_back = |f: u32| {
+        if faces[f as usize].contains(&v) {
+            return None;
+        }
+        let triangle = tree.triangle(f)?;
+        let (along, _) = along_line(p, n, &triangle)?;
+        let is_in_reach = along * reach.signum() > 0.0 && along.abs() <= reach.abs();
+        (is_in_reach && dot(normal_of(&triangle), n) < FACING).then_some(along)
+    };
+    tree.faces_in_box(low, high).filter_map(looks_back).min_by(|a, b| a.abs().total_cmp(&b.abs()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::TriMesh;
+    use crate::mesh::shapes;
+    use crate::vec3::{add, norm, sub};
+
+    /// Two balls of 10 cm, their centres `apart`.
+    fn balls(apart: f64) -> TriMesh {
+        let ball = shapes::icosphere(0.1, 4);
+        shapes::union(&[&ball, &shapes::mapped(&ball, |p| add(p, [apart, 0.0, 0.0]))])
+    }
+
+    fn relieved(apart: f64, garments: usize) -> (Surface<f64>, Option<Relief>) {
+        let body = Surface::from_mesh(&balls(apart));
+        let near = vec![true; body.positions.len()];
+        let relief = Relief::of(&body, &near, garments);
+        (body, relief)
+    }
+
+    /// The least distance of the two balls along the line of their centres, by their vertices.
+    fn space(surface: &Surface<f64>, apart: f64) -> f64 {
+        let (left, right) = surface.positions.split_at(surface.positions.len() / 2);
+        let near_axis = |p: &&[f64; 3]| norm([0.0, p[1], p[2]]) < 0.03;
+        let end = left.iter().filter(near_axis).map(|p| p[0]).fold(f64::NEG_INFINITY, f64::max);
+        let is_left = |p: &&[f64; 3]| p[0] < apart;
+        right.iter().filter(near_axis).filter(is_left).map(|p| p[0]).fold(f64::INFINITY, f64::min) - end
+    }
+
+    #[test]
+    fn parts_that_press_into_each_other_make_room() {
+        for (apart, garments) in [(0.19, 1), (0.203, 1), (0.17, 3)] {
+            let (body, relief) = relieved(apart, garments);
+            let relief = relief.unwrap();
+            let room = ROOM + ROOM_PER_GARMENT * garments as f64;
+            assert!(space(&body, apart) < 0.5 * room);
+            let space = space(&relief.surface, apart);
+            assert!((0.9 * room..1.3 * room).contains(&space), "{apart}: {space} of {room}");
+            let moves = body.positions.iter().zip(&relief.surface.positions).map(|(p, q)| norm(sub(*q, *p)));
+            for (moved, gave_way) in moves.zip(&relief.gave_way) {
+                assert_eq!(moved > 0.0, *gave_way);
+                assert!(moved <= 0.5 * (0.2 - apart + room) * 1.05 + 1e-9);
+            }
+            let share = relief.gave_way.iter().filter(|g| **g).count() as f64 / relief.gave_way.len() as f64;
+            assert!(share < 0.3, "{share}");
+        }
+    }
+
+    #[test]
+    fn what_is_apart_open_or_far_from_cloth_stays() {
+        assert!(relieved(0.25, 1).1.is_none());
+        let open = Surface::from_mesh(&shapes::grid(0.1, 0.1, 4, 4));
+        assert!(Relief::of(&open, &vec![true; open.positions.len()], 1).is_none());
+        let body = Surface::from_mesh(&balls(0.19));
+        assert!(Relief::of(&body, &vec![false; body.positions.len()], 1).is_none());
+    }
+}

@@ -1,0 +1,140 @@
+//! What the networks make of an outfit on one body, brought to where the body stands.
+
+use super::{BodyState, Draper, DraperError, Outfit, elapsed};
+use crate::drape::{body_tensors, drape_on};
+use crate::evaluate::equilibrium_error::skinning_transforms;
+use crate::scene::{BodyDraw, Dresser, PreparedScene, SceneDraw};
+use clothcombo_data::asset::Pose;
+use clothcombo_data::asset::rotation::{Matrix3, apply, matrix_from_axis_angle};
+use clothcombo_physics::contact::resolve::Waypoint;
+use clothcombo_physics::query::Surface;
+use clothcombo_physics::transform::{self, Transform};
+use clothcombo_physics::vec3::add;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// An outfit on one body before any post-process; garments packed inner → outer.
+pub(super) struct Networked {
+    /// The scene the networks saw: the body facing +z, at the origin.
+    pub scene: PreparedScene,
+    /// The body where it stands.
+    pub surface: Arc<Surface<f64>>,
+    /// Where it faces: angle about the vertical from +z towards +x [radians].
+    pub heading: f64,
+    /// Blended skinning transform of every vertex, canonical → posed.
+    pub transforms: Vec<Transform>,
+    /// Linear blend skinning of the start state [m].
+    pub skinned: Vec<[f64; 3]>,
+    /// What the networks made of it [m].
+    pub network: Vec<[f64; 3]>,
+    /// Time for the body, for draping and for untangling [ms].
+    pub milliseconds: [f64; 3],
+}
+
+impl Draper {
+    /// Poses the body and lets the networks drape `outfit` on it.
+    pub(super) fn networked(&self, outfit: &Outfit, body: &BodyState) -> Result<Networked, DraperError> {
+        let clock = Instant::now();
+        let shape = self.checked_shape(&body.shape)?;
+        if body.pose.rotations.as_flattened().iter().chain(&body.place).any(|x| !x.is_finite()) {
+            return Err(DraperError::NotFinite { what: "pose" });
+        }
+        let posed = self.body().posed(&shape, &body.pose)?;
+        let mut surface = match &body.surface {
+            Some(given) => self.checked_surface(given)?.to_vec(),
+            None => posed.positions.iter().map(|p| add(*p, body.place)).collect(),
+        };
+        super::round(&mut surface);
+        let surface = Arc::new(Surface::new(surface, self.body().faces.clone()));
+        let (facing, heading) = body.pose.without_heading();
+        let (facing, yaw) = match self.trained.config.data.poses.remove_heading {
+            true => (facing, heading),
+            false => (body.pose.clone(), 0.0),
+        };
+        let scene = self.scene(outfit, BodyDraw { shape, pose: facing });
+        let (tensors, start) = body_tensors(&scene.bodies[0], &self.dimensions(), &self.device)?;
+        let posing = elapsed(clock);
+
+        let (drape, [draping, untangling]) =
+            drape_on(&self.model, &outfit.tensors, &outfit.embeddings, &tensors, start);
+
+        // The body may be turned about the vertical: what the networks made turns with it, to where everything else happens.
+        let turn = matrix_from_axis_angle([0.0, yaw, 0.0]);
+        let transforms: Vec<Transform> =
+            skinning_transforms(&scene).iter().map(|t| turned(&turn, t, body.place)).collect();
+        let start = scene.bodies[0].start.iter().map(|p| p.map(f64::from));
+        let skinned = transforms.iter().zip(start).map(|(t, p)| transform::apply(t, p)).collect();
+        let network: Vec<[f64; 3]> =
+            drape.layered.posed.iter().map(|p| add(apply(&turn, p.map(f64::from)), body.place)).collect();
+        outfit.check_finite(&network)?;
+        let milliseconds = [posing, 1e3 * draping.as_secs_f64(), 1e3 * untangling.as_secs_f64()];
+        Ok(Networked { scene, surface, heading, transforms, skinned, network, milliseconds })
+    }
+
+    /// The same in `pose` and place, somewhere on the way to `body`, for the post-process.
+    pub(super) fn stage(
+        &self,
+        outfit: &Outfit,
+        body: &BodyState,
+        pose: Pose,
+        place: [f64; 3],
+    ) -> Result<Waypoint, DraperError> {
+        // A surface is known at the end only.
+        let on_the_way = BodyState { shape: body.shape.clone(), pose, surface: None, place };
+        let made = self.networked(outfit, &on_the_way)?;
+        Ok(Waypoint {
+            body: Surface::new(made.surface.positions.clone(), made.surface.faces.clone()),
+            draped: outfit.split(&made.network).into_iter().map(<[_]>::to_vec).collect(),
+            transforms: made.transforms,
+        })
+    }
+
+    fn scene(&self, outfit: &Outfit, body: BodyDraw) -> PreparedScene {
+        let encoding = self.trained.config.data.poses.encoding;
+        let dresser = Dresser {
+            body: self.body(),
+            joints: &self.joints,
+            features: &|pose, joints| encoding.features(pose, joints),
+            losses: &self.trained.config.losses,
+        };
+        let draw = SceneDraw { garments: (0..outfit.pieces.len()).collect(), bodies: vec![body] };
+        let mut scene = dresser.dress(draw, outfit.worn(), 1.0);
+        // A body with fewer components than the networks know has the others at their mean.
+        scene.bodies[0].shape.resize(self.trained.state.shape_count, 0.0);
+        scene
+    }
+
+    fn checked_shape(&self, shape: &[f64]) -> Result<Vec<f64>, DraperError> {
+        if shape.iter().any(|x| !x.is_finite()) {
+            return Err(DraperError::NotFinite { what: "shape" });
+        }
+        let mut shape = shape.to_vec();
+        let count = self.body().shape_count;
+        // Longer ones are refused by the body, by name.
+        if shape.len() < count {
+            shape.resize(count, 0.0);
+        }
+        Ok(shape)
+    }
+
+    fn checked_surface<'a>(&self, surface: &'a [[f64; 3]]) -> Result<&'a [[f64; 3]], DraperError> {
+        let (found, expected) = (surface.len(), self.body().vertex_count());
+        if found != expected {
+            return Err(DraperError::Surface { body: self.body().name.clone(), found, expected });
+        }
+        match surface.as_flattened().iter().all(|x| x.is_finite()) {
+            true => Ok(surface),
+            false => Err(DraperError::NotFinite { what: "posed body" }),
+        }
+    }
+}
+
+/// `turn` after `transform`, then a move to `place`.
+fn turned(turn: &Matrix3, transform: &Transform, place: [f64; 3]) -> Transform {
+    std::array::from_fn(|r| {
+        std::array::from_fn(|c| {
+            let value: f64 = (0..3).map(|k| turn[r][k] * transform[k][c]).sum();
+            if c == 3 { value + place[r] } else { value }
+        })
+    })
+}
