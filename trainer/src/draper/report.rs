@@ -314,6 +314,7 @@ fn combined(drapes: &[Drape]) -> Certificate {
         sum.self_triangle_pairs += more.self_triangle_pairs;
         sum.contour_length_mm += more.contour_length_mm;
         sum.vertices_inside += more.vertices_inside;
+        sum.narrow_triangle_pairs += more.narrow_triangle_pairs;
         sum.pinched.body_triangle_pairs += more.pinched.body_triangle_pairs;
         sum.pinched.layer_triangle_pairs += more.pinched.layer_triangle_pairs;
         sum.pinched.self_triangle_pairs += more.pinched.self_triangle_pairs;

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::near::near_cloth;
 use super::obstacle::{BodyObstacle, GaveWay, LayerObstacle};
-use super::relief::Relief;
+use super::relief::{Relief, Room};
 use super::{Layer, ResolveError, ResolveSettings};
 use crate::contact::triangle_pair::Triangle;
 use crate::contact::{TriangleTree, contours, self_contours};
@@ -21,6 +21,9 @@ use crate::vec3::{add, scale};
 pub struct Certificate {
     /// Pairs of a garment triangle and a body triangle that share a point.
     pub body_triangle_pairs: usize,
+    /// Those of them where another part of the body is so near that hardly any cloth fits between (see `docs/resolve.md`).
+    #[serde(default)]
+    pub narrow_triangle_pairs: usize,
     /// Pairs of triangles of two garments that share a point.
     pub layer_triangle_pairs: usize,
     /// Pairs of triangles of one garment that share more than their common vertices.
@@ -127,7 +130,7 @@ impl Certificate {
 pub fn certify(body: &Surface<f64>, layers: &[Layer<'_>]) -> Result<Certificate, ResolveError> {
     super::check(body, layers)?;
     let near = near_cloth(&body.positions, &super::triangles(layers));
-    let relief = Relief::of(body, &near, layers.len());
+    let relief = Relief::of(body, &near, layers.len(), Room::Ample);
     let gave_way = relief.as_ref().map(GaveWay::NotYet);
     Ok(certificate(&BodyObstacle::new(body, &near, gave_way), layers))
 }
@@ -160,6 +163,7 @@ pub(super) fn certificate(body: &BodyObstacle<'_>, layers: &[Layer<'_>]) -> Cert
         let pairs = tree.pairs_with(&body.tree);
         let (pinched, pairs): (Vec<_>, Vec<_>) = pairs.into_iter().partition(|&(_, b)| body.is_pinched(b));
         own.body_triangle_pairs = pairs.len();
+        found.narrow_triangle_pairs += pairs.iter().filter(|&&(_, b)| body.gave_way(b)).count();
         found.pinched.body_triangle_pairs += pinched.len();
         found.contour_length_mm += length_mm(&contours(&tree, &body.tree, &pairs));
         found.list(index, Crossed::Body, &pairs, false);

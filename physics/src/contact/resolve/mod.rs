@@ -17,8 +17,9 @@
 //!    nothing gets better; the best state is taken.
 //! 5. **Certificate.** All pairs are counted again, from nothing, by the exact predicates.
 //!
-//! **Pinched regions**, where the body lies inside itself or leaves no room for cloth, are told apart by a stated rule:
-//! `BodyObstacle`. There the body gives way ([`relief`]).
+//! **Pinched regions**, where the body lies inside itself, are told apart by a stated rule: `BodyObstacle`. There, and where
+//! hardly any cloth fits between two parts, the body gives way while garments are sorted out ([`relief`]); in the end they
+//! are brought out of it again where they can.
 //!
 //! **Bent limbs.** Where crossings are left, [`resolve_along`] takes the garments from the T-pose, where their order is plain,
 //! step by step to the pose ([`follow`]).
@@ -55,7 +56,7 @@ use certificate::certificate;
 use near::near_cloth;
 use obstacle::{BodyObstacle, GaveWay};
 use outfit::Outfit;
-use relief::Relief;
+use relief::{Relief, Room};
 use untangle::Untangling;
 
 /// Positions farther from the origin than this are refused [m]: the exact predicates would hold, but no distance would.
@@ -92,6 +93,32 @@ pub struct GarmentWork {
 }
 
 impl Resolved {
+    /// Where cloth lies in room that the body only made for it, tries to do without: the body gives way no more than where it
+    /// lies inside itself. Taken if fewer pairs are left.
+    fn close_in(
+        &mut self,
+        (body, near): (&Surface<f64>, &[bool]),
+        judge: &BodyObstacle<'_>,
+        layers: &[Layer<'_>],
+        settings: &ResolveSettings,
+    ) {
+        if self.certificate.narrow_triangle_pairs == 0 {
+            return;
+        }
+        let relief = Relief::of(body, near, layers.len(), Room::Least);
+        let obstacle = match &relief {
+            Some(relief) => relief.obstacle(near),
+            None => BodyObstacle::new(body, near, None),
+        };
+        let settings = ResolveSettings { is_shallow: true, loosened: 1.0, ..*settings };
+        let closer = untangled(&obstacle, &at(layers, &self.positions), &settings);
+        let certificate = certificate(judge, &at(layers, &closer.positions));
+        let counts = |c: &Certificate| (c.between(), c.self_triangle_pairs);
+        if counts(&certificate) < counts(&self.certificate) {
+            (self.positions, self.certificate) = (closer.positions, certificate);
+        }
+    }
+
     /// Tells moves and strain from `layers`, and that all of it took `time`.
     fn compare(&mut self, layers: &[Layer<'_>], time: Duration) {
         let count: usize = self.positions.iter().map(Vec::len).sum();
@@ -119,8 +146,9 @@ pub fn resolve(
     settings.check()?;
     check(body, layers)?;
     let start = Instant::now();
+    let drawn = body;
     let near = near_cloth(&body.positions, &triangles(layers));
-    let relief = Relief::of(body, &near, layers.len());
+    let relief = Relief::of(body, &near, layers.len(), Room::Ample);
     let gave_way = relief.as_ref().map(GaveWay::NotYet);
     let judge = BodyObstacle::new(body, &near, gave_way);
     let relieved = relief.as_ref().map(|r| r.obstacle(&near));
@@ -129,16 +157,26 @@ pub fn resolve(
     let start = Instant::now();
     let Untangled { positions, rounds, .. } = untangled(body, layers, settings);
     let time = start.elapsed();
-    let work = GarmentWork { rounds, ..GarmentWork::default() };
     let start = Instant::now();
-    let resolved: Vec<Layer> =
-        layers.iter().zip(&positions).map(|(l, positions)| Layer { garment: l.garment, positions }).collect();
-    let certificate = certificate(&judge, &resolved);
-    let certificate_time = start.elapsed();
-    let garments = vec![work; layers.len()];
-    let mut resolved = Resolved { positions, certificate, garments, steps: 0, body_time, certificate_time };
-    resolved.compare(layers, time);
+    let certificate = certificate(&judge, &at(layers, &positions));
+    let work = GarmentWork { rounds, ..GarmentWork::default() };
+    let mut resolved = Resolved {
+        positions,
+        certificate,
+        garments: vec![work; layers.len()],
+        steps: 0,
+        body_time,
+        certificate_time: start.elapsed(),
+    };
+    let start = Instant::now();
+    resolved.close_in((drawn, &near), &judge, layers, settings);
+    resolved.compare(layers, time + start.elapsed());
     Ok(resolved)
+}
+
+/// The same garments elsewhere.
+fn at<'a>(layers: &[Layer<'a>], positions: &'a [Vec<[f64; 3]>]) -> Vec<Layer<'a>> {
+    layers.iter().zip(positions).map(|(l, positions)| Layer { garment: l.garment, positions }).collect()
 }
 
 /// What untangling left.

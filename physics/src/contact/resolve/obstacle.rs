@@ -46,13 +46,12 @@ pub(super) struct BodyView {
 /// **Pinched regions.** Where one part of the body lies inside another (an arm pressed into the torso), no cloth can be
 /// outside of both. The rule (after Baraff, Witkin and Kass, "Untangling cloth", 2003): faces inside another part of the
 /// body, the seams where parts cross, and the faces next to those are *pinched*. They push nothing, and what crosses them is
-/// counted apart. A vertex inside the body whose nearest face, of all, is pinched is left alone. To a certificate, faces that
-/// gave way to make room ([`Relief`]) are pinched too.
+/// counted apart. A vertex inside the body whose nearest face, of all, is pinched is left alone.
 pub(super) struct BodyObstacle<'a> {
     pub tree: TriangleTree<'a>,
     is_pinched: Vec<bool>,
     has_pinched: bool,
-    /// Faces that are not where they are drawn.
+    /// Faces that give way.
     gave_way: Vec<bool>,
     nearest: Nearest,
     /// All faces near cloth, and which they are; made when it is first asked.
@@ -101,10 +100,7 @@ impl<'a> BodyObstacle<'a> {
             }
         }
         let gave_way = match gave_way {
-            Some(GaveWay::NotYet(relief)) => {
-                touched.copy_from_slice(&relief.pinched);
-                Vec::new()
-            }
+            Some(GaveWay::NotYet(relief)) => touching(&relief.gave_way),
             Some(GaveWay::Already(relief)) => {
                 // Where the body only meets itself because it gave way, it is to be respected as it was.
                 touched.iter_mut().zip(&relief.pinched).for_each(|(touched, was)| *touched &= was);
@@ -122,7 +118,7 @@ impl<'a> BodyObstacle<'a> {
         self.is_pinched.get(f as usize).is_some_and(|p| *p)
     }
 
-    /// Whether face `f` is not where it is drawn: cloth that crosses it crosses nothing that is seen.
+    /// Whether face `f` gives way, to make room for cloth.
     pub fn gave_way(&self, f: u32) -> bool {
         self.gave_way.get(f as usize).is_some_and(|p| *p)
     }

@@ -3,7 +3,8 @@
 //! Skinned bodies do not know contact: the upper arm of a hanging arm lies inside the chest, the thigh of a crouching body
 //! inside the belly. No cloth can be outside of both, and where two parts merely touch there is none for it either. Real flesh
 //! gives way. So does this body, in what the garments have to stay out of: both surfaces step back by half of what is missing
-//! for some room between them. Cloth then lies between the two parts, under the skin that is drawn, where nobody sees it.
+//! for some room between them. Cloth then lies between the two parts, under the skin that is drawn. A certificate knows
+//! nothing of this: it counts against the body as it is drawn.
 
 use rayon::prelude::*;
 
@@ -28,31 +29,46 @@ const RINGS: usize = 2;
 /// How far outside the surface a vertex is asked whether it is inside another part [m].
 const LOOK_OUT: f64 = 1e-6;
 
+/// Where a body gives way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Room {
+    /// Wherever two parts are too near to each other for cloth.
+    Ample,
+    /// Only where it lies inside itself.
+    Least,
+}
+
 /// A body that has given way.
 pub(super) struct Relief {
     /// The surface after it.
     pub surface: Surface<f64>,
     /// Vertices that gave way.
     pub gave_way: Vec<bool>,
-    /// Those, and the corners of faces that were inside another part or crossed one before.
+    /// Corners of faces that were inside another part, or crossed one, before.
     pub pinched: Vec<bool>,
 }
 
 impl Relief {
     /// Of a body with its vertices `near` cloth of `garments` garments. `None` where nothing has to give way, or the surface
     /// is not closed and has no inside.
-    pub fn of(body: &Surface<f64>, near: &[bool], garments: usize) -> Option<Self> {
+    pub fn of(body: &Surface<f64>, near: &[bool], garments: usize, room: Room) -> Option<Self> {
         if !is_closed(&body.faces) {
             return None;
         }
-        let (steps, mut pinched) = steps(body, near, ROOM + ROOM_PER_GARMENT * garments as f64);
+        let (mut steps, pinched) = steps(body, near, ROOM + ROOM_PER_GARMENT * garments as f64);
+        if room == Room::Least {
+            steps
+                .iter_mut()
+                .zip(&pinched)
+                .filter(|(_, pinched)| !**pinched)
+                .for_each(|(step, _)| *step = 0.0);
+        }
         if steps.iter().all(|s| *s == 0.0) {
             return None;
         }
         let moved = body.positions.iter().zip(&body.normals).zip(&steps);
         let positions = moved.map(|((p, n), step)| add_scaled(*p, -step, *n)).collect();
         let gave_way: Vec<bool> = steps.iter().map(|s| *s > 0.0).collect();
-        pinched.iter_mut().zip(&gave_way).for_each(|(pinched, gave_way)| *pinched |= gave_way);
         Some(Self { surface: Surface::new(positions, body.faces.clone()), gave_way, pinched })
     }
 
@@ -139,7 +155,7 @@ mod tests {
     fn relieved(apart: f64, garments: usize) -> (Surface<f64>, Option<Relief>) {
         let body = Surface::from_mesh(&balls(apart));
         let near = vec![true; body.positions.len()];
-        let relief = Relief::of(&body, &near, garments);
+        let relief = Relief::of(&body, &near, garments, Room::Ample);
         (body, relief)
     }
 
@@ -175,8 +191,13 @@ mod tests {
     fn what_is_apart_open_or_far_from_cloth_stays() {
         assert!(relieved(0.25, 1).1.is_none());
         let open = Surface::from_mesh(&shapes::grid(0.1, 0.1, 4, 4));
-        assert!(Relief::of(&open, &vec![true; open.positions.len()], 1).is_none());
+        assert!(Relief::of(&open, &vec![true; open.positions.len()], 1, Room::Ample).is_none());
         let body = Surface::from_mesh(&balls(0.19));
-        assert!(Relief::of(&body, &vec![false; body.positions.len()], 1).is_none());
+        assert!(Relief::of(&body, &vec![false; body.positions.len()], 1, Room::Ample).is_none());
+        // Near each other, but not inside.
+        let body = Surface::from_mesh(&balls(0.203));
+        let near = vec![true; body.positions.len()];
+        assert!(Relief::of(&body, &near, 1, Room::Ample).is_some());
+        assert!(Relief::of(&body, &near, 1, Room::Least).is_none());
     }
 }
