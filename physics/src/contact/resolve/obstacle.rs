@@ -53,18 +53,12 @@ pub(super) struct BodyObstacle<'a> {
     has_pinched: bool,
     /// Faces that give way.
     gave_way: Vec<bool>,
-    nearest: Nearest,
+    /// Of a surface without a border: inside and outside are known everywhere.
+    union: Option<UnionDistance>,
     /// All faces near cloth, and which they are; made when it is first asked.
     all: OnceLock<(ClosestPoint, Vec<u32>)>,
     surface: &'a Surface<f64>,
     near: &'a [bool],
-}
-
-/// What a point asks for the surface.
-enum Nearest {
-    /// Without a border inside and outside are known everywhere.
-    Closed(UnionDistance),
-    Open,
 }
 
 /// What became of the vertices that gave way.
@@ -82,19 +76,13 @@ impl<'a> BodyObstacle<'a> {
         let faces = &surface.faces;
         let is_part = |f: u32| faces[f as usize].iter().any(|&v| near[v as usize]);
         let tree = TriangleTree::of_part(&surface.positions, faces, |f, _| is_part(f));
-        let nearest = match is_closed(faces) {
-            true => {
-                let seams = tree.self_pairs();
-                let positions = surface.positions.clone();
-                Nearest::Closed(UnionDistance::of_part(positions, faces, is_part, &seams))
-            }
-            false => Nearest::Open,
-        };
+        let union = is_closed(faces)
+            .then(|| UnionDistance::of_part(surface.positions.clone(), faces, is_part, &tree.self_pairs()));
         let touching = |touched: &[bool]| -> Vec<bool> {
             faces.iter().map(|face| face.iter().any(|&v| touched[v as usize])).collect()
         };
         let mut touched = vec![false; surface.positions.len()];
-        if let Nearest::Closed(union) = &nearest {
+        if let Some(union) = &union {
             for (face, _) in faces.iter().zip(union.sides()).filter(|(_, side)| **side != FaceSide::Exposed) {
                 face.iter().for_each(|&v| touched[v as usize] = true);
             }
@@ -110,7 +98,7 @@ impl<'a> BodyObstacle<'a> {
         };
         let is_pinched = touching(&touched);
         let has_pinched = is_pinched.contains(&true);
-        Self { tree, is_pinched, has_pinched, gave_way, nearest, all: OnceLock::new(), surface, near }
+        Self { tree, is_pinched, has_pinched, gave_way, union, all: OnceLock::new(), surface, near }
     }
 
     /// Whether face `f` is pinched.
@@ -147,12 +135,12 @@ impl<'a> BodyObstacle<'a> {
 
     /// What the body is to a point; `None` where it is not near cloth.
     pub fn look(&self, p: [f64; 3]) -> Option<BodyView> {
-        let (found, is_inside, face) = match &self.nearest {
-            Nearest::Closed(union) => {
+        let (found, is_inside, face) = match &self.union {
+            Some(union) => {
                 let (found, is_inside) = union.project(p)?;
                 (found, is_inside, union.kept_face(found.face))
             }
-            Nearest::Open => {
+            None => {
                 let (found, face) = self.nearest_of_all(p)?;
                 (found, dot(sub(p, found.position), found.normal) < 0.0, face)
             }
