@@ -2,6 +2,8 @@
 
 use super::render::Figure;
 
+/// What is farther from the centre of the framed figure than this, in its radii, may be cut off.
+const NEARBY_IN_RADII: f64 = 1.25;
 /// Distance of the camera in radii of the framed figure: far enough that a person keeps natural proportions.
 const DISTANCE_IN_RADII: f64 = 5.0;
 /// Depth range in radii of the framed figure around its centre; geometry outside is not drawn.
@@ -84,8 +86,9 @@ pub struct Projected {
 }
 
 impl Camera {
-    /// Frames the first figure with anything to draw (the body, where there is one) for a picture of `size` pixels.
-    /// Later figures do not move the camera: a garment that flies off must not make the person small.
+    /// Frames the first figure with anything to draw (the body, where there is one) for a picture of `size` pixels, and what
+    /// of the others is near it. What is far does not move the camera: a garment that flies off must not make the person
+    /// small.
     pub fn framing(figures: &[Figure<'_>], view: View, size: [u32; 2]) -> Self {
         let (azimuth, elevation) = view.angles();
         let (sin_a, cos_a) = azimuth.sin_cos();
@@ -126,7 +129,12 @@ impl Camera {
 
         let mut window_low = [f64::INFINITY; 2];
         let mut window_high = [f64::NEG_INFINITY; 2];
-        for &p in points() {
+        let is_near = |p: &&[f64; 3]| {
+            (0..3).map(|k| (p[k] - centre[k]).powi(2)).sum::<f64>().sqrt() <= NEARBY_IN_RADII * radius
+        };
+        let others =
+            figures.iter().flat_map(|figure| figure.positions.iter().filter(is_finite).filter(is_near));
+        for &p in points().chain(others) {
             let [x, y, z] = camera.to_camera(p);
             for (axis, value) in [x, y].into_iter().enumerate() {
                 let value = value / (camera.distance - z).max(camera.near);
