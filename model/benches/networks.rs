@@ -55,8 +55,7 @@ fn config(width: usize, eigen_count: usize, diffusion_blocks: usize) -> ModelCon
 
 fn networks(criterion: &mut Criterion, vertices: usize, config: &ModelConfig) {
     let device = device();
-    device.seed(1);
-    let model = ClothCombo::new(config, &DIMENSIONS, &device).expect("valid sizes");
+    let model = ClothCombo::new(config, &DIMENSIONS, 1, &device).expect("valid sizes");
     let bone = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
     let body = BodyTensors::new(
         &random(DIMENSIONS.shape, 2.0),

@@ -63,7 +63,7 @@ mod tests {
 
     /// Weight and bias after some steps.
     fn train(mut optimizer: ModuleOptimizer, steps: u64) -> [Tensor<2>; 2] {
-        let mut layer = seeded(1, |device| Linear::new(37, 600, device));
+        let mut layer = seeded(1, |start| Linear::new(37, 600, start));
         let device = layer.weight.val().device();
         for step in 0..steps {
             let loss = (layer.forward(uniform(20, 37, 2.0, step, &device)) - 0.3).square().mean();
@@ -87,7 +87,7 @@ mod tests {
             "the same to the bit"
         );
         let mut first = burn();
-        let layer = seeded(1, |device| Linear::new(3, 2, device));
+        let layer = seeded(1, |start| Linear::new(3, 2, start));
         let gradients = || {
             let input = Tensor::<2>::ones([1, 3], &layer.weight.val().device());
             GradientsParams::from_grads(layer.forward(input).sum().backward(), &layer)

@@ -1,9 +1,10 @@
 //! Single-garment draping: F_s (body and garment to the draping embedding) and D_s (coordinates to a displacement).
 
 use burn::module::Module;
-use burn::tensor::{Device, Tensor};
+use burn::tensor::Tensor;
 
 use crate::config::{Dimensions, ModelConfig};
+use crate::initializer::Initializer;
 use crate::mlp::ResidualMlp;
 use crate::ops::Segments;
 use crate::siren::{ModulatedSiren, SirenSizes};
@@ -23,7 +24,7 @@ pub struct Draping {
 }
 
 impl Draping {
-    pub(crate) fn new(config: &ModelConfig, dimensions: &Dimensions, device: &Device) -> Self {
+    pub(crate) fn new(config: &ModelConfig, dimensions: &Dimensions, start: &mut Initializer) -> Self {
         let inputs = config.embedding + dimensions.shape + dimensions.pose;
         let (width, hidden) = (config.width, config.mlp_layers - 1);
         let sizes = SirenSizes {
@@ -35,8 +36,8 @@ impl Draping {
             omega_hidden: config.omega_hidden,
         };
         Self {
-            embedding: ResidualMlp::new(inputs, width, hidden, width, device),
-            displacement: ModulatedSiren::new(&sizes, device),
+            embedding: ResidualMlp::new(inputs, width, hidden, width, start),
+            displacement: ModulatedSiren::new(&sizes, start),
             scale: config.displacement_scale,
         }
     }

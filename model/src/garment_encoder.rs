@@ -1,10 +1,11 @@
 //! The embedding network E_c: a garment to one feature row per vertex and one for the whole.
 
 use burn::module::Module;
-use burn::tensor::{Device, Tensor};
+use burn::tensor::Tensor;
 
 use crate::config::ModelConfig;
 use crate::diffusion_net::DiffusionNet;
+use crate::initializer::Initializer;
 use crate::ops::product;
 use crate::tensors::GarmentTensors;
 
@@ -42,10 +43,10 @@ impl GarmentEmbedding {
 }
 
 impl GarmentEncoder {
-    pub(crate) fn new(config: &ModelConfig, device: &Device) -> Self {
+    pub(crate) fn new(config: &ModelConfig, start: &mut Initializer) -> Self {
         let (blocks, width) = (config.diffusion_blocks, config.diffusion_width);
         Self {
-            diffusion_net: DiffusionNet::new(blocks, width, config.embedding, device),
+            diffusion_net: DiffusionNet::new(blocks, width, config.embedding, start),
             has_vertex_embedding: config.vertex_embedding,
         }
     }

@@ -129,7 +129,7 @@ mod tests {
 
     #[test]
     fn clipping_scales_all_gradients_by_their_joint_norm() {
-        let layer = seeded(1, |device| Linear::new(300, 200, device));
+        let layer = seeded(1, |start| Linear::new(300, 200, start));
         for (scale, clipped) in [(50.0, true), (1e-6, false)] {
             let input = uniform(40, 300, 2.0, 1, &layer.weight.val().device());
             let loss = (layer.forward(input) * scale).square().sum();
@@ -146,13 +146,13 @@ mod tests {
 
     #[test]
     fn no_gradient_has_no_norm() {
-        let layer = seeded(2, |device| Linear::new(3, 2, device));
+        let layer = seeded(2, |start| Linear::new(3, 2, start));
         assert!(clip_global_norm(&layer, &mut GradientsParams::new(), 1.0).is_none());
     }
 
     #[test]
     fn a_bucket_keeps_every_gradient_and_which_parameters_have_one() {
-        let layer = seeded(3, |device| Linear::new(5, 4, device));
+        let layer = seeded(3, |start| Linear::new(5, 4, start));
         let device = layer.weight.val().device();
         let loss = layer.forward(uniform(6, 5, 1.0, 1, &device)).square().sum();
         let mut gradients = GradientsParams::from_grads(loss.backward(), &layer);

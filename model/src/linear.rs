@@ -1,8 +1,9 @@
-//! Affine layers and parameter initialisation.
+//! Affine layers.
 
 use burn::module::{Module, Param};
-use burn::tensor::{Device, Distribution, Tensor};
+use burn::tensor::Tensor;
 
+use crate::initializer::{Initializer, fan_in_bound};
 use crate::ops::{Activation, activate, product};
 
 /// `y = x·weight + bias`.
@@ -18,16 +19,13 @@ pub struct Linear {
 
 impl Linear {
     /// A layer drawn from U(±1/√in), weight before bias.
-    pub fn new(inputs: usize, outputs: usize, device: &Device) -> Self {
-        Self::uniform(inputs, outputs, fan_in_bound(inputs), device)
+    pub fn new(inputs: usize, outputs: usize, start: &mut Initializer) -> Self {
+        Self::uniform(inputs, outputs, fan_in_bound(inputs), start)
     }
 
     /// A layer drawn from U(±bound), weight before bias.
-    pub fn uniform(inputs: usize, outputs: usize, bound: f64, device: &Device) -> Self {
-        Self {
-            weight: uniform_parameter([inputs, outputs], bound, device),
-            bias: uniform_parameter([outputs], bound, device),
-        }
+    pub fn uniform(inputs: usize, outputs: usize, bound: f64, start: &mut Initializer) -> Self {
+        Self { weight: start.uniform([inputs, outputs], bound), bias: start.uniform([outputs], bound) }
     }
 
     /// The product without the bias.
@@ -44,23 +42,4 @@ impl Linear {
     pub fn forward(&self, input: Tensor<2>) -> Tensor<2> {
         activate(Activation::Identity, self.product(input), self.bias_row())
     }
-}
-
-/// Bound 1/√fan_in of the uniform distribution a linear layer starts from.
-pub(crate) fn fan_in_bound(fan_in: usize) -> f64 {
-    1.0 / (fan_in.max(1) as f64).sqrt()
-}
-
-/// A parameter drawn from U(±bound) at once: drawing lazily would make the weights depend on the order of first use.
-pub(crate) fn uniform_parameter<const D: usize>(
-    shape: [usize; D],
-    bound: f64,
-    device: &Device,
-) -> Param<Tensor<D>> {
-    parameter(Tensor::random(shape, Distribution::Uniform(-bound, bound), device))
-}
-
-/// A trainable parameter; it requires gradients where the device has autodiff.
-pub(crate) fn parameter<const D: usize>(value: Tensor<D>) -> Param<Tensor<D>> {
-    Param::from_tensor(value)
 }

@@ -1,8 +1,9 @@
 //! Perceptron with a residual connection over every two layers.
 
 use burn::module::Module;
-use burn::tensor::{Device, Tensor};
+use burn::tensor::Tensor;
 
+use crate::initializer::Initializer;
 use crate::linear::Linear;
 use crate::ops::{Activation, activate, activate_residual};
 
@@ -22,11 +23,17 @@ pub struct ResidualMlp {
 
 impl ResidualMlp {
     /// `hidden_layers` counts the first one too.
-    pub fn new(inputs: usize, width: usize, hidden_layers: usize, outputs: usize, device: &Device) -> Self {
+    pub fn new(
+        inputs: usize,
+        width: usize,
+        hidden_layers: usize,
+        outputs: usize,
+        start: &mut Initializer,
+    ) -> Self {
         Self {
-            first: Linear::new(inputs, width, device),
-            hidden: (1..hidden_layers).map(|_| Linear::new(width, width, device)).collect(),
-            output: Linear::new(width, outputs, device),
+            first: Linear::new(inputs, width, start),
+            hidden: (1..hidden_layers).map(|_| Linear::new(width, width, start)).collect(),
+            output: Linear::new(width, outputs, start),
         }
     }
 

@@ -11,6 +11,7 @@ use crate::diffusion_net::MINIMUM_TIME;
 use crate::draping::Draping;
 use crate::error::ModelError;
 use crate::garment_encoder::{GarmentEmbedding, GarmentEncoder};
+use crate::initializer::Initializer;
 use crate::linear_blend_skinning::linear_blend_skinning;
 use crate::skinning::Skinning;
 use crate::tensors::{BodyTensors, GarmentTensors, OutfitTensors, stack_rows};
@@ -95,13 +96,16 @@ pub struct LayeredDrape {
 }
 
 impl ClothCombo {
-    /// Networks with random weights; `device.seed(…)` before the call fixes them.
-    ///
-    /// Every parameter is drawn at once, in visit order, and requires gradients if the device has autodiff.
+    /// Networks with random weights, fixed by the seed; they require gradients if the device has autodiff.
     ///
     /// # Errors
     /// A configuration value out of range, or dimensions without a joint.
-    pub fn new(config: &ModelConfig, dimensions: &Dimensions, device: &Device) -> Result<Self, ModelError> {
+    pub fn new(
+        config: &ModelConfig,
+        dimensions: &Dimensions,
+        seed: u64,
+        device: &Device,
+    ) -> Result<Self, ModelError> {
         config.validate()?;
         if dimensions.joints == 0 {
             return Err(ModelError::Config {
@@ -110,11 +114,12 @@ impl ClothCombo {
                 expected: "at least 1".into(),
             });
         }
+        let start = &mut Initializer::new(seed, device);
         Ok(Self {
-            garment_encoder: GarmentEncoder::new(config, device),
-            draping: Draping::new(config, dimensions, device),
-            skinning: Skinning::new(config, dimensions, device),
-            untangling: Untangling::new(config, device),
+            garment_encoder: GarmentEncoder::new(config, start),
+            draping: Draping::new(config, dimensions, start),
+            skinning: Skinning::new(config, dimensions, start),
+            untangling: Untangling::new(config, start),
         })
     }
 

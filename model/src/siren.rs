@@ -12,9 +12,10 @@
 //! for all layers, which does not depend on the body and can be kept. The result is exactly that of the whole `A_l`.
 
 use burn::module::{Module, Param};
-use burn::tensor::{Device, Distribution, Tensor};
+use burn::tensor::Tensor;
 
-use crate::linear::{Linear, fan_in_bound, parameter, uniform_parameter};
+use crate::initializer::{Initializer, fan_in_bound};
+use crate::linear::Linear;
 use crate::ops::{
     Activation, Segments, product, segment_activate, segment_activate_sum, sine_modulation, split_columns,
 };
@@ -55,7 +56,7 @@ pub struct Modulator {
 }
 
 impl Modulator {
-    fn new(sizes: &SirenSizes, device: &Device) -> Self {
+    fn new(sizes: &SirenSizes, start: &mut Initializer) -> Self {
         let columns = sizes.layers * sizes.width;
         let latent = sizes.garment_latent + sizes.vertex_latent;
         // Each column block starts as the same rows of an ordinary layer on [previous gate, latent] would.
@@ -65,19 +66,12 @@ impl Modulator {
                 fan_in_bound(previous + latent) as f32
             })
             .collect();
-        let bounds = Tensor::<1>::from_floats(bounds.as_slice(), device);
-        let draw = |rows: usize| {
-            let unit = Tensor::<2>::random([rows, columns], Distribution::Uniform(-1.0, 1.0), device);
-            unit * bounds.clone().unsqueeze()
-        };
         let bound = fan_in_bound(sizes.width + latent);
         Self {
-            vertex: parameter(draw(sizes.vertex_latent)),
-            garment: parameter(draw(sizes.garment_latent)),
-            bias: parameter(draw(1).reshape([columns])),
-            hidden: (1..sizes.layers)
-                .map(|_| uniform_parameter([sizes.width, sizes.width], bound, device))
-                .collect(),
+            vertex: start.uniform_columns(sizes.vertex_latent, &bounds),
+            garment: start.uniform_columns(sizes.garment_latent, &bounds),
+            bias: start.uniform_row(&bounds),
+            hidden: (1..sizes.layers).map(|_| start.uniform([sizes.width, sizes.width], bound)).collect(),
             width: sizes.width,
         }
     }
@@ -130,22 +124,19 @@ impl ModulatedSiren {
     ///
     /// The output bias starts at zero: drawn, it would shift every garment by centimetres before training has begun,
     /// while the gates make the rest of an untrained network nearly vanish.
-    pub fn new(sizes: &SirenSizes, device: &Device) -> Self {
-        let modulator = Modulator::new(sizes, device);
+    pub fn new(sizes: &SirenSizes, start: &mut Initializer) -> Self {
+        let modulator = Modulator::new(sizes, start);
         let hidden_bound = (6.0 / sizes.width as f64).sqrt() / sizes.omega_hidden;
         let sine = (0..sizes.layers)
             .map(|layer| match layer {
-                0 => Linear::uniform(3, sizes.width, 1.0 / 3.0, device),
-                _ => Linear::uniform(sizes.width, sizes.width, hidden_bound, device),
+                0 => Linear::uniform(3, sizes.width, 1.0 / 3.0, start),
+                _ => Linear::uniform(sizes.width, sizes.width, hidden_bound, start),
             })
             .collect();
         Self {
             modulator,
             sine,
-            output: Linear {
-                weight: uniform_parameter([sizes.width, 3], hidden_bound, device),
-                bias: parameter(Tensor::zeros([3], device)),
-            },
+            output: Linear { weight: start.uniform([sizes.width, 3], hidden_bound), bias: start.zeros([3]) },
             omega_first: sizes.omega_first,
             omega_hidden: sizes.omega_hidden,
         }

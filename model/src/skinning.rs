@@ -1,10 +1,11 @@
 //! Skinning network S: a correction of the skin weights.
 
 use burn::module::{Module, Param};
-use burn::tensor::{Device, Tensor};
+use burn::tensor::Tensor;
 
 use crate::config::{Dimensions, ModelConfig};
-use crate::linear::{Linear, fan_in_bound, uniform_parameter};
+use crate::initializer::{Initializer, fan_in_bound};
+use crate::linear::Linear;
 use crate::mlp::residual_pairs;
 use crate::ops::{Activation, product, product_add, segment_activate, skin_correction};
 use crate::tensors::OutfitTensors;
@@ -34,16 +35,16 @@ pub struct Skinning {
 }
 
 impl Skinning {
-    pub(crate) fn new(config: &ModelConfig, dimensions: &Dimensions, device: &Device) -> Self {
+    pub(crate) fn new(config: &ModelConfig, dimensions: &Dimensions, start: &mut Initializer) -> Self {
         let width = config.skinning_width;
         let bound = fan_in_bound(3 + config.width + config.embedding);
         Self {
-            coordinate: uniform_parameter([3, width], bound, device),
-            garment: uniform_parameter([config.width, width], bound, device),
-            vertex: uniform_parameter([config.embedding, width], bound, device),
-            bias: uniform_parameter([width], bound, device),
-            hidden: (1..config.skinning_layers).map(|_| Linear::new(width, width, device)).collect(),
-            output: Linear::new(width, dimensions.joints, device),
+            coordinate: start.uniform([3, width], bound),
+            garment: start.uniform([config.width, width], bound),
+            vertex: start.uniform([config.embedding, width], bound),
+            bias: start.uniform([width], bound),
+            hidden: (1..config.skinning_layers).map(|_| Linear::new(width, width, start)).collect(),
+            output: Linear::new(width, dimensions.joints, start),
             scale: config.skinning_scale,
             zero_sum: config.zero_sum_skinning,
         }

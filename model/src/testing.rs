@@ -1,12 +1,11 @@
 //! What the tests of this crate share.
 
-use std::sync::{Mutex, PoisonError};
-
 use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
 use burn::tensor::{Device, Gradients, Tensor, TensorData};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use crate::initializer::Initializer;
 use crate::tensors::{GarmentArrays, GarmentTensors};
 
 /// The autodiff device the tests run on.
@@ -72,13 +71,9 @@ pub(crate) fn uniform(rows: usize, columns: usize, range: f32, seed: u64, device
     Tensor::from_data(TensorData::new(values, [rows, columns]), &device.clone().inner())
 }
 
-/// Makes something from device random numbers; burn's generator is one for the process, hence one at a time.
-pub(crate) fn seeded<T>(seed: u64, make: impl FnOnce(&Device) -> T) -> T {
-    static GENERATOR: Mutex<()> = Mutex::new(());
-    let _lock = GENERATOR.lock().unwrap_or_else(PoisonError::into_inner);
-    let device = device();
-    device.seed(seed);
-    make(&device)
+/// Makes a part of the networks with random parameters.
+pub(crate) fn seeded<T>(seed: u64, make: impl FnOnce(&mut Initializer) -> T) -> T {
+    make(&mut Initializer::new(seed, &device()))
 }
 
 /// A garment with `vertices` vertices and `eigen` eigenpairs of plausible size; algebra does not ask for more.

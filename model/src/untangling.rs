@@ -1,9 +1,10 @@
 //! Untangling phase: forces between garments (F_f) and the displacement they cause (D_m).
 
 use burn::module::Module;
-use burn::tensor::{Device, Tensor};
+use burn::tensor::Tensor;
 
 use crate::config::ModelConfig;
+use crate::initializer::Initializer;
 use crate::mlp::ResidualMlp;
 use crate::ops::product;
 use crate::siren::{ModulatedSiren, SirenSizes};
@@ -23,7 +24,7 @@ pub struct Untangling {
 }
 
 impl Untangling {
-    pub(crate) fn new(config: &ModelConfig, device: &Device) -> Self {
+    pub(crate) fn new(config: &ModelConfig, start: &mut Initializer) -> Self {
         let (width, hidden) = (config.width, config.mlp_layers - 1);
         let sizes = SirenSizes {
             layers: config.siren_layers,
@@ -34,8 +35,8 @@ impl Untangling {
             omega_hidden: config.omega_hidden,
         };
         Self {
-            force: ResidualMlp::new(2 * width, width, hidden, width, device),
-            displacement: ModulatedSiren::new(&sizes, device),
+            force: ResidualMlp::new(2 * width, width, hidden, width, start),
+            displacement: ModulatedSiren::new(&sizes, start),
             scale: config.untangling_scale,
         }
     }

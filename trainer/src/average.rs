@@ -103,7 +103,8 @@ mod tests {
             skinning_width: 4,
             ..ModelConfig::default()
         };
-        let model = ClothCombo::new(&config, &Dimensions { joints: 2, shape: 2, pose: 18 }, &device).unwrap();
+        let model =
+            ClothCombo::new(&config, &Dimensions { joints: 2, shape: 2, pose: 18 }, 0, &device).unwrap();
         let before = values(&model);
         let mut average = Average::new(model.valid(), 0.9);
         average.update(&model, 1_000_000);

@@ -33,8 +33,7 @@ pub fn time_stages(
     steps: u64,
 ) -> Result<Vec<StageTime>, DrapeError> {
     let device = device.clone().autodiff();
-    device.seed(config.seed);
-    let model = ClothCombo::new(&config.model, &dimensions(library), &device)?;
+    let model = ClothCombo::new(&config.model, &dimensions(library), config.seed, &device)?;
     let tensors = WardrobeTensors::new(library.clone(), dimensions(library), &device);
     let mut learner = Learner::new(model, new_optimizer(&config.optimizer), &config.optimizer);
     let schedule = Schedule::new(config);

@@ -268,7 +268,7 @@ impl Incident {
             return Err(unusable("does not match its checksum".into()));
         }
         let record = ModuleRecord::load(&file).map_err(|e| unusable(e.to_string()))?;
-        ClothCombo::new(&config.model, &dimensions(library), device)
+        ClothCombo::new(&config.model, &dimensions(library), 0, device)
             .map_err(|e| unusable(e.to_string()))?
             .try_load_record(record)
             .map_err(|e| unusable(e.to_string()))

@@ -61,9 +61,9 @@ impl Session {
     /// When the networks cannot be made, or the model they start from does not fit.
     pub fn new(run: RunDir, config: Config, library: Arc<Library>, device: &Device) -> Result<Self, Report> {
         let device = device.clone().autodiff();
-        device.seed(config.seed);
         let model = match &config.init_from {
-            None => ClothCombo::new(&config.model, &dimensions(&library), &device).into_diagnostic()?,
+            None => ClothCombo::new(&config.model, &dimensions(&library), config.seed, &device)
+                .into_diagnostic()?,
             Some(path) => TrainedModel::open(Path::new(path))?.start_of(&config, &library, &device)?,
         };
         let average = (config.optimizer.ema_decay > 0.0)

@@ -1,10 +1,11 @@
 //! One DiffusionNet block: diffusion, gradient features, MLP, residual.
 
 use burn::module::{Module, Param};
-use burn::tensor::{Device, Tensor};
+use burn::tensor::Tensor;
 
 use super::{ComplexMixing, SpectralDiffusion};
-use crate::linear::{Linear, fan_in_bound, uniform_parameter};
+use crate::initializer::{Initializer, fan_in_bound};
+use crate::linear::Linear;
 use crate::ops::{Activation, activate, activate_residual, gradient_features, product, product_add};
 use crate::tensors::GarmentTensors;
 
@@ -29,16 +30,16 @@ pub struct BlockMlp {
 }
 
 impl BlockMlp {
-    fn new(width: usize, device: &Device) -> Self {
+    fn new(width: usize, start: &mut Initializer) -> Self {
         let bound = fan_in_bound(3 * width);
-        let square = || uniform_parameter([width, width], bound, device);
+        let mut square = || start.uniform([width, width], bound);
         Self {
             input: square(),
             diffused: square(),
             gradient: square(),
-            bias: uniform_parameter([width], bound, device),
-            hidden: Linear::new(width, width, device),
-            output: Linear::new(width, width, device),
+            bias: start.uniform([width], bound),
+            hidden: Linear::new(width, width, start),
+            output: Linear::new(width, width, start),
         }
     }
 }
@@ -57,11 +58,11 @@ pub struct DiffusionBlock {
 }
 
 impl DiffusionBlock {
-    pub(crate) fn new(width: usize, device: &Device) -> Self {
+    pub(crate) fn new(width: usize, start: &mut Initializer) -> Self {
         Self {
-            diffusion: SpectralDiffusion::new(width, device),
-            mixing: ComplexMixing::new(width, device),
-            mlp: BlockMlp::new(width, device),
+            diffusion: SpectralDiffusion::new(width, start),
+            mixing: ComplexMixing::new(width, start),
+            mlp: BlockMlp::new(width, start),
         }
     }
 

@@ -1,9 +1,9 @@
 //! Learned rotation and scaling of gradients between channels.
 
 use burn::module::{Module, Param};
-use burn::tensor::{Device, Tensor};
+use burn::tensor::Tensor;
 
-use crate::linear::{fan_in_bound, uniform_parameter};
+use crate::initializer::{Initializer, fan_in_bound};
 
 /// Complex matrix A that mixes the tangent gradients (as complex numbers) of all channels.
 ///
@@ -17,11 +17,8 @@ pub struct ComplexMixing {
 }
 
 impl ComplexMixing {
-    pub(crate) fn new(width: usize, device: &Device) -> Self {
+    pub(crate) fn new(width: usize, start: &mut Initializer) -> Self {
         let bound = fan_in_bound(width);
-        Self {
-            real: uniform_parameter([width, width], bound, device),
-            imaginary: uniform_parameter([width, width], bound, device),
-        }
+        Self { real: start.uniform([width, width], bound), imaginary: start.uniform([width, width], bound) }
     }
 }

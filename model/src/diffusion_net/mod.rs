@@ -18,8 +18,9 @@ pub(crate) use spectral::MINIMUM_TIME;
 pub use spectral::SpectralDiffusion;
 
 use burn::module::Module;
-use burn::tensor::{Device, Tensor};
+use burn::tensor::Tensor;
 
+use crate::initializer::Initializer;
 use crate::linear::Linear;
 use crate::tensors::GarmentTensors;
 
@@ -38,11 +39,11 @@ pub struct DiffusionNet {
 
 impl DiffusionNet {
     /// A network from 3 coordinates through `blocks` blocks of `width` channels to `outputs` features.
-    pub fn new(blocks: usize, width: usize, outputs: usize, device: &Device) -> Self {
+    pub fn new(blocks: usize, width: usize, outputs: usize, start: &mut Initializer) -> Self {
         Self {
-            first: Linear::new(3, width, device),
-            blocks: (0..blocks).map(|_| DiffusionBlock::new(width, device)).collect(),
-            last: Linear::new(width, outputs, device),
+            first: Linear::new(3, width, start),
+            blocks: (0..blocks).map(|_| DiffusionBlock::new(width, start)).collect(),
+            last: Linear::new(width, outputs, start),
         }
     }
 

@@ -1,9 +1,9 @@
 //! Learned diffusion of every channel, on spectral coefficients.
 
 use burn::module::{Module, Param};
-use burn::tensor::{Device, Tensor};
+use burn::tensor::Tensor;
 
-use crate::linear::parameter;
+use crate::initializer::Initializer;
 
 /// Shortest diffusion time: the published lower bound.
 pub(crate) const MINIMUM_TIME: f64 = 1e-8;
@@ -18,8 +18,8 @@ pub struct SpectralDiffusion {
 }
 
 impl SpectralDiffusion {
-    pub(crate) fn new(width: usize, device: &Device) -> Self {
-        Self { time: parameter(Tensor::zeros([width], device)) }
+    pub(crate) fn new(width: usize, start: &mut Initializer) -> Self {
+        Self { time: start.zeros([width]) }
     }
 
     /// The times in use `[1,C]`: at least [`MINIMUM_TIME`].

@@ -6,12 +6,12 @@ use crate::testing::{
 
 fn net(width: usize) -> DiffusionNet {
     let device = device();
-    let mut net = seeded(5, |device| DiffusionNet::new(3, width, 6, device));
+    let mut net = seeded(5, |start| DiffusionNet::new(3, width, 6, start));
     // Away from the starting times, so that diffusion matters.
     for (index, block) in net.blocks.iter_mut().enumerate() {
         let times = (0..width).map(|channel| 0.002 * (channel + index) as f32 - 0.001).collect::<Vec<_>>();
         let times = Tensor::from_floats(times.as_slice(), &device);
-        block.diffusion.time = crate::linear::parameter(times);
+        block.diffusion.time = burn::module::Param::from_tensor(times);
     }
     net
 }
@@ -81,7 +81,7 @@ fn gradients_match_finite_differences() {
 fn a_time_at_its_lower_bound_still_learns() {
     let device = device();
     let garment = HostGarment::random(60, 12, &[true], 4).tensors(&device);
-    let net = seeded(6, |device| DiffusionNet::new(1, 6, 6, device));
+    let net = seeded(6, |start| DiffusionNet::new(1, 6, 6, start));
     let gradients = parameter_gradients(&net, loss(net.forward(&garment)));
     let (_, time) = gradients.iter().find(|(name, _)| name == "blocks.0.diffusion.time").expect("name");
     assert!(time.iter().any(|gradient| gradient.abs() > 0.0));
@@ -93,8 +93,8 @@ fn a_time_at_its_lower_bound_still_learns() {
 #[test]
 fn diffusion_damps_each_eigenvector_by_its_eigenvalue() {
     let device = device().inner();
-    let mut diffusion = SpectralDiffusion::new(2, &device);
-    diffusion.time = crate::linear::parameter(Tensor::from_floats([0.1, 0.5], &device));
+    let mut diffusion = seeded(1, |start| SpectralDiffusion::new(2, start));
+    diffusion.time = burn::module::Param::from_tensor(Tensor::from_floats([0.1, 0.5], &device));
     let decay = Tensor::<2>::from_floats([[0.0], [-2.0], [-7.0]], &device);
     let damped = diffusion.diffuse(Tensor::ones([3, 2], &device), decay);
     let expected = [[1.0, 1.0], [(-0.2f32).exp(), (-1.0f32).exp()], [(-0.7f32).exp(), (-3.5f32).exp()]];

@@ -28,7 +28,7 @@ struct Case {
 fn case() -> Case {
     let device = device();
     Case {
-        siren: seeded(11, |device| ModulatedSiren::new(&SIZES, device)),
+        siren: seeded(11, |start| ModulatedSiren::new(&SIZES, start)),
         coordinates: uniform(60, 3, 0.8, 1, &device),
         vertex: uniform(60, 7, 2.0, 2, &device),
         garment: uniform(3, 5, 2.0, 3, &device),

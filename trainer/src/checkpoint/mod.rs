@@ -155,7 +155,7 @@ impl Checkpoint {
     ) -> Result<ClothCombo, CheckpointError> {
         let unusable = |reason: String| CheckpointError::Unusable { path: self.path.clone(), reason };
         let record = ModuleRecord::load(self.path.join(file)).map_err(|e| unusable(e.to_string()))?;
-        ClothCombo::new(&config.model, &self.state.dimensions(), device)
+        ClothCombo::new(&config.model, &self.state.dimensions(), 0, device)
             .map_err(|e| unusable(e.to_string()))?
             .try_load_record(record)
             .map_err(|e| unusable(e.to_string()))

@@ -46,7 +46,7 @@ impl TrainedModel {
     /// When the stored parameters do not fit the configuration.
     pub fn networks(&self, device: &Device) -> Result<ClothCombo, CheckpointError> {
         let unusable = |reason: String| CheckpointError::Unusable { path: self.folder.clone(), reason };
-        let mut model = ClothCombo::new(&self.config.model, &self.state.dimensions(), device)
+        let mut model = ClothCombo::new(&self.config.model, &self.state.dimensions(), 0, device)
             .map_err(|e| unusable(e.to_string()))?;
         let mut store = SafetensorsStore::from_file(self.folder.join(MODEL_EXCHANGE));
         let applied = model.load_from(&mut store).map_err(|e| unusable(format!("{MODEL_EXCHANGE}: {e}")))?;

@@ -89,9 +89,8 @@ impl Subject {
             miette!("the configuration has {} stages, there is no stage {stage}", boundaries.len())
         })?;
         let device = device.clone().autodiff();
-        device.seed(config.seed);
         let dimensions = state(&library, 0).dimensions();
-        let model = ClothCombo::new(&config.model, &dimensions, &device).into_diagnostic()?;
+        let model = ClothCombo::new(&config.model, &dimensions, config.seed, &device).into_diagnostic()?;
         let learner = Learner::new(model, new_optimizer(&config.optimizer), &config.optimizer);
         let tensors = Arc::new(WardrobeTensors::new(library, dimensions, &device));
         Ok(Self { config: Arc::new(config), tensors, learner, device, first_step })
