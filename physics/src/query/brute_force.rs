@@ -1,6 +1,7 @@
 //! The same queries without an accelerator, in O(V) or O(F) each: the oracles that the fast ones are tested against.
 
-use crate::query::closest_point::{closest_on_triangle, pseudo_normals};
+use crate::query::closest_point::closest_on_triangle;
+use crate::query::pseudo_normal::{FacesAtVertex, PseudoNormals};
 use crate::query::{Distance, Gap};
 use crate::real::Real;
 use crate::vec3;
@@ -55,7 +56,6 @@ pub fn gap(
             Gap { gap: vec3::dot(vec3::sub(p, position), normal), gradient: normal, vertex }
         }
         Distance::ClosestPoint | Distance::Union => {
-            let (at_vertex, at_edge) = pseudo_normals(positions, faces);
             let (index, found) = faces
                 .iter()
                 .map(|face| closest_on_triangle(p, face.map(|v| positions[v as usize])))
@@ -63,14 +63,8 @@ pub fn gap(
                 .min_by(|a, b| a.1.distance_squared.total_cmp(&b.1.distance_squared))
                 .expect("a surface has faces");
             let face = faces[index];
-            let normal = match found.feature {
-                super::Feature::Vertex(corner) => at_vertex[face[corner] as usize],
-                super::Feature::Edge(edge) => at_edge[index][edge],
-                super::Feature::Face => {
-                    let [a, b, c] = face.map(|v| positions[v as usize]);
-                    vec3::normalized(vec3::cross(vec3::sub(b, a), vec3::sub(c, a)))
-                }
-            };
+            let at_vertex = &FacesAtVertex::new(positions.len(), faces);
+            let normal = PseudoNormals { positions, faces, at_vertex }.at(index as u32, found.feature);
             let offset = vec3::sub(p, found.position);
             let sign = if vec3::dot(offset, normal) < 0.0 { -1.0 } else { 1.0 };
             let corner =

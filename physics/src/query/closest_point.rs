@@ -4,12 +4,11 @@
 //! an edge or at a vertex (Bærentzen and Aanæs, "Signed distance computation using the angle weighted pseudonormal", IEEE
 //! TVCG 2005). All of it is `f64`, whatever the caller's scalar: the sign must not depend on rounding.
 
-use std::collections::HashMap;
-
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::Vector;
 use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
 
+use super::pseudo_normal::{FacesAtVertex, PseudoNormals};
 use crate::vec3;
 
 /// Part of a triangle.
@@ -43,9 +42,7 @@ pub struct ClosestPoint {
     positions: Vec<[f64; 3]>,
     faces: Vec<[u32; 3]>,
     bvh: Bvh,
-    vertex_normals: Vec<[f64; 3]>,
-    /// Pseudo-normals of a face's three edges.
-    edge_normals: Vec<[[f64; 3]; 3]>,
+    at_vertex: FacesAtVertex,
 }
 
 impl std::fmt::Debug for ClosestPoint {
@@ -58,7 +55,7 @@ impl std::fmt::Debug for ClosestPoint {
 }
 
 impl ClosestPoint {
-    /// Builds the tree and the pseudo-normals. `positions` `[V, 3]` (m), `faces` `[F, 3]` with every index below `V`.
+    /// Builds the tree. `positions` `[V, 3]` (m), `faces` `[F, 3]` with every index below `V`.
     ///
     /// Faces with a corner that is not finite are left out: nothing is ever closest to them.
     pub fn new(positions: Vec<[f64; 3]>, faces: &[[u32; 3]]) -> Self {
@@ -70,8 +67,8 @@ impl ClosestPoint {
         let boxes: Vec<Aabb> =
             faces.iter().map(|face| triangle_box(face.map(|v| positions[v as usize]))).collect();
         let bvh = Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes);
-        let (vertex_normals, edge_normals) = pseudo_normals(&positions, &faces);
-        Self { positions, faces, bvh, vertex_normals, edge_normals }
+        let at_vertex = FacesAtVertex::new(positions.len(), &faces);
+        Self { positions, faces, bvh, at_vertex }
     }
 
     /// The closest point of the surface; `None` for a query that is not finite or a surface without a face.
@@ -109,15 +106,9 @@ impl ClosestPoint {
     }
 
     fn feature_normal(&self, face: u32, feature: Feature) -> [f64; 3] {
-        let corners = self.faces[face as usize];
-        match feature {
-            Feature::Vertex(corner) => self.vertex_normals[corners[corner] as usize],
-            Feature::Edge(edge) => self.edge_normals[face as usize][edge],
-            Feature::Face => {
-                let [a, b, c] = self.corners(face);
-                vec3::normalized(vec3::cross(vec3::sub(b, a), vec3::sub(c, a)))
-            }
-        }
+        let Self { positions, faces, at_vertex, .. } = self;
+        let normals = PseudoNormals { positions, faces, at_vertex };
+        normals.at(face, feature)
     }
 }
 
@@ -217,47 +208,6 @@ fn closest_on_edges(p: [f64; 3], corners: [[f64; 3]; 3]) -> TrianglePoint {
         barycentric: [1.0, 0.0, 0.0],
         feature: Feature::Vertex(0),
     })
-}
-
-/// Angle-weighted vertex normals `[V]` and, per face, the normals of its edges: the sum of the unit normals of all faces that
-/// share the edge. A sum that vanishes on an edge is replaced by that of its ends.
-pub(super) fn pseudo_normals(
-    positions: &[[f64; 3]],
-    faces: &[[u32; 3]],
-) -> (Vec<[f64; 3]>, Vec<[[f64; 3]; 3]>) {
-    let key = |a: u32, b: u32| (a.min(b), a.max(b));
-    let mut at_vertex = vec![[0.0; 3]; positions.len()];
-    let mut at_edge: HashMap<(u32, u32), [f64; 3]> = HashMap::with_capacity(2 * faces.len());
-    for face in faces {
-        let [a, b, c] = face.map(|v| positions[v as usize]);
-        let normal = vec3::normalized(vec3::cross(vec3::sub(b, a), vec3::sub(c, a)));
-        for corner in 0..3 {
-            let [here, next, previous] = [0, 1, 2].map(|step| face[(corner + step) % 3]);
-            let along = vec3::sub(positions[next as usize], positions[here as usize]);
-            let back = vec3::sub(positions[previous as usize], positions[here as usize]);
-            let angle = vec3::norm(vec3::cross(along, back)).atan2(vec3::dot(along, back));
-            vec3::axpy(&mut at_vertex[here as usize], angle, normal);
-            vec3::accumulate(at_edge.entry(key(here, next)).or_insert([0.0; 3]), normal);
-        }
-    }
-    for normal in &mut at_vertex {
-        *normal = vec3::normalized(*normal);
-    }
-    let edge_normals = faces
-        .iter()
-        .map(|face| {
-            std::array::from_fn(|edge| {
-                let (from, to) = (face[edge], face[(edge + 1) % 3]);
-                let normal = vec3::normalized(at_edge.get(&key(from, to)).copied().unwrap_or([0.0; 3]));
-                if normal == [0.0; 3] {
-                    vec3::normalized(vec3::add(at_vertex[from as usize], at_vertex[to as usize]))
-                } else {
-                    normal
-                }
-            })
-        })
-        .collect();
-    (at_vertex, edge_normals)
 }
 
 /// The smallest box around a triangle.

@@ -15,6 +15,7 @@ use std::sync::OnceLock;
 use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
 
 use super::closest_point::triangle_box;
+use super::pseudo_normal::FacesAtVertex;
 use super::{ClosestPoint, SurfacePoint};
 use crate::contact::self_triangle_pairs;
 use crate::vec3::{self, add, add_scaled, cross, dot, normalized, scale, sub};
@@ -139,16 +140,16 @@ impl UnionDistance {
 
 /// Which of some faces that are no seam have the outside of the union before them and its inside behind them.
 fn exposed(all: &Crossings, faces: &[[u32; 3]], is_seam: &[bool]) -> Vec<bool> {
-    let mut edges: Vec<([u32; 2], u32)> = Vec::with_capacity(3 * faces.len());
-    for (f, face) in faces.iter().enumerate().filter(|(f, _)| !is_seam[*f]) {
-        let ends = [0, 1, 2].map(|e| [face[e], face[(e + 1) % 3]]);
-        edges.extend(ends.map(|[a, b]| ([a.min(b), a.max(b)], f as u32)));
-    }
-    edges.sort_unstable();
+    let at_vertex = FacesAtVertex::new(all.positions.len(), faces);
     let mut root: Vec<u32> = (0..faces.len() as u32).collect();
-    for pair in edges.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
-        let (a, b) = (find(&mut root, pair[0].1), find(&mut root, pair[1].1));
-        root[a.max(b) as usize] = a.min(b);
+    for (f, [a, b, c]) in (0u32..).zip(faces).filter(|(f, _)| !is_seam[*f as usize]) {
+        for (from, to) in [(*a, *b), (*b, *c), (*c, *a)] {
+            let beside = at_vertex.of(from).iter().filter(|&&g| g > f && !is_seam[g as usize]);
+            for &g in beside.filter(|&&g| faces[g as usize].contains(&to)) {
+                let (one, other) = (find(&mut root, f), find(&mut root, g));
+                root[one.max(other) as usize] = one.min(other);
+            }
+        }
     }
     let roots: Vec<u32> = (0..faces.len() as u32).map(|f| find(&mut root, f)).collect();
     // The side is asked at the largest face of each piece, where rounding matters least.

@@ -282,7 +282,7 @@ impl Draper {
         let (resolved, times) = match self.settings.resolve {
             true => {
                 let at_the_end = || Waypoint {
-                    body: Surface::new(surface.positions.clone(), surface.faces.clone()),
+                    body: surface.clone(),
                     draped: parts.iter().map(|p| p.to_vec()).collect(),
                     transforms: transforms.clone(),
                 };

@@ -83,7 +83,7 @@ impl Draper {
         let on_the_way = BodyState { shape: body.shape.clone(), pose, surface: None, place };
         let made = self.networked(outfit, &on_the_way)?;
         Ok(Waypoint {
-            body: Surface::new(made.surface.positions.clone(), made.surface.faces.clone()),
+            body: made.surface,
             draped: outfit.split(&made.network).into_iter().map(<[_]>::to_vec).collect(),
             transforms: made.transforms,
         })

@@ -79,7 +79,7 @@ impl<'a> Dressing<'a> {
         }
         let scene = prepare(self.library, self.losses, draw, 1.0).map_err(DrapeError::from)?;
         Ok(Waypoint {
-            body: scene.exact_body(),
+            body: Arc::new(scene.exact_body()),
             draped: wide(&scene, &self.drape(&scene)?),
             transforms: skinning_transforms(&scene),
         })

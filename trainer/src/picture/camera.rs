@@ -233,6 +233,23 @@ mod tests {
     }
 
     #[test]
+    fn a_wide_skirt_is_in_the_picture_and_what_flew_off_is_not() {
+        let skirt = [[-0.9, -0.5, 0.0], [0.9, -0.5, 0.0], [0.0, -0.5, 0.9]];
+        let gone = [[40.0, 0.0, 0.0], [40.0, 1.0, 0.0], [41.0, 0.0, 0.0]];
+        for view in [View::Front, View::Side, View::ThreeQuarter] {
+            let frame = |figures: &[Figure<'_>]| Camera::framing(figures, view, [512, 768]);
+            let dressed = frame(&[figure(&BOX), figure(&skirt)]);
+            for p in BOX.iter().chain(&skirt) {
+                let [x, y] = dressed.project(*p).unwrap().ndc;
+                assert!(x.abs().max(y.abs()) <= FILL + 1e-9, "{view:?} {p:?}");
+            }
+            let [alone, beside] = [frame(&[figure(&BOX)]), frame(&[figure(&BOX), figure(&gone)])];
+            assert_eq!(alone.pixels_per_metre(100), beside.pixels_per_metre(100));
+            assert!(dressed.pixels_per_metre(100) <= alone.pixels_per_metre(100));
+        }
+    }
+
+    #[test]
     fn left_hand_is_right_in_front_and_left_in_back_and_nearer_is_less_deep() {
         let hand = [0.4, 0.0, 0.0];
         let front = Camera::framing(&[figure(&BOX)], View::Front, [100, 100]);

@@ -74,12 +74,13 @@ pub fn ask(
     subject: &Subject,
     question: usize,
     scenes: usize,
+    settings: &ResolveSettings,
     done: &(dyn Fn() + Sync),
 ) -> Result<Vec<Extreme>, Report> {
     cases()
         .iter()
         .enumerate()
-        .map(|(i, case)| measure(subject, [question, 1000 * i], case, scenes, done))
+        .map(|(i, case)| measure(subject, [question, 1000 * i], case, scenes, settings, done))
         .collect()
 }
 
@@ -88,11 +89,11 @@ fn measure(
     [question, first]: [usize; 2],
     case: &Case,
     scenes: usize,
+    settings: &ResolveSettings,
     done: &(dyn Fn() + Sync),
 ) -> Result<Extreme, Report> {
     let all: Vec<usize> = (0..subject.library.wardrobe.len()).collect();
     let networks = subject.networks();
-    let settings = ResolveSettings::default();
     let dressing = Dressing::new(&subject.library, &subject.config.losses, Some(&networks));
     let (mut ratios, mut depths) = (Vec::new(), Vec::new());
     let mut found = Extreme {
@@ -142,7 +143,7 @@ fn measure(
             .map(|(a, b)| (0..3).map(|axis| f64::from(a[axis] - b[axis]).powi(2)).sum::<f64>().sqrt());
         found.farthest_mm = moved.map(|m| 1e3 * m).fold(found.farthest_mm, f64::max);
         let draped = dressing.of(&scene, &draped.posed);
-        match OutfitResult::new(index, &draped, &settings) {
+        match OutfitResult::new(index, &draped, settings) {
             Ok((result, _)) => {
                 found.clear += f64::from(u8::from(result.after.is_clear())) / scenes as f64;
                 depths.push(result.after.max_depth_mm);

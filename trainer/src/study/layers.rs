@@ -6,7 +6,7 @@ use super::table::{Table, number, percent};
 use crate::drape::NetworkDrape;
 use crate::evaluate::certificates::{Dressing, OutfitResult};
 use crate::scene::{PreparedScene, Unseen, draw_study};
-use clothcombo_physics::contact::resolve::ResolveSettings;
+use clothcombo_physics::contact::resolve::{Certificate, ResolveSettings};
 use clothcombo_physics::energy::Term;
 use miette::{IntoDiagnostic, Report};
 use serde::Serialize;
@@ -18,6 +18,8 @@ pub struct LayerCount {
     pub layers: usize,
     /// Number of outfits.
     pub scenes: usize,
+    /// How many of them, the first, went through the post-process.
+    pub resolved: usize,
     /// Strain of each layer in the outfit over that of the same garment draped alone, innermost first.
     pub strain: Vec<Ratio>,
     /// Median over the outfits of the ratio of each.
@@ -28,7 +30,8 @@ pub struct LayerCount {
     pub wrong_side: Estimate,
     /// The same after the post-process.
     pub wrong_side_resolved: Estimate,
-    /// Share of outfits without an intersection with the body or between garments, before and after the post-process.
+    /// Share of outfits without an intersection with the body or between garments: all before the post-process, those that
+    /// went through it after it.
     pub clear: [f64; 2],
     /// Rise of the strain energy by the post-process, median share.
     pub strain_added: f64,
@@ -38,7 +41,8 @@ pub struct LayerCount {
     pub post_ms: Estimate,
 }
 
-/// Drapes `scenes` random outfits of `layers` garments of the whole wardrobe, held-out ones among them, in random order.
+/// Drapes `scenes` random outfits of `layers` garments of the whole wardrobe, held-out ones among them, in random order, and
+/// resolves the first `resolved` of them with `settings`.
 ///
 /// # Errors
 /// When a scene cannot be draped or resolved.
@@ -46,15 +50,15 @@ pub fn ask(
     subject: &Subject,
     question: usize,
     layers: usize,
-    scenes: usize,
+    [scenes, resolved]: [usize; 2],
+    settings: &ResolveSettings,
     done: &(dyn Fn() + Sync),
 ) -> Result<LayerCount, Report> {
     let all: Vec<usize> = (0..subject.library.wardrobe.len()).collect();
     let networks = subject.networks();
     let dressing = Dressing::new(&subject.library, &subject.config.losses, Some(&networks));
-    let settings = ResolveSettings::default();
     let (mut single, mut layered) = (vec![Vec::new(); layers], vec![Vec::new(); layers]);
-    let (mut wrong_single, mut results) = (Vec::new(), Vec::new());
+    let (mut wrong_single, mut before, mut results) = (Vec::new(), Vec::new(), Vec::new());
     for index in 0..scenes {
         let draw =
             draw_study(&subject.library, subject.config.seed, [question, index], &all, layers, Unseen::Poses);
@@ -67,12 +71,15 @@ pub fn ask(
         let alone = dressing.of(&scene, &drape.single.posed);
         wrong_single.push(alone.certificate().into_diagnostic()?.order_violations);
         let draped = dressing.of(&scene, &drape.layered.posed);
-        results.push(OutfitResult::new(index, &draped, &settings)?.0);
+        if index < resolved {
+            results.push(OutfitResult::new(index, &draped, settings)?.0);
+        }
+        before.push(draped.certificate().into_diagnostic()?);
         done();
     }
-    let over = |f: &dyn Fn(&OutfitResult) -> f64| Estimate::of(&results.iter().map(f).collect::<Vec<_>>());
-    let clear = |f: &dyn Fn(&OutfitResult) -> bool| {
-        results.iter().filter(|r| f(r)).count() as f64 / results.len().max(1) as f64
+    let shares = |values: &mut dyn Iterator<Item = f64>| Estimate::of(&values.collect::<Vec<_>>());
+    let clear = |all: &mut dyn Iterator<Item = bool>| {
+        shares(&mut all.map(|is_clear| f64::from(u8::from(is_clear)))).spread.mean
     };
     let added: Vec<f64> = results.iter().filter_map(|r| r.strain_added).collect();
     let times: Vec<f64> = results.iter().flat_map(|r| r.milliseconds.clone()).collect();
@@ -82,14 +89,18 @@ pub fn ask(
     Ok(LayerCount {
         layers,
         scenes,
+        resolved: results.len(),
         strain: (0..layers).map(|l| Ratio::of(&layered[l], &single[l])).collect(),
         strain_median: (0..layers).map(|l| Estimate::of(&ratios(l)).spread.median).collect(),
         wrong_side_single: Estimate::of(&wrong_single),
-        wrong_side: over(&|r| r.before.order_violations),
-        wrong_side_resolved: over(&|r| r.after.order_violations),
-        clear: [clear(&|r| r.before.is_clear()), clear(&|r| r.after.is_clear())],
+        wrong_side: shares(&mut before.iter().map(|c| c.order_violations)),
+        wrong_side_resolved: shares(&mut results.iter().map(|r| r.after.order_violations)),
+        clear: [
+            clear(&mut before.iter().map(Certificate::is_clear)),
+            clear(&mut results.iter().map(|r| r.after.is_clear())),
+        ],
         strain_added: Estimate::of(&added).spread.median,
-        layer_pairs: over(&|r| r.before.layer_triangle_pairs as f64),
+        layer_pairs: shares(&mut before.iter().map(|c| c.layer_triangle_pairs as f64)),
         post_ms: Estimate::of(&times),
     })
 }
@@ -142,10 +153,11 @@ pub fn tables(counts: &[LayerCount]) -> Vec<Table> {
             "outfits",
             "wrong side, each alone [%]",
             "untangled [%]",
-            "after the post-process [%]",
             "pairs between garments",
-            "clear before [%]",
-            "clear after [%]",
+            "clear [%]",
+            "post-processed outfits",
+            "wrong side then [%]",
+            "clear then [%]",
             "strain added, median [%]",
             "post-process per garment [ms], median",
         ],
@@ -157,9 +169,10 @@ pub fn tables(counts: &[LayerCount]) -> Vec<Table> {
             c.scenes.to_string(),
             percent(c.wrong_side_single.spread.mean),
             percent(c.wrong_side.spread.mean),
-            percent(c.wrong_side_resolved.spread.mean),
             number(c.layer_pairs.spread.mean),
             percent(c.clear[0]),
+            c.resolved.to_string(),
+            percent(c.wrong_side_resolved.spread.mean),
             percent(c.clear[1]),
             percent(c.strain_added),
             number(c.post_ms.spread.median),

@@ -31,6 +31,7 @@ pub use variants::Variant;
 
 use crate::picture::{draw_lines, png_bytes};
 use crate::scene::Unseen;
+use clothcombo_physics::contact::resolve::ResolveSettings;
 use methods::Question;
 use miette::{IntoDiagnostic, Report};
 use serde::Serialize;
@@ -47,10 +48,12 @@ pub struct Sizes {
     pub unseen_garments: usize,
     /// Wrong embeddings, per kind of garment.
     pub embeddings: usize,
-    /// Outfits per number of layers up to 6.
-    pub layered: usize,
-    /// Outfits of 7, 8 and 12 layers each.
-    pub many_layers: usize,
+    /// Outfits per number of layers up to 6, and how many of them go through the post-process, which takes seconds.
+    pub layered: [usize; 2],
+    /// The same for 7, 8 and 12 layers.
+    pub many_layers: [usize; 2],
+    /// Most steps of the post-process on the way from the T-pose.
+    pub steps: usize,
     /// Scenes per further model.
     pub variants: usize,
     /// Outfits that are timed.
@@ -70,12 +73,13 @@ impl Sizes {
         unseen_clips: 200,
         unseen_garments: 200,
         embeddings: 100,
-        layered: 24,
-        many_layers: 8,
+        layered: [24, 8],
+        many_layers: [8, 2],
+        steps: 64,
         variants: 100,
         times: 20,
         pareto: 16,
-        extremes: 6,
+        extremes: 3,
         gallery: true,
     };
     /// Enough to see that everything works.
@@ -84,8 +88,9 @@ impl Sizes {
         unseen_clips: 12,
         unseen_garments: 12,
         embeddings: 8,
-        layered: 2,
-        many_layers: 1,
+        layered: [2, 1],
+        many_layers: [1, 1],
+        steps: 0,
         variants: 8,
         times: 3,
         pareto: 2,
@@ -98,8 +103,8 @@ impl Sizes {
             + self.unseen_clips
             + self.unseen_garments
             + 2 * self.embeddings
-            + 6 * self.layered
-            + 3 * self.many_layers
+            + 6 * self.layered[0]
+            + 3 * self.many_layers[0]
             + variants * self.variants
             + self.times
             + self.pareto
@@ -162,6 +167,7 @@ pub fn study(
 ) -> Result<Study, Report> {
     let variant_count = if ablations.is_empty() { 0 } else { ablations.len() + 1 } + 2 * specific.len();
     let steps = sizes.steps(variant_count);
+    let settings = ResolveSettings { steps: sizes.steps, ..ResolveSettings::default() };
     let begin = |part: &str| progress(Some(part), steps);
     let done = || progress(None, steps);
 
@@ -200,7 +206,7 @@ pub fn study(
     let mut layers = Vec::new();
     for count in (1..=6).chain([7, 8, 12]) {
         let scenes = if count <= 6 { sizes.layered } else { sizes.many_layers };
-        layers.push(layers::ask(subject, 100 + count, count, scenes, &done)?);
+        layers.push(layers::ask(subject, 100 + count, count, scenes, &settings, &done)?);
     }
 
     begin("Table 4: ablations");
@@ -229,11 +235,11 @@ pub fn study(
     }
 
     begin("Table 5: times");
-    let times = times::ask(subject, 6, sizes.times, &done)?;
+    let times = times::ask(subject, 6, sizes.times, &settings, &done)?;
     begin("speed against error");
-    let pareto = pareto::ask(subject, 7, sizes.pareto, &done)?;
+    let pareto = pareto::ask(subject, 7, sizes.pareto, &settings, &done)?;
     begin("stability");
-    let extremes = extremes::ask(subject, 8, sizes.extremes, &done)?;
+    let extremes = extremes::ask(subject, 8, sizes.extremes, &settings, &done)?;
     begin("pictures");
     let pictures = if sizes.gallery { gallery::draw(subject, 9, &done)? } else { Vec::new() };
     Ok(Study {

@@ -45,6 +45,7 @@ pub fn ask(
     subject: &Subject,
     question: usize,
     outfits: usize,
+    settings: &ResolveSettings,
     done: &(dyn Fn() + Sync),
 ) -> Result<Times, Report> {
     let all: Vec<usize> = (0..subject.library.wardrobe.len()).collect();
@@ -70,7 +71,7 @@ pub fn ask(
         let (body, start) = subject.tensors.body(&scene.bodies[0]).into_diagnostic()?;
         let (drape, [draping, untangling]) = drape_on(&subject.model, &outfit, &embeddings, &body, start);
         let draped = dressing.of(&scene, &drape.layered.posed);
-        let resolved = draped.resolved(&ResolveSettings::default())?;
+        let resolved = draped.resolved(settings)?;
         let post: Duration = resolved.garments.iter().map(|g| g.time).sum();
         if index > 0 {
             let times = [embedding, ms(draping), ms(untangling), ms(post), ms(resolved.body_time) * count];

@@ -3,9 +3,8 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::near::near_cloth;
-use super::obstacle::{BodyObstacle, GaveWay, LayerObstacle};
-use super::relief::{Relief, Room};
+use super::body::{with_body, with_drawn};
+use super::obstacle::{BodyObstacle, LayerObstacle};
 use super::{Layer, ResolveError, ResolveSettings};
 use crate::contact::triangle_pair::Triangle;
 use crate::contact::{TriangleTree, contours, self_contours};
@@ -129,10 +128,14 @@ impl Certificate {
 /// When positions do not fit their garment or are not finite, or the body has no surface.
 pub fn certify(body: &Surface<f64>, layers: &[Layer<'_>]) -> Result<Certificate, ResolveError> {
     super::check(body, layers)?;
-    let near = near_cloth(&body.positions, &super::triangles(layers));
-    let relief = Relief::of(body, &near, layers.len(), Room::Ample);
-    let gave_way = relief.as_ref().map(GaveWay::NotYet);
-    Ok(certificate(&BodyObstacle::new(body, &near, gave_way), layers))
+    Ok(with_drawn(body, layers, |drawn| {
+        let found = certificate(&drawn, layers);
+        if found.body_triangle_pairs == 0 {
+            return found;
+        }
+        // Which of the pairs are narrow is only known of a body that gives way.
+        with_body(drawn, layers.len(), |body| certificate(&body.drawn, layers))
+    }))
 }
 
 /// Less strain energy than this [J] is rounding of a garment in its rest shape.

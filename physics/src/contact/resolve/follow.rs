@@ -5,15 +5,14 @@
 //! each step is short: what was resolved before is carried along by skinning and by what the drape changes, crossings are
 //! shallow, and the nearest way out is right. Where a step leaves crossings, a shorter one is tried.
 
+use std::sync::Arc;
 use std::time::Instant;
 
-use super::certificate::certificate;
-use super::near::near_cloth;
-use super::obstacle::{BodyObstacle, GaveWay};
-use super::relief::{Relief, Room};
+use super::body::{Body, with_body, with_drawn};
+use super::obstacle::BodyObstacle;
 use super::{
-    GarmentWork, Layer, ResolveError, ResolveSettings, Resolved, Untangled, at, check, resolve, triangles,
-    untangled,
+    Layer, ResolveError, ResolveSettings, Resolved, Untangled, at, check, is_near, resolved, settled,
+    simply_resolved, untangled,
 };
 use crate::query::Surface;
 use crate::transform::{Transform, into_frame, out_of_frame};
@@ -23,10 +22,8 @@ use crate::vec3::{add, scale, sub};
 const LONGEST: f64 = 1.0 / 8.0;
 /// The shortest one: it is taken even where it leaves crossings.
 const SHORTEST: f64 = 1.0 / 128.0;
-/// Steps after which the way is given up…
-const MOST_STEPS: usize = 64;
-/// …or as many of the shortest that left crossings.
-const MOST_FAILURES: usize = 6;
+/// The way is given up after as many of the shortest that left crossings.
+const MOST_FAILURES: usize = 3;
 /// Steps without crossings after which a longer one is tried.
 const GOOD_STEPS: usize = 2;
 /// How much of what the post-process changed is kept from step to step, so that old changes fade.
@@ -35,7 +32,7 @@ const KEPT: f64 = 0.95;
 /// What is somewhere along the way.
 pub struct Waypoint {
     /// The body.
-    pub body: Surface<f64>,
+    pub body: Arc<Surface<f64>>,
     /// The drape on it, `[V, 3]` per garment [m].
     pub draped: Vec<Vec<[f64; 3]>>,
     /// Skinning transforms of all vertices, garment after garment, from one and the same state.
@@ -58,11 +55,12 @@ impl Reached {
     }
 }
 
-/// As [`resolve`], with a second way out: where crossings of `layers` on `body` cannot be mended, the garments are taken along
-/// from the stage at 0, the T-pose, to the stage at 1, which is `body` with `layers`. What leaves fewer crossings is returned.
+/// As [`super::resolve`], with a second way out: where crossings of `layers` on `body` cannot be mended, the garments are taken
+/// along from the stage at 0, the T-pose, to the stage at 1, which is `body` with `layers`. What leaves fewer crossings is
+/// returned.
 ///
 /// # Errors
-/// Those of `stage_at` and of [`resolve`].
+/// Those of `stage_at` and of [`super::resolve`].
 pub fn resolve_along<E: From<ResolveError>>(
     body: &Surface<f64>,
     layers: &[Layer<'_>],
@@ -70,33 +68,41 @@ pub fn resolve_along<E: From<ResolveError>>(
     mut stage_at: impl FnMut(f64) -> Result<Waypoint, E>,
 ) -> Result<Resolved, E> {
     let start = Instant::now();
-    let direct = resolve(body, layers, settings)?;
-    if direct.certificate.is_clear() {
-        return Ok(direct);
-    }
-    let limit = settings.time.map(|limit| limit * layers.len() as u32);
-    let is_late = || limit.is_some_and(|limit| start.elapsed() > limit);
-    let stage = stage_at(0.0)?;
-    let first = on_stage(layers, &stage, settings, std::iter::once(stage.draped.clone()))?;
-    let reached = Reached::new(stage, first.positions);
-    let (followed, steps) = follow(layers, reached, LONGEST, settings, stage_at, &is_late)?;
-    let mut best = direct;
-    if let Some(Untangled { positions, rounds, .. }) = followed {
-        let found = finished(body, layers, positions, rounds, settings)?;
-        if found.certificate.between() < best.certificate.between() {
-            best = Resolved { body_time: best.body_time, ..found };
+    settings.check()?;
+    check(body, layers)?;
+    with_drawn(body, layers, |drawn| {
+        let simple = simply_resolved(&drawn, layers, settings, start);
+        if simple.certificate.is_clear() {
+            return Ok(simple);
         }
-    }
-    best.compare(layers, start.elapsed());
-    best.steps = steps;
-    Ok(best)
+        with_body(drawn, layers.len(), |body| {
+            let mut best = resolved(body, layers, settings, simple);
+            if best.certificate.is_clear() || settings.steps == 0 {
+                return Ok(best);
+            }
+            let stage = stage_at(0.0)?;
+            let first = on_stage(layers, &stage, settings, std::slice::from_ref(&stage.draped))?;
+            let reached = Reached::new(stage, first.positions);
+            let way = Way { layers, end: body, settings, start };
+            let (followed, steps) = way.follow(reached, LONGEST, stage_at)?;
+            if let Some(found) = followed {
+                let found = settled(body, layers, found, settings);
+                if found.certificate.between() < best.certificate.between() {
+                    best = Resolved { body_time: best.body_time, ..found };
+                }
+            }
+            best.compare(layers, start.elapsed());
+            best.steps = steps;
+            Ok(best)
+        })
+    })
 }
 
 /// Resolves `layers` on `body`, the stage at 1, by carrying on from `before`, the frame of a motion before it, at 0. What
 /// was done there is kept, fading, so that nothing pops. None where that leaves crossings, but for narrow ones.
 ///
 /// # Errors
-/// Those of `stage_at` and of [`resolve`].
+/// Those of `stage_at` and of [`super::resolve`].
 pub fn resolve_after<E: From<ResolveError>>(
     before: Reached,
     body: &Surface<f64>,
@@ -106,102 +112,107 @@ pub fn resolve_after<E: From<ResolveError>>(
 ) -> Result<Option<Resolved>, E> {
     let start = Instant::now();
     settings.check()?;
-    let limit = settings.time.map(|limit| limit * layers.len() as u32);
-    let is_late = || limit.is_some_and(|limit| start.elapsed() > limit);
-    let (followed, steps) = follow(layers, before, 1.0, settings, stage_at, &is_late)?;
-    let Some(Untangled { positions, rounds, .. }) = followed else { return Ok(None) };
-    let mut resolved = finished(body, layers, positions, rounds, settings)?;
-    if resolved.certificate.between() > resolved.certificate.narrow_triangle_pairs {
-        return Ok(None);
-    }
-    resolved.compare(layers, start.elapsed());
-    resolved.steps = steps;
-    Ok(Some(resolved))
-}
-
-/// Garments at the end of a way, with their certificate.
-fn finished(
-    body: &Surface<f64>,
-    layers: &[Layer<'_>],
-    positions: Vec<Vec<[f64; 3]>>,
-    rounds: usize,
-    settings: &ResolveSettings,
-) -> Result<Resolved, ResolveError> {
-    let start = Instant::now();
-    let now = at(layers, &positions);
-    check(body, &now)?;
-    let near = near_cloth(&body.positions, &triangles(&now));
-    let relief = Relief::of(body, &near, layers.len(), Room::Ample);
-    let judge = BodyObstacle::new(body, &near, relief.as_ref().map(GaveWay::NotYet));
-    let certificate = certificate(&judge, &now);
-    let certificate_time = start.elapsed();
-    let garments = vec![GarmentWork { rounds, ..GarmentWork::default() }; layers.len()];
-    let mut resolved = Resolved { positions, certificate, garments, certificate_time, ..Resolved::default() };
-    resolved.close_in((body, &near), &judge, layers, settings);
-    Ok(resolved)
-}
-
-/// Takes garments from where they are `reached`, at 0, to the stage at 1, by steps of at most `longest`; also how many steps were
-/// tried. None where the way was given up.
-fn follow<E: From<ResolveError>>(
-    layers: &[Layer<'_>],
-    mut reached: Reached,
-    longest: f64,
-    settings: &ResolveSettings,
-    mut stage_at: impl FnMut(f64) -> Result<Waypoint, E>,
-    is_late: &dyn Fn() -> bool,
-) -> Result<(Option<Untangled>, usize), E> {
-    let (mut from, mut step, mut steps) = (0.0, longest, 0);
-    // How many steps in a row went well, and how many of the shortest did not.
-    let (mut well, mut failures) = (0, 0);
-    while steps < MOST_STEPS && failures < MOST_FAILURES && !is_late() {
-        let is_shortest = step <= SHORTEST * (1.0 + 1e-9);
-        let at = if step > 1.0 - from - 1e-9 { 1.0 } else { from + step };
-        let stage = stage_at(at)?;
-        steps += 1;
-        // What may be halved is not worth a second attempt.
-        let loosened = if is_shortest { settings.loosened } else { 1.0 };
-        let settings = ResolveSettings { is_shallow: true, loosened, ..*settings };
-        let kept: &[f64] = if is_shortest { &[KEPT, 1.0] } else { &[KEPT] };
-        let starts = kept.iter().map(|kept| carried(&reached, &stage, *kept));
-        let untangled = on_stage(layers, &stage, &settings, starts)?;
-        if untangled.crossings > 0 && !is_shortest {
-            (step, well) = (0.5 * step, 0);
-        } else if at == 1.0 {
-            return Ok((Some(untangled), steps));
-        } else {
-            match untangled.crossings {
-                0 => well += 1,
-                _ => failures += 1,
-            }
-            if well >= GOOD_STEPS {
-                (step, well) = ((2.0 * step).min(longest), 0);
-            }
-            from = at;
-            reached = Reached::new(stage, untangled.positions);
+    check(body, layers)?;
+    let carry_on = |body: &Body<'_>| {
+        let way = Way { layers, end: body, settings, start };
+        let (followed, steps) = way.follow(before, 1.0, stage_at)?;
+        let Some(found) = followed else { return Ok(None) };
+        let mut resolved = settled(body, layers, found, settings);
+        if resolved.certificate.between() > resolved.certificate.narrow_triangle_pairs {
+            return Ok(None);
         }
-    }
-    Ok((None, steps))
+        resolved.compare(layers, start.elapsed());
+        resolved.steps = steps;
+        Ok(Some(resolved))
+    };
+    with_drawn(body, layers, |drawn| with_body(drawn, layers.len(), carry_on))
 }
 
-/// Untangles the garments at each of `starts` until one has no crossing; the best.
+/// Where garments are to be taken.
+struct Way<'a, 'b> {
+    layers: &'a [Layer<'a>],
+    /// The body at 1.
+    end: &'a Body<'b>,
+    settings: &'a ResolveSettings,
+    /// When it began.
+    start: Instant,
+}
+
+impl Way<'_, '_> {
+    /// Takes garments from where they are `reached`, at 0, to the stage at 1, by steps of at most `longest`; also how many steps
+    /// were tried. None where the way was given up.
+    fn follow<E: From<ResolveError>>(
+        &self,
+        mut reached: Reached,
+        longest: f64,
+        mut stage_at: impl FnMut(f64) -> Result<Waypoint, E>,
+    ) -> Result<(Option<Untangled>, usize), E> {
+        let (mut from, mut step, mut steps) = (0.0, longest, 0);
+        // How many steps in a row went well, and how many of the shortest did not.
+        let (mut well, mut failures) = (0, 0);
+        while steps < self.settings.steps && failures < MOST_FAILURES && !self.is_late() {
+            let is_shortest = step <= SHORTEST * (1.0 + 1e-9);
+            let at = if step > 1.0 - from - 1e-9 { 1.0 } else { from + step };
+            let stage = stage_at(at)?;
+            steps += 1;
+            // What may be halved is not worth a second attempt.
+            let loosened = if is_shortest { self.settings.loosened } else { 1.0 };
+            let settings = ResolveSettings { is_shallow: true, loosened, ..*self.settings };
+            let kept: &[f64] = if is_shortest { &[KEPT, 1.0] } else { &[KEPT] };
+            let starts: Vec<_> = kept.iter().map(|kept| carried(&reached, &stage, *kept)).collect();
+            let untangled = match at == 1.0 && starts.iter().all(|start| is_near(self.layers, start)) {
+                true => least_crossed(self.end.obstacle(), self.layers, &settings, &starts),
+                false => on_stage(self.layers, &stage, &settings, &starts)?,
+            };
+            if untangled.crossings > 0 && !is_shortest {
+                (step, well) = (0.5 * step, 0);
+            } else if at == 1.0 {
+                return Ok((Some(untangled), steps));
+            } else {
+                match untangled.crossings {
+                    0 => well += 1,
+                    _ => failures += 1,
+                }
+                if well >= GOOD_STEPS {
+                    (step, well) = ((2.0 * step).min(longest), 0);
+                }
+                from = at;
+                reached = Reached::new(stage, untangled.positions);
+            }
+        }
+        Ok((None, steps))
+    }
+
+    fn is_late(&self) -> bool {
+        let limit = self.settings.time.map(|limit| limit * self.layers.len() as u32);
+        limit.is_some_and(|limit| self.start.elapsed() > limit)
+    }
+}
+
+/// Untangles the garments at `stage` from the best of `starts`.
 fn on_stage(
     layers: &[Layer<'_>],
     stage: &Waypoint,
     settings: &ResolveSettings,
-    starts: impl Iterator<Item = Vec<Vec<[f64; 3]>>>,
+    starts: &[Vec<Vec<[f64; 3]>>],
 ) -> Result<Untangled, ResolveError> {
-    let draped = at(layers, &stage.draped);
-    check(&stage.body, &draped)?;
-    let near = near_cloth(&stage.body.positions, &triangles(&draped));
-    let relief = Relief::of(&stage.body, &near, layers.len(), Room::Ample);
-    let obstacle = match &relief {
-        Some(relief) => relief.obstacle(&near),
-        None => BodyObstacle::new(&stage.body, &near, None),
-    };
+    let mut places = at(layers, &stage.draped);
+    check(&stage.body, &places)?;
+    places.extend(starts.iter().flat_map(|start| at(layers, start)));
+    let untangle = |body: &Body<'_>| least_crossed(body.obstacle(), layers, settings, starts);
+    Ok(with_drawn(&stage.body, &places, |drawn| with_body(drawn, layers.len(), untangle)))
+}
+
+/// Untangles the garments at each of `starts` until one has no crossing; the best.
+fn least_crossed(
+    obstacle: &BodyObstacle<'_>,
+    layers: &[Layer<'_>],
+    settings: &ResolveSettings,
+    starts: &[Vec<Vec<[f64; 3]>>],
+) -> Untangled {
     let mut best: Option<Untangled> = None;
     for start in starts {
-        let now = untangled(&obstacle, &at(layers, &start), settings);
+        let now = untangled(obstacle, &at(layers, start), settings);
         if best.as_ref().is_none_or(|best| now.crossings < best.crossings) {
             best = Some(now);
         }
@@ -209,7 +220,7 @@ fn on_stage(
             break;
         }
     }
-    Ok(best.unwrap_or_default())
+    best.unwrap_or_default()
 }
 
 /// The drape at `stage` with what the post-process had changed before, turned as skinning turns it.
@@ -236,6 +247,7 @@ mod tests {
     use crate::contact::TriangleTree;
     use crate::mesh::TriMesh;
     use crate::mesh::shapes;
+    use std::time::Duration;
 
     const IDENTITY: Transform = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
 
@@ -247,7 +259,7 @@ mod tests {
         let stage_at = move |share: f64| {
             let knee = shapes::mapped(&ball, |p| add(p, [0.0, 0.18 * share - 0.1, 0.0]));
             Ok(Waypoint {
-                body: Surface::from_mesh(&knee),
+                body: Arc::new(Surface::from_mesh(&knee)),
                 draped: vec![draped.clone()],
                 transforms: vec![IDENTITY; draped.len()],
             })
@@ -266,22 +278,47 @@ mod tests {
         let stage = end(&stage_at);
         let layers = [Layer { garment: &garment, positions: &stage.draped[0] }];
         let settings = ResolveSettings::default();
-        let start = || {
-            let stage = stage_at(0.0).unwrap();
-            let positions = stage.draped.clone();
-            Reached::new(stage, positions)
+        let follow = |end: &Body<'_>| {
+            let way = Way { layers: &layers, end, settings: &settings, start: Instant::now() };
+            let first = stage_at(0.0).unwrap();
+            let positions = first.draped.clone();
+            let (followed, steps) = way.follow(Reached::new(first, positions), LONGEST, &stage_at).unwrap();
+            assert!(steps >= 8, "{steps}");
+            followed.unwrap()
         };
-        let (followed, steps) = follow(&layers, start(), LONGEST, &settings, &stage_at, &|| false).unwrap();
-        let followed = followed.unwrap();
-        assert!(steps >= 8, "{steps}");
-        let resolved = resolve_after(start(), &stage.body, &layers, &settings, &stage_at).unwrap().unwrap();
-        assert!(resolved.certificate.is_clear() && resolved.steps >= 1);
-        let over = &followed.positions[0];
-        // The knee's top is at 0.16: nearer to the lower side of the ball, the sheet lies over its top all the same.
+        let followed = with_drawn(&stage.body, &layers, |drawn| with_body(drawn, 1, follow));
+        is_over_the_knee(&followed.positions[0], &sheet, &stage.body);
+    }
+
+    /// The knee's top is at 0.16: nearer to the lower side of the ball, the sheet lies over its top all the same.
+    fn is_over_the_knee(over: &[[f64; 3]], sheet: &TriMesh, knee: &Surface<f64>) {
         let highest = over.iter().map(|p| p[1]).fold(0.0, f64::max);
         assert!(highest > 0.155, "{highest}");
         let tree = TriangleTree::new(over, sheet.faces());
-        assert!(tree.pairs_with(&TriangleTree::new(&stage.body.positions, &stage.body.faces)).is_empty());
+        assert!(tree.pairs_with(&TriangleTree::new(&knee.positions, &knee.faces)).is_empty());
+    }
+
+    #[test]
+    fn the_next_frame_carries_on_from_the_one_before() {
+        let (sheet, stage_at) = rising(0.6);
+        let garment = RestGarment::new(&sheet);
+        let (settings, stage) = (ResolveSettings::default(), end(&stage_at));
+        let layers = [Layer { garment: &garment, positions: &stage.draped[0] }];
+        // By itself the last frame goes wrong: the ball's lower side is nearer.
+        let alone = super::super::resolve(&stage.body, &layers, &settings).unwrap();
+        let highest = alone.positions[0].iter().map(|p| p[1]).fold(0.0, f64::max);
+        assert!(highest < 0.1, "{highest}");
+
+        let mut reached = Reached::new(stage_at(0.0).unwrap(), stage.draped.clone());
+        for frame in 1..=10 {
+            let [before, now] = [0.1 * f64::from(frame - 1), 0.1 * f64::from(frame)];
+            let body = stage_at(now).unwrap().body;
+            let between = |share: f64| stage_at(before + (now - before) * share);
+            let found = resolve_after(reached, &body, &layers, &settings, between).unwrap().unwrap();
+            assert!(found.certificate.is_clear() && found.steps >= 1, "frame {frame}");
+            reached = Reached::new(stage_at(now).unwrap(), found.positions);
+        }
+        is_over_the_knee(&reached.positions[0], &sheet, &stage.body);
     }
 
     #[test]
@@ -293,9 +330,10 @@ mod tests {
         let layers = [Layer { garment: &garment, positions: &shallow.draped[0] }];
         let resolved = resolve_along(&shallow.body, &layers, &settings, &stage_at).unwrap();
         assert!(resolved.certificate.is_clear() && resolved.steps == 0);
-        let start = Reached::new(stage_at(0.0).unwrap(), shallow.draped.clone());
-        let late = follow(&layers, start, LONGEST, &settings, &stage_at, &|| true).unwrap();
-        assert!(late.0.is_none());
+        let first = Reached::new(stage_at(0.0).unwrap(), shallow.draped.clone());
+        let settings = ResolveSettings { time: Some(Duration::ZERO), ..settings };
+        let late = resolve_after(first, &shallow.body, &layers, &settings, &stage_at).unwrap();
+        assert!(late.is_none());
     }
 
     #[test]
@@ -303,17 +341,18 @@ mod tests {
         let (sheet, stage_at) = rising(0.3);
         let garment = RestGarment::new(&sheet);
         let layers = [Layer { garment: &garment, positions: sheet.positions() }];
-        let start = Reached::new(stage_at(0.0).unwrap(), vec![sheet.positions().to_vec()]);
+        let first = stage_at(0.0).unwrap();
+        let body = first.body.clone();
+        let start = Reached::new(first, vec![sheet.positions().to_vec()]);
         let broken = |_: f64| Err::<Waypoint, _>(ResolveError::EmptyBody);
-        let settings = ResolveSettings::default();
-        assert!(follow(&layers, start, LONGEST, &settings, broken, &|| false).is_err());
+        assert!(resolve_after(start, &body, &layers, &ResolveSettings::default(), broken).is_err());
     }
 
     #[test]
     fn changes_turn_with_the_skinning_and_fade() {
         let quarter = [[0.0, -1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
         let stage = |drape: [f64; 3], transform| Waypoint {
-            body: Surface::from_mesh(&shapes::tetrahedron()),
+            body: Arc::new(Surface::from_mesh(&shapes::tetrahedron())),
             draped: vec![vec![drape]],
             transforms: vec![transform],
         };

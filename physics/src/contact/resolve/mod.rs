@@ -24,6 +24,7 @@
 //! **Bent limbs.** Where crossings are left, [`resolve_along`] takes the garments from the T-pose, where their order is plain,
 //! step by step to the pose ([`follow`]).
 
+mod body;
 mod certificate;
 mod contact;
 mod detect;
@@ -52,11 +53,11 @@ pub use settings::ResolveSettings;
 
 use crate::query::Surface;
 use crate::vec3;
+use body::{Body, with_body, with_drawn};
 use certificate::certificate;
-use near::near_cloth;
-use obstacle::{BodyObstacle, GaveWay};
+use near::MARGIN;
+use obstacle::BodyObstacle;
 use outfit::Outfit;
-use relief::{Relief, Room};
 use untangle::Untangling;
 
 /// Positions farther from the origin than this are refused [m]: the exact predicates would hold, but no distance would.
@@ -95,24 +96,14 @@ pub struct GarmentWork {
 impl Resolved {
     /// Where cloth lies in room that the body only made for it, tries to do without: the body gives way no more than where it
     /// lies inside itself. Taken if fewer pairs are left.
-    fn close_in(
-        &mut self,
-        (body, near): (&Surface<f64>, &[bool]),
-        judge: &BodyObstacle<'_>,
-        layers: &[Layer<'_>],
-        settings: &ResolveSettings,
-    ) {
+    fn close_in(&mut self, body: &Body<'_>, layers: &[Layer<'_>], settings: &ResolveSettings) {
         if self.certificate.narrow_triangle_pairs == 0 {
             return;
         }
-        let relief = Relief::of(body, near, layers.len(), Room::Least);
-        let obstacle = match &relief {
-            Some(relief) => relief.obstacle(near),
-            None => BodyObstacle::new(body, near, None),
-        };
         let settings = ResolveSettings { is_shallow: true, loosened: 1.0, ..*settings };
-        let closer = untangled(&obstacle, &at(layers, &self.positions), &settings);
-        let certificate = certificate(judge, &at(layers, &closer.positions));
+        let now = at(layers, &self.positions);
+        let closer = body.with_least_room(|obstacle| untangled(obstacle, &now, &settings));
+        let certificate = certificate(&body.drawn, &at(layers, &closer.positions));
         let counts = |c: &Certificate| (c.between(), c.self_triangle_pairs);
         if counts(&certificate) < counts(&self.certificate) {
             (self.positions, self.certificate) = (closer.positions, certificate);
@@ -146,32 +137,79 @@ pub fn resolve(
     settings.check()?;
     check(body, layers)?;
     let start = Instant::now();
-    let drawn = body;
-    let near = near_cloth(&body.positions, &triangles(layers));
-    let relief = Relief::of(body, &near, layers.len(), Room::Ample);
-    let gave_way = relief.as_ref().map(GaveWay::NotYet);
-    let judge = BodyObstacle::new(body, &near, gave_way);
-    let relieved = relief.as_ref().map(|r| r.obstacle(&near));
-    let body = relieved.as_ref().unwrap_or(&judge);
+    Ok(with_drawn(body, layers, |drawn| {
+        let simple = simply_resolved(&drawn, layers, settings, start);
+        if simple.certificate.is_clear() {
+            return simple;
+        }
+        with_body(drawn, layers.len(), |body| resolved(body, layers, settings, simple))
+    }))
+}
+
+/// [`resolve`] on a body that does not give way, whose preparation began at `start`: enough for most garments.
+fn simply_resolved(
+    drawn: &BodyObstacle<'_>,
+    layers: &[Layer<'_>],
+    settings: &ResolveSettings,
+    start: Instant,
+) -> Resolved {
     let body_time = start.elapsed();
     let start = Instant::now();
-    let Untangled { positions, rounds, .. } = untangled(body, layers, settings);
-    let time = start.elapsed();
+    // Wider limits are for what is left when the body has given way.
+    let settings = ResolveSettings { loosened: 1.0, ..*settings };
+    let mut resolved = judged(drawn, layers, untangled(drawn, layers, &settings));
+    resolved.body_time = body_time;
+    resolved.compare(layers, start.elapsed() - resolved.certificate_time);
+    resolved
+}
+
+/// [`resolve`] on a body that gives way; `simple` is what was reached before it did.
+fn resolved(body: &Body<'_>, layers: &[Layer<'_>], settings: &ResolveSettings, simple: Resolved) -> Resolved {
     let start = Instant::now();
-    let certificate = certificate(&judge, &at(layers, &positions));
-    let work = GarmentWork { rounds, ..GarmentWork::default() };
-    let mut resolved = Resolved {
-        positions,
+    let obstacle = body.obstacle();
+    let body_time = simple.body_time + start.elapsed();
+    let start = Instant::now();
+    let mut resolved = settled(body, layers, untangled(obstacle, layers, settings), settings);
+    resolved.body_time = body_time;
+    let before: Duration = simple.garments.iter().map(|work| work.time).sum();
+    resolved.compare(layers, before + start.elapsed() - resolved.certificate_time);
+    resolved
+}
+
+/// What untangling left, brought back to the body as it is drawn where it can be, with its certificate.
+fn settled(body: &Body<'_>, layers: &[Layer<'_>], found: Untangled, settings: &ResolveSettings) -> Resolved {
+    if !is_near(layers, &found.positions) {
+        let now = at(layers, &found.positions);
+        let again = |body: &Body<'_>| settled(body, &now, found.clone(), settings);
+        return with_drawn(body.drawn.surface, &now, |drawn| with_body(drawn, layers.len(), again));
+    }
+    let mut resolved = judged(&body.drawn, layers, found);
+    resolved.close_in(body, layers, settings);
+    resolved
+}
+
+/// What untangling left, with its certificate.
+fn judged(drawn: &BodyObstacle<'_>, layers: &[Layer<'_>], found: Untangled) -> Resolved {
+    let start = Instant::now();
+    let now = at(layers, &found.positions);
+    let certificate = match is_near(layers, &found.positions) {
+        true => certificate(drawn, &now),
+        false => with_drawn(drawn.surface, &now, |drawn| certificate(&drawn, &now)),
+    };
+    let work = GarmentWork { rounds: found.rounds, ..GarmentWork::default() };
+    Resolved {
+        positions: found.positions,
         certificate,
         garments: vec![work; layers.len()],
-        steps: 0,
-        body_time,
         certificate_time: start.elapsed(),
-    };
-    let start = Instant::now();
-    resolved.close_in((drawn, &near), &judge, layers, settings);
-    resolved.compare(layers, time + start.elapsed());
-    Ok(resolved)
+        ..Resolved::default()
+    }
+}
+
+/// Whether nothing moved so far from `layers` that it could meet more of the body than what is near those.
+fn is_near(layers: &[Layer<'_>], positions: &[Vec<[f64; 3]>]) -> bool {
+    let is_near = |(p, q): (&[f64; 3], &[f64; 3])| vec3::norm(vec3::sub(*q, *p)) <= MARGIN;
+    layers.iter().zip(positions).all(|(layer, moved)| layer.positions.iter().zip(moved).all(is_near))
 }
 
 /// The same garments elsewhere.
@@ -180,7 +218,7 @@ fn at<'a>(layers: &[Layer<'a>], positions: &'a [Vec<[f64; 3]>]) -> Vec<Layer<'a>
 }
 
 /// What untangling left.
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Untangled {
     positions: Vec<Vec<[f64; 3]>>,
     rounds: usize,

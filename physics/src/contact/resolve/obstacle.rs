@@ -54,51 +54,48 @@ pub(super) struct BodyObstacle<'a> {
     /// Faces that give way.
     gave_way: Vec<bool>,
     /// Of a surface without a border: inside and outside are known everywhere.
-    union: Option<UnionDistance>,
+    pub union: Option<UnionDistance>,
     /// All faces near cloth, and which they are; made when it is first asked.
     all: OnceLock<(ClosestPoint, Vec<u32>)>,
-    surface: &'a Surface<f64>,
-    near: &'a [bool],
-}
-
-/// What became of the vertices that gave way.
-#[derive(Clone, Copy)]
-pub(super) enum GaveWay<'a> {
-    /// They are where they were: the body as it is drawn, to be judged by.
-    NotYet(&'a Relief),
-    /// They moved: the body that garments have to stay out of.
-    Already(&'a Relief),
+    pub surface: &'a Surface<f64>,
+    /// Vertices near cloth.
+    pub near: &'a [bool],
 }
 
 impl<'a> BodyObstacle<'a> {
-    /// `near`: vertices near cloth.
-    pub fn new(surface: &'a Surface<f64>, near: &'a [bool], gave_way: Option<GaveWay<'_>>) -> Self {
+    /// The body as it is drawn; `near`: vertices near cloth.
+    pub fn new(surface: &'a Surface<f64>, near: &'a [bool]) -> Self {
+        Self::pinched_where(surface, near, |_| true)
+    }
+
+    /// The body after it gave way. Where it only meets itself because of that, it is to be respected as it was.
+    pub fn relieved(relief: &'a Relief, near: &'a [bool]) -> Self {
+        let mut obstacle = Self::pinched_where(&relief.surface, near, |v| relief.pinched[v as usize]);
+        obstacle.gives_way(relief);
+        obstacle
+    }
+
+    fn pinched_where(surface: &'a Surface<f64>, near: &'a [bool], may_be: impl Fn(u32) -> bool) -> Self {
         let faces = &surface.faces;
         let is_part = |f: u32| faces[f as usize].iter().any(|&v| near[v as usize]);
         let tree = TriangleTree::of_part(&surface.positions, faces, |f, _| is_part(f));
         let union = is_closed(faces)
             .then(|| UnionDistance::of_part(surface.positions.clone(), faces, is_part, &tree.self_pairs()));
-        let touching = |touched: &[bool]| -> Vec<bool> {
-            faces.iter().map(|face| face.iter().any(|&v| touched[v as usize])).collect()
-        };
         let mut touched = vec![false; surface.positions.len()];
         if let Some(union) = &union {
             for (face, _) in faces.iter().zip(union.sides()).filter(|(_, side)| **side != FaceSide::Exposed) {
-                face.iter().for_each(|&v| touched[v as usize] = true);
+                face.iter().for_each(|&v| touched[v as usize] = may_be(v));
             }
         }
-        let gave_way = match gave_way {
-            Some(GaveWay::NotYet(relief)) => touching(&relief.gave_way),
-            Some(GaveWay::Already(relief)) => {
-                // Where the body only meets itself because it gave way, it is to be respected as it was.
-                touched.iter_mut().zip(&relief.pinched).for_each(|(touched, was)| *touched &= was);
-                touching(&relief.gave_way)
-            }
-            None => Vec::new(),
-        };
-        let is_pinched = touching(&touched);
+        let is_pinched = touching(faces, &touched);
         let has_pinched = is_pinched.contains(&true);
+        let gave_way = Vec::new();
         Self { tree, is_pinched, has_pinched, gave_way, union, all: OnceLock::new(), surface, near }
+    }
+
+    /// Notes which faces give way.
+    pub fn gives_way(&mut self, relief: &Relief) {
+        self.gave_way = touching(&self.surface.faces, &relief.gave_way);
     }
 
     /// Whether face `f` is pinched.
@@ -181,8 +178,13 @@ impl BodyObstacle<'_> {
     }
 }
 
+/// Which faces have a corner that is `touched`.
+fn touching(faces: &[[u32; 3]], touched: &[bool]) -> Vec<bool> {
+    faces.iter().map(|face| face.iter().any(|&v| touched[v as usize])).collect()
+}
+
 /// Whether every edge has two faces.
-pub(super) fn is_closed(faces: &[[u32; 3]]) -> bool {
+fn is_closed(faces: &[[u32; 3]]) -> bool {
     let mut edges: Vec<[u32; 2]> = faces
         .iter()
         .flat_map(|f| (0..3).map(|k| [f[k].min(f[(k + 1) % 3]), f[k].max(f[(k + 1) % 3])]))

@@ -9,9 +9,9 @@
 use rayon::prelude::*;
 
 use super::contact::{along_line, normal_of};
-use super::obstacle::{BodyObstacle, GaveWay, is_closed};
+use super::obstacle::BodyObstacle;
 use crate::contact::TriangleTree;
-use crate::query::{FaceSide, Surface, UnionDistance};
+use crate::query::{FaceSide, Surface};
 use crate::vec3::{add_scaled, dot};
 
 /// Distance that two parts of the body that look at each other keep [m], for what straight triangles need to go round a limb…
@@ -49,13 +49,11 @@ pub(super) struct Relief {
 }
 
 impl Relief {
-    /// Of a body with its vertices `near` cloth of `garments` garments. `None` where nothing has to give way, or the surface
-    /// is not closed and has no inside.
-    pub fn of(body: &Surface<f64>, near: &[bool], garments: usize, room: Room) -> Option<Self> {
-        if !is_closed(&body.faces) {
-            return None;
-        }
-        let (mut steps, pinched) = steps(body, near, ROOM + ROOM_PER_GARMENT * garments as f64);
+    /// Of the body as it is `drawn`, near `garments` garments. `None` where nothing has to give way, or the surface is not
+    /// closed and has no inside.
+    pub fn of(drawn: &BodyObstacle<'_>, garments: usize, room: Room) -> Option<Self> {
+        let body = drawn.surface;
+        let (mut steps, pinched) = steps(drawn, ROOM + ROOM_PER_GARMENT * garments as f64)?;
         if room == Room::Least {
             steps
                 .iter_mut()
@@ -74,17 +72,15 @@ impl Relief {
 
     /// What the garments have to stay out of.
     pub fn obstacle<'a>(&'a self, near: &'a [bool]) -> BodyObstacle<'a> {
-        BodyObstacle::new(&self.surface, near, Some(GaveWay::Already(self)))
+        BodyObstacle::relieved(self, near)
     }
 }
 
 /// How far every vertex steps back, against its normal [m]; only those `near` cloth and around them do. Also the corners of
-/// faces inside another part, or crossing one.
-fn steps(surface: &Surface<f64>, near: &[bool], room: f64) -> (Vec<f64>, Vec<bool>) {
-    let (positions, faces) = (&surface.positions, &surface.faces);
-    let is_part = |f: u32| faces[f as usize].iter().any(|&v| near[v as usize]);
-    let tree = TriangleTree::of_part(positions, faces, |f, _| is_part(f));
-    let union = UnionDistance::of_part(positions.clone(), faces, is_part, &tree.self_pairs());
+/// faces inside another part, or crossing one. `None` without an inside.
+fn steps(drawn: &BodyObstacle<'_>, room: f64) -> Option<(Vec<f64>, Vec<bool>)> {
+    let BodyObstacle { surface, near, tree, .. } = drawn;
+    let (positions, faces, union) = (&surface.positions, &surface.faces, drawn.union.as_ref()?);
     // Whether all, or some, of the faces at a vertex are inside another part.
     let (mut all_inside, mut some_inside) = (vec![true; positions.len()], vec![false; positions.len()]);
     for (face, side) in faces.iter().zip(union.sides()) {
@@ -101,7 +97,7 @@ fn steps(surface: &Surface<f64>, near: &[bool], room: f64) -> (Vec<f64>, Vec<boo
         let is_inside =
             all_inside[v] || some_inside[v] && union.winding_number(add_scaled(p, LOOK_OUT, n)) >= 1;
         let reach = if is_inside { -DEEPEST } else { room };
-        let apart = facing_surface(&tree, faces, v as u32, reach, p, n);
+        let apart = facing_surface(tree, faces, v as u32, reach, p, n);
         apart.map_or(0.0, |apart| (0.5 * (room - apart)).clamp(0.0, LONGEST_STEP))
     };
     let mut steps: Vec<f64> = (0..positions.len()).into_par_iter().with_min_len(256).map(missing).collect();
@@ -112,7 +108,7 @@ fn steps(surface: &Surface<f64>, near: &[bool], room: f64) -> (Vec<f64>, Vec<boo
             face.iter().for_each(|&v| steps[v as usize] = steps[v as usize].max(0.5 * most));
         }
     }
-    (steps, some_inside)
+    Some((steps, some_inside))
 }
 
 /// How far along `n` from vertex `v` at `p` a surface looks back at it, at most `reach` (backwards where that is negative).
@@ -155,7 +151,7 @@ mod tests {
     fn relieved(apart: f64, garments: usize) -> (Surface<f64>, Option<Relief>) {
         let body = Surface::from_mesh(&balls(apart));
         let near = vec![true; body.positions.len()];
-        let relief = Relief::of(&body, &near, garments, Room::Ample);
+        let relief = Relief::of(&BodyObstacle::new(&body, &near), garments, Room::Ample);
         (body, relief)
     }
 
@@ -191,13 +187,16 @@ mod tests {
     fn what_is_apart_open_or_far_from_cloth_stays() {
         assert!(relieved(0.25, 1).1.is_none());
         let open = Surface::from_mesh(&shapes::grid(0.1, 0.1, 4, 4));
-        assert!(Relief::of(&open, &vec![true; open.positions.len()], 1, Room::Ample).is_none());
+        let near = vec![true; open.positions.len()];
+        assert!(Relief::of(&BodyObstacle::new(&open, &near), 1, Room::Ample).is_none());
         let body = Surface::from_mesh(&balls(0.19));
-        assert!(Relief::of(&body, &vec![false; body.positions.len()], 1, Room::Ample).is_none());
+        let far = vec![false; body.positions.len()];
+        assert!(Relief::of(&BodyObstacle::new(&body, &far), 1, Room::Ample).is_none());
         // Near each other, but not inside.
         let body = Surface::from_mesh(&balls(0.203));
         let near = vec![true; body.positions.len()];
-        assert!(Relief::of(&body, &near, 1, Room::Ample).is_some());
-        assert!(Relief::of(&body, &near, 1, Room::Least).is_none());
+        let drawn = BodyObstacle::new(&body, &near);
+        assert!(Relief::of(&drawn, 1, Room::Ample).is_some());
+        assert!(Relief::of(&drawn, 1, Room::Least).is_none());
     }
 }

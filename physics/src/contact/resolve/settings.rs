@@ -30,6 +30,8 @@ pub struct ResolveSettings {
     /// How many times wider both limits are in a second attempt, where crossings are left; its result is only taken if it ends
     /// with none. Default 6; 1 for no second attempt.
     pub loosened: f64,
+    /// Most steps of [`super::resolve_along`] on the way from the T-pose. Default 64; 0 mends the drape as it is or not at all.
+    pub steps: usize,
     /// Whether nothing lies deeper than half a limb, so that the nearest way out is the right one: true for a small step from a
     /// state without crossings. Default no.
     pub is_shallow: bool,
@@ -52,6 +54,7 @@ impl Default for ResolveSettings {
             farthest: 0.06,
             stretch: 1.15,
             loosened: 6.0,
+            steps: 64,
             is_shallow: false,
             self_contact: true,
             time: None,

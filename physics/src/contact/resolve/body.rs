@@ -1,0 +1,59 @@
+//! The body of an outfit: as it is drawn, and as it gives way to the garments.
+
+use std::cell::OnceCell;
+
+use super::near::near_cloth;
+use super::obstacle::BodyObstacle;
+use super::relief::{Relief, Room};
+use super::{Layer, triangles};
+use crate::query::Surface;
+
+/// Calls `with` the body of `surface` as it is drawn, near `layers`: the same garments once or, in several places, more often.
+pub(super) fn with_drawn<R>(
+    surface: &Surface<f64>,
+    layers: &[Layer<'_>],
+    with: impl FnOnce(BodyObstacle<'_>) -> R,
+) -> R {
+    let near = near_cloth(&surface.positions, &surface.faces, &triangles(layers));
+    with(BodyObstacle::new(surface, &near))
+}
+
+/// Calls `with` a `drawn` body that can give way to `garments` garments.
+pub(super) fn with_body<R>(
+    mut drawn: BodyObstacle<'_>,
+    garments: usize,
+    with: impl FnOnce(&Body<'_>) -> R,
+) -> R {
+    let relief = Relief::of(&drawn, garments, Room::Ample);
+    if let Some(relief) = &relief {
+        drawn.gives_way(relief);
+    }
+    with(&Body { drawn, garments, relief: relief.as_ref(), relieved: OnceCell::new() })
+}
+
+/// A posed body near some garments.
+pub(super) struct Body<'a> {
+    /// As it is drawn: what a certificate counts against. Faces that give way are noted.
+    pub drawn: BodyObstacle<'a>,
+    garments: usize,
+    relief: Option<&'a Relief>,
+    relieved: OnceCell<BodyObstacle<'a>>,
+}
+
+impl<'a> Body<'a> {
+    /// What the garments have to stay out of while they are sorted out.
+    pub fn obstacle(&self) -> &BodyObstacle<'a> {
+        match self.relief {
+            Some(relief) => self.relieved.get_or_init(|| relief.obstacle(self.drawn.near)),
+            None => &self.drawn,
+        }
+    }
+
+    /// Calls `with` what the garments have to stay out of where the body gives way no more than where it lies inside itself.
+    pub fn with_least_room<R>(&self, with: impl FnOnce(&BodyObstacle<'_>) -> R) -> R {
+        match Relief::of(&self.drawn, self.garments, Room::Least) {
+            Some(relief) => with(&relief.obstacle(self.drawn.near)),
+            None => with(&self.drawn),
+        }
+    }
+}
