@@ -4,6 +4,7 @@ pub mod allocator;
 pub mod average;
 pub mod checkpoint;
 pub mod cli;
+pub mod closed_pipe;
 pub mod config;
 pub mod device;
 pub mod drape;

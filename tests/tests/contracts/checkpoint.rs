@@ -28,6 +28,10 @@ fn it_restores_the_networks_from_nothing_but_its_folder() {
     let elsewhere = folder.path().join("copied");
     fs::rename(&path, &elsewhere).unwrap();
 
+    // A colleague who may read the configuration may read the parameters.
+    let may = |file: &str| fs::metadata(elsewhere.join(file)).unwrap().permissions();
+    assert_eq!(may("model.safetensors"), may("config.toml"));
+
     let checkpoint = Checkpoint::open(&elsewhere).unwrap();
     let config = checkpoint.config().unwrap();
     let model = checkpoint.model(&config, &Backend::preferred().device()).unwrap();

@@ -246,6 +246,9 @@ fn write(
         save_model(average, &folder.join(AVERAGE))?;
         files.push(AVERAGE);
     }
+    // The exchange file is written as private to its owner; it may be read by whom the others may be read.
+    let usual = fs::metadata(folder.join(CONFIG)).map_err(text)?.permissions();
+    fs::set_permissions(folder.join(MODEL_EXCHANGE), usual).map_err(text)?;
     for file in &files {
         let path = folder.join(file);
         let named = |e: io::Error| format!("{file}: {e}");

@@ -126,3 +126,22 @@ fn wrong_usage_exits_with_two() {
         Command::cargo_bin("clothcombo-train").unwrap().args(["--confg", "x.toml"]).output().unwrap();
     assert_eq!(output.status.code(), Some(2));
 }
+
+/// `clothcombo config check … | head -0`: whoever reads is gone before anything is printed.
+#[cfg(unix)]
+#[test]
+fn a_closed_pipe_is_no_panic() {
+    use std::process::Stdio;
+    let case = Case::new();
+    case.write("tiny.toml", crate::common::TINY);
+    let mut program = std::process::Command::new(env!("CARGO_BIN_EXE_clothcombo"))
+        .args(["config", "check", &case.path("tiny.toml")])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(program.stdout.take());
+    let output = program.wait_with_output().unwrap();
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(!message.contains("panicked"), "{message}");
+}
