@@ -1,11 +1,13 @@
 //! Triangle meshes: validated storage, normals, topology, and analytic shapes for tests.
 
+mod faces_at_vertex;
 mod normals;
 pub mod shapes;
 mod stretch;
 mod topology;
 mod tri_mesh;
 
+pub(crate) use faces_at_vertex::FacesAtVertex;
 pub use normals::{face_normal_area, vertex_normals};
 pub use stretch::vertex_stretch;
 pub use topology::{Hinge, Topology};

@@ -8,7 +8,8 @@ use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::Vector;
 use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
 
-use super::pseudo_normal::{FacesAtVertex, PseudoNormals};
+use super::pseudo_normal::PseudoNormals;
+use crate::mesh::FacesAtVertex;
 use crate::vec3;
 
 /// Part of a triangle.

@@ -15,15 +15,17 @@ use std::sync::OnceLock;
 use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
 
 use super::closest_point::triangle_box;
-use super::pseudo_normal::FacesAtVertex;
 use super::{ClosestPoint, SurfacePoint};
 use crate::contact::self_triangle_pairs;
+use crate::mesh::FacesAtVertex;
 use crate::vec3::{self, add, add_scaled, cross, dot, normalized, scale, sub};
 
 /// How far outside a triangle the side of its piece is asked for [m].
 const LOOK_OUT: f64 = 1e-8;
 /// Questions that are asked of all faces instead of a tree.
 const FEW: usize = 64;
+/// Rings of faces where a part of a surface ends that may cross what does not belong to it.
+const END_RINGS: usize = 2;
 
 /// Where a face of a surface lies, seen from the union of the surface's parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -80,7 +82,8 @@ impl UnionDistance {
         let is_seam: Vec<bool> = part.iter().map(|&f| crosses[f as usize]).collect();
         let whole = faces.iter().filter(|face| is_whole(face)).copied().collect();
         let all = Crossings::new(positions, whole);
-        let is_exposed = exposed(&all, &part_faces, &is_seam);
+        let is_alone = at_the_end(faces, &part);
+        let is_exposed = exposed(&all, &part_faces, &is_seam, &is_alone);
         let mut is_sure_vertex = vec![true; all.positions.len()];
         for (face, _) in part_faces.iter().zip(&is_exposed).filter(|(_, exposed)| !**exposed) {
             face.iter().for_each(|&v| is_sure_vertex[v as usize] = false);
@@ -138,13 +141,33 @@ impl UnionDistance {
     }
 }
 
-/// Which of some faces that are no seam have the outside of the union before them and its inside behind them.
-fn exposed(all: &Crossings, faces: &[[u32; 3]], is_seam: &[bool]) -> Vec<bool> {
+/// Which faces of a `part` are where it ends. What they cross may not belong to it, so that they do not tell of their
+/// neighbours' side.
+fn at_the_end(faces: &[[u32; 3]], part: &[u32]) -> Vec<bool> {
+    let mut is_inner: Vec<bool> = vec![false; faces.len()];
+    part.iter().for_each(|&f| is_inner[f as usize] = true);
+    let vertices = faces.as_flattened().iter().max().map_or(0, |&v| v as usize + 1);
+    for _ in 0..END_RINGS {
+        let mut touched = vec![false; vertices];
+        for (face, _) in faces.iter().zip(&is_inner).filter(|(_, is_inner)| !**is_inner) {
+            face.iter().for_each(|&v| touched[v as usize] = true);
+        }
+        for (face, is_inner) in faces.iter().zip(&mut is_inner) {
+            *is_inner &= !face.iter().any(|&v| touched[v as usize]);
+        }
+    }
+    part.iter().map(|&f| !is_inner[f as usize]).collect()
+}
+
+/// Which of some faces that are no seam have the outside of the union before them and its inside behind them. Those that are
+/// `alone` are asked one by one.
+fn exposed(all: &Crossings, faces: &[[u32; 3]], is_seam: &[bool], is_alone: &[bool]) -> Vec<bool> {
     let at_vertex = FacesAtVertex::new(all.positions.len(), faces);
     let mut root: Vec<u32> = (0..faces.len() as u32).collect();
-    for (f, [a, b, c]) in (0u32..).zip(faces).filter(|(f, _)| !is_seam[*f as usize]) {
+    let is_joined = |f: u32| !is_seam[f as usize] && !is_alone[f as usize];
+    for (f, [a, b, c]) in (0u32..).zip(faces).filter(|(f, _)| is_joined(*f)) {
         for (from, to) in [(*a, *b), (*b, *c), (*c, *a)] {
-            let beside = at_vertex.of(from).iter().filter(|&&g| g > f && !is_seam[g as usize]);
+            let beside = at_vertex.of(from).iter().filter(|&&g| g > f && is_joined(g));
             for &g in beside.filter(|&&g| faces[g as usize].contains(&to)) {
                 let (one, other) = (find(&mut root, f), find(&mut root, g));
                 root[one.max(other) as usize] = one.min(other);
@@ -340,6 +363,26 @@ mod tests {
             }
         }
         assert!(jumps_of_the_closest_point > 50, "{jumps_of_the_closest_point}");
+    }
+
+    /// A fine ball through a coarse one, cut where the seam between them goes on: pieces must not run together there.
+    #[test]
+    fn a_seam_that_leaves_the_part_still_parts_inside_from_outside() {
+        let fine = shapes::mapped(&shapes::icosphere(0.4, 4), |p| vec3::add(p, [0.05, 0.3, 0.1]));
+        let mesh = shapes::union(&[&shapes::icosphere(0.5, 1), &fine]);
+        let (positions, faces) = (mesh.positions(), mesh.faces());
+        let whole = UnionDistance::new(positions.to_vec(), faces);
+        for cut in (-6..6).map(|i| 0.05 * f64::from(i)) {
+            let is_part = |f: u32| faces[f as usize].iter().any(|&v| positions[v as usize][0] > cut);
+            let mut seams = self_triangle_pairs(positions, faces);
+            seams.retain(|&(a, b)| is_part(a) && is_part(b));
+            let part = UnionDistance::of_part(positions.to_vec(), faces, is_part, &seams);
+            for f in (0..faces.len() as u32).filter(|f| is_part(*f)) {
+                let (expected, found) = (whole.sides()[f as usize], part.sides()[f as usize]);
+                // A face that only crosses what was left out is no seam any more.
+                assert!(expected == found || expected == FaceSide::Seam, "cut {cut}, face {f}: {found:?}");
+            }
+        }
     }
 
     #[test]

@@ -1,7 +1,6 @@
 //! `clothcombo eval`: everything a trained model is judged by, in one report.
 
 use crate::checkpoint::TrainedModel;
-use crate::cli::print_all;
 use crate::cli::train::load_under_bar;
 use crate::cli::verbosity::{progress_bar, say};
 use crate::config::{Config, load};
@@ -103,7 +102,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     bar.finish_and_clear();
     let page = page(&trained, &found, clock.elapsed().as_secs_f64())?;
     write(folder, &found, &page)?;
-    print_all(&format!("{}\n", page.markdown()))?;
+    println!("{}", page.markdown());
     say(&format!("written: {}", folder.join(HTML).display()));
     Ok(())
 }

@@ -20,8 +20,7 @@ mod wardrobe_sheet;
 
 pub use verbosity::Verbosity;
 
-use miette::{IntoDiagnostic, Report};
-use std::io::{ErrorKind, Write};
+use miette::Report;
 
 /// Exit code of a program that ended with `result`; an error is printed once, with its place and hint.
 pub fn exit_code(result: Result<(), Report>) -> std::process::ExitCode {
@@ -31,14 +30,5 @@ pub fn exit_code(result: Result<(), Report>) -> std::process::ExitCode {
             eprintln!("{report:?}");
             std::process::ExitCode::FAILURE
         }
-    }
-}
-
-/// Prints `text` to stdout.
-pub(crate) fn print_all(text: &str) -> Result<(), Report> {
-    match std::io::stdout().write_all(text.as_bytes()) {
-        // Whoever reads the output has seen enough.
-        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
-        written => written.into_diagnostic(),
     }
 }

@@ -45,7 +45,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     } else {
         tables(&score)
     };
-    super::print_all(&text)
+    print!("{text}");
+    Ok(())
 }
 
 /// Terms of one garment, in the order of the columns.

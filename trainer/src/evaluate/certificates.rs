@@ -127,6 +127,14 @@ impl DrapedScene<'_> {
         certify(&self.body, &self.layers(&self.positions))
     }
 
+    /// The same as numbers.
+    ///
+    /// # Errors
+    /// When it is no valid scene.
+    pub fn counts(&self) -> Result<Counts, ResolveError> {
+        Ok(Counts::new(&self.certificate()?, self.order_by_vertices(&self.positions)))
+    }
+
     /// Share of wrong-side vertices over all pairs of layers, by the nearest vertex: the definition of the score.
     pub fn order_by_vertices(&self, positions: &[Vec<[f64; 3]>]) -> f64 {
         let mut sum = OrderViolations::default();
@@ -236,7 +244,7 @@ impl OutfitResult {
         settings: &ResolveSettings,
     ) -> Result<(Self, Resolved), PostProcessError> {
         let scene = draped.scene;
-        let before = Counts::new(&draped.certificate()?, draped.order_by_vertices(&draped.positions));
+        let before = draped.counts()?;
         let resolved = draped.resolved(settings)?;
         let works = &resolved.garments;
         let ms = |time: std::time::Duration| 1e3 * time.as_secs_f64();

@@ -4,9 +4,9 @@ use super::estimate::{Estimate, Ratio};
 use super::subject::Subject;
 use super::table::{Table, number, percent};
 use crate::drape::NetworkDrape;
-use crate::evaluate::certificates::{Dressing, OutfitResult};
+use crate::evaluate::certificates::{Counts, Dressing, OutfitResult};
 use crate::scene::{PreparedScene, Unseen, draw_study};
-use clothcombo_physics::contact::resolve::{Certificate, ResolveSettings};
+use clothcombo_physics::contact::resolve::ResolveSettings;
 use clothcombo_physics::energy::Term;
 use miette::{IntoDiagnostic, Report};
 use serde::Serialize;
@@ -72,9 +72,12 @@ pub fn ask(
         wrong_single.push(alone.certificate().into_diagnostic()?.order_violations);
         let draped = dressing.of(&scene, &drape.layered.posed);
         if index < resolved {
-            results.push(OutfitResult::new(index, &draped, settings)?.0);
+            let result = OutfitResult::new(index, &draped, settings)?.0;
+            before.push(result.before);
+            results.push(result);
+        } else {
+            before.push(draped.counts().into_diagnostic()?);
         }
-        before.push(draped.certificate().into_diagnostic()?);
         done();
     }
     let shares = |values: &mut dyn Iterator<Item = f64>| Estimate::of(&values.collect::<Vec<_>>());
@@ -96,7 +99,7 @@ pub fn ask(
         wrong_side: shares(&mut before.iter().map(|c| c.order_violations)),
         wrong_side_resolved: shares(&mut results.iter().map(|r| r.after.order_violations)),
         clear: [
-            clear(&mut before.iter().map(Certificate::is_clear)),
+            clear(&mut before.iter().map(Counts::is_clear)),
             clear(&mut results.iter().map(|r| r.after.is_clear())),
         ],
         strain_added: Estimate::of(&added).spread.median,

@@ -53,7 +53,7 @@ pub struct Sizes {
     /// The same for 7, 8 and 12 layers.
     pub many_layers: [usize; 2],
     /// Most steps of the post-process on the way from the T-pose.
-    pub steps: usize,
+    pub way_steps: usize,
     /// Scenes per further model.
     pub variants: usize,
     /// Outfits that are timed.
@@ -75,7 +75,7 @@ impl Sizes {
         embeddings: 100,
         layered: [24, 6],
         many_layers: [8, 2],
-        steps: 64,
+        way_steps: 64,
         variants: 100,
         times: 20,
         pareto: 10,
@@ -90,7 +90,7 @@ impl Sizes {
         embeddings: 8,
         layered: [2, 1],
         many_layers: [1, 1],
-        steps: 0,
+        way_steps: 0,
         variants: 8,
         times: 3,
         pareto: 2,
@@ -98,7 +98,8 @@ impl Sizes {
         gallery: false,
     };
 
-    fn steps(&self, variants: usize) -> usize {
+    /// Steps of the progress bar.
+    fn progress_steps(&self, variants: usize) -> usize {
         self.single
             + self.unseen_clips
             + self.unseen_garments
@@ -166,8 +167,8 @@ pub fn study(
     progress: Progress<'_>,
 ) -> Result<Study, Report> {
     let variant_count = if ablations.is_empty() { 0 } else { ablations.len() + 1 } + 2 * specific.len();
-    let steps = sizes.steps(variant_count);
-    let settings = ResolveSettings { steps: sizes.steps, ..ResolveSettings::default() };
+    let steps = sizes.progress_steps(variant_count);
+    let settings = ResolveSettings { steps: sizes.way_steps, ..ResolveSettings::default() };
     let begin = |part: &str| progress(Some(part), steps);
     let done = || progress(None, steps);
 

@@ -28,7 +28,7 @@ pub struct Times {
     pub draping: Spread,
     /// Untangling.
     pub untangling: Spread,
-    /// Post-process, its share of the body's preparation left out.
+    /// Post-process, its share of the body's preparation left out where it needs no way from the T-pose.
     pub post: Spread,
     /// Preparation of the body for the post-process, once per outfit.
     pub body: Spread,

@@ -115,6 +115,19 @@ impl Certificate {
         self.between() == 0
     }
 
+    /// What is wrong: fewer is better, in this order.
+    pub(super) fn defects(&self) -> (usize, usize) {
+        (self.between(), self.self_triangle_pairs)
+    }
+
+    /// Counts the pairs with the body where it gives way.
+    pub(super) fn count_narrow(&mut self, body: &BodyObstacle<'_>) {
+        let is_narrow = |pair: &&RemainingPair| {
+            pair.crosses == Crossed::Body && !pair.is_pinched && body.gave_way(pair.other_triangle as u32)
+        };
+        self.narrow_triangle_pairs = self.remaining.iter().filter(is_narrow).count();
+    }
+
     /// Notes the strain energy before the post-process [J].
     pub(super) fn compare_strain(&mut self, before: f64) {
         let after: f64 = self.garments.iter().map(|g| g.strain_joule).sum();
@@ -129,12 +142,11 @@ impl Certificate {
 pub fn certify(body: &Surface<f64>, layers: &[Layer<'_>]) -> Result<Certificate, ResolveError> {
     super::check(body, layers)?;
     Ok(with_drawn(body, layers, |drawn| {
-        let found = certificate(&drawn, layers);
-        if found.body_triangle_pairs == 0 {
-            return found;
+        let mut found = certificate(&drawn, layers);
+        if found.body_triangle_pairs > 0 {
+            with_body(drawn, layers.len(), |body| found.count_narrow(&body.drawn));
         }
-        // Which of the pairs are narrow is only known of a body that gives way.
-        with_body(drawn, layers.len(), |body| certificate(&body.drawn, layers))
+        found
     }))
 }
 
@@ -166,7 +178,6 @@ pub(super) fn certificate(body: &BodyObstacle<'_>, layers: &[Layer<'_>]) -> Cert
         let pairs = tree.pairs_with(&body.tree);
         let (pinched, pairs): (Vec<_>, Vec<_>) = pairs.into_iter().partition(|&(_, b)| body.is_pinched(b));
         own.body_triangle_pairs = pairs.len();
-        found.narrow_triangle_pairs += pairs.iter().filter(|&&(_, b)| body.gave_way(b)).count();
         found.pinched.body_triangle_pairs += pinched.len();
         found.contour_length_mm += length_mm(&contours(&tree, &body.tree, &pairs));
         found.list(index, Crossed::Body, &pairs, false);
@@ -221,6 +232,7 @@ pub(super) fn certificate(body: &BodyObstacle<'_>, layers: &[Layer<'_>]) -> Cert
     found.max_depth_mm = 1e3 * depths.iter().fold(0.0, |a: f64, b| a.max(*b));
     found.mean_depth_mm = 1e3 * depths.iter().sum::<f64>() / depths.len().max(1) as f64;
     found.order_violations = wrong as f64 / judged.max(1) as f64;
+    found.count_narrow(body);
     found
 }
 

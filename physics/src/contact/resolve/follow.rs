@@ -75,19 +75,21 @@ pub fn resolve_along<E: From<ResolveError>>(
         if simple.certificate.is_clear() {
             return Ok(simple);
         }
+        let relieving = Instant::now();
         with_body(drawn, layers.len(), |body| {
-            let mut best = resolved(body, layers, settings, simple);
+            let mut best = resolved(body, layers, settings, simple, relieving);
             if best.certificate.is_clear() || settings.steps == 0 {
                 return Ok(best);
             }
             let stage = stage_at(0.0)?;
-            let first = on_stage(layers, &stage, settings, std::slice::from_ref(&stage.draped))?;
+            check(&stage.body, &placed(layers, &stage.draped)?)?;
+            let first = on_stage(layers, &stage, settings, std::slice::from_ref(&stage.draped));
             let reached = Reached::new(stage, first.positions);
             let way = Way { layers, end: body, settings, start };
             let (followed, steps) = way.follow(reached, LONGEST, stage_at)?;
             if let Some(found) = followed {
                 let found = settled(body, layers, found, settings);
-                if found.certificate.between() < best.certificate.between() {
+                if found.is_better_than(&best) {
                     best = Resolved { body_time: best.body_time, ..found };
                 }
             }
@@ -147,6 +149,8 @@ impl Way<'_, '_> {
         longest: f64,
         mut stage_at: impl FnMut(f64) -> Result<Waypoint, E>,
     ) -> Result<(Option<Untangled>, usize), E> {
+        check(self.end.drawn.surface, &placed(self.layers, &reached.draped)?)?;
+        check(self.end.drawn.surface, &placed(self.layers, &reached.positions)?)?;
         let (mut from, mut step, mut steps) = (0.0, longest, 0);
         // How many steps in a row went well, and how many of the shortest did not.
         let (mut well, mut failures) = (0, 0);
@@ -154,15 +158,19 @@ impl Way<'_, '_> {
             let is_shortest = step <= SHORTEST * (1.0 + 1e-9);
             let at = if step > 1.0 - from - 1e-9 { 1.0 } else { from + step };
             let stage = stage_at(at)?;
+            check(&stage.body, &placed(self.layers, &stage.draped)?)?;
             steps += 1;
             // What may be halved is not worth a second attempt.
             let loosened = if is_shortest { self.settings.loosened } else { 1.0 };
             let settings = ResolveSettings { is_shallow: true, loosened, ..*self.settings };
             let kept: &[f64] = if is_shortest { &[KEPT, 1.0] } else { &[KEPT] };
             let starts: Vec<_> = kept.iter().map(|kept| carried(&reached, &stage, *kept)).collect();
+            for start in &starts {
+                check(&stage.body, &placed(self.layers, start)?)?;
+            }
             let untangled = match at == 1.0 && starts.iter().all(|start| is_near(self.layers, start)) {
                 true => least_crossed(self.end.obstacle(), self.layers, &settings, &starts),
-                false => on_stage(self.layers, &stage, &settings, &starts)?,
+                false => on_stage(self.layers, &stage, &settings, &starts),
             };
             if untangled.crossings > 0 && !is_shortest {
                 (step, well) = (0.5 * step, 0);
@@ -195,12 +203,11 @@ fn on_stage(
     stage: &Waypoint,
     settings: &ResolveSettings,
     starts: &[Vec<Vec<[f64; 3]>>],
-) -> Result<Untangled, ResolveError> {
+) -> Untangled {
     let mut places = at(layers, &stage.draped);
-    check(&stage.body, &places)?;
     places.extend(starts.iter().flat_map(|start| at(layers, start)));
     let untangle = |body: &Body<'_>| least_crossed(body.obstacle(), layers, settings, starts);
-    Ok(with_drawn(&stage.body, &places, |drawn| with_body(drawn, layers.len(), untangle)))
+    with_drawn(&stage.body, &places, |drawn| with_body(drawn, layers.len(), untangle))
 }
 
 /// Untangles the garments at each of `starts` until one has no crossing; the best.
@@ -221,6 +228,17 @@ fn least_crossed(
         }
     }
     best.unwrap_or_default()
+}
+
+/// The garments elsewhere, if that is all of them.
+fn placed<'a>(layers: &[Layer<'a>], positions: &'a [Vec<[f64; 3]>]) -> Result<Vec<Layer<'a>>, ResolveError> {
+    let garment = positions.len().min(layers.len());
+    match layers.get(garment) {
+        Some(missing) => {
+            Err(ResolveError::Count { garment, expected: missing.garment.vertex_count(), found: 0 })
+        }
+        None => Ok(at(layers, positions)),
+    }
 }
 
 /// The drape at `stage` with what the post-process had changed before, turned as skinning turns it.
@@ -346,6 +364,32 @@ mod tests {
         let start = Reached::new(first, vec![sheet.positions().to_vec()]);
         let broken = |_: f64| Err::<Waypoint, _>(ResolveError::EmptyBody);
         assert!(resolve_after(start, &body, &layers, &ResolveSettings::default(), broken).is_err());
+    }
+
+    #[test]
+    fn what_does_not_fit_is_refused() {
+        let (sheet, stage_at) = rising(0.3);
+        let garment = RestGarment::new(&sheet);
+        let layers = [Layer { garment: &garment, positions: sheet.positions() }];
+        let after = |spoil: &dyn Fn(&mut Reached)| {
+            let first = stage_at(0.0).unwrap();
+            let body = first.body.clone();
+            let mut before = Reached::new(first, vec![sheet.positions().to_vec()]);
+            spoil(&mut before);
+            resolve_after(before, &body, &layers, &ResolveSettings::default(), &stage_at)
+        };
+        assert!(after(&|_| {}).is_ok());
+        let nan = after(&|before| before.positions[0][7][1] = f64::NAN);
+        assert!(matches!(nan, Err(ResolveError::Position { garment: 0, vertex: 7, .. })));
+        let turned = after(&|before| before.transforms[3][0][0] = f64::NAN);
+        assert!(turned.is_ok(), "what such a vertex was moved by stays as it stands");
+        for spoil in [
+            |before: &mut Reached| before.positions.clear(),
+            |before: &mut Reached| before.draped[0].truncate(5),
+            |before: &mut Reached| before.transforms.truncate(5),
+        ] {
+            assert!(matches!(after(&spoil), Err(ResolveError::Count { garment: 0, .. })));
+        }
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! A garment as the post-process sees it: what its positions do not change, and where it is.
 
 use crate::energy::{Material, strain::Strain};
-use crate::mesh::{Topology, TriMesh};
+use crate::mesh::{FacesAtVertex, Topology, TriMesh};
 
 /// Everything about a garment that its positions do not change: made once, used for every frame and body.
 #[derive(Debug)]
@@ -12,9 +12,7 @@ pub struct RestGarment {
     pub(super) is_border: Vec<bool>,
     /// For every face, which of its edges (corner k → k+1) have no second face: bit k.
     pub(super) border_edges: Vec<u8>,
-    /// Faces around vertices in compressed rows.
-    face_offsets: Vec<u32>,
-    faces_at: Vec<u32>,
+    faces_at: FacesAtVertex,
     strain: Strain,
 }
 
@@ -45,9 +43,9 @@ impl RestGarment {
                 })
             })
             .collect();
-        let (face_offsets, faces_at) = faces_around(rest.vertex_count(), &faces);
+        let faces_at = FacesAtVertex::new(rest.vertex_count(), &faces);
         let strain = Strain::new(rest, &Material::default());
-        Self { faces, topology, is_border, border_edges, face_offsets, faces_at, strain }
+        Self { faces, topology, is_border, border_edges, faces_at, strain }
     }
 
     /// Number of vertices.
@@ -62,31 +60,13 @@ impl RestGarment {
 
     /// Faces around vertex `v`, ascending.
     pub(super) fn faces_of(&self, v: u32) -> &[u32] {
-        let v = v as usize;
-        &self.faces_at[self.face_offsets[v] as usize..self.face_offsets[v + 1] as usize]
+        self.faces_at.of(v)
     }
 
     /// Strain energy at `positions` `[V, 3]` [J], of the default material.
     pub fn strain_energy(&self, positions: &[[f64; 3]]) -> f64 {
         self.strain.evaluate(positions, None)
     }
-}
-
-fn faces_around(vertices: usize, faces: &[[u32; 3]]) -> (Vec<u32>, Vec<u32>) {
-    let mut offsets = vec![0u32; vertices + 1];
-    faces.as_flattened().iter().for_each(|&v| offsets[v as usize + 1] += 1);
-    for v in 0..vertices {
-        offsets[v + 1] += offsets[v];
-    }
-    let mut next = offsets.clone();
-    let mut around = vec![0u32; 3 * faces.len()];
-    for (f, face) in (0u32..).zip(faces) {
-        for &v in face {
-            around[next[v as usize] as usize] = f;
-            next[v as usize] += 1;
-        }
-    }
-    (offsets, around)
 }
 
 /// One garment of an outfit.

@@ -18,8 +18,8 @@
 //! 5. **Certificate.** All pairs are counted again, from nothing, by the exact predicates.
 //!
 //! **Pinched regions**, where the body lies inside itself, are told apart by a stated rule: `BodyObstacle`. There, and where
-//! hardly any cloth fits between two parts, the body gives way while garments are sorted out ([`relief`]); in the end they
-//! are brought out of it again where they can.
+//! hardly any cloth fits between two parts, the body gives way ([`relief`]) where crossings are left otherwise; in the
+//! end garments are brought out of it again where they can.
 //!
 //! **Bent limbs.** Where crossings are left, [`resolve_along`] takes the garments from the T-pose, where their order is plain,
 //! step by step to the pose ([`follow`]).
@@ -103,11 +103,14 @@ impl Resolved {
         let settings = ResolveSettings { is_shallow: true, loosened: 1.0, ..*settings };
         let now = at(layers, &self.positions);
         let closer = body.with_least_room(|obstacle| untangled(obstacle, &now, &settings));
-        let certificate = certificate(&body.drawn, &at(layers, &closer.positions));
-        let counts = |c: &Certificate| (c.between(), c.self_triangle_pairs);
-        if counts(&certificate) < counts(&self.certificate) {
+        let certificate = certified(&body.drawn, layers, &closer.positions);
+        if certificate.defects() < self.certificate.defects() {
             (self.positions, self.certificate) = (closer.positions, certificate);
         }
+    }
+
+    fn is_better_than(&self, other: &Self) -> bool {
+        self.certificate.defects() < other.certificate.defects()
     }
 
     /// Tells moves and strain from `layers`, and that all of it took `time`.
@@ -142,7 +145,8 @@ pub fn resolve(
         if simple.certificate.is_clear() {
             return simple;
         }
-        with_body(drawn, layers.len(), |body| resolved(body, layers, settings, simple))
+        let start = Instant::now();
+        with_body(drawn, layers.len(), |body| resolved(body, layers, settings, simple, start))
     }))
 }
 
@@ -154,35 +158,45 @@ fn simply_resolved(
     start: Instant,
 ) -> Resolved {
     let body_time = start.elapsed();
-    let start = Instant::now();
+    let now = Instant::now();
     // Wider limits are for what is left when the body has given way.
     let settings = ResolveSettings { loosened: 1.0, ..*settings };
     let mut resolved = judged(drawn, layers, untangled(drawn, layers, &settings));
     resolved.body_time = body_time;
-    resolved.compare(layers, start.elapsed() - resolved.certificate_time);
+    resolved.compare(layers, now.elapsed() - resolved.certificate_time);
     resolved
 }
 
-/// [`resolve`] on a body that gives way; `simple` is what was reached before it did.
-fn resolved(body: &Body<'_>, layers: &[Layer<'_>], settings: &ResolveSettings, simple: Resolved) -> Resolved {
-    let start = Instant::now();
+/// [`resolve`] on a body that gives way, prepared since `start`; `simple` is what was reached before it did, and stays where it
+/// is better.
+fn resolved(
+    body: &Body<'_>,
+    layers: &[Layer<'_>],
+    settings: &ResolveSettings,
+    simple: Resolved,
+    start: Instant,
+) -> Resolved {
     let obstacle = body.obstacle();
     let body_time = simple.body_time + start.elapsed();
-    let start = Instant::now();
-    let mut resolved = settled(body, layers, untangled(obstacle, layers, settings), settings);
-    resolved.body_time = body_time;
-    let before: Duration = simple.garments.iter().map(|work| work.time).sum();
-    resolved.compare(layers, before + start.elapsed() - resolved.certificate_time);
-    resolved
+    let now = Instant::now();
+    let mut found = settled(body, layers, untangled(obstacle, layers, settings), settings);
+    let own: Duration = simple.garments.iter().map(|work| work.time).sum();
+    let time = own + now.elapsed() - found.certificate_time;
+    let certificate_time = simple.certificate_time + found.certificate_time;
+    let rounds = |resolved: &Resolved| resolved.garments.first().map_or(0, |work| work.rounds);
+    let all_rounds = rounds(&simple) + rounds(&found);
+    if simple.is_better_than(&found) {
+        found = simple;
+        found.certificate.count_narrow(&body.drawn);
+    }
+    found.garments.iter_mut().for_each(|work| work.rounds = all_rounds);
+    (found.body_time, found.certificate_time) = (body_time, certificate_time);
+    found.compare(layers, time);
+    found
 }
 
 /// What untangling left, brought back to the body as it is drawn where it can be, with its certificate.
 fn settled(body: &Body<'_>, layers: &[Layer<'_>], found: Untangled, settings: &ResolveSettings) -> Resolved {
-    if !is_near(layers, &found.positions) {
-        let now = at(layers, &found.positions);
-        let again = |body: &Body<'_>| settled(body, &now, found.clone(), settings);
-        return with_drawn(body.drawn.surface, &now, |drawn| with_body(drawn, layers.len(), again));
-    }
     let mut resolved = judged(&body.drawn, layers, found);
     resolved.close_in(body, layers, settings);
     resolved
@@ -191,11 +205,7 @@ fn settled(body: &Body<'_>, layers: &[Layer<'_>], found: Untangled, settings: &R
 /// What untangling left, with its certificate.
 fn judged(drawn: &BodyObstacle<'_>, layers: &[Layer<'_>], found: Untangled) -> Resolved {
     let start = Instant::now();
-    let now = at(layers, &found.positions);
-    let certificate = match is_near(layers, &found.positions) {
-        true => certificate(drawn, &now),
-        false => with_drawn(drawn.surface, &now, |drawn| certificate(&drawn, &now)),
-    };
+    let certificate = certified(drawn, layers, &found.positions);
     let work = GarmentWork { rounds: found.rounds, ..GarmentWork::default() };
     Resolved {
         positions: found.positions,
@@ -203,6 +213,19 @@ fn judged(drawn: &BodyObstacle<'_>, layers: &[Layer<'_>], found: Untangled) -> R
         garments: vec![work; layers.len()],
         certificate_time: start.elapsed(),
         ..Resolved::default()
+    }
+}
+
+/// The certificate of garments that went from `layers`, near which the body is `drawn`, to `positions`.
+fn certified(drawn: &BodyObstacle<'_>, layers: &[Layer<'_>], positions: &[Vec<[f64; 3]>]) -> Certificate {
+    let now = at(layers, positions);
+    match is_near(layers, positions) {
+        true => certificate(drawn, &now),
+        false => with_drawn(drawn.surface, &now, |around| {
+            let mut found = certificate(&around, &now);
+            found.count_narrow(drawn);
+            found
+        }),
     }
 }
 

@@ -2,15 +2,15 @@
 
 use std::collections::HashSet;
 
-/// What is within one or two cells of cloth, along each axis, is near [m].
+/// Cells in which cloth is looked for [m].
 const CELL: f64 = 0.05;
-/// Cells on each side.
+/// What lies in a cell with cloth, or so many cells beside one along each axis, is near.
 const REACH: i64 = 2;
 /// A triangle over more cells is near everything.
 const MOST_CELLS: f64 = 4096.0;
 
-/// So far cloth may move [m] and still meet nothing of the body but what is near.
-pub(super) const MARGIN: f64 = REACH as f64 * CELL;
+/// So far cloth may move [m] and still meet nothing of the body but what is near; a little less than all, for rounding.
+pub(super) const MARGIN: f64 = REACH as f64 * CELL * (1.0 - 1e-9);
 
 /// Which vertices of a surface belong to a face near a triangle of the cloth, given as positions and faces of each garment;
 /// all where none does. Faces count, however large: none that comes closer than [`MARGIN`] is left out.
@@ -56,7 +56,7 @@ fn cells_of(corners: [[f64; 3]; 3]) -> Option<impl Iterator<Item = [i64; 3]>> {
         std::array::from_fn(|k| cell(pick(pick(corners[0][k], corners[1][k]), corners[2][k])))
     };
     let (low, high) = (bound(f64::min), bound(f64::max));
-    let count: f64 = (0..3).map(|k| (high[k] - low[k] + 1) as f64).product();
+    let count: f64 = (0..3).map(|k| high[k] as f64 - low[k] as f64 + 1.0).product();
     let is_small = count <= MOST_CELLS && corners.as_flattened().iter().all(|x| x.is_finite());
     let [x, y, z] = [0, 1, 2].map(|k| low[k]..=high[k]);
     let columns = move || x.flat_map(move |x| y.clone().map(move |y| [x, y]));

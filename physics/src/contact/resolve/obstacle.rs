@@ -2,6 +2,7 @@
 
 use super::RestGarment;
 use super::contact::{along_line, normal_of};
+use super::near::MARGIN;
 use super::relief::Relief;
 use crate::contact::TriangleTree;
 use crate::mesh::vertex_normals;
@@ -132,7 +133,7 @@ impl<'a> BodyObstacle<'a> {
 
     /// What the body is to a point; `None` where it is not near cloth.
     pub fn look(&self, p: [f64; 3]) -> Option<BodyView> {
-        let (found, is_inside, face) = match &self.union {
+        let (found, mut is_inside, face) = match &self.union {
             Some(union) => {
                 let (found, is_inside) = union.project(p)?;
                 (found, is_inside, union.kept_face(found.face))
@@ -143,6 +144,10 @@ impl<'a> BodyObstacle<'a> {
             }
         };
         let far = found.distance_squared.sqrt();
+        if far >= MARGIN {
+            // The nearest face may not be near cloth, and another one's normal tells nothing.
+            is_inside = self.union.as_ref().is_some_and(|union| union.winding_number(p) >= 1);
+        }
         let distance = if is_inside { -far } else { far };
         let direction =
             if far > CONTACT { scale(sub(p, found.position), distance.signum() / far) } else { found.normal };
@@ -279,4 +284,26 @@ pub(super) fn bounds(positions: &[[f64; 3]]) -> [[f64; 3]; 2] {
     positions.iter().fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |[low, high], p| {
         [std::array::from_fn(|k| low[k].min(p[k])), std::array::from_fn(|k| high[k].max(p[k]))]
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::shapes;
+
+    /// The nearest face of the part that is near cloth looks the other way.
+    #[test]
+    fn what_is_far_from_the_body_is_outside_of_it() {
+        let body = Surface::from_mesh(&shapes::icosphere(0.5, 3));
+        let near: Vec<bool> = body.positions.iter().map(|p| p[0] > 0.3).collect();
+        let obstacle = BodyObstacle::new(&body, &near);
+        let behind = obstacle.look([-0.8, 0.1, 0.0]).unwrap();
+        assert!(behind.plane.unwrap().distance > MARGIN);
+        let deep = obstacle.look([-0.1, 0.1, 0.0]).unwrap();
+        assert!(deep.plane.unwrap().distance < -MARGIN);
+        let open = Surface::from_mesh(&shapes::grid(0.2, 0.2, 4, 4));
+        let all = vec![true; open.positions.len()];
+        let under = BodyObstacle::new(&open, &all).look([0.1, 0.1, -0.5]).unwrap();
+        assert!(under.plane.unwrap().distance > 0.0, "no inside is known so far from an open surface");
+    }
 }

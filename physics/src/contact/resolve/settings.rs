@@ -30,14 +30,16 @@ pub struct ResolveSettings {
     /// How many times wider both limits are in a second attempt, where crossings are left; its result is only taken if it ends
     /// with none. Default 6; 1 for no second attempt.
     pub loosened: f64,
-    /// Most steps of [`super::resolve_along`] on the way from the T-pose. Default 64; 0 mends the drape as it is or not at all.
+    /// Most steps on a way: of [`super::resolve_along`] from the T-pose, of [`super::resolve_after`] from the frame before.
+    /// Default 64; 0 mends the drape as it is or not at all.
     pub steps: usize,
     /// Whether nothing lies deeper than half a limb, so that the nearest way out is the right one: true for a small step from a
     /// state without crossings. Default no.
     pub is_shallow: bool,
     /// Whether crossings of a garment with itself are mended where possible. Default yes.
     pub self_contact: bool,
-    /// Most wall time, times the number of garments, looked at between rounds; a limit that is hit makes the result depend on the machine.
+    /// Most wall time of one attempt, and of a way altogether, times the number of garments; looked at between rounds. A limit
+    /// that is hit makes the result depend on the machine.
     /// Default none.
     pub time: Option<Duration>,
 }

@@ -341,3 +341,17 @@ fn wrong_input_is_named() {
     let found = resolve(&body, &scene.layers(), &ResolveSettings::default());
     assert_eq!(found.unwrap_err(), ResolveError::EmptyBody);
 }
+
+/// The body was prepared near where the sheet was; it is certified where it ended up, at another ball.
+#[test]
+fn what_went_far_is_certified_against_all_that_is_there() {
+    let ball = shapes::icosphere(0.1, 3);
+    let body = shapes::union(&[&ball, &moved(&ball, [0.0, 0.6, 0.0])]);
+    let scene = Scene::new(&body, &[sheet(0.3, 12, -0.15)]);
+    let layers = scene.layers();
+    let up = vec![scene.positions[0].iter().map(|p| add(*p, [0.0, 0.75, 0.0])).collect::<Vec<_>>()];
+    let faces = scene.garments[0].faces();
+    let expected = brute_force_pairs(&[(body.positions(), body.faces()), (&up[0], faces)]);
+    let found = with_drawn(&scene.body, &layers, |drawn| certified(&drawn, &layers, &up));
+    assert!(expected > 20 && found.body_triangle_pairs == expected);
+}

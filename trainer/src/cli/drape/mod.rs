@@ -291,5 +291,6 @@ fn print(arguments: &Arguments, reports: &[(&str, Report)]) -> Result<(), Failur
             .collect::<Vec<_>>()
             .join("\n"),
     };
-    super::print_all(&text)
+    print!("{text}");
+    Ok(())
 }
