@@ -67,7 +67,7 @@ pub struct Sizes {
 }
 
 impl Sizes {
-    /// What the published numbers are measured with.
+    /// The whole evaluation.
     pub const FULL: Self = Self {
         single: 500,
         unseen_clips: 200,
