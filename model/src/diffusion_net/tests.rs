@@ -1,7 +1,7 @@
 use super::*;
 use crate::testing::{
     HostGarment, assert_close, assert_gradients_close, change_parameter, device, parameter_gradients, seeded,
-    weighting,
+    values, weighting,
 };
 
 fn net(width: usize) -> DiffusionNet {
@@ -65,15 +65,18 @@ fn gradients_match_finite_differences() {
         let (_, gradient) = gradients.iter().find(|(found, _)| found == name).expect("documented name");
         let index = (0..gradient.len()).max_by(|&a, &b| gradient[a].abs().total_cmp(&gradient[b].abs()));
         let index = index.expect("not empty");
-        // Wide enough that the change of the loss stands out from its rounding in f32.
-        let step = if name.ends_with("time") { 1e-4 } else { 1e-2 };
         let value = |change: f32| -> f64 {
             let changed = change_parameter(net.clone(), name, index, change).valid();
-            f64::from(loss(changed.forward(&garment)).into_scalar::<f32>())
+            let output = changed.forward(&garment);
+            let weights = values(&weighting(output.dims(), &output.device()));
+            values(&output).iter().zip(weights).map(|(x, w)| f64::from(*x) * f64::from(w)).sum()
         };
-        let slope = (value(step) - value(-step)) / f64::from(2.0 * step);
+        // Narrow steps are lost in the rounding of f32, wide ones pass kinks of the activations: one in between must agree.
+        let quotient = |step: f32| (value(step) - value(-step)) / f64::from(2.0 * step);
         let found = f64::from(gradient[index]);
-        assert!((slope - found).abs() < 2e-2 * found.abs(), "{name}[{index}]: {found} {slope}");
+        let slopes = [1e-2, 2e-3, 5e-4, 1e-4, 2e-5].map(quotient);
+        let is_right = |slope: &f64| (slope - found).abs() < 1e-2 * found.abs();
+        assert!(slopes.iter().any(is_right), "{name}[{index}]: {found} {slopes:?}");
     }
 }
 
@@ -86,7 +89,7 @@ fn a_time_at_its_lower_bound_still_learns() {
     let (_, time) = gradients.iter().find(|(name, _)| name == "blocks.0.diffusion.time").expect("name");
     assert!(time.iter().any(|gradient| gradient.abs() > 0.0));
     let times = net.blocks[0].diffusion.times().inner();
-    assert!(crate::testing::values(&times).iter().all(|&time| time == 1e-8));
+    assert!(values(&times).iter().all(|&time| time == 1e-8));
 }
 
 /// Diffusion of an eigenvector multiplies it with e^{−λt}.
