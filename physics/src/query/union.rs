@@ -82,7 +82,7 @@ impl UnionDistance {
         let is_seam: Vec<bool> = part.iter().map(|&f| crosses[f as usize]).collect();
         let whole = faces.iter().filter(|face| is_whole(face)).copied().collect();
         let all = Crossings::new(positions, whole);
-        let is_alone = at_the_end(faces, &part);
+        let is_alone = at_the_end(all.positions.len(), faces, &part);
         let is_exposed = exposed(&all, &part_faces, &is_seam, &is_alone);
         let mut is_sure_vertex = vec![true; all.positions.len()];
         for (face, _) in part_faces.iter().zip(&is_exposed).filter(|(_, exposed)| !**exposed) {
@@ -143,10 +143,12 @@ impl UnionDistance {
 
 /// Which faces of a `part` are where it ends. What they cross may not belong to it, so that they do not tell of their
 /// neighbours' side.
-fn at_the_end(faces: &[[u32; 3]], part: &[u32]) -> Vec<bool> {
+fn at_the_end(vertices: usize, faces: &[[u32; 3]], part: &[u32]) -> Vec<bool> {
+    if part.len() == faces.len() {
+        return vec![false; part.len()];
+    }
     let mut is_inner: Vec<bool> = vec![false; faces.len()];
     part.iter().for_each(|&f| is_inner[f as usize] = true);
-    let vertices = faces.as_flattened().iter().max().map_or(0, |&v| v as usize + 1);
     for _ in 0..END_RINGS {
         let mut touched = vec![false; vertices];
         for (face, _) in faces.iter().zip(&is_inner).filter(|(_, is_inner)| !**is_inner) {

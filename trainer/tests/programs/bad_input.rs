@@ -131,6 +131,7 @@ fn wrong_usage_exits_with_two() {
 #[cfg(unix)]
 #[test]
 fn a_closed_pipe_is_no_panic() {
+    use std::os::unix::process::ExitStatusExt;
     use std::process::Stdio;
     let case = Case::new();
     case.write("tiny.toml", crate::common::TINY);
@@ -144,4 +145,6 @@ fn a_closed_pipe_is_no_panic() {
     let output = program.wait_with_output().unwrap();
     let message = String::from_utf8_lossy(&output.stderr);
     assert!(!message.contains("panicked"), "{message}");
+    // Nothing else ended it before it wrote.
+    assert_eq!(output.status.signal(), Some(libc::SIGPIPE), "{message}");
 }

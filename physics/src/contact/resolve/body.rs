@@ -44,7 +44,7 @@ impl<'a> Body<'a> {
     /// What the garments have to stay out of while they are sorted out.
     pub fn obstacle(&self) -> &BodyObstacle<'a> {
         match self.relief {
-            Some(relief) => self.relieved.get_or_init(|| relief.obstacle(self.drawn.near)),
+            Some(relief) => self.relieved.get_or_init(|| BodyObstacle::relieved(relief, self.drawn.near)),
             None => &self.drawn,
         }
     }
@@ -52,7 +52,7 @@ impl<'a> Body<'a> {
     /// Calls `with` what the garments have to stay out of where the body gives way no more than where it lies inside itself.
     pub fn with_least_room<R>(&self, with: impl FnOnce(&BodyObstacle<'_>) -> R) -> R {
         match Relief::of(&self.drawn, self.garments, Room::Least) {
-            Some(relief) => with(&relief.obstacle(self.drawn.near)),
+            Some(relief) => with(&BodyObstacle::relieved(&relief, self.drawn.near)),
             None => with(&self.drawn),
         }
     }

@@ -69,11 +69,6 @@ impl Relief {
         let gave_way: Vec<bool> = steps.iter().map(|s| *s > 0.0).collect();
         Some(Self { surface: Surface::new(positions, body.faces.clone()), gave_way, pinched })
     }
-
-    /// What the garments have to stay out of.
-    pub fn obstacle<'a>(&'a self, near: &'a [bool]) -> BodyObstacle<'a> {
-        BodyObstacle::relieved(self, near)
-    }
 }
 
 /// How far every vertex steps back, against its normal [m]; only those `near` cloth and around them do. Also the corners of
