@@ -42,5 +42,20 @@ impl Backend {
     }
 }
 
+/// Whether `device` (with or without automatic differentiation) is this machine's processor, where several threads can
+/// compute beside each other.
+pub fn is_processor(device: &Device) -> bool {
+    let device = device.clone().inner();
+    let is = |backend: &Backend| match backend {
+        #[cfg(feature = "flex")]
+        Backend::Flex => backend.device() == device,
+        #[cfg(feature = "ndarray")]
+        Backend::Ndarray => backend.device() == device,
+        #[cfg(any(feature = "wgpu", feature = "cuda"))]
+        _ => false,
+    };
+    Backend::value_variants().iter().any(is)
+}
+
 #[cfg(not(any(feature = "flex", feature = "ndarray", feature = "wgpu", feature = "cuda")))]
 compile_error!("choose at least one backend feature: flex, ndarray, wgpu or cuda");

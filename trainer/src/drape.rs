@@ -9,7 +9,6 @@ use clothcombo_model::{
 };
 use clothcombo_physics::operators::SurfaceOperators;
 use miette::Diagnostic;
-use std::cell::RefCell;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use thiserror::Error;
@@ -25,6 +24,9 @@ pub enum DrapeError {
     #[error(transparent)]
     Model(#[from] ModelError),
 }
+
+/// Embeddings of one state of the networks, by garment; threads share it.
+pub type KnownEmbeddings = Mutex<Recent<GarmentEmbedding>>;
 
 /// The constant tensors of a wardrobe on one device, made when a garment is first drawn.
 pub struct WardrobeTensors {
@@ -87,8 +89,8 @@ impl WardrobeTensors {
     }
 
     /// An empty store of embeddings for [`embed`](Self::embed).
-    pub fn embeddings(&self) -> Recent<GarmentEmbedding> {
-        Recent::new(self.library.memory_limit)
+    pub fn embeddings(&self) -> KnownEmbeddings {
+        Mutex::new(Recent::new(self.library.memory_limit))
     }
 
     /// One body of a scene, and the start positions of the garments on it `[ΣV, 3]`.
@@ -109,15 +111,17 @@ impl WardrobeTensors {
         model: &ClothCombo,
         scene: &PreparedScene,
         outfit: &OutfitTensors,
-        known: &mut Recent<GarmentEmbedding>,
+        known: &KnownEmbeddings,
     ) -> Result<Embeddings, DrapeError> {
+        let recent = || known.lock().unwrap_or_else(PoisonError::into_inner);
         let mut packed = Vec::with_capacity(scene.worn.len());
         for (&g, worn) in scene.draw.garments.iter().zip(&scene.worn) {
-            let embedding = match known.get(g) {
+            let kept = recent().get(g);
+            let embedding = match kept {
                 Some(embedding) => embedding,
                 None => {
                     let embedding = model.encode(&self.garment(g, worn)?);
-                    known.insert(g, embedding.clone(), embedding.bytes());
+                    recent().insert(g, embedding.clone(), embedding.bytes());
                     embedding
                 }
             };
@@ -168,7 +172,7 @@ pub fn body_tensors(
 pub struct Networks<'a> {
     model: ClothCombo,
     tensors: &'a WardrobeTensors,
-    embeddings: RefCell<Recent<GarmentEmbedding>>,
+    embeddings: KnownEmbeddings,
 }
 
 /// What the networks make of a scene's first body.
@@ -182,7 +186,7 @@ pub struct NetworkDrape {
 impl<'a> Networks<'a> {
     /// Wraps a model without automatic differentiation.
     pub fn new(model: ClothCombo, tensors: &'a WardrobeTensors) -> Self {
-        Self { model, tensors, embeddings: RefCell::new(tensors.embeddings()) }
+        Self { model, tensors, embeddings: tensors.embeddings() }
     }
 
     /// Drapes the garments of `scene` on its first body.
@@ -191,8 +195,7 @@ impl<'a> Networks<'a> {
     /// When the scene's numbers are not finite.
     pub fn drape(&self, scene: &PreparedScene) -> Result<NetworkDrape, DrapeError> {
         let outfit = self.tensors.outfit(scene)?;
-        let embeddings =
-            self.tensors.embed(&self.model, scene, &outfit, &mut self.embeddings.borrow_mut())?;
+        let embeddings = self.tensors.embed(&self.model, scene, &outfit, &self.embeddings)?;
         let (body, start) = self.tensors.body(&scene.bodies[0])?;
         Ok(drape_on(&self.model, &outfit, &embeddings, &body, start).0)
     }

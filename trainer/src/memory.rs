@@ -41,7 +41,7 @@ pub struct MemoryEstimate {
     pub garments: u64,
     /// Prepared scenes: those of the next steps, and those of a validation.
     pub scenes: u64,
-    /// What the largest scene takes in networks and energies.
+    /// What the largest scene, or several beside each other, take in networks and energies.
     pub activations: u64,
     /// All of it, or the peak so far where that is more.
     pub peak: u64,
@@ -96,7 +96,9 @@ pub fn estimate(config: &Config, library: &Library, parameters: usize) -> Option
     let worn = |layers: usize| sizes.iter().cycle().take(layers).sum::<usize>() as f64;
     let of_stage = |s: &StageConfig| {
         let embedding = if s.trains == Trains::Untangling { 0.0 } else { per_embedded_vertex(config) };
-        embedding * embedded(s.layers[1]) + per_vertex(config, s, joints) * worn(s.layers[1])
+        let of_scene = embedding * embedded(s.layers[1]) + per_vertex(config, s, joints) * worn(s.layers[1]);
+        // Scenes of a step are computed beside each other, one a thread.
+        of_scene * s.accumulate.min(rayon::current_num_threads()) as f64
     };
     let activations = 4.0 * config.stages.iter().map(of_stage).fold(0.0, f64::max);
     let activations = activations as u64;

@@ -379,7 +379,7 @@ impl Session {
 }
 
 /// Input sizes of networks for `library`.
-pub(crate) fn dimensions(library: &Library) -> Dimensions {
+pub fn dimensions(library: &Library) -> Dimensions {
     state(library, 0).dimensions()
 }
 

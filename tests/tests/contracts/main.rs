@@ -6,5 +6,6 @@ mod hard_cases;
 mod intersections;
 mod messy_garments;
 mod resume;
+mod scenes_at_once;
 mod score_oracle;
 mod streaming;

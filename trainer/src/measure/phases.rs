@@ -32,7 +32,8 @@ pub const PHASES: [&str; 12] = [
 /// Seconds by span name.
 pub type PhaseTimes = BTreeMap<&'static str, f64>;
 
-/// Runs `work` and returns how long each span of the project was entered on this thread.
+/// Runs `work` and returns how long each span of the project was entered, on this thread and on those that `work` hands its
+/// subscriber to.
 pub fn record_phases<R>(work: impl FnOnce() -> R) -> (R, PhaseTimes) {
     let totals = Arc::new(Mutex::new(BTreeMap::<&'static str, Duration>::new()));
     let targets = Targets::new()

@@ -63,7 +63,7 @@ pub fn ask(
         let ms = |time: Duration| 1e3 * time.as_secs_f64() / count;
         let clock = Instant::now();
         let embeddings =
-            subject.tensors.embed(&subject.model, &scene, &outfit, &mut subject.tensors.embeddings())?;
+            subject.tensors.embed(&subject.model, &scene, &outfit, &subject.tensors.embeddings())?;
         // Reading a result waits for it on devices that compute behind the caller's back.
         let _ = embeddings.garment.clone().into_data();
         let embedding = ms(clock.elapsed());

@@ -1,15 +1,22 @@
-//! Networks and optimiser: one step on one prepared scene.
+//! Networks and optimiser: one step on prepared scenes.
+
+mod scene;
+mod workers;
 
 use crate::config::{OptimizerConfig, Trains};
+use crate::device::is_processor;
 use crate::drape::{DrapeError, WardrobeTensors};
-use crate::scene::{PreparedScene, Recent};
+use crate::scene::PreparedScene;
 use burn::module::Module;
 use burn::optim::{GradientsAccumulator, GradientsParams, ModuleOptimizer};
-use burn::tensor::Tensor;
-use clothcombo_model::{ClothCombo, FusedAdam, GarmentEmbedding, clip_global_norm, global_norm};
-use clothcombo_physics::autodiff::{SceneLossOutput, scene_loss};
-use std::time::{Duration, Instant};
+use clothcombo_model::{ClothCombo, FusedAdam, clip_global_norm, global_norm};
+use clothcombo_physics::autodiff::SceneLossOutput;
+use scene::{Frozen, Work};
+use std::time::Instant;
 use tracing::trace_span;
+use workers::Workers;
+
+pub use scene::StepTimes;
 
 /// Trains the networks.
 pub struct Learner {
@@ -17,12 +24,9 @@ pub struct Learner {
     optimizer: ModuleOptimizer,
     clip_norm: f64,
     frozen: Option<Frozen>,
-}
-
-/// The first stage while it is not trained, with the embeddings it made.
-struct Frozen {
-    model: ClothCombo,
-    embeddings: Recent<GarmentEmbedding>,
+    /// Scenes computed beside each other.
+    at_once: usize,
+    workers: Workers,
 }
 
 /// Loss and gradients of scenes, before the update.
@@ -51,17 +55,6 @@ pub struct StepOutcome {
     pub times: StepTimes,
 }
 
-/// Where the time of a step went; honest on backends that compute at once (the CPU ones).
-#[derive(Clone, Copy, Debug, Default)]
-pub struct StepTimes {
-    /// Networks and energies.
-    pub forward: Duration,
-    /// Gradients.
-    pub backward: Duration,
-    /// Clipping, Adam, the running average.
-    pub update: Duration,
-}
-
 /// The optimiser of a run without any state yet.
 pub fn new_optimizer(config: &OptimizerConfig) -> ModuleOptimizer {
     FusedAdam { beta_1: config.beta_1, beta_2: config.beta_2, epsilon: config.epsilon }.into()
@@ -70,7 +63,16 @@ pub fn new_optimizer(config: &OptimizerConfig) -> ModuleOptimizer {
 impl Learner {
     /// Trains `model` (on a device with automatic differentiation) with `optimizer`.
     pub fn new(model: ClothCombo, optimizer: ModuleOptimizer, config: &OptimizerConfig) -> Self {
-        Self { model, optimizer, clip_norm: config.clip_norm, frozen: None }
+        // A GPU computes one scene after the other anyway.
+        let at_once = if model.devices().iter().all(is_processor) { rayon::current_num_threads() } else { 1 };
+        Self {
+            model,
+            optimizer,
+            clip_norm: config.clip_norm,
+            frozen: None,
+            at_once,
+            workers: Workers::default(),
+        }
     }
 
     /// The networks.
@@ -100,7 +102,8 @@ impl Learner {
         Ok(self.update(computed, trains, learning_rate))
     }
 
-    /// Loss and gradients of `scenes`, which are some of the `total` scenes of a step.
+    /// Loss and gradients of `scenes`, which are some of the `total` scenes of a step. On a processor as many of them are
+    /// computed beside each other as there are threads.
     ///
     /// # Errors
     /// When a scene's tensors cannot be made.
@@ -112,36 +115,35 @@ impl Learner {
         trains: Trains,
         spoil_gradient: bool,
     ) -> Result<Computed, DrapeError> {
+        if trains != Trains::Untangling {
+            self.frozen = None;
+        } else if self.frozen.is_none() {
+            self.frozen = Some(Frozen { model: self.model.valid(), embeddings: tensors.embeddings() });
+        }
+        let work =
+            Work { tensors, frozen: self.frozen.as_ref(), trains, share: 1.0 / total as f64, spoil_gradient };
         let mut computed = Computed {
             loss: 0.0,
             scenes: Vec::with_capacity(scenes.len()),
             gradients: GradientsParams::new(),
             times: StepTimes::default(),
         };
-        let share = 1.0 / total as f64;
         let mut sum = GradientsAccumulator::<ClothCombo>::new();
-        for scene in scenes {
-            let start = Instant::now();
-            let (loss, values) = self.forward(tensors, scene, trains)?;
-            let mean = values.iter().map(|s| s.value().total).sum::<f64>() / values.len() as f64;
-            computed.loss += mean * share;
-            computed.scenes.push(values);
-            computed.times.forward += start.elapsed();
-            let Some(mut loss) = loss else { continue };
-            if total > 1 {
-                loss = loss * share;
+        for scenes_at_once in scenes.chunks(self.at_once) {
+            let parts = match scenes_at_once {
+                [scene] => vec![work.compute(&self.model, scene)?],
+                several => work.compute_beside(&self.model, several, &mut self.workers)?,
+            };
+            computed.times += StepTimes::longest(parts.iter().map(|part| part.times));
+            for part in parts {
+                computed.loss += part.loss;
+                computed.scenes.push(part.bodies);
+                match part.gradients {
+                    None => {}
+                    Some(gradients) if scenes.len() == 1 => computed.gradients = gradients,
+                    Some(gradients) => sum.accumulate(&self.model, gradients),
+                }
             }
-            if spoil_gradient {
-                loss = loss * f64::NAN;
-            }
-            let start = Instant::now();
-            let gradients = trace_span!("backward")
-                .in_scope(|| GradientsParams::from_grads(loss.backward(), &self.model));
-            match scenes.len() {
-                1 => computed.gradients = gradients,
-                _ => sum.accumulate(&self.model, gradients),
-            }
-            computed.times.backward += start.elapsed();
         }
         if scenes.len() > 1 {
             computed.gradients = sum.grads();
@@ -172,46 +174,5 @@ impl Learner {
         }
         outcome.times.update = start.elapsed();
         outcome
-    }
-
-    /// Mean loss over the bodies, `None` when nothing in it depends on what is trained.
-    fn forward(
-        &mut self,
-        tensors: &WardrobeTensors,
-        scene: &PreparedScene,
-        trains: Trains,
-    ) -> Result<(Option<Tensor<1>>, Vec<SceneLossOutput>), DrapeError> {
-        let outfit = trace_span!("tensors").in_scope(|| tensors.outfit(scene))?;
-        if trains != Trains::Untangling {
-            self.frozen = None;
-        } else if self.frozen.is_none() {
-            self.frozen = Some(Frozen { model: self.model.valid(), embeddings: tensors.embeddings() });
-        }
-        let (first_stage, embeddings) = match &mut self.frozen {
-            Some(f) => (&f.model, tensors.embed(&f.model, scene, &outfit, &mut f.embeddings)?),
-            None => (&self.model, tensors.embed(&self.model, scene, &outfit, &mut tensors.embeddings())?),
-        };
-        let embeddings = match trains {
-            Trains::Single => embeddings,
-            Trains::Untangling | Trains::All => self.model.prepare_untangling(&outfit, embeddings),
-        };
-        let mut scenes = Vec::with_capacity(scene.bodies.len());
-        for prepared in &scene.bodies {
-            let (body, start) = trace_span!("tensors").in_scope(|| tensors.body(prepared))?;
-            let single = first_stage.drape_single(&outfit, &embeddings, &body, start);
-            let (posed, canonical) = match trains {
-                Trains::Single => (single.posed, single.canonical),
-                Trains::Untangling | Trains::All => {
-                    let layered = self.model.untangle(&outfit, &embeddings, &single, &body);
-                    (layered.posed, layered.canonical)
-                }
-            };
-            let energy = prepared.energy.clone();
-            scenes.push(trace_span!("energies").in_scope(|| scene_loss(posed, canonical, energy)));
-        }
-        let depends = trains != Trains::Untangling || outfit.has_contacts();
-        let sum = scenes.iter().map(|s| s.loss.clone()).reduce(|a, b| a + b);
-        let loss = sum.filter(|_| depends).map(|l| l / scenes.len() as f64);
-        Ok((loss, scenes))
     }
 }

@@ -1,0 +1,146 @@
+//! Loss and gradients of one scene, and of several beside each other.
+
+use super::workers::Workers;
+use crate::config::Trains;
+use crate::drape::{DrapeError, KnownEmbeddings, WardrobeTensors};
+use crate::scene::PreparedScene;
+use burn::module::Module;
+use burn::optim::GradientsParams;
+use burn::tensor::Tensor;
+use clothcombo_model::ClothCombo;
+use clothcombo_physics::autodiff::{SceneLossOutput, scene_loss};
+use std::ops::AddAssign;
+use std::time::{Duration, Instant};
+use tracing::trace_span;
+
+/// Where the time of a step went; honest on backends that compute at once (the CPU ones). Of scenes that were computed
+/// beside each other the slowest counts.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct StepTimes {
+    /// Networks and energies.
+    pub forward: Duration,
+    /// Gradients.
+    pub backward: Duration,
+    /// Clipping, Adam, the running average.
+    pub update: Duration,
+}
+
+impl StepTimes {
+    /// Those of the longest of several that ran beside each other.
+    pub(super) fn longest(times: impl Iterator<Item = Self>) -> Self {
+        times.max_by_key(|t| t.forward + t.backward + t.update).unwrap_or_default()
+    }
+}
+
+impl AddAssign for StepTimes {
+    fn add_assign(&mut self, other: Self) {
+        self.forward += other.forward;
+        self.backward += other.backward;
+        self.update += other.update;
+    }
+}
+
+/// The first stage while it is not trained, with the embeddings it made.
+pub(super) struct Frozen {
+    pub model: ClothCombo,
+    pub embeddings: KnownEmbeddings,
+}
+
+/// What the scenes of a step have in common.
+#[derive(Clone, Copy)]
+pub(super) struct Work<'a> {
+    pub tensors: &'a WardrobeTensors,
+    pub frozen: Option<&'a Frozen>,
+    pub trains: Trains,
+    /// Weight of a scene in the step's loss.
+    pub share: f64,
+    pub spoil_gradient: bool,
+}
+
+/// What one scene contributes to a step.
+pub(super) struct SceneGradient {
+    /// Its part of the weighted loss.
+    pub loss: f64,
+    /// Energies per body.
+    pub bodies: Vec<SceneLossOutput>,
+    /// Its part of the gradient; `None` when nothing in the scene depends on what is trained.
+    pub gradients: Option<GradientsParams>,
+    pub times: StepTimes,
+}
+
+impl Work<'_> {
+    /// Every scene on its share of the threads, as few operations of a scene are large enough for all of them.
+    ///
+    /// burn keeps all operations on the same parameters in one graph under one lock, so that each scene gets a copy of the
+    /// networks whose parameters are leaves of their own; their values are shared.
+    pub fn compute_beside(
+        &self,
+        model: &ClothCombo,
+        scenes: &[PreparedScene],
+        workers: &mut Workers,
+    ) -> Result<Vec<SceneGradient>, DrapeError> {
+        let copies = scenes.iter().map(|scene| (detached_copy(model), scene)).collect();
+        workers.map(copies, |(model, scene)| self.compute(&model, scene)).into_iter().collect()
+    }
+
+    /// Loss and gradients of `scene` for the parameters of `model`.
+    pub fn compute(&self, model: &ClothCombo, scene: &PreparedScene) -> Result<SceneGradient, DrapeError> {
+        let start = Instant::now();
+        let (loss, bodies) = self.forward(model, scene)?;
+        let mean = bodies.iter().map(|s| s.value().total).sum::<f64>() / bodies.len() as f64;
+        let forward = start.elapsed();
+        let start = Instant::now();
+        let gradients = loss.map(|mut loss| {
+            if self.share < 1.0 {
+                loss = loss * self.share;
+            }
+            if self.spoil_gradient {
+                loss = loss * f64::NAN;
+            }
+            trace_span!("backward").in_scope(|| GradientsParams::from_grads(loss.backward(), model))
+        });
+        let times = StepTimes { forward, backward: start.elapsed(), ..StepTimes::default() };
+        Ok(SceneGradient { loss: mean * self.share, bodies, gradients, times })
+    }
+
+    /// Mean loss over the bodies, `None` when nothing in it depends on what is trained.
+    fn forward(
+        &self,
+        model: &ClothCombo,
+        scene: &PreparedScene,
+    ) -> Result<(Option<Tensor<1>>, Vec<SceneLossOutput>), DrapeError> {
+        let outfit = trace_span!("tensors").in_scope(|| self.tensors.outfit(scene))?;
+        let (first_stage, embeddings) = match self.frozen {
+            Some(f) => (&f.model, self.tensors.embed(&f.model, scene, &outfit, &f.embeddings)?),
+            None => (model, self.tensors.embed(model, scene, &outfit, &self.tensors.embeddings())?),
+        };
+        let embeddings = match self.trains {
+            Trains::Single => embeddings,
+            Trains::Untangling | Trains::All => model.prepare_untangling(&outfit, embeddings),
+        };
+        let mut scenes = Vec::with_capacity(scene.bodies.len());
+        for prepared in &scene.bodies {
+            let (body, start) = trace_span!("tensors").in_scope(|| self.tensors.body(prepared))?;
+            let single = first_stage.drape_single(&outfit, &embeddings, &body, start);
+            let (posed, canonical) = match self.trains {
+                Trains::Single => (single.posed, single.canonical),
+                Trains::Untangling | Trains::All => {
+                    let layered = model.untangle(&outfit, &embeddings, &single, &body);
+                    (layered.posed, layered.canonical)
+                }
+            };
+            let energy = prepared.energy.clone();
+            scenes.push(trace_span!("energies").in_scope(|| scene_loss(posed, canonical, energy)));
+        }
+        let depends = self.trains != Trains::Untangling || outfit.has_contacts();
+        let sum = scenes.iter().map(|s| s.loss.clone()).reduce(|a, b| a + b);
+        let loss = sum.filter(|_| depends).map(|l| l / scenes.len() as f64);
+        Ok((loss, scenes))
+    }
+}
+
+/// The same parameters as leaves of another graph. Not `fork`: it notes a move between devices in the graph of the original,
+/// and there the note stays for as long as a parameter does that is not trained.
+fn detached_copy(model: &ClothCombo) -> ClothCombo {
+    model.valid().train()
+}
