@@ -53,6 +53,8 @@ pub struct Costs {
     pub forward_backward_ms: f64,
     /// A whole step: networks, losses, backward pass, clip, Adam.
     pub step_ms: f64,
+    /// A step on two scenes (`accumulate = 2`), which are computed beside each other where there are threads for it.
+    pub step_of_two_ms: f64,
     /// All losses with their gradient.
     pub losses_ms: f64,
     /// Draping again what has been embedded and packed before, as for the next frame of a motion.
@@ -259,6 +261,10 @@ impl Subject {
             median_ms(seconds, || self.learner.step(&self.tensors, &scenes, trains, rate, false).map(drop))?;
         let peak_mib = Memory::now().filter(|_| reset).map(|memory| memory.peak as f64 / f64::from(1 << 20));
 
+        let two = [self.scene(0)?, self.scene(0)?];
+        let step_of_two_ms =
+            median_ms(seconds, || self.learner.step(&self.tensors, &two, trains, rate, false).map(drop))?;
+
         let plain = self.model().valid();
         let read = |positions: [Tensor<2>; 2]| positions.map(Tensor::into_data);
         let forward_ms =
@@ -290,7 +296,16 @@ impl Subject {
                 terms_ms.insert(term.name(), evaluate(&alone)?);
             }
         }
-        Ok(Costs { forward_ms, forward_backward_ms, step_ms, losses_ms, drape_ms, terms_ms, peak_mib })
+        Ok(Costs {
+            forward_ms,
+            forward_backward_ms,
+            step_ms,
+            step_of_two_ms,
+            losses_ms,
+            drape_ms,
+            terms_ms,
+            peak_mib,
+        })
     }
 }
 

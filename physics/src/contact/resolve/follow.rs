@@ -88,10 +88,10 @@ pub fn resolve_along<E: From<ResolveError>>(
             let way = Way { layers, end: body, settings, start };
             let (followed, steps) = way.follow(reached, LONGEST, stage_at)?;
             if let Some(found) = followed {
+                let rounds = found.rounds;
+                best.garments.iter_mut().for_each(|work| work.rounds += rounds);
                 let found = settled(body, layers, found, settings);
-                if found.is_better_than(&best) {
-                    best = Resolved { body_time: best.body_time, ..found };
-                }
+                best.join(found.positions, found.certificate, &body.drawn, layers);
             }
             best.compare(layers, start.elapsed());
             best.steps = steps;

@@ -36,6 +36,7 @@ mod near;
 mod obstacle;
 mod outfit;
 mod over;
+mod places;
 mod relax;
 mod relief;
 mod settings;
@@ -58,6 +59,7 @@ use certificate::certificate;
 use near::MARGIN;
 use obstacle::BodyObstacle;
 use outfit::Outfit;
+use places::best_places;
 use untangle::Untangling;
 
 /// Positions farther from the origin than this are refused [m]: the exact predicates would hold, but no distance would.
@@ -104,13 +106,32 @@ impl Resolved {
         let now = at(layers, &self.positions);
         let closer = body.with_least_room(|obstacle| untangled(obstacle, &now, &settings));
         let certificate = certified(&body.drawn, layers, &closer.positions);
-        if certificate.defects() < self.certificate.defects() {
-            (self.positions, self.certificate) = (closer.positions, certificate);
-        }
+        self.join(closer.positions, certificate, &body.drawn, layers);
     }
 
-    fn is_better_than(&self, other: &Self) -> bool {
-        self.certificate.defects() < other.certificate.defects()
+    /// Takes over what another state of the garments has better: all of it, or the places in which it is.
+    fn join(
+        &mut self,
+        positions: Vec<Vec<[f64; 3]>>,
+        certificate: Certificate,
+        drawn: &BodyObstacle<'_>,
+        layers: &[Layer<'_>],
+    ) {
+        let best = self.certificate.defects().min(certificate.defects());
+        if best > (0, 0)
+            && let Some(mixed) =
+                best_places(layers, (&self.positions, &self.certificate), (&positions, &certificate))
+        {
+            // Two places may have moved into each other.
+            let certificate = certified(drawn, layers, &mixed);
+            if certificate.defects() < best {
+                (self.positions, self.certificate) = (mixed, certificate);
+                return;
+            }
+        }
+        if certificate.defects() < self.certificate.defects() {
+            (self.positions, self.certificate) = (positions, certificate);
+        }
     }
 
     /// Tells moves and strain from `layers`, and that all of it took `time`.
@@ -185,10 +206,9 @@ fn resolved(
     let certificate_time = simple.certificate_time + found.certificate_time;
     let rounds = |resolved: &Resolved| resolved.garments.first().map_or(0, |work| work.rounds);
     let all_rounds = rounds(&simple) + rounds(&found);
-    if simple.is_better_than(&found) {
-        found = simple;
-        found.certificate.count_narrow(&body.drawn);
-    }
+    let mut simple_certificate = simple.certificate;
+    simple_certificate.count_narrow(&body.drawn);
+    found.join(simple.positions, simple_certificate, &body.drawn, layers);
     found.garments.iter_mut().for_each(|work| work.rounds = all_rounds);
     (found.body_time, found.certificate_time) = (body_time, certificate_time);
     found.compare(layers, time);

@@ -238,13 +238,20 @@ fn print_tables(measured: &[Measured]) {
     }
     println!("\nParts of one scene, medians [ms]; scenes are prepared on another thread.\n");
     println!(
-        "| case | vertices | parameters | forward | forward + backward | step | losses | drape again | prepare scene | peak memory [MiB] |"
+        "| case | vertices | parameters | forward | forward + backward | step | step on two scenes | losses | drape again | prepare scene | peak memory [MiB] |"
     );
-    println!("|---|{}", "---:|".repeat(9));
+    println!("|---|{}", "---:|".repeat(10));
     for m in measured {
         let c = &m.costs;
-        let times =
-            [c.forward_ms, c.forward_backward_ms, c.step_ms, c.losses_ms, c.drape_ms, m.profile.prepare_ms];
+        let times = [
+            c.forward_ms,
+            c.forward_backward_ms,
+            c.step_ms,
+            c.step_of_two_ms,
+            c.losses_ms,
+            c.drape_ms,
+            m.profile.prepare_ms,
+        ];
         let peak = c.peak_mib.map_or("–".into(), |mib| format!("{mib:.0}"));
         let times = times.map(short).join(" | ");
         println!("| {} | {} | {} | {times} | {peak} |", m.name, m.vertices, m.parameters);
