@@ -24,6 +24,8 @@ const LONGEST: f64 = 1.0 / 8.0;
 const SHORTEST: f64 = 1.0 / 128.0;
 /// The way is given up after as many of the shortest that left crossings.
 const MOST_FAILURES: usize = 3;
+/// Pairs left that further attempts are likelier to mend than a way from the T-pose.
+const FEW: usize = 32;
 /// Steps without crossings after which a longer one is tried.
 const GOOD_STEPS: usize = 2;
 /// How much of what the post-process changed is kept from step to step, so that old changes fade.
@@ -78,6 +80,9 @@ pub fn resolve_along<E: From<ResolveError>>(
         let relieving = Instant::now();
         with_body(drawn, layers.len(), |body| {
             let mut best = resolved(body, layers, settings, simple, relieving);
+            if best.certificate.between() <= FEW || settings.steps == 0 {
+                best.go_on(&body.drawn, layers, settings, start);
+            }
             if best.certificate.is_clear() || settings.steps == 0 {
                 return Ok(best);
             }
@@ -93,7 +98,7 @@ pub fn resolve_along<E: From<ResolveError>>(
                 let found = settled(body, layers, found, settings);
                 best.join(found.positions, found.certificate, &body.drawn, layers);
             }
-            best.compare(layers, start.elapsed());
+            best.go_on(&body.drawn, layers, settings, start);
             best.steps = steps;
             Ok(best)
         })
@@ -120,10 +125,10 @@ pub fn resolve_after<E: From<ResolveError>>(
         let (followed, steps) = way.follow(before, 1.0, stage_at)?;
         let Some(found) = followed else { return Ok(None) };
         let mut resolved = settled(body, layers, found, settings);
+        resolved.go_on(&body.drawn, layers, settings, start);
         if resolved.certificate.between() > resolved.certificate.narrow_triangle_pairs {
             return Ok(None);
         }
-        resolved.compare(layers, start.elapsed());
         resolved.steps = steps;
         Ok(Some(resolved))
     };
@@ -192,8 +197,7 @@ impl Way<'_, '_> {
     }
 
     fn is_late(&self) -> bool {
-        let limit = self.settings.time.map(|limit| limit * self.layers.len() as u32);
-        limit.is_some_and(|limit| self.start.elapsed() > limit)
+        self.settings.is_late(self.start, self.layers.len())
     }
 }
 

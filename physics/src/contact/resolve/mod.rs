@@ -65,6 +65,9 @@ use untangle::Untangling;
 /// Positions farther from the origin than this are refused [m]: the exact predicates would hold, but no distance would.
 const FARTHEST: f64 = 1e3;
 
+/// Most attempts that begin where another one ended.
+const FURTHER_ATTEMPTS: usize = 3;
+
 /// Garments that were resolved.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Resolved {
@@ -107,6 +110,35 @@ impl Resolved {
         let closer = body.with_least_room(|obstacle| untangled(obstacle, &now, &settings));
         let certificate = certified(&body.drawn, layers, &closer.positions);
         self.join(closer.positions, certificate, &body.drawn, layers);
+    }
+
+    /// Where crossings are left, attempts that begin where the one before ended: cloth that is nearly sorted out is the better
+    /// shape to return to and to measure lengths from than the drape it came from. `start`: when all of it began.
+    fn go_on(
+        &mut self,
+        drawn: &BodyObstacle<'_>,
+        layers: &[Layer<'_>],
+        settings: &ResolveSettings,
+        start: Instant,
+    ) {
+        let mut now = self.positions.clone();
+        for _ in 0..FURTHER_ATTEMPTS {
+            if self.certificate.is_clear() || settings.is_late(start, layers.len()) {
+                break;
+            }
+            let found = resolved_once(drawn.surface, &at(layers, &now), settings);
+            if found.positions == now {
+                break;
+            }
+            for (work, further) in self.garments.iter_mut().zip(&found.garments) {
+                work.rounds += further.rounds;
+            }
+            self.body_time += found.body_time;
+            self.certificate_time += found.certificate_time;
+            now.clone_from(&found.positions);
+            self.join(found.positions, found.certificate, drawn, layers);
+        }
+        self.compare(layers, start.elapsed().saturating_sub(self.body_time + self.certificate_time));
     }
 
     /// Takes over what another state of the garments has better: all of it, or the places in which it is.
@@ -166,9 +198,26 @@ pub fn resolve(
         if simple.certificate.is_clear() {
             return simple;
         }
-        let start = Instant::now();
-        with_body(drawn, layers.len(), |body| resolved(body, layers, settings, simple, start))
+        let relieving = Instant::now();
+        with_body(drawn, layers.len(), |body| {
+            let mut found = resolved(body, layers, settings, simple, relieving);
+            found.go_on(&body.drawn, layers, settings, start);
+            found
+        })
     }))
+}
+
+/// [`resolve`] without what follows the first attempts.
+fn resolved_once(surface: &Surface<f64>, layers: &[Layer<'_>], settings: &ResolveSettings) -> Resolved {
+    let start = Instant::now();
+    with_drawn(surface, layers, |drawn| {
+        let simple = simply_resolved(&drawn, layers, settings, start);
+        if simple.certificate.is_clear() {
+            return simple;
+        }
+        let relieving = Instant::now();
+        with_body(drawn, layers.len(), |body| resolved(body, layers, settings, simple, relieving))
+    })
 }
 
 /// [`resolve`] on a body that does not give way, whose preparation began at `start`: enough for most garments.

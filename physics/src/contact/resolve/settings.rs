@@ -1,6 +1,6 @@
 //! How far apart, how wide, how often.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use super::ResolveError;
 
@@ -65,6 +65,11 @@ impl Default for ResolveSettings {
 }
 
 impl ResolveSettings {
+    /// Whether what began at `start` has had its time.
+    pub(super) fn is_late(&self, start: Instant, garments: usize) -> bool {
+        self.time.is_some_and(|limit| start.elapsed() > limit * garments as u32)
+    }
+
     /// Checks every value.
     ///
     /// # Errors

@@ -173,8 +173,7 @@ impl<'a> Untangling<'a> {
     }
 
     fn is_late(&self, start: Instant) -> bool {
-        let limit = self.settings.time.map(|limit| limit * self.outfit.len() as u32);
-        limit.is_some_and(|limit| start.elapsed() > limit)
+        self.settings.is_late(start, self.outfit.len())
     }
 
     /// Pairs that are left, and vertices on the wrong side.
