@@ -10,7 +10,7 @@ anything is timed. Then both sides run in turn with the same number of threads; 
 forward             all networks without gradients, the garments' embedding included
 forward + backward  the same with autodiff, from a fixed gradient at the positions
 step                networks, losses, backward pass, clip of the global norm to 1, Adam
-step on two scenes  the same with the gradients of two scenes accumulated before clip and Adam
+step on two outfits  the same with the gradients of two outfits accumulated before clip and Adam
 losses              all losses and their gradient at fixed positions
 drape again         all networks but the embedding, which is kept
 memory              largest resident memory of a process that trains (VmHWM after the first step's set-up)
@@ -36,7 +36,7 @@ PARTS = {
     "forward": "forward_ms",
     "forward + backward": "forward_backward_ms",
     "step": "step_ms",
-    "step on two scenes": "step_of_two_ms",
+    "step on two outfits": "step_of_several_ms",
     "losses": "losses_ms",
     "drape again": "drape_ms",
 }
@@ -168,7 +168,7 @@ class Scene:
     def times(self, seconds):
         found = {name: median_ms(run, seconds) for name, run in [
             ("forward", self.forward), ("forward + backward", self.forward_backward), ("step", self.step),
-            ("step on two scenes", lambda: self.step(2)), ("losses", self.losses_alone)]}
+            ("step on two outfits", lambda: self.step(2)), ("losses", self.losses_alone)]}
         with torch.no_grad():
             embeddings = self.model.encode(self.outfit)
             found["drape again"] = median_ms(lambda: self.model(self.outfit, embeddings), seconds)
@@ -198,7 +198,7 @@ def peak_mib(folder):
 
 def ours(options, width, layers, folder=None):
     command = [options.ours, "bench", "step", "--json", "--steps", "3", "--seconds", str(options.seconds)]
-    command += ["--widths", str(width), "--layers", str(layers), "--vertices", str(options.vertices)]
+    command += ["--accumulate", "2", "--widths", str(width), "--layers", str(layers), "--vertices", str(options.vertices)]
     if folder:
         command += ["--export", folder]
     environment = dict(os.environ, RAYON_NUM_THREADS=str(options.threads))

@@ -53,8 +53,9 @@ pub struct Costs {
     pub forward_backward_ms: f64,
     /// A whole step: networks, losses, backward pass, clip, Adam.
     pub step_ms: f64,
-    /// A step on two scenes (`accumulate = 2`), which are computed beside each other where there are threads for it.
-    pub step_of_two_ms: f64,
+    /// A step on several scenes (`accumulate`), which are computed beside each other where there are threads for it; absent
+    /// if none was asked for.
+    pub step_of_several_ms: Option<f64>,
     /// All losses with their gradient.
     pub losses_ms: f64,
     /// Draping again what has been embedded and packed before, as for the next frame of a motion.
@@ -248,11 +249,11 @@ impl Subject {
         Ok((total, named.found))
     }
 
-    /// Measures the parts of one scene, each for about `seconds`.
+    /// Measures the parts of one scene, each for about `seconds`, and a step on it `several` times over.
     ///
     /// # Errors
     /// When the scene cannot be prepared or its tensors cannot be made.
-    pub fn costs(&mut self, seconds: f64) -> Result<Costs, Report> {
+    pub fn costs(&mut self, seconds: f64, several: usize) -> Result<Costs, Report> {
         let scenes = [self.scene(0)?];
         let [scene] = &scenes;
         let (trains, rate) = (self.trains(), 1e-4);
@@ -261,9 +262,14 @@ impl Subject {
             median_ms(seconds, || self.learner.step(&self.tensors, &scenes, trains, rate, false).map(drop))?;
         let peak_mib = Memory::now().filter(|_| reset).map(|memory| memory.peak as f64 / f64::from(1 << 20));
 
-        let two = [self.scene(0)?, self.scene(0)?];
-        let step_of_two_ms =
-            median_ms(seconds, || self.learner.step(&self.tensors, &two, trains, rate, false).map(drop))?;
+        let step_of_several_ms = match several {
+            0 | 1 => None,
+            _ => {
+                let scenes = (0..several).map(|_| self.scene(0)).collect::<Result<Vec<_>, _>>()?;
+                let step = || self.learner.step(&self.tensors, &scenes, trains, rate, false).map(drop);
+                Some(median_ms(seconds, step)?)
+            }
+        };
 
         let plain = self.model().valid();
         let read = |positions: [Tensor<2>; 2]| positions.map(Tensor::into_data);
@@ -300,7 +306,7 @@ impl Subject {
             forward_ms,
             forward_backward_ms,
             step_ms,
-            step_of_two_ms,
+            step_of_several_ms,
             losses_ms,
             drape_ms,
             terms_ms,

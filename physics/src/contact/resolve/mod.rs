@@ -21,6 +21,9 @@
 //! hardly any cloth fits between two parts, the body gives way ([`relief`]) where crossings are left otherwise; in the
 //! end garments are brought out of it again where they can.
 //!
+//! What several attempts reach is joined place by place ([`places`]), and where crossings are left the next one begins where the
+//! last one ended.
+//!
 //! **Bent limbs.** Where crossings are left, [`resolve_along`] takes the garments from the T-pose, where their order is plain,
 //! step by step to the pose ([`follow`]).
 
@@ -113,7 +116,8 @@ impl Resolved {
     }
 
     /// Where crossings are left, attempts that begin where the one before ended: cloth that is nearly sorted out is the better
-    /// shape to return to and to measure lengths from than the drape it came from. `start`: when all of it began.
+    /// shape to return to and to measure lengths from than the drape it came from. None where limits are strict
+    /// (`settings.loosened`). `start`: when all of it began.
     fn go_on(
         &mut self,
         drawn: &BodyObstacle<'_>,
@@ -122,7 +126,8 @@ impl Resolved {
         start: Instant,
     ) {
         let mut now = self.positions.clone();
-        for _ in 0..FURTHER_ATTEMPTS {
+        let attempts = if settings.loosened > 1.0 { FURTHER_ATTEMPTS } else { 0 };
+        for _ in 0..attempts {
             if self.certificate.is_clear() || settings.is_late(start, layers.len()) {
                 break;
             }

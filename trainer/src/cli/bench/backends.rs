@@ -86,7 +86,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
             .zip(&found)
             .map(|((name, expected), (_, found))| (difference(found, expected), name));
         let worst = differences.max_by(|a, b| a.0.total_cmp(&b.0));
-        let costs = subject.costs(arguments.seconds)?;
+        let costs = subject.costs(arguments.seconds, 1)?;
         rows.push(Row {
             device: name(device),
             loss: found_loss,

@@ -200,7 +200,8 @@ fn panels(sweeps: &[Sweep]) -> Vec<LinePanel> {
             };
             let e = &sweep.exponents;
             LinePanel {
-                title: format!("{} ({})", sweep.varied, sweep.fixed),
+                // What is fixed stands in the table; it does not fit over a panel.
+                title: format!("over {}", sweep.varied),
                 lines: vec![
                     line(format!("step [ms], exponent {:.2}", e.step), |p| p.step_ms),
                     line(format!("forward [ms], exponent {:.2}", e.forward), |p| p.forward_ms),

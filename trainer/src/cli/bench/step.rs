@@ -45,6 +45,9 @@ pub struct Arguments {
     /// Bodies per step, which share the garments' embeddings
     #[arg(long, value_delimiter = ',', default_values_t = [1])]
     bodies: Vec<usize>,
+    /// Also times a step on this many outfits (accumulate), which are computed beside each other
+    #[arg(long, value_name = "OUTFITS", default_value_t = 1)]
+    accumulate: usize,
     /// Training steps that are profiled
     #[arg(long, default_value_t = 10)]
     steps: usize,
@@ -186,7 +189,7 @@ fn measure(
 ) -> Result<Measured, Report> {
     say(&format!("measuring {name}"));
     let scene = subject.scene(0)?;
-    let costs = subject.costs(arguments.seconds)?;
+    let costs = subject.costs(arguments.seconds, arguments.accumulate)?;
     let profile = subject.profile(arguments.steps)?;
     Ok(Measured {
         name,
@@ -238,23 +241,22 @@ fn print_tables(measured: &[Measured]) {
     }
     println!("\nParts of one scene, medians [ms]; scenes are prepared on another thread.\n");
     println!(
-        "| case | vertices | parameters | forward | forward + backward | step | step on two scenes | losses | drape again | prepare scene | peak memory [MiB] |"
+        "| case | vertices | parameters | forward | forward + backward | step | step on several outfits | losses | drape again | prepare scene | peak memory [MiB] |"
     );
     println!("|---|{}", "---:|".repeat(10));
     for m in measured {
         let c = &m.costs;
-        let times = [
-            c.forward_ms,
-            c.forward_backward_ms,
-            c.step_ms,
-            c.step_of_two_ms,
-            c.losses_ms,
-            c.drape_ms,
-            m.profile.prepare_ms,
-        ];
+        let several = c.step_of_several_ms.map_or("–".into(), short);
+        let [before, after] = [
+            [c.forward_ms, c.forward_backward_ms, c.step_ms],
+            [c.losses_ms, c.drape_ms, m.profile.prepare_ms],
+        ]
+        .map(|times| times.map(short).join(" | "));
         let peak = c.peak_mib.map_or("–".into(), |mib| format!("{mib:.0}"));
-        let times = times.map(short).join(" | ");
-        println!("| {} | {} | {} | {times} | {peak} |", m.name, m.vertices, m.parameters);
+        println!(
+            "| {} | {} | {} | {before} | {several} | {after} | {peak} |",
+            m.name, m.vertices, m.parameters
+        );
     }
     println!("\nEvery loss alone, value and gradient [ms].\n");
     println!("| case | {} |", Term::ALL.map(Term::name).join(" | "));
