@@ -24,8 +24,6 @@ const LONGEST: f64 = 1.0 / 8.0;
 const SHORTEST: f64 = 1.0 / 128.0;
 /// The way is given up after as many of the shortest that left crossings.
 const MOST_FAILURES: usize = 3;
-/// Pairs left that further attempts are likelier to mend than a way from the T-pose.
-const FEW: usize = 32;
 /// Steps without crossings after which a longer one is tried.
 const GOOD_STEPS: usize = 2;
 /// How much of what the post-process changed is kept from step to step, so that old changes fade.
@@ -80,9 +78,7 @@ pub fn resolve_along<E: From<ResolveError>>(
         let relieving = Instant::now();
         with_body(drawn, layers.len(), |body| {
             let mut best = resolved(body, layers, settings, simple, relieving);
-            if best.certificate.between() <= FEW || settings.steps == 0 {
-                best.go_on(&body.drawn, layers, settings, start);
-            }
+            best.go_on(&body.drawn, layers, settings, start);
             if best.certificate.is_clear() || settings.steps == 0 {
                 return Ok(best);
             }

@@ -68,8 +68,10 @@ use untangle::Untangling;
 /// Positions farther from the origin than this are refused [m]: the exact predicates would hold, but no distance would.
 const FARTHEST: f64 = 1e3;
 
-/// Most attempts that begin where another one ended.
+/// Most attempts that begin where another one ended…
 const FURTHER_ATTEMPTS: usize = 3;
+/// …and most pairs that may be left there: more would only be torn further.
+const FEW: usize = 32;
 
 /// Garments that were resolved.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -115,7 +117,7 @@ impl Resolved {
         self.join(closer.positions, certificate, &body.drawn, layers);
     }
 
-    /// Where crossings are left, attempts that begin where the one before ended: cloth that is nearly sorted out is the better
+    /// Where few crossings are left, attempts that begin where the one before ended: cloth that is nearly sorted out is the better
     /// shape to return to and to measure lengths from than the drape it came from. None where limits are strict
     /// (`settings.loosened`). `start`: when all of it began.
     fn go_on(
@@ -128,7 +130,8 @@ impl Resolved {
         let mut now = self.positions.clone();
         let attempts = if settings.loosened > 1.0 { FURTHER_ATTEMPTS } else { 0 };
         for _ in 0..attempts {
-            if self.certificate.is_clear() || settings.is_late(start, layers.len()) {
+            let left = self.certificate.between();
+            if left == 0 || left > FEW || settings.is_late(start, layers.len()) {
                 break;
             }
             let found = resolved_once(drawn.surface, &at(layers, &now), settings);
