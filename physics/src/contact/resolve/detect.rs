@@ -2,7 +2,6 @@
 
 use super::obstacle::BodyObstacle;
 use super::outfit::Outfit;
-use super::places::Crossing;
 use crate::contact::TriangleTree;
 use crate::vec3::{add, distance_squared, scale};
 
@@ -31,13 +30,6 @@ impl Crossings {
     /// Pairs with the body and between garments.
     pub fn between(&self) -> usize {
         self.body.len() + self.layers.len()
-    }
-
-    /// All of them, whatever is crossed.
-    pub fn listed(&self) -> Vec<Crossing> {
-        let with_body = self.body.iter().map(|pair| Crossing::with_body(pair.0));
-        let between = self.layers.iter().copied().map(Crossing::between);
-        with_body.chain(between).chain(self.own.iter().copied().map(Crossing::own)).collect()
     }
 
     /// Looks at the faces that are dirty. `trees` are those of the garments, `far` the distances of vertices to the body.

@@ -92,7 +92,7 @@ pub fn resolve_along<E: From<ResolveError>>(
                 let rounds = found.rounds;
                 best.garments.iter_mut().for_each(|work| work.rounds += rounds);
                 let found = settled(body, layers, found, settings);
-                best.join(found.positions, found.certificate, &body.drawn, layers);
+                best.prefer(found.positions, found.certificate);
             }
             best.go_on(&body.drawn, layers, settings, start);
             best.steps = steps;

@@ -21,8 +21,7 @@
 //! hardly any cloth fits between two parts, the body gives way ([`relief`]) where crossings are left otherwise; in the
 //! end garments are brought out of it again where they can.
 //!
-//! What several attempts reach is joined place by place ([`places`]), and where crossings are left the next one begins where the
-//! last one ended.
+//! **Once more.** Where few crossings are left, what was reached is resolved like a new drape.
 //!
 //! **Bent limbs.** Where crossings are left, [`resolve_along`] takes the garments from the T-pose, where their order is plain,
 //! step by step to the pose ([`follow`]).
@@ -39,7 +38,6 @@ mod near;
 mod obstacle;
 mod outfit;
 mod over;
-mod places;
 mod relax;
 mod relief;
 mod settings;
@@ -62,7 +60,6 @@ use certificate::certificate;
 use near::MARGIN;
 use obstacle::BodyObstacle;
 use outfit::Outfit;
-use places::best_places;
 use untangle::Untangling;
 
 /// Positions farther from the origin than this are refused [m]: the exact predicates would hold, but no distance would.
@@ -114,7 +111,7 @@ impl Resolved {
         let now = at(layers, &self.positions);
         let closer = body.with_least_room(|obstacle| untangled(obstacle, &now, &settings));
         let certificate = certified(&body.drawn, layers, &closer.positions);
-        self.join(closer.positions, certificate, &body.drawn, layers);
+        self.prefer(closer.positions, certificate);
     }
 
     /// Where few crossings are left, attempts that begin where the one before ended: cloth that is nearly sorted out is the better
@@ -144,31 +141,13 @@ impl Resolved {
             self.body_time += found.body_time;
             self.certificate_time += found.certificate_time;
             now.clone_from(&found.positions);
-            self.join(found.positions, found.certificate, drawn, layers);
+            self.prefer(found.positions, found.certificate);
         }
         self.compare(layers, start.elapsed().saturating_sub(self.body_time + self.certificate_time));
     }
 
-    /// Takes over what another state of the garments has better: all of it, or the places in which it is.
-    fn join(
-        &mut self,
-        positions: Vec<Vec<[f64; 3]>>,
-        certificate: Certificate,
-        drawn: &BodyObstacle<'_>,
-        layers: &[Layer<'_>],
-    ) {
-        let best = self.certificate.defects().min(certificate.defects());
-        if best > (0, 0)
-            && let Some(mixed) =
-                best_places(layers, (&self.positions, &self.certificate), (&positions, &certificate))
-        {
-            // Two places may have moved into each other.
-            let certificate = certified(drawn, layers, &mixed);
-            if certificate.defects() < best {
-                (self.positions, self.certificate) = (mixed, certificate);
-                return;
-            }
-        }
+    /// Takes another state of the garments if it is better.
+    fn prefer(&mut self, positions: Vec<Vec<[f64; 3]>>, certificate: Certificate) {
         if certificate.defects() < self.certificate.defects() {
             (self.positions, self.certificate) = (positions, certificate);
         }
@@ -263,9 +242,9 @@ fn resolved(
     let certificate_time = simple.certificate_time + found.certificate_time;
     let rounds = |resolved: &Resolved| resolved.garments.first().map_or(0, |work| work.rounds);
     let all_rounds = rounds(&simple) + rounds(&found);
-    let mut simple_certificate = simple.certificate;
-    simple_certificate.count_narrow(&body.drawn);
-    found.join(simple.positions, simple_certificate, &body.drawn, layers);
+    let mut certificate = simple.certificate;
+    certificate.count_narrow(&body.drawn);
+    found.prefer(simple.positions, certificate);
     found.garments.iter_mut().for_each(|work| work.rounds = all_rounds);
     (found.body_time, found.certificate_time) = (body_time, certificate_time);
     found.compare(layers, time);

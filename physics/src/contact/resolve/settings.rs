@@ -27,9 +27,9 @@ pub struct ResolveSettings {
     /// Longest that an edge may get, as a share of its length in the input. Default 1.15: cloth gives a little, and a place that
     /// asks for more is left and listed instead of torn.
     pub stretch: f64,
-    /// How many times wider both limits are in a second attempt, where crossings are left; its result is only taken in places
-    /// that end with none. What is left then is tried again from there, where both limits are measured anew. Default 6; 1 for
-    /// strict limits: one attempt.
+    /// How many times wider both limits are in a second attempt, where crossings are left; its result is only taken if it ends
+    /// with none. Where few are left in the end, all is tried again from there and both limits are measured anew. Default 6; 1
+    /// for strict limits: one attempt.
     pub loosened: f64,
     /// Most steps on a way: of [`super::resolve_along`] from the T-pose, of [`super::resolve_after`] from the frame before.
     /// Default 64; 0 mends the drape as it is or not at all.

@@ -11,7 +11,6 @@ use super::folds::folds;
 use super::obstacle::{BodyObstacle, Plane};
 use super::outfit::Outfit;
 use super::over::{Order, Over, all_over, order, outward, part_along};
-use super::places::{Crossing, State, Wrong, by_place, count};
 use super::relax::relax;
 use crate::contact::TriangleTree;
 use crate::vec3::{add, add_scaled, dot, norm, norm_squared, scale, sub};
@@ -105,7 +104,7 @@ impl<'a> Untangling<'a> {
     }
 
     /// Rounds of detection and relaxation until nothing is wrong or nothing gets better; how many it took. Where crossings
-    /// are left, a second attempt with wider limits is kept in the places that end with none.
+    /// are left, a second attempt with wider limits is kept if it ends with none.
     pub fn run(&mut self) -> usize {
         let start = Instant::now();
         self.detect();
@@ -114,41 +113,16 @@ impl<'a> Untangling<'a> {
         if self.crossings.between() == 0 || self.settings.loosened <= 1.0 || self.is_late(start) {
             return rounds;
         }
-        let first = (self.positions.clone(), self.shape.clone(), self.crossings.listed());
+        let (positions, shape) = (self.positions.clone(), self.shape.clone());
         self.farthest *= self.settings.loosened;
         self.stretch = 1.0 + (self.stretch - 1.0) * self.settings.loosened;
         let more = self.attempt(start);
-        self.keep_mended_places(first);
-        rounds + more
-    }
-
-    /// Goes back to an earlier state wherever the present one has crossings with the body or between garments, or more of
-    /// garments with themselves.
-    fn keep_mended_places(
-        &mut self,
-        (mut positions, mut shape, before): (Vec<[f64; 3]>, Vec<[f64; 3]>, Vec<Crossing>),
-    ) {
-        if self.crossings.between() == 0 && self.crossings.own.len() <= self.known_folds.len() {
-            return;
-        }
-        let (first, now) = (count(&before), self.crossings.listed());
-        let is_mended = |before: Wrong, now: Wrong| now.0 == 0 && before.0 > 0 && now.1 <= before.1;
-        let states = [(&positions, &before), (&self.positions, &now)]
-            .map(|(positions, crossings)| State { positions, crossings });
-        let taken = by_place(self.outfit, &states[0], &states[1], is_mended);
-        let original = (positions.clone(), shape.clone());
-        for v in taken.iter().enumerate().filter_map(|(v, taken)| taken.then_some(v)) {
-            (positions[v], shape[v]) = (self.positions[v], self.shape[v]);
-        }
-        self.move_to(&positions);
-        self.shape = shape;
-        self.detect();
-        // Two places may have moved into each other.
-        if count(&self.crossings.listed()) > first {
-            self.move_to(&original.0);
-            self.shape = original.1;
+        if self.crossings.between() > 0 || self.crossings.own.len() > self.known_folds.len() {
+            self.move_to(&positions);
+            self.shape = shape;
             self.detect();
         }
+        rounds + more
     }
 
     /// Rounds within the limits as they are. The crossings are those of the positions afterwards.
