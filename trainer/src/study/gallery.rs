@@ -58,22 +58,12 @@ pub fn draw(subject: &Subject, question: usize, done: &(dyn Fn() + Sync)) -> Res
     let [a, b, c] = three;
     let orders = [[a, b, c], [a, c, b], [b, a, c], [b, c, a], [c, a, b]];
     let cells = orders.map(|order| (order.to_vec(), mean.clone()));
-    let columns = orders.map(|order| {
-        order
-            .map(|g| {
-                if g == a {
-                    "1"
-                } else if g == b {
-                    "2"
-                } else {
-                    "3"
-                }
-            })
-            .join(" < ")
-    });
+    // Numbered as the legend lists them.
+    let number = |g| three.iter().position(|other| *other == g).map_or(0, |i| i + 1).to_string();
+    let columns = orders.map(|order| order.map(number).join(" < "));
     add(
         "orders",
-        "The same three garments in different orders, inner to outer.",
+        "The same three garments in different orders, inner to outer; numbers as in the legend.",
         studio.sheet(&cells, &columns)?,
     );
 
@@ -139,7 +129,9 @@ impl Studio<'_> {
     fn sheet(&self, outfits: &[(Vec<usize>, BodyDraw)], columns: &[String]) -> Result<RgbImage, Report> {
         let mut rows = [View::ThreeQuarter, View::Back]
             .map(|view| SheetRow { label: view.name().to_owned(), ..SheetRow::default() });
-        let longest = outfits.iter().map(|(garments, _)| garments).max_by_key(|garments| garments.len());
+        // The first of them: legend and numbers follow its order.
+        let longest =
+            outfits.iter().rev().map(|(garments, _)| garments).max_by_key(|garments| garments.len());
         let same = longest.filter(|all| {
             outfits.iter().all(|(o, _)| o.len() == all.len() && o.iter().all(|g| all.contains(g)))
         });

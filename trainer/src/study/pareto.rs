@@ -303,7 +303,9 @@ impl Pareto {
                 .iter()
                 .map(|(name, belongs)| {
                     let family = self.points.iter().filter(|p| belongs(&p.method));
-                    let points = family.map(|p| (p.ms.spread.median, value(p))).collect();
+                    let mut points: Vec<_> = family.map(|p| (p.ms.spread.median, value(p))).collect();
+                    // More steps may take no longer; a line that turns back is drawn with spikes.
+                    points.sort_by(|a, b| a.0.total_cmp(&b.0));
                     Line { name: (*name).to_owned(), points }
                 })
                 .collect(),
