@@ -24,6 +24,8 @@ const LONGEST: f64 = 1.0 / 8.0;
 const SHORTEST: f64 = 1.0 / 128.0;
 /// The way is given up after as many of the shortest that left crossings.
 const MOST_FAILURES: usize = 3;
+/// A rise of the strain energy, as a share, that is only accepted where the way leaves crossings.
+const TORN: f64 = 1.0;
 /// Steps without crossings after which a longer one is tried.
 const GOOD_STEPS: usize = 2;
 /// How much of what the post-process changed is kept from step to step, so that old changes fade.
@@ -78,9 +80,11 @@ pub fn resolve_along<E: From<ResolveError>>(
         let relieving = Instant::now();
         with_body(drawn, layers.len(), |body| {
             let mut best = resolved(body, layers, settings, simple, relieving);
-            best.go_on(&body.drawn, layers, settings, start);
-            if best.certificate.is_clear() || settings.steps == 0 {
-                return Ok(best);
+            let mut quick = best.clone();
+            quick.go_on(&body.drawn, layers, settings, start);
+            let is_torn = quick.certificate.strain_added.is_some_and(|added| added > TORN);
+            if quick.certificate.is_clear() && !is_torn || settings.steps == 0 {
+                return Ok(quick);
             }
             let stage = stage_at(0.0)?;
             check(&stage.body, &placed(layers, &stage.draped)?)?;
@@ -95,6 +99,10 @@ pub fn resolve_along<E: From<ResolveError>>(
                 best.prefer(found.positions, found.certificate);
             }
             best.go_on(&body.drawn, layers, settings, start);
+            if !best.certificate.is_clear() {
+                best.prefer(quick.positions, quick.certificate);
+                best.compare(layers, start.elapsed());
+            }
             best.steps = steps;
             Ok(best)
         })
