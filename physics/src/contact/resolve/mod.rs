@@ -114,12 +114,12 @@ impl Resolved {
         self.prefer(closer.positions, certificate);
     }
 
-    /// Where few crossings are left, attempts that begin where the one before ended: cloth that is nearly sorted out is the better
-    /// shape to return to and to measure lengths from than the drape it came from. None where limits are strict
+    /// Where few crossings are left on `body`, attempts that begin where the one before ended: cloth that is nearly sorted out is
+    /// the better shape to return to and to measure lengths from than the drape it came from. None where limits are strict
     /// (`settings.loosened`). `start`: when all of it began.
     fn go_on(
         &mut self,
-        drawn: &BodyObstacle<'_>,
+        body: &Surface<f64>,
         layers: &[Layer<'_>],
         settings: &ResolveSettings,
         start: Instant,
@@ -131,19 +131,25 @@ impl Resolved {
             if left == 0 || left > FEW || settings.is_late(start, layers.len()) {
                 break;
             }
-            let found = resolved_once(drawn.surface, &at(layers, &now), settings);
-            if found.positions == now {
-                break;
-            }
-            for (work, further) in self.garments.iter_mut().zip(&found.garments) {
-                work.rounds += further.rounds;
-            }
-            self.body_time += found.body_time;
-            self.certificate_time += found.certificate_time;
+            let found = resolved_once(body, &at(layers, &now), settings);
+            self.add_work(&found);
+            let is_stuck = found.positions == now;
             now.clone_from(&found.positions);
             self.prefer(found.positions, found.certificate);
+            self.compare(layers, start.elapsed().saturating_sub(self.body_time + self.certificate_time));
+            if is_stuck {
+                break;
+            }
         }
-        self.compare(layers, start.elapsed().saturating_sub(self.body_time + self.certificate_time));
+    }
+
+    /// Counts the rounds of another attempt, and its time for the body and for certificates.
+    fn add_work(&mut self, attempt: &Self) {
+        for (work, further) in self.garments.iter_mut().zip(&attempt.garments) {
+            work.rounds += further.rounds;
+        }
+        self.body_time += attempt.body_time;
+        self.certificate_time += attempt.certificate_time;
     }
 
     /// Takes another state of the garments if it is better.
@@ -180,24 +186,15 @@ pub fn resolve(
     settings.check()?;
     check(body, layers)?;
     let start = Instant::now();
-    Ok(with_drawn(body, layers, |drawn| {
-        let simple = simply_resolved(&drawn, layers, settings, start);
-        if simple.certificate.is_clear() {
-            return simple;
-        }
-        let relieving = Instant::now();
-        with_body(drawn, layers.len(), |body| {
-            let mut found = resolved(body, layers, settings, simple, relieving);
-            found.go_on(&body.drawn, layers, settings, start);
-            found
-        })
-    }))
+    let mut found = resolved_once(body, layers, settings);
+    found.go_on(body, layers, settings, start);
+    Ok(found)
 }
 
 /// [`resolve`] without what follows the first attempts.
-fn resolved_once(surface: &Surface<f64>, layers: &[Layer<'_>], settings: &ResolveSettings) -> Resolved {
+fn resolved_once(body: &Surface<f64>, layers: &[Layer<'_>], settings: &ResolveSettings) -> Resolved {
     let start = Instant::now();
-    with_drawn(surface, layers, |drawn| {
+    with_drawn(body, layers, |drawn| {
         let simple = simply_resolved(&drawn, layers, settings, start);
         if simple.certificate.is_clear() {
             return simple;

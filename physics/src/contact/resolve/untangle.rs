@@ -12,7 +12,7 @@ use super::obstacle::{BodyObstacle, Plane};
 use super::outfit::Outfit;
 use super::over::{Order, Over, all_over, order, outward, part_along};
 use super::relax::relax;
-use crate::contact::TriangleTree;
+use crate::contact::intersections::{KeptTree, TriangleTree};
 use crate::vec3::{add, add_scaled, dot, norm, norm_squared, scale, sub};
 
 /// A half-space is remembered for a vertex that is nearer to it than this [m]: smoothing may carry it there.
@@ -43,6 +43,8 @@ pub(super) struct Untangling<'a> {
     /// Directions away from the body; zero where there is none.
     outward: Vec<[f64; 3]>,
     over: Vec<Over>,
+    /// Trees of the garments where they were last looked at.
+    trees: Vec<KeptTree>,
     crossings: Crossings,
     /// Crossings of the input's garments with themselves, ascending.
     known_folds: Vec<(u32, u32)>,
@@ -88,6 +90,7 @@ impl<'a> Untangling<'a> {
             planes: vec![None; count],
             outward: vec![[0.0; 3]; count],
             over: Vec::new(),
+            trees: (0..outfit.len()).map(|_| KeptTree::default()).collect(),
             crossings: Crossings::new(outfit.faces.len()),
             known_folds: Vec::new(),
             remembered: Vec::new(),
@@ -169,13 +172,17 @@ impl<'a> Untangling<'a> {
     /// Brings crossings and the order of layers up to date.
     fn detect(&mut self) {
         let (outfit, positions) = (self.outfit, &self.positions);
-        let trees: Vec<TriangleTree<'_>> = (0..outfit.len())
+        let trees: Vec<TriangleTree<'_>> = std::mem::take(&mut self.trees)
             .into_par_iter()
-            .map(|g| TriangleTree::new(outfit.part(positions, g), &outfit.layers[g].garment.faces))
+            .enumerate()
+            .map(|(g, tree)| {
+                TriangleTree::refitted(tree, outfit.part(positions, g), &outfit.layers[g].garment.faces)
+            })
             .collect();
         let reach = (self.settings.reach, WATCH);
         self.over = all_over(outfit, &trees, positions, &self.outward, reach);
         self.crossings.update(outfit, self.body, &trees, positions, &self.far, self.settings.self_contact);
+        self.trees = trees.into_iter().map(TriangleTree::into_kept).collect();
     }
 
     fn step(&mut self, round: usize) {

@@ -1,0 +1,147 @@
+use super::super::RestGarment;
+use super::*;
+use crate::contact::TriangleTree;
+use crate::mesh::TriMesh;
+use crate::mesh::shapes;
+use std::time::Duration;
+
+const IDENTITY: Transform = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
+
+/// A knee that rises through a sheet that does not know of it: half a metre long at `size` 0.5, in the plane y = 0.
+fn rising(size: f64) -> (TriMesh, impl Fn(f64) -> Result<Waypoint, ResolveError>) {
+    let grid = shapes::irregular_grid(size, size, 24, 24, 0.25, 4);
+    let sheet = shapes::mapped(&grid, |[x, y, _]| [y - 0.5 * size, 0.0, x - 0.5 * size]);
+    let (ball, draped) = (shapes::icosphere(0.08, 3), sheet.positions().to_vec());
+    let stage_at = move |share: f64| {
+        let knee = shapes::mapped(&ball, |p| add(p, [0.0, 0.18 * share - 0.1, 0.0]));
+        Ok(Waypoint {
+            body: Arc::new(Surface::from_mesh(&knee)),
+            draped: vec![draped.clone()],
+            transforms: vec![IDENTITY; draped.len()],
+        })
+    };
+    (sheet, stage_at)
+}
+
+fn end<E>(stage_at: &impl Fn(f64) -> Result<Waypoint, E>) -> Waypoint {
+    stage_at(1.0).unwrap_or_else(|_| unreachable!("made without errors"))
+}
+
+#[test]
+fn a_rising_knee_takes_the_sheet_along() {
+    let (sheet, stage_at) = rising(0.6);
+    let garment = RestGarment::new(&sheet);
+    let stage = end(&stage_at);
+    let layers = [Layer { garment: &garment, positions: &stage.draped[0] }];
+    let settings = ResolveSettings::default();
+    let follow = |end: &Body<'_>| {
+        let way = Way { layers: &layers, end, settings: &settings, start: Instant::now() };
+        let first = stage_at(0.0).unwrap();
+        let positions = first.draped.clone();
+        let (followed, steps) = way.follow(Reached::new(first, positions), LONGEST, &stage_at).unwrap();
+        assert!(steps >= 8, "{steps}");
+        followed.unwrap()
+    };
+    let followed = with_drawn(&stage.body, &layers, |drawn| with_body(drawn, 1, follow));
+    is_over_the_knee(&followed.positions[0], &sheet, &stage.body);
+}
+
+/// The knee's top is at 0.16: nearer to the lower side of the ball, the sheet lies over its top all the same.
+fn is_over_the_knee(over: &[[f64; 3]], sheet: &TriMesh, knee: &Surface<f64>) {
+    let highest = over.iter().map(|p| p[1]).fold(0.0, f64::max);
+    assert!(highest > 0.155, "{highest}");
+    let tree = TriangleTree::new(over, sheet.faces());
+    assert!(tree.pairs_with(&TriangleTree::new(&knee.positions, &knee.faces)).is_empty());
+}
+
+#[test]
+fn the_next_frame_carries_on_from_the_one_before() {
+    let (sheet, stage_at) = rising(0.6);
+    let garment = RestGarment::new(&sheet);
+    let (settings, stage) = (ResolveSettings::default(), end(&stage_at));
+    let layers = [Layer { garment: &garment, positions: &stage.draped[0] }];
+    // By itself the last frame goes wrong: the ball's lower side is nearer.
+    let alone = super::super::resolve(&stage.body, &layers, &settings).unwrap();
+    let highest = alone.positions[0].iter().map(|p| p[1]).fold(0.0, f64::max);
+    assert!(highest < 0.1, "{highest}");
+
+    let mut reached = Reached::new(stage_at(0.0).unwrap(), stage.draped.clone());
+    for frame in 1..=10 {
+        let [before, now] = [0.1 * f64::from(frame - 1), 0.1 * f64::from(frame)];
+        let body = stage_at(now).unwrap().body;
+        let between = |share: f64| stage_at(before + (now - before) * share);
+        let found = resolve_after(reached, &body, &layers, &settings, between).unwrap().unwrap();
+        assert!(found.certificate.is_clear() && found.steps >= 1, "frame {frame}");
+        reached = Reached::new(stage_at(now).unwrap(), found.positions);
+    }
+    is_over_the_knee(&reached.positions[0], &sheet, &stage.body);
+}
+
+#[test]
+fn what_can_be_mended_at_once_is_not_followed_and_what_is_late_is_given_up() {
+    let (sheet, stage_at) = rising(0.6);
+    let garment = RestGarment::new(&sheet);
+    let settings = ResolveSettings::default();
+    let shallow = stage_at(0.3).unwrap();
+    let layers = [Layer { garment: &garment, positions: &shallow.draped[0] }];
+    let resolved = resolve_along(&shallow.body, &layers, &settings, &stage_at).unwrap();
+    assert!(resolved.certificate.is_clear() && resolved.steps == 0);
+    let first = Reached::new(stage_at(0.0).unwrap(), shallow.draped.clone());
+    let settings = ResolveSettings { time: Some(Duration::ZERO), ..settings };
+    let late = resolve_after(first, &shallow.body, &layers, &settings, &stage_at).unwrap();
+    assert!(late.is_none());
+}
+
+#[test]
+fn errors_of_a_stage_come_back() {
+    let (sheet, stage_at) = rising(0.3);
+    let garment = RestGarment::new(&sheet);
+    let layers = [Layer { garment: &garment, positions: sheet.positions() }];
+    let first = stage_at(0.0).unwrap();
+    let body = first.body.clone();
+    let start = Reached::new(first, vec![sheet.positions().to_vec()]);
+    let broken = |_: f64| Err::<Waypoint, _>(ResolveError::EmptyBody);
+    assert!(resolve_after(start, &body, &layers, &ResolveSettings::default(), broken).is_err());
+}
+
+#[test]
+fn what_does_not_fit_is_refused() {
+    let (sheet, stage_at) = rising(0.3);
+    let garment = RestGarment::new(&sheet);
+    let layers = [Layer { garment: &garment, positions: sheet.positions() }];
+    let after = |spoil: &dyn Fn(&mut Reached)| {
+        let first = stage_at(0.0).unwrap();
+        let body = first.body.clone();
+        let mut before = Reached::new(first, vec![sheet.positions().to_vec()]);
+        spoil(&mut before);
+        resolve_after(before, &body, &layers, &ResolveSettings::default(), &stage_at)
+    };
+    assert!(after(&|_| {}).is_ok());
+    let nan = after(&|before| before.positions[0][7][1] = f64::NAN);
+    assert!(matches!(nan, Err(ResolveError::Position { garment: 0, vertex: 7, .. })));
+    let turned = after(&|before| before.transforms[3][0][0] = f64::NAN);
+    assert!(turned.is_ok(), "what such a vertex was moved by stays as it stands");
+    for spoil in [
+        |before: &mut Reached| before.positions.clear(),
+        |before: &mut Reached| before.draped[0].truncate(5),
+        |before: &mut Reached| before.transforms.truncate(5),
+    ] {
+        assert!(matches!(after(&spoil), Err(ResolveError::Count { garment: 0, .. })));
+    }
+}
+
+#[test]
+fn changes_turn_with_the_skinning_and_fade() {
+    let quarter = [[0.0, -1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
+    let stage = |drape: [f64; 3], transform| Waypoint {
+        body: Arc::new(Surface::from_mesh(&shapes::tetrahedron())),
+        draped: vec![vec![drape]],
+        transforms: vec![transform],
+    };
+    let reached = Reached::new(stage([1.0, 0.0, 0.0], IDENTITY), vec![vec![[1.2, 0.0, 0.4]]]);
+    let next = stage([0.0, 1.0, 0.0], quarter);
+    let found = carried(&reached, &next, 0.5)[0][0];
+    for (a, b) in found.iter().zip([0.0, 1.1, 0.2]) {
+        assert!((a - b).abs() < 1e-12, "{found:?}");
+    }
+}
