@@ -26,6 +26,8 @@ pub struct Picture {
 pub const COUNT: usize = 5;
 /// Columns of a sheet.
 const COLUMNS: usize = 5;
+/// Bodies drawn for them: neighbouring frames of a motion would show the same pose twice.
+const CANDIDATES: usize = 8;
 
 struct Studio<'a> {
     subject: &'a Subject,
@@ -67,7 +69,7 @@ pub fn draw(subject: &Subject, question: usize, done: &(dyn Fn() + Sync)) -> Res
         studio.sheet(&cells, &columns)?,
     );
 
-    let bodies: Vec<BodyDraw> = (0..COLUMNS).map(|i| studio.body(i)).collect();
+    let bodies = unlike((0..CANDIDATES).map(|i| studio.body(i)).collect());
     let cells = bodies.iter().map(|b| (three.to_vec(), BodyDraw { pose: mean.pose.clone(), ..b.clone() }));
     let numbers: Vec<String> = (1..=COLUMNS).map(|i| format!("body {i}")).collect();
     add(
@@ -99,6 +101,22 @@ pub fn draw(subject: &Subject, question: usize, done: &(dyn Fn() + Sync)) -> Res
     let numbers: Vec<String> = (1..=COLUMNS).map(|n| format!("outer garment {n}")).collect();
     add("outer", "Different garments over the same two.", studio.sheet(&cells, &numbers)?);
     Ok(pictures)
+}
+
+/// As many bodies as a sheet has columns: the first one, then always that whose pose is least like those before.
+fn unlike(mut bodies: Vec<BodyDraw>) -> Vec<BodyDraw> {
+    let difference = |a: &BodyDraw, b: &BodyDraw| -> f64 {
+        let turned = a.pose.rotations.iter().flatten().zip(b.pose.rotations.iter().flatten());
+        turned.map(|(a, b)| (a - b) * (a - b)).sum()
+    };
+    for taken in 1..COLUMNS.min(bodies.len()) {
+        let (chosen, others) = bodies.split_at(taken);
+        let least = |b: &BodyDraw| chosen.iter().map(|c| difference(c, b)).fold(f64::INFINITY, f64::min);
+        let farthest = (0..others.len()).max_by(|a, b| least(&others[*a]).total_cmp(&least(&others[*b])));
+        bodies.swap(taken, taken + farthest.unwrap_or(0));
+    }
+    bodies.truncate(COLUMNS);
+    bodies
 }
 
 impl Subject {
@@ -171,5 +189,24 @@ impl Studio<'_> {
         let posed = resolved.positions.concat().into_iter().map(|p| p.map(|v| v as f32)).collect();
         let draped = Draped { posed, ..draped };
         Ok([View::ThreeQuarter, View::Back].map(|view| picture_of(&scene, &draped, view, colour)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bodies_of_a_sheet_are_in_unlike_poses() {
+        let body = |angle: f64| BodyDraw {
+            shape: vec![angle],
+            pose: Pose { rotations: vec![[0.0; 3], [angle, 0.0, 0.0]] },
+        };
+        let chosen = unlike([0.0, 0.01, 0.5, 0.02, 1.0, 0.03, 0.25, 0.75].map(body).to_vec());
+        let mut angles: Vec<f64> = chosen.iter().map(|b| b.shape[0]).collect();
+        assert_eq!(angles[..3], [0.0, 1.0, 0.5]);
+        angles.sort_by(f64::total_cmp);
+        assert_eq!(angles, [0.0, 0.25, 0.5, 0.75, 1.0]);
+        assert_eq!(unlike(vec![body(0.3)]).len(), 1);
     }
 }
