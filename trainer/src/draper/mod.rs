@@ -21,6 +21,7 @@
 //! post-process. The networks see the pose without its heading; positions come back in the frame of the given pose.
 
 mod acceleration;
+mod drape;
 mod error;
 mod networked;
 mod outfit;
@@ -33,6 +34,7 @@ mod source;
 
 pub use acceleration::{Acceleration, acceleration};
 pub use clothcombo_physics::contact::resolve::Certificate;
+pub use drape::{Drape, GarmentDrape};
 pub use error::DraperError;
 pub use outfit::{MAX_GARMENTS, MAX_VERTICES, Outfit, Piece, PieceTimes};
 pub use refine::{Refinement, refine};
@@ -51,9 +53,8 @@ use clothcombo_data::cache::{ArrayCache, Key, body_key};
 use clothcombo_model::ClothCombo;
 use clothcombo_physics::Surface;
 use clothcombo_physics::contact::resolve::{
-    Layer, Reached, ResolveSettings, Resolved, Waypoint, certify, resolve_after, resolve_along,
+    ResolveSettings, Resolved, Waypoint, resolve_after, resolve_along,
 };
-use clothcombo_physics::transform::Transform;
 use clothcombo_physics::vec3::{add_scaled, sub};
 use networked::Networked;
 use outfit::KnownGarments;
@@ -115,42 +116,6 @@ impl BodyState {
     pub fn new(shape: Vec<f64>, pose: Pose) -> Self {
         Self { shape, pose, surface: None, place: [0.0; 3] }
     }
-}
-
-/// One garment on one body, vertices as in its [`Piece`].
-#[derive(Clone, Debug)]
-pub struct GarmentDrape {
-    /// Linear blend skinning of the start state, which has learned nothing `[V, 3]` [m].
-    pub skinned: Vec<[f64; 3]>,
-    /// What the networks made of it `[V, 3]` [m].
-    pub network: Vec<[f64; 3]>,
-    /// What came to the post-process: of the networks, or refined `[V, 3]` [m].
-    pub before: Vec<[f64; 3]>,
-    /// The result `[V, 3]` [m].
-    pub positions: Vec<[f64; 3]>,
-    /// Blended skinning transform of every vertex, canonical → posed.
-    pub transforms: Vec<Transform>,
-    /// Wall time of the post-process [ms].
-    pub resolve_ms: f64,
-}
-
-/// An outfit on one body.
-#[derive(Clone, Debug)]
-pub struct Drape {
-    /// The posed body `[V, 3]` [m].
-    pub body: Vec<[f64; 3]>,
-    /// Where it faces: angle about the vertical from +z towards +x [radians].
-    pub heading: f64,
-    /// The garments, inner → outer.
-    pub garments: Vec<GarmentDrape>,
-    /// Wall time of the phases.
-    pub milliseconds: PhaseTimes,
-    /// What the refinement did, if there was one.
-    pub refinement: Option<Refinement>,
-    /// Exact counts of what intersects in the result.
-    pub certificate: Certificate,
-    /// The body with its search trees, as long as they are worth their memory.
-    surface: Option<Arc<Surface<f64>>>,
 }
 
 /// A trained model with a body, ready to drape.
@@ -354,50 +319,6 @@ impl Draper {
 
     fn dimensions(&self) -> clothcombo_model::Dimensions {
         self.trained.state.dimensions()
-    }
-}
-
-impl Drape {
-    /// The body's surface, with its search trees if they were kept.
-    fn surface(&self, draper: &Draper) -> Arc<Surface<f64>> {
-        let make = || Arc::new(Surface::new(self.body.clone(), draper.body().faces.clone()));
-        self.surface.clone().unwrap_or_else(make)
-    }
-
-    /// Where the next frame starts.
-    fn reached(&self) -> Reached {
-        let garments = || self.garments.iter();
-        Reached {
-            draped: garments().map(|g| g.before.clone()).collect(),
-            positions: garments().map(|g| g.positions.clone()).collect(),
-            transforms: garments().flat_map(|g| g.transforms.iter().copied()).collect(),
-        }
-    }
-
-    /// Drops what can be made again at any time: some megabytes, which add up over the frames of a motion.
-    pub fn slim(&mut self) {
-        self.surface = None;
-    }
-
-    /// Brings the positions to what files hold, and counts what intersects there.
-    fn settle(&mut self, draper: &Draper, outfit: &Outfit) -> Result<(), DraperError> {
-        self.garments.iter_mut().for_each(|garment| round(&mut garment.positions));
-        let before: Vec<&[[f64; 3]]> = self.garments.iter().map(|g| g.before.as_slice()).collect();
-        let after: Vec<&[[f64; 3]]> = self.garments.iter().map(|g| g.positions.as_slice()).collect();
-        let mut certificate = certify(&self.surface(draper), &outfit.layers(&after))?;
-        let strain =
-            |layers: Vec<Layer>| layers.iter().map(|l| l.garment.strain_energy(l.positions)).sum::<f64>();
-        let [before, after] = [before, after].map(|parts| strain(outfit.layers(&parts)));
-        certificate.strain_added = (before > 0.0).then(|| after / before - 1.0);
-        self.certificate = certificate;
-        Ok(())
-    }
-}
-
-/// To the 0.1 µm that OBJ files hold: what is certified is then, to the bit, what is read from them.
-fn round(positions: &mut [[f64; 3]]) {
-    for x in positions.as_flattened_mut() {
-        *x = (*x * 1e7).round() / 1e7;
     }
 }
 

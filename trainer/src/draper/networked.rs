@@ -44,7 +44,7 @@ impl Draper {
             Some(given) => self.checked_surface(given)?.to_vec(),
             None => posed.positions.iter().map(|p| add(*p, body.place)).collect(),
         };
-        super::round(&mut surface);
+        super::drape::round(&mut surface);
         let surface = Arc::new(Surface::new(surface, self.body().faces.clone()));
         let (facing, heading) = body.pose.without_heading();
         let (facing, yaw) = match self.trained.config.data.poses.remove_heading {

@@ -4,7 +4,8 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::body::{with_body, with_drawn};
-use super::obstacle::{BodyObstacle, LayerObstacle};
+use super::layer_obstacle::{LayerObstacle, facing};
+use super::obstacle::BodyObstacle;
 use super::{Layer, ResolveError, ResolveSettings};
 use crate::contact::triangle_pair::Triangle;
 use crate::contact::{TriangleTree, contours, self_contours};
@@ -225,7 +226,7 @@ pub(super) fn certificate(body: &BodyObstacle<'_>, layers: &[Layer<'_>]) -> Cert
             let outward = |v: usize| -> [f64; 3] {
                 views[v].and_then(|view| view.plane).map_or([0.0; 3], |plane| plane.normal)
             };
-            let facing = super::obstacle::facing(garment, positions, outward);
+            let facing = facing(garment, positions, outward);
             inner.push(LayerObstacle::new(garment, positions, facing));
         }
     }

@@ -34,6 +34,7 @@ mod error;
 mod folds;
 mod follow;
 mod garment;
+mod layer_obstacle;
 mod near;
 mod obstacle;
 mod outfit;

@@ -1,17 +1,15 @@
-//! What a garment has to stay outside of: the body, and every garment nearer to it.
+//! The posed body as what garments have to stay outside of.
 
-use super::RestGarment;
 use super::contact::{along_line, normal_of};
 use super::near::MARGIN;
 use super::relief::Relief;
 use crate::contact::TriangleTree;
-use crate::mesh::vertex_normals;
 use crate::query::{ClosestPoint, FaceSide, Surface, SurfacePoint, UnionDistance};
-use crate::vec3::{add_scaled, dot, is_finite, norm, scale, sub};
+use crate::vec3::{add_scaled, dot, is_finite, scale, sub};
 use std::sync::OnceLock;
 
 /// Below this distance [m] the direction from the closest point is rounding.
-const CONTACT: f64 = 1e-9;
+pub(super) const CONTACT: f64 = 1e-9;
 
 /// The half-space that the surface nearest to a point leaves to it: `normal·x ≥ offset`.
 #[derive(Debug, Clone, Copy)]
@@ -27,7 +25,7 @@ pub(super) struct Plane {
 }
 
 impl Plane {
-    fn at(found: &SurfacePoint, normal: [f64; 3], distance: f64, is_held: bool) -> Self {
+    pub(super) fn at(found: &SurfacePoint, normal: [f64; 3], distance: f64, is_held: bool) -> Self {
         let offset = dot(normal, found.position);
         Self { normal, offset, distance, is_held }
     }
@@ -196,94 +194,6 @@ fn is_closed(faces: &[[u32; 3]]) -> bool {
         .collect();
     edges.sort_unstable();
     edges.chunk_by(|a, b| a == b).all(|same| same.len() % 2 == 0)
-}
-
-/// A garment that lies under the one being resolved.
-pub(super) struct LayerObstacle<'a> {
-    garment: &'a RestGarment,
-    pub tree: TriangleTree<'a>,
-    closest: ClosestPoint,
-    facing: Vec<f64>,
-    bounds: [[f64; 3]; 2],
-}
-
-impl<'a> LayerObstacle<'a> {
-    /// `facing` as of [`facing`].
-    pub fn new(garment: &'a RestGarment, positions: &'a [[f64; 3]], facing: Vec<f64>) -> Self {
-        let (tree, closest) = rayon::join(
-            || TriangleTree::new(positions, &garment.faces),
-            || ClosestPoint::new(positions.to_vec(), &garment.faces),
-        );
-        Self { garment, tree, closest, facing, bounds: bounds(positions) }
-    }
-
-    /// 1 where face `f` looks away from the body, −1 where the mesh is inside out.
-    pub fn facing(&self, f: u32) -> f64 {
-        self.garment.faces.get(f as usize).map_or(1.0, |face| self.facing[face[0] as usize])
-    }
-
-    /// Whether a box comes closer than `margin` to the garment.
-    pub fn is_near(&self, [low, high]: [[f64; 3]; 2], margin: f64) -> bool {
-        (0..3).all(|k| low[k] - margin <= self.bounds[1][k] && self.bounds[0][k] - margin <= high[k])
-    }
-
-    /// The half-space over the garment at the point nearest to `p`, if it is within `reach` and `p` lies over or under the
-    /// garment and not beside it.
-    pub fn look(&self, p: [f64; 3], reach: f64, gap: f64) -> Option<Plane> {
-        if !self.is_near([p, p], reach) {
-            return None;
-        }
-        let found = self.closest.project_within(p, reach)?;
-        let facing = self.facing(found.face);
-        let normal = scale(found.normal, facing);
-        let offset = sub(p, found.position);
-        let along = dot(offset, normal);
-        let length = found.distance_squared.sqrt();
-        if self.is_at_border(found.face, found.barycentric) {
-            // Past the hem there is nothing to be over; right at it there is.
-            let beside = add_scaled(offset, -along, normal);
-            if norm(beside) > gap.max(0.5 * along.abs()) {
-                return None;
-            }
-            return Some(Plane::at(&found, normal, along, false));
-        }
-        let distance = if along < 0.0 { -length } else { length };
-        let direction = if length > CONTACT { scale(offset, distance.signum() / length) } else { normal };
-        Some(Plane::at(&found, direction, distance, false))
-    }
-
-    fn is_at_border(&self, f: u32, barycentric: [f64; 3]) -> bool {
-        let face = self.garment.faces[f as usize];
-        let zero: Vec<usize> = (0..3).filter(|&k| barycentric[k] <= 1e-9).collect();
-        match zero[..] {
-            [] => false,
-            // On the edge opposite to corner k, which starts at corner k + 1.
-            [k] => self.garment.border_edges[f as usize] >> ((k + 1) % 3) & 1 == 1,
-            _ => (0..3).any(|k| barycentric[k] > 0.5 && self.garment.is_border[face[k] as usize]),
-        }
-    }
-}
-
-/// For every vertex 1 or −1: which side of its component looks away from the body, by what most of its vertices say.
-pub(super) fn facing(
-    garment: &RestGarment,
-    positions: &[[f64; 3]],
-    outward: impl Fn(usize) -> [f64; 3],
-) -> Vec<f64> {
-    let normals = vertex_normals(positions, &garment.faces);
-    let component = &garment.topology.component_of_vertex;
-    let mut votes = vec![0.0; garment.topology.component_count];
-    for v in 0..positions.len() {
-        votes[component[v] as usize] += dot(normals[v], outward(v));
-    }
-    component.iter().map(|&c| if votes[c as usize] < 0.0 { -1.0 } else { 1.0 }).collect()
-}
-
-/// Smallest and largest coordinates.
-pub(super) fn bounds(positions: &[[f64; 3]]) -> [[f64; 3]; 2] {
-    positions.iter().fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |[low, high], p| {
-        [std::array::from_fn(|k| low[k].min(p[k])), std::array::from_fn(|k| high[k].max(p[k]))]
-    })
 }
 
 #[cfg(test)]
