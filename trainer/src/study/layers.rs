@@ -24,6 +24,10 @@ pub struct LayerCount {
     pub strain: Vec<Ratio>,
     /// Median over the outfits of the ratio of each.
     pub strain_median: Vec<f64>,
+    /// Strain of the garments draped alone [J].
+    pub strain_alone: Estimate,
+    /// Strain of the same garments in the outfit [J].
+    pub strain_worn: Estimate,
     /// Share of outer vertices on the wrong side, closest surface point: every garment draped alone.
     pub wrong_side_single: Estimate,
     /// The same after untangling.
@@ -95,6 +99,8 @@ pub fn ask(
         resolved: results.len(),
         strain: (0..layers).map(|l| Ratio::of(&layered[l], &single[l])).collect(),
         strain_median: (0..layers).map(|l| Estimate::of(&ratios(l)).spread.median).collect(),
+        strain_alone: Estimate::of(&single.concat()),
+        strain_worn: Estimate::of(&layered.concat()),
         wrong_side_single: Estimate::of(&wrong_single),
         wrong_side: shares(&mut before.iter().map(|c| c.order_violations)),
         wrong_side_resolved: shares(&mut results.iter().map(|r| r.after.order_violations)),
@@ -154,6 +160,8 @@ pub fn tables(counts: &[LayerCount]) -> Vec<Table> {
         &[
             "layers M",
             "outfits",
+            "strain of a garment alone [J]",
+            "in the outfit [J]",
             "wrong side, each alone [%]",
             "untangled [%]",
             "pairs between garments",
@@ -170,6 +178,8 @@ pub fn tables(counts: &[LayerCount]) -> Vec<Table> {
         order.rows.push(vec![
             format!("M = {}", c.layers),
             c.scenes.to_string(),
+            number(c.strain_alone.spread.mean),
+            number(c.strain_worn.spread.mean),
             percent(c.wrong_side_single.spread.mean),
             percent(c.wrong_side.spread.mean),
             number(c.layer_pairs.spread.mean),
