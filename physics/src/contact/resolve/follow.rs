@@ -81,6 +81,7 @@ pub fn resolve_along<E: From<ResolveError>>(
         with_body(drawn, layers.len(), |room| {
             let mut best = resolved(room, layers, settings, simple, relieving);
             best.go_on(body, layers, settings, start);
+            best.compare_since(layers, start);
             let is_torn = best.certificate.strain_added.is_some_and(|added| added > TORN);
             if best.certificate.is_clear() && !is_torn || settings.steps == 0 {
                 return Ok(best);
@@ -101,8 +102,7 @@ pub fn resolve_along<E: From<ResolveError>>(
                     false => best.prefer(along.positions, along.certificate),
                 }
             }
-            let apart = best.body_time + best.certificate_time;
-            best.compare(layers, start.elapsed().saturating_sub(apart));
+            best.compare_since(layers, start);
             Ok(best)
         })
     })
@@ -129,6 +129,7 @@ pub fn resolve_after<E: From<ResolveError>>(
         let Some(found) = followed else { return Ok(None) };
         let mut resolved = settled(body, layers, found, settings);
         resolved.go_on(body.drawn.surface, layers, settings, start);
+        resolved.compare_since(layers, start);
         if resolved.certificate.between() > resolved.certificate.narrow_triangle_pairs {
             return Ok(None);
         }

@@ -137,7 +137,6 @@ impl Resolved {
             let is_stuck = found.positions == now;
             now.clone_from(&found.positions);
             self.prefer(found.positions, found.certificate);
-            self.compare(layers, start.elapsed().saturating_sub(self.body_time + self.certificate_time));
             if is_stuck {
                 break;
             }
@@ -158,6 +157,11 @@ impl Resolved {
         if certificate.defects() < self.certificate.defects() {
             (self.positions, self.certificate) = (positions, certificate);
         }
+    }
+
+    /// [`compare`](Self::compare) for work that began at `start`, without the time for the body and for certificates.
+    fn compare_since(&mut self, layers: &[Layer<'_>], start: Instant) {
+        self.compare(layers, start.elapsed().saturating_sub(self.body_time + self.certificate_time));
     }
 
     /// Tells moves and strain from `layers`, and that all of it took `time`.
@@ -188,7 +192,10 @@ pub fn resolve(
     check(body, layers)?;
     let start = Instant::now();
     let mut found = resolved_once(body, layers, settings);
-    found.go_on(body, layers, settings, start);
+    if !found.certificate.is_clear() {
+        found.go_on(body, layers, settings, start);
+        found.compare_since(layers, start);
+    }
     Ok(found)
 }
 

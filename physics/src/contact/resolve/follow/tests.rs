@@ -66,14 +66,20 @@ fn the_next_frame_carries_on_from_the_one_before() {
     assert!(highest < 0.1, "{highest}");
 
     let mut reached = Reached::new(stage_at(0.0).unwrap(), stage.draped.clone());
+    let mut was_moved = false;
     for frame in 1..=10 {
         let [before, now] = [0.1 * f64::from(frame - 1), 0.1 * f64::from(frame)];
         let body = stage_at(now).unwrap().body;
         let between = |share: f64| stage_at(before + (now - before) * share);
         let found = resolve_after(reached, &body, &layers, &settings, between).unwrap().unwrap();
         assert!(found.certificate.is_clear() && found.steps >= 1, "frame {frame}");
+        assert!(found.garments[0].time > Duration::ZERO, "frame {frame}");
+        let moved = found.positions[0].iter().zip(&layers[0].positions[..]).filter(|(p, q)| p != q).count();
+        assert_eq!(found.garments[0].moved, moved, "frame {frame}");
+        was_moved |= moved > 0;
         reached = Reached::new(stage_at(now).unwrap(), found.positions);
     }
+    assert!(was_moved);
     is_over_the_knee(&reached.positions[0], &sheet, &stage.body);
 }
 
