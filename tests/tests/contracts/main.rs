@@ -1,5 +1,6 @@
 //! Contracts between the crates: one binary, because linking burn takes longer than most of these tests.
 
+mod alone;
 mod checkpoint;
 mod config_fuzz;
 mod hard_cases;

@@ -271,5 +271,9 @@ mod tests {
     fn contradictions_are_named() {
         let f = written(&SMALL.replace("steps = 10", "steps = 10\nlayers = [1, 3]"));
         assert!(load(f.path(), &[]).unwrap_err().to_string().contains("stages[0].layers"));
+        for key in ["losses.alone", "losses.strain.weight"] {
+            let e = load(written(SMALL).path(), &[format!("{key}=-1")]).unwrap_err();
+            assert!(e.to_string().contains(key), "{e}");
+        }
     }
 }

@@ -113,14 +113,7 @@ impl Config {
         if let Some(problem) = sections.into_iter().flatten().next() {
             return Some(problem);
         }
-        self.data.problem().or_else(|| {
-            if let Err(error) = self.losses.energy_settings().check() {
-                return Some((
-                    "losses".into(),
-                    error.to_string(),
-                    "configs/paper.toml shows every value".into(),
-                ));
-            }
+        self.data.problem().or_else(|| self.losses.problem()).or_else(|| {
             let error = self.model.validate().err()?;
             Some((
                 "model".into(),

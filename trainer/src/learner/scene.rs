@@ -9,7 +9,9 @@ use burn::optim::GradientsParams;
 use burn::tensor::Tensor;
 use clothcombo_model::ClothCombo;
 use clothcombo_physics::autodiff::{SceneLossOutput, scene_loss};
+use clothcombo_physics::energy::SceneEnergy;
 use std::ops::AddAssign;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tracing::trace_span;
 
@@ -68,6 +70,16 @@ pub(super) struct SceneGradient {
     pub times: StepTimes,
 }
 
+/// Losses of a scene.
+struct Losses {
+    /// Mean over the bodies, those of garments draped alone included; `None` when nothing in it depends on what is trained.
+    loss: Option<Tensor<1>>,
+    /// The same on the host, always.
+    mean: f64,
+    /// Energies per body.
+    bodies: Vec<SceneLossOutput>,
+}
+
 impl Work<'_> {
     /// Every scene on its share of the threads, as few operations of a scene are large enough for all of them.
     ///
@@ -86,8 +98,7 @@ impl Work<'_> {
     /// Loss and gradients of `scene` for the parameters of `model`.
     pub fn compute(&self, model: &ClothCombo, scene: &PreparedScene) -> Result<SceneGradient, DrapeError> {
         let start = Instant::now();
-        let (loss, bodies) = self.forward(model, scene)?;
-        let mean = bodies.iter().map(|s| s.value().total).sum::<f64>() / bodies.len() as f64;
+        let Losses { loss, mean, bodies } = self.forward(model, scene)?;
         let forward = start.elapsed();
         let start = Instant::now();
         let gradients = loss.map(|mut loss| {
@@ -103,12 +114,7 @@ impl Work<'_> {
         Ok(SceneGradient { loss: mean * self.share, bodies, gradients, times })
     }
 
-    /// Mean loss over the bodies, `None` when nothing in it depends on what is trained.
-    fn forward(
-        &self,
-        model: &ClothCombo,
-        scene: &PreparedScene,
-    ) -> Result<(Option<Tensor<1>>, Vec<SceneLossOutput>), DrapeError> {
+    fn forward(&self, model: &ClothCombo, scene: &PreparedScene) -> Result<Losses, DrapeError> {
         let outfit = trace_span!("tensors").in_scope(|| self.tensors.outfit(scene))?;
         let (first_stage, embeddings) = match self.frozen {
             Some(f) => (&f.model, self.tensors.embed(&f.model, scene, &outfit, &f.embeddings)?),
@@ -118,24 +124,40 @@ impl Work<'_> {
             Trains::Single => embeddings,
             Trains::Untangling | Trains::All => model.prepare_untangling(&outfit, embeddings),
         };
-        let mut scenes = Vec::with_capacity(scene.bodies.len());
+        let mut bodies = Vec::with_capacity(scene.bodies.len());
+        let mut losses = Vec::with_capacity(scene.bodies.len());
+        let mut mean = 0.0;
+        let share = 1.0 / scene.bodies.len() as f64;
         for prepared in &scene.bodies {
             let (body, start) = trace_span!("tensors").in_scope(|| self.tensors.body(prepared))?;
             let single = first_stage.drape_single(&outfit, &embeddings, &body, start);
-            let (posed, canonical) = match self.trains {
-                Trains::Single => (single.posed, single.canonical),
+            let layered = match self.trains {
+                Trains::Single => None,
                 Trains::Untangling | Trains::All => {
-                    let layered = model.untangle(&outfit, &embeddings, &single, &body);
-                    (layered.posed, layered.canonical)
+                    Some(model.untangle(&outfit, &embeddings, &single, &body))
                 }
             };
-            let energy = prepared.energy.clone();
-            scenes.push(trace_span!("energies").in_scope(|| scene_loss(posed, canonical, energy)));
+            let loss_at = |posed, canonical, energy: &Arc<SceneEnergy<f32>>| {
+                trace_span!("energies").in_scope(|| scene_loss(posed, canonical, energy.clone()))
+            };
+            let alone = prepared.alone.as_ref().filter(|_| self.trains == Trains::All).map(|alone| {
+                (loss_at(single.posed.clone(), single.canonical.clone(), &alone.energy), alone.weight * share)
+            });
+            let worn = match layered {
+                Some(layered) => loss_at(layered.posed, layered.canonical, &prepared.energy),
+                None => loss_at(single.posed, single.canonical, &prepared.energy),
+            };
+            losses.push(worn.loss.clone() * share);
+            mean += worn.value().total * share;
+            if let Some((alone, weight)) = alone {
+                losses.push(alone.loss.clone() * weight);
+                mean += alone.value().total * weight;
+            }
+            bodies.push(worn);
         }
         let depends = self.trains != Trains::Untangling || outfit.has_contacts();
-        let sum = scenes.iter().map(|s| s.loss.clone()).reduce(|a, b| a + b);
-        let loss = sum.filter(|_| depends).map(|l| l / scenes.len() as f64);
-        Ok((loss, scenes))
+        let loss = losses.into_iter().reduce(|a, b| a + b).filter(|_| depends);
+        Ok(Losses { loss, mean, bodies })
     }
 }
 

@@ -24,6 +24,16 @@ pub struct PreparedBody {
     pub start: Vec<[f32; 3]>,
     /// The losses of this scene.
     pub energy: Arc<SceneEnergy<f32>>,
+    /// The losses of its garments draped alone, if they count as well.
+    pub alone: Option<AloneLoss>,
+}
+
+/// The losses of garments that are draped alone.
+pub struct AloneLoss {
+    /// Weight beside the losses of the outfit.
+    pub weight: f64,
+    /// The losses; there are no pairs.
+    pub energy: Arc<SceneEnergy<f32>>,
 }
 
 /// A scene ready for a step.
@@ -141,17 +151,24 @@ impl Dresser<'_> {
             .zip(weights.layers)
             .map(|(&(inner, outer), weights)| SceneLayers { inner, outer, weights })
             .collect();
+        let energy = SceneEnergy {
+            body: Arc::new(surface),
+            garments: scene_garments,
+            layers,
+            settings: losses.energy_settings(),
+        };
+        let alone_weight = losses.alone.at(run_progress);
+        let alone = (alone_weight > 0.0).then(|| AloneLoss {
+            weight: alone_weight,
+            energy: Arc::new(SceneEnergy { layers: Vec::new(), ..energy.clone() }),
+        });
         PreparedBody {
             shape: body.shape.iter().map(|v| *v as f32).collect(),
             pose: (self.features)(&body.pose, &self.joints.indices),
             bones: bones.collect(),
             start: starts.concat(),
-            energy: Arc::new(SceneEnergy {
-                body: Arc::new(surface),
-                garments: scene_garments,
-                layers,
-                settings: losses.energy_settings(),
-            }),
+            energy: Arc::new(energy),
+            alone,
         }
     }
 }

@@ -1,0 +1,56 @@
+//! `losses.alone`: garments draped alone count beside the outfit, where all networks are trained.
+
+use clothcombo_model::{ClothCombo, gradient_bucket};
+use clothcombo_physics::energy::SceneEnergy;
+use clothcombo_tests::tiny_config;
+use clothcombo_trainer::config::Trains;
+use clothcombo_trainer::device::Backend;
+use clothcombo_trainer::drape::WardrobeTensors;
+use clothcombo_trainer::learner::{Learner, new_optimizer};
+use clothcombo_trainer::scene::{Library, PreparedScene, prepare_step};
+use clothcombo_trainer::schedule::Schedule;
+use clothcombo_trainer::session::dimensions;
+use clothcombo_trainer::world::Share;
+use std::sync::Arc;
+
+#[test]
+fn the_losses_of_garments_alone_are_added_where_all_networks_are_trained() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = tiny_config(folder.path(), &["losses.alone=0.5"]);
+    let silent = tiny_config(folder.path(), &[]);
+    let library = Arc::new(Library::load(&config, &|_, _, _| {}).unwrap());
+    let device = Backend::preferred().device().autodiff();
+    let dimensions = dimensions(&library);
+    let tensors = WardrobeTensors::new(library.clone(), dimensions, &device);
+    let model = ClothCombo::new(&config.model, &dimensions, config.seed, &device).unwrap();
+    let of = |scene: PreparedScene, trains: Trains| {
+        let mut learner = Learner::new(model.clone(), new_optimizer(&config.optimizer), &config.optimizer);
+        let computed = learner.compute(&tensors, &[scene], 1, trains, false).unwrap();
+        (computed.loss, gradient_bucket(learner.model(), &computed.gradients))
+    };
+    let schedule = Schedule::new(&config);
+    let stages = config.stages.iter().zip(schedule.boundaries());
+    let (_, first) = stages.filter(|(stage, _)| stage.trains == Trains::All).last().unwrap();
+    // Steps until one has garments that can touch.
+    let scene_of =
+        |config, step| prepare_step(&library, config, &schedule, step, Share::WHOLE).unwrap().remove(0);
+    let step = (first..).find(|&step| !scene_of(&config, step).contacts.is_empty()).unwrap();
+
+    let both = of(scene_of(&config, step), Trains::All);
+    let outfit = of(scene_of(&silent, step), Trains::All);
+    let mut without_pairs = scene_of(&silent, step);
+    for body in &mut without_pairs.bodies {
+        body.energy = Arc::new(SceneEnergy { layers: Vec::new(), ..(*body.energy).clone() });
+    }
+    let alone = of(without_pairs, Trains::Single);
+
+    assert!((both.0 - outfit.0 - 0.5 * alone.0).abs() <= 1e-6 * both.0.abs());
+    let largest = both.1.iter().fold(0.0_f32, |m, g| m.max(g.abs()));
+    assert!(largest > 0.0 && both.1 != outfit.1);
+    for ((both, outfit), alone) in both.1.iter().zip(&outfit.1).zip(&alone.1) {
+        assert!((both - outfit - 0.5 * alone).abs() <= 1e-5 * largest, "{both} {outfit} {alone}");
+    }
+    // The untangling network changes nothing of garments alone.
+    let untangling = |config| of(scene_of(config, step), Trains::Untangling);
+    assert_eq!(untangling(&config), untangling(&silent));
+}
