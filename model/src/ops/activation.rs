@@ -9,10 +9,11 @@ use burn::backend::tensor::FloatTensor;
 use burn::backend::{Autodiff, Backend, Dispatch, TensorMetadata};
 use burn::tensor::{Shape, Slice, Tensor};
 
-use super::backend::{FusedOps, Kernels};
+use super::backend::FusedOps;
 use super::host::{
     Chunk, HostBackend, NewValues, Rows, chunks, for_each, part_lengths, split_mut, sum_partials, vectorised,
 };
+use super::kernels::Kernels;
 use super::math;
 use super::segments::{SegmentEnds, Segments, ranges};
 

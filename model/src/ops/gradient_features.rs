@@ -7,8 +7,9 @@ use burn::backend::tensor::FloatTensor;
 use burn::backend::{Autodiff, Backend, Dispatch, TensorMetadata};
 use burn::tensor::{Slice, Tensor};
 
-use super::backend::{FusedOps, Kernels};
+use super::backend::FusedOps;
 use super::host::{Chunk, HostBackend, NewValues, Rows, chunks, for_each, part_lengths, vectorised};
+use super::kernels::Kernels;
 use super::math::tanh;
 
 /// `[2V,3C]` → `[V,C]`.

@@ -13,6 +13,7 @@ mod adam;
 mod backend;
 mod gradient_features;
 mod host;
+mod kernels;
 mod math;
 mod norm;
 mod product;

@@ -7,10 +7,11 @@ use burn::backend::tensor::FloatTensor;
 use burn::backend::{Autodiff, Backend, Dispatch, TensorMetadata};
 use burn::tensor::Tensor;
 
-use super::backend::{FusedOps, Kernels};
+use super::backend::FusedOps;
 use super::host::{
     Chunk, HostBackend, NewValues, Rows, chunks, for_each, part_lengths, sum_partials, vectorised,
 };
+use super::kernels::Kernels;
 use super::math::sin_cos;
 
 /// `sin(omega·(input + bias)) ⊙ gate`: input and gate `[N,C]`, bias `[1,C]`.

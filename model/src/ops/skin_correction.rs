@@ -8,8 +8,9 @@ use burn::backend::{Autodiff, Backend, Dispatch, TensorMetadata};
 use burn::tensor::Tensor;
 
 use super::activation::broadcast_rows;
-use super::backend::{FusedOps, Kernels};
+use super::backend::FusedOps;
 use super::host::{Chunk, HostBackend, NewValues, Rows, chunks, for_each, part_lengths, vectorised};
+use super::kernels::Kernels;
 use super::segments::{SegmentEnds, Segments};
 
 /// `weights + scale·P(raw)`: weights and raw `[N,J]`, mask `[M,J]` of zeros and ones.

@@ -14,7 +14,8 @@ use burn::backend::tensor::FloatTensor;
 use burn::backend::{Autodiff, Backend, Dispatch, TensorMetadata};
 use burn::tensor::{Shape, Slice, Tensor};
 
-use super::backend::{FusedOps, Kernels};
+use super::backend::FusedOps;
+use super::kernels::Kernels;
 
 /// Gradients of the blocks of one matrix, on their way to the collector (which knows their type).
 #[derive(Clone, Debug)]

@@ -7,8 +7,9 @@ use burn::backend::tensor::FloatTensor;
 use burn::backend::{Autodiff, Backend, Dispatch, TensorMetadata};
 use burn::tensor::{Slice, Tensor};
 
-use super::backend::{FusedOps, Kernels};
+use super::backend::FusedOps;
 use super::host::{HostBackend, NewValues, Rows, chunks, for_each, part_lengths, vectorised};
+use super::kernels::Kernels;
 
 /// `R_n p_n + t_n`: transforms `[N,12]` (the rows of 3×4 matrices [R|t] one after another), points `[N,3]` → `[N,3]`.
 pub fn transform_points(transforms: Tensor<2>, points: Tensor<2>) -> Tensor<2> {

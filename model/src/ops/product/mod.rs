@@ -11,7 +11,8 @@ use burn::backend::tensor::FloatTensor;
 use burn::backend::{Autodiff, Backend, Dispatch};
 use burn::tensor::Tensor;
 
-use super::backend::{FusedOps, Kernels};
+use super::backend::FusedOps;
+use super::kernels::Kernels;
 
 /// `lhs·rhs`: `[N,K]`, `[K,C]` → `[N,C]`.
 ///
