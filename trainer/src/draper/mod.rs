@@ -18,11 +18,12 @@
 //!
 //! [`Draper::outfit`] does what depends on the garments alone (binding, operators, embedding), once per garment and process,
 //! and once per machine with a cache; [`Draper::drape`] does what depends on the body: networks, optional refinement,
-//! post-process. The networks see the pose without its heading; positions come back in the frame of the given pose.
+//! post-process; [`Draper::drape_motion`] does it for the frames of a motion. The networks see the pose without its heading; positions come back in the frame of the given pose.
 
 mod acceleration;
 mod drape;
 mod error;
+mod motion;
 mod networked;
 mod outfit;
 pub mod output;
@@ -96,6 +97,10 @@ impl Default for DraperSettings {
         }
     }
 }
+
+/// Frames of a motion for which the way from the T-pose is not tried again after it left crossings: it takes seconds, and
+/// poses change slowly.
+const FRAMES_WITHOUT_WAY: usize = 15;
 
 /// A body to be dressed.
 #[derive(Clone, Debug, PartialEq)]
@@ -199,20 +204,7 @@ impl Draper {
         self.drape_frame(outfit, body, None)
     }
 
-    /// Drapes `outfit` on `body`, the next frame of a motion: the post-process carries on from the frame `before`, on its body,
-    /// where that is clear.
-    ///
-    /// # Errors
-    /// As [`drape`](Self::drape).
-    pub fn drape_after(
-        &self,
-        outfit: &Outfit,
-        body: &BodyState,
-        before: (&BodyState, &Drape),
-    ) -> Result<Drape, DraperError> {
-        self.drape_frame(outfit, body, Some(before))
-    }
-
+    /// Drapes `outfit` on `body`, carrying on from the `last` drape if there is one, another frame of the same motion.
     fn drape_frame(
         &self,
         outfit: &Outfit,
@@ -244,6 +236,7 @@ impl Draper {
 
         let clock = Instant::now();
         let parts = outfit.split(&before);
+        let mut frames_without_way = 0;
         let (resolved, times) = match self.settings.resolve {
             true => {
                 let at_the_end = || Waypoint {
@@ -251,7 +244,9 @@ impl Draper {
                     draped: parts.iter().map(|p| p.to_vec()).collect(),
                     transforms: transforms.clone(),
                 };
-                let done = self.resolved(outfit, body, last, &surface, &parts, &at_the_end)?;
+                let done;
+                (done, frames_without_way) =
+                    self.resolved(outfit, body, last, &surface, &parts, &at_the_end)?;
                 (done.positions, done.garments.iter().map(|g| 1e3 * g.time.as_secs_f64()).collect())
             }
             false => (parts.iter().map(|p| p.to_vec()).collect(), vec![0.0; parts.len()]),
@@ -279,6 +274,7 @@ impl Draper {
             milliseconds,
             refinement,
             certificate: Certificate::default(),
+            frames_without_way,
             surface: Some(surface),
         };
         let clock = Instant::now();
@@ -287,7 +283,8 @@ impl Draper {
         Ok(drape)
     }
 
-    /// The post-process, from the `last` frame on if there is one and it is clear.
+    /// The post-process, from the `last` frame on if there is one; also for how many further frames the way from the T-pose need
+    /// not be tried.
     fn resolved(
         &self,
         outfit: &Outfit,
@@ -296,9 +293,11 @@ impl Draper {
         surface: &Surface<f64>,
         parts: &[&[[f64; 3]]],
         at_the_end: &dyn Fn() -> Waypoint,
-    ) -> Result<Resolved, DraperError> {
+    ) -> Result<(Resolved, usize), DraperError> {
         let (layers, settings) = (outfit.layers(parts), &self.settings.post_process);
-        if let Some((state, drape)) = last.filter(|(_, drape)| drape.certificate.is_clear()) {
+        let is_sound = |done: &Resolved| done.certificate.between() <= done.certificate.narrow_triangle_pairs;
+        let mut carried = None;
+        if let Some((state, drape)) = last {
             let between = |share: f64| match share {
                 1.0 => Ok(at_the_end()),
                 _ => {
@@ -306,15 +305,21 @@ impl Draper {
                     self.stage(outfit, body, state.pose.between(&body.pose, share), place)
                 }
             };
-            if let Some(done) = resolve_after(drape.reached(), surface, &layers, settings, between)? {
-                return Ok(done);
+            carried = resolve_after(drape.reached(), surface, &layers, settings, between)?;
+            let wait = drape.frames_without_way;
+            if let Some(done) = carried.take_if(|done| is_sound(done) || wait > 0) {
+                return Ok((done, wait.saturating_sub(1)));
             }
         }
         let from_t_pose = |share: f64| match share {
             1.0 => Ok(at_the_end()),
             _ => self.stage(outfit, body, body.pose.on_the_way(share), body.place),
         };
-        resolve_along(surface, &layers, settings, from_t_pose)
+        let anew = resolve_along(surface, &layers, settings, from_t_pose)?;
+        let wait = if is_sound(&anew) { 0 } else { FRAMES_WITHOUT_WAY };
+        // What carries on does not pop.
+        let is_no_worse = |done: &Resolved| done.certificate.between() <= anew.certificate.between();
+        Ok((carried.filter(is_no_worse).unwrap_or(anew), wait))
     }
 
     fn dimensions(&self) -> clothcombo_model::Dimensions {

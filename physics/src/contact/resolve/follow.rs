@@ -3,7 +3,8 @@
 //! In a pose with bent limbs the drape alone does not tell where cloth belongs: a knee has gone through a skirt, a sleeve through
 //! the side of the chest, and the nearest way out is the wrong one. In the T-pose nothing of that has happened. On a way from there
 //! each step is short: what was resolved before is carried along by skinning and by what the drape changes, crossings are
-//! shallow, and the nearest way out is right. Where a step leaves crossings, a shorter one is tried.
+//! shallow, and the nearest way out is right. Where a step leaves more crossings than there were, a shorter one
+//! is tried.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -20,13 +21,15 @@ use crate::vec3::{add, scale, sub};
 
 /// The longest step, as a share of the way.
 const LONGEST: f64 = 1.0 / 8.0;
-/// The shortest one: it is taken even where it leaves crossings.
+/// The shortest one: it is taken even where it leaves more crossings than there were.
 const SHORTEST: f64 = 1.0 / 128.0;
-/// The way is given up after as many of the shortest that left crossings.
+/// The shortest one from a frame that was not clear.
+const SHORTEST_OF_CROSSED: f64 = 1.0 / 4.0;
+/// After as many of the shortest that left more crossings, the rest of the way is one step.
 const MOST_FAILURES: usize = 3;
 /// A rise of the strain energy, as a share, that is only accepted where the way leaves crossings.
 const TORN: f64 = 1.0;
-/// Steps without crossings after which a longer one is tried.
+/// Steps without further crossings after which a longer one is tried.
 const GOOD_STEPS: usize = 2;
 /// How much of what the post-process changed is kept from step to step, so that old changes fade.
 const KEPT: f64 = 0.95;
@@ -41,7 +44,7 @@ pub struct Waypoint {
     pub transforms: Vec<Transform>,
 }
 
-/// Garments that are resolved: where a way starts.
+/// Garments that are resolved, as far as they could be: where a way starts.
 pub struct Reached {
     /// Their drape before that, `[V, 3]` each [m].
     pub draped: Vec<Vec<[f64; 3]>>,
@@ -49,11 +52,14 @@ pub struct Reached {
     pub positions: Vec<Vec<[f64; 3]>>,
     /// Skinning transforms, as in [`Waypoint`].
     pub transforms: Vec<Transform>,
+    /// Pairs with the body and between garments that are left in `positions`.
+    pub crossings: usize,
 }
 
 impl Reached {
-    fn new(stage: Waypoint, positions: Vec<Vec<[f64; 3]>>) -> Self {
-        Self { draped: stage.draped, positions, transforms: stage.transforms }
+    fn new(stage: Waypoint, found: Untangled) -> Self {
+        let Waypoint { draped, transforms, .. } = stage;
+        Self { draped, positions: found.positions, transforms, crossings: found.crossings }
     }
 }
 
@@ -89,9 +95,8 @@ pub fn resolve_along<E: From<ResolveError>>(
             let stage = stage_at(0.0)?;
             check(&stage.body, &placed(layers, &stage.draped)?)?;
             let first = on_stage(layers, &stage, settings, std::slice::from_ref(&stage.draped));
-            let reached = Reached::new(stage, first.positions);
-            let way = Way { layers, end: room, settings, start };
-            let (followed, steps) = way.follow(reached, LONGEST, stage_at)?;
+            let way = Way { layers, end: room, settings, start, longest: LONGEST, shortest: SHORTEST };
+            let (followed, steps) = way.follow(Reached::new(stage, first), stage_at)?;
             best.steps = steps;
             if let Some(found) = followed {
                 let mut along = settled(room, layers, found, settings);
@@ -109,7 +114,7 @@ pub fn resolve_along<E: From<ResolveError>>(
 }
 
 /// Resolves `layers` on `body`, the stage at 1, by carrying on from `before`, the frame of a motion before it, at 0. What
-/// was done there is kept, fading, so that nothing pops. None where that leaves crossings, but for narrow ones.
+/// was done there is kept, fading, so that nothing pops. None where the time of `settings` is used up, or no step allowed.
 ///
 /// # Errors
 /// Those of `stage_at` and of [`super::resolve`].
@@ -124,15 +129,13 @@ pub fn resolve_after<E: From<ResolveError>>(
     settings.check()?;
     check(body, layers)?;
     let carry_on = |body: &Body<'_>| {
-        let way = Way { layers, end: body, settings, start };
-        let (followed, steps) = way.follow(before, 1.0, stage_at)?;
+        let shortest = if before.crossings == 0 { SHORTEST } else { SHORTEST_OF_CROSSED };
+        let way = Way { layers, end: body, settings, start, longest: 1.0, shortest };
+        let (followed, steps) = way.follow(before, stage_at)?;
         let Some(found) = followed else { return Ok(None) };
         let mut resolved = settled(body, layers, found, settings);
         resolved.go_on(body.drawn.surface, layers, settings, start);
         resolved.compare_since(layers, start);
-        if resolved.certificate.between() > resolved.certificate.narrow_triangle_pairs {
-            return Ok(None);
-        }
         resolved.steps = steps;
         Ok(Some(resolved))
     };
@@ -147,25 +150,28 @@ struct Way<'a, 'b> {
     settings: &'a ResolveSettings,
     /// When it began.
     start: Instant,
+    /// Longest and shortest step, as shares of the way.
+    longest: f64,
+    shortest: f64,
 }
 
 impl Way<'_, '_> {
-    /// Takes garments from where they are `reached`, at 0, to the stage at 1, by steps of at most `longest`; also how many steps
-    /// were tried. None where the way was given up.
+    /// Takes garments from where they are `reached`, at 0, to the stage at 1; also how many steps were tried. None where the time
+    /// is used up, or no step allowed.
     fn follow<E: From<ResolveError>>(
         &self,
         mut reached: Reached,
-        longest: f64,
         mut stage_at: impl FnMut(f64) -> Result<Waypoint, E>,
     ) -> Result<(Option<Untangled>, usize), E> {
         check(self.end.drawn.surface, &placed(self.layers, &reached.draped)?)?;
         check(self.end.drawn.surface, &placed(self.layers, &reached.positions)?)?;
-        let (mut from, mut step, mut steps) = (0.0, longest, 0);
+        let (mut from, mut step, mut steps) = (0.0, self.longest, 0);
         // How many steps in a row went well, and how many of the shortest did not.
         let (mut well, mut failures) = (0, 0);
-        while steps < self.settings.steps && failures < MOST_FAILURES && !self.is_late() {
-            let is_shortest = step <= SHORTEST * (1.0 + 1e-9);
-            let at = if step > 1.0 - from - 1e-9 { 1.0 } else { from + step };
+        while steps < self.settings.steps && !self.is_late() {
+            let is_last = failures >= MOST_FAILURES || steps + 1 == self.settings.steps;
+            let is_shortest = is_last || step <= self.shortest * (1.0 + 1e-9);
+            let at = if is_last || step > 1.0 - from - 1e-9 { 1.0 } else { from + step };
             let stage = stage_at(at)?;
             check(&stage.body, &placed(self.layers, &stage.draped)?)?;
             steps += 1;
@@ -181,20 +187,21 @@ impl Way<'_, '_> {
                 true => least_crossed(self.end.obstacle(), self.layers, &settings, &starts),
                 false => on_stage(self.layers, &stage, &settings, &starts),
             };
-            if untangled.crossings > 0 && !is_shortest {
+            let is_worse = untangled.crossings > reached.crossings;
+            if is_worse && !is_shortest {
                 (step, well) = (0.5 * step, 0);
             } else if at == 1.0 {
                 return Ok((Some(untangled), steps));
             } else {
-                match untangled.crossings {
-                    0 => well += 1,
-                    _ => failures += 1,
+                match is_worse {
+                    false => well += 1,
+                    true => failures += 1,
                 }
                 if well >= GOOD_STEPS {
-                    (step, well) = ((2.0 * step).min(longest), 0);
+                    (step, well) = ((2.0 * step).min(self.longest), 0);
                 }
                 from = at;
-                reached = Reached::new(stage, untangled.positions);
+                reached = Reached::new(stage, untangled);
             }
         }
         Ok((None, steps))

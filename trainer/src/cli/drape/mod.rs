@@ -251,19 +251,7 @@ fn drape_all(draper: &Draper, outfit: &Outfit, scenes: &Scenes) -> Result<Vec<Dr
         1 => ProgressBar::hidden(),
         frames => progress_bar(frames, "frames {bar:30} {pos}/{len} · {eta} left"),
     };
-    let mut drapes: Vec<Drape> = Vec::with_capacity(scenes.states.len());
-    for (frame, state) in scenes.states.iter().enumerate() {
-        let before = drapes.last().map(|drape| (&scenes.states[frame - 1], drape));
-        let mut drape = match before {
-            Some(before) => draper.drape_after(outfit, state, before),
-            None => draper.drape(outfit, state),
-        }?;
-        if scenes.states.len() > 1 {
-            drape.slim();
-        }
-        drapes.push(drape);
-        bar.inc(1);
-    }
+    let drapes = draper.drape_motion(outfit, &scenes.states, || bar.inc(1))?;
     bar.finish_and_clear();
     Ok(drapes)
 }

@@ -3,6 +3,7 @@ use super::*;
 use crate::contact::TriangleTree;
 use crate::mesh::TriMesh;
 use crate::mesh::shapes;
+use crate::vec3::norm;
 use std::time::Duration;
 
 const IDENTITY: Transform = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
@@ -23,6 +24,11 @@ fn rising(size: f64) -> (TriMesh, impl Fn(f64) -> Result<Waypoint, ResolveError>
     (sheet, stage_at)
 }
 
+/// Where a way starts that has no crossing yet.
+fn untouched(stage: Waypoint, positions: Vec<Vec<[f64; 3]>>) -> Reached {
+    Reached::new(stage, Untangled { positions, ..Untangled::default() })
+}
+
 fn end<E>(stage_at: &impl Fn(f64) -> Result<Waypoint, E>) -> Waypoint {
     stage_at(1.0).unwrap_or_else(|_| unreachable!("made without errors"))
 }
@@ -35,10 +41,11 @@ fn a_rising_knee_takes_the_sheet_along() {
     let layers = [Layer { garment: &garment, positions: &stage.draped[0] }];
     let settings = ResolveSettings::default();
     let follow = |end: &Body<'_>| {
-        let way = Way { layers: &layers, end, settings: &settings, start: Instant::now() };
+        let (longest, shortest) = (LONGEST, SHORTEST);
+        let way = Way { layers: &layers, end, settings: &settings, start: Instant::now(), longest, shortest };
         let first = stage_at(0.0).unwrap();
         let positions = first.draped.clone();
-        let (followed, steps) = way.follow(Reached::new(first, positions), LONGEST, &stage_at).unwrap();
+        let (followed, steps) = way.follow(untouched(first, positions), &stage_at).unwrap();
         assert!(steps >= 8, "{steps}");
         followed.unwrap()
     };
@@ -65,7 +72,7 @@ fn the_next_frame_carries_on_from_the_one_before() {
     let highest = alone.positions[0].iter().map(|p| p[1]).fold(0.0, f64::max);
     assert!(highest < 0.1, "{highest}");
 
-    let mut reached = Reached::new(stage_at(0.0).unwrap(), stage.draped.clone());
+    let mut reached = untouched(stage_at(0.0).unwrap(), stage.draped.clone());
     let mut was_moved = false;
     for frame in 1..=10 {
         let [before, now] = [0.1 * f64::from(frame - 1), 0.1 * f64::from(frame)];
@@ -77,7 +84,7 @@ fn the_next_frame_carries_on_from_the_one_before() {
         let moved = found.positions[0].iter().zip(&layers[0].positions[..]).filter(|(p, q)| p != q).count();
         assert_eq!(found.garments[0].moved, moved, "frame {frame}");
         was_moved |= moved > 0;
-        reached = Reached::new(stage_at(now).unwrap(), found.positions);
+        reached = untouched(stage_at(now).unwrap(), found.positions);
     }
     assert!(was_moved);
     is_over_the_knee(&reached.positions[0], &sheet, &stage.body);
@@ -92,10 +99,42 @@ fn what_can_be_mended_at_once_is_not_followed_and_what_is_late_is_given_up() {
     let layers = [Layer { garment: &garment, positions: &shallow.draped[0] }];
     let resolved = resolve_along(&shallow.body, &layers, &settings, &stage_at).unwrap();
     assert!(resolved.certificate.is_clear() && resolved.steps == 0);
-    let first = Reached::new(stage_at(0.0).unwrap(), shallow.draped.clone());
+    let first = untouched(stage_at(0.0).unwrap(), shallow.draped.clone());
     let settings = ResolveSettings { time: Some(Duration::ZERO), ..settings };
     let late = resolve_after(first, &shallow.body, &layers, &settings, &stage_at).unwrap();
     assert!(late.is_none());
+}
+
+#[test]
+fn what_cannot_be_mended_is_carried_on_all_the_same() {
+    let (sheet, stage_at) = rising(0.6);
+    let garment = RestGarment::new(&sheet);
+    let stage = end(&stage_at);
+    let layers = [Layer { garment: &garment, positions: &stage.draped[0] }];
+    // One round is too few for a whole knee.
+    let settings = ResolveSettings { rounds: 1, ..ResolveSettings::default() };
+    let lifted = || stage.draped[0].iter().map(|p| add(*p, [0.0, 0.03, 0.0])).collect::<Vec<_>>();
+    let after = |crossings| {
+        let mut before = untouched(stage_at(0.3).unwrap(), vec![lifted()]);
+        before.crossings = crossings;
+        let found =
+            resolve_after(before, &stage.body, &layers, &settings, |share| stage_at(0.3 + 0.7 * share));
+        found.unwrap().unwrap()
+    };
+    let clear = after(0);
+    assert!(clear.certificate.between() > 0, "nothing is left to carry on");
+    // Shorter and shorter steps, in the end the rest at once.
+    assert!(clear.steps >= 8, "{}", clear.steps);
+    // No more crossings than there were is good enough.
+    let crossed = after(10_000);
+    assert_eq!(crossed.steps, 1);
+    // What lay higher before still does, where nothing was in its way.
+    let far = (0..sheet.positions().len()).max_by(|&a, &b| {
+        let from_knee = |v: usize| norm(sheet.positions()[v]);
+        from_knee(a).total_cmp(&from_knee(b))
+    });
+    let height = crossed.positions[0][far.unwrap()][1];
+    assert!((height - 0.95 * 0.03).abs() < 1e-9, "{height}");
 }
 
 #[test]
@@ -105,7 +144,7 @@ fn errors_of_a_stage_come_back() {
     let layers = [Layer { garment: &garment, positions: sheet.positions() }];
     let first = stage_at(0.0).unwrap();
     let body = first.body.clone();
-    let start = Reached::new(first, vec![sheet.positions().to_vec()]);
+    let start = untouched(first, vec![sheet.positions().to_vec()]);
     let broken = |_: f64| Err::<Waypoint, _>(ResolveError::EmptyBody);
     assert!(resolve_after(start, &body, &layers, &ResolveSettings::default(), broken).is_err());
 }
@@ -118,7 +157,7 @@ fn what_does_not_fit_is_refused() {
     let after = |spoil: &dyn Fn(&mut Reached)| {
         let first = stage_at(0.0).unwrap();
         let body = first.body.clone();
-        let mut before = Reached::new(first, vec![sheet.positions().to_vec()]);
+        let mut before = untouched(first, vec![sheet.positions().to_vec()]);
         spoil(&mut before);
         resolve_after(before, &body, &layers, &ResolveSettings::default(), &stage_at)
     };
@@ -144,7 +183,7 @@ fn changes_turn_with_the_skinning_and_fade() {
         draped: vec![vec![drape]],
         transforms: vec![transform],
     };
-    let reached = Reached::new(stage([1.0, 0.0, 0.0], IDENTITY), vec![vec![[1.2, 0.0, 0.4]]]);
+    let reached = untouched(stage([1.0, 0.0, 0.0], IDENTITY), vec![vec![[1.2, 0.0, 0.4]]]);
     let next = stage([0.0, 1.0, 0.0], quarter);
     let found = carried(&reached, &next, 0.5)[0][0];
     for (a, b) in found.iter().zip([0.0, 1.1, 0.2]) {
