@@ -3,6 +3,7 @@
 mod alone;
 mod checkpoint;
 mod config_fuzz;
+mod configs;
 mod hard_cases;
 mod intersections;
 mod messy_garments;

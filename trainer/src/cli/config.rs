@@ -83,6 +83,7 @@ fn print_plan(config: &Config) {
     for term in Term::ALL {
         println!("  {:<16} {}", term.name(), config.losses.weight(term));
     }
+    println!("  {:<16} {}", "garments alone", config.losses.alone);
     let o = &config.optimizer;
     println!(
         "\nAdam {} {} · gradient norm clipped at {} · average of the weights {}",
