@@ -18,7 +18,8 @@ pub struct StepRecord {
     pub layers: usize,
     /// Share of the full pose.
     pub pose_scale: f64,
-    /// Weighted sum that was minimised, mean over the step's bodies.
+    /// Weighted sum that was minimised, mean over the step's bodies: that of `weighted` and, where `losses.alone` counts, the
+    /// losses of the garments draped alone.
     pub loss: f64,
     /// Raw energies, summed over garments or pairs, mean over the step's bodies; terms that were not evaluated are
     /// left out.

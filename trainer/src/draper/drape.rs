@@ -38,8 +38,6 @@ pub struct Drape {
     pub refinement: Option<Refinement>,
     /// Exact counts of what intersects in the result.
     pub certificate: Certificate,
-    /// For how many further frames the way from the T-pose is not tried, as it left crossings.
-    pub(super) frames_without_way: usize,
     /// The body with its search trees, as long as they are worth their memory.
     pub(super) surface: Option<Arc<Surface<f64>>>,
 }
@@ -58,7 +56,7 @@ impl Drape {
             draped: garments().map(|g| g.before.clone()).collect(),
             positions: garments().map(|g| g.positions.clone()).collect(),
             transforms: garments().flat_map(|g| g.transforms.iter().copied()).collect(),
-            crossings: self.certificate.between(),
+            crossings: self.certificate.crossings(),
         }
     }
 

@@ -18,7 +18,8 @@
 //!
 //! [`Draper::outfit`] does what depends on the garments alone (binding, operators, embedding), once per garment and process,
 //! and once per machine with a cache; [`Draper::drape`] does what depends on the body: networks, optional refinement,
-//! post-process; [`Draper::drape_motion`] does it for the frames of a motion. The networks see the pose without its heading; positions come back in the frame of the given pose.
+//! post-process; [`Draper::drape_motion`] does it for the frames of a motion. The networks see the pose without its heading;
+//! positions come back in the frame of the given pose.
 
 mod acceleration;
 mod drape;
@@ -98,9 +99,15 @@ impl Default for DraperSettings {
     }
 }
 
-/// Frames of a motion for which the way from the T-pose is not tried again after it left crossings: it takes seconds, and
-/// poses change slowly.
-const FRAMES_WITHOUT_WAY: usize = 15;
+/// Another frame of the same motion, which a drape carries on from.
+#[derive(Clone, Copy)]
+struct Last<'a> {
+    body: &'a BodyState,
+    drape: &'a Drape,
+    /// Whether the drape may also be resolved by itself, and on a way from the T-pose, where carrying on leaves crossings: that
+    /// takes seconds.
+    may_start_anew: bool,
+}
 
 /// A body to be dressed.
 #[derive(Clone, Debug, PartialEq)]
@@ -209,7 +216,7 @@ impl Draper {
         &self,
         outfit: &Outfit,
         body: &BodyState,
-        last: Option<(&BodyState, &Drape)>,
+        last: Option<Last<'_>>,
     ) -> Result<Drape, DraperError> {
         let Networked {
             scene,
@@ -236,7 +243,6 @@ impl Draper {
 
         let clock = Instant::now();
         let parts = outfit.split(&before);
-        let mut frames_without_way = 0;
         let (resolved, times) = match self.settings.resolve {
             true => {
                 let at_the_end = || Waypoint {
@@ -244,9 +250,7 @@ impl Draper {
                     draped: parts.iter().map(|p| p.to_vec()).collect(),
                     transforms: transforms.clone(),
                 };
-                let done;
-                (done, frames_without_way) =
-                    self.resolved(outfit, body, last, &surface, &parts, &at_the_end)?;
+                let done = self.resolved(outfit, body, last, &surface, &parts, &at_the_end)?;
                 (done.positions, done.garments.iter().map(|g| 1e3 * g.time.as_secs_f64()).collect())
             }
             false => (parts.iter().map(|p| p.to_vec()).collect(), vec![0.0; parts.len()]),
@@ -274,7 +278,6 @@ impl Draper {
             milliseconds,
             refinement,
             certificate: Certificate::default(),
-            frames_without_way,
             surface: Some(surface),
         };
         let clock = Instant::now();
@@ -283,21 +286,19 @@ impl Draper {
         Ok(drape)
     }
 
-    /// The post-process, from the `last` frame on if there is one; also for how many further frames the way from the T-pose need
-    /// not be tried.
+    /// The post-process, from the `last` frame on if there is one.
     fn resolved(
         &self,
         outfit: &Outfit,
         body: &BodyState,
-        last: Option<(&BodyState, &Drape)>,
+        last: Option<Last<'_>>,
         surface: &Surface<f64>,
         parts: &[&[[f64; 3]]],
         at_the_end: &dyn Fn() -> Waypoint,
-    ) -> Result<(Resolved, usize), DraperError> {
+    ) -> Result<Resolved, DraperError> {
         let (layers, settings) = (outfit.layers(parts), &self.settings.post_process);
-        let is_sound = |done: &Resolved| done.certificate.between() <= done.certificate.narrow_triangle_pairs;
         let mut carried = None;
-        if let Some((state, drape)) = last {
+        if let Some(Last { body: state, drape, may_start_anew }) = last {
             let between = |share: f64| match share {
                 1.0 => Ok(at_the_end()),
                 _ => {
@@ -306,9 +307,8 @@ impl Draper {
                 }
             };
             carried = resolve_after(drape.reached(), surface, &layers, settings, between)?;
-            let wait = drape.frames_without_way;
-            if let Some(done) = carried.take_if(|done| is_sound(done) || wait > 0) {
-                return Ok((done, wait.saturating_sub(1)));
+            if let Some(done) = carried.take_if(|done| done.certificate.crossings() == 0 || !may_start_anew) {
+                return Ok(done);
             }
         }
         let from_t_pose = |share: f64| match share {
@@ -316,10 +316,11 @@ impl Draper {
             _ => self.stage(outfit, body, body.pose.on_the_way(share), body.place),
         };
         let anew = resolve_along(surface, &layers, settings, from_t_pose)?;
-        let wait = if is_sound(&anew) { 0 } else { FRAMES_WITHOUT_WAY };
         // What carries on does not pop.
-        let is_no_worse = |done: &Resolved| done.certificate.between() <= anew.certificate.between();
-        Ok((carried.filter(is_no_worse).unwrap_or(anew), wait))
+        Ok(match carried {
+            Some(carried) => carried.or(anew),
+            None => anew,
+        })
     }
 
     fn dimensions(&self) -> clothcombo_model::Dimensions {

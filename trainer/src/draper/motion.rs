@@ -1,11 +1,14 @@
 //! A motion: each frame carries on from the one before, and what that leaves over from the one after.
 
-use super::{BodyState, Drape, Draper, DraperError, FRAMES_WITHOUT_WAY, Outfit};
+use super::{BodyState, Drape, Draper, DraperError, Last, Outfit};
+
+/// So many frames after one that was left with crossings only carry on: poses change slowly, and starting anew takes seconds.
+const FRAMES_CARRIED: usize = 15;
 
 impl Draper {
     /// Drapes `outfit` on each of `bodies`, the frames of a motion. The post-process carries on from frame to frame; where frames
-    /// are left with crossings and a later one is clear, it carries on backwards from that one as well. `done` is called after
-    /// each frame.
+    /// are left with crossings and a later one has none, it carries on backwards from that one as well. `done` is called after
+    /// each frame of the first pass.
     ///
     /// # Errors
     /// When shape or pose do not fit the body model, or the networks diverge.
@@ -15,48 +18,54 @@ impl Draper {
         bodies: &[BodyState],
         mut done: impl FnMut(),
     ) -> Result<Vec<Drape>, DraperError> {
+        let crossings = |drape: &Drape| drape.certificate.crossings();
         let mut drapes: Vec<Drape> = Vec::with_capacity(bodies.len());
+        let mut only_carried = 0;
         for (frame, body) in bodies.iter().enumerate() {
-            let before = drapes.last().map(|drape| (&bodies[frame - 1], drape));
-            let mut drape = self.drape_frame(outfit, body, before)?;
+            let may_start_anew = only_carried == 0;
+            let last = drapes.last().map(|drape| Last { body: &bodies[frame - 1], drape, may_start_anew });
+            let mut drape = self.drape_frame(outfit, body, last)?;
+            only_carried = match may_start_anew && crossings(&drape) > 0 {
+                true => FRAMES_CARRIED,
+                false => only_carried.saturating_sub(1),
+            };
             if bodies.len() > 1 {
                 drape.slim();
             }
             drapes.push(drape);
             done();
         }
-        carry_back(
-            &mut drapes,
-            |drape| drape.certificate.is_clear(),
-            |frame, drape, after| {
-                // The way from the T-pose has been tried.
-                after.frames_without_way = FRAMES_WITHOUT_WAY;
-                let mut again =
-                    self.drape_frame(outfit, &bodies[frame], Some((&bodies[frame + 1], after)))?;
-                again.milliseconds += drape.milliseconds;
-                again.slim();
-                Ok::<_, DraperError>(again)
-            },
-        )?;
+        if !self.settings.resolve {
+            return Ok(drapes);
+        }
+        carry_back(&mut drapes, crossings, |frame, own, after| {
+            let last = Last { body: &bodies[frame + 1], drape: after, may_start_anew: false };
+            let mut again = self.drape_frame(outfit, &bodies[frame], Some(last))?;
+            again.slim();
+            if crossings(&again) < crossings(own) {
+                std::mem::swap(own, &mut again);
+            }
+            own.milliseconds += again.milliseconds;
+            for (garment, other) in own.garments.iter_mut().zip(&again.garments) {
+                garment.resolve_ms += other.resolve_ms;
+            }
+            Ok::<_, DraperError>(())
+        })?;
         Ok(drapes)
     }
 }
 
-/// From the last frame to the first: one that is not clear is made `again` from a clear one after it, and replaced if that
-/// makes it clear.
+/// From the last frame to the first: `again` makes better what has crossings, from the frame after it, where that has none.
 fn carry_back<T, E>(
     frames: &mut [T],
-    is_clear: impl Fn(&T) -> bool,
-    mut again: impl FnMut(usize, &T, &mut T) -> Result<T, E>,
+    crossings: impl Fn(&T) -> usize,
+    mut again: impl FnMut(usize, &mut T, &T) -> Result<(), E>,
 ) -> Result<(), E> {
-    for frame in (1..frames.len()).rev().map(|after| after - 1) {
-        let [own, after] = &mut frames[frame..=frame + 1] else { continue };
-        if is_clear(own) || !is_clear(after) {
-            continue;
-        }
-        let made = again(frame, own, after)?;
-        if is_clear(&made) {
-            *own = made;
+    for frame in (0..frames.len().saturating_sub(1)).rev() {
+        let (own, after) = frames.split_at_mut(frame + 1);
+        let (own, after) = (&mut own[frame], &after[0]);
+        if crossings(own) > 0 && crossings(after) == 0 {
+            again(frame, own, after)?;
         }
     }
     Ok(())
@@ -73,18 +82,19 @@ mod tests {
         let mut asked = Vec::new();
         let found: Result<(), String> = carry_back(
             &mut frames,
-            |crossings| *crossings == 0,
+            |crossings| *crossings,
             |frame, own, after| {
                 assert_eq!(*after, 0);
                 asked.push((frame, *own));
-                Ok(if frame == 1 { 9 } else { 0 })
+                *own = usize::from(frame == 1);
+                Ok(())
             },
         );
         assert!(found.is_ok());
         assert_eq!(asked, [(4, 2), (2, 3), (1, 4)]);
-        assert_eq!(frames, [5, 4, 0, 0, 0, 0, 7]);
-        let failed = carry_back(&mut frames, |c| *c == 0, |_, _, _| Err("an error comes back"));
-        assert!(failed.is_err());
-        assert!(carry_back(&mut [0; 0], |_| true, |_, _, _| Err("none")).is_ok());
+        assert_eq!(frames, [5, 1, 0, 0, 0, 0, 7]);
+        let failed = carry_back(&mut frames, |c| *c, |_, _, _| Err("an error comes back"));
+        assert_eq!(failed, Err("an error comes back"));
+        assert!(carry_back(&mut [0; 0], |c| *c, |_, _, _| Err("none")).is_ok());
     }
 }

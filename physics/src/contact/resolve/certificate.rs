@@ -111,6 +111,11 @@ impl Certificate {
         self.body_triangle_pairs + self.layer_triangle_pairs
     }
 
+    /// Those of them that are not narrow either: what more work might mend.
+    pub fn crossings(&self) -> usize {
+        self.between().saturating_sub(self.narrow_triangle_pairs)
+    }
+
     /// Whether no garment crosses the body or another garment, pinched regions left out.
     pub fn is_clear(&self) -> bool {
         self.between() == 0

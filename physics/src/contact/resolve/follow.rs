@@ -19,7 +19,7 @@ use crate::query::Surface;
 use crate::transform::{Transform, into_frame, out_of_frame};
 use crate::vec3::{add, scale, sub};
 
-/// The longest step, as a share of the way.
+/// The longest step from the T-pose, as a share of the way; the way between frames may be one.
 const LONGEST: f64 = 1.0 / 8.0;
 /// The shortest one: it is taken even where it leaves more crossings than there were.
 const SHORTEST: f64 = 1.0 / 128.0;
@@ -52,7 +52,7 @@ pub struct Reached {
     pub positions: Vec<Vec<[f64; 3]>>,
     /// Skinning transforms, as in [`Waypoint`].
     pub transforms: Vec<Transform>,
-    /// Pairs with the body and between garments that are left in `positions`.
+    /// Pairs with the body and between garments that are left in `positions`, but for narrow and pinched ones.
     pub crossings: usize,
 }
 
@@ -177,7 +177,7 @@ impl Way<'_, '_> {
             steps += 1;
             // What may be halved is not worth a second attempt.
             let loosened = if is_shortest { self.settings.loosened } else { 1.0 };
-            let settings = ResolveSettings { is_shallow: true, loosened, ..*self.settings };
+            let settings = ResolveSettings { is_shallow: !is_last, loosened, ..*self.settings };
             let kept: &[f64] = if is_shortest { &[KEPT, 1.0] } else { &[KEPT] };
             let starts: Vec<_> = kept.iter().map(|kept| carried(&reached, &stage, *kept)).collect();
             for start in &starts {
@@ -195,7 +195,7 @@ impl Way<'_, '_> {
             } else {
                 match is_worse {
                     false => well += 1,
-                    true => failures += 1,
+                    true => (failures, well) = (failures + 1, 0),
                 }
                 if well >= GOOD_STEPS {
                     (step, well) = ((2.0 * step).min(self.longest), 0);

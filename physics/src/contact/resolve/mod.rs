@@ -80,7 +80,8 @@ pub struct Resolved {
     pub certificate: Certificate,
     /// What was done, per garment.
     pub garments: Vec<GarmentWork>,
-    /// Steps from the T-pose that were tried, by [`resolve_along`]; 0 where the drape could be mended as it was.
+    /// Steps that were tried: from the T-pose, by [`resolve_along`] (0 where the drape could be mended as it was), or from the
+    /// frame before, by [`resolve_after`].
     pub steps: usize,
     /// Time to prepare the body.
     pub body_time: Duration,
@@ -141,6 +142,21 @@ impl Resolved {
                 break;
             }
         }
+    }
+
+    /// The better of two results for the same drape: the one with fewer crossings, `self` of equal ones. It counts the work
+    /// of both.
+    #[must_use]
+    pub fn or(mut self, mut other: Self) -> Self {
+        let rank = |c: &Certificate| (c.crossings(), c.between());
+        if rank(&other.certificate) < rank(&self.certificate) {
+            std::mem::swap(&mut self, &mut other);
+        }
+        self.add_work(&other);
+        for (work, further) in self.garments.iter_mut().zip(&other.garments) {
+            work.time += further.time;
+        }
+        self
     }
 
     /// Counts the rounds of another attempt, and its time for the body and for certificates.

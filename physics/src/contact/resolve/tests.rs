@@ -6,6 +6,7 @@ use crate::mesh::TriMesh;
 use crate::mesh::shapes::{self, SplitMix};
 use crate::vec3::{add, add_scaled, norm, scale};
 use std::f64::consts::FRAC_PI_2;
+use std::time::Duration;
 
 fn moved(mesh: &TriMesh, by: [f64; 3]) -> TriMesh {
     shapes::mapped(mesh, |p| add(p, by))
@@ -359,4 +360,32 @@ fn what_went_far_is_certified_against_all_that_is_there() {
     let expected = brute_force_pairs(&[(body.positions(), body.faces()), (&up[0], faces)]);
     let found = with_drawn(&scene.body, &layers, |drawn| certified(&drawn, &layers, &up));
     assert!(expected > 20 && found.body_triangle_pairs == expected);
+}
+
+#[test]
+fn of_two_results_the_one_with_fewer_crossings_counts_and_the_work_of_both() {
+    let result = |body_triangle_pairs, narrow_triangle_pairs, layer_triangle_pairs, rounds| Resolved {
+        certificate: Certificate {
+            body_triangle_pairs,
+            narrow_triangle_pairs,
+            layer_triangle_pairs,
+            ..Certificate::default()
+        },
+        garments: vec![GarmentWork { rounds, time: Duration::from_secs(1), ..GarmentWork::default() }],
+        ..Resolved::default()
+    };
+    // Narrow pairs are no crossings, but of two results without any the one with fewer pairs is better.
+    let (crossed, narrow, clear) = (result(8, 0, 0, 1), result(10, 10, 0, 2), result(0, 0, 0, 4));
+    for (first, second, best) in [
+        (&crossed, &narrow, &narrow),
+        (&narrow, &crossed, &narrow),
+        (&narrow, &clear, &clear),
+        (&clear, &narrow, &clear),
+        (&result(2, 2, 1, 0), &result(1, 0, 0, 0), &result(1, 0, 0, 0)),
+    ] {
+        let found = first.clone().or(second.clone());
+        assert_eq!(found.certificate, best.certificate);
+        assert_eq!(found.garments[0].rounds, first.garments[0].rounds + second.garments[0].rounds);
+        assert_eq!(found.garments[0].time, Duration::from_secs(2));
+    }
 }
