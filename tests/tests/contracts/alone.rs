@@ -33,8 +33,8 @@ fn the_losses_of_garments_alone_are_added_where_all_networks_are_trained() {
         (computed.loss, gradient)
     };
     let schedule = Schedule::new(&config);
-    let stages = config.stages.iter().zip(schedule.boundaries());
-    let (_, first) = stages.filter(|(stage, _)| stage.trains == Trains::All).last().unwrap();
+    let mut stages = config.stages.iter().zip(schedule.boundaries());
+    let (_, first) = stages.find(|(stage, _)| stage.trains == Trains::All).unwrap();
     // Steps until one has garments that can touch.
     let scene_of =
         |config, step| prepare_step(&library, config, &schedule, step, Share::WHOLE).unwrap().remove(0);
