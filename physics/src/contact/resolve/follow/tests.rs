@@ -81,7 +81,7 @@ fn the_next_frame_carries_on_from_the_one_before() {
         let found = resolve_after(reached, &body, &layers, &settings, between).unwrap().unwrap();
         assert!(found.certificate.is_clear() && found.steps >= 1, "frame {frame}");
         assert!(found.garments[0].time > Duration::ZERO, "frame {frame}");
-        let moved = found.positions[0].iter().zip(&layers[0].positions[..]).filter(|(p, q)| p != q).count();
+        let moved = found.positions[0].iter().zip(layers[0].positions).filter(|(p, q)| p != q).count();
         assert_eq!(found.garments[0].moved, moved, "frame {frame}");
         was_moved |= moved > 0;
         reached = untouched(stage_at(now).unwrap(), found.positions);
