@@ -1,6 +1,11 @@
 //! Fixtures for the contract tests: the smallest run that is still the real thing.
 
-use clothcombo_trainer::config::{Config, load};
+use burn::module::Module;
+use clothcombo_model::gradient_bucket;
+use clothcombo_trainer::config::{Config, Trains, load};
+use clothcombo_trainer::drape::WardrobeTensors;
+use clothcombo_trainer::learner::Learner;
+use clothcombo_trainer::scene::PreparedScene;
 use std::path::Path;
 
 /// A run of a few steps on built-in data: every network, all three stages, up to three layers.
@@ -27,4 +32,19 @@ pub fn tiny_config(folder: &Path, overrides: &[&str]) -> Config {
 pub fn fuzz_cases(few: usize) -> (usize, u64) {
     let number = |name: &str| std::env::var(name).ok().and_then(|text| text.parse::<u64>().ok());
     (number("CLOTHCOMBO_FUZZ_CASES").map_or(few, |n| n as usize), number("CLOTHCOMBO_FUZZ_SEED").unwrap_or(1))
+}
+
+/// Loss of `scenes` and its gradient for all parameters, in the order of the networks.
+pub fn loss_and_gradient(
+    mut learner: Learner,
+    tensors: &WardrobeTensors,
+    scenes: &[PreparedScene],
+    trains: Trains,
+) -> (f64, Vec<f32>) {
+    let computed =
+        learner.compute(tensors, scenes, scenes.len(), trains, false).expect("the scenes are valid");
+    let mut gradient = gradient_bucket(learner.model(), &computed.gradients);
+    // What comes after tells which parameters have one.
+    gradient.truncate(learner.model().num_params());
+    (computed.loss, gradient)
 }

@@ -55,8 +55,8 @@ impl<'a> TriangleTree<'a> {
         Self { positions, faces, bvh: Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes), kept }
     }
 
-    /// As [`new`](Self::new), with the tree of the same faces elsewhere, whose boxes are fitted anew in O(F): for meshes that are still
-    /// in about the same shape. Pairs are the same.
+    /// As [`new`](Self::new), with the tree of the same faces elsewhere, whose boxes are fitted anew in O(F): for meshes that are
+    /// still in about the same shape. Pairs are the same.
     pub(super) fn refitted(tree: KeptTree, positions: &'a [[f64; 3]], faces: &'a [[u32; 3]]) -> Self {
         let KeptTree { mut bvh, kept } = tree;
         let boxes = triangle_boxes(positions, faces);

@@ -104,6 +104,12 @@ impl<T: Real> SceneEnergy<T> {
         self.garments.iter().map(|g| g.energies.vertex_count()).sum()
     }
 
+    /// The same garments, each by itself: without the pairs.
+    pub fn without_layers(&self) -> Self {
+        let Self { body, garments, settings, .. } = self;
+        Self { body: body.clone(), garments: garments.clone(), layers: Vec::new(), settings: *settings }
+    }
+
     /// The same scene with no other weights than those of `term`; `None` if it has none.
     pub fn only(&self, term: Term) -> Option<Self> {
         let mut scene = self.clone();

@@ -1,9 +1,8 @@
 //! `losses.alone`: garments draped alone count beside the outfit, where all networks are trained.
 
-use burn::module::Module;
-use clothcombo_model::{ClothCombo, gradient_bucket};
+use clothcombo_model::ClothCombo;
 use clothcombo_physics::energy::SceneEnergy;
-use clothcombo_tests::tiny_config;
+use clothcombo_tests::{loss_and_gradient, tiny_config};
 use clothcombo_trainer::config::Trains;
 use clothcombo_trainer::device::Backend;
 use clothcombo_trainer::drape::WardrobeTensors;
@@ -25,12 +24,8 @@ fn the_losses_of_garments_alone_are_added_where_all_networks_are_trained() {
     let tensors = WardrobeTensors::new(library.clone(), dimensions, &device);
     let model = ClothCombo::new(&config.model, &dimensions, config.seed, &device).unwrap();
     let of = |scene: PreparedScene, trains: Trains| {
-        let mut learner = Learner::new(model.clone(), new_optimizer(&config.optimizer), &config.optimizer);
-        let computed = learner.compute(&tensors, &[scene], 1, trains, false).unwrap();
-        let mut gradient = gradient_bucket(learner.model(), &computed.gradients);
-        // What comes after tells which parameters have one.
-        gradient.truncate(learner.model().num_params());
-        (computed.loss, gradient)
+        let learner = Learner::new(model.clone(), new_optimizer(&config.optimizer), &config.optimizer);
+        loss_and_gradient(learner, &tensors, &[scene], trains)
     };
     let schedule = Schedule::new(&config);
     let mut stages = config.stages.iter().zip(schedule.boundaries());

@@ -1,8 +1,7 @@
 //! Scenes of a step that are computed beside each other give what they give one after the other.
 
-use burn::module::Module;
-use clothcombo_model::{ClothCombo, gradient_bucket};
-use clothcombo_tests::tiny_config;
+use clothcombo_model::ClothCombo;
+use clothcombo_tests::{loss_and_gradient, tiny_config};
 use clothcombo_trainer::config::Trains;
 use clothcombo_trainer::device::Backend;
 use clothcombo_trainer::drape::WardrobeTensors;
@@ -22,14 +21,7 @@ fn gradient(
     threads: usize,
 ) -> (f64, Vec<f32>) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    pool.install(|| {
-        let mut learner = learner();
-        let computed = learner.compute(tensors, scenes, scenes.len(), trains, false).unwrap();
-        let mut gradient = gradient_bucket(learner.model(), &computed.gradients);
-        // What comes after tells which parameters have one.
-        gradient.truncate(learner.model().num_params());
-        (computed.loss, gradient)
-    })
+    pool.install(|| loss_and_gradient(learner(), tensors, scenes, trains))
 }
 
 #[test]

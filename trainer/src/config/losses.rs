@@ -173,7 +173,8 @@ pub struct LossesConfig {
     pub reference_vertices: f64,
     /// Weight, beside the loss of the outfit, of the losses that every garment of it has when it is draped alone, before
     /// untangling. Counts where all networks are trained at once: what is gained for outfits need not be lost for
-    /// garments worn alone. A scene in which nothing can touch has the same losses twice, 1 + `alone` times in all. 0, the default, is the paper's.
+    /// garments worn alone. A scene in which nothing can touch has the same losses twice, 1 + `alone` times in all. 0, the
+    /// default, is the paper's.
     pub alone: Ramp,
     /// StVK strain.
     pub strain: PlainLoss,

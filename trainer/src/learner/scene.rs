@@ -9,7 +9,6 @@ use burn::optim::GradientsParams;
 use burn::tensor::Tensor;
 use clothcombo_model::ClothCombo;
 use clothcombo_physics::autodiff::{SceneLossOutput, scene_loss};
-use clothcombo_physics::energy::SceneEnergy;
 use std::ops::AddAssign;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -124,35 +123,32 @@ impl Work<'_> {
             Trains::Single => embeddings,
             Trains::Untangling | Trains::All => model.prepare_untangling(&outfit, embeddings),
         };
-        let mut bodies = Vec::with_capacity(scene.bodies.len());
-        let mut losses = Vec::with_capacity(scene.bodies.len());
-        let mut mean = 0.0;
+        let loss_at = |posed, canonical, energy| {
+            trace_span!("energies").in_scope(|| scene_loss(posed, canonical, energy))
+        };
+        let alone = if self.trains == Trains::All { scene.alone } else { 0.0 };
         let share = 1.0 / scene.bodies.len() as f64;
+        let (mut bodies, mut losses, mut mean) = (Vec::with_capacity(scene.bodies.len()), Vec::new(), 0.0);
+        let mut add = |output: &SceneLossOutput, weight: f64| {
+            losses.push(output.loss.clone() * weight);
+            mean += output.value().total * weight;
+        };
         for prepared in &scene.bodies {
             let (body, start) = trace_span!("tensors").in_scope(|| self.tensors.body(prepared))?;
             let single = first_stage.drape_single(&outfit, &embeddings, &body, start);
-            let layered = match self.trains {
-                Trains::Single => None,
+            if alone > 0.0 {
+                let energy = Arc::new(prepared.energy.without_layers());
+                add(&loss_at(single.posed.clone(), single.canonical.clone(), energy), alone * share);
+            }
+            let (posed, canonical) = match self.trains {
+                Trains::Single => (single.posed, single.canonical),
                 Trains::Untangling | Trains::All => {
-                    Some(model.untangle(&outfit, &embeddings, &single, &body))
+                    let layered = model.untangle(&outfit, &embeddings, &single, &body);
+                    (layered.posed, layered.canonical)
                 }
             };
-            let loss_at = |posed, canonical, energy: &Arc<SceneEnergy<f32>>| {
-                trace_span!("energies").in_scope(|| scene_loss(posed, canonical, energy.clone()))
-            };
-            let alone = prepared.alone.as_ref().filter(|_| self.trains == Trains::All).map(|alone| {
-                (loss_at(single.posed.clone(), single.canonical.clone(), &alone.energy), alone.weight * share)
-            });
-            let worn = match layered {
-                Some(layered) => loss_at(layered.posed, layered.canonical, &prepared.energy),
-                None => loss_at(single.posed, single.canonical, &prepared.energy),
-            };
-            losses.push(worn.loss.clone() * share);
-            mean += worn.value().total * share;
-            if let Some((alone, weight)) = alone {
-                losses.push(alone.loss.clone() * weight);
-                mean += alone.value().total * weight;
-            }
+            let worn = loss_at(posed, canonical, prepared.energy.clone());
+            add(&worn, share);
             bodies.push(worn);
         }
         let depends = self.trains != Trains::Untangling || outfit.has_contacts();

@@ -24,16 +24,6 @@ pub struct PreparedBody {
     pub start: Vec<[f32; 3]>,
     /// The losses of this scene.
     pub energy: Arc<SceneEnergy<f32>>,
-    /// The losses of its garments draped alone, if they count as well.
-    pub alone: Option<AloneLoss>,
-}
-
-/// The losses of garments that are draped alone.
-pub struct AloneLoss {
-    /// Weight beside the losses of the outfit.
-    pub weight: f64,
-    /// The losses; there are no pairs.
-    pub energy: Arc<SceneEnergy<f32>>,
 }
 
 /// A scene ready for a step.
@@ -46,6 +36,8 @@ pub struct PreparedScene {
     pub contacts: Vec<(usize, usize)>,
     /// Bodies.
     pub bodies: Vec<PreparedBody>,
+    /// Weight of the losses of the garments draped alone, beside those of the outfit.
+    pub alone: f64,
 }
 
 impl PreparedScene {
@@ -112,7 +104,7 @@ impl Dresser<'_> {
         let contacts = contacts(&worn);
         let bodies =
             draw.bodies.iter().map(|body| self.on_body(&worn, &contacts, body, run_progress)).collect();
-        PreparedScene { draw, worn, contacts, bodies }
+        PreparedScene { draw, worn, contacts, bodies, alone: self.losses.alone.at(run_progress) }
     }
 
     fn on_body(
@@ -151,24 +143,17 @@ impl Dresser<'_> {
             .zip(weights.layers)
             .map(|(&(inner, outer), weights)| SceneLayers { inner, outer, weights })
             .collect();
-        let energy = SceneEnergy {
-            body: Arc::new(surface),
-            garments: scene_garments,
-            layers,
-            settings: losses.energy_settings(),
-        };
-        let alone_weight = losses.alone.at(run_progress);
-        let alone = (alone_weight > 0.0).then(|| AloneLoss {
-            weight: alone_weight,
-            energy: Arc::new(SceneEnergy { layers: Vec::new(), ..energy.clone() }),
-        });
         PreparedBody {
             shape: body.shape.iter().map(|v| *v as f32).collect(),
             pose: (self.features)(&body.pose, &self.joints.indices),
             bones: bones.collect(),
             start: starts.concat(),
-            energy: Arc::new(energy),
-            alone,
+            energy: Arc::new(SceneEnergy {
+                body: Arc::new(surface),
+                garments: scene_garments,
+                layers,
+                settings: losses.energy_settings(),
+            }),
         }
     }
 }

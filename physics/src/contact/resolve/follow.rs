@@ -3,8 +3,8 @@
 //! In a pose with bent limbs the drape alone does not tell where cloth belongs: a knee has gone through a skirt, a sleeve through
 //! the side of the chest, and the nearest way out is the wrong one. In the T-pose nothing of that has happened. On a way from there
 //! each step is short: what was resolved before is carried along by skinning and by what the drape changes, crossings are
-//! shallow, and the nearest way out is right. Where a step leaves more crossings than there were, a shorter one
-//! is tried.
+//! shallow, and the nearest way out is right. Where a step leaves more crossings than there were, a shorter one is
+//! tried.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -129,11 +129,13 @@ pub fn resolve_after<E: From<ResolveError>>(
     settings.check()?;
     check(body, layers)?;
     let carry_on = |body: &Body<'_>| {
+        let body_time = start.elapsed();
         let shortest = if before.crossings == 0 { SHORTEST } else { SHORTEST_OF_CROSSED };
         let way = Way { layers, end: body, settings, start, longest: 1.0, shortest };
         let (followed, steps) = way.follow(before, stage_at)?;
         let Some(found) = followed else { return Ok(None) };
         let mut resolved = settled(body, layers, found, settings);
+        resolved.body_time = body_time;
         resolved.go_on(body.drawn.surface, layers, settings, start);
         resolved.compare_since(layers, start);
         resolved.steps = steps;

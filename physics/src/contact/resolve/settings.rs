@@ -34,8 +34,7 @@ pub struct ResolveSettings {
     /// Most steps on a way: of [`super::resolve_along`] from the T-pose, of [`super::resolve_after`] from the frame before.
     /// Default 64; 0 mends the drape as it is or not at all.
     pub steps: usize,
-    /// Whether nothing lies deeper than half a limb, so that the nearest way out is the right one: true for a small step. Default
-    /// no.
+    /// Whether nothing lies deeper than half a limb, so that the nearest way out is the right one: true for a small step. Default no.
     pub is_shallow: bool,
     /// Whether crossings of a garment with itself are mended where possible. Default yes.
     pub self_contact: bool,
