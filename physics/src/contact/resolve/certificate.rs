@@ -60,6 +60,13 @@ pub struct PinchedPairs {
     pub self_triangle_pairs: usize,
 }
 
+impl PinchedPairs {
+    /// All of them.
+    pub fn count(&self) -> usize {
+        self.body_triangle_pairs + self.layer_triangle_pairs + self.self_triangle_pairs
+    }
+}
+
 /// The share of one garment.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct GarmentCertificate {
@@ -124,6 +131,16 @@ impl Certificate {
     /// What is wrong: fewer is better, in this order.
     pub(super) fn defects(&self) -> (usize, usize) {
         (self.between(), self.self_triangle_pairs)
+    }
+
+    /// Whether there are more pairs than in `other`, of those between first, or more pinched ones.
+    pub(super) fn is_worse(&self, other: &Self) -> bool {
+        self.defects() > other.defects() || self.pinched.count() > other.pinched.count()
+    }
+
+    /// Pairs that are not in `other`.
+    pub(super) fn remaining_beside<'a>(&'a self, other: &'a Self) -> impl Iterator<Item = &'a RemainingPair> {
+        self.remaining.iter().filter(|pair| !other.remaining.contains(pair))
     }
 
     /// Counts the pairs with the body where it gives way.

@@ -12,15 +12,15 @@ use std::time::Instant;
 use super::body::{Body, with_body, with_drawn};
 use super::obstacle::BodyObstacle;
 use super::{
-    Layer, ResolveError, ResolveSettings, Resolved, Untangled, at, check, is_near, resolved, settled,
-    simply_resolved, untangled,
+    Layer, ResolveError, ResolveSettings, Resolved, Untangled, at, check, is_near, resolved_further, settled,
+    untangled,
 };
 use crate::query::Surface;
 use crate::transform::{Transform, into_frame, out_of_frame};
 use crate::vec3::{add, scale, sub};
 
 /// The longest step from the T-pose, as a share of the way; the way between frames may be one.
-const LONGEST: f64 = 1.0 / 8.0;
+const LONGEST: f64 = 1.0 / 4.0;
 /// The shortest one: it is taken even where it leaves more crossings than there were.
 const SHORTEST: f64 = 1.0 / 128.0;
 /// The shortest one from a frame that was not clear.
@@ -75,41 +75,29 @@ pub fn resolve_along<E: From<ResolveError>>(
     settings: &ResolveSettings,
     mut stage_at: impl FnMut(f64) -> Result<Waypoint, E>,
 ) -> Result<Resolved, E> {
-    let start = Instant::now();
     settings.check()?;
     check(body, layers)?;
-    with_drawn(body, layers, |drawn| {
-        let simple = simply_resolved(&drawn, layers, settings, start);
-        if simple.certificate.is_clear() {
-            return Ok(simple);
+    resolved_further(body, layers, settings, |room, mut best, start| {
+        let is_torn = best.certificate.strain_added.is_some_and(|added| added > TORN);
+        if best.certificate.is_clear() && !is_torn || settings.steps == 0 {
+            return Ok(best);
         }
-        let relieving = Instant::now();
-        with_body(drawn, layers.len(), |room| {
-            let mut best = resolved(room, layers, settings, simple, relieving);
-            best.go_on(body, layers, settings, start);
-            best.compare_since(layers, start);
-            let is_torn = best.certificate.strain_added.is_some_and(|added| added > TORN);
-            if best.certificate.is_clear() && !is_torn || settings.steps == 0 {
-                return Ok(best);
+        let stage = stage_at(0.0)?;
+        check(&stage.body, &placed(layers, &stage.draped)?)?;
+        let first = on_stage(layers, &stage, settings, std::slice::from_ref(&stage.draped));
+        let way = Way { layers, end: room, settings, start, longest: LONGEST, shortest: SHORTEST };
+        let (followed, steps) = way.follow(Reached::new(stage, first), stage_at)?;
+        best.steps = steps;
+        if let Some(found) = followed {
+            let mut along = settled(room, layers, found, settings);
+            along.go_on(body, layers, settings, start);
+            best.add_work(&along);
+            match along.certificate.is_clear() {
+                true => (best.positions, best.certificate) = (along.positions, along.certificate),
+                false => best.prefer(along.positions, along.certificate),
             }
-            let stage = stage_at(0.0)?;
-            check(&stage.body, &placed(layers, &stage.draped)?)?;
-            let first = on_stage(layers, &stage, settings, std::slice::from_ref(&stage.draped));
-            let way = Way { layers, end: room, settings, start, longest: LONGEST, shortest: SHORTEST };
-            let (followed, steps) = way.follow(Reached::new(stage, first), stage_at)?;
-            best.steps = steps;
-            if let Some(found) = followed {
-                let mut along = settled(room, layers, found, settings);
-                along.go_on(body, layers, settings, start);
-                best.add_work(&along);
-                match along.certificate.is_clear() {
-                    true => (best.positions, best.certificate) = (along.positions, along.certificate),
-                    false => best.prefer(along.positions, along.certificate),
-                }
-            }
-            best.compare_since(layers, start);
-            Ok(best)
-        })
+        }
+        Ok(best)
     })
 }
 

@@ -2,12 +2,15 @@
 
 use crate::energy::{Material, strain::Strain};
 use crate::mesh::{FacesAtVertex, Topology, TriMesh};
+use crate::vec3::{norm, sub};
 
 /// Everything about a garment that its positions do not change: made once, used for every frame and body.
 #[derive(Debug)]
 pub struct RestGarment {
     pub(super) faces: Vec<[u32; 3]>,
     pub(super) topology: Topology,
+    /// Lengths of the topology's edges [m].
+    pub(super) edge_lengths: Vec<f64>,
     /// Vertices on an edge with one face.
     pub(super) is_border: Vec<bool>,
     /// For every face, which of its edges (corner k → k+1) have no second face: bit k.
@@ -43,9 +46,11 @@ impl RestGarment {
                 })
             })
             .collect();
+        let at = |v: u32| rest.positions()[v as usize];
+        let edge_lengths = topology.edges.iter().map(|&[a, b]| norm(sub(at(a), at(b)))).collect();
         let faces_at = FacesAtVertex::new(rest.vertex_count(), &faces);
         let strain = Strain::new(rest, &Material::default());
-        Self { faces, topology, is_border, border_edges, faces_at, strain }
+        Self { faces, topology, edge_lengths, is_border, border_edges, faces_at, strain }
     }
 
     /// Number of vertices.

@@ -23,6 +23,8 @@
 //!
 //! **Once more.** Where few crossings are left, what was reached is resolved like a new drape.
 //!
+//! **Easing.** Where the strain energy has risen, cloth gives back what it can without crossing anything ([`ease`]).
+//!
 //! **Bent limbs.** Where crossings are left, [`resolve_along`] takes the garments from the T-pose, where their order is plain,
 //! step by step to the pose ([`follow`]).
 
@@ -30,6 +32,7 @@ mod body;
 mod certificate;
 mod contact;
 mod detect;
+mod ease;
 mod error;
 mod folds;
 mod follow;
@@ -206,13 +209,34 @@ pub fn resolve(
 ) -> Result<Resolved, ResolveError> {
     settings.check()?;
     check(body, layers)?;
+    resolved_further(body, layers, settings, |_, found, _| Ok(found))
+}
+
+/// [`resolve`] for valid arguments. Where something is left to do after the first attempts, `further` may go on from there: it
+/// gets the body, what was reached, and when all began.
+fn resolved_further<E>(
+    body: &Surface<f64>,
+    layers: &[Layer<'_>],
+    settings: &ResolveSettings,
+    further: impl FnOnce(&Body<'_>, Resolved, Instant) -> Result<Resolved, E>,
+) -> Result<Resolved, E> {
     let start = Instant::now();
-    let mut found = resolved_once(body, layers, settings);
-    if !found.certificate.is_clear() {
-        found.go_on(body, layers, settings, start);
-        found.compare_since(layers, start);
-    }
-    Ok(found)
+    with_drawn(body, layers, |drawn| {
+        let simple = simply_resolved(&drawn, layers, settings, start);
+        if simple.certificate.is_clear() {
+            return Ok(simple);
+        }
+        let relieving = Instant::now();
+        with_body(drawn, layers.len(), |room| {
+            let mut found = resolved(room, layers, settings, simple, relieving);
+            found.go_on(body, layers, settings, start);
+            found.compare_since(layers, start);
+            let mut found = further(room, found, start)?;
+            found.ease(room, layers, settings, start);
+            found.compare_since(layers, start);
+            Ok(found)
+        })
+    })
 }
 
 /// [`resolve`] without what follows the first attempts.

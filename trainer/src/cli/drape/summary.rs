@@ -108,10 +108,9 @@ fn certificate(report: &Report) -> String {
     if let Some(strain) = found.strain_added {
         text += &format!(", strain {:+.1} %", 100.0 * strain);
     }
-    let pinched = &found.pinched;
-    let sum = pinched.body_triangle_pairs + pinched.layer_triangle_pairs + pinched.self_triangle_pairs;
-    if sum > 0 {
-        text += &format!("\nwhere the body lies inside itself: {sum} pairs that no cloth can avoid");
+    let pinched = found.pinched.count();
+    if pinched > 0 {
+        text += &format!("\nwhere the body lies inside itself: {pinched} pairs that no cloth can avoid");
     }
     if let Some(done) = &report.smoothing {
         text += &format!(
