@@ -179,14 +179,11 @@ pub struct Counts {
 impl Counts {
     /// Those of `certificate`.
     pub fn new(certificate: &Certificate, order_violations_by_vertices: f64) -> Self {
-        let pinched = &certificate.pinched;
         Self {
             body_triangle_pairs: certificate.body_triangle_pairs,
             layer_triangle_pairs: certificate.layer_triangle_pairs,
             self_triangle_pairs: certificate.self_triangle_pairs,
-            pinched_pairs: pinched.body_triangle_pairs
-                + pinched.layer_triangle_pairs
-                + pinched.self_triangle_pairs,
+            pinched_pairs: certificate.pinched.count(),
             contour_length_mm: certificate.contour_length_mm,
             max_depth_mm: certificate.max_depth_mm,
             order_violations: certificate.order_violations,
@@ -221,7 +218,7 @@ pub struct OutfitResult {
     pub largest_move_mm: f64,
     /// Share of vertices that moved.
     pub moved: f64,
-    /// Rounds per garment, in the last step.
+    /// Rounds per garment, of all attempts but those of the way.
     pub rounds: Vec<usize>,
     /// Steps from the T-pose that were tried; 0 where the drape could be mended as it was.
     pub steps: usize,

@@ -1,24 +1,22 @@
 //! Brings all garments of an outfit to the right side of the body and of each other, together.
 
+mod step;
+
 use std::time::Instant;
 
 use rayon::prelude::*;
 
 use super::ResolveSettings;
-use super::contact::{Contact, is_tiny, normal_of, overlap};
+use super::contact::Contact;
 use super::detect::Crossings;
-use super::folds::folds;
 use super::obstacle::{BodyObstacle, Plane};
 use super::outfit::Outfit;
-use super::over::{Order, Over, all_over, order, outward, part_along};
-use super::relax::relax;
+use super::over::{Over, all_over, outward};
 use crate::contact::intersections::{KeptTree, TriangleTree};
-use crate::vec3::{add, add_scaled, dot, norm, norm_squared, scale, sub};
+use crate::vec3::dot;
 
 /// A half-space is remembered for a vertex that is nearer to it than this [m]: smoothing may carry it there.
 const WATCH: f64 = 0.01;
-/// No contact asks for a longer step than this in a round [m].
-const LONGEST_STEP: f64 = 0.02;
 /// Rounds without progress after which an outfit is left as it is.
 const PATIENCE: usize = 8;
 /// Rounds in which vertices that are merely closer than asked for still count.
@@ -183,161 +181,6 @@ impl<'a> Untangling<'a> {
         self.over = all_over(outfit, &trees, positions, &self.outward, reach);
         self.crossings.update(outfit, self.body, &trees, positions, &self.far, self.settings.self_contact);
         self.trees = trees.into_iter().map(TriangleTree::into_kept).collect();
-    }
-
-    fn step(&mut self, round: usize) {
-        let gap = self.settings.gap * (1.0 + 0.1 * round as f64).min(3.0);
-        let outfit = self.outfit;
-        let (mut asked, crumpled) = self.part_folds(0.25 * gap);
-        let mut seeds: Vec<u32> = asked.iter().flat_map(|c| c.vertices).chain(crumpled).collect();
-        for &(f, g) in &self.crossings.layers {
-            let (outer, inner) = (outfit.faces[f as usize], outfit.faces[g as usize]);
-            seeds.extend(outer.iter().chain(&inner));
-            if let Order::Along(away) = order(outer, inner, true, &self.outward) {
-                part_along(away, outer, inner, &self.positions, 0.5 * gap, LONGEST_STEP, &mut asked);
-            }
-        }
-        for &(f, other) in &self.crossings.body {
-            seeds.extend(outfit.faces[f as usize]);
-            self.part_from_body(f, other, gap, &mut asked);
-        }
-        self.remembered.extend(asked);
-        let least = self.least(round);
-        for o in self.over.iter().filter(|o| o.height < least) {
-            seeds.push(o.vertex);
-            seeds.extend(o.face);
-        }
-        let violated = (0..self.planes.len() as u32)
-            .filter(|&v| self.planes[v as usize].is_some_and(|p| self.is_violated(&p, round)));
-        seeds.extend(violated);
-
-        let region = outfit.neighbourhood(&seeds, self.settings.rings);
-        let mut is_in = vec![false; self.positions.len()];
-        region.iter().for_each(|&v| is_in[v as usize] = true);
-        let mut contacts: Vec<Contact> = Vec::new();
-        for o in self.over.iter().filter(|o| is_in[o.vertex as usize]) {
-            contacts.push(o.contact(gap.min(o.height + LONGEST_STEP)));
-        }
-        contacts.extend(&self.remembered);
-        // The body last, so that it has the last word.
-        for &v in &region {
-            let Some(plane) = self.planes[v as usize].filter(|p| p.distance < WATCH) else { continue };
-            let wanted = if plane.is_held { plane.distance.clamp(0.0, gap) } else { gap };
-            let step = (wanted - plane.distance).min(LONGEST_STEP);
-            let moved = sub(self.positions[v as usize], self.input[v as usize]);
-            if norm(add_scaled(moved, step, plane.normal)) <= self.farthest {
-                contacts.push(Contact::vertex(v, &plane, plane.distance + step));
-            }
-        }
-        let (sweeps, stretch) = (self.settings.sweeps, self.stretch);
-        relax(outfit, &mut self.positions, &self.shape, &region, &contacts, sweeps, stretch);
-        self.hold_back(&region);
-        self.touch(&region);
-    }
-
-    /// Takes vertices back that went farther than allowed.
-    fn hold_back(&mut self, region: &[u32]) {
-        for &v in region {
-            let v = v as usize;
-            let moved = sub(self.positions[v], self.input[v]);
-            let most = self.farthest;
-            if norm_squared(moved) > most * most {
-                self.positions[v] = add_scaled(self.input[v], most / norm(moved), moved);
-            }
-        }
-    }
-
-    /// The part of a face over a face of the body has to come out of it.
-    fn part_from_body(&self, f: u32, other: u32, gap: f64, found: &mut Vec<Contact>) {
-        let face = self.outfit.faces[f as usize];
-        let upper = face.map(|v| self.positions[v as usize]);
-        let Some(lower) = self.body.tree.triangle(other).filter(|t| !is_tiny(t)) else { return };
-        let normal = normal_of(&lower);
-        // A face on the other side of the limb asks for the way through it.
-        let away = face.iter().fold([0.0; 3], |sum, &v| add(sum, self.outward[v as usize]));
-        let seen = face.iter().fold([0.0; 3], |sum, &v| {
-            add(sum, self.planes[v as usize].filter(|p| p.distance > 0.0).map_or([0.0; 3], |p| p.normal))
-        });
-        if dot(normal, away) < 0.0 && dot(normal, seen) <= 0.0 {
-            return;
-        }
-        // The ground under the corner, as a height along the normal.
-        let ground = dot(normal, lower[0]);
-        for corner in overlap(&upper, &lower, normal).iter().filter(|c| c.height < 0.5 * gap) {
-            let target = ground + (0.5 * gap).min(corner.height + LONGEST_STEP);
-            found.push(Contact::face_point(face, corner.at_upper, normal, target));
-        }
-    }
-
-    /// Conditions that part crossings of garments with themselves, and crumpled vertices, which are smoothed.
-    fn part_folds(&mut self, gap: f64) -> (Vec<Contact>, Vec<u32>) {
-        let (mut contacts, mut crumpled) = (Vec::new(), Vec::new());
-        let own = std::mem::take(&mut self.crossings.own);
-        let mut folded = Vec::new();
-        for &(f, g) in &own {
-            let (one, other) = (self.outfit.faces[f as usize], self.outfit.faces[g as usize]);
-            match order(one, other, false, &self.outward) {
-                Order::Along(away) => {
-                    part_along(away, one, other, &self.positions, gap, LONGEST_STEP, &mut contacts);
-                }
-                Order::Unknown => folded.push((f, g)),
-            }
-        }
-        for of_garment in
-            folded.chunk_by(|a, b| self.outfit.garment_of_face(a.0) == self.outfit.garment_of_face(b.0))
-        {
-            let g = self.outfit.garment_of_face(of_garment[0].0);
-            let (first, start) = (self.outfit.faces_of_garment(g).start, self.outfit.vertices(g).start);
-            let had_some = of_garment.iter().any(|pair| self.known_folds.binary_search(pair).is_ok());
-            let local: Vec<(u32, u32)> = of_garment.iter().map(|(f, g)| (f - first, g - first)).collect();
-            let garment = self.outfit.layers[g].garment;
-            let found = folds(garment, self.outfit.part(&self.positions, g), &local, gap);
-            contacts.extend(found.contacts.into_iter().map(|c| c.shifted(start)));
-            let here: Vec<u32> = found.crumpled.iter().map(|v| v + start).collect();
-            // What the input already had is smoothed for good, what was done to it is taken back.
-            match had_some {
-                true => self.smooth_shape(&here),
-                false => self.smooth_moves(&here),
-            }
-            crumpled.extend(here);
-        }
-        self.crossings.own = own;
-        (contacts, crumpled)
-    }
-
-    /// Moves vertices half way to the middle of their neighbours, and the shape they return to with them.
-    fn smooth_shape(&mut self, vertices: &[u32]) {
-        let moves: Vec<[f64; 3]> = vertices
-            .iter()
-            .map(|&v| {
-                let own = self.positions[v as usize];
-                scale(sub(self.middle(v, |n| self.positions[n as usize]), own), 0.5)
-            })
-            .collect();
-        for (&v, by) in vertices.iter().zip(moves) {
-            let v = v as usize;
-            self.positions[v] = add(self.positions[v], by);
-            self.shape[v] = add(self.shape[v], by);
-        }
-    }
-
-    /// Gives vertices the mean displacement of their neighbours.
-    fn smooth_moves(&mut self, vertices: &[u32]) {
-        let by = |n: u32| sub(self.positions[n as usize], self.shape[n as usize]);
-        let smoothed: Vec<[f64; 3]> = vertices.iter().map(|&v| self.middle(v, by)).collect();
-        for (&v, by) in vertices.iter().zip(smoothed) {
-            self.positions[v as usize] = add(self.shape[v as usize], by);
-        }
-    }
-
-    fn middle(&self, v: u32, value: impl Fn(u32) -> [f64; 3]) -> [f64; 3] {
-        let ring = self.outfit.ring(v);
-        let count = ring.len();
-        if count == 0 {
-            value(v)
-        } else {
-            scale(ring.fold([0.0; 3], |sum, n| add(sum, value(n))), 1.0 / count as f64)
-        }
     }
 
     /// Looks again at vertices that moved, and marks the faces around them.

@@ -1,0 +1,187 @@
+//! What the post-process reached, and how it is judged.
+
+use std::time::{Duration, Instant};
+
+use super::body::{Body, with_drawn};
+use super::certificate::{Certificate, certificate};
+use super::near::MARGIN;
+use super::obstacle::BodyObstacle;
+use super::{Layer, ResolveSettings, Untangled, at, resolved_once, untangled};
+use crate::query::Surface;
+use crate::vec3;
+
+/// Most attempts that begin where another one ended…
+const FURTHER_ATTEMPTS: usize = 3;
+/// …and most pairs that may be left there: more would only be torn further.
+const FEW: usize = 32;
+
+/// Garments that were resolved.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Resolved {
+    /// New positions of every garment, `[V, 3]` [m], in the order given.
+    pub positions: Vec<Vec<[f64; 3]>>,
+    /// What is left.
+    pub certificate: Certificate,
+    /// What was done, per garment.
+    pub garments: Vec<GarmentWork>,
+    /// Steps that were tried: from the T-pose, by [`super::resolve_along`] (0 where the drape could be mended as it was), or from the
+    /// frame before, by [`super::resolve_after`].
+    pub steps: usize,
+    /// Time to prepare the body.
+    pub body_time: Duration,
+    /// Time for the certificate.
+    pub certificate_time: Duration,
+}
+
+/// What was done to one garment.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct GarmentWork {
+    /// Rounds of detection and relaxation.
+    pub rounds: usize,
+    /// Vertices that moved.
+    pub moved: usize,
+    /// The largest move [m].
+    pub largest_move: f64,
+    /// Its share, by vertices, of the wall time for all garments together.
+    pub time: Duration,
+}
+
+impl Resolved {
+    /// Where cloth lies in room that the body only made for it, tries to do without: the body gives way no more than where it
+    /// lies inside itself. Taken if fewer pairs are left.
+    fn close_in(&mut self, body: &Body<'_>, layers: &[Layer<'_>], settings: &ResolveSettings) {
+        if self.certificate.narrow_triangle_pairs == 0 {
+            return;
+        }
+        let settings = ResolveSettings { is_shallow: true, loosened: 1.0, ..*settings };
+        let now = at(layers, &self.positions);
+        let closer = body.with_least_room(|obstacle| untangled(obstacle, &now, &settings));
+        let certificate = certified(&body.drawn, layers, &closer.positions);
+        self.prefer(closer.positions, certificate);
+    }
+
+    /// Where few crossings are left on `body`, attempts that begin where the one before ended: cloth that is nearly sorted out is
+    /// the better shape to return to and to measure lengths from than the drape it came from. None where limits are strict
+    /// (`settings.loosened`). `start`: when all of it began.
+    pub(super) fn go_on(
+        &mut self,
+        body: &Surface<f64>,
+        layers: &[Layer<'_>],
+        settings: &ResolveSettings,
+        start: Instant,
+    ) {
+        let mut now = self.positions.clone();
+        let attempts = if settings.loosened > 1.0 { FURTHER_ATTEMPTS } else { 0 };
+        for _ in 0..attempts {
+            let left = self.certificate.between();
+            if left == 0 || left > FEW || settings.is_late(start, layers.len()) {
+                break;
+            }
+            let found = resolved_once(body, &at(layers, &now), settings);
+            self.add_work(&found);
+            let is_stuck = found.positions == now;
+            now.clone_from(&found.positions);
+            self.prefer(found.positions, found.certificate);
+            if is_stuck {
+                break;
+            }
+        }
+    }
+
+    /// The better of two results for the same drape: the one with fewer crossings, `self` of equal ones. It counts the work
+    /// of both.
+    #[must_use]
+    pub fn or(mut self, mut other: Self) -> Self {
+        let rank = |c: &Certificate| (c.crossings(), c.between());
+        if rank(&other.certificate) < rank(&self.certificate) {
+            std::mem::swap(&mut self, &mut other);
+        }
+        self.add_work(&other);
+        for (work, further) in self.garments.iter_mut().zip(&other.garments) {
+            work.time += further.time;
+        }
+        self
+    }
+
+    /// Counts the rounds of another attempt, and its time for the body and for certificates.
+    pub(super) fn add_work(&mut self, attempt: &Self) {
+        for (work, further) in self.garments.iter_mut().zip(&attempt.garments) {
+            work.rounds += further.rounds;
+        }
+        self.body_time += attempt.body_time;
+        self.certificate_time += attempt.certificate_time;
+    }
+
+    /// Takes another state of the garments if it is better.
+    pub(super) fn prefer(&mut self, positions: Vec<Vec<[f64; 3]>>, certificate: Certificate) {
+        if certificate.defects() < self.certificate.defects() {
+            (self.positions, self.certificate) = (positions, certificate);
+        }
+    }
+
+    /// [`compare`](Self::compare) for work that began at `start`, without the time for the body and for certificates.
+    pub(super) fn compare_since(&mut self, layers: &[Layer<'_>], start: Instant) {
+        self.compare(layers, start.elapsed().saturating_sub(self.body_time + self.certificate_time));
+    }
+
+    /// Tells moves and strain from `layers`, and that all of it took `time`.
+    pub(super) fn compare(&mut self, layers: &[Layer<'_>], time: Duration) {
+        let count: usize = self.positions.iter().map(Vec::len).sum();
+        for ((work, layer), positions) in self.garments.iter_mut().zip(layers).zip(&self.positions) {
+            let moves = layer.positions.iter().zip(positions).map(|(p, q)| vec3::norm(vec3::sub(*q, *p)));
+            work.moved = moves.clone().filter(|m| *m > 0.0).count();
+            work.largest_move = moves.fold(0.0, f64::max);
+            work.time = time.mul_f64(positions.len() as f64 / count.max(1) as f64);
+        }
+        self.certificate.compare_strain(layers.iter().map(|l| l.garment.strain_energy(l.positions)).sum());
+    }
+}
+
+/// What untangling left, brought back to the body as it is drawn where it can be, with its certificate.
+pub(super) fn settled(
+    body: &Body<'_>,
+    layers: &[Layer<'_>],
+    found: Untangled,
+    settings: &ResolveSettings,
+) -> Resolved {
+    let mut resolved = judged(&body.drawn, layers, found);
+    resolved.close_in(body, layers, settings);
+    resolved
+}
+
+/// What untangling left, with its certificate.
+pub(super) fn judged(drawn: &BodyObstacle<'_>, layers: &[Layer<'_>], found: Untangled) -> Resolved {
+    let start = Instant::now();
+    let certificate = certified(drawn, layers, &found.positions);
+    let work = GarmentWork { rounds: found.rounds, ..GarmentWork::default() };
+    Resolved {
+        positions: found.positions,
+        certificate,
+        garments: vec![work; layers.len()],
+        certificate_time: start.elapsed(),
+        ..Resolved::default()
+    }
+}
+
+/// The certificate of garments that went from `layers`, near which the body is `drawn`, to `positions`.
+pub(super) fn certified(
+    drawn: &BodyObstacle<'_>,
+    layers: &[Layer<'_>],
+    positions: &[Vec<[f64; 3]>],
+) -> Certificate {
+    let now = at(layers, positions);
+    match is_near(layers, positions) {
+        true => certificate(drawn, &now),
+        false => with_drawn(drawn.surface, &now, |around| {
+            let mut found = certificate(&around, &now);
+            found.count_narrow(drawn);
+            found
+        }),
+    }
+}
+
+/// Whether nothing moved so far from `layers` that it could meet more of the body than what is near those.
+pub(super) fn is_near(layers: &[Layer<'_>], positions: &[Vec<[f64; 3]>]) -> bool {
+    let is_near = |(p, q): (&[f64; 3], &[f64; 3])| vec3::norm(vec3::sub(*q, *p)) <= MARGIN;
+    layers.iter().zip(positions).all(|(layer, moved)| layer.positions.iter().zip(moved).all(is_near))
+}
