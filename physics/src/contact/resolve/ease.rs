@@ -13,7 +13,7 @@ use super::{Crossed, Layer, RemainingPair, ResolveSettings, Resolved, at, certif
 use crate::vec3::{add_scaled, norm, sub};
 
 /// A rise of the strain energy, as a share, that is left as it is.
-const ENOUGH: f64 = 0.01;
+const ENOUGH: f64 = 0.03;
 /// Most times that cloth is eased.
 const TIMES: usize = 10;
 /// Failures in a row after which it is left.
@@ -25,7 +25,7 @@ const PASSES: usize = 20;
 /// Share of an edge's change of length that one pass takes back.
 const STIFFNESS: f64 = 0.5;
 /// Farthest that a vertex is moved each time [m]: no limb is so thin that cloth could get to its other side.
-const FARTHEST: f64 = 0.004;
+const FARTHEST: f64 = 0.002;
 /// Rounds in which the contacts are met again.
 const ROUNDS: usize = 8;
 /// Rings of neighbours around a crossing that easing would make, which keep their positions.
