@@ -253,7 +253,8 @@ pub(super) fn certificate(body: &BodyObstacle<'_>, layers: &[Layer<'_>]) -> Cert
         }
     }
     found.max_depth_mm = 1e3 * depths.iter().fold(0.0, |a: f64, b| a.max(*b));
-    found.mean_depth_mm = 1e3 * depths.iter().sum::<f64>() / depths.len().max(1) as f64;
+    // The sum of none is −0.
+    found.mean_depth_mm = 1e3 * depths.iter().fold(0.0, |sum, d| sum + d) / depths.len().max(1) as f64;
     found.order_violations = wrong as f64 / judged.max(1) as f64;
     found.count_narrow(body);
     found
