@@ -218,7 +218,7 @@ pub struct OutfitResult {
     pub largest_move_mm: f64,
     /// Share of vertices that moved.
     pub moved: f64,
-    /// Rounds per garment, of all attempts but those of the way.
+    /// Rounds per garment, of all attempts but those of the way and of easing.
     pub rounds: Vec<usize>,
     /// Steps from the T-pose that were tried; 0 where the drape could be mended as it was.
     pub steps: usize,

@@ -33,7 +33,8 @@ const RINGS_HELD: usize = 3;
 
 impl Resolved {
     /// Lowers the strain energy where it has risen from that of `layers`, without any further crossing. What the
-    /// post-process has not moved only moves where contacts ask for it. `start`: when all of it began.
+    /// post-process has not moved only moves where contacts ask for it. None where limits are strict (`settings.loosened`).
+    /// `start`: when all of it began.
     pub(super) fn ease(
         &mut self,
         body: &Body<'_>,
@@ -47,7 +48,7 @@ impl Resolved {
         let before = energy(layers);
         let mut least = energy(&at(layers, &self.positions));
         let is_enough = |least: f64| least <= (1.0 + ENOUGH) * before;
-        if is_enough(least) {
+        if is_enough(least) || settings.loosened <= 1.0 {
             return;
         }
         let settings = ResolveSettings { is_shallow: true, loosened: 1.0, rounds: ROUNDS, ..*settings };
