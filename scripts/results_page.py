@@ -32,7 +32,7 @@ def main() -> None:
     # Colours of a drawing are few: a palette makes the files four times smaller.
     for name in set(re.findall(r"\]\((figures/)?([\w-]+\.png)\)", new)):
         source = folder / "".join(name)
-        Image.open(source).convert("RGB").quantize(256).save(DOCS / "figures" / name[1], optimize=True)
+        Image.open(source).convert("RGB").quantize(256, kmeans=3).save(DOCS / "figures" / name[1], optimize=True)
     new = re.sub(r"\]\((?:figures/)?([\w-]+\.png)\)", r"](figures/\1)", new)
     page.write_text(old[: old.index(FIRST)] + new.rstrip("\n") + "\n\n" + old[old.index(LAST) :])
 
