@@ -30,10 +30,10 @@ def main() -> None:
     page = DOCS / "results.md"
     old = page.read_text()
     # Colours of a drawing are few: a palette makes the files four times smaller.
-    for name in set(re.findall(r"\]\((figures/)?([\w-]+\.png)\)", new)):
-        source = folder / "".join(name)
-        Image.open(source).convert("RGB").quantize(256, kmeans=3).save(DOCS / "figures" / name[1], optimize=True)
-    new = re.sub(r"\]\((?:figures/)?([\w-]+\.png)\)", r"](figures/\1)", new)
+    for name in set(re.findall(r"\]\(([\w-]+\.png)\)", new)):
+        picture = Image.open(folder / name).convert("RGB")
+        picture.quantize(256, kmeans=3).save(DOCS / "figures" / name, optimize=True)
+    new = re.sub(r"\]\(([\w-]+\.png)\)", r"](figures/\1)", new)
     page.write_text(old[: old.index(FIRST)] + new.rstrip("\n") + "\n\n" + old[old.index(LAST) :])
 
 

@@ -1,5 +1,7 @@
 //! What is left, counted exactly.
 
+use std::collections::HashSet;
+
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -81,7 +83,7 @@ pub struct GarmentCertificate {
 }
 
 /// What a garment triangle crosses.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Crossed {
     /// The body.
@@ -93,7 +95,7 @@ pub enum Crossed {
 }
 
 /// Two triangles that cross. Indices are 0-based.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct RemainingPair {
     /// The garment; of two, the outer one.
     pub garment: usize,
@@ -140,7 +142,13 @@ impl Certificate {
 
     /// Pairs that are not in `other`.
     pub(super) fn remaining_beside<'a>(&'a self, other: &'a Self) -> impl Iterator<Item = &'a RemainingPair> {
-        self.remaining.iter().filter(|pair| !other.remaining.contains(pair))
+        let known: HashSet<&RemainingPair> = other.remaining.iter().collect();
+        self.remaining.iter().filter(move |pair| !known.contains(pair))
+    }
+
+    /// Strain energy of all garments [J].
+    pub(super) fn strain_joule(&self) -> f64 {
+        self.garments.iter().map(|g| g.strain_joule).sum()
     }
 
     /// Counts the pairs with the body where it gives way.
@@ -153,7 +161,7 @@ impl Certificate {
 
     /// Notes the strain energy before the post-process [J].
     pub(super) fn compare_strain(&mut self, before: f64) {
-        let after: f64 = self.garments.iter().map(|g| g.strain_joule).sum();
+        let after = self.strain_joule();
         self.strain_added = (before > NO_STRAIN).then(|| after / before - 1.0);
     }
 }

@@ -9,8 +9,10 @@ use std::time::Instant;
 
 use super::body::Body;
 use super::outfit::Outfit;
-use super::{Crossed, Layer, RemainingPair, ResolveSettings, Resolved, at, certified, untangled};
-use crate::vec3::{add_scaled, norm, sub};
+use super::relax::{keep_length, no_farther};
+use super::{
+    Certificate, Crossed, Layer, RemainingPair, ResolveSettings, Resolved, at, certified, untangled,
+};
 
 /// A rise of the strain energy, as a share, that is left as it is.
 const ENOUGH: f64 = 0.03;
@@ -22,8 +24,6 @@ const MOST_FAILURES: usize = 4;
 const LEAST_GAIN: f64 = 0.05;
 /// Passes over the edges each time.
 const PASSES: usize = 20;
-/// Share of an edge's change of length that one pass takes back.
-const STIFFNESS: f64 = 0.5;
 /// Farthest that a vertex is moved each time [m]: no limb is so thin that cloth could get to its other side.
 const FARTHEST: f64 = 0.002;
 /// Rounds in which the contacts are met again.
@@ -33,8 +33,8 @@ const RINGS_HELD: usize = 3;
 
 impl Resolved {
     /// Lowers the strain energy where it has risen from that of `layers`, without any further crossing. What the
-    /// post-process has not moved only moves where contacts ask for it. None where limits are strict (`settings.loosened`).
-    /// `start`: when all of it began.
+    /// post-process has not moved only moves where contacts ask for it. Strict limits (`settings.loosened`) allow none of
+    /// this. `start`: when all of it began.
     pub(super) fn ease(
         &mut self,
         body: &Body<'_>,
@@ -42,13 +42,9 @@ impl Resolved {
         settings: &ResolveSettings,
         start: Instant,
     ) {
-        let energy = |layers: &[Layer<'_>]| -> f64 {
-            layers.iter().map(|l| l.garment.strain_energy(l.positions)).sum()
-        };
-        let before = energy(layers);
-        let mut least = energy(&at(layers, &self.positions));
-        let is_enough = |least: f64| least <= (1.0 + ENOUGH) * before;
-        if is_enough(least) || settings.loosened <= 1.0 {
+        let before: f64 = layers.iter().map(|l| l.garment.strain_energy(l.positions)).sum();
+        let is_enough = |now: &Certificate| now.strain_joule() <= (1.0 + ENOUGH) * before;
+        if settings.loosened <= 1.0 || is_enough(&self.certificate) {
             return;
         }
         let settings = ResolveSettings { is_shallow: true, loosened: 1.0, rounds: ROUNDS, ..*settings };
@@ -56,7 +52,8 @@ impl Resolved {
         let mut failures = 0;
         body.with_least_room(|obstacle| {
             for _ in 0..TIMES {
-                if is_enough(least) || failures == MOST_FAILURES || settings.is_late(start, layers.len()) {
+                let is_late = settings.is_late(start, layers.len());
+                if is_enough(&self.certificate) || failures == MOST_FAILURES || is_late {
                     break;
                 }
                 let found = untangled(obstacle, &at(layers, &cloth.eased(&self.positions)), &settings);
@@ -64,19 +61,19 @@ impl Resolved {
                 let certificate = certified(&body.drawn, layers, &found.positions);
                 self.certificate_time += clock.elapsed();
                 if certificate.is_worse(&self.certificate) {
-                    cloth.hold_back(certificate.remaining_beside(&self.certificate));
+                    cloth.hold_around(certificate.remaining_beside(&self.certificate));
                     failures += 1;
                     continue;
                 }
-                let now = energy(&at(layers, &found.positions));
-                let gain = (least - now) / (least - before);
+                failures = 0;
+                let risen = self.certificate.strain_joule();
+                let gain = (risen - certificate.strain_joule()) / (risen - before);
                 if gain > 0.0 {
-                    (self.positions, self.certificate, least) = (found.positions, certificate, now);
+                    (self.positions, self.certificate) = (found.positions, certificate);
                 }
                 if gain < LEAST_GAIN {
                     break;
                 }
-                failures = 0;
             }
         });
     }
@@ -105,44 +102,34 @@ impl<'a> Cloth<'a> {
         let edges = self.edges();
         for _ in 0..PASSES {
             for &(a, b, length) in &edges {
-                let along = sub(eased[b], eased[a]);
-                let now = norm(along);
-                if now < 1e-12 {
-                    continue;
-                }
-                let moving = [a, b].into_iter().filter(|v| self.may_move[*v]).count() as f64;
-                let by = STIFFNESS * (now - length) / (now * moving);
-                for (v, by) in [(a, by), (b, -by)] {
-                    if self.may_move[v] {
-                        eased[v] = add_scaled(eased[v], by, along);
-                    }
-                }
+                keep_length(&mut eased, a, b, self.may_move[b], length);
             }
         }
         for (p, q) in before.iter().zip(&mut eased) {
-            let moved = sub(*q, *p);
-            let length = norm(moved);
-            if length > self.farthest {
-                *q = add_scaled(*p, self.farthest / length, moved);
-            }
+            *q = no_farther(*p, *q, self.farthest);
         }
         (0..self.outfit.len()).map(|g| self.outfit.part(&eased, g).to_vec()).collect()
     }
 
-    /// Edges of which an end may move: packed vertices and the rest length [m].
+    /// Edges of which an end may move, the first one: packed vertices and the rest length [m].
     fn edges(&self) -> Vec<(usize, usize, f64)> {
         let of_garment = |g: usize| {
             let garment = self.outfit.layers[g].garment;
             let start = self.outfit.vertices(g).start as usize;
             let edges = garment.topology.edges.iter().zip(&garment.edge_lengths);
-            edges.map(move |(&[a, b], length)| (start + a as usize, start + b as usize, *length))
+            edges.map(move |(edge, length)| (edge.map(|v| start + v as usize), *length))
         };
         let all = (0..self.outfit.len()).flat_map(of_garment);
-        all.filter(|&(a, b, _)| self.may_move[a] || self.may_move[b]).collect()
+        all.filter_map(|([a, b], length)| match (self.may_move[a], self.may_move[b]) {
+            (true, _) => Some((a, b, length)),
+            (false, true) => Some((b, a, length)),
+            (false, false) => None,
+        })
+        .collect()
     }
 
     /// Keeps the garments where they are around `crossings`; where that is so already, all move half as far.
-    fn hold_back<'b>(&mut self, crossings: impl Iterator<Item = &'b RemainingPair>) {
+    fn hold_around<'b>(&mut self, crossings: impl Iterator<Item = &'b RemainingPair>) {
         let mut seeds = Vec::new();
         for pair in crossings {
             let mut crossed = |garment: usize, triangle: usize| {
@@ -172,7 +159,7 @@ mod tests {
     use super::*;
     use crate::mesh::shapes::{self, SplitMix};
     use crate::query::Surface;
-    use crate::vec3::{add, scale};
+    use crate::vec3::{add, norm, scale, sub};
 
     const RADIUS: f64 = 0.1;
 
@@ -225,14 +212,19 @@ mod tests {
     #[test]
     fn nothing_is_done_where_strain_has_not_risen() {
         let (body, garment, sheet) = ball_and_sheet();
-        let crumpled = pulled(&sheet, 0.002);
-        let layers = [Layer { garment: &garment, positions: &crumpled }];
-        let mut resolved = Resolved { positions: vec![sheet.clone()], ..Resolved::default() };
-        let ease = |body: &Body<'_>| {
-            resolved.ease(body, &layers, &ResolveSettings::default(), Instant::now());
-        };
-        with_drawn(&body, &layers, |drawn| with_body(drawn, 1, ease));
-        assert_eq!(resolved.positions, [sheet]);
+        let [more, less] = [0.002, 0.001].map(|most| pulled(&sheet, most));
+        let strict = ResolveSettings { loosened: 1.0, ..ResolveSettings::default() };
+        let cases = [(&more, &less, ResolveSettings::default(), false), (&sheet, &less, strict, false)];
+        let risen = (&sheet, &less, ResolveSettings::default(), true);
+        for (before, now, settings, is_eased) in cases.into_iter().chain([risen]) {
+            let layers = [Layer { garment: &garment, positions: before }];
+            let positions = vec![now.clone()];
+            let certificate = certify(&body, &at(&layers, &positions)).unwrap();
+            let mut resolved = Resolved { positions, certificate, ..Resolved::default() };
+            let ease = |body: &Body<'_>| resolved.ease(body, &layers, &settings, Instant::now());
+            with_drawn(&body, &layers, |drawn| with_body(drawn, 1, ease));
+            assert_eq!(resolved.positions[0] != *now, is_eased);
+        }
     }
 
     #[test]
@@ -249,13 +241,13 @@ mod tests {
             other_triangle: 0,
             is_pinched: false,
         };
-        cloth.hold_back(std::iter::once(&pair));
+        cloth.hold_around(std::iter::once(&pair));
         let held = cloth.outfit.neighbourhood(&garment.faces()[7], RINGS_HELD);
         for v in 0..sheet.len() {
             assert_eq!(cloth.may_move[v], !held.contains(&(v as u32)));
         }
         assert_eq!(cloth.farthest, FARTHEST);
-        cloth.hold_back(std::iter::once(&pair));
+        cloth.hold_around(std::iter::once(&pair));
         assert_eq!(cloth.farthest, 0.5 * FARTHEST);
         let eased = cloth.eased(&moved);
         for (p, q) in moved[0].iter().zip(&eased[0]) {

@@ -96,9 +96,16 @@ fn limit_length(
     }
 }
 
+/// `to`, or what is as far as allowed on the way there from `from`.
+pub(super) fn no_farther(from: [f64; 3], to: [f64; 3], farthest: f64) -> [f64; 3] {
+    let moved = sub(to, from);
+    let length = norm(moved);
+    if length > farthest { add_scaled(from, farthest / length, moved) } else { to }
+}
+
 /// Takes back part of the change of an edge's length; `b` may be fixed.
 #[inline]
-fn keep_length(positions: &mut [[f64; 3]], a: usize, b: usize, b_may_move: bool, length: f64) {
+pub(super) fn keep_length(positions: &mut [[f64; 3]], a: usize, b: usize, b_may_move: bool, length: f64) {
     let along = sub(positions[b], positions[a]);
     let now = norm(along);
     if now < 1e-12 {

@@ -3,9 +3,9 @@
 use super::super::contact::{Contact, is_tiny, normal_of, overlap};
 use super::super::folds::folds;
 use super::super::over::{Order, order, part_along};
-use super::super::relax::relax;
+use super::super::relax::{no_farther, relax};
 use super::{Untangling, WATCH};
-use crate::vec3::{add, add_scaled, dot, norm, norm_squared, scale, sub};
+use crate::vec3::{add, add_scaled, dot, norm, scale, sub};
 
 /// No contact asks for a longer step than this in a round [m].
 const LONGEST_STEP: f64 = 0.02;
@@ -66,11 +66,7 @@ impl Untangling<'_> {
     fn hold_back(&mut self, region: &[u32]) {
         for &v in region {
             let v = v as usize;
-            let moved = sub(self.positions[v], self.input[v]);
-            let most = self.farthest;
-            if norm_squared(moved) > most * most {
-                self.positions[v] = add_scaled(self.input[v], most / norm(moved), moved);
-            }
+            self.positions[v] = no_farther(self.input[v], self.positions[v], self.farthest);
         }
     }
 
