@@ -64,7 +64,17 @@ impl Session {
         let model = match &config.init_from {
             None => ClothCombo::new(&config.model, &dimensions(&library), config.seed, &device)
                 .into_diagnostic()?,
-            Some(path) => TrainedModel::open(Path::new(path))?.start_of(&config, &library, &device)?,
+            Some(path) => {
+                let trained = TrainedModel::open(Path::new(path))?;
+                if trained.config.seed == config.seed {
+                    tracing::warn!(
+                        "{path} was trained with seed {}, too: its scenes come again; set another seed (and \
+                         validation.seed to this one, to score the same scenes)",
+                        config.seed
+                    );
+                }
+                trained.start_of(&config, &library, &device)?
+            }
         };
         let average = (config.optimizer.ema_decay > 0.0)
             .then(|| Average::new(model.valid(), config.optimizer.ema_decay));

@@ -4,9 +4,10 @@ use clothcombo_tests::tiny_config;
 use clothcombo_trainer::checkpoint::Checkpoint;
 use clothcombo_trainer::config::Config;
 use clothcombo_trainer::device::Backend;
+use clothcombo_trainer::evaluate::ValidationSet;
 use clothcombo_trainer::event::{Observer, TrainEvent};
 use clothcombo_trainer::run_dir::RunDir;
-use clothcombo_trainer::scene::Library;
+use clothcombo_trainer::scene::{Library, ValidationGroup};
 use clothcombo_trainer::session::Session;
 use clothcombo_trainer::stop::StopFlag;
 use clothcombo_trainer::train_loop::train;
@@ -123,4 +124,20 @@ fn a_run_starts_from_another_ones_parameters() {
 
     let refused = further("third", &["model.width=24"]).err().expect("other sizes do not fit");
     assert!(refused.to_string().contains("init_from"), "{refused}");
+}
+
+#[test]
+fn a_further_run_draws_other_scenes_and_can_be_scored_on_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let first = tiny_config(folder.path(), &[]);
+    let library = Library::load(&first, &|_, _, _| {}).unwrap();
+    let scored = |overrides: &[&str]| {
+        let set = ValidationSet::new(&library, &tiny_config(folder.path(), overrides));
+        [ValidationGroup::Single, ValidationGroup::Layered].map(|group| set.draws(group).to_vec())
+    };
+    let same = format!("validation.seed={}", first.seed);
+    let [other, known] = [scored(&["seed=9"]), scored(&["seed=9", &same])];
+    assert!(known.iter().all(|group| !group.is_empty()));
+    assert_eq!(known, scored(&[]));
+    assert_ne!(known, other);
 }

@@ -49,7 +49,7 @@ pub struct Arguments {
     /// A model trained on a single garment of the data, measured on this garment; repeatable
     #[arg(long, value_name = "NAME=DIR", value_parser = named)]
     specific: Vec<(String, PathBuf)>,
-    /// Seed of the scenes; default: that of the configuration
+    /// Seed of the scenes; default: that of validation in the configuration
     #[arg(long)]
     seed: Option<u64>,
     /// The compute device
@@ -121,7 +121,7 @@ fn check_output(folder: &Path) -> Result<(), Report> {
 }
 
 fn subject(arguments: &Arguments, trained: &TrainedModel, mut config: Config) -> Result<Subject, Report> {
-    config.seed = arguments.seed.unwrap_or(config.seed);
+    config.validation.seed = arguments.seed.or(config.validation.seed);
     let library = Arc::new(load_under_bar(&config)?);
     Subject::new(trained, config, library, &arguments.device.device())
 }
@@ -132,7 +132,7 @@ fn others(arguments: &Arguments, named: &[(String, PathBuf)], first: &Subject) -
         let trained = TrainedModel::open(path)?;
         let mut config = trained.config.clone();
         config.losses = first.config.losses.clone();
-        config.seed = first.config.seed;
+        config.validation.seed = Some(first.config.validation_seed());
         let subject = subject(arguments, &trained, config).wrap_err_with(|| name.clone())?;
         Ok(Other { name: name.clone(), subject })
     };

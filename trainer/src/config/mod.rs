@@ -38,7 +38,8 @@ pub struct Config {
     /// Everything random follows from this number: the same seed gives the same run, bit for bit. At most 2⁶³ − 1.
     pub seed: u64,
     /// Run, checkpoint or model folder whose parameters the networks start with, to train a model further on other data or
-    /// another schedule; absent: random ones. Sizes of the networks, body, joints and pose encoding must be its own.
+    /// another schedule; absent: random ones. Sizes of the networks, body, joints and pose encoding must be its own. Give such
+    /// a run a seed of its own: scenes follow from seed and step, and that of the model would bring its scenes again.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub init_from: Option<String>,
     /// Body, garments and poses.
@@ -72,6 +73,11 @@ impl Config {
     /// Total number of steps.
     pub fn total_steps(&self) -> u64 {
         self.stages.iter().map(|s| s.steps).sum()
+    }
+
+    /// Seed of the scenes that are scored.
+    pub fn validation_seed(&self) -> u64 {
+        self.validation.seed.unwrap_or(self.seed)
     }
 
     /// The most layers any stage or validation scene uses.

@@ -4,10 +4,14 @@ use super::stages::MOST_LAYERS;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Fixed validation scenes, drawn from the seed, of held-out poses and shapes.
+/// Fixed validation scenes of held-out poses and shapes.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ValidationConfig {
+    /// Seed of these scenes, and of those of `clothcombo eval`; absent: that of the run. Set it to compare runs with
+    /// different seeds on the same scenes. At most 2⁶³ − 1.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seed: Option<u64>,
     /// Scenes of one garment. About fifty bring the standard error of a mean loss to a tenth of its spread.
     pub single_scenes: usize,
     /// Scenes of one garment on motion clips never trained on (data.poses.held_out_clips).
@@ -25,6 +29,7 @@ pub struct ValidationConfig {
 impl Default for ValidationConfig {
     fn default() -> Self {
         Self {
+            seed: None,
             single_scenes: 48,
             unseen_scenes: 24,
             unseen_garment_scenes: 24,

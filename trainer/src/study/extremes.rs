@@ -109,7 +109,7 @@ fn measure(
     };
     for index in 0..scenes {
         let at = [question, first + index];
-        let draw = draw_study(&subject.library, subject.config.seed, at, &all, case.layers, Unseen::Poses);
+        let draw = draw_study(&subject.library, subject.config.validation_seed(), at, &all, case.layers, Unseen::Poses);
         let body = &draw.bodies[0];
         let body = BodyDraw {
             shape: body.shape.iter().map(|b| case.shape.unwrap_or(*b)).collect(),

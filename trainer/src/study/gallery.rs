@@ -137,7 +137,7 @@ impl Subject {
 impl Studio<'_> {
     fn body(&self, index: usize) -> BodyDraw {
         let at = [self.question, index];
-        draw_study(&self.subject.library, self.subject.config.seed, at, &[0], 1, Unseen::Poses)
+        draw_study(&self.subject.library, self.subject.config.validation_seed(), at, &[0], 1, Unseen::Poses)
             .bodies
             .remove(0)
     }

@@ -65,7 +65,7 @@ pub fn ask(
     let (mut wrong_single, mut before, mut results) = (Vec::new(), Vec::new(), Vec::new());
     for index in 0..scenes {
         let draw =
-            draw_study(&subject.library, subject.config.seed, [question, index], &all, layers, Unseen::Poses);
+            draw_study(&subject.library, subject.config.validation_seed(), [question, index], &all, layers, Unseen::Poses);
         let scene = subject.prepare(draw)?;
         let drape = networks.drape(&scene)?;
         for (layer, [alone, worn]) in strains(&scene, &drape).into_iter().enumerate() {

@@ -38,7 +38,7 @@ impl Question<'_> {
         };
         let draw = |i: usize| {
             let garment = &self.pool[turn(i)..][..1];
-            draw_study(&subject.library, subject.config.seed, [self.number, i], garment, 1, self.unseen)
+            draw_study(&subject.library, subject.config.validation_seed(), [self.number, i], garment, 1, self.unseen)
         };
         if self.pool.is_empty() { Vec::new() } else { (0..self.scenes).map(draw).collect() }
     }

@@ -245,7 +245,7 @@ pub fn study(
     let pictures = if sizes.gallery { gallery::draw(subject, 9, &done)? } else { Vec::new() };
     Ok(Study {
         sizes,
-        seed: subject.config.seed,
+        seed: subject.config.validation_seed(),
         methods,
         embeddings,
         layers,

@@ -100,7 +100,7 @@ pub fn ask(
     let mut drapes = Vec::with_capacity(scenes);
     for index in 0..scenes {
         let draw =
-            draw_study(&subject.library, subject.config.seed, [question, index], &all, 1, Unseen::Poses);
+            draw_study(&subject.library, subject.config.validation_seed(), [question, index], &all, 1, Unseen::Poses);
         let scene = subject.prepare(draw)?;
         let fast = fast_methods(subject, &scene, settings)?;
         drapes.push((scene, fast));

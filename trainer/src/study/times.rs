@@ -56,7 +56,7 @@ pub fn ask(
     // The first outfit warms up: buffers, threads, files.
     for index in 0..=outfits {
         let at = [question, index];
-        let draw = draw_study(&subject.library, subject.config.seed, at, &all, LAYERS, Unseen::Poses);
+        let draw = draw_study(&subject.library, subject.config.validation_seed(), at, &all, LAYERS, Unseen::Poses);
         let scene = subject.prepare(draw)?;
         let outfit = subject.tensors.outfit(&scene)?;
         let count = scene.worn.len() as f64;

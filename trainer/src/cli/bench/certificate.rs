@@ -127,7 +127,7 @@ fn measure(
     let dressing = Dressing::new(library, &config.losses, networks.as_ref());
     let mut results = Vec::with_capacity(draws.len());
     for draw in draws {
-        let seed = arguments.seed.unwrap_or(config.seed);
+        let seed = arguments.seed.unwrap_or_else(|| config.validation_seed());
         let outfit = match orders.is_empty() {
             true => draw_outfit(library, seed, draw as u64, usize::from(arguments.layers)),
             false => {

@@ -152,7 +152,7 @@ fn scenes(library: &Library, config: &Config, arguments: &Arguments) -> Result<V
     };
     let mut scenes = Vec::new();
     for group in [ValidationGroup::Single, ValidationGroup::Layered] {
-        for draw in draw_validation(library, config.seed, &validation, group) {
+        for draw in draw_validation(library, config.validation_seed(), &validation, group) {
             scenes.push(prepare(library, &config.losses, draw, 1.0)?);
         }
     }
