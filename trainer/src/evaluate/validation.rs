@@ -47,8 +47,9 @@ const CHUNK: usize = 16;
 impl ValidationSet {
     /// Draws the scenes of `config`; losses have their final weights.
     pub fn new(library: &Library, config: &Config) -> Self {
-        let groups = ValidationGroup::ALL
-            .map(|group| (group, draw_validation(library, config.validation_seed(), &config.validation, group)));
+        let groups = ValidationGroup::ALL.map(|group| {
+            (group, draw_validation(library, config.validation_seed(), &config.validation, group))
+        });
         Self {
             groups: groups.into_iter().filter(|(_, scenes)| !scenes.is_empty()).collect(),
             losses: config.losses.clone(),

@@ -5,7 +5,7 @@ use super::table::{Table, number, percent};
 use crate::drape::DrapeError;
 use crate::evaluate::certificates::{Dressing, OutfitResult};
 use crate::evaluate::hard_poses;
-use crate::scene::{BodyDraw, SceneDraw, Unseen, draw_study};
+use crate::scene::{BodyDraw, SceneDraw, Unseen};
 use clothcombo_data::asset::Pose;
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use clothcombo_physics::energy::Term;
@@ -109,7 +109,7 @@ fn measure(
     };
     for index in 0..scenes {
         let at = [question, first + index];
-        let draw = draw_study(&subject.library, subject.config.validation_seed(), at, &all, case.layers, Unseen::Poses);
+        let draw = subject.draw(at, &all, case.layers, Unseen::Poses);
         let body = &draw.bodies[0];
         let body = BodyDraw {
             shape: body.shape.iter().map(|b| case.shape.unwrap_or(*b)).collect(),

@@ -6,7 +6,7 @@ use crate::evaluate::Draped;
 use crate::evaluate::certificates::Dressing;
 use crate::picture::{LegendEntry, Sheet, SheetRow, View, layer_colour};
 use crate::samples::picture_of;
-use crate::scene::{BodyDraw, SceneDraw, Unseen, draw_study};
+use crate::scene::{BodyDraw, SceneDraw, Unseen};
 use clothcombo_data::asset::{Category, Pose};
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use image::RgbImage;
@@ -137,9 +137,7 @@ impl Subject {
 impl Studio<'_> {
     fn body(&self, index: usize) -> BodyDraw {
         let at = [self.question, index];
-        draw_study(&self.subject.library, self.subject.config.validation_seed(), at, &[0], 1, Unseen::Poses)
-            .bodies
-            .remove(0)
+        self.subject.draw(at, &[0], 1, Unseen::Poses).bodies.remove(0)
     }
 
     /// Outfits from left to right; seen from the front, then from the back. Where all of them hold the same garments a colour

@@ -5,7 +5,7 @@ use super::subject::Subject;
 use super::table::{Table, number, percent};
 use crate::drape::NetworkDrape;
 use crate::evaluate::certificates::{Counts, Dressing, OutfitResult};
-use crate::scene::{PreparedScene, Unseen, draw_study};
+use crate::scene::{PreparedScene, Unseen};
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use clothcombo_physics::energy::Term;
 use miette::{IntoDiagnostic, Report};
@@ -64,8 +64,7 @@ pub fn ask(
     let (mut single, mut layered) = (vec![Vec::new(); layers], vec![Vec::new(); layers]);
     let (mut wrong_single, mut before, mut results) = (Vec::new(), Vec::new(), Vec::new());
     for index in 0..scenes {
-        let draw =
-            draw_study(&subject.library, subject.config.validation_seed(), [question, index], &all, layers, Unseen::Poses);
+        let draw = subject.draw([question, index], &all, layers, Unseen::Poses);
         let scene = subject.prepare(draw)?;
         let drape = networks.drape(&scene)?;
         for (layer, [alone, worn]) in strains(&scene, &drape).into_iter().enumerate() {

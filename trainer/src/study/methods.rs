@@ -4,7 +4,7 @@ use super::estimate::{Estimate, Ratio};
 use super::subject::{Measured, Subject};
 use super::table::{Table, number, percent};
 use crate::drape::DrapeError;
-use crate::scene::{SceneDraw, Unseen, draw_study};
+use crate::scene::{SceneDraw, Unseen};
 use clothcombo_data::asset::Category;
 use clothcombo_physics::energy::Term;
 use serde::Serialize;
@@ -38,7 +38,7 @@ impl Question<'_> {
         };
         let draw = |i: usize| {
             let garment = &self.pool[turn(i)..][..1];
-            draw_study(&subject.library, subject.config.validation_seed(), [self.number, i], garment, 1, self.unseen)
+            subject.draw([self.number, i], garment, 1, self.unseen)
         };
         if self.pool.is_empty() { Vec::new() } else { (0..self.scenes).map(draw).collect() }
     }

@@ -8,7 +8,7 @@ use crate::evaluate::certificates::Dressing;
 use crate::evaluate::equilibrium_error::{ReferenceScene, mean_distance};
 use crate::measure::median_ms;
 use crate::picture::{Line, LinePanel};
-use crate::scene::{PreparedScene, Unseen, draw_study};
+use crate::scene::{PreparedScene, Unseen};
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use clothcombo_physics::energy::Term;
 use clothcombo_physics::equilibrium::{Problem, SolverSettings, solve};
@@ -99,8 +99,7 @@ pub fn ask(
     let all: Vec<usize> = (0..subject.library.wardrobe.len()).collect();
     let mut drapes = Vec::with_capacity(scenes);
     for index in 0..scenes {
-        let draw =
-            draw_study(&subject.library, subject.config.validation_seed(), [question, index], &all, 1, Unseen::Poses);
+        let draw = subject.draw([question, index], &all, 1, Unseen::Poses);
         let scene = subject.prepare(draw)?;
         let fast = fast_methods(subject, &scene, settings)?;
         drapes.push((scene, fast));

@@ -4,7 +4,7 @@ use crate::checkpoint::TrainedModel;
 use crate::config::Config;
 use crate::drape::{DrapeError, Networks, WardrobeTensors};
 use crate::evaluate::{Draped, SceneScore, score_scene};
-use crate::scene::{Library, PreparedScene, SceneDraw, prepare};
+use crate::scene::{Library, PreparedScene, SceneDraw, Unseen, draw_study, prepare};
 use burn::tensor::Device;
 use clothcombo_model::ClothCombo;
 use clothcombo_physics::contact::{Intersections, TriangleTree};
@@ -44,6 +44,11 @@ impl Subject {
     /// The networks ready to drape.
     pub fn networks(&self) -> Networks<'_> {
         Networks::new(self.model.clone(), &self.tensors)
+    }
+
+    /// Scene `index` of question number `question` (`at`), drawn as [`draw_study`] says.
+    pub fn draw(&self, at: [usize; 2], pool: &[usize], layers: usize, unseen: Unseen) -> SceneDraw {
+        draw_study(&self.library, self.config.validation_seed(), at, pool, layers, unseen)
     }
 
     /// Prepares a scene, losses with the weights they end with.

@@ -4,7 +4,7 @@ use super::methods::MethodResult;
 use super::subject::{Measured, Subject};
 use super::table::{Table, number, percent};
 use crate::drape::DrapeError;
-use crate::scene::{Unseen, draw_study};
+use crate::scene::Unseen;
 use clothcombo_physics::energy::Term;
 use serde::Serialize;
 
@@ -50,7 +50,7 @@ pub fn ask(
     let draw = |index: usize| {
         let layers = low + index % (high - low + 1);
         let at = [question.number, index];
-        draw_study(&subject.library, subject.config.validation_seed(), at, &pool, layers, Unseen::Poses)
+        subject.draw(at, &pool, layers, Unseen::Poses)
     };
     let draws: Vec<_> = if pool.is_empty() { Vec::new() } else { (0..question.scenes).map(draw).collect() };
     let networks = subject.networks();

@@ -71,7 +71,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let trained = arguments.checkpoint.as_deref().map(TrainedModel::open).transpose()?;
     let config = configuration(arguments, trained.as_ref())?;
     let library = Arc::new(load_under_bar(&config)?);
-    let scenes = draw_scenes(&library, &config, arguments.scenes, arguments.seed.unwrap_or_else(|| config.validation_seed()))?;
+    let seed = arguments.seed.unwrap_or_else(|| config.validation_seed());
+    let scenes = draw_scenes(&library, &config, arguments.scenes, seed)?;
     let networks = match &trained {
         Some(trained) => drape(trained, &library, &scenes)?.into_iter().map(Some).collect(),
         None => vec![None; scenes.len()],
