@@ -113,21 +113,30 @@ impl WardrobeTensors {
         outfit: &OutfitTensors,
         known: &KnownEmbeddings,
     ) -> Result<Embeddings, DrapeError> {
+        Ok(model.pack(outfit, &self.encode(model, scene, known)?)?)
+    }
+
+    /// The embeddings of the garments of `scene`, from `known` or made now and kept there.
+    ///
+    /// # Errors
+    /// When a garment cannot be read.
+    pub fn encode(
+        &self,
+        model: &ClothCombo,
+        scene: &PreparedScene,
+        known: &KnownEmbeddings,
+    ) -> Result<Vec<GarmentEmbedding>, DrapeError> {
         let recent = || known.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut packed = Vec::with_capacity(scene.worn.len());
-        for (&g, worn) in scene.draw.garments.iter().zip(&scene.worn) {
+        let encoded = |(&g, worn): (&usize, &Arc<LibraryGarment>)| {
             let kept = recent().get(g);
-            let embedding = match kept {
-                Some(embedding) => embedding,
-                None => {
-                    let embedding = model.encode(&self.garment(g, worn)?);
-                    recent().insert(g, embedding.clone(), embedding.bytes());
-                    embedding
-                }
-            };
-            packed.push(embedding);
-        }
-        Ok(model.pack(outfit, &packed)?)
+            if let Some(embedding) = kept {
+                return Ok(embedding);
+            }
+            let embedding = model.encode(&self.garment(g, worn)?);
+            recent().insert(g, embedding.clone(), embedding.bytes());
+            Ok(embedding)
+        };
+        scene.draw.garments.iter().zip(&scene.worn).map(encoded).collect()
     }
 }
 

@@ -29,7 +29,7 @@ use std::sync::Arc;
 use thiserror::Error;
 
 /// Version of the file; others are refused.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
 /// Why an incident cannot be written, read or replayed.
 #[derive(Debug, Error, Diagnostic)]
@@ -106,6 +106,8 @@ pub struct IncidentScene {
     pub garments: Vec<IncidentGarment>,
     /// Bodies the garments were draped on.
     pub bodies: Vec<IncidentBody>,
+    /// Number of the random sample of pairs that the repulsion looked at.
+    pub repulsion_sample: u32,
 }
 
 /// A garment, found again by its place and name.
@@ -321,7 +323,11 @@ fn describe(library: &Library, scenes: &[PreparedScene], outcome: &StepOutcome) 
                 }
             },
         );
-        IncidentScene { garments: garments.collect(), bodies: bodies.collect() }
+        IncidentScene {
+            garments: garments.collect(),
+            bodies: bodies.collect(),
+            repulsion_sample: scene.draw.repulsion_sample,
+        }
     };
     scenes.iter().zip(&outcome.scenes).map(of_scene).collect()
 }
@@ -356,6 +362,7 @@ impl IncidentScene {
         Ok(SceneDraw {
             garments: garments.collect::<Result<_, _>>()?,
             bodies: bodies.collect::<Result<_, _>>()?,
+            repulsion_sample: self.repulsion_sample,
         })
     }
 }

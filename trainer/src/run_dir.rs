@@ -290,7 +290,7 @@ fn is_known(key: &str, configs: &[&Config]) -> bool {
 }
 
 /// Keys whose values differ, as dotted paths. What only concerns output may change between sessions.
-fn differing_keys(a: &Config, b: &Config) -> Vec<String> {
+pub(crate) fn differing_keys(a: &Config, b: &Config) -> Vec<String> {
     fn walk(path: &str, a: Option<&toml::Value>, b: Option<&toml::Value>, out: &mut Vec<String>) {
         match (a, b) {
             (Some(toml::Value::Table(a)), Some(toml::Value::Table(b))) => {

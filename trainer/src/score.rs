@@ -10,8 +10,8 @@ mod files;
 mod tests;
 
 pub use error::{MeshSize, ScoreError};
-pub(crate) use files::load_garment;
 pub use files::{MeshFiles, score_files};
+pub(crate) use files::{load_body, load_garment};
 
 use crate::config::LossesConfig;
 use crate::objective::scene_weights;

@@ -10,9 +10,9 @@ use crate::guard::{Guard, Verdict};
 use crate::incident::{Circumstances, Incident, spoil_position};
 use crate::learner::{Computed, Learner, StepOutcome, new_optimizer};
 use crate::memory::{MemoryEstimate, estimate};
-use crate::run_dir::RunDir;
+use crate::run_dir::{RunDir, differing_keys};
 use crate::samples;
-use crate::scene::{Library, PreparedScene, prepare_step};
+use crate::scene::{Library, PreparedScene, is_fingerprint, prepare_step};
 use crate::schedule::{Schedule, ScheduleAt};
 use crate::step_summary::StepSummary;
 use crate::stop::StopFlag;
@@ -98,7 +98,8 @@ impl Session {
         let expected = state(&library, 0);
         let found = &checkpoint.state;
         let dimensions = |s: &CheckpointState| (s.joints.clone(), s.shape_count, s.pose_features);
-        let same_data = found.data.is_none() || found.data == expected.data;
+        let same_data =
+            found.data == expected.data || !found.data.as_ref().is_some_and(|d| is_fingerprint(d));
         if dimensions(found) != dimensions(&expected) || !same_data {
             return Err(miette!(
                 help = "the body, garments or motions have changed since the run was started; restore them, or start a new run",
@@ -116,7 +117,13 @@ impl Session {
         };
         let optimizer = checkpoint.optimizer(new_optimizer(&config.optimizer))?;
         let learner = Learner::new(model, optimizer, &config.optimizer);
-        Ok(Self::assemble(run, config, library, &device, learner, average, found))
+        // A score of other losses or scenes cannot be beaten by one of these.
+        let scores = ["losses", "validation", "data", "seed"];
+        let changed = differing_keys(&checkpoint.config()?, &config);
+        let is_comparable = !changed.iter().any(|key| scores.iter().any(|part| key.starts_with(part)));
+        let best = found.best.filter(|_| is_comparable);
+        let found = CheckpointState { best, ..found.clone() };
+        Ok(Self::assemble(run, config, library, &device, learner, average, &found))
     }
 
     fn assemble(

@@ -12,7 +12,8 @@ use std::time::Instant;
 /// Steps whose scenes are prepared in advance.
 pub(crate) const SCENES_AHEAD: usize = 4;
 
-/// Trains from the session's step to the end of the schedule, or until `stop` is requested of any process of the run.
+/// Trains from the session's step to the end of the schedule, or until `stop` is requested of any process of the run. When
+/// something fails that the networks are not to blame for, what was trained since the last checkpoint is saved.
 ///
 /// # Errors
 /// When something cannot be written, or the numbers stop being finite.
@@ -20,6 +21,25 @@ pub fn train(
     session: &mut Session,
     observers: &mut [Box<dyn Observer>],
     stop: &StopFlag,
+) -> Result<(), Report> {
+    let mut kept = session.step();
+    let result = run(session, observers, stop, &mut kept);
+    if result.is_err() && session.leads() && session.step() > kept {
+        let step = session.step();
+        match session.save() {
+            Ok(path) => tracing::warn!("step {step} is saved as {}: continue with --resume", path.display()),
+            Err(error) => tracing::warn!("step {step} could not be saved: {error}"),
+        }
+    }
+    result
+}
+
+/// The loop. `kept`: the last step that needs not be saved any more.
+fn run(
+    session: &mut Session,
+    observers: &mut [Box<dyn Observer>],
+    stop: &StopFlag,
+    kept: &mut u64,
 ) -> Result<(), Report> {
     let mut tell = |event: &TrainEvent| observers.iter_mut().try_for_each(|o| o.observe(event));
     let schedule = session.schedule().clone();
@@ -59,6 +79,7 @@ pub fn train(
             Verdict::Skipped { count, is_over } => {
                 tell(&TrainEvent::Skipped { step: done, count, file: report.incident.as_deref() })?;
                 if is_over {
+                    *kept = done;
                     tell(&TrainEvent::GaveUp { step: done })?;
                     return Err(session.gave_up(count));
                 }
@@ -80,6 +101,8 @@ pub fn train(
             }
             if at.last_of_stage || due(output.checkpoint_every) || is_best || stopping {
                 tell(&TrainEvent::CheckpointDue { step: done })?;
+                // A save that failed would fail again.
+                *kept = done;
                 tell(&TrainEvent::CheckpointSaved { step: done, path: &session.save()? })?;
             }
         }

@@ -19,7 +19,7 @@ use crate::format::mesh::{MeshFileError, is_mesh_path, load_tri_mesh};
 use crate::format::obj::{self, ObjError};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::collections::HashSet;
+use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -49,7 +49,7 @@ pub enum GarmentFolderError {
     /// A manifest entry is wrong.
     #[error("{}: garment {entry} ('{file}'): {message}", path.display())]
     Entry {
-        /// The manifest.
+        /// The manifest, or the folder without one.
         path: PathBuf,
         /// Number of the entry, from 1.
         entry: usize,
@@ -160,11 +160,12 @@ pub fn load_garment_folder(folder: &Path, body: &Body) -> Result<Vec<FolderGarme
 pub fn list_garment_folder(folder: &Path) -> Result<Vec<ListedGarment>, GarmentFolderError> {
     let manifest_path = folder.join(MANIFEST);
     let entries = read_entries(folder)?;
-    let mut names = HashSet::new();
+    let place = if manifest_path.is_file() { manifest_path } else { folder.to_owned() };
+    let mut names: HashMap<String, String> = HashMap::new();
     let mut garments = Vec::with_capacity(entries.len());
     for (number, entry) in entries.into_iter().enumerate() {
         let wrong = |message: String| GarmentFolderError::Entry {
-            path: manifest_path.clone(),
+            path: place.clone(),
             entry: number + 1,
             file: entry.file.clone(),
             message,
@@ -180,8 +181,10 @@ pub fn list_garment_folder(folder: &Path) -> Result<Vec<ListedGarment>, GarmentF
         }
         let stem = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
         let name = entry.name.clone().unwrap_or(stem);
-        if !names.insert(name.clone()) {
-            return Err(wrong(format!("the name '{name}' is used twice")));
+        if let Some(other) = names.insert(name.clone(), entry.file.clone()) {
+            return Err(wrong(format!(
+                "it has the name '{name}' of '{other}'; rename one, or give it another `name` in {MANIFEST}"
+            )));
         }
         garments.push(ListedGarment {
             path,
@@ -378,7 +381,7 @@ mod tests {
             (format!("{entry}colour = \"red\"\n"), ["garments.toml", "line 3", "`colour`"]),
             (format!("{entry}category = \"socks\"\n"), ["garments.toml", "line 3", "open_shirt"]),
             ("[[garment]]\nfile = \"none.obj\"\n".into(), ["garments.toml", "none.obj", "garment 1"]),
-            (format!("{entry}{entry}"), ["garment 2", "'a'", "twice"]),
+            (format!("{entry}{entry}"), ["garment 2", "'a'", "of 'a.obj'"]),
             (format!("{entry}layer = [3, 1]\n"), ["garment 1", "[3, 1]", "lowest"]),
             (String::new(), ["no garments", "OBJ", "garments.toml"]),
         ] {
@@ -389,6 +392,9 @@ mod tests {
         let folder = folder_with(&[("a.obj", "v 0 0 0\nv 1 0 0\nv 0 nan 0\nf 1 2 3\n")]);
         let message = load_garment_folder(folder.path(), &body).unwrap_err().to_string();
         assert!(message.contains("a.obj:3:"), "{message}");
+        let folder = folder_with(&[("tee.obj", TRIANGLE), ("tee.ply", PLY)]);
+        let message = load_garment_folder(folder.path(), &body).unwrap_err().to_string();
+        assert!(["'tee.obj'", "'tee.ply'"].iter().all(|file| message.contains(file)), "{message}");
         let empty = folder_with(&[]);
         assert!(matches!(load_garment_folder(empty.path(), &body), Err(GarmentFolderError::Empty { .. })));
         let missing = load_garment_folder(&empty.path().join("x"), &body).unwrap_err();

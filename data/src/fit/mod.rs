@@ -33,6 +33,10 @@ use thiserror::Error;
 /// Most vertices a garment may have after welding.
 pub const MAX_VERTICES: usize = 1_000_000;
 
+/// What is left longer than this many times its length by the push out of the body is stretched.
+const MOST_STRETCH: f64 = 1.5;
+/// Share of its edges from which a stretched garment does not fit.
+const MOST_STRETCHED: f64 = 0.1;
 /// Fewest triangles that can be a garment.
 pub const MIN_TRIANGLES: usize = 20;
 
@@ -110,6 +114,15 @@ pub enum FitError {
         /// How it sits.
         sitting: Sitting,
     },
+    /// Too small, or no garment in this placement.
+    #[error(
+        "does not fit this body: {:.0} % of its edges would be longer than {MOST_STRETCH} times their length once it is outside of \
+         the body", 100.0 * share
+    )]
+    Stretched {
+        /// Share of the edges.
+        share: f64,
+    },
     /// No mesh after the repairs.
     #[error("no mesh is left: {0}")]
     Mesh(String),
@@ -172,6 +185,10 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
     let before = contact(&positions, &rest_surface);
     let unpushed = positions.clone();
     push_out(&mut positions, &sheet.faces, &rest_surface, CLEARANCE);
+    let share = stretched(&topology, &unpushed, &positions);
+    if share > MOST_STRETCHED {
+        return Err(FitError::Stretched { share });
+    }
     let after = contact(&positions, &rest_surface);
     let moves: Vec<f64> = positions.iter().zip(&unpushed).map(|(a, b)| norm(sub(*a, *b))).collect();
     let pushed = (0..moves.len()).filter(|v| moves[*v] > 0.0).map(|v| sheet.vertex_origin[v]).collect();
@@ -324,6 +341,15 @@ fn turn_outward(
     }
     let turned = (0..sheet.faces.len()).filter(|f| sheet.turned[*f]).map(|f| sheet.face_origin[f]).collect();
     sheet.note(RepairKind::TurnedFaces, Elements::Faces(turned));
+}
+
+/// Share of the edges that became longer than [`MOST_STRETCH`] times what they were.
+fn stretched(topology: &Topology, before: &[[f64; 3]], after: &[[f64; 3]]) -> f64 {
+    let is_long = |edge: &&[u32; 2]| {
+        let [now, rest] = [after, before].map(|p| norm(sub(p[edge[1] as usize], p[edge[0] as usize])));
+        now > MOST_STRETCH * rest
+    };
+    topology.edges.iter().filter(is_long).count() as f64 / topology.edges.len().max(1) as f64
 }
 
 fn refuse_other_things(positions: &[[f64; 3]], body: &Body, sitting: &Sitting) -> Result<(), FitError> {

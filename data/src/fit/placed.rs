@@ -1,13 +1,13 @@
 //! Does a garment already lie on a body, in metres and T-pose, so that nothing has to be found out?
 
-use super::FitSettings;
 use super::search::{Samples, Search};
+use super::{FitSettings, outwardness};
 use crate::asset::Body;
-use clothcombo_physics::TriMesh;
+use clothcombo_physics::{Surface, Topology, TriMesh};
 
 /// Whether `mesh`, taken as it stands (metres, y up, pelvis at the origin, arms level), sits on the zero body of `body` as a
-/// garment does: most of it close to the surface or all the way round it, little of it inside. It is the same judgement by
-/// which [`fit`](super::fit) takes a placement.
+/// garment does: most of it close to the surface or all the way round it, little of it inside, by the same judgement by which
+/// [`fit`](super::fit) takes a placement; and every piece of it with its faces outwards.
 pub fn is_on_body(mesh: &TriMesh, body: &Body) -> bool {
     if mesh.face_count() < super::MIN_TRIANGLES {
         return false;
@@ -15,7 +15,18 @@ pub fn is_on_body(mesh: &TriMesh, body: &Body) -> bool {
     let settings = FitSettings { arms_lowered: Some(false), ..FitSettings::default() };
     let search = Search::new(body, &settings);
     let samples = Samples::new(mesh.positions(), mesh.faces(), 600);
-    search.sits_well(&samples)
+    search.sits_well(&samples) && faces_outwards(mesh, body)
+}
+
+/// Whether the area of every piece faces away from the body more than towards it.
+fn faces_outwards(mesh: &TriMesh, body: &Body) -> bool {
+    let topology = Topology::new(mesh);
+    let mut outward = vec![0.0; topology.component_count];
+    let cosines = outwardness(mesh.positions(), mesh.faces(), &Surface::from_mesh(&body.zero_body()));
+    for (face, (cosine, area)) in mesh.faces().iter().zip(cosines) {
+        outward[topology.component_of_vertex[face[0] as usize] as usize] += cosine * area;
+    }
+    outward.into_iter().all(|sum| sum >= 0.0)
 }
 
 #[cfg(test)]
@@ -37,6 +48,9 @@ mod tests {
             assert!(!is_on_body(&changed(|p| p.map(|x| 100.0 * x)), &body), "{category} in centimetres");
             assert!(!is_on_body(&changed(|[x, y, z]| [x, -z, y]), &body), "{category} with z up");
             assert!(!is_on_body(&changed(|[x, y, z]| [x + 0.6, y, z]), &body), "{category} beside the body");
+            let turned = rest.faces().iter().map(|&[a, b, c]| [a, c, b]).collect();
+            let turned = TriMesh::new(rest.positions().to_vec(), turned).unwrap();
+            assert!(!is_on_body(&turned, &body), "{category} inside out");
         }
     }
 }

@@ -30,9 +30,6 @@ use crate::vec3::{axpy, sub, zero};
 
 pub use super::pair_kernel::CONTACT_DISTANCE;
 
-/// Seed of the random subset; fixed, so that the energy is a function of positions alone.
-const SUBSET_SEED: u64 = 0x5eed_0fc1_07c0_4b05;
-
 /// The repulsion energy of one garment.
 #[derive(Debug, Clone)]
 pub struct Repulsion {
@@ -42,14 +39,19 @@ pub struct Repulsion {
     /// Factor on the sum over unordered pairs.
     factor: f64,
     pairs: Pairs,
+    /// Per vertex those that do not count: itself and its neighbours.
+    excluded: Rows,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 enum Pairs {
-    /// All close pairs; per vertex those that do not count: itself and its neighbours.
-    All { excluded: Rows },
-    /// A fixed random sample; per vertex its partners, whichever of the two drew the other. A pair drawn twice counts twice.
-    Subset { partners: Rows },
+    /// All close pairs.
+    All,
+    /// A random sample of all pairs, see [`Sample`].
+    Sampled {
+        /// Half the number of partners of every vertex.
+        reach: usize,
+    },
 }
 
 /// Compressed rows of vertex indices.
@@ -78,24 +80,21 @@ impl Rows {
 
 impl Repulsion {
     /// Prepares the energy of a garment. `radius` [m]; `normalised`: divide by the number of vertices; `subset`: this many
-    /// random partners per vertex instead of all pairs, an unbiased estimate of their sum.
+    /// random pairs per vertex instead of all, an estimate of their sum that is unbiased over the samples.
     pub fn new(topology: &Topology, radius: f64, normalised: bool, subset: Option<usize>) -> Self {
         let count = topology.vertex_count();
         let mut factor = if normalised { 1.0 / count.max(1) as f64 } else { 1.0 };
         let pairs = match subset {
-            // As many partners as there are others: nothing is saved.
-            Some(size) if size + 1 < count => {
-                // Each of the N−1 ordered partners of a vertex is drawn `size/(N−1)` times on average, and each unordered
-                // pair can be drawn from both ends.
-                factor *= (count - 1) as f64 / (2 * size) as f64;
-                Pairs::Subset { partners: draw_partners(topology, size) }
+            // Otherwise every vertex would meet every other one: nothing is saved.
+            Some(reach) if 2 * reach + 1 < count => {
+                // Of the N−1 others a vertex meets `2·reach`.
+                factor *= (count - 1) as f64 / (2 * reach) as f64;
+                Pairs::Sampled { reach }
             }
-            _ => {
-                let excluded = Rows::from_fn(count, |v| topology.ring(v).iter().copied().chain([v as u32]));
-                Pairs::All { excluded }
-            }
+            _ => Pairs::All,
         };
-        Self { radius, unit: 1.0, factor, pairs }
+        let excluded = Rows::from_fn(count, |v| topology.ring(v).iter().copied().chain([v as u32]));
+        Self { radius, unit: 1.0, factor, pairs, excluded }
     }
 
     /// The same forces from an energy without the jump at the radius: `−log d²/r²` for pairs inside.
@@ -104,13 +103,20 @@ impl Repulsion {
         self
     }
 
-    /// Energy at `positions` `[V, 3]` [m]; adds its weighted gradient to `target`. A vertex that is not finite repels
-    /// nothing.
-    pub fn evaluate<T: Real>(&self, positions: &[[T; 3]], target: Option<Weighted<'_, T>>) -> f64 {
+    /// Energy at `positions` `[V, 3]` [m], of subsets that of sample number `sample`; adds its weighted gradient to `target`.
+    /// A vertex that is not finite repels nothing.
+    pub fn evaluate<T: Real>(
+        &self,
+        positions: &[[T; 3]],
+        sample: u32,
+        target: Option<Weighted<'_, T>>,
+    ) -> f64 {
         let kernel = Kernel::<T>::new(self.radius, self.unit);
-        let (twice, responses) = match &self.pairs {
-            Pairs::All { excluded } => all_pairs(positions, excluded, kernel),
-            Pairs::Subset { partners } => sampled_pairs(positions, partners, kernel),
+        let (twice, responses) = match self.pairs {
+            Pairs::All => all_pairs(positions, &self.excluded, kernel),
+            Pairs::Sampled { reach } => {
+                sampled_pairs(positions, &self.excluded, &Sample::new(sample, positions.len(), reach), kernel)
+            }
         };
         if let Some(target) = target {
             let weight = T::from_f64(target.weight * self.factor);
@@ -125,29 +131,39 @@ impl Repulsion {
 
 impl<T: Real> GarmentTerm<T> for Repulsion {
     fn evaluate(&self, state: &GarmentState<'_, T>, target: Option<Weighted<'_, T>>) -> f64 {
-        self.evaluate(state.posed, target)
+        self.evaluate(state.posed, state.settings.repulsion_sample, target)
     }
 }
 
-fn draw_partners(topology: &Topology, size: usize) -> Rows {
-    let count = topology.vertex_count();
-    let mut random = SplitMix::new(SUBSET_SEED);
-    let mut lists: Vec<Vec<u32>> = vec![Vec::with_capacity(2 * size); count];
-    for v in 0..count {
-        for _ in 0..size {
-            // Uniform over the others: multiply-shift keeps the bias below 2⁻³².
-            let draw = ((u128::from(random.next_u64()) * (count - 1) as u128) >> 64) as usize;
-            let partner = if draw < v { draw } else { draw + 1 };
-            if !topology.are_adjacent(v as u32, partner as u32) {
-                lists[v].push(partner as u32);
-                lists[partner].push(v as u32);
-            }
+/// A random sample of pairs: all vertices on a circle in random order, each with the nearest ones on both sides. Every vertex
+/// meets equally many, no pair comes twice, and over the samples each pair is as likely as any other.
+struct Sample {
+    circle: Vec<u32>,
+    place: Vec<u32>,
+    reach: usize,
+}
+
+impl Sample {
+    fn new(number: u32, count: usize, reach: usize) -> Self {
+        let mut random = SplitMix::new(u64::from(number));
+        let mut circle: Vec<u32> = (0..count as u32).collect();
+        for last in (1..count).rev() {
+            // Uniform over the places up to `last`: multiply-shift keeps the bias below 2⁻³².
+            let other = ((u128::from(random.next_u64()) * (last + 1) as u128) >> 64) as usize;
+            circle.swap(last, other);
         }
+        let mut place = vec![0; count];
+        for (i, &v) in circle.iter().enumerate() {
+            place[v as usize] = i as u32;
+        }
+        Self { circle, place, reach }
     }
-    for list in &mut lists {
-        list.sort_unstable();
+
+    fn partners(&self, v: usize) -> impl Iterator<Item = u32> {
+        let (count, place) = (self.circle.len(), self.place[v] as usize);
+        let both = (1..=self.reach).flat_map(move |k| [place + k, place + count - k]);
+        both.map(move |at| self.circle[at % count])
     }
-    Rows::from_fn(count, |v| lists[v].to_vec())
 }
 
 /// Twice the sum over close pairs and, per vertex, its derivative.
@@ -179,17 +195,41 @@ fn all_pairs<T: Real>(positions: &[[T; 3]], excluded: &Rows, kernel: Kernel<T>) 
     (twice, grid.order.iter().copied().zip(responses.map(|(_, pull)| *pull)).collect())
 }
 
-/// The same over the drawn pairs.
+/// The same over the pairs of `sample`.
 fn sampled_pairs<T: Real>(
     positions: &[[T; 3]],
-    partners: &Rows,
+    excluded: &Rows,
+    sample: &Sample,
     kernel: Kernel<T>,
 ) -> (f64, Vec<(u32, [T; 3])>) {
-    let responses: Vec<VertexResponse<T>> = (0..positions.len())
-        .into_par_iter()
-        .with_min_len(GRAIN / 8)
-        .map(|v| kernel.few(positions[v], partners.row(v).iter().map(|&partner| positions[partner as usize])))
-        .collect();
+    let response = |v: usize| {
+        let counts = |partner: &u32| !excluded.row(v).contains(partner);
+        kernel.few(positions[v], sample.partners(v).filter(counts).map(|partner| positions[partner as usize]))
+    };
+    let responses: Vec<VertexResponse<T>> =
+        (0..positions.len()).into_par_iter().with_min_len(GRAIN / 8).map(response).collect();
     let twice = responses.iter().map(|(energy, _)| energy).sum();
     (twice, responses.into_iter().enumerate().map(|(v, (_, pull))| (v as u32, pull)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn in_a_sample_every_vertex_meets_equally_many_and_each_of_them_once() {
+        for (count, reach) in [(9, 4), (10, 4), (57, 8)] {
+            let sample = Sample::new(3, count, reach);
+            for v in 0..count {
+                let mut partners: Vec<u32> = sample.partners(v).collect();
+                for &partner in &partners {
+                    assert!(partner != v as u32 && sample.partners(partner as usize).any(|p| p == v as u32));
+                }
+                partners.sort_unstable();
+                partners.dedup();
+                assert_eq!(partners.len(), 2 * reach);
+            }
+        }
+        assert!(Sample::new(3, 57, 8).circle != Sample::new(4, 57, 8).circle);
+    }
 }

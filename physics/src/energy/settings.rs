@@ -36,9 +36,12 @@ pub struct EnergySettings {
     pub repulsion_radius: f64,
     /// Whether the repulsion is divided by the number of vertices, which the paper's magnitudes need; off: as printed.
     pub repulsion_normalised: bool,
-    /// Random partners per vertex instead of all close pairs: an unbiased estimate of the same sum over a subset that is
-    /// drawn once, from a fixed seed. `None` (default): all pairs.
+    /// Random pairs per vertex instead of all close ones: an estimate of the same sum that is unbiased over the samples. `None`
+    /// (default): all pairs.
     pub repulsion_subset: Option<usize>,
+    /// Number of the sample that the subset is. Where it stays the same (default: 0), the energy is a function of positions
+    /// alone. May differ from scene to scene of a garment.
+    pub repulsion_sample: u32,
     /// The same repulsion forces from an energy without the printed form's jump at the radius: what a solver with a line
     /// search needs. Off (default): as printed.
     pub repulsion_continuous: bool,
@@ -62,6 +65,7 @@ impl Default for EnergySettings {
             repulsion_radius: 0.1,
             repulsion_normalised: true,
             repulsion_subset: None,
+            repulsion_sample: 0,
             repulsion_continuous: false,
             gravity_acceleration: 9.81,
             layer_gate: Some(LayerGate::default()),

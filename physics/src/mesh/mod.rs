@@ -6,9 +6,11 @@ pub mod shapes;
 mod stretch;
 mod topology;
 mod tri_mesh;
+mod volume;
 
 pub(crate) use faces_at_vertex::FacesAtVertex;
 pub use normals::{face_normal_area, vertex_normals};
 pub use stretch::vertex_stretch;
 pub use topology::{Hinge, Topology};
 pub use tri_mesh::{MeshError, TriMesh};
+pub use volume::{is_closed, signed_volume};

@@ -28,6 +28,18 @@ impl Observer for StopAfter {
     }
 }
 
+/// Cannot write what it is told at step `.0`.
+struct FailsAt(u64);
+
+impl Observer for FailsAt {
+    fn observe(&mut self, event: &TrainEvent) -> Result<(), miette::Report> {
+        match event {
+            TrainEvent::Step(record) if record.step == self.0 => Err(miette::miette!("the disk is full")),
+            _ => Ok(()),
+        }
+    }
+}
+
 fn run(config: &Config, library: &Arc<Library>, folder: &Path, resume: bool, stop_after: Option<u64>) {
     let device = Backend::preferred().device();
     let mut session = if resume {
@@ -140,4 +152,21 @@ fn a_further_run_draws_other_scenes_and_can_be_scored_on_the_same() {
     assert!(known.iter().all(|group| !group.is_empty()));
     assert_eq!(known, scored(&[]));
     assert_ne!(known, other);
+}
+
+#[test]
+fn what_was_trained_is_kept_when_something_beside_it_fails() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = tiny_config(folder.path(), &[]);
+    let library = Arc::new(Library::load(&config, &|_, _, _| {}).unwrap());
+    let place = folder.path().join("run");
+    let run = RunDir::create(&place, &config).unwrap();
+    let device = Backend::preferred().device();
+    let mut session = Session::new(run, config.clone(), library.clone(), &device).unwrap();
+    let mut observers: Vec<Box<dyn Observer>> = vec![Box::new(FailsAt(7))];
+    let error = train(&mut session, &mut observers, &StopFlag::default()).unwrap_err();
+    assert!(error.to_string().contains("disk is full"), "{error}");
+    let kept = Checkpoint::open(&place).unwrap();
+    assert_eq!(kept.state.step, 7);
+    assert_eq!(Session::resume(RunDir::follow(&place), config, library, &device, &kept).unwrap().step(), 7);
 }

@@ -92,7 +92,7 @@ impl Checkpoint {
         File::open(&folder).and_then(|d| d.sync_all()).map_err(io_failed)?;
         atomic::write(&folder.join("latest"), name.as_bytes()).map_err(io_failed)?;
         let best = state.best.map(|b| b.step);
-        if best == Some(state.step) {
+        if config.output.keep_best && best == Some(state.step) {
             atomic::write(&folder.join("best"), name.as_bytes()).map_err(io_failed)?;
         }
         retention::prune(&folder, &config.output, state.step, best).map_err(io_failed)?;

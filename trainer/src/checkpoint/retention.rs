@@ -4,6 +4,7 @@
 //! folder that no longer has the name of a checkpoint.
 
 use crate::config::OutputConfig;
+use clothcombo_data::format::atomic;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -76,6 +77,16 @@ pub(super) fn abandon_after(folder: &Path, step: u64) -> io::Result<usize> {
         }
         fs::rename(path, target)?;
     }
+    // What named one of them names nothing any more.
+    let dangles = |file: &str| {
+        fs::read_to_string(folder.join(file)).is_ok_and(|name| !folder.join(name.trim()).exists())
+    };
+    if dangles("best") {
+        fs::remove_file(folder.join("best"))?;
+    }
+    if let (true, Some((newest, _))) = (dangles("latest"), list(folder).last()) {
+        atomic::write(&folder.join("latest"), name(*newest).as_bytes())?;
+    }
     Ok(later.len())
 }
 
@@ -121,7 +132,11 @@ mod tests {
         let made = folder([10, 20, 30]);
         fs::create_dir(made.path().join("step-00000040.tmp")).unwrap();
         sweep(made.path());
+        fs::write(made.path().join("latest"), name(30)).unwrap();
+        fs::write(made.path().join("best"), name(30)).unwrap();
         assert_eq!(abandon_after(made.path(), 10).unwrap(), 2);
+        assert_eq!(fs::read_to_string(made.path().join("latest")).unwrap(), name(10));
+        assert!(!made.path().join("best").exists());
         assert_eq!(steps(made.path()), [10]);
         assert!(made.path().join("abandoned-step-00000030").exists());
         assert!(!made.path().join("step-00000040.tmp").exists());

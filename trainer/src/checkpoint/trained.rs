@@ -1,8 +1,8 @@
 //! A trained model, apart from the run that made it.
 
 use super::{CONFIG, CheckpointError, CheckpointState, MODEL_EXCHANGE, newest, read_state, verify};
-use crate::config::{Config, load};
-use crate::scene::Library;
+use crate::config::{Config, PoseConfig, load};
+use crate::scene::{Library, is_trained_on};
 use crate::session::state;
 use burn::store::{ModuleSnapshot, SafetensorsStore};
 use burn::tensor::Device;
@@ -83,6 +83,33 @@ impl TrainedModel {
         }
     }
 
+    /// Says which garments and poses `config` holds out of `library`, its data, that these networks were trained on all the
+    /// same: their scores would be those of known ones. Only where the garments come from the same sources, or the motions
+    /// from the same folder, can it be told.
+    pub fn warn_of_known(&self, config: &Config, library: &Library) {
+        let (trained, data) = (&self.config.data, &config.data);
+        let held_out = [&library.split.validation, &library.split.test].into_iter().flatten();
+        let names = held_out.map(|&garment| library.wardrobe.card(garment).name.as_str());
+        let known: Vec<&str> = names.filter(|name| is_trained_on(name, trained)).collect();
+        if !known.is_empty() && trained.garments == data.garments {
+            tracing::warn!(
+                "{} was trained on held-out garments: {}",
+                self.folder.display(),
+                known.join(", ")
+            );
+        }
+        let [before, now] = [trained, data].map(|data| &data.poses);
+        let holds_out = |poses: &PoseConfig| {
+            (poses.held_out_clips.clone(), poses.held_out_share.to_bits(), poses.held_out_block.to_bits())
+        };
+        if before.motions.is_some() && before.motions == now.motions && holds_out(before) != holds_out(now) {
+            tracing::warn!(
+                "{} may have been trained on held-out poses: other ones were held out of it",
+                self.folder.display()
+            );
+        }
+    }
+
     /// The networks as the start of a run of `config` on `library`.
     ///
     /// # Errors
@@ -94,6 +121,7 @@ impl TrainedModel {
         device: &Device,
     ) -> Result<ClothCombo, CheckpointError> {
         self.check_fits(library)?;
+        self.warn_of_known(config, library);
         if self.config.model != config.model {
             let reason =
                 "its [model] section differs from that of the configuration, which init_from does not allow";

@@ -88,6 +88,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let ablations = others(arguments, &arguments.ablation, &subject)?;
     let specific = others(arguments, &arguments.specific, &subject)?;
     check_specific(&specific, &subject.library)?;
+    check_ablations(&ablations, &subject)?;
+    fs::create_dir_all(folder).into_diagnostic().wrap_err_with(|| format!("{}", folder.display()))?;
 
     let sizes = if arguments.quick { Sizes::QUICK } else { Sizes::FULL };
     let bar = progress_bar(0, "{bar:30} {pos}/{len} · {elapsed} · {msg}");
@@ -107,7 +109,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     Ok(())
 }
 
-/// Before hours are spent: whether the report can be written where it is wanted.
+/// Before anything is loaded: whether the report may be written where it is wanted.
 fn check_output(folder: &Path) -> Result<(), Report> {
     let occupied = fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
     if occupied && !folder.join(JSON).is_file() {
@@ -117,7 +119,7 @@ fn check_output(folder: &Path) -> Result<(), Report> {
             folder.display()
         ));
     }
-    fs::create_dir_all(folder).into_diagnostic().wrap_err_with(|| format!("{}", folder.display()))
+    Ok(())
 }
 
 fn subject(arguments: &Arguments, trained: &TrainedModel, mut config: Config) -> Result<Subject, Report> {
@@ -137,6 +139,19 @@ fn others(arguments: &Arguments, named: &[(String, PathBuf)], first: &Subject) -
         Ok(Other { name: name.clone(), subject })
     };
     named.iter().map(other).collect()
+}
+
+/// Ablations are compared on the same outfits, which are drawn from a model's own data.
+fn check_ablations(ablations: &[Other], first: &Subject) -> Result<(), Report> {
+    let data = |subject: &Subject| (subject.library.fingerprint(), subject.config.data.shape_range);
+    match ablations.iter().find(|other| data(&other.subject) != data(first)) {
+        None => Ok(()),
+        Some(other) => Err(miette!(
+            help = "train it on the data of the evaluated model: body, garments, motions, data.shape_range",
+            "--ablation {}: it was trained on other data",
+            other.name
+        )),
+    }
 }
 
 fn check_specific(specific: &[Other], library: &Library) -> Result<(), Report> {

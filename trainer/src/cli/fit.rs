@@ -7,7 +7,8 @@ use clothcombo_data::fit::{FitReport, FitSettings, Unit, UpAxis, fit};
 use clothcombo_data::format::{load_mesh, obj};
 use miette::{IntoDiagnostic, Report, miette};
 use serde::Serialize;
-use std::path::PathBuf;
+use std::fs;
+use std::path::{Path, PathBuf};
 
 /// Fits a garment file to a body: finds unit, axes and arm pose, repairs the mesh, says everything it did
 #[derive(Parser)]
@@ -22,7 +23,7 @@ pub struct Arguments {
     /// Body to fit it to: "mannequin" or a body npz
     #[arg(long, default_value = "mannequin")]
     body: String,
-    /// OBJ to write: metres, y up, at rest on the zero body in T-pose
+    /// OBJ to write: metres, y up, at rest on the zero body in T-pose; triangles only, without texture coordinates
     #[arg(short, long)]
     output: Option<PathBuf>,
     /// Unit of the file: m, dm, cm, mm, inch or auto
@@ -69,11 +70,25 @@ struct Output<'a> {
     report: &'a FitReport,
 }
 
+/// Nothing but an OBJ is written, and never over the garment as it was given.
+fn check_output(output: &Path, garment: &Path) -> Result<(), Report> {
+    if !output.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) {
+        let help = format!("for example -o {}", output.with_extension("obj").display());
+        return Err(miette!(help = help, "{}: the fitted garment is written as .obj", output.display()));
+    }
+    let is_same = fs::canonicalize(output).ok().is_some_and(|o| fs::canonicalize(garment).ok() == Some(o));
+    match is_same {
+        true => Err(miette!(help = "give -o another name", "{} is the garment itself", output.display())),
+        false => Ok(()),
+    }
+}
+
 /// Runs the verb.
 ///
 /// # Errors
 /// When a file cannot be read or written, or the mesh is no garment of this body.
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
+    arguments.output.as_deref().map_or(Ok(()), |output| check_output(output, &arguments.garment))?;
     let body = load_body(&arguments.body, 0)?;
     let file = load_mesh(&arguments.garment).into_diagnostic()?;
     let settings = FitSettings {

@@ -8,6 +8,7 @@ pub mod eval;
 pub mod fit;
 pub mod generate;
 pub mod import;
+mod interrupted;
 pub mod prepare;
 pub mod replay;
 pub mod resolve;

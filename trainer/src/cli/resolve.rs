@@ -1,8 +1,11 @@
 //! `clothcombo resolve`: anyone's garments taken out of anyone's body, and out of each other.
 
-use crate::score::{DrapedGarment, Score, ScoreDistance, ScoreError, load_garment, score};
+use crate::cli::interrupted::remove_on_signals;
+use crate::draper::UniqueNames;
+use crate::draper::output::Staged;
+use crate::score::{DrapedGarment, Score, ScoreDistance, ScoreError, load_body, load_garment, score};
 use clap::Parser;
-use clothcombo_data::format::{MeshFormat, atomic, load_mesh, load_tri_mesh, obj};
+use clothcombo_data::format::{MeshFormat, load_mesh, obj};
 use clothcombo_physics::contact::resolve::{
     Certificate, Layer, ResolveSettings, Resolved, RestGarment, certify, resolve,
 };
@@ -31,9 +34,12 @@ pub struct Arguments {
     /// Their rest meshes, in the same order, for strain; default: the garments as they are
     #[arg(long, num_args = 1.., value_name = "MESH")]
     rest: Vec<PathBuf>,
-    /// Folder for NAME.obj of every garment and report.json
+    /// Folder to make, for NAME.obj of every garment and report.json
     #[arg(short, long, default_value = "resolved")]
     output: PathBuf,
+    /// Replaces the folder of an earlier run
+    #[arg(long)]
+    replace: bool,
     /// Gap that a garment gets where it has to move [mm]
     #[arg(long, default_value_t = 1.0)]
     gap_mm: f64,
@@ -81,8 +87,19 @@ struct Garment {
     draped: TriMesh,
 }
 
+impl Garment {
+    fn file(&self) -> String {
+        format!("{}.obj", self.name)
+    }
+}
+
 /// Larger bodies than this are not in metres [m].
 const TALLEST: f64 = 20.0;
+/// Sizes of a garment that are refused, as shares of the body's.
+const LARGEST: f64 = 5.0;
+const SMALLEST: f64 = 0.02;
+/// A garment farther from the body than this share of the body's size is refused.
+const NEAR: f64 = 0.25;
 
 /// Runs the verb.
 ///
@@ -95,8 +112,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         ..ResolveSettings::default()
     };
     settings.check().into_diagnostic()?;
-    let body = load_body(&arguments.body)?;
+    let inputs: Vec<PathBuf> =
+        [&arguments.body].into_iter().chain(&arguments.garments).chain(&arguments.rest).cloned().collect();
+    let staged = Staged::new(&arguments.output, arguments.replace, &inputs)?;
+    remove_on_signals(staged.folder());
+    let body = checked_body(&arguments.body)?;
     let garments = load_garments(arguments)?;
+    garments.iter().try_for_each(|garment| check_place(garment, &body))?;
     let surface = Surface::from_mesh(&body);
     let rest: Vec<RestGarment> = garments.iter().map(|g| RestGarment::new(&g.rest)).collect();
     let layers: Vec<Layer> = rest
@@ -115,8 +137,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
             .collect();
         Ok(score(&body, &draped, ScoreDistance::Surface)?)
     };
-    let outputs: Vec<PathBuf> =
-        garments.iter().map(|g| arguments.output.join(format!("{}.obj", g.name))).collect();
     let ms = |time: std::time::Duration| 1e3 * time.as_secs_f64();
     let report = ResolveReport {
         gap_mm: arguments.gap_mm,
@@ -131,18 +151,17 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         },
         garments: garments
             .iter()
-            .zip(&outputs)
             .zip(&resolved.garments)
-            .map(|((garment, output), work)| GarmentReport {
+            .map(|(garment, work)| GarmentReport {
                 name: garment.name.clone(),
-                output: output.clone(),
+                output: arguments.output.join(garment.file()),
                 rounds: work.rounds,
                 moved_vertices: work.moved,
                 largest_move_mm: 1e3 * work.largest_move,
             })
             .collect(),
     };
-    write(arguments, &garments, &outputs, &resolved, &report)?;
+    write(staged, &garments, &resolved, &report)?;
     if arguments.json {
         println!("{}", serde_json::to_string_pretty(&report).into_diagnostic()?);
     } else {
@@ -151,10 +170,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     Ok(())
 }
 
-fn load_body(path: &Path) -> Result<TriMesh, Report> {
-    let body = load_tri_mesh(path).map_err(ScoreError::from)?;
-    let (low, high) = body.bounds();
-    let largest = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
+fn checked_body(path: &Path) -> Result<TriMesh, Report> {
+    let body = load_body(path)?;
+    let largest = extent(&body);
     if largest > TALLEST {
         return Err(miette!(
             help = "scale body and garments to metres (0.01 for centimetres)",
@@ -163,6 +181,40 @@ fn load_body(path: &Path) -> Result<TriMesh, Report> {
         ));
     }
     Ok(body)
+}
+
+/// Longest side of the bounding box.
+fn extent(mesh: &TriMesh) -> f64 {
+    let (low, high) = mesh.bounds();
+    (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max)
+}
+
+/// A garment in another unit or another place crosses nothing, which would look like a good result.
+fn check_place(garment: &Garment, body: &TriMesh) -> Result<(), Report> {
+    let refused = |what: String| {
+        miette!(
+            help = "body and garments must be in one unit and one place: as draped",
+            "{}: {what}",
+            garment.path.display()
+        )
+    };
+    let (own, whole) = (extent(&garment.draped), extent(body));
+    if own > LARGEST * whole || own < SMALLEST * whole {
+        return Err(refused(format!("the garment measures {own:.3}, the body {whole:.3} from end to end")));
+    }
+    let ((low, high), (body_low, body_high)) = (garment.draped.bounds(), body.bounds());
+    let is_apart = |k: usize| low[k] > body_high[k] + NEAR * whole || high[k] < body_low[k] - NEAR * whole;
+    match (0..3).find(|k| is_apart(*k)) {
+        Some(k) => Err(refused(format!(
+            "the garment lies beside the body: {} from {:.3} to {:.3}, the body from {:.3} to {:.3}",
+            ["x", "y", "z"][k],
+            low[k],
+            high[k],
+            body_low[k],
+            body_high[k]
+        ))),
+        None => Ok(()),
+    }
 }
 
 fn load_garments(arguments: &Arguments) -> Result<Vec<Garment>, Report> {
@@ -176,34 +228,32 @@ fn load_garments(arguments: &Arguments) -> Result<Vec<Garment>, Report> {
         ));
     }
     let mut garments: Vec<Garment> = Vec::with_capacity(draped.len());
+    let mut names = UniqueNames::default();
     for (i, path) in draped.iter().enumerate() {
         let (name, rest, draped) = load_garment(rest.get(i).unwrap_or(path), path)?;
         // Two files of one name from two folders must not overwrite each other.
-        let is_taken = garments.iter().any(|g| g.name == name);
-        let name = if is_taken { format!("{name}-{i}") } else { name };
-        garments.push(Garment { path: path.clone(), name, rest, draped });
+        garments.push(Garment { path: path.clone(), name: names.take(&name), rest, draped });
     }
     Ok(garments)
 }
 
 /// Writes everything, after everything that could fail has been computed.
 fn write(
-    arguments: &Arguments,
+    staged: Staged,
     garments: &[Garment],
-    outputs: &[PathBuf],
     resolved: &Resolved,
     report: &ResolveReport,
 ) -> Result<(), Report> {
     let texts = garments.iter().zip(&resolved.positions).map(|(garment, p)| text(garment, p));
     let texts = texts.collect::<Result<Vec<_>, Report>>()?;
-    let save = |path: &Path, bytes: &[u8]| {
-        atomic::write(path, bytes)
-            .into_diagnostic()
-            .wrap_err_with(|| format!("cannot write {}", path.display()))
+    let save = |name: &str, bytes: &[u8]| {
+        let path = staged.folder().join(name);
+        fs::write(&path, bytes).into_diagnostic().wrap_err_with(|| format!("cannot write {}", path.display()))
     };
-    outputs.iter().zip(&texts).try_for_each(|(path, text)| save(path, text))?;
+    garments.iter().zip(&texts).try_for_each(|(garment, text)| save(&garment.file(), text))?;
     let json = serde_json::to_string_pretty(report).into_diagnostic()?;
-    save(&arguments.output.join("report.json"), json.as_bytes())
+    save("report.json", json.as_bytes())?;
+    Ok(staged.commit()?)
 }
 
 /// The garment's file with new positions; a file of another format becomes an OBJ of its polygons.

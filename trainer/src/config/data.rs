@@ -85,7 +85,7 @@ impl Default for CacheConfig {
 }
 
 /// One source of garments: a folder, or the generator.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GarmentSource {
     /// Folder of OBJ garments with an optional `garments.toml`.
@@ -100,7 +100,7 @@ pub struct GarmentSource {
 }
 
 /// Settings of the built-in generator.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GenerateConfig {
     /// Number of garments; categories are taken in turn.
@@ -143,7 +143,7 @@ pub struct PoseConfig {
     /// Clips whose name contains one of these are never trained on: validation on unseen motion.
     pub held_out_clips: Vec<String>,
     /// Share of every other clip that is never trained on, in blocks spread over the clip: validation on the trained
-    /// kinds of motion.
+    /// kinds of motion. A clip shorter than half of `held_out_block / held_out_share` is trained on whole.
     pub held_out_share: f64,
     /// Length of such a block [s]; long against the time in which a pose changes.
     pub held_out_block: f64,

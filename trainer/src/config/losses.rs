@@ -62,7 +62,7 @@ pub struct RepulsionLoss {
     pub radius: f64,
     /// Divide the printed double sum by the vertex count.
     pub per_vertex: bool,
-    /// Random partners per vertex (unbiased estimate); 0 takes every pair.
+    /// Random pairs per vertex, other ones in every training scene: an estimate without bias. 0 takes every pair.
     pub subset: usize,
 }
 

@@ -65,10 +65,23 @@ impl Drape {
         self.surface = None;
     }
 
+    fn before(&self) -> Vec<&[[f64; 3]]> {
+        self.garments.iter().map(|g| g.before.as_slice()).collect()
+    }
+
+    /// What intersected before the post-process.
+    pub(super) fn certificate_before(
+        &self,
+        draper: &Draper,
+        outfit: &Outfit,
+    ) -> Result<Certificate, DraperError> {
+        Ok(certify(&self.surface(draper), &outfit.layers(&self.before()))?)
+    }
+
     /// Brings the positions to what files hold, and counts what intersects there.
     pub(super) fn settle(&mut self, draper: &Draper, outfit: &Outfit) -> Result<(), DraperError> {
         self.garments.iter_mut().for_each(|garment| round(&mut garment.positions));
-        let before: Vec<&[[f64; 3]]> = self.garments.iter().map(|g| g.before.as_slice()).collect();
+        let before = self.before();
         let after: Vec<&[[f64; 3]]> = self.garments.iter().map(|g| g.positions.as_slice()).collect();
         let mut certificate = certify(&self.surface(draper), &outfit.layers(&after))?;
         let strain =

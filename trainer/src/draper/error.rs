@@ -63,6 +63,14 @@ pub enum DraperError {
     /// Shape or pose do not fit the body.
     #[error(transparent)]
     Body(#[from] BodyError),
+    /// A shape parameter that makes no body.
+    #[error("shape parameter {value} makes no body: at most {most}, models are trained with about 2")]
+    Shape {
+        /// The parameter.
+        value: f64,
+        /// The largest one that is taken.
+        most: f64,
+    },
     /// A number in shape or pose is not finite.
     #[error("the {what} holds a number that is not finite")]
     NotFinite {

@@ -5,10 +5,19 @@ use super::{BodyState, Drape, Draper, DraperError, Last, Outfit};
 /// So many frames after one that was left with crossings only carry on: poses change slowly, and starting anew takes seconds.
 const FRAMES_CARRIED: usize = 15;
 
+/// How far [`Draper::drape_motion`] is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MotionProgress {
+    /// One more frame is draped.
+    Draped,
+    /// The frame of this number is draped once more, from the one after it.
+    Again(usize),
+}
+
 impl Draper {
     /// Drapes `outfit` on each of `bodies`, the frames of a motion. The post-process carries on from frame to frame; where frames
-    /// are left with crossings and a later one has none, it carries on backwards from that one as well. `done` is called after
-    /// each frame of the first pass.
+    /// are left with crossings and a later one has none, it carries on backwards from that one as well. `progress` is called
+    /// after each frame, and before each that is draped once more.
     ///
     /// # Errors
     /// When shape or pose do not fit the body model, or the networks diverge.
@@ -16,7 +25,7 @@ impl Draper {
         &self,
         outfit: &Outfit,
         bodies: &[BodyState],
-        mut done: impl FnMut(),
+        mut progress: impl FnMut(MotionProgress),
     ) -> Result<Vec<Drape>, DraperError> {
         let crossings = |drape: &Drape| drape.certificate.crossings();
         let mut drapes: Vec<Drape> = Vec::with_capacity(bodies.len());
@@ -33,12 +42,13 @@ impl Draper {
                 drape.slim();
             }
             drapes.push(drape);
-            done();
+            progress(MotionProgress::Draped);
         }
         if !self.settings.resolve {
             return Ok(drapes);
         }
         carry_back(&mut drapes, crossings, |frame, own, after| {
+            progress(MotionProgress::Again(frame));
             let last = Last { body: &bodies[frame + 1], drape: after, may_start_anew: false };
             let mut again = self.drape_frame(outfit, &bodies[frame], Some(last))?;
             again.slim();

@@ -31,6 +31,9 @@ pub(super) struct Networked {
     pub milliseconds: [f64; 3],
 }
 
+/// Shape parameters are standard deviations: with a larger one there is no body any more.
+const MOST_SHAPE: f64 = 20.0;
+
 impl Draper {
     /// Poses the body and lets the networks drape `outfit` on it.
     pub(super) fn networked(&self, outfit: &Outfit, body: &BodyState) -> Result<Networked, DraperError> {
@@ -97,7 +100,11 @@ impl Draper {
             features: &|pose, joints| encoding.features(pose, joints),
             losses: &self.trained.config.losses,
         };
-        let draw = SceneDraw { garments: (0..outfit.pieces.len()).collect(), bodies: vec![body] };
+        let draw = SceneDraw {
+            garments: (0..outfit.pieces.len()).collect(),
+            bodies: vec![body],
+            repulsion_sample: 0,
+        };
         let mut scene = dresser.dress(draw, outfit.worn(), 1.0);
         // A body with fewer components than the networks know has the others at their mean.
         scene.bodies[0].shape.resize(self.trained.state.shape_count, 0.0);
@@ -107,6 +114,9 @@ impl Draper {
     fn checked_shape(&self, shape: &[f64]) -> Result<Vec<f64>, DraperError> {
         if shape.iter().any(|x| !x.is_finite()) {
             return Err(DraperError::NotFinite { what: "shape" });
+        }
+        if let Some(value) = shape.iter().find(|x| x.abs() > MOST_SHAPE) {
+            return Err(DraperError::Shape { value: *value, most: MOST_SHAPE });
         }
         let mut shape = shape.to_vec();
         let count = self.body().shape_count;

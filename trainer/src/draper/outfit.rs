@@ -3,6 +3,7 @@
 
 use super::Draper;
 use super::error::DraperError;
+use super::names::UniqueNames;
 use super::source::SourceGarment;
 use crate::drape::garment_tensors;
 use crate::scene::{LibraryError, LibraryGarment};
@@ -15,7 +16,7 @@ use clothcombo_data::cache::{
 use clothcombo_model::{Embeddings, GarmentEmbedding, GarmentTensors, OutfitTensors};
 use clothcombo_physics::contact::resolve::{Layer, RestGarment};
 use clothcombo_physics::operators::SurfaceOperators;
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
@@ -245,36 +246,4 @@ fn kept(stored: Result<(), clothcombo_data::cache::CacheError>) {
 
 fn near(a: &Piece, b: &Piece) -> bool {
     crate::scene::can_touch(&a.worn, &b.worn)
-}
-
-/// Names that are different and can be file names.
-#[derive(Default)]
-struct UniqueNames(HashSet<String>);
-
-impl UniqueNames {
-    fn take(&mut self, name: &str) -> String {
-        // The body has a file of that name.
-        self.0.insert("body".to_owned());
-        let plain = |c: char| if c.is_alphanumeric() || "-_+.".contains(c) { c } else { '_' };
-        let name: String = name.chars().map(plain).collect();
-        let name = if name.trim_matches('.').is_empty() { "garment".to_owned() } else { name };
-        let numbered = (2..).map(|n| format!("{name}-{n}"));
-        // Some file systems do not tell capitals apart.
-        let is_free = |n: &String| !self.0.contains(&n.to_lowercase());
-        let free = std::iter::once(name.clone()).chain(numbered).find(is_free).unwrap_or(name);
-        self.0.insert(free.to_lowercase());
-        free
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_are_unique_and_can_be_files() {
-        let mut names = UniqueNames::default();
-        let taken = ["tee", "Tee", "body", "a/b c", "..", "tee", "Hemd_ä"].map(|n| names.take(n));
-        assert_eq!(taken, ["tee", "Tee-2", "body-2", "a_b_c", "garment", "tee-3", "Hemd_ä"]);
-    }
 }

@@ -101,7 +101,7 @@ pub struct BodyReport {
     pub recovered_within_mm: Option<f64>,
 }
 
-/// One garment. Networks and refinement treat all garments at once: their time is shared by number of vertices.
+/// One garment. The time of what treats all garments at once is shared by number of vertices.
 #[derive(Clone, Debug, Serialize)]
 pub struct GarmentReport {
     /// Its name, and that of its file.
@@ -159,6 +159,8 @@ pub struct Report {
     /// What is left: of a motion, numbers of pairs are sums over the frames, depths and strain the worst frame's, and the
     /// lists are those of `frames`.
     pub certificate: Certificate,
+    /// The same of what came to the post-process in the first frame, without the list of pairs.
+    pub certificate_before: Certificate,
     /// What the refinement of the first frame did.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub refinement: Option<Refinement>,
@@ -202,9 +204,12 @@ impl Report {
             milliseconds.preparation += piece.milliseconds.preparation;
             milliseconds.embedding += piece.milliseconds.embedding;
         }
-        let (before, after) = rayon::join(
-            || first.score(draper, outfit, Stage::BeforeResolve),
-            || first.score(draper, outfit, Stage::Result),
+        let (certificate_before, (before, after)) = rayon::join(
+            || first.certificate_before(draper, outfit),
+            || {
+                let score = |stage| first.score(draper, outfit, stage);
+                rayon::join(|| score(Stage::BeforeResolve), || score(Stage::Result))
+            },
         );
         let frames = drapes.iter().zip(moments).map(|(drape, moment)| FrameReport {
             frame: moment.frame,
@@ -226,6 +231,7 @@ impl Report {
             after: after?,
             milliseconds,
             certificate: combined(drapes),
+            certificate_before: Certificate { remaining: Vec::new(), ..certificate_before? },
             refinement: first.refinement.clone(),
             smoothing,
             acceleration: acceleration(drapes, moments),
@@ -280,12 +286,13 @@ fn garment_reports(outfit: &Outfit, drapes: &[Drape]) -> Vec<GarmentReport> {
         };
         for drape in drapes {
             let shared = drape.milliseconds;
+            let own: f64 = drape.garments.iter().map(|g| g.resolve_ms).sum();
             times += PhaseTimes {
                 posing: share * shared.posing,
                 draping: share * shared.draping,
                 untangling: share * shared.untangling,
                 refine: share * shared.refine,
-                resolve: drape.garments[index].resolve_ms,
+                resolve: drape.garments[index].resolve_ms + share * (shared.resolve - own),
                 certificate: share * shared.certificate,
                 ..PhaseTimes::default()
             };
@@ -330,6 +337,10 @@ fn combined(drapes: &[Drape]) -> Certificate {
             own.layer_triangle_pairs += more.layer_triangle_pairs;
             own.self_triangle_pairs += more.self_triangle_pairs;
             own.strain_joule = own.strain_joule.max(more.strain_joule);
+        }
+        for (own, more) in sum.layers.iter_mut().zip(&more.layers) {
+            own.triangle_pairs += more.triangle_pairs;
+            own.order_violations = own.order_violations.max(more.order_violations);
         }
     }
     if drapes.len() > 1 {

@@ -133,7 +133,8 @@ impl Closet {
         &self.names
     }
 
-    /// The garment of a file or, where there is no such file, of that name.
+    /// The garment of a file or, where there is no such file, of that name. A named one from a file is fitted like any other
+    /// file where it does not lie on this body: it may have been made for another one.
     ///
     /// # Errors
     /// Naming the file or the unknown name.
@@ -156,12 +157,19 @@ impl Closet {
             known: self.names.clone(),
         })?;
         let maker = Maker::new(body, std::slice::from_ref(origin))?;
-        let mut source = SourceGarment::new(maker.make(origin)?);
-        if let Origin::File(listed) = origin {
-            // Polygons as the file has them.
-            source.given = load_mesh(&listed.path).map_err(LibraryError::data)?;
-            source.path = Some(listed.path.clone());
+        let Origin::File(listed) = origin else {
+            return Ok(SourceGarment::new(maker.make(origin)?));
+        };
+        let made = maker.make(origin);
+        let must_fit =
+            always_fit.unwrap_or_else(|| !made.as_ref().is_ok_and(|garment| is_on_body(&garment.rest, body)));
+        if must_fit {
+            return SourceGarment::read(&listed.path, body, Some(true));
         }
+        let mut source = SourceGarment::new(made?);
+        // Polygons as the file has them.
+        source.given = load_mesh(&listed.path).map_err(LibraryError::data)?;
+        source.path = Some(listed.path.clone());
         Ok(source)
     }
 }

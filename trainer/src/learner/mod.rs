@@ -120,6 +120,12 @@ impl Learner {
         } else if self.frozen.is_none() {
             self.frozen = Some(Frozen { model: self.model.valid(), embeddings: tensors.embeddings() });
         }
+        if let Some(frozen) = &self.frozen {
+            // Here, with all threads, whatever scene meets a garment first: else the last bits would depend on the order.
+            for scene in scenes {
+                tensors.encode(&frozen.model, scene, &frozen.embeddings)?;
+            }
+        }
         let work =
             Work { tensors, frozen: self.frozen.as_ref(), trains, share: 1.0 / total as f64, spoil_gradient };
         let mut computed = Computed {

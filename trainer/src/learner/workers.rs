@@ -1,30 +1,37 @@
 //! The processor's threads in equal shares, for work that is done beside each other.
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use tracing::dispatcher;
 
 /// Pools of threads that do not help each other: an operation that runs on a thread of its own waits for nobody, while
 /// small operations that are split over all threads spend much of their time on waking them.
 #[derive(Default)]
 pub struct Workers {
-    pools: Vec<ThreadPool>,
+    /// For so many items at once as many pools: how many threads one has must not depend on what was done before, since
+    /// sums of networks differ with it in their last bits.
+    pools: BTreeMap<usize, Vec<ThreadPool>>,
 }
 
 impl Workers {
     /// The results of `work` on `items`, in their order, computed at once; one after the other if the system refuses more
     /// threads.
     pub fn map<I: Send, O: Send>(&mut self, items: Vec<I>, work: impl Fn(I) -> O + Sync) -> Vec<O> {
-        if self.pools.len() < items.len() {
-            let threads = (rayon::current_num_threads() / items.len()).max(1);
-            let pool = |i| {
-                let name = move |thread| format!("scene-{i}-{thread}");
-                ThreadPoolBuilder::new().num_threads(threads).thread_name(name).build()
-            };
-            match (0..items.len()).map(pool).collect() {
-                Ok(pools) => self.pools = pools,
-                Err(_) => return items.into_iter().map(work).collect(),
+        let pools = match self.pools.entry(items.len()) {
+            Entry::Occupied(known) => known.into_mut(),
+            Entry::Vacant(place) => {
+                let threads = (rayon::current_num_threads() / items.len().max(1)).max(1);
+                let pool = |i| {
+                    let name = move |thread| format!("scene-{i}-{thread}");
+                    ThreadPoolBuilder::new().num_threads(threads).thread_name(name).build()
+                };
+                match (0..items.len()).map(pool).collect() {
+                    Ok(pools) => place.insert(pools),
+                    Err(_) => return items.into_iter().map(work).collect(),
+                }
             }
-        }
+        };
         // Spans belong to a thread: those of the workers go to whoever listens on this one.
         let listener = dispatcher::get_default(Clone::clone);
         let work = |item| dispatcher::with_default(&listener, || work(item));
@@ -33,7 +40,7 @@ impl Workers {
             let work = &work;
             move || *result = Some(work(item))
         });
-        run_at_once(&self.pools, jobs);
+        run_at_once(pools, jobs);
         results.into_iter().map(|result| result.expect("every job was run")).collect()
     }
 }
@@ -63,11 +70,8 @@ mod tests {
                 (i, rayon::current_num_threads())
             });
             assert_eq!(results.iter().map(|(i, _)| *i).collect::<Vec<_>>(), (0..count).collect::<Vec<_>>());
-            assert!(
-                results
-                    .iter()
-                    .all(|(_, threads)| (1..=rayon::current_num_threads().max(1)).contains(threads))
-            );
+            let share = (rayon::current_num_threads() / count).max(1);
+            assert!(results.iter().all(|(_, threads)| *threads == share));
         }
     }
 }

@@ -28,6 +28,9 @@ pub struct SceneDraw {
     pub garments: Vec<usize>,
     /// Bodies.
     pub bodies: Vec<BodyDraw>,
+    /// Number of the random sample of pairs that the repulsion looks at (`losses.repulsion.subset`): another one in every
+    /// training scene, so that in the long run all pairs count.
+    pub repulsion_sample: u32,
 }
 
 /// The part of the schedule a draw depends on.
@@ -61,6 +64,11 @@ fn shape(library: &Library, rng: &mut ChaCha8Rng) -> Vec<f64> {
     (0..library.shape_count).map(|_| low + (high - low) * rng.random::<f64>()).collect()
 }
 
+/// A scene that is scored: always by the same sample of pairs.
+fn scored(garments: Vec<usize>, body: BodyDraw) -> SceneDraw {
+    SceneDraw { garments, bodies: vec![body], repulsion_sample: 0 }
+}
+
 /// Streams of the further scenes of a step lie this far apart; a run has fewer steps.
 const FURTHER_SCENE: u64 = 1 << 48;
 
@@ -77,7 +85,7 @@ pub fn draw_training(library: &Library, seed: u64, step: u64, scene: usize, plan
             pose: library.poses.draw_training(scale, &mut rng),
         })
         .collect();
-    SceneDraw { garments, bodies }
+    SceneDraw { garments, bodies, repulsion_sample: rng.random() }
 }
 
 /// Its block of streams lies behind those of the validation groups.
@@ -90,7 +98,7 @@ pub fn draw_outfit(library: &Library, seed: u64, index: u64, most: usize) -> Sce
     let all: Vec<usize> = (0..library.wardrobe.len()).collect();
     let garments = garments(&all, 1 + index as usize % most.max(1), &mut rng);
     let pose = library.poses.draw_held_out(Unseen::Clips, &mut rng);
-    SceneDraw { garments, bodies: vec![BodyDraw { shape: shape(library, &mut rng), pose }] }
+    scored(garments, BodyDraw { shape: shape(library, &mut rng), pose })
 }
 
 /// Scenes of an evaluation lie behind the outfits; every question has a block of streams of its own.
@@ -110,7 +118,7 @@ pub fn draw_study(
     // The body first: with it, a question asked of two wardrobes is asked on the same bodies.
     let body =
         BodyDraw { shape: shape(library, &mut rng), pose: library.poses.draw_held_out(unseen, &mut rng) };
-    SceneDraw { garments: garments(pool, layers, &mut rng), bodies: vec![body] }
+    scored(garments(pool, layers, &mut rng), body)
 }
 
 /// What a validation scene is drawn for.
@@ -151,7 +159,13 @@ impl ValidationGroup {
     }
 }
 
-/// The fixed validation scenes of `group`; trained garments in turn, layer counts in turn.
+/// Of `count` scenes, which of `of` garments scene `i` is about: all in turn, or evenly spread ones where there are more
+/// garments than scenes.
+pub fn in_turn(i: usize, count: usize, of: usize) -> usize {
+    if count < of { i * of / count } else { i % of }
+}
+
+/// The fixed validation scenes of `group`; garments in turn, layer counts in turn.
 pub fn draw_validation(
     library: &Library,
     seed: u64,
@@ -166,6 +180,7 @@ pub fn draw_validation(
         ValidationGroup::UnseenGarment => (config.unseen_garment_scenes, Unseen::Poses),
         ValidationGroup::Layered => (config.layered_scenes, Unseen::Poses),
     };
+    let one = |pool: &[usize], i: usize| vec![pool[in_turn(i, count, pool.len())]];
     (0..count)
         .map(|i| {
             let mut rng = generator(seed, VALIDATION_STREAM + (group.stream() << 32) + i as u64);
@@ -174,13 +189,11 @@ pub fn draw_validation(
                     let [low, high] = config.layers;
                     garments(&library.split.training, low + i % (high - low + 1), &mut rng)
                 }
-                ValidationGroup::UnseenGarment => {
-                    vec![library.split.validation[i % library.split.validation.len()]]
-                }
-                _ => vec![library.split.training[i % library.split.training.len()]],
+                ValidationGroup::UnseenGarment => one(&library.split.validation, i),
+                ValidationGroup::Single | ValidationGroup::UnseenMotion => one(&library.split.training, i),
             };
             let pose = library.poses.draw_held_out(unseen, &mut rng);
-            SceneDraw { garments, bodies: vec![BodyDraw { shape: shape(library, &mut rng), pose }] }
+            scored(garments, BodyDraw { shape: shape(library, &mut rng), pose })
         })
         .collect()
 }

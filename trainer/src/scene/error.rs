@@ -62,6 +62,17 @@ pub enum LibraryError {
         /// The existing names.
         available: String,
     },
+    /// A held-out name fits no clip.
+    #[error("data.poses.held_out_clips names {name:?}, which fits no clip in {}", folder.display())]
+    #[diagnostic(help("the clips are: {clips}"))]
+    UnknownClip {
+        /// The motion folder.
+        folder: PathBuf,
+        /// The name.
+        name: String,
+        /// The clips of the folder.
+        clips: String,
+    },
     /// A wanted name fits no garment of its source.
     #[error("data.garments[{source_index}].only names {name:?}, which is no garment of this source")]
     #[diagnostic(help("the garments are: {available}"))]

@@ -58,6 +58,14 @@ pub struct LicenceLine {
     pub count: usize,
 }
 
+/// What a fingerprint of this kind begins with; earlier ones looked at less.
+const FINGERPRINT: &str = "2:";
+
+/// Whether `text` is a [fingerprint](Library::fingerprint) as they are made now, and can be compared with another.
+pub fn is_fingerprint(text: &str) -> bool {
+    text.starts_with(FINGERPRINT)
+}
+
 /// What a body file says about where it comes from; empty where it says nothing.
 fn body_source(name: &str) -> Provenance {
     if name == "mannequin" {
@@ -122,8 +130,8 @@ impl Library {
         }
     }
 
-    /// A fingerprint of what scenes are drawn from: garments (name, size, place), body and poses. Equal data gives equal
-    /// scenes.
+    /// A fingerprint of what scenes are drawn from: garments (name, size, place), body and every frame of the poses. Equal
+    /// data gives equal scenes.
     pub fn fingerprint(&self) -> String {
         let mut hasher = blake3::Hasher::new();
         let mut numbers = |values: &[u64]| {
@@ -142,12 +150,18 @@ impl Library {
                     .collect::<Vec<_>>(),
             );
         }
-        numbers(&[self.body.template.len() as u64, self.body.faces.len() as u64, self.shape_count as u64]);
-        numbers(&self.body.template.as_flattened().iter().map(|v| v.to_bits()).collect::<Vec<_>>());
-        if let Some(frames) = self.poses.frame_counts() {
-            numbers(&frames.map(|f| f as u64));
+        let body = &self.body;
+        numbers(&[body.template.len() as u64, body.faces.len() as u64, self.shape_count as u64]);
+        numbers(&body.template.as_flattened().iter().map(|v| v.to_bits()).collect::<Vec<_>>());
+        numbers(&body.shape_directions.iter().map(|v| u64::from(v.to_bits())).collect::<Vec<_>>());
+        numbers(&body.joint_template.as_flattened().iter().map(|v| v.to_bits()).collect::<Vec<_>>());
+        for part in self.poses.frames() {
+            numbers(&[part.len() as u64]);
+            for pose in part {
+                numbers(&pose.rotations.as_flattened().iter().map(|v| v.to_bits()).collect::<Vec<_>>());
+            }
         }
-        hasher.finalize().to_hex()[..32].to_owned()
+        format!("{FINGERPRINT}{}", &hasher.finalize().to_hex()[..32])
     }
 
     /// Under which terms the data may be used: body, garments, motions, one line per author and licence.

@@ -18,15 +18,16 @@ mod wardrobe;
 pub use active_joints::ActiveJoints;
 pub use draw::{
     BodyDraw, Plan, SceneDraw, ValidationGroup, draw_outfit, draw_study, draw_training, draw_validation,
+    in_turn,
 };
 pub use error::LibraryError;
 pub use garment::LibraryGarment;
-pub use library::{Library, LicenceLine, load_body};
+pub use library::{Library, LicenceLine, is_fingerprint, load_body};
 pub use origin::{Maker, Origin};
 pub use poses::{PoseLibrary, SelfIntersecting, Unseen};
 pub use prefetch::{Prefetch, prepare_step};
 pub use prepare::{Dresser, PreparedBody, PreparedScene, can_touch, prepare};
 pub use recent::Recent;
 pub use recipe::Recipe;
-pub use split::{GarmentSplit, SplitNames};
+pub use split::{GarmentSplit, SplitNames, is_trained_on};
 pub use wardrobe::{Card, Wardrobe};

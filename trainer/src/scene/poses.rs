@@ -56,13 +56,39 @@ enum Source {
 /// Frames by what they are for.
 #[derive(Default)]
 struct Frames {
-    train: Vec<Pose>,
+    train: Vec<Clip>,
     held_out: Vec<Pose>,
     unseen: Vec<Pose>,
     training_clips: Vec<String>,
     unseen_clips: Vec<String>,
     /// Where every clip comes from.
     sources: Vec<Provenance>,
+}
+
+/// What is trained on of a clip.
+struct Clip {
+    poses: Vec<Pose>,
+    seconds: f64,
+}
+
+impl Frames {
+    /// Number of frames trained on.
+    fn trained(&self) -> usize {
+        self.train.iter().map(|clip| clip.poses.len()).sum()
+    }
+
+    /// A frame to train on. The share of a clip grows with the square root of its length in time: neighbouring frames are
+    /// alike, so that by frames alone a long clip, or one of a high frame rate, would crowd out the others.
+    fn draw_training(&self, rng: &mut ChaCha8Rng) -> &Pose {
+        let share = |clip: &Clip| clip.seconds.sqrt();
+        let mut left = rng.random::<f64>() * self.train.iter().map(share).sum::<f64>();
+        let chosen = self.train.iter().find(|clip| {
+            left -= share(clip);
+            left < 0.0
+        });
+        let Clip { poses, .. } = chosen.unwrap_or(&self.train[self.train.len() - 1]);
+        &poses[rng.random_range(0..poses.len())]
+    }
 }
 
 /// Which poses a validation scene draws from.
@@ -85,11 +111,22 @@ impl PoseLibrary {
             None => Source::Sampler(PoseSampler::default()),
             Some(folder) => {
                 let clips = load_motion_folder(folder).map_err(LibraryError::data)?;
+                if let Some(name) = config
+                    .held_out_clips
+                    .iter()
+                    .find(|name| !clips.iter().any(|clip| clip.name.contains(name.as_str())))
+                {
+                    return Err(LibraryError::UnknownClip {
+                        folder: folder.clone(),
+                        name: name.clone(),
+                        clips: clips.iter().map(|clip| clip.name.as_str()).collect::<Vec<_>>().join(", "),
+                    });
+                }
                 let frames = split(&clips, config);
-                if frames.train.is_empty() || frames.held_out.is_empty() {
+                if frames.trained() == 0 || frames.held_out.is_empty() {
                     return Err(LibraryError::EmptySplit {
                         folder: folder.clone(),
-                        train: frames.train.len(),
+                        train: frames.trained(),
                         held_out: frames.held_out.len(),
                     });
                 }
@@ -146,8 +183,19 @@ impl PoseLibrary {
     /// Number of frames trained on, held out of the trained clips, and of unseen clips; none when poses are sampled.
     pub fn frame_counts(&self) -> Option<[usize; 3]> {
         match &self.source {
-            Source::Frames(f) => Some([f.train.len(), f.held_out.len(), f.unseen.len()]),
+            Source::Frames(f) => Some([f.trained(), f.held_out.len(), f.unseen.len()]),
             Source::Sampler(_) => None,
+        }
+    }
+
+    /// All poses that were captured: trained on clip by clip, held out, of unseen clips.
+    pub fn frames(&self) -> Vec<&[Pose]> {
+        match &self.source {
+            Source::Frames(f) => {
+                let clips = f.train.iter().map(|clip| clip.poses.as_slice());
+                clips.chain([f.held_out.as_slice(), f.unseen.as_slice()]).collect()
+            }
+            Source::Sampler(_) => Vec::new(),
         }
     }
 
@@ -194,11 +242,11 @@ impl PoseLibrary {
     fn draw_unfiltered(&self, scale: f64, rng: &mut ChaCha8Rng) -> Pose {
         let pose = match &self.source {
             Source::Sampler(sampler) => sampler.sample(rng),
-            Source::Frames(Frames { train, .. }) => {
-                let pose = &train[rng.random_range(0..train.len())];
+            Source::Frames(frames) => {
+                let pose = frames.draw_training(rng);
                 match &self.augmentation {
                     Some(augmentation) => {
-                        let other = &train[rng.random_range(0..train.len())];
+                        let other = frames.draw_training(rng);
                         augmentation.apply(pose, other, rng)
                     }
                     None => pose.clone(),
@@ -247,7 +295,8 @@ impl Filter {
     }
 }
 
-/// Every clip is cut into blocks; one block in every `1 / held_out_share`, in the middle of its group, is held out.
+/// Every clip is cut into blocks; one block in every `1 / held_out_share`, in the middle of its group, is held out. A clip of less
+/// than about half a group has none.
 fn split(clips: &[Motion], config: &PoseConfig) -> Frames {
     let mut frames =
         Frames { sources: clips.iter().map(|c| c.source.clone()).collect(), ..Frames::default() };
@@ -260,9 +309,14 @@ fn split(clips: &[Motion], config: &PoseConfig) -> Frames {
         }
         frames.training_clips.push(clip.name.clone());
         let block = ((config.held_out_block * clip.frame_rate).round() as usize).max(1);
+        let mut train = Vec::new();
         for (i, poses) in clip.poses.chunks(block).enumerate() {
-            let part = if i % group == group / 2 { &mut frames.held_out } else { &mut frames.train };
+            let part = if i % group == group / 2 { &mut frames.held_out } else { &mut train };
             part.extend_from_slice(poses);
+        }
+        if !train.is_empty() {
+            let seconds = train.len() as f64 / clip.frame_rate;
+            frames.train.push(Clip { poses: train, seconds });
         }
     }
     frames
@@ -276,6 +330,26 @@ mod tests {
     fn library(max_self_intersection: f64) -> PoseLibrary {
         let config = PoseConfig { max_self_intersection, ..PoseConfig::default() };
         PoseLibrary::new(&config, &Arc::new(mannequin())).unwrap()
+    }
+
+    #[test]
+    fn long_clips_do_not_crowd_out_short_ones() {
+        let clip = |frames: usize, rate: f64| Clip {
+            poses: vec![Pose { rotations: vec![[frames as f64; 3]] }; frames],
+            seconds: frames as f64 / rate,
+        };
+        // 64 s, 4 s, and 4 s at a high frame rate: 8 to 2 to 2.
+        let frames =
+            Frames { train: vec![clip(640, 10.0), clip(40, 10.0), clip(480, 120.0)], ..Frames::default() };
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let mut counts = [0; 3];
+        for _ in 0..12_000 {
+            let length = frames.draw_training(&mut rng).rotations[0][0] as usize;
+            counts[[640, 40, 480].iter().position(|l| *l == length).unwrap()] += 1;
+        }
+        for (count, expected) in counts.into_iter().zip([8000.0_f64, 2000.0, 2000.0]) {
+            assert!((f64::from(count) - expected).abs() < 4.0 * expected.sqrt(), "{counts:?}");
+        }
     }
 
     #[test]

@@ -8,7 +8,7 @@ use super::library::Library;
 use crate::config::LossesConfig;
 use crate::objective::scene_weights;
 use clothcombo_data::asset::{Body, Pose};
-use clothcombo_physics::energy::{SceneEnergy, SceneGarment, SceneLayers};
+use clothcombo_physics::energy::{EnergySettings, SceneEnergy, SceneGarment, SceneLayers};
 use clothcombo_physics::query::Surface;
 use std::sync::Arc;
 
@@ -102,8 +102,13 @@ impl Dresser<'_> {
     /// If a shape or pose is longer than the body allows.
     pub fn dress(&self, draw: SceneDraw, worn: Vec<Arc<LibraryGarment>>, run_progress: f64) -> PreparedScene {
         let contacts = contacts(&worn);
-        let bodies =
-            draw.bodies.iter().map(|body| self.on_body(&worn, &contacts, body, run_progress)).collect();
+        let settings =
+            EnergySettings { repulsion_sample: draw.repulsion_sample, ..self.losses.energy_settings() };
+        let bodies = draw
+            .bodies
+            .iter()
+            .map(|body| self.on_body(&worn, &contacts, body, &settings, run_progress))
+            .collect();
         PreparedScene { draw, worn, contacts, bodies, alone: self.losses.alone.at(run_progress) }
     }
 
@@ -112,6 +117,7 @@ impl Dresser<'_> {
         garments: &[Arc<LibraryGarment>],
         contacts: &[(usize, usize)],
         body: &BodyDraw,
+        settings: &EnergySettings,
         run_progress: f64,
     ) -> PreparedBody {
         let Self { losses, .. } = self;
@@ -152,7 +158,7 @@ impl Dresser<'_> {
                 body: Arc::new(surface),
                 garments: scene_garments,
                 layers,
-                settings: losses.energy_settings(),
+                settings: *settings,
             }),
         }
     }

@@ -29,13 +29,10 @@ impl GarmentSplit {
         }
         let mut split = Self { training: Vec::new(), validation: Vec::new(), test: Vec::new() };
         for (i, &name) in names.iter().enumerate() {
-            let place = place(name);
-            let part = if held_out.iter().any(|n| n == name) || place >= 1.0 - config.split.test {
-                &mut split.test
-            } else if place < config.split.validation {
-                &mut split.validation
-            } else {
-                &mut split.training
+            let part = match purpose(name, config) {
+                Purpose::Training => &mut split.training,
+                Purpose::Validation => &mut split.validation,
+                Purpose::Test => &mut split.test,
             };
             part.push(i);
         }
@@ -44,6 +41,27 @@ impl GarmentSplit {
             false => Ok(split),
         }
     }
+}
+
+/// What a garment is for.
+enum Purpose {
+    Training,
+    Validation,
+    Test,
+}
+
+fn purpose(name: &str, config: &DataConfig) -> Purpose {
+    match place(name) {
+        _ if config.held_out_garments.iter().any(|n| n == name) => Purpose::Test,
+        place if place >= 1.0 - config.split.test => Purpose::Test,
+        place if place < config.split.validation => Purpose::Validation,
+        _ => Purpose::Training,
+    }
+}
+
+/// Whether a garment of this name is trained on where `config` splits the data.
+pub fn is_trained_on(name: &str, config: &DataConfig) -> bool {
+    matches!(purpose(name, config), Purpose::Training)
 }
 
 /// The split of a run by name.

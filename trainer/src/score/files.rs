@@ -2,7 +2,7 @@
 
 use super::{DrapedGarment, MeshSize, Score, ScoreDistance, ScoreError, score};
 use clothcombo_data::format::load_tri_mesh;
-use clothcombo_physics::mesh::TriMesh;
+use clothcombo_physics::mesh::{TriMesh, is_closed, signed_volume};
 use std::path::{Path, PathBuf};
 
 /// The files of a scene; polygons are cut into triangles.
@@ -25,7 +25,7 @@ pub fn score_files(files: &MeshFiles, distance: ScoreDistance) -> Result<Score, 
     if rest.len() != draped.len() {
         return Err(ScoreError::FileCounts { rest: rest.len(), draped: draped.len() });
     }
-    let body = load_tri_mesh(body)?;
+    let body = load_body(body)?;
     let loaded = rest.iter().zip(draped).map(|(rest, draped)| load_garment(rest, draped));
     let loaded = loaded.collect::<Result<Vec<_>, _>>()?;
     let garments: Vec<DrapedGarment> = loaded
@@ -33,6 +33,17 @@ pub fn score_files(files: &MeshFiles, distance: ScoreDistance) -> Result<Score, 
         .map(|(name, rest, draped)| DrapedGarment { name, rest, positions: draped.positions() })
         .collect();
     score(&body, &garments, distance)
+}
+
+/// A posed body. One that is inside out, its faces towards its inside, is turned, and said so.
+pub(crate) fn load_body(path: &Path) -> Result<TriMesh, ScoreError> {
+    let body = load_tri_mesh(path)?;
+    if !(is_closed(body.faces()) && signed_volume(&body) < 0.0) {
+        return Ok(body);
+    }
+    tracing::warn!("{}: the body is inside out; its faces were turned", path.display());
+    let faces = body.faces().iter().map(|&[a, b, c]| [a, c, b]).collect();
+    Ok(TriMesh::new(body.positions().to_vec(), faces).expect("a valid mesh is one with its faces turned"))
 }
 
 /// Name, rest mesh and draped mesh of a garment, which have the same faces.

@@ -3,6 +3,7 @@
 use super::subject::Subject;
 use super::table::{Table, number, percent};
 use crate::drape::DrapeError;
+use crate::evaluate::Spread;
 use crate::evaluate::certificates::{Dressing, OutfitResult};
 use crate::evaluate::hard_poses;
 use crate::scene::{BodyDraw, SceneDraw, Unseen};
@@ -154,8 +155,9 @@ fn measure(
             }
         }
     }
-    found.strain_ratio = crate::evaluate::Spread::of(ratios).median;
-    found.depth_mm = crate::evaluate::Spread::of(depths).median;
+    // Not a number where nothing came of a case: none is no good result.
+    let median = |values: Vec<f64>| if values.is_empty() { f64::NAN } else { Spread::of(values).median };
+    (found.strain_ratio, found.depth_mm) = (median(ratios), median(depths));
     Ok(found)
 }
 

@@ -180,7 +180,7 @@ impl Studio<'_> {
         body: &BodyDraw,
         colour: &dyn Fn(usize) -> [u8; 3],
     ) -> Result<[RgbImage; 2], Report> {
-        let draw = SceneDraw { garments: garments.to_vec(), bodies: vec![body.clone()] };
+        let draw = SceneDraw { garments: garments.to_vec(), bodies: vec![body.clone()], repulsion_sample: 0 };
         let scene = self.subject.prepare(draw)?;
         let draped = self.networks.drape(&scene)?.layered;
         let resolved = self.dressing.of(&scene, &draped.posed).resolved(&ResolveSettings::default())?;

@@ -89,6 +89,11 @@ pub fn ask(
     };
     let added: Vec<f64> = results.iter().filter_map(|r| r.strain_added).collect();
     let times: Vec<f64> = results.iter().flat_map(|r| r.milliseconds.clone()).collect();
+    // The garments of an outfit are no independent scenes.
+    let of_outfits = |layers: &[Vec<f64>]| {
+        let mean = |i: usize| layers.iter().map(|values| values[i]).sum::<f64>() / layers.len() as f64;
+        Estimate::of(&(0..scenes).map(mean).collect::<Vec<_>>())
+    };
     let ratios = |layer: usize| -> Vec<f64> {
         single[layer].iter().zip(&layered[layer]).map(|(alone, worn)| worn / alone).collect()
     };
@@ -98,8 +103,8 @@ pub fn ask(
         resolved: results.len(),
         strain: (0..layers).map(|l| Ratio::of(&layered[l], &single[l])).collect(),
         strain_median: (0..layers).map(|l| Estimate::of(&ratios(l)).spread.median).collect(),
-        strain_alone: Estimate::of(&single.concat()),
-        strain_worn: Estimate::of(&layered.concat()),
+        strain_alone: of_outfits(&single),
+        strain_worn: of_outfits(&layered),
         wrong_side_single: Estimate::of(&wrong_single),
         wrong_side: shares(&mut before.iter().map(|c| c.order_violations)),
         wrong_side_resolved: shares(&mut results.iter().map(|r| r.after.order_violations)),

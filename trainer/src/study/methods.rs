@@ -4,7 +4,7 @@ use super::estimate::{Estimate, Ratio};
 use super::subject::{Measured, Subject};
 use super::table::{Table, number, percent};
 use crate::drape::DrapeError;
-use crate::scene::{SceneDraw, Unseen};
+use crate::scene::{SceneDraw, Unseen, in_turn};
 use clothcombo_data::asset::Category;
 use clothcombo_physics::energy::Term;
 use serde::Serialize;
@@ -31,13 +31,8 @@ pub struct Question<'a> {
 impl Question<'_> {
     /// Its scenes, one garment each.
     pub fn draws(&self, subject: &Subject) -> Vec<SceneDraw> {
-        // Evenly over the pool where there are fewer scenes than garments.
-        let turn = |i: usize| match self.scenes < self.pool.len() {
-            true => i * self.pool.len() / self.scenes,
-            false => i % self.pool.len(),
-        };
         let draw = |i: usize| {
-            let garment = &self.pool[turn(i)..][..1];
+            let garment = &self.pool[in_turn(i, self.scenes, self.pool.len())..][..1];
             subject.draw([self.number, i], garment, 1, self.unseen)
         };
         if self.pool.is_empty() { Vec::new() } else { (0..self.scenes).map(draw).collect() }

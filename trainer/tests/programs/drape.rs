@@ -178,8 +178,13 @@ fn a_posed_outfit_leaves_every_output_and_each_reads_back() {
         report["garments"].as_array().unwrap().iter().map(|g| g["name"].as_str().unwrap()).collect();
     assert_eq!(names, [SKIRT, TEE, "band"]);
     for phase in ["embedding", "draping", "untangling", "resolve"] {
-        assert!(report["milliseconds"][phase].as_f64().is_some_and(|ms| ms > 0.0), "{phase}");
-        assert!(report["garments"][0]["milliseconds"][phase].as_f64().is_some_and(f64::is_finite), "{phase}");
+        let all = report["milliseconds"][phase].as_f64().unwrap();
+        let parts = report["garments"].as_array().unwrap().iter();
+        let sum: f64 = parts.map(|g| g["milliseconds"][phase].as_f64().unwrap()).sum();
+        assert!(
+            all > 0.0 && (all - sum).abs() < 1e-9 * all,
+            "{phase}: {all} ms of all, {sum} ms of the garments"
+        );
     }
     for score in ["before", "after"] {
         assert!(report[score]["garments"][1]["raw"]["strain"].as_f64().is_some_and(f64::is_finite));
@@ -200,6 +205,11 @@ fn a_posed_outfit_leaves_every_output_and_each_reads_back() {
     let pinched = |key: &str| report["certificate"]["pinched"][key].as_u64().unwrap() as usize;
     assert_eq!(count("body_triangle_pairs") + pinched("body_triangle_pairs"), with_body);
     assert_eq!(count("layer_triangle_pairs") + pinched("layer_triangle_pairs"), between);
+    for certificate in ["certificate", "certificate_before"] {
+        let pairs = report[certificate]["layers"].as_array().unwrap().iter();
+        let sum: u64 = pairs.map(|pair| pair["triangle_pairs"].as_u64().unwrap()).sum();
+        assert_eq!(Some(sum), report[certificate]["layer_triangle_pairs"].as_u64(), "{certificate}");
+    }
     assert_eq!(
         count("body_triangle_pairs") + count("layer_triangle_pairs"),
         0,
@@ -399,7 +409,7 @@ fn wrong_input_names_itself_and_leaves_nothing() {
     fs::create_dir(&out).unwrap();
     fs::write(Path::new(&out).join("thesis.tex"), "x").unwrap();
     assert!(failure(&mut drape(&to(&["--garments", TEE], &out)), 1).contains("not empty"));
-    assert!(failure(&mut drape(&to(&["--garments", TEE, "--replace"], &out)), 1).contains("report.json"));
+    assert!(failure(&mut drape(&to(&["--garments", TEE, "--replace"], &out)), 1).contains("not written by"));
     assert_eq!(fs::read_dir(&out).unwrap().count(), 1);
     let left: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
     assert!(left.iter().all(|n| !n.to_string_lossy().ends_with(".tmp")), "{left:?}");
@@ -441,4 +451,58 @@ fn a_model_is_three_files_and_a_damaged_or_missing_one_is_named() {
     fs::remove_dir_all(&models).unwrap();
     let message = failure(&mut run(&["-o", "d"]), 1);
     assert!(message.contains("no trained model") && message.contains("--checkpoint"), "{message}");
+}
+
+#[test]
+fn garments_that_do_not_lie_on_the_body_as_they_are_are_fitted() {
+    let folder = tempfile::tempdir().unwrap();
+    let plain = at(&folder, "plain");
+    drape(&["--garments", TEE, "--shape", "-0.5,1", "-o", &plain]).assert().success();
+    let rest = folder.path().join("made");
+    // The garment itself as a file, inside out, and one a hundred times as large in a folder.
+    let made = Command::cargo_bin("clothcombo")
+        .unwrap()
+        .args([
+            "generate",
+            "--count",
+            "1",
+            "--seed",
+            "5",
+            "--vertices",
+            "250",
+            "--categories",
+            "t_shirt",
+            "-o",
+        ])
+        .arg(&rest)
+        .output()
+        .unwrap();
+    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+    let text = fs::read_to_string(rest.join(format!("{TEE}.obj"))).unwrap();
+    let changed = |change: &dyn Fn(&[&str]) -> Option<String>| -> String {
+        text.lines()
+            .map(|l| change(&l.split(' ').collect::<Vec<_>>()).unwrap_or(l.to_owned()) + "\n")
+            .collect()
+    };
+    let turned = changed(&|words| match words {
+        ["f", a, b, c] => Some(format!("f {a} {c} {b}")),
+        _ => None,
+    });
+    let large = changed(&|words| match words {
+        ["v", x, y, z] => {
+            let [x, y, z] = [x, y, z].map(|v| 100.0 * v.parse::<f64>().unwrap());
+            Some(format!("v {x} {y} {z}"))
+        }
+        _ => None,
+    });
+    let wardrobe = folder.path().join("wardrobe");
+    fs::create_dir(&wardrobe).unwrap();
+    fs::write(folder.path().join("turned.obj"), turned).unwrap();
+    fs::write(wardrobe.join("large.obj"), large).unwrap();
+    let (turned, wardrobe, out) = (at(&folder, "turned.obj"), at(&folder, "wardrobe"), at(&folder, "out"));
+    drape(&["--garments", &turned, "large", "--dataset", &wardrobe, "-o", &out]).assert().success();
+    let report = report(Path::new(&out));
+    let fit = |garment: usize| &report["garments"][garment]["fit"];
+    assert_eq!(fit(0)["repairs"][0]["kind"].as_str(), Some("turned_faces"), "{}", fit(0));
+    assert_eq!(fit(1)["placement"]["unit"].as_str(), Some("cm"), "{}", fit(1));
 }

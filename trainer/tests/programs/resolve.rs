@@ -151,17 +151,68 @@ fn files_that_cannot_be_used_are_named() {
     case.must_fail(&["tee.obj", "coat.obj"], &["--rest", "tee.obj"], &["1 rest meshes", "2 garments"]);
     case.must_fail(&["tee.obj"], &["--rest", "coat.obj"], &["tee.obj", "coat.obj", "vertices"]);
     case.must_fail(&["tee.obj"], &["--gap-mm", "0"], &["gap", "greater than 0"]);
+    case.write("beside.obj", &with_vertices(&quad_tube(0.149, 40, 12), |[x, y, z]| [x + 2.0, y, z]));
+    case.must_fail(&["beside.obj"], &[], &["beside.obj", "beside the body", "x from"]);
+    case.write("large.obj", &with_vertices(&quad_tube(0.149, 40, 12), |p| p.map(|x| 1e3 * x)));
+    case.must_fail(&["tee.obj", "large.obj"], &[], &["large.obj", "one unit"]);
     let body = fs::read_to_string(case.path("body.obj")).unwrap();
-    let centimetres: String = body
+    case.write("body.obj", &with_vertices(&body, |p| p.map(|x| 1e3 * x)));
+    case.must_fail(&["tee.obj"], &[], &["body.obj", "metres"]);
+}
+
+#[test]
+fn a_body_that_is_inside_out_is_turned_and_names_are_told_apart() {
+    let case = Case::new();
+    case.command(&["tee.obj"], &["-o", "right"]).assert().success();
+    let body = fs::read_to_string(case.path("body.obj")).unwrap();
+    let turned: Vec<String> = body
         .lines()
-        .map(|line| match line.strip_prefix("v ") {
-            Some(numbers) => {
-                let scaled = numbers.split(' ').map(|x| (1e3 * x.parse::<f64>().unwrap()).to_string());
-                format!("v {}\n", scaled.collect::<Vec<_>>().join(" "))
-            }
-            None => format!("{line}\n"),
+        .map(|line| match line.split(' ').collect::<Vec<_>>()[..] {
+            ["f", a, b, c] => format!("f {a} {c} {b}"),
+            _ => line.to_owned(),
         })
         .collect();
-    case.write("body.obj", &centimetres);
-    case.must_fail(&["tee.obj"], &[], &["body.obj", "metres"]);
+    case.write("body.obj", &turned.join("\n"));
+    let said = case.command(&["tee.obj"], &["-o", "turned"]).assert().success();
+    assert!(String::from_utf8_lossy(&said.get_output().stderr).contains("inside out"));
+    let read = |name: &str| fs::read(case.path(name)).unwrap();
+    assert!(read("right/tee.obj") == read("turned/tee.obj"));
+
+    // The third one must not become the file of the first.
+    case.write("a/tee.obj", &quad_tube(0.16, 40, 12));
+    case.write("tee-2.obj", &quad_tube(0.17, 36, 12));
+    case.command(&["tee.obj", "tee-2.obj", "a/tee.obj"], &["-o", "three"]).assert().success();
+    let mut files: Vec<_> = fs::read_dir(case.path("three"))
+        .unwrap()
+        .map(|e| e.unwrap().file_name().into_string().unwrap())
+        .collect();
+    files.sort();
+    assert_eq!(files, [".clothcombo-files", "report.json", "tee-2.obj", "tee-3.obj", "tee.obj"]);
+}
+
+#[test]
+fn nothing_is_written_over() {
+    let case = Case::new();
+    let before = fs::read(case.path("tee.obj")).unwrap();
+    case.must_fail(&["tee.obj"], &["-o", "."], &["names no new folder"]);
+    case.must_fail(&["tee.obj"], &["-o", "../work/..", "--replace"], &["names no new folder"]);
+    case.command(&["tee.obj"], &["-o", "out"]).assert().success();
+    case.must_fail(&["coat.obj"], &["-o", "out"], &["out is there", "--replace"]);
+    case.must_fail(&["out/tee.obj"], &["-o", "out", "--replace"], &["out/tee.obj in it is read"]);
+    case.command(&["coat.obj"], &["-o", "out", "--replace"]).assert().success();
+    assert!(!case.path("out/tee.obj").exists() && case.path("out/coat.obj").exists());
+    assert!(fs::read(case.path("tee.obj")).unwrap() == before);
+}
+
+/// An OBJ text with other vertex positions.
+fn with_vertices(text: &str, change: impl Fn([f64; 3]) -> [f64; 3]) -> String {
+    let line = |line: &str| match line.strip_prefix("v ") {
+        Some(numbers) => {
+            let numbers: Vec<f64> = numbers.split(' ').map(|x| x.parse().unwrap()).collect();
+            let [x, y, z] = change([numbers[0], numbers[1], numbers[2]]);
+            format!("v {x} {y} {z}\n")
+        }
+        None => format!("{line}\n"),
+    };
+    text.lines().map(line).collect()
 }

@@ -49,6 +49,9 @@ pub struct Certificate {
     pub remaining: Vec<RemainingPair>,
     /// Per garment, innermost first.
     pub garments: Vec<GarmentCertificate>,
+    /// Per pair of layers.
+    #[serde(default)]
+    pub layers: Vec<LayerCertificate>,
 }
 
 /// Pairs that no cloth could avoid: where one part of the body lies inside another.
@@ -80,6 +83,19 @@ pub struct GarmentCertificate {
     pub self_triangle_pairs: usize,
     /// Strain energy [J].
     pub strain_joule: f64,
+}
+
+/// The share of two layers. Indices are 0-based.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct LayerCertificate {
+    /// The inner garment.
+    pub inner: usize,
+    /// The outer garment.
+    pub outer: usize,
+    /// Pairs of their triangles.
+    pub triangle_pairs: usize,
+    /// Share of the outer one's vertices over or under the inner one that lie under it, 0–1.
+    pub order_violations: f64,
 }
 
 /// What a garment triangle crosses.
@@ -232,11 +248,17 @@ pub(super) fn certificate(body: &BodyObstacle<'_>, layers: &[Layer<'_>]) -> Cert
                 .with_min_len(128)
                 .filter_map(|p| under.look(*p, order_reach(), 0.0).map(|plane| plane.distance))
                 .collect();
-            judged += order.len();
-            let below = order.into_iter().filter(|d| *d < 0.0).map(|d| -d);
             let before = depths.len();
-            depths.extend(below);
-            wrong += depths.len() - before;
+            depths.extend(order.iter().filter(|d| **d < 0.0).map(|d| -d));
+            let below = depths.len() - before;
+            found.layers.push(LayerCertificate {
+                inner: i,
+                outer: index,
+                triangle_pairs: pairs.len(),
+                order_violations: below as f64 / order.len().max(1) as f64,
+            });
+            judged += order.len();
+            wrong += below;
         }
 
         let all = tree.self_pairs();

@@ -52,7 +52,9 @@ mod untangle;
 
 use std::time::{Duration, Instant};
 
-pub use certificate::{Certificate, Crossed, GarmentCertificate, PinchedPairs, RemainingPair, certify};
+pub use certificate::{
+    Certificate, Crossed, GarmentCertificate, LayerCertificate, PinchedPairs, RemainingPair, certify,
+};
 pub use error::ResolveError;
 pub use follow::{Reached, Waypoint, resolve_after, resolve_along};
 pub use garment::{Layer, RestGarment};

@@ -4,6 +4,7 @@ use super::contact::{along_line, normal_of};
 use super::near::MARGIN;
 use super::relief::Relief;
 use crate::contact::TriangleTree;
+use crate::mesh::is_closed;
 use crate::query::{ClosestPoint, FaceSide, Surface, SurfacePoint, UnionDistance};
 use crate::vec3::{add_scaled, dot, is_finite, scale, sub};
 use std::sync::OnceLock;
@@ -184,16 +185,6 @@ impl BodyObstacle<'_> {
 /// Which faces have a corner that is `touched`.
 fn touching(faces: &[[u32; 3]], touched: &[bool]) -> Vec<bool> {
     faces.iter().map(|face| face.iter().any(|&v| touched[v as usize])).collect()
-}
-
-/// Whether every edge has two faces.
-fn is_closed(faces: &[[u32; 3]]) -> bool {
-    let mut edges: Vec<[u32; 2]> = faces
-        .iter()
-        .flat_map(|f| (0..3).map(|k| [f[k].min(f[(k + 1) % 3]), f[k].max(f[(k + 1) % 3])]))
-        .collect();
-    edges.sort_unstable();
-    edges.chunk_by(|a, b| a == b).all(|same| same.len() % 2 == 0)
 }
 
 #[cfg(test)]

@@ -141,6 +141,9 @@ fn reversed_layers_change_places() {
     let scene = Scene::new(&trunk, &[wide, narrow]);
     let before = certify(&scene.body, &scene.layers()).unwrap();
     assert!(before.is_clear() && before.order_violations > 0.9, "{before:?}");
+    let [pair] = before.layers[..] else { panic!("one pair of layers: {:?}", before.layers) };
+    assert_eq!((pair.inner, pair.outer, pair.triangle_pairs), (0, 1, 0));
+    assert_eq!(pair.order_violations, before.order_violations);
     let done = scene.resolved();
     assert_eq!(scene.pairs(&done.positions), 0, "{:?}", done.certificate);
     assert_eq!(done.certificate.order_violations, 0.0);

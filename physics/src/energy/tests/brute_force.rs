@@ -36,8 +36,12 @@ fn repulsion_is_the_double_loop() {
         let count = rest.vertex_count() as f64;
         for (normalised, scale) in [(true, 1.0 / count), (false, 1.0)] {
             let mut gradient = vec![[0.0; 3]; rest.vertex_count()];
-            let value = Repulsion::new(&topology, radius, normalised, None)
-                .evaluate(posed.positions(), Some(Weighted { weight: 1.0 / scale, gradient: &mut gradient }));
+            let target = Weighted { weight: 1.0 / scale, gradient: &mut gradient };
+            let value = Repulsion::new(&topology, radius, normalised, None).evaluate(
+                posed.positions(),
+                0,
+                Some(target),
+            );
             assert!((value / (scale * sum) - 1.0).abs() < 1e-12, "{value} {}", scale * sum);
             let largest = super::scenes::largest(&expected);
             for (g, e) in gradient.iter().zip(&expected) {
@@ -48,18 +52,38 @@ fn repulsion_is_the_double_loop() {
 }
 
 #[test]
-fn the_random_subset_estimates_the_full_sum() {
-    // One large garment and one fixed draw: the standard error of the estimate is a few per cent.
-    let rest = garment(0.12, 40, 24, 1);
-    let topology = Topology::new(&rest);
-    let full = Repulsion::new(&topology, 0.1, true, None).evaluate(rest.positions(), None);
-    let subset = Repulsion::new(&topology, 0.1, true, Some(64)).evaluate(rest.positions(), None);
-    assert!((subset / full - 1.0).abs() < 0.03, "{subset} {full}");
-    assert!(subset != full);
+fn random_subsets_are_unbiased_estimates_of_the_full_sum() {
+    let rest = garment(0.12, 17, 8, 1);
+    let posed = jittered(&rest, 0.02, 4);
+    let (topology, count) = (Topology::new(&rest), rest.vertex_count());
+    let evaluate = |subset: Option<usize>, sample: u32| {
+        let mut gradient = vec![[0.0; 3]; count];
+        let target = Weighted { weight: 1.0, gradient: &mut gradient };
+        let value =
+            Repulsion::new(&topology, 0.1, true, subset).evaluate(posed.positions(), sample, Some(target));
+        (value, gradient)
+    };
+    let (full, full_gradient) = evaluate(None, 0);
+    const SAMPLES: u32 = 4000;
+    let (mut sum, mut squares, mut gradients) = (0.0, 0.0, vec![[0.0; 3]; count]);
+    for sample in 0..SAMPLES {
+        let (value, gradient) = evaluate(Some(4), sample);
+        assert_eq!((value, &gradient), (evaluate(Some(4), sample).0, &gradient));
+        sum += value;
+        squares += value * value;
+        gradients.iter_mut().zip(gradient).for_each(|(all, own)| vec3::axpy(all, 1.0, own));
+    }
+    let mean = sum / f64::from(SAMPLES);
+    let deviation = (squares / f64::from(SAMPLES) - mean * mean).sqrt();
+    assert!(deviation > 0.01 * full, "samples differ: {deviation}");
+    assert!((mean - full).abs() < 4.0 * deviation / f64::from(SAMPLES).sqrt(), "{mean} {full} {deviation}");
+    let difference =
+        |g: &[f64; 3], e: &[f64; 3]| vec3::norm(vec3::sub(vec3::scale(*g, 1.0 / f64::from(SAMPLES)), *e));
+    let off: f64 = gradients.iter().zip(&full_gradient).map(|(g, e)| difference(g, e)).sum();
+    let size: f64 = full_gradient.iter().map(|g| vec3::norm(*g)).sum();
+    assert!(off < 0.15 * size, "{off} of {size}");
     // As many partners as there are: the full sum itself.
-    let all =
-        Repulsion::new(&topology, 0.1, true, Some(rest.vertex_count())).evaluate(rest.positions(), None);
-    assert_eq!(all, full);
+    assert_eq!(evaluate(Some(count / 2), 3).0, full);
 }
 
 #[test]

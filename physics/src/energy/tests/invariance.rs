@@ -23,7 +23,7 @@ fn internal(rest: &TriMesh, posed: &TriMesh) -> [(f64, Vec<[f64; 3]>); 3] {
     [
         evaluate(&|t| strain.evaluate(p, t)),
         evaluate(&|t| bending.evaluate(p, t)),
-        evaluate(&|t| repulsion.evaluate(p, t)),
+        evaluate(&|t| repulsion.evaluate(p, 0, t)),
     ]
 }
 

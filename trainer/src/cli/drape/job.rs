@@ -13,7 +13,7 @@ use std::str::FromStr;
 #[derive(Args, Clone, Debug, Default)]
 pub(super) struct SceneArguments {
     /// Shape parameters; missing ones are 0
-    #[arg(long, value_delimiter = ',', allow_negative_numbers = true, value_name = "NUMBERS")]
+    #[arg(long, value_delimiter = ',', allow_hyphen_values = true, value_name = "NUMBERS")]
     pub shape: Vec<f64>,
     /// Pose: a frame of a motion file, FILE.npz or FILE.npz:FRAME; default: the T-pose
     #[arg(long, value_name = "POSE", conflicts_with_all = ["motion", "posed"])]
@@ -82,6 +82,15 @@ pub(super) struct Scenes {
 }
 
 impl Job {
+    /// Files that are read, names of garments among them.
+    pub fn files(&self) -> impl Iterator<Item = PathBuf> {
+        let SceneArguments { pose, motion, posed, t_pose, .. } = &self.scene;
+        let pose =
+            pose.iter().map(|pose| PathBuf::from(pose.rsplit_once(':').map_or(pose.as_str(), |p| p.0)));
+        let scene = pose.chain([motion, posed, t_pose].into_iter().flatten().cloned());
+        self.garments.iter().map(PathBuf::from).chain(scene)
+    }
+
     /// Reads pose, motion or meshes.
     pub fn scenes(&self, draper: &Draper) -> Result<Scenes, Failure> {
         let (body, scene) = (draper.body(), &self.scene);

@@ -4,16 +4,17 @@ mod job;
 mod outfits;
 mod summary;
 
+use crate::cli::interrupted::remove_on_signals;
 use crate::cli::verbosity::{progress_bar, say};
 use crate::device::Backend;
 use crate::draper::output::{Show, Staged, write};
-use crate::draper::{Drape, Draper, DraperSettings, Outfit, Report, SourceGarment, smooth};
+use crate::draper::{Drape, Draper, DraperSettings, MotionProgress, Outfit, Report, SourceGarment, smooth};
 use clap::{Parser, ValueEnum};
 use clothcombo_data::format::atomic;
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use indicatif::ProgressBar;
 use job::{Job, Scenes, ordered};
-use miette::{IntoDiagnostic, Report as Failure, WrapErr};
+use miette::{IntoDiagnostic, Report as Failure, WrapErr, miette};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -65,8 +66,9 @@ pub struct Arguments {
     #[arg(long, default_value_t = 1.0, value_name = "MM")]
     gap: f64,
     /// Smooths a motion over this many frames to each side; never makes an intersection
-    #[arg(long, num_args = 0..=1, default_value_t = 0, default_missing_value = "2", value_name = "FRAMES")]
-    smooth: usize,
+    #[arg(long, num_args = 0..=1, default_value_t = 0, default_missing_value = "2", value_name = "FRAMES",
+          value_parser = clap::value_parser!(u16).range(..=100))]
+    smooth: u16,
     /// Folder that keeps embeddings between runs; default: clothcombo in the user's cache folder
     #[arg(long, value_name = "FOLDER")]
     cache: Option<PathBuf>,
@@ -118,7 +120,12 @@ impl Fit {
 /// certificate lists them.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let jobs = jobs(arguments)?;
-    let staged = Staged::new(&arguments.output, arguments.replace)?;
+    if arguments.smooth > 0 && jobs.iter().all(|job| job.scene.motion.is_none()) {
+        return Err(miette!(help = "give --motion FILE, or leave --smooth out", "--smooth without a motion"));
+    }
+    let inputs: Vec<PathBuf> = jobs.iter().flat_map(Job::files).chain(arguments.outfits.clone()).collect();
+    let staged = Staged::new(&arguments.output, arguments.replace, &inputs)?;
+    remove_on_signals(staged.folder());
     let clock = Instant::now();
     let draper = Draper::load(arguments.checkpoint.as_deref(), &settings(arguments)?)?;
     let closet = draper.closet(&arguments.dataset)?;
@@ -137,13 +144,17 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         let sources = ordered(sources, job.order.as_deref())?;
         sources.iter().for_each(tell_repairs);
         let scenes = job.scenes(&draper)?;
+        tell_shape(&scenes.body.shape, draper.trained().config.data.shape_range);
         let outfit = draper.outfit(sources)?;
         let folder = match jobs.len() {
             1 => staged.folder().to_owned(),
             _ => staged.folder().join(&job.name),
         };
-        let report = drape_job(arguments, &draper, &outfit, job, &scenes, &folder)
-            .wrap_err_with(|| format!("outfit {}", job.name))?;
+        let report = drape_job(arguments, &draper, &outfit, job, &scenes, &folder);
+        let report = match jobs.len() {
+            1 => report?,
+            _ => report.wrap_err_with(|| format!("outfit {}", job.name))?,
+        };
         reports.push((job.name.as_str(), report));
     }
     if jobs.len() > 1 {
@@ -197,6 +208,12 @@ fn user_cache() -> Option<PathBuf> {
     Some(cache.or_else(|| Some(folder("HOME")?.join(".cache")))?.join("clothcombo"))
 }
 
+fn tell_shape(shape: &[f64], [low, high]: [f64; 2]) {
+    if let Some(value) = shape.iter().find(|value| !(low..=high).contains(*value)) {
+        tracing::warn!("shape parameter {value}: the model was trained with {low} to {high}");
+    }
+}
+
 fn tell_repairs(source: &SourceGarment) {
     let Some(fit) = &source.fit else { return };
     let name = &source.garment.name;
@@ -217,7 +234,7 @@ fn drape_job(
     let mut drapes = drape_all(draper, outfit, scenes)?;
     let smoothing = match arguments.smooth {
         radius if radius > 0 && !scenes.moments.is_empty() => {
-            Some(smooth(draper, outfit, &mut drapes, radius)?)
+            Some(smooth(draper, outfit, &mut drapes, usize::from(radius))?)
         }
         _ => None,
     };
@@ -249,9 +266,14 @@ fn drape_job(
 fn drape_all(draper: &Draper, outfit: &Outfit, scenes: &Scenes) -> Result<Vec<Drape>, Failure> {
     let bar = match scenes.states.len() {
         1 => ProgressBar::hidden(),
-        frames => progress_bar(frames, "frames {bar:30} {pos}/{len} · {eta} left"),
+        frames => progress_bar(frames, "frames {bar:30} {pos}/{len} · {eta} left{msg}"),
     };
-    let drapes = draper.drape_motion(outfit, &scenes.states, || bar.inc(1))?;
+    let drapes = draper.drape_motion(outfit, &scenes.states, |progress| match progress {
+        MotionProgress::Draped => bar.inc(1),
+        MotionProgress::Again(frame) => {
+            bar.set_message(format!(" · number {} once more, from the one after it", frame + 1));
+        }
+    })?;
     bar.finish_and_clear();
     Ok(drapes)
 }

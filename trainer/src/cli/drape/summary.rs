@@ -9,7 +9,7 @@ const TERMS: [&str; 5] = ["strain", "bending", "gravity", "body_collision", "rep
 
 pub(super) fn tables(report: &Report) -> String {
     let mut parts = vec![garments(report), times(report), scores(report)];
-    if !report.after.layers.is_empty() {
+    if !report.certificate.layers.is_empty() {
         parts.push(layers(report));
     }
     parts.push(certificate(report));
@@ -50,9 +50,22 @@ fn times(report: &Report) -> String {
     table(&head, &rows)
 }
 
+/// Scores, and what the layers were before, are those of a motion's first frame.
+fn of_first_frame(report: &Report, what: &str) -> String {
+    if report.frames.len() > 1 { format!("{what}, first frame") } else { what.to_owned() }
+}
+
 fn scores(report: &Report) -> String {
-    let head =
-        ["score", "state", "strain [J]", "bending [J]", "gravity [J]", "collision [m³]", "repulsion [1]"];
+    let first = of_first_frame(report, "score");
+    let head = [
+        first.as_str(),
+        "state",
+        "strain [J]",
+        "bending [J]",
+        "gravity [J]",
+        "collision [m³]",
+        "repulsion [1]",
+    ];
     let contact = ["inside [%]", "depth [mm]", "body pairs", "self pairs"];
     let head: Vec<&str> = head.into_iter().chain(contact).collect();
     let row = |score: &Score, state: &str, index: usize| {
@@ -74,13 +87,15 @@ fn scores(report: &Report) -> String {
 }
 
 fn layers(report: &Report) -> String {
-    let head = ["layers", "pairs before", "after", "wrong side before [%]", "after [%]"];
+    let first = of_first_frame(report, "layers");
+    let after = report.frames.first().map_or(&report.certificate, |frame| &frame.certificate);
+    let head = [first.as_str(), "pairs before", "after", "wrong side before [%]", "after [%]"];
     let name = |i: usize| &report.garments[i].name;
     let rows: Vec<_> = report
-        .before
+        .certificate_before
         .layers
         .iter()
-        .zip(&report.after.layers)
+        .zip(&after.layers)
         .map(|(before, after)| {
             vec![
                 format!("{} under {}", name(before.inner), name(before.outer)),
@@ -106,7 +121,8 @@ fn certificate(report: &Report) -> String {
         found.max_depth_mm
     );
     if let Some(strain) = found.strain_added {
-        text += &format!(", strain {:+.1} %", 100.0 * strain);
+        let worst = if report.frames.len() > 1 { " in the worst frame" } else { "" };
+        text += &format!(", strain {:+.1} %{worst}", 100.0 * strain);
     }
     let pinched = found.pinched.count();
     if pinched > 0 {

@@ -29,19 +29,37 @@ use thiserror::Error;
 pub enum OutputError {
     /// Something else is there.
     #[error("{} is there and is not empty", path.display())]
-    #[diagnostic(help("choose another folder, or pass --replace if it holds an earlier drape"))]
+    #[diagnostic(help("choose another folder, or pass --replace if it holds earlier results"))]
     Occupied {
         /// The folder.
         path: PathBuf,
     },
-    /// What is to be replaced is no drape.
-    #[error("{} is no folder that a drape was written to: it has no report.json", path.display())]
-    #[diagnostic(help(
-        "--replace removes the whole folder, and so only takes folders this verb has written"
-    ))]
+    /// Something else is among what is to be replaced.
+    #[error("{} holds {file}, which was not written with the rest", path.display())]
+    #[diagnostic(help("--replace removes the whole folder: move the file away, or choose another folder"))]
     Foreign {
         /// The folder.
         path: PathBuf,
+        /// The file, relative to the folder.
+        file: String,
+    },
+    /// What is to be replaced was not written here, or by an early version.
+    #[error("{} is there and was not written by this program", path.display())]
+    #[diagnostic(help(
+        "--replace only takes folders that drape or resolve has written; choose another folder"
+    ))]
+    NotOurs {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// What is to be replaced is being read.
+    #[error("{} would be replaced, and {} in it is read", path.display(), input.display())]
+    #[diagnostic(help("choose another folder for the output"))]
+    Input {
+        /// The folder.
+        path: PathBuf,
+        /// The input.
+        input: PathBuf,
     },
     /// The path names no folder that could be made.
     #[error("{} names no new folder", path.display())]

@@ -1,13 +1,14 @@
 //! A folder that appears whole or not at all.
 
 use super::OutputError;
+use std::collections::HashSet;
 use std::fs;
 use std::hash::{BuildHasher, RandomState};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Marks a folder as one that a drape was written to.
-const MARK: &str = "report.json";
+/// Lists the files of a folder that was written here, one relative path a line: `--replace` removes nothing else.
+const LIST: &str = ".clothcombo-files";
 
 /// A folder under a temporary name beside its target; removed again unless it is [committed](Self::commit).
 #[derive(Debug)]
@@ -18,26 +19,26 @@ pub struct Staged {
 }
 
 impl Staged {
-    /// Starts a folder that will become `target`, which must not exist or be empty, or hold an earlier drape if `replace`.
+    /// Starts a folder that will become `target`, which must not exist or be empty, or hold what an earlier one held and
+    /// none of `inputs` if `replace`.
     ///
     /// # Errors
     /// When something else is there, or the folder cannot be made.
-    pub fn new(target: &Path, replace: bool) -> Result<Self, OutputError> {
+    pub fn new(target: &Path, replace: bool, inputs: &[PathBuf]) -> Result<Self, OutputError> {
         let name = target.file_name().ok_or_else(|| OutputError::NoName { path: target.into() })?;
-        if target.exists() && !is_empty_folder(target) {
-            match replace {
-                false => return Err(OutputError::Occupied { path: target.into() }),
-                true if !target.join(MARK).is_file() => {
-                    return Err(OutputError::Foreign { path: target.into() });
-                }
-                true => {}
+        // A link to a folder stays a link.
+        let target = fs::canonicalize(target).unwrap_or_else(|_| target.to_owned());
+        if target.exists() && !is_empty_folder(&target) {
+            if !replace {
+                return Err(OutputError::Occupied { path: target });
             }
+            check_own(&target, inputs)?;
         }
         let number = RandomState::new().hash_one(0);
         let temporary = target.with_file_name(format!(".{}.{number:016x}.tmp", name.to_string_lossy()));
         fs::create_dir_all(&temporary)
             .map_err(|reason| OutputError::Io { path: temporary.clone(), reason })?;
-        Ok(Self { target: target.into(), temporary, is_committed: false })
+        Ok(Self { target, temporary, is_committed: false })
     }
 
     /// Where to write.
@@ -51,6 +52,8 @@ impl Staged {
     /// When it cannot be renamed; what was there before is left as it was.
     pub fn commit(mut self) -> Result<(), OutputError> {
         let failed = |reason: io::Error| OutputError::Io { path: self.target.clone(), reason };
+        let list: String = files(&self.temporary).map_err(failed)?.iter().map(|f| format!("{f}\n")).collect();
+        fs::write(self.temporary.join(LIST), list).map_err(failed)?;
         let earlier = self.temporary.with_extension("old");
         let had_earlier = self.target.exists();
         if had_earlier {
@@ -81,6 +84,42 @@ impl Drop for Staged {
     }
 }
 
+/// Whether all of `folder` was written here, and none of it is read now.
+fn check_own(folder: &Path, inputs: &[PathBuf]) -> Result<(), OutputError> {
+    let path = folder.to_owned();
+    let Ok(list) = fs::read_to_string(folder.join(LIST)) else {
+        return Err(OutputError::NotOurs { path });
+    };
+    let own: HashSet<&str> = list.lines().chain([LIST]).collect();
+    let found = files(folder).map_err(|reason| OutputError::Io { path: path.clone(), reason })?;
+    if let Some(file) = found.into_iter().find(|file| !own.contains(file.as_str())) {
+        return Err(OutputError::Foreign { path, file });
+    }
+    let is_inside = |input: &&PathBuf| fs::canonicalize(input).is_ok_and(|input| input.starts_with(folder));
+    match inputs.iter().find(is_inside) {
+        Some(input) => Err(OutputError::Input { path, input: input.clone() }),
+        None => Ok(()),
+    }
+}
+
+/// Everything in `folder` that is no folder, relative to it, in order.
+fn files(folder: &Path) -> io::Result<Vec<String>> {
+    let mut found = Vec::new();
+    let mut folders = vec![PathBuf::new()];
+    while let Some(inner) = folders.pop() {
+        for entry in fs::read_dir(folder.join(&inner))? {
+            let entry = entry?;
+            let path = inner.join(entry.file_name());
+            match entry.file_type()?.is_dir() {
+                true => folders.push(path),
+                false => found.push(path.to_string_lossy().into_owned()),
+            }
+        }
+    }
+    found.sort();
+    Ok(found)
+}
+
 fn is_empty_folder(path: &Path) -> bool {
     fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none())
 }
@@ -98,39 +137,62 @@ mod tests {
         names
     }
 
+    fn written(target: &Path, replace: bool, text: &str) -> Result<(), OutputError> {
+        let staged = Staged::new(target, replace, &[])?;
+        fs::create_dir_all(staged.folder().join("frames")).unwrap();
+        fs::write(staged.folder().join("frames/a.obj"), text).unwrap();
+        staged.commit()
+    }
+
     #[test]
     fn a_folder_appears_whole_and_an_abandoned_one_not_at_all() {
         let place = tempfile::tempdir().unwrap();
         let target = place.path().join("out");
-        let staged = Staged::new(&target, false).unwrap();
+        let staged = Staged::new(&target, false, &[]).unwrap();
         fs::write(staged.folder().join("a.obj"), "x").unwrap();
         assert!(!target.exists());
         drop(staged);
         assert!(names(place.path()).is_empty());
-        let staged = Staged::new(&target, false).unwrap();
-        fs::write(staged.folder().join(MARK), "1").unwrap();
-        staged.commit().unwrap();
+        written(&target, false, "1").unwrap();
         assert_eq!(names(place.path()), ["out"]);
-        assert_eq!(names(&target), [MARK]);
+        assert_eq!(names(&target), [LIST, "frames"]);
+        assert!(matches!(Staged::new(Path::new("/"), false, &[]), Err(OutputError::NoName { .. })));
     }
 
     #[test]
-    fn only_an_earlier_drape_is_replaced_and_only_when_asked() {
+    fn only_what_was_written_here_is_replaced_and_only_when_asked() {
         let place = tempfile::tempdir().unwrap();
         let target = place.path().join("out");
         fs::create_dir(&target).unwrap();
-        drop(Staged::new(&target, false).unwrap());
-        fs::write(target.join("thesis.tex"), "x").unwrap();
-        assert!(matches!(Staged::new(&target, false), Err(OutputError::Occupied { .. })));
-        assert!(matches!(Staged::new(&target, true), Err(OutputError::Foreign { .. })));
-        fs::write(target.join(MARK), "1").unwrap();
-        assert!(matches!(Staged::new(&target, false), Err(OutputError::Occupied { .. })));
-        let staged = Staged::new(&target, true).unwrap();
-        fs::write(staged.folder().join(MARK), "2").unwrap();
-        assert_eq!(fs::read_to_string(target.join(MARK)).unwrap(), "1");
-        staged.commit().unwrap();
-        assert_eq!(fs::read_to_string(target.join(MARK)).unwrap(), "2");
-        assert_eq!((names(place.path()), names(&target)), (vec!["out".into()], vec![MARK.into()]));
-        assert!(matches!(Staged::new(Path::new("/"), false), Err(OutputError::NoName { .. })));
+        written(&target, false, "1").unwrap();
+        assert!(matches!(written(&target, false, "2"), Err(OutputError::Occupied { .. })));
+        written(&target, true, "2").unwrap();
+        let file = target.join("frames/a.obj");
+        assert_eq!(fs::read_to_string(&file).unwrap(), "2");
+        // Neither what is read now is lost, nor what someone else has put there.
+        let reading = Staged::new(&target, true, std::slice::from_ref(&file));
+        assert!(matches!(reading, Err(OutputError::Input { .. })));
+        fs::write(target.join("frames/thesis.tex"), "x").unwrap();
+        let Err(OutputError::Foreign { file: foreign, .. }) = written(&target, true, "3") else {
+            panic!("a thesis was thrown away")
+        };
+        assert_eq!(Path::new(&foreign), Path::new("frames/thesis.tex"));
+        assert_eq!(names(&target.join("frames")), ["a.obj", "thesis.tex"]);
+        fs::remove_file(target.join(LIST)).unwrap();
+        assert!(matches!(written(&target, true, "3"), Err(OutputError::NotOurs { .. })));
+        assert_eq!(names(place.path()), ["out"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_to_a_folder_stays_a_link() {
+        let place = tempfile::tempdir().unwrap();
+        let [real, link] = ["real", "link"].map(|name| place.path().join(name));
+        fs::create_dir(&real).unwrap();
+        std::os::unix::fs::symlink(&real, &link).unwrap();
+        written(&link, false, "1").unwrap();
+        written(&link, true, "2").unwrap();
+        assert!(link.is_symlink());
+        assert_eq!(fs::read_to_string(real.join("frames/a.obj")).unwrap(), "2");
     }
 }
