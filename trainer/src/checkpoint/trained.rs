@@ -27,8 +27,8 @@ impl TrainedModel {
     /// # Errors
     /// When there is none, or one of the three files is missing, damaged or of another version.
     pub fn open(path: &Path) -> Result<Self, CheckpointError> {
-        let path = match path.is_file() {
-            true => path.parent().unwrap_or(Path::new("")),
+        let path = match path.file_name().is_some_and(|name| name == MODEL_EXCHANGE) && path.is_file() {
+            true => path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new(".")),
             false => path,
         };
         newest(path, |folder| {

@@ -57,7 +57,8 @@ pub fn run(verb: &Verb) -> Result<(), Report> {
 
 fn check(arguments: &CheckArguments) -> Result<(), Report> {
     let config = load(&arguments.file, &arguments.overrides)?;
-    println!("{} is valid: seed {}, {} steps", arguments.file.display(), config.seed, config.total_steps());
+    let file = arguments.file.display();
+    println!("{file}: every key and value is valid; seed {}, {} steps", config.seed, config.total_steps());
     print_plan(&config);
     if arguments.no_timing {
         return Ok(());

@@ -18,7 +18,7 @@ pub enum DraperError {
     /// No model was named and none is shipped.
     #[error("no trained model: none was named, and there is none in {}", searched.join(", "))]
     #[diagnostic(help(
-        "train one (clothcombo-train --config configs/smoke.toml takes three minutes) and pass --checkpoint RUN, \
+        "train one (clothcombo-train --config configs/smoke.toml takes about five minutes) and pass --checkpoint RUN, \
          or a folder with model.safetensors, config.toml and state.json"
     ))]
     NoModel {

@@ -127,6 +127,17 @@ fn wrong_usage_exits_with_two() {
     assert_eq!(output.status.code(), Some(2));
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn an_output_that_cannot_be_written_is_no_panic() {
+    let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_clothcombo"));
+    let output = command.args(["config", "schema"]).stdout(full).output().unwrap();
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(message.lines().count() == 1 && message.contains("No space left"), "{message}");
+}
+
 /// `clothcombo config check … | head -0`: whoever reads is gone before anything is printed.
 #[cfg(unix)]
 #[test]
