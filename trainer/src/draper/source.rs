@@ -164,7 +164,9 @@ impl Closet {
         let must_fit =
             always_fit.unwrap_or_else(|| !made.as_ref().is_ok_and(|garment| is_on_body(&garment.rest, body)));
         if must_fit {
-            return SourceGarment::read(&listed.path, body, Some(true));
+            let mut source = SourceGarment::read(&listed.path, body, Some(true))?;
+            source.garment.name.clone_from(&listed.name);
+            return Ok(source);
         }
         let mut source = SourceGarment::new(made?);
         // Polygons as the file has them.
