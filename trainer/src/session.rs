@@ -406,6 +406,6 @@ pub(crate) fn state(library: &Library, step: u64) -> CheckpointState {
         library.joints().indices.iter().map(|&j| library.body.joint_names[j].clone()).collect();
     let pose_features = joints.len() * library.poses.features_per_joint();
     let mut state = CheckpointState::new(step, joints, library.shape_count, pose_features);
-    state.data = Some(library.fingerprint());
+    state.data = Some(library.fingerprint().to_owned());
     state
 }

@@ -1,5 +1,6 @@
 //! Triangle soup → oriented manifold sheets: cut where more than two faces meet, turned to one orientation per piece.
 
+use clothcombo_physics::Topology;
 use clothcombo_physics::query::{Distance, Surface};
 use clothcombo_physics::vec3::{add, cross, dot, norm, normalized, scale, sub};
 use std::collections::{HashMap, VecDeque};
@@ -172,11 +173,25 @@ pub(crate) fn outwardness(
         .collect()
 }
 
+/// Per piece its area that faces away from the body less what faces towards it [m²].
+pub(crate) fn outward_area(
+    positions: &[[f64; 3]],
+    faces: &[[u32; 3]],
+    topology: &Topology,
+    body: &Surface<f64>,
+) -> Vec<f64> {
+    let mut outward = vec![0.0; topology.component_count];
+    for (face, (cosine, area)) in faces.iter().zip(outwardness(positions, faces, body)) {
+        outward[topology.component_of_vertex[face[0] as usize] as usize] += cosine * area;
+    }
+    outward
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use clothcombo_physics::TriMesh;
     use clothcombo_physics::mesh::shapes::tube;
-    use clothcombo_physics::{Topology, TriMesh};
 
     #[test]
     fn a_fin_comes_off_and_the_sheet_stays_whole() {

@@ -4,6 +4,7 @@
 
 mod arm_pose;
 mod clean;
+mod error;
 mod manifold;
 mod placed;
 mod placement;
@@ -11,13 +12,14 @@ mod push_out;
 mod report;
 mod search;
 
+pub use error::FitError;
 pub use placed::is_on_body;
 pub use placement::{Origin, Placement, Unit, UpAxis};
 pub use report::{BodyContact, Elements, FitReport, Piece, Repair, RepairKind};
 pub use search::Sitting;
 
 pub(crate) use clean::{clean_faces, triangulate, weld};
-pub(crate) use manifold::{SplitSheet, join_faces, orient, outwardness, split_fans};
+pub(crate) use manifold::{SplitSheet, join_faces, orient, outward_area, outwardness, split_fans};
 pub(crate) use push_out::{Contact, contact, one_rings, push_out};
 
 use crate::asset::{Body, Category, Garment, Provenance};
@@ -28,7 +30,6 @@ use clothcombo_physics::contact::{self_triangle_pairs, triangle_pairs};
 use clothcombo_physics::vec3::{norm, sub};
 use clothcombo_physics::{Topology, TriMesh};
 use search::Search;
-use thiserror::Error;
 
 /// Most vertices a garment may have after welding.
 pub const MAX_VERTICES: usize = 1_000_000;
@@ -54,78 +55,6 @@ pub struct FitSettings {
     pub arms_lowered: Option<bool>,
     /// Category; otherwise guessed from the shape.
     pub category: Option<Category>,
-}
-
-/// Why a mesh is not fitted.
-#[derive(Clone, Debug, PartialEq, Error)]
-pub enum FitError {
-    /// Too many vertices.
-    #[error("{vertices} vertices, more than the {MAX_VERTICES} a garment may have; decimate it first")]
-    TooManyVertices {
-        /// After welding.
-        vertices: usize,
-    },
-    /// Too few triangles.
-    #[error("not a garment: {triangles} triangles with an area, a garment has at least {MIN_TRIANGLES}")]
-    TooFewTriangles {
-        /// After cleaning.
-        triangles: usize,
-    },
-    /// No opening.
-    #[error(
-        "not a garment: a closed surface without any opening (a body, a solid, or cloth with thickness: then keep its outer \
-         layer only)"
-    )]
-    Closed,
-    /// As large as no garment of this body.
-    #[error(
-        "not a garment of this body: its largest extent is {extent} in the file's unit{}; the body is {reach:.2} m large",
-         unit.map(|u| format!(", {} m for {u}", extent * u.metres())).unwrap_or_default()
-    )]
-    Extent {
-        /// Largest extent in the file's unit.
-        extent: f64,
-        /// The unit, if given.
-        unit: Option<Unit>,
-        /// Largest extent of the body [m].
-        reach: f64,
-    },
-    /// Reaches from head to feet and to both hands.
-    #[error("not a garment: it reaches from the crown to the soles and to both hands, as a body does")]
-    Body,
-    /// Worn where none of the six categories is.
-    #[error("not one of the six garment categories: {place}")]
-    Worn {
-        /// Where it is worn.
-        place: &'static str,
-    },
-    /// No cloth around the trunk.
-    #[error(
-        "touches no body: in the best placement there is cloth in {:.0} % of the directions around the trunk, {:.0} mm away on \
-         average", 100.0 * sitting.wrap, 1e3 * sitting.mean_distance
-    )]
-    OffBody {
-        /// How it sits.
-        sitting: Sitting,
-    },
-    /// Mostly inside the body.
-    #[error("does not fit this body: {:.0} % of it lies inside in the best placement", 100.0 * sitting.inside)]
-    Inside {
-        /// How it sits.
-        sitting: Sitting,
-    },
-    /// Too small, or no garment in this placement.
-    #[error(
-        "does not fit this body: {:.0} % of its edges would be longer than {MOST_STRETCH} times their length once it is outside of \
-         the body", 100.0 * share
-    )]
-    Stretched {
-        /// Share of the edges.
-        share: f64,
-    },
-    /// No mesh after the repairs.
-    #[error("no mesh is left: {0}")]
-    Mesh(String),
 }
 
 /// A fitted garment and how it came about.
@@ -167,8 +96,7 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
     }
 
     let search = Search::new(body, settings);
-    let (low, high) = mesh.bounds();
-    let extent = (0..3).map(|a| high[a] - low[a]).fold(0.0, f64::max);
+    let extent = mesh.extent();
     let units = settings.unit.map_or(Unit::ALL.to_vec(), |u| vec![u]);
     if !units.iter().any(|u| search.is_plausible_extent(extent * u.metres())) {
         return Err(FitError::Extent { extent, unit: settings.unit, reach: search.reach });
@@ -328,11 +256,8 @@ fn turn_outward(
     topology: &Topology,
     body: &clothcombo_physics::Surface<f64>,
 ) {
-    let mut outward = vec![0.0; topology.component_count];
+    let outward = outward_area(positions, &sheet.faces, topology, body);
     let piece = |f: &[u32; 3]| topology.component_of_vertex[f[0] as usize] as usize;
-    for (f, (cosine, area)) in sheet.faces.iter().zip(outwardness(positions, &sheet.faces, body)) {
-        outward[piece(f)] += cosine * area;
-    }
     for (f, turned) in sheet.faces.iter_mut().zip(&mut sheet.turned) {
         if outward[piece(f)] < 0.0 {
             f.swap(1, 2);

@@ -1,7 +1,7 @@
 //! Does a garment already lie on a body, in metres and T-pose, so that nothing has to be found out?
 
 use super::search::{Samples, Search};
-use super::{FitSettings, outwardness};
+use super::{FitSettings, outward_area};
 use crate::asset::Body;
 use clothcombo_physics::{Surface, Topology, TriMesh};
 
@@ -20,13 +20,9 @@ pub fn is_on_body(mesh: &TriMesh, body: &Body) -> bool {
 
 /// Whether the area of every piece faces away from the body more than towards it.
 fn faces_outwards(mesh: &TriMesh, body: &Body) -> bool {
-    let topology = Topology::new(mesh);
-    let mut outward = vec![0.0; topology.component_count];
-    let cosines = outwardness(mesh.positions(), mesh.faces(), &Surface::from_mesh(&body.zero_body()));
-    for (face, (cosine, area)) in mesh.faces().iter().zip(cosines) {
-        outward[topology.component_of_vertex[face[0] as usize] as usize] += cosine * area;
-    }
-    outward.into_iter().all(|sum| sum >= 0.0)
+    let surface = Surface::from_mesh(&body.zero_body());
+    let outward = outward_area(mesh.positions(), mesh.faces(), &Topology::new(mesh), &surface);
+    outward.into_iter().all(|area| area >= 0.0)
 }
 
 #[cfg(test)]
@@ -48,9 +44,7 @@ mod tests {
             assert!(!is_on_body(&changed(|p| p.map(|x| 100.0 * x)), &body), "{category} in centimetres");
             assert!(!is_on_body(&changed(|[x, y, z]| [x, -z, y]), &body), "{category} with z up");
             assert!(!is_on_body(&changed(|[x, y, z]| [x + 0.6, y, z]), &body), "{category} beside the body");
-            let turned = rest.faces().iter().map(|&[a, b, c]| [a, c, b]).collect();
-            let turned = TriMesh::new(rest.positions().to_vec(), turned).unwrap();
-            assert!(!is_on_body(&turned, &body), "{category} inside out");
+            assert!(!is_on_body(&rest.turned(), &body), "{category} inside out");
         }
     }
 }

@@ -117,7 +117,7 @@ impl<'a> Search<'a> {
             })
             .collect();
         let (low, high) = body.zero_body().bounds();
-        let reach = (0..3).map(|a| high[a] - low[a]).fold(0.0, f64::max);
+        let reach = body.zero_body().extent();
         Self { body, arms, trunk, floor: low[1], top: high[1], reach }
     }
 

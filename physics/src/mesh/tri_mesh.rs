@@ -167,6 +167,18 @@ impl TriMesh {
         *lengths.select_nth_unstable_by(middle, f64::total_cmp).1
     }
 
+    /// Longest side of the bounding box (m).
+    pub fn extent(&self) -> f64 {
+        let (low, high) = self.bounds();
+        (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max)
+    }
+
+    /// The same mesh inside out: every face looks the other way.
+    pub fn turned(&self) -> Self {
+        let faces = self.faces.iter().map(|&[a, b, c]| [a, c, b]).collect();
+        Self { positions: self.positions.clone(), faces }
+    }
+
     /// Smallest and largest coordinates over all vertices (m).
     pub fn bounds(&self) -> ([f64; 3], [f64; 3]) {
         let mut low = [f64::INFINITY; 3];

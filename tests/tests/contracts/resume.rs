@@ -1,7 +1,7 @@
 //! A run that is interrupted and continued equals one that never stopped, bit for bit.
 
 use clothcombo_tests::tiny_config;
-use clothcombo_trainer::checkpoint::Checkpoint;
+use clothcombo_trainer::checkpoint::{Checkpoint, TrainedModel};
 use clothcombo_trainer::config::Config;
 use clothcombo_trainer::device::Backend;
 use clothcombo_trainer::evaluate::ValidationSet;
@@ -169,4 +169,21 @@ fn what_was_trained_is_kept_when_something_beside_it_fails() {
     let kept = Checkpoint::open(&place).unwrap();
     assert_eq!(kept.state.step, 7);
     assert_eq!(Session::resume(RunDir::follow(&place), config, library, &device, &kept).unwrap().step(), 7);
+}
+
+#[test]
+fn garments_that_were_trained_on_before_they_were_held_out_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = tiny_config(folder.path(), &["stages.0.steps=5"]);
+    let library = Arc::new(Library::load(&config, &|_, _, _| {}).unwrap());
+    let first = folder.path().join("first");
+    run(&config, &library, &first, false, Some(5));
+    let trained = TrainedModel::open(&first).unwrap();
+    assert!(trained.known_of_held_out(&config, &library).is_empty());
+
+    let name = library.wardrobe.card(library.split.training[0]).name.clone();
+    let config = tiny_config(folder.path(), &[&format!("data.held_out_garments=[{name:?}]")]);
+    let library = Library::load(&config, &|_, _, _| {}).unwrap();
+    let known = trained.known_of_held_out(&config, &library);
+    assert!(known.len() == 1 && known[0].contains(&name), "{known:?}");
 }

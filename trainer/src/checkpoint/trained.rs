@@ -83,31 +83,38 @@ impl TrainedModel {
         }
     }
 
-    /// Says which garments and poses `config` holds out of `library`, its data, that these networks were trained on all the
-    /// same: their scores would be those of known ones. Only where the garments come from the same sources, or the motions
-    /// from the same folder, can it be told.
-    pub fn warn_of_known(&self, config: &Config, library: &Library) {
+    /// What `config` holds out of `library`, its data, although these networks were trained on it, in words: scores would be
+    /// those of known garments or poses. Only where the garments come from the same sources, or the motions from the same
+    /// folder, can it be told.
+    pub fn known_of_held_out(&self, config: &Config, library: &Library) -> Vec<String> {
+        let mut found = Vec::new();
         let (trained, data) = (&self.config.data, &config.data);
         let held_out = [&library.split.validation, &library.split.test].into_iter().flatten();
         let names = held_out.map(|&garment| library.wardrobe.card(garment).name.as_str());
         let known: Vec<&str> = names.filter(|name| is_trained_on(name, trained)).collect();
         if !known.is_empty() && trained.garments == data.garments {
-            tracing::warn!(
-                "{} was trained on held-out garments: {}",
-                self.folder.display(),
-                known.join(", ")
-            );
+            found.push(format!("was trained on held-out garments: {}", known.join(", ")));
         }
         let [before, now] = [trained, data].map(|data| &data.poses);
         let holds_out = |poses: &PoseConfig| {
             (poses.held_out_clips.clone(), poses.held_out_share.to_bits(), poses.held_out_block.to_bits())
         };
         if before.motions.is_some() && before.motions == now.motions && holds_out(before) != holds_out(now) {
-            tracing::warn!(
-                "{} may have been trained on held-out poses: other ones were held out of it",
-                self.folder.display()
-            );
+            found.push("may have been trained on held-out poses: other ones were held out of it".to_owned());
         }
+        found
+    }
+
+    /// Whether the networks fit the data ([`check_fits`](Self::check_fits)); warns of what they know already.
+    ///
+    /// # Errors
+    /// When they do not fit.
+    pub fn check_data(&self, config: &Config, library: &Library) -> Result<(), CheckpointError> {
+        self.check_fits(library)?;
+        for what in self.known_of_held_out(config, library) {
+            tracing::warn!("{} {what}", self.folder.display());
+        }
+        Ok(())
     }
 
     /// The networks as the start of a run of `config` on `library`.
@@ -120,8 +127,7 @@ impl TrainedModel {
         library: &Library,
         device: &Device,
     ) -> Result<ClothCombo, CheckpointError> {
-        self.check_fits(library)?;
-        self.warn_of_known(config, library);
+        self.check_data(config, library)?;
         if self.config.model != config.model {
             let reason =
                 "its [model] section differs from that of the configuration, which init_from does not allow";

@@ -143,8 +143,12 @@ fn others(arguments: &Arguments, named: &[(String, PathBuf)], first: &Subject) -
 
 /// Ablations are compared on the same outfits, which are drawn from a model's own data.
 fn check_ablations(ablations: &[Other], first: &Subject) -> Result<(), Report> {
-    let data = |subject: &Subject| (subject.library.fingerprint(), subject.config.data.shape_range);
-    match ablations.iter().find(|other| data(&other.subject) != data(first)) {
+    let differs = |other: &&Other| {
+        let [own, of_first] = [&other.subject, first];
+        own.library.fingerprint() != of_first.library.fingerprint()
+            || own.config.data.shape_range != of_first.config.data.shape_range
+    };
+    match ablations.iter().find(differs) {
         None => Ok(()),
         Some(other) => Err(miette!(
             help = "train it on the data of the evaluated model: body, garments, motions, data.shape_range",

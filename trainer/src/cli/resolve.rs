@@ -172,7 +172,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
 
 fn checked_body(path: &Path) -> Result<TriMesh, Report> {
     let body = load_body(path)?;
-    let largest = extent(&body);
+    let largest = body.extent();
     if largest > TALLEST {
         return Err(miette!(
             help = "scale body and garments to metres (0.01 for centimetres)",
@@ -181,12 +181,6 @@ fn checked_body(path: &Path) -> Result<TriMesh, Report> {
         ));
     }
     Ok(body)
-}
-
-/// Longest side of the bounding box.
-fn extent(mesh: &TriMesh) -> f64 {
-    let (low, high) = mesh.bounds();
-    (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max)
 }
 
 /// A garment in another unit or another place crosses nothing, which would look like a good result.
@@ -198,7 +192,7 @@ fn check_place(garment: &Garment, body: &TriMesh) -> Result<(), Report> {
             garment.path.display()
         )
     };
-    let (own, whole) = (extent(&garment.draped), extent(body));
+    let (own, whole) = (garment.draped.extent(), body.extent());
     if own > LARGEST * whole || own < SMALLEST * whole {
         return Err(refused(format!("the garment measures {own:.3}, the body {whole:.3} from end to end")));
     }

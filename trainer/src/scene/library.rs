@@ -10,7 +10,7 @@ use clothcombo_data::asset::{BODY_JOINT_COUNT, Body, BodyFileSettings, Provenanc
 use clothcombo_data::format::npz::NpzFile;
 use clothcombo_data::generate::mannequin;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// What a run draws its scenes from.
 pub struct Library {
@@ -30,6 +30,7 @@ pub struct Library {
     pub shape_count: usize,
     /// Range every component is drawn from.
     pub shape_range: [f64; 2],
+    fingerprint: OnceLock<String>,
 }
 
 /// Reads `"mannequin"` or a body npz with at most `shape_components` components (0: all it has).
@@ -114,6 +115,7 @@ impl Library {
             memory_limit: config.data.memory_limit(),
             shape_count,
             shape_range: config.data.shape_range,
+            fingerprint: OnceLock::new(),
         })
     }
 
@@ -132,7 +134,11 @@ impl Library {
 
     /// A fingerprint of what scenes are drawn from: garments (name, size, place), body and every frame of the poses. Equal
     /// data gives equal scenes.
-    pub fn fingerprint(&self) -> String {
+    pub fn fingerprint(&self) -> &str {
+        self.fingerprint.get_or_init(|| self.hash())
+    }
+
+    fn hash(&self) -> String {
         let mut hasher = blake3::Hasher::new();
         let mut numbers = |values: &[u64]| {
             values.iter().for_each(|v| {

@@ -5,6 +5,7 @@ use crate::config::{PoseConfig, PoseEncoding};
 use clothcombo_data::asset::{Body, Motion, Pose, Provenance};
 use clothcombo_data::dataset::load_motion_folder;
 use clothcombo_data::generate::{PoseAugmentation, PoseSampler, SelfContact};
+use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -80,13 +81,8 @@ impl Frames {
     /// A frame to train on. The share of a clip grows with the square root of its length in time: neighbouring frames are
     /// alike, so that by frames alone a long clip, or one of a high frame rate, would crowd out the others.
     fn draw_training(&self, rng: &mut ChaCha8Rng) -> &Pose {
-        let share = |clip: &Clip| clip.seconds.sqrt();
-        let mut left = rng.random::<f64>() * self.train.iter().map(share).sum::<f64>();
-        let chosen = self.train.iter().find(|clip| {
-            left -= share(clip);
-            left < 0.0
-        });
-        let Clip { poses, .. } = chosen.unwrap_or(&self.train[self.train.len() - 1]);
+        let clip = self.train.choose_weighted(rng, |clip| clip.seconds.sqrt());
+        let poses = &clip.expect("a library has frames to train on, and they take time").poses;
         &poses[rng.random_range(0..poses.len())]
     }
 }

@@ -42,8 +42,7 @@ pub(crate) fn load_body(path: &Path) -> Result<TriMesh, ScoreError> {
         return Ok(body);
     }
     tracing::warn!("{}: the body is inside out; its faces were turned", path.display());
-    let faces = body.faces().iter().map(|&[a, b, c]| [a, c, b]).collect();
-    Ok(TriMesh::new(body.positions().to_vec(), faces).expect("a valid mesh is one with its faces turned"))
+    Ok(body.turned())
 }
 
 /// Name, rest mesh and draped mesh of a garment, which have the same faces.

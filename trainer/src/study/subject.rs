@@ -36,8 +36,7 @@ impl Subject {
         library: Arc<Library>,
         device: &Device,
     ) -> Result<Self, Report> {
-        trained.check_fits(&library)?;
-        trained.warn_of_known(&config, &library);
+        trained.check_data(&config, &library)?;
         let tensors = WardrobeTensors::new(library.clone(), trained.state.dimensions(), device);
         Ok(Self { model: trained.networks(device)?, config, library, tensors })
     }

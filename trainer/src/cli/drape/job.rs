@@ -85,8 +85,7 @@ impl Job {
     /// Files that are read, names of garments among them.
     pub fn files(&self) -> impl Iterator<Item = PathBuf> {
         let SceneArguments { pose, motion, posed, t_pose, .. } = &self.scene;
-        let pose =
-            pose.iter().map(|pose| PathBuf::from(pose.rsplit_once(':').map_or(pose.as_str(), |p| p.0)));
+        let pose = pose.iter().map(|pose| PathBuf::from(file_and_frame(pose).0));
         let scene = pose.chain([motion, posed, t_pose].into_iter().flatten().cloned());
         self.garments.iter().map(PathBuf::from).chain(scene)
     }
@@ -138,13 +137,18 @@ fn no_frame(path: &Path, frame: usize, count: usize) -> Failure {
 }
 
 /// `FILE.npz` or `FILE.npz:FRAME`.
-fn one_pose(text: &str) -> Result<Pose, Failure> {
-    let (path, frame) = match text.rsplit_once(':') {
+fn file_and_frame(text: &str) -> (&str, &str) {
+    match text.rsplit_once(':') {
         Some((path, frame)) if !Path::new(text).exists() && frame.bytes().all(|b| b.is_ascii_digit()) => {
-            (path, frame.parse().map_err(|_| miette!("--pose {text}: {frame:?} is no number of a frame"))?)
+            (path, frame)
         }
-        _ => (text, 0),
-    };
+        _ => (text, "0"),
+    }
+}
+
+fn one_pose(text: &str) -> Result<Pose, Failure> {
+    let (path, frame) = file_and_frame(text);
+    let frame = frame.parse().map_err(|_| miette!("--pose {text}: {frame:?} is no number of a frame"))?;
     let motion = Motion::load(Path::new(path)).map_err(LibraryError::data)?;
     motion.poses.get(frame).cloned().ok_or_else(|| no_frame(Path::new(path), frame, motion.poses.len()))
 }

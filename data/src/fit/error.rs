@@ -1,0 +1,76 @@
+//! Why a mesh is no garment of a body.
+
+use super::{MAX_VERTICES, MIN_TRIANGLES, MOST_STRETCH, Sitting, Unit};
+use thiserror::Error;
+
+/// Why a mesh is not fitted.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum FitError {
+    /// Too many vertices.
+    #[error("{vertices} vertices, more than the {MAX_VERTICES} a garment may have; decimate it first")]
+    TooManyVertices {
+        /// After welding.
+        vertices: usize,
+    },
+    /// Too few triangles.
+    #[error("not a garment: {triangles} triangles with an area, a garment has at least {MIN_TRIANGLES}")]
+    TooFewTriangles {
+        /// After cleaning.
+        triangles: usize,
+    },
+    /// No opening.
+    #[error(
+        "not a garment: a closed surface without any opening (a body, a solid, or cloth with thickness: then keep its outer \
+         layer only)"
+    )]
+    Closed,
+    /// As large as no garment of this body.
+    #[error(
+        "not a garment of this body: its largest extent is {extent} in the file's unit{}; the body is {reach:.2} m large",
+         unit.map(|u| format!(", {} m for {u}", extent * u.metres())).unwrap_or_default()
+    )]
+    Extent {
+        /// Largest extent in the file's unit.
+        extent: f64,
+        /// The unit, if given.
+        unit: Option<Unit>,
+        /// Largest extent of the body [m].
+        reach: f64,
+    },
+    /// Reaches from head to feet and to both hands.
+    #[error("not a garment: it reaches from the crown to the soles and to both hands, as a body does")]
+    Body,
+    /// Worn where none of the six categories is.
+    #[error("not one of the six garment categories: {place}")]
+    Worn {
+        /// Where it is worn.
+        place: &'static str,
+    },
+    /// No cloth around the trunk.
+    #[error(
+        "touches no body: in the best placement there is cloth in {:.0} % of the directions around the trunk, {:.0} mm away on \
+         average", 100.0 * sitting.wrap, 1e3 * sitting.mean_distance
+    )]
+    OffBody {
+        /// How it sits.
+        sitting: Sitting,
+    },
+    /// Mostly inside the body.
+    #[error("does not fit this body: {:.0} % of it lies inside in the best placement", 100.0 * sitting.inside)]
+    Inside {
+        /// How it sits.
+        sitting: Sitting,
+    },
+    /// Too small, or no garment in this placement.
+    #[error(
+        "does not fit this body: {:.0} % of its edges would be longer than {MOST_STRETCH} times their length once it is outside of \
+         the body", 100.0 * share
+    )]
+    Stretched {
+        /// Share of the edges.
+        share: f64,
+    },
+    /// No mesh after the repairs.
+    #[error("no mesh is left: {0}")]
+    Mesh(String),
+}
