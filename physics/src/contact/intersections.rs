@@ -43,7 +43,7 @@ impl<'a> TriangleTree<'a> {
     }
 
     /// Of some of the faces, which keep their numbers.
-    pub(super) fn of_part(
+    pub(crate) fn of_part(
         positions: &'a [[f64; 3]],
         faces: &'a [[u32; 3]],
         is_part: impl Fn(u32, &Aabb) -> bool,
@@ -73,6 +73,26 @@ impl<'a> TriangleTree<'a> {
     /// The tree alone, for [`refitted`](Self::refitted).
     pub(super) fn into_kept(self) -> KeptTree {
         KeptTree { bvh: self.bvh, kept: self.kept }
+    }
+
+    /// Positions of the mesh, `[V, 3]` (m).
+    pub(crate) fn positions(&self) -> &'a [[f64; 3]] {
+        self.positions
+    }
+
+    /// All faces of the mesh, `[F, 3]`.
+    pub(crate) fn all_faces(&self) -> &'a [[u32; 3]] {
+        self.faces
+    }
+
+    /// The bounding volumes; leaf `i` is face `part()[i]`.
+    pub(crate) fn bvh(&self) -> &Bvh {
+        &self.bvh
+    }
+
+    /// The faces that take part, ascending.
+    pub(crate) fn part(&self) -> &[u32] {
+        &self.kept
     }
 
     /// Faces that take part in nothing.

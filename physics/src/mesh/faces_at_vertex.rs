@@ -11,17 +11,22 @@ pub(crate) struct FacesAtVertex {
 impl FacesAtVertex {
     /// Of `faces` with every index below `vertices`. A face is listed once for each of its corners.
     pub fn new(vertices: usize, faces: &[[u32; 3]]) -> Self {
+        Self::of_some(vertices, faces, 0..faces.len() as u32)
+    }
+
+    /// Those among `some` of the faces, ascending.
+    pub fn of_some(vertices: usize, faces: &[[u32; 3]], some: impl Iterator<Item = u32> + Clone) -> Self {
         let mut first = vec![0; vertices + 1];
-        for &v in faces.as_flattened() {
+        for v in some.clone().flat_map(|f| faces[f as usize]) {
             first[v as usize + 1] += 1;
         }
         for v in 0..vertices {
             first[v + 1] += first[v];
         }
         let mut next = first.clone();
-        let mut at_vertex = vec![0; 3 * faces.len()];
-        for (f, face) in (0u32..).zip(faces) {
-            for &v in face {
+        let mut at_vertex = vec![0; first[vertices] as usize];
+        for f in some {
+            for v in faces[f as usize] {
                 at_vertex[next[v as usize] as usize] = f;
                 next[v as usize] += 1;
             }

@@ -9,6 +9,7 @@ use parry3d_f64::math::Vector;
 use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
 
 use super::pseudo_normal::PseudoNormals;
+use crate::contact::TriangleTree;
 use crate::mesh::FacesAtVertex;
 use crate::vec3;
 
@@ -30,7 +31,7 @@ pub struct SurfacePoint {
     pub position: [f64; 3],
     /// Squared distance from the query point (m²).
     pub distance_squared: f64,
-    /// The face it lies on; one of them when it lies on an edge or a vertex.
+    /// The face it lies on, as numbered in what the query was built of; one of them when it lies on an edge or a vertex.
     pub face: u32,
     /// Barycentric coordinates in that face; non-negative, sum 1.
     pub barycentric: [f64; 3],
@@ -43,6 +44,8 @@ pub struct ClosestPoint {
     positions: Vec<[f64; 3]>,
     faces: Vec<[u32; 3]>,
     bvh: Bvh,
+    /// Leaf of the tree → face; none for one that is never closest.
+    leaves: Vec<Option<u32>>,
     at_vertex: FacesAtVertex,
 }
 
@@ -60,16 +63,24 @@ impl ClosestPoint {
     ///
     /// Faces with a corner that is not finite are left out: nothing is ever closest to them.
     pub fn new(positions: Vec<[f64; 3]>, faces: &[[u32; 3]]) -> Self {
-        let faces: Vec<[u32; 3]> = faces
-            .iter()
-            .copied()
-            .filter(|face| face.iter().all(|&v| vec3::is_finite(positions[v as usize])))
-            .collect();
+        let is_whole = |face: &[u32; 3]| face.iter().all(|&v| vec3::is_finite(positions[v as usize]));
+        let whole = || (0u32..).zip(faces).filter(|(_, face)| is_whole(face));
         let boxes: Vec<Aabb> =
-            faces.iter().map(|face| triangle_box(face.map(|v| positions[v as usize]))).collect();
+            whole().map(|(_, face)| triangle_box(face.map(|v| positions[v as usize]))).collect();
         let bvh = Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes);
-        let at_vertex = FacesAtVertex::new(positions.len(), &faces);
-        Self { positions, faces, bvh, at_vertex }
+        let leaves = whole().map(|(number, _)| Some(number)).collect();
+        Self::on_tree(positions, faces.to_vec(), bvh, leaves)
+    }
+
+    /// On a tree that is there already, of its faces that `may_be` closest. Faces without area are not.
+    pub(crate) fn of_tree(tree: &TriangleTree<'_>, may_be: impl Fn(u32) -> bool) -> Self {
+        let leaves = tree.part().iter().map(|&face| may_be(face).then_some(face)).collect();
+        Self::on_tree(tree.positions().to_vec(), tree.all_faces().to_vec(), tree.bvh().clone(), leaves)
+    }
+
+    fn on_tree(positions: Vec<[f64; 3]>, faces: Vec<[u32; 3]>, bvh: Bvh, leaves: Vec<Option<u32>>) -> Self {
+        let at_vertex = FacesAtVertex::of_some(positions.len(), &faces, leaves.iter().flatten().copied());
+        Self { positions, faces, bvh, leaves, at_vertex }
     }
 
     /// The closest point of the surface; `None` for a query that is not finite or a surface without a face.
@@ -82,11 +93,15 @@ impl ClosestPoint {
         if !vec3::is_finite(p) {
             return None;
         }
-        let (face, _) = self.bvh.find_best(
+        let (leaf, _) = self.bvh.find_best(
             (reach * reach).min(f64::MAX),
             |node, _| box_distance_squared(p, node.mins().to_array(), node.maxs().to_array()),
-            |face, _| Some(closest_on_triangle(p, self.corners(face)).distance_squared),
+            |leaf, _| {
+                let face = self.leaves[leaf as usize]?;
+                Some(closest_on_triangle(p, self.corners(face)).distance_squared)
+            },
         )?;
+        let face = self.leaves[leaf as usize]?;
         let found = closest_on_triangle(p, self.corners(face));
         Some(SurfacePoint {
             position: found.position,
@@ -212,7 +227,7 @@ fn closest_on_edges(p: [f64; 3], corners: [[f64; 3]; 3]) -> TrianglePoint {
 }
 
 /// The smallest box around a triangle.
-pub(super) fn triangle_box(corners: [[f64; 3]; 3]) -> Aabb {
+fn triangle_box(corners: [[f64; 3]; 3]) -> Aabb {
     let [a, b, c] = corners.map(Vector::from_array);
     Aabb::new(a.min(b).min(c), a.max(b).max(c))
 }

@@ -3,6 +3,7 @@
 pub mod brute_force;
 mod closest_point;
 mod closest_vertex;
+mod crossings;
 mod pseudo_normal;
 mod surface;
 mod union;

@@ -90,7 +90,8 @@ impl<T: Real> Surface<T> {
     /// The closest-point tree over the boundary of the union of its parts.
     pub fn union_distance(&self) -> &UnionDistance {
         self.union_distance.get_or_init(|| {
-            UnionDistance::new(self.positions.iter().map(|p| vec3::to_f64(*p)).collect(), &self.faces)
+            let positions: Vec<_> = self.positions.iter().map(|p| vec3::to_f64(*p)).collect();
+            UnionDistance::new(&positions, &self.faces)
         })
     }
 

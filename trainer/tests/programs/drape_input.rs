@@ -92,6 +92,26 @@ fn wrong_input_names_itself_and_leaves_nothing() {
 }
 
 #[test]
+fn a_wrong_name_in_the_last_outfit_is_told_before_anything_is_draped() {
+    let folder = tempfile::tempdir().unwrap();
+    let [file, out, cache, motion] =
+        ["outfits.toml", "out", "cache", "arms.npz"].map(|name| at(&folder, name));
+    save_motion(Path::new(&motion), 4);
+    let good = format!("[[outfit]]\nname = \"good\"\ngarments = [\"{TEE}\"]\n");
+    for (bad, word) in [
+        (format!("garments = [\"{TEE}\"]\npose = \"{motion}:9\""), "no frame 9"),
+        ("garments = [\"cloak\"]".to_owned(), "cloak"),
+        (format!("garments = [\"{SKIRT}\", \"{TEE}\"]\norder = [1]"), "--order"),
+    ] {
+        fs::write(&file, format!("{good}[[outfit]]\nname = \"bad one\"\n{bad}\n")).unwrap();
+        let message = failure(&mut drape(&["--outfits", &file, "--cache", &cache, "-o", &out]), 1);
+        assert!(message.contains("outfit bad one") && message.contains(word), "{message}");
+        // The embedding of the good one would lie in the cache.
+        assert!(!Path::new(&out).exists() && fs::read_dir(&cache).unwrap().next().is_none(), "{message}");
+    }
+}
+
+#[test]
 fn a_model_is_three_files_and_a_damaged_or_missing_one_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let newest = fs::read_to_string(run_folder().join("checkpoints/latest")).unwrap();

@@ -279,7 +279,7 @@ pub(super) fn certificate(body: &BodyObstacle<'_>, layers: &[Layer<'_>]) -> Cert
                 views[v].and_then(|view| view.plane).map_or([0.0; 3], |plane| plane.normal)
             };
             let facing = facing(garment, positions, outward);
-            inner.push(LayerObstacle::new(garment, positions, facing));
+            inner.push(LayerObstacle::new(garment, tree, facing));
         }
     }
     found.max_depth_mm = 1e3 * depths.iter().fold(0.0, |a: f64, b| a.max(*b));

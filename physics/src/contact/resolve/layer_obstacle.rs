@@ -17,13 +17,11 @@ pub(super) struct LayerObstacle<'a> {
 }
 
 impl<'a> LayerObstacle<'a> {
-    /// `facing` as of [`facing`].
-    pub fn new(garment: &'a RestGarment, positions: &'a [[f64; 3]], facing: Vec<f64>) -> Self {
-        let (tree, closest) = rayon::join(
-            || TriangleTree::new(positions, &garment.faces),
-            || ClosestPoint::new(positions.to_vec(), &garment.faces),
-        );
-        Self { garment, tree, closest, facing, bounds: bounds(positions) }
+    /// `tree` of the garment where it is; `facing` as of [`facing`].
+    pub fn new(garment: &'a RestGarment, tree: TriangleTree<'a>, facing: Vec<f64>) -> Self {
+        let closest = ClosestPoint::of_tree(&tree, |_| true);
+        let bounds = bounds(tree.positions());
+        Self { garment, tree, closest, facing, bounds }
     }
 
     /// 1 where face `f` looks away from the body, −1 where the mesh is inside out.

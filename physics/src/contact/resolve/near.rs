@@ -1,13 +1,14 @@
 //! Which part of the body clothes can meet: a tight top asks nothing of ten fingers, which are half of the body's triangles.
 
-use std::collections::HashSet;
+use crate::vec3::is_finite;
+use std::ops::Range;
 
 /// Cells in which cloth is looked for [m].
 const CELL: f64 = 0.05;
 /// What lies in a cell with cloth, or so many cells beside one along each axis, is near.
-const REACH: i64 = 2;
-/// A triangle over more cells is near everything.
-const MOST_CELLS: f64 = 4096.0;
+const REACH: usize = 2;
+/// Cloth over a box of more cells, 125 m³ here, is near everything.
+const MOST_CELLS: f64 = 1e6;
 
 /// So far cloth may move [m] and still meet nothing of the body but what is near; a little less than all, for rounding.
 pub(super) const MARGIN: f64 = REACH as f64 * CELL * (1.0 - 1e-9);
@@ -19,48 +20,104 @@ pub(super) fn near_cloth(
     surface: &[[u32; 3]],
     cloth: &[(&[[f64; 3]], &[[u32; 3]])],
 ) -> Vec<bool> {
-    let mut cells: HashSet<[i64; 3]> = HashSet::new();
+    let all = || vec![true; points.len()];
+    let Some(mut cells) = Cells::around(cloth) else { return all() };
     for (positions, faces) in cloth {
         for face in *faces {
-            match cells_of(face.map(|v| positions[v as usize])) {
-                Some(found) => cells.extend(found),
-                None => return vec![true; points.len()],
-            }
+            cells.fill(face.map(|v| positions[v as usize]));
         }
     }
-    for axis in 0..3 {
-        let spread = |cell: &[i64; 3]| {
-            let cell = *cell;
-            (-REACH..=REACH).map(move |by| {
-                let mut moved = cell;
-                moved[axis] += by;
-                moved
-            })
-        };
-        cells = cells.iter().flat_map(spread).collect();
-    }
+    cells.spread();
     let mut near = vec![false; points.len()];
     for face in surface {
-        let mut found = cells_of(face.map(|v| points[v as usize]));
-        if found.as_mut().is_none_or(|found| found.any(|cell| cells.contains(&cell))) {
+        if cells.meet(face.map(|v| points[v as usize])) {
             face.iter().for_each(|&v| near[v as usize] = true);
         }
     }
-    if near.contains(&true) { near } else { vec![true; points.len()] }
+    if near.contains(&true) { near } else { all() }
 }
 
-/// The cells that the box around a triangle touches; `None` for more than [`MOST_CELLS`], or corners that are no numbers.
-fn cells_of(corners: [[f64; 3]; 3]) -> Option<impl Iterator<Item = [i64; 3]>> {
-    let cell = |x: f64| (x / CELL).floor() as i64;
-    let bound = |pick: fn(f64, f64) -> f64| -> [i64; 3] {
-        std::array::from_fn(|k| cell(pick(pick(corners[0][k], corners[1][k]), corners[2][k])))
-    };
-    let (low, high) = (bound(f64::min), bound(f64::max));
-    let count: f64 = (0..3).map(|k| high[k] as f64 - low[k] as f64 + 1.0).product();
-    let is_small = count <= MOST_CELLS && corners.as_flattened().iter().all(|x| x.is_finite());
-    let [x, y, z] = [0, 1, 2].map(|k| low[k]..=high[k]);
-    let columns = move || x.flat_map(move |x| y.clone().map(move |y| [x, y]));
-    is_small.then(|| columns().flat_map(move |[x, y]| z.clone().map(move |z| [x, y, z])))
+/// A box of cells, of which some are full.
+struct Cells {
+    /// Its lowest corner [m].
+    low: [f64; 3],
+    count: [usize; 3],
+    /// Along z first, then y.
+    is_full: Vec<bool>,
+}
+
+impl Cells {
+    /// Those around all corners of the cloth, with room to spread; `None` for more than [`MOST_CELLS`], or corners that are no
+    /// numbers.
+    fn around(cloth: &[(&[[f64; 3]], &[[u32; 3]])]) -> Option<Self> {
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for (positions, faces) in cloth {
+            for p in faces.as_flattened().iter().map(|&v| positions[v as usize]) {
+                if !is_finite(p) {
+                    return None;
+                }
+                low = std::array::from_fn(|k| low[k].min(p[k]));
+                high = std::array::from_fn(|k| high[k].max(p[k]));
+            }
+        }
+        // One more than what spreads, for rounding.
+        let room = REACH as f64 + 1.0;
+        let low = low.map(|x| x - room * CELL);
+        let sides: [f64; 3] = std::array::from_fn(|k| ((high[k] - low[k]) / CELL).floor() + 1.0 + room);
+        let is_small = sides.iter().product::<f64>() <= MOST_CELLS;
+        let count = sides.map(|side| side as usize);
+        is_small.then(|| Self { low, count, is_full: vec![false; count.iter().product()] })
+    }
+
+    /// First and one past the last cell along each axis of those that the box around a triangle touches; what is no number
+    /// touches all.
+    fn touched(&self, corners: [[f64; 3]; 3]) -> [Range<usize>; 3] {
+        std::array::from_fn(|k| {
+            let along = corners.map(|corner| corner[k]);
+            if !along.iter().all(|x| x.is_finite()) {
+                return 0..self.count[k];
+            }
+            let cell = |x: f64| ((x - self.low[k]) / CELL).floor();
+            let first = cell(along.into_iter().fold(f64::INFINITY, f64::min)).max(0.0) as usize;
+            let end = (cell(along.into_iter().fold(f64::NEG_INFINITY, f64::max)) + 1.0).max(0.0) as usize;
+            first.min(self.count[k])..end.min(self.count[k])
+        })
+    }
+
+    /// The cells of a column along z, of all columns in a box.
+    fn columns(&self, [x, y, z]: [Range<usize>; 3]) -> impl Iterator<Item = Range<usize>> + use<> {
+        let [_, deep, tall] = self.count;
+        x.flat_map(move |x| {
+            let z = z.clone();
+            y.clone().map(move |y| (x * deep + y) * tall).map(move |column| column + z.start..column + z.end)
+        })
+    }
+
+    fn fill(&mut self, corners: [[f64; 3]; 3]) {
+        for column in self.columns(self.touched(corners)) {
+            self.is_full[column].fill(true);
+        }
+    }
+
+    /// Whether a triangle touches a full cell.
+    fn meet(&self, corners: [[f64; 3]; 3]) -> bool {
+        self.columns(self.touched(corners)).any(|column| self.is_full[column].contains(&true))
+    }
+
+    /// Fills what is within [`REACH`] cells of a full one along each axis.
+    fn spread(&mut self) {
+        let [_, deep, tall] = self.count;
+        for stride in [1, tall, deep * tall] {
+            for _ in 0..REACH {
+                let before = self.is_full.clone();
+                // There is room around what was filled, so that nothing spreads over an edge of the box.
+                for (cell, _) in before.iter().enumerate().filter(|(_, is_full)| **is_full) {
+                    self.is_full[cell - stride] = true;
+                    self.is_full[cell + stride] = true;
+                }
+            }
+        }
+    }
 }
 
 #[cfg(test)]

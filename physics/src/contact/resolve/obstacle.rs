@@ -6,7 +6,7 @@ use super::relief::Relief;
 use crate::contact::TriangleTree;
 use crate::mesh::is_closed;
 use crate::query::{ClosestPoint, FaceSide, Surface, SurfacePoint, UnionDistance};
-use crate::vec3::{add_scaled, dot, is_finite, scale, sub};
+use crate::vec3::{add_scaled, dot, scale, sub};
 use std::sync::OnceLock;
 
 /// Below this distance [m] the direction from the closest point is rounding.
@@ -55,8 +55,8 @@ pub(super) struct BodyObstacle<'a> {
     gave_way: Vec<bool>,
     /// Of a surface without a border: inside and outside are known everywhere.
     pub union: Option<UnionDistance>,
-    /// All faces near cloth, and which they are; made when it is first asked.
-    all: OnceLock<(ClosestPoint, Vec<u32>)>,
+    /// All faces near cloth; made when it is first asked.
+    all: OnceLock<ClosestPoint>,
     pub surface: &'a Surface<f64>,
     /// Vertices near cloth.
     pub near: &'a [bool],
@@ -79,8 +79,7 @@ impl<'a> BodyObstacle<'a> {
         let faces = &surface.faces;
         let is_part = |f: u32| faces[f as usize].iter().any(|&v| near[v as usize]);
         let tree = TriangleTree::of_part(&surface.positions, faces, |f, _| is_part(f));
-        let union = is_closed(faces)
-            .then(|| UnionDistance::of_part(surface.positions.clone(), faces, is_part, &tree.self_pairs()));
+        let union = is_closed(faces).then(|| UnionDistance::of_tree(&tree));
         let mut touched = vec![false; surface.positions.len()];
         if let Some(union) = &union {
             for (face, _) in faces.iter().zip(union.sides()).filter(|(_, side)| **side != FaceSide::Exposed) {
@@ -108,38 +107,23 @@ impl<'a> BodyObstacle<'a> {
         self.gave_way.get(f as usize).is_some_and(|p| *p)
     }
 
-    /// The nearest of all faces near cloth, whatever the side, and its number.
-    fn nearest_of_all(&self, p: [f64; 3]) -> Option<(SurfacePoint, u32)> {
-        let (tree, part) = self.all.get_or_init(|| {
-            let faces = &self.surface.faces;
-            let is_part = |f: &u32| {
-                let face = faces[*f as usize];
-                face.iter().any(|&v| self.near[v as usize])
-                    // As ClosestPoint does.
-                    && face.iter().all(|&v| is_finite(self.surface.positions[v as usize]))
-            };
-            let part: Vec<u32> = (0..faces.len() as u32).filter(is_part).collect();
-            let part_faces: Vec<[u32; 3]> = part.iter().map(|&f| faces[f as usize]).collect();
-            (ClosestPoint::new(self.surface.positions.clone(), &part_faces), part)
-        });
-        tree.project(p).map(|found| (found, part[found.face as usize]))
+    /// The nearest of all faces near cloth, whatever the side.
+    fn nearest_of_all(&self, p: [f64; 3]) -> Option<SurfacePoint> {
+        self.all.get_or_init(|| ClosestPoint::of_tree(&self.tree, |_| true)).project(p)
     }
 
     /// Whether the body's face nearest to `p` is pinched.
     pub fn is_pinch(&self, p: [f64; 3]) -> bool {
-        self.has_pinched && self.nearest_of_all(p).is_some_and(|(_, face)| self.is_pinched(face))
+        self.has_pinched && self.nearest_of_all(p).is_some_and(|found| self.is_pinched(found.face))
     }
 
     /// What the body is to a point; `None` where it is not near cloth.
     pub fn look(&self, p: [f64; 3]) -> Option<BodyView> {
-        let (found, mut is_inside, face) = match &self.union {
-            Some(union) => {
-                let (found, is_inside) = union.project(p)?;
-                (found, is_inside, union.kept_face(found.face))
-            }
+        let (found, mut is_inside) = match &self.union {
+            Some(union) => union.project(p)?,
             None => {
-                let (found, face) = self.nearest_of_all(p)?;
-                (found, dot(sub(p, found.position), found.normal) < 0.0, face)
+                let found = self.nearest_of_all(p)?;
+                (found, dot(sub(p, found.position), found.normal) < 0.0)
             }
         };
         let far = found.distance_squared.sqrt();
@@ -150,7 +134,7 @@ impl<'a> BodyObstacle<'a> {
         let distance = if is_inside { -far } else { far };
         let direction =
             if far > CONTACT { scale(sub(p, found.position), distance.signum() / far) } else { found.normal };
-        let is_pinched = self.is_pinched(face);
+        let is_pinched = self.is_pinched(found.face);
         let plane = if is_inside && (is_pinched || self.is_pinch(p)) {
             None
         } else {

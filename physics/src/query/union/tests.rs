@@ -17,32 +17,10 @@ fn balls() -> TriMesh {
 }
 
 #[test]
-fn crossings_give_the_winding_number() {
-    let mesh = balls();
-    let crossings = Crossings::new(mesh.positions().to_vec(), mesh.faces().to_vec());
-    let mut seen = [0; 4];
-    // Few random points lie in three balls at once.
-    for p in points(500, 3).into_iter().chain([[0.1; 3], [0.12, 0.09, 0.1]]) {
-        let expected = brute_force::winding_number(mesh.positions(), mesh.faces(), p).round() as i32;
-        assert_eq!(crossings.winding_number(p), expected);
-        assert_eq!(crossings.winding_number_of_all(p), expected);
-        seen[expected as usize] += 1;
-    }
-    assert!(seen.iter().all(|&n| n > 0), "{seen:?}");
-    // At a vertex of the projection, where every test is a tie.
-    let octahedron = shapes::icosphere(0.5, 0);
-    let crossings = Crossings::new(octahedron.positions().to_vec(), octahedron.faces().to_vec());
-    for p in octahedron.positions() {
-        assert_eq!(crossings.winding_number([-2.0, p[1], p[2]]), 0);
-        assert_eq!(crossings.winding_number([0.01, 0.3 * p[1], 0.3 * p[2]]), 1);
-    }
-}
-
-#[test]
 fn the_distance_is_continuous_and_its_sign_that_of_the_union() {
     let mesh = balls();
     let surface = Surface::<f64>::from_mesh(&mesh);
-    let union = UnionDistance::new(mesh.positions().to_vec(), mesh.faces());
+    let union = UnionDistance::new(mesh.positions(), mesh.faces());
     assert!(union.buried() > 1280, "the small ball and the lenses: {}", union.buried());
     let mut jumps_of_the_closest_point = 0;
     for p in points(300, 11) {
@@ -71,12 +49,10 @@ fn a_seam_that_leaves_the_part_still_parts_inside_from_outside() {
     let fine = shapes::mapped(&shapes::icosphere(0.4, 4), |p| vec3::add(p, [0.05, 0.3, 0.1]));
     let mesh = shapes::union(&[&shapes::icosphere(0.5, 1), &fine]);
     let (positions, faces) = (mesh.positions(), mesh.faces());
-    let whole = UnionDistance::new(positions.to_vec(), faces);
+    let whole = UnionDistance::new(positions, faces);
     for cut in (-6..6).map(|i| 0.05 * f64::from(i)) {
         let is_part = |f: u32| faces[f as usize].iter().any(|&v| positions[v as usize][0] > cut);
-        let mut seams = self_triangle_pairs(positions, faces);
-        seams.retain(|&(a, b)| is_part(a) && is_part(b));
-        let part = UnionDistance::of_part(positions.to_vec(), faces, is_part, &seams);
+        let part = UnionDistance::of_tree(&TriangleTree::of_part(positions, faces, |f, _| is_part(f)));
         for f in (0..faces.len() as u32).filter(|f| is_part(*f)) {
             let (expected, found) = (whole.sides()[f as usize], part.sides()[f as usize]);
             // A face that only crosses what was left out is no seam any more.
@@ -89,10 +65,9 @@ fn a_seam_that_leaves_the_part_still_parts_inside_from_outside() {
 fn a_part_answers_as_the_whole_does_near_it() {
     let mesh = balls();
     let (positions, faces) = (mesh.positions(), mesh.faces());
-    let whole = UnionDistance::new(positions.to_vec(), faces);
+    let whole = UnionDistance::new(positions, faces);
     let is_part = |f: u32| faces[f as usize].iter().any(|&v| positions[v as usize][0] > 0.1);
-    let seams = self_triangle_pairs(positions, faces);
-    let part = UnionDistance::of_part(positions.to_vec(), faces, is_part, &seams);
+    let part = UnionDistance::of_tree(&TriangleTree::of_part(positions, faces, |f, _| is_part(f)));
     assert!(part.buried() > 0 && part.buried() < whole.buried());
     let mut asked = 0;
     for p in points(400, 17).into_iter().filter(|p| p[0] > 0.2) {
@@ -102,7 +77,7 @@ fn a_part_answers_as_the_whole_does_near_it() {
             let (b, is_inside_part) = part.project(p).unwrap();
             assert_eq!((a.position, is_inside), (b.position, is_inside_part));
             // Which face may be either of two, on an edge.
-            assert!(is_part(part.kept_face(b.face)));
+            assert!(is_part(b.face));
             asked += 1;
         }
     }
@@ -122,5 +97,5 @@ fn without_intersections_nothing_differs() {
         assert_eq!((a.gap, a.gradient), (b.gap, b.gradient));
     }
     assert!(surface.gap([f64::NAN, 0.0, 0.0], Distance::Union).gap.is_nan());
-    assert!(UnionDistance::new(vec![[0.0; 3]], &[]).project([0.0; 3]).is_none());
+    assert!(UnionDistance::new(&[[0.0; 3]], &[]).project([0.0; 3]).is_none());
 }

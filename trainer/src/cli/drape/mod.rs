@@ -137,26 +137,37 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         clock.elapsed().as_secs_f64()
     );
     let clock = Instant::now();
-    let mut reports = Vec::new();
-    for job in &jobs {
-        let find = |name: &String| closet.find(name, draper.body(), arguments.fit.decided());
+    // All of it is read before anything is draped: a wrong name in the last outfit is told at once.
+    let blame = |job: &Job, failure: Failure| match jobs.len() {
+        1 => failure,
+        _ => failure.wrap_err(format!("outfit {}", job.name)),
+    };
+    let find = |name: &String| closet.find(name, draper.body(), arguments.fit.decided());
+    let read = |job: &Job| {
         let sources = job.garments.iter().map(find).collect::<Result<Vec<_>, _>>()?;
         let sources = ordered(sources, job.order.as_deref())?;
         sources.iter().for_each(tell_repairs);
         let scenes = job.scenes(&draper)?;
         tell_shape(&scenes.body.shape, draper.trained().config.data.shape_range);
-        let outfit = draper.outfit(sources)?;
+        Ok((sources, scenes))
+    };
+    let read = |job| read(job).map_err(|failure| blame(job, failure));
+    let wanted = jobs.iter().map(read).collect::<Result<Vec<_>, Failure>>()?;
+    let bar = match wanted.iter().map(|(_, scenes)| scenes.states.len()).sum() {
+        1 => ProgressBar::hidden(),
+        drapes => progress_bar(drapes, "drapes {bar:30} {pos}/{len} · {eta} left{msg}"),
+    };
+    let mut reports = Vec::new();
+    for (job, (sources, scenes)) in jobs.iter().zip(wanted) {
         let folder = match jobs.len() {
             1 => staged.folder().to_owned(),
             _ => staged.folder().join(&job.name),
         };
-        let report = drape_job(arguments, &draper, &outfit, job, &scenes, &folder);
-        let report = match jobs.len() {
-            1 => report?,
-            _ => report.wrap_err_with(|| format!("outfit {}", job.name))?,
-        };
-        reports.push((job.name.as_str(), report));
+        let outfit = draper.outfit(sources).map_err(|e| blame(job, e.into()))?;
+        let report = drape_job(arguments, &draper, &outfit, job, &scenes, &folder, &bar);
+        reports.push((job.name.as_str(), report.map_err(|failure| blame(job, failure))?));
     }
+    bar.finish_and_clear();
     if jobs.len() > 1 {
         let list: Vec<_> = reports
             .iter()
@@ -230,8 +241,9 @@ fn drape_job(
     job: &Job,
     scenes: &Scenes,
     folder: &Path,
+    bar: &ProgressBar,
 ) -> Result<Report, Failure> {
-    let mut drapes = drape_all(draper, outfit, scenes)?;
+    let mut drapes = drape_all(draper, outfit, scenes, bar)?;
     let smoothing = match arguments.smooth {
         radius if radius > 0 && !scenes.moments.is_empty() => {
             Some(smooth(draper, outfit, &mut drapes, usize::from(radius))?)
@@ -263,18 +275,19 @@ fn drape_job(
     Ok(report)
 }
 
-fn drape_all(draper: &Draper, outfit: &Outfit, scenes: &Scenes) -> Result<Vec<Drape>, Failure> {
-    let bar = match scenes.states.len() {
-        1 => ProgressBar::hidden(),
-        frames => progress_bar(frames, "frames {bar:30} {pos}/{len} · {eta} left{msg}"),
-    };
+fn drape_all(
+    draper: &Draper,
+    outfit: &Outfit,
+    scenes: &Scenes,
+    bar: &ProgressBar,
+) -> Result<Vec<Drape>, Failure> {
     let drapes = draper.drape_motion(outfit, &scenes.states, |progress| match progress {
         MotionProgress::Draped => bar.inc(1),
         MotionProgress::Again(frame) => {
             bar.set_message(format!(" · number {} once more, from the one after it", frame + 1));
         }
     })?;
-    bar.finish_and_clear();
+    bar.set_message("");
     Ok(drapes)
 }
 
