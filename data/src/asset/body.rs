@@ -11,86 +11,12 @@ use super::skin_weights::SparseSkinWeights;
 use clothcombo_physics::mesh::TriMesh;
 use rayon::prelude::*;
 use std::sync::Arc;
-use thiserror::Error;
 
-/// Why a body cannot be made or posed.
-#[derive(Debug, Error)]
-pub enum BodyError {
-    /// An array does not have the length the others ask for.
-    #[error("body '{body}': {part} has {found} numbers, expected {expected} ({layout})")]
-    Shape {
-        /// Body name.
-        body: String,
-        /// Which array.
-        part: &'static str,
-        /// What its layout should be.
-        layout: &'static str,
-        /// Its length.
-        found: usize,
-        /// The length it should have.
-        expected: usize,
-    },
-    /// A number is NaN or infinite.
-    #[error("body '{body}': {part} holds a non-finite number at position {index}")]
-    NonFinite {
-        /// Body name.
-        body: String,
-        /// Which array.
-        part: &'static str,
-        /// Flat position in it.
-        index: usize,
-    },
-    /// The joints are not a tree with parents first.
-    #[error(
-        "body '{body}': joint {joint} has parent {parent:?}; joint 0 must be the only root and parents must come first"
-    )]
-    Tree {
-        /// Body name.
-        body: String,
-        /// The joint.
-        joint: usize,
-        /// Its parent.
-        parent: Option<usize>,
-    },
-    /// A vertex has no usable skin weights.
-    #[error("body '{body}': skin weights of vertex {vertex} {problem}")]
-    Weights {
-        /// Body name.
-        body: String,
-        /// The vertex.
-        vertex: usize,
-        /// What is wrong.
-        problem: String,
-    },
-    /// The surface is not a mesh.
-    #[error("body '{body}': {message}")]
-    Mesh {
-        /// Body name.
-        body: String,
-        /// What the mesh check said.
-        message: String,
-    },
-    /// More shape numbers than the body has components.
-    #[error("{given} shape numbers for body '{body}', which has {available} shape components")]
-    TooManyShapeNumbers {
-        /// Body name.
-        body: String,
-        /// How many were given.
-        given: usize,
-        /// How many there are.
-        available: usize,
-    },
-    /// More pose rotations than the body has joints.
-    #[error("{given} joint rotations for body '{body}', which has {available} joints")]
-    TooManyJoints {
-        /// Body name.
-        body: String,
-        /// How many were given.
-        given: usize,
-        /// How many there are.
-        available: usize,
-    },
-}
+mod error;
+mod skinning;
+
+pub use error::BodyError;
+pub use skinning::{skin, transform, unskin};
 
 /// Everything a body is made of; see [`Body`] for shapes and units.
 #[derive(Clone, Debug)]
@@ -419,43 +345,6 @@ impl Body {
         }
         collars.iter().sum::<f64>() / collars.len() as f64
     }
-}
-
-/// Weighted sum of bone transforms applied to `p`.
-pub fn skin<'a>(p: [f64; 3], bones: impl Iterator<Item = (&'a [[f64; 4]; 3], f64)>) -> [f64; 3] {
-    transform(&blend(bones), p)
-}
-
-/// The point that [`skin`] with these bones carries to `p`; `None` if they flatten space there.
-pub fn unskin<'a>(p: [f64; 3], bones: impl Iterator<Item = (&'a [[f64; 4]; 3], f64)>) -> Option<[f64; 3]> {
-    let m = blend(bones);
-    let row = |a: usize| [m[a][0], m[a][1], m[a][2]];
-    let cross = |u: [f64; 3], v: [f64; 3]| {
-        [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
-    };
-    // The columns of the adjugate are the cross products of the rows.
-    let columns = [cross(row(1), row(2)), cross(row(2), row(0)), cross(row(0), row(1))];
-    let determinant: f64 = (0..3).map(|a| m[0][a] * columns[0][a]).sum();
-    let q: [f64; 3] = std::array::from_fn(|a| p[a] - m[a][3]);
-    (determinant.abs() > 1e-9)
-        .then(|| std::array::from_fn(|a| (0..3).map(|b| columns[b][a] * q[b]).sum::<f64>() / determinant))
-}
-
-fn blend<'a>(bones: impl Iterator<Item = (&'a [[f64; 4]; 3], f64)>) -> [[f64; 4]; 3] {
-    let mut blended = [[0.0; 4]; 3];
-    for (bone, w) in bones {
-        for a in 0..3 {
-            for b in 0..4 {
-                blended[a][b] += w * bone[a][b];
-            }
-        }
-    }
-    blended
-}
-
-/// A 3×4 affine transform applied to a point.
-pub fn transform(m: &[[f64; 4]; 3], p: [f64; 3]) -> [f64; 3] {
-    m.map(|row| row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + row[3])
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Triangle soup → oriented manifold sheets: cut where more than two faces meet, turned to one orientation per piece.
 
 use clothcombo_physics::Topology;
+use clothcombo_physics::mesh::DisjointSets;
 use clothcombo_physics::query::{Distance, Surface};
 use clothcombo_physics::vec3::{add, cross, dot, norm, normalized, scale, sub};
 use std::collections::{HashMap, VecDeque};
@@ -108,15 +109,7 @@ pub(crate) struct SplitSheet {
 
 /// One vertex per fan of joined faces, so that pieces meeting at an edge or a vertex come apart.
 pub(crate) fn split_fans(positions: &[[f64; 3]], faces: &[[u32; 3]], joined: &Joined) -> SplitSheet {
-    // Union-find over face corners.
-    let mut root: Vec<u32> = (0..3 * faces.len() as u32).collect();
-    fn find(root: &mut [u32], mut v: u32) -> u32 {
-        while root[v as usize] != v {
-            root[v as usize] = root[root[v as usize] as usize];
-            v = root[v as usize];
-        }
-        v
-    }
+    let mut corners = DisjointSets::new(3 * faces.len());
     let corner = |f: usize, v: u32| (0..3).find(|i| faces[f][*i] == v).map(|i| 3 * f as u32 + i as u32);
     let mut sheet = SplitSheet::default();
     for f in 0..faces.len() {
@@ -135,8 +128,7 @@ pub(crate) fn split_fans(positions: &[[f64; 3]], faces: &[[u32; 3]], joined: &Jo
             }
             for v in [a, b] {
                 if let (Some(p), Some(q)) = (corner(f, v), corner(g, v)) {
-                    let (p, q) = (find(&mut root, p), find(&mut root, q));
-                    root[p.max(q) as usize] = p.min(q);
+                    corners.join(p, q);
                 }
             }
         }
@@ -144,7 +136,7 @@ pub(crate) fn split_fans(positions: &[[f64; 3]], faces: &[[u32; 3]], joined: &Jo
     let mut number = HashMap::new();
     for (f, face) in faces.iter().enumerate() {
         sheet.faces.push(std::array::from_fn(|i| {
-            *number.entry(find(&mut root, (3 * f + i) as u32)).or_insert_with(|| {
+            *number.entry(corners.root((3 * f + i) as u32)).or_insert_with(|| {
                 sheet.positions.push(positions[face[i] as usize]);
                 sheet.origin.push(face[i]);
                 sheet.positions.len() as u32 - 1

@@ -3,6 +3,7 @@
 mod field;
 pub mod garment;
 mod isosurface;
+pub(crate) mod labelled_triangles;
 pub mod mannequin;
 mod parts;
 pub mod pose;

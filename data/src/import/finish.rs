@@ -3,8 +3,9 @@
 use super::reference_surface::ReferenceSurface;
 use super::sheet_repair::boundary_loops;
 use crate::fit::{Contact, contact, push_out};
+use crate::generate::labelled_triangles::LabelledTriangles;
 use crate::generate::remesh::{Quality, remesh};
-use crate::generate::sheet::{LabelledTriangles, Sheet, smallest_sine};
+use crate::generate::sheet::{Sheet, smallest_sine};
 use clothcombo_physics::query::Surface;
 use clothcombo_physics::vec3::{add, dot, norm, normalized, scale, sub};
 use clothcombo_physics::{Topology, TriMesh};

@@ -4,7 +4,7 @@
 use super::finish::{GarmentResolution, finish};
 use crate::asset::{Body, Category};
 use crate::fit::{Contact, one_rings};
-use crate::generate::sheet::LabelledTriangles;
+use crate::generate::labelled_triangles::LabelledTriangles;
 use clothcombo_physics::query::{Distance, Surface};
 use clothcombo_physics::vec3::{add, add_scaled, normalized, scale};
 use clothcombo_physics::{TriMesh, vertex_normals};

@@ -1,7 +1,7 @@
 //! A fixed triangle sheet to which a remeshed copy keeps: its surface, its boundary curves and their corners.
 
+use crate::generate::labelled_triangles::LabelledTriangles;
 use crate::generate::remesh::Target;
-use crate::generate::sheet::LabelledTriangles;
 use clothcombo_physics::query::ClosestPoint;
 use clothcombo_physics::vec3::{add, dot, norm_squared, scale, sub};
 use std::collections::HashMap;

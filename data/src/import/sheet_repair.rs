@@ -2,7 +2,7 @@
 
 use super::reference_surface::boundary_edges;
 use crate::fit::{SplitSheet, clean_faces, join_faces, orient, outwardness, split_fans, weld};
-use crate::generate::sheet::LabelledTriangles;
+use crate::generate::labelled_triangles::LabelledTriangles;
 use clothcombo_physics::query::Surface;
 use clothcombo_physics::vec3::{add, norm, scale, sub};
 use std::collections::{HashMap, VecDeque};

@@ -1,5 +1,6 @@
 //! Triangle meshes: validated storage, normals, topology, and analytic shapes for tests.
 
+mod disjoint_sets;
 mod faces_at_vertex;
 mod normals;
 pub mod shapes;
@@ -8,6 +9,7 @@ mod topology;
 mod tri_mesh;
 mod volume;
 
+pub use disjoint_sets::DisjointSets;
 pub(crate) use faces_at_vertex::FacesAtVertex;
 pub use normals::{face_normal_area, vertex_normals};
 pub use stretch::vertex_stretch;

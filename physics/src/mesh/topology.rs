@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
-use crate::mesh::TriMesh;
 use crate::mesh::tri_mesh::unique_edges;
+use crate::mesh::{DisjointSets, TriMesh};
 
 /// An interior edge with the two triangles that fold about it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -149,24 +149,14 @@ fn one_rings(vertex_count: usize, edges: &[[u32; 2]]) -> (Vec<u32>, Vec<u32>) {
     (offsets, vertices)
 }
 
-/// Union–find with the lowest vertex as root, then numbering by root.
+/// Components numbered in the order of their lowest vertices.
 fn components(vertex_count: usize, edges: &[[u32; 2]]) -> (Vec<u32>, usize) {
-    fn root(parent: &mut [u32], mut v: u32) -> u32 {
-        while parent[v as usize] != v {
-            parent[v as usize] = parent[parent[v as usize] as usize];
-            v = parent[v as usize];
-        }
-        v
-    }
-    let mut parent: Vec<u32> = (0..vertex_count as u32).collect();
-    for &[a, b] in edges {
-        let (a, b) = (root(&mut parent, a), root(&mut parent, b));
-        parent[a.max(b) as usize] = a.min(b);
-    }
+    let mut sets = DisjointSets::new(vertex_count);
+    edges.iter().for_each(|&[a, b]| sets.join(a, b));
     let mut component = vec![0u32; vertex_count];
     let mut count = 0;
     for v in 0..vertex_count {
-        let r = root(&mut parent, v as u32) as usize;
+        let r = sets.root(v as u32) as usize;
         if r == v {
             component[v] = count;
             count += 1;

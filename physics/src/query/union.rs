@@ -13,7 +13,7 @@
 use super::crossings::Crossings;
 use super::{ClosestPoint, SurfacePoint};
 use crate::contact::TriangleTree;
-use crate::mesh::FacesAtVertex;
+use crate::mesh::{DisjointSets, FacesAtVertex};
 use crate::vec3::{self, add, add_scaled, dot, normalized, scale, sub};
 
 /// How far outside a triangle the side of its piece is asked for [m].
@@ -141,18 +141,15 @@ fn at_the_end(vertices: usize, faces: &[[u32; 3]], part: &[u32]) -> Vec<bool> {
 /// `alone` are asked one by one.
 fn exposed(all: &Crossings, faces: &[[u32; 3]], is_seam: &[bool], is_alone: &[bool]) -> Vec<bool> {
     let at_vertex = FacesAtVertex::new(all.positions().len(), faces);
-    let mut root: Vec<u32> = (0..faces.len() as u32).collect();
+    let mut pieces = DisjointSets::new(faces.len());
     let is_joined = |f: u32| !is_seam[f as usize] && !is_alone[f as usize];
     for (f, [a, b, c]) in (0u32..).zip(faces).filter(|(f, _)| is_joined(*f)) {
         for (from, to) in [(*a, *b), (*b, *c), (*c, *a)] {
             let beside = at_vertex.of(from).iter().filter(|&&g| g > f && is_joined(g));
-            for &g in beside.filter(|&&g| faces[g as usize].contains(&to)) {
-                let (one, other) = (find(&mut root, f), find(&mut root, g));
-                root[one.max(other) as usize] = one.min(other);
-            }
+            beside.filter(|&&g| faces[g as usize].contains(&to)).for_each(|&g| pieces.join(f, g));
         }
     }
-    let roots: Vec<u32> = (0..faces.len() as u32).map(|f| find(&mut root, f)).collect();
+    let roots: Vec<u32> = (0..faces.len() as u32).map(|f| pieces.root(f)).collect();
     // The side is asked at the largest face of each piece, where rounding matters least.
     let areas: Vec<f64> = faces.iter().map(|face| vec3::norm_squared(all.normal(*face))).collect();
     let mut largest: Vec<usize> = (0..faces.len()).collect();
@@ -175,15 +172,6 @@ fn exposed(all: &Crossings, faces: &[[u32; 3]], is_seam: &[bool], is_alone: &[bo
         })
         .collect();
     roots.iter().map(|&piece| is_exposed_piece[piece as usize]).collect()
-}
-
-/// The representative of a face's piece.
-fn find(root: &mut [u32], mut face: u32) -> u32 {
-    while root[face as usize] != face {
-        root[face as usize] = root[root[face as usize] as usize];
-        face = root[face as usize];
-    }
-    face
 }
 
 #[cfg(test)]

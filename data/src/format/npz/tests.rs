@@ -1,4 +1,7 @@
 use super::*;
+use std::io::Write;
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipWriter};
 
 /// An `.npy` file as NumPy writes it, header version 1.
 fn npy(kind: &str, fortran: bool, shape: &str, data: &[u8]) -> Vec<u8> {

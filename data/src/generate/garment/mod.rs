@@ -20,8 +20,9 @@ mod upper;
 mod wardrobe;
 
 use super::isosurface::{Lattice, extract};
+use super::labelled_triangles::LabelledTriangles;
 use super::remesh::{Quality, remesh};
-use super::sheet::{LabelledTriangles, Sheet};
+use super::sheet::Sheet;
 use crate::asset::{Body, Category, Garment, Provenance};
 use cloth::Cloth;
 use clothcombo_physics::TriMesh;

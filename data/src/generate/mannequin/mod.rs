@@ -10,8 +10,9 @@ mod skinning;
 
 use super::field;
 use super::isosurface::{Lattice, extract};
+use super::labelled_triangles::LabelledTriangles;
 use super::remesh::{Quality, Target, remesh};
-use super::sheet::{LabelledTriangles, Sheet};
+use super::sheet::Sheet;
 use crate::asset::{BODY_JOINT_COUNT, BODY_JOINT_NAMES, BODY_JOINT_PARENTS, Body, BodyParts};
 
 pub use shape::SHAPE_COMPONENT_NAMES;

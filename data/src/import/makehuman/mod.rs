@@ -14,7 +14,7 @@ use super::{Progress, Summary};
 use crate::asset::{Body, Category, Garment, Provenance};
 use crate::dataset::garment_folder::{FolderGarment, GarmentFolderError, save_garment_folder};
 use crate::fit::{Contact, triangulate, worn_where};
-use crate::generate::sheet::LabelledTriangles;
+use crate::generate::labelled_triangles::LabelledTriangles;
 use archive::read_proxies;
 use clothcombo_physics::TriMesh;
 use clothcombo_physics::query::Surface;
