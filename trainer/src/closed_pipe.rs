@@ -1,5 +1,7 @@
 //! What happens when the output cannot be written: `clothcombo runs runs | head`, or a full disk behind `>`.
 
+use std::io::Write;
+
 /// Ends the process quietly when it writes to a pipe that was closed, as other programs do, and with one line when the system
 /// refuses the output; by default Rust makes an error of both, which `println!` turns into a panic. Not for training, which must
 /// not end because of what it prints.
@@ -12,7 +14,7 @@ pub fn end_quietly() {
     let usual = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| match info.payload_as_str() {
         Some(text) if text.starts_with("failed printing to stdout") => {
-            eprintln!("{text}");
+            let _ = writeln!(std::io::stderr(), "{text}");
             std::process::exit(1);
         }
         _ => usual(info),

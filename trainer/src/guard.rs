@@ -46,6 +46,17 @@ impl Guard {
         self.incidents.iter().copied().collect()
     }
 
+    /// The first of the skipped steps, one after the other, that end with the last one; 0 without any.
+    pub fn first_of_last_incidents(&self) -> u64 {
+        let mut first = self.incidents.back().copied().unwrap_or(0);
+        for &step in self.incidents.iter().rev().skip(1) {
+            if step + 1 == first {
+                first = step;
+            }
+        }
+        first
+    }
+
     /// Takes note of step `step`; `skipped` if its loss or gradient was not finite.
     pub fn watch(&mut self, step: u64, gradient_norm: f64, skipped: bool) -> Verdict {
         while self.incidents.front().is_some_and(|first| first.saturating_add(self.config.window) <= step) {
@@ -57,7 +68,10 @@ impl Guard {
             return Verdict::Skipped { count, is_over: count >= self.config.max_incidents };
         }
         let usual = self.usual();
-        self.norms.push_back(gradient_norm);
+        // A scene in which nothing depends on what is trained has no gradient, and says nothing about that of others.
+        if gradient_norm > 0.0 {
+            self.norms.push_back(gradient_norm);
+        }
         if self.norms.len() > NORMS {
             self.norms.pop_front();
         }
@@ -96,6 +110,9 @@ mod tests {
         assert_eq!(guard.watch(10, f64::NAN, true), skipped(1, false));
         assert_eq!(guard.watch(60, f64::NAN, true), skipped(2, false));
         assert_eq!(guard.watch(110, f64::NAN, true), skipped(2, false), "step 10 is out of the window");
+        assert_eq!(guard.first_of_last_incidents(), 110);
+        assert_eq!(Guard::new(guard.config.clone(), &[3, 7, 8, 9]).first_of_last_incidents(), 7);
+        assert_eq!(Guard::new(guard.config.clone(), &[]).first_of_last_incidents(), 0);
         let mut continued = Guard::new(guard.config.clone(), &guard.incidents());
         assert_eq!(continued.watch(120, f64::NAN, true), skipped(3, true), "a checkpoint remembers them");
     }
@@ -105,6 +122,10 @@ mod tests {
         let mut guard = guard(3, 100);
         for step in 0..50 {
             assert_eq!(guard.watch(step, 1.0 + 0.1 * (step % 5) as f64, false), Verdict::Fine);
+        }
+        // Steps without a gradient change nothing, however many.
+        for step in 50..150 {
+            assert_eq!(guard.watch(step, 0.0, false), Verdict::Fine);
         }
         assert_eq!(guard.watch(50, 11.0, false), Verdict::Fine);
         assert!(

@@ -57,6 +57,8 @@ fn run(
         .into_diagnostic()
         .wrap_err("cannot start the thread that prepares scenes")?;
 
+    // A checkpoint that is due after a skipped step waits for one that is not: the parameters may be at fault.
+    let mut owed = false;
     for step in first_step..total_steps {
         let at = schedule.at(step);
         if at.first_of_stage || step == first_step {
@@ -92,14 +94,17 @@ fn run(
         if session.leads() {
             let mut is_best = false;
             if at.last_of_stage || due(validate_every) {
-                let report = session.validate()?;
-                is_best = session.note_validation(&report) && output.keep_best;
-                tell(&TrainEvent::Validated { step: done, report: &report })?;
+                let scores = session.validate()?;
+                is_best = session.note_validation(&scores) && output.keep_best;
+                tell(&TrainEvent::Validated { step: done, report: &scores })?;
             }
             if at.last_of_stage || due(output.sample_every) {
                 tell(&TrainEvent::SampleDrawn { path: &session.draw_sample()? })?;
             }
-            if at.last_of_stage || due(output.checkpoint_every) || is_best || stopping {
+            owed |= due(output.checkpoint_every);
+            let is_time = owed && !matches!(report.verdict, Verdict::Skipped { .. });
+            if at.last_of_stage || is_time || is_best || stopping {
+                owed = false;
                 tell(&TrainEvent::CheckpointDue { step: done })?;
                 // A save that failed would fail again.
                 *kept = done;

@@ -196,8 +196,8 @@ fn shape_error(path: &Path, key: &str, found: &[usize], expected: &str) -> BodyF
 
 fn points(path: &Path, key: &str, array: Array<f64>) -> Result<Vec<[f64; 3]>, BodyFileError> {
     match array.shape[..] {
-        [_, 3] => Ok(array.data.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect()),
-        _ => Err(shape_error(path, key, &array.shape, "[n, 3]")),
+        [n, 3] if n > 0 => Ok(array.data.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect()),
+        _ => Err(shape_error(path, key, &array.shape, "[n, 3], n >= 1")),
     }
 }
 
@@ -250,6 +250,19 @@ fn regress_joints(
 mod tests {
     use super::super::body::tests::random_parts;
     use super::*;
+
+    #[test]
+    fn a_body_without_vertices_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("none.npz");
+        let mut npz = NpzWriter::new();
+        npz.f32("v_template", &[0, 3], &[]).u32("f", &[0, 3], &[]).f32("shapedirs", &[0, 3, 1], &[]);
+        npz.f32("weights", &[0, 2], &[]).u32("kintree_table", &[2, 2], &[u32::MAX, 0, 0, 1]);
+        npz.f64("J_regressor", &[2, 0], &[]);
+        npz.save(&path).unwrap();
+        let message = Body::load(&path, &BodyFileSettings::default()).unwrap_err().to_string();
+        assert!(message.contains("none.npz") && message.contains("v_template"), "{message}");
+    }
 
     #[test]
     fn what_is_saved_loads_again() {

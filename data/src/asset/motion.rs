@@ -24,6 +24,14 @@ pub enum MotionError {
         /// The joint.
         joint: usize,
     },
+    /// Some joints are named as ours are, but not this one.
+    #[error("{}: key 'joint_names' names no '{joint}'; the 22 joints of the body are named as in SMPL, in any order", path.display())]
+    Joint {
+        /// The file.
+        path: PathBuf,
+        /// Its name.
+        joint: &'static str,
+    },
     /// The frame rate is not a positive number.
     #[error("{}: key '{key}' is {value}, expected frames per second > 0", path.display())]
     FrameRate {
@@ -52,8 +60,21 @@ pub struct Motion {
 const HINT: &str = "a motion has poses (frames, 66 or more) and mocap_framerate";
 const RATE_KEYS: [&str; 2] = ["mocap_framerate", "mocap_frame_rate"];
 
+/// Where the joints of the body are among those called `names`, of which there must be `count`. Names that are all unknown, or too
+/// few or many, say nothing: the order is SMPL's.
+fn places(names: &[String], count: usize) -> Result<[usize; BODY_JOINT_COUNT], &'static str> {
+    let own = BODY_JOINT_NAMES.map(|joint| names.iter().position(|name| name == joint));
+    if names.len() != count || own.iter().all(Option::is_none) {
+        return Ok(std::array::from_fn(|joint| joint));
+    }
+    match own.iter().position(Option::is_none) {
+        Some(missing) => Err(BODY_JOINT_NAMES[missing]),
+        None => Ok(own.map(Option::unwrap_or_default)),
+    }
+}
+
 impl Motion {
-    /// Reads a motion npz; of more than 22 joints the first 22 are kept.
+    /// Reads a motion npz. Of more than 22 joints those of the body are kept: those that `joint_names` says, or else the first.
     ///
     /// # Errors
     /// [`MotionError`] naming file, key or frame.
@@ -69,14 +90,14 @@ impl Motion {
         let mut file = NpzFile::open(path)?;
         let poses = file.numbers("poses", HINT)?;
         let columns = match poses.shape[..] {
-            [_, columns] if columns >= 3 * BODY_JOINT_COUNT => columns,
+            [_, columns] if columns >= 3 * BODY_JOINT_COUNT && columns % 3 == 0 => columns,
             _ => {
                 let (key, found) = ("poses".into(), poses.shape);
                 return Err(NpzError::Shape {
                     path: path.into(),
                     key,
                     found,
-                    expected: "[frames, 66 or more]".into(),
+                    expected: "[frames, 66 or more, three for each joint]".into(),
                 }
                 .into());
             }
@@ -86,13 +107,19 @@ impl Motion {
         if !(frame_rate > 0.0 && frame_rate.is_finite()) {
             return Err(MotionError::FrameRate { path: path.into(), key, value: frame_rate });
         }
+        let places = match file.contains("joint_names") {
+            true => places(&file.strings("joint_names", HINT)?.data, columns / 3)
+                .map_err(|joint| MotionError::Joint { path: path.into(), joint })?,
+            false => std::array::from_fn(|joint| joint),
+        };
         let mut frames = Vec::with_capacity(poses.shape[0]);
         for (frame, row) in poses.data.chunks_exact(columns).enumerate() {
-            let row = &row[..3 * BODY_JOINT_COUNT];
-            if let Some(at) = row.iter().position(|x| !x.is_finite()) {
-                return Err(MotionError::NonFinite { path: path.into(), frame, joint: at / 3 });
+            let rotations = places.map(|place| [row[3 * place], row[3 * place + 1], row[3 * place + 2]]);
+            let is_finite = |rotation: &[f64; 3]| rotation.iter().all(|x| x.is_finite());
+            if let Some(joint) = rotations.iter().position(|rotation| !is_finite(rotation)) {
+                return Err(MotionError::NonFinite { path: path.into(), frame, joint });
             }
-            frames.push(Pose { rotations: row.chunks_exact(3).map(|r| [r[0], r[1], r[2]]).collect() });
+            frames.push(Pose { rotations: rotations.to_vec() });
         }
         let mut text = |key: &str| match file.strings(key, HINT) {
             Ok(array) => array.data.into_iter().next().unwrap_or_default(),
@@ -138,6 +165,33 @@ mod tests {
         let path = folder.path().join("clip.npz");
         motion.save(&path).unwrap();
         assert_eq!(Motion::load(&path).unwrap(), motion);
+    }
+
+    #[test]
+    fn joints_are_found_by_their_names() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("named.npz");
+        // Joint j turns by j; the file has them backwards, with one more in front.
+        let load = |names: &[&str]| {
+            let row: Vec<f32> = (0..names.len()).rev().flat_map(|j| [j as f32, 0.0, 0.0]).collect();
+            let mut npz = NpzWriter::new();
+            npz.f32("poses", &[1, row.len()], &row).f64("mocap_framerate", &[], &[30.0]);
+            npz.strings("joint_names", &[names.len()], names);
+            npz.save(&path).unwrap();
+            let first = |motion: Motion| motion.poses[0].rotations.iter().map(|r| r[0]).collect::<Vec<_>>();
+            Motion::load(&path).map(first)
+        };
+        let backwards: Vec<&str> = ["jaw"].into_iter().chain(BODY_JOINT_NAMES.into_iter().rev()).collect();
+        let ascending: Vec<f64> = (0..22).map(f64::from).collect();
+        assert_eq!(load(&backwards).unwrap(), ascending);
+        // Names of another kind say nothing; where some are known, all must be.
+        let numbers: Vec<String> = (0..22).map(|j| format!("joint {j}")).collect();
+        let descending: Vec<f64> = (0..22).rev().map(f64::from).collect();
+        assert_eq!(load(&numbers.iter().map(String::as_str).collect::<Vec<_>>()).unwrap(), descending);
+        let mut misspelt = BODY_JOINT_NAMES;
+        misspelt[5] = "right_knie";
+        let message = load(&misspelt).unwrap_err().to_string();
+        assert!(message.contains("named.npz") && message.contains("'right_knee'"), "{message}");
     }
 
     #[test]

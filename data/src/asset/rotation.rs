@@ -48,7 +48,7 @@ pub fn axis_angle_from_quaternion(q: [f64; 4]) -> [f64; 3] {
 }
 
 /// Unit quaternion of a rotation matrix (Shepperd's method: divides by the largest component).
-pub fn quaternion_from_matrix(m: &Matrix3) -> [f64; 4] {
+fn quaternion_from_matrix(m: &Matrix3) -> [f64; 4] {
     let trace = m[0][0] + m[1][1] + m[2][2];
     let squares = [trace, m[0][0], m[1][1], m[2][2]];
     let largest = (0..4).fold(0, |best, i| if squares[i] > squares[best] { i } else { best });

@@ -11,7 +11,7 @@ mod targets;
 pub use body::BodyCheck;
 pub use garment::{GarmentCheck, layer_guess};
 pub use measures::{MeshDefects, MeshMeasures};
-pub use motion::MotionCheck;
+pub use motion::{MotionCheck, impossible_turn};
 pub use targets::{ManifestHints, Target, find_targets};
 
 use crate::asset::Body;
@@ -24,6 +24,7 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Debug, Serialize)]
 pub struct FileCheck {
     /// The file.
+    #[serde(serialize_with = "lossy")]
     pub path: PathBuf,
     /// Why it cannot be used, if so.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -39,6 +40,11 @@ pub struct FileCheck {
     /// If it is a motion.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub motion: Option<MotionCheck>,
+}
+
+/// Names need not be UTF-8, JSON must.
+fn lossy<S: serde::Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(&path.to_string_lossy())
 }
 
 impl FileCheck {

@@ -1,7 +1,7 @@
 //! A motion file.
 
 use super::FileCheck;
-use crate::asset::{BODY_JOINT_NAMES, Motion};
+use crate::asset::{BODY_JOINT_NAMES, Motion, Pose};
 use crate::generate::pose::JOINT_LIMITS;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -31,6 +31,27 @@ const IMPOSSIBLE: f64 = 90.0;
 /// Excess over a limit that is measurement noise [degrees].
 const TOLERANCE: f64 = 1.0;
 
+/// How far every joint but the pelvis is outside its range of motion, in the angle that is farthest [degrees]; 0 within. The
+/// heading of the pelvis is free, and falls and floor poses turn it any way.
+fn excesses(pose: &Pose) -> impl Iterator<Item = (usize, f64)> + '_ {
+    (1..JOINT_LIMITS.len()).map(|joint| {
+        let (rotation, limits) = (pose.rotation(joint), &JOINT_LIMITS[joint]);
+        let excess = (0..3).map(|a| {
+            let angle = rotation[a].to_degrees();
+            (limits.low[a] - angle).max(angle - limits.high[a])
+        });
+        (joint, excess.fold(0.0, f64::max))
+    })
+}
+
+/// What to tell about poses in which a joint turns as none does; `None` if there is nothing.
+pub fn impossible_turn<'a>(poses: impl IntoIterator<Item = &'a Pose>) -> Option<String> {
+    let excess = poses.into_iter().flat_map(excesses).map(|(_, excess)| excess).fold(0.0, f64::max);
+    (excess > IMPOSSIBLE).then(|| {
+        format!("joints turn up to {excess:.0}° beyond their range: other axes, or angles in degrees?")
+    })
+}
+
 pub(super) fn check(path: &Path) -> FileCheck {
     // NaN, wrong shapes and rates are refused here, with frame and joint.
     let motion = match Motion::load(path) {
@@ -50,15 +71,7 @@ pub(super) fn check(path: &Path) -> FileCheck {
     };
     for pose in &motion.poses {
         let mut outside = false;
-        // The heading of the pelvis is free, and falls and floor poses turn it any way.
-        for joint in 1..JOINT_LIMITS.len() {
-            let (rotation, limits) = (pose.rotation(joint), &JOINT_LIMITS[joint]);
-            let excess = (0..3)
-                .map(|a| {
-                    let angle = rotation[a].to_degrees();
-                    (limits.low[a] - angle).max(angle - limits.high[a])
-                })
-                .fold(0.0, f64::max);
+        for (joint, excess) in excesses(pose) {
             check.largest_excess_degrees = check.largest_excess_degrees.max(excess);
             if excess > TOLERANCE {
                 outside = true;
@@ -68,12 +81,7 @@ pub(super) fn check(path: &Path) -> FileCheck {
         check.frames_outside_limits += usize::from(outside);
     }
     let mut file = FileCheck::new(path);
-    if check.largest_excess_degrees > IMPOSSIBLE {
-        file.warnings.push(format!(
-            "joints turn up to {:.0}° beyond their range: other axes, or angles in degrees?",
-            check.largest_excess_degrees
-        ));
-    }
+    file.warnings.extend(impossible_turn(&motion.poses));
     file.motion = Some(check);
     file
 }

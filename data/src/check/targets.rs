@@ -3,6 +3,7 @@
 use crate::asset::Category;
 use crate::dataset::garment_folder::{MANIFEST, read_entries};
 use crate::format::mesh::is_mesh_path;
+use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -61,7 +62,7 @@ pub fn find_targets(paths: &[PathBuf]) -> Vec<Target> {
         match fs::metadata(path) {
             Ok(m) if m.is_dir() => {
                 let before = targets.len();
-                visit(path, 0, &mut targets);
+                visit(path, 0, &mut HashSet::new(), &mut targets);
                 if targets.len() == before {
                     let reason = format!("{}: no garments, bodies or motions in it", path.display());
                     targets.push(Target::Unusable { path: path.clone(), reason });
@@ -90,7 +91,11 @@ fn file_target(path: &Path) -> Option<Target> {
     is_npz.then(|| Target::Npz { path: path.into() })
 }
 
-fn visit(folder: &Path, depth: usize, targets: &mut Vec<Target>) {
+/// `seen`: the folders that were visited, by their real paths; links may lead back.
+fn visit(folder: &Path, depth: usize, seen: &mut HashSet<PathBuf>, targets: &mut Vec<Target>) {
+    if !seen.insert(fs::canonicalize(folder).unwrap_or_else(|_| folder.into())) {
+        return;
+    }
     let wrong = |reason: String| Target::Unusable { path: folder.into(), reason };
     let mut children: Vec<PathBuf> = match fs::read_dir(folder) {
         Ok(entries) => entries.filter_map(|e| Some(e.ok()?.path())).collect(),
@@ -117,7 +122,7 @@ fn visit(folder: &Path, depth: usize, targets: &mut Vec<Target>) {
     for child in children {
         if child.is_dir() {
             if depth < MAX_DEPTH {
-                visit(&child, depth + 1, targets);
+                visit(&child, depth + 1, seen, targets);
             }
         } else if !(has_manifest && is_mesh_path(&child)) {
             targets.extend(file_target(&child));

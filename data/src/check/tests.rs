@@ -79,3 +79,17 @@ fn layers_are_guessed_from_the_distance() {
     assert_eq!(layer_guess(0.004, Category::OpenShirt), [2, 3]);
     assert_eq!(layer_guess(0.05, Category::Dress), [3, 4]);
 }
+
+#[cfg(unix)]
+#[test]
+fn links_that_lead_back_and_names_that_are_no_text_do_no_harm() {
+    use std::os::unix::ffi::OsStrExt;
+    let folder = tempfile::tempdir().unwrap();
+    let name = std::ffi::OsStr::from_bytes(b"caf\xe9.obj");
+    fs::write(folder.path().join(name), "v 0 0 0\n").unwrap();
+    std::os::unix::fs::symlink(folder.path(), folder.path().join("again")).unwrap();
+    let targets = find_targets(&[folder.path().to_path_buf()]);
+    assert_eq!(targets.len(), 1);
+    let json = serde_json::to_value(Checker::new(mannequin()).check(&targets[0])).unwrap();
+    assert!(json["path"].as_str().unwrap().ends_with(".obj") && json["unusable"].is_string(), "{json}");
+}

@@ -173,7 +173,11 @@ impl NpzFile {
         let shape = shape.ok_or_else(|| damaged("shape does not fit in memory".into()))?;
         let count =
             shape.iter().try_fold(1usize, |a, n| a.checked_mul(*n)).and_then(|n| n.checked_mul(width));
-        let count = count.filter(|n| *n / width.max(1) <= LARGEST_ARRAY);
+        let most = match kind.type_char() {
+            TypeChar::Bool | TypeChar::Int | TypeChar::Uint | TypeChar::Float => width * LARGEST_ARRAY,
+            _ => LARGEST_TEXT,
+        };
+        let count = count.filter(|bytes| *bytes <= most);
         let count = count.ok_or_else(|| damaged(format!("shape {shape:?} does not fit in memory")))?;
         // Grows with what is there, so that a lying header cannot reserve memory.
         let mut bytes = Vec::new();
@@ -205,6 +209,8 @@ impl NpzFile {
 /// More numbers than any model or motion holds (SMPL-X's largest array has 15 million); a deflated file of a few kilobytes
 /// can claim any size.
 const LARGEST_ARRAY: usize = 1 << 26;
+/// More bytes than the names and notices in any file; one cell of text may claim to be of any width.
+const LARGEST_TEXT: usize = 1 << 24;
 
 /// The header of an `.npy` member. Its text is looked at before it is parsed: it cannot be long or deeply nested, or else it
 /// exhausts memory or stack.

@@ -63,6 +63,8 @@ impl ObjMesh {
         let mut mesh = Self { groups: vec![String::new()], ..Self::default() };
         let mut group = 0;
         let mut number_of_group = HashMap::from([(String::new(), 0)]);
+        // Left by some editors; taken for a part of the first word it would hide the first vertex.
+        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         for (number, line) in text.lines().enumerate() {
             let line = line.split('#').next().unwrap_or_default();
             let mut words = line.split_ascii_whitespace();
@@ -284,6 +286,13 @@ pub fn without_normals(bytes: &[u8]) -> Vec<u8> {
 mod tests {
     use super::*;
     use std::fs;
+
+    #[test]
+    fn a_mark_of_the_byte_order_hides_no_vertex() {
+        let mesh =
+            ObjMesh::parse("\u{feff}v 1 2 3\nv 0 1 0\nv 0 0 1\nf 1 2 3\n", Path::new("a.obj")).unwrap();
+        assert_eq!((mesh.positions.len(), mesh.positions[0]), (3, [1.0, 2.0, 3.0]));
+    }
 
     #[test]
     fn without_normals_everything_else_stays() {

@@ -26,7 +26,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<PolygonMesh, String> {
     }
     let count = announced(bytes)
         .ok_or_else(|| format!("{} bytes are no STL: binary ones have a header of {HEADER}", bytes.len()))?;
-    check_count("faces", count)?;
+    // First of all: other files announce any number.
     if bytes.len() != HEADER + TRIANGLE * count {
         return Err(format!(
             "announces {count} triangles, which take {} bytes, but has {} (truncated, or no STL?)",
@@ -34,6 +34,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<PolygonMesh, String> {
             bytes.len()
         ));
     }
+    check_count("faces", count)?;
     let mut welded = Welded::default();
     for triangle in bytes[HEADER..].chunks_exact(TRIANGLE) {
         let number = |i: usize| {
@@ -142,6 +143,12 @@ mod tests {
     }
 
     #[test]
+    fn another_file_is_told_from_a_large_one() {
+        let text = "# a garment\n".repeat(20);
+        assert!(parse(text.as_bytes()).unwrap_err().contains("no STL?"));
+    }
+
+    #[test]
     fn what_is_wrong_is_named() {
         let whole = binary();
         let mut no_solid = whole.clone();
@@ -154,7 +161,7 @@ mod tests {
                 no_solid[..no_solid.len() - 1].to_vec(),
                 "announces 2 triangles, which take 184 bytes, but has 183",
             ),
-            (huge, "more than"),
+            (huge, "announces 4278190082 triangles"),
             (text("short"), "5 bytes are no STL"),
             (text("solid\nfacet\nvertex 0 0 x\n"), "line 3: 'x' is not a number"),
             (text("solid\nfacet\nvertex 0 0 0\nendfacet"), "line 4: a facet has 3 vertices, this one has 1"),

@@ -11,6 +11,7 @@ use super::{Progress, Summary};
 use crate::asset::motion::MotionError;
 use crate::asset::rotation::{Matrix3, axis_angle_from_matrix, matrix_from_axis_angle, product};
 use crate::asset::{Motion, Pose, Provenance};
+use crate::check::impossible_turn;
 use crate::format::{NpzError, NpzFile};
 use std::collections::HashSet;
 use std::fs;
@@ -173,6 +174,9 @@ fn import_file(path: &Path, settings: &AmassSettings) -> Result<Clip, String> {
     }
     if lying < -0.2 || (lying.abs() < 0.2 && settings.up == UpAxis::Z && looks_y_up(&poses)) {
         note.push_str("; the body is not upright on average, check the up axis (--up)");
+    }
+    if let Some(turn) = impossible_turn(&poses) {
+        note.push_str(&format!("; {turn}"));
     }
     motion.poses = poses;
     motion.frame_rate = frame_rate;

@@ -88,11 +88,6 @@ impl OutfitTensors {
         (0..count).flat_map(|a| (a + 1..count).map(move |b| (a, b))).collect()
     }
 
-    /// Number of garments M.
-    pub fn garment_count(&self) -> usize {
-        self.segments.count()
-    }
-
     /// Number of vertices of all garments, ΣV.
     pub fn vertex_count(&self) -> usize {
         self.segments.rows()

@@ -113,6 +113,17 @@ impl Checkpoint {
         })
     }
 
+    /// The newest whole checkpoint of the run in `path` after at most `step` steps.
+    ///
+    /// # Errors
+    /// When there is none.
+    pub fn open_until(path: &Path, step: u64) -> Result<Self, CheckpointError> {
+        let folders = retention::list(&path.join("checkpoints"));
+        let whole = |(_, folder): (u64, PathBuf)| Self::open(&folder).ok();
+        let found = folders.into_iter().rev().filter(|(number, _)| *number <= step).find_map(whole);
+        found.ok_or_else(|| CheckpointError::Missing { path: path.to_owned() })
+    }
+
     /// The configuration of the run it belongs to.
     ///
     /// # Errors

@@ -16,19 +16,22 @@ pub mod runs;
 pub mod score;
 mod table;
 pub mod train;
+mod values;
 mod verbosity;
 mod wardrobe_sheet;
 
 pub use verbosity::Verbosity;
 
 use miette::Report;
+use std::io::Write;
 
 /// Exit code of a program that ended with `result`; an error is printed once, with its place and hint.
 pub fn exit_code(result: Result<(), Report>) -> std::process::ExitCode {
     match result {
         Ok(()) => std::process::ExitCode::SUCCESS,
         Err(report) => {
-            eprintln!("{report:?}");
+            // Nobody is left to tell where even this cannot be written.
+            let _ = writeln!(std::io::stderr(), "{report:?}");
             std::process::ExitCode::FAILURE
         }
     }

@@ -1,6 +1,7 @@
 //! `clothcombo resolve`: anyone's garments taken out of anyone's body, and out of each other.
 
 use crate::cli::interrupted::remove_on_signals;
+use crate::cli::values::gap_mm;
 use crate::draper::UniqueNames;
 use crate::draper::output::Staged;
 use crate::score::{DrapedGarment, Score, ScoreDistance, ScoreError, load_body, load_garment, score};
@@ -41,7 +42,7 @@ pub struct Arguments {
     #[arg(long)]
     replace: bool,
     /// Gap that a garment gets where it has to move [mm]
-    #[arg(long, default_value_t = 1.0)]
+    #[arg(long = "gap", alias = "gap-mm", default_value_t = 1.0, value_name = "MM", value_parser = gap_mm)]
     gap_mm: f64,
     /// Leave crossings of a garment with itself alone
     #[arg(long)]

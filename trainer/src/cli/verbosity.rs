@@ -2,7 +2,7 @@
 
 use clap::{ArgAction, Args};
 use indicatif::{ProgressBar, ProgressStyle};
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 use tracing_subscriber::EnvFilter;
 
@@ -41,6 +41,8 @@ impl Verbosity {
             .with_env_filter(filter)
             .with_ansi(std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none())
             .with_writer(std::io::stderr)
+            // A log that cannot be written is no reason to stop: by default it is one to panic.
+            .log_internal_errors(false)
             .try_init();
     }
 }
@@ -62,6 +64,7 @@ pub(crate) fn progress_bar(length: usize, template: &str) -> ProgressBar {
 /// One line on stderr, none with `--quiet`.
 pub(crate) fn say(line: &str) {
     if !is_quiet() {
-        eprintln!("{line}");
+        // What is made does not depend on what can be told of it.
+        let _ = writeln!(std::io::stderr(), "{line}");
     }
 }

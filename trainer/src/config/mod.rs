@@ -80,12 +80,6 @@ impl Config {
         self.validation.seed.unwrap_or(self.seed)
     }
 
-    /// The most layers any stage or validation scene uses.
-    pub fn max_layers(&self) -> usize {
-        let stages = self.stages.iter().map(|s| s.layers[1]).max().unwrap_or(1);
-        stages.max(if self.validation.layered_scenes > 0 { self.validation.layers[1] } else { 1 })
-    }
-
     /// What is inconsistent, as (place, what, hint).
     pub(crate) fn problem(&self) -> Option<(String, String, String)> {
         let at = |place: &str, what: &str, hint: &str| Some((place.into(), what.into(), hint.into()));

@@ -60,11 +60,6 @@ impl Ramp {
         }
     }
 
-    /// Whether the value is zero during the whole span.
-    pub fn is_zero(&self) -> bool {
-        self.from == 0.0 && self.to == 0.0
-    }
-
     /// What is wrong with the ramp, if anything.
     pub fn problem(&self) -> Option<&'static str> {
         if ![self.from, self.to, self.start, self.end].iter().all(|v| v.is_finite()) {

@@ -2,6 +2,7 @@
 
 use super::report::Moment;
 use super::{Drape, GarmentDrape};
+use crate::evaluate::Spread;
 use serde::{Deserialize, Serialize};
 
 /// Accelerations over all vertices and inner frames of a motion [m/s²].
@@ -33,7 +34,7 @@ pub fn acceleration(drapes: &[Drape], moments: &[Moment]) -> Option<Acceleration
                 }
             }
         }
-        percentile_95(values)
+        (!values.is_empty()).then(|| Spread::of(values).p95)
     };
     let (draped_95, skinned_95) = (of(|g| &g.positions)?, of(|g| &g.skinned)?);
     (skinned_95 > 0.0 && step > 0.0).then(|| Acceleration {
@@ -41,21 +42,4 @@ pub fn acceleration(drapes: &[Drape], moments: &[Moment]) -> Option<Acceleration
         skinned_95,
         ratio: draped_95 / skinned_95,
     })
-}
-
-fn percentile_95(mut values: Vec<f64>) -> Option<f64> {
-    let at = (values.len() * 95 / 100).min(values.len().checked_sub(1)?);
-    let (_, value, _) = values.select_nth_unstable_by(at, f64::total_cmp);
-    Some(*value)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_percentile_leaves_a_twentieth_above() {
-        assert_eq!(percentile_95((0..100).rev().map(f64::from).collect()), Some(95.0));
-        assert_eq!((percentile_95(vec![3.0]), percentile_95(Vec::new())), (Some(3.0), None));
-    }
 }

@@ -3,7 +3,7 @@
 use crate::event::{Observer, TrainEvent};
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::Report;
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write};
 use std::time::{Duration, Instant};
 
 /// Seconds between lines when there is no terminal to draw on.
@@ -36,12 +36,17 @@ impl Default for ProgressObserver {
     }
 }
 
+/// A line on stderr. Training does not end because of what cannot be printed.
+fn tell(text: std::fmt::Arguments<'_>) {
+    let _ = writeln!(std::io::stderr(), "{text}");
+}
+
 impl ProgressObserver {
     /// Prints `text` above the bar.
     fn say(&self, text: &str) {
         match &self.bar {
             Some(bar) => bar.println(text),
-            None => eprintln!("{text}"),
+            None => tell(format_args!("{text}")),
         }
     }
 
@@ -52,13 +57,13 @@ impl ProgressObserver {
         self.last_line = Instant::now();
         let per_second = (step - self.started_at) as f64 / self.start.elapsed().as_secs_f64();
         let left = Duration::from_secs_f64((self.total - step) as f64 / per_second.max(1e-9));
-        eprintln!(
+        tell(format_args!(
             "{} · step {step}/{} · {per_second:.1} steps/s · {} left · loss {:.3}",
             self.stage,
             self.total,
             indicatif::HumanDuration(left),
             self.smoothed_loss
-        );
+        ));
     }
 }
 
@@ -130,7 +135,10 @@ impl Observer for ProgressObserver {
                 if let Some(bar) = self.bar.take() {
                     bar.finish();
                 }
-                eprintln!("finished after step {step} in {:.0} s", self.start.elapsed().as_secs_f64());
+                tell(format_args!(
+                    "finished after step {step} in {:.0} s",
+                    self.start.elapsed().as_secs_f64()
+                ));
             }
         }
         Ok(())

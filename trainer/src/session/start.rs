@@ -87,7 +87,9 @@ impl Session {
         let changed = differing_keys(&checkpoint.config()?, &config);
         let is_comparable = !changed.iter().any(|key| scores.iter().any(|part| key.starts_with(part)));
         let best = found.best.filter(|_| is_comparable);
-        let found = CheckpointState { best, ..found.clone() };
+        // What was changed may be the mend for what went wrong before.
+        let incidents = if changed.is_empty() { found.incidents.clone() } else { Vec::new() };
+        let found = CheckpointState { best, incidents, ..found.clone() };
         Ok(Self::assemble(run, config, library, &device, learner, average, &found))
     }
 

@@ -141,9 +141,11 @@ impl Session {
 
     /// The error of a run that gave up after `count` incidents, pointing to the last checkpoint.
     pub fn gave_up(&self, count: usize) -> Report {
-        let last = match Checkpoint::open(self.run.root()) {
+        // Parameters are good if the step after them was.
+        let good = self.guard.first_of_last_incidents().saturating_sub(2);
+        let last = match Checkpoint::open_until(self.run.root(), good) {
             Ok(checkpoint) => format!("the last good checkpoint is {}", checkpoint.path.display()),
-            Err(_) => "no checkpoint had been written yet".into(),
+            Err(_) => "no checkpoint had been written before they began".into(),
         };
         miette!(
             help = format!(

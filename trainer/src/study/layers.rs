@@ -41,7 +41,7 @@ pub struct LayerCount {
     pub strain_added: f64,
     /// Exact pairs between garments before the post-process.
     pub layer_pairs: Estimate,
-    /// Time of the post-process per garment [ms].
+    /// Time of the post-process per garment, means of outfits [ms].
     pub post_ms: Estimate,
 }
 
@@ -88,8 +88,9 @@ pub fn ask(
         shares(&mut all.map(|is_clear| f64::from(u8::from(is_clear)))).spread.mean
     };
     let added: Vec<f64> = results.iter().filter_map(|r| r.strain_added).collect();
-    let times: Vec<f64> = results.iter().flat_map(|r| r.milliseconds.clone()).collect();
     // The garments of an outfit are no independent scenes.
+    let times: Vec<f64> =
+        results.iter().map(|r| r.milliseconds.iter().sum::<f64>() / layers as f64).collect();
     let of_outfits = |layers: &[Vec<f64>]| {
         let mean = |i: usize| layers.iter().map(|values| values[i]).sum::<f64>() / layers.len() as f64;
         Estimate::of(&(0..scenes).map(mean).collect::<Vec<_>>())

@@ -67,7 +67,6 @@ fn wrong_input_names_itself_and_leaves_nothing() {
         (vec!["--garments", TEE, "--posed", &cube], vec!["cube.obj", "4 vertices"]),
         (vec!["--garments", TEE, "--body", "none.npz"], vec!["none.npz"]),
         (vec!["--garments", TEE, "--dataset", "none"], vec!["none"]),
-        (vec!["--garments", TEE, "--gap", "0"], vec!["gap", "greater than 0"]),
         ([&["--garments"][..], &many].concat(), vec!["13 garments", "1 to 12"]),
     ];
     for (arguments, words) in cases {
@@ -77,6 +76,12 @@ fn wrong_input_names_itself_and_leaves_nothing() {
         }
     }
     failure(&mut drape(&to(&[], &out)), 2);
+    let message = failure(&mut drape(&to(&["--garments", TEE, "--gap", "0"], &out)), 2);
+    assert!(message.contains("--gap") && message.contains("at most 50 mm"), "{message}");
+    failure(&mut drape(&to(&["--outfits", &band, "--order", "1,0"], &out)), 2);
+    let inner = format!("{out}/cache");
+    let message = failure(&mut drape(&to(&["--garments", TEE, "--cache", &inner], &out)), 1);
+    assert!(message.contains("--cache") && message.contains("folder that is to be made"), "{message}");
     failure(&mut drape(&to(&["--garments", TEE, "--frames", "0..4"], &out)), 2);
     failure(&mut drape(&to(&["--garments", TEE, "--motion", &motion, "--frames", "4..1"], &out)), 2);
     assert!(!Path::new(&out).exists());

@@ -56,3 +56,15 @@ fn a_folder_of_other_garments_is_refused_and_a_picture_is_drawn() {
         .code(1)
         .stderr(contains("dress_000000.obj").and(contains("another garment")).and(contains("--vertices")));
 }
+
+#[test]
+fn garments_that_are_not_listed_are_not_hidden_by_a_list() {
+    let folder = tempfile::tempdir().unwrap();
+    let own = folder.path().join("own.obj");
+    fs::write(&own, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    generate(folder.path(), &["--count", "1"])
+        .assert()
+        .code(1)
+        .stderr(contains("own.obj").and(contains("no longer be found")));
+    assert_eq!(contents(folder.path()).len(), 1);
+}

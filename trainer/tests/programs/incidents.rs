@@ -1,6 +1,6 @@
 //! A step that is not finite is skipped, written down, and replays; too many end the run.
 
-use crate::common::{clothcombo, holds, said, start, tiny};
+use crate::common::{clothcombo, holds, resume, said, start, tiny};
 use std::path::Path;
 
 const TWO: &str = "[guard]\ninject = { every = 25, what = \"WHAT\" }\n";
@@ -75,4 +75,19 @@ fn too_many_incidents_end_the_run_at_its_last_good_checkpoint() {
     let incidents = std::fs::read_dir(run.join("incidents")).unwrap().flatten();
     assert_eq!(incidents.filter(|e| e.path().extension().is_some_and(|x| x == "json")).count(), 2);
     assert!(std::fs::read_to_string(run.join("report.html")).unwrap().contains("gave up"));
+}
+
+/// Parameters that make every further step fail are no good checkpoint, and push none out.
+#[test]
+fn a_diverged_run_names_a_checkpoint_from_before_and_goes_on_from_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = tiny(folder.path(), "[guard]\nmax_incidents = 6\n");
+    let run = folder.path().join("run");
+    let output = start(&config, &run, 1).args(["--set", "stages.1.learning_rate=1e30"]).output().unwrap();
+    let message = said(&output);
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(holds(&message, "last good checkpoint") && holds(&message, "step-00000020"), "{message}");
+    let mended = ["--set", "stages.1.learning_rate=1e-4", "--allow-config-change", "stages"];
+    let output = resume(&run, 1).args(mended).output().unwrap();
+    assert!(output.status.success(), "{}", said(&output));
 }

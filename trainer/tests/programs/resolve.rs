@@ -150,7 +150,9 @@ fn files_that_cannot_be_used_are_named() {
     case.must_fail(&["tee.obj", "short.obj"], &[], &["short.obj:4", "vertex 9"]);
     case.must_fail(&["tee.obj", "coat.obj"], &["--rest", "tee.obj"], &["1 rest meshes", "2 garments"]);
     case.must_fail(&["tee.obj"], &["--rest", "coat.obj"], &["tee.obj", "coat.obj", "vertices"]);
-    case.must_fail(&["tee.obj"], &["--gap-mm", "0"], &["gap", "greater than 0"]);
+    let output = case.command(&["tee.obj"], &["--gap", "51"]).output().unwrap();
+    assert!(output.status.code() == Some(2), "{output:?}");
+    assert!(String::from_utf8_lossy(&output.stderr).contains("at most 50 mm"), "{output:?}");
     case.write("beside.obj", &with_vertices(&quad_tube(0.149, 40, 12), |[x, y, z]| [x + 2.0, y, z]));
     case.must_fail(&["beside.obj"], &[], &["beside.obj", "beside the body", "x from"]);
     case.write("large.obj", &with_vertices(&quad_tube(0.149, 40, 12), |p| p.map(|x| 1e3 * x)));

@@ -120,6 +120,8 @@ fn pickles_are_listed_but_never_read_and_damage_is_named() {
         ("huge", npy("<f8", false, "(4611686018427387904, 4)", &[0; 16])),
         ("text", npy("<U2", false, "(1,)", &[97, 0, 0, 0, 0, 0, 0, 0])),
         ("bytes", npy("|S6", false, "()", b"female")),
+        ("wide", npy("|S20000000", false, "()", b"female")),
+        ("void", npy("|V600000000", false, "()", b"female")),
         ("junk", b"not an array".to_vec()),
     ];
     let (_folder, path) = archive(CompressionMethod::Stored, &members);
@@ -128,6 +130,11 @@ fn pickles_are_listed_but_never_read_and_damage_is_named() {
     assert!(message.contains("pickle") && message.contains("joint2num"), "{message}");
     assert!(file.numbers("short", "").unwrap_err().to_string().contains("truncated: 16 of 32"));
     assert!(file.numbers("huge", "").is_err());
+    // What claims to be too large is not even begun.
+    for key in ["wide", "void"] {
+        let message = file.strings(key, "").unwrap_err().to_string();
+        assert!(message.contains(key) && message.contains("does not fit in memory"), "{message}");
+    }
     assert!(file.numbers("text", "").unwrap_err().to_string().contains("<U2"));
     assert!(file.numbers("junk", "").unwrap_err().to_string().contains("'junk'"));
     assert_eq!(file.strings("text", "").unwrap().data, ["a"]);

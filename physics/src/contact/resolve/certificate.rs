@@ -219,8 +219,9 @@ pub(super) fn certificate(body: &BodyObstacle<'_>, layers: &[Layer<'_>]) -> Cert
         let views: Vec<_> = positions.par_iter().with_min_len(128).map(|p| body.look(*p)).collect();
         let body_planes = views.iter().filter_map(|view| view.and_then(|v| v.plane));
         let inside = body_planes.filter(|p| p.distance < 0.0).map(|p| -p.distance);
+        let before = depths.len();
         depths.extend(inside);
-        found.vertices_inside = depths.len();
+        found.vertices_inside += depths.len() - before;
 
         let pairs = tree.pairs_with(&body.tree);
         let (pinched, pairs): (Vec<_>, Vec<_>) = pairs.into_iter().partition(|&(_, b)| body.is_pinched(b));

@@ -155,6 +155,24 @@ fn reversed_layers_change_places() {
     assert_eq!((scene.pairs(&done.positions), done.certificate.order_violations), (0, 0.0));
 }
 
+/// Depths under the body and under inner layers are counted apart.
+#[test]
+fn the_certificate_counts_vertices_inside_the_body_only() {
+    let trunk = shapes::icosphere(0.15, 4);
+    let tube = |radius, sides| moved(&shapes::tube(radius, 0.2, sides, 15), [0.0, -0.1, 0.0]);
+    // The second lies under the first, the third over both.
+    let scene = Scene::new(&trunk, &[tube(0.175, 48), tube(0.165, 44), tube(0.185, 52)]);
+    let found = certify(&scene.body, &scene.layers()).unwrap();
+    assert!(found.is_clear() && found.order_violations > 0.2, "{found:?}");
+    assert_eq!(found.vertices_inside, 0);
+    // The middle of a tube that is too tight, twice, with a wide one between.
+    let tight = tube(0.14, 60);
+    let inside = tight.positions().iter().filter(|p| norm(**p) < 0.15).count();
+    let scene = Scene::new(&trunk, &[tight.clone(), tube(0.175, 48), tight]);
+    let found = certify(&scene.body, &scene.layers()).unwrap();
+    assert!(inside > 100 && found.vertices_inside == 2 * inside, "{inside} {found:?}");
+}
+
 #[test]
 fn a_hem_is_laid_over_the_garment_it_cuts() {
     let trunk = shapes::mapped(&shapes::icosphere(0.12, 3), |[x, y, z]| [x, 2.0 * y, z]);

@@ -2,6 +2,7 @@
 
 use crate::checkpoint::TrainedModel;
 use crate::cli::train::load_under_bar;
+use crate::cli::values::{at_least_one, gap_mm};
 use crate::cli::verbosity::progress_bar;
 use crate::config::{Config, load};
 use crate::device::Backend;
@@ -37,7 +38,7 @@ pub struct Arguments {
     #[arg(long, value_name = "DIR")]
     checkpoint: Option<PathBuf>,
     /// Random outfits
-    #[arg(long, default_value_t = 500)]
+    #[arg(long, default_value_t = 500, value_parser = at_least_one)]
     draws: usize,
     /// Most garments of an outfit
     #[arg(long, default_value_t = 6, value_parser = clap::value_parser!(u8).range(1..=12))]
@@ -52,7 +53,7 @@ pub struct Arguments {
     #[arg(long)]
     seed: Option<u64>,
     /// Smallest gap between a moved garment and what is under it [mm]
-    #[arg(long, default_value_t = 1.0)]
+    #[arg(long = "gap", alias = "gap-mm", default_value_t = 1.0, value_name = "MM", value_parser = gap_mm)]
     gap_mm: f64,
     /// Writes body and garments (rest, draped, resolved) of every draw as OBJ under this folder
     #[arg(long, value_name = "DIR")]
@@ -162,6 +163,9 @@ fn orders(library: &Library, names: &[String]) -> Result<Vec<Vec<usize>>, Report
         })
     };
     let garments = names.iter().map(find).collect::<Result<Vec<usize>, Report>>()?;
+    if let Some(at) = (1..garments.len()).find(|&at| garments[..at].contains(&garments[at])) {
+        return Err(miette!(help = "name each garment once", "--orders names {:?} twice", names[at]));
+    }
     let mut orders = if garments.is_empty() { Vec::new() } else { vec![Vec::new()] };
     for _ in &garments {
         orders = orders

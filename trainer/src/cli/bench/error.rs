@@ -2,6 +2,7 @@
 
 use crate::checkpoint::TrainedModel;
 use crate::cli::train::load_under_bar;
+use crate::cli::values::at_least_one;
 use crate::cli::verbosity::progress_bar;
 use crate::config::{Config, ValidationConfig, load};
 use crate::device::Backend;
@@ -37,7 +38,7 @@ pub struct Arguments {
     #[arg(long, value_name = "DIR")]
     checkpoint: Option<PathBuf>,
     /// Random scenes: validation draws of trained garments
-    #[arg(long, default_value_t = 20)]
+    #[arg(long, default_value_t = 20, value_parser = at_least_one)]
     scenes: usize,
     /// Seed of the draws; default: that of the configuration
     #[arg(long)]

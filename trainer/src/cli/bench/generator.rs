@@ -1,5 +1,6 @@
 //! `clothcombo bench generator`: the promises of the garment generator over many seeds.
 
+use crate::cli::values::at_least_one;
 use crate::cli::verbosity::progress_bar;
 use crate::scene::load_body;
 use clap::Parser;
@@ -16,7 +17,7 @@ use miette::{IntoDiagnostic, Report, miette};
 )]
 pub struct Arguments {
     /// Number of garments; categories are taken in turn
-    #[arg(long, default_value_t = 1000)]
+    #[arg(long, default_value_t = 1000, value_parser = at_least_one)]
     count: usize,
     /// First seed; garment i uses seed + i
     #[arg(long, default_value_t = 0)]

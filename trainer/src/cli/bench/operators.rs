@@ -1,6 +1,7 @@
 //! `clothcombo bench operators`: what preparing a garment for DiffusionNet costs, and how exact the eigenpairs are.
 
 use crate::cli::table::{number, table};
+use crate::cli::values::at_least_one;
 use crate::measure::median_ms;
 use crate::scene::LibraryError;
 use clap::Parser;
@@ -9,7 +10,7 @@ use clothcombo_data::format::{load_tri_mesh, obj};
 use clothcombo_data::generate::{GarmentGenerator, GarmentSettings, mannequin};
 use clothcombo_physics::mesh::TriMesh;
 use clothcombo_physics::operators::{SurfaceOperators, cotangent_laplacian};
-use miette::{IntoDiagnostic, Report};
+use miette::{IntoDiagnostic, Report, miette};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -26,7 +27,7 @@ pub struct Arguments {
     #[arg(long, default_value_t = 8000)]
     vertices: usize,
     /// Eigenpairs k
-    #[arg(long, default_value_t = 128)]
+    #[arg(long, default_value_t = 128, value_parser = at_least_one)]
     eigen_count: usize,
     /// Time spent on the measurement [s]
     #[arg(long, default_value_t = 5.0)]
@@ -54,6 +55,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
             generator.generate(Category::TShirt, 0, &settings).into_diagnostic()?.rest
         }
     };
+    if arguments.eigen_count > mesh.vertex_count() {
+        return Err(miette!(
+            help = "lower --eigen-count",
+            "{} eigenpairs of a mesh of {} vertices",
+            arguments.eigen_count,
+            mesh.vertex_count()
+        ));
+    }
     if let Some(path) = &arguments.export {
         obj::save(path, mesh.positions(), mesh.faces(), &[]).into_diagnostic()?;
     }

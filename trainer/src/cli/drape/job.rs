@@ -139,7 +139,11 @@ fn no_frame(path: &Path, frame: usize, count: usize) -> Failure {
 /// `FILE.npz` or `FILE.npz:FRAME`.
 fn file_and_frame(text: &str) -> (&str, &str) {
     match text.rsplit_once(':') {
-        Some((path, frame)) if !Path::new(text).exists() && frame.bytes().all(|b| b.is_ascii_digit()) => {
+        // What is no number is one that was meant as one where the rest is a file.
+        Some((path, frame))
+            if !Path::new(text).exists()
+                && (frame.bytes().all(|b| b.is_ascii_digit()) || Path::new(path).is_file()) =>
+        {
             (path, frame)
         }
         _ => (text, "0"),

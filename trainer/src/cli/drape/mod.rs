@@ -5,11 +5,14 @@ mod outfits;
 mod summary;
 
 use crate::cli::interrupted::remove_on_signals;
+use crate::cli::values::gap_mm;
 use crate::cli::verbosity::{progress_bar, say};
 use crate::device::Backend;
 use crate::draper::output::{Show, Staged, write};
 use crate::draper::{Drape, Draper, DraperSettings, MotionProgress, Outfit, Report, SourceGarment, smooth};
 use clap::{Parser, ValueEnum};
+use clothcombo_data::check::impossible_turn;
+use clothcombo_data::fit::RepairKind;
 use clothcombo_data::format::atomic;
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use indicatif::ProgressBar;
@@ -45,7 +48,7 @@ pub struct Arguments {
     #[arg(long, num_args = 1.., value_name = "GARMENT", required_unless_present = "outfits", conflicts_with = "outfits")]
     garments: Vec<String>,
     /// Wears the garments in another order: their numbers from 0, innermost first
-    #[arg(long, value_delimiter = ',', value_name = "NUMBERS")]
+    #[arg(long, value_delimiter = ',', value_name = "NUMBERS", conflicts_with = "outfits")]
     order: Option<Vec<usize>>,
     /// Several outfits in one process, from a TOML file; each garment is embedded once
     #[arg(long, value_name = "FILE")]
@@ -63,7 +66,7 @@ pub struct Arguments {
     #[arg(long)]
     no_resolve: bool,
     /// Gap the post-process makes [mm]
-    #[arg(long, default_value_t = 1.0, value_name = "MM")]
+    #[arg(long, alias = "gap-mm", default_value_t = 1.0, value_name = "MM", value_parser = gap_mm)]
     gap: f64,
     /// Smooths a motion over this many frames to each side; never makes an intersection
     #[arg(long, num_args = 0..=1, default_value_t = 0, default_missing_value = "2", value_name = "FRAMES",
@@ -113,6 +116,9 @@ impl Fit {
     }
 }
 
+/// A garment of which more has to be pushed away from the body lies wrongly on it.
+const MOST_PUSHED: f64 = 0.5;
+
 /// Runs the verb.
 ///
 /// # Errors
@@ -124,6 +130,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         return Err(miette!(help = "give --motion FILE, or leave --smooth out", "--smooth without a motion"));
     }
     let inputs: Vec<PathBuf> = jobs.iter().flat_map(Job::files).chain(arguments.outfits.clone()).collect();
+    check_cache(arguments)?;
     let staged = Staged::new(&arguments.output, arguments.replace, &inputs)?;
     remove_on_signals(staged.folder());
     let clock = Instant::now();
@@ -149,6 +156,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         sources.iter().for_each(tell_repairs);
         let scenes = job.scenes(&draper)?;
         tell_shape(&scenes.body.shape, draper.trained().config.data.shape_range);
+        if let Some(turn) = impossible_turn(scenes.states.iter().map(|state| &state.pose)) {
+            tracing::warn!("{}: {turn}", scenes.body.pose);
+        }
         Ok((sources, scenes))
     };
     let read = |job| read(job).map_err(|failure| blame(job, failure));
@@ -196,7 +206,6 @@ fn jobs(arguments: &Arguments) -> Result<Vec<Job>, Failure> {
 
 fn settings(arguments: &Arguments) -> Result<DraperSettings, Failure> {
     let post_process = ResolveSettings { gap: 1e-3 * arguments.gap, ..ResolveSettings::default() };
-    post_process.check().into_diagnostic().wrap_err("--gap")?;
     let cache = match arguments.no_cache {
         true => None,
         false => arguments.cache.clone().or_else(user_cache),
@@ -210,6 +219,21 @@ fn settings(arguments: &Arguments) -> Result<DraperSettings, Failure> {
         post_process,
         ..DraperSettings::default()
     })
+}
+
+/// Refuses a cache in the folder that is to be made.
+fn check_cache(arguments: &Arguments) -> Result<(), Failure> {
+    let Some(cache) = &arguments.cache else { return Ok(()) };
+    let [inner, outer] = [cache, &arguments.output].map(std::path::absolute);
+    match inner.into_diagnostic()?.starts_with(outer.into_diagnostic()?) {
+        true => Err(miette!(
+            help = "choose another folder for one of them",
+            "--cache {} lies in the folder that is to be made, {}",
+            cache.display(),
+            arguments.output.display()
+        )),
+        false => Ok(()),
+    }
 }
 
 /// `clothcombo` in the folder for what programs may compute anew.
@@ -231,6 +255,15 @@ fn tell_repairs(source: &SourceGarment) {
     tracing::info!("{name} fitted: {}", fit.assumptions().join("; "));
     for repair in &fit.repairs {
         tracing::info!("{name} repaired: {} ({})", repair.kind.text(), repair.count);
+    }
+    let vertices = source.garment.rest.vertex_count();
+    let pushed =
+        fit.repairs.iter().filter(|r| r.kind == RepairKind::PushedOut).map(|r| r.count).sum::<usize>();
+    if pushed as f64 > MOST_PUSHED * vertices as f64 {
+        tracing::warn!(
+            "{name} does not fit this body: {pushed} of {vertices} vertices had to be pushed out of it or away from it; is it of \
+             another size, upside down, or turned? look at the picture"
+        );
     }
 }
 

@@ -76,6 +76,9 @@ pub(super) fn read(file: &Path, scene: &SceneArguments) -> Result<Vec<Job>, Fail
         if own.motion.is_none() && (own.frames.is_some() || entry.every.is_some()) {
             return Err(wrong("frames of no motion".to_owned()));
         }
+        if entry.garments.is_empty() {
+            return Err(wrong("it has no garments".to_owned()));
+        }
         let garments = entry.garments.iter().map(|g| beside(g)).collect();
         Ok(Job { name, garments, order: entry.order, scene: own })
     });
@@ -128,7 +131,11 @@ mod tests {
         for (text, part) in [
             ("[[outfit]]\ngarments = [\"a\"]\ncolour = 1\n", "colour"),
             ("[[outfit]]\nname = \"a/b\"\ngarments = [\"a\"]\n", "a/b"),
-            ("[[outfit]]\nname = \"a\"\ngarments = []\n[[outfit]]\nname = \"A\"\ngarments = []\n", "twice"),
+            (
+                "[[outfit]]\nname = \"a\"\ngarments = [\"x\"]\n[[outfit]]\nname = \"A\"\ngarments = []\n",
+                "twice",
+            ),
+            ("[[outfit]]\ngarments = []\n", "no garments"),
             ("[[outfit]]\ngarments = []\nframes = \"9..1\"\n", "9..1"),
             ("[[outfit]]\ngarments = []\nframes = \"0..4\"\n", "no motion"),
             ("[[outfit]]\ngarments = []\npose = \"a\"\nmotion = \"b\"\n", "both"),

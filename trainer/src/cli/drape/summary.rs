@@ -26,7 +26,11 @@ fn garments(report: &Report) -> String {
                 g.vertices.to_string(),
                 g.triangles.to_string(),
                 match &g.fit {
-                    Some(fit) => format!("yes, {} repairs", fit.repairs.len()),
+                    Some(fit) => format!(
+                        "yes, {} kind{} of repair",
+                        fit.repairs.len(),
+                        if fit.repairs.len() == 1 { "" } else { "s" }
+                    ),
                     None => "no".to_owned(),
                 },
                 if g.embedding_known { "known" } else { "made" }.to_owned(),
@@ -122,7 +126,9 @@ fn certificate(report: &Report) -> String {
     );
     if let Some(strain) = found.strain_added {
         let worst = if report.frames.len() > 1 { " in the worst frame" } else { "" };
-        text += &format!(", strain {:+.1} %{worst}", 100.0 * strain);
+        // Without the sign of what rounds to nothing.
+        let percent = (1e3 * strain).round() / 10.0 + 0.0;
+        text += &format!(", strain {percent:+.1} %{worst}");
     }
     let pinched = found.pinched.count();
     if pinched > 0 {

@@ -61,6 +61,14 @@ pub enum OutputError {
         /// The input.
         input: PathBuf,
     },
+    /// Something has come there since the start.
+    #[error("while this ran, something else came: {reason}; the result is in {}", instead.display())]
+    Meanwhile {
+        /// What is in the way.
+        reason: Box<OutputError>,
+        /// The folder that was made.
+        instead: PathBuf,
+    },
     /// The path names no folder that could be made.
     #[error("{} names no new folder", path.display())]
     #[diagnostic(help("give the folder to be made a name, for example -o {}", path.join("drape").display()))]

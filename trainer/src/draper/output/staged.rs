@@ -15,6 +15,8 @@ const LIST: &str = ".clothcombo-files";
 pub struct Staged {
     target: PathBuf,
     temporary: PathBuf,
+    replace: bool,
+    inputs: Vec<PathBuf>,
     is_committed: bool,
 }
 
@@ -28,17 +30,12 @@ impl Staged {
         let name = target.file_name().ok_or_else(|| OutputError::NoName { path: target.into() })?;
         // A link to a folder stays a link.
         let target = fs::canonicalize(target).unwrap_or_else(|_| target.to_owned());
-        if target.exists() && !is_empty_folder(&target) {
-            if !replace {
-                return Err(OutputError::Occupied { path: target });
-            }
-            check_own(&target, inputs)?;
-        }
+        check_free(&target, replace, inputs)?;
         let number = RandomState::new().hash_one(0);
         let temporary = target.with_file_name(format!(".{}.{number:016x}.tmp", name.to_string_lossy()));
         fs::create_dir_all(&temporary)
             .map_err(|reason| OutputError::Io { path: temporary.clone(), reason })?;
-        Ok(Self { target, temporary, is_committed: false })
+        Ok(Self { target, temporary, replace, inputs: inputs.to_vec(), is_committed: false })
     }
 
     /// Where to write.
@@ -46,14 +43,21 @@ impl Staged {
         &self.temporary
     }
 
-    /// Gives the folder its name. What was there before is removed only after that.
+    /// Gives the folder its name. What was there before is removed only after that; what has come there since the start is
+    /// not, and the folder gets another name.
     ///
     /// # Errors
-    /// When it cannot be renamed; what was there before is left as it was.
+    /// When it cannot be renamed, or not as was asked; what was there before is left as it was.
     pub fn commit(mut self) -> Result<(), OutputError> {
         let failed = |reason: io::Error| OutputError::Io { path: self.target.clone(), reason };
         let list: String = files(&self.temporary).map_err(failed)?.iter().map(|f| format!("{f}\n")).collect();
         fs::write(self.temporary.join(LIST), list).map_err(failed)?;
+        if let Err(reason) = check_free(&self.target, self.replace, &self.inputs) {
+            let instead = free_name(&self.target);
+            fs::rename(&self.temporary, &instead).map_err(failed)?;
+            self.is_committed = true;
+            return Err(OutputError::Meanwhile { reason: Box::new(reason), instead });
+        }
         let earlier = self.temporary.with_extension("old");
         let had_earlier = self.target.exists();
         if had_earlier {
@@ -82,6 +86,22 @@ impl Drop for Staged {
             let _ = fs::remove_dir_all(&self.temporary);
         }
     }
+}
+
+/// Whether there is nothing at `target`, or what may be replaced.
+fn check_free(target: &Path, replace: bool, inputs: &[PathBuf]) -> Result<(), OutputError> {
+    match fs::symlink_metadata(target).is_ok() && !is_empty_folder(target) {
+        true if replace => check_own(target, inputs),
+        true => Err(OutputError::Occupied { path: target.into() }),
+        false => Ok(()),
+    }
+}
+
+/// `target` with the first number that is not taken.
+fn free_name(target: &Path) -> PathBuf {
+    let name = target.file_name().unwrap_or_default().to_string_lossy();
+    let numbered = |number: usize| target.with_file_name(format!("{name}-{number}"));
+    (2..).map(numbered).find(|path| fs::symlink_metadata(path).is_err()).unwrap_or_else(|| numbered(2))
 }
 
 /// Whether all of `folder` was written here, and none of it is read now.
@@ -181,6 +201,36 @@ mod tests {
         fs::remove_file(target.join(LIST)).unwrap();
         assert!(matches!(written(&target, true, "3"), Err(OutputError::NotOurs { .. })));
         assert_eq!(names(place.path()), ["out"]);
+    }
+
+    #[test]
+    fn what_comes_meanwhile_is_kept_and_so_is_the_result() {
+        let place = tempfile::tempdir().unwrap();
+        let target = place.path().join("out");
+        let begun = |replace| {
+            let staged = Staged::new(&target, replace, &[]).unwrap();
+            fs::write(staged.folder().join("a.obj"), "x").unwrap();
+            staged
+        };
+        // A file, then a folder with something in it, then something more in a folder that is to be replaced.
+        let staged = begun(false);
+        fs::write(&target, "mine").unwrap();
+        let Err(OutputError::Meanwhile { instead, .. }) = staged.commit() else { panic!("a file is gone") };
+        assert_eq!(fs::read_to_string(&target).unwrap(), "mine");
+        assert_eq!(names(&instead), [LIST, "a.obj"]);
+        fs::remove_file(&target).unwrap();
+        let staged = begun(false);
+        fs::create_dir(&target).unwrap();
+        fs::write(target.join("own.txt"), "mine").unwrap();
+        assert!(matches!(staged.commit(), Err(OutputError::Meanwhile { .. })));
+        assert_eq!(names(&target), ["own.txt"]);
+        fs::remove_dir_all(&target).unwrap();
+        begun(false).commit().unwrap();
+        let staged = begun(true);
+        fs::write(target.join("own.txt"), "mine").unwrap();
+        assert!(matches!(staged.commit(), Err(OutputError::Meanwhile { .. })));
+        assert_eq!(names(&target), [LIST, "a.obj", "own.txt"]);
+        assert_eq!(names(place.path()), ["out", "out-2", "out-3", "out-4"]);
     }
 
     #[cfg(unix)]

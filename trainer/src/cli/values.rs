@@ -1,0 +1,19 @@
+//! What the values of flags must be, where the type alone does not say it.
+
+/// A whole number that is at least 1.
+pub fn at_least_one(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(0) => Err("it must be at least 1".into()),
+        Ok(number) => Ok(number),
+        Err(_) => Err("it is no whole number".into()),
+    }
+}
+
+/// A gap between garments [mm], in the bounds of the post-process.
+pub fn gap_mm(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(gap) if gap > 0.0 && gap <= 50.0 => Ok(gap),
+        Ok(_) => Err("it must be greater than 0 and at most 50 mm".into()),
+        Err(_) => Err("it is no number".into()),
+    }
+}
