@@ -164,7 +164,24 @@ pub struct FitReport {
     pub contact: BodyContact,
 }
 
+/// A garment of which a larger share lies inside the body, and deeper than [`MISFIT_DEPTH_MM`], lies wrongly on it.
+const MISFIT_INSIDE: f64 = 0.1;
+/// See [`MISFIT_INSIDE`].
+const MISFIT_DEPTH_MM: f64 = 30.0;
+
 impl FitReport {
+    /// What to tell of a garment that does not lie on the body as clothes do; `None` of one that does.
+    pub fn misfit(&self) -> Option<String> {
+        let BodyContact { inside_before, depth_before_mm, .. } = self.contact;
+        let inside = inside_before as f64 / self.mesh.vertices.max(1) as f64;
+        (inside > MISFIT_INSIDE && depth_before_mm > MISFIT_DEPTH_MM).then(|| {
+            format!(
+                "{:.0} % of it lay inside the body, up to {depth_before_mm:.0} mm deep: is it of another size, upside down or turned?",
+                100.0 * inside
+            )
+        })
+    }
+
     /// The assumptions in words, one a line.
     pub fn assumptions(&self) -> Vec<String> {
         let p = &self.placement;
@@ -240,6 +257,9 @@ impl fmt::Display for FitReport {
             "result    {} vertices, {} triangles, edges {:.1} mm ({:.1}–{:.1})",
             m.vertices, m.triangles, m.edge_median_mm, m.edge_min_mm, m.edge_max_mm
         )?;
+        if let Some(misfit) = self.misfit() {
+            writeln!(f, "warning   {misfit}")?;
+        }
         for (count, name) in m.defects.counts() {
             writeln!(f, "warning   {count} {name} remain")?;
         }

@@ -264,6 +264,22 @@ fn what_was_inside_the_body_is_pushed_out_and_listed() {
     assert_eq!(contact.inside_after, 0);
     assert!(contact.least_distance_mm > 1.5 && contact.largest_move_mm > 1.0, "{contact:?}");
     assert!(fitted.report.repairs.iter().any(|r| r.kind == RepairKind::PushedOut && r.count > 0));
+    assert_eq!(fitted.report.misfit(), None, "{contact:?}");
+}
+
+#[test]
+fn a_garment_that_lies_wrongly_is_told_of() {
+    let body = mannequin();
+    let shirt = long_sleeved(&body);
+    let faces = || shirt.rest.faces().iter().map(<[u32; 3]>::as_slice);
+    let told = |change: fn([f64; 3]) -> [f64; 3]| {
+        let positions = shirt.rest.positions().iter().map(|p| change(*p)).collect();
+        let report = fit(&polygons(positions, faces()), &body, &FitSettings::default()).unwrap().report;
+        (report.misfit(), report.contact)
+    };
+    assert_eq!(told(|p| p).0, None);
+    let (misfit, contact) = told(|[x, y, z]| [0.7 * (x + z), y, 0.7 * (z - x)]);
+    assert!(misfit.is_some_and(|text| text.contains("inside the body")), "{contact:?}");
 }
 
 #[test]

@@ -12,7 +12,6 @@ use crate::draper::output::{Show, Staged, write};
 use crate::draper::{Drape, Draper, DraperSettings, MotionProgress, Outfit, Report, SourceGarment, smooth};
 use clap::{Parser, ValueEnum};
 use clothcombo_data::check::impossible_turn;
-use clothcombo_data::fit::RepairKind;
 use clothcombo_data::format::atomic;
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use indicatif::ProgressBar;
@@ -115,9 +114,6 @@ impl Fit {
         }
     }
 }
-
-/// A garment of which more has to be pushed away from the body lies wrongly on it.
-const MOST_PUSHED: f64 = 0.5;
 
 /// Runs the verb.
 ///
@@ -256,14 +252,8 @@ fn tell_repairs(source: &SourceGarment) {
     for repair in &fit.repairs {
         tracing::info!("{name} repaired: {} ({})", repair.kind.text(), repair.count);
     }
-    let vertices = source.garment.rest.vertex_count();
-    let pushed =
-        fit.repairs.iter().filter(|r| r.kind == RepairKind::PushedOut).map(|r| r.count).sum::<usize>();
-    if pushed as f64 > MOST_PUSHED * vertices as f64 {
-        tracing::warn!(
-            "{name} does not fit this body: {pushed} of {vertices} vertices had to be pushed out of it or away from it; is it of \
-             another size, upside down, or turned? look at the picture"
-        );
+    if let Some(misfit) = fit.misfit() {
+        tracing::warn!("{name} does not fit this body: {misfit} Look at the picture.");
     }
 }
 
