@@ -112,7 +112,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
 /// Before anything is loaded: whether the report may be written where it is wanted.
 fn check_output(folder: &Path) -> Result<(), Report> {
     let occupied = fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
-    if occupied && !folder.join(JSON).is_file() {
+    let read = |text: String| serde_json::from_str::<serde_json::Value>(&text).ok();
+    let earlier = fs::read_to_string(folder.join(JSON)).ok().and_then(read);
+    if occupied && earlier.is_none_or(|report| report["study"].is_null()) {
         return Err(miette!(
             help = "choose another folder with -o",
             "{} holds files that are no evaluation",

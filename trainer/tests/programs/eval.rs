@@ -54,9 +54,14 @@ fn a_quick_evaluation_holds_every_table_of_the_paper() {
 
     // An evaluation is replaced, anything else is not.
     fs::write(folder.path().join("report").join("note.txt"), "mine").unwrap();
-    fs::remove_file(report.join("eval.json")).unwrap();
-    let output = arguments(&[]);
-    assert_eq!(output.status.code(), Some(1));
-    assert!(holds(&said(&output), "holds files that are no evaluation"), "{}", said(&output));
+    for foreign in [None, Some("mine"), Some("{ \"mine\": 1 }")] {
+        fs::remove_file(report.join("eval.json")).unwrap_or_default();
+        if let Some(text) = foreign {
+            fs::write(report.join("eval.json"), text).unwrap();
+        }
+        let output = arguments(&[]);
+        assert_eq!(output.status.code(), Some(1));
+        assert!(holds(&said(&output), "holds files that are no evaluation"), "{}", said(&output));
+    }
     assert!(report.join("note.txt").is_file());
 }
