@@ -107,11 +107,14 @@ impl Motion {
         if !(frame_rate > 0.0 && frame_rate.is_finite()) {
             return Err(MotionError::FrameRate { path: path.into(), key, value: frame_rate });
         }
-        let places = match file.contains("joint_names") {
-            true => places(&file.strings("joint_names", HINT)?.data, columns / 3)
-                .map_err(|joint| MotionError::Joint { path: path.into(), joint })?,
-            false => std::array::from_fn(|joint| joint),
+        // Names that are no text (pickled ones), as none at all, say nothing.
+        let names = match file.strings("joint_names", HINT) {
+            Ok(names) => names.data,
+            Err(NpzError::Missing { .. } | NpzError::Kind { .. }) => Vec::new(),
+            Err(damaged) => return Err(damaged.into()),
         };
+        let places =
+            places(&names, columns / 3).map_err(|joint| MotionError::Joint { path: path.into(), joint })?;
         let mut frames = Vec::with_capacity(poses.shape[0]);
         for (frame, row) in poses.data.chunks_exact(columns).enumerate() {
             let rotations = places.map(|place| [row[3 * place], row[3 * place + 1], row[3 * place + 2]]);
@@ -188,6 +191,19 @@ mod tests {
         let numbers: Vec<String> = (0..22).map(|j| format!("joint {j}")).collect();
         let descending: Vec<f64> = (0..22).rev().map(f64::from).collect();
         assert_eq!(load(&numbers.iter().map(String::as_str).collect::<Vec<_>>()).unwrap(), descending);
+        let row: Vec<f32> = (0..22).flat_map(|j| [j as f32, 0.0, 0.0]).collect();
+        let mut npz = NpzWriter::new();
+        npz.f32("poses", &[1, 66], &row).f64("mocap_framerate", &[], &[30.0]).f32(
+            "joint_names",
+            &[1],
+            &[0.0],
+        );
+        npz.save(&path).unwrap();
+        assert_eq!(
+            Motion::load(&path).unwrap().poses[0].rotations[21],
+            [21.0, 0.0, 0.0],
+            "names that are no text"
+        );
         let mut misspelt = BODY_JOINT_NAMES;
         misspelt[5] = "right_knie";
         let message = load(&misspelt).unwrap_err().to_string();

@@ -1,7 +1,5 @@
 //! Winding numbers of closed surfaces, by the faces that a ray crosses.
 
-use std::sync::OnceLock;
-
 use crate::vec3::{cross, dot, sub};
 
 /// Cells of the grid for each face, at most…
@@ -13,23 +11,18 @@ const ENTRIES_PER_FACE: usize = 16;
 ///
 /// Which faces it crosses is decided edge by edge, each with the same numbers from both of its faces: on a closed surface no
 /// crossing is missed or counted twice, whatever the rounding.
+#[derive(Debug)]
 pub(super) struct Crossings {
     positions: Vec<[f64; 3]>,
     faces: Vec<[u32; 3]>,
-    /// Built at first use.
-    columns: OnceLock<Columns>,
-}
-
-impl std::fmt::Debug for Crossings {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Crossings").field("faces", &self.faces.len()).finish_non_exhaustive()
-    }
+    columns: Columns,
 }
 
 impl Crossings {
     /// `positions` `[V, 3]` (m), `faces` `[F, 3]` whose corners are finite.
     pub fn new(positions: Vec<[f64; 3]>, faces: Vec<[u32; 3]>) -> Self {
-        Self { positions, faces, columns: OnceLock::new() }
+        let columns = Columns::new(&positions, &faces);
+        Self { positions, faces, columns }
     }
 
     /// `[V, 3]` (m).
@@ -50,8 +43,7 @@ impl Crossings {
 
     /// How many parts `p` is inside of, where none is inside out. In O(faces along the ray).
     pub fn winding_number(&self, p: [f64; 3]) -> i32 {
-        let columns = self.columns.get_or_init(|| Columns::new(&self.positions, &self.faces));
-        columns.at(p).iter().map(|&face| self.crossing(self.faces[face as usize], p)).sum()
+        self.columns.at(p).iter().map(|&face| self.crossing(self.faces[face as usize], p)).sum()
     }
 
     /// 1 where the ray from `p` leaves through `face`, −1 where it enters, 0 where it misses.
@@ -84,6 +76,7 @@ fn is_left(a: [f64; 3], b: [f64; 3], p: [f64; 3]) -> bool {
 
 /// The faces of a surface by the cells of a grid over y and z that their boxes touch. Built in O(F), where a tree takes
 /// O(F log F): every body in another pose asks a few hundred questions only.
+#[derive(Debug)]
 struct Columns {
     axes: [Axis; 2],
     /// Where the faces of a cell begin, and one entry more.
@@ -92,7 +85,7 @@ struct Columns {
 }
 
 /// One side of the grid.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct Axis {
     low: f64,
     high: f64,
@@ -237,7 +230,7 @@ mod tests {
         assert_eq!(crossings.winding_number([0.3, 0.2, 0.1]), 401);
         assert_eq!(crossings.winding_number([0.3, 0.2, 0.2]), 400);
         assert_eq!(crossings.winding_number([100.0, 0.2, 0.1]), 0);
-        assert!(crossings.columns.get().unwrap().faces.len() <= ENTRIES_PER_FACE * mesh.faces().len());
+        assert!(crossings.columns.faces.len() <= ENTRIES_PER_FACE * mesh.faces().len());
     }
 
     #[test]

@@ -106,22 +106,19 @@ impl Checkpoint {
     /// # Errors
     /// When there is none, or it (or all of them) is damaged or of another version.
     pub fn open(path: &Path) -> Result<Self, CheckpointError> {
-        newest(path, |folder| {
+        Self::open_until(path, u64::MAX)
+    }
+
+    /// The same of at most `step` steps, where the newest of several is asked for.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn open_until(path: &Path, step: u64) -> Result<Self, CheckpointError> {
+        newest(path, step, |folder| {
             let state = read_state(folder, &REQUIRED)?;
             state.checksums.keys().try_for_each(|file| verify(folder, &state, file))?;
             Ok(Self { path: folder.to_owned(), state })
         })
-    }
-
-    /// The newest whole checkpoint of the run in `path` after at most `step` steps.
-    ///
-    /// # Errors
-    /// When there is none.
-    pub fn open_until(path: &Path, step: u64) -> Result<Self, CheckpointError> {
-        let folders = retention::list(&path.join("checkpoints"));
-        let whole = |(_, folder): (u64, PathBuf)| Self::open(&folder).ok();
-        let found = folders.into_iter().rev().filter(|(number, _)| *number <= step).find_map(whole);
-        found.ok_or_else(|| CheckpointError::Missing { path: path.to_owned() })
     }
 
     /// The configuration of the run it belongs to.
@@ -192,14 +189,20 @@ impl Checkpoint {
     }
 }
 
-/// What `open` makes of a checkpoint folder, or of the newest one in a run or checkpoints folder that it accepts.
-fn newest<T>(path: &Path, open: impl Fn(&Path) -> Result<T, CheckpointError>) -> Result<T, CheckpointError> {
+/// What `open` makes of a checkpoint folder, or of the newest one in a run or checkpoints folder that it accepts, of at most
+/// `step` steps.
+fn newest<T>(
+    path: &Path,
+    step: u64,
+    open: impl Fn(&Path) -> Result<T, CheckpointError>,
+) -> Result<T, CheckpointError> {
     if path.join(STATE).exists() {
         return open(path);
     }
     let mut first_error = None;
     for folder in [path.to_owned(), path.join("checkpoints")] {
-        for (_, candidate) in retention::list(&folder).into_iter().rev() {
+        let listed = retention::list(&folder).into_iter().rev();
+        for (_, candidate) in listed.filter(|(number, _)| *number <= step) {
             match open(&candidate) {
                 Ok(found) => return Ok(found),
                 Err(error) => {

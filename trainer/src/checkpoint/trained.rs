@@ -31,7 +31,7 @@ impl TrainedModel {
             true => path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new(".")),
             false => path,
         };
-        newest(path, |folder| {
+        newest(path, u64::MAX, |folder| {
             let files = [MODEL_EXCHANGE, CONFIG];
             let state = read_state(folder, &files)?;
             files.iter().try_for_each(|file| verify(folder, &state, file))?;

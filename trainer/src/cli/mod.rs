@@ -22,16 +22,15 @@ mod wardrobe_sheet;
 
 pub use verbosity::Verbosity;
 
+use crate::closed_pipe::tell;
 use miette::Report;
-use std::io::Write;
 
 /// Exit code of a program that ended with `result`; an error is printed once, with its place and hint.
 pub fn exit_code(result: Result<(), Report>) -> std::process::ExitCode {
     match result {
         Ok(()) => std::process::ExitCode::SUCCESS,
         Err(report) => {
-            // Nobody is left to tell where even this cannot be written.
-            let _ = writeln!(std::io::stderr(), "{report:?}");
+            tell(format_args!("{report:?}"));
             std::process::ExitCode::FAILURE
         }
     }

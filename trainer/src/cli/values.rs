@@ -1,5 +1,7 @@
 //! What the values of flags must be, where the type alone does not say it.
 
+use clothcombo_physics::contact::resolve::ResolveSettings;
+
 /// A whole number that is at least 1.
 pub fn at_least_one(text: &str) -> Result<usize, String> {
     match text.parse() {
@@ -11,9 +13,10 @@ pub fn at_least_one(text: &str) -> Result<usize, String> {
 
 /// A gap between garments [mm], in the bounds of the post-process.
 pub fn gap_mm(text: &str) -> Result<f64, String> {
+    const MOST: f64 = 1e3 * ResolveSettings::LARGEST_GAP;
     match text.parse() {
-        Ok(gap) if gap > 0.0 && gap <= 50.0 => Ok(gap),
-        Ok(_) => Err("it must be greater than 0 and at most 50 mm".into()),
+        Ok(gap) if gap > 0.0 && gap <= MOST => Ok(gap),
+        Ok(_) => Err(format!("it must be greater than 0 and at most {MOST} mm")),
         Err(_) => Err("it is no number".into()),
     }
 }

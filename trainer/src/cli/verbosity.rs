@@ -1,8 +1,9 @@
 //! How much the programs say: the same flags for every verb.
 
+use crate::closed_pipe::tell;
 use clap::{ArgAction, Args};
 use indicatif::{ProgressBar, ProgressStyle};
-use std::io::{IsTerminal, Write};
+use std::io::IsTerminal;
 use std::sync::atomic::{AtomicBool, Ordering};
 use tracing_subscriber::EnvFilter;
 
@@ -64,7 +65,6 @@ pub(crate) fn progress_bar(length: usize, template: &str) -> ProgressBar {
 /// One line on stderr, none with `--quiet`.
 pub(crate) fn say(line: &str) {
     if !is_quiet() {
-        // What is made does not depend on what can be told of it.
-        let _ = writeln!(std::io::stderr(), "{line}");
+        tell(line);
     }
 }

@@ -1,9 +1,10 @@
 //! The progress bar: stage, steps per second, time left, loss. Without a terminal, a line now and then.
 
+use crate::closed_pipe::tell;
 use crate::event::{Observer, TrainEvent};
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::Report;
-use std::io::{IsTerminal, Write};
+use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
 /// Seconds between lines when there is no terminal to draw on.
@@ -36,17 +37,12 @@ impl Default for ProgressObserver {
     }
 }
 
-/// A line on stderr. Training does not end because of what cannot be printed.
-fn tell(text: std::fmt::Arguments<'_>) {
-    let _ = writeln!(std::io::stderr(), "{text}");
-}
-
 impl ProgressObserver {
     /// Prints `text` above the bar.
     fn say(&self, text: &str) {
         match &self.bar {
             Some(bar) => bar.println(text),
-            None => tell(format_args!("{text}")),
+            None => tell(text),
         }
     }
 

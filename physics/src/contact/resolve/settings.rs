@@ -66,6 +66,9 @@ impl Default for ResolveSettings {
 }
 
 impl ResolveSettings {
+    /// The largest `gap` [m].
+    pub const LARGEST_GAP: f64 = 0.05;
+
     /// Whether what began at `start` has had its time.
     pub(super) fn is_late(&self, start: Instant, garments: usize) -> bool {
         self.time.is_some_and(|limit| start.elapsed() > limit * garments as u32)
@@ -77,7 +80,7 @@ impl ResolveSettings {
     /// [`ResolveError::Setting`] names the first that is out of range.
     pub fn check(&self) -> Result<(), ResolveError> {
         let fail = |setting, value, expected| Err(ResolveError::Setting { setting, value, expected });
-        if !(self.gap > 0.0 && self.gap <= 0.05) {
+        if !(self.gap > 0.0 && self.gap <= Self::LARGEST_GAP) {
             return fail("gap", self.gap, "greater than 0 and at most 0.05 m");
         }
         if !(0.0..=1.0).contains(&self.trigger) {
