@@ -251,6 +251,7 @@ impl Draper {
                 let at_the_end = || Waypoint {
                     body: surface.clone(),
                     draped: parts.iter().map(|p| p.to_vec()).collect(),
+                    skinned: outfit.split(&skinned).into_iter().map(<[_]>::to_vec).collect(),
                     transforms: transforms.clone(),
                 };
                 let done = self.resolved(outfit, body, last, &surface, &parts, &at_the_end)?;

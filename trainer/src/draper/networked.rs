@@ -85,9 +85,11 @@ impl Draper {
         // A surface is known at the end only.
         let on_the_way = BodyState { shape: body.shape.clone(), pose, surface: None, place };
         let made = self.networked(outfit, &on_the_way)?;
+        let parts = |packed| outfit.split(packed).into_iter().map(<[_]>::to_vec).collect();
         Ok(Waypoint {
             body: made.surface,
-            draped: outfit.split(&made.network).into_iter().map(<[_]>::to_vec).collect(),
+            draped: parts(&made.network),
+            skinned: parts(&made.skinned),
             transforms: made.transforms,
         })
     }

@@ -81,6 +81,7 @@ impl<'a> Dressing<'a> {
         Ok(Waypoint {
             body: Arc::new(scene.exact_body()),
             draped: wide(&scene, &self.drape(&scene)?),
+            skinned: wide(&scene, &skinned(&scene)),
             transforms: skinning_transforms(&scene),
         })
     }

@@ -11,6 +11,7 @@ use std::time::Instant;
 
 use super::body::{Body, with_body, with_drawn};
 use super::obstacle::BodyObstacle;
+use super::taken_back::{shares, taken_back};
 use super::{
     Layer, ResolveError, ResolveSettings, Resolved, Untangled, at, check, is_near, resolved_further, settled,
     untangled,
@@ -23,6 +24,8 @@ use crate::vec3::{add, scale, sub};
 const LONGEST: f64 = 1.0 / 4.0;
 /// The shortest one: it is taken even where it leaves more crossings than there were.
 const SHORTEST: f64 = 1.0 / 128.0;
+/// The shortest one with drapes that are taken back: where those help they do so at once.
+const SHORTEST_TAKEN_BACK: f64 = 1.0 / 16.0;
 /// The shortest one from a frame that was not clear.
 const SHORTEST_OF_CROSSED: f64 = 1.0 / 4.0;
 /// After as many of the shortest that left more crossings, the rest of the way is one step.
@@ -40,6 +43,8 @@ pub struct Waypoint {
     pub body: Arc<Surface<f64>>,
     /// The drape on it, `[V, 3]` per garment [m].
     pub draped: Vec<Vec<[f64; 3]>>,
+    /// What that began from: the garments as skinning alone puts them.
+    pub skinned: Vec<Vec<[f64; 3]>>,
     /// Skinning transforms of all vertices, garment after garment, from one and the same state.
     pub transforms: Vec<Transform>,
 }
@@ -64,8 +69,8 @@ impl Reached {
 }
 
 /// As [`super::resolve`], with a second way out: where crossings of `layers` on `body` cannot be mended, the garments are taken
-/// along from the stage at 0, the T-pose, to the stage at 1, which is `body` with `layers`. What leaves fewer crossings is
-/// returned.
+/// along from the stage at 0, the T-pose, to the stage at 1, which is `body` with `layers`; where that leaves crossings, once more
+/// with drapes that are taken back towards the skinned garments around them. What leaves the fewest is returned.
 ///
 /// # Errors
 /// Those of `stage_at` and of [`super::resolve`].
@@ -82,19 +87,18 @@ pub fn resolve_along<E: From<ResolveError>>(
         if best.certificate.is_clear() && !is_torn || settings.steps == 0 {
             return Ok(best);
         }
-        let stage = stage_at(0.0)?;
-        check(&stage.body, &placed(layers, &stage.draped)?)?;
-        let first = on_stage(layers, &stage, settings, std::slice::from_ref(&stage.draped));
         let way = Way { layers, end: room, settings, start, longest: LONGEST, shortest: SHORTEST };
-        let (followed, steps) = way.follow(Reached::new(stage, first), stage_at)?;
-        best.steps = steps;
-        if let Some(found) = followed {
-            let mut along = settled(room, layers, found, settings);
-            along.go_on(body, layers, settings, start);
-            best.add_work(&along);
-            match along.certificate.is_clear() {
-                true => (best.positions, best.certificate) = (along.positions, along.certificate),
-                false => best.prefer(along.positions, along.certificate),
+        let t_pose = stage_at(0.0)?;
+        let places = t_pose.draped.clone();
+        way.improve(&mut best, body, t_pose, &mut stage_at)?;
+        if !best.certificate.is_clear() {
+            check(body, &placed(layers, &places)?)?;
+            let shares = shares(&best.certificate, layers, &places);
+            let mut nearer = |at: f64| stage_at(at).map(|stage| taken_back(stage, &shares));
+            let t_pose = nearer(0.0)?;
+            if t_pose.draped != places {
+                let way = Way { shortest: SHORTEST_TAKEN_BACK, ..way };
+                way.improve(&mut best, body, t_pose, nearer)?;
             }
         }
         Ok(best)
@@ -146,6 +150,34 @@ struct Way<'a, 'b> {
 }
 
 impl Way<'_, '_> {
+    /// Resolves garments in the T-pose and takes them to 1; what comes of it is taken if it is better than the `best` so far.
+    /// Crossings that are there in the T-pose already are not mended on a way.
+    fn improve<E: From<ResolveError>>(
+        &self,
+        best: &mut Resolved,
+        body: &Surface<f64>,
+        t_pose: Waypoint,
+        stage_at: impl FnMut(f64) -> Result<Waypoint, E>,
+    ) -> Result<(), E> {
+        let (layers, settings) = (self.layers, self.settings);
+        check(&t_pose.body, &placed(layers, &t_pose.draped)?)?;
+        let first = on_stage(layers, &t_pose, settings, std::slice::from_ref(&t_pose.draped));
+        if first.crossings > 0 && first.crossings >= best.certificate.crossings() {
+            return Ok(());
+        }
+        let (followed, steps) = self.follow(Reached::new(t_pose, first), stage_at)?;
+        best.steps += steps;
+        let Some(found) = followed else { return Ok(()) };
+        let mut along = settled(self.end, layers, found, settings);
+        along.go_on(body, layers, settings, self.start);
+        best.add_work(&along);
+        match along.certificate.is_clear() {
+            true => (best.positions, best.certificate) = (along.positions, along.certificate),
+            false => best.prefer(along.positions, along.certificate),
+        }
+        Ok(())
+    }
+
     /// Takes garments from where they are `reached`, at 0, to the stage at 1; also how many steps were tried. None where the time
     /// is used up, or no step allowed.
     fn follow<E: From<ResolveError>>(

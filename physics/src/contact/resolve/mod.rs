@@ -26,7 +26,7 @@
 //! **Easing.** Where the strain energy has risen, cloth gives back what it can without crossing anything ([`ease`]).
 //!
 //! **Bent limbs.** Where crossings are left, [`resolve_along`] takes the garments from the T-pose, where their order is plain,
-//! step by step to the pose ([`follow`]).
+//! step by step to the pose ([`follow`]); where that leaves some, with drapes that lie nearer to where they began ([`taken_back`]).
 
 mod body;
 mod certificate;
@@ -46,6 +46,7 @@ mod relax;
 mod relief;
 mod resolved;
 mod settings;
+mod taken_back;
 #[cfg(test)]
 mod tests;
 mod untangle;

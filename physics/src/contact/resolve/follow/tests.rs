@@ -18,6 +18,7 @@ fn rising(size: f64) -> (TriMesh, impl Fn(f64) -> Result<Waypoint, ResolveError>
         Ok(Waypoint {
             body: Arc::new(Surface::from_mesh(&knee)),
             draped: vec![draped.clone()],
+            skinned: vec![draped.clone()],
             transforms: vec![IDENTITY; draped.len()],
         })
     };
@@ -181,6 +182,7 @@ fn changes_turn_with_the_skinning_and_fade() {
     let stage = |drape: [f64; 3], transform| Waypoint {
         body: Arc::new(Surface::from_mesh(&shapes::tetrahedron())),
         draped: vec![vec![drape]],
+        skinned: vec![vec![drape]],
         transforms: vec![transform],
     };
     let reached = untouched(stage([1.0, 0.0, 0.0], IDENTITY), vec![vec![[1.2, 0.0, 0.4]]]);
