@@ -15,6 +15,7 @@ pub use motion::{MotionCheck, impossible_turn};
 pub use targets::{ManifestHints, Target, find_targets};
 
 use crate::asset::Body;
+use crate::dataset::garment_folder::MANIFEST;
 use crate::format::NpzFile;
 use clothcombo_physics::Surface;
 use serde::Serialize;
@@ -85,6 +86,10 @@ impl Checker {
         match target {
             Target::Garment { path, entry } => garment::check(path, entry, &self.body, &self.surface),
             Target::Npz { path } => check_npz(path),
+            Target::Unlisted { path } => {
+                let warning = format!("not in the {MANIFEST} beside it, so no dataset takes it");
+                FileCheck { warnings: vec![warning], ..FileCheck::new(path) }
+            }
             Target::Unusable { path, reason } => FileCheck::unusable(path, reason),
         }
     }

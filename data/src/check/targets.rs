@@ -36,6 +36,11 @@ pub enum Target {
         /// The file.
         path: PathBuf,
     },
+    /// A mesh that the `garments.toml` beside it leaves out.
+    Unlisted {
+        /// The file.
+        path: PathBuf,
+    },
     /// Something that is known to be wrong before it is opened.
     Unusable {
         /// The file or folder.
@@ -49,13 +54,16 @@ impl Target {
     /// The file.
     pub fn path(&self) -> &Path {
         match self {
-            Self::Garment { path, .. } | Self::Npz { path } | Self::Unusable { path, .. } => path,
+            Self::Garment { path, .. }
+            | Self::Npz { path }
+            | Self::Unlisted { path }
+            | Self::Unusable { path, .. } => path,
         }
     }
 }
 
 /// All meshes and npz files of `paths`: files as they are, folders with everything below them, sorted by name. In a folder with a
-/// `garments.toml` the meshes are those it lists.
+/// `garments.toml` the garments are the meshes it lists.
 pub fn find_targets(paths: &[PathBuf]) -> Vec<Target> {
     let mut targets = Vec::new();
     for path in paths {
@@ -102,7 +110,9 @@ fn visit(folder: &Path, depth: usize, seen: &mut HashSet<PathBuf>, targets: &mut
         Err(e) => return targets.push(wrong(format!("{}: {e}", folder.display()))),
     };
     children.sort();
-    let has_manifest = folder.join(MANIFEST).exists();
+    // A manifest that cannot be read is among the targets, and leaves nothing out.
+    let (manifest, first) = (folder.join(MANIFEST), targets.len());
+    let has_manifest = manifest.exists();
     if has_manifest {
         match read_entries(folder) {
             Ok(entries) => targets.extend(entries.into_iter().map(|entry| {
@@ -116,7 +126,7 @@ fn visit(folder: &Path, depth: usize, seen: &mut HashSet<PathBuf>, targets: &mut
                     Target::Unusable { path, reason }
                 }
             })),
-            Err(e) => targets.push(Target::Unusable { path: folder.join(MANIFEST), reason: e.to_string() }),
+            Err(e) => targets.push(Target::Unusable { path: manifest.clone(), reason: e.to_string() }),
         }
     }
     for child in children {
@@ -126,6 +136,8 @@ fn visit(folder: &Path, depth: usize, seen: &mut HashSet<PathBuf>, targets: &mut
             }
         } else if !(has_manifest && is_mesh_path(&child)) {
             targets.extend(file_target(&child));
+        } else if !targets[first..].iter().any(|t| t.path() == child || t.path() == manifest) {
+            targets.push(Target::Unlisted { path: child });
         }
     }
 }

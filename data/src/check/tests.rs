@@ -50,7 +50,8 @@ fn a_dataset_with_good_and_bad_files_is_told_apart() {
         .map(|f| f.path.file_name().unwrap().to_str().unwrap())
         .collect();
     assert_eq!(unusable, ["broken.stl", "cut.npz", "missing"]);
-    assert!(!files.iter().any(|f| f.path.ends_with("unlisted.obj")));
+    let unlisted = by_name(&files, "unlisted.obj");
+    assert!(unlisted.garment.is_none() && unlisted.warnings.iter().any(|w| w.contains("garments.toml")));
 
     let good = by_name(&files, &format!("{}.obj", skirt.name));
     let check = good.garment.as_ref().unwrap();

@@ -156,19 +156,14 @@ fn import_file(path: &Path, settings: &AmassSettings) -> Result<Clip, String> {
     if motion.poses.is_empty() {
         return Err("it has no frames".into());
     }
-    let before = motion.poses.len();
     let rate = motion.frame_rate;
     if settings.up == UpAxis::Z {
         motion.poses.iter_mut().for_each(turn_root_to_y_up);
     }
     let lying = mean_uprightness(&motion.poses);
-    let Thinned { poses, frame_rate, step, static_frames } =
+    let Thinned { poses, frame_rate, note } =
         thin(std::mem::take(&mut motion.poses), rate, &settings.thinning);
-    let mut note = format!(
-        "{} ({columns} columns), {} of {before} frames at {rate:.2} frames/s (every {step}., {static_frames} static)",
-        layout(columns),
-        poses.len(),
-    );
+    let mut note = format!("{} ({columns} columns), {note}", layout(columns));
     if !subject.is_empty() {
         note.push_str(&format!(", {subject}"));
     }

@@ -150,15 +150,8 @@ fn import_file(file: &Path, body: &Body, settings: &BvhImportSettings) -> Result
     }
     let rate = 1.0 / bvh.frame_time;
     let thinning = Thinning { frame_rate: settings.frame_rate, static_threshold: 0.0 };
-    let thinned = thin(poses, rate, &thinning);
-    let note = format!(
-        "{} skeleton, {} of {} frames at {rate:.0} frames/s (every {}.){note}",
-        naming.name,
-        thinned.poses.len(),
-        bvh.frame_count(),
-        thinned.step
-    );
-    let Thinned { poses, frame_rate, .. } = thinned;
+    let Thinned { poses, frame_rate, note: kept } = thin(poses, rate, &thinning);
+    let note = format!("{} skeleton, {kept}{note}", naming.name);
     let motion = Motion { name: String::new(), frame_rate, poses, source: (naming.provenance)() };
     Ok(Clip { motion, subject: String::new(), note })
 }

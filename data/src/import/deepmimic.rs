@@ -175,12 +175,8 @@ pub fn import_deepmimic(
         let frames = parse(&String::from_utf8_lossy(&bytes))?;
         let rate = frame_rate(&frames)?;
         let poses = frames.iter().map(|row| retarget.pose(&world_rotations(row))).collect();
-        let Thinned { poses, frame_rate, step, static_frames } = thin(poses, rate, &settings.thinning);
-        let note = format!(
-            "DeepMimic humanoid, {} of {} frames at {rate:.1} frames/s (every {step}., {static_frames} static)",
-            poses.len(),
-            frames.len()
-        );
+        let Thinned { poses, frame_rate, note } = thin(poses, rate, &settings.thinning);
+        let note = format!("DeepMimic humanoid, {note}");
         let mut source = settings.provenance.clone();
         source.source = format!("{} ({})", source.source, stem(file));
         let motion = Motion { name: String::new(), frame_rate, poses, source };

@@ -20,15 +20,14 @@ pub struct Thinned {
     pub poses: Vec<Pose>,
     /// Rate of the frames but for the static ones [frames/s].
     pub frame_rate: f64,
-    /// Every how many frames one was kept.
-    pub step: usize,
-    /// Frames dropped because nothing moved.
-    pub static_frames: usize,
+    /// What was kept of what: "120 of 243 frames at 60 frames/s (every 2nd, 2 static ones dropped)".
+    pub note: String,
 }
 
 /// Applies `thinning` to a clip of `rate` frames per second.
 pub fn thin(poses: Vec<Pose>, rate: f64, thinning: &Thinning) -> Thinned {
     let step = (rate / thinning.frame_rate.max(1e-6)).round().clamp(1.0, 1e6) as usize;
+    let count = poses.len();
     let mut kept: Vec<Pose> = Vec::new();
     let mut static_frames = 0;
     for pose in poses.into_iter().step_by(step) {
@@ -39,7 +38,38 @@ pub fn thin(poses: Vec<Pose>, rate: f64, thinning: &Thinning) -> Thinned {
             static_frames += 1;
         }
     }
-    Thinned { poses: kept, frame_rate: rate / step as f64, step, static_frames }
+    let note = note(count, kept.len(), rate, step, static_frames);
+    Thinned { poses: kept, frame_rate: rate / step as f64, note }
+}
+
+fn note(count: usize, kept: usize, rate: f64, step: usize, static_frames: usize) -> String {
+    let frames = if count == 1 { "frame" } else { "frames" };
+    let of = if kept < count { format!("{kept} of {count}") } else { count.to_string() };
+    // Two digits tell 29.97 from 30; whole rates need none.
+    let rate = format!("{rate:.2}");
+    let rate = rate.strip_suffix(".00").unwrap_or(&rate);
+    let mut left_out = Vec::new();
+    if step > 1 {
+        left_out.push(format!("every {step}{}", ordinal_ending(step)));
+    }
+    if static_frames > 0 {
+        let ones = if static_frames == 1 { "one" } else { "ones" };
+        left_out.push(format!("{static_frames} static {ones} dropped"));
+    }
+    match left_out.is_empty() {
+        true => format!("{of} {frames} at {rate} frames/s"),
+        false => format!("{of} {frames} at {rate} frames/s ({})", left_out.join(", ")),
+    }
+}
+
+fn ordinal_ending(number: usize) -> &'static str {
+    match (number % 10, number % 100) {
+        (_, 11..=13) => "th",
+        (1, _) => "st",
+        (2, _) => "nd",
+        (3, _) => "rd",
+        _ => "th",
+    }
 }
 
 /// Largest angle by which any joint from `first` on turns between two poses [rad].
@@ -66,7 +96,7 @@ mod tests {
         let settings = Thinning { frame_rate: 30.0, static_threshold: 0.0 };
         for (rate, step) in [(120.000045, 4), (100.0, 3), (59.94, 2), (30.0, 1), (25.0, 1)] {
             let thinned = thin(poses.clone(), rate, &settings);
-            assert_eq!((thinned.step, thinned.static_frames), (step, 0));
+            assert_eq!(thinned.note.contains("of 121 frames"), step > 1, "{}", thinned.note);
             assert_eq!(thinned.poses, poses.iter().step_by(step).cloned().collect::<Vec<_>>());
             assert!((thinned.frame_rate - rate / step as f64).abs() < 1e-12);
         }
@@ -78,8 +108,27 @@ mod tests {
         let still: Vec<Pose> = (0..50).map(|_| pose(0.3)).chain([pose(0.5), pose(0.5)]).collect();
         let thinned = thin(still, 30.0, &settings);
         assert_eq!(thinned.poses, [pose(0.3), pose(0.5)]);
-        assert_eq!(thinned.static_frames, 50);
+        assert_eq!(thinned.note, "2 of 52 frames at 30 frames/s (50 static ones dropped)");
         let slow: Vec<Pose> = (0..100).map(|i| pose(0.0101 * f64::from(i))).collect();
         assert_eq!(thin(slow, 30.0, &settings).poses.len(), 10);
+    }
+
+    #[test]
+    fn the_note_reads_as_a_sentence() {
+        for (numbers, expected) in [
+            ((1, 1, 30.0, 1, 0), "1 frame at 30 frames/s"),
+            (
+                (243, 120, 59.94, 2, 2),
+                "120 of 243 frames at 59.94 frames/s (every 2nd, 2 static ones dropped)",
+            ),
+            ((12, 11, 30.0, 1, 1), "11 of 12 frames at 30 frames/s (1 static one dropped)"),
+            ((121, 31, 120.000045, 4, 0), "31 of 121 frames at 120 frames/s (every 4th)"),
+        ] {
+            let (count, kept, rate, step, static_frames) = numbers;
+            assert_eq!(note(count, kept, rate, step, static_frames), expected);
+        }
+        let ordinals =
+            [1, 2, 3, 4, 11, 12, 13, 21, 22, 103, 112].map(|n| format!("{n}{}", ordinal_ending(n)));
+        assert_eq!(ordinals.join(" "), "1st 2nd 3rd 4th 11th 12th 13th 21st 22nd 103rd 112th");
     }
 }

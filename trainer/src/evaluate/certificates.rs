@@ -4,6 +4,7 @@ use super::equilibrium_error::skinning_transforms;
 use crate::config::LossesConfig;
 use crate::drape::{DrapeError, Networks};
 use crate::scene::{Library, PreparedScene, prepare};
+use clothcombo_data::asset::{Garment, unwearable};
 use clothcombo_physics::contact::resolve::{
     Certificate, Layer, ResolveError, ResolveSettings, Resolved, RestGarment, Waypoint, certify,
     resolve_along,
@@ -205,7 +206,7 @@ pub struct OutfitResult {
     pub draw: usize,
     /// Names, inner → outer.
     pub garments: Vec<String>,
-    /// Whether the order can be worn: no garment with legs over one that hangs between them.
+    /// Whether the order can be worn ([`unwearable`]).
     pub is_wearable: bool,
     /// Vertices per garment.
     pub vertices: Vec<usize>,
@@ -248,10 +249,11 @@ impl OutfitResult {
         let ms = |time: std::time::Duration| 1e3 * time.as_secs_f64();
         let vertices: Vec<usize> = scene.worn.iter().map(|w| w.vertex_count()).collect();
         let moved: usize = works.iter().map(|w| w.moved).sum();
+        let order: Vec<&Garment> = scene.worn.iter().map(|w| &w.garment).collect();
         let result = Self {
             draw,
             garments: scene.worn.iter().map(|w| w.garment.name.clone()).collect(),
-            is_wearable: is_wearable(scene),
+            is_wearable: unwearable(&order).is_none(),
             before,
             after: Counts::new(&resolved.certificate, draped.order_by_vertices(&resolved.positions)),
             strain_added: resolved.certificate.strain_added,
@@ -266,15 +268,4 @@ impl OutfitResult {
         };
         Ok((result, resolved))
     }
-}
-
-/// Cloth around each leg cannot lie over cloth that hangs between the legs: they would have to pass through each other at the
-/// crotch.
-fn is_wearable(scene: &PreparedScene) -> bool {
-    use clothcombo_data::asset::Category;
-    let categories: Vec<Category> = scene.worn.iter().map(|w| w.garment.category).collect();
-    (0..categories.len()).all(|outer| {
-        categories[outer] != Category::Trousers
-            || !categories[..outer].iter().any(|inner| inner.hangs_between_legs())
-    })
 }

@@ -376,10 +376,8 @@ fn convert_cache(
 fn motion(info_mat: &Path, settings: &Cloth3dSettings) -> Result<Clip, String> {
     let info = SampleInfo::load(info_mat)?;
     let mut poses = info.poses;
-    let count = poses.len();
     poses.iter_mut().for_each(turn_root_to_y_up);
-    let Thinned { poses, frame_rate, step, static_frames } = thin(poses, FRAME_RATE, &settings.thinning);
-    let note = format!("{} of {count} frames (every {step}., {static_frames} static)", poses.len());
+    let Thinned { poses, frame_rate, note } = thin(poses, FRAME_RATE, &settings.thinning);
     let folder = info_mat.parent().and_then(Path::file_name).map(|f| f.to_string_lossy().into_owned());
     let source = provenance(&folder.unwrap_or_default());
     let motion = Motion { name: String::new(), frame_rate, poses, source };

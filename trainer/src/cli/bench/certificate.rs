@@ -305,7 +305,7 @@ fn print_tables(results: &[OutfitResult], layers: usize) {
             r.after.pinched_pairs,
             r.after.max_depth_mm,
             r.garments.join(" < "),
-            if r.is_wearable { "" } else { "  (legs over a skirt)" }
+            if r.is_wearable { "" } else { "  (cannot be worn)" }
         );
     }
 }

@@ -11,6 +11,7 @@ use crate::device::Backend;
 use crate::draper::output::{Show, Staged, write};
 use crate::draper::{Drape, Draper, DraperSettings, MotionProgress, Outfit, Report, SourceGarment, smooth};
 use clap::{Parser, ValueEnum};
+use clothcombo_data::asset::{Garment, unwearable};
 use clothcombo_data::check::impossible_turn;
 use clothcombo_data::format::atomic;
 use clothcombo_physics::contact::resolve::ResolveSettings;
@@ -150,6 +151,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         let sources = job.garments.iter().map(find).collect::<Result<Vec<_>, _>>()?;
         let sources = ordered(sources, job.order.as_deref())?;
         sources.iter().for_each(tell_repairs);
+        tell_order(&sources);
         let scenes = job.scenes(&draper)?;
         tell_shape(&scenes.body.shape, draper.trained().config.data.shape_range);
         if let Some(turn) = impossible_turn(scenes.states.iter().map(|state| &state.pose)) {
@@ -242,6 +244,17 @@ fn user_cache() -> Option<PathBuf> {
 fn tell_shape(shape: &[f64], [low, high]: [f64; 2]) {
     if let Some(value) = shape.iter().find(|value| !(low..=high).contains(*value)) {
         tracing::warn!("shape parameter {value}: the model was trained with {low} to {high}");
+    }
+}
+
+fn tell_order(sources: &[SourceGarment]) {
+    let order: Vec<&Garment> = sources.iter().map(|source| &source.garment).collect();
+    if let Some([inner, outer]) = unwearable(&order) {
+        tracing::warn!(
+            "{} cannot be worn over {}, which hangs between the legs: they will cross at the crotch",
+            outer.name,
+            inner.name
+        );
     }
 }
 
