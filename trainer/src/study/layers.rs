@@ -6,6 +6,7 @@ use super::table::{Table, number, percent};
 use crate::drape::NetworkDrape;
 use crate::evaluate::certificates::{Counts, Dressing, OutfitResult};
 use crate::scene::{PreparedScene, Unseen};
+use clothcombo_data::asset::{Garment, unwearable};
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use clothcombo_physics::energy::Term;
 use miette::{IntoDiagnostic, Report};
@@ -16,9 +17,19 @@ use serde::Serialize;
 pub struct LayerCount {
     /// Number of garments M.
     pub layers: usize,
+    /// All of them.
+    #[serde(flatten)]
+    pub all: Outfits,
+    /// Those in an order that can be worn ([`unwearable`]).
+    pub wearable: Outfits,
+}
+
+/// Outfits of as many layers each.
+#[derive(Clone, Debug, Serialize)]
+pub struct Outfits {
     /// Number of outfits.
     pub scenes: usize,
-    /// How many of them, the first, went through the post-process.
+    /// How many of them went through the post-process.
     pub resolved: usize,
     /// Strain of each layer in the outfit over that of the same garment draped alone, innermost first.
     pub strain: Vec<Ratio>,
@@ -45,6 +56,18 @@ pub struct LayerCount {
     pub post_ms: Estimate,
 }
 
+/// One outfit.
+struct Measured {
+    is_wearable: bool,
+    /// Strain of every garment draped alone and in the outfit [J].
+    strain: Vec<[f64; 2]>,
+    /// Share on the wrong side, every garment draped alone.
+    wrong_single: f64,
+    before: Counts,
+    /// If it went through the post-process.
+    result: Option<OutfitResult>,
+}
+
 /// Drapes `scenes` random outfits of `layers` garments of the whole wardrobe, held-out ones among them, in random order, and
 /// resolves the first `resolved` of them with `settings`.
 ///
@@ -61,62 +84,86 @@ pub fn ask(
     let all: Vec<usize> = (0..subject.library.wardrobe.len()).collect();
     let networks = subject.networks();
     let dressing = Dressing::new(&subject.library, &subject.config.losses, Some(&networks));
-    let (mut single, mut layered) = (vec![Vec::new(); layers], vec![Vec::new(); layers]);
-    let (mut wrong_single, mut before, mut results) = (Vec::new(), Vec::new(), Vec::new());
+    let mut outfits = Vec::with_capacity(scenes);
     for index in 0..scenes {
         let draw = subject.draw([question, index], &all, layers, Unseen::Poses);
         let scene = subject.prepare(draw)?;
         let drape = networks.drape(&scene)?;
-        for (layer, [alone, worn]) in strains(&scene, &drape).into_iter().enumerate() {
-            single[layer].push(alone);
-            layered[layer].push(worn);
-        }
         let alone = dressing.of(&scene, &drape.single.posed);
-        wrong_single.push(alone.certificate().into_diagnostic()?.order_violations);
         let draped = dressing.of(&scene, &drape.layered.posed);
-        if index < resolved {
-            let result = OutfitResult::new(index, &draped, settings)?.0;
-            before.push(result.before);
-            results.push(result);
-        } else {
-            before.push(draped.counts().into_diagnostic()?);
-        }
+        let order: Vec<&Garment> = scene.worn.iter().map(|w| &w.garment).collect();
+        let result =
+            (index < resolved).then(|| OutfitResult::new(index, &draped, settings)).transpose()?.map(|r| r.0);
+        outfits.push(Measured {
+            is_wearable: unwearable(&order).is_none(),
+            strain: strains(&scene, &drape),
+            wrong_single: alone.certificate().into_diagnostic()?.order_violations,
+            before: match &result {
+                Some(result) => result.before,
+                None => draped.counts().into_diagnostic()?,
+            },
+            result,
+        });
         done();
     }
-    let shares = |values: &mut dyn Iterator<Item = f64>| Estimate::of(&values.collect::<Vec<_>>());
-    let clear = |all: &mut dyn Iterator<Item = bool>| {
-        shares(&mut all.map(|is_clear| f64::from(u8::from(is_clear)))).spread.mean
-    };
-    let added: Vec<f64> = results.iter().filter_map(|r| r.strain_added).collect();
-    // The garments of an outfit are no independent scenes.
-    let times: Vec<f64> =
-        results.iter().map(|r| r.milliseconds.iter().sum::<f64>() / layers as f64).collect();
-    let of_outfits = |layers: &[Vec<f64>]| {
-        let mean = |i: usize| layers.iter().map(|values| values[i]).sum::<f64>() / layers.len() as f64;
-        Estimate::of(&(0..scenes).map(mean).collect::<Vec<_>>())
-    };
-    let ratios = |layer: usize| -> Vec<f64> {
-        single[layer].iter().zip(&layered[layer]).map(|(alone, worn)| worn / alone).collect()
-    };
+    let wearable: Vec<&Measured> = outfits.iter().filter(|outfit| outfit.is_wearable).collect();
     Ok(LayerCount {
         layers,
-        scenes,
-        resolved: results.len(),
-        strain: (0..layers).map(|l| Ratio::of(&layered[l], &single[l])).collect(),
-        strain_median: (0..layers).map(|l| Estimate::of(&ratios(l)).spread.median).collect(),
-        strain_alone: of_outfits(&single),
-        strain_worn: of_outfits(&layered),
-        wrong_side_single: Estimate::of(&wrong_single),
-        wrong_side: shares(&mut before.iter().map(|c| c.order_violations)),
-        wrong_side_resolved: shares(&mut results.iter().map(|r| r.after.order_violations)),
-        clear: [
-            clear(&mut before.iter().map(Counts::is_clear)),
-            clear(&mut results.iter().map(|r| r.after.is_clear())),
-        ],
-        strain_added: Estimate::of(&added).spread.median,
-        layer_pairs: shares(&mut before.iter().map(|c| c.layer_triangle_pairs as f64)),
-        post_ms: Estimate::of(&times),
+        all: Outfits::of(layers, &outfits.iter().collect::<Vec<_>>()),
+        wearable: Outfits::of(layers, &wearable),
     })
+}
+
+impl LayerCount {
+    /// What its rows in a table are called, and stand for: a second one where some orders can be worn and some cannot.
+    fn rows(&self) -> impl Iterator<Item = (String, &Outfits)> {
+        let all = (format!("M = {}", self.layers), &self.all);
+        let differs = (1..self.all.scenes).contains(&self.wearable.scenes);
+        let wearable = differs.then(|| (format!("M = {}, wearable", self.layers), &self.wearable));
+        [all].into_iter().chain(wearable)
+    }
+}
+
+impl Outfits {
+    fn of(layers: usize, outfits: &[&Measured]) -> Self {
+        let results: Vec<&OutfitResult> =
+            outfits.iter().filter_map(|outfit| outfit.result.as_ref()).collect();
+        let of_all = |value: &dyn Fn(&Measured) -> f64| {
+            Estimate::of(&outfits.iter().map(|outfit| value(outfit)).collect::<Vec<_>>())
+        };
+        let of_resolved = |value: &dyn Fn(&OutfitResult) -> f64| {
+            Estimate::of(&results.iter().map(|result| value(result)).collect::<Vec<_>>())
+        };
+        let share = |is_clear: bool| f64::from(u8::from(is_clear));
+        // The garments of an outfit are no independent scenes.
+        let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / layers as f64;
+        let [alone, worn] = [0, 1].map(|which| {
+            let of_layer = |layer: usize| outfits.iter().map(|o| o.strain[layer][which]).collect();
+            (0..layers).map(of_layer).collect::<Vec<Vec<f64>>>()
+        });
+        let ratios = |layer: usize| -> Vec<f64> {
+            alone[layer].iter().zip(&worn[layer]).map(|(alone, worn)| worn / alone).collect()
+        };
+        let added: Vec<f64> = results.iter().filter_map(|r| r.strain_added).collect();
+        Self {
+            scenes: outfits.len(),
+            resolved: results.len(),
+            strain: (0..layers).map(|l| Ratio::of(&worn[l], &alone[l])).collect(),
+            strain_median: (0..layers).map(|l| Estimate::of(&ratios(l)).spread.median).collect(),
+            strain_alone: of_all(&|outfit| mean(&mut outfit.strain.iter().map(|s| s[0]))),
+            strain_worn: of_all(&|outfit| mean(&mut outfit.strain.iter().map(|s| s[1]))),
+            wrong_side_single: of_all(&|outfit| outfit.wrong_single),
+            wrong_side: of_all(&|outfit| outfit.before.order_violations),
+            wrong_side_resolved: of_resolved(&|result| result.after.order_violations),
+            clear: [
+                of_all(&|outfit| share(outfit.before.is_clear())).spread.mean,
+                of_resolved(&|result| share(result.after.is_clear())).spread.mean,
+            ],
+            strain_added: Estimate::of(&added).spread.median,
+            layer_pairs: of_all(&|outfit| outfit.before.layer_triangle_pairs as f64),
+            post_ms: of_resolved(&|result| mean(&mut result.milliseconds.iter().copied())),
+        }
+    }
 }
 
 /// Strain of every garment draped alone and in the outfit [J].
@@ -148,12 +195,14 @@ pub fn tables(counts: &[LayerCount]) -> Vec<Table> {
         row
     };
     let mut strain = Table::new("Strain of each layer, innermost first, over the same garment draped alone", &head)
-        .with_note("Ratio of means (median of the ratios); after the networks, before the post-process. More than 6 layers were never trained on.");
+        .with_note("Ratio of means (median of the ratios); after the networks, before the post-process. More than 6 layers were never trained on. Wearable: only the outfits without legs over cloth that hangs between them.");
     for count in counts {
-        let cells = count.strain.iter().zip(&count.strain_median);
-        let mut row = vec![format!("M = {}", count.layers)];
-        row.extend(cells.map(|(r, median)| format!("{} ({})", number(r.of_means), number(*median))));
-        strain.rows.push(filled(row));
+        for (name, outfits) in count.rows() {
+            let cells = outfits.strain.iter().zip(&outfits.strain_median);
+            let mut row = vec![name];
+            row.extend(cells.map(|(r, median)| format!("{} ({})", number(r.of_means), number(*median))));
+            strain.rows.push(filled(row));
+        }
         if let Some(paper) = PAPER.get(count.layers - 1) {
             let mut row = vec![format!("paper, M = {}", count.layers)];
             row.extend(paper.iter().map(|v| format!("{v:.2}")));
@@ -178,10 +227,11 @@ pub fn tables(counts: &[LayerCount]) -> Vec<Table> {
             "post-process per garment [ms], median",
         ],
     )
-    .with_note("Wrong side: share of outer vertices within 5 cm of an inner layer that lie under it, by the closest surface point. Clear: no exact pair with the body or between garments, outside of pinched regions.");
-    for c in counts {
+    .with_note("Wrong side: share of outer vertices within 5 cm of an inner layer that lie under it, by the closest surface point. Clear: no exact pair with the body or between garments, outside of pinched regions. Wearable: the outfits without legs over cloth that hangs between them, which must cross at the crotch.");
+    for (name, c) in counts.iter().flat_map(LayerCount::rows) {
+        let then = |cell: String| if c.resolved == 0 { "–".to_owned() } else { cell };
         order.rows.push(vec![
-            format!("M = {}", c.layers),
+            name,
             c.scenes.to_string(),
             number(c.strain_alone.spread.mean),
             number(c.strain_worn.spread.mean),
@@ -190,10 +240,10 @@ pub fn tables(counts: &[LayerCount]) -> Vec<Table> {
             number(c.layer_pairs.spread.mean),
             percent(c.clear[0]),
             c.resolved.to_string(),
-            percent(c.wrong_side_resolved.spread.mean),
-            percent(c.clear[1]),
-            percent(c.strain_added),
-            number(c.post_ms.spread.median),
+            then(percent(c.wrong_side_resolved.spread.mean)),
+            then(percent(c.clear[1])),
+            then(percent(c.strain_added)),
+            then(number(c.post_ms.spread.median)),
         ]);
     }
     vec![strain, order]
