@@ -110,23 +110,27 @@ fn visit(folder: &Path, depth: usize, seen: &mut HashSet<PathBuf>, targets: &mut
         Err(e) => return targets.push(wrong(format!("{}: {e}", folder.display()))),
     };
     children.sort();
-    // A manifest that cannot be read is among the targets, and leaves nothing out.
-    let (manifest, first) = (folder.join(MANIFEST), targets.len());
+    let manifest = folder.join(MANIFEST);
     let has_manifest = manifest.exists();
+    // None where a manifest cannot be read, too: it is among the targets, and leaves nothing out.
+    let mut listed: Option<HashSet<PathBuf>> = None;
     if has_manifest {
         match read_entries(folder) {
-            Ok(entries) => targets.extend(entries.into_iter().map(|entry| {
-                let path = folder.join(entry.file());
-                if path.is_file() {
-                    let (category, layer, holding) = (entry.category, entry.layer, entry.holding);
-                    Target::Garment { path, entry: ManifestHints { category, layer, holding } }
-                } else {
-                    let reason =
-                        format!("{}: {MANIFEST} lists it, but there is no such file", path.display());
-                    Target::Unusable { path, reason }
-                }
-            })),
-            Err(e) => targets.push(Target::Unusable { path: manifest.clone(), reason: e.to_string() }),
+            Ok(entries) => {
+                listed = Some(entries.iter().map(|entry| folder.join(entry.file())).collect());
+                targets.extend(entries.into_iter().map(|entry| {
+                    let path = folder.join(entry.file());
+                    if path.is_file() {
+                        let (category, layer, holding) = (entry.category, entry.layer, entry.holding);
+                        Target::Garment { path, entry: ManifestHints { category, layer, holding } }
+                    } else {
+                        let reason =
+                            format!("{}: {MANIFEST} lists it, but there is no such file", path.display());
+                        Target::Unusable { path, reason }
+                    }
+                }));
+            }
+            Err(e) => targets.push(Target::Unusable { path: manifest, reason: e.to_string() }),
         }
     }
     for child in children {
@@ -136,7 +140,7 @@ fn visit(folder: &Path, depth: usize, seen: &mut HashSet<PathBuf>, targets: &mut
             }
         } else if !(has_manifest && is_mesh_path(&child)) {
             targets.extend(file_target(&child));
-        } else if !targets[first..].iter().any(|t| t.path() == child || t.path() == manifest) {
+        } else if listed.as_ref().is_some_and(|listed| !listed.contains(&child)) {
             targets.push(Target::Unlisted { path: child });
         }
     }

@@ -121,6 +121,12 @@ impl DrapedScene<'_> {
         resolve_along(&self.body, &self.layers(&self.positions), settings, stage_at)
     }
 
+    /// Whether the order of the garments can be worn ([`unwearable`]).
+    pub fn is_wearable(&self) -> bool {
+        let order: Vec<&Garment> = self.scene.worn.iter().map(|w| &w.garment).collect();
+        unwearable(&order).is_none()
+    }
+
     /// What crosses before anything is done.
     ///
     /// # Errors
@@ -249,11 +255,10 @@ impl OutfitResult {
         let ms = |time: std::time::Duration| 1e3 * time.as_secs_f64();
         let vertices: Vec<usize> = scene.worn.iter().map(|w| w.vertex_count()).collect();
         let moved: usize = works.iter().map(|w| w.moved).sum();
-        let order: Vec<&Garment> = scene.worn.iter().map(|w| &w.garment).collect();
         let result = Self {
             draw,
             garments: scene.worn.iter().map(|w| w.garment.name.clone()).collect(),
-            is_wearable: unwearable(&order).is_none(),
+            is_wearable: draped.is_wearable(),
             before,
             after: Counts::new(&resolved.certificate, draped.order_by_vertices(&resolved.positions)),
             strain_added: resolved.certificate.strain_added,

@@ -6,7 +6,6 @@ use super::table::{Table, number, percent};
 use crate::drape::NetworkDrape;
 use crate::evaluate::certificates::{Counts, Dressing, OutfitResult};
 use crate::scene::{PreparedScene, Unseen};
-use clothcombo_data::asset::{Garment, unwearable};
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use clothcombo_physics::energy::Term;
 use miette::{IntoDiagnostic, Report};
@@ -20,7 +19,7 @@ pub struct LayerCount {
     /// All of them.
     #[serde(flatten)]
     pub all: Outfits,
-    /// Those in an order that can be worn ([`unwearable`]).
+    /// Those in an order that can be worn.
     pub wearable: Outfits,
 }
 
@@ -91,11 +90,10 @@ pub fn ask(
         let drape = networks.drape(&scene)?;
         let alone = dressing.of(&scene, &drape.single.posed);
         let draped = dressing.of(&scene, &drape.layered.posed);
-        let order: Vec<&Garment> = scene.worn.iter().map(|w| &w.garment).collect();
         let result =
             (index < resolved).then(|| OutfitResult::new(index, &draped, settings)).transpose()?.map(|r| r.0);
         outfits.push(Measured {
-            is_wearable: unwearable(&order).is_none(),
+            is_wearable: draped.is_wearable(),
             strain: strains(&scene, &drape),
             wrong_single: alone.certificate().into_diagnostic()?.order_violations,
             before: match &result {

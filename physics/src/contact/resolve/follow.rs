@@ -38,6 +38,7 @@ const GOOD_STEPS: usize = 2;
 const KEPT: f64 = 0.95;
 
 /// What is somewhere along the way.
+#[derive(Clone)]
 pub struct Waypoint {
     /// The body.
     pub body: Arc<Surface<f64>>,
@@ -89,17 +90,15 @@ pub fn resolve_along<E: From<ResolveError>>(
         }
         let way = Way { layers, end: room, settings, start, longest: LONGEST, shortest: SHORTEST };
         let t_pose = stage_at(0.0)?;
-        let places = t_pose.draped.clone();
-        way.improve(&mut best, body, t_pose, &mut stage_at)?;
+        way.improve(&mut best, body, t_pose.clone(), &mut stage_at)?;
         // Where most of what crosses is pinched it is the body, not the drape, that leaves no way out.
         if best.certificate.between() > best.certificate.pinched.count() {
-            check(body, &placed(layers, &places)?)?;
-            let shares = shares(&best.certificate, layers, &places);
-            let mut nearer = |at: f64| stage_at(at).map(|stage| taken_back(stage, &shares));
-            let t_pose = nearer(0.0)?;
-            if t_pose.draped != places {
+            let shares = shares(&best.certificate, layers, &t_pose.draped);
+            let nearer = taken_back(t_pose.clone(), &shares);
+            if nearer.draped != t_pose.draped {
                 let way = Way { shortest: SHORTEST_TAKEN_BACK, ..way };
-                way.improve(&mut best, body, t_pose, nearer)?;
+                let nearer_at = |at: f64| stage_at(at).map(|stage| taken_back(stage, &shares));
+                way.improve(&mut best, body, nearer, nearer_at)?;
             }
         }
         Ok(best)
