@@ -6,6 +6,8 @@ use parry3d_f64::math::Vector;
 use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhNode, BvhWorkspace};
 use rayon::prelude::*;
 
+use crate::query::{box_distance_squared, closest_on_triangle};
+
 use super::triangle_pair::{Triangle, corners, has_area, mesh_triangles_intersect, triangles_intersect};
 
 /// A mesh in a state, ready for intersection tests: positions `[V, 3]` (m), faces `[F, 3]`, and a tree over the faces.
@@ -176,6 +178,26 @@ impl<'a> TriangleTree<'a> {
     pub(super) fn faces_in_box(&self, low: [f64; 3], high: [f64; 3]) -> impl Iterator<Item = u32> {
         let probe = BvhNode::leaf(Aabb::new(Vector::from_array(low), Vector::from_array(high)), 0);
         self.bvh.leaves(move |node| node.intersects(&probe)).map(|leaf| self.kept[leaf as usize])
+    }
+
+    /// How far `p` is from the nearest of the faces that `may_be`, if that is nearer than `reach`.
+    pub(super) fn nearest(
+        &self,
+        p: [f64; 3],
+        reach: f64,
+        may_be: impl Fn(u32, &Triangle) -> bool,
+    ) -> Option<f64> {
+        let distance_squared = |leaf: u32| {
+            let face = self.kept[leaf as usize];
+            let triangle = self.triangle(face).filter(|triangle| may_be(face, triangle))?;
+            Some(closest_on_triangle(p, triangle).distance_squared)
+        };
+        let (_, nearest) = self.bvh.find_best(
+            reach * reach,
+            |node, _| box_distance_squared(p, node.mins().to_array(), node.maxs().to_array()),
+            |leaf, _| distance_squared(leaf),
+        )?;
+        Some(nearest.sqrt())
     }
 
     /// Pairs of faces whose boxes meet, in no particular order.

@@ -232,7 +232,8 @@ fn triangle_box(corners: [[f64; 3]; 3]) -> Aabb {
     Aabb::new(a.min(b).min(c), a.max(b).max(c))
 }
 
-fn box_distance_squared(p: [f64; 3], low: [f64; 3], high: [f64; 3]) -> f64 {
+/// How far a point is from a box, squared; 0 inside.
+pub(crate) fn box_distance_squared(p: [f64; 3], low: [f64; 3], high: [f64; 3]) -> f64 {
     vec3::norm_squared(std::array::from_fn(|k| (low[k] - p[k]).max(p[k] - high[k]).max(0.0)))
 }
 

@@ -9,8 +9,8 @@ mod surface;
 mod union;
 mod winding_number;
 
-pub(crate) use closest_point::closest_on_triangle;
 pub use closest_point::{ClosestPoint, Feature, SurfacePoint};
+pub(crate) use closest_point::{box_distance_squared, closest_on_triangle};
 pub use closest_vertex::{KdScalar, VertexIndex};
 pub use surface::{Distance, Gap, Surface};
 pub use union::{FaceSide, UnionDistance};

@@ -4,7 +4,7 @@ use std::cell::OnceCell;
 
 use super::near::near_cloth;
 use super::obstacle::BodyObstacle;
-use super::relief::{Relief, Room};
+use super::relief::{Before, Relief, Room};
 use super::{Layer, triangles};
 use crate::query::Surface;
 
@@ -19,12 +19,18 @@ pub(super) fn with_drawn<R>(
 }
 
 /// Calls `with` a `drawn` body that can give way to `garments` garments.
-pub(super) fn with_body<R>(
+pub(super) fn with_body<R>(drawn: BodyObstacle<'_>, garments: usize, with: impl FnOnce(&Body<'_>) -> R) -> R {
+    with_body_after(None, drawn, garments, with)
+}
+
+/// [`with_body`] a step after it gave way as it did `before`.
+pub(super) fn with_body_after<R>(
+    before: Option<Before<'_>>,
     mut drawn: BodyObstacle<'_>,
     garments: usize,
     with: impl FnOnce(&Body<'_>) -> R,
 ) -> R {
-    let relief = Relief::of(&drawn, garments, Room::Ample);
+    let relief = Relief::of(&drawn, garments, Room::AMPLE, before);
     if let Some(relief) = &relief {
         drawn.gives_way(relief);
     }
@@ -49,9 +55,15 @@ impl<'a> Body<'a> {
         }
     }
 
-    /// Calls `with` what the garments have to stay out of where the body gives way no more than where it lies inside itself.
-    pub fn with_least_room<R>(&self, with: impl FnOnce(&BodyObstacle<'_>) -> R) -> R {
-        match Relief::of(&self.drawn, self.garments, Room::Least) {
+    /// How far every vertex gives way [m].
+    pub fn steps(&self) -> Vec<f64> {
+        let none = || vec![0.0; self.drawn.surface.positions.len()];
+        self.relief.map_or_else(none, |relief| relief.steps.clone())
+    }
+
+    /// Calls `with` what the garments have to stay out of where the body gives way as far as `room` says.
+    pub fn with_room<R>(&self, room: Room, with: impl FnOnce(&BodyObstacle<'_>) -> R) -> R {
+        match Relief::of(&self.drawn, self.garments, room, None) {
             Some(relief) => with(&BodyObstacle::relieved(&relief, self.drawn.near)),
             None => with(&self.drawn),
         }

@@ -12,7 +12,6 @@ use super::{Layer, ResolveError, ResolveSettings};
 use crate::contact::triangle_pair::Triangle;
 use crate::contact::{TriangleTree, contours, self_contours};
 use crate::query::Surface;
-use crate::vec3::{add, scale};
 
 /// Proof of the state of dressed garments: every number comes from exact predicates over all pairs of triangles, or (depths)
 /// from the closest surface point of every vertex.
@@ -231,9 +230,7 @@ pub(super) fn certificate(body: &BodyObstacle<'_>, layers: &[Layer<'_>]) -> Cert
         found.list(index, Crossed::Body, &pairs, false);
         found.list(index, Crossed::Body, &pinched, true);
 
-        let is_pinched = |t: Option<Triangle>| {
-            t.is_some_and(|[a, b, c]| body.is_pinch(scale(add(add(a, b), c), 1.0 / 3.0)))
-        };
+        let is_pinched = |t: Option<Triangle>| t.is_some_and(|t| body.is_pinch_at(&t));
         for (i, under) in inner.iter().enumerate() {
             let all = tree.pairs_with(&under.tree);
             let (pinched, pairs): (Vec<_>, Vec<_>) = all

@@ -46,6 +46,17 @@ impl Contact {
         Self { vertices, weights, count: 6, normal, target: gap }
     }
 
+    /// A point of the first edge over a point of the second, places 0–1 on each, at least `gap` along `normal`.
+    pub fn edges(
+        [[p, q], [r, s]]: [[u32; 2]; 2],
+        [first, second]: [f64; 2],
+        normal: [f64; 3],
+        gap: f64,
+    ) -> Self {
+        let weights = [1.0 - first, first, second - 1.0, -second, 0.0, 0.0];
+        Self { vertices: [p, q, r, s, p, p], weights, count: 4, normal, target: gap }
+    }
+
     /// The same condition on vertices numbered from `start` on.
     pub fn shifted(mut self, start: u32) -> Self {
         self.vertices.iter_mut().for_each(|v| *v += start);

@@ -3,9 +3,9 @@
 use super::obstacle::BodyObstacle;
 use super::outfit::Outfit;
 use crate::contact::TriangleTree;
-use crate::vec3::{add, distance_squared, scale};
+use crate::vec3::distance_squared;
 
-/// Pairs of triangles that cross, outside of pinched regions. Faces of garments are numbered through.
+/// Pairs of triangles that cross. Faces of garments are numbered through.
 pub(super) struct Crossings {
     /// (face, face of the body)
     pub body: Vec<(u32, u32)>,
@@ -32,7 +32,8 @@ impl Crossings {
         self.body.len() + self.layers.len()
     }
 
-    /// Looks at the faces that are dirty. `trees` are those of the garments, `far` the distances of vertices to the body.
+    /// Looks at the faces that are dirty. `trees` are those of the garments, `far` the distances of vertices to the body; garments
+    /// with themselves, and where the body is pinched, only count if asked for.
     pub fn update(
         &mut self,
         outfit: &Outfit<'_>,
@@ -40,7 +41,7 @@ impl Crossings {
         trees: &[TriangleTree<'_>],
         positions: &[[f64; 3]],
         far: &[f64],
-        with_own: bool,
+        (with_own, with_pinched): (bool, bool),
     ) {
         let is_dirty = std::mem::take(&mut self.is_dirty);
         let dirty =
@@ -48,10 +49,7 @@ impl Crossings {
         let moved: Vec<Vec<u32>> = (0..outfit.len()).map(dirty).collect();
         let is_clean = |f: u32| !is_dirty[f as usize];
         let corners = |f: u32| outfit.faces[f as usize].map(|v| positions[v as usize]);
-        let is_pinch = |f: u32| {
-            let [a, b, c] = corners(f);
-            body.is_pinch(scale(add(add(a, b), c), 1.0 / 3.0))
-        };
+        let is_pinch = |f: u32| !with_pinched && body.is_pinch_at(&corners(f));
 
         self.body.retain(|&(f, _)| is_clean(f));
         // No face reaches farther from a corner than its longest edge.

@@ -10,6 +10,7 @@ use std::time::Instant;
 use super::body::Body;
 use super::outfit::Outfit;
 use super::relax::{keep_length, no_farther};
+use super::relief::Room;
 use super::{
     Certificate, Crossed, Layer, RemainingPair, ResolveSettings, Resolved, at, certified, untangled,
 };
@@ -50,7 +51,7 @@ impl Resolved {
         let settings = ResolveSettings { is_shallow: true, loosened: 1.0, rounds: ROUNDS, ..*settings };
         let mut cloth = Cloth::new(layers, &self.positions);
         let mut failures = 0;
-        body.with_least_room(|obstacle| {
+        body.with_room(Room::LEAST, |obstacle| {
             for _ in 0..TIMES {
                 let is_late = settings.is_late(start, layers.len());
                 if is_enough(&self.certificate) || failures == MOST_FAILURES || is_late {

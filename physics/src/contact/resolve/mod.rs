@@ -26,7 +26,7 @@
 //! **Easing.** Where the strain energy has risen, cloth gives back what it can without crossing anything ([`ease`]).
 //!
 //! **Bent limbs.** Where crossings are left, [`resolve_along`] takes the garments from the T-pose, where their order is plain,
-//! step by step to the pose ([`follow`]); where that leaves some, with drapes that lie nearer to where they began ([`taken_back`]).
+//! step by step to the pose ([`follow`]); in short steps cloth keeps the sides it was on before ([`sides`]); where that leaves some, with drapes that lie nearer to where they began ([`taken_back`]).
 
 mod body;
 mod certificate;
@@ -46,10 +46,12 @@ mod relax;
 mod relief;
 mod resolved;
 mod settings;
+mod sides;
 mod taken_back;
 #[cfg(test)]
 mod tests;
 mod untangle;
+mod way;
 
 use std::time::{Duration, Instant};
 
@@ -67,7 +69,8 @@ use crate::vec3;
 use body::{Body, with_body, with_drawn};
 use obstacle::BodyObstacle;
 use outfit::Outfit;
-use resolved::{certified, is_near, judged, settled};
+use resolved::{certified, judged, settled};
+use sides::Sides;
 use untangle::Untangling;
 
 /// Positions farther from the origin than this are refused [m]: the exact predicates would hold, but no distance would.
@@ -183,16 +186,36 @@ fn at<'a>(layers: &[Layer<'a>], positions: &'a [Vec<[f64; 3]>]) -> Vec<Layer<'a>
 struct Untangled {
     positions: Vec<Vec<[f64; 3]>>,
     rounds: usize,
-    /// Pairs with the body and between garments.
+    /// Pairs with the body where it is drawn and between garments, but for pinched ones.
     crossings: usize,
+    /// Pairs with the body, where it gives way too.
+    with_body: usize,
+    /// Pairs of garments with themselves; where cloth keeps its sides, pinched ones too.
+    own: usize,
 }
 
 fn untangled(body: &BodyObstacle<'_>, layers: &[Layer<'_>], settings: &ResolveSettings) -> Untangled {
+    untangled_keeping(None, body, layers, settings)
+}
+
+/// [`untangled`] where the order of sheets is known from a step before.
+fn untangled_keeping(
+    sides: Option<&Sides>,
+    body: &BodyObstacle<'_>,
+    layers: &[Layer<'_>],
+    settings: &ResolveSettings,
+) -> Untangled {
     let outfit = Outfit::new(layers);
-    let mut untangling = Untangling::new(&outfit, body, settings);
+    let mut untangling = Untangling::new(&outfit, body, settings, sides);
     let rounds = untangling.run();
     let positions = (0..outfit.len()).map(|g| outfit.part(&untangling.positions, g).to_vec()).collect();
-    Untangled { positions, rounds, crossings: untangling.crossings() }
+    Untangled {
+        positions,
+        rounds,
+        crossings: untangling.crossings(),
+        with_body: untangling.body_crossings(),
+        own: untangling.own_crossings(),
+    }
 }
 
 /// Positions and faces of every garment.

@@ -3,10 +3,10 @@
 use super::contact::{along_line, normal_of};
 use super::near::MARGIN;
 use super::relief::Relief;
-use crate::contact::TriangleTree;
+use crate::contact::{Triangle, TriangleTree};
 use crate::mesh::is_closed;
 use crate::query::{ClosestPoint, FaceSide, Surface, SurfacePoint, UnionDistance};
-use crate::vec3::{add_scaled, dot, scale, sub};
+use crate::vec3::{add, add_scaled, dot, scale, sub};
 use std::sync::OnceLock;
 
 /// Below this distance [m] the direction from the closest point is rounding.
@@ -115,6 +115,11 @@ impl<'a> BodyObstacle<'a> {
     /// Whether the body's face nearest to `p` is pinched.
     pub fn is_pinch(&self, p: [f64; 3]) -> bool {
         self.has_pinched && self.nearest_of_all(p).is_some_and(|found| self.is_pinched(found.face))
+    }
+
+    /// Whether the body's face nearest to the middle of a triangle is pinched.
+    pub fn is_pinch_at(&self, [a, b, c]: &Triangle) -> bool {
+        self.has_pinched && self.is_pinch(scale(add(add(*a, *b), *c), 1.0 / 3.0))
     }
 
     /// What the body is to a point; `None` where it is not near cloth.

@@ -13,11 +13,28 @@ const OVER: f64 = 1.4;
 const LENGTH_STIFFNESS: f64 = 0.5;
 /// An edge gets no shorter than this share of its length.
 const SHORTEST: f64 = 0.6;
+
 /// Passes over the contacts alone at the end.
-const LAST_PASSES: usize = 8;
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LastPasses {
+    /// Most of them.
+    most: usize,
+    /// After as many the lengths of edges are limited again.
+    limited: usize,
+    /// As many at the very end leave lengths as they are.
+    free: usize,
+}
+
+impl LastPasses {
+    /// Few: what is left is met in the next round.
+    pub const FEW: Self = Self { most: 8, limited: 1, free: 0 };
+    /// Until contacts are met: a push goes through a stack of sheets one sheet at a time.
+    pub const ALL: Self = Self { most: 400, limited: 10, free: 20 };
+}
 
 /// Moves the vertices of `region` until `contacts` are met, by a displacement from `shape` that is smooth over the garment,
-/// keeps its edge lengths, and is left as it is outside. Gauss–Seidel in a fixed order: smoothing, lengths, contacts.
+/// keeps its edge lengths, and is left as it is outside. Gauss–Seidel in a fixed order: smoothing, lengths, contacts; in the end
+/// as many passes over the contacts alone as `last` allows.
 pub(super) fn relax(
     cloth: &Outfit<'_>,
     positions: &mut [[f64; 3]],
@@ -26,6 +43,7 @@ pub(super) fn relax(
     contacts: &[Contact],
     sweeps: usize,
     stretch: f64,
+    last: LastPasses,
 ) {
     let mut may_move = vec![false; positions.len()];
     region.iter().for_each(|&v| may_move[v as usize] = true);
@@ -58,13 +76,16 @@ pub(super) fn relax(
             limit_length(positions, (a, b), may_move[b], length, stretch);
         }
     }
-    for _ in 0..LAST_PASSES {
+    for pass in 1..=last.most {
         let mut is_violated = false;
         for contact in contacts {
             is_violated |= contact.enforce(positions, &may_move);
         }
         if !is_violated {
             break;
+        }
+        if pass % last.limited != 0 || pass + last.free > last.most {
+            continue;
         }
         for &(a, b, length) in &edges {
             limit_length(positions, (a, b), may_move[b], length, stretch);

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::contact::{along_line, normal_of};
 use super::obstacle::BodyObstacle;
-use crate::contact::TriangleTree;
+use crate::contact::{Triangle, TriangleTree};
 use crate::query::{FaceSide, Surface};
 use crate::vec3::{add_scaled, dot};
 
@@ -20,7 +20,7 @@ const ROOM: f64 = 0.006;
 const ROOM_PER_GARMENT: f64 = 0.002;
 /// Two surfaces look at each other where their normals have a cosine below this.
 const FACING: f64 = -0.3;
-/// Parts that overlap by more [m] are not parted.
+/// Farthest that the surface of another part is looked for [m].
 const DEEPEST: f64 = 0.08;
 /// Farthest that a vertex gives way [m].
 const LONGEST_STEP: f64 = 0.04;
@@ -29,13 +29,25 @@ const RINGS: usize = 2;
 /// How far outside the surface a vertex is asked whether it is inside another part [m].
 const LOOK_OUT: f64 = 1e-6;
 
-/// Where a body gives way.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Room {
-    /// Wherever two parts are too near to each other for cloth.
-    Ample,
+/// Where a body gives way: where it lies inside itself, and wherever else two parts are too near to each other for cloth, there
+/// by this share, 0–1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Room(pub f64);
+
+impl Room {
+    /// Everywhere.
+    pub const AMPLE: Self = Self(1.0);
     /// Only where it lies inside itself.
-    Least,
+    pub const LEAST: Self = Self(0.0);
+}
+
+/// How a body gave way a step before.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Before<'a> {
+    /// By how much, per vertex [m].
+    pub steps: &'a [f64],
+    /// By how much that may change [m]: what looks back at a vertex may be another surface all of a sudden.
+    pub most: f64,
 }
 
 /// A body that has given way.
@@ -44,6 +56,8 @@ pub(super) struct Relief {
     pub surface: Surface<f64>,
     /// Vertices that gave way.
     pub gave_way: Vec<bool>,
+    /// By how much [m], with all the room there is.
+    pub steps: Vec<f64>,
     /// Corners of faces that were inside another part, or crossed one, before.
     pub pinched: Vec<bool>,
 }
@@ -51,23 +65,26 @@ pub(super) struct Relief {
 impl Relief {
     /// Of the body as it is `drawn`, near `garments` garments. `None` where nothing has to give way, or the surface is not
     /// closed and has no inside.
-    pub fn of(drawn: &BodyObstacle<'_>, garments: usize, room: Room) -> Option<Self> {
+    pub fn of(
+        drawn: &BodyObstacle<'_>,
+        garments: usize,
+        Room(share): Room,
+        before: Option<Before<'_>>,
+    ) -> Option<Self> {
         let body = drawn.surface;
         let (mut steps, pinched) = steps(drawn, ROOM + ROOM_PER_GARMENT * garments as f64)?;
-        if room == Room::Least {
-            steps
-                .iter_mut()
-                .zip(&pinched)
-                .filter(|(_, pinched)| !**pinched)
-                .for_each(|(step, _)| *step = 0.0);
+        if let Some(Before { steps: before, most }) = before {
+            steps.iter_mut().zip(before).for_each(|(step, was)| *step = step.clamp(was - most, was + most));
         }
-        if steps.iter().all(|s| *s == 0.0) {
+        let scaled = steps.iter().zip(&pinched).map(|(s, pinched)| if *pinched { *s } else { share * s });
+        let scaled: Vec<f64> = scaled.collect();
+        if scaled.iter().all(|s| *s == 0.0) {
             return None;
         }
-        let moved = body.positions.iter().zip(&body.normals).zip(&steps);
+        let moved = body.positions.iter().zip(&body.normals).zip(&scaled);
         let positions = moved.map(|((p, n), step)| add_scaled(*p, -step, *n)).collect();
-        let gave_way: Vec<bool> = steps.iter().map(|s| *s > 0.0).collect();
-        Some(Self { surface: Surface::new(positions, body.faces.clone()), gave_way, pinched })
+        let gave_way: Vec<bool> = scaled.iter().map(|s| *s > 0.0).collect();
+        Some(Self { surface: Surface::new(positions, body.faces.clone()), gave_way, steps, pinched })
     }
 }
 
@@ -91,8 +108,11 @@ fn steps(drawn: &BodyObstacle<'_>, room: f64) -> Option<(Vec<f64>, Vec<bool>)> {
         let (p, n) = (positions[v], surface.normals[v]);
         let is_inside =
             all_inside[v] || some_inside[v] && union.winding_number(add_scaled(p, LOOK_OUT, n)) >= 1;
-        let reach = if is_inside { -DEEPEST } else { room };
-        let apart = facing_surface(tree, faces, v as u32, reach, p, n);
+        let apart = match is_inside {
+            true => facing_surface(tree, faces, v as u32, -DEEPEST, p, n)
+                .or_else(|| Some(-nearest_facing(tree, faces, v as u32, p, n).unwrap_or(DEEPEST))),
+            false => facing_surface(tree, faces, v as u32, room, p, n),
+        };
         apart.map_or(0.0, |apart| (0.5 * (room - apart)).clamp(0.0, LONGEST_STEP))
     };
     let mut steps: Vec<f64> = (0..positions.len()).into_par_iter().with_min_len(256).map(missing).collect();
@@ -130,6 +150,20 @@ fn facing_surface(
     tree.faces_in_box(low, high).filter_map(looks_back).min_by(|a, b| a.abs().total_cmp(&b.abs()))
 }
 
+/// How far from vertex `v` at `p`, inside another part, the nearest surface is that does not look where it looks, `n`: for what has
+/// just gone in at a slant, and sees no surface straight behind it.
+fn nearest_facing(
+    tree: &TriangleTree<'_>,
+    faces: &[[u32; 3]],
+    v: u32,
+    p: [f64; 3],
+    n: [f64; 3],
+) -> Option<f64> {
+    let looks_elsewhere =
+        |f: u32, triangle: &Triangle| !faces[f as usize].contains(&v) && dot(normal_of(triangle), n) < 0.0;
+    tree.nearest(p, DEEPEST, looks_elsewhere)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -146,7 +180,7 @@ mod tests {
     fn relieved(apart: f64, garments: usize) -> (Surface<f64>, Option<Relief>) {
         let body = Surface::from_mesh(&balls(apart));
         let near = vec![true; body.positions.len()];
-        let relief = Relief::of(&BodyObstacle::new(&body, &near), garments, Room::Ample);
+        let relief = Relief::of(&BodyObstacle::new(&body, &near), garments, Room::AMPLE, None);
         (body, relief)
     }
 
@@ -178,20 +212,60 @@ mod tests {
         }
     }
 
+    /// From step to step no vertex goes farther than allowed, and with a share of the room it gives way by that share.
+    #[test]
+    fn a_body_gives_way_by_and_by_and_by_shares() {
+        let body = Surface::from_mesh(&balls(0.19));
+        let near = vec![true; body.positions.len()];
+        let drawn = BodyObstacle::new(&body, &near);
+        let all = Relief::of(&drawn, 1, Room::AMPLE, None).unwrap();
+        let (steps, most) = (vec![0.0; body.positions.len()], 0.002);
+        let slow = Relief::of(&drawn, 1, Room::AMPLE, Some(Before { steps: &steps, most })).unwrap();
+        assert!(all.steps.iter().any(|step| *step > most));
+        for (slow, all) in slow.steps.iter().zip(&all.steps) {
+            assert_eq!(*slow, all.min(most));
+        }
+        let half = Relief::of(&drawn, 1, Room(0.5), None).unwrap();
+        let moves = |relief: &Relief| -> Vec<f64> {
+            let moved = relief.surface.positions.iter().zip(&body.positions);
+            moved.map(|(p, q)| norm(sub(*p, *q))).collect()
+        };
+        for ((half, all), pinched) in moves(&half).iter().zip(moves(&all)).zip(&all.pinched) {
+            let share = if *pinched { 1.0 } else { 0.5 };
+            assert!((half - share * all).abs() < 1e-12);
+        }
+    }
+
+    /// Vertices that have just gone in at a slant see no surface straight behind them: the nearest one counts, so that they do not
+    /// give way all at once.
+    #[test]
+    fn what_has_just_gone_in_gives_way_a_little() {
+        let steps = |apart: f64| {
+            let body = Surface::from_mesh(&balls(apart));
+            let near = vec![true; body.positions.len()];
+            Relief::of(&BodyObstacle::new(&body, &near), 1, Room::AMPLE, None).unwrap().steps
+        };
+        for apart in [0.199, 0.19, 0.17, 0.15] {
+            // Nowhere farther than half of what overlaps along the line of the centres.
+            let most = steps(apart).into_iter().fold(0.0, f64::max);
+            assert!(most <= 0.5 * (0.2 - apart + ROOM + ROOM_PER_GARMENT) * 1.05 + 1e-9, "{apart}: {most}");
+        }
+    }
+
     #[test]
     fn what_is_apart_open_or_far_from_cloth_stays() {
         assert!(relieved(0.25, 1).1.is_none());
         let open = Surface::from_mesh(&shapes::grid(0.1, 0.1, 4, 4));
         let near = vec![true; open.positions.len()];
-        assert!(Relief::of(&BodyObstacle::new(&open, &near), 1, Room::Ample).is_none());
+        assert!(Relief::of(&BodyObstacle::new(&open, &near), 1, Room::AMPLE, None).is_none());
         let body = Surface::from_mesh(&balls(0.19));
         let far = vec![false; body.positions.len()];
-        assert!(Relief::of(&BodyObstacle::new(&body, &far), 1, Room::Ample).is_none());
+        assert!(Relief::of(&BodyObstacle::new(&body, &far), 1, Room::AMPLE, None).is_none());
         // Near each other, but not inside.
         let body = Surface::from_mesh(&balls(0.203));
         let near = vec![true; body.positions.len()];
         let drawn = BodyObstacle::new(&body, &near);
-        assert!(Relief::of(&drawn, 1, Room::Ample).is_some());
-        assert!(Relief::of(&drawn, 1, Room::Least).is_none());
+        assert!(Relief::of(&drawn, 1, Room::AMPLE, None).is_some());
+        assert!(Relief::of(&drawn, 1, Room::LEAST, None).is_none());
     }
 }

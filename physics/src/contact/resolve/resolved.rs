@@ -6,7 +6,10 @@ use super::body::{Body, with_drawn};
 use super::certificate::{Certificate, certificate};
 use super::near::MARGIN;
 use super::obstacle::BodyObstacle;
-use super::{Layer, ResolveSettings, Untangled, at, resolved_once, untangled};
+use super::outfit::Outfit;
+use super::relief::Room;
+use super::sides::Sides;
+use super::{Layer, ResolveSettings, Untangled, at, resolved_once, untangled, untangled_keeping};
 use crate::query::Surface;
 use crate::vec3;
 
@@ -14,6 +17,8 @@ use crate::vec3;
 const FURTHER_ATTEMPTS: usize = 3;
 /// …and most pairs that may be left there: more would only be torn further.
 const FEW: usize = 32;
+/// Longest and shortest step, as shares of the room that the body made, by which it is taken back.
+const CLOSING_IN: (f64, f64) = (1.0 / 4.0, 1.0 / 32.0);
 
 /// Garments that were resolved.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -54,10 +59,43 @@ impl Resolved {
             return;
         }
         let settings = ResolveSettings { is_shallow: true, loosened: 1.0, ..*settings };
+        let apart = (self.certificate.layer_triangle_pairs == 0).then(|| self.positions.clone());
         let now = at(layers, &self.positions);
-        let closer = body.with_least_room(|obstacle| untangled(obstacle, &now, &settings));
+        let closer = body.with_room(Room::LEAST, |obstacle| untangled(obstacle, &now, &settings));
         let certificate = certified(&body.drawn, layers, &closer.positions);
         self.prefer(closer.positions, certificate);
+        if let Some(apart) = apart.filter(|_| !self.certificate.is_clear()) {
+            self.close_in_slowly(apart, body, layers, &settings);
+        }
+    }
+
+    /// The same step by step from `now`, where no garment crosses another: the body comes back by and by, and cloth keeps
+    /// its sides.
+    fn close_in_slowly(
+        &mut self,
+        mut now: Vec<Vec<[f64; 3]>>,
+        body: &Body<'_>,
+        layers: &[Layer<'_>],
+        settings: &ResolveSettings,
+    ) {
+        let outfit = Outfit::new(layers);
+        let (mut share, mut step, mut with_body) = (1.0, CLOSING_IN.0, usize::MAX);
+        while share > 0.0 && step >= CLOSING_IN.1 {
+            let next = f64::max(share - step, 0.0);
+            let sides = Sides::of(&outfit, &now.concat());
+            let before = at(layers, &now);
+            let found = body.with_room(Room(next), |obstacle| {
+                untangled_keeping(Some(&sides), obstacle, &before, settings)
+            });
+            let certificate = certified(&body.drawn, layers, &found.positions);
+            if certificate.layer_triangle_pairs == 0 && found.with_body <= with_body {
+                (share, with_body) = (next, found.with_body);
+                now.clone_from(&found.positions);
+            } else {
+                step *= 0.5;
+            }
+            self.prefer(found.positions, certificate);
+        }
     }
 
     /// Where few crossings are left on `body`, attempts that begin where the one before ended: cloth that is nearly sorted out is

@@ -32,7 +32,7 @@ pub struct ResolveSettings {
     /// for strict limits: one attempt, and no easing.
     pub loosened: f64,
     /// Most steps on a way: of [`super::resolve_along`] from the T-pose, of [`super::resolve_after`] from the frame before.
-    /// Default 64; 0 mends the drape as it is or not at all.
+    /// Default 128; 0 mends the drape as it is or not at all.
     pub steps: usize,
     /// Whether nothing lies deeper than half a limb, so that the nearest way out is the right one: true for a small step.
     /// Default no.
@@ -57,7 +57,7 @@ impl Default for ResolveSettings {
             farthest: 0.06,
             stretch: 1.15,
             loosened: 6.0,
-            steps: 64,
+            steps: 128,
             is_shallow: false,
             self_contact: true,
             time: None,

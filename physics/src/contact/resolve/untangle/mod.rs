@@ -12,6 +12,7 @@ use super::detect::Crossings;
 use super::obstacle::{BodyObstacle, Plane};
 use super::outfit::Outfit;
 use super::over::{Over, all_over, outward};
+use super::sides::Sides;
 use crate::contact::intersections::{KeptTree, TriangleTree};
 use crate::vec3::dot;
 
@@ -19,6 +20,8 @@ use crate::vec3::dot;
 const WATCH: f64 = 0.01;
 /// Rounds without progress after which an outfit is left as it is.
 const PATIENCE: usize = 8;
+/// The same where cloth keeps its sides: that ends soon or never.
+const PATIENCE_WITH_SIDES: usize = 4;
 /// Rounds in which vertices that are merely closer than asked for still count.
 const ROUNDS_FOR_GAPS: usize = 3;
 
@@ -48,6 +51,8 @@ pub(super) struct Untangling<'a> {
     known_folds: Vec<(u32, u32)>,
     /// Conditions that all crossings so far asked for: a mended place would be torn again by its neighbours without them.
     remembered: Vec<Contact>,
+    /// What tells the order of sheets, where it was known a step before; otherwise the directions away from the body do.
+    sides: Option<&'a Sides>,
 }
 
 /// How wrong a state is: fewer is better, in this order.
@@ -72,7 +77,12 @@ impl Best {
 }
 
 impl<'a> Untangling<'a> {
-    pub fn new(outfit: &'a Outfit<'a>, body: &'a BodyObstacle<'a>, settings: &'a ResolveSettings) -> Self {
+    pub fn new(
+        outfit: &'a Outfit<'a>,
+        body: &'a BodyObstacle<'a>,
+        settings: &'a ResolveSettings,
+        sides: Option<&'a Sides>,
+    ) -> Self {
         let input: Vec<[f64; 3]> = outfit.layers.iter().flat_map(|l| l.positions).copied().collect();
         let count = input.len();
         let mut untangling = Self {
@@ -92,6 +102,7 @@ impl<'a> Untangling<'a> {
             crossings: Crossings::new(outfit.faces.len()),
             known_folds: Vec::new(),
             remembered: Vec::new(),
+            sides,
         };
         let all: Vec<u32> = (0..count as u32).collect();
         untangling.touch(&all);
@@ -129,6 +140,7 @@ impl<'a> Untangling<'a> {
     /// Rounds within the limits as they are. The crossings are those of the positions afterwards.
     fn attempt(&mut self, start: Instant) -> usize {
         let mut best = Best::default();
+        let patience = if self.sides.is_some() { PATIENCE_WITH_SIDES } else { PATIENCE };
         for round in 0..=self.settings.rounds {
             let is_violated = self.planes.iter().flatten().any(|p| self.is_violated(p, round))
                 || self.over.iter().any(|o| o.height < self.least(round));
@@ -136,7 +148,7 @@ impl<'a> Untangling<'a> {
                 return round;
             }
             best.look(self.defects(), &self.positions);
-            if round == self.settings.rounds || best.stale > PATIENCE || self.is_late(start) {
+            if round == self.settings.rounds || best.stale > patience || self.is_late(start) {
                 self.move_to(&best.positions);
                 self.detect();
                 return round;
@@ -178,8 +190,12 @@ impl<'a> Untangling<'a> {
             })
             .collect();
         let reach = (self.settings.reach, WATCH);
-        self.over = all_over(outfit, &trees, positions, &self.outward, reach);
-        self.crossings.update(outfit, self.body, &trees, positions, &self.far, self.settings.self_contact);
+        if self.sides.is_none() {
+            self.over = all_over(outfit, &trees, positions, &self.outward, reach);
+        }
+        // What crosses where the body is pinched has no side in the next step.
+        let counted = (self.settings.self_contact, self.sides.is_some());
+        self.crossings.update(outfit, self.body, &trees, positions, &self.far, counted);
         self.trees = trees.into_iter().map(TriangleTree::into_kept).collect();
     }
 
@@ -219,6 +235,23 @@ impl<'a> Untangling<'a> {
     /// Pairs between garments, and with the body where it is drawn, that are left.
     pub fn crossings(&self) -> usize {
         let is_seen = |&&(_, other): &&(u32, u32)| !self.body.gave_way(other);
-        self.crossings.layers.len() + self.crossings.body.iter().filter(is_seen).count()
+        self.layer_crossings() + self.crossings.body.iter().filter(is_seen).count()
+    }
+
+    /// Pairs between garments that are left.
+    fn layer_crossings(&self) -> usize {
+        let corners = |f: u32| self.outfit.faces[f as usize].map(|v| self.positions[v as usize]);
+        let is_pinch = |f: u32| self.body.is_pinch_at(&corners(f));
+        self.crossings.layers.iter().filter(|&&(f, g)| !(is_pinch(f) && is_pinch(g))).count()
+    }
+
+    /// All pairs with the body that are left.
+    pub fn body_crossings(&self) -> usize {
+        self.crossings.body.len()
+    }
+
+    /// Pairs of garments with themselves that are left.
+    pub fn own_crossings(&self) -> usize {
+        self.crossings.own.len()
     }
 }

@@ -3,7 +3,7 @@
 use super::super::contact::{Contact, is_tiny, normal_of, overlap};
 use super::super::folds::folds;
 use super::super::over::{Order, order, part_along};
-use super::super::relax::{no_farther, relax};
+use super::super::relax::{LastPasses, no_farther, relax};
 use super::{Untangling, WATCH};
 use crate::vec3::{add, add_scaled, dot, norm, scale, sub};
 
@@ -15,12 +15,16 @@ impl Untangling<'_> {
     pub(super) fn step(&mut self, round: usize) {
         let gap = self.settings.gap * (1.0 + 0.1 * round as f64).min(3.0);
         let outfit = self.outfit;
-        let (mut asked, crumpled) = self.part_folds(0.25 * gap);
+        let (mut asked, crumpled) = match self.sides {
+            None => self.part_folds(0.25 * gap),
+            Some(_) => (Vec::new(), self.folded()),
+        };
         let mut seeds: Vec<u32> = asked.iter().flat_map(|c| c.vertices).chain(crumpled).collect();
         for &(f, g) in &self.crossings.layers {
             let (outer, inner) = (outfit.faces[f as usize], outfit.faces[g as usize]);
             seeds.extend(outer.iter().chain(&inner));
-            if let Order::Along(away) = order(outer, inner, true, &self.outward) {
+            let has_side = self.sides.is_some_and(|sides| !sides.crossed(f, g));
+            if !has_side && let Order::Along(away) = order(outer, inner, true, &self.outward) {
                 part_along(away, outer, inner, &self.positions, 0.5 * gap, LONGEST_STEP, &mut asked);
             }
         }
@@ -56,10 +60,24 @@ impl Untangling<'_> {
                 contacts.push(Contact::vertex(v, &plane, plane.distance + step));
             }
         }
+        // But that cloth keeps its sides matters more: cloth that has gone through cloth would not come back.
+        let last = match self.sides {
+            None => LastPasses::FEW,
+            Some(sides) => {
+                sides.contacts(&self.positions, &is_in, self.settings.gap, &mut contacts);
+                LastPasses::ALL
+            }
+        };
         let (sweeps, stretch) = (self.settings.sweeps, self.stretch);
-        relax(outfit, &mut self.positions, &self.shape, &region, &contacts, sweeps, stretch);
+        relax(outfit, &mut self.positions, &self.shape, &region, &contacts, sweeps, stretch, last);
         self.hold_back(&region);
         self.touch(&region);
+    }
+
+    /// Vertices of faces that cross others of their garment.
+    fn folded(&self) -> Vec<u32> {
+        let faces = self.crossings.own.iter().flat_map(|&(f, g)| [f, g]);
+        faces.flat_map(|f| self.outfit.faces[f as usize]).collect()
     }
 
     /// Takes vertices back that went farther than allowed.

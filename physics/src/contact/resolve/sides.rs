@@ -1,0 +1,247 @@
+//! Which side of each other sheets of cloth lie on, told where nothing crosses, and what keeps them there.
+//!
+//! Deep in a crease of the body many sheets lie over each other, and no direction away from the body says which belongs where:
+//! the nearest body point may be on either side. Where nothing crosses there is no need to ask. A step later every
+//! vertex is still to be on the side of the faces near it where it was before, and every edge on the side of the edges near it:
+//! the two ways in which triangles can begin to cross.
+
+use std::collections::HashSet;
+
+use rayon::prelude::*;
+
+use super::contact::{Contact, is_tiny, normal_of};
+use super::outfit::Outfit;
+use crate::contact::TriangleTree;
+use crate::vec3::{cross, dot, norm_squared, scale, sub};
+
+/// What is nearer than this [m] may meet in a step.
+const WATCH: f64 = 0.006;
+/// How far beyond a face or an edge, as a share of it, what lies beside it may slide over it in a step.
+const BESIDE: f64 = 0.25;
+/// Edges with a smaller sine between them have no side of each other.
+const PARALLEL: f64 = 0.1;
+/// What is kept of the distance between two sheets, as shares of the gap: no less and no more than this.
+const KEPT: (f64, f64) = (0.1, 0.5);
+
+/// Sides of everything that was near each other in a state of an outfit.
+pub(super) struct Sides {
+    vertices: Vec<OfVertex>,
+    edges: Vec<OfEdges>,
+    /// Faces that crossed there, either way round: they have no sides.
+    crossed: HashSet<(u32, u32)>,
+}
+
+/// A vertex over (`side` 1) or under (−1) a face.
+struct OfVertex {
+    vertex: u32,
+    face: [u32; 3],
+    side: f64,
+    /// How far from it [m].
+    gap: f64,
+}
+
+/// An edge on the side of another one to which the cross product of the two points (`side` 1), or on the other (−1).
+struct OfEdges {
+    edges: [[u32; 2]; 2],
+    side: f64,
+    /// How far apart [m].
+    gap: f64,
+}
+
+impl Sides {
+    /// Sides of `outfit` at `positions`. Two faces that cross there have none.
+    pub fn of(outfit: &Outfit<'_>, positions: &[[f64; 3]]) -> Self {
+        let tree = TriangleTree::new(positions, &outfit.faces);
+        let edges = Edges::of(&outfit.faces);
+        let crossings = tree.self_pairs();
+        let crossed: HashSet<_> = crossings.iter().flat_map(|&(f, g)| [(f, g), (g, f)]).collect();
+        let unknown = Unknown::of(&outfit.faces, &crossings);
+        let vertices = (0..positions.len() as u32)
+            .into_par_iter()
+            .with_min_len(64)
+            .flat_map_iter(|v| {
+                let near = faces_near(&tree, [positions[v as usize]; 2]);
+                near.map(|f| outfit.faces[f as usize])
+                    .filter(|face| !face.contains(&v) && !unknown.vertices.contains(&(v, *face)))
+                    .filter_map(|face| {
+                        let Over { at, height, .. } = over(positions, v, face)?;
+                        if at.iter().any(|w| *w < 0.0) && are_joined(outfit, &[v], &face) {
+                            return None;
+                        }
+                        let (side, gap) = (height.signum(), height.abs());
+                        (gap < WATCH).then_some(OfVertex { vertex: v, face, side, gap })
+                    })
+                    .collect::<Vec<_>>()
+            })
+            .collect();
+        let near_edge = |i: u32| {
+            let first = edges.all[i as usize];
+            let near = faces_near(&tree, first.map(|v| positions[v as usize]));
+            // Every edge is looked at as one of one face.
+            near.flat_map(|f| edges.owned[f as usize])
+                .filter(|j| *j != u32::MAX && *j > i)
+                .map(|j| [first, edges.all[j as usize]])
+                .filter(|[first, second]| !second.iter().any(|v| first.contains(v)))
+                .filter(|pair| !unknown.edges.contains(pair))
+                .filter_map(|edges| {
+                    let Past { at, height, .. } = past(positions, edges)?;
+                    let is_beside = at.iter().any(|t| !(0.0..=1.0).contains(t));
+                    if is_beside && are_joined(outfit, &edges[0], &edges[1]) {
+                        return None;
+                    }
+                    let (side, gap) = (height.signum(), height.abs());
+                    (gap < WATCH).then_some(OfEdges { edges, side, gap })
+                })
+                .collect::<Vec<_>>()
+        };
+        let edges =
+            (0..edges.all.len() as u32).into_par_iter().with_min_len(64).flat_map_iter(near_edge).collect();
+        Self { vertices, edges, crossed }
+    }
+
+    /// Whether two faces have no side of each other because they crossed.
+    pub fn crossed(&self, f: u32, g: u32) -> bool {
+        self.crossed.contains(&(f, g))
+    }
+
+    /// What keeps all sides of which a vertex `is_in`, at `positions` on the way: to be enforced within a step.
+    pub fn contacts(&self, positions: &[[f64; 3]], is_in: &[bool], gap: f64, found: &mut Vec<Contact>) {
+        let (least, most) = (KEPT.0 * gap, KEPT.1 * gap);
+        let may_move = |vertices: &[u32]| vertices.iter().any(|&v| is_in[v as usize]);
+        for OfVertex { vertex, face, side, gap } in &self.vertices {
+            if !(may_move(&[*vertex]) || may_move(face)) {
+                continue;
+            }
+            let Some(Over { at, normal, height }) = over(positions, *vertex, *face) else { continue };
+            if height * side < 2.0 * most {
+                let gap = gap.clamp(least, most);
+                found.push(Contact::vertex_over(*vertex, (*face, at), scale(normal, *side), gap));
+            }
+        }
+        for OfEdges { edges, side, gap } in &self.edges {
+            if !may_move(edges.as_flattened()) {
+                continue;
+            }
+            let Some(Past { at, normal, height }) = past(positions, *edges) else { continue };
+            if height * side < 2.0 * most {
+                found.push(Contact::edges(*edges, at, scale(normal, *side), gap.clamp(least, most)));
+            }
+        }
+    }
+}
+
+/// All edges of some faces, and for every face those that no face before it has; `u32::MAX` for the others.
+struct Edges {
+    all: Vec<[u32; 2]>,
+    owned: Vec<[u32; 3]>,
+}
+
+impl Edges {
+    fn of(faces: &[[u32; 3]]) -> Self {
+        let (mut all, mut known) = (Vec::new(), HashSet::new());
+        let owned = faces
+            .iter()
+            .map(|face| {
+                edges_of(*face).map(|edge| match known.insert(edge) {
+                    true => {
+                        all.push(edge);
+                        all.len() as u32 - 1
+                    }
+                    false => u32::MAX,
+                })
+            })
+            .collect();
+        Self { all, owned }
+    }
+}
+
+/// Edges of a face, the smaller vertex first.
+fn edges_of([a, b, c]: [u32; 3]) -> [[u32; 2]; 3] {
+    [[a, b], [b, c], [c, a]].map(|[a, b]| [a.min(b), a.max(b)])
+}
+
+/// What lies on no side, since its faces cross.
+struct Unknown {
+    vertices: HashSet<(u32, [u32; 3])>,
+    /// Either way round.
+    edges: HashSet<[[u32; 2]; 2]>,
+}
+
+impl Unknown {
+    fn of(faces: &[[u32; 3]], crossings: &[(u32, u32)]) -> Self {
+        let (mut vertices, mut edges) = (HashSet::new(), HashSet::new());
+        for &(f, g) in crossings {
+            let (f, g) = (faces[f as usize], faces[g as usize]);
+            vertices.extend(f.map(|v| (v, g)).into_iter().chain(g.map(|v| (v, f))));
+            for one in edges_of(f) {
+                edges.extend(edges_of(g).into_iter().flat_map(|other| [[one, other], [other, one]]));
+            }
+        }
+        Self { vertices, edges }
+    }
+}
+
+/// Faces with a box near that of two points.
+fn faces_near<'a>(tree: &'a TriangleTree<'_>, [a, b]: [[f64; 3]; 2]) -> impl Iterator<Item = u32> + 'a {
+    let low = std::array::from_fn(|k| a[k].min(b[k]) - WATCH);
+    let high = std::array::from_fn(|k| a[k].max(b[k]) + WATCH);
+    tree.faces_in_box(low, high)
+}
+
+/// Whether an edge joins one of `some` to one of `others`: beside each other in one sheet they have no side.
+fn are_joined(outfit: &Outfit<'_>, some: &[u32], others: &[u32]) -> bool {
+    some.iter().any(|&v| outfit.ring(v).any(|n| others.contains(&n)))
+}
+
+/// Where a vertex is, seen from a face.
+struct Over {
+    /// Its place in the face, straight below it.
+    at: [f64; 3],
+    normal: [f64; 3],
+    /// Over the face along its normal [m].
+    height: f64,
+}
+
+/// None where the vertex is not over the face, or the face has no normal.
+fn over(positions: &[[f64; 3]], vertex: u32, face: [u32; 3]) -> Option<Over> {
+    let (p, corners) = (positions[vertex as usize], face.map(|v| positions[v as usize]));
+    if is_tiny(&corners) {
+        return None;
+    }
+    let area = cross(sub(corners[1], corners[0]), sub(corners[2], corners[0]));
+    let at = std::array::from_fn(|k| {
+        let (next, last) = (corners[(k + 1) % 3], corners[(k + 2) % 3]);
+        dot(cross(sub(last, next), sub(p, next)), area) / norm_squared(area)
+    });
+    let normal = normal_of(&corners);
+    let is_over = at.iter().all(|w: &f64| *w > -BESIDE);
+    is_over.then(|| Over { at, normal, height: dot(normal, sub(p, corners[0])) })
+}
+
+/// Where two edges pass each other.
+struct Past {
+    /// Places on each of them, 0–1.
+    at: [f64; 2],
+    /// Along the cross product of the two.
+    normal: [f64; 3],
+    /// Of the first over the second along the normal [m].
+    height: f64,
+}
+
+/// None where they do not pass each other, or are about parallel.
+fn past(positions: &[[f64; 3]], edges: [[u32; 2]; 2]) -> Option<Past> {
+    let [[p, q], [r, s]] = edges.map(|edge| edge.map(|v| positions[v as usize]));
+    let (first, second, between) = (sub(q, p), sub(s, r), sub(r, p));
+    let across = cross(first, second);
+    let squared = norm_squared(across);
+    if squared <= PARALLEL * PARALLEL * norm_squared(first) * norm_squared(second) || squared < 1e-24 {
+        return None;
+    }
+    let at = [second, first].map(|other| dot(cross(between, other), across) / squared);
+    let normal = scale(across, 1.0 / squared.sqrt());
+    let is_past = at.iter().all(|t| *t > -BESIDE && *t < 1.0 + BESIDE);
+    is_past.then(|| Past { at, normal, height: -dot(normal, between) })
+}
+
+#[cfg(test)]
+mod tests;
