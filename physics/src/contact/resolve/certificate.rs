@@ -150,9 +150,12 @@ impl Certificate {
         (self.between(), self.self_triangle_pairs)
     }
 
-    /// Whether there are more pairs than in `other`, of those between first, or more pinched ones.
-    pub(super) fn is_worse(&self, other: &Self) -> bool {
-        self.defects() > other.defects() || self.pinched.count() > other.pinched.count()
+    /// Whether there are more pairs than in `other`, pinched ones or between garments and with the body, or more than `own` of
+    /// garments with themselves.
+    pub(super) fn is_worse(&self, other: &Self, own: usize) -> bool {
+        self.between() > other.between()
+            || self.self_triangle_pairs > own
+            || self.pinched.count() > other.pinched.count()
     }
 
     /// Pairs that are not in `other`.

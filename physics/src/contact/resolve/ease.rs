@@ -11,14 +11,16 @@ use super::body::Body;
 use super::outfit::Outfit;
 use super::relax::{keep_length, no_farther};
 use super::relief::Room;
+use super::sides::Sides;
 use super::{
-    Certificate, Crossed, Layer, RemainingPair, ResolveSettings, Resolved, at, certified, untangled,
+    Certificate, Crossed, Layer, RemainingPair, ResolveSettings, Resolved, at, certified, untangled_keeping,
 };
+use crate::contact::self_triangle_pairs;
 
 /// A rise of the strain energy, as a share, that is left as it is.
 const ENOUGH: f64 = 0.03;
 /// Most times that cloth is eased.
-const TIMES: usize = 10;
+const TIMES: usize = 20;
 /// Failures in a row after which it is left.
 const MOST_FAILURES: usize = 4;
 /// Easing ends where it lowers the energy by a smaller share of what it had risen by.
@@ -29,11 +31,14 @@ const PASSES: usize = 20;
 const FARTHEST: f64 = 0.002;
 /// Rounds in which the contacts are met again.
 const ROUNDS: usize = 8;
+/// Crossings of garments with themselves may become as many as there are, or one in so many of those before the post-process.
+const OWN: usize = 4;
 /// Rings of neighbours around a crossing that easing would make, which keep their positions.
 const RINGS_HELD: usize = 3;
 
 impl Resolved {
-    /// Lowers the strain energy where it has risen from that of `layers`, without any further crossing. What the
+    /// Lowers the strain energy where it has risen from that of `layers`, without any further crossing with the body or between
+    /// garments, and few of garments with themselves. What the
     /// post-process has not moved only moves where contacts ask for it. Strict limits (`settings.loosened`) allow none of
     /// this. `start`: when all of it began.
     pub(super) fn ease(
@@ -49,6 +54,7 @@ impl Resolved {
             return;
         }
         let settings = ResolveSettings { is_shallow: true, loosened: 1.0, rounds: ROUNDS, ..*settings };
+        let own = self.certificate.self_triangle_pairs.max(own_crossings(layers) / OWN);
         let mut cloth = Cloth::new(layers, &self.positions);
         let mut failures = 0;
         body.with_room(Room::LEAST, |obstacle| {
@@ -57,11 +63,13 @@ impl Resolved {
                 if is_enough(&self.certificate) || failures == MOST_FAILURES || is_late {
                     break;
                 }
-                let found = untangled(obstacle, &at(layers, &cloth.eased(&self.positions)), &settings);
+                let sides = Sides::of(&cloth.outfit, &self.positions.concat());
+                let eased = cloth.eased(&self.positions);
+                let found = untangled_keeping(Some(&sides), obstacle, &at(layers, &eased), &settings);
                 let clock = Instant::now();
                 let certificate = certified(&body.drawn, layers, &found.positions);
                 self.certificate_time += clock.elapsed();
-                if certificate.is_worse(&self.certificate) {
+                if certificate.is_worse(&self.certificate, own) {
                     cloth.hold_around(certificate.remaining_beside(&self.certificate));
                     failures += 1;
                     continue;
@@ -78,6 +86,12 @@ impl Resolved {
             }
         });
     }
+}
+
+/// Pairs of triangles of one garment that cross, of all garments.
+fn own_crossings(layers: &[Layer<'_>]) -> usize {
+    let of_garment = |layer: &Layer<'_>| self_triangle_pairs(layer.positions, layer.garment.faces()).len();
+    layers.iter().map(of_garment).sum()
 }
 
 /// Garments whose edges give back what they can.
