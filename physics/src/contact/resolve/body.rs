@@ -20,17 +20,18 @@ pub(super) fn with_drawn<R>(
 
 /// Calls `with` a `drawn` body that can give way to `garments` garments.
 pub(super) fn with_body<R>(drawn: BodyObstacle<'_>, garments: usize, with: impl FnOnce(&Body<'_>) -> R) -> R {
-    with_body_after(None, drawn, garments, with)
+    with_body_after(Room::AMPLE, None, drawn, garments, with)
 }
 
-/// [`with_body`] a step after it gave way as it did `before`.
+/// [`with_body`] that gives way as `room` says, a step after it did `before`.
 pub(super) fn with_body_after<R>(
+    room: Room,
     before: Option<Before<'_>>,
     mut drawn: BodyObstacle<'_>,
     garments: usize,
     with: impl FnOnce(&Body<'_>) -> R,
 ) -> R {
-    let relief = Relief::of(&drawn, garments, Room::AMPLE, before);
+    let relief = Relief::of(&drawn, garments, room, before);
     if let Some(relief) = &relief {
         drawn.gives_way(relief);
     }

@@ -19,8 +19,10 @@ use crate::contact::self_triangle_pairs;
 
 /// A rise of the strain energy, as a share, that is left as it is.
 const ENOUGH: f64 = 0.03;
-/// Most times that cloth is eased.
-const TIMES: usize = 20;
+/// Most times that cloth is eased…
+pub(super) const TIMES: usize = 20;
+/// …and those in a frame of a motion: what is left is for the next one.
+pub(super) const TIMES_IN_FRAME: usize = 2;
 /// Failures in a row after which it is left.
 const MOST_FAILURES: usize = 4;
 /// Easing ends where it lowers the energy by a smaller share of what it had risen by.
@@ -40,13 +42,15 @@ impl Resolved {
     /// Lowers the strain energy where it has risen from that of `layers`, without any further crossing with the body or between
     /// garments, and few of garments with themselves. What the
     /// post-process has not moved only moves where contacts ask for it. Strict limits (`settings.loosened`) allow none of
-    /// this. `start`: when all of it began.
+    /// this. At most so many
+    /// `times`. `start`: when all of it began.
     pub(super) fn ease(
         &mut self,
         body: &Body<'_>,
         layers: &[Layer<'_>],
         settings: &ResolveSettings,
         start: Instant,
+        times: usize,
     ) {
         let before: f64 = layers.iter().map(|l| l.garment.strain_energy(l.positions)).sum();
         let is_enough = |now: &Certificate| now.strain_joule() <= (1.0 + ENOUGH) * before;
@@ -57,8 +61,8 @@ impl Resolved {
         let own = self.certificate.self_triangle_pairs.max(own_crossings(layers) / OWN);
         let mut cloth = Cloth::new(layers, &self.positions);
         let mut failures = 0;
-        body.with_room(Room::LEAST, |obstacle| {
-            for _ in 0..TIMES {
+        body.with_room(Room::AMPLE.with_share(0.0), |obstacle| {
+            for _ in 0..times {
                 let is_late = settings.is_late(start, layers.len());
                 if is_enough(&self.certificate) || failures == MOST_FAILURES || is_late {
                     break;

@@ -10,6 +10,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::body::{Body, with_body, with_drawn};
+use super::ease::TIMES_IN_FRAME;
 use super::resolved::settled;
 use super::taken_back::{shares, taken_back};
 use super::way::{Strides, Way};
@@ -102,9 +103,10 @@ pub fn resolve_after<E: From<ResolveError>>(
         let way = Way { layers, end: body, settings, start, strides };
         let (followed, steps) = way.follow(before, stage_at)?;
         let Some(found) = followed else { return Ok(None) };
-        let mut resolved = settled(body, layers, found, settings);
+        let mut resolved = settled(body, layers, found, settings, strides.room);
         resolved.body_time = body_time;
         resolved.go_on(body.drawn.surface, layers, settings, start);
+        resolved.ease(body, layers, settings, start, TIMES_IN_FRAME);
         resolved.compare_since(layers, start);
         resolved.steps = steps;
         Ok(Some(resolved))

@@ -69,6 +69,7 @@ use crate::vec3;
 use body::{Body, with_body, with_drawn};
 use obstacle::BodyObstacle;
 use outfit::Outfit;
+use relief::Room;
 use resolved::{certified, judged, settled};
 use sides::Sides;
 use untangle::Untangling;
@@ -112,7 +113,7 @@ fn resolved_further<E>(
             found.go_on(body, layers, settings, start);
             found.compare_since(layers, start);
             let mut found = further(room, found, start)?;
-            found.ease(room, layers, settings, start);
+            found.ease(room, layers, settings, start, ease::TIMES);
             found.compare_since(layers, start);
             Ok(found)
         })
@@ -161,7 +162,7 @@ fn resolved(
     let obstacle = body.obstacle();
     let body_time = simple.body_time + start.elapsed();
     let now = Instant::now();
-    let mut found = settled(body, layers, untangled(obstacle, layers, settings), settings);
+    let mut found = settled(body, layers, untangled(obstacle, layers, settings), settings, Room::AMPLE);
     let own: Duration = simple.garments.iter().map(|work| work.time).sum();
     let time = own + now.elapsed() - found.certificate_time;
     let certificate_time = simple.certificate_time + found.certificate_time;

@@ -29,16 +29,26 @@ const RINGS: usize = 2;
 /// How far outside the surface a vertex is asked whether it is inside another part [m].
 const LOOK_OUT: f64 = 1e-6;
 
-/// Where a body gives way: where it lies inside itself, and wherever else two parts are too near to each other for cloth, there
-/// by this share, 0–1.
+/// Where a body gives way: where it lies inside itself, and wherever else two parts are too near to each other for cloth.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Room(pub f64);
+pub(super) struct Room {
+    /// By which share where it does not lie inside itself, 0–1.
+    pub share: f64,
+    /// Whether it also does where it lies so deep inside itself, or at such a slant, that no surface looks back. Cloth that comes
+    /// into a crease step by step needs that; where it is there already, it would only be drawn deeper.
+    pub is_deep: bool,
+}
 
 impl Room {
+    /// Wherever two surfaces look at each other.
+    pub const AMPLE: Self = Self { share: 1.0, is_deep: false };
     /// Everywhere.
-    pub const AMPLE: Self = Self(1.0);
-    /// Only where it lies inside itself.
-    pub const LEAST: Self = Self(0.0);
+    pub const DEEP: Self = Self { share: 1.0, is_deep: true };
+
+    /// The same by another share.
+    pub fn with_share(self, share: f64) -> Self {
+        Self { share, ..self }
+    }
 }
 
 /// How a body gave way a step before.
@@ -68,15 +78,16 @@ impl Relief {
     pub fn of(
         drawn: &BodyObstacle<'_>,
         garments: usize,
-        Room(share): Room,
+        room: Room,
         before: Option<Before<'_>>,
     ) -> Option<Self> {
         let body = drawn.surface;
-        let (mut steps, pinched) = steps(drawn, ROOM + ROOM_PER_GARMENT * garments as f64)?;
+        let (mut steps, pinched) = steps(drawn, ROOM + ROOM_PER_GARMENT * garments as f64, room.is_deep)?;
         if let Some(Before { steps: before, most }) = before {
             steps.iter_mut().zip(before).for_each(|(step, was)| *step = step.clamp(was - most, was + most));
         }
-        let scaled = steps.iter().zip(&pinched).map(|(s, pinched)| if *pinched { *s } else { share * s });
+        let scaled =
+            steps.iter().zip(&pinched).map(|(s, pinched)| if *pinched { *s } else { room.share * s });
         let scaled: Vec<f64> = scaled.collect();
         if scaled.iter().all(|s| *s == 0.0) {
             return None;
@@ -90,7 +101,7 @@ impl Relief {
 
 /// How far every vertex steps back, against its normal [m]; only those `near` cloth and around them do. Also the corners of
 /// faces inside another part, or crossing one. `None` without an inside.
-fn steps(drawn: &BodyObstacle<'_>, room: f64) -> Option<(Vec<f64>, Vec<bool>)> {
+fn steps(drawn: &BodyObstacle<'_>, room: f64, is_deep: bool) -> Option<(Vec<f64>, Vec<bool>)> {
     let BodyObstacle { surface, near, tree, .. } = drawn;
     let (positions, faces, union) = (&surface.positions, &surface.faces, drawn.union.as_ref()?);
     // Whether all, or some, of the faces at a vertex are inside another part.
@@ -110,7 +121,7 @@ fn steps(drawn: &BodyObstacle<'_>, room: f64) -> Option<(Vec<f64>, Vec<bool>)> {
             all_inside[v] || some_inside[v] && union.winding_number(add_scaled(p, LOOK_OUT, n)) >= 1;
         let apart = match is_inside {
             true => facing_surface(tree, faces, v as u32, -DEEPEST, p, n)
-                .or_else(|| Some(-nearest_facing(tree, faces, v as u32, p, n).unwrap_or(DEEPEST))),
+                .or_else(|| is_deep.then(|| -nearest_facing(tree, faces, v as u32, p, n).unwrap_or(DEEPEST))),
             false => facing_surface(tree, faces, v as u32, room, p, n),
         };
         apart.map_or(0.0, |apart| (0.5 * (room - apart)).clamp(0.0, LONGEST_STEP))
@@ -225,7 +236,7 @@ mod tests {
         for (slow, all) in slow.steps.iter().zip(&all.steps) {
             assert_eq!(*slow, all.min(most));
         }
-        let half = Relief::of(&drawn, 1, Room(0.5), None).unwrap();
+        let half = Relief::of(&drawn, 1, Room::AMPLE.with_share(0.5), None).unwrap();
         let moves = |relief: &Relief| -> Vec<f64> {
             let moved = relief.surface.positions.iter().zip(&body.positions);
             moved.map(|(p, q)| norm(sub(*p, *q))).collect()
@@ -243,7 +254,7 @@ mod tests {
         let steps = |apart: f64| {
             let body = Surface::from_mesh(&balls(apart));
             let near = vec![true; body.positions.len()];
-            Relief::of(&BodyObstacle::new(&body, &near), 1, Room::AMPLE, None).unwrap().steps
+            Relief::of(&BodyObstacle::new(&body, &near), 1, Room::DEEP, None).unwrap().steps
         };
         for apart in [0.199, 0.19, 0.17, 0.15] {
             // Nowhere farther than half of what overlaps along the line of the centres.
@@ -266,6 +277,6 @@ mod tests {
         let near = vec![true; body.positions.len()];
         let drawn = BodyObstacle::new(&body, &near);
         assert!(Relief::of(&drawn, 1, Room::AMPLE, None).is_some());
-        assert!(Relief::of(&drawn, 1, Room::LEAST, None).is_none());
+        assert!(Relief::of(&drawn, 1, Room::AMPLE.with_share(0.0), None).is_none());
     }
 }

@@ -54,18 +54,18 @@ pub struct GarmentWork {
 impl Resolved {
     /// Where cloth lies in room that the body only made for it, tries to do without: the body gives way no more than where it
     /// lies inside itself. Taken if fewer pairs are left.
-    fn close_in(&mut self, body: &Body<'_>, layers: &[Layer<'_>], settings: &ResolveSettings) {
+    fn close_in(&mut self, body: &Body<'_>, layers: &[Layer<'_>], settings: &ResolveSettings, room: Room) {
         if self.certificate.narrow_triangle_pairs == 0 {
             return;
         }
         let settings = ResolveSettings { is_shallow: true, loosened: 1.0, ..*settings };
         let apart = (self.certificate.layer_triangle_pairs == 0).then(|| self.positions.clone());
         let now = at(layers, &self.positions);
-        let closer = body.with_room(Room::LEAST, |obstacle| untangled(obstacle, &now, &settings));
+        let closer = body.with_room(room.with_share(0.0), |obstacle| untangled(obstacle, &now, &settings));
         let certificate = certified(&body.drawn, layers, &closer.positions);
         self.prefer(closer.positions, certificate);
         if let Some(apart) = apart.filter(|_| !self.certificate.is_clear()) {
-            self.close_in_slowly(apart, body, layers, &settings);
+            self.close_in_slowly(apart, body, layers, &settings, room);
         }
     }
 
@@ -77,6 +77,7 @@ impl Resolved {
         body: &Body<'_>,
         layers: &[Layer<'_>],
         settings: &ResolveSettings,
+        room: Room,
     ) {
         let outfit = Outfit::new(layers);
         let (mut share, mut step, mut with_body) = (1.0, CLOSING_IN.0, usize::MAX);
@@ -84,7 +85,7 @@ impl Resolved {
             let next = f64::max(share - step, 0.0);
             let sides = Sides::of(&outfit, &now.concat());
             let before = at(layers, &now);
-            let found = body.with_room(Room(next), |obstacle| {
+            let found = body.with_room(room.with_share(next), |obstacle| {
                 untangled_keeping(Some(&sides), obstacle, &before, settings)
             });
             let certificate = certified(&body.drawn, layers, &found.positions);
@@ -181,9 +182,10 @@ pub(super) fn settled(
     layers: &[Layer<'_>],
     found: Untangled,
     settings: &ResolveSettings,
+    room: Room,
 ) -> Resolved {
     let mut resolved = judged(&body.drawn, layers, found);
-    resolved.close_in(body, layers, settings);
+    resolved.close_in(body, layers, settings, room);
     resolved
 }
 

@@ -7,7 +7,7 @@ use super::body::{Body, with_body_after, with_drawn};
 use super::follow::{Reached, Waypoint};
 use super::obstacle::BodyObstacle;
 use super::outfit::Outfit;
-use super::relief::Before;
+use super::relief::{Before, Room};
 use super::resolved::settled;
 use super::sides::Sides;
 use super::{
@@ -41,16 +41,24 @@ pub(super) struct Strides {
     pub keeping: f64,
     /// The shortest one in which it need not, where nothing crosses before.
     pub free: f64,
+    /// Where the body gives way, from step to step by little more or less.
+    pub room: Room,
 }
 
 impl Strides {
     /// From the T-pose to a pose.
-    pub const FROM_T_POSE: Self =
-        Self { longest: 1.0 / 4.0, shortest: 1.0 / 512.0, keeping: 1.0 / 32.0, free: 1.0 / 32.0 };
+    pub const FROM_T_POSE: Self = Self {
+        longest: 1.0 / 4.0,
+        shortest: 1.0 / 512.0,
+        keeping: 1.0 / 32.0,
+        free: 1.0 / 32.0,
+        room: Room::DEEP,
+    };
     /// The same with drapes that are taken back: where those help they do so at once.
     pub const TAKEN_BACK: Self = Self { shortest: 1.0 / 16.0, ..Self::FROM_T_POSE };
     /// From one frame of a motion to the next.
-    pub const OF_FRAME: Self = Self { longest: 1.0, shortest: 1.0 / 128.0, keeping: 1.0, free: 0.0 };
+    pub const OF_FRAME: Self =
+        Self { longest: 1.0, shortest: 1.0 / 128.0, keeping: 1.0, free: 0.0, room: Room::AMPLE };
     /// The same from a frame that was not clear.
     pub const OF_CROSSED_FRAME: Self = Self { shortest: 1.0 / 4.0, ..Self::OF_FRAME };
 }
@@ -120,7 +128,7 @@ impl Way<'_, '_> {
             layers,
             &t_pose,
             start,
-            None,
+            (self.strides.room, None),
             |_| true,
             |obstacle, start| untangled(obstacle, start, settings),
         );
@@ -131,7 +139,7 @@ impl Way<'_, '_> {
         let (followed, steps) = self.go(Place::new(t_pose, first), stage_at)?;
         best.steps += steps;
         let Some(found) = followed else { return Ok(()) };
-        let mut along = settled(self.end, layers, found, settings);
+        let mut along = settled(self.end, layers, found, settings, self.strides.room);
         along.go_on(body, layers, settings, self.start);
         best.add_work(&along);
         match along.certificate.is_clear() {
@@ -213,9 +221,10 @@ impl Way<'_, '_> {
         let is_free = step >= free || step > keeping || place.reached.crossings > 0;
         let sides = (step <= keeping).then(|| place.sides(self.layers));
         let before = place.gave_way.as_ref().map(|steps| Before { steps, most: GIVING_WAY * step });
+        let gives_way = (self.strides.room, before);
         let is_enough =
             |found: &Untangled| found.crossings == 0 && !place.crosses_less_than(found, step <= keeping);
-        Ok(on_stage(self.layers, stage, &starts, before, is_enough, |obstacle, start| {
+        Ok(on_stage(self.layers, stage, &starts, gives_way, is_enough, |obstacle, start| {
             let free = is_free.then(|| untangled(obstacle, start, &settings));
             if free.as_ref().is_some_and(|free| free.crossings == 0) || sides.is_none() {
                 return free.unwrap_or_default();
@@ -239,7 +248,7 @@ fn on_stage(
     layers: &[Layer<'_>],
     stage: &Waypoint,
     starts: &[Vec<Vec<[f64; 3]>>],
-    before: Option<Before<'_>>,
+    (room, before): (Room, Option<Before<'_>>),
     is_enough: impl Fn(&Untangled) -> bool,
     mut untangle: impl FnMut(&BodyObstacle<'_>, &[Layer<'_>]) -> Untangled,
 ) -> Arrived {
@@ -259,7 +268,7 @@ fn on_stage(
         }
         Arrived { untangled: best.unwrap_or_default(), gave_way: body.steps() }
     };
-    with_drawn(&stage.body, &places, |drawn| with_body_after(before, drawn, layers.len(), arrive))
+    with_drawn(&stage.body, &places, |drawn| with_body_after(room, before, drawn, layers.len(), arrive))
 }
 
 /// The garments elsewhere, if that is all of them.
