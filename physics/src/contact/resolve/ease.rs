@@ -215,7 +215,7 @@ mod tests {
         assert_eq!(certificate.pairs(), 0);
         let mut resolved = Resolved { positions: crumpled, certificate, ..Resolved::default() };
         let ease = |body: &Body<'_>| {
-            resolved.ease(body, &layers, &ResolveSettings::default(), Instant::now());
+            resolved.ease(body, &layers, &ResolveSettings::default(), Instant::now(), TIMES);
         };
         with_drawn(&body, &layers, |drawn| with_body(drawn, 1, ease));
         let after = garment.strain_energy(&resolved.positions[0]);
@@ -240,7 +240,7 @@ mod tests {
             let positions = vec![now.clone()];
             let certificate = certify(&body, &at(&layers, &positions)).unwrap();
             let mut resolved = Resolved { positions, certificate, ..Resolved::default() };
-            let ease = |body: &Body<'_>| resolved.ease(body, &layers, &settings, Instant::now());
+            let ease = |body: &Body<'_>| resolved.ease(body, &layers, &settings, Instant::now(), TIMES);
             with_drawn(&body, &layers, |drawn| with_body(drawn, 1, ease));
             assert_eq!(resolved.positions[0] != *now, is_eased);
         }

@@ -18,7 +18,7 @@ use crate::transform::{into_frame, out_of_frame};
 use crate::vec3::{add, scale, sub};
 
 /// After as many of the shortest steps that left more crossings, the rest of the way is one step.
-const MOST_FAILURES: usize = 8;
+const MOST_FAILURES: usize = 3;
 /// Steps without further crossings after which a longer one is tried.
 const GOOD_STEPS: usize = 4;
 /// How much of what the post-process changed is kept in a long step, so that old changes fade…
@@ -198,8 +198,8 @@ impl Way<'_, '_> {
         Ok((None, steps))
     }
 
-    /// Untangles garments at `stage`, `step` of the way after `place`: as at the start of a way, and with the sides that
-    /// they had before, as far as the strides allow, until nothing crosses.
+    /// Untangles garments at `stage`, `step` of the way after `place`: as at the start of a way, and, where that leaves crossings,
+    /// with the sides that they had before, each as far as the strides allow.
     fn arrive(
         &self,
         place: &Place,
@@ -219,20 +219,19 @@ impl Way<'_, '_> {
         }
         let Strides { keeping, free, .. } = self.strides;
         let is_free = step >= free || step > keeping || place.reached.crossings > 0;
-        let sides = (step <= keeping).then(|| place.sides(self.layers));
         let before = place.gave_way.as_ref().map(|steps| Before { steps, most: GIVING_WAY * step });
         let gives_way = (self.strides.room, before);
         let is_enough =
             |found: &Untangled| found.crossings == 0 && !place.crosses_less_than(found, step <= keeping);
         Ok(on_stage(self.layers, stage, &starts, gives_way, is_enough, |obstacle, start| {
             let free = is_free.then(|| untangled(obstacle, start, &settings));
-            if free.as_ref().is_some_and(|free| free.crossings == 0) || sides.is_none() {
+            if step > keeping || free.as_ref().is_some_and(|free| free.crossings == 0) {
                 return free.unwrap_or_default();
             }
-            let keeping = untangled_keeping(sides, obstacle, start, &settings);
+            let kept = untangled_keeping(Some(place.sides(self.layers)), obstacle, start, &settings);
             match free {
-                Some(free) if free.crossings <= keeping.crossings => free,
-                _ => keeping,
+                Some(free) if free.crossings <= kept.crossings => free,
+                _ => kept,
             }
         }))
     }
