@@ -17,8 +17,9 @@ use crate::query::Surface;
 use crate::transform::{into_frame, out_of_frame};
 use crate::vec3::{add, scale, sub};
 
-/// After as many of the shortest steps that left more crossings, the rest of the way is one step.
-const MOST_FAILURES: usize = 3;
+/// Where so many of the steps that are allowed, one in 16, were as short as may be and left more crossings all the same, the rest of
+/// the way is one step.
+const FAILURES: usize = 16;
 /// Steps without further crossings after which a longer one is tried.
 const GOOD_STEPS: usize = 4;
 /// How much of what the post-process changed is kept in a long step, so that old changes fade…
@@ -170,8 +171,9 @@ impl Way<'_, '_> {
         let (mut from, mut step, mut steps) = (0.0, longest, 0);
         // How many steps in a row went well, and how many of the shortest did not.
         let (mut well, mut failures) = (0, 0);
+        let most_failures = (self.settings.steps / FAILURES).max(1);
         while steps < self.settings.steps && !self.is_late() {
-            let is_last = failures >= MOST_FAILURES || steps + 1 == self.settings.steps;
+            let is_last = failures >= most_failures || steps + 1 == self.settings.steps;
             let is_shortest = is_last || step <= shortest * (1.0 + 1e-9);
             let at = if is_last || step > 1.0 - from - 1e-9 { 1.0 } else { from + step };
             let stage = stage_at(at)?;
