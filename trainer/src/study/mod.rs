@@ -75,7 +75,7 @@ impl Sizes {
         embeddings: 100,
         layered: [24, 6],
         many_layers: [8, 2],
-        way_steps: 48,
+        way_steps: 32,
         variants: 100,
         times: 20,
         pareto: 10,
