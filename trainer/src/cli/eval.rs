@@ -98,6 +98,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         Some(part) => {
             bar.set_length(steps as u64);
             bar.set_message(part.to_owned());
+            // Off a terminal there is no bar.
+            if bar.is_hidden() {
+                say(&format!("{:6.0} s  {part}", clock.elapsed().as_secs_f64()));
+            }
         }
         None => bar.inc(1),
     })?;

@@ -319,7 +319,7 @@ impl Draper {
             1.0 => Ok(at_the_end()),
             _ => self.stage(outfit, body, body.pose.on_the_way(share), body.place),
         };
-        let anew = resolve_along(surface, &layers, settings, from_t_pose)?;
+        let anew = resolve_along(surface, &layers, &at_the_end().skinned, settings, from_t_pose)?;
         // What carries on does not pop.
         Ok(match carried {
             Some(carried) => carried.or(anew),

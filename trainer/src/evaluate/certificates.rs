@@ -118,7 +118,8 @@ impl DrapedScene<'_> {
     /// When it is no valid scene, or another pose cannot be draped.
     pub fn resolved(&self, settings: &ResolveSettings) -> Result<Resolved, PostProcessError> {
         let stage_at = |share: f64| self.dressing.stage(self.scene, share);
-        resolve_along(&self.body, &self.layers(&self.positions), settings, stage_at)
+        let skinned = wide(self.scene, &skinned(self.scene));
+        resolve_along(&self.body, &self.layers(&self.positions), &skinned, settings, stage_at)
     }
 
     /// Whether the order of the garments can be worn ([`unwearable`]).

@@ -16,6 +16,7 @@ use super::{
     Certificate, Crossed, Layer, RemainingPair, ResolveSettings, Resolved, at, certified, untangled_keeping,
 };
 use crate::contact::self_triangle_pairs;
+use crate::vec3::distance_squared;
 
 /// A rise of the strain energy, as a share, that is left as it is.
 const ENOUGH: f64 = 0.03;
@@ -25,8 +26,9 @@ pub(super) const TIMES: usize = 20;
 pub(super) const TIMES_IN_FRAME: usize = 2;
 /// Failures in a row after which it is left.
 const MOST_FAILURES: usize = 4;
-/// Easing ends where it lowers the energy by a smaller share of what it had risen by.
-const LEAST_GAIN: f64 = 0.05;
+/// Where easing lowers the energy by a smaller share of what it had risen by, edges that are too short are eased as well as those that
+/// are too long: cloth then crumples a little. Where that lowers it by a smaller share than the second, it ends.
+const LEAST_GAIN: (f64, f64) = (0.01, 0.05);
 /// Passes over the edges each time.
 const PASSES: usize = 20;
 /// Farthest that a vertex is moved each time [m]: no limb is so thin that cloth could get to its other side.
@@ -39,11 +41,9 @@ const OWN: usize = 4;
 const RINGS_HELD: usize = 3;
 
 impl Resolved {
-    /// Lowers the strain energy where it has risen from that of `layers`, without any further crossing with the body or between
-    /// garments, and few of garments with themselves. What the
-    /// post-process has not moved only moves where contacts ask for it. Strict limits (`settings.loosened`) allow none of
-    /// this. At most so many
-    /// `times`. `start`: when all of it began.
+    /// Lowers the strain energy where it has risen from that of `layers`, at most so many `times`, without any further crossing
+    /// with the body or between garments, and few of garments with themselves. What the post-process has not moved only
+    /// moves where contacts ask for it. Strict limits (`settings.loosened`) allow none of this. `start`: when all of it began.
     pub(super) fn ease(
         &mut self,
         body: &Body<'_>,
@@ -84,8 +84,10 @@ impl Resolved {
                 if gain > 0.0 {
                     (self.positions, self.certificate) = (found.positions, certificate);
                 }
-                if gain < LEAST_GAIN {
-                    break;
+                match cloth.only_stretched {
+                    true => cloth.only_stretched = gain >= LEAST_GAIN.0,
+                    false if gain < LEAST_GAIN.1 => break,
+                    false => (),
                 }
             }
         });
@@ -104,6 +106,8 @@ struct Cloth<'a> {
     may_move: Vec<bool>,
     /// Farthest that a vertex is moved [m].
     farthest: f64,
+    /// Whether edges that are too short stay so.
+    only_stretched: bool,
 }
 
 impl<'a> Cloth<'a> {
@@ -111,7 +115,7 @@ impl<'a> Cloth<'a> {
     fn new(layers: &'a [Layer<'a>], positions: &[Vec<[f64; 3]>]) -> Self {
         let moves = layers.iter().zip(positions).flat_map(|(l, now)| l.positions.iter().zip(now));
         let may_move = moves.map(|(p, q)| p != q).collect();
-        Self { outfit: Outfit::new(layers), may_move, farthest: FARTHEST }
+        Self { outfit: Outfit::new(layers), may_move, farthest: FARTHEST, only_stretched: true }
     }
 
     /// The garments from `positions` with edges nearer to their rest lengths, by Gauss–Seidel in a fixed order.
@@ -121,7 +125,9 @@ impl<'a> Cloth<'a> {
         let edges = self.edges();
         for _ in 0..PASSES {
             for &(a, b, length) in &edges {
-                keep_length(&mut eased, a, b, self.may_move[b], length);
+                if !self.only_stretched || distance_squared(eased[a], eased[b]) > length * length {
+                    keep_length(&mut eased, a, b, self.may_move[b], length);
+                }
             }
         }
         for (p, q) in before.iter().zip(&mut eased) {

@@ -12,14 +12,16 @@ use std::time::Instant;
 use super::body::{Body, with_body, with_drawn};
 use super::ease::TIMES_IN_FRAME;
 use super::resolved::settled;
+use super::strides::Strides;
 use super::taken_back::{shares, taken_back};
-use super::way::{Strides, Way};
-use super::{Layer, ResolveError, ResolveSettings, Resolved, check, resolved_further};
+use super::unfold::Folds;
+use super::way::{Way, placed};
+use super::{Layer, ResolveError, ResolveSettings, Resolved, at, check, resolved_further};
 use crate::query::Surface;
 use crate::transform::Transform;
 
 /// A rise of the strain energy, as a share, that is only accepted where the way leaves crossings.
-const TORN: f64 = 1.0;
+const TORN: f64 = 0.25;
 
 /// What is somewhere along the way.
 #[derive(Clone)]
@@ -46,7 +48,8 @@ pub struct Reached {
     pub crossings: usize,
 }
 
-/// As [`super::resolve`], with a second way out: where crossings of `layers` on `body` cannot be mended, the garments are taken
+/// As [`super::resolve`], with a second way out, and for garments of which it is known where they are `skinned` alone, `[V, 3]` each
+/// [m]: what folds only in the drape is laid out first. Where crossings of `layers` on `body` cannot be mended, the garments are taken
 /// along from the stage at 0, the T-pose, to the stage at 1, which is `body` with `layers`; where that leaves crossings, once more
 /// with drapes that are taken back towards the skinned garments around them. What leaves the fewest is returned.
 ///
@@ -55,18 +58,34 @@ pub struct Reached {
 pub fn resolve_along<E: From<ResolveError>>(
     body: &Surface<f64>,
     layers: &[Layer<'_>],
+    skinned: &[Vec<[f64; 3]>],
     settings: &ResolveSettings,
     mut stage_at: impl FnMut(f64) -> Result<Waypoint, E>,
 ) -> Result<Resolved, E> {
     settings.check()?;
     check(body, layers)?;
-    resolved_further(body, layers, settings, |room, mut best, start| {
+    check(body, &placed(layers, skinned)?)?;
+    // Strict limits leave a drape as it is, as far as it can be left.
+    let is_strict = settings.loosened <= 1.0 || !settings.self_contact;
+    let folds = if is_strict { Folds::none(layers) } else { Folds::of(layers, skinned) };
+    let positions = (!folds.is_empty()).then(|| folds.laid_out(layers, skinned));
+    let laid_out = positions.as_ref().map(|positions| at(layers, positions));
+    let laid_out = laid_out.as_deref();
+    resolved_further(body, layers, laid_out, settings, |room, mut best, start| {
+        let layers = laid_out.unwrap_or(layers);
         let is_torn = best.certificate.strain_added.is_some_and(|added| added > TORN);
         if best.certificate.is_clear() && !is_torn || settings.steps == 0 {
             return Ok(best);
         }
         let way = Way { layers, end: room, settings, start, strides: Strides::FROM_T_POSE };
-        let t_pose = stage_at(0.0)?;
+        let mut checked_at = |share: f64| Ok::<_, E>(checked(stage_at(share)?, layers)?);
+        let t_pose = checked_at(0.0)?;
+        let folds = match is_strict {
+            true => folds,
+            false => folds.and(Folds::of(&at(layers, &t_pose.draped), &t_pose.skinned)),
+        };
+        let t_pose = folds.laid_out_at(t_pose, layers);
+        let mut stage_at = |share: f64| checked_at(share).map(|stage| folds.laid_out_at(stage, layers));
         way.improve(&mut best, body, t_pose.clone(), &mut stage_at)?;
         // Where most of what crosses is pinched it is the body, not the drape, that leaves no way out.
         if best.certificate.between() > best.certificate.pinched.count() {
@@ -92,7 +111,7 @@ pub fn resolve_after<E: From<ResolveError>>(
     body: &Surface<f64>,
     layers: &[Layer<'_>],
     settings: &ResolveSettings,
-    stage_at: impl FnMut(f64) -> Result<Waypoint, E>,
+    mut stage_at: impl FnMut(f64) -> Result<Waypoint, E>,
 ) -> Result<Option<Resolved>, E> {
     let start = Instant::now();
     settings.check()?;
@@ -101,7 +120,7 @@ pub fn resolve_after<E: From<ResolveError>>(
         let body_time = start.elapsed();
         let strides = if before.crossings == 0 { Strides::OF_FRAME } else { Strides::OF_CROSSED_FRAME };
         let way = Way { layers, end: body, settings, start, strides };
-        let (followed, steps) = way.follow(before, stage_at)?;
+        let (followed, steps) = way.follow(before, |share| Ok::<_, E>(checked(stage_at(share)?, layers)?))?;
         let Some(found) = followed else { return Ok(None) };
         let mut resolved = settled(body, layers, found, settings, strides.room);
         resolved.body_time = body_time;
@@ -112,6 +131,14 @@ pub fn resolve_after<E: From<ResolveError>>(
         Ok(Some(resolved))
     };
     with_drawn(body, layers, |drawn| with_body(drawn, layers.len(), carry_on))
+}
+
+/// A stage, if everything on it fits the garments.
+fn checked(stage: Waypoint, layers: &[Layer<'_>]) -> Result<Waypoint, ResolveError> {
+    for positions in [&stage.draped, &stage.skinned] {
+        check(&stage.body, &placed(layers, positions)?)?;
+    }
+    Ok(stage)
 }
 
 #[cfg(test)]

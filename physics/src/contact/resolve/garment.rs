@@ -11,6 +11,8 @@ pub struct RestGarment {
     pub(super) topology: Topology,
     /// Lengths of the topology's edges [m].
     pub(super) edge_lengths: Vec<f64>,
+    /// For every face, the topology's edges between its corners k and k+1.
+    pub(super) edges_of_faces: Vec<[u32; 3]>,
     /// Vertices on an edge with one face.
     pub(super) is_border: Vec<bool>,
     /// For every face, which of its edges (corner k → k+1) have no second face: bit k.
@@ -24,33 +26,27 @@ impl RestGarment {
     pub fn new(rest: &TriMesh) -> Self {
         let topology = Topology::new(rest);
         let faces = rest.faces().to_vec();
-        let mut hinged: Vec<[u32; 2]> = topology
-            .hinges
-            .iter()
-            .map(|h| [h.edge[0].min(h.edge[1]), h.edge[0].max(h.edge[1])])
-            .chain(topology.non_manifold_edges.iter().copied())
-            .collect();
-        hinged.sort_unstable();
+        let edge_between = |[a, b]: [u32; 2]| -> u32 {
+            let edge = [a.min(b), a.max(b)];
+            // Every side of a face is an edge of the topology.
+            topology.edges.partition_point(|other| *other < edge) as u32
+        };
+        let edges_of_faces: Vec<[u32; 3]> =
+            faces.iter().map(|&[a, b, c]| [[a, b], [b, c], [c, a]].map(edge_between)).collect();
+        let mut faces_at_edge = vec![0; topology.edges.len()];
+        edges_of_faces.iter().flatten().for_each(|&e| faces_at_edge[e as usize] += 1);
+        let is_single = |e: u32| faces_at_edge[e as usize] == 1;
         let mut is_border = vec![false; rest.vertex_count()];
-        let border_edges = faces
-            .iter()
-            .map(|face| {
-                (0..3).fold(0u8, |bits, k| {
-                    let (a, b) = (face[k], face[(k + 1) % 3]);
-                    if hinged.binary_search(&[a.min(b), a.max(b)]).is_ok() {
-                        return bits;
-                    }
-                    is_border[a as usize] = true;
-                    is_border[b as usize] = true;
-                    bits | 1 << k
-                })
-            })
-            .collect();
+        for (edge, faces) in topology.edges.iter().zip(&faces_at_edge) {
+            edge.iter().for_each(|&v| is_border[v as usize] |= *faces == 1);
+        }
+        let bits = |edges: &[u32; 3]| (0..3).fold(0, |bits, k| bits | u8::from(is_single(edges[k])) << k);
+        let border_edges = edges_of_faces.iter().map(bits).collect();
         let at = |v: u32| rest.positions()[v as usize];
         let edge_lengths = topology.edges.iter().map(|&[a, b]| norm(sub(at(a), at(b)))).collect();
         let faces_at = FacesAtVertex::new(rest.vertex_count(), &faces);
         let strain = Strain::new(rest, &Material::default());
-        Self { faces, topology, edge_lengths, is_border, border_edges, faces_at, strain }
+        Self { faces, topology, edge_lengths, edges_of_faces, is_border, border_edges, faces_at, strain }
     }
 
     /// Number of vertices.

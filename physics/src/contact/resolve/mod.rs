@@ -26,7 +26,8 @@
 //! **Easing.** Where the strain energy has risen, cloth gives back what it can without crossing anything ([`ease`]).
 //!
 //! **Bent limbs.** Where crossings are left, [`resolve_along`] takes the garments from the T-pose, where their order is plain,
-//! step by step to the pose ([`follow`]); in short steps cloth keeps the sides it was on before ([`sides`]); where that leaves some, with drapes that lie nearer to where they began ([`taken_back`]).
+//! step by step to the pose ([`follow`], [`way`]); in short steps cloth keeps the sides it was on before ([`sides`]). Where that
+//! leaves some, it does so again with drapes that lie nearer to where they began ([`taken_back`]).
 
 mod body;
 mod certificate;
@@ -47,9 +48,11 @@ mod relief;
 mod resolved;
 mod settings;
 mod sides;
+mod strides;
 mod taken_back;
 #[cfg(test)]
 mod tests;
+mod unfold;
 mod untangle;
 mod way;
 
@@ -90,31 +93,38 @@ pub fn resolve(
 ) -> Result<Resolved, ResolveError> {
     settings.check()?;
     check(body, layers)?;
-    resolved_further(body, layers, settings, |_, found, _| Ok(found))
+    resolved_further(body, layers, None, settings, |_, found, _| Ok(found))
 }
 
 /// [`resolve`] for valid arguments. Where something is left to do after the first attempts, `further` may go on from there: it
-/// gets the body, what was reached, and when all began.
+/// gets the body, what was reached, and when all began. What comes of it is compared with the garments as they were `given`, before
+/// they were laid out.
 fn resolved_further<E>(
     body: &Surface<f64>,
-    layers: &[Layer<'_>],
+    given: &[Layer<'_>],
+    laid_out: Option<&[Layer<'_>]>,
     settings: &ResolveSettings,
     further: impl FnOnce(&Body<'_>, Resolved, Instant) -> Result<Resolved, E>,
 ) -> Result<Resolved, E> {
     let start = Instant::now();
+    let layers = laid_out.unwrap_or(given);
     with_drawn(body, layers, |drawn| {
         let simple = simply_resolved(&drawn, layers, settings, start);
-        if simple.certificate.is_clear() {
+        let is_done = simple.certificate.is_clear();
+        if is_done && laid_out.is_none() {
             return Ok(simple);
         }
         let relieving = Instant::now();
         with_body(drawn, layers.len(), |room| {
-            let mut found = resolved(room, layers, settings, simple, relieving);
-            found.go_on(body, layers, settings, start);
-            found.compare_since(layers, start);
-            let mut found = further(room, found, start)?;
-            found.ease(room, layers, settings, start, ease::TIMES);
-            found.compare_since(layers, start);
+            let mut found = simple;
+            if !is_done {
+                found = resolved(room, layers, settings, found, relieving);
+                found.go_on(body, layers, settings, start);
+                found.compare_since(given, start);
+                found = further(room, found, start)?;
+            }
+            found.ease(room, given, settings, start, ease::TIMES);
+            found.compare_since(given, start);
             Ok(found)
         })
     })

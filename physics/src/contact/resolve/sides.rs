@@ -52,7 +52,7 @@ impl Sides {
     /// Sides of `outfit` at `positions`. Two faces that cross there have none.
     pub fn of(outfit: &Outfit<'_>, positions: &[[f64; 3]]) -> Self {
         let tree = TriangleTree::new(positions, &outfit.faces);
-        let edges = Edges::of(&outfit.faces);
+        let edges = Edges::of(outfit);
         let crossings = tree.self_pairs();
         let crossed: HashSet<_> = crossings.iter().flat_map(|&(f, g)| [(f, g), (g, f)]).collect();
         let unknown = Unknown::of(&outfit.faces, &crossings);
@@ -77,10 +77,12 @@ impl Sides {
         let near_edge = |i: u32| {
             let first = edges.all[i as usize];
             let near = faces_near(&tree, first.map(|v| positions[v as usize]));
-            // Every edge is looked at as one of one face.
-            near.flat_map(|f| edges.owned[f as usize])
-                .filter(|j| *j != u32::MAX && *j > i)
-                .map(|j| [first, edges.all[j as usize]])
+            let mut others: Vec<u32> =
+                near.flat_map(|f| edges.of_face[f as usize]).filter(|j| *j > i).collect();
+            others.sort_unstable();
+            others.dedup();
+            let pairs = others.into_iter().map(|j| [first, edges.all[j as usize]]);
+            pairs
                 .filter(|[first, second]| !second.iter().any(|v| first.contains(v)))
                 .filter(|pair| !unknown.edges.contains(pair))
                 .filter_map(|edges| {
@@ -130,28 +132,22 @@ impl Sides {
     }
 }
 
-/// All edges of some faces, and for every face those that no face before it has; `u32::MAX` for the others.
+/// All edges of an outfit, and for every face its three.
 struct Edges {
     all: Vec<[u32; 2]>,
-    owned: Vec<[u32; 3]>,
+    of_face: Vec<[u32; 3]>,
 }
 
 impl Edges {
-    fn of(faces: &[[u32; 3]]) -> Self {
-        let (mut all, mut known) = (Vec::new(), HashSet::new());
-        let owned = faces
-            .iter()
-            .map(|face| {
-                edges_of(*face).map(|edge| match known.insert(edge) {
-                    true => {
-                        all.push(edge);
-                        all.len() as u32 - 1
-                    }
-                    false => u32::MAX,
-                })
-            })
-            .collect();
-        Self { all, owned }
+    fn of(outfit: &Outfit<'_>) -> Self {
+        let (mut all, mut of_face): (Vec<[u32; 2]>, Vec<[u32; 3]>) = (Vec::new(), Vec::new());
+        for (g, layer) in outfit.layers.iter().enumerate() {
+            let (start, first) = (outfit.vertices(g).start, all.len() as u32);
+            let garment = layer.garment;
+            all.extend(garment.topology.edges.iter().map(|edge| edge.map(|v| v + start)));
+            of_face.extend(garment.edges_of_faces.iter().map(|edges| edges.map(|e| e + first)));
+        }
+        Self { all, of_face }
     }
 }
 

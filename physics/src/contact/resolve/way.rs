@@ -1,4 +1,4 @@
-//! The steps of a way: how long they are, and what is done at each.
+//! A way that garments are taken, step by step: which steps are tried, and what is done at each.
 
 use std::sync::OnceLock;
 use std::time::Instant;
@@ -10,6 +10,7 @@ use super::outfit::Outfit;
 use super::relief::{Before, Room};
 use super::resolved::settled;
 use super::sides::Sides;
+use super::strides::Strides;
 use super::{
     Layer, ResolveError, ResolveSettings, Resolved, Untangled, at, check, untangled, untangled_keeping,
 };
@@ -17,8 +18,8 @@ use crate::query::Surface;
 use crate::transform::{into_frame, out_of_frame};
 use crate::vec3::{add, scale, sub};
 
-/// Where so many of the steps that are allowed, one in 16, were as short as may be and left more crossings all the same, the rest of
-/// the way is one step.
+/// The rest of the way is one step where of the steps that are allowed one in so many was as short as may be, and left more
+/// crossings all the same.
 const FAILURES: usize = 16;
 /// Steps without further crossings after which a longer one is tried.
 const GOOD_STEPS: usize = 4;
@@ -30,39 +31,6 @@ const FADING: f64 = 1.0 / 16.0;
 const GIVING_WAY: f64 = 0.5;
 /// Crossings of garments with themselves may become more by this share, and by so many, in a short step.
 const OWN: (f64, usize) = (0.125, 4);
-
-/// How long steps are, as shares of the way.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Strides {
-    /// The longest one.
-    pub longest: f64,
-    /// The shortest one: it is taken even where it leaves more crossings than there were.
-    pub shortest: f64,
-    /// The longest one in which cloth may keep its sides: little passes by in it.
-    pub keeping: f64,
-    /// The shortest one in which it need not, where nothing crosses before.
-    pub free: f64,
-    /// Where the body gives way, from step to step by little more or less.
-    pub room: Room,
-}
-
-impl Strides {
-    /// From the T-pose to a pose.
-    pub const FROM_T_POSE: Self = Self {
-        longest: 1.0 / 4.0,
-        shortest: 1.0 / 512.0,
-        keeping: 1.0 / 32.0,
-        free: 1.0 / 32.0,
-        room: Room::DEEP,
-    };
-    /// The same with drapes that are taken back: where those help they do so at once.
-    pub const TAKEN_BACK: Self = Self { shortest: 1.0 / 16.0, ..Self::FROM_T_POSE };
-    /// From one frame of a motion to the next.
-    pub const OF_FRAME: Self =
-        Self { longest: 1.0, shortest: 1.0 / 128.0, keeping: 1.0, free: 0.0, room: Room::AMPLE };
-    /// The same from a frame that was not clear.
-    pub const OF_CROSSED_FRAME: Self = Self { shortest: 1.0 / 4.0, ..Self::OF_FRAME };
-}
 
 /// Where garments are to be taken.
 pub(super) struct Way<'a, 'b> {
@@ -98,7 +66,7 @@ impl Place {
         self.sides.get_or_init(|| Sides::of(&Outfit::new(layers), &self.reached.positions.concat()))
     }
 
-    /// Whether fewer crosses here than `now`; garments with themselves only count in a step that is `short`.
+    /// Whether less crosses here than `now`; garments with themselves only count in a step that `is_short`.
     fn crosses_less_than(&self, now: &Untangled, is_short: bool) -> bool {
         let is_crumpled = |own: usize| now.own > own + OWN.1 && now.own as f64 > (1.0 + OWN.0) * own as f64;
         now.crossings > self.reached.crossings || is_short && self.own.is_some_and(is_crumpled)
@@ -123,7 +91,6 @@ impl Way<'_, '_> {
         stage_at: impl FnMut(f64) -> Result<Waypoint, E>,
     ) -> Result<(), E> {
         let (layers, settings) = (self.layers, self.settings);
-        check(&t_pose.body, &placed(layers, &t_pose.draped)?)?;
         let start = std::slice::from_ref(&t_pose.draped);
         let first = on_stage(
             layers,
@@ -143,8 +110,13 @@ impl Way<'_, '_> {
         let mut along = settled(self.end, layers, found, settings, self.strides.room);
         along.go_on(body, layers, settings, self.start);
         best.add_work(&along);
-        match along.certificate.is_clear() {
-            true => (best.positions, best.certificate) = (along.positions, along.certificate),
+        let [now, then] = [&along, &*best].map(|resolved| &resolved.certificate);
+        match now.is_clear() {
+            // Cloth that was torn out of what it crossed may cross itself less, but it is torn.
+            true if !then.is_clear() || now.strain_joule() < then.strain_joule() => {
+                (best.positions, best.certificate) = (along.positions, along.certificate);
+            }
+            true => (),
             false => best.prefer(along.positions, along.certificate),
         }
         Ok(())
@@ -177,7 +149,6 @@ impl Way<'_, '_> {
             let is_shortest = is_last || step <= shortest * (1.0 + 1e-9);
             let at = if is_last || step > 1.0 - from - 1e-9 { 1.0 } else { from + step };
             let stage = stage_at(at)?;
-            check(&stage.body, &placed(self.layers, &stage.draped)?)?;
             steps += 1;
             let arrived = self.arrive(&place, &stage, at - from, is_shortest, is_last)?;
             let is_worse = place.crosses_less_than(&arrived.untangled, at - from <= keeping);
@@ -273,7 +244,10 @@ fn on_stage(
 }
 
 /// The garments elsewhere, if that is all of them.
-fn placed<'a>(layers: &[Layer<'a>], positions: &'a [Vec<[f64; 3]>]) -> Result<Vec<Layer<'a>>, ResolveError> {
+pub(super) fn placed<'a>(
+    layers: &[Layer<'a>],
+    positions: &'a [Vec<[f64; 3]>],
+) -> Result<Vec<Layer<'a>>, ResolveError> {
     let garment = positions.len().min(layers.len());
     match layers.get(garment) {
         Some(missing) => {
@@ -301,44 +275,4 @@ fn carried(reached: &Reached, stage: &Waypoint, kept: f64) -> Vec<Vec<[f64; 3]>>
 }
 
 #[cfg(test)]
-mod tests {
-    use std::sync::Arc;
-
-    use super::*;
-    use crate::mesh::shapes;
-    use crate::transform::Transform;
-
-    const IDENTITY: Transform = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
-
-    #[test]
-    fn changes_turn_with_the_skinning_and_fade() {
-        let quarter = [[0.0, -1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
-        let stage = |drape: [f64; 3], transform| Waypoint {
-            body: Arc::new(Surface::from_mesh(&shapes::tetrahedron())),
-            draped: vec![vec![drape]],
-            skinned: vec![vec![drape]],
-            transforms: vec![transform],
-        };
-        let Waypoint { draped, transforms, .. } = stage([1.0, 0.0, 0.0], IDENTITY);
-        let reached = Reached { draped, positions: vec![vec![[1.2, 0.0, 0.4]]], transforms, crossings: 0 };
-        let next = stage([0.0, 1.0, 0.0], quarter);
-        let found = carried(&reached, &next, 0.5)[0][0];
-        for (a, b) in found.iter().zip([0.0, 1.1, 0.2]) {
-            assert!((a - b).abs() < 1e-12, "{found:?}");
-        }
-    }
-
-    #[test]
-    fn garments_with_themselves_count_in_short_steps_only() {
-        let reached = || Reached { draped: vec![], positions: vec![], transforms: vec![], crossings: 2 };
-        let place = |own| Place { reached: reached(), gave_way: None, own, sides: OnceLock::new() };
-        let found = |crossings, own| Untangled { crossings, own, ..Untangled::default() };
-        for is_short in [false, true] {
-            assert!(place(Some(50)).crosses_less_than(&found(3, 0), is_short));
-            assert!(!place(Some(50)).crosses_less_than(&found(2, 56), is_short));
-            assert_eq!(place(Some(50)).crosses_less_than(&found(0, 57), is_short), is_short);
-            assert!(!place(Some(0)).crosses_less_than(&found(0, 4), is_short));
-            assert!(!place(None).crosses_less_than(&found(0, 1000), is_short));
-        }
-    }
-}
+mod tests;

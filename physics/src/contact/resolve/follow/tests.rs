@@ -99,7 +99,7 @@ fn what_can_be_mended_at_once_is_not_followed_and_what_is_late_is_given_up() {
     let settings = ResolveSettings::default();
     let shallow = stage_at(0.3).unwrap();
     let layers = [Layer { garment: &garment, positions: &shallow.draped[0] }];
-    let resolved = resolve_along(&shallow.body, &layers, &settings, &stage_at).unwrap();
+    let resolved = resolve_along(&shallow.body, &layers, &shallow.skinned, &settings, &stage_at).unwrap();
     assert!(resolved.certificate.is_clear() && resolved.steps == 0);
     let first = untouched(stage_at(0.0).unwrap(), shallow.draped.clone());
     let settings = ResolveSettings { time: Some(Duration::ZERO), ..settings };

@@ -122,13 +122,15 @@ fn faces_that_cross_have_no_sides() {
     });
 }
 
-/// Every edge is looked at once, however many faces share it.
+/// The edges of all garments, numbered through, and those of every face.
 #[test]
-fn edges_have_one_owner() {
-    let mesh = shapes::icosphere(1.0, 2);
-    let edges = Edges::of(mesh.faces());
-    assert_eq!(edges.all.len(), mesh.faces().len() * 3 / 2);
-    let owned: Vec<u32> = edges.owned.iter().flatten().copied().filter(|e| *e != u32::MAX).collect();
-    let distinct: HashSet<u32> = owned.iter().copied().collect();
-    assert_eq!((owned.len(), distinct.len()), (edges.all.len(), edges.all.len()));
+fn faces_know_their_edges() {
+    dressed(&sheets(0.01), |outfit, _| {
+        let edges = Edges::of(outfit);
+        let distinct: HashSet<[u32; 2]> = edges.all.iter().copied().collect();
+        assert_eq!(distinct.len(), edges.all.len());
+        for (face, of_face) in outfit.faces.iter().zip(&edges.of_face) {
+            assert_eq!(edges_of(*face), of_face.map(|e| edges.all[e as usize]));
+        }
+    });
 }

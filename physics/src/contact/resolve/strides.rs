@@ -1,0 +1,36 @@
+//! How long the steps of a way may be.
+
+use super::relief::Room;
+
+/// How long steps are, as shares of the way.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Strides {
+    /// The longest one.
+    pub longest: f64,
+    /// The shortest one: it is taken even where it leaves more crossings than there were.
+    pub shortest: f64,
+    /// The longest one in which cloth may keep its sides: little passes by in it.
+    pub keeping: f64,
+    /// The shortest one in which it need not, where nothing crosses before.
+    pub free: f64,
+    /// Where the body gives way, from step to step by little more or less.
+    pub room: Room,
+}
+
+impl Strides {
+    /// From the T-pose to a pose.
+    pub const FROM_T_POSE: Self = Self {
+        longest: 1.0 / 4.0,
+        shortest: 1.0 / 512.0,
+        keeping: 1.0 / 32.0,
+        free: 1.0 / 32.0,
+        room: Room::DEEP,
+    };
+    /// The same with drapes that are taken back: where those help they do so at once.
+    pub const TAKEN_BACK: Self = Self { shortest: 1.0 / 16.0, ..Self::FROM_T_POSE };
+    /// From one frame of a motion to the next.
+    pub const OF_FRAME: Self =
+        Self { longest: 1.0, shortest: 1.0 / 128.0, keeping: 1.0, free: 0.0, room: Room::AMPLE };
+    /// The same from a frame that was not clear.
+    pub const OF_CROSSED_FRAME: Self = Self { shortest: 1.0 / 4.0, ..Self::OF_FRAME };
+}

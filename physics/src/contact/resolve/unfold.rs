@@ -1,0 +1,251 @@
+//! Cloth that a drape folds into itself is laid out, before anything else.
+//!
+//! What a network adds to a skinned garment is smooth, but where it folds cloth: on a body unlike those it was trained on, or where
+//! garments press on each other. No sheet over such a fold can tell its outside from its inside. Around it what is added is
+//! replaced by what is smoothest between its surroundings, a harmonic function on the edges: the fold goes, the distance to
+//! the body and to other garments stays about what it is next to it.
+
+use rayon::prelude::*;
+
+use super::outfit::Outfit;
+use super::{Layer, Waypoint, at};
+use crate::contact::self_triangle_pairs;
+use crate::vec3::{add, add_scaled, scale, sub};
+
+/// How far around crossings cloth is laid out [m]: farther where some are left.
+const REACH: [f64; 3] = [0.03, 0.06, 0.12];
+/// How far around crossings of the skinned garment others are left [m]: in a crease of the body skinning folds cloth as well, and
+/// is of no help.
+const CREASE: f64 = 0.06;
+/// Fewest and most rings of neighbours for these distances.
+const RINGS: (usize, usize) = (2, 40);
+/// What is laid out may raise the strain energy of a garment by this share: a fold that holds more is none to take away.
+const STRAINED: f64 = 0.1;
+/// Sweeps of the smoothing…
+const SWEEPS: usize = 100;
+/// …and its over-relaxation.
+const OVER: f64 = 1.7;
+
+/// Where garments are to be laid out: vertices of each, ascending.
+#[derive(Debug, Clone)]
+pub(super) struct Folds(Vec<Vec<u32>>);
+
+impl Folds {
+    /// Around crossings of every garment with itself where the same garment, `skinned`, has none, as far as there are fewer of them
+    /// when it is laid out.
+    pub fn of(layers: &[Layer<'_>], skinned: &[Vec<[f64; 3]>]) -> Self {
+        Self(layers.par_iter().zip(skinned).map(|(layer, skinned)| folded(*layer, skinned)).collect())
+    }
+
+    /// No folds.
+    pub fn none(layers: &[Layer<'_>]) -> Self {
+        Self(vec![Vec::new(); layers.len()])
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.0.iter().all(Vec::is_empty)
+    }
+
+    /// These and those of the same garments in another pose, so that what is laid out in one is in the other.
+    pub fn and(mut self, others: Self) -> Self {
+        for (folds, more) in self.0.iter_mut().zip(others.0) {
+            folds.extend(more);
+            folds.sort_unstable();
+            folds.dedup();
+        }
+        self
+    }
+
+    /// The garments without them.
+    pub fn laid_out(&self, layers: &[Layer<'_>], skinned: &[Vec<[f64; 3]>]) -> Vec<Vec<[f64; 3]>> {
+        let garments = layers.par_iter().zip(skinned).zip(&self.0);
+        let laid_out = garments.map(|((layer, skinned), region)| match region[..] {
+            [] => layer.positions.to_vec(),
+            _ => smoothed(&Outfit::new(std::slice::from_ref(layer)), skinned, region),
+        });
+        laid_out.collect()
+    }
+
+    /// The drape of `layers` at `stage` without them.
+    pub fn laid_out_at(&self, mut stage: Waypoint, layers: &[Layer<'_>]) -> Waypoint {
+        if !self.is_empty() {
+            stage.draped = self.laid_out(&at(layers, &stage.draped), &stage.skinned);
+        }
+        stage
+    }
+}
+
+/// The folds of one garment.
+fn folded(layer: Layer<'_>, skinned: &[[f64; 3]]) -> Vec<u32> {
+    let garment = layer.garment;
+    let faces = garment.faces();
+    let found = self_triangle_pairs(layer.positions, faces);
+    if found.is_empty() {
+        return Vec::new();
+    }
+    let outfit = Outfit::new(std::slice::from_ref(&layer));
+    let length = garment.edge_lengths.iter().sum::<f64>() / garment.edge_lengths.len() as f64;
+    let rings = |reach: f64| ((reach / length).ceil() as usize).clamp(RINGS.0, RINGS.1);
+    let corners = |pairs: &[(u32, u32)]| -> Vec<u32> {
+        pairs.iter().flat_map(|&(f, g)| [f, g]).flat_map(|f| faces[f as usize]).collect()
+    };
+    let creases = corners(&self_triangle_pairs(skinned, faces));
+    let mut is_crease = vec![false; skinned.len()];
+    outfit.neighbourhood(&creases, rings(CREASE)).iter().for_each(|&v| is_crease[v as usize] = true);
+    let is_outside = |f: u32| !faces[f as usize].iter().any(|&v| is_crease[v as usize]);
+    let outside = |mut pairs: Vec<(u32, u32)>| {
+        pairs.retain(|&(f, g)| is_outside(f) && is_outside(g));
+        pairs
+    };
+    let mut crossings = outside(found);
+    let (mut fewest, mut best, mut seeds) = (crossings.len(), Vec::new(), Vec::new());
+    let most = (1.0 + STRAINED) * garment.strain_energy(layer.positions);
+    for reach in REACH {
+        if fewest == 0 {
+            break;
+        }
+        seeds.extend(corners(&crossings));
+        let mut places = places(&outfit, &outfit.neighbourhood(&seeds, rings(reach)));
+        places.retain(|place| garment.strain_energy(&smoothed(&outfit, skinned, place)) <= most);
+        let region = places.concat();
+        crossings = outside(self_triangle_pairs(&smoothed(&outfit, skinned, &region), faces));
+        if crossings.len() < fewest {
+            (fewest, best) = (crossings.len(), region);
+        }
+    }
+    best.sort_unstable();
+    best
+}
+
+/// The parts of a region of the lone garment of `outfit` that hang together.
+fn places(outfit: &Outfit<'_>, region: &[u32]) -> Vec<Vec<u32>> {
+    let mut is_left = vec![false; outfit.vertex_count()];
+    region.iter().for_each(|&v| is_left[v as usize] = true);
+    let mut places = Vec::new();
+    for &start in region {
+        if !std::mem::replace(&mut is_left[start as usize], false) {
+            continue;
+        }
+        let (mut place, mut next) = (vec![start], 0);
+        while let Some(&v) = place.get(next) {
+            place.extend(outfit.ring(v).filter(|&n| std::mem::replace(&mut is_left[n as usize], false)));
+            next += 1;
+        }
+        places.push(place);
+    }
+    places
+}
+
+/// The lone garment of `outfit` with what it adds to `skinned` harmonic in `region`: over-relaxed Gauss–Seidel in a fixed order.
+fn smoothed(outfit: &Outfit<'_>, skinned: &[[f64; 3]], region: &[u32]) -> Vec<[f64; 3]> {
+    let mut positions = outfit.layers[0].positions.to_vec();
+    let mut added: Vec<[f64; 3]> = positions.iter().zip(skinned).map(|(p, s)| sub(*p, *s)).collect();
+    for _ in 0..SWEEPS {
+        for &v in region {
+            let ring = outfit.ring(v);
+            let share = 1.0 / ring.len().max(1) as f64;
+            let mean = scale(ring.fold([0.0; 3], |sum, n| add(sum, added[n as usize])), share);
+            let now = added[v as usize];
+            added[v as usize] = add_scaled(now, OVER, sub(mean, now));
+        }
+    }
+    for &v in region {
+        positions[v as usize] = add(skinned[v as usize], added[v as usize]);
+    }
+    positions
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::RestGarment;
+    use super::*;
+    use crate::mesh::{TriMesh, shapes};
+    use crate::vec3::norm;
+
+    /// A sheet of 40 cm in the plane y = 0, around the origin.
+    fn sheet() -> TriMesh {
+        let grid = shapes::irregular_grid(0.4, 0.4, 24, 24, 0.25, 4);
+        shapes::mapped(&grid, |[x, y, _]| [x - 0.2, 0.0, y - 0.2])
+    }
+
+    /// `p` 1 cm higher, and pushed up to 8 cm along x where it lies around `centre`, over what lies there and back under it.
+    fn folded_at(p: [f64; 3], centre: [f64; 3]) -> [f64; 3] {
+        let from = sub(p, centre);
+        let push = 0.08 * (-(norm(from) / 0.04).powi(2)).exp();
+        [p[0] + push, 0.01 - 0.5 * push * from[0], p[2]]
+    }
+
+    /// The sheet with a fold in its middle.
+    fn folded_sheet(sheet: &TriMesh) -> Vec<[f64; 3]> {
+        sheet.positions().iter().map(|p| folded_at(*p, [0.0; 3])).collect()
+    }
+
+    #[test]
+    fn a_fold_is_laid_out_at_the_height_of_its_surroundings_and_nothing_else_moves() {
+        let mesh = sheet();
+        let garment = RestGarment::new(&mesh);
+        let (skinned, draped) = (vec![mesh.positions().to_vec()], folded_sheet(&mesh));
+        let layers = [Layer { garment: &garment, positions: &draped }];
+        assert!(self_triangle_pairs(&draped, garment.faces()).len() > 20);
+        let folds = Folds::of(&layers, &skinned);
+        let flat = &folds.laid_out(&layers, &skinned)[0];
+        assert!(self_triangle_pairs(flat, garment.faces()).is_empty());
+        let (mut moved, mut kept) = (0, 0);
+        for (v, (p, q)) in draped.iter().zip(flat).enumerate() {
+            if folds.0[0].contains(&(v as u32)) {
+                assert!((q[1] - 0.01).abs() < 0.002, "{q:?}");
+                moved += 1;
+            } else {
+                assert_eq!(p, q);
+                kept += 1;
+            }
+        }
+        assert!(moved > 50 && kept > 200, "{moved} {kept}");
+    }
+
+    #[test]
+    fn what_does_not_cross_or_crosses_in_a_crease_of_the_skinned_garment_stays() {
+        let mesh = sheet();
+        let garment = RestGarment::new(&mesh);
+        let (flat, folded) = (mesh.positions().to_vec(), folded_sheet(&mesh));
+        for (draped, skinned) in [(&flat, &folded), (&folded, &folded)] {
+            let layers = [Layer { garment: &garment, positions: draped }];
+            let folds = Folds::of(&layers, std::slice::from_ref(skinned));
+            assert!(folds.is_empty());
+            assert_eq!(folds.laid_out(&layers, std::slice::from_ref(skinned))[0], *draped);
+        }
+    }
+
+    /// Two folds; around the second one skinning pulls a long spike out of the sheet.
+    #[test]
+    fn a_fold_stays_where_cloth_would_be_stretched_without_it() {
+        let mesh = sheet();
+        let garment = RestGarment::new(&mesh);
+        let centres = [[-0.1, 0.0, 0.0], [0.1, 0.0, 0.0]];
+        let fold = |p: &[f64; 3]| folded_at(*p, centres[usize::from(p[0] > 0.0)]);
+        let draped: Vec<[f64; 3]> = mesh.positions().iter().map(fold).collect();
+        let spike = |p: &[f64; 3]| [p[0], 0.5 * (-(norm(sub(*p, centres[1])) / 0.02).powi(2)).exp(), p[2]];
+        let skinned = vec![mesh.positions().iter().map(spike).collect::<Vec<_>>()];
+        let layers = [Layer { garment: &garment, positions: &draped }];
+        let folds = Folds::of(&layers, &skinned);
+        assert!(folds.0[0].len() > 20);
+        assert!(folds.0[0].iter().all(|v| mesh.positions()[*v as usize][0] < 0.05));
+        let flat = &folds.laid_out(&layers, &skinned)[0];
+        assert!(garment.strain_energy(flat) <= (1.0 + STRAINED) * garment.strain_energy(&draped));
+        let left = self_triangle_pairs(flat, garment.faces());
+        assert!(!left.is_empty() && left.len() < self_triangle_pairs(&draped, garment.faces()).len());
+    }
+
+    /// A place that is folded in one pose is laid out in all of them.
+    #[test]
+    fn folds_of_two_poses_add_up() {
+        let mesh = sheet();
+        let garment = RestGarment::new(&mesh);
+        let (skinned, draped) = (vec![mesh.positions().to_vec()], folded_sheet(&mesh));
+        let layers = [Layer { garment: &garment, positions: &draped }];
+        let folds = Folds::of(&layers, &skinned);
+        let both = Folds::none(&layers).and(folds.clone()).and(folds.clone());
+        assert_eq!(both.0, folds.0);
+    }
+}
