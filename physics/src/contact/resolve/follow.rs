@@ -49,7 +49,7 @@ pub struct Reached {
 }
 
 /// As [`super::resolve`], with a second way out, and for garments of which it is known where they are `skinned` alone, `[V, 3]` each
-/// [m]: what folds only in the drape is laid out first. Where crossings of `layers` on `body` cannot be mended, the garments are taken
+/// [m]: what only the drape folds is laid out first, unless that leaves more crossings. Where crossings of `layers` on `body` cannot be mended, the garments are taken
 /// along from the stage at 0, the T-pose, to the stage at 1, which is `body` with `layers`; where that leaves crossings, once more
 /// with drapes that are taken back towards the skinned garments around them. What leaves the fewest is returned.
 ///
@@ -62,17 +62,38 @@ pub fn resolve_along<E: From<ResolveError>>(
     settings: &ResolveSettings,
     mut stage_at: impl FnMut(f64) -> Result<Waypoint, E>,
 ) -> Result<Resolved, E> {
+    let start = Instant::now();
     settings.check()?;
     check(body, layers)?;
     check(body, &placed(layers, skinned)?)?;
     // Strict limits leave a drape as it is, as far as it can be left.
-    let is_strict = settings.loosened <= 1.0 || !settings.self_contact;
-    let folds = if is_strict { Folds::none(layers) } else { Folds::of(layers, skinned) };
-    let positions = (!folds.is_empty()).then(|| folds.laid_out(layers, skinned));
-    let laid_out = positions.as_ref().map(|positions| at(layers, positions));
-    let laid_out = laid_out.as_deref();
-    resolved_further(body, layers, laid_out, settings, |room, mut best, start| {
-        let layers = laid_out.unwrap_or(layers);
+    if settings.loosened <= 1.0 || !settings.self_contact {
+        return taken_along(body, layers, None, settings, &mut stage_at);
+    }
+    let folds = Folds::of(layers, skinned);
+    let positions = folds.laid_out(layers, skinned);
+    let mut resolved = taken_along(body, &at(layers, &positions), Some(&folds), settings, &mut stage_at)?;
+    if !folds.is_empty() {
+        let is_late = settings.is_late(start, layers.len());
+        if !resolved.certificate.is_clear() && !is_late {
+            let as_given = taken_along(body, layers, None, settings, &mut stage_at)?;
+            resolved = resolved.or(as_given);
+        }
+        resolved.compare_since(layers, start);
+    }
+    Ok(resolved)
+}
+
+/// [`resolve_along`] for `layers` as they are; with `folds`, those and others that the drape in the T-pose has are laid out on the
+/// way.
+fn taken_along<E: From<ResolveError>>(
+    body: &Surface<f64>,
+    layers: &[Layer<'_>],
+    folds: Option<&Folds>,
+    settings: &ResolveSettings,
+    stage_at: &mut impl FnMut(f64) -> Result<Waypoint, E>,
+) -> Result<Resolved, E> {
+    resolved_further(body, layers, settings, |room, mut best, start| {
         let is_torn = best.certificate.strain_added.is_some_and(|added| added > TORN);
         if best.certificate.is_clear() && !is_torn || settings.steps == 0 {
             return Ok(best);
@@ -80,9 +101,9 @@ pub fn resolve_along<E: From<ResolveError>>(
         let way = Way { layers, end: room, settings, start, strides: Strides::FROM_T_POSE };
         let mut checked_at = |share: f64| Ok::<_, E>(checked(stage_at(share)?, layers)?);
         let t_pose = checked_at(0.0)?;
-        let folds = match is_strict {
-            true => folds,
-            false => folds.and(Folds::of(&at(layers, &t_pose.draped), &t_pose.skinned)),
+        let folds = match folds {
+            Some(folds) => folds.clone().and(&Folds::of(&at(layers, &t_pose.draped), &t_pose.skinned)),
+            None => Folds::default(),
         };
         let t_pose = folds.laid_out_at(t_pose, layers);
         let mut stage_at = |share: f64| checked_at(share).map(|stage| folds.laid_out_at(stage, layers));

@@ -93,38 +93,31 @@ pub fn resolve(
 ) -> Result<Resolved, ResolveError> {
     settings.check()?;
     check(body, layers)?;
-    resolved_further(body, layers, None, settings, |_, found, _| Ok(found))
+    resolved_further(body, layers, settings, |_, found, _| Ok(found))
 }
 
 /// [`resolve`] for valid arguments. Where something is left to do after the first attempts, `further` may go on from there: it
-/// gets the body, what was reached, and when all began. What comes of it is compared with the garments as they were `given`, before
-/// they were laid out.
+/// gets the body, what was reached, and when all began.
 fn resolved_further<E>(
     body: &Surface<f64>,
-    given: &[Layer<'_>],
-    laid_out: Option<&[Layer<'_>]>,
+    layers: &[Layer<'_>],
     settings: &ResolveSettings,
     further: impl FnOnce(&Body<'_>, Resolved, Instant) -> Result<Resolved, E>,
 ) -> Result<Resolved, E> {
     let start = Instant::now();
-    let layers = laid_out.unwrap_or(given);
     with_drawn(body, layers, |drawn| {
         let simple = simply_resolved(&drawn, layers, settings, start);
-        let is_done = simple.certificate.is_clear();
-        if is_done && laid_out.is_none() {
+        if simple.certificate.is_clear() {
             return Ok(simple);
         }
         let relieving = Instant::now();
         with_body(drawn, layers.len(), |room| {
-            let mut found = simple;
-            if !is_done {
-                found = resolved(room, layers, settings, found, relieving);
-                found.go_on(body, layers, settings, start);
-                found.compare_since(given, start);
-                found = further(room, found, start)?;
-            }
-            found.ease(room, given, settings, start, ease::TIMES);
-            found.compare_since(given, start);
+            let mut found = resolved(room, layers, settings, simple, relieving);
+            found.go_on(body, layers, settings, start);
+            found.compare_since(layers, start);
+            let mut found = further(room, found, start)?;
+            found.ease(room, layers, settings, start, ease::TIMES);
+            found.compare_since(layers, start);
             Ok(found)
         })
     })

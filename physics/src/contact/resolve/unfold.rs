@@ -26,8 +26,8 @@ const SWEEPS: usize = 100;
 /// …and its over-relaxation.
 const OVER: f64 = 1.7;
 
-/// Where garments are to be laid out: vertices of each, ascending.
-#[derive(Debug, Clone)]
+/// Where garments are to be laid out: vertices of each, ascending; without an entry for a garment it has none.
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Folds(Vec<Vec<u32>>);
 
 impl Folds {
@@ -37,19 +37,14 @@ impl Folds {
         Self(layers.par_iter().zip(skinned).map(|(layer, skinned)| folded(*layer, skinned)).collect())
     }
 
-    /// No folds.
-    pub fn none(layers: &[Layer<'_>]) -> Self {
-        Self(vec![Vec::new(); layers.len()])
-    }
-
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.0.iter().all(Vec::is_empty)
     }
 
     /// These and those of the same garments in another pose, so that what is laid out in one is in the other.
-    pub fn and(mut self, others: Self) -> Self {
-        for (folds, more) in self.0.iter_mut().zip(others.0) {
+    pub fn and(mut self, others: &Self) -> Self {
+        for (folds, more) in self.0.iter_mut().zip(&others.0) {
             folds.extend(more);
             folds.sort_unstable();
             folds.dedup();
@@ -59,10 +54,10 @@ impl Folds {
 
     /// The garments without them.
     pub fn laid_out(&self, layers: &[Layer<'_>], skinned: &[Vec<[f64; 3]>]) -> Vec<Vec<[f64; 3]>> {
-        let garments = layers.par_iter().zip(skinned).zip(&self.0);
-        let laid_out = garments.map(|((layer, skinned), region)| match region[..] {
-            [] => layer.positions.to_vec(),
-            _ => smoothed(&Outfit::new(std::slice::from_ref(layer)), skinned, region),
+        let garments = layers.par_iter().zip(skinned).enumerate();
+        let laid_out = garments.map(|(g, (layer, skinned))| match self.0.get(g).map(Vec::as_slice) {
+            None | Some([]) => layer.positions.to_vec(),
+            Some(region) => smoothed(&Outfit::new(std::slice::from_ref(layer)), skinned, region),
         });
         laid_out.collect()
     }
@@ -245,7 +240,6 @@ mod tests {
         let (skinned, draped) = (vec![mesh.positions().to_vec()], folded_sheet(&mesh));
         let layers = [Layer { garment: &garment, positions: &draped }];
         let folds = Folds::of(&layers, &skinned);
-        let both = Folds::none(&layers).and(folds.clone()).and(folds.clone());
-        assert_eq!(both.0, folds.0);
+        assert_eq!(folds.clone().and(&folds), folds);
     }
 }
