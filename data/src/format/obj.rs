@@ -2,6 +2,10 @@
 //!
 //! Own parser, because a message must name the line: the usual libraries report neither it nor the offending index.
 
+mod moved;
+
+pub use moved::MovedObj;
+
 use super::atomic;
 use super::mesh::{MeshFileError, PolygonMesh, check_count, fan, read_limited};
 use clothcombo_physics::mesh::TriMesh;
@@ -226,62 +230,6 @@ pub fn save_polygons<'a>(
     atomic::write(path, text.as_bytes()).map_err(|source| ObjError::Io { path: path.into(), source })
 }
 
-/// The bytes of an OBJ file with other vertex positions: faces, texture coordinates, groups, materials, comments and what
-/// follows a vertex's coordinates (colours) stay as they are. Coordinates are written so that they read back to the bit.
-///
-/// # Errors
-/// The number of vertices in the file, if there are not as many `positions`.
-pub fn with_positions(bytes: &[u8], positions: &[[f64; 3]]) -> Result<Vec<u8>, usize> {
-    let mut out = Vec::with_capacity(bytes.len() + bytes.len() / 4);
-    let mut count = 0;
-    for line in bytes.split_inclusive(|b| *b == b'\n') {
-        let mut words = line.split(|b| b.is_ascii_whitespace()).filter(|word| !word.is_empty());
-        if words.next() != Some(b"v") {
-            out.extend_from_slice(line);
-            continue;
-        }
-        if let Some([x, y, z]) = positions.get(count) {
-            out.extend_from_slice(format!("v {x} {y} {z}").as_bytes());
-        }
-        count += 1;
-        // Behind the third coordinate, the line's end included.
-        let mut rest = line;
-        for _ in 0..4 {
-            let start = rest.iter().position(|b| !b.is_ascii_whitespace()).unwrap_or(rest.len());
-            let length = rest[start..].iter().position(|b| b.is_ascii_whitespace() || *b == b'#');
-            rest = &rest[start + length.unwrap_or(rest.len() - start)..];
-        }
-        out.extend_from_slice(rest);
-    }
-    if count == positions.len() { Ok(out) } else { Err(count) }
-}
-
-/// The bytes of an OBJ file without its normals, which other positions make wrong; programs that read it compute them anew.
-pub fn without_normals(bytes: &[u8]) -> Vec<u8> {
-    let mut out = Vec::with_capacity(bytes.len());
-    for line in bytes.split_inclusive(|b| *b == b'\n') {
-        let mut words = line.split(|b| b.is_ascii_whitespace()).filter(|word| !word.is_empty());
-        match words.next() {
-            Some(b"vn") => {}
-            Some(b"f") => {
-                out.push(b'f');
-                for word in words.take_while(|word| !word.starts_with(b"#")) {
-                    let mut parts = word.split(|b| *b == b'/');
-                    out.push(b' ');
-                    out.extend_from_slice(parts.next().unwrap_or_default());
-                    if let Some(texture) = parts.next().filter(|t| !t.is_empty()) {
-                        out.push(b'/');
-                        out.extend_from_slice(texture);
-                    }
-                }
-                out.push(b'\n');
-            }
-            _ => out.extend_from_slice(line),
-        }
-    }
-    out
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -292,30 +240,6 @@ mod tests {
         let mesh =
             ObjMesh::parse("\u{feff}v 1 2 3\nv 0 1 0\nv 0 0 1\nf 1 2 3\n", Path::new("a.obj")).unwrap();
         assert_eq!((mesh.positions.len(), mesh.positions[0]), (3, [1.0, 2.0, 3.0]));
-    }
-
-    #[test]
-    fn without_normals_everything_else_stays() {
-        let text = "v 0 0 0\nvn 0 0 1\nvt 0 1\nusemtl red\nf 1/1/1 2//1 -1/2 4 # seam\r\n  f 1//1 2//1 3//1";
-        let bytes = without_normals(text.as_bytes());
-        assert_eq!(
-            String::from_utf8(bytes).unwrap(),
-            "v 0 0 0\nvt 0 1\nusemtl red\nf 1/1 2 -1/2 4\nf 1 2 3\n"
-        );
-    }
-
-    #[test]
-    fn other_positions_leave_the_rest_of_the_file_alone() {
-        let text =
-            "# one\r\n  v 1 2 3 0.5 0.5 0.5 # red\r\nvn 0 0 1\nv 4 5 6#x\nv\t7 8 9\ng a b\nf 1/1 2/2 -1/3\n";
-        let positions = [[0.1, -2e-17, 3.0], [1.0 / 3.0, 0.0, 0.0], [5.0, 6.0, 7.0]];
-        let bytes = with_positions(text.as_bytes(), &positions).unwrap();
-        let new = String::from_utf8(bytes).unwrap();
-        assert!(new.contains(" 0.5 0.5 0.5 # red\r\nvn 0 0 1\n") && new.contains("0 0#x\n"), "{new}");
-        assert!(new.ends_with("g a b\nf 1/1 2/2 -1/3\n"));
-        assert_eq!(parse(&new).unwrap().positions, positions);
-        assert_eq!(parse(&new).unwrap().polygons, [[0, 1, 2]]);
-        assert_eq!(with_positions(text.as_bytes(), &positions[1..]), Err(3));
     }
 
     fn parse(text: &str) -> Result<ObjMesh, String> {

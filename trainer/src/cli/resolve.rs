@@ -6,7 +6,8 @@ use crate::draper::UniqueNames;
 use crate::draper::output::Staged;
 use crate::score::{DrapedGarment, Score, ScoreDistance, ScoreError, load_body, load_garment, score};
 use clap::Parser;
-use clothcombo_data::format::{MeshFormat, load_mesh, obj};
+use clothcombo_data::format::obj::MovedObj;
+use clothcombo_data::format::{MeshFormat, load_mesh};
 use clothcombo_physics::contact::resolve::{
     Certificate, Layer, ResolveSettings, Resolved, RestGarment, certify, resolve,
 };
@@ -239,24 +240,24 @@ fn write(
     resolved: &Resolved,
     report: &ResolveReport,
 ) -> Result<(), Report> {
-    let texts = garments.iter().zip(&resolved.positions).map(|(garment, p)| text(garment, p));
-    let texts = texts.collect::<Result<Vec<_>, Report>>()?;
-    let save = |name: &str, bytes: &[u8]| {
-        let path = staged.folder().join(name);
-        fs::write(&path, bytes).into_diagnostic().wrap_err_with(|| format!("cannot write {}", path.display()))
-    };
-    garments.iter().zip(&texts).try_for_each(|(garment, text)| save(&garment.file(), text))?;
+    let meshes = garments.iter().zip(&resolved.positions).map(|(garment, p)| moved(garment, p));
+    let meshes = meshes.collect::<Result<Vec<_>, Report>>()?;
     let json = serde_json::to_string_pretty(report).into_diagnostic()?;
-    save("report.json", json.as_bytes())?;
+    let folder = staged.folder();
+    let failed = |name: &str| format!("cannot write {}", folder.join(name).display());
+    for (garment, mesh) in garments.iter().zip(&meshes) {
+        mesh.save(folder, &garment.name).into_diagnostic().wrap_err_with(|| failed(&garment.name))?;
+    }
+    fs::write(folder.join("report.json"), json).into_diagnostic().wrap_err_with(|| failed("report.json"))?;
     Ok(staged.commit()?)
 }
 
 /// The garment's file with new positions; a file of another format becomes an OBJ of its polygons.
-fn text(garment: &Garment, positions: &[[f64; 3]]) -> Result<Vec<u8>, Report> {
+fn moved(garment: &Garment, positions: &[[f64; 3]]) -> Result<MovedObj, Report> {
     let path = &garment.path;
     let bytes = fs::read(path).into_diagnostic().wrap_err_with(|| path.display().to_string())?;
     if MeshFormat::detect(path, &bytes) == Some(MeshFormat::Obj) {
-        return obj::with_positions(&bytes, positions)
+        return MovedObj::new(path, &bytes, positions, &garment.name)
             .map_err(|count| miette!("{} changed while it was read: {count} vertices now", path.display()));
     }
     let mut text = String::new();
@@ -270,7 +271,7 @@ fn text(garment: &Garment, positions: &[[f64; 3]]) -> Result<Vec<u8>, Report> {
         });
         text.push('\n');
     }
-    Ok(text.into_bytes())
+    Ok(MovedObj { obj: text.into_bytes(), mtl: None })
 }
 
 fn table(report: &ResolveReport) -> String {

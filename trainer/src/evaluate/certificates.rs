@@ -169,6 +169,8 @@ fn skinned(scene: &PreparedScene) -> Vec<[f32; 3]> {
 pub struct Counts {
     /// Exact pairs with the body.
     pub body_triangle_pairs: usize,
+    /// Those of them where the body leaves hardly any room for cloth.
+    pub narrow_triangle_pairs: usize,
     /// Exact pairs of two garments.
     pub layer_triangle_pairs: usize,
     /// Exact pairs of a garment with itself.
@@ -190,6 +192,7 @@ impl Counts {
     pub fn new(certificate: &Certificate, order_violations_by_vertices: f64) -> Self {
         Self {
             body_triangle_pairs: certificate.body_triangle_pairs,
+            narrow_triangle_pairs: certificate.narrow_triangle_pairs,
             layer_triangle_pairs: certificate.layer_triangle_pairs,
             self_triangle_pairs: certificate.self_triangle_pairs,
             pinched_pairs: certificate.pinched.count(),

@@ -25,6 +25,7 @@ impl Case {
         case.write("body.obj", &text);
         case.write("tee.obj", &quad_tube(0.149, 40, 12));
         case.write("coat.obj", &quad_tube(0.1485, 36, 10));
+        case.write("tube.mtl", "newmtl wool\nKd 1 0 0\n");
         case
     }
 
@@ -114,13 +115,20 @@ fn what_is_written_is_clear_and_has_the_topology_it_came_with() {
     for name in ["tee.obj", "coat.obj"] {
         let parse = |path: PathBuf| {
             let text = fs::read_to_string(&path).unwrap();
-            let others: Vec<String> =
-                text.lines().filter(|l| !l.starts_with("v ")).map(str::to_owned).collect();
+            let others: Vec<String> = text
+                .lines()
+                .filter(|l| !l.starts_with("v "))
+                .map(|l| l.replace("tube.mtl", "NAME.mtl"))
+                .collect();
             (ObjMesh::parse(&text, &path).unwrap(), others)
         };
         let (before, others_before) = parse(case.path(name));
         let (after, others_after) = parse(case.path("out").join(name));
-        assert_eq!(others_before, others_after);
+        let name = name.trim_end_matches(".obj");
+        let others_after = others_after.iter().map(|l| l.replace(&format!("{name}.mtl"), "NAME.mtl"));
+        assert!(others_before.iter().cloned().eq(others_after));
+        let mtl = fs::read_to_string(case.path("out").join(format!("{name}.mtl"))).unwrap();
+        assert!(mtl.starts_with("newmtl wool\nKd 1 0 0\n"), "{mtl}");
         assert_eq!(before.polygons, after.polygons);
         assert_eq!(before.positions.len(), after.positions.len());
         assert_ne!(before.positions, after.positions);
@@ -189,7 +197,8 @@ fn a_body_that_is_inside_out_is_turned_and_names_are_told_apart() {
         .map(|e| e.unwrap().file_name().into_string().unwrap())
         .collect();
     files.sort();
-    assert_eq!(files, [".clothcombo-files", "report.json", "tee-2.obj", "tee-3.obj", "tee.obj"]);
+    let meshes = ["tee-2.mtl", "tee-2.obj", "tee-3.obj", "tee.mtl", "tee.obj"];
+    assert_eq!(files, [[".clothcombo-files", "report.json"].as_slice(), &meshes].concat());
 }
 
 #[test]

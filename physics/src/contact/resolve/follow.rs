@@ -49,9 +49,10 @@ pub struct Reached {
 }
 
 /// As [`super::resolve`], with a second way out, and for garments of which it is known where they are `skinned` alone, `[V, 3]` each
-/// [m]: what only the drape folds is laid out first, unless that leaves more crossings. Where crossings of `layers` on `body` cannot be mended, the garments are taken
-/// along from the stage at 0, the T-pose, to the stage at 1, which is `body` with `layers`; where that leaves crossings, once more
-/// with drapes that are taken back towards the skinned garments around them. What leaves the fewest is returned.
+/// [m]: what only the drape folds is laid out first, unless that leaves more crossings. Where crossings of `layers` on `body`
+/// cannot be mended, the garments are taken along from the stage at 0, the T-pose, to the stage at 1, which is `body` with
+/// `layers`; where that leaves crossings, once more with drapes that are taken back towards the skinned garments around them.
+/// What leaves the fewest is returned.
 ///
 /// # Errors
 /// Those of `stage_at` and of [`super::resolve`].

@@ -292,14 +292,17 @@ fn print_tables(results: &[OutfitResult], layers: usize) {
     }
     let failures: Vec<&OutfitResult> = results.iter().filter(|r| !r.after.is_clear()).collect();
     if !failures.is_empty() {
-        println!("\nnot clear: pairs with the body, between layers (before → after); pinched; deepest [mm]");
+        println!(
+            "\nnot clear: pairs with the body (before → after, of those narrow), between layers; pinched; deepest [mm]"
+        );
     }
     for r in failures {
         println!(
-            "{:>5}  {:>5} → {:<5}{:>6} → {:<5}{:>6}{:>8.1}  {}{}",
+            "{:>5}  {:>5} → {:<5}{:>5}{:>6} → {:<5}{:>6}{:>8.1}  {}{}",
             r.draw,
             r.before.body_triangle_pairs,
             r.after.body_triangle_pairs,
+            r.after.narrow_triangle_pairs,
             r.before.layer_triangle_pairs,
             r.after.layer_triangle_pairs,
             r.after.pinched_pairs,

@@ -17,8 +17,8 @@ pub use staged::Staged;
 
 use super::{Drape, Draper, DraperError, Moment, Outfit, SourceGarment};
 use crate::picture::{BODY_COLOUR, PictureError, layer_colour};
-use clothcombo_data::format::obj::{self, ObjError};
-use clothcombo_data::format::{GlbError, SceneMesh, atomic, save_glb};
+use clothcombo_data::format::obj::{self, MovedObj, ObjError};
+use clothcombo_data::format::{GlbError, SceneMesh, save_glb};
 use miette::Diagnostic;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -168,8 +168,10 @@ fn write_frame(folder: &Path, show: &Show, drape: &Drape) -> Result<(), OutputEr
         }
         let positions = source.in_given_order(&garment.positions);
         let path = folder.join(format!("{}.obj", piece.name));
-        match as_given(source, &positions, &comments) {
-            Some(bytes) => atomic::write(&path, &bytes).map_err(|reason| OutputError::Io { path, reason })?,
+        match as_given(source, &positions, &piece.name, &comments) {
+            Some(moved) => {
+                moved.save(folder, &piece.name).map_err(|reason| OutputError::Io { path, reason })?
+            }
             None => obj::save_polygons(&path, &positions, source.given.polygons(), &comments)?,
         }
     }
@@ -178,15 +180,20 @@ fn write_frame(folder: &Path, show: &Show, drape: &Drape) -> Result<(), OutputEr
 
 /// The given OBJ file at other positions, with its texture coordinates, groups and materials; `None` for another format, or
 /// a file that is no longer what was read.
-fn as_given(source: &SourceGarment, positions: &[[f64; 3]], comments: &[String]) -> Option<Vec<u8>> {
+fn as_given(
+    source: &SourceGarment,
+    positions: &[[f64; 3]],
+    name: &str,
+    comments: &[String],
+) -> Option<MovedObj> {
     let path =
         source.path.as_ref().filter(|p| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")))?;
-    let moved = obj::with_positions(&std::fs::read(path).ok()?, positions).ok()?;
+    let mut moved = MovedObj::new(path, &std::fs::read(path).ok()?, positions, name).ok()?;
     let lines = comments.iter().flat_map(|comment| comment.lines());
     let mut bytes: Vec<u8> = lines.flat_map(|line| format!("# {line}\n").into_bytes()).collect();
     bytes.extend_from_slice(b"# what follows is the file as it was given, with other vertices\n");
-    bytes.extend(obj::without_normals(&moved));
-    Some(bytes)
+    bytes.append(&mut moved.obj);
+    Some(MovedObj { obj: bytes, ..moved })
 }
 
 fn write_scene(path: &Path, show: &Show) -> Result<(), OutputError> {

@@ -176,3 +176,41 @@ fn what_does_not_fit_is_refused() {
         assert!(matches!(after(&spoil), Err(ResolveError::Count { garment: 0, .. })));
     }
 }
+
+/// A sheet that lies folded over a ball. Laid out it is clear of the ball where it may be lifted, and is in it otherwise.
+#[test]
+fn what_only_the_drape_folds_is_laid_out_unless_that_leaves_crossings() {
+    let grid = shapes::irregular_grid(0.4, 0.4, 24, 24, 0.25, 4);
+    let sheet = shapes::mapped(&grid, |[x, y, _]| [x - 0.2, 0.0, y - 0.2]);
+    let ball =
+        Surface::from_mesh(&shapes::mapped(&shapes::icosphere(0.08, 3), |p| add(p, [0.0, -0.03, 0.0])));
+    let folded = |p: &[f64; 3]| {
+        let push = 0.08 * (-(norm(*p) / 0.04).powi(2)).exp();
+        let [x, z] = [p[0] + push, p[2]];
+        let over_ball = 0.06 * (-(x * x + z * z) / 0.0081).exp();
+        [x, 0.01 + over_ball - 0.5 * push * p[0], z]
+    };
+    let draped: Vec<[f64; 3]> = sheet.positions().iter().map(folded).collect();
+    let skinned = vec![sheet.positions().to_vec()];
+    let garment = RestGarment::new(&sheet);
+    let layers = [Layer { garment: &garment, positions: &draped }];
+    let along = |settings: ResolveSettings| {
+        let no_way = |_| Err(ResolveError::EmptyBody);
+        resolve_along(&ball, &layers, &skinned, &ResolveSettings { steps: 0, ..settings }, no_way).unwrap()
+    };
+
+    let free = along(ResolveSettings::default());
+    assert!(free.certificate.is_clear());
+    assert_eq!(free.certificate.self_triangle_pairs, 0);
+
+    // The ball is deeper in the sheet than 2 mm.
+    let narrow = ResolveSettings { farthest: 5e-4, loosened: 1.1, ..ResolveSettings::default() };
+    let held = along(narrow);
+    assert!(held.certificate.is_clear());
+    assert!(held.certificate.self_triangle_pairs > 20, "{}", held.certificate.self_triangle_pairs);
+    assert!(held.garments[0].largest_move < 5e-3, "{}", held.garments[0].largest_move);
+
+    // Strict limits leave the fold alone from the start.
+    let strict = along(ResolveSettings { loosened: 1.0, ..ResolveSettings::default() });
+    assert!(strict.certificate.self_triangle_pairs > 0);
+}

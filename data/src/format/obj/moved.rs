@@ -1,0 +1,207 @@
+//! A garment's own file for where the garment is now.
+
+use super::super::atomic;
+use super::super::mesh::read_limited;
+use std::io;
+use std::path::Path;
+
+/// Statements of a material library that name a texture, but for those that begin with `map_`.
+const TEXTURES: [&str; 5] = ["bump", "disp", "decal", "refl", "norm"];
+/// An OBJ file at other vertex positions, with the materials it names.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MovedObj {
+    /// The file: faces, texture coordinates, groups, comments and colours as they were, other vertices, no normals.
+    pub obj: Vec<u8>,
+    /// Its material libraries in one; none where it names none that can be read.
+    pub mtl: Option<Vec<u8>>,
+}
+
+impl MovedObj {
+    /// The file of `bytes`, read from `path`, at other `positions`, to be written as `NAME.obj` and `NAME.mtl`: textures are named
+    /// by where they are, so that both files can be elsewhere.
+    ///
+    /// # Errors
+    /// The number of vertices in the file, if there are not as many `positions`.
+    pub fn new(path: &Path, bytes: &[u8], positions: &[[f64; 3]], name: &str) -> Result<Self, usize> {
+        let moved = without_normals(&with_positions(bytes, positions)?);
+        let folder = path.parent().unwrap_or(Path::new(""));
+        Ok(with_materials(&moved, folder, name))
+    }
+
+    /// Writes both into `folder`, each whole or not at all.
+    ///
+    /// # Errors
+    /// When one cannot be written.
+    pub fn save(&self, folder: &Path, name: &str) -> io::Result<()> {
+        if let Some(mtl) = &self.mtl {
+            atomic::write(&folder.join(format!("{name}.mtl")), mtl)?;
+        }
+        atomic::write(&folder.join(format!("{name}.obj")), &self.obj)
+    }
+}
+
+/// Other vertex positions. What follows a vertex's coordinates (colours) stays, and the coordinates read back to the bit.
+fn with_positions(bytes: &[u8], positions: &[[f64; 3]]) -> Result<Vec<u8>, usize> {
+    let mut out = Vec::with_capacity(bytes.len() + bytes.len() / 4);
+    let mut count = 0;
+    for line in bytes.split_inclusive(|b| *b == b'\n') {
+        let mut words = line.split(|b| b.is_ascii_whitespace()).filter(|word| !word.is_empty());
+        if words.next() != Some(b"v") {
+            out.extend_from_slice(line);
+            continue;
+        }
+        if let Some([x, y, z]) = positions.get(count) {
+            out.extend_from_slice(format!("v {x} {y} {z}").as_bytes());
+        }
+        count += 1;
+        // Behind the third coordinate, the line's end included.
+        let mut rest = line;
+        for _ in 0..4 {
+            let start = rest.iter().position(|b| !b.is_ascii_whitespace()).unwrap_or(rest.len());
+            let length = rest[start..].iter().position(|b| b.is_ascii_whitespace() || *b == b'#');
+            rest = &rest[start + length.unwrap_or(rest.len() - start)..];
+        }
+        out.extend_from_slice(rest);
+    }
+    if count == positions.len() { Ok(out) } else { Err(count) }
+}
+
+/// The bytes of an OBJ file without its normals, which other positions make wrong; programs that read it compute them anew.
+fn without_normals(bytes: &[u8]) -> Vec<u8> {
+    let mut out = Vec::with_capacity(bytes.len());
+    for line in bytes.split_inclusive(|b| *b == b'\n') {
+        let mut words = line.split(|b| b.is_ascii_whitespace()).filter(|word| !word.is_empty());
+        match words.next() {
+            Some(b"vn") => {}
+            Some(b"f") => {
+                out.push(b'f');
+                for word in words.take_while(|word| !word.starts_with(b"#")) {
+                    let mut parts = word.split(|b| *b == b'/');
+                    out.push(b' ');
+                    out.extend_from_slice(parts.next().unwrap_or_default());
+                    if let Some(texture) = parts.next().filter(|t| !t.is_empty()) {
+                        out.push(b'/');
+                        out.extend_from_slice(texture);
+                    }
+                }
+                out.push(b'\n');
+            }
+            _ => out.extend_from_slice(line),
+        }
+    }
+    out
+}
+
+/// The OBJ file of `bytes`, from `folder`, with one material library instead of those it names.
+fn with_materials(bytes: &[u8], folder: &Path, name: &str) -> MovedObj {
+    let (mut obj, mut mtl) = (Vec::with_capacity(bytes.len()), None::<Vec<u8>>);
+    for line in bytes.split_inclusive(|b| *b == b'\n') {
+        let text = String::from_utf8_lossy(line);
+        let libraries =
+            text.trim().strip_prefix("mtllib").filter(|rest| rest.starts_with(char::is_whitespace));
+        let found = libraries.map(|names| libraries_of(names.trim(), folder)).unwrap_or_default();
+        if found.is_empty() {
+            obj.extend_from_slice(line);
+            continue;
+        }
+        if mtl.is_none() {
+            obj.extend_from_slice(format!("mtllib {name}.mtl\n").as_bytes());
+        }
+        mtl.get_or_insert_default().extend_from_slice(found.as_bytes());
+    }
+    MovedObj { obj, mtl }
+}
+
+/// All material libraries in `folder` that can be read of those in `names`, which is one name with spaces, or several.
+fn libraries_of(names: &str, folder: &Path) -> String {
+    let read = |name: &str| read_limited(&folder.join(name)).ok();
+    let libraries = match read(names) {
+        Some(one) => vec![one],
+        None => names.split_whitespace().filter_map(read).collect(),
+    };
+    let mut all = String::new();
+    for line in libraries.iter().flat_map(|library| library.split(|b| *b == b'\n')) {
+        all.push_str(&with_texture_found(String::from_utf8_lossy(line).trim_end(), folder));
+        all.push('\n');
+    }
+    all
+}
+
+/// A line of a material library with its texture named by where it is, if it names one that can be found from `folder`. Options
+/// come before a name that may have spaces: the longest end of the line that is a file is it.
+fn with_texture_found(line: &str, folder: &Path) -> String {
+    let statement = line.split_whitespace().next().unwrap_or_default().to_ascii_lowercase();
+    if !statement.starts_with("map_") && !TEXTURES.contains(&statement.as_str()) {
+        return line.into();
+    }
+    let spaces = line.match_indices(char::is_whitespace).map(|(at, space)| at + space.len());
+    let found = spaces.filter(|start| !line[*start..].starts_with(char::is_whitespace)).find_map(|start| {
+        // Some programs write the separators of their system.
+        let path = std::path::absolute(folder.join(line[start..].replace('\\', "/"))).ok()?;
+        path.is_file().then_some((start, path))
+    });
+    found.map_or_else(|| line.into(), |(start, path)| format!("{}{}", &line[..start], path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::ObjMesh;
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn without_normals_everything_else_stays() {
+        let text = "v 0 0 0\nvn 0 0 1\nvt 0 1\nusemtl red\nf 1/1/1 2//1 -1/2 4 # seam\r\n  f 1//1 2//1 3//1";
+        let bytes = without_normals(text.as_bytes());
+        assert_eq!(
+            String::from_utf8(bytes).unwrap(),
+            "v 0 0 0\nvt 0 1\nusemtl red\nf 1/1 2 -1/2 4\nf 1 2 3\n"
+        );
+    }
+
+    #[test]
+    fn other_positions_leave_the_rest_of_the_file_alone() {
+        let text =
+            "# one\r\n  v 1 2 3 0.5 0.5 0.5 # red\r\nvn 0 0 1\nv 4 5 6#x\nv\t7 8 9\ng a b\nf 1/1 2/2 -1/3\n";
+        let positions = [[0.1, -2e-17, 3.0], [1.0 / 3.0, 0.0, 0.0], [5.0, 6.0, 7.0]];
+        let bytes = with_positions(text.as_bytes(), &positions).unwrap();
+        let new = String::from_utf8(bytes).unwrap();
+        assert!(new.contains(" 0.5 0.5 0.5 # red\r\nvn 0 0 1\n") && new.contains("0 0#x\n"), "{new}");
+        assert!(new.ends_with("g a b\nf 1/1 2/2 -1/3\n"));
+        let mesh = ObjMesh::parse(&new, Path::new("shirt.obj")).unwrap();
+        assert_eq!(mesh.positions, positions);
+        assert_eq!(mesh.polygons, [[0, 1, 2]]);
+        assert_eq!(with_positions(text.as_bytes(), &positions[1..]), Err(3));
+    }
+
+    #[test]
+    fn materials_come_along_and_their_textures_are_found() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::create_dir(at("maps")).unwrap();
+        fs::write(at("maps/red wool.png"), "").unwrap();
+        fs::write(at("wool.png"), "").unwrap();
+        fs::write(at("my cloth.mtl"), "newmtl wool\r\nKd 1 0 0\r\nmap_Kd -s 2 2 1 maps\\red wool.png\r\n")
+            .unwrap();
+        fs::write(at("b.mtl"), "newmtl b\n\tbump  wool.png\nmap_Ka gone.png\nKd wool.png").unwrap();
+        let path = at("coat.obj");
+        let text = "mtllib my cloth.mtl\nv 0 0 0\nmtllib gone.mtl b.mtl\nusemtl wool\nmtllib none.mtl\n";
+        let moved = MovedObj::new(&path, text.as_bytes(), &[[1.0, 2.0, 3.0]], "coat 2").unwrap();
+        let obj = String::from_utf8(moved.obj.clone()).unwrap();
+        assert_eq!(obj, "mtllib coat 2.mtl\nv 1 2 3\nusemtl wool\nmtllib none.mtl\n");
+        let mtl = String::from_utf8(moved.mtl.clone().unwrap()).unwrap();
+        let expected = format!(
+            "newmtl wool\nKd 1 0 0\nmap_Kd -s 2 2 1 {}\n\nnewmtl b\n\tbump  {}\nmap_Ka gone.png\nKd wool.png\n",
+            at("maps/red wool.png").display(),
+            at("wool.png").display()
+        );
+        assert_eq!(mtl, expected);
+
+        let out = at("out");
+        moved.save(&out, "coat 2").unwrap();
+        assert_eq!(fs::read(out.join("coat 2.mtl")).unwrap(), mtl.as_bytes());
+        assert_eq!(fs::read(out.join("coat 2.obj")).unwrap(), obj.as_bytes());
+        let bare = MovedObj::new(&path, b"v 0 0 0\nmtllib none.mtl\n", &[[0.0; 3]], "x").unwrap();
+        assert_eq!((bare.obj.as_slice(), bare.mtl), (b"v 0 0 0\nmtllib none.mtl\n".as_slice(), None));
+    }
+}
