@@ -22,8 +22,9 @@ use std::path::{Path, PathBuf};
 /// Takes draped garments out of the body and out of each other, in their order, and proves what it reached
 #[derive(Parser)]
 #[command(
-    after_help = "Files are meshes of any topology in metres, y up (OBJ, PLY, STL, glTF); nothing is trained or fitted. Vertices\n\
-                  move, everything else in an OBJ file stays as it is. What cannot be mended is listed in report.json.\n\n\
+    after_help = "Files are meshes of any topology in metres, y up (OBJ, PLY, STL, glTF); nothing is trained or fitted.\n\
+                  Vertices of an OBJ file move, its normals go, its materials come along; faces, groups and texture\n\
+                  coordinates stay. What cannot be mended is listed in report.json.\n\n\
                   Example (inner to outer):\n  clothcombo resolve --body body.obj --garments tee.obj coat.obj -o resolved"
 )]
 pub struct Arguments {
@@ -36,7 +37,7 @@ pub struct Arguments {
     /// Their rest meshes, in the same order, for strain; default: the garments as they are
     #[arg(long, num_args = 1.., value_name = "MESH")]
     rest: Vec<PathBuf>,
-    /// Folder to make, for NAME.obj of every garment and report.json
+    /// Folder to make, for NAME.obj (and NAME.mtl) of every garment and report.json
     #[arg(short, long, default_value = "resolved")]
     output: PathBuf,
     /// Replaces the folder of an earlier run
@@ -246,7 +247,7 @@ fn write(
     let folder = staged.folder();
     let failed = |name: &str| format!("cannot write {}", folder.join(name).display());
     for (garment, mesh) in garments.iter().zip(&meshes) {
-        mesh.save(folder, &garment.name).into_diagnostic().wrap_err_with(|| failed(&garment.name))?;
+        mesh.save(folder, &garment.name).into_diagnostic().wrap_err_with(|| failed(&garment.file()))?;
     }
     fs::write(folder.join("report.json"), json).into_diagnostic().wrap_err_with(|| failed("report.json"))?;
     Ok(staged.commit()?)

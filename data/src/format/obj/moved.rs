@@ -7,18 +7,19 @@ use std::path::Path;
 
 /// Statements of a material library that name a texture, but for those that begin with `map_`.
 const TEXTURES: [&str; 5] = ["bump", "disp", "decal", "refl", "norm"];
+
 /// An OBJ file at other vertex positions, with the materials it names.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MovedObj {
-    /// The file: faces, texture coordinates, groups, comments and colours as they were, other vertices, no normals.
+    /// The file: faces, texture coordinates, groups and colours as they were, other vertices, no normals.
     pub obj: Vec<u8>,
     /// Its material libraries in one; none where it names none that can be read.
     pub mtl: Option<Vec<u8>>,
 }
 
 impl MovedObj {
-    /// The file of `bytes`, read from `path`, at other `positions`, to be written as `NAME.obj` and `NAME.mtl`: textures are named
-    /// by where they are, so that both files can be elsewhere.
+    /// The file of `bytes`, read from `path`, at other `positions`, to be written as `NAME.obj` and `NAME.mtl`: textures are
+    /// named by where they are, so that both files can be elsewhere.
     ///
     /// # Errors
     /// The number of vertices in the file, if there are not as many `positions`.
@@ -92,55 +93,79 @@ fn without_normals(bytes: &[u8]) -> Vec<u8> {
     out
 }
 
-/// The OBJ file of `bytes`, from `folder`, with one material library instead of those it names.
+/// The OBJ file of `bytes`, from `folder`, with one material library instead of those it names. What cannot be read becomes a
+/// comment: by its name another garment's library might be found.
 fn with_materials(bytes: &[u8], folder: &Path, name: &str) -> MovedObj {
     let (mut obj, mut mtl) = (Vec::with_capacity(bytes.len()), None::<Vec<u8>>);
     for line in bytes.split_inclusive(|b| *b == b'\n') {
         let text = String::from_utf8_lossy(line);
         let libraries =
             text.trim().strip_prefix("mtllib").filter(|rest| rest.starts_with(char::is_whitespace));
-        let found = libraries.map(|names| libraries_of(names.trim(), folder)).unwrap_or_default();
+        let Some(names) = libraries else {
+            obj.extend_from_slice(line);
+            continue;
+        };
+        let found = libraries_of(names.trim(), folder);
         if found.is_empty() {
+            obj.extend_from_slice(b"# not found: ");
             obj.extend_from_slice(line);
             continue;
         }
         if mtl.is_none() {
             obj.extend_from_slice(format!("mtllib {name}.mtl\n").as_bytes());
         }
-        mtl.get_or_insert_default().extend_from_slice(found.as_bytes());
+        mtl.get_or_insert_default().extend(found);
     }
     MovedObj { obj, mtl }
 }
 
-/// All material libraries in `folder` that can be read of those in `names`, which is one name with spaces, or several.
-fn libraries_of(names: &str, folder: &Path) -> String {
-    let read = |name: &str| read_limited(&folder.join(name)).ok();
+/// All material libraries, seen from `folder`, that can be read of those in `names`: one name with spaces, or several.
+fn libraries_of(names: &str, folder: &Path) -> Vec<u8> {
+    let read = |name: &str| {
+        let path = folder.join(portable(name));
+        // Whatever else a file may name is not for a folder that is given away.
+        let is_library = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mtl"));
+        let bytes = is_library.then(|| read_limited(&path).ok()).flatten()?;
+        Some((path.parent().unwrap_or(folder).to_owned(), bytes))
+    };
     let libraries = match read(names) {
         Some(one) => vec![one],
         None => names.split_whitespace().filter_map(read).collect(),
     };
-    let mut all = String::new();
-    for line in libraries.iter().flat_map(|library| library.split(|b| *b == b'\n')) {
-        all.push_str(&with_texture_found(String::from_utf8_lossy(line).trim_end(), folder));
-        all.push('\n');
+    let mut all = Vec::new();
+    for (place, library) in libraries {
+        for line in library.split(|b| *b == b'\n') {
+            match std::str::from_utf8(line).ok().and_then(|line| with_texture_found(line, [&place, folder])) {
+                Some(line) => all.extend(line.into_bytes()),
+                None => all.extend_from_slice(line),
+            }
+            all.push(b'\n');
+        }
     }
     all
 }
 
-/// A line of a material library with its texture named by where it is, if it names one that can be found from `folder`. Options
+/// A line of a material library with its texture named by where it is; none if it names none that is in one of `folders`. Options
 /// come before a name that may have spaces: the longest end of the line that is a file is it.
-fn with_texture_found(line: &str, folder: &Path) -> String {
-    let statement = line.split_whitespace().next().unwrap_or_default().to_ascii_lowercase();
+fn with_texture_found(line: &str, folders: [&Path; 2]) -> Option<String> {
+    let line = line.trim_end();
+    let statement = line.split_whitespace().next()?.to_ascii_lowercase();
     if !statement.starts_with("map_") && !TEXTURES.contains(&statement.as_str()) {
-        return line.into();
+        return None;
     }
     let spaces = line.match_indices(char::is_whitespace).map(|(at, space)| at + space.len());
-    let found = spaces.filter(|start| !line[*start..].starts_with(char::is_whitespace)).find_map(|start| {
-        // Some programs write the separators of their system.
-        let path = std::path::absolute(folder.join(line[start..].replace('\\', "/"))).ok()?;
-        path.is_file().then_some((start, path))
-    });
-    found.map_or_else(|| line.into(), |(start, path)| format!("{}{}", &line[..start], path.display()))
+    let mut words = spaces.filter(|start| !line[*start..].starts_with(char::is_whitespace));
+    words.find_map(|start| {
+        let name = portable(&line[start..]);
+        let paths = folders.iter().filter_map(|folder| std::path::absolute(folder.join(&name)).ok());
+        let path = paths.into_iter().find(|path| path.is_file())?;
+        Some(format!("{}{}", &line[..start], path.display()))
+    })
+}
+
+/// A path with this system's separators: some programs write those of theirs.
+fn portable(name: &str) -> String {
+    name.replace('\\', "/")
 }
 
 #[cfg(test)]
@@ -178,30 +203,51 @@ mod tests {
     fn materials_come_along_and_their_textures_are_found() {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
-        fs::create_dir(at("maps")).unwrap();
-        fs::write(at("maps/red wool.png"), "").unwrap();
-        fs::write(at("wool.png"), "").unwrap();
-        fs::write(at("my cloth.mtl"), "newmtl wool\r\nKd 1 0 0\r\nmap_Kd -s 2 2 1 maps\\red wool.png\r\n")
-            .unwrap();
-        fs::write(at("b.mtl"), "newmtl b\n\tbump  wool.png\nmap_Ka gone.png\nKd wool.png").unwrap();
-        let path = at("coat.obj");
-        let text = "mtllib my cloth.mtl\nv 0 0 0\nmtllib gone.mtl b.mtl\nusemtl wool\nmtllib none.mtl\n";
-        let moved = MovedObj::new(&path, text.as_bytes(), &[[1.0, 2.0, 3.0]], "coat 2").unwrap();
-        let obj = String::from_utf8(moved.obj.clone()).unwrap();
-        assert_eq!(obj, "mtllib coat 2.mtl\nv 1 2 3\nusemtl wool\nmtllib none.mtl\n");
-        let mtl = String::from_utf8(moved.mtl.clone().unwrap()).unwrap();
-        let expected = format!(
-            "newmtl wool\nKd 1 0 0\nmap_Kd -s 2 2 1 {}\n\nnewmtl b\n\tbump  {}\nmap_Ka gone.png\nKd wool.png\n",
-            at("maps/red wool.png").display(),
-            at("wool.png").display()
+        let write = |name: &str, bytes: &[u8]| {
+            fs::create_dir_all(at(name).parent().unwrap()).unwrap();
+            fs::write(at(name), bytes).unwrap();
+        };
+        write("maps/red wool.png", b"");
+        write("mats/wool.png", b"");
+        write("linen.png", b"");
+        write("secret", b"newmtl secret\n");
+        write("my cloth.mtl", b"newmtl gr\xfcn\r\nKd 1 0 0\r\nmap_Kd -s 2 2 1 maps\\red wool.png\r\n");
+        write("mats/b.mtl", b"newmtl b\n\tbump  wool.png\nmap_Ka gone.png\nmap_Kd linen.png\nKd wool.png");
+        let text =
+            "mtllib my cloth.mtl\nv 0 0 0\nmtllib gone.mtl mats\\b.mtl secret\nusemtl b\nmtllib none.mtl\n";
+        let moved = MovedObj::new(&at("coat.obj"), text.as_bytes(), &[[1.0, 2.0, 3.0]], "coat 2").unwrap();
+        let expected = "mtllib coat 2.mtl\nv 1 2 3\nusemtl b\n# not found: mtllib none.mtl\n";
+        assert_eq!(String::from_utf8(moved.obj.clone()).unwrap(), expected);
+        let mut expected = b"newmtl gr\xfcn\r\nKd 1 0 0\r\nmap_Kd -s 2 2 1 ".to_vec();
+        let textures =
+            ["maps/red wool.png", "mats/wool.png", "linen.png"].map(|name| at(name).display().to_string());
+        expected.extend(
+            format!(
+                "{}\n\nnewmtl b\n\tbump  {}\nmap_Ka gone.png\nmap_Kd {}\nKd wool.png\n",
+                textures[0], textures[1], textures[2]
+            )
+            .bytes(),
         );
+        let mtl = moved.mtl.clone().unwrap();
+        assert_eq!(String::from_utf8_lossy(&mtl), String::from_utf8_lossy(&expected));
         assert_eq!(mtl, expected);
 
         let out = at("out");
         moved.save(&out, "coat 2").unwrap();
-        assert_eq!(fs::read(out.join("coat 2.mtl")).unwrap(), mtl.as_bytes());
-        assert_eq!(fs::read(out.join("coat 2.obj")).unwrap(), obj.as_bytes());
-        let bare = MovedObj::new(&path, b"v 0 0 0\nmtllib none.mtl\n", &[[0.0; 3]], "x").unwrap();
-        assert_eq!((bare.obj.as_slice(), bare.mtl), (b"v 0 0 0\nmtllib none.mtl\n".as_slice(), None));
+        assert_eq!(fs::read(out.join("coat 2.mtl")).unwrap(), mtl);
+        assert_eq!(fs::read(out.join("coat 2.obj")).unwrap(), moved.obj);
+    }
+
+    #[test]
+    fn without_a_library_there_is_none() {
+        let folder = tempfile::tempdir().unwrap();
+        let moved = |text: &str| {
+            MovedObj::new(&folder.path().join("x.obj"), text.as_bytes(), &[[0.0; 3]], "x").unwrap()
+        };
+        let MovedObj { obj, mtl } = moved("v 0 0 0\nusemtl a\n");
+        assert_eq!((obj.as_slice(), mtl), (b"v 0 0 0\nusemtl a\n".as_slice(), None));
+        // A folder is no library.
+        fs::create_dir(folder.path().join("a.mtl")).unwrap();
+        assert_eq!(moved("mtllib a.mtl\nv 0 0 0\n").mtl, None);
     }
 }

@@ -26,9 +26,11 @@ pub(super) const TIMES: usize = 20;
 pub(super) const TIMES_IN_FRAME: usize = 2;
 /// Failures in a row after which it is left.
 const MOST_FAILURES: usize = 4;
-/// Where easing lowers the energy by a smaller share of what it had risen by, edges that are too short are eased as well as those that
-/// are too long: cloth then crumples a little. Where that lowers it by a smaller share than the second, it ends.
-const LEAST_GAIN: (f64, f64) = (0.01, 0.05);
+/// Where easing edges that are too long lowers the energy by a smaller share of what it had risen by, those that are too short
+/// are eased as well, which crumples cloth a little…
+const LEAST_GAIN_OF_LONG: f64 = 0.01;
+/// …and where that lowers it by a smaller share than this, it ends.
+const LEAST_GAIN_OF_ALL: f64 = 0.05;
 /// Passes over the edges each time.
 const PASSES: usize = 20;
 /// Farthest that a vertex is moved each time [m]: no limb is so thin that cloth could get to its other side.
@@ -85,8 +87,8 @@ impl Resolved {
                     (self.positions, self.certificate) = (found.positions, certificate);
                 }
                 match cloth.only_stretched {
-                    true => cloth.only_stretched = gain >= LEAST_GAIN.0,
-                    false if gain < LEAST_GAIN.1 => break,
+                    true => cloth.only_stretched = gain >= LEAST_GAIN_OF_LONG,
+                    false if gain < LEAST_GAIN_OF_ALL => break,
                     false => (),
                 }
             }

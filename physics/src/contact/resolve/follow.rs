@@ -16,7 +16,7 @@ use super::strides::Strides;
 use super::taken_back::{shares, taken_back};
 use super::unfold::Folds;
 use super::way::{Way, placed};
-use super::{Layer, ResolveError, ResolveSettings, Resolved, at, check, resolved_further};
+use super::{Certificate, Layer, ResolveError, ResolveSettings, Resolved, at, check, resolved_further};
 use crate::query::Surface;
 use crate::transform::Transform;
 
@@ -49,10 +49,10 @@ pub struct Reached {
 }
 
 /// As [`super::resolve`], with a second way out, and for garments of which it is known where they are `skinned` alone, `[V, 3]` each
-/// [m]: what only the drape folds is laid out first, unless that leaves more crossings. Where crossings of `layers` on `body`
-/// cannot be mended, the garments are taken along from the stage at 0, the T-pose, to the stage at 1, which is `body` with
-/// `layers`; where that leaves crossings, once more with drapes that are taken back towards the skinned garments around them.
-/// What leaves the fewest is returned.
+/// [m]: what only the drape folds is laid out first. Where crossings of `layers` on `body` cannot be mended, the garments are taken
+/// along from the stage at 0, the T-pose, to the stage at 1, which is `body` with `layers`; where that leaves crossings, once
+/// more with drapes that are taken back towards the skinned garments around them. Where crossings are left then and anything was
+/// laid out, all of it is tried with the drape as it is as well. What leaves the fewest is returned.
 ///
 /// # Errors
 /// Those of `stage_at` and of [`super::resolve`].
@@ -67,34 +67,38 @@ pub fn resolve_along<E: From<ResolveError>>(
     settings.check()?;
     check(body, layers)?;
     check(body, &placed(layers, skinned)?)?;
+    let mut along = |layers: &[Layer<'_>], folds: &mut Option<Folds>| {
+        taken_along(body, layers, folds, settings, start, &mut stage_at)
+    };
     // Strict limits leave a drape as it is, as far as it can be left.
-    if settings.loosened <= 1.0 || !settings.self_contact {
-        return taken_along(body, layers, None, settings, &mut stage_at);
-    }
-    let folds = Folds::of(layers, skinned);
-    let positions = folds.laid_out(layers, skinned);
-    let mut resolved = taken_along(body, &at(layers, &positions), Some(&folds), settings, &mut stage_at)?;
-    if !folds.is_empty() {
-        let is_late = settings.is_late(start, layers.len());
-        if !resolved.certificate.is_clear() && !is_late {
-            let as_given = taken_along(body, layers, None, settings, &mut stage_at)?;
-            resolved = resolved.or(as_given);
+    let may_lay_out = settings.loosened > 1.0 && settings.self_contact;
+    let mut folds = may_lay_out.then(|| Folds::of(layers, skinned));
+    let mut resolved = match &folds {
+        None => along(layers, &mut folds)?,
+        Some(found) => {
+            let positions = found.laid_out(layers, skinned);
+            along(&at(layers, &positions), &mut folds)?
         }
-        resolved.compare_since(layers, start);
+    };
+    let is_laid_out = folds.is_some_and(|folds| !folds.is_empty());
+    if is_laid_out && !resolved.certificate.is_clear() && !settings.is_late(start, layers.len()) {
+        resolved = resolved.or_by(along(layers, &mut None)?, Certificate::defects);
     }
+    resolved.compare_since(layers, start);
     Ok(resolved)
 }
 
-/// [`resolve_along`] for `layers` as they are; with `folds`, those and others that the drape in the T-pose has are laid out on the
-/// way.
+/// [`resolve_along`] for `layers` as they are. On the way `folds`, if there are any, are laid out, and those that the drape has in the
+/// T-pose, which are added to them: what is laid out in one pose has to be in the next.
 fn taken_along<E: From<ResolveError>>(
     body: &Surface<f64>,
     layers: &[Layer<'_>],
-    folds: Option<&Folds>,
+    folds: &mut Option<Folds>,
     settings: &ResolveSettings,
+    start: Instant,
     stage_at: &mut impl FnMut(f64) -> Result<Waypoint, E>,
 ) -> Result<Resolved, E> {
-    resolved_further(body, layers, settings, |room, mut best, start| {
+    resolved_further(body, layers, settings, start, |room, mut best| {
         let is_torn = best.certificate.strain_added.is_some_and(|added| added > TORN);
         if best.certificate.is_clear() && !is_torn || settings.steps == 0 {
             return Ok(best);
@@ -102,12 +106,16 @@ fn taken_along<E: From<ResolveError>>(
         let way = Way { layers, end: room, settings, start, strides: Strides::FROM_T_POSE };
         let mut checked_at = |share: f64| Ok::<_, E>(checked(stage_at(share)?, layers)?);
         let t_pose = checked_at(0.0)?;
-        let folds = match folds {
-            Some(folds) => folds.clone().and(&Folds::of(&at(layers, &t_pose.draped), &t_pose.skinned)),
-            None => Folds::default(),
+        if let Some(folds) = folds {
+            folds.add(&Folds::of(&at(layers, &t_pose.draped), &t_pose.skinned));
+        }
+        let folds = &*folds;
+        let laid_out = |stage: Waypoint| match folds {
+            Some(folds) => folds.laid_out_at(stage, layers),
+            None => stage,
         };
-        let t_pose = folds.laid_out_at(t_pose, layers);
-        let mut stage_at = |share: f64| checked_at(share).map(|stage| folds.laid_out_at(stage, layers));
+        let t_pose = laid_out(t_pose);
+        let mut stage_at = |share: f64| checked_at(share).map(laid_out);
         way.improve(&mut best, body, t_pose.clone(), &mut stage_at)?;
         // Where most of what crosses is pinched it is the body, not the drape, that leaves no way out.
         if best.certificate.between() > best.certificate.pinched.count() {

@@ -25,6 +25,8 @@
 //!
 //! **Easing.** Where the strain energy has risen, cloth gives back what it can without crossing anything ([`ease`]).
 //!
+//! **Folds of the drape.** What only a network folds into itself is laid out by [`resolve_along`] before all this ([`unfold`]).
+//!
 //! **Bent limbs.** Where crossings are left, [`resolve_along`] takes the garments from the T-pose, where their order is plain,
 //! step by step to the pose ([`follow`], [`way`]); in short steps cloth keeps the sides it was on before ([`sides`]). Where that
 //! leaves some, it does so again with drapes that lie nearer to where they began ([`taken_back`]).
@@ -93,18 +95,18 @@ pub fn resolve(
 ) -> Result<Resolved, ResolveError> {
     settings.check()?;
     check(body, layers)?;
-    resolved_further(body, layers, settings, |_, found, _| Ok(found))
+    resolved_further(body, layers, settings, Instant::now(), |_, found| Ok(found))
 }
 
-/// [`resolve`] for valid arguments. Where something is left to do after the first attempts, `further` may go on from there: it
-/// gets the body, what was reached, and when all began.
+/// [`resolve`] for valid arguments, of which all began at `start`. Where something is left to do after the first attempt, `further`
+/// may go on from there: it gets the body and what was reached.
 fn resolved_further<E>(
     body: &Surface<f64>,
     layers: &[Layer<'_>],
     settings: &ResolveSettings,
-    further: impl FnOnce(&Body<'_>, Resolved, Instant) -> Result<Resolved, E>,
+    start: Instant,
+    further: impl FnOnce(&Body<'_>, Resolved) -> Result<Resolved, E>,
 ) -> Result<Resolved, E> {
-    let start = Instant::now();
     with_drawn(body, layers, |drawn| {
         let simple = simply_resolved(&drawn, layers, settings, start);
         if simple.certificate.is_clear() {
@@ -115,7 +117,7 @@ fn resolved_further<E>(
             let mut found = resolved(room, layers, settings, simple, relieving);
             found.go_on(body, layers, settings, start);
             found.compare_since(layers, start);
-            let mut found = further(room, found, start)?;
+            let mut found = further(room, found)?;
             found.ease(room, layers, settings, start, ease::TIMES);
             found.compare_since(layers, start);
             Ok(found)

@@ -130,12 +130,17 @@ impl Resolved {
     /// The better of two results for the same drape: the one with fewer crossings, `self` of equal ones. It counts the work
     /// of both.
     #[must_use]
-    pub fn or(mut self, mut other: Self) -> Self {
-        let rank = |c: &Certificate| (c.crossings(), c.between());
+    pub fn or(self, other: Self) -> Self {
+        self.or_by(other, |c| (c.crossings(), c.between()))
+    }
+
+    /// [`or`](Self::or) where the one of lower `rank` is the better one.
+    pub(super) fn or_by<K: Ord>(mut self, mut other: Self, rank: impl Fn(&Certificate) -> K) -> Self {
         if rank(&other.certificate) < rank(&self.certificate) {
             std::mem::swap(&mut self, &mut other);
         }
         self.add_work(&other);
+        self.steps += other.steps;
         for (work, further) in self.garments.iter_mut().zip(&other.garments) {
             work.time += further.time;
         }

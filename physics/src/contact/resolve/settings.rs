@@ -29,7 +29,7 @@ pub struct ResolveSettings {
     pub stretch: f64,
     /// How many times wider both limits are in a second attempt, where crossings are left; its result is only taken if it ends
     /// with none. Where few are left in the end, all is tried again from there and both limits are measured anew. Default 6; 1
-    /// for strict limits: one attempt, and no easing.
+    /// for strict limits: one attempt, nothing laid out, no easing.
     pub loosened: f64,
     /// Most steps on a way: of [`super::resolve_along`] from the T-pose, of [`super::resolve_after`] from the frame before.
     /// Default 128; 0 mends the drape as it is or not at all.
@@ -37,7 +37,8 @@ pub struct ResolveSettings {
     /// Whether nothing lies deeper than half a limb, so that the nearest way out is the right one: true for a small step.
     /// Default no.
     pub is_shallow: bool,
-    /// Whether crossings of a garment with itself are mended where possible. Default yes.
+    /// Whether crossings of a garment with itself are mended where possible; otherwise nothing is laid out either. Default
+    /// yes.
     pub self_contact: bool,
     /// Most wall time of one attempt, and of a way altogether, times the number of garments; looked at between rounds. A limit
     /// that is hit makes the result depend on the machine.

@@ -359,6 +359,7 @@ fn of_two_results_the_one_with_fewer_crossings_counts_and_the_work_of_both() {
             ..Certificate::default()
         },
         garments: vec![GarmentWork { rounds, time: Duration::from_secs(1), ..GarmentWork::default() }],
+        steps: 3,
         ..Resolved::default()
     };
     // Narrow pairs are no crossings, but of two results without any the one with fewer pairs is better.
@@ -373,6 +374,6 @@ fn of_two_results_the_one_with_fewer_crossings_counts_and_the_work_of_both() {
         let found = first.clone().or(second.clone());
         assert_eq!(found.certificate, best.certificate);
         assert_eq!(found.garments[0].rounds, first.garments[0].rounds + second.garments[0].rounds);
-        assert_eq!(found.garments[0].time, Duration::from_secs(2));
+        assert_eq!((found.garments[0].time, found.steps), (Duration::from_secs(2), 6));
     }
 }

@@ -1,8 +1,8 @@
 //! Cloth that a drape folds into itself is laid out, before anything else.
 //!
-//! What a network adds to a skinned garment is smooth, but where it folds cloth: on a body unlike those it was trained on, or where
-//! garments press on each other. No sheet over such a fold can tell its outside from its inside. Around it what is added is
-//! replaced by what is smoothest between its surroundings, a harmonic function on the edges: the fold goes, the distance to
+//! What a network adds to a skinned garment is smooth, but where it folds cloth: on a body unlike those it was trained on, or
+//! where garments press on each other. No sheet over such a fold can tell its outside from its inside. Around it what is added
+//! is replaced by what is smoothest between its surroundings, a harmonic function on the edges: the fold goes, the distance to
 //! the body and to other garments stays about what it is next to it.
 
 use rayon::prelude::*;
@@ -26,13 +26,13 @@ const SWEEPS: usize = 100;
 /// …and its over-relaxation.
 const OVER: f64 = 1.7;
 
-/// Where garments are to be laid out: vertices of each, ascending; without an entry for a garment it has none.
-#[derive(Debug, Clone, Default, PartialEq)]
+/// Where garments are to be laid out: vertices of each, ascending.
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Folds(Vec<Vec<u32>>);
 
 impl Folds {
-    /// Around crossings of every garment with itself where the same garment, `skinned`, has none, as far as there are fewer of them
-    /// when it is laid out.
+    /// Around crossings of every garment with itself where the same garment, `skinned`, has none, as far as there are fewer of
+    /// them when it is laid out.
     pub fn of(layers: &[Layer<'_>], skinned: &[Vec<[f64; 3]>]) -> Self {
         Self(layers.par_iter().zip(skinned).map(|(layer, skinned)| folded(*layer, skinned)).collect())
     }
@@ -42,22 +42,21 @@ impl Folds {
         self.0.iter().all(Vec::is_empty)
     }
 
-    /// These and those of the same garments in another pose, so that what is laid out in one is in the other.
-    pub fn and(mut self, others: &Self) -> Self {
+    /// Adds those of the same garments in another pose, so that what is laid out in one is in the other.
+    pub fn add(&mut self, others: &Self) {
         for (folds, more) in self.0.iter_mut().zip(&others.0) {
             folds.extend(more);
             folds.sort_unstable();
             folds.dedup();
         }
-        self
     }
 
     /// The garments without them.
     pub fn laid_out(&self, layers: &[Layer<'_>], skinned: &[Vec<[f64; 3]>]) -> Vec<Vec<[f64; 3]>> {
-        let garments = layers.par_iter().zip(skinned).enumerate();
-        let laid_out = garments.map(|(g, (layer, skinned))| match self.0.get(g).map(Vec::as_slice) {
-            None | Some([]) => layer.positions.to_vec(),
-            Some(region) => smoothed(&Outfit::new(std::slice::from_ref(layer)), skinned, region),
+        let garments = layers.par_iter().zip(skinned).zip(&self.0);
+        let laid_out = garments.map(|((layer, skinned), region)| match region.as_slice() {
+            [] => layer.positions.to_vec(),
+            region => smoothed(&Outfit::new(std::slice::from_ref(layer)), skinned, region),
         });
         laid_out.collect()
     }
@@ -93,6 +92,7 @@ fn folded(layer: Layer<'_>, skinned: &[[f64; 3]]) -> Vec<u32> {
         pairs.retain(|&(f, g)| is_outside(f) && is_outside(g));
         pairs
     };
+    let all = found.len();
     let mut crossings = outside(found);
     let (mut fewest, mut best, mut seeds) = (crossings.len(), Vec::new(), Vec::new());
     let most = (1.0 + STRAINED) * garment.strain_energy(layer.positions);
@@ -101,15 +101,21 @@ fn folded(layer: Layer<'_>, skinned: &[[f64; 3]]) -> Vec<u32> {
             break;
         }
         seeds.extend(corners(&crossings));
-        let mut places = places(&outfit, &outfit.neighbourhood(&seeds, rings(reach)));
-        places.retain(|place| garment.strain_energy(&smoothed(&outfit, skinned, place)) <= most);
-        let region = places.concat();
-        crossings = outside(self_triangle_pairs(&smoothed(&outfit, skinned, &region), faces));
-        if crossings.len() < fewest {
+        let mut region = Vec::new();
+        for place in places(&outfit, &outfit.neighbourhood(&seeds, rings(reach))) {
+            let mut with_place = [region.as_slice(), &place].concat();
+            with_place.sort_unstable();
+            if garment.strain_energy(&smoothed(&outfit, skinned, &with_place)) <= most {
+                region = with_place;
+            }
+        }
+        let left = self_triangle_pairs(&smoothed(&outfit, skinned, &region), faces);
+        let has_no_more = left.len() <= all;
+        crossings = outside(left);
+        if has_no_more && crossings.len() < fewest {
             (fewest, best) = (crossings.len(), region);
         }
     }
-    best.sort_unstable();
     best
 }
 
@@ -204,7 +210,8 @@ mod tests {
         let mesh = sheet();
         let garment = RestGarment::new(&mesh);
         let (flat, folded) = (mesh.positions().to_vec(), folded_sheet(&mesh));
-        for (draped, skinned) in [(&flat, &folded), (&folded, &folded)] {
+        let beside: Vec<_> = mesh.positions().iter().map(|p| folded_at(*p, [0.03, 0.0, 0.02])).collect();
+        for (draped, skinned) in [(&flat, &folded), (&folded, &folded), (&folded, &beside)] {
             let layers = [Layer { garment: &garment, positions: draped }];
             let folds = Folds::of(&layers, std::slice::from_ref(skinned));
             assert!(folds.is_empty());
@@ -237,9 +244,16 @@ mod tests {
     fn folds_of_two_poses_add_up() {
         let mesh = sheet();
         let garment = RestGarment::new(&mesh);
-        let (skinned, draped) = (vec![mesh.positions().to_vec()], folded_sheet(&mesh));
-        let layers = [Layer { garment: &garment, positions: &draped }];
-        let folds = Folds::of(&layers, &skinned);
-        assert_eq!(folds.clone().and(&folds), folds);
+        let skinned = vec![mesh.positions().to_vec()];
+        let folds_at = |centre: [f64; 3]| {
+            let draped: Vec<_> = mesh.positions().iter().map(|p| folded_at(*p, centre)).collect();
+            Folds::of(&[Layer { garment: &garment, positions: &draped }], &skinned)
+        };
+        let [left, right] = [-0.1, 0.08].map(|x| folds_at([x, 0.0, 0.0]));
+        let mut both = left.clone();
+        both.add(&right);
+        assert!(both.0[0].len() > left.0[0].len().max(right.0[0].len()));
+        assert!(left.0[0].iter().chain(&right.0[0]).all(|v| both.0[0].contains(v)));
+        assert!(both.0[0].is_sorted_by(|a, b| a < b));
     }
 }

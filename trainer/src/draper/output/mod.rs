@@ -191,7 +191,9 @@ fn as_given(
     let mut moved = MovedObj::new(path, &std::fs::read(path).ok()?, positions, name).ok()?;
     let lines = comments.iter().flat_map(|comment| comment.lines());
     let mut bytes: Vec<u8> = lines.flat_map(|line| format!("# {line}\n").into_bytes()).collect();
-    bytes.extend_from_slice(b"# what follows is the file as it was given, with other vertices\n");
+    bytes.extend_from_slice(
+        b"# what follows is the file as it was given, with other vertices and without normals\n",
+    );
     bytes.append(&mut moved.obj);
     Some(MovedObj { obj: bytes, ..moved })
 }

@@ -203,7 +203,7 @@ fn what_only_the_drape_folds_is_laid_out_unless_that_leaves_crossings() {
     assert!(free.certificate.is_clear());
     assert_eq!(free.certificate.self_triangle_pairs, 0);
 
-    // The ball is deeper in the sheet than 2 mm.
+    // Where it may hardly be moved the sheet is better left folded: laid out, the ball is deep in it.
     let narrow = ResolveSettings { farthest: 5e-4, loosened: 1.1, ..ResolveSettings::default() };
     let held = along(narrow);
     assert!(held.certificate.is_clear());
