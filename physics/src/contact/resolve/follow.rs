@@ -48,11 +48,11 @@ pub struct Reached {
     pub crossings: usize,
 }
 
-/// As [`super::resolve`], with a second way out, and for garments of which it is known where they are `skinned` alone, `[V, 3]` each
-/// [m]: what only the drape folds is laid out first. Where crossings of `layers` on `body` cannot be mended, the garments are taken
-/// along from the stage at 0, the T-pose, to the stage at 1, which is `body` with `layers`; where that leaves crossings, once
-/// more with drapes that are taken back towards the skinned garments around them. Where crossings are left then and anything was
-/// laid out, all of it is tried with the drape as it is as well. What leaves the fewest is returned.
+/// As [`super::resolve`], with a second way out, and for garments of which it is known where they are `skinned` alone,
+/// `[V, 3]` each [m]: what only the drape folds is laid out first. Where crossings of `layers` on `body` cannot be mended, the
+/// garments are taken along from the stage at 0, the T-pose, to the stage at 1, which is `body` with `layers`; where that leaves
+/// crossings, once more with drapes that are taken back towards the skinned garments around them. Where crossings are left then
+/// and anything was laid out, all of it is tried with the drape as it is as well. What leaves the fewest is returned.
 ///
 /// # Errors
 /// Those of `stage_at` and of [`super::resolve`].
@@ -88,8 +88,8 @@ pub fn resolve_along<E: From<ResolveError>>(
     Ok(resolved)
 }
 
-/// [`resolve_along`] for `layers` as they are. On the way `folds`, if there are any, are laid out, and those that the drape has in the
-/// T-pose, which are added to them: what is laid out in one pose has to be in the next.
+/// [`resolve_along`] for `layers` as they are. On the way `folds`, if there are any, are laid out, and those that the drape has
+/// in the T-pose, which are added to them: what is laid out in one pose has to be in the next.
 fn taken_along<E: From<ResolveError>>(
     body: &Surface<f64>,
     layers: &[Layer<'_>],

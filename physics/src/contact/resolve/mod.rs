@@ -98,8 +98,8 @@ pub fn resolve(
     resolved_further(body, layers, settings, Instant::now(), |_, found| Ok(found))
 }
 
-/// [`resolve`] for valid arguments, of which all began at `start`. Where something is left to do after the first attempt, `further`
-/// may go on from there: it gets the body and what was reached.
+/// [`resolve`] for valid arguments, of which all began at `start`. Where something is left to do after the first attempt,
+/// `further` may go on from there: it gets the body and what was reached.
 fn resolved_further<E>(
     body: &Surface<f64>,
     layers: &[Layer<'_>],

@@ -101,15 +101,20 @@ fn folded(layer: Layer<'_>, skinned: &[[f64; 3]]) -> Vec<u32> {
             break;
         }
         seeds.extend(corners(&crossings));
-        let mut region = Vec::new();
-        for place in places(&outfit, &outfit.neighbourhood(&seeds, rings(reach))) {
-            let mut with_place = [region.as_slice(), &place].concat();
-            with_place.sort_unstable();
-            if garment.strain_energy(&smoothed(&outfit, skinned, &with_place)) <= most {
-                region = with_place;
+        let around = outfit.neighbourhood(&seeds, rings(reach));
+        // No edge joins two places: what is smoothest in one does not depend on the others.
+        let smooth = smoothed(&outfit, skinned, &around);
+        let (mut region, mut laid_out) = (Vec::new(), layer.positions.to_vec());
+        for place in places(&outfit, &around) {
+            place.iter().for_each(|&v| laid_out[v as usize] = smooth[v as usize]);
+            if garment.strain_energy(&laid_out) <= most {
+                region.extend(place);
+            } else {
+                place.iter().for_each(|&v| laid_out[v as usize] = layer.positions[v as usize]);
             }
         }
-        let left = self_triangle_pairs(&smoothed(&outfit, skinned, &region), faces);
+        region.sort_unstable();
+        let left = self_triangle_pairs(&laid_out, faces);
         let has_no_more = left.len() <= all;
         crossings = outside(left);
         if has_no_more && crossings.len() < fewest {
@@ -158,7 +163,7 @@ fn smoothed(outfit: &Outfit<'_>, skinned: &[[f64; 3]], region: &[u32]) -> Vec<[f
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::super::RestGarment;
     use super::*;
     use crate::mesh::{TriMesh, shapes};
@@ -171,7 +176,7 @@ mod tests {
     }
 
     /// `p` 1 cm higher, and pushed up to 8 cm along x where it lies around `centre`, over what lies there and back under it.
-    fn folded_at(p: [f64; 3], centre: [f64; 3]) -> [f64; 3] {
+    pub fn folded_at(p: [f64; 3], centre: [f64; 3]) -> [f64; 3] {
         let from = sub(p, centre);
         let push = 0.08 * (-(norm(from) / 0.04).powi(2)).exp();
         [p[0] + push, 0.01 - 0.5 * push * from[0], p[2]]
@@ -210,7 +215,15 @@ mod tests {
         let mesh = sheet();
         let garment = RestGarment::new(&mesh);
         let (flat, folded) = (mesh.positions().to_vec(), folded_sheet(&mesh));
-        let beside: Vec<_> = mesh.positions().iter().map(|p| folded_at(*p, [0.03, 0.0, 0.02])).collect();
+        // A smaller fold, 4 cm beside the other one: without a margin around it that one would be laid out.
+        let smaller = |p: &[f64; 3]| {
+            let from = sub(*p, [0.04, 0.0, 0.0]);
+            let push = 0.06 * (-(norm(from) / 0.03).powi(2)).exp();
+            [p[0] + push, -0.5 * push * from[0], p[2]]
+        };
+        let beside: Vec<_> = mesh.positions().iter().map(smaller).collect();
+        let [crease, fold] = [&beside, &folded].map(|p| self_triangle_pairs(p, garment.faces()).len());
+        assert!(0 < crease && crease < fold, "{crease} {fold}");
         for (draped, skinned) in [(&flat, &folded), (&folded, &folded), (&folded, &beside)] {
             let layers = [Layer { garment: &garment, positions: draped }];
             let folds = Folds::of(&layers, std::slice::from_ref(skinned));

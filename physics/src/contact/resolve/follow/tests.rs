@@ -1,4 +1,5 @@
 use super::super::RestGarment;
+use super::super::unfold::tests::folded_at;
 use super::*;
 use crate::contact::TriangleTree;
 use crate::mesh::TriMesh;
@@ -185,10 +186,8 @@ fn what_only_the_drape_folds_is_laid_out_unless_that_leaves_crossings() {
     let ball =
         Surface::from_mesh(&shapes::mapped(&shapes::icosphere(0.08, 3), |p| add(p, [0.0, -0.03, 0.0])));
     let folded = |p: &[f64; 3]| {
-        let push = 0.08 * (-(norm(*p) / 0.04).powi(2)).exp();
-        let [x, z] = [p[0] + push, p[2]];
-        let over_ball = 0.06 * (-(x * x + z * z) / 0.0081).exp();
-        [x, 0.01 + over_ball - 0.5 * push * p[0], z]
+        let [x, y, z] = folded_at(*p, [0.0; 3]);
+        [x, y + 0.06 * (-(x * x + z * z) / 0.0081).exp(), z]
     };
     let draped: Vec<[f64; 3]> = sheet.positions().iter().map(folded).collect();
     let skinned = vec![sheet.positions().to_vec()];
