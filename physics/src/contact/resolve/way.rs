@@ -18,8 +18,8 @@ use crate::query::Surface;
 use crate::transform::{into_frame, out_of_frame};
 use crate::vec3::{add, scale, sub};
 
-/// The rest of the way is one step where of the steps that are allowed one in so many was as short as may be, and left more
-/// crossings all the same.
+/// The rest of the way is one step where, since nothing crossed, of the steps that are allowed one in so many was as short as may
+/// be, and left more crossings all the same.
 const FAILURES: usize = 16;
 /// Steps without further crossings after which a longer one is tried.
 const GOOD_STEPS: usize = 4;
@@ -141,7 +141,8 @@ impl Way<'_, '_> {
         check(self.end.drawn.surface, &placed(self.layers, &place.reached.draped)?)?;
         check(self.end.drawn.surface, &placed(self.layers, &place.reached.positions)?)?;
         let (mut from, mut step, mut steps) = (0.0, longest, 0);
-        // How many steps in a row went well, and how many of the shortest did not.
+        // How many steps in a row went well, and how many of the shortest did not since nothing crossed: most crossings that such a
+        // step leaves are mended in the next.
         let (mut well, mut failures) = (0, 0);
         let most_failures = (self.settings.steps / FAILURES).max(1);
         while steps < self.settings.steps && !self.is_late() {
@@ -163,6 +164,9 @@ impl Way<'_, '_> {
                 }
                 if well >= GOOD_STEPS {
                     (step, well) = ((2.0 * step).min(longest), 0);
+                }
+                if arrived.untangled.crossings == 0 {
+                    failures = 0;
                 }
                 from = at;
                 place = Place::new(stage, arrived);
