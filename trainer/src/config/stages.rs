@@ -38,8 +38,9 @@ pub struct StageConfig {
     /// second body cheaper than a second step.
     #[serde(default = "one")]
     pub scenes_per_step: usize,
-    /// Scenes with garments of their own whose gradients are averaged before one update (gradient accumulation). A step
-    /// costs this many times as much and no more memory; the gradient is less noisy. Processes of one run share the scenes.
+    /// Scenes with garments of their own whose gradients are averaged before one update (gradient accumulation). They are
+    /// computed beside each other, so that a step costs less than this many times as much; the gradient is less noisy.
+    /// Processes of one run share the scenes.
     #[serde(default = "one")]
     pub accumulate: usize,
     /// Adam's step size. 1e-4 is the paper's, for networks of width 512; small networks take ten times that.

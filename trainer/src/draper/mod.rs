@@ -7,7 +7,7 @@
 //!
 //! let draper = Draper::load(Some(Path::new("runs/smoke")), &DraperSettings::default())?;
 //! let closet = draper.closet(&[])?;
-//! let garments = ["t_shirt_000003", "skirt_000004"].map(|name| closet.find(name, draper.body(), None));
+//! let garments = ["t_shirt_000003", "skirt_000005"].map(|name| closet.find(name, draper.body(), None));
 //! let outfit = draper.outfit(garments.into_iter().collect::<Result<_, _>>()?)?;
 //! let drape = draper.drape(&outfit, &BodyState::new(vec![1.0, -0.5], Pose::t_pose(22)))?;
 //! for (piece, draped) in outfit.pieces.iter().zip(&drape.garments) {
