@@ -39,8 +39,8 @@ pub struct StageConfig {
     #[serde(default = "one")]
     pub scenes_per_step: usize,
     /// Scenes with garments of their own whose gradients are averaged before one update (gradient accumulation). They are
-    /// computed beside each other, so that a step costs less than this many times as much; the gradient is less noisy.
-    /// Processes of one run share the scenes.
+    /// computed beside each other: on two cores a step with 2 takes 1.3 to 1.8 times as long as one with 1. The gradient is
+    /// less noisy. Processes of one run share the scenes.
     #[serde(default = "one")]
     pub accumulate: usize,
     /// Adam's step size. 1e-4 is the paper's, for networks of width 512; small networks take ten times that.
