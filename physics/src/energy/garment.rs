@@ -6,7 +6,7 @@ use super::bending::Bending;
 use super::body_collision::BodyCollision;
 use super::gravity::Gravity;
 use super::holding::Holding;
-use super::layer_collision::InnerSurface;
+use super::layer_collision::InnerGarment;
 use super::repulsion::Repulsion;
 use super::strain::Strain;
 use super::{CurvatureSink, EnergyError, EnergySettings, Term, Weighted};
@@ -44,7 +44,7 @@ pub trait GarmentTerm<T>: Debug + Send + Sync {
 #[derive(Debug)]
 pub struct GarmentEnergies<T: Real> {
     vertex_count: usize,
-    inner_surface: InnerSurface,
+    as_inner: InnerGarment,
     terms: Vec<(Term, Box<dyn GarmentTerm<T>>)>,
 }
 
@@ -93,7 +93,7 @@ impl<T: Real> GarmentEnergies<T> {
         if holding {
             terms.push((Term::Holding, Box::new(Holding::new(rest, settings.holding_fraction))));
         }
-        Ok(Self { vertex_count, inner_surface: InnerSurface::with_median_edge(rest, median_edge), terms })
+        Ok(Self { vertex_count, as_inner: InnerGarment::new(rest, topology, median_edge), terms })
     }
 
     /// Number of vertices.
@@ -111,7 +111,8 @@ impl<T: Real> GarmentEnergies<T> {
         self.terms.iter().map(|(term, energy)| (*term, energy.as_ref()))
     }
 
-    pub(super) fn inner_surface(&self) -> &InnerSurface {
-        &self.inner_surface
+    /// As others see it that lie on it.
+    pub(super) fn as_inner(&self) -> &InnerGarment {
+        &self.as_inner
     }
 }

@@ -13,12 +13,13 @@
 //! | body collision | `3(ε + D)²` | unit normals, `d ≥ −D` |
 //! | repulsion | `2(N − 1)·factor/δ` | a pair pulls with at most `2/δ`; over `N` vertices the default is below `2/δ` for any garment |
 //! | holding | `2·max|y − y_ref|` | a parabola |
-//! | layer collision | `3M(ε + D)²·(1 + 3·n·ℓ·D/τ)` | `M` outer vertices at most share an inner one, whose normal turns by at most `ℓ/τ` per face |
+//! | layer collision, nearest vertex | `3M(ε + D)²·(1 + 3·n·ℓ·D/τ)` | `M` outer vertices at most share an inner one, whose normal turns by at most `ℓ/τ` per face |
+//! | layer collision, closest point | none | the share of a triangle at the border changes within its deformed height |
 //! | layer distance | `3M(r + D)²` | `d_inner < r`, `d_outer ≥ −D`, `M` vertices at most per bucket |
 
 use super::bending;
 use super::strain::NEEDLE_RATIO;
-use super::{EnergySettings, SceneEnergy, Term, layer_collision, repulsion};
+use super::{EnergySettings, LayerContact, SceneEnergy, Term, layer_collision, repulsion};
 use crate::mesh::{Topology, TriMesh};
 use crate::real::Real;
 use crate::vec3::{distance_squared, norm, sub, to_f64};
@@ -27,7 +28,8 @@ use crate::vec3::{distance_squared, norm, sub, to_f64};
 const ROUNDING: f64 = 1.001;
 
 /// A bound on every entry of the gradient of `term` (weight 1) in `scene`, whose garments have the rest shapes `rest`, at
-/// `posed` and `canonical` (`[ΣV, 3]` [m]); see the module for the formulas. NaN if a position is not finite.
+/// `posed` and `canonical` (`[ΣV, 3]` [m]); see the module for the formulas. Infinite where there is none, NaN if a position is not
+/// finite.
 ///
 /// # Panics
 /// If `rest` has not one mesh per garment, or the positions are not those of the scene.
@@ -77,6 +79,7 @@ pub fn gradient_bound<T: Real>(
             2.0 * (count - 1.0) * factor / repulsion::CONTACT_DISTANCE
         }),
         Term::Holding => of_garments(&|g| g.holding()),
+        Term::LayerCollision if settings.layer_contact == LayerContact::ClosestPoint => f64::INFINITY,
         Term::LayerCollision => over_pairs(&|inner, outer| inner.layer_collision(outer, settings)),
         Term::LayerDistance => {
             let depths: Vec<f64> = garments.iter().map(to_body).collect();
@@ -167,7 +170,7 @@ impl Deformed<'_> {
         let distance = |p: &[f64; 3]| norm(sub(*p, self.posed[index.nearest(*p).0 as usize]));
         let farthest = outer.posed.iter().map(distance).fold(0.0, f64::max);
         let reach = settings.layer_gate.map_or(farthest, |gate| farthest.min(aside(gate)));
-        let floor = layer_collision::COLLAPSE_FLOOR * self.median_edge * self.median_edge;
+        let floor = layer_collision::nearest_vertex::COLLAPSE_FLOOR * self.median_edge * self.median_edge;
         let longest = (0..self.rest.face_count() as u32).map(|f| self.longest(f)).fold(0.0, f64::max);
         let turning = self.rest.faces().iter().map(|face| (*face, 3.0 * longest * reach / floor));
         let push = 3.0 * (settings.layer_collision_epsilon + reach).powi(2);

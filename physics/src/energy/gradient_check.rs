@@ -114,7 +114,7 @@ pub fn check_gradient(
 ) -> Option<GradientReport> {
     let scene = alone(scene, term);
     raw_value(&scene.value(posed, canonical), term)?;
-    let edges = scene.garments.iter().map(|g| g.energies.inner_surface().median_edge());
+    let edges = scene.garments.iter().map(|g| g.energies.as_inner().median_edge());
     let edge = edges.fold(LONGEST_EDGE, f64::min);
     Some(if term.is_canonical() {
         let value = |x: &[[f64; 3]]| scene.value(posed, x).total;

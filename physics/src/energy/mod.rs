@@ -44,6 +44,7 @@ pub(crate) mod tests;
 pub use curvature::CurvatureSink;
 pub use elements::Weighted;
 pub use error::EnergyError;
+pub use layer_collision::LayerContact;
 pub use garment::{GarmentEnergies, GarmentState, GarmentTerm};
 pub use material::Material;
 pub use scene::{SceneEnergy, SceneGarment, SceneLayers, SceneValue};

@@ -187,7 +187,7 @@ impl<T: Real> SceneEnergy<T> {
     }
 
     /// A positive semidefinite approximation of the second derivatives of the weighted sum with respect to posed and to
-    /// canonical positions, vertices numbered as in `posed`. Layer terms are left out.
+    /// canonical positions, vertices numbered as in `posed`. Of the layer terms only the collision by the closest point has one.
     ///
     /// # Panics
     /// As [`evaluate`](Self::evaluate).
@@ -213,6 +213,16 @@ impl<T: Real> SceneEnergy<T> {
                     }
                 }
             }
+        }
+        let ranges = self.ranges();
+        for pair in self.layers.iter().filter(|pair| pair.weights[Term::LayerCollision] > 0.0) {
+            let [inner, outer] = [pair.inner, pair.outer].map(|garment| ranges[garment].clone());
+            let as_inner = self.garments[pair.inner].energies.as_inner();
+            let surface = as_inner.posed(&posed[inner.clone()], self.settings.layer_contact);
+            let weight = pair.weights[Term::LayerCollision];
+            let mut sink = Scaled { sink: &mut *posed_sink, offset: 0, weight };
+            let offsets = [inner.start, outer.start];
+            as_inner.curvature(&surface, &posed[outer], &self.settings, offsets, &mut sink);
         }
     }
 
@@ -354,7 +364,7 @@ impl<T: Real> SceneEnergy<T> {
             },
             buckets: in_distance.then(|| BodyBuckets::new(&gaps, body_vertex_count, radius)),
             gaps,
-            as_inner: is_inner.then(|| garment.energies.inner_surface().posed(posed)),
+            as_inner: is_inner.then(|| garment.energies.as_inner().posed(posed, self.settings.layer_contact)),
         }
     }
 
@@ -378,12 +388,11 @@ impl<T: Real> SceneEnergy<T> {
                 .map(|[a, b]| [Weighted { weight, gradient: a }, Weighted { weight, gradient: b }]);
             raw[term] = match term {
                 Term::LayerCollision => inner.as_inner.as_ref().map(|posed_inner| {
-                    self.garments[pair.inner].energies.inner_surface().evaluate(
+                    self.garments[pair.inner].energies.as_inner().evaluate(
                         inner.state.posed,
                         posed_inner,
                         outer.state.posed,
-                        self.settings.layer_collision_epsilon,
-                        self.settings.layer_gate,
+                        &self.settings,
                         targets,
                     )
                 }),

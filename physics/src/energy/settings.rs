@@ -1,5 +1,6 @@
 //! The switches and constants of the energies.
 
+use super::layer_collision::LayerContact;
 use super::{EnergyError, Material};
 use crate::query::Distance;
 
@@ -47,7 +48,10 @@ pub struct EnergySettings {
     pub repulsion_continuous: bool,
     /// Gravitational acceleration [m/s²], along −y.
     pub gravity_acceleration: f64,
-    /// Which outer vertices the layer collision counts; `None`: all, as printed in the paper.
+    /// How the distance to an inner garment is measured; paper: nearest vertex.
+    pub layer_contact: LayerContact,
+    /// Which outer vertices the layer collision counts; `None`: all, as printed in the paper. By the closest point, cloth that
+    /// lies deeper than the gate has faded out, and `None` stands for the default.
     pub layer_gate: Option<LayerGate>,
     /// The layer distance counts vertices closer to the body than this [m]; paper: 0.1.
     pub layer_distance_radius: f64,
@@ -68,6 +72,7 @@ impl Default for EnergySettings {
             repulsion_sample: 0,
             repulsion_continuous: false,
             gravity_acceleration: 9.81,
+            layer_contact: LayerContact::default(),
             layer_gate: Some(LayerGate::default()),
             layer_distance_radius: 0.1,
             holding_fraction: 0.1,

@@ -35,6 +35,8 @@ pub struct SurfacePoint {
     pub face: u32,
     /// Barycentric coordinates in that face; non-negative, sum 1.
     pub barycentric: [f64; 3],
+    /// Part of that face it lies on.
+    pub feature: Feature,
     /// Unit pseudo-normal of the feature it lies on; zero where every incident face has no area.
     pub normal: [f64; 3],
 }
@@ -108,6 +110,7 @@ impl ClosestPoint {
             distance_squared: found.distance_squared,
             face,
             barycentric: found.barycentric,
+            feature: found.feature,
             normal: self.feature_normal(face, found.feature),
         })
     }
@@ -117,7 +120,7 @@ impl ClosestPoint {
         self.faces[face as usize]
     }
 
-    fn corners(&self, face: u32) -> [[f64; 3]; 3] {
+    pub(crate) fn corners(&self, face: u32) -> [[f64; 3]; 3] {
         self.faces[face as usize].map(|v| self.positions[v as usize])
     }
 

@@ -7,10 +7,10 @@
 //! taken off (`EnergySettings::repulsion_continuous`). Training uses cheaper forms of these two.
 
 use crate::config::LossesConfig;
-use crate::evaluate::Draped;
+use crate::drape::NetworkDrape;
 use crate::scene::PreparedScene;
 use clothcombo_physics::energy::{
-    EnergyError, EnergySettings, GarmentEnergies, SceneEnergy, SceneGarment, SceneLayers,
+    EnergyError, EnergySettings, GarmentEnergies, LayerContact, SceneEnergy, SceneGarment, SceneLayers, Term, TermMap,
 };
 use clothcombo_physics::equilibrium::{
     EquilibriumError, Problem, Progress, Solution, SolverSettings, Stop, solve,
@@ -45,6 +45,7 @@ pub fn reference_settings(losses: &LossesConfig) -> EnergySettings {
         distance: Distance::Union,
         repulsion_subset: None,
         repulsion_continuous: true,
+        layer_contact: LayerContact::ClosestPoint,
         ..losses.energy_settings()
     }
 }
@@ -57,9 +58,6 @@ impl ReferenceScene {
     pub fn new(losses: &LossesConfig, scene: &PreparedScene) -> Result<Self, EnergyError> {
         let settings = reference_settings(losses);
         let body = &scene.bodies[0];
-        let wide = |positions: &[[f32; 3]]| -> Vec<[f64; 3]> {
-            positions.iter().map(|p| p.map(f64::from)).collect()
-        };
         let start = wide(&body.start);
         let mut rest = Vec::with_capacity(start.len());
         let transforms = skinning_transforms(scene);
@@ -77,7 +75,7 @@ impl ReferenceScene {
         }
         let layers = body.energy.layers.iter();
         let layers =
-            layers.map(|l| SceneLayers { inner: l.inner, outer: l.outer, weights: l.weights }).collect();
+            layers.map(|l| SceneLayers { inner: l.inner, outer: l.outer, weights: continuous(l.weights) }).collect();
         let surface = &body.energy.body;
         let skinned = |positions: &[[f64; 3]]| -> Vec<[f64; 3]> {
             transforms.iter().zip(positions).map(|(t, p)| apply(t, *p)).collect()
@@ -95,6 +93,11 @@ impl ReferenceScene {
             transforms,
         })
     }
+}
+
+/// Without the layer distance, whose pairs change with the nearest body vertex: no solver can balance its jumps.
+fn continuous(weights: TermMap<f64>) -> TermMap<f64> {
+    TermMap::from_fn(|term| if term == Term::LayerDistance { 0.0 } else { weights[term] })
 }
 
 /// Energy and distance of one method on one scene.
@@ -150,6 +153,19 @@ pub struct SceneError {
     pub reference: usize,
     /// Whether the runs ended in minima of different energy.
     pub minima_differ: bool,
+    /// Strain of every garment, inner → outer; of a scene of several garments only.
+    pub layers: Vec<LayerStrain>,
+}
+
+/// Strain of one garment of an outfit [J].
+#[derive(Clone, Debug, Serialize)]
+pub struct LayerStrain {
+    /// Worn alone, in the equilibrium that was found.
+    pub alone: f64,
+    /// In the reference of the outfit.
+    pub outfit: f64,
+    /// Draped by the networks, alone and in the outfit.
+    pub network: Option<[f64; 2]>,
 }
 
 impl SceneError {
@@ -169,21 +185,19 @@ pub const LBS: &str = "LBS";
 pub fn scene_error(
     number: usize,
     scene: &ReferenceScene,
-    network: Option<&Draped>,
+    network: Option<&NetworkDrape>,
     settings: &SolverSettings,
     observer: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
 ) -> Result<SceneError, EquilibriumError> {
     let problem = Problem::new(&scene.energy, Some(&scene.transforms))?;
     let mut states = vec![("LBS of rest", scene.skinned_rest.clone()), (LBS, scene.skinned_start.clone())];
-    states.extend(network.map(|d| ("network", d.posed.iter().map(|p| p.map(f64::from)).collect())));
+    states.extend(network.map(|drape| ("network", wide(&drape.layered.posed))));
 
     let mut solutions: Vec<(&'static str, Solution)> = Vec::new();
     for (method, start) in &states[1..] {
         solutions.push((method, solve(&problem, start, settings, observer)?));
     }
-    let energies = solutions.iter().map(|(_, s)| s.energy());
-    let (reference, _) =
-        energies.enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).expect("there is a run from LBS");
+    let reference = lowest(&solutions);
     let minimum = &solutions[reference].1;
     let gained = solutions[0].1.history[0].energy - minimum.energy();
 
@@ -203,7 +217,50 @@ pub fn scene_error(
         minima_differ: solutions.iter().any(|(_, s)| differ(s)),
         reference,
         runs: solutions.iter().map(|(start, s)| solver_run(start, s)).collect(),
+        layers: layer_strains(scene, &minimum.positions, network, settings, observer)?,
     })
+}
+
+/// Which solution has the lowest energy.
+fn lowest(solutions: &[(&'static str, Solution)]) -> usize {
+    let energies = solutions.iter().map(|(_, s)| s.energy());
+    energies.enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).expect("there is a run from LBS").0
+}
+
+/// Strain of every garment in the outfit at `minimum`, and alone in the equilibrium found for it.
+fn layer_strains(
+    scene: &ReferenceScene,
+    minimum: &[[f64; 3]],
+    network: Option<&NetworkDrape>,
+    settings: &SolverSettings,
+    observer: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
+) -> Result<Vec<LayerStrain>, EquilibriumError> {
+    if scene.energy.garments.len() < 2 {
+        return Ok(Vec::new());
+    }
+    let alone = scene.energy.without_layers();
+    let problem = Problem::new(&alone, Some(&scene.transforms))?;
+    let mut solutions = vec![(LBS, solve(&problem, &scene.skinned_start, settings, observer)?)];
+    if let Some(drape) = network {
+        solutions.push(("network", solve(&problem, &wide(&drape.single.posed), settings, observer)?));
+    }
+    let strain = |positions: &[[f64; 3]]| -> Vec<f64> {
+        let raw = alone.raw(positions, positions).garments;
+        raw.iter().map(|terms| terms[Term::Strain].unwrap_or(0.0)).collect()
+    };
+    let [in_outfit, by_itself] = [minimum, &solutions[lowest(&solutions)].1.positions].map(strain);
+    let drapes = network.map(|drape| [&drape.single, &drape.layered].map(|d| strain(&wide(&d.posed))));
+    Ok((0..in_outfit.len())
+        .map(|g| LayerStrain {
+            alone: by_itself[g],
+            outfit: in_outfit[g],
+            network: drapes.as_ref().map(|[alone, worn]| [alone[g], worn[g]]),
+        })
+        .collect())
+}
+
+fn wide(positions: &[[f32; 3]]) -> Vec<[f64; 3]> {
+    positions.iter().map(|p| p.map(f64::from)).collect()
 }
 
 fn solver_run(start: &'static str, solution: &Solution) -> SolverRun {

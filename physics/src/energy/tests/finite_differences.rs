@@ -3,7 +3,7 @@
 
 use super::scenes::{only, scene};
 use crate::energy::gradient_check::{GradientCheck, check_gradient};
-use crate::energy::{EnergySettings, LayerGate, Term};
+use crate::energy::{EnergySettings, LayerContact, LayerGate, Term};
 use crate::query::Distance;
 
 fn check(term: Term, settings: EnergySettings, seed: u64, what: &str) {
@@ -40,6 +40,12 @@ fn so_it_is_with_every_switch() {
     check(Term::LayerCollision, EnergySettings { layer_gate: None, ..default }, 3, "no gate");
     let gate = Some(LayerGate { tangential_edges: 0.4, depth: 0.004 });
     check(Term::LayerCollision, EnergySettings { layer_gate: gate, ..default }, 3, "narrow gate");
+    // By the closest point the same gate fades cloth out that is 2 to 4 mm deep.
+    for gate in [default.layer_gate, gate] {
+        let layer_contact = LayerContact::ClosestPoint;
+        let settings = EnergySettings { layer_gate: gate, layer_contact, ..default };
+        check(Term::LayerCollision, settings, 3, "closest point");
+    }
     check(Term::Repulsion, EnergySettings { repulsion_normalised: false, ..default }, 3, "as printed");
     check(Term::Repulsion, EnergySettings { repulsion_subset: Some(16), ..default }, 3, "random subset");
     check(Term::Holding, EnergySettings { holding_fraction: 0.4, ..default }, 3, "40 % held");

@@ -6,11 +6,11 @@ use crate::cli::values::at_least_one;
 use crate::cli::verbosity::progress_bar;
 use crate::config::{Config, ValidationConfig, load};
 use crate::device::Backend;
-use crate::drape::{Networks, WardrobeTensors};
+use crate::drape::{NetworkDrape, Networks, WardrobeTensors};
 use crate::evaluate::equilibrium_error::{
     LBS, MethodError, ReferenceScene, SceneError, converged, scene_error,
 };
-use crate::evaluate::{Draped, Spread};
+use crate::evaluate::Spread;
 use crate::scene::{Library, LibraryError, PreparedScene, ValidationGroup, draw_validation, prepare};
 use clap::Parser;
 use clothcombo_physics::equilibrium::SolverSettings;
@@ -40,6 +40,9 @@ pub struct Arguments {
     /// Random scenes: validation draws of trained garments
     #[arg(long, default_value_t = 20, value_parser = at_least_one)]
     scenes: usize,
+    /// Garments of each scene
+    #[arg(long, default_value_t = 1, value_parser = at_least_one)]
+    layers: usize,
     /// Seed of the draws; default: that of the configuration
     #[arg(long)]
     seed: Option<u64>,
@@ -73,10 +76,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let config = configuration(arguments, trained.as_ref())?;
     let library = Arc::new(load_under_bar(&config)?);
     let seed = arguments.seed.unwrap_or_else(|| config.validation_seed());
-    let scenes = draw_scenes(&library, &config, arguments.scenes, seed)?;
-    let networks = match &trained {
+    let scenes = draw_scenes(&library, &config, [arguments.scenes, arguments.layers], seed)?;
+    let networks: Vec<Option<NetworkDrape>> = match &trained {
         Some(trained) => drape(trained, &library, &scenes)?.into_iter().map(Some).collect(),
-        None => vec![None; scenes.len()],
+        None => scenes.iter().map(|_| None).collect(),
     };
     let errors = solve_all(arguments, &config, &scenes, &networks, &settings)?;
     if arguments.json {
@@ -100,12 +103,18 @@ fn configuration(arguments: &Arguments, trained: Option<&TrainedModel>) -> Resul
 fn draw_scenes(
     library: &Library,
     config: &Config,
-    count: usize,
+    [count, layers]: [usize; 2],
     seed: u64,
 ) -> Result<Vec<PreparedScene>, LibraryError> {
     let pool = config.validation.single_scenes.max(count);
-    let validation = ValidationConfig { single_scenes: pool, ..config.validation.clone() };
-    let draws = draw_validation(library, seed, &validation, ValidationGroup::Single);
+    let validation = ValidationConfig {
+        single_scenes: pool,
+        layered_scenes: pool,
+        layers: [layers, layers],
+        ..config.validation.clone()
+    };
+    let group = if layers == 1 { ValidationGroup::Single } else { ValidationGroup::Layered };
+    let draws = draw_validation(library, seed, &validation, group);
     let chosen = index::sample(&mut ChaCha8Rng::seed_from_u64(seed), pool, count);
     chosen.into_iter().map(|i| prepare(library, &config.losses, draws[i].clone(), 1.0)).collect()
 }
@@ -114,12 +123,12 @@ fn drape(
     trained: &TrainedModel,
     library: &Arc<Library>,
     scenes: &[PreparedScene],
-) -> Result<Vec<Draped>, Report> {
+) -> Result<Vec<NetworkDrape>, Report> {
     trained.check_fits(library)?;
     let device = Backend::preferred().device();
     let tensors = WardrobeTensors::new(library.clone(), trained.state.dimensions(), &device);
     let networks = Networks::new(trained.networks(&device)?, &tensors);
-    scenes.iter().map(|scene| Ok(networks.drape(scene)?.layered)).collect()
+    scenes.iter().map(|scene| Ok(networks.drape(scene)?)).collect()
 }
 
 /// Solves every scene on one core of its own; results are in the order of the scenes.
@@ -127,7 +136,7 @@ fn solve_all(
     arguments: &Arguments,
     config: &Config,
     scenes: &[PreparedScene],
-    networks: &[Option<Draped>],
+    networks: &[Option<NetworkDrape>],
     settings: &SolverSettings,
 ) -> Result<Vec<SceneError>, Report> {
     let bar = progress_bar(scenes.len(), "scenes {bar:30} {pos}/{len} · {eta} left · {msg}");

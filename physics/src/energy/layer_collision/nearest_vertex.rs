@@ -1,20 +1,19 @@
-//! Layer collision: an outer garment stays outside an inner one (paper, equation for L_mc).
+//! The paper's form: `d = (x − x_g)·n_g` for the nearest inner vertex `x_g` and its area-weighted normal.
 //!
-//! `Σ max(ε − d, 0)³` over outer vertices, with `d = (x − x_g)·n_g` for the nearest inner vertex `x_g` and its area-weighted
-//! normal. Both garments move, so the gradient reaches the outer vertex, the inner vertex and, through the normal, the
-//! one-ring of the inner vertex: it is the exact derivative wherever the nearest vertex stays the same.
+//! The gradient reaches the outer vertex, the inner vertex and, through the normal, the one-ring of the inner vertex: it is the
+//! exact derivative wherever the nearest vertex stays the same.
 //!
 //! **Without a normal.** An inner vertex whose faces have collapsed has no normal, and near that its normal turns
 //! arbitrarily fast. With `N` the sum of its faces' normals (twice their areas), `n = N/√(|N|² + τ²)` with τ 1e-4 of `|N|`
 //! at rest (at least 1e-6 squared median edges): within 1e-8 of a unit normal at rest, and a bounded derivative. Inner
 //! vertices without a face take no part.
 //!
-//! [`super::LayerGate`] limits the sum to outer vertices that have inner cloth under them.
+//! [`LayerGate`] limits the sum to outer vertices that have inner cloth under them.
 
 use rayon::prelude::*;
 
-use super::elements::{GRAIN, Incidence};
-use super::{LayerGate, Weighted};
+use crate::energy::elements::{GRAIN, Incidence};
+use crate::energy::{EnergySettings, LayerGate, Weighted};
 use crate::mesh::TriMesh;
 use crate::query::VertexIndex;
 use crate::real::Real;
@@ -26,9 +25,9 @@ pub const COLLAPSE_RATIO: f64 = 1e-4;
 /// Smallest τ in units of the squared median edge.
 pub const COLLAPSE_FLOOR: f64 = 1e-6;
 
-/// What stays the same of a garment that others lie on.
+/// What stays the same of an inner garment.
 #[derive(Debug, Clone)]
-pub struct InnerSurface {
+pub struct InnerVertices {
     faces: Vec<[u32; 3]>,
     incidence: Incidence,
     /// τ² per vertex [m⁴].
@@ -36,9 +35,9 @@ pub struct InnerSurface {
     median_edge: f64,
 }
 
-/// Posed normals and index of an inner garment: made once per evaluation, used by every pair that it is the inner one of.
+/// Posed normals and index of an inner garment.
 #[derive(Debug)]
-pub struct PosedInner<T: Real> {
+pub struct PosedVertices<T: Real> {
     index: VertexIndex<T>,
     /// `N`, the sum of the faces' cross products [m²].
     area_normals: Vec<[f64; 3]>,
@@ -55,12 +54,7 @@ struct Contact {
 
 const NO_CONTACT: Contact = Contact { inner: 0, energy: 0.0, slope: 0.0 };
 
-impl InnerSurface {
-    /// Prepares a garment with rest shape `rest`.
-    pub fn new(rest: &TriMesh) -> Self {
-        Self::with_median_edge(rest, rest.median_edge_length())
-    }
-
+impl InnerVertices {
     pub(super) fn with_median_edge(rest: &TriMesh, median_edge: f64) -> Self {
         let faces = rest.faces().to_vec();
         let incidence = Incidence::new(rest.vertex_count(), &faces);
@@ -77,9 +71,8 @@ impl InnerSurface {
         self.median_edge
     }
 
-    /// Prepares the garment at `positions` `[V, 3]` [m] for queries.
-    pub fn posed<T: Real>(&self, positions: &[[T; 3]]) -> PosedInner<T> {
-        PosedInner {
+    pub(super) fn posed<T: Real>(&self, positions: &[[T; 3]]) -> PosedVertices<T> {
+        PosedVertices {
             index: VertexIndex::new(positions),
             area_normals: area_normals(positions, &self.faces, &self.incidence),
         }
@@ -87,7 +80,7 @@ impl InnerSurface {
 
     /// The regularised normal `n` and `√(|N|² + τ²)`; `None` without faces.
     #[inline(always)]
-    fn normal<T: Real>(&self, posed: &PosedInner<T>, v: usize) -> Option<([f64; 3], f64)> {
+    fn normal<T: Real>(&self, posed: &PosedVertices<T>, v: usize) -> Option<([f64; 3], f64)> {
         if self.incidence.slots(v).is_empty() {
             return None;
         }
@@ -96,17 +89,16 @@ impl InnerSurface {
         Some((if length > 0.0 { scale(sum, 1.0 / length) } else { zero() }, length))
     }
 
-    /// Penalty [m³] of the vertices of `outer` against this garment at `inner` (both `[V, 3]` [m]), with margin `epsilon`
-    /// [m]; adds its weighted gradient to `targets`, the inner garment's first.
-    pub fn evaluate<T: Real>(
+    /// As [`InnerGarment::evaluate`](super::InnerGarment::evaluate).
+    pub(super) fn evaluate<T: Real>(
         &self,
         inner: &[[T; 3]],
-        posed: &PosedInner<T>,
+        posed: &PosedVertices<T>,
         outer: &[[T; 3]],
-        epsilon: f64,
-        gate: Option<LayerGate>,
+        settings: &EnergySettings,
         targets: Option<[Weighted<'_, T>; 2]>,
     ) -> f64 {
+        let (epsilon, gate) = (settings.layer_collision_epsilon, settings.layer_gate);
         let contacts: Vec<Contact> = outer
             .par_iter()
             .with_min_len(GRAIN / 2)
@@ -139,7 +131,7 @@ impl InnerSurface {
     fn contact<T: Real>(
         &self,
         inner: &[[T; 3]],
-        posed: &PosedInner<T>,
+        posed: &PosedVertices<T>,
         p: [T; 3],
         epsilon: f64,
         gate: Option<LayerGate>,

@@ -1,0 +1,92 @@
+//! Layer collision: an outer garment stays outside an inner one (paper, equation for L_mc).
+//!
+//! `Σ max(ε − d, 0)³` over outer vertices. Both garments move, so the gradient reaches both. [`LayerContact`] says how `d` is
+//! measured: [`nearest_vertex`] is the paper's form, cheap enough for training; [`closest_point`] has no jumps where the nearest
+//! feature changes, and is what a solver with a line search needs.
+
+pub mod closest_point;
+pub mod nearest_vertex;
+
+use super::{CurvatureSink, EnergySettings, Weighted};
+use crate::mesh::{Topology, TriMesh};
+use crate::query::ClosestPoint;
+use crate::real::Real;
+use closest_point::InnerCloth;
+use nearest_vertex::{InnerVertices, PosedVertices};
+
+/// How the signed distance of an outer vertex to an inner garment is measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum LayerContact {
+    /// `(x − x_g)·n_g` with the nearest vertex `g` and its area-weighted normal: the paper's form.
+    #[default]
+    NearestVertex,
+    /// The distance to the closest point of the surface.
+    ClosestPoint,
+}
+
+/// What stays the same of a garment that others lie on.
+#[derive(Debug, Clone)]
+pub struct InnerGarment {
+    vertices: InnerVertices,
+    cloth: InnerCloth,
+}
+
+/// An inner garment in its present position: made once per evaluation, used by every pair that it is the inner one of.
+#[derive(Debug)]
+pub enum PosedInner<T: Real> {
+    /// For [`LayerContact::NearestVertex`].
+    Vertices(PosedVertices<T>),
+    /// For [`LayerContact::ClosestPoint`].
+    Cloth(ClosestPoint),
+}
+
+impl InnerGarment {
+    pub(super) fn new(rest: &TriMesh, topology: &Topology, median_edge: f64) -> Self {
+        let vertices = InnerVertices::with_median_edge(rest, median_edge);
+        Self { vertices, cloth: InnerCloth::new(rest, topology) }
+    }
+
+    /// Median edge of the rest shape [m].
+    pub(super) fn median_edge(&self) -> f64 {
+        self.vertices.median_edge()
+    }
+
+    /// Prepares the garment at `positions` `[V, 3]` [m] for queries.
+    pub fn posed<T: Real>(&self, positions: &[[T; 3]], contact: LayerContact) -> PosedInner<T> {
+        match contact {
+            LayerContact::NearestVertex => PosedInner::Vertices(self.vertices.posed(positions)),
+            LayerContact::ClosestPoint => PosedInner::Cloth(self.cloth.posed(positions)),
+        }
+    }
+
+    /// Penalty [m³] of the vertices of `outer` against this garment at `inner` (both `[V, 3]` [m]); adds its weighted gradient to
+    /// `targets`, the inner garment's first.
+    pub fn evaluate<T: Real>(
+        &self,
+        inner: &[[T; 3]],
+        posed: &PosedInner<T>,
+        outer: &[[T; 3]],
+        settings: &EnergySettings,
+        targets: Option<[Weighted<'_, T>; 2]>,
+    ) -> f64 {
+        match posed {
+            PosedInner::Vertices(posed) => self.vertices.evaluate(inner, posed, outer, settings, targets),
+            PosedInner::Cloth(closest) => self.cloth.evaluate(closest, outer, settings, targets),
+        }
+    }
+
+    /// Curvature of the penalty at the inner and at the outer garment, whose vertices start at `offsets`, without what couples the
+    /// two. The paper's form has none: no solver gets far with it.
+    pub(super) fn curvature<T: Real>(
+        &self,
+        posed: &PosedInner<T>,
+        outer: &[[T; 3]],
+        settings: &EnergySettings,
+        offsets: [usize; 2],
+        sink: &mut dyn CurvatureSink,
+    ) {
+        if let PosedInner::Cloth(closest) = posed {
+            self.cloth.curvature(closest, outer, settings, offsets, sink);
+        }
+    }
+}
