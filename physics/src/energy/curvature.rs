@@ -9,7 +9,8 @@
 pub trait CurvatureSink {
     /// Adds `block` at row `i`, column `j` of vertices, and, for `i ≠ j`, its transpose at row `j`, column `i`.
     ///
-    /// Off the diagonal, the vertex pairs a term adds to must not depend on positions.
+    /// Off the diagonal, the vertex pairs a term adds to must not depend on positions, but for contact between garments
+    /// ([`SceneEnergy::couples_garments`](super::SceneEnergy::couples_garments)).
     fn add(&mut self, i: usize, j: usize, block: [[f64; 3]; 3]);
 }
 

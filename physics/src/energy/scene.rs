@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::curvature::{CurvatureSink, Scaled};
 use super::elements::GRAIN;
-use super::layer_collision::PosedInner;
+use super::layer_collision::{LayerContact, PosedInner};
 use super::layer_distance::{BodyBuckets, LayerGaps, layer_distance};
 use super::{EnergyError, EnergySettings, GarmentEnergies, GarmentState, Term, TermMap, Weighted};
 use crate::query::{Gap, Surface};
@@ -184,6 +184,12 @@ impl<T: Real> SceneEnergy<T> {
     pub fn needs_canonical(&self) -> bool {
         let mut terms = self.garments.iter().flat_map(|g| g.energies.terms().map(move |(term, _)| (g, term)));
         terms.any(|(g, term)| term.is_canonical() && g.weights[term] != 0.0)
+    }
+
+    /// Whether [`curvature`](Self::curvature) couples vertices that touch at the moment.
+    pub fn couples_garments(&self) -> bool {
+        let is_coupled = |pair: &SceneLayers| pair.weights[Term::LayerCollision] > 0.0;
+        self.settings.layer_contact == LayerContact::ClosestPoint && self.layers.iter().any(is_coupled)
     }
 
     /// A positive semidefinite approximation of the second derivatives of the weighted sum with respect to posed and to

@@ -121,6 +121,11 @@ impl<'a> Problem<'a> {
         (!moved.is_empty()).then_some(positions)
     }
 
+    /// As [`SceneEnergy::couples_garments`].
+    pub(super) fn couples_garments(&self) -> bool {
+        self.energy.couples_garments()
+    }
+
     /// Passes a positive semidefinite approximation of the Hessian with respect to posed positions to `sink`.
     pub(super) fn curvature(&self, posed: &[[f64; 3]], sink: &mut dyn CurvatureSink) {
         let mut in_canonical = Collected::default();

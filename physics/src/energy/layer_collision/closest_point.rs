@@ -83,8 +83,7 @@ impl InnerCloth {
         contacts.iter().map(|contact| contact.share * contact.penalty[0]).sum()
     }
 
-    /// `w·6(ε − d) u uᵀ` at the outer vertex and, by barycentric coordinates, at the corners: what the penalty has if the surface
-    /// is flat. What couples the two garments is left out: it is at other places in every step.
+    /// `w·6(ε − d) a aᵀ` with `a = ∂d/∂(x, q)`: what the penalty has if the surface is flat.
     pub fn curvature<T: Real>(
         &self,
         closest: &ClosestPoint,
@@ -94,14 +93,16 @@ impl InnerCloth {
         sink: &mut dyn CurvatureSink,
     ) {
         for contact in self.contacts(closest, outer, settings) {
-            let (u, b) = (contact.direction, contact.barycentric);
+            let u = contact.direction;
+            let [a, b, c] = contact.corners.map(|v| inner_offset + v as usize);
+            let vertices = [outer_offset + contact.outer, a, b, c];
+            let [a, b, c] = contact.barycentric;
+            let parts = [1.0, -a, -b, -c];
             let stiffness = contact.share * contact.penalty[2];
-            let vertex = outer_offset + contact.outer;
-            sink.add(vertex, vertex, dyad(stiffness, u, u));
-            let corners = contact.corners.map(|v| inner_offset + v as usize);
-            for i in 0..3 {
-                // Two corners of a face share an edge, which strain couples in every pose.
-                (0..=i).for_each(|j| sink.add(corners[i], corners[j], dyad(stiffness * b[i] * b[j], u, u)));
+            for i in 0..4 {
+                for j in 0..=i {
+                    sink.add(vertices[i], vertices[j], dyad(stiffness * parts[i] * parts[j], u, u));
+                }
             }
         }
     }

@@ -75,8 +75,8 @@ impl InnerGarment {
         }
     }
 
-    /// Curvature of the penalty at the inner and at the outer garment, whose vertices start at `offsets`, without what couples the
-    /// two. The paper's form has none: no solver gets far with it.
+    /// Curvature of the penalty, for an inner and an outer garment whose vertices start at `offsets`. The paper's form has none: no
+    /// solver gets far with it.
     pub(super) fn curvature<T: Real>(
         &self,
         posed: &PosedInner<T>,
