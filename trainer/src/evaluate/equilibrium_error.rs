@@ -157,6 +157,23 @@ pub struct SceneError {
     pub layers: Vec<LayerStrain>,
 }
 
+/// What networks make of a scene, `[ΣV, 3]` [m] each.
+pub struct Drapes {
+    /// Every garment draped alone.
+    pub single: Vec<[f64; 3]>,
+    /// After untangling.
+    pub layered: Vec<[f64; 3]>,
+    /// After the post-process, if it was run.
+    pub resolved: Option<Vec<[f64; 3]>>,
+}
+
+impl Drapes {
+    /// Of networks, and what the post-process made of it.
+    pub fn new(drape: &NetworkDrape, resolved: Option<Vec<[f64; 3]>>) -> Self {
+        Self { single: wide(&drape.single.posed), layered: wide(&drape.layered.posed), resolved }
+    }
+}
+
 /// Strain of one garment of an outfit [J].
 #[derive(Clone, Debug, Serialize)]
 pub struct LayerStrain {
@@ -185,13 +202,15 @@ pub const LBS: &str = "LBS";
 pub fn scene_error(
     number: usize,
     scene: &ReferenceScene,
-    network: Option<&NetworkDrape>,
+    network: Option<&Drapes>,
     settings: &SolverSettings,
     observer: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
 ) -> Result<SceneError, EquilibriumError> {
     let problem = Problem::new(&scene.energy, Some(&scene.transforms))?;
     let mut states = vec![("LBS of rest", scene.skinned_rest.clone()), (LBS, scene.skinned_start.clone())];
-    states.extend(network.map(|drape| ("network", wide(&drape.layered.posed))));
+    states.extend(network.map(|drapes| ("network", drapes.layered.clone())));
+    let resolved = network.and_then(|drapes| drapes.resolved.clone());
+    states.extend(resolved.map(|resolved| ("network + post-process", resolved)));
 
     let mut solutions: Vec<(&'static str, Solution)> = Vec::new();
     for (method, start) in &states[1..] {
@@ -231,7 +250,7 @@ fn lowest(solutions: &[(&'static str, Solution)]) -> usize {
 fn layer_strains(
     scene: &ReferenceScene,
     minimum: &[[f64; 3]],
-    network: Option<&NetworkDrape>,
+    network: Option<&Drapes>,
     settings: &SolverSettings,
     observer: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Vec<LayerStrain>, EquilibriumError> {
@@ -241,15 +260,15 @@ fn layer_strains(
     let alone = scene.energy.without_layers();
     let problem = Problem::new(&alone, Some(&scene.transforms))?;
     let mut solutions = vec![(LBS, solve(&problem, &scene.skinned_start, settings, observer)?)];
-    if let Some(drape) = network {
-        solutions.push(("network", solve(&problem, &wide(&drape.single.posed), settings, observer)?));
+    if let Some(drapes) = network {
+        solutions.push(("network", solve(&problem, &drapes.single, settings, observer)?));
     }
     let strain = |positions: &[[f64; 3]]| -> Vec<f64> {
         let raw = alone.raw(positions, positions).garments;
         raw.iter().map(|terms| terms[Term::Strain].unwrap_or(0.0)).collect()
     };
     let [in_outfit, by_itself] = [minimum, &solutions[lowest(&solutions)].1.positions].map(strain);
-    let drapes = network.map(|drape| [&drape.single, &drape.layered].map(|d| strain(&wide(&d.posed))));
+    let drapes = network.map(|drapes| [&drapes.single, &drapes.layered].map(|d| strain(d)));
     Ok((0..in_outfit.len())
         .map(|g| LayerStrain {
             alone: by_itself[g],

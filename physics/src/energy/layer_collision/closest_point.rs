@@ -211,3 +211,6 @@ fn interpolated_gradients(
     }
     gradients
 }
+
+#[cfg(test)]
+mod tests;

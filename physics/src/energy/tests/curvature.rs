@@ -2,7 +2,7 @@
 //! out.
 
 use super::scenes::{Scene, only, random, scene};
-use crate::energy::{CurvatureSink, EnergySettings, Term};
+use crate::energy::{CurvatureSink, EnergySettings, LayerContact, Term};
 use crate::mesh::shapes;
 use crate::query::Distance;
 use rand::RngExt;
@@ -47,9 +47,12 @@ fn scalar(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
 
 #[test]
 fn never_negative() {
-    for term in [Term::Strain, Term::Bending, Term::BodyCollision, Term::Holding] {
+    let terms = [Term::Strain, Term::Bending, Term::BodyCollision, Term::Holding, Term::LayerCollision];
+    let settings = EnergySettings { layer_contact: LayerContact::ClosestPoint, ..EnergySettings::default() };
+    for term in terms {
         for seed in 0..4 {
-            let scene = scene::<f64>(EnergySettings::default(), only(term), seed);
+            let scene = scene::<f64>(settings, only(term), seed);
+            assert!(scene.energy.couples_garments() == (term == Term::LayerCollision));
             let mut largest = 0.0f64;
             for k in 0..40 {
                 let x = directions(scene.posed.len(), 100 * seed + k);

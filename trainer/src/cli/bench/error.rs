@@ -6,13 +6,15 @@ use crate::cli::values::at_least_one;
 use crate::cli::verbosity::progress_bar;
 use crate::config::{Config, ValidationConfig, load};
 use crate::device::Backend;
-use crate::drape::{NetworkDrape, Networks, WardrobeTensors};
+use crate::drape::{Networks, WardrobeTensors};
+use crate::evaluate::certificates::Dressing;
 use crate::evaluate::equilibrium_error::{
-    LBS, MethodError, ReferenceScene, SceneError, converged, scene_error,
+    Drapes, LBS, MethodError, ReferenceScene, SceneError, converged, scene_error,
 };
 use crate::evaluate::Spread;
 use crate::scene::{Library, LibraryError, PreparedScene, ValidationGroup, draw_validation, prepare};
 use clap::Parser;
+use clothcombo_physics::contact::resolve::ResolveSettings;
 use clothcombo_physics::equilibrium::SolverSettings;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use rand::{SeedableRng, seq::index};
@@ -60,6 +62,9 @@ pub struct Arguments {
     json: bool,
 }
 
+/// Most steps of the post-process on the way from the T-pose, as in `clothcombo eval`.
+const WAY_STEPS: usize = 32;
+
 /// Runs the verb.
 ///
 /// # Errors
@@ -77,8 +82,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let library = Arc::new(load_under_bar(&config)?);
     let seed = arguments.seed.unwrap_or_else(|| config.validation_seed());
     let scenes = draw_scenes(&library, &config, [arguments.scenes, arguments.layers], seed)?;
-    let networks: Vec<Option<NetworkDrape>> = match &trained {
-        Some(trained) => drape(trained, &library, &scenes)?.into_iter().map(Some).collect(),
+    let networks: Vec<Option<Drapes>> = match &trained {
+        Some(trained) => drape(trained, &config, &library, &scenes)?.into_iter().map(Some).collect(),
         None => scenes.iter().map(|_| None).collect(),
     };
     let errors = solve_all(arguments, &config, &scenes, &networks, &settings)?;
@@ -121,14 +126,31 @@ fn draw_scenes(
 
 fn drape(
     trained: &TrainedModel,
+    config: &Config,
     library: &Arc<Library>,
     scenes: &[PreparedScene],
-) -> Result<Vec<NetworkDrape>, Report> {
+) -> Result<Vec<Drapes>, Report> {
     trained.check_fits(library)?;
     let device = Backend::preferred().device();
     let tensors = WardrobeTensors::new(library.clone(), trained.state.dimensions(), &device);
     let networks = Networks::new(trained.networks(&device)?, &tensors);
-    scenes.iter().map(|scene| Ok(networks.drape(scene)?)).collect()
+    let dressing = Dressing::new(library, &config.losses, Some(&networks));
+    let post_process = ResolveSettings { steps: WAY_STEPS, ..ResolveSettings::default() };
+    let bar = progress_bar(scenes.len(), "draping {bar:30} {pos}/{len} · {eta} left");
+    let drapes = scenes.iter().map(|scene| {
+        let drape = networks.drape(scene)?;
+        // Alone a garment is near enough to its equilibrium to start from; in an outfit that crosses, no force can tell where
+        // cloth belongs.
+        let resolved = match scene.worn.len() {
+            1 => None,
+            _ => Some(dressing.of(scene, &drape.layered.posed).resolved(&post_process)?.positions.concat()),
+        };
+        bar.inc(1);
+        Ok(Drapes::new(&drape, resolved))
+    });
+    let drapes = drapes.collect();
+    bar.finish_and_clear();
+    drapes
 }
 
 /// Solves every scene on one core of its own; results are in the order of the scenes.
@@ -136,7 +158,7 @@ fn solve_all(
     arguments: &Arguments,
     config: &Config,
     scenes: &[PreparedScene],
-    networks: &[Option<NetworkDrape>],
+    networks: &[Option<Drapes>],
     settings: &SolverSettings,
 ) -> Result<Vec<SceneError>, Report> {
     let bar = progress_bar(scenes.len(), "scenes {bar:30} {pos}/{len} · {eta} left · {msg}");
