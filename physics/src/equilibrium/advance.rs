@@ -5,7 +5,9 @@ use super::lbfgs::{Memory, product};
 use super::line_search::{Trial, search};
 use super::preconditioner::Preconditioner;
 use super::{Problem, SolverSettings};
+use crate::energy::LayerTouch;
 use crate::vec3::{add_scaled, dot, is_finite, norm_squared, sub};
+use std::collections::{HashMap, HashSet};
 
 /// How far ahead the forces are looked at where no step goes downhill [m]: past a kink that is hit at once, and not past much
 /// else.
@@ -39,6 +41,15 @@ pub(super) struct Model<'a> {
     pub preconditioner: &'a Preconditioner,
 }
 
+/// Who stands in the way of a step.
+#[derive(Debug, Default)]
+pub(super) struct Blocked {
+    /// Vertices whose forces turn against the step.
+    pub turned: Vec<usize>,
+    /// Vertices at a wall: beyond it another part of a garment is nearest, with them on its wrong side.
+    pub walls: Vec<usize>,
+}
+
 /// One step downhill along the kinks of `model`, and the vertices that made it short, if it is; if there is no step along the
 /// direction of its memory, the vertices that stand in the way.
 pub(super) fn advance(
@@ -47,7 +58,7 @@ pub(super) fn advance(
     model: &Model<'_>,
     settings: &SolverSettings,
     evaluations: &mut usize,
-) -> Result<(State, Vec<usize>), Vec<usize>> {
+) -> Result<(State, Vec<usize>), Blocked> {
     // −P H P g is downhill for every projection P.
     let mut along = model.gradient.to_vec();
     project(model.kinks, &mut along);
@@ -56,7 +67,7 @@ pub(super) fn advance(
     let slope = product(&direction, model.gradient);
     let reach = longest(&direction);
     if !(slope < 0.0 && reach.is_finite()) {
-        return Err(Vec::new());
+        return Err(Blocked::default());
     }
     let mut evaluate = |length: f64| {
         *evaluations += 1;
@@ -78,8 +89,11 @@ pub(super) fn advance(
             Ok((trial.state, slowed))
         }
         _ => {
-            let ahead = evaluate(GLANCE / reach).state.gradient;
-            Err(turned_against(&direction, model.gradient, &ahead))
+            let ahead = evaluate(GLANCE / reach).state;
+            Err(Blocked {
+                turned: turned_against(&direction, model.gradient, &ahead.gradient),
+                walls: walls(problem, state, &ahead),
+            })
         }
     }
 }
@@ -99,6 +113,33 @@ fn turned_against(direction: &[[f64; 3]], here: &[[f64; 3]], ahead: &[[f64; 3]])
     let held: Vec<usize> = held.copied().collect();
     // Where everything turns, nothing is in the way of the rest.
     if held.len() > direction.len() / MOST_HELD { Vec::new() } else { held }
+}
+
+/// The vertices whose contact with other garments costs so much more `ahead` than `here` that no force explains it: as many as must
+/// be held for the energy to fall, with the faces that they touch.
+fn walls(problem: &Problem<'_>, here: &State, ahead: &State) -> Vec<usize> {
+    let touches = [here, ahead].map(|state| problem.layer_touches(&state.positions));
+    let mut rises: HashMap<(usize, usize), f64> = HashMap::new();
+    for (touches, sign) in touches.iter().zip([-1.0, 1.0]) {
+        touches
+            .iter()
+            .for_each(|touch| *rises.entry((touch.pair, touch.vertex)).or_default() += sign * touch.energy);
+    }
+    let mut order: Vec<_> = rises.into_iter().filter(|(_, rise)| *rise > 0.0).collect();
+    order.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    let mut left = ahead.energy - here.energy;
+    let needed = |(_, rise): &&((usize, usize), f64)| {
+        let needed = left >= 0.0;
+        left -= rise;
+        needed
+    };
+    let held: HashSet<_> = order.iter().take_while(needed).map(|(key, _)| *key).collect();
+    let is_held = |touch: &&LayerTouch| held.contains(&(touch.pair, touch.vertex));
+    let of_touch = |touch: &LayerTouch| [touch.vertex].into_iter().chain(touch.corners);
+    let mut vertices: Vec<usize> = touches.iter().flatten().filter(is_held).flat_map(of_touch).collect();
+    vertices.sort_unstable();
+    vertices.dedup();
+    if vertices.len() > here.positions.len() / MOST_HELD { Vec::new() } else { vertices }
 }
 
 /// The longest of vectors.

@@ -2,7 +2,7 @@
 
 use super::EquilibriumError;
 use super::kinks::{self, Kink};
-use crate::energy::{CurvatureSink, SceneEnergy, Term};
+use crate::energy::{CurvatureSink, LayerTouch, SceneEnergy, Term};
 use crate::transform::{Transform, apply, apply_transposed, inverse};
 use crate::vec3::{accumulate, norm_squared};
 
@@ -124,6 +124,11 @@ impl<'a> Problem<'a> {
     /// As [`SceneEnergy::couples_garments`].
     pub(super) fn couples_garments(&self) -> bool {
         self.energy.couples_garments()
+    }
+
+    /// As [`SceneEnergy::layer_touches`].
+    pub(super) fn layer_touches(&self, posed: &[[f64; 3]]) -> Vec<LayerTouch> {
+        self.energy.layer_touches(posed)
     }
 
     /// Passes a positive semidefinite approximation of the Hessian with respect to posed positions to `sink`.

@@ -57,6 +57,8 @@ pub fn solve(
     let mut kinks: Vec<Kink> = Vec::new();
     // Vertices before kinks that made the last step short.
     let mut in_the_way: Vec<usize> = Vec::new();
+    // Vertices at walls: held until the next look.
+    let mut at_walls: Vec<usize> = Vec::new();
     // The last step, and the gradient before it.
     let mut last: Option<(Vec<[f64; 3]>, Vec<[f64; 3]>)> = None;
     let mut history = Vec::new();
@@ -69,6 +71,7 @@ pub fn solve(
         }
         if step.iteration.is_multiple_of(LOOK_EVERY) && step.iteration > 0 {
             force_scale = problem.force_scale(&state.positions);
+            at_walls.clear();
         }
         // Vertices of a smaller gradient than this may all be wrong together.
         let least = 0.1 * settings.tolerance * force_scale / (state.positions.len() as f64).sqrt();
@@ -121,6 +124,7 @@ pub fn solve(
         });
         // They had the last step, the others have this one.
         kinks.extend(in_the_way.drain(..).map(|vertex| Kink::held(vertex, balanced[vertex])));
+        kinks.extend(at_walls.iter().map(|&vertex| Kink::held(vertex, balanced[vertex])));
         let (mut holds, mut kinks_were_wrong) = (0, false);
         let next = loop {
             if age >= settings.refactorise_every {
@@ -135,12 +139,16 @@ pub fn solve(
                 }
                 Err(blocked) => blocked,
             };
-            if age > 0 || !memory.is_empty() {
+            if !blocked.walls.is_empty() && holds < MOST_HOLDS && !kinks_were_wrong {
+                kinks.extend(blocked.walls.iter().map(|&vertex| Kink::held(vertex, balanced[vertex])));
+                at_walls.extend(blocked.walls);
+                holds += 1;
+            } else if age > 0 || !memory.is_empty() {
                 memory.clear();
                 age = settings.refactorise_every;
-            } else if !blocked.is_empty() && holds < MOST_HOLDS && !kinks_were_wrong {
+            } else if !blocked.turned.is_empty() && holds < MOST_HOLDS && !kinks_were_wrong {
                 // A few vertices before a kink hold up all others: for once without them.
-                kinks.extend(blocked.into_iter().map(|vertex| Kink::held(vertex, balanced[vertex])));
+                kinks.extend(blocked.turned.into_iter().map(|vertex| Kink::held(vertex, balanced[vertex])));
                 holds += 1;
             } else if !kinks.is_empty() && !kinks_were_wrong {
                 // The model of the kinks was wrong somewhere: once without.

@@ -10,7 +10,8 @@ use crate::config::LossesConfig;
 use crate::drape::NetworkDrape;
 use crate::scene::PreparedScene;
 use clothcombo_physics::energy::{
-    EnergyError, EnergySettings, GarmentEnergies, LayerContact, SceneEnergy, SceneGarment, SceneLayers, Term, TermMap,
+    EnergyError, EnergySettings, GarmentEnergies, LayerContact, SceneEnergy, SceneGarment, SceneLayers, Term,
+    TermMap,
 };
 use clothcombo_physics::equilibrium::{
     EquilibriumError, Problem, Progress, Solution, SolverSettings, Stop, solve,
@@ -74,8 +75,9 @@ impl ReferenceScene {
             rest.extend_from_slice(mesh.positions());
         }
         let layers = body.energy.layers.iter();
-        let layers =
-            layers.map(|l| SceneLayers { inner: l.inner, outer: l.outer, weights: continuous(l.weights) }).collect();
+        let layers = layers
+            .map(|l| SceneLayers { inner: l.inner, outer: l.outer, weights: continuous(l.weights) })
+            .collect();
         let surface = &body.energy.body;
         let skinned = |positions: &[[f64; 3]]| -> Vec<[f64; 3]> {
             transforms.iter().zip(positions).map(|(t, p)| apply(t, *p)).collect()

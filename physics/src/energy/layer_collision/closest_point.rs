@@ -83,6 +83,23 @@ impl InnerCloth {
         contacts.iter().map(|contact| contact.share * contact.penalty[0]).sum()
     }
 
+    /// As [`InnerGarment::touches`](super::InnerGarment::touches).
+    pub fn touches<T: Real>(
+        &self,
+        closest: &ClosestPoint,
+        outer: &[[T; 3]],
+        settings: &EnergySettings,
+    ) -> Vec<(usize, [u32; 3], f64)> {
+        let (epsilon, gate) = (settings.layer_collision_epsilon, settings.layer_gate.unwrap_or_default());
+        let of = |(number, p): (usize, &[T; 3])| {
+            let p = to_f64(*p);
+            let corners = closest.face(closest.project_within(p, gate.depth.max(epsilon))?.face);
+            let contact = self.contact(closest, number, p, epsilon, gate);
+            Some((number, corners, contact.map_or(0.0, |contact| contact.share * contact.penalty[0])))
+        };
+        outer.par_iter().with_min_len(GRAIN / 2).enumerate().filter_map(of).collect()
+    }
+
     /// `w·6(ε − d) a aᵀ` with `a = ∂d/∂(x, q)`: what the penalty has if the surface is flat.
     pub fn curvature<T: Real>(
         &self,

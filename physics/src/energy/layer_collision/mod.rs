@@ -75,6 +75,20 @@ impl InnerGarment {
         }
     }
 
+    /// The outer vertices that are nearer than the gate, with the corners of the inner faces that they are nearest to, and their penalty
+    /// [m³]; none by the nearest vertex.
+    pub(super) fn touches<T: Real>(
+        &self,
+        posed: &PosedInner<T>,
+        outer: &[[T; 3]],
+        settings: &EnergySettings,
+    ) -> Vec<(usize, [u32; 3], f64)> {
+        match posed {
+            PosedInner::Vertices(_) => Vec::new(),
+            PosedInner::Cloth(closest) => self.cloth.touches(closest, outer, settings),
+        }
+    }
+
     /// Curvature of the penalty, for an inner and an outer garment whose vertices start at `offsets`. The paper's form has none: no
     /// solver gets far with it.
     pub(super) fn curvature<T: Real>(

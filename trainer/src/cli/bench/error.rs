@@ -7,11 +7,11 @@ use crate::cli::verbosity::progress_bar;
 use crate::config::{Config, ValidationConfig, load};
 use crate::device::Backend;
 use crate::drape::{Networks, WardrobeTensors};
+use crate::evaluate::Spread;
 use crate::evaluate::certificates::Dressing;
 use crate::evaluate::equilibrium_error::{
     Drapes, LBS, MethodError, ReferenceScene, SceneError, converged, scene_error,
 };
-use crate::evaluate::Spread;
 use crate::scene::{Library, LibraryError, PreparedScene, ValidationGroup, draw_validation, prepare};
 use clap::Parser;
 use clothcombo_physics::contact::resolve::ResolveSettings;
