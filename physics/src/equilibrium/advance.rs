@@ -150,6 +150,50 @@ pub(super) fn longest(x: &[[f64; 3]]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::energy::tests::scenes::{only, scene_of};
+    use crate::energy::{EnergySettings, LayerContact, Term};
+    use crate::mesh::shapes;
+
+    #[test]
+    fn a_vertex_half_way_between_two_sheets_is_at_a_wall() {
+        // Two sheets of one garment, 2 cm apart, that both look up. Half way between them the upper one becomes the nearer, and
+        // a vertex of another garment is on its wrong side at once.
+        let sheet = |height: f64, size: f64, cells: usize| {
+            let grid = shapes::grid(size, size, cells, cells);
+            shapes::mapped(&grid, |[x, y, _]| [x - 0.5 * size, height, 0.5 * size - y])
+        };
+        let inner = shapes::union(&[&sheet(0.0, 0.3, 12), &sheet(0.02, 0.3, 12)]);
+        let outer = sheet(0.0099, 0.1, 4);
+        let far = shapes::mapped(&shapes::icosphere(0.1, 1), |[x, y, z]| [x + 100.0, y, z]);
+        let settings =
+            EnergySettings { layer_contact: LayerContact::ClosestPoint, ..EnergySettings::default() };
+        let count = inner.vertex_count();
+        let scene = scene_of::<f64>(vec![inner, outer], &far, settings, only(Term::LayerCollision), 0.0, 1);
+        let problem = Problem::new(&scene.energy, None).unwrap();
+        let state = |positions: Vec<[f64; 3]>| {
+            let (energy, gradient) = problem.value_and_gradient(&positions);
+            State { positions, energy, gradient }
+        };
+        let moved = |vertex: usize, height: f64| {
+            let mut positions = scene.posed.clone();
+            positions[vertex][1] = height;
+            state(positions)
+        };
+        let here = state(scene.posed.clone());
+        assert_eq!(here.energy, 0.0);
+        let ahead = moved(count + 12, 0.0101);
+        assert!(ahead.energy > 0.0);
+        let found = walls(&problem, &here, &ahead);
+        assert!(
+            found.contains(&(count + 12)) && !found.iter().any(|v| *v > count && *v != count + 12),
+            "{found:?}"
+        );
+        // With corners of a face of both sheets.
+        let heights: HashSet<_> = found.iter().map(|v| (1e3 * scene.posed[*v][1]).round() as i64).collect();
+        assert_eq!(heights, HashSet::from([0, 10, 20]));
+        // No other side, no wall.
+        assert!(walls(&problem, &here, &moved(count + 12, 0.0095)).is_empty());
+    }
 
     #[test]
     fn the_vertices_that_turn_against_a_step_are_held_and_no_others() {
