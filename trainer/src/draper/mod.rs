@@ -50,7 +50,7 @@ pub use source::{Closet, SourceGarment};
 
 use crate::checkpoint::TrainedModel;
 use crate::device::Backend;
-use crate::evaluate::equilibrium_error::ReferenceScene;
+use crate::evaluate::reference::ReferenceScene;
 use crate::scene::{ActiveJoints, LibraryError, Recipe, load_body};
 use burn::tensor::Device;
 use clothcombo_data::asset::{Body, Pose};

@@ -2,7 +2,7 @@
 
 use super::{BodyState, Draper, DraperError, Outfit, elapsed};
 use crate::drape::{body_tensors, drape_on};
-use crate::evaluate::equilibrium_error::skinning_transforms;
+use crate::evaluate::reference::skinning_transforms;
 use crate::scene::{BodyDraw, Dresser, PreparedScene, SceneDraw};
 use clothcombo_data::asset::Pose;
 use clothcombo_data::asset::rotation::{Matrix3, apply, matrix_from_axis_angle};

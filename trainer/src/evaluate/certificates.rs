@@ -1,6 +1,6 @@
 //! What the post-process makes of random outfits.
 
-use super::equilibrium_error::skinning_transforms;
+use super::reference::skinning_transforms;
 use crate::config::LossesConfig;
 use crate::drape::{DrapeError, Networks};
 use crate::scene::{Library, PreparedScene, prepare};

@@ -1,106 +1,20 @@
 //! How far a drape is from the equilibrium of its scene: energy above the minimum, and distance to the minimiser.
 //!
-//! The reference is the state of lowest energy that the static solver of `clothcombo_physics` finds from linear blend
-//! skinning and, if there are networks, from their drape. All methods are measured by one function of posed positions: the
-//! losses of the configuration with the weights they end with, in f64, with the distance to the outside of the body, whose
-//! parts may intersect when posed (`Distance::Union`), and all pairs in the repulsion, from which the constant of each pair is
-//! taken off (`EnergySettings::repulsion_continuous`). Training uses cheaper forms of these two.
+//! The reference is the state of lowest energy that the static solver of `clothcombo_physics` finds from linear blend skinning
+//! and, if there are networks, from their drape and from what the post-process makes of it. All methods are measured by one
+//! function of posed positions ([`super::reference`]).
 
-use crate::config::LossesConfig;
+use super::reference::{ReferenceScene, wide};
 use crate::drape::NetworkDrape;
-use crate::scene::PreparedScene;
-use clothcombo_physics::energy::{
-    EnergyError, EnergySettings, GarmentEnergies, LayerContact, SceneEnergy, SceneGarment, SceneLayers, Term,
-    TermMap,
-};
+use clothcombo_physics::energy::Term;
 use clothcombo_physics::equilibrium::{
     EquilibriumError, Problem, Progress, Solution, SolverSettings, Stop, solve,
 };
-use clothcombo_physics::mesh::Topology;
-use clothcombo_physics::query::{Distance, Surface};
-use clothcombo_physics::transform::{Transform, apply};
 use serde::Serialize;
 use std::ops::ControlFlow;
-use std::sync::Arc;
 
 /// Two minima are told apart when their energies differ by more than this share of what the solver gained.
 const SAME_MINIMUM: f64 = 1e-3;
-
-/// A scene on its first body in f64, ready to be solved.
-pub struct ReferenceScene {
-    /// Names of the garments, inner → outer.
-    pub garments: Vec<String>,
-    /// Energy of posed positions.
-    pub energy: SceneEnergy<f64>,
-    /// Initial blended skinning transform of every vertex, `[ΣV]`.
-    pub transforms: Vec<Transform>,
-    /// Linear blend skinning of the rest garments, `[ΣV, 3]`.
-    pub skinned_rest: Vec<[f64; 3]>,
-    /// Linear blend skinning of the start state (with shape transfer), `[ΣV, 3]`.
-    pub skinned_start: Vec<[f64; 3]>,
-}
-
-/// The settings the reference is measured with: those of training, with exact distances and all pairs.
-pub fn reference_settings(losses: &LossesConfig) -> EnergySettings {
-    EnergySettings {
-        distance: Distance::Union,
-        repulsion_subset: None,
-        repulsion_continuous: true,
-        layer_contact: LayerContact::ClosestPoint,
-        ..losses.energy_settings()
-    }
-}
-
-impl ReferenceScene {
-    /// Takes over the body, the weights and the start of `scene`.
-    ///
-    /// # Errors
-    /// When a garment has no energies: it has no area, or a setting is out of range.
-    pub fn new(losses: &LossesConfig, scene: &PreparedScene) -> Result<Self, EnergyError> {
-        let settings = reference_settings(losses);
-        let body = &scene.bodies[0];
-        let start = wide(&body.start);
-        let mut rest = Vec::with_capacity(start.len());
-        let transforms = skinning_transforms(scene);
-        let mut garments = Vec::new();
-        for (garment, narrow) in scene.worn.iter().zip(&body.energy.garments) {
-            let mesh = &garment.garment.rest;
-            let energies =
-                GarmentEnergies::new(mesh, &Topology::new(mesh), &settings, garment.garment.holding)?;
-            garments.push(SceneGarment {
-                energies: Arc::new(energies),
-                holding_reference: wide(&narrow.holding_reference),
-                weights: narrow.weights,
-            });
-            rest.extend_from_slice(mesh.positions());
-        }
-        let layers = body.energy.layers.iter();
-        let layers = layers
-            .map(|l| SceneLayers { inner: l.inner, outer: l.outer, weights: continuous(l.weights) })
-            .collect();
-        let surface = &body.energy.body;
-        let skinned = |positions: &[[f64; 3]]| -> Vec<[f64; 3]> {
-            transforms.iter().zip(positions).map(|(t, p)| apply(t, *p)).collect()
-        };
-        Ok(Self {
-            garments: scene.worn.iter().map(|g| g.garment.name.clone()).collect(),
-            energy: SceneEnergy {
-                body: Arc::new(Surface::new(wide(&surface.positions), surface.faces.clone())),
-                garments,
-                layers,
-                settings,
-            },
-            skinned_rest: skinned(&rest),
-            skinned_start: skinned(&start),
-            transforms,
-        })
-    }
-}
-
-/// Without the layer distance, whose pairs change with the nearest body vertex: no solver can balance its jumps.
-fn continuous(weights: TermMap<f64>) -> TermMap<f64> {
-    TermMap::from_fn(|term| if term == Term::LayerDistance { 0.0 } else { weights[term] })
-}
 
 /// Energy and distance of one method on one scene.
 #[derive(Clone, Debug, Serialize)]
@@ -280,10 +194,6 @@ fn layer_strains(
         .collect())
 }
 
-fn wide(positions: &[[f32; 3]]) -> Vec<[f64; 3]> {
-    positions.iter().map(|p| p.map(f64::from)).collect()
-}
-
 fn solver_run(start: &'static str, solution: &Solution) -> SolverRun {
     let (first, last) = (&solution.history[0], solution.last());
     SolverRun {
@@ -311,23 +221,4 @@ pub(crate) fn mean_distance(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
     let sum: f64 =
         a.iter().zip(b).map(|(a, b)| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()).sum();
     sum / a.len().max(1) as f64
-}
-
-/// Initial blended skinning transform of every vertex of `scene` on its first body, `[ΣV]`.
-pub(crate) fn skinning_transforms(scene: &PreparedScene) -> Vec<Transform> {
-    let bones = &scene.bodies[0].bones;
-    let rows = scene.worn.iter().flat_map(|garment| garment.skin_weights.chunks_exact(bones.len()));
-    rows.map(|weights| blended(weights, bones)).collect()
-}
-
-fn blended(weights: &[f32], bones: &[Transform]) -> Transform {
-    let mut sum = [[0.0; 4]; 3];
-    for (weight, bone) in weights.iter().zip(bones) {
-        for (row, bone_row) in sum.iter_mut().zip(bone) {
-            for (x, b) in row.iter_mut().zip(bone_row) {
-                *x += f64::from(*weight) * b;
-            }
-        }
-    }
-    sum
 }

@@ -2,6 +2,7 @@
 
 pub mod certificates;
 pub mod equilibrium_error;
+pub mod reference;
 mod report;
 mod score;
 mod sign_error;

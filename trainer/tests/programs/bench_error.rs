@@ -80,6 +80,26 @@ fn skinning_and_a_network_are_measured_against_the_minimum() {
     check(&report, &["LBS of rest", "LBS", "network"]);
     assert!(report["scenes"].as_array().unwrap().iter().all(|s| s["runs"].as_array().unwrap().len() == 2));
 
+    // Outfits start from the post-process as well, and tell the strain of their layers.
+    let outfits = ["--checkpoint", "run", "--layers", "2", "--iterations", "30"];
+    let output = bench(&[&outfits[..], &["--json"]].concat(), folder.path()).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    check(&report, &["LBS of rest", "LBS", "network", "network + post-process"]);
+    for scene in report["scenes"].as_array().unwrap() {
+        assert_eq!(scene["garments"].as_array().unwrap().len(), 2);
+        assert_eq!(scene["runs"].as_array().unwrap().len(), 3);
+        assert_eq!(scene["layers"].as_array().unwrap().len(), 2);
+    }
+    let ratios = report["strain_ratios"].as_array().unwrap();
+    assert_eq!(ratios.len(), 2);
+    assert!(
+        ratios.iter().all(|r| r["equilibrium"].as_f64() > Some(0.0) && r["network"].as_f64() > Some(0.0))
+    );
+    let output = bench(&outfits, folder.path()).output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(text.contains("strain in the outfit over that of the garment alone"), "{text}");
+
     // One iteration converges nowhere: said in the table, and still a result.
     let output = bench(&["--config", "tiny.toml", "--iterations", "1"], folder.path()).output().unwrap();
     assert!(output.status.success());

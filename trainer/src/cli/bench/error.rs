@@ -9,9 +9,8 @@ use crate::device::Backend;
 use crate::drape::{Networks, WardrobeTensors};
 use crate::evaluate::Spread;
 use crate::evaluate::certificates::Dressing;
-use crate::evaluate::equilibrium_error::{
-    Drapes, LBS, MethodError, ReferenceScene, SceneError, converged, scene_error,
-};
+use crate::evaluate::equilibrium_error::{Drapes, LBS, MethodError, SceneError, converged, scene_error};
+use crate::evaluate::reference::ReferenceScene;
 use crate::scene::{Library, LibraryError, PreparedScene, ValidationGroup, draw_validation, prepare};
 use clap::Parser;
 use clothcombo_physics::contact::resolve::ResolveSettings;
@@ -19,16 +18,18 @@ use clothcombo_physics::equilibrium::SolverSettings;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use rand::{SeedableRng, seq::index};
 use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
 use serde_json::json;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
-/// Energy above the equilibrium and distance to it, for skinning and a trained network, on random scenes of one garment
+/// Energy above the equilibrium and distance to it, for skinning and a trained network, on random scenes
 #[derive(Parser)]
 #[command(after_help = "Examples:\n  clothcombo bench error --config configs/open.toml --scenes 20\n  \
-        clothcombo bench error --checkpoint runs/open --json > error.json")]
+        clothcombo bench error --checkpoint runs/open --json > error.json\n  \
+        clothcombo bench error --checkpoint runs/open --layers 3 --scenes 8   # outfits; also strain per layer")]
 pub struct Arguments {
     /// Configuration (TOML); default: that of the checkpoint, else configs/open.toml
     #[arg(long, value_name = "FILE")]
@@ -42,7 +43,7 @@ pub struct Arguments {
     /// Random scenes: validation draws of trained garments
     #[arg(long, default_value_t = 20, value_parser = at_least_one)]
     scenes: usize,
-    /// Garments of each scene
+    /// Garments of each scene. In outfits the energy is that of the losses without the layer distance
     #[arg(long, default_value_t = 1, value_parser = at_least_one)]
     layers: usize,
     /// Seed of the draws; default: that of the configuration
@@ -248,12 +249,37 @@ fn summary(errors: &[SceneError], settings: &SolverSettings) -> serde_json::Valu
             "seconds": over(&|e| e.reference_run().seconds),
             "relative_gradient": over(&|e| e.reference_run().relative_gradient),
         },
+        "strain_ratios": strain_ratios(errors),
     })
+}
+
+/// Strain of a layer in the outfit over that of the same garment alone, medians over the scenes.
+#[derive(Serialize)]
+struct StrainRatio {
+    /// In equilibrium.
+    equilibrium: f64,
+    /// Of the networks' drapes.
+    network: Option<f64>,
+}
+
+/// Innermost first.
+fn strain_ratios(errors: &[SceneError]) -> Vec<StrainRatio> {
+    let layers = errors.iter().map(|e| e.layers.len()).min().unwrap_or(0);
+    let ratio = |layer: usize| {
+        let of_layer = || errors.iter().map(move |e| &e.layers[layer]);
+        let network: Vec<f64> =
+            of_layer().filter_map(|l| l.network.map(|[alone, outfit]| outfit / alone)).collect();
+        StrainRatio {
+            equilibrium: Spread::of(of_layer().map(|l| l.outfit / l.alone).collect()).median,
+            network: (!network.is_empty()).then(|| Spread::of(network).median),
+        }
+    };
+    (0..layers).map(ratio).collect()
 }
 
 fn print_tables(errors: &[SceneError], settings: &SolverSettings) {
     let names = methods(errors);
-    print!("{:>5} {:<28}{:>9}{:>11}", "scene", "garment", "vertices", "minimum J");
+    print!("{:>5} {:<28}{:>9}{:>11}", "scene", "garments", "vertices", "minimum J");
     for name in &names {
         print!("{:>14}{:>9}{:>8}", format!("{name} +J"), "%", "mm");
     }
@@ -299,5 +325,16 @@ fn print_tables(errors: &[SceneError], settings: &SolverSettings) {
     if names.len() > 2 {
         let differ = errors.iter().filter(|e| e.minima_differ).count();
         println!("starts that end in different minima: {differ} of {}", errors.len());
+    }
+    let ratios = strain_ratios(errors);
+    if !ratios.is_empty() {
+        println!(
+            "\nstrain in the outfit over that of the garment alone, medians\n{:>6}{:>14}{:>10}",
+            "layer", "equilibrium", "network"
+        );
+    }
+    for (layer, ratio) in ratios.iter().enumerate() {
+        let network = ratio.network.map_or("–".to_owned(), |network| format!("{network:.2}"));
+        println!("{:>6}{:>14.2}{:>10}", layer + 1, ratio.equilibrium, network);
     }
 }
