@@ -115,8 +115,8 @@ fn turned_against(direction: &[[f64; 3]], here: &[[f64; 3]], ahead: &[[f64; 3]])
     if held.len() > direction.len() / MOST_HELD { Vec::new() } else { held }
 }
 
-/// The vertices whose contact with other garments costs so much more `ahead` than `here` that no force explains it: as many as must
-/// be held for the energy to fall, with the faces that they touch.
+/// The vertices whose contact with other garments costs more `ahead` than `here`, most first: as many as must be held for the
+/// energy to fall, with the faces that they are nearest to.
 fn walls(problem: &Problem<'_>, here: &State, ahead: &State) -> Vec<usize> {
     let touches = [here, ahead].map(|state| problem.layer_touches(&state.positions));
     let mut rises: HashMap<(usize, usize), f64> = HashMap::new();

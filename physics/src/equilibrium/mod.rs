@@ -33,6 +33,12 @@
 //! vertices that are driven against a kink are put on it, where that lowers the energy, and steps are projected along the
 //! kinks that their vertices rest on. Where a few vertices before a kink make a step short, or allow none, they are held for
 //! one step, so that all others go on.
+//!
+//! **Several garments.** The paper's layer terms jump in every few steps;
+//! [`LayerContact::ClosestPoint`](crate::energy::LayerContact::ClosestPoint) only jumps where a vertex is as near to a sheet that
+//! it lies over as to one that it lies under, both of the same garment. No force acts across such a wall. A vertex that a step
+//! drives against one is held for up to ten steps, with the faces on both sides; its force still counts in the relative gradient,
+//! so that outfits seldom end as [`Stop::Converged`].
 
 mod advance;
 mod error;
