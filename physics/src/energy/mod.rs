@@ -40,6 +40,7 @@ pub mod strain;
 mod term;
 #[cfg(test)]
 pub(crate) mod tests;
+mod touching;
 
 pub use curvature::CurvatureSink;
 pub use elements::Weighted;
@@ -47,6 +48,7 @@ pub use error::EnergyError;
 pub use garment::{GarmentEnergies, GarmentState, GarmentTerm};
 pub use layer_collision::LayerContact;
 pub use material::Material;
-pub use scene::{LayerTouch, SceneEnergy, SceneGarment, SceneLayers, SceneValue};
+pub use scene::{SceneEnergy, SceneGarment, SceneLayers, SceneValue};
 pub use settings::{EnergySettings, LayerGate};
 pub use term::{Term, TermMap};
+pub use touching::LayerTouch;

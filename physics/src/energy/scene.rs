@@ -7,8 +7,9 @@ use rayon::prelude::*;
 
 use super::curvature::{CurvatureSink, Scaled};
 use super::elements::GRAIN;
-use super::layer_collision::{InnerGarment, LayerContact, PosedInner};
+use super::layer_collision::PosedInner;
 use super::layer_distance::{BodyBuckets, LayerGaps, layer_distance};
+use super::touching::Touching;
 use super::{EnergyError, EnergySettings, GarmentEnergies, GarmentState, Term, TermMap, Weighted};
 use crate::query::{Gap, Surface};
 use crate::real::Real;
@@ -48,30 +49,6 @@ pub struct SceneEnergy<T: Real> {
     pub layers: Vec<SceneLayers>,
     /// Constants and switches. Those that shape a garment's own energies must be the ones they were made with.
     pub settings: EnergySettings,
-}
-
-/// One vertex near an inner garment.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LayerTouch {
-    /// Number of the pair.
-    pub pair: usize,
-    /// The outer vertex, numbered in the scene.
-    pub vertex: usize,
-    /// The corners of the inner face it is nearest to, numbered alike.
-    pub corners: [usize; 3],
-    /// Weighted energy [J].
-    pub energy: f64,
-}
-
-/// A pair of garments, the inner one ready for queries.
-struct Touching<'a, T: Real> {
-    pair: usize,
-    as_inner: &'a InnerGarment,
-    surface: PosedInner<T>,
-    outer: &'a [[T; 3]],
-    /// Where the vertices of the inner and of the outer garment start.
-    offsets: [usize; 2],
-    weight: f64,
 }
 
 /// Values and gradients of a [`SceneEnergy`].
@@ -210,12 +187,6 @@ impl<T: Real> SceneEnergy<T> {
         terms.any(|(g, term)| term.is_canonical() && g.weights[term] != 0.0)
     }
 
-    /// Whether [`curvature`](Self::curvature) couples vertices that touch at the moment.
-    pub fn couples_garments(&self) -> bool {
-        let is_coupled = |pair: &SceneLayers| pair.weights[Term::LayerCollision] > 0.0;
-        self.settings.layer_contact == LayerContact::ClosestPoint && self.layers.iter().any(is_coupled)
-    }
-
     /// A positive semidefinite approximation of the second derivatives of the weighted sum with respect to posed and to
     /// canonical positions, vertices numbered as in `posed`. Of the layer terms only the collision by the closest point has one.
     ///
@@ -249,44 +220,6 @@ impl<T: Real> SceneEnergy<T> {
             let mut sink = Scaled { sink: &mut *posed_sink, offset: 0, weight };
             as_inner.curvature(&surface, outer, &self.settings, offsets, &mut sink);
         }
-    }
-
-    /// Every vertex at `posed` that is near an inner garment, of those that [`couples_garments`](Self::couples_garments) is about.
-    pub fn layer_touches(&self, posed: &[[T; 3]]) -> Vec<LayerTouch> {
-        let mut found = Vec::new();
-        if !self.couples_garments() {
-            return found;
-        }
-        for touching in self.touching(posed) {
-            let Touching { pair, as_inner, surface, outer, offsets: [inner_offset, outer_offset], weight } =
-                touching;
-            let touches = as_inner.touches(&surface, outer, &self.settings).into_iter();
-            found.extend(touches.map(|(vertex, corners, penalty)| LayerTouch {
-                pair,
-                vertex: outer_offset + vertex,
-                corners: corners.map(|v| inner_offset + v as usize),
-                energy: weight * penalty,
-            }));
-        }
-        found
-    }
-
-    /// The pairs with a weight on their collision.
-    fn touching<'a>(&'a self, posed: &'a [[T; 3]]) -> impl Iterator<Item = Touching<'a, T>> {
-        let ranges = self.ranges();
-        let pairs = self.layers.iter().enumerate();
-        pairs.filter(|(_, pair)| pair.weights[Term::LayerCollision] > 0.0).map(move |(number, pair)| {
-            let [inner, outer] = [pair.inner, pair.outer].map(|garment| ranges[garment].clone());
-            let as_inner = self.garments[pair.inner].energies.as_inner();
-            Touching {
-                pair: number,
-                as_inner,
-                surface: as_inner.posed(&posed[inner.clone()], self.settings.layer_contact),
-                offsets: [inner.start, outer.start],
-                outer: &posed[outer],
-                weight: pair.weights[Term::LayerCollision],
-            }
-        })
     }
 
     fn run(
@@ -366,7 +299,7 @@ impl<T: Real> SceneEnergy<T> {
     }
 
     /// The vertices of every garment in the packed positions.
-    fn ranges(&self) -> Vec<Range<usize>> {
+    pub(super) fn ranges(&self) -> Vec<Range<usize>> {
         let mut start = 0;
         let next = |g: &SceneGarment<T>| {
             let range = start..start + g.energies.vertex_count();
