@@ -41,6 +41,27 @@ pub struct SurfacePoint {
     pub normal: [f64; 3],
 }
 
+/// Below this distance (m) the direction from the closest point is rounding, and the pseudo-normal replaces it.
+const CONTACT_DISTANCE: f64 = 1e-10;
+
+impl SurfacePoint {
+    /// Whether `p`, the point that it is closest to, lies behind its pseudo-normal.
+    pub(crate) fn is_behind(&self, p: [f64; 3]) -> bool {
+        vec3::dot(vec3::sub(p, self.position), self.normal) < 0.0
+    }
+
+    /// The distance of `p`, the point that it is closest to, negative where that `is_inside` (m), and its derivative by `p`.
+    pub(crate) fn signed(&self, p: [f64; 3], is_inside: bool) -> (f64, [f64; 3]) {
+        let length = self.distance_squared.sqrt();
+        let sign = if is_inside { -1.0 } else { 1.0 };
+        let direction = match length > CONTACT_DISTANCE {
+            true => vec3::scale(vec3::sub(p, self.position), sign / length),
+            false => self.normal,
+        };
+        (sign * length, direction)
+    }
+}
+
 /// Accelerated closest-point queries on one fixed surface.
 pub struct ClosestPoint {
     positions: Vec<[f64; 3]>,

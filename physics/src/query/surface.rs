@@ -33,9 +33,6 @@ pub struct Gap<T> {
     pub vertex: u32,
 }
 
-/// Below this distance (m) the direction from the closest point is rounding, and the pseudo-normal replaces it.
-const CONTACT_DISTANCE: f64 = 1e-10;
-
 /// Spacing of the numbers at a query point (m) above which nearest vertices are found in `f64`.
 const FAR_SPACING: f64 = 1e-4;
 
@@ -147,8 +144,7 @@ impl<T: Real> Surface<T> {
 
     fn closest_point_gap(&self, p: [T; 3]) -> Gap<T> {
         let Some(found) = self.project(p) else { return not_a_gap() };
-        let is_inside = vec3::dot(vec3::sub(vec3::to_f64(p), found.position), found.normal) < 0.0;
-        signed_gap(p, &found, is_inside, self.closest_point())
+        signed_gap(p, &found, found.is_behind(vec3::to_f64(p)), self.closest_point())
     }
 
     fn union_gap(&self, p: [T; 3]) -> Gap<T> {
@@ -162,10 +158,7 @@ impl<T: Real> Surface<T> {
 
 /// The distance from `found`, the point of `tree` closest to `p`, with its sign.
 fn signed_gap<T: Real>(p: [T; 3], found: &SurfacePoint, is_inside: bool, tree: &ClosestPoint) -> Gap<T> {
-    let offset = vec3::sub(vec3::to_f64(p), found.position);
-    let length = found.distance_squared.sqrt();
-    let sign = if is_inside { -1.0 } else { 1.0 };
-    let gradient = if length > CONTACT_DISTANCE { vec3::scale(offset, sign / length) } else { found.normal };
+    let (gap, gradient) = found.signed(vec3::to_f64(p), is_inside);
     let corners = tree.face(found.face);
     let [a, b, c] = found.barycentric;
     let vertex = if a >= b && a >= c {
@@ -175,7 +168,7 @@ fn signed_gap<T: Real>(p: [T; 3], found: &SurfacePoint, is_inside: bool, tree: &
     } else {
         corners[2]
     };
-    Gap { gap: T::from_f64(sign * length), gradient: vec3::from_f64(gradient), vertex }
+    Gap { gap: T::from_f64(gap), gradient: vec3::from_f64(gradient), vertex }
 }
 
 fn not_a_gap<T: Real>() -> Gap<T> {

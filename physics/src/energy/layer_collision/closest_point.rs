@@ -20,13 +20,9 @@ use crate::query::{ClosestPoint, Feature, SurfacePoint};
 use crate::real::Real;
 use crate::vec3::{add, add_scaled, dot, norm_squared, scale, sub, to_f64};
 
-/// Below this distance [m] the direction from the closest point is rounding, and the pseudo-normal replaces it.
-const CONTACT_DISTANCE: f64 = 1e-10;
-
 /// What stays the same of an inner garment.
 #[derive(Debug, Clone)]
 pub(super) struct InnerCloth {
-    faces: Vec<[u32; 3]>,
     /// `w` per vertex.
     inside: Vec<f64>,
 }
@@ -52,11 +48,7 @@ impl InnerCloth {
         for &v in border.chain(topology.non_manifold_edges.iter().flatten()) {
             inside[v as usize] = 0.0;
         }
-        Self { faces: rest.faces().to_vec(), inside }
-    }
-
-    pub fn posed<T: Real>(&self, positions: &[[T; 3]]) -> ClosestPoint {
-        ClosestPoint::new(positions.iter().map(|p| to_f64(*p)).collect(), &self.faces)
+        Self { inside }
     }
 
     /// As [`InnerGarment::evaluate`](super::InnerGarment::evaluate).
@@ -93,9 +85,10 @@ impl InnerCloth {
         let (epsilon, gate) = (settings.layer_collision_epsilon, settings.layer_gate.unwrap_or_default());
         let of = |(number, p): (usize, &[T; 3])| {
             let p = to_f64(*p);
-            let corners = closest.face(closest.project_within(p, gate.depth.max(epsilon))?.face);
-            let contact = self.contact(closest, number, p, epsilon, gate);
-            Some((number, corners, contact.map_or(0.0, |contact| contact.share * contact.penalty[0])))
+            let found = closest.project_within(p, gate.depth.max(epsilon))?;
+            let contact = self.contact(closest, number, p, &found, epsilon, gate);
+            let penalty = contact.map_or(0.0, |contact| contact.share * contact.penalty[0]);
+            Some((number, closest.face(found.face), penalty))
         };
         outer.par_iter().with_min_len(GRAIN / 2).enumerate().filter_map(of).collect()
     }
@@ -131,7 +124,11 @@ impl InnerCloth {
         settings: &EnergySettings,
     ) -> Vec<Contact> {
         let (epsilon, gate) = (settings.layer_collision_epsilon, settings.layer_gate.unwrap_or_default());
-        let of = |(outer, p): (usize, &[T; 3])| self.contact(closest, outer, to_f64(*p), epsilon, gate);
+        let of = |(outer, p): (usize, &[T; 3])| {
+            let p = to_f64(*p);
+            let found = closest.project_within(p, gate.depth.max(epsilon))?;
+            self.contact(closest, outer, p, &found, epsilon, gate)
+        };
         outer.par_iter().with_min_len(GRAIN / 2).enumerate().filter_map(of).collect()
     }
 
@@ -140,14 +137,12 @@ impl InnerCloth {
         closest: &ClosestPoint,
         outer: usize,
         p: [f64; 3],
+        found: &SurfacePoint,
         epsilon: f64,
         gate: LayerGate,
     ) -> Option<Contact> {
-        let found = closest.project_within(p, gate.depth.max(epsilon))?;
-        let offset = sub(p, found.position);
-        let length = found.distance_squared.sqrt();
-        let side = if dot(offset, found.normal) < 0.0 { -1.0 } else { 1.0 };
-        let penalty = penalty(side * length, epsilon, gate.depth);
+        let (distance, direction) = found.signed(p, found.is_behind(p));
+        let penalty = penalty(distance, epsilon, gate.depth);
         if penalty[0] == 0.0 {
             return None;
         }
@@ -161,12 +156,9 @@ impl InnerCloth {
             outer,
             corners,
             barycentric: found.barycentric,
-            direction: match length > CONTACT_DISTANCE {
-                true => scale(offset, side / length),
-                false => found.normal,
-            },
+            direction,
             share,
-            share_gradients: interpolated_gradients(values, closest.corners(found.face), &found, offset),
+            share_gradients: interpolated_gradients(values, closest.corners(found.face), found, p),
             penalty,
         })
     }
@@ -187,18 +179,18 @@ fn penalty(d: f64, epsilon: f64, depth: f64) -> [f64; 3] {
     [cube * fade, slope * fade + cube * fade_slope, 6.0 * excess * fade]
 }
 
-/// Derivatives of `Σ values·barycentric` of the closest point `found` of the triangle `q` to the point at `offset` from it, by that
-/// point and by the corners.
+/// Derivatives of `Σ values·barycentric` of the point `found` of the triangle `q` that is closest to `p`, by `p` and by the corners.
 fn interpolated_gradients(
     values: [f64; 3],
     q: [[f64; 3]; 3],
     found: &SurfacePoint,
-    offset: [f64; 3],
+    p: [f64; 3],
 ) -> [[f64; 3]; 4] {
     let mut gradients = [[0.0; 3]; 4];
     if values[0] == values[1] && values[1] == values[2] {
         return gradients;
     }
+    let offset = sub(p, found.position);
     match found.feature {
         Feature::Vertex(_) => (),
         Feature::Edge(a) => {

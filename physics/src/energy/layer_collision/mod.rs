@@ -11,6 +11,7 @@ use super::{CurvatureSink, EnergySettings, Weighted};
 use crate::mesh::{Topology, TriMesh};
 use crate::query::ClosestPoint;
 use crate::real::Real;
+use crate::vec3::to_f64;
 use closest_point::InnerCloth;
 use nearest_vertex::{InnerVertices, PosedVertices};
 
@@ -55,7 +56,10 @@ impl InnerGarment {
     pub fn posed<T: Real>(&self, positions: &[[T; 3]], contact: LayerContact) -> PosedInner<T> {
         match contact {
             LayerContact::NearestVertex => PosedInner::Vertices(self.vertices.posed(positions)),
-            LayerContact::ClosestPoint => PosedInner::Cloth(self.cloth.posed(positions)),
+            LayerContact::ClosestPoint => {
+                let positions = positions.iter().map(|p| to_f64(*p)).collect();
+                PosedInner::Cloth(ClosestPoint::new(positions, self.vertices.faces()))
+            }
         }
     }
 

@@ -71,6 +71,10 @@ impl InnerVertices {
         self.median_edge
     }
 
+    pub(super) fn faces(&self) -> &[[u32; 3]] {
+        &self.faces
+    }
+
     pub(super) fn posed<T: Real>(&self, positions: &[[T; 3]]) -> PosedVertices<T> {
         PosedVertices {
             index: VertexIndex::new(positions),
