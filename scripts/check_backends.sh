@@ -15,7 +15,7 @@ runs=$(mktemp -d)
 trap 'rm -rf "$runs"' EXIT
 for device in ${features//,/ }; do
     "$CARGO_TARGET_DIR/release/clothcombo-train" --config configs/smoke.toml --device "$device" --run-dir "$runs/$device" \
-        --set stages.0.steps=15 --set stages.1.steps=5 --set stages.2.steps=5 \
+        --set stages.0.steps=15 --set stages.1.steps=5 --set stages.2.steps=5 --set stages.3.steps=5 \
         --set validation.single_scenes=2 --set validation.unseen_scenes=0 --set validation.layered_scenes=1 --quiet
-    echo "$device: three stages trained"
+    echo "$device: four stages trained"
 done

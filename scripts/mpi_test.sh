@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Several processes are one run: 20 steps over all three stages by `mpirun -n 2`, each process with one outfit per step, give
+# Several processes are one run: 24 steps over all four stages by `mpirun -n 2`, each process with one outfit per step, give
 # the parameters (relative 1e-5) of one process that accumulates both outfits; an error in one process ends all of them with
 # one message. Needs an MPI library with its headers (Debian: libopenmpi-dev openmpi-bin), libclang (libclang-dev) and python3.
 # About a minute after the build.
@@ -20,9 +20,9 @@ if [ "$(id -u)" -eq 0 ]; then
 fi
 mpi=(mpirun --oversubscribe -n "$processes")
 short=(--quiet --config configs/smoke.toml
-    --set stages.0.steps=8 --set stages.1.steps=6 --set stages.2.steps=6
+    --set stages.0.steps=8 --set stages.1.steps=6 --set stages.2.steps=6 --set stages.3.steps=4
     --set validation.single_scenes=1 --set validation.layered_scenes=1)
-for stage in 0 1 2; do
+for stage in 0 1 2 3; do
     short+=(--set "stages.$stage.accumulate=$processes")
 done
 
@@ -48,7 +48,7 @@ def lines(run):
         return [json.loads(line) for line in file]
 
 (one_step, one), (shared_step, shared) = tensors("one"), tensors("shared")
-assert one_step == shared_step == "step-00000020", (one_step, shared_step)
+assert one_step == shared_step == "step-00000024", (one_step, shared_step)
 assert one.keys() == shared.keys()
 norm = lambda values: math.sqrt(sum(value * value for value in values))
 worst, different, count = (0.0, ""), 0, 0
@@ -64,7 +64,7 @@ assert worst[0] <= 1e-5, "the processes did not train what one process trains"
 losses = [[line["loss"] for line in lines(run)] for run in ("one", "shared")]
 apart = max(abs(a - b) / abs(a) for a, b in zip(*losses))
 print(f"steps in the log: {[len(x) for x in losses]}, largest relative difference of a loss {apart:.2e}")
-assert len(losses[0]) == len(losses[1]) == 20 and apart <= 1e-5
+assert len(losses[0]) == len(losses[1]) == 24 and apart <= 1e-5
 PYTHON
 
 # once MESSAGE COMMAND…: the command fails in time and says MESSAGE exactly once.

@@ -46,6 +46,10 @@ pub struct ModelConfig {
     /// Hand the vertex embedding `z_v` to `D_s`, `S` and `D_m`. `false` is an ablation of the paper: they see zeros, and the
     /// garment embedding `z̄_v` alone tells garments apart.
     pub vertex_embedding: bool,
+    /// Correction networks that garments go through at the end; 0 is the paper, which has none.
+    pub corrections: usize,
+    /// Width of the correction networks.
+    pub correction_width: usize,
 }
 
 impl Default for ModelConfig {
@@ -68,11 +72,18 @@ impl Default for ModelConfig {
             skinning_scale: 0.01,
             zero_sum_skinning: true,
             vertex_embedding: true,
+            corrections: 0,
+            correction_width: 96,
         }
     }
 }
 
 impl ModelConfig {
+    /// The same without correction networks: all that a model has of the paper's.
+    pub fn without_corrections(&self) -> Self {
+        Self { corrections: 0, ..self.clone() }
+    }
+
     /// Checks that every size is at least one and every scale and frequency is usable.
     ///
     /// # Errors
@@ -88,6 +99,7 @@ impl ModelConfig {
             ("siren_width", self.siren_width, 1),
             ("skinning_layers", self.skinning_layers, 1),
             ("skinning_width", self.skinning_width, 1),
+            ("correction_width", self.correction_width, 1),
         ];
         for (key, value, minimum) in sizes {
             if value < minimum {

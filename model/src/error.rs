@@ -54,6 +54,19 @@ pub enum ModelError {
     },
 }
 
+/// Checks the length of an array.
+pub(crate) fn check_length(
+    array: &'static str,
+    found: usize,
+    expected: usize,
+    layout: &'static str,
+) -> Result<(), ModelError> {
+    match found == expected {
+        true => Ok(()),
+        false => Err(ModelError::Length { array, expected, found, layout }),
+    }
+}
+
 /// Checks length and finiteness of a flat array.
 pub(crate) fn check_array(
     array: &'static str,
@@ -61,9 +74,7 @@ pub(crate) fn check_array(
     expected: usize,
     layout: &'static str,
 ) -> Result<(), ModelError> {
-    if values.len() != expected {
-        return Err(ModelError::Length { array, expected, found: values.len(), layout });
-    }
+    check_length(array, values.len(), expected, layout)?;
     match values.iter().position(|value| !value.is_finite()) {
         Some(index) => Err(ModelError::NotFinite { array, index, value: f64::from(values[index]) }),
         None => Ok(()),

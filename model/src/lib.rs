@@ -7,6 +7,7 @@
 //! S    skinning          x, z_s, z_v → skin weight correction ΔW
 //! F_f  untangling        z_s^i, z_s^j → force f^ij
 //! D_m  untangling        x_s, f^i, z_s, z_v → displacement Δx_m                        (modulated SIREN)
+//!      corrections       what every vertex feels, z_s, z_v → corrected displacement    (not in the paper)
 //! ```
 //!
 //! No files and no energies here: arrays come in as host slices ([`GarmentTensors`], [`BodyTensors`]), positions go out as
@@ -15,6 +16,7 @@
 
 mod adam;
 mod config;
+mod correction;
 pub mod diffusion_net;
 mod draping;
 mod error;
@@ -35,6 +37,7 @@ mod untangling;
 
 pub use adam::FusedAdam;
 pub use config::{Dimensions, ModelConfig};
+pub use correction::Correction;
 pub use draping::Draping;
 pub use error::ModelError;
 pub use garment_encoder::{GarmentEmbedding, GarmentEncoder};
@@ -43,8 +46,8 @@ pub use initializer::Initializer;
 pub use linear::Linear;
 pub use linear_blend_skinning::linear_blend_skinning;
 pub use mlp::ResidualMlp;
-pub use pipeline::{ClothCombo, Embeddings, LayeredDrape, SingleDrape};
+pub use pipeline::{ClothCombo, Embeddings, Feel, LayeredDrape, SingleDrape};
 pub use siren::{ModulatedSiren, Modulator, SirenSizes};
 pub use skinning::Skinning;
-pub use tensors::{BodyTensors, GarmentArrays, GarmentTensors, OutfitTensors};
+pub use tensors::{BodyTensors, FeltTensors, GarmentArrays, GarmentTensors, OutfitTensors};
 pub use untangling::Untangling;

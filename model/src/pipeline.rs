@@ -7,6 +7,7 @@ use burn::tensor::{Device, Tensor};
 use tracing::trace_span;
 
 use crate::config::{Dimensions, ModelConfig};
+use crate::correction::{Correction, Given};
 use crate::diffusion_net::MINIMUM_TIME;
 use crate::draping::Draping;
 use crate::error::ModelError;
@@ -14,13 +15,13 @@ use crate::garment_encoder::{GarmentEmbedding, GarmentEncoder};
 use crate::initializer::Initializer;
 use crate::linear_blend_skinning::linear_blend_skinning;
 use crate::skinning::Skinning;
-use crate::tensors::{BodyTensors, GarmentTensors, OutfitTensors, stack_rows};
+use crate::tensors::{BodyTensors, FeltTensors, GarmentTensors, OutfitTensors, stack_rows};
 use crate::untangling::Untangling;
 
-/// The four networks.
+/// The four networks, and those that correct what they do.
 ///
-/// Parameters (the names in a safetensors file): `garment_encoder`, `draping`, `skinning`, `untangling`, each documented at
-/// its type.
+/// Parameters (the names in a safetensors file): `garment_encoder`, `draping`, `skinning`, `untangling`, `corrections.{0…}`, each
+/// documented at its type.
 #[derive(Module, Debug)]
 pub struct ClothCombo {
     /// E_c.
@@ -31,7 +32,12 @@ pub struct ClothCombo {
     pub skinning: Skinning,
     /// F_f and D_m.
     pub untangling: Untangling,
+    /// Correct what the others do, one after the other; the paper has none.
+    pub corrections: Vec<Correction>,
 }
+
+/// What the vertices of all garments feel at posed positions `[ΣV,3]` [m].
+pub type Feel<'a> = &'a dyn Fn(Tensor<2>) -> FeltTensors;
 
 /// Embeddings of the garments of an outfit, with everything that follows from them alone.
 ///
@@ -120,6 +126,7 @@ impl ClothCombo {
             draping: Draping::new(config, dimensions, start),
             skinning: Skinning::new(config, dimensions, start),
             untangling: Untangling::new(config, start),
+            corrections: (0..config.corrections).map(|_| Correction::new(config, start)).collect(),
         })
     }
 
@@ -232,6 +239,41 @@ impl ClothCombo {
                 LayeredDrape { canonical, posed }
             }
         }
+    }
+
+    /// The same networks with new correction networks in place of any they have; untrained, these correct nothing.
+    pub fn with_corrections(mut self, config: &ModelConfig, start: &mut Initializer) -> Self {
+        self.corrections = (0..config.corrections).map(|_| Correction::new(config, start)).collect();
+        self
+    }
+
+    /// Corrects how garments lie: the states after each of the correction networks, none without any.
+    ///
+    /// `draped` is where `single` and untangling brought them from `start`; `feel` says what is felt at posed positions. Nothing
+    /// of that gets a gradient, whatever device it comes from.
+    pub fn correct(
+        &self,
+        outfit: &OutfitTensors,
+        embeddings: &Embeddings,
+        (start, single): (Tensor<2>, &SingleDrape),
+        draped: &LayeredDrape,
+        body: &BodyTensors,
+        feel: Feel<'_>,
+    ) -> Vec<LayeredDrape> {
+        let _span = (!self.corrections.is_empty()).then(|| trace_span!("corrections").entered());
+        let [vertex, draping, weights] =
+            [&embeddings.vertex, &single.draping_embedding, &single.skin_weights].map(|t| t.clone().detach());
+        let given = Given { vertex: &vertex, draping: &draping, segments: &outfit.segments };
+        let mut states: Vec<LayeredDrape> = Vec::with_capacity(self.corrections.len());
+        for correction in &self.corrections {
+            let before = states.last().unwrap_or(draped);
+            let displacement = before.canonical.clone().detach() - start.clone();
+            let felt = feel(before.posed.clone().detach());
+            let canonical = correction.correct(displacement, felt, &given) + start.clone();
+            let posed = linear_blend_skinning(canonical.clone(), weights.clone(), body.bones.clone());
+            states.push(LayeredDrape { canonical, posed });
+        }
+        states
     }
 
     /// Raises diffusion times that an optimiser step pushed below the smallest one in use.

@@ -12,6 +12,7 @@
 //! | [`contact`] | penetration of the body, order of layers, exact intersections and their contours |
 //! | [`equilibrium`] | static drape: direct minimisation of the same energies from any start |
 //! | [`query`] | nearest vertex and closest surface point, accelerated, with brute-force oracles |
+//! | [`sensing`] | what every vertex of an outfit feels of the other garments, for the contact network |
 //! | [`transform`] | affine maps, as skinning blends them |
 //! | `autodiff` | the energies as one differentiable burn operation (feature `autodiff`) |
 
@@ -24,6 +25,7 @@ pub mod mesh;
 pub mod operators;
 pub mod query;
 pub mod real;
+pub mod sensing;
 pub mod transform;
 pub mod vec3;
 

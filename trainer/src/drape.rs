@@ -1,11 +1,13 @@
 //! The networks at inference: a prepared scene in, positions on the host out.
 
 use crate::evaluate::Draped;
+use crate::felt::{Company, felt};
+use crate::least_energy::least_energy;
 use crate::scene::{Library, LibraryError, LibraryGarment, PreparedBody, PreparedScene, Recent};
 use burn::tensor::{Device, Tensor, TensorData};
 use clothcombo_model::{
-    BodyTensors, ClothCombo, Dimensions, Embeddings, GarmentArrays, GarmentEmbedding, GarmentTensors,
-    ModelError, OutfitTensors, linear_blend_skinning,
+    BodyTensors, ClothCombo, Dimensions, Embeddings, Feel, GarmentArrays, GarmentEmbedding, GarmentTensors,
+    LayeredDrape, ModelError, OutfitTensors, SingleDrape, linear_blend_skinning,
 };
 use clothcombo_physics::operators::SurfaceOperators;
 use miette::Diagnostic;
@@ -186,9 +188,9 @@ pub struct Networks<'a> {
 
 /// What the networks make of a scene's first body.
 pub struct NetworkDrape {
-    /// Every garment draped alone.
+    /// Every garment as if it were worn alone.
     pub single: Draped,
-    /// After untangling.
+    /// All of them worn together.
     pub layered: Draped,
 }
 
@@ -206,7 +208,13 @@ impl<'a> Networks<'a> {
         let outfit = self.tensors.outfit(scene)?;
         let embeddings = self.tensors.embed(&self.model, scene, &outfit, &self.embeddings)?;
         let (body, start) = self.tensors.body(&scene.bodies[0])?;
-        Ok(drape_on(&self.model, &outfit, &embeddings, &body, start).0)
+        let on_body = OnBody { scene, outfit: &outfit, embeddings: &embeddings, body: &body, start };
+        let (layered, _) = drape_on(&self.model, &on_body);
+        let single = match scene.worn.len() {
+            1 => layered.clone(),
+            _ => drape_alone(&self.model, &on_body),
+        };
+        Ok(NetworkDrape { single, layered })
     }
 
     /// Linear blend skinning of the start state, which has learned nothing.
@@ -231,34 +239,88 @@ impl<'a> Networks<'a> {
         let outfit = self.tensors.outfit(scene)?;
         let (body, _) = self.tensors.body(&scene.bodies[0])?;
         let posed = linear_blend_skinning(start.clone(), outfit.skin_weights, body.bones);
-        Ok(draped(start, posed))
+        Ok(draped(&start, &posed))
     }
 }
 
-/// Lets `model` drape an outfit from `start` on one body; also the time of each of the two phases, until their positions
-/// are on the host.
-pub fn drape_on(
-    model: &ClothCombo,
-    outfit: &OutfitTensors,
-    embeddings: &Embeddings,
-    body: &BodyTensors,
-    start: Tensor<2>,
-) -> (NetworkDrape, [Duration; 2]) {
+/// An outfit with its embeddings on the first body of a scene.
+pub struct OnBody<'a> {
+    /// The scene.
+    pub scene: &'a PreparedScene,
+    /// Its garments.
+    pub outfit: &'a OutfitTensors,
+    /// Their embeddings.
+    pub embeddings: &'a Embeddings,
+    /// Its first body.
+    pub body: &'a BodyTensors,
+    /// Where the garments start on it `[ΣV, 3]` [m].
+    pub start: Tensor<2>,
+}
+
+/// Time of every phase of the networks, until its positions are on the host.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NetworkTimes {
+    /// Every garment by itself.
+    pub draping: Duration,
+    /// The garments against each other.
+    pub untangling: Duration,
+    /// The correction networks.
+    pub correcting: Duration,
+}
+
+/// Lets `model` drape an outfit.
+pub fn drape_on(model: &ClothCombo, on_body: &OnBody<'_>) -> (Draped, NetworkTimes) {
+    let OnBody { outfit, embeddings, body, start, .. } = on_body;
+    let mut times = NetworkTimes::default();
     let clock = Instant::now();
-    let tensors = model.drape_single(outfit, embeddings, body, start);
-    let single = draped(tensors.canonical.clone(), tensors.posed.clone());
-    let draping = clock.elapsed();
-    let layered = model.untangle(outfit, embeddings, &tensors, body);
-    let layered = draped(layered.canonical, layered.posed);
-    let untangling = clock.elapsed() - draping;
-    (NetworkDrape { single, layered }, [draping, untangling])
+    let single = model.drape_single(outfit, embeddings, body, start.clone());
+    // On the host before the clock is read: devices compute behind the caller's back.
+    let mut found = draped(&single.canonical, &single.posed);
+    times.draping = clock.elapsed();
+    let layered = model.untangle(outfit, embeddings, &single, body);
+    if outfit.has_contacts() {
+        found = draped(&layered.canonical, &layered.posed);
+    }
+    times.untangling = clock.elapsed() - times.draping;
+    found = corrected(model, on_body, &single, &layered, Company::Together).unwrap_or(found);
+    times.correcting = clock.elapsed() - times.draping - times.untangling;
+    (found, times)
 }
 
-fn draped(canonical: Tensor<2>, posed: Tensor<2>) -> Draped {
-    Draped { canonical: to_host(canonical), posed: to_host(posed) }
+/// Lets `model` drape every garment of an outfit as if it were worn alone.
+pub fn drape_alone(model: &ClothCombo, on_body: &OnBody<'_>) -> Draped {
+    let OnBody { outfit, embeddings, body, start, .. } = on_body;
+    let single = model.drape_single(outfit, embeddings, body, start.clone());
+    let alone = LayeredDrape { canonical: single.canonical.clone(), posed: single.posed.clone() };
+    corrected(model, on_body, &single, &alone, Company::Alone)
+        .unwrap_or_else(|| draped(&alone.canonical, &alone.posed))
 }
 
-fn to_host(positions: Tensor<2>) -> Vec<[f32; 3]> {
+/// What the correction networks make of `uncorrected`, or what they were given where that has less energy; `None` without any.
+fn corrected(
+    model: &ClothCombo,
+    OnBody { scene, outfit, embeddings, body, start }: &OnBody<'_>,
+    single: &SingleDrape,
+    uncorrected: &LayeredDrape,
+    company: Company,
+) -> Option<Draped> {
+    let prepared = &scene.bodies[0];
+    let feel: Feel<'_> = &|posed| felt(scene, prepared, company.contacts(scene), posed);
+    let states = model.correct(outfit, embeddings, (start.clone(), single), uncorrected, body, feel);
+    if states.is_empty() {
+        return None;
+    }
+    let states = std::iter::once(uncorrected).chain(&states);
+    let states: Vec<Draped> = states.map(|state| draped(&state.canonical, &state.posed)).collect();
+    Some(least_energy(&states, &prepared.energy, company))
+}
+
+fn draped(canonical: &Tensor<2>, posed: &Tensor<2>) -> Draped {
+    Draped { canonical: to_host(canonical.clone()), posed: to_host(posed.clone()) }
+}
+
+/// Positions `[N, 3]` of a tensor.
+pub(crate) fn to_host(positions: Tensor<2>) -> Vec<[f32; 3]> {
     let data = positions.into_data();
     let values = data.as_slice::<f32>().expect("positions are f32");
     values.as_chunks::<3>().0.to_vec()

@@ -60,6 +60,8 @@ const PER_BLOCK: f64 = 9.0;
 const PER_SINE_LAYER: f64 = 1.6;
 /// Per channel of a hidden layer of the skinning network.
 const PER_SKINNING_LAYER: f64 = 2.4;
+/// Per channel of a correction network.
+const PER_CORRECTION_LAYER: f64 = 12.0;
 /// Per joint: weights, corrections, blended transforms.
 const PER_JOINT: f64 = 5.0;
 /// For the energies of a garment alone.
@@ -95,7 +97,7 @@ pub fn estimate(config: &Config, library: &Library, parameters: usize) -> Option
     let embedded = |layers: usize| sizes.iter().take(layers).sum::<usize>() as f64;
     let worn = |layers: usize| sizes.iter().cycle().take(layers).sum::<usize>() as f64;
     let of_stage = |s: &StageConfig| {
-        let embedding = if s.trains == Trains::Untangling { 0.0 } else { per_embedded_vertex(config) };
+        let embedding = if s.trains.freezes() { 0.0 } else { per_embedded_vertex(config) };
         let of_scene = embedding * embedded(s.layers[1]) + per_vertex(config, s, joints) * worn(s.layers[1]);
         // Scenes of a step are computed beside each other, one a thread.
         of_scene * s.accumulate.min(rayon::current_num_threads()) as f64
@@ -123,6 +125,7 @@ fn per_vertex(config: &Config, stage: &StageConfig, joints: usize) -> f64 {
         // The first stage is not trained: it keeps nothing for a backward pass.
         Trains::Untangling => sine,
         Trains::All => 2.0 * sine + skinning,
+        Trains::Corrections => PER_CORRECTION_LAYER * (m.corrections * m.correction_width) as f64,
     };
     stage.scenes_per_step as f64 * (networks + energies)
 }

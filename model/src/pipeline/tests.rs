@@ -337,3 +337,103 @@ fn wrong_sizes_are_named() {
         Err(ModelError::Config { key: "width", .. })
     ));
 }
+
+/// What is felt: irregular, and by the positions.
+fn felt(posed: Tensor<2>) -> FeltTensors {
+    let (rows, device) = (posed.dims()[0], posed.device());
+    let positions = values(&posed);
+    let directions: [Vec<[f32; 3]>; FeltTensors::DIRECTIONS] = std::array::from_fn(|k| {
+        let values = values(&uniform(rows, 3, 1.0, 11 + k as u64, &device));
+        values.as_chunks::<3>().0.to_vec()
+    });
+    let mut features = values(&uniform(rows, FeltTensors::FEATURES, 2.0, 30, &device));
+    for (row, position) in features.chunks_exact_mut(FeltTensors::FEATURES).zip(positions.chunks_exact(3)) {
+        row[0] = position[0].clamp(-5.0, 5.0);
+    }
+    FeltTensors::new(features, directions.each_ref().map(Vec::as_slice), &device).expect("equal rows")
+}
+
+/// A scene whose model has two correction networks; their output layers start at zero or, `trained`, with other numbers.
+fn scene_with_corrections(trained: bool) -> Scene {
+    let mut scene = scene(&OutfitTensors::all_pairs(3));
+    let config = ModelConfig { corrections: 2, correction_width: 7, ..config() };
+    scene.model = scene.model.with_corrections(&config, &mut Initializer::new(5, &device()));
+    if trained {
+        for (seed, correction) in (8..).zip(&mut scene.model.corrections) {
+            let [rows, columns] = correction.output.weight.dims();
+            let weight = uniform(rows, columns, 0.5, seed, &device());
+            correction.output.weight = Param::from_tensor(Tensor::from_inner(weight).require_grad());
+        }
+    }
+    scene
+}
+
+impl Scene {
+    fn corrected(&self, model: &ClothCombo, feel: Feel<'_>) -> (LayeredDrape, Vec<LayeredDrape>) {
+        let embeddings = self.embeddings(model);
+        let start = self.outfit.rest.clone();
+        let single = model.drape_single(&self.outfit, &embeddings, &self.body, start.clone());
+        let layered = model.untangle(&self.outfit, &embeddings, &single, &self.body);
+        let states = model.correct(&self.outfit, &embeddings, (start, &single), &layered, &self.body, feel);
+        (layered, states)
+    }
+}
+
+#[test]
+fn untrained_corrections_correct_nothing() {
+    let scene = scene_with_corrections(false);
+    let (layered, states) = scene.corrected(&scene.model, &felt);
+    assert_eq!(states.len(), 2);
+    for state in states {
+        assert_close(&state.canonical, &layered.canonical, 1e-6);
+        assert_close(&state.posed, &layered.posed, 1e-6);
+    }
+    let plain = scene_with_corrections(false).model;
+    let none = plain.with_corrections(&config(), &mut Initializer::new(5, &device()));
+    assert!(scene.corrected(&none, &|_| panic!("nobody is there to feel")).1.is_empty());
+}
+
+#[test]
+fn every_correction_feels_where_the_one_before_led() {
+    let scene = scene_with_corrections(true);
+    let asked = std::cell::RefCell::new(Vec::new());
+    let (layered, states) = scene.corrected(&scene.model, &|posed| {
+        asked.borrow_mut().push(values(&posed));
+        felt(posed)
+    });
+    assert_eq!(asked.into_inner(), [values(&layered.posed), values(&states[0].posed)]);
+    assert!(values(&states[1].posed) != values(&states[0].posed));
+}
+
+#[test]
+fn a_correction_has_its_own_gradient_and_gives_nothing_back() {
+    let scene = scene_with_corrections(true);
+    let state = |model: &ClothCombo, k: usize| scene.corrected(model, &felt).1.swap_remove(k);
+    for k in [0, 1] {
+        let gradients = parameter_gradients(&scene.model, loss(state(&scene.model, k).posed));
+        for (name, gradient) in &gradients {
+            if !name.starts_with(&format!("corrections.{k}.")) {
+                assert!(gradient.iter().all(|g| *g == 0.0), "{name} has a gradient from correction {k}");
+                continue;
+            }
+            let index = (0..gradient.len()).max_by(|&a, &b| gradient[a].abs().total_cmp(&gradient[b].abs()));
+            let index = index.expect("not empty");
+            let value = |change: f32| -> f64 {
+                let changed = change_parameter(scene.model.clone(), name, index, change).valid();
+                let posed = state(&changed, k).posed;
+                let weights = values(&weighting(posed.dims(), &posed.device()));
+                values(&posed).iter().zip(weights).map(|(p, w)| f64::from(*p) * f64::from(w)).sum()
+            };
+            let found = f64::from(gradient[index]);
+            let slope = (value(5e-2) - value(-5e-2)) / 1e-1;
+            assert!(found != 0.0 && (slope - found).abs() < 3e-2 * found.abs(), "{name}: {found} {slope}");
+        }
+    }
+}
+
+#[test]
+fn what_is_felt_has_one_row_per_vertex() {
+    let directions = [[0.0; 3]; 4];
+    let wrong = FeltTensors::new(vec![0.0; 3], [directions.as_slice(); FeltTensors::DIRECTIONS], &device());
+    assert!(matches!(wrong, Err(ModelError::Length { array: "felt features", .. })));
+}

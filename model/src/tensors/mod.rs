@@ -4,10 +4,12 @@
 //! constants, so the same tensors serve training and inference.
 
 mod body;
+mod felt;
 mod garment;
 mod outfit;
 
 pub use body::BodyTensors;
+pub use felt::FeltTensors;
 pub use garment::{GarmentArrays, GarmentTensors};
 pub use outfit::OutfitTensors;
 pub(crate) use outfit::stack_rows;

@@ -299,7 +299,7 @@ impl<T: Real> SceneEnergy<T> {
     }
 
     /// The vertices of every garment in the packed positions.
-    pub(super) fn ranges(&self) -> Vec<Range<usize>> {
+    pub(crate) fn ranges(&self) -> Vec<Range<usize>> {
         let mut start = 0;
         let next = |g: &SceneGarment<T>| {
             let range = start..start + g.energies.vertex_count();

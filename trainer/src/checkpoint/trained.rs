@@ -6,7 +6,7 @@ use crate::scene::{Library, is_trained_on};
 use crate::session::state;
 use burn::store::{ModuleSnapshot, SafetensorsStore};
 use burn::tensor::Device;
-use clothcombo_model::ClothCombo;
+use clothcombo_model::{ClothCombo, Initializer, ModelConfig};
 use std::path::{Path, PathBuf};
 
 /// Trained networks for use, not for training on: `model.safetensors`, `config.toml` and `state.json` of a checkpoint,
@@ -117,7 +117,7 @@ impl TrainedModel {
         Ok(())
     }
 
-    /// The networks as the start of a run of `config` on `library`.
+    /// The networks as the start of a run of `config` on `library`; with untrained correction networks if those are new.
     ///
     /// # Errors
     /// When data or sizes of the networks are not the model's own.
@@ -128,12 +128,24 @@ impl TrainedModel {
         device: &Device,
     ) -> Result<ClothCombo, CheckpointError> {
         self.check_data(config, library)?;
-        if self.config.model != config.model {
+        let adds_corrections = self.config.model.corrections == 0 && config.model.corrections > 0;
+        let expected = match adds_corrections {
+            true => ModelConfig {
+                correction_width: self.config.model.correction_width,
+                ..config.model.without_corrections()
+            },
+            false => config.model.clone(),
+        };
+        if self.config.model != expected {
             let reason =
                 "its [model] section differs from that of the configuration, which init_from does not allow";
             return Err(CheckpointError::Foreign { path: self.folder.clone(), reason: reason.into() });
         }
-        self.networks(device)
+        let networks = self.networks(device)?;
+        Ok(match adds_corrections {
+            true => networks.with_corrections(&config.model, &mut Initializer::new(config.seed, device)),
+            false => networks,
+        })
     }
 
     /// Checksum of the parameters: equal ones make equal embeddings.

@@ -99,7 +99,8 @@ fn trains(trains: Trains) -> &'static str {
     match trains {
         Trains::Single => "embedding, draping and skinning",
         Trains::Untangling => "untangling, on the frozen first stage",
-        Trains::All => "all networks",
+        Trains::All => "both phases",
+        Trains::Corrections => "corrections, on everything else frozen",
     }
 }
 

@@ -38,7 +38,8 @@ pub struct Config {
     /// Everything random follows from this number: the same seed gives the same run, bit for bit. At most 2⁶³ − 1.
     pub seed: u64,
     /// Run, checkpoint or model folder whose parameters the networks start with, to train a model further on other data or
-    /// another schedule; absent: random ones. Sizes of the networks, body, joints and pose encoding must be its own. Give such
+    /// another schedule; absent: random ones. Sizes of the networks, body, joints and pose encoding must be its own, but a model
+    /// without correction networks may be given some. Give such
     /// a run a seed of its own: scenes follow from seed and step, and that of the model would bring its scenes again.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub init_from: Option<String>,
@@ -90,6 +91,13 @@ impl Config {
             if let Some((key, what, hint)) = stage.problem() {
                 return Some((format!("stages[{i}].{key}"), what, hint));
             }
+            if stage.trains == Trains::Corrections && self.model.corrections == 0 {
+                return Some((
+                    format!("stages[{i}].trains"),
+                    "there are no correction networks to train".into(),
+                    "give the networks some with model.corrections, for example 3".into(),
+                ));
+            }
         }
         if self.data.garments.is_empty() {
             return at("data.garments", "there are no garments", "add a [[data.garments]] table");
@@ -126,7 +134,7 @@ impl Config {
 
 /// Networks that no machine holds, as (place, what, hint): a slip of the finger must not end in an allocation that fails.
 fn model_problem(model: &ModelConfig) -> Option<(String, String, String)> {
-    let widths: [(&str, usize, usize); 10] = [
+    let widths: [(&str, usize, usize); 12] = [
         ("width", model.width, 16_384),
         ("embedding", model.embedding, 16_384),
         ("diffusion_width", model.diffusion_width, 16_384),
@@ -137,6 +145,8 @@ fn model_problem(model: &ModelConfig) -> Option<(String, String, String)> {
         ("mlp_layers", model.mlp_layers, 256),
         ("siren_layers", model.siren_layers, 256),
         ("skinning_layers", model.skinning_layers, 256),
+        ("corrections", model.corrections, 256),
+        ("correction_width", model.correction_width, 16_384),
     ];
     let (key, _, most) = widths.into_iter().find(|(_, value, most)| value > most)?;
     Some((

@@ -12,8 +12,17 @@ pub enum Trains {
     Single,
     /// The untangling network on the frozen first stage.
     Untangling,
-    /// All networks end to end.
+    /// The networks of both phases end to end.
     All,
+    /// The correction networks on everything else, frozen.
+    Corrections,
+}
+
+impl Trains {
+    /// Whether the first stage stays as it is.
+    pub fn freezes(self) -> bool {
+        matches!(self, Self::Untangling | Self::Corrections)
+    }
 }
 
 /// A stage.

@@ -221,16 +221,8 @@ impl Draper {
         body: &BodyState,
         last: Option<Last<'_>>,
     ) -> Result<Drape, DraperError> {
-        let Networked {
-            scene,
-            surface,
-            heading,
-            transforms,
-            skinned,
-            network,
-            milliseconds: [posing, draping, untangling],
-        } = self.networked(outfit, body)?;
-        let mut milliseconds = PhaseTimes { posing, draping, untangling, ..PhaseTimes::default() };
+        let Networked { scene, surface, heading, transforms, skinned, network, mut milliseconds } =
+            self.networked(outfit, body)?;
 
         let clock = Instant::now();
         let (before, refinement) = match self.settings.refine {

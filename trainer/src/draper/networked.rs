@@ -1,7 +1,7 @@
 //! What the networks make of an outfit on one body, brought to where the body stands.
 
-use super::{BodyState, Draper, DraperError, Outfit, elapsed};
-use crate::drape::{body_tensors, drape_on};
+use super::{BodyState, Draper, DraperError, Outfit, PhaseTimes, elapsed};
+use crate::drape::{OnBody, body_tensors, drape_on};
 use crate::evaluate::reference::skinning_transforms;
 use crate::scene::{BodyDraw, Dresser, PreparedScene, SceneDraw};
 use clothcombo_data::asset::Pose;
@@ -11,7 +11,7 @@ use clothcombo_physics::query::Surface;
 use clothcombo_physics::transform::{self, Transform};
 use clothcombo_physics::vec3::add;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// An outfit on one body before any post-process; garments packed inner → outer.
 pub(super) struct Networked {
@@ -27,8 +27,8 @@ pub(super) struct Networked {
     pub skinned: Vec<[f64; 3]>,
     /// What the networks made of it [m].
     pub network: Vec<[f64; 3]>,
-    /// Time for the body, for draping and for untangling [ms].
-    pub milliseconds: [f64; 3],
+    /// Time for the body and the networks [ms].
+    pub milliseconds: PhaseTimes,
 }
 
 /// Shape parameters are standard deviations: with a larger one there is no body any more.
@@ -58,8 +58,9 @@ impl Draper {
         let (tensors, start) = body_tensors(&scene.bodies[0], &self.dimensions(), &self.device)?;
         let posing = elapsed(clock);
 
-        let (drape, [draping, untangling]) =
-            drape_on(&self.model, &outfit.tensors, &outfit.embeddings, &tensors, start);
+        let (outfit_tensors, embeddings) = (&outfit.tensors, &outfit.embeddings);
+        let on_body = OnBody { scene: &scene, outfit: outfit_tensors, embeddings, body: &tensors, start };
+        let (draped, times) = drape_on(&self.model, &on_body);
 
         // The body may be turned about the vertical: what the networks made turns with it, to where everything else happens.
         let turn = matrix_from_axis_angle([0.0, yaw, 0.0]);
@@ -68,9 +69,16 @@ impl Draper {
         let start = scene.bodies[0].start.iter().map(|p| p.map(f64::from));
         let skinned = transforms.iter().zip(start).map(|(t, p)| transform::apply(t, p)).collect();
         let network: Vec<[f64; 3]> =
-            drape.layered.posed.iter().map(|p| add(apply(&turn, p.map(f64::from)), body.place)).collect();
+            draped.posed.iter().map(|p| add(apply(&turn, p.map(f64::from)), body.place)).collect();
         outfit.check_finite(&network)?;
-        let milliseconds = [posing, 1e3 * draping.as_secs_f64(), 1e3 * untangling.as_secs_f64()];
+        let ms = |time: Duration| 1e3 * time.as_secs_f64();
+        let milliseconds = PhaseTimes {
+            posing,
+            draping: ms(times.draping),
+            untangling: ms(times.untangling),
+            correcting: ms(times.correcting),
+            ..PhaseTimes::default()
+        };
         Ok(Networked { scene, surface, heading, transforms, skinned, network, milliseconds })
     }
 

@@ -26,6 +26,8 @@ pub struct PhaseTimes {
     pub draping: f64,
     /// The garments against each other.
     pub untangling: f64,
+    /// The correction networks.
+    pub correcting: f64,
     /// The static solver, if asked for.
     pub refine: f64,
     /// The post-process, without its certificate.
@@ -42,6 +44,7 @@ impl AddAssign for PhaseTimes {
             (&mut self.posing, other.posing),
             (&mut self.draping, other.draping),
             (&mut self.untangling, other.untangling),
+            (&mut self.correcting, other.correcting),
             (&mut self.refine, other.refine),
             (&mut self.resolve, other.resolve),
             (&mut self.certificate, other.certificate),
@@ -53,13 +56,14 @@ impl AddAssign for PhaseTimes {
 
 impl PhaseTimes {
     /// Every phase with its name, in order.
-    pub fn phases(&self) -> [(&'static str, f64); 8] {
+    pub fn phases(&self) -> [(&'static str, f64); 9] {
         [
             ("preparation", self.preparation),
             ("embedding", self.embedding),
             ("posing", self.posing),
             ("draping", self.draping),
             ("untangling", self.untangling),
+            ("correcting", self.correcting),
             ("refine", self.refine),
             ("resolve", self.resolve),
             ("certificate", self.certificate),
@@ -291,6 +295,7 @@ fn garment_reports(outfit: &Outfit, drapes: &[Drape]) -> Vec<GarmentReport> {
                 posing: share * shared.posing,
                 draping: share * shared.draping,
                 untangling: share * shared.untangling,
+                correcting: share * shared.correcting,
                 refine: share * shared.refine,
                 resolve: drape.garments[index].resolve_ms + share * (shared.resolve - own),
                 certificate: share * shared.certificate,

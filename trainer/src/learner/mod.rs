@@ -115,10 +115,13 @@ impl Learner {
         trains: Trains,
         spoil_gradient: bool,
     ) -> Result<Computed, DrapeError> {
-        if trains != Trains::Untangling {
-            self.frozen = None;
-        } else if self.frozen.is_none() {
-            self.frozen = Some(Frozen { model: self.model.valid(), embeddings: tensors.embeddings() });
+        self.frozen = self.frozen.take().filter(|frozen| frozen.while_training == trains);
+        if trains.freezes() && self.frozen.is_none() {
+            self.frozen = Some(Frozen {
+                model: self.model.valid(),
+                embeddings: tensors.embeddings(),
+                while_training: trains,
+            });
         }
         if let Some(frozen) = &self.frozen {
             // Here, with all threads, whatever scene meets a garment first: else the last bits would depend on the order.
@@ -176,7 +179,7 @@ impl Learner {
         if !outcome.skipped {
             let _span = trace_span!("optimiser").entered();
             let model = self.optimizer.step(learning_rate, self.model.clone(), gradients);
-            self.model = if trains == Trains::Untangling { model } else { model.clamp_diffusion_times() };
+            self.model = if trains.freezes() { model } else { model.clamp_diffusion_times() };
         }
         outcome.times.update = start.elapsed();
         outcome

@@ -3,11 +3,12 @@
 use super::workers::Workers;
 use crate::config::Trains;
 use crate::drape::{DrapeError, KnownEmbeddings, WardrobeTensors};
+use crate::felt::felt;
 use crate::scene::PreparedScene;
 use burn::module::Module;
 use burn::optim::GradientsParams;
 use burn::tensor::Tensor;
-use clothcombo_model::ClothCombo;
+use clothcombo_model::{ClothCombo, Feel, LayeredDrape};
 use clothcombo_physics::autodiff::{SceneLossOutput, scene_loss};
 use std::ops::AddAssign;
 use std::sync::Arc;
@@ -41,10 +42,12 @@ impl AddAssign for StepTimes {
     }
 }
 
-/// The first stage while it is not trained, with the embeddings it made.
+/// The networks before a stage that freezes some, with the embeddings they made.
 pub(super) struct Frozen {
     pub model: ClothCombo,
     pub embeddings: KnownEmbeddings,
+    /// What the stage trains.
+    pub while_training: Trains,
 }
 
 /// What the scenes of a step have in common.
@@ -119,9 +122,13 @@ impl Work<'_> {
             Some(f) => (&f.model, self.tensors.embed(&f.model, scene, &outfit, &f.embeddings)?),
             None => (model, self.tensors.embed(model, scene, &outfit, &self.tensors.embeddings())?),
         };
+        // What untangles: the networks themselves, or as they were before, while only corrections learn.
+        let untangler = if self.trains == Trains::Corrections { first_stage } else { model };
         let embeddings = match self.trains {
             Trains::Single => embeddings,
-            Trains::Untangling | Trains::All => model.prepare_untangling(&outfit, embeddings),
+            Trains::Untangling | Trains::All | Trains::Corrections => {
+                untangler.prepare_untangling(&outfit, embeddings)
+            }
         };
         let loss_at = |posed, canonical, energy| {
             trace_span!("energies").in_scope(|| scene_loss(posed, canonical, energy))
@@ -135,21 +142,33 @@ impl Work<'_> {
         };
         for prepared in &scene.bodies {
             let (body, start) = trace_span!("tensors").in_scope(|| self.tensors.body(prepared))?;
-            let single = first_stage.drape_single(&outfit, &embeddings, &body, start);
+            let single = first_stage.drape_single(&outfit, &embeddings, &body, start.clone());
             if alone > 0.0 {
                 let energy = Arc::new(prepared.energy.without_layers());
                 add(&loss_at(single.posed.clone(), single.canonical.clone(), energy), alone * share);
             }
-            let (posed, canonical) = match self.trains {
-                Trains::Single => (single.posed, single.canonical),
-                Trains::Untangling | Trains::All => {
-                    let layered = model.untangle(&outfit, &embeddings, &single, &body);
-                    (layered.posed, layered.canonical)
+            let untangled = || untangler.untangle(&outfit, &embeddings, &single, &body);
+            let states = match self.trains {
+                Trains::Single => {
+                    vec![LayeredDrape { posed: single.posed.clone(), canonical: single.canonical.clone() }]
+                }
+                Trains::Untangling | Trains::All => vec![untangled()],
+                Trains::Corrections => {
+                    let feel: Feel<'_> = &|posed| {
+                        trace_span!("feeling").in_scope(|| felt(scene, prepared, &scene.contacts, posed))
+                    };
+                    model.correct(&outfit, &embeddings, (start, &single), &untangled(), &body, feel)
                 }
             };
-            let worn = loss_at(posed, canonical, prepared.energy.clone());
-            add(&worn, share);
-            bodies.push(worn);
+            // Every correction learns from where it leads itself.
+            let each = share / states.len() as f64;
+            let mut worn = None;
+            for LayeredDrape { posed, canonical } in states {
+                let output = loss_at(posed, canonical, prepared.energy.clone());
+                add(&output, each);
+                worn = Some(output);
+            }
+            bodies.extend(worn);
         }
         let depends = self.trains != Trains::Untangling || outfit.has_contacts();
         let loss = losses.into_iter().reduce(|a, b| a + b).filter(|_| depends);

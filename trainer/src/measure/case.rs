@@ -45,6 +45,7 @@ impl Case {
             Trains::Single => "single",
             Trains::Untangling => "untangling",
             Trains::All => "all",
+            Trains::Corrections => "corrections",
         };
         // Garments that reach the same parts of the body come first, so that even two layers touch.
         let text = format!(

@@ -4,6 +4,7 @@ use super::phases::{OTHER, PHASES, record_phases};
 use crate::config::{Config, Trains};
 use crate::drape::{DrapeError, KnownEmbeddings, WardrobeTensors};
 use crate::evaluate::Spread;
+use crate::felt::felt;
 use crate::learner::{Learner, new_optimizer};
 use crate::memory::Memory;
 use crate::scene::{Library, Plan, Prefetch, PreparedScene, draw_training, prepare};
@@ -13,7 +14,7 @@ use crate::world::Share;
 use burn::module::Module;
 use burn::optim::GradientsParams;
 use burn::tensor::{Device, Tensor, TensorData};
-use clothcombo_model::{ClothCombo, Embeddings, OutfitTensors};
+use clothcombo_model::{ClothCombo, Embeddings, Feel, LayeredDrape, OutfitTensors};
 use clothcombo_physics::energy::{SceneEnergy, Term};
 use miette::{IntoDiagnostic, Report, miette};
 use serde::Serialize;
@@ -211,12 +212,20 @@ impl Subject {
         embeddings: &Embeddings,
     ) -> Result<[Tensor<2>; 2], DrapeError> {
         let (body, start) = self.tensors.body(&scene.bodies[0])?;
-        let single = model.drape_single(outfit, embeddings, &body, start);
+        let single = model.drape_single(outfit, embeddings, &body, start.clone());
         if self.trains() == Trains::Single {
             return Ok([single.posed, single.canonical]);
         }
         let layered = model.untangle(outfit, embeddings, &single, &body);
-        Ok([layered.posed, layered.canonical])
+        let feel: Feel<'_> = &|posed| felt(scene, &scene.bodies[0], &scene.contacts, posed);
+        let corrected = match self.trains() {
+            Trains::Corrections => {
+                model.correct(outfit, embeddings, (start, &single), &layered, &body, feel).pop()
+            }
+            Trains::Single | Trains::Untangling | Trains::All => None,
+        };
+        let LayeredDrape { posed, canonical } = corrected.unwrap_or(layered);
+        Ok([posed, canonical])
     }
 
     /// The same without gradients, on the host.

@@ -2,6 +2,7 @@
 
 use clothcombo_data::asset::Garment;
 use clothcombo_physics::energy::GarmentEnergies;
+use clothcombo_physics::sensing::Rings;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -12,6 +13,8 @@ pub struct LibraryGarment {
     pub garment: Garment,
     /// Constants of its energies.
     pub energies: Arc<GarmentEnergies<f32>>,
+    /// Neighbourhoods that it feels other garments over.
+    pub rings: Rings,
     /// Initial skin weights of the active joints, `[V, J]`.
     pub skin_weights: Vec<f32>,
     /// 1 for each active joint that carries the garment, `[J]`.
@@ -50,8 +53,9 @@ impl LibraryGarment {
 
     /// About how much memory it takes [bytes].
     pub fn bytes(&self) -> usize {
-        /// Constants of the energies per vertex, estimated from their fields: about two faces and three hinges a vertex.
-        const ENERGIES: usize = 1200;
+        /// Constants of the energies per vertex, estimated from their fields: about two faces and three hinges a vertex,
+        /// and its neighbourhoods.
+        const ENERGIES: usize = 1320;
         let mesh = self.vertex_count() * 24 + self.garment.rest.face_count() * 12;
         mesh + self.vertex_count() * ENERGIES + 4 * (self.skin_weights.len() + self.shape_directions.len())
     }

@@ -8,6 +8,7 @@ use clothcombo_data::asset::{Binding, BindingSettings, Body, Garment};
 use clothcombo_physics::energy::{EnergySettings, GarmentEnergies};
 use clothcombo_physics::mesh::{Topology, TriMesh};
 use clothcombo_physics::operators::SurfaceOperators;
+use clothcombo_physics::sensing::Rings;
 use std::sync::Arc;
 
 /// Body and settings with which garments are prepared.
@@ -69,6 +70,7 @@ impl Recipe {
             shape_stride: self.body.shape_count,
             shape_directions: binding.shape_directions,
             energies: Arc::new(energies),
+            rings: Rings::new(&garment.rest, &topology),
             garment,
         })
     }

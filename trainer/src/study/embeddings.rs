@@ -3,7 +3,7 @@
 use super::methods::{MethodResult, Question};
 use super::subject::{Measured, Subject};
 use super::table::{Table, number};
-use crate::drape::{DrapeError, drape_on};
+use crate::drape::{DrapeError, OnBody, drape_on};
 use crate::scene::PreparedScene;
 use burn::tensor::{Int, Tensor};
 use clothcombo_model::GarmentEmbedding;
@@ -58,7 +58,9 @@ pub fn ask(
             .into_iter()
             .map(|embedding| {
                 let embeddings = subject.model.pack(&outfit, &[embedding])?;
-                Ok(drape_on(&subject.model, &outfit, &embeddings, &body, start.clone()).0.single)
+                let (outfit, body) = (&outfit, &body);
+                let on_body = OnBody { scene, outfit, embeddings: &embeddings, body, start: start.clone() };
+                Ok(drape_on(&subject.model, &on_body).0)
             })
             .collect()
     };

@@ -8,13 +8,13 @@ use crate::evaluate::certificates::Dressing;
 use crate::evaluate::equilibrium_error::mean_distance;
 use crate::evaluate::reference::ReferenceScene;
 use crate::measure::median_ms;
+use crate::one_core::each_on_one_core;
 use crate::picture::{Line, LinePanel};
 use crate::scene::{PreparedScene, Unseen};
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use clothcombo_physics::energy::Term;
 use clothcombo_physics::equilibrium::{Problem, SolverSettings, solve};
 use miette::{IntoDiagnostic, Report, miette};
-use rayon::prelude::*;
 use serde::Serialize;
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -105,18 +105,11 @@ pub fn ask(
         let fast = fast_methods(subject, &scene, settings)?;
         drapes.push((scene, fast));
     }
-    let solved: Vec<Result<(Vec<Sample>, bool), Report>> = drapes
-        .into_par_iter()
-        .with_max_len(1)
-        .map(|(scene, fast)| {
-            // A pool of one thread: the energies share their work among the threads of the pool they are called in.
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().into_diagnostic()?;
-            let found = pool.install(|| solved(subject, &scene, fast));
-            done();
-            found
-        })
-        .collect();
-    let solved = solved.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let solved = each_on_one_core(drapes, None, |(scene, fast)| {
+        let found = solved(subject, &scene, fast);
+        done();
+        found
+    })?;
     let converged = solved.iter().filter(|(_, converged)| *converged).count();
     let samples: Vec<Vec<Sample>> = solved.into_iter().map(|(samples, _)| samples).collect();
     Ok(Pareto { scenes, converged, points: points(&samples), samples })
@@ -140,6 +133,17 @@ fn fast_methods(
     let skin_ms = median_ms(SECONDS, || networks.skin(scene))?;
     // The garment is embedded in the first, unmeasured drape, as for the next frame of a motion.
     let network_ms = median_ms(SECONDS, || networks.drape(scene))?;
+    let mut with_fewer = Vec::new();
+    for corrections in 0..subject.model.corrections.len() {
+        let networks = subject.networks_with(corrections);
+        let ms = median_ms(SECONDS, || networks.drape(scene))?;
+        let name = match corrections {
+            0 => "network, uncorrected".to_owned(),
+            1 => "network, 1 correction".to_owned(),
+            _ => format!("network, {corrections} corrections"),
+        };
+        with_fewer.push(state(&name, ms, wide(&networks.drape(scene)?.layered.posed)));
+    }
     let draped = networks.drape(scene)?.layered;
     let dressing = Dressing::new(&subject.library, &subject.config.losses, Some(&networks));
     let before = dressing.of(scene, &draped.posed);
@@ -148,12 +152,14 @@ fn fast_methods(
     let mut resolved = before.resolved(settings)?.positions;
     let post_ms = 1e3 * clock.elapsed().as_secs_f64();
     let resolved = resolved.pop().ok_or_else(|| miette!("a scene without a garment"))?;
-    Ok(vec![
+    let mut states = vec![
         state("LBS of rest", rest_ms, wide(&networks.skin_rest(scene)?.posed)),
         state("LBS", skin_ms, wide(&networks.skin(scene)?.posed)),
-        state("network", network_ms, wide(&draped.posed)),
-        state("network + post-process", network_ms + post_ms, resolved),
-    ])
+    ];
+    states.extend(with_fewer);
+    states.push(state("network", network_ms, wide(&draped.posed)));
+    states.push(state("network + post-process", network_ms + post_ms, resolved));
+    Ok(states)
 }
 
 /// Adds refinement and solver to the fast methods, and measures all of them against the lowest state found; also whether

@@ -46,6 +46,13 @@ impl Subject {
         Networks::new(self.model.clone(), &self.tensors)
     }
 
+    /// The same with no more than the first `corrections` of the correction networks.
+    pub fn networks_with(&self, corrections: usize) -> Networks<'_> {
+        let mut model = self.model.clone();
+        model.corrections.truncate(corrections);
+        Networks::new(model, &self.tensors)
+    }
+
     /// Scene `index` of question number `question` (`at`), drawn as [`draw_study`] says.
     pub fn draw(&self, at: [usize; 2], pool: &[usize], layers: usize, unseen: Unseen) -> SceneDraw {
         draw_study(&self.library, self.config.validation_seed(), at, pool, layers, unseen)

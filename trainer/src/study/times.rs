@@ -2,7 +2,7 @@
 
 use super::subject::Subject;
 use super::table::{Table, number};
-use crate::drape::drape_on;
+use crate::drape::{OnBody, drape_on};
 use crate::evaluate::Spread;
 use crate::evaluate::certificates::Dressing;
 use crate::scene::Unseen;
@@ -28,6 +28,8 @@ pub struct Times {
     pub draping: Spread,
     /// Untangling.
     pub untangling: Spread,
+    /// The correction networks.
+    pub correcting: Spread,
     /// Post-process, its share of the body's preparation left out where it needs no way from the T-pose.
     pub post: Spread,
     /// Preparation of the body for the post-process, once per outfit.
@@ -51,7 +53,7 @@ pub fn ask(
     let all: Vec<usize> = (0..subject.library.wardrobe.len()).collect();
     let networks = subject.networks();
     let dressing = Dressing::new(&subject.library, &subject.config.losses, Some(&networks));
-    let mut parts: [Vec<f64>; 5] = Default::default();
+    let mut parts: [Vec<f64>; 6] = Default::default();
     let (mut vertices, mut garments) = (0, 0);
     // The first outfit warms up: buffers, threads, files.
     for index in 0..=outfits {
@@ -69,19 +71,23 @@ pub fn ask(
         let embedding = ms(clock.elapsed());
         let embeddings = subject.model.prepare_untangling(&outfit, embeddings);
         let (body, start) = subject.tensors.body(&scene.bodies[0]).into_diagnostic()?;
-        let (drape, [draping, untangling]) = drape_on(&subject.model, &outfit, &embeddings, &body, start);
-        let draped = dressing.of(&scene, &drape.layered.posed);
+        let on_body = OnBody { scene: &scene, outfit: &outfit, embeddings: &embeddings, body: &body, start };
+        let (found, networks) = drape_on(&subject.model, &on_body);
+        let draped = dressing.of(&scene, &found.posed);
         let resolved = draped.resolved(settings)?;
         let post: Duration = resolved.garments.iter().map(|g| g.time).sum();
         if index > 0 {
-            let times = [embedding, ms(draping), ms(untangling), ms(post), ms(resolved.body_time) * count];
+            let [draping, untangling, correcting] =
+                [networks.draping, networks.untangling, networks.correcting].map(ms);
+            let body = ms(resolved.body_time) * count;
+            let times = [embedding, draping, untangling, correcting, ms(post), body];
             parts.iter_mut().zip(times).for_each(|(part, time)| part.push(time));
             vertices += scene.worn.iter().map(|w| w.vertex_count()).sum::<usize>();
             garments += scene.worn.len();
             done();
         }
     }
-    let [embedding, draping, untangling, post, body] = parts.map(Spread::of);
+    let [embedding, draping, untangling, correcting, post, body] = parts.map(Spread::of);
     Ok(Times {
         outfits,
         layers: LAYERS,
@@ -90,6 +96,7 @@ pub fn ask(
         embedding,
         draping,
         untangling,
+        correcting,
         post,
         body,
     })
@@ -108,6 +115,7 @@ impl Times {
                 "embedding, once",
                 "single draping",
                 "untangling",
+                "corrections",
                 "post-process",
                 "body of the post-process, once",
             ],
@@ -117,9 +125,10 @@ impl Times {
             self.threads
         ));
         let cell = |s: &Spread| format!("{} ({})", number(s.median), number(s.p95));
-        let parts = [&self.embedding, &self.draping, &self.untangling, &self.post, &self.body];
+        let parts =
+            [&self.embedding, &self.draping, &self.untangling, &self.correcting, &self.post, &self.body];
         table.rows.push([vec!["this model".to_owned()], parts.map(cell).to_vec()].concat());
-        table.rows.push(["paper", "27", "0.6", "0.4", "200–300", "–"].map(str::to_owned).to_vec());
+        table.rows.push(["paper", "27", "0.6", "0.4", "–", "200–300", "–"].map(str::to_owned).to_vec());
         table
     }
 }

@@ -11,19 +11,19 @@ use crate::evaluate::Spread;
 use crate::evaluate::certificates::Dressing;
 use crate::evaluate::equilibrium_error::{Drapes, LBS, MethodError, SceneError, converged, scene_error};
 use crate::evaluate::reference::ReferenceScene;
+use crate::one_core::each_on_one_core;
 use crate::scene::{Library, LibraryError, PreparedScene, ValidationGroup, draw_validation, prepare};
 use clap::Parser;
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use clothcombo_physics::equilibrium::SolverSettings;
-use miette::{IntoDiagnostic, Report, WrapErr, miette};
+use miette::{IntoDiagnostic, Report, WrapErr};
 use rand::{SeedableRng, seq::index};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 use serde_json::json;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 /// Energy above the equilibrium and distance to it, for skinning and a trained network, on random scenes
 #[derive(Parser)]
@@ -174,33 +174,9 @@ fn solve_all(
         bar.inc(1);
         result.into_diagnostic().wrap_err_with(|| format!("scene {i} ({name})"))
     };
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let jobs = arguments.jobs.unwrap_or(cores).clamp(1, scenes.len().max(1));
-    let next = AtomicUsize::new(0);
-    let results: Mutex<Vec<(usize, Result<SceneError, Report>)>> = Mutex::default();
-    std::thread::scope(|scope| {
-        for _ in 0..jobs {
-            scope.spawn(|| {
-                // A pool of one thread: the energies share their work among the threads of the pool they are called in.
-                let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().into_diagnostic();
-                loop {
-                    let i = next.fetch_add(1, Ordering::Relaxed);
-                    if i >= scenes.len() {
-                        break;
-                    }
-                    let result = match &pool {
-                        Ok(pool) => pool.install(|| solve_one(i)),
-                        Err(error) => Err(miette!("no thread to solve on: {error}")),
-                    };
-                    results.lock().unwrap_or_else(|e| e.into_inner()).push((i, result));
-                }
-            });
-        }
-    });
+    let results = each_on_one_core((0..scenes.len()).collect(), arguments.jobs, solve_one);
     bar.finish_and_clear();
-    let mut results = results.into_inner().unwrap_or_else(|e| e.into_inner());
-    results.sort_by_key(|(i, _)| *i);
-    results.into_iter().map(|(_, result)| result).collect()
+    results
 }
 
 /// Names of the methods, the same in every scene.

@@ -1,0 +1,66 @@
+//! Height of a point over the sheet of cloth next to it.
+
+use super::rings::Rings;
+use crate::query::Surface;
+use crate::vec3::{accumulate, add_scaled, distance_squared, dot, norm, scale, sub, to_f64, zero};
+
+/// Sheets farther away than this are not felt [m].
+const REACH: f64 = 0.08;
+/// Vertices count whose distance exceeds the least by less than this many median edges.
+const SPREAD: f64 = 1.5;
+
+/// Where a point lies seen from a sheet.
+pub(super) struct Height {
+    /// Mean height over the tangent planes of the vertices near it, positive outside [m].
+    pub height: f64,
+    /// Mean of their normals: of length 1 where the sheet is flat.
+    pub normal: [f64; 3],
+    /// Distance along the sheet to the mean of those vertices: how far beyond a hem, within it next to nothing [m].
+    pub beside: f64,
+    /// 1 on the sheet, falling to 0 at the reach.
+    pub presence: f64,
+}
+
+/// The height of `p` over `sheet`, if that is near; cloth that faces the other way than `facing` is not felt, as the back of a
+/// sleeve or the other leg.
+///
+/// A moving weighted mean over the tangent planes rather than the nearest one alone: it changes smoothly with `p` but for
+/// where another part of the sheet becomes the nearest.
+pub(super) fn height(sheet: &Surface<f32>, rings: &Rings, p: [f64; 3], facing: [f64; 3]) -> Option<Height> {
+    if sheet.positions.is_empty() {
+        return None;
+    }
+    let nearest = sheet.nearest_vertex(p.map(|x| x as f32));
+    let least = distance_squared(to_f64(*sheet.positions.get(nearest as usize)?), p).sqrt();
+    // Also refuses what is not a number.
+    if least.partial_cmp(&REACH) != Some(std::cmp::Ordering::Less) {
+        return None;
+    }
+    let spread = SPREAD * rings.median_edge();
+    let (mut total, mut height, mut normal, mut centre) = (0.0, 0.0, zero(), zero());
+    for &v in rings.patch(nearest) {
+        let (q, n) = (to_f64(sheet.positions[v as usize]), to_f64(sheet.normals[v as usize]));
+        let excess = (distance_squared(p, q).sqrt() - least) / spread;
+        if excess >= 1.0 || dot(n, facing) <= 0.0 {
+            continue;
+        }
+        let weight = (1.0 - excess).powi(2);
+        total += weight;
+        height += weight * dot(n, sub(p, q));
+        normal = add_scaled(normal, weight, n);
+        accumulate(&mut centre, scale(q, weight));
+    }
+    if total.partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) {
+        return None;
+    }
+    let normal = scale(normal, 1.0 / total);
+    let offset = sub(p, scale(centre, 1.0 / total));
+    let length = norm(normal);
+    let along = if length > 0.0 { scale(normal, dot(offset, normal) / (length * length)) } else { zero() };
+    Some(Height {
+        height: height / total,
+        normal,
+        beside: norm(sub(offset, along)),
+        presence: (1.0 - least / REACH).powi(2),
+    })
+}
