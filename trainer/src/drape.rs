@@ -186,35 +186,33 @@ pub struct Networks<'a> {
     embeddings: KnownEmbeddings,
 }
 
-/// What the networks make of a scene's first body.
-pub struct NetworkDrape {
-    /// Every garment as if it were worn alone.
-    pub single: Draped,
-    /// All of them worn together.
-    pub layered: Draped,
-}
-
 impl<'a> Networks<'a> {
     /// Wraps a model without automatic differentiation.
     pub fn new(model: ClothCombo, tensors: &'a WardrobeTensors) -> Self {
         Self { model, tensors, embeddings: tensors.embeddings() }
     }
 
-    /// Drapes the garments of `scene` on its first body.
+    /// Drapes the garments of `scene` together on its first body.
     ///
     /// # Errors
     /// When the scene's numbers are not finite.
-    pub fn drape(&self, scene: &PreparedScene) -> Result<NetworkDrape, DrapeError> {
+    pub fn drape(&self, scene: &PreparedScene) -> Result<Draped, DrapeError> {
+        self.ask(scene, |on_body| drape_on(&self.model, on_body).0)
+    }
+
+    /// Drapes every garment of `scene` as if it were worn alone.
+    ///
+    /// # Errors
+    /// When the scene's numbers are not finite.
+    pub fn drape_alone(&self, scene: &PreparedScene) -> Result<Draped, DrapeError> {
+        self.ask(scene, |on_body| drape_alone(&self.model, on_body))
+    }
+
+    fn ask<T>(&self, scene: &PreparedScene, answer: impl Fn(&OnBody<'_>) -> T) -> Result<T, DrapeError> {
         let outfit = self.tensors.outfit(scene)?;
         let embeddings = self.tensors.embed(&self.model, scene, &outfit, &self.embeddings)?;
         let (body, start) = self.tensors.body(&scene.bodies[0])?;
-        let on_body = OnBody { scene, outfit: &outfit, embeddings: &embeddings, body: &body, start };
-        let (layered, _) = drape_on(&self.model, &on_body);
-        let single = match scene.worn.len() {
-            1 => layered.clone(),
-            _ => drape_alone(&self.model, &on_body),
-        };
-        Ok(NetworkDrape { single, layered })
+        Ok(answer(&OnBody { scene, outfit: &outfit, embeddings: &embeddings, body: &body, start }))
     }
 
     /// Linear blend skinning of the start state, which has learned nothing.

@@ -42,7 +42,7 @@ pub fn draw(
 fn row(networks: &Networks, scene: &PreparedScene) -> Result<SheetRow, Report> {
     let names: Vec<&str> = scene.worn.iter().map(|g| g.garment.name.as_str()).collect();
     let skinned = networks.skin(scene)?;
-    let draped = networks.drape(scene)?.layered;
+    let draped = networks.drape(scene)?;
     let cells = [&skinned, &draped]
         .into_iter()
         .flat_map(|d| [View::Front, View::Back].map(|view| picture_of(scene, d, view, &layer_colour)))

@@ -21,6 +21,18 @@ pub(super) struct Height {
     pub presence: f64,
 }
 
+/// Least and largest coordinates of points that may feel a sheet with vertices at `positions`.
+pub(super) fn felt_within(positions: &[[f32; 3]]) -> [[f64; 3]; 2] {
+    let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+    for p in positions {
+        for (k, x) in to_f64(*p).into_iter().enumerate() {
+            bounds[0][k] = bounds[0][k].min(x - REACH);
+            bounds[1][k] = bounds[1][k].max(x + REACH);
+        }
+    }
+    bounds
+}
+
 /// The height of `p` over `sheet`, if that is near; cloth that faces the other way than `facing` is not felt, as the back of a
 /// sleeve or the other leg.
 ///

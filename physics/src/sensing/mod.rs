@@ -93,6 +93,7 @@ pub fn sense(
     let parts: Vec<&[[f32; 3]]> = scene.ranges().into_iter().map(|range| &posed[range]).collect();
     let surfaces: Vec<Surface<f32>> =
         parts.iter().zip(sheets).map(|(p, sheet)| Surface::new(p.to_vec(), sheet.faces.clone())).collect();
+    let boxes: Vec<[[f64; 3]; 2]> = parts.iter().map(|part| height::felt_within(part)).collect();
     let mut sensed = Sensed {
         features: Vec::with_capacity(FEATURES * posed.len()),
         directions: std::array::from_fn(|_| Vec::with_capacity(posed.len())),
@@ -107,8 +108,13 @@ pub fn sense(
             .map(|v| {
                 let (position, normal) = (own.positions[v], to_f64(own.normals[v]));
                 let side = |others: &[usize], outwards: f64| {
-                    let over = |&j: &usize| height(&surfaces[j], sheets[j].rings, to_f64(position), normal);
-                    Side::new(others.iter().filter_map(over), outwards)
+                    let p = to_f64(position);
+                    let near = |j: &&usize| {
+                        let [low, high] = boxes[**j];
+                        (0..3).all(|k| (low[k]..=high[k]).contains(&p[k]))
+                    };
+                    let over = |&j: &usize| height(&surfaces[j], sheets[j].rings, p, normal);
+                    Side::new(others.iter().filter(near).filter_map(over), outwards)
                 };
                 let [under, over] = [side(&below, 1.0), side(&above, -1.0)];
                 let body = scene.body.gap(position, Distance::NearestVertex);

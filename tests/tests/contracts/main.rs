@@ -4,6 +4,7 @@ mod alone;
 mod checkpoint;
 mod config_fuzz;
 mod configs;
+mod corrections;
 mod hard_cases;
 mod intersections;
 mod messy_garments;

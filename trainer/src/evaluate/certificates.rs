@@ -67,7 +67,7 @@ impl<'a> Dressing<'a> {
     /// When the networks do not take it.
     pub fn drape(&self, scene: &PreparedScene) -> Result<Vec<[f32; 3]>, DrapeError> {
         match self.networks {
-            Some(networks) => Ok(networks.drape(scene)?.layered.posed),
+            Some(networks) => Ok(networks.drape(scene)?.posed),
             None => Ok(skinned(scene)),
         }
     }

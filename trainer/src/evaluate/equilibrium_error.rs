@@ -4,8 +4,8 @@
 //! and, if there are networks, from their drape and from what the post-process makes of it. All methods are measured by one
 //! function of posed positions ([`super::reference`]).
 
+use super::Draped;
 use super::reference::{ReferenceScene, wide};
-use crate::drape::NetworkDrape;
 use clothcombo_physics::energy::Term;
 use clothcombo_physics::equilibrium::{
     EquilibriumError, Problem, Progress, Solution, SolverSettings, Stop, solve,
@@ -85,8 +85,8 @@ pub struct Drapes {
 
 impl Drapes {
     /// Of networks, and what the post-process made of it.
-    pub fn new(drape: &NetworkDrape, resolved: Option<Vec<[f64; 3]>>) -> Self {
-        Self { single: wide(&drape.single.posed), layered: wide(&drape.layered.posed), resolved }
+    pub fn new(alone: &Draped, together: &Draped, resolved: Option<Vec<[f64; 3]>>) -> Self {
+        Self { single: wide(&alone.posed), layered: wide(&together.posed), resolved }
     }
 }
 

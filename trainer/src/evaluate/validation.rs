@@ -103,13 +103,12 @@ impl ValidationSet {
             for scene in scenes {
                 let scene = scene?;
                 let body = scene.exact_body();
-                let network = networks.drape(&scene)?;
                 for (method, scores) in methods.iter().zip(&mut scores) {
                     let draped: &Draped = match method {
                         Method::RestSkinning => &networks.skin_rest(&scene)?,
                         Method::StartSkinning => &networks.skin(&scene)?,
-                        Method::Single => &network.single,
-                        Method::Network => &network.layered,
+                        Method::Single => &networks.drape_alone(&scene)?,
+                        Method::Network => &networks.drape(&scene)?,
                     };
                     scores.push(score_scene(&scene, &body, draped));
                 }

@@ -119,7 +119,7 @@ fn measure(
         let scene = subject.prepare(SceneDraw { bodies: vec![body], ..draw })?;
         done();
         let draped = match networks.drape(&scene) {
-            Ok(drape) => drape.layered,
+            Ok(draped) => draped,
             Err(DrapeError::Library(error)) => return Err(error.into()),
             Err(DrapeError::Model(error)) => {
                 found.refused += 1;

@@ -182,7 +182,7 @@ impl Studio<'_> {
     ) -> Result<[RgbImage; 2], Report> {
         let draw = SceneDraw { garments: garments.to_vec(), bodies: vec![body.clone()], repulsion_sample: 0 };
         let scene = self.subject.prepare(draw)?;
-        let draped = self.networks.drape(&scene)?.layered;
+        let draped = self.networks.drape(&scene)?;
         let resolved = self.dressing.of(&scene, &draped.posed).resolved(&ResolveSettings::default())?;
         let posed = resolved.positions.concat().into_iter().map(|p| p.map(|v| v as f32)).collect();
         let draped = Draped { posed, ..draped };

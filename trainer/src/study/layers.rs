@@ -3,7 +3,7 @@
 use super::estimate::{Estimate, Ratio};
 use super::subject::Subject;
 use super::table::{Table, number, percent};
-use crate::drape::NetworkDrape;
+use crate::evaluate::Draped;
 use crate::evaluate::certificates::{Counts, Dressing, OutfitResult};
 use crate::scene::{PreparedScene, Unseen};
 use clothcombo_physics::contact::resolve::ResolveSettings;
@@ -87,14 +87,13 @@ pub fn ask(
     for index in 0..scenes {
         let draw = subject.draw([question, index], &all, layers, Unseen::Poses);
         let scene = subject.prepare(draw)?;
-        let drape = networks.drape(&scene)?;
-        let alone = dressing.of(&scene, &drape.single.posed);
-        let draped = dressing.of(&scene, &drape.layered.posed);
+        let drapes = [networks.drape_alone(&scene)?, networks.drape(&scene)?];
+        let [alone, draped] = drapes.each_ref().map(|drape| dressing.of(&scene, &drape.posed));
         let result =
             (index < resolved).then(|| OutfitResult::new(index, &draped, settings)).transpose()?.map(|r| r.0);
         outfits.push(Measured {
             is_wearable: draped.is_wearable(),
-            strain: strains(&scene, &drape),
+            strain: strains(&scene, &drapes),
             wrong_single: alone.certificate().into_diagnostic()?.order_violations,
             before: match &result {
                 Some(result) => result.before,
@@ -165,10 +164,9 @@ impl Outfits {
 }
 
 /// Strain of every garment draped alone and in the outfit [J].
-fn strains(scene: &PreparedScene, drape: &NetworkDrape) -> Vec<[f64; 2]> {
+fn strains(scene: &PreparedScene, drapes: &[Draped; 2]) -> Vec<[f64; 2]> {
     let energy = &scene.bodies[0].energy;
-    let [single, layered] =
-        [&drape.single, &drape.layered].map(|d| energy.raw(&d.posed, &d.canonical).garments);
+    let [single, layered] = drapes.each_ref().map(|d| energy.raw(&d.posed, &d.canonical).garments);
     let strain = |raw: &clothcombo_physics::energy::TermMap<Option<f64>>| raw[Term::Strain].unwrap_or(0.0);
     single.iter().zip(&layered).map(|(alone, worn)| [strain(alone), strain(worn)]).collect()
 }

@@ -138,7 +138,7 @@ pub fn ask(
     let draws = question.draws(subject);
     let networks = subject.networks();
     let measured = subject.measure(&draws, done, |scene| {
-        Ok(vec![networks.skin_rest(scene)?, networks.skin(scene)?, networks.drape(scene)?.layered])
+        Ok(vec![networks.skin_rest(scene)?, networks.skin(scene)?, networks.drape(scene)?])
     })?;
     let of = |method: usize, scenes: &[usize]| -> Vec<&Measured> {
         scenes.iter().map(|&i| &measured[i][method]).collect()

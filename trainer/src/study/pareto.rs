@@ -142,9 +142,9 @@ fn fast_methods(
             1 => "network, 1 correction".to_owned(),
             _ => format!("network, {corrections} corrections"),
         };
-        with_fewer.push(state(&name, ms, wide(&networks.drape(scene)?.layered.posed)));
+        with_fewer.push(state(&name, ms, wide(&networks.drape(scene)?.posed)));
     }
-    let draped = networks.drape(scene)?.layered;
+    let draped = networks.drape(scene)?;
     let dressing = Dressing::new(&subject.library, &subject.config.losses, Some(&networks));
     let before = dressing.of(scene, &draped.posed);
     // Once: it may take seconds.

@@ -54,7 +54,7 @@ pub fn ask(
     };
     let draws: Vec<_> = if pool.is_empty() { Vec::new() } else { (0..question.scenes).map(draw).collect() };
     let networks = subject.networks();
-    let measured = subject.measure(&draws, done, |scene| Ok(vec![networks.drape(scene)?.layered]))?;
+    let measured = subject.measure(&draws, done, |scene| Ok(vec![networks.drape(scene)?]))?;
     let all: Vec<&Measured> = measured.iter().map(|methods| &methods[0]).collect();
     let mean = |f: &dyn Fn(&Measured) -> f64| all.iter().map(|m| f(m)).sum::<f64>() / all.len().max(1) as f64;
     Ok(Variant {

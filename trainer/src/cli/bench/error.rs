@@ -144,10 +144,10 @@ fn drape(
         // cloth belongs.
         let resolved = match scene.worn.len() {
             1 => None,
-            _ => Some(dressing.of(scene, &drape.layered.posed).resolved(&post_process)?.positions.concat()),
+            _ => Some(dressing.of(scene, &drape.posed).resolved(&post_process)?.positions.concat()),
         };
         bar.inc(1);
-        Ok(Drapes::new(&drape, resolved))
+        Ok(Drapes::new(&networks.drape_alone(scene)?, &drape, resolved))
     });
     let drapes = drapes.collect();
     bar.finish_and_clear();

@@ -183,7 +183,7 @@ fn drapes(
     for scene in scenes {
         // Networks made anew have embedded nothing yet.
         ms += median_ms(seconds, || Networks::new(model.clone(), &tensors).drape(scene))?;
-        let found = Networks::new(model.clone(), &tensors).drape(scene)?.layered;
+        let found = Networks::new(model.clone(), &tensors).drape(scene)?;
         energy += scene.bodies[0].energy.value(&found.posed, &found.canonical).total;
         draped.push(found);
     }

@@ -1,0 +1,90 @@
+//! Correction networks: what their stage trains, and what becomes of their results.
+
+use burn::module::Module;
+use clothcombo_model::{ClothCombo, Initializer};
+use clothcombo_tests::{loss_and_gradient, tiny_config};
+use clothcombo_trainer::config::{Config, Trains};
+use clothcombo_trainer::device::Backend;
+use clothcombo_trainer::drape::{Networks, WardrobeTensors};
+use clothcombo_trainer::learner::{Learner, new_optimizer};
+use clothcombo_trainer::scene::{Library, PreparedScene, prepare_step};
+use clothcombo_trainer::schedule::Schedule;
+use clothcombo_trainer::session::dimensions;
+use clothcombo_trainer::world::Share;
+use std::sync::Arc;
+
+/// A library, an untrained model with two corrections, and a scene of garments that can touch.
+fn setting(folder: &std::path::Path) -> (Config, Arc<Library>, WardrobeTensors, ClothCombo, PreparedScene) {
+    let config = tiny_config(folder, &["model.corrections=2", "model.correction_width=16"]);
+    let library = Arc::new(Library::load(&config, &|_, _, _| {}).unwrap());
+    let device = Backend::preferred().device().autodiff();
+    let dimensions = dimensions(&library);
+    let tensors = WardrobeTensors::new(library.clone(), dimensions, &device);
+    let model = ClothCombo::new(&config.model, &dimensions, config.seed, &device).unwrap();
+    let schedule = Schedule::new(&config);
+    let scene_of = |step| prepare_step(&library, &config, &schedule, step, Share::WHOLE).unwrap().remove(0);
+    let scene = (20..).map(scene_of).find(|scene| !scene.contacts.is_empty()).unwrap();
+    (config, library, tensors, model, scene)
+}
+
+#[test]
+fn their_stage_trains_nothing_else_and_lowers_the_loss() {
+    let folder = tempfile::tempdir().unwrap();
+    let (config, _, tensors, model, scene) = setting(folder.path());
+    let parameters = |model: &ClothCombo| {
+        let (phases, skinning) =
+            ([&model.draping.displacement, &model.untangling.displacement], &model.skinning);
+        let weights = phases.map(|siren| siren.output.weight.val().to_data().try_to_vec::<f32>().unwrap());
+        (weights, skinning.output.weight.val().to_data().try_to_vec::<f32>().unwrap())
+    };
+    let others = parameters(&model);
+    let mut learner = Learner::new(model.clone(), new_optimizer(&config.optimizer), &config.optimizer);
+    let (first, gradient) = {
+        let learner = Learner::new(model.clone(), new_optimizer(&config.optimizer), &config.optimizer);
+        loss_and_gradient(learner, &tensors, std::slice::from_ref(&scene), Trains::Corrections)
+    };
+    let own: usize = model.corrections.iter().map(Module::num_params).sum();
+    let (of_others, of_corrections) = gradient.split_at(gradient.len() - own);
+    assert!(of_others.iter().all(|g| *g == 0.0));
+    assert!(of_corrections.iter().any(|g| *g != 0.0));
+    let mut last = first;
+    for _ in 0..40 {
+        let outcome =
+            learner.step(&tensors, std::slice::from_ref(&scene), Trains::Corrections, 1e-3, false).unwrap();
+        last = outcome.loss;
+    }
+    assert!(last < 0.9 * first, "{first} → {last}");
+    assert_eq!(parameters(learner.model()), others);
+}
+
+#[test]
+fn what_has_no_less_energy_is_not_taken() {
+    let folder = tempfile::tempdir().unwrap();
+    let (config, _, tensors, model, scene) = setting(folder.path());
+    let energy = |model: &ClothCombo| {
+        let networks = Networks::new(model.valid(), &tensors);
+        let [together, apart] = [networks.drape(&scene), networks.drape_alone(&scene)].map(Result::unwrap);
+        let alone = scene.bodies[0].energy.without_layers();
+        (
+            scene.bodies[0].energy.value(&together.posed, &together.canonical).total,
+            alone.value(&apart.posed, &apart.canonical).total,
+        )
+    };
+    let uncorrected = {
+        let none = config.model.without_corrections();
+        energy(&model.clone().with_corrections(&none, &mut Initializer::new(1, &device())))
+    };
+    // Corrections that know nothing and move everything.
+    let mut wild = model;
+    for correction in &mut wild.corrections {
+        let bias = correction.output.bias.val();
+        correction.output.bias = burn::module::Param::from_tensor((bias + 0.7).detach());
+    }
+    let found = energy(&wild);
+    assert!(found.0 <= uncorrected.0 * (1.0 + 1e-6), "{found:?} {uncorrected:?}");
+    assert!(found.1 <= uncorrected.1 * (1.0 + 1e-6), "{found:?} {uncorrected:?}");
+}
+
+fn device() -> burn::tensor::Device {
+    Backend::preferred().device().autodiff()
+}
