@@ -425,8 +425,10 @@ fn a_correction_has_its_own_gradient_and_gives_nothing_back() {
                 values(&posed).iter().zip(weights).map(|(p, w)| f64::from(*p) * f64::from(w)).sum()
             };
             let found = f64::from(gradient[index]);
-            let slope = (value(5e-2) - value(-5e-2)) / 1e-1;
-            assert!(found != 0.0 && (slope - found).abs() < 3e-2 * found.abs(), "{name}: {found} {slope}");
+            // Short steps lose digits of f32, long ones curve: one of them must fit.
+            let slopes = [2e-3, 1e-2, 5e-2].map(|step| (value(step) - value(-step)) / f64::from(2.0 * step));
+            let fits = slopes.iter().any(|slope| (slope - found).abs() < 2e-2 * found.abs());
+            assert!(found != 0.0 && fits, "{name}: {found} {slopes:?}");
         }
     }
 }
