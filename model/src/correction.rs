@@ -12,8 +12,8 @@
 //! than 2 cm, so that cloth far from all that was seen in training is not thrown about. Several corrections, one after the other,
 //! are steps of a solver that was learned.
 //!
-//! What is felt, and all that was before, counts as given: no gradient goes through it. A network that answers to another one's
-//! answer would make that drift, since by the gradient it sees, what it does is still undone when it no longer is.
+//! What is felt, and all that was before, counts as given: no gradient goes through it. A run with one diverged
+//! (`docs/corrections.md`).
 
 use burn::module::{Module, Param};
 use burn::tensor::Tensor;

@@ -126,8 +126,9 @@ impl ClothCombo {
             draping: Draping::new(config, dimensions, start),
             skinning: Skinning::new(config, dimensions, start),
             untangling: Untangling::new(config, start),
-            corrections: (0..config.corrections).map(|_| Correction::new(config, start)).collect(),
-        })
+            corrections: Vec::new(),
+        }
+        .with_corrections(config, start))
     }
 
     /// Embeds one garment (E_c).

@@ -280,7 +280,7 @@ pub fn drape_on(model: &ClothCombo, on_body: &OnBody<'_>) -> (Draped, NetworkTim
         found = draped(&layered.canonical, &layered.posed);
     }
     times.untangling = clock.elapsed() - times.draping;
-    found = corrected(model, on_body, &single, &layered, Company::Together).unwrap_or(found);
+    found = corrected(model, on_body, &single, (&layered, found), Company::Together);
     times.correcting = clock.elapsed() - times.draping - times.untangling;
     (found, times)
 }
@@ -290,27 +290,27 @@ pub fn drape_alone(model: &ClothCombo, on_body: &OnBody<'_>) -> Draped {
     let OnBody { outfit, embeddings, body, start, .. } = on_body;
     let single = model.drape_single(outfit, embeddings, body, start.clone());
     let alone = LayeredDrape { canonical: single.canonical.clone(), posed: single.posed.clone() };
-    corrected(model, on_body, &single, &alone, Company::Alone)
-        .unwrap_or_else(|| draped(&alone.canonical, &alone.posed))
+    let found = draped(&alone.canonical, &alone.posed);
+    corrected(model, on_body, &single, (&alone, found), Company::Alone)
 }
 
-/// What the correction networks make of `uncorrected`, or what they were given where that has less energy; `None` without any.
+/// What the correction networks make of `uncorrected`, on the device and on the host; that itself where it has less energy.
 fn corrected(
     model: &ClothCombo,
     OnBody { scene, outfit, embeddings, body, start }: &OnBody<'_>,
     single: &SingleDrape,
-    uncorrected: &LayeredDrape,
+    (uncorrected, found): (&LayeredDrape, Draped),
     company: Company,
-) -> Option<Draped> {
+) -> Draped {
     let prepared = &scene.bodies[0];
     let feel: Feel<'_> = &|posed| felt(scene, prepared, company.contacts(scene), posed);
     let states = model.correct(outfit, embeddings, (start.clone(), single), uncorrected, body, feel);
     if states.is_empty() {
-        return None;
+        return found;
     }
-    let states = std::iter::once(uncorrected).chain(&states);
-    let states: Vec<Draped> = states.map(|state| draped(&state.canonical, &state.posed)).collect();
-    Some(least_energy(&states, &prepared.energy, company))
+    let states = states.iter().map(|state| draped(&state.canonical, &state.posed));
+    let states: Vec<Draped> = std::iter::once(found).chain(states).collect();
+    least_energy(&states, &prepared.energy, company)
 }
 
 fn draped(canonical: &Tensor<2>, posed: &Tensor<2>) -> Draped {

@@ -4,7 +4,7 @@ use crate::drape::to_host;
 use crate::scene::{LibraryGarment, PreparedBody, PreparedScene};
 use burn::tensor::Tensor;
 use clothcombo_model::FeltTensors;
-use clothcombo_physics::sensing::{DIRECTIONS, FEATURES, Sensed, Sheet, sense};
+use clothcombo_physics::sensing::{DIRECTIONS, FEATURES, Rings, Sensed, sense};
 use std::sync::Arc;
 
 /// Whether the garments of a scene feel each other.
@@ -39,9 +39,8 @@ pub fn felt(
     posed: Tensor<2>,
 ) -> FeltTensors {
     let device = posed.device();
-    let meshes = scene.worn.iter().map(|worn| (worn.garment.rest.faces().into(), &worn.rings));
-    let sheets: Vec<Sheet<'_>> = meshes.map(|(faces, rings)| Sheet { faces, rings }).collect();
-    let Sensed { features, directions } = sense(&body.energy, &sheets, &to_host(posed), contacts);
+    let rings: Vec<&Rings> = scene.worn.iter().map(|worn| &worn.rings).collect();
+    let Sensed { features, directions } = sense(&body.energy, &rings, &to_host(posed), contacts);
     let directions = directions.map(|posed| unposed(scene, body, &posed));
     FeltTensors::new(features, directions.each_ref().map(Vec::as_slice), &device)
         .expect("every vertex of the scene has its features")

@@ -112,7 +112,7 @@ impl<T: Real> GarmentEnergies<T> {
     }
 
     /// As others see it that lie on it.
-    pub(super) fn as_inner(&self) -> &InnerGarment {
+    pub(crate) fn as_inner(&self) -> &InnerGarment {
         &self.as_inner
     }
 }

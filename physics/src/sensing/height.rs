@@ -9,6 +9,14 @@ const REACH: f64 = 0.08;
 /// Vertices count whose distance exceeds the least by less than this many median edges.
 const SPREAD: f64 = 1.5;
 
+/// A garment in its present position, as a point near it feels it.
+pub(super) struct Sheet<'a> {
+    pub surface: Surface<f32>,
+    pub rings: &'a Rings,
+    /// Of the rest shape [m].
+    pub median_edge: f64,
+}
+
 /// Where a point lies seen from a sheet.
 pub(super) struct Height {
     /// Mean height over the tangent planes of the vertices near it, positive outside [m].
@@ -38,7 +46,8 @@ pub(super) fn felt_within(positions: &[[f32; 3]]) -> [[f64; 3]; 2] {
 ///
 /// A moving weighted mean over the tangent planes rather than the nearest one alone: it changes smoothly with `p` but for
 /// where another part of the sheet becomes the nearest.
-pub(super) fn height(sheet: &Surface<f32>, rings: &Rings, p: [f64; 3], facing: [f64; 3]) -> Option<Height> {
+pub(super) fn height(sheet: &Sheet<'_>, p: [f64; 3], facing: [f64; 3]) -> Option<Height> {
+    let Sheet { surface: sheet, rings, median_edge } = sheet;
     if sheet.positions.is_empty() {
         return None;
     }
@@ -48,7 +57,7 @@ pub(super) fn height(sheet: &Surface<f32>, rings: &Rings, p: [f64; 3], facing: [
     if least.partial_cmp(&REACH) != Some(std::cmp::Ordering::Less) {
         return None;
     }
-    let spread = SPREAD * rings.median_edge();
+    let spread = SPREAD * median_edge;
     let (mut total, mut height, mut normal, mut centre) = (0.0, 0.0, zero(), zero());
     for &v in rings.patch(nearest) {
         let (q, n) = (to_f64(sheet.positions[v as usize]), to_f64(sheet.normals[v as usize]));

@@ -15,14 +15,12 @@ mod forces;
 mod height;
 mod rings;
 
-use std::sync::Arc;
-
 use rayon::prelude::*;
 
-use crate::energy::SceneEnergy;
+use crate::energy::{SceneEnergy, SceneGarment};
 use crate::query::{Distance, Surface};
 use crate::vec3::{add_scaled, dot, norm, scale, to_f64, zero};
-use height::{Height, height};
+use height::{Height, Sheet, height};
 
 pub use rings::Rings;
 
@@ -45,14 +43,6 @@ const UNIT: f64 = 0.01;
 const MOST: f64 = 5.0;
 /// Weight in the mean direction of a garment that is near, but where it should be, against a centimetre too little.
 const AT_REST: f64 = 0.05;
-
-/// The mesh of a garment.
-pub struct Sheet<'a> {
-    /// Faces `[F, 3]`.
-    pub faces: Arc<[[u32; 3]]>,
-    /// Neighbourhoods.
-    pub rings: &'a Rings,
-}
 
 /// What the vertices of an outfit feel.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,31 +67,34 @@ struct Side {
     direction: [f64; 3],
 }
 
-/// What the garments of `scene` feel at `posed` `[ΣV, 3]` [m]; `sheets` are their meshes, and `contacts` the pairs (inner, outer)
-/// that feel each other.
+/// What the garments of `scene` feel at `posed` `[ΣV, 3]` [m]; `rings` are their neighbourhoods, and `contacts` the pairs
+/// (inner, outer) that feel each other.
 ///
 /// Positions that are not finite make features that are not finite, at least at their own vertices.
 ///
 /// # Panics
 /// If the lengths are not those of the scene.
-pub fn sense(
+pub fn sense<'a>(
     scene: &SceneEnergy<f32>,
-    sheets: &[Sheet<'_>],
+    rings: &[&'a Rings],
     posed: &[[f32; 3]],
     contacts: &[(usize, usize)],
 ) -> Sensed {
     let parts: Vec<&[[f32; 3]]> = scene.ranges().into_iter().map(|range| &posed[range]).collect();
-    let surfaces: Vec<Surface<f32>> =
-        parts.iter().zip(sheets).map(|(p, sheet)| Surface::new(p.to_vec(), sheet.faces.clone())).collect();
+    let sheet = |((part, rings), garment): ((&&[[f32; 3]], &&'a Rings), &SceneGarment<f32>)| {
+        let mesh = garment.energies.as_inner();
+        let surface = Surface::new(part.to_vec(), mesh.faces().clone());
+        Sheet { surface, rings, median_edge: mesh.median_edge() }
+    };
+    let sheets: Vec<Sheet<'_>> = parts.iter().zip(rings).zip(&scene.garments).map(sheet).collect();
     let boxes: Vec<[[f64; 3]; 2]> = parts.iter().map(|part| height::felt_within(part)).collect();
     let mut sensed = Sensed {
         features: Vec::with_capacity(FEATURES * posed.len()),
         directions: std::array::from_fn(|_| Vec::with_capacity(posed.len())),
     };
-    for (i, (garment, Sheet { rings, .. })) in scene.garments.iter().zip(sheets).enumerate() {
+    for (i, (garment, Sheet { surface: own, rings, .. })) in scene.garments.iter().zip(&sheets).enumerate() {
         let below: Vec<usize> = contacts.iter().filter(|c| c.1 == i).map(|c| c.0).collect();
         let above: Vec<usize> = contacts.iter().filter(|c| c.0 == i).map(|c| c.1).collect();
-        let own = &surfaces[i];
         let felt: Vec<([f64; FELT], [[f64; 3]; OUTWARDS])> = (0..own.positions.len())
             .into_par_iter()
             .with_min_len(64)
@@ -113,7 +106,7 @@ pub fn sense(
                         let [low, high] = boxes[**j];
                         (0..3).all(|k| (low[k]..=high[k]).contains(&p[k]))
                     };
-                    let over = |&j: &usize| height(&surfaces[j], sheets[j].rings, p, normal);
+                    let over = |&j: &usize| height(&sheets[j], p, normal);
                     Side::new(others.iter().filter(near).filter_map(over), outwards)
                 };
                 let [under, over] = [side(&below, 1.0), side(&above, -1.0)];

@@ -2,14 +2,13 @@
 
 use rayon::prelude::*;
 
-use crate::mesh::{Topology, TriMesh};
+use crate::mesh::Topology;
 
 /// The neighbours of every vertex, one and two edges away.
 #[derive(Debug, Clone)]
 pub struct Rings {
     one: Lists,
     two: Lists,
-    median_edge: f64,
 }
 
 /// A list for every vertex, one after the other.
@@ -32,10 +31,10 @@ impl Lists {
 }
 
 impl Rings {
-    /// Of a garment at rest, whose topology is known.
-    pub fn new(rest: &TriMesh, topology: &Topology) -> Self {
+    /// Of a garment with this topology.
+    pub fn new(topology: &Topology) -> Self {
         let (mut one, mut two) = (Lists::default(), Lists::default());
-        for v in 0..rest.vertex_count() {
+        for v in 0..topology.vertex_count() {
             let ring = topology.ring(v);
             one.push(ring.iter().copied());
             let mut patch: Vec<u32> = ring.iter().flat_map(|&n| topology.ring(n as usize)).copied().collect();
@@ -45,17 +44,12 @@ impl Rings {
             patch.dedup();
             two.push(patch);
         }
-        Self { one, two, median_edge: rest.median_edge_length() }
+        Self { one, two }
     }
 
     /// `v` itself and the vertices one and two edges away, ascending.
     pub(super) fn patch(&self, v: u32) -> &[u32] {
         self.two.of(v as usize)
-    }
-
-    /// Median edge at rest [m].
-    pub(super) fn median_edge(&self) -> f64 {
-        self.median_edge
     }
 
     /// Half of every vertex's own values and half of the mean of its neighbours'; a constant stays what it is.

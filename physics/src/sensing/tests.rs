@@ -1,13 +1,14 @@
 use super::*;
-use crate::energy::{EnergySettings, GarmentEnergies, SceneGarment, Term, TermMap};
+use crate::energy::{EnergySettings, GarmentEnergies, Term, TermMap};
 use crate::mesh::{Topology, TriMesh, shapes};
 use crate::vec3::{distance_squared, normalized, sub};
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 /// Garments of the given shapes at rest, on a body.
 struct Outfit {
     scene: SceneEnergy<f32>,
-    meshes: Vec<(Arc<[[u32; 3]]>, Rings)>,
+    rings: Vec<Rings>,
     posed: Vec<[f32; 3]>,
 }
 
@@ -26,16 +27,13 @@ impl Outfit {
             layers: Vec::new(),
             settings,
         };
-        let meshes =
-            garments.iter().zip(&topologies).map(|(g, t)| (g.faces().into(), Rings::new(g, t))).collect();
+        let rings = topologies.iter().map(Rings::new).collect();
         let positions = garments.iter().flat_map(|g| g.positions());
-        Self { scene, meshes, posed: positions.map(|p| p.map(|x| x as f32)).collect() }
+        Self { scene, rings, posed: positions.map(|p| p.map(|x| x as f32)).collect() }
     }
 
     fn sense(&self, contacts: &[(usize, usize)]) -> Sensed {
-        let sheets: Vec<Sheet<'_>> =
-            self.meshes.iter().map(|(faces, rings)| Sheet { faces: faces.clone(), rings }).collect();
-        sense(&self.scene, &sheets, &self.posed, contacts)
+        sense(&self.scene, &self.rings.iter().collect::<Vec<_>>(), &self.posed, contacts)
     }
 
     fn strain(&self) -> f64 {
@@ -141,15 +139,17 @@ fn far_cloth_and_cloth_that_faces_the_other_way_are_not_felt() {
 #[test]
 fn height_over_a_plane_is_exact_and_beyond_the_hem_is_beside() {
     let sheet = shapes::mapped(&shapes::irregular_grid(0.4, 0.4, 21, 21, 0.3, 2), |p| [p[0], p[1], 0.0]);
-    let (surface, rings) = (Surface::from_mesh(&sheet), Rings::new(&sheet, &Topology::new(&sheet)));
+    let rings = Rings::new(&Topology::new(&sheet));
+    let sheet =
+        Sheet { surface: Surface::from_mesh(&sheet), rings: &rings, median_edge: sheet.median_edge_length() };
     for k in 0..40 {
         let (sine, cosine) = (TAU * f64::from(k) / 40.0).sin_cos();
         let p = [0.2 + 0.15 * cosine, 0.2 + 0.15 * sine, 0.02 * sine];
-        let felt = height(&surface, &rings, p, [0.0, 0.0, 1.0]).expect("the sheet is near");
+        let felt = height(&sheet, p, [0.0, 0.0, 1.0]).expect("the sheet is near");
         assert!((felt.height - p[2]).abs() < 1e-6);
         assert!(felt.beside < 0.01, "within half an edge: {}", felt.beside);
     }
-    let beyond = height(&surface, &rings, [-0.05, 0.2, 0.01], [0.0, 0.0, 1.0]).expect("the hem is near");
+    let beyond = height(&sheet, [-0.05, 0.2, 0.01], [0.0, 0.0, 1.0]).expect("the hem is near");
     assert!((beyond.height - 0.01).abs() < 1e-6 && (0.05..0.08).contains(&beyond.beside));
 }
 
@@ -173,7 +173,7 @@ fn a_vertex_that_is_nowhere_spoils_no_other() {
 fn means_keep_constants_and_patches_are_two_edges_wide() {
     let sheet = shapes::irregular_grid(0.3, 0.3, 9, 7, 0.2, 4);
     let topology = Topology::new(&sheet);
-    let rings = Rings::new(&sheet, &topology);
+    let rings = Rings::new(&topology);
     let constant = vec![[2.0, -3.0]; sheet.vertex_count()];
     let averaged = rings.averaged(&constant);
     assert!(averaged.iter().flatten().zip(constant.iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-12));

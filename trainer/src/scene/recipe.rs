@@ -70,7 +70,7 @@ impl Recipe {
             shape_stride: self.body.shape_count,
             shape_directions: binding.shape_directions,
             energies: Arc::new(energies),
-            rings: Rings::new(&garment.rest, &topology),
+            rings: Rings::new(&topology),
             garment,
         })
     }

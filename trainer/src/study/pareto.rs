@@ -3,6 +3,7 @@
 use super::estimate::Estimate;
 use super::subject::Subject;
 use super::table::{Table, number};
+use crate::drape::DrapeError;
 use crate::draper::refine;
 use crate::evaluate::certificates::Dressing;
 use crate::evaluate::equilibrium_error::mean_distance;
@@ -131,20 +132,28 @@ fn fast_methods(
     };
     let rest_ms = median_ms(SECONDS, || networks.skin_rest(scene))?;
     let skin_ms = median_ms(SECONDS, || networks.skin(scene))?;
-    // The garment is embedded in the first, unmeasured drape, as for the next frame of a motion.
-    let network_ms = median_ms(SECONDS, || networks.drape(scene))?;
-    let mut with_fewer = Vec::new();
-    for corrections in 0..subject.model.corrections.len() {
+    let mut states = vec![
+        state("LBS of rest", rest_ms, wide(&networks.skin_rest(scene)?.posed)),
+        state("LBS", skin_ms, wide(&networks.skin(scene)?.posed)),
+    ];
+    let measured = |corrections: usize| {
         let networks = subject.networks_with(corrections);
+        // The garment is embedded in the first, unmeasured drape, as for the next frame of a motion.
         let ms = median_ms(SECONDS, || networks.drape(scene))?;
+        Ok::<_, DrapeError>((ms, networks.drape(scene)?))
+    };
+    let all = subject.model.corrections.len();
+    for corrections in 0..all {
+        let (ms, draped) = measured(corrections)?;
         let name = match corrections {
             0 => "network, uncorrected".to_owned(),
             1 => "network, 1 correction".to_owned(),
             _ => format!("network, {corrections} corrections"),
         };
-        with_fewer.push(state(&name, ms, wide(&networks.drape(scene)?.posed)));
+        states.push(state(&name, ms, wide(&draped.posed)));
     }
-    let draped = networks.drape(scene)?;
+    let (network_ms, draped) = measured(all)?;
+    states.push(state("network", network_ms, wide(&draped.posed)));
     let dressing = Dressing::new(&subject.library, &subject.config.losses, Some(&networks));
     let before = dressing.of(scene, &draped.posed);
     // Once: it may take seconds.
@@ -152,12 +161,6 @@ fn fast_methods(
     let mut resolved = before.resolved(settings)?.positions;
     let post_ms = 1e3 * clock.elapsed().as_secs_f64();
     let resolved = resolved.pop().ok_or_else(|| miette!("a scene without a garment"))?;
-    let mut states = vec![
-        state("LBS of rest", rest_ms, wide(&networks.skin_rest(scene)?.posed)),
-        state("LBS", skin_ms, wide(&networks.skin(scene)?.posed)),
-    ];
-    states.extend(with_fewer);
-    states.push(state("network", network_ms, wide(&draped.posed)));
     states.push(state("network + post-process", network_ms + post_ms, resolved));
     Ok(states)
 }

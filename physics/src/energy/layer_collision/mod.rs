@@ -7,6 +7,8 @@
 pub mod closest_point;
 pub mod nearest_vertex;
 
+use std::sync::Arc;
+
 use super::{CurvatureSink, EnergySettings, Weighted};
 use crate::mesh::{Topology, TriMesh};
 use crate::query::ClosestPoint;
@@ -47,8 +49,13 @@ impl InnerGarment {
         Self { vertices, cloth: InnerCloth::new(rest, topology) }
     }
 
+    /// Faces `[F, 3]`, shared by all surfaces of the garment.
+    pub(crate) fn faces(&self) -> &Arc<[[u32; 3]]> {
+        self.vertices.faces()
+    }
+
     /// Median edge of the rest shape [m].
-    pub(super) fn median_edge(&self) -> f64 {
+    pub(crate) fn median_edge(&self) -> f64 {
         self.vertices.median_edge()
     }
 

@@ -10,6 +10,8 @@
 //!
 //! [`LayerGate`] limits the sum to outer vertices that have inner cloth under them.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
 use crate::energy::elements::{GRAIN, Incidence};
@@ -28,7 +30,7 @@ pub const COLLAPSE_FLOOR: f64 = 1e-6;
 /// What stays the same of an inner garment.
 #[derive(Debug, Clone)]
 pub struct InnerVertices {
-    faces: Vec<[u32; 3]>,
+    faces: Arc<[[u32; 3]]>,
     incidence: Incidence,
     /// τ² per vertex [m⁴].
     collapse_squared: Vec<f64>,
@@ -56,7 +58,7 @@ const NO_CONTACT: Contact = Contact { inner: 0, energy: 0.0, slope: 0.0 };
 
 impl InnerVertices {
     pub(super) fn with_median_edge(rest: &TriMesh, median_edge: f64) -> Self {
-        let faces = rest.faces().to_vec();
+        let faces: Arc<[[u32; 3]]> = rest.faces().into();
         let incidence = Incidence::new(rest.vertex_count(), &faces);
         let floor = COLLAPSE_FLOOR * median_edge * median_edge;
         let collapse_squared = area_normals(rest.positions(), &faces, &incidence)
@@ -71,7 +73,7 @@ impl InnerVertices {
         self.median_edge
     }
 
-    pub(super) fn faces(&self) -> &[[u32; 3]] {
+    pub(super) fn faces(&self) -> &Arc<[[u32; 3]]> {
         &self.faces
     }
 
