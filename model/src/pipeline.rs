@@ -248,6 +248,12 @@ impl ClothCombo {
         self
     }
 
+    /// The same networks with no more than the first `count` of their correction networks.
+    pub fn with_first_corrections(mut self, count: usize) -> Self {
+        self.corrections.truncate(count);
+        self
+    }
+
     /// Corrects how garments lie: the states after each of the correction networks, none without any.
     ///
     /// `draped` is where `single` and untangling brought them from `start`; `feel` says what is felt at posed positions. Nothing

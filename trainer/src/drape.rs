@@ -183,13 +183,19 @@ pub fn body_tensors(
 pub struct Networks<'a> {
     model: ClothCombo,
     tensors: &'a WardrobeTensors,
-    embeddings: KnownEmbeddings,
+    embeddings: Arc<KnownEmbeddings>,
 }
 
 impl<'a> Networks<'a> {
     /// Wraps a model without automatic differentiation.
     pub fn new(model: ClothCombo, tensors: &'a WardrobeTensors) -> Self {
-        Self { model, tensors, embeddings: tensors.embeddings() }
+        Self { model, tensors, embeddings: Arc::new(tensors.embeddings()) }
+    }
+
+    /// The same without correction networks.
+    pub fn uncorrected(&self) -> Self {
+        let model = self.model.clone().with_first_corrections(0);
+        Self { model, tensors: self.tensors, embeddings: self.embeddings.clone() }
     }
 
     /// Drapes the garments of `scene` together on its first body.

@@ -137,6 +137,8 @@ impl BodyState {
 pub struct Draper {
     trained: TrainedModel,
     model: ClothCombo,
+    /// The same without corrections, for poses on the way from the T-pose: these change less from pose to pose.
+    uncorrected: ClothCombo,
     recipe: Recipe,
     joints: ActiveJoints,
     device: Device,
@@ -166,6 +168,7 @@ impl Draper {
         let settings = settings.clone();
         Ok(Self {
             trained,
+            uncorrected: model.clone().with_first_corrections(0),
             model,
             recipe,
             joints,
@@ -222,7 +225,7 @@ impl Draper {
         last: Option<Last<'_>>,
     ) -> Result<Drape, DraperError> {
         let Networked { scene, surface, heading, transforms, skinned, network, mut milliseconds } =
-            self.networked(outfit, body)?;
+            self.networked(&self.model, outfit, body)?;
 
         let clock = Instant::now();
         let (before, refinement) = match self.settings.refine {
@@ -299,7 +302,7 @@ impl Draper {
                 1.0 => Ok(at_the_end()),
                 _ => {
                     let place = add_scaled(state.place, share, sub(body.place, state.place));
-                    self.stage(outfit, body, state.pose.between(&body.pose, share), place)
+                    self.stage(&self.model, outfit, body, state.pose.between(&body.pose, share), place)
                 }
             };
             carried = resolve_after(drape.reached(), surface, &layers, settings, between)?;
@@ -308,8 +311,13 @@ impl Draper {
             }
         }
         let from_t_pose = |share: f64| match share {
-            1.0 => Ok(at_the_end()),
-            _ => self.stage(outfit, body, body.pose.on_the_way(share), body.place),
+            // The surface is known here only; what is to be resolved was corrected and refined, which is added along the way.
+            1.0 => {
+                let uncorrected =
+                    self.stage(&self.uncorrected, outfit, body, body.pose.clone(), body.place)?;
+                Ok(Waypoint { draped: uncorrected.draped, ..at_the_end() })
+            }
+            _ => self.stage(&self.uncorrected, outfit, body, body.pose.on_the_way(share), body.place),
         };
         let anew = resolve_along(surface, &layers, &at_the_end().skinned, settings, from_t_pose)?;
         // What carries on does not pop.

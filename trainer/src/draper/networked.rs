@@ -6,6 +6,7 @@ use crate::evaluate::reference::skinning_transforms;
 use crate::scene::{BodyDraw, Dresser, PreparedScene, SceneDraw};
 use clothcombo_data::asset::Pose;
 use clothcombo_data::asset::rotation::{Matrix3, apply, matrix_from_axis_angle};
+use clothcombo_model::ClothCombo;
 use clothcombo_physics::contact::resolve::Waypoint;
 use clothcombo_physics::query::Surface;
 use clothcombo_physics::transform::{self, Transform};
@@ -35,8 +36,13 @@ pub(super) struct Networked {
 const MOST_SHAPE: f64 = 20.0;
 
 impl Draper {
-    /// Poses the body and lets the networks drape `outfit` on it.
-    pub(super) fn networked(&self, outfit: &Outfit, body: &BodyState) -> Result<Networked, DraperError> {
+    /// Poses the body and lets `model` drape `outfit` on it.
+    pub(super) fn networked(
+        &self,
+        model: &ClothCombo,
+        outfit: &Outfit,
+        body: &BodyState,
+    ) -> Result<Networked, DraperError> {
         let clock = Instant::now();
         let shape = self.checked_shape(&body.shape)?;
         if body.pose.rotations.as_flattened().iter().chain(&body.place).any(|x| !x.is_finite()) {
@@ -60,7 +66,7 @@ impl Draper {
 
         let (outfit_tensors, embeddings) = (&outfit.tensors, &outfit.embeddings);
         let on_body = OnBody { scene: &scene, outfit: outfit_tensors, embeddings, body: &tensors, start };
-        let (draped, times) = drape_on(&self.model, &on_body);
+        let (draped, times) = drape_on(model, &on_body);
 
         // The body may be turned about the vertical: what the networks made turns with it, to where everything else happens.
         let turn = matrix_from_axis_angle([0.0, yaw, 0.0]);
@@ -85,6 +91,7 @@ impl Draper {
     /// The same in `pose` and place, somewhere on the way to `body`, for the post-process.
     pub(super) fn stage(
         &self,
+        model: &ClothCombo,
         outfit: &Outfit,
         body: &BodyState,
         pose: Pose,
@@ -92,7 +99,7 @@ impl Draper {
     ) -> Result<Waypoint, DraperError> {
         // A surface is known at the end only.
         let on_the_way = BodyState { shape: body.shape.clone(), pose, surface: None, place };
-        let made = self.networked(outfit, &on_the_way)?;
+        let made = self.networked(model, outfit, &on_the_way)?;
         let parts = |packed| outfit.split(packed).into_iter().map(<[_]>::to_vec).collect();
         Ok(Waypoint {
             body: made.surface,

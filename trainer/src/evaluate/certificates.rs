@@ -36,13 +36,16 @@ pub struct Dressing<'a> {
     library: &'a Library,
     losses: &'a LossesConfig,
     networks: Option<&'a Networks<'a>>,
+    /// What drapes poses on the way from the T-pose: corrections change more from pose to pose.
+    uncorrected: Option<Networks<'a>>,
     known: RefCell<HashMap<usize, Arc<RestGarment>>>,
 }
 
 impl<'a> Dressing<'a> {
     /// For scenes of `library`, draped by `networks`; without them by skinning.
     pub fn new(library: &'a Library, losses: &'a LossesConfig, networks: Option<&'a Networks<'a>>) -> Self {
-        Self { library, losses, networks, known: RefCell::default() }
+        let uncorrected = networks.map(Networks::uncorrected);
+        Self { library, losses, networks, uncorrected, known: RefCell::default() }
     }
 
     /// A drape of `scene` from the packed positions of all garments on its first body.
@@ -66,10 +69,7 @@ impl<'a> Dressing<'a> {
     /// # Errors
     /// When the networks do not take it.
     pub fn drape(&self, scene: &PreparedScene) -> Result<Vec<[f32; 3]>, DrapeError> {
-        match self.networks {
-            Some(networks) => Ok(networks.drape(scene)?.posed),
-            None => Ok(skinned(scene)),
-        }
+        draped_by(self.networks, scene)
     }
 
     /// `scene` on the way from the T-pose.
@@ -81,10 +81,18 @@ impl<'a> Dressing<'a> {
         let scene = prepare(self.library, self.losses, draw, 1.0).map_err(DrapeError::from)?;
         Ok(Waypoint {
             body: Arc::new(scene.exact_body()),
-            draped: wide(&scene, &self.drape(&scene)?),
+            draped: wide(&scene, &draped_by(self.uncorrected.as_ref(), &scene)?),
             skinned: wide(&scene, &skinned(&scene)),
             transforms: skinning_transforms(&scene),
         })
+    }
+}
+
+/// Packed positions of `scene`: draped by `networks`, without them by skinning.
+fn draped_by(networks: Option<&Networks<'_>>, scene: &PreparedScene) -> Result<Vec<[f32; 3]>, DrapeError> {
+    match networks {
+        Some(networks) => Ok(networks.drape(scene)?.posed),
+        None => Ok(skinned(scene)),
     }
 }
 

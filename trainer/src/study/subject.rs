@@ -48,9 +48,7 @@ impl Subject {
 
     /// The same with no more than the first `corrections` of the correction networks.
     pub fn networks_with(&self, corrections: usize) -> Networks<'_> {
-        let mut model = self.model.clone();
-        model.corrections.truncate(corrections);
-        Networks::new(model, &self.tensors)
+        Networks::new(self.model.clone().with_first_corrections(corrections), &self.tensors)
     }
 
     /// Scene `index` of question number `question` (`at`), drawn as [`draw_study`] says.

@@ -12,6 +12,7 @@ use std::time::Instant;
 use super::body::{Body, with_body, with_drawn};
 use super::ease::TIMES_IN_FRAME;
 use super::resolved::settled;
+use super::stages::Stages;
 use super::strides::Strides;
 use super::taken_back::{shares, taken_back};
 use super::unfold::Folds;
@@ -50,9 +51,10 @@ pub struct Reached {
 
 /// As [`super::resolve`], with a second way out, and for garments of which it is known where they are `skinned` alone,
 /// `[V, 3]` each [m]: what only the drape folds is laid out first. Where crossings of `layers` on `body` cannot be mended, the
-/// garments are taken along from the stage at 0, the T-pose, to the stage at 1, which is `body` with `layers`; where that leaves
-/// crossings, once more with drapes that are taken back towards the skinned garments around them. Where crossings are left then
-/// and anything was laid out, all of it is tried with the drape as it is as well. What leaves the fewest is returned.
+/// garments are taken along from the stage at 0, the T-pose, to the stage at 1, on `body`; what `layers` differ by from the
+/// drape there is added along the way. Where that leaves crossings, they are taken once more with drapes that are taken back
+/// towards the skinned garments around them. Where crossings are left then and anything was laid out, all of it is tried with
+/// the drape as it is as well. What leaves the fewest is returned.
 ///
 /// # Errors
 /// Those of `stage_at` and of [`super::resolve`].
@@ -67,8 +69,10 @@ pub fn resolve_along<E: From<ResolveError>>(
     settings.check()?;
     check(body, layers)?;
     check(body, &placed(layers, skinned)?)?;
+    let mut stages = Stages::to(layers);
+    let mut checked_at = |share: f64| Ok::<_, E>(checked(stage_at(share)?, layers)?);
     let mut along = |layers: &[Layer<'_>], folds: &mut Option<Folds>| {
-        taken_along(body, layers, folds, settings, start, &mut stage_at)
+        taken_along(body, layers, folds, settings, start, &mut |share| stages.at(share, &mut checked_at))
     };
     // Strict limits leave a drape as it is, as far as it can be left.
     let may_lay_out = settings.loosened > 1.0 && settings.self_contact;
@@ -104,8 +108,7 @@ fn taken_along<E: From<ResolveError>>(
             return Ok(best);
         }
         let way = Way { layers, end: room, settings, start, strides: Strides::FROM_T_POSE };
-        let mut checked_at = |share: f64| Ok::<_, E>(checked(stage_at(share)?, layers)?);
-        let t_pose = checked_at(0.0)?;
+        let t_pose = stage_at(0.0)?;
         if let Some(folds) = folds {
             folds.add(&Folds::of(&at(layers, &t_pose.draped), &t_pose.skinned));
         }
@@ -115,7 +118,7 @@ fn taken_along<E: From<ResolveError>>(
             None => stage,
         };
         let t_pose = laid_out(t_pose);
-        let mut stage_at = |share: f64| checked_at(share).map(laid_out);
+        let mut stage_at = |share: f64| stage_at(share).map(laid_out);
         way.improve(&mut best, body, t_pose.clone(), &mut stage_at)?;
         // Where most of what crosses is pinched it is the body, not the drape, that leaves no way out.
         if best.certificate.between() > best.certificate.pinched.count() {

@@ -50,6 +50,7 @@ mod relief;
 mod resolved;
 mod settings;
 mod sides;
+mod stages;
 mod strides;
 mod taken_back;
 #[cfg(test)]

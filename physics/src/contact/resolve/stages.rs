@@ -1,0 +1,139 @@
+//! The stages of a way: none is made twice, and they end with the drape that is to be resolved.
+//!
+//! A step that is halved comes by the same places again, and so does a second way.
+//!
+//! The drape at the end may be more than what is known of the stages: networks may have corrected it, a solver may have refined
+//! it. What it differs by from the stage at 1 is faded in along the way, in the frames of the skinning transforms. So every stage
+//! may be draped by what changes least from pose to pose, which is what cloth follows best.
+
+use super::Layer;
+use super::follow::Waypoint;
+use crate::transform::{into_frame, out_of_frame};
+use crate::vec3::{add_scaled, sub};
+
+/// Stages kept: some megabytes each.
+const MOST: usize = 64;
+
+/// Stages by their share of the way; the ones that were used last are kept.
+pub(super) struct Stages<'a> {
+    end: &'a [Layer<'a>],
+    /// What the drape at the end differs by, in the frames of all vertices; none before a stage was asked for.
+    difference: Option<Vec<[f64; 3]>>,
+    kept: Vec<(f64, Waypoint)>,
+}
+
+impl<'a> Stages<'a> {
+    /// Those of a way to the drape `end`.
+    pub fn to(end: &'a [Layer<'a>]) -> Self {
+        Self { end, difference: None, kept: Vec::new() }
+    }
+
+    /// The stage at `share`, `made` where it is not known.
+    pub fn at<E>(
+        &mut self,
+        share: f64,
+        mut made: impl FnMut(f64) -> Result<Waypoint, E>,
+    ) -> Result<Waypoint, E> {
+        if self.difference.is_none() {
+            let mut last = made(1.0)?;
+            let pairs =
+                self.end.iter().zip(&last.draped).flat_map(|(end, draped)| end.positions.iter().zip(draped));
+            let in_frame =
+                |((p, q), transform): ((&[f64; 3], &[f64; 3]), _)| into_frame(transform, sub(*p, *q));
+            self.difference = Some(pairs.zip(&last.transforms).map(in_frame).collect());
+            last.draped = self.end.iter().map(|layer| layer.positions.to_vec()).collect();
+            self.kept.push((1.0, last));
+        }
+        let entry = match self.kept.iter().position(|(known, _)| *known == share) {
+            Some(i) => self.kept.remove(i),
+            None => (share, self.faded_in(share, made(share)?)),
+        };
+        let stage = entry.1.clone();
+        if self.kept.len() == MOST {
+            self.kept.remove(0);
+        }
+        self.kept.push(entry);
+        Ok(stage)
+    }
+
+    fn faded_in(&self, share: f64, mut stage: Waypoint) -> Waypoint {
+        let difference = self.difference.iter().flatten().zip(&stage.transforms);
+        for (p, (offset, transform)) in stage.draped.iter_mut().flatten().zip(difference) {
+            *p = add_scaled(*p, share, out_of_frame(transform, *offset));
+        }
+        stage
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::RestGarment;
+    use super::*;
+    use crate::mesh::shapes;
+    use crate::query::Surface;
+    use crate::vec3::distance_squared;
+    use std::sync::Arc;
+
+    /// A stage where cloth at rest has been turned about the vertical by `angle`.
+    fn turned(rest: &[[f64; 3]], angle: f64) -> Waypoint {
+        let (s, c) = angle.sin_cos();
+        let turn = |[x, y, z]: [f64; 3]| [c * x + s * z, y, c * z - s * x];
+        Waypoint {
+            body: Arc::new(Surface::from_mesh(&shapes::tetrahedron())),
+            draped: vec![rest.iter().map(|p| turn(*p)).collect()],
+            skinned: Vec::new(),
+            transforms: vec![[[c, 0.0, s, 0.0], [0.0, 1.0, 0.0, 0.0], [-s, 0.0, c, 0.0]]; rest.len()],
+        }
+    }
+
+    #[test]
+    fn what_the_drape_at_the_end_has_more_grows_along_the_way_and_turns_with_the_body() {
+        let mesh = shapes::grid(0.2, 0.1, 5, 4);
+        let garment = RestGarment::new(&mesh);
+        let rest = mesh.positions();
+        // A centimetre along what was x, which has been turned to −z.
+        let end: Vec<[f64; 3]> = turned(rest, 1.5).draped[0]
+            .iter()
+            .map(|p| add_scaled(*p, 0.01, [1.5_f64.cos(), 0.0, -1.5_f64.sin()]))
+            .collect();
+        let layers = [Layer { garment: &garment, positions: &end }];
+        let mut stages = Stages::to(&layers);
+        for share in [0.0, 0.5, 1.0] {
+            let stage = stages.at(share, |share| Ok::<_, ()>(turned(rest, 1.5 * share))).unwrap();
+            let moved: Vec<[f64; 3]> = rest.iter().map(|p| [p[0] + 0.01 * share, p[1], p[2]]).collect();
+            for (p, q) in stage.draped[0].iter().zip(&turned(&moved, 1.5 * share).draped[0]) {
+                assert!(distance_squared(*p, *q) < 1e-24, "at {share}: {p:?} {q:?}");
+            }
+        }
+        let last = stages.at(1.0, |_| Err("is known")).unwrap();
+        assert_eq!(last.draped[0], end, "to the last bit");
+    }
+
+    #[test]
+    fn a_stage_is_made_once_while_it_is_among_the_last() {
+        let mut stages = Stages::to(&[]);
+        let mut made = Vec::new();
+        let mut ask = |share: f64| {
+            let stage = stages.at(share, |share| {
+                made.push(share);
+                Ok::<_, ()>(turned(&[[1.0; 3]], share))
+            });
+            assert_eq!(stage.unwrap().draped.len(), usize::from(share != 1.0));
+        };
+        let early = |i: usize| i as f64 / MOST as f64;
+        (0..MOST - 1).for_each(|i| ask(early(i)));
+        // The end was made first of all; what is asked for again stays.
+        [1.0, early(0), 0.999, early(0), early(1)].into_iter().for_each(&mut ask);
+        let expected: Vec<f64> =
+            [1.0].into_iter().chain((0..MOST - 1).map(early)).chain([0.999, early(1)]).collect();
+        assert_eq!(made, expected);
+        assert_eq!(stages.kept.len(), MOST);
+    }
+
+    #[test]
+    fn what_cannot_be_made_is_not_kept() {
+        let mut stages = Stages::to(&[]);
+        assert_eq!(stages.at(0.5, |_| Err("no")).err(), Some("no"));
+        assert!(stages.kept.is_empty() && stages.difference.is_none());
+    }
+}
