@@ -1,7 +1,7 @@
 //! `clothcombo resolve`: anyone's garments taken out of anyone's body, and out of each other.
 
 use crate::cli::interrupted::remove_on_signals;
-use crate::cli::values::gap_mm;
+use crate::cli::values::{gap_mm, seconds};
 use crate::draper::UniqueNames;
 use crate::draper::output::Staged;
 use crate::score::{DrapedGarment, Score, ScoreDistance, ScoreError, load_body, load_garment, score};
@@ -18,6 +18,7 @@ use serde::Serialize;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 /// Takes draped garments out of the body and out of each other, in their order, and proves what it reached
 #[derive(Parser)]
@@ -46,6 +47,9 @@ pub struct Arguments {
     /// Gap that a garment gets where it has to move [mm]
     #[arg(long = "gap", alias = "gap-mm", default_value_t = 1.0, value_name = "MM", value_parser = gap_mm)]
     gap_mm: f64,
+    /// Time per garment after which the post-process begins nothing new and returns the best it has [s]; default: none
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    time_limit: Option<Duration>,
     /// Leave crossings of a garment with itself alone
     #[arg(long)]
     keep_self: bool,
@@ -111,6 +115,7 @@ const NEAR: f64 = 0.25;
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let settings = ResolveSettings {
         gap: 1e-3 * arguments.gap_mm,
+        time: arguments.time_limit,
         self_contact: !arguments.keep_self,
         ..ResolveSettings::default()
     };
@@ -140,7 +145,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
             .collect();
         Ok(score(&body, &draped, ScoreDistance::Surface)?)
     };
-    let ms = |time: std::time::Duration| 1e3 * time.as_secs_f64();
+    let ms = |time: Duration| 1e3 * time.as_secs_f64();
     let report = ResolveReport {
         gap_mm: arguments.gap_mm,
         before: scored(&|i| garments[i].draped.positions().to_vec())?,

@@ -138,6 +138,23 @@ fn what_is_written_is_clear_and_has_the_topology_it_came_with() {
 }
 
 #[test]
+fn without_time_what_is_there_is_returned_and_listed() {
+    let case = Case::new();
+    let output =
+        case.command(&["tee.obj", "coat.obj"], &["--time-limit", "1e-9", "--json"]).assert().success();
+    let report: Value = serde_json::from_slice(&output.get_output().stdout).unwrap();
+    let pairs = |of: &str| report[of]["body_triangle_pairs"].as_u64().unwrap();
+    assert!(pairs("certificate") > 0 && pairs("certificate") <= pairs("certificate_before"), "{report}");
+    assert!(case.path("resolved/coat.obj").exists());
+    for wrong in ["0", "-1", "nan", "1e300", "soon"] {
+        let flag = format!("--time-limit={wrong}");
+        let output = case.command(&["tee.obj"], &[&flag]).output().unwrap();
+        assert!(output.status.code() == Some(2), "{output:?}");
+        assert!(String::from_utf8_lossy(&output.stderr).contains("--time-limit"), "{output:?}");
+    }
+}
+
+#[test]
 fn strain_is_measured_against_the_rest_meshes() {
     let case = Case::new();
     case.write("rest/tee.obj", &quad_tube(0.14, 40, 12));

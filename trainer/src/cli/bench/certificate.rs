@@ -2,7 +2,7 @@
 
 use crate::checkpoint::TrainedModel;
 use crate::cli::train::load_under_bar;
-use crate::cli::values::{at_least_one, gap_mm};
+use crate::cli::values::{at_least_one, gap_mm, seconds};
 use crate::cli::verbosity::progress_bar;
 use crate::config::{Config, load};
 use crate::device::Backend;
@@ -17,6 +17,7 @@ use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Duration;
 
 /// The post-process on random outfits: exact pairs before and after, strain added, time
 ///
@@ -55,6 +56,9 @@ pub struct Arguments {
     /// Smallest gap between a moved garment and what is under it [mm]
     #[arg(long = "gap", alias = "gap-mm", default_value_t = 1.0, value_name = "MM", value_parser = gap_mm)]
     gap_mm: f64,
+    /// Time per garment after which the post-process begins nothing new and returns the best it has [s]; default: none
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    time_limit: Option<Duration>,
     /// Writes body and garments (rest, draped, resolved) of every draw as OBJ under this folder
     #[arg(long, value_name = "DIR")]
     meshes: Option<PathBuf>,
@@ -68,7 +72,8 @@ pub struct Arguments {
 /// # Errors
 /// When the configuration, its data or the checkpoint cannot be read. Crossings that stay are a result, not an error.
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
-    let settings = ResolveSettings { gap: 1e-3 * arguments.gap_mm, ..ResolveSettings::default() };
+    let (gap, time) = (1e-3 * arguments.gap_mm, arguments.time_limit);
+    let settings = ResolveSettings { gap, time, ..ResolveSettings::default() };
     settings.check().into_diagnostic()?;
     let checkpoint = arguments.checkpoint.as_deref().map(TrainedModel::open).transpose()?;
     let file = match (&arguments.config, &checkpoint) {
@@ -86,6 +91,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     if arguments.json {
         let summary = json!({
             "gap_mm": arguments.gap_mm,
+            "time_limit_s": arguments.time_limit.map(|t| t.as_secs_f64()),
             "drape": if checkpoint.is_some() { "network" } else { "skinning" },
             "all": summary(&results, |_| true),
             "wearable": summary(&results, |r| r.is_wearable),
