@@ -9,6 +9,7 @@ pub mod fit;
 pub mod generate;
 pub mod import;
 mod interrupted;
+mod post_process;
 pub mod prepare;
 pub mod replay;
 pub mod resolve;

@@ -1,7 +1,7 @@
 //! `clothcombo resolve`: anyone's garments taken out of anyone's body, and out of each other.
 
 use crate::cli::interrupted::remove_on_signals;
-use crate::cli::values::{gap_mm, seconds};
+use crate::cli::post_process::PostProcessArguments;
 use crate::draper::UniqueNames;
 use crate::draper::output::Staged;
 use crate::score::{DrapedGarment, Score, ScoreDistance, ScoreError, load_body, load_garment, score};
@@ -44,12 +44,8 @@ pub struct Arguments {
     /// Replaces the folder of an earlier run
     #[arg(long)]
     replace: bool,
-    /// Gap that a garment gets where it has to move [mm]
-    #[arg(long = "gap", alias = "gap-mm", default_value_t = 1.0, value_name = "MM", value_parser = gap_mm)]
-    gap_mm: f64,
-    /// Time per garment after which the post-process begins nothing new and returns the best it has [s]; default: none
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
-    time_limit: Option<Duration>,
+    #[command(flatten)]
+    post_process: PostProcessArguments,
     /// Leave crossings of a garment with itself alone
     #[arg(long)]
     keep_self: bool,
@@ -113,12 +109,8 @@ const NEAR: f64 = 0.25;
 /// # Errors
 /// When a file cannot be read or written, or meshes do not fit together. Crossings that stay are a result, not an error.
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
-    let settings = ResolveSettings {
-        gap: 1e-3 * arguments.gap_mm,
-        time: arguments.time_limit,
-        self_contact: !arguments.keep_self,
-        ..ResolveSettings::default()
-    };
+    let settings =
+        ResolveSettings { self_contact: !arguments.keep_self, ..arguments.post_process.settings() };
     settings.check().into_diagnostic()?;
     let inputs: Vec<PathBuf> =
         [&arguments.body].into_iter().chain(&arguments.garments).chain(&arguments.rest).cloned().collect();
@@ -147,7 +139,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     };
     let ms = |time: Duration| 1e3 * time.as_secs_f64();
     let report = ResolveReport {
-        gap_mm: arguments.gap_mm,
+        gap_mm: arguments.post_process.gap_mm,
         before: scored(&|i| garments[i].draped.positions().to_vec())?,
         after: scored(&|i| resolved.positions[i].clone())?,
         certificate_before,

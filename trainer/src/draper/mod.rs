@@ -137,7 +137,7 @@ impl BodyState {
 pub struct Draper {
     trained: TrainedModel,
     model: ClothCombo,
-    /// The same without corrections, for poses on the way from the T-pose: these change less from pose to pose.
+    /// The same without corrections, for poses on the way from the T-pose: that leaves fewer crossings (docs/resolve.md).
     uncorrected: ClothCombo,
     recipe: Recipe,
     joints: ActiveJoints,
@@ -310,14 +310,14 @@ impl Draper {
                 return Ok(done);
             }
         }
-        let from_t_pose = |share: f64| match share {
-            // The surface is known here only; what is to be resolved was corrected and refined, which is added along the way.
-            1.0 => {
-                let uncorrected =
-                    self.stage(&self.uncorrected, outfit, body, body.pose.clone(), body.place)?;
-                Ok(Waypoint { draped: uncorrected.draped, ..at_the_end() })
-            }
-            _ => self.stage(&self.uncorrected, outfit, body, body.pose.on_the_way(share), body.place),
+        let from_t_pose = |share: f64| {
+            let pose = body.pose.on_the_way(share);
+            let stage = self.stage(&self.uncorrected, outfit, body, pose, body.place)?;
+            Ok::<_, DraperError>(match share {
+                // The surface is known here only.
+                1.0 => Waypoint { draped: stage.draped, ..at_the_end() },
+                _ => stage,
+            })
         };
         let anew = resolve_along(surface, &layers, &at_the_end().skinned, settings, from_t_pose)?;
         // What carries on does not pop.

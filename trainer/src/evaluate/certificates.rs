@@ -36,7 +36,7 @@ pub struct Dressing<'a> {
     library: &'a Library,
     losses: &'a LossesConfig,
     networks: Option<&'a Networks<'a>>,
-    /// What drapes poses on the way from the T-pose: corrections change more from pose to pose.
+    /// What drapes poses on the way from the T-pose: without corrections, which leaves fewer crossings (docs/resolve.md).
     uncorrected: Option<Networks<'a>>,
     known: RefCell<HashMap<usize, Arc<RestGarment>>>,
 }

@@ -3,8 +3,7 @@
 //! A step that is halved comes by the same places again, and so does a second way.
 //!
 //! The drape at the end may be more than what is known of the stages: networks may have corrected it, a solver may have refined
-//! it. What it differs by from the stage at 1 is faded in along the way, in the frames of the skinning transforms. So every stage
-//! may be draped by what changes least from pose to pose, which is what cloth follows best.
+//! it. What it differs by from the stage at 1 is faded in along the way, in the frames of the skinning transforms.
 
 use super::Layer;
 use super::follow::Waypoint;

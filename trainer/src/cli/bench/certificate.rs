@@ -1,8 +1,9 @@
 //! `clothcombo bench certificate`: the post-process on random outfits.
 
 use crate::checkpoint::TrainedModel;
+use crate::cli::post_process::PostProcessArguments;
 use crate::cli::train::load_under_bar;
-use crate::cli::values::{at_least_one, gap_mm, seconds};
+use crate::cli::values::at_least_one;
 use crate::cli::verbosity::progress_bar;
 use crate::config::{Config, load};
 use crate::device::Backend;
@@ -17,7 +18,6 @@ use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Duration;
 
 /// The post-process on random outfits: exact pairs before and after, strain added, time
 ///
@@ -53,12 +53,8 @@ pub struct Arguments {
     /// Seed of the draws; default: that of the configuration
     #[arg(long)]
     seed: Option<u64>,
-    /// Smallest gap between a moved garment and what is under it [mm]
-    #[arg(long = "gap", alias = "gap-mm", default_value_t = 1.0, value_name = "MM", value_parser = gap_mm)]
-    gap_mm: f64,
-    /// Time per garment after which the post-process begins nothing new and returns the best it has [s]; default: none
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
-    time_limit: Option<Duration>,
+    #[command(flatten)]
+    post_process: PostProcessArguments,
     /// Writes body and garments (rest, draped, resolved) of every draw as OBJ under this folder
     #[arg(long, value_name = "DIR")]
     meshes: Option<PathBuf>,
@@ -72,8 +68,7 @@ pub struct Arguments {
 /// # Errors
 /// When the configuration, its data or the checkpoint cannot be read. Crossings that stay are a result, not an error.
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
-    let (gap, time) = (1e-3 * arguments.gap_mm, arguments.time_limit);
-    let settings = ResolveSettings { gap, time, ..ResolveSettings::default() };
+    let settings = arguments.post_process.settings();
     settings.check().into_diagnostic()?;
     let checkpoint = arguments.checkpoint.as_deref().map(TrainedModel::open).transpose()?;
     let file = match (&arguments.config, &checkpoint) {
@@ -90,8 +85,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let results = measure(arguments, &config, &library, checkpoint.as_ref(), &settings)?;
     if arguments.json {
         let summary = json!({
-            "gap_mm": arguments.gap_mm,
-            "time_limit_s": arguments.time_limit.map(|t| t.as_secs_f64()),
+            "gap_mm": arguments.post_process.gap_mm,
+            "time_limit_s": arguments.post_process.time_limit.map(|t| t.as_secs_f64()),
             "drape": if checkpoint.is_some() { "network" } else { "skinning" },
             "all": summary(&results, |_| true),
             "wearable": summary(&results, |r| r.is_wearable),

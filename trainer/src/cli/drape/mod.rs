@@ -5,7 +5,7 @@ mod outfits;
 mod summary;
 
 use crate::cli::interrupted::remove_on_signals;
-use crate::cli::values::{gap_mm, seconds};
+use crate::cli::post_process::PostProcessArguments;
 use crate::cli::verbosity::{progress_bar, say};
 use crate::device::Backend;
 use crate::draper::output::{Show, Staged, write};
@@ -14,13 +14,12 @@ use clap::{Parser, ValueEnum};
 use clothcombo_data::asset::{Garment, unwearable};
 use clothcombo_data::check::impossible_turn;
 use clothcombo_data::format::atomic;
-use clothcombo_physics::contact::resolve::ResolveSettings;
 use indicatif::ProgressBar;
 use job::{Job, Scenes, ordered};
 use miette::{IntoDiagnostic, Report as Failure, WrapErr, miette};
 use serde_json::json;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Drapes garments on a body, innermost first: OBJ, GLB, picture, viewer and a report with a certificate
 #[derive(Parser)]
@@ -65,12 +64,8 @@ pub struct Arguments {
     /// Leaves out the post-process; the certificate still counts everything
     #[arg(long)]
     no_resolve: bool,
-    /// Gap the post-process makes [mm]
-    #[arg(long, alias = "gap-mm", default_value_t = 1.0, value_name = "MM", value_parser = gap_mm)]
-    gap: f64,
-    /// Time per garment after which the post-process begins nothing new and returns the best it has [s]; default: none
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
-    time_limit: Option<Duration>,
+    #[command(flatten)]
+    post_process: PostProcessArguments,
     /// Smooths a motion over this many frames to each side; never makes an intersection
     #[arg(long, num_args = 0..=1, default_value_t = 0, default_missing_value = "2", value_name = "FRAMES",
           value_parser = clap::value_parser!(u16).range(..=100))]
@@ -206,8 +201,6 @@ fn jobs(arguments: &Arguments) -> Result<Vec<Job>, Failure> {
 }
 
 fn settings(arguments: &Arguments) -> Result<DraperSettings, Failure> {
-    let (gap, time) = (1e-3 * arguments.gap, arguments.time_limit);
-    let post_process = ResolveSettings { gap, time, ..ResolveSettings::default() };
     let cache = match arguments.no_cache {
         true => None,
         false => arguments.cache.clone().or_else(user_cache),
@@ -218,7 +211,7 @@ fn settings(arguments: &Arguments) -> Result<DraperSettings, Failure> {
         backend: arguments.device,
         refine: arguments.refine,
         resolve: !arguments.no_resolve,
-        post_process,
+        post_process: arguments.post_process.settings(),
         ..DraperSettings::default()
     })
 }

@@ -1,0 +1,24 @@
+//! Flags of every verb that takes garments out of the body and of each other.
+
+use super::values::{gap_mm, seconds};
+use clap::Args;
+use clothcombo_physics::contact::resolve::ResolveSettings;
+use std::time::Duration;
+
+/// What the post-process is to do.
+#[derive(Args)]
+pub struct PostProcessArguments {
+    /// Gap that a garment gets where the post-process has to move it [mm]
+    #[arg(long = "gap", alias = "gap-mm", default_value_t = 1.0, value_name = "MM", value_parser = gap_mm)]
+    pub gap_mm: f64,
+    /// Time per garment after which the post-process begins nothing new and returns the best it has [s]; default: none
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    pub time_limit: Option<Duration>,
+}
+
+impl PostProcessArguments {
+    /// The settings that say so.
+    pub fn settings(&self) -> ResolveSettings {
+        ResolveSettings { gap: 1e-3 * self.gap_mm, time: self.time_limit, ..ResolveSettings::default() }
+    }
+}
