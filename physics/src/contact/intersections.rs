@@ -113,13 +113,14 @@ impl<'a> TriangleTree<'a> {
         })
     }
 
-    /// Pairs (face of another mesh, face of this one) that share a point, for some `faces` of the other mesh with `positions`
-    /// and `all_faces`; in ascending order.
+    /// Pairs (face of another mesh, face of this one that is `asked` for) that share a point, for some `faces` of the other mesh
+    /// with `positions` and `all_faces`; in ascending order.
     pub(super) fn pairs_of_faces(
         &self,
         positions: &[[f64; 3]],
         all_faces: &[[u32; 3]],
         faces: &[u32],
+        asked: impl Fn(u32) -> bool + Copy + Sync,
     ) -> Vec<(u32, u32)> {
         if self.bvh.is_empty() {
             return Vec::new();
@@ -128,10 +129,11 @@ impl<'a> TriangleTree<'a> {
             .par_iter()
             .with_min_len(256)
             .flat_map_iter(|&f| {
-                let bounds = triangle_box(positions, all_faces[f as usize]);
+                let face = all_faces[f as usize];
+                let bounds = triangle_box(positions, face);
                 bounds
                     .into_iter()
-                    .flat_map(move |bounds| self.faces_meeting(positions, all_faces[f as usize], bounds, f))
+                    .flat_map(move |bounds| self.faces_meeting(positions, (face, bounds, f), asked))
             })
             .collect();
         pairs.sort_unstable();
@@ -154,24 +156,30 @@ impl<'a> TriangleTree<'a> {
         if self.bvh.is_empty() {
             return Vec::new();
         }
+        let mut takes_part = vec![false; self.faces.len()];
+        faces.iter().for_each(|&f| takes_part[f as usize] = true);
+        let takes_part = &takes_part;
+        // Two of them meet once, seen from the smaller one.
+        let is_asked = move |f: u32, g: u32| f < g || f > g && !takes_part[g as usize];
         let mut pairs: Vec<(u32, u32)> = faces
             .par_iter()
             .with_min_len(256)
-            .flat_map_iter(|&f| self.faces_meeting_own(f).map(move |g| (f.min(g), f.max(g))))
+            .flat_map_iter(|&f| {
+                self.faces_meeting_own(f, move |g| is_asked(f, g)).map(move |g| (f.min(g), f.max(g)))
+            })
             .collect();
         pairs.sort_unstable();
-        pairs.dedup();
         pairs
     }
 
-    /// Faces of this mesh that intersect its face `f`.
-    fn faces_meeting_own(&self, f: u32) -> impl Iterator<Item = u32> {
+    /// Faces of this mesh, of those `asked` for, that intersect its face `f`.
+    fn faces_meeting_own(&self, f: u32, asked: impl Fn(u32) -> bool) -> impl Iterator<Item = u32> {
         let probe = triangle_box(self.positions, self.face(f)).map(|bounds| BvhNode::leaf(bounds, f));
         let leaves =
             probe.into_iter().flat_map(move |probe| self.bvh.leaves(move |node| node.intersects(&probe)));
         leaves
             .map(move |leaf| self.kept[leaf as usize])
-            .filter(move |&g| f != g && mesh_triangles_intersect(self.positions, self.face(f), self.face(g)))
+            .filter(move |&g| asked(g) && mesh_triangles_intersect(self.positions, self.face(f), self.face(g)))
     }
 
     /// Faces whose box meets the box from `low` to `high`, in no particular order.
@@ -208,19 +216,20 @@ impl<'a> TriangleTree<'a> {
             .collect()
     }
 
-    /// Pairs of one face of another mesh, with its box and index there, and the faces of this mesh that share a point with it.
+    /// Pairs of one face of another mesh, with its box and index there, and the faces of this mesh, of those `asked` for, that
+    /// share a point with it.
     fn faces_meeting(
         &self,
         positions: &[[f64; 3]],
-        face: [u32; 3],
-        bounds: Aabb,
-        index: u32,
+        (face, bounds, index): ([u32; 3], Aabb, u32),
+        asked: impl Fn(u32) -> bool,
     ) -> impl Iterator<Item = (u32, u32)> {
         let triangle = corners(positions, face);
         let probe = BvhNode::leaf(bounds, index);
         self.bvh.leaves(move |node| node.intersects(&probe)).filter_map(move |leaf| {
             let other = self.kept[leaf as usize];
-            let meet = triangle.zip(self.triangle(other)).is_some_and(|(a, b)| triangles_intersect(&a, &b));
+            let meet = asked(other)
+                && triangle.zip(self.triangle(other)).is_some_and(|(a, b)| triangles_intersect(&a, &b));
             meet.then_some((index, other))
         })
     }
@@ -255,7 +264,7 @@ pub fn triangle_pairs(
     let mut pairs: Vec<(u32, u32)> = boxes
         .par_iter()
         .with_min_len(256)
-        .flat_map_iter(|&(face, bounds)| b.faces_meeting(a_positions, a_faces[face as usize], bounds, face))
+        .flat_map_iter(|&(face, bounds)| b.faces_meeting(a_positions, (a_faces[face as usize], bounds, face), |_| true))
         .collect();
     pairs.sort_unstable();
     pairs

@@ -1,5 +1,7 @@
 //! Exact crossings of an outfit, kept up to date as vertices move.
 
+use std::collections::HashMap;
+
 use super::obstacle::BodyObstacle;
 use super::outfit::Outfit;
 use crate::contact::TriangleTree;
@@ -49,7 +51,9 @@ impl Crossings {
         let moved: Vec<Vec<u32>> = (0..outfit.len()).map(dirty).collect();
         let is_clean = |f: u32| !is_dirty[f as usize];
         let corners = |f: u32| outfit.faces[f as usize].map(|v| positions[v as usize]);
-        let is_pinch = |f: u32| !with_pinched && body.is_pinch_at(&corners(f));
+        let mut known = HashMap::new();
+        let mut is_pinch =
+            |f: u32| !with_pinched && *known.entry(f).or_insert_with(|| body.is_pinch_at(&corners(f)));
 
         self.body.retain(|&(f, _)| is_clean(f));
         // No face reaches farther from a corner than its longest edge.
@@ -60,7 +64,7 @@ impl Crossings {
             outfit.faces[*f as usize].iter().all(|&v| far[v as usize] <= longest * (1.0 + 1e-9))
         };
         let near: Vec<u32> = moved.iter().flatten().copied().filter(may_touch).collect();
-        let found = body.tree.pairs_of_faces(positions, &outfit.faces, &near);
+        let found = body.tree.pairs_of_faces(positions, &outfit.faces, &near, |_| true);
         self.body.extend(found.into_iter().filter(|&(_, b)| !body.is_pinched(b)));
         self.body.sort_unstable();
 
@@ -70,15 +74,19 @@ impl Crossings {
             let first_inner = outfit.faces_of_garment(inner).start;
             for outer in inner + 1..outfit.len() {
                 let first_outer = outfit.faces_of_garment(outer).start;
-                let over = trees[inner].pairs_of_faces(positions, &outfit.faces, &moved[outer]);
+                let over =
+                    trees[inner].pairs_of_faces(positions, &outfit.faces, &moved[outer], |_| true);
                 self.layers.extend(over.into_iter().map(|(f, g)| (f, g + first_inner)));
-                let under = trees[outer].pairs_of_faces(positions, &outfit.faces, &moved[inner]);
+                if moved[outer].len() == outfit.faces_of_garment(outer).len() {
+                    continue;
+                }
+                // Those that moved were asked already.
+                let others = |f: u32| is_clean(f + first_outer);
+                let under = trees[outer].pairs_of_faces(positions, &outfit.faces, &moved[inner], others);
                 self.layers.extend(under.into_iter().map(|(g, f)| (f + first_outer, g)));
             }
         }
         let mut found = self.layers.split_off(before);
-        found.sort_unstable();
-        found.dedup();
         found.retain(|&(f, g)| !(is_pinch(f) && is_pinch(g)));
         self.layers.extend(found);
         self.layers.sort_unstable();
