@@ -177,9 +177,9 @@ impl<'a> TriangleTree<'a> {
         let probe = triangle_box(self.positions, self.face(f)).map(|bounds| BvhNode::leaf(bounds, f));
         let leaves =
             probe.into_iter().flat_map(move |probe| self.bvh.leaves(move |node| node.intersects(&probe)));
-        leaves
-            .map(move |leaf| self.kept[leaf as usize])
-            .filter(move |&g| asked(g) && mesh_triangles_intersect(self.positions, self.face(f), self.face(g)))
+        leaves.map(move |leaf| self.kept[leaf as usize]).filter(move |&g| {
+            asked(g) && mesh_triangles_intersect(self.positions, self.face(f), self.face(g))
+        })
     }
 
     /// Faces whose box meets the box from `low` to `high`, in no particular order.
@@ -264,7 +264,9 @@ pub fn triangle_pairs(
     let mut pairs: Vec<(u32, u32)> = boxes
         .par_iter()
         .with_min_len(256)
-        .flat_map_iter(|&(face, bounds)| b.faces_meeting(a_positions, (a_faces[face as usize], bounds, face), |_| true))
+        .flat_map_iter(|&(face, bounds)| {
+            b.faces_meeting(a_positions, (a_faces[face as usize], bounds, face), |_| true)
+        })
         .collect();
     pairs.sort_unstable();
     pairs

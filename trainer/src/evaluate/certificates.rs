@@ -14,9 +14,8 @@ use clothcombo_physics::query::Surface;
 use clothcombo_physics::transform::apply;
 use miette::Diagnostic;
 use serde::Serialize;
-use std::cell::RefCell;
 use std::collections::HashMap;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use thiserror::Error;
 
 /// Why a drape cannot be post-processed.
@@ -38,19 +37,19 @@ pub struct Dressing<'a> {
     networks: Option<&'a Networks<'a>>,
     /// What drapes poses on the way from the T-pose: without corrections, which leaves fewer crossings (docs/resolve.md).
     uncorrected: Option<Networks<'a>>,
-    known: RefCell<HashMap<usize, Arc<RestGarment>>>,
+    known: Mutex<HashMap<usize, Arc<RestGarment>>>,
 }
 
 impl<'a> Dressing<'a> {
     /// For scenes of `library`, draped by `networks`; without them by skinning.
     pub fn new(library: &'a Library, losses: &'a LossesConfig, networks: Option<&'a Networks<'a>>) -> Self {
         let uncorrected = networks.map(Networks::uncorrected);
-        Self { library, losses, networks, uncorrected, known: RefCell::default() }
+        Self { library, losses, networks, uncorrected, known: Mutex::default() }
     }
 
     /// A drape of `scene` from the packed positions of all garments on its first body.
     pub fn of<'s>(&'s self, scene: &'s PreparedScene, packed: &[[f32; 3]]) -> DrapedScene<'s> {
-        let mut known = self.known.borrow_mut();
+        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
         let worn = scene.draw.garments.iter().zip(&scene.worn);
         let rest = worn.map(|(&g, worn)| {
             known.entry(g).or_insert_with(|| Arc::new(RestGarment::new(&worn.garment.rest))).clone()

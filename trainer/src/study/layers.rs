@@ -5,6 +5,7 @@ use super::subject::Subject;
 use super::table::{Table, number, percent};
 use crate::evaluate::Draped;
 use crate::evaluate::certificates::{Counts, Dressing, OutfitResult};
+use crate::one_core::each_on_one_core;
 use crate::scene::{PreparedScene, Unseen};
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use clothcombo_physics::energy::Term;
@@ -51,7 +52,7 @@ pub struct Outfits {
     pub strain_added: f64,
     /// Exact pairs between garments before the post-process.
     pub layer_pairs: Estimate,
-    /// Time of the post-process per garment, means of outfits [ms].
+    /// Time of the post-process per garment, means of outfits, each on one core [ms].
     pub post_ms: Estimate,
 }
 
@@ -83,15 +84,14 @@ pub fn ask(
     let all: Vec<usize> = (0..subject.library.wardrobe.len()).collect();
     let networks = subject.networks();
     let dressing = Dressing::new(&subject.library, &subject.config.losses, Some(&networks));
-    let mut outfits = Vec::with_capacity(scenes);
-    for index in 0..scenes {
+    let measured = |index: usize| -> Result<Measured, Report> {
         let draw = subject.draw([question, index], &all, layers, Unseen::Poses);
         let scene = subject.prepare(draw)?;
         let drapes = [networks.drape_alone(&scene)?, networks.drape(&scene)?];
         let [alone, draped] = drapes.each_ref().map(|drape| dressing.of(&scene, &drape.posed));
         let result =
             (index < resolved).then(|| OutfitResult::new(index, &draped, settings)).transpose()?.map(|r| r.0);
-        outfits.push(Measured {
+        let measured = Measured {
             is_wearable: draped.is_wearable(),
             strain: strains(&scene, &drapes),
             wrong_single: alone.certificate().into_diagnostic()?.order_violations,
@@ -100,9 +100,11 @@ pub fn ask(
                 None => draped.counts().into_diagnostic()?,
             },
             result,
-        });
+        };
         done();
-    }
+        Ok(measured)
+    };
+    let outfits = each_on_one_core((0..scenes).collect(), None, measured)?;
     let wearable: Vec<&Measured> = outfits.iter().filter(|outfit| outfit.is_wearable).collect();
     Ok(LayerCount {
         layers,
@@ -223,7 +225,7 @@ pub fn tables(counts: &[LayerCount]) -> Vec<Table> {
             "post-process per garment [ms], median",
         ],
     )
-    .with_note("Wrong side: share of outer vertices within 5 cm of an inner layer that lie under it, by the closest surface point. Clear: no exact pair with the body or between garments, outside of pinched regions. Wearable: the outfits without legs over cloth that hangs between them, which must cross at the crotch.");
+    .with_note("Wrong side: share of outer vertices within 5 cm of an inner layer that lie under it, by the closest surface point. Clear: no exact pair with the body or between garments, outside of pinched regions. Wearable: the outfits without legs over cloth that hangs between them, which must cross at the crotch. Time: of outfits beside each other, each on one core.");
     for (name, c) in counts.iter().flat_map(LayerCount::rows) {
         let then = |cell: String| if c.resolved == 0 { "–".to_owned() } else { cell };
         order.rows.push(vec![

@@ -74,8 +74,7 @@ impl Crossings {
             let first_inner = outfit.faces_of_garment(inner).start;
             for outer in inner + 1..outfit.len() {
                 let first_outer = outfit.faces_of_garment(outer).start;
-                let over =
-                    trees[inner].pairs_of_faces(positions, &outfit.faces, &moved[outer], |_| true);
+                let over = trees[inner].pairs_of_faces(positions, &outfit.faces, &moved[outer], |_| true);
                 self.layers.extend(over.into_iter().map(|(f, g)| (f, g + first_inner)));
                 if moved[outer].len() == outfit.faces_of_garment(outer).len() {
                     continue;
@@ -104,5 +103,92 @@ impl Crossings {
         }
         self.is_dirty = is_dirty;
         self.is_dirty.fill(false);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::resolve::{Layer, RestGarment};
+    use crate::contact::{Triangle, triangles_intersect};
+    use crate::mesh::shapes::{self, SplitMix};
+    use crate::query::Surface;
+    use crate::vec3::add;
+
+    /// All pairs of faces, by looking at each.
+    fn all_pairs<'a>(
+        outfit: &'a Outfit<'_>,
+        positions: &'a [[f64; 3]],
+        body: &'a Surface<f64>,
+    ) -> [Vec<(u32, u32)>; 2] {
+        let triangle = |face: [u32; 3], of: &[[f64; 3]]| -> Triangle { face.map(|v| of[v as usize]) };
+        let faces = || (0u32..).zip(&outfit.faces).map(|(f, face)| (f, triangle(*face, positions)));
+        let of_body = || (0u32..).zip(body.faces.iter()).map(|(f, face)| (f, triangle(*face, &body.positions)));
+        let with_body = faces().flat_map(|(f, a)| {
+            of_body().filter(move |(_, b)| triangles_intersect(&a, b)).map(move |(b, _)| (f, b))
+        });
+        let is_outer = |f: u32, g: u32| outfit.garment_of_face(f) > outfit.garment_of_face(g);
+        let between = faces().flat_map(|(f, a)| {
+            faces()
+                .filter(move |(g, b)| is_outer(f, *g) && triangles_intersect(&a, b))
+                .map(move |(g, _)| (f, g))
+        });
+        [with_body.collect(), between.collect()]
+    }
+
+    /// Few or all of the vertices move each time: what is kept and what is found anew is what there is.
+    #[test]
+    fn crossings_kept_up_to_date_are_all_crossings() {
+        let mut random = SplitMix::new(7);
+        let ball = Surface::from_mesh(&shapes::icosphere(0.1, 2));
+        let meshes = [9, 10, 11].map(|n| shapes::irregular_grid(0.1, 0.1, n, n, 0.2, n as u64));
+        let garments = meshes.each_ref().map(RestGarment::new);
+        let on_top = |mesh: &crate::mesh::TriMesh| -> Vec<[f64; 3]> {
+            mesh.positions().iter().map(|[x, y, _]| [x - 0.05, 0.099, y - 0.05]).collect()
+        };
+        let places = meshes.each_ref().map(on_top);
+        let layers: Vec<Layer<'_>> =
+            garments.iter().zip(&places).map(|(garment, positions)| Layer { garment, positions }).collect();
+        let outfit = Outfit::new(&layers);
+        let near = vec![true; ball.positions.len()];
+        let body = BodyObstacle::new(&ball, &near);
+        let mut positions = places.concat();
+        let mut kept = Crossings::new(outfit.faces.len());
+        let mut counts = [0; 3];
+        for round in 0..12 {
+            // All, one in ten, and all of a garment but none of the others.
+            let moves = |v: u32, chance: f64| match round % 3 {
+                0 => true,
+                1 => chance < 0.1,
+                _ => outfit.garment_of(v) == round / 3 % 3,
+            };
+            for v in 0..outfit.vertex_count() as u32 {
+                if moves(v, 0.5 + 0.5 * random.symmetric()) {
+                    let by = std::array::from_fn(|_| 0.006 * random.symmetric());
+                    positions[v as usize] = add(positions[v as usize], by);
+                    outfit.faces_at(v).for_each(|f| kept.is_dirty[f as usize] = true);
+                }
+            }
+            let trees: Vec<TriangleTree<'_>> = (0..outfit.len())
+                .map(|g| TriangleTree::new(outfit.part(&positions, g), &layers[g].garment.faces))
+                .collect();
+            let far: Vec<f64> = positions.iter().map(|p| body.look(*p).unwrap().far).collect();
+            kept.update(&outfit, &body, &trees, &positions, &far, (true, true));
+            let [with_body, between] = all_pairs(&outfit, &positions, &ball);
+            assert_eq!(kept.body, with_body, "round {round}");
+            assert_eq!(kept.layers, between, "round {round}");
+            let own: Vec<(u32, u32)> = trees
+                .iter()
+                .enumerate()
+                .flat_map(|(g, tree)| {
+                    let first = outfit.faces_of_garment(g).start;
+                    tree.self_pairs().into_iter().map(move |(a, b)| (a + first, b + first))
+                })
+                .collect();
+            assert_eq!(kept.own, own, "round {round}");
+            let found = [with_body.len(), between.len(), own.len()];
+            counts = std::array::from_fn(|k| counts[k] + found[k]);
+        }
+        assert!(counts.iter().all(|count| *count > 100), "{counts:?}");
     }
 }

@@ -22,6 +22,8 @@ use crate::vec3::distance_squared;
 const ENOUGH: f64 = 0.03;
 /// Most times that cloth is eased…
 pub(super) const TIMES: usize = 20;
+/// …those of an outfit that is left with crossings…
+const TIMES_WHERE_CROSSED: usize = 4;
 /// …and those in a frame of a motion: what is left is for the next one.
 pub(super) const TIMES_IN_FRAME: usize = 2;
 /// Failures in a row after which it is left.
@@ -60,6 +62,7 @@ impl Resolved {
             return;
         }
         let settings = ResolveSettings { is_shallow: true, loosened: 1.0, rounds: ROUNDS, ..*settings };
+        let times = if self.certificate.is_clear() { times } else { times.min(TIMES_WHERE_CROSSED) };
         let own = self.certificate.self_triangle_pairs.max(own_crossings(layers) / OWN);
         let mut cloth = Cloth::new(layers, &self.positions);
         let mut failures = 0;

@@ -37,6 +37,8 @@ pub struct ResolveSettings {
     /// Whether nothing lies deeper than half a limb, so that the nearest way out is the right one: true for a small step.
     /// Default no.
     pub is_shallow: bool,
+    /// Whether a few rounds without progress are borne with: false where a shorter step is tried next. Default yes.
+    pub is_patient: bool,
     /// Whether crossings of a garment with itself are mended where possible; otherwise nothing is laid out either. Default
     /// yes.
     pub self_contact: bool,
@@ -60,6 +62,7 @@ impl Default for ResolveSettings {
             loosened: 6.0,
             steps: 128,
             is_shallow: false,
+            is_patient: true,
             self_contact: true,
             time: None,
         }

@@ -187,7 +187,8 @@ impl Way<'_, '_> {
     ) -> Result<Arrived, ResolveError> {
         // What may be halved is not worth a second attempt.
         let loosened = if is_shortest { self.settings.loosened } else { 1.0 };
-        let settings = ResolveSettings { is_shallow: !is_last, loosened, ..*self.settings };
+        let settings =
+            ResolveSettings { is_shallow: !is_last, is_patient: is_shortest, loosened, ..*self.settings };
         let fading = KEPT.powf((step / FADING).min(1.0));
         let kept: &[f64] = if is_shortest { &[fading, 1.0] } else { &[fading] };
         let starts: Vec<_> = kept.iter().map(|kept| carried(&place.reached, stage, *kept)).collect();

@@ -22,6 +22,8 @@ const WATCH: f64 = 0.01;
 const PATIENCE: usize = 8;
 /// The same where cloth keeps its sides: that ends soon or never.
 const PATIENCE_WITH_SIDES: usize = 4;
+/// The same in a step that may be halved: a shorter one costs less than a long wait.
+const PATIENCE_IN_LONG_STEP: usize = 3;
 /// Rounds in which vertices that are merely closer than asked for still count.
 const ROUNDS_FOR_GAPS: usize = 3;
 
@@ -140,7 +142,11 @@ impl<'a> Untangling<'a> {
     /// Rounds within the limits as they are. The crossings are those of the positions afterwards.
     fn attempt(&mut self, start: Instant) -> usize {
         let mut best = Best::default();
-        let patience = if self.sides.is_some() { PATIENCE_WITH_SIDES } else { PATIENCE };
+        let patience = match (self.sides, self.settings.is_patient) {
+            (Some(_), _) => PATIENCE_WITH_SIDES,
+            (None, true) => PATIENCE,
+            (None, false) => PATIENCE_IN_LONG_STEP,
+        };
         for round in 0..=self.settings.rounds {
             let is_violated = self.planes.iter().flatten().any(|p| self.is_violated(p, round))
                 || self.over.iter().any(|o| o.height < self.least(round));
