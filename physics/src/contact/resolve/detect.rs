@@ -123,7 +123,8 @@ mod tests {
     ) -> [Vec<(u32, u32)>; 2] {
         let triangle = |face: [u32; 3], of: &[[f64; 3]]| -> Triangle { face.map(|v| of[v as usize]) };
         let faces = || (0u32..).zip(&outfit.faces).map(|(f, face)| (f, triangle(*face, positions)));
-        let of_body = || (0u32..).zip(body.faces.iter()).map(|(f, face)| (f, triangle(*face, &body.positions)));
+        let of_body =
+            || (0u32..).zip(body.faces.iter()).map(|(f, face)| (f, triangle(*face, &body.positions)));
         let with_body = faces().flat_map(|(f, a)| {
             of_body().filter(move |(_, b)| triangles_intersect(&a, b)).map(move |(b, _)| (f, b))
         });
