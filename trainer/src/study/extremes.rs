@@ -22,7 +22,7 @@ pub struct Extreme {
     pub scenes: usize,
     /// Scenes with a position that is not finite.
     pub not_finite: usize,
-    /// Scenes the post-process refused, with the reason of the last.
+    /// Scenes the post-process refused, with the reason of one of them.
     pub refused: usize,
     /// See `refused`.
     pub reason: Option<String>,
@@ -105,12 +105,8 @@ pub fn ask(
     // Those with the most layers, which take longest, come last and are begun first.
     let items = (0..cases.len()).flat_map(|case| (0..scenes).map(move |index| (case, index))).rev();
     let mut outcomes = each_on_one_core(items.collect(), None, measured)?;
-    let mut found: Vec<Extreme> = Vec::with_capacity(cases.len());
-    for case in cases {
-        let of_case = outcomes.split_off(outcomes.len() - scenes);
-        found.push(Extreme::of(case.name, of_case));
-    }
-    Ok(found)
+    let of_case = |case: Case| Extreme::of(case.name, outcomes.split_off(outcomes.len() - scenes));
+    Ok(cases.into_iter().map(of_case).collect())
 }
 
 impl Case {
