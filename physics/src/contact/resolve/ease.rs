@@ -72,7 +72,7 @@ impl Resolved {
                 if is_enough(&self.certificate) || failures == MOST_FAILURES || is_late {
                     break;
                 }
-                let sides = Sides::of(&cloth.outfit, &self.positions.concat());
+                let sides = Sides::of(&cloth.outfit, &self.positions.concat(), None);
                 let eased = cloth.eased(&self.positions);
                 let found = untangled_keeping(Some(&sides), obstacle, &at(layers, &eased), &settings);
                 let clock = Instant::now();

@@ -197,7 +197,7 @@ struct Untangled {
     crossings: usize,
     /// Pairs with the body, where it gives way too.
     with_body: usize,
-    /// Pairs of garments with themselves; where cloth keeps its sides, pinched ones too.
+    /// Pairs of garments with themselves; on a way pinched ones too.
     own: usize,
 }
 

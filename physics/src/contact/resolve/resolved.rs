@@ -83,7 +83,7 @@ impl Resolved {
         let (mut share, mut step, mut with_body) = (1.0, CLOSING_IN.0, usize::MAX);
         while share > 0.0 && step >= CLOSING_IN.1 {
             let next = f64::max(share - step, 0.0);
-            let sides = Sides::of(&outfit, &now.concat());
+            let sides = Sides::of(&outfit, &now.concat(), None);
             let before = at(layers, &now);
             let found = body.with_room(room.with_share(next), |obstacle| {
                 untangled_keeping(Some(&sides), obstacle, &before, settings)

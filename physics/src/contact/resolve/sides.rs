@@ -3,7 +3,8 @@
 //! Deep in a crease of the body many sheets lie over each other, and no direction away from the body says which belongs where:
 //! the nearest body point may be on either side. Where nothing crosses there is no need to ask. A step later every
 //! vertex is still to be on the side of the faces near it where it was before, and every edge on the side of the edges near it:
-//! the two ways in which triangles can begin to cross.
+//! the two ways in which triangles can begin to cross. What crosses all the same keeps the side it had before: on the way on it
+//! can still go back.
 
 use std::collections::HashSet;
 
@@ -27,11 +28,12 @@ const KEPT: (f64, f64) = (0.1, 0.5);
 pub(super) struct Sides {
     vertices: Vec<OfVertex>,
     edges: Vec<OfEdges>,
-    /// Faces that crossed there, either way round: they have no sides.
+    /// Faces that crossed there, either way round, and had no sides before either.
     crossed: HashSet<(u32, u32)>,
 }
 
 /// A vertex over (`side` 1) or under (−1) a face.
+#[derive(Clone, Copy)]
 struct OfVertex {
     vertex: u32,
     face: [u32; 3],
@@ -41,6 +43,7 @@ struct OfVertex {
 }
 
 /// An edge on the side of another one to which the cross product of the two points (`side` 1), or on the other (−1).
+#[derive(Clone, Copy)]
 struct OfEdges {
     edges: [[u32; 2]; 2],
     side: f64,
@@ -49,14 +52,13 @@ struct OfEdges {
 }
 
 impl Sides {
-    /// Sides of `outfit` at `positions`. Two faces that cross there have none.
-    pub fn of(outfit: &Outfit<'_>, positions: &[[f64; 3]]) -> Self {
+    /// Sides of `outfit` at `positions`. Two faces that cross there have those that they had `before`, or none.
+    pub fn of(outfit: &Outfit<'_>, positions: &[[f64; 3]], before: Option<&Self>) -> Self {
         let tree = TriangleTree::new(positions, &outfit.faces);
         let edges = Edges::of(outfit);
         let crossings = tree.self_pairs();
-        let crossed: HashSet<_> = crossings.iter().flat_map(|&(f, g)| [(f, g), (g, f)]).collect();
-        let unknown = Unknown::of(&outfit.faces, &crossings);
-        let vertices = (0..positions.len() as u32)
+        let unknown = Pairs::crossing(&outfit.faces, &crossings);
+        let mut vertices: Vec<OfVertex> = (0..positions.len() as u32)
             .into_par_iter()
             .with_min_len(64)
             .flat_map_iter(|v| {
@@ -96,12 +98,25 @@ impl Sides {
                 })
                 .collect::<Vec<_>>()
         };
-        let edges =
+        let mut edges: Vec<OfEdges> =
             (0..edges.all.len() as u32).into_par_iter().with_min_len(64).flat_map_iter(near_edge).collect();
+        // Of what crosses only that is told.
+        let (first_vertex, first_edge) = (vertices.len(), edges.len());
+        if let Some(before) = before {
+            let is_unknown = |of: &&OfVertex| unknown.vertices.contains(&(of.vertex, of.face));
+            vertices.extend(before.vertices.iter().filter(is_unknown));
+            let is_unknown = |of: &&OfEdges| unknown.edges.contains(&of.edges);
+            edges.extend(before.edges.iter().filter(is_unknown));
+        }
+        let told = Pairs::told(&vertices[first_vertex..], &edges[first_edge..]);
+        let crosses_untold =
+            |&(f, g): &(u32, u32)| !told.include(outfit.faces[f as usize], outfit.faces[g as usize]);
+        let crossed =
+            crossings.into_iter().filter(crosses_untold).flat_map(|(f, g)| [(f, g), (g, f)]).collect();
         Self { vertices, edges, crossed }
     }
 
-    /// Whether two faces have no side of each other because they crossed.
+    /// Whether two faces have no side of each other because they crossed before any was told.
     pub fn crossed(&self, f: u32, g: u32) -> bool {
         self.crossed.contains(&(f, g))
     }
@@ -156,15 +171,16 @@ fn edges_of([a, b, c]: [u32; 3]) -> [[u32; 2]; 3] {
     [[a, b], [b, c], [c, a]].map(|[a, b]| [a.min(b), a.max(b)])
 }
 
-/// What lies on no side, since its faces cross.
-struct Unknown {
+/// Vertices and faces, edges and edges: what sides may be told of.
+struct Pairs {
     vertices: HashSet<(u32, [u32; 3])>,
     /// Either way round.
     edges: HashSet<[[u32; 2]; 2]>,
 }
 
-impl Unknown {
-    fn of(faces: &[[u32; 3]], crossings: &[(u32, u32)]) -> Self {
+impl Pairs {
+    /// Of faces that cross.
+    fn crossing(faces: &[[u32; 3]], crossings: &[(u32, u32)]) -> Self {
         let (mut vertices, mut edges) = (HashSet::new(), HashSet::new());
         for &(f, g) in crossings {
             let (f, g) = (faces[f as usize], faces[g as usize]);
@@ -174,6 +190,22 @@ impl Unknown {
             }
         }
         Self { vertices, edges }
+    }
+
+    /// Of which a side is told.
+    fn told(vertices: &[OfVertex], edges: &[OfEdges]) -> Self {
+        let both_ways = |of: &OfEdges| [of.edges, [of.edges[1], of.edges[0]]];
+        Self {
+            vertices: vertices.iter().map(|of| (of.vertex, of.face)).collect(),
+            edges: edges.iter().flat_map(both_ways).collect(),
+        }
+    }
+
+    /// Whether there are any of two faces.
+    fn include(&self, one: [u32; 3], other: [u32; 3]) -> bool {
+        let has_vertex = |f: [u32; 3], g| f.iter().any(|&v| self.vertices.contains(&(v, g)));
+        let has_edge = |a: &[u32; 2]| edges_of(other).iter().any(|b| self.edges.contains(&[*a, *b]));
+        has_vertex(one, other) || has_vertex(other, one) || edges_of(one).iter().any(has_edge)
     }
 }
 

@@ -11,6 +11,8 @@ pub(super) struct Strides {
     pub shortest: f64,
     /// The longest one in which cloth may keep its sides: little passes by in it.
     pub keeping: f64,
+    /// Whether it does so at first, or only where crossings are left otherwise.
+    pub keeps_first: bool,
     /// The shortest one in which it need not, where nothing crosses before.
     pub free: f64,
     /// Where the body gives way, from step to step by little more or less.
@@ -23,14 +25,21 @@ impl Strides {
         longest: 1.0 / 4.0,
         shortest: 1.0 / 512.0,
         keeping: 1.0 / 32.0,
+        keeps_first: true,
         free: 1.0 / 32.0,
         room: Room::DEEP,
     };
     /// The same with drapes that are taken back: where those help they do so at once.
     pub const TAKEN_BACK: Self = Self { shortest: 1.0 / 16.0, ..Self::FROM_T_POSE };
     /// From one frame of a motion to the next.
-    pub const OF_FRAME: Self =
-        Self { longest: 1.0, shortest: 1.0 / 128.0, keeping: 1.0, free: 0.0, room: Room::AMPLE };
+    pub const OF_FRAME: Self = Self {
+        longest: 1.0,
+        shortest: 1.0 / 128.0,
+        keeping: 1.0,
+        keeps_first: false,
+        free: 0.0,
+        room: Room::AMPLE,
+    };
     /// The same from a frame that was not clear.
     pub const OF_CROSSED_FRAME: Self = Self { shortest: 1.0 / 4.0, ..Self::OF_FRAME };
 }

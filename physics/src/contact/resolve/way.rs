@@ -14,6 +14,7 @@ use super::strides::Strides;
 use super::{
     Layer, ResolveError, ResolveSettings, Resolved, Untangled, at, check, untangled, untangled_keeping,
 };
+use crate::contact::self_triangle_pairs;
 use crate::query::Surface;
 use crate::transform::{into_frame, out_of_frame};
 use crate::vec3::{add, scale, sub};
@@ -52,18 +53,21 @@ struct Place {
     own: Option<usize>,
     /// Told when they are first asked for.
     sides: OnceLock<Sides>,
+    /// Those of the place before, if they were asked for.
+    sides_before: Option<Sides>,
 }
 
 impl Place {
-    fn new(stage: Waypoint, Arrived { untangled, gave_way }: Arrived) -> Self {
+    fn new(stage: Waypoint, Arrived { untangled, gave_way }: Arrived, sides_before: Option<Sides>) -> Self {
         let Waypoint { draped, transforms, .. } = stage;
         let Untangled { positions, crossings, own, .. } = untangled;
         let reached = Reached { draped, positions, transforms, crossings };
-        Self { reached, gave_way: Some(gave_way), own: Some(own), sides: OnceLock::new() }
+        Self { reached, gave_way: Some(gave_way), own: Some(own), sides: OnceLock::new(), sides_before }
     }
 
     fn sides(&self, layers: &[Layer<'_>]) -> &Sides {
-        self.sides.get_or_init(|| Sides::of(&Outfit::new(layers), &self.reached.positions.concat()))
+        let positions = || self.reached.positions.concat();
+        self.sides.get_or_init(|| Sides::of(&Outfit::new(layers), &positions(), self.sides_before.as_ref()))
     }
 
     /// Whether less crosses here than `now`; garments with themselves only count in a step that `is_short`.
@@ -98,13 +102,13 @@ impl Way<'_, '_> {
             start,
             (self.strides.room, None),
             |_| true,
-            |obstacle, start| untangled(obstacle, start, settings),
+            |obstacle, start| with_all_own(untangled(obstacle, start, settings), layers, settings),
         );
         let crossings = first.untangled.crossings;
         if crossings > 0 && crossings >= best.certificate.crossings() {
             return Ok(());
         }
-        let (followed, steps) = self.go(Place::new(t_pose, first), stage_at)?;
+        let (followed, steps) = self.go(Place::new(t_pose, first, None), stage_at)?;
         best.steps += steps;
         let Some(found) = followed else { return Ok(()) };
         let mut along = settled(self.end, layers, found, settings, self.strides.room);
@@ -129,7 +133,8 @@ impl Way<'_, '_> {
         reached: Reached,
         stage_at: impl FnMut(f64) -> Result<Waypoint, E>,
     ) -> Result<(Option<Untangled>, usize), E> {
-        self.go(Place { reached, gave_way: None, own: None, sides: OnceLock::new() }, stage_at)
+        let sides = OnceLock::new();
+        self.go(Place { reached, gave_way: None, own: None, sides, sides_before: None }, stage_at)
     }
 
     fn go<E: From<ResolveError>>(
@@ -169,7 +174,7 @@ impl Way<'_, '_> {
                     failures = 0;
                 }
                 from = at;
-                place = Place::new(stage, arrived);
+                place = Place::new(stage, arrived, place.sides.into_inner());
             }
         }
         Ok((None, steps))
@@ -195,20 +200,26 @@ impl Way<'_, '_> {
         for start in &starts {
             check(&stage.body, &placed(self.layers, start)?)?;
         }
-        let Strides { keeping, free, .. } = self.strides;
-        let is_free = step >= free || step > keeping || place.reached.crossings > 0;
+        let Strides { keeping, keeps_first, free, .. } = self.strides;
+        let is_free = step >= free || place.reached.crossings > 0;
         let before = place.gave_way.as_ref().map(|steps| Before { steps, most: GIVING_WAY * step });
         let gives_way = (self.strides.room, before);
         let is_enough =
             |found: &Untangled| found.crossings == 0 && !place.crosses_less_than(found, step <= keeping);
-        Ok(on_stage(self.layers, stage, &starts, gives_way, is_enough, |obstacle, start| {
-            let free = is_free.then(|| untangled(obstacle, start, &settings));
-            if step > keeping || free.as_ref().is_some_and(|free| free.crossings == 0) {
-                return free.unwrap_or_default();
+        let layers = self.layers;
+        Ok(on_stage(layers, stage, &starts, gives_way, is_enough, |obstacle, start| {
+            let at_will = || with_all_own(untangled(obstacle, start, &settings), layers, &settings);
+            let first = (step > keeping || is_free && !keeps_first).then(at_will);
+            match first {
+                Some(found) if step > keeping || found.crossings == 0 => return found,
+                _ => (),
             }
-            let kept = untangled_keeping(Some(place.sides(self.layers)), obstacle, start, &settings);
-            match free {
-                Some(free) if free.crossings <= kept.crossings => free,
+            let kept = untangled_keeping(Some(place.sides(layers)), obstacle, start, &settings);
+            let is_asked = is_free && kept.crossings > 0;
+            // Cloth that went through itself lost its sides.
+            let rank = |found: &Untangled| found.crossings + found.own;
+            match first.or_else(|| is_asked.then(at_will)) {
+                Some(found) if rank(&found) < rank(&kept) => found,
                 _ => kept,
             }
         }))
@@ -217,6 +228,16 @@ impl Way<'_, '_> {
     fn is_late(&self) -> bool {
         self.settings.is_late(self.start, self.layers.len())
     }
+}
+
+/// With crossings of garments with themselves counted where the body is pinched, too: they have no side in the next step, either.
+fn with_all_own(mut found: Untangled, layers: &[Layer<'_>], settings: &ResolveSettings) -> Untangled {
+    if settings.self_contact {
+        let garments = layers.iter().zip(&found.positions);
+        let own = garments.map(|(layer, now)| self_triangle_pairs(now, &layer.garment.faces).len());
+        found.own = own.sum();
+    }
+    found
 }
 
 /// Untangles the garments at `stage` by `untangle`, from each of `starts` until it `is_enough`; the best. The body gives way about

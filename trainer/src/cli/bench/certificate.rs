@@ -10,6 +10,7 @@ use crate::device::Backend;
 use crate::drape::{Networks, WardrobeTensors};
 use crate::evaluate::Spread;
 use crate::evaluate::certificates::{DrapedScene, Dressing, OutfitResult};
+use crate::one_core::each_on_one_core;
 use crate::scene::{Library, PreparedScene, SceneDraw, draw_outfit, prepare};
 use clap::Parser;
 use clothcombo_data::format::obj;
@@ -26,6 +27,7 @@ use std::sync::Arc;
 #[derive(Parser)]
 #[command(after_help = "Examples:\n  clothcombo bench certificate --draws 500\n  \
         clothcombo bench certificate --checkpoint runs/open --json > certificate.json\n  \
+        clothcombo bench certificate --checkpoint models/default --jobs 2\n  \
         clothcombo bench certificate --only 17 --meshes /tmp/draw-17\n  \
         clothcombo bench certificate --draws 24 --orders helper_tee,helper_vest,Coat,helper_shorts")]
 pub struct Arguments {
@@ -50,6 +52,9 @@ pub struct Arguments {
     /// Only these draws, by number from 0
     #[arg(long, value_delimiter = ',')]
     only: Vec<usize>,
+    /// Outfits beside each other, a core for each; 1: one after the other, each with all cores
+    #[arg(long, default_value_t = 1, value_parser = at_least_one)]
+    jobs: usize,
     /// Seed of the draws; default: that of the configuration
     #[arg(long)]
     seed: Option<u64>,
@@ -85,6 +90,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let results = measure(arguments, &config, &library, checkpoint.as_ref(), &settings)?;
     if arguments.json {
         let summary = json!({
+            "jobs": arguments.jobs,
             "gap_mm": arguments.post_process.gap_mm,
             "time_limit_s": arguments.post_process.time_limit.map(|t| t.as_secs_f64()),
             "drape": if checkpoint.is_some() { "network" } else { "skinning" },
@@ -127,8 +133,7 @@ fn measure(
     let bar = progress_bar(draws.len(), "outfits {bar:30} {pos}/{len} · {eta} left");
     let orders = orders(library, &arguments.orders)?;
     let dressing = Dressing::new(library, &config.losses, networks.as_ref());
-    let mut results = Vec::with_capacity(draws.len());
-    for draw in draws {
+    let resolve = |draw: usize| {
         let seed = arguments.seed.unwrap_or_else(|| config.validation_seed());
         let outfit = match orders.is_empty() {
             true => draw_outfit(library, seed, draw as u64, usize::from(arguments.layers)),
@@ -144,9 +149,13 @@ fn measure(
         if let Some(folder) = &arguments.meshes {
             write_meshes(&folder.join(format!("{draw:04}")), &scene, &draped, &resolved.positions)?;
         }
-        results.push(result);
         bar.inc(1);
-    }
+        Ok(result)
+    };
+    let results = match arguments.jobs {
+        1 => draws.into_iter().map(resolve).collect::<Result<_, Report>>()?,
+        jobs => each_on_one_core(draws, Some(jobs), resolve)?,
+    };
     bar.finish_and_clear();
     Ok(results)
 }

@@ -46,7 +46,7 @@ fn enforced(contacts: &[Contact], positions: &mut [[f64; 3]], may_move: &[bool])
 fn sheets_that_were_pushed_through_each_other_come_back_to_the_side_they_were_on() {
     for gap in [1e-3, -1e-3, 4e-3] {
         dressed(&sheets(gap), |outfit, before| {
-            let sides = Sides::of(outfit, &before);
+            let sides = Sides::of(outfit, &before, None);
             assert_eq!(crossings(outfit, &before), 0);
             let mut random = SplitMix::new(7);
             let mut positions = before.clone();
@@ -74,11 +74,11 @@ fn sheets_that_were_pushed_through_each_other_come_back_to_the_side_they_were_on
 #[test]
 fn nothing_is_asked_of_what_is_far_or_held() {
     dressed(&sheets(2.0 * WATCH), |outfit, before| {
-        let sides = Sides::of(outfit, &before);
+        let sides = Sides::of(outfit, &before, None);
         assert!(sides.vertices.is_empty() && sides.edges.is_empty());
     });
     dressed(&sheets(4e-4), |outfit, before| {
-        let sides = Sides::of(outfit, &before);
+        let sides = Sides::of(outfit, &before, None);
         let asked = |is_in: bool| {
             let mut contacts = Vec::new();
             sides.contacts(&before, &vec![is_in; before.len()], 1e-3, &mut contacts);
@@ -101,7 +101,7 @@ fn faces_that_cross_have_no_sides() {
     let tilted = |mesh: &TriMesh| shapes::mapped(mesh, |[x, y, z]| [x, y, z + 0.2 * (x - 0.05)]);
     let [lower, upper] = sheets(0.0);
     dressed(&[lower, tilted(&upper)], |outfit, before| {
-        let sides = Sides::of(outfit, &before);
+        let sides = Sides::of(outfit, &before, None);
         let crossed = TriangleTree::new(&before, &outfit.faces).self_pairs();
         assert!(crossed.len() > 10);
         for (f, g) in crossed {
@@ -119,6 +119,40 @@ fn faces_that_cross_have_no_sides() {
             let looks_up = before[s.face[0] as usize][2] == 0.0;
             assert!(!looks_up || (s.side > 0.0) == is_over);
         }
+    });
+}
+
+/// Some vertices of a sheet go through another one: what was told before brings them back; without that they have no side.
+#[test]
+fn what_crosses_keeps_the_side_it_had_before() {
+    let gap = 2e-3;
+    dressed(&sheets(gap), |outfit, before| {
+        let told = Sides::of(outfit, &before, None);
+        let upper = outfit.part(&before, 0).len();
+        let mut through = before.clone();
+        let is_in_the_middle = |p: &[f64; 3]| p[..2].iter().all(|x| (x - 0.05).abs() < 0.008);
+        for p in through[upper..].iter_mut().filter(|p| is_in_the_middle(p)) {
+            p[2] -= 1.2 * gap;
+        }
+        let crossed = crossings(outfit, &through);
+        assert!(crossed > 10);
+        let unknown = Sides::of(outfit, &through, None);
+        let known = Sides::of(outfit, &through, Some(&told));
+        // And so on from step to step.
+        let known = Sides::of(outfit, &through, Some(&known));
+        assert!(known.crossed.is_empty() && unknown.crossed.len() == 2 * crossed);
+        let over = |sides: &Sides| {
+            let is_up = |of: &&OfVertex| of.vertex as usize >= upper && before[of.face[0] as usize][2] == 0.0;
+            sides.vertices.iter().filter(is_up).filter(|of| of.side > 0.0).count()
+        };
+        assert!(over(&known) > over(&unknown));
+        let mut positions = through.clone();
+        for _ in 0..20 {
+            let mut contacts = Vec::new();
+            known.contacts(&positions, &vec![true; before.len()], 1e-3, &mut contacts);
+            enforced(&contacts, &mut positions, &vec![true; before.len()]);
+        }
+        assert_eq!(crossings(outfit, &positions), 0);
     });
 }
 

@@ -27,7 +27,8 @@ fn changes_turn_with_the_skinning_and_fade() {
 #[test]
 fn garments_with_themselves_count_in_short_steps_only() {
     let reached = || Reached { draped: vec![], positions: vec![], transforms: vec![], crossings: 2 };
-    let place = |own| Place { reached: reached(), gave_way: None, own, sides: OnceLock::new() };
+    let place =
+        |own| Place { reached: reached(), gave_way: None, own, sides: OnceLock::new(), sides_before: None };
     let found = |crossings, own| Untangled { crossings, own, ..Untangled::default() };
     for is_short in [false, true] {
         assert!(place(Some(50)).crosses_less_than(&found(3, 0), is_short));
