@@ -19,6 +19,8 @@ const FURTHER_ATTEMPTS: usize = 3;
 const FEW: usize = 32;
 /// Longest and shortest step, as shares of the room that the body made, by which it is taken back.
 const CLOSING_IN: (f64, f64) = (1.0 / 4.0, 1.0 / 32.0);
+/// Gaps with which that is tried, as shares of the one asked for: what is narrow holds more sheets that lie closer to each other.
+const CLOSING_GAPS: [f64; 2] = [1.0, 0.3];
 
 /// Garments that were resolved.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -55,17 +57,24 @@ impl Resolved {
     /// Where cloth lies in room that the body only made for it, tries to do without: the body gives way no more than where it
     /// lies inside itself. Taken if fewer pairs are left.
     fn close_in(&mut self, body: &Body<'_>, layers: &[Layer<'_>], settings: &ResolveSettings, room: Room) {
-        if self.certificate.narrow_triangle_pairs == 0 {
-            return;
+        for share in CLOSING_GAPS {
+            if self.certificate.narrow_triangle_pairs == 0 {
+                return;
+            }
+            let gap = share * settings.gap;
+            let settings = ResolveSettings { gap, is_shallow: true, loosened: 1.0, ..*settings };
+            self.close_in_to(body, layers, &settings, room);
         }
-        let settings = ResolveSettings { is_shallow: true, loosened: 1.0, ..*settings };
+    }
+
+    fn close_in_to(&mut self, body: &Body<'_>, layers: &[Layer<'_>], settings: &ResolveSettings, room: Room) {
         let apart = (self.certificate.layer_triangle_pairs == 0).then(|| self.positions.clone());
         let now = at(layers, &self.positions);
-        let closer = body.with_room(room.with_share(0.0), |obstacle| untangled(obstacle, &now, &settings));
+        let closer = body.with_room(room.with_share(0.0), |obstacle| untangled(obstacle, &now, settings));
         let certificate = certified(&body.drawn, layers, &closer.positions);
         self.prefer(closer.positions, certificate);
         if let Some(apart) = apart.filter(|_| !self.certificate.is_clear()) {
-            self.close_in_slowly(apart, body, layers, &settings, room);
+            self.close_in_slowly(apart, body, layers, settings, room);
         }
     }
 
