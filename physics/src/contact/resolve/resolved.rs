@@ -67,6 +67,7 @@ impl Resolved {
         }
     }
 
+    /// [`close_in`](Self::close_in) with one gap: all at once and, where no garment crosses another, step by step as well.
     fn close_in_to(&mut self, body: &Body<'_>, layers: &[Layer<'_>], settings: &ResolveSettings, room: Room) {
         let apart = (self.certificate.layer_triangle_pairs == 0).then(|| self.positions.clone());
         let now = at(layers, &self.positions);
