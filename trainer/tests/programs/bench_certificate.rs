@@ -45,6 +45,13 @@ fn draws_are_counted_and_failures_listed() {
     for state in ["rest", "draped", "resolved"] {
         assert_eq!(fs::read_dir(folder.path().join("meshes/0001").join(state)).unwrap().count(), 2);
     }
+    // Nor does it matter how many are resolved at a time, or on how many cores.
+    let beside: Value = serde_json::from_slice(&run(&["--json", "--jobs", "3"])).unwrap();
+    for (alone, beside) in draws.iter().zip(beside["draws"].as_array().unwrap()) {
+        for key in ["draw", "garments", "before", "after", "strain_added"] {
+            assert_eq!(alone[key], beside[key], "{key}");
+        }
+    }
     let table = String::from_utf8(run(&[])).unwrap();
     assert!(table.contains("clear %") && table.contains("2 garments"), "{table}");
 }

@@ -7,7 +7,8 @@ use super::ResolveError;
 /// Settings of [`super::resolve`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ResolveSettings {
-    /// Distance from body and inner layers that a vertex gets when it has to move [m]. Default 1 mm.
+    /// Distance from body and inner layers that a vertex gets when it has to move [m]; three tenths of it between parts of the body
+    /// that are too near to each other for more. Default 1 mm.
     pub gap: f64,
     /// A vertex has to move where its distance is below this share of `gap`, 0–1. Default 0.25: whatever was resolved once
     /// stays as it is.

@@ -11,7 +11,7 @@ pub(super) struct Strides {
     pub shortest: f64,
     /// The longest one in which cloth may keep its sides: little passes by in it.
     pub keeping: f64,
-    /// Whether it does so at first, or only where crossings are left otherwise.
+    /// Whether it does so at first, and otherwise where that leaves crossings; or the other way round.
     pub keeps_first: bool,
     /// The shortest one in which it need not, where nothing crosses before.
     pub free: f64,

@@ -216,7 +216,7 @@ impl Way<'_, '_> {
             }
             let kept = untangled_keeping(Some(place.sides(layers)), obstacle, start, &settings);
             let is_asked = is_free && kept.crossings > 0;
-            // Cloth that went through itself lost its sides.
+            // Cloth that went through itself is in the way of the next steps.
             let rank = |found: &Untangled| found.crossings + found.own;
             match first.or_else(|| is_asked.then(at_will)) {
                 Some(found) if rank(&found) < rank(&kept) => found,
@@ -230,7 +230,7 @@ impl Way<'_, '_> {
     }
 }
 
-/// With crossings of garments with themselves counted where the body is pinched, too: they have no side in the next step, either.
+/// With crossings of garments with themselves counted where the body is pinched, too, as they are where cloth keeps its sides.
 fn with_all_own(mut found: Untangled, layers: &[Layer<'_>], settings: &ResolveSettings) -> Untangled {
     if settings.self_contact {
         let garments = layers.iter().zip(&found.positions);
