@@ -61,6 +61,7 @@ use clothcombo_physics::contact::resolve::{
     ResolveSettings, Resolved, Waypoint, resolve_after, resolve_along,
 };
 use clothcombo_physics::vec3::{add_scaled, sub};
+use motion::Bearable;
 use networked::Networked;
 use outfit::KnownGarments;
 use std::path::{Path, PathBuf};
@@ -107,9 +108,9 @@ impl Default for DraperSettings {
 struct Last<'a> {
     body: &'a BodyState,
     drape: &'a Drape,
-    /// Whether the drape may also be resolved by itself, and on a way from the T-pose, where carrying on leaves crossings: that
+    /// What carrying on may leave. Where it leaves more, the drape is also resolved by itself, and on a way from the T-pose: that
     /// takes seconds.
-    may_start_anew: bool,
+    bearable: Bearable,
 }
 
 /// A body to be dressed.
@@ -297,7 +298,7 @@ impl Draper {
     ) -> Result<Resolved, DraperError> {
         let (layers, settings) = (outfit.layers(parts), &self.settings.post_process);
         let mut carried = None;
-        if let Some(Last { body: state, drape, may_start_anew }) = last {
+        if let Some(Last { body: state, drape, bearable }) = last {
             let between = |share: f64| match share {
                 1.0 => Ok(at_the_end()),
                 _ => {
@@ -306,7 +307,7 @@ impl Draper {
                 }
             };
             carried = resolve_after(drape.reached(), surface, &layers, settings, between)?;
-            if let Some(done) = carried.take_if(|done| done.certificate.crossings() == 0 || !may_start_anew) {
+            if let Some(done) = carried.take_if(|done| bearable.is_met(&done.certificate)) {
                 return Ok(done);
             }
         }

@@ -1,9 +1,38 @@
 //! A motion: each frame carries on from the one before, and what that leaves over from the one after.
 
-use super::{BodyState, Drape, Draper, DraperError, Last, Outfit};
+use super::{BodyState, Certificate, Drape, Draper, DraperError, Last, Outfit};
 
-/// So many frames after one that was left with crossings only carry on: poses change slowly, and starting anew takes seconds.
+/// So many frames after one that was left with flaws only carry on: poses change slowly, and starting anew takes seconds.
 const FRAMES_CARRIED: usize = 15;
+
+/// What shows: crossings, and how torn cloth is; fewer is better, in this order.
+type Flaws = (usize, usize);
+
+fn flaws(certificate: &Certificate) -> Flaws {
+    (certificate.crossings(), certificate.tears())
+}
+
+/// Flaws that carrying on from another frame may leave.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bearable {
+    crossings: usize,
+    tears: usize,
+}
+
+impl Bearable {
+    const NONE: Self = Self { crossings: 0, tears: 0 };
+    const ALL: Self = Self { crossings: usize::MAX, tears: usize::MAX };
+
+    /// After a frame of which starting anew left these: tears must not grow from frame to frame.
+    fn after((_, tears): Flaws) -> Self {
+        Self { crossings: usize::MAX, tears: tears.saturating_add(1) }
+    }
+
+    pub fn is_met(self, certificate: &Certificate) -> bool {
+        let (crossings, tears) = flaws(certificate);
+        crossings <= self.crossings && tears <= self.tears
+    }
+}
 
 /// How far [`Draper::drape_motion`] is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,8 +45,8 @@ pub enum MotionProgress {
 
 impl Draper {
     /// Drapes `outfit` on each of `bodies`, the frames of a motion. The post-process carries on from frame to frame; where frames
-    /// are left with crossings and a later one has none, it carries on backwards from that one as well. `progress` is called
-    /// after each frame, and before each that is draped once more.
+    /// are left with crossings or torn cloth and a later one has neither, it carries on backwards from that one as well.
+    /// `progress` is called after each frame, and before each that is draped once more.
     ///
     /// # Errors
     /// When shape or pose do not fit the body model, or the networks diverge.
@@ -27,17 +56,19 @@ impl Draper {
         bodies: &[BodyState],
         mut progress: impl FnMut(MotionProgress),
     ) -> Result<Vec<Drape>, DraperError> {
-        let crossings = |drape: &Drape| drape.certificate.crossings();
+        let flaws = |drape: &Drape| flaws(&drape.certificate);
         let mut drapes: Vec<Drape> = Vec::with_capacity(bodies.len());
-        let mut only_carried = 0;
+        let (mut bearable, mut only_carried) = (Bearable::NONE, 0);
         for (frame, body) in bodies.iter().enumerate() {
-            let may_start_anew = only_carried == 0;
-            let last = drapes.last().map(|drape| Last { body: &bodies[frame - 1], drape, may_start_anew });
+            let last = drapes.last().map(|drape| Last { body: &bodies[frame - 1], drape, bearable });
             let mut drape = self.drape_frame(outfit, body, last)?;
-            only_carried = match may_start_anew && crossings(&drape) > 0 {
-                true => FRAMES_CARRIED,
-                false => only_carried.saturating_sub(1),
-            };
+            if !bearable.is_met(&drape.certificate) {
+                (bearable, only_carried) = (Bearable::after(flaws(&drape)), FRAMES_CARRIED);
+            } else if only_carried > 1 {
+                only_carried -= 1;
+            } else {
+                (bearable, only_carried) = (Bearable::NONE, 0);
+            }
             if bodies.len() > 1 {
                 drape.slim();
             }
@@ -47,12 +78,12 @@ impl Draper {
         if !self.settings.resolve {
             return Ok(drapes);
         }
-        carry_back(&mut drapes, crossings, |frame, own, after| {
+        carry_back(&mut drapes, flaws, |frame, own, after| {
             progress(MotionProgress::Again(frame));
-            let last = Last { body: &bodies[frame + 1], drape: after, may_start_anew: false };
+            let last = Last { body: &bodies[frame + 1], drape: after, bearable: Bearable::ALL };
             let mut again = self.drape_frame(outfit, &bodies[frame], Some(last))?;
             again.slim();
-            if crossings(&again) < crossings(own) {
+            if flaws(&again) < flaws(own) {
                 std::mem::swap(own, &mut again);
             }
             own.milliseconds += again.milliseconds;
@@ -65,16 +96,17 @@ impl Draper {
     }
 }
 
-/// From the last frame to the first: `again` makes better what has crossings, from the frame after it, where that has none.
+/// From the last frame to the first: `again` makes better what has flaws, from the frame after it, where that has fewer and no
+/// crossings.
 fn carry_back<T, E>(
     frames: &mut [T],
-    crossings: impl Fn(&T) -> usize,
+    flaws: impl Fn(&T) -> Flaws,
     mut again: impl FnMut(usize, &mut T, &T) -> Result<(), E>,
 ) -> Result<(), E> {
     for frame in (0..frames.len().saturating_sub(1)).rev() {
         let (own, after) = frames.split_at_mut(frame + 1);
         let (own, after) = (&mut own[frame], &after[0]);
-        if crossings(own) > 0 && crossings(after) == 0 {
+        if flaws(after) < flaws(own) && flaws(after).0 == 0 {
             again(frame, own, after)?;
         }
     }
@@ -86,13 +118,36 @@ mod tests {
     use super::*;
 
     #[test]
+    fn after_a_frame_that_could_not_be_mended_crossings_are_borne_but_no_growing_tears() {
+        let left = |crossings, strain| Certificate {
+            body_triangle_pairs: crossings,
+            strain_added: Some(strain),
+            ..Certificate::default()
+        };
+        for (certificate, at_first, after_crossings, after_tears) in [
+            (left(0, 0.4), true, true, true),
+            (left(0, -0.4), true, true, true),
+            (left(3, 0.0), false, true, true),
+            (left(0, 0.6), false, true, true),
+            (left(0, 1.2), false, false, true),
+            (left(9, 3.0), false, false, false),
+        ] {
+            assert_eq!(Bearable::NONE.is_met(&certificate), at_first, "{certificate:?}");
+            assert_eq!(Bearable::after((7, 0)).is_met(&certificate), after_crossings, "{certificate:?}");
+            assert_eq!(Bearable::after((0, 2)).is_met(&certificate), after_tears, "{certificate:?}");
+            assert!(Bearable::ALL.is_met(&certificate));
+        }
+        assert!(Bearable::after((0, usize::MAX)).is_met(&left(1, f64::INFINITY)));
+    }
+
+    #[test]
     fn frames_are_mended_from_clear_ones_after_them_as_far_as_that_goes() {
         // How many crossings each frame has.
         let mut frames = [5, 4, 3, 0, 2, 0, 7];
         let mut asked = Vec::new();
         let found: Result<(), String> = carry_back(
             &mut frames,
-            |crossings| *crossings,
+            |crossings| (*crossings, 0),
             |frame, own, after| {
                 assert_eq!(*after, 0);
                 asked.push((frame, *own));
@@ -103,8 +158,21 @@ mod tests {
         assert!(found.is_ok());
         assert_eq!(asked, [(4, 2), (2, 3), (1, 4)]);
         assert_eq!(frames, [5, 1, 0, 0, 0, 0, 7]);
-        let failed = carry_back(&mut frames, |c| *c, |_, _, _| Err("an error comes back"));
+        // Torn cloth is mended as well, and from what is torn less.
+        let (mut torn, mut asked) = ([(0, 4), (2, 0), (0, 3), (0, 1)], Vec::new());
+        let found: Result<(), String> = carry_back(
+            &mut torn,
+            |flaws| *flaws,
+            |frame, own, _| {
+                asked.push(frame);
+                own.0 = 0;
+                Ok(())
+            },
+        );
+        assert!(found.is_ok());
+        assert_eq!(asked, [2, 1, 0]);
+        let failed = carry_back(&mut frames, |c| (*c, 0), |_, _, _| Err("an error comes back"));
         assert_eq!(failed, Err("an error comes back"));
-        assert!(carry_back(&mut [0; 0], |c| *c, |_, _, _| Err("none")).is_ok());
+        assert!(carry_back(&mut [0; 0], |c| (*c, 0), |_, _, _| Err("none")).is_ok());
     }
 }

@@ -145,6 +145,12 @@ impl Certificate {
         self.between() == 0
     }
 
+    /// How many times over the strain energy has risen by half of what it was: 0 where cloth is merely pulled straight, more where
+    /// it is torn out of shape, which shows.
+    pub fn tears(&self) -> usize {
+        self.strain_added.map_or(0, |added| (added / TEAR) as usize)
+    }
+
     /// What is wrong: fewer is better, in this order.
     pub(super) fn defects(&self) -> (usize, usize) {
         (self.between(), self.self_triangle_pairs)
@@ -201,6 +207,8 @@ pub fn certify(body: &Surface<f64>, layers: &[Layer<'_>]) -> Result<Certificate,
 
 /// Less strain energy than this [J] is rounding of a garment in its rest shape.
 const NO_STRAIN: f64 = 1e-9;
+/// A rise of the strain energy, as a share, from which cloth is torn.
+const TEAR: f64 = 0.5;
 
 /// The distance up to which a vertex counts as over or under an inner garment [m].
 fn order_reach() -> f64 {

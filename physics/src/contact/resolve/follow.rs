@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::body::{Body, with_body, with_drawn};
-use super::ease::TIMES_IN_FRAME;
+use super::ease::{TIMES, TIMES_IN_FRAME};
 use super::resolved::settled;
 use super::stages::Stages;
 use super::strides::Strides;
@@ -160,6 +160,10 @@ pub fn resolve_after<E: From<ResolveError>>(
         resolved.go_on(body.drawn.surface, layers, settings, start);
         resolved.ease(body, layers, settings, start, TIMES_IN_FRAME);
         resolved.compare_since(layers, start);
+        if resolved.certificate.tears() > 0 {
+            resolved.ease(body, layers, settings, start, TIMES - TIMES_IN_FRAME);
+            resolved.compare_since(layers, start);
+        }
         resolved.steps = steps;
         Ok(Some(resolved))
     };

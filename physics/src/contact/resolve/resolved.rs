@@ -137,11 +137,11 @@ impl Resolved {
         }
     }
 
-    /// The better of two results for the same drape: the one with fewer crossings, `self` of equal ones. It counts the work
-    /// of both.
+    /// The better of two results for the same drape: the one with fewer crossings, of equal ones the one that is torn less, then
+    /// `self`. It counts the work of both.
     #[must_use]
     pub fn or(self, other: Self) -> Self {
-        self.or_by(other, |c| (c.crossings(), c.between()))
+        self.or_by(other, |c| (c.crossings(), c.tears(), c.between()))
     }
 
     /// [`or`](Self::or) where the one of lower `rank` is the better one.
