@@ -2,7 +2,7 @@
 
 use super::{Draper, DraperError, Outfit, PhaseTimes, Refinement};
 use clothcombo_physics::Surface;
-use clothcombo_physics::contact::resolve::{Certificate, Layer, Reached, certify};
+use clothcombo_physics::contact::resolve::{Certificate, Reached, certify};
 use clothcombo_physics::transform::Transform;
 use std::sync::Arc;
 
@@ -84,10 +84,8 @@ impl Drape {
         let before = self.before();
         let after: Vec<&[[f64; 3]]> = self.garments.iter().map(|g| g.positions.as_slice()).collect();
         let mut certificate = certify(&self.surface(draper), &outfit.layers(&after))?;
-        let strain =
-            |layers: Vec<Layer>| layers.iter().map(|l| l.garment.strain_energy(l.positions)).sum::<f64>();
-        let [before, after] = [before, after].map(|parts| strain(outfit.layers(&parts)));
-        certificate.strain_added = (before > 0.0).then(|| after / before - 1.0);
+        let layers = outfit.layers(&before);
+        certificate.compare_strain(layers.iter().map(|l| l.garment.strain_energy(l.positions)).sum());
         self.certificate = certificate;
         Ok(())
     }

@@ -44,9 +44,9 @@ pub enum MotionProgress {
 }
 
 impl Draper {
-    /// Drapes `outfit` on each of `bodies`, the frames of a motion. The post-process carries on from frame to frame; where frames
-    /// are left with crossings or torn cloth and a later one has neither, it carries on backwards from that one as well.
-    /// `progress` is called after each frame, and before each that is draped once more.
+    /// Drapes `outfit` on each of `bodies`, the frames of a motion. The post-process carries on from frame to frame; where a frame is
+    /// left with crossings or torn cloth, and the one after it with less and no crossings, it carries on backwards from that one as
+    /// well. `progress` is called after each frame, and before each that is draped once more.
     ///
     /// # Errors
     /// When shape or pose do not fit the body model, or the networks diverge.

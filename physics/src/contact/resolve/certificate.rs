@@ -184,7 +184,7 @@ impl Certificate {
     }
 
     /// Notes the strain energy before the post-process [J].
-    pub(super) fn compare_strain(&mut self, before: f64) {
+    pub fn compare_strain(&mut self, before: f64) {
         let after = self.strain_joule();
         self.strain_added = (before > NO_STRAIN).then(|| after / before - 1.0);
     }
