@@ -24,6 +24,7 @@
 mod acceleration;
 mod drape;
 mod error;
+mod frame;
 mod motion;
 mod names;
 mod networked;
@@ -39,7 +40,7 @@ pub use acceleration::{Acceleration, acceleration};
 pub use clothcombo_physics::contact::resolve::Certificate;
 pub use drape::{Drape, GarmentDrape};
 pub use error::DraperError;
-pub use motion::MotionProgress;
+pub use motion::DrapeProgress;
 pub use names::UniqueNames;
 pub use outfit::{MAX_GARMENTS, MAX_VERTICES, Outfit, Piece, PieceTimes};
 pub use refine::{Refinement, refine};
@@ -50,19 +51,13 @@ pub use source::{Closet, SourceGarment};
 
 use crate::checkpoint::TrainedModel;
 use crate::device::Backend;
-use crate::evaluate::reference::ReferenceScene;
 use crate::scene::{ActiveJoints, LibraryError, Recipe, load_body};
 use burn::tensor::Device;
 use clothcombo_data::asset::{Body, Pose};
 use clothcombo_data::cache::{ArrayCache, Key, body_key};
 use clothcombo_model::ClothCombo;
-use clothcombo_physics::Surface;
-use clothcombo_physics::contact::resolve::{
-    ResolveSettings, Resolved, Waypoint, resolve_after, resolve_along,
-};
-use clothcombo_physics::vec3::{add_scaled, sub};
-use motion::Bearable;
-use networked::Networked;
+use clothcombo_physics::contact::resolve::ResolveSettings;
+use frame::Frame;
 use outfit::KnownGarments;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -101,16 +96,6 @@ impl Default for DraperSettings {
             post_process,
         }
     }
-}
-
-/// Another frame of the same motion, which a drape carries on from.
-#[derive(Clone, Copy)]
-struct Last<'a> {
-    body: &'a BodyState,
-    drape: &'a Drape,
-    /// What carrying on may leave. Where it leaves more, the drape is also resolved by itself, and on a way from the T-pose: that
-    /// takes seconds.
-    bearable: Bearable,
 }
 
 /// A body to be dressed.
@@ -215,117 +200,7 @@ impl Draper {
     /// # Errors
     /// When shape or pose do not fit the body model, or the networks diverge.
     pub fn drape(&self, outfit: &Outfit, body: &BodyState) -> Result<Drape, DraperError> {
-        self.drape_frame(outfit, body, None)
-    }
-
-    /// Drapes `outfit` on `body`, carrying on from the `last` drape if there is one, another frame of the same motion.
-    fn drape_frame(
-        &self,
-        outfit: &Outfit,
-        body: &BodyState,
-        last: Option<Last<'_>>,
-    ) -> Result<Drape, DraperError> {
-        let Networked { scene, surface, heading, transforms, skinned, network, mut milliseconds } =
-            self.networked(&self.model, outfit, body)?;
-
-        let clock = Instant::now();
-        let (before, refinement) = match self.settings.refine {
-            0 => (network.clone(), None),
-            steps => {
-                let mut energy = ReferenceScene::new(&self.trained.config.losses, &scene)?.energy;
-                energy.body = surface.clone();
-                let (positions, done) = refine::refine(&energy, &transforms, &network, steps)?;
-                (positions, Some(done))
-            }
-        };
-        milliseconds.refine = elapsed(clock);
-
-        let clock = Instant::now();
-        let parts = outfit.split(&before);
-        let (resolved, times) = match self.settings.resolve {
-            true => {
-                let at_the_end = || Waypoint {
-                    body: surface.clone(),
-                    draped: parts.iter().map(|p| p.to_vec()).collect(),
-                    skinned: outfit.split(&skinned).into_iter().map(<[_]>::to_vec).collect(),
-                    transforms: transforms.clone(),
-                };
-                let done = self.resolved(outfit, body, last, &surface, &parts, &at_the_end)?;
-                (done.positions, done.garments.iter().map(|g| 1e3 * g.time.as_secs_f64()).collect())
-            }
-            false => (parts.iter().map(|p| p.to_vec()).collect(), vec![0.0; parts.len()]),
-        };
-        milliseconds.resolve = elapsed(clock);
-
-        let (skinned, network) = (outfit.split(&skinned), outfit.split(&network));
-        let transforms = outfit.split(&transforms);
-        let garments = resolved
-            .into_iter()
-            .enumerate()
-            .map(|(g, positions)| GarmentDrape {
-                skinned: skinned[g].to_vec(),
-                network: network[g].to_vec(),
-                before: parts[g].to_vec(),
-                positions,
-                transforms: transforms[g].to_vec(),
-                resolve_ms: times[g],
-            })
-            .collect();
-        let mut drape = Drape {
-            body: surface.positions.clone(),
-            heading,
-            garments,
-            milliseconds,
-            refinement,
-            certificate: Certificate::default(),
-            surface: Some(surface),
-        };
-        let clock = Instant::now();
-        drape.settle(self, outfit)?;
-        drape.milliseconds.certificate = elapsed(clock);
-        Ok(drape)
-    }
-
-    /// The post-process, from the `last` frame on if there is one.
-    fn resolved(
-        &self,
-        outfit: &Outfit,
-        body: &BodyState,
-        last: Option<Last<'_>>,
-        surface: &Surface<f64>,
-        parts: &[&[[f64; 3]]],
-        at_the_end: &dyn Fn() -> Waypoint,
-    ) -> Result<Resolved, DraperError> {
-        let (layers, settings) = (outfit.layers(parts), &self.settings.post_process);
-        let mut carried = None;
-        if let Some(Last { body: state, drape, bearable }) = last {
-            let between = |share: f64| match share {
-                1.0 => Ok(at_the_end()),
-                _ => {
-                    let place = add_scaled(state.place, share, sub(body.place, state.place));
-                    self.stage(&self.model, outfit, body, state.pose.between(&body.pose, share), place)
-                }
-            };
-            carried = resolve_after(drape.reached(), surface, &layers, settings, between)?;
-            if let Some(done) = carried.take_if(|done| bearable.is_met(&done.certificate)) {
-                return Ok(done);
-            }
-        }
-        let from_t_pose = |share: f64| {
-            let pose = body.pose.on_the_way(share);
-            let stage = self.stage(&self.uncorrected, outfit, body, pose, body.place)?;
-            Ok::<_, DraperError>(match share {
-                // The surface is known here only.
-                1.0 => Waypoint { draped: stage.draped, ..at_the_end() },
-                _ => stage,
-            })
-        };
-        let anew = resolve_along(surface, &layers, &at_the_end().skinned, settings, from_t_pose)?;
-        // What carries on does not pop.
-        Ok(match carried {
-            Some(carried) => carried.or(anew),
-            None => anew,
-        })
+        self.drape_frame(outfit, Frame { body, last: None }, &mut |_| ())
     }
 
     fn dimensions(&self) -> clothcombo_model::Dimensions {

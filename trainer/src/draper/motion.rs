@@ -1,6 +1,7 @@
 //! A motion: each frame carries on from the one before, and what that leaves over from the one after.
 
-use super::{BodyState, Certificate, Drape, Draper, DraperError, Last, Outfit};
+use super::frame::{Frame, Last};
+use super::{BodyState, Certificate, Drape, Draper, DraperError, Outfit};
 
 /// So many frames after one that was left with flaws only carry on: poses change slowly, and starting anew takes seconds.
 const FRAMES_CARRIED: usize = 15;
@@ -35,8 +36,11 @@ impl Bearable {
 }
 
 /// How far [`Draper::drape_motion`] is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MotionProgress {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum DrapeProgress {
+    /// The post-process looks at a pose at this share of the way to the frame: from the one before it, or, where that leaves
+    /// crossings, from the T-pose.
+    OnTheWay(f64),
     /// One more frame is draped.
     Draped,
     /// The frame of this number is draped once more, from the one after it.
@@ -46,7 +50,7 @@ pub enum MotionProgress {
 impl Draper {
     /// Drapes `outfit` on each of `bodies`, the frames of a motion. The post-process carries on from frame to frame; where a frame is
     /// left with crossings or torn cloth, and the one after it with less and no crossings, it carries on backwards from that one as
-    /// well. `progress` is called after each frame, and before each that is draped once more.
+    /// well. `progress` is called on the way to each frame, after it, and before each that is draped once more.
     ///
     /// # Errors
     /// When shape or pose do not fit the body model, or the networks diverge.
@@ -54,14 +58,15 @@ impl Draper {
         &self,
         outfit: &Outfit,
         bodies: &[BodyState],
-        mut progress: impl FnMut(MotionProgress),
+        mut progress: impl FnMut(DrapeProgress),
     ) -> Result<Vec<Drape>, DraperError> {
         let flaws = |drape: &Drape| flaws(&drape.certificate);
         let mut drapes: Vec<Drape> = Vec::with_capacity(bodies.len());
         let (mut bearable, mut only_carried) = (Bearable::NONE, 0);
         for (frame, body) in bodies.iter().enumerate() {
             let last = drapes.last().map(|drape| Last { body: &bodies[frame - 1], drape, bearable });
-            let mut drape = self.drape_frame(outfit, body, last)?;
+            let mut watch = |share| progress(DrapeProgress::OnTheWay(share));
+            let mut drape = self.drape_frame(outfit, Frame { body, last }, &mut watch)?;
             if !bearable.is_met(&drape.certificate) {
                 (bearable, only_carried) = (Bearable::after(flaws(&drape)), FRAMES_CARRIED);
             } else if only_carried > 1 {
@@ -73,15 +78,17 @@ impl Draper {
                 drape.slim();
             }
             drapes.push(drape);
-            progress(MotionProgress::Draped);
+            progress(DrapeProgress::Draped);
         }
         if !self.settings.resolve {
             return Ok(drapes);
         }
         carry_back(&mut drapes, flaws, |frame, own, after| {
-            progress(MotionProgress::Again(frame));
+            progress(DrapeProgress::Again(frame));
             let last = Last { body: &bodies[frame + 1], drape: after, bearable: Bearable::ALL };
-            let mut again = self.drape_frame(outfit, &bodies[frame], Some(last))?;
+            let mut watch = |share| progress(DrapeProgress::OnTheWay(share));
+            let frame = Frame { body: &bodies[frame], last: Some(last) };
+            let mut again = self.drape_frame(outfit, frame, &mut watch)?;
             again.slim();
             if flaws(&again) < flaws(own) {
                 std::mem::swap(own, &mut again);

@@ -35,6 +35,12 @@ fn draws_are_counted_and_failures_listed() {
     };
     let share = draws.iter().filter(clear).count() as f64 / 4.0;
     assert_eq!(report["all"]["clear_after"].as_f64(), Some(share));
+    let in_the_end = report["clear_within"].as_array().unwrap().last().unwrap();
+    assert_eq!(in_the_end["share"].as_f64(), Some(share), "{in_the_end}");
+    let groups = ["in_one_go", "hardly_pinched"].map(|key| report[key]["draws"].as_u64().unwrap());
+    let belongs: [fn(&&Value) -> bool; 2] =
+        [|r| r["steps"] == 0, |r| r["before"]["pinched_pairs"].as_u64().unwrap() < 200];
+    assert_eq!(groups, belongs.map(|belongs| draws.iter().filter(belongs).count() as u64));
     assert_eq!(report["failures"].as_array().unwrap().len(), draws.iter().filter(|r| !clear(r)).count());
     assert_eq!(draws[0]["garments"].as_array().unwrap().len(), 1);
     assert_eq!(draws[1]["garments"].as_array().unwrap().len(), 2);
@@ -53,5 +59,8 @@ fn draws_are_counted_and_failures_listed() {
         }
     }
     let table = String::from_utf8(run(&[])).unwrap();
-    assert!(table.contains("clear %") && table.contains("2 garments"), "{table}");
+    assert!(
+        table.contains("clear %") && table.contains("2 garments") && table.contains("in 600 s"),
+        "{table}"
+    );
 }

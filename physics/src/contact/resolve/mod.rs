@@ -108,8 +108,9 @@ fn resolved_further<E>(
     start: Instant,
     further: impl FnOnce(&Body<'_>, Resolved) -> Result<Resolved, E>,
 ) -> Result<Resolved, E> {
+    let preparing = Instant::now();
     with_drawn(body, layers, |drawn| {
-        let simple = simply_resolved(&drawn, layers, settings, start);
+        let simple = simply_resolved(&drawn, layers, settings, preparing);
         if simple.certificate.is_clear() {
             return Ok(simple);
         }
@@ -128,9 +129,9 @@ fn resolved_further<E>(
 
 /// [`resolve`] without what follows the first attempts.
 fn resolved_once(body: &Surface<f64>, layers: &[Layer<'_>], settings: &ResolveSettings) -> Resolved {
-    let start = Instant::now();
+    let preparing = Instant::now();
     with_drawn(body, layers, |drawn| {
-        let simple = simply_resolved(&drawn, layers, settings, start);
+        let simple = simply_resolved(&drawn, layers, settings, preparing);
         if simple.certificate.is_clear() {
             return simple;
         }
@@ -139,14 +140,14 @@ fn resolved_once(body: &Surface<f64>, layers: &[Layer<'_>], settings: &ResolveSe
     })
 }
 
-/// [`resolve`] on a body that does not give way, whose preparation began at `start`: enough for most garments.
+/// [`resolve`] on a body that does not give way, in preparation since `preparing`: enough for most garments.
 fn simply_resolved(
     drawn: &BodyObstacle<'_>,
     layers: &[Layer<'_>],
     settings: &ResolveSettings,
-    start: Instant,
+    preparing: Instant,
 ) -> Resolved {
-    let body_time = start.elapsed();
+    let body_time = preparing.elapsed();
     let now = Instant::now();
     // Wider limits are for what is left when the body has given way.
     let settings = ResolveSettings { loosened: 1.0, ..*settings };

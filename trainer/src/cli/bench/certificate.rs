@@ -1,5 +1,7 @@
 //! `clothcombo bench certificate`: the post-process on random outfits.
 
+mod summary;
+
 use crate::checkpoint::TrainedModel;
 use crate::cli::post_process::PostProcessArguments;
 use crate::cli::train::load_under_bar;
@@ -8,7 +10,6 @@ use crate::cli::verbosity::progress_bar;
 use crate::config::{Config, load};
 use crate::device::Backend;
 use crate::drape::{Networks, WardrobeTensors};
-use crate::evaluate::Spread;
 use crate::evaluate::certificates::{DrapedScene, Dressing, OutfitResult};
 use crate::one_core::each_on_one_core;
 use crate::scene::{Library, PreparedScene, SceneDraw, draw_outfit, prepare};
@@ -89,22 +90,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let library = Arc::new(load_under_bar(&config)?);
     let results = measure(arguments, &config, &library, checkpoint.as_ref(), &settings)?;
     if arguments.json {
-        let summary = json!({
-            "jobs": arguments.jobs,
-            "gap_mm": arguments.post_process.gap_mm,
-            "time_limit_s": arguments.post_process.time_limit.map(|t| t.as_secs_f64()),
-            "drape": if checkpoint.is_some() { "network" } else { "skinning" },
-            "all": summary(&results, |_| true),
-            "wearable": summary(&results, |r| r.is_wearable),
-            "by_layers": (1..=usize::from(arguments.layers))
-                .map(|layers| summary(&results, |r| r.garments.len() == layers))
-                .collect::<Vec<_>>(),
-            "failures": results.iter().filter(|r| !r.after.is_clear()).collect::<Vec<_>>(),
-            "draws": results,
-        });
-        println!("{}", serde_json::to_string_pretty(&summary).into_diagnostic()?);
+        let mut report = summary::report(&results, usize::from(arguments.layers));
+        report["jobs"] = json!(arguments.jobs);
+        report["gap_mm"] = json!(arguments.post_process.gap_mm);
+        report["time_limit_s"] = json!(arguments.post_process.time_limit.map(|t| t.as_secs_f64()));
+        report["drape"] = json!(if checkpoint.is_some() { "network" } else { "skinning" });
+        println!("{}", serde_json::to_string_pretty(&report).into_diagnostic()?);
     } else {
-        print_tables(&results, usize::from(arguments.layers));
+        summary::print_tables(&results, usize::from(arguments.layers));
     }
     Ok(())
 }
@@ -212,113 +205,4 @@ fn write_meshes(
         }
     }
     Ok(())
-}
-
-/// Where a share of 500 draws may not hold, every number that stands for the rest.
-fn summary(results: &[OutfitResult], counts: impl Fn(&OutfitResult) -> bool) -> serde_json::Value {
-    let chosen: Vec<&OutfitResult> = results.iter().filter(|r| counts(r)).collect();
-    let share = |holds: &dyn Fn(&OutfitResult) -> bool| {
-        chosen.iter().filter(|r| holds(r)).count() as f64 / chosen.len().max(1) as f64
-    };
-    json!({
-        "draws": chosen.len(),
-        "clear_before": share(&|r| r.before.is_clear()),
-        "clear_after": share(&|r| r.after.is_clear()),
-        "clear_of_self_after": share(&|r| r.after.self_triangle_pairs == 0),
-        "pinched_after": share(&|r| r.after.pinched_pairs > 0),
-        "order_violations_after": spread(&chosen, |r| vec![r.after.order_violations]),
-        "order_violations_by_vertices_after": spread(&chosen, |r| vec![r.after.order_violations_by_vertices]),
-        "strain_added": spread(&chosen, |r| r.strain_added.into_iter().collect()),
-        "milliseconds_per_garment": spread(&chosen, |r| r.milliseconds.clone()),
-        "milliseconds_per_8000_vertices": spread(&chosen, per_8000_vertices),
-        "body_milliseconds": spread(&chosen, |r| vec![r.body_milliseconds]),
-        "certificate_milliseconds": spread(&chosen, |r| vec![r.certificate_milliseconds]),
-    })
-}
-
-fn per_8000_vertices(result: &OutfitResult) -> Vec<f64> {
-    result.milliseconds.iter().zip(&result.vertices).map(|(ms, &v)| ms * 8000.0 / v.max(1) as f64).collect()
-}
-
-fn spread(results: &[&OutfitResult], values: impl Fn(&OutfitResult) -> Vec<f64>) -> Option<Spread> {
-    let all: Vec<f64> = results.iter().flat_map(|r| values(r)).collect();
-    (!all.is_empty()).then(|| Spread::of(all))
-}
-
-fn print_tables(results: &[OutfitResult], layers: usize) {
-    println!(
-        "{:<22}{:>7}{:>9}{:>9}{:>9}{:>10}{:>10}{:>10}{:>9}{:>9}",
-        "outfits",
-        "draws",
-        "clear %",
-        "after %",
-        "self %",
-        "pinched %",
-        "order %",
-        "strain %",
-        "p50 ms",
-        "p95 ms"
-    );
-    let line = |name: String, counts: &dyn Fn(&OutfitResult) -> bool| {
-        let chosen: Vec<&OutfitResult> = results.iter().filter(|r| counts(r)).collect();
-        if chosen.is_empty() {
-            return;
-        }
-        let share = |holds: &dyn Fn(&OutfitResult) -> bool| {
-            100.0 * chosen.iter().filter(|r| holds(r)).count() as f64 / chosen.len() as f64
-        };
-        let strain = spread(&chosen, |r| r.strain_added.into_iter().collect());
-        let time = spread(&chosen, |r| r.milliseconds.clone());
-        let order = spread(&chosen, |r| vec![r.after.order_violations]);
-        println!(
-            "{name:<22}{:>7}{:>9.1}{:>9.1}{:>9.1}{:>10.1}{:>10.3}{:>10.2}{:>9.1}{:>9.1}",
-            chosen.len(),
-            share(&|r| r.before.is_clear()),
-            share(&|r| r.after.is_clear()),
-            share(&|r| r.after.self_triangle_pairs == 0),
-            share(&|r| r.after.pinched_pairs > 0),
-            100.0 * order.map_or(0.0, |s| s.mean),
-            100.0 * strain.map_or(0.0, |s| s.median),
-            time.map_or(0.0, |s| s.median),
-            time.map_or(0.0, |s| s.p95),
-        );
-    };
-    let most = results.iter().map(|r| r.garments.len()).max().unwrap_or(0).max(layers);
-    for count in 1..=most {
-        line(format!("{count} garments"), &|r| r.garments.len() == count);
-    }
-    line("all".into(), &|_| true);
-    line("in a wearable order".into(), &|r| r.is_wearable);
-    let all: Vec<&OutfitResult> = results.iter().collect();
-    for (what, found) in [
-        ("ms per 8,000 vertices", spread(&all, per_8000_vertices)),
-        ("ms for the body", spread(&all, |r| vec![r.body_milliseconds])),
-        ("ms for the certificate", spread(&all, |r| vec![r.certificate_milliseconds])),
-        ("largest move [mm]", spread(&all, |r| vec![r.largest_move_mm])),
-    ] {
-        if let Some(s) = found {
-            println!("{what:<24}p50 {:>8.1}   p95 {:>8.1}", s.median, s.p95);
-        }
-    }
-    let failures: Vec<&OutfitResult> = results.iter().filter(|r| !r.after.is_clear()).collect();
-    if !failures.is_empty() {
-        println!(
-            "\nnot clear: pairs with the body (before → after, of those narrow), between layers; pinched; deepest [mm]"
-        );
-    }
-    for r in failures {
-        println!(
-            "{:>5}  {:>5} → {:<5}{:>5}{:>6} → {:<5}{:>6}{:>8.1}  {}{}",
-            r.draw,
-            r.before.body_triangle_pairs,
-            r.after.body_triangle_pairs,
-            r.after.narrow_triangle_pairs,
-            r.before.layer_triangle_pairs,
-            r.after.layer_triangle_pairs,
-            r.after.pinched_pairs,
-            r.after.max_depth_mm,
-            r.garments.join(" < "),
-            if r.is_wearable { "" } else { "  (cannot be worn)" }
-        );
-    }
 }

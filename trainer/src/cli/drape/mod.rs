@@ -9,7 +9,7 @@ use crate::cli::post_process::PostProcessArguments;
 use crate::cli::verbosity::{progress_bar, say};
 use crate::device::Backend;
 use crate::draper::output::{Show, Staged, write};
-use crate::draper::{Drape, Draper, DraperSettings, MotionProgress, Outfit, Report, SourceGarment, smooth};
+use crate::draper::{Drape, DrapeProgress, Draper, DraperSettings, Outfit, Report, SourceGarment, smooth};
 use clap::{Parser, ValueEnum};
 use clothcombo_data::asset::{Garment, unwearable};
 use clothcombo_data::check::impossible_turn;
@@ -19,7 +19,7 @@ use job::{Job, Scenes, ordered};
 use miette::{IntoDiagnostic, Report as Failure, WrapErr, miette};
 use serde_json::json;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Drapes garments on a body, innermost first: OBJ, GLB, picture, viewer and a report with a certificate
 #[derive(Parser)]
@@ -160,9 +160,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let read = |job| read(job).map_err(|failure| blame(job, failure));
     let wanted = jobs.iter().map(read).collect::<Result<Vec<_>, Failure>>()?;
     let bar = match wanted.iter().map(|(_, scenes)| scenes.states.len()).sum() {
-        1 => ProgressBar::hidden(),
-        drapes => progress_bar(drapes, "drapes {bar:30} {pos}/{len} · {eta} left{msg}"),
+        1 => progress_bar(1, "{spinner} draping · {elapsed}{prefix}{msg}"),
+        drapes => progress_bar(drapes, "drapes {bar:30} {pos}/{len} · {eta} left{prefix}{msg}"),
     };
+    bar.enable_steady_tick(Duration::from_millis(200));
     let mut reports = Vec::new();
     for (job, (sources, scenes)) in jobs.iter().zip(wanted) {
         let folder = match jobs.len() {
@@ -315,12 +316,20 @@ fn drape_all(
     bar: &ProgressBar,
 ) -> Result<Vec<Drape>, Failure> {
     let drapes = draper.drape_motion(outfit, &scenes.states, |progress| match progress {
-        MotionProgress::Draped => bar.inc(1),
-        MotionProgress::Again(frame) => {
-            bar.set_message(format!(" · number {} once more, from the one after it", frame + 1));
+        DrapeProgress::OnTheWay(share) if share < 1.0 => {
+            bar.set_message(format!(" · sorting out crossings, {:.0} % of the way", 100.0 * share));
+        }
+        DrapeProgress::OnTheWay(_) => bar.set_message(""),
+        DrapeProgress::Draped => {
+            bar.set_message("");
+            bar.inc(1);
+        }
+        DrapeProgress::Again(frame) => {
+            bar.set_message("");
+            bar.set_prefix(format!(" · number {} once more, from the one after it", frame + 1));
         }
     })?;
-    bar.set_message("");
+    bar.set_prefix("");
     Ok(drapes)
 }
 
