@@ -122,6 +122,21 @@ fn wrong_models_are_refused_with_file_and_key_and_leave_nothing_behind() {
 }
 
 #[test]
+fn a_model_is_not_written_over_itself() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = folder.path().join("b.npz");
+    fs::copy(fixture("smplh_tiny.npz"), &model).unwrap();
+    let before = fs::read(&model).unwrap();
+    fs::create_dir(folder.path().join("sub")).unwrap();
+    for out in ["b.npz", "sub/../b.npz"] {
+        let out = folder.path().join(out);
+        let message = import_smpl_family(&model, &out, &ALL, &mut no_progress()).unwrap_err().to_string();
+        assert!(message.contains("would be written over the input") && message.contains("-o"), "{message}");
+    }
+    assert_eq!(fs::read(&model).unwrap(), before);
+}
+
+#[test]
 fn pickles_and_folders_get_a_hint() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("body.npz");

@@ -75,7 +75,7 @@ fn both_layouts_are_found_in_nested_folders_and_stand_up() {
         ("pickled_poses.npz", "pickle"),
         ("narrow_poses.npz", "[2, 63]"),
         ("rateless_poses.npz", "mocap_framerate"),
-        ("stopped_poses.npz", "frames per second > 0"),
+        ("stopped_poses.npz", "expected 0.01 to 10000"),
         ("nan_poses.npz", "frame 1, joint 3"),
         ("empty_poses.npz", "no frames"),
         ("junk_poses.npz", "not an npz archive"),
@@ -117,6 +117,36 @@ fn a_wrong_up_axis_is_noticed_and_the_right_one_believed() {
     let settings = AmassSettings { thinning: every_frame(), up: UpAxis::Z };
     let summary = import_amass(&[y_up], &folder.path().join("out"), &settings, &mut no_progress()).unwrap();
     assert!(summary.taken[0].1.contains("check the up axis"), "{summary:?}");
+}
+
+#[test]
+fn motions_are_not_written_over_themselves() {
+    let folder = tempfile::tempdir().unwrap();
+    let clip = folder.path().join("jump.npz");
+    fs::copy(fixture("amass/CMU/02/jump_poses.npz"), &clip).unwrap();
+    let before = fs::read(&clip).unwrap();
+    let again = folder.path().join("out/..");
+    fs::create_dir(folder.path().join("out")).unwrap();
+    for out in [folder.path(), &again] {
+        let inputs = [folder.path().to_path_buf()];
+        let result = import_amass(&inputs, out, &AmassSettings::default(), &mut no_progress());
+        let message = result.unwrap_err().to_string();
+        assert!(message.contains("jump.npz would be written over the input"), "{message}");
+    }
+    assert_eq!(fs::read(&clip).unwrap(), before);
+    assert_eq!(files_in(folder.path()), ["jump.npz", "out"]);
+}
+
+#[test]
+fn rates_that_no_motion_may_have_are_not_written() {
+    let folder = tempfile::tempdir().unwrap();
+    // 60 frames/s, of which every millionth frame is asked for.
+    let slow =
+        AmassSettings { thinning: Thinning { frame_rate: 1e-9, static_threshold: 0.0 }, up: UpAxis::Z };
+    let files = [fixture("amass/CMU/02/jump_poses.npz")];
+    let message = import_amass(&files, folder.path(), &slow, &mut no_progress()).unwrap_err().to_string();
+    assert!(message.contains("expected 0.01 to 10000"), "{message}");
+    assert!(files_in(folder.path()).is_empty());
 }
 
 #[test]

@@ -23,6 +23,7 @@ pub mod memory;
 pub mod objective;
 pub mod observer;
 pub mod one_core;
+pub mod paths;
 pub mod picture;
 pub mod report;
 pub mod run_dir;

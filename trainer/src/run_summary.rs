@@ -2,11 +2,12 @@
 
 use crate::checkpoint::Checkpoint;
 use crate::config::{Config, load};
+use crate::paths::lossy;
 use crate::report::run_name;
 use crate::run_lock::RunLock;
 use serde::Serialize;
 use serde_json::Value;
-use std::io::{BufRead, BufReader};
+use std::io::{self, BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
 /// A run in a few numbers.
@@ -15,6 +16,7 @@ pub struct RunSummary {
     /// Name of its folder.
     pub name: String,
     /// The folder.
+    #[serde(serialize_with = "lossy")]
     pub path: PathBuf,
     /// `"running"`, `"finished"` or `"stopped"`.
     pub state: &'static str,
@@ -46,16 +48,71 @@ pub struct RunSummary {
     pub seed: u64,
 }
 
-const LAST: usize = 100;
+/// A run whose configuration cannot be read.
+#[derive(Clone, Debug, Serialize)]
+pub struct UnreadableRun {
+    /// Name of its folder.
+    pub name: String,
+    /// The folder.
+    #[serde(serialize_with = "lossy")]
+    pub path: PathBuf,
+    /// `"unreadable"`.
+    pub state: &'static str,
+    /// What is wrong.
+    pub error: String,
+}
 
-impl RunSummary {
-    /// Reads `root`; `None` if it is no run.
+/// A run that was found.
+#[derive(Clone, Debug, Serialize)]
+#[serde(untagged)]
+pub enum FoundRun {
+    /// One that says how it went.
+    Whole(Box<RunSummary>),
+    /// One that is damaged.
+    Unreadable(UnreadableRun),
+}
+
+impl FoundRun {
+    /// Reads `root`; `None` if it is no run, which is a folder with checkpoints in it.
     pub fn read(root: &Path) -> Option<Self> {
-        let config = load(&root.join("config.toml"), &[]).ok()?;
         if !root.join("checkpoints").is_dir() {
             return None;
         }
-        let mut summary = Self::empty(root, &config);
+        Some(match load(&root.join(CONFIG), &[]) {
+            Ok(config) => Self::Whole(Box::new(RunSummary::read(root, &config))),
+            Err(error) => Self::Unreadable(UnreadableRun {
+                name: run_name(root),
+                path: root.to_owned(),
+                state: "unreadable",
+                error: error.to_string(),
+            }),
+        })
+    }
+
+    /// Name of its folder.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Whole(run) => &run.name,
+            Self::Unreadable(run) => &run.name,
+        }
+    }
+
+    /// Score of the best validation, if there was one.
+    pub fn best_score(&self) -> Option<f64> {
+        match self {
+            Self::Whole(run) => run.best_score,
+            Self::Unreadable(_) => None,
+        }
+    }
+}
+
+const CONFIG: &str = "config.toml";
+const LAST: usize = 100;
+
+impl RunSummary {
+    /// Reads the run in `root`, whose configuration is `config`.
+    fn read(root: &Path, config: &Config) -> Self {
+        let mut summary = Self::empty(root, config);
         summary.read_steps(root);
         summary.read_validations(root);
         summary.checkpoint = Checkpoint::open(root).ok().map(|c| c.state.step);
@@ -65,7 +122,7 @@ impl RunSummary {
             (false, true) => "finished",
             (false, false) => "stopped",
         };
-        Some(summary)
+        summary
     }
 
     fn empty(root: &Path, config: &Config) -> Self {
@@ -151,17 +208,60 @@ fn median(values: &[f64]) -> Option<f64> {
 }
 
 /// All runs in `folder`: the folder itself, if it is a run, else those below it, by name.
-pub fn find_runs(folder: &Path) -> Vec<RunSummary> {
-    if let Some(run) = RunSummary::read(folder) {
-        return vec![run];
+///
+/// # Errors
+/// When the folder cannot be listed.
+pub fn find_runs(folder: &Path) -> io::Result<Vec<FoundRun>> {
+    // A folder of runs may have one that is called checkpoints.
+    if folder.join(CONFIG).exists()
+        && let Some(run) = FoundRun::read(folder)
+    {
+        return Ok(vec![run]);
     }
-    let mut paths: Vec<PathBuf> = std::fs::read_dir(folder)
-        .into_iter()
-        .flatten()
-        .flatten()
-        .map(|e| e.path())
-        .filter(|p| p.is_dir())
-        .collect();
+    let entries = std::fs::read_dir(folder)?.collect::<Result<Vec<_>, _>>()?;
+    let mut paths: Vec<PathBuf> = entries.into_iter().map(|e| e.path()).filter(|p| p.is_dir()).collect();
     paths.sort();
-    paths.iter().filter_map(|p| RunSummary::read(p)).collect()
+    Ok(paths.iter().filter_map(|p| FoundRun::read(p)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn damaged_runs_are_found_and_a_folder_that_is_not_there_is_an_error() {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, config) in [("broken", Some("seed = ")), ("lost", None)] {
+            std::fs::create_dir_all(folder.path().join(name).join("checkpoints")).unwrap();
+            if let Some(config) = config {
+                std::fs::write(folder.path().join(name).join(CONFIG), config).unwrap();
+            }
+        }
+        std::fs::create_dir(folder.path().join("no run")).unwrap();
+        let runs = find_runs(folder.path()).unwrap();
+        assert_eq!(runs.iter().map(FoundRun::name).collect::<Vec<_>>(), ["broken", "lost"]);
+        let json = serde_json::to_value(&runs).unwrap();
+        assert_eq!((&json[0]["state"], &json[1]["state"]), (&"unreadable".into(), &"unreadable".into()));
+        assert!(json[1]["error"].as_str().unwrap().contains("cannot read the configuration"), "{json}");
+        assert_eq!(find_runs(&folder.path().join("broken")).unwrap().len(), 1);
+        assert!(find_runs(&folder.path().join("no run")).unwrap().is_empty());
+        let missing = find_runs(&folder.path().join("missing")).unwrap_err();
+        assert_eq!(missing.kind(), io::ErrorKind::NotFound);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_run_of_any_name_can_be_told_as_json() {
+        use std::os::unix::ffi::OsStrExt;
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path().join(std::ffi::OsStr::from_bytes(b"run-\xff"));
+        std::fs::create_dir_all(root.join("checkpoints")).unwrap();
+        let broken = FoundRun::read(&root).unwrap();
+        assert!(serde_json::to_string(&broken).unwrap().contains("run-\u{fffd}"));
+        let config = "seed = 1\n[data]\n[[data.garments]]\ngenerate = { count = 2 }\n[[stages]]\nname = \"a\"\ntrains = \"single\"\nsteps = 1\n";
+        std::fs::write(root.join(CONFIG), config).unwrap();
+        let whole = FoundRun::read(&root).unwrap();
+        assert!(matches!(whole, FoundRun::Whole(_)), "{whole:?}");
+        assert!(serde_json::to_string(&whole).unwrap().contains("run-\u{fffd}"));
+    }
 }

@@ -6,12 +6,14 @@
 
 mod error;
 mod files;
+mod place;
 #[cfg(test)]
 mod tests;
 
 pub use error::{MeshSize, ScoreError};
 pub use files::{MeshFiles, score_files};
 pub(crate) use files::{load_body, load_garment};
+pub(crate) use place::misplaced;
 
 use crate::config::LossesConfig;
 use crate::objective::scene_weights;

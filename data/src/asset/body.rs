@@ -192,6 +192,12 @@ impl Body {
         })
     }
 
+    /// The same body inside out: every face looks the other way.
+    pub(super) fn turned(self) -> Self {
+        let zero_body = self.zero_body.turned();
+        Self { faces: zero_body.faces().into(), zero_body, ..self }
+    }
+
     /// Number of vertices V.
     pub fn vertex_count(&self) -> usize {
         self.template.len()

@@ -9,6 +9,7 @@ use super::provenance::Provenance;
 use super::skeleton;
 use super::skin_weights::SparseSkinWeights;
 use crate::format::npz::{Array, NpzError, NpzFile, NpzWriter};
+use clothcombo_physics::mesh::{is_closed, signed_volume};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -19,12 +20,12 @@ pub enum BodyFileError {
     #[error(transparent)]
     Npz(#[from] NpzError),
     /// The arrays do not make a body.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {reason}", path.display())]
     Body {
         /// The file.
         path: PathBuf,
         /// What is wrong.
-        source: BodyError,
+        reason: BodyError,
     },
     /// A face names a vertex that is not there.
     #[error("{}: key 'f', face {face} names vertex {vertex}, but there are {vertices} vertices", path.display())]
@@ -37,6 +38,18 @@ pub enum BodyFileError {
         vertex: f64,
         /// How many there are.
         vertices: usize,
+    },
+    /// A vertex or joint is named by a fraction.
+    #[error("{}: key '{key}', {place} is {value}, which is no whole number; vertices and joints are numbered 0, 1, 2 …", path.display())]
+    Fraction {
+        /// The file.
+        path: PathBuf,
+        /// The key.
+        key: &'static str,
+        /// Which of its numbers.
+        place: String,
+        /// Its value.
+        value: f64,
     },
 }
 
@@ -55,6 +68,9 @@ impl Default for BodyFileSettings {
 
 const HINT: &str = "a body is an SMPL, SMPL-H or SMPL-X npz with v_template, f, shapedirs, weights, kintree_table and J_regressor";
 
+/// What is told of a body whose faces look inwards.
+pub(crate) const INSIDE_OUT: &str = "the body is inside out; its faces were turned";
+
 /// How many of SMPL-X's `shapedirs` are body shape; the rest are facial expression, which clothes do not see. Files with
 /// joint directions are those written here (`ours`), where every component is shape.
 pub(crate) fn shape_part(joints: usize, components: usize, ours: bool) -> usize {
@@ -66,27 +82,36 @@ pub(crate) fn shape_part(joints: usize, components: usize, ours: bool) -> usize 
 }
 
 impl Body {
-    /// Reads a body from an SMPL-family npz. The body is moved so that its pelvis stands at the origin (see [`Body`]).
+    /// Reads a body from an SMPL-family npz. The body is moved so that its pelvis stands at the origin (see [`Body`]). Where it is
+    /// closed and inside out, its faces are turned, and a warning says so.
     ///
     /// # Errors
     /// [`BodyFileError`] naming file and key.
     pub fn load(path: &Path, settings: &BodyFileSettings) -> Result<Self, BodyFileError> {
+        let (body, was_inside_out) = Self::load_turned(path, settings)?;
+        if was_inside_out {
+            tracing::warn!("{}: {INSIDE_OUT}", path.display());
+        }
+        Ok(body)
+    }
+
+    /// As [`Self::load`], with whether the body was inside out instead of the warning.
+    pub(crate) fn load_turned(
+        path: &Path,
+        settings: &BodyFileSettings,
+    ) -> Result<(Self, bool), BodyFileError> {
+        let body = Self::load_as_written(path, settings)?;
+        let is_inside_out = is_closed(&body.faces) && signed_volume(&body.zero_body()) < 0.0;
+        Ok((if is_inside_out { body.turned() } else { body }, is_inside_out))
+    }
+
+    fn load_as_written(path: &Path, settings: &BodyFileSettings) -> Result<Self, BodyFileError> {
         let mut file = NpzFile::open(path)?;
         let template = points(path, "v_template", file.numbers("v_template", HINT)?)?;
         let vertices = template.len();
         let faces = faces(path, file.numbers("f", HINT)?, vertices)?;
-        let tree = file.numbers("kintree_table", HINT)?;
-        let joints = match tree.shape[..] {
-            [2, joints] if joints > 0 => joints,
-            _ => return Err(shape_error(path, "kintree_table", &tree.shape, "[2, joints]")),
-        };
-        // The root's parent is −1, or 2³² − 1 where the table is unsigned; anything that is no joint is "none".
-        let parents: Vec<Option<usize>> = tree.data[..joints]
-            .iter()
-            .map(|p| (*p >= 0.0 && *p < joints as f64).then_some(*p as usize))
-            .enumerate()
-            .map(|(joint, parent)| if joint == 0 { None } else { parent })
-            .collect();
+        let parents = parents(path, file.numbers("kintree_table", HINT)?)?;
+        let joints = parents.len();
 
         let directions = file.numbers_f32("shapedirs", HINT)?;
         let components = match directions.shape[..] {
@@ -159,7 +184,7 @@ impl Body {
             parents,
             joint_names,
         })
-        .map_err(|source| BodyFileError::Body { path: path.into(), source })
+        .map_err(|reason| BodyFileError::Body { path: path.into(), reason })
     }
 
     /// Writes the body as npz (keys as [`Body::load`] reads them, `f32` throughout but for the joints).
@@ -205,11 +230,34 @@ fn faces(path: &Path, array: Array<f64>, vertices: usize) -> Result<Vec<[u32; 3]
     if !matches!(array.shape[..], [_, 3]) {
         return Err(shape_error(path, "f", &array.shape, "[faces, 3]"));
     }
-    if let Some(at) = array.data.iter().position(|i| !(*i >= 0.0 && *i < vertices as f64)) {
+    let is_vertex = |i: f64| i >= 0.0 && i < vertices as f64 && i.fract() == 0.0;
+    if let Some(at) = array.data.iter().position(|i| !is_vertex(*i)) {
         let (face, vertex) = (at / 3, array.data[at]);
+        if vertex.fract() != 0.0 {
+            let place = format!("corner {} of face {face}", at % 3);
+            return Err(BodyFileError::Fraction { path: path.into(), key: "f", place, value: vertex });
+        }
         return Err(BodyFileError::Face { path: path.into(), face, vertex, vertices });
     }
     Ok(array.data.chunks_exact(3).map(|f| [f[0] as u32, f[1] as u32, f[2] as u32]).collect())
+}
+
+/// The parent of each joint, from the first row of the table. The root's is −1, or 2³² − 1 where the table is unsigned; anything
+/// that is no joint is "none".
+fn parents(path: &Path, tree: Array<f64>) -> Result<Vec<Option<usize>>, BodyFileError> {
+    let joints = match tree.shape[..] {
+        [2, joints] if joints > 0 => joints,
+        _ => return Err(shape_error(path, "kintree_table", &tree.shape, "[2, joints]")),
+    };
+    let parents = &tree.data[..joints];
+    if let Some(joint) = parents.iter().position(|p| p.fract() != 0.0) {
+        let (key, place) = ("kintree_table", format!("the parent of joint {joint}"));
+        return Err(BodyFileError::Fraction { path: path.into(), key, place, value: parents[joint] });
+    }
+    let is_joint = |p: f64| p >= 0.0 && p < joints as f64;
+    Ok((parents.iter().enumerate())
+        .map(|(joint, p)| (joint > 0 && is_joint(*p)).then_some(*p as usize))
+        .collect())
 }
 
 fn first_columns<T: Copy>(data: &[T], columns: usize, keep: usize) -> Vec<T> {
@@ -247,90 +295,4 @@ fn regress_joints(
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::body::tests::random_parts;
-    use super::*;
-
-    #[test]
-    fn a_body_without_vertices_is_refused() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("none.npz");
-        let mut npz = NpzWriter::new();
-        npz.f32("v_template", &[0, 3], &[]).u32("f", &[0, 3], &[]).f32("shapedirs", &[0, 3, 1], &[]);
-        npz.f32("weights", &[0, 2], &[]).u32("kintree_table", &[2, 2], &[u32::MAX, 0, 0, 1]);
-        npz.f64("J_regressor", &[2, 0], &[]);
-        npz.save(&path).unwrap();
-        let message = Body::load(&path, &BodyFileSettings::default()).unwrap_err().to_string();
-        assert!(message.contains("none.npz") && message.contains("v_template"), "{message}");
-    }
-
-    #[test]
-    fn what_is_saved_loads_again() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("test.npz");
-        let body = Body::new(random_parts(7, 1)).unwrap();
-        body.save(&path, &Provenance::default()).unwrap();
-        let loaded = Body::load(&path, &BodyFileSettings::default()).unwrap();
-        assert_eq!(loaded.faces, body.faces);
-        assert_eq!(loaded.shape_directions, body.shape_directions);
-        assert_eq!(loaded.joint_template, body.joint_template);
-        assert_eq!(loaded.joint_shape_directions, body.joint_shape_directions);
-        assert_eq!(loaded.pose_directions, body.pose_directions);
-        assert_eq!((loaded.parents, loaded.joint_names), (body.parents, body.joint_names));
-        for (a, b) in loaded.template.iter().flatten().zip(body.template.iter().flatten()) {
-            assert!((a - b).abs() < 1e-7);
-        }
-        let few = Body::load(&path, &BodyFileSettings { shape_components: 2 }).unwrap();
-        assert_eq!(few.shape_count, 2);
-        assert_eq!(few.shape_directions[2..4], [body.shape_directions[3], body.shape_directions[4]]);
-    }
-
-    /// The layout the SMPL family ships: unsigned tree with 2³² − 1 at the root, dense weights, a joint regressor.
-    #[test]
-    fn joints_come_from_the_regressor_and_a_missing_key_is_named() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("smpl.npz");
-        let template = [0.0f32, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 2.0, 0.0];
-        let directions = [1.0f32, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
-        let write = |leave_out: &str| {
-            let mut npz = NpzWriter::new();
-            if leave_out != "v_template" {
-                npz.f32("v_template", &[3, 3], &template);
-            }
-            npz.u32("f", &[1, 3], &[0, 1, 2]).f32("shapedirs", &[3, 3, 1], &directions);
-            if leave_out != "weights" {
-                npz.f32("weights", &[3, 2], &[1.0, 0.0, 0.5, 0.5, 0.0, 1.0]);
-            }
-            npz.u32("kintree_table", &[2, 2], &[u32::MAX, 0, 0, 1]);
-            if leave_out != "J_regressor" {
-                npz.f64("J_regressor", &[2, 3], &[0.5, 0.5, 0.0, 0.0, 0.5, 0.5]);
-            }
-            npz.save(&path).unwrap();
-        };
-        write("");
-        let body = Body::load(&path, &BodyFileSettings::default()).unwrap();
-        // Regressed joints are (1, 0, 0) and (1, 1, 0); then the pelvis goes to the origin.
-        assert_eq!(body.joint_template, [[0.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
-        assert_eq!(body.template[0], [-1.0, 0.0, 0.0]);
-        // The second joint's direction (0, .5, .5) less the pelvis' (.5, .5, 0).
-        assert_eq!(body.joint_shape_directions[3..], [-0.5, 0.0, 0.5]);
-        assert_eq!(body.parents, [None, Some(0)]);
-        for key in ["v_template", "weights", "J_regressor"] {
-            write(key);
-            let message = Body::load(&path, &BodyFileSettings::default()).unwrap_err().to_string();
-            assert!(message.contains("smpl.npz") && message.contains(&format!("'{key}'")), "{message}");
-            assert!(message.contains("SMPL") && message.contains("shapedirs"), "{message}");
-        }
-    }
-
-    #[test]
-    fn a_pickle_is_not_opened() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("SMPL_NEUTRAL.pkl");
-        std::fs::write(&path, b"\x80\x02}q\x00.").unwrap();
-        let message = Body::load(&path, &BodyFileSettings::default()).unwrap_err().to_string();
-        assert!(message.contains("SMPL_NEUTRAL.pkl") && message.contains("pickles"), "{message}");
-        let missing = Body::load(&folder.path().join("none.npz"), &BodyFileSettings::default()).unwrap_err();
-        assert!(missing.to_string().contains("none.npz"));
-    }
-}
+mod tests;

@@ -5,43 +5,23 @@ use super::pose::Pose;
 use super::provenance::Provenance;
 use super::skeleton::{BODY_JOINT_COUNT, BODY_JOINT_NAMES};
 use crate::format::npz::{NpzError, NpzFile, NpzWriter};
-use std::path::{Path, PathBuf};
-use thiserror::Error;
+use std::ops::RangeInclusive;
+use std::path::Path;
 
-/// Why a motion file cannot be used.
-#[derive(Debug, Error)]
-pub enum MotionError {
-    /// The archive or one of its arrays is unusable.
-    #[error(transparent)]
-    Npz(#[from] NpzError),
-    /// A frame holds a NaN or infinite angle.
-    #[error("{}: frame {frame}, joint {joint} has a non-finite rotation", path.display())]
-    NonFinite {
-        /// The file.
-        path: PathBuf,
-        /// The frame, from 0.
-        frame: usize,
-        /// The joint.
-        joint: usize,
-    },
-    /// Some joints are named as ours are, but not this one.
-    #[error("{}: key 'joint_names' names no '{joint}'; the 22 joints of the body are named as in SMPL, in any order", path.display())]
-    Joint {
-        /// The file.
-        path: PathBuf,
-        /// Its name.
-        joint: &'static str,
-    },
-    /// The frame rate is not a positive number.
-    #[error("{}: key '{key}' is {value}, expected frames per second > 0", path.display())]
-    FrameRate {
-        /// The file.
-        path: PathBuf,
-        /// The key.
-        key: &'static str,
-        /// Its value.
-        value: f64,
-    },
+mod error;
+
+pub use error::{MotionDefect, MotionError};
+
+/// Frame rates that a motion may have [frames/s]: from time lapse to high-speed cameras. Beyond them times and numbers of frames
+/// leave the range of their types.
+pub const FRAME_RATES: RangeInclusive<f64> = 0.01..=10_000.0;
+
+/// Largest component of a rotation vector in a motion [rad]: over a thousand turns, where f32 still tells a thousandth of a radian.
+pub const MAX_ANGLE: f64 = 1e4;
+
+/// Refuses a frame rate [frames/s] out of [`FRAME_RATES`].
+pub(crate) fn check_frame_rate(rate: f64) -> Result<(), MotionDefect> {
+    if FRAME_RATES.contains(&rate) { Ok(()) } else { Err(MotionDefect::FrameRate { rate }) }
 }
 
 /// A clip of motion: poses of the 22 body joints at a constant rate.
@@ -104,9 +84,6 @@ impl Motion {
         };
         let key = if file.contains(RATE_KEYS[1]) { RATE_KEYS[1] } else { RATE_KEYS[0] };
         let frame_rate = file.numbers(key, HINT)?.data.first().copied().unwrap_or(f64::NAN);
-        if !(frame_rate > 0.0 && frame_rate.is_finite()) {
-            return Err(MotionError::FrameRate { path: path.into(), key, value: frame_rate });
-        }
         // Names that are no text (pickled ones), as none at all, say nothing.
         let names = match file.strings("joint_names", HINT) {
             Ok(names) => names.data,
@@ -115,22 +92,37 @@ impl Motion {
         };
         let places =
             places(&names, columns / 3).map_err(|joint| MotionError::Joint { path: path.into(), joint })?;
-        let mut frames = Vec::with_capacity(poses.shape[0]);
-        for (frame, row) in poses.data.chunks_exact(columns).enumerate() {
-            let rotations = places.map(|place| [row[3 * place], row[3 * place + 1], row[3 * place + 2]]);
-            let is_finite = |rotation: &[f64; 3]| rotation.iter().all(|x| x.is_finite());
-            if let Some(joint) = rotations.iter().position(|rotation| !is_finite(rotation)) {
-                return Err(MotionError::NonFinite { path: path.into(), frame, joint });
-            }
-            frames.push(Pose { rotations: rotations.to_vec() });
-        }
+        let pose = |row: &[f64]| Pose {
+            rotations: places.map(|place| [row[3 * place], row[3 * place + 1], row[3 * place + 2]]).to_vec(),
+        };
+        let poses = poses.data.chunks_exact(columns).map(pose).collect();
         let mut text = |key: &str| match file.strings(key, HINT) {
             Ok(array) => array.data.into_iter().next().unwrap_or_default(),
             Err(_) => String::new(),
         };
         let source = Provenance { source: text("source"), author: text("author"), licence: text("licence") };
         let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-        Ok((Self { name, frame_rate, poses: frames, source }, columns))
+        let motion = Self { name, frame_rate, poses, source };
+        motion.check().map_err(|defect| MotionError::Defect { path: path.into(), defect })?;
+        Ok((motion, columns))
+    }
+
+    /// Checks frame rate and angles: what is read and what is written must pass.
+    pub(crate) fn check(&self) -> Result<(), MotionDefect> {
+        check_frame_rate(self.frame_rate)?;
+        for (frame, pose) in self.poses.iter().enumerate() {
+            for (joint, rotation) in pose.rotations.iter().enumerate() {
+                if rotation.iter().any(|x| !x.is_finite()) {
+                    return Err(MotionDefect::NonFinite { frame, joint });
+                }
+                // By component, not by length: rounded to f32 in a file they pass still.
+                let angle = rotation.iter().fold(0.0f64, |largest, x| largest.max(x.abs()));
+                if angle > MAX_ANGLE {
+                    return Err(MotionDefect::Angle { frame, joint, angle });
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Writes the motion npz.
@@ -229,6 +221,31 @@ mod tests {
         npz.f32("poses", &[2, 66], &rows).f64("mocap_framerate", &[], &[30.0]);
         npz.save(&path).unwrap();
         let message = Motion::load(&path).unwrap_err().to_string();
-        assert!(message.contains("frame 1, joint 2"), "{message}");
+        assert!(message.contains("frame 1, joint 2 (right_hip)"), "{message}");
+    }
+
+    #[test]
+    fn rates_and_angles_of_no_motion_are_refused_with_their_place() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("clip.npz");
+        let load = |rate: f64, angle: f32| {
+            let mut rows = vec![0.0f32; 132];
+            rows[66 + 3 * 4 + 1] = angle;
+            let mut npz = NpzWriter::new();
+            npz.f32("poses", &[2, 66], &rows).f64("mocap_framerate", &[], &[rate]);
+            npz.save(&path).unwrap();
+            Motion::load(&path).map_err(|e| e.to_string())
+        };
+        for rate in [0.01, 29.97, 10_000.0] {
+            assert_eq!(load(rate, -1e4).unwrap().frame_rate, rate);
+        }
+        for rate in [0.0, -30.0, 1e-305, 0.0099, 10_001.0, 1e300, f64::INFINITY, f64::NAN] {
+            let message = load(rate, 0.0).unwrap_err();
+            assert!(message.contains("clip.npz") && message.contains("expected 0.01 to 10000"), "{message}");
+        }
+        for angle in [1.1e4, -1e30, f32::MAX] {
+            let message = load(30.0, angle).unwrap_err();
+            assert!(message.contains("clip.npz: frame 1, joint 4 (left_knee) turns by"), "{message}");
+        }
     }
 }

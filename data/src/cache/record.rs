@@ -73,12 +73,12 @@ impl Kind {
 #[derive(Debug, Error)]
 pub enum RecordError {
     /// The file cannot be opened or mapped.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {reason}", path.display())]
     Io {
         /// The record.
         path: PathBuf,
         /// What the system said.
-        source: io::Error,
+        reason: io::Error,
     },
     /// The file is not whole or was changed.
     #[error("{}: damaged cache record ({reason}); it is computed anew when the file is removed", path.display())]
@@ -111,7 +111,7 @@ impl Record {
     /// # Errors
     /// [`RecordError`] naming the file.
     pub fn open(path: &Path) -> Result<Self, RecordError> {
-        let failed = |source| RecordError::Io { path: path.into(), source };
+        let failed = |reason| RecordError::Io { path: path.into(), reason };
         let file = File::open(path).map_err(failed)?;
         // SAFETY: records are written under another name and renamed into place, and nobody writes to one afterwards, so
         // the mapped bytes do not change. (Whoever truncates a file of the cache by hand ends the process with SIGBUS,

@@ -13,12 +13,12 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum CacheError {
     /// The folder cannot be made, listed or written to.
-    #[error("cache {}: {source}; hint: check that the folder can be written to and the disk is not full", path.display())]
+    #[error("cache {}: {reason}; hint: check that the folder can be written to and the disk is not full", path.display())]
     Io {
         /// File or folder.
         path: PathBuf,
         /// What the system said.
-        source: io::Error,
+        reason: io::Error,
     },
     /// Another record would make the folder larger than allowed.
     #[error(
@@ -97,7 +97,7 @@ impl ArrayCache {
     /// # Errors
     /// [`CacheError::Io`].
     pub fn open(root: &Path, limit_bytes: u64) -> Result<Self, CacheError> {
-        let failed = |source| CacheError::Io { path: root.into(), source };
+        let failed = |reason| CacheError::Io { path: root.into(), reason };
         fs::create_dir_all(root).map_err(failed)?;
         let mut used = 0;
         for shelf in fs::read_dir(root).map_err(failed)? {
@@ -130,7 +130,7 @@ impl ArrayCache {
         let path = self.path(key);
         match Record::open(&path).and_then(|record| read(&record)) {
             Ok(value) => Some(value),
-            Err(RecordError::Io { source, .. }) if source.kind() == io::ErrorKind::NotFound => None,
+            Err(RecordError::Io { reason, .. }) if reason.kind() == io::ErrorKind::NotFound => None,
             Err(error) => {
                 tracing::warn!("{error}; removed");
                 let size = fs::metadata(&path).map_or(0, |m| m.len());
@@ -167,7 +167,7 @@ impl ArrayCache {
                 limit: mib(self.limit),
             });
         }
-        atomic::write(&path, &bytes).map_err(|source| CacheError::Io { path, source })?;
+        atomic::write(&path, &bytes).map_err(|reason| CacheError::Io { path, reason })?;
         self.used.fetch_add(size, Ordering::Relaxed);
         Ok(())
     }

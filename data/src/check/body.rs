@@ -1,6 +1,7 @@
 //! A body file.
 
 use super::FileCheck;
+use crate::asset::body_file::INSIDE_OUT;
 use crate::asset::{BODY_JOINT_COUNT, Body, BodyFileSettings};
 use crate::format::NpzFile;
 use clothcombo_physics::Topology;
@@ -30,11 +31,14 @@ pub struct BodyCheck {
     pub boundary_loops: usize,
     /// Edges with three or more triangles.
     pub non_manifold_edges: usize,
+    /// Whether the faces of its closed surface look inwards; they are turned when it is read.
+    pub inside_out: bool,
 }
 
 pub(super) fn check(path: &Path, npz: &mut NpzFile) -> FileCheck {
-    let body = match Body::load(path, &BodyFileSettings { shape_components: usize::MAX }) {
-        Ok(body) => body,
+    let settings = BodyFileSettings { shape_components: usize::MAX };
+    let (body, was_inside_out) = match Body::load_turned(path, &settings) {
+        Ok(loaded) => loaded,
         Err(e) => return FileCheck::unusable(path, e),
     };
     // The loader normalises each row: the sums are those of the file.
@@ -61,6 +65,7 @@ pub(super) fn check(path: &Path, npz: &mut NpzFile) -> FileCheck {
         components: topology.component_count - topology.unreferenced.len(),
         boundary_loops: topology.boundary_loops.len(),
         non_manifold_edges: topology.non_manifold_edges.len(),
+        inside_out: was_inside_out,
     };
     if check.joints < BODY_JOINT_COUNT {
         file.unusable = Some(format!(
@@ -76,6 +81,9 @@ pub(super) fn check(path: &Path, npz: &mut NpzFile) -> FileCheck {
     }
     if !(0.4..=2.8).contains(&check.height) {
         file.warnings.push(format!("{:.2} m high: are the units metres and y up?", check.height));
+    }
+    if check.inside_out {
+        file.warnings.push(INSIDE_OUT.into());
     }
     if check.boundary_loops > 0 {
         file.warnings.push(format!("{} holes in the surface", check.boundary_loops));

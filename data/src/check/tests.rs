@@ -35,6 +35,9 @@ fn a_dataset_with_good_and_bad_files_is_told_apart() {
     obj::save(&loose.join("centimetres.obj"), &far, skirt.rest.faces(), &[]).unwrap();
     fs::write(loose.join("broken.stl"), "solid\nfacet\n vertex 0 0 z\n").unwrap();
     body.save(&folder.path().join("body.npz"), &Provenance::default()).unwrap();
+    let mut inside_out = body.clone();
+    inside_out.faces = body.faces.iter().map(|&[a, b, c]| [a, c, b]).collect();
+    inside_out.save(&folder.path().join("inside_out.npz"), &Provenance::default()).unwrap();
     let mut poses = vec![Pose::t_pose(22); 4];
     poses[3].rotations[4] = [-1.0, 0.0, 0.0];
     let motion = Motion { name: String::new(), frame_rate: 2.0, poses, source: Provenance::default() };
@@ -67,6 +70,9 @@ fn a_dataset_with_good_and_bad_files_is_told_apart() {
     let body = by_name(&files, "body.npz").body.as_ref().unwrap();
     assert_eq!((body.joints, body.components, body.boundary_loops), (checker.body.joint_count(), 1, 0));
     assert!(body.weight_sums.iter().all(|s| (s - 1.0).abs() < 1e-5));
+    let inside_out = by_name(&files, "inside_out.npz");
+    assert!(!body.inside_out && inside_out.body.as_ref().unwrap().inside_out);
+    assert!(inside_out.warnings.iter().any(|w| w.contains("inside out")), "{:?}", inside_out.warnings);
     let knee = by_name(&files, "knee.npz").motion.as_ref().unwrap();
     assert_eq!((knee.frames, knee.frames_outside_limits, knee.duration), (4, 1, 2.0));
     assert_eq!(knee.joints_outside_limits.get("left_knee"), Some(&1));

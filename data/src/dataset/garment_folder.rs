@@ -31,12 +31,12 @@ pub const MANIFEST: &str = "garments.toml";
 #[derive(Debug, Error)]
 pub enum GarmentFolderError {
     /// The folder or manifest cannot be read or written.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {reason}", path.display())]
     Io {
         /// File or folder.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        reason: std::io::Error,
     },
     /// The manifest is not as it should be; the message shows line and column.
     #[error("{}: {message}", path.display())]
@@ -207,7 +207,7 @@ pub(crate) fn read_entries(folder: &Path) -> Result<Vec<ManifestEntry>, GarmentF
             .into_iter()
             .map(|file| ManifestEntry { file, ..ManifestEntry::default() })
             .collect(),
-        Err(source) => return Err(GarmentFolderError::Io { path, source }),
+        Err(reason) => return Err(GarmentFolderError::Io { path, reason }),
     };
     if entries.is_empty() {
         return Err(GarmentFolderError::Empty { path: folder.into() });
@@ -216,7 +216,7 @@ pub(crate) fn read_entries(folder: &Path) -> Result<Vec<ManifestEntry>, GarmentF
 }
 
 fn list_mesh_files(folder: &Path) -> Result<Vec<String>, GarmentFolderError> {
-    let failed = |source| GarmentFolderError::Io { path: folder.into(), source };
+    let failed = |reason| GarmentFolderError::Io { path: folder.into(), reason };
     let mut files = Vec::new();
     for entry in fs::read_dir(folder).map_err(failed)? {
         let path = entry.map_err(failed)?.path();
@@ -259,7 +259,7 @@ pub fn read_manifest(folder: &Path) -> Result<Vec<ManifestEntry>, GarmentFolderE
     match fs::read_to_string(&path) {
         Ok(text) => Ok(manifest_from(&path, &text)?.garment),
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(Vec::new()),
-        Err(source) => Err(GarmentFolderError::Io { path, source }),
+        Err(reason) => Err(GarmentFolderError::Io { path, reason }),
     }
 }
 
@@ -297,8 +297,14 @@ pub fn save_manifest(folder: &Path, entries: Vec<ManifestEntry>) -> Result<PathB
     let text = toml::to_string(&Manifest { garment: entries })
         .map_err(|e| GarmentFolderError::Manifest { path: path.clone(), message: e.to_string() })?;
     atomic::write(&path, text.as_bytes())
-        .map_err(|source| GarmentFolderError::Io { path: path.clone(), source })?;
+        .map_err(|reason| GarmentFolderError::Io { path: path.clone(), reason })?;
     Ok(path)
+}
+
+/// The files that [`save_garment_folder`] writes.
+pub(crate) fn garment_folder_files(folder: &Path, garments: &[FolderGarment]) -> Vec<PathBuf> {
+    let files = garments.iter().map(|g| format!("{}.obj", g.garment.name));
+    files.chain([MANIFEST.into()]).map(|file| folder.join(file)).collect()
 }
 
 /// Writes garments as `<name>.obj` and a manifest; the manifest comes last, so that a folder with one is complete. Returns the
@@ -311,9 +317,8 @@ pub fn save_garment_folder(
     garments: &[FolderGarment],
 ) -> Result<Vec<PathBuf>, GarmentFolderError> {
     let entries = garments.iter().map(|g| save_garment(folder, g)).collect::<Result<Vec<_>, _>>()?;
-    let mut written: Vec<PathBuf> = entries.iter().map(|e| folder.join(&e.file)).collect();
-    written.push(save_manifest(folder, entries)?);
-    Ok(written)
+    save_manifest(folder, entries)?;
+    Ok(garment_folder_files(folder, garments))
 }
 
 #[cfg(test)]

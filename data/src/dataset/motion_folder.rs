@@ -10,12 +10,12 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum MotionFolderError {
     /// The folder cannot be read.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {reason}", path.display())]
     Io {
         /// The folder.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        reason: std::io::Error,
     },
     /// No motion in it.
     #[error("{}: no motions; expected .npz files with poses and mocap_framerate", path.display())]
@@ -33,7 +33,7 @@ pub enum MotionFolderError {
 /// # Errors
 /// [`MotionFolderError`] naming folder, or file and key.
 pub fn load_motion_folder(folder: &Path) -> Result<Vec<Motion>, MotionFolderError> {
-    let failed = |source| MotionFolderError::Io { path: folder.into(), source };
+    let failed = |reason| MotionFolderError::Io { path: folder.into(), reason };
     let mut files = Vec::new();
     for entry in fs::read_dir(folder).map_err(failed)? {
         let path = entry.map_err(failed)?.path();

@@ -1,5 +1,6 @@
 //! Biovision hierarchy (BVH) motion capture: a joint tree with rest offsets, and channel values per frame.
 
+use crate::asset::motion::{MAX_ANGLE, check_frame_rate};
 use crate::asset::rotation::{self, Matrix3};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,12 +10,12 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum BvhError {
     /// The file cannot be read.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {reason}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        reason: std::io::Error,
     },
     /// A line is wrong.
     #[error("{}:{line}: {message}", path.display())]
@@ -119,7 +120,7 @@ impl Bvh {
     /// # Errors
     /// [`BvhError`] naming file and line.
     pub fn load(path: &Path) -> Result<Self, BvhError> {
-        let bytes = fs::read(path).map_err(|source| BvhError::Io { path: path.into(), source })?;
+        let bytes = fs::read(path).map_err(|reason| BvhError::Io { path: path.into(), reason })?;
         Self::parse(&String::from_utf8_lossy(&bytes), path)
     }
 
@@ -146,11 +147,10 @@ impl Bvh {
         if frame_time <= 0.0 {
             return Err(words.error(format!("frame time {frame_time} is not positive")));
         }
+        check_frame_rate(1.0 / frame_time)
+            .map_err(|defect| words.error(format!("a frame time of {frame_time:?} s means {defect}")))?;
         let channel_count: usize = joints.iter().map(|j: &BvhJoint| j.channels.len()).sum();
-        let mut values = Vec::with_capacity(words.words.len() - words.at);
-        while words.peek().is_some() {
-            values.push(words.number("a channel value")?);
-        }
+        let mut values = read_values(&mut words, &joints)?;
         if channel_count == 0 || values.len() < channel_count {
             return Err(
                 words.error(format!("no whole frame: {} values for {channel_count} channels", values.len()))
@@ -201,6 +201,26 @@ impl Bvh {
         }
         world
     }
+}
+
+/// The channel values of all frames. Angles no motion has are refused: their sines mean nothing.
+fn read_values(words: &mut Words, joints: &[BvhJoint]) -> Result<Vec<f64>, BvhError> {
+    let limit = MAX_ANGLE.to_degrees();
+    let channels: Vec<(&str, bool)> =
+        joints.iter().flat_map(|j| j.channels.iter().map(|c| (j.name.as_str(), c.rotates))).collect();
+    let mut values = Vec::with_capacity(words.words.len().saturating_sub(words.at));
+    while words.peek().is_some() {
+        let value = words.number("a channel value")?;
+        if let Some((name, true)) = channels.get(values.len() % channels.len().max(1))
+            && value.abs() > limit
+        {
+            return Err(words.error(format!(
+                "joint '{name}' turns by {value:?} degrees, more than the {limit:.0} of any motion; is the file damaged?"
+            )));
+        }
+        values.push(value);
+    }
+    Ok(values)
 }
 
 fn read_joint(
@@ -268,6 +288,8 @@ pub(crate) mod tests {
         assert_eq!(bvh.joints[1].parent, Some(0));
         assert_eq!(bvh.joints[1].end, Some([0.0, 1.0, 0.0]));
         assert_eq!(bvh.rest_positions(), [[0.0, 1.0, 0.0], [0.0, 3.0, 0.0]]);
+        // Only angles have a limit.
+        assert!(parse(&SMALL.replace("5 5 5", "5 1e6 5")).is_ok());
     }
 
     #[test]
@@ -287,7 +309,10 @@ pub(crate) mod tests {
             (SMALL.replace("0 2 0", "0 x 0"), 8, "'x' is not a finite number"),
             (SMALL.replace("Yrotation Xrotation\n", "Yrotation Wrotation\n"), 5, "not a channel"),
             (SMALL.replace("Frame Time: 0.0083333", "Frame Time: 0"), 18, "not positive"),
+            (SMALL.replace("Frame Time: 0.0083333", "Frame Time: 1e-320"), 18, "expected 0.01 to 10000"),
+            (SMALL.replace("Frame Time: 0.0083333", "Frame Time: 1e300"), 18, "expected 0.01 to 10000"),
             (SMALL.replace("90 0 0 0 90 0", "90 0 0 0 nan 0"), 19, "'nan'"),
+            (SMALL.replace("90 0 0 0 90 0", "90 0 0 0 9e20 0"), 19, "joint 'Chest' turns by"),
             (SMALL.split("MOTION").next().unwrap().into(), 15, "the file ends"),
             (SMALL.replace("CHANNELS 6", "CHANNELS 999999999"), 5, "at most 6"),
         ] {

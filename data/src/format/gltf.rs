@@ -43,10 +43,10 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<PolygonMesh, String> {
             .meshes
             .get(mesh_index)
             .ok_or_else(|| format!("a node names mesh {mesh_index} of {}", document.meshes.len()))?;
-        // Primitives of one mesh often share their vertices.
-        let mut first_vertex: HashMap<usize, u32> = HashMap::new();
+        // Primitives of one mesh often share their vertices: first vertex and number of those of an accessor.
+        let mut vertices: HashMap<usize, (u32, u32)> = HashMap::new();
         for (number, primitive) in source.primitives.iter().enumerate() {
-            add_primitive(primitive, &document, &mut buffers, &place, &mut first_vertex, &mut mesh)
+            add_primitive(primitive, &document, &mut buffers, &place, &mut vertices, &mut mesh)
                 .map_err(|message| format!("mesh {mesh_index}, primitive {number}: {message}"))?;
         }
     }
@@ -155,7 +155,7 @@ fn add_primitive(
     document: &Document,
     buffers: &mut Buffers,
     place: &Affine,
-    first_vertex: &mut HashMap<usize, u32>,
+    vertices: &mut HashMap<usize, (u32, u32)>,
     mesh: &mut PolygonMesh,
 ) -> Result<(), String> {
     let mode = primitive.mode.unwrap_or(4);
@@ -164,18 +164,18 @@ fn add_primitive(
         return Ok(());
     }
     let accessor = *primitive.attributes.get("POSITION").ok_or("no attribute POSITION")?;
-    let base = match first_vertex.get(&accessor) {
-        Some(base) => *base,
+    let (base, count) = match vertices.get(&accessor) {
+        Some(known) => *known,
         None => {
             let base = mesh.positions.len();
             let positions = buffers.positions(document, accessor)?;
             check_count("vertices", base + positions.len())?;
+            let own = (base as u32, positions.len() as u32);
             mesh.positions.extend(positions.into_iter().map(|p| transform(place, p)));
-            first_vertex.insert(accessor, base as u32);
-            base as u32
+            vertices.insert(accessor, own);
+            own
         }
     };
-    let count = mesh.positions.len() as u32 - base;
     let indices: Vec<u32> = match primitive.indices {
         Some(accessor) => buffers.indices(document, accessor)?,
         None => (0..document.accessors[accessor].count as u32).collect(),

@@ -15,12 +15,12 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum MatError {
     /// The file cannot be read.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {reason}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        reason: std::io::Error,
     },
     /// Not a MAT file of level 5.
     #[error("{}: not a MAT-5 file ({reason})", path.display())]
@@ -107,7 +107,7 @@ impl MatFile {
     /// # Errors
     /// [`MatError`] naming file and variable.
     pub fn load(path: &Path) -> Result<Self, MatError> {
-        let failed = |source| MatError::Io { path: path.into(), source };
+        let failed = |reason| MatError::Io { path: path.into(), reason };
         let file = fs::File::open(path).map_err(failed)?;
         let mut bytes = Vec::new();
         file.take(LARGEST + 1).read_to_end(&mut bytes).map_err(failed)?;

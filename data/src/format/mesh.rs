@@ -3,7 +3,7 @@
 //! Garments and bodies come as Wavefront OBJ, PLY, STL and glTF. Every reader gives the same [`PolygonMesh`], in the file's own
 //! unit and axes. What a file holds too much of is refused before memory is taken for it.
 
-use super::obj::{self, ObjError};
+use super::obj::{ObjError, ObjMesh};
 use super::{gltf, ply, stl};
 use clothcombo_physics::mesh::{MeshError, TriMesh};
 use std::fs;
@@ -23,12 +23,12 @@ pub const MAX_ELEMENTS: usize = 8_000_000;
 #[derive(Debug, Error)]
 pub enum MeshFileError {
     /// The file cannot be read.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {reason}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        reason: std::io::Error,
     },
     /// The name and the content tell no known format.
     #[error("{}: neither its name nor its content is that of a mesh; known are .obj, .ply, .stl, .gltf and .glb", path.display())]
@@ -68,12 +68,12 @@ pub enum MeshFileError {
         vertex: u64,
     },
     /// Not a valid triangle mesh.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {reason}", path.display())]
     Mesh {
         /// The file.
         path: PathBuf,
         /// What is wrong.
-        source: MeshError,
+        reason: MeshError,
     },
 }
 
@@ -202,7 +202,7 @@ impl PolygonMesh {
             faces.extend(fan(polygon));
         }
         TriMesh::new(self.positions.clone(), faces)
-            .map_err(|source| MeshFileError::Mesh { path: path.into(), source })
+            .map_err(|reason| MeshFileError::Mesh { path: path.into(), reason })
     }
 }
 
@@ -231,11 +231,11 @@ pub(super) fn check_count(what: &str, count: usize) -> Result<(), String> {
 
 /// Reads a file whose size is checked first.
 pub(super) fn read_limited(path: &Path) -> Result<Vec<u8>, MeshFileError> {
-    let failed = |source| MeshFileError::Io { path: path.into(), source };
+    let failed = |reason| MeshFileError::Io { path: path.into(), reason };
     let metadata = fs::metadata(path).map_err(failed)?;
     if !metadata.is_file() {
-        let source = std::io::Error::new(std::io::ErrorKind::InvalidInput, "not a regular file");
-        return Err(MeshFileError::Io { path: path.into(), source });
+        let reason = std::io::Error::new(std::io::ErrorKind::InvalidInput, "not a regular file");
+        return Err(MeshFileError::Io { path: path.into(), reason });
     }
     if metadata.len() > MAX_FILE_BYTES {
         return Err(MeshFileError::TooLarge { path: path.into(), bytes: metadata.len() });
@@ -262,7 +262,7 @@ pub fn parse_mesh(bytes: &[u8], path: &Path) -> Result<PolygonMesh, MeshFileErro
             .map_err(|message| MeshFileError::Content { path: path.into(), message })
     };
     match MeshFormat::detect(path, bytes) {
-        Some(MeshFormat::Obj) => Ok(obj::parse_bytes(bytes, path)?.into_polygon_mesh()),
+        Some(MeshFormat::Obj) => Ok(ObjMesh::parse_bytes(bytes, path)?.into_polygon_mesh()),
         Some(MeshFormat::Ply) => content(ply::parse(bytes)),
         Some(MeshFormat::Stl) => content(stl::parse(bytes)),
         Some(MeshFormat::Gltf) => content(gltf::parse(bytes, path)),
@@ -276,4 +276,36 @@ pub fn parse_mesh(bytes: &[u8], path: &Path) -> Result<PolygonMesh, MeshFileErro
 /// As [`load_mesh`], and [`MeshFileError::RepeatedCorner`].
 pub fn load_tri_mesh(path: &Path) -> Result<TriMesh, MeshFileError> {
     load_mesh(path)?.to_tri_mesh(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::asset::{Body, BodyFileSettings, Motion};
+    use crate::dataset::{load_garment_folder, load_motion_folder};
+    use crate::format::{Bvh, MatFile, PointCache};
+    use crate::generate::mannequin;
+    use std::error::Error;
+
+    /// Whoever prints an error prints its sources below it: a text that has them already must not name them as such.
+    #[test]
+    fn no_error_tells_its_cause_twice() {
+        let folder = tempfile::tempdir().unwrap();
+        let missing = folder.path().join("missing.obj");
+        let errors: [Box<dyn Error>; 8] = [
+            load_mesh(&missing).unwrap_err().into(),
+            Body::load(&missing, &BodyFileSettings::default()).unwrap_err().into(),
+            Motion::load(&missing).unwrap_err().into(),
+            Bvh::load(&missing).unwrap_err().into(),
+            MatFile::load(&missing).unwrap_err().into(),
+            PointCache::load(&missing).unwrap_err().into(),
+            load_garment_folder(&missing, &mannequin()).unwrap_err().into(),
+            load_motion_folder(&missing).unwrap_err().into(),
+        ];
+        for error in errors {
+            let text = error.to_string();
+            assert!(text.contains("missing.obj") && text.contains("os error 2"), "{text}");
+            assert!(error.source().is_none_or(|cause| !text.contains(&cause.to_string())), "{text}");
+        }
+    }
 }

@@ -42,7 +42,7 @@ impl NpzFile {
     /// # Errors
     /// If the file cannot be opened or is not a zip archive.
     pub fn open(path: &Path) -> Result<Self, NpzError> {
-        let file = File::open(path).map_err(|source| NpzError::Io { path: path.into(), source })?;
+        let file = File::open(path).map_err(|reason| NpzError::Io { path: path.into(), reason })?;
         let archive = ZipArchive::new(BufReader::new(file))
             .map_err(|e| NpzError::NotAnArchive { path: path.into(), reason: e.to_string() })?;
         Ok(Self { path: path.into(), archive })

@@ -3,12 +3,14 @@
 //! Own parser, because a message must name the line: the usual libraries report neither it nor the offending index.
 
 mod moved;
+mod statements;
 
 pub use moved::MovedObj;
 
 use super::atomic;
 use super::mesh::{MeshFileError, PolygonMesh, check_count, fan, read_limited};
 use clothcombo_physics::mesh::TriMesh;
+use statements::{Statement, statements};
 use std::collections::HashMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -18,19 +20,19 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum ObjError {
     /// The file cannot be read or written.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {reason}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        reason: std::io::Error,
     },
     /// A line is wrong.
     #[error("{}:{line}: {message}", path.display())]
     Line {
         /// The file.
         path: PathBuf,
-        /// The line, from 1.
+        /// The line, from 1; the first one of a statement that goes over several.
         line: usize,
         /// What is wrong with it.
         message: String,
@@ -54,7 +56,7 @@ pub struct ObjMesh {
     pub groups: Vec<String>,
     /// Group of each polygon.
     pub group_of_polygon: Vec<u32>,
-    /// Line of each polygon, from 1.
+    /// First line of each polygon, from 1.
     pub lines: Vec<u32>,
 }
 
@@ -64,15 +66,18 @@ impl ObjMesh {
     /// # Errors
     /// [`ObjError`] naming file and line.
     pub fn parse(text: &str, path: &Path) -> Result<Self, ObjError> {
+        Self::parse_bytes(text.as_bytes(), path)
+    }
+
+    /// As [`Self::parse`]. Names and comments may be in any encoding; numbers are ASCII.
+    pub(super) fn parse_bytes(bytes: &[u8], path: &Path) -> Result<Self, ObjError> {
         let mut mesh = Self { groups: vec![String::new()], ..Self::default() };
         let mut group = 0;
         let mut number_of_group = HashMap::from([(String::new(), 0)]);
-        // Left by some editors; taken for a part of the first word it would hide the first vertex.
-        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-        for (number, line) in text.lines().enumerate() {
-            let line = line.split('#').next().unwrap_or_default();
-            let mut words = line.split_ascii_whitespace();
-            let wrong = |message: String| ObjError::Line { path: path.into(), line: number + 1, message };
+        for Statement { line, text, .. } in statements(bytes) {
+            let text = String::from_utf8_lossy(&text);
+            let mut words = text.split('#').next().unwrap_or_default().split_ascii_whitespace();
+            let wrong = |message: String| ObjError::Line { path: path.into(), line, message };
             match words.next() {
                 Some("v") => {
                     check_count("vertices", mesh.positions.len() + 1).map_err(wrong)?;
@@ -91,7 +96,7 @@ impl ObjMesh {
                     }
                     mesh.polygons.push(polygon);
                     mesh.group_of_polygon.push(group);
-                    mesh.lines.push(number as u32 + 1);
+                    mesh.lines.push(line as u32);
                 }
                 Some("g") => {
                     let name = words.collect::<Vec<_>>().join(" ");
@@ -148,11 +153,6 @@ impl ObjMesh {
     }
 }
 
-/// Parses an OBJ file in memory. Names and comments may be in any encoding; numbers are ASCII.
-pub(super) fn parse_bytes(bytes: &[u8], path: &Path) -> Result<ObjMesh, ObjError> {
-    ObjMesh::parse(&String::from_utf8_lossy(bytes), path)
-}
-
 fn vertex<'a>(mut words: impl Iterator<Item = &'a str>) -> Result<[f64; 3], String> {
     let mut position = [0.0f64; 3];
     for (axis, x) in position.iter_mut().enumerate() {
@@ -185,7 +185,7 @@ fn corner(word: &str, vertices_so_far: usize) -> Result<u32, String> {
 /// # Errors
 /// [`MeshFileError`] naming file and line.
 pub fn load(path: &Path) -> Result<TriMesh, MeshFileError> {
-    parse_bytes(&read_limited(path)?, path)?.into_polygon_mesh().to_tri_mesh(path)
+    ObjMesh::parse_bytes(&read_limited(path)?, path)?.into_polygon_mesh().to_tri_mesh(path)
 }
 
 /// Writes a mesh as OBJ, whole or not at all; `comments` become leading `#` lines. Coordinates keep 0.1 µm.
@@ -227,20 +227,13 @@ pub fn save_polygons<'a>(
         }
         text.push('\n');
     }
-    atomic::write(path, text.as_bytes()).map_err(|source| ObjError::Io { path: path.into(), source })
+    atomic::write(path, text.as_bytes()).map_err(|reason| ObjError::Io { path: path.into(), reason })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use std::fs;
-
-    #[test]
-    fn a_mark_of_the_byte_order_hides_no_vertex() {
-        let mesh =
-            ObjMesh::parse("\u{feff}v 1 2 3\nv 0 1 0\nv 0 0 1\nf 1 2 3\n", Path::new("a.obj")).unwrap();
-        assert_eq!((mesh.positions.len(), mesh.positions[0]), (3, [1.0, 2.0, 3.0]));
-    }
 
     fn parse(text: &str) -> Result<ObjMesh, String> {
         ObjMesh::parse(text, Path::new("shirt.obj")).map_err(|e| e.to_string())

@@ -13,12 +13,12 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum PointCacheError {
     /// The file cannot be read.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {reason}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        reason: std::io::Error,
     },
     /// The header is not one of a point cache.
     #[error("{}: {reason}; a .pc16 file starts with POINTCACHE2, version 1", path.display())]
@@ -76,7 +76,7 @@ impl PointCache {
     /// # Errors
     /// [`PointCacheError`] naming the file and what is wrong with it.
     pub fn load(path: &Path) -> Result<Self, PointCacheError> {
-        let failed = |source| PointCacheError::Io { path: path.into(), source };
+        let failed = |reason| PointCacheError::Io { path: path.into(), reason };
         let wrong = |reason: String| PointCacheError::Header { path: path.into(), reason };
         let mut file = fs::File::open(path).map_err(failed)?;
         let size = file.metadata().map_err(failed)?.len();

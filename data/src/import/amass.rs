@@ -101,7 +101,7 @@ fn find(
     seen: &mut HashSet<PathBuf>,
     depth: usize,
 ) -> Result<(), MotionImportError> {
-    let failed = |source| MotionImportError::Io { path: path.into(), source };
+    let failed = |reason| MotionImportError::Io { path: path.into(), reason };
     if !fs::metadata(path).map_err(failed)?.is_dir() {
         found.push(path.into());
         return Ok(());

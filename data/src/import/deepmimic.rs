@@ -8,6 +8,7 @@ use super::motions::{Clip, MotionImportError, named, require_body_joints, stem, 
 use super::retarget::{JointMap, Retarget};
 use super::thinning::{Thinned, Thinning, thin};
 use super::{Progress, Summary};
+use crate::asset::motion::{MAX_ANGLE, check_frame_rate};
 use crate::asset::rotation::{Matrix3, axis_angle_from_quaternion, matrix_from_axis_angle, product};
 use crate::asset::{Body, Motion, Provenance};
 use serde::Deserialize;
@@ -125,6 +126,13 @@ fn parse(text: &str) -> Result<Vec<Vec<f64>>, String> {
         if let Some(column) = row.iter().position(|x| !x.is_finite()) {
             return Err(format!("frame {number}, number {column} is not finite"));
         }
+        let mut angles = ROW.iter().filter(|(_, hinge, _)| *hinge).map(|(column, _, _)| *column);
+        if let Some(column) = angles.find(|column| row[*column].abs() > MAX_ANGLE) {
+            return Err(format!(
+                "frame {number}, number {column} is an angle of {:?} rad, more than the {MAX_ANGLE} rad of any motion",
+                row[column]
+            ));
+        }
         let quaternions = ROW.iter().filter(|(_, hinge, _)| !hinge).map(|(column, _, _)| *column);
         for column in quaternions.chain([ROOT]) {
             let length = row[column..column + 4].iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -147,7 +155,11 @@ fn frame_rate(frames: &[Vec<f64>]) -> Result<f64, String> {
     let mut durations: Vec<f64> = frames.iter().map(|row| row[0]).filter(|d| *d > 0.0).collect();
     durations.sort_by(f64::total_cmp);
     match durations.get(durations.len() / 2) {
-        Some(d) if *d < 10.0 => Ok(1.0 / d),
+        Some(d) if *d < 10.0 => {
+            check_frame_rate(1.0 / d)
+                .map_err(|defect| format!("a median duration of {d:?} s for a frame means {defect}"))?;
+            Ok(1.0 / d)
+        }
         _ => Err("no frame has a duration between 0 and 10 s".into()),
     }
 }
@@ -256,7 +268,11 @@ mod tests {
         for bad in ["", "[1, 2]", "{\"Frames\": [[1, \"x\"]]}", &text(&rest_row())[..200]] {
             assert!(parse(bad).unwrap_err().contains("line 1"), "{bad}");
         }
+        let mut row = rest_row();
+        row[20] = 1e300;
+        assert!(parse(&text(&row)).unwrap_err().contains("frame 1, number 20 is an angle"));
         assert!(frame_rate(&[vec![0.0]]).is_err());
+        assert!(frame_rate(&[vec![1e-300]]).unwrap_err().contains("expected 0.01 to 10000"));
         assert!((frame_rate(&[vec![0.05], vec![0.05], vec![0.0]]).unwrap() - 20.0).abs() < 1e-9);
     }
 }

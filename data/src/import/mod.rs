@@ -9,6 +9,7 @@ mod finish;
 mod helper_garments;
 pub mod makehuman;
 pub mod motions;
+mod overwrite;
 mod reference_surface;
 pub mod retarget;
 mod sheet_repair;
@@ -23,6 +24,7 @@ pub use deepmimic::{DeepMimicSettings, import_deepmimic};
 pub use finish::GarmentResolution;
 pub use makehuman::{MakeHumanError, MakeHumanSettings, import_makehuman};
 pub use motions::MotionImportError;
+pub use overwrite::OverwriteError;
 pub use smpl_family::{SmplFamilyError, import_smpl_family};
 pub use thinning::Thinning;
 

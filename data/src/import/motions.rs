@@ -11,6 +11,7 @@
 //! licence = "…"
 //! ```
 
+use super::overwrite::{OverwriteError, refuse_overwriting};
 use super::{Progress, Summary};
 use crate::asset::motion::MotionError;
 use crate::asset::{Body, Motion, skeleton::BODY_JOINT_COUNT};
@@ -50,12 +51,12 @@ pub enum MotionImportError {
         reason: String,
     },
     /// A folder or the manifest cannot be read or written.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {reason}", path.display())]
     Io {
         /// File or folder.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        reason: std::io::Error,
     },
     /// The manifest that is already there is not one.
     #[error("{}: {message}; remove it or choose another folder", path.display())]
@@ -68,6 +69,9 @@ pub enum MotionImportError {
     /// A result cannot be written.
     #[error(transparent)]
     Motion(#[from] MotionError),
+    /// An input would be written over.
+    #[error(transparent)]
+    Overwrite(#[from] OverwriteError),
     /// The body lacks joints.
     #[error("body '{body}' has {joints} joints; retargeting needs the {BODY_JOINT_COUNT} SMPL body joints")]
     Body {
@@ -151,6 +155,9 @@ pub(super) fn write_motions(
     import: &(dyn Fn(&Path) -> Result<Clip, String> + Sync),
     progress: Progress<'_>,
 ) -> Result<Summary, MotionImportError> {
+    let written = |name: &str| out.join(format!("{name}.npz"));
+    let outputs = inputs.iter().map(|input| written(&input.name)).chain([out.join(MANIFEST)]);
+    refuse_overwriting(inputs.iter().map(|input| &input.path), outputs)?;
     let mut summary = Summary::default();
     let mut manifest = read_manifest(out)?;
     let (mut done, mut frames, mut seconds) = (0, 0, 0.0);
@@ -159,7 +166,12 @@ pub(super) fn write_motions(
         for (Input { path, name }, clip) in chunk.iter().zip(clips) {
             done += 1;
             progress("importing motions", done, inputs.len());
-            let Clip { mut motion, subject, note } = match clip {
+            // What no motion file may hold is not written either.
+            let valid = clip.and_then(|clip| match clip.motion.check() {
+                Ok(()) => Ok(clip),
+                Err(defect) => Err(defect.to_string()),
+            });
+            let Clip { mut motion, subject, note } = match valid {
                 Ok(clip) => clip,
                 Err(reason) => {
                     summary.skipped.push((path.display().to_string(), reason));
@@ -167,8 +179,7 @@ pub(super) fn write_motions(
                 }
             };
             motion.name = name.clone();
-            let file = format!("{name}.npz");
-            let written = out.join(&file);
+            let (file, written) = (format!("{name}.npz"), written(name));
             motion.save(&written)?;
             frames += motion.poses.len();
             seconds += motion.poses.len() as f64 / motion.frame_rate;
@@ -205,7 +216,7 @@ fn read_manifest(out: &Path) -> Result<Manifest, MotionImportError> {
         Ok(text) => toml::from_str(&text)
             .map_err(|e| MotionImportError::Manifest { path, message: e.to_string().trim_end().to_string() }),
         Err(e) if e.kind() == ErrorKind::NotFound => Ok(Manifest::default()),
-        Err(source) => Err(MotionImportError::Io { path, source }),
+        Err(reason) => Err(MotionImportError::Io { path, reason }),
     }
 }
 
@@ -215,6 +226,6 @@ fn write_manifest(out: &Path, mut manifest: Manifest) -> Result<PathBuf, MotionI
     let text = toml::to_string(&manifest)
         .map_err(|e| MotionImportError::Manifest { path: path.clone(), message: e.to_string() })?;
     atomic::write(&path, text.as_bytes())
-        .map_err(|source| MotionImportError::Io { path: path.clone(), source })?;
+        .map_err(|reason| MotionImportError::Io { path: path.clone(), reason })?;
     Ok(path)
 }

@@ -2,8 +2,9 @@
 //!
 //! The reading is [`Body::load`]'s; here the model is recognised, and said what was taken, what was left out and why.
 
+use super::overwrite::{OverwriteError, refuse_overwriting};
 use super::{Progress, Summary};
-use crate::asset::body_file::{BodyFileError, BodyFileSettings, shape_part};
+use crate::asset::body_file::{BodyFileError, BodyFileSettings, INSIDE_OUT, shape_part};
 use crate::asset::{Body, Provenance};
 use crate::format::NpzFile;
 use std::path::{Path, PathBuf};
@@ -15,6 +16,9 @@ pub enum SmplFamilyError {
     /// The file is not a usable body model, or the result cannot be written.
     #[error(transparent)]
     Body(#[from] BodyFileError),
+    /// An input would be written over.
+    #[error(transparent)]
+    Overwrite(#[from] OverwriteError),
     /// A pickle, which is a program.
     #[error(
         "{}: a Python pickle is a program and is never run here; convert it once with scripts/smpl_pickle_to_npz.py {} model.npz, \
@@ -102,8 +106,9 @@ pub fn import_smpl_family(
     progress: Progress<'_>,
 ) -> Result<Summary, SmplFamilyError> {
     refuse_what_is_no_npz(input)?;
+    refuse_overwriting([input], [out])?;
     progress("reading the model", 0, 2);
-    let body = Body::load(input, settings)?;
+    let (body, was_inside_out) = Body::load_turned(input, settings)?;
     let mut file = NpzFile::open(input).map_err(BodyFileError::from)?;
     let model = MODELS.iter().find(|m| (m.vertices, m.joints) == (body.vertex_count(), body.joint_count()));
     let provenance = provenance(&mut file, model, input);
@@ -144,6 +149,9 @@ pub fn import_smpl_family(
             let note = format!("{} of {shape} shape components kept (--components)", body.shape_count);
             summary.notes.push(note);
         }
+    }
+    if was_inside_out {
+        summary.notes.push(INSIDE_OUT.into());
     }
     summary.notes.push(format!(
         "the pelvis joint was moved to the origin for every shape{}; hands rest flat",

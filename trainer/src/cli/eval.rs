@@ -6,6 +6,7 @@ use crate::cli::verbosity::{progress_bar, say};
 use crate::config::{Config, load};
 use crate::device::Backend;
 use crate::draper::shipped_model;
+use crate::paths::obstacle;
 use crate::report::html::utc;
 use crate::scene::Library;
 use crate::study::{Other, Page, Sizes, Study, Subject, study};
@@ -115,6 +116,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
 
 /// Before anything is loaded: whether the report may be written where it is wanted.
 fn check_output(folder: &Path) -> Result<(), Report> {
+    if let Some(file) = obstacle(folder) {
+        return Err(miette!(help = "choose another folder with -o", "{} is no folder", file.display()));
+    }
     let occupied = fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
     let read = |text: String| serde_json::from_str::<serde_json::Value>(&text).ok();
     let earlier = fs::read_to_string(folder.join(JSON)).ok().and_then(read);

@@ -1,5 +1,6 @@
 //! `clothcombo fit`: any garment file onto any body.
 
+use crate::paths::{lossy, lossy_option};
 use crate::scene::load_body;
 use clap::{Parser, ValueEnum};
 use clothcombo_data::asset::Category;
@@ -63,9 +64,11 @@ enum ArmPose {
 
 #[derive(Serialize)]
 struct Output<'a> {
-    garment: &'a PathBuf,
+    #[serde(serialize_with = "lossy")]
+    garment: &'a Path,
     body: &'a str,
-    output: Option<&'a PathBuf>,
+    #[serde(serialize_with = "lossy_option")]
+    output: Option<&'a Path>,
     #[serde(flatten)]
     report: &'a FitReport,
 }
@@ -117,7 +120,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         let output = Output {
             garment: &arguments.garment,
             body: &body.name,
-            output: arguments.output.as_ref(),
+            output: arguments.output.as_deref(),
             report,
         };
         println!("{}", serde_json::to_string_pretty(&output).into_diagnostic()?);

@@ -1,7 +1,9 @@
 //! `clothcombo generate`: garments from nothing but a body.
 
 use super::wardrobe_sheet::{PER_ROW, wardrobe_sheet};
+use crate::cli::values::{at_least_one, picture_file};
 use crate::cli::verbosity::{progress_bar, say};
+use crate::config::MOST_GARMENTS;
 use crate::picture::save_png;
 use crate::scene::load_body;
 use clap::Parser;
@@ -26,8 +28,8 @@ use std::path::{Path, PathBuf};
                   it was stopped: garments that are there are kept. --start adds more to a folder."
 )]
 pub struct Arguments {
-    /// Number of garments
-    #[arg(long, default_value_t = 12)]
+    /// Number of garments, at most 1000000
+    #[arg(long, default_value_t = 12, value_parser = garment_count)]
     count: usize,
     /// Number of the first garment: makes garments START to START + COUNT - 1
     #[arg(long, default_value_t = 0)]
@@ -45,11 +47,19 @@ pub struct Arguments {
     #[arg(long, value_delimiter = ',')]
     categories: Vec<Category>,
     /// Picture of the first eight garments of each category (PNG)
-    #[arg(long)]
+    #[arg(long, value_parser = picture_file())]
     picture: Option<PathBuf>,
     /// Folder to write; one that holds garments is added to
     #[arg(short, long)]
     output: PathBuf,
+}
+
+/// As many garments as a configuration may ask for.
+fn garment_count(text: &str) -> Result<usize, String> {
+    match at_least_one(text)? {
+        count if count > MOST_GARMENTS => Err(format!("it must be at most {MOST_GARMENTS}")),
+        count => Ok(count),
+    }
 }
 
 /// Runs the verb.

@@ -1,5 +1,6 @@
 //! `clothcombo import`: other people's files become this project's bodies, garments and motions.
 
+use crate::cli::values::{not_negative, positive};
 use crate::cli::verbosity::progress_bar;
 use crate::scene::load_body;
 use clap::{Args, Subcommand, ValueEnum};
@@ -92,7 +93,7 @@ pub struct BvhArguments {
     #[arg(long, default_value = "mannequin")]
     body: String,
     /// Frames per second kept
-    #[arg(long, default_value_t = 60.0)]
+    #[arg(long, default_value_t = 60.0, value_parser = positive)]
     frame_rate: f64,
     /// Folder to write
     #[arg(short, long)]
@@ -127,17 +128,6 @@ impl ThinningArguments {
     fn thinning(&self) -> Thinning {
         Thinning { frame_rate: self.frame_rate, static_threshold: self.static_threshold.to_radians() }
     }
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|x: &f64| x.is_finite() && *x > 0.0).ok_or_else(|| "not a number above 0".into())
-}
-
-fn not_negative(text: &str) -> Result<f64, String> {
-    text.parse()
-        .ok()
-        .filter(|x: &f64| x.is_finite() && *x >= 0.0)
-        .ok_or_else(|| "not a number from 0 up".into())
 }
 
 /// The world's up axis.

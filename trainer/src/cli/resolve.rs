@@ -4,6 +4,7 @@ use crate::cli::interrupted::remove_on_signals;
 use crate::cli::post_process::PostProcessArguments;
 use crate::draper::UniqueNames;
 use crate::draper::output::Staged;
+use crate::paths::lossy;
 use crate::score::{DrapedGarment, Score, ScoreDistance, ScoreError, load_body, load_garment, score};
 use clap::Parser;
 use clothcombo_data::format::obj::MovedObj;
@@ -17,7 +18,7 @@ use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use serde::Serialize;
 use std::fmt::Write as _;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 /// Takes draped garments out of the body and out of each other, in their order, and proves what it reached
@@ -76,6 +77,7 @@ struct Milliseconds {
 #[derive(Serialize)]
 struct GarmentReport {
     name: String,
+    #[serde(serialize_with = "lossy")]
     output: PathBuf,
     rounds: usize,
     moved_vertices: usize,
@@ -96,14 +98,6 @@ impl Garment {
     }
 }
 
-/// Larger bodies than this are not in metres [m].
-const TALLEST: f64 = 20.0;
-/// Sizes of a garment that are refused, as shares of the body's.
-const LARGEST: f64 = 5.0;
-const SMALLEST: f64 = 0.02;
-/// A garment farther from the body than this share of the body's size is refused.
-const NEAR: f64 = 0.25;
-
 /// Runs the verb.
 ///
 /// # Errors
@@ -116,9 +110,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         [&arguments.body].into_iter().chain(&arguments.garments).chain(&arguments.rest).cloned().collect();
     let staged = Staged::new(&arguments.output, arguments.replace, &inputs)?;
     remove_on_signals(staged.folder());
-    let body = checked_body(&arguments.body)?;
-    let garments = load_garments(arguments)?;
-    garments.iter().try_for_each(|garment| check_place(garment, &body))?;
+    let body = load_body(&arguments.body)?;
+    let garments = load_garments(arguments, &body)?;
     let surface = Surface::from_mesh(&body);
     let rest: Vec<RestGarment> = garments.iter().map(|g| RestGarment::new(&g.rest)).collect();
     let layers: Vec<Layer> = rest
@@ -170,48 +163,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     Ok(())
 }
 
-fn checked_body(path: &Path) -> Result<TriMesh, Report> {
-    let body = load_body(path)?;
-    let largest = body.extent();
-    if largest > TALLEST {
-        return Err(miette!(
-            help = "scale body and garments to metres (0.01 for centimetres)",
-            "{}: the body measures {largest:.0} from end to end, which is no human body in metres",
-            path.display()
-        ));
-    }
-    Ok(body)
-}
-
-/// A garment in another unit or another place crosses nothing, which would look like a good result.
-fn check_place(garment: &Garment, body: &TriMesh) -> Result<(), Report> {
-    let refused = |what: String| {
-        miette!(
-            help = "body and garments must be in one unit and one place: as draped",
-            "{}: {what}",
-            garment.path.display()
-        )
-    };
-    let (own, whole) = (garment.draped.extent(), body.extent());
-    if own > LARGEST * whole || own < SMALLEST * whole {
-        return Err(refused(format!("the garment measures {own:.3}, the body {whole:.3} from end to end")));
-    }
-    let ((low, high), (body_low, body_high)) = (garment.draped.bounds(), body.bounds());
-    let is_apart = |k: usize| low[k] > body_high[k] + NEAR * whole || high[k] < body_low[k] - NEAR * whole;
-    match (0..3).find(|k| is_apart(*k)) {
-        Some(k) => Err(refused(format!(
-            "the garment lies beside the body: {} from {:.3} to {:.3}, the body from {:.3} to {:.3}",
-            ["x", "y", "z"][k],
-            low[k],
-            high[k],
-            body_low[k],
-            body_high[k]
-        ))),
-        None => Ok(()),
-    }
-}
-
-fn load_garments(arguments: &Arguments) -> Result<Vec<Garment>, Report> {
+fn load_garments(arguments: &Arguments, body: &TriMesh) -> Result<Vec<Garment>, Report> {
     let (draped, rest) = (&arguments.garments, &arguments.rest);
     if !rest.is_empty() && rest.len() != draped.len() {
         return Err(miette!(
@@ -224,7 +176,7 @@ fn load_garments(arguments: &Arguments) -> Result<Vec<Garment>, Report> {
     let mut garments: Vec<Garment> = Vec::with_capacity(draped.len());
     let mut names = UniqueNames::default();
     for (i, path) in draped.iter().enumerate() {
-        let (name, rest, draped) = load_garment(rest.get(i).unwrap_or(path), path)?;
+        let (name, rest, draped) = load_garment(rest.get(i).unwrap_or(path), path, body)?;
         // Two files of one name from two folders must not overwrite each other.
         garments.push(Garment { path: path.clone(), name: names.take(&name), rest, draped });
     }

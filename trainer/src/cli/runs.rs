@@ -1,8 +1,8 @@
 //! `clothcombo runs`: all runs of a folder in one table.
 
-use crate::run_summary::{RunSummary, find_runs};
+use crate::run_summary::{FoundRun, RunSummary, find_runs};
 use clap::Parser;
-use miette::{IntoDiagnostic, Report, miette};
+use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use std::path::PathBuf;
 
 /// Compares training runs in a table: state, progress, losses, best validation
@@ -35,9 +35,11 @@ enum Order {
 /// Runs the verb.
 ///
 /// # Errors
-/// When the folder holds no run.
+/// When the folder cannot be listed or holds no run. A damaged run is none: the table says what is wrong with it.
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
-    let mut runs = find_runs(&arguments.folder);
+    let mut runs = find_runs(&arguments.folder)
+        .into_diagnostic()
+        .wrap_err_with(|| format!("cannot list {}", arguments.folder.display()))?;
     if runs.is_empty() {
         return Err(miette!(
             help = "pass a folder whose subfolders are runs, as clothcombo-train makes them",
@@ -46,16 +48,16 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         ));
     }
     if arguments.sort == Order::Score {
-        let score = |r: &RunSummary| r.best_score.unwrap_or(f64::INFINITY);
+        let score = |r: &FoundRun| r.best_score().unwrap_or(f64::INFINITY);
         runs.sort_by(|a, b| score(a).total_cmp(&score(b)));
     }
     if arguments.json {
         println!("{}", serde_json::to_string_pretty(&runs).into_diagnostic()?);
         return Ok(());
     }
-    let width = runs.iter().map(|r| r.name.chars().count()).max().unwrap_or(0).clamp(3, 32);
+    let width = runs.iter().map(|r| r.name().chars().count()).max().unwrap_or(0).clamp(3, 32);
     println!(
-        "{:<width$} {:<9} {:>17} {:<18} {:>9} {:>8} {:>9} {:>9} {:>8} {:>8} {:>8} {:>7} {:>10}",
+        "{:<width$} {:<10} {:>17} {:<18} {:>9} {:>8} {:>9} {:>9} {:>8} {:>8} {:>8} {:>7} {:>10}",
         "run",
         "state",
         "step",
@@ -71,7 +73,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         "checkpoint"
     );
     for run in &runs {
-        println!("{}", row(run, width));
+        match run {
+            FoundRun::Whole(run) => println!("{}", row(run, width)),
+            FoundRun::Unreadable(run) => {
+                // On one line, as every run.
+                let error = run.error.split_whitespace().collect::<Vec<_>>().join(" ");
+                println!("{:<width$} {:<10} {error}", run.name, run.state);
+            }
+        }
     }
     Ok(())
 }
@@ -82,7 +91,7 @@ fn row(r: &RunSummary, width: usize) -> String {
     let percent = |v: Option<f64>| or_dash(v.map(|v| format!("{:.2}", 100.0 * v)));
     let step = |v: Option<u64>| or_dash(v.map(|v| v.to_string()));
     format!(
-        "{:<width$} {:<9} {:>17} {:<18} {:>9} {:>8} {:>9} {:>9} {:>8} {:>8} {:>8} {:>7} {:>10}",
+        "{:<width$} {:<10} {:>17} {:<18} {:>9} {:>8} {:>9} {:>9} {:>8} {:>8} {:>8} {:>7} {:>10}",
         r.name,
         r.state,
         format!("{}/{}", r.step, r.total_steps),

@@ -200,7 +200,7 @@ impl Default for StartConfig {
 }
 
 /// Garments a generator is asked for at most.
-const MOST_GARMENTS: usize = 1_000_000;
+pub const MOST_GARMENTS: usize = 1_000_000;
 
 impl DataConfig {
     /// Memory for garments that can be read again [bytes]; those of a run without a cache cannot.

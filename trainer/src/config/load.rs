@@ -99,7 +99,7 @@ pub fn parse(text: &str, path: &Path, overrides: &[String]) -> Result<Config, Co
         let mut tree: toml::Value = toml::Value::try_from(&config)
             .map_err(|e| ConfigError::BadOverride { setting: String::new(), message: e.to_string() })?;
         for setting in overrides {
-            let bad = |message: String| ConfigError::BadOverride { setting: setting.clone(), message };
+            let bad = |message: String| ConfigError::BadOverride { setting: shortened(setting), message };
             apply(&mut tree, setting).map_err(bad)?;
             config = tree.clone().try_into().map_err(|e: toml::de::Error| bad(e.message().to_owned()))?;
         }
@@ -158,8 +158,24 @@ pub fn to_toml(config: &Config) -> Result<String, toml::ser::Error> {
     toml::to_string_pretty(config)
 }
 
+/// The beginning of an override, which may be as long as the command line.
+fn shortened(setting: &str) -> String {
+    const SHOWN: usize = 120;
+    match setting.char_indices().nth(SHOWN) {
+        Some((end, _)) => format!("{}…", &setting[..end]),
+        None => setting.to_owned(),
+    }
+}
+
+/// Tables within tables of an override at most; no key of a configuration lies that deep, and each costs stack.
+const MOST_PARTS: usize = 32;
+
 fn apply(tree: &mut toml::Value, setting: &str) -> Result<(), String> {
     let (key, value) = setting.split_once('=').ok_or("there is no '='")?;
+    let parts = key.split('.').count();
+    if parts > MOST_PARTS {
+        return Err(format!("the key has {parts} parts, none has more than {MOST_PARTS}"));
+    }
     // A bare word is a string: `--set data.body=body.npz` needs no quotes.
     let value = toml::from_str::<toml::Table>(&format!("v = {value}"))
         .ok()
@@ -221,6 +237,18 @@ mod tests {
     }
 
     #[test]
+    fn an_override_of_a_key_without_end_is_refused() {
+        let f = written(SMALL);
+        let e = load(f.path(), &[format!("{}=1", vec!["a"; 60_000].join("."))]).unwrap_err();
+        // Its whole text would fill the terminal.
+        let text = e.to_string();
+        assert!(text.contains("60000 parts") && text.len() < 400, "{} bytes", text.len());
+        for value in ["[".repeat(60_000), "{a=".repeat(60_000)] {
+            assert!(load(f.path(), &[format!("data.body={value}")]).is_ok(), "a bare word is a string");
+        }
+    }
+
+    #[test]
     fn resolved_text_reads_back_to_the_same_text() {
         let f = written(SMALL);
         let text = to_toml(&load(f.path(), &[]).unwrap()).unwrap();
@@ -271,9 +299,12 @@ mod tests {
     fn contradictions_are_named() {
         let f = written(&SMALL.replace("steps = 10", "steps = 10\nlayers = [1, 3]"));
         assert!(load(f.path(), &[]).unwrap_err().to_string().contains("stages[0].layers"));
-        for key in ["losses.alone", "losses.strain.weight"] {
-            let e = load(written(SMALL).path(), &[format!("{key}=-1")]).unwrap_err();
-            assert!(e.to_string().contains(key), "{e}");
+        for key in ["losses.alone", "losses.strain.weight", "losses.reference_vertices"] {
+            for value in ["-1", "nan", "inf"] {
+                let e = load(written(SMALL).path(), &[format!("{key}={value}")]).unwrap_err();
+                assert!(e.to_string().contains(key), "{e}");
+            }
         }
+        assert!(load(written(SMALL).path(), &["losses.reference_vertices=0".into()]).is_ok());
     }
 }

@@ -238,6 +238,13 @@ impl LossesConfig {
         if let Some((key, _)) = weights.find(|(_, w)| !(is_weight(w.from) && is_weight(w.to))) {
             return Some((key, "must be a number from 0 on".into(), "0 switches it off".into()));
         }
+        if !is_weight(self.reference_vertices) {
+            return Some((
+                "losses.reference_vertices".into(),
+                "must be a number from 0 on".into(),
+                "the paper's weights belong to 8000; 0 switches the scaling off".into(),
+            ));
+        }
         let error = self.energy_settings().check().err()?;
         Some(("losses".into(), error.to_string(), "configs/paper.toml shows every value".into()))
     }

@@ -14,8 +14,8 @@ mod stages;
 mod validation;
 
 pub use data::{
-    CacheConfig, DataConfig, GarmentSource, GenerateConfig, PoseConfig, PoseEncoding, SplitConfig,
-    StartConfig,
+    CacheConfig, DataConfig, GarmentSource, GenerateConfig, MOST_GARMENTS, PoseConfig, PoseEncoding,
+    SplitConfig, StartConfig,
 };
 pub use guard::{GuardConfig, InjectConfig, Injected};
 pub use load::{ConfigError, load, parse, to_toml};

@@ -100,6 +100,15 @@ pub enum DraperError {
         /// Why.
         reason: FitError,
     },
+    /// A mesh that is not to be fitted lies nowhere near the body.
+    #[error("{}: {what}", path.display())]
+    #[diagnostic(help("leave out --fit never: unit, axes and place are then found"))]
+    Place {
+        /// The file.
+        path: PathBuf,
+        /// What tells it.
+        what: String,
+    },
     /// A garment is too fine.
     #[error(
         "garment '{name}' has {vertices} vertices, more than {} can be draped at once",
@@ -136,7 +145,10 @@ pub enum DraperError {
     Model(#[from] ModelError),
     /// The networks made something that is no number.
     #[error("the networks moved garment '{garment}' to a place that is not finite")]
-    #[diagnostic(help("the model is damaged or was trained to divergence; try an earlier checkpoint"))]
+    #[diagnostic(help(
+        "either the garment lies far from the body (metres, y up, about the origin: `clothcombo fit` finds unit and axes), or \
+         the model is damaged or was trained to divergence: try an earlier checkpoint"
+    ))]
     Diverged {
         /// The garment.
         garment: String,
@@ -146,10 +158,40 @@ pub enum DraperError {
     Energy(#[from] EnergyError),
     /// Refinement failed.
     #[error("refinement: {0}")]
-    Refine(#[from] EquilibriumError),
+    Refine(EquilibriumError),
+    /// A garment came to the post-process far from the body.
+    #[error(
+        "post-process: garment '{garment}', vertex {vertex} (from 0) is at [{}, {}, {}]",
+        position[0], position[1], position[2]
+    )]
+    #[diagnostic(help(
+        "positions are finite, in metres, within a kilometre of the origin: check the garment's coordinates, `clothcombo fit` \
+         finds unit and axes"
+    ))]
+    Far {
+        /// The garment.
+        garment: String,
+        /// The vertex.
+        vertex: usize,
+        /// Where it is [m].
+        position: [f64; 3],
+    },
     /// The post-process refused its input.
     #[error("post-process: {0}")]
-    Resolve(#[from] ResolveError),
+    Resolve(ResolveError),
+}
+
+// Not as sources: their text is part of the message, and would be printed twice.
+impl From<EquilibriumError> for DraperError {
+    fn from(reason: EquilibriumError) -> Self {
+        Self::Refine(reason)
+    }
+}
+
+impl From<ResolveError> for DraperError {
+    fn from(reason: ResolveError) -> Self {
+        Self::Resolve(reason)
+    }
 }
 
 fn known_names(known: &[String]) -> String {
@@ -158,5 +200,25 @@ fn known_names(known: &[String]) -> String {
         0 => "pass a mesh file (.obj, .ply, .stl, .gltf, .glb), or --dataset FOLDER".to_owned(),
         n if n > SHOWN => format!("for example {}, and {} more", known[..SHOWN].join(", "), n - SHOWN),
         _ => format!("the garments are: {}", known.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::error::Error;
+
+    #[test]
+    fn a_cause_that_the_message_holds_is_no_source_as_well() {
+        let resolve = DraperError::from(ResolveError::EmptyBody);
+        let refine = DraperError::from(EquilibriumError::Count { what: "positions", expected: 2, found: 1 });
+        for error in [resolve, refine] {
+            assert!(error.to_string().contains(": ") && error.source().is_none(), "{error}");
+        }
+        let far = DraperError::Far { garment: "tee".into(), vertex: 7, position: [1e9, 0.0, 0.0] };
+        assert_eq!(
+            far.to_string(),
+            "post-process: garment 'tee', vertex 7 (from 0) is at [1000000000, 0, 0]"
+        );
     }
 }

@@ -28,15 +28,27 @@ pub(super) struct Last<'a> {
 }
 
 impl Draper {
-    /// Drapes `outfit` on `frame`. `watch` is called for every pose that the post-process looks at, with its share of the way there.
+    /// Drapes `outfit` on `frame`, of which the networks have `made` this. `watch` is called for every pose that the post-process
+    /// looks at, with its share of the way there.
     pub(super) fn drape_frame(
         &self,
         outfit: &Outfit,
         frame: Frame<'_>,
+        made: Networked,
         watch: &mut dyn FnMut(f64),
     ) -> Result<Drape, DraperError> {
-        let Networked { scene, surface, heading, transforms, skinned, network, mut milliseconds } =
-            self.networked(&self.model, outfit, frame.body)?;
+        self.unnamed(outfit, frame, made, watch).map_err(|error| outfit.named(error))
+    }
+
+    /// As [`drape_frame`](Self::drape_frame), with errors that may know a garment by its number only.
+    fn unnamed(
+        &self,
+        outfit: &Outfit,
+        frame: Frame<'_>,
+        made: Networked,
+        watch: &mut dyn FnMut(f64),
+    ) -> Result<Drape, DraperError> {
+        let Networked { scene, surface, heading, transforms, skinned, network, mut milliseconds } = made;
 
         let clock = Instant::now();
         let (before, refinement) = match self.settings.refine {

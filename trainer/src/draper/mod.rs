@@ -35,6 +35,7 @@ mod report;
 mod shipped;
 mod smooth;
 mod source;
+mod steady;
 
 pub use acceleration::{Acceleration, acceleration};
 pub use clothcombo_physics::contact::resolve::Certificate;
@@ -76,6 +77,9 @@ pub struct DraperSettings {
     pub backend: Backend,
     /// Steps of the static solver after the networks; 0 switches refinement off.
     pub refine: usize,
+    /// Frames of a motion to each side over which the networks' drapes are averaged before the post-process; 0 takes each frame by
+    /// itself.
+    pub steady: usize,
     /// Whether the post-process resolves what still intersects.
     pub resolve: bool,
     /// How it does that.
@@ -92,6 +96,7 @@ impl Default for DraperSettings {
             cache_limit: 10 << 30,
             backend,
             refine: 0,
+            steady: 2,
             resolve: true,
             post_process,
         }
@@ -200,7 +205,8 @@ impl Draper {
     /// # Errors
     /// When shape or pose do not fit the body model, or the networks diverge.
     pub fn drape(&self, outfit: &Outfit, body: &BodyState) -> Result<Drape, DraperError> {
-        self.drape_frame(outfit, Frame { body, last: None }, &mut |_| ())
+        let made = self.networked(&self.model, outfit, body)?;
+        self.drape_frame(outfit, Frame { body, last: None }, made, &mut |_| ())
     }
 
     fn dimensions(&self) -> clothcombo_model::Dimensions {

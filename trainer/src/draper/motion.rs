@@ -1,6 +1,7 @@
 //! A motion: each frame carries on from the one before, and what that leaves over from the one after.
 
 use super::frame::{Frame, Last};
+use super::steady::Steady;
 use super::{BodyState, Certificate, Drape, Draper, DraperError, Outfit};
 
 /// So many frames after one that was left with flaws only carry on: poses change slowly, and starting anew takes seconds.
@@ -48,7 +49,8 @@ pub enum DrapeProgress {
 }
 
 impl Draper {
-    /// Drapes `outfit` on each of `bodies`, the frames of a motion. The post-process carries on from frame to frame; where a frame is
+    /// Drapes `outfit` on each of `bodies`, the frames of a motion. What the networks make is averaged over neighbouring frames
+    /// ([`DraperSettings::steady`](super::DraperSettings::steady)). The post-process carries on from frame to frame; where a frame is
     /// left with crossings or torn cloth, and the one after it with less and no crossings, it carries on backwards from that one as
     /// well. `progress` is called on the way to each frame, after it, and before each that is draped once more.
     ///
@@ -63,10 +65,11 @@ impl Draper {
         let flaws = |drape: &Drape| flaws(&drape.certificate);
         let mut drapes: Vec<Drape> = Vec::with_capacity(bodies.len());
         let (mut bearable, mut only_carried) = (Bearable::NONE, 0);
+        let mut steady = Steady::new(self, outfit, bodies, self.settings.steady);
         for (frame, body) in bodies.iter().enumerate() {
             let last = drapes.last().map(|drape| Last { body: &bodies[frame - 1], drape, bearable });
             let mut watch = |share| progress(DrapeProgress::OnTheWay(share));
-            let mut drape = self.drape_frame(outfit, Frame { body, last }, &mut watch)?;
+            let mut drape = self.drape_frame(outfit, Frame { body, last }, steady.at(frame)?, &mut watch)?;
             if !bearable.is_met(&drape.certificate) {
                 (bearable, only_carried) = (Bearable::after(flaws(&drape)), FRAMES_CARRIED);
             } else if only_carried > 1 {
@@ -87,8 +90,10 @@ impl Draper {
             progress(DrapeProgress::Again(frame));
             let last = Last { body: &bodies[frame + 1], drape: after, bearable: Bearable::ALL };
             let mut watch = |share| progress(DrapeProgress::OnTheWay(share));
-            let frame = Frame { body: &bodies[frame], last: Some(last) };
-            let mut again = self.drape_frame(outfit, frame, &mut watch)?;
+            let body = &bodies[frame];
+            let mut made = self.networked(&self.model, outfit, body)?;
+            made.network = own.garments.iter().flat_map(|garment| &garment.network).copied().collect();
+            let mut again = self.drape_frame(outfit, Frame { body, last: Some(last) }, made, &mut watch)?;
             again.slim();
             if flaws(&again) < flaws(own) {
                 std::mem::swap(own, &mut again);

@@ -4,8 +4,8 @@ use super::{BodyState, Draper, DraperError, Outfit, PhaseTimes, elapsed};
 use crate::drape::{OnBody, body_tensors, drape_on};
 use crate::evaluate::reference::skinning_transforms;
 use crate::scene::{BodyDraw, Dresser, PreparedScene, SceneDraw};
-use clothcombo_data::asset::Pose;
 use clothcombo_data::asset::rotation::{Matrix3, apply, matrix_from_axis_angle};
+use clothcombo_data::asset::{Pose, PosedBody};
 use clothcombo_model::ClothCombo;
 use clothcombo_physics::contact::resolve::Waypoint;
 use clothcombo_physics::query::Surface;
@@ -44,11 +44,7 @@ impl Draper {
         body: &BodyState,
     ) -> Result<Networked, DraperError> {
         let clock = Instant::now();
-        let shape = self.checked_shape(&body.shape)?;
-        if body.pose.rotations.as_flattened().iter().chain(&body.place).any(|x| !x.is_finite()) {
-            return Err(DraperError::NotFinite { what: "pose" });
-        }
-        let posed = self.body().posed(&shape, &body.pose)?;
+        let (shape, posed) = self.posed(body)?;
         let mut surface = match &body.surface {
             Some(given) => self.checked_surface(given)?.to_vec(),
             None => posed.positions.iter().map(|p| add(*p, body.place)).collect(),
@@ -126,6 +122,25 @@ impl Draper {
         // A body with fewer components than the networks know has the others at their mean.
         scene.bodies[0].shape.resize(self.trained.state.shape_count, 0.0);
         scene
+    }
+
+    /// The shape with all its parameters, and the body model's own surface.
+    fn posed(&self, body: &BodyState) -> Result<(Vec<f64>, PosedBody), DraperError> {
+        let shape = self.checked_shape(&body.shape)?;
+        if body.pose.rotations.as_flattened().iter().chain(&body.place).any(|x| !x.is_finite()) {
+            return Err(DraperError::NotFinite { what: "pose" });
+        }
+        let posed = self.body().posed(&shape, &body.pose)?;
+        Ok((shape, posed))
+    }
+
+    /// Whether `body` can be dressed: what [`drape`](Self::drape) would say, at once.
+    ///
+    /// # Errors
+    /// When shape, pose or surface do not fit the body model.
+    pub fn check_body(&self, body: &BodyState) -> Result<(), DraperError> {
+        self.posed(body)?;
+        body.surface.as_deref().map_or(Ok(()), |given| self.checked_surface(given).map(|_| ()))
     }
 
     fn checked_shape(&self, shape: &[f64]) -> Result<Vec<f64>, DraperError> {

@@ -14,7 +14,7 @@ use clothcombo_data::cache::{
     get_operators, mesh_key, operators_key, put_binding, put_embedding, put_operators,
 };
 use clothcombo_model::{Embeddings, GarmentEmbedding, GarmentTensors, OutfitTensors};
-use clothcombo_physics::contact::resolve::{Layer, RestGarment};
+use clothcombo_physics::contact::resolve::{Layer, ResolveError, RestGarment};
 use clothcombo_physics::operators::SurfaceOperators;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -61,6 +61,21 @@ pub struct Outfit {
 }
 
 impl Outfit {
+    /// Whether `garments` are few and small enough to be an outfit: what [`Draper::outfit`] would say, at once.
+    ///
+    /// # Errors
+    /// When they are not.
+    pub fn check(garments: &[SourceGarment]) -> Result<(), DraperError> {
+        if garments.is_empty() || garments.len() > MAX_GARMENTS {
+            return Err(DraperError::Count { count: garments.len(), most: MAX_GARMENTS });
+        }
+        let sizes = garments.iter().map(|source| (&source.garment.name, source.garment.rest.vertex_count()));
+        match sizes.into_iter().find(|(_, vertices)| *vertices > MAX_VERTICES) {
+            Some((name, vertices)) => Err(DraperError::TooLarge { name: name.clone(), vertices }),
+            None => Ok(()),
+        }
+    }
+
     /// Names, innermost first.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.pieces.iter().map(|p| p.name.as_str())
@@ -86,6 +101,17 @@ impl Outfit {
     pub(super) fn layers<'a>(&'a self, positions: &[&'a [[f64; 3]]]) -> Vec<Layer<'a>> {
         let pieces = self.pieces.iter().zip(positions);
         pieces.map(|(piece, positions)| Layer { garment: &piece.rest, positions }).collect()
+    }
+
+    /// `error` with the garment's name where the post-process knows only its number.
+    pub(super) fn named(&self, error: DraperError) -> DraperError {
+        match error {
+            DraperError::Resolve(ResolveError::Position { garment, vertex, position }) => {
+                let garment = self.pieces.get(garment).map_or_else(String::new, |piece| piece.name.clone());
+                DraperError::Far { garment, vertex, position }
+            }
+            other => other,
+        }
     }
 
     pub(super) fn check_finite(&self, packed: &[[f64; 3]]) -> Result<(), DraperError> {
@@ -120,16 +146,10 @@ impl KnownGarments {
     }
 
     pub fn outfit(&self, draper: &Draper, garments: Vec<SourceGarment>) -> Result<Outfit, DraperError> {
-        if garments.is_empty() || garments.len() > MAX_GARMENTS {
-            return Err(DraperError::Count { count: garments.len(), most: MAX_GARMENTS });
-        }
+        Outfit::check(&garments)?;
         let mut names = UniqueNames::default();
         let (mut pieces, mut known) = (Vec::new(), Vec::new());
         for source in garments {
-            let vertices = source.garment.rest.vertex_count();
-            if vertices > MAX_VERTICES {
-                return Err(DraperError::TooLarge { name: source.garment.name, vertices });
-            }
             let name = names.take(&source.garment.name);
             let (found, milliseconds, embedding_known) = self.know(draper, &source)?;
             let (source, worn, rest) = (Arc::new(source), found.worn.clone(), found.rest.clone());

@@ -3,6 +3,7 @@
 use super::acceleration::{Acceleration, acceleration};
 use super::refine::Refinement;
 use super::{Drape, Draper, DraperError, Outfit, Smoothing};
+use crate::paths::{lossy, lossy_option};
 use crate::scene::LibraryError;
 use crate::score::{DrapedGarment, Score, ScoreDistance, score};
 use clothcombo_data::asset::Category;
@@ -80,6 +81,7 @@ impl PhaseTimes {
 #[derive(Clone, Debug, Serialize)]
 pub struct ModelReport {
     /// Its folder.
+    #[serde(serialize_with = "lossy")]
     pub folder: PathBuf,
     /// Steps it was trained for.
     pub step: u64,
@@ -111,7 +113,7 @@ pub struct GarmentReport {
     /// Its name, and that of its file.
     pub name: String,
     /// The file it was read from, if it was.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "lossy_option")]
     pub given: Option<PathBuf>,
     /// Vertices of the mesh as given.
     pub given_vertices: usize,

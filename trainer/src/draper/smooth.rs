@@ -1,8 +1,8 @@
-//! Temporal smoothing of a motion that never makes an intersection.
+//! Temporal smoothing of a motion that never makes an intersection nor tears cloth.
 //!
 //! What is smoothed is each vertex's offset from linear blend skinning in the frame of its own skinning transform, so that
 //! cloth that merely follows the body stays as it is. Every smoothed frame is counted exactly; where it crosses more than the
-//! frame as it was, less of the smoothing is applied, and none if need be.
+//! frame as it was, or is torn more, less of the smoothing is applied, and none if need be.
 
 use super::{Drape, Draper, DraperError, Outfit};
 use clothcombo_physics::transform::{into_frame, out_of_frame};
@@ -22,7 +22,7 @@ pub struct Smoothing {
     pub whole: usize,
     /// Frames that were smoothed in part.
     pub partly: usize,
-    /// Frames that were left as they were, because smoothing would have made intersections.
+    /// Frames that were left as they were, because smoothing would have made intersections or torn cloth.
     pub left: usize,
 }
 
@@ -74,7 +74,7 @@ fn smoothed_frame(
         .iter()
         .enumerate()
         .map(|(g, garment)| {
-            let mean = averaged(offsets, g, frame, weights);
+            let mean = averaged(|other| &offsets[other][g], offsets.len(), frame, weights);
             let vertices = garment.skinned.iter().zip(&garment.transforms).zip(mean);
             vertices
                 .map(|((start, transform), offset)| add(*start, out_of_frame(transform, offset)))
@@ -91,7 +91,8 @@ fn smoothed_frame(
         let (now, before) = (&candidate.certificate, &drape.certificate);
         let is_no_worse = now.body_triangle_pairs <= before.body_triangle_pairs
             && now.layer_triangle_pairs <= before.layer_triangle_pairs
-            && now.self_triangle_pairs <= before.self_triangle_pairs;
+            && now.self_triangle_pairs <= before.self_triangle_pairs
+            && now.tears() <= before.tears();
         if is_no_worse {
             return Ok(Some((number, candidate)));
         }
@@ -100,7 +101,7 @@ fn smoothed_frame(
 }
 
 /// Binomial weights −radius…radius, not yet normalised.
-fn binomial(radius: usize) -> Vec<f64> {
+pub(super) fn binomial(radius: usize) -> Vec<f64> {
     let mut row = vec![1.0];
     for _ in 0..2 * radius {
         row = std::iter::once(1.0)
@@ -111,16 +112,22 @@ fn binomial(radius: usize) -> Vec<f64> {
     row
 }
 
-fn averaged(offsets: &[Vec<Vec<[f64; 3]>>], garment: usize, frame: usize, weights: &[f64]) -> Vec<[f64; 3]> {
+/// The mean of `offsets` around `frame` of `count`.
+pub(super) fn averaged<'a>(
+    offsets: impl Fn(usize) -> &'a Vec<[f64; 3]>,
+    count: usize,
+    frame: usize,
+    weights: &[f64],
+) -> Vec<[f64; 3]> {
     let radius = weights.len() / 2;
-    let mut sum = vec![[0.0; 3]; offsets[frame][garment].len()];
+    let mut sum = vec![[0.0; 3]; offsets(frame).len()];
     let mut total = 0.0;
     // Symmetric about the frame also near the ends, so that steady movement stays where it is.
-    let reach = radius.min(frame).min(offsets.len() - 1 - frame);
+    let reach = radius.min(frame).min(count - 1 - frame);
     for other in frame - reach..=frame + reach {
         let weight = weights[radius + other - frame];
         total += weight;
-        for (sum, offset) in sum.iter_mut().zip(&offsets[other][garment]) {
+        for (sum, offset) in sum.iter_mut().zip(offsets(other)) {
             *sum = add(*sum, scale(*offset, weight));
         }
     }
@@ -147,13 +154,13 @@ mod tests {
 
     #[test]
     fn steady_movement_stays_and_a_jerk_is_damped() {
-        let line = |f: usize| vec![vec![[f as f64, -2.0 * f as f64, 1.0]]];
+        let line = |f: usize| vec![[f as f64, -2.0 * f as f64, 1.0]];
         let mut offsets: Vec<_> = (0..7).map(line).collect();
         for frame in 0..7 {
-            assert_eq!(averaged(&offsets, 0, frame, &binomial(2)), line(frame)[0]);
+            assert_eq!(averaged(|other| &offsets[other], 7, frame, &binomial(2)), line(frame));
         }
-        offsets[3][0][0][0] += 1.6;
-        let jerk = averaged(&offsets, 0, 3, &binomial(2))[0][0] - 3.0;
+        offsets[3][0][0] += 1.6;
+        let jerk = averaged(|other| &offsets[other], 7, 3, &binomial(2))[0][0] - 3.0;
         assert!((jerk - 0.6).abs() < 1e-12, "{jerk}");
     }
 }

@@ -3,6 +3,7 @@
 use super::error::DraperError;
 use crate::config::Config;
 use crate::scene::{LibraryError, Maker, Origin};
+use crate::score::misplaced;
 use clothcombo_data::asset::{Body, Category, Garment, Provenance};
 use clothcombo_data::check::MeshMeasures;
 use clothcombo_data::dataset::list_garment_folder;
@@ -52,6 +53,7 @@ impl SourceGarment {
             None => given.to_tri_mesh(path).ok().filter(|mesh| is_clean(mesh) && is_on_body(mesh, body)),
         };
         if let Some(rest) = placed {
+            check_place(path, &rest, body)?;
             let category = Category::guess(&rest, body);
             let holding = Garment::needs_holding(&rest, body);
             let follows = (0..rest.vertex_count() as u32).collect();
@@ -68,6 +70,14 @@ impl SourceGarment {
     /// Positions of the garment's vertices as positions of the given ones, in their order.
     pub fn in_given_order(&self, positions: &[[f64; 3]]) -> Vec<[f64; 3]> {
         self.follows.iter().map(|v| positions[*v as usize]).collect()
+    }
+}
+
+/// Whether a mesh that is taken as it is lies somewhere near the zero body: if not, it crosses nothing, and looks like a good drape.
+fn check_place(path: &Path, rest: &TriMesh, body: &Body) -> Result<(), DraperError> {
+    match misplaced(rest, &body.zero_body()) {
+        Some(what) => Err(DraperError::Place { path: path.into(), what }),
+        None => Ok(()),
     }
 }
 
@@ -168,7 +178,9 @@ impl Closet {
             source.garment.name.clone_from(&listed.name);
             return Ok(source);
         }
-        let mut source = SourceGarment::new(made?);
+        let garment = made?;
+        check_place(&listed.path, &garment.rest, body)?;
+        let mut source = SourceGarment::new(garment);
         // Polygons as the file has them.
         source.given = load_mesh(&listed.path).map_err(LibraryError::data)?;
         source.path = Some(listed.path.clone());

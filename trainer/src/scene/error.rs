@@ -97,6 +97,19 @@ pub enum LibraryError {
         /// Held-out frames.
         held_out: usize,
     },
+    /// Clips are weighted by their length in time, and some of these have none.
+    #[error("{}: at frame rates from {lowest:?} to {highest:?} a second the clips' lengths in time cannot be compared", folder.display())]
+    #[diagnostic(help(
+        "`clothcombo check` tells the frame rate of every motion; mend mocap_framerate, for example to 30"
+    ))]
+    FrameRates {
+        /// The motion folder.
+        folder: PathBuf,
+        /// Lowest frame rate [1/s].
+        lowest: f64,
+        /// Highest frame rate [1/s].
+        highest: f64,
+    },
     /// The skeleton is too small for the poses.
     #[error("body {name} has {joints} joints, poses turn the {BODY_JOINT_COUNT} body joints of SMPL")]
     #[diagnostic(help(

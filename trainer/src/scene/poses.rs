@@ -1,11 +1,13 @@
 //! Poses for training and validation: frames of motion clips, or the sampler within joint limits.
 
+mod frames;
+
 use super::error::LibraryError;
 use crate::config::{PoseConfig, PoseEncoding};
-use clothcombo_data::asset::{Body, Motion, Pose, Provenance};
+use clothcombo_data::asset::{Body, Pose, Provenance};
 use clothcombo_data::dataset::load_motion_folder;
 use clothcombo_data::generate::{PoseAugmentation, PoseSampler, SelfContact};
-use rand::seq::IndexedRandom;
+use frames::Frames;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -54,39 +56,6 @@ enum Source {
     Sampler(PoseSampler),
 }
 
-/// Frames by what they are for.
-#[derive(Default)]
-struct Frames {
-    train: Vec<Clip>,
-    held_out: Vec<Pose>,
-    unseen: Vec<Pose>,
-    training_clips: Vec<String>,
-    unseen_clips: Vec<String>,
-    /// Where every clip comes from.
-    sources: Vec<Provenance>,
-}
-
-/// What is trained on of a clip.
-struct Clip {
-    poses: Vec<Pose>,
-    seconds: f64,
-}
-
-impl Frames {
-    /// Number of frames trained on.
-    fn trained(&self) -> usize {
-        self.train.iter().map(|clip| clip.poses.len()).sum()
-    }
-
-    /// A frame to train on. The share of a clip grows with the square root of its length in time: neighbouring frames are
-    /// alike, so that by frames alone a long clip, or one of a high frame rate, would crowd out the others.
-    fn draw_training(&self, rng: &mut ChaCha8Rng) -> &Pose {
-        let clip = self.train.choose_weighted(rng, |clip| clip.seconds.sqrt());
-        let poses = &clip.expect("a library has frames to train on, and they take time").poses;
-        &poses[rng.random_range(0..poses.len())]
-    }
-}
-
 /// Which poses a validation scene draws from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Unseen {
@@ -101,7 +70,7 @@ impl PoseLibrary {
     /// of mean shape.
     ///
     /// # Errors
-    /// When the folder cannot be read or one of the two parts is empty.
+    /// When the folder cannot be read, one of the two parts is empty, or the frame rates of the clips are no rates.
     pub fn new(config: &PoseConfig, body: &Arc<Body>) -> Result<Self, LibraryError> {
         let source = match &config.motions {
             None => Source::Sampler(PoseSampler::default()),
@@ -118,15 +87,7 @@ impl PoseLibrary {
                         clips: clips.iter().map(|clip| clip.name.as_str()).collect::<Vec<_>>().join(", "),
                     });
                 }
-                let frames = split(&clips, config);
-                if frames.trained() == 0 || frames.held_out.is_empty() {
-                    return Err(LibraryError::EmptySplit {
-                        folder: folder.clone(),
-                        train: frames.trained(),
-                        held_out: frames.held_out.len(),
-                    });
-                }
-                Source::Frames(frames)
+                Source::Frames(Frames::split(&clips, config, folder)?)
             }
         };
         let limit = config.max_self_intersection;
@@ -188,7 +149,7 @@ impl PoseLibrary {
     pub fn frames(&self) -> Vec<&[Pose]> {
         match &self.source {
             Source::Frames(f) => {
-                let clips = f.train.iter().map(|clip| clip.poses.as_slice());
+                let clips = f.trained_clips();
                 clips.chain([f.held_out.as_slice(), f.unseen.as_slice()]).collect()
             }
             Source::Sampler(_) => Vec::new(),
@@ -291,33 +252,6 @@ impl Filter {
     }
 }
 
-/// Every clip is cut into blocks; one block in every `1 / held_out_share`, in the middle of its group, is held out. A clip of less
-/// than about half a group has none.
-fn split(clips: &[Motion], config: &PoseConfig) -> Frames {
-    let mut frames =
-        Frames { sources: clips.iter().map(|c| c.source.clone()).collect(), ..Frames::default() };
-    let group = (1.0 / config.held_out_share).round().max(2.0) as usize;
-    for clip in clips {
-        if config.held_out_clips.iter().any(|name| clip.name.contains(name.as_str())) {
-            frames.unseen.extend_from_slice(&clip.poses);
-            frames.unseen_clips.push(clip.name.clone());
-            continue;
-        }
-        frames.training_clips.push(clip.name.clone());
-        let block = ((config.held_out_block * clip.frame_rate).round() as usize).max(1);
-        let mut train = Vec::new();
-        for (i, poses) in clip.poses.chunks(block).enumerate() {
-            let part = if i % group == group / 2 { &mut frames.held_out } else { &mut train };
-            part.extend_from_slice(poses);
-        }
-        if !train.is_empty() {
-            let seconds = train.len() as f64 / clip.frame_rate;
-            frames.train.push(Clip { poses: train, seconds });
-        }
-    }
-    frames
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -326,26 +260,6 @@ mod tests {
     fn library(max_self_intersection: f64) -> PoseLibrary {
         let config = PoseConfig { max_self_intersection, ..PoseConfig::default() };
         PoseLibrary::new(&config, &Arc::new(mannequin())).unwrap()
-    }
-
-    #[test]
-    fn long_clips_do_not_crowd_out_short_ones() {
-        let clip = |frames: usize, rate: f64| Clip {
-            poses: vec![Pose { rotations: vec![[frames as f64; 3]] }; frames],
-            seconds: frames as f64 / rate,
-        };
-        // 64 s, 4 s, and 4 s at a high frame rate: 8 to 2 to 2.
-        let frames =
-            Frames { train: vec![clip(640, 10.0), clip(40, 10.0), clip(480, 120.0)], ..Frames::default() };
-        let mut rng = ChaCha8Rng::seed_from_u64(1);
-        let mut counts = [0; 3];
-        for _ in 0..12_000 {
-            let length = frames.draw_training(&mut rng).rotations[0][0] as usize;
-            counts[[640, 40, 480].iter().position(|l| *l == length).unwrap()] += 1;
-        }
-        for (count, expected) in counts.into_iter().zip([8000.0_f64, 2000.0, 2000.0]) {
-            assert!((f64::from(count) - expected).abs() < 4.0 * expected.sqrt(), "{counts:?}");
-        }
     }
 
     #[test]

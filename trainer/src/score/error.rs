@@ -67,6 +67,35 @@ pub enum ScoreError {
         /// Its corners there.
         draped_face: [u32; 3],
     },
+    /// A body that is not in metres.
+    #[error("{}: {what}", path.display())]
+    #[diagnostic(help("scale body and garments to metres (0.01 for centimetres)"))]
+    BodySize {
+        /// Its file.
+        path: PathBuf,
+        /// What tells it.
+        what: String,
+    },
+    /// A garment in another unit or place than the body.
+    #[error("{}: {what}", path.display())]
+    #[diagnostic(help("body and garments must be in one unit and one place: as draped"))]
+    Place {
+        /// Its draped file.
+        path: PathBuf,
+        /// What tells it.
+        what: String,
+    },
+    /// A rest mesh in another unit than the draped one.
+    #[error("{} beside {}: {what}", rest.display(), draped.display())]
+    #[diagnostic(help("rest and draped meshes must be in one unit: metres"))]
+    RestUnit {
+        /// The rest file.
+        rest: PathBuf,
+        /// The draped file.
+        draped: PathBuf,
+        /// What tells it.
+        what: String,
+    },
     /// Positions that are not those of the garment.
     #[error("garment '{garment}': {reason}")]
     Positions {

@@ -1,5 +1,6 @@
 //! Meshes to be scored, from files of any mesh format.
 
+use super::place::{misplaced, oversized, rescaled};
 use super::{DrapedGarment, MeshSize, Score, ScoreDistance, ScoreError, score};
 use clothcombo_data::format::load_tri_mesh;
 use clothcombo_physics::mesh::{TriMesh, is_closed, signed_volume};
@@ -26,7 +27,7 @@ pub fn score_files(files: &MeshFiles, distance: ScoreDistance) -> Result<Score, 
         return Err(ScoreError::FileCounts { rest: rest.len(), draped: draped.len() });
     }
     let body = load_body(body)?;
-    let loaded = rest.iter().zip(draped).map(|(rest, draped)| load_garment(rest, draped));
+    let loaded = rest.iter().zip(draped).map(|(rest, draped)| load_garment(rest, draped, &body));
     let loaded = loaded.collect::<Result<Vec<_>, _>>()?;
     let garments: Vec<DrapedGarment> = loaded
         .iter()
@@ -35,9 +36,12 @@ pub fn score_files(files: &MeshFiles, distance: ScoreDistance) -> Result<Score, 
     score(&body, &garments, distance)
 }
 
-/// A posed body. One that is inside out, its faces towards its inside, is turned, and said so.
+/// A posed body in metres. One that is inside out, its faces towards its inside, is turned, and said so.
 pub(crate) fn load_body(path: &Path) -> Result<TriMesh, ScoreError> {
     let body = load_tri_mesh(path)?;
+    if let Some(what) = oversized(&body) {
+        return Err(ScoreError::BodySize { path: path.into(), what });
+    }
     if !(is_closed(body.faces()) && signed_volume(&body) < 0.0) {
         return Ok(body);
     }
@@ -45,10 +49,11 @@ pub(crate) fn load_body(path: &Path) -> Result<TriMesh, ScoreError> {
     Ok(body.turned())
 }
 
-/// Name, rest mesh and draped mesh of a garment, which have the same faces.
+/// Name, rest mesh and draped mesh of a garment, which have the same faces; in the unit and place of `body`.
 pub(crate) fn load_garment(
     rest_path: &Path,
     draped_path: &Path,
+    body: &TriMesh,
 ) -> Result<(String, TriMesh, TriMesh), ScoreError> {
     let (rest, draped) = (load_tri_mesh(rest_path)?, load_tri_mesh(draped_path)?);
     let size = |path: &Path, mesh: &TriMesh| MeshSize {
@@ -65,6 +70,12 @@ pub(crate) fn load_garment(
         let [rest_face, draped_face] = [&rest, &draped].map(|mesh| mesh.faces()[face]);
         let (rest, draped) = sizes();
         return Err(ScoreError::Faces { face, rest, rest_face, draped, draped_face });
+    }
+    if let Some(what) = misplaced(&draped, body) {
+        return Err(ScoreError::Place { path: draped_path.into(), what });
+    }
+    if let Some(what) = rescaled(&rest, &draped) {
+        return Err(ScoreError::RestUnit { rest: rest_path.into(), draped: draped_path.into(), what });
     }
     let name = draped_path.file_stem().unwrap_or(draped_path.as_os_str()).to_string_lossy().into_owned();
     Ok((name, rest, draped))

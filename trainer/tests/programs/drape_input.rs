@@ -1,8 +1,10 @@
 //! What goes into `clothcombo drape`: garments in any unit and orientation, wrong input, models, and a signal half way.
 
+use crate::common::holds;
 use crate::drape::{SKIRT, TEE, at, drape, failure, report, run_folder, save_motion};
 use assert_cmd::Command;
 use clothcombo_data::format::{load_mesh, load_tri_mesh, obj};
+use clothcombo_physics::mesh::shapes::{icosphere, mapped};
 use std::fs;
 use std::path::Path;
 
@@ -51,10 +53,19 @@ fn wrong_input_names_itself_and_leaves_nothing() {
     save_motion(Path::new(&motion), 4);
     let beyond = format!("{motion}:9");
     let many = vec![TEE; 13];
+    let ball = |name: &str, scale: f64, x_of_middle: f64| {
+        let path = at(&folder, name);
+        let mesh = mapped(&icosphere(0.3, 2), |[x, y, z]| [scale * x + x_of_middle, scale * y, scale * z]);
+        obj::save(Path::new(&path), mesh.positions(), mesh.faces(), &[]).unwrap();
+        path
+    };
+    let (huge, far) = (ball("huge.obj", 1e3, 0.0), ball("far.obj", 1.0, 100.0));
     let cases: Vec<(Vec<&str>, Vec<&str>)> = vec![
         (vec!["--garments", &band], vec!["broken.obj:2:", "not finite"]),
         (vec!["--garments", &cube], vec!["cube.obj", "triangles"]),
         (vec!["--garments", "none.obj"], vec!["none.obj"]),
+        (vec!["--garments", &huge, "--fit", "never"], vec!["huge.obj", "measures 600"]),
+        (vec!["--garments", &far, "--fit", "never"], vec!["far.obj", "beside the body: x from 99.7"]),
         (vec!["--garments", "cloak"], vec!["cloak", TEE]),
         (vec!["--garments", TEE, "--order", "1"], vec!["--order 1", "1 garments"]),
         (
@@ -81,7 +92,14 @@ fn wrong_input_names_itself_and_leaves_nothing() {
     failure(&mut drape(&to(&["--outfits", &band, "--order", "1,0"], &out)), 2);
     let inner = format!("{out}/cache");
     let message = failure(&mut drape(&to(&["--garments", TEE, "--cache", &inner], &out)), 1);
-    assert!(message.contains("--cache") && message.contains("folder that is to be made"), "{message}");
+    assert!(message.contains("--cache") && holds(&message, "folder that is to be made"), "{message}");
+    let name = folder.path().file_name().unwrap().display();
+    let around = format!("{}/../{name}/out/cache", folder.path().display());
+    let message = failure(&mut drape(&to(&["--garments", TEE, "--cache", &around], &out)), 1);
+    assert!(holds(&message, "folder that is to be made"), "{message}");
+    // Neither are the folders it was to lie in.
+    failure(&mut drape(&["--garments", &band, "-o", &at(&folder, "new/er/out")]), 1);
+    assert!(!folder.path().join("new").exists());
     failure(&mut drape(&to(&["--garments", TEE, "--frames", "0..4"], &out)), 2);
     failure(&mut drape(&to(&["--garments", TEE, "--motion", &motion, "--frames", "4..1"], &out)), 2);
     assert!(!Path::new(&out).exists());
@@ -103,17 +121,41 @@ fn a_wrong_name_in_the_last_outfit_is_told_before_anything_is_draped() {
         ["outfits.toml", "out", "cache", "arms.npz"].map(|name| at(&folder, name));
     save_motion(Path::new(&motion), 4);
     let good = format!("[[outfit]]\nname = \"good\"\ngarments = [\"{TEE}\"]\n");
+    let thirteen = vec![format!("\"{TEE}\""); 13].join(", ");
     for (bad, word) in [
+        (format!("garments = [\"{TEE}\"]\nshape = [1e9]"), "1000000000 makes no body"),
+        (format!("garments = [\"{TEE}\"]\nshape = [{}]", ["1"; 17].join(", ")), "17 shape numbers"),
+        (format!("garments = [{thirteen}]"), "13 garments"),
         (format!("garments = [\"{TEE}\"]\npose = \"{motion}:9\""), "no frame 9"),
         ("garments = [\"cloak\"]".to_owned(), "cloak"),
         (format!("garments = [\"{SKIRT}\", \"{TEE}\"]\norder = [1]"), "--order"),
     ] {
         fs::write(&file, format!("{good}[[outfit]]\nname = \"bad one\"\n{bad}\n")).unwrap();
         let message = failure(&mut drape(&["--outfits", &file, "--cache", &cache, "-o", &out]), 1);
-        assert!(message.contains("outfit bad one") && message.contains(word), "{message}");
+        assert!(holds(&message, "outfit bad one") && holds(&message, word), "{message}");
         // The embedding of the good one would lie in the cache.
         assert!(!Path::new(&out).exists() && fs::read_dir(&cache).unwrap().next().is_none(), "{message}");
     }
+}
+
+#[test]
+fn frames_of_the_command_line_are_for_outfits_in_motion() {
+    let folder = tempfile::tempdir().unwrap();
+    let [file, out, motion] = ["outfits.toml", "out", "arms.npz"].map(|name| at(&folder, name));
+    save_motion(Path::new(&motion), 4);
+    let still = format!("[[outfit]]\nname = \"still\"\ngarments = [\"{TEE}\"]\npose = \"{motion}:3\"\n");
+    fs::write(&file, &still).unwrap();
+    let arguments = ["--outfits", &file, "--frames", "1..4", "--every", "2", "-o", &out];
+    let message = failure(&mut drape(&arguments), 1);
+    assert!(holds(&message, "no outfit of") && holds(&message, "has a motion"), "{message}");
+    fs::write(
+        &file,
+        format!("{still}[[outfit]]\nname = \"moving\"\ngarments = [\"{TEE}\"]\nmotion = \"{motion}\"\n"),
+    )
+    .unwrap();
+    drape(&arguments).assert().success();
+    let frames = |name: &str| report(&Path::new(&out).join(name))["frames"].as_array().map_or(0, Vec::len);
+    assert_eq!((frames("still"), frames("moving")), (0, 2));
 }
 
 #[test]

@@ -65,3 +65,16 @@ fn a_quick_evaluation_holds_every_table_of_the_paper() {
     }
     assert!(report.join("note.txt").is_file());
 }
+
+#[test]
+fn a_file_in_the_place_of_the_report_is_told_before_anything_is_loaded() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("thesis.tex");
+    fs::write(&file, "mine").unwrap();
+    for output in [file.clone(), file.join("report")] {
+        // The model is not there either: it would be missed first.
+        let output = clothcombo(&["eval", "--checkpoint", "nowhere", "-o", output.to_str().unwrap()]);
+        assert_eq!(output.status.code(), Some(1));
+        assert!(holds(&said(&output), "thesis.tex is no folder"), "{}", said(&output));
+    }
+}

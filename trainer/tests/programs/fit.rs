@@ -91,3 +91,21 @@ fn refusals_name_file_and_reason_and_usage_errors_exit_2() {
         .stderr(predicate::str::contains("inch"));
     clothcombo().args(["fit", "none.obj"]).assert().code(1).stderr(predicate::str::contains("none.obj"));
 }
+
+#[cfg(unix)]
+#[test]
+fn files_of_any_name_are_reported() {
+    use std::os::unix::ffi::OsStrExt;
+    let folder = tempfile::tempdir().unwrap();
+    let made = folder.path().join("made");
+    let mut generate = clothcombo();
+    generate.args(["generate", "--count", "1", "--vertices", "300", "-o"]).arg(&made).assert().success();
+    let garment = folder.path().join(std::ffi::OsStr::from_bytes(b"dress-\xff.obj"));
+    fs::copy(made.join("dress_000000.obj"), &garment).unwrap();
+    let output = folder.path().join(std::ffi::OsStr::from_bytes(b"fitted-\xff.obj"));
+    let run = clothcombo().args(["fit", "--json"]).arg(&garment).arg("-o").arg(&output).output().unwrap();
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let report: serde_json::Value = serde_json::from_slice(&run.stdout).unwrap();
+    assert!(report["garment"].as_str().unwrap().ends_with("dress-\u{fffd}.obj"), "{report}");
+    assert!(report["output"].as_str().unwrap().ends_with("fitted-\u{fffd}.obj") && output.is_file());
+}

@@ -58,6 +58,37 @@ fn a_folder_of_other_garments_is_refused_and_a_picture_is_drawn() {
 }
 
 #[test]
+fn what_cannot_be_made_or_written_is_refused_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("garments");
+    let thesis = folder.path().join("thesis.tex");
+    fs::write(&thesis, "mine").unwrap();
+    for count in ["0", "1000001", "18446744073709551615"] {
+        generate(&out, &["--count", count]).assert().code(2).stderr(contains("--count"));
+    }
+    for picture in [thesis.clone(), thesis.join("sheet.png")] {
+        generate(&out, &["--count", "1", "--picture"])
+            .arg(&picture)
+            .assert()
+            .code(2)
+            .stderr(contains("thesis"));
+    }
+    for bench in [
+        ["generator", "--most-failures", "nan"],
+        ["generator", "--most-failures", "2"],
+        ["operators", "--seconds", "nan"],
+        ["operators", "--seconds", "1e30"],
+        ["step", "--seconds", "0"],
+        ["growth", "--picture", "growth.md"],
+    ] {
+        let mut command = Command::cargo_bin("clothcombo").unwrap();
+        command.arg("bench").args(bench).assert().code(2).stderr(contains(bench[1]));
+    }
+    assert!(!out.exists());
+    assert_eq!(fs::read_to_string(&thesis).unwrap(), "mine");
+}
+
+#[test]
 fn garments_that_are_not_listed_are_not_hidden_by_a_list() {
     let folder = tempfile::tempdir().unwrap();
     let own = folder.path().join("own.obj");

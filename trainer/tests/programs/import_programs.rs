@@ -23,6 +23,14 @@ fn every_importer_has_help_with_an_example() {
 }
 
 #[test]
+fn a_frame_rate_that_is_none_is_refused() {
+    for rate in ["nan", "inf", "0", "-30"] {
+        let rate = format!("--frame-rate={rate}");
+        import("bvh").args(["walk.bvh", "-o", "motions", &rate]).assert().code(2).stderr(contains("above 0"));
+    }
+}
+
+#[test]
 fn a_model_its_motions_and_its_garments_come_in() {
     let folder = tempfile::tempdir().unwrap();
     let body = folder.path().join("body.npz");

@@ -8,6 +8,7 @@ mod bench_step;
 mod check;
 mod common;
 mod drape;
+mod drape_folders;
 mod drape_input;
 mod eval;
 mod fit;

@@ -97,6 +97,18 @@ fn runs_are_compared_in_a_table_and_as_json() {
     assert_eq!(runs[0]["best_score"], runs[1]["best_score"], "the same configuration is the same run");
     let nothing = clothcombo(&["runs", &folder.path().join("no run").display().to_string()]);
     assert!(nothing.status.code() == Some(1) && holds(&said(&nothing), "holds no run"));
+    let missing = clothcombo(&["runs", &folder.path().join("missing").display().to_string()]);
+    assert!(missing.status.code() == Some(1) && holds(&said(&missing), "cannot list"), "{}", said(&missing));
+
+    // A damaged run is shown beside the others.
+    std::fs::write(folder.path().join("first/config.toml"), "seed = ").unwrap();
+    let text = String::from_utf8(clothcombo(&["runs", &path]).stdout).unwrap();
+    let row = text.lines().find(|line| line.starts_with("first")).unwrap();
+    assert!(row.contains("unreadable") && text.lines().count() == 3, "{text}");
+    let json = clothcombo(&["runs", &path, "--json", "--sort", "score"]);
+    let runs: Vec<serde_json::Value> = serde_json::from_slice(&json.stdout).unwrap();
+    assert_eq!((&runs[0]["name"], &runs[1]["state"]), (&"second".into(), &"unreadable".into()));
+    assert!(!runs[1]["error"].as_str().unwrap().is_empty());
 }
 
 #[test]

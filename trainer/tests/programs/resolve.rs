@@ -179,6 +179,9 @@ fn files_that_cannot_be_used_are_named() {
     case.must_fail(&["beside.obj"], &[], &["beside.obj", "beside the body", "x from"]);
     case.write("large.obj", &with_vertices(&quad_tube(0.149, 40, 12), |p| p.map(|x| 1e3 * x)));
     case.must_fail(&["tee.obj", "large.obj"], &[], &["large.obj", "one unit"]);
+    case.write("rest.obj", &with_vertices(&quad_tube(0.149, 40, 12), |p| p.map(|x| 1e3 * x)));
+    case.write("tight.obj", &quad_tube(0.149, 40, 12));
+    case.must_fail(&["tight.obj"], &["--rest", "rest.obj"], &["rest.obj", "tight.obj", "one unit"]);
     let body = fs::read_to_string(case.path("body.obj")).unwrap();
     case.write("body.obj", &with_vertices(&body, |p| p.map(|x| 1e3 * x)));
     case.must_fail(&["tee.obj"], &[], &["body.obj", "metres"]);

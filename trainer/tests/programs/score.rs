@@ -211,6 +211,25 @@ fn files_that_cannot_be_read_are_named_with_the_line() {
 }
 
 #[test]
+fn meshes_in_another_unit_or_place_are_refused() {
+    let case = Case::new();
+    case.write("rest/large.obj", &quad_box(120.0, [-200.0, 200.0]));
+    case.write("draped/large.obj", &quad_box(120.0, [-200.0, 200.0]));
+    case.must_fail(&["rest/large.obj"], &["draped/large.obj"], &["draped/large.obj", "one unit"]);
+    case.must_fail(
+        &["rest/large.obj"],
+        &["draped/tee.obj"],
+        &["rest/large.obj", "draped/tee.obj", "one unit"],
+    );
+    case.write("draped/above.obj", &quad_box(0.12, [9.8, 10.2]));
+    case.must_fail(
+        &["rest/tee.obj"],
+        &["draped/above.obj"],
+        &["draped/above.obj", "beside the body: y from 9.8"],
+    );
+}
+
+#[test]
 fn usage_errors_exit_with_two() {
     Command::cargo_bin("clothcombo").unwrap().args(["score", "--body", "b.obj"]).assert().code(2);
 }

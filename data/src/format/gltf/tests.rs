@@ -112,3 +112,23 @@ fn what_is_wrong_is_named() {
     assert!(parse(&bytes[..bytes.len() - 1], Path::new("x")).unwrap_err().contains("truncated"));
     assert!(parse(b"{}", Path::new("x")).unwrap().positions.is_empty());
 }
+
+#[test]
+fn an_index_past_its_own_vertices_reads_no_other_primitives_ones() {
+    // Between the two primitives of vertices 0 there is one of vertices of its own; index 4 would be its first.
+    let own = r#"{"attributes":{"POSITION":0},"indices":1}"#;
+    let other = r#"{"attributes":{"POSITION":4},"indices":1}"#;
+    let json = document("")
+        .replacen(r#"{"attributes":{"POSITION":0},"indices":1},"#, &format!("{own},{other},"), 1)
+        .replacen(
+            r#""byteOffset":16,"componentType":5125,"count":4,"type":"SCALAR"}]"#,
+            r#""byteOffset":16,"componentType":5125,"count":4,"type":"SCALAR"},{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3"}]"#,
+            1,
+        );
+    let mut bytes = payload();
+    assert_eq!(parse(&glb(&json, &bytes), Path::new("x.glb")).unwrap().positions.len(), 12);
+    // The strip's second index.
+    bytes[58] = 4;
+    let message = parse(&glb(&json, &bytes), Path::new("x.glb")).unwrap_err();
+    assert!(message.contains("primitive 2: names vertex 4, but has 4 vertices"), "{message}");
+}

@@ -17,12 +17,12 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum GlbError {
     /// The file system refused.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {reason}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        reason: std::io::Error,
     },
     /// Frames of different sizes, or another number of them than of times.
     #[error("mesh '{mesh}' has {found}, expected {expected}")]
@@ -71,7 +71,7 @@ pub struct SceneMesh<'a> {
 /// As [`encode_glb`], or when the file cannot be written.
 pub fn save_glb(path: &Path, meshes: &[SceneMesh], times: &[f64]) -> Result<(), GlbError> {
     let bytes = encode_glb(meshes, times)?;
-    atomic::write(path, &bytes).map_err(|source| GlbError::Io { path: path.into(), source })
+    atomic::write(path, &bytes).map_err(|reason| GlbError::Io { path: path.into(), reason })
 }
 
 /// The bytes of a `.glb`. `times` [s], ascending, are those of the frames; a single frame needs none.

@@ -96,7 +96,7 @@ impl NpzWriter {
     /// # Errors
     /// If an array did not fit its shape, or the file cannot be written.
     pub fn save(self, path: &Path) -> Result<(), NpzError> {
-        let failed = |source| NpzError::Io { path: path.into(), source };
+        let failed = |reason| NpzError::Io { path: path.into(), reason };
         if let Some(reason) = self.error {
             return Err(failed(std::io::Error::other(reason)));
         }

@@ -2,6 +2,7 @@
 
 use super::super::atomic;
 use super::super::mesh::read_limited;
+use super::statements::one_per_line;
 use std::io;
 use std::path::Path;
 
@@ -19,12 +20,12 @@ pub struct MovedObj {
 
 impl MovedObj {
     /// The file of `bytes`, read from `path`, at other `positions`, to be written as `NAME.obj` and `NAME.mtl`: textures are
-    /// named by where they are, so that both files can be elsewhere.
+    /// named by where they are, so that both files can be elsewhere. Lines that a backslash continues become one.
     ///
     /// # Errors
     /// The number of vertices in the file, if there are not as many `positions`.
     pub fn new(path: &Path, bytes: &[u8], positions: &[[f64; 3]], name: &str) -> Result<Self, usize> {
-        let moved = without_normals(&with_positions(bytes, positions)?);
+        let moved = without_normals(&with_positions(&one_per_line(bytes), positions)?);
         let folder = path.parent().unwrap_or(Path::new(""));
         Ok(with_materials(&moved, folder, name))
     }
@@ -197,6 +198,23 @@ mod tests {
         assert_eq!(mesh.positions, positions);
         assert_eq!(mesh.polygons, [[0, 1, 2]]);
         assert_eq!(with_positions(text.as_bytes(), &positions[1..]), Err(3));
+    }
+
+    #[test]
+    fn a_mark_of_the_byte_order_continued_lines_and_old_line_ends_are_read_as_the_reader_does() {
+        let positions = [[1.5, 0.0, 0.0], [0.0, 2.5, 0.0], [0.0, 0.0, 3.5]];
+        for text in [
+            "\u{feff}v 9 9 9 1 0 0\nv 9 9 9\nv 9 9 9\nf 1 2 3\n",
+            "v 9 \\\n9 9 1 0 0\nv 9 9 9\nv 9 9 9\nf 1/1 \\\r\n2 \\\n 3\n",
+            "v 9 9 9 1 0 0\rv 9 9 9\rv 9 9 9\rvn 0 0 1\rf 1//1 2//1 3//1\r",
+        ] {
+            let read = ObjMesh::parse(text, Path::new("x.obj")).unwrap();
+            let moved = MovedObj::new(Path::new("x.obj"), text.as_bytes(), &positions, "x").unwrap();
+            let written = String::from_utf8(moved.obj).unwrap();
+            assert!(written.starts_with("v 1.5 0 0 1 0 0\nv 0 2.5 0\n"), "{written:?}");
+            let again = ObjMesh::parse(&written, Path::new("x.obj")).unwrap();
+            assert_eq!((again.positions.as_slice(), again.polygons), (&positions[..], read.polygons));
+        }
     }
 
     #[test]

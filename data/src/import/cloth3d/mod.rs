@@ -14,6 +14,7 @@ pub use unpose::{Unposing, upright};
 
 use super::amass::turn_root_to_y_up;
 use super::motions::{Clip, Input, MotionImportError, write_motions};
+use super::overwrite::{OverwriteError, refuse_overwriting};
 use super::thinning::{Thinned, Thinning, thin};
 use super::{Progress, Summary};
 use crate::asset::{BindingSettings, Body, Category, Garment, Motion, Provenance};
@@ -30,12 +31,12 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum Cloth3dError {
     /// A folder cannot be read, or a file not be written.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {reason}", path.display())]
     Io {
         /// File or folder.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        reason: std::io::Error,
     },
     /// No sample.
     #[error("{}: no CLOTH3D sample; a sample folder holds info.mat", inputs.join(", "))]
@@ -72,6 +73,9 @@ pub enum Cloth3dError {
     /// A sequence cannot be written.
     #[error(transparent)]
     Npz(#[from] NpzError),
+    /// An input would be written over.
+    #[error(transparent)]
+    Overwrite(#[from] OverwriteError),
 }
 
 /// The bodies involved: SMPL or SMPL-H, because the samples' shape numbers are SMPL's.
@@ -136,6 +140,9 @@ pub fn import_cloth3d(
         let inputs = inputs.iter().map(|i| i.display().to_string()).collect();
         return Err(Cloth3dError::NoSample { inputs });
     }
+    // Inputs lie in the samples' folders, results in these: none meet unless the folders do.
+    let outputs = ["garments", "motions", "sequences"].map(|folder| out.join(folder));
+    refuse_overwriting(samples.iter().map(|sample| &sample.folder), outputs)?;
     let mut summary = Summary { notes: assumptions(bodies), ..Summary::default() };
     let surface = Surface::new(target.template.clone(), target.faces.clone());
     let (mut garments, mut entries) = (Vec::new(), Vec::new());
@@ -163,7 +170,7 @@ pub fn import_cloth3d(
     summary.notes.extend(motions.notes);
     summary.written.extend(motions.written);
     let path = out.join("cloth3d.toml");
-    manifest::write(&path, entries).map_err(|source| Cloth3dError::Io { path: path.clone(), source })?;
+    manifest::write(&path, entries).map_err(|reason| Cloth3dError::Io { path: path.clone(), reason })?;
     summary.written.push(path);
     Ok(summary)
 }
@@ -205,7 +212,7 @@ fn find_samples(inputs: &[PathBuf]) -> Result<Vec<Sample>, Cloth3dError> {
             folders.push(input.clone());
             continue;
         }
-        let failed = |source| Cloth3dError::Io { path: input.clone(), source };
+        let failed = |reason| Cloth3dError::Io { path: input.clone(), reason };
         let mut below = Vec::new();
         for entry in fs::read_dir(input).map_err(failed)? {
             let folder = entry.map_err(failed)?.path();

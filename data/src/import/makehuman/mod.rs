@@ -9,10 +9,13 @@ mod proxy;
 use super::anny::{AnnyError, AnnySettings, BaseModel};
 use super::finish::{GarmentResolution, finish, label_rim};
 use super::helper_garments::cut_helpers;
+use super::overwrite::{OverwriteError, refuse_overwriting};
 use super::sheet_repair;
 use super::{Progress, Summary};
 use crate::asset::{Body, Category, Garment, Provenance};
-use crate::dataset::garment_folder::{FolderGarment, GarmentFolderError, save_garment_folder};
+use crate::dataset::garment_folder::{
+    FolderGarment, GarmentFolderError, garment_folder_files, save_garment_folder,
+};
 use crate::fit::{Contact, triangulate, worn_where};
 use crate::generate::labelled_triangles::LabelledTriangles;
 use archive::read_proxies;
@@ -40,6 +43,9 @@ pub enum MakeHumanError {
     /// The results cannot be written.
     #[error(transparent)]
     Folder(#[from] GarmentFolderError),
+    /// An input would be written over.
+    #[error(transparent)]
+    Overwrite(#[from] OverwriteError),
 }
 
 /// How garments are imported.
@@ -132,6 +138,7 @@ pub fn import_makehuman(
     taken.extend(helper_garments(&model, &body, &surface, settings, &mut summary, progress));
     taken.sort_by(|a, b| a.garment.garment.name.cmp(&b.garment.garment.name));
     let garments: Vec<FolderGarment> = taken.iter().map(|t| t.garment.clone()).collect();
+    refuse_overwriting([package, wheel], garment_folder_files(out, &garments))?;
     summary.written = save_garment_folder(out, &garments)?;
     summary.taken = taken.into_iter().map(|t| (t.garment.garment.name, t.note)).collect();
     summary.notes.push(format!("{} garments taken, {} left out", summary.taken.len(), summary.skipped.len()));

@@ -1,6 +1,7 @@
 //! `clothcombo bench backends`.
 
 use crate::cli::train::load_under_bar;
+use crate::cli::values::{measuring_seconds, not_negative};
 use crate::cli::verbosity::say;
 use crate::device::Backend;
 use crate::measure::{Case, Subject};
@@ -31,13 +32,13 @@ pub struct Arguments {
     #[arg(long, default_value_t = 700)]
     vertices: usize,
     /// Time spent on each single measurement [s]
-    #[arg(long, default_value_t = 1.0)]
+    #[arg(long, default_value_t = 1.0, value_parser = measuring_seconds)]
     seconds: f64,
     /// Largest relative difference of the loss
-    #[arg(long, default_value_t = 1e-4)]
+    #[arg(long, default_value_t = 1e-4, value_parser = not_negative)]
     most_loss: f64,
     /// Largest relative difference of a parameter's gradient
-    #[arg(long, default_value_t = 1e-3)]
+    #[arg(long, default_value_t = 1e-3, value_parser = not_negative)]
     most_gradient: f64,
     /// Print JSON instead of a Markdown table
     #[arg(long)]

@@ -1,6 +1,6 @@
 //! `clothcombo bench generator`: the promises of the garment generator over many seeds.
 
-use crate::cli::values::at_least_one;
+use crate::cli::values::{at_least_one, share};
 use crate::cli::verbosity::progress_bar;
 use crate::scene::load_body;
 use clap::Parser;
@@ -29,7 +29,7 @@ pub struct Arguments {
     #[arg(long, default_value_t = 1500)]
     vertices: usize,
     /// Largest share of garments for which no design may pass
-    #[arg(long, default_value_t = 0.001)]
+    #[arg(long, default_value_t = 0.001, value_parser = share)]
     most_failures: f64,
 }
 

@@ -1,5 +1,6 @@
 //! `clothcombo bench growth`.
 
+use crate::cli::values::{measuring_seconds, picture_file};
 use crate::cli::verbosity::progress_bar;
 use crate::measure::Case;
 use crate::picture::{Line, LinePanel, draw_lines, save_png};
@@ -32,10 +33,10 @@ pub struct Arguments {
     #[arg(long, default_value_t = 64)]
     width: usize,
     /// Time spent on each single measurement [s]
-    #[arg(long, default_value_t = 0.5)]
+    #[arg(long, default_value_t = 0.5, value_parser = measuring_seconds)]
     seconds: f64,
     /// Writes the curves (PNG)
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = picture_file())]
     picture: Option<PathBuf>,
     /// Print JSON instead of Markdown tables
     #[arg(long)]

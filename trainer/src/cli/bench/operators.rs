@@ -1,7 +1,7 @@
 //! `clothcombo bench operators`: what preparing a garment for DiffusionNet costs, and how exact the eigenpairs are.
 
 use crate::cli::table::{number, table};
-use crate::cli::values::at_least_one;
+use crate::cli::values::{at_least_one, measuring_seconds};
 use crate::measure::median_ms;
 use crate::scene::LibraryError;
 use clap::Parser;
@@ -30,7 +30,7 @@ pub struct Arguments {
     #[arg(long, default_value_t = 128, value_parser = at_least_one)]
     eigen_count: usize,
     /// Time spent on the measurement [s]
-    #[arg(long, default_value_t = 5.0)]
+    #[arg(long, default_value_t = 5.0, value_parser = measuring_seconds)]
     seconds: f64,
     /// Writes the mesh (OBJ)
     #[arg(long, value_name = "FILE")]

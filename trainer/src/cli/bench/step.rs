@@ -1,6 +1,7 @@
 //! `clothcombo bench step`.
 
 use crate::cli::train::load_under_bar;
+use crate::cli::values::{at_least_one, measuring_seconds, picture_file};
 use crate::cli::verbosity::say;
 use crate::config::{Config, load};
 use crate::device::Backend;
@@ -49,16 +50,16 @@ pub struct Arguments {
     #[arg(long, value_name = "OUTFITS", default_value_t = 1)]
     accumulate: usize,
     /// Training steps that are profiled
-    #[arg(long, default_value_t = 10)]
+    #[arg(long, default_value_t = 10, value_parser = at_least_one)]
     steps: usize,
     /// Time spent on each single measurement [s]
-    #[arg(long, default_value_t = 1.0)]
+    #[arg(long, default_value_t = 1.0, value_parser = measuring_seconds)]
     seconds: f64,
     /// Compute device
     #[arg(long, value_enum, default_value_t = Backend::preferred())]
     device: Backend,
     /// Writes the shares of a step as stacked bars (PNG)
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = picture_file())]
     picture: Option<PathBuf>,
     /// Writes scene, networks and results of the only case into a folder, for scripts/bench_torch.py
     #[arg(long, value_name = "DIR")]
@@ -102,12 +103,6 @@ pub(crate) struct Sizes {
 /// # Errors
 /// When the configuration or its data cannot be read, a size is out of range, or an output cannot be written.
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
-    if !(arguments.seconds.is_finite() && arguments.seconds > 0.0) || arguments.steps == 0 {
-        return Err(miette!(
-            help = "for example --steps 10 --seconds 1",
-            "--steps and --seconds must be positive"
-        ));
-    }
     let measured = match &arguments.config {
         Some(file) => stages(arguments, load(file, &arguments.overrides)?)?,
         None => made_up(arguments)?,

@@ -3,6 +3,7 @@
 use super::step::short;
 use crate::checkpoint::TrainedModel;
 use crate::cli::train::load_under_bar;
+use crate::cli::values::{measuring_seconds, picture_file};
 use crate::cli::verbosity::say;
 use crate::config::{Config, LossesConfig, ValidationConfig};
 use crate::device::Backend;
@@ -46,10 +47,10 @@ pub struct Arguments {
     #[arg(long, default_value_t = 4)]
     layered_scenes: usize,
     /// Time spent on each single measurement [s]
-    #[arg(long, default_value_t = 0.2)]
+    #[arg(long, default_value_t = 0.2, value_parser = measuring_seconds)]
     seconds: f64,
     /// Writes time and difference over the eigenpairs (PNG)
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = picture_file())]
     picture: Option<PathBuf>,
     /// Print JSON instead of Markdown tables
     #[arg(long)]

@@ -22,10 +22,10 @@ pub(super) struct SceneArguments {
     #[arg(long, value_name = "NPZ", conflicts_with = "posed")]
     pub motion: Option<PathBuf>,
     /// Frames of the motion: FIRST..END, FIRST.. or ..END, without END
-    #[arg(long, value_name = "RANGE", requires = "motion")]
+    #[arg(long, value_name = "RANGE", requires = "moving")]
     pub frames: Option<FrameRange>,
     /// Takes every so-manieth frame of the motion
-    #[arg(long, value_name = "N", requires = "motion", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", requires = "moving", value_parser = clap::value_parser!(u32).range(1..))]
     pub every: Option<u32>,
     /// A mesh of the posed body, with the vertices of the body model: the pose is recovered from it
     #[arg(long, value_name = "MESH")]

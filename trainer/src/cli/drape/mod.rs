@@ -1,32 +1,36 @@
 //! `clothcombo drape`: any body, any garments, in order.
 
+mod folders;
 mod job;
 mod outfits;
 mod summary;
+mod tell;
 
 use crate::cli::interrupted::remove_on_signals;
 use crate::cli::post_process::PostProcessArguments;
 use crate::cli::verbosity::{progress_bar, say};
 use crate::device::Backend;
 use crate::draper::output::{Show, Staged, write};
-use crate::draper::{Drape, DrapeProgress, Draper, DraperSettings, Outfit, Report, SourceGarment, smooth};
-use clap::{Parser, ValueEnum};
-use clothcombo_data::asset::{Garment, unwearable};
+use crate::draper::{Drape, DrapeProgress, Draper, DraperSettings, Outfit, Report, smooth};
+use clap::{ArgGroup, Parser, ValueEnum};
 use clothcombo_data::check::impossible_turn;
 use clothcombo_data::format::atomic;
+use folders::{check_cache, user_cache};
 use indicatif::ProgressBar;
 use job::{Job, Scenes, ordered};
 use miette::{IntoDiagnostic, Report as Failure, WrapErr, miette};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
+use tell::{tell_order, tell_repairs, tell_shape};
 
 /// Drapes garments on a body, innermost first: OBJ, GLB, picture, viewer and a report with a certificate
 #[derive(Parser)]
+#[command(group(ArgGroup::new("moving").args(["motion", "outfits"]).multiple(true)))]
 #[command(after_help = "Examples (garments from the body outwards):\n  \
         clothcombo drape --checkpoint runs/smoke --garments tee.obj coat.glb -o out\n  \
         clothcombo drape --garments tee.obj skirt.obj coat.obj --order 1,0,2 --shape 1.5,-0.5 --pose walk.npz:30 -o out\n  \
-        clothcombo drape --garments tee.obj --motion walk.npz --frames 0..120 --smooth -o out\n  \
+        clothcombo drape --garments tee.obj --motion walk.npz --frames 0..120 -o out\n  \
         clothcombo drape --outfits wardrobe.toml -o out\n\n\
         A garment is a mesh file (.obj, .ply, .stl, .gltf, .glb) or the name of one in --dataset or in the model's own data.\n\
         What does not lie on the body in metres, y up and T-pose is fitted first (see `clothcombo fit`); every repair is in\n\
@@ -66,10 +70,11 @@ pub struct Arguments {
     no_resolve: bool,
     #[command(flatten)]
     post_process: PostProcessArguments,
-    /// Smooths a motion over this many frames to each side; never makes an intersection
-    #[arg(long, num_args = 0..=1, default_value_t = 0, default_missing_value = "2", value_name = "FRAMES",
+    /// Smooths a motion over this many frames to each side, before the post-process and, where that makes no intersection, after it;
+    /// 0 takes every frame as it is [default: 2]
+    #[arg(long, num_args = 0..=1, default_missing_value = "2", value_name = "FRAMES",
           value_parser = clap::value_parser!(u16).range(..=100))]
-    smooth: u16,
+    smooth: Option<u16>,
     /// Folder that keeps embeddings between runs; default: clothcombo in the user's cache folder
     #[arg(long, value_name = "FOLDER")]
     cache: Option<PathBuf>,
@@ -91,6 +96,15 @@ pub struct Arguments {
     /// Folder to make
     #[arg(short, long, value_name = "FOLDER")]
     output: PathBuf,
+}
+
+impl Arguments {
+    /// What is read, beside what an outfit names.
+    fn inputs(&self) -> impl Iterator<Item = PathBuf> {
+        let body = self.body.iter().map(PathBuf::from);
+        let paths = [&self.outfits, &self.checkpoint].into_iter().flatten().chain(&self.dataset);
+        paths.cloned().chain(body)
+    }
 }
 
 /// Whether mesh files are fitted.
@@ -121,15 +135,17 @@ impl Fit {
 /// certificate lists them.
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let jobs = jobs(arguments)?;
-    if arguments.smooth > 0 && jobs.iter().all(|job| job.scene.motion.is_none()) {
+    if arguments.smooth.is_some_and(|radius| radius > 0) && jobs.iter().all(|job| job.scene.motion.is_none())
+    {
         return Err(miette!(help = "give --motion FILE, or leave --smooth out", "--smooth without a motion"));
     }
-    let inputs: Vec<PathBuf> = jobs.iter().flat_map(Job::files).chain(arguments.outfits.clone()).collect();
-    check_cache(arguments)?;
-    let staged = Staged::new(&arguments.output, arguments.replace, &inputs)?;
+    let settings = settings(arguments);
+    check_cache(settings.cache.as_deref(), &arguments.output)?;
+    let inputs: Vec<PathBuf> = jobs.iter().flat_map(Job::files).chain(arguments.inputs()).collect();
+    let mut staged = Staged::new(&arguments.output, arguments.replace, &inputs)?;
     remove_on_signals(staged.folder());
     let clock = Instant::now();
-    let draper = Draper::load(arguments.checkpoint.as_deref(), &settings(arguments)?)?;
+    let draper = Draper::load(arguments.checkpoint.as_deref(), &settings)?;
     let closet = draper.closet(&arguments.dataset)?;
     tracing::info!(
         "model {} (step {}), body {}: loaded in {:.1} s",
@@ -148,9 +164,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let read = |job: &Job| {
         let sources = job.garments.iter().map(find).collect::<Result<Vec<_>, _>>()?;
         let sources = ordered(sources, job.order.as_deref())?;
+        Outfit::check(&sources)?;
         sources.iter().for_each(tell_repairs);
         tell_order(&sources);
         let scenes = job.scenes(&draper)?;
+        // The frames of a motion are alike in what may be wrong with them.
+        scenes.states.first().map_or(Ok(()), |state| draper.check_body(state))?;
         tell_shape(&scenes.body.shape, draper.trained().config.data.shape_range);
         if let Some(turn) = impossible_turn(scenes.states.iter().map(|state| &state.pose)) {
             tracing::warn!("{}: {turn}", scenes.body.pose);
@@ -159,6 +178,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let read = |job| read(job).map_err(|failure| blame(job, failure));
     let wanted = jobs.iter().map(read).collect::<Result<Vec<_>, Failure>>()?;
+    // A name says only now which file it stands for.
+    let files = wanted.iter().flat_map(|(sources, _)| sources).filter_map(|source| source.path.clone());
+    staged.keep(files.chain([draper.trained().folder.clone()]))?;
     let bar = match wanted.iter().map(|(_, scenes)| scenes.states.len()).sum() {
         1 => progress_bar(1, "{spinner} draping · {elapsed}{prefix}{msg}"),
         drapes => progress_bar(drapes, "drapes {bar:30} {pos}/{len} · {eta} left{prefix}{msg}"),
@@ -180,7 +202,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             .iter()
             .map(|(name, r)| json!({ "name": name, "milliseconds": r.milliseconds, "certificate": r.certificate }))
             .collect();
-        write_json(&staged.folder().join("report.json"), &json!({ "outfits": list }))?;
+        write_json(&staged.folder().join(outfits::REPORT), &json!({ "outfits": list }))?;
     }
     staged.commit()?;
     print(arguments, &reports)?;
@@ -201,71 +223,26 @@ fn jobs(arguments: &Arguments) -> Result<Vec<Job>, Failure> {
     }
 }
 
-fn settings(arguments: &Arguments) -> Result<DraperSettings, Failure> {
+fn settings(arguments: &Arguments) -> DraperSettings {
     let cache = match arguments.no_cache {
         true => None,
         false => arguments.cache.clone().or_else(user_cache),
     };
-    Ok(DraperSettings {
+    DraperSettings {
         body: arguments.body.clone(),
         cache,
         backend: arguments.device,
         refine: arguments.refine,
+        steady: smoothing_radius(arguments),
         resolve: !arguments.no_resolve,
         post_process: arguments.post_process.settings(),
         ..DraperSettings::default()
-    })
-}
-
-/// Refuses a cache in the folder that is to be made.
-fn check_cache(arguments: &Arguments) -> Result<(), Failure> {
-    let Some(cache) = &arguments.cache else { return Ok(()) };
-    let [inner, outer] = [cache, &arguments.output].map(std::path::absolute);
-    match inner.into_diagnostic()?.starts_with(outer.into_diagnostic()?) {
-        true => Err(miette!(
-            help = "choose another folder for one of them",
-            "--cache {} lies in the folder that is to be made, {}",
-            cache.display(),
-            arguments.output.display()
-        )),
-        false => Ok(()),
     }
 }
 
-/// `clothcombo` in the folder for what programs may compute anew.
-fn user_cache() -> Option<PathBuf> {
-    let folder = |variable: &str| std::env::var_os(variable).filter(|v| !v.is_empty()).map(PathBuf::from);
-    let cache = folder("XDG_CACHE_HOME").or_else(|| folder("LOCALAPPDATA"));
-    Some(cache.or_else(|| Some(folder("HOME")?.join(".cache")))?.join("clothcombo"))
-}
-
-fn tell_shape(shape: &[f64], [low, high]: [f64; 2]) {
-    if let Some(value) = shape.iter().find(|value| !(low..=high).contains(*value)) {
-        tracing::warn!("shape parameter {value}: the model was trained with {low} to {high}");
-    }
-}
-
-fn tell_order(sources: &[SourceGarment]) {
-    let order: Vec<&Garment> = sources.iter().map(|source| &source.garment).collect();
-    if let Some([inner, outer]) = unwearable(&order) {
-        tracing::warn!(
-            "{} cannot be worn over {}, which hangs between the legs: they will cross at the crotch",
-            outer.name,
-            inner.name
-        );
-    }
-}
-
-fn tell_repairs(source: &SourceGarment) {
-    let Some(fit) = &source.fit else { return };
-    let name = &source.garment.name;
-    tracing::info!("{name} fitted: {}", fit.assumptions().join("; "));
-    for repair in &fit.repairs {
-        tracing::info!("{name} repaired: {} ({})", repair.kind.text(), repair.count);
-    }
-    if let Some(misfit) = fit.misfit() {
-        tracing::warn!("{name} does not fit this body: {misfit} Look at the picture.");
-    }
+/// Frames to each side over which a motion is smoothed.
+fn smoothing_radius(arguments: &Arguments) -> usize {
+    arguments.smooth.map_or(DraperSettings::default().steady, usize::from)
 }
 
 fn drape_job(
@@ -278,9 +255,9 @@ fn drape_job(
     bar: &ProgressBar,
 ) -> Result<Report, Failure> {
     let mut drapes = drape_all(draper, outfit, scenes, bar)?;
-    let smoothing = match arguments.smooth {
+    let smoothing = match smoothing_radius(arguments) {
         radius if radius > 0 && !scenes.moments.is_empty() => {
-            Some(smooth(draper, outfit, &mut drapes, usize::from(radius))?)
+            Some(smooth(draper, outfit, &mut drapes, radius)?)
         }
         _ => None,
     };

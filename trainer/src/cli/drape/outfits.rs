@@ -6,6 +6,9 @@ use serde::Deserialize;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
+/// The report of all outfits, beside their folders.
+pub(super) const REPORT: &str = "report.json";
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Outfits {
@@ -37,8 +40,7 @@ pub(super) fn read(file: &Path, scene: &SceneArguments) -> Result<Vec<Job>, Fail
     let jobs = outfits.outfit.into_iter().enumerate().map(|(number, entry)| {
         let wrong = |what: String| miette!("{}: outfit {}: {what}", file.display(), number + 1);
         let name = entry.name.unwrap_or_else(|| format!("outfit-{}", number + 1));
-        let is_plain = |c: char| c.is_alphanumeric() || "-_+. ".contains(c);
-        if name.trim_matches('.').is_empty() || !name.chars().all(is_plain) {
+        if !is_folder_name(&name) {
             return Err(wrong(format!("the name {name:?} cannot be that of a folder")));
         }
         if !names.insert(name.to_lowercase()) {
@@ -66,6 +68,7 @@ pub(super) fn read(file: &Path, scene: &SceneArguments) -> Result<Vec<Job>, Fail
             }
             (None, None) => {}
         }
+        let named_frames = entry.frames.is_some() || entry.every.is_some();
         if let Some(frames) = entry.frames {
             own.frames = Some(frames.parse().map_err(wrong)?);
         }
@@ -73,8 +76,12 @@ pub(super) fn read(file: &Path, scene: &SceneArguments) -> Result<Vec<Job>, Fail
             Some(0) => return Err(wrong("every = 0 takes no frame".to_owned())),
             every => every.or(own.every),
         };
-        if own.motion.is_none() && (own.frames.is_some() || entry.every.is_some()) {
-            return Err(wrong("frames of no motion".to_owned()));
+        if own.motion.is_none() {
+            if named_frames {
+                return Err(wrong("frames of no motion".to_owned()));
+            }
+            // Those of the command line are for outfits in motion.
+            (own.frames, own.every) = (None, None);
         }
         if entry.garments.is_empty() {
             return Err(wrong("it has no garments".to_owned()));
@@ -83,10 +90,29 @@ pub(super) fn read(file: &Path, scene: &SceneArguments) -> Result<Vec<Job>, Fail
         Ok(Job { name, garments, order: entry.order, scene: own })
     });
     let jobs = jobs.collect::<Result<Vec<_>, _>>()?;
-    match jobs.is_empty() {
-        true => Err(miette!(help = "add an [[outfit]]", "{} holds no outfit", file.display())),
-        false => Ok(jobs),
+    if jobs.is_empty() {
+        return Err(miette!(help = "add an [[outfit]]", "{} holds no outfit", file.display()));
     }
+    if (scene.frames.is_some() || scene.every.is_some()) && jobs.iter().all(|job| job.scene.motion.is_none())
+    {
+        return Err(miette!(
+            help = "give an outfit motion = \"FILE\", or all of them --motion FILE",
+            "--frames or --every, but no outfit of {} has a motion",
+            file.display()
+        ));
+    }
+    Ok(jobs)
+}
+
+/// Whether `name` can be that of a folder on every system, beside the report of all outfits. One that begins with a dot would
+/// be hidden, and Windows drops dots and blanks at the end.
+fn is_folder_name(name: &str) -> bool {
+    let is_plain = |c: char| c.is_alphanumeric() || "-_+. ".contains(c);
+    !name.trim().is_empty()
+        && name.chars().all(is_plain)
+        && !name.starts_with('.')
+        && !name.ends_with(['.', ' '])
+        && !name.eq_ignore_ascii_case(REPORT)
 }
 
 /// The path of `FILE:FRAME` beside the file of outfits.
@@ -121,9 +147,32 @@ mod tests {
         .unwrap();
         assert_eq!(jobs[0].name, "outfit-1");
         assert!(jobs[0].garments[0].ends_with("/tee.obj") && jobs[0].garments[1] == "coat");
-        assert_eq!((&jobs[0].scene.shape, jobs[0].scene.every), (&vec![0.5], Some(3)));
+        // It does not move: what --every says is for the other.
+        assert_eq!((&jobs[0].scene.shape, jobs[0].scene.every), (&vec![0.5], None));
         assert_eq!((&jobs[1].scene.shape, jobs[1].scene.every), (&vec![1.0], Some(1)));
         assert_eq!(jobs[1].scene.frames, "2..4".parse().ok());
+    }
+
+    #[test]
+    fn only_outfits_in_motion_take_frames_from_the_command_line() {
+        let entry = |more: &str| format!("[[outfit]]\ngarments = [\"coat\"]\n{more}\n");
+        let text = ["motion = \"walk.npz\"", "pose = \"walk.npz:3\"", ""].map(entry).concat();
+        let jobs = read_text(&text).unwrap();
+        assert_eq!(jobs.iter().map(|job| job.scene.every).collect::<Vec<_>>(), [Some(3), None, None]);
+        let message = read_text(&entry("pose = \"walk.npz:3\"\nevery = 2")).unwrap_err();
+        assert!(message.contains("frames of no motion"), "{message}");
+    }
+
+    #[test]
+    fn names_are_those_of_visible_folders_that_every_system_can_make() {
+        for good in ["monday", "a.b", "tee + coat", "Mäntel", " x"] {
+            assert!(is_folder_name(good), "{good:?}");
+        }
+        for bad in
+            ["", " ", ".", "..", ".hidden", "a.", "a ", "a/b", "a\\b", "report.json", "Report.JSON", "a\n"]
+        {
+            assert!(!is_folder_name(bad), "{bad:?}");
+        }
     }
 
     #[test]
@@ -140,6 +189,7 @@ mod tests {
             ("[[outfit]]\ngarments = []\nframes = \"0..4\"\n", "no motion"),
             ("[[outfit]]\ngarments = []\npose = \"a\"\nmotion = \"b\"\n", "both"),
             ("outfit = []\n", "no outfit"),
+            ("[[outfit]]\ngarments = [\"a\"]\n", "no outfit of"),
         ] {
             let message = read_text(text).unwrap_err();
             assert!(message.contains(part) && message.contains("outfits.toml"), "{message}");

@@ -142,7 +142,9 @@ pub fn write(folder: &Path, show: &Show) -> Result<WriteTimes, OutputError> {
 }
 
 fn write_meshes(folder: &Path, show: &Show) -> Result<(), OutputError> {
-    write_frame(folder, show, &show.drapes[0])?;
+    for loss in write_frame(folder, show, &show.drapes[0])? {
+        tracing::warn!("{loss}");
+    }
     if show.all_frames {
         for (drape, moment) in show.drapes.iter().zip(show.moments) {
             write_frame(&folder.join(format!("frames/{:05}", moment.frame)), show, drape)?;
@@ -151,7 +153,9 @@ fn write_meshes(folder: &Path, show: &Show) -> Result<(), OutputError> {
     Ok(())
 }
 
-fn write_frame(folder: &Path, show: &Show, drape: &Drape) -> Result<(), OutputError> {
+/// Returns what of the given files is lost, if anything: in every frame the same.
+fn write_frame(folder: &Path, show: &Show, drape: &Drape) -> Result<Vec<String>, OutputError> {
+    let mut lost = Vec::new();
     let body = show.draper.body();
     obj::save(&folder.join("body.obj"), &drape.body, &body.faces, &[format!("body {}", body.name)])?;
     for (layer, (piece, garment)) in show.outfit.pieces.iter().zip(&drape.garments).enumerate() {
@@ -168,34 +172,47 @@ fn write_frame(folder: &Path, show: &Show, drape: &Drape) -> Result<(), OutputEr
         }
         let positions = source.in_given_order(&garment.positions);
         let path = folder.join(format!("{}.obj", piece.name));
-        match as_given(source, &positions, &piece.name, &comments) {
+        let moved = as_given(source, &positions, &piece.name, &comments).unwrap_or_else(|reason| {
+            lost.push(format!(
+                "{} is written without texture coordinates, groups and materials: {reason}",
+                piece.name
+            ));
+            None
+        });
+        match moved {
             Some(moved) => {
                 moved.save(folder, &piece.name).map_err(|reason| OutputError::Io { path, reason })?
             }
             None => obj::save_polygons(&path, &positions, source.given.polygons(), &comments)?,
         }
     }
-    Ok(())
+    Ok(lost)
 }
 
-/// The given OBJ file at other positions, with its texture coordinates, groups and materials; `None` for another format, or
-/// a file that is no longer what was read.
+/// The given OBJ file at other positions, with its texture coordinates, groups and materials; `None` for another format.
+///
+/// # Errors
+/// Naming the file, when it cannot be read any more, or is no longer what was read.
 fn as_given(
     source: &SourceGarment,
     positions: &[[f64; 3]],
     name: &str,
     comments: &[String],
-) -> Option<MovedObj> {
-    let path =
-        source.path.as_ref().filter(|p| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")))?;
-    let mut moved = MovedObj::new(path, &std::fs::read(path).ok()?, positions, name).ok()?;
+) -> Result<Option<MovedObj>, String> {
+    let is_obj = |path: &&PathBuf| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"));
+    let Some(path) = source.path.as_ref().filter(is_obj) else { return Ok(None) };
+    let bytes = std::fs::read(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let mut moved = MovedObj::new(path, &bytes, positions, name).map_err(|found| {
+        let read = positions.len();
+        format!("{} cannot be repeated line by line, of {read} vertices {found} are found", path.display())
+    })?;
     let lines = comments.iter().flat_map(|comment| comment.lines());
     let mut bytes: Vec<u8> = lines.flat_map(|line| format!("# {line}\n").into_bytes()).collect();
     bytes.extend_from_slice(
         b"# what follows is the file as it was given, with other vertices and without normals\n",
     );
     bytes.append(&mut moved.obj);
-    Some(MovedObj { obj: bytes, ..moved })
+    Ok(Some(MovedObj { obj: bytes, ..moved }))
 }
 
 fn write_scene(path: &Path, show: &Show) -> Result<(), OutputError> {
@@ -215,4 +232,36 @@ fn write_scene(path: &Path, show: &Show) -> Result<(), OutputError> {
     }
     let times: Vec<f64> = show.moments.iter().map(|m| m.seconds).collect();
     Ok(save_glb(path, &meshes, &times)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clothcombo_data::asset::Category;
+    use clothcombo_data::generate::{GarmentGenerator, GarmentSettings, mannequin};
+
+    #[test]
+    fn what_cannot_be_repeated_of_a_given_file_is_told_with_the_reason() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("tee.obj");
+        let body = mannequin();
+        let settings = GarmentSettings { target_vertices: 250, ..GarmentSettings::default() };
+        let generator = GarmentGenerator::new(&body).unwrap();
+        let garment = generator.generate(Category::TShirt, 0, &settings).unwrap();
+        let positions = garment.rest.positions().to_vec();
+        obj::save(&path, &positions, garment.rest.faces(), &[]).unwrap();
+        let mut source = SourceGarment::new(garment);
+        let given =
+            |source: &SourceGarment| as_given(source, &positions, "tee", &[]).map(|moved| moved.is_some());
+        assert_eq!(given(&source), Ok(false), "of no file there is nothing to repeat");
+        source.path = Some(path.clone());
+        assert_eq!(given(&source), Ok(true));
+        std::fs::write(&path, "v 0 0 0\n").unwrap();
+        let reason = given(&source).unwrap_err();
+        assert!(reason.contains("tee.obj") && reason.contains("vertices 1 are found"), "{reason}");
+        std::fs::remove_file(&path).unwrap();
+        assert!(given(&source).unwrap_err().contains("tee.obj"));
+        source.path = Some(path.with_extension("ply"));
+        assert_eq!(given(&source), Ok(false));
+    }
 }

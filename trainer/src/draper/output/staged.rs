@@ -1,6 +1,7 @@
 //! A folder that appears whole or not at all.
 
 use super::OutputError;
+use crate::paths::first_missing_folder;
 use std::collections::HashSet;
 use std::fs;
 use std::hash::{BuildHasher, RandomState};
@@ -17,6 +18,8 @@ pub struct Staged {
     temporary: PathBuf,
     replace: bool,
     inputs: Vec<PathBuf>,
+    /// The outermost folder that was made for this one to lie in, if any was.
+    made: Option<PathBuf>,
     is_committed: bool,
 }
 
@@ -33,9 +36,20 @@ impl Staged {
         check_free(&target, replace, inputs)?;
         let number = RandomState::new().hash_one(0);
         let temporary = target.with_file_name(format!(".{}.{number:016x}.tmp", name.to_string_lossy()));
-        fs::create_dir_all(&temporary)
-            .map_err(|reason| OutputError::Io { path: temporary.clone(), reason })?;
-        Ok(Self { target, temporary, replace, inputs: inputs.to_vec(), is_committed: false })
+        let made = first_missing_folder(&temporary).map(Path::to_owned);
+        let staged = Self { target, temporary, replace, inputs: inputs.to_vec(), made, is_committed: false };
+        fs::create_dir_all(&staged.temporary)
+            .map_err(|reason| OutputError::Io { path: staged.temporary.clone(), reason })?;
+        Ok(staged)
+    }
+
+    /// Adds to what is read, for what is only known after the start.
+    ///
+    /// # Errors
+    /// When one of `inputs` lies in the folder that is to be replaced.
+    pub fn keep(&mut self, inputs: impl IntoIterator<Item = PathBuf>) -> Result<(), OutputError> {
+        self.inputs.extend(inputs);
+        check_free(&self.target, self.replace, &self.inputs)
     }
 
     /// Where to write.
@@ -84,6 +98,11 @@ impl Drop for Staged {
         if !self.is_committed {
             // Nothing can be done about a folder that cannot be removed; its name says that it is temporary.
             let _ = fs::remove_dir_all(&self.temporary);
+            let Some(first) = &self.made else { return };
+            for folder in self.temporary.ancestors().skip(1).take_while(|folder| folder.starts_with(first)) {
+                // One that something else has come into stays.
+                let _ = fs::remove_dir(folder);
+            }
         }
     }
 }
@@ -177,6 +196,46 @@ mod tests {
         assert_eq!(names(place.path()), ["out"]);
         assert_eq!(names(&target), [LIST, "frames"]);
         assert!(matches!(Staged::new(Path::new("/"), false, &[]), Err(OutputError::NoName { .. })));
+    }
+
+    #[test]
+    fn folders_made_for_an_abandoned_one_are_gone_unless_something_came_into_them() {
+        let place = tempfile::tempdir().unwrap();
+        let staged = || Staged::new(&place.path().join("a/b/out"), false, &[]).unwrap();
+        drop(staged());
+        assert!(names(place.path()).is_empty());
+        let begun = staged();
+        fs::write(place.path().join("a/note"), "x").unwrap();
+        drop(begun);
+        assert_eq!(
+            (names(place.path()), names(&place.path().join("a"))),
+            (vec!["a".into()], vec!["note".into()])
+        );
+        // What was there before stays, empty or not.
+        fs::create_dir(place.path().join("a/b")).unwrap();
+        drop(staged());
+        assert_eq!(names(&place.path().join("a")), ["b", "note"]);
+        staged().commit().unwrap();
+        assert_eq!(names(&place.path().join("a/b")), ["out"]);
+        // A file in the way: what was made up to it is gone too.
+        assert!(matches!(
+            Staged::new(&place.path().join("a/note/c/out"), false, &[]),
+            Err(OutputError::Io { .. })
+        ));
+        assert_eq!(names(&place.path().join("a")), ["b", "note"]);
+    }
+
+    #[test]
+    fn what_turns_out_to_be_read_is_not_replaced() {
+        let place = tempfile::tempdir().unwrap();
+        let target = place.path().join("out");
+        written(&target, false, "1").unwrap();
+        let mut staged = Staged::new(&target, true, &[]).unwrap();
+        staged.keep([place.path().join("elsewhere.obj")]).unwrap();
+        assert!(matches!(staged.keep([target.join("frames/a.obj")]), Err(OutputError::Input { .. })));
+        assert!(matches!(staged.keep([target.clone()]), Err(OutputError::Input { .. })));
+        drop(staged);
+        assert_eq!(names(place.path()), ["out"]);
     }
 
     #[test]

@@ -1,0 +1,59 @@
+//! No importer writes over what it reads: the input may be the only copy.
+
+use std::collections::HashMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// A result would take the place of an input.
+#[derive(Debug, Error)]
+#[error("{} would be written over the input {}; choose another folder or file with -o", output.display(), input.display())]
+pub struct OverwriteError {
+    /// What would be written.
+    pub output: PathBuf,
+    /// What is read.
+    pub input: PathBuf,
+}
+
+/// Refuses outputs that are inputs, by whatever path they are named. Folders as inputs are compared with folders as outputs.
+pub(super) fn refuse_overwriting<I: AsRef<Path>, O: AsRef<Path>>(
+    inputs: impl IntoIterator<Item = I>,
+    outputs: impl IntoIterator<Item = O>,
+) -> Result<(), OverwriteError> {
+    // What is not there yet is no input.
+    let outputs: HashMap<PathBuf, O> = (outputs.into_iter())
+        .filter_map(|output| Some((fs::canonicalize(output.as_ref()).ok()?, output)))
+        .collect();
+    for input in inputs {
+        let input = input.as_ref();
+        if let Some(output) = fs::canonicalize(input).ok().and_then(|real| outputs.get(&real)) {
+            return Err(OverwriteError { output: output.as_ref().into(), input: input.into() });
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_output_is_refused_by_any_name_of_an_input() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::create_dir(at("sub")).unwrap();
+        fs::write(at("a.npz"), b"a").unwrap();
+        fs::write(at("b.npz"), b"b").unwrap();
+        let inputs = [at("a.npz"), at("sub")];
+        refuse_overwriting(&inputs, [at("b.npz"), at("new.npz"), at("nowhere/a.npz")]).unwrap();
+        for output in ["a.npz", "sub/../a.npz", "sub/../sub"] {
+            let message = refuse_overwriting(&inputs, [at("b.npz"), at(output)]).unwrap_err().to_string();
+            assert!(message.contains(output) && message.contains("-o"), "{message}");
+        }
+        #[cfg(unix)]
+        {
+            std::os::unix::fs::symlink(at("a.npz"), at("link.npz")).unwrap();
+            assert!(refuse_overwriting(&inputs, [at("link.npz")]).is_err());
+        }
+    }
+}

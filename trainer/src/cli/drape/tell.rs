@@ -1,0 +1,33 @@
+//! What a user should know about the input, though it can be draped.
+
+use crate::draper::SourceGarment;
+use clothcombo_data::asset::{Garment, unwearable};
+
+pub(super) fn tell_shape(shape: &[f64], [low, high]: [f64; 2]) {
+    if let Some(value) = shape.iter().find(|value| !(low..=high).contains(*value)) {
+        tracing::warn!("shape parameter {value}: the model was trained with {low} to {high}");
+    }
+}
+
+pub(super) fn tell_order(sources: &[SourceGarment]) {
+    let order: Vec<&Garment> = sources.iter().map(|source| &source.garment).collect();
+    if let Some([inner, outer]) = unwearable(&order) {
+        tracing::warn!(
+            "{} cannot be worn over {}, which hangs between the legs: they will cross at the crotch",
+            outer.name,
+            inner.name
+        );
+    }
+}
+
+pub(super) fn tell_repairs(source: &SourceGarment) {
+    let Some(fit) = &source.fit else { return };
+    let name = &source.garment.name;
+    tracing::info!("{name} fitted: {}", fit.assumptions().join("; "));
+    for repair in &fit.repairs {
+        tracing::info!("{name} repaired: {} ({})", repair.kind.text(), repair.count);
+    }
+    if let Some(misfit) = fit.misfit() {
+        tracing::warn!("{name} does not fit this body: {misfit} Look at the picture.");
+    }
+}

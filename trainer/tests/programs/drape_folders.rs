@@ -1,0 +1,47 @@
+//! Folders that `clothcombo drape` reads from and writes to: what is read is never replaced, and any name will do.
+
+use crate::common::holds;
+use crate::drape::{TEE, at, drape, failure, report};
+use std::fs;
+use std::path::Path;
+
+#[test]
+fn nothing_that_is_read_is_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = at(&folder, "out");
+    drape(&["--garments", TEE, "-o", &out]).assert().success();
+    let garment = Path::new(&out).join(format!("{TEE}.obj"));
+    let before = fs::read(&garment).unwrap();
+    let replace = |arguments: &[&str]| {
+        let message = failure(&mut drape(&[arguments, &["--replace", "-o", &out]].concat()), 1);
+        assert!(holds(&message, "would be replaced"), "{message}");
+        assert_eq!(fs::read(&garment).unwrap(), before);
+    };
+    replace(&["--garments", TEE, "--dataset", &out]);
+    replace(&["--garments", TEE, "--body", &garment.display().to_string()]);
+    // A name that turns out to stand for a file of the folder.
+    #[cfg(unix)]
+    {
+        let dataset = at(&folder, "dataset");
+        fs::create_dir(&dataset).unwrap();
+        std::os::unix::fs::symlink(&garment, Path::new(&dataset).join("own.obj")).unwrap();
+        replace(&["--garments", "own", "--dataset", &dataset]);
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_dataset_of_any_name_is_reported() {
+    use std::os::unix::ffi::OsStrExt;
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    drape(&["--garments", TEE, "-o", &out.display().to_string()]).assert().success();
+    let dataset = folder.path().join(std::ffi::OsStr::from_bytes(b"wardrobe-\xff"));
+    fs::create_dir(&dataset).unwrap();
+    fs::copy(out.join(format!("{TEE}.obj")), dataset.join("own.obj")).unwrap();
+    let again = folder.path().join("again");
+    let mut named = drape(&["--garments", "own", "-o", &again.display().to_string()]);
+    named.arg("--dataset").arg(&dataset).assert().success();
+    let given = report(&again)["garments"][0]["given"].as_str().unwrap().to_owned();
+    assert!(given.contains("wardrobe-\u{fffd}"), "{given}");
+}
