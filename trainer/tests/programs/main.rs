@@ -22,4 +22,5 @@ mod own_garments;
 mod resolve;
 mod run_safety;
 mod score;
+mod steady;
 mod viewer;
