@@ -83,7 +83,8 @@ impl Drape {
         self.garments.iter_mut().for_each(|garment| round(&mut garment.positions));
         let before = self.before();
         let after: Vec<&[[f64; 3]]> = self.garments.iter().map(|g| g.positions.as_slice()).collect();
-        let mut certificate = certify(&self.surface(draper), &outfit.layers(&after))?;
+        let certified = certify(&self.surface(draper), &outfit.layers(&after));
+        let mut certificate = certified.map_err(|error| outfit.named(error.into()))?;
         let layers = outfit.layers(&before);
         certificate.compare_strain(layers.iter().map(|l| l.garment.strain_energy(l.positions)).sum());
         self.certificate = certificate;

@@ -37,17 +37,6 @@ impl Draper {
         made: Networked,
         watch: &mut dyn FnMut(f64),
     ) -> Result<Drape, DraperError> {
-        self.unnamed(outfit, frame, made, watch).map_err(|error| outfit.named(error))
-    }
-
-    /// As [`drape_frame`](Self::drape_frame), with errors that may know a garment by its number only.
-    fn unnamed(
-        &self,
-        outfit: &Outfit,
-        frame: Frame<'_>,
-        made: Networked,
-        watch: &mut dyn FnMut(f64),
-    ) -> Result<Drape, DraperError> {
         let Networked { scene, surface, heading, transforms, skinned, network, mut milliseconds } = made;
 
         let clock = Instant::now();
@@ -72,7 +61,8 @@ impl Draper {
                     skinned: outfit.split(&skinned).into_iter().map(<[_]>::to_vec).collect(),
                     transforms: transforms.clone(),
                 };
-                let done = self.resolved(outfit, frame, watch, &surface, &parts, &at_the_end)?;
+                let done = self.resolved(outfit, frame, watch, &surface, &parts, &at_the_end);
+                let done = done.map_err(|error| outfit.named(error))?;
                 (done.positions, done.garments.iter().map(|g| 1e3 * g.time.as_secs_f64()).collect())
             }
             false => (parts.iter().map(|p| p.to_vec()).collect(), vec![0.0; parts.len()]),

@@ -77,9 +77,6 @@ pub struct DraperSettings {
     pub backend: Backend,
     /// Steps of the static solver after the networks; 0 switches refinement off.
     pub refine: usize,
-    /// Frames of a motion to each side over which the networks' drapes are averaged before the post-process; 0 takes each frame by
-    /// itself.
-    pub steady: usize,
     /// Whether the post-process resolves what still intersects.
     pub resolve: bool,
     /// How it does that.
@@ -96,7 +93,6 @@ impl Default for DraperSettings {
             cache_limit: 10 << 30,
             backend,
             refine: 0,
-            steady: 2,
             resolve: true,
             post_process,
         }

@@ -49,8 +49,8 @@ pub enum DrapeProgress {
 }
 
 impl Draper {
-    /// Drapes `outfit` on each of `bodies`, the frames of a motion. What the networks make is averaged over neighbouring frames
-    /// ([`DraperSettings::steady`](super::DraperSettings::steady)). The post-process carries on from frame to frame; where a frame is
+    /// Drapes `outfit` on each of `bodies`, the frames of a motion. What the networks make is averaged over `radius` frames to each
+    /// side before the post-process; 0 takes each frame as it is. The post-process carries on from frame to frame; where a frame is
     /// left with crossings or torn cloth, and the one after it with less and no crossings, it carries on backwards from that one as
     /// well. `progress` is called on the way to each frame, after it, and before each that is draped once more.
     ///
@@ -60,12 +60,13 @@ impl Draper {
         &self,
         outfit: &Outfit,
         bodies: &[BodyState],
+        radius: usize,
         mut progress: impl FnMut(DrapeProgress),
     ) -> Result<Vec<Drape>, DraperError> {
         let flaws = |drape: &Drape| flaws(&drape.certificate);
         let mut drapes: Vec<Drape> = Vec::with_capacity(bodies.len());
         let (mut bearable, mut only_carried) = (Bearable::NONE, 0);
-        let mut steady = Steady::new(self, outfit, bodies, self.settings.steady);
+        let mut steady = Steady::new(self, outfit, bodies, radius);
         for (frame, body) in bodies.iter().enumerate() {
             let last = drapes.last().map(|drape| Last { body: &bodies[frame - 1], drape, bearable });
             let mut watch = |share| progress(DrapeProgress::OnTheWay(share));

@@ -30,12 +30,17 @@ struct Near {
 impl<'a> Steady<'a> {
     /// For `bodies`, averaged over `radius` of them to each side.
     pub fn new(draper: &'a Draper, outfit: &'a Outfit, bodies: &'a [BodyState], radius: usize) -> Self {
+        // One frame has no neighbours.
+        let radius = if bodies.len() > 1 { radius } else { 0 };
         Self { draper, outfit, bodies, weights: binomial(radius), near: BTreeMap::new() }
     }
 
     /// The next frame. Each is asked for once, in ascending order.
     pub fn at(&mut self, frame: usize) -> Result<Networked, DraperError> {
         let (radius, count) = (self.weights.len() / 2, self.bodies.len());
+        if radius == 0 {
+            return self.draper.networked(&self.draper.model, self.outfit, &self.bodies[frame]);
+        }
         self.near.retain(|other, _| other + radius >= frame);
         for other in frame..count.min(frame + radius + 1) {
             if !self.near.contains_key(&other) {
@@ -50,10 +55,8 @@ impl<'a> Steady<'a> {
             Some(made) => made,
             None => self.draper.networked(&self.draper.model, self.outfit, &self.bodies[frame])?,
         };
-        if radius > 0 {
-            let vertices = made.skinned.iter().zip(&made.transforms).zip(mean);
-            made.network = vertices.map(|((p, t), offset)| add(*p, out_of_frame(t, offset))).collect();
-        }
+        let vertices = made.skinned.iter().zip(&made.transforms).zip(mean);
+        made.network = vertices.map(|((p, t), offset)| add(*p, out_of_frame(t, offset))).collect();
         Ok(made)
     }
 }

@@ -16,13 +16,13 @@ fn bodies() -> Vec<BodyState> {
     [0.0, -0.4, -0.1, -0.6, -0.5].map(pose).into()
 }
 
-fn draped(steady: usize) -> Vec<Drape> {
-    let settings = DraperSettings { steady, resolve: false, ..DraperSettings::default() };
+fn draped(radius: usize) -> Vec<Drape> {
+    let settings = DraperSettings { resolve: false, ..DraperSettings::default() };
     let draper = Draper::load(Some(run_folder()), &settings).unwrap();
     let closet = draper.closet(&[]).unwrap();
     let garments = [TEE, SKIRT].map(|name| closet.find(name, draper.body(), None).unwrap());
     let outfit = draper.outfit(garments.into()).unwrap();
-    draper.drape_motion(&outfit, &bodies(), |_| ()).unwrap()
+    draper.drape_motion(&outfit, &bodies(), radius, |_| ()).unwrap()
 }
 
 #[test]

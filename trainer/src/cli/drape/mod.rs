@@ -11,7 +11,7 @@ use crate::cli::post_process::PostProcessArguments;
 use crate::cli::verbosity::{progress_bar, say};
 use crate::device::Backend;
 use crate::draper::output::{Show, Staged, write};
-use crate::draper::{Drape, DrapeProgress, Draper, DraperSettings, Outfit, Report, smooth};
+use crate::draper::{Drape, DrapeProgress, Draper, DraperSettings, Moment, Outfit, Report, smooth};
 use clap::{ArgGroup, Parser, ValueEnum};
 use clothcombo_data::check::impossible_turn;
 use clothcombo_data::format::atomic;
@@ -71,7 +71,7 @@ pub struct Arguments {
     #[command(flatten)]
     post_process: PostProcessArguments,
     /// Smooths a motion over this many frames to each side, before the post-process and, where that makes no intersection, after it;
-    /// 0 takes every frame as it is [default: 2]
+    /// 0 takes every frame as it is [default: 2 for frames at most 0.05 s apart, else 0]
     #[arg(long, num_args = 0..=1, default_missing_value = "2", value_name = "FRAMES",
           value_parser = clap::value_parser!(u16).range(..=100))]
     smooth: Option<u16>,
@@ -127,6 +127,9 @@ impl Fit {
         }
     }
 }
+
+/// Frames this near to each other show the same cloth [s]; a little more than 0.05, for rounding.
+const CLOSE_FRAMES: f64 = 0.050_001;
 
 /// Runs the verb.
 ///
@@ -233,16 +236,18 @@ fn settings(arguments: &Arguments) -> DraperSettings {
         cache,
         backend: arguments.device,
         refine: arguments.refine,
-        steady: smoothing_radius(arguments),
         resolve: !arguments.no_resolve,
         post_process: arguments.post_process.settings(),
         ..DraperSettings::default()
     }
 }
 
-/// Frames to each side over which a motion is smoothed.
-fn smoothing_radius(arguments: &Arguments) -> usize {
-    arguments.smooth.map_or(DraperSettings::default().steady, usize::from)
+/// Frames to each side over which a motion is smoothed: where nothing else is asked for, two of frames that are
+/// [close](CLOSE_FRAMES), so that only what trembles is averaged.
+fn smoothing_radius(asked: Option<u16>, moments: &[Moment]) -> usize {
+    let is_close = |pair: &[Moment]| pair[1].seconds - pair[0].seconds <= CLOSE_FRAMES;
+    let usual = if moments.windows(2).all(is_close) { 2 } else { 0 };
+    asked.map_or(usual, usize::from)
 }
 
 fn drape_job(
@@ -254,8 +259,9 @@ fn drape_job(
     folder: &Path,
     bar: &ProgressBar,
 ) -> Result<Report, Failure> {
-    let mut drapes = drape_all(draper, outfit, scenes, bar)?;
-    let smoothing = match smoothing_radius(arguments) {
+    let radius = smoothing_radius(arguments.smooth, &scenes.moments);
+    let mut drapes = drape_all(draper, outfit, scenes, radius, bar)?;
+    let smoothing = match radius {
         radius if radius > 0 && !scenes.moments.is_empty() => {
             Some(smooth(draper, outfit, &mut drapes, radius)?)
         }
@@ -290,9 +296,10 @@ fn drape_all(
     draper: &Draper,
     outfit: &Outfit,
     scenes: &Scenes,
+    radius: usize,
     bar: &ProgressBar,
 ) -> Result<Vec<Drape>, Failure> {
-    let drapes = draper.drape_motion(outfit, &scenes.states, |progress| match progress {
+    let drapes = draper.drape_motion(outfit, &scenes.states, radius, |progress| match progress {
         DrapeProgress::OnTheWay(share) if share < 1.0 => {
             bar.set_message(format!(" · sorting out crossings, {:.0} % of the way", 100.0 * share));
         }
@@ -335,4 +342,21 @@ fn print(arguments: &Arguments, reports: &[(&str, Report)]) -> Result<(), Failur
     };
     print!("{text}");
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_far_from_each_other_are_only_smoothed_if_asked_for() {
+        let moments = |rate: f64| -> Vec<Moment> {
+            (0..5).map(|frame| Moment { frame, seconds: frame as f64 / rate }).collect()
+        };
+        assert_eq!(
+            [60.0, 30.0, 20.0, 19.0, 3.0].map(|rate| smoothing_radius(None, &moments(rate))),
+            [2, 2, 2, 0, 0]
+        );
+        assert_eq!([0, 3].map(|asked| smoothing_radius(Some(asked), &moments(3.0))), [0, 3]);
+    }
 }

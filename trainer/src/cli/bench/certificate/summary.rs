@@ -50,12 +50,16 @@ fn time_of(result: &OutfitResult) -> f64 {
 
 /// That time shared out to the garments by vertices [ms].
 fn per_garment(result: &OutfitResult) -> Vec<f64> {
-    per_8000_vertices(result).iter().zip(&result.vertices).map(|(ms, &v)| ms * v as f64 / 8000.0).collect()
+    let per_vertex = per_vertex(result);
+    result.vertices.iter().map(|&vertices| per_vertex * vertices as f64).collect()
 }
 
 fn per_8000_vertices(result: &OutfitResult) -> Vec<f64> {
-    let vertices: usize = result.vertices.iter().sum();
-    vec![time_of(result) * 8000.0 / vertices.max(1) as f64; result.vertices.len()]
+    vec![8000.0 * per_vertex(result); result.vertices.len()]
+}
+
+fn per_vertex(result: &OutfitResult) -> f64 {
+    time_of(result) / result.vertices.iter().sum::<usize>().max(1) as f64
 }
 
 /// Where a share of 500 draws may not hold, every number that stands for the rest.
