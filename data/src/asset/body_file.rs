@@ -9,7 +9,7 @@ use super::provenance::Provenance;
 use super::skeleton;
 use super::skin_weights::SparseSkinWeights;
 use crate::format::npz::{Array, NpzError, NpzFile, NpzWriter};
-use clothcombo_physics::mesh::{is_closed, signed_volume};
+use clothcombo_physics::mesh::is_inside_out;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -101,7 +101,7 @@ impl Body {
         settings: &BodyFileSettings,
     ) -> Result<(Self, bool), BodyFileError> {
         let body = Self::load_as_written(path, settings)?;
-        let is_inside_out = is_closed(&body.faces) && signed_volume(&body.zero_body()) < 0.0;
+        let is_inside_out = is_inside_out(&body.zero_body());
         Ok((if is_inside_out { body.turned() } else { body }, is_inside_out))
     }
 

@@ -15,4 +15,4 @@ pub use normals::{face_normal_area, vertex_normals};
 pub use stretch::vertex_stretch;
 pub use topology::{Hinge, Topology};
 pub use tri_mesh::{MeshError, TriMesh};
-pub use volume::{is_closed, signed_volume};
+pub use volume::{is_closed, is_inside_out, signed_volume};

@@ -24,6 +24,11 @@ pub fn signed_volume(mesh: &TriMesh) -> f64 {
     (0..mesh.face_count()).map(six_fold).sum::<f64>() / 6.0
 }
 
+/// Whether `mesh` is closed and its faces, as a whole, look inwards. One that is not closed has no inside.
+pub fn is_inside_out(mesh: &TriMesh) -> bool {
+    is_closed(mesh.faces()) && signed_volume(mesh) < 0.0
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -36,6 +41,11 @@ mod tests {
         assert!(is_closed(ball.faces()));
         assert!((signed_volume(&ball) / expected - 1.0).abs() < 2e-3);
         assert!((signed_volume(&ball.turned()) + signed_volume(&ball)).abs() < 1e-12);
+        assert!(!is_inside_out(&ball) && is_inside_out(&ball.turned()));
+        assert!(
+            !is_inside_out(&shapes::tube(0.1, 0.1, 8, 2))
+                && !is_inside_out(&shapes::tube(0.1, 0.1, 8, 2).turned())
+        );
         assert!(!is_closed(&ball.faces()[1..]) && !is_closed(shapes::tube(0.1, 0.1, 8, 2).faces()));
     }
 }

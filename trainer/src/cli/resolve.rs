@@ -5,6 +5,7 @@ use crate::cli::post_process::PostProcessArguments;
 use crate::draper::UniqueNames;
 use crate::draper::output::Staged;
 use crate::paths::lossy;
+use crate::picture::{DressedRow, draw_dressed, save_png};
 use crate::score::{DrapedGarment, Score, ScoreDistance, ScoreError, load_body, load_garment, score};
 use clap::Parser;
 use clothcombo_data::format::obj::MovedObj;
@@ -14,6 +15,7 @@ use clothcombo_physics::contact::resolve::{
 };
 use clothcombo_physics::mesh::TriMesh;
 use clothcombo_physics::query::Surface;
+use image::RgbImage;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use serde::Serialize;
 use std::fmt::Write as _;
@@ -39,7 +41,7 @@ pub struct Arguments {
     /// Their rest meshes, in the same order, for strain; default: the garments as they are
     #[arg(long, num_args = 1.., value_name = "MESH")]
     rest: Vec<PathBuf>,
-    /// Folder to make, for NAME.obj (and NAME.mtl) of every garment and report.json
+    /// Folder to make, for NAME.obj (and NAME.mtl) of every garment, picture.png and report.json
     #[arg(short, long, default_value = "resolved")]
     output: PathBuf,
     /// Replaces the folder of an earlier run
@@ -154,7 +156,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
             })
             .collect(),
     };
-    write(staged, &garments, &resolved, &report)?;
+    write(staged, &body, &garments, &resolved, &report)?;
     if arguments.json {
         println!("{}", serde_json::to_string_pretty(&report).into_diagnostic()?);
     } else {
@@ -186,6 +188,7 @@ fn load_garments(arguments: &Arguments, body: &TriMesh) -> Result<Vec<Garment>, 
 /// Writes everything, after everything that could fail has been computed.
 fn write(
     staged: Staged,
+    body: &TriMesh,
     garments: &[Garment],
     resolved: &Resolved,
     report: &ResolveReport,
@@ -198,8 +201,30 @@ fn write(
     for (garment, mesh) in garments.iter().zip(&meshes) {
         mesh.save(folder, &garment.name).into_diagnostic().wrap_err_with(|| failed(&garment.file()))?;
     }
+    save_png(&picture(body, garments, resolved), &folder.join("picture.png")).into_diagnostic()?;
     fs::write(folder.join("report.json"), json).into_diagnostic().wrap_err_with(|| failed("report.json"))?;
     Ok(staged.commit()?)
+}
+
+/// Before and after, one below the other.
+fn picture(body: &TriMesh, garments: &[Garment], resolved: &Resolved) -> RgbImage {
+    let (before, after) =
+        (garments.iter().map(|g| g.draped.positions()), resolved.positions.iter().map(Vec::as_slice));
+    let rows =
+        [("before", before.collect::<Vec<_>>()), ("after", after.collect())].map(|(label, positions)| {
+            DressedRow {
+                label: label.to_owned(),
+                body: (body.positions(), body.faces()),
+                heading: 0.0,
+                garments: positions
+                    .into_iter()
+                    .zip(garments)
+                    .map(|(p, garment)| (p, garment.draped.faces()))
+                    .collect(),
+            }
+        });
+    let names: Vec<&str> = garments.iter().map(|garment| garment.name.as_str()).collect();
+    draw_dressed("clothcombo resolve", &names, &rows)
 }
 
 /// The garment's file with new positions; a file of another format becomes an OBJ of its polygons.

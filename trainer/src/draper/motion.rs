@@ -7,13 +7,6 @@ use super::{BodyState, Certificate, Drape, Draper, DraperError, Outfit};
 /// So many frames after one that was left with flaws only carry on: poses change slowly, and starting anew takes seconds.
 const FRAMES_CARRIED: usize = 15;
 
-/// What shows: crossings, and how torn cloth is; fewer is better, in this order.
-type Flaws = (usize, usize);
-
-fn flaws(certificate: &Certificate) -> Flaws {
-    (certificate.crossings(), certificate.tears())
-}
-
 /// Flaws that carrying on from another frame may leave.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bearable {
@@ -26,13 +19,12 @@ impl Bearable {
     const ALL: Self = Self { crossings: usize::MAX, tears: usize::MAX };
 
     /// After a frame of which starting anew left these: tears must not grow from frame to frame.
-    fn after((_, tears): Flaws) -> Self {
-        Self { crossings: usize::MAX, tears: tears.saturating_add(1) }
+    fn after(anew: &Certificate) -> Self {
+        Self { crossings: usize::MAX, tears: anew.tears().saturating_add(1) }
     }
 
     pub fn is_met(self, certificate: &Certificate) -> bool {
-        let (crossings, tears) = flaws(certificate);
-        crossings <= self.crossings && tears <= self.tears
+        certificate.crossings() <= self.crossings && certificate.tears() <= self.tears
     }
 }
 
@@ -63,7 +55,6 @@ impl Draper {
         radius: usize,
         mut progress: impl FnMut(DrapeProgress),
     ) -> Result<Vec<Drape>, DraperError> {
-        let flaws = |drape: &Drape| flaws(&drape.certificate);
         let mut drapes: Vec<Drape> = Vec::with_capacity(bodies.len());
         let (mut bearable, mut only_carried) = (Bearable::NONE, 0);
         let mut steady = Steady::new(self, outfit, bodies, radius);
@@ -72,7 +63,7 @@ impl Draper {
             let mut watch = |share| progress(DrapeProgress::OnTheWay(share));
             let mut drape = self.drape_frame(outfit, Frame { body, last }, steady.at(frame)?, &mut watch)?;
             if !bearable.is_met(&drape.certificate) {
-                (bearable, only_carried) = (Bearable::after(flaws(&drape)), FRAMES_CARRIED);
+                (bearable, only_carried) = (Bearable::after(&drape.certificate), FRAMES_CARRIED);
             } else if only_carried > 1 {
                 only_carried -= 1;
             } else {
@@ -87,24 +78,29 @@ impl Draper {
         if !self.settings.resolve {
             return Ok(drapes);
         }
-        carry_back(&mut drapes, flaws, |frame, own, after| {
-            progress(DrapeProgress::Again(frame));
-            let last = Last { body: &bodies[frame + 1], drape: after, bearable: Bearable::ALL };
-            let mut watch = |share| progress(DrapeProgress::OnTheWay(share));
-            let body = &bodies[frame];
-            let mut made = self.networked(&self.model, outfit, body)?;
-            made.network = own.garments.iter().flat_map(|garment| &garment.network).copied().collect();
-            let mut again = self.drape_frame(outfit, Frame { body, last: Some(last) }, made, &mut watch)?;
-            again.slim();
-            if flaws(&again) < flaws(own) {
-                std::mem::swap(own, &mut again);
-            }
-            own.milliseconds += again.milliseconds;
-            for (garment, other) in own.garments.iter_mut().zip(&again.garments) {
-                garment.resolve_ms += other.resolve_ms;
-            }
-            Ok::<_, DraperError>(())
-        })?;
+        carry_back(
+            &mut drapes,
+            |drape| &drape.certificate,
+            |frame, own, after| {
+                progress(DrapeProgress::Again(frame));
+                let last = Last { body: &bodies[frame + 1], drape: after, bearable: Bearable::ALL };
+                let mut watch = |share| progress(DrapeProgress::OnTheWay(share));
+                let body = &bodies[frame];
+                let mut made = self.networked(&self.model, outfit, body)?;
+                made.network = own.garments.iter().flat_map(|garment| &garment.network).copied().collect();
+                let mut again =
+                    self.drape_frame(outfit, Frame { body, last: Some(last) }, made, &mut watch)?;
+                again.slim();
+                if again.certificate.flaws() < own.certificate.flaws() {
+                    std::mem::swap(own, &mut again);
+                }
+                own.milliseconds += again.milliseconds;
+                for (garment, other) in own.garments.iter_mut().zip(&again.garments) {
+                    garment.resolve_ms += other.resolve_ms;
+                }
+                Ok::<_, DraperError>(())
+            },
+        )?;
         Ok(drapes)
     }
 }
@@ -113,13 +109,14 @@ impl Draper {
 /// crossings.
 fn carry_back<T, E>(
     frames: &mut [T],
-    flaws: impl Fn(&T) -> Flaws,
+    certificate: impl Fn(&T) -> &Certificate,
     mut again: impl FnMut(usize, &mut T, &T) -> Result<(), E>,
 ) -> Result<(), E> {
     for frame in (0..frames.len().saturating_sub(1)).rev() {
         let (own, after) = frames.split_at_mut(frame + 1);
         let (own, after) = (&mut own[frame], &after[0]);
-        if flaws(after) < flaws(own) && flaws(after).0 == 0 {
+        let (now, next) = (certificate(own), certificate(after));
+        if next.flaws() < now.flaws() && next.crossings() == 0 {
             again(frame, own, after)?;
         }
     }
@@ -130,13 +127,12 @@ fn carry_back<T, E>(
 mod tests {
     use super::*;
 
+    fn left(crossings: usize, strain: f64) -> Certificate {
+        Certificate { body_triangle_pairs: crossings, strain_added: Some(strain), ..Certificate::default() }
+    }
+
     #[test]
     fn after_a_frame_that_could_not_be_mended_crossings_are_borne_but_no_growing_tears() {
-        let left = |crossings, strain| Certificate {
-            body_triangle_pairs: crossings,
-            strain_added: Some(strain),
-            ..Certificate::default()
-        };
         for (certificate, at_first, after_crossings, after_tears) in [
             (left(0, 0.4), true, true, true),
             (left(0, -0.4), true, true, true),
@@ -146,46 +142,52 @@ mod tests {
             (left(9, 3.0), false, false, false),
         ] {
             assert_eq!(Bearable::NONE.is_met(&certificate), at_first, "{certificate:?}");
-            assert_eq!(Bearable::after((7, 0)).is_met(&certificate), after_crossings, "{certificate:?}");
-            assert_eq!(Bearable::after((0, 2)).is_met(&certificate), after_tears, "{certificate:?}");
+            assert_eq!(
+                Bearable::after(&left(7, 0.0)).is_met(&certificate),
+                after_crossings,
+                "{certificate:?}"
+            );
+            assert_eq!(Bearable::after(&left(0, 1.0)).is_met(&certificate), after_tears, "{certificate:?}");
             assert!(Bearable::ALL.is_met(&certificate));
         }
-        assert!(Bearable::after((0, usize::MAX)).is_met(&left(1, f64::INFINITY)));
+        assert!(Bearable::after(&left(0, f64::INFINITY)).is_met(&left(1, f64::INFINITY)));
     }
 
     #[test]
     fn frames_are_mended_from_clear_ones_after_them_as_far_as_that_goes() {
-        // How many crossings each frame has.
-        let mut frames = [5, 4, 3, 0, 2, 0, 7];
+        let crossings =
+            |frames: &[Certificate]| frames.iter().map(Certificate::crossings).collect::<Vec<_>>();
+        let mut frames = [5, 4, 3, 0, 2, 0, 7].map(|crossings| left(crossings, 0.0));
         let mut asked = Vec::new();
         let found: Result<(), String> = carry_back(
             &mut frames,
-            |crossings| (*crossings, 0),
+            |frame| frame,
             |frame, own, after| {
-                assert_eq!(*after, 0);
-                asked.push((frame, *own));
-                *own = usize::from(frame == 1);
+                assert_eq!(after.crossings(), 0);
+                asked.push((frame, own.crossings()));
+                *own = left(usize::from(frame == 1), 0.0);
                 Ok(())
             },
         );
         assert!(found.is_ok());
         assert_eq!(asked, [(4, 2), (2, 3), (1, 4)]);
-        assert_eq!(frames, [5, 1, 0, 0, 0, 0, 7]);
+        assert_eq!(crossings(&frames), [5, 1, 0, 0, 0, 0, 7]);
         // Torn cloth is mended as well, and from what is torn less.
-        let (mut torn, mut asked) = ([(0, 4), (2, 0), (0, 3), (0, 1)], Vec::new());
+        let mut torn = [left(0, 2.0), left(0, 1.5), left(2, 0.0), left(0, 0.5)];
+        let mut asked = Vec::new();
         let found: Result<(), String> = carry_back(
             &mut torn,
-            |flaws| *flaws,
+            |frame| frame,
             |frame, own, _| {
                 asked.push(frame);
-                own.0 = 0;
+                own.body_triangle_pairs = 0;
                 Ok(())
             },
         );
         assert!(found.is_ok());
         assert_eq!(asked, [2, 1, 0]);
-        let failed = carry_back(&mut frames, |c| (*c, 0), |_, _, _| Err("an error comes back"));
+        let failed = carry_back(&mut frames, |frame| frame, |_, _, _| Err("an error comes back"));
         assert_eq!(failed, Err("an error comes back"));
-        assert!(carry_back(&mut [0; 0], |c| (*c, 0), |_, _, _| Err("none")).is_ok());
+        assert!(carry_back(&mut [], |frame: &Certificate| frame, |_, _, _| Err("none")).is_ok());
     }
 }

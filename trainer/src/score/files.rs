@@ -3,7 +3,7 @@
 use super::place::{misplaced, oversized, rescaled};
 use super::{DrapedGarment, MeshSize, Score, ScoreDistance, ScoreError, score};
 use clothcombo_data::format::load_tri_mesh;
-use clothcombo_physics::mesh::{TriMesh, is_closed, signed_volume};
+use clothcombo_physics::mesh::{TriMesh, is_inside_out};
 use std::path::{Path, PathBuf};
 
 /// The files of a scene; polygons are cut into triangles.
@@ -42,7 +42,7 @@ pub(crate) fn load_body(path: &Path) -> Result<TriMesh, ScoreError> {
     if let Some(what) = oversized(&body) {
         return Err(ScoreError::BodySize { path: path.into(), what });
     }
-    if !(is_closed(body.faces()) && signed_volume(&body) < 0.0) {
+    if !is_inside_out(&body) {
         return Ok(body);
     }
     tracing::warn!("{}: the body is inside out; its faces were turned", path.display());

@@ -130,6 +130,9 @@ fn what_is_written_is_clear_and_has_the_topology_it_came_with() {
         assert_eq!(before.positions.len(), after.positions.len());
         assert_ne!(before.positions, after.positions);
     }
+    // Before and after, three views each.
+    let picture = image::open(case.path("out/picture.png")).unwrap();
+    assert!(picture.width() > 900 && picture.height() > 1000, "{} x {}", picture.width(), picture.height());
     // The bottom and top rims lie off the ball, within reach of nothing: a second run changes nothing at all.
     case.command(&["out/tee.obj", "out/coat.obj"], &["-o", "again"]).assert().success();
     for name in ["tee.obj", "coat.obj"] {

@@ -151,6 +151,11 @@ impl Certificate {
         self.strain_added.map_or(0, |added| (added / TEAR) as usize)
     }
 
+    /// What shows: cloth that crosses, and cloth that is torn out of shape.
+    pub fn flaws(&self) -> usize {
+        self.crossings().saturating_add(self.tears())
+    }
+
     /// What is wrong: fewer is better, in this order.
     pub(super) fn defects(&self) -> (usize, usize) {
         (self.between(), self.self_triangle_pairs)

@@ -76,7 +76,7 @@ pub fn resolve_along<E: From<ResolveError>>(
     };
     // Strict limits leave a drape as it is, as far as it can be left.
     let may_lay_out = settings.loosened > 1.0 && settings.self_contact;
-    let mut folds = may_lay_out.then(|| Folds::of(layers, skinned));
+    let mut folds = may_lay_out.then(|| Folds::of(body, layers, skinned));
     let mut resolved = match &folds {
         None => along(layers, &mut folds)?,
         Some(found) => {
@@ -87,6 +87,12 @@ pub fn resolve_along<E: From<ResolveError>>(
     let is_laid_out = folds.is_some_and(|folds| !folds.is_empty());
     if is_laid_out && !resolved.certificate.is_clear() && !settings.is_late(start, layers.len()) {
         resolved = resolved.or_by(along(layers, &mut None)?, Certificate::defects);
+    }
+    if is_laid_out {
+        // So far strain was measured from what was laid out.
+        with_drawn(body, layers, |drawn| {
+            with_body(drawn, layers.len(), |room| resolved.ease(room, layers, settings, start, TIMES));
+        });
     }
     resolved.compare_since(layers, start);
     Ok(resolved)
@@ -110,7 +116,7 @@ fn taken_along<E: From<ResolveError>>(
         let way = Way { layers, end: room, settings, start, strides: Strides::FROM_T_POSE };
         let t_pose = stage_at(0.0)?;
         if let Some(folds) = folds {
-            folds.add(&Folds::of(&at(layers, &t_pose.draped), &t_pose.skinned));
+            folds.add(&Folds::of(&t_pose.body, &at(layers, &t_pose.draped), &t_pose.skinned));
         }
         let folds = &*folds;
         let laid_out = |stage: Waypoint| match folds {

@@ -110,8 +110,10 @@ fn resolved_further<E>(
 ) -> Result<Resolved, E> {
     let preparing = Instant::now();
     with_drawn(body, layers, |drawn| {
-        let simple = simply_resolved(&drawn, layers, settings, preparing);
+        let mut simple = simply_resolved(&drawn, layers, settings, preparing);
         if simple.certificate.is_clear() {
+            simple.go_on(body, layers, settings, start);
+            simple.compare_since(layers, start);
             return Ok(simple);
         }
         let relieving = Instant::now();

@@ -17,6 +17,8 @@ use crate::vec3;
 const FURTHER_ATTEMPTS: usize = 3;
 /// …and most pairs that may be left there: more would only be torn further.
 const FEW: usize = 32;
+/// Pairs of garments with themselves that may be left where nothing else crosses.
+const FEW_OF_ITSELF: usize = 8;
 /// Longest and shortest step, as shares of the room that the body made, by which it is taken back.
 const CLOSING_IN: (f64, f64) = (1.0 / 4.0, 1.0 / 32.0);
 /// Gaps with which that is tried, as shares of the one asked for: what is narrow holds more sheets that lie closer to each other.
@@ -109,9 +111,9 @@ impl Resolved {
         }
     }
 
-    /// Where few crossings are left on `body`, attempts that begin where the one before ended: cloth that is nearly sorted out is
-    /// the better shape to return to and to measure lengths from than the drape it came from. None where limits are strict
-    /// (`settings.loosened`). `start`: when all of it began.
+    /// Where few crossings are left on `body`, or none but those of garments with themselves, attempts that begin where the one before
+    /// ended: cloth that is nearly sorted out is the better shape to return to and to measure lengths from than the drape it came
+    /// from. None where limits are strict (`settings.loosened`). `start`: when all of it began.
     pub(super) fn go_on(
         &mut self,
         body: &Surface<f64>,
@@ -123,7 +125,8 @@ impl Resolved {
         let attempts = if settings.loosened > 1.0 { FURTHER_ATTEMPTS } else { 0 };
         for _ in 0..attempts {
             let left = self.certificate.between();
-            if left == 0 || left > FEW || settings.is_late(start, layers.len()) {
+            let is_smooth = !settings.self_contact || self.certificate.self_triangle_pairs <= FEW_OF_ITSELF;
+            if left == 0 && is_smooth || left > FEW || settings.is_late(start, layers.len()) {
                 break;
             }
             let found = resolved_once(body, &at(layers, &now), settings);
@@ -137,11 +140,11 @@ impl Resolved {
         }
     }
 
-    /// The better of two results for the same drape: the one with fewer crossings, of equal ones the one that is torn less, then
-    /// `self`. It counts the work of both.
+    /// The better of two results for the same drape: the one with fewer [`Certificate::flaws`], of equal ones the one with fewer
+    /// narrow pairs, then `self`. It counts the work of both.
     #[must_use]
     pub fn or(self, other: Self) -> Self {
-        self.or_by(other, |c| (c.crossings(), c.tears(), c.between()))
+        self.or_by(other, |c| (c.flaws(), c.between()))
     }
 
     /// [`or`](Self::or) where the one of lower `rank` is the better one.

@@ -379,7 +379,9 @@ fn of_two_results_the_one_with_fewer_crossings_counts_and_the_work_of_both() {
         (&torn(1.1), &torn(0.4), &torn(0.4)),
         // A little more strain is no reason to take another result.
         (&torn(0.4), &torn(0.1), &torn(0.4)),
-        (&crossed, &torn(30.0), &torn(30.0)),
+        // Torn cloth shows as well as cloth that crosses.
+        (&crossed, &torn(3.9), &torn(3.9)),
+        (&crossed, &torn(30.0), &crossed),
     ] {
         let found = first.clone().or(second.clone());
         assert_eq!(found.certificate, best.certificate);
