@@ -91,25 +91,20 @@ fn folded(body: &BodyObstacle<'_>, layer: Layer<'_>, skinned: &[[f64; 3]]) -> Ve
     let outfit = Outfit::new(std::slice::from_ref(&layer));
     let length = garment.edge_lengths.iter().sum::<f64>() / garment.edge_lengths.len() as f64;
     let rings = |reach: f64| ((reach / length).ceil() as usize).clamp(RINGS.0, RINGS.1);
-    let near = |pairs: &[(u32, u32)]| {
-        let mut is_near = vec![false; skinned.len()];
-        let around = outfit.neighbourhood(&corners(pairs, faces), rings(CREASE));
-        around.iter().for_each(|&v| is_near[v as usize] = true);
-        is_near
-    };
+    // What lies in a closed crease is left: there skinning folds the garment as well.
     let skinned_too = self_triangle_pairs(skinned, faces);
-    let pinched_of = |pairs: &[(u32, u32)], positions| pinched(body, pairs, positions, faces);
-    let closed = [pinched_of(&all, layer.positions), pinched_of(&skinned_too, skinned)].concat();
-    let is_crease: Vec<bool> =
-        near(&closed).into_iter().zip(near(&skinned_too)).map(|(a, b)| a && b).collect();
-    let is_outside = |f: u32| !faces[f as usize].iter().any(|&v| is_crease[v as usize]);
+    let closed =
+        [pinched(body, &all, layer.positions, faces), pinched(body, &skinned_too, skinned, faces)].concat();
+    let [closed, skinned_too] = [closed, skinned_too].map(|pairs| near(&outfit, &pairs, rings(CREASE)));
+    let is_outside =
+        |f: u32| !faces[f as usize].iter().any(|&v| closed[v as usize] && skinned_too[v as usize]);
     let crossings = |positions: &[[f64; 3]]| {
         let mut pairs = self_triangle_pairs(positions, faces);
         pairs.retain(|&(f, g)| is_outside(f) && is_outside(g));
         pairs
     };
     let found = crossings(layer.positions);
-    let pinched = pinched_of(&found, layer.positions);
+    let pinched = pinched(body, &found, layer.positions, faces);
     let energy = garment.strain_energy(layer.positions);
     let count = |pairs: &[(u32, u32)], place: &[u32]| count_at(pairs, place, &outfit);
     let (mut seeds, mut region) = (Vec::new(), Vec::new());
@@ -174,6 +169,14 @@ fn corners(pairs: &[(u32, u32)], faces: &[[u32; 3]]) -> Vec<u32> {
     pairs.iter().flat_map(|&(f, g)| [f, g]).flat_map(|f| faces[f as usize]).collect()
 }
 
+/// Which vertices of the lone garment of `outfit` are within so many `rings` of `pairs` of its faces.
+fn near(outfit: &Outfit<'_>, pairs: &[(u32, u32)], rings: usize) -> Vec<bool> {
+    let mut is_near = vec![false; outfit.vertex_count()];
+    let around = outfit.neighbourhood(&corners(pairs, outfit.layers[0].garment.faces()), rings);
+    around.iter().for_each(|&v| is_near[v as usize] = true);
+    is_near
+}
+
 /// How many `pairs` of faces of the lone garment of `outfit` have a vertex in `place`.
 fn count_at(pairs: &[(u32, u32)], place: &[u32], outfit: &Outfit<'_>) -> usize {
     let faces = outfit.layers[0].garment.faces();
@@ -222,142 +225,4 @@ fn smoothed(outfit: &Outfit<'_>, skinned: &[[f64; 3]], region: &[u32]) -> Vec<[f
 }
 
 #[cfg(test)]
-pub(super) mod tests {
-    use super::super::RestGarment;
-    use super::*;
-    use crate::mesh::{TriMesh, shapes};
-    use crate::vec3::norm;
-
-    /// A sheet of 40 cm in the plane y = 0, around the origin.
-    fn sheet() -> TriMesh {
-        let grid = shapes::irregular_grid(0.4, 0.4, 24, 24, 0.25, 4);
-        shapes::mapped(&grid, |[x, y, _]| [x - 0.2, 0.0, y - 0.2])
-    }
-
-    /// `p` 1 cm higher, and pushed up to 8 cm along x where it lies around `centre`, over what lies there and back under it.
-    pub fn folded_at(p: [f64; 3], centre: [f64; 3]) -> [f64; 3] {
-        let from = sub(p, centre);
-        let push = 0.08 * (-(norm(from) / 0.04).powi(2)).exp();
-        [p[0] + push, 0.01 - 0.5 * push * from[0], p[2]]
-    }
-
-    /// A body that no sheet is near to.
-    fn elsewhere() -> Surface<f64> {
-        Surface::from_mesh(&shapes::mapped(&shapes::tetrahedron(), |[x, y, z]| [x, y - 9.0, z]))
-    }
-
-    /// The sheet with a fold in its middle.
-    fn folded_sheet(sheet: &TriMesh) -> Vec<[f64; 3]> {
-        sheet.positions().iter().map(|p| folded_at(*p, [0.0; 3])).collect()
-    }
-
-    #[test]
-    fn a_fold_is_laid_out_at_the_height_of_its_surroundings_and_nothing_else_moves() {
-        let mesh = sheet();
-        let garment = RestGarment::new(&mesh);
-        let (skinned, draped) = (vec![mesh.positions().to_vec()], folded_sheet(&mesh));
-        let layers = [Layer { garment: &garment, positions: &draped }];
-        assert!(self_triangle_pairs(&draped, garment.faces()).len() > 20);
-        let folds = Folds::of(&elsewhere(), &layers, &skinned);
-        let flat = &folds.laid_out(&layers, &skinned)[0];
-        assert!(self_triangle_pairs(flat, garment.faces()).is_empty());
-        let (mut moved, mut kept) = (0, 0);
-        for (v, (p, q)) in draped.iter().zip(flat).enumerate() {
-            if folds.0[0].contains(&(v as u32)) {
-                assert!((q[1] - 0.01).abs() < 0.002, "{q:?}");
-                moved += 1;
-            } else {
-                assert_eq!(p, q);
-                kept += 1;
-            }
-        }
-        assert!(moved > 50 && kept > 200, "{moved} {kept}");
-    }
-
-    #[test]
-    fn what_does_not_cross_or_crosses_as_much_when_it_is_skinned_stays() {
-        let mesh = sheet();
-        let garment = RestGarment::new(&mesh);
-        let (flat, folded) = (mesh.positions().to_vec(), folded_sheet(&mesh));
-        let crossings = |positions: &[[f64; 3]]| self_triangle_pairs(positions, garment.faces()).len();
-        // The fold, but for a share.
-        let partly = |share: f64| -> Vec<[f64; 3]> {
-            flat.iter().zip(&folded).map(|(p, q)| add_scaled(*p, share, sub(*q, *p))).collect()
-        };
-        let (much, little) = (partly(0.9), partly(0.62));
-        let [all, most, few] = [&folded, &much, &little].map(|p| crossings(p));
-        assert!(0 < few && 3 * few < all && 2 * most > all && most < all, "{few} {most} {all}");
-        for (draped, skinned, is_laid_out) in [
-            (&flat, &folded, false),
-            (&folded, &folded, false),
-            (&folded, &much, false),
-            (&folded, &little, true),
-            (&folded, &flat, true),
-        ] {
-            let layers = [Layer { garment: &garment, positions: draped }];
-            let folds = Folds::of(&elsewhere(), &layers, std::slice::from_ref(skinned));
-            let now = &folds.laid_out(&layers, std::slice::from_ref(skinned))[0];
-            assert_eq!((!folds.is_empty(), now != draped), (is_laid_out, is_laid_out));
-            assert!(!is_laid_out || 2 * crossings(now) <= crossings(draped));
-        }
-    }
-
-    /// Over two balls, which lie in each other under the tip of the fold, or do not. Skinned, the sheet hardly crosses itself.
-    #[test]
-    fn a_fold_stays_in_a_crease_where_the_body_is_pinched() {
-        let mesh = sheet();
-        let garment = RestGarment::new(&mesh);
-        let (flat, draped) = (mesh.positions(), folded_sheet(&mesh));
-        let partly = |(p, q): (&[f64; 3], &[f64; 3])| add_scaled(*p, 0.62, sub(*q, *p));
-        let (flat, creased) = (flat.to_vec(), flat.iter().zip(&draped).map(partly).collect::<Vec<_>>());
-        assert!(!self_triangle_pairs(&creased, garment.faces()).is_empty());
-        let layers = [Layer { garment: &garment, positions: &draped }];
-        let ball =
-            |x: f64| shapes::mapped(&shapes::icosphere(0.1, 3), |p| [p[0] + 0.07 + x, p[1] - 0.11, p[2]]);
-        for (apart, skinned, is_laid_out) in
-            [(0.06, &creased, false), (0.06, &flat, true), (0.15, &creased, true), (0.15, &flat, true)]
-        {
-            let body = Surface::from_mesh(&shapes::union(&[&ball(-apart), &ball(apart)]));
-            let folds = Folds::of(&body, &layers, std::slice::from_ref(skinned));
-            assert_eq!(!folds.is_empty(), is_laid_out, "{apart}");
-        }
-    }
-
-    /// Two folds; around the second one skinning pulls a long spike out of the sheet.
-    #[test]
-    fn a_fold_stays_where_cloth_would_be_stretched_without_it() {
-        let mesh = sheet();
-        let garment = RestGarment::new(&mesh);
-        let centres = [[-0.1, 0.0, 0.0], [0.1, 0.0, 0.0]];
-        let fold = |p: &[f64; 3]| folded_at(*p, centres[usize::from(p[0] > 0.0)]);
-        let draped: Vec<[f64; 3]> = mesh.positions().iter().map(fold).collect();
-        let spike = |p: &[f64; 3]| [p[0], 0.5 * (-(norm(sub(*p, centres[1])) / 0.02).powi(2)).exp(), p[2]];
-        let skinned = vec![mesh.positions().iter().map(spike).collect::<Vec<_>>()];
-        let layers = [Layer { garment: &garment, positions: &draped }];
-        let folds = Folds::of(&elsewhere(), &layers, &skinned);
-        assert!(folds.0[0].len() > 20);
-        assert!(folds.0[0].iter().all(|v| mesh.positions()[*v as usize][0] < 0.05));
-        let flat = &folds.laid_out(&layers, &skinned)[0];
-        assert!(garment.strain_energy(flat) <= (1.0 + STRAINED) * garment.strain_energy(&draped));
-        let left = self_triangle_pairs(flat, garment.faces());
-        assert!(!left.is_empty() && left.len() < self_triangle_pairs(&draped, garment.faces()).len());
-    }
-
-    /// A place that is folded in one pose is laid out in all of them.
-    #[test]
-    fn folds_of_two_poses_add_up() {
-        let mesh = sheet();
-        let garment = RestGarment::new(&mesh);
-        let skinned = vec![mesh.positions().to_vec()];
-        let folds_at = |centre: [f64; 3]| {
-            let draped: Vec<_> = mesh.positions().iter().map(|p| folded_at(*p, centre)).collect();
-            Folds::of(&elsewhere(), &[Layer { garment: &garment, positions: &draped }], &skinned)
-        };
-        let [left, right] = [-0.1, 0.08].map(|x| folds_at([x, 0.0, 0.0]));
-        let mut both = left.clone();
-        both.add(&right);
-        assert!(both.0[0].len() > left.0[0].len().max(right.0[0].len()));
-        assert!(left.0[0].iter().chain(&right.0[0]).all(|v| both.0[0].contains(v)));
-        assert!(both.0[0].is_sorted_by(|a, b| a < b));
-    }
-}
+pub(super) mod tests;
