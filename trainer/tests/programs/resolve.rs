@@ -218,7 +218,7 @@ fn a_body_that_is_inside_out_is_turned_and_names_are_told_apart() {
         .collect();
     files.sort();
     let meshes = ["tee-2.mtl", "tee-2.obj", "tee-3.obj", "tee.mtl", "tee.obj"];
-    assert_eq!(files, [[".clothcombo-files", "report.json"].as_slice(), &meshes].concat());
+    assert_eq!(files, [[".clothcombo-files", "picture.png", "report.json"].as_slice(), &meshes].concat());
 }
 
 #[test]

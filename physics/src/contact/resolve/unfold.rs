@@ -24,10 +24,10 @@ const CREASE: f64 = 0.06;
 const LEFT: f64 = 0.5;
 /// Fewest and most rings of neighbours for these distances.
 const RINGS: (usize, usize) = (2, 40);
-/// What is laid out in one place may raise the strain energy of a garment by this share: a fold that holds more is none to take
-/// away. The cloth under a bust that a network folds up over it holds 15 to 30 % in a tight garment…
+/// What is laid out may raise the strain energy of a garment by this share: a fold that holds more is none to take away. The cloth
+/// under a bust that a network folds up over it holds 15 to 30 % in a tight garment…
 const STRAINED: f64 = 0.5;
-/// …but where the body is pinched there is hardly any room to lay cloth out in.
+/// …but a place where the body is pinched only by this one: there is hardly any room to lay cloth out in.
 const STRAINED_WHERE_PINCHED: f64 = 0.1;
 /// Sweeps of the smoothing…
 const SWEEPS: usize = 100;
@@ -128,9 +128,10 @@ fn folded(body: &BodyObstacle<'_>, layer: Layer<'_>, skinned: &[[f64; 3]]) -> Ve
         };
         let mut strained = take(&[], &smooth);
         let is_slack = |place: &Vec<u32>| {
-            let allowed = if count(&pinched, place) > 0 { STRAINED_WHERE_PINCHED } else { STRAINED };
             let then = take(place, &smooth);
-            let is_slack = then <= strained + allowed * energy;
+            let is_closed = count(&pinched, place) > 0;
+            let is_slack = then <= (1.0 + STRAINED) * energy
+                && (!is_closed || then <= strained + STRAINED_WHERE_PINCHED * energy);
             strained = if is_slack { then } else { take(place, &laid_out) };
             is_slack
         };
