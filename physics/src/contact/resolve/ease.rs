@@ -45,6 +45,11 @@ const OWN: usize = 4;
 const RINGS_HELD: usize = 3;
 
 impl Resolved {
+    /// Whether the strain energy has risen from that of `layers` by so much that [`ease`](Self::ease) has something to do.
+    pub(super) fn is_strained(&self, layers: &[Layer<'_>]) -> bool {
+        self.certificate.strain_joule() > (1.0 + ENOUGH) * strain_joule(layers)
+    }
+
     /// Lowers the strain energy where it has risen from that of `layers`, at most so many `times`, without any further crossing
     /// with the body or between garments, and few of garments with themselves. What the post-process has not moved only
     /// moves where contacts ask for it. Strict limits (`settings.loosened`) allow none of this. `start`: when all of it began.
@@ -56,7 +61,7 @@ impl Resolved {
         start: Instant,
         times: usize,
     ) {
-        let before: f64 = layers.iter().map(|l| l.garment.strain_energy(l.positions)).sum();
+        let before = strain_joule(layers);
         let is_enough = |now: &Certificate| now.strain_joule() <= (1.0 + ENOUGH) * before;
         if settings.loosened <= 1.0 || is_enough(&self.certificate) {
             return;
@@ -97,6 +102,11 @@ impl Resolved {
             }
         });
     }
+}
+
+/// Strain energy of all garments [J].
+fn strain_joule(layers: &[Layer<'_>]) -> f64 {
+    layers.iter().map(|l| l.garment.strain_energy(l.positions)).sum()
 }
 
 /// Pairs of triangles of one garment that cross, of all garments.

@@ -88,7 +88,7 @@ pub fn resolve_along<E: From<ResolveError>>(
     if is_laid_out && !resolved.certificate.is_clear() && !settings.is_late(start, layers.len()) {
         resolved = resolved.or_by(along(layers, &mut None)?, Certificate::defects);
     }
-    if is_laid_out {
+    if is_laid_out && resolved.is_strained(layers) {
         // So far strain was measured from what was laid out.
         with_drawn(body, layers, |drawn| {
             with_body(drawn, layers.len(), |room| resolved.ease(room, layers, settings, start, TIMES));

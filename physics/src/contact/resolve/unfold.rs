@@ -41,8 +41,15 @@ pub(super) struct Folds(Vec<Vec<u32>>);
 impl Folds {
     /// Around crossings of every garment with itself, where at most half of them are left when it is laid out on `body`.
     pub fn of(body: &Surface<f64>, layers: &[Layer<'_>], skinned: &[Vec<[f64; 3]>]) -> Self {
+        let crossings = |layer: &Layer<'_>| self_triangle_pairs(layer.positions, layer.garment.faces());
+        let crossings: Vec<Vec<(u32, u32)>> = layers.par_iter().map(crossings).collect();
+        // Most drapes have none, and a body takes long to prepare.
+        if crossings.iter().all(Vec::is_empty) {
+            return Self(vec![Vec::new(); layers.len()]);
+        }
         let folded = |body: BodyObstacle<'_>| {
-            layers.par_iter().zip(skinned).map(|(layer, skinned)| folded(&body, *layer, skinned)).collect()
+            let garments = layers.par_iter().zip(skinned).zip(&crossings);
+            garments.map(|((layer, skinned), all)| folded(&body, *layer, skinned, all)).collect()
         };
         Self(with_drawn(body, layers, folded))
     }
@@ -80,21 +87,20 @@ impl Folds {
     }
 }
 
-/// The folds of one garment.
-fn folded(body: &BodyObstacle<'_>, layer: Layer<'_>, skinned: &[[f64; 3]]) -> Vec<u32> {
-    let garment = layer.garment;
-    let faces = garment.faces();
-    let all = self_triangle_pairs(layer.positions, faces);
+/// The folds of one garment that crosses itself in `all` these pairs of faces.
+fn folded(body: &BodyObstacle<'_>, layer: Layer<'_>, skinned: &[[f64; 3]], all: &[(u32, u32)]) -> Vec<u32> {
     if all.is_empty() {
         return Vec::new();
     }
+    let garment = layer.garment;
+    let faces = garment.faces();
     let outfit = Outfit::new(std::slice::from_ref(&layer));
     let length = garment.edge_lengths.iter().sum::<f64>() / garment.edge_lengths.len() as f64;
     let rings = |reach: f64| ((reach / length).ceil() as usize).clamp(RINGS.0, RINGS.1);
     // What lies in a closed crease is left: there skinning folds the garment as well.
     let skinned_too = self_triangle_pairs(skinned, faces);
     let closed =
-        [pinched(body, &all, layer.positions, faces), pinched(body, &skinned_too, skinned, faces)].concat();
+        [pinched(body, all, layer.positions, faces), pinched(body, &skinned_too, skinned, faces)].concat();
     let [closed, skinned_too] = [closed, skinned_too].map(|pairs| near(&outfit, &pairs, rings(CREASE)));
     let is_outside =
         |f: u32| !faces[f as usize].iter().any(|&v| closed[v as usize] && skinned_too[v as usize]);
@@ -126,7 +132,7 @@ fn folded(body: &BodyObstacle<'_>, layer: Layer<'_>, skinned: &[[f64; 3]]) -> Ve
             place.iter().for_each(|&v| now[v as usize] = from[v as usize]);
             garment.strain_energy(&now)
         };
-        let mut strained = take(&[], &smooth);
+        let mut strained = garment.strain_energy(&laid_out);
         let is_slack = |place: &Vec<u32>| {
             let then = take(place, &smooth);
             let is_closed = count(&pinched, place) > 0;
