@@ -15,12 +15,11 @@ use clothcombo_physics::contact::resolve::{
 };
 use clothcombo_physics::mesh::TriMesh;
 use clothcombo_physics::query::Surface;
-use image::RgbImage;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use serde::Serialize;
 use std::fmt::Write as _;
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Takes draped garments out of the body and out of each other, in their order, and proves what it reached
@@ -41,7 +40,7 @@ pub struct Arguments {
     /// Their rest meshes, in the same order, for strain; default: the garments as they are
     #[arg(long, num_args = 1.., value_name = "MESH")]
     rest: Vec<PathBuf>,
-    /// Folder to make, for NAME.obj (and NAME.mtl) of every garment, picture.png and report.json
+    /// Folder to make, for NAME.obj (and NAME.mtl) of every garment, picture.png, layers.png and report.json
     #[arg(short, long, default_value = "resolved")]
     output: PathBuf,
     /// Replaces the folder of an earlier run
@@ -201,30 +200,47 @@ fn write(
     for (garment, mesh) in garments.iter().zip(&meshes) {
         mesh.save(folder, &garment.name).into_diagnostic().wrap_err_with(|| failed(&garment.file()))?;
     }
-    save_png(&picture(body, garments, resolved), &folder.join("picture.png")).into_diagnostic()?;
+    save_pictures(folder, body, garments, resolved)?;
     fs::write(folder.join("report.json"), json).into_diagnostic().wrap_err_with(|| failed("report.json"))?;
     Ok(staged.commit()?)
 }
 
-/// Before and after, one below the other.
-fn picture(body: &TriMesh, garments: &[Garment], resolved: &Resolved) -> RgbImage {
-    let (before, after) =
-        (garments.iter().map(|g| g.draped.positions()), resolved.positions.iter().map(Vec::as_slice));
-    let rows =
-        [("before", before.collect::<Vec<_>>()), ("after", after.collect())].map(|(label, positions)| {
-            DressedRow {
-                label: label.to_owned(),
-                body: (body.positions(), body.faces()),
-                heading: 0.0,
-                garments: positions
-                    .into_iter()
-                    .zip(garments)
-                    .map(|(p, garment)| (p, garment.draped.faces()))
-                    .collect(),
-            }
-        });
+/// Writes `picture.png`, before and after one below the other, and `layers.png`, after, each garment alone, where there is more
+/// than one.
+fn save_pictures(
+    folder: &Path,
+    body: &TriMesh,
+    garments: &[Garment],
+    resolved: &Resolved,
+) -> Result<(), Report> {
+    let rows = [
+        row("before", body, garments, garments.iter().map(|garment| garment.draped.positions())),
+        row("after", body, garments, resolved.positions.iter().map(Vec::as_slice)),
+    ];
     let names: Vec<&str> = garments.iter().map(|garment| garment.name.as_str()).collect();
-    draw_dressed("clothcombo resolve", &names, &rows)
+    let save = |rows: &[DressedRow<'_>], name: &str| {
+        save_png(&draw_dressed("clothcombo resolve", &names, rows), &folder.join(name)).into_diagnostic()
+    };
+    save(&rows, "picture.png")?;
+    match garments {
+        [_] => Ok(()),
+        _ => save(&rows[1].layers(&names), "layers.png"),
+    }
+}
+
+fn row<'a>(
+    label: &str,
+    body: &'a TriMesh,
+    garments: &'a [Garment],
+    positions: impl Iterator<Item = &'a [[f64; 3]]>,
+) -> DressedRow<'a> {
+    DressedRow {
+        label: label.to_owned(),
+        body: (body.positions(), body.faces()),
+        heading: 0.0,
+        garments: positions.zip(garments).map(|(p, garment)| (p, garment.draped.faces())).collect(),
+        innermost: 0,
+    }
 }
 
 /// The garment's file with new positions; a file of another format becomes an OBJ of its polygons.

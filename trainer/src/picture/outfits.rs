@@ -28,6 +28,22 @@ pub struct DressedRow<'a> {
     pub heading: f64,
     /// Its garments, innermost first.
     pub garments: Vec<MeshSlices<'a>>,
+    /// Number of the innermost one in its outfit: 0, unless it is shown without those under it.
+    pub innermost: usize,
+}
+
+impl<'a> DressedRow<'a> {
+    /// The body with each garment alone, by the `names` of the garments: an outer layer hides what is wrong with an inner one.
+    #[must_use]
+    pub fn layers(&self, names: &[&str]) -> Vec<DressedRow<'a>> {
+        let alone = |(layer, (&garment, name)): (usize, (&MeshSlices<'a>, &&str))| DressedRow {
+            label: (*name).to_owned(),
+            garments: vec![garment],
+            innermost: self.innermost + layer,
+            ..self.clone()
+        };
+        self.garments.iter().zip(names).enumerate().map(alone).collect()
+    }
 }
 
 /// Draws `rows` from top to bottom under a `title`; `names` are those of the garments, which every row has.
@@ -66,7 +82,7 @@ fn draw_view(row: &DressedRow<'_>, view: View) -> RgbImage {
     let garments = row.garments.iter().enumerate().map(|(layer, &(positions, faces))| Figure {
         positions,
         faces,
-        colour: layer_colour(layer),
+        colour: layer_colour(row.innermost + layer),
     });
     let figures: Vec<Figure> = std::iter::once(body).chain(garments).collect();
     render(&figures, view, CELL)
@@ -86,6 +102,7 @@ mod tests {
             body: (body.positions(), body.faces()),
             heading: 0.0,
             garments: vec![(positions, cloth.faces())],
+            innermost: 0,
         };
         let sheet = |rows: &[DressedRow<'_>]| draw_dressed("title", &["cloth"], rows);
         let (wide, slim) = (row("one", cloth.positions()), row("two", &slim));
@@ -107,5 +124,25 @@ mod tests {
         // A lone drape has no label and stands beside the names.
         let alone = sheet(&[row("", cloth.positions())]);
         assert!(alone.height() < first.height());
+    }
+
+    #[test]
+    fn each_garment_alone_keeps_its_colour_and_shows_what_was_hidden() {
+        let mesh = shapes::icosphere(0.2, 2);
+        let scaled = |by: f64| mesh.positions().iter().map(|p| p.map(|x| by * x)).collect::<Vec<[f64; 3]>>();
+        let (inner, outer) = (scaled(1.1), scaled(1.2));
+        let row = DressedRow {
+            label: "both".into(),
+            body: (mesh.positions(), mesh.faces()),
+            heading: 0.0,
+            garments: vec![(&inner, mesh.faces()), (&outer, mesh.faces())],
+            innermost: 0,
+        };
+        let layers = row.layers(&["tee", "coat"]);
+        assert_eq!(layers.iter().map(|row| row.label.as_str()).collect::<Vec<_>>(), ["tee", "coat"]);
+        let middle = |row: &DressedRow<'_>| draw_view(row, View::Front).get_pixel(CELL[0] / 2, CELL[1] / 2).0;
+        let [both, tee, coat] = [&row, &layers[0], &layers[1]].map(middle);
+        let differ = |a: [u8; 3], b: [u8; 3]| a.iter().zip(b).any(|(a, b)| a.abs_diff(b) > 20);
+        assert!(!differ(both, coat) && differ(both, tee), "{both:?} {tee:?} {coat:?}");
     }
 }

@@ -219,6 +219,8 @@ fn a_posed_outfit_leaves_every_output_and_each_reads_back() {
     let picture = image::open(out.join("picture.png")).unwrap().to_rgb8();
     let ground = *picture.get_pixel(1, 1);
     assert!(picture.pixels().filter(|p| **p != ground).count() > 20_000);
+    let layers = image::open(out.join("layers.png")).unwrap();
+    assert!(layers.height() > picture.height() + 1000, "each of the three garments has a row");
     let page = fs::read_to_string(out.join("viewer.html")).unwrap();
     assert!(!page.contains("http:") && !page.contains("https:"), "the page loads nothing");
     assert!(page.contains(TEE) && page.len() > 200_000);

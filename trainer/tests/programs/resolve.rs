@@ -133,6 +133,8 @@ fn what_is_written_is_clear_and_has_the_topology_it_came_with() {
     // Before and after, three views each.
     let picture = image::open(case.path("out/picture.png")).unwrap();
     assert!(picture.width() > 900 && picture.height() > 1000, "{} x {}", picture.width(), picture.height());
+    let layers = image::open(case.path("out/layers.png")).unwrap();
+    assert_eq!((layers.width(), layers.height()), (picture.width(), picture.height()), "two garments");
     // The bottom and top rims lie off the ball, within reach of nothing: a second run changes nothing at all.
     case.command(&["out/tee.obj", "out/coat.obj"], &["-o", "again"]).assert().success();
     for name in ["tee.obj", "coat.obj"] {
@@ -218,7 +220,10 @@ fn a_body_that_is_inside_out_is_turned_and_names_are_told_apart() {
         .collect();
     files.sort();
     let meshes = ["tee-2.mtl", "tee-2.obj", "tee-3.obj", "tee.mtl", "tee.obj"];
-    assert_eq!(files, [[".clothcombo-files", "picture.png", "report.json"].as_slice(), &meshes].concat());
+    assert_eq!(
+        files,
+        [[".clothcombo-files", "layers.png", "picture.png", "report.json"].as_slice(), &meshes].concat()
+    );
 }
 
 #[test]

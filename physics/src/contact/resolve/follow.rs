@@ -54,7 +54,7 @@ pub struct Reached {
 /// garments are taken along from the stage at 0, the T-pose, to the stage at 1, on `body`; what `layers` differ by from the
 /// drape there is added along the way. Where that leaves crossings, they are taken once more with drapes that are taken back
 /// towards the skinned garments around them. Where crossings are left then and anything was laid out, all of it is tried with
-/// the drape as it is as well. What leaves the fewest is returned.
+/// the drape as it is as well. What leaves the fewest is taken, and folds that are left in it are laid out once more.
 ///
 /// # Errors
 /// Those of `stage_at` and of [`super::resolve`].
@@ -88,6 +88,8 @@ pub fn resolve_along<E: From<ResolveError>>(
     if is_laid_out && !resolved.certificate.is_clear() && !settings.is_late(start, layers.len()) {
         resolved = resolved.or_by(along(layers, &mut None)?, Certificate::defects);
     }
+    // What a drape as it came has of its folds, and what was folded on the way.
+    let is_laid_out = may_lay_out && resolved.lay_out(body, layers, skinned, settings, start) || is_laid_out;
     if is_laid_out && resolved.is_strained(layers) {
         // So far strain was measured from what was laid out.
         with_drawn(body, layers, |drawn| {

@@ -9,6 +9,7 @@ use super::obstacle::BodyObstacle;
 use super::outfit::Outfit;
 use super::relief::Room;
 use super::sides::Sides;
+use super::unfold::Folds;
 use super::{Layer, ResolveSettings, Untangled, at, resolved_once, untangled, untangled_keeping};
 use crate::query::Surface;
 use crate::vec3;
@@ -138,6 +139,33 @@ impl Resolved {
                 break;
             }
         }
+    }
+
+    /// Where nothing crosses but garments themselves, lays out what of them is folded, beside where they are `skinned`, and begins
+    /// once more from there. Returns whether that was better. `start`: when all of it began.
+    pub(super) fn lay_out(
+        &mut self,
+        body: &Surface<f64>,
+        layers: &[Layer<'_>],
+        skinned: &[Vec<[f64; 3]>],
+        settings: &ResolveSettings,
+        start: Instant,
+    ) -> bool {
+        let is_smooth = self.certificate.self_triangle_pairs <= FEW_OF_ITSELF;
+        if is_smooth || !self.certificate.is_clear() || settings.is_late(start, layers.len()) {
+            return false;
+        }
+        let now = at(layers, &self.positions);
+        let folds = Folds::of(body, &now, skinned);
+        if folds.is_empty() {
+            return false;
+        }
+        let mut found = resolved_once(body, &at(layers, &folds.laid_out(&now, skinned)), settings);
+        found.go_on(body, layers, settings, start);
+        self.add_work(&found);
+        let is_better = found.certificate.defects() < self.certificate.defects();
+        self.prefer(found.positions, found.certificate);
+        is_better
     }
 
     /// The better of two results for the same drape: the one with fewer [`Certificate::flaws`], of equal ones the one with fewer

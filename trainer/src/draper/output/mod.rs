@@ -5,6 +5,7 @@
 //! OUT/frames/00012/…                 the same for every frame of a motion, if asked for
 //! OUT/scene.glb                      body and garments as named, coloured meshes; a motion as morph targets
 //! OUT/picture.png                    front, back and three-quarter
+//! OUT/layers.png                     the same of each garment alone, where there is more than one
 //! OUT/viewer.html                    one page without any other file: orbit, layers, frames, heat maps
 //! OUT/report.json                    times, scores before and after the post-process, certificate
 //! ```
@@ -133,8 +134,15 @@ pub fn write(folder: &Path, show: &Show) -> Result<WriteTimes, OutputError> {
     }
     let meshes = || timed(|| write_meshes(folder, show));
     let scene = || timed(|| write_scene(&folder.join("scene.glb"), show));
-    let picture =
-        || timed(|| Ok(crate::picture::save_png(&picture::draw(show), &folder.join("picture.png"))?));
+    let picture = || {
+        timed(|| {
+            crate::picture::save_png(&picture::draw(show), &folder.join("picture.png"))?;
+            if show.outfit.pieces.len() > 1 {
+                crate::picture::save_png(&picture::draw_layers(show), &folder.join("layers.png"))?;
+            }
+            Ok(())
+        })
+    };
     let page = || timed(|| viewer::save(&folder.join("viewer.html"), show));
     let ((meshes, scene), (picture, page)) =
         rayon::join(|| rayon::join(meshes, scene), || rayon::join(picture, page));

@@ -1,4 +1,4 @@
-//! The picture of a drape; of a motion some frames, one below the other.
+//! The pictures of a drape: all garments, of a motion in some frames, one below the other; and each garment alone.
 
 use super::Show;
 use crate::picture::{DressedRow, draw_dressed};
@@ -18,6 +18,12 @@ pub(super) fn draw(show: &Show) -> RgbImage {
     draw_dressed(show.title, &names, &rows)
 }
 
+/// Each garment alone, in the first frame.
+pub(super) fn draw_layers(show: &Show) -> RgbImage {
+    let names: Vec<&str> = show.outfit.names().collect();
+    draw_dressed(show.title, &names, &row(show, 0).layers(&names))
+}
+
 fn row<'a>(show: &'a Show, frame: usize) -> DressedRow<'a> {
     let drape = &show.drapes[frame];
     let pieces = show.outfit.pieces.iter().zip(&drape.garments);
@@ -29,5 +35,6 @@ fn row<'a>(show: &'a Show, frame: usize) -> DressedRow<'a> {
         body: (&drape.body, &show.draper.body().faces),
         heading: drape.heading,
         garments: pieces.map(|(piece, g)| (&g.positions[..], piece.worn.garment.rest.faces())).collect(),
+        innermost: 0,
     }
 }

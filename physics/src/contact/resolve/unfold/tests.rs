@@ -1,6 +1,9 @@
 //! Sheets with folds.
 
-use super::super::RestGarment;
+use std::time::{Duration, Instant};
+
+use super::super::{ResolveSettings, Resolved, RestGarment, certify};
+use super::places::STRAINED;
 use super::*;
 use crate::mesh::{TriMesh, shapes};
 use crate::vec3::norm;
@@ -135,4 +138,26 @@ fn folds_of_two_poses_add_up() {
     assert!(both.0[0].len() > left.0[0].len().max(right.0[0].len()));
     assert!(left.0[0].iter().chain(&right.0[0]).all(|v| both.0[0].contains(v)));
     assert!(both.0[0].is_sorted_by(|a, b| a < b));
+}
+
+#[test]
+fn what_a_result_still_has_of_a_fold_is_laid_out_and_resolved() {
+    let mesh = sheet();
+    let garment = RestGarment::new(&mesh);
+    let (body, skinned, draped) = (elsewhere(), vec![mesh.positions().to_vec()], folded_sheet(&mesh));
+    let layers = [Layer { garment: &garment, positions: &draped }];
+    let certificate = certify(&body, &layers).unwrap();
+    let folded = Resolved { positions: vec![draped.clone()], certificate, ..Resolved::default() };
+    let lay_out = |resolved: &mut Resolved, settings: &ResolveSettings| {
+        resolved.lay_out(&body, &layers, &skinned, settings, Instant::now())
+    };
+    let late = ResolveSettings { time: Some(Duration::ZERO), ..ResolveSettings::default() };
+    let mut kept = folded.clone();
+    assert!(!lay_out(&mut kept, &late) && kept == folded);
+    let mut resolved = folded;
+    assert!(lay_out(&mut resolved, &ResolveSettings::default()));
+    assert_eq!(certify(&body, &at(&layers, &resolved.positions)).unwrap().pairs(), 0);
+    assert_eq!(resolved.certificate.pairs(), 0);
+    let flat = resolved.clone();
+    assert!(!lay_out(&mut resolved, &ResolveSettings::default()) && resolved == flat, "nothing is folded");
 }
