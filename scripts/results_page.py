@@ -9,17 +9,25 @@ What is written by hand stays: everything before the first table, and everything
 import pathlib
 import re
 import sys
+import textwrap
 
 from PIL import Image
 
 FIRST, LAST = "### Networks and skinning (Table 2)\n", "## Smoke training\n"
+WIDTH = 131
 DOCS = pathlib.Path(__file__).resolve().parent.parent / "docs"
 
 
 def body(report: str) -> str:
     """The report's sections, one level deeper."""
     sections = report[report.index(FIRST[1:]) :]
-    return re.sub(r"^(#+) ", r"#\1 ", sections, flags=re.MULTILINE)
+    deeper = re.sub(r"^(#+) ", r"#\1 ", sections, flags=re.MULTILINE)
+    return "\n".join(wrapped(line) for line in deeper.split("\n"))
+
+
+def wrapped(line: str) -> str:
+    """A paragraph in lines as long as those of the page; tables, headings and figures as they are."""
+    return line if re.match(r"[|#!*]|$", line) else textwrap.fill(line, WIDTH, break_long_words=False)
 
 
 def main() -> None:
