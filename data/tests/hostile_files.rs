@@ -187,6 +187,7 @@ fn simulated_samples() {
         binding: BindingSettings { smooth: false, ..BindingSettings::default() },
         thinning: Thinning { frame_rate: 30.0, static_threshold: 0.0 },
         caches: true,
+        ..Cloth3dSettings::default()
     };
     // A sample travels as one blob: the number of the damaged file, then its bytes.
     let seeds: Vec<Vec<u8>> =

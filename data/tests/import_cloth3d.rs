@@ -23,6 +23,7 @@ fn import(inputs: &[PathBuf], female: &Body, out: &Path, smooth: bool) -> Result
         binding: BindingSettings { smooth, ..BindingSettings::default() },
         thinning: Thinning { frame_rate: 30.0, static_threshold: 0.0 },
         caches: true,
+        ..Cloth3dSettings::default()
     };
     import_cloth3d(inputs, &bodies, out, &settings, &mut no_progress())
 }
@@ -157,6 +158,21 @@ fn numbers(value: Option<&MatValue>) -> (&[usize], &[f64]) {
         Some(MatValue::Numbers(array)) => (&array.shape, &array.data),
         other => panic!("{other:?}"),
     }
+}
+
+#[test]
+fn nothing_is_written_beside_a_body() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join("motions")).unwrap();
+    let file = folder.path().join("motions/00001.npz");
+    fs::copy(fixture("cloth3d_bodies/body_neutral.npz"), &file).unwrap();
+    let neutral = Body::load(&file, &BodyFileSettings::default()).unwrap();
+    let bodies = Cloth3dBodies { target: &neutral, female: None, male: None };
+    let settings = Cloth3dSettings { body_files: vec![file.clone()], ..Cloth3dSettings::default() };
+    let result = import_cloth3d(&[fixture("cloth3d")], &bodies, folder.path(), &settings, &mut no_progress());
+    let message = result.unwrap_err().to_string();
+    assert!(message.contains("motions would be written over the input"), "{message}");
+    assert_eq!(fs::read(&file).unwrap(), fs::read(fixture("cloth3d_bodies/body_neutral.npz")).unwrap());
 }
 
 #[test]

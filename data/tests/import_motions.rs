@@ -138,6 +138,19 @@ fn motions_are_not_written_over_themselves() {
 }
 
 #[test]
+fn no_motion_takes_the_place_of_the_body() {
+    let folder = tempfile::tempdir().unwrap();
+    let body_file = folder.path().join("humanoid3d_random.npz");
+    fs::write(&body_file, "the only copy").unwrap();
+    let settings = DeepMimicSettings { body_file: Some(body_file.clone()), ..DeepMimicSettings::default() };
+    let clip = [fixture("deepmimic/humanoid3d_random.txt")];
+    let result = import_deepmimic(&clip, &mannequin(), folder.path(), &settings, &mut no_progress());
+    let message = result.unwrap_err().to_string();
+    assert!(message.contains("humanoid3d_random.npz would be written over the input"), "{message}");
+    assert_eq!(fs::read(&body_file).unwrap(), b"the only copy");
+}
+
+#[test]
 fn rates_that_no_motion_may_have_are_not_written() {
     let folder = tempfile::tempdir().unwrap();
     // 60 frames/s, of which every millionth frame is asked for.

@@ -81,7 +81,8 @@ pub fn import_amass(
         return Err(MotionImportError::NoInput { where_, expected: EXPECTED });
     }
     let files = named(files.into_iter().map(|f| (f.path, f.name)));
-    let mut summary = write_motions(&files, out, EXPECTED, &|file| import_file(file, settings), progress)?;
+    let import = |file: &Path| import_file(file, settings);
+    let mut summary = write_motions(&files, None, out, EXPECTED, &import, progress)?;
     summary.notes.push(format!(
         "kept are the root and the 21 body joints; {}; a frame that differs from the last one kept by less than {:.2}° in \
          every joint is dropped",

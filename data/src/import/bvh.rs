@@ -19,11 +19,13 @@ pub struct BvhImportSettings {
     /// Drop a first frame that jumps to the second one by more than this angle [rad] and by more than ten times the usual
     /// step: some collections insert a T-pose there.
     pub inserted_frame_angle: f64,
+    /// The file that the body came from, which no motion may take the place of.
+    pub body_file: Option<PathBuf>,
 }
 
 impl Default for BvhImportSettings {
     fn default() -> Self {
-        Self { frame_rate: 60.0, inserted_frame_angle: 0.2 }
+        Self { frame_rate: 60.0, inserted_frame_angle: 0.2, body_file: None }
     }
 }
 
@@ -129,7 +131,8 @@ pub fn import_bvh(
     }
     require_body_joints(body)?;
     let inputs = named(files.iter().map(|f| (f.clone(), stem(f))));
-    write_motions(&inputs, out, EXPECTED, &|file| import_file(file, body, settings), progress)
+    let import = |file: &Path| import_file(file, body, settings);
+    write_motions(&inputs, settings.body_file.as_deref(), out, EXPECTED, &import, progress)
 }
 
 fn import_file(file: &Path, body: &Body, settings: &BvhImportSettings) -> Result<Clip, String> {

@@ -23,12 +23,14 @@ pub struct DeepMimicSettings {
     pub thinning: Thinning,
     /// Where the clips come from; the text itself does not say.
     pub provenance: Provenance,
+    /// The file that the body came from, which no motion may take the place of.
+    pub body_file: Option<PathBuf>,
 }
 
 impl Default for DeepMimicSettings {
     fn default() -> Self {
         let provenance = Provenance { source: "DeepMimic motion text".into(), ..Provenance::default() };
-        Self { thinning: Thinning { frame_rate: 60.0, static_threshold: 0.0 }, provenance }
+        Self { thinning: Thinning { frame_rate: 60.0, static_threshold: 0.0 }, provenance, body_file: None }
     }
 }
 
@@ -194,7 +196,7 @@ pub fn import_deepmimic(
         let motion = Motion { name: String::new(), frame_rate, poses, source };
         Ok(Clip { motion, subject: String::new(), note })
     };
-    write_motions(&inputs, out, EXPECTED, &import, progress)
+    write_motions(&inputs, settings.body_file.as_deref(), out, EXPECTED, &import, progress)
 }
 
 #[cfg(test)]

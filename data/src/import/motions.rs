@@ -147,9 +147,10 @@ pub(super) fn stem(path: &Path) -> String {
 }
 
 /// Imports each file with `import`, several at a time; writes the clips to `out` and records them in its manifest. What cannot
-/// be used is skipped with its reason.
+/// be used is skipped with its reason. Nothing is written over an input, nor over `body_file`.
 pub(super) fn write_motions(
     inputs: &[Input],
+    body_file: Option<&Path>,
     out: &Path,
     expected: &'static str,
     import: &(dyn Fn(&Path) -> Result<Clip, String> + Sync),
@@ -157,7 +158,7 @@ pub(super) fn write_motions(
 ) -> Result<Summary, MotionImportError> {
     let written = |name: &str| out.join(format!("{name}.npz"));
     let outputs = inputs.iter().map(|input| written(&input.name)).chain([out.join(MANIFEST)]);
-    refuse_overwriting(inputs.iter().map(|input| &input.path), outputs)?;
+    refuse_overwriting(inputs.iter().map(|input| input.path.as_path()).chain(body_file), outputs)?;
     let mut summary = Summary::default();
     let mut manifest = read_manifest(out)?;
     let (mut done, mut frames, mut seconds) = (0, 0, 0.0);

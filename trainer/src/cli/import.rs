@@ -228,7 +228,11 @@ pub fn run(source: &Source) -> Result<(), Report> {
         }
         Source::Bvh(a) => {
             let body = load_body(&a.body, 0)?;
-            let settings = BvhImportSettings { frame_rate: a.frame_rate, ..BvhImportSettings::default() };
+            let settings = BvhImportSettings {
+                frame_rate: a.frame_rate,
+                body_file: Some(PathBuf::from(&a.body)),
+                ..BvhImportSettings::default()
+            };
             import_bvh(&a.files, &body, &a.output, &settings, &mut progress).into_diagnostic()?
         }
         Source::Smplx(a) => {
@@ -254,6 +258,11 @@ pub fn run(source: &Source) -> Result<(), Report> {
             let settings = Cloth3dSettings {
                 thinning: a.thinning.thinning(),
                 caches: a.caches,
+                body_files: [Some(&a.body), a.female.as_ref(), a.male.as_ref()]
+                    .into_iter()
+                    .flatten()
+                    .map(PathBuf::from)
+                    .collect(),
                 ..Cloth3dSettings::default()
             };
             import_cloth3d(&a.samples, &bodies, &a.output, &settings, &mut progress).into_diagnostic()?
@@ -262,7 +271,8 @@ pub fn run(source: &Source) -> Result<(), Report> {
             let body = load_body(&a.body, 0)?;
             let provenance =
                 Provenance { source: a.source.clone(), author: a.author.clone(), licence: a.licence.clone() };
-            let settings = DeepMimicSettings { thinning: a.thinning.thinning(), provenance };
+            let body_file = Some(PathBuf::from(&a.body));
+            let settings = DeepMimicSettings { thinning: a.thinning.thinning(), provenance, body_file };
             import_deepmimic(&a.files, &body, &a.output, &settings, &mut progress).into_diagnostic()?
         }
     };

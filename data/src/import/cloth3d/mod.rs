@@ -98,12 +98,14 @@ pub struct Cloth3dSettings {
     pub thinning: Thinning,
     /// Convert the point caches as well.
     pub caches: bool,
+    /// The files that the bodies came from: folders with one of them are not written to.
+    pub body_files: Vec<PathBuf>,
 }
 
 impl Default for Cloth3dSettings {
     fn default() -> Self {
         let thinning = Thinning { frame_rate: FRAME_RATE, static_threshold: 0.5f64.to_radians() };
-        Self { binding: BindingSettings::default(), thinning, caches: false }
+        Self { binding: BindingSettings::default(), thinning, caches: false, body_files: Vec::new() }
     }
 }
 
@@ -142,7 +144,8 @@ pub fn import_cloth3d(
     }
     // Inputs lie in the samples' folders, results in these: none meet unless the folders do.
     let outputs = ["garments", "motions", "sequences"].map(|folder| out.join(folder));
-    refuse_overwriting(samples.iter().map(|sample| &sample.folder), outputs)?;
+    let of_bodies = settings.body_files.iter().filter_map(|file| file.parent());
+    refuse_overwriting(samples.iter().map(|sample| sample.folder.as_path()).chain(of_bodies), outputs)?;
     let mut summary = Summary { notes: assumptions(bodies), ..Summary::default() };
     let surface = Surface::new(target.template.clone(), target.faces.clone());
     let (mut garments, mut entries) = (Vec::new(), Vec::new());
@@ -164,7 +167,7 @@ pub fn import_cloth3d(
         .map(|s| Input { path: s.folder.join("info.mat"), name: s.name.clone() })
         .collect();
     let import = |path: &Path| motion(path, settings);
-    let motions = write_motions(&clips, &out.join("motions"), "info.mat files", &import, progress)?;
+    let motions = write_motions(&clips, None, &out.join("motions"), "info.mat files", &import, progress)?;
     summary.taken.extend(motions.taken.into_iter().map(|(name, note)| (format!("motion {name}"), note)));
     summary.skipped.extend(motions.skipped);
     summary.notes.extend(motions.notes);
