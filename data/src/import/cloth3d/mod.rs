@@ -144,8 +144,10 @@ pub fn import_cloth3d(
     }
     // Inputs lie in the samples' folders, results in these: none meet unless the folders do.
     let outputs = ["garments", "motions", "sequences"].map(|folder| out.join(folder));
-    let of_bodies = settings.body_files.iter().filter_map(|file| file.parent());
-    refuse_overwriting(samples.iter().map(|sample| sample.folder.as_path()).chain(of_bodies), outputs)?;
+    // A file that is named without its folder lies in one, too.
+    let folder = |file: &PathBuf| fs::canonicalize(file).ok()?.parent().map(Path::to_path_buf);
+    let of_bodies = settings.body_files.iter().filter_map(folder);
+    refuse_overwriting(samples.iter().map(|sample| sample.folder.clone()).chain(of_bodies), outputs)?;
     let mut summary = Summary { notes: assumptions(bodies), ..Summary::default() };
     let surface = Surface::new(target.template.clone(), target.faces.clone());
     let (mut garments, mut entries) = (Vec::new(), Vec::new());

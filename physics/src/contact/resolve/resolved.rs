@@ -163,9 +163,7 @@ impl Resolved {
         let mut found = resolved_once(body, &at(layers, &folds.laid_out(&now, skinned)), settings);
         found.go_on(body, layers, settings, start);
         self.add_work(&found);
-        let is_better = found.certificate.defects() < self.certificate.defects();
-        self.prefer(found.positions, found.certificate);
-        is_better
+        self.prefer(found.positions, found.certificate)
     }
 
     /// The better of two results for the same drape: the one with fewer [`Certificate::flaws`], of equal ones the one with fewer
@@ -197,11 +195,13 @@ impl Resolved {
         self.certificate_time += attempt.certificate_time;
     }
 
-    /// Takes another state of the garments if it is better.
-    pub(super) fn prefer(&mut self, positions: Vec<Vec<[f64; 3]>>, certificate: Certificate) {
-        if certificate.defects() < self.certificate.defects() {
+    /// Takes another state of the garments if it is better; whether it is.
+    pub(super) fn prefer(&mut self, positions: Vec<Vec<[f64; 3]>>, certificate: Certificate) -> bool {
+        let is_better = certificate.defects() < self.certificate.defects();
+        if is_better {
             (self.positions, self.certificate) = (positions, certificate);
         }
+        is_better
     }
 
     /// [`compare`](Self::compare) for work that began at `start`, without the time for the body and for certificates.

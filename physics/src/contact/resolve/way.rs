@@ -121,7 +121,9 @@ impl Way<'_, '_> {
                 (best.positions, best.certificate) = (along.positions, along.certificate);
             }
             true => (),
-            false => best.prefer(along.positions, along.certificate),
+            false => {
+                best.prefer(along.positions, along.certificate);
+            }
         }
         Ok(())
     }
