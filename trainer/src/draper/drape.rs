@@ -11,7 +11,7 @@ use std::sync::Arc;
 pub struct GarmentDrape {
     /// Linear blend skinning of the start state, which has learned nothing `[V, 3]` [m].
     pub skinned: Vec<[f64; 3]>,
-    /// What the networks made of it `[V, 3]` [m].
+    /// What the networks made of it, in a motion averaged over frames if that was asked for `[V, 3]` [m].
     pub network: Vec<[f64; 3]>,
     /// What came to the post-process: of the networks, or refined `[V, 3]` [m].
     pub before: Vec<[f64; 3]>,
@@ -85,8 +85,7 @@ impl Drape {
         let after: Vec<&[[f64; 3]]> = self.garments.iter().map(|g| g.positions.as_slice()).collect();
         let certified = certify(&self.surface(draper), &outfit.layers(&after));
         let mut certificate = certified.map_err(|error| outfit.named(error.into()))?;
-        let layers = outfit.layers(&before);
-        certificate.compare_strain(layers.iter().map(|l| l.garment.strain_energy(l.positions)).sum());
+        certificate.compare_strain(&outfit.layers(&before));
         self.certificate = certificate;
         Ok(())
     }

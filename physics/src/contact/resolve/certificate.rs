@@ -2,16 +2,10 @@
 
 use std::collections::HashSet;
 
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::body::{with_body, with_drawn};
-use super::layer_obstacle::{LayerObstacle, facing};
+use super::Layer;
 use super::obstacle::BodyObstacle;
-use super::{Layer, ResolveError, ResolveSettings};
-use crate::contact::triangle_pair::Triangle;
-use crate::contact::{TriangleTree, contours, self_contours};
-use crate::query::Surface;
 
 /// Proof of the state of dressed garments: every number comes from exact predicates over all pairs of triangles, or (depths)
 /// from the closest surface point of every vertex.
@@ -37,7 +31,8 @@ pub struct Certificate {
     pub mean_depth_mm: f64,
     /// Vertices inside the body.
     pub vertices_inside: usize,
-    /// Share of the vertices over or under an inner garment that lie under it, 0–1, by the closest point of its surface.
+    /// Share of the vertices over or under an inner garment that lie under it, 0–1, by the closest point of its surface; a vertex
+    /// counts once for each inner garment.
     pub order_violations: f64,
     /// Rise of the strain energy by the post-process, as a share of the energy before; `None` where there was none before, or
     /// nothing was done.
@@ -188,134 +183,19 @@ impl Certificate {
         self.narrow_triangle_pairs = self.remaining.iter().filter(is_narrow).count();
     }
 
-    /// Notes the strain energy before the post-process [J].
-    pub fn compare_strain(&mut self, before: f64) {
-        let after = self.strain_joule();
+    /// Notes by how much the strain energy has risen from that of the garments as they were `before` the post-process.
+    pub fn compare_strain(&mut self, before: &[Layer<'_>]) {
+        let (before, after) = (strain_joule(before), self.strain_joule());
         self.strain_added = (before > NO_STRAIN).then(|| after / before - 1.0);
     }
 }
 
-/// Counts what crosses what. `layers` from the body outwards. The same for any number of threads.
-///
-/// # Errors
-/// When positions do not fit their garment or are not finite, or the body has no surface.
-pub fn certify(body: &Surface<f64>, layers: &[Layer<'_>]) -> Result<Certificate, ResolveError> {
-    super::check(body, layers)?;
-    Ok(with_drawn(body, layers, |drawn| {
-        let mut found = certificate(&drawn, layers);
-        if found.body_triangle_pairs > 0 {
-            with_body(drawn, layers.len(), |body| found.count_narrow(&body.drawn));
-        }
-        found
-    }))
+/// Strain energy of all garments [J].
+pub(super) fn strain_joule(layers: &[Layer<'_>]) -> f64 {
+    layers.iter().map(|l| l.garment.strain_energy(l.positions)).sum()
 }
 
 /// Less strain energy than this [J] is rounding of a garment in its rest shape.
 const NO_STRAIN: f64 = 1e-9;
 /// A rise of the strain energy, as a share, from which cloth is torn.
 const TEAR: f64 = 0.5;
-
-/// The distance up to which a vertex counts as over or under an inner garment [m].
-fn order_reach() -> f64 {
-    ResolveSettings::default().reach
-}
-
-pub(super) fn certificate(body: &BodyObstacle<'_>, layers: &[Layer<'_>]) -> Certificate {
-    let mut found = Certificate::default();
-    let mut depths: Vec<f64> = Vec::new();
-    let (mut judged, mut wrong) = (0, 0);
-    let mut inner: Vec<LayerObstacle> = Vec::new();
-    for (index, layer) in layers.iter().enumerate() {
-        let Layer { garment, positions } = *layer;
-        let tree = TriangleTree::new(positions, &garment.faces);
-        let mut own =
-            GarmentCertificate { strain_joule: garment.strain_energy(positions), ..Default::default() };
-
-        let views: Vec<_> = positions.par_iter().with_min_len(128).map(|p| body.look(*p)).collect();
-        let body_planes = views.iter().filter_map(|view| view.and_then(|v| v.plane));
-        let inside = body_planes.filter(|p| p.distance < 0.0).map(|p| -p.distance);
-        let before = depths.len();
-        depths.extend(inside);
-        found.vertices_inside += depths.len() - before;
-
-        let pairs = tree.pairs_with(&body.tree);
-        let (pinched, pairs): (Vec<_>, Vec<_>) = pairs.into_iter().partition(|&(_, b)| body.is_pinched(b));
-        own.body_triangle_pairs = pairs.len();
-        found.pinched.body_triangle_pairs += pinched.len();
-        found.contour_length_mm += length_mm(&contours(&tree, &body.tree, &pairs));
-        found.list(index, Crossed::Body, &pairs, false);
-        found.list(index, Crossed::Body, &pinched, true);
-
-        let is_pinched = |t: Option<Triangle>| t.is_some_and(|t| body.is_pinch_at(&t));
-        for (i, under) in inner.iter().enumerate() {
-            let all = tree.pairs_with(&under.tree);
-            let (pinched, pairs): (Vec<_>, Vec<_>) = all
-                .into_iter()
-                .partition(|&(f, g)| is_pinched(tree.triangle(f)) && is_pinched(under.tree.triangle(g)));
-            own.layer_triangle_pairs += pairs.len();
-            found.pinched.layer_triangle_pairs += pinched.len();
-            found.contour_length_mm += length_mm(&contours(&tree, &under.tree, &pairs));
-            found.list(index, Crossed::Layer(i), &pairs, false);
-            found.list(index, Crossed::Layer(i), &pinched, true);
-            let order: Vec<f64> = positions
-                .par_iter()
-                .with_min_len(128)
-                .filter_map(|p| under.look(*p, order_reach(), 0.0).map(|plane| plane.distance))
-                .collect();
-            let before = depths.len();
-            depths.extend(order.iter().filter(|d| **d < 0.0).map(|d| -d));
-            let below = depths.len() - before;
-            found.layers.push(LayerCertificate {
-                inner: i,
-                outer: index,
-                triangle_pairs: pairs.len(),
-                order_violations: below as f64 / order.len().max(1) as f64,
-            });
-            judged += order.len();
-            wrong += below;
-        }
-
-        let all = tree.self_pairs();
-        let (pinched, pairs): (Vec<_>, Vec<_>) =
-            all.into_iter().partition(|&(f, g)| is_pinched(tree.triangle(f)) && is_pinched(tree.triangle(g)));
-        own.self_triangle_pairs = pairs.len();
-        found.pinched.self_triangle_pairs += pinched.len();
-        found.contour_length_mm += length_mm(&self_contours(&tree, &pairs));
-        found.list(index, Crossed::Itself, &pairs, false);
-        found.list(index, Crossed::Itself, &pinched, true);
-
-        found.body_triangle_pairs += own.body_triangle_pairs;
-        found.layer_triangle_pairs += own.layer_triangle_pairs;
-        found.self_triangle_pairs += own.self_triangle_pairs;
-        found.garments.push(own);
-        if index + 1 < layers.len() {
-            let outward = |v: usize| -> [f64; 3] {
-                views[v].and_then(|view| view.plane).map_or([0.0; 3], |plane| plane.normal)
-            };
-            let facing = facing(garment, positions, outward);
-            inner.push(LayerObstacle::new(garment, tree, facing));
-        }
-    }
-    found.max_depth_mm = 1e3 * depths.iter().fold(0.0, |a: f64, b| a.max(*b));
-    // The sum of none is −0.
-    found.mean_depth_mm = 1e3 * depths.iter().fold(0.0, |sum, d| sum + d) / depths.len().max(1) as f64;
-    found.order_violations = wrong as f64 / judged.max(1) as f64;
-    found.count_narrow(body);
-    found
-}
-
-impl Certificate {
-    fn list(&mut self, garment: usize, crosses: Crossed, pairs: &[(u32, u32)], is_pinched: bool) {
-        self.remaining.extend(pairs.iter().map(|&(f, g)| RemainingPair {
-            garment,
-            triangle: f as usize,
-            crosses,
-            other_triangle: g as usize,
-            is_pinched,
-        }));
-    }
-}
-
-fn length_mm(contours: &[crate::contact::Contour]) -> f64 {
-    1e3 * contours.iter().map(|c| c.length).sum::<f64>()
-}

@@ -2,12 +2,14 @@
 //!
 //! Taking garments out of the body and of each other keeps the lengths of edges only as far as contacts allow, and what one
 //! round needs the next may not. Where the strain energy has risen in the end, edges are taken back towards their rest lengths
-//! by small moves, the contacts are met again, and the outcome is kept if nothing crosses that did not before and the
-//! energy is lower.
+//! by small moves, the contacts are met again, and the outcome is kept if no more pairs cross than before (of garments with
+//! themselves a few more may) and the energy is lower.
 
 use std::time::Instant;
 
 use super::body::Body;
+use super::certificate::strain_joule;
+use super::obstacle::BodyObstacle;
 use super::outfit::Outfit;
 use super::relax::{keep_length, no_farther};
 use super::relief::Room;
@@ -68,7 +70,7 @@ impl Resolved {
         }
         let settings = ResolveSettings { is_shallow: true, loosened: 1.0, rounds: ROUNDS, ..*settings };
         let times = if self.certificate.is_clear() { times } else { times.min(TIMES_WHERE_CROSSED) };
-        let own = self.certificate.self_triangle_pairs.max(own_crossings(layers) / OWN);
+        let own = self.certificate.self_triangle_pairs.max(own_crossings(layers, &body.drawn) / OWN);
         let mut cloth = Cloth::new(layers, &self.positions);
         let mut failures = 0;
         body.with_room(Room::AMPLE.with_share(0.0), |obstacle| {
@@ -104,14 +106,14 @@ impl Resolved {
     }
 }
 
-/// Strain energy of all garments [J].
-fn strain_joule(layers: &[Layer<'_>]) -> f64 {
-    layers.iter().map(|l| l.garment.strain_energy(l.positions)).sum()
-}
-
-/// Pairs of triangles of one garment that cross, of all garments.
-fn own_crossings(layers: &[Layer<'_>]) -> usize {
-    let of_garment = |layer: &Layer<'_>| self_triangle_pairs(layer.positions, layer.garment.faces()).len();
+/// Pairs of triangles of one garment that cross, of all garments, without pinched ones.
+fn own_crossings(layers: &[Layer<'_>], body: &BodyObstacle<'_>) -> usize {
+    let of_garment = |layer: &Layer<'_>| {
+        let faces = layer.garment.faces();
+        let is_pinched = |f: u32| body.is_pinch_at(&faces[f as usize].map(|v| layer.positions[v as usize]));
+        let all = self_triangle_pairs(layer.positions, faces);
+        all.into_iter().filter(|&(f, g)| !(is_pinched(f) && is_pinched(g))).count()
+    };
     layers.iter().map(of_garment).sum()
 }
 

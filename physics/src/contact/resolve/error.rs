@@ -30,6 +30,17 @@ pub enum ResolveError {
         found: usize,
     },
 
+    /// Skinning transforms of other garments.
+    #[error(
+        "the garments have {expected} vertices, but there are {found} skinning transforms; hint: give one for each vertex, garment after garment"
+    )]
+    Transforms {
+        /// Vertices of all garments.
+        expected: usize,
+        /// Transforms given.
+        found: usize,
+    },
+
     /// A position is NaN, infinite or kilometres away.
     #[error(
         "garment {garment}, vertex {vertex} is at [{}, {}, {}]; hint: positions are finite, in metres, within a kilometre of the origin",
@@ -45,6 +56,8 @@ pub enum ResolveError {
     },
 
     /// The body has nothing to keep a distance from.
-    #[error("the body has no triangle with finite corners; hint: check the body's mesh")]
+    #[error(
+        "the body has no triangle within a kilometre of the origin; hint: check its mesh, which is in metres"
+    )]
     EmptyBody,
 }

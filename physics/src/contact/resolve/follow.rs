@@ -22,7 +22,7 @@ use crate::query::Surface;
 use crate::transform::Transform;
 
 /// A rise of the strain energy, as a share, that is only accepted where the way leaves crossings.
-const TORN: f64 = 0.25;
+const STRAINED: f64 = 0.25;
 
 /// What is somewhere along the way.
 #[derive(Clone)]
@@ -54,7 +54,8 @@ pub struct Reached {
 /// garments are taken along from the stage at 0, the T-pose, to the stage at 1, on `body`; what `layers` differ by from the
 /// drape there is added along the way. Where that leaves crossings, they are taken once more with drapes that are taken back
 /// towards the skinned garments around them. Where crossings are left then and anything was laid out, all of it is tried with
-/// the drape as it is as well. What leaves the fewest is taken, and folds that are left in it are laid out once more.
+/// the drape as it is as well. What leaves the fewest is taken; a few crossings that are left in it are tried with other gaps,
+/// and folds that are left are laid out once more.
 ///
 /// # Errors
 /// Those of `stage_at` and of [`super::resolve`].
@@ -88,6 +89,7 @@ pub fn resolve_along<E: From<ResolveError>>(
     if is_laid_out && !resolved.certificate.is_clear() && !settings.is_late(start, layers.len()) {
         resolved = resolved.or_by(along(layers, &mut None)?, Certificate::defects);
     }
+    let is_laid_out = may_lay_out && resolved.mend_last(body, layers, settings, start) || is_laid_out;
     // What a drape as it came has of its folds, and what was folded on the way.
     let is_laid_out = may_lay_out && resolved.lay_out(body, layers, skinned, settings, start) || is_laid_out;
     if is_laid_out && resolved.is_strained(layers) {
@@ -111,8 +113,9 @@ fn taken_along<E: From<ResolveError>>(
     stage_at: &mut impl FnMut(f64) -> Result<Waypoint, E>,
 ) -> Result<Resolved, E> {
     resolved_further(body, layers, settings, start, |room, mut best| {
-        let is_torn = best.certificate.strain_added.is_some_and(|added| added > TORN);
-        if best.certificate.is_clear() && !is_torn || settings.steps == 0 {
+        let is_late = || settings.is_late(start, layers.len());
+        let is_strained = best.certificate.strain_added.is_some_and(|added| added > STRAINED);
+        if best.certificate.is_clear() && !is_strained || settings.steps == 0 || is_late() {
             return Ok(best);
         }
         let way = Way { layers, end: room, settings, start, strides: Strides::FROM_T_POSE };
@@ -127,15 +130,15 @@ fn taken_along<E: From<ResolveError>>(
         };
         let t_pose = laid_out(t_pose);
         let mut stage_at = |share: f64| stage_at(share).map(laid_out);
-        way.improve(&mut best, body, t_pose.clone(), &mut stage_at)?;
+        way.improve(&mut best, t_pose.clone(), &mut stage_at)?;
         // Where most of what crosses is pinched it is the body, not the drape, that leaves no way out.
-        if best.certificate.between() > best.certificate.pinched.count() {
+        if best.certificate.between() > best.certificate.pinched.count() && !is_late() {
             let shares = shares(&best.certificate, layers, &t_pose.draped);
             let nearer = taken_back(t_pose.clone(), &shares);
             if nearer.draped != t_pose.draped {
                 let way = Way { strides: Strides::TAKEN_BACK, ..way };
                 let nearer_at = |at: f64| stage_at(at).map(|stage| taken_back(stage, &shares));
-                way.improve(&mut best, body, nearer, nearer_at)?;
+                way.improve(&mut best, nearer, nearer_at)?;
             }
         }
         Ok(best)
@@ -157,13 +160,14 @@ pub fn resolve_after<E: From<ResolveError>>(
     let start = Instant::now();
     settings.check()?;
     check(body, layers)?;
+    check_transforms(&before.transforms, layers)?;
     let carry_on = |body: &Body<'_>| {
         let body_time = start.elapsed();
         let strides = if before.crossings == 0 { Strides::OF_FRAME } else { Strides::OF_CROSSED_FRAME };
         let way = Way { layers, end: body, settings, start, strides };
         let (followed, steps) = way.follow(before, |share| Ok::<_, E>(checked(stage_at(share)?, layers)?))?;
         let Some(found) = followed else { return Ok(None) };
-        let mut resolved = settled(body, layers, found, settings, strides.room);
+        let mut resolved = settled(body, layers, found, settings, strides.room, start);
         resolved.body_time = body_time;
         resolved.go_on(body.drawn.surface, layers, settings, start);
         resolved.ease(body, layers, settings, start, TIMES_IN_FRAME);
@@ -183,7 +187,14 @@ fn checked(stage: Waypoint, layers: &[Layer<'_>]) -> Result<Waypoint, ResolveErr
     for positions in [&stage.draped, &stage.skinned] {
         check(&stage.body, &placed(layers, positions)?)?;
     }
+    check_transforms(&stage.transforms, layers)?;
     Ok(stage)
+}
+
+fn check_transforms(transforms: &[Transform], layers: &[Layer<'_>]) -> Result<(), ResolveError> {
+    let expected = layers.iter().map(|layer| layer.garment.vertex_count()).sum();
+    let found = transforms.len();
+    if expected == found { Ok(()) } else { Err(ResolveError::Transforms { expected, found }) }
 }
 
 #[cfg(test)]

@@ -65,6 +65,9 @@ impl RestGarment {
     }
 
     /// Strain energy at `positions` `[V, 3]` [J], of the default material.
+    ///
+    /// # Panics
+    /// When there are fewer positions than vertices.
     pub fn strain_energy(&self, positions: &[[f64; 3]]) -> f64 {
         self.strain.evaluate(positions, None)
     }

@@ -12,7 +12,7 @@
 //! 3. **Folds.** Sheets of one garment that cross and have no such order are parted by what most of their vertices say
 //!    ([`folds`]), crumples are smoothed.
 //! 4. **Relaxation.** Vertices on the wrong side and their neighbourhood move by a displacement from the input that is smooth,
-//!    keeps edge lengths, and meets all conditions as far as no edge is stretched more than allowed ([`relax`]); everything
+//!    aims at the edge lengths there were, and meets all conditions as far as vertices may move ([`relax`]); everything
 //!    else keeps its position to the bit. Conditions of a crossing are kept for good. Repeated until no pair is left or
 //!    nothing gets better; the best state is taken.
 //! 5. **Certificate.** All pairs are counted again, from nothing, by the exact predicates.
@@ -21,7 +21,7 @@
 //! hardly any cloth fits between two parts, the body gives way ([`relief`]) where crossings are left otherwise; in the
 //! end garments are brought out of it again where they can.
 //!
-//! **Once more.** Where few crossings are left, what was reached is resolved like a new drape.
+//! **Once more.** Where few crossings are left, what was reached is resolved like a new drape, in the end with other gaps.
 //!
 //! **Easing.** Where the strain energy has risen, cloth gives back what it can without crossing anything ([`ease`]).
 //!
@@ -35,13 +35,14 @@
 mod body;
 mod certificate;
 mod contact;
+mod count;
 mod detect;
 mod ease;
 mod error;
 mod folds;
 mod follow;
 mod garment;
-mod layer_obstacle;
+mod inner_garment;
 mod near;
 mod obstacle;
 mod outfit;
@@ -63,8 +64,9 @@ mod way;
 use std::time::{Duration, Instant};
 
 pub use certificate::{
-    Certificate, Crossed, GarmentCertificate, LayerCertificate, PinchedPairs, RemainingPair, certify,
+    Certificate, Crossed, GarmentCertificate, LayerCertificate, PinchedPairs, RemainingPair,
 };
+pub use count::certify;
 pub use error::ResolveError;
 pub use follow::{Reached, Waypoint, resolve_after, resolve_along};
 pub use garment::{Layer, RestGarment};
@@ -119,7 +121,7 @@ fn resolved_further<E>(
         }
         let relieving = Instant::now();
         with_body(drawn, layers.len(), |room| {
-            let mut found = resolved(room, layers, settings, simple, relieving);
+            let mut found = resolved(room, layers, settings, simple, (start, relieving));
             found.go_on(body, layers, settings, start);
             found.compare_since(layers, start);
             let mut found = further(room, found)?;
@@ -130,8 +132,13 @@ fn resolved_further<E>(
     })
 }
 
-/// [`resolve`] without what follows the first attempts.
-fn resolved_once(body: &Surface<f64>, layers: &[Layer<'_>], settings: &ResolveSettings) -> Resolved {
+/// [`resolve`] without what follows the first attempts; all of it began at `start`.
+fn resolved_once(
+    body: &Surface<f64>,
+    layers: &[Layer<'_>],
+    settings: &ResolveSettings,
+    start: Instant,
+) -> Resolved {
     let preparing = Instant::now();
     with_drawn(body, layers, |drawn| {
         let simple = simply_resolved(&drawn, layers, settings, preparing);
@@ -139,7 +146,7 @@ fn resolved_once(body: &Surface<f64>, layers: &[Layer<'_>], settings: &ResolveSe
             return simple;
         }
         let relieving = Instant::now();
-        with_body(drawn, layers.len(), |body| resolved(body, layers, settings, simple, relieving))
+        with_body(drawn, layers.len(), |body| resolved(body, layers, settings, simple, (start, relieving)))
     })
 }
 
@@ -160,27 +167,30 @@ fn simply_resolved(
     resolved
 }
 
-/// [`resolve`] on a body that gives way, prepared since `start`; `simple` is what was reached before it did, and stays where it
-/// is better.
+/// [`resolve`] on a body that gives way, prepared since `relieving`; `simple` is what was reached before it did, and stays where
+/// it is better, or where all that began at `start` has had its time.
 fn resolved(
     body: &Body<'_>,
     layers: &[Layer<'_>],
     settings: &ResolveSettings,
-    simple: Resolved,
-    start: Instant,
+    mut simple: Resolved,
+    (start, relieving): (Instant, Instant),
 ) -> Resolved {
+    simple.certificate.count_narrow(&body.drawn);
+    if settings.is_late(start, layers.len()) {
+        return simple;
+    }
     let obstacle = body.obstacle();
-    let body_time = simple.body_time + start.elapsed();
+    let body_time = simple.body_time + relieving.elapsed();
     let now = Instant::now();
-    let mut found = settled(body, layers, untangled(obstacle, layers, settings), settings, Room::AMPLE);
+    let found = untangled(obstacle, layers, settings);
+    let mut found = settled(body, layers, found, settings, Room::AMPLE, start);
     let own: Duration = simple.garments.iter().map(|work| work.time).sum();
     let time = own + now.elapsed() - found.certificate_time;
     let certificate_time = simple.certificate_time + found.certificate_time;
     let rounds = |resolved: &Resolved| resolved.garments.first().map_or(0, |work| work.rounds);
     let all_rounds = rounds(&simple) + rounds(&found);
-    let mut certificate = simple.certificate;
-    certificate.count_narrow(&body.drawn);
-    found.prefer(simple.positions, certificate);
+    found.prefer(simple.positions, simple.certificate);
     found.garments.iter_mut().for_each(|work| work.rounds = all_rounds);
     (found.body_time, found.certificate_time) = (body_time, certificate_time);
     found.compare(layers, time);

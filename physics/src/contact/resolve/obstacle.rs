@@ -10,7 +10,7 @@ use crate::vec3::{add, add_scaled, dot, scale, sub};
 use std::sync::OnceLock;
 
 /// Below this distance [m] the direction from the closest point is rounding.
-pub(super) const CONTACT: f64 = 1e-9;
+const CONTACT: f64 = 1e-9;
 
 /// The half-space that the surface nearest to a point leaves to it: `normal·x ≥ offset`.
 #[derive(Debug, Clone, Copy)]
@@ -26,7 +26,7 @@ pub(super) struct Plane {
 }
 
 impl Plane {
-    pub(super) fn at(found: &SurfacePoint, normal: [f64; 3], distance: f64, is_held: bool) -> Self {
+    fn at(found: &SurfacePoint, normal: [f64; 3], distance: f64, is_held: bool) -> Self {
         let offset = dot(normal, found.position);
         Self { normal, offset, distance, is_held }
     }

@@ -7,7 +7,7 @@
 use rayon::prelude::*;
 
 use super::contact::{Contact, along_line, is_tiny, normal_of, overlap};
-use super::layer_obstacle::facing;
+use super::inner_garment::facing;
 use super::outfit::Outfit;
 use crate::contact::{Triangle, TriangleTree};
 use crate::mesh::vertex_normals;

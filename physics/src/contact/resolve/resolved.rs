@@ -2,8 +2,9 @@
 
 use std::time::{Duration, Instant};
 
-use super::body::{Body, with_drawn};
-use super::certificate::{Certificate, certificate};
+use super::body::Body;
+use super::certificate::Certificate;
+use super::count::{certificate, certified_around};
 use super::near::MARGIN;
 use super::obstacle::BodyObstacle;
 use super::outfit::Outfit;
@@ -24,6 +25,10 @@ const FEW_OF_ITSELF: usize = 8;
 const CLOSING_IN: (f64, f64) = (1.0 / 4.0, 1.0 / 32.0);
 /// Gaps with which that is tried, as shares of the one asked for: what is narrow holds more sheets that lie closer to each other.
 const CLOSING_GAPS: [f64; 2] = [1.0, 0.3];
+
+/// How the last few crossings are tried once more: gap and rings, as shares of those asked for. A smaller gap is for many sheets in
+/// one crease, a larger one goes round what holds a few of them.
+const LAST: [(f64, usize); 2] = [(0.3, 1), (3.0, 2)];
 
 /// Garments that were resolved.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -59,26 +64,41 @@ pub struct GarmentWork {
 impl Resolved {
     /// Where cloth lies in room that the body only made for it, tries to do without: the body gives way no more than where it
     /// lies inside itself. Taken if fewer pairs are left.
-    fn close_in(&mut self, body: &Body<'_>, layers: &[Layer<'_>], settings: &ResolveSettings, room: Room) {
+    /// `start`: when all of it began.
+    fn close_in(
+        &mut self,
+        body: &Body<'_>,
+        layers: &[Layer<'_>],
+        settings: &ResolveSettings,
+        room: Room,
+        start: Instant,
+    ) {
         for share in CLOSING_GAPS {
-            if self.certificate.narrow_triangle_pairs == 0 {
+            if self.certificate.narrow_triangle_pairs == 0 || settings.is_late(start, layers.len()) {
                 return;
             }
             let gap = share * settings.gap;
             let settings = ResolveSettings { gap, is_shallow: true, loosened: 1.0, ..*settings };
-            self.close_in_to(body, layers, &settings, room);
+            self.close_in_to(body, layers, &settings, room, start);
         }
     }
 
     /// [`close_in`](Self::close_in) with one gap: all at once and, where no garment crosses another, step by step as well.
-    fn close_in_to(&mut self, body: &Body<'_>, layers: &[Layer<'_>], settings: &ResolveSettings, room: Room) {
+    fn close_in_to(
+        &mut self,
+        body: &Body<'_>,
+        layers: &[Layer<'_>],
+        settings: &ResolveSettings,
+        room: Room,
+        start: Instant,
+    ) {
         let apart = (self.certificate.layer_triangle_pairs == 0).then(|| self.positions.clone());
         let now = at(layers, &self.positions);
         let closer = body.with_room(room.with_share(0.0), |obstacle| untangled(obstacle, &now, settings));
         let certificate = certified(&body.drawn, layers, &closer.positions);
         self.prefer(closer.positions, certificate);
         if let Some(apart) = apart.filter(|_| !self.certificate.is_clear()) {
-            self.close_in_slowly(apart, body, layers, settings, room);
+            self.close_in_slowly(apart, body, layers, settings, room, start);
         }
     }
 
@@ -91,10 +111,11 @@ impl Resolved {
         layers: &[Layer<'_>],
         settings: &ResolveSettings,
         room: Room,
+        start: Instant,
     ) {
         let outfit = Outfit::new(layers);
         let (mut share, mut step, mut with_body) = (1.0, CLOSING_IN.0, usize::MAX);
-        while share > 0.0 && step >= CLOSING_IN.1 {
+        while share > 0.0 && step >= CLOSING_IN.1 && !settings.is_late(start, layers.len()) {
             let next = f64::max(share - step, 0.0);
             let sides = Sides::of(&outfit, &now.concat(), None);
             let before = at(layers, &now);
@@ -130,7 +151,7 @@ impl Resolved {
             if left == 0 && is_smooth || left > FEW || settings.is_late(start, layers.len()) {
                 break;
             }
-            let found = resolved_once(body, &at(layers, &now), settings);
+            let found = resolved_once(body, &at(layers, &now), settings, start);
             self.add_work(&found);
             let is_stuck = found.positions == now;
             now.clone_from(&found.positions);
@@ -139,6 +160,30 @@ impl Resolved {
                 break;
             }
         }
+    }
+
+    /// Where few crossings are left in the end, tries to mend them with other gaps. Returns whether that was better. `start`: when all
+    /// of it began.
+    pub(super) fn mend_last(
+        &mut self,
+        body: &Surface<f64>,
+        layers: &[Layer<'_>],
+        settings: &ResolveSettings,
+        start: Instant,
+    ) -> bool {
+        let mut is_better = false;
+        for (gap, rings) in LAST {
+            let left = self.certificate.between();
+            if left == 0 || left > FEW || settings.is_late(start, layers.len()) {
+                break;
+            }
+            let settings =
+                ResolveSettings { gap: gap * settings.gap, rings: rings * settings.rings, ..*settings };
+            let found = resolved_once(body, &at(layers, &self.positions), &settings, start);
+            self.add_work(&found);
+            is_better |= self.prefer(found.positions, found.certificate);
+        }
+        is_better
     }
 
     /// Where nothing crosses but garments themselves, lays out what of them is folded, beside where they are `skinned`, and begins
@@ -160,14 +205,15 @@ impl Resolved {
         if folds.is_empty() {
             return false;
         }
-        let mut found = resolved_once(body, &at(layers, &folds.laid_out(&now, skinned)), settings);
+        let laid_out = folds.laid_out(&now, skinned);
+        let mut found = resolved_once(body, &at(layers, &laid_out), settings, start);
         found.go_on(body, layers, settings, start);
         self.add_work(&found);
         self.prefer(found.positions, found.certificate)
     }
 
     /// The better of two results for the same drape: the one with fewer [`Certificate::flaws`], of equal ones the one with fewer
-    /// narrow pairs, then `self`. It counts the work of both.
+    /// pairs that are narrow, then `self`. It counts the work of both.
     #[must_use]
     pub fn or(self, other: Self) -> Self {
         self.or_by(other, |c| (c.flaws(), c.between()))
@@ -218,20 +264,22 @@ impl Resolved {
             work.largest_move = moves.fold(0.0, f64::max);
             work.time = time.mul_f64(positions.len() as f64 / count.max(1) as f64);
         }
-        self.certificate.compare_strain(layers.iter().map(|l| l.garment.strain_energy(l.positions)).sum());
+        self.certificate.compare_strain(layers);
     }
 }
 
-/// What untangling left, brought back to the body as it is drawn where it can be, with its certificate.
+/// What untangling left, brought back to the body as it is drawn where it can be, with its certificate. All of it began at
+/// `start`.
 pub(super) fn settled(
     body: &Body<'_>,
     layers: &[Layer<'_>],
     found: Untangled,
     settings: &ResolveSettings,
     room: Room,
+    start: Instant,
 ) -> Resolved {
     let mut resolved = judged(&body.drawn, layers, found);
-    resolved.close_in(body, layers, settings, room);
+    resolved.close_in(body, layers, settings, room, start);
     resolved
 }
 
@@ -258,11 +306,7 @@ pub(super) fn certified(
     let now = at(layers, positions);
     match is_near(layers, positions) {
         true => certificate(drawn, &now),
-        false => with_drawn(drawn.surface, &now, |around| {
-            let mut found = certificate(&around, &now);
-            found.count_narrow(drawn);
-            found
-        }),
+        false => certified_around(drawn.surface, &now),
     }
 }
 

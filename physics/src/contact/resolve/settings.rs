@@ -7,8 +7,9 @@ use super::ResolveError;
 /// Settings of [`super::resolve`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ResolveSettings {
-    /// Distance from body and inner layers that a vertex gets when it has to move [m]; three tenths of it between parts of the body
-    /// that are too near to each other for more. Default 1 mm.
+    /// Distance from the body that a vertex gets when it has to move [m], a tenth more in each round up to three times as much;
+    /// the same over an inner garment, half of it where triangles cross; three tenths between parts of the body that are too
+    /// near to each other for more. Default 1 mm.
     pub gap: f64,
     /// A vertex has to move where its distance is below this share of `gap`, 0–1. Default 0.25: whatever was resolved once
     /// stays as it is.
@@ -25,12 +26,12 @@ pub struct ResolveSettings {
     /// Farthest that any vertex may be moved [m]. Default 6 cm: what asks for more (an order that cannot be worn, a part of the
     /// body inside another one) would tear the garment instead of mending it, and is left and listed.
     pub farthest: f64,
-    /// Longest that an edge may get, as a share of its length in the input. Default 1.15: cloth gives a little, and a place that
-    /// asks for more is left and listed instead of torn.
+    /// Longest that an edge should get, as a share of its length in the input. Default 1.15: cloth gives a little, and a place
+    /// that asks for more is left and listed instead of torn. Contacts come last in a round, so that single edges get longer.
     pub stretch: f64,
     /// How many times wider both limits are in a second attempt, where crossings are left; its result is only taken if it ends
     /// with none. Where few are left in the end, all is tried again from there and both limits are measured anew. Default 6; 1
-    /// for strict limits: one attempt, nothing laid out, no easing.
+    /// for strict limits: no attempt begins where another one ended, nothing is laid out, and cloth is not eased.
     pub loosened: f64,
     /// Most steps on a way: of [`super::resolve_along`] from the T-pose, of [`super::resolve_after`] from the frame before.
     /// Default 128; 0 mends the drape as it is or not at all.
@@ -43,9 +44,8 @@ pub struct ResolveSettings {
     /// Whether crossings of a garment with itself are mended where possible; otherwise nothing is laid out either. Default
     /// yes.
     pub self_contact: bool,
-    /// Most wall time of one attempt, and of a way altogether, times the number of garments; looked at between rounds. A limit
-    /// that is hit makes the result depend on the machine.
-    /// Default none.
+    /// Wall time, times the number of garments, after which no other attempt is begun; one that has begun has as much for itself,
+    /// looked at between its rounds, and what begins where another attempt ended counts from the start of all. A limit that is hit makes the result depend on the machine. Default none.
     pub time: Option<Duration>,
 }
 
@@ -76,7 +76,8 @@ impl ResolveSettings {
 
     /// Whether what began at `start` has had its time.
     pub(super) fn is_late(&self, start: Instant, garments: usize) -> bool {
-        self.time.is_some_and(|limit| start.elapsed() > limit * garments as u32)
+        let most = |limit: Duration| limit.checked_mul(garments as u32).unwrap_or(Duration::MAX);
+        self.time.is_some_and(|limit| start.elapsed() > most(limit))
     }
 
     /// Checks every value.
@@ -115,5 +116,20 @@ impl ResolveSettings {
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_time_without_end_is_never_over() {
+        let settings = ResolveSettings { time: Some(Duration::MAX), ..ResolveSettings::default() };
+        assert!(!settings.is_late(Instant::now(), 12));
+        let none = ResolveSettings { time: Some(Duration::ZERO), ..settings };
+        let start = Instant::now();
+        std::thread::sleep(Duration::from_millis(1));
+        assert!(none.is_late(start, 12));
     }
 }

@@ -13,18 +13,25 @@ use crate::vec3::{add_scaled, sub};
 /// Stages kept: some megabytes each.
 const MOST: usize = 64;
 
-/// Stages by their share of the way; the ones that were used last are kept.
+/// Stages by their share of the way; the last one, and the others that were used last, are kept.
 pub(super) struct Stages<'a> {
     end: &'a [Layer<'a>],
-    /// What the drape at the end differs by, in the frames of all vertices; none before a stage was asked for.
-    difference: Option<Vec<[f64; 3]>>,
+    /// None before a stage was asked for.
+    last: Option<Last>,
     kept: Vec<(f64, Waypoint)>,
+}
+
+/// The end of the way.
+struct Last {
+    stage: Waypoint,
+    /// What the drape there differs by from what is known of the stages, in the frames of all vertices.
+    difference: Vec<[f64; 3]>,
 }
 
 impl<'a> Stages<'a> {
     /// Those of a way to the drape `end`.
     pub fn to(end: &'a [Layer<'a>]) -> Self {
-        Self { end, difference: None, kept: Vec::new() }
+        Self { end, last: None, kept: Vec::new() }
     }
 
     /// The stage at `share`, `made` where it is not known.
@@ -33,19 +40,19 @@ impl<'a> Stages<'a> {
         share: f64,
         mut made: impl FnMut(f64) -> Result<Waypoint, E>,
     ) -> Result<Waypoint, E> {
-        if self.difference.is_none() {
-            let mut last = made(1.0)?;
-            let pairs =
-                self.end.iter().zip(&last.draped).flat_map(|(end, draped)| end.positions.iter().zip(draped));
-            let in_frame =
-                |((p, q), transform): ((&[f64; 3], &[f64; 3]), _)| into_frame(transform, sub(*p, *q));
-            self.difference = Some(pairs.zip(&last.transforms).map(in_frame).collect());
-            last.draped = self.end.iter().map(|layer| layer.positions.to_vec()).collect();
-            self.kept.push((1.0, last));
+        let last = match &mut self.last {
+            Some(last) => last,
+            None => {
+                let last = Last::of(made(1.0)?, self.end);
+                self.last.insert(last)
+            }
+        };
+        if share == 1.0 {
+            return Ok(last.stage.clone());
         }
         let entry = match self.kept.iter().position(|(known, _)| *known == share) {
             Some(i) => self.kept.remove(i),
-            None => (share, self.faded_in(share, made(share)?)),
+            None => (share, last.faded_in(share, made(share)?)),
         };
         let stage = entry.1.clone();
         if self.kept.len() == MOST {
@@ -54,9 +61,20 @@ impl<'a> Stages<'a> {
         self.kept.push(entry);
         Ok(stage)
     }
+}
+
+impl Last {
+    /// Of the drape `end`, on what is known of the stage there.
+    fn of(mut stage: Waypoint, end: &[Layer<'_>]) -> Self {
+        let pairs = end.iter().zip(&stage.draped).flat_map(|(end, draped)| end.positions.iter().zip(draped));
+        let in_frame = |((p, q), transform): ((&[f64; 3], &[f64; 3]), _)| into_frame(transform, sub(*p, *q));
+        let difference = pairs.zip(&stage.transforms).map(in_frame).collect();
+        stage.draped = end.iter().map(|layer| layer.positions.to_vec()).collect();
+        Self { stage, difference }
+    }
 
     fn faded_in(&self, share: f64, mut stage: Waypoint) -> Waypoint {
-        let difference = self.difference.iter().flatten().zip(&stage.transforms);
+        let difference = self.difference.iter().zip(&stage.transforms);
         for (p, (offset, transform)) in stage.draped.iter_mut().flatten().zip(difference) {
             *p = add_scaled(*p, share, out_of_frame(transform, *offset));
         }
@@ -120,11 +138,11 @@ mod tests {
             assert_eq!(stage.unwrap().draped.len(), usize::from(share != 1.0));
         };
         let early = |i: usize| i as f64 / MOST as f64;
-        (0..MOST - 1).for_each(|i| ask(early(i)));
-        // The end was made first of all; what is asked for again stays.
-        [1.0, early(0), 0.999, early(0), early(1)].into_iter().for_each(&mut ask);
+        (0..MOST).for_each(|i| ask(early(i)));
+        // The end was made first of all and stays; so does what is asked for again.
+        [early(0), 0.999, early(0), early(1), 1.0].into_iter().for_each(&mut ask);
         let expected: Vec<f64> =
-            [1.0].into_iter().chain((0..MOST - 1).map(early)).chain([0.999, early(1)]).collect();
+            [1.0].into_iter().chain((0..MOST).map(early)).chain([0.999, early(1)]).collect();
         assert_eq!(made, expected);
         assert_eq!(stages.kept.len(), MOST);
     }
@@ -133,6 +151,6 @@ mod tests {
     fn what_cannot_be_made_is_not_kept() {
         let mut stages = Stages::to(&[]);
         assert_eq!(stages.at(0.5, |_| Err("no")).err(), Some("no"));
-        assert!(stages.kept.is_empty() && stages.difference.is_none());
+        assert!(stages.kept.is_empty() && stages.last.is_none());
     }
 }

@@ -15,7 +15,6 @@ use super::{
     Layer, ResolveError, ResolveSettings, Resolved, Untangled, at, check, untangled, untangled_keeping,
 };
 use crate::contact::self_triangle_pairs;
-use crate::query::Surface;
 use crate::transform::{into_frame, out_of_frame};
 use crate::vec3::{add, scale, sub};
 
@@ -90,7 +89,6 @@ impl Way<'_, '_> {
     pub fn improve<E: From<ResolveError>>(
         &self,
         best: &mut Resolved,
-        body: &Surface<f64>,
         t_pose: Waypoint,
         stage_at: impl FnMut(f64) -> Result<Waypoint, E>,
     ) -> Result<(), E> {
@@ -111,8 +109,8 @@ impl Way<'_, '_> {
         let (followed, steps) = self.go(Place::new(t_pose, first, None), stage_at)?;
         best.steps += steps;
         let Some(found) = followed else { return Ok(()) };
-        let mut along = settled(self.end, layers, found, settings, self.strides.room);
-        along.go_on(body, layers, settings, self.start);
+        let mut along = settled(self.end, layers, found, settings, self.strides.room, self.start);
+        along.go_on(self.end.drawn.surface, layers, settings, self.start);
         best.add_work(&along);
         let [now, then] = [&along, &*best].map(|resolved| &resolved.certificate);
         match now.is_clear() {
@@ -161,7 +159,8 @@ impl Way<'_, '_> {
             let arrived = self.arrive(&place, &stage, at - from, is_shortest, is_last)?;
             let is_worse = place.crosses_less_than(&arrived.untangled, at - from <= keeping);
             if is_worse && !is_shortest {
-                (step, well) = (0.5 * step, 0);
+                // Of the step that was tried: the last one may be shorter than it might have been.
+                (step, well) = (f64::max(0.5 * (at - from), shortest), 0);
             } else if at == 1.0 {
                 return Ok((Some(arrived.untangled), steps));
             } else {

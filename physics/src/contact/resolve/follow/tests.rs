@@ -169,13 +169,23 @@ fn what_does_not_fit_is_refused() {
     assert!(matches!(nan, Err(ResolveError::Position { garment: 0, vertex: 7, .. })));
     let turned = after(&|before| before.transforms[3][0][0] = f64::NAN);
     assert!(turned.is_ok(), "what such a vertex was moved by stays as it stands");
-    for spoil in [
-        |before: &mut Reached| before.positions.clear(),
-        |before: &mut Reached| before.draped[0].truncate(5),
-        |before: &mut Reached| before.transforms.truncate(5),
-    ] {
+    for spoil in
+        [|before: &mut Reached| before.positions.clear(), |before: &mut Reached| before.draped[0].truncate(5)]
+    {
         assert!(matches!(after(&spoil), Err(ResolveError::Count { garment: 0, .. })));
     }
+    let few = after(&|before| before.transforms.truncate(5));
+    assert_eq!(few.err(), Some(ResolveError::Transforms { expected: sheet.vertex_count(), found: 5 }));
+    let few_at = |share: f64| {
+        let mut stage = stage_at(share)?;
+        stage.transforms.pop();
+        Ok(stage)
+    };
+    let first = stage_at(0.0).unwrap();
+    let (body, before) = (first.body.clone(), untouched(first, vec![sheet.positions().to_vec()]));
+    let few = resolve_after(before, &body, &layers, &ResolveSettings::default(), few_at);
+    let expected = sheet.vertex_count();
+    assert_eq!(few.err(), Some(ResolveError::Transforms { expected, found: expected - 1 }));
 }
 
 /// A sheet that lies folded over a ball. Laid out it is clear of the ball where it may be lifted, and is in it otherwise.

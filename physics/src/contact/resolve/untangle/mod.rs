@@ -16,7 +16,7 @@ use super::sides::Sides;
 use crate::contact::intersections::{KeptTree, TriangleTree};
 use crate::vec3::dot;
 
-/// A half-space is remembered for a vertex that is nearer to it than this [m]: smoothing may carry it there.
+/// A half-space is remembered for a vertex that is nearer to it than this [m], or too close: smoothing may carry it there.
 const WATCH: f64 = 0.01;
 /// Rounds without progress after which an outfit is left as it is.
 const PATIENCE: usize = 8;
@@ -176,6 +176,11 @@ impl<'a> Untangling<'a> {
         (self.crossings.count() + wrong, wrong)
     }
 
+    /// Up to which distance half-spaces and sheets are remembered [m].
+    fn watch(&self) -> f64 {
+        WATCH.max(self.settings.trigger * self.settings.gap)
+    }
+
     /// The distance that counts as too close in a round: what is merely close is left alone after the first ones.
     fn least(&self, round: usize) -> f64 {
         if round < ROUNDS_FOR_GAPS { self.settings.trigger * self.settings.gap } else { 0.0 }
@@ -195,7 +200,7 @@ impl<'a> Untangling<'a> {
                 TriangleTree::refitted(tree, outfit.part(positions, g), &outfit.layers[g].garment.faces)
             })
             .collect();
-        let reach = (self.settings.reach, WATCH);
+        let reach = (self.settings.reach, self.watch());
         if self.sides.is_none() {
             self.over = all_over(outfit, &trees, positions, &self.outward, reach);
         }

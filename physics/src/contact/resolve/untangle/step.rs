@@ -4,7 +4,7 @@ use super::super::contact::{Contact, is_tiny, normal_of, overlap};
 use super::super::folds::folds;
 use super::super::over::{Order, order, part_along};
 use super::super::relax::{LastPasses, no_farther, relax};
-use super::{Untangling, WATCH};
+use super::Untangling;
 use crate::vec3::{add, add_scaled, dot, norm, scale, sub};
 
 /// No contact asks for a longer step than this in a round [m].
@@ -50,9 +50,10 @@ impl Untangling<'_> {
             contacts.push(o.contact(gap.min(o.height + LONGEST_STEP)));
         }
         contacts.extend(&self.remembered);
+        let watch = self.watch();
         // The body last, so that it has the last word.
         for &v in &region {
-            let Some(plane) = self.planes[v as usize].filter(|p| p.distance < WATCH) else { continue };
+            let Some(plane) = self.planes[v as usize].filter(|p| p.distance < watch) else { continue };
             let wanted = if plane.is_held { plane.distance.clamp(0.0, gap) } else { gap };
             let step = (wanted - plane.distance).min(LONGEST_STEP);
             let moved = sub(self.positions[v as usize], self.input[v as usize]);

@@ -2,6 +2,7 @@ use std::sync::Arc;
 
 use super::*;
 use crate::mesh::shapes;
+use crate::query::Surface;
 use crate::transform::Transform;
 
 const IDENTITY: Transform = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];

@@ -1,14 +1,13 @@
-//! A garment as what lies under another one: the half-space that its nearest sheet leaves.
+//! A garment as what lies under another one, and which of its sides looks away from the body.
 
 use super::RestGarment;
-use super::obstacle::{CONTACT, Plane};
 use crate::contact::TriangleTree;
 use crate::mesh::vertex_normals;
 use crate::query::ClosestPoint;
 use crate::vec3::{add_scaled, dot, norm, scale, sub};
 
-/// A garment that lies under the one being resolved.
-pub(super) struct LayerObstacle<'a> {
+/// A garment that lies under another one.
+pub(super) struct InnerGarment<'a> {
     garment: &'a RestGarment,
     pub tree: TriangleTree<'a>,
     closest: ClosestPoint,
@@ -16,7 +15,7 @@ pub(super) struct LayerObstacle<'a> {
     bounds: [[f64; 3]; 2],
 }
 
-impl<'a> LayerObstacle<'a> {
+impl<'a> InnerGarment<'a> {
     /// `tree` of the garment where it is; `facing` as of [`facing`].
     pub fn new(garment: &'a RestGarment, tree: TriangleTree<'a>, facing: Vec<f64>) -> Self {
         let closest = ClosestPoint::of_tree(&tree, |_| true);
@@ -24,39 +23,25 @@ impl<'a> LayerObstacle<'a> {
         Self { garment, tree, closest, facing, bounds }
     }
 
-    /// 1 where face `f` looks away from the body, −1 where the mesh is inside out.
-    pub fn facing(&self, f: u32) -> f64 {
-        self.garment.faces.get(f as usize).map_or(1.0, |face| self.facing[face[0] as usize])
-    }
-
-    /// Whether a box comes closer than `margin` to the garment.
-    pub fn is_near(&self, [low, high]: [[f64; 3]; 2], margin: f64) -> bool {
-        (0..3).all(|k| low[k] - margin <= self.bounds[1][k] && self.bounds[0][k] - margin <= high[k])
-    }
-
-    /// The half-space over the garment at the point nearest to `p`, if it is within `reach` and `p` lies over or under the
-    /// garment and not beside it.
-    pub fn look(&self, p: [f64; 3], reach: f64, gap: f64) -> Option<Plane> {
-        if !self.is_near([p, p], reach) {
+    /// Distance of `p` to the garment [m], negative under it, if it is within `reach` and `p` lies over or under the garment and
+    /// not beside it.
+    pub fn signed_distance(&self, p: [f64; 3], reach: f64) -> Option<f64> {
+        let [low, high] = self.bounds;
+        if !(0..3).all(|k| p[k] - reach <= high[k] && low[k] - reach <= p[k]) {
             return None;
         }
         let found = self.closest.project_within(p, reach)?;
-        let facing = self.facing(found.face);
+        let facing = self.facing[self.garment.faces[found.face as usize][0] as usize];
         let normal = scale(found.normal, facing);
         let offset = sub(p, found.position);
         let along = dot(offset, normal);
-        let length = found.distance_squared.sqrt();
         if self.is_at_border(found.face, found.barycentric) {
             // Past the hem there is nothing to be over; right at it there is.
-            let beside = add_scaled(offset, -along, normal);
-            if norm(beside) > gap.max(0.5 * along.abs()) {
-                return None;
-            }
-            return Some(Plane::at(&found, normal, along, false));
+            let beside = norm(add_scaled(offset, -along, normal));
+            return (beside <= 0.5 * along.abs()).then_some(along);
         }
-        let distance = if along < 0.0 { -length } else { length };
-        let direction = if length > CONTACT { scale(offset, distance.signum() / length) } else { normal };
-        Some(Plane::at(&found, direction, distance, false))
+        let distance = found.distance_squared.sqrt();
+        Some(if along < 0.0 { -distance } else { distance })
     }
 
     fn is_at_border(&self, f: u32, barycentric: [f64; 3]) -> bool {
