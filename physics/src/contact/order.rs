@@ -33,9 +33,12 @@ pub fn order_violations(inner: &[[f64; 3]], inner_faces: &[[u32; 3]], outer: &[[
         .with_min_len(256)
         .map(|&p| {
             let (nearest, squared_distance) = index.nearest(p);
-            let near = squared_distance <= ORDER_RADIUS * ORDER_RADIUS;
-            let gap = dot(sub(p, inner[nearest as usize]), normals[nearest as usize]);
-            (usize::from(near), usize::from(near && gap < 0.0))
+            // None is where no inner vertex is finite.
+            let found = inner.get(nearest as usize).zip(normals.get(nearest as usize));
+            let Some((q, normal)) = found.filter(|_| squared_distance <= ORDER_RADIUS * ORDER_RADIUS) else {
+                return (0, 0);
+            };
+            (1, usize::from(dot(sub(p, *q), *normal) < 0.0))
         })
         .reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
     OrderViolations { counted, violations }
@@ -53,6 +56,8 @@ mod tests {
         assert_eq!((right.counted, right.violations), (large.vertex_count(), 0));
         let wrong = order_violations(large.positions(), large.faces(), small.positions());
         assert_eq!(wrong.violations, small.vertex_count());
+        let lost = vec![[f64::NAN; 3]; small.vertex_count()];
+        assert_eq!(order_violations(&lost, small.faces(), large.positions()).counted, 0);
         let far = icosphere(2.0, 3);
         assert_eq!(order_violations(small.positions(), small.faces(), far.positions()).counted, 0);
     }

@@ -8,11 +8,11 @@ use rayon::prelude::*;
 pub struct Penetration {
     /// Vertices looked at.
     pub vertices: usize,
-    /// Vertices with a negative gap.
+    /// Vertices with a negative gap, and those that are nowhere (NaN or infinite).
     pub inside: usize,
     /// Vertices deeper than the given threshold.
     pub deep: usize,
-    /// Largest depth (m), 0 when no vertex is inside.
+    /// Largest depth (m), 0 when no vertex is inside, infinite when one is nowhere.
     pub max_depth: f64,
 }
 
@@ -29,12 +29,16 @@ pub fn penetration_by(
     deep_threshold: f64,
     distance: Distance,
 ) -> Penetration {
-    let gaps: Vec<f64> = positions.par_iter().with_min_len(256).map(|&p| body.gap(p, distance).gap).collect();
+    let depth = |&p: &[f64; 3]| match body.gap(p, distance).gap {
+        gap if gap.is_nan() => f64::INFINITY,
+        gap => -gap,
+    };
+    let depths: Vec<f64> = positions.par_iter().with_min_len(256).map(depth).collect();
     Penetration {
         vertices: positions.len(),
-        inside: gaps.iter().filter(|g| **g < 0.0).count(),
-        deep: gaps.iter().filter(|g| **g < -deep_threshold).count(),
-        max_depth: gaps.iter().fold(0.0, |deepest, g| f64::max(deepest, -g)),
+        inside: depths.iter().filter(|d| **d > 0.0).count(),
+        deep: depths.iter().filter(|d| **d > deep_threshold).count(),
+        max_depth: depths.iter().fold(0.0, |deepest, d| f64::max(deepest, *d)),
     }
 }
 

@@ -12,11 +12,12 @@
 //! | [`layer_distance`] | two posed garments, body | `max(d_inner − d_outer, 0)³` (pairs over one body vertex) |
 //!
 //! Weights never live in a term: [`SceneEnergy`] multiplies them in. Elements are evaluated in `f64` whatever the scalar of
-//! the positions (only the pair loop of the repulsion works in the caller's scalar), sums are `f64` and run in a fixed
-//! order, and every vertex gathers its own gradient: results are bit-identical for any number of threads.
+//! the positions (only the pair loop of the repulsion and the distances to vertices work in the caller's scalar), and sums are
+//! `f64` and run in a fixed order: results are bit-identical for any number of threads.
 //!
-//! A ninth term is one new file, one line in [`Term::ALL`] and one line where [`GarmentEnergies`] (or, for a pair of
-//! garments, [`SceneEnergy`]) lists what it evaluates; the finite-difference test walks the list.
+//! A ninth term is one new file, its name in [`Term`], its weight in the configuration, a bound of its gradient for the suite of
+//! hard cases, and one line where [`GarmentEnergies`] (or, for a pair of garments, [`SceneEnergy`]) lists what it evaluates; the
+//! finite-difference test walks the list.
 
 pub mod bending;
 pub mod body_collision;

@@ -232,7 +232,8 @@ impl<T: Real> SceneEnergy<T> {
         let count = self.vertex_count();
         assert_eq!(posed.len(), count, "posed positions of all garments of the scene");
         assert!(
-            canonical.len() == count || (canonical.is_empty() && !self.needs_canonical()),
+            canonical.len() == count
+                || canonical.is_empty() && (selection == Selection::All || !self.needs_canonical()),
             "{} canonical positions for the {count} vertices of the scene",
             canonical.len()
         );

@@ -60,7 +60,11 @@ impl RestTriangle {
         let mut triangle = Self {
             corners,
             volume: area * thickness,
-            inverse: [1.0 / length, -along / (length * height), 1.0 / height],
+            // Where most of a mesh is points there is no length to measure by, and a point has no volume either.
+            inverse: match height > 0.0 {
+                true => [1.0 / length, -along / (length * height), 1.0 / height],
+                false => [0.0; 3],
+            },
             metric: [1.0, 0.0, 1.0],
         };
         if length > true_length || height > true_height {
@@ -191,4 +195,28 @@ fn positive_part([a, b, c]: [f64; 3]) -> [f64; 3] {
     // high·(A − low·I)/(high − low) keeps the eigenvector of `high` alone.
     let factor = high / (high - low);
     [factor * (a - low), factor * b, factor * (c - low)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vec3::is_finite;
+
+    #[test]
+    fn a_mesh_of_points_and_one_triangle_has_the_energy_of_that() {
+        let mut positions = vec![[0.0; 3], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0]];
+        positions.resize(12, [0.3, 0.0, 0.0]);
+        let faces = (0..4).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
+        let rest = TriMesh::new(positions.clone(), faces).unwrap();
+        assert_eq!(rest.median_edge_length(), 0.0);
+        let one = TriMesh::new(positions[..3].to_vec(), vec![[0, 1, 2]]).unwrap();
+        positions[2] = [0.02, 0.15, 0.0];
+        positions[7] = [0.3, 0.01, 0.0];
+        let strain = |rest: &TriMesh| Strain::new(rest, &Material::default());
+        let mut gradient = vec![[0.0; 3]; 12];
+        let target = Weighted { weight: 1.0, gradient: &mut gradient };
+        let energy = strain(&rest).evaluate(&positions, Some(target));
+        assert_eq!(energy, strain(&one).evaluate(&positions[..3], None));
+        assert!(energy > 0.0 && gradient.iter().all(|g| is_finite(*g)));
+    }
 }

@@ -58,8 +58,8 @@ impl Preconditioner {
         Self { offsets, columns, matrix, factor, usable: false, factorisations: 0 }
     }
 
-    /// Assembles and factorises at `posed`; where garments touch, entries are at other places than before. Where that fails (out of memory, numbers that are not finite) the identity is
-    /// used: plain BFGS.
+    /// Assembles and factorises at `posed`; for an outfit also finds anew which entries there are, since garments touch elsewhere
+    /// than before. Where factorising fails (out of memory, numbers that are not finite) the identity is used: plain BFGS.
     pub fn refresh(&mut self, problem: &Problem<'_>, posed: &[[f64; 3]]) {
         if problem.couples_garments() {
             *self = Self { factorisations: self.factorisations, ..Self::new(problem, posed) };

@@ -16,8 +16,8 @@ pub struct SolverSettings {
     /// No vertex moves farther than this in one step [m]. Default 5 cm: a garment stays in its valley instead of jumping
     /// through the body.
     pub step_bound: f64,
-    /// No vertex ends farther than this from its start [m]; `None`: no bound. Where the bound is reached the solver stops
-    /// as [`super::Stop::Escaped`]. Default 1 m: what nothing holds falls for ever.
+    /// No vertex goes farther than this from its start [m], but for the step that leads there; `None`: no bound. Where the bound is
+    /// passed the solver stops as [`super::Stop::Escaped`]. Default 1 m: what nothing holds falls for ever.
     pub escape_distance: Option<f64>,
     /// Iterations between two factorisations of the preconditioner.
     pub refactorise_every: usize,

@@ -11,7 +11,8 @@ use super::problem::{norm, relative};
 use super::{EquilibriumError, Problem, Progress, Solution, SolverSettings, Step, Stop};
 use crate::vec3::{distance_squared, is_finite, sub};
 
-/// Iterations between two looks at the scale of the forces, which costs an evaluation.
+/// Iterations between two looks at the scale of the forces, which costs an evaluation of
+/// each term.
 const LOOK_EVERY: usize = 10;
 
 /// The iteration from which on vertices are kept on kinks: before, they only pass.
@@ -54,46 +55,46 @@ pub fn solve(
     let mut preconditioner: Option<Preconditioner> = None;
     let mut memory = Memory::new(settings.memory);
     let mut age = 0;
-    let mut kinks: Vec<Kink> = Vec::new();
     // Vertices before kinks that made the last step short.
     let mut in_the_way: Vec<usize> = Vec::new();
     // Vertices at walls: held until the next look.
     let mut at_walls: Vec<usize> = Vec::new();
-    // The last step, and the gradient before it.
+    // The positions before the last step, and the gradient there.
     let mut last: Option<(Vec<[f64; 3]>, Vec<[f64; 3]>)> = None;
     let mut history = Vec::new();
 
     let stop = loop {
-        step.milliseconds = 1e3 * clock.elapsed().as_secs_f64();
-        history.push(step);
-        if observer(&Progress { step: &step, positions: &state.positions }).is_break() {
-            break Stop::Cancelled;
-        }
         if step.iteration.is_multiple_of(LOOK_EVERY) && step.iteration > 0 {
             force_scale = problem.force_scale(&state.positions);
             at_walls.clear();
         }
         // Vertices of a smaller gradient than this may all be wrong together.
         let least = 0.1 * settings.tolerance * force_scale / (state.positions.len() as f64).sqrt();
-        if step.iteration >= FIRST_LOOK {
-            if let Some(positions) = problem.onto_kinks(&state.positions, &state.gradient, least) {
-                let (energy, gradient) = problem.value_and_gradient(&positions);
-                step.evaluations += 1;
-                if energy < state.energy && gradient.iter().all(|g| is_finite(*g)) {
-                    state = State { positions, energy, gradient };
-                    step = Step { energy, gradient_norm: norm(&state.gradient), ..step };
-                    if let Some(entry) = history.last_mut() {
-                        *entry = step;
-                    }
-                }
+        let looks_at_kinks = step.iteration >= FIRST_LOOK;
+        if looks_at_kinks
+            && let Some(positions) = problem.onto_kinks(&state.positions, &state.gradient, least)
+        {
+            let (energy, gradient) = problem.value_and_gradient(&positions);
+            step.evaluations += 1;
+            if energy < state.energy && gradient.iter().all(|g| is_finite(*g)) {
+                state = State { positions, energy, gradient };
+                step = Step { energy, gradient_norm: norm(&state.gradient), ..step };
             }
-            kinks = problem.kinks(&state.positions, &state.gradient, least);
         }
+        step.milliseconds = 1e3 * clock.elapsed().as_secs_f64();
+        history.push(step);
+        if observer(&Progress { step: &step, positions: &state.positions }).is_break() {
+            break Stop::Cancelled;
+        }
+        let mut kinks: Vec<Kink> = match looks_at_kinks {
+            true => problem.kinks(&state.positions, &state.gradient, least),
+            false => Vec::new(),
+        };
         let mut balanced = state.gradient.clone();
         balance(&kinks, &mut balanced);
         let residual = norm(&balanced);
-        if let Some((moved, before)) = last.take() {
-            memory.push(moved, difference(&balanced, &before));
+        if let Some((positions, gradient)) = last.take() {
+            memory.push(difference(&state.positions, &positions), difference(&balanced, &gradient));
         }
         // The scale of some iterations ago is only believed when it says no.
         if relative(residual, force_scale) <= settings.tolerance {
@@ -161,16 +162,15 @@ pub fn solve(
         };
         let Some(next) = next else { break Stop::Stalled };
         age += 1;
-        let moved = difference(&next.positions, &state.positions);
+        let moved = longest(&difference(&next.positions, &state.positions));
         step = Step {
             iteration: step.iteration + 1,
             energy: next.energy,
             gradient_norm: norm(&next.gradient),
-            displacement: longest(&moved),
+            displacement: moved,
             ..step
         };
-        last = Some((moved, balanced));
-        state = next;
+        last = Some((std::mem::replace(&mut state, next).positions, balanced));
     };
     let residual = problem.unbalanced_norm(&state.positions, &state.gradient);
     let relative_gradient = relative(residual, problem.force_scale(&state.positions));

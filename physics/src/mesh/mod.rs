@@ -11,7 +11,7 @@ mod volume;
 
 pub use disjoint_sets::DisjointSets;
 pub(crate) use faces_at_vertex::FacesAtVertex;
-pub use normals::{face_normal_area, vertex_normals};
+pub use normals::vertex_normals;
 pub use stretch::vertex_stretch;
 pub use topology::{Hinge, Topology};
 pub use tri_mesh::{MeshError, TriMesh};

@@ -1,15 +1,7 @@
-//! Normals of faces and vertices.
+//! Normals of vertices.
 
 use crate::real::Real;
 use crate::vec3;
-
-/// Unit normal and area (m²) of the triangle `a b c` (counter-clockwise seen from outside).
-///
-/// The normal is zero where the triangle has no area.
-pub fn face_normal_area<T: Real>(a: [T; 3], b: [T; 3], c: [T; 3]) -> ([T; 3], T) {
-    let doubled = vec3::cross(vec3::sub(b, a), vec3::sub(c, a));
-    (vec3::normalized(doubled), vec3::norm(doubled) * T::from_f64(0.5))
-}
 
 /// Area-weighted vertex normals, unit length; zero where undefined (unreferenced vertex, faces that cancel).
 ///

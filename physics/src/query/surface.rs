@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use crate::mesh::{TriMesh, vertex_normals};
+use crate::mesh::{TriMesh, is_closed, vertex_normals};
 use crate::query::{ClosestPoint, SurfacePoint, UnionDistance, VertexIndex};
 use crate::real::Real;
 use crate::vec3;
@@ -50,6 +50,7 @@ pub struct Surface<T: Real> {
     vertex_index: OnceLock<VertexIndex<T>>,
     closest_point: OnceLock<ClosestPoint>,
     union_distance: OnceLock<UnionDistance>,
+    is_closed: OnceLock<bool>,
 }
 
 impl<T: Real> Surface<T> {
@@ -63,6 +64,7 @@ impl<T: Real> Surface<T> {
             vertex_index: OnceLock::new(),
             closest_point: OnceLock::new(),
             union_distance: OnceLock::new(),
+            is_closed: OnceLock::new(),
         }
     }
 
@@ -90,6 +92,11 @@ impl<T: Real> Surface<T> {
             let positions: Vec<_> = self.positions.iter().map(|p| vec3::to_f64(*p)).collect();
             UnionDistance::new(&positions, &self.faces)
         })
+    }
+
+    /// Whether the surface has no border.
+    fn is_closed(&self) -> bool {
+        *self.is_closed.get_or_init(|| is_closed(&self.faces))
     }
 
     /// Index of the vertex nearest to `p`; the lowest of several equally near.
@@ -148,6 +155,10 @@ impl<T: Real> Surface<T> {
     }
 
     fn union_gap(&self, p: [T; 3]) -> Gap<T> {
+        // A ray through a hole would tell the whole body as buried.
+        if !self.is_closed() {
+            return self.closest_point_gap(p);
+        }
         let union = self.union_distance();
         match union.project(vec3::to_f64(p)) {
             Some((found, is_inside)) => signed_gap(p, &found, is_inside, union.kept()),
@@ -202,6 +213,20 @@ mod tests {
                 let vertex = surface.gap(p, Distance::NearestVertex).vertex;
                 assert_eq!(vertex, brute_force::nearest(mesh.positions(), p).0);
             }
+        }
+    }
+
+    #[test]
+    fn a_surface_with_a_hole_has_no_union() {
+        let ball = shapes::icosphere(0.5, 2);
+        let half: Vec<[u32; 3]> = (ball.faces().iter().copied())
+            .filter(|face| face.iter().all(|&v| ball.positions()[v as usize][0] <= 0.1))
+            .collect();
+        let surface = Surface::<f64>::new(ball.positions().to_vec(), half.into());
+        for p in queries(50, 0.9, 4) {
+            let (union, closest) = (surface.gap(p, Distance::Union), surface.gap(p, Distance::ClosestPoint));
+            assert_eq!((union.gap, union.gradient), (closest.gap, closest.gradient));
+            assert!(union.gap.is_finite());
         }
     }
 

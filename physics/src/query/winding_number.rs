@@ -62,6 +62,10 @@ impl Default for AngleSum {
 impl AngleSum {
     #[inline(always)]
     fn add(&mut self, cosine: f64, sine: f64) {
+        // On an edge the angle is undefined: the face counts as seen from the side, at no angle.
+        if cosine == 0.0 && sine == 0.0 {
+            return;
+        }
         let product = (self.cosine * cosine - self.sine * sine, self.cosine * sine + self.sine * cosine);
         // Two angles of [0, π] whose sum appears negative went past π; two of (−π, 0) whose sum does not went past −π.
         if self.sine >= 0.0 && sine >= 0.0 && product.1 < 0.0 {
@@ -109,6 +113,16 @@ mod tests {
     fn points(count: usize, extent: f64, seed: u64) -> Vec<[f64; 3]> {
         let mut random = SplitMix::new(seed);
         (0..count).map(|_| std::array::from_fn(|_| extent * random.symmetric())).collect()
+    }
+
+    #[test]
+    fn a_point_on_an_edge_takes_nothing_from_the_other_triangles() {
+        // Corners on the axes: the middle of an edge between opposite corners of the base is on two faces.
+        let corners = [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let faces = [[0, 3, 1], [0, 1, 2], [0, 2, 3], [1, 3, 2]];
+        let found = winding_number(&corners, &faces, [0.0; 3]);
+        assert!((found - by_definition(&corners, &faces, [0.0; 3])).abs() < 1e-12, "{found}");
+        assert!(found.abs() > 0.1);
     }
 
     #[test]

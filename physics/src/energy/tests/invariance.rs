@@ -148,6 +148,8 @@ fn the_total_is_the_weighted_sum_of_the_raw_values() {
     let silent = super::scenes::scene::<f64>(EnergySettings::default(), Default::default(), 5);
     let raw = silent.energy.raw(&silent.posed, &silent.canonical);
     assert_eq!((raw.garments, raw.layers, raw.total), (value.garments, value.layers, 0.0));
+    let unheld = scene.energy.raw(&scene.posed, &[]);
+    assert!(unheld.garments.iter().all(|raw| raw[Term::Holding].is_none() && raw[Term::Strain].is_some()));
     let nothing = silent.energy.evaluate(&silent.posed, &[]);
     assert!(nothing.garments.iter().chain(&nothing.layers).all(|raw| raw.iter().all(|(_, v)| v.is_none())));
     assert_eq!(super::scenes::largest(&nothing.posed_gradient), 0.0);
