@@ -211,7 +211,20 @@ if [ ${#clips[@]} -gt 0 ]; then
     todo=0
     for clip in "${clips[@]}"; do [ -f "$out/motions/$(basename "${clip%.bvh}").npz" ] || todo=1; done
     if [ $force = 1 ] || [ $todo = 1 ]; then
-        clothcombo import bvh "${clips[@]}" --body "$out/body.npz" -o "$out/motions"
+        import_bvh() { clothcombo import bvh "$@" --body "$out/body.npz" -o "$out/motions"; }
+        for clip in "${clips[@]}"; do
+            case $(basename "$clip") in
+            Boxing_Toes.bvh)
+                import_bvh "$clip" --source "Debian assimp-testmodels" --author "assimp contributors" \
+                    --licence BSD-3-Clause ;;
+            test_mocapbank.bvh)
+                import_bvh "$clip" --source "Rust crate bvh_anim 0.4.0" \
+                    --author "mocapbank; bvh_anim contributors" --licence MIT ;;
+            *)
+                import_bvh "$clip" --author "Carnegie Mellon University" --licence "CMU: free for research and commercial use" \
+                    --source "CMU Graphics Lab Motion Capture Database (BVH conversion), as in Debian assimp-testmodels" ;;
+            esac
+        done
     fi
 else
     skip "motions: no BVH file could be fetched"

@@ -108,7 +108,8 @@ fn a_wrong_up_axis_is_noticed_and_the_right_one_believed() {
     let folder = tempfile::tempdir().unwrap();
     let settings = AmassSettings { thinning: every_frame(), up: UpAxis::Y };
     let files = [fixture("amass/CMU/02/jump_poses.npz")];
-    import_amass(&files, folder.path(), &settings, &mut no_progress()).unwrap();
+    let summary = import_amass(&files, folder.path(), &settings, &mut no_progress()).unwrap();
+    assert!(summary.taken[0].1.contains("check the up axis"), "{summary:?}");
     // Importing our own y-up motions as if they were z up is told.
     let y_up = folder.path().join("y_up.npz");
     let mut standing = Motion::load(&folder.path().join("jump.npz")).unwrap();
@@ -135,6 +136,20 @@ fn motions_are_not_written_over_themselves() {
     }
     assert_eq!(fs::read(&clip).unwrap(), before);
     assert_eq!(files_in(folder.path()), ["jump.npz", "out"]);
+}
+
+#[test]
+fn what_was_imported_before_is_no_input() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::copy(fixture("amass/CMU/02/jump_poses.npz"), folder.path().join("jump.npz")).unwrap();
+    let out = folder.path().join("converted");
+    for _ in 0..2 {
+        let settings = AmassSettings { thinning: every_frame(), ..AmassSettings::default() };
+        let inputs = [folder.path().to_path_buf()];
+        let summary = import_amass(&inputs, &out, &settings, &mut no_progress()).unwrap();
+        assert_eq!(summary.taken.len(), 1, "{summary:?}");
+    }
+    assert_eq!(files_in(&out), ["jump.npz", "motions.toml"]);
 }
 
 #[test]

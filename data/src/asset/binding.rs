@@ -16,7 +16,7 @@ pub struct BindingSettings {
     pub smoothing_iterations: usize,
     /// Averaging steps for skirts and dresses, which span both legs.
     pub skirt_smoothing_iterations: usize,
-    /// Smooth at all; off is the paper's nearest vertex.
+    /// Smooth at all, and take a trouser leg's weights from its own leg only; off is the paper's nearest vertex.
     pub smooth: bool,
     /// Take shape displacements as well; off leaves them zero (the paper's form).
     pub shape_transfer: bool,
@@ -41,7 +41,7 @@ impl Binding {
     /// Binds a garment that lies on the zero body.
     pub fn new(garment: &Garment, body: &Body, settings: &BindingSettings) -> Self {
         let (joints, width) = (body.joint_count(), 3 * body.shape_count);
-        let nearest = nearest_body_vertices(garment, body);
+        let nearest = nearest_body_vertices(garment, body, settings.smooth);
         // Most joints (fingers, face) have no weight on a garment: smooth only the columns in use.
         let mut used: Vec<u16> =
             nearest.iter().flat_map(|v| body.skin_weights.row(*v).0.iter().copied()).collect();
@@ -124,11 +124,14 @@ const LEG_JOINTS: [&[&str]; 2] = [
     &["right_hip", "right_knee", "right_ankle", "right_foot"],
 ];
 
-/// Nearest body vertex of each garment vertex. A trouser leg looks only at its own leg (and the trunk): at the inner
-/// thigh the other leg can be nearer.
-fn nearest_body_vertices(garment: &Garment, body: &Body) -> Vec<usize> {
+/// Nearest body vertex of each garment vertex; with `own_leg` a trouser leg looks only at its own leg (and the trunk): at the
+/// inner thigh the other leg can be nearer.
+fn nearest_body_vertices(garment: &Garment, body: &Body, own_leg: bool) -> Vec<usize> {
     let points = garment.rest.positions();
-    let all = VertexIndex::new(&body.template);
+    if garment.category != Category::Trousers || !own_leg {
+        let all = VertexIndex::new(&body.template);
+        return points.iter().map(|p| all.nearest(*p).0 as usize).collect();
+    }
     let crotch_side = |leg: usize| {
         let names: Vec<usize> = LEG_JOINTS[leg]
             .iter()
@@ -146,9 +149,6 @@ fn nearest_body_vertices(garment: &Garment, body: &Body) -> Vec<usize> {
         };
         (0..body.vertex_count()).filter(of_leg).collect::<Vec<usize>>()
     };
-    if garment.category != Category::Trousers {
-        return points.iter().map(|p| all.nearest(*p).0 as usize).collect();
-    }
     // Body without the other leg: [for left garment vertices, for right ones].
     let legs = [crotch_side(0), crotch_side(1)];
     let without_other: [(Vec<usize>, VertexIndex<f64>); 2] = std::array::from_fn(|side| {

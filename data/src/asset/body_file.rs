@@ -6,7 +6,7 @@
 
 use super::body::{Body, BodyError, BodyParts};
 use super::provenance::Provenance;
-use super::skeleton;
+use super::skeleton::{self, BODY_JOINT_NAMES};
 use super::skin_weights::SparseSkinWeights;
 use crate::format::npz::{Array, NpzError, NpzFile, NpzWriter};
 use clothcombo_physics::mesh::is_inside_out;
@@ -38,6 +38,21 @@ pub enum BodyFileError {
         vertex: f64,
         /// How many there are.
         vertices: usize,
+    },
+    /// Joints in another order than that of SMPL, by which poses name them.
+    #[error(
+        "{}: key 'joint_names', joint {found} is '{name}', which must be joint {expected}; poses go by the order of SMPL",
+        path.display()
+    )]
+    JointOrder {
+        /// The file.
+        path: PathBuf,
+        /// The joint.
+        name: &'static str,
+        /// Its number there.
+        found: usize,
+        /// Its number in SMPL.
+        expected: usize,
     },
     /// A vertex or joint is named by a fraction.
     #[error("{}: key '{key}', {place} is {value}, which is no whole number; vertices and joints are numbered 0, 1, 2 …", path.display())]
@@ -170,6 +185,12 @@ impl Body {
             Some(Ok(names)) if names.data.len() == joints => names.data,
             _ => skeleton::joint_names(joints),
         };
+        for (expected, name) in BODY_JOINT_NAMES.into_iter().enumerate() {
+            let found = joint_names.iter().position(|n| n == name).unwrap_or(expected);
+            if found != expected {
+                return Err(BodyFileError::JointOrder { path: path.into(), name, found, expected });
+            }
+        }
         let name = path.file_stem().map_or_else(|| "body".into(), |s| s.to_string_lossy().into_owned());
         Body::new(BodyParts {
             name,

@@ -3,6 +3,7 @@
 
 use super::pose::Pose;
 use super::provenance::Provenance;
+use super::rotation::matrix_from_axis_angle;
 use super::skeleton::{BODY_JOINT_COUNT, BODY_JOINT_NAMES};
 use crate::format::npz::{NpzError, NpzFile, NpzWriter};
 use std::ops::RangeInclusive;
@@ -59,7 +60,14 @@ impl Motion {
     /// # Errors
     /// [`MotionError`] naming file, key or frame.
     pub fn load(path: &Path) -> Result<Self, MotionError> {
-        Self::load_with_columns(path).map(|(motion, _)| motion)
+        let (motion, columns) = Self::load_with_columns(path)?;
+        if columns > 3 * BODY_JOINT_COUNT && stands_along_z(&motion.poses) {
+            tracing::warn!(
+                "{}: the body lies on its back as in files with z up; `clothcombo import amass` turns those",
+                path.display()
+            );
+        }
+        Ok(motion)
     }
 
     /// As [`Self::load`], with the number of columns of `poses`, which tells the layouts apart.
@@ -145,6 +153,16 @@ impl Motion {
             .strings("licence", &[], &[&self.source.licence]);
         Ok(npz.save(path)?)
     }
+}
+
+/// Whether the body stands along z, as in files with z up.
+pub(crate) fn stands_along_z(poses: &[Pose]) -> bool {
+    along_z(poses) > 0.7
+}
+
+/// Mean of the z component of the body's own vertical axis.
+pub(crate) fn along_z(poses: &[Pose]) -> f64 {
+    poses.iter().map(|p| matrix_from_axis_angle(p.rotation(0))[2][1]).sum::<f64>() / poses.len().max(1) as f64
 }
 
 #[cfg(test)]

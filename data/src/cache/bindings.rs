@@ -25,7 +25,9 @@ pub fn body_key(body: &Body) -> Key {
 pub fn binding_key(mesh: Key, body: Key, category: Category, settings: &BindingSettings) -> Key {
     let BindingSettings { smoothing_iterations, skirt_smoothing_iterations, smooth, shape_transfer } =
         *settings;
-    KeyBuilder::new("binding")
+    // Trousers that are not smoothed were bound to their own leg at first.
+    let kind = if category == Category::Trousers && !smooth { "binding 2" } else { "binding" };
+    KeyBuilder::new(kind)
         .key(mesh)
         .key(body)
         .text(category.name())

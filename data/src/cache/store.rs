@@ -40,6 +40,13 @@ pub enum CacheError {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Key(blake3::Hash);
 
+impl std::fmt::Display for Key {
+    /// In hexadecimal digits.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
 /// Collects what a record depends on.
 pub struct KeyBuilder(blake3::Hasher);
 
@@ -124,19 +131,27 @@ impl ArrayCache {
         self.root.join(&hex[..2]).join(&hex[2..])
     }
 
-    /// What `read` takes from the record of `key`; `None` if there is none. A damaged record is removed with a warning,
-    /// and counts as none.
+    /// What `read` takes from the record of `key`; `None` if there is none, or it cannot be read. A damaged record is
+    /// removed with a warning.
     pub fn get<T>(&self, key: Key, read: impl FnOnce(&Record) -> Result<T, RecordError>) -> Option<T> {
         let path = self.path(key);
         match Record::open(&path).and_then(|record| read(&record)) {
             Ok(value) => Some(value),
             Err(RecordError::Io { reason, .. }) if reason.kind() == io::ErrorKind::NotFound => None,
+            // It may be a good one that cannot be read just now.
+            Err(error @ RecordError::Io { .. }) => {
+                tracing::warn!("{error}; computed anew");
+                None
+            }
             Err(error) => {
-                tracing::warn!("{error}; removed");
                 let size = fs::metadata(&path).map_or(0, |m| m.len());
-                // If it cannot be removed, it is computed anew each time: slow, not wrong.
-                if fs::remove_file(&path).is_ok() {
-                    self.used.fetch_sub(size.min(self.used()), Ordering::Relaxed);
+                match fs::remove_file(&path) {
+                    Ok(()) => {
+                        self.used.fetch_sub(size.min(self.used()), Ordering::Relaxed);
+                        tracing::warn!("{error}; removed");
+                    }
+                    // It is computed anew each time: slow, not wrong.
+                    Err(reason) => tracing::warn!("{error}; it cannot be removed: {reason}"),
                 }
                 None
             }

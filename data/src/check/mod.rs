@@ -104,6 +104,9 @@ fn check_npz(path: &Path) -> FileCheck {
         body::check(path, &mut file)
     } else if file.contains("poses") {
         motion::check(path)
+    } else if file.contains("positions") && file.contains("f") {
+        let warning = "a simulated sequence: training does not read it".into();
+        FileCheck { warnings: vec![warning], ..FileCheck::new(path) }
     } else {
         FileCheck::unusable(
             path,

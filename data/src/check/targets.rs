@@ -1,7 +1,7 @@
 //! Which files a list of paths means.
 
 use crate::asset::Category;
-use crate::dataset::garment_folder::{MANIFEST, read_entries};
+use crate::dataset::garment_folder::{MANIFEST, list_garment_folder, read_entries};
 use crate::format::mesh::is_mesh_path;
 use std::collections::HashSet;
 use std::fs;
@@ -117,6 +117,7 @@ fn visit(folder: &Path, depth: usize, seen: &mut HashSet<PathBuf>, targets: &mut
     if has_manifest {
         match read_entries(folder) {
             Ok(entries) => {
+                let before = targets.len();
                 listed = Some(entries.iter().map(|entry| folder.join(entry.file())).collect());
                 targets.extend(entries.into_iter().map(|entry| {
                     let path = folder.join(entry.file());
@@ -129,6 +130,12 @@ fn visit(folder: &Path, depth: usize, seen: &mut HashSet<PathBuf>, targets: &mut
                         Target::Unusable { path, reason }
                     }
                 }));
+                // What it lists is there, but training may refuse the list.
+                if targets[before..].iter().all(|target| matches!(target, Target::Garment { .. }))
+                    && let Err(e) = list_garment_folder(folder)
+                {
+                    targets.push(Target::Unusable { path: manifest, reason: e.to_string() });
+                }
             }
             Err(e) => targets.push(Target::Unusable { path: manifest, reason: e.to_string() }),
         }

@@ -19,7 +19,7 @@ use crate::format::mesh::{MeshFileError, is_mesh_path, load_tri_mesh};
 use crate::format::obj::{self, ObjError};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -62,6 +62,15 @@ pub enum GarmentFolderError {
     #[error("{}: no garments; put OBJ, PLY, STL or glTF files there, or list them in {MANIFEST}", path.display())]
     Empty {
         /// The folder.
+        path: PathBuf,
+    },
+    /// A folder without a list holds another garment.
+    #[error(
+        "{} is there already and would no longer be found: {MANIFEST}, which is written, lists only what is made; hint: choose another folder",
+        path.display()
+    )]
+    Unlisted {
+        /// The other garment's mesh.
         path: PathBuf,
     },
     /// A mesh is unusable.
@@ -307,18 +316,40 @@ pub(crate) fn garment_folder_files(folder: &Path, garments: &[FolderGarment]) ->
     files.chain([MANIFEST.into()]).map(|file| folder.join(file)).collect()
 }
 
-/// Writes garments as `<name>.obj` and a manifest; the manifest comes last, so that a folder with one is complete. Returns the
-/// files written.
+/// Refuses a `folder` without a list in which a mesh lies that is none of `files`: the list that is to be written would hide it.
 ///
 /// # Errors
-/// If a file cannot be written.
+/// [`GarmentFolderError::Unlisted`] names the mesh.
+pub fn refuse_unlisted(folder: &Path, files: &HashSet<PathBuf>) -> Result<(), GarmentFolderError> {
+    if folder.join(MANIFEST).exists() {
+        return Ok(());
+    }
+    let there = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    match there.filter(|path| is_mesh_path(path)).find(|path| !files.contains(path)) {
+        Some(path) => Err(GarmentFolderError::Unlisted { path }),
+        None => Ok(()),
+    }
+}
+
+/// Writes garments as `<name>.obj` and lists them in the manifest, beside what it lists already; the manifest comes last, so that
+/// a folder with one is complete. Returns the files written.
+///
+/// # Errors
+/// If the folder holds garments that it does not list, its manifest cannot be read, or a file cannot be written.
 pub fn save_garment_folder(
     folder: &Path,
     garments: &[FolderGarment],
 ) -> Result<Vec<PathBuf>, GarmentFolderError> {
-    let entries = garments.iter().map(|g| save_garment(folder, g)).collect::<Result<Vec<_>, _>>()?;
+    let files = garment_folder_files(folder, garments);
+    refuse_unlisted(folder, &files.iter().cloned().collect())?;
+    let mut entries = read_manifest(folder)?;
+    for garment in garments {
+        let entry = save_garment(folder, garment)?;
+        entries.retain(|listed| listed.file != entry.file);
+        entries.push(entry);
+    }
     save_manifest(folder, entries)?;
-    Ok(garment_folder_files(folder, garments))
+    Ok(files)
 }
 
 #[cfg(test)]
@@ -364,6 +395,28 @@ mod tests {
         {
             assert!((a - b).abs() < 1e-7);
         }
+    }
+
+    #[test]
+    fn what_a_folder_lists_stays_listed_and_what_it_does_not_list_is_not_hidden() {
+        let named = |name: &str, height: f64| {
+            let rest = tube(0.1, height, 8, 4);
+            let source = Provenance::default();
+            let garment =
+                Garment { name: name.into(), category: Category::Top, rest, holding: false, source };
+            FolderGarment { garment, layer: None, path: PathBuf::new() }
+        };
+        let folder = folder_with(&[]);
+        save_garment_folder(folder.path(), &[named("a", 0.2), named("b", 0.2)]).unwrap();
+        save_garment_folder(folder.path(), &[named("b", 0.3), named("c", 0.2)]).unwrap();
+        let listed: Vec<String> =
+            list_garment_folder(folder.path()).unwrap().into_iter().map(|g| g.name).collect();
+        assert_eq!(listed, ["a", "b", "c"]);
+
+        let own = folder_with(&[("shirt.obj", TRIANGLE)]);
+        let refused = save_garment_folder(own.path(), &[named("a", 0.2)]).unwrap_err();
+        assert!(matches!(&refused, GarmentFolderError::Unlisted { path } if path.ends_with("shirt.obj")));
+        assert!(!own.path().join("a.obj").exists());
     }
 
     #[test]

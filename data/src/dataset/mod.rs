@@ -5,6 +5,6 @@ pub mod motion_folder;
 
 pub use garment_folder::{
     FolderGarment, GarmentFolderError, ListedGarment, ManifestEntry, list_garment_folder,
-    load_garment_folder, read_manifest, save_garment, save_garment_folder, save_manifest,
+    load_garment_folder, read_manifest, refuse_unlisted, save_garment, save_garment_folder, save_manifest,
 };
 pub use motion_folder::{MotionFolderError, load_motion_folder};

@@ -8,7 +8,7 @@
 use super::motions::{Clip, Input, MotionImportError, named, stem, write_motions};
 use super::thinning::{Thinned, Thinning, thin};
 use super::{Progress, Summary};
-use crate::asset::motion::MotionError;
+use crate::asset::motion::{MotionError, along_z, stands_along_z};
 use crate::asset::rotation::{Matrix3, axis_angle_from_matrix, matrix_from_axis_angle, product};
 use crate::asset::{Motion, Pose, Provenance};
 use crate::check::impossible_turn;
@@ -71,7 +71,11 @@ pub fn import_amass(
     progress("looking for motions", 0, 1);
     for input in inputs {
         let mut found = Vec::new();
-        find(input, &mut found, &mut HashSet::new(), 0)?;
+        // What was imported before is no input, unless it is asked for.
+        let below =
+            fs::canonicalize(out).ok().filter(|out| fs::canonicalize(input).ok().as_ref() != Some(out));
+        let mut seen = HashSet::from_iter(below);
+        find(input, &mut found, &mut seen, 0)?;
         files.extend(found.into_iter().map(|path| Input { name: clip_name(input, &path), path }));
     }
     progress("looking for motions", 1, 1);
@@ -168,7 +172,11 @@ fn import_file(path: &Path, settings: &AmassSettings) -> Result<Clip, String> {
     if !subject.is_empty() {
         note.push_str(&format!(", {subject}"));
     }
-    if lying < -0.2 || (lying.abs() < 0.2 && settings.up == UpAxis::Z && looks_y_up(&poses)) {
+    let was_turned_wrongly = match settings.up {
+        UpAxis::Z => looks_y_up(&poses),
+        UpAxis::Y => stands_along_z(&poses),
+    };
+    if lying < -0.2 || (lying.abs() < 0.2 && was_turned_wrongly) {
         note.push_str("; the body is not upright on average, check the up axis (--up)");
     }
     if let Some(turn) = impossible_turn(&poses) {
@@ -190,8 +198,7 @@ fn mean_uprightness(poses: &[Pose]) -> f64 {
 /// Whether undoing the turn from z up would make the body stand.
 fn looks_y_up(poses: &[Pose]) -> bool {
     // Row 1 of Yᵀ·R is −row 2 of R.
-    let upright = |p: &Pose| -matrix_from_axis_angle(p.rotation(0))[2][1];
-    poses.iter().map(upright).sum::<f64>() > 0.7 * poses.len() as f64
+    along_z(poses) < -0.7
 }
 
 /// Text or bytes, also the way Python prints bytes; empty if it is not there or something else.

@@ -1,8 +1,10 @@
 //! Motion capture in BVH form, retargeted to the 22 SMPL body joints.
 //!
-//! The skeletons known are those of the collections named in `NAMINGS`; see [`super::retarget`] for how they are matched.
+//! The skeletons known are those in `NAMINGS`, named after collections that use them; see [`super::retarget`] for how they are matched.
 
-use super::motions::{Clip, MotionImportError, named, require_body_joints, stem, write_motions};
+use super::motions::{
+    Clip, MotionImportError, named, provenance_of, require_body_joints, stem, write_motions,
+};
 use super::retarget::Retarget;
 use super::thinning::{Thinned, Thinning, largest_turn, thin};
 use super::{Progress, Summary};
@@ -19,13 +21,20 @@ pub struct BvhImportSettings {
     /// Drop a first frame that jumps to the second one by more than this angle [rad] and by more than ten times the usual
     /// step: some collections insert a T-pose there.
     pub inserted_frame_angle: f64,
+    /// Where the motions come from; the file itself does not say.
+    pub provenance: Provenance,
     /// The file that the body came from, which no motion may take the place of.
     pub body_file: Option<PathBuf>,
 }
 
 impl Default for BvhImportSettings {
     fn default() -> Self {
-        Self { frame_rate: 60.0, inserted_frame_angle: 0.2, body_file: None }
+        Self {
+            frame_rate: 60.0,
+            inserted_frame_angle: 0.2,
+            provenance: Provenance::default(),
+            body_file: None,
+        }
     }
 }
 
@@ -33,7 +42,6 @@ impl Default for BvhImportSettings {
 struct Naming {
     name: &'static str,
     joints: [&'static str; BODY_JOINT_COUNT],
-    provenance: fn() -> Provenance,
 }
 
 #[rustfmt::skip]
@@ -45,11 +53,6 @@ const NAMINGS: [Naming; 3] = [
             "Spine1", "LeftToeBase", "RightToeBase", "Neck", "LeftShoulder", "RightShoulder", "Head", "LeftArm",
             "RightArm", "LeftForeArm", "RightForeArm", "LeftHand", "RightHand",
         ],
-        provenance: || Provenance {
-            source: "CMU Graphics Lab Motion Capture Database (BVH conversion), as in Debian assimp-testmodels".into(),
-            author: "Carnegie Mellon University".into(),
-            licence: "CMU: free for research and commercial use".into(),
-        },
     },
     Naming {
         name: "Boxing",
@@ -58,11 +61,6 @@ const NAMINGS: [Naming; 3] = [
             "LeftToes", "RightToes", "Neck", "LeftCollar", "RightCollar", "Head", "LeftShoulder", "RightShoulder",
             "LeftElbow", "RightElbow", "LeftWrist", "RightWrist",
         ],
-        provenance: || Provenance {
-            source: "Debian assimp-testmodels (BVH/Boxing_Toes.bvh)".into(),
-            author: "assimp contributors".into(),
-            licence: "BSD-3-Clause".into(),
-        },
     },
     Naming {
         name: "mocapbank",
@@ -71,11 +69,6 @@ const NAMINGS: [Naming; 3] = [
             "LeftToe", "RightToe", "Neck", "LeftCollar", "RightCollar", "Head", "LeftShoulder", "RightShoulder",
             "LeftElbow", "RightElbow", "LeftWrist", "RightWrist",
         ],
-        provenance: || Provenance {
-            source: "Rust crate bvh_anim 0.4.0 (data/test_mocapbank.bvh)".into(),
-            author: "mocapbank; bvh_anim contributors".into(),
-            licence: "MIT".into(),
-        },
     },
 ];
 
@@ -155,7 +148,8 @@ fn import_file(file: &Path, body: &Body, settings: &BvhImportSettings) -> Result
     let thinning = Thinning { frame_rate: settings.frame_rate, static_threshold: 0.0 };
     let Thinned { poses, frame_rate, note: kept } = thin(poses, rate, &thinning);
     let note = format!("{} skeleton, {kept}{note}", naming.name);
-    let motion = Motion { name: String::new(), frame_rate, poses, source: (naming.provenance)() };
+    let source = provenance_of(file, &settings.provenance);
+    let motion = Motion { name: String::new(), frame_rate, poses, source };
     Ok(Clip { motion, subject: String::new(), note })
 }
 
@@ -276,6 +270,22 @@ mod tests {
         let (rest, yaw) = poses[0].without_heading();
         assert!((yaw.abs() - std::f64::consts::PI).abs() < 1e-9);
         assert!(rest.rotations.iter().flatten().all(|x| x.abs() < 1e-9));
+    }
+
+    #[test]
+    fn a_clip_says_where_it_comes_from_and_nothing_more() {
+        let folder = tempfile::tempdir().unwrap();
+        let clip = folder.path().join("walk.bvh");
+        std::fs::write(&clip, synthetic(&t_pose_joints(), &[[[0.0; 3]; BODY_JOINT_COUNT]; 3])).unwrap();
+        let body = crate::generate::mannequin();
+        let imported = |provenance: Provenance| {
+            let settings = BvhImportSettings { provenance, ..BvhImportSettings::default() };
+            import_file(&clip, &body, &settings).unwrap().motion.source
+        };
+        let own = imported(Provenance::default());
+        assert_eq!((own.source.as_str(), own.author.as_str(), own.licence.as_str()), ("walk", "", ""));
+        let given = Provenance { source: "my studio".into(), author: "me".into(), licence: "CC0".into() };
+        assert_eq!(imported(given.clone()), Provenance { source: "my studio (walk)".into(), ..given });
     }
 
     #[test]

@@ -4,7 +4,9 @@
 //! `ROW` relative to their parents: quaternions `w x y z`, and angles about z for knees and elbows. The character stands in y
 //! up, faces +x with its left towards −z, and rests with hanging arms.
 
-use super::motions::{Clip, MotionImportError, named, require_body_joints, stem, write_motions};
+use super::motions::{
+    Clip, MotionImportError, named, provenance_of, require_body_joints, stem, write_motions,
+};
 use super::retarget::{JointMap, Retarget};
 use super::thinning::{Thinned, Thinning, thin};
 use super::{Progress, Summary};
@@ -29,8 +31,11 @@ pub struct DeepMimicSettings {
 
 impl Default for DeepMimicSettings {
     fn default() -> Self {
-        let provenance = Provenance { source: "DeepMimic motion text".into(), ..Provenance::default() };
-        Self { thinning: Thinning { frame_rate: 60.0, static_threshold: 0.0 }, provenance, body_file: None }
+        Self {
+            thinning: Thinning { frame_rate: 60.0, static_threshold: 0.0 },
+            provenance: Provenance::default(),
+            body_file: None,
+        }
     }
 }
 
@@ -191,8 +196,7 @@ pub fn import_deepmimic(
         let poses = frames.iter().map(|row| retarget.pose(&world_rotations(row))).collect();
         let Thinned { poses, frame_rate, note } = thin(poses, rate, &settings.thinning);
         let note = format!("DeepMimic humanoid, {note}");
-        let mut source = settings.provenance.clone();
-        source.source = format!("{} ({})", source.source, stem(file));
+        let source = provenance_of(file, &settings.provenance);
         let motion = Motion { name: String::new(), frame_rate, poses, source };
         Ok(Clip { motion, subject: String::new(), note })
     };

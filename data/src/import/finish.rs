@@ -63,7 +63,7 @@ pub(super) fn label_rim(sheet: &mut LabelledTriangles, smoothing: usize, edge: f
         for _ in 0..smoothing {
             let old = sheet.positions.clone();
             for i in 0..n {
-                if corner_at(&old, i) && smoothing < 3 {
+                if corner_at(&old, i) {
                     continue;
                 }
                 let [a, b, c] = [(i + n - 1) % n, i, (i + 1) % n].map(|k| old[chain[k] as usize]);

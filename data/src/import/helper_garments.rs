@@ -300,8 +300,7 @@ fn ease(
         let gap = surface.gap(*p, Distance::ClosestPoint).gap;
         let side = p[0].signum();
         // The helper is already a little off the body: add what is missing to the ease.
-        let step =
-            if leg || !matches!(recipe.cut, Cut::Skirt { .. }) { (wanted - gap).max(0.0) } else { wanted };
+        let step = if !matches!(recipe.cut, Cut::Skirt { .. }) { (wanted - gap).max(0.0) } else { wanted };
         *p = add_scaled(*p, step, *n);
         if leg && p[1] < marks.hip[1] - 0.10 && p[0] * side < 0.003 {
             // Trouser legs do not reach through each other.

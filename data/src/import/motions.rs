@@ -14,7 +14,7 @@
 use super::overwrite::{OverwriteError, refuse_overwriting};
 use super::{Progress, Summary};
 use crate::asset::motion::MotionError;
-use crate::asset::{Body, Motion, skeleton::BODY_JOINT_COUNT};
+use crate::asset::{Body, Motion, Provenance, skeleton::BODY_JOINT_COUNT};
 use crate::format::atomic;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -144,6 +144,15 @@ pub(super) fn named(files: impl IntoIterator<Item = (PathBuf, String)>) -> Vec<I
 /// The file's name without its extension.
 pub(super) fn stem(path: &Path) -> String {
     path.file_stem().map_or_else(|| "motion".into(), |s| s.to_string_lossy().into_owned())
+}
+
+/// Where the motion of `file` comes from: what was given, with the file's name.
+pub(super) fn provenance_of(file: &Path, given: &Provenance) -> Provenance {
+    let source = match given.source.as_str() {
+        "" => stem(file),
+        source => format!("{source} ({})", stem(file)),
+    };
+    Provenance { source, ..given.clone() }
 }
 
 /// Imports each file with `import`, several at a time; writes the clips to `out` and records them in its manifest. What cannot

@@ -8,9 +8,9 @@ use crate::picture::save_png;
 use crate::scene::load_body;
 use clap::Parser;
 use clothcombo_data::asset::{Body, Category, Garment};
-use clothcombo_data::dataset::garment_folder::MANIFEST;
-use clothcombo_data::dataset::{FolderGarment, ManifestEntry, read_manifest, save_garment, save_manifest};
-use clothcombo_data::format::mesh::is_mesh_path;
+use clothcombo_data::dataset::{
+    FolderGarment, ManifestEntry, read_manifest, refuse_unlisted, save_garment, save_manifest,
+};
 use clothcombo_data::format::obj;
 use clothcombo_data::generate::{GarmentGenerator, GarmentSettings};
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
@@ -73,7 +73,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let folder = &arguments.output;
     // Before anything is made: a folder that holds other garments stays as it is.
     (0..arguments.count as u64).try_for_each(|i| order.check(arguments.start.wrapping_add(i)))?;
-    order.check_unlisted(arguments)?;
+    refuse_unlisted(folder, &order.paths(arguments)).into_diagnostic()?;
     let mut entries = read_manifest(folder).into_diagnostic()?;
     let listed: HashSet<String> = entries.iter().map(|e| e.file().to_string()).collect();
     let bar = progress_bar(arguments.count, "garments {bar:40} {pos}/{len} · {eta} left");
@@ -171,24 +171,12 @@ impl<'a> Order<'a> {
         }
     }
 
-    /// Refuses a folder of garments without a list: the list that is written would hide them.
-    fn check_unlisted(&self, arguments: &Arguments) -> Result<(), Report> {
-        if self.folder.join(MANIFEST).exists() {
-            return Ok(());
-        }
-        let own: HashSet<PathBuf> = (0..arguments.count as u64)
+    /// Where all garments that are asked for lie.
+    fn paths(&self, arguments: &Arguments) -> HashSet<PathBuf> {
+        (0..arguments.count as u64)
             .map(|i| self.category_and_seed(arguments.start.wrapping_add(i)))
             .map(|(category, seed)| self.path(category, seed))
-            .collect();
-        let files = std::fs::read_dir(self.folder).into_iter().flatten().flatten().map(|entry| entry.path());
-        match files.filter(|path| is_mesh_path(path)).find(|path| !own.contains(path)) {
-            Some(other) => Err(miette!(
-                help = "choose another folder with -o",
-                "{} is there already and would no longer be found: {MANIFEST}, which is written, lists only generated garments",
-                other.display()
-            )),
-            None => Ok(()),
-        }
+            .collect()
     }
 
     /// Makes garment `index` unless it is there.

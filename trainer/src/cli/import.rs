@@ -95,9 +95,31 @@ pub struct BvhArguments {
     /// Frames per second kept
     #[arg(long, default_value_t = 60.0, value_parser = positive)]
     frame_rate: f64,
+    #[command(flatten)]
+    provenance: ProvenanceArguments,
     /// Folder to write
     #[arg(short, long)]
     output: PathBuf,
+}
+
+/// Where motions come from, for their files and the manifest.
+#[derive(Args)]
+struct ProvenanceArguments {
+    /// Where the motions come from; without it the name of each file
+    #[arg(long, default_value = "", hide_default_value = true)]
+    source: String,
+    /// Whom to attribute
+    #[arg(long, default_value = "", hide_default_value = true)]
+    author: String,
+    /// Licence of the motions
+    #[arg(long, default_value = "", hide_default_value = true)]
+    licence: String,
+}
+
+impl ProvenanceArguments {
+    fn provenance(&self) -> Provenance {
+        Provenance { source: self.source.clone(), author: self.author.clone(), licence: self.licence.clone() }
+    }
 }
 
 /// Arguments of `import smplx`.
@@ -119,7 +141,8 @@ pub struct ThinningArguments {
     /// Frames per second kept
     #[arg(long, visible_alias = "fps", default_value_t = 30.0, value_parser = positive)]
     frame_rate: f64,
-    /// Drop frames that differ from the last one kept by less than this in every joint [degrees]; 0 keeps all
+    /// Drop frames that differ from the last one kept by less than this in every joint [degrees]: enough to train on, but slow
+    /// movement then plays faster; 0 keeps all, and with them the timing
     #[arg(long, default_value_t = 0.5, value_parser = not_negative)]
     static_threshold: f64,
 }
@@ -191,15 +214,8 @@ pub struct DeepmimicArguments {
     body: String,
     #[command(flatten)]
     thinning: ThinningArguments,
-    /// Where the texts come from, for the manifest
-    #[arg(long, default_value = "DeepMimic motion text")]
-    source: String,
-    /// Whom to attribute, for the manifest
-    #[arg(long, default_value = "")]
-    author: String,
-    /// Licence of the texts, for the manifest
-    #[arg(long, default_value = "")]
-    licence: String,
+    #[command(flatten)]
+    provenance: ProvenanceArguments,
     /// Folder to write
     #[arg(short, long)]
     output: PathBuf,
@@ -230,6 +246,7 @@ pub fn run(source: &Source) -> Result<(), Report> {
             let body = load_body(&a.body, 0)?;
             let settings = BvhImportSettings {
                 frame_rate: a.frame_rate,
+                provenance: a.provenance.provenance(),
                 body_file: Some(PathBuf::from(&a.body)),
                 ..BvhImportSettings::default()
             };
@@ -269,8 +286,7 @@ pub fn run(source: &Source) -> Result<(), Report> {
         }
         Source::Deepmimic(a) => {
             let body = load_body(&a.body, 0)?;
-            let provenance =
-                Provenance { source: a.source.clone(), author: a.author.clone(), licence: a.licence.clone() };
+            let provenance = a.provenance.provenance();
             let body_file = Some(PathBuf::from(&a.body));
             let settings = DeepMimicSettings { thinning: a.thinning.thinning(), provenance, body_file };
             import_deepmimic(&a.files, &body, &a.output, &settings, &mut progress).into_diagnostic()?

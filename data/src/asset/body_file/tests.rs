@@ -35,6 +35,17 @@ fn what_is_saved_loads_again() {
     assert_eq!(few.shape_directions[2..4], [body.shape_directions[3], body.shape_directions[4]]);
 }
 
+#[test]
+fn joints_in_another_order_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("body.npz");
+    let mut body = crate::generate::mannequin();
+    body.joint_names.swap(4, 5);
+    body.save(&path, &Provenance::default()).unwrap();
+    let message = Body::load(&path, &BodyFileSettings::default()).unwrap_err().to_string();
+    assert!(message.contains("body.npz") && message.contains("joint 5 is 'left_knee'"), "{message}");
+}
+
 /// The layout the SMPL family ships: unsigned tree with 2³² − 1 at the root, dense weights, a joint regressor.
 #[test]
 fn joints_come_from_the_regressor_and_a_missing_key_is_named() {

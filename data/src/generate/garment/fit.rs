@@ -42,6 +42,9 @@ pub(super) struct BodyFit {
     pub surface: Surface<f64>,
 }
 
+/// No vertex of a body is farther from the pelvis [m].
+const FARTHEST: f64 = 5.0;
+
 impl BodyFit {
     pub fn new(body: &Body) -> Result<Self, GarmentError> {
         let unsuitable = |reason: String| GarmentError::UnsuitableBody { body: body.name.clone(), reason };
@@ -49,6 +52,11 @@ impl BodyFit {
             return Err(unsuitable(format!(
                 "it has {} joints; garments are cut by the {BODY_JOINT_COUNT} SMPL body joints",
                 body.joint_count()
+            )));
+        }
+        if let Some(vertex) = body.template.iter().position(|p| p.iter().any(|x| x.abs() > FARTHEST)) {
+            return Err(unsuitable(format!(
+                "vertex {vertex} is more than {FARTHEST} m from its pelvis; is it in metres?"
             )));
         }
         let joint = &body.joint_template;

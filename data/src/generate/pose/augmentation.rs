@@ -1,6 +1,6 @@
 //! Variations of recorded poses: a thin collection of motion becomes a dense one.
 
-use super::limits::{JOINT_LIMITS, other_side};
+use super::limits::JOINT_LIMITS;
 use crate::asset::{BODY_JOINT_COUNT, Pose};
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
@@ -70,7 +70,6 @@ impl PoseAugmentation {
                 rotation[axis] = (factor * recorded + noise * jitter).clamp(low, high);
             }
         }
-        debug_assert!((0..BODY_JOINT_COUNT).all(|j| other_side(other_side(j)) == j));
         result
     }
 }

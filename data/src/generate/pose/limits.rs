@@ -5,7 +5,6 @@
 //! (American Academy of Orthopaedic Surgeons, "Joint Motion", 1965), rounded, and kept a little inside where the skin of a
 //! linear-blend body would fold into itself.
 
-use crate::asset::skeleton::mirrored_joint;
 use crate::asset::{BODY_JOINT_COUNT, Pose};
 
 /// Lower and upper bound of each axis-angle component in degrees.
@@ -91,19 +90,15 @@ pub fn is_within_limits(pose: &Pose) -> bool {
     })
 }
 
-/// The body joint on the other side.
-pub(super) fn other_side(joint: usize) -> usize {
-    mirrored_joint(joint, BODY_JOINT_COUNT)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::asset::skeleton::mirrored_joint;
 
     #[test]
     fn limits_are_mirror_images_and_allow_the_t_pose() {
         for joint in 0..BODY_JOINT_COUNT {
-            assert_eq!(JOINT_LIMITS[other_side(joint)], mirrored(JOINT_LIMITS[joint]));
+            assert_eq!(JOINT_LIMITS[mirrored_joint(joint, BODY_JOINT_COUNT)], mirrored(JOINT_LIMITS[joint]));
             let limits = JOINT_LIMITS[joint];
             assert!((0..3).all(|a| limits.low[a] <= 0.0 && limits.high[a] >= 0.0));
         }

@@ -1,7 +1,7 @@
 //! The learned model of the whole base mesh: skin, joints and clothing helpers under one set of shape components.
 
 use super::AnnySettings;
-use super::people::{Components, principal_components};
+use super::people::{Components, enough_people, principal_components};
 use super::phenotype::{Phenotype, Targets};
 use super::rig::Rig;
 use super::t_pose::t_pose;
@@ -68,12 +68,22 @@ impl Source {
     }
 }
 
+/// Most people that shape components are learned from: each takes half a megabyte.
+const MOST_PEOPLE: usize = 10_000;
+
 impl BaseModel {
     /// Builds random adults and learns the shape components.
     ///
     /// # Errors
     /// [`AnnyError`] naming the member of the wheel that is missing or wrong.
     pub fn learn(wheel: &Path, settings: &AnnySettings, progress: Progress<'_>) -> Result<Self, AnnyError> {
+        if settings.people > MOST_PEOPLE {
+            return Err(AnnyError::Settings(format!(
+                "{} people; at most {MOST_PEOPLE} fit in memory",
+                settings.people
+            )));
+        }
+        enough_people(settings.people, settings.shape_components)?;
         progress("reading the base mesh and its targets", 0, 1);
         let source = Source::read(wheel)?;
         progress("reading the base mesh and its targets", 1, 1);

@@ -14,6 +14,16 @@ pub struct Components {
     pub explained: Vec<f64>,
 }
 
+/// Whether `count` components can be learned from `people`.
+pub fn enough_people(people: usize, count: usize) -> Result<(), AnnyError> {
+    match people >= 2 && count < people {
+        true => Ok(()),
+        false => Err(AnnyError::Settings(format!(
+            "{count} shape components need more than {count} people, not {people}"
+        ))),
+    }
+}
+
 /// PCA by the Gram matrix of the first `measured` coordinates of each row, applied to all coordinates, so that joints and
 /// helper meshes follow the same components as the skin.
 pub fn principal_components(
@@ -22,11 +32,7 @@ pub fn principal_components(
     count: usize,
 ) -> Result<Components, AnnyError> {
     let n = rows.len();
-    if n < 2 || count >= n {
-        return Err(AnnyError::Settings(format!(
-            "{count} shape components need more than {count} people, not {n}"
-        )));
-    }
+    enough_people(n, count)?;
     let width = rows[0].len();
     let mut mean = vec![0.0; width];
     for row in rows {

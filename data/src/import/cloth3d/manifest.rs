@@ -3,23 +3,24 @@
 use super::info::SampleInfo;
 use crate::asset::Category;
 use crate::format::atomic;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+use std::fs;
 use std::io;
 use std::path::Path;
 
-#[derive(Serialize)]
+#[derive(Serialize, Deserialize)]
 struct Manifest {
-    source: &'static str,
-    author: &'static str,
-    licence: &'static str,
+    source: String,
+    author: String,
+    licence: String,
     sample: Vec<SampleEntry>,
 }
 
 /// One sample.
-#[derive(Serialize)]
+#[derive(Serialize, Deserialize)]
 pub(super) struct SampleEntry {
     pub name: String,
-    pub gender: &'static str,
+    pub gender: String,
     pub shape: Vec<f64>,
     pub tightness: Vec<f64>,
     pub zrot: f64,
@@ -28,12 +29,12 @@ pub(super) struct SampleEntry {
 }
 
 /// One garment of it.
-#[derive(Serialize)]
+#[derive(Serialize, Deserialize)]
 pub(super) struct GarmentEntry {
     pub name: String,
     pub file: String,
     pub category: Category,
-    #[serde(skip_serializing_if = "String::is_empty")]
+    #[serde(default, skip_serializing_if = "String::is_empty")]
     pub fabric: String,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub simulated_frames: Option<usize>,
@@ -45,7 +46,7 @@ impl SampleEntry {
     pub fn new(name: &str, info: &SampleInfo) -> Self {
         Self {
             name: name.into(),
-            gender: info.gender.name(),
+            gender: info.gender.name().into(),
             shape: info.shape.clone(),
             tightness: info.tightness.clone(),
             zrot: info.zrot,
@@ -55,10 +56,21 @@ impl SampleEntry {
     }
 }
 
-/// Writes the manifest, whole or not at all.
-pub(super) fn write(path: &Path, sample: Vec<SampleEntry>) -> io::Result<()> {
-    let manifest =
-        Manifest { source: "CLOTH3D / CLOTH3D++", author: super::AUTHOR, licence: super::LICENCE, sample };
+/// Adds samples to the manifest, in place of earlier ones of the same names; it is written whole or not at all.
+pub(super) fn add(path: &Path, sample: Vec<SampleEntry>) -> io::Result<()> {
+    let mut all: Vec<SampleEntry> = match fs::read_to_string(path) {
+        Ok(text) => toml::from_str::<Manifest>(&text).map_err(io::Error::other)?.sample,
+        Err(reason) if reason.kind() == io::ErrorKind::NotFound => Vec::new(),
+        Err(reason) => return Err(reason),
+    };
+    all.retain(|known| sample.iter().all(|new| new.name != known.name));
+    all.extend(sample);
+    let manifest = Manifest {
+        source: "CLOTH3D / CLOTH3D++".into(),
+        author: super::AUTHOR.into(),
+        licence: super::LICENCE.into(),
+        sample: all,
+    };
     let text = toml::to_string(&manifest).map_err(io::Error::other)?;
     atomic::write(path, text.as_bytes())
 }

@@ -94,7 +94,7 @@ pub struct Cloth3dBodies<'a> {
 pub struct Cloth3dSettings {
     /// How garments are bound to the body for being unposed.
     pub binding: BindingSettings,
-    /// Which frames of the motions are kept.
+    /// Which frames of the motions are kept; all where point caches are converted.
     pub thinning: Thinning,
     /// Convert the point caches as well.
     pub caches: bool,
@@ -175,7 +175,7 @@ pub fn import_cloth3d(
     summary.notes.extend(motions.notes);
     summary.written.extend(motions.written);
     let path = out.join("cloth3d.toml");
-    manifest::write(&path, entries).map_err(|reason| Cloth3dError::Io { path: path.clone(), reason })?;
+    manifest::add(&path, entries).map_err(|reason| Cloth3dError::Io { path: path.clone(), reason })?;
     summary.written.push(path);
     Ok(summary)
 }
@@ -389,7 +389,10 @@ fn motion(info_mat: &Path, settings: &Cloth3dSettings) -> Result<Clip, String> {
     let info = SampleInfo::load(info_mat)?;
     let mut poses = info.poses;
     poses.iter_mut().for_each(turn_root_to_y_up);
-    let Thinned { poses, frame_rate, note } = thin(poses, FRAME_RATE, &settings.thinning);
+    // Simulated frames are matched with poses by their numbers.
+    let all = Thinning { frame_rate: FRAME_RATE, static_threshold: 0.0 };
+    let thinning = if settings.caches { &all } else { &settings.thinning };
+    let Thinned { poses, frame_rate, note } = thin(poses, FRAME_RATE, thinning);
     let folder = info_mat.parent().and_then(Path::file_name).map(|f| f.to_string_lossy().into_owned());
     let source = provenance(&folder.unwrap_or_default());
     let motion = Motion { name: String::new(), frame_rate, poses, source };

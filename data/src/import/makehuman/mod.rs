@@ -165,9 +165,7 @@ fn import_proxy(
     let edge = settings.resolution.edge_for(sheet.area());
     label_rim(&mut sheet, 2, edge);
     let (rest, contact) = finish(sheet, surface, &settings.resolution).map_err(refuse)?;
-    if contact.inside > 0 {
-        repairs.push(format!("pushed {} vertices out of the body", contact.inside));
-    }
+    repairs.extend(pushed(contact));
     let known = CATEGORIES.iter().find(|(n, _)| *n == name).map(|(_, c)| *c);
     let category = known.unwrap_or_else(|| Category::guess(&rest, body));
     let source = Provenance {
@@ -175,7 +173,12 @@ fn import_proxy(
         author: proxy.author.clone(),
         licence: licence.to_string(),
     };
-    Ok(take(name, category, rest, body, source, &repairs, contact))
+    Ok(take(name, category, rest, body, source, &repairs))
+}
+
+/// What `contact` with the body did to a garment, if anything.
+fn pushed(contact: Contact) -> Option<String> {
+    (contact.inside > 0).then(|| format!("pushed {} vertices out of the body", contact.inside))
 }
 
 fn take(
@@ -185,7 +188,6 @@ fn take(
     body: &Body,
     source: Provenance,
     repairs: &[String],
-    _contact: Contact,
 ) -> Taken {
     let note = format!(
         "{category}, {} vertices, {} triangles, edge {:.1} cm, {} ({}){}{}",
@@ -234,7 +236,8 @@ fn helper_garments(
                     author: "MakeHuman community".into(),
                     licence: "CC0-1.0".into(),
                 };
-                taken.push(take(helper.name.into(), helper.category, rest, body, source, &[], contact));
+                let repairs = Vec::from_iter(pushed(contact));
+                taken.push(take(helper.name.into(), helper.category, rest, body, source, &repairs));
             }
             Err(reason) => summary.skipped.push((helper.name.into(), reason)),
         }

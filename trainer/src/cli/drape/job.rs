@@ -18,7 +18,7 @@ pub(super) struct SceneArguments {
     /// Pose: a frame of a motion file, FILE.npz or FILE.npz:FRAME; default: the T-pose
     #[arg(long, value_name = "POSE", conflicts_with_all = ["motion", "posed"])]
     pub pose: Option<String>,
-    /// Motion file (npz with poses and mocap_framerate, as AMASS has them): drapes every frame
+    /// Motion file (npz with poses and mocap_framerate, y up; `import amass` makes them of AMASS files): drapes every frame
     #[arg(long, value_name = "NPZ", conflicts_with = "posed")]
     pub motion: Option<PathBuf>,
     /// Frames of the motion: FIRST..END, FIRST.. or ..END, without END
