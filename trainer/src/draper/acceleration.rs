@@ -10,8 +10,8 @@ use serde::{Deserialize, Serialize};
 pub struct Acceleration {
     /// 95th percentile of the result.
     pub draped_95: f64,
-    /// 95th percentile of what the networks made, before any post-process.
-    pub network_95: f64,
+    /// 95th percentile of what came to the post-process: what the networks made, averaged over frames if that was asked for.
+    pub before_95: f64,
     /// 95th percentile of linear blend skinning of the start state.
     pub skinned_95: f64,
     /// Their ratio; above 1 the cloth moves less smoothly than skin.
@@ -38,11 +38,11 @@ pub fn acceleration(drapes: &[Drape], moments: &[Moment]) -> Option<Acceleration
         }
         (!values.is_empty()).then(|| Spread::of(values).p95)
     };
-    let [draped_95, network_95, skinned_95] =
+    let [draped_95, before_95, skinned_95] =
         [of(|g| &g.positions)?, of(|g| &g.network)?, of(|g| &g.skinned)?];
     (skinned_95 > 0.0 && step > 0.0).then(|| Acceleration {
         draped_95,
-        network_95,
+        before_95,
         skinned_95,
         ratio: draped_95 / skinned_95,
     })

@@ -57,11 +57,11 @@ impl Draper {
     ) -> Result<Vec<Drape>, DraperError> {
         let mut drapes: Vec<Drape> = Vec::with_capacity(bodies.len());
         let (mut bearable, mut only_carried) = (Bearable::NONE, 0);
-        let mut steady = Steady::new(self, outfit, bodies, radius);
-        for (frame, body) in bodies.iter().enumerate() {
+        let steady = Steady::new(self, outfit, bodies, radius);
+        for ((frame, body), made) in bodies.iter().enumerate().zip(steady) {
             let last = drapes.last().map(|drape| Last { body: &bodies[frame - 1], drape, bearable });
             let mut watch = |share| progress(DrapeProgress::OnTheWay(share));
-            let mut drape = self.drape_frame(outfit, Frame { body, last }, steady.at(frame)?, &mut watch)?;
+            let mut drape = self.drape_frame(outfit, Frame { body, last }, made?, &mut watch)?;
             if !bearable.is_met(&drape.certificate) {
                 (bearable, only_carried) = (Bearable::after(&drape.certificate), FRAMES_CARRIED);
             } else if only_carried > 1 {

@@ -171,8 +171,9 @@ impl Closet {
             return Ok(SourceGarment::new(maker.make(origin)?));
         };
         let made = maker.make(origin);
-        let must_fit =
-            always_fit.unwrap_or_else(|| !made.as_ref().is_ok_and(|garment| is_on_body(&garment.rest, body)));
+        let must_fit = always_fit.unwrap_or_else(|| {
+            !made.as_ref().is_ok_and(|garment| is_clean(&garment.rest) && is_on_body(&garment.rest, body))
+        });
         if must_fit {
             let mut source = SourceGarment::read(&listed.path, body, Some(true))?;
             source.garment.name.clone_from(&listed.name);

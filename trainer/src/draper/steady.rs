@@ -8,23 +8,20 @@ use super::smooth::{averaged, binomial};
 use super::{BodyState, Draper, DraperError, Outfit};
 use clothcombo_physics::transform::{into_frame, out_of_frame};
 use clothcombo_physics::vec3::{add, sub};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 
-/// The frames of a motion as the networks make them, in order.
+/// The frames of a motion as the networks make them, in order; each is made when it is first needed.
 pub(super) struct Steady<'a> {
     draper: &'a Draper,
     outfit: &'a Outfit,
     bodies: &'a [BodyState],
     weights: Vec<f64>,
-    /// Frames around the last that was asked for.
-    near: BTreeMap<usize, Near>,
-}
-
-struct Near {
-    /// Until it was asked for.
-    made: Option<Networked>,
-    /// Offsets from skinning in the frames of the skinning transforms.
-    offsets: Vec<[f64; 3]>,
+    /// The frame that comes next.
+    next: usize,
+    /// What was made of it and of frames after it.
+    made: VecDeque<Networked>,
+    /// Offsets from skinning in the frames of the skinning transforms, of those and of the frames before that are averaged.
+    offsets: BTreeMap<usize, Vec<[f64; 3]>>,
 }
 
 impl<'a> Steady<'a> {
@@ -32,32 +29,40 @@ impl<'a> Steady<'a> {
     pub fn new(draper: &'a Draper, outfit: &'a Outfit, bodies: &'a [BodyState], radius: usize) -> Self {
         // One frame has no neighbours.
         let radius = if bodies.len() > 1 { radius } else { 0 };
-        Self { draper, outfit, bodies, weights: binomial(radius), near: BTreeMap::new() }
+        let (made, offsets) = (VecDeque::new(), BTreeMap::new());
+        Self { draper, outfit, bodies, weights: binomial(radius), next: 0, made, offsets }
     }
 
-    /// The next frame. Each is asked for once, in ascending order.
-    pub fn at(&mut self, frame: usize) -> Result<Networked, DraperError> {
-        let (radius, count) = (self.weights.len() / 2, self.bodies.len());
-        if radius == 0 {
-            return self.draper.networked(&self.draper.model, self.outfit, &self.bodies[frame]);
-        }
-        self.near.retain(|other, _| other + radius >= frame);
-        for other in frame..count.min(frame + radius + 1) {
-            if !self.near.contains_key(&other) {
-                let made = self.draper.networked(&self.draper.model, self.outfit, &self.bodies[other])?;
-                let offsets = offsets(&made);
-                self.near.insert(other, Near { made: Some(made), offsets });
+    /// Makes what is missing for the next frame.
+    fn make(&mut self) -> Result<(), DraperError> {
+        let radius = self.weights.len() / 2;
+        for frame in self.next + self.made.len()..self.bodies.len().min(self.next + radius + 1) {
+            let made = self.draper.networked(&self.draper.model, self.outfit, &self.bodies[frame])?;
+            if radius > 0 {
+                self.offsets.insert(frame, offsets(&made));
             }
+            self.made.push_back(made);
         }
-        let mean = averaged(|other| &self.near[&other].offsets, count, frame, &self.weights);
-        let made = self.near.get_mut(&frame).and_then(|near| near.made.take());
-        let mut made = match made {
-            Some(made) => made,
-            None => self.draper.networked(&self.draper.model, self.outfit, &self.bodies[frame])?,
-        };
-        let vertices = made.skinned.iter().zip(&made.transforms).zip(mean);
-        made.network = vertices.map(|((p, t), offset)| add(*p, out_of_frame(t, offset))).collect();
-        Ok(made)
+        self.offsets.retain(|frame, _| frame + radius >= self.next);
+        Ok(())
+    }
+}
+
+impl Iterator for Steady<'_> {
+    type Item = Result<Networked, DraperError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if let Err(error) = self.make() {
+            return Some(Err(error));
+        }
+        let mut made = self.made.pop_front()?;
+        if !self.offsets.is_empty() {
+            let mean = averaged(|other| &self.offsets[&other], self.bodies.len(), self.next, &self.weights);
+            let vertices = made.skinned.iter().zip(&made.transforms).zip(mean);
+            made.network = vertices.map(|((p, t), offset)| add(*p, out_of_frame(t, offset))).collect();
+        }
+        self.next += 1;
+        Some(Ok(made))
     }
 }
 

@@ -82,7 +82,7 @@ pub struct Arguments {
     #[arg(long, conflicts_with = "cache")]
     no_cache: bool,
     /// Writes OBJ files of every frame of a motion, not only of the first
-    #[arg(long)]
+    #[arg(long, requires = "moving")]
     all_frames: bool,
     /// Replaces the folder of an earlier drape
     #[arg(long)]

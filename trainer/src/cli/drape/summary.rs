@@ -143,10 +143,10 @@ fn certificate(report: &Report) -> String {
     if let Some(found) = &report.acceleration {
         text += &format!(
             "\nacceleration of 95 % of the vertices at most {} m/s², {:.2} times that of skinning \
-             ({:.2} as the networks made it)",
+             ({:.2} before the post-process)",
             number(found.draped_95),
             found.ratio,
-            found.network_95 / found.skinned_95
+            found.before_95 / found.skinned_95
         );
     }
     if let Some(done) = &report.refinement {
