@@ -41,7 +41,8 @@ pub struct ModelConfig {
     pub untangling_scale: f64,
     /// Factor on the output of S, which makes it ΔW.
     pub skinning_scale: f64,
-    /// Keep Σ_j W_j = 1 by removing the mean of ΔW over a garment's joints. `false` is the paper's raw sum.
+    /// Keep Σ_j W_j = 1 by removing the mean of ΔW over a garment's joints. `false` is the paper's raw sum. In
+    /// either case a vertex only gets weight on joints that its garment's initial weights use.
     pub zero_sum_skinning: bool,
     /// Hand the vertex embedding `z_v` to `D_s`, `S` and `D_m`. `false` is an ablation of the paper: they see zeros, and the
     /// garment embedding `z̄_v` alone tells garments apart.

@@ -13,7 +13,7 @@ pub const TINY: &str = include_str!("../fixtures/tiny.toml");
 
 /// What the contract tests have otherwise: two bodies per step, the pose filter, a checkpoint every thirty steps, pictures.
 const CONTRACTS: [&str; 4] = [
-    "stages.0.scenes_per_step=2",
+    "stages.0.bodies=2",
     "data.poses.max_self_intersection=0.1",
     "output.checkpoint_every=30",
     "output.sample_scenes=1",

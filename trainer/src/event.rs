@@ -1,5 +1,6 @@
 //! What the training loop says while it runs. The loop knows no progress bar, file or picture: observers do.
 
+use crate::checkpoint::Best;
 use crate::evaluate::ValidationReport;
 use clothcombo_physics::energy::Term;
 use miette::Report;
@@ -19,7 +20,8 @@ pub struct StepRecord {
     /// Share of the full pose.
     pub pose_scale: f64,
     /// Weighted sum that was minimised, mean over the step's bodies: that of `weighted` and, where `losses.alone` counts, the
-    /// losses of the garments draped alone.
+    /// losses of the garments draped alone. Where corrections learn, it is the mean over what each of them leads to, and the
+    /// energies below are those of the last.
     pub loss: f64,
     /// Raw energies, summed over garments or pairs, mean over the step's bodies; terms that were not evaluated are
     /// left out.
@@ -96,6 +98,8 @@ pub enum TrainEvent<'a> {
         step: u64,
         /// The scores.
         report: &'a ValidationReport,
+        /// The best one after a step so far.
+        best: Option<Best>,
     },
     /// A checkpoint is about to be written: logs that must reach as far as it are to be flushed now.
     CheckpointDue {

@@ -46,7 +46,7 @@ pub fn felt(
         .expect("every vertex of the scene has its features")
 }
 
-/// Posed directions `[ΣV, 3]` turned back by the transforms that skinning moves their vertices with.
+/// Posed directions `[ΣV, 3]` turned back by the transforms that the initial skin weights give their vertices.
 fn unposed(scene: &PreparedScene, body: &PreparedBody, posed: &[[f32; 3]]) -> Vec<[f32; 3]> {
     let bones = &body.bones;
     let turned_back = |direction: &[f32; 3], weights: &[f32]| {

@@ -87,7 +87,7 @@ pub fn estimate(config: &Config, library: &Library, parameters: usize) -> Option
     let garments = sizes.iter().map(|v| of_garment(*v)).sum::<usize>().min(library.memory_limit) as u64;
 
     let body = BODY_VERTEX * library.body.template.len() + BODY_TRIANGLE * library.body.faces.len();
-    let bodies = config.stages.iter().map(|s| s.scenes_per_step * s.accumulate).max().unwrap_or(1);
+    let bodies = config.stages.iter().map(|s| s.bodies * s.accumulate).max().unwrap_or(1);
     let validated =
         VALIDATION_SCENES.min(config.validation.single_scenes.max(config.validation.layered_scenes));
     let scenes = (body * ((SCENES_AHEAD + 2) * bodies + validated)) as u64;
@@ -127,7 +127,7 @@ fn per_vertex(config: &Config, stage: &StageConfig, joints: usize) -> f64 {
         Trains::All => 2.0 * sine + skinning,
         Trains::Corrections => PER_CORRECTION_LAYER * (m.corrections * m.correction_width) as f64,
     };
-    stage.scenes_per_step as f64 * (networks + energies)
+    stage.bodies as f64 * (networks + energies)
 }
 
 #[cfg(test)]

@@ -139,8 +139,8 @@ impl RunDir {
         Ok(run)
     }
 
-    /// Makes `config` the run's own; the one before is kept beside it as `config.before-N.toml`. Returns the keys that
-    /// change, none when nothing that matters does.
+    /// Makes `config` the run's own. Returns the keys that change; if there are any that matter, the configuration before is
+    /// kept beside it as `config.before-N.toml`.
     ///
     /// # Errors
     /// When a file cannot be written.
@@ -152,8 +152,8 @@ impl RunDir {
                 .find(|path| !path.exists())
                 .expect("there are more numbers than files");
             fs::copy(self.config(), &kept).map_err(|e| io_error(&kept, e))?;
-            self.write_config(config)?;
         }
+        self.write_config(config)?;
         Ok(keys)
     }
 
@@ -356,6 +356,11 @@ mod tests {
         assert_eq!(load(&run.config(), &[]).unwrap().stages[0].steps, 20);
         assert_eq!(load(&folder.path().join("config.before-1.toml"), &[]).unwrap().stages[0].steps, 10);
         assert!(run.adopt_config(&changed).unwrap().is_empty());
+        // What changes no result is taken over without further ado.
+        let changed = Config { output: config(&["output.keep_checkpoints=4"]).output, ..changed };
+        assert!(run.adopt_config(&changed).unwrap().is_empty());
+        assert_eq!(load(&run.config(), &[]).unwrap().output.keep_checkpoints, 4);
+        assert!(!folder.path().join("config.before-2.toml").exists());
     }
 
     #[test]

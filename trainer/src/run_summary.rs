@@ -2,9 +2,12 @@
 
 use crate::checkpoint::Checkpoint;
 use crate::config::{Config, load};
+use crate::evaluate::Method;
+use crate::observer::best_so_far;
 use crate::paths::lossy;
 use crate::report::run_name;
 use crate::run_lock::RunLock;
+use crate::scene::ValidationGroup;
 use serde::Serialize;
 use serde_json::Value;
 use std::io::{self, BufRead, BufReader};
@@ -163,27 +166,17 @@ impl RunSummary {
     fn read_validations(&mut self, root: &Path) {
         for line in values(&root.join("validation.jsonl")) {
             // Before the first step there is nothing to compare.
-            let Some(step) = line["step"].as_u64().filter(|step| *step > 0) else { continue };
-            let networks: Vec<(&str, &Value, &Value)> = line["groups"]
-                .as_array()
-                .into_iter()
-                .flatten()
-                .filter_map(|g| {
-                    let methods = g["methods"].as_array()?;
-                    let skinning = methods.iter().find(|m| m["method"] == "LBS")?;
-                    Some((g["group"].as_str()?, methods.last()?, skinning))
-                })
-                .collect();
-            let totals: Vec<f64> =
-                networks.iter().filter_map(|(_, m, _)| m["total"]["mean"].as_f64()).collect();
-            let score = totals.iter().sum::<f64>() / totals.len() as f64;
-            if score.is_finite() && self.best_score.is_none_or(|best| score < best) {
-                (self.best_step, self.best_score) = (Some(step), Some(score));
+            if line["step"].as_u64().is_none_or(|step| step == 0) {
+                continue;
             }
-            for (group, network, skinning) in networks {
-                if group.starts_with("layered") {
+            (self.best_step, self.best_score) = best_so_far(&line).unzip();
+            for group in line["groups"].as_array().into_iter().flatten() {
+                let methods = group["methods"].as_array().map_or(&[][..], Vec::as_slice);
+                let skinning = methods.iter().find(|m| m["method"] == Method::StartSkinning.name());
+                let (Some(network), Some(skinning)) = (methods.last(), skinning) else { continue };
+                if group["group"] == ValidationGroup::Layered.name() {
                     self.wrong_side = network["wrong_side"].as_f64();
-                } else if group == "single garments" {
+                } else if group["group"] == ValidationGroup::Single.name() {
                     let strain = |m: &Value| m["raw"]["strain"]["mean"].as_f64();
                     self.strain_ratio = strain(network).zip(strain(skinning)).map(|(a, b)| a / b);
                     self.inside = network["inside"].as_f64();

@@ -50,7 +50,7 @@ fn run(
 
     tell(&TrainEvent::Started { step: first_step, total_steps })?;
     if first_step == 0 && session.leads() {
-        tell(&TrainEvent::Validated { step: 0, report: &session.validate()? })?;
+        tell(&TrainEvent::Validated { step: 0, report: &session.validate()?, best: None })?;
     }
     let (tensors, config) = (session.tensors().clone(), session.shared_config());
     let scenes = Prefetch::start(tensors, config, first_step, SCENES_AHEAD, session.share())
@@ -96,7 +96,7 @@ fn run(
             if at.last_of_stage || due(validate_every) {
                 let scores = session.validate()?;
                 is_best = session.note_validation(&scores) && output.keep_best;
-                tell(&TrainEvent::Validated { step: done, report: &scores })?;
+                tell(&TrainEvent::Validated { step: done, report: &scores, best: session.best() })?;
             }
             if at.last_of_stage || due(output.sample_every) {
                 tell(&TrainEvent::SampleDrawn { path: &session.draw_sample()? })?;

@@ -11,7 +11,7 @@ use crate::error::{ModelError, check_array};
 pub struct BodyTensors {
     /// Shape coefficients β `[1,S]`.
     pub shape: Tensor<2>,
-    /// Pose feature θ `[1,P]` of the active joints, heading removed.
+    /// Pose feature θ `[1,P]` of the active joints.
     pub pose: Tensor<2>,
     /// World transform of every active joint relative to the T-pose `[J,12]`: the rows of a 3×4 matrix one after another.
     pub bones: Tensor<2>,

@@ -1,5 +1,6 @@
 //! A run that is interrupted and continued equals one that never stopped, bit for bit.
 
+use clothcombo_data::format::obj;
 use clothcombo_tests::tiny_config;
 use clothcombo_trainer::checkpoint::{Checkpoint, TrainedModel};
 use clothcombo_trainer::config::Config;
@@ -180,6 +181,42 @@ fn what_was_trained_is_kept_when_something_beside_it_fails() {
     let kept = Checkpoint::open(&place).unwrap();
     assert_eq!(kept.state.step, 7);
     assert_eq!(Session::resume(RunDir::follow(&place), config, library, &device, &kept).unwrap().step(), 7);
+}
+
+#[test]
+fn a_run_does_not_go_on_with_other_data() {
+    let folder = tempfile::tempdir().unwrap();
+    let generated = Library::load(&tiny_config(folder.path(), &[]), &|_, _, _| {}).unwrap();
+    let names: Vec<String> = (0..2)
+        .map(|index| {
+            let garment = generated.wardrobe.garment(index).unwrap();
+            let name = format!("garment_{index}.obj");
+            let rest = &garment.garment.rest;
+            obj::save(&folder.path().join(&name), rest.positions(), rest.faces(), &[]).unwrap();
+            name
+        })
+        .collect();
+    let config = tiny_config(
+        folder.path(),
+        &[&format!("data.garments=[{{folder={:?}}}]", folder.path()), "stages.0.steps=5"],
+    );
+    let load = |category: &str| {
+        let entry = |name: &String| format!("[[garment]]\nfile = {name:?}\ncategory = {category:?}\n");
+        let manifest: String = names.iter().map(entry).collect();
+        std::fs::write(folder.path().join("garments.toml"), manifest).unwrap();
+        Arc::new(Library::load(&config, &|_, _, _| {}).unwrap())
+    };
+    let place = folder.path().join("run");
+    run(&config, &load("dress"), &place, false, Some(5));
+    let resume = |library: Arc<Library>| {
+        let checkpoint = Checkpoint::open(&place).unwrap();
+        let device = Backend::preferred().device();
+        Session::resume(RunDir::follow(&place), config.clone(), library, &device, &checkpoint)
+    };
+    assert_eq!(resume(load("dress")).unwrap().step(), 5);
+    // Skin weights are smoothed farther on a dress.
+    let refused = resume(load("top")).err().expect("another category has other skin weights");
+    assert!(refused.to_string().contains("no longer fits"), "{refused}");
 }
 
 #[test]

@@ -92,10 +92,9 @@ impl Checkpoint {
         File::open(&folder).and_then(|d| d.sync_all()).map_err(io_failed)?;
         atomic::write(&folder.join("latest"), name.as_bytes()).map_err(io_failed)?;
         let best = state.best.map(|b| b.step);
-        if config.output.keep_best && best == Some(state.step) {
-            atomic::write(&folder.join("best"), name.as_bytes()).map_err(io_failed)?;
-        }
         retention::prune(&folder, &config.output, state.step, best).map_err(io_failed)?;
+        // Also where this one is not the best: a save that was cut short may have left an older name.
+        retention::name_best(&folder, best.filter(|_| config.output.keep_best)).map_err(io_failed)?;
         tracing::info!("checkpoint {} written", path.display());
         Ok(Self { path, state })
     }

@@ -44,6 +44,16 @@ pub(super) fn prune(folder: &Path, output: &OutputConfig, newest: u64, best: Opt
     Ok(())
 }
 
+/// Writes the name of the checkpoint of step `best` to the file `best`; without one there is no such file.
+pub(super) fn name_best(folder: &Path, best: Option<u64>) -> io::Result<()> {
+    let file = folder.join("best");
+    match best.map(name).filter(|name| folder.join(name).exists()) {
+        Some(name) => atomic::write(&file, name.as_bytes()),
+        None if file.exists() => fs::remove_file(&file),
+        None => Ok(()),
+    }
+}
+
 fn remove(folder: &Path, step: u64) -> io::Result<()> {
     let leaving = folder.join(format!("{}{TEMPORARY}", name(step)));
     let _ = fs::remove_dir_all(&leaving);
@@ -82,7 +92,7 @@ pub(super) fn abandon_after(folder: &Path, step: u64) -> io::Result<usize> {
         fs::read_to_string(folder.join(file)).is_ok_and(|name| !folder.join(name.trim()).exists())
     };
     if dangles("best") {
-        fs::remove_file(folder.join("best"))?;
+        name_best(folder, None)?;
     }
     if let (true, Some((newest, _))) = (dangles("latest"), list(folder).last()) {
         atomic::write(&folder.join("latest"), name(*newest).as_bytes())?;
@@ -117,6 +127,16 @@ mod tests {
         assert_eq!(steps(made.path()), [30, 40, 80, 90, 100]);
         prune(made.path(), &output(1, 0, false), 100, Some(30)).unwrap();
         assert_eq!(steps(made.path()), [100]);
+    }
+
+    #[test]
+    fn the_file_best_names_what_is_there() {
+        let made = folder([10, 20]);
+        let best = || fs::read_to_string(made.path().join("best")).ok();
+        for (step, expected) in [(Some(10), Some(10)), (Some(20), Some(20)), (Some(30), None), (None, None)] {
+            name_best(made.path(), step).unwrap();
+            assert_eq!(best(), expected.map(name));
+        }
     }
 
     #[test]

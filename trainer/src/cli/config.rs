@@ -127,7 +127,7 @@ fn step(stage: &StageConfig) -> String {
     format!(
         "{} on {} each",
         plural(stage.accumulate, "outfit", "outfits"),
-        plural(stage.scenes_per_step, "body", "bodies")
+        plural(stage.bodies, "body", "bodies")
     )
 }
 

@@ -90,7 +90,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let specific = others(arguments, &arguments.specific, &subject)?;
     check_specific(&specific, &subject.library)?;
     check_ablations(&ablations, &subject)?;
-    fs::create_dir_all(folder).into_diagnostic().wrap_err_with(|| format!("{}", folder.display()))?;
+    let unwritable = || format!("{}", folder.display());
+    fs::create_dir_all(folder).into_diagnostic().wrap_err_with(unwritable)?;
+    // Now, not after all the work.
+    let probe = folder.join(".clothcombo-probe");
+    let written = fs::write(&probe, "").and_then(|()| fs::remove_file(&probe));
+    written.into_diagnostic().wrap_err_with(unwritable)?;
 
     let sizes = if arguments.quick { Sizes::QUICK } else { Sizes::FULL };
     let bar = progress_bar(0, "{bar:30} {pos}/{len} · {elapsed} · {msg}");
@@ -108,8 +113,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     })?;
     bar.finish_and_clear();
     let page = page(&trained, &found, clock.elapsed().as_secs_f64())?;
-    write(folder, &found, &page)?;
     println!("{}", page.markdown());
+    write(folder, &found, &page)?;
     say(&format!("written: {}", folder.join(HTML).display()));
     Ok(())
 }
@@ -217,13 +222,14 @@ fn write(folder: &Path, found: &Study, page: &Page) -> Result<(), Report> {
             .into_diagnostic()
             .wrap_err_with(|| format!("cannot write {}", path.display()))
     };
+    // First what tells a later run that the folder is a report.
+    let tables: Vec<_> =
+        page.sections.iter().map(|s| json!({ "title": s.title, "tables": s.tables })).collect();
+    let json = json!({ "facts": page.facts, "study": found, "sections": tables });
+    save(JSON, serde_json::to_string_pretty(&json).into_diagnostic()?.as_bytes())?;
     for (name, _, png) in page.sections.iter().flat_map(|section| &section.pictures) {
         save(name, png)?;
     }
     save(MARKDOWN, page.markdown().as_bytes())?;
-    save(HTML, page.html().as_bytes())?;
-    let tables: Vec<_> =
-        page.sections.iter().map(|s| json!({ "title": s.title, "tables": s.tables })).collect();
-    let json = json!({ "facts": page.facts, "study": found, "sections": tables });
-    save(JSON, serde_json::to_string_pretty(&json).into_diagnostic()?.as_bytes())
+    save(HTML, page.html().as_bytes())
 }

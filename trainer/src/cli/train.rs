@@ -53,7 +53,7 @@ pub struct Arguments {
     /// Folder of the run; default: runs/NAME-OF-CONFIG, numbered when taken, or the folder that PATH lies in
     #[arg(long, value_name = "DIR")]
     run_dir: Option<PathBuf>,
-    /// Compute device; a run continues to the bit only on the device it was started on
+    /// Compute device; a run continues to the bit only on the device it was started on, with as many threads
     #[arg(long, value_enum, default_value_t = Backend::preferred())]
     device: Backend,
     #[command(flatten)]
@@ -188,9 +188,12 @@ fn run(arguments: &Arguments, world: &Rc<World>) -> Result<(), Report> {
         }
         if let Some(m) = memory {
             say(&format!(
-                "memory: about {} at the peak ({} in use, {} for the largest scene, {} for parameters)",
+                "memory: about {} at the peak ({} in use, {} for garments, {} for prepared scenes, {} for the largest \
+                scene, {} for parameters)",
                 gibibytes(m.peak),
                 gibibytes(m.start),
+                gibibytes(m.garments),
+                gibibytes(m.scenes),
                 gibibytes(m.activations),
                 gibibytes(m.parameters)
             ));

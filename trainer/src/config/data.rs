@@ -32,8 +32,9 @@ pub struct DataConfig {
     /// start and kept in memory.
     #[serde(default)]
     pub cache: CacheConfig,
-    /// Memory for garments that are streamed from the cache [MiB], spent twice: for the host's share (meshes, energies) and
-    /// for the device's (operators as tensors). More only saves reading.
+    /// Memory for garments that are streamed from the cache [MiB], spent up to four times: for the host's share (meshes,
+    /// energies), for the device's (operators as tensors), and for embeddings, those of frozen networks and those of a
+    /// validation. More only saves reading and computing.
     #[serde(default = "memory_mib")]
     pub memory_mib: usize,
     /// Garments with more vertices than this are refused before training.
@@ -88,7 +89,7 @@ impl Default for CacheConfig {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GarmentSource {
-    /// Folder of OBJ garments with an optional `garments.toml`.
+    /// Folder of garments (OBJ, PLY, STL, glTF) with an optional `garments.toml`.
     #[serde(default)]
     pub folder: Option<PathBuf>,
     /// Garments made by the built-in generator.
@@ -142,8 +143,8 @@ pub struct PoseConfig {
     pub motions: Option<PathBuf>,
     /// Clips whose name contains one of these are never trained on: validation on unseen motion.
     pub held_out_clips: Vec<String>,
-    /// Share of every other clip that is never trained on, in blocks spread over the clip: validation on the trained
-    /// kinds of motion. A clip shorter than half of `held_out_block / held_out_share` is trained on whole.
+    /// Share of every other clip that is never trained on, in blocks spread over the clip: validation on the trained kinds of
+    /// motion. One block in every `1 / held_out_share`, rounded, at most every second one. A clip shorter than half of `held_out_block / held_out_share` is trained on whole.
     pub held_out_share: f64,
     /// Length of such a block [s]; long against the time in which a pose changes.
     pub held_out_block: f64,

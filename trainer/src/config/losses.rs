@@ -1,7 +1,7 @@
 //! The eight losses: weights and the switches between the paper's printed form and the measured better one.
 
 use super::ramp::Ramp;
-use clothcombo_physics::energy::{EnergySettings, LayerGate, Material, Term};
+use clothcombo_physics::energy::{EnergyError, EnergySettings, LayerGate, Material, Term};
 use clothcombo_physics::query::Distance;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -245,8 +245,14 @@ impl LossesConfig {
                 "the paper's weights belong to 8000; 0 switches the scaling off".into(),
             ));
         }
-        let error = self.energy_settings().check().err()?;
-        Some(("losses".into(), error.to_string(), "configs/paper.toml shows every value".into()))
+        match self.energy_settings().check().err()? {
+            EnergyError::Setting { setting, value, expected } => {
+                Some((key_of(setting), format!("is {value}"), format!("it must be {expected}")))
+            }
+            error => {
+                Some(("losses".into(), error.to_string(), "configs/paper.toml shows every value".into()))
+            }
+        }
     }
 
     /// The settings the energies are evaluated with.
@@ -276,4 +282,21 @@ impl LossesConfig {
             ..EnergySettings::default()
         }
     }
+}
+
+/// The key that sets an energy `setting`.
+fn key_of(setting: &str) -> String {
+    let key = match setting {
+        "body_collision_epsilon" => "body_collision.epsilon",
+        "layer_collision_epsilon" => "layer_collision.epsilon",
+        "layer_gate.tangential_edges" => "layer_collision.gate_tangential_edges",
+        "layer_gate.depth" => "layer_collision.gate_depth",
+        "layer_distance_radius" => "layer_distance.radius",
+        "repulsion_radius" => "repulsion.radius",
+        "repulsion_subset" => "repulsion.subset",
+        "holding_fraction" => "holding.fraction",
+        // Those of the material have one name.
+        same => same,
+    };
+    format!("losses.{key}")
 }

@@ -27,7 +27,7 @@ pub use schema::schema;
 pub use stages::{StageConfig, Trains};
 pub use validation::ValidationConfig;
 
-use clothcombo_model::ModelConfig;
+use clothcombo_model::{ModelConfig, ModelError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -107,7 +107,7 @@ impl Config {
                 return Some((
                     format!("data.garments[{i}]"),
                     "needs exactly one of `folder` and `generate`".into(),
-                    "folder = \"…\" reads OBJ files, generate = { count = … } makes garments".into(),
+                    "folder = \"…\" reads mesh files, generate = { count = … } makes garments".into(),
                 ));
             }
         }
@@ -122,12 +122,13 @@ impl Config {
             return Some(problem);
         }
         self.data.problem().or_else(|| self.losses.problem()).or_else(|| {
-            let error = self.model.validate().err()?;
-            Some((
-                "model".into(),
-                error.to_string(),
-                "configs/smoke.toml and paper.toml show usable sizes".into(),
-            ))
+            const USABLE: &str = "configs/smoke.toml and paper.toml show usable sizes";
+            Some(match self.model.validate().err()? {
+                ModelError::Config { key, value, expected } => {
+                    (format!("model.{key}"), format!("is {value}, but must be {expected}"), USABLE.into())
+                }
+                error => ("model".into(), error.to_string(), USABLE.into()),
+            })
         })
     }
 }

@@ -45,8 +45,8 @@ pub struct StageConfig {
     pub layer_curriculum: f64,
     /// Bodies (shape and pose) that one step drapes the same garments on; they share the garment embedding, which makes a
     /// second body cheaper than a second step.
-    #[serde(default = "one")]
-    pub scenes_per_step: usize,
+    #[serde(default = "one", alias = "scenes_per_step")]
+    pub bodies: usize,
     /// Scenes with garments of their own whose gradients are averaged before one update (gradient accumulation). They are
     /// computed beside each other: on two cores a step with 2 takes 1.3 to 1.8 times as long as one with 1. The gradient is
     /// less noisy. Processes of one run share the scenes.
@@ -129,8 +129,8 @@ impl StageConfig {
             says("layers", "are more garments than anyone wears", "the paper goes up to 6, 32 are allowed")
         } else if !(0.0..=1.0).contains(&self.layer_curriculum) {
             says("layer_curriculum", "is not a fraction of the stage", "for example 0.5; 0 switches it off")
-        } else if self.scenes_per_step == 0 || self.scenes_per_step > MOST_SCENES {
-            says("scenes_per_step", "must lie between 1 and 1024", "1 drapes every outfit on one body")
+        } else if self.bodies == 0 || self.bodies > MOST_SCENES {
+            says("bodies", "must lie between 1 and 1024", "1 drapes every outfit on one body")
         } else if self.accumulate == 0 || self.accumulate > MOST_SCENES {
             says("accumulate", "must lie between 1 and 1024", "1 makes an update after every scene")
         } else if self.warm_up_steps > self.steps {

@@ -11,7 +11,7 @@ use burn::module::Module;
 use burn::optim::{GradientsAccumulator, GradientsParams, ModuleOptimizer};
 use clothcombo_model::{ClothCombo, FusedAdam, clip_global_norm, global_norm};
 use clothcombo_physics::autodiff::SceneLossOutput;
-use scene::{Frozen, Work};
+use scene::{Asked, Frozen, Work};
 use std::time::Instant;
 use tracing::trace_span;
 use workers::Workers;
@@ -123,14 +123,16 @@ impl Learner {
                 while_training: trains,
             });
         }
-        if let Some(frozen) = &self.frozen {
+        let frozen = |scene| match &self.frozen {
             // Here, with all threads, whatever scene meets a garment first: else the last bits would depend on the order.
-            for scene in scenes {
-                tensors.encode(&frozen.model, scene, &frozen.embeddings)?;
+            Some(Frozen { model, embeddings, .. }) => {
+                tensors.encode(model, scene, embeddings).map(|embeddings| Some((model, embeddings)))
             }
-        }
-        let work =
-            Work { tensors, frozen: self.frozen.as_ref(), trains, share: 1.0 / total as f64, spoil_gradient };
+            None => Ok(None),
+        };
+        let asked = scenes.iter().map(|scene| Ok(Asked { scene, frozen: frozen(scene)? }));
+        let asked: Vec<Asked<'_>> = asked.collect::<Result<_, DrapeError>>()?;
+        let work = Work { tensors, trains, share: 1.0 / total as f64, spoil_gradient };
         let mut computed = Computed {
             loss: 0.0,
             scenes: Vec::with_capacity(scenes.len()),
@@ -138,9 +140,9 @@ impl Learner {
             times: StepTimes::default(),
         };
         let mut sum = GradientsAccumulator::<ClothCombo>::new();
-        for scenes_at_once in scenes.chunks(self.at_once) {
-            let parts = match scenes_at_once {
-                [scene] => vec![work.compute(&self.model, scene)?],
+        for at_once in asked.chunks(self.at_once) {
+            let parts = match at_once {
+                [asked] => vec![work.compute(&self.model, asked)?],
                 several => work.compute_beside(&self.model, several, &mut self.workers)?,
             };
             computed.times += StepTimes::longest(parts.iter().map(|part| part.times));

@@ -8,7 +8,7 @@ use crate::scene::PreparedScene;
 use burn::module::Module;
 use burn::optim::GradientsParams;
 use burn::tensor::Tensor;
-use clothcombo_model::{ClothCombo, Feel, LayeredDrape};
+use clothcombo_model::{ClothCombo, Feel, GarmentEmbedding, LayeredDrape};
 use clothcombo_physics::autodiff::{SceneLossOutput, scene_loss};
 use std::ops::AddAssign;
 use std::sync::Arc;
@@ -50,11 +50,17 @@ pub(super) struct Frozen {
     pub while_training: Trains,
 }
 
+/// One scene of a step.
+pub(super) struct Asked<'a> {
+    pub scene: &'a PreparedScene,
+    /// The networks that the stage freezes, and what they made of the garments, if it freezes any.
+    pub frozen: Option<(&'a ClothCombo, Vec<GarmentEmbedding>)>,
+}
+
 /// What the scenes of a step have in common.
 #[derive(Clone, Copy)]
 pub(super) struct Work<'a> {
     pub tensors: &'a WardrobeTensors,
-    pub frozen: Option<&'a Frozen>,
     pub trains: Trains,
     /// Weight of a scene in the step's loss.
     pub share: f64,
@@ -90,17 +96,17 @@ impl Work<'_> {
     pub fn compute_beside(
         &self,
         model: &ClothCombo,
-        scenes: &[PreparedScene],
+        scenes: &[Asked<'_>],
         workers: &mut Workers,
     ) -> Result<Vec<SceneGradient>, DrapeError> {
-        let copies = scenes.iter().map(|scene| (detached_copy(model), scene)).collect();
-        workers.map(copies, |(model, scene)| self.compute(&model, scene)).into_iter().collect()
+        let copies = scenes.iter().map(|asked| (detached_copy(model), asked)).collect();
+        workers.map(copies, |(model, asked)| self.compute(&model, asked)).into_iter().collect()
     }
 
-    /// Loss and gradients of `scene` for the parameters of `model`.
-    pub fn compute(&self, model: &ClothCombo, scene: &PreparedScene) -> Result<SceneGradient, DrapeError> {
+    /// Loss and gradients of a scene for the parameters of `model`.
+    pub fn compute(&self, model: &ClothCombo, asked: &Asked<'_>) -> Result<SceneGradient, DrapeError> {
         let start = Instant::now();
-        let Losses { loss, mean, bodies } = self.forward(model, scene)?;
+        let Losses { loss, mean, bodies } = self.forward(model, asked)?;
         let forward = start.elapsed();
         let start = Instant::now();
         let gradients = loss.map(|mut loss| {
@@ -116,10 +122,11 @@ impl Work<'_> {
         Ok(SceneGradient { loss: mean * self.share, bodies, gradients, times })
     }
 
-    fn forward(&self, model: &ClothCombo, scene: &PreparedScene) -> Result<Losses, DrapeError> {
+    fn forward(&self, model: &ClothCombo, asked: &Asked<'_>) -> Result<Losses, DrapeError> {
+        let scene = asked.scene;
         let outfit = trace_span!("tensors").in_scope(|| self.tensors.outfit(scene))?;
-        let (first_stage, embeddings) = match self.frozen {
-            Some(f) => (&f.model, self.tensors.embed(&f.model, scene, &outfit, &f.embeddings)?),
+        let (first_stage, embeddings) = match &asked.frozen {
+            Some((frozen, known)) => (*frozen, frozen.pack(&outfit, known)?),
             None => (model, self.tensors.embed(model, scene, &outfit, &self.tensors.embeddings())?),
         };
         // What untangles: the networks themselves, or as they were before, while only corrections learn.

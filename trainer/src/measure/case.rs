@@ -71,7 +71,7 @@ impl Case {
             trains = "{trains}"
             steps = 1000000
             layers = [{layers}, {layers}]
-            scenes_per_step = {bodies}
+            bodies = {bodies}
             "#
         );
         let config: Config = toml::from_str(&text).into_diagnostic()?;

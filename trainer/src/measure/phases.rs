@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 use tracing::span::Id;
 use tracing::{Level, Subscriber};
 use tracing_subscriber::Layer;
@@ -14,7 +14,7 @@ use tracing_subscriber::registry::LookupSpan;
 pub const OTHER: &str = "other";
 
 /// The parts of a step in their order: waiting for the scene, then the spans by name, then the rest.
-pub const PHASES: [&str; 12] = [
+pub const PHASES: [&str; 14] = [
     "data wait",
     "tensors",
     "embedding",
@@ -22,6 +22,8 @@ pub const PHASES: [&str; 12] = [
     "draping",
     "skinning",
     "untangling",
+    "feeling",
+    "corrections",
     "energies",
     "backward",
     "clip",
@@ -33,19 +35,19 @@ pub const PHASES: [&str; 12] = [
 pub type PhaseTimes = BTreeMap<&'static str, f64>;
 
 /// Runs `work` and returns how long each span of the project was entered, on this thread and on those that `work` hands its
-/// subscriber to.
+/// subscriber to. A span within another one counts for itself alone.
 pub fn record_phases<R>(work: impl FnOnce() -> R) -> (R, PhaseTimes) {
-    let totals = Arc::new(Mutex::new(BTreeMap::<&'static str, Duration>::new()));
+    let totals = Arc::new(Mutex::new(PhaseTimes::new()));
     let targets = Targets::new()
         .with_target("clothcombo_model", Level::TRACE)
         .with_target("clothcombo_trainer", Level::TRACE);
     let subscriber = tracing_subscriber::registry().with(SpanClock(totals.clone()).with_filter(targets));
     let result = tracing::subscriber::with_default(subscriber, work);
     let totals = totals.lock().unwrap_or_else(PoisonError::into_inner);
-    (result, totals.iter().map(|(name, time)| (*name, time.as_secs_f64())).collect())
+    (result, totals.clone())
 }
 
-struct SpanClock(Arc<Mutex<BTreeMap<&'static str, Duration>>>);
+struct SpanClock(Arc<Mutex<PhaseTimes>>);
 
 struct Entered(Instant);
 
@@ -60,7 +62,11 @@ impl<S: Subscriber + for<'a> LookupSpan<'a>> Layer<S> for SpanClock {
         let Some(span) = context.span(id) else { return };
         if let Some(Entered(start)) = span.extensions_mut().remove() {
             let mut totals = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-            *totals.entry(span.name()).or_default() += start.elapsed();
+            let seconds = start.elapsed().as_secs_f64();
+            *totals.entry(span.name()).or_default() += seconds;
+            if let Some(outer) = span.parent() {
+                *totals.entry(outer.name()).or_default() -= seconds;
+            }
         }
     }
 }
@@ -68,6 +74,7 @@ impl<S: Subscriber + for<'a> LookupSpan<'a>> Layer<S> for SpanClock {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::time::Duration;
 
     #[test]
     fn spans_are_added_up_by_name() {
@@ -80,5 +87,14 @@ mod tests {
         });
         assert_eq!(times.keys().copied().collect::<Vec<_>>(), ["clip", "embedding"]);
         assert!(times["embedding"] >= 0.01 && times["clip"] < times["embedding"]);
+    }
+
+    #[test]
+    fn a_span_within_another_one_counts_once() {
+        let ((), times) = record_phases(|| {
+            let _outer = tracing::trace_span!("corrections").entered();
+            tracing::trace_span!("feeling").in_scope(|| std::thread::sleep(Duration::from_millis(20)));
+        });
+        assert!(times["corrections"] >= 0.0 && times["corrections"] < times["feeling"], "{times:?}");
     }
 }

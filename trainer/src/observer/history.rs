@@ -36,6 +36,8 @@ pub struct History {
     pub baselines: BTreeMap<&'static str, f64>,
     /// Validations: step and report, as in `validation.jsonl`.
     pub validations: Vec<(u64, Value)>,
+    /// Step and score of the best one.
+    pub best: Option<(u64, f64)>,
     /// Steps that were skipped.
     pub skipped: Vec<u64>,
     /// Steps with an unusually large gradient, of this session.
@@ -79,6 +81,7 @@ impl History {
             history.last = Some((step, line["stage"].as_str().unwrap_or_default().to_owned()));
         }
         for line in lines(run.validation())? {
+            history.best = best_so_far(&line);
             history.note_validation(line["step"].as_u64().unwrap_or(0), line);
         }
         let pictures = std::fs::read_dir(run.samples()).into_iter().flatten().flatten().map(|e| e.path());
@@ -90,13 +93,6 @@ impl History {
     /// The curve of a quantity: (step, value).
     pub fn points(&self, name: &str) -> &[(f64, f64)] {
         self.points.get(name).map_or(&[], Vec::as_slice)
-    }
-
-    /// Step and score of the best validation after the first step.
-    pub fn best(&self) -> Option<(u64, f64)> {
-        let scored = self.validations.iter().filter(|(step, _)| *step > 0);
-        let scored = scored.filter_map(|(step, report)| Some((*step, score(report)?)));
-        scored.min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
     fn push(&mut self, name: &'static str, step: f64, value: Option<f64>) {
@@ -123,12 +119,10 @@ impl History {
     }
 }
 
-/// [`ValidationReport::score`](crate::evaluate::ValidationReport::score) of a line of the log.
-fn score(report: &Value) -> Option<f64> {
-    let groups = report["groups"].as_array()?.iter();
-    let totals: Vec<f64> =
-        groups.filter_map(|g| g["methods"].as_array()?.last()?["total"]["mean"].as_f64()).collect();
-    (!totals.is_empty()).then(|| totals.iter().sum::<f64>() / totals.len() as f64)
+/// Step and score of the best validation so far, by a line of `validation.jsonl`.
+pub fn best_so_far(line: &Value) -> Option<(u64, f64)> {
+    let best = &line["best"];
+    best["step"].as_u64().zip(best["score"].as_f64())
 }
 
 fn lines(path: PathBuf) -> Result<Vec<Value>, Report> {
@@ -166,7 +160,8 @@ impl Observer for HistoryObserver {
                     last => *last = Some((record.step, record.stage.clone())),
                 }
             }
-            TrainEvent::Validated { step, report } => {
+            TrainEvent::Validated { step, report, best } => {
+                history.best = best.map(|best| (best.step, best.score.0));
                 history.note_validation(*step, serde_json::to_value(report).into_diagnostic()?);
             }
             TrainEvent::Skipped { step, .. } => history.skipped.push(*step),

@@ -77,8 +77,11 @@ impl Observer for MetricsObserver {
                 self.flushed = Instant::now();
                 self.metrics.flush()
             }
-            TrainEvent::Validated { step, report } => {
-                self.validation.line(&json!({ "step": step, "groups": report.groups }))?;
+            TrainEvent::Validated { step, report, best } => {
+                let best = best.map(|best| json!({ "step": best.step, "score": best.score.0 }));
+                let (score, groups) = (report.score(), &report.groups);
+                self.validation
+                    .line(&json!({ "step": step, "score": score, "best": best, "groups": groups }))?;
                 self.validation.flush()
             }
             TrainEvent::CheckpointDue { .. }

@@ -8,7 +8,7 @@ mod report;
 mod tensorboard;
 
 pub use curves::CurvesObserver;
-pub use history::{History, HistoryObserver, SharedHistory};
+pub use history::{History, HistoryObserver, SharedHistory, best_so_far};
 pub use metrics::MetricsObserver;
 pub use progress::ProgressObserver;
 pub use report::ReportObserver;

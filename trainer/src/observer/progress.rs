@@ -99,7 +99,7 @@ impl Observer for ProgressObserver {
                     None => self.plain_line(record.step),
                 }
             }
-            TrainEvent::Validated { step, report } => {
+            TrainEvent::Validated { step, report, .. } => {
                 self.say(&format!("validation after step {step}\n{report}"));
             }
             TrainEvent::Spike { step, norm, usual } => {

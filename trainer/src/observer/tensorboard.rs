@@ -196,7 +196,7 @@ impl TensorBoardObserver {
                 let raw = raw.iter().map(|(n, v)| (n.as_str(), *v));
                 self.events.scalars(r.step, plain.into_iter().chain(raw))
             }
-            TrainEvent::Validated { step, report } => {
+            TrainEvent::Validated { step, report, .. } => {
                 let mut values = Vec::new();
                 for group in &report.groups {
                     let Some(network) = group.methods.last() else { continue };

@@ -3,7 +3,7 @@
 use image::{Rgb, RgbImage};
 
 use super::font::{CAPITAL_HEIGHT, draw_text, fitted, text_size};
-use super::palette::layer_colour;
+use super::palette::{LAYER_COLOURS, layer_colour};
 
 const PAPER: Rgb<u8> = Rgb([255, 255, 255]);
 const INK: Rgb<u8> = Rgb([44, 48, 54]);
@@ -40,7 +40,7 @@ pub fn draw_bars(title: &str, parts: &[&str], bars: &[Bar]) -> RgbImage {
     text(&mut picture, [MARGIN, MARGIN], &fitted(title, WIDTH - 2 * MARGIN, SCALE), INK);
     for (part, (name, [x, line])) in parts.iter().zip(&legend).enumerate() {
         let y = MARGIN + LINE + line * LINE;
-        fill(&mut picture, [*x, y], [PATCH, PATCH], layer_colour(part));
+        fill(&mut picture, [*x, y], [PATCH, PATCH], part_colour(part));
         text(&mut picture, [x + PATCH + 8, y], name, FAINT_INK);
     }
     let (left, length) = (MARGIN + LABEL, WIDTH - 2 * MARGIN - LABEL - TOTAL);
@@ -56,7 +56,7 @@ pub fn draw_bars(title: &str, parts: &[&str], bars: &[Bar]) -> RgbImage {
             // Both ends are rounded, so that neighbours meet and the last part ends where the bar does.
             let place = |share: f64| (share / sum * f64::from(length)).round() as u32;
             let (start, end) = (place(before), place(before + value));
-            fill(&mut picture, [left + start, y], [end - start, BAR], layer_colour(part));
+            fill(&mut picture, [left + start, y], [end - start, BAR], part_colour(part));
             before += value;
         }
     }
@@ -99,6 +99,12 @@ fn fill(picture: &mut RgbImage, [left, top]: [u32; 2], [width, height]: [u32; 2]
     }
 }
 
+/// Colour of a part: the palette, and when that is used up the same darker.
+fn part_colour(part: usize) -> [u8; 3] {
+    let colour = layer_colour(part);
+    if part < LAYER_COLOURS.len() { colour } else { colour.map(|channel| channel / 2) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -108,7 +114,7 @@ mod tests {
         let bar = Bar { label: "a".into(), parts: vec![3.0, f64::NAN, 1.0], total: "4 ms".into() };
         let picture = draw_bars("title", &["one", "none", "two"], &[bar, Bar::default()]);
         let count = |part: usize| {
-            let colour = Rgb(layer_colour(part));
+            let colour = Rgb(part_colour(part));
             picture.pixels().filter(|pixel| **pixel == colour).count() as u32 - PATCH * PATCH
         };
         let length = WIDTH - 2 * MARGIN - LABEL - TOTAL;

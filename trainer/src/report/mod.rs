@@ -115,11 +115,11 @@ impl Page<'_> {
         if let Some(loss) = median_of_last(self.history.points("loss"), 100) {
             tiles.push(("loss, median of 100", number_text(loss, 4)));
         }
-        if let Some((step, score)) = self.history.best() {
+        if let Some((step, score)) = self.history.best {
             tiles.push(("best validation", format!("{} at step {step}", number_text(score, 4))));
         }
         tiles.push(("skipped steps", self.history.skipped.len().to_string()));
-        tiles.push(("gradient spikes", self.history.spikes.len().to_string()));
+        tiles.push(("gradient spikes, this session", self.history.spikes.len().to_string()));
         if let Some(peak) = self.peak {
             let estimated =
                 self.memory.map(|m| format!(" (estimated {})", gibibytes(m.peak))).unwrap_or_default();

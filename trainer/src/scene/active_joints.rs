@@ -64,17 +64,4 @@ impl ActiveJoints {
         }
         out
     }
-
-    /// 1 for every active joint with weight on some vertex of `restricted` `[V, active]`, else 0.
-    pub fn mask(&self, restricted: &[f32]) -> Vec<f32> {
-        let mut mask = vec![0f32; self.len()];
-        for row in restricted.chunks_exact(self.len()) {
-            for (m, w) in mask.iter_mut().zip(row) {
-                if *w > NEGLIGIBLE {
-                    *m = 1.0;
-                }
-            }
-        }
-        mask
-    }
 }

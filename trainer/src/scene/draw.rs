@@ -17,7 +17,7 @@ use rand_chacha::ChaCha8Rng;
 pub struct BodyDraw {
     /// Shape parameters β.
     pub shape: Vec<f64>,
-    /// Pose θ, heading removed.
+    /// Pose θ, as the networks see it: facing +z unless `data.poses.remove_heading` is off.
     pub pose: Pose,
 }
 
@@ -79,7 +79,7 @@ pub fn draw_training(library: &Library, seed: u64, step: u64, scene: usize, plan
     let layers = rng.random_range(low..=high);
     let garments = garments(&library.split.training, layers, &mut rng);
     let scale = plan.stage.pose_scale.at(plan.progress);
-    let bodies = (0..plan.stage.scenes_per_step)
+    let bodies = (0..plan.stage.bodies)
         .map(|_| BodyDraw {
             shape: shape(library, &mut rng),
             pose: library.poses.draw_training(scale, &mut rng),

@@ -17,8 +17,6 @@ pub struct LibraryGarment {
     pub rings: Rings,
     /// Initial skin weights of the active joints, `[V, J]`.
     pub skin_weights: Vec<f32>,
-    /// 1 for each active joint that carries the garment, `[J]`.
-    pub joint_mask: Vec<f32>,
     /// Shape displacement per unit β, `[V, 3, K]`; zero without shape transfer.
     pub shape_directions: Vec<f32>,
     /// Number of shape components K stored in `shape_directions`.

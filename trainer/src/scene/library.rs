@@ -7,6 +7,7 @@ use super::split::{GarmentSplit, SplitNames};
 use super::wardrobe::Wardrobe;
 use crate::config::Config;
 use clothcombo_data::asset::{BODY_JOINT_COUNT, Body, BodyFileSettings, Provenance};
+use clothcombo_data::cache::{Key, KeyBuilder, body_key};
 use clothcombo_data::format::npz::NpzFile;
 use clothcombo_data::generate::mannequin;
 use std::path::Path;
@@ -60,7 +61,7 @@ pub struct LicenceLine {
 }
 
 /// What a fingerprint of this kind begins with; earlier ones looked at less.
-const FINGERPRINT: &str = "2:";
+const FINGERPRINT: &str = "3:";
 
 /// Whether `text` is a [fingerprint](Library::fingerprint) as they are made now, and can be compared with another.
 pub fn is_fingerprint(text: &str) -> bool {
@@ -132,42 +133,34 @@ impl Library {
         }
     }
 
-    /// A fingerprint of what scenes are drawn from: garments (name, size, place), body and every frame of the poses. Equal
+    /// A fingerprint of what scenes are drawn from: garments (name, category, mesh), body and every frame of the poses. Equal
     /// data gives equal scenes.
     pub fn fingerprint(&self) -> &str {
-        self.fingerprint.get_or_init(|| self.hash())
+        self.fingerprint.get_or_init(|| format!("{FINGERPRINT}{}", self.key()))
     }
 
-    fn hash(&self) -> String {
-        let mut hasher = blake3::Hasher::new();
-        let mut numbers = |values: &[u64]| {
-            values.iter().for_each(|v| {
-                hasher.update(&v.to_le_bytes());
-            });
-        };
-        for card in (0..self.wardrobe.len()).map(|i| self.wardrobe.card(i)) {
-            numbers(&[card.vertices as u64, u64::from(card.holding), card.name.len() as u64]);
-            numbers(&card.name.bytes().map(u64::from).collect::<Vec<_>>());
-            numbers(
-                &[card.bounds.0, card.bounds.1]
-                    .as_flattened()
-                    .iter()
-                    .map(|v| v.to_bits())
-                    .collect::<Vec<_>>(),
-            );
-        }
+    fn key(&self) -> Key {
         let body = &self.body;
-        numbers(&[body.template.len() as u64, body.faces.len() as u64, self.shape_count as u64]);
-        numbers(&body.template.as_flattened().iter().map(|v| v.to_bits()).collect::<Vec<_>>());
-        numbers(&body.shape_directions.iter().map(|v| u64::from(v.to_bits())).collect::<Vec<_>>());
-        numbers(&body.joint_template.as_flattened().iter().map(|v| v.to_bits()).collect::<Vec<_>>());
+        let mut key = KeyBuilder::new("data")
+            .key(body_key(body))
+            .array(body.joint_template.as_flattened())
+            .array(&body.joint_shape_directions)
+            .array(body.pose_directions.as_deref().unwrap_or_default())
+            .number(self.shape_count as u64);
+        for card in (0..self.wardrobe.len()).map(|i| self.wardrobe.card(i)) {
+            key = key
+                .text(&card.name)
+                .text(card.category.name())
+                .number(u64::from(card.holding))
+                .key(card.mesh);
+        }
         for part in self.poses.frames() {
-            numbers(&[part.len() as u64]);
+            key = key.number(part.len() as u64);
             for pose in part {
-                numbers(&pose.rotations.as_flattened().iter().map(|v| v.to_bits()).collect::<Vec<_>>());
+                key = key.array(pose.rotations.as_flattened());
             }
         }
-        format!("{FINGERPRINT}{}", &hasher.finalize().to_hex()[..32])
+        key.finish()
     }
 
     /// Under which terms the data may be used: body, garments, motions, one line per author and licence.

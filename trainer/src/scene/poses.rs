@@ -177,7 +177,7 @@ impl PoseLibrary {
         self.frame_counts().is_some_and(|[_, _, unseen]| unseen > 0)
     }
 
-    /// A pose for training, augmented, scaled by the progressive schedule, heading removed. A pose that intersects itself
+    /// A pose for training, augmented, scaled by the progressive schedule, as the networks see it. A pose that intersects itself
     /// beyond the limit is drawn again; if many in a row do, the least intersecting of them is taken.
     pub fn draw_training(&self, scale: f64, rng: &mut ChaCha8Rng) -> Pose {
         let mut pose = self.draw_unfiltered(scale, rng);
@@ -213,7 +213,7 @@ impl PoseLibrary {
         self.facing_forward(&pose).scaled(scale)
     }
 
-    /// A pose never trained on, as it was captured, heading removed.
+    /// A pose never trained on, as it was captured but for its heading.
     pub fn draw_held_out(&self, kind: Unseen, rng: &mut ChaCha8Rng) -> Pose {
         let pose = match &self.source {
             Source::Sampler(sampler) => sampler.sample(rng),

@@ -63,10 +63,8 @@ impl Recipe {
         let topology = Topology::new(&garment.rest);
         let energies = GarmentEnergies::new(&garment.rest, &topology, &self.energy, garment.holding)
             .map_err(|e| LibraryError::Garment { name: garment.name.clone(), reason: e.to_string() })?;
-        let skin_weights = joints.restrict(&binding.skin_weights);
         Ok(LibraryGarment {
-            joint_mask: joints.mask(&skin_weights),
-            skin_weights,
+            skin_weights: joints.restrict(&binding.skin_weights),
             shape_stride: self.body.shape_count,
             shape_directions: binding.shape_directions,
             energies: Arc::new(energies),

@@ -34,8 +34,8 @@ pub struct Card {
     pub source: Provenance,
     /// Number of vertices.
     pub vertices: usize,
-    /// Lowest and highest corner of the rest mesh [m].
-    pub bounds: ([f64; 3], [f64; 3]),
+    /// Key of the rest mesh.
+    pub mesh: Key,
 }
 
 /// All garments of a run.
@@ -239,7 +239,7 @@ fn first_look(
             holding: garment.holding,
             source: garment.source.clone(),
             vertices,
-            bounds: garment.rest.bounds(),
+            mesh: mesh_key(&garment.rest),
         };
         let look = match (cache, body) {
             (Some(cache), Some(body)) => stored(card, &garment, recipe, cache, body)?,
@@ -264,10 +264,9 @@ fn stored(
     body: Key,
 ) -> Result<FirstLook, LibraryError> {
     let joints = recipe.body.joint_count();
-    let mesh = mesh_key(&garment.rest);
     let keys = Keys {
-        binding: binding_key(mesh, body, garment.category, &recipe.binding),
-        operators: operators_key(mesh, recipe.eigen_count),
+        binding: binding_key(card.mesh, body, garment.category, &recipe.binding),
+        operators: operators_key(card.mesh, recipe.eigen_count),
     };
     let largest_weights = match get_largest_weights(cache, keys.binding) {
         Some(largest) if largest.len() == joints => largest,

@@ -72,6 +72,12 @@ impl Session {
                 checkpoint.path.display()
             ));
         }
+        if !found.data.as_ref().is_some_and(|d| is_fingerprint(d)) {
+            tracing::warn!(
+                "checkpoint {} cannot tell whether the data is still the same",
+                checkpoint.path.display()
+            );
+        }
         let model = checkpoint.trained_model(&config, &device)?;
         let average = match config.optimizer.ema_decay {
             decay if decay > 0.0 => {

@@ -121,7 +121,7 @@ impl Times {
             ],
         )
         .with_note(format!(
-            "Median (95th percentile), CPU, {} threads. The paper's times are for 8,000 vertices on a GPU.",
+            "Median (95th percentile), {} threads. The paper's times are for 8,000 vertices on a GPU.",
             self.threads
         ));
         let cell = |s: &Spread| format!("{} ({})", number(s.median), number(s.p95));

@@ -10,6 +10,7 @@ use crate::cli::verbosity::progress_bar;
 use crate::config::{Config, load};
 use crate::device::Backend;
 use crate::drape::{Networks, WardrobeTensors};
+use crate::draper::UniqueNames;
 use crate::evaluate::certificates::{DrapedScene, Dressing, OutfitResult};
 use crate::one_core::each_on_one_core;
 use crate::scene::{Library, PreparedScene, SceneDraw, draw_outfit, prepare};
@@ -192,8 +193,10 @@ fn write_meshes(
         obj::save(&folder.join(file), positions, faces, &[note]).into_diagnostic()
     };
     save("body.obj".into(), &draped.body.positions, &draped.body.faces, "body".into())?;
+    let mut names = UniqueNames::default();
     for (i, worn) in scene.worn.iter().enumerate() {
         let garment = &worn.garment;
+        let name = names.take(&garment.name);
         let states = [
             ("rest", garment.rest.positions()),
             ("draped", &draped.positions[i]),
@@ -201,7 +204,7 @@ fn write_meshes(
         ];
         for (state, positions) in states {
             let note = format!("{}: {} {}", garment.name, garment.source.author, garment.source.licence);
-            save(format!("{state}/{i}-{}.obj", garment.name), positions, garment.rest.faces(), note)?;
+            save(format!("{state}/{i}-{name}.obj"), positions, garment.rest.faces(), note)?;
         }
     }
     Ok(())
