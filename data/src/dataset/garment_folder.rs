@@ -13,13 +13,17 @@
 //! ```
 //! Without a manifest every mesh file in the folder is a garment.
 
+mod write;
+
+pub(crate) use write::garment_folder_files;
+pub use write::{refuse_unlisted, save_garment, save_garment_folder, save_manifest};
+
 use crate::asset::{Body, Category, Garment, Provenance};
-use crate::format::atomic;
 use crate::format::mesh::{MeshFileError, is_mesh_path, load_tri_mesh};
-use crate::format::obj::{self, ObjError};
+use crate::format::obj::ObjError;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -277,79 +281,6 @@ fn manifest_from(path: &Path, text: &str) -> Result<Manifest, GarmentFolderError
         path: path.into(),
         message: e.to_string().trim_end().to_string(),
     })
-}
-
-/// Writes one garment as `<name>.obj` and returns its manifest entry, for [`save_manifest`]: for more garments than fit in
-/// memory. The file appears whole or not at all.
-///
-/// # Errors
-/// If the file cannot be written.
-pub fn save_garment(folder: &Path, garment: &FolderGarment) -> Result<ManifestEntry, GarmentFolderError> {
-    let entry = ManifestEntry::of(garment);
-    let Garment { name, category, rest, .. } = &garment.garment;
-    let comments = [
-        format!("{name} ({category}), metres, y up, on the zero body in T-pose"),
-        format!("source: {}", entry.source),
-        format!("author: {}", entry.author),
-        format!("licence: {}", entry.licence),
-    ];
-    obj::save(&folder.join(&entry.file), rest.positions(), rest.faces(), &comments)?;
-    Ok(entry)
-}
-
-/// Writes the manifest of a folder and returns its path.
-///
-/// # Errors
-/// If it cannot be written.
-pub fn save_manifest(folder: &Path, entries: Vec<ManifestEntry>) -> Result<PathBuf, GarmentFolderError> {
-    let path = folder.join(MANIFEST);
-    let text = toml::to_string(&Manifest { garment: entries })
-        .map_err(|e| GarmentFolderError::Manifest { path: path.clone(), message: e.to_string() })?;
-    atomic::write(&path, text.as_bytes())
-        .map_err(|reason| GarmentFolderError::Io { path: path.clone(), reason })?;
-    Ok(path)
-}
-
-/// The files that [`save_garment_folder`] writes.
-pub(crate) fn garment_folder_files(folder: &Path, garments: &[FolderGarment]) -> Vec<PathBuf> {
-    let files = garments.iter().map(|g| format!("{}.obj", g.garment.name));
-    files.chain([MANIFEST.into()]).map(|file| folder.join(file)).collect()
-}
-
-/// Refuses a `folder` without a list in which a mesh lies that is none of `files`: the list that is to be written would hide it.
-///
-/// # Errors
-/// [`GarmentFolderError::Unlisted`] names the mesh.
-pub fn refuse_unlisted(folder: &Path, files: &HashSet<PathBuf>) -> Result<(), GarmentFolderError> {
-    if folder.join(MANIFEST).exists() {
-        return Ok(());
-    }
-    let there = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
-    match there.filter(|path| is_mesh_path(path)).find(|path| !files.contains(path)) {
-        Some(path) => Err(GarmentFolderError::Unlisted { path }),
-        None => Ok(()),
-    }
-}
-
-/// Writes garments as `<name>.obj` and lists them in the manifest, beside what it lists already; the manifest comes last, so that
-/// a folder with one is complete. Returns the files written.
-///
-/// # Errors
-/// If the folder holds garments that it does not list, its manifest cannot be read, or a file cannot be written.
-pub fn save_garment_folder(
-    folder: &Path,
-    garments: &[FolderGarment],
-) -> Result<Vec<PathBuf>, GarmentFolderError> {
-    let files = garment_folder_files(folder, garments);
-    refuse_unlisted(folder, &files.iter().cloned().collect())?;
-    let mut entries = read_manifest(folder)?;
-    for garment in garments {
-        let entry = save_garment(folder, garment)?;
-        entries.retain(|listed| listed.file != entry.file);
-        entries.push(entry);
-    }
-    save_manifest(folder, entries)?;
-    Ok(files)
 }
 
 #[cfg(test)]

@@ -95,7 +95,7 @@ impl<T: Real> Surface<T> {
     }
 
     /// Whether the surface has no border.
-    fn is_closed(&self) -> bool {
+    pub(crate) fn is_closed(&self) -> bool {
         *self.is_closed.get_or_init(|| is_closed(&self.faces))
     }
 

@@ -144,7 +144,8 @@ pub struct PoseConfig {
     /// Clips whose name contains one of these are never trained on: validation on unseen motion.
     pub held_out_clips: Vec<String>,
     /// Share of every other clip that is never trained on, in blocks spread over the clip: validation on the trained kinds of
-    /// motion. One block in every `1 / held_out_share`, rounded, at most every second one. A clip shorter than half of `held_out_block / held_out_share` is trained on whole.
+    /// motion. One block in every `1 / held_out_share`, rounded, at most every second one. A clip shorter than half of
+    /// `held_out_block / held_out_share` is trained on whole.
     pub held_out_share: f64,
     /// Length of such a block [s]; long against the time in which a pose changes.
     pub held_out_block: f64,

@@ -7,5 +7,5 @@ mod subject;
 
 pub use case::Case;
 pub use export::export;
-pub use phases::{OTHER, PHASES, PhaseTimes, record_phases};
+pub use phases::{OTHER, PHASES, SpanSeconds, record_phases};
 pub use subject::{Costs, Profile, Subject, median_ms};

@@ -32,12 +32,12 @@ pub const PHASES: [&str; 14] = [
 ];
 
 /// Seconds by span name.
-pub type PhaseTimes = BTreeMap<&'static str, f64>;
+pub type SpanSeconds = BTreeMap<&'static str, f64>;
 
 /// Runs `work` and returns how long each span of the project was entered, on this thread and on those that `work` hands its
 /// subscriber to. A span within another one counts for itself alone.
-pub fn record_phases<R>(work: impl FnOnce() -> R) -> (R, PhaseTimes) {
-    let totals = Arc::new(Mutex::new(PhaseTimes::new()));
+pub fn record_phases<R>(work: impl FnOnce() -> R) -> (R, SpanSeconds) {
+    let totals = Arc::new(Mutex::new(SpanSeconds::new()));
     let targets = Targets::new()
         .with_target("clothcombo_model", Level::TRACE)
         .with_target("clothcombo_trainer", Level::TRACE);
@@ -47,7 +47,7 @@ pub fn record_phases<R>(work: impl FnOnce() -> R) -> (R, PhaseTimes) {
     (result, totals.clone())
 }
 
-struct SpanClock(Arc<Mutex<PhaseTimes>>);
+struct SpanClock(Arc<Mutex<SpanSeconds>>);
 
 struct Entered(Instant);
 

@@ -89,11 +89,11 @@ pub fn resolve_along<E: From<ResolveError>>(
     if is_laid_out && !resolved.certificate.is_clear() && !settings.is_late(start, layers.len()) {
         resolved = resolved.or_by(along(layers, &mut None)?, Certificate::defects);
     }
-    let is_laid_out = may_lay_out && resolved.mend_last(body, layers, settings, start) || is_laid_out;
+    let is_mended = resolved.mend_last(body, layers, settings, start);
     // What a drape as it came has of its folds, and what was folded on the way.
     let is_laid_out = may_lay_out && resolved.lay_out(body, layers, skinned, settings, start) || is_laid_out;
-    if is_laid_out && resolved.is_strained(layers) {
-        // So far strain was measured from what was laid out.
+    if (is_mended || is_laid_out) && resolved.is_strained(layers) {
+        // So far strain was measured from what was laid out, and not since the last attempts.
         with_drawn(body, layers, |drawn| {
             with_body(drawn, layers.len(), |room| resolved.ease(room, layers, settings, start, TIMES));
         });

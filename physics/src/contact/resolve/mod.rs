@@ -34,6 +34,7 @@
 
 mod body;
 mod certificate;
+mod close_in;
 mod contact;
 mod count;
 mod detect;

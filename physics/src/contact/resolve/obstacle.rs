@@ -4,7 +4,6 @@ use super::contact::{along_line, normal_of};
 use super::near::MARGIN;
 use super::relief::Relief;
 use crate::contact::{Triangle, TriangleTree};
-use crate::mesh::is_closed;
 use crate::query::{ClosestPoint, FaceSide, Surface, SurfacePoint, UnionDistance};
 use crate::vec3::{add, add_scaled, dot, scale, sub};
 use std::sync::OnceLock;
@@ -79,7 +78,7 @@ impl<'a> BodyObstacle<'a> {
         let faces = &surface.faces;
         let is_part = |f: u32| faces[f as usize].iter().any(|&v| near[v as usize]);
         let tree = TriangleTree::of_part(&surface.positions, faces, |f, _| is_part(f));
-        let union = is_closed(faces).then(|| UnionDistance::of_tree(&tree));
+        let union = surface.is_closed().then(|| UnionDistance::of_tree(&tree));
         let mut touched = vec![false; surface.positions.len()];
         if let Some(union) = &union {
             for (face, _) in faces.iter().zip(union.sides()).filter(|(_, side)| **side != FaceSide::Exposed) {

@@ -4,14 +4,13 @@ use std::time::{Duration, Instant};
 
 use super::body::Body;
 use super::certificate::Certificate;
+use super::close_in::ClosingIn;
 use super::count::{certificate, certified_around};
 use super::near::MARGIN;
 use super::obstacle::BodyObstacle;
-use super::outfit::Outfit;
 use super::relief::Room;
-use super::sides::Sides;
 use super::unfold::Folds;
-use super::{Layer, ResolveSettings, Untangled, at, resolved_once, untangled, untangled_keeping};
+use super::{Layer, ResolveSettings, Untangled, at, resolved_once};
 use crate::query::Surface;
 use crate::vec3;
 
@@ -21,11 +20,6 @@ const FURTHER_ATTEMPTS: usize = 3;
 const FEW: usize = 32;
 /// Pairs of garments with themselves that may be left where nothing else crosses.
 const FEW_OF_ITSELF: usize = 8;
-/// Longest and shortest step, as shares of the room that the body made, by which it is taken back.
-const CLOSING_IN: (f64, f64) = (1.0 / 4.0, 1.0 / 32.0);
-/// Gaps with which that is tried, as shares of the one asked for: what is narrow holds more sheets that lie closer to each other.
-const CLOSING_GAPS: [f64; 2] = [1.0, 0.3];
-
 /// How the last few crossings are tried once more: gap and rings, as shares of those asked for. A smaller gap is for many sheets in
 /// one crease, a larger one goes round what holds a few of them.
 const LAST: [(f64, usize); 2] = [(0.3, 1), (3.0, 2)];
@@ -62,77 +56,6 @@ pub struct GarmentWork {
 }
 
 impl Resolved {
-    /// Where cloth lies in room that the body only made for it, tries to do without: the body gives way no more than where it
-    /// lies inside itself. Taken if fewer pairs are left.
-    /// `start`: when all of it began.
-    fn close_in(
-        &mut self,
-        body: &Body<'_>,
-        layers: &[Layer<'_>],
-        settings: &ResolveSettings,
-        room: Room,
-        start: Instant,
-    ) {
-        for share in CLOSING_GAPS {
-            if self.certificate.narrow_triangle_pairs == 0 || settings.is_late(start, layers.len()) {
-                return;
-            }
-            let gap = share * settings.gap;
-            let settings = ResolveSettings { gap, is_shallow: true, loosened: 1.0, ..*settings };
-            self.close_in_to(body, layers, &settings, room, start);
-        }
-    }
-
-    /// [`close_in`](Self::close_in) with one gap: all at once and, where no garment crosses another, step by step as well.
-    fn close_in_to(
-        &mut self,
-        body: &Body<'_>,
-        layers: &[Layer<'_>],
-        settings: &ResolveSettings,
-        room: Room,
-        start: Instant,
-    ) {
-        let apart = (self.certificate.layer_triangle_pairs == 0).then(|| self.positions.clone());
-        let now = at(layers, &self.positions);
-        let closer = body.with_room(room.with_share(0.0), |obstacle| untangled(obstacle, &now, settings));
-        let certificate = certified(&body.drawn, layers, &closer.positions);
-        self.prefer(closer.positions, certificate);
-        if let Some(apart) = apart.filter(|_| !self.certificate.is_clear()) {
-            self.close_in_slowly(apart, body, layers, settings, room, start);
-        }
-    }
-
-    /// The same step by step from `now`, where no garment crosses another: the body comes back by and by, and cloth keeps
-    /// its sides.
-    fn close_in_slowly(
-        &mut self,
-        mut now: Vec<Vec<[f64; 3]>>,
-        body: &Body<'_>,
-        layers: &[Layer<'_>],
-        settings: &ResolveSettings,
-        room: Room,
-        start: Instant,
-    ) {
-        let outfit = Outfit::new(layers);
-        let (mut share, mut step, mut with_body) = (1.0, CLOSING_IN.0, usize::MAX);
-        while share > 0.0 && step >= CLOSING_IN.1 && !settings.is_late(start, layers.len()) {
-            let next = f64::max(share - step, 0.0);
-            let sides = Sides::of(&outfit, &now.concat(), None);
-            let before = at(layers, &now);
-            let found = body.with_room(room.with_share(next), |obstacle| {
-                untangled_keeping(Some(&sides), obstacle, &before, settings)
-            });
-            let certificate = certified(&body.drawn, layers, &found.positions);
-            if certificate.layer_triangle_pairs == 0 && found.with_body <= with_body {
-                (share, with_body) = (next, found.with_body);
-                now.clone_from(&found.positions);
-            } else {
-                step *= 0.5;
-            }
-            self.prefer(found.positions, certificate);
-        }
-    }
-
     /// Where few crossings are left on `body`, or none but those of garments with themselves, attempts that begin where the one before
     /// ended: cloth that is nearly sorted out is the better shape to return to and to measure lengths from than the drape it came
     /// from. None where limits are strict (`settings.loosened`). `start`: when all of it began.
@@ -162,8 +85,8 @@ impl Resolved {
         }
     }
 
-    /// Where few crossings are left in the end, tries to mend them with other gaps. Returns whether that was better. `start`: when all
-    /// of it began.
+    /// Where few crossings are left in the end, tries to mend them with other gaps. None where limits are strict. Returns whether that
+    /// was better. `start`: when all of it began.
     pub(super) fn mend_last(
         &mut self,
         body: &Surface<f64>,
@@ -172,7 +95,8 @@ impl Resolved {
         start: Instant,
     ) -> bool {
         let mut is_better = false;
-        for (gap, rings) in LAST {
+        let attempts = if settings.loosened > 1.0 { &LAST[..] } else { &[] };
+        for (gap, rings) in attempts {
             let left = self.certificate.between();
             if left == 0 || left > FEW || settings.is_late(start, layers.len()) {
                 break;
@@ -279,7 +203,7 @@ pub(super) fn settled(
     start: Instant,
 ) -> Resolved {
     let mut resolved = judged(&body.drawn, layers, found);
-    resolved.close_in(body, layers, settings, room, start);
+    ClosingIn { body, layers, room, start }.improve(&mut resolved, settings);
     resolved
 }
 

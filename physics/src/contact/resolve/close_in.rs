@@ -1,0 +1,76 @@
+//! Where cloth lies in room that the body only made for it, tries to do without: the body gives way no more than where it lies
+//! inside itself.
+
+use std::time::Instant;
+
+use super::body::Body;
+use super::outfit::Outfit;
+use super::relief::Room;
+use super::resolved::certified;
+use super::sides::Sides;
+use super::{Layer, ResolveSettings, Resolved, at, untangled, untangled_keeping};
+
+/// Longest and shortest step, as shares of the room that the body made, by which it is taken back.
+const STEPS: (f64, f64) = (1.0 / 4.0, 1.0 / 32.0);
+/// Gaps with which that is tried, as shares of the one asked for: what is narrow holds more sheets that lie closer to each other.
+const GAPS: [f64; 2] = [1.0, 0.3];
+
+/// A body that takes back the room it made.
+pub(super) struct ClosingIn<'a, 'b> {
+    pub body: &'a Body<'b>,
+    /// The garments as they were before all of it.
+    pub layers: &'a [Layer<'a>],
+    pub room: Room,
+    /// When all of it began.
+    pub start: Instant,
+}
+
+impl ClosingIn<'_, '_> {
+    /// Takes what comes of it if fewer pairs are left than in the `best` so far.
+    pub fn improve(&self, best: &mut Resolved, settings: &ResolveSettings) {
+        for share in GAPS {
+            if best.certificate.narrow_triangle_pairs == 0 || settings.is_late(self.start, self.layers.len())
+            {
+                return;
+            }
+            let gap = share * settings.gap;
+            let settings = ResolveSettings { gap, is_shallow: true, loosened: 1.0, ..*settings };
+            self.at_once(best, &settings);
+        }
+    }
+
+    /// All at once and, where no garment crosses another, step by step as well.
+    fn at_once(&self, best: &mut Resolved, settings: &ResolveSettings) {
+        let apart = (best.certificate.layer_triangle_pairs == 0).then(|| best.positions.clone());
+        let now = at(self.layers, &best.positions);
+        let none = self.room.with_share(0.0);
+        let closer = self.body.with_room(none, |obstacle| untangled(obstacle, &now, settings));
+        let certificate = certified(&self.body.drawn, self.layers, &closer.positions);
+        best.prefer(closer.positions, certificate);
+        if let Some(apart) = apart.filter(|_| !best.certificate.is_clear()) {
+            self.slowly(best, apart, settings);
+        }
+    }
+
+    /// Step by step from `now`, where no garment crosses another: the body comes back by and by, and cloth keeps its sides.
+    fn slowly(&self, best: &mut Resolved, mut now: Vec<Vec<[f64; 3]>>, settings: &ResolveSettings) {
+        let outfit = Outfit::new(self.layers);
+        let (mut share, mut step, mut with_body) = (1.0, STEPS.0, usize::MAX);
+        while share > 0.0 && step >= STEPS.1 && !settings.is_late(self.start, self.layers.len()) {
+            let next = f64::max(share - step, 0.0);
+            let sides = Sides::of(&outfit, &now.concat(), None);
+            let before = at(self.layers, &now);
+            let found = self.body.with_room(self.room.with_share(next), |obstacle| {
+                untangled_keeping(Some(&sides), obstacle, &before, settings)
+            });
+            let certificate = certified(&self.body.drawn, self.layers, &found.positions);
+            if certificate.layer_triangle_pairs == 0 && found.with_body <= with_body {
+                (share, with_body) = (next, found.with_body);
+                now.clone_from(&found.positions);
+            } else {
+                step *= 0.5;
+            }
+            best.prefer(found.positions, certificate);
+        }
+    }
+}
