@@ -247,23 +247,11 @@ fn number_reader(kind: TypeChar, width: usize) -> Option<fn([u8; 8]) -> f64> {
         (TypeChar::Int, 4) => |b| f64::from(i32::from_le_bytes([b[0], b[1], b[2], b[3]])),
         (TypeChar::Int, 8) => |b| i64::from_le_bytes(b) as f64,
         (TypeChar::Uint, 1 | 2 | 4 | 8) => |b| u64::from_le_bytes(b) as f64,
-        (TypeChar::Float, 2) => |b| half_to_f64(u16::from_le_bytes([b[0], b[1]])),
+        (TypeChar::Float, 2) => |b| half::f16::from_le_bytes([b[0], b[1]]).to_f64(),
         (TypeChar::Float, 4) => |b| f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]])),
         (TypeChar::Float, 8) => f64::from_le_bytes,
         _ => return None,
     })
-}
-
-/// IEEE 754 binary16.
-pub(super) fn half_to_f64(bits: u16) -> f64 {
-    let sign = if bits & 0x8000 == 0 { 1.0 } else { -1.0 };
-    let (exponent, fraction) = (i32::from(bits >> 10 & 0x1f), f64::from(bits & 0x3ff));
-    match exponent {
-        0 => sign * fraction * 2f64.powi(-24),
-        31 if fraction == 0.0 => sign * f64::INFINITY,
-        31 => f64::NAN,
-        _ => sign * (1.0 + fraction / 1024.0) * 2f64.powi(exponent - 15),
-    }
 }
 
 fn to_row_major<T: Clone>(data: Vec<T>, shape: &[usize], order: Order) -> Vec<T> {

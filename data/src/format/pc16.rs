@@ -3,7 +3,7 @@
 //! Layout, little-endian: `POINTCACHE2\0`, i32 version = 1, i32 points, f32 first frame, f32 rate, i32 frames, then
 //! f16 `[frames × points × 3]`.
 
-use super::npz::half_to_f64;
+use half::f16;
 use std::fs;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -105,9 +105,8 @@ impl PointCache {
         }
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes).map_err(failed)?;
-        let half = |cell: &[u8], axis: usize| {
-            half_to_f64(u16::from_le_bytes([cell[2 * axis], cell[2 * axis + 1]])) as f32
-        };
+        let half =
+            |cell: &[u8], axis: usize| f16::from_le_bytes([cell[2 * axis], cell[2 * axis + 1]]).to_f32();
         let positions: Vec<[f32; 3]> =
             bytes.chunks_exact(6).map(|cell| std::array::from_fn(|a| half(cell, a))).collect();
         let point_count = points as usize;

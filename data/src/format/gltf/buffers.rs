@@ -2,6 +2,9 @@
 
 use super::super::mesh::{check_count, read_limited};
 use super::document::{Accessor, Document};
+use base64::Engine;
+use base64::alphabet::STANDARD;
+use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use std::borrow::Cow;
 use std::path::{Component, Path, PathBuf};
 
@@ -148,6 +151,12 @@ impl<'a> Buffers<'a> {
     }
 }
 
+/// Files come with padding or without it.
+const BASE64: GeneralPurpose = GeneralPurpose::new(
+    &STANDARD,
+    GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
+);
+
 fn get_accessor(document: &Document, index: usize) -> Result<&Accessor, String> {
     document.accessors.get(index).ok_or_else(|| format!("accessor {index} is not there"))
 }
@@ -155,35 +164,8 @@ fn get_accessor(document: &Document, index: usize) -> Result<&Accessor, String> 
 fn decode_data_uri(data: &str, index: usize) -> Result<Vec<u8>, String> {
     let encoded = data.split_once(";base64,").map(|(_, e)| e);
     encoded
-        .and_then(decode_base64)
+        .and_then(|text| BASE64.decode(text).ok())
         .ok_or_else(|| format!("buffer {index} is a data URI that is not valid base64"))
-}
-
-/// Base64 of RFC 4648, with or without padding.
-fn decode_base64(text: &str) -> Option<Vec<u8>> {
-    let text = text.trim_end_matches('=').as_bytes();
-    let mut bytes = Vec::with_capacity(text.len() / 4 * 3 + 2);
-    for group in text.chunks(4) {
-        let mut bits = 0u32;
-        for c in group {
-            let value = match c {
-                b'A'..=b'Z' => c - b'A',
-                b'a'..=b'z' => c - b'a' + 26,
-                b'0'..=b'9' => c - b'0' + 52,
-                b'+' => 62,
-                b'/' => 63,
-                _ => return None,
-            };
-            bits = bits << 6 | u32::from(value);
-        }
-        match group.len() {
-            4 => bytes.extend(&bits.to_be_bytes()[1..]),
-            3 => bytes.extend(&(bits >> 2).to_be_bytes()[2..]),
-            2 => bytes.push((bits >> 4) as u8),
-            _ => return None,
-        }
-    }
-    Some(bytes)
 }
 
 fn percent_decoded(uri: &str) -> String {
@@ -211,14 +193,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn base64_and_percent_codes_decode() {
+    fn base64_with_or_without_padding_and_percent_codes_decode() {
         for (text, bytes) in
-            [("", &b""[..]), ("Zg==", b"f"), ("Zm8=", b"fo"), ("Zm9v", b"foo"), ("Zm9vYg", b"foob")]
+            [("", &b""[..]), ("Zg==", b"f"), ("Zm8=", b"fo"), ("Zm9vYg", b"foob"), ("+/8=", b"\xfb\xff")]
         {
-            assert_eq!(decode_base64(text).as_deref(), Some(bytes));
+            assert_eq!(BASE64.decode(text).as_deref(), Ok(bytes));
         }
-        assert_eq!(decode_base64("+/8="), Some(vec![0xfb, 0xff]));
-        assert!(decode_base64("Zm9v!").is_none() && decode_base64("Z").is_none());
+        assert!(
+            decode_data_uri("data:;base64,Zm9v!", 0).is_err()
+                && decode_data_uri("data:;base64,Z", 0).is_err()
+        );
         assert_eq!(percent_decoded("a%20b%2"), "a b%2");
     }
 }

@@ -1,4 +1,6 @@
 use super::*;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use std::fs;
 
 /// Four corners of a unit square and indices of two triangles, padded to whole words.
@@ -45,26 +47,13 @@ fn glb(json: &str, binary: &[u8]) -> Vec<u8> {
     bytes
 }
 
-fn base64(bytes: &[u8]) -> String {
-    const LETTERS: &[u8] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut text = String::new();
-    for group in bytes.chunks(3) {
-        let word = (0..3).fold(0u32, |w, i| w << 8 | u32::from(group.get(i).copied().unwrap_or(0)));
-        for i in 0..4 {
-            let letter = LETTERS[(word >> (18 - 6 * i) & 63) as usize];
-            text.push(if i <= group.len() { letter as char } else { '=' });
-        }
-    }
-    text
-}
-
 #[test]
 fn embedded_external_and_binary_buffers_give_the_same_placed_triangles() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("shirt.gltf");
     fs::write(folder.path().join("its data.bin"), payload()).unwrap();
     let external = parse(document(r#""uri":"its%20data.bin","#).as_bytes(), &path).unwrap();
-    let uri = format!(r#""uri":"data:application/octet-stream;base64,{}","#, base64(&payload()));
+    let uri = format!(r#""uri":"data:application/octet-stream;base64,{}","#, STANDARD.encode(payload()));
     let embedded = parse(document(&uri).as_bytes(), &path).unwrap();
     let binary = parse(&glb(&document(""), &payload()), &path).unwrap();
     assert_eq!(external, embedded);

@@ -21,9 +21,7 @@ pub(super) fn check_cache(cache: Option<&Path>, output: &Path) -> Result<(), Fai
 
 /// `clothcombo` in the folder for what programs may compute anew.
 pub(super) fn user_cache() -> Option<PathBuf> {
-    let folder = |variable: &str| std::env::var_os(variable).filter(|v| !v.is_empty()).map(PathBuf::from);
-    let cache = folder("XDG_CACHE_HOME").or_else(|| folder("LOCALAPPDATA"));
-    Some(cache.or_else(|| Some(folder("HOME")?.join(".cache")))?.join("clothcombo"))
+    Some(dirs::cache_dir()?.join("clothcombo"))
 }
 
 #[cfg(all(test, unix))]

@@ -10,6 +10,8 @@
 use super::{OutputError, Show};
 use crate::draper::{Drape, DraperError};
 use crate::picture::{BODY_COLOUR, layer_colour};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
 use clothcombo_data::format::atomic;
 use clothcombo_physics::contact::resolve::{Certificate, Crossed, certify};
 use clothcombo_physics::mesh::vertex_stretch;
@@ -68,7 +70,7 @@ fn page(show: &Show) -> Result<String, OutputError> {
     let (middle, tail) = rest.split_once(DATA).unwrap_or((rest, ""));
     let mut page = String::with_capacity(PAGE.len() + scene.len() + binary.len() * 4 / 3 + 4);
     page.extend([head, &scene, middle]);
-    encode_base64(&binary, &mut page);
+    STANDARD.encode_string(&binary, &mut page);
     page.push_str(tail);
     Ok(page)
 }
@@ -220,38 +222,9 @@ fn pack<'a>(
     about
 }
 
-/// Base64 of RFC 4648 with padding.
-fn encode_base64(bytes: &[u8], text: &mut String) {
-    const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    for group in bytes.chunks(3) {
-        let word =
-            group.iter().fold(0u32, |word, byte| word << 8 | u32::from(*byte)) << (8 * (3 - group.len()));
-        for k in 0..4 {
-            let letter = LETTERS[(word >> (18 - 6 * k) & 63) as usize];
-            text.push(if k <= group.len() { char::from(letter) } else { '=' });
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn base64_is_that_of_the_standard() {
-        for (bytes, text) in [
-            (&b""[..], ""),
-            (b"f", "Zg=="),
-            (b"fo", "Zm8="),
-            (b"foo", "Zm9v"),
-            (b"foobar", "Zm9vYmFy"),
-            (b"\xfb\xff", "+/8="),
-        ] {
-            let mut found = String::new();
-            encode_base64(bytes, &mut found);
-            assert_eq!(found, text);
-        }
-    }
 
     #[test]
     fn packed_positions_are_within_half_a_step_and_aligned() {
