@@ -51,6 +51,10 @@ pub struct ModelConfig {
     pub corrections: usize,
     /// Width of the correction networks.
     pub correction_width: usize,
+    /// Correction steps of a drape at most: the networks take turns, round after round, until no step lowers the energy of a
+    /// garment any more. Training takes every network once. By default one step per network; 0 leaves what the paper's
+    /// networks make as it is.
+    pub correction_steps: Option<usize>,
 }
 
 impl Default for ModelConfig {
@@ -75,6 +79,7 @@ impl Default for ModelConfig {
             vertex_embedding: true,
             corrections: 0,
             correction_width: 96,
+            correction_steps: None,
         }
     }
 }
@@ -82,7 +87,7 @@ impl Default for ModelConfig {
 impl ModelConfig {
     /// The same without correction networks: all that a model has of the paper's.
     pub fn without_corrections(&self) -> Self {
-        Self { corrections: 0, ..self.clone() }
+        Self { corrections: 0, correction_steps: None, ..self.clone() }
     }
 
     /// Checks that every size is at least one and every scale and frequency is usable.
@@ -110,6 +115,13 @@ impl ModelConfig {
                     expected: format!("at least {minimum}"),
                 });
             }
+        }
+        if let Some(steps) = self.correction_steps.filter(|steps| *steps > 0 && self.corrections == 0) {
+            return Err(ModelError::Config {
+                key: "correction_steps",
+                value: steps.to_string(),
+                expected: "left out without correction networks (corrections = 0)".into(),
+            });
         }
         let positive = [("omega_first", self.omega_first), ("omega_hidden", self.omega_hidden)];
         for (key, value) in positive {

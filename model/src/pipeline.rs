@@ -34,6 +34,9 @@ pub struct ClothCombo {
     pub untangling: Untangling,
     /// Correct what the others do, one after the other; the paper has none.
     pub corrections: Vec<Correction>,
+    /// Correction steps at inference ([`ModelConfig::correction_steps`]).
+    #[module(skip)]
+    pub correction_steps: usize,
 }
 
 /// What the vertices of all garments feel at posed positions `[ΣV,3]` [m].
@@ -127,6 +130,7 @@ impl ClothCombo {
             skinning: Skinning::new(config, dimensions, start),
             untangling: Untangling::new(config, start),
             corrections: Vec::new(),
+            correction_steps: 0,
         }
         .with_corrections(config, start))
     }
@@ -245,19 +249,20 @@ impl ClothCombo {
     /// The same networks with new correction networks in place of any they have; untrained, these correct nothing.
     pub fn with_corrections(mut self, config: &ModelConfig, start: &mut Initializer) -> Self {
         self.corrections = (0..config.corrections).map(|_| Correction::new(config, start)).collect();
+        self.correction_steps = config.correction_steps.unwrap_or(config.corrections);
         self
     }
 
-    /// The same networks with no more than the first `count` of their correction networks.
-    pub fn with_first_corrections(mut self, count: usize) -> Self {
-        self.corrections.truncate(count);
+    /// The same networks with at most `steps` correction steps at inference.
+    pub fn with_correction_steps(mut self, steps: usize) -> Self {
+        self.correction_steps = steps;
         self
     }
 
-    /// Corrects how garments lie: the states after each of the correction networks, none without any.
+    /// The states after each of the correction networks, one after the other, as they are trained; none without any.
     ///
-    /// `draped` is where `single` and untangling brought them from `start`; `feel` says what is felt at posed positions. Nothing
-    /// of that gets a gradient, whatever device it comes from.
+    /// `draped` is where `single` and untangling brought the garments from `start`; `feel` says what is felt at posed positions.
+    /// Nothing of that gets a gradient, whatever device it comes from.
     pub fn correct(
         &self,
         outfit: &OutfitTensors,
@@ -267,20 +272,47 @@ impl ClothCombo {
         body: &BodyTensors,
         feel: Feel<'_>,
     ) -> Vec<LayeredDrape> {
-        let _span = (!self.corrections.is_empty()).then(|| trace_span!("corrections").entered());
+        let mut states: Vec<LayeredDrape> = Vec::with_capacity(self.corrections.len());
+        for network in 0..self.corrections.len() {
+            let before = states.last().unwrap_or(draped);
+            let felt = feel(before.posed.clone().detach());
+            let canonical = before.canonical.clone().detach();
+            let state = self.correct_once(
+                network,
+                outfit,
+                embeddings,
+                (start.clone(), single),
+                canonical,
+                body,
+                felt,
+            );
+            states.push(state);
+        }
+        states
+    }
+
+    /// Where correction network `network` moves garments from `canonical` positions `[ΣV,3]` [m], at which `felt` is felt.
+    ///
+    /// # Panics
+    /// If there is no such network.
+    pub fn correct_once(
+        &self,
+        network: usize,
+        outfit: &OutfitTensors,
+        embeddings: &Embeddings,
+        (start, single): (Tensor<2>, &SingleDrape),
+        canonical: Tensor<2>,
+        body: &BodyTensors,
+        felt: FeltTensors,
+    ) -> LayeredDrape {
+        let _span = trace_span!("corrections").entered();
         let [vertex, draping, weights] =
             [&embeddings.vertex, &single.draping_embedding, &single.skin_weights].map(|t| t.clone().detach());
         let given = Given { vertex: &vertex, draping: &draping, segments: &outfit.segments };
-        let mut states: Vec<LayeredDrape> = Vec::with_capacity(self.corrections.len());
-        for correction in &self.corrections {
-            let before = states.last().unwrap_or(draped);
-            let displacement = before.canonical.clone().detach() - start.clone();
-            let felt = feel(before.posed.clone().detach());
-            let canonical = correction.correct(displacement, felt, &given) + start.clone();
-            let posed = linear_blend_skinning(canonical.clone(), weights.clone(), body.bones.clone());
-            states.push(LayeredDrape { canonical, posed });
-        }
-        states
+        let displacement = canonical - start.clone();
+        let canonical = self.corrections[network].correct(displacement, felt, &given) + start;
+        let posed = linear_blend_skinning(canonical.clone(), weights, body.bones.clone());
+        LayeredDrape { canonical, posed }
     }
 
     /// Raises diffusion times that an optimiser step pushed below the smallest one in use.

@@ -1,13 +1,13 @@
 //! The networks at inference: a prepared scene in, positions on the host out.
 
+use crate::correct::{corrected, skinned};
 use crate::evaluate::Draped;
-use crate::felt::{Company, felt};
-use crate::least_energy::least_energy;
+use crate::felt::Company;
 use crate::scene::{Library, LibraryError, LibraryGarment, PreparedBody, PreparedScene, Recent};
 use burn::tensor::{Device, Tensor, TensorData};
 use clothcombo_model::{
-    BodyTensors, ClothCombo, Dimensions, Embeddings, Feel, GarmentArrays, GarmentEmbedding, GarmentTensors,
-    LayeredDrape, ModelError, OutfitTensors, SingleDrape, linear_blend_skinning,
+    BodyTensors, ClothCombo, Dimensions, Embeddings, GarmentArrays, GarmentEmbedding, GarmentTensors,
+    ModelError, OutfitTensors,
 };
 use clothcombo_physics::operators::SurfaceOperators;
 use miette::Diagnostic;
@@ -175,8 +175,7 @@ pub fn body_tensors(
     device: &Device,
 ) -> Result<(BodyTensors, Tensor<2>), ModelError> {
     let tensors = BodyTensors::new(&body.shape, &body.pose, &body.bones, dimensions, device)?;
-    let start = TensorData::new(body.start.as_flattened().to_vec(), [body.start.len(), 3]);
-    Ok((tensors, Tensor::from_data(start, device)))
+    Ok((tensors, to_device(&body.start, device)))
 }
 
 /// The networks ready for inference; garments are embedded once.
@@ -192,9 +191,14 @@ impl<'a> Networks<'a> {
         Self { model, tensors, embeddings: Arc::new(tensors.embeddings()) }
     }
 
-    /// The same without correction networks.
+    /// The same without corrections.
     pub fn uncorrected(&self) -> Self {
-        let model = self.model.clone().with_first_corrections(0);
+        self.with_correction_steps(0)
+    }
+
+    /// The same with at most `steps` correction steps.
+    pub fn with_correction_steps(&self, steps: usize) -> Self {
+        let model = self.model.clone().with_correction_steps(steps);
         Self { model, tensors: self.tensors, embeddings: self.embeddings.clone() }
     }
 
@@ -221,6 +225,25 @@ impl<'a> Networks<'a> {
         Ok(answer(&OnBody { scene, outfit: &outfit, embeddings: &embeddings, body: &body, start }))
     }
 
+    /// The energy of every garment of `scene`, with the pairs that it is part of, at the states that the correction steps take
+    /// from skinning on [J].
+    ///
+    /// # Errors
+    /// When the scene's numbers are not finite.
+    pub fn energies(&self, scene: &PreparedScene) -> Result<Vec<Vec<f64>>, DrapeError> {
+        self.ask(scene, |on_body| {
+            let OnBody { outfit, embeddings, body, start, .. } = on_body;
+            let single = self.model.drape_single(outfit, embeddings, body, start.clone());
+            let layered = self.model.untangle(outfit, embeddings, &single, body);
+            let found = draped(&layered.canonical, &layered.posed);
+            let mut energies = Vec::new();
+            corrected(&self.model, on_body, &single, found, Company::Together, &mut |descent| {
+                energies.push(descent.energies().to_vec());
+            });
+            energies
+        })
+    }
+
     /// Linear blend skinning of the start state, which has learned nothing.
     ///
     /// # Errors
@@ -242,8 +265,7 @@ impl<'a> Networks<'a> {
     fn skin_from(&self, scene: &PreparedScene, start: Tensor<2>) -> Result<Draped, DrapeError> {
         let outfit = self.tensors.outfit(scene)?;
         let (body, _) = self.tensors.body(&scene.bodies[0])?;
-        let posed = linear_blend_skinning(start.clone(), outfit.skin_weights, body.bones);
-        Ok(draped(&start, &posed))
+        Ok(skinned(start, outfit.skin_weights, &body))
     }
 }
 
@@ -286,7 +308,7 @@ pub fn drape_on(model: &ClothCombo, on_body: &OnBody<'_>) -> (Draped, NetworkTim
         found = draped(&layered.canonical, &layered.posed);
     }
     times.untangling = clock.elapsed() - times.draping;
-    found = corrected(model, on_body, &single, (&layered, found), Company::Together);
+    found = corrected(model, on_body, &single, found, Company::Together, &mut |_| ());
     times.correcting = clock.elapsed() - times.draping - times.untangling;
     (found, times)
 }
@@ -295,32 +317,19 @@ pub fn drape_on(model: &ClothCombo, on_body: &OnBody<'_>) -> (Draped, NetworkTim
 pub fn drape_alone(model: &ClothCombo, on_body: &OnBody<'_>) -> Draped {
     let OnBody { outfit, embeddings, body, start, .. } = on_body;
     let single = model.drape_single(outfit, embeddings, body, start.clone());
-    let alone = LayeredDrape { canonical: single.canonical.clone(), posed: single.posed.clone() };
-    let found = draped(&alone.canonical, &alone.posed);
-    corrected(model, on_body, &single, (&alone, found), Company::Alone)
+    let found = draped(&single.canonical, &single.posed);
+    corrected(model, on_body, &single, found, Company::Alone, &mut |_| ())
 }
 
-/// What the correction networks make of `uncorrected`, on the device and on the host; that itself where it has less energy.
-fn corrected(
-    model: &ClothCombo,
-    OnBody { scene, outfit, embeddings, body, start }: &OnBody<'_>,
-    single: &SingleDrape,
-    (uncorrected, found): (&LayeredDrape, Draped),
-    company: Company,
-) -> Draped {
-    let prepared = &scene.bodies[0];
-    let feel: Feel<'_> = &|posed| felt(scene, prepared, company.contacts(scene), posed);
-    let states = model.correct(outfit, embeddings, (start.clone(), single), uncorrected, body, feel);
-    if states.is_empty() {
-        return found;
-    }
-    let states = states.iter().map(|state| draped(&state.canonical, &state.posed));
-    let states: Vec<Draped> = std::iter::once(found).chain(states).collect();
-    least_energy(&states, &prepared.energy, company)
-}
-
-fn draped(canonical: &Tensor<2>, posed: &Tensor<2>) -> Draped {
+/// Positions on the host.
+pub(crate) fn draped(canonical: &Tensor<2>, posed: &Tensor<2>) -> Draped {
     Draped { canonical: to_host(canonical.clone()), posed: to_host(posed.clone()) }
+}
+
+/// Positions as a tensor `[N, 3]`.
+pub(crate) fn to_device(positions: &[[f32; 3]], device: &Device) -> Tensor<2> {
+    let data = TensorData::new(positions.as_flattened().to_vec(), [positions.len(), 3]);
+    Tensor::from_data(data, device)
 }
 
 /// Positions `[N, 3]` of a tensor.

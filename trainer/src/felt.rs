@@ -1,8 +1,7 @@
 //! What the vertices of a scene feel, for the correction networks.
 
-use crate::drape::to_host;
 use crate::scene::{LibraryGarment, PreparedBody, PreparedScene};
-use burn::tensor::Tensor;
+use burn::tensor::Device;
 use clothcombo_model::FeltTensors;
 use clothcombo_physics::sensing::{DIRECTIONS, FEATURES, Rings, Sensed, sense};
 use std::sync::Arc;
@@ -28,7 +27,7 @@ impl Company {
 
 const _: () = assert!(FEATURES == FeltTensors::FEATURES && DIRECTIONS == FeltTensors::DIRECTIONS);
 
-/// What the vertices of the garments of `scene` feel at `posed` `[ΣV, 3]` [m] on `body`.
+/// What the vertices of the garments of `scene` feel at `posed` `[ΣV, 3]` [m] on `body`, as tensors on `device`.
 ///
 /// `contacts` are the pairs (inner, outer) that feel each other: those of the scene, or none for garments that are draped by
 /// themselves.
@@ -36,13 +35,13 @@ pub fn felt(
     scene: &PreparedScene,
     body: &PreparedBody,
     contacts: &[(usize, usize)],
-    posed: Tensor<2>,
+    posed: &[[f32; 3]],
+    device: &Device,
 ) -> FeltTensors {
-    let device = posed.device();
     let rings: Vec<&Rings> = scene.worn.iter().map(|worn| &worn.rings).collect();
-    let Sensed { features, directions } = sense(&body.energy, &rings, &to_host(posed), contacts);
+    let Sensed { features, directions } = sense(&body.energy, &rings, posed, contacts);
     let directions = directions.map(|posed| unposed(scene, body, &posed));
-    FeltTensors::new(features, directions.each_ref().map(Vec::as_slice), &device)
+    FeltTensors::new(features, directions.each_ref().map(Vec::as_slice), device)
         .expect("every vertex of the scene has its features")
 }
 

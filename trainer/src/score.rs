@@ -90,7 +90,7 @@ pub struct GarmentScore {
     pub vertices: usize,
     /// Number of triangles.
     pub triangles: usize,
-    /// Energies of one garment [J, m³, 1]; holding needs the canonical pose and is left out.
+    /// Energies of one garment [J, m³, 1, m²]; holding only where canonical positions are given.
     pub raw: TermValues,
     /// The same times the paper's weights, whatever the number of vertices.
     pub weighted: TermValues,
@@ -137,6 +137,9 @@ pub struct DrapedGarment<'a> {
     pub rest: &'a TriMesh,
     /// Draped positions of the vertices of `rest`, `[V, 3]` [m].
     pub positions: &'a [[f64; 3]],
+    /// The same before skinning, for the holding energy against `rest`, the paper's printed form; all garments have them or
+    /// none.
+    pub canonical: Option<&'a [[f64; 3]]>,
 }
 
 /// Scores `garments`, innermost first, on the posed `body`.
@@ -172,7 +175,8 @@ pub fn score(
         settings,
     };
     let posed: Vec<[f64; 3]> = garments.iter().flat_map(|g| g.positions).copied().collect();
-    let value = scene.raw(&posed, &[]);
+    let canonical: Option<Vec<&[[f64; 3]]>> = garments.iter().map(|g| g.canonical).collect();
+    let value = scene.raw(&posed, &canonical.map_or(Vec::new(), |parts| parts.concat()));
 
     let body_tree = TriangleTree::new(body.positions(), body.faces());
     let trees: Vec<TriangleTree> =
@@ -243,9 +247,21 @@ fn scene_garment(
         .rest
         .with_positions(garment.positions.to_vec())
         .map_err(|reason| ScoreError::Positions { garment: name(), reason })?;
-    let energies = GarmentEnergies::new(garment.rest, &Topology::new(garment.rest), settings, false)
+    let is_held = garment.canonical.is_some();
+    if let Some(canonical) = garment.canonical {
+        garment
+            .rest
+            .with_positions(canonical.to_vec())
+            .map_err(|reason| ScoreError::Positions { garment: name(), reason })?;
+    }
+    let energies = GarmentEnergies::new(garment.rest, &Topology::new(garment.rest), settings, is_held)
         .map_err(|reason| ScoreError::Energy { garment: name(), reason })?;
-    Ok(SceneGarment { energies: Arc::new(energies), holding_reference: Vec::new(), weights })
+    Ok(SceneGarment {
+        energies: Arc::new(energies),
+        holding_reference: if is_held { garment.rest.positions().to_vec() } else { Vec::new() },
+        pull_back: None,
+        weights,
+    })
 }
 
 /// The evaluated terms by name, times `factor`.

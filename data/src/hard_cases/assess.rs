@@ -159,7 +159,8 @@ fn assess(
         let numbers = [value, value_f32, largest, largest_f32];
         let pairs = gradient.as_flattened().iter().zip(gradient_f32.as_flattened());
         let difference = pairs.map(|(a, b)| (a - f64::from(*b)).abs()).fold(0.0, f64::max);
-        let positions = if term.is_canonical() { &double.canonical } else { &double.posed };
+        let is_canonical = alone(&double.energy, term).needs_canonical();
+        let positions = if is_canonical { &double.canonical } else { &double.posed };
         let extent = positions.as_flattened().iter().fold(1.0, |m: f64, x| m.max(x.abs()));
         let slope: f64 = gradient.as_flattened().iter().map(|g| g.abs()).sum();
         Some(TermReport {
@@ -194,8 +195,9 @@ impl<T: Real> Evaluated<T> {
 
     /// Raw value and gradient of one term.
     fn term(&self, term: Term) -> Option<(f64, Vec<[T; 3]>)> {
-        let value = alone(&self.energy, term).evaluate(&self.posed, &self.canonical);
+        let energy = alone(&self.energy, term);
+        let value = energy.evaluate(&self.posed, &self.canonical);
         let raw = raw_value(&value, term)?;
-        Some((raw, if term.is_canonical() { value.canonical_gradient } else { value.posed_gradient }))
+        Some((raw, if energy.needs_canonical() { value.canonical_gradient } else { value.posed_gradient }))
     }
 }

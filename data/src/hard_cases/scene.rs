@@ -47,6 +47,7 @@ impl HardScene {
             Ok(SceneGarment {
                 energies: Arc::new(energies),
                 holding_reference: rest.positions().iter().map(|p| vec3::from_f64(*p)).collect(),
+                pull_back: None,
                 weights,
             })
         });

@@ -164,6 +164,7 @@ impl Scene {
             .map(|(energies, dressed)| SceneGarment {
                 energies: energies.clone(),
                 holding_reference: narrowed(dressed.rest.positions()),
+                pull_back: None,
                 weights,
             })
             .collect();

@@ -70,7 +70,7 @@ fn without_autodiff_the_value_is_the_same() {
 fn a_scene_without_holding_leaves_canonical_positions_alone() {
     for (_, device) in devices() {
         let device = device.autodiff();
-        let weights = TermMap::from_fn(|term| if term.is_canonical() { 0.0 } else { 1.0 });
+        let weights = TermMap::from_fn(|term| if term == Term::Holding { 0.0 } else { 1.0 });
         let s = scene::<f32>(EnergySettings::default(), weights, 3);
         let posed = tensor(&s.posed, &device).require_grad();
         let canonical = tensor(&s.canonical, &device).require_grad();

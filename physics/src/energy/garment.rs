@@ -5,10 +5,10 @@ use std::fmt::Debug;
 use super::bending::Bending;
 use super::body_collision::BodyCollision;
 use super::gravity::Gravity;
-use super::holding::Holding;
+use super::holding::{HeightRow, Holding};
 use super::layer_collision::InnerGarment;
 use super::repulsion::Repulsion;
-use super::strain::Strain;
+use super::strain::{Needle, Strain};
 use super::{CurvatureSink, EnergyError, EnergySettings, Term, Weighted};
 use crate::mesh::{Topology, TriMesh};
 use crate::query::Gap;
@@ -23,6 +23,8 @@ pub struct GarmentState<'a, T> {
     pub canonical: &'a [[T; 3]],
     /// Canonical positions that the holding energy measures against `[V, 3]` [m].
     pub holding_reference: &'a [[T; 3]],
+    /// Reads the heights of the holding energy off posed positions `[V]`; `None`: off canonical ones.
+    pub pull_back: Option<&'a [HeightRow]>,
     /// Signed distance of every posed vertex to the body `[V]`; empty when no active term needs it.
     pub gaps: &'a [Gap<T>],
     /// Constants of the scene.
@@ -31,8 +33,8 @@ pub struct GarmentState<'a, T> {
 
 /// An energy of one garment.
 pub trait GarmentTerm<T>: Debug + Send + Sync {
-    /// Its raw value; adds `weight·∂E/∂positions` to the target, positions being canonical or posed as
-    /// [`Term::is_canonical`] says.
+    /// Its raw value; adds `weight·∂E/∂positions` to the target, positions being canonical for
+    /// the holding energy without [`GarmentState::pull_back`], else posed.
     fn evaluate(&self, state: &GarmentState<'_, T>, target: Option<Weighted<'_, T>>) -> f64;
 
     /// Adds a positive semidefinite approximation of its second derivatives; nothing for a term that is linear or whose
@@ -74,21 +76,15 @@ impl<T: Real> GarmentEnergies<T> {
         }
         let material = &settings.material;
         let median_edge = rest.median_edge_length();
-        let repulsion = Repulsion::new(
-            topology,
-            settings.repulsion_radius,
-            settings.repulsion_normalised,
-            settings.repulsion_subset,
-        );
-        let repulsion = if settings.repulsion_continuous { repulsion.continuous() } else { repulsion };
         let bending =
             Bending::with_median_edge(rest, &topology.hinges, material.bending_stiffness, median_edge);
+        let needle = Needle { ratio: settings.needle_ratio, median_edge };
         let mut terms: Vec<(Term, Box<dyn GarmentTerm<T>>)> = vec![
-            (Term::Strain, Box::new(Strain::with_median_edge(rest, material, median_edge))),
+            (Term::Strain, Box::new(Strain::with_needle(rest, material, needle))),
             (Term::Bending, Box::new(bending)),
             (Term::Gravity, Box::new(Gravity::new(rest, material, settings.gravity_acceleration))),
             (Term::BodyCollision, Box::new(BodyCollision)),
-            (Term::Repulsion, Box::new(repulsion)),
+            (Term::Repulsion, Box::new(Repulsion::new(topology))),
         ];
         if holding {
             terms.push((Term::Holding, Box::new(Holding::new(rest, settings.holding_fraction))));

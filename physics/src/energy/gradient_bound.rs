@@ -7,18 +7,18 @@
 //!
 //! | term | bound on `|∂E/∂x_v|` | why |
 //! |---|---|---|
-//! | strain | `Σ_T 2V·S·(λ√2 + 2μ)·(S² + M)·√3/h` | `‖P‖ ≤ ‖F‖·‖S‖`, with `‖F‖ ≤ S = √6·ℓ/h`, and `h` the height of the rest triangle, which the regularisation keeps above 1e-2 of its longest edge; `M` is the norm of the rest metric |
+//! | strain | `Σ_T 2V·S·(λ√2 + 2μ)·(S² + M)·√3/h` | `‖P‖ ≤ ‖F‖·‖S‖`, with `‖F‖ ≤ S = √6·ℓ/h`, and `h` the height of the rest triangle, which the regularisation keeps above a ratio of its longest edge (without it there is no bound); `M` is the norm of the rest metric |
 //! | bending | `Σ_H 58·k·ℓ/τ` | `|∂α/∂c|·φ ≤ 1.1·ℓ/τ` and `|∂φ/∂c| ≤ 2.2·ℓ/τ` for `φ = t²(6 − 8t + 3t²)`, `t = s²/τ²` below τ, `α ≤ π`; the ends of the edge carry up to four times that |
 //! | gravity | `m_v·g` | it is that everywhere |
 //! | body collision | `3(ε + D)²` | unit normals, `d ≥ −D` |
 //! | repulsion | `2(N − 1)·factor/δ` | a pair pulls with at most `2/δ`; over `N` vertices the default is below `2/δ` for any garment |
-//! | holding | `2·max|y − y_ref|` | a parabola |
+//! | holding | `2·max|y − y_ref|·|r|` | a parabola along the row `r` that reads the height off; `|r| = 1` on canonical positions |
 //! | layer collision, nearest vertex | `3M(ε + D)²·(1 + 3·n·ℓ·D/τ)` | `M` outer vertices at most share an inner one, whose normal turns by at most `ℓ/τ` per face |
 //! | layer collision, closest point | none | the share of a triangle at the border changes within its deformed height |
 //! | layer distance | `3M(r + D)²` | `d_inner < r`, `d_outer ≥ −D`, `M` vertices at most per bucket |
 
 use super::bending;
-use super::strain::NEEDLE_RATIO;
+use super::holding::HeightRow;
 use super::{EnergySettings, LayerContact, SceneEnergy, Term, layer_collision, repulsion};
 use crate::mesh::{Topology, TriMesh};
 use crate::real::Real;
@@ -52,6 +52,7 @@ pub fn gradient_bound<T: Real>(
             posed: posed[range.clone()].iter().map(|p| to_f64(*p)).collect(),
             canonical: canonical[range].iter().map(|p| to_f64(*p)).collect(),
             reference: garment.holding_reference.iter().map(|p| to_f64(*p)).collect(),
+            pull_back: garment.pull_back.as_deref(),
         });
     }
     let settings = &scene.settings;
@@ -98,6 +99,7 @@ struct Deformed<'a> {
     posed: Vec<[f64; 3]>,
     canonical: Vec<[f64; 3]>,
     reference: Vec<[f64; 3]>,
+    pull_back: Option<&'a [HeightRow]>,
 }
 
 impl Deformed<'_> {
@@ -127,9 +129,9 @@ impl Deformed<'_> {
             let [a, b, c] = self.rest.corners(f);
             let length = norm(sub(b, a)).max(norm(sub(c, b))).max(norm(sub(a, c)));
             let area = self.rest.face_area(f);
-            let regular = length.max(NEEDLE_RATIO * self.median_edge);
+            let regular = length.max(settings.needle_ratio * self.median_edge);
             let true_height = if length > 0.0 { 2.0 * area / length } else { 0.0 };
-            let height = true_height.max(NEEDLE_RATIO * regular);
+            let height = true_height.max(settings.needle_ratio * regular);
             let stretch = 6f64.sqrt() * self.longest(f as u32) / height;
             let metric = 6f64.sqrt() * length / height;
             let strain = stretch * stretch + metric * metric + 2.0;
@@ -159,8 +161,14 @@ impl Deformed<'_> {
     }
 
     fn holding(&self) -> f64 {
-        let raised = self.canonical.iter().zip(&self.reference).map(|(p, q)| (p[1] - q[1]).abs());
-        2.0 * raised.fold(0.0, f64::max)
+        let bound = |(v, reference): (usize, &[f64; 3])| match self.pull_back {
+            None => (self.canonical[v][1] - reference[1]).abs(),
+            Some(rows) => {
+                let ([a, b, c, d], [x, y, z]) = (rows[v], self.posed[v]);
+                (a * x + b * y + c * z + d - reference[1]).abs() * norm([a, b, c])
+            }
+        };
+        2.0 * self.reference.iter().enumerate().map(bound).fold(0.0, f64::max)
     }
 
     /// As the inner garment under `outer`.

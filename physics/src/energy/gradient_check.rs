@@ -116,7 +116,7 @@ pub fn check_gradient(
     raw_value(&scene.value(posed, canonical), term)?;
     let edges = scene.garments.iter().map(|g| g.energies.as_inner().median_edge());
     let edge = edges.fold(LONGEST_EDGE, f64::min);
-    Some(if term.is_canonical() {
+    Some(if scene.needs_canonical() {
         let value = |x: &[[f64; 3]]| scene.value(posed, x).total;
         let gradient = |x: &[[f64; 3]]| {
             let value = scene.evaluate(posed, x);

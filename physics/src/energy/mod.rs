@@ -7,7 +7,7 @@
 //! | [`gravity`] | posed garment | `m·g·y` (vertices) |
 //! | [`body_collision`] | posed garment, body | `max(ε − d, 0)³` (vertices) |
 //! | [`repulsion`] | posed garment | `−log d²` (close vertex pairs that share no edge), over `N` |
-//! | [`holding`] | canonical garment | `(y − y_ref)²` (top tenth of the vertices) |
+//! | [`holding`] | posed garment, pulled back; paper: canonical garment | `(y − y_ref)²` (top tenth of the vertices) |
 //! | [`layer_collision`] | two posed garments | `max(ε − d, 0)³` (outer vertices, distance to the inner garment) |
 //! | [`layer_distance`] | two posed garments, body | `max(d_inner − d_outer, 0)³` (pairs over one body vertex) |
 //!

@@ -6,8 +6,8 @@
 //! **Near d = 0** the logarithm has no value. Below [`CONTACT_DISTANCE`] it continues as the line in `d²` that touches it
 //! there, `−log δ² + 1 − d²/δ²`: continuously differentiable, bounded, gradient at most `2/δ`; two vertices at one point
 //! have no direction to part in and get none from each other. **At the radius** the printed term jumps from 4.6 to 0; this
-//! is kept, and the gradient is that of the pairs inside. [`Repulsion::continuous`] drops the jump without touching the
-//! gradient: pairs inside count `−log d²/r²`. Training, which follows gradients, cannot tell the two forms apart; a line
+//! is kept, and the gradient is that of the pairs inside. [`EnergySettings::repulsion_continuous`] drops the jump without
+//! touching the gradient: pairs inside count `−log d²/r²`. Training, which follows gradients, cannot tell the two forms apart; a line
 //! search can, because in the printed form every pair that comes closer than the radius is a wall.
 //!
 //! **No all-pairs work.** Vertices are sorted into cells of half or a quarter of the radius; those of one cell share a list of
@@ -22,7 +22,7 @@ use rayon::prelude::*;
 use super::cell_grid::CellGrid;
 use super::elements::GRAIN;
 use super::pair_kernel::{Candidates, Kernel, VertexResponse};
-use super::{GarmentState, GarmentTerm, Weighted};
+use super::{EnergySettings, GarmentState, GarmentTerm, Weighted};
 use crate::mesh::Topology;
 use crate::mesh::shapes::SplitMix;
 use crate::real::Real;
@@ -30,28 +30,11 @@ use crate::vec3::{axpy, sub, zero};
 
 pub use super::pair_kernel::CONTACT_DISTANCE;
 
-/// The repulsion energy of one garment.
+/// The repulsion energy of one garment; radius, form and subset are settings of the scene.
 #[derive(Debug, Clone)]
 pub struct Repulsion {
-    radius: f64,
-    /// Squared lengths are measured in units of one over this [1/m²].
-    unit: f64,
-    /// Factor on the sum over unordered pairs.
-    factor: f64,
-    pairs: Pairs,
     /// Per vertex those that do not count: itself and its neighbours.
     excluded: Rows,
-}
-
-#[derive(Debug, Clone, Copy)]
-enum Pairs {
-    /// All close pairs.
-    All,
-    /// A random sample of all pairs, see [`Sample`].
-    Sampled {
-        /// Half the number of partners of every vertex.
-        reach: usize,
-    },
 }
 
 /// Compressed rows of vertex indices.
@@ -79,59 +62,50 @@ impl Rows {
 }
 
 impl Repulsion {
-    /// Prepares the energy of a garment. `radius` [m]; `normalised`: divide by the number of vertices; `subset`: this many
-    /// random pairs per vertex instead of all, an estimate of their sum that is unbiased over the samples.
-    pub fn new(topology: &Topology, radius: f64, normalised: bool, subset: Option<usize>) -> Self {
-        let count = topology.vertex_count();
-        let mut factor = if normalised { 1.0 / count.max(1) as f64 } else { 1.0 };
-        let pairs = match subset {
+    /// For a garment with this topology.
+    pub fn new(topology: &Topology) -> Self {
+        let excluded = |v| topology.ring(v).iter().copied().chain([v as u32]);
+        Self { excluded: Rows::from_fn(topology.vertex_count(), excluded) }
+    }
+
+    /// Energy at `positions` `[V, 3]` [m] by the `repulsion_…` of `settings`; adds its weighted gradient to `target`. A vertex
+    /// that is not finite repels nothing.
+    pub fn evaluate<T: Real>(
+        &self,
+        positions: &[[T; 3]],
+        settings: &EnergySettings,
+        target: Option<Weighted<'_, T>>,
+    ) -> f64 {
+        let (count, radius) = (positions.len(), settings.repulsion_radius);
+        // Squared lengths in units of the squared radius have no logarithm there.
+        let unit = if settings.repulsion_continuous { 1.0 / (radius * radius) } else { 1.0 };
+        let kernel = Kernel::<T>::new(radius, unit);
+        // On the sum over unordered pairs.
+        let mut factor = if settings.repulsion_normalised { 1.0 / count.max(1) as f64 } else { 1.0 };
+        let (twice, responses) = match settings.repulsion_subset {
             // Otherwise every vertex would meet every other one: nothing is saved.
             Some(reach) if 2 * reach + 1 < count => {
                 // Of the N−1 others a vertex meets `2·reach`.
                 factor *= (count - 1) as f64 / (2 * reach) as f64;
-                Pairs::Sampled { reach }
+                let sample = Sample::new(settings.repulsion_sample, count, reach);
+                sampled_pairs(positions, &self.excluded, &sample, kernel)
             }
-            _ => Pairs::All,
-        };
-        let excluded = Rows::from_fn(count, |v| topology.ring(v).iter().copied().chain([v as u32]));
-        Self { radius, unit: 1.0, factor, pairs, excluded }
-    }
-
-    /// The same forces from an energy without the jump at the radius: `−log d²/r²` for pairs inside.
-    pub fn continuous(mut self) -> Self {
-        self.unit = 1.0 / (self.radius * self.radius);
-        self
-    }
-
-    /// Energy at `positions` `[V, 3]` [m], of subsets that of sample number `sample`; adds its weighted gradient to `target`.
-    /// A vertex that is not finite repels nothing.
-    pub fn evaluate<T: Real>(
-        &self,
-        positions: &[[T; 3]],
-        sample: u32,
-        target: Option<Weighted<'_, T>>,
-    ) -> f64 {
-        let kernel = Kernel::<T>::new(self.radius, self.unit);
-        let (twice, responses) = match self.pairs {
-            Pairs::All => all_pairs(positions, &self.excluded, kernel),
-            Pairs::Sampled { reach } => {
-                sampled_pairs(positions, &self.excluded, &Sample::new(sample, positions.len(), reach), kernel)
-            }
+            _ => all_pairs(positions, &self.excluded, kernel),
         };
         if let Some(target) = target {
-            let weight = T::from_f64(target.weight * self.factor);
+            let weight = T::from_f64(target.weight * factor);
             for (v, pull) in responses {
                 axpy(&mut target.gradient[v as usize], weight, pull);
             }
         }
         // Every pair was met from both ends.
-        0.5 * self.factor * twice
+        0.5 * factor * twice
     }
 }
 
 impl<T: Real> GarmentTerm<T> for Repulsion {
     fn evaluate(&self, state: &GarmentState<'_, T>, target: Option<Weighted<'_, T>>) -> f64 {
-        self.evaluate(state.posed, state.settings.repulsion_sample, target)
+        self.evaluate(state.posed, state.settings, target)
     }
 }
 

@@ -7,12 +7,14 @@ use rayon::prelude::*;
 
 use super::curvature::{CurvatureSink, Scaled};
 use super::elements::GRAIN;
+use super::holding::{HeightRow, height_rows};
 use super::layer_collision::PosedInner;
 use super::layer_distance::{BodyBuckets, LayerGaps, layer_distance};
 use super::touching::Touching;
 use super::{EnergyError, EnergySettings, GarmentEnergies, GarmentState, Term, TermMap, Weighted};
 use crate::query::{Gap, Surface};
 use crate::real::Real;
+use crate::transform::Transform;
 use crate::vec3;
 
 /// One garment of a scene.
@@ -23,8 +25,18 @@ pub struct SceneGarment<T: Real> {
     /// Canonical positions that the holding energy measures against `[V, 3]` [m]; may be empty for a garment that is not
     /// held.
     pub holding_reference: Vec<[T; 3]>,
+    /// Heights before skinning as functions of posed positions `[V]`, which the holding energy then acts on
+    /// ([`super::holding`]); `None`: it acts on canonical positions (the paper's form).
+    pub pull_back: Option<Vec<HeightRow>>,
     /// Weight of every term; entries of layer terms are ignored.
     pub weights: TermMap<f64>,
+}
+
+impl<T: Real> SceneGarment<T> {
+    /// Whether `term` of this garment acts on canonical positions (before skinning).
+    fn is_canonical(&self, term: Term) -> bool {
+        term == Term::Holding && self.pull_back.is_none()
+    }
 }
 
 /// Two garments of a scene, one over the other.
@@ -47,7 +59,7 @@ pub struct SceneEnergy<T: Real> {
     pub garments: Vec<SceneGarment<T>>,
     /// The pairs that the layer terms are about.
     pub layers: Vec<SceneLayers>,
-    /// Constants and switches. Those that shape a garment's own energies must be the ones they were made with.
+    /// Constants and switches. Material, gravity and the share of held vertices must be those the energies were made with.
     pub settings: EnergySettings,
 }
 
@@ -109,6 +121,15 @@ impl<T: Real> SceneEnergy<T> {
     pub fn without_layers(&self) -> Self {
         let Self { body, garments, settings, .. } = self;
         Self { body: body.clone(), garments: garments.clone(), layers: Vec::new(), settings: *settings }
+    }
+
+    /// The same scene with [`EnergySettings::continuous`] and without the layer distance, whose pairs change with the nearest
+    /// body vertex: what states of a scene are compared by.
+    #[must_use]
+    pub fn continuous(mut self) -> Self {
+        self.settings = self.settings.continuous();
+        self.layers.iter_mut().for_each(|pair| pair.weights[Term::LayerDistance] = 0.0);
+        self
     }
 
     /// The same scene with no other weights than those of `term`; `None` if it has none.
@@ -184,21 +205,31 @@ impl<T: Real> SceneEnergy<T> {
     /// Whether any garment is held with a weight: if not, the canonical gradient is zero.
     pub fn needs_canonical(&self) -> bool {
         let mut terms = self.garments.iter().flat_map(|g| g.energies.terms().map(move |(term, _)| (g, term)));
-        terms.any(|(g, term)| term.is_canonical() && g.weights[term] != 0.0)
+        terms.any(|(g, term)| g.is_canonical(term) && g.weights[term] != 0.0)
     }
 
-    /// A positive semidefinite approximation of the second derivatives of the weighted sum with respect to posed and to
-    /// canonical positions, vertices numbered as in `posed`. Of the layer terms only the collision by the closest point has one.
+    /// The same scene with the holding energy on posed positions, pulled back by `transforms` `[ΣV]`: the initial blended
+    /// skinning of every vertex, canonical → posed.
+    ///
+    /// # Panics
+    /// If there is not one transform per vertex.
+    #[must_use]
+    pub fn pulled_back(mut self, transforms: &[Transform]) -> Self {
+        assert_eq!(transforms.len(), self.vertex_count(), "skinning transforms of all garments of the scene");
+        for (garment, range) in self.ranges().into_iter().enumerate() {
+            let garment = &mut self.garments[garment];
+            garment.pull_back = garment.energies.has_holding().then(|| height_rows(&transforms[range]));
+        }
+        self
+    }
+
+    /// A positive semidefinite approximation of the second derivatives of the weighted sum with respect to posed positions,
+    /// vertices numbered as in `posed`; with respect to canonical ones for the holding energy of garments that are not pulled
+    /// back. Of the layer terms only the collision by the closest point has one.
     ///
     /// # Panics
     /// As [`evaluate`](Self::evaluate).
-    pub fn curvature(
-        &self,
-        posed: &[[T; 3]],
-        canonical: &[[T; 3]],
-        posed_sink: &mut dyn CurvatureSink,
-        canonical_sink: &mut dyn CurvatureSink,
-    ) {
+    pub fn curvature(&self, posed: &[[T; 3]], canonical: &[[T; 3]], sink: &mut dyn CurvatureSink) {
         for (i, (garment, range)) in self.garments.iter().zip(self.ranges()).enumerate() {
             let offset = range.start;
             let canonical = canonical.get(range.clone()).unwrap_or(&[]);
@@ -206,18 +237,13 @@ impl<T: Real> SceneEnergy<T> {
             for (term, energy) in garment.energies.terms() {
                 let weight = garment.weights[term];
                 if weight > 0.0 {
-                    let state = shared.state();
-                    if term.is_canonical() {
-                        energy.curvature(&state, &mut Scaled { sink: canonical_sink, offset, weight });
-                    } else {
-                        energy.curvature(&state, &mut Scaled { sink: posed_sink, offset, weight });
-                    }
+                    energy.curvature(&shared.state(), &mut Scaled { sink, offset, weight });
                 }
             }
         }
         for touching in self.touching(posed) {
             let Touching { as_inner, surface, outer, offsets, weight, .. } = touching;
-            let mut sink = Scaled { sink: &mut *posed_sink, offset: 0, weight };
+            let mut sink = Scaled { sink, offset: 0, weight };
             as_inner.curvature(&surface, outer, &self.settings, offsets, &mut sink);
         }
     }
@@ -237,9 +263,9 @@ impl<T: Real> SceneEnergy<T> {
             "{} canonical positions for the {count} vertices of the scene",
             canonical.len()
         );
-        let is_active = |term: Term, weight: f64| match selection {
+        let is_active = |_: Term, weight: f64| match selection {
             Selection::Weighted => weight != 0.0,
-            Selection::All => !(term.is_canonical() && canonical.is_empty()),
+            Selection::All => true,
         };
         let shared: Vec<Shared<'_, T>> = self
             .ranges()
@@ -263,11 +289,11 @@ impl<T: Real> SceneEnergy<T> {
                 let mut raw = TermMap::default();
                 for (term, energy) in garment.energies.terms() {
                     let weight = garment.weights[term];
-                    if !is_active(term, weight) {
+                    let is_canonical = garment.is_canonical(term);
+                    if !is_active(term, weight) || is_canonical && canonical.is_empty() {
                         continue;
                     }
-                    let space =
-                        if term.is_canonical() { &mut canonical_gradient } else { &mut posed_gradient };
+                    let space = if is_canonical { &mut canonical_gradient } else { &mut posed_gradient };
                     let target = space.as_deref_mut().map(|gradient| Weighted { weight, gradient });
                     raw[term] = Some(energy.evaluate(&shared.state(), target));
                 }
@@ -356,6 +382,7 @@ impl<T: Real> SceneEnergy<T> {
                 posed,
                 canonical,
                 holding_reference: &garment.holding_reference,
+                pull_back: garment.pull_back.as_deref(),
                 gaps: &[],
                 settings: &self.settings,
             },

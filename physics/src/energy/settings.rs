@@ -27,6 +27,9 @@ impl Default for LayerGate {
 pub struct EnergySettings {
     /// The cloth of all garments.
     pub material: Material,
+    /// Rest triangles flatter than this ratio of height to longest edge are measured by the strain as if they had it: else a
+    /// needle is a spring of unbounded stiffness. 0: as printed in the paper, which has no floor.
+    pub needle_ratio: f64,
     /// Margin ε between garment and body [m]; paper: 0.002.
     pub body_collision_epsilon: f64,
     /// Margin ε between two garments [m]; paper: 0.002.
@@ -63,6 +66,7 @@ impl Default for EnergySettings {
     fn default() -> Self {
         Self {
             material: Material::default(),
+            needle_ratio: 1e-2,
             body_collision_epsilon: 0.002,
             layer_collision_epsilon: 0.002,
             distance: Distance::NearestVertex,
@@ -83,7 +87,21 @@ impl Default for EnergySettings {
 impl EnergySettings {
     /// The paper's printed form of every term (repulsion over `N`, which its magnitudes need): what a score reports.
     pub fn printed() -> Self {
-        Self { layer_gate: None, ..Self::default() }
+        Self { layer_gate: None, needle_ratio: 0.0, ..Self::default() }
+    }
+
+    /// The same energies without their jumps, which no step can be judged across and no force can balance: the distance to the
+    /// outside of the body, whose parts may intersect when posed; all pairs in the repulsion, from which the constant of each is
+    /// taken off; the distance to the closest point of an inner garment.
+    #[must_use]
+    pub fn continuous(self) -> Self {
+        Self {
+            distance: Distance::Union,
+            repulsion_subset: None,
+            repulsion_continuous: true,
+            layer_contact: LayerContact::ClosestPoint,
+            ..self
+        }
     }
 
     /// Checks every value.
@@ -97,6 +115,7 @@ impl EnergySettings {
             ("material.mu", self.material.mu),
             ("material.lambda", self.material.lambda),
             ("material.bending_stiffness", self.material.bending_stiffness),
+            ("needle_ratio", self.needle_ratio),
             ("body_collision_epsilon", self.body_collision_epsilon),
             ("layer_collision_epsilon", self.layer_collision_epsilon),
             ("gravity_acceleration", self.gravity_acceleration),

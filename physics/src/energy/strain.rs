@@ -4,20 +4,18 @@
 //! gradient `F` from the rest triangle to the deformed one. A polynomial in the positions: inverted and collapsed triangles
 //! need no special care.
 //!
-//! **Degenerate rest triangles.** `F` divides by the height of the rest triangle, so a needle would be a spring of
-//! unbounded stiffness. Its height is therefore taken as at least [`NEEDLE_RATIO`] of its longest edge, and that edge as at
-//! least [`NEEDLE_RATIO`] of the garment's median edge, while the volume stays the true one: a triangle without area has no
-//! energy. To remain at rest in its rest shape all the same, such a triangle measures `G = ½(FᵀF − F₀ᵀF₀)`, `F₀` being
-//! its `F` in the rest shape; for every other triangle `F₀ᵀF₀ = I`.
+//! **Degenerate rest triangles.** `F` divides by the height of the rest triangle, so a needle is a spring of unbounded
+//! stiffness. Training therefore takes its height as at least a ratio
+//! ([`EnergySettings::needle_ratio`](super::EnergySettings::needle_ratio)) of its longest edge, and that edge as at least the
+//! same ratio of the garment's median edge, while the volume stays the true one. To remain at rest in its rest shape all the
+//! same, such a triangle measures `G = ½(FᵀF − F₀ᵀF₀)`, `F₀` being its `F` in the rest shape; for every other triangle
+//! `F₀ᵀF₀ = I`. A ratio of 0 is the printed form. A triangle without area has no energy in either.
 
 use super::elements::{Incidence, Response, sum_elements};
 use super::{CurvatureSink, GarmentState, GarmentTerm, Material, Weighted};
 use crate::mesh::TriMesh;
 use crate::real::Real;
 use crate::vec3::{add, add_scaled, dot, norm, scale, sub, to_f64};
-
-/// Rest triangles flatter than this ratio of height to longest edge are measured as if they had it.
-pub const NEEDLE_RATIO: f64 = 1e-2;
 
 /// The strain energy of one garment.
 #[derive(Debug, Clone)]
@@ -26,6 +24,15 @@ pub struct Strain {
     lambda: f64,
     triangles: Vec<RestTriangle>,
     incidence: Incidence,
+}
+
+/// Which rest triangles are too flat to be measured as they are.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Needle {
+    /// Least ratio of height to longest edge.
+    pub ratio: f64,
+    /// Of the whole garment [m].
+    pub median_edge: f64,
 }
 
 /// A rest triangle in a frame whose first axis is its longest edge, corner 0 → corner 1.
@@ -42,7 +49,7 @@ struct RestTriangle {
 }
 
 impl RestTriangle {
-    fn new(positions: &[[f64; 3]], face: [u32; 3], thickness: f64, median_edge: f64) -> Self {
+    fn new(positions: &[[f64; 3]], face: [u32; 3], thickness: f64, needle: Needle) -> Self {
         let length = |k: usize| norm(sub(positions[face[(k + 1) % 3] as usize], positions[face[k] as usize]));
         let lengths = [length(0), length(1), length(2)];
         let first = (0..3).max_by(|&a, &b| lengths[a].total_cmp(&lengths[b])).unwrap_or(0);
@@ -54,8 +61,8 @@ impl RestTriangle {
         let true_length = lengths[first];
         let along = if true_length > 0.0 { dot(side, base) / true_length } else { 0.0 };
         let true_height = if true_length > 0.0 { 2.0 * area / true_length } else { 0.0 };
-        let length = true_length.max(NEEDLE_RATIO * median_edge);
-        let height = true_height.max(NEEDLE_RATIO * length);
+        let length = true_length.max(needle.ratio * needle.median_edge);
+        let height = true_height.max(needle.ratio * length);
 
         let mut triangle = Self {
             corners,
@@ -145,16 +152,17 @@ impl RestTriangle {
 }
 
 impl Strain {
-    /// Prepares the energy of a garment with rest shape `rest`.
-    pub fn new(rest: &TriMesh, material: &Material) -> Self {
-        Self::with_median_edge(rest, material, rest.median_edge_length())
+    /// For a garment with rest shape `rest`; `needle_ratio` as in [`EnergySettings`](super::EnergySettings::needle_ratio).
+    pub fn new(rest: &TriMesh, material: &Material, needle_ratio: f64) -> Self {
+        let median_edge = rest.median_edge_length();
+        Self::with_needle(rest, material, Needle { ratio: needle_ratio, median_edge })
     }
 
-    pub(super) fn with_median_edge(rest: &TriMesh, material: &Material, median_edge: f64) -> Self {
+    pub(super) fn with_needle(rest: &TriMesh, material: &Material, needle: Needle) -> Self {
         let triangles: Vec<RestTriangle> = rest
             .faces()
             .iter()
-            .map(|&face| RestTriangle::new(rest.positions(), face, material.thickness, median_edge))
+            .map(|&face| RestTriangle::new(rest.positions(), face, material.thickness, needle))
             .collect();
         let corners: Vec<[u32; 3]> = triangles.iter().map(|t| t.corners).collect();
         let incidence = Incidence::new(rest.vertex_count(), &corners);
@@ -212,11 +220,66 @@ mod tests {
         let one = TriMesh::new(positions[..3].to_vec(), vec![[0, 1, 2]]).unwrap();
         positions[2] = [0.02, 0.15, 0.0];
         positions[7] = [0.3, 0.01, 0.0];
-        let strain = |rest: &TriMesh| Strain::new(rest, &Material::default());
+        let strain = |rest: &TriMesh| Strain::new(rest, &Material::default(), 1e-2);
         let mut gradient = vec![[0.0; 3]; 12];
         let target = Weighted { weight: 1.0, gradient: &mut gradient };
         let energy = strain(&rest).evaluate(&positions, Some(target));
         assert_eq!(energy, strain(&one).evaluate(&positions[..3], None));
         assert!(energy > 0.0 && gradient.iter().all(|g| is_finite(*g)));
+    }
+
+    #[test]
+    fn without_a_needle_ratio_the_strain_is_the_printed_one() {
+        // A needle whose height is a thousandth of its length, and a regular triangle.
+        let rest_positions = vec![
+            [0.0, 0.0, 0.0],
+            [0.1, 0.0, 0.0],
+            [0.04, 1e-4, 0.0],
+            [0.2, 0.0, 0.0],
+            [0.3, 0.0, 0.0],
+            [0.2, 0.1, 0.0],
+        ];
+        let rest = TriMesh::new(rest_positions, vec![[0, 1, 2], [3, 4, 5]]).unwrap();
+        let posed: Vec<[f64; 3]> = vec![
+            [0.0, 0.0, 0.0],
+            [0.11, 0.0, 0.01],
+            [0.041, 3e-4, 2e-4],
+            [0.2, 0.01, 0.0],
+            [0.31, 0.0, 0.0],
+            [0.2, 0.13, 0.02],
+        ];
+        let material = Material::default();
+        // The paper's formula, triangle by triangle: F from the edges in the plane of the rest triangle.
+        let printed = |[a, b, c]: [usize; 3]| {
+            let p = rest.positions();
+            let (x1, [x2, y2]) = (p[b][0] - p[a][0], [p[c][0] - p[a][0], p[c][1] - p[a][1]]);
+            let column = |k: usize| {
+                let (e1, e2) = (sub(posed[b], posed[a])[k], sub(posed[c], posed[a])[k]);
+                [e1 / x1, (e2 - e1 * x2 / x1) / y2]
+            };
+            let f: Vec<[f64; 2]> = (0..3).map(column).collect();
+            let product = |i: usize, j: usize| f.iter().map(|row| row[i] * row[j]).sum::<f64>();
+            let [g11, g12, g22] =
+                [0.5 * (product(0, 0) - 1.0), 0.5 * product(0, 1), 0.5 * (product(1, 1) - 1.0)];
+            let trace = g11 + g22;
+            let density = 0.5 * material.lambda * trace * trace
+                + material.mu * (g11 * g11 + 2.0 * g12 * g12 + g22 * g22);
+            0.5 * x1 * y2 * material.thickness * density
+        };
+        let expected = printed([0, 1, 2]) + printed([3, 4, 5]);
+        let found = Strain::new(&rest, &material, 0.0).evaluate(&posed, None);
+        assert!((found / expected - 1.0).abs() < 1e-12, "{found:e} {expected:e}");
+        let floored = Strain::new(&rest, &material, 1e-2).evaluate(&posed, None);
+        assert!(floored < 0.5 * expected, "{floored} {expected}");
+    }
+
+    #[test]
+    fn a_triangle_without_area_has_no_strain_in_the_printed_form_either() {
+        let rest = TriMesh::new(vec![[0.0; 3], [0.1, 0.0, 0.0], [0.2, 0.0, 0.0]], vec![[0, 1, 2]]).unwrap();
+        let posed = [[0.0; 3], [0.2, 0.1, 0.0], [0.4, 0.0, 0.3]];
+        let mut gradient = vec![[0.0; 3]; 3];
+        let target = Weighted { weight: 1.0, gradient: &mut gradient };
+        assert_eq!(Strain::new(&rest, &Material::default(), 0.0).evaluate(&posed, Some(target)), 0.0);
+        assert_eq!(gradient, [[0.0; 3]; 3]);
     }
 }

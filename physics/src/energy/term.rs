@@ -15,7 +15,7 @@ pub enum Term {
     BodyCollision,
     /// Logarithmic repulsion between vertices of one garment [1].
     Repulsion,
-    /// Squared vertical displacement of the garment's upper edge, before skinning [m²].
+    /// Squared vertical displacement of the garment's upper edge, undone by skinning [m²].
     Holding,
     /// Cubic penalty of outer vertices below the inner garment [m³].
     LayerCollision,
@@ -61,11 +61,6 @@ impl Term {
     /// Whether the term is about a pair of garments; the others are about one.
     pub fn is_layer_term(self) -> bool {
         matches!(self, Self::LayerCollision | Self::LayerDistance)
-    }
-
-    /// Whether the term acts on canonical positions (before skinning); the others act on posed ones.
-    pub fn is_canonical(self) -> bool {
-        matches!(self, Self::Holding)
     }
 }
 

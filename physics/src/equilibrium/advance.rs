@@ -169,7 +169,7 @@ mod tests {
             EnergySettings { layer_contact: LayerContact::ClosestPoint, ..EnergySettings::default() };
         let count = inner.vertex_count();
         let scene = scene_of::<f64>(vec![inner, outer], &far, settings, only(Term::LayerCollision), 0.0, 1);
-        let problem = Problem::new(&scene.energy, None).unwrap();
+        let problem = Problem::new(&scene.energy).unwrap();
         let state = |positions: Vec<[f64; 3]>| {
             let (energy, gradient) = problem.value_and_gradient(&positions);
             State { positions, energy, gradient }

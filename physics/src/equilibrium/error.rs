@@ -25,17 +25,9 @@ pub enum EquilibriumError {
         found: usize,
     },
 
-    /// The skinning of a vertex cannot be undone.
-    #[error(
-        "the skinning transform of vertex {vertex} is singular (determinant {determinant:e}); hint: it blends bones that \
-         turn against each other; solve this pose without holding, or with other skin weights"
-    )]
-    Singular {
-        /// The vertex.
-        vertex: usize,
-        /// Determinant of its linear part.
-        determinant: f64,
-    },
+    /// A garment is held at canonical positions, which posed ones do not determine.
+    #[error("a garment is held before skinning; hint: pull its heights back from posed positions")]
+    Canonical,
 
     /// A start position is NaN or infinite.
     #[error("vertex {vertex} starts at a position that is not finite; hint: check what made the start")]

@@ -4,10 +4,10 @@
 //! this solver finds of the *same* sum says how much of it was left, and how far [mm] the vertices are from where they
 //! would come to rest. The same steps refine a network's drape.
 //!
-//! **Unknowns** are the posed positions `p` `[ΣV, 3]`. The one term that acts before skinning (holding) sees
-//! `x = A⁻¹(p − t)`, the canonical positions that the given skinning transforms `p = A x + t` would have posed to `p`
-//! ([`Problem`]). So the energy is a function of posed positions alone, whoever made them: a solver, a network with learned
-//! skin weights, or another program; and a vertex weighs the same wherever its bones have turned.
+//! **Unknowns** are the posed positions `[ΣV, 3]`. The one term about heights before skinning (holding) reads them off posed
+//! positions ([`SceneEnergy::pulled_back`](crate::energy::SceneEnergy::pulled_back)), as in training. So the energy is a
+//! function of posed positions alone, whoever made them: a solver, a network with learned skin weights, or another program;
+//! and a vertex weighs the same wherever its bones have turned.
 //!
 //! **Method.** Limited-memory BFGS (Nocedal and Wright, "Numerical Optimization", algorithm 7.4) whose initial matrix is
 //! the sparse Cholesky factor of a positive definite approximation of the Hessian: the terms' Gauss–Newton and tension

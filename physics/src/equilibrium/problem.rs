@@ -3,51 +3,30 @@
 use super::EquilibriumError;
 use super::kinks::{self, Kink};
 use crate::energy::{CurvatureSink, LayerTouch, SceneEnergy, Term};
-use crate::transform::{Transform, apply, apply_transposed, inverse};
-use crate::vec3::{accumulate, norm_squared};
-
-/// Linear parts with a smaller determinant cannot be undone.
-const SMALLEST_DETERMINANT: f64 = 1e-6;
+use crate::vec3::norm_squared;
+use std::collections::BTreeMap;
 
 /// A scene to be brought into equilibrium.
 #[derive(Debug)]
 pub struct Problem<'a> {
     energy: &'a SceneEnergy<f64>,
-    /// Posed → canonical, per vertex; `None`: they are the same, or nothing asks for canonical positions.
-    inverse: Option<Vec<Transform>>,
     /// The scene with one of its terms each, for the relative gradient.
     single_terms: Vec<SceneEnergy<f64>>,
 }
 
 impl<'a> Problem<'a> {
-    /// `transforms` `[ΣV]`: the blended skinning transform of every vertex, canonical → posed; `None`: canonical positions
-    /// are the posed ones.
+    /// The scene as it stands.
     ///
     /// # Errors
-    /// When the scene does not pass its check, the number of transforms is not that of vertices, or a transform that is
-    /// needed (some garment is held with a weight) is singular.
-    pub fn new(
-        energy: &'a SceneEnergy<f64>,
-        transforms: Option<&[Transform]>,
-    ) -> Result<Self, EquilibriumError> {
+    /// When the scene does not pass its check, or a garment is held at canonical positions
+    /// ([`SceneEnergy::pulled_back`] mends that).
+    pub fn new(energy: &'a SceneEnergy<f64>) -> Result<Self, EquilibriumError> {
         energy.check()?;
-        let (expected, needed) = (energy.vertex_count(), energy.needs_canonical());
-        let inverse = match transforms {
-            Some(transforms) if transforms.len() != expected => {
-                let (what, found) = ("skinning transforms", transforms.len());
-                return Err(EquilibriumError::Count { what, expected, found });
-            }
-            Some(transforms) if needed => {
-                let undone = transforms.iter().enumerate().map(|(vertex, t)| {
-                    inverse(t, SMALLEST_DETERMINANT)
-                        .map_err(|determinant| EquilibriumError::Singular { vertex, determinant })
-                });
-                Some(undone.collect::<Result<_, _>>()?)
-            }
-            _ => None,
-        };
+        if energy.needs_canonical() {
+            return Err(EquilibriumError::Canonical);
+        }
         let single_terms = Term::ALL.into_iter().filter_map(|term| energy.only(term)).collect();
-        Ok(Self { energy, inverse, single_terms })
+        Ok(Self { energy, single_terms })
     }
 
     /// Number of vertices.
@@ -55,20 +34,35 @@ impl<'a> Problem<'a> {
         self.energy.vertex_count()
     }
 
-    /// Canonical positions of vertices at `posed` `[ΣV, 3]` [m].
-    pub fn canonical(&self, posed: &[[f64; 3]]) -> Vec<[f64; 3]> {
-        match &self.inverse {
-            Some(inverse) => inverse.iter().zip(posed).map(|(t, p)| apply(t, *p)).collect(),
-            None => posed.to_vec(),
-        }
-    }
-
     /// Weighted sum of all energies at `posed` `[ΣV, 3]` [m].
     ///
     /// # Panics
     /// If `posed` does not have one entry per vertex.
     pub fn value(&self, posed: &[[f64; 3]]) -> f64 {
-        self.energy.value(posed, &self.canonical(posed)).total
+        self.energy.value(posed, &[]).total
+    }
+
+    /// The same sum, and what every term adds to it [J], by its name.
+    ///
+    /// # Panics
+    /// As [`value`](Self::value).
+    pub fn terms(&self, posed: &[[f64; 3]]) -> (f64, BTreeMap<&'static str, f64>) {
+        let value = self.energy.value(posed, &[]);
+        let mut terms = BTreeMap::new();
+        let weights = self
+            .energy
+            .garments
+            .iter()
+            .map(|g| &g.weights)
+            .chain(self.energy.layers.iter().map(|l| &l.weights));
+        for (weights, raw) in weights.zip(value.garments.iter().chain(&value.layers)) {
+            for (term, raw) in raw.iter() {
+                if let Some(raw) = raw {
+                    *terms.entry(term.name()).or_default() += weights[term] * raw;
+                }
+            }
+        }
+        (value.total, terms)
     }
 
     /// The same, with its gradient `[ΣV, 3]`.
@@ -133,42 +127,12 @@ impl<'a> Problem<'a> {
 
     /// Passes a positive semidefinite approximation of the Hessian with respect to posed positions to `sink`.
     pub(super) fn curvature(&self, posed: &[[f64; 3]], sink: &mut dyn CurvatureSink) {
-        let mut in_canonical = Collected::default();
-        self.energy.curvature(posed, &self.canonical(posed), sink, &mut in_canonical);
-        for (i, j, block) in in_canonical.0 {
-            let block = match &self.inverse {
-                // Aᵀ-congruence: rows by the transform of i, columns by that of j.
-                Some(inverse) => {
-                    let right: [[f64; 3]; 3] = block.map(|row| apply_transposed(&inverse[j], row));
-                    let columns: [[f64; 3]; 3] = std::array::from_fn(|c| {
-                        apply_transposed(&inverse[i], [right[0][c], right[1][c], right[2][c]])
-                    });
-                    std::array::from_fn(|r| std::array::from_fn(|c| columns[c][r]))
-                }
-                None => block,
-            };
-            sink.add(i, j, block);
-        }
+        self.energy.curvature(posed, &[], sink);
     }
 
     fn evaluate(&self, energy: &SceneEnergy<f64>, posed: &[[f64; 3]]) -> (f64, Vec<[f64; 3]>) {
-        let value = energy.evaluate(posed, &self.canonical(posed));
-        let mut gradient = value.posed_gradient;
-        for (v, (sum, g)) in gradient.iter_mut().zip(&value.canonical_gradient).enumerate() {
-            let pulled = self.inverse.as_ref().map_or(*g, |inverse| apply_transposed(&inverse[v], *g));
-            accumulate(sum, pulled);
-        }
-        (value.total, gradient)
-    }
-}
-
-/// Blocks kept as they come.
-#[derive(Default)]
-struct Collected(Vec<(usize, usize, [[f64; 3]; 3])>);
-
-impl CurvatureSink for Collected {
-    fn add(&mut self, i: usize, j: usize, block: [[f64; 3]; 3]) {
-        self.0.push((i, j, block));
+        let value = energy.evaluate(posed, &[]);
+        (value.total, value.posed_gradient)
     }
 }
 

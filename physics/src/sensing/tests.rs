@@ -19,6 +19,7 @@ impl Outfit {
         let garment = |(mesh, topology)| SceneGarment {
             energies: Arc::new(GarmentEnergies::new(mesh, topology, &settings, false).expect("a garment")),
             holding_reference: Vec::new(),
+            pull_back: None,
             weights: TermMap::filled(1.0),
         };
         let scene = SceneEnergy {

@@ -1,13 +1,14 @@
 //! Correction networks: what their stage trains, and what becomes of their results.
 
 use burn::module::Module;
-use clothcombo_model::{ClothCombo, Initializer};
+use clothcombo_model::ClothCombo;
 use clothcombo_tests::{loss_and_gradient, tiny_config};
 use clothcombo_trainer::config::{Config, Trains};
+use clothcombo_trainer::descent::Descent;
 use clothcombo_trainer::device::Backend;
 use clothcombo_trainer::drape::{Networks, WardrobeTensors};
 use clothcombo_trainer::learner::{Learner, new_optimizer};
-use clothcombo_trainer::scene::{Library, PreparedScene, prepare_step};
+use clothcombo_trainer::scene::{Library, PreparedScene, SceneDraw, prepare, prepare_step};
 use clothcombo_trainer::schedule::Schedule;
 use clothcombo_trainer::session::dimensions;
 use clothcombo_trainer::world::Share;
@@ -60,7 +61,7 @@ fn their_stage_trains_nothing_else_and_lowers_the_loss() {
 #[test]
 fn what_has_no_less_energy_is_not_taken() {
     let folder = tempfile::tempdir().unwrap();
-    let (config, _, tensors, model, scene) = setting(folder.path());
+    let (_, _, tensors, model, scene) = setting(folder.path());
     let energy = |model: &ClothCombo| {
         let networks = Networks::new(model.valid(), &tensors);
         let [together, apart] = [networks.drape(&scene), networks.drape_alone(&scene)].map(Result::unwrap);
@@ -70,21 +71,73 @@ fn what_has_no_less_energy_is_not_taken() {
             alone.value(&apart.posed, &apart.canonical).total,
         )
     };
-    let uncorrected = {
-        let none = config.model.without_corrections();
-        energy(&model.clone().with_corrections(&none, &mut Initializer::new(1, &device())))
-    };
+    let uncorrected = energy(&model.clone().with_correction_steps(0));
     // Corrections that know nothing and move everything.
-    let mut wild = model;
-    for correction in &mut wild.corrections {
-        let bias = correction.output.bias.val();
-        correction.output.bias = burn::module::Param::from_tensor((bias + 0.7).detach());
-    }
-    let found = energy(&wild);
+    let found = energy(&wild(model));
     assert!(found.0 <= uncorrected.0 * (1.0 + 1e-6), "{found:?} {uncorrected:?}");
     assert!(found.1 <= uncorrected.1 * (1.0 + 1e-6), "{found:?} {uncorrected:?}");
 }
 
-fn device() -> burn::tensor::Device {
-    Backend::preferred().device().autodiff()
+/// The model with corrections that know nothing and move everything.
+fn wild(mut model: ClothCombo) -> ClothCombo {
+    for correction in &mut model.corrections {
+        let bias = correction.output.bias.val();
+        correction.output.bias = burn::module::Param::from_tensor((bias + 0.7).detach());
+    }
+    model
+}
+
+#[test]
+fn twenty_steps_never_raise_the_energy_of_any_garment_and_all_end_below_skinning() {
+    let folder = tempfile::tempdir().unwrap();
+    let (config, library, tensors, model, _) = setting(folder.path());
+    let schedule = Schedule::new(&config);
+    let mut moved = 0;
+    for (name, model) in [("untrained", model.clone()), ("wild", wild(model))] {
+        let networks = Networks::new(model.valid().with_correction_steps(20), &tensors);
+        for step in 20..44 {
+            let scene = prepare_step(&library, &config, &schedule, step, Share::WHOLE).unwrap().remove(0);
+            let energies = networks.energies(&scene).unwrap();
+            for (before, after) in energies.iter().zip(&energies[1..]) {
+                assert!(
+                    after.iter().zip(before).all(|(after, before)| after <= before),
+                    "{name} {energies:?}"
+                );
+                moved += usize::from(after != before);
+            }
+            // What `drape` returns is the last of these states, which begin with skinning.
+            let energy = scene.bodies[0].energy.as_ref().clone().continuous();
+            let of_drape = Descent::new(&energy, networks.drape(&scene).unwrap()).energies().to_vec();
+            assert_eq!(&of_drape, energies.last().unwrap());
+            assert_eq!(Descent::new(&energy, networks.skin(&scene).unwrap()).energies(), energies[0]);
+        }
+    }
+    assert!(moved > 20, "{moved}");
+}
+
+#[test]
+fn a_garment_drapes_in_an_outfit_that_it_does_not_touch_as_it_does_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let (config, library, tensors, model, scene) = setting(folder.path());
+    let networks = Networks::new(wild(model).valid(), &tensors);
+    let draw = |garments: &[usize]| {
+        let draw = SceneDraw { garments: garments.to_vec(), ..scene.draw.clone() };
+        let mut scene = prepare(&library, &config.losses, draw, 1.0).unwrap();
+        // Without an edge nothing presses and nothing is judged together.
+        scene.contacts.clear();
+        let apart = scene.bodies[0].energy.without_layers();
+        scene.bodies[0].energy = Arc::new(apart);
+        scene
+    };
+    let pair = &scene.draw.garments[..2];
+    let together = networks.drape(&draw(pair)).unwrap();
+    let rows = library.wardrobe.garment(pair[0]).unwrap().vertex_count();
+    for (garment, rows) in pair.iter().zip([0..rows, rows..together.posed.len()]) {
+        let alone = networks.drape(&draw(&[*garment])).unwrap();
+        let largest = |a: &[[f32; 3]], b: &[[f32; 3]]| {
+            let pairs = a.as_flattened().iter().zip(b.as_flattened());
+            pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+        };
+        assert!(largest(&alone.posed, &together.posed[rows]) < 1e-5);
+    }
 }

@@ -73,6 +73,7 @@ fn all_eight_energies_equal_the_oracle() {
                 GarmentEnergies::<f64>::new(rest, &Topology::new(rest), &settings, true).unwrap(),
             ),
             holding_reference: rest.positions().to_vec(),
+            pull_back: None,
             weights: TermMap::filled(1.0),
         });
         let pairs: Vec<(usize, usize)> =
@@ -115,12 +116,13 @@ fn the_score_equals_the_oracle() {
         let golden = Golden::open(name);
         let (body, rest, draped) =
             (golden.folder.join("body.obj"), golden.files("rest"), golden.files("draped"));
-        let files = MeshFiles { body: &body, rest: &rest, draped: &draped };
+        let canonical = golden.files("canonical");
+        let files = MeshFiles { body: &body, rest: &rest, draped: &draped, canonical: &canonical };
         let score = score_files(&files, ScoreDistance::NearestVertex).unwrap();
         assert_eq!(score.garments.iter().map(|g| g.name.as_str()).collect::<Vec<_>>(), golden.names());
         for (garment, oracle) in score.garments.iter().zip(golden.oracle["garments"].as_array().unwrap()) {
             for (values, kind) in [(&garment.raw, "raw"), (&garment.weighted, "weighted")] {
-                assert_eq!(values.len(), 5);
+                assert_eq!(values.len(), 6);
                 for (term, value) in values {
                     assert_close(*value, &oracle[kind][term], &format!("{kind} {term} of {}", garment.name));
                 }

@@ -132,6 +132,7 @@ impl TrainedModel {
         let expected = match adds_corrections {
             true => ModelConfig {
                 correction_width: self.config.model.correction_width,
+                correction_steps: self.config.model.correction_steps,
                 ..config.model.without_corrections()
             },
             false => config.model.clone(),

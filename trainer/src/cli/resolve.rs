@@ -127,7 +127,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         let draped: Vec<DrapedGarment> = garments
             .iter()
             .zip(&all)
-            .map(|(g, positions)| DrapedGarment { name: &g.name, rest: &g.rest, positions })
+            .map(|(g, positions)| DrapedGarment { name: &g.name, rest: &g.rest, positions, canonical: None })
             .collect();
         Ok(score(&body, &draped, ScoreDistance::Surface)?)
     };

@@ -24,6 +24,9 @@ pub struct Arguments {
     /// Draped meshes, in the same order
     #[arg(long, num_args = 1.., required = true, value_name = "OBJ")]
     draped: Vec<PathBuf>,
+    /// The meshes before skinning, in the same order: adds the holding energy against the rest meshes
+    #[arg(long, num_args = 1.., value_name = "OBJ")]
+    canonical: Vec<PathBuf>,
     /// Distances to the closest point of the body's surface instead of its nearest vertex
     #[arg(long)]
     surface: bool,
@@ -37,7 +40,8 @@ pub struct Arguments {
 /// # Errors
 /// When a file cannot be read, or meshes do not fit together.
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
-    let files = MeshFiles { body: &arguments.body, rest: &arguments.rest, draped: &arguments.draped };
+    let Arguments { body, rest, draped, canonical, .. } = arguments;
+    let files = MeshFiles { body, rest, draped, canonical };
     let distance = if arguments.surface { ScoreDistance::Surface } else { ScoreDistance::NearestVertex };
     let score = score_files(&files, distance)?;
     let text = if arguments.json {
@@ -50,16 +54,25 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
 }
 
 /// Terms of one garment, in the order of the columns.
-const TERMS: [&str; 5] = ["strain", "bending", "gravity", "body_collision", "repulsion"];
+const TERMS: [&str; 6] = ["strain", "bending", "gravity", "body_collision", "repulsion", "holding"];
 
-const RAW: [&str; 6] = ["raw", "strain [J]", "bending [J]", "gravity [J]", "collision [m³]", "repulsion [1]"];
-const WEIGHTED: [&str; 7] = ["weighted [J]", "strain", "bending", "gravity", "collision", "repulsion", "sum"];
+const RAW: [&str; 6] =
+    ["strain [J]", "bending [J]", "gravity [J]", "collision [m³]", "repulsion [1]", "holding [m²]"];
+const WEIGHTED: [&str; 6] = ["strain", "bending", "gravity", "collision", "repulsion", "holding"];
 const CONTACT: [&str; 7] =
     ["contact", "vertices", "triangles", "inside [%]", "depth [mm]", "body pairs", "self pairs"];
 const LAYERS: [&str; 5] = ["layers", "collision [m³]", "distance [m³]", "pairs", "wrong side [%]"];
 
 fn tables(score: &Score) -> String {
     let garments = || score.garments.iter();
+    // Holding comes last, and only with canonical meshes.
+    let is_held = garments().any(|g| g.raw.contains_key(TERMS[TERMS.len() - 1]));
+    let terms = if is_held { &TERMS[..] } else { &TERMS[..TERMS.len() - 1] };
+    let head = |first: &str, names: &[&'static str], last: Option<&'static str>| -> Vec<String> {
+        let names = names.iter().take(terms.len()).copied().chain(last);
+        [first].into_iter().chain(names).map(str::to_owned).collect()
+    };
+    let term_row = |name: &str, values: &TermValues, with_sum| term_row(name, values, terms, with_sum);
     let mut raw: Vec<_> = garments().map(|g| term_row(&g.name, &g.raw, false)).collect();
     let mut weighted: Vec<_> = garments().map(|g| term_row(&g.name, &g.weighted, true)).collect();
     if score.garments.len() > 1 {
@@ -94,7 +107,9 @@ fn tables(score: &Score) -> String {
             ]
         })
         .collect();
-    let mut text = [table(&RAW, &raw), table(&WEIGHTED, &weighted), table(&CONTACT, &contact)].join("\n");
+    let raw = table(&head("raw", &RAW, None), &raw);
+    let weighted = table(&head("weighted [J]", &WEIGHTED, Some("sum")), &weighted);
+    let mut text = [raw, weighted, table(&CONTACT, &contact)].join("\n");
     if !layers.is_empty() {
         text += &format!("\n{}", table(&LAYERS, &layers));
     }
@@ -116,8 +131,8 @@ fn sum<'a>(of: impl Iterator<Item = &'a TermValues>) -> TermValues {
     sums
 }
 
-fn term_row(name: &str, values: &TermValues, with_sum: bool) -> Vec<String> {
+fn term_row(name: &str, values: &TermValues, terms: &[&str], with_sum: bool) -> Vec<String> {
     let value = |term: &&str| values.get(*term).map_or_else(String::new, |v| number(*v));
     let sum = with_sum.then(|| number(values.values().sum()));
-    [name.to_owned()].into_iter().chain(TERMS.iter().map(value)).chain(sum).collect()
+    [name.to_owned()].into_iter().chain(terms.iter().map(value)).chain(sum).collect()
 }

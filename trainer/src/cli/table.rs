@@ -13,8 +13,8 @@ pub(crate) fn number(value: f64) -> String {
 }
 
 /// Rows under a heading: the first column to the left, the others to the right.
-pub(crate) fn table(head: &[&str], rows: &[Vec<String>]) -> String {
-    let head: Vec<String> = head.iter().map(|cell| (*cell).to_owned()).collect();
+pub(crate) fn table(head: &[impl AsRef<str>], rows: &[Vec<String>]) -> String {
+    let head: Vec<String> = head.iter().map(|cell| cell.as_ref().to_owned()).collect();
     let lines = || [&head].into_iter().chain(rows);
     let width = |column: usize| lines().map(|row| row[column].chars().count()).max().unwrap_or(0);
     let widths: Vec<usize> = (0..head.len()).map(width).collect();

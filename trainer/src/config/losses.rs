@@ -34,6 +34,23 @@ pub struct PlainLoss {
     pub weight: Ramp,
 }
 
+/// StVK strain.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct StrainLoss {
+    /// Factor on the raw value.
+    pub weight: Ramp,
+    /// Rest triangles flatter than this ratio of height to longest edge count as if they had it: a needle is else a spring of
+    /// unbounded stiffness, whose gradient hides all others. 0 is the paper's printed form, and that of `clothcombo score`.
+    pub needle_ratio: f64,
+}
+
+impl Default for StrainLoss {
+    fn default() -> Self {
+        Self { weight: 1.0.into(), needle_ratio: EnergySettings::default().needle_ratio }
+    }
+}
+
 /// Body collision, Σ max(ε − d, 0)³.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -72,7 +89,7 @@ impl Default for RepulsionLoss {
     }
 }
 
-/// Holding, Σ H (Δy)².
+/// Holding, Σ H (Δy)², of heights before skinning.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct HoldingLoss {
@@ -83,11 +100,14 @@ pub struct HoldingLoss {
     /// Measure the displacement from the shape-transferred start instead of the rest garment: a waistband should
     /// follow a taller body.
     pub relative: bool,
+    /// Read heights off the posed garment, pulled back by its initial skinning, so that learned skin weights cannot slide a
+    /// waistband down for nothing. `false` is the paper's: heights of `x + Δx`, before skinning.
+    pub posed: bool,
 }
 
 impl Default for HoldingLoss {
     fn default() -> Self {
-        Self { weight: 100.0.into(), fraction: 0.1, relative: true }
+        Self { weight: 100.0.into(), fraction: 0.1, relative: true, posed: true }
     }
 }
 
@@ -177,7 +197,7 @@ pub struct LossesConfig {
     /// default, is the paper's.
     pub alone: Ramp,
     /// StVK strain.
-    pub strain: PlainLoss,
+    pub strain: StrainLoss,
     /// Bending.
     pub bending: PlainLoss,
     /// Gravity.
@@ -202,7 +222,7 @@ impl Default for LossesConfig {
         Self {
             reference_vertices: 8000.0,
             alone: 0.0.into(),
-            strain: plain(1.0),
+            strain: StrainLoss::default(),
             bending: plain(5.0),
             gravity: plain(1.0),
             body_collision: BodyCollisionLoss::default(),
@@ -267,6 +287,7 @@ impl LossesConfig {
                 mu: m.mu,
                 bending_stiffness: m.bending_stiffness,
             },
+            needle_ratio: self.strain.needle_ratio,
             body_collision_epsilon: self.body_collision.epsilon,
             layer_collision_epsilon: gate.epsilon,
             distance: self.body_collision.distance.into(),
@@ -289,6 +310,7 @@ fn key_of(setting: &str) -> String {
     let key = match setting {
         "body_collision_epsilon" => "body_collision.epsilon",
         "layer_collision_epsilon" => "layer_collision.epsilon",
+        "needle_ratio" => "strain.needle_ratio",
         "layer_gate.tangential_edges" => "layer_collision.gate_tangential_edges",
         "layer_gate.depth" => "layer_collision.gate_depth",
         "layer_distance_radius" => "layer_distance.radius",

@@ -45,7 +45,7 @@ impl Draper {
             steps => {
                 let mut energy = ReferenceScene::new(&self.trained.config.losses, &scene)?.energy;
                 energy.body = surface.clone();
-                let (positions, done) = refine(&energy, &transforms, &network, steps)?;
+                let (positions, done) = refine(&energy.pulled_back(&transforms), &network, steps)?;
                 (positions, Some(done))
             }
         };

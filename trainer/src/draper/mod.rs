@@ -77,6 +77,8 @@ pub struct DraperSettings {
     pub cache_limit: u64,
     /// The compute device.
     pub backend: Backend,
+    /// Correction steps at most; `None`: as many as the model's configuration says.
+    pub corrections: Option<usize>,
     /// Steps of the static solver after the networks; 0 switches refinement off.
     pub refine: usize,
     /// Whether the post-process resolves what still intersects.
@@ -94,6 +96,7 @@ impl Default for DraperSettings {
             cache: None,
             cache_limit: 10 << 30,
             backend,
+            corrections: None,
             refine: 0,
             resolve: true,
             post_process,
@@ -149,7 +152,10 @@ impl Draper {
         let joints = ActiveJoints::named(&body, &trained.state.joints)
             .map_err(|missing| DraperError::Joints { body: body.name.clone(), missing })?;
         let device = settings.backend.device();
-        let model = trained.networks(&device)?;
+        let mut model = trained.networks(&device)?;
+        if let Some(steps) = settings.corrections {
+            model = model.with_correction_steps(steps);
+        }
         let cache = settings.cache.as_deref().map(|folder| ArrayCache::open(folder, settings.cache_limit));
         let cache = cache.transpose().map_err(LibraryError::data)?;
         let key: Option<Key> = cache.as_ref().map(|_| body_key(&body));
@@ -157,7 +163,7 @@ impl Draper {
         let settings = settings.clone();
         Ok(Self {
             trained,
-            uncorrected: model.clone().with_first_corrections(0),
+            uncorrected: model.clone().with_correction_steps(0),
             model,
             recipe,
             joints,

@@ -2,7 +2,6 @@
 
 use super::{BodyState, Draper, DraperError, Outfit, PhaseTimes, elapsed};
 use crate::drape::{OnBody, body_tensors, drape_on};
-use crate::evaluate::reference::skinning_transforms;
 use crate::scene::{BodyDraw, Dresser, PreparedScene, SceneDraw};
 use clothcombo_data::asset::rotation::{Matrix3, apply, matrix_from_axis_angle};
 use clothcombo_data::asset::{Pose, PosedBody};
@@ -67,7 +66,7 @@ impl Draper {
         // The body may be turned about the vertical: what the networks made turns with it, to where everything else happens.
         let turn = matrix_from_axis_angle([0.0, yaw, 0.0]);
         let transforms: Vec<Transform> =
-            skinning_transforms(&scene).iter().map(|t| turned(&turn, t, body.place)).collect();
+            scene.skinning_transforms().iter().map(|t| turned(&turn, t, body.place)).collect();
         let start = scene.bodies[0].start.iter().map(|p| p.map(f64::from));
         let skinned = transforms.iter().zip(start).map(|(t, p)| transform::apply(t, p)).collect();
         let network: Vec<[f64; 3]> =

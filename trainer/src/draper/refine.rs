@@ -3,7 +3,6 @@
 use super::error::DraperError;
 use clothcombo_physics::energy::SceneEnergy;
 use clothcombo_physics::equilibrium::{Problem, SolverSettings, solve};
-use clothcombo_physics::transform::Transform;
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 
@@ -31,10 +30,9 @@ pub struct Refinement {
 /// Lowers `energy` from `start` `[ΣV, 3]` [m] for at most `steps` steps.
 ///
 /// # Errors
-/// When a garment that is held has a singular skinning transform, or the energy at the start is not finite.
+/// When the energy at the start is not finite.
 pub fn refine(
     energy: &SceneEnergy<f64>,
-    transforms: &[Transform],
     start: &[[f64; 3]],
     steps: usize,
 ) -> Result<(Vec<[f64; 3]>, Refinement), DraperError> {
@@ -44,7 +42,7 @@ pub fn refine(
         escape_distance: Some(REACH),
         ..SolverSettings::default()
     };
-    let problem = Problem::new(energy, Some(transforms))?;
+    let problem = Problem::new(energy)?;
     let solution = solve(&problem, start, &settings, &mut |_| ControlFlow::Continue(()))?;
     let moved = solution
         .positions

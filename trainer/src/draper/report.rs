@@ -210,6 +210,7 @@ impl Drape {
                     Stage::BeforeResolve => &drape.before,
                     Stage::Result => &drape.positions,
                 },
+                canonical: None,
             })
             .collect();
         Ok(score(&body, &garments, ScoreDistance::default()).map_err(|e| refused(&e))?)

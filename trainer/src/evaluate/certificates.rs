@@ -1,6 +1,5 @@
 //! What the post-process makes of random outfits.
 
-use super::reference::skinning_transforms;
 use crate::config::LossesConfig;
 use crate::drape::{DrapeError, Networks};
 use crate::scene::{Library, PreparedScene, prepare};
@@ -82,7 +81,7 @@ impl<'a> Dressing<'a> {
             body: Arc::new(scene.exact_body()),
             draped: wide(&scene, &draped_by(self.uncorrected.as_ref(), &scene)?),
             skinned: wide(&scene, &skinned(&scene)),
-            transforms: skinning_transforms(&scene),
+            transforms: scene.skinning_transforms(),
         })
     }
 }
@@ -168,7 +167,7 @@ impl DrapedScene<'_> {
 /// Linear blend skinning of the start state on the host, packed: what the networks start from.
 fn skinned(scene: &PreparedScene) -> Vec<[f32; 3]> {
     let start = scene.bodies[0].start.iter().map(|p| p.map(f64::from));
-    skinning_transforms(scene).iter().zip(start).map(|(t, p)| apply(t, p).map(|x| x as f32)).collect()
+    scene.skinning_transforms().iter().zip(start).map(|(t, p)| apply(t, p).map(|x| x as f32)).collect()
 }
 
 /// The numbers of a certificate without its list.

@@ -11,6 +11,7 @@ use clothcombo_physics::equilibrium::{
     EquilibriumError, Problem, Progress, Solution, SolverSettings, Stop, solve,
 };
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
 /// Two minima are told apart when their energies differ by more than this share of what the solver gained.
@@ -20,9 +21,11 @@ const SAME_MINIMUM: f64 = 1e-3;
 #[derive(Clone, Debug, Serialize)]
 pub struct MethodError {
     /// Name of the method.
-    pub method: &'static str,
+    pub method: String,
     /// Weighted sum of all energies [J].
     pub energy: f64,
+    /// What every energy adds to it [J], by its name.
+    pub terms: TermEnergies,
     /// Above the reference [J].
     pub excess: f64,
     /// The same in percent of what LBS has above the reference.
@@ -31,6 +34,9 @@ pub struct MethodError {
     pub distance_mm: f64,
 }
 
+/// Weighted energies [J] by their names; those that a scene does not have are left out.
+pub type TermEnergies = BTreeMap<&'static str, f64>;
+
 /// One run of the solver.
 #[derive(Clone, Debug, Serialize)]
 pub struct SolverRun {
@@ -38,6 +44,8 @@ pub struct SolverRun {
     pub start: &'static str,
     /// Energy at the end [J].
     pub energy: f64,
+    /// What every energy adds to it [J].
+    pub terms: TermEnergies,
     /// Why it stopped there.
     pub stop: &'static str,
     /// Relative gradient at the end.
@@ -81,12 +89,14 @@ pub struct Drapes {
     pub layered: Vec<[f64; 3]>,
     /// After the post-process, if it was run.
     pub resolved: Option<Vec<[f64; 3]>>,
+    /// After other numbers of correction steps than the model's own.
+    pub steps: Vec<(usize, Vec<[f64; 3]>)>,
 }
 
 impl Drapes {
     /// Of networks, and what the post-process made of it.
     pub fn new(alone: &Draped, together: &Draped, resolved: Option<Vec<[f64; 3]>>) -> Self {
-        Self { single: wide(&alone.posed), layered: wide(&together.posed), resolved }
+        Self { single: wide(&alone.posed), layered: wide(&together.posed), resolved, steps: Vec::new() }
     }
 }
 
@@ -106,8 +116,21 @@ impl SceneError {
     pub fn reference_run(&self) -> &SolverRun {
         &self.runs[self.reference]
     }
+
+    /// Whether the networks end above skinning with shape transfer, by more than the rounding of positions in f32; `None`
+    /// without networks.
+    pub fn is_above_skinning(&self) -> Option<bool> {
+        let energy = |name: &str| Some(self.methods.iter().find(|m| m.method == name)?.energy);
+        let (network, skinning) = (energy(NETWORK)?, energy(LBS)?);
+        Some(network - skinning > ROUNDING * skinning.abs().max(1.0))
+    }
 }
 
+/// Relative difference of energies at positions that were rounded to f32 (measured: at most 4e-7).
+const ROUNDING: f64 = 1e-5;
+
+/// Name of the networks' drape in reports.
+pub const NETWORK: &str = "network";
 /// Name of linear blend skinning of the start state in reports.
 pub const LBS: &str = "LBS";
 
@@ -122,9 +145,9 @@ pub fn scene_error(
     settings: &SolverSettings,
     observer: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
 ) -> Result<SceneError, EquilibriumError> {
-    let problem = Problem::new(&scene.energy, Some(&scene.transforms))?;
+    let problem = Problem::new(&scene.energy)?;
     let mut states = vec![("LBS of rest", scene.skinned_rest.clone()), (LBS, scene.skinned_start.clone())];
-    states.extend(network.map(|drapes| ("network", drapes.layered.clone())));
+    states.extend(network.map(|drapes| (NETWORK, drapes.layered.clone())));
     let resolved = network.and_then(|drapes| drapes.resolved.clone());
     states.extend(resolved.map(|resolved| ("network + post-process", resolved)));
 
@@ -136,13 +159,17 @@ pub fn scene_error(
     let minimum = &solutions[reference].1;
     let gained = solutions[0].1.history[0].energy - minimum.energy();
 
-    let measure = |method: &'static str, positions: &[[f64; 3]], energy: f64| {
+    let measure = |method: String, positions: &[[f64; 3]]| {
+        let (energy, terms) = problem.terms(positions);
         let excess = energy - minimum.energy();
         let excess_percent = if gained > 0.0 { 100.0 * excess / gained } else { 0.0 };
         let distance_mm = 1e3 * mean_distance(positions, &minimum.positions);
-        MethodError { method, energy, excess, excess_percent, distance_mm }
+        MethodError { method, energy, terms, excess, excess_percent, distance_mm }
     };
-    let methods = states.iter().map(|(method, p)| measure(method, p, problem.value(p))).collect();
+    let steps = network.iter().flat_map(|drapes| &drapes.steps);
+    let steps = steps.map(|(steps, positions)| (format!("network, {steps} steps"), positions));
+    let named = states.iter().map(|(method, positions)| ((*method).to_owned(), positions));
+    let methods = named.chain(steps).map(|(method, positions)| measure(method, positions)).collect();
     let differ = |s: &Solution| s.energy() - minimum.energy() > SAME_MINIMUM * gained;
     Ok(SceneError {
         scene: number,
@@ -151,7 +178,7 @@ pub fn scene_error(
         methods,
         minima_differ: solutions.iter().any(|(_, s)| differ(s)),
         reference,
-        runs: solutions.iter().map(|(start, s)| solver_run(start, s)).collect(),
+        runs: solutions.iter().map(|(start, s)| solver_run(&problem, start, s)).collect(),
         layers: layer_strains(scene, &minimum.positions, network, settings, observer)?,
     })
 }
@@ -174,10 +201,10 @@ fn layer_strains(
         return Ok(Vec::new());
     }
     let alone = scene.energy.without_layers();
-    let problem = Problem::new(&alone, Some(&scene.transforms))?;
+    let problem = Problem::new(&alone)?;
     let mut solutions = vec![(LBS, solve(&problem, &scene.skinned_start, settings, observer)?)];
     if let Some(drapes) = network {
-        solutions.push(("network", solve(&problem, &drapes.single, settings, observer)?));
+        solutions.push((NETWORK, solve(&problem, &drapes.single, settings, observer)?));
     }
     let strain = |positions: &[[f64; 3]]| -> Vec<f64> {
         let raw = alone.raw(positions, positions).garments;
@@ -194,11 +221,12 @@ fn layer_strains(
         .collect())
 }
 
-fn solver_run(start: &'static str, solution: &Solution) -> SolverRun {
+fn solver_run(problem: &Problem<'_>, start: &'static str, solution: &Solution) -> SolverRun {
     let (first, last) = (&solution.history[0], solution.last());
     SolverRun {
         start,
         energy: last.energy,
+        terms: problem.terms(&solution.positions).1,
         stop: solution.stop.name(),
         relative_gradient: solution.relative_gradient,
         gradient_ratio: match first.gradient_norm > 0.0 {

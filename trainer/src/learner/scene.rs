@@ -2,7 +2,7 @@
 
 use super::workers::Workers;
 use crate::config::Trains;
-use crate::drape::{DrapeError, KnownEmbeddings, WardrobeTensors};
+use crate::drape::{DrapeError, KnownEmbeddings, WardrobeTensors, to_host};
 use crate::felt::felt;
 use crate::scene::PreparedScene;
 use burn::module::Module;
@@ -162,7 +162,9 @@ impl Work<'_> {
                 Trains::Untangling | Trains::All => vec![untangled()],
                 Trains::Corrections => {
                     let feel: Feel<'_> = &|posed| {
-                        trace_span!("feeling").in_scope(|| felt(scene, prepared, &scene.contacts, posed))
+                        let device = posed.device();
+                        trace_span!("feeling")
+                            .in_scope(|| felt(scene, prepared, &scene.contacts, &to_host(posed), &device))
                     };
                     model.correct(&outfit, &embeddings, (start, &single), &untangled(), &body, feel)
                 }

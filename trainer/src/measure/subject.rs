@@ -2,7 +2,7 @@
 
 use super::phases::{OTHER, PHASES, record_phases};
 use crate::config::{Config, Trains};
-use crate::drape::{DrapeError, KnownEmbeddings, WardrobeTensors};
+use crate::drape::{DrapeError, KnownEmbeddings, WardrobeTensors, to_host};
 use crate::evaluate::Spread;
 use crate::felt::felt;
 use crate::learner::{Learner, new_optimizer};
@@ -217,7 +217,10 @@ impl Subject {
             return Ok([single.posed, single.canonical]);
         }
         let layered = model.untangle(outfit, embeddings, &single, &body);
-        let feel: Feel<'_> = &|posed| felt(scene, &scene.bodies[0], &scene.contacts, posed);
+        let feel: Feel<'_> = &|posed| {
+            let device = posed.device();
+            felt(scene, &scene.bodies[0], &scene.contacts, &to_host(posed), &device)
+        };
         let corrected = match self.trains() {
             Trains::Corrections => {
                 model.correct(outfit, embeddings, (start, &single), &layered, &body, feel).pop()

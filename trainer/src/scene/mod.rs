@@ -12,6 +12,7 @@ mod prefetch;
 mod prepare;
 mod recent;
 mod recipe;
+mod skinning;
 mod split;
 mod wardrobe;
 
@@ -29,5 +30,6 @@ pub use prefetch::{Prefetch, prepare_step};
 pub use prepare::{Dresser, PreparedBody, PreparedScene, can_touch, prepare};
 pub use recent::Recent;
 pub use recipe::Recipe;
+pub use skinning::skinning_transforms;
 pub use split::{GarmentSplit, SplitNames, is_trained_on};
 pub use wardrobe::{Card, Wardrobe};

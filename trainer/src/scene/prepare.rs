@@ -5,11 +5,13 @@ use super::draw::{BodyDraw, SceneDraw};
 use super::error::LibraryError;
 use super::garment::LibraryGarment;
 use super::library::Library;
+use super::skinning::skinning_transforms;
 use crate::config::LossesConfig;
 use crate::objective::scene_weights;
 use clothcombo_data::asset::{Body, Pose};
 use clothcombo_physics::energy::{EnergySettings, SceneEnergy, SceneGarment, SceneLayers};
 use clothcombo_physics::query::Surface;
+use clothcombo_physics::transform::Transform;
 use std::sync::Arc;
 
 /// One body of a prepared scene, with the garments' state on it; garments are packed inner → outer.
@@ -50,6 +52,11 @@ impl PreparedScene {
             own
         };
         self.worn.iter().map(part).collect()
+    }
+
+    /// Initial skinning of every vertex on the first body, canonical → posed, `[ΣV]`.
+    pub fn skinning_transforms(&self) -> Vec<Transform> {
+        skinning_transforms(&self.worn, &self.bodies[0].bones)
     }
 
     /// The first body in f64, for exact distances and intersections.
@@ -127,7 +134,7 @@ impl Dresser<'_> {
             posed.positions.iter().map(|p| p.map(|v| v as f32)).collect(),
             self.body.faces.clone(),
         );
-        let bones = self.joints.indices.iter().map(|&j| posed.bones[j]);
+        let bones: Vec<Transform> = self.joints.indices.iter().map(|&j| posed.bones[j]).collect();
         let starts: Vec<Vec<[f32; 3]>> = garments.iter().map(|g| g.start_positions(&body.shape)).collect();
         let counts: Vec<usize> = garments.iter().map(|g| g.vertex_count()).collect();
         let weights = scene_weights(losses, run_progress, &counts, contacts);
@@ -141,6 +148,7 @@ impl Dresser<'_> {
                     true => start.clone(),
                     false => g.garment.rest.positions().iter().map(|p| p.map(|v| v as f32)).collect(),
                 },
+                pull_back: None,
                 weights,
             })
             .collect();
@@ -149,17 +157,17 @@ impl Dresser<'_> {
             .zip(weights.layers)
             .map(|(&(inner, outer), weights)| SceneLayers { inner, outer, weights })
             .collect();
+        let mut energy =
+            SceneEnergy { body: Arc::new(surface), garments: scene_garments, layers, settings: *settings };
+        if losses.holding.posed {
+            energy = energy.pulled_back(&skinning_transforms(garments, &bones));
+        }
         PreparedBody {
             shape: body.shape.iter().map(|v| *v as f32).collect(),
             pose: (self.features)(&body.pose, &self.joints.indices),
-            bones: bones.collect(),
+            bones,
             start: starts.concat(),
-            energy: Arc::new(SceneEnergy {
-                body: Arc::new(surface),
-                garments: scene_garments,
-                layers,
-                settings: *settings,
-            }),
+            energy: Arc::new(energy),
         }
     }
 }

@@ -20,14 +20,16 @@ pub enum ScoreError {
         /// What the reader said.
         reason: MeshFileError,
     },
-    /// Every garment needs both its files.
-    #[error("{rest} rest meshes (--rest) but {draped} draped meshes (--draped)")]
-    #[diagnostic(help("give each garment once in both lists, from the body outwards"))]
+    /// Every garment needs all its files.
+    #[error("{rest} rest meshes (--rest) but {found} {what} meshes (--{what})")]
+    #[diagnostic(help("give each garment once in every list, from the body outwards"))]
     FileCounts {
         /// Rest meshes.
         rest: usize,
-        /// Draped meshes.
-        draped: usize,
+        /// The other list.
+        what: &'static str,
+        /// Its meshes.
+        found: usize,
     },
     /// The two files of a garment are different meshes.
     #[error(

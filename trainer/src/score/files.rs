@@ -15,6 +15,8 @@ pub struct MeshFiles<'a> {
     pub rest: &'a [PathBuf],
     /// Draped meshes of the same vertices and faces, in the same order.
     pub draped: &'a [PathBuf],
+    /// The same before skinning, for the holding energy; none leaves it out.
+    pub canonical: &'a [PathBuf],
 }
 
 /// Scores the meshes of `files`; a garment is named after its draped file.
@@ -22,16 +24,27 @@ pub struct MeshFiles<'a> {
 /// # Errors
 /// [`ScoreError`] naming file and line, or the two files that do not fit together.
 pub fn score_files(files: &MeshFiles, distance: ScoreDistance) -> Result<Score, ScoreError> {
-    let MeshFiles { body, rest, draped } = *files;
+    let MeshFiles { body, rest, draped, canonical } = *files;
     if rest.len() != draped.len() {
-        return Err(ScoreError::FileCounts { rest: rest.len(), draped: draped.len() });
+        return Err(ScoreError::FileCounts { rest: rest.len(), what: "draped", found: draped.len() });
+    }
+    if !(canonical.is_empty() || rest.len() == canonical.len()) {
+        return Err(ScoreError::FileCounts { rest: rest.len(), what: "canonical", found: canonical.len() });
     }
     let body = load_body(body)?;
     let loaded = rest.iter().zip(draped).map(|(rest, draped)| load_garment(rest, draped, &body));
     let loaded = loaded.collect::<Result<Vec<_>, _>>()?;
+    let before = rest.iter().zip(canonical).map(|(rest, canonical)| load_pair(rest, canonical));
+    let before = before.map(|pair| Ok(pair?.1)).collect::<Result<Vec<TriMesh>, ScoreError>>()?;
     let garments: Vec<DrapedGarment> = loaded
         .iter()
-        .map(|(name, rest, draped)| DrapedGarment { name, rest, positions: draped.positions() })
+        .enumerate()
+        .map(|(i, (name, rest, draped))| DrapedGarment {
+            name,
+            rest,
+            positions: draped.positions(),
+            canonical: before.get(i).map(TriMesh::positions),
+        })
         .collect();
     score(&body, &garments, distance)
 }
@@ -55,6 +68,19 @@ pub(crate) fn load_garment(
     draped_path: &Path,
     body: &TriMesh,
 ) -> Result<(String, TriMesh, TriMesh), ScoreError> {
+    let (rest, draped) = load_pair(rest_path, draped_path)?;
+    if let Some(what) = misplaced(&draped, body) {
+        return Err(ScoreError::Place { path: draped_path.into(), what });
+    }
+    if let Some(what) = rescaled(&rest, &draped) {
+        return Err(ScoreError::RestUnit { rest: rest_path.into(), draped: draped_path.into(), what });
+    }
+    let name = draped_path.file_stem().unwrap_or(draped_path.as_os_str()).to_string_lossy().into_owned();
+    Ok((name, rest, draped))
+}
+
+/// A rest mesh and a mesh of the same faces.
+fn load_pair(rest_path: &Path, draped_path: &Path) -> Result<(TriMesh, TriMesh), ScoreError> {
     let (rest, draped) = (load_tri_mesh(rest_path)?, load_tri_mesh(draped_path)?);
     let size = |path: &Path, mesh: &TriMesh| MeshSize {
         path: path.to_owned(),
@@ -71,12 +97,5 @@ pub(crate) fn load_garment(
         let (rest, draped) = sizes();
         return Err(ScoreError::Faces { face, rest, rest_face, draped, draped_face });
     }
-    if let Some(what) = misplaced(&draped, body) {
-        return Err(ScoreError::Place { path: draped_path.into(), what });
-    }
-    if let Some(what) = rescaled(&rest, &draped) {
-        return Err(ScoreError::RestUnit { rest: rest_path.into(), draped: draped_path.into(), what });
-    }
-    let name = draped_path.file_stem().unwrap_or(draped_path.as_os_str()).to_string_lossy().into_owned();
-    Ok((name, rest, draped))
+    Ok((rest, draped))
 }

@@ -11,7 +11,7 @@ fn scene() -> (TriMesh, TriMesh, TriMesh) {
 }
 
 fn draped<'a>(name: &'a str, mesh: &'a TriMesh) -> DrapedGarment<'a> {
-    DrapedGarment { name, rest: mesh, positions: mesh.positions() }
+    DrapedGarment { name, rest: mesh, positions: mesh.positions(), canonical: None }
 }
 
 #[test]
@@ -48,6 +48,61 @@ fn a_garment_at_rest_over_its_body_has_no_strain_and_crosses_nothing() {
     assert!(wrong.layers[0].order_violations > 0.99, "{:?}", wrong.layers);
     assert!(wrong.layers[0].layer_collision > 0.0 && wrong.layers[0].layer_distance > 0.0);
     assert_eq!(wrong.garments[0].raw, right.garments[1].raw);
+}
+
+#[test]
+fn holding_is_measured_where_canonical_positions_are_given_and_strain_is_the_printed_one() {
+    // A sleeve with one needle among its triangles: a vertex pulled to a tenth of a millimetre of the opposite edge.
+    let (body, sleeve, _) = scene();
+    let [a, b, c] = sleeve.faces()[0];
+    let mut positions = sleeve.positions().to_vec();
+    let middle = |k: usize| 0.5 * (positions[a as usize][k] + positions[b as usize][k]);
+    let [x, y, z] = [middle(0), middle(1), middle(2)];
+    positions[c as usize] = [x, y + 1e-4, z];
+    let rest = sleeve.with_positions(positions).unwrap();
+    let positions = mapped(&rest, |[x, y, z]| [1.02 * x, y + 0.01 * x, z]).positions().to_vec();
+    let canonical = mapped(&rest, |[x, y, z]| [x, 1.1 * y, z]).positions().to_vec();
+    let garment =
+        DrapedGarment { canonical: Some(&canonical), positions: &positions, ..draped("tee", &rest) };
+    let found = score(&body, &[garment], ScoreDistance::default()).unwrap().garments.remove(0);
+    assert_eq!(found.raw.len(), 6);
+
+    // Both formulas as the paper prints them.
+    let material = clothcombo_physics::energy::Material::default();
+    let sub = |p: [f64; 3], q: [f64; 3]| [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
+    let dot = |p: [f64; 3], q: [f64; 3]| p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
+    let norm = |p: [f64; 3]| dot(p, p).sqrt();
+    let strain: f64 = rest
+        .faces()
+        .iter()
+        .map(|face| {
+            let edge = |k: usize, p: &[[f64; 3]]| sub(p[face[(k + 1) % 3] as usize], p[face[k] as usize]);
+            let length = |k: &usize| norm(edge(*k, rest.positions()));
+            // In a frame along the longest edge, where a needle loses no digits.
+            let first = (0..3).max_by(|k, l| length(k).total_cmp(&length(l))).unwrap();
+            let edges = |p: &[[f64; 3]]| [edge(first, p), edge((first + 2) % 3, p).map(|x| -x)];
+            let ([base, side], [d1, d2]) = (edges(rest.positions()), edges(&positions));
+            let x1 = norm(base);
+            let x2 = dot(side, base) / x1;
+            let [a, b, c] = base;
+            let [d, e, f] = side;
+            let y2 = norm([b * f - c * e, c * d - a * f, a * e - b * d]) / x1;
+            let f1 = d1.map(|x| x / x1);
+            let f2: [f64; 3] = std::array::from_fn(|k| (d2[k] - d1[k] * x2 / x1) / y2);
+            let [g11, g12, g22] = [0.5 * (dot(f1, f1) - 1.0), 0.5 * dot(f1, f2), 0.5 * (dot(f2, f2) - 1.0)];
+            let square = g11 * g11 + 2.0 * g12 * g12 + g22 * g22;
+            let density = 0.5 * material.lambda * (g11 + g22).powi(2) + material.mu * square;
+            0.5 * x1 * y2 * material.thickness * density
+        })
+        .sum();
+    assert!((found.raw["strain"] / strain - 1.0).abs() < 1e-12, "{} {strain}", found.raw["strain"]);
+    let mut heights: Vec<f64> = rest.positions().iter().map(|p| p[1]).collect();
+    heights.sort_by(|a, b| b.total_cmp(a));
+    let held = heights.len().div_ceil(10);
+    let holding: f64 = heights[..held].iter().map(|y| (0.1 * y).powi(2)).sum();
+    assert!((found.raw["holding"] / holding - 1.0).abs() < 1e-12, "{} {holding}", found.raw["holding"]);
+    let part = DrapedGarment { canonical: Some(&canonical[1..]), ..garment };
+    assert!(matches!(score(&body, &[part], ScoreDistance::default()), Err(ScoreError::Positions { .. })));
 }
 
 #[test]

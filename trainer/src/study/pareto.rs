@@ -173,15 +173,14 @@ fn solved(
     mut states: Vec<State>,
 ) -> Result<(Vec<Sample>, bool), Report> {
     let reference = ReferenceScene::new(&subject.config.losses, scene).into_diagnostic()?;
-    let problem = Problem::new(&reference.energy, Some(&reference.transforms)).into_diagnostic()?;
+    let problem = Problem::new(&reference.energy).into_diagnostic()?;
     states.iter_mut().for_each(|s| s.energy = problem.value(&s.positions));
     let find = |name: &str| states.iter().find(|s| s.method == name).expect("it is a fast method");
     let (network, lbs) = (find("network"), find("LBS"));
     let (network_start, network_ms, skin_ms) = (network.positions.clone(), network.ms, lbs.ms);
     for steps in REFINEMENT {
         let clock = Instant::now();
-        let (positions, done) =
-            refine(&reference.energy, &reference.transforms, &network_start, steps).into_diagnostic()?;
+        let (positions, done) = refine(&reference.energy, &network_start, steps).into_diagnostic()?;
         let ms = network_ms + 1e3 * clock.elapsed().as_secs_f64();
         states.push(State {
             method: format!("network + {steps} steps"),

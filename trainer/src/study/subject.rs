@@ -46,9 +46,9 @@ impl Subject {
         Networks::new(self.model.clone(), &self.tensors)
     }
 
-    /// The same with no more than the first `corrections` of the correction networks.
-    pub fn networks_with(&self, corrections: usize) -> Networks<'_> {
-        Networks::new(self.model.clone().with_first_corrections(corrections), &self.tensors)
+    /// The same with at most `steps` correction steps.
+    pub fn networks_with(&self, steps: usize) -> Networks<'_> {
+        Networks::new(self.model.clone().with_correction_steps(steps), &self.tensors)
     }
 
     /// Scene `index` of question number `question` (`at`), drawn as [`draw_study`] says.

@@ -1,6 +1,6 @@
 //! A garment as the post-process sees it: what its positions do not change, and where it is.
 
-use crate::energy::{Material, strain::Strain};
+use crate::energy::{EnergySettings, Material, strain::Strain};
 use crate::mesh::{FacesAtVertex, Topology, TriMesh};
 use crate::vec3::{norm, sub};
 
@@ -45,7 +45,7 @@ impl RestGarment {
         let at = |v: u32| rest.positions()[v as usize];
         let edge_lengths = topology.edges.iter().map(|&[a, b]| norm(sub(at(a), at(b)))).collect();
         let faces_at = FacesAtVertex::new(rest.vertex_count(), &faces);
-        let strain = Strain::new(rest, &Material::default());
+        let strain = Strain::new(rest, &Material::default(), EnergySettings::default().needle_ratio);
         Self { faces, topology, edge_lengths, edges_of_faces, is_border, border_edges, faces_at, strain }
     }
 

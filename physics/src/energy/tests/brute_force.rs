@@ -37,11 +37,12 @@ fn repulsion_is_the_double_loop() {
         for (normalised, scale) in [(true, 1.0 / count), (false, 1.0)] {
             let mut gradient = vec![[0.0; 3]; rest.vertex_count()];
             let target = Weighted { weight: 1.0 / scale, gradient: &mut gradient };
-            let value = Repulsion::new(&topology, radius, normalised, None).evaluate(
-                posed.positions(),
-                0,
-                Some(target),
-            );
+            let settings = EnergySettings {
+                repulsion_radius: radius,
+                repulsion_normalised: normalised,
+                ..EnergySettings::default()
+            };
+            let value = Repulsion::new(&topology).evaluate(posed.positions(), &settings, Some(target));
             assert!((value / (scale * sum) - 1.0).abs() < 1e-12, "{value} {}", scale * sum);
             let largest = super::scenes::largest(&expected);
             for (g, e) in gradient.iter().zip(&expected) {
@@ -59,8 +60,12 @@ fn random_subsets_are_unbiased_estimates_of_the_full_sum() {
     let evaluate = |subset: Option<usize>, sample: u32| {
         let mut gradient = vec![[0.0; 3]; count];
         let target = Weighted { weight: 1.0, gradient: &mut gradient };
-        let value =
-            Repulsion::new(&topology, 0.1, true, subset).evaluate(posed.positions(), sample, Some(target));
+        let settings = EnergySettings {
+            repulsion_subset: subset,
+            repulsion_sample: sample,
+            ..EnergySettings::default()
+        };
+        let value = Repulsion::new(&topology).evaluate(posed.positions(), &settings, Some(target));
         (value, gradient)
     };
     let (full, full_gradient) = evaluate(None, 0);

@@ -26,14 +26,11 @@ impl CurvatureSink for Product<'_> {
     }
 }
 
-/// Curvature times `x`, taken as a displacement of posed and of canonical positions.
+/// Curvature times `x`, taken as a displacement of posed and of canonical positions alike.
 fn product(scene: &Scene<f64>, posed: &[[f64; 3]], x: &[[f64; 3]]) -> Vec<[f64; 3]> {
-    let zero = vec![[0.0; 3]; x.len()];
-    let mut of_posed = Product { x, result: zero.clone() };
-    let mut of_canonical = Product { x, result: zero };
-    scene.energy.curvature(posed, &scene.canonical, &mut of_posed, &mut of_canonical);
-    let sums = of_posed.result.iter().zip(&of_canonical.result);
-    sums.map(|(a, b)| crate::vec3::add(*a, *b)).collect()
+    let mut product = Product { x, result: vec![[0.0; 3]; x.len()] };
+    scene.energy.curvature(posed, &scene.canonical, &mut product);
+    product.result
 }
 
 fn directions(count: usize, seed: u64) -> Vec<[f64; 3]> {
@@ -70,9 +67,12 @@ fn exact_in_tension_without_folds_and_over_flat_ground() {
     let flat = shapes::irregular_grid(0.3, 0.3, 6, 6, 0.25, 1);
     let stretched = |[x, y, z]: [f64; 3]| [1.15 * x + 0.02 * y, 1.1 * y, z];
     let ground = shapes::mapped(&shapes::grid(4.0, 4.0, 2, 2), |[x, y, z]| [x - 2.0, y - 2.0, z - 0.001]);
-    for term in [Term::Strain, Term::Bending, Term::BodyCollision, Term::Holding] {
+    let held = [(Term::Holding, false), (Term::Holding, true)];
+    let others = [Term::Strain, Term::Bending, Term::BodyCollision].map(|term| (term, false));
+    for (term, is_pulled_back) in others.into_iter().chain(held) {
         let settings = EnergySettings { distance: Distance::ClosestPoint, ..EnergySettings::default() };
         let scene = super::scenes::scene_of::<f64>(vec![flat.clone()], &ground, settings, only(term), 0.0, 1);
+        let scene = if is_pulled_back { super::scenes::pulled_back(scene) } else { scene };
         let posed: Vec<[f64; 3]> = match term {
             Term::Strain => flat.positions().iter().map(|p| stretched(*p)).collect(),
             _ => flat.positions().to_vec(),

@@ -1,13 +1,16 @@
 //! Every gradient against difference quotients in `f64`, on random scenes and for every switch. The suite of hard cases runs
 //! through the same check in the workspace's `tests` crate.
 
-use super::scenes::{only, scene};
+use super::scenes::{Scene, only, pulled_back, scene};
 use crate::energy::gradient_check::{GradientCheck, check_gradient};
 use crate::energy::{EnergySettings, LayerContact, LayerGate, Term};
 use crate::query::Distance;
 
 fn check(term: Term, settings: EnergySettings, seed: u64, what: &str) {
-    let scene = scene::<f64>(settings, only(term), seed);
+    check_scene(scene(settings, only(term), seed), term, seed, what);
+}
+
+fn check_scene(scene: Scene<f64>, term: Term, seed: u64, what: &str) {
     let check = GradientCheck { coordinates: 100, directions: 6, seed: seed + 7 };
     let report = check_gradient(&scene.energy, term, &scene.posed, &scene.canonical, &check);
     let report = report.unwrap_or_else(|| panic!("{term} is not in the scene"));
@@ -18,7 +21,8 @@ fn check(term: Term, settings: EnergySettings, seed: u64, what: &str) {
     assert!(report.kinks * 20 <= report.lines, "{term} {what}: {report:?}");
     // Only the space that the term is about has a gradient.
     let value = scene.energy.evaluate(&scene.posed, &scene.canonical);
-    let other = if term.is_canonical() { &value.posed_gradient } else { &value.canonical_gradient };
+    let other =
+        if scene.energy.needs_canonical() { &value.posed_gradient } else { &value.canonical_gradient };
     assert_eq!(super::scenes::largest(other), 0.0, "{term}");
 }
 
@@ -49,4 +53,14 @@ fn so_it_is_with_every_switch() {
     check(Term::Repulsion, EnergySettings { repulsion_normalised: false, ..default }, 3, "as printed");
     check(Term::Repulsion, EnergySettings { repulsion_subset: Some(16), ..default }, 3, "random subset");
     check(Term::Holding, EnergySettings { holding_fraction: 0.4, ..default }, 3, "40 % held");
+}
+
+#[test]
+fn holding_pulled_back_by_bent_skinning_has_its_gradient_at_posed_positions() {
+    for seed in [1, 2] {
+        let settings = EnergySettings { holding_fraction: 0.4, ..EnergySettings::default() };
+        let scene = pulled_back(scene(settings, only(Term::Holding), seed));
+        assert!(!scene.energy.needs_canonical());
+        check_scene(scene, Term::Holding, seed, "pulled back");
+    }
 }

@@ -9,7 +9,9 @@ use crate::device::Backend;
 use crate::drape::{Networks, WardrobeTensors};
 use crate::evaluate::Spread;
 use crate::evaluate::certificates::Dressing;
-use crate::evaluate::equilibrium_error::{Drapes, LBS, MethodError, SceneError, converged, scene_error};
+use crate::evaluate::equilibrium_error::{
+    Drapes, LBS, MethodError, SceneError, TermEnergies, converged, scene_error,
+};
 use crate::evaluate::reference::ReferenceScene;
 use crate::one_core::each_on_one_core;
 use crate::scene::{Library, LibraryError, PreparedScene, ValidationGroup, draw_validation, prepare};
@@ -21,6 +23,7 @@ use rand::{SeedableRng, seq::index};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 use serde_json::json;
+use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -58,6 +61,9 @@ pub struct Arguments {
     /// Scenes solved at the same time, each on one core; default: all cores
     #[arg(long)]
     jobs: Option<usize>,
+    /// Also measures the networks after these numbers of correction steps, for example 0,1,2,4,8
+    #[arg(long, value_name = "STEPS", value_delimiter = ',', requires = "checkpoint")]
+    corrections: Vec<usize>,
     /// Print JSON instead of a table
     #[arg(long)]
     json: bool,
@@ -84,7 +90,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let seed = arguments.seed.unwrap_or_else(|| config.validation_seed());
     let scenes = draw_scenes(&library, &config, [arguments.scenes, arguments.layers], seed)?;
     let networks: Vec<Option<Drapes>> = match &trained {
-        Some(trained) => drape(trained, &config, &library, &scenes)?.into_iter().map(Some).collect(),
+        Some(trained) => {
+            let drapes = drape(trained, &config, &library, &scenes, &arguments.corrections)?;
+            drapes.into_iter().map(Some).collect()
+        }
         None => scenes.iter().map(|_| None).collect(),
     };
     let errors = solve_all(arguments, &config, &scenes, &networks, &settings)?;
@@ -130,6 +139,7 @@ fn drape(
     config: &Config,
     library: &Arc<Library>,
     scenes: &[PreparedScene],
+    corrections: &[usize],
 ) -> Result<Vec<Drapes>, Report> {
     trained.check_fits(library)?;
     let device = Backend::preferred().device();
@@ -146,8 +156,13 @@ fn drape(
             1 => None,
             _ => Some(dressing.of(scene, &drape.posed).resolved(&post_process)?.positions.concat()),
         };
+        let mut drapes = Drapes::new(&networks.drape_alone(scene)?, &drape, resolved);
+        for &steps in corrections {
+            let drape = networks.with_correction_steps(steps).drape(scene)?;
+            drapes.steps.push((steps, drape.posed.iter().map(|p| p.map(f64::from)).collect()));
+        }
         bar.inc(1);
-        Ok(Drapes::new(&networks.drape_alone(scene)?, &drape, resolved))
+        Ok(drapes)
     });
     let drapes = drapes.collect();
     bar.finish_and_clear();
@@ -180,8 +195,8 @@ fn solve_all(
 }
 
 /// Names of the methods, the same in every scene.
-fn methods(errors: &[SceneError]) -> Vec<&'static str> {
-    errors.first().map_or(Vec::new(), |e| e.methods.iter().map(|m| m.method).collect())
+fn methods(errors: &[SceneError]) -> Vec<&str> {
+    errors.first().map_or(Vec::new(), |e| e.methods.iter().map(|m| m.method.as_str()).collect())
 }
 
 fn spread(errors: &[SceneError], method: &str, value: impl Fn(&MethodError) -> f64) -> Spread {
@@ -204,12 +219,13 @@ fn stops(errors: &[SceneError]) -> Vec<(&'static str, usize)> {
 
 fn summary(errors: &[SceneError], settings: &SolverSettings) -> serde_json::Value {
     let over = |f: &dyn Fn(&SceneError) -> f64| Spread::of(errors.iter().map(f).collect());
-    let of_method = |method: &'static str| {
+    let of_method = |method: &str| {
         json!({
             "method": method,
             "excess": spread(errors, method, |m| m.excess),
             "excess_percent": spread(errors, method, |m| m.excess_percent),
             "distance_mm": spread(errors, method, |m| m.distance_mm),
+            "terms": mean_terms(errors, |e| terms_of(e, method)),
         })
     };
     json!({
@@ -217,6 +233,8 @@ fn summary(errors: &[SceneError], settings: &SolverSettings) -> serde_json::Valu
         "iterations": settings.iterations,
         "scenes": errors,
         "methods": methods(errors).into_iter().map(of_method).collect::<Vec<_>>(),
+        "reference_terms": mean_terms(errors, |e| &e.reference_run().terms),
+        "above_skinning": above_skinning(errors),
         "solver": {
             "converged": errors.iter().filter(|e| converged(e.reference_run())).count(),
             "stops": stops(errors).into_iter().collect::<std::collections::BTreeMap<_, _>>(),
@@ -227,6 +245,21 @@ fn summary(errors: &[SceneError], settings: &SolverSettings) -> serde_json::Valu
         },
         "strain_ratios": strain_ratios(errors),
     })
+}
+
+/// Mean of every weighted energy over the scenes [J].
+fn mean_terms<'a>(errors: &'a [SceneError], of: impl Fn(&'a SceneError) -> &'a TermEnergies) -> TermEnergies {
+    let mut means = TermEnergies::new();
+    for (term, energy) in errors.iter().flat_map(of) {
+        *means.entry(term).or_default() += energy / errors.len() as f64;
+    }
+    means
+}
+
+/// In how many scenes the networks end above skinning; none without networks.
+fn above_skinning(errors: &[SceneError]) -> Option<usize> {
+    let above: Option<Vec<bool>> = errors.iter().map(SceneError::is_above_skinning).collect();
+    above.filter(|above| !above.is_empty()).map(|above| above.into_iter().filter(|above| *above).count())
 }
 
 /// Strain of a layer in the outfit over that of the same garment alone, medians over the scenes.
@@ -302,6 +335,10 @@ fn print_tables(errors: &[SceneError], settings: &SolverSettings) {
         let differ = errors.iter().filter(|e| e.minima_differ).count();
         println!("starts that end in different minima: {differ} of {}", errors.len());
     }
+    if let Some(above) = above_skinning(errors) {
+        println!("networks above skinning with shape transfer: {above} of {}", errors.len());
+    }
+    print_terms(errors, &names);
     let ratios = strain_ratios(errors);
     if !ratios.is_empty() {
         println!(
@@ -313,4 +350,25 @@ fn print_tables(errors: &[SceneError], settings: &SolverSettings) {
         let network = ratio.network.map_or("–".to_owned(), |network| format!("{network:.2}"));
         println!("{:>6}{:>14.2}{:>10}", layer + 1, ratio.equilibrium, network);
     }
+}
+
+/// Every term of the energy, method by method.
+fn print_terms(errors: &[SceneError], methods: &[&str]) {
+    let mut rows: Vec<(&str, TermEnergies)> =
+        methods.iter().map(|name| (*name, mean_terms(errors, |e| terms_of(e, name)))).collect();
+    rows.push(("equilibrium", mean_terms(errors, |e| &e.reference_run().terms)));
+    let terms: BTreeSet<&str> = rows.iter().flat_map(|(_, terms)| terms.keys().copied()).collect();
+    println!("\nmean of every energy, weighted [J]");
+    print!("{:<26}", "method");
+    terms.iter().for_each(|term| print!("{term:>17}"));
+    println!("{:>12}", "sum");
+    for (name, values) in rows {
+        print!("{name:<26}");
+        terms.iter().for_each(|term| print!("{:>17.4}", values.get(term).copied().unwrap_or(0.0)));
+        println!("{:>12.4}", values.values().sum::<f64>());
+    }
+}
+
+fn terms_of<'a>(error: &'a SceneError, method: &str) -> &'a TermEnergies {
+    &error.methods.iter().find(|m| m.method == method).expect("every scene has every method").terms
 }

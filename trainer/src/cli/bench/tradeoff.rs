@@ -283,6 +283,7 @@ fn evaluated<T: Real>(
         Ok(SceneGarment {
             energies: Arc::new(energies.into_diagnostic()?),
             holding_reference: scalars(&dressed.holding_reference),
+            pull_back: dressed.pull_back.clone(),
             weights: dressed.weights,
         })
     };

@@ -62,6 +62,10 @@ pub struct Arguments {
     /// Whether mesh files are fitted to the body
     #[arg(long, value_enum, default_value_t = Fit::Auto)]
     fit: Fit,
+    /// Correction steps at most, each taken as far as it lowers the energy; the correction networks take turns. 0 leaves the
+    /// networks' drape as it is [default: model.correction_steps of the model]
+    #[arg(long, value_name = "STEPS")]
+    corrections: Option<usize>,
     /// Steps of the static solver from the networks' state, at most 5 mm each and 5 cm together
     #[arg(long, default_value_t = 0, value_name = "STEPS")]
     refine: usize,
@@ -235,6 +239,7 @@ fn settings(arguments: &Arguments) -> DraperSettings {
         body: arguments.body.clone(),
         cache,
         backend: arguments.device,
+        corrections: arguments.corrections,
         refine: arguments.refine,
         resolve: !arguments.no_resolve,
         post_process: arguments.post_process.settings(),
