@@ -5,6 +5,28 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::ModelError;
 
+/// Which garments of an outfit interact.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Graph {
+    /// Garments whose rest boxes are at most 5 cm apart. `D_m` moves no other garment: Δx_m = 0 exactly.
+    #[default]
+    Near,
+    /// All pairs i < j, as in the paper. `D_m` moves every garment, one without neighbours too (f^i = 0 ⊕ 0).
+    Full,
+}
+
+/// Joints of which the skinning network S corrects a garment's weights.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SkinningJoints {
+    /// Joints that the garment's initial weights W use.
+    #[default]
+    Bound,
+    /// All active joints, as in the paper.
+    All,
+}
+
 /// Size and scale of every network; the defaults are the paper's.
 ///
 /// Nothing here depends on the data: see [`Dimensions`] for what does.
@@ -41,11 +63,18 @@ pub struct ModelConfig {
     pub untangling_scale: f64,
     /// Factor on the output of S, which makes it ΔW.
     pub skinning_scale: f64,
-    /// Keep Σ_j W_j = 1 by removing the mean of ΔW over a garment's joints. `false` is the paper's raw sum. In
-    /// either case a vertex only gets weight on joints that its garment's initial weights use.
+    /// Keep Σ_j W_j = 1 by removing the mean of ΔW over the joints that `skinning_joints` names. `false` is the paper's raw sum.
     pub zero_sum_skinning: bool,
-    /// Hand the vertex embedding `z_v` to `D_s`, `S` and `D_m`. `false` is an ablation of the paper: they see zeros, and the
-    /// garment embedding `z̄_v` alone tells garments apart.
+    /// Joints that ΔW acts on. `"bound"`: those that the garment's initial weights use, so that no garment follows a limb far
+    /// from it. `"all"`: every active joint, the paper's W + ΔW.
+    pub skinning_joints: SkinningJoints,
+    /// Garments that interact: edges of the untangling network, and pairs with layer losses. `"near"`: those whose rest boxes are
+    /// at most 5 cm apart, so that garments that cannot touch cost nothing and do not move. `"full"`: all, the paper's fully
+    /// connected graph; `D_m` then moves every garment, a single one too. In `"full"` a layer collision without gate
+    /// (`losses.layer_collision.gated`) pushes distant garments apart.
+    pub graph: Graph,
+    /// Give the vertex embedding `z_v` to `D_s`, `S`, `D_m` and the corrections. `false` is the ablation of the paper's Table 4: the
+    /// garment embedding `z̄_v` replaces it at every vertex.
     pub vertex_embedding: bool,
     /// Correction networks that garments go through at the end; 0 is the paper, which has none.
     pub corrections: usize,
@@ -76,6 +105,8 @@ impl Default for ModelConfig {
             untangling_scale: 0.01,
             skinning_scale: 0.01,
             zero_sum_skinning: true,
+            skinning_joints: SkinningJoints::Bound,
+            graph: Graph::Near,
             vertex_embedding: true,
             corrections: 0,
             correction_width: 96,

@@ -23,7 +23,7 @@ pub struct GarmentEncoder {
 /// Embedding of one garment.
 #[derive(Clone, Debug)]
 pub struct GarmentEmbedding {
-    /// Vertex embedding z_v `[V,d]`.
+    /// Vertex embedding z_v `[V,d]`; z̄_v in every row without [`ModelConfig::vertex_embedding`].
     pub vertex: Tensor<2>,
     /// Garment embedding z̄_v `[1,d]`, the mass-weighted mean of z_v.
     pub garment: Tensor<2>,
@@ -56,7 +56,11 @@ impl GarmentEncoder {
         let vertex = self.diffusion_net.forward(garment);
         // A product with the normalised mass row: a plain sum over thousands of rows would lose digits in f32.
         let mean = product(garment.mass.clone(), vertex.clone());
-        let vertex = if self.has_vertex_embedding { vertex } else { vertex.zeros_like() };
+        let vertex = match self.has_vertex_embedding {
+            true => vertex,
+            // A product as well: its backward pass sums thousands of rows.
+            false => product(Tensor::ones([vertex.dims()[0], 1], &garment.mass.device()), mean.clone()),
+        };
         GarmentEmbedding { vertex, garment: mean }
     }
 }

@@ -36,7 +36,7 @@ mod testing;
 mod untangling;
 
 pub use adam::FusedAdam;
-pub use config::{Dimensions, ModelConfig};
+pub use config::{Dimensions, Graph, ModelConfig, SkinningJoints};
 pub use correction::Correction;
 pub use draping::Draping;
 pub use error::ModelError;

@@ -178,9 +178,9 @@ impl ClothCombo {
     /// Adds what untangling needs of the embeddings, so that several bodies share it.
     ///
     /// Uses the untangling weights of `self`: when the first stage is frozen, pack with the frozen model and prepare with
-    /// the trained one. Does nothing for an outfit in which nothing can touch.
+    /// the trained one. Does nothing for an outfit that [untangling leaves alone](Untangling::acts_on).
     pub fn prepare_untangling(&self, outfit: &OutfitTensors, mut embeddings: Embeddings) -> Embeddings {
-        if outfit.has_contacts() {
+        if self.untangling.acts_on(outfit) {
             let _span = trace_span!("untangling").entered();
             embeddings.untangling_product = Some(self.untangling.vertex_product(embeddings.vertex.clone()));
         }
@@ -216,8 +216,8 @@ impl ClothCombo {
 
     /// Lets the garments press on each other.
     ///
-    /// One garment, or none that can touch another: returns the single drape and evaluates nothing. The single drape may
-    /// come from a frozen model (plain tensors), in which case gradients reach the untangling networks only.
+    /// An outfit that [untangling leaves alone](Untangling::acts_on): returns the single drape and evaluates nothing. The single
+    /// drape may come from a frozen model (plain tensors), in which case gradients reach the untangling networks only.
     pub fn untangle(
         &self,
         outfit: &OutfitTensors,
@@ -225,7 +225,7 @@ impl ClothCombo {
         single: &SingleDrape,
         body: &BodyTensors,
     ) -> LayeredDrape {
-        let _span = outfit.has_contacts().then(|| trace_span!("untangling").entered());
+        let _span = self.untangling.acts_on(outfit).then(|| trace_span!("untangling").entered());
         let displacement = self.untangling.displace(
             outfit,
             single.canonical.clone(),

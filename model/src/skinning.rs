@@ -3,7 +3,7 @@
 use burn::module::{Module, Param};
 use burn::tensor::Tensor;
 
-use crate::config::{Dimensions, ModelConfig};
+use crate::config::{Dimensions, ModelConfig, SkinningJoints};
 use crate::initializer::{Initializer, fan_in_bound};
 use crate::linear::Linear;
 use crate::mlp::residual_pairs;
@@ -32,6 +32,8 @@ pub struct Skinning {
     scale: f64,
     #[module(skip)]
     zero_sum: bool,
+    #[module(skip)]
+    joints: SkinningJoints,
 }
 
 impl Skinning {
@@ -47,6 +49,7 @@ impl Skinning {
             output: Linear::new(width, dimensions.joints, start),
             scale: config.skinning_scale,
             zero_sum: config.zero_sum_skinning,
+            joints: config.skinning_joints,
         }
     }
 
@@ -55,7 +58,7 @@ impl Skinning {
         product_add(rest, self.coordinate.val(), product(vertex, self.vertex.val()))
     }
 
-    /// Skin weights W + ΔW `[ΣV,J]`; ΔW is zero outside each garment's joints.
+    /// Skin weights W + ΔW `[ΣV,J]`; ΔW is zero outside the joints of [`SkinningJoints`].
     pub fn weights(
         &self,
         outfit: &OutfitTensors,
@@ -66,7 +69,10 @@ impl Skinning {
         let rows = product(draping, self.garment.val()) + self.bias.val().unsqueeze();
         let features = segment_activate(Activation::Gelu, vertex_product, rows, segments);
         let raw = self.output.forward(residual_pairs(&self.hidden, features));
-        let (weights, mask) = (outfit.skin_weights.clone(), outfit.joint_mask.clone());
-        skin_correction(weights, raw, mask, segments, self.scale, self.zero_sum)
+        let mask = match self.joints {
+            SkinningJoints::Bound => outfit.joint_mask.clone(),
+            SkinningJoints::All => outfit.joint_mask.ones_like(),
+        };
+        skin_correction(outfit.skin_weights.clone(), raw, mask, segments, self.scale, self.zero_sum)
     }
 }

@@ -3,12 +3,12 @@
 use burn::module::Module;
 use burn::tensor::Tensor;
 
-use crate::config::ModelConfig;
+use crate::config::{Graph, ModelConfig};
 use crate::initializer::Initializer;
 use crate::mlp::ResidualMlp;
 use crate::ops::product;
 use crate::siren::{ModulatedSiren, SirenSizes};
-use crate::tensors::OutfitTensors;
+use crate::tensors::{ForceEdges, OutfitTensors};
 
 /// F_f and D_m.
 ///
@@ -21,6 +21,8 @@ pub struct Untangling {
     pub displacement: ModulatedSiren,
     #[module(skip)]
     scale: f64,
+    #[module(skip)]
+    graph: Graph,
 }
 
 impl Untangling {
@@ -38,6 +40,7 @@ impl Untangling {
             force: ResidualMlp::new(2 * width, width, hidden, width, start),
             displacement: ModulatedSiren::new(&sizes, start),
             scale: config.untangling_scale,
+            graph: config.graph,
         }
     }
 
@@ -46,7 +49,15 @@ impl Untangling {
         self.displacement.modulator.vertex_product(vertex)
     }
 
-    /// Displacements Δx_m `[ΣV,3]` in metres, exactly zero on garments without contact; `None` if nothing can touch.
+    /// Whether any garment of `outfit` is displaced: always in the full graph, else if two garments can touch.
+    pub fn acts_on(&self, outfit: &OutfitTensors) -> bool {
+        self.graph == Graph::Full || outfit.has_contacts()
+    }
+
+    /// Displacements Δx_m `[ΣV,3]` in metres; `None` if [no garment is displaced](Self::acts_on).
+    ///
+    /// [`Graph::Near`] connects the contacts of `outfit`: exactly zero on garments without one. [`Graph::Full`] connects all
+    /// garments, whatever the contacts.
     ///
     /// `canonical` is x_s `[ΣV,3]`, `draping` z_s `[M,width]`, `vertex_product` from [`Untangling::vertex_product`].
     pub fn displace(
@@ -56,18 +67,33 @@ impl Untangling {
         draping: Tensor<2>,
         vertex_product: impl FnOnce() -> Tensor<2>,
     ) -> Option<Tensor<2>> {
-        let edges = outfit.edges.as_ref()?;
-        let receiver = product(edges.receiver.clone(), draping.clone());
-        let sender = product(edges.sender.clone(), draping.clone());
-        let forces = self.force.forward(Tensor::cat(vec![receiver, sender], 1));
-        let from_below = product(edges.from_below.clone(), forces.clone());
-        let from_above = product(edges.from_above.clone(), forces);
+        if !self.acts_on(outfit) {
+            return None;
+        }
+        let all_pairs;
+        let edges = match self.graph {
+            Graph::Near => outfit.edges.as_ref(),
+            Graph::Full => {
+                all_pairs = outfit.complete_edges();
+                all_pairs.as_ref()
+            }
+        };
+        let [from_below, from_above] = self.net_forces(edges, &draping);
         let latent = Tensor::cat(vec![from_below, from_above, draping], 1);
         let values = self.displacement.forward(canonical, vertex_product(), latent, &outfit.segments);
         let displacement = values * self.scale;
-        Some(match &edges.touched {
+        Some(match edges.and_then(|edges| edges.touched.as_ref()) {
             Some(touched) => displacement * touched.clone(),
             None => displacement,
         })
+    }
+
+    /// Both halves `[M,width]` of the net forces f^i: from the layers below and above. Zero without edges.
+    fn net_forces(&self, edges: Option<&ForceEdges>, draping: &Tensor<2>) -> [Tensor<2>; 2] {
+        let Some(edges) = edges else { return [draping.zeros_like(), draping.zeros_like()] };
+        let receiver = product(edges.receiver.clone(), draping.clone());
+        let sender = product(edges.sender.clone(), draping.clone());
+        let forces = self.force.forward(Tensor::cat(vec![receiver, sender], 1));
+        [&edges.from_below, &edges.from_above].map(|sum| product(sum.clone(), forces.clone()))
     }
 }

@@ -304,7 +304,7 @@ pub fn drape_on(model: &ClothCombo, on_body: &OnBody<'_>) -> (Draped, NetworkTim
     let mut found = draped(&single.canonical, &single.posed);
     times.draping = clock.elapsed();
     let layered = model.untangle(outfit, embeddings, &single, body);
-    if outfit.has_contacts() {
+    if model.untangling.acts_on(outfit) {
         found = draped(&layered.canonical, &layered.posed);
     }
     times.untangling = clock.elapsed() - times.draping;

@@ -6,6 +6,8 @@ use crate::testing::{
 };
 use burn::module::{Module, ModuleVisitor};
 
+mod switches;
+
 const DIMENSIONS: Dimensions = Dimensions { joints: 5, shape: 4, pose: 6 };
 
 fn config() -> ModelConfig {

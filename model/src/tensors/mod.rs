@@ -12,7 +12,7 @@ pub use body::BodyTensors;
 pub use felt::FeltTensors;
 pub use garment::{GarmentArrays, GarmentTensors};
 pub use outfit::OutfitTensors;
-pub(crate) use outfit::stack_rows;
+pub(crate) use outfit::{ForceEdges, stack_rows};
 
 use burn::tensor::{Device, Tensor, TensorData};
 

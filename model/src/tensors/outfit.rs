@@ -8,7 +8,7 @@ use super::{GarmentTensors, matrix};
 use crate::error::ModelError;
 use crate::ops::Segments;
 
-/// Which garments press on which: one row per ordered pair of garments that can touch.
+/// Which garments press on which: one row per ordered pair.
 #[derive(Clone, Debug)]
 pub(crate) struct ForceEdges {
     /// One-hot receiver i of every edge `[E,M]`.
@@ -83,7 +83,7 @@ impl OutfitTensors {
         })
     }
 
-    /// Every pair of `count` garments: the contacts of an outfit about which nothing is known.
+    /// Every pair (i, j), i < j, of `count` garments.
     pub fn all_pairs(count: usize) -> Vec<(usize, usize)> {
         (0..count).flat_map(|a| (a + 1..count).map(move |b| (a, b))).collect()
     }
@@ -103,9 +103,14 @@ impl OutfitTensors {
         &self.segments
     }
 
-    /// Whether any two garments can touch, so that untangling has something to do.
+    /// Whether any two garments can touch.
     pub fn has_contacts(&self) -> bool {
         self.edges.is_some()
+    }
+
+    /// Edges between all garments, whatever the contacts; `None` for a single one.
+    pub(crate) fn complete_edges(&self) -> Option<ForceEdges> {
+        ForceEdges::new(&Self::all_pairs(self.segments.count()), &self.segments, &self.rest.device())
     }
 }
 

@@ -5,6 +5,7 @@ mod checkpoint;
 mod config_fuzz;
 mod configs;
 mod corrections;
+mod graph;
 mod hard_cases;
 mod intersections;
 mod messy_garments;

@@ -111,6 +111,7 @@ impl Draper {
             joints: &self.joints,
             features: &|pose, joints| encoding.features(pose, joints),
             losses: &self.trained.config.losses,
+            graph: self.trained.config.model.graph,
         };
         let draw = SceneDraw {
             garments: (0..outfit.pieces.len()).collect(),

@@ -6,7 +6,7 @@ use super::error::DraperError;
 use super::names::UniqueNames;
 use super::source::SourceGarment;
 use crate::drape::garment_tensors;
-use crate::scene::{LibraryError, LibraryGarment};
+use crate::scene::{LibraryError, LibraryGarment, contacts};
 use burn::tensor::{Tensor, TensorData};
 use clothcombo_data::asset::Binding;
 use clothcombo_data::cache::{
@@ -148,7 +148,7 @@ impl KnownGarments {
     pub fn outfit(&self, draper: &Draper, garments: Vec<SourceGarment>) -> Result<Outfit, DraperError> {
         Outfit::check(&garments)?;
         let mut names = UniqueNames::default();
-        let (mut pieces, mut known) = (Vec::new(), Vec::new());
+        let (mut pieces, mut known) = (Vec::new(), Vec::<Known>::new());
         for source in garments {
             let name = names.take(&source.garment.name);
             let (found, milliseconds, embedding_known) = self.know(draper, &source)?;
@@ -156,9 +156,8 @@ impl KnownGarments {
             pieces.push(Piece { name, source, worn, rest, embedding_known, milliseconds });
             known.push(found);
         }
-        let pairs = OutfitTensors::all_pairs(known.len());
-        let contacts: Vec<(usize, usize)> =
-            pairs.into_iter().filter(|&(a, b)| near(&pieces[a], &pieces[b])).collect();
+        let worn: Vec<Arc<LibraryGarment>> = known.iter().map(|k| k.worn.clone()).collect();
+        let contacts = contacts(draper.trained.config.model.graph, &worn);
         let tensors: Vec<&GarmentTensors> = known.iter().map(|k| &k.tensors).collect();
         let tensors = OutfitTensors::new(&tensors, &contacts)?;
         let embeddings: Vec<GarmentEmbedding> = known.iter().map(|k| k.embedding.clone()).collect();
@@ -262,8 +261,4 @@ fn kept(stored: Result<(), clothcombo_data::cache::CacheError>) {
     if let Err(error) = stored {
         tracing::warn!("{error}");
     }
-}
-
-fn near(a: &Piece, b: &Piece) -> bool {
-    crate::scene::can_touch(&a.worn, &b.worn)
 }

@@ -28,7 +28,7 @@ pub struct SceneScore {
     pub total: f64,
     /// Garment vertices inside the body, by closest surface point.
     pub penetration: Penetration,
-    /// Wrong-side vertices over all pairs of layers that can touch.
+    /// Wrong-side vertices over all pairs of layers that interact.
     pub order: OrderViolations,
 }
 

@@ -179,7 +179,7 @@ impl Work<'_> {
             }
             bodies.extend(worn);
         }
-        let depends = self.trains != Trains::Untangling || outfit.has_contacts();
+        let depends = self.trains != Trains::Untangling || untangler.untangling.acts_on(&outfit);
         let loss = losses.into_iter().reduce(|a, b| a + b).filter(|_| depends);
         Ok(Losses { loss, mean, bodies })
     }

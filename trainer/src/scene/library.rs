@@ -10,6 +10,7 @@ use clothcombo_data::asset::{BODY_JOINT_COUNT, Body, BodyFileSettings, Provenanc
 use clothcombo_data::cache::{Key, KeyBuilder, body_key};
 use clothcombo_data::format::npz::NpzFile;
 use clothcombo_data::generate::mannequin;
+use clothcombo_model::Graph;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
@@ -25,6 +26,8 @@ pub struct Library {
     pub split: GarmentSplit,
     /// Poses.
     pub poses: PoseLibrary,
+    /// Which garments of a scene have layer losses with each other (`model.graph`).
+    pub graph: Graph,
     /// Memory for garments of a streamed wardrobe, on the host and again on the device [bytes].
     pub memory_limit: usize,
     /// Shape components drawn.
@@ -113,6 +116,7 @@ impl Library {
             wardrobe,
             split,
             poses,
+            graph: config.model.graph,
             memory_limit: config.data.memory_limit(),
             shape_count,
             shape_range: config.data.shape_range,

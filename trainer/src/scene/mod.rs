@@ -27,7 +27,7 @@ pub use library::{Library, LicenceLine, is_fingerprint, load_body};
 pub use origin::{Maker, Origin};
 pub use poses::{PoseLibrary, SelfIntersecting, Unseen};
 pub use prefetch::{Prefetch, prepare_step};
-pub use prepare::{Dresser, PreparedBody, PreparedScene, can_touch, prepare};
+pub use prepare::{Dresser, PreparedBody, PreparedScene, contacts, prepare};
 pub use recent::Recent;
 pub use recipe::Recipe;
 pub use skinning::skinning_transforms;

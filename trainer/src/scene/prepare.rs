@@ -9,6 +9,7 @@ use super::skinning::skinning_transforms;
 use crate::config::LossesConfig;
 use crate::objective::scene_weights;
 use clothcombo_data::asset::{Body, Pose};
+use clothcombo_model::{Graph, OutfitTensors};
 use clothcombo_physics::energy::{EnergySettings, SceneEnergy, SceneGarment, SceneLayers};
 use clothcombo_physics::query::Surface;
 use clothcombo_physics::transform::Transform;
@@ -34,7 +35,7 @@ pub struct PreparedScene {
     pub draw: SceneDraw,
     /// The garments themselves.
     pub worn: Vec<Arc<LibraryGarment>>,
-    /// Pairs (inner, outer) of positions in `worn` that can touch.
+    /// Pairs (inner, outer) of positions in `worn` that interact: those of [`contacts`].
     pub contacts: Vec<(usize, usize)>,
     /// Bodies.
     pub bodies: Vec<PreparedBody>,
@@ -66,7 +67,7 @@ impl PreparedScene {
     }
 }
 
-/// Two garments whose rest bounding boxes are farther apart than this never interact [m].
+/// Two garments whose rest bounding boxes are farther apart than this are not near [m].
 const CONTACT_MARGIN: f64 = 0.05;
 
 /// Prepares `draw`; loss weights are taken at `run_progress`.
@@ -86,6 +87,7 @@ pub fn prepare(
         joints: library.joints(),
         features: &|pose, joints| library.poses.features(pose, joints),
         losses,
+        graph: library.graph,
     };
     Ok(dresser.dress(draw, garments, run_progress))
 }
@@ -100,6 +102,8 @@ pub struct Dresser<'a> {
     pub features: &'a (dyn Fn(&Pose, &[usize]) -> Vec<f32> + Sync),
     /// The losses.
     pub losses: &'a LossesConfig,
+    /// Which garments have layer losses with each other.
+    pub graph: Graph,
 }
 
 impl Dresser<'_> {
@@ -108,7 +112,7 @@ impl Dresser<'_> {
     /// # Panics
     /// If a shape or pose is longer than the body allows.
     pub fn dress(&self, draw: SceneDraw, worn: Vec<Arc<LibraryGarment>>, run_progress: f64) -> PreparedScene {
-        let contacts = contacts(&worn);
+        let contacts = contacts(self.graph, &worn);
         let settings =
             EnergySettings { repulsion_sample: draw.repulsion_sample, ..self.losses.energy_settings() };
         let bodies = draw
@@ -172,14 +176,20 @@ impl Dresser<'_> {
     }
 }
 
-/// Pairs of garments that can touch.
-fn contacts(garments: &[Arc<LibraryGarment>]) -> Vec<(usize, usize)> {
-    let pairs = (0..garments.len()).flat_map(|i| (i + 1..garments.len()).map(move |j| (i, j)));
-    pairs.filter(|&(i, j)| can_touch(&garments[i], &garments[j])).collect()
+/// Pairs (inner, outer) of `garments`, inner → outer, that interact: all in the full graph, else those whose rest boxes are near
+/// enough for them ever to touch.
+pub fn contacts(graph: Graph, garments: &[Arc<LibraryGarment>]) -> Vec<(usize, usize)> {
+    let mut pairs = OutfitTensors::all_pairs(garments.len());
+    if graph == Graph::Near {
+        pairs.retain(|&(i, j)| are_near(&garments[i], &garments[j]));
+    }
+    pairs
 }
 
-/// Whether the rest boxes of two garments are near enough for them ever to touch.
-pub fn can_touch(a: &LibraryGarment, b: &LibraryGarment) -> bool {
+fn are_near(a: &LibraryGarment, b: &LibraryGarment) -> bool {
     let [(a_low, a_high), (b_low, b_high)] = [a, b].map(|g| g.garment.rest.bounds());
     (0..3).all(|k| a_low[k] - CONTACT_MARGIN <= b_high[k] && b_low[k] - CONTACT_MARGIN <= a_high[k])
 }
+
+#[cfg(test)]
+mod tests;
