@@ -2,10 +2,12 @@
 """Training and draping beside the same networks and losses in PyTorch, on the same cores: Markdown tables and JSON.
 
 Called by scripts/bench_vs_torch.sh. For every case `clothcombo bench step` writes out a scene and its networks; PyTorch
-(torch_networks.py, torch_losses.py) loads both, and its positions, loss and gradient norm must agree with ours before
-anything is timed. Then both sides run in turn with the same number of threads; medians over all rounds are printed.
+(torch_networks.py, torch_losses.py) loads both, and its positions, loss and gradient norm of every network must agree with
+ours before anything is timed. Then both sides run in turn with the same number of threads; medians over all rounds are
+printed. A run with switches that are not implemented here is refused, and they are named.
 
     python3 scripts/bench_torch.py --ours target/release/clothcombo --widths 128 --layers 1,3
+    python3 scripts/bench_torch.py --config configs/paper.toml --stage 1 --set model.width=64 --check
 
 forward             all networks without gradients, the garments' embedding included
 forward + backward  the same with autodiff, from a fixed gradient at the positions
@@ -31,6 +33,17 @@ import torch
 import torch_losses as losses
 from torch_networks import ClothCombo, read_safetensors
 
+# Networks by the names of ours, and what their parameters are called in torch_networks.py.
+NETWORKS = {
+    "garment_encoder": ["encoder"], "draping": ["embedding", "displacement"], "skinning": ["skinning"],
+    "untangling": ["force", "untangling"], "corrections": [],
+}
+# What the networks and losses here heed of `model` and `settings`.
+MODEL = {
+    "width", "embedding", "diffusion_blocks", "diffusion_width", "eigen_count", "mlp_layers", "siren_layers", "siren_width",
+    "omega_first", "omega_hidden", "skinning_layers", "skinning_width", "displacement_scale", "untangling_scale",
+    "skinning_scale", "zero_sum_skinning", "vertex_embedding", "corrections", "correction_width",
+}
 torch.sparse.check_sparse_tensor_invariants.disable()  # said explicitly, which silences a warning
 PARTS = {
     "forward": "forward_ms",
@@ -76,12 +89,30 @@ class Outfit:
         self.touched[self.edges[0]] = 1
 
 
+def not_implemented(about):
+    """Switches of an exported run that this script would ignore. One that it has never heard of must be off."""
+    model, settings = about["model"], about["settings"]
+    found = [f"model.{key} = {value}" for key, value in model.items() if key not in MODEL and value]
+    found += [f"{key} = {value}" for key, value in settings.items() if key not in losses.SETTINGS | {"distance": 0} and value]
+    if about["trains"] not in ("single", "all"):
+        found.append(f"stages.trains = {about['trains']}")
+    if not model["vertex_embedding"]:
+        found.append("model.vertex_embedding = false")
+    if settings["distance"] != "nearest_vertex":
+        found.append(f"losses.body_collision.distance = {settings['distance']}")
+    weights = [part["weights"] for part in about["garments"] + about["layers"]]
+    terms = {term for part in weights for term in part} - set(losses.GARMENT_TERMS + losses.LAYER_TERMS)
+    return found + [f"losses.{term}" for term in sorted(terms)]
+
+
 class Scene:
     """Networks, losses and optimiser of one exported case."""
 
     def __init__(self, folder):
         with open(f"{folder}/scene.json") as file:
             self.about = json.load(file)
+        if unknown := not_implemented(self.about):
+            raise SystemExit("the PyTorch side does not implement " + ", ".join(unknown))
         arrays = self.arrays = np.load(f"{folder}/scene.npz")
         self.outfit = Outfit(arrays, self.about)
         self.model = ClothCombo(read_safetensors(f"{folder}/model.safetensors"), self.about["model"])
@@ -100,7 +131,7 @@ class Scene:
         count = sum(self.sizes)
         self.pull = ((torch.arange(3 * count) * 37 % 101) / 50 - 1).reshape(count, 3)
 
-    def loss(self, posed, canonical):
+    def loss(self, posed, canonical, layers=True):
         x, y = posed.split(self.sizes), canonical.split(self.sizes)
         total = posed.new_zeros(())
         for i, garment in enumerate(self.garments):
@@ -108,7 +139,7 @@ class Scene:
             for term, weight in about["weights"].items():
                 if term in losses.GARMENT_TERMS and (term != "holding" or about["held"]):
                     total = total + weight * garment.term(term, x[i], y[i], self.body)
-        for pair in self.about["layers"]:
+        for pair in self.about["layers"] if layers else []:
             inner, outer, weights = pair["inner"], pair["outer"], pair["weights"]
             if "layer_collision" in weights:
                 total = total + weights["layer_collision"] * losses.layer_collision(self.garments[inner], x[inner], x[outer])
@@ -116,6 +147,14 @@ class Scene:
                 radius = self.about["settings"]["layer_radius"]
                 total = total + weights["layer_distance"] * losses.layer_distance(self.body, x[inner], x[outer], radius)
         return total
+
+    def objective(self):
+        """What a step minimises."""
+        alone = self.about["alone"]
+        if not alone:
+            return self.loss(*self.model(self.outfit))
+        posed, canonical, *single = self.model(self.outfit, alone=True)
+        return self.loss(posed, canonical) + alone * self.loss(*single, layers=False)
 
     def forward(self):
         with torch.no_grad():
@@ -128,14 +167,14 @@ class Scene:
 
     def gradients(self):
         self.optimizer.zero_grad()
-        loss = self.loss(*self.model(self.outfit))
+        loss = self.objective()
         loss.backward()
         return loss.item()
 
     def step(self, scenes=1):
         self.optimizer.zero_grad()
         for _ in range(scenes):
-            loss = self.loss(*self.model(self.outfit)) / scenes
+            loss = self.objective() / scenes
             loss.backward()
         norm = torch.nn.utils.clip_grad_norm_(self.model.parameters(), self.clip_norm)
         self.optimizer.step()
@@ -146,7 +185,7 @@ class Scene:
         self.loss(posed, canonical).backward()
 
     def check(self):
-        """Stops unless positions, loss and gradient norm are ours."""
+        """Stops unless positions, loss and the gradient norm of every network are ours."""
         losses.set_exact(True)
         self.positions = posed, canonical = self.forward()
         expected = self.about["expected"]
@@ -155,15 +194,20 @@ class Scene:
             difference = float(np.abs(found.numpy() - self.arrays[f"expected.{name}"]).max())
             if not difference < 1e-5:
                 wrong.append(f"{name} positions differ by {difference:.2g} m")
-        loss = self.gradients()
-        norm = sum(float(p.grad.double().square().sum()) for p in self.model.parameters() if p.grad is not None) ** 0.5
-        for name, found in [("loss", loss), ("gradient_norm", norm)]:
-            if not abs(found - expected[name]) <= 1e-3 * abs(expected[name]):
-                wrong.append(f"{name}: PyTorch has {found:.8g}, ours is {expected[name]:.8g}")
+        compared = [("loss", self.gradients(), expected["loss"])]
+        compared += [(f"gradient of {name}", self.norm(NETWORKS[name]), norm) for name, norm in expected["gradient_norms"].items()]
+        for name, found, ours in compared:
+            if not abs(found - ours) <= 1e-3 * abs(ours):
+                wrong.append(f"{name}: PyTorch has {found:.8g}, ours is {ours:.8g}")
         losses.set_exact(False)
         if wrong:
             raise SystemExit("\n".join(wrong))
-        return {"loss": abs(loss / expected["loss"] - 1), "gradient norm": abs(norm / expected["gradient_norm"] - 1)}
+        return {name: abs(found / ours - 1) for name, found, ours in compared if ours}
+
+    def norm(self, modules):
+        """Gradient norm of some modules."""
+        parameters = [p for module in modules for p in getattr(self.model, module).parameters() if p.grad is not None]
+        return sum(float(p.grad.double().square().sum()) for p in parameters) ** 0.5
 
     def times(self, seconds):
         found = {name: median_ms(run, seconds) for name, run in [
@@ -196,9 +240,12 @@ def peak_mib(folder):
         return next(int(line.split()[1]) / 1024 for line in file if line.startswith("VmHWM:"))
 
 
-def ours(options, width, layers, folder=None):
+def ours(options, case, folder=None):
     command = [options.ours, "bench", "step", "--json", "--steps", "3", "--seconds", str(options.seconds)]
-    command += ["--accumulate", "2", "--widths", str(width), "--layers", str(layers), "--vertices", str(options.vertices)]
+    # Clipped once a step, as PyTorch's users do.
+    command += ["--accumulate", "2", "--set", "optimizer.clip=step", *case]
+    for setting in options.set:
+        command += ["--set", setting]
     if folder:
         command += ["--export", folder]
     environment = dict(os.environ, RAYON_NUM_THREADS=str(options.threads))
@@ -206,14 +253,21 @@ def ours(options, width, layers, folder=None):
     return json.loads(output)["cases"][0]
 
 
-def compare(options, width, layers):
+def compare(options, case):
     with tempfile.TemporaryDirectory() as folder:
-        mine = [ours(options, width, layers, folder)]
+        mine = [ours(options, case, folder)]
         scene = Scene(folder)
         agreement = scene.check()
+        about = {
+            "width": scene.about["model"]["width"], "layers": len(scene.about["garments"]), "vertices": mine[0]["vertices"],
+            "parameters": mine[0]["parameters"], "agreement": agreement,
+        }
+        print(f"width {about['width']}, M = {about['layers']}: agreement {agreement}", file=sys.stderr)
+        if options.check:
+            return about
         theirs = [scene.times(options.seconds)]
         for _ in range(1, options.rounds):
-            mine.append(ours(options, width, layers))
+            mine.append(ours(options, case))
             theirs.append(scene.times(options.seconds))
         command = [sys.executable, __file__, "--peak-of", folder, "--threads", str(options.threads)]
         peak = float(subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout)
@@ -223,8 +277,7 @@ def compare(options, width, layers):
         for name, key in PARTS.items()
     }
     return {
-        "width": width, "layers": layers, "vertices": mine[0]["vertices"], "parameters": mine[0]["parameters"],
-        "rounds": options.rounds, "agreement": agreement, "parts": parts,
+        **about, "rounds": options.rounds, "parts": parts,
         "peak_mib": {"ours": middle([m["costs"]["peak_mib"] for m in mine]), "torch": peak},
     }
 
@@ -254,6 +307,10 @@ def main():
     parser.add_argument("--widths", type=numbers, default=numbers("64,128,512"))
     parser.add_argument("--layers", type=numbers, default=numbers("1,3,6"))
     parser.add_argument("--vertices", type=int, default=2000, help="per garment, about")
+    parser.add_argument("--config", help="a stage of this configuration instead of made-up cases")
+    parser.add_argument("--stage", default="0", help="with --config: which one, from 0")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="overrides one value; repeatable")
+    parser.add_argument("--check", action="store_true", help="only compare positions, loss and gradients")
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--rounds", type=int, default=2)
     parser.add_argument("--seconds", type=float, default=1.0, help="per measurement and round")
@@ -263,14 +320,18 @@ def main():
     torch.set_num_threads(options.threads)
     if options.peak_of:
         return print(peak_mib(options.peak_of))
+    made_up = [
+        ["--widths", str(width), "--layers", str(layers), "--vertices", str(options.vertices)]
+        for width in options.widths for layers in options.layers
+    ]
     cases = []
-    for width in options.widths:
-        for layers in options.layers:
-            cases.append(compare(options, width, layers))
-            print(f"width {width}, M = {layers}: agreement {cases[-1]['agreement']}", file=sys.stderr)
-            if options.json:
-                with open(options.json, "a") as file:
-                    file.write(json.dumps(cases[-1]) + "\n")
+    for case in [["--config", options.config, "--stage", options.stage]] if options.config else made_up:
+        cases.append(compare(options, case))
+        if options.json:
+            with open(options.json, "a") as file:
+                file.write(json.dumps(cases[-1]) + "\n")
+    if options.check:
+        return
     print(f"PyTorch {torch.__version__}, {options.threads} threads, ours / PyTorch [ms]\n")
     print_tables(cases)
 

@@ -13,7 +13,7 @@ import torch
 SETTINGS = {
     "thickness": 4.7e-4, "density": 426.0, "mu": 2.36e4, "lambda": 4.44e4, "bending_stiffness": 3.96e-5, "gravity": 9.81,
     "radius": 0.1, "body_epsilon": 0.002, "layer_epsilon": 0.002, "layer_radius": 0.1, "holding_fraction": 0.1,
-    "gate_depth": 0.05, "gate_edges": 0.75,
+    "gate_depth": 0.05, "gate_edges": 0.75, "repulsion_per_vertex": True,
 }
 GARMENT_TERMS = ["strain", "bending", "gravity", "body_collision", "repulsion", "holding"]
 LAYER_TERMS = ["layer_collision", "layer_distance"]
@@ -114,7 +114,8 @@ class Garment:
     def repulsion(self, x):
         distance = torch.cdist(x, x, compute_mode=_mode)
         close = (distance < self.settings["radius"]) & self.apart
-        return -torch.log(torch.where(close, distance, torch.ones(())) ** 2).sum() / (2 * self.count)
+        pairs = -torch.log(torch.where(close, distance, torch.ones(())) ** 2).sum() / 2
+        return pairs / self.count if self.settings["repulsion_per_vertex"] else pairs
 
     def holding(self, y):
         return ((y[self.held, 1] - self.reference[self.held, 1]) ** 2).sum()

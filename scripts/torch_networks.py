@@ -156,8 +156,8 @@ class ClothCombo(nn.Module):
         mean = [(garment.mass[:, None] * z).sum(0) / garment.mass.sum() for garment, z in zip(outfit.garments, vertex)]
         return torch.cat(vertex), torch.stack(mean)
 
-    def forward(self, outfit, embeddings=None):
-        """Posed and canonical positions [ΣV,3]."""
+    def forward(self, outfit, embeddings=None, alone=False):
+        """Posed and canonical positions [ΣV,3]; with `alone` also those of every garment draped alone."""
         vertex, garment = self.encode(outfit) if embeddings is None else embeddings
         config, of = self.config, outfit.of_vertex
         body = torch.cat([outfit.shape, outfit.pose])[None].expand(len(garment), -1)
@@ -172,8 +172,9 @@ class ClothCombo(nn.Module):
             raw = raw - mask * raw.sum(1, keepdim=True) / mask.sum(1, keepdim=True)
         transforms = torch.einsum("vj,jab->vab", outfit.weights + config["skinning_scale"] * raw, outfit.bones)
         pose = lambda x: torch.einsum("vab,vb->va", transforms[:, :, :3], x) + transforms[:, :, 3]
+        single = (pose(canonical), canonical) if alone or not outfit.contacts else ()
         if not outfit.contacts:
-            return pose(canonical), canonical
+            return single + single if alone else single
         i, j = outfit.edges
         forces = self.force(torch.cat([draping[i], draping[j]], dim=1))
         below, above = torch.zeros_like(draping), torch.zeros_like(draping)
@@ -181,4 +182,4 @@ class ClothCombo(nn.Module):
         above = above.index_add(0, i[j > i], forces[j > i])
         latent = torch.cat([torch.cat([below, above, draping], dim=1)[of], vertex], dim=1)
         moved = self.untangling(canonical, latent) * config["untangling_scale"] * outfit.touched[of]
-        return pose(canonical + moved), canonical + moved
+        return (pose(canonical + moved), canonical + moved) + single

@@ -6,23 +6,29 @@ use burn::tensor::{Tensor, TensorData};
 
 use crate::ops::{scale_by, squared_norm};
 
-/// Scales all gradients of `module` so that their joint Euclidean norm is at most `max_norm`, and returns the norm before
-/// as a tensor `[1]`, which nobody has to wait for. `None` if no parameter has a gradient.
+/// Scales all gradients of `module` so that their joint Euclidean norm is at most `max_norm` (`None`: leaves them), then by
+/// `share`, their weight in a mean of several. Returns the norm before as a tensor `[1]`, which nobody has to wait for; `None`
+/// if no parameter has a gradient.
 ///
 /// burn's own clipping treats each tensor on its own; this is the norm over all parameters, as in the paper.
 pub fn clip_global_norm<M: Module>(
     module: &M,
     gradients: &mut GradientsParams,
-    max_norm: f64,
+    max_norm: Option<f64>,
+    share: f64,
 ) -> Option<Tensor<1>> {
     let norm = global_norm(module, gradients)?;
-    let factor = (norm.clone().add_scalar(1e-6).recip() * max_norm).clamp_max(1.0);
-    module.visit(&mut Scale { gradients, factor });
+    let clip = match max_norm {
+        Some(most) => (norm.clone().add_scalar(1e-6).recip() * most).clamp_max(1.0),
+        None => norm.ones_like(),
+    };
+    // A share of 1 changes no bit.
+    module.visit(&mut Scale { gradients, factor: clip * share });
     Some(norm)
 }
 
 /// Euclidean norm `[1]` of all gradients of `module`, `None` if there is none.
-pub fn global_norm<M: Module>(module: &M, gradients: &GradientsParams) -> Option<Tensor<1>> {
+fn global_norm<M: Module>(module: &M, gradients: &GradientsParams) -> Option<Tensor<1>> {
     let mut squares = SquaredNorms { gradients, parts: Vec::new() };
     module.visit(&mut squares);
     (!squares.parts.is_empty()).then(|| Tensor::cat(squares.parts, 0).sum().sqrt())
@@ -130,16 +136,18 @@ mod tests {
     #[test]
     fn clipping_scales_all_gradients_by_their_joint_norm() {
         let layer = seeded(1, |start| Linear::new(300, 200, start));
-        for (scale, clipped) in [(50.0, true), (1e-6, false)] {
+        for (scale, max_norm, share) in
+            [(50.0, Some(1.0), 1.0), (50.0, Some(2.0), 0.25), (1e-6, Some(1.0), 0.5), (50.0, None, 0.5)]
+        {
             let input = uniform(40, 300, 2.0, 1, &layer.weight.val().device());
             let loss = (layer.forward(input) * scale).square().sum();
             let mut gradients = GradientsParams::from_grads(loss.backward(), &layer);
             let before = squares(&layer, &gradients).sqrt();
-            let norm = clip_global_norm(&layer, &mut gradients, 1.0).expect("gradients");
+            let norm = clip_global_norm(&layer, &mut gradients, max_norm, share).expect("gradients");
             let norm = f64::from(norm.into_scalar::<f32>());
             assert!((norm - before).abs() < 1e-5 * before, "{norm} {before}");
             let after = squares(&layer, &gradients).sqrt();
-            let expected = if clipped { 1.0 } else { before };
+            let expected = share * max_norm.map_or(before, |most| before.min(most));
             assert!((after - expected).abs() < 1e-4 * expected, "{after} {expected}");
         }
     }
@@ -147,7 +155,7 @@ mod tests {
     #[test]
     fn no_gradient_has_no_norm() {
         let layer = seeded(2, |start| Linear::new(3, 2, start));
-        assert!(clip_global_norm(&layer, &mut GradientsParams::new(), 1.0).is_none());
+        assert!(clip_global_norm(&layer, &mut GradientsParams::new(), Some(1.0), 1.0).is_none());
     }
 
     #[test]

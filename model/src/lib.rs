@@ -41,7 +41,7 @@ pub use correction::Correction;
 pub use draping::Draping;
 pub use error::ModelError;
 pub use garment_encoder::{GarmentEmbedding, GarmentEncoder};
-pub use gradient::{clip_global_norm, global_norm, gradient_bucket, gradients_of_bucket};
+pub use gradient::{clip_global_norm, gradient_bucket, gradients_of_bucket};
 pub use initializer::Initializer;
 pub use linear::Linear;
 pub use linear_blend_skinning::linear_blend_skinning;

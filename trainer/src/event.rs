@@ -28,7 +28,8 @@ pub struct StepRecord {
     pub raw: BTreeMap<&'static str, f64>,
     /// The same, times their weights.
     pub weighted: BTreeMap<&'static str, f64>,
-    /// Global norm of the gradient before clipping.
+    /// Global norm of the gradient before clipping: with `optimizer.clip = "scene"` the largest of the scenes', with `"step"`
+    /// that of their mean.
     pub grad_norm: f64,
     /// Adam's step size.
     pub lr: f64,
@@ -45,6 +46,9 @@ pub struct StepRecord {
     /// Whether loss or gradient was not finite and the parameters were left alone.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub skipped: bool,
+    /// Whether the gradient norm was far above the usual one ([`Verdict::Spike`](crate::guard::Verdict::Spike)).
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub spike: bool,
 }
 
 impl StepRecord {

@@ -86,7 +86,7 @@ pub struct Incident {
     pub injected: Option<Injected>,
     /// Weighted loss.
     pub loss: Exact,
-    /// Global gradient norm before clipping.
+    /// Global gradient norm before clipping, as in the log of the run.
     pub gradient_norm: Exact,
     /// The scenes of the step.
     pub scenes: Vec<IncidentScene>,

@@ -198,6 +198,10 @@ impl RunDir {
     pub fn validation(&self) -> PathBuf {
         self.root.join("validation.jsonl")
     }
+    /// What happened besides the steps: stages, spikes of the gradient, skipped steps, checkpoints.
+    pub fn log(&self) -> PathBuf {
+        self.root.join("log.txt")
+    }
     /// Loss curves.
     pub fn curves(&self) -> PathBuf {
         self.root.join("curves.png")

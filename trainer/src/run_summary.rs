@@ -35,6 +35,8 @@ pub struct RunSummary {
     pub seconds_per_step: Option<f64>,
     /// Steps skipped because loss or gradient was not finite.
     pub skipped: u64,
+    /// Steps whose gradient norm was far above the usual one.
+    pub spikes: u64,
     /// Step of the best validation.
     pub best_step: Option<u64>,
     /// Score of the best validation: mean total loss of the networks, mean over the groups.
@@ -139,6 +141,7 @@ impl RunSummary {
             loss: None,
             seconds_per_step: None,
             skipped: 0,
+            spikes: 0,
             best_step: None,
             best_score: None,
             strain_ratio: None,
@@ -156,6 +159,7 @@ impl RunSummary {
             self.step = step;
             self.stage = line["stage"].as_str().unwrap_or_default().to_owned();
             self.skipped += u64::from(line["skipped"].as_bool() == Some(true));
+            self.spikes += u64::from(line["spike"].as_bool() == Some(true));
             losses.extend(line["loss"].as_f64());
             times.extend(line["seconds"].as_f64());
         }

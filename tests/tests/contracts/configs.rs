@@ -73,7 +73,12 @@ fn the_configuration_of_the_paper_has_the_papers_values() {
     assert_eq!((losses.reference_vertices, losses.body_collision.epsilon), (0.0, 0.002));
     // The weight of 0.001 belongs to the sum over N: see the comment in the file.
     assert!(losses.repulsion.per_vertex && losses.repulsion.subset == 0 && losses.repulsion.radius == 0.1);
-    assert!(losses.holding.fraction == 0.1 && !losses.holding.relative);
+    assert!(
+        losses.holding.fraction == 0.1
+            && !losses.holding.relative
+            && !losses.holding.posed
+            && losses.strain.needle_ratio == 0.0
+    );
     assert!(losses.layer_collision.epsilon == 0.002 && !losses.layer_collision.gated);
     assert_eq!(losses.layer_distance.radius, 0.1);
     let material = &losses.material;

@@ -2,6 +2,7 @@
 
 mod alone;
 mod checkpoint;
+mod clipping;
 mod config_fuzz;
 mod configs;
 mod corrections;

@@ -1,7 +1,7 @@
 //! `clothcombo config`: what a configuration may say, and what one comes to.
 
 use crate::cli::train::load_under_bar;
-use crate::config::{Config, StageConfig, Trains, load, schema};
+use crate::config::{ClipScope, Config, StageConfig, Trains, load, schema};
 use crate::device::Backend;
 use crate::estimate::{StageTime, time_stages};
 use crate::report::duration;
@@ -87,10 +87,14 @@ fn print_plan(config: &Config) {
     println!("  {:<16} {}", "garments alone", config.losses.alone);
     let o = &config.optimizer;
     println!(
-        "\nAdam {} {} · gradient norm clipped at {} · average of the weights {}",
+        "\nAdam {} {} · gradient norm {} · average of the weights {}",
         o.beta_1,
         o.beta_2,
-        o.clip_norm,
+        match (o.max_norm(), o.clip) {
+            (None, _) => "not clipped".into(),
+            (Some(most), ClipScope::Scene) => format!("of every scene clipped at {most}"),
+            (Some(most), ClipScope::Step) => format!("of the mean over the scenes clipped at {most}"),
+        },
         if o.ema_decay > 0.0 { format!("with decay {}", o.ema_decay) } else { "none".into() }
     );
 }

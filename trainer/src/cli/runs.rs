@@ -57,7 +57,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     }
     let width = runs.iter().map(|r| r.name().chars().count()).max().unwrap_or(0).clamp(3, 32);
     println!(
-        "{:<width$} {:<10} {:>17} {:<18} {:>9} {:>8} {:>9} {:>9} {:>8} {:>8} {:>8} {:>7} {:>10}",
+        "{:<width$} {:<10} {:>17} {:<18} {:>9} {:>8} {:>9} {:>9} {:>8} {:>8} {:>8} {:>7} {:>6} {:>10}",
         "run",
         "state",
         "step",
@@ -70,6 +70,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         "inside %",
         "wrong %",
         "skipped",
+        "spikes",
         "checkpoint"
     );
     for run in &runs {
@@ -91,7 +92,7 @@ fn row(r: &RunSummary, width: usize) -> String {
     let percent = |v: Option<f64>| or_dash(v.map(|v| format!("{:.2}", 100.0 * v)));
     let step = |v: Option<u64>| or_dash(v.map(|v| v.to_string()));
     format!(
-        "{:<width$} {:<10} {:>17} {:<18} {:>9} {:>8} {:>9} {:>9} {:>8} {:>8} {:>8} {:>7} {:>10}",
+        "{:<width$} {:<10} {:>17} {:<18} {:>9} {:>8} {:>9} {:>9} {:>8} {:>8} {:>8} {:>7} {:>6} {:>10}",
         r.name,
         r.state,
         format!("{}/{}", r.step, r.total_steps),
@@ -104,6 +105,7 @@ fn row(r: &RunSummary, width: usize) -> String {
         percent(r.inside),
         percent(r.wrong_side),
         r.skipped,
+        r.spikes,
         step(r.checkpoint)
     )
 }

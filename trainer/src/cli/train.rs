@@ -8,7 +8,7 @@ use crate::device::Backend;
 use crate::event::Observer;
 use crate::memory::MemoryEstimate;
 use crate::observer::{
-    CurvesObserver, History, HistoryObserver, MetricsObserver, ProgressObserver, ReportObserver,
+    CurvesObserver, History, HistoryObserver, LogObserver, MetricsObserver, ProgressObserver, ReportObserver,
     TensorBoardObserver,
 };
 use crate::report::gibibytes;
@@ -242,15 +242,16 @@ fn observers(
     let report = ReportObserver::new(run, config, library.licences(), memory, history.clone())?;
     let mut observers: Vec<Box<dyn Observer>> = vec![
         Box::new(metrics),
+        Box::new(LogObserver::new(run)?),
         Box::new(HistoryObserver(history.clone())),
-        Box::new(CurvesObserver::new(run, config, history)),
+        Box::new(CurvesObserver::new(run, config, history.clone())),
     ];
     if config.output.tensorboard {
         observers.push(Box::new(TensorBoardObserver::new(run, step, config.output.metrics_every)?));
     }
     observers.push(Box::new(report));
     if !is_quiet() {
-        observers.push(Box::new(ProgressObserver::default()));
+        observers.push(Box::new(ProgressObserver::new(run, history)));
     }
     Ok(observers)
 }

@@ -1,8 +1,11 @@
 //! Reading a configuration: file, then `--set` overrides, then consistency; errors show the place.
 
 use super::Config;
+use super::sources::{Place, Sources};
 use miette::{Diagnostic, NamedSource, SourceSpan};
+use serde::Deserialize;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use thiserror::Error;
 
 /// Why a configuration cannot be used.
@@ -27,21 +30,25 @@ pub enum ConfigError {
         message: String,
         /// The file's text.
         #[source_code]
-        source_code: NamedSource<String>,
+        source_code: Arc<NamedSource<String>>,
         /// Where.
         #[label("here")]
         span: Option<SourceSpan>,
     },
     /// A configuration that extends another cannot be put together.
-    #[error("{}: {reason}", path.display())]
+    #[error("{}: {reason}", source_code.name())]
     #[diagnostic(help(
         "extends = \"base.toml\" names another configuration, relative to the folder of this one"
     ))]
     BadBase {
-        /// The file that extends another.
-        path: PathBuf,
         /// What is wrong.
         reason: String,
+        /// The text of the file that extends another.
+        #[source_code]
+        source_code: Arc<NamedSource<String>>,
+        /// Where.
+        #[label("here")]
+        span: Option<SourceSpan>,
     },
     /// An override is not valid.
     #[error("--set {setting}: {message}")]
@@ -55,10 +62,8 @@ pub enum ConfigError {
         message: String,
     },
     /// Values contradict each other.
-    #[error("{place} {what} ({})", path.display())]
+    #[error("{place} {what} ({})", source_code.name())]
     Inconsistent {
-        /// The file.
-        path: PathBuf,
         /// The key.
         place: String,
         /// What is wrong.
@@ -66,6 +71,12 @@ pub enum ConfigError {
         /// How to mend it.
         #[help]
         hint: String,
+        /// The text of the file with the value.
+        #[source_code]
+        source_code: Arc<NamedSource<String>>,
+        /// Where; `None` if an override is at fault.
+        #[label("here")]
+        span: Option<SourceSpan>,
     },
 }
 
@@ -84,17 +95,10 @@ pub fn load(path: &Path, overrides: &[String]) -> Result<Config, ConfigError> {
 /// # Errors
 /// As [`load`].
 pub fn parse(text: &str, path: &Path, overrides: &[String]) -> Result<Config, ConfigError> {
-    let invalid = |error: toml::de::Error| ConfigError::Invalid {
-        message: error.message().to_owned(),
-        span: error.span().map(SourceSpan::from),
-        source_code: NamedSource::new(path.display().to_string(), text.to_owned()).with_language("toml"),
-    };
-    let own: toml::Table = toml::from_str(text).map_err(invalid)?;
-    let mut config: Config = match own.contains_key(EXTENDS) {
-        // From the text itself, so that errors show their place.
-        false => toml::from_str(text).map_err(invalid)?,
-        true => extended(own, path, 0)?.try_into().map_err(invalid)?,
-    };
+    let sources = Sources::read(text, path)?;
+    let tree = toml::de::Deserializer::from(sources.tree()?);
+    let mut config = Config::deserialize(tree).map_err(|error| sources.invalid(&error))?;
+    let of_the_files = config.problem();
     if !overrides.is_empty() {
         let mut tree: toml::Value = toml::Value::try_from(&config)
             .map_err(|e| ConfigError::BadOverride { setting: String::new(), message: e.to_string() })?;
@@ -106,46 +110,12 @@ pub fn parse(text: &str, path: &Path, overrides: &[String]) -> Result<Config, Co
     }
     match config.problem() {
         None => Ok(config),
-        Some((place, what, hint)) => {
-            Err(ConfigError::Inconsistent { path: path.to_owned(), place, what, hint })
-        }
-    }
-}
-
-/// Key that names the configuration another one starts from: tables are merged, everything else replaces.
-pub(super) const EXTENDS: &str = "extends";
-/// Longer chains of configurations are taken for a circle.
-const LONGEST_CHAIN: usize = 8;
-
-/// `own`, read from `path`, over the configuration it extends.
-fn extended(mut own: toml::Table, path: &Path, depth: usize) -> Result<toml::Table, ConfigError> {
-    let bad = |reason: String| ConfigError::BadBase { path: path.to_owned(), reason };
-    let name = match own.remove(EXTENDS) {
-        None => return Ok(own),
-        Some(toml::Value::String(name)) => name,
-        Some(other) => return Err(bad(format!("{EXTENDS} is {other}, not the name of a file"))),
-    };
-    if depth == LONGEST_CHAIN {
-        return Err(bad(format!(
-            "extends {name}, the last of {LONGEST_CHAIN} in a row: do they extend each other?"
-        )));
-    }
-    let file = path.parent().unwrap_or(Path::new("")).join(&name);
-    let text = std::fs::read_to_string(&file).map_err(|e| bad(format!("extends {}: {e}", file.display())))?;
-    let base: toml::Table =
-        toml::from_str(&text).map_err(|e| bad(format!("extends {}: {}", file.display(), e.message())))?;
-    let mut whole = extended(base, &file, depth + 1)?;
-    merge(&mut whole, own);
-    Ok(whole)
-}
-
-fn merge(base: &mut toml::Table, over: toml::Table) {
-    for (key, value) in over {
-        match (base.get_mut(&key), value) {
-            (Some(toml::Value::Table(base)), toml::Value::Table(over)) => merge(base, over),
-            (_, value) => {
-                base.insert(key, value);
-            }
+        Some(problem) => {
+            let is_in_a_file = of_the_files.as_ref() == Some(&problem);
+            let (place, what, hint) = problem;
+            let Place { source_code, span } = sources.place_of(&place);
+            let span = span.filter(|_| is_in_a_file);
+            Err(ConfigError::Inconsistent { place, what, hint, source_code, span })
         }
     }
 }

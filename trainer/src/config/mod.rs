@@ -10,6 +10,7 @@ mod optimizer;
 mod output;
 mod ramp;
 mod schema;
+mod sources;
 mod stages;
 mod validation;
 
@@ -20,7 +21,7 @@ pub use data::{
 pub use guard::{GuardConfig, InjectConfig, Injected};
 pub use load::{ConfigError, load, parse, to_toml};
 pub use losses::{DistanceMode, LossesConfig};
-pub use optimizer::OptimizerConfig;
+pub use optimizer::{ClipScope, OptimizerConfig};
 pub use output::OutputConfig;
 pub use ramp::{Ramp, RampShape};
 pub use schema::schema;

@@ -1,7 +1,7 @@
 //! The JSON schema of a configuration, for editors and for reading.
 
 use super::Config;
-use super::load::EXTENDS;
+use super::sources::EXTENDS;
 use serde_json::json;
 
 /// The JSON schema (draft 2020-12) of a configuration file: every key with meaning, type and default.

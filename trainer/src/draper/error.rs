@@ -51,6 +51,15 @@ pub enum DraperError {
         /// The path in the model's configuration.
         body: String,
     },
+    /// Correction steps were asked for from a model that has no correction networks.
+    #[error("{steps} correction steps, but the model has no correction networks")]
+    #[diagnostic(help(
+        "leave --corrections out; a [model] with corrections = 3 and a stage that trains them adds some"
+    ))]
+    NoCorrections {
+        /// Steps asked for.
+        steps: usize,
+    },
     /// The body lacks joints the networks were trained on.
     #[error("body '{body}' has no joint {}", missing.join(", "))]
     #[diagnostic(help("use the body the model was trained on, or one with joints of the same names"))]

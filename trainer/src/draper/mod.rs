@@ -154,6 +154,9 @@ impl Draper {
         let device = settings.backend.device();
         let mut model = trained.networks(&device)?;
         if let Some(steps) = settings.corrections {
+            if steps > 0 && model.corrections.is_empty() {
+                return Err(DraperError::NoCorrections { steps });
+            }
             model = model.with_correction_steps(steps);
         }
         let cache = settings.cache.as_deref().map(|folder| ArrayCache::open(folder, settings.cache_limit));

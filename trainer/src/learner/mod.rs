@@ -3,26 +3,28 @@
 mod scene;
 mod workers;
 
-use crate::config::{OptimizerConfig, Trains};
+use crate::config::{ClipScope, OptimizerConfig, Trains};
 use crate::device::is_processor;
 use crate::drape::{DrapeError, WardrobeTensors};
 use crate::scene::PreparedScene;
 use burn::module::Module;
 use burn::optim::{GradientsAccumulator, GradientsParams, ModuleOptimizer};
-use clothcombo_model::{ClothCombo, FusedAdam, clip_global_norm, global_norm};
+use clothcombo_model::{ClothCombo, FusedAdam, clip_global_norm};
 use clothcombo_physics::autodiff::SceneLossOutput;
-use scene::{Asked, Frozen, Work};
+use scene::{Asked, Frozen, Work, norm_of};
 use std::time::Instant;
 use tracing::trace_span;
 use workers::Workers;
 
 pub use scene::StepTimes;
+pub(crate) use scene::larger;
 
 /// Trains the networks.
 pub struct Learner {
     model: ClothCombo,
     optimizer: ModuleOptimizer,
-    clip_norm: f64,
+    clip: ClipScope,
+    max_norm: Option<f64>,
     frozen: Option<Frozen>,
     /// Scenes computed beside each other.
     at_once: usize,
@@ -35,8 +37,12 @@ pub struct Computed {
     pub loss: f64,
     /// Energies per scene and body.
     pub scenes: Vec<Vec<SceneLossOutput>>,
-    /// Their part of the gradient; empty when nothing in the scenes depends on what is trained.
+    /// Their part of the gradient, clipped already where every scene is ([`ClipScope::Scene`]); empty when nothing in the
+    /// scenes depends on what is trained.
     pub gradients: GradientsParams,
+    /// Largest gradient norm of a scene before clipping, where every scene is clipped; else 0. Not finite if that of any
+    /// scene is not.
+    pub largest_norm: f64,
     /// Where the time went.
     pub times: StepTimes,
 }
@@ -47,7 +53,8 @@ pub struct StepOutcome {
     pub loss: f64,
     /// Energies per scene and body.
     pub scenes: Vec<Vec<SceneLossOutput>>,
-    /// Global gradient norm before clipping; 0 when nothing in the scenes depends on what is trained.
+    /// Global gradient norm before clipping: the largest of the scenes' where every scene is clipped, else that of their mean;
+    /// 0 when nothing in the scenes depends on what is trained.
     pub gradient_norm: f64,
     /// Whether the parameters were left alone because loss or gradient was not finite.
     pub skipped: bool,
@@ -68,7 +75,8 @@ impl Learner {
         Self {
             model,
             optimizer,
-            clip_norm: config.clip_norm,
+            clip: config.clip,
+            max_norm: config.max_norm(),
             frozen: None,
             at_once,
             workers: Workers::default(),
@@ -132,11 +140,13 @@ impl Learner {
         };
         let asked = scenes.iter().map(|scene| Ok(Asked { scene, frozen: frozen(scene)? }));
         let asked: Vec<Asked<'_>> = asked.collect::<Result<_, DrapeError>>()?;
-        let work = Work { tensors, trains, share: 1.0 / total as f64, spoil_gradient };
+        let (clip, max_norm) = (self.clip, self.max_norm);
+        let work = Work { tensors, trains, share: 1.0 / total as f64, clip, max_norm, spoil_gradient };
         let mut computed = Computed {
             loss: 0.0,
             scenes: Vec::with_capacity(scenes.len()),
             gradients: GradientsParams::new(),
+            largest_norm: 0.0,
             times: StepTimes::default(),
         };
         let mut sum = GradientsAccumulator::<ClothCombo>::new();
@@ -148,6 +158,7 @@ impl Learner {
             computed.times += StepTimes::longest(parts.iter().map(|part| part.times));
             for part in parts {
                 computed.loss += part.loss;
+                computed.largest_norm = larger(computed.largest_norm, part.norm);
                 computed.scenes.push(part.bodies);
                 match part.gradients {
                     None => {}
@@ -164,26 +175,24 @@ impl Learner {
 
     /// The optimiser step on gradients of the whole step.
     pub fn update(&mut self, computed: Computed, trains: Trains, learning_rate: f64) -> StepOutcome {
-        let Computed { loss, scenes, mut gradients, times } = computed;
+        let Computed { loss, scenes, mut gradients, largest_norm, times } = computed;
         let mut outcome = StepOutcome { loss, scenes, gradient_norm: 0.0, skipped: !loss.is_finite(), times };
         if gradients.is_empty() {
             return outcome;
         }
         let start = Instant::now();
-        let clipping = trace_span!("clip").entered();
-        let norm = match self.clip_norm > 0.0 {
-            true => clip_global_norm(&self.model, &mut gradients, self.clip_norm),
-            false => global_norm(&self.model, &gradients),
+        outcome.gradient_norm = match self.clip {
+            ClipScope::Scene => largest_norm,
+            ClipScope::Step => trace_span!("clip")
+                .in_scope(|| norm_of(clip_global_norm(&self.model, &mut gradients, self.max_norm, 1.0))),
         };
-        outcome.gradient_norm = norm.map_or(0.0, |n| n.into_scalar::<f32>() as f64);
-        drop(clipping);
         outcome.skipped = !(outcome.loss.is_finite() && outcome.gradient_norm.is_finite());
         if !outcome.skipped {
             let _span = trace_span!("optimiser").entered();
             let model = self.optimizer.step(learning_rate, self.model.clone(), gradients);
             self.model = if trains.freezes() { model } else { model.clamp_diffusion_times() };
         }
-        outcome.times.update = start.elapsed();
+        outcome.times.update += start.elapsed();
         outcome
     }
 }

@@ -1,14 +1,14 @@
 //! Loss and gradients of one scene, and of several beside each other.
 
 use super::workers::Workers;
-use crate::config::Trains;
+use crate::config::{ClipScope, Trains};
 use crate::drape::{DrapeError, KnownEmbeddings, WardrobeTensors, to_host};
 use crate::felt::felt;
 use crate::scene::PreparedScene;
 use burn::module::Module;
 use burn::optim::GradientsParams;
 use burn::tensor::Tensor;
-use clothcombo_model::{ClothCombo, Feel, GarmentEmbedding, LayeredDrape};
+use clothcombo_model::{ClothCombo, Feel, GarmentEmbedding, LayeredDrape, clip_global_norm};
 use clothcombo_physics::autodiff::{SceneLossOutput, scene_loss};
 use std::ops::AddAssign;
 use std::sync::Arc;
@@ -64,6 +64,10 @@ pub(super) struct Work<'a> {
     pub trains: Trains,
     /// Weight of a scene in the step's loss.
     pub share: f64,
+    /// Whether the gradient of a scene is clipped here, before it becomes a share of the step's.
+    pub clip: ClipScope,
+    /// Largest norm of a clipped gradient; `None`: any.
+    pub max_norm: Option<f64>,
     pub spoil_gradient: bool,
 }
 
@@ -75,6 +79,8 @@ pub(super) struct SceneGradient {
     pub bodies: Vec<SceneLossOutput>,
     /// Its part of the gradient; `None` when nothing in the scene depends on what is trained.
     pub gradients: Option<GradientsParams>,
+    /// Norm of the scene's gradient before clipping, where it is clipped; else 0.
+    pub norm: f64,
     pub times: StepTimes,
 }
 
@@ -109,8 +115,8 @@ impl Work<'_> {
         let Losses { loss, mean, bodies } = self.forward(model, asked)?;
         let forward = start.elapsed();
         let start = Instant::now();
-        let gradients = loss.map(|mut loss| {
-            if self.share < 1.0 {
+        let mut gradients = loss.map(|mut loss| {
+            if self.clip == ClipScope::Step && self.share < 1.0 {
                 loss = loss * self.share;
             }
             if self.spoil_gradient {
@@ -118,8 +124,15 @@ impl Work<'_> {
             }
             trace_span!("backward").in_scope(|| GradientsParams::from_grads(loss.backward(), model))
         });
-        let times = StepTimes { forward, backward: start.elapsed(), ..StepTimes::default() };
-        Ok(SceneGradient { loss: mean * self.share, bodies, gradients, times })
+        let backward = start.elapsed();
+        let start = Instant::now();
+        let norm = match (&mut gradients, self.clip) {
+            (Some(gradients), ClipScope::Scene) => trace_span!("clip")
+                .in_scope(|| norm_of(clip_global_norm(model, gradients, self.max_norm, self.share))),
+            _ => 0.0,
+        };
+        let times = StepTimes { forward, backward, update: start.elapsed() };
+        Ok(SceneGradient { loss: mean * self.share, bodies, gradients, norm, times })
     }
 
     fn forward(&self, model: &ClothCombo, asked: &Asked<'_>) -> Result<Losses, DrapeError> {
@@ -183,6 +196,16 @@ impl Work<'_> {
         let loss = losses.into_iter().reduce(|a, b| a + b).filter(|_| depends);
         Ok(Losses { loss, mean, bodies })
     }
+}
+
+/// A gradient norm on the host; 0 of no gradient.
+pub(super) fn norm_of(norm: Option<Tensor<1>>) -> f64 {
+    norm.map_or(0.0, |norm| f64::from(norm.into_scalar::<f32>()))
+}
+
+/// The larger of two norms; NaN if either is, which `f64::max` would drop.
+pub(crate) fn larger(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a > b { a } else { b }
 }
 
 /// The same parameters as leaves of another graph. Not `fork`: it notes a move between devices in the graph of the original,

@@ -1,7 +1,7 @@
 //! A made-up training run of a given size, on built-in data.
 
-use crate::config::{Config, Trains};
-use miette::{IntoDiagnostic, Report, miette};
+use crate::config::{Config, ConfigError, Trains, parse};
+use std::path::Path;
 
 /// Sizes of a run to measure.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,11 +34,12 @@ impl Case {
         Self { vertices, layers, width, blocks, eigen_count, bodies: 1, trains: Trains::All }
     }
 
-    /// The run: generated garments on the built-in body, all losses over all pairs of vertices, as printed in the paper.
+    /// The run: generated garments on the built-in body, all losses over all pairs of vertices, as printed in the paper; with
+    /// `overrides` (`a.b=value`), as of a configuration that is read.
     ///
     /// # Errors
-    /// A size out of range, named.
-    pub fn config(&self) -> Result<Config, Report> {
+    /// A size out of range or an override that is none, named.
+    pub fn config(&self, overrides: &[String]) -> Result<Config, ConfigError> {
         let Self { vertices, layers, width, blocks, eigen_count, bodies, trains } = *self;
         let skinning_width = width.min(128);
         let trains = match trains {
@@ -74,10 +75,20 @@ impl Case {
             bodies = {bodies}
             "#
         );
-        let config: Config = toml::from_str(&text).into_diagnostic()?;
-        match config.problem() {
-            None => Ok(config),
-            Some((place, what, hint)) => Err(miette!(help = hint, "{place} {what}")),
+        parse(&text, Path::new("the made-up run"), overrides)
+    }
+
+    /// The sizes that `config`, the run of this case with overrides, has in the end.
+    pub fn of_config(self, config: &Config) -> Self {
+        let stage = &config.stages[0];
+        Self {
+            layers: stage.layers[1],
+            width: config.model.width,
+            blocks: config.model.diffusion_blocks,
+            eigen_count: config.model.eigen_count,
+            bodies: stage.bodies,
+            trains: stage.trains,
+            ..self
         }
     }
 
@@ -96,12 +107,18 @@ mod tests {
     #[test]
     fn a_case_is_a_valid_run_and_a_size_out_of_range_is_named() {
         let case = Case::new(128, 3, 2000);
-        let config = case.config().expect("valid");
+        let config = case.config(&[]).expect("valid");
         assert_eq!(
             (config.model.width, config.model.eigen_count, config.stages[0].layers),
             (128, 64, [3, 3])
         );
-        let few = Case { vertices: 3, ..case }.config().expect_err("too few vertices");
+        let few = Case { vertices: 3, ..case }.config(&[]).expect_err("too few vertices");
         assert!(few.to_string().contains("data.garments[0].generate"), "{few}");
+        let other = case
+            .config(&["model.width=16".into(), "losses.repulsion.per_vertex=false".into()])
+            .expect("valid");
+        assert_eq!(case.of_config(&other), Case { width: 16, ..case });
+        assert!(!other.losses.repulsion.per_vertex);
+        assert!(case.config(&["losses.strian.weight=1".into()]).is_err());
     }
 }

@@ -1,24 +1,30 @@
 //! A scene, the networks and what they make of it, as files for an independent implementation.
 
 use super::subject::Subject;
+use crate::config::Trains;
 use crate::scene::PreparedScene;
 use burn::store::{ModuleSnapshot, SafetensorsStore};
 use clothcombo_data::format::{NpzWriter, atomic};
 use clothcombo_physics::energy::{SceneEnergy, Term, TermMap};
 use clothcombo_physics::mesh::Topology;
 use clothcombo_physics::operators::{SparseMatrix, surface_gradient};
+use clothcombo_physics::query::Distance;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use std::path::Path;
 
-/// Writes into `folder`: `model.safetensors` (parameters by their documented names), `scene.npz` (body, garments, operators,
-/// and the positions our networks find) and `scene.json` (sizes, settings, weights, and our loss and gradient norm). For
-/// scenes of one body.
+/// The networks, as the names of their parameters begin.
+const NETWORKS: [&str; 5] = ["garment_encoder", "draping", "skinning", "untangling", "corrections"];
+
+/// Writes the first scene of the stage, on the first of its bodies, into `folder`: `model.safetensors` (parameters by their
+/// documented names), `scene.npz` (body, garments, operators, and the positions our networks find) and `scene.json` (sizes,
+/// settings, weights, switches, and our loss and gradient norms: of all networks and of each, 0 for one that is not trained).
 ///
 /// # Errors
 /// When a file cannot be written, or the scene cannot be draped.
 pub fn export(subject: &Subject, folder: &Path) -> Result<(), Report> {
-    let scene = subject.scene(0)?;
+    let mut scene = subject.scene(0)?;
+    scene.bodies.truncate(1);
     std::fs::create_dir_all(folder)
         .into_diagnostic()
         .wrap_err_with(|| format!("cannot make the folder {}", folder.display()))?;
@@ -90,7 +96,12 @@ fn description(subject: &Subject, scene: &PreparedScene) -> Result<Value, Report
     let energy = &scene.bodies[0].energy;
     let (loss, gradients) = subject.loss_and_gradients(scene)?;
     let squares = |values: &[f32]| values.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>();
-    let norm = gradients.iter().map(|(_, values)| squares(values)).sum::<f64>().sqrt();
+    let norm_below = |prefix: &str| {
+        let below = gradients.iter().filter(|(name, _)| name.starts_with(prefix));
+        below.map(|(_, values)| squares(values)).sum::<f64>().sqrt()
+    };
+    let norms: Map<String, Value> =
+        NETWORKS.into_iter().map(|name| (name.to_owned(), json!(norm_below(&format!("{name}."))))).collect();
     let garments: Vec<Value> = scene
         .worn
         .iter()
@@ -117,7 +128,9 @@ fn description(subject: &Subject, scene: &PreparedScene) -> Result<Value, Report
         "contacts": scene.contacts,
         "layers": layers,
         "settings": settings(energy),
-        "expected": { "loss": loss, "gradient_norm": norm },
+        "trains": subject.trains(),
+        "alone": if subject.trains() == Trains::All { scene.alone } else { 0.0 },
+        "expected": { "loss": loss, "gradient_norm": norm_below(""), "gradient_norms": norms },
     }))
 }
 
@@ -145,5 +158,12 @@ fn settings(energy: &SceneEnergy<f32>) -> Value {
         "holding_fraction": s.holding_fraction,
         "gate_depth": s.layer_gate.map(|gate| gate.depth),
         "gate_edges": s.layer_gate.map(|gate| gate.tangential_edges),
+        "distance": match s.distance {
+            Distance::NearestVertex => "nearest_vertex",
+            Distance::ClosestPoint => "closest_point",
+            Distance::Union => "union",
+        },
+        "repulsion_per_vertex": s.repulsion_normalised,
+        "repulsion_subset": s.repulsion_subset,
     })
 }

@@ -1,7 +1,7 @@
 //! A run whose steps are measured.
 
 use super::phases::{OTHER, PHASES, record_phases};
-use crate::config::{Config, Trains};
+use crate::config::{ClipScope, Config, OptimizerConfig, Trains};
 use crate::drape::{DrapeError, KnownEmbeddings, WardrobeTensors, to_host};
 use crate::evaluate::Spread;
 use crate::felt::felt;
@@ -132,7 +132,8 @@ impl Subject {
         Ok(prepare(self.library(), &self.config.losses, draw, at.run_progress)?)
     }
 
-    fn trains(&self) -> Trains {
+    /// Which networks the stage trains.
+    pub fn trains(&self) -> Trains {
         self.config.stages[Schedule::new(&self.config).at(self.first_step).stage].trains
     }
 
@@ -243,7 +244,8 @@ impl Subject {
         }))
     }
 
-    /// Loss of the scene's first body and the gradient of every parameter, by name.
+    /// What a training step minimises on `scene`, and the gradient of every parameter before clipping, by name; empty for
+    /// those that the stage does not train.
     ///
     /// # Errors
     /// When the scene's tensors cannot be made.
@@ -251,14 +253,14 @@ impl Subject {
         &self,
         scene: &PreparedScene,
     ) -> Result<(f64, Vec<(String, Vec<f32>)>), DrapeError> {
-        let [posed, canonical] = self.drape(self.model(), scene, &self.tensors.embeddings())?;
-        let output =
-            clothcombo_physics::autodiff::scene_loss(posed, canonical, scene.bodies[0].energy.clone());
-        let total = output.value().total;
-        let gradients = GradientsParams::from_grads(output.loss.backward(), self.model());
-        let mut named = NamedGradients { gradients, path: Vec::new(), found: Vec::new() };
+        // Clipped after the mean, which is not made here.
+        let unclipped = OptimizerConfig { clip: ClipScope::Step, ..self.config.optimizer.clone() };
+        let mut learner = Learner::new(self.model().clone(), new_optimizer(&unclipped), &unclipped);
+        let computed =
+            learner.compute(&self.tensors, std::slice::from_ref(scene), 1, self.trains(), false)?;
+        let mut named = NamedGradients { gradients: computed.gradients, path: Vec::new(), found: Vec::new() };
         self.model().visit(&mut named);
-        Ok((total, named.found))
+        Ok((computed.loss, named.found))
     }
 
     /// Measures the parts of one scene, each for about `seconds`, and a step on it `several` times over.

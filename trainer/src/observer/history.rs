@@ -40,7 +40,7 @@ pub struct History {
     pub best: Option<(u64, f64)>,
     /// Steps that were skipped.
     pub skipped: Vec<u64>,
-    /// Steps with an unusually large gradient, of this session.
+    /// Steps with an unusually large gradient, and its norm.
     pub spikes: Vec<(u64, f64)>,
     /// Sample pictures, oldest first.
     pub samples: Vec<PathBuf>,
@@ -77,6 +77,9 @@ impl History {
             }
             if line["skipped"].as_bool() == Some(true) {
                 history.skipped.push(step);
+            }
+            if line["spike"].as_bool() == Some(true) {
+                history.spikes.push((step, line["grad_norm"].as_f64().unwrap_or(f64::INFINITY)));
             }
             history.last = Some((step, line["stage"].as_str().unwrap_or_default().to_owned()));
         }
@@ -155,6 +158,9 @@ impl Observer for HistoryObserver {
                     record.update_seconds,
                 ];
                 SCALARS.into_iter().zip(scalars).for_each(|(name, v)| history.push(name, step, Some(v)));
+                if record.spike {
+                    history.spikes.push((record.step, record.grad_norm));
+                }
                 match &mut history.last {
                     Some((last, stage)) if *stage == record.stage => *last = record.step,
                     last => *last = Some((record.step, record.stage.clone())),
@@ -165,7 +171,6 @@ impl Observer for HistoryObserver {
                 history.note_validation(*step, serde_json::to_value(report).into_diagnostic()?);
             }
             TrainEvent::Skipped { step, .. } => history.skipped.push(*step),
-            TrainEvent::Spike { step, norm, .. } => history.spikes.push((*step, *norm)),
             TrainEvent::SampleDrawn { path } => {
                 history.samples.retain(|p| p != path);
                 history.samples.push(path.to_path_buf());

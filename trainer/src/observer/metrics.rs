@@ -52,7 +52,8 @@ impl Log {
 }
 
 impl MetricsObserver {
-    /// Continues the logs of `run` after `step`; every `every`-th step is logged.
+    /// Continues the logs of `run` after `step`; every `every`-th step is logged, and
+    /// every one that was skipped or is a spike.
     ///
     /// # Errors
     /// When a log cannot be written.
@@ -69,7 +70,7 @@ impl MetricsObserver {
 impl Observer for MetricsObserver {
     fn observe(&mut self, event: &TrainEvent) -> Result<(), Report> {
         match event {
-            TrainEvent::Step(record) if record.step % self.every == 0 || record.skipped => {
+            TrainEvent::Step(record) if record.step % self.every == 0 || record.skipped || record.spike => {
                 self.metrics.line(record)?;
                 if self.flushed.elapsed() < FLUSH_EVERY {
                     return Ok(());

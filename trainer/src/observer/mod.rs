@@ -2,6 +2,7 @@
 
 mod curves;
 mod history;
+mod log;
 mod metrics;
 mod progress;
 mod report;
@@ -9,6 +10,7 @@ mod tensorboard;
 
 pub use curves::CurvesObserver;
 pub use history::{History, HistoryObserver, SharedHistory, best_so_far};
+pub use log::LogObserver;
 pub use metrics::MetricsObserver;
 pub use progress::ProgressObserver;
 pub use report::ReportObserver;

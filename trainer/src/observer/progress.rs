@@ -1,17 +1,22 @@
 //! The progress bar: stage, steps per second, time left, loss. Without a terminal, a line now and then.
 
+use super::history::SharedHistory;
 use crate::closed_pipe::tell;
 use crate::event::{Observer, TrainEvent};
+use crate::run_dir::RunDir;
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::Report;
 use std::io::IsTerminal;
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 /// Seconds between lines when there is no terminal to draw on.
 const PLAIN_INTERVAL: Duration = Duration::from_secs(15);
 
-/// Shows a run on stderr.
+/// Shows a run on stderr. It comes after what keeps the history.
 pub struct ProgressObserver {
+    history: SharedHistory,
+    log: PathBuf,
     bar: Option<ProgressBar>,
     terminal: bool,
     started_at: u64,
@@ -22,9 +27,12 @@ pub struct ProgressObserver {
     last_line: Instant,
 }
 
-impl Default for ProgressObserver {
-    fn default() -> Self {
+impl ProgressObserver {
+    /// Shows `run`, which `history` is kept of.
+    pub fn new(run: &RunDir, history: SharedHistory) -> Self {
         Self {
+            history,
+            log: run.log(),
             bar: None,
             terminal: std::io::stderr().is_terminal(),
             started_at: 0,
@@ -35,9 +43,7 @@ impl Default for ProgressObserver {
             last_line: Instant::now(),
         }
     }
-}
 
-impl ProgressObserver {
     /// Prints `text` above the bar.
     fn say(&self, text: &str) {
         match &self.bar {
@@ -54,12 +60,35 @@ impl ProgressObserver {
         let per_second = (step - self.started_at) as f64 / self.start.elapsed().as_secs_f64();
         let left = Duration::from_secs_f64((self.total - step) as f64 / per_second.max(1e-9));
         tell(format_args!(
-            "{} · step {step}/{} · {per_second:.1} steps/s · {} left · loss {:.3}",
+            "{} · step {step}/{} · {per_second:.1} steps/s · {} left · {}",
             self.stage,
             self.total,
             indicatif::HumanDuration(left),
-            self.smoothed_loss
+            self.message()
         ));
+    }
+
+    /// The end of a progress line: the loss, and how many spikes of the gradient the run has had.
+    fn message(&self) -> String {
+        let loss = format!("loss {:.3}", self.smoothed_loss);
+        match self.spikes() {
+            None => loss,
+            Some(spikes) => format!("{loss} · {spikes}"),
+        }
+    }
+
+    fn spikes(&self) -> Option<String> {
+        match self.history.borrow().spikes.len() {
+            0 => None,
+            1 => Some("1 spike".into()),
+            several => Some(format!("{several} spikes")),
+        }
+    }
+
+    /// Where the spikes stand, for the last line of a session.
+    fn listed(&self) -> String {
+        let listed = |spikes| format!(" · {spikes} of the gradient: {}", self.log.display());
+        self.spikes().map(listed).unwrap_or_default()
     }
 }
 
@@ -93,7 +122,7 @@ impl Observer for ProgressObserver {
                 };
                 match &self.bar {
                     Some(bar) => {
-                        bar.set_message(format!("loss {:.3}", self.smoothed_loss));
+                        bar.set_message(self.message());
                         bar.set_position(record.step);
                     }
                     None => self.plain_line(record.step),
@@ -102,14 +131,12 @@ impl Observer for ProgressObserver {
             TrainEvent::Validated { step, report, .. } => {
                 self.say(&format!("validation after step {step}\n{report}"));
             }
-            TrainEvent::Spike { step, norm, usual } => {
-                self.say(&format!("step {step}: gradient norm {norm:.3e}, usually {usual:.3e}"));
-            }
             TrainEvent::Skipped { step, count, file } => {
                 let file = file.map(|f| format!(", scene in {}", f.display())).unwrap_or_default();
                 self.say(&format!("step {step} skipped: loss or gradient not finite ({count} lately){file}"));
             }
-            TrainEvent::CheckpointDue { .. } => {}
+            // Dozens of them are usual where poses are hard, and clipping makes them harmless: counted, and listed in the log.
+            TrainEvent::Spike { .. } | TrainEvent::CheckpointDue { .. } => {}
             TrainEvent::CheckpointSaved { path, .. } => {
                 if !self.terminal {
                     self.say(&format!("checkpoint {}", path.display()));
@@ -117,7 +144,7 @@ impl Observer for ProgressObserver {
             }
             TrainEvent::SampleDrawn { path } => self.say(&format!("picture {}", path.display())),
             TrainEvent::Interrupted { step } => {
-                self.say(&format!("stopped after step {step}; continue with --resume"));
+                self.say(&format!("stopped after step {step}; continue with --resume{}", self.listed()));
                 if let Some(bar) = self.bar.take() {
                     bar.abandon();
                 }
@@ -132,11 +159,40 @@ impl Observer for ProgressObserver {
                     bar.finish();
                 }
                 tell(format_args!(
-                    "finished after step {step} in {:.0} s",
-                    self.start.elapsed().as_secs_f64()
+                    "finished after step {step} in {:.0} s{}",
+                    self.start.elapsed().as_secs_f64(),
+                    self.listed()
                 ));
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::event::StepRecord;
+    use crate::observer::{History, HistoryObserver};
+    use std::cell::RefCell;
+    use std::rc::Rc;
+
+    #[test]
+    fn spikes_are_one_count_in_the_line() {
+        let history: SharedHistory = Rc::new(RefCell::new(History::default()));
+        let folder = tempfile::tempdir().unwrap();
+        let mut progress = ProgressObserver::new(&RunDir::follow(folder.path()), history.clone());
+        let mut keeper = HistoryObserver(history);
+        for (step, spike, expected) in
+            [(1, false, "loss 2.000"), (2, true, "loss 2.000 · 1 spike"), (3, true, "loss 2.000 · 2 spikes")]
+        {
+            let record = StepRecord { step, loss: 2.0, spike, ..StepRecord::default() };
+            keeper.observe(&TrainEvent::Step(&record)).unwrap();
+            progress.observe(&TrainEvent::Step(&record)).unwrap();
+            assert_eq!(progress.message(), expected);
+        }
+        assert!(
+            progress.listed().contains("2 spikes of the gradient") && progress.listed().ends_with("log.txt")
+        );
     }
 }

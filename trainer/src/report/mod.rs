@@ -119,7 +119,7 @@ impl Page<'_> {
             tiles.push(("best validation", format!("{} at step {step}", number_text(score, 4))));
         }
         tiles.push(("skipped steps", self.history.skipped.len().to_string()));
-        tiles.push(("gradient spikes, this session", self.history.spikes.len().to_string()));
+        tiles.push(("gradient spikes", self.history.spikes.len().to_string()));
         if let Some(peak) = self.peak {
             let estimated =
                 self.memory.map(|m| format!(" (estimated {})", gibibytes(m.peak))).unwrap_or_default();

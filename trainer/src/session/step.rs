@@ -46,11 +46,12 @@ impl Session {
         let mut computed = self.compute(&mut scenes, at, self.step + 1)?;
         let stopping = self.world.meet(stop.requested())?;
         let stage = &self.schedule.stages()[at.stage];
-        let mut summary = StepSummary::of(&scenes, computed.loss, &computed.scenes, stage.accumulate);
+        let mut summary = StepSummary::of(&scenes, &computed, stage.accumulate);
         if self.world.is_shared() {
             let exchange = Instant::now();
             summary = StepSummary::joined(&self.world.gather(&summary.to_row()));
             computed.loss = summary.loss;
+            computed.largest_norm = summary.largest_norm;
             let bucket = gradient_bucket(self.learner.model(), &computed.gradients);
             computed.gradients = gradients_of_bucket(self.learner.model(), &self.world.sum(bucket));
             computed.times.update += exchange.elapsed();
@@ -79,6 +80,7 @@ impl Session {
             backward_seconds: outcome.times.backward.as_secs_f64(),
             update_seconds: outcome.times.update.as_secs_f64(),
             skipped: outcome.skipped,
+            spike: matches!(verdict, Verdict::Spike { .. }),
         };
         let incident = match outcome.skipped && self.leads() {
             true => self.keep_incident(at, scenes, outcome)?,

@@ -41,7 +41,9 @@ fn check(report: &Value, methods: &[&str]) {
             let (energy, excess) = (m["energy"].as_f64().unwrap(), m["excess"].as_f64().unwrap());
             assert!(excess > 0.0 && (energy - lowest - excess).abs() < 1e-9 * energy.abs().max(1.0), "{m}");
             assert!(m["distance_mm"].as_f64().unwrap() > 0.0);
+            assert_terms(&m["terms"], energy);
         }
+        assert_terms(&reference["terms"], lowest);
         assert!(
             (scene["methods"][1]["excess_percent"].as_f64().unwrap() - 100.0).abs() < 1e-6
                 || methods.len() > 2
@@ -56,6 +58,14 @@ fn check(report: &Value, methods: &[&str]) {
     let converged =
         scenes.iter().filter(|s| s["runs"][s["reference"].as_u64().unwrap() as usize]["stop"] == "converged");
     assert_eq!(converged.count() as u64, report["solver"]["converged"].as_u64().unwrap());
+}
+
+/// The terms add up to the energy.
+fn assert_terms(terms: &Value, energy: f64) {
+    let terms = terms.as_object().unwrap();
+    assert!(terms.contains_key("strain") && terms.contains_key("body_collision"), "{terms:?}");
+    let sum: f64 = terms.values().map(|v| v.as_f64().unwrap()).sum();
+    assert!((sum - energy).abs() < 1e-9 * energy.abs().max(1.0), "{terms:?} {energy}");
 }
 
 #[test]
@@ -104,6 +114,7 @@ fn skinning_and_a_network_are_measured_against_the_minimum() {
     let output = bench(&["--config", "tiny.toml", "--iterations", "1"], folder.path()).output().unwrap();
     assert!(output.status.success());
     let text = String::from_utf8(output.stdout).unwrap();
+    assert!(text.contains("mean of every energy, weighted [J]") && text.contains("equilibrium"), "{text}");
     assert!(text.contains("0 of 2; stops: 2 iterations"), "{text}");
 }
 

@@ -100,6 +100,8 @@ fn wrong_input_names_itself_and_leaves_nothing() {
     // Neither are the folders it was to lie in.
     failure(&mut drape(&["--garments", &band, "-o", &at(&folder, "new/er/out")]), 1);
     assert!(!folder.path().join("new").exists());
+    let message = failure(&mut drape(&to(&["--garments", TEE, "--corrections", "4"], &out)), 1);
+    assert!(holds(&message, "no correction networks") && holds(&message, "--corrections"), "{message}");
     failure(&mut drape(&to(&["--garments", TEE, "--frames", "0..4"], &out)), 2);
     failure(&mut drape(&to(&["--garments", TEE, "--motion", &motion, "--frames", "4..1"], &out)), 2);
     assert!(!Path::new(&out).exists());

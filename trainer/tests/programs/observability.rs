@@ -143,6 +143,52 @@ fn away_from_a_terminal_there_are_plain_lines_and_quiet_is_quiet() {
 }
 
 #[test]
+fn spikes_of_the_gradient_are_counted_and_stand_in_the_log_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    // What is usual already counts as one.
+    let config = tiny(folder.path(), "[guard]\nspike_factor = 0.5\n");
+    let root = folder.path().join("run");
+    let run = |arguments: &[&str]| {
+        let output = Command::new(env!("CARGO_BIN_EXE_clothcombo-train"))
+            .args(arguments)
+            .args(["--run-dir", &root.display().to_string()])
+            .env_remove("RUST_LOG")
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{}", said(&output));
+        said(&output)
+    };
+    let count = |text: &str| text.lines().filter(|line| line.contains("gradient norm")).count();
+    let log = || std::fs::read_to_string(root.join("log.txt")).unwrap();
+    let marked = || {
+        let metrics = std::fs::read_to_string(root.join("metrics.jsonl")).unwrap();
+        metrics.matches("\"spike\":true").count()
+    };
+
+    let first = run(&["--config", &config.display().to_string(), "--set", "output.metrics_every=1000"]);
+    let spikes = count(&log());
+    assert!(spikes > 5, "no spike, no test: {}", log());
+    assert_eq!(count(&first), 0, "{first}");
+    let last = first.lines().last().unwrap();
+    assert!(
+        last.starts_with("finished after step 60")
+            && last.contains(&format!("{spikes} spikes of the gradient")),
+        "{last}"
+    );
+    assert!(last.ends_with("log.txt"), "{last}");
+    assert_eq!(marked(), spikes, "every one is in the metrics");
+
+    // Those of the sessions before count.
+    let longer = ["--set", "stages.2.steps=21", "--allow-config-change", "stages", "--resume"];
+    let again = run(&longer);
+    assert!(again.lines().last().unwrap().contains(&format!("{} spikes", marked())), "{again}");
+    assert!(log().contains("session starts after step 60 of 61") && log().contains("finished after step 60"));
+    let runs = clothcombo(&["runs", &root.display().to_string(), "--json"]);
+    let runs: Vec<serde_json::Value> = serde_json::from_slice(&runs.stdout).unwrap();
+    assert_eq!(runs[0]["spikes"], marked());
+}
+
+#[test]
 fn the_schema_is_json_and_the_plan_names_its_stages() {
     let schema = clothcombo(&["config", "schema"]);
     let schema: serde_json::Value = serde_json::from_slice(&schema.stdout).unwrap();

@@ -63,7 +63,7 @@ struct Row {
 /// # Errors
 /// When a device fails, or disagrees with the first by more than is asked for.
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
-    let config = Case::new(arguments.width, arguments.layers, arguments.vertices).config()?;
+    let config = Case::new(arguments.width, arguments.layers, arguments.vertices).config(&[])?;
     let library = Arc::new(load_under_bar(&config)?);
     let subject = |backend: Backend| Subject::new(config.clone(), library.clone(), 0, &backend.device());
     let first = subject(Backend::preferred())?;

@@ -87,7 +87,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         ("eigenpairs", eigen_counts.iter().map(|&eigen_count| Case { eigen_count, ..base }).collect()),
     ];
     for case in sweeps.iter().flat_map(|(_, cases)| cases) {
-        case.config()?;
+        case.config(&[])?;
     }
     let bar = progress_bar(
         sweeps.iter().map(|(_, cases)| cases.len()).sum(),

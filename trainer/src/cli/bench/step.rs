@@ -18,15 +18,19 @@ use std::sync::Arc;
 #[derive(Parser)]
 #[command(
     after_help = "Examples:\n  clothcombo bench step --widths 64,128 --layers 1,3 --picture step.png\n  \
-        clothcombo bench step --config configs/open.toml --picture open.png --json > open.json\n\n\
+        clothcombo bench step --config configs/open.toml --picture open.png --json > open.json\n  \
+        clothcombo bench step --config configs/paper.toml --stage 1 --set model.width=64 --export case\n\n\
         Two threads and fewer: RAYON_NUM_THREADS=2. Nothing else should run meanwhile."
 )]
 pub struct Arguments {
     /// Measures the stages of this configuration instead of made-up runs
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["widths", "layers", "vertices", "eigen_count", "blocks", "bodies", "export"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["widths", "layers", "vertices", "eigen_count", "blocks", "bodies"])]
     config: Option<PathBuf>,
-    /// Overrides one value of the configuration, for example model.width=128; repeatable
-    #[arg(long = "set", value_name = "KEY=VALUE", requires = "config")]
+    /// With --config: only this stage, counted from 0 as in stages.0
+    #[arg(long, value_name = "N", requires = "config")]
+    stage: Option<usize>,
+    /// Overrides one value of the configuration or of every made-up run, for example losses.strain.weight=2; repeatable
+    #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
     /// Widths of the networks; the number of DiffusionNet blocks and eigenpairs goes with them
     #[arg(long, value_delimiter = ',', default_values_t = [64, 128])]
@@ -61,7 +65,7 @@ pub struct Arguments {
     /// Writes the shares of a step as stacked bars (PNG)
     #[arg(long, value_name = "FILE", value_parser = picture_file())]
     picture: Option<PathBuf>,
-    /// Writes scene, networks and results of the only case into a folder, for scripts/bench_torch.py
+    /// Writes scene, networks and results of the only case or stage into a folder, for scripts/bench_torch.py
     #[arg(long, value_name = "DIR")]
     export: Option<PathBuf>,
     /// Print JSON instead of Markdown tables
@@ -134,13 +138,13 @@ fn made_up(arguments: &Arguments) -> Result<Vec<Measured>, Report> {
     }
     let mut measured = Vec::with_capacity(cases.len());
     for case in cases {
-        let config = case.config()?;
+        let config = case.config(&arguments.overrides)?;
+        let case = case.of_config(&config);
         let library = Arc::new(load_under_bar(&config)?);
         let mut subject = Subject::new(config, library, 0, &arguments.device.device())?;
-        if let Some(folder) = &arguments.export {
-            export(&subject, folder)?;
-        }
-        measured.push(measure(&mut subject, case.name(), Some(case), arguments)?);
+        let name =
+            std::iter::once(case.name()).chain(arguments.overrides.iter().cloned()).collect::<Vec<_>>();
+        measured.push(measure(&mut subject, name.join(", "), Some(case), arguments)?);
     }
     Ok(measured)
 }
@@ -167,13 +171,29 @@ fn cases(arguments: &Arguments) -> Vec<Case> {
 }
 
 fn stages(arguments: &Arguments, config: Config) -> Result<Vec<Measured>, Report> {
-    let library = Arc::new(load_under_bar(&config)?);
     let names: Vec<String> = config.stages.iter().map(|stage| stage.name.clone()).collect();
-    let stage = |(index, name): (usize, String)| {
-        let mut subject = Subject::new(config.clone(), library.clone(), index, &arguments.device.device())?;
-        measure(&mut subject, name, None, arguments)
+    let all =
+        || names.iter().enumerate().map(|(i, name)| format!("{i} {name:?}")).collect::<Vec<_>>().join(", ");
+    let chosen: Vec<usize> = match arguments.stage {
+        Some(stage) if stage < names.len() => vec![stage],
+        Some(stage) => {
+            return Err(miette!(help = format!("there are {}", all()), "--stage {stage}: no such stage"));
+        }
+        None => (0..names.len()).collect(),
     };
-    names.into_iter().enumerate().map(stage).collect()
+    if arguments.export.is_some() && chosen.len() != 1 {
+        return Err(miette!(
+            help = format!("choose one with --stage: {}", all()),
+            "--export writes one stage, the configuration has {}",
+            names.len()
+        ));
+    }
+    let library = Arc::new(load_under_bar(&config)?);
+    let stage = |index: usize| {
+        let mut subject = Subject::new(config.clone(), library.clone(), index, &arguments.device.device())?;
+        measure(&mut subject, names[index].clone(), None, arguments)
+    };
+    chosen.into_iter().map(stage).collect()
 }
 
 fn measure(
@@ -182,6 +202,9 @@ fn measure(
     case: Option<Case>,
     arguments: &Arguments,
 ) -> Result<Measured, Report> {
+    if let Some(folder) = &arguments.export {
+        export(subject, folder)?;
+    }
     say(&format!("measuring {name}"));
     let scene = subject.scene(0)?;
     let costs = subject.costs(arguments.seconds, arguments.accumulate)?;
