@@ -43,6 +43,7 @@ MODEL = {
     "width", "embedding", "diffusion_blocks", "diffusion_width", "eigen_count", "mlp_layers", "siren_layers", "siren_width",
     "omega_first", "omega_hidden", "skinning_layers", "skinning_width", "displacement_scale", "untangling_scale",
     "skinning_scale", "zero_sum_skinning", "vertex_embedding", "corrections", "correction_width",
+    "correction_steps", "graph", "skinning_joints",
 }
 torch.sparse.check_sparse_tensor_invariants.disable()  # said explicitly, which silences a warning
 PARTS = {
@@ -79,6 +80,8 @@ class Outfit:
         self.rest = torch.cat([g.rest for g in self.garments])
         self.weights = torch.cat([g.weights for g in self.garments])
         self.mask = torch.stack([(g.weights != 0).any(0).float() for g in self.garments])
+        if about["model"]["skinning_joints"] == "all":
+            self.mask = torch.ones_like(self.mask)
         self.of_vertex = torch.repeat_interleave(torch.arange(count), torch.tensor([len(g.rest) for g in self.garments]))
         self.start, self.shape, self.pose = (losses.narrow(arrays[k]) for k in ("start", "shape", "pose"))
         self.bones = losses.narrow(arrays["bones"]).reshape(-1, 3, 4)
@@ -86,7 +89,7 @@ class Outfit:
         both = [(a, b) for a, b in self.contacts] + [(b, a) for a, b in self.contacts]
         self.edges = torch.tensor(both, dtype=torch.long).reshape(-1, 2).T
         self.touched = torch.zeros((count, 1))
-        self.touched[self.edges[0]] = 1
+        self.touched[slice(None) if about["model"]["graph"] == "full" else self.edges[0]] = 1
 
 
 def not_implemented(about):
@@ -127,6 +130,9 @@ class Scene:
             losses.Garment(part(i, "rest"), part(i, "faces"), part(i, "holding_reference"), self.about["settings"])
             for i in range(len(self.outfit.garments))
         ]
+        for i, garment in enumerate(self.garments):
+            if self.about["garments"][i]["held_posed"]:
+                garment.pull_back(part(i, "skin_weights"), arrays["bones"].reshape(-1, 3, 4))
         self.sizes = [garment.count for garment in self.garments]
         count = sum(self.sizes)
         self.pull = ((torch.arange(3 * count) * 37 % 101) / 50 - 1).reshape(count, 3)

@@ -90,6 +90,19 @@ class Garment:
         held = np.argsort(-rest[:, 1], kind="stable")[: math.ceil(settings["holding_fraction"] * count - 1e-9)]
         self.held = torch.from_numpy(held.copy())
         self.reference = narrow(reference)
+        self.rows = None
+
+    def pull_back(self, weights, bones):
+        """Heights are read off posed positions from here on, undone by the initial skinning [V,J] of bones [J,3,4]."""
+        blended = np.einsum("vj,jab->vab", weights.astype(np.float64), bones.astype(np.float64))
+        held = self.held.numpy()
+        linear = blended[held, :, :3]
+        is_flat = np.abs(np.linalg.det(linear)) < 0.05
+        linear[is_flat] = np.eye(3)
+        row = np.linalg.inv(linear)[:, 1, :]
+        shift = -(row * blended[held, :, 3]).sum(1)
+        self.held = self.held[torch.from_numpy(~is_flat)]
+        self.rows = narrow(np.concatenate([row, shift[:, None]], axis=1)[~is_flat])
 
     def strain(self, x):
         a, b, c = (x[self.faces[:, k]] for k in range(3))
@@ -117,13 +130,14 @@ class Garment:
         pairs = -torch.log(torch.where(close, distance, torch.ones(())) ** 2).sum() / 2
         return pairs / self.count if self.settings["repulsion_per_vertex"] else pairs
 
-    def holding(self, y):
-        return ((y[self.held, 1] - self.reference[self.held, 1]) ** 2).sum()
+    def holding(self, x, y):
+        height = y[self.held, 1] if self.rows is None else (self.rows[:, :3] * x[self.held]).sum(1) + self.rows[:, 3]
+        return ((height - self.reference[self.held, 1]) ** 2).sum()
 
     def term(self, name, x, y, body):
         """One term at posed positions x and canonical positions y."""
         if name == "holding":
-            return self.holding(y)
+            return self.holding(x, y)
         return self.body_collision(x, body) if name == "body_collision" else getattr(self, name)(x)
 
 

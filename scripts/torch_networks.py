@@ -172,8 +172,9 @@ class ClothCombo(nn.Module):
             raw = raw - mask * raw.sum(1, keepdim=True) / mask.sum(1, keepdim=True)
         transforms = torch.einsum("vj,jab->vab", outfit.weights + config["skinning_scale"] * raw, outfit.bones)
         pose = lambda x: torch.einsum("vab,vb->va", transforms[:, :, :3], x) + transforms[:, :, 3]
-        single = (pose(canonical), canonical) if alone or not outfit.contacts else ()
-        if not outfit.contacts:
+        moves = bool(outfit.touched.any())
+        single = (pose(canonical), canonical) if alone or not moves else ()
+        if not moves:
             return single + single if alone else single
         i, j = outfit.edges
         forces = self.force(torch.cat([draping[i], draping[j]], dim=1))

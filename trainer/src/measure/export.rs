@@ -111,6 +111,7 @@ fn description(subject: &Subject, scene: &PreparedScene) -> Result<Value, Report
                 "name": worn.garment.name,
                 "vertices": worn.vertex_count(),
                 "held": dressed.energies.has_holding(),
+                "held_posed": dressed.pull_back.is_some(),
                 "weights": weights(&dressed.weights),
             })
         })
