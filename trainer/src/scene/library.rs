@@ -60,8 +60,8 @@ pub struct LicenceLine {
     pub count: usize,
 }
 
-/// What a fingerprint of this kind begins with; earlier ones looked at less.
-const FINGERPRINT: &str = "3:";
+/// What a fingerprint of this kind begins with; earlier ones looked at less, or split the poses otherwise.
+const FINGERPRINT: &str = "4:";
 
 /// Whether `text` is a [fingerprint](Library::fingerprint) as they are made now, and can be compared with another.
 pub fn is_fingerprint(text: &str) -> bool {
@@ -123,18 +123,20 @@ impl Library {
     /// Which garments and clips are for what, by name: what a run writes down.
     pub fn split_names(&self) -> SplitNames {
         let names = |indices: &[usize]| indices.iter().map(|&i| self.wardrobe.card(i).name.clone()).collect();
-        let [training_clips, unseen_clips] = self.poses.clips();
+        let clips = self.poses.clips();
         SplitNames {
             training_garments: names(&self.split.training),
             validation_garments: names(&self.split.validation),
             test_garments: names(&self.split.test),
-            training_clips: training_clips.to_vec(),
-            unseen_clips: unseen_clips.to_vec(),
+            training_clips: clips.training,
+            validation_windows: clips.windows,
+            validation_clips: clips.validation,
+            test_clips: clips.test,
         }
     }
 
-    /// A fingerprint of what scenes are drawn from: garments (name, category, mesh), body and every frame of the poses. Equal
-    /// data gives equal scenes.
+    /// A fingerprint of what scenes are drawn from: garments (name, category, mesh), body and every frame of the poses with
+    /// what it is for. Equal data gives equal scenes.
     pub fn fingerprint(&self) -> &str {
         self.fingerprint.get_or_init(|| format!("{FINGERPRINT}{}", self.key()))
     }
