@@ -2,11 +2,11 @@
 
 use super::active_joints::ActiveJoints;
 use super::error::LibraryError;
-use super::poses::PoseLibrary;
+use super::poses::{HeldOut, PoseLibrary};
 use super::split::{GarmentSplit, SplitNames};
 use super::wardrobe::Wardrobe;
 use crate::config::Config;
-use clothcombo_data::asset::{BODY_JOINT_COUNT, Body, BodyFileSettings, Provenance};
+use clothcombo_data::asset::{BODY_JOINT_COUNT, Body, BodyFileSettings, Pose, Provenance};
 use clothcombo_data::cache::{Key, KeyBuilder, body_key};
 use clothcombo_data::format::npz::NpzFile;
 use clothcombo_data::generate::mannequin;
@@ -85,6 +85,17 @@ fn body_source(name: &str) -> Provenance {
     Provenance { source: text("source"), author: text("author"), licence: text("licence") }
 }
 
+/// `key` with the poses of every one of `parts`.
+fn poses_key(mut key: KeyBuilder, parts: &[&[Pose]]) -> Key {
+    for part in parts {
+        key = key.number(part.len() as u64);
+        for pose in *part {
+            key = key.array(pose.rotations.as_flattened());
+        }
+    }
+    key.finish()
+}
+
 impl Library {
     /// Loads and prepares everything `config` names. `progress(done, total, name)` is called per garment.
     ///
@@ -141,7 +152,18 @@ impl Library {
         self.fingerprint.get_or_init(|| format!("{FINGERPRINT}{}", self.key()))
     }
 
+    /// A fingerprint of what outfits in held-out windows are drawn from: garments, body, and the frames of the windows. Two models
+    /// for which it is the same can be asked about the same outfits, whatever else their poses were split into.
+    pub fn fingerprint_of_windows(&self) -> String {
+        poses_key(self.assets(), &[self.poses.held_out(HeldOut::Windows)]).to_string()
+    }
+
     fn key(&self) -> Key {
+        poses_key(self.assets(), &self.poses.frames())
+    }
+
+    /// Body and garments.
+    fn assets(&self) -> KeyBuilder {
         let body = &self.body;
         let mut key = KeyBuilder::new("data")
             .key(body_key(body))
@@ -156,13 +178,7 @@ impl Library {
                 .number(u64::from(card.holding))
                 .key(card.mesh);
         }
-        for part in self.poses.frames() {
-            key = key.number(part.len() as u64);
-            for pose in part {
-                key = key.array(pose.rotations.as_flattened());
-            }
-        }
-        key.finish()
+        key
     }
 
     /// Under which terms the data may be used: body, garments, motions, one line per author and licence.

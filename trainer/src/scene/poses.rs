@@ -185,6 +185,14 @@ impl PoseLibrary {
         }
     }
 
+    /// The captured poses of one kind; none when poses are sampled.
+    pub fn held_out(&self, kind: HeldOut) -> &[Pose] {
+        match &self.source {
+            Source::Frames(f) => f.held_out(kind),
+            Source::Sampler(_) => &[],
+        }
+    }
+
     /// Whether there are poses of this kind.
     pub fn has(&self, kind: HeldOut) -> bool {
         match &self.source {

@@ -103,3 +103,19 @@ fn without_a_validation_set_its_groups_are_empty() {
     assert_eq!(draws(ValidationGroup::UnseenGarment), 0);
     assert_eq!(draws(ValidationGroup::UnseenMotion), ValidationConfig::default().unseen_scenes);
 }
+
+#[test]
+fn another_margin_is_other_data_with_the_same_windows() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut config, library) = library(folder.path());
+    let same = |config: &Config| {
+        let other = Library::load(config, &|_, _, _| {}).unwrap();
+        let windows = library.fingerprint_of_windows() == other.fingerprint_of_windows();
+        (library.fingerprint() == other.fingerprint(), windows)
+    };
+    assert_eq!(same(&config), (true, true));
+    config.data.poses.held_out_margin = 0.0;
+    assert_eq!(same(&config), (false, true));
+    config.data.poses.held_out_block = 1.0;
+    assert_eq!(same(&config), (false, false));
+}
