@@ -13,7 +13,7 @@ import textwrap
 
 from PIL import Image
 
-FIRST, LAST = "### Networks and skinning (Table 2)\n", "## Smoke training\n"
+FIRST, LAST = "### Sets\n", "## Smoke training\n"
 WIDTH = 131
 DOCS = pathlib.Path(__file__).resolve().parent.parent / "docs"
 

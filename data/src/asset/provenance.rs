@@ -12,3 +12,16 @@ pub struct Provenance {
     /// Licence, as an SPDX identifier where there is one.
     pub licence: String,
 }
+
+/// How the source of a garment made by the generator begins.
+pub(crate) const GENERATED: &str = "generated for ";
+/// What the source of a garment cut from helper meshes of the body contains.
+pub(crate) const CUT_FROM_HELPERS: &str = "cut from the clothing helpers";
+
+impl Provenance {
+    /// Whether this project made the garment, by its generator or from helper meshes of the body. Garments of one maker are
+    /// relatives: one of them that was never trained on is still like those that were.
+    pub fn is_made_here(&self) -> bool {
+        self.source.starts_with(GENERATED) || self.source.contains(CUT_FROM_HELPERS)
+    }
+}

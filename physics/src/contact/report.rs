@@ -25,8 +25,12 @@ impl Intersections {
 
     /// Those of a surface with itself. Exact.
     pub fn within(mesh: &TriangleTree) -> Self {
-        let pairs = mesh.self_pairs();
-        Self::new(&pairs, &self_contours(mesh, &pairs))
+        Self::of_self_pairs(mesh, &mesh.self_pairs())
+    }
+
+    /// The same where `pairs`, those of [`TriangleTree::self_pairs`], are known already.
+    pub fn of_self_pairs(mesh: &TriangleTree, pairs: &[(u32, u32)]) -> Self {
+        Self::new(pairs, &self_contours(mesh, pairs))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::{CONFIG, CheckpointError, CheckpointState, MODEL_EXCHANGE, newest, read_state, verify};
 use crate::config::{Config, PoseConfig, load};
-use crate::scene::{Library, is_trained_on};
+use crate::scene::{GarmentPurpose, Library, purpose};
 use crate::session::state;
 use burn::store::{ModuleSnapshot, SafetensorsStore};
 use burn::tensor::Device;
@@ -83,24 +83,41 @@ impl TrainedModel {
         }
     }
 
-    /// What `config` holds out of `library`, its data, although these networks were trained on it, in words: scores would be
-    /// those of known garments or poses. Only where the garments come from the same sources, or the motions from the same
-    /// folder, can it be told.
+    /// What `config` holds out of `library`, its data, although these networks were trained on it, or what it keeps for the
+    /// test although the validation of their run looked at it, in words: scores would be those of known garments or poses.
+    /// Only where the garments come from the same sources, or the motions from the same folder, can it be told.
     pub fn known_of_held_out(&self, config: &Config, library: &Library) -> Vec<String> {
         let mut found = Vec::new();
         let (trained, data) = (&self.config.data, &config.data);
-        let held_out = [&library.split.validation, &library.split.test].into_iter().flatten();
-        let names = held_out.map(|&garment| library.wardrobe.card(garment).name.as_str());
-        let known: Vec<&str> = names.filter(|name| is_trained_on(name, trained)).collect();
-        if !known.is_empty() && trained.garments == data.garments {
-            found.push(format!("was trained on held-out garments: {}", known.join(", ")));
+        let known = |garments: &[usize], was: GarmentPurpose| -> Vec<&str> {
+            let names = garments.iter().map(|&garment| library.wardrobe.card(garment).name.as_str());
+            names.filter(|name| purpose(name, trained) == was).collect()
+        };
+        let held_out = [library.split.validation.as_slice(), &library.split.test].concat();
+        if trained.garments == data.garments {
+            for (names, what) in [
+                (known(&held_out, GarmentPurpose::Training), "was trained on held-out garments"),
+                (known(&library.split.test, GarmentPurpose::Validation), "was validated on test garments"),
+            ] {
+                if !names.is_empty() {
+                    found.push(format!("{what}: {}", names.join(", ")));
+                }
+            }
         }
         let [before, now] = [trained, data].map(|data| &data.poses);
-        let holds_out = |poses: &PoseConfig| {
-            (poses.held_out_clips.clone(), poses.held_out_share.to_bits(), poses.held_out_block.to_bits())
-        };
-        if before.motions.is_some() && before.motions == now.motions && holds_out(before) != holds_out(now) {
-            found.push("may have been trained on held-out poses: other ones were held out of it".to_owned());
+        if before.motions.is_some() && before.motions == now.motions {
+            if held_out_poses(before) != held_out_poses(now) {
+                found.push(
+                    "may have been trained on held-out poses: other ones were held out of it".to_owned(),
+                );
+            }
+            let was_validated =
+                |clip: &String| before.validation_clips.iter().any(|name| clip.contains(name));
+            let validated: Vec<String> =
+                library.poses.clips().test.into_iter().filter(was_validated).collect();
+            if !validated.is_empty() {
+                found.push(format!("was validated on test clips: {}", validated.join(", ")));
+            }
         }
         found
     }
@@ -153,4 +170,12 @@ impl TrainedModel {
     pub fn checksum(&self) -> &str {
         self.state.checksums.get(MODEL_EXCHANGE).map_or("", String::as_str)
     }
+}
+
+/// What is never trained on, whatever reads it: names of clips, share, length and margin of the windows.
+fn held_out_poses(poses: &PoseConfig) -> (Vec<&str>, [u64; 3]) {
+    let mut clips: Vec<&str> =
+        poses.validation_clips.iter().chain(&poses.test_clips).map(String::as_str).collect();
+    clips.sort_unstable();
+    (clips, [poses.held_out_share, poses.held_out_block, poses.held_out_margin].map(f64::to_bits))
 }

@@ -21,8 +21,8 @@ use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 /// The paper's tables for a trained model, speed against error, stability, pictures
 ///
-/// Writes eval.json, eval.md and report.html, one page that needs no network. Scenes are drawn from the seed: poses and shapes
-/// never trained on, garments never trained on apart from the others.
+/// Writes eval.json, eval.md and report.html, one page that needs no network. Scenes are drawn from the seed. Training, validation
+/// and test set (the latter read by no run) are reported one by one.
 #[derive(Parser)]
 #[command(after_help = "Examples:\n  clothcombo eval -o report\n  \
         clothcombo eval --checkpoint runs/open --quick -o report\n  \
@@ -156,17 +156,17 @@ fn others(arguments: &Arguments, named: &[(String, PathBuf)], first: &Subject) -
     named.iter().map(other).collect()
 }
 
-/// Ablations are compared on the same outfits, which are drawn from a model's own data.
+/// Ablations are compared on the same outfits, which are drawn from a model's own data: all garments, in held-out windows.
 fn check_ablations(ablations: &[Other], first: &Subject) -> Result<(), Report> {
     let differs = |other: &&Other| {
         let [own, of_first] = [&other.subject, first];
-        own.library.fingerprint() != of_first.library.fingerprint()
+        own.library.fingerprint_of_windows() != of_first.library.fingerprint_of_windows()
             || own.config.data.shape_range != of_first.config.data.shape_range
     };
     match ablations.iter().find(differs) {
         None => Ok(()),
         Some(other) => Err(miette!(
-            help = "train it on the data of the evaluated model: body, garments, motions, data.shape_range",
+            help = "train it on the data of the evaluated model: body, garments, held-out windows of the motions, data.shape_range",
             "--ablation {}: it was trained on other data",
             other.name
         )),

@@ -13,7 +13,7 @@ use crate::observer::{
 };
 use crate::report::gibibytes;
 use crate::run_dir::RunDir;
-use crate::scene::Library;
+use crate::scene::{FrameCounts, Library};
 use crate::session::Session;
 use crate::stop::StopFlag;
 use crate::train_loop::train;
@@ -282,9 +282,10 @@ fn load_library(config: &Config) -> Result<Library, Report> {
             library.joints().len(),
             library.shape_count,
             match library.poses.frame_counts() {
-                Some([train, held_out, unseen]) => {
-                    format!(" · {train} motion frames ({held_out} more held out, {unseen} of unseen clips)")
-                }
+                Some(FrameCounts { training, windows, validation, test }) => format!(
+                    " · {training} motion frames (never trained on: {windows} of held-out windows, {validation} of \
+                     validation clips, {test} of test clips)"
+                ),
                 None => " · sampled poses".into(),
             }
         ));

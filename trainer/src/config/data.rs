@@ -22,7 +22,8 @@ pub struct DataConfig {
     pub shape_range: [f64; 2],
     /// Sources of garments, all used together.
     pub garments: Vec<GarmentSource>,
-    /// Garments of these names are never trained on, nor validated on during the run: they are for the final test.
+    /// Garments of these names are for the final test: never trained on, and read by no validation, no choice of the best
+    /// checkpoint and no picture of a run. `clothcombo eval` reads them.
     #[serde(default)]
     pub held_out_garments: Vec<String>,
     /// Shares of the other garments that are not trained on.
@@ -65,7 +66,7 @@ fn memory_mib() -> usize {
 pub struct SplitConfig {
     /// Share that is scored during the run but never trained on.
     pub validation: f64,
-    /// Share that is neither trained on nor scored during the run.
+    /// Share that is for the final test, as `data.held_out_garments` is.
     pub test: f64,
 }
 
@@ -141,14 +142,20 @@ pub enum PoseEncoding {
 pub struct PoseConfig {
     /// Folder of motion npz files; without it poses are drawn within joint limits.
     pub motions: Option<PathBuf>,
-    /// Clips whose name contains one of these are never trained on: validation on unseen motion.
-    pub held_out_clips: Vec<String>,
-    /// Share of every other clip that is never trained on, in blocks spread over the clip: validation on the trained kinds of
-    /// motion. One block in every `1 / held_out_share`, rounded, at most every second one. A clip shorter than half of
+    /// Clips whose name contains one of these are never trained on; every validation of the run scores them.
+    pub validation_clips: Vec<String>,
+    /// Clips whose name contains one of these are for the final test: never trained on, and read by no validation, no choice
+    /// of the best checkpoint and no picture of a run. `clothcombo eval` reads them.
+    pub test_clips: Vec<String>,
+    /// Share of every other clip that is never trained on, in windows spread over the clip, which every validation scores. One
+    /// block of `held_out_block` in every `1 / held_out_share`, rounded, at most every second one. A clip shorter than half of
     /// `held_out_block / held_out_share` is trained on whole.
     pub held_out_share: f64,
-    /// Length of such a block [s]; long against the time in which a pose changes.
+    /// Length of such a window [s]; long against the time in which a pose changes.
     pub held_out_block: f64,
+    /// Time on both sides of such a window that is neither trained on nor validated [s]. Frames next door show nearly the same
+    /// pose; 1 s later a moving body is in another one. It is taken from the trained part.
+    pub held_out_margin: f64,
     /// Mirror, interpolation between frames of any clips, exchange of limbs between frames, scaling of joints, noise.
     pub augmentation: bool,
     /// Training poses in which far-apart parts of the body run through each other are drawn again: the most length [m]
@@ -165,14 +172,54 @@ impl Default for PoseConfig {
     fn default() -> Self {
         Self {
             motions: None,
-            held_out_clips: Vec::new(),
+            validation_clips: Vec::new(),
+            test_clips: Vec::new(),
             held_out_share: 0.1,
             held_out_block: 2.0,
+            held_out_margin: 1.0,
             augmentation: true,
             max_self_intersection: 0.1,
             encoding: PoseEncoding::RotationMatrix,
             remove_heading: true,
         }
+    }
+}
+
+impl PoseConfig {
+    /// One block in so many is held out.
+    pub(crate) fn blocks_per_window(&self) -> usize {
+        (1.0 / self.held_out_share).round().max(2.0) as usize
+    }
+
+    /// What is inconsistent, as (place, what, hint).
+    fn problem(&self) -> Option<(String, String, String)> {
+        let says = |p: &str, w: &str, h: &str| Some((format!("data.poses.{p}"), w.into(), h.into()));
+        if !(self.held_out_share > 0.0 && self.held_out_share < 1.0) {
+            return says("held_out_share", "is not a share between 0 and 1", "for example 0.1");
+        }
+        if !(self.held_out_block.is_finite() && self.held_out_block > 0.0) {
+            return says("held_out_block", "is not a positive time", "for example 2.0 seconds");
+        }
+        if !(self.held_out_margin.is_finite() && self.held_out_margin >= 0.0) {
+            return says("held_out_margin", "is not a time", "for example 1.0 seconds; 0 leaves no margin");
+        }
+        let between = (self.blocks_per_window() - 1) as f64 * self.held_out_block;
+        if self.motions.is_some() && 2.0 * self.held_out_margin >= between {
+            return says(
+                "held_out_margin",
+                "leaves nothing to train on between two held-out windows",
+                "shorten it, lengthen data.poses.held_out_block or lower data.poses.held_out_share: twice the margin must \
+                 be less than held_out_block * (1 / held_out_share - 1)",
+            );
+        }
+        if self.max_self_intersection.is_nan() || self.max_self_intersection < 0.0 {
+            return says(
+                "max_self_intersection",
+                "is not a length in metres",
+                "for example 0.1; 10 lets every pose pass",
+            );
+        }
+        None
     }
 }
 
@@ -244,18 +291,8 @@ impl DataConfig {
         if self.memory_mib == 0 {
             return says("data.memory_mib", "must be at least 1", "for example 1024");
         }
-        if !(self.poses.held_out_share > 0.0 && self.poses.held_out_share < 1.0) {
-            return says("data.poses.held_out_share", "is not a share between 0 and 1", "for example 0.1");
-        }
-        if !(self.poses.held_out_block.is_finite() && self.poses.held_out_block > 0.0) {
-            return says("data.poses.held_out_block", "is not a positive time", "for example 2.0 seconds");
-        }
-        if self.poses.max_self_intersection.is_nan() || self.poses.max_self_intersection < 0.0 {
-            return says(
-                "data.poses.max_self_intersection",
-                "is not a length in metres",
-                "for example 0.1; 10 lets every pose pass",
-            );
+        if let Some(problem) = self.poses.problem() {
+            return Some(problem);
         }
         for (i, source) in self.garments.iter().enumerate() {
             if let Some(g) = &source.generate

@@ -1,6 +1,7 @@
 //! Reading a configuration: file, then `--set` overrides, then consistency; errors show the place.
 
 use super::Config;
+use super::renamed::with_new_name;
 use super::sources::{Place, Sources};
 use miette::{Diagnostic, NamedSource, SourceSpan};
 use serde::Deserialize;
@@ -105,7 +106,7 @@ pub fn parse(text: &str, path: &Path, overrides: &[String]) -> Result<Config, Co
         for setting in overrides {
             let bad = |message: String| ConfigError::BadOverride { setting: shortened(setting), message };
             apply(&mut tree, setting).map_err(bad)?;
-            config = tree.clone().try_into().map_err(|e: toml::de::Error| bad(e.message().to_owned()))?;
+            config = tree.clone().try_into().map_err(|e: toml::de::Error| bad(with_new_name(e.message())))?;
         }
     }
     match config.problem() {
@@ -238,6 +239,13 @@ mod tests {
         }
         let e = load(written(SMALL).path(), &["losses.strian.weight=1".into()]).unwrap_err();
         assert!(e.to_string().contains("strian"), "{e}");
+        // A key that is gone names its successors.
+        let gone = SMALL.replace("[data]\n", "[data]\nposes = { held_out_clips = [] }\n");
+        let setting = "data.poses.held_out_clips=[]".to_owned();
+        for e in [load(written(&gone).path(), &[]), load(written(SMALL).path(), &[setting])] {
+            let text = e.unwrap_err().to_string();
+            assert!(text.contains("data.poses.validation_clips") && text.contains("test_clips"), "{text}");
+        }
     }
 
     #[test]
@@ -263,6 +271,23 @@ mod tests {
             let e = load(&file("wrong.toml", text), &[]).unwrap_err();
             assert!(e.to_string().contains(reason), "{e}");
         }
+    }
+
+    #[test]
+    fn margins_that_leave_nothing_to_train_on_are_refused() {
+        let moving = SMALL.replace("[data]\n", "[data]\nposes = { motions = \"motions\" }\n");
+        let load = |text: &str, settings: &[&str]| {
+            let settings: Vec<String> = settings.iter().map(|s| format!("data.poses.{s}")).collect();
+            load(written(text).path(), &settings)
+        };
+        assert_eq!(load(&moving, &[]).unwrap().data.poses.held_out_margin, 1.0);
+        for settings in [&["held_out_share=0.5"][..], &["held_out_block=0.2"], &["held_out_margin=-1"]] {
+            let e = load(&moving, settings).unwrap_err().to_string();
+            assert!(e.contains("data.poses.held_out_margin"), "{settings:?}: {e}");
+        }
+        assert!(load(&moving, &["held_out_share=0.5", "held_out_block=4"]).is_ok());
+        // Sampled poses have no windows.
+        assert!(load(SMALL, &["held_out_share=0.5"]).is_ok());
     }
 
     #[test]

@@ -9,6 +9,7 @@ mod losses;
 mod optimizer;
 mod output;
 mod ramp;
+mod renamed;
 mod schema;
 mod sources;
 mod stages;

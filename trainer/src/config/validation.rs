@@ -4,7 +4,8 @@ use super::stages::MOST_LAYERS;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Fixed validation scenes of held-out poses and shapes.
+/// Fixed validation scenes of held-out poses and shapes. The test set (data.held_out_garments, data.split.test,
+/// data.poses.test_clips) is in none of them.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ValidationConfig {
@@ -14,9 +15,9 @@ pub struct ValidationConfig {
     pub seed: Option<u64>,
     /// Scenes of one garment. About fifty bring the standard error of a mean loss to a tenth of its spread.
     pub single_scenes: usize,
-    /// Scenes of one garment on motion clips never trained on (data.poses.held_out_clips).
+    /// Scenes of one garment in the motion clips of data.poses.validation_clips.
     pub unseen_scenes: usize,
-    /// Scenes of one garment never trained on (data.split.validation), in held-out poses.
+    /// Scenes of one garment of data.split.validation, in held-out poses.
     pub unseen_garment_scenes: usize,
     /// Scenes of several layers. Fewer than single ones: each costs several times as much.
     pub layered_scenes: usize,

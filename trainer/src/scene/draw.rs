@@ -4,7 +4,7 @@
 //! another thread changes nothing.
 
 use super::library::Library;
-use super::poses::Unseen;
+use super::poses::HeldOut;
 use crate::config::{StageConfig, ValidationConfig};
 use clothcombo_data::asset::Pose;
 use rand::RngExt;
@@ -92,12 +92,15 @@ pub fn draw_training(library: &Library, seed: u64, step: u64, scene: usize, plan
 const OUTFIT_STREAM: u64 = VALIDATION_STREAM + (16 << 32);
 
 /// Outfit `index`: 1 to `most` garments (one more from each outfit to the next) of the whole wardrobe, held-out ones among
-/// them, in random order, on a body in a pose of a clip never trained on.
+/// them, in random order, on a body in a pose of a validation clip, or of a held-out window where there are none. The test
+/// clips stay unread: the post-process is tuned on these outfits.
 pub fn draw_outfit(library: &Library, seed: u64, index: u64, most: usize) -> SceneDraw {
     let mut rng = generator(seed, OUTFIT_STREAM + index);
     let all: Vec<usize> = (0..library.wardrobe.len()).collect();
     let garments = garments(&all, 1 + index as usize % most.max(1), &mut rng);
-    let pose = library.poses.draw_held_out(Unseen::Clips, &mut rng);
+    let clips = HeldOut::ValidationClips;
+    let poses = if library.poses.has(clips) { clips } else { HeldOut::Windows };
+    let pose = library.poses.draw_held_out(poses, &mut rng);
     scored(garments, BodyDraw { shape: shape(library, &mut rng), pose })
 }
 
@@ -105,32 +108,32 @@ pub fn draw_outfit(library: &Library, seed: u64, index: u64, most: usize) -> Sce
 const STUDY_STREAM: u64 = VALIDATION_STREAM + (32 << 32);
 
 /// Scene `index` of question number `question` of an evaluation: `layers` garments of `pool` in random order, on a body in a
-/// pose never trained on.
+/// pose of `poses`.
 pub fn draw_study(
     library: &Library,
     seed: u64,
     [question, index]: [usize; 2],
     pool: &[usize],
     layers: usize,
-    unseen: Unseen,
+    poses: HeldOut,
 ) -> SceneDraw {
     let mut rng = generator(seed, STUDY_STREAM + ((question as u64) << 32) + index as u64);
     // The body first: with it, a question asked of two wardrobes is asked on the same bodies.
     let body =
-        BodyDraw { shape: shape(library, &mut rng), pose: library.poses.draw_held_out(unseen, &mut rng) };
+        BodyDraw { shape: shape(library, &mut rng), pose: library.poses.draw_held_out(poses, &mut rng) };
     scored(garments(pool, layers, &mut rng), body)
 }
 
-/// What a validation scene is drawn for.
+/// What a validation scene is drawn for. No group draws a garment or a clip of the test set.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ValidationGroup {
-    /// One garment, held-out poses of the trained clips.
+    /// One trained garment, held-out windows of the trained clips.
     Single,
-    /// One garment, clips never trained on.
+    /// One trained garment, validation clips.
     UnseenMotion,
-    /// One garment never trained on, held-out poses of the trained clips.
+    /// One validation garment, held-out windows of the trained clips.
     UnseenGarment,
-    /// Several layers, held-out poses of the trained clips.
+    /// Several layers of trained garments, held-out windows of the trained clips.
     Layered,
 }
 
@@ -152,8 +155,8 @@ impl ValidationGroup {
     pub fn name(self) -> &'static str {
         match self {
             Self::Single => "single garments",
-            Self::UnseenMotion => "single garments, unseen clips",
-            Self::UnseenGarment => "single garments, never trained on",
+            Self::UnseenMotion => "single garments, validation clips",
+            Self::UnseenGarment => "single validation garments",
             Self::Layered => "layered outfits",
         }
     }
@@ -172,14 +175,14 @@ pub fn draw_validation(
     config: &ValidationConfig,
     group: ValidationGroup,
 ) -> Vec<SceneDraw> {
-    let (count, unseen) = match group {
-        ValidationGroup::Single => (config.single_scenes, Unseen::Poses),
-        ValidationGroup::UnseenMotion if !library.poses.has_unseen_clips() => (0, Unseen::Clips),
-        ValidationGroup::UnseenMotion => (config.unseen_scenes, Unseen::Clips),
-        ValidationGroup::UnseenGarment if library.split.validation.is_empty() => (0, Unseen::Poses),
-        ValidationGroup::UnseenGarment => (config.unseen_garment_scenes, Unseen::Poses),
-        ValidationGroup::Layered => (config.layered_scenes, Unseen::Poses),
+    let (count, poses) = match group {
+        ValidationGroup::Single => (config.single_scenes, HeldOut::Windows),
+        ValidationGroup::UnseenMotion => (config.unseen_scenes, HeldOut::ValidationClips),
+        ValidationGroup::UnseenGarment => (config.unseen_garment_scenes, HeldOut::Windows),
+        ValidationGroup::Layered => (config.layered_scenes, HeldOut::Windows),
     };
+    let is_without = group == ValidationGroup::UnseenGarment && library.split.validation.is_empty();
+    let count = if is_without || !library.poses.has(poses) { 0 } else { count };
     let one = |pool: &[usize], i: usize| vec![pool[in_turn(i, count, pool.len())]];
     (0..count)
         .map(|i| {
@@ -192,8 +195,11 @@ pub fn draw_validation(
                 ValidationGroup::UnseenGarment => one(&library.split.validation, i),
                 ValidationGroup::Single | ValidationGroup::UnseenMotion => one(&library.split.training, i),
             };
-            let pose = library.poses.draw_held_out(unseen, &mut rng);
+            let pose = library.poses.draw_held_out(poses, &mut rng);
             scored(garments, BodyDraw { shape: shape(library, &mut rng), pose })
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests;

@@ -63,15 +63,24 @@ pub enum LibraryError {
         available: String,
     },
     /// A held-out name fits no clip.
-    #[error("data.poses.held_out_clips names {name:?}, which fits no clip in {}", folder.display())]
+    #[error("data.poses.{key} names {name:?}, which fits no clip in {}", folder.display())]
     #[diagnostic(help("the clips are: {clips}"))]
     UnknownClip {
+        /// The key.
+        key: &'static str,
         /// The motion folder.
         folder: PathBuf,
         /// The name.
         name: String,
         /// The clips of the folder.
         clips: String,
+    },
+    /// A clip is for validation and for the test.
+    #[error("clip {clip} is named by data.poses.validation_clips and by data.poses.test_clips")]
+    #[diagnostic(help("a clip is for one of them; a name stands for every clip whose name contains it"))]
+    ClipOfTwoSets {
+        /// The clip.
+        clip: String,
     },
     /// A wanted name fits no garment of its source.
     #[error("data.garments[{source_index}].only names {name:?}, which is no garment of this source")]
@@ -87,7 +96,8 @@ pub enum LibraryError {
     /// One side of the pose split is empty.
     #[error("{}: {train} frames to train on and {held_out} held out", folder.display())]
     #[diagnostic(help(
-        "both must be positive: change data.poses.held_out_clips, held_out_share or held_out_block"
+        "both must be positive: change data.poses.validation_clips, test_clips, held_out_share, held_out_block or \
+         held_out_margin"
     ))]
     EmptySplit {
         /// The motion folder.

@@ -2,11 +2,11 @@
 
 use super::active_joints::ActiveJoints;
 use super::error::LibraryError;
-use super::poses::PoseLibrary;
+use super::poses::{HeldOut, PoseLibrary};
 use super::split::{GarmentSplit, SplitNames};
 use super::wardrobe::Wardrobe;
 use crate::config::Config;
-use clothcombo_data::asset::{BODY_JOINT_COUNT, Body, BodyFileSettings, Provenance};
+use clothcombo_data::asset::{BODY_JOINT_COUNT, Body, BodyFileSettings, Pose, Provenance};
 use clothcombo_data::cache::{Key, KeyBuilder, body_key};
 use clothcombo_data::format::npz::NpzFile;
 use clothcombo_data::generate::mannequin;
@@ -63,8 +63,8 @@ pub struct LicenceLine {
     pub count: usize,
 }
 
-/// What a fingerprint of this kind begins with; earlier ones looked at less.
-const FINGERPRINT: &str = "3:";
+/// What a fingerprint of this kind begins with; earlier ones looked at less, or split the poses otherwise.
+const FINGERPRINT: &str = "4:";
 
 /// Whether `text` is a [fingerprint](Library::fingerprint) as they are made now, and can be compared with another.
 pub fn is_fingerprint(text: &str) -> bool {
@@ -86,6 +86,17 @@ fn body_source(name: &str) -> Provenance {
         found.unwrap_or_default()
     };
     Provenance { source: text("source"), author: text("author"), licence: text("licence") }
+}
+
+/// `key` with the poses of every one of `parts`.
+fn poses_key(mut key: KeyBuilder, parts: &[&[Pose]]) -> Key {
+    for part in parts {
+        key = key.number(part.len() as u64);
+        for pose in *part {
+            key = key.array(pose.rotations.as_flattened());
+        }
+    }
+    key.finish()
 }
 
 impl Library {
@@ -127,23 +138,36 @@ impl Library {
     /// Which garments and clips are for what, by name: what a run writes down.
     pub fn split_names(&self) -> SplitNames {
         let names = |indices: &[usize]| indices.iter().map(|&i| self.wardrobe.card(i).name.clone()).collect();
-        let [training_clips, unseen_clips] = self.poses.clips();
+        let clips = self.poses.clips();
         SplitNames {
             training_garments: names(&self.split.training),
             validation_garments: names(&self.split.validation),
             test_garments: names(&self.split.test),
-            training_clips: training_clips.to_vec(),
-            unseen_clips: unseen_clips.to_vec(),
+            training_clips: clips.training,
+            validation_windows: clips.windows,
+            validation_clips: clips.validation,
+            test_clips: clips.test,
         }
     }
 
-    /// A fingerprint of what scenes are drawn from: garments (name, category, mesh), body and every frame of the poses. Equal
-    /// data gives equal scenes.
+    /// A fingerprint of what scenes are drawn from: garments (name, category, mesh), body and every frame of the poses with
+    /// what it is for. Equal data gives equal scenes.
     pub fn fingerprint(&self) -> &str {
         self.fingerprint.get_or_init(|| format!("{FINGERPRINT}{}", self.key()))
     }
 
+    /// A fingerprint of what outfits in held-out windows are drawn from: garments, body, and the frames of the windows. Two models
+    /// for which it is the same can be asked about the same outfits, whatever else their poses were split into.
+    pub fn fingerprint_of_windows(&self) -> String {
+        poses_key(self.assets(), &[self.poses.held_out(HeldOut::Windows)]).to_string()
+    }
+
     fn key(&self) -> Key {
+        poses_key(self.assets(), &self.poses.frames())
+    }
+
+    /// Body and garments.
+    fn assets(&self) -> KeyBuilder {
         let body = &self.body;
         let mut key = KeyBuilder::new("data")
             .key(body_key(body))
@@ -158,13 +182,7 @@ impl Library {
                 .number(u64::from(card.holding))
                 .key(card.mesh);
         }
-        for part in self.poses.frames() {
-            key = key.number(part.len() as u64);
-            for pose in part {
-                key = key.array(pose.rotations.as_flattened());
-            }
-        }
-        key.finish()
+        key
     }
 
     /// Under which terms the data may be used: body, garments, motions, one line per author and licence.

@@ -8,9 +8,11 @@ use clothcombo_data::asset::{Body, Pose, Provenance};
 use clothcombo_data::dataset::load_motion_folder;
 use clothcombo_data::generate::{PoseAugmentation, PoseSampler, SelfContact};
 use frames::Frames;
+pub use frames::{ClipSplit, Window};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use serde::Serialize;
 use std::sync::Arc;
 
 /// All poses of a run, split by clip.
@@ -52,17 +54,33 @@ const DRAWS: usize = 8;
 const REPORTED_POSES: usize = 64;
 
 enum Source {
-    Frames(Frames),
+    Frames(Box<Frames>),
     Sampler(PoseSampler),
 }
 
-/// Which poses a validation scene draws from.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Unseen {
-    /// Frames of the trained clips that were never trained on.
-    Poses,
-    /// Clips that were never trained on.
-    Clips,
+/// Poses never trained on, by what reads them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum HeldOut {
+    /// Windows of the trained clips, which every validation of a run scores; sampled poses where there are no clips.
+    Windows,
+    /// Clips that every validation of a run scores.
+    ValidationClips,
+    /// Clips that no run reads.
+    TestClips,
+}
+
+/// Numbers of captured frames by what they are for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FrameCounts {
+    /// Trained on.
+    pub training: usize,
+    /// In the windows held out of the trained clips.
+    pub windows: usize,
+    /// In validation clips.
+    pub validation: usize,
+    /// In test clips.
+    pub test: usize,
 }
 
 impl PoseLibrary {
@@ -76,18 +94,7 @@ impl PoseLibrary {
             None => Source::Sampler(PoseSampler::default()),
             Some(folder) => {
                 let clips = load_motion_folder(folder).map_err(LibraryError::data)?;
-                if let Some(name) = config
-                    .held_out_clips
-                    .iter()
-                    .find(|name| !clips.iter().any(|clip| clip.name.contains(name.as_str())))
-                {
-                    return Err(LibraryError::UnknownClip {
-                        folder: folder.clone(),
-                        name: name.clone(),
-                        clips: clips.iter().map(|clip| clip.name.as_str()).collect::<Vec<_>>().join(", "),
-                    });
-                }
-                Source::Frames(Frames::split(&clips, config, folder)?)
+                Source::Frames(Box::new(Frames::split(&clips, config, folder)?))
             }
         };
         let limit = config.max_self_intersection;
@@ -137,30 +144,36 @@ impl PoseLibrary {
         })
     }
 
-    /// Number of frames trained on, held out of the trained clips, and of unseen clips; none when poses are sampled.
-    pub fn frame_counts(&self) -> Option<[usize; 3]> {
+    /// Numbers of captured frames; none when poses are sampled.
+    pub fn frame_counts(&self) -> Option<FrameCounts> {
         match &self.source {
-            Source::Frames(f) => Some([f.trained(), f.held_out.len(), f.unseen.len()]),
+            Source::Frames(f) => Some(FrameCounts {
+                training: f.trained(),
+                windows: f.windows.len(),
+                validation: f.validation.len(),
+                test: f.test.len(),
+            }),
             Source::Sampler(_) => None,
         }
     }
 
-    /// All poses that were captured: trained on clip by clip, held out, of unseen clips.
+    /// All captured poses that a scene may show: trained on clip by clip, of held-out windows, of validation clips, of test
+    /// clips.
     pub fn frames(&self) -> Vec<&[Pose]> {
         match &self.source {
             Source::Frames(f) => {
-                let clips = f.trained_clips();
-                clips.chain([f.held_out.as_slice(), f.unseen.as_slice()]).collect()
+                let held_out = [&f.windows, &f.validation, &f.test].map(Vec::as_slice);
+                f.trained_clips().chain(held_out).collect()
             }
             Source::Sampler(_) => Vec::new(),
         }
     }
 
-    /// Names of the clips trained on, and of those never trained on.
-    pub fn clips(&self) -> [&[String]; 2] {
+    /// The clips by what they are for; none when poses are sampled.
+    pub fn clips(&self) -> ClipSplit {
         match &self.source {
-            Source::Frames(f) => [&f.training_clips, &f.unseen_clips],
-            Source::Sampler(_) => [&[], &[]],
+            Source::Frames(f) => f.clips.clone(),
+            Source::Sampler(_) => ClipSplit::default(),
         }
     }
 
@@ -172,9 +185,20 @@ impl PoseLibrary {
         }
     }
 
-    /// Whether there are clips that are never trained on.
-    pub fn has_unseen_clips(&self) -> bool {
-        self.frame_counts().is_some_and(|[_, _, unseen]| unseen > 0)
+    /// The captured poses of one kind; none when poses are sampled.
+    pub fn held_out(&self, kind: HeldOut) -> &[Pose] {
+        match &self.source {
+            Source::Frames(f) => f.held_out(kind),
+            Source::Sampler(_) => &[],
+        }
+    }
+
+    /// Whether there are poses of this kind.
+    pub fn has(&self, kind: HeldOut) -> bool {
+        match &self.source {
+            Source::Frames(f) => !f.held_out(kind).is_empty(),
+            Source::Sampler(_) => kind == HeldOut::Windows,
+        }
     }
 
     /// A pose for training, augmented, scaled by the progressive schedule, as the networks see it. A pose that intersects itself
@@ -214,14 +238,14 @@ impl PoseLibrary {
     }
 
     /// A pose never trained on, as it was captured but for its heading.
-    pub fn draw_held_out(&self, kind: Unseen, rng: &mut ChaCha8Rng) -> Pose {
+    ///
+    /// # Panics
+    /// If there are none of this `kind` ([`has`](Self::has)).
+    pub fn draw_held_out(&self, kind: HeldOut, rng: &mut ChaCha8Rng) -> Pose {
         let pose = match &self.source {
             Source::Sampler(sampler) => sampler.sample(rng),
             Source::Frames(frames) => {
-                let pool = match kind {
-                    Unseen::Clips if !frames.unseen.is_empty() => &frames.unseen,
-                    _ => &frames.held_out,
-                };
+                let pool = frames.held_out(kind);
                 pool[rng.random_range(0..pool.len())].clone()
             }
         };

@@ -1,6 +1,7 @@
 //! Which garments are trained on, which only validate, and which are kept for the final test.
 
 use super::error::LibraryError;
+use super::poses::Window;
 use crate::config::DataConfig;
 use serde::Serialize;
 
@@ -30,9 +31,9 @@ impl GarmentSplit {
         let mut split = Self { training: Vec::new(), validation: Vec::new(), test: Vec::new() };
         for (i, &name) in names.iter().enumerate() {
             let part = match purpose(name, config) {
-                Purpose::Training => &mut split.training,
-                Purpose::Validation => &mut split.validation,
-                Purpose::Test => &mut split.test,
+                GarmentPurpose::Training => &mut split.training,
+                GarmentPurpose::Validation => &mut split.validation,
+                GarmentPurpose::Test => &mut split.test,
             };
             part.push(i);
         }
@@ -44,24 +45,24 @@ impl GarmentSplit {
 }
 
 /// What a garment is for.
-enum Purpose {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GarmentPurpose {
+    /// Trained on.
     Training,
+    /// Never trained on; scored during the run.
     Validation,
+    /// Never trained on and never scored during the run.
     Test,
 }
 
-fn purpose(name: &str, config: &DataConfig) -> Purpose {
+/// What a garment of this name is for where `config` splits the data.
+pub fn purpose(name: &str, config: &DataConfig) -> GarmentPurpose {
     match place(name) {
-        _ if config.held_out_garments.iter().any(|n| n == name) => Purpose::Test,
-        place if place >= 1.0 - config.split.test => Purpose::Test,
-        place if place < config.split.validation => Purpose::Validation,
-        _ => Purpose::Training,
+        _ if config.held_out_garments.iter().any(|n| n == name) => GarmentPurpose::Test,
+        place if place >= 1.0 - config.split.test => GarmentPurpose::Test,
+        place if place < config.split.validation => GarmentPurpose::Validation,
+        _ => GarmentPurpose::Training,
     }
-}
-
-/// Whether a garment of this name is trained on where `config` splits the data.
-pub fn is_trained_on(name: &str, config: &DataConfig) -> bool {
-    matches!(purpose(name, config), Purpose::Training)
 }
 
 /// The split of a run by name.
@@ -73,10 +74,14 @@ pub struct SplitNames {
     pub validation_garments: Vec<String>,
     /// Garments neither trained on nor scored during the run.
     pub test_garments: Vec<String>,
-    /// Motion clips trained on, but for the blocks held out of each.
+    /// Motion clips trained on, but for the windows held out of them and the margins around those.
     pub training_clips: Vec<String>,
-    /// Motion clips never trained on.
-    pub unseen_clips: Vec<String>,
+    /// Windows held out of those clips, scored during the run.
+    pub validation_windows: Vec<Window>,
+    /// Motion clips scored during the run, never trained on.
+    pub validation_clips: Vec<String>,
+    /// Motion clips neither trained on nor scored during the run.
+    pub test_clips: Vec<String>,
 }
 
 /// A number in [0, 1) that depends on the name alone.

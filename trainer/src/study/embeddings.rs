@@ -1,12 +1,15 @@
 //! Table 1: what the networks make of a garment with a wrong embedding.
 
+use super::estimate::Estimate;
 use super::methods::{MethodResult, Question};
-use super::subject::{Measured, Subject};
-use super::table::{Table, number};
+use super::sets::DataSet;
+use super::subject::{Measured, PAPER_COLLISION, Subject};
+use super::table::{Table, mean_and_median};
 use crate::drape::{DrapeError, OnBody, drape_on};
+use crate::evaluate::Draped;
 use crate::scene::PreparedScene;
 use burn::tensor::{Int, Tensor};
-use clothcombo_model::GarmentEmbedding;
+use clothcombo_model::{ClothCombo, GarmentEmbedding};
 use clothcombo_physics::energy::Term;
 use serde::Serialize;
 
@@ -17,10 +20,17 @@ const KINDS: [&str; 3] = ["correct", "different", "zero"];
 pub struct EmbeddingStudy {
     /// What it is about.
     pub title: String,
+    /// The garments and poses.
+    pub set: DataSet,
     /// Number of scenes.
     pub scenes: usize,
-    /// Correct, of another garment, and zero.
+    /// Weight and margin of the collision as the model's configuration has it.
+    pub collision: String,
+    /// Correct, of another garment, and zero: the networks without corrections. Corrections see where the cloth lies, and the
+    /// choice of the state with the least energy falls back on skinning: they would hide what a wrong embedding does.
     pub kinds: Vec<MethodResult>,
+    /// The same with the correction networks and that choice; empty for a model that has none.
+    pub corrected: Vec<MethodResult>,
 }
 
 /// Asks `question` with correct and wrong embeddings. The other garment is of another category where there is one; vertex i
@@ -30,7 +40,7 @@ pub struct EmbeddingStudy {
 /// When a scene cannot be draped.
 pub fn ask(
     subject: &Subject,
-    question: &Question<'_>,
+    question: &Question,
     done: &(dyn Fn() + Sync),
 ) -> Result<EmbeddingStudy, DrapeError> {
     let draws = question.draws(subject);
@@ -46,6 +56,10 @@ pub fn ask(
             .or(turn.clone().next())
             .unwrap_or(garment)
     };
+    let mut models = vec![subject.model.clone().with_correction_steps(0)];
+    if subject.config.model.corrections > 0 {
+        models.push(subject.model.clone());
+    }
     let drape = |scene: &PreparedScene| {
         let garment = scene.draw.garments[0];
         let (outfit, (body, start)) =
@@ -54,22 +68,28 @@ pub fn ask(
         let zero =
             GarmentEmbedding { vertex: correct.vertex.zeros_like(), garment: correct.garment.zeros_like() };
         let different = resampled(embed(other(garment))?, correct.vertex.dims()[0]);
-        [correct, different, zero]
-            .into_iter()
-            .map(|embedding| {
-                let embeddings = subject.model.pack(&outfit, &[embedding])?;
-                let (outfit, body) = (&outfit, &body);
-                let on_body = OnBody { scene, outfit, embeddings: &embeddings, body, start: start.clone() };
-                Ok(drape_on(&subject.model, &on_body).0)
-            })
-            .collect()
+        let kinds = [correct, different, zero];
+        let drape = |(model, embedding): (&ClothCombo, &GarmentEmbedding)| -> Result<Draped, DrapeError> {
+            let embeddings = model.pack(&outfit, std::slice::from_ref(embedding))?;
+            let (outfit, body) = (&outfit, &body);
+            let on_body = OnBody { scene, outfit, embeddings: &embeddings, body, start: start.clone() };
+            Ok(drape_on(model, &on_body).0)
+        };
+        models.iter().flat_map(|model| kinds.iter().map(move |kind| (model, kind))).map(drape).collect()
     };
     let measured = subject.measure(&draws, done, drape)?;
-    let of = |kind: usize| measured.iter().map(|m| &m[kind]).collect::<Vec<&Measured>>();
+    let of = |drape: usize| measured.iter().map(|m| &m[drape]).collect::<Vec<&Measured>>();
+    let results = |model: usize| -> Vec<MethodResult> {
+        let drapes = (0..KINDS.len()).map(|kind| of(model * KINDS.len() + kind));
+        KINDS.into_iter().zip(drapes).map(|(name, drapes)| MethodResult::new(name, &drapes)).collect()
+    };
     Ok(EmbeddingStudy {
-        title: question.title.clone(),
+        title: question.set.title(&subject.library),
+        set: question.set,
         scenes: draws.len(),
-        kinds: KINDS.into_iter().enumerate().map(|(i, kind)| MethodResult::new(kind, &of(i))).collect(),
+        collision: subject.collision_form(Term::BodyCollision),
+        kinds: results(0),
+        corrected: if models.len() > 1 { results(1) } else { Vec::new() },
     })
 }
 
@@ -81,31 +101,40 @@ fn resampled(embedding: GarmentEmbedding, count: usize) -> GarmentEmbedding {
     GarmentEmbedding { vertex: embedding.vertex.select(0, rows), garment: embedding.garment }
 }
 
-/// The paper's Table 1.
-const PAPER: [(&str, [&str; 3]); 4] = [
-    ("strain", ["0.899", "2.77e14", "179"]),
-    ("bending", ["0.081", "5.5e5", "0.116"]),
-    ("collision, weighted", ["0.57", "109", "187"]),
-    ("gravity", ["-0.623", "-0.553", "-0.57"]),
-];
+/// The paper's Table 1: correct, different, zero.
+const STRAIN: [&str; 3] = ["0.899", "2.77e14", "179"];
+const BENDING: [&str; 3] = ["0.081", "5.5e5", "0.116"];
+const COLLISION: [&str; 3] = ["0.57", "109", "187"];
+const GRAVITY: [&str; 3] = ["-0.623", "-0.553", "-0.57"];
 
 impl EmbeddingStudy {
     /// As a table with the paper's numbers.
     pub fn table(&self) -> Table {
+        let of = |what: &str| KINDS.map(|kind| format!("{what}{kind}"));
+        let mut head = vec!["energy".to_owned()];
+        head.extend(of(""));
+        if !self.corrected.is_empty() {
+            head.extend(of("with corrections: "));
+        }
+        head.extend(of("paper: "));
         let mut table = Table::new(
             format!("{}: energies [J] with correct and wrong embeddings, {} scenes", self.title, self.scenes),
-            &["energy", "correct", "different", "zero", "paper: correct", "paper: different", "paper: zero"],
+            &head.iter().map(String::as_str).collect::<Vec<_>>(),
         )
-        .with_note("Means over the scenes (medians); every garment draped alone.");
-        let terms = [Term::Strain, Term::Bending, Term::BodyCollision, Term::Gravity];
-        for ((name, paper), term) in PAPER.into_iter().zip(terms) {
-            let cell = |kind: &MethodResult| {
-                let map = if term == Term::BodyCollision { &kind.weighted } else { &kind.raw };
-                let spread = map[term.name()].spread;
-                format!("{} ({})", number(spread.mean), number(spread.median))
-            };
+        .with_note("Means over the scenes (medians); every garment draped alone, by the networks without corrections and, beside them, with.");
+        let own = format!("collision ({})", self.collision);
+        let paper = format!("collision ({PAPER_COLLISION})");
+        let raw = |term: Term| move |kind: &MethodResult| kind.raw[term.name()];
+        let rows: [(&str, &dyn Fn(&MethodResult) -> Estimate, [&str; 3]); 5] = [
+            ("strain", &raw(Term::Strain), STRAIN),
+            ("bending", &raw(Term::Bending), BENDING),
+            (&own, &|kind| kind.weighted[Term::BodyCollision.name()], ["–"; 3]),
+            (&paper, &|kind| kind.paper_collision, COLLISION),
+            ("gravity", &raw(Term::Gravity), GRAVITY),
+        ];
+        for (name, value, paper) in rows {
             let mut row = vec![name.to_owned()];
-            row.extend(self.kinds.iter().map(cell));
+            row.extend(self.kinds.iter().chain(&self.corrected).map(|kind| mean_and_median(&value(kind))));
             row.extend(paper.map(str::to_owned));
             table.rows.push(row);
         }

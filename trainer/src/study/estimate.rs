@@ -54,6 +54,37 @@ impl Ratio {
     }
 }
 
+/// How many scenes something holds in.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Share {
+    /// Scenes it holds in.
+    pub count: usize,
+    /// All scenes.
+    pub of: usize,
+    /// 95 % confidence interval of the share (Wilson's); 0 to 1 without scenes.
+    pub interval: [f64; 2],
+}
+
+impl Share {
+    /// Of the scenes for which it `holds`.
+    pub fn new(holds: impl IntoIterator<Item = bool>) -> Self {
+        let (mut count, mut of) = (0, 0);
+        for holds in holds {
+            count += usize::from(holds);
+            of += 1;
+        }
+        if of == 0 {
+            return Self { count, of, interval: [0.0, 1.0] };
+        }
+        /// 97.5th percentile of the normal distribution.
+        const Z: f64 = 1.959_964;
+        let (n, p) = (of as f64, count as f64 / of as f64);
+        let middle = (p + Z * Z / (2.0 * n)) / (1.0 + Z * Z / n);
+        let half = Z / (1.0 + Z * Z / n) * (p * (1.0 - p) / n + Z * Z / (4.0 * n * n)).sqrt();
+        Self { count, of, interval: [(middle - half).max(0.0), (middle + half).min(1.0)] }
+    }
+}
+
 /// The 2.5th and 97.5th percentile of `statistic` over resamples of `0..count`, from a fixed seed.
 fn bootstrap(count: usize, statistic: impl Fn(&[usize]) -> f64) -> [f64; 2] {
     if count == 0 {
@@ -95,7 +126,19 @@ mod tests {
     }
 
     #[test]
+    fn six_of_six_tell_little() {
+        // Wilson's interval of 6 of 6 and of 5 of 6.
+        let shares = [[true; 6], [true, true, true, true, true, false]].map(Share::new);
+        let expected = [[0.6097, 1.0], [0.4365, 0.9699]];
+        for (share, expected) in shares.into_iter().zip(expected) {
+            let near = |i: usize| (share.interval[i] - expected[i]).abs() < 1e-4;
+            assert!(near(0) && near(1) && share.of == 6, "{share:?}");
+        }
+    }
+
+    #[test]
     fn nothing_is_no_error() {
+        assert_eq!(Share::new([]).interval, [0.0, 1.0]);
         assert_eq!(Estimate::of(&[]).interval, [0.0; 2]);
         assert!(Ratio::of(&[], &[]).of_means.is_nan());
     }

@@ -6,7 +6,7 @@ use crate::drape::{DrapeError, Networks};
 use crate::evaluate::certificates::{Dressing, OutfitResult};
 use crate::evaluate::{Draped, Spread, hard_poses};
 use crate::one_core::each_on_one_core;
-use crate::scene::{BodyDraw, PreparedScene, SceneDraw, Unseen};
+use crate::scene::{BodyDraw, HeldOut, PreparedScene, SceneDraw};
 use clothcombo_data::asset::Pose;
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use clothcombo_physics::energy::Term;
@@ -96,7 +96,7 @@ pub fn ask(
     let networks = subject.networks();
     let dressing = Dressing::new(&subject.library, &subject.config.losses, Some(&networks));
     let measured = |(case, index): (usize, usize)| {
-        let draw = subject.draw([question, 1000 * case + index], &all, cases[case].layers, Unseen::Poses);
+        let draw = subject.draw([question, 1000 * case + index], &all, cases[case].layers, HeldOut::Windows);
         let scene = subject.prepare(cases[case].applied_to(draw))?;
         let outcome = measure(&networks, &dressing, &scene, index, settings);
         done();

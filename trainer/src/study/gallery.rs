@@ -6,7 +6,7 @@ use crate::evaluate::Draped;
 use crate::evaluate::certificates::Dressing;
 use crate::picture::{LegendEntry, Sheet, SheetRow, View, layer_colour};
 use crate::samples::picture_of;
-use crate::scene::{BodyDraw, SceneDraw, Unseen};
+use crate::scene::{BodyDraw, HeldOut, SceneDraw};
 use clothcombo_data::asset::{Category, Pose};
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use image::RgbImage;
@@ -36,7 +36,7 @@ struct Studio<'a> {
     question: usize,
 }
 
-/// Draws all galleries, garments never trained on where there are some of their kind.
+/// Draws all galleries, of test garments where there are some of their kind.
 ///
 /// # Errors
 /// When a scene cannot be draped or resolved.
@@ -82,7 +82,7 @@ pub fn draw(subject: &Subject, question: usize, done: &(dyn Fn() + Sync)) -> Res
     let numbers: Vec<String> = (1..=COLUMNS).map(|i| format!("pose {i}")).collect();
     add(
         "poses",
-        "The same outfit in poses never trained on.",
+        "The same outfit in poses of held-out windows.",
         studio.sheet(&cells.collect::<Vec<_>>(), &numbers)?,
     );
 
@@ -120,7 +120,7 @@ fn unlike(mut bodies: Vec<BodyDraw>) -> Vec<BodyDraw> {
 }
 
 impl Subject {
-    /// The `n`-th garment of the first of `categories` that has one: garments never trained on come first. Garment 0 where
+    /// The `n`-th garment of the first of `categories` that has one: test garments come first, then validation garments. Garment 0 where
     /// there is none of them.
     fn pick(&self, categories: &[Category], n: usize) -> usize {
         let split = &self.library.split;
@@ -137,7 +137,7 @@ impl Subject {
 impl Studio<'_> {
     fn body(&self, index: usize) -> BodyDraw {
         let at = [self.question, index];
-        self.subject.draw(at, &[0], 1, Unseen::Poses).bodies.remove(0)
+        self.subject.draw(at, &[0], 1, HeldOut::Windows).bodies.remove(0)
     }
 
     /// Outfits from left to right; seen from the front, then from the back. Where all of them hold the same garments a colour

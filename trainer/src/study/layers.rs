@@ -1,12 +1,12 @@
 //! Table 3: what several layers cost each garment, and what is on the wrong side before and after the post-process.
 
-use super::estimate::{Estimate, Ratio};
+use super::estimate::{Estimate, Ratio, Share};
 use super::subject::Subject;
-use super::table::{Table, number, percent};
+use super::table::{Table, number, percent, percent_with_interval, share_text};
 use crate::evaluate::Draped;
 use crate::evaluate::certificates::{Counts, Dressing, OutfitResult};
 use crate::one_core::each_on_one_core;
-use crate::scene::{PreparedScene, Unseen};
+use crate::scene::{HeldOut, PreparedScene};
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use clothcombo_physics::energy::Term;
 use miette::{IntoDiagnostic, Report};
@@ -45,9 +45,9 @@ pub struct Outfits {
     pub wrong_side: Estimate,
     /// The same after the post-process.
     pub wrong_side_resolved: Estimate,
-    /// Share of outfits without an intersection with the body or between garments: all before the post-process, those that
-    /// went through it after it.
-    pub clear: [f64; 2],
+    /// Outfits without an intersection with the body or between garments: all before the post-process, those that went
+    /// through it after it.
+    pub clear: [Share; 2],
     /// Rise of the strain energy by the post-process, median share.
     pub strain_added: f64,
     /// Exact pairs between garments before the post-process.
@@ -85,7 +85,7 @@ pub fn ask(
     let networks = subject.networks();
     let dressing = Dressing::new(&subject.library, &subject.config.losses, Some(&networks));
     let measured = |index: usize| -> Result<Measured, Report> {
-        let draw = subject.draw([question, index], &all, layers, Unseen::Poses);
+        let draw = subject.draw([question, index], &all, layers, HeldOut::Windows);
         let scene = subject.prepare(draw)?;
         let drapes = [networks.drape_alone(&scene)?, networks.drape(&scene)?];
         let [alone, draped] = drapes.each_ref().map(|drape| dressing.of(&scene, &drape.posed));
@@ -133,7 +133,6 @@ impl Outfits {
         let of_resolved = |value: &dyn Fn(&OutfitResult) -> f64| {
             Estimate::of(&results.iter().map(|result| value(result)).collect::<Vec<_>>())
         };
-        let share = |is_clear: bool| f64::from(u8::from(is_clear));
         // The garments of an outfit are no independent scenes.
         let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / layers as f64;
         let [alone, worn] = [0, 1].map(|which| {
@@ -155,8 +154,8 @@ impl Outfits {
             wrong_side: of_all(&|outfit| outfit.before.order_violations),
             wrong_side_resolved: of_resolved(&|result| result.after.order_violations),
             clear: [
-                of_all(&|outfit| share(outfit.before.is_clear())).spread.mean,
-                of_resolved(&|result| share(result.after.is_clear())).spread.mean,
+                Share::new(outfits.iter().map(|outfit| outfit.before.is_clear())),
+                Share::new(results.iter().map(|result| result.after.is_clear())),
             ],
             strain_added: Estimate::of(&added).spread.median,
             layer_pairs: of_all(&|outfit| outfit.before.layer_triangle_pairs as f64),
@@ -217,15 +216,15 @@ pub fn tables(counts: &[LayerCount]) -> Vec<Table> {
             "wrong side, each alone [%]",
             "untangled [%]",
             "pairs between garments",
-            "clear [%]",
+            "clear",
             "post-processed outfits",
             "wrong side then [%]",
-            "clear then [%]",
+            "clear then",
             "strain added, median [%]",
             "post-process per garment [ms], median",
         ],
     )
-    .with_note("Wrong side: share of outer vertices within 5 cm of an inner layer that lie under it, by the closest surface point. Clear: no exact pair with the body or between garments, outside of pinched regions. Wearable: the outfits without legs over cloth that hangs between them, which must cross at the crotch. Time: of outfits beside each other, each on one core.");
+    .with_note("Wrong side: share of outer vertices within 5 cm of an inner layer that lie under it, by the closest surface point. Clear: no exact pair with the body or between garments, outside of pinched regions. Wearable: the outfits without legs over cloth that hangs between them, which must cross at the crotch. In brackets: 95 % intervals of the mean, and of the share in %. Time: of outfits beside each other, each on one core.");
     for (name, c) in counts.iter().flat_map(LayerCount::rows) {
         let then = |cell: String| if c.resolved == 0 { "–".to_owned() } else { cell };
         order.rows.push(vec![
@@ -234,12 +233,12 @@ pub fn tables(counts: &[LayerCount]) -> Vec<Table> {
             number(c.strain_alone.spread.mean),
             number(c.strain_worn.spread.mean),
             percent(c.wrong_side_single.spread.mean),
-            percent(c.wrong_side.spread.mean),
+            percent_with_interval(&c.wrong_side),
             number(c.layer_pairs.spread.mean),
-            percent(c.clear[0]),
+            share_text(&c.clear[0]),
             c.resolved.to_string(),
-            then(percent(c.wrong_side_resolved.spread.mean)),
-            then(percent(c.clear[1])),
+            then(percent_with_interval(&c.wrong_side_resolved)),
+            then(share_text(&c.clear[1])),
             then(percent(c.strain_added)),
             then(number(c.post_ms.spread.median)),
         ]);

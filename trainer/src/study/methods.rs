@@ -1,10 +1,11 @@
 //! Table 2: the networks beside linear blend skinning, one garment per scene.
 
 use super::estimate::{Estimate, Ratio};
-use super::subject::{Measured, Subject};
-use super::table::{Table, number, percent};
+use super::sets::DataSet;
+use super::subject::{Measured, PAPER_COLLISION, Subject};
+use super::table::{Table, mean_and_median, mean_with_interval, number, percent, ratio_with_interval};
 use crate::drape::DrapeError;
-use crate::scene::{SceneDraw, Unseen, in_turn};
+use crate::scene::{Library, SceneDraw, in_turn};
 use clothcombo_data::asset::Category;
 use clothcombo_physics::energy::Term;
 use serde::Serialize;
@@ -15,27 +16,31 @@ const METHODS: [&str; 3] = ["LBS of rest", "LBS", "network"];
 const NETWORK: usize = METHODS.len() - 1;
 
 /// What scenes are drawn from.
-pub struct Question<'a> {
+pub struct Question {
     /// Its number: other numbers are other scenes.
     pub number: usize,
-    /// What it is about.
-    pub title: String,
-    /// Garments, in turn.
-    pub pool: &'a [usize],
-    /// Poses.
-    pub unseen: Unseen,
+    /// The garments, in turn, and the poses.
+    pub set: DataSet,
+    /// The garments as indices into the wardrobe; not empty.
+    pub pool: Vec<usize>,
     /// Number of scenes.
     pub scenes: usize,
 }
 
-impl Question<'_> {
+impl Question {
+    /// `scenes` scenes of `set`; none where the data has no such garments or poses.
+    pub fn new(number: usize, set: DataSet, scenes: usize, library: &Library) -> Option<Self> {
+        let pool = set.pool(library);
+        (!pool.is_empty() && scenes > 0).then_some(Self { number, set, pool, scenes })
+    }
+
     /// Its scenes, one garment each.
     pub fn draws(&self, subject: &Subject) -> Vec<SceneDraw> {
         let draw = |i: usize| {
             let garment = &self.pool[in_turn(i, self.scenes, self.pool.len())..][..1];
-            subject.draw([self.number, i], garment, 1, self.unseen)
+            subject.draw([self.number, i], garment, 1, self.set.poses)
         };
-        if self.pool.is_empty() { Vec::new() } else { (0..self.scenes).map(draw).collect() }
+        (0..self.scenes).map(draw).collect()
     }
 }
 
@@ -50,6 +55,12 @@ pub struct MethodResult {
     pub raw: BTreeMap<&'static str, Estimate>,
     /// Energies times their weights [J].
     pub weighted: BTreeMap<&'static str, Estimate>,
+    /// Collision with the body in the paper's form: weight 250, ε = 2 mm, not scaled with the number of vertices.
+    pub paper_collision: Estimate,
+    /// Collision between garments in the same form, over every two garments.
+    pub paper_layer_collision: Estimate,
+    /// The paper's degree of self-collision ([`clothcombo_physics::contact::self_collision`]).
+    pub self_collision: Estimate,
     /// Share of vertices inside the body.
     pub inside: Estimate,
     /// Share of vertices deeper than 5 mm.
@@ -76,6 +87,9 @@ impl MethodResult {
             total: over(&|m| m.score.total),
             raw: terms(&|m, term| m.score.raw[term]),
             weighted: terms(&|m, term| m.score.weighted[term]),
+            paper_collision: over(&|m| m.paper_collision),
+            paper_layer_collision: over(&|m| m.paper_layer_collision),
+            self_collision: over(&|m| m.self_collision),
             inside: over(&|m| share(m.score.penetration.inside, m.score.penetration.vertices)),
             deeper_than_5mm: over(&|m| share(m.score.penetration.deep, m.score.penetration.vertices)),
             body_pairs: over(&|m| m.body.pairs as f64),
@@ -94,6 +108,8 @@ pub struct Comparison {
     pub strain: Ratio,
     /// Weighted collision with the body.
     pub collision: Ratio,
+    /// The same in the paper's form.
+    pub paper_collision: Ratio,
     /// Weighted sum of all energies.
     pub total: Ratio,
 }
@@ -114,8 +130,12 @@ pub struct CategoryResult {
 pub struct Methods {
     /// What it is about.
     pub title: String,
+    /// The garments and poses.
+    pub set: DataSet,
     /// Number of scenes.
     pub scenes: usize,
+    /// Weight and margin of the collision as the model's configuration has it.
+    pub collision: String,
     /// Names of the garments asked for.
     pub garments: Vec<String>,
     /// All methods.
@@ -130,11 +150,7 @@ pub struct Methods {
 ///
 /// # Errors
 /// When a scene cannot be draped.
-pub fn ask(
-    subject: &Subject,
-    question: &Question<'_>,
-    done: &(dyn Fn() + Sync),
-) -> Result<Methods, DrapeError> {
+pub fn ask(subject: &Subject, question: &Question, done: &(dyn Fn() + Sync)) -> Result<Methods, DrapeError> {
     let draws = question.draws(subject);
     let networks = subject.networks();
     let measured = subject.measure(&draws, done, |scene| {
@@ -161,8 +177,10 @@ pub fn ask(
         })
     });
     Ok(Methods {
-        title: question.title.clone(),
+        title: question.set.title(&subject.library),
+        set: question.set,
         scenes: draws.len(),
+        collision: subject.collision_form(Term::BodyCollision),
         garments: question.pool.iter().map(|&g| subject.library.wardrobe.card(g).name.clone()).collect(),
         methods: METHODS
             .into_iter()
@@ -174,6 +192,7 @@ pub fn ask(
                 against: METHODS[against],
                 strain: ratio(against, &all, &strain),
                 collision: ratio(against, &all, &|m| m.score.weighted[Term::BodyCollision]),
+                paper_collision: ratio(against, &all, &|m| m.paper_collision),
                 total: ratio(against, &all, &|m| m.score.total),
             })
             .collect(),
@@ -181,26 +200,68 @@ pub fn ask(
     })
 }
 
-/// The paper's Table 2, on data that cannot be had.
+/// The paper's Table 2, on data that cannot be had: strain, bending, gravity, collision.
 const PAPER: [(&str, [&str; 4]); 3] = [
-    ("paper: garment-specific network", ["0.737", "0.115", "-0.46", "0.165"]),
+    ("paper: SNUG, one model per garment", ["0.737", "0.115", "-0.46", "0.165"]),
     ("paper: ClothCombo", ["0.955", "0.105", "-0.478", "0.62"]),
     ("paper: LBS", ["2.177", "0.072", "-0.463", "222.521"]),
 ];
 
+/// One row per set: what is quoted.
+pub fn summary(sets: &[Methods]) -> Table {
+    let collision = sets.first().map_or("", |set| set.collision.as_str());
+    let mut table = Table::new(
+        "The networks on every set, against LBS of rest",
+        &[
+            "set",
+            "garments",
+            "scenes",
+            "strain [J]",
+            "total [J]",
+            "strain over LBS of rest",
+            "of medians",
+            &format!("collision over it ({collision})"),
+            &format!("collision over it ({PAPER_COLLISION})"),
+            "deeper than 5 mm [%]",
+        ],
+    )
+    .with_note(
+        "Means over the scenes [95 % interval of the mean] (median); ratios of means [95 % interval]. The intervals are over scenes, not over \
+         garments: those of a set of few garments do not tell how much other garments would change.",
+    );
+    for set in sets {
+        let (Some(network), Some(against)) = (set.methods.get(NETWORK), set.comparisons.first()) else {
+            continue;
+        };
+        let cell = |e: &Estimate| format!("{} ({})", mean_with_interval(e), number(e.spread.median));
+        table.rows.push(vec![
+            set.title.clone(),
+            set.garments.len().to_string(),
+            set.scenes.to_string(),
+            cell(&network.raw[Term::Strain.name()]),
+            cell(&network.total),
+            ratio_with_interval(&against.strain),
+            number(against.strain.of_medians),
+            ratio_with_interval(&against.collision),
+            ratio_with_interval(&against.paper_collision),
+            percent(network.deeper_than_5mm.spread.mean),
+        ]);
+    }
+    table
+}
+
 impl Methods {
     /// As tables; with the paper's numbers where they answer the same question.
     pub fn tables(&self, with_paper: bool) -> Vec<Table> {
-        let mean = |e: &Estimate| {
-            format!("{} [{}, {}]", number(e.spread.mean), number(e.interval[0]), number(e.interval[1]))
-        };
+        let own = format!("collision ({})", self.collision);
+        let paper = format!("collision ({PAPER_COLLISION})");
         let mut means = Table::new(
             format!("{}: energies [J], means over {} scenes [95 % interval]", self.title, self.scenes),
-            &["method", "total", "strain", "bending", "gravity", "collision, weighted"],
+            &["method", "total", "strain", "bending", "gravity", &own, &paper],
         );
         let mut spreads = Table::new(
             format!("{}: medians / 95th percentiles [J]", self.title),
-            &["method", "total", "strain", "bending", "collision, weighted"],
+            &["method", "total", "strain", "bending", &own, &paper],
         );
         let mut contact = Table::new(
             format!("{}: contact", self.title),
@@ -215,43 +276,42 @@ impl Methods {
         )
         .with_note("Means over the scenes, exact pairs of intersecting triangles; medians in brackets.");
         for m in &self.methods {
-            let collision = &m.weighted[Term::BodyCollision.name()];
+            let collisions = [&m.weighted[Term::BodyCollision.name()], &m.paper_collision];
             let [strain, bending, gravity] =
                 [Term::Strain, Term::Bending, Term::Gravity].map(|t| &m.raw[t.name()]);
-            let name = m.method.to_owned();
-            means.rows.push(
-                [vec![name.clone()], [&m.total, strain, bending, gravity, collision].map(mean).to_vec()]
-                    .concat(),
-            );
+            let row = |first: &[&Estimate], cell: &dyn Fn(&Estimate) -> String| -> Vec<String> {
+                let cells = first.iter().copied().chain(collisions).map(cell);
+                [m.method.to_owned()].into_iter().chain(cells).collect()
+            };
+            means.rows.push(row(&[&m.total, strain, bending, gravity], &mean_with_interval));
             let both = |e: &Estimate| format!("{} / {}", number(e.spread.median), number(e.spread.p95));
-            spreads.rows.push(
-                [vec![name.clone()], [&m.total, strain, bending, collision].map(both).to_vec()].concat(),
-            );
+            spreads.rows.push(row(&[&m.total, strain, bending], &both));
             let shares = [&m.inside, &m.deeper_than_5mm]
                 .map(|e| format!("{} ({})", percent(e.spread.mean), percent(e.spread.median)));
-            let counts = [&m.body_pairs, &m.contour_mm, &m.self_pairs]
-                .map(|e| format!("{} ({})", number(e.spread.mean), number(e.spread.median)));
-            contact.rows.push([vec![name], shares.to_vec(), counts.to_vec()].concat());
+            let counts = [&m.body_pairs, &m.contour_mm, &m.self_pairs].map(mean_and_median);
+            contact.rows.push([vec![m.method.to_owned()], shares.to_vec(), counts.to_vec()].concat());
         }
-        for (name, values) in PAPER.into_iter().filter(|_| with_paper) {
-            let values = values.map(str::to_owned).to_vec();
-            means.rows.push([vec![name.to_owned(), "–".to_owned()], values].concat());
+        for (name, [strain, bending, gravity, collision]) in PAPER.into_iter().filter(|_| with_paper) {
+            means
+                .rows
+                .push([name, "–", strain, bending, gravity, "–", collision].map(str::to_owned).to_vec());
         }
         let mut ratios = Table::new(
             format!("{}: the networks over skinning", self.title),
-            &["against", "strain", "strain, medians", "collision, weighted", "total", "total, medians"],
+            &["against", "strain", "strain, medians", &own, &paper, "total", "total, medians"],
         )
-        .with_note("Ratios of means [95 % interval] and of medians over the same scenes; the paper has 0.44 for strain and 1/359 for collision against LBS.");
+        .with_note(
+            "Ratios of means [95 % interval] and of medians over the same scenes; the paper has 0.44 for strain and 1/359 for collision, in its \
+             own form, against LBS.",
+        );
         for c in &self.comparisons {
-            let ratio = |r: &Ratio| {
-                format!("{} [{}, {}]", number(r.of_means), number(r.interval[0]), number(r.interval[1]))
-            };
             ratios.rows.push(vec![
                 c.against.to_owned(),
-                ratio(&c.strain),
+                ratio_with_interval(&c.strain),
                 number(c.strain.of_medians),
-                ratio(&c.collision),
-                ratio(&c.total),
+                ratio_with_interval(&c.collision),
+                ratio_with_interval(&c.paper_collision),
+                ratio_with_interval(&c.total),
                 number(c.total.of_medians),
             ]);
         }
@@ -260,10 +320,8 @@ impl Methods {
             &["category", "scenes", METHODS[0], METHODS[1], METHODS[2], "strain over LBS of rest"],
         );
         for c in &self.categories {
-            let totals =
-                c.totals.iter().map(|e| format!("{} ({})", number(e.spread.mean), number(e.spread.median)));
             let mut row = vec![c.category.to_owned(), c.totals[0].scenes.to_string()];
-            row.extend(totals);
+            row.extend(c.totals.iter().map(mean_and_median));
             row.push(number(c.strain.of_means));
             categories.rows.push(row);
         }

@@ -11,7 +11,7 @@ use crate::evaluate::reference::ReferenceScene;
 use crate::measure::median_ms;
 use crate::one_core::each_on_one_core;
 use crate::picture::{Line, LinePanel};
-use crate::scene::{PreparedScene, Unseen};
+use crate::scene::{HeldOut, PreparedScene};
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use clothcombo_physics::energy::Term;
 use clothcombo_physics::equilibrium::{Problem, SolverSettings, solve};
@@ -101,7 +101,7 @@ pub fn ask(
     let all: Vec<usize> = (0..subject.library.wardrobe.len()).collect();
     let mut drapes = Vec::with_capacity(scenes);
     for index in 0..scenes {
-        let draw = subject.draw([question, index], &all, 1, Unseen::Poses);
+        let draw = subject.draw([question, index], &all, 1, HeldOut::Windows);
         let scene = subject.prepare(draw)?;
         let fast = fast_methods(subject, &scene, settings)?;
         drapes.push((scene, fast));

@@ -1,5 +1,6 @@
 //! A table that is written as Markdown and as HTML.
 
+use super::estimate::{Estimate, Ratio, Share};
 use crate::picture::axis::number_text;
 use crate::report::html::escape;
 use serde::Serialize;
@@ -59,6 +60,32 @@ impl Table {
             cells("th", &self.head)
         )
     }
+}
+
+/// Mean [95 % interval of the mean].
+pub fn mean_with_interval(e: &Estimate) -> String {
+    format!("{} [{}, {}]", number(e.spread.mean), number(e.interval[0]), number(e.interval[1]))
+}
+
+/// Mean (median).
+pub fn mean_and_median(e: &Estimate) -> String {
+    format!("{} ({})", number(e.spread.mean), number(e.spread.median))
+}
+
+/// Ratio of means [95 % interval].
+pub fn ratio_with_interval(r: &Ratio) -> String {
+    format!("{} [{}, {}]", number(r.of_means), number(r.interval[0]), number(r.interval[1]))
+}
+
+/// Mean of shares in percent [95 % interval of the mean].
+pub fn percent_with_interval(e: &Estimate) -> String {
+    format!("{} [{}, {}]", percent(e.spread.mean), percent(e.interval[0]), percent(e.interval[1]))
+}
+
+/// Count of all [95 % interval in percent, without decimals].
+pub fn share_text(share: &Share) -> String {
+    let [low, high] = share.interval.map(|end| 100.0 * end);
+    format!("{} of {} [{low:.0}, {high:.0}]", share.count, share.of)
 }
 
 /// Three significant digits.

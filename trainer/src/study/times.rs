@@ -5,7 +5,7 @@ use super::table::{Table, number};
 use crate::drape::{OnBody, drape_on};
 use crate::evaluate::Spread;
 use crate::evaluate::certificates::Dressing;
-use crate::scene::Unseen;
+use crate::scene::HeldOut;
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use miette::{IntoDiagnostic, Report};
 use serde::Serialize;
@@ -58,7 +58,7 @@ pub fn ask(
     // The first outfit warms up: buffers, threads, files.
     for index in 0..=outfits {
         let at = [question, index];
-        let draw = subject.draw(at, &all, LAYERS, Unseen::Poses);
+        let draw = subject.draw(at, &all, LAYERS, HeldOut::Windows);
         let scene = subject.prepare(draw)?;
         let outfit = subject.tensors.outfit(&scene)?;
         let count = scene.worn.len() as f64;

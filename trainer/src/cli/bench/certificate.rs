@@ -24,7 +24,7 @@ use std::sync::Arc;
 
 /// The post-process on random outfits: exact pairs before and after, strain added, time
 ///
-/// Shapes are drawn from the configuration's range, poses from clips never trained on, 1 to --layers garments of the whole
+/// Shapes are drawn from the configuration's range, poses from validation clips, 1 to --layers garments of the whole
 /// wardrobe in random order.
 #[derive(Parser)]
 #[command(after_help = "Examples:\n  clothcombo bench certificate --draws 500\n  \

@@ -1,5 +1,6 @@
 //! Frames of motion clips, by what they are for.
 
+use super::HeldOut;
 use crate::config::PoseConfig;
 use crate::scene::LibraryError;
 use clothcombo_data::asset::{Motion, Pose, Provenance};
@@ -7,56 +8,182 @@ use rand::RngExt;
 use rand::distr::Distribution;
 use rand::distr::weighted::{self, WeightedIndex};
 use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
 use std::path::Path;
+
+/// Motion clips by what they are for.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct ClipSplit {
+    /// Trained on, but for the windows held out of them and the margins around those.
+    pub training: Vec<String>,
+    /// Never trained on; scored by every validation of a run.
+    pub validation: Vec<String>,
+    /// Never trained on, and read by no run.
+    pub test: Vec<String>,
+    /// Windows held out of the trained clips; scored by every validation of a run.
+    pub windows: Vec<Window>,
+}
+
+/// A part of a trained clip that is not trained on.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Window {
+    /// The clip.
+    pub clip: String,
+    /// Begin and end in it [s].
+    pub seconds: [f64; 2],
+}
+
+impl Window {
+    /// The windows of a clip whose frames have these purposes.
+    fn list(clip: &str, frame_rate: f64, purposes: &[Purpose]) -> Vec<Self> {
+        let window = |frames: [usize; 2]| Self {
+            clip: clip.to_owned(),
+            seconds: frames.map(|frame| frame as f64 / frame_rate),
+        };
+        runs_of(purposes, Purpose::HeldOut).into_iter().map(window).collect()
+    }
+}
+
+/// What a frame of a trained clip is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Purpose {
+    Training,
+    HeldOut,
+    /// Too near to a held-out frame to train on.
+    Margin,
+}
+
+/// First frame, and the one after the last, of every run of frames that are for `wanted`.
+fn runs_of(purposes: &[Purpose], wanted: Purpose) -> Vec<[usize; 2]> {
+    let mut start = 0;
+    let mut runs = Vec::new();
+    for run in purposes.chunk_by(|a, b| a == b) {
+        let end = start + run.len();
+        if run[0] == wanted {
+            runs.push([start, end]);
+        }
+        start = end;
+    }
+    runs
+}
+
+/// The purposes of the frames of a clip.
+fn purposes(count: usize, frame_rate: f64, config: &PoseConfig) -> Vec<Purpose> {
+    let block = ((config.held_out_block * frame_rate).round() as usize).max(1);
+    let group = config.blocks_per_window();
+    let held_out = |frame: usize| frame / block % group == group / 2;
+    let mut purposes = vec![Purpose::Training; count];
+    // A trained frame is at least so many frames from any held-out one.
+    let distance = (config.held_out_margin * frame_rate).ceil() as usize;
+    let reach = distance.saturating_sub(1);
+    for frame in (0..count).filter(|frame| held_out(*frame)) {
+        purposes[frame] = Purpose::HeldOut;
+    }
+    for [start, end] in runs_of(&purposes, Purpose::HeldOut) {
+        let around = [start.saturating_sub(reach)..start, end..end.saturating_add(reach).min(count)];
+        for frame in around.into_iter().flatten().filter(|frame| !held_out(*frame)) {
+            purposes[frame] = Purpose::Margin;
+        }
+    }
+    purposes
+}
+
+/// Whether the name of a clip contains one of `names`.
+fn is_named(clip: &str, names: &[String]) -> bool {
+    names.iter().any(|name| clip.contains(name.as_str()))
+}
+
+/// Whether every name of the configuration fits a clip, and no clip is for two things.
+fn check_names(clips: &[Motion], config: &PoseConfig, folder: &Path) -> Result<(), LibraryError> {
+    let sets = [("validation_clips", &config.validation_clips), ("test_clips", &config.test_clips)];
+    for (key, names) in sets {
+        let fits = |name: &&String| clips.iter().any(|clip| clip.name.contains(name.as_str()));
+        if let Some(name) = names.iter().find(|name| !fits(name)) {
+            return Err(LibraryError::UnknownClip {
+                key,
+                folder: folder.to_owned(),
+                name: name.clone(),
+                clips: clips.iter().map(|clip| clip.name.as_str()).collect::<Vec<_>>().join(", "),
+            });
+        }
+    }
+    let in_both = |clip: &&Motion| sets.iter().all(|(_, names)| is_named(&clip.name, names));
+    match clips.iter().find(in_both) {
+        None => Ok(()),
+        Some(clip) => Err(LibraryError::ClipOfTwoSets { clip: clip.name.clone() }),
+    }
+}
 
 /// Frames by what they are for.
 pub(super) struct Frames {
     training: Training,
-    pub held_out: Vec<Pose>,
-    pub unseen: Vec<Pose>,
-    pub training_clips: Vec<String>,
-    pub unseen_clips: Vec<String>,
+    /// Frames of the windows held out of the trained clips.
+    pub windows: Vec<Pose>,
+    /// Frames of the validation clips.
+    pub validation: Vec<Pose>,
+    /// Frames of the test clips.
+    pub test: Vec<Pose>,
+    /// The clips by name.
+    pub clips: ClipSplit,
     /// Where every clip comes from.
     pub sources: Vec<Provenance>,
 }
 
 impl Frames {
-    /// Every clip is cut into blocks; one block in every `1 / held_out_share`, in the middle of its group, is held out. A clip
-    /// of less than about half a group has none.
+    /// Every clip but those for validation and test is cut into blocks; one block in every `1 / held_out_share`, in the middle
+    /// of its group, is held out. A clip of less than about half a group has none. Frames within `held_out_margin` of a
+    /// held-out one are for nothing.
     ///
     /// # Errors
-    /// Naming `folder`, when nothing is left to train on or nothing is held out, or the clips' lengths in time cannot be
-    /// compared.
+    /// Naming `folder`, when a clip of the configuration is missing or named twice, nothing is left to train on, nothing is held
+    /// out, or the clips' lengths in time cannot be compared.
     pub fn split(clips: &[Motion], config: &PoseConfig, folder: &Path) -> Result<Self, LibraryError> {
-        let (mut train, mut held_out, mut unseen) = (Vec::new(), Vec::new(), Vec::new());
-        let (mut training_clips, mut unseen_clips) = (Vec::new(), Vec::new());
-        let group = (1.0 / config.held_out_share).round().max(2.0) as usize;
+        check_names(clips, config, folder)?;
+        let (mut train, mut windows) = (Vec::new(), Vec::new());
+        let (mut validation, mut test) = (Vec::new(), Vec::new());
+        let mut names = ClipSplit::default();
         for clip in clips {
-            if config.held_out_clips.iter().any(|name| clip.name.contains(name.as_str())) {
-                unseen.extend_from_slice(&clip.poses);
-                unseen_clips.push(clip.name.clone());
+            if is_named(&clip.name, &config.test_clips) {
+                test.extend_from_slice(&clip.poses);
+                names.test.push(clip.name.clone());
                 continue;
             }
-            training_clips.push(clip.name.clone());
-            let block = ((config.held_out_block * clip.frame_rate).round() as usize).max(1);
-            let mut poses = Vec::new();
-            for (i, frames) in clip.poses.chunks(block).enumerate() {
-                let part = if i % group == group / 2 { &mut held_out } else { &mut poses };
-                part.extend_from_slice(frames);
+            if is_named(&clip.name, &config.validation_clips) {
+                validation.extend_from_slice(&clip.poses);
+                names.validation.push(clip.name.clone());
+                continue;
             }
+            names.training.push(clip.name.clone());
+            let purposes = purposes(clip.poses.len(), clip.frame_rate, config);
+            let of = |wanted: Purpose| {
+                let frames = clip.poses.iter().zip(&purposes).filter(move |(_, purpose)| **purpose == wanted);
+                frames.map(|(pose, _)| pose.clone())
+            };
+            windows.extend(of(Purpose::HeldOut));
+            names.windows.extend(Window::list(&clip.name, clip.frame_rate, &purposes));
+            let poses: Vec<Pose> = of(Purpose::Training).collect();
             if !poses.is_empty() {
                 let seconds = poses.len() as f64 / clip.frame_rate;
                 train.push(Clip { poses, seconds });
             }
         }
         let trained: usize = train.iter().map(|clip| clip.poses.len()).sum();
-        if trained == 0 || held_out.is_empty() {
-            let (folder, held_out) = (folder.to_owned(), held_out.len());
+        if trained == 0 || windows.is_empty() {
+            let (folder, held_out) = (folder.to_owned(), windows.len());
             return Err(LibraryError::EmptySplit { folder, train: trained, held_out });
         }
         let training = Training::new(train).map_err(|_| frame_rates(folder, clips))?;
         let sources = clips.iter().map(|clip| clip.source.clone()).collect();
-        Ok(Self { training, held_out, unseen, training_clips, unseen_clips, sources })
+        Ok(Self { training, windows, validation, test, clips: names, sources })
+    }
+
+    /// The frames of one kind of held-out poses.
+    pub fn held_out(&self, kind: HeldOut) -> &[Pose] {
+        match kind {
+            HeldOut::Windows => &self.windows,
+            HeldOut::ValidationClips => &self.validation,
+            HeldOut::TestClips => &self.test,
+        }
     }
 
     /// Number of frames trained on.
@@ -112,48 +239,4 @@ impl Training {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use rand::SeedableRng;
-
-    #[test]
-    fn long_clips_do_not_crowd_out_short_ones() {
-        let clip = |frames: usize, rate: f64| Clip {
-            poses: vec![Pose { rotations: vec![[frames as f64; 3]] }; frames],
-            seconds: frames as f64 / rate,
-        };
-        // 64 s, 4 s, and 4 s at a high frame rate: 8 to 2 to 2.
-        let training = Training::new(vec![clip(640, 10.0), clip(40, 10.0), clip(480, 120.0)]).unwrap();
-        let mut rng = ChaCha8Rng::seed_from_u64(1);
-        let mut counts = [0; 3];
-        for _ in 0..12_000 {
-            let length = training.draw(&mut rng).rotations[0][0] as usize;
-            counts[[640, 40, 480].iter().position(|l| *l == length).unwrap()] += 1;
-        }
-        for (count, expected) in counts.into_iter().zip([8000.0_f64, 2000.0, 2000.0]) {
-            assert!((f64::from(count) - expected).abs() < 4.0 * expected.sqrt(), "{counts:?}");
-        }
-    }
-
-    #[test]
-    fn frame_rates_that_are_none_are_refused() {
-        let clip = |frame_rate: f64| Motion {
-            name: "walk".into(),
-            frame_rate,
-            poses: vec![Pose::t_pose(2); 400],
-            source: Provenance::default(),
-        };
-        let split = |rates: &[f64]| {
-            let clips: Vec<Motion> = rates.iter().map(|rate| clip(*rate)).collect();
-            // One frame a block at the absurd rates, and something held out at the good ones.
-            let config = PoseConfig { held_out_block: 0.1, ..PoseConfig::default() };
-            Frames::split(&clips, &config, Path::new("motions"))
-        };
-        assert!(split(&[30.0, 60.0]).is_ok());
-        for rates in [[30.0, 0.0], [1e-320, 30.0], [30.0, f64::NAN], [30.0, -1.0]] {
-            let error = split(&rates).err().unwrap_or_else(|| panic!("{rates:?} passed"));
-            assert!(matches!(error, LibraryError::FrameRates { .. }), "{error}");
-            assert!(error.to_string().starts_with("motions: "), "{error}");
-        }
-    }
-}
+mod tests;
