@@ -2,6 +2,7 @@
 
 use super::exit_code;
 use crate::checkpoint::{Checkpoint, CheckpointError};
+use crate::cli::memory_table::{memory_line, memory_warning};
 use crate::cli::verbosity::{Verbosity, is_quiet, progress_bar, say};
 use crate::config::{Config, load};
 use crate::device::Backend;
@@ -11,7 +12,6 @@ use crate::observer::{
     CurvesObserver, History, HistoryObserver, MetricsObserver, ProgressObserver, ReportObserver,
     TensorBoardObserver,
 };
-use crate::report::gibibytes;
 use crate::run_dir::RunDir;
 use crate::scene::Library;
 use crate::session::Session;
@@ -187,16 +187,10 @@ fn run(arguments: &Arguments, world: &Rc<World>) -> Result<(), Report> {
             say(&format!("{} processes share every step", world.share().size));
         }
         if let Some(m) = memory {
-            say(&format!(
-                "memory: about {} at the peak ({} in use, {} for garments, {} for prepared scenes, {} for the largest \
-                scene, {} for parameters)",
-                gibibytes(m.peak),
-                gibibytes(m.start),
-                gibibytes(m.garments),
-                gibibytes(m.scenes),
-                gibibytes(m.activations),
-                gibibytes(m.parameters)
-            ));
+            say(&memory_line(&m));
+            if let Some(warning) = memory_warning(&m) {
+                tracing::warn!("{warning}");
+            }
         }
     }
     let mut observers = observers(&run, &config, &library, session.step(), memory)?;

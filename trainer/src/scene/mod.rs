@@ -27,7 +27,7 @@ pub use origin::{Maker, Origin};
 pub use poses::{PoseLibrary, SelfIntersecting, Unseen};
 pub use prefetch::{Prefetch, prepare_step};
 pub use prepare::{Dresser, PreparedBody, PreparedScene, can_touch, prepare};
-pub use recent::Recent;
+pub use recent::{KeptBytes, MemoryBudget, Recent, Residence};
 pub use recipe::Recipe;
 pub use split::{GarmentSplit, SplitNames, is_trained_on};
 pub use wardrobe::{Card, Wardrobe};
