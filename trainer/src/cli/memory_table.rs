@@ -46,8 +46,8 @@ pub fn print_memory(config: &Config, sizes: &DataSizes) -> Result<(), Report> {
     on_host("scenes prepared in advance", &|m| m.scenes);
     on_host("at the start: garments being prepared", &|m| m.preparation);
     on_device(&format!("tensors and embeddings kept, of {}", gibibytes(gpu.all_tensors)), &|m| m.tensors);
-    on_device("gradients, moments, copies of the parameters", &|m| m.parameters);
-    on_device(&format!("the largest step ({})", largest_step(config)), &|m| m.activations);
+    on_device("Adam's moments, copies of the parameters", &|m| m.parameters);
+    on_device(&format!("the largest step ({})", largest_step(config)), &|m| m.step);
     row("together", [gpu.host(), gpu.device(), cpu.peak()].map(gibibytes));
     if config.data.poses.motions.is_some() {
         println!("  motions come on top: about 0.6 KiB a frame of 22 joints");
@@ -87,7 +87,7 @@ pub fn memory_line(m: &MemoryEstimate) -> String {
     let of_device = format!(
         "{} for their tensors, {} for the largest step, {} for parameters",
         gibibytes(m.tensors),
-        gibibytes(m.activations),
+        gibibytes(m.step),
         gibibytes(m.parameters)
     );
     match m.is_processor {

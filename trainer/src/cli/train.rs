@@ -12,6 +12,7 @@ use crate::observer::{
     CurvesObserver, History, HistoryObserver, MetricsObserver, ProgressObserver, ReportObserver,
     TensorBoardObserver,
 };
+use crate::report::gibibytes;
 use crate::run_dir::RunDir;
 use crate::scene::Library;
 use crate::session::Session;
@@ -194,7 +195,14 @@ fn run(arguments: &Arguments, world: &Rc<World>) -> Result<(), Report> {
         }
     }
     let mut observers = observers(&run, &config, &library, session.step(), memory)?;
-    train(&mut session, &mut observers, &stop)
+    let result = train(&mut session, &mut observers, &stop);
+    let (host, device) = (library.memory.most(), session.tensors().memory().most());
+    tracing::info!(
+        "kept of garments at most {}, {} of it tensors and embeddings",
+        gibibytes(host.total.max(device.total) as u64),
+        gibibytes(device.device as u64)
+    );
+    result
 }
 
 /// The checkpoint at `path`, or the newest whole one of the run there; `None` where the run was killed before its first.

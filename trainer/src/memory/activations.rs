@@ -24,7 +24,7 @@ const PER_GARMENT_VERTEX: f64 = 300.0;
 /// For the energies of a garment among others, fitted.
 const PER_LAYER_VERTEX: f64 = 1100.0;
 /// What comes on top: buffers of the operation in work, gradients on their way, and gaps that the allocator leaves.
-const MARGIN: f64 = 1.15;
+const MARGIN: f64 = 1.1;
 
 /// Bytes of a scene of `stage` at its peak, whose garments have `vertices` vertices, `embedded` of them in distinct garments.
 pub(super) fn of_scene(

@@ -11,6 +11,7 @@ use super::garment::LibraryGarment;
 use super::origin::{Maker, Origin};
 use super::recent::{MemoryBudget, Recent, Residence};
 use super::recipe::Recipe;
+use crate::allocator::return_freed_memory;
 use crate::config::Config;
 use crate::memory::{DataSizes, available};
 use clothcombo_data::asset::{Binding, Body, Category, Garment, Provenance};
@@ -102,6 +103,8 @@ impl Wardrobe {
         }
         let looks = first_look(&origins, &recipe, cache.as_ref(), config.data.max_vertices, progress)?;
 
+        // Computing operators takes more than a step of small networks.
+        return_freed_memory();
         let joints = ActiveJoints::new(&recipe.body, looks.iter().map(|l| l.largest_weights.as_slice()));
         let cards = looks.iter().map(|l| l.card.clone()).collect();
         let store = match cache {
