@@ -1,9 +1,14 @@
 //! The networks at inference: a prepared scene in, positions on the host out.
 
 use crate::correct::{corrected, skinned};
+use crate::device::is_processor;
 use crate::evaluate::Draped;
 use crate::felt::Company;
-use crate::scene::{Library, LibraryError, LibraryGarment, PreparedBody, PreparedScene, Recent};
+use crate::scene::{
+    KeptBytes, Library, LibraryError, LibraryGarment, MemoryBudget, PreparedBody, PreparedScene, Recent,
+    Residence,
+};
+use crate::train_loop::SCENES_AHEAD;
 use burn::tensor::{Device, Tensor, TensorData};
 use clothcombo_model::{
     BodyTensors, ClothCombo, Dimensions, Embeddings, GarmentArrays, GarmentEmbedding, GarmentTensors,
@@ -11,7 +16,7 @@ use clothcombo_model::{
 };
 use clothcombo_physics::operators::SurfaceOperators;
 use miette::Diagnostic;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 use thiserror::Error;
 
@@ -28,12 +33,13 @@ pub enum DrapeError {
 }
 
 /// Embeddings of one state of the networks, by garment; threads share it.
-pub type KnownEmbeddings = Mutex<Recent<GarmentEmbedding>>;
+pub type KnownEmbeddings = Recent<GarmentEmbedding>;
 
 /// The constant tensors of a wardrobe on one device, made when a garment is first drawn.
 pub struct WardrobeTensors {
     library: Arc<Library>,
-    garments: Mutex<Recent<GarmentTensors>>,
+    memory: Arc<MemoryBudget>,
+    garments: Recent<GarmentTensors>,
     dimensions: Dimensions,
     device: Device,
 }
@@ -41,8 +47,19 @@ pub struct WardrobeTensors {
 impl WardrobeTensors {
     /// For the garments of `library`.
     pub fn new(library: Arc<Library>, dimensions: Dimensions, device: &Device) -> Self {
-        let garments = Mutex::new(Recent::new(library.memory_limit));
-        Self { library, garments, dimensions, device: device.clone().inner() }
+        let memory = match is_processor(device) {
+            true => library.memory.clone(),
+            false => {
+                MemoryBudget::new(KeptBytes { total: usize::MAX, device: library.memory.limits().device })
+            }
+        };
+        let garments = Recent::new(&memory, Residence::Device);
+        Self { library, memory, garments, dimensions, device: device.clone().inner() }
+    }
+
+    /// What is kept of garments on the device, and how much may be.
+    pub fn memory(&self) -> &MemoryBudget {
+        &self.memory
     }
 
     /// The data the tensors are made from.
@@ -54,24 +71,30 @@ impl WardrobeTensors {
     ///
     /// # Errors
     /// When its operators cannot be read or its numbers are not finite.
-    pub fn garment(&self, index: usize, garment: &LibraryGarment) -> Result<GarmentTensors, DrapeError> {
-        let recent = || self.garments.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(tensors) = recent().get(index) {
+    pub fn garment(&self, index: usize, garment: &LibraryGarment) -> Result<Arc<GarmentTensors>, DrapeError> {
+        if let Some(tensors) = self.garments.get(index) {
             return Ok(tensors);
         }
         let operators = self.library.wardrobe.operators(index)?;
         let tensors = garment_tensors(garment, &operators, &self.dimensions, &self.device)?;
-        // Φ, ΦᵀM and both gradient products, and the skin weights.
-        let bytes = 4 * (4 * operators.eigenvectors.len() + garment.skin_weights.len());
-        recent().insert(index, tensors.clone(), bytes);
-        Ok(tensors)
+        Ok(self.garments.insert(index, tensors, self.bytes(garment, operators.eigen_count)))
     }
 
-    /// Makes the tensors of the scene's garments, so that a step on another thread finds them.
+    fn bytes(&self, garment: &LibraryGarment, eigen_count: usize) -> usize {
+        tensor_bytes(garment.vertex_count(), eigen_count, self.dimensions.joints)
+    }
+
+    /// Makes the tensors of the scene's garments, so that a step on another thread finds them; not where those of the scenes
+    /// before it would have to make room for them.
     ///
     /// # Errors
     /// As [`garment`](Self::garment).
-    pub fn warm(&self, scene: &PreparedScene) -> Result<(), DrapeError> {
+    pub fn warm(&self, scene: &PreparedScene, eigen_count: usize) -> Result<(), DrapeError> {
+        let bytes: usize = scene.worn.iter().map(|worn| self.bytes(worn, eigen_count)).sum();
+        let KeptBytes { total, device } = self.memory.limits();
+        if bytes.saturating_mul(SCENES_AHEAD + 2) > total.min(device) {
+            return Ok(());
+        }
         scene
             .draw
             .garments
@@ -87,12 +110,17 @@ impl WardrobeTensors {
     pub fn outfit(&self, scene: &PreparedScene) -> Result<OutfitTensors, DrapeError> {
         let garments = scene.draw.garments.iter().zip(&scene.worn).map(|(&g, worn)| self.garment(g, worn));
         let garments = garments.collect::<Result<Vec<_>, _>>()?;
-        Ok(OutfitTensors::new(&garments.iter().collect::<Vec<_>>(), &scene.contacts)?)
+        Ok(OutfitTensors::new(&garments.iter().map(Arc::as_ref).collect::<Vec<_>>(), &scene.contacts)?)
     }
 
-    /// An empty store of embeddings for [`embed`](Self::embed).
+    /// An empty store of embeddings for [`embed`](Self::embed), of one scene: all of them are kept for as long as it lives.
     pub fn embeddings(&self) -> KnownEmbeddings {
-        Mutex::new(Recent::new(self.library.memory_limit))
+        Recent::unlimited()
+    }
+
+    /// The same for any number of scenes, within the limits of memory.
+    pub fn kept_embeddings(&self) -> KnownEmbeddings {
+        Recent::new(&self.memory, Residence::Device)
     }
 
     /// One body of a scene, and the start positions of the garments on it `[ΣV, 3]`.
@@ -128,18 +156,24 @@ impl WardrobeTensors {
         scene: &PreparedScene,
         known: &KnownEmbeddings,
     ) -> Result<Vec<GarmentEmbedding>, DrapeError> {
-        let recent = || known.lock().unwrap_or_else(PoisonError::into_inner);
         let encoded = |(&g, worn): (&usize, &Arc<LibraryGarment>)| {
-            let kept = recent().get(g);
-            if let Some(embedding) = kept {
-                return Ok(embedding);
-            }
-            let embedding = model.encode(&self.garment(g, worn)?);
-            recent().insert(g, embedding.clone(), embedding.bytes());
-            Ok(embedding)
+            let embedding = match known.get(g) {
+                Some(kept) => kept,
+                None => {
+                    let embedding = model.encode(self.garment(g, worn)?.as_ref());
+                    let bytes = embedding.bytes();
+                    known.insert(g, embedding, bytes)
+                }
+            };
+            Ok(embedding.as_ref().clone())
         };
         scene.draw.garments.iter().zip(&scene.worn).map(encoded).collect()
     }
+}
+
+/// Memory of the tensors of a garment [bytes]: Φ, ΦᵀM and both gradient products, skin weights, rest positions and masses.
+pub fn tensor_bytes(vertices: usize, eigen_count: usize, joints: usize) -> usize {
+    4 * vertices * (4 * eigen_count + joints + 4)
 }
 
 /// The constant tensors of one garment.
@@ -188,7 +222,7 @@ pub struct Networks<'a> {
 impl<'a> Networks<'a> {
     /// Wraps a model without automatic differentiation.
     pub fn new(model: ClothCombo, tensors: &'a WardrobeTensors) -> Self {
-        Self { model, tensors, embeddings: Arc::new(tensors.embeddings()) }
+        Self { model, tensors, embeddings: Arc::new(tensors.kept_embeddings()) }
     }
 
     /// The same without corrections.

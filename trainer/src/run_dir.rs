@@ -319,7 +319,7 @@ pub(crate) fn differing_keys(a: &Config, b: &Config) -> Vec<String> {
         // Where things are kept and when a run gives up changes no result.
         c.guard = crate::config::GuardConfig { inject: c.guard.inject, ..Default::default() };
         c.data.cache = crate::config::CacheConfig::default();
-        c.data.memory_mib = 1;
+        (c.data.memory_mib, c.data.device_memory_mib) = (1, 1);
         toml::Value::try_from(c).ok()
     };
     let mut out = Vec::new();

@@ -3,11 +3,12 @@
 use crate::average::Average;
 use crate::checkpoint::{Best, Checkpoint, CheckpointState, Snapshot};
 use crate::config::Config;
+use crate::device::is_processor;
 use crate::drape::{Networks, WardrobeTensors};
 use crate::evaluate::{ValidationReport, ValidationSet};
 use crate::guard::Guard;
 use crate::learner::Learner;
-use crate::memory::{MemoryEstimate, estimate};
+use crate::memory::{DataSizes, Memory, MemoryEstimate};
 use crate::run_dir::RunDir;
 use crate::samples;
 use crate::scene::Library;
@@ -93,7 +94,11 @@ impl Session {
     }
     /// Memory the run is expected to use; `None` where the system does not tell what is in use already.
     pub fn memory_estimate(&self) -> Option<MemoryEstimate> {
-        estimate(&self.config, &self.library, self.learner.model().num_params())
+        let (sizes, model) = (DataSizes::of(&self.library), self.learner.model());
+        let on_processor = model.devices().iter().all(is_processor);
+        let streams = self.config.data.cache.folder.is_some();
+        let estimate = MemoryEstimate::new(&self.config, &sizes, model.num_params(), on_processor);
+        Some(estimate.after_start(Memory::now()?.resident, streams))
     }
     /// The constant tensors of the wardrobe.
     pub fn tensors(&self) -> &Arc<WardrobeTensors> {

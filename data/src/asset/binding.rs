@@ -18,7 +18,7 @@ pub struct BindingSettings {
     pub skirt_smoothing_iterations: usize,
     /// Smooth at all, and take a trouser leg's weights from its own leg only; off is the paper's nearest vertex.
     pub smooth: bool,
-    /// Take shape displacements as well; off leaves them zero (the paper's form).
+    /// Take shape displacements as well; without them a garment starts at its rest positions on every body (the paper's form).
     pub shape_transfer: bool,
 }
 
@@ -33,7 +33,8 @@ impl Default for BindingSettings {
 pub struct Binding {
     /// `[V × J]` row-major, each row summing to one.
     pub skin_weights: Vec<f32>,
-    /// `[V × 3 × K]` row-major, metres per unit of shape.
+    /// `[V × 3 × K]` row-major, metres per unit of shape; empty without shape transfer. All K components of 4,300 garments of
+    /// 8,000 vertices on a body with 300 would take 124 GB.
     pub shape_directions: Vec<f32>,
 }
 
@@ -70,13 +71,13 @@ impl Binding {
         }
 
         let mut skin_weights = vec![0.0; nearest.len() * joints];
-        let mut shape_directions = vec![0.0; nearest.len() * width];
+        let mut shape_directions = Vec::with_capacity(nearest.len() * shape_width);
         for (i, row) in values.chunks_exact(columns.max(1)).enumerate() {
             let sum: f32 = row[..used.len()].iter().sum();
             for (c, j) in used.iter().enumerate() {
                 skin_weights[i * joints + usize::from(*j)] = row[c] / sum;
             }
-            shape_directions[i * width..i * width + shape_width].copy_from_slice(&row[used.len()..]);
+            shape_directions.extend_from_slice(&row[used.len()..]);
         }
         Self { skin_weights, shape_directions }
     }
@@ -90,7 +91,8 @@ impl Binding {
         largest
     }
 
-    /// Displacement of every garment vertex [m] for shape `beta` (a short one is continued with zeros).
+    /// Displacement of every garment vertex [m] for shape `beta` (a short one is continued with zeros); empty without shape
+    /// transfer.
     pub fn shape_displacement(&self, beta: &[f64], shape_count: usize) -> Vec<[f64; 3]> {
         if shape_count == 0 {
             return Vec::new();
@@ -267,8 +269,9 @@ mod tests {
             assert!(fits, "vertex {i}");
         }
         let untransferred = Binding::new(&shirt, &body, &BindingSettings { shape_transfer: false, ..plain });
-        assert!(untransferred.shape_directions.iter().all(|d| *d == 0.0));
-        assert_eq!(untransferred.shape_directions.len(), binding.shape_directions.len());
+        assert!(untransferred.shape_directions.is_empty(), "no array of zeros");
+        assert!(untransferred.shape_displacement(&[1.0], k).is_empty());
+        assert_eq!(untransferred.skin_weights, binding.skin_weights);
     }
 
     #[test]

@@ -198,6 +198,19 @@ impl Body {
         Self { faces: zero_body.faces().into(), zero_body, ..self }
     }
 
+    /// The same body with its first `count` shape components, or all it has.
+    pub fn with_shape_components(mut self, count: usize) -> Self {
+        let k = self.shape_count;
+        if count < k {
+            self.shape_directions =
+                self.shape_directions.chunks_exact(k).flat_map(|row| &row[..count]).copied().collect();
+            self.joint_shape_directions =
+                self.joint_shape_directions.chunks_exact(k).flat_map(|row| &row[..count]).copied().collect();
+            self.shape_count = count;
+        }
+        self
+    }
+
     /// Number of vertices V.
     pub fn vertex_count(&self) -> usize {
         self.template.len()

@@ -25,9 +25,8 @@ pub fn body_key(body: &Body) -> Key {
 pub fn binding_key(mesh: Key, body: Key, category: Category, settings: &BindingSettings) -> Key {
     let BindingSettings { smoothing_iterations, skirt_smoothing_iterations, smooth, shape_transfer } =
         *settings;
-    // Trousers that are not smoothed were bound to their own leg at first.
-    let kind = if category == Category::Trousers && !smooth { "binding 2" } else { "binding" };
-    KeyBuilder::new(kind)
+    // The number changes with what a record holds: since 3 there are no shape displacements without shape transfer.
+    KeyBuilder::new("binding 3")
         .key(mesh)
         .key(body)
         .text(category.name())
@@ -79,7 +78,10 @@ pub fn get_binding(cache: &ArrayCache, key: Key, joints: usize) -> Option<(TriMe
         ))
     })?;
     // The bytes are those that were stored, and the key holds the body: anything else is another program's record.
-    if used.iter().any(|&j| j as usize >= joints) || weights.len() != positions.len() * used.len() {
+    if used.iter().any(|&j| j as usize >= joints)
+        || weights.len() != positions.len() * used.len()
+        || !shape_directions.len().is_multiple_of(3 * positions.len().max(1))
+    {
         return None;
     }
     let mut skin_weights = vec![0.0; positions.len() * joints];

@@ -142,6 +142,14 @@ pub struct ListedGarment {
 }
 
 impl ListedGarment {
+    /// Reads the mesh and tells its number of vertices.
+    ///
+    /// # Errors
+    /// [`MeshFileError`] naming file and line or element.
+    pub fn vertex_count(&self) -> Result<usize, MeshFileError> {
+        Ok(load_tri_mesh(&self.path)?.vertex_count())
+    }
+
     /// Reads the mesh. `body` is needed for the guesses: category and the collarbone rule.
     ///
     /// # Errors

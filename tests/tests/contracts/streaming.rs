@@ -3,9 +3,10 @@
 use clothcombo_tests::tiny_config;
 use clothcombo_trainer::config::Config;
 use clothcombo_trainer::device::Backend;
+use clothcombo_trainer::drape::{WardrobeTensors, tensor_bytes};
 use clothcombo_trainer::run_dir::RunDir;
-use clothcombo_trainer::scene::{Library, Wardrobe, load_body};
-use clothcombo_trainer::session::Session;
+use clothcombo_trainer::scene::{KeptBytes, Library, Wardrobe, load_body};
+use clothcombo_trainer::session::{Session, dimensions};
 use clothcombo_trainer::stop::StopFlag;
 use clothcombo_trainer::train_loop::train;
 use std::fs;
@@ -108,4 +109,45 @@ fn a_full_cache_is_one_clear_message() {
     config.data.cache.limit_gib = 1e-5;
     let error = Library::load(&config, &|_, _, _| {}).err().unwrap().to_string();
     assert!(error.contains("limit") && error.contains("raise the limit"), "{error}");
+}
+
+#[test]
+fn garments_and_their_tensors_stay_within_the_limits() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut config = streamed(folder.path());
+    (config.data.memory_mib, config.data.device_memory_mib) = (4, 1);
+    let generate = config.data.garments[0].generate.as_mut().unwrap();
+    (generate.count, generate.vertices) = (12, 1000);
+    let library = Arc::new(load(&config));
+    let tensors = WardrobeTensors::new(library.clone(), dimensions(&library), &Backend::preferred().device());
+    let mut whole = KeptBytes::default();
+    for index in (0..12).chain(0..12) {
+        let garment = library.wardrobe.garment(index).unwrap();
+        tensors.garment(index, &garment).unwrap();
+        let bytes = tensor_bytes(garment.vertex_count(), config.model.eigen_count, library.joints().len());
+        whole.total += garment.bytes() + bytes;
+        whole.device += bytes;
+    }
+    let most = tensors.memory().most();
+    assert!(most.total <= 4 << 20 && most.device <= 1 << 20, "{most:?}");
+    // Both limits were of use: all twelve garments take several times as much.
+    assert!(whole.total / 2 > 4 * most.total && whole.device / 2 > 3 * most.device, "{whole:?} {most:?}");
+    assert!(most.total > 3 << 20 && most.device > 500 << 10, "{most:?}");
+}
+
+#[test]
+fn nothing_is_stored_of_shapes_without_shape_transfer() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut config = streamed(folder.path());
+    let with = load(&config).wardrobe.garment(0).unwrap();
+    assert_eq!(with.shape_directions.len(), with.vertex_count() * 3 * 8, "all components of the mannequin");
+    config.data.shape_components = 2;
+    let few = load(&config).wardrobe.garment(0).unwrap();
+    assert_eq!(few.shape_directions.len(), few.vertex_count() * 3 * 2);
+    assert_eq!(few.start_positions(&[0.5, -1.0]), with.start_positions(&[0.5, -1.0]));
+    config.start.shape_transfer = false;
+    let without = load(&config).wardrobe.garment(0).unwrap();
+    assert!(without.shape_directions.is_empty());
+    let rest = without.garment.rest.positions().iter().map(|p| p.map(|x| x as f32));
+    assert_eq!(without.start_positions(&[0.5, -1.0]), rest.collect::<Vec<_>>());
 }

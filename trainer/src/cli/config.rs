@@ -1,9 +1,11 @@
 //! `clothcombo config`: what a configuration may say, and what one comes to.
 
+use crate::cli::memory_table::print_memory;
 use crate::cli::train::load_under_bar;
-use crate::config::{ClipScope, Config, StageConfig, Trains, load, schema};
+use crate::config::{ClipScope, Config, MOST_GARMENTS, StageConfig, Trains, load, schema};
 use crate::device::Backend;
 use crate::estimate::{StageTime, time_stages};
+use crate::memory::DataSizes;
 use crate::report::duration;
 use clap::{Parser, Subcommand};
 use clothcombo_physics::energy::Term;
@@ -23,9 +25,11 @@ pub enum Verb {
 /// Checks a configuration.
 #[derive(Parser)]
 #[command(after_help = "Examples:\n  clothcombo config check configs/smoke.toml\n  \
-        clothcombo config check configs/open.toml --no-timing\n\n\
-        The time is estimated from a few real steps of every stage on this machine, which needs the data; --no-timing looks at \
-        the file alone.")]
+        clothcombo config check configs/open.toml --no-timing\n  \
+        clothcombo config check configs/paper.toml --garments 4300 --vertices 8000 --shape-components 300\n\n\
+        Memory is estimated from the number of vertices of every garment, and the time from a few real steps of every stage \
+        on this machine; both need the data. --no-timing looks at the file alone; --garments and --vertices state the memory \
+        for a wardrobe that is not at hand.")]
 pub struct CheckArguments {
     /// Configuration file (TOML)
     #[arg(value_name = "FILE")]
@@ -39,6 +43,22 @@ pub struct CheckArguments {
     /// Steps timed per stage
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u64).range(1..=1000))]
     timed_steps: u64,
+    /// State the memory for so many garments instead of those there are, on a body like SMPL-X; no data is loaded
+    #[arg(long, value_name = "N", requires = "vertices", value_parser = positive)]
+    garments: Option<usize>,
+    /// Vertices of each of those garments
+    #[arg(long, value_name = "V", requires = "garments", value_parser = positive)]
+    vertices: Option<usize>,
+    /// Shape components of that body; default: data.shape_components or, where that takes all, the 300 of SMPL-X
+    #[arg(long, value_name = "K", requires = "garments")]
+    shape_components: Option<usize>,
+}
+
+fn positive(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(number @ 1..=MOST_GARMENTS) => Ok(number),
+        _ => Err(format!("not a number from 1 to {MOST_GARMENTS}")),
+    }
 }
 
 /// Runs the verb.
@@ -60,9 +80,15 @@ fn check(arguments: &CheckArguments) -> Result<(), Report> {
     let file = arguments.file.display();
     println!("{file}: every key and value is valid; seed {}, {} steps", config.seed, config.total_steps());
     print_plan(&config);
+    if let (Some(garments), Some(vertices)) = (arguments.garments, arguments.vertices) {
+        let all = if config.data.shape_components == 0 { 300 } else { config.data.shape_components };
+        let components = arguments.shape_components.unwrap_or(all);
+        return print_memory(&config, &DataSizes::assumed(garments, vertices, components));
+    }
     if arguments.no_timing {
         return Ok(());
     }
+    print_memory(&config, &DataSizes::of_named(&config)?)?;
     let library = Arc::new(load_under_bar(&config)?);
     let times = time_stages(&config, &library, &Backend::preferred().device(), arguments.timed_steps)?;
     print_times(&config, &times);

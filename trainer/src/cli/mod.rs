@@ -9,6 +9,7 @@ pub mod fit;
 pub mod generate;
 pub mod import;
 mod interrupted;
+mod memory_table;
 mod post_process;
 pub mod prepare;
 pub mod replay;

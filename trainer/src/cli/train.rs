@@ -2,6 +2,7 @@
 
 use super::exit_code;
 use crate::checkpoint::{Checkpoint, CheckpointError};
+use crate::cli::memory_table::{memory_line, memory_warning};
 use crate::cli::verbosity::{Verbosity, is_quiet, progress_bar, say};
 use crate::config::{Config, load};
 use crate::device::Backend;
@@ -187,20 +188,21 @@ fn run(arguments: &Arguments, world: &Rc<World>) -> Result<(), Report> {
             say(&format!("{} processes share every step", world.share().size));
         }
         if let Some(m) = memory {
-            say(&format!(
-                "memory: about {} at the peak ({} in use, {} for garments, {} for prepared scenes, {} for the largest \
-                scene, {} for parameters)",
-                gibibytes(m.peak),
-                gibibytes(m.start),
-                gibibytes(m.garments),
-                gibibytes(m.scenes),
-                gibibytes(m.activations),
-                gibibytes(m.parameters)
-            ));
+            say(&memory_line(&m));
+            if let Some(warning) = memory_warning(&m) {
+                tracing::warn!("{warning}");
+            }
         }
     }
     let mut observers = observers(&run, &config, &library, session.step(), memory)?;
-    train(&mut session, &mut observers, &stop)
+    let result = train(&mut session, &mut observers, &stop);
+    let (host, device) = (library.memory.most(), session.tensors().memory().most());
+    tracing::info!(
+        "kept of garments at most {}, {} of it tensors and embeddings",
+        gibibytes(host.total.max(device.total) as u64),
+        gibibytes(device.device as u64)
+    );
+    result
 }
 
 /// The checkpoint at `path`, or the newest whole one of the run there; `None` where the run was killed before its first.

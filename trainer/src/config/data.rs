@@ -1,6 +1,6 @@
 //! Where bodies, garments and poses come from, and the state the networks start from.
 
-use crate::scene::LibraryError;
+use crate::scene::{KeptBytes, LibraryError};
 use clothcombo_data::asset::Category;
 use clothcombo_data::cache::ArrayCache;
 use schemars::JsonSchema;
@@ -33,11 +33,16 @@ pub struct DataConfig {
     /// start and kept in memory.
     #[serde(default)]
     pub cache: CacheConfig,
-    /// Memory for garments that are streamed from the cache [MiB], spent up to four times: for the host's share (meshes,
-    /// energies), for the device's (operators as tensors), and for embeddings, those of frozen networks and those of a
-    /// validation. More only saves reading and computing.
+    /// Memory for what is kept of garments that are streamed from the cache [MiB]: meshes, energies and bindings and, on a CPU
+    /// backend, their tensors and embeddings as well. Garments of the scenes in work count and always stay. More only saves
+    /// reading and computing; 1 GiB holds 60 garments of 8,000 vertices. Without a cache all garments stay in memory.
     #[serde(default = "memory_mib")]
     pub memory_mib: usize,
+    /// Memory on the device for tensors of garments (operators, skin weights) and their embeddings [MiB], with a cache or
+    /// without; on a CPU backend a part of `memory_mib`. Those of the scene in work always fit. 4 GiB leaves 20 GiB of a card
+    /// of 24 to the paper's networks and the largest of their scenes.
+    #[serde(default = "device_memory_mib")]
+    pub device_memory_mib: usize,
     /// Garments with more vertices than this are refused before training.
     #[serde(default = "max_vertices")]
     pub max_vertices: usize,
@@ -57,6 +62,9 @@ fn max_vertices() -> usize {
 }
 fn memory_mib() -> usize {
     1024
+}
+fn device_memory_mib() -> usize {
+    4096
 }
 
 /// Shares of the garments that are not trained on. A garment goes by the hash of its name: it stays where it is when others
@@ -252,12 +260,11 @@ impl Default for StartConfig {
 pub const MOST_GARMENTS: usize = 1_000_000;
 
 impl DataConfig {
-    /// Memory for garments that can be read again [bytes]; those of a run without a cache cannot.
-    pub(crate) fn memory_limit(&self) -> usize {
-        match self.cache.folder {
-            Some(_) => self.memory_mib.saturating_mul(1 << 20),
-            None => usize::MAX,
-        }
+    /// Memory for what can be made again [bytes]; garments of a run without a cache cannot.
+    pub(crate) fn memory_limits(&self) -> KeptBytes {
+        let bytes = |mib: usize| mib.saturating_mul(1 << 20);
+        let total = if self.cache.folder.is_some() { bytes(self.memory_mib) } else { usize::MAX };
+        KeptBytes { total, device: bytes(self.device_memory_mib) }
     }
 
     /// The cache of the run, if it has one.
@@ -288,8 +295,12 @@ impl DataConfig {
         if !(self.cache.limit_gib.is_finite() && self.cache.limit_gib > 0.0) {
             return says("data.cache.limit_gib", "is not a positive size", "for example 100.0");
         }
-        if self.memory_mib == 0 {
-            return says("data.memory_mib", "must be at least 1", "for example 1024");
+        for (key, mib) in
+            [("data.memory_mib", self.memory_mib), ("data.device_memory_mib", self.device_memory_mib)]
+        {
+            if mib == 0 {
+                return says(key, "must be at least 1", "for example 1024");
+            }
         }
         if let Some(problem) = self.poses.problem() {
             return Some(problem);

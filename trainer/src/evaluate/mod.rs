@@ -11,4 +11,5 @@ mod validation;
 pub use report::{GroupReport, MethodScore, Spread, ValidationReport};
 pub use score::{Draped, SceneScore, score_scene};
 pub use sign_error::{RegionErrors, SignErrorSettings, SignErrors, WrongSigns, hard_poses, sign_errors};
+pub(crate) use validation::GARMENTS_AT_ONCE;
 pub use validation::{Method, ValidationSet};

@@ -41,8 +41,14 @@ pub struct ValidationSet {
     shape_transfer: bool,
 }
 
-/// Scenes prepared at a time: enough to keep every core busy.
-const CHUNK: usize = 16;
+/// Garments of the scenes prepared at a time: enough to keep every core busy, few enough to be in memory together.
+pub(crate) const GARMENTS_AT_ONCE: usize = 16;
+
+/// How many of these scenes are prepared at a time.
+fn at_once(draws: &[SceneDraw]) -> usize {
+    let most = draws.iter().map(|draw| draw.garments.len()).max().unwrap_or(1);
+    (GARMENTS_AT_ONCE / most.max(1)).max(1)
+}
 
 impl ValidationSet {
     /// Draws the scenes of `config`; losses have their final weights.
@@ -98,7 +104,7 @@ impl ValidationSet {
         methods: &[Method],
     ) -> Result<GroupReport, DrapeError> {
         let mut scores: Vec<Vec<SceneScore>> = vec![Vec::with_capacity(draws.len()); methods.len()];
-        for chunk in draws.chunks(CHUNK) {
+        for chunk in draws.chunks(at_once(draws)) {
             let scenes: Vec<_> = chunk.par_iter().map(|draw| self.prepare(library, draw)).collect();
             for scene in scenes {
                 let scene = scene?;

@@ -127,7 +127,7 @@ impl Learner {
         if trains.freezes() && self.frozen.is_none() {
             self.frozen = Some(Frozen {
                 model: self.model.valid(),
-                embeddings: tensors.embeddings(),
+                embeddings: tensors.kept_embeddings(),
                 while_training: trains,
             });
         }

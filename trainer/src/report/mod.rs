@@ -122,7 +122,7 @@ impl Page<'_> {
         tiles.push(("gradient spikes", self.history.spikes.len().to_string()));
         if let Some(peak) = self.peak {
             let estimated =
-                self.memory.map(|m| format!(" (estimated {})", gibibytes(m.peak))).unwrap_or_default();
+                self.memory.map(|m| format!(" (estimated {})", gibibytes(m.peak()))).unwrap_or_default();
             tiles.push(("peak memory", format!("{}{estimated}", gibibytes(peak))));
         }
         let tiles: String = tiles

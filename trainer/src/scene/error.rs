@@ -1,5 +1,6 @@
 //! Why the data of a run cannot be used.
 
+use crate::report::gibibytes;
 use clothcombo_data::asset::BODY_JOINT_COUNT;
 use miette::Diagnostic;
 use std::error::Error as StdError;
@@ -31,6 +32,22 @@ pub enum LibraryError {
         vertices: usize,
         /// The limit.
         limit: usize,
+    },
+    /// Without a cache all garments stay in memory, which is too small for them.
+    #[error(
+        "the {garments} garments take about {} of memory, of which {} are available",
+        gibibytes(*needed), gibibytes(*available)
+    )]
+    #[diagnostic(help(
+        "set data.cache.folder: what is computed from a garment is then kept on disk, and read when a scene needs it"
+    ))]
+    Memory {
+        /// Number of garments.
+        garments: usize,
+        /// What they take [bytes].
+        needed: u64,
+        /// What the system can give [bytes].
+        available: u64,
     },
     /// Records that were there are gone and cannot be written again.
     #[error("the records of garment {name} vanished from cache {}", cache.display())]

@@ -3,6 +3,7 @@
 use super::active_joints::ActiveJoints;
 use super::error::LibraryError;
 use super::poses::{HeldOut, PoseLibrary};
+use super::recent::MemoryBudget;
 use super::split::{GarmentSplit, SplitNames};
 use super::wardrobe::Wardrobe;
 use crate::config::Config;
@@ -28,8 +29,9 @@ pub struct Library {
     pub poses: PoseLibrary,
     /// Which garments of a scene have layer losses with each other (`model.graph`).
     pub graph: Graph,
-    /// Memory for garments of a streamed wardrobe, on the host and again on the device [bytes].
-    pub memory_limit: usize,
+    /// Memory for what is kept of garments and can be made again: garments of a streamed wardrobe, tensors, embeddings. A
+    /// device with memory of its own has a budget of its own.
+    pub memory: Arc<MemoryBudget>,
     /// Shape components drawn.
     pub shape_count: usize,
     /// Range every component is drawn from.
@@ -47,7 +49,7 @@ pub fn load_body(name: &str, shape_components: usize) -> Result<Body, LibraryErr
         limit => BodyFileSettings { shape_components: limit },
     };
     match name {
-        "mannequin" => Ok(mannequin()),
+        "mannequin" => Ok(mannequin().with_shape_components(settings.shape_components)),
         path => Body::load(Path::new(path), &settings).map_err(LibraryError::data),
     }
 }
@@ -118,7 +120,8 @@ impl Library {
             asked => return Err(LibraryError::ShapeComponents { asked, available: body.shape_count }),
         };
         let poses = PoseLibrary::new(&config.data.poses, &body)?;
-        let wardrobe = Wardrobe::load(config, body.clone(), progress)?;
+        let memory = MemoryBudget::new(config.data.memory_limits());
+        let wardrobe = Wardrobe::load(config, body.clone(), &memory, progress)?;
         let names: Vec<&str> = (0..wardrobe.len()).map(|i| wardrobe.card(i).name.as_str()).collect();
         let split = GarmentSplit::new(&names, &config.data)?;
         Ok(Self {
@@ -128,7 +131,7 @@ impl Library {
             split,
             poses,
             graph: config.model.graph,
-            memory_limit: config.data.memory_limit(),
+            memory,
             shape_count,
             shape_range: config.data.shape_range,
             fingerprint: OnceLock::new(),

@@ -28,7 +28,7 @@ pub use origin::{Maker, Origin};
 pub use poses::{ClipSplit, FrameCounts, HeldOut, PoseLibrary, SelfIntersecting, Window};
 pub use prefetch::{Prefetch, prepare_step};
 pub use prepare::{Dresser, PreparedBody, PreparedScene, contacts, prepare};
-pub use recent::Recent;
+pub use recent::{KeptBytes, MemoryBudget, Recent, Residence};
 pub use recipe::Recipe;
 pub use skinning::skinning_transforms;
 pub use split::{GarmentPurpose, GarmentSplit, SplitNames, purpose};

@@ -56,6 +56,17 @@ impl Origin {
         Ok(origins)
     }
 
+    /// How many vertices it has; of a generated garment, which is not made for this, how many were asked for.
+    ///
+    /// # Errors
+    /// [`LibraryError`] naming the file and line.
+    pub fn vertices(&self) -> Result<usize, LibraryError> {
+        match self {
+            Self::File(listed) => Ok(listed.vertex_count().map_err(LibraryError::data)?),
+            Self::Generated { settings, .. } => Ok(settings.target_vertices),
+        }
+    }
+
     /// Name of the garment, unique within a source.
     fn name(&self) -> String {
         match self {

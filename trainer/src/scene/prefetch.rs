@@ -56,7 +56,10 @@ impl Prefetch {
             for step in first_step..schedule.total_steps() {
                 let scenes = prepare_step(library, &config, &schedule, step, share)
                     .map_err(DrapeError::from)
-                    .and_then(|scenes| scenes.iter().try_for_each(|s| tensors.warm(s)).map(|()| scenes));
+                    .and_then(|scenes| {
+                        let eigen_count = config.model.eigen_count;
+                        scenes.iter().try_for_each(|s| tensors.warm(s, eigen_count)).map(|()| scenes)
+                    });
                 let failed = scenes.is_err();
                 if sender.send(scenes).is_err() || failed {
                     return; // the trainer stopped early, or is about to

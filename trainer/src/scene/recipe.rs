@@ -65,7 +65,6 @@ impl Recipe {
             .map_err(|e| LibraryError::Garment { name: garment.name.clone(), reason: e.to_string() })?;
         Ok(LibraryGarment {
             skin_weights: joints.restrict(&binding.skin_weights),
-            shape_stride: self.body.shape_count,
             shape_directions: binding.shape_directions,
             energies: Arc::new(energies),
             rings: Rings::new(&topology),

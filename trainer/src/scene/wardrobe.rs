@@ -1,16 +1,19 @@
 //! All garments of a run, in memory or streamed from the cache.
 //!
-//! Without a cache everything is computed at the start and kept. With one, what is expensive is computed once and stored;
-//! a run keeps the garments it used last, within `data.memory_mib`, and reads the others again when a scene draws them:
-//! a wardrobe may be many times larger than memory, and the results are the same to the bit.
+//! Without a cache everything is computed at the start and kept, if the machine has the memory. With one, what is expensive
+//! is computed once, a few garments at a time, and stored; a run keeps the garments it used last, within `data.memory_mib`,
+//! and reads the others again when a scene draws them: a wardrobe may be many times larger than memory, and the results are
+//! the same to the bit.
 
 use super::active_joints::ActiveJoints;
 use super::error::LibraryError;
 use super::garment::LibraryGarment;
 use super::origin::{Maker, Origin};
-use super::recent::Recent;
+use super::recent::{MemoryBudget, Recent, Residence};
 use super::recipe::Recipe;
+use crate::allocator::return_freed_memory;
 use crate::config::Config;
+use crate::memory::{DataSizes, available};
 use clothcombo_data::asset::{Binding, Body, Category, Garment, Provenance};
 use clothcombo_data::cache::{
     ArrayCache, Key, binding_key, body_key, get_binding, get_largest_weights, get_operators, mesh_key,
@@ -18,8 +21,8 @@ use clothcombo_data::cache::{
 };
 use clothcombo_physics::operators::SurfaceOperators;
 use rayon::prelude::*;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
 
 /// What is known of every garment without reading it.
 #[derive(Clone, Debug)]
@@ -60,7 +63,7 @@ struct Keys {
 struct Streamed {
     cache: ArrayCache,
     keys: Vec<Keys>,
-    recent: Mutex<Recent<Arc<LibraryGarment>>>,
+    recent: Recent<LibraryGarment>,
     origins: Vec<Origin>,
     recipe: Recipe,
 }
@@ -74,28 +77,41 @@ struct FirstLook {
 }
 
 impl Wardrobe {
-    /// Reads or makes all garments `config` names, and computes what the cache does not hold.
-    /// `progress(done, total, name)` is called per garment.
+    /// Reads or makes all garments `config` names, and computes what the cache does not hold. Those of a streamed wardrobe are
+    /// kept within `memory`. `progress(done, total, name)` is called per garment.
     ///
     /// # Errors
-    /// [`LibraryError`] names the file or garment at fault.
+    /// [`LibraryError`] names the file or garment at fault; [`LibraryError::Memory`] if the machine cannot hold garments that
+    /// are not streamed, before any of them is prepared.
     pub fn load(
         config: &Config,
         body: Arc<Body>,
+        memory: &Arc<MemoryBudget>,
         progress: &(dyn Fn(usize, usize, &str) + Sync),
     ) -> Result<Self, LibraryError> {
         let origins = Origin::list(&config.data.garments)?;
         let recipe = Recipe::new(config, body);
         let cache = config.data.open_cache()?;
+        if cache.is_none()
+            && let Some(available) = available()
+        {
+            let sizes = DataSizes::of_listed(&origins, &recipe.body)?;
+            let (garments, needed) = (origins.len(), sizes.unstreamed_bytes(config));
+            if needed > available {
+                return Err(LibraryError::Memory { garments, needed, available });
+            }
+        }
         let looks = first_look(&origins, &recipe, cache.as_ref(), config.data.max_vertices, progress)?;
 
+        // Computing operators takes more than a step of small networks.
+        return_freed_memory();
         let joints = ActiveJoints::new(&recipe.body, looks.iter().map(|l| l.largest_weights.as_slice()));
         let cards = looks.iter().map(|l| l.card.clone()).collect();
         let store = match cache {
             Some(cache) => Store::Streamed(Box::new(Streamed {
                 cache,
                 keys: looks.iter().filter_map(|l| l.keys).collect(),
-                recent: Mutex::new(Recent::new(config.data.memory_limit())),
+                recent: Recent::new(memory, Residence::Host),
                 origins,
                 recipe,
             })),
@@ -162,13 +178,12 @@ impl Wardrobe {
             Store::Kept { garments, .. } => return Ok(garments[index].clone()),
             Store::Streamed(streamed) => streamed,
         };
-        let recent = || streamed.recent.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(garment) = recent().get(index) {
+        if let Some(garment) = streamed.recent.get(index) {
             return Ok(garment);
         }
-        let garment = Arc::new(streamed.read(index, &self.cards[index], &self.joints)?);
-        recent().insert(index, garment.clone(), garment.bytes());
-        Ok(garment)
+        let garment = streamed.read(index, &self.cards[index], &self.joints)?;
+        let bytes = garment.bytes();
+        Ok(streamed.recent.insert(index, garment, bytes))
     }
 
     /// DiffusionNet's operators of garment `index`.
@@ -216,7 +231,8 @@ impl Streamed {
     }
 }
 
-/// Makes every garment once: what is missing is computed, and stored or kept.
+/// Makes every garment once: what is missing is computed, and stored or kept. Only as many as there are threads are in work at
+/// a time: one that waits for a part of its garment would begin another one.
 fn first_look(
     origins: &[Origin],
     recipe: &Recipe,
@@ -253,7 +269,11 @@ fn first_look(
         progress(done.fetch_add(1, Ordering::Relaxed) + 1, origins.len(), &look.card.name);
         Ok(look)
     };
-    origins.par_iter().map(look).collect()
+    let mut looks = Vec::with_capacity(origins.len());
+    for at_once in origins.chunks(rayon::current_num_threads()) {
+        looks.par_extend(at_once.par_iter().map(look).collect::<Result<Vec<_>, _>>()?);
+    }
+    Ok(looks)
 }
 
 fn stored(

@@ -46,7 +46,7 @@ pub fn ask(
     let draws = question.draws(subject);
     let wardrobe = &subject.library.wardrobe;
     let embed = |garment: usize| -> Result<GarmentEmbedding, DrapeError> {
-        Ok(subject.model.encode(&subject.tensors.garment(garment, &*wardrobe.garment(garment)?)?))
+        Ok(subject.model.encode(subject.tensors.garment(garment, &*wardrobe.garment(garment)?)?.as_ref()))
     };
     let other = |garment: usize| {
         let category = wardrobe.card(garment).category;

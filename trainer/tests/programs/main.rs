@@ -17,6 +17,7 @@ mod import_programs;
 mod incidents;
 mod interrupt;
 mod kill;
+mod memory;
 mod observability;
 mod own_garments;
 mod resolve;

@@ -57,6 +57,17 @@ fn the_t_pose_is_the_shaped_body_and_the_zero_body_the_template() {
 }
 
 #[test]
+fn fewer_shape_components_make_the_same_body_without_the_others() {
+    let body = Body::new(random_parts(7, 4)).unwrap();
+    let first = body.clone().with_shape_components(2);
+    assert_eq!((first.shape_count, first.shape_directions.len()), (2, 40 * 3 * 2));
+    let pose = random_pose(7, 4);
+    let (a, b) = (body.posed(&[0.4, -1.2], &pose).unwrap(), first.posed(&[0.4, -1.2], &pose).unwrap());
+    assert_eq!((a.positions, a.joints), (b.positions, b.joints));
+    assert_eq!(body.clone().with_shape_components(9).shape_directions, body.shape_directions);
+}
+
+#[test]
 fn turning_the_root_turns_the_body_rigidly_about_the_pelvis() {
     let body = Body::new(random_parts(7, 3)).unwrap();
     let mut pose = random_pose(7, 4);

@@ -66,7 +66,9 @@ impl Unposing {
             source: Provenance::default(),
         };
         let binding = Binding::new(&garment, &self.rest, settings);
+        // Without shape transfer it stays on the sample's body.
         let moved = binding.shape_displacement(&[1.0], 1);
+        let moved = |v: usize| moved.get(v).copied().unwrap_or_default();
         let joints = self.bones.len();
         (mesh.positions().iter().enumerate())
             .map(|(v, p)| {
@@ -74,7 +76,8 @@ impl Unposing {
                 let bones =
                     self.bones.iter().zip(weights.iter().map(|w| f64::from(*w))).filter(|(_, w)| *w > 0.0);
                 let unposed = unskin(*p, bones).ok_or_else(|| format!("vertex {v} cannot be unposed"))?;
-                Ok(std::array::from_fn(|a| unposed[a] - moved[v][a]))
+                let moved = moved(v);
+                Ok(std::array::from_fn(|a| unposed[a] - moved[a]))
             })
             .collect()
     }

@@ -1,0 +1,113 @@
+//! What a run will need of memory, as a table and in a line.
+
+use crate::config::{Config, PoseEncoding};
+use crate::device::Backend;
+use crate::memory::{DataSizes, MemoryEstimate, available};
+use crate::report::gibibytes;
+use burn::module::Module;
+use clothcombo_model::{ClothCombo, Dimensions};
+use miette::{IntoDiagnostic, Report};
+
+/// Prints what a run of `config` on data of these sizes needs, on a GPU and on the processor.
+///
+/// # Errors
+/// When the networks cannot be made.
+pub fn print_memory(config: &Config, sizes: &DataSizes) -> Result<(), Report> {
+    let parameters = parameter_count(config, sizes)?;
+    let [gpu, cpu] = [false, true].map(|on| MemoryEstimate::new(config, sizes, parameters, on));
+    let (count, total) = (sizes.vertices.len(), sizes.vertices.iter().sum::<usize>());
+    println!(
+        "\nmemory at the peak for {count} garments of {} vertices on average, {} shape components",
+        total / count.max(1),
+        sizes.shape_components
+    );
+    let row = |name: &str, cells: [String; 3]| {
+        let [host, device, processor] = cells;
+        println!("  {name:<46} {host:>12} {device:>12} {processor:>12}");
+    };
+    let on_host = |name: &str, of: &dyn Fn(&MemoryEstimate) -> u64| {
+        row(name, [gibibytes(of(&gpu)), String::new(), gibibytes(of(&cpu))]);
+    };
+    let on_device = |name: &str, of: &dyn Fn(&MemoryEstimate) -> u64| {
+        row(name, [String::new(), gibibytes(of(&gpu)), gibibytes(of(&cpu))]);
+    };
+    row("", ["with a GPU:", "on the", "CPU backend:"].map(String::from));
+    row("", ["host", "device", "host"].map(String::from));
+    on_host("program, body, list of garments", &|m| m.program);
+    let streams = config.data.cache.folder.is_some();
+    match streams {
+        true => on_host(&format!("garments kept, of {}", gibibytes(gpu.all_garments)), &|m| m.garments),
+        false => on_host("all garments, for want of data.cache.folder", &|m| m.garments),
+    }
+    match streams {
+        true => on_host("operators, streamed from data.cache.folder", &|_| 0),
+        false => on_host("operators of all garments, for the same reason", &|m| m.operators),
+    }
+    on_host("scenes prepared in advance", &|m| m.scenes);
+    on_host("at the start: garments being prepared", &|m| m.preparation);
+    on_device(&format!("tensors and embeddings kept, of {}", gibibytes(gpu.all_tensors)), &|m| m.tensors);
+    on_device("Adam's moments, copies of the parameters", &|m| m.parameters);
+    on_device(&format!("the largest step ({})", largest_step(config)), &|m| m.step);
+    row("together", [gpu.host(), gpu.device(), cpu.peak()].map(gibibytes));
+    if config.data.poses.motions.is_some() {
+        println!("  motions come on top: about 0.6 KiB a frame of 22 joints");
+    }
+    if let Some(available) = available() {
+        println!("  available on this machine: {}", gibibytes(available));
+    }
+    Ok(())
+}
+
+/// Garments of the largest scene, and scenes of a step.
+fn largest_step(config: &Config) -> String {
+    let layers = config.stages.iter().map(|s| s.layers[1]).max().unwrap_or(1);
+    format!("{layers} garment{}", if layers == 1 { "" } else { "s" })
+}
+
+/// Number of parameters of the networks of `config` for data of these sizes.
+fn parameter_count(config: &Config, sizes: &DataSizes) -> Result<usize, Report> {
+    let per_joint = match config.data.poses.encoding {
+        PoseEncoding::RotationMatrix => 9,
+        PoseEncoding::AxisAngle => 3,
+    };
+    let dimensions =
+        Dimensions { joints: sizes.joints, shape: sizes.shape_components, pose: per_joint * sizes.joints };
+    let model = ClothCombo::new(&config.model, &dimensions, config.seed, &Backend::preferred().device());
+    Ok(model.into_diagnostic()?.num_params())
+}
+
+/// What a run that starts says.
+pub fn memory_line(m: &MemoryEstimate) -> String {
+    let of_host = format!(
+        "{} in use, {} for garments, {} for prepared scenes",
+        gibibytes(m.program),
+        gibibytes(m.garments + m.operators),
+        gibibytes(m.scenes)
+    );
+    let of_device = format!(
+        "{} for their tensors, {} for the largest step, {} for parameters",
+        gibibytes(m.tensors),
+        gibibytes(m.step),
+        gibibytes(m.parameters)
+    );
+    match m.is_processor {
+        true => format!("memory: about {} at the peak ({of_host}, {of_device})", gibibytes(m.peak())),
+        false => format!(
+            "memory: about {} at the peak ({of_host}) and {} on the device ({of_device})",
+            gibibytes(m.host()),
+            gibibytes(m.device())
+        ),
+    }
+}
+
+/// What to say where the run is expected to need more than there is.
+pub fn memory_warning(m: &MemoryEstimate) -> Option<String> {
+    let further = m.peak().saturating_sub(m.program);
+    let available = available().filter(|available| further > *available)?;
+    Some(format!(
+        "the run may need {} more memory, of which {} are available; smaller networks, fewer layers or \
+            data.memory_mib take less",
+        gibibytes(further),
+        gibibytes(available)
+    ))
+}
