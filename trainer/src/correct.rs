@@ -1,7 +1,7 @@
 //! Correction steps at inference: from linear blend skinning over the networks' drape to a state of less energy.
 //!
 //! Every state on the path is accepted garment by garment, as far as it lowers the energy ([`crate::descent`]), in the form
-//! that has no jumps ([`SceneEnergy::continuous`]), the one that drapes are measured by:
+//! without jumps that drapes are measured by ([`crate::evaluate::reference`]):
 //!
 //! 1. skinning of the start by the initial weights W;
 //! 2. the networks' drape: Δx and ΔW together; where a garment does not take it, Δx with W, and then ΔW as far as it helps
@@ -16,7 +16,6 @@ use crate::evaluate::Draped;
 use crate::felt::{Company, felt};
 use burn::tensor::{Device, Tensor, TensorData};
 use clothcombo_model::{BodyTensors, ClothCombo, OutfitTensors, SingleDrape, linear_blend_skinning};
-use clothcombo_physics::energy::SceneEnergy;
 
 /// The state that the correction steps of `model` lead to, `uncorrected` being the networks' drape: that itself where the model
 /// takes no such step. `watch` sees every state that was accepted, skinning first.
@@ -34,7 +33,11 @@ pub(crate) fn corrected(
         return uncorrected;
     }
     let (prepared, device) = (&scene.bodies[0], start.device());
-    let energy = compared_by(&prepared.energy, company);
+    let energy = match company {
+        Company::Together => (*prepared.energy).clone(),
+        Company::Alone => prepared.energy.without_layers(),
+    };
+    let energy = energy.continuous().pulled_back(&scene.skinning_transforms());
     let mut descent = Descent::new(&energy, skinned(start.clone(), outfit.skin_weights.clone(), body));
     watch(&descent);
     let skin_weights = take_networks(&mut descent, &uncorrected, single, outfit, body, &device);
@@ -56,14 +59,6 @@ pub(crate) fn corrected(
         }
     }
     descent.into_state()
-}
-
-/// The energy that states of garments are compared by, together or each alone.
-fn compared_by(energy: &SceneEnergy<f32>, company: Company) -> SceneEnergy<f32> {
-    match company {
-        Company::Together => energy.clone().continuous(),
-        Company::Alone => energy.without_layers().continuous(),
-    }
 }
 
 /// Moves from skinning to the networks' drape, and says which skin weights `[ΣV, J]` every garment has then.

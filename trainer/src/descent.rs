@@ -2,10 +2,10 @@
 //!
 //! A network may make worse what is unlike anything that it was trained on. The losses need no ground truth, so that this is
 //! seen at inference. A proposal is a new state of all garments; every garment goes a share of the distance there, the
-//! largest of some with which *no garment's energy rises*. The energy of a garment is that of its own terms and of every pair it
-//! is part of: what it wins against a neighbour counts, and what that loses is its own to see. So the energy of every garment
-//! falls or stays from state to state, and a garment that a proposal would harm does not keep those from moving that it
-//! has nothing to do with.
+//! first of some with which *no garment's energy rises, nor their sum*. The energy of a garment is that of its own terms and of
+//! every pair it is part of: what it wins against a neighbour counts, and what that loses is its own to see. So the energy of every
+//! garment and that of the outfit fall or stay from state to state, and a garment that a proposal would harm does not keep
+//! those from moving that it has nothing to do with.
 
 use crate::evaluate::Draped;
 use clothcombo_physics::energy::{SceneEnergy, TermMap};
@@ -21,13 +21,15 @@ pub struct Descent<'a> {
     energy: &'a SceneEnergy<f32>,
     state: Draped,
     energies: Vec<f64>,
+    /// Of the whole outfit, in which every pair counts once.
+    total: f64,
 }
 
 impl<'a> Descent<'a> {
     /// Starts from `state`.
     pub fn new(energy: &'a SceneEnergy<f32>, state: Draped) -> Self {
-        let energies = of_garments(energy, &state);
-        Self { energy, state, energies }
+        let (energies, total) = measured(energy, &state);
+        Self { energy, state, energies, total }
     }
 
     /// Where it is.
@@ -40,13 +42,18 @@ impl<'a> Descent<'a> {
         &self.energies
     }
 
+    /// Energy of the outfit [J]; infinite where it is not finite.
+    pub fn total(&self) -> f64 {
+        self.total
+    }
+
     /// The state that was reached.
     pub fn into_state(self) -> Draped {
         self.state
     }
 
     /// Moves every garment towards `proposal` by the first of `shares` of the distance, or not at all, so that no garment's
-    /// energy rises; which share every garment took.
+    /// energy rises, nor that of the outfit; which share every garment took.
     ///
     /// # Panics
     /// If the proposal has another number of vertices.
@@ -70,14 +77,18 @@ impl<'a> Descent<'a> {
         let share = |taken: usize| shares.get(taken).copied().unwrap_or(0.0);
         while taken.iter().any(|s| *s < shares.len()) {
             let trial = self.between(proposal, |i| share(taken[i]));
-            let energies = of_garments(self.energy, &trial);
+            let (energies, total) = measured(self.energy, &trial);
+            let moves = |i: usize| taken[i] < shares.len();
             let rose = (0..taken.len()).filter(|&i| energies[i] > self.energies[i]);
-            let shorter: BTreeSet<usize> =
-                rose.flat_map(|i| self.shortened(i, |j| taken[j] < shares.len())).collect();
+            let mut shorter: BTreeSet<usize> = rose.flat_map(|i| self.shortened(i, moves)).collect();
+            if shorter.is_empty() && total > self.total {
+                // What garments win from each other counts twice for them, what they pay for it once.
+                shorter.extend((0..taken.len()).filter(|&i| moves(i)));
+            }
             if shorter.is_empty() {
                 // Infinite energies neither rise nor fall.
                 if energies.iter().zip(&self.energies).any(|(new, old)| new < old) {
-                    (self.state, self.energies) = (trial, energies);
+                    (self.state, self.energies, self.total) = (trial, energies, total);
                     return taken.into_iter().map(share).collect();
                 }
                 break;
@@ -119,8 +130,8 @@ impl<'a> Descent<'a> {
     }
 }
 
-/// Weighted energy of every garment: its own terms, and those of every pair that it is part of.
-fn of_garments(energy: &SceneEnergy<f32>, state: &Draped) -> Vec<f64> {
+/// Weighted energy of every garment, its own terms and those of every pair that it is part of; and of the outfit.
+fn measured(energy: &SceneEnergy<f32>, state: &Draped) -> (Vec<f64>, f64) {
     let value = energy.value(&state.posed, &state.canonical);
     let weighted = |weights: &TermMap<f64>, raw: &TermMap<Option<f64>>| -> f64 {
         raw.iter().map(|(term, value)| value.map_or(0.0, |value| weights[term] * value)).sum()
@@ -132,7 +143,8 @@ fn of_garments(energy: &SceneEnergy<f32>, state: &Draped) -> Vec<f64> {
         energies[pair.inner] += shared;
         energies[pair.outer] += shared;
     }
-    energies.iter().map(|e| if e.is_finite() { *e } else { f64::INFINITY }).collect()
+    let bounded = |e: f64| if e.is_finite() { e } else { f64::INFINITY };
+    (energies.into_iter().map(bounded).collect(), bounded(value.total))
 }
 
 #[cfg(test)]
@@ -236,6 +248,25 @@ mod tests {
         let mut descent = Descent::new(&free, start);
         assert_eq!(descent.advance(&stretched(&rest, &[1.0, 1.0]), &BACKTRACKING)[0], 1.0);
         assert_eq!(descent.state().posed, rest);
+    }
+
+    #[test]
+    fn garments_do_not_both_strain_for_what_the_outfit_loses() {
+        // Two tubes that cross would part by stretching: each wins the pair, which counts for both, and pays its own strain.
+        let (mut energy, rest) = scene(&[0.12, 0.12], &[[0, 1]]);
+        let (apart, start) = (stretched(&rest, &[0.96, 1.04]), stretched(&rest, &[1.0, 1.0]));
+        let raw = Descent::new(&energy, start.clone());
+        let strain = Descent::new(&energy, apart.clone()).total();
+        assert!(raw.total() > 0.0 && strain > 0.0);
+        // A pair that is worth three quarters of what both strain together: more than each of them pays, less than their sum.
+        energy.layers[0].weights =
+            energy.layers[0].weights.map(|_, weight| weight * 0.75 * strain / raw.total());
+        let mut descent = Descent::new(&energy, start);
+        let (energies, total) = (descent.energies().to_vec(), descent.total());
+        assert!(Descent::new(&energy, apart.clone()).energies().iter().zip(&energies).all(|(a, b)| a < b));
+        assert_eq!(descent.advance(&apart, &WHOLE), [0.0, 0.0]);
+        descent.advance(&apart, &BACKTRACKING);
+        assert!(descent.total() <= total);
     }
 
     #[test]

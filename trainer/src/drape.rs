@@ -347,7 +347,7 @@ pub fn drape_on(model: &ClothCombo, on_body: &OnBody<'_>) -> (Draped, NetworkTim
     (found, times)
 }
 
-/// Lets `model` drape every garment of an outfit as if it were worn alone.
+/// Lets `model` drape every garment of an outfit by itself, before untangling (whatever `model.graph`), and correct it alone.
 pub fn drape_alone(model: &ClothCombo, on_body: &OnBody<'_>) -> Draped {
     let OnBody { outfit, embeddings, body, start, .. } = on_body;
     let single = model.drape_single(outfit, embeddings, body, start.clone());

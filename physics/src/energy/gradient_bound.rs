@@ -129,6 +129,9 @@ impl Deformed<'_> {
             let [a, b, c] = self.rest.corners(f);
             let length = norm(sub(b, a)).max(norm(sub(c, b))).max(norm(sub(a, c)));
             let area = self.rest.face_area(f);
+            if area == 0.0 {
+                return (*face, 0.0);
+            }
             let regular = length.max(settings.needle_ratio * self.median_edge);
             let true_height = if length > 0.0 { 2.0 * area / length } else { 0.0 };
             let height = true_height.max(settings.needle_ratio * regular);

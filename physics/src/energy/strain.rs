@@ -26,6 +26,9 @@ pub struct Strain {
     incidence: Incidence,
 }
 
+/// A triangle with a smaller ratio of height to longest edge has no area: corners on a line round to heights of about 1e-16.
+const NO_HEIGHT: f64 = 1e-12;
+
 /// Which rest triangles are too flat to be measured as they are.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Needle {
@@ -61,6 +64,9 @@ impl RestTriangle {
         let true_length = lengths[first];
         let along = if true_length > 0.0 { dot(side, base) / true_length } else { 0.0 };
         let true_height = if true_length > 0.0 { 2.0 * area / true_length } else { 0.0 };
+        // Corners on a line have a height of rounding errors.
+        let area = if true_height > NO_HEIGHT * true_length { area } else { 0.0 };
+        let true_height = if area > 0.0 { true_height } else { 0.0 };
         let length = true_length.max(needle.ratio * needle.median_edge);
         let height = true_height.max(needle.ratio * length);
 
@@ -275,7 +281,9 @@ mod tests {
 
     #[test]
     fn a_triangle_without_area_has_no_strain_in_the_printed_form_either() {
-        let rest = TriMesh::new(vec![[0.0; 3], [0.1, 0.0, 0.0], [0.2, 0.0, 0.0]], vec![[0, 1, 2]]).unwrap();
+        // Corners on a line that do not round to one.
+        let on_a_line = |share: f64| [0.1, 0.2, 0.3].map(|x| share * x);
+        let rest = TriMesh::new([0.0, 1.0, 0.495].map(on_a_line).to_vec(), vec![[0, 1, 2]]).unwrap();
         let posed = [[0.0; 3], [0.2, 0.1, 0.0], [0.4, 0.0, 0.3]];
         let mut gradient = vec![[0.0; 3]; 3];
         let target = Weighted { weight: 1.0, gradient: &mut gradient };

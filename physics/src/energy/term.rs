@@ -15,7 +15,7 @@ pub enum Term {
     BodyCollision,
     /// Logarithmic repulsion between vertices of one garment [1].
     Repulsion,
-    /// Squared vertical displacement of the garment's upper edge, undone by skinning [m²].
+    /// Squared vertical displacement of the garment's upper edge, before skinning [m²].
     Holding,
     /// Cubic penalty of outer vertices below the inner garment [m³].
     LayerCollision,

@@ -347,18 +347,18 @@ fn dense_newton(problem: &Problem<'_>, start: &[[f64; 3]]) -> Vec<[f64; 3]> {
 
 #[test]
 fn a_garment_is_held_at_the_height_that_its_skinning_says() {
-    // Skinning turns the garment upside down and lifts it: held at its top, that is below when posed. It hangs from there by
-    // compression, which nothing but the holding carries.
+    // Skinning turns the garment upside down and lifts it: held at its top, that is below when posed. It starts 2 cm too low.
     let rest = shapes::grid(0.2, 0.2, 4, 4);
-    let weights = weights(&[(Term::Strain, 1.0), (Term::Gravity, 1.0), (Term::Holding, 1e6)]);
+    let weights = weights(&[(Term::Strain, 1.0), (Term::Holding, 1e3)]);
     let turned: Transform = [[1.0, 0.0, 0.0, 0.1], [0.0, -1.0, 0.0, 0.7], [0.0, 0.0, -1.0, 0.0]];
     let energy = scene(&rest, &far_body(), settings(), weights).pulled_back(&vec![turned; 25]);
     let problem = Problem::new(&energy).unwrap();
     let start: Vec<_> = rest.positions().iter().map(|[x, y, z]| [x + 0.1, 0.68 - y, -z]).collect();
-    let solution = run(&problem, &start, &SolverSettings { iterations: 40, ..SolverSettings::default() });
+    assert!((problem.value(&start) - 1e3 * 3.0 * 0.02 * 0.02).abs() < 1e-9);
+    let solution = run(&problem, &start, &SolverSettings::default());
     assert_monotone(&solution);
-    for v in 22..25 {
-        assert!((solution.positions[v][1] - (0.7 - 0.2)).abs() < 1e-4, "{:?}", solution.positions[v]);
+    for (found, rest) in solution.positions.iter().zip(rest.positions()) {
+        assert!((found[1] - (0.7 - rest[1])).abs() < 1e-4, "{found:?} {rest:?}");
     }
 
     let mut held = energy.clone();

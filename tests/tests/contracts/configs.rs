@@ -1,7 +1,7 @@
 //! The configurations that come with the project say what they mean.
 
 use clothcombo_model::{Graph, ModelConfig, SkinningJoints};
-use clothcombo_trainer::config::{Config, PoseEncoding, Trains, load, to_toml};
+use clothcombo_trainer::config::{ClipScope, Config, DistanceMode, PoseEncoding, Trains, load, to_toml};
 use std::path::{Path, PathBuf};
 
 fn configurations(folder: &Path) -> Vec<PathBuf> {
@@ -84,7 +84,8 @@ fn the_configuration_of_the_paper_has_the_papers_values() {
     let material = &losses.material;
     assert_eq!((material.lambda, material.mu), (4.44e4, 2.36e4));
 
-    assert_eq!(config.optimizer.clip_norm, 1.0);
+    assert!(config.optimizer.clip == ClipScope::Step && config.optimizer.clip_norm == 1.0);
+    assert_eq!(losses.body_collision.distance, DistanceMode::NearestVertex);
     assert_eq!(config.total_steps(), 200_000);
     let [single, all] = &config.stages[..] else { panic!("two stages") };
     assert!(single.trains == Trains::Single && single.steps == 100_000);

@@ -149,11 +149,12 @@ impl TrainedModel {
         let expected = match adds_corrections {
             true => ModelConfig {
                 correction_width: self.config.model.correction_width,
-                correction_steps: self.config.model.correction_steps,
                 ..config.model.without_corrections()
             },
             false => config.model.clone(),
         };
+        // How many steps are taken is a choice of inference, not of the networks.
+        let expected = ModelConfig { correction_steps: self.config.model.correction_steps, ..expected };
         if self.config.model != expected {
             let reason =
                 "its [model] section differs from that of the configuration, which init_from does not allow";

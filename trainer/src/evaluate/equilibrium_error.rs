@@ -167,7 +167,7 @@ pub fn scene_error(
         MethodError { method, energy, terms, excess, excess_percent, distance_mm }
     };
     let steps = network.iter().flat_map(|drapes| &drapes.steps);
-    let steps = steps.map(|(steps, positions)| (format!("network, {steps} steps"), positions));
+    let steps = steps.map(|(steps, positions)| (format!("network, {steps} corrections"), positions));
     let named = states.iter().map(|(method, positions)| ((*method).to_owned(), positions));
     let methods = named.chain(steps).map(|(method, positions)| measure(method, positions)).collect();
     let differ = |s: &Solution| s.energy() - minimum.energy() > SAME_MINIMUM * gained;

@@ -26,10 +26,10 @@ pub struct EmbeddingStudy {
     pub scenes: usize,
     /// Weight and margin of the collision as the model's configuration has it.
     pub collision: String,
-    /// Correct, of another garment, and zero: the networks without corrections. Corrections see where the cloth lies, and the
-    /// choice of the state with the least energy falls back on skinning: they would hide what a wrong embedding does.
+    /// Correct, of another garment, and zero: the networks without corrections. Corrections see where the cloth lies
+    /// and are accepted from skinning on as far as they lower the energy: they would hide what a wrong embedding does.
     pub kinds: Vec<MethodResult>,
-    /// The same with the correction networks and that choice; empty for a model that has none.
+    /// The same with the correction networks; empty for a model that has none.
     pub corrected: Vec<MethodResult>,
 }
 

@@ -16,7 +16,8 @@ pub struct Estimate {
     /// Mean, median and 95th percentile over the scenes.
     #[serde(flatten)]
     pub spread: Spread,
-    /// 95 % confidence interval of the mean: percentile bootstrap over the scenes.
+    /// 95 % confidence interval of the mean: percentile bootstrap over the scenes. Of few scenes it is too narrow: of 24 normal
+    /// values it holds the mean in 92 %, of 8 in 89 %, of 2 in 49 % of all cases.
     pub interval: [f64; 2],
 }
 
@@ -41,7 +42,7 @@ pub struct Ratio {
 }
 
 impl Ratio {
-    /// Of `above` over `below`, values of the same scenes; not a number where `below` is zero on all of them.
+    /// Of `above` over `below`, values of the same scenes; not finite where `below` is zero on all of them.
     pub fn of(above: &[f64], below: &[f64]) -> Self {
         let sum = |values: &[f64], draw: &[usize]| draw.iter().map(|&i| values[i]).sum::<f64>();
         let all: Vec<usize> = (0..above.len()).collect();
@@ -98,8 +99,13 @@ fn bootstrap(count: usize, statistic: impl Fn(&[usize]) -> f64) -> [f64; 2] {
             statistic(&draw)
         })
         .collect();
+    found.retain(|statistic| !statistic.is_nan());
+    if found.is_empty() {
+        return [f64::NAN; 2];
+    }
     found.sort_by(f64::total_cmp);
-    [0.025, 0.975].map(|share| found[((RESAMPLES as f64 * share) as usize).min(RESAMPLES - 1)])
+    let last = found.len() - 1;
+    [0.025, 0.975].map(|share| found[((found.len() as f64 * share) as usize).min(last)])
 }
 
 #[cfg(test)]

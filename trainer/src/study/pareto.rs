@@ -142,7 +142,7 @@ fn fast_methods(
         let ms = median_ms(SECONDS, || networks.drape(scene))?;
         Ok::<_, DrapeError>((ms, networks.drape(scene)?))
     };
-    let all = subject.model.corrections.len();
+    let all = subject.model.correction_steps;
     for corrections in 0..all {
         let (ms, draped) = measured(corrections)?;
         let name = match corrections {

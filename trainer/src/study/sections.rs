@@ -33,8 +33,8 @@ impl Study {
             ),
             section(
                 "Embeddings (Table 1)",
-                "The networks without corrections are what compares with the paper: corrections see where the cloth lies, and of all states the one \
-                 with the least energy is taken, which repairs what a wrong embedding does.",
+                "The networks without corrections are what compares with the paper: corrections see where the cloth lies and are \
+                 accepted as far as they lower the energy, which repairs what a wrong embedding does.",
                 self.embeddings.iter().map(EmbeddingStudy::table).collect(),
             ),
             section(

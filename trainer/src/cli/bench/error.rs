@@ -7,6 +7,7 @@ use crate::cli::verbosity::progress_bar;
 use crate::config::{Config, ValidationConfig, load};
 use crate::device::Backend;
 use crate::drape::{Networks, WardrobeTensors};
+use crate::draper::DraperError;
 use crate::evaluate::Spread;
 use crate::evaluate::certificates::Dressing;
 use crate::evaluate::equilibrium_error::{
@@ -86,6 +87,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     settings.check().into_diagnostic()?;
     let trained = arguments.checkpoint.as_deref().map(TrainedModel::open).transpose()?;
     let config = configuration(arguments, trained.as_ref())?;
+    if let (Some(trained), Some(steps)) = (&trained, arguments.corrections.iter().find(|steps| **steps > 0))
+        && trained.config.model.corrections == 0
+    {
+        return Err(DraperError::NoCorrections { steps: *steps }.into());
+    }
     let library = Arc::new(load_under_bar(&config)?);
     let seed = arguments.seed.unwrap_or_else(|| config.validation_seed());
     let scenes = draw_scenes(&library, &config, [arguments.scenes, arguments.layers], seed)?;
