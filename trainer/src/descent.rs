@@ -8,7 +8,7 @@
 //! those from moving that it has nothing to do with.
 
 use crate::evaluate::Draped;
-use clothcombo_physics::energy::{SceneEnergy, TermMap};
+use clothcombo_physics::energy::{SceneEnergy, weighted};
 use std::collections::BTreeSet;
 
 /// Backtracking: a step that goes too far along a direction that is right is halved, and halved again.
@@ -133,9 +133,6 @@ impl<'a> Descent<'a> {
 /// Weighted energy of every garment, its own terms and those of every pair that it is part of; and of the outfit.
 fn measured(energy: &SceneEnergy<f32>, state: &Draped) -> (Vec<f64>, f64) {
     let value = energy.value(&state.posed, &state.canonical);
-    let weighted = |weights: &TermMap<f64>, raw: &TermMap<Option<f64>>| -> f64 {
-        raw.iter().map(|(term, value)| value.map_or(0.0, |value| weights[term] * value)).sum()
-    };
     let own = energy.garments.iter().zip(&value.garments);
     let mut energies: Vec<f64> = own.map(|(garment, raw)| weighted(&garment.weights, raw)).collect();
     for (pair, raw) in energy.layers.iter().zip(&value.layers) {
@@ -150,7 +147,9 @@ fn measured(energy: &SceneEnergy<f32>, state: &Draped) -> (Vec<f64>, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clothcombo_physics::energy::{EnergySettings, GarmentEnergies, SceneGarment, SceneLayers, Term};
+    use clothcombo_physics::energy::{
+        EnergySettings, GarmentEnergies, SceneGarment, SceneLayers, Term, TermMap,
+    };
     use clothcombo_physics::mesh::{Topology, shapes};
     use clothcombo_physics::query::Surface;
     use std::sync::Arc;

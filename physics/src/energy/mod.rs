@@ -49,7 +49,7 @@ pub use error::EnergyError;
 pub use garment::{GarmentEnergies, GarmentState, GarmentTerm};
 pub use layer_collision::LayerContact;
 pub use material::Material;
-pub use scene::{SceneEnergy, SceneGarment, SceneLayers, SceneValue};
+pub use scene::{SceneEnergy, SceneGarment, SceneLayers, SceneValue, weighted};
 pub use settings::{EnergySettings, LayerGate};
 pub use term::{Term, TermMap};
 pub use touching::LayerTouch;

@@ -78,6 +78,12 @@ pub struct SceneValue<T> {
     pub layers: Vec<TermMap<Option<f64>>>,
 }
 
+/// `Σ weight·raw` over the terms that were evaluated.
+pub fn weighted(weights: &TermMap<f64>, raw: &TermMap<Option<f64>>) -> f64 {
+    let terms = raw.iter().filter(|(term, _)| weights[*term] != 0.0);
+    terms.filter_map(|(term, value)| value.map(|v| weights[term] * v)).sum()
+}
+
 /// Which terms a run evaluates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Selection {
@@ -315,10 +321,6 @@ impl<T: Real> SceneEnergy<T> {
             }
         }
         let layers: Vec<TermMap<Option<f64>>> = pairs.into_iter().map(|pair| pair.raw).collect();
-        let weighted = |weights: &TermMap<f64>, raw: &TermMap<Option<f64>>| -> f64 {
-            let terms = raw.iter().filter(|(term, _)| weights[*term] != 0.0);
-            terms.filter_map(|(term, value)| value.map(|v| weights[term] * v)).sum()
-        };
         let total =
             self.garments.iter().zip(&garments).map(|(g, raw)| weighted(&g.weights, raw)).sum::<f64>()
                 + self.layers.iter().zip(&layers).map(|(l, raw)| weighted(&l.weights, raw)).sum::<f64>();

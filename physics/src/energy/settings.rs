@@ -115,7 +115,6 @@ impl EnergySettings {
             ("material.mu", self.material.mu),
             ("material.lambda", self.material.lambda),
             ("material.bending_stiffness", self.material.bending_stiffness),
-            ("needle_ratio", self.needle_ratio),
             ("body_collision_epsilon", self.body_collision_epsilon),
             ("layer_collision_epsilon", self.layer_collision_epsilon),
             ("gravity_acceleration", self.gravity_acceleration),
@@ -136,6 +135,11 @@ impl EnergySettings {
             if !(value.is_finite() && value > 0.0) {
                 return Err(EnergyError::Setting { setting, value, expected: "finite and greater than 0" });
             }
+        }
+        // Of an equilateral triangle it is 0.87: with as much, every triangle would count as a needle.
+        if !(0.0..=0.5).contains(&self.needle_ratio) {
+            let (setting, value) = ("needle_ratio", self.needle_ratio);
+            return Err(EnergyError::Setting { setting, value, expected: "between 0 and 0.5" });
         }
         if !(0.0..=1.0).contains(&self.holding_fraction) {
             let (setting, value) = ("holding_fraction", self.holding_fraction);
@@ -158,6 +162,10 @@ mod tests {
         assert_eq!(EnergySettings::default().check(), Ok(()));
         let bad = EnergySettings { repulsion_radius: f64::NAN, ..EnergySettings::default() };
         assert!(matches!(bad.check(), Err(EnergyError::Setting { setting: "repulsion_radius", .. })));
+        for needle_ratio in [-0.1, 0.6, f64::NAN] {
+            let bad = EnergySettings { needle_ratio, ..EnergySettings::default() };
+            assert!(matches!(bad.check(), Err(EnergyError::Setting { setting: "needle_ratio", .. })));
+        }
         let bad = EnergySettings { holding_fraction: 1.5, ..EnergySettings::default() };
         assert!(matches!(bad.check(), Err(EnergyError::Setting { setting: "holding_fraction", .. })));
         let bad = EnergySettings { repulsion_subset: Some(0), ..EnergySettings::default() };

@@ -140,6 +140,16 @@ fn check_output(folder: &Path) -> Result<(), Report> {
 fn subject(arguments: &Arguments, trained: &TrainedModel, mut config: Config) -> Result<Subject, Report> {
     config.validation.seed = arguments.seed.or(config.validation.seed);
     let library = Arc::new(load_under_bar(&config)?);
+    let known = trained.known_of_held_out(&config, &library);
+    if !known.is_empty() {
+        return Err(miette!(
+            help = "evaluate it with the split of its own configuration: leave out --config and --set of data.split, \
+                    data.held_out_garments and the clips of data.poses",
+            "{} {}: its scores there would not be those of unseen data",
+            trained.folder.display(),
+            known.join("; it ")
+        ));
+    }
     Subject::new(trained, config, library, &arguments.device.device())
 }
 

@@ -220,6 +220,16 @@ impl PoseConfig {
                  be less than held_out_block * (1 / held_out_share - 1)",
             );
         }
+        let named = [("validation_clips", &self.validation_clips), ("test_clips", &self.test_clips)];
+        if let Some((key, _)) =
+            named.into_iter().find(|(_, clips)| self.motions.is_none() && !clips.is_empty())
+        {
+            return says(
+                key,
+                "names clips, but there are no motions",
+                "name their folder: data.poses.motions",
+            );
+        }
         if self.max_self_intersection.is_nan() || self.max_self_intersection < 0.0 {
             return says(
                 "max_self_intersection",

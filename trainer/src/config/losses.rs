@@ -41,7 +41,7 @@ pub struct StrainLoss {
     /// Factor on the raw value.
     pub weight: Ramp,
     /// Rest triangles flatter than this ratio of height to longest edge count as if they had it: a needle is else a spring of
-    /// unbounded stiffness, whose gradient hides all others. 0 is the paper's printed form, and that of `clothcombo score`.
+    /// unbounded stiffness, whose gradient hides all others. At most 0.5. 0 is the paper's printed form, and that of `clothcombo score`.
     pub needle_ratio: f64,
 }
 

@@ -35,7 +35,14 @@ pub fn score_files(files: &MeshFiles, distance: ScoreDistance) -> Result<Score, 
     let loaded = rest.iter().zip(draped).map(|(rest, draped)| load_garment(rest, draped, &body));
     let loaded = loaded.collect::<Result<Vec<_>, _>>()?;
     let before = rest.iter().zip(canonical).map(|(rest, canonical)| load_pair(rest, canonical));
-    let before = before.map(|pair| Ok(pair?.1)).collect::<Result<Vec<TriMesh>, ScoreError>>()?;
+    let before = before.zip(rest.iter().zip(canonical)).map(|(pair, (rest_path, path))| {
+        let (rest, before) = pair?;
+        match rescaled(&rest, &before) {
+            Some(what) => Err(ScoreError::RestUnit { rest: rest_path.into(), draped: path.into(), what }),
+            None => Ok(before),
+        }
+    });
+    let before = before.collect::<Result<Vec<TriMesh>, ScoreError>>()?;
     let garments: Vec<DrapedGarment> = loaded
         .iter()
         .enumerate()

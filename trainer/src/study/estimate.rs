@@ -57,7 +57,7 @@ impl Ratio {
 
 /// How many scenes something holds in.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Share {
+pub struct Proportion {
     /// Scenes it holds in.
     pub count: usize,
     /// All scenes.
@@ -66,7 +66,7 @@ pub struct Share {
     pub interval: [f64; 2],
 }
 
-impl Share {
+impl Proportion {
     /// Of the scenes for which it `holds`.
     pub fn new(holds: impl IntoIterator<Item = bool>) -> Self {
         let (mut count, mut of) = (0, 0);
@@ -134,7 +134,7 @@ mod tests {
     #[test]
     fn six_of_six_tell_little() {
         // Wilson's interval of 6 of 6 and of 5 of 6.
-        let shares = [[true; 6], [true, true, true, true, true, false]].map(Share::new);
+        let shares = [[true; 6], [true, true, true, true, true, false]].map(Proportion::new);
         let expected = [[0.6097, 1.0], [0.4365, 0.9699]];
         for (share, expected) in shares.into_iter().zip(expected) {
             let near = |i: usize| (share.interval[i] - expected[i]).abs() < 1e-4;
@@ -144,7 +144,7 @@ mod tests {
 
     #[test]
     fn nothing_is_no_error() {
-        assert_eq!(Share::new([]).interval, [0.0, 1.0]);
+        assert_eq!(Proportion::new([]).interval, [0.0, 1.0]);
         assert_eq!(Estimate::of(&[]).interval, [0.0; 2]);
         assert!(Ratio::of(&[], &[]).of_means.is_nan());
     }

@@ -1,6 +1,6 @@
 //! Table 3: what several layers cost each garment, and what is on the wrong side before and after the post-process.
 
-use super::estimate::{Estimate, Ratio, Share};
+use super::estimate::{Estimate, Proportion, Ratio};
 use super::subject::Subject;
 use super::table::{Table, number, percent, percent_with_interval, share_text};
 use crate::evaluate::Draped;
@@ -47,7 +47,7 @@ pub struct Outfits {
     pub wrong_side_resolved: Estimate,
     /// Outfits without an intersection with the body or between garments: all before the post-process, those that went
     /// through it after it.
-    pub clear: [Share; 2],
+    pub clear: [Proportion; 2],
     /// Rise of the strain energy by the post-process, median share.
     pub strain_added: f64,
     /// Exact pairs between garments before the post-process.
@@ -154,8 +154,8 @@ impl Outfits {
             wrong_side: of_all(&|outfit| outfit.before.order_violations),
             wrong_side_resolved: of_resolved(&|result| result.after.order_violations),
             clear: [
-                Share::new(outfits.iter().map(|outfit| outfit.before.is_clear())),
-                Share::new(results.iter().map(|result| result.after.is_clear())),
+                Proportion::new(outfits.iter().map(|outfit| outfit.before.is_clear())),
+                Proportion::new(results.iter().map(|result| result.after.is_clear())),
             ],
             strain_added: Estimate::of(&added).spread.median,
             layer_pairs: of_all(&|outfit| outfit.before.layer_triangle_pairs as f64),

@@ -20,7 +20,7 @@ mod times;
 mod variants;
 
 pub use embeddings::EmbeddingStudy;
-pub use estimate::{Estimate, Ratio, Share};
+pub use estimate::{Estimate, Proportion, Ratio};
 pub use extremes::Extreme;
 pub use gallery::Picture;
 pub use layers::LayerCount;

@@ -1,6 +1,6 @@
 //! A table that is written as Markdown and as HTML.
 
-use super::estimate::{Estimate, Ratio, Share};
+use super::estimate::{Estimate, Proportion, Ratio};
 use crate::picture::axis::number_text;
 use crate::report::html::escape;
 use serde::Serialize;
@@ -83,7 +83,7 @@ pub fn percent_with_interval(e: &Estimate) -> String {
 }
 
 /// Count of all [95 % interval in percent, without decimals].
-pub fn share_text(share: &Share) -> String {
+pub fn share_text(share: &Proportion) -> String {
     let [low, high] = share.interval.map(|end| 100.0 * end);
     format!("{} of {} [{low:.0}, {high:.0}]", share.count, share.of)
 }

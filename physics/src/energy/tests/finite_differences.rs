@@ -2,6 +2,7 @@
 //! through the same check in the workspace's `tests` crate.
 
 use super::scenes::{Scene, only, pulled_back, scene};
+use crate::energy::gradient_bound::gradient_bound;
 use crate::energy::gradient_check::{GradientCheck, check_gradient};
 use crate::energy::{EnergySettings, LayerContact, LayerGate, Term};
 use crate::query::Distance;
@@ -61,6 +62,12 @@ fn holding_pulled_back_by_bent_skinning_has_its_gradient_at_posed_positions() {
         let settings = EnergySettings { holding_fraction: 0.4, ..EnergySettings::default() };
         let scene = pulled_back(scene(settings, only(Term::Holding), seed));
         assert!(!scene.energy.needs_canonical());
+        let rest: Vec<_> = scene.rest.iter().collect();
+        let bound = gradient_bound(&scene.energy, &rest, Term::Holding, &scene.posed, &scene.canonical);
+        let largest = scene.energy.evaluate(&scene.posed, &[]).posed_gradient;
+        let largest = largest.iter().map(|g| crate::vec3::norm(*g)).fold(0.0, f64::max);
+        // Vertices that are not held may be farther off.
+        assert!(largest <= bound && bound < 100.0 * largest, "{largest} {bound}");
         check_scene(scene, Term::Holding, seed, "pulled back");
     }
 }

@@ -19,7 +19,7 @@ use crate::scene::{Library, LibraryError, PreparedScene, ValidationGroup, draw_v
 use clap::Parser;
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use clothcombo_physics::equilibrium::SolverSettings;
-use miette::{IntoDiagnostic, Report, WrapErr};
+use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use rand::{SeedableRng, seq::index};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
@@ -117,6 +117,13 @@ fn configuration(arguments: &Arguments, trained: Option<&TrainedModel>) -> Resul
         (None, Some(trained)) => trained.folder.join("config.toml"),
         (None, None) => Path::new("configs").join("open.toml"),
     };
+    if let (Some(_), Some(setting)) = (trained, arguments.overrides.iter().find(|s| s.starts_with("model.")))
+    {
+        return Err(miette!(
+            help = "the networks are those of the checkpoint; --corrections sets the correction steps",
+            "--set {setting} would change nothing with --checkpoint"
+        ));
+    }
     Ok(load(&file, &arguments.overrides)?)
 }
 
@@ -295,15 +302,17 @@ fn strain_ratios(errors: &[SceneError]) -> Vec<StrainRatio> {
 fn print_tables(errors: &[SceneError], settings: &SolverSettings) {
     let names = methods(errors);
     print!("{:>5} {:<28}{:>9}{:>11}", "scene", "garments", "vertices", "minimum J");
+    // A heading is never narrower than its column.
+    let width = |name: &str| (name.chars().count() + 5).max(14);
     for name in &names {
-        print!("{:>14}{:>9}{:>8}", format!("{name} +J"), "%", "mm");
+        print!("{:>1$}{2:>9}{3:>8}", format!("{name} +J"), width(name), "%", "mm");
     }
     println!("{:>7}{:>9}{:>11}  {:<11}lowest from", "steps", "seconds", "rel. grad", "stop");
     for e in errors {
         let run = e.reference_run();
         print!("{:>5} {:<28}{:>9}{:>11.4}", e.scene, e.garments.join(", "), e.vertices, run.energy);
         for m in &e.methods {
-            print!("{:>14.4}{:>9.1}{:>8.2}", m.excess, m.excess_percent, m.distance_mm);
+            print!("{:>1$.4}{2:>9.1}{3:>8.2}", m.excess, width(&m.method), m.excess_percent, m.distance_mm);
         }
         println!(
             "{:>7}{:>9.2}{:>11.1e}  {:<11}{}{}",
