@@ -19,10 +19,8 @@ const PER_EMBEDDING: f64 = 2.0;
 const PER_CORRECTION: f64 = 12.0;
 /// Per joint: weights, corrections, blended transforms.
 const PER_JOINT: f64 = 5.0;
-/// For the energies of a garment alone, fitted.
-const PER_GARMENT_VERTEX: f64 = 300.0;
-/// For the energies of a garment among others, fitted.
-const PER_LAYER_VERTEX: f64 = 1100.0;
+/// For the energies; fitted.
+const PER_VERTEX: f64 = 300.0;
 /// What comes on top: buffers of the operation in work, gradients on their way, and gaps that the allocator leaves.
 const MARGIN: f64 = 1.1;
 
@@ -50,7 +48,6 @@ fn per_vertex(config: &Config, stage: &StageConfig, joints: usize) -> f64 {
     let (sine, modulator) = (PER_SINE_LAYER * layers, PER_MODULATOR_LAYER * layers);
     let skinning =
         PER_SKINNING_LAYER * (m.skinning_layers * m.skinning_width) as f64 + PER_JOINT * joints as f64;
-    let energies = if stage.layers[1] > 1 { PER_LAYER_VERTEX } else { PER_GARMENT_VERTEX };
     // Of all bodies of a scene, and of the garments whatever the body.
     let (of_body, of_garments) = match stage.trains {
         Trains::Single => (sine + skinning, modulator),
@@ -61,5 +58,5 @@ fn per_vertex(config: &Config, stage: &StageConfig, joints: usize) -> f64 {
             (PER_CORRECTION * (m.corrections * m.correction_width) as f64, 2.0 * modulator)
         }
     };
-    of_garments + stage.bodies as f64 * (of_body + energies)
+    of_garments + stage.bodies as f64 * (of_body + PER_VERTEX)
 }

@@ -15,7 +15,7 @@ pub struct MemoryEstimate {
     pub garments: u64,
     /// Host: DiffusionNet's operators, of all garments without a cache, otherwise none.
     pub operators: u64,
-    /// Host: prepared scenes, those of the next steps and those of a validation.
+    /// Host: scenes prepared for the next steps, their garments apart.
     pub scenes: u64,
     /// Host: the preparation of garments at the start, when there are no scenes yet.
     pub preparation: u64,
@@ -23,8 +23,8 @@ pub struct MemoryEstimate {
     pub tensors: u64,
     /// Device: copies of the parameters beside the networks: Adam's moments, those of frozen networks, a running average.
     pub parameters: u64,
-    /// Device: what the largest scene, or several in parallel, keep of networks and energies for the backward pass, or the
-    /// update of the parameters where that takes more.
+    /// Device: what the largest scene, or several in parallel, keep of networks and energies for the backward pass; or the
+    /// update of the parameters, the scenes of a validation or a picture, where one of these takes more.
     pub step: u64,
     /// What the garments of the whole wardrobe would take on the host, if all were kept.
     pub all_garments: u64,
@@ -49,7 +49,7 @@ const BODY_TRIANGLE: usize = 100;
 /// Bytes per vertex of a garment in a prepared scene.
 const SCENE_VERTEX: usize = 32;
 /// Bytes per vertex and eigenpair while operators are computed, and per vertex besides; fitted.
-const PREPARED_PAIR: usize = 64;
+const PREPARED_PAIR: usize = 96;
 const PREPARED_VERTEX: usize = 3000;
 
 impl MemoryEstimate {
@@ -65,10 +65,12 @@ impl MemoryEstimate {
         let layers = config.stages.iter().map(|s| s.layers[1]).max().unwrap_or(1);
         let worn = |s: &StageConfig| s.accumulate * s.layers[1];
         let ahead = (SCENES_AHEAD + 2) * config.stages.iter().map(worn).max().unwrap_or(1);
+        // Scenes that a validation prepares at a time, and their garments.
         let v = &config.validation;
         let validated = [(v.single_scenes, 1), (v.unseen_scenes, 1), (v.layered_scenes, v.layers[1])]
-            .map(|(scenes, layers)| scenes.min((GARMENTS_AT_ONCE / layers.max(1)).max(1)) * layers);
-        let validated = validated.into_iter().max().unwrap_or(0);
+            .map(|(scenes, layers)| (scenes.min((GARMENTS_AT_ONCE / layers.max(1)).max(1)), layers));
+        let validated_scenes = validated.iter().map(|(scenes, _)| *scenes).max().unwrap_or(0);
+        let validated = validated.iter().map(|(scenes, layers)| scenes * layers).max().unwrap_or(0);
         let of_garment = |v: usize| sizes.garment_bytes(config, v);
         let bytes_of = |count: usize, bytes: &dyn Fn(usize) -> usize| -> u64 {
             sizes.largest(count).iter().map(|v| bytes(*v) as u64).sum()
@@ -90,8 +92,8 @@ impl MemoryEstimate {
 
         let bodies = config.stages.iter().map(|s| s.bodies * s.accumulate).max().unwrap_or(1);
         let body = BODY_VERTEX * sizes.body_vertices + BODY_TRIANGLE * sizes.body_faces;
-        let posed = body * ((SCENES_AHEAD + 2) * bodies + validated);
-        let scenes = posed as u64 + bytes_of(ahead + validated, &|v| SCENE_VERTEX * v);
+        let scenes = (body * (SCENES_AHEAD + 2) * bodies) as u64 + bytes_of(ahead, &|v| SCENE_VERTEX * v);
+        let validation = (body * validated_scenes) as u64 + bytes_of(validated, &|v| SCENE_VERTEX * v);
         let prepared = |v: usize| v * (PREPARED_PAIR * config.model.eigen_count + PREPARED_VERTEX);
 
         let of_stage = |s: &StageConfig| {
@@ -111,7 +113,7 @@ impl MemoryEstimate {
             preparation: bytes_of(threads.min(sizes.vertices.len()), &prepared),
             tensors,
             parameters: network * copies,
-            step: activations.max(UPDATE_COPIES * network).max(PICTURES),
+            step: activations.max(UPDATE_COPIES * network).max(validation).max(PICTURES),
             all_garments,
             all_tensors,
             is_processor,
