@@ -186,7 +186,8 @@ mod tests {
         kept.data.cache.folder = None;
         assert!(of(&kept, 4300).host() > 80 * GIB);
         // Shape transfer stores all components of every garment; without it there is nothing to store.
-        let transferred = paper(&["start.shape_transfer=true"]);
+        let mut transferred = paper(&["start.shape_transfer=true"]);
+        transferred.data.cache.folder = None;
         let more = of(&transferred, 4300).garments - of(&kept, 4300).garments;
         assert_eq!(more, 4300 * 8000 * 3 * 300 * 4);
     }
