@@ -1,6 +1,7 @@
 //! The networks at inference: a prepared scene in, positions on the host out.
 
 use crate::correct::{corrected, skinned};
+use crate::descent::Descent;
 use crate::device::is_processor;
 use crate::evaluate::Draped;
 use crate::felt::Company;
@@ -266,14 +267,8 @@ impl<'a> Networks<'a> {
     /// When the scene's numbers are not finite.
     pub fn energies(&self, scene: &PreparedScene) -> Result<Vec<Vec<f64>>, DrapeError> {
         self.ask(scene, |on_body| {
-            let OnBody { outfit, embeddings, body, start, .. } = on_body;
-            let single = self.model.drape_single(outfit, embeddings, body, start.clone());
-            let layered = self.model.untangle(outfit, embeddings, &single, body);
-            let found = draped(&layered.canonical, &layered.posed);
             let mut energies = Vec::new();
-            corrected(&self.model, on_body, &single, found, Company::Together, &mut |descent| {
-                energies.push(descent.energies().to_vec());
-            });
+            drape_watched(&self.model, on_body, &mut |descent| energies.push(descent.energies().to_vec()));
             energies
         })
     }
@@ -330,6 +325,15 @@ pub struct NetworkTimes {
 
 /// Lets `model` drape an outfit.
 pub fn drape_on(model: &ClothCombo, on_body: &OnBody<'_>) -> (Draped, NetworkTimes) {
+    drape_watched(model, on_body, &mut |_| ())
+}
+
+/// The same; `watch` sees every state that the correction steps accept.
+fn drape_watched(
+    model: &ClothCombo,
+    on_body: &OnBody<'_>,
+    watch: &mut dyn FnMut(&Descent<'_>),
+) -> (Draped, NetworkTimes) {
     let OnBody { outfit, embeddings, body, start, .. } = on_body;
     let mut times = NetworkTimes::default();
     let clock = Instant::now();
@@ -342,7 +346,7 @@ pub fn drape_on(model: &ClothCombo, on_body: &OnBody<'_>) -> (Draped, NetworkTim
         found = draped(&layered.canonical, &layered.posed);
     }
     times.untangling = clock.elapsed() - times.draping;
-    found = corrected(model, on_body, &single, found, Company::Together, &mut |_| ());
+    found = corrected(model, on_body, &single, found, Company::Together, watch);
     times.correcting = clock.elapsed() - times.draping - times.untangling;
     (found, times)
 }
