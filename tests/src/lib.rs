@@ -3,9 +3,9 @@
 use burn::module::Module;
 use clothcombo_model::gradient_bucket;
 use clothcombo_trainer::config::{Config, Trains, load};
-use clothcombo_trainer::drape::WardrobeTensors;
-use clothcombo_trainer::learner::Learner;
-use clothcombo_trainer::scene::PreparedScene;
+use clothcombo_trainer::dataset::PreparedScene;
+use clothcombo_trainer::inference::networks::WardrobeTensors;
+use clothcombo_trainer::training::learner::Learner;
 use std::path::Path;
 
 /// A run of a few steps on built-in data: every network, all three stages, up to three layers.

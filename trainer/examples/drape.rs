@@ -6,7 +6,7 @@
 
 use clothcombo_data::asset::Pose;
 use clothcombo_trainer::cli;
-use clothcombo_trainer::draper::{BodyState, Draper, DraperSettings, Stage};
+use clothcombo_trainer::inference::{BodyState, Draper, DraperSettings, Stage};
 use miette::{Report, miette};
 use std::path::PathBuf;
 

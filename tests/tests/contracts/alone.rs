@@ -4,13 +4,13 @@ use clothcombo_model::ClothCombo;
 use clothcombo_physics::energy::SceneEnergy;
 use clothcombo_tests::{loss_and_gradient, tiny_config};
 use clothcombo_trainer::config::Trains;
-use clothcombo_trainer::device::Backend;
-use clothcombo_trainer::drape::WardrobeTensors;
-use clothcombo_trainer::learner::{Learner, new_optimizer};
-use clothcombo_trainer::scene::{Library, PreparedScene, prepare_step};
-use clothcombo_trainer::schedule::Schedule;
-use clothcombo_trainer::session::dimensions;
-use clothcombo_trainer::world::Share;
+use clothcombo_trainer::dataset::{Library, PreparedScene};
+use clothcombo_trainer::inference::networks::WardrobeTensors;
+use clothcombo_trainer::system::device::Backend;
+use clothcombo_trainer::training::learner::{Learner, new_optimizer};
+use clothcombo_trainer::training::scenes::prepare_step;
+use clothcombo_trainer::training::schedule::Schedule;
+use clothcombo_trainer::training::world::Share;
 use std::sync::Arc;
 
 #[test]
@@ -21,7 +21,7 @@ fn the_losses_of_garments_alone_are_added_where_all_networks_are_trained() {
     let silent = tiny_config(folder.path(), &["optimizer.clip=step"]);
     let library = Arc::new(Library::load(&config, &|_, _, _| {}).unwrap());
     let device = Backend::preferred().device().autodiff();
-    let dimensions = dimensions(&library);
+    let dimensions = library.dimensions();
     let tensors = WardrobeTensors::new(library.clone(), dimensions, &device);
     let model = ClothCombo::new(&config.model, &dimensions, config.seed, &device).unwrap();
     let of = |scene: PreparedScene, trains: Trains| {

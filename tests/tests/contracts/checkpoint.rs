@@ -2,11 +2,11 @@
 
 use burn::store::{ModuleSnapshot, SafetensorsStore};
 use clothcombo_tests::{fuzz_cases, tiny_config};
-use clothcombo_trainer::checkpoint::{Checkpoint, CheckpointError};
-use clothcombo_trainer::device::Backend;
-use clothcombo_trainer::run_dir::RunDir;
-use clothcombo_trainer::scene::Library;
-use clothcombo_trainer::session::Session;
+use clothcombo_trainer::dataset::Library;
+use clothcombo_trainer::run::checkpoint::{Checkpoint, CheckpointError};
+use clothcombo_trainer::run::folder::RunDir;
+use clothcombo_trainer::system::device::Backend;
+use clothcombo_trainer::training::session::Session;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::fs;

@@ -4,14 +4,14 @@ use burn::module::Module;
 use clothcombo_model::ClothCombo;
 use clothcombo_tests::{loss_and_gradient, tiny_config};
 use clothcombo_trainer::config::{Config, Trains};
-use clothcombo_trainer::descent::Descent;
-use clothcombo_trainer::device::Backend;
-use clothcombo_trainer::drape::{Networks, WardrobeTensors};
-use clothcombo_trainer::learner::{Learner, new_optimizer};
-use clothcombo_trainer::scene::{Library, PreparedScene, SceneDraw, prepare, prepare_step};
-use clothcombo_trainer::schedule::Schedule;
-use clothcombo_trainer::session::dimensions;
-use clothcombo_trainer::world::Share;
+use clothcombo_trainer::dataset::{Library, PreparedScene, SceneDraw, prepare};
+use clothcombo_trainer::inference::descent::Descent;
+use clothcombo_trainer::inference::networks::{Networks, WardrobeTensors};
+use clothcombo_trainer::system::device::Backend;
+use clothcombo_trainer::training::learner::{Learner, new_optimizer};
+use clothcombo_trainer::training::scenes::prepare_step;
+use clothcombo_trainer::training::schedule::Schedule;
+use clothcombo_trainer::training::world::Share;
 use std::sync::Arc;
 
 /// A library, an untrained model with two corrections, and a scene of garments that can touch.
@@ -19,7 +19,7 @@ fn setting(folder: &std::path::Path) -> (Config, Arc<Library>, WardrobeTensors, 
     let config = tiny_config(folder, &["model.corrections=2", "model.correction_width=16"]);
     let library = Arc::new(Library::load(&config, &|_, _, _| {}).unwrap());
     let device = Backend::preferred().device().autodiff();
-    let dimensions = dimensions(&library);
+    let dimensions = library.dimensions();
     let tensors = WardrobeTensors::new(library.clone(), dimensions, &device);
     let model = ClothCombo::new(&config.model, &dimensions, config.seed, &device).unwrap();
     let schedule = Schedule::new(&config);

@@ -3,13 +3,13 @@
 use clothcombo_model::ClothCombo;
 use clothcombo_tests::{loss_and_gradient, tiny_config};
 use clothcombo_trainer::config::Trains;
-use clothcombo_trainer::device::Backend;
-use clothcombo_trainer::drape::{Networks, WardrobeTensors};
-use clothcombo_trainer::learner::{Learner, new_optimizer};
-use clothcombo_trainer::scene::{Library, prepare_step};
-use clothcombo_trainer::schedule::Schedule;
-use clothcombo_trainer::session::dimensions;
-use clothcombo_trainer::world::Share;
+use clothcombo_trainer::dataset::Library;
+use clothcombo_trainer::inference::networks::{Networks, WardrobeTensors};
+use clothcombo_trainer::system::device::Backend;
+use clothcombo_trainer::training::learner::{Learner, new_optimizer};
+use clothcombo_trainer::training::scenes::prepare_step;
+use clothcombo_trainer::training::schedule::Schedule;
+use clothcombo_trainer::training::world::Share;
 use std::sync::Arc;
 
 /// Whether D_m moves a single garment, and whether the gradient of its loss trains D_m.
@@ -18,7 +18,7 @@ fn acts_on_a_single_garment(graph: &str) -> (bool, bool) {
     let config = tiny_config(folder.path(), &[&format!("model.graph={graph}")]);
     let library = Arc::new(Library::load(&config, &|_, _, _| {}).unwrap());
     let device = Backend::preferred().device().autodiff();
-    let dimensions = dimensions(&library);
+    let dimensions = library.dimensions();
     let tensors = WardrobeTensors::new(library.clone(), dimensions, &device);
     let model = ClothCombo::new(&config.model, &dimensions, config.seed, &device).unwrap();
     let schedule = Schedule::new(&config);

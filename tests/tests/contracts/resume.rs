@@ -2,16 +2,16 @@
 
 use clothcombo_data::format::obj;
 use clothcombo_tests::tiny_config;
-use clothcombo_trainer::checkpoint::{Checkpoint, TrainedModel};
 use clothcombo_trainer::config::Config;
-use clothcombo_trainer::device::Backend;
-use clothcombo_trainer::evaluate::ValidationSet;
-use clothcombo_trainer::event::{Observer, TrainEvent};
-use clothcombo_trainer::run_dir::RunDir;
-use clothcombo_trainer::scene::{Library, ValidationGroup};
-use clothcombo_trainer::session::Session;
-use clothcombo_trainer::stop::StopFlag;
-use clothcombo_trainer::train_loop::train;
+use clothcombo_trainer::dataset::{Library, ValidationGroup};
+use clothcombo_trainer::evaluation::ValidationSet;
+use clothcombo_trainer::run::checkpoint::{Checkpoint, TrainedModel};
+use clothcombo_trainer::run::event::{Observer, TrainEvent};
+use clothcombo_trainer::run::folder::RunDir;
+use clothcombo_trainer::system::device::Backend;
+use clothcombo_trainer::system::stop::StopFlag;
+use clothcombo_trainer::training::session::Session;
+use clothcombo_trainer::training::train_loop::train;
 use std::path::Path;
 use std::sync::Arc;
 

@@ -2,13 +2,15 @@
 
 use clothcombo_tests::tiny_config;
 use clothcombo_trainer::config::Config;
-use clothcombo_trainer::device::Backend;
-use clothcombo_trainer::drape::{WardrobeTensors, tensor_bytes};
-use clothcombo_trainer::run_dir::RunDir;
-use clothcombo_trainer::scene::{KeptBytes, Library, Wardrobe, load_body};
-use clothcombo_trainer::session::{Session, dimensions};
-use clothcombo_trainer::stop::StopFlag;
-use clothcombo_trainer::train_loop::train;
+use clothcombo_trainer::dataset::tensor_bytes;
+use clothcombo_trainer::dataset::{Library, Wardrobe, load_body};
+use clothcombo_trainer::inference::networks::WardrobeTensors;
+use clothcombo_trainer::run::folder::RunDir;
+use clothcombo_trainer::system::device::Backend;
+use clothcombo_trainer::system::lru_cache::KeptBytes;
+use clothcombo_trainer::system::stop::StopFlag;
+use clothcombo_trainer::training::session::Session;
+use clothcombo_trainer::training::train_loop::train;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -119,7 +121,7 @@ fn garments_and_their_tensors_stay_within_the_limits() {
     let generate = config.data.garments[0].generate.as_mut().unwrap();
     (generate.count, generate.vertices) = (12, 1000);
     let library = Arc::new(load(&config));
-    let tensors = WardrobeTensors::new(library.clone(), dimensions(&library), &Backend::preferred().device());
+    let tensors = WardrobeTensors::new(library.clone(), library.dimensions(), &Backend::preferred().device());
     let mut whole = KeptBytes::default();
     for index in (0..12).chain(0..12) {
         let garment = library.wardrobe.garment(index).unwrap();

@@ -3,10 +3,10 @@
 use crate::cli::memory_table::print_memory;
 use crate::cli::train::load_under_bar;
 use crate::config::{ClipScope, Config, MOST_GARMENTS, StageConfig, Trains, load, schema};
-use crate::device::Backend;
-use crate::estimate::{StageTime, time_stages};
-use crate::memory::DataSizes;
-use crate::report::duration;
+use crate::dataset::DataSizes;
+use crate::run::report::duration;
+use crate::system::device::Backend;
+use crate::training::estimate::{StageTime, time_stages};
 use clap::{Parser, Subcommand};
 use clothcombo_physics::energy::Term;
 use miette::{IntoDiagnostic, Report};

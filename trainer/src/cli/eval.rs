@@ -1,15 +1,15 @@
 //! `clothcombo eval`: everything a trained model is judged by, in one report.
 
-use crate::checkpoint::TrainedModel;
 use crate::cli::train::load_under_bar;
 use crate::cli::verbosity::{progress_bar, say};
 use crate::config::{Config, load};
-use crate::device::Backend;
-use crate::draper::shipped_model;
-use crate::paths::obstacle;
-use crate::report::html::utc;
-use crate::scene::Library;
-use crate::study::{Other, Page, Sizes, Study, Subject, study};
+use crate::dataset::Library;
+use crate::evaluation::study::{Other, Page, Sizes, Study, Subject, study};
+use crate::inference::shipped_model;
+use crate::run::checkpoint::TrainedModel;
+use crate::run::report::html::utc;
+use crate::system::device::Backend;
+use crate::system::paths::obstacle;
 use clap::Parser;
 use clothcombo_data::format::atomic;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};

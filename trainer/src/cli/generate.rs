@@ -4,8 +4,8 @@ use super::wardrobe_sheet::{PER_ROW, wardrobe_sheet};
 use crate::cli::values::{at_least_one, picture_file};
 use crate::cli::verbosity::{progress_bar, say};
 use crate::config::MOST_GARMENTS;
+use crate::dataset::load_body;
 use crate::picture::save_png;
-use crate::scene::load_body;
 use clap::Parser;
 use clothcombo_data::asset::{Body, Category, Garment};
 use clothcombo_data::dataset::{

@@ -3,7 +3,7 @@
 use crate::cli::train::PREPARING;
 use crate::cli::verbosity::{progress_bar, say};
 use crate::config::load;
-use crate::scene::{Wardrobe, load_body};
+use crate::dataset::{Wardrobe, load_body};
 use clap::Parser;
 use miette::Report;
 use std::path::PathBuf;

@@ -1,9 +1,9 @@
 //! `clothcombo replay`: a step whose loss or gradient was not finite, once more.
 
 use crate::cli::train::load_under_bar;
-use crate::device::Backend;
-use crate::exact::Exact;
-use crate::incident::Incident;
+use crate::system::device::Backend;
+use crate::system::exact::Exact;
+use crate::training::incident::Incident;
 use clap::Parser;
 use miette::{Report, miette};
 use std::path::PathBuf;

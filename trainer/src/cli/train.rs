@@ -1,24 +1,24 @@
 //! `clothcombo-train`.
 
 use super::exit_code;
-use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::cli::memory_table::{memory_line, memory_warning};
 use crate::cli::verbosity::{Verbosity, is_quiet, progress_bar, say};
 use crate::config::{Config, load};
-use crate::device::Backend;
-use crate::event::Observer;
-use crate::memory::MemoryEstimate;
-use crate::observer::{
+use crate::dataset::{FrameCounts, Library};
+use crate::run::checkpoint::{Checkpoint, CheckpointError};
+use crate::run::event::Observer;
+use crate::run::folder::RunDir;
+use crate::run::memory::MemoryEstimate;
+use crate::run::observer::{
     CurvesObserver, History, HistoryObserver, LogObserver, MetricsObserver, ProgressObserver, ReportObserver,
     TensorBoardObserver,
 };
-use crate::report::gibibytes;
-use crate::run_dir::RunDir;
-use crate::scene::{FrameCounts, Library};
-use crate::session::Session;
-use crate::stop::StopFlag;
-use crate::train_loop::train;
-use crate::world::World;
+use crate::system::device::Backend;
+use crate::system::memory::gibibytes;
+use crate::system::stop::StopFlag;
+use crate::training::session::Session;
+use crate::training::train_loop::train;
+use crate::training::world::World;
 use clap::Parser;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use std::cell::RefCell;

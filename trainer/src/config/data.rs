@@ -1,8 +1,8 @@
 //! Where bodies, garments and poses come from, and the state the networks start from.
 
-use crate::scene::{KeptBytes, LibraryError};
+use crate::system::lru_cache::KeptBytes;
 use clothcombo_data::asset::Category;
-use clothcombo_data::cache::ArrayCache;
+use clothcombo_data::cache::{ArrayCache, CacheError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -281,10 +281,9 @@ impl DataConfig {
     ///
     /// # Errors
     /// When the folder cannot be used.
-    pub(crate) fn open_cache(&self) -> Result<Option<ArrayCache>, LibraryError> {
+    pub(crate) fn open_cache(&self) -> Result<Option<ArrayCache>, CacheError> {
         let limit = (self.cache.limit_gib * f64::from(1 << 30)) as u64;
-        let open = |folder: &PathBuf| ArrayCache::open(folder, limit).map_err(LibraryError::data);
-        self.cache.folder.as_ref().map(open).transpose()
+        self.cache.folder.as_ref().map(|folder| ArrayCache::open(folder, limit)).transpose()
     }
 
     /// What is inconsistent, as (place, what, hint).

@@ -26,7 +26,7 @@ pub use optimizer::{ClipScope, OptimizerConfig};
 pub use output::OutputConfig;
 pub use ramp::{Ramp, RampShape};
 pub use schema::schema;
-pub use stages::{StageConfig, Trains};
+pub use stages::{StageConfig, Trains, stage_starts};
 pub use validation::ValidationConfig;
 
 use clothcombo_model::{ModelConfig, ModelError};

@@ -4,7 +4,7 @@ use crate::drape::{SKIRT, TEE, run_folder};
 use clothcombo_data::asset::Pose;
 use clothcombo_physics::transform::{into_frame, out_of_frame};
 use clothcombo_physics::vec3::{add, distance_squared, scale, sub};
-use clothcombo_trainer::draper::{BodyState, Drape, Draper, DraperSettings};
+use clothcombo_trainer::inference::{BodyState, Drape, Draper, DraperSettings};
 
 /// Frames of an arm that jerks.
 fn bodies() -> Vec<BodyState> {

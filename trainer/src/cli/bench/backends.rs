@@ -3,8 +3,8 @@
 use crate::cli::train::load_under_bar;
 use crate::cli::values::{measuring_seconds, not_negative};
 use crate::cli::verbosity::say;
-use crate::device::Backend;
-use crate::measure::{Case, Subject};
+use crate::system::device::Backend;
+use crate::training::measure::{Case, Subject};
 use clap::{Parser, ValueEnum};
 use clothcombo_model::ClothCombo;
 use miette::{IntoDiagnostic, Report, miette};

@@ -2,18 +2,18 @@
 
 mod summary;
 
-use crate::checkpoint::TrainedModel;
 use crate::cli::post_process::PostProcessArguments;
 use crate::cli::train::load_under_bar;
 use crate::cli::values::at_least_one;
 use crate::cli::verbosity::progress_bar;
 use crate::config::{Config, load};
-use crate::device::Backend;
-use crate::drape::{Networks, WardrobeTensors};
-use crate::draper::UniqueNames;
-use crate::evaluate::certificates::{DrapedScene, Dressing, OutfitResult};
-use crate::one_core::each_on_one_core;
-use crate::scene::{Library, PreparedScene, SceneDraw, draw_outfit, prepare};
+use crate::dataset::{Library, PreparedScene, SceneDraw, draw_outfit, prepare};
+use crate::evaluation::certificates::{DrapedScene, Dressing, OutfitResult};
+use crate::inference::UniqueNames;
+use crate::inference::networks::{Networks, WardrobeTensors};
+use crate::run::checkpoint::TrainedModel;
+use crate::system::device::Backend;
+use crate::system::one_core::each_on_one_core;
 use clap::Parser;
 use clothcombo_data::format::obj;
 use clothcombo_physics::contact::resolve::ResolveSettings;

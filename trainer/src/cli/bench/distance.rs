@@ -2,8 +2,8 @@
 
 use crate::cli::verbosity::progress_bar;
 use crate::config::PoseConfig;
-use crate::evaluate::{RegionErrors, SignErrorSettings, SignErrors, WrongSigns, hard_poses, sign_errors};
-use crate::scene::{HeldOut, PoseLibrary, load_body};
+use crate::dataset::{HeldOut, PoseLibrary, load_body};
+use crate::evaluation::{RegionErrors, SignErrorSettings, SignErrors, WrongSigns, hard_poses, sign_errors};
 use clap::Parser;
 use clothcombo_data::asset::{BODY_JOINT_COUNT, Body, Pose};
 use miette::{IntoDiagnostic, Report, miette};

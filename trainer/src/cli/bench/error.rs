@@ -1,21 +1,21 @@
 //! `clothcombo bench error`: how far drapes are from equilibrium.
 
-use crate::checkpoint::TrainedModel;
 use crate::cli::train::load_under_bar;
 use crate::cli::values::at_least_one;
 use crate::cli::verbosity::progress_bar;
 use crate::config::{Config, ValidationConfig, load};
-use crate::device::Backend;
-use crate::drape::{Networks, WardrobeTensors};
-use crate::draper::DraperError;
-use crate::evaluate::Spread;
-use crate::evaluate::certificates::Dressing;
-use crate::evaluate::equilibrium_error::{
+use crate::dataset::{Library, LibraryError, PreparedScene, ValidationGroup, draw_validation, prepare};
+use crate::evaluation::certificates::Dressing;
+use crate::evaluation::equilibrium_error::{
     Drapes, LBS, MethodError, SceneError, TermEnergies, converged, scene_error,
 };
-use crate::evaluate::reference::ReferenceScene;
-use crate::one_core::each_on_one_core;
-use crate::scene::{Library, LibraryError, PreparedScene, ValidationGroup, draw_validation, prepare};
+use crate::inference::DraperError;
+use crate::inference::networks::{Networks, WardrobeTensors};
+use crate::inference::reference::ReferenceScene;
+use crate::run::checkpoint::TrainedModel;
+use crate::run::spread::Spread;
+use crate::system::device::Backend;
+use crate::system::one_core::each_on_one_core;
 use clap::Parser;
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use clothcombo_physics::equilibrium::SolverSettings;

@@ -2,8 +2,8 @@
 
 use crate::cli::table::{number, table};
 use crate::cli::values::{at_least_one, measuring_seconds};
-use crate::measure::median_ms;
-use crate::scene::LibraryError;
+use crate::dataset::LibraryError;
+use crate::training::measure::median_ms;
 use clap::Parser;
 use clothcombo_data::asset::Category;
 use clothcombo_data::format::{load_tri_mesh, obj};

@@ -1,18 +1,17 @@
 //! `clothcombo bench tradeoff`.
 
 use super::step::short;
-use crate::checkpoint::TrainedModel;
 use crate::cli::train::load_under_bar;
 use crate::cli::values::{measuring_seconds, picture_file};
 use crate::cli::verbosity::say;
 use crate::config::{Config, LossesConfig, ValidationConfig};
-use crate::device::Backend;
-use crate::drape::{Networks, WardrobeTensors};
-use crate::evaluate::Draped;
-use crate::measure::median_ms;
+use crate::dataset::{Library, PreparedScene, ValidationGroup, draw_validation, prepare};
+use crate::inference::Draped;
+use crate::inference::networks::{Networks, WardrobeTensors};
 use crate::picture::{Line, LinePanel, draw_lines, save_png};
-use crate::scene::{Library, PreparedScene, ValidationGroup, draw_validation, prepare};
-use crate::session::state;
+use crate::run::checkpoint::TrainedModel;
+use crate::system::device::Backend;
+use crate::training::measure::median_ms;
 use burn::module::{Module, ModuleMapper, Param};
 use burn::tensor::{Tensor, TensorData, bf16, f16};
 use clap::Parser;
@@ -178,7 +177,7 @@ fn drapes(
     seconds: f64,
 ) -> Result<Drapes, Report> {
     let device = Backend::preferred().device();
-    let tensors = WardrobeTensors::new(library.clone(), state(library, 0).dimensions(), &device);
+    let tensors = WardrobeTensors::new(library.clone(), library.dimensions(), &device);
     let mut draped = Vec::with_capacity(scenes.len());
     let (mut ms, mut energy) = (0.0, 0.0);
     for scene in scenes {
@@ -277,7 +276,7 @@ fn evaluated<T: Real>(
     let scalars = |positions: &[[f32; 3]]| -> Vec<[T; 3]> {
         positions.iter().map(|p| p.map(|v| T::from_f64(f64::from(v)))).collect()
     };
-    let garment = |(worn, dressed): (&Arc<crate::scene::LibraryGarment>, &SceneGarment<f32>)| {
+    let garment = |(worn, dressed): (&Arc<crate::dataset::LibraryGarment>, &SceneGarment<f32>)| {
         let mesh = &worn.garment.rest;
         let energies = GarmentEnergies::new(mesh, &Topology::new(mesh), &settings, worn.garment.holding);
         Ok(SceneGarment {

@@ -1,7 +1,7 @@
 //! One outfit to be draped, and the bodies it is draped on.
 
-use crate::draper::{BodyReport, BodyState, Draper, Moment, SourceGarment};
-use crate::scene::LibraryError;
+use crate::dataset::LibraryError;
+use crate::inference::{BodyReport, BodyState, Draper, Moment, SourceGarment};
 use clap::Args;
 use clothcombo_data::asset::{KnownShape, Motion, Pose, recover_body};
 use clothcombo_data::format::load_mesh;
