@@ -4,7 +4,7 @@ use burn::module::Module;
 use clothcombo_model::gradient_bucket;
 use clothcombo_trainer::config::{Config, Trains, load};
 use clothcombo_trainer::dataset::PreparedScene;
-use clothcombo_trainer::inference::networks::WardrobeTensors;
+use clothcombo_trainer::inference::networks::TensorStore;
 use clothcombo_trainer::training::learner::Learner;
 use std::path::Path;
 
@@ -37,7 +37,7 @@ pub fn fuzz_cases(few: usize) -> (usize, u64) {
 /// Loss of `scenes` and its gradient for all parameters, in the order of the networks.
 pub fn loss_and_gradient(
     mut learner: Learner,
-    tensors: &WardrobeTensors,
+    tensors: &TensorStore,
     scenes: &[PreparedScene],
     trains: Trains,
 ) -> (f64, Vec<f32>) {

@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 #[derive(Parser)]
 #[command(
     after_help = "Examples:\n  clothcombo generate --count 48 --seed 7 --body datasets/open/body.npz -o datasets/generated\n  \
-                  clothcombo generate --count 4300 --picture wardrobe.png -o datasets/wardrobe\n\n\
+                  clothcombo generate --count 4300 --picture garments.png -o datasets/garments\n\n\
                   Garment i is a function of body, seed + i, category and --vertices alone. The same command again goes on where \
                   it was stopped: garments that are there are kept. --start adds more to a folder."
 )]

@@ -38,8 +38,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let file = &arguments.file;
     let incident = Incident::read(file)?;
     let config = incident.configuration(file, &arguments.overrides)?;
-    let library = Arc::new(load_under_bar(&config)?);
-    let again = incident.replay(file, &config, &library, &arguments.device.device())?;
+    let dataset = Arc::new(load_under_bar(&config)?);
+    let again = incident.replay(file, &config, &dataset, &arguments.device.device())?;
 
     println!("step {} of stage {:?}, seed {}", incident.step, incident.stage, incident.seed);
     if let Some(injected) = incident.injected {

@@ -21,7 +21,7 @@ pub struct DataConfig {
     #[serde(default = "shape_range")]
     pub shape_range: [f64; 2],
     /// Sources of garments, all used together.
-    pub garments: Vec<GarmentSource>,
+    pub garments: Vec<GarmentSourceConfig>,
     /// Garments of these names are for the final test: never trained on, and read by no validation, no choice of the best
     /// checkpoint and no picture of a run. `clothcombo eval` reads them.
     #[serde(default)]
@@ -72,9 +72,9 @@ fn device_memory_mib() -> usize {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SplitConfig {
-    /// Share that is scored during the run but never trained on.
+    /// RankPartition that is scored during the run but never trained on.
     pub validation: f64,
-    /// Share that is for the final test, as `data.held_out_garments` is.
+    /// RankPartition that is for the final test, as `data.held_out_garments` is.
     pub test: f64,
 }
 
@@ -97,7 +97,7 @@ impl Default for CacheConfig {
 /// One source of garments: a folder, or the generator.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct GarmentSource {
+pub struct GarmentSourceConfig {
     /// Folder of garments (OBJ, PLY, STL, glTF) with an optional `garments.toml`.
     #[serde(default)]
     pub folder: Option<PathBuf>,
@@ -155,7 +155,7 @@ pub struct PoseConfig {
     /// Clips whose name contains one of these are for the final test: never trained on, and read by no validation, no choice
     /// of the best checkpoint and no picture of a run. `clothcombo eval` reads them.
     pub test_clips: Vec<String>,
-    /// Share of every other clip that is never trained on, in windows spread over the clip, which every validation scores. One
+    /// RankPartition of every other clip that is never trained on, in windows spread over the clip, which every validation scores. One
     /// block of `held_out_block` in every `1 / held_out_share`, rounded, at most every second one. A clip shorter than half of
     /// `held_out_block / held_out_share` is trained on whole.
     pub held_out_share: f64,

@@ -16,7 +16,7 @@ mod stages;
 mod validation;
 
 pub use data::{
-    CacheConfig, DataConfig, GarmentSource, GenerateConfig, MOST_GARMENTS, PoseConfig, PoseEncoding,
+    CacheConfig, DataConfig, GarmentSourceConfig, GenerateConfig, MOST_GARMENTS, PoseConfig, PoseEncoding,
     SplitConfig, StartConfig,
 };
 pub use guard::{GuardConfig, InjectConfig, Injected};

@@ -9,7 +9,7 @@ use thiserror::Error;
 
 /// Why the data of a run cannot be used.
 #[derive(Debug, Error, Diagnostic)]
-pub enum LibraryError {
+pub enum DatasetError {
     /// A file is missing or wrong; the message names it and says how to mend it.
     #[error("{0}")]
     Data(String),
@@ -159,7 +159,7 @@ pub enum LibraryError {
     },
 }
 
-impl LibraryError {
+impl DatasetError {
     /// Wraps an error of the data crate, whose message already names file and mend; causes are appended.
     pub(crate) fn data(error: impl StdError) -> Self {
         let mut text = error.to_string();
@@ -171,6 +171,6 @@ impl LibraryError {
             }
             source = cause.source();
         }
-        LibraryError::Data(text)
+        DatasetError::Data(text)
     }
 }

@@ -1,37 +1,37 @@
 //! From a step number to everything the networks and the energies need: draw, prepare, hand over.
 
 mod active_joints;
-mod draw;
+mod contents;
 mod error;
-mod garment;
-mod library;
+mod garment_source;
+mod garment_store;
 pub mod objective;
-mod origin;
 mod pose_features;
 mod poses;
 mod prepare;
-mod recipe;
+mod prepared_garment;
+mod preprocessor;
+mod sampling;
 pub(crate) mod sizes;
 mod skinning;
 mod split;
-mod wardrobe;
 
 pub use active_joints::ActiveJoints;
-pub use draw::{
-    BodyDraw, Plan, SceneDraw, ValidationGroup, draw_outfit, draw_study, draw_training, draw_validation,
-    in_turn,
-};
-pub use error::LibraryError;
-pub use garment::LibraryGarment;
-pub use library::{Library, LicenceLine, is_fingerprint, load_body};
-pub use origin::{Maker, Origin};
+pub use contents::{Dataset, LicenceLine, is_fingerprint, load_body};
+pub use error::DatasetError;
+pub use garment_source::{GarmentLoader, GarmentSource};
+pub use garment_store::{GarmentInfo, GarmentStore};
 pub use poses::{ClipSplit, FrameCounts, HeldOut, PoseLibrary, SelfIntersecting, Window};
-pub use prepare::{Dresser, PreparedBody, PreparedScene, contacts, prepare};
-pub use recipe::Recipe;
+pub use prepare::{PreparedBody, PreparedScene, SceneBuilder, contacts, prepare};
+pub use prepared_garment::PreparedGarment;
+pub use preprocessor::Preprocessor;
+pub use sampling::{
+    BodySample, Plan, SceneSample, ValidationGroup, round_robin, sample_evaluation, sample_outfit,
+    sample_training, sample_validation,
+};
 pub use sizes::{DataSizes, tensor_bytes};
 pub use skinning::skinning_transforms;
 pub use split::{GarmentPurpose, GarmentSplit, SplitNames, purpose};
-pub use wardrobe::{Card, Wardrobe};
 
 /// Steps whose scenes are prepared in advance.
 pub const SCENES_AHEAD: usize = 4;

@@ -2,7 +2,7 @@
 
 mod frames;
 
-use super::error::LibraryError;
+use super::error::DatasetError;
 use crate::config::{PoseConfig, PoseEncoding};
 use clothcombo_data::asset::{Body, Pose, Provenance};
 use clothcombo_data::dataset::load_motion_folder;
@@ -38,9 +38,9 @@ struct Filter {
 pub struct SelfIntersecting {
     /// Poses looked at.
     pub poses: usize,
-    /// Share in which far-apart parts of the body intersect at all, 0–1.
+    /// RankPartition in which far-apart parts of the body intersect at all, 0–1.
     pub touching: f64,
-    /// Share above the limit, which is drawn again, 0–1.
+    /// RankPartition above the limit, which is drawn again, 0–1.
     pub above_limit: f64,
     /// The limit [m].
     pub limit: f64,
@@ -89,11 +89,11 @@ impl PoseLibrary {
     ///
     /// # Errors
     /// When the folder cannot be read, one of the two parts is empty, or the frame rates of the clips are no rates.
-    pub fn new(config: &PoseConfig, body: &Arc<Body>) -> Result<Self, LibraryError> {
+    pub fn new(config: &PoseConfig, body: &Arc<Body>) -> Result<Self, DatasetError> {
         let source = match &config.motions {
             None => Source::Sampler(PoseSampler::default()),
             Some(folder) => {
-                let clips = load_motion_folder(folder).map_err(LibraryError::data)?;
+                let clips = load_motion_folder(folder).map_err(DatasetError::data)?;
                 Source::Frames(Box::new(Frames::split(&clips, config, folder)?))
             }
         };
@@ -103,7 +103,7 @@ impl PoseLibrary {
             contact: SelfContact::new(body),
             limit,
         });
-        let mut library = Self {
+        let mut dataset = Self {
             source,
             augmentation: config.augmentation.then(PoseAugmentation::default),
             filter,
@@ -111,8 +111,8 @@ impl PoseLibrary {
             encoding: config.encoding,
             remove_heading: config.remove_heading,
         };
-        library.self_intersecting = library.survey_self_intersections();
-        if let Some(s) = &library.self_intersecting {
+        dataset.self_intersecting = dataset.survey_self_intersections();
+        if let Some(s) = &dataset.self_intersecting {
             tracing::info!(
                 "self-intersecting bodies: {:.0} % of {} training poses, {:.0} % above {} m and drawn again",
                 100.0 * s.touching,
@@ -121,7 +121,7 @@ impl PoseLibrary {
                 s.limit
             );
         }
-        Ok(library)
+        Ok(dataset)
     }
 
     /// How many training poses intersect themselves before the filter; none where nothing is filtered.
@@ -203,7 +203,7 @@ impl PoseLibrary {
 
     /// A pose for training, augmented, scaled by the progressive schedule, as the networks see it. A pose that intersects itself
     /// beyond the limit is drawn again; if many in a row do, the least intersecting of them is taken.
-    pub fn draw_training(&self, scale: f64, rng: &mut ChaCha8Rng) -> Pose {
+    pub fn sample_training(&self, scale: f64, rng: &mut ChaCha8Rng) -> Pose {
         let mut pose = self.draw_unfiltered(scale, rng);
         let Some(filter) = &self.filter else { return pose };
         let mut length = filter.measure(&pose);
@@ -224,10 +224,10 @@ impl PoseLibrary {
         let pose = match &self.source {
             Source::Sampler(sampler) => sampler.sample(rng),
             Source::Frames(frames) => {
-                let pose = frames.draw_training(rng);
+                let pose = frames.sample_training(rng);
                 match &self.augmentation {
                     Some(augmentation) => {
-                        let other = frames.draw_training(rng);
+                        let other = frames.sample_training(rng);
                         augmentation.apply(pose, other, rng)
                     }
                     None => pose.clone(),
@@ -281,7 +281,7 @@ mod tests {
     use super::*;
     use clothcombo_data::generate::mannequin;
 
-    fn library(max_self_intersection: f64) -> PoseLibrary {
+    fn dataset(max_self_intersection: f64) -> PoseLibrary {
         let config = PoseConfig { max_self_intersection, ..PoseConfig::default() };
         PoseLibrary::new(&config, &Arc::new(mannequin())).unwrap()
     }
@@ -291,12 +291,12 @@ mod tests {
         let body = mannequin();
         let contact = SelfContact::new(&body);
         let limit = 0.02;
-        let (filtered, free) = (library(limit), library(NO_FILTER));
+        let (filtered, free) = (dataset(limit), dataset(NO_FILTER));
         assert!(free.self_intersecting().is_none());
         let report = filtered.self_intersecting().unwrap();
         assert!(report.above_limit > 0.0 && report.above_limit <= report.touching, "{report:?}");
         let draw =
-            |library: &PoseLibrary, seed| library.draw_training(1.0, &mut ChaCha8Rng::seed_from_u64(seed));
+            |dataset: &PoseLibrary, seed| dataset.sample_training(1.0, &mut ChaCha8Rng::seed_from_u64(seed));
         let length = |pose: &Pose| contact.of_pose(&body, pose).unwrap();
         let mut replaced = 0;
         for seed in 0..60 {

@@ -1,10 +1,10 @@
 //! Turns a draw into numbers: posed body, bone transforms, start positions, and the scene's energies.
 
 use super::active_joints::ActiveJoints;
-use super::draw::{BodyDraw, SceneDraw};
-use super::error::LibraryError;
-use super::garment::LibraryGarment;
-use super::library::Library;
+use super::contents::Dataset;
+use super::error::DatasetError;
+use super::prepared_garment::PreparedGarment;
+use super::sampling::{BodySample, SceneSample};
 use super::skinning::skinning_transforms;
 use crate::config::LossesConfig;
 use crate::dataset::objective::scene_weights;
@@ -21,7 +21,7 @@ pub struct PreparedBody {
     pub shape: Vec<f32>,
     /// Pose features of the active joints, `[P]`.
     pub pose: Vec<f32>,
-    /// World transforms of the active joints relative to the T-pose.
+    /// ProcessGroup transforms of the active joints relative to the T-pose.
     pub bones: Vec<[[f64; 4]; 3]>,
     /// Canonical start positions of all garments, `[ΣV, 3]`.
     pub start: Vec<[f32; 3]>,
@@ -32,9 +32,9 @@ pub struct PreparedBody {
 /// A scene ready for a step.
 pub struct PreparedScene {
     /// What was drawn.
-    pub draw: SceneDraw,
+    pub draw: SceneSample,
     /// The garments themselves.
-    pub worn: Vec<Arc<LibraryGarment>>,
+    pub worn: Vec<Arc<PreparedGarment>>,
     /// Pairs (inner, outer) of positions in `worn` that interact: those of [`contacts`].
     pub contacts: Vec<(usize, usize)>,
     /// Bodies.
@@ -47,7 +47,7 @@ impl PreparedScene {
     /// What of `packed`, one value per vertex of all garments inner → outer, belongs to each garment.
     pub fn parts<'a, T>(&self, packed: &'a [T]) -> Vec<&'a [T]> {
         let mut rest = packed;
-        let part = |garment: &Arc<LibraryGarment>| {
+        let part = |garment: &Arc<PreparedGarment>| {
             let (own, tail) = rest.split_at(garment.vertex_count());
             rest = tail;
             own
@@ -73,27 +73,27 @@ const CONTACT_MARGIN: f64 = 0.05;
 /// Prepares `draw`; loss weights are taken at `run_progress`.
 ///
 /// # Errors
-/// [`LibraryError`] when a garment cannot be read.
+/// [`DatasetError`] when a garment cannot be read.
 pub fn prepare(
-    library: &Library,
+    dataset: &Dataset,
     losses: &LossesConfig,
-    draw: SceneDraw,
+    draw: SceneSample,
     run_progress: f64,
-) -> Result<PreparedScene, LibraryError> {
+) -> Result<PreparedScene, DatasetError> {
     let garments =
-        draw.garments.iter().map(|&g| library.wardrobe.garment(g)).collect::<Result<Vec<_>, _>>()?;
-    let dresser = Dresser {
-        body: &library.body,
-        joints: library.joints(),
-        features: &|pose, joints| library.poses.features(pose, joints),
+        draw.garments.iter().map(|&g| dataset.garments.garment(g)).collect::<Result<Vec<_>, _>>()?;
+    let builder = SceneBuilder {
+        body: &dataset.body,
+        joints: dataset.joints(),
+        features: &|pose, joints| dataset.poses.features(pose, joints),
         losses,
-        graph: library.graph,
+        graph: dataset.graph,
     };
-    Ok(dresser.dress(draw, garments, run_progress))
+    Ok(builder.dress(draw, garments, run_progress))
 }
 
 /// Everything but the garments and the bodies that a scene is prepared with.
-pub struct Dresser<'a> {
+pub struct SceneBuilder<'a> {
     /// The body model.
     pub body: &'a Body,
     /// The joints the networks see.
@@ -106,12 +106,17 @@ pub struct Dresser<'a> {
     pub graph: Graph,
 }
 
-impl Dresser<'_> {
+impl SceneBuilder<'_> {
     /// Prepares `draw`, whose garments are `worn`; loss weights are taken at `run_progress`.
     ///
     /// # Panics
     /// If a shape or pose is longer than the body allows.
-    pub fn dress(&self, draw: SceneDraw, worn: Vec<Arc<LibraryGarment>>, run_progress: f64) -> PreparedScene {
+    pub fn dress(
+        &self,
+        draw: SceneSample,
+        worn: Vec<Arc<PreparedGarment>>,
+        run_progress: f64,
+    ) -> PreparedScene {
         let contacts = contacts(self.graph, &worn);
         let settings =
             EnergySettings { repulsion_sample: draw.repulsion_sample, ..self.losses.energy_settings() };
@@ -125,9 +130,9 @@ impl Dresser<'_> {
 
     fn on_body(
         &self,
-        garments: &[Arc<LibraryGarment>],
+        garments: &[Arc<PreparedGarment>],
         contacts: &[(usize, usize)],
-        body: &BodyDraw,
+        body: &BodySample,
         settings: &EnergySettings,
         run_progress: f64,
     ) -> PreparedBody {
@@ -178,7 +183,7 @@ impl Dresser<'_> {
 
 /// Pairs (inner, outer) of `garments`, inner → outer, that interact: all in the full graph, else those whose rest boxes are near
 /// enough for them ever to touch.
-pub fn contacts(graph: Graph, garments: &[Arc<LibraryGarment>]) -> Vec<(usize, usize)> {
+pub fn contacts(graph: Graph, garments: &[Arc<PreparedGarment>]) -> Vec<(usize, usize)> {
     let mut pairs = OutfitTensors::all_pairs(garments.len());
     if graph == Graph::Near {
         pairs.retain(|&(i, j)| are_near(&garments[i], &garments[j]));
@@ -186,7 +191,7 @@ pub fn contacts(graph: Graph, garments: &[Arc<LibraryGarment>]) -> Vec<(usize, u
     pairs
 }
 
-fn are_near(a: &LibraryGarment, b: &LibraryGarment) -> bool {
+fn are_near(a: &PreparedGarment, b: &PreparedGarment) -> bool {
     let [(a_low, a_high), (b_low, b_high)] = [a, b].map(|g| g.garment.rest.bounds());
     (0..3).all(|k| a_low[k] - CONTACT_MARGIN <= b_high[k] && b_low[k] - CONTACT_MARGIN <= a_high[k])
 }

@@ -1,6 +1,6 @@
 //! What of its data a run's memory depends on.
 
-use super::{Library, LibraryError, LibraryGarment, Origin, load_body};
+use super::{Dataset, DatasetError, GarmentSource, PreparedGarment, load_body};
 use crate::config::Config;
 use clothcombo_data::asset::{BODY_JOINT_COUNT, Body};
 use rayon::prelude::*;
@@ -30,26 +30,26 @@ const CARD: usize = 1536;
 
 impl DataSizes {
     /// Those of data that is loaded.
-    pub fn of(library: &Library) -> Self {
-        let vertices = (0..library.wardrobe.len()).map(|i| library.wardrobe.card(i).vertices).collect();
-        Self { joints: library.joints().len(), ..Self::of_body(vertices, &library.body) }
+    pub fn of(dataset: &Dataset) -> Self {
+        let vertices = (0..dataset.garments.len()).map(|i| dataset.garments.info(i).vertices).collect();
+        Self { joints: dataset.joints().len(), ..Self::of_body(vertices, &dataset.body) }
     }
 
     /// Those of the data that `config` names. Meshes are read for their number of vertices, nothing is computed.
     ///
     /// # Errors
-    /// [`LibraryError`] naming the file at fault.
-    pub fn of_named(config: &Config) -> Result<Self, LibraryError> {
+    /// [`DatasetError`] naming the file at fault.
+    pub fn of_named(config: &Config) -> Result<Self, DatasetError> {
         let body = load_body(&config.data.body, config.data.shape_components)?;
-        Self::of_listed(&Origin::list(&config.data.garments)?, &body)
+        Self::of_listed(&GarmentSource::list(&config.data.garments)?, &body)
     }
 
     /// Those of listed garments on `body`.
     ///
     /// # Errors
-    /// [`LibraryError`] naming the file at fault.
-    pub fn of_listed(origins: &[Origin], body: &Body) -> Result<Self, LibraryError> {
-        Ok(Self::of_body(origins.par_iter().map(Origin::vertices).collect::<Result<_, _>>()?, body))
+    /// [`DatasetError`] naming the file at fault.
+    pub fn of_listed(sources: &[GarmentSource], body: &Body) -> Result<Self, DatasetError> {
+        Ok(Self::of_body(sources.par_iter().map(GarmentSource::vertices).collect::<Result<_, _>>()?, body))
     }
 
     /// Those of a wardrobe that is not at hand, on a body like SMPL-X.
@@ -88,7 +88,7 @@ impl DataSizes {
     /// Memory of a garment of `vertices` vertices on the host [bytes].
     pub(crate) fn garment_bytes(&self, config: &Config, vertices: usize) -> usize {
         let transferred = if config.start.shape_transfer { self.shape_components } else { 0 };
-        LibraryGarment::expected_bytes(vertices, self.joints, transferred)
+        PreparedGarment::expected_bytes(vertices, self.joints, transferred)
     }
 
     /// Memory of its tensors and, `embeddings` times over, of its embedding [bytes].

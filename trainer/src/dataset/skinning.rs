@@ -1,11 +1,11 @@
 //! Initial linear blend skinning of every vertex, as one affine map.
 
-use super::garment::LibraryGarment;
+use super::prepared_garment::PreparedGarment;
 use clothcombo_physics::transform::Transform;
 use std::sync::Arc;
 
 /// The transforms, canonical → posed, that `bones` blend to by the initial skin weights of `garments`, `[ΣV]`.
-pub fn skinning_transforms(garments: &[Arc<LibraryGarment>], bones: &[Transform]) -> Vec<Transform> {
+pub fn skinning_transforms(garments: &[Arc<PreparedGarment>], bones: &[Transform]) -> Vec<Transform> {
     let rows = garments.iter().flat_map(|garment| garment.skin_weights.chunks_exact(bones.len()));
     rows.map(|weights| blended(weights, bones)).collect()
 }

@@ -1,6 +1,6 @@
 //! Which garments are trained on, which only validate, and which are kept for the final test.
 
-use super::error::LibraryError;
+use super::error::DatasetError;
 use super::poses::Window;
 use crate::config::DataConfig;
 use serde::Serialize;
@@ -21,12 +21,12 @@ impl GarmentSplit {
     /// that a garment stays where it is when others are added or removed.
     ///
     /// # Errors
-    /// [`LibraryError`] when a held-out name fits no garment or nothing is left to train on.
-    pub fn new(names: &[&str], config: &DataConfig) -> Result<Self, LibraryError> {
+    /// [`DatasetError`] when a held-out name fits no garment or nothing is left to train on.
+    pub fn new(names: &[&str], config: &DataConfig) -> Result<Self, DatasetError> {
         let held_out = &config.held_out_garments;
         if let Some(name) = held_out.iter().find(|n| !names.contains(&n.as_str())) {
             let available = names.join(", ");
-            return Err(LibraryError::UnknownHeldOut { name: name.clone(), available });
+            return Err(DatasetError::UnknownHeldOut { name: name.clone(), available });
         }
         let mut split = Self { training: Vec::new(), validation: Vec::new(), test: Vec::new() };
         for (i, &name) in names.iter().enumerate() {
@@ -38,7 +38,7 @@ impl GarmentSplit {
             part.push(i);
         }
         match split.training.is_empty() {
-            true => Err(LibraryError::AllHeldOut(names.len())),
+            true => Err(DatasetError::AllHeldOut(names.len())),
             false => Ok(split),
         }
     }
@@ -124,6 +124,6 @@ mod tests {
         let unknown = GarmentSplit::new(&names, &config(0.0, 0.0, &["d"])).unwrap_err();
         assert!(unknown.to_string().contains("\"d\""));
         let none = GarmentSplit::new(&names, &config(0.0, 0.0, &names)).unwrap_err();
-        assert!(matches!(none, LibraryError::AllHeldOut(3)));
+        assert!(matches!(none, DatasetError::AllHeldOut(3)));
     }
 }

@@ -1,7 +1,7 @@
 //! What the post-process makes of random outfits.
 
 use crate::config::LossesConfig;
-use crate::dataset::{Library, PreparedScene, prepare};
+use crate::dataset::{Dataset, PreparedScene, prepare};
 use crate::inference::networks::{DrapeError, Networks};
 use clothcombo_data::asset::{Garment, unwearable};
 use clothcombo_physics::contact::resolve::{
@@ -31,7 +31,7 @@ pub enum PostProcessError {
 
 /// What the post-process needs besides a drape: the data, who drapes other poses, and constants of garments.
 pub struct Dressing<'a> {
-    library: &'a Library,
+    dataset: &'a Dataset,
     losses: &'a LossesConfig,
     networks: Option<&'a Networks<'a>>,
     /// What drapes poses on the way from the T-pose: without corrections, which leaves fewer crossings (docs/resolve.md).
@@ -40,10 +40,10 @@ pub struct Dressing<'a> {
 }
 
 impl<'a> Dressing<'a> {
-    /// For scenes of `library`, draped by `networks`; without them by skinning.
-    pub fn new(library: &'a Library, losses: &'a LossesConfig, networks: Option<&'a Networks<'a>>) -> Self {
+    /// For scenes of `dataset`, draped by `networks`; without them by skinning.
+    pub fn new(dataset: &'a Dataset, losses: &'a LossesConfig, networks: Option<&'a Networks<'a>>) -> Self {
         let uncorrected = networks.map(Networks::uncorrected);
-        Self { library, losses, networks, uncorrected, known: Mutex::default() }
+        Self { dataset, losses, networks, uncorrected, known: Mutex::default() }
     }
 
     /// A drape of `scene` from the packed positions of all garments on its first body.
@@ -76,7 +76,7 @@ impl<'a> Dressing<'a> {
         for body in &mut draw.bodies {
             body.pose = body.pose.on_the_way(share);
         }
-        let scene = prepare(self.library, self.losses, draw, 1.0).map_err(DrapeError::from)?;
+        let scene = prepare(self.dataset, self.losses, draw, 1.0).map_err(DrapeError::from)?;
         Ok(Waypoint {
             body: Arc::new(scene.exact_body()),
             draped: wide(&scene, &draped_by(self.uncorrected.as_ref(), &scene)?),
@@ -150,7 +150,7 @@ impl DrapedScene<'_> {
         Ok(Counts::new(&self.certificate()?, self.order_by_vertices(&self.positions)))
     }
 
-    /// Share of wrong-side vertices over all pairs of layers, by the nearest vertex: the definition of the score.
+    /// RankPartition of wrong-side vertices over all pairs of layers, by the nearest vertex: the definition of the score.
     pub fn order_by_vertices(&self, positions: &[Vec<[f64; 3]>]) -> f64 {
         let mut sum = OrderViolations::default();
         for (outer, over) in positions.iter().enumerate() {
@@ -187,9 +187,9 @@ pub struct Counts {
     pub contour_length_mm: f64,
     /// Deepest vertex [mm].
     pub max_depth_mm: f64,
-    /// Share of wrong-side vertices by the closest surface point.
+    /// RankPartition of wrong-side vertices by the closest surface point.
     pub order_violations: f64,
-    /// Share of wrong-side vertices by the nearest vertex.
+    /// RankPartition of wrong-side vertices by the nearest vertex.
     pub order_violations_by_vertices: f64,
 }
 
@@ -234,7 +234,7 @@ pub struct OutfitResult {
     pub strain_added: Option<f64>,
     /// Largest move of a vertex [mm].
     pub largest_move_mm: f64,
-    /// Share of vertices that moved.
+    /// RankPartition of vertices that moved.
     pub moved: f64,
     /// Rounds per garment, of all attempts but those of the way and of easing.
     pub rounds: Vec<usize>,

@@ -1,6 +1,6 @@
 //! The sample picture of a run: validation scenes before and after the networks, front and back.
 
-use crate::dataset::{Library, PreparedScene, ValidationGroup};
+use crate::dataset::{Dataset, PreparedScene, ValidationGroup};
 use crate::evaluation::ValidationSet;
 use crate::inference::Draped;
 use crate::inference::networks::Networks;
@@ -18,7 +18,7 @@ const CELL: [u32; 2] = [300, 460];
 /// # Errors
 /// When a scene cannot be draped or the picture not written.
 pub fn draw(
-    library: &Library,
+    dataset: &Dataset,
     validation: &ValidationSet,
     networks: &Networks,
     count: usize,
@@ -31,7 +31,7 @@ pub fn draw(
         for i in 0..count {
             // One further in each part: layer counts come in turn, and equal strides would always meet the same one.
             let draw = &draws[(i * draws.len() / count + i) % draws.len()];
-            rows.push(row(networks, &validation.prepare(library, draw)?)?);
+            rows.push(row(networks, &validation.prepare(dataset, draw)?)?);
         }
     }
     let heading = |m: &str, v: &str| format!("{m}, {v}");

@@ -1,6 +1,6 @@
 //! What the vertices of a scene feel, for the correction networks.
 
-use crate::dataset::{LibraryGarment, PreparedBody, PreparedScene};
+use crate::dataset::{PreparedBody, PreparedGarment, PreparedScene};
 use burn::tensor::Device;
 use clothcombo_model::FeltTensors;
 use clothcombo_physics::sensing::{DIRECTIONS, FEATURES, Rings, Sensed, sense};
@@ -8,14 +8,14 @@ use std::sync::Arc;
 
 /// Whether the garments of a scene feel each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Company {
+pub enum LayerInteraction {
     /// Every garment is draped by itself.
     Alone,
     /// All are worn together.
     Together,
 }
 
-impl Company {
+impl LayerInteraction {
     /// The pairs (inner, outer) of `scene` that feel each other.
     pub fn contacts(self, scene: &PreparedScene) -> &[(usize, usize)] {
         match self {
@@ -58,7 +58,7 @@ fn unposed(scene: &PreparedScene, body: &PreparedBody, posed: &[[f32; 3]]) -> Ve
         }
         canonical.map(|x| x as f32)
     };
-    let of_garment = |(worn, part): (&Arc<LibraryGarment>, &[[f32; 3]])| {
+    let of_garment = |(worn, part): (&Arc<PreparedGarment>, &[[f32; 3]])| {
         let rows = worn.skin_weights.chunks_exact(bones.len().max(1));
         part.iter().zip(rows).map(|(direction, weights)| turned_back(direction, weights)).collect::<Vec<_>>()
     };

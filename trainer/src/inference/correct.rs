@@ -11,7 +11,7 @@
 //! So no garment ends above skinning, and more steps never raise its energy.
 
 use crate::inference::Draped;
-use crate::inference::contact_features::{Company, felt};
+use crate::inference::contact_features::{LayerInteraction, felt};
 use crate::inference::descent::{BACKTRACKING, Descent, WHOLE};
 use crate::inference::draped::{draped, to_device};
 use crate::inference::networks::OnBody;
@@ -25,7 +25,7 @@ pub(crate) fn corrected(
     on_body: &OnBody<'_>,
     single: &SingleDrape,
     uncorrected: Draped,
-    company: Company,
+    company: LayerInteraction,
     watch: &mut dyn FnMut(&Descent<'_>),
 ) -> Draped {
     let OnBody { scene, outfit, embeddings, body, start } = on_body;
@@ -35,8 +35,8 @@ pub(crate) fn corrected(
     }
     let (prepared, device) = (&scene.bodies[0], start.device());
     let energy = match company {
-        Company::Together => (*prepared.energy).clone(),
-        Company::Alone => prepared.energy.without_layers(),
+        LayerInteraction::Together => (*prepared.energy).clone(),
+        LayerInteraction::Alone => prepared.energy.without_layers(),
     };
     let energy = energy.continuous().pulled_back(&scene.skinning_transforms());
     let mut descent = Descent::new(&energy, skinned(start.clone(), outfit.skin_weights.clone(), body));

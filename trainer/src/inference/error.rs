@@ -1,6 +1,6 @@
 //! Why something cannot be draped.
 
-use crate::dataset::LibraryError;
+use crate::dataset::DatasetError;
 use crate::run::checkpoint::CheckpointError;
 use clothcombo_data::asset::BodyError;
 use clothcombo_data::fit::FitError;
@@ -41,7 +41,7 @@ pub enum DraperError {
     /// Body or garment folder cannot be read, or a garment not be prepared.
     #[error(transparent)]
     #[diagnostic(transparent)]
-    Library(#[from] LibraryError),
+    Dataset(#[from] DatasetError),
     /// The body the model was trained on is not there.
     #[error("the model was trained on body {body}, which is not there")]
     #[diagnostic(help(

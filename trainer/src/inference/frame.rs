@@ -1,6 +1,6 @@
 //! One drape: networks, refinement, post-process.
 
-use super::motion::Bearable;
+use super::motion::RetryPolicy;
 use super::networked::Networked;
 use super::{BodyState, Certificate, Drape, Draper, DraperError, GarmentDrape, Outfit, elapsed, refine};
 use crate::inference::reference::ReferenceScene;
@@ -24,7 +24,7 @@ pub(super) struct Last<'a> {
     pub drape: &'a Drape,
     /// What carrying on may leave. Where it leaves more, the drape is also resolved by itself, and on a way from the T-pose: that
     /// takes seconds.
-    pub bearable: Bearable,
+    pub bearable: RetryPolicy,
 }
 
 impl Draper {

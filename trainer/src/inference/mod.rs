@@ -1,4 +1,4 @@
-//! Any body, any garments, in order: the trained networks as a library.
+//! Any body, any garments, in order: the trained networks as a dataset.
 //!
 //! ```no_run
 //! use clothcombo_data::asset::Pose;
@@ -6,8 +6,8 @@
 //! use std::path::Path;
 //!
 //! let draper = Draper::load(Some(Path::new("runs/smoke")), &DraperSettings::default())?;
-//! let closet = draper.closet(&[])?;
-//! let garments = ["t_shirt_000003", "skirt_000005"].map(|name| closet.find(name, draper.body(), None));
+//! let catalog = draper.catalog(&[])?;
+//! let garments = ["t_shirt_000003", "skirt_000005"].map(|name| catalog.find(name, draper.body(), None));
 //! let outfit = draper.outfit(garments.into_iter().collect::<Result<_, _>>()?)?;
 //! let drape = draper.drape(&outfit, &BodyState::new(vec![1.0, -0.5], Pose::t_pose(22)))?;
 //! for (piece, draped) in outfit.pieces.iter().zip(&drape.garments) {
@@ -42,7 +42,7 @@ mod report;
 mod shipped;
 mod smooth;
 mod source;
-mod steady;
+mod temporal_filter;
 
 pub use acceleration::{Acceleration, acceleration};
 pub use clothcombo_physics::contact::resolve::Certificate;
@@ -57,9 +57,9 @@ pub use refine::{Refinement, refine};
 pub use report::{BodyReport, FrameReport, GarmentReport, ModelReport, Moment, Report, Stage};
 pub use shipped::shipped_model;
 pub use smooth::{Smoothing, smooth};
-pub use source::{Closet, SourceGarment};
+pub use source::{GarmentCatalog, SourceGarment};
 
-use crate::dataset::{ActiveJoints, LibraryError, Recipe, load_body};
+use crate::dataset::{ActiveJoints, DatasetError, Preprocessor, load_body};
 use crate::run::checkpoint::TrainedModel;
 use crate::system::device::Backend;
 use burn::tensor::Device;
@@ -138,7 +138,7 @@ pub struct Draper {
     model: ClothCombo,
     /// The same without corrections, for poses on the way from the T-pose: that leaves fewer crossings (docs/resolve.md).
     uncorrected: ClothCombo,
-    recipe: Recipe,
+    preprocessor: Preprocessor,
     joints: ActiveJoints,
     device: Device,
     settings: DraperSettings,
@@ -167,15 +167,15 @@ impl Draper {
             model = model.with_correction_steps(steps);
         }
         let cache = settings.cache.as_deref().map(|folder| ArrayCache::open(folder, settings.cache_limit));
-        let cache = cache.transpose().map_err(LibraryError::data)?;
+        let cache = cache.transpose().map_err(DatasetError::data)?;
         let key: Option<Key> = cache.as_ref().map(|_| body_key(&body));
-        let recipe = Recipe::new(&trained.config, Arc::new(body));
+        let preprocessor = Preprocessor::new(&trained.config, Arc::new(body));
         let settings = settings.clone();
         Ok(Self {
             trained,
             uncorrected: model.clone().with_correction_steps(0),
             model,
-            recipe,
+            preprocessor,
             joints,
             device,
             settings,
@@ -185,7 +185,7 @@ impl Draper {
 
     /// The body model.
     pub fn body(&self) -> &Body {
-        &self.recipe.body
+        &self.preprocessor.body
     }
 
     /// The trained model.
@@ -202,8 +202,8 @@ impl Draper {
     ///
     /// # Errors
     /// When a folder cannot be listed.
-    pub fn closet(&self, folders: &[PathBuf]) -> Result<Closet, DraperError> {
-        Closet::new(folders, &self.trained.config)
+    pub fn catalog(&self, folders: &[PathBuf]) -> Result<GarmentCatalog, DraperError> {
+        GarmentCatalog::new(folders, &self.trained.config)
     }
 
     /// Prepares and embeds garments, innermost first. A garment this draper has met before, by content, costs nothing.

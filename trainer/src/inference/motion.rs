@@ -1,7 +1,7 @@
 //! A motion: each frame carries on from the one before, and what that leaves over from the one after.
 
 use super::frame::{Frame, Last};
-use super::steady::Steady;
+use super::temporal_filter::TemporalFilter;
 use super::{BodyState, Certificate, Drape, Draper, DraperError, Outfit};
 
 /// So many frames after one that was left with flaws only carry on: poses change slowly, and starting anew takes seconds.
@@ -9,12 +9,12 @@ const FRAMES_CARRIED: usize = 15;
 
 /// Flaws that carrying on from another frame may leave.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Bearable {
+pub(super) struct RetryPolicy {
     crossings: usize,
     tears: usize,
 }
 
-impl Bearable {
+impl RetryPolicy {
     const NONE: Self = Self { crossings: 0, tears: 0 };
     const ALL: Self = Self { crossings: usize::MAX, tears: usize::MAX };
 
@@ -56,18 +56,18 @@ impl Draper {
         mut progress: impl FnMut(DrapeProgress),
     ) -> Result<Vec<Drape>, DraperError> {
         let mut drapes: Vec<Drape> = Vec::with_capacity(bodies.len());
-        let (mut bearable, mut only_carried) = (Bearable::NONE, 0);
-        let steady = Steady::new(self, outfit, bodies, radius);
+        let (mut bearable, mut only_carried) = (RetryPolicy::NONE, 0);
+        let steady = TemporalFilter::new(self, outfit, bodies, radius);
         for ((frame, body), made) in bodies.iter().enumerate().zip(steady) {
             let last = drapes.last().map(|drape| Last { body: &bodies[frame - 1], drape, bearable });
             let mut watch = |share| progress(DrapeProgress::OnTheWay(share));
             let mut drape = self.drape_frame(outfit, Frame { body, last }, made?, &mut watch)?;
             if !bearable.is_met(&drape.certificate) {
-                (bearable, only_carried) = (Bearable::after(&drape.certificate), FRAMES_CARRIED);
+                (bearable, only_carried) = (RetryPolicy::after(&drape.certificate), FRAMES_CARRIED);
             } else if only_carried > 1 {
                 only_carried -= 1;
             } else {
-                (bearable, only_carried) = (Bearable::NONE, 0);
+                (bearable, only_carried) = (RetryPolicy::NONE, 0);
             }
             if bodies.len() > 1 {
                 drape.slim();
@@ -83,7 +83,7 @@ impl Draper {
             |drape| &drape.certificate,
             |frame, own, after| {
                 progress(DrapeProgress::Again(frame));
-                let last = Last { body: &bodies[frame + 1], drape: after, bearable: Bearable::ALL };
+                let last = Last { body: &bodies[frame + 1], drape: after, bearable: RetryPolicy::ALL };
                 let mut watch = |share| progress(DrapeProgress::OnTheWay(share));
                 let body = &bodies[frame];
                 let mut made = self.networked(&self.model, outfit, body)?;
@@ -141,16 +141,20 @@ mod tests {
             (left(0, 1.2), false, false, true),
             (left(9, 3.0), false, false, false),
         ] {
-            assert_eq!(Bearable::NONE.is_met(&certificate), at_first, "{certificate:?}");
+            assert_eq!(RetryPolicy::NONE.is_met(&certificate), at_first, "{certificate:?}");
             assert_eq!(
-                Bearable::after(&left(7, 0.0)).is_met(&certificate),
+                RetryPolicy::after(&left(7, 0.0)).is_met(&certificate),
                 after_crossings,
                 "{certificate:?}"
             );
-            assert_eq!(Bearable::after(&left(0, 1.0)).is_met(&certificate), after_tears, "{certificate:?}");
-            assert!(Bearable::ALL.is_met(&certificate));
+            assert_eq!(
+                RetryPolicy::after(&left(0, 1.0)).is_met(&certificate),
+                after_tears,
+                "{certificate:?}"
+            );
+            assert!(RetryPolicy::ALL.is_met(&certificate));
         }
-        assert!(Bearable::after(&left(0, f64::INFINITY)).is_met(&left(1, f64::INFINITY)));
+        assert!(RetryPolicy::after(&left(0, f64::INFINITY)).is_met(&left(1, f64::INFINITY)));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! What the networks make of an outfit on one body, brought to where the body stands.
 
 use super::{BodyState, Draper, DraperError, Outfit, PhaseTimes, elapsed};
-use crate::dataset::{BodyDraw, Dresser, PreparedScene, SceneDraw};
+use crate::dataset::{BodySample, PreparedScene, SceneBuilder, SceneSample};
 use crate::inference::networks::{OnBody, body_tensors, drape_on};
 use clothcombo_data::asset::rotation::{Matrix3, apply, matrix_from_axis_angle};
 use clothcombo_data::asset::{Pose, PosedBody};
@@ -55,7 +55,7 @@ impl Draper {
             true => (facing, heading),
             false => (body.pose.clone(), 0.0),
         };
-        let scene = self.scene(outfit, BodyDraw { shape, pose: facing });
+        let scene = self.scene(outfit, BodySample { shape, pose: facing });
         let (tensors, start) = body_tensors(&scene.bodies[0], &self.dimensions(), &self.device)?;
         let posing = elapsed(clock);
 
@@ -104,21 +104,21 @@ impl Draper {
         })
     }
 
-    fn scene(&self, outfit: &Outfit, body: BodyDraw) -> PreparedScene {
+    fn scene(&self, outfit: &Outfit, body: BodySample) -> PreparedScene {
         let encoding = self.trained.config.data.poses.encoding;
-        let dresser = Dresser {
+        let builder = SceneBuilder {
             body: self.body(),
             joints: &self.joints,
             features: &|pose, joints| encoding.features(pose, joints),
             losses: &self.trained.config.losses,
             graph: self.trained.config.model.graph,
         };
-        let draw = SceneDraw {
+        let draw = SceneSample {
             garments: (0..outfit.pieces.len()).collect(),
             bodies: vec![body],
             repulsion_sample: 0,
         };
-        let mut scene = dresser.dress(draw, outfit.worn(), 1.0);
+        let mut scene = builder.dress(draw, outfit.worn(), 1.0);
         // A body with fewer components than the networks know has the others at their mean.
         scene.bodies[0].shape.resize(self.trained.state.shape_count, 0.0);
         scene

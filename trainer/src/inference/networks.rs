@@ -2,13 +2,13 @@
 
 use super::draped::{Draped, draped, to_device};
 use crate::dataset::{
-    Library, LibraryError, LibraryGarment, PreparedBody, PreparedScene, SCENES_AHEAD, tensor_bytes,
+    Dataset, DatasetError, PreparedBody, PreparedGarment, PreparedScene, SCENES_AHEAD, tensor_bytes,
 };
-use crate::inference::contact_features::Company;
+use crate::inference::contact_features::LayerInteraction;
 use crate::inference::correct::{corrected, skinned};
 use crate::inference::descent::Descent;
 use crate::system::device::is_processor;
-use crate::system::lru_cache::{KeptBytes, MemoryBudget, Recent, Residence};
+use crate::system::lru_cache::{KeptBytes, LruCache, MemoryBudget, Residence};
 use burn::tensor::{Device, Tensor};
 use clothcombo_model::{
     BodyTensors, ClothCombo, Dimensions, Embeddings, GarmentArrays, GarmentEmbedding, GarmentTensors,
@@ -26,35 +26,35 @@ pub enum DrapeError {
     /// A garment cannot be read.
     #[error(transparent)]
     #[diagnostic(transparent)]
-    Library(#[from] LibraryError),
+    Dataset(#[from] DatasetError),
     /// The networks do not take it.
     #[error(transparent)]
     Model(#[from] ModelError),
 }
 
 /// Embeddings of one state of the networks, by garment; threads share it.
-pub type KnownEmbeddings = Recent<GarmentEmbedding>;
+pub type KnownEmbeddings = LruCache<GarmentEmbedding>;
 
 /// The constant tensors of a wardrobe on one device, made when a garment is first drawn.
-pub struct WardrobeTensors {
-    library: Arc<Library>,
+pub struct TensorStore {
+    dataset: Arc<Dataset>,
     memory: Arc<MemoryBudget>,
-    garments: Recent<GarmentTensors>,
+    garments: LruCache<GarmentTensors>,
     dimensions: Dimensions,
     device: Device,
 }
 
-impl WardrobeTensors {
-    /// For the garments of `library`.
-    pub fn new(library: Arc<Library>, dimensions: Dimensions, device: &Device) -> Self {
+impl TensorStore {
+    /// For the garments of `dataset`.
+    pub fn new(dataset: Arc<Dataset>, dimensions: Dimensions, device: &Device) -> Self {
         let memory = match is_processor(device) {
-            true => library.memory.clone(),
+            true => dataset.memory.clone(),
             false => {
-                MemoryBudget::new(KeptBytes { total: usize::MAX, device: library.memory.limits().device })
+                MemoryBudget::new(KeptBytes { total: usize::MAX, device: dataset.memory.limits().device })
             }
         };
-        let garments = Recent::new(&memory, Residence::Device);
-        Self { library, memory, garments, dimensions, device: device.clone().inner() }
+        let garments = LruCache::new(&memory, Residence::Device);
+        Self { dataset, memory, garments, dimensions, device: device.clone().inner() }
     }
 
     /// What is kept of garments on the device, and how much may be.
@@ -63,24 +63,28 @@ impl WardrobeTensors {
     }
 
     /// The data the tensors are made from.
-    pub fn library(&self) -> &Library {
-        &self.library
+    pub fn dataset(&self) -> &Dataset {
+        &self.dataset
     }
 
     /// The tensors of one garment.
     ///
     /// # Errors
     /// When its operators cannot be read or its numbers are not finite.
-    pub fn garment(&self, index: usize, garment: &LibraryGarment) -> Result<Arc<GarmentTensors>, DrapeError> {
+    pub fn garment(
+        &self,
+        index: usize,
+        garment: &PreparedGarment,
+    ) -> Result<Arc<GarmentTensors>, DrapeError> {
         if let Some(tensors) = self.garments.get(index) {
             return Ok(tensors);
         }
-        let operators = self.library.wardrobe.operators(index)?;
+        let operators = self.dataset.garments.operators(index)?;
         let tensors = garment_tensors(garment, &operators, &self.dimensions, &self.device)?;
         Ok(self.garments.insert(index, tensors, self.bytes(garment, operators.eigen_count)))
     }
 
-    fn bytes(&self, garment: &LibraryGarment, eigen_count: usize) -> usize {
+    fn bytes(&self, garment: &PreparedGarment, eigen_count: usize) -> usize {
         tensor_bytes(garment.vertex_count(), eigen_count, self.dimensions.joints)
     }
 
@@ -115,12 +119,12 @@ impl WardrobeTensors {
 
     /// An empty store of embeddings for [`embed`](Self::embed), of one scene: all of them are kept for as long as it lives.
     pub fn embeddings(&self) -> KnownEmbeddings {
-        Recent::unlimited()
+        LruCache::unlimited()
     }
 
     /// The same for any number of scenes, within the limits of memory.
     pub fn kept_embeddings(&self) -> KnownEmbeddings {
-        Recent::new(&self.memory, Residence::Device)
+        LruCache::new(&self.memory, Residence::Device)
     }
 
     /// One body of a scene, and the start positions of the garments on it `[ΣV, 3]`.
@@ -156,7 +160,7 @@ impl WardrobeTensors {
         scene: &PreparedScene,
         known: &KnownEmbeddings,
     ) -> Result<Vec<GarmentEmbedding>, DrapeError> {
-        let encoded = |(&g, worn): (&usize, &Arc<LibraryGarment>)| {
+        let encoded = |(&g, worn): (&usize, &Arc<PreparedGarment>)| {
             let embedding = match known.get(g) {
                 Some(kept) => kept,
                 None => {
@@ -176,7 +180,7 @@ impl WardrobeTensors {
 /// # Errors
 /// When its numbers are not finite.
 pub fn garment_tensors(
-    garment: &LibraryGarment,
+    garment: &PreparedGarment,
     operators: &SurfaceOperators,
     dimensions: &Dimensions,
     device: &Device,
@@ -210,13 +214,13 @@ pub fn body_tensors(
 /// The networks ready for inference; garments are embedded once.
 pub struct Networks<'a> {
     model: ClothCombo,
-    tensors: &'a WardrobeTensors,
+    tensors: &'a TensorStore,
     embeddings: Arc<KnownEmbeddings>,
 }
 
 impl<'a> Networks<'a> {
     /// Wraps a model without automatic differentiation.
-    pub fn new(model: ClothCombo, tensors: &'a WardrobeTensors) -> Self {
+    pub fn new(model: ClothCombo, tensors: &'a TensorStore) -> Self {
         Self { model, tensors, embeddings: Arc::new(tensors.kept_embeddings()) }
     }
 
@@ -340,7 +344,7 @@ fn drape_watched(
         found = draped(&layered.canonical, &layered.posed);
     }
     times.untangling = clock.elapsed() - times.draping;
-    found = corrected(model, on_body, &single, found, Company::Together, watch);
+    found = corrected(model, on_body, &single, found, LayerInteraction::Together, watch);
     times.correcting = clock.elapsed() - times.draping - times.untangling;
     (found, times)
 }
@@ -350,5 +354,5 @@ pub fn drape_alone(model: &ClothCombo, on_body: &OnBody<'_>) -> Draped {
     let OnBody { outfit, embeddings, body, start, .. } = on_body;
     let single = model.drape_single(outfit, embeddings, body, start.clone());
     let found = draped(&single.canonical, &single.posed);
-    corrected(model, on_body, &single, found, Company::Alone, &mut |_| ())
+    corrected(model, on_body, &single, found, LayerInteraction::Alone, &mut |_| ())
 }

@@ -5,7 +5,7 @@ use super::Draper;
 use super::error::DraperError;
 use super::names::UniqueNames;
 use super::source::SourceGarment;
-use crate::dataset::{LibraryError, LibraryGarment, contacts};
+use crate::dataset::{DatasetError, PreparedGarment, contacts};
 use crate::inference::networks::garment_tensors;
 use burn::tensor::{Tensor, TensorData};
 use clothcombo_data::asset::Binding;
@@ -43,7 +43,7 @@ pub struct Piece {
     /// As it was given.
     pub source: Arc<SourceGarment>,
     /// As it is worn.
-    pub worn: Arc<LibraryGarment>,
+    pub worn: Arc<PreparedGarment>,
     /// As the post-process sees it.
     pub rest: Arc<RestGarment>,
     /// Whether the embedding was there already, in memory or in the cache.
@@ -81,7 +81,7 @@ impl Outfit {
         self.pieces.iter().map(|p| p.name.as_str())
     }
 
-    pub(super) fn worn(&self) -> Vec<Arc<LibraryGarment>> {
+    pub(super) fn worn(&self) -> Vec<Arc<PreparedGarment>> {
         self.pieces.iter().map(|p| p.worn.clone()).collect()
     }
 
@@ -127,7 +127,7 @@ impl Outfit {
 /// A garment with its tensors.
 #[derive(Clone)]
 struct Known {
-    worn: Arc<LibraryGarment>,
+    worn: Arc<PreparedGarment>,
     rest: Arc<RestGarment>,
     tensors: GarmentTensors,
     embedding: GarmentEmbedding,
@@ -156,7 +156,7 @@ impl KnownGarments {
             pieces.push(Piece { name, source, worn, rest, embedding_known, milliseconds });
             known.push(found);
         }
-        let worn: Vec<Arc<LibraryGarment>> = known.iter().map(|k| k.worn.clone()).collect();
+        let worn: Vec<Arc<PreparedGarment>> = known.iter().map(|k| k.worn.clone()).collect();
         let contacts = contacts(draper.trained.config.model.graph, &worn);
         let tensors: Vec<&GarmentTensors> = known.iter().map(|k| &k.tensors).collect();
         let tensors = OutfitTensors::new(&tensors, &contacts)?;
@@ -181,7 +181,7 @@ impl KnownGarments {
         }
         let clock = Instant::now();
         let binding = self.binding(draper, source, mesh)?;
-        let worn = Arc::new(draper.recipe.finish(garment.clone(), binding, &draper.joints)?);
+        let worn = Arc::new(draper.preprocessor.finish(garment.clone(), binding, &draper.joints)?);
         let rest = Arc::new(RestGarment::new(&garment.rest));
         let operators = self.operators(draper, source, mesh)?;
         let tensors = garment_tensors(&worn, &operators, &draper.dimensions(), &draper.device)?;
@@ -194,12 +194,12 @@ impl KnownGarments {
         Ok((found, PieceTimes { preparation, embedding: embedding_ms }, was_stored))
     }
 
-    fn binding(&self, draper: &Draper, source: &SourceGarment, mesh: Key) -> Result<Binding, LibraryError> {
-        let (garment, recipe) = (&source.garment, &draper.recipe);
-        let joints = recipe.body.joint_count();
-        let make = || Binding::new(garment, &recipe.body, &recipe.binding);
+    fn binding(&self, draper: &Draper, source: &SourceGarment, mesh: Key) -> Result<Binding, DatasetError> {
+        let (garment, preprocessor) = (&source.garment, &draper.preprocessor);
+        let joints = preprocessor.body.joint_count();
+        let make = || Binding::new(garment, &preprocessor.body, &preprocessor.binding);
         let Some((cache, body)) = &self.cache else { return Ok(make()) };
-        let key = binding_key(mesh, *body, garment.category, &recipe.binding);
+        let key = binding_key(mesh, *body, garment.category, &preprocessor.binding);
         if let Some((_, binding)) = get_binding(cache, key, joints) {
             return Ok(binding);
         }
@@ -213,10 +213,10 @@ impl KnownGarments {
         draper: &Draper,
         source: &SourceGarment,
         mesh: Key,
-    ) -> Result<SurfaceOperators, LibraryError> {
-        let make = || draper.recipe.operators(&source.garment.name, &source.garment.rest);
+    ) -> Result<SurfaceOperators, DatasetError> {
+        let make = || draper.preprocessor.operators(&source.garment.name, &source.garment.rest);
         let Some((cache, _)) = &self.cache else { return make() };
-        let key = operators_key(mesh, draper.recipe.eigen_count);
+        let key = operators_key(mesh, draper.preprocessor.eigen_count);
         if let Some(operators) = get_operators(cache, key) {
             return Ok(operators);
         }
@@ -232,7 +232,7 @@ impl KnownGarments {
         mesh: Key,
     ) -> Result<(GarmentEmbedding, bool), DraperError> {
         let Some((cache, _)) = &self.cache else { return Ok((draper.model.encode(tensors), false)) };
-        let key = embedding_key(mesh, draper.trained.checksum(), draper.recipe.eigen_count);
+        let key = embedding_key(mesh, draper.trained.checksum(), draper.preprocessor.eigen_count);
         let (vertices, width) = (tensors.vertex_count(), draper.trained.config.model.embedding);
         if let Some(StoredEmbedding { vertex, garment }) = get_embedding(cache, key, vertices)
             && garment.len() == width

@@ -3,7 +3,7 @@
 use super::acceleration::{Acceleration, acceleration};
 use super::refine::Refinement;
 use super::{Drape, Draper, DraperError, Outfit, PhaseTimes, Smoothing};
-use crate::dataset::LibraryError;
+use crate::dataset::DatasetError;
 use crate::score::{DrapedGarment, Score, ScoreDistance, score};
 use crate::system::paths::{lossy, lossy_option};
 use clothcombo_data::asset::Category;
@@ -197,7 +197,7 @@ impl Drape {
     /// # Errors
     /// When a value overflows.
     pub fn score(&self, draper: &Draper, outfit: &Outfit, stage: Stage) -> Result<Score, DraperError> {
-        let refused = |e: &dyn std::fmt::Display| LibraryError::Data(e.to_string());
+        let refused = |e: &dyn std::fmt::Display| DatasetError::Data(e.to_string());
         let body = TriMesh::new(self.body.clone(), draper.body().faces.to_vec()).map_err(|e| refused(&e))?;
         let garments: Vec<DrapedGarment> = outfit
             .pieces

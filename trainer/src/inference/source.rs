@@ -2,7 +2,7 @@
 
 use super::error::DraperError;
 use crate::config::Config;
-use crate::dataset::{LibraryError, Maker, Origin};
+use crate::dataset::{DatasetError, GarmentLoader, GarmentSource};
 use crate::score::misplaced;
 use clothcombo_data::asset::{Body, Category, Garment, Provenance};
 use clothcombo_data::check::MeshMeasures;
@@ -45,11 +45,11 @@ impl SourceGarment {
     /// # Errors
     /// Naming the file, when it is no mesh, or no garment of this body.
     pub fn read(path: &Path, body: &Body, always_fit: Option<bool>) -> Result<Self, DraperError> {
-        let given = load_mesh(path).map_err(LibraryError::data)?;
+        let given = load_mesh(path).map_err(DatasetError::data)?;
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let placed = match always_fit {
             Some(true) => None,
-            Some(false) => Some(given.to_tri_mesh(path).map_err(LibraryError::data)?),
+            Some(false) => Some(given.to_tri_mesh(path).map_err(DatasetError::data)?),
             None => given.to_tri_mesh(path).ok().filter(|mesh| is_clean(mesh) && is_on_body(mesh, body)),
         };
         if let Some(rest) = placed {
@@ -100,40 +100,40 @@ fn followed(given: &PolygonMesh, vertex_of_file: &[Option<u32>]) -> Vec<u32> {
 }
 
 /// Finds garments by name: those of the given folders and those a model was trained on.
-pub struct Closet {
+pub struct GarmentCatalog {
     names: Vec<String>,
-    origins: HashMap<String, Origin>,
+    sources: HashMap<String, GarmentSource>,
 }
 
-impl Closet {
+impl GarmentCatalog {
     /// `folders` first, then what `config` names; of two garments of one name the first counts. What the configuration names
     /// but is not there is left out: a model may be used without the garments it was trained on.
     ///
     /// # Errors
     /// When one of `folders` cannot be listed.
     pub fn new(folders: &[PathBuf], config: &Config) -> Result<Self, DraperError> {
-        let mut closet = Self { names: Vec::new(), origins: HashMap::new() };
+        let mut catalog = Self { names: Vec::new(), sources: HashMap::new() };
         for folder in folders {
-            let listed = list_garment_folder(folder).map_err(LibraryError::data)?;
-            closet.extend(listed.into_iter().map(Origin::File));
+            let listed = list_garment_folder(folder).map_err(DatasetError::data)?;
+            catalog.extend(listed.into_iter().map(GarmentSource::File));
         }
         for source in &config.data.garments {
-            if let Ok(origins) = Origin::list(std::slice::from_ref(source)) {
-                closet.extend(origins);
+            if let Ok(sources) = GarmentSource::list(std::slice::from_ref(source)) {
+                catalog.extend(sources);
             }
         }
-        Ok(closet)
+        Ok(catalog)
     }
 
-    fn extend(&mut self, origins: impl IntoIterator<Item = Origin>) {
-        for origin in origins {
+    fn extend(&mut self, sources: impl IntoIterator<Item = GarmentSource>) {
+        for origin in sources {
             let name = match &origin {
-                Origin::File(listed) => listed.name.clone(),
-                Origin::Generated { category, seed, .. } => GarmentGenerator::name(*category, *seed),
+                GarmentSource::File(listed) => listed.name.clone(),
+                GarmentSource::Generated { category, seed, .. } => GarmentGenerator::name(*category, *seed),
             };
-            if !self.origins.contains_key(&name) {
+            if !self.sources.contains_key(&name) {
                 self.names.push(name.clone());
-                self.origins.insert(name, origin);
+                self.sources.insert(name, origin);
             }
         }
     }
@@ -158,16 +158,16 @@ impl Closet {
         // A word without a dot or a slash is a name, not a file that happens to be missing.
         let is_path = path.is_file()
             || name.contains('/')
-            || (path.extension().is_some() && !self.origins.contains_key(name));
+            || (path.extension().is_some() && !self.sources.contains_key(name));
         if is_path {
             return SourceGarment::read(path, body, always_fit);
         }
-        let origin = self.origins.get(name).ok_or_else(|| DraperError::UnknownGarment {
+        let origin = self.sources.get(name).ok_or_else(|| DraperError::UnknownGarment {
             name: name.to_owned(),
             known: self.names.clone(),
         })?;
-        let maker = Maker::new(body, std::slice::from_ref(origin))?;
-        let Origin::File(listed) = origin else {
+        let maker = GarmentLoader::new(body, std::slice::from_ref(origin))?;
+        let GarmentSource::File(listed) = origin else {
             return Ok(SourceGarment::new(maker.make(origin)?));
         };
         let made = maker.make(origin);
@@ -183,7 +183,7 @@ impl Closet {
         check_place(&listed.path, &garment.rest, body)?;
         let mut source = SourceGarment::new(garment);
         // Polygons as the file has them.
-        source.given = load_mesh(&listed.path).map_err(LibraryError::data)?;
+        source.given = load_mesh(&listed.path).map_err(DatasetError::data)?;
         source.path = Some(listed.path.clone());
         Ok(source)
     }

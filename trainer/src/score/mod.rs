@@ -1,4 +1,4 @@
-//! The score of anyone's draped garments, as JSON contract and library: every energy in the paper's printed form
+//! The score of anyone's draped garments, as JSON contract and dataset: every energy in the paper's printed form
 //! ([`EnergySettings::printed`]), penetration of the body, exact triangle intersections, order of the layers.
 //!
 //! Nothing is measured here: energies come from [`SceneEnergy::raw`], intersections from [`IntersectionReport`]. This file
@@ -101,7 +101,7 @@ pub struct GarmentScore {
 /// Contact of one garment with the body and with itself.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PenetrationScore {
-    /// Share of the vertices inside the body, by the distance of [`ScoreSettings::distance`].
+    /// RankPartition of the vertices inside the body, by the distance of [`ScoreSettings::distance`].
     pub vertices_inside: f64,
     /// Largest depth of a vertex [mm]; 0 when none is inside.
     pub max_depth_mm: f64,
@@ -124,7 +124,7 @@ pub struct LayerScore {
     pub layer_distance: f64,
     /// Pairs of triangles that share a point. Exact.
     pub triangle_pairs: usize,
-    /// Share of the outer vertices within 5 cm of the inner garment whose gap to its nearest vertex is negative.
+    /// RankPartition of the outer vertices within 5 cm of the inner garment whose gap to its nearest vertex is negative.
     pub order_violations: f64,
 }
 

@@ -26,7 +26,7 @@ pub struct KeptBytes {
     pub device: usize,
 }
 
-/// Limits on what is kept, shared by any number of [`Recent`] sets. Values that someone still uses count, and are dropped
+/// Limits on what is kept, shared by any number of [`LruCache`] sets. Values that someone still uses count, and are dropped
 /// once they are no longer used: together never more is kept than the limit, or what is in use and the newest value.
 #[derive(Debug)]
 pub struct MemoryBudget {
@@ -134,14 +134,14 @@ impl Store {
 
 /// Values by index, of a set of which only those used last are kept.
 #[derive(Debug)]
-pub struct Recent<T> {
+pub struct LruCache<T> {
     budget: Arc<MemoryBudget>,
     set: u64,
     residence: Residence,
     values: PhantomData<fn() -> T>,
 }
 
-impl<T: Any + Send + Sync> Recent<T> {
+impl<T: Any + Send + Sync> LruCache<T> {
     /// An empty set within `budget`.
     pub fn new(budget: &Arc<MemoryBudget>, residence: Residence) -> Self {
         let mut store = budget.lock();
@@ -182,7 +182,7 @@ impl<T: Any + Send + Sync> Recent<T> {
     }
 }
 
-impl<T> Drop for Recent<T> {
+impl<T> Drop for LruCache<T> {
     fn drop(&mut self) {
         let mut store = self.budget.lock();
         let own: Vec<Place> = store.entries.keys().copied().filter(|(set, _)| *set == self.set).collect();
@@ -200,13 +200,13 @@ mod tests {
         MemoryBudget::new(KeptBytes { total, device })
     }
 
-    fn kept(set: &Recent<usize>, indices: impl IntoIterator<Item = usize>) -> Vec<Option<usize>> {
+    fn kept(set: &LruCache<usize>, indices: impl IntoIterator<Item = usize>) -> Vec<Option<usize>> {
         indices.into_iter().map(|i| set.get(i).map(|value| *value)).collect()
     }
 
     #[test]
     fn the_least_recently_used_goes_first() {
-        let recent = Recent::new(&budget(30, 0), Residence::Host);
+        let recent = LruCache::new(&budget(30, 0), Residence::Host);
         for i in 0..3 {
             recent.insert(i, i * 10, 10);
         }
@@ -223,8 +223,8 @@ mod tests {
     #[test]
     fn sets_share_a_limit_and_the_device_has_its_own() {
         let budget = budget(50, 20);
-        let host = Recent::new(&budget, Residence::Host);
-        let device = Recent::new(&budget, Residence::Device);
+        let host = LruCache::new(&budget, Residence::Host);
+        let device = LruCache::new(&budget, Residence::Device);
         for i in 0..4 {
             host.insert(i, i, 10);
             device.insert(i, i, 10);
@@ -240,7 +240,7 @@ mod tests {
     #[test]
     fn what_is_in_use_counts_and_stays_until_it_is_not() {
         let budget = budget(20, 0);
-        let recent = Recent::new(&budget, Residence::Host);
+        let recent = LruCache::new(&budget, Residence::Host);
         let held = [0, 1, 2].map(|i| recent.insert(i, i, 10));
         assert_eq!(budget.kept().total, 30, "nothing would be freed");
         drop(held);

@@ -6,7 +6,7 @@ pub mod device;
 pub mod exact;
 pub mod lru_cache;
 pub mod memory;
-pub mod one_core;
 pub mod paths;
 pub mod prefetch;
+pub mod single_threaded;
 pub mod stop;

@@ -1,12 +1,12 @@
 //! How long a run will take: a few real steps of every stage, timed.
 
 use crate::config::Config;
-use crate::dataset::Library;
-use crate::inference::networks::{DrapeError, WardrobeTensors};
+use crate::dataset::Dataset;
+use crate::inference::networks::{DrapeError, TensorStore};
 use crate::training::learner::{Learner, new_optimizer};
+use crate::training::process_group::RankPartition;
 use crate::training::scenes::prepare_step;
 use crate::training::schedule::Schedule;
-use crate::training::world::Share;
 use burn::tensor::Device;
 use clothcombo_model::ClothCombo;
 use std::sync::Arc;
@@ -28,13 +28,13 @@ pub struct StageTime {
 /// When a scene cannot be computed.
 pub fn time_stages(
     config: &Config,
-    library: &Arc<Library>,
+    dataset: &Arc<Dataset>,
     device: &Device,
     steps: u64,
 ) -> Result<Vec<StageTime>, DrapeError> {
     let device = device.clone().autodiff();
-    let model = ClothCombo::new(&config.model, &library.dimensions(), config.seed, &device)?;
-    let tensors = WardrobeTensors::new(library.clone(), library.dimensions(), &device);
+    let model = ClothCombo::new(&config.model, &dataset.dimensions(), config.seed, &device)?;
+    let tensors = TensorStore::new(dataset.clone(), dataset.dimensions(), &device);
     let mut learner = Learner::new(model, new_optimizer(&config.optimizer), &config.optimizer);
     let schedule = Schedule::new(config);
     let mut times = Vec::with_capacity(config.stages.len());
@@ -45,7 +45,7 @@ pub fn time_stages(
         for i in 0..=timed {
             let step = first + i.saturating_sub(1) * stage.steps / timed.max(1);
             let start = Instant::now();
-            let scenes = prepare_step(library, config, &schedule, step, Share::WHOLE)?;
+            let scenes = prepare_step(dataset, config, &schedule, step, RankPartition::WHOLE)?;
             let prepared = Instant::now();
             // A rate of zero would be no step; this one moves nothing that matters.
             learner.step(&tensors, &scenes, stage.trains, 1e-12, false)?;

@@ -7,8 +7,8 @@
 //! The scene is kept by its numbers, not by its seed alone: it replays even where the generator has changed since.
 
 use crate::config::{Config, ConfigError, Injected, Trains, parse, to_toml};
-use crate::dataset::{BodyDraw, Library, PreparedScene, SceneDraw, prepare};
-use crate::inference::networks::WardrobeTensors;
+use crate::dataset::{BodySample, Dataset, PreparedScene, SceneSample, prepare};
+use crate::inference::networks::TensorStore;
 use crate::run::checkpoint::{checksum, save_model};
 use crate::system::exact::Exact;
 use crate::training::learner::{Learner, StepOutcome, new_optimizer};
@@ -79,7 +79,7 @@ pub struct Incident {
     pub run_progress: Exact,
     /// Adam's step size.
     pub learning_rate: Exact,
-    /// Share of the full pose.
+    /// RankPartition of the full pose.
     pub pose_scale: Exact,
     /// What a test broke on purpose.
     pub injected: Option<Injected>,
@@ -142,7 +142,7 @@ pub struct Circumstances<'a> {
     /// Configuration of the run.
     pub config: &'a Config,
     /// Its data.
-    pub library: &'a Library,
+    pub dataset: &'a Dataset,
     /// Steps done, this one included.
     pub step: u64,
     /// The schedule at this step.
@@ -183,7 +183,7 @@ impl Incident {
             injected: around.injected,
             loss: outcome.loss.into(),
             gradient_norm: outcome.gradient_norm.into(),
-            scenes: describe(around.library, scenes, outcome),
+            scenes: describe(around.dataset, scenes, outcome),
             weights,
             weights_checksum,
             config: to_toml(around.config).map_err(|e| unusable(e.to_string()))?,
@@ -229,28 +229,28 @@ impl Incident {
         &self,
         path: &Path,
         config: &Config,
-        library: &Arc<Library>,
+        dataset: &Arc<Dataset>,
         device: &Device,
     ) -> Result<Self, IncidentError> {
         let device = device.clone().autodiff();
-        let model = self.model(path, config, library, &device)?;
+        let model = self.model(path, config, dataset, &device)?;
         let mut scenes = Vec::with_capacity(self.scenes.len());
         for scene in &self.scenes {
-            let draw = scene.draw(library, path)?;
-            let prepared = prepare(library, &config.losses, draw, self.run_progress.0);
+            let draw = scene.draw(dataset, path)?;
+            let prepared = prepare(dataset, &config.losses, draw, self.run_progress.0);
             scenes.push(prepared.map_err(crate::inference::networks::DrapeError::from)?);
         }
         if self.injected == Some(Injected::Position) {
             spoil_position(&mut scenes);
         }
-        let tensors = WardrobeTensors::new(library.clone(), library.dimensions(), &device);
+        let tensors = TensorStore::new(dataset.clone(), dataset.dimensions(), &device);
         let mut learner = Learner::new(model, new_optimizer(&config.optimizer), &config.optimizer);
         let spoil = self.injected == Some(Injected::Gradient);
         let outcome = learner.step(&tensors, &scenes, self.trains, self.learning_rate.0, spoil)?;
         Ok(Self {
             loss: outcome.loss.into(),
             gradient_norm: outcome.gradient_norm.into(),
-            scenes: describe(library, &scenes, &outcome),
+            scenes: describe(dataset, &scenes, &outcome),
             ..self.clone()
         })
     }
@@ -259,7 +259,7 @@ impl Incident {
         &self,
         path: &Path,
         config: &Config,
-        library: &Library,
+        dataset: &Dataset,
         device: &Device,
     ) -> Result<ClothCombo, IncidentError> {
         let file = path.with_file_name(&self.weights);
@@ -269,7 +269,7 @@ impl Incident {
             return Err(unusable("does not match its checksum".into()));
         }
         let record = ModuleRecord::load(&file).map_err(|e| unusable(e.to_string()))?;
-        ClothCombo::new(&config.model, &library.dimensions(), 0, device)
+        ClothCombo::new(&config.model, &dataset.dimensions(), 0, device)
             .map_err(|e| unusable(e.to_string()))?
             .try_load_record(record)
             .map_err(|e| unusable(e.to_string()))
@@ -301,17 +301,17 @@ pub(crate) fn spoil_position(scenes: &mut [PreparedScene]) {
     }
 }
 
-fn describe(library: &Library, scenes: &[PreparedScene], outcome: &StepOutcome) -> Vec<IncidentScene> {
+fn describe(dataset: &Dataset, scenes: &[PreparedScene], outcome: &StepOutcome) -> Vec<IncidentScene> {
     let energies = |values: &TermMap<Option<f64>>| -> BTreeMap<String, Exact> {
         Term::ALL.into_iter().filter_map(|t| Some((t.name().to_owned(), Exact(values[t]?)))).collect()
     };
     let of_scene = |(scene, outputs): (&PreparedScene, &Vec<_>)| {
         let garments = scene.draw.garments.iter().map(|&index| {
-            let card = library.wardrobe.card(index);
+            let card = dataset.garments.info(index);
             IncidentGarment { index, name: card.name.clone(), vertices: card.vertices }
         });
         let bodies = scene.draw.bodies.iter().zip(outputs).map(
-            |(body, output): (&BodyDraw, &clothcombo_physics::autodiff::SceneLossOutput)| {
+            |(body, output): (&BodySample, &clothcombo_physics::autodiff::SceneLossOutput)| {
                 let value = output.value();
                 IncidentBody {
                     shape: body.shape.iter().copied().map(Exact).collect(),
@@ -333,15 +333,15 @@ fn describe(library: &Library, scenes: &[PreparedScene], outcome: &StepOutcome) 
 
 impl IncidentScene {
     /// The scene as it was drawn.
-    fn draw(&self, library: &Library, path: &Path) -> Result<SceneDraw, IncidentError> {
+    fn draw(&self, dataset: &Dataset, path: &Path) -> Result<SceneSample, IncidentError> {
         let garments = self.garments.iter().map(|garment| {
             let changed = |reason: String| IncidentError::DataChanged { name: garment.name.clone(), reason };
-            let is_it = |i: usize| library.wardrobe.card(i).name == garment.name;
+            let is_it = |i: usize| dataset.garments.info(i).name == garment.name;
             let index = Some(garment.index)
-                .filter(|&i| i < library.wardrobe.len() && is_it(i))
-                .or_else(|| (0..library.wardrobe.len()).find(|&i| is_it(i)))
+                .filter(|&i| i < dataset.garments.len() && is_it(i))
+                .or_else(|| (0..dataset.garments.len()).find(|&i| is_it(i)))
                 .ok_or_else(|| changed("is not in the wardrobe any more".into()))?;
-            match library.wardrobe.card(index).vertices {
+            match dataset.garments.info(index).vertices {
                 found if found == garment.vertices => Ok(index),
                 found => Err(changed(format!("has {found} vertices now, it had {}", garment.vertices))),
             }
@@ -349,16 +349,16 @@ impl IncidentScene {
         let wrong = |reason: &str| IncidentError::Unusable { path: path.to_owned(), reason: reason.into() };
         let bodies = self.bodies.iter().map(|body| {
             let pose = Pose { rotations: body.pose.iter().map(|r| r.map(|v| v.0)).collect() };
-            if body.shape.len() != library.shape_count || pose.rotations.len() > library.body.joint_count() {
+            if body.shape.len() != dataset.shape_count || pose.rotations.len() > dataset.body.joint_count() {
                 return Err(wrong("has a shape or pose that the body of the run does not take"));
             }
             let shape: Vec<f64> = body.shape.iter().map(|v| v.0).collect();
             match shape.iter().chain(pose.rotations.as_flattened()).all(|v| v.is_finite()) {
-                true => Ok(BodyDraw { shape, pose }),
+                true => Ok(BodySample { shape, pose }),
                 false => Err(wrong("has a shape or pose that is not finite")),
             }
         });
-        Ok(SceneDraw {
+        Ok(SceneSample {
             garments: garments.collect::<Result<_, _>>()?,
             bodies: bodies.collect::<Result<_, _>>()?,
             repulsion_sample: self.repulsion_sample,

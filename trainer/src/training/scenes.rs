@@ -1,10 +1,10 @@
 //! The scenes of a step, and those of the next steps in advance.
 
+use super::process_group::RankPartition;
 use super::schedule::Schedule;
-use super::world::Share;
 use crate::config::Config;
-use crate::dataset::{Library, LibraryError, Plan, PreparedScene, SCENES_AHEAD, draw_training, prepare};
-use crate::inference::networks::{DrapeError, WardrobeTensors};
+use crate::dataset::{Dataset, DatasetError, Plan, PreparedScene, SCENES_AHEAD, prepare, sample_training};
+use crate::inference::networks::{DrapeError, TensorStore};
 use crate::system::prefetch::Prefetch;
 use std::sync::Arc;
 
@@ -16,18 +16,18 @@ pub type Scenes = Prefetch<Vec<PreparedScene>, DrapeError>;
 /// # Errors
 /// When a garment cannot be read.
 pub fn prepare_step(
-    library: &Library,
+    dataset: &Dataset,
     config: &Config,
     schedule: &Schedule,
     step: u64,
-    share: Share,
-) -> Result<Vec<PreparedScene>, LibraryError> {
+    share: RankPartition,
+) -> Result<Vec<PreparedScene>, DatasetError> {
     let at = schedule.at(step);
     let stage = &config.stages[at.stage];
     let plan = Plan { stage, progress: at.stage_progress };
     let scenes = (0..stage.accumulate).filter(|scene| share.has(*scene));
-    let draws = scenes.map(|i| draw_training(library, config.seed, step, i, plan));
-    draws.map(|draw| prepare(library, &config.losses, draw, at.run_progress)).collect()
+    let draws = scenes.map(|i| sample_training(dataset, config.seed, step, i, plan));
+    draws.map(|draw| prepare(dataset, &config.losses, draw, at.run_progress)).collect()
 }
 
 /// Starts preparing the scenes in `share` from `first_step` to the end of the schedule, with the tensors of their garments.
@@ -35,15 +35,15 @@ pub fn prepare_step(
 /// # Errors
 /// When the system refuses another thread.
 pub fn prefetch(
-    tensors: Arc<WardrobeTensors>,
+    tensors: Arc<TensorStore>,
     config: Arc<Config>,
     first_step: u64,
-    share: Share,
+    share: RankPartition,
 ) -> std::io::Result<Scenes> {
     let schedule = Schedule::new(&config);
     let steps = first_step..schedule.total_steps();
     Prefetch::start("prepare-scenes", steps, SCENES_AHEAD, move |step| {
-        let scenes = prepare_step(tensors.library(), &config, &schedule, step, share)?;
+        let scenes = prepare_step(tensors.dataset(), &config, &schedule, step, share)?;
         scenes.iter().try_for_each(|scene| tensors.warm(scene, config.model.eigen_count))?;
         Ok(scenes)
     })

@@ -23,7 +23,7 @@ pub struct ScheduleAt {
     pub run_progress: f64,
     /// Adam's step size.
     pub learning_rate: f64,
-    /// Share of the full pose.
+    /// RankPartition of the full pose.
     pub pose_scale: f64,
 }
 

@@ -2,10 +2,10 @@
 
 use crate::config::Config;
 use crate::dataset::DataSizes;
-use crate::dataset::Library;
+use crate::dataset::Dataset;
 use crate::evaluation::ValidationSet;
 use crate::evaluation::samples;
-use crate::inference::networks::{Networks, WardrobeTensors};
+use crate::inference::networks::{Networks, TensorStore};
 use crate::run::checkpoint::{Best, Checkpoint, CheckpointState, Snapshot};
 use crate::run::folder::RunDir;
 use crate::run::memory::MemoryEstimate;
@@ -15,8 +15,8 @@ use crate::system::memory::Memory;
 use crate::training::average::Average;
 use crate::training::guard::Guard;
 use crate::training::learner::Learner;
+use crate::training::process_group::{ProcessGroup, ProcessGroupError, RankPartition};
 use crate::training::schedule::Schedule;
-use crate::training::world::{Share, World, WorldError};
 use burn::module::Module;
 use miette::Report;
 use std::path::PathBuf;
@@ -32,16 +32,16 @@ pub use step::StepReport;
 pub struct Session {
     run: RunDir,
     config: Arc<Config>,
-    library: Arc<Library>,
+    dataset: Arc<Dataset>,
     schedule: Schedule,
-    tensors: Arc<WardrobeTensors>,
+    tensors: Arc<TensorStore>,
     validation: ValidationSet,
     learner: Learner,
     average: Option<Average>,
     guard: Guard,
     best: Option<Best>,
     step: u64,
-    world: Rc<World>,
+    world: Rc<ProcessGroup>,
 }
 
 impl Session {
@@ -49,10 +49,10 @@ impl Session {
     ///
     /// # Errors
     /// When they cannot share the scenes of every stage equally.
-    pub fn shared_in(mut self, world: Rc<World>) -> Result<Self, WorldError> {
+    pub fn shared_in(mut self, world: Rc<ProcessGroup>) -> Result<Self, ProcessGroupError> {
         let size = world.share().size;
         match self.schedule.stages().iter().find(|stage| stage.accumulate % size != 0) {
-            Some(stage) => Err(WorldError::UnequalShares {
+            Some(stage) => Err(ProcessGroupError::UnequalShares {
                 stage: stage.name.clone(),
                 accumulate: stage.accumulate,
                 size,
@@ -65,13 +65,13 @@ impl Session {
     }
 
     /// Which scenes of a step this process computes.
-    pub fn share(&self) -> Share {
+    pub fn share(&self) -> RankPartition {
         self.world.share()
     }
 
     /// Whether this process writes and prints.
-    pub fn leads(&self) -> bool {
-        self.world.leads()
+    pub fn is_rank_zero(&self) -> bool {
+        self.world.is_rank_zero()
     }
 
     /// Steps done.
@@ -91,19 +91,19 @@ impl Session {
         self.config.clone()
     }
     /// The wardrobe.
-    pub fn library(&self) -> &Arc<Library> {
-        &self.library
+    pub fn dataset(&self) -> &Arc<Dataset> {
+        &self.dataset
     }
     /// Memory the run is expected to use; `None` where the system does not tell what is in use already.
     pub fn memory_estimate(&self) -> Option<MemoryEstimate> {
-        let (sizes, model) = (DataSizes::of(&self.library), self.learner.model());
+        let (sizes, model) = (DataSizes::of(&self.dataset), self.learner.model());
         let on_processor = model.devices().iter().all(is_processor);
         let streams = self.config.data.cache.folder.is_some();
         let estimate = MemoryEstimate::new(&self.config, &sizes, model.num_params(), on_processor);
         Some(estimate.after_start(Memory::now()?.resident, streams))
     }
     /// The constant tensors of the wardrobe.
-    pub fn tensors(&self) -> &Arc<WardrobeTensors> {
+    pub fn tensors(&self) -> &Arc<TensorStore> {
         &self.tensors
     }
     /// Scores the fixed validation scenes.
@@ -111,7 +111,7 @@ impl Session {
     /// # Errors
     /// When a scene cannot be draped.
     pub fn validate(&self) -> Result<ValidationReport, Report> {
-        Ok(self.validation.score(&self.library, &self.networks())?)
+        Ok(self.validation.score(&self.dataset, &self.networks())?)
     }
 
     /// Takes note of a validation at the current step; whether it is the best so far.
@@ -136,7 +136,7 @@ impl Session {
     pub fn draw_sample(&self) -> Result<PathBuf, Report> {
         let path = self.run.sample(self.step);
         let count = self.config.output.sample_scenes;
-        samples::draw(&self.library, &self.validation, &self.networks(), count, &path)?;
+        samples::draw(&self.dataset, &self.validation, &self.networks(), count, &path)?;
         Ok(path)
     }
 
@@ -145,7 +145,7 @@ impl Session {
     /// # Errors
     /// When it cannot be written; earlier checkpoints are untouched.
     pub fn save(&self) -> Result<PathBuf, Report> {
-        let mut state = CheckpointState::of(&self.library, self.step);
+        let mut state = CheckpointState::of(&self.dataset, self.step);
         state.best = self.best;
         state.incidents = self.guard.incidents();
         let snapshot = Snapshot {

@@ -4,8 +4,8 @@ use super::scenes::prefetch;
 use crate::run::event::{Observer, TrainEvent};
 use crate::system::stop::StopFlag;
 use crate::training::guard::Verdict;
+use crate::training::process_group::RankPartition;
 use crate::training::session::Session;
-use crate::training::world::Share;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use std::time::Instant;
 
@@ -21,7 +21,7 @@ pub fn train(
 ) -> Result<(), Report> {
     let mut kept = session.step();
     let result = run(session, observers, stop, &mut kept);
-    if result.is_err() && session.leads() && session.step() > kept {
+    if result.is_err() && session.is_rank_zero() && session.step() > kept {
         let step = session.step();
         match session.save() {
             Ok(path) => tracing::warn!("step {step} is saved as {}: continue with --resume", path.display()),
@@ -46,7 +46,7 @@ fn run(
     let total_steps = schedule.total_steps();
 
     tell(&TrainEvent::Started { step: first_step, total_steps })?;
-    if first_step == 0 && session.leads() {
+    if first_step == 0 && session.is_rank_zero() {
         tell(&TrainEvent::Validated { step: 0, report: &session.validate()?, best: None })?;
     }
     let (tensors, config) = (session.tensors().clone(), session.shared_config());
@@ -85,10 +85,10 @@ fn run(
             }
         }
         // Alone nobody has to agree: a request that came since counts for this step.
-        let stopping = report.stopping || (session.share() == Share::WHOLE && stop.requested());
+        let stopping = report.stopping || (session.share() == RankPartition::WHOLE && stop.requested());
         let due = |every: u64| every > 0 && done % every == 0;
         // The others go on to the next step, where they wait for the leader.
-        if session.leads() {
+        if session.is_rank_zero() {
             let mut is_best = false;
             if at.last_of_stage || due(validate_every) {
                 let scores = session.validate()?;

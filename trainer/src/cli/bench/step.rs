@@ -140,8 +140,8 @@ fn made_up(arguments: &Arguments) -> Result<Vec<Measured>, Report> {
     for case in cases {
         let config = case.config(&arguments.overrides)?;
         let case = case.of_config(&config);
-        let library = Arc::new(load_under_bar(&config)?);
-        let mut subject = Subject::new(config, library, 0, &arguments.device.device())?;
+        let dataset = Arc::new(load_under_bar(&config)?);
+        let mut subject = Subject::new(config, dataset, 0, &arguments.device.device())?;
         let name =
             std::iter::once(case.name()).chain(arguments.overrides.iter().cloned()).collect::<Vec<_>>();
         measured.push(measure(&mut subject, name.join(", "), Some(case), arguments)?);
@@ -188,9 +188,9 @@ fn stages(arguments: &Arguments, config: Config) -> Result<Vec<Measured>, Report
             names.len()
         ));
     }
-    let library = Arc::new(load_under_bar(&config)?);
+    let dataset = Arc::new(load_under_bar(&config)?);
     let stage = |index: usize| {
-        let mut subject = Subject::new(config.clone(), library.clone(), index, &arguments.device.device())?;
+        let mut subject = Subject::new(config.clone(), dataset.clone(), index, &arguments.device.device())?;
         measure(&mut subject, names[index].clone(), None, arguments)
     };
     chosen.into_iter().map(stage).collect()

@@ -2,7 +2,7 @@
 
 use super::HeldOut;
 use crate::config::PoseConfig;
-use crate::dataset::LibraryError;
+use crate::dataset::DatasetError;
 use clothcombo_data::asset::{Motion, Pose, Provenance};
 use rand::RngExt;
 use rand::distr::Distribution;
@@ -94,12 +94,12 @@ fn is_named(clip: &str, names: &[String]) -> bool {
 }
 
 /// Whether every name of the configuration fits a clip, and no clip is for two things.
-fn check_names(clips: &[Motion], config: &PoseConfig, folder: &Path) -> Result<(), LibraryError> {
+fn check_names(clips: &[Motion], config: &PoseConfig, folder: &Path) -> Result<(), DatasetError> {
     let sets = [("validation_clips", &config.validation_clips), ("test_clips", &config.test_clips)];
     for (key, names) in sets {
         let fits = |name: &&String| clips.iter().any(|clip| clip.name.contains(name.as_str()));
         if let Some(name) = names.iter().find(|name| !fits(name)) {
-            return Err(LibraryError::UnknownClip {
+            return Err(DatasetError::UnknownClip {
                 key,
                 folder: folder.to_owned(),
                 name: name.clone(),
@@ -110,7 +110,7 @@ fn check_names(clips: &[Motion], config: &PoseConfig, folder: &Path) -> Result<(
     let in_both = |clip: &&Motion| sets.iter().all(|(_, names)| is_named(&clip.name, names));
     match clips.iter().find(in_both) {
         None => Ok(()),
-        Some(clip) => Err(LibraryError::ClipOfTwoSets { clip: clip.name.clone() }),
+        Some(clip) => Err(DatasetError::ClipOfTwoSets { clip: clip.name.clone() }),
     }
 }
 
@@ -137,7 +137,7 @@ impl Frames {
     /// # Errors
     /// Naming `folder`, when a clip of the configuration is missing or named twice, nothing is left to train on, nothing is held
     /// out, or the clips' lengths in time cannot be compared.
-    pub fn split(clips: &[Motion], config: &PoseConfig, folder: &Path) -> Result<Self, LibraryError> {
+    pub fn split(clips: &[Motion], config: &PoseConfig, folder: &Path) -> Result<Self, DatasetError> {
         check_names(clips, config, folder)?;
         let (mut train, mut windows) = (Vec::new(), Vec::new());
         let (mut validation, mut test) = (Vec::new(), Vec::new());
@@ -170,7 +170,7 @@ impl Frames {
         let trained: usize = train.iter().map(|clip| clip.poses.len()).sum();
         if trained == 0 || windows.is_empty() {
             let (folder, held_out) = (folder.to_owned(), windows.len());
-            return Err(LibraryError::EmptySplit { folder, train: trained, held_out });
+            return Err(DatasetError::EmptySplit { folder, train: trained, held_out });
         }
         let training = Training::new(train).map_err(|_| frame_rates(folder, clips))?;
         let sources = clips.iter().map(|clip| clip.source.clone()).collect();
@@ -197,15 +197,15 @@ impl Frames {
     }
 
     /// A frame to train on.
-    pub fn draw_training(&self, rng: &mut ChaCha8Rng) -> &Pose {
+    pub fn sample_training(&self, rng: &mut ChaCha8Rng) -> &Pose {
         self.training.draw(rng)
     }
 }
 
 /// The frame rates between which the lengths of the clips in `folder` cannot be compared.
-fn frame_rates(folder: &Path, clips: &[Motion]) -> LibraryError {
+fn frame_rates(folder: &Path, clips: &[Motion]) -> DatasetError {
     let rates = || clips.iter().map(|clip| clip.frame_rate);
-    LibraryError::FrameRates {
+    DatasetError::FrameRates {
         folder: folder.to_owned(),
         lowest: rates().fold(f64::INFINITY, f64::min),
         highest: rates().fold(f64::NEG_INFINITY, f64::max),

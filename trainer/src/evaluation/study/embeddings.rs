@@ -44,15 +44,15 @@ pub fn ask(
     done: &(dyn Fn() + Sync),
 ) -> Result<EmbeddingStudy, DrapeError> {
     let draws = question.draws(subject);
-    let wardrobe = &subject.library.wardrobe;
+    let garments = &subject.dataset.garments;
     let embed = |garment: usize| -> Result<GarmentEmbedding, DrapeError> {
-        Ok(subject.model.encode(subject.tensors.garment(garment, &*wardrobe.garment(garment)?)?.as_ref()))
+        Ok(subject.model.encode(subject.tensors.garment(garment, &*garments.garment(garment)?)?.as_ref()))
     };
     let other = |garment: usize| {
-        let category = wardrobe.card(garment).category;
-        let turn = (1..wardrobe.len()).map(|step| (garment + step) % wardrobe.len());
+        let category = garments.info(garment).category;
+        let turn = (1..garments.len()).map(|step| (garment + step) % garments.len());
         turn.clone()
-            .find(|&g| wardrobe.card(g).category != category)
+            .find(|&g| garments.info(g).category != category)
             .or(turn.clone().next())
             .unwrap_or(garment)
     };
@@ -84,7 +84,7 @@ pub fn ask(
         KINDS.into_iter().zip(drapes).map(|(name, drapes)| MethodResult::new(name, &drapes)).collect()
     };
     Ok(EmbeddingStudy {
-        title: question.set.title(&subject.library),
+        title: question.set.title(&subject.dataset),
         set: question.set,
         scenes: draws.len(),
         collision: subject.collision_form(Term::BodyCollision),

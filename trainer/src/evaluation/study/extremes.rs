@@ -2,13 +2,13 @@
 
 use super::subject::Subject;
 use super::table::{Table, number, percent};
-use crate::dataset::{BodyDraw, HeldOut, PreparedScene, SceneDraw};
+use crate::dataset::{BodySample, HeldOut, PreparedScene, SceneSample};
 use crate::evaluation::certificates::{Dressing, OutfitResult};
 use crate::evaluation::hard_poses;
 use crate::inference::Draped;
 use crate::inference::networks::{DrapeError, Networks};
 use crate::run::spread::Spread;
-use crate::system::one_core::each_on_one_core;
+use crate::system::single_threaded::map_single_threaded;
 use clothcombo_data::asset::Pose;
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use clothcombo_physics::energy::Term;
@@ -32,7 +32,7 @@ pub struct Extreme {
     pub strain_ratio: f64,
     /// Farthest any vertex is from where skinning puts it [mm].
     pub farthest_mm: f64,
-    /// Share of scenes without a pair with the body or between garments after the post-process.
+    /// RankPartition of scenes without a pair with the body or between garments after the post-process.
     pub clear: f64,
     /// Deepest vertex after the post-process [mm], median over the scenes.
     pub depth_mm: f64,
@@ -94,9 +94,9 @@ pub fn ask(
     done: &(dyn Fn() + Sync),
 ) -> Result<Vec<Extreme>, Report> {
     let cases = cases();
-    let all: Vec<usize> = (0..subject.library.wardrobe.len()).collect();
+    let all: Vec<usize> = (0..subject.dataset.garments.len()).collect();
     let networks = subject.networks();
-    let dressing = Dressing::new(&subject.library, &subject.config.losses, Some(&networks));
+    let dressing = Dressing::new(&subject.dataset, &subject.config.losses, Some(&networks));
     let measured = |(case, index): (usize, usize)| {
         let draw = subject.draw([question, 1000 * case + index], &all, cases[case].layers, HeldOut::Windows);
         let scene = subject.prepare(cases[case].applied_to(draw))?;
@@ -106,20 +106,20 @@ pub fn ask(
     };
     // Those with the most layers, which take longest, come last and are begun first.
     let items = (0..cases.len()).flat_map(|case| (0..scenes).map(move |index| (case, index))).rev();
-    let mut outcomes = each_on_one_core(items.collect(), None, measured)?;
+    let mut outcomes = map_single_threaded(items.collect(), None, measured)?;
     let of_case = |case: Case| Extreme::of(case.name, outcomes.split_off(outcomes.len() - scenes));
     Ok(cases.into_iter().map(of_case).collect())
 }
 
 impl Case {
     /// `draw` with what is extreme.
-    fn applied_to(&self, draw: SceneDraw) -> SceneDraw {
+    fn applied_to(&self, draw: SceneSample) -> SceneSample {
         let body = &draw.bodies[0];
-        let body = BodyDraw {
+        let body = BodySample {
             shape: body.shape.iter().map(|b| self.shape.unwrap_or(*b)).collect(),
             pose: self.pose.clone().unwrap_or_else(|| body.pose.clone()),
         };
-        SceneDraw { bodies: vec![body], ..draw }
+        SceneSample { bodies: vec![body], ..draw }
     }
 }
 
@@ -132,7 +132,7 @@ fn measure(
 ) -> Result<Outcome, Report> {
     let draped = match networks.drape(scene) {
         Ok(draped) => draped,
-        Err(DrapeError::Library(error)) => return Err(error.into()),
+        Err(DrapeError::Dataset(error)) => return Err(error.into()),
         Err(DrapeError::Model(error)) => return Ok(Outcome::Refused(error.to_string())),
     };
     if !draped.posed.as_flattened().iter().all(|v| v.is_finite()) {

@@ -1,7 +1,7 @@
 //! Pictures: orders, shapes, poses, growing stacks, different garments over the same ones.
 
 use super::subject::Subject;
-use crate::dataset::{BodyDraw, HeldOut, SceneDraw};
+use crate::dataset::{BodySample, HeldOut, SceneSample};
 use crate::evaluation::certificates::Dressing;
 use crate::evaluation::samples::picture_of;
 use crate::inference::Draped;
@@ -42,15 +42,15 @@ struct Studio<'a> {
 /// When a scene cannot be draped or resolved.
 pub fn draw(subject: &Subject, question: usize, done: &(dyn Fn() + Sync)) -> Result<Vec<Picture>, Report> {
     let networks = &subject.networks();
-    let dressing = Dressing::new(&subject.library, &subject.config.losses, Some(networks));
+    let dressing = Dressing::new(&subject.dataset, &subject.config.losses, Some(networks));
     let studio = Studio { subject, networks, dressing, question };
     let shirt = |n| subject.pick(&[Category::TShirt, Category::Top], n);
     let legs = |n| subject.pick(&[Category::Trousers, Category::Skirt], n);
     let skirt = |n| subject.pick(&[Category::Skirt, Category::Dress], n);
     let over = |n| subject.pick(&[Category::OpenShirt, Category::Dress], n);
     let three = [shirt(0), skirt(0), over(0)];
-    let t_pose = Pose::t_pose(subject.library.body.joint_count());
-    let mean = BodyDraw { shape: vec![0.0; subject.library.shape_count], pose: t_pose };
+    let t_pose = Pose::t_pose(subject.dataset.body.joint_count());
+    let mean = BodySample { shape: vec![0.0; subject.dataset.shape_count], pose: t_pose };
     let mut pictures = Vec::with_capacity(COUNT);
     let mut add = |name, caption: &str, image| {
         pictures.push(Picture { name, caption: caption.to_owned(), image });
@@ -70,7 +70,7 @@ pub fn draw(subject: &Subject, question: usize, done: &(dyn Fn() + Sync)) -> Res
     );
 
     let bodies = unlike((0..CANDIDATES).map(|i| studio.body(i)).collect());
-    let cells = bodies.iter().map(|b| (three.to_vec(), BodyDraw { pose: mean.pose.clone(), ..b.clone() }));
+    let cells = bodies.iter().map(|b| (three.to_vec(), BodySample { pose: mean.pose.clone(), ..b.clone() }));
     let numbers: Vec<String> = (1..=COLUMNS).map(|i| format!("body {i}")).collect();
     add(
         "shapes",
@@ -78,7 +78,8 @@ pub fn draw(subject: &Subject, question: usize, done: &(dyn Fn() + Sync)) -> Res
         studio.sheet(&cells.collect::<Vec<_>>(), &numbers)?,
     );
 
-    let cells = bodies.iter().map(|b| (three.to_vec(), BodyDraw { shape: mean.shape.clone(), ..b.clone() }));
+    let cells =
+        bodies.iter().map(|b| (three.to_vec(), BodySample { shape: mean.shape.clone(), ..b.clone() }));
     let numbers: Vec<String> = (1..=COLUMNS).map(|i| format!("pose {i}")).collect();
     add(
         "poses",
@@ -104,14 +105,14 @@ pub fn draw(subject: &Subject, question: usize, done: &(dyn Fn() + Sync)) -> Res
 }
 
 /// As many bodies as a sheet has columns: the first one, then always that whose pose is least like those before.
-fn unlike(mut bodies: Vec<BodyDraw>) -> Vec<BodyDraw> {
-    let difference = |a: &BodyDraw, b: &BodyDraw| -> f64 {
+fn unlike(mut bodies: Vec<BodySample>) -> Vec<BodySample> {
+    let difference = |a: &BodySample, b: &BodySample| -> f64 {
         let turned = a.pose.rotations.iter().flatten().zip(b.pose.rotations.iter().flatten());
         turned.map(|(a, b)| (a - b) * (a - b)).sum()
     };
     for taken in 1..COLUMNS.min(bodies.len()) {
         let (chosen, others) = bodies.split_at(taken);
-        let least = |b: &BodyDraw| chosen.iter().map(|c| difference(c, b)).fold(f64::INFINITY, f64::min);
+        let least = |b: &BodySample| chosen.iter().map(|c| difference(c, b)).fold(f64::INFINITY, f64::min);
         let farthest = (0..others.len()).max_by(|a, b| least(&others[*a]).total_cmp(&least(&others[*b])));
         bodies.swap(taken, taken + farthest.unwrap_or(0));
     }
@@ -123,11 +124,11 @@ impl Subject {
     /// The `n`-th garment of the first of `categories` that has one: test garments come first, then validation garments. Garment 0 where
     /// there is none of them.
     fn pick(&self, categories: &[Category], n: usize) -> usize {
-        let split = &self.library.split;
+        let split = &self.dataset.split;
         let all = || split.test.iter().chain(&split.validation).chain(&split.training).copied();
         let of = |category: &Category| {
-            let wardrobe = &self.library.wardrobe;
-            all().filter(|&g| wardrobe.card(g).category == *category).collect::<Vec<usize>>()
+            let garments = &self.dataset.garments;
+            all().filter(|&g| garments.info(g).category == *category).collect::<Vec<usize>>()
         };
         let found = categories.iter().map(of).find(|garments| !garments.is_empty()).unwrap_or_default();
         found.get(n % found.len().max(1)).copied().unwrap_or(0)
@@ -135,14 +136,14 @@ impl Subject {
 }
 
 impl Studio<'_> {
-    fn body(&self, index: usize) -> BodyDraw {
+    fn body(&self, index: usize) -> BodySample {
         let at = [self.question, index];
         self.subject.draw(at, &[0], 1, HeldOut::Windows).bodies.remove(0)
     }
 
     /// Outfits from left to right; seen from the front, then from the back. Where all of them hold the same garments a colour
     /// stands for a garment, otherwise for a layer.
-    fn sheet(&self, outfits: &[(Vec<usize>, BodyDraw)], columns: &[String]) -> Result<RgbImage, Report> {
+    fn sheet(&self, outfits: &[(Vec<usize>, BodySample)], columns: &[String]) -> Result<RgbImage, Report> {
         let mut rows = [View::ThreeQuarter, View::Back]
             .map(|view| SheetRow { label: view.name().to_owned(), ..SheetRow::default() });
         // The first of them: legend and numbers follow its order.
@@ -161,14 +162,14 @@ impl Studio<'_> {
             rows[1].cells.push(back);
         }
         // Names are given where a colour means the same garment all along.
-        let wardrobe = &self.subject.library.wardrobe;
+        let garments = &self.subject.dataset.garments;
         let grows = |all: &Vec<usize>| outfits.iter().all(|(garments, _)| all.starts_with(garments));
         rows[0].legend = longest
             .filter(|all| same.is_some() || grows(all))
             .into_iter()
             .flatten()
             .enumerate()
-            .map(|(i, &g)| LegendEntry { colour: layer_colour(i), name: wardrobe.card(g).name.clone() })
+            .map(|(i, &g)| LegendEntry { colour: layer_colour(i), name: garments.info(g).name.clone() })
             .collect();
         Ok(Sheet { title: String::new(), columns: columns.to_vec(), rows: rows.to_vec() }.compose())
     }
@@ -177,10 +178,11 @@ impl Studio<'_> {
     fn views(
         &self,
         garments: &[usize],
-        body: &BodyDraw,
+        body: &BodySample,
         colour: &dyn Fn(usize) -> [u8; 3],
     ) -> Result<[RgbImage; 2], Report> {
-        let draw = SceneDraw { garments: garments.to_vec(), bodies: vec![body.clone()], repulsion_sample: 0 };
+        let draw =
+            SceneSample { garments: garments.to_vec(), bodies: vec![body.clone()], repulsion_sample: 0 };
         let scene = self.subject.prepare(draw)?;
         let draped = self.networks.drape(&scene)?;
         let resolved = self.dressing.of(&scene, &draped.posed).resolved(&ResolveSettings::default())?;
@@ -196,7 +198,7 @@ mod tests {
 
     #[test]
     fn bodies_of_a_sheet_are_in_unlike_poses() {
-        let body = |angle: f64| BodyDraw {
+        let body = |angle: f64| BodySample {
             shape: vec![angle],
             pose: Pose { rotations: vec![[0.0; 3], [angle, 0.0, 0.0]] },
         };

@@ -6,7 +6,7 @@ use super::table::{Table, number, percent, percent_with_interval, share_text};
 use crate::dataset::{HeldOut, PreparedScene};
 use crate::evaluation::certificates::{Counts, Dressing, OutfitResult};
 use crate::inference::Draped;
-use crate::system::one_core::each_on_one_core;
+use crate::system::single_threaded::map_single_threaded;
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use clothcombo_physics::energy::Term;
 use miette::{IntoDiagnostic, Report};
@@ -39,7 +39,7 @@ pub struct Outfits {
     pub strain_alone: Estimate,
     /// Strain of the same garments in the outfit [J].
     pub strain_worn: Estimate,
-    /// Share of outer vertices on the wrong side, closest surface point: every garment draped alone.
+    /// RankPartition of outer vertices on the wrong side, closest surface point: every garment draped alone.
     pub wrong_side_single: Estimate,
     /// The same after untangling.
     pub wrong_side: Estimate,
@@ -61,7 +61,7 @@ struct Measured {
     is_wearable: bool,
     /// Strain of every garment draped alone and in the outfit [J].
     strain: Vec<[f64; 2]>,
-    /// Share on the wrong side, every garment draped alone.
+    /// RankPartition on the wrong side, every garment draped alone.
     wrong_single: f64,
     before: Counts,
     /// If it went through the post-process.
@@ -81,9 +81,9 @@ pub fn ask(
     settings: &ResolveSettings,
     done: &(dyn Fn() + Sync),
 ) -> Result<LayerCount, Report> {
-    let all: Vec<usize> = (0..subject.library.wardrobe.len()).collect();
+    let all: Vec<usize> = (0..subject.dataset.garments.len()).collect();
     let networks = subject.networks();
-    let dressing = Dressing::new(&subject.library, &subject.config.losses, Some(&networks));
+    let dressing = Dressing::new(&subject.dataset, &subject.config.losses, Some(&networks));
     let measured = |index: usize| -> Result<Measured, Report> {
         let draw = subject.draw([question, index], &all, layers, HeldOut::Windows);
         let scene = subject.prepare(draw)?;
@@ -104,7 +104,7 @@ pub fn ask(
         done();
         Ok(measured)
     };
-    let outfits = each_on_one_core((0..scenes).collect(), None, measured)?;
+    let outfits = map_single_threaded((0..scenes).collect(), None, measured)?;
     let wearable: Vec<&Measured> = outfits.iter().filter(|outfit| outfit.is_wearable).collect();
     Ok(LayerCount {
         layers,

@@ -4,7 +4,7 @@ use super::estimate::{Estimate, Ratio};
 use super::sets::DataSet;
 use super::subject::{Measured, PAPER_COLLISION, Subject};
 use super::table::{Table, mean_and_median, mean_with_interval, number, percent, ratio_with_interval};
-use crate::dataset::{Library, SceneDraw, in_turn};
+use crate::dataset::{Dataset, SceneSample, round_robin};
 use crate::inference::networks::DrapeError;
 use clothcombo_data::asset::Category;
 use clothcombo_physics::energy::Term;
@@ -29,15 +29,15 @@ pub struct Question {
 
 impl Question {
     /// `scenes` scenes of `set`; none where the data has no such garments or poses.
-    pub fn new(number: usize, set: DataSet, scenes: usize, library: &Library) -> Option<Self> {
-        let pool = set.pool(library);
+    pub fn new(number: usize, set: DataSet, scenes: usize, dataset: &Dataset) -> Option<Self> {
+        let pool = set.pool(dataset);
         (!pool.is_empty() && scenes > 0).then_some(Self { number, set, pool, scenes })
     }
 
     /// Its scenes, one garment each.
-    pub fn draws(&self, subject: &Subject) -> Vec<SceneDraw> {
+    pub fn draws(&self, subject: &Subject) -> Vec<SceneSample> {
         let draw = |i: usize| {
-            let garment = &self.pool[in_turn(i, self.scenes, self.pool.len())..][..1];
+            let garment = &self.pool[round_robin(i, self.scenes, self.pool.len())..][..1];
             subject.draw([self.number, i], garment, 1, self.set.poses)
         };
         (0..self.scenes).map(draw).collect()
@@ -61,9 +61,9 @@ pub struct MethodResult {
     pub paper_layer_collision: Estimate,
     /// The paper's degree of self-collision ([`clothcombo_physics::contact::self_collision`]).
     pub self_collision: Estimate,
-    /// Share of vertices inside the body.
+    /// RankPartition of vertices inside the body.
     pub inside: Estimate,
-    /// Share of vertices deeper than 5 mm.
+    /// RankPartition of vertices deeper than 5 mm.
     pub deeper_than_5mm: Estimate,
     /// Exact pairs of intersecting triangles with the body.
     pub body_pairs: Estimate,
@@ -165,7 +165,7 @@ pub fn ask(subject: &Subject, question: &Question, done: &(dyn Fn() + Sync)) -> 
     };
     let all: Vec<usize> = (0..draws.len()).collect();
     let strain = |m: &Measured| m.score.raw[Term::Strain];
-    let category = |i: usize| subject.library.wardrobe.card(draws[i].garments[0]).category;
+    let category = |i: usize| subject.dataset.garments.info(draws[i].garments[0]).category;
     let categories = Category::ALL.into_iter().filter_map(|wanted| {
         let scenes: Vec<usize> = all.iter().copied().filter(|&i| category(i) == wanted).collect();
         (!scenes.is_empty()).then(|| CategoryResult {
@@ -177,11 +177,11 @@ pub fn ask(subject: &Subject, question: &Question, done: &(dyn Fn() + Sync)) -> 
         })
     });
     Ok(Methods {
-        title: question.set.title(&subject.library),
+        title: question.set.title(&subject.dataset),
         set: question.set,
         scenes: draws.len(),
         collision: subject.collision_form(Term::BodyCollision),
-        garments: question.pool.iter().map(|&g| subject.library.wardrobe.card(g).name.clone()).collect(),
+        garments: question.pool.iter().map(|&g| subject.dataset.garments.info(g).name.clone()).collect(),
         methods: METHODS
             .into_iter()
             .enumerate()

@@ -1,6 +1,6 @@
 //! `clothcombo eval`: the paper's tables on the user's data, speed against error, stability, pictures.
 //!
-//! Scenes are a pure function of the seed, the question and their number ([`crate::dataset::draw_study`]): two models of the same
+//! Scenes are a pure function of the seed, the question and their number ([`crate::dataset::sample_evaluation`]): two models of the same
 //! data are asked about the same bodies in the same clothes.
 
 mod embeddings;
@@ -94,8 +94,8 @@ pub fn study(
     progress: Progress<'_>,
 ) -> Result<Study, Report> {
     let variant_count = if ablations.is_empty() { 0 } else { ablations.len() + 1 } + 2 * specific.len();
-    let library = &subject.library;
-    let (method_questions, embedding_questions) = (sizes.methods(library), sizes.embeddings(library));
+    let dataset = &subject.dataset;
+    let (method_questions, embedding_questions) = (sizes.methods(dataset), sizes.embeddings(dataset));
     let single_garments = method_questions.iter().chain(&embedding_questions).map(|q| q.scenes).sum();
     let steps = sizes.progress_steps(single_garments, variant_count);
     let settings = ResolveSettings { steps: sizes.way_steps, ..ResolveSettings::default() };
@@ -132,8 +132,8 @@ pub fn study(
     }
     let mut pairs = Vec::new();
     for (i, other) in specific.iter().enumerate() {
-        let wardrobe = &other.subject.library.wardrobe;
-        let names: Vec<String> = (0..wardrobe.len()).map(|g| wardrobe.card(g).name.clone()).collect();
+        let garments = &other.subject.dataset.garments;
+        let names: Vec<String> = (0..garments.len()).map(|g| garments.info(g).name.clone()).collect();
         let question = VariantQuestion {
             number: 200 + i,
             garments: Some(&names),

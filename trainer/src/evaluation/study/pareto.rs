@@ -6,12 +6,12 @@ use super::table::{Table, number};
 use crate::dataset::{HeldOut, PreparedScene};
 use crate::evaluation::certificates::Dressing;
 use crate::evaluation::equilibrium_error::mean_distance;
+use crate::evaluation::median_ms;
 use crate::inference::networks::DrapeError;
 use crate::inference::reference::ReferenceScene;
 use crate::inference::refine;
 use crate::picture::{Line, LinePanel};
-use crate::system::one_core::each_on_one_core;
-use crate::training::measure::median_ms;
+use crate::system::single_threaded::map_single_threaded;
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use clothcombo_physics::energy::Term;
 use clothcombo_physics::equilibrium::{Problem, SolverSettings, solve};
@@ -98,7 +98,7 @@ pub fn ask(
     settings: &ResolveSettings,
     done: &(dyn Fn() + Sync),
 ) -> Result<Pareto, Report> {
-    let all: Vec<usize> = (0..subject.library.wardrobe.len()).collect();
+    let all: Vec<usize> = (0..subject.dataset.garments.len()).collect();
     let mut drapes = Vec::with_capacity(scenes);
     for index in 0..scenes {
         let draw = subject.draw([question, index], &all, 1, HeldOut::Windows);
@@ -106,7 +106,7 @@ pub fn ask(
         let fast = fast_methods(subject, &scene, settings)?;
         drapes.push((scene, fast));
     }
-    let solved = each_on_one_core(drapes, None, |(scene, fast)| {
+    let solved = map_single_threaded(drapes, None, |(scene, fast)| {
         let found = solved(subject, &scene, fast);
         done();
         found
@@ -154,7 +154,7 @@ fn fast_methods(
     }
     let (network_ms, draped) = measured(all)?;
     states.push(state("network", network_ms, wide(&draped.posed)));
-    let dressing = Dressing::new(&subject.library, &subject.config.losses, Some(&networks));
+    let dressing = Dressing::new(&subject.dataset, &subject.config.losses, Some(&networks));
     let before = dressing.of(scene, &draped.posed);
     // Once: it may take seconds.
     let clock = Instant::now();

@@ -3,7 +3,7 @@
 
 use super::subject::Subject;
 use super::table::Table;
-use crate::dataset::{HeldOut, Library, SplitNames};
+use crate::dataset::{Dataset, HeldOut, SplitNames};
 use serde::Serialize;
 
 /// Garments of one kind.
@@ -36,9 +36,9 @@ impl GarmentSet {
     }
 
     /// The garments, as indices into the wardrobe.
-    pub fn garments(self, library: &Library) -> Vec<usize> {
-        let is_independent = |garment: &usize| !library.wardrobe.card(*garment).source.is_made_here();
-        let split = &library.split;
+    pub fn garments(self, dataset: &Dataset) -> Vec<usize> {
+        let is_independent = |garment: &usize| !dataset.garments.info(*garment).source.is_made_here();
+        let split = &dataset.split;
         match self {
             Self::Training => split.training.clone(),
             Self::Validation => split.validation.clone(),
@@ -49,9 +49,9 @@ impl GarmentSet {
 }
 
 /// Name in titles.
-fn name_of_poses(poses: HeldOut, library: &Library) -> &'static str {
+fn name_of_poses(poses: HeldOut, dataset: &Dataset) -> &'static str {
     match poses {
-        HeldOut::Windows if library.poses.frame_counts().is_none() => "sampled poses",
+        HeldOut::Windows if dataset.poses.frame_counts().is_none() => "sampled poses",
         HeldOut::Windows => "held-out windows",
         HeldOut::ValidationClips => "validation clips",
         HeldOut::TestClips => "test clips",
@@ -69,13 +69,13 @@ pub struct DataSet {
 
 impl DataSet {
     /// What it is called.
-    pub fn title(self, library: &Library) -> String {
-        format!("{}, {}", self.garments.name(), name_of_poses(self.poses, library))
+    pub fn title(self, dataset: &Dataset) -> String {
+        format!("{}, {}", self.garments.name(), name_of_poses(self.poses, dataset))
     }
 
     /// Its garments; none where there are none of its poses.
-    pub fn pool(self, library: &Library) -> Vec<usize> {
-        if library.poses.has(self.poses) { self.garments.garments(library) } else { Vec::new() }
+    pub fn pool(self, dataset: &Dataset) -> Vec<usize> {
+        if dataset.poses.has(self.poses) { self.garments.garments(dataset) } else { Vec::new() }
     }
 }
 
@@ -94,15 +94,15 @@ pub struct Sets {
 impl Sets {
     /// Of the data of `subject`.
     pub fn of(subject: &Subject) -> Self {
-        let library = &subject.library;
-        let independent = GarmentSet::IndependentTest.garments(library);
+        let dataset = &subject.dataset;
+        let independent = GarmentSet::IndependentTest.garments(dataset);
         Self {
-            split: library.split_names(),
+            split: dataset.split_names(),
             independent_test_garments: independent
                 .into_iter()
-                .map(|garment| library.wardrobe.card(garment).name.clone())
+                .map(|garment| dataset.garments.info(garment).name.clone())
                 .collect(),
-            held_out_margin: library.poses.frame_counts().map(|_| subject.config.data.poses.held_out_margin),
+            held_out_margin: dataset.poses.frame_counts().map(|_| subject.config.data.poses.held_out_margin),
         }
     }
 

@@ -4,7 +4,7 @@ use super::extremes;
 use super::gallery;
 use super::methods::Question;
 use super::sets::{DataSet, GarmentSet};
-use crate::dataset::{HeldOut, Library};
+use crate::dataset::{Dataset, HeldOut};
 use serde::Serialize;
 
 /// How many scenes every question gets.
@@ -90,7 +90,7 @@ impl Sizes {
 
     /// Table 2: every set by itself, since only the last ones were read by no run. Numbers stay with their set, so that its
     /// scenes stay the same.
-    pub(super) fn methods(&self, library: &Library) -> Vec<Question> {
+    pub(super) fn methods(&self, dataset: &Dataset) -> Vec<Question> {
         use GarmentSet::{IndependentTest, Test, Training, Validation};
         use HeldOut::{TestClips, ValidationClips, Windows};
         let questions = [
@@ -102,19 +102,19 @@ impl Sizes {
             (12, IndependentTest, Windows, self.independent_garments),
             (13, Test, TestClips, self.test_garments),
         ];
-        Self::asked(&questions, library)
+        Self::asked(&questions, dataset)
     }
 
     /// Table 1.
-    pub(super) fn embeddings(&self, library: &Library) -> Vec<Question> {
+    pub(super) fn embeddings(&self, dataset: &Dataset) -> Vec<Question> {
         let garments = [(3, GarmentSet::Training), (4, GarmentSet::Test)];
-        Self::asked(&garments.map(|(number, set)| (number, set, HeldOut::Windows, self.embeddings)), library)
+        Self::asked(&garments.map(|(number, set)| (number, set, HeldOut::Windows, self.embeddings)), dataset)
     }
 
     /// Those that the data has garments and poses for.
-    fn asked(questions: &[(usize, GarmentSet, HeldOut, usize)], library: &Library) -> Vec<Question> {
+    fn asked(questions: &[(usize, GarmentSet, HeldOut, usize)], dataset: &Dataset) -> Vec<Question> {
         let question = |&(number, garments, poses, scenes): &(usize, GarmentSet, HeldOut, usize)| {
-            Question::new(number, DataSet { garments, poses }, scenes, library)
+            Question::new(number, DataSet { garments, poses }, scenes, dataset)
         };
         questions.iter().filter_map(question).collect()
     }

@@ -2,10 +2,10 @@
 
 use super::table::number;
 use crate::config::Config;
-use crate::dataset::{HeldOut, Library, PreparedScene, SceneDraw, draw_study, prepare};
+use crate::dataset::{Dataset, HeldOut, PreparedScene, SceneSample, prepare, sample_evaluation};
 use crate::evaluation::{SceneScore, score_scene};
 use crate::inference::Draped;
-use crate::inference::networks::{DrapeError, Networks, WardrobeTensors};
+use crate::inference::networks::{DrapeError, Networks, TensorStore};
 use crate::run::checkpoint::TrainedModel;
 use burn::tensor::Device;
 use clothcombo_model::ClothCombo;
@@ -22,27 +22,27 @@ pub struct Subject {
     /// Losses, data and seed.
     pub config: Config,
     /// The data.
-    pub library: Arc<Library>,
+    pub dataset: Arc<Dataset>,
     /// Its tensors.
-    pub tensors: WardrobeTensors,
+    pub tensors: TensorStore,
     /// The networks, without automatic differentiation.
     pub model: ClothCombo,
 }
 
 impl Subject {
-    /// `trained` on `library`, which was loaded for `config`.
+    /// `trained` on `dataset`, which was loaded for `config`.
     ///
     /// # Errors
     /// When the data is not that of the model, or its parameters cannot be read.
     pub fn new(
         trained: &TrainedModel,
         config: Config,
-        library: Arc<Library>,
+        dataset: Arc<Dataset>,
         device: &Device,
     ) -> Result<Self, Report> {
-        trained.check_data(&config, &library)?;
-        let tensors = WardrobeTensors::new(library.clone(), trained.state.dimensions(), device);
-        Ok(Self { model: trained.networks(device)?, config, library, tensors })
+        trained.check_data(&config, &dataset)?;
+        let tensors = TensorStore::new(dataset.clone(), trained.state.dimensions(), device);
+        Ok(Self { model: trained.networks(device)?, config, dataset, tensors })
     }
 
     /// The networks ready to drape.
@@ -70,17 +70,17 @@ impl Subject {
         format!("as trained: {}{scale}, ε {} mm", losses.weight(term).at(1.0), number(1e3 * epsilon))
     }
 
-    /// Scene `index` of question number `question` (`at`), drawn as [`draw_study`] says.
-    pub fn draw(&self, at: [usize; 2], pool: &[usize], layers: usize, poses: HeldOut) -> SceneDraw {
-        draw_study(&self.library, self.config.validation_seed(), at, pool, layers, poses)
+    /// Scene `index` of question number `question` (`at`), drawn as [`sample_evaluation`] says.
+    pub fn draw(&self, at: [usize; 2], pool: &[usize], layers: usize, poses: HeldOut) -> SceneSample {
+        sample_evaluation(&self.dataset, self.config.validation_seed(), at, pool, layers, poses)
     }
 
     /// Prepares a scene, losses with the weights they end with.
     ///
     /// # Errors
     /// When a garment cannot be read.
-    pub fn prepare(&self, draw: SceneDraw) -> Result<PreparedScene, DrapeError> {
-        Ok(prepare(&self.library, &self.config.losses, draw, 1.0)?)
+    pub fn prepare(&self, draw: SceneSample) -> Result<PreparedScene, DrapeError> {
+        Ok(prepare(&self.dataset, &self.config.losses, draw, 1.0)?)
     }
 }
 
@@ -200,7 +200,7 @@ impl Subject {
     /// The first error of `drape`, or when a garment cannot be read.
     pub fn measure(
         &self,
-        draws: &[SceneDraw],
+        draws: &[SceneSample],
         done: &(dyn Fn() + Sync),
         mut drape: impl FnMut(&PreparedScene) -> Result<Vec<Draped>, DrapeError>,
     ) -> Result<Vec<Vec<Measured>>, DrapeError> {

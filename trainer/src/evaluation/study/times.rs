@@ -50,9 +50,9 @@ pub fn ask(
     settings: &ResolveSettings,
     done: &(dyn Fn() + Sync),
 ) -> Result<Times, Report> {
-    let all: Vec<usize> = (0..subject.library.wardrobe.len()).collect();
+    let all: Vec<usize> = (0..subject.dataset.garments.len()).collect();
     let networks = subject.networks();
-    let dressing = Dressing::new(&subject.library, &subject.config.losses, Some(&networks));
+    let dressing = Dressing::new(&subject.dataset, &subject.config.losses, Some(&networks));
     let mut parts: [Vec<f64>; 6] = Default::default();
     let (mut vertices, mut garments) = (0, 0);
     // The first outfit warms up: buffers, threads, files.

@@ -21,7 +21,7 @@ pub struct Variant {
     pub result: MethodResult,
     /// Weight and margin of the collision with the body, and of that between garments, that all models are measured with.
     pub collisions: [String; 2],
-    /// Share of outer vertices on the wrong side of an inner layer, by the nearest vertex; mean over the scenes.
+    /// RankPartition of outer vertices on the wrong side of an inner layer, by the nearest vertex; mean over the scenes.
     pub wrong_side: f64,
     /// Exact pairs between garments, mean over the scenes.
     pub layer_pairs: f64,
@@ -49,9 +49,9 @@ pub fn ask(
     question: &VariantQuestion<'_>,
     done: &(dyn Fn() + Sync),
 ) -> Result<Variant, DrapeError> {
-    let wardrobe = &subject.library.wardrobe;
-    let wanted = |g: &usize| question.garments.is_none_or(|names| names.contains(&wardrobe.card(*g).name));
-    let pool: Vec<usize> = (0..wardrobe.len()).filter(wanted).collect();
+    let garments = &subject.dataset.garments;
+    let wanted = |g: &usize| question.garments.is_none_or(|names| names.contains(&garments.info(*g).name));
+    let pool: Vec<usize> = (0..garments.len()).filter(wanted).collect();
     let [low, high] = question.layers;
     let draw = |index: usize| {
         let layers = low + index % (high - low + 1);

@@ -1,6 +1,6 @@
 //! What a checkpoint says about itself, sealed against damage.
 
-use crate::dataset::Library;
+use crate::dataset::Dataset;
 use crate::system::exact::Exact;
 use clothcombo_model::Dimensions;
 use serde::{Deserialize, Serialize};
@@ -30,7 +30,7 @@ pub struct CheckpointState {
     /// The best validation so far.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub best: Option<Best>,
-    /// Recent steps that were skipped because their loss or gradient was not finite.
+    /// LruCache steps that were skipped because their loss or gradient was not finite.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub incidents: Vec<u64>,
     /// BLAKE3 checksum of each file.
@@ -63,11 +63,11 @@ impl CheckpointState {
         }
     }
 
-    /// Of networks for `library` after `step` steps, without checksums.
-    pub fn of(library: &Library, step: u64) -> Self {
-        let names = library.joints().indices.iter().map(|&j| library.body.joint_names[j].clone());
-        let mut state = Self::new(step, names.collect(), library.shape_count, library.dimensions().pose);
-        state.data = Some(library.fingerprint().to_owned());
+    /// Of networks for `dataset` after `step` steps, without checksums.
+    pub fn of(dataset: &Dataset, step: u64) -> Self {
+        let names = dataset.joints().indices.iter().map(|&j| dataset.body.joint_names[j].clone());
+        let mut state = Self::new(step, names.collect(), dataset.shape_count, dataset.dimensions().pose);
+        state.data = Some(dataset.fingerprint().to_owned());
         state
     }
 

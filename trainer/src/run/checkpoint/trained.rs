@@ -2,7 +2,7 @@
 
 use super::{CONFIG, CheckpointError, CheckpointState, MODEL_EXCHANGE, newest, read_state, verify};
 use crate::config::{Config, PoseConfig, load};
-use crate::dataset::{GarmentPurpose, Library, purpose};
+use crate::dataset::{Dataset, GarmentPurpose, purpose};
 use burn::store::{ModuleSnapshot, SafetensorsStore};
 use burn::tensor::Device;
 use clothcombo_model::{ClothCombo, Initializer, ModelConfig};
@@ -55,12 +55,12 @@ impl TrainedModel {
         }
     }
 
-    /// Whether the networks know what `library` is made of: its joints in their order, shape components and pose features.
+    /// Whether the networks know what `dataset` is made of: its joints in their order, shape components and pose features.
     ///
     /// # Errors
     /// Names the model when they do not.
-    pub fn check_fits(&self, library: &Library) -> Result<(), CheckpointError> {
-        let (expected, found) = (CheckpointState::of(library, 0), &self.state);
+    pub fn check_fits(&self, dataset: &Dataset) -> Result<(), CheckpointError> {
+        let (expected, found) = (CheckpointState::of(dataset, 0), &self.state);
         let fits = (&found.joints, found.shape_count, found.pose_features)
             == (&expected.joints, expected.shape_count, expected.pose_features);
         let reason = || {
@@ -82,21 +82,21 @@ impl TrainedModel {
         }
     }
 
-    /// What `config` holds out of `library`, its data, although these networks were trained on it, or what it keeps for the
+    /// What `config` holds out of `dataset`, its data, although these networks were trained on it, or what it keeps for the
     /// test although the validation of their run looked at it, in words: scores would be those of known garments or poses.
     /// Only where the garments come from the same sources, or the motions from the same folder, can it be told.
-    pub fn known_of_held_out(&self, config: &Config, library: &Library) -> Vec<String> {
+    pub fn known_of_held_out(&self, config: &Config, dataset: &Dataset) -> Vec<String> {
         let mut found = Vec::new();
         let (trained, data) = (&self.config.data, &config.data);
         let known = |garments: &[usize], was: GarmentPurpose| -> Vec<&str> {
-            let names = garments.iter().map(|&garment| library.wardrobe.card(garment).name.as_str());
+            let names = garments.iter().map(|&garment| dataset.garments.info(garment).name.as_str());
             names.filter(|name| purpose(name, trained) == was).collect()
         };
-        let held_out = [library.split.validation.as_slice(), &library.split.test].concat();
+        let held_out = [dataset.split.validation.as_slice(), &dataset.split.test].concat();
         if trained.garments == data.garments {
             for (names, what) in [
                 (known(&held_out, GarmentPurpose::Training), "was trained on held-out garments"),
-                (known(&library.split.test, GarmentPurpose::Validation), "was validated on test garments"),
+                (known(&dataset.split.test, GarmentPurpose::Validation), "was validated on test garments"),
             ] {
                 if !names.is_empty() {
                     found.push(format!("{what}: {}", names.join(", ")));
@@ -113,7 +113,7 @@ impl TrainedModel {
             let was_validated =
                 |clip: &String| before.validation_clips.iter().any(|name| clip.contains(name));
             let validated: Vec<String> =
-                library.poses.clips().test.into_iter().filter(was_validated).collect();
+                dataset.poses.clips().test.into_iter().filter(was_validated).collect();
             if !validated.is_empty() {
                 found.push(format!("was validated on test clips: {}", validated.join(", ")));
             }
@@ -125,25 +125,25 @@ impl TrainedModel {
     ///
     /// # Errors
     /// When they do not fit.
-    pub fn check_data(&self, config: &Config, library: &Library) -> Result<(), CheckpointError> {
-        self.check_fits(library)?;
-        for what in self.known_of_held_out(config, library) {
+    pub fn check_data(&self, config: &Config, dataset: &Dataset) -> Result<(), CheckpointError> {
+        self.check_fits(dataset)?;
+        for what in self.known_of_held_out(config, dataset) {
             tracing::warn!("{} {what}", self.folder.display());
         }
         Ok(())
     }
 
-    /// The networks as the start of a run of `config` on `library`; with untrained correction networks if those are new.
+    /// The networks as the start of a run of `config` on `dataset`; with untrained correction networks if those are new.
     ///
     /// # Errors
     /// When data or sizes of the networks are not the model's own.
     pub fn start_of(
         &self,
         config: &Config,
-        library: &Library,
+        dataset: &Dataset,
         device: &Device,
     ) -> Result<ClothCombo, CheckpointError> {
-        self.check_data(config, library)?;
+        self.check_data(config, dataset)?;
         let adds_corrections = self.config.model.corrections == 0 && config.model.corrections > 0;
         let expected = match adds_corrections {
             true => ModelConfig {

@@ -5,7 +5,7 @@ mod workers;
 
 use crate::config::{ClipScope, OptimizerConfig, Trains};
 use crate::dataset::PreparedScene;
-use crate::inference::networks::{DrapeError, WardrobeTensors};
+use crate::inference::networks::{DrapeError, TensorStore};
 use crate::system::device::is_processor;
 use burn::module::Module;
 use burn::optim::{GradientsAccumulator, GradientsParams, ModuleOptimizer};
@@ -100,7 +100,7 @@ impl Learner {
     /// When a scene's tensors cannot be made.
     pub fn step(
         &mut self,
-        tensors: &WardrobeTensors,
+        tensors: &TensorStore,
         scenes: &[PreparedScene],
         trains: Trains,
         learning_rate: f64,
@@ -117,7 +117,7 @@ impl Learner {
     /// When a scene's tensors cannot be made.
     pub fn compute(
         &mut self,
-        tensors: &WardrobeTensors,
+        tensors: &TensorStore,
         scenes: &[PreparedScene],
         total: usize,
         trains: Trains,

@@ -5,7 +5,7 @@ use crate::config::{ClipScope, Trains};
 use crate::dataset::PreparedScene;
 use crate::inference::contact_features::felt;
 use crate::inference::draped::to_host;
-use crate::inference::networks::{DrapeError, KnownEmbeddings, WardrobeTensors};
+use crate::inference::networks::{DrapeError, KnownEmbeddings, TensorStore};
 use burn::module::Module;
 use burn::optim::GradientsParams;
 use burn::tensor::Tensor;
@@ -61,7 +61,7 @@ pub(super) struct Asked<'a> {
 /// What the scenes of a step have in common.
 #[derive(Clone, Copy)]
 pub(super) struct Work<'a> {
-    pub tensors: &'a WardrobeTensors,
+    pub tensors: &'a TensorStore,
     pub trains: Trains,
     /// Weight of a scene in the step's loss.
     pub share: f64,
@@ -183,7 +183,7 @@ impl Work<'_> {
                     model.correct(&outfit, &embeddings, (start, &single), &untangled(), &body, feel)
                 }
             };
-            // Every correction learns from where it leads itself.
+            // Every correction learns from where it is_rank_zero itself.
             let each = share / states.len() as f64;
             let mut worn = None;
             for LayeredDrape { posed, canonical } in states {

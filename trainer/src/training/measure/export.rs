@@ -65,7 +65,7 @@ fn arrays(subject: &Subject, scene: &PreparedScene) -> Result<NpzWriter, Report>
         file.f32(&key("skin_weights"), &[vertices, joints], &worn.skin_weights);
         let reference = &dressed.holding_reference;
         file.f32(&key("holding_reference"), &[reference.len(), 3], reference.as_flattened());
-        let operators = subject.library().wardrobe.operators(index)?;
+        let operators = subject.dataset().garments.operators(index)?;
         let k = operators.eigen_count;
         file.f64(&key("mass"), &[vertices], &operators.mass);
         file.f64(&key("eigenvalues"), &[k], &operators.eigenvalues);

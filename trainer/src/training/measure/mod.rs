@@ -8,4 +8,4 @@ mod subject;
 pub use case::Case;
 pub use export::export;
 pub use phases::{OTHER, PHASES, SpanSeconds, record_phases};
-pub use subject::{Costs, Profile, Subject, median_ms};
+pub use subject::{Costs, Profile, Subject};

@@ -2,16 +2,17 @@
 
 use super::phases::{OTHER, PHASES, record_phases};
 use crate::config::{ClipScope, Config, OptimizerConfig, Trains};
-use crate::dataset::{Library, Plan, PreparedScene, draw_training, prepare};
+use crate::dataset::{Dataset, Plan, PreparedScene, prepare, sample_training};
+use crate::evaluation::median_ms;
 use crate::inference::contact_features::felt;
 use crate::inference::draped::to_host;
-use crate::inference::networks::{DrapeError, KnownEmbeddings, WardrobeTensors};
+use crate::inference::networks::{DrapeError, KnownEmbeddings, TensorStore};
 use crate::run::spread::Spread;
 use crate::system::memory::Memory;
 use crate::training::learner::{Learner, new_optimizer};
+use crate::training::process_group::RankPartition;
 use crate::training::scenes::prefetch;
 use crate::training::schedule::Schedule;
-use crate::training::world::Share;
 use burn::module::Module;
 use burn::optim::GradientsParams;
 use burn::tensor::{Device, Tensor, TensorData};
@@ -20,14 +21,13 @@ use clothcombo_physics::energy::{SceneEnergy, Term};
 use miette::{IntoDiagnostic, Report, miette};
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::hint::black_box;
 use std::sync::Arc;
 use std::time::Instant;
 
 /// A run whose steps are measured.
 pub struct Subject {
     config: Arc<Config>,
-    tensors: Arc<WardrobeTensors>,
+    tensors: Arc<TensorStore>,
     learner: Learner,
     device: Device,
     first_step: u64,
@@ -68,36 +68,21 @@ pub struct Costs {
     pub peak_mib: Option<f64>,
 }
 
-/// Median time [ms] of `run` over at least 3 and about `seconds` of repetitions, after one to warm up.
-///
-/// # Errors
-/// The first error of `run`.
-pub fn median_ms<R, E>(seconds: f64, mut run: impl FnMut() -> Result<R, E>) -> Result<f64, E> {
-    black_box(run()?);
-    let (start, mut times) = (Instant::now(), Vec::new());
-    while times.len() < 3 || start.elapsed().as_secs_f64() < seconds {
-        let before = Instant::now();
-        black_box(run()?);
-        times.push(1e3 * before.elapsed().as_secs_f64());
-    }
-    Ok(Spread::of(times).median)
-}
-
 impl Subject {
     /// A new run of stage `stage` of `config` on `device` (named without automatic differentiation).
     ///
     /// # Errors
     /// When there is no such stage or the networks cannot be made.
-    pub fn new(config: Config, library: Arc<Library>, stage: usize, device: &Device) -> Result<Self, Report> {
+    pub fn new(config: Config, dataset: Arc<Dataset>, stage: usize, device: &Device) -> Result<Self, Report> {
         let boundaries = Schedule::new(&config).boundaries();
         let first_step = *boundaries.get(stage).ok_or_else(|| {
             miette!("the configuration has {} stages, there is no stage {stage}", boundaries.len())
         })?;
         let device = device.clone().autodiff();
-        let dimensions = library.dimensions();
+        let dimensions = dataset.dimensions();
         let model = ClothCombo::new(&config.model, &dimensions, config.seed, &device).into_diagnostic()?;
         let learner = Learner::new(model, new_optimizer(&config.optimizer), &config.optimizer);
-        let tensors = Arc::new(WardrobeTensors::new(library, dimensions, &device));
+        let tensors = Arc::new(TensorStore::new(dataset, dimensions, &device));
         Ok(Self { config: Arc::new(config), tensors, learner, device, first_step })
     }
 
@@ -107,8 +92,8 @@ impl Subject {
     }
 
     /// The data.
-    pub fn library(&self) -> &Library {
-        self.tensors.library()
+    pub fn dataset(&self) -> &Dataset {
+        self.tensors.dataset()
     }
 
     /// The networks as they are now.
@@ -129,8 +114,8 @@ impl Subject {
         let step = self.first_step + offset;
         let at = Schedule::new(&self.config).at(step);
         let plan = Plan { stage: &self.config.stages[at.stage], progress: at.stage_progress };
-        let draw = draw_training(self.library(), self.config.seed, step, 0, plan);
-        Ok(prepare(self.library(), &self.config.losses, draw, at.run_progress)?)
+        let draw = sample_training(self.dataset(), self.config.seed, step, 0, plan);
+        Ok(prepare(self.dataset(), &self.config.losses, draw, at.run_progress)?)
     }
 
     /// Which networks the stage trains.
@@ -155,7 +140,7 @@ impl Subject {
             ));
         }
         let (tensors, config) = (self.tensors.clone(), self.config.clone());
-        let scenes = prefetch(tensors, config, self.first_step, Share::WHOLE).into_diagnostic()?;
+        let scenes = prefetch(tensors, config, self.first_step, RankPartition::WHOLE).into_diagnostic()?;
         let mut parts: Vec<Vec<f64>> = vec![Vec::new(); PHASES.len()];
         let mut totals = Vec::new();
         for step in 0..WARM_UP + steps {

@@ -2,9 +2,9 @@
 
 use super::Session;
 use crate::config::Config;
-use crate::dataset::{Library, is_fingerprint};
+use crate::dataset::{Dataset, is_fingerprint};
 use crate::evaluation::ValidationSet;
-use crate::inference::networks::WardrobeTensors;
+use crate::inference::networks::TensorStore;
 use crate::run::checkpoint::{Checkpoint, CheckpointState, TrainedModel};
 use crate::run::folder::{RunDir, differing_keys};
 use crate::training::average::Average;
@@ -24,10 +24,10 @@ impl Session {
     ///
     /// # Errors
     /// When the networks cannot be made, or the model they start from does not fit.
-    pub fn new(run: RunDir, config: Config, library: Arc<Library>, device: &Device) -> Result<Self, Report> {
+    pub fn new(run: RunDir, config: Config, dataset: Arc<Dataset>, device: &Device) -> Result<Self, Report> {
         let device = device.clone().autodiff();
         let model = match &config.init_from {
-            None => ClothCombo::new(&config.model, &library.dimensions(), config.seed, &device)
+            None => ClothCombo::new(&config.model, &dataset.dimensions(), config.seed, &device)
                 .into_diagnostic()?,
             Some(path) => {
                 let trained = TrainedModel::open(Path::new(path))?;
@@ -38,14 +38,14 @@ impl Session {
                         config.seed
                     );
                 }
-                trained.start_of(&config, &library, &device)?
+                trained.start_of(&config, &dataset, &device)?
             }
         };
         let average = (config.optimizer.ema_decay > 0.0)
             .then(|| Average::new(model.valid(), config.optimizer.ema_decay));
         let learner = Learner::new(model, new_optimizer(&config.optimizer), &config.optimizer);
-        let start = CheckpointState::of(&library, 0);
-        Ok(Self::assemble(run, config, library, &device, learner, average, &start))
+        let start = CheckpointState::of(&dataset, 0);
+        Ok(Self::assemble(run, config, dataset, &device, learner, average, &start))
     }
 
     /// The run in `run`, from `checkpoint` on.
@@ -55,12 +55,12 @@ impl Session {
     pub fn resume(
         run: RunDir,
         config: Config,
-        library: Arc<Library>,
+        dataset: Arc<Dataset>,
         device: &Device,
         checkpoint: &Checkpoint,
     ) -> Result<Self, Report> {
         let device = device.clone().autodiff();
-        let expected = CheckpointState::of(&library, 0);
+        let expected = CheckpointState::of(&dataset, 0);
         let found = &checkpoint.state;
         let dimensions = |s: &CheckpointState| (s.joints.clone(), s.shape_count, s.pose_features);
         let same_data =
@@ -96,28 +96,28 @@ impl Session {
         // What was changed may be the mend for what went wrong before.
         let incidents = if changed.is_empty() { found.incidents.clone() } else { Vec::new() };
         let found = CheckpointState { best, incidents, ..found.clone() };
-        Ok(Self::assemble(run, config, library, &device, learner, average, &found))
+        Ok(Self::assemble(run, config, dataset, &device, learner, average, &found))
     }
 
     fn assemble(
         run: RunDir,
         config: Config,
-        library: Arc<Library>,
+        dataset: Arc<Dataset>,
         device: &Device,
         learner: Learner,
         average: Option<Average>,
         state: &CheckpointState,
     ) -> Self {
         Self {
-            tensors: Arc::new(WardrobeTensors::new(library.clone(), library.dimensions(), device)),
-            validation: ValidationSet::new(&library, &config),
+            tensors: Arc::new(TensorStore::new(dataset.clone(), dataset.dimensions(), device)),
+            validation: ValidationSet::new(&dataset, &config),
             schedule: Schedule::new(&config),
             guard: Guard::new(config.guard.clone(), &state.incidents),
             best: state.best,
             step: state.step,
             config: Arc::new(config),
             run,
-            library,
+            dataset,
             learner,
             average,
             world: Rc::default(),

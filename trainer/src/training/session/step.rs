@@ -9,10 +9,10 @@ use crate::system::stop::StopFlag;
 use crate::training::guard::Verdict;
 use crate::training::incident::{Circumstances, Incident, spoil_position};
 use crate::training::learner::{Computed, StepOutcome};
+use crate::training::process_group::RankPartition;
 use crate::training::scenes::prepare_step;
 use crate::training::schedule::ScheduleAt;
 use crate::training::step_summary::StepSummary;
-use crate::training::world::Share;
 use clothcombo_model::{gradient_bucket, gradients_of_bucket};
 use miette::{Report, WrapErr, miette};
 use std::path::PathBuf;
@@ -83,7 +83,7 @@ impl Session {
             skipped: outcome.skipped,
             spike: matches!(verdict, Verdict::Spike { .. }),
         };
-        let incident = match outcome.skipped && self.leads() {
+        let incident = match outcome.skipped && self.is_rank_zero() {
             true => self.keep_incident(at, scenes, outcome)?,
             false => None,
         };
@@ -128,12 +128,12 @@ impl Session {
         if self.world.is_shared() {
             // The scene at fault may be another process's: all of them once more, the step having changed nothing.
             let step = self.step - 1;
-            scenes = prepare_step(&self.library, &self.config, &self.schedule, step, Share::WHOLE)?;
+            scenes = prepare_step(&self.dataset, &self.config, &self.schedule, step, RankPartition::WHOLE)?;
             outcome = StepOutcome { scenes: self.compute(&mut scenes, at, self.step)?.scenes, ..outcome };
         }
         let around = Circumstances {
             config: &self.config,
-            library: &self.library,
+            dataset: &self.dataset,
             step: self.step,
             at,
             injected,

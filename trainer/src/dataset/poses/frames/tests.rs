@@ -37,7 +37,7 @@ fn frame_rates_that_are_none_are_refused() {
     assert!(split(&[30.0, 60.0]).is_ok());
     for rates in [[30.0, 0.0], [1e-320, 30.0], [30.0, f64::NAN], [30.0, -1.0]] {
         let error = split(&rates).err().unwrap_or_else(|| panic!("{rates:?} passed"));
-        assert!(matches!(error, LibraryError::FrameRates { .. }), "{error}");
+        assert!(matches!(error, DatasetError::FrameRates { .. }), "{error}");
         assert!(error.to_string().starts_with("motions: "), "{error}");
     }
 }

@@ -6,14 +6,14 @@
 //! the same to the bit.
 
 use super::active_joints::ActiveJoints;
-use super::error::LibraryError;
-use super::garment::LibraryGarment;
-use super::origin::{Maker, Origin};
-use super::recipe::Recipe;
+use super::error::DatasetError;
+use super::garment_source::{GarmentLoader, GarmentSource};
+use super::prepared_garment::PreparedGarment;
+use super::preprocessor::Preprocessor;
 use crate::config::Config;
 use crate::dataset::DataSizes;
 use crate::system::allocator::return_freed_memory;
-use crate::system::lru_cache::{MemoryBudget, Recent, Residence};
+use crate::system::lru_cache::{LruCache, MemoryBudget, Residence};
 use crate::system::memory::available;
 use clothcombo_data::asset::{Binding, Body, Category, Garment, Provenance};
 use clothcombo_data::cache::{
@@ -27,7 +27,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// What is known of every garment without reading it.
 #[derive(Clone, Debug)]
-pub struct Card {
+pub struct GarmentInfo {
     /// Name, unique within a source.
     pub name: String,
     /// Category.
@@ -43,14 +43,14 @@ pub struct Card {
 }
 
 /// All garments of a run.
-pub struct Wardrobe {
-    cards: Vec<Card>,
+pub struct GarmentStore {
+    cards: Vec<GarmentInfo>,
     joints: ActiveJoints,
     store: Store,
 }
 
 enum Store {
-    Kept { garments: Vec<Arc<LibraryGarment>>, operators: Vec<Arc<SurfaceOperators>> },
+    Kept { garments: Vec<Arc<PreparedGarment>>, operators: Vec<Arc<SurfaceOperators>> },
     Streamed(Box<Streamed>),
 }
 
@@ -64,66 +64,68 @@ struct Keys {
 struct Streamed {
     cache: ArrayCache,
     keys: Vec<Keys>,
-    recent: Recent<LibraryGarment>,
-    origins: Vec<Origin>,
-    recipe: Recipe,
+    recent: LruCache<PreparedGarment>,
+    sources: Vec<GarmentSource>,
+    preprocessor: Preprocessor,
 }
 
 /// What the first pass over a garment leaves.
-struct FirstLook {
-    card: Card,
+struct IndexEntry {
+    card: GarmentInfo,
     largest_weights: Vec<f32>,
     kept: Option<(Garment, Binding, SurfaceOperators)>,
     keys: Option<Keys>,
 }
 
-impl Wardrobe {
+impl GarmentStore {
     /// Reads or makes all garments `config` names, and computes what the cache does not hold. Those of a streamed wardrobe are
     /// kept within `memory`. `progress(done, total, name)` is called per garment.
     ///
     /// # Errors
-    /// [`LibraryError`] names the file or garment at fault; [`LibraryError::Memory`] if the machine cannot hold garments that
+    /// [`DatasetError`] names the file or garment at fault; [`DatasetError::Memory`] if the machine cannot hold garments that
     /// are not streamed, before any of them is prepared.
     pub fn load(
         config: &Config,
         body: Arc<Body>,
         memory: &Arc<MemoryBudget>,
         progress: &(dyn Fn(usize, usize, &str) + Sync),
-    ) -> Result<Self, LibraryError> {
-        let origins = Origin::list(&config.data.garments)?;
-        let recipe = Recipe::new(config, body);
-        let cache = config.data.open_cache().map_err(LibraryError::data)?;
+    ) -> Result<Self, DatasetError> {
+        let sources = GarmentSource::list(&config.data.garments)?;
+        let preprocessor = Preprocessor::new(config, body);
+        let cache = config.data.open_cache().map_err(DatasetError::data)?;
         if cache.is_none()
             && let Some(available) = available()
         {
-            let sizes = DataSizes::of_listed(&origins, &recipe.body)?;
-            let (garments, needed) = (origins.len(), sizes.unstreamed_bytes(config));
+            let sizes = DataSizes::of_listed(&sources, &preprocessor.body)?;
+            let (garments, needed) = (sources.len(), sizes.unstreamed_bytes(config));
             if needed > available {
-                return Err(LibraryError::Memory { garments, needed, available });
+                return Err(DatasetError::Memory { garments, needed, available });
             }
         }
-        let looks = first_look(&origins, &recipe, cache.as_ref(), config.data.max_vertices, progress)?;
+        let looks =
+            index_garments(&sources, &preprocessor, cache.as_ref(), config.data.max_vertices, progress)?;
 
         // Computing operators takes more than a step of small networks.
         return_freed_memory();
-        let joints = ActiveJoints::new(&recipe.body, looks.iter().map(|l| l.largest_weights.as_slice()));
+        let joints =
+            ActiveJoints::new(&preprocessor.body, looks.iter().map(|l| l.largest_weights.as_slice()));
         let cards = looks.iter().map(|l| l.card.clone()).collect();
         let store = match cache {
             Some(cache) => Store::Streamed(Box::new(Streamed {
                 cache,
                 keys: looks.iter().filter_map(|l| l.keys).collect(),
-                recent: Recent::new(memory, Residence::Host),
-                origins,
-                recipe,
+                recent: LruCache::new(memory, Residence::Host),
+                sources,
+                preprocessor,
             })),
             None => {
                 let parts =
                     looks.into_par_iter().filter_map(|l| l.kept).map(|(garment, binding, operators)| {
-                        let garment = recipe.finish(garment, binding, &joints)?;
+                        let garment = preprocessor.finish(garment, binding, &joints)?;
                         Ok((Arc::new(garment), Arc::new(operators)))
                     });
                 let (garments, operators) =
-                    parts.collect::<Result<Vec<_>, LibraryError>>()?.into_iter().unzip();
+                    parts.collect::<Result<Vec<_>, DatasetError>>()?.into_iter().unzip();
                 Store::Kept { garments, operators }
             }
         };
@@ -135,19 +137,19 @@ impl Wardrobe {
     /// Returns the number of garments looked at and the bytes in the cache.
     ///
     /// # Errors
-    /// [`LibraryError`] names the file or garment at fault, or the missing setting.
+    /// [`DatasetError`] names the file or garment at fault, or the missing setting.
     pub fn prepare(
         config: &Config,
         body: Arc<Body>,
         [part, of]: [usize; 2],
         progress: &(dyn Fn(usize, usize, &str) + Sync),
-    ) -> Result<(usize, u64), LibraryError> {
-        let cache = config.data.open_cache().map_err(LibraryError::data)?.ok_or(LibraryError::NoCache)?;
-        let origins: Vec<_> =
-            Origin::list(&config.data.garments)?.into_iter().skip(part).step_by(of.max(1)).collect();
-        let recipe = Recipe::new(config, body);
-        first_look(&origins, &recipe, Some(&cache), config.data.max_vertices, progress)?;
-        Ok((origins.len(), cache.used()))
+    ) -> Result<(usize, u64), DatasetError> {
+        let cache = config.data.open_cache().map_err(DatasetError::data)?.ok_or(DatasetError::NoCache)?;
+        let sources: Vec<_> =
+            GarmentSource::list(&config.data.garments)?.into_iter().skip(part).step_by(of.max(1)).collect();
+        let preprocessor = Preprocessor::new(config, body);
+        index_garments(&sources, &preprocessor, Some(&cache), config.data.max_vertices, progress)?;
+        Ok((sources.len(), cache.used()))
     }
 
     /// Number of garments.
@@ -161,7 +163,7 @@ impl Wardrobe {
     }
 
     /// What is known of garment `index` without reading it.
-    pub fn card(&self, index: usize) -> &Card {
+    pub fn info(&self, index: usize) -> &GarmentInfo {
         &self.cards[index]
     }
 
@@ -173,8 +175,8 @@ impl Wardrobe {
     /// Garment `index`.
     ///
     /// # Errors
-    /// [`LibraryError`] when its records vanished from the cache and it cannot be made again.
-    pub fn garment(&self, index: usize) -> Result<Arc<LibraryGarment>, LibraryError> {
+    /// [`DatasetError`] when its records vanished from the cache and it cannot be made again.
+    pub fn garment(&self, index: usize) -> Result<Arc<PreparedGarment>, DatasetError> {
         let streamed = match &self.store {
             Store::Kept { garments, .. } => return Ok(garments[index].clone()),
             Store::Streamed(streamed) => streamed,
@@ -191,7 +193,7 @@ impl Wardrobe {
     ///
     /// # Errors
     /// As [`garment`](Self::garment).
-    pub fn operators(&self, index: usize) -> Result<Arc<SurfaceOperators>, LibraryError> {
+    pub fn operators(&self, index: usize) -> Result<Arc<SurfaceOperators>, DatasetError> {
         match &self.store {
             Store::Kept { operators, .. } => Ok(operators[index].clone()),
             Store::Streamed(streamed) => {
@@ -207,8 +209,13 @@ impl Wardrobe {
 }
 
 impl Streamed {
-    fn read(&self, index: usize, card: &Card, joints: &ActiveJoints) -> Result<LibraryGarment, LibraryError> {
-        let get = || get_binding(&self.cache, self.keys[index].binding, self.recipe.body.joint_count());
+    fn read(
+        &self,
+        index: usize,
+        card: &GarmentInfo,
+        joints: &ActiveJoints,
+    ) -> Result<PreparedGarment, DatasetError> {
+        let get = || get_binding(&self.cache, self.keys[index].binding, self.preprocessor.body.joint_count());
         let (rest, binding) = match get() {
             Some(found) => found,
             None => {
@@ -216,41 +223,41 @@ impl Streamed {
                 get().ok_or_else(|| self.lost(card))?
             }
         };
-        let Card { name, category, holding, source, .. } = card.clone();
-        self.recipe.finish(Garment { name, category, rest, holding, source }, binding, joints)
+        let GarmentInfo { name, category, holding, source, .. } = card.clone();
+        self.preprocessor.finish(Garment { name, category, rest, holding, source }, binding, joints)
     }
 
     /// Computes the records of a garment again that were there at the start of the run and no longer are.
-    fn restore(&self, index: usize) -> Result<(), LibraryError> {
+    fn restore(&self, index: usize) -> Result<(), DatasetError> {
         tracing::warn!(cache = %self.cache.root().display(), "a record vanished during the run, computed anew");
-        let origin = std::slice::from_ref(&self.origins[index]);
-        first_look(origin, &self.recipe, Some(&self.cache), usize::MAX, &|_, _, _| {}).map(|_| ())
+        let origin = std::slice::from_ref(&self.sources[index]);
+        index_garments(origin, &self.preprocessor, Some(&self.cache), usize::MAX, &|_, _, _| {}).map(|_| ())
     }
 
-    fn lost(&self, card: &Card) -> LibraryError {
-        LibraryError::Vanished { name: card.name.clone(), cache: self.cache.root().into() }
+    fn lost(&self, card: &GarmentInfo) -> DatasetError {
+        DatasetError::Vanished { name: card.name.clone(), cache: self.cache.root().into() }
     }
 }
 
 /// Makes every garment once: what is missing is computed, and stored or kept. Only as many as there are threads are in work at
 /// a time: one that waits for a part of its garment would begin another one.
-fn first_look(
-    origins: &[Origin],
-    recipe: &Recipe,
+fn index_garments(
+    sources: &[GarmentSource],
+    preprocessor: &Preprocessor,
     cache: Option<&ArrayCache>,
     max_vertices: usize,
     progress: &(dyn Fn(usize, usize, &str) + Sync),
-) -> Result<Vec<FirstLook>, LibraryError> {
-    let maker = Maker::new(&recipe.body, origins)?;
-    let body = cache.map(|_| body_key(&recipe.body));
+) -> Result<Vec<IndexEntry>, DatasetError> {
+    let maker = GarmentLoader::new(&preprocessor.body, sources)?;
+    let body = cache.map(|_| body_key(&preprocessor.body));
     let done = AtomicUsize::new(0);
-    let look = |origin: &Origin| {
+    let look = |origin: &GarmentSource| {
         let garment = maker.make(origin)?;
         let vertices = garment.rest.vertex_count();
         if vertices > max_vertices {
-            return Err(LibraryError::TooLarge { name: garment.name, vertices, limit: max_vertices });
+            return Err(DatasetError::TooLarge { name: garment.name, vertices, limit: max_vertices });
         }
-        let card = Card {
+        let card = GarmentInfo {
             name: garment.name.clone(),
             category: garment.category,
             holding: garment.holding,
@@ -259,47 +266,47 @@ fn first_look(
             mesh: mesh_key(&garment.rest),
         };
         let look = match (cache, body) {
-            (Some(cache), Some(body)) => stored(card, &garment, recipe, cache, body)?,
+            (Some(cache), Some(body)) => stored(card, &garment, preprocessor, cache, body)?,
             _ => {
-                let binding = Binding::new(&garment, &recipe.body, &recipe.binding);
-                let operators = recipe.operators(&garment.name, &garment.rest)?;
-                let largest_weights = binding.largest_weights(recipe.body.joint_count());
-                FirstLook { card, largest_weights, kept: Some((garment, binding, operators)), keys: None }
+                let binding = Binding::new(&garment, &preprocessor.body, &preprocessor.binding);
+                let operators = preprocessor.operators(&garment.name, &garment.rest)?;
+                let largest_weights = binding.largest_weights(preprocessor.body.joint_count());
+                IndexEntry { card, largest_weights, kept: Some((garment, binding, operators)), keys: None }
             }
         };
-        progress(done.fetch_add(1, Ordering::Relaxed) + 1, origins.len(), &look.card.name);
+        progress(done.fetch_add(1, Ordering::Relaxed) + 1, sources.len(), &look.card.name);
         Ok(look)
     };
-    let mut looks = Vec::with_capacity(origins.len());
-    for at_once in origins.chunks(rayon::current_num_threads()) {
+    let mut looks = Vec::with_capacity(sources.len());
+    for at_once in sources.chunks(rayon::current_num_threads()) {
         looks.par_extend(at_once.par_iter().map(look).collect::<Result<Vec<_>, _>>()?);
     }
     Ok(looks)
 }
 
 fn stored(
-    card: Card,
+    card: GarmentInfo,
     garment: &Garment,
-    recipe: &Recipe,
+    preprocessor: &Preprocessor,
     cache: &ArrayCache,
     body: Key,
-) -> Result<FirstLook, LibraryError> {
-    let joints = recipe.body.joint_count();
+) -> Result<IndexEntry, DatasetError> {
+    let joints = preprocessor.body.joint_count();
     let keys = Keys {
-        binding: binding_key(card.mesh, body, garment.category, &recipe.binding),
-        operators: operators_key(card.mesh, recipe.eigen_count),
+        binding: binding_key(card.mesh, body, garment.category, &preprocessor.binding),
+        operators: operators_key(card.mesh, preprocessor.eigen_count),
     };
     let largest_weights = match get_largest_weights(cache, keys.binding) {
         Some(largest) if largest.len() == joints => largest,
         _ => {
-            let binding = Binding::new(garment, &recipe.body, &recipe.binding);
-            put_binding(cache, keys.binding, &garment.rest, &binding, joints).map_err(LibraryError::data)?;
+            let binding = Binding::new(garment, &preprocessor.body, &preprocessor.binding);
+            put_binding(cache, keys.binding, &garment.rest, &binding, joints).map_err(DatasetError::data)?;
             binding.largest_weights(joints)
         }
     };
     if !cache.contains(keys.operators) {
-        let operators = recipe.operators(&garment.name, &garment.rest)?;
-        put_operators(cache, keys.operators, &operators).map_err(LibraryError::data)?;
+        let operators = preprocessor.operators(&garment.name, &garment.rest)?;
+        put_operators(cache, keys.operators, &operators).map_err(DatasetError::data)?;
     }
-    Ok(FirstLook { card, largest_weights, kept: None, keys: Some(keys) })
+    Ok(IndexEntry { card, largest_weights, kept: None, keys: Some(keys) })
 }

@@ -1,4 +1,4 @@
-//! Motions of the library's `Draper`: what the networks make is averaged over frames.
+//! Motions of the dataset's `Draper`: what the networks make is averaged over frames.
 
 use crate::drape::{SKIRT, TEE, run_folder};
 use clothcombo_data::asset::Pose;
@@ -19,8 +19,8 @@ fn bodies() -> Vec<BodyState> {
 fn draped(radius: usize) -> Vec<Drape> {
     let settings = DraperSettings { resolve: false, ..DraperSettings::default() };
     let draper = Draper::load(Some(run_folder()), &settings).unwrap();
-    let closet = draper.closet(&[]).unwrap();
-    let garments = [TEE, SKIRT].map(|name| closet.find(name, draper.body(), None).unwrap());
+    let catalog = draper.catalog(&[]).unwrap();
+    let garments = [TEE, SKIRT].map(|name| catalog.find(name, draper.body(), None).unwrap());
     let outfit = draper.outfit(garments.into()).unwrap();
     draper.drape_motion(&outfit, &bodies(), radius, |_| ()).unwrap()
 }

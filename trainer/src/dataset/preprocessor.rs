@@ -1,8 +1,8 @@
-//! How a rest mesh becomes a [`LibraryGarment`]: the same for training and for draping.
+//! How a rest mesh becomes a [`PreparedGarment`]: the same for training and for draping.
 
 use super::active_joints::ActiveJoints;
-use super::error::LibraryError;
-use super::garment::LibraryGarment;
+use super::error::DatasetError;
+use super::prepared_garment::PreparedGarment;
 use crate::config::Config;
 use clothcombo_data::asset::{Binding, BindingSettings, Body, Garment};
 use clothcombo_physics::energy::{EnergySettings, GarmentEnergies};
@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 /// Body and settings with which garments are prepared.
 #[derive(Clone)]
-pub struct Recipe {
+pub struct Preprocessor {
     /// The body garments are bound to.
     pub body: Arc<Body>,
     /// How they are bound.
@@ -24,7 +24,7 @@ pub struct Recipe {
     pub eigen_count: usize,
 }
 
-impl Recipe {
+impl Preprocessor {
     /// That of a run with `config` on `body`.
     pub fn new(config: &Config, body: Arc<Body>) -> Self {
         let start = &config.start;
@@ -45,9 +45,9 @@ impl Recipe {
     ///
     /// # Errors
     /// When the mesh has none, by the garment's name.
-    pub fn operators(&self, name: &str, rest: &TriMesh) -> Result<SurfaceOperators, LibraryError> {
+    pub fn operators(&self, name: &str, rest: &TriMesh) -> Result<SurfaceOperators, DatasetError> {
         SurfaceOperators::new(rest, self.eigen_count)
-            .map_err(|e| LibraryError::Garment { name: name.to_owned(), reason: e.to_string() })
+            .map_err(|e| DatasetError::Garment { name: name.to_owned(), reason: e.to_string() })
     }
 
     /// Puts a garment and its binding together for networks that see `joints`.
@@ -59,11 +59,11 @@ impl Recipe {
         garment: Garment,
         binding: Binding,
         joints: &ActiveJoints,
-    ) -> Result<LibraryGarment, LibraryError> {
+    ) -> Result<PreparedGarment, DatasetError> {
         let topology = Topology::new(&garment.rest);
         let energies = GarmentEnergies::new(&garment.rest, &topology, &self.energy, garment.holding)
-            .map_err(|e| LibraryError::Garment { name: garment.name.clone(), reason: e.to_string() })?;
-        Ok(LibraryGarment {
+            .map_err(|e| DatasetError::Garment { name: garment.name.clone(), reason: e.to_string() })?;
+        Ok(PreparedGarment {
             skin_weights: joints.restrict(&binding.skin_weights),
             shape_directions: binding.shape_directions,
             energies: Arc::new(energies),

@@ -11,7 +11,7 @@ use clothcombo_physics::vec3::{add, sub};
 use std::collections::{BTreeMap, VecDeque};
 
 /// The frames of a motion as the networks make them, in order; each is made when it is first needed.
-pub(super) struct Steady<'a> {
+pub(super) struct TemporalFilter<'a> {
     draper: &'a Draper,
     outfit: &'a Outfit,
     bodies: &'a [BodyState],
@@ -24,7 +24,7 @@ pub(super) struct Steady<'a> {
     offsets: BTreeMap<usize, Vec<[f64; 3]>>,
 }
 
-impl<'a> Steady<'a> {
+impl<'a> TemporalFilter<'a> {
     /// For `bodies`, averaged over `radius` of them to each side.
     pub fn new(draper: &'a Draper, outfit: &'a Outfit, bodies: &'a [BodyState], radius: usize) -> Self {
         // One frame has no neighbours.
@@ -48,7 +48,7 @@ impl<'a> Steady<'a> {
     }
 }
 
-impl Iterator for Steady<'_> {
+impl Iterator for TemporalFilter<'_> {
     type Item = Result<Networked, DraperError>;
 
     fn next(&mut self) -> Option<Self::Item> {

@@ -12,7 +12,7 @@ use std::sync::Mutex;
 ///
 /// # Errors
 /// The first one of `work`, by the order of the items; and when the system refuses a thread.
-pub fn each_on_one_core<I: Send, O: Send>(
+pub fn map_single_threaded<I: Send, O: Send>(
     items: Vec<I>,
     jobs: Option<usize>,
     work: impl Fn(I) -> Result<O, Report> + Sync,
@@ -54,7 +54,7 @@ mod tests {
     fn no_more_run_at_once_than_asked_for_and_each_on_one_thread() {
         for jobs in [1, 2, 3] {
             let (running, most) = (AtomicUsize::new(0), AtomicUsize::new(0));
-            let results = each_on_one_core((0..12).collect(), Some(jobs), |i| {
+            let results = map_single_threaded((0..12).collect(), Some(jobs), |i| {
                 most.fetch_max(running.fetch_add(1, SeqCst) + 1, SeqCst);
                 std::thread::sleep(Duration::from_millis(5));
                 running.fetch_sub(1, SeqCst);
@@ -68,10 +68,10 @@ mod tests {
 
     #[test]
     fn the_first_failure_by_order_is_told() {
-        let results = each_on_one_core(vec![1, 2, 3, 4], Some(2), |i| {
+        let results = map_single_threaded(vec![1, 2, 3, 4], Some(2), |i| {
             if i % 2 == 0 { Err(miette!("item {i}")) } else { Ok(i) }
         });
         assert_eq!(results.unwrap_err().to_string(), "item 2");
-        assert!(each_on_one_core(Vec::<u8>::new(), None, Ok).unwrap().is_empty());
+        assert!(map_single_threaded(Vec::<u8>::new(), None, Ok).unwrap().is_empty());
     }
 }

@@ -3,7 +3,7 @@
 //! Every step reads its own stream of the generator, so nothing has to be stored to resume, and drawing ahead on
 //! another thread changes nothing.
 
-use super::library::Library;
+use super::contents::Dataset;
 use super::poses::HeldOut;
 use crate::config::{StageConfig, ValidationConfig};
 use clothcombo_data::asset::Pose;
@@ -14,7 +14,7 @@ use rand_chacha::ChaCha8Rng;
 
 /// One body of a scene.
 #[derive(Clone, Debug, PartialEq)]
-pub struct BodyDraw {
+pub struct BodySample {
     /// Shape parameters β.
     pub shape: Vec<f64>,
     /// Pose θ, as the networks see it: facing +z unless `data.poses.remove_heading` is off.
@@ -23,11 +23,11 @@ pub struct BodyDraw {
 
 /// Garments from the innermost to the outermost, and the bodies they are draped on.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SceneDraw {
-    /// Indices into the library, inner → outer.
+pub struct SceneSample {
+    /// Indices into the dataset, inner → outer.
     pub garments: Vec<usize>,
     /// Bodies.
-    pub bodies: Vec<BodyDraw>,
+    pub bodies: Vec<BodySample>,
     /// Number of the random sample of pairs that the repulsion looks at (`losses.repulsion.subset`): another one in every
     /// training scene, so that in the long run all pairs count.
     pub repulsion_sample: u32,
@@ -59,33 +59,33 @@ fn garments(pool: &[usize], count: usize, rng: &mut ChaCha8Rng) -> Vec<usize> {
     }
 }
 
-fn shape(library: &Library, rng: &mut ChaCha8Rng) -> Vec<f64> {
-    let [low, high] = library.shape_range;
-    (0..library.shape_count).map(|_| low + (high - low) * rng.random::<f64>()).collect()
+fn shape(dataset: &Dataset, rng: &mut ChaCha8Rng) -> Vec<f64> {
+    let [low, high] = dataset.shape_range;
+    (0..dataset.shape_count).map(|_| low + (high - low) * rng.random::<f64>()).collect()
 }
 
 /// A scene that is scored: always by the same sample of pairs.
-fn scored(garments: Vec<usize>, body: BodyDraw) -> SceneDraw {
-    SceneDraw { garments, bodies: vec![body], repulsion_sample: 0 }
+fn scored(garments: Vec<usize>, body: BodySample) -> SceneSample {
+    SceneSample { garments, bodies: vec![body], repulsion_sample: 0 }
 }
 
 /// Streams of the further scenes of a step lie this far apart; a run has fewer steps.
 const FURTHER_SCENE: u64 = 1 << 48;
 
 /// Scene number `scene` (from 0) of training step `step`.
-pub fn draw_training(library: &Library, seed: u64, step: u64, scene: usize, plan: Plan) -> SceneDraw {
+pub fn sample_training(dataset: &Dataset, seed: u64, step: u64, scene: usize, plan: Plan) -> SceneSample {
     let mut rng = generator(seed, step + scene as u64 * FURTHER_SCENE);
     let [low, high] = plan.stage.layers_at(plan.progress);
     let layers = rng.random_range(low..=high);
-    let garments = garments(&library.split.training, layers, &mut rng);
+    let garments = garments(&dataset.split.training, layers, &mut rng);
     let scale = plan.stage.pose_scale.at(plan.progress);
     let bodies = (0..plan.stage.bodies)
-        .map(|_| BodyDraw {
-            shape: shape(library, &mut rng),
-            pose: library.poses.draw_training(scale, &mut rng),
+        .map(|_| BodySample {
+            shape: shape(dataset, &mut rng),
+            pose: dataset.poses.sample_training(scale, &mut rng),
         })
         .collect();
-    SceneDraw { garments, bodies, repulsion_sample: rng.random() }
+    SceneSample { garments, bodies, repulsion_sample: rng.random() }
 }
 
 /// Its block of streams lies behind those of the validation groups.
@@ -94,14 +94,14 @@ const OUTFIT_STREAM: u64 = VALIDATION_STREAM + (16 << 32);
 /// Outfit `index`: 1 to `most` garments (one more from each outfit to the next) of the whole wardrobe, held-out ones among
 /// them, in random order, on a body in a pose of a validation clip, or of a held-out window where there are none. The test
 /// clips stay unread: the post-process is tuned on these outfits.
-pub fn draw_outfit(library: &Library, seed: u64, index: u64, most: usize) -> SceneDraw {
+pub fn sample_outfit(dataset: &Dataset, seed: u64, index: u64, most: usize) -> SceneSample {
     let mut rng = generator(seed, OUTFIT_STREAM + index);
-    let all: Vec<usize> = (0..library.wardrobe.len()).collect();
+    let all: Vec<usize> = (0..dataset.garments.len()).collect();
     let garments = garments(&all, 1 + index as usize % most.max(1), &mut rng);
     let clips = HeldOut::ValidationClips;
-    let poses = if library.poses.has(clips) { clips } else { HeldOut::Windows };
-    let pose = library.poses.draw_held_out(poses, &mut rng);
-    scored(garments, BodyDraw { shape: shape(library, &mut rng), pose })
+    let poses = if dataset.poses.has(clips) { clips } else { HeldOut::Windows };
+    let pose = dataset.poses.draw_held_out(poses, &mut rng);
+    scored(garments, BodySample { shape: shape(dataset, &mut rng), pose })
 }
 
 /// Scenes of an evaluation lie behind the outfits; every question has a block of streams of its own.
@@ -109,18 +109,18 @@ const STUDY_STREAM: u64 = VALIDATION_STREAM + (32 << 32);
 
 /// Scene `index` of question number `question` of an evaluation: `layers` garments of `pool` in random order, on a body in a
 /// pose of `poses`.
-pub fn draw_study(
-    library: &Library,
+pub fn sample_evaluation(
+    dataset: &Dataset,
     seed: u64,
     [question, index]: [usize; 2],
     pool: &[usize],
     layers: usize,
     poses: HeldOut,
-) -> SceneDraw {
+) -> SceneSample {
     let mut rng = generator(seed, STUDY_STREAM + ((question as u64) << 32) + index as u64);
     // The body first: with it, a question asked of two wardrobes is asked on the same bodies.
     let body =
-        BodyDraw { shape: shape(library, &mut rng), pose: library.poses.draw_held_out(poses, &mut rng) };
+        BodySample { shape: shape(dataset, &mut rng), pose: dataset.poses.draw_held_out(poses, &mut rng) };
     scored(garments(pool, layers, &mut rng), body)
 }
 
@@ -164,39 +164,39 @@ impl ValidationGroup {
 
 /// Of `count` scenes, which of `of` garments scene `i` is about: all in turn, or evenly spread ones where there are more
 /// garments than scenes.
-pub fn in_turn(i: usize, count: usize, of: usize) -> usize {
+pub fn round_robin(i: usize, count: usize, of: usize) -> usize {
     if count < of { i * of / count } else { i % of }
 }
 
 /// The fixed validation scenes of `group`; garments in turn, layer counts in turn.
-pub fn draw_validation(
-    library: &Library,
+pub fn sample_validation(
+    dataset: &Dataset,
     seed: u64,
     config: &ValidationConfig,
     group: ValidationGroup,
-) -> Vec<SceneDraw> {
+) -> Vec<SceneSample> {
     let (count, poses) = match group {
         ValidationGroup::Single => (config.single_scenes, HeldOut::Windows),
         ValidationGroup::UnseenMotion => (config.unseen_scenes, HeldOut::ValidationClips),
         ValidationGroup::UnseenGarment => (config.unseen_garment_scenes, HeldOut::Windows),
         ValidationGroup::Layered => (config.layered_scenes, HeldOut::Windows),
     };
-    let is_without = group == ValidationGroup::UnseenGarment && library.split.validation.is_empty();
-    let count = if is_without || !library.poses.has(poses) { 0 } else { count };
-    let one = |pool: &[usize], i: usize| vec![pool[in_turn(i, count, pool.len())]];
+    let is_without = group == ValidationGroup::UnseenGarment && dataset.split.validation.is_empty();
+    let count = if is_without || !dataset.poses.has(poses) { 0 } else { count };
+    let one = |pool: &[usize], i: usize| vec![pool[round_robin(i, count, pool.len())]];
     (0..count)
         .map(|i| {
             let mut rng = generator(seed, VALIDATION_STREAM + (group.stream() << 32) + i as u64);
             let garments = match group {
                 ValidationGroup::Layered => {
                     let [low, high] = config.layers;
-                    garments(&library.split.training, low + i % (high - low + 1), &mut rng)
+                    garments(&dataset.split.training, low + i % (high - low + 1), &mut rng)
                 }
-                ValidationGroup::UnseenGarment => one(&library.split.validation, i),
-                ValidationGroup::Single | ValidationGroup::UnseenMotion => one(&library.split.training, i),
+                ValidationGroup::UnseenGarment => one(&dataset.split.validation, i),
+                ValidationGroup::Single | ValidationGroup::UnseenMotion => one(&dataset.split.training, i),
             };
-            let pose = library.poses.draw_held_out(poses, &mut rng);
-            scored(garments, BodyDraw { shape: shape(library, &mut rng), pose })
+            let pose = dataset.poses.draw_held_out(poses, &mut rng);
+            scored(garments, BodySample { shape: shape(dataset, &mut rng), pose })
         })
         .collect()
 }

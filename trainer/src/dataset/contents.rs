@@ -1,10 +1,10 @@
 //! What a run draws its scenes from: body, garments, poses.
 
 use super::active_joints::ActiveJoints;
-use super::error::LibraryError;
+use super::error::DatasetError;
+use super::garment_store::GarmentStore;
 use super::poses::{HeldOut, PoseLibrary};
 use super::split::{GarmentSplit, SplitNames};
-use super::wardrobe::Wardrobe;
 use crate::config::Config;
 use crate::system::lru_cache::MemoryBudget;
 use clothcombo_data::asset::{BODY_JOINT_COUNT, Body, BodyFileSettings, Pose, Provenance};
@@ -16,13 +16,13 @@ use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
 /// What a run draws its scenes from.
-pub struct Library {
+pub struct Dataset {
     /// The body model.
     pub body: Arc<Body>,
     /// Where the body comes from.
     pub body_source: Provenance,
     /// All garments, in source order.
-    pub wardrobe: Wardrobe,
+    pub garments: GarmentStore,
     /// Which garments are trained on.
     pub split: GarmentSplit,
     /// Poses.
@@ -43,14 +43,14 @@ pub struct Library {
 ///
 /// # Errors
 /// When the file is not a body model.
-pub fn load_body(name: &str, shape_components: usize) -> Result<Body, LibraryError> {
+pub fn load_body(name: &str, shape_components: usize) -> Result<Body, DatasetError> {
     let settings = match shape_components {
         0 => BodyFileSettings { shape_components: usize::MAX },
         limit => BodyFileSettings { shape_components: limit },
     };
     match name {
         "mannequin" => Ok(mannequin().with_shape_components(settings.shape_components)),
-        path => Body::load(Path::new(path), &settings).map_err(LibraryError::data),
+        path => Body::load(Path::new(path), &settings).map_err(DatasetError::data),
     }
 }
 
@@ -68,7 +68,7 @@ pub struct LicenceLine {
 /// What a fingerprint of this kind begins with; earlier ones looked at less, or split the poses otherwise.
 const FINGERPRINT: &str = "4:";
 
-/// Whether `text` is a [fingerprint](Library::fingerprint) as they are made now, and can be compared with another.
+/// Whether `text` is a [fingerprint](Dataset::fingerprint) as they are made now, and can be compared with another.
 pub fn is_fingerprint(text: &str) -> bool {
     text.starts_with(FINGERPRINT)
 }
@@ -101,33 +101,33 @@ fn poses_key(mut key: KeyBuilder, parts: &[&[Pose]]) -> Key {
     key.finish()
 }
 
-impl Library {
+impl Dataset {
     /// Loads and prepares everything `config` names. `progress(done, total, name)` is called per garment.
     ///
     /// # Errors
-    /// [`LibraryError`] names the file or garment at fault.
+    /// [`DatasetError`] names the file or garment at fault.
     pub fn load(
         config: &Config,
         progress: &(dyn Fn(usize, usize, &str) + Sync),
-    ) -> Result<Self, LibraryError> {
+    ) -> Result<Self, DatasetError> {
         let body = Arc::new(load_body(&config.data.body, config.data.shape_components)?);
         if body.joint_count() < BODY_JOINT_COUNT {
-            return Err(LibraryError::FewJoints { name: body.name.clone(), joints: body.joint_count() });
+            return Err(DatasetError::FewJoints { name: body.name.clone(), joints: body.joint_count() });
         }
         let shape_count = match config.data.shape_components {
             0 => body.shape_count,
             asked if asked <= body.shape_count => asked,
-            asked => return Err(LibraryError::ShapeComponents { asked, available: body.shape_count }),
+            asked => return Err(DatasetError::ShapeComponents { asked, available: body.shape_count }),
         };
         let poses = PoseLibrary::new(&config.data.poses, &body)?;
         let memory = MemoryBudget::new(config.data.memory_limits());
-        let wardrobe = Wardrobe::load(config, body.clone(), &memory, progress)?;
-        let names: Vec<&str> = (0..wardrobe.len()).map(|i| wardrobe.card(i).name.as_str()).collect();
+        let garments = GarmentStore::load(config, body.clone(), &memory, progress)?;
+        let names: Vec<&str> = (0..garments.len()).map(|i| garments.info(i).name.as_str()).collect();
         let split = GarmentSplit::new(&names, &config.data)?;
         Ok(Self {
             body_source: body_source(&config.data.body),
             body,
-            wardrobe,
+            garments,
             split,
             poses,
             graph: config.model.graph,
@@ -140,7 +140,7 @@ impl Library {
 
     /// Which garments and clips are for what, by name: what a run writes down.
     pub fn split_names(&self) -> SplitNames {
-        let names = |indices: &[usize]| indices.iter().map(|&i| self.wardrobe.card(i).name.clone()).collect();
+        let names = |indices: &[usize]| indices.iter().map(|&i| self.garments.info(i).name.clone()).collect();
         let clips = self.poses.clips();
         SplitNames {
             training_garments: names(&self.split.training),
@@ -178,7 +178,7 @@ impl Library {
             .array(&body.joint_shape_directions)
             .array(body.pose_directions.as_deref().unwrap_or_default())
             .number(self.shape_count as u64);
-        for card in (0..self.wardrobe.len()).map(|i| self.wardrobe.card(i)) {
+        for card in (0..self.garments.len()).map(|i| self.garments.info(i)) {
             key = key
                 .text(&card.name)
                 .text(card.category.name())
@@ -201,7 +201,7 @@ impl Library {
             }
         };
         add("body", &self.body_source);
-        (0..self.wardrobe.len()).for_each(|i| add("garment", &self.wardrobe.card(i).source));
+        (0..self.garments.len()).for_each(|i| add("garment", &self.garments.info(i).source));
         self.poses.sources().iter().for_each(|source| add("motion", source));
         lines
     }
@@ -214,6 +214,6 @@ impl Library {
 
     /// Joints the networks see.
     pub fn joints(&self) -> &ActiveJoints {
-        self.wardrobe.joints()
+        self.garments.joints()
     }
 }

@@ -4,7 +4,7 @@
 //! step's scenes, and takes the same optimiser step on the sum of all gradients. Only the leader writes and prints.
 //!
 //! All processes call the same collective operations in the same order. To keep that so when one of them fails, everyone
-//! meets before each exchange ([`World::meet`]) and once at the end ([`World::conclude`]): a process with an error goes
+//! meets before each exchange ([`ProcessGroup::meet`]) and once at the end ([`ProcessGroup::conclude`]): a process with an error goes
 //! straight to the latter, and the others learn of it at whichever meeting they are waiting in.
 
 use miette::{Diagnostic, Report};
@@ -17,21 +17,21 @@ use mpi_engine::Engine;
 
 /// The processes of a run.
 #[derive(Default)]
-pub struct World {
+pub struct ProcessGroup {
     #[cfg(feature = "mpi")]
     engine: Option<Engine>,
 }
 
 /// Which scenes of a step a process computes: number i where i mod `size` is `rank`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Share {
+pub struct RankPartition {
     /// Number of the process, from 0.
     pub rank: usize,
     /// Processes, at least 1.
     pub size: usize,
 }
 
-impl Share {
+impl RankPartition {
     /// All scenes.
     pub const WHOLE: Self = Self { rank: 0, size: 1 };
 
@@ -51,7 +51,7 @@ pub struct FailedElsewhere {
 
 /// Why processes cannot train together.
 #[derive(Debug, Error, Diagnostic)]
-pub enum WorldError {
+pub enum ProcessGroupError {
     /// Started by an MPI launcher, but built without MPI.
     #[error("started as one of {size} MPI processes, but this program was built without MPI")]
     #[diagnostic(help("build with --features mpi, or start it without mpirun"))]
@@ -89,32 +89,32 @@ enum Attendance {
     Failed,
 }
 
-impl World {
+impl ProcessGroup {
     /// Joins the processes started by the same launcher; alone where there is none.
     ///
     /// # Errors
     /// When MPI does not start, or this build knows none and several processes were started.
-    pub fn join() -> Result<Self, WorldError> {
+    pub fn join() -> Result<Self, ProcessGroupError> {
         #[cfg(feature = "mpi")]
         return Ok(Self { engine: Some(Engine::start()?) });
         #[cfg(not(feature = "mpi"))]
         match launched() {
             0 | 1 => Ok(Self::default()),
-            size => Err(WorldError::NotBuilt { size }),
+            size => Err(ProcessGroupError::NotBuilt { size }),
         }
     }
 
     /// Which scenes this process computes.
-    pub fn share(&self) -> Share {
+    pub fn share(&self) -> RankPartition {
         #[cfg(feature = "mpi")]
         if let Some(engine) = &self.engine {
             return engine.share();
         }
-        Share::WHOLE
+        RankPartition::WHOLE
     }
 
     /// Whether this process writes and prints.
-    pub fn leads(&self) -> bool {
+    pub fn is_rank_zero(&self) -> bool {
         self.share().rank == 0
     }
 
@@ -193,15 +193,15 @@ mod tests {
     #[test]
     fn shares_cover_every_scene_once() {
         for size in 1..5 {
-            let shares: Vec<Share> = (0..size).map(|rank| Share { rank, size }).collect();
+            let shares: Vec<RankPartition> = (0..size).map(|rank| RankPartition { rank, size }).collect();
             assert!((0..12).all(|scene| shares.iter().filter(|share| share.has(scene)).count() == 1));
         }
     }
 
     #[test]
     fn a_process_alone_meets_itself_and_reports_its_own_errors() {
-        let world = World::default();
-        assert!(world.leads() && !world.is_shared());
+        let world = ProcessGroup::default();
+        assert!(world.is_rank_zero() && !world.is_shared());
         assert!(!world.meet(false).unwrap() && world.meet(true).unwrap());
         assert_eq!(world.sum(vec![1.0, 2.0]), [1.0, 2.0]);
         assert!(world.conclude(Ok(())).is_ok());

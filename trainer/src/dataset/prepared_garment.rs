@@ -7,8 +7,8 @@ use rayon::prelude::*;
 use std::sync::Arc;
 
 /// A garment with everything that does not change during training, but for DiffusionNet's operators
-/// ([`Wardrobe::operators`](super::Wardrobe::operators)), which only the device needs.
-pub struct LibraryGarment {
+/// ([`GarmentStore::operators`](super::GarmentStore::operators)), which only the device needs.
+pub struct PreparedGarment {
     /// Rest mesh, category, provenance.
     pub garment: Garment,
     /// Constants of its energies.
@@ -24,7 +24,7 @@ pub struct LibraryGarment {
 /// Constants of the energies per vertex [bytes], and its neighbourhoods; measured on garments of 8,000 vertices.
 const ENERGIES: usize = 1050;
 
-impl LibraryGarment {
+impl PreparedGarment {
     /// Number of vertices.
     pub fn vertex_count(&self) -> usize {
         self.garment.rest.vertex_count()

@@ -1,6 +1,6 @@
 //! The collective operations over MPI.
 
-use super::{Share, WorldError};
+use super::{ProcessGroupError, RankPartition};
 use mpi::Threading;
 use mpi::collective::SystemOperation;
 use mpi::environment::Universe;
@@ -14,15 +14,15 @@ pub(super) struct Engine {
 }
 
 impl Engine {
-    pub(super) fn start() -> Result<Self, WorldError> {
+    pub(super) fn start() -> Result<Self, ProcessGroupError> {
         // Other threads compute and read, but only this one exchanges anything.
         let (universe, _) =
-            mpi::initialize_with_threading(Threading::Funneled).ok_or(WorldError::NotStarted)?;
+            mpi::initialize_with_threading(Threading::Funneled).ok_or(ProcessGroupError::NotStarted)?;
         Ok(Self { communicator: universe.world(), _universe: universe })
     }
 
-    pub(super) fn share(&self) -> Share {
-        Share { rank: self.communicator.rank() as usize, size: self.communicator.size() as usize }
+    pub(super) fn share(&self) -> RankPartition {
+        RankPartition { rank: self.communicator.rank() as usize, size: self.communicator.size() as usize }
     }
 
     pub(super) fn gather(&self, row: &[f64]) -> Vec<Vec<f64>> {

@@ -25,11 +25,11 @@ fn motions(folder: &Path) {
     }
 }
 
-fn clip_of(body: &BodyDraw) -> &'static str {
+fn clip_of(body: &BodySample) -> &'static str {
     CLIPS[(body.pose.rotations[1][0] / 0.1).round() as usize]
 }
 
-fn library(folder: &Path) -> (Config, Library) {
+fn dataset(folder: &Path) -> (Config, Dataset) {
     motions(folder);
     let text = format!(
         "seed = 1\n[data]\nbody = \"mannequin\"\nsplit = {{ validation = 0.3, test = 0.3 }}\n\
@@ -39,17 +39,17 @@ fn library(folder: &Path) -> (Config, Library) {
          [[stages]]\nname = \"single\"\ntrains = \"single\"\nsteps = 10\nlayers = [1, 1]\n"
     );
     let config: Config = toml::from_str(&text).unwrap();
-    let library = Library::load(&config, &|_, _, _| {}).unwrap();
-    (config, library)
+    let dataset = Dataset::load(&config, &|_, _, _| {}).unwrap();
+    (config, dataset)
 }
 
 #[test]
 fn no_run_draws_a_test_garment_or_a_test_clip_and_the_evaluation_does() {
     let folder = tempfile::tempdir().unwrap();
-    let (config, library) = library(folder.path());
-    let split = &library.split;
+    let (config, dataset) = dataset(folder.path());
+    let split = &dataset.split;
     assert!(split.training.len() > 1 && !split.validation.is_empty() && !split.test.is_empty(), "{split:?}");
-    let names = library.split_names();
+    let names = dataset.split_names();
     assert_eq!((names.validation_clips, names.test_clips), (vec!["dance".to_owned()], vec!["jump".into()]));
     assert_eq!(names.training_clips, ["reach", "walk"]);
     assert_eq!(names.validation_windows.len(), 2);
@@ -64,7 +64,7 @@ fn no_run_draws_a_test_garment_or_a_test_clip_and_the_evaluation_does() {
     for group in ValidationGroup::ALL {
         let (mut clips, mut garments) = (BTreeSet::new(), BTreeSet::new());
         for seed in 0..50 {
-            for draw in draw_validation(&library, seed, &scenes, group) {
+            for draw in sample_validation(&dataset, seed, &scenes, group) {
                 clips.extend(draw.bodies.iter().map(clip_of));
                 garments.extend(draw.garments);
             }
@@ -82,24 +82,24 @@ fn no_run_draws_a_test_garment_or_a_test_clip_and_the_evaluation_does() {
     }
     let plan = Plan { stage: &config.stages[0], progress: 1.0 };
     for step in 0..500 {
-        let draw = draw_training(&library, 1, step, 0, plan);
+        let draw = sample_training(&dataset, 1, step, 0, plan);
         assert!(["walk", "reach"].contains(&clip_of(&draw.bodies[0])));
         assert!(draw.garments.iter().all(|g| split.training.contains(g)));
     }
     for index in 0..50 {
-        let draw = draw_study(&library, 1, [0, index], &split.test, 1, HeldOut::TestClips);
+        let draw = sample_evaluation(&dataset, 1, [0, index], &split.test, 1, HeldOut::TestClips);
         assert_eq!(clip_of(&draw.bodies[0]), "jump");
         // The outfits that the post-process is tuned on leave the test clips alone.
-        assert_eq!(clip_of(&draw_outfit(&library, 1, index as u64, 2).bodies[0]), "dance");
+        assert_eq!(clip_of(&sample_outfit(&dataset, 1, index as u64, 2).bodies[0]), "dance");
     }
 }
 
 #[test]
 fn without_a_validation_set_its_groups_are_empty() {
     let folder = tempfile::tempdir().unwrap();
-    let (_, mut library) = library(folder.path());
-    library.split.validation.clear();
-    let draws = |group| draw_validation(&library, 1, &ValidationConfig::default(), group).len();
+    let (_, mut dataset) = dataset(folder.path());
+    dataset.split.validation.clear();
+    let draws = |group| sample_validation(&dataset, 1, &ValidationConfig::default(), group).len();
     assert_eq!(draws(ValidationGroup::UnseenGarment), 0);
     assert_eq!(draws(ValidationGroup::UnseenMotion), ValidationConfig::default().unseen_scenes);
 }
@@ -107,11 +107,11 @@ fn without_a_validation_set_its_groups_are_empty() {
 #[test]
 fn another_margin_is_other_data_with_the_same_windows() {
     let folder = tempfile::tempdir().unwrap();
-    let (mut config, library) = library(folder.path());
+    let (mut config, dataset) = dataset(folder.path());
     let same = |config: &Config| {
-        let other = Library::load(config, &|_, _, _| {}).unwrap();
-        let windows = library.fingerprint_of_windows() == other.fingerprint_of_windows();
-        (library.fingerprint() == other.fingerprint(), windows)
+        let other = Dataset::load(config, &|_, _, _| {}).unwrap();
+        let windows = dataset.fingerprint_of_windows() == other.fingerprint_of_windows();
+        (dataset.fingerprint() == other.fingerprint(), windows)
     };
     assert_eq!(same(&config), (true, true));
     config.data.poses.held_out_margin = 0.0;
