@@ -124,7 +124,7 @@ fn a_garment_drapes_in_an_outfit_that_it_does_not_touch_as_it_does_alone() {
     let (config, dataset, tensors, model, scene) = setting(folder.path());
     let networks = Networks::new(wild(model).valid(), &tensors);
     let draw = |garments: &[usize]| {
-        let draw = SceneSample { garments: garments.to_vec(), ..scene.draw.clone() };
+        let draw = SceneSample { garments: garments.to_vec(), ..scene.sample.clone() };
         let mut scene = prepare(&dataset, &config.losses, draw, 1.0).unwrap();
         // Without an edge nothing presses and nothing is judged together.
         scene.contacts.clear();
@@ -132,7 +132,7 @@ fn a_garment_drapes_in_an_outfit_that_it_does_not_touch_as_it_does_alone() {
         scene.bodies[0].energy = Arc::new(apart);
         scene
     };
-    let pair = &scene.draw.garments[..2];
+    let pair = &scene.sample.garments[..2];
     let together = networks.drape(&draw(pair)).unwrap();
     let rows = dataset.garments.garment(pair[0]).unwrap().vertex_count();
     for (garment, rows) in pair.iter().zip([0..rows, rows..together.posed.len()]) {

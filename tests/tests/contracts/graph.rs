@@ -23,7 +23,7 @@ fn acts_on_a_single_garment(graph: &str) -> (bool, bool) {
     let model = ClothCombo::new(&config.model, &dimensions, config.seed, &device).unwrap();
     let schedule = Schedule::new(&config);
     let scene = prepare_step(&dataset, &config, &schedule, 0, RankPartition::WHOLE).unwrap().remove(0);
-    assert_eq!((scene.worn.len(), scene.contacts.len()), (1, 0));
+    assert_eq!((scene.garments.len(), scene.contacts.len()), (1, 0));
 
     let networks = Networks::new(burn::module::Module::valid(&model), &tensors);
     let [drape, single] = [networks.drape(&scene), networks.drape_alone(&scene)].map(Result::unwrap);

@@ -72,9 +72,9 @@ fn device_memory_mib() -> usize {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SplitConfig {
-    /// RankPartition that is scored during the run but never trained on.
+    /// Share that is scored during the run but never trained on.
     pub validation: f64,
-    /// RankPartition that is for the final test, as `data.held_out_garments` is.
+    /// Share that is for the final test, as `data.held_out_garments` is.
     pub test: f64,
 }
 
@@ -155,7 +155,7 @@ pub struct PoseConfig {
     /// Clips whose name contains one of these are for the final test: never trained on, and read by no validation, no choice
     /// of the best checkpoint and no picture of a run. `clothcombo eval` reads them.
     pub test_clips: Vec<String>,
-    /// RankPartition of every other clip that is never trained on, in windows spread over the clip, which every validation scores. One
+    /// Share of every other clip that is never trained on, in windows spread over the clip, which every validation scores. One
     /// block of `held_out_block` in every `1 / held_out_share`, rounded, at most every second one. A clip shorter than half of
     /// `held_out_block / held_out_share` is trained on whole.
     pub held_out_share: f64,

@@ -95,7 +95,7 @@ impl Default for RepulsionLoss {
 pub struct HoldingLoss {
     /// Factor on the raw value.
     pub weight: Ramp,
-    /// RankPartition of the vertices, from the top, that are held.
+    /// Share of the vertices, from the top, that are held.
     pub fraction: f64,
     /// Measure the displacement from the shape-transferred start instead of the rest garment: a waistband should
     /// follow a taller body.

@@ -68,7 +68,7 @@ pub struct StageConfig {
     /// default, starts at full. Adam's moments are rough in the first hundreds of steps of newly trained networks.
     #[serde(default)]
     pub warm_up_steps: u64,
-    /// RankPartition of the full pose, 0 = T-pose (progressive learning): the paper starts at 0, where drapes are easy. Above 1
+    /// Share of the full pose, 0 = T-pose (progressive learning): the paper starts at 0, where drapes are easy. Above 1
     /// poses are exaggerated.
     #[serde(default = "full_pose")]
     pub pose_scale: Ramp,

@@ -38,9 +38,9 @@ struct Filter {
 pub struct SelfIntersecting {
     /// Poses looked at.
     pub poses: usize,
-    /// RankPartition in which far-apart parts of the body intersect at all, 0–1.
+    /// Share in which far-apart parts of the body intersect at all, 0–1.
     pub touching: f64,
-    /// RankPartition above the limit, which is drawn again, 0–1.
+    /// Share above the limit, which is drawn again, 0–1.
     pub above_limit: f64,
     /// The limit [m].
     pub limit: f64,

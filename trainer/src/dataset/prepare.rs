@@ -1,4 +1,4 @@
-//! Turns a draw into numbers: posed body, bone transforms, start positions, and the scene's energies.
+//! Turns a sample into numbers: posed body, bone transforms, start positions, and the scene's energies.
 
 use super::active_joints::ActiveJoints;
 use super::contents::Dataset;
@@ -21,7 +21,7 @@ pub struct PreparedBody {
     pub shape: Vec<f32>,
     /// Pose features of the active joints, `[P]`.
     pub pose: Vec<f32>,
-    /// ProcessGroup transforms of the active joints relative to the T-pose.
+    /// World transforms of the active joints relative to the T-pose.
     pub bones: Vec<[[f64; 4]; 3]>,
     /// Canonical start positions of all garments, `[ΣV, 3]`.
     pub start: Vec<[f32; 3]>,
@@ -31,11 +31,11 @@ pub struct PreparedBody {
 
 /// A scene ready for a step.
 pub struct PreparedScene {
-    /// What was drawn.
-    pub draw: SceneSample,
+    /// What was sampled.
+    pub sample: SceneSample,
     /// The garments themselves.
-    pub worn: Vec<Arc<PreparedGarment>>,
-    /// Pairs (inner, outer) of positions in `worn` that interact: those of [`contacts`].
+    pub garments: Vec<Arc<PreparedGarment>>,
+    /// Pairs (inner, outer) of positions in `garments` that interact: those of [`contacts`].
     pub contacts: Vec<(usize, usize)>,
     /// Bodies.
     pub bodies: Vec<PreparedBody>,
@@ -52,12 +52,12 @@ impl PreparedScene {
             rest = tail;
             own
         };
-        self.worn.iter().map(part).collect()
+        self.garments.iter().map(part).collect()
     }
 
     /// Initial skinning of every vertex on the first body, canonical → posed, `[ΣV]`.
     pub fn skinning_transforms(&self) -> Vec<Transform> {
-        skinning_transforms(&self.worn, &self.bodies[0].bones)
+        skinning_transforms(&self.garments, &self.bodies[0].bones)
     }
 
     /// The first body in f64, for exact distances and intersections.
@@ -70,18 +70,18 @@ impl PreparedScene {
 /// Two garments whose rest bounding boxes are farther apart than this are not near [m].
 const CONTACT_MARGIN: f64 = 0.05;
 
-/// Prepares `draw`; loss weights are taken at `run_progress`.
+/// Prepares `sample`; loss weights are taken at `run_progress`.
 ///
 /// # Errors
 /// [`DatasetError`] when a garment cannot be read.
 pub fn prepare(
     dataset: &Dataset,
     losses: &LossesConfig,
-    draw: SceneSample,
+    sample: SceneSample,
     run_progress: f64,
 ) -> Result<PreparedScene, DatasetError> {
     let garments =
-        draw.garments.iter().map(|&g| dataset.garments.garment(g)).collect::<Result<Vec<_>, _>>()?;
+        sample.garments.iter().map(|&g| dataset.garments.garment(g)).collect::<Result<Vec<_>, _>>()?;
     let builder = SceneBuilder {
         body: &dataset.body,
         joints: dataset.joints(),
@@ -89,7 +89,7 @@ pub fn prepare(
         losses,
         graph: dataset.graph,
     };
-    Ok(builder.dress(draw, garments, run_progress))
+    Ok(builder.build(sample, garments, run_progress))
 }
 
 /// Everything but the garments and the bodies that a scene is prepared with.
@@ -107,25 +107,25 @@ pub struct SceneBuilder<'a> {
 }
 
 impl SceneBuilder<'_> {
-    /// Prepares `draw`, whose garments are `worn`; loss weights are taken at `run_progress`.
+    /// Prepares `sample`, of `garments`; loss weights are taken at `run_progress`.
     ///
     /// # Panics
     /// If a shape or pose is longer than the body allows.
-    pub fn dress(
+    pub fn build(
         &self,
-        draw: SceneSample,
-        worn: Vec<Arc<PreparedGarment>>,
+        sample: SceneSample,
+        garments: Vec<Arc<PreparedGarment>>,
         run_progress: f64,
     ) -> PreparedScene {
-        let contacts = contacts(self.graph, &worn);
+        let contacts = contacts(self.graph, &garments);
         let settings =
-            EnergySettings { repulsion_sample: draw.repulsion_sample, ..self.losses.energy_settings() };
-        let bodies = draw
+            EnergySettings { repulsion_sample: sample.repulsion_sample, ..self.losses.energy_settings() };
+        let bodies = sample
             .bodies
             .iter()
-            .map(|body| self.on_body(&worn, &contacts, body, &settings, run_progress))
+            .map(|body| self.on_body(&garments, &contacts, body, &settings, run_progress))
             .collect();
-        PreparedScene { draw, worn, contacts, bodies, alone: self.losses.alone.at(run_progress) }
+        PreparedScene { sample, garments, contacts, bodies, alone: self.losses.alone.at(run_progress) }
     }
 
     fn on_body(

@@ -49,9 +49,9 @@ impl<'a> Dressing<'a> {
     /// A drape of `scene` from the packed positions of all garments on its first body.
     pub fn of<'s>(&'s self, scene: &'s PreparedScene, packed: &[[f32; 3]]) -> DrapedScene<'s> {
         let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
-        let worn = scene.draw.garments.iter().zip(&scene.worn);
-        let rest = worn.map(|(&g, worn)| {
-            known.entry(g).or_insert_with(|| Arc::new(RestGarment::new(&worn.garment.rest))).clone()
+        let garment = scene.sample.garments.iter().zip(&scene.garments);
+        let rest = garment.map(|(&g, garment)| {
+            known.entry(g).or_insert_with(|| Arc::new(RestGarment::new(&garment.garment.rest))).clone()
         });
         DrapedScene {
             dressing: self,
@@ -72,7 +72,7 @@ impl<'a> Dressing<'a> {
 
     /// `scene` on the way from the T-pose.
     fn stage(&self, scene: &PreparedScene, share: f64) -> Result<Waypoint, PostProcessError> {
-        let mut draw = scene.draw.clone();
+        let mut draw = scene.sample.clone();
         for body in &mut draw.bodies {
             body.pose = body.pose.on_the_way(share);
         }
@@ -128,9 +128,9 @@ impl DrapedScene<'_> {
         resolve_along(&self.body, &self.layers(&self.positions), &skinned, settings, stage_at)
     }
 
-    /// Whether the order of the garments can be worn ([`unwearable`]).
+    /// Whether the order of the garments can be garment ([`unwearable`]).
     pub fn is_wearable(&self) -> bool {
-        let order: Vec<&Garment> = self.scene.worn.iter().map(|w| &w.garment).collect();
+        let order: Vec<&Garment> = self.scene.garments.iter().map(|w| &w.garment).collect();
         unwearable(&order).is_none()
     }
 
@@ -150,7 +150,7 @@ impl DrapedScene<'_> {
         Ok(Counts::new(&self.certificate()?, self.order_by_vertices(&self.positions)))
     }
 
-    /// RankPartition of wrong-side vertices over all pairs of layers, by the nearest vertex: the definition of the score.
+    /// Share of wrong-side vertices over all pairs of layers, by the nearest vertex: the definition of the score.
     pub fn order_by_vertices(&self, positions: &[Vec<[f64; 3]>]) -> f64 {
         let mut sum = OrderViolations::default();
         for (outer, over) in positions.iter().enumerate() {
@@ -187,9 +187,9 @@ pub struct Counts {
     pub contour_length_mm: f64,
     /// Deepest vertex [mm].
     pub max_depth_mm: f64,
-    /// RankPartition of wrong-side vertices by the closest surface point.
+    /// Share of wrong-side vertices by the closest surface point.
     pub order_violations: f64,
-    /// RankPartition of wrong-side vertices by the nearest vertex.
+    /// Share of wrong-side vertices by the nearest vertex.
     pub order_violations_by_vertices: f64,
 }
 
@@ -222,7 +222,7 @@ pub struct OutfitResult {
     pub draw: usize,
     /// Names, inner → outer.
     pub garments: Vec<String>,
-    /// Whether the order can be worn ([`unwearable`]).
+    /// Whether the order can be garment ([`unwearable`]).
     pub is_wearable: bool,
     /// Vertices per garment.
     pub vertices: Vec<usize>,
@@ -234,7 +234,7 @@ pub struct OutfitResult {
     pub strain_added: Option<f64>,
     /// Largest move of a vertex [mm].
     pub largest_move_mm: f64,
-    /// RankPartition of vertices that moved.
+    /// Share of vertices that moved.
     pub moved: f64,
     /// Rounds per garment, of all attempts but those of the way and of easing.
     pub rounds: Vec<usize>,
@@ -263,11 +263,11 @@ impl OutfitResult {
         let resolved = draped.resolved(settings)?;
         let works = &resolved.garments;
         let ms = |time: std::time::Duration| 1e3 * time.as_secs_f64();
-        let vertices: Vec<usize> = scene.worn.iter().map(|w| w.vertex_count()).collect();
+        let vertices: Vec<usize> = scene.garments.iter().map(|w| w.vertex_count()).collect();
         let moved: usize = works.iter().map(|w| w.moved).sum();
         let result = Self {
             draw,
-            garments: scene.worn.iter().map(|w| w.garment.name.clone()).collect(),
+            garments: scene.garments.iter().map(|w| w.garment.name.clone()).collect(),
             is_wearable: draped.is_wearable(),
             before,
             after: Counts::new(&resolved.certificate, draped.order_by_vertices(&resolved.positions)),

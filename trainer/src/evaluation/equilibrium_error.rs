@@ -216,7 +216,7 @@ fn layer_strains(
         .map(|g| LayerStrain {
             alone: by_itself[g],
             outfit: in_outfit[g],
-            network: drapes.as_ref().map(|[alone, worn]| [alone[g], worn[g]]),
+            network: drapes.as_ref().map(|[single, together]| [single[g], together[g]]),
         })
         .collect())
 }

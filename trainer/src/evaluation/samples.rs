@@ -41,7 +41,7 @@ pub fn draw(
 }
 
 fn row(networks: &Networks, scene: &PreparedScene) -> Result<SheetRow, Report> {
-    let names: Vec<&str> = scene.worn.iter().map(|g| g.garment.name.as_str()).collect();
+    let names: Vec<&str> = scene.garments.iter().map(|g| g.garment.name.as_str()).collect();
     let skinned = networks.skin(scene)?;
     let draped = networks.drape(scene)?;
     let cells = [&skinned, &draped]
@@ -72,7 +72,7 @@ pub(crate) fn picture_of(
     let body_positions = wide(&body.positions);
     let positions = wide(&draped.posed);
     let mut figures = vec![Figure { positions: &body_positions, faces: &body.faces, colour: BODY_COLOUR }];
-    for (layer, (garment, positions)) in scene.worn.iter().zip(scene.parts(&positions)).enumerate() {
+    for (layer, (garment, positions)) in scene.garments.iter().zip(scene.parts(&positions)).enumerate() {
         figures.push(Figure { positions, faces: garment.garment.rest.faces(), colour: colour(layer) });
     }
     render(&figures, view, CELL)

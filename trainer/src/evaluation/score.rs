@@ -47,7 +47,7 @@ pub fn score_scene(scene: &PreparedScene, body: &Surface<f64>, draped: &Draped) 
 
     let parts = scene.parts(&positions);
     for &(inner, outer) in &scene.contacts {
-        let faces = scene.worn[inner].garment.rest.faces();
+        let faces = scene.garments[inner].garment.rest.faces();
         let pair = order_violations(parts[inner], faces, parts[outer]);
         score.order.counted += pair.counted;
         score.order.violations += pair.violations;

@@ -38,7 +38,7 @@ pub fn felt(
     posed: &[[f32; 3]],
     device: &Device,
 ) -> FeltTensors {
-    let rings: Vec<&Rings> = scene.worn.iter().map(|worn| &worn.rings).collect();
+    let rings: Vec<&Rings> = scene.garments.iter().map(|garment| &garment.rings).collect();
     let Sensed { features, directions } = sense(&body.energy, &rings, posed, contacts);
     let directions = directions.map(|posed| unposed(scene, body, &posed));
     FeltTensors::new(features, directions.each_ref().map(Vec::as_slice), device)
@@ -58,9 +58,9 @@ fn unposed(scene: &PreparedScene, body: &PreparedBody, posed: &[[f32; 3]]) -> Ve
         }
         canonical.map(|x| x as f32)
     };
-    let of_garment = |(worn, part): (&Arc<PreparedGarment>, &[[f32; 3]])| {
-        let rows = worn.skin_weights.chunks_exact(bones.len().max(1));
+    let of_garment = |(garment, part): (&Arc<PreparedGarment>, &[[f32; 3]])| {
+        let rows = garment.skin_weights.chunks_exact(bones.len().max(1));
         part.iter().zip(rows).map(|(direction, weights)| turned_back(direction, weights)).collect::<Vec<_>>()
     };
-    scene.worn.iter().zip(scene.parts(posed)).flat_map(of_garment).collect()
+    scene.garments.iter().zip(scene.parts(posed)).flat_map(of_garment).collect()
 }

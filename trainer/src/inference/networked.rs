@@ -113,12 +113,12 @@ impl Draper {
             losses: &self.trained.config.losses,
             graph: self.trained.config.model.graph,
         };
-        let draw = SceneSample {
+        let sample = SceneSample {
             garments: (0..outfit.pieces.len()).collect(),
             bodies: vec![body],
             repulsion_sample: 0,
         };
-        let mut scene = builder.dress(draw, outfit.worn(), 1.0);
+        let mut scene = builder.build(sample, outfit.prepared(), 1.0);
         // A body with fewer components than the networks know has the others at their mean.
         scene.bodies[0].shape.resize(self.trained.state.shape_count, 0.0);
         scene

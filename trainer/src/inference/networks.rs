@@ -94,17 +94,17 @@ impl TensorStore {
     /// # Errors
     /// As [`garment`](Self::garment).
     pub fn warm(&self, scene: &PreparedScene, eigen_count: usize) -> Result<(), DrapeError> {
-        let bytes: usize = scene.worn.iter().map(|worn| self.bytes(worn, eigen_count)).sum();
+        let bytes: usize = scene.garments.iter().map(|garment| self.bytes(garment, eigen_count)).sum();
         let KeptBytes { total, device } = self.memory.limits();
         if bytes.saturating_mul(SCENES_AHEAD + 2) > total.min(device) {
             return Ok(());
         }
         scene
-            .draw
+            .sample
             .garments
             .iter()
-            .zip(&scene.worn)
-            .try_for_each(|(&g, worn)| self.garment(g, worn).map(|_| ()))
+            .zip(&scene.garments)
+            .try_for_each(|(&g, garment)| self.garment(g, garment).map(|_| ()))
     }
 
     /// The outfit of a scene.
@@ -112,7 +112,8 @@ impl TensorStore {
     /// # Errors
     /// When the scene has no garment, or one cannot be read.
     pub fn outfit(&self, scene: &PreparedScene) -> Result<OutfitTensors, DrapeError> {
-        let garments = scene.draw.garments.iter().zip(&scene.worn).map(|(&g, worn)| self.garment(g, worn));
+        let garments =
+            scene.sample.garments.iter().zip(&scene.garments).map(|(&g, garment)| self.garment(g, garment));
         let garments = garments.collect::<Result<Vec<_>, _>>()?;
         Ok(OutfitTensors::new(&garments.iter().map(Arc::as_ref).collect::<Vec<_>>(), &scene.contacts)?)
     }
@@ -160,18 +161,18 @@ impl TensorStore {
         scene: &PreparedScene,
         known: &KnownEmbeddings,
     ) -> Result<Vec<GarmentEmbedding>, DrapeError> {
-        let encoded = |(&g, worn): (&usize, &Arc<PreparedGarment>)| {
+        let encoded = |(&g, garment): (&usize, &Arc<PreparedGarment>)| {
             let embedding = match known.get(g) {
                 Some(kept) => kept,
                 None => {
-                    let embedding = model.encode(self.garment(g, worn)?.as_ref());
+                    let embedding = model.encode(self.garment(g, garment)?.as_ref());
                     let bytes = embedding.bytes();
                     known.insert(g, embedding, bytes)
                 }
             };
             Ok(embedding.as_ref().clone())
         };
-        scene.draw.garments.iter().zip(&scene.worn).map(encoded).collect()
+        scene.sample.garments.iter().zip(&scene.garments).map(encoded).collect()
     }
 }
 

@@ -42,8 +42,8 @@ pub struct Piece {
     pub name: String,
     /// As it was given.
     pub source: Arc<SourceGarment>,
-    /// As it is worn.
-    pub worn: Arc<PreparedGarment>,
+    /// Ready for the networks.
+    pub prepared: Arc<PreparedGarment>,
     /// As the post-process sees it.
     pub rest: Arc<RestGarment>,
     /// Whether the embedding was there already, in memory or in the cache.
@@ -81,8 +81,8 @@ impl Outfit {
         self.pieces.iter().map(|p| p.name.as_str())
     }
 
-    pub(super) fn worn(&self) -> Vec<Arc<PreparedGarment>> {
-        self.pieces.iter().map(|p| p.worn.clone()).collect()
+    pub(super) fn prepared(&self) -> Vec<Arc<PreparedGarment>> {
+        self.pieces.iter().map(|p| p.prepared.clone()).collect()
     }
 
     /// The part of each garment of a packed `[ΣV]` array.
@@ -90,7 +90,7 @@ impl Outfit {
         let mut rest = packed;
         let mut parts = Vec::with_capacity(self.pieces.len());
         for piece in &self.pieces {
-            let (part, tail) = rest.split_at(piece.worn.vertex_count());
+            let (part, tail) = rest.split_at(piece.prepared.vertex_count());
             parts.push(part);
             rest = tail;
         }
@@ -127,7 +127,7 @@ impl Outfit {
 /// A garment with its tensors.
 #[derive(Clone)]
 struct Known {
-    worn: Arc<PreparedGarment>,
+    prepared: Arc<PreparedGarment>,
     rest: Arc<RestGarment>,
     tensors: GarmentTensors,
     embedding: GarmentEmbedding,
@@ -152,12 +152,12 @@ impl KnownGarments {
         for source in garments {
             let name = names.take(&source.garment.name);
             let (found, milliseconds, embedding_known) = self.know(draper, &source)?;
-            let (source, worn, rest) = (Arc::new(source), found.worn.clone(), found.rest.clone());
-            pieces.push(Piece { name, source, worn, rest, embedding_known, milliseconds });
+            let (source, prepared, rest) = (Arc::new(source), found.prepared.clone(), found.rest.clone());
+            pieces.push(Piece { name, source, prepared, rest, embedding_known, milliseconds });
             known.push(found);
         }
-        let worn: Vec<Arc<PreparedGarment>> = known.iter().map(|k| k.worn.clone()).collect();
-        let contacts = contacts(draper.trained.config.model.graph, &worn);
+        let prepared: Vec<Arc<PreparedGarment>> = known.iter().map(|k| k.prepared.clone()).collect();
+        let contacts = contacts(draper.trained.config.model.graph, &prepared);
         let tensors: Vec<&GarmentTensors> = known.iter().map(|k| &k.tensors).collect();
         let tensors = OutfitTensors::new(&tensors, &contacts)?;
         let embeddings: Vec<GarmentEmbedding> = known.iter().map(|k| k.embedding.clone()).collect();
@@ -181,15 +181,15 @@ impl KnownGarments {
         }
         let clock = Instant::now();
         let binding = self.binding(draper, source, mesh)?;
-        let worn = Arc::new(draper.preprocessor.finish(garment.clone(), binding, &draper.joints)?);
+        let prepared = Arc::new(draper.preprocessor.finish(garment.clone(), binding, &draper.joints)?);
         let rest = Arc::new(RestGarment::new(&garment.rest));
         let operators = self.operators(draper, source, mesh)?;
-        let tensors = garment_tensors(&worn, &operators, &draper.dimensions(), &draper.device)?;
+        let tensors = garment_tensors(&prepared, &operators, &draper.dimensions(), &draper.device)?;
         let preparation = super::elapsed(clock);
         let clock = Instant::now();
         let (embedding, was_stored) = self.embedding(draper, &tensors, mesh)?;
         let embedding_ms = super::elapsed(clock);
-        let found = Known { worn, rest, tensors, embedding };
+        let found = Known { prepared, rest, tensors, embedding };
         known().insert(key, found.clone());
         Ok((found, PieceTimes { preparation, embedding: embedding_ms }, was_stored))
     }

@@ -37,7 +37,7 @@ impl ReferenceScene {
         let mut rest = Vec::with_capacity(start.len());
         let transforms = scene.skinning_transforms();
         let mut garments = Vec::new();
-        for (garment, narrow) in scene.worn.iter().zip(&body.energy.garments) {
+        for (garment, narrow) in scene.garments.iter().zip(&body.energy.garments) {
             let mesh = &garment.garment.rest;
             let energies =
                 GarmentEnergies::new(mesh, &Topology::new(mesh), &settings, garment.garment.holding)?;
@@ -58,7 +58,7 @@ impl ReferenceScene {
         };
         let body = Arc::new(Surface::new(wide(&surface.positions), surface.faces.clone()));
         Ok(Self {
-            garments: scene.worn.iter().map(|g| g.garment.name.clone()).collect(),
+            garments: scene.garments.iter().map(|g| g.garment.name.clone()).collect(),
             energy: SceneEnergy { body, garments, layers, settings }.continuous().pulled_back(&transforms),
             skinned_rest: skinned(&rest),
             skinned_start: skinned(&start),

@@ -205,7 +205,7 @@ impl Drape {
             .zip(&self.garments)
             .map(|(piece, drape)| DrapedGarment {
                 name: &piece.name,
-                rest: &piece.worn.garment.rest,
+                rest: &piece.prepared.garment.rest,
                 positions: match stage {
                     Stage::BeforeResolve => &drape.before,
                     Stage::Result => &drape.positions,
@@ -218,9 +218,9 @@ impl Drape {
 }
 
 fn garment_reports(outfit: &Outfit, drapes: &[Drape]) -> Vec<GarmentReport> {
-    let all: usize = outfit.pieces.iter().map(|p| p.worn.vertex_count()).sum();
+    let all: usize = outfit.pieces.iter().map(|p| p.prepared.vertex_count()).sum();
     let report = |(index, piece): (usize, &super::Piece)| {
-        let vertices = piece.worn.vertex_count();
+        let vertices = piece.prepared.vertex_count();
         let share = vertices as f64 / all.max(1) as f64;
         let mut times = PhaseTimes {
             preparation: piece.milliseconds.preparation,
@@ -246,8 +246,8 @@ fn garment_reports(outfit: &Outfit, drapes: &[Drape]) -> Vec<GarmentReport> {
             given: piece.source.path.clone(),
             given_vertices: piece.source.given.positions.len(),
             vertices,
-            triangles: piece.worn.garment.rest.face_count(),
-            category: piece.worn.garment.category,
+            triangles: piece.prepared.garment.rest.face_count(),
+            category: piece.prepared.garment.category,
             fit: piece.source.fit.clone(),
             embedding_known: piece.embedding_known,
             milliseconds: times,

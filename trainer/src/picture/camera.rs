@@ -8,7 +8,7 @@ const NEARBY_IN_RADII: f64 = 1.25;
 const DISTANCE_IN_RADII: f64 = 5.0;
 /// Depth range in radii of the framed figure around its centre; geometry outside is not drawn.
 const DEPTH_IN_RADII: f64 = 3.0;
-/// RankPartition of the picture the framed figure may fill along its tighter side.
+/// Share of the picture the framed figure may fill along its tighter side.
 const FILL: f64 = 0.9;
 
 /// A direction to look from; the subject faces +z and its left hand points to +x.

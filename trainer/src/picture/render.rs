@@ -127,7 +127,7 @@ impl ProjectedMesh {
     }
 }
 
-/// RankPartition of the picture that the bounding box of a triangle covers, a sample at least; 0 when it lies outside.
+/// Share of the picture that the bounding box of a triangle covers, a sample at least; 0 when it lies outside.
 fn picture_share(corners: [[f64; 2]; 3], sample_size: [usize; 2]) -> f64 {
     let mut share = 1.0;
     for axis in 0..2 {

@@ -160,7 +160,7 @@ fn contact_offsets(pixels_per_metre: f32) -> [Vec<[i32; 2]>; 4] {
     })
 }
 
-/// RankPartition of the light from around that reaches a sample: 1 in the open, less in folds and next to a nearer layer.
+/// Share of the light from around that reaches a sample: 1 in the open, less in folds and next to a nearer layer.
 fn contact(samples: &Samples, offsets: &[Vec<[i32; 2]>; 4], x: usize, y: usize) -> f32 {
     let [width, height] = samples.size;
     let here = samples.height[y * width + x];

@@ -17,10 +17,10 @@ pub struct StepRecord {
     pub stage: String,
     /// Garments in the scene.
     pub layers: usize,
-    /// RankPartition of the full pose.
+    /// Share of the full pose.
     pub pose_scale: f64,
     /// Weighted sum that was minimised, mean over the step's bodies: that of `weighted` and, where `losses.alone` counts, the
-    /// losses of the garments draped alone. Where corrections learn, it is the mean over what each of them is_rank_zero to, and the
+    /// losses of the garments draped alone. Where corrections learn, it is the mean over what each of them leads to, and the
     /// energies below are those of the last.
     pub loss: f64,
     /// Raw energies, summed over garments or pairs, mean over the step's bodies; terms that were not evaluated are

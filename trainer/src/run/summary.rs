@@ -43,9 +43,9 @@ pub struct RunSummary {
     pub best_score: Option<f64>,
     /// Strain of the networks over that of skinning, last validation, single garments.
     pub strain_ratio: Option<f64>,
-    /// RankPartition of the vertices inside the body, last validation, single garments.
+    /// Share of the vertices inside the body, last validation, single garments.
     pub inside: Option<f64>,
-    /// RankPartition of outer vertices on the wrong side of an inner layer, last validation, layered outfits.
+    /// Share of outer vertices on the wrong side of an inner layer, last validation, layered outfits.
     pub wrong_side: Option<f64>,
     /// Step of the newest whole checkpoint.
     pub checkpoint: Option<u64>,

@@ -42,11 +42,11 @@ pub struct MethodScore {
     pub raw: BTreeMap<&'static str, Spread>,
     /// Mean weighted energies.
     pub weighted: BTreeMap<&'static str, f64>,
-    /// RankPartition of the garment vertices inside the body.
+    /// Share of the garment vertices inside the body.
     pub inside: f64,
-    /// RankPartition of the garment vertices deeper than 5 mm.
+    /// Share of the garment vertices deeper than 5 mm.
     pub deeper_than_5mm: f64,
-    /// RankPartition of outer vertices on the wrong side of an inner layer, among those within 5 cm of it.
+    /// Share of outer vertices on the wrong side of an inner layer, among those within 5 cm of it.
     pub wrong_side: f64,
 }
 

@@ -101,7 +101,7 @@ pub struct GarmentScore {
 /// Contact of one garment with the body and with itself.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PenetrationScore {
-    /// RankPartition of the vertices inside the body, by the distance of [`ScoreSettings::distance`].
+    /// Share of the vertices inside the body, by the distance of [`ScoreSettings::distance`].
     pub vertices_inside: f64,
     /// Largest depth of a vertex [mm]; 0 when none is inside.
     pub max_depth_mm: f64,
@@ -124,7 +124,7 @@ pub struct LayerScore {
     pub layer_distance: f64,
     /// Pairs of triangles that share a point. Exact.
     pub triangle_pairs: usize,
-    /// RankPartition of the outer vertices within 5 cm of the inner garment whose gap to its nearest vertex is negative.
+    /// Share of the outer vertices within 5 cm of the inner garment whose gap to its nearest vertex is negative.
     pub order_violations: f64,
 }
 

@@ -4,7 +4,7 @@ use serde::Serializer;
 use std::path::{Component, Path, PathBuf};
 use std::{fs, io};
 
-/// Where `path` is_rank_zero, with `..` and links followed; what is not there yet is taken as it is written.
+/// Where `path` leads, with `..` and links followed; what is not there yet is taken as it is written.
 ///
 /// # Errors
 /// When `path` is empty, or relative and the working folder is gone.
@@ -17,7 +17,7 @@ pub fn destination(path: &Path) -> io::Result<PathBuf> {
             }
             part => found.push(part),
         }
-        // Part by part: what is above a link is above what it is_rank_zero to.
+        // Part by part: what is above a link is above what it leads to.
         found = fs::canonicalize(&found).unwrap_or(found);
     }
     Ok(found)

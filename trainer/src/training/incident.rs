@@ -79,7 +79,7 @@ pub struct Incident {
     pub run_progress: Exact,
     /// Adam's step size.
     pub learning_rate: Exact,
-    /// RankPartition of the full pose.
+    /// Share of the full pose.
     pub pose_scale: Exact,
     /// What a test broke on purpose.
     pub injected: Option<Injected>,
@@ -236,7 +236,7 @@ impl Incident {
         let model = self.model(path, config, dataset, &device)?;
         let mut scenes = Vec::with_capacity(self.scenes.len());
         for scene in &self.scenes {
-            let draw = scene.draw(dataset, path)?;
+            let draw = scene.to_sample(dataset, path)?;
             let prepared = prepare(dataset, &config.losses, draw, self.run_progress.0);
             scenes.push(prepared.map_err(crate::inference::networks::DrapeError::from)?);
         }
@@ -306,11 +306,11 @@ fn describe(dataset: &Dataset, scenes: &[PreparedScene], outcome: &StepOutcome) 
         Term::ALL.into_iter().filter_map(|t| Some((t.name().to_owned(), Exact(values[t]?)))).collect()
     };
     let of_scene = |(scene, outputs): (&PreparedScene, &Vec<_>)| {
-        let garments = scene.draw.garments.iter().map(|&index| {
+        let garments = scene.sample.garments.iter().map(|&index| {
             let card = dataset.garments.info(index);
             IncidentGarment { index, name: card.name.clone(), vertices: card.vertices }
         });
-        let bodies = scene.draw.bodies.iter().zip(outputs).map(
+        let bodies = scene.sample.bodies.iter().zip(outputs).map(
             |(body, output): (&BodySample, &clothcombo_physics::autodiff::SceneLossOutput)| {
                 let value = output.value();
                 IncidentBody {
@@ -325,15 +325,15 @@ fn describe(dataset: &Dataset, scenes: &[PreparedScene], outcome: &StepOutcome) 
         IncidentScene {
             garments: garments.collect(),
             bodies: bodies.collect(),
-            repulsion_sample: scene.draw.repulsion_sample,
+            repulsion_sample: scene.sample.repulsion_sample,
         }
     };
     scenes.iter().zip(&outcome.scenes).map(of_scene).collect()
 }
 
 impl IncidentScene {
-    /// The scene as it was drawn.
-    fn draw(&self, dataset: &Dataset, path: &Path) -> Result<SceneSample, IncidentError> {
+    /// The scene as it was sampled.
+    fn to_sample(&self, dataset: &Dataset, path: &Path) -> Result<SceneSample, IncidentError> {
         let garments = self.garments.iter().map(|garment| {
             let changed = |reason: String| IncidentError::DataChanged { name: garment.name.clone(), reason };
             let is_it = |i: usize| dataset.garments.info(i).name == garment.name;

@@ -23,7 +23,7 @@ pub struct ScheduleAt {
     pub run_progress: f64,
     /// Adam's step size.
     pub learning_rate: f64,
-    /// RankPartition of the full pose.
+    /// Share of the full pose.
     pub pose_scale: f64,
 }
 

@@ -25,7 +25,7 @@ impl StepSummary {
     pub fn of(scenes: &[PreparedScene], computed: &Computed, total: usize) -> Self {
         let mut summary = Self {
             loss: computed.loss,
-            layers: scenes.iter().map(|s| s.draw.garments.len()).max().unwrap_or(0),
+            layers: scenes.iter().map(|s| s.sample.garments.len()).max().unwrap_or(0),
             largest_norm: computed.largest_norm,
             ..Self::default()
         };

@@ -194,8 +194,8 @@ fn write_meshes(
     };
     save("body.obj".into(), &draped.body.positions, &draped.body.faces, "body".into())?;
     let mut names = UniqueNames::default();
-    for (i, worn) in scene.worn.iter().enumerate() {
-        let garment = &worn.garment;
+    for (i, garment) in scene.garments.iter().enumerate() {
+        let garment = &garment.garment;
         let name = names.take(&garment.name);
         let states = [
             ("rest", garment.rest.positions()),

@@ -165,7 +165,7 @@ fn drape(
         let drape = networks.drape(scene)?;
         // Alone a garment is near enough to its equilibrium to start from; in an outfit that crosses, no force can tell where
         // cloth belongs.
-        let resolved = match scene.worn.len() {
+        let resolved = match scene.garments.len() {
             1 => None,
             _ => Some(dressing.of(scene, &drape.posed).resolved(&post_process)?.positions.concat()),
         };

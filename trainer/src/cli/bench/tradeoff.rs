@@ -276,9 +276,9 @@ fn evaluated<T: Real>(
     let scalars = |positions: &[[f32; 3]]| -> Vec<[T; 3]> {
         positions.iter().map(|p| p.map(|v| T::from_f64(f64::from(v)))).collect()
     };
-    let garment = |(worn, dressed): (&Arc<crate::dataset::PreparedGarment>, &SceneGarment<f32>)| {
-        let mesh = &worn.garment.rest;
-        let energies = GarmentEnergies::new(mesh, &Topology::new(mesh), &settings, worn.garment.holding);
+    let garment = |(garment, dressed): (&Arc<crate::dataset::PreparedGarment>, &SceneGarment<f32>)| {
+        let mesh = &garment.garment.rest;
+        let energies = GarmentEnergies::new(mesh, &Topology::new(mesh), &settings, garment.garment.holding);
         Ok(SceneGarment {
             energies: Arc::new(energies.into_diagnostic()?),
             holding_reference: scalars(&dressed.holding_reference),
@@ -287,7 +287,7 @@ fn evaluated<T: Real>(
         })
     };
     let garments =
-        scene.worn.iter().zip(&narrow.garments).map(garment).collect::<Result<Vec<_>, Report>>()?;
+        scene.garments.iter().zip(&narrow.garments).map(garment).collect::<Result<Vec<_>, Report>>()?;
     let energy = SceneEnergy::<T> {
         body: Arc::new(Surface::new(scalars(&narrow.body.positions), narrow.body.faces.clone())),
         garments,

@@ -61,7 +61,7 @@ pub fn ask(
         models.push(subject.model.clone());
     }
     let drape = |scene: &PreparedScene| {
-        let garment = scene.draw.garments[0];
+        let garment = scene.sample.garments[0];
         let (outfit, (body, start)) =
             (subject.tensors.outfit(scene)?, subject.tensors.body(&scene.bodies[0])?);
         let correct = embed(garment)?;

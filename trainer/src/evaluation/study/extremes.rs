@@ -32,7 +32,7 @@ pub struct Extreme {
     pub strain_ratio: f64,
     /// Farthest any vertex is from where skinning puts it [mm].
     pub farthest_mm: f64,
-    /// RankPartition of scenes without a pair with the body or between garments after the post-process.
+    /// Share of scenes without a pair with the body or between garments after the post-process.
     pub clear: f64,
     /// Deepest vertex after the post-process [mm], median over the scenes.
     pub depth_mm: f64,

@@ -20,7 +20,7 @@ pub struct LayerCount {
     /// All of them.
     #[serde(flatten)]
     pub all: Outfits,
-    /// Those in an order that can be worn.
+    /// Those in an order that can be together.
     pub wearable: Outfits,
 }
 
@@ -38,8 +38,8 @@ pub struct Outfits {
     /// Strain of the garments draped alone [J].
     pub strain_alone: Estimate,
     /// Strain of the same garments in the outfit [J].
-    pub strain_worn: Estimate,
-    /// RankPartition of outer vertices on the wrong side, closest surface point: every garment draped alone.
+    pub strain_in_outfit: Estimate,
+    /// Share of outer vertices on the wrong side, closest surface point: every garment draped alone.
     pub wrong_side_single: Estimate,
     /// The same after untangling.
     pub wrong_side: Estimate,
@@ -61,7 +61,7 @@ struct Measured {
     is_wearable: bool,
     /// Strain of every garment draped alone and in the outfit [J].
     strain: Vec<[f64; 2]>,
-    /// RankPartition on the wrong side, every garment draped alone.
+    /// Share on the wrong side, every garment draped alone.
     wrong_single: f64,
     before: Counts,
     /// If it went through the post-process.
@@ -135,21 +135,21 @@ impl Outfits {
         };
         // The garments of an outfit are no independent scenes.
         let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / layers as f64;
-        let [alone, worn] = [0, 1].map(|which| {
+        let [alone, together] = [0, 1].map(|which| {
             let of_layer = |layer: usize| outfits.iter().map(|o| o.strain[layer][which]).collect();
             (0..layers).map(of_layer).collect::<Vec<Vec<f64>>>()
         });
         let ratios = |layer: usize| -> Vec<f64> {
-            alone[layer].iter().zip(&worn[layer]).map(|(alone, worn)| worn / alone).collect()
+            alone[layer].iter().zip(&together[layer]).map(|(alone, together)| together / alone).collect()
         };
         let added: Vec<f64> = results.iter().filter_map(|r| r.strain_added).collect();
         Self {
             scenes: outfits.len(),
             resolved: results.len(),
-            strain: (0..layers).map(|l| Ratio::of(&worn[l], &alone[l])).collect(),
+            strain: (0..layers).map(|l| Ratio::of(&together[l], &alone[l])).collect(),
             strain_median: (0..layers).map(|l| Estimate::of(&ratios(l)).spread.median).collect(),
             strain_alone: of_all(&|outfit| mean(&mut outfit.strain.iter().map(|s| s[0]))),
-            strain_worn: of_all(&|outfit| mean(&mut outfit.strain.iter().map(|s| s[1]))),
+            strain_in_outfit: of_all(&|outfit| mean(&mut outfit.strain.iter().map(|s| s[1]))),
             wrong_side_single: of_all(&|outfit| outfit.wrong_single),
             wrong_side: of_all(&|outfit| outfit.before.order_violations),
             wrong_side_resolved: of_resolved(&|result| result.after.order_violations),
@@ -169,7 +169,7 @@ fn strains(scene: &PreparedScene, drapes: &[Draped; 2]) -> Vec<[f64; 2]> {
     let energy = &scene.bodies[0].energy;
     let [single, layered] = drapes.each_ref().map(|d| energy.raw(&d.posed, &d.canonical).garments);
     let strain = |raw: &clothcombo_physics::energy::TermMap<Option<f64>>| raw[Term::Strain].unwrap_or(0.0);
-    single.iter().zip(&layered).map(|(alone, worn)| [strain(alone), strain(worn)]).collect()
+    single.iter().zip(&layered).map(|(alone, together)| [strain(alone), strain(together)]).collect()
 }
 
 /// The paper's Table 3: rows M = 1 to 6.
@@ -231,7 +231,7 @@ pub fn tables(counts: &[LayerCount]) -> Vec<Table> {
             name,
             c.scenes.to_string(),
             number(c.strain_alone.spread.mean),
-            number(c.strain_worn.spread.mean),
+            number(c.strain_in_outfit.spread.mean),
             percent(c.wrong_side_single.spread.mean),
             percent_with_interval(&c.wrong_side),
             number(c.layer_pairs.spread.mean),

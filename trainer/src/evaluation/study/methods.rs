@@ -61,9 +61,9 @@ pub struct MethodResult {
     pub paper_layer_collision: Estimate,
     /// The paper's degree of self-collision ([`clothcombo_physics::contact::self_collision`]).
     pub self_collision: Estimate,
-    /// RankPartition of vertices inside the body.
+    /// Share of vertices inside the body.
     pub inside: Estimate,
-    /// RankPartition of vertices deeper than 5 mm.
+    /// Share of vertices deeper than 5 mm.
     pub deeper_than_5mm: Estimate,
     /// Exact pairs of intersecting triangles with the body.
     pub body_pairs: Estimate,

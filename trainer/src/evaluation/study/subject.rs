@@ -121,7 +121,7 @@ impl<'a> Witness<'a> {
             scene,
             body: scene.exact_body(),
             paper: paper_collisions(&scene.bodies[0].energy),
-            topologies: scene.worn.iter().map(|worn| Topology::new(&worn.garment.rest)).collect(),
+            topologies: scene.garments.iter().map(|garment| Topology::new(&garment.garment.rest)).collect(),
         }
     }
 
@@ -129,9 +129,9 @@ impl<'a> Witness<'a> {
     pub fn measure(&self, draped: &Draped) -> Measured {
         let positions: Vec<[f64; 3]> = draped.posed.iter().map(|p| p.map(f64::from)).collect();
         let body = TriangleTree::new(&self.body.positions, &self.body.faces);
-        let parts = self.scene.parts(&positions).into_iter().zip(&self.scene.worn);
+        let parts = self.scene.parts(&positions).into_iter().zip(&self.scene.garments);
         let trees: Vec<TriangleTree> =
-            parts.map(|(part, worn)| TriangleTree::new(part, worn.garment.rest.faces())).collect();
+            parts.map(|(part, garment)| TriangleTree::new(part, garment.garment.rest.faces())).collect();
         let pairs = (0..trees.len()).flat_map(|i| (i + 1..trees.len()).map(move |j| (i, j)));
         let (own, self_collisions): (Vec<Intersections>, Vec<f64>) = trees
             .iter()

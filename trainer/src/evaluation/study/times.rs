@@ -61,7 +61,7 @@ pub fn ask(
         let draw = subject.draw(at, &all, LAYERS, HeldOut::Windows);
         let scene = subject.prepare(draw)?;
         let outfit = subject.tensors.outfit(&scene)?;
-        let count = scene.worn.len() as f64;
+        let count = scene.garments.len() as f64;
         let ms = |time: Duration| 1e3 * time.as_secs_f64() / count;
         let clock = Instant::now();
         let embeddings =
@@ -82,8 +82,8 @@ pub fn ask(
             let body = ms(resolved.body_time) * count;
             let times = [embedding, draping, untangling, correcting, ms(post), body];
             parts.iter_mut().zip(times).for_each(|(part, time)| part.push(time));
-            vertices += scene.worn.iter().map(|w| w.vertex_count()).sum::<usize>();
-            garments += scene.worn.len();
+            vertices += scene.garments.iter().map(|w| w.vertex_count()).sum::<usize>();
+            garments += scene.garments.len();
             done();
         }
     }

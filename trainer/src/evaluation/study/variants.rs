@@ -21,7 +21,7 @@ pub struct Variant {
     pub result: MethodResult,
     /// Weight and margin of the collision with the body, and of that between garments, that all models are measured with.
     pub collisions: [String; 2],
-    /// RankPartition of outer vertices on the wrong side of an inner layer, by the nearest vertex; mean over the scenes.
+    /// Share of outer vertices on the wrong side of an inner layer, by the nearest vertex; mean over the scenes.
     pub wrong_side: f64,
     /// Exact pairs between garments, mean over the scenes.
     pub layer_pairs: f64,

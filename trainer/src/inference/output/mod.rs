@@ -234,7 +234,7 @@ fn write_scene(path: &Path, show: &Show) -> Result<(), OutputError> {
         meshes.push(SceneMesh {
             name: &piece.name,
             colour: layer_colour(layer),
-            faces: piece.worn.garment.rest.faces(),
+            faces: piece.prepared.garment.rest.faces(),
             frames: show.drapes.iter().map(|d| d.garments[layer].positions.as_slice()).collect(),
         });
     }

@@ -34,7 +34,7 @@ fn row<'a>(show: &'a Show, frame: usize) -> DressedRow<'a> {
             .map_or(String::new(), |m| format!("frame {}, {:.2} s", m.frame, m.seconds)),
         body: (&drape.body, &show.draper.body().faces),
         heading: drape.heading,
-        garments: pieces.map(|(piece, g)| (&g.positions[..], piece.worn.garment.rest.faces())).collect(),
+        garments: pieces.map(|(piece, g)| (&g.positions[..], piece.prepared.garment.rest.faces())).collect(),
         innermost: 0,
     }
 }

@@ -30,7 +30,7 @@ pub struct CheckpointState {
     /// The best validation so far.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub best: Option<Best>,
-    /// LruCache steps that were skipped because their loss or gradient was not finite.
+    /// Recent steps that were skipped because their loss or gradient was not finite.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub incidents: Vec<u64>,
     /// BLAKE3 checksum of each file.

@@ -62,8 +62,8 @@ impl MemoryEstimate {
         let at_once = |s: &StageConfig| if is_processor { s.accumulate.min(threads) } else { 1 };
 
         let layers = config.stages.iter().map(|s| s.layers[1]).max().unwrap_or(1);
-        let worn = |s: &StageConfig| s.accumulate * s.layers[1];
-        let ahead = (SCENES_AHEAD + 2) * config.stages.iter().map(worn).max().unwrap_or(1);
+        let garments_of = |s: &StageConfig| s.accumulate * s.layers[1];
+        let ahead = (SCENES_AHEAD + 2) * config.stages.iter().map(garments_of).max().unwrap_or(1);
         // Scenes that a validation prepares at a time, and their garments.
         let v = &config.validation;
         let validated = [(v.single_scenes, 1), (v.unseen_scenes, 1), (v.layered_scenes, v.layers[1])]
@@ -97,7 +97,7 @@ impl MemoryEstimate {
 
         let of_stage = |s: &StageConfig| {
             let vertices = sizes.largest(s.layers[1]).iter().sum::<usize>();
-            // A garment that is worn twice is embedded once.
+            // A garment that occurs twice is embedded once.
             let embedded = sizes.largest(s.layers[1].min(sizes.vertices.len())).iter().sum();
             of_scene(config, s, sizes.joints, [vertices, embedded]) * at_once(s) as f64
         };

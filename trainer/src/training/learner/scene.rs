@@ -183,15 +183,15 @@ impl Work<'_> {
                     model.correct(&outfit, &embeddings, (start, &single), &untangled(), &body, feel)
                 }
             };
-            // Every correction learns from where it is_rank_zero itself.
+            // Every correction learns from where it leads itself.
             let each = share / states.len() as f64;
-            let mut worn = None;
+            let mut last = None;
             for LayeredDrape { posed, canonical } in states {
                 let output = loss_at(posed, canonical, prepared.energy.clone());
                 add(&output, each);
-                worn = Some(output);
+                last = Some(output);
             }
-            bodies.extend(worn);
+            bodies.extend(last);
         }
         let depends = self.trains != Trains::Untangling || untangler.untangling.acts_on(&outfit);
         let loss = losses.into_iter().reduce(|a, b| a + b).filter(|_| depends);

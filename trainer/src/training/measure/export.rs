@@ -54,15 +54,15 @@ fn arrays(subject: &Subject, scene: &PreparedScene) -> Result<NpzWriter, Report>
     file.f32("pose", &[body.pose.len()], &body.pose);
     let bones: Vec<f32> = body.bones.iter().flatten().flatten().map(|v| *v as f32).collect();
     file.f32("bones", &[body.bones.len(), 12], &bones);
-    for (layer, ((&index, worn), dressed)) in
-        scene.draw.garments.iter().zip(&scene.worn).zip(&body.energy.garments).enumerate()
+    for (layer, ((&index, garment), dressed)) in
+        scene.sample.garments.iter().zip(&scene.garments).zip(&body.energy.garments).enumerate()
     {
         let key = |name: &str| format!("garment{layer}.{name}");
-        let rest = &worn.garment.rest;
+        let rest = &garment.garment.rest;
         let (vertices, joints) = (rest.vertex_count(), body.bones.len());
         file.f64(&key("rest"), &[vertices, 3], rest.positions().as_flattened());
         file.u32(&key("faces"), &[rest.face_count(), 3], rest.faces().as_flattened());
-        file.f32(&key("skin_weights"), &[vertices, joints], &worn.skin_weights);
+        file.f32(&key("skin_weights"), &[vertices, joints], &garment.skin_weights);
         let reference = &dressed.holding_reference;
         file.f32(&key("holding_reference"), &[reference.len(), 3], reference.as_flattened());
         let operators = subject.dataset().garments.operators(index)?;
@@ -103,13 +103,13 @@ fn description(subject: &Subject, scene: &PreparedScene) -> Result<Value, Report
     let norms: Map<String, Value> =
         NETWORKS.into_iter().map(|name| (name.to_owned(), json!(norm_below(&format!("{name}."))))).collect();
     let garments: Vec<Value> = scene
-        .worn
+        .garments
         .iter()
         .zip(&energy.garments)
-        .map(|(worn, dressed)| {
+        .map(|(garment, dressed)| {
             json!({
-                "name": worn.garment.name,
-                "vertices": worn.vertex_count(),
+                "name": garment.garment.name,
+                "vertices": garment.vertex_count(),
                 "held": dressed.energies.has_holding(),
                 "held_posed": dressed.pull_back.is_some(),
                 "weights": weights(&dressed.weights),

@@ -37,7 +37,7 @@ pub(super) fn report(results: &[OutfitResult], layers: usize) -> Value {
     report
 }
 
-/// RankPartition of the outfits that are clear and took no longer.
+/// Share of the outfits that are clear and took no longer.
 fn clear_within(results: &[OutfitResult], seconds: f64) -> f64 {
     let clear = results.iter().filter(|r| r.after.is_clear() && time_of(r) <= 1e3 * seconds).count();
     clear as f64 / results.len().max(1) as f64
