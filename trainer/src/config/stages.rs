@@ -1,6 +1,7 @@
 //! One stage of training: what learns, how long, on how many layers.
 
 use super::ramp::{Ramp, RampShape};
+use clothcombo_model::Mode;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -19,6 +20,14 @@ pub enum Trains {
 }
 
 impl Trains {
+    /// How far the forward pass goes.
+    pub fn mode(self) -> Mode {
+        match self {
+            Self::Single => Mode::Single,
+            Self::Untangling | Self::All | Self::Corrections => Mode::Layered,
+        }
+    }
+
     /// Whether the first stage stays as it is.
     pub fn freezes(self) -> bool {
         matches!(self, Self::Untangling | Self::Corrections)

@@ -43,6 +43,7 @@ mod shipped;
 mod smooth;
 mod source;
 mod temporal_filter;
+pub mod tensor_store;
 
 pub use acceleration::{Acceleration, acceleration};
 pub use clothcombo_physics::contact::resolve::Certificate;

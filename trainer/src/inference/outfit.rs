@@ -6,14 +6,14 @@ use super::error::DraperError;
 use super::names::UniqueNames;
 use super::source::SourceGarment;
 use crate::dataset::{DatasetError, PreparedGarment, contacts};
-use crate::inference::networks::garment_tensors;
+use crate::inference::tensor_store::garment_tensors;
 use burn::tensor::{Tensor, TensorData};
 use clothcombo_data::asset::Binding;
 use clothcombo_data::cache::{
     ArrayCache, Key, KeyBuilder, StoredEmbedding, binding_key, embedding_key, get_binding, get_embedding,
     get_operators, mesh_key, operators_key, put_binding, put_embedding, put_operators,
 };
-use clothcombo_model::{Embeddings, GarmentEmbedding, GarmentTensors, OutfitTensors};
+use clothcombo_model::{Embeddings, GarmentEmbedding, GarmentTensors, Mode, OutfitTensors};
 use clothcombo_physics::contact::resolve::{Layer, ResolveError, RestGarment};
 use clothcombo_physics::operators::SurfaceOperators;
 use std::collections::HashMap;
@@ -161,8 +161,7 @@ impl KnownGarments {
         let tensors: Vec<&GarmentTensors> = known.iter().map(|k| &k.tensors).collect();
         let tensors = OutfitTensors::new(&tensors, &contacts)?;
         let embeddings: Vec<GarmentEmbedding> = known.iter().map(|k| k.embedding.clone()).collect();
-        let embeddings = draper.model.pack(&tensors, &embeddings)?;
-        let embeddings = draper.model.prepare_untangling(&tensors, embeddings);
+        let embeddings = draper.model.pack(&tensors, &embeddings, Mode::Layered)?;
         Ok(Outfit { pieces, tensors, embeddings })
     }
 

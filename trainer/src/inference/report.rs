@@ -232,9 +232,8 @@ fn garment_reports(outfit: &Outfit, drapes: &[Drape]) -> Vec<GarmentReport> {
             let own: f64 = drape.garments.iter().map(|g| g.resolve_ms).sum();
             times += PhaseTimes {
                 posing: share * shared.posing,
-                draping: share * shared.draping,
-                untangling: share * shared.untangling,
-                correcting: share * shared.correcting,
+                networks: share * shared.networks,
+                corrections: share * shared.corrections,
                 refine: share * shared.refine,
                 resolve: drape.garments[index].resolve_ms + share * (shared.resolve - own),
                 certificate: share * shared.certificate,

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// One optimiser step, as it stands in `metrics.jsonl`.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct StepRecord {
     /// Steps done, this one included (the first step is 1).
     pub step: u64,
@@ -146,4 +146,15 @@ pub trait Observer {
     /// # Errors
     /// When something cannot be written; the run then ends with this error.
     fn observe(&mut self, event: &TrainEvent) -> Result<(), Report>;
+}
+
+/// The observers of a run.
+pub type Observers = [Box<dyn Observer>];
+
+/// Shows `event` to every observer, in order.
+///
+/// # Errors
+/// The first one of an observer.
+pub fn emit(observers: &mut Observers, event: &TrainEvent) -> Result<(), Report> {
+    observers.iter_mut().try_for_each(|observer| observer.observe(event))
 }

@@ -4,7 +4,7 @@ use super::Session;
 use crate::config::Config;
 use crate::dataset::{Dataset, is_fingerprint};
 use crate::evaluation::ValidationSet;
-use crate::inference::networks::TensorStore;
+use crate::inference::tensor_store::TensorStore;
 use crate::run::checkpoint::{Checkpoint, CheckpointState, TrainedModel};
 use crate::run::folder::{RunDir, differing_keys};
 use crate::training::average::Average;
@@ -115,12 +115,14 @@ impl Session {
             guard: Guard::new(config.guard.clone(), &state.incidents),
             best: state.best,
             step: state.step,
+            saved_step: state.step,
+            owes_checkpoint: false,
             config: Arc::new(config),
             run,
             dataset,
             learner,
             average,
-            world: Rc::default(),
+            group: Rc::default(),
         }
     }
 }
