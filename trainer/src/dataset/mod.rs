@@ -24,7 +24,7 @@ pub use garment_store::{GarmentInfo, GarmentStore};
 pub use poses::{ClipSplit, FrameCounts, HeldOut, PoseLibrary, SelfIntersecting, Window};
 pub use prepare::{PreparedBody, PreparedScene, SceneBuilder, contacts, prepare};
 pub use prepared_garment::PreparedGarment;
-pub use preprocessor::Preprocessor;
+pub use preprocessor::{CachePolicy, Preprocessor};
 pub use sampling::{
     BodySample, Plan, SceneSample, ValidationGroup, round_robin, sample_evaluation, sample_outfit,
     sample_training, sample_validation,

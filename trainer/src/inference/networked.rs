@@ -115,7 +115,7 @@ impl Draper {
             graph: self.trained.config.model.graph,
         };
         let sample = SceneSample {
-            garments: (0..outfit.pieces.len()).collect(),
+            garments: (0..outfit.garments.len()).collect(),
             bodies: vec![body],
             repulsion_sample: 0,
         };
