@@ -40,7 +40,7 @@ fn run() -> Result<(), Report> {
                 "shape {shape:>4}: {} has {:.2} % of {} vertices inside the body",
                 garment.name,
                 100.0 * scored.penetration.vertices_inside,
-                garment.vertices
+                scored.vertices
             );
         }
         println!(
