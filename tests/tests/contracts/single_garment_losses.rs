@@ -1,4 +1,4 @@
-//! `losses.alone`: losses of single garments count besides those of the outfit, where all networks are trained.
+//! `losses.single_garments`: losses of single garments count besides those of the outfit, where all networks are trained.
 
 use clothcombo_physics::energy::SceneEnergy;
 use clothcombo_tests::{Untrained, tiny_config};
@@ -10,7 +10,7 @@ use std::sync::Arc;
 fn losses_of_single_garments_are_added_where_all_networks_are_trained() {
     let folder = tempfile::tempdir().unwrap();
     // Gradients that are compared as they are: those of scenes are not clipped where the mean is.
-    let run = Untrained::new(folder.path(), &["losses.alone=0.5", "optimizer.clip=step"]);
+    let run = Untrained::new(folder.path(), &["losses.single_garments=0.5", "optimizer.clip=step"]);
     let silent = tiny_config(folder.path(), &["optimizer.clip=step"]);
     let schedule = Schedule::new(&run.config);
     let mut stages = run.config.stages.iter().zip(schedule.boundaries());

@@ -66,7 +66,7 @@ pub struct StageConfig {
     #[serde(default = "one", alias = "scenes_per_step")]
     pub bodies: usize,
     /// Scenes with garments of their own whose gradients are averaged before one update (gradient accumulation). They are
-    /// computed beside each other: on two cores a step with 2 takes 1.3 to 1.8 times as long as one with 1. The gradient is
+    /// computed in parallel: on two cores a step with 2 takes 1.3 to 1.8 times as long as one with 1. The gradient is
     /// less noisy. Processes of one run share the scenes.
     #[serde(default = "one")]
     pub accumulate: usize,
@@ -142,7 +142,7 @@ impl StageConfig {
                 "use layers = [1, 1], or trains = \"all\"",
             )
         } else if self.trains == Trains::Untangling && low < 2 {
-            says("layers", "one garment alone has nothing to untangle", "use at least 2 layers")
+            says("layers", "a single garment has nothing to untangle", "use at least 2 layers")
         } else if high > MOST_LAYERS {
             says("layers", "are more garments than anyone wears", "the paper goes up to 6, 32 are allowed")
         } else if !(0.0..=1.0).contains(&self.layer_curriculum) {

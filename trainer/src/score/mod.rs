@@ -74,7 +74,7 @@ pub struct ScoreSettings {
     pub distance: ScoreDistance,
 }
 
-/// What the body does on its own: no garment can mend it, so it is counted against none.
+/// What the body does on its own: no garment can change it, so it is counted against none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct BodyScore {
     /// Pairs of its triangles that intersect.

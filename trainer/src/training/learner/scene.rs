@@ -118,7 +118,7 @@ impl<'a> SceneStep<'a> {
             None => tensors.embed(&networks, scene, &outfit, &tensors.embeddings(), mode)?,
         };
         let share = 1.0 / scene.bodies.len() as f64;
-        let single_weight = if trains == Trains::All { scene.alone * share } else { 0.0 };
+        let single_weight = if trains == Trains::All { scene.single_garments * share } else { 0.0 };
         let mut losses = Losses::default();
         for body in &scene.bodies {
             let states = drape_states(&networks, tensors, scene, body, (&outfit, &embeddings), trains)?;

@@ -93,7 +93,7 @@ impl Session {
         let changed = differing_keys(&checkpoint.config()?, &config);
         let is_comparable = !changed.iter().any(|key| scores.iter().any(|part| key.starts_with(part)));
         let best = found.best.filter(|_| is_comparable);
-        // What was changed may be the mend for what went wrong before.
+        // What was changed may have fixed what went wrong before.
         let incidents = if changed.is_empty() { found.incidents.clone() } else { Vec::new() };
         let found = CheckpointState { best, incidents, ..found.clone() };
         Ok(Self::assemble(run, config, dataset, &device, learner, average, &found))
