@@ -1,4 +1,4 @@
-//! The draper as a dataset: two garments of the model's own wardrobe on three bodies.
+//! The draper as a library: two garments of the model's own data on three bodies.
 //!
 //! ```text
 //! cargo run --release --example drape -- runs/smoke

@@ -1,4 +1,5 @@
-//! From a step number to everything the networks and the energies need: draw, prepare, hand over.
+//! The data of a run. In: a configuration. Out: body, garments and poses ([`Dataset`]), samples of scenes as pure functions of seed and
+//! step, and prepared scenes with their energies.
 
 mod active_joints;
 mod contents;

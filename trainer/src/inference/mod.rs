@@ -1,4 +1,5 @@
-//! Any body, any garments, in order: the trained networks as a dataset.
+//! Inference. In: a trained model, any garments in their order, any body. Out: draped garments, with a certificate of what still
+//! intersects.
 //!
 //! ```no_run
 //! use clothcombo_data::asset::Pose;
