@@ -7,7 +7,7 @@ use burn::tensor::{Device, Tensor};
 use tracing::trace_span;
 
 use crate::config::{Dimensions, ModelConfig};
-use crate::correction::{Correction, Given};
+use crate::correction::{Conditioning, Correction};
 use crate::diffusion_net::MINIMUM_TIME;
 use crate::draping::Draping;
 use crate::error::ModelError;
@@ -15,7 +15,7 @@ use crate::garment_encoder::{GarmentEmbedding, GarmentEncoder};
 use crate::initializer::Initializer;
 use crate::linear_blend_skinning::linear_blend_skinning;
 use crate::skinning::Skinning;
-use crate::tensors::{BodyTensors, FeltTensors, GarmentTensors, OutfitTensors, stack_rows};
+use crate::tensors::{BodyTensors, ContactFeatureTensors, GarmentTensors, OutfitTensors, stack_rows};
 use crate::untangling::Untangling;
 
 /// The four networks, and those that correct what they do.
@@ -40,7 +40,7 @@ pub struct ClothCombo {
 }
 
 /// What the vertices of all garments feel at posed positions `[ΣV,3]` [m].
-pub type Feel<'a> = &'a dyn Fn(Tensor<2>) -> FeltTensors;
+pub type Feel<'a> = &'a dyn Fn(Tensor<2>) -> ContactFeatureTensors;
 
 /// Embeddings of the garments of an outfit, with everything that follows from them alone.
 ///
@@ -203,7 +203,7 @@ impl ClothCombo {
             outfit.rest.clone(),
             embeddings.draping_product.clone(),
             draping_embedding.clone(),
-            &outfit.segments,
+            &outfit.packing,
         );
         let canonical = displacement + start;
         drop(span);
@@ -303,12 +303,12 @@ impl ClothCombo {
         (start, single): (Tensor<2>, &SingleDrape),
         canonical: Tensor<2>,
         body: &BodyTensors,
-        felt: FeltTensors,
+        felt: ContactFeatureTensors,
     ) -> LayeredDrape {
         let _span = trace_span!("corrections").entered();
         let [vertex, draping, weights] =
             [&embeddings.vertex, &single.draping_embedding, &single.skin_weights].map(|t| t.clone().detach());
-        let given = Given { vertex: &vertex, draping: &draping, segments: &outfit.segments };
+        let given = Conditioning { vertex: &vertex, draping: &draping, packing: &outfit.packing };
         let displacement = canonical - start.clone();
         let canonical = self.corrections[network].correct(displacement, felt, &given) + start;
         let posed = linear_blend_skinning(canonical.clone(), weights, body.bones.clone());

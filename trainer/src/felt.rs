@@ -2,7 +2,7 @@
 
 use crate::scene::{LibraryGarment, PreparedBody, PreparedScene};
 use burn::tensor::Device;
-use clothcombo_model::FeltTensors;
+use clothcombo_model::ContactFeatureTensors;
 use clothcombo_physics::sensing::{DIRECTIONS, FEATURES, Rings, Sensed, sense};
 use std::sync::Arc;
 
@@ -25,7 +25,8 @@ impl Company {
     }
 }
 
-const _: () = assert!(FEATURES == FeltTensors::FEATURES && DIRECTIONS == FeltTensors::DIRECTIONS);
+const _: () =
+    assert!(FEATURES == ContactFeatureTensors::FEATURES && DIRECTIONS == ContactFeatureTensors::DIRECTIONS);
 
 /// What the vertices of the garments of `scene` feel at `posed` `[ΣV, 3]` [m] on `body`, as tensors on `device`.
 ///
@@ -37,11 +38,11 @@ pub fn felt(
     contacts: &[(usize, usize)],
     posed: &[[f32; 3]],
     device: &Device,
-) -> FeltTensors {
+) -> ContactFeatureTensors {
     let rings: Vec<&Rings> = scene.worn.iter().map(|worn| &worn.rings).collect();
     let Sensed { features, directions } = sense(&body.energy, &rings, posed, contacts);
     let directions = directions.map(|posed| unposed(scene, body, &posed));
-    FeltTensors::new(features, directions.each_ref().map(Vec::as_slice), device)
+    ContactFeatureTensors::new(features, directions.each_ref().map(Vec::as_slice), device)
         .expect("every vertex of the scene has its features")
 }
 
