@@ -11,3 +11,4 @@ pub mod format;
 pub mod generate;
 pub mod hard_cases;
 pub mod import;
+pub mod mesh;

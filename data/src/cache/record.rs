@@ -8,9 +8,9 @@
 //! …            arrays, each on a multiple of 64 bytes, little endian
 //! ```
 
+use crate::format::FileError;
 use memmap2::Mmap;
 use std::fs::File;
-use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -73,13 +73,8 @@ impl Kind {
 #[derive(Debug, Error)]
 pub enum RecordError {
     /// The file cannot be opened or mapped.
-    #[error("{}: {reason}", path.display())]
-    Io {
-        /// The record.
-        path: PathBuf,
-        /// What the system said.
-        reason: io::Error,
-    },
+    #[error(transparent)]
+    Io(#[from] FileError),
     /// The file is not whole or was changed.
     #[error("{}: damaged cache record ({reason}); it is computed anew when the file is removed", path.display())]
     Damaged {
@@ -111,8 +106,8 @@ impl Record {
     /// # Errors
     /// [`RecordError`] naming the file.
     pub fn open(path: &Path) -> Result<Self, RecordError> {
-        let failed = |reason| RecordError::Io { path: path.into(), reason };
-        let file = File::open(path).map_err(failed)?;
+        let failed = FileError::at(path);
+        let file = File::open(path).map_err(&failed)?;
         // SAFETY: records are written under another name and renamed into place, and nobody writes to one afterwards, so
         // the mapped bytes do not change. (Whoever truncates a file of the cache by hand ends the process with SIGBUS,
         // as for every mapped file.)

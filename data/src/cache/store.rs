@@ -137,9 +137,9 @@ impl ArrayCache {
         let path = self.path(key);
         match Record::open(&path).and_then(|record| read(&record)) {
             Ok(value) => Some(value),
-            Err(RecordError::Io { reason, .. }) if reason.kind() == io::ErrorKind::NotFound => None,
+            Err(RecordError::Io(error)) if error.reason.kind() == io::ErrorKind::NotFound => None,
             // It may be a good one that cannot be read just now.
-            Err(error @ RecordError::Io { .. }) => {
+            Err(error @ RecordError::Io(_)) => {
                 tracing::warn!("{error}; computed anew");
                 None
             }

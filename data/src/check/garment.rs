@@ -1,10 +1,10 @@
 //! A garment file: the mesh, what it is, and how it lies on the body.
 
 use super::FileCheck;
-use super::measures::MeshMeasures;
 use super::targets::ManifestHints;
 use crate::asset::{Body, Category, Garment};
 use crate::format::load_tri_mesh;
+use crate::mesh::MeshMeasures;
 use clothcombo_physics::Topology;
 use clothcombo_physics::contact::{self_triangle_pairs, triangle_pairs};
 use clothcombo_physics::query::{Distance, Surface};

@@ -4,13 +4,11 @@
 
 mod body;
 mod garment;
-pub(crate) mod measures;
 mod motion;
 mod targets;
 
 pub use body::BodyCheck;
 pub use garment::{GarmentCheck, layer_guess};
-pub use measures::{MeshDefects, MeshMeasures};
 pub use motion::{MotionCheck, impossible_turn};
 pub use targets::{ManifestHints, Target, find_targets};
 

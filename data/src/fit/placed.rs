@@ -1,8 +1,9 @@
 //! Does a garment already lie on a body, in metres and T-pose, so that nothing has to be found out?
 
+use super::FitSettings;
 use super::search::{Samples, Search};
-use super::{FitSettings, outward_area};
 use crate::asset::Body;
+use crate::mesh::outward_area;
 use clothcombo_physics::{Surface, Topology, TriMesh};
 
 /// Whether `mesh`, taken as it stands (metres, y up, pelvis at the origin, arms level), sits on the zero body of `body` as a

@@ -3,7 +3,7 @@
 use super::placement::{Origin, Placement};
 use super::search::Sitting;
 use crate::asset::Category;
-use crate::check::MeshMeasures;
+use crate::mesh::MeshMeasures;
 use serde::Serialize;
 use std::fmt;
 

@@ -6,8 +6,9 @@
 //! also moved to where it fits best.
 
 use super::arm_pose::ArmPose;
+use super::coverage::off_trunk;
 use super::placement::{Origin, Placement, Unit, UpAxis};
-use super::{FitError, FitSettings, worn_where};
+use super::{FitError, FitSettings};
 use crate::asset::{Body, skeleton};
 use clothcombo_physics::query::Distance;
 use clothcombo_physics::vec3::{add, cross, norm, scale, sub};
@@ -197,12 +198,12 @@ impl<'a> Search<'a> {
             .par_iter()
             .filter_map(|(placement, arm)| {
                 let points = placement.apply(&samples.0);
-                let place = worn_where(&points, self.body).err()?;
+                let place = off_trunk(&points, self.body)?;
                 let sitting = self.sitting(&points, &self.arms[*arm]);
                 (sitting.mean_distance < 0.04 && sitting.inside < 0.25).then_some(place)
             })
             .find_first(|_| true);
-        snug.map_or(Ok(()), |place| Err(FitError::Worn { place }))
+        snug.map_or(Ok(()), |place| Err(FitError::OffTrunk { place }))
     }
 
     /// Cheap costs first, careful ones for the best few.

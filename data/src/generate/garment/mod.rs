@@ -20,11 +20,9 @@ mod upper;
 mod wardrobe;
 
 use super::isosurface::{Lattice, extract};
-use super::labelled_triangles::LabelledTriangles;
-use super::remesh::{Quality, remesh};
-use super::sheet::Sheet;
 use crate::asset::provenance::GENERATED;
 use crate::asset::{Body, Category, Garment, Provenance};
+use crate::mesh::{EditableMesh, LabelledTriangles, Quality, remesh};
 use cloth::Cloth;
 use clothcombo_physics::TriMesh;
 use clothcombo_physics::contact::TriangleTree;
@@ -234,7 +232,7 @@ impl<'a> GarmentGenerator<'a> {
                 })
             }),
         };
-        let mut sheet = Sheet::new(triangles);
+        let mut sheet = EditableMesh::new(triangles);
         let limits = Quality { angle: 15.0, edge_ratio: [0.4, 2.5] };
         remesh(&mut sheet, &target, 6, limits);
         let (positions, faces) = sheet.compact();

@@ -1,8 +1,7 @@
 //! What a generated garment promises, measured: topology, triangle shapes, and no contact with the body.
 
-use super::super::remesh::Quality;
-use super::super::sheet::{smallest_sine, triangle_normal};
 use super::distance;
+use crate::mesh::{Quality, smallest_sine, triangle_normal};
 use clothcombo_physics::contact::TriangleTree;
 use clothcombo_physics::query::{Distance, Surface};
 use clothcombo_physics::vec3::{dot, norm};

@@ -19,8 +19,8 @@ use super::thinning::{Thinned, Thinning, thin};
 use super::{Progress, Summary};
 use crate::asset::{BindingSettings, Body, Category, Garment, Motion, Provenance};
 use crate::dataset::garment_folder::{FolderGarment, GarmentFolderError, save_garment_folder};
-use crate::fit::contact;
-use crate::format::{NpzError, NpzWriter, PointCache, obj};
+use crate::format::{FileError, NpzError, NpzWriter, PointCache, obj};
+use crate::mesh::contact;
 use clothcombo_physics::query::Surface;
 use manifest::{GarmentEntry, SampleEntry};
 use std::fs;
@@ -31,13 +31,8 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum Cloth3dError {
     /// A folder cannot be read, or a file not be written.
-    #[error("{}: {reason}", path.display())]
-    Io {
-        /// File or folder.
-        path: PathBuf,
-        /// What the system said.
-        reason: std::io::Error,
-    },
+    #[error(transparent)]
+    Io(#[from] FileError),
     /// No sample.
     #[error("{}: no CLOTH3D sample; a sample folder holds info.mat", inputs.join(", "))]
     NoSample {
@@ -175,7 +170,7 @@ pub fn import_cloth3d(
     summary.notes.extend(motions.notes);
     summary.written.extend(motions.written);
     let path = out.join("cloth3d.toml");
-    manifest::add(&path, entries).map_err(|reason| Cloth3dError::Io { path: path.clone(), reason })?;
+    manifest::add(&path, entries).map_err(FileError::at(&path))?;
     summary.written.push(path);
     Ok(summary)
 }
@@ -217,10 +212,10 @@ fn find_samples(inputs: &[PathBuf]) -> Result<Vec<Sample>, Cloth3dError> {
             folders.push(input.clone());
             continue;
         }
-        let failed = |reason| Cloth3dError::Io { path: input.clone(), reason };
+        let failed = FileError::at(input);
         let mut below = Vec::new();
-        for entry in fs::read_dir(input).map_err(failed)? {
-            let folder = entry.map_err(failed)?.path();
+        for entry in fs::read_dir(input).map_err(&failed)? {
+            let folder = entry.map_err(&failed)?.path();
             if folder.join("info.mat").is_file() {
                 below.push(folder);
             }

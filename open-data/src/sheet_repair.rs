@@ -1,8 +1,8 @@
 //! Polygon soup of a game asset → one oriented manifold sheet, or the reason why not.
 
 use super::reference_surface::boundary_edges;
-use crate::fit::{SplitSheet, clean_faces, join_faces, orient, outwardness, split_fans, weld};
-use crate::generate::labelled_triangles::LabelledTriangles;
+use clothcombo_data::mesh::LabelledTriangles;
+use clothcombo_data::mesh::{SplitMesh, clean_faces, join_faces, orient, outwardness, split_fans, weld};
 use clothcombo_physics::query::Surface;
 use clothcombo_physics::vec3::{add, norm, scale, sub};
 use std::collections::{HashMap, VecDeque};
@@ -60,7 +60,7 @@ pub(super) fn repair(
     Ok((sheet, repairs))
 }
 
-fn unlabelled(sheet: SplitSheet) -> LabelledTriangles {
+fn unlabelled(sheet: SplitMesh) -> LabelledTriangles {
     LabelledTriangles {
         labels: vec![0; sheet.positions.len()],
         positions: sheet.positions,

@@ -16,9 +16,8 @@ pub use phenotype::Phenotype;
 pub use rig::Rig;
 pub use wheel::{AnnyError, BODY_VERTEX_COUNT};
 
-use super::overwrite::refuse_overwriting;
-use super::{Progress, Summary};
-use crate::asset::{Provenance, body_file::BodyFileError};
+use clothcombo_data::asset::{Provenance, body_file::BodyFileError};
+use clothcombo_data::import::{Progress, Summary, refuse_overwriting};
 use std::path::Path;
 
 /// How the body model is learned from random people.

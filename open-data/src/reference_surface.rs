@@ -1,7 +1,7 @@
 //! A fixed triangle sheet to which a remeshed copy keeps: its surface, its boundary curves and their corners.
 
-use crate::generate::labelled_triangles::LabelledTriangles;
-use crate::generate::remesh::Target;
+use clothcombo_data::mesh::LabelledTriangles;
+use clothcombo_data::mesh::RemeshTarget;
 use clothcombo_physics::query::ClosestPoint;
 use clothcombo_physics::vec3::{add, dot, norm_squared, scale, sub};
 use std::collections::HashMap;
@@ -53,7 +53,7 @@ fn closest_on_segment(p: [f64; 3], [a, b]: [[f64; 3]; 2]) -> [f64; 3] {
     add(a, scale(along, t))
 }
 
-impl Target for ReferenceSurface {
+impl RemeshTarget for ReferenceSurface {
     fn project(&self, point: [f64; 3], label: u32) -> [f64; 3] {
         let nearest = |candidates: &mut dyn Iterator<Item = [f64; 3]>| {
             let mut best = (f64::MAX, point);

@@ -9,9 +9,12 @@ use std::collections::HashMap;
 
 /// Triangle soup with labels, the form in which surfaces are clipped.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct LabelledTriangles {
+pub struct LabelledTriangles {
+    /// Vertices `[V, 3]` (m).
     pub positions: Vec<[f64; 3]>,
+    /// Label of each vertex.
     pub labels: Vec<u32>,
+    /// Triangles.
     pub faces: Vec<[u32; 3]>,
 }
 

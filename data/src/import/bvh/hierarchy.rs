@@ -2,31 +2,20 @@
 
 use crate::asset::motion::{MAX_ANGLE, check_frame_rate};
 use crate::asset::rotation::{self, Matrix3};
+use crate::format::{FileError, LineError};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use thiserror::Error;
 
 /// Why a BVH file cannot be used.
 #[derive(Debug, Error)]
 pub enum BvhError {
     /// The file cannot be read.
-    #[error("{}: {reason}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        reason: std::io::Error,
-    },
+    #[error(transparent)]
+    Io(#[from] FileError),
     /// A line is wrong.
-    #[error("{}:{line}: {message}", path.display())]
-    Line {
-        /// The file.
-        path: PathBuf,
-        /// The line, from 1; the last one if the file ends too early.
-        line: usize,
-        /// What is wrong with it.
-        message: String,
-    },
+    #[error(transparent)]
+    Line(#[from] LineError),
 }
 
 /// One motion channel: which axis, and whether it moves or turns.
@@ -76,13 +65,13 @@ struct Words<'a> {
 }
 
 impl<'a> Words<'a> {
-    fn error(&self, message: String) -> BvhError {
+    fn error(&self, message: String) -> LineError {
         let line =
             self.words.get(self.at.saturating_sub(1)).or(self.words.last()).map_or(1, |(line, _)| *line);
-        BvhError::Line { path: self.path.into(), line, message }
+        LineError { path: self.path.into(), line, message }
     }
 
-    fn next(&mut self, expected: &str) -> Result<&'a str, BvhError> {
+    fn next(&mut self, expected: &str) -> Result<&'a str, LineError> {
         let word = self.words.get(self.at).map(|(_, word)| *word);
         self.at += 1;
         word.ok_or_else(|| self.error(format!("the file ends where {expected} should be")))
@@ -92,7 +81,7 @@ impl<'a> Words<'a> {
         self.words.get(self.at).map(|(_, word)| *word)
     }
 
-    fn expect(&mut self, expected: &str) -> Result<(), BvhError> {
+    fn expect(&mut self, expected: &str) -> Result<(), LineError> {
         let word = self.next(&format!("'{expected}'"))?;
         if word.eq_ignore_ascii_case(expected) {
             return Ok(());
@@ -100,7 +89,7 @@ impl<'a> Words<'a> {
         Err(self.error(format!("expected '{expected}', found '{word}'")))
     }
 
-    fn number(&mut self, what: &str) -> Result<f64, BvhError> {
+    fn number(&mut self, what: &str) -> Result<f64, LineError> {
         let word = self.next(what)?;
         match word.parse::<f64>() {
             Ok(x) if x.is_finite() => Ok(x),
@@ -108,7 +97,7 @@ impl<'a> Words<'a> {
         }
     }
 
-    fn offset(&mut self) -> Result<[f64; 3], BvhError> {
+    fn offset(&mut self) -> Result<[f64; 3], LineError> {
         self.expect("OFFSET")?;
         Ok([self.number("an offset")?, self.number("an offset")?, self.number("an offset")?])
     }
@@ -120,15 +109,15 @@ impl Bvh {
     /// # Errors
     /// [`BvhError`] naming file and line.
     pub fn load(path: &Path) -> Result<Self, BvhError> {
-        let bytes = fs::read(path).map_err(|reason| BvhError::Io { path: path.into(), reason })?;
-        Self::parse(&String::from_utf8_lossy(&bytes), path)
+        let bytes = fs::read(path).map_err(FileError::at(path))?;
+        Ok(Self::parse(&String::from_utf8_lossy(&bytes), path)?)
     }
 
     /// Parses BVH text; `path` is for messages only. A last frame that is not whole is dropped.
     ///
     /// # Errors
-    /// [`BvhError`] naming file and line.
-    pub fn parse(text: &str, path: &Path) -> Result<Self, BvhError> {
+    /// [`LineError`] naming file and line.
+    pub fn parse(text: &str, path: &Path) -> Result<Self, LineError> {
         let lines = text.lines().enumerate();
         let words = lines
             .flat_map(|(n, line)| line.split_ascii_whitespace().map(move |word| (n + 1, word)))
@@ -204,7 +193,7 @@ impl Bvh {
 }
 
 /// The channel values of all frames. Angles no motion has are refused: their sines mean nothing.
-fn read_values(words: &mut Words, joints: &[BvhJoint]) -> Result<Vec<f64>, BvhError> {
+fn read_values(words: &mut Words, joints: &[BvhJoint]) -> Result<Vec<f64>, LineError> {
     let limit = MAX_ANGLE.to_degrees();
     let channels: Vec<(&str, bool)> =
         joints.iter().flat_map(|j| j.channels.iter().map(|c| (j.name.as_str(), c.rotates))).collect();
@@ -228,7 +217,7 @@ fn read_joint(
     joints: &mut Vec<BvhJoint>,
     parent: Option<usize>,
     depth: usize,
-) -> Result<(), BvhError> {
+) -> Result<(), LineError> {
     if depth > DEEPEST_TREE {
         return Err(words.error(format!("the joint tree is deeper than {DEEPEST_TREE}")));
     }

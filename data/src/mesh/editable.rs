@@ -1,25 +1,27 @@
-//! A triangle sheet that can be edited: the three local edge operations of remeshing.
+//! A triangle mesh that can be edited: the three local edge operations of remeshing.
 //!
-//! Vertices keep the labels of the [`LabelledTriangles`] the sheet is made of.
+//! Vertices keep the labels of the [`LabelledTriangles`] the mesh is made of.
 
 use super::labelled_triangles::LabelledTriangles;
-use clothcombo_physics::vec3::{add, cross, dot, norm, norm_squared, sub};
+use super::triangle::{smallest_sine, triangle_normal};
+use clothcombo_physics::vec3::{add, dot, norm, sub};
 
 /// An editable manifold triangle mesh with boundary.
 #[derive(Debug, Clone)]
-pub(crate) struct Sheet {
-    pub positions: Vec<[f64; 3]>,
-    pub labels: Vec<u32>,
+pub struct EditableMesh {
+    pub(super) positions: Vec<[f64; 3]>,
+    pub(super) labels: Vec<u32>,
     /// Removed faces are [`DEAD`].
-    pub faces: Vec<[u32; 3]>,
+    pub(super) faces: Vec<[u32; 3]>,
     /// Faces around each vertex; empty for removed vertices.
     incident: Vec<Vec<u32>>,
 }
 
 /// Marks a removed face.
-pub(crate) const DEAD: [u32; 3] = [u32::MAX; 3];
+pub(super) const DEAD: [u32; 3] = [u32::MAX; 3];
 
-impl Sheet {
+impl EditableMesh {
+    /// The mesh of these triangles, with their labels.
     pub fn new(triangles: LabelledTriangles) -> Self {
         let LabelledTriangles { positions, labels, faces } = triangles;
         let mut incident = vec![Vec::with_capacity(8); positions.len()];
@@ -48,24 +50,24 @@ impl Sheet {
         (positions, faces)
     }
 
-    pub fn incident(&self, v: u32) -> &[u32] {
+    pub(super) fn incident(&self, v: u32) -> &[u32] {
         &self.incident[v as usize]
     }
 
-    pub fn is_alive(&self, v: u32) -> bool {
+    pub(super) fn is_alive(&self, v: u32) -> bool {
         !self.incident[v as usize].is_empty()
     }
 
-    pub fn point(&self, v: u32) -> [f64; 3] {
+    pub(super) fn point(&self, v: u32) -> [f64; 3] {
         self.positions[v as usize]
     }
 
-    pub fn length(&self, a: u32, b: u32) -> f64 {
+    pub(super) fn length(&self, a: u32, b: u32) -> f64 {
         norm(sub(self.point(a), self.point(b)))
     }
 
     /// Unique living edges `[low, high]` in a fixed order.
-    pub fn edges(&self) -> Vec<[u32; 2]> {
+    pub(super) fn edges(&self) -> Vec<[u32; 2]> {
         let mut edges = Vec::with_capacity(self.faces.len() * 3 / 2 + 16);
         for face in self.faces.iter().filter(|f| **f != DEAD) {
             for corner in 0..3 {
@@ -81,7 +83,7 @@ impl Sheet {
     }
 
     /// The faces of an edge (at most two are returned) and their number.
-    pub fn edge_faces(&self, a: u32, b: u32) -> ([u32; 2], usize) {
+    pub(super) fn edge_faces(&self, a: u32, b: u32) -> ([u32; 2], usize) {
         let (mut faces, mut count) = ([u32::MAX; 2], 0);
         for &f in &self.incident[a as usize] {
             if self.faces[f as usize].contains(&b) {
@@ -105,17 +107,17 @@ impl Sheet {
     }
 
     /// Unnormalised normal (twice the area) of a face.
-    pub fn normal(&self, f: u32) -> [f64; 3] {
+    pub(super) fn normal(&self, f: u32) -> [f64; 3] {
         triangle_normal(self.faces[f as usize].map(|v| self.point(v)))
     }
 
     /// Area-weighted normal of a vertex, not normalised.
-    pub fn vertex_normal(&self, v: u32) -> [f64; 3] {
+    pub(super) fn vertex_normal(&self, v: u32) -> [f64; 3] {
         self.incident[v as usize].iter().fold([0.0; 3], |sum, f| add(sum, self.normal(*f)))
     }
 
     /// Neighbours of a vertex in order of first appearance.
-    pub fn neighbours(&self, v: u32, into: &mut Vec<u32>) {
+    pub(super) fn neighbours(&self, v: u32, into: &mut Vec<u32>) {
         into.clear();
         for &f in &self.incident[v as usize] {
             for u in self.faces[f as usize] {
@@ -127,7 +129,7 @@ impl Sheet {
     }
 
     /// The two neighbours along the boundary, if `v` is an ordinary boundary vertex.
-    pub fn boundary_neighbours(&self, v: u32) -> Option<[u32; 2]> {
+    pub(super) fn boundary_neighbours(&self, v: u32) -> Option<[u32; 2]> {
         let (mut ends, mut count) = ([0; 2], 0);
         for &f in &self.incident[v as usize] {
             for u in self.faces[f as usize] {
@@ -160,7 +162,7 @@ impl Sheet {
     }
 
     /// Inserts a vertex at `position` into the edge; the label of a boundary edge is inherited.
-    pub fn split(&mut self, a: u32, b: u32, position: [f64; 3]) -> u32 {
+    pub(super) fn split(&mut self, a: u32, b: u32, position: [f64; 3]) -> u32 {
         let (faces, count) = self.edge_faces(a, b);
         let middle = self.positions.len() as u32;
         self.positions.push(position);
@@ -180,8 +182,8 @@ impl Sheet {
         middle
     }
 
-    /// Whether removing `gone` by merging it into `kept` keeps the sheet a manifold and the boundary curves whole.
-    pub fn can_collapse(&self, gone: u32, kept: u32) -> bool {
+    /// Whether removing `gone` by merging it into `kept` keeps the mesh a manifold and the boundary curves whole.
+    pub(super) fn can_collapse(&self, gone: u32, kept: u32) -> bool {
         let (faces, count) = self.edge_faces(gone, kept);
         if count == 0 || count > 2 {
             return false;
@@ -217,7 +219,7 @@ impl Sheet {
     }
 
     /// Whether every face around `v` outside `without` keeps its orientation and a usable shape when `v` moves.
-    pub fn can_move(&self, v: u32, target: [f64; 3], without: u32, least_angle: f64) -> bool {
+    pub(super) fn can_move(&self, v: u32, target: [f64; 3], without: u32, least_angle: f64) -> bool {
         let least_sine = least_angle.to_radians().sin();
         let around = self.vertex_normal(v);
         self.incident[v as usize].iter().all(|&f| {
@@ -240,7 +242,7 @@ impl Sheet {
     }
 
     /// Merges `gone` into `kept`, which moves to `position`. Call [`Self::can_collapse`] first.
-    pub fn collapse(&mut self, gone: u32, kept: u32, position: [f64; 3]) {
+    pub(super) fn collapse(&mut self, gone: u32, kept: u32, position: [f64; 3]) {
         let faces = std::mem::take(&mut self.incident[gone as usize]);
         for f in faces {
             let face = self.faces[f as usize];
@@ -261,7 +263,7 @@ impl Sheet {
 
     /// Replaces edge `ab` by the other diagonal of its two faces if that raises the smallest angle, by more than a
     /// relative `gain`, without folding the surface. Returns whether it did.
-    pub fn flip_if_better(&mut self, a: u32, b: u32, gain: f64) -> bool {
+    pub(super) fn flip_if_better(&mut self, a: u32, b: u32, gain: f64) -> bool {
         let (faces, count) = self.edge_faces(a, b);
         if count != 2 {
             return false;
@@ -296,19 +298,4 @@ impl Sheet {
         self.incident[c as usize].push(g);
         true
     }
-}
-
-/// Unnormalised normal of a triangle.
-pub(crate) fn triangle_normal([a, b, c]: [[f64; 3]; 3]) -> [f64; 3] {
-    cross(sub(b, a), sub(c, a))
-}
-
-/// Sine-like measure of the smallest angle of a triangle: exact for acute smallest angles, which a smallest angle is.
-pub(crate) fn smallest_sine([a, b, c]: [[f64; 3]; 3]) -> f64 {
-    let lengths = [norm_squared(sub(b, a)), norm_squared(sub(c, b)), norm_squared(sub(a, c))];
-    let shortest = lengths.iter().copied().fold(f64::MAX, f64::min);
-    let product: f64 = lengths.iter().product();
-    let doubled_area = norm(triangle_normal([a, b, c]));
-    // 2A = (product of the two longer sides) · sin(smallest angle).
-    if product > 0.0 { doubled_area / (product / shortest).sqrt() } else { 0.0 }
 }

@@ -1,6 +1,6 @@
 //! What a mesh is like: counts, edge lengths, defects.
 
-use crate::fit::{clean_faces, weld};
+use super::clean::{AREA_SHARE, WELD_SHARE, clean_faces, diagonal, weld};
 use clothcombo_physics::vec3::{norm, sub};
 use clothcombo_physics::{Topology, TriMesh};
 use serde::Serialize;
@@ -55,22 +55,6 @@ impl MeshDefects {
         .filter(|(n, _)| *n > 0)
         .collect()
     }
-}
-
-/// Vertices closer than this share of a mesh's diagonal are one.
-pub(crate) const WELD_SHARE: f64 = 1e-5;
-
-/// Faces whose edges have a cross product shorter than this share of the squared diagonal have no area.
-pub(crate) const AREA_SHARE: f64 = 1e-10;
-
-/// Length of the diagonal of the bounding box.
-pub(crate) fn diagonal(positions: &[[f64; 3]]) -> f64 {
-    let extent = |a: usize| {
-        let low = positions.iter().map(|p| p[a]).fold(f64::MAX, f64::min);
-        let high = positions.iter().map(|p| p[a]).fold(f64::MIN, f64::max);
-        high - low
-    };
-    if positions.is_empty() { 0.0 } else { norm([extent(0), extent(1), extent(2)]) }
 }
 
 impl MeshMeasures {

@@ -1,9 +1,9 @@
 //! The game-engine rig of the base mesh: exactly SMPL-H's 52 joints, to which jaw and eyes are added for SMPL-X's 55.
 
 use super::wheel::{AnnyError, BASE_VERTEX_COUNT, Wheel};
-use crate::asset::SparseSkinWeights;
-use crate::asset::skeleton::{self, BODY_JOINT_PARENTS};
-use crate::format::ObjMesh;
+use clothcombo_data::asset::SparseSkinWeights;
+use clothcombo_data::asset::skeleton::{self, BODY_JOINT_PARENTS};
+use clothcombo_data::format::ObjMesh;
 use serde::Deserialize;
 use std::collections::HashMap;
 

@@ -1,8 +1,8 @@
 //! From the rig's A-pose to a T-pose: arms along ±x with palms down, legs straight and nearly vertical, toes forward.
 
 use super::rig::Rig;
-use crate::asset::body::{skin, transform};
-use crate::asset::rotation::{IDENTITY, Matrix3, apply, between, matrix_from_axis_angle, product};
+use clothcombo_data::asset::body::{skin, transform};
+use clothcombo_data::asset::rotation::{IDENTITY, Matrix3, apply, between, matrix_from_axis_angle, product};
 use rayon::prelude::*;
 
 /// Clavicles rise with the arms.

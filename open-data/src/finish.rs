@@ -2,10 +2,10 @@
 
 use super::reference_surface::ReferenceSurface;
 use super::sheet_repair::boundary_loops;
-use crate::fit::{Contact, contact, push_out};
-use crate::generate::labelled_triangles::LabelledTriangles;
-use crate::generate::remesh::{Quality, remesh};
-use crate::generate::sheet::{Sheet, smallest_sine};
+use clothcombo_data::mesh::LabelledTriangles;
+use clothcombo_data::mesh::{Contact, contact, push_out};
+use clothcombo_data::mesh::{EditableMesh, smallest_sine};
+use clothcombo_data::mesh::{Quality, remesh};
 use clothcombo_physics::query::Surface;
 use clothcombo_physics::vec3::{add, dot, norm, normalized, scale, sub};
 use clothcombo_physics::{Topology, TriMesh};
@@ -94,7 +94,7 @@ pub(super) fn finish(
     let edge = resolution.edge_for(sheet.area());
     let even = |sheet: LabelledTriangles, iterations: usize| {
         let target = ReferenceSurface::new(&sheet, edge);
-        let mut editable = Sheet::new(sheet);
+        let mut editable = EditableMesh::new(sheet);
         remesh(&mut editable, &target, iterations, QUALITY);
         let (mut positions, mut faces) = editable.compact();
         trim_ears(&mut positions, &mut faces);

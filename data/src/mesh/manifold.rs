@@ -7,14 +7,14 @@ use clothcombo_physics::vec3::{add, cross, dot, norm, normalized, scale, sub};
 use std::collections::{HashMap, VecDeque};
 
 /// Per face and side the face that continues it there.
-pub(crate) type Joined = Vec<[Option<u32>; 3]>;
+pub type Joined = Vec<[Option<u32>; 3]>;
 
 /// An edge with more faces than this joins none of them: no surface looks like that, and comparing all pairs would not end.
 const CROWD: usize = 32;
 
 /// Joins faces along edges. Where more than two meet, the two that continue each other most smoothly stay joined and the others
 /// get edges of their own; those crowded edges are returned, sorted.
-pub(crate) fn join_faces(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> (Joined, Vec<[u32; 2]>) {
+pub fn join_faces(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> (Joined, Vec<[u32; 2]>) {
     let mut sides: HashMap<[u32; 2], Vec<(u32, usize)>> = HashMap::new();
     for (f, face) in faces.iter().enumerate() {
         for i in 0..3 {
@@ -57,7 +57,7 @@ pub(crate) fn join_faces(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> (Joined,
 }
 
 /// Gives all faces of a piece one orientation, that of most of them; returns the faces that were turned, ascending.
-pub(crate) fn orient(faces: &mut [[u32; 3]], joined: &Joined) -> Vec<u32> {
+pub fn orient(faces: &mut [[u32; 3]], joined: &Joined) -> Vec<u32> {
     let mut state = vec![0u8; faces.len()];
     let mut turned = Vec::new();
     let original: Vec<[u32; 3]> = faces.to_vec();
@@ -96,7 +96,7 @@ pub(crate) fn orient(faces: &mut [[u32; 3]], joined: &Joined) -> Vec<u32> {
 
 /// A soup taken apart into fans.
 #[derive(Debug, Default)]
-pub(crate) struct SplitSheet {
+pub struct SplitMesh {
     /// Vertices.
     pub positions: Vec<[f64; 3]>,
     /// Faces in the order they came in.
@@ -108,10 +108,10 @@ pub(crate) struct SplitSheet {
 }
 
 /// One vertex per fan of joined faces, so that pieces meeting at an edge or a vertex come apart.
-pub(crate) fn split_fans(positions: &[[f64; 3]], faces: &[[u32; 3]], joined: &Joined) -> SplitSheet {
+pub fn split_fans(positions: &[[f64; 3]], faces: &[[u32; 3]], joined: &Joined) -> SplitMesh {
     let mut corners = DisjointSets::new(3 * faces.len());
     let corner = |f: usize, v: u32| (0..3).find(|i| faces[f][*i] == v).map(|i| 3 * f as u32 + i as u32);
-    let mut sheet = SplitSheet::default();
+    let mut sheet = SplitMesh::default();
     for f in 0..faces.len() {
         for g in joined[f].iter().flatten().map(|g| *g as usize).filter(|g| *g > f) {
             // By their vertices: the sides of a face that was turned have changed places.
@@ -148,11 +148,7 @@ pub(crate) fn split_fans(positions: &[[f64; 3]], faces: &[[u32; 3]], joined: &Jo
 }
 
 /// Per face the cosine between its normal and the direction away from the body, and its area [m²].
-pub(crate) fn outwardness(
-    positions: &[[f64; 3]],
-    faces: &[[u32; 3]],
-    body: &Surface<f64>,
-) -> Vec<(f64, f64)> {
+pub fn outwardness(positions: &[[f64; 3]], faces: &[[u32; 3]], body: &Surface<f64>) -> Vec<(f64, f64)> {
     faces
         .iter()
         .map(|f| {
@@ -166,7 +162,7 @@ pub(crate) fn outwardness(
 }
 
 /// Per piece its area that faces away from the body less what faces towards it [m²].
-pub(crate) fn outward_area(
+pub fn outward_area(
     positions: &[[f64; 3]],
     faces: &[[u32; 3]],
     topology: &Topology,

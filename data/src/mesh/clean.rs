@@ -1,12 +1,33 @@
 //! Polygons of any file → triangles over welded vertices, each remembering where it came from.
 
-use crate::generate::sheet::smallest_sine;
+use super::triangle::smallest_sine;
 use clothcombo_physics::vec3::{cross, norm, norm_squared, sub};
 use std::collections::{HashMap, HashSet};
 
+/// Vertices closer than this share of a mesh's diagonal are one.
+pub const WELD_SHARE: f64 = 1e-5;
+
+/// Faces whose edges have a cross product shorter than this share of the squared diagonal have no area.
+pub const AREA_SHARE: f64 = 1e-10;
+
+/// Length of the diagonal of the bounding box.
+pub fn diagonal(positions: &[[f64; 3]]) -> f64 {
+    let extent = |a: usize| {
+        let low = positions.iter().map(|p| p[a]).fold(f64::MAX, f64::min);
+        let high = positions.iter().map(|p| p[a]).fold(f64::MIN, f64::max);
+        high - low
+    };
+    if positions.is_empty() { 0.0 } else { norm([extent(0), extent(1), extent(2)]) }
+}
+
+/// A polygon as triangles around its first corner.
+pub fn fan(polygon: &[u32]) -> impl Iterator<Item = [u32; 3]> + '_ {
+    polygon.get(1..).unwrap_or_default().windows(2).map(|w| [polygon[0], w[0], w[1]])
+}
+
 /// Triangles and the polygon each of them is part of. Quads are cut by the diagonal that leaves the larger smallest angle,
 /// larger polygons into fans.
-pub(crate) fn triangulate<'a>(
+pub fn triangulate<'a>(
     positions: &[[f64; 3]],
     polygons: impl IntoIterator<Item = &'a [u32]>,
 ) -> (Vec<[u32; 3]>, Vec<u32>) {
@@ -19,7 +40,7 @@ pub(crate) fn triangulate<'a>(
                 let worst = |pair: [[u32; 3]; 2]| sine(pair[0]).min(sine(pair[1]));
                 faces.extend(if worst(one) >= worst(two) { one } else { two });
             }
-            _ => faces.extend(crate::format::mesh::fan(polygon)),
+            _ => faces.extend(fan(polygon)),
         }
         origin.resize(faces.len(), number as u32);
     }
@@ -28,7 +49,7 @@ pub(crate) fn triangulate<'a>(
 
 /// Vertices with near ones merged into the first of them.
 #[derive(Debug)]
-pub(crate) struct Welded {
+pub struct Welded {
     /// Positions that are left.
     pub positions: Vec<[f64; 3]>,
     /// For each of them the vertex it was.
@@ -40,7 +61,7 @@ pub(crate) struct Welded {
 }
 
 /// Merges every vertex into the first one closer than `distance`.
-pub(crate) fn weld(positions: &[[f64; 3]], distance: f64) -> Welded {
+pub fn weld(positions: &[[f64; 3]], distance: f64) -> Welded {
     let cell = |p: [f64; 3]| p.map(|x| (x / distance).floor() as i64);
     let mut grid: HashMap<[i64; 3], Vec<u32>> = HashMap::new();
     let mut welded = Welded {
@@ -84,7 +105,7 @@ pub(crate) fn weld(positions: &[[f64; 3]], distance: f64) -> Welded {
 
 /// Which faces stay.
 #[derive(Debug, Default)]
-pub(crate) struct CleanFaces {
+pub struct CleanFaces {
     /// Indices of the faces that stay.
     pub kept: Vec<u32>,
     /// Faces without area.
@@ -95,7 +116,7 @@ pub(crate) struct CleanFaces {
 
 /// Sorts out faces that name a vertex twice, whose edges' cross product is not longer than `least_cross` (twice the area), or
 /// that were there before.
-pub(crate) fn clean_faces(positions: &[[f64; 3]], faces: &[[u32; 3]], least_cross: f64) -> CleanFaces {
+pub fn clean_faces(positions: &[[f64; 3]], faces: &[[u32; 3]], least_cross: f64) -> CleanFaces {
     let mut clean = CleanFaces::default();
     let mut seen = HashSet::with_capacity(faces.len());
     for (number, f) in faces.iter().enumerate() {
