@@ -3,9 +3,9 @@
 use burn::module::Module;
 use clothcombo_model::gradient_bucket;
 use clothcombo_trainer::config::{Config, Trains, load};
-use clothcombo_trainer::drape::WardrobeTensors;
-use clothcombo_trainer::learner::Learner;
-use clothcombo_trainer::scene::PreparedScene;
+use clothcombo_trainer::dataset::PreparedScene;
+use clothcombo_trainer::inference::networks::TensorStore;
+use clothcombo_trainer::training::learner::Learner;
 use std::path::Path;
 
 /// A run of a few steps on built-in data: every network, all three stages, up to three layers.
@@ -37,7 +37,7 @@ pub fn fuzz_cases(few: usize) -> (usize, u64) {
 /// Loss of `scenes` and its gradient for all parameters, in the order of the networks.
 pub fn loss_and_gradient(
     mut learner: Learner,
-    tensors: &WardrobeTensors,
+    tensors: &TensorStore,
     scenes: &[PreparedScene],
     trains: Trains,
 ) -> (f64, Vec<f32>) {

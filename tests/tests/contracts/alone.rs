@@ -4,13 +4,13 @@ use clothcombo_model::ClothCombo;
 use clothcombo_physics::energy::SceneEnergy;
 use clothcombo_tests::{loss_and_gradient, tiny_config};
 use clothcombo_trainer::config::Trains;
-use clothcombo_trainer::device::Backend;
-use clothcombo_trainer::drape::WardrobeTensors;
-use clothcombo_trainer::learner::{Learner, new_optimizer};
-use clothcombo_trainer::scene::{Library, PreparedScene, prepare_step};
-use clothcombo_trainer::schedule::Schedule;
-use clothcombo_trainer::session::dimensions;
-use clothcombo_trainer::world::Share;
+use clothcombo_trainer::dataset::{Dataset, PreparedScene};
+use clothcombo_trainer::inference::networks::TensorStore;
+use clothcombo_trainer::system::device::Backend;
+use clothcombo_trainer::training::learner::{Learner, new_optimizer};
+use clothcombo_trainer::training::process_group::RankPartition;
+use clothcombo_trainer::training::scenes::prepare_step;
+use clothcombo_trainer::training::schedule::Schedule;
 use std::sync::Arc;
 
 #[test]
@@ -19,10 +19,10 @@ fn the_losses_of_garments_alone_are_added_where_all_networks_are_trained() {
     // Gradients that are compared as they are: those of scenes are not clipped where the mean is.
     let config = tiny_config(folder.path(), &["losses.alone=0.5", "optimizer.clip=step"]);
     let silent = tiny_config(folder.path(), &["optimizer.clip=step"]);
-    let library = Arc::new(Library::load(&config, &|_, _, _| {}).unwrap());
+    let dataset = Arc::new(Dataset::load(&config, &|_, _, _| {}).unwrap());
     let device = Backend::preferred().device().autodiff();
-    let dimensions = dimensions(&library);
-    let tensors = WardrobeTensors::new(library.clone(), dimensions, &device);
+    let dimensions = dataset.dimensions();
+    let tensors = TensorStore::new(dataset.clone(), dimensions, &device);
     let model = ClothCombo::new(&config.model, &dimensions, config.seed, &device).unwrap();
     let of = |scene: PreparedScene, trains: Trains| {
         let learner = Learner::new(model.clone(), new_optimizer(&config.optimizer), &config.optimizer);
@@ -32,8 +32,9 @@ fn the_losses_of_garments_alone_are_added_where_all_networks_are_trained() {
     let mut stages = config.stages.iter().zip(schedule.boundaries());
     let (_, first) = stages.find(|(stage, _)| stage.trains == Trains::All).unwrap();
     // Steps until one has garments that can touch.
-    let scene_of =
-        |config, step| prepare_step(&library, config, &schedule, step, Share::WHOLE).unwrap().remove(0);
+    let scene_of = |config, step| {
+        prepare_step(&dataset, config, &schedule, step, RankPartition::WHOLE).unwrap().remove(0)
+    };
     let step = (first..).find(|&step| !scene_of(&config, step).contacts.is_empty()).unwrap();
 
     let both = of(scene_of(&config, step), Trains::All);

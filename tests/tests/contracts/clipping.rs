@@ -5,19 +5,19 @@ use burn::tensor::Tensor;
 use clothcombo_model::{ClothCombo, gradient_bucket};
 use clothcombo_tests::{loss_and_gradient, tiny_config};
 use clothcombo_trainer::config::{ClipScope, Config, OptimizerConfig, Trains};
-use clothcombo_trainer::device::Backend;
-use clothcombo_trainer::drape::WardrobeTensors;
-use clothcombo_trainer::learner::{Learner, StepOutcome, new_optimizer};
-use clothcombo_trainer::scene::{Library, PreparedScene, prepare_step};
-use clothcombo_trainer::schedule::Schedule;
-use clothcombo_trainer::session::dimensions;
-use clothcombo_trainer::step_summary::StepSummary;
-use clothcombo_trainer::world::Share;
+use clothcombo_trainer::dataset::{Dataset, PreparedScene};
+use clothcombo_trainer::inference::networks::TensorStore;
+use clothcombo_trainer::system::device::Backend;
+use clothcombo_trainer::training::learner::{Learner, StepOutcome, new_optimizer};
+use clothcombo_trainer::training::process_group::RankPartition;
+use clothcombo_trainer::training::scenes::prepare_step;
+use clothcombo_trainer::training::schedule::Schedule;
+use clothcombo_trainer::training::step_summary::StepSummary;
 use std::sync::Arc;
 
 struct Setting {
     config: Config,
-    tensors: WardrobeTensors,
+    tensors: TensorStore,
     model: ClothCombo,
     scenes: Vec<PreparedScene>,
 }
@@ -25,12 +25,13 @@ struct Setting {
 /// A usual scene and one whose garment starts so far from its shape that its gradient is huge.
 fn setting(folder: &std::path::Path) -> Setting {
     let config = tiny_config(folder, &["stages.0.accumulate=2", "optimizer.ema_decay=0.0"]);
-    let library = Arc::new(Library::load(&config, &|_, _, _| {}).unwrap());
+    let dataset = Arc::new(Dataset::load(&config, &|_, _, _| {}).unwrap());
     let device = Backend::preferred().device().autodiff();
-    let dimensions = dimensions(&library);
-    let tensors = WardrobeTensors::new(library.clone(), dimensions, &device);
+    let dimensions = dataset.dimensions();
+    let tensors = TensorStore::new(dataset.clone(), dimensions, &device);
     let model = ClothCombo::new(&config.model, &dimensions, config.seed, &device).unwrap();
-    let mut scenes = prepare_step(&library, &config, &Schedule::new(&config), 0, Share::WHOLE).unwrap();
+    let mut scenes =
+        prepare_step(&dataset, &config, &Schedule::new(&config), 0, RankPartition::WHOLE).unwrap();
     for start in scenes[1].bodies.iter_mut().flat_map(|body| &mut body.start) {
         *start = start.map(|x| 4.0 * x);
     }

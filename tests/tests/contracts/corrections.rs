@@ -4,28 +4,29 @@ use burn::module::Module;
 use clothcombo_model::ClothCombo;
 use clothcombo_tests::{loss_and_gradient, tiny_config};
 use clothcombo_trainer::config::{Config, Trains};
-use clothcombo_trainer::descent::Descent;
-use clothcombo_trainer::device::Backend;
-use clothcombo_trainer::drape::{Networks, WardrobeTensors};
-use clothcombo_trainer::learner::{Learner, new_optimizer};
-use clothcombo_trainer::scene::{Library, PreparedScene, SceneDraw, prepare, prepare_step};
-use clothcombo_trainer::schedule::Schedule;
-use clothcombo_trainer::session::dimensions;
-use clothcombo_trainer::world::Share;
+use clothcombo_trainer::dataset::{Dataset, PreparedScene, SceneSample, prepare};
+use clothcombo_trainer::inference::descent::Descent;
+use clothcombo_trainer::inference::networks::{Networks, TensorStore};
+use clothcombo_trainer::system::device::Backend;
+use clothcombo_trainer::training::learner::{Learner, new_optimizer};
+use clothcombo_trainer::training::process_group::RankPartition;
+use clothcombo_trainer::training::scenes::prepare_step;
+use clothcombo_trainer::training::schedule::Schedule;
 use std::sync::Arc;
 
-/// A library, an untrained model with two corrections, and a scene of garments that can touch.
-fn setting(folder: &std::path::Path) -> (Config, Arc<Library>, WardrobeTensors, ClothCombo, PreparedScene) {
+/// A dataset, an untrained model with two corrections, and a scene of garments that can touch.
+fn setting(folder: &std::path::Path) -> (Config, Arc<Dataset>, TensorStore, ClothCombo, PreparedScene) {
     let config = tiny_config(folder, &["model.corrections=2", "model.correction_width=16"]);
-    let library = Arc::new(Library::load(&config, &|_, _, _| {}).unwrap());
+    let dataset = Arc::new(Dataset::load(&config, &|_, _, _| {}).unwrap());
     let device = Backend::preferred().device().autodiff();
-    let dimensions = dimensions(&library);
-    let tensors = WardrobeTensors::new(library.clone(), dimensions, &device);
+    let dimensions = dataset.dimensions();
+    let tensors = TensorStore::new(dataset.clone(), dimensions, &device);
     let model = ClothCombo::new(&config.model, &dimensions, config.seed, &device).unwrap();
     let schedule = Schedule::new(&config);
-    let scene_of = |step| prepare_step(&library, &config, &schedule, step, Share::WHOLE).unwrap().remove(0);
+    let scene_of =
+        |step| prepare_step(&dataset, &config, &schedule, step, RankPartition::WHOLE).unwrap().remove(0);
     let scene = (20..).map(scene_of).find(|scene| !scene.contacts.is_empty()).unwrap();
-    (config, library, tensors, model, scene)
+    (config, dataset, tensors, model, scene)
 }
 
 #[test]
@@ -90,13 +91,14 @@ fn wild(mut model: ClothCombo) -> ClothCombo {
 #[test]
 fn twenty_steps_never_raise_the_energy_of_any_garment_and_all_end_below_skinning() {
     let folder = tempfile::tempdir().unwrap();
-    let (config, library, tensors, model, _) = setting(folder.path());
+    let (config, dataset, tensors, model, _) = setting(folder.path());
     let schedule = Schedule::new(&config);
     let mut moved = 0;
     for (name, model) in [("untrained", model.clone()), ("wild", wild(model))] {
         let networks = Networks::new(model.valid().with_correction_steps(20), &tensors);
         for step in 20..44 {
-            let scene = prepare_step(&library, &config, &schedule, step, Share::WHOLE).unwrap().remove(0);
+            let scene =
+                prepare_step(&dataset, &config, &schedule, step, RankPartition::WHOLE).unwrap().remove(0);
             let energies = networks.energies(&scene).unwrap();
             for (before, after) in energies.iter().zip(&energies[1..]) {
                 assert!(
@@ -119,20 +121,20 @@ fn twenty_steps_never_raise_the_energy_of_any_garment_and_all_end_below_skinning
 #[test]
 fn a_garment_drapes_in_an_outfit_that_it_does_not_touch_as_it_does_alone() {
     let folder = tempfile::tempdir().unwrap();
-    let (config, library, tensors, model, scene) = setting(folder.path());
+    let (config, dataset, tensors, model, scene) = setting(folder.path());
     let networks = Networks::new(wild(model).valid(), &tensors);
     let draw = |garments: &[usize]| {
-        let draw = SceneDraw { garments: garments.to_vec(), ..scene.draw.clone() };
-        let mut scene = prepare(&library, &config.losses, draw, 1.0).unwrap();
+        let draw = SceneSample { garments: garments.to_vec(), ..scene.sample.clone() };
+        let mut scene = prepare(&dataset, &config.losses, draw, 1.0).unwrap();
         // Without an edge nothing presses and nothing is judged together.
         scene.contacts.clear();
         let apart = scene.bodies[0].energy.without_layers();
         scene.bodies[0].energy = Arc::new(apart);
         scene
     };
-    let pair = &scene.draw.garments[..2];
+    let pair = &scene.sample.garments[..2];
     let together = networks.drape(&draw(pair)).unwrap();
-    let rows = library.wardrobe.garment(pair[0]).unwrap().vertex_count();
+    let rows = dataset.garments.garment(pair[0]).unwrap().vertex_count();
     for (garment, rows) in pair.iter().zip([0..rows, rows..together.posed.len()]) {
         let alone = networks.drape(&draw(&[*garment])).unwrap();
         let largest = |a: &[[f32; 3]], b: &[[f32; 3]]| {

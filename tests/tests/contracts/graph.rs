@@ -3,27 +3,27 @@
 use clothcombo_model::ClothCombo;
 use clothcombo_tests::{loss_and_gradient, tiny_config};
 use clothcombo_trainer::config::Trains;
-use clothcombo_trainer::device::Backend;
-use clothcombo_trainer::drape::{Networks, WardrobeTensors};
-use clothcombo_trainer::learner::{Learner, new_optimizer};
-use clothcombo_trainer::scene::{Library, prepare_step};
-use clothcombo_trainer::schedule::Schedule;
-use clothcombo_trainer::session::dimensions;
-use clothcombo_trainer::world::Share;
+use clothcombo_trainer::dataset::Dataset;
+use clothcombo_trainer::inference::networks::{Networks, TensorStore};
+use clothcombo_trainer::system::device::Backend;
+use clothcombo_trainer::training::learner::{Learner, new_optimizer};
+use clothcombo_trainer::training::process_group::RankPartition;
+use clothcombo_trainer::training::scenes::prepare_step;
+use clothcombo_trainer::training::schedule::Schedule;
 use std::sync::Arc;
 
 /// Whether D_m moves a single garment, and whether the gradient of its loss trains D_m.
 fn acts_on_a_single_garment(graph: &str) -> (bool, bool) {
     let folder = tempfile::tempdir().unwrap();
     let config = tiny_config(folder.path(), &[&format!("model.graph={graph}")]);
-    let library = Arc::new(Library::load(&config, &|_, _, _| {}).unwrap());
+    let dataset = Arc::new(Dataset::load(&config, &|_, _, _| {}).unwrap());
     let device = Backend::preferred().device().autodiff();
-    let dimensions = dimensions(&library);
-    let tensors = WardrobeTensors::new(library.clone(), dimensions, &device);
+    let dimensions = dataset.dimensions();
+    let tensors = TensorStore::new(dataset.clone(), dimensions, &device);
     let model = ClothCombo::new(&config.model, &dimensions, config.seed, &device).unwrap();
     let schedule = Schedule::new(&config);
-    let scene = prepare_step(&library, &config, &schedule, 0, Share::WHOLE).unwrap().remove(0);
-    assert_eq!((scene.worn.len(), scene.contacts.len()), (1, 0));
+    let scene = prepare_step(&dataset, &config, &schedule, 0, RankPartition::WHOLE).unwrap().remove(0);
+    assert_eq!((scene.garments.len(), scene.contacts.len()), (1, 0));
 
     let networks = Networks::new(burn::module::Module::valid(&model), &tensors);
     let [drape, single] = [networks.drape(&scene), networks.drape_alone(&scene)].map(Result::unwrap);

@@ -3,19 +3,19 @@
 use clothcombo_model::ClothCombo;
 use clothcombo_tests::{loss_and_gradient, tiny_config};
 use clothcombo_trainer::config::Trains;
-use clothcombo_trainer::device::Backend;
-use clothcombo_trainer::drape::WardrobeTensors;
-use clothcombo_trainer::learner::{Learner, new_optimizer};
-use clothcombo_trainer::scene::{Library, PreparedScene, prepare_step};
-use clothcombo_trainer::schedule::Schedule;
-use clothcombo_trainer::session::dimensions;
-use clothcombo_trainer::world::Share;
+use clothcombo_trainer::dataset::{Dataset, PreparedScene};
+use clothcombo_trainer::inference::networks::TensorStore;
+use clothcombo_trainer::system::device::Backend;
+use clothcombo_trainer::training::learner::{Learner, new_optimizer};
+use clothcombo_trainer::training::process_group::RankPartition;
+use clothcombo_trainer::training::scenes::prepare_step;
+use clothcombo_trainer::training::schedule::Schedule;
 use std::sync::Arc;
 
 /// Loss and gradient of `scenes` with a pool of `threads` threads.
 fn gradient(
     learner: &(impl Fn() -> Learner + Sync),
-    tensors: &WardrobeTensors,
+    tensors: &TensorStore,
     scenes: &[PreparedScene],
     trains: Trains,
     threads: usize,
@@ -29,17 +29,17 @@ fn gradients_do_not_depend_on_what_is_computed_at_once() {
     let folder = tempfile::tempdir().unwrap();
     let several: Vec<String> = (0..3).map(|i| format!("stages.{i}.accumulate=3")).collect();
     let config = tiny_config(folder.path(), &several.iter().map(String::as_str).collect::<Vec<_>>());
-    let library = Arc::new(Library::load(&config, &|_, _, _| {}).unwrap());
+    let dataset = Arc::new(Dataset::load(&config, &|_, _, _| {}).unwrap());
     let device = Backend::preferred().device().autodiff();
-    let dimensions = dimensions(&library);
-    let tensors = WardrobeTensors::new(library.clone(), dimensions, &device);
+    let dimensions = dataset.dimensions();
+    let tensors = TensorStore::new(dataset.clone(), dimensions, &device);
     let learner = || {
         let model = ClothCombo::new(&config.model, &dimensions, config.seed, &device).unwrap();
         Learner::new(model, new_optimizer(&config.optimizer), &config.optimizer)
     };
     let schedule = Schedule::new(&config);
     for (first, stage) in schedule.boundaries().into_iter().zip(&config.stages) {
-        let scenes = prepare_step(&library, &config, &schedule, first, Share::WHOLE).unwrap();
+        let scenes = prepare_step(&dataset, &config, &schedule, first, RankPartition::WHOLE).unwrap();
         let of = |threads| gradient(&learner, &tensors, &scenes, stage.trains, threads);
         let (loss, one_by_one) = of(1);
         let largest = one_by_one.iter().fold(0.0_f32, |m, g| m.max(g.abs()));

@@ -2,7 +2,7 @@
 
 use crate::cli::values::{not_negative, positive};
 use crate::cli::verbosity::progress_bar;
-use crate::scene::load_body;
+use crate::dataset::load_body;
 use clap::{Args, Subcommand, ValueEnum};
 use clothcombo_data::asset::{Body, BodyFileSettings, Provenance};
 use clothcombo_data::import::{

@@ -24,7 +24,7 @@ mod wardrobe_sheet;
 
 pub use verbosity::Verbosity;
 
-use crate::closed_pipe::tell;
+use crate::system::closed_pipe::tell;
 use miette::Report;
 
 /// Exit code of a program that ended with `result`; an error is printed once, with its place and hint.

@@ -1,6 +1,6 @@
 //! What the values of flags must be, where the type alone does not say it.
 
-use crate::paths::obstacle;
+use crate::system::paths::obstacle;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use std::path::PathBuf;

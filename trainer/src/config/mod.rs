@@ -16,7 +16,7 @@ mod stages;
 mod validation;
 
 pub use data::{
-    CacheConfig, DataConfig, GarmentSource, GenerateConfig, MOST_GARMENTS, PoseConfig, PoseEncoding,
+    CacheConfig, DataConfig, GarmentSourceConfig, GenerateConfig, MOST_GARMENTS, PoseConfig, PoseEncoding,
     SplitConfig, StartConfig,
 };
 pub use guard::{GuardConfig, InjectConfig, Injected};
@@ -26,7 +26,7 @@ pub use optimizer::{ClipScope, OptimizerConfig};
 pub use output::OutputConfig;
 pub use ramp::{Ramp, RampShape};
 pub use schema::schema;
-pub use stages::{StageConfig, Trains};
+pub use stages::{StageConfig, Trains, stage_starts};
 pub use validation::ValidationConfig;
 
 use clothcombo_model::{ModelConfig, ModelError};

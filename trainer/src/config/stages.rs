@@ -25,6 +25,15 @@ impl Trains {
     }
 }
 
+/// First step of each of `stages`, which follow each other.
+pub fn stage_starts(stages: &[StageConfig]) -> impl Iterator<Item = u64> + '_ {
+    stages.iter().scan(0, |at, stage| {
+        let first = *at;
+        *at += stage.steps;
+        Some(first)
+    })
+}
+
 /// A stage.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

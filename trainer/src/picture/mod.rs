@@ -63,12 +63,12 @@ pub enum PictureError {
         /// What the encoder said.
         source: image::ImageError,
     },
-    /// The plotting library refused a panel.
+    /// The plotting dataset refused a panel.
     #[error("cannot draw the curve of `{series}`: {reason}")]
     Plot {
         /// Name of the series.
         series: String,
-        /// What the library said.
+        /// What the dataset said.
         reason: String,
     },
 }

@@ -2,7 +2,7 @@
 
 use crate::cli::values::{at_least_one, share};
 use crate::cli::verbosity::progress_bar;
-use crate::scene::load_body;
+use crate::dataset::load_body;
 use clap::Parser;
 use clothcombo_data::generate::{GarmentGenerator, GarmentSettings, Survey};
 use miette::{IntoDiagnostic, Report, miette};

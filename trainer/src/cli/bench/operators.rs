@@ -2,8 +2,8 @@
 
 use crate::cli::table::{number, table};
 use crate::cli::values::{at_least_one, measuring_seconds};
-use crate::measure::median_ms;
-use crate::scene::LibraryError;
+use crate::dataset::DatasetError;
+use crate::evaluation::median_ms;
 use clap::Parser;
 use clothcombo_data::asset::Category;
 use clothcombo_data::format::{load_tri_mesh, obj};
@@ -46,7 +46,7 @@ pub struct Arguments {
 /// When the mesh cannot be read, written or prepared.
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let mesh = match &arguments.garment {
-        Some(path) => load_tri_mesh(path).map_err(LibraryError::data)?,
+        Some(path) => load_tri_mesh(path).map_err(DatasetError::data)?,
         None => {
             let settings =
                 GarmentSettings { target_vertices: arguments.vertices, ..GarmentSettings::default() };

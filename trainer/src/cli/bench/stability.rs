@@ -1,7 +1,7 @@
 //! `clothcombo bench stability`: the hard cases, one row each.
 
 use crate::cli::verbosity::progress_bar;
-use crate::scene::load_body;
+use crate::dataset::load_body;
 use clap::Args;
 use clothcombo_data::hard_cases::{CaseReport, Expectation, HardCases, Outcome, TermReport};
 use clothcombo_physics::energy::{EnergySettings, Term, TermMap};

@@ -1,0 +1,66 @@
+//! What the vertices of a scene feel, for the correction networks.
+
+use crate::dataset::{PreparedBody, PreparedGarment, PreparedScene};
+use burn::tensor::Device;
+use clothcombo_model::FeltTensors;
+use clothcombo_physics::sensing::{DIRECTIONS, FEATURES, Rings, Sensed, sense};
+use std::sync::Arc;
+
+/// Whether the garments of a scene feel each other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LayerInteraction {
+    /// Every garment is draped by itself.
+    Alone,
+    /// All are worn together.
+    Together,
+}
+
+impl LayerInteraction {
+    /// The pairs (inner, outer) of `scene` that feel each other.
+    pub fn contacts(self, scene: &PreparedScene) -> &[(usize, usize)] {
+        match self {
+            Self::Alone => &[],
+            Self::Together => &scene.contacts,
+        }
+    }
+}
+
+const _: () = assert!(FEATURES == FeltTensors::FEATURES && DIRECTIONS == FeltTensors::DIRECTIONS);
+
+/// What the vertices of the garments of `scene` feel at `posed` `[ΣV, 3]` [m] on `body`, as tensors on `device`.
+///
+/// `contacts` are the pairs (inner, outer) that feel each other: those of the scene, or none for garments that are draped by
+/// themselves.
+pub fn felt(
+    scene: &PreparedScene,
+    body: &PreparedBody,
+    contacts: &[(usize, usize)],
+    posed: &[[f32; 3]],
+    device: &Device,
+) -> FeltTensors {
+    let rings: Vec<&Rings> = scene.garments.iter().map(|garment| &garment.rings).collect();
+    let Sensed { features, directions } = sense(&body.energy, &rings, posed, contacts);
+    let directions = directions.map(|posed| unposed(scene, body, &posed));
+    FeltTensors::new(features, directions.each_ref().map(Vec::as_slice), device)
+        .expect("every vertex of the scene has its features")
+}
+
+/// Posed directions `[ΣV, 3]` turned back by the transforms that the initial skin weights give their vertices.
+fn unposed(scene: &PreparedScene, body: &PreparedBody, posed: &[[f32; 3]]) -> Vec<[f32; 3]> {
+    let bones = &body.bones;
+    let turned_back = |direction: &[f32; 3], weights: &[f32]| {
+        let mut canonical = [0.0; 3];
+        for (bone, &weight) in bones.iter().zip(weights).filter(|(_, weight)| **weight != 0.0) {
+            for (axis, sum) in canonical.iter_mut().enumerate() {
+                let along: f64 = (0..3).map(|row| bone[row][axis] * f64::from(direction[row])).sum();
+                *sum += f64::from(weight) * along;
+            }
+        }
+        canonical.map(|x| x as f32)
+    };
+    let of_garment = |(garment, part): (&Arc<PreparedGarment>, &[[f32; 3]])| {
+        let rows = garment.skin_weights.chunks_exact(bones.len().max(1));
+        part.iter().zip(rows).map(|(direction, weights)| turned_back(direction, weights)).collect::<Vec<_>>()
+    };
+    scene.garments.iter().zip(scene.parts(posed)).flat_map(of_garment).collect()
+}

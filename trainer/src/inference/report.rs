@@ -1,0 +1,294 @@
+//! What a drape reports: `report.json`.
+
+use super::acceleration::{Acceleration, acceleration};
+use super::refine::Refinement;
+use super::{Drape, Draper, DraperError, Outfit, PhaseTimes, Smoothing};
+use crate::dataset::DatasetError;
+use crate::score::{DrapedGarment, Score, ScoreDistance, score};
+use crate::system::paths::{lossy, lossy_option};
+use clothcombo_data::asset::Category;
+use clothcombo_data::fit::FitReport;
+use clothcombo_physics::contact::resolve::Certificate;
+use clothcombo_physics::mesh::TriMesh;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// The model that draped.
+#[derive(Clone, Debug, Serialize)]
+pub struct ModelReport {
+    /// Its folder.
+    #[serde(serialize_with = "lossy")]
+    pub folder: PathBuf,
+    /// Steps it was trained for.
+    pub step: u64,
+    /// BLAKE3 checksum of its parameters.
+    pub checksum: String,
+}
+
+/// The body.
+#[derive(Clone, Debug, Serialize)]
+pub struct BodyReport {
+    /// Its name.
+    pub name: String,
+    /// Shape parameters β.
+    pub shape: Vec<f64>,
+    /// Where the pose comes from.
+    pub pose: String,
+    /// Vertices.
+    pub vertices: usize,
+    /// Triangles.
+    pub triangles: usize,
+    /// For a body recovered from meshes: mean distance of its vertices to theirs [mm].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub recovered_within_mm: Option<f64>,
+}
+
+/// One garment. The time of what treats all garments at once is shared by number of vertices.
+#[derive(Clone, Debug, Serialize)]
+pub struct GarmentReport {
+    /// Its name, and that of its file.
+    pub name: String,
+    /// The file it was read from, if it was.
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "lossy_option")]
+    pub given: Option<PathBuf>,
+    /// Vertices of the mesh as given.
+    pub given_vertices: usize,
+    /// Vertices that were draped.
+    pub vertices: usize,
+    /// Triangles.
+    pub triangles: usize,
+    /// Category.
+    pub category: Category,
+    /// What fitting assumed and repaired; none if the garment lay on the body as it was.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fit: Option<FitReport>,
+    /// Whether its embedding was known before.
+    pub embedding_known: bool,
+    /// Wall time, all frames together.
+    pub milliseconds: PhaseTimes,
+}
+
+/// One frame of a motion.
+#[derive(Clone, Debug, Serialize)]
+pub struct FrameReport {
+    /// Number in the motion.
+    pub frame: usize,
+    /// Its time [s].
+    pub seconds: f64,
+    /// Wall time.
+    pub milliseconds: PhaseTimes,
+    /// What is left.
+    pub certificate: Certificate,
+}
+
+/// Everything about a drape.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// The program.
+    pub program: String,
+    /// The model.
+    pub model: ModelReport,
+    /// The body.
+    pub body: BodyReport,
+    /// The garments, innermost first.
+    pub garments: Vec<GarmentReport>,
+    /// Score of the first frame before the post-process.
+    pub before: Score,
+    /// And of the result.
+    pub after: Score,
+    /// Wall time by phase, all garments and frames together.
+    pub milliseconds: PhaseTimes,
+    /// What is left: of a motion, numbers of pairs are sums over the frames, depths and strain the worst frame's, and the
+    /// lists are those of `frames`.
+    pub certificate: Certificate,
+    /// The same of what came to the post-process in the first frame, without the list of pairs.
+    pub certificate_before: Certificate,
+    /// What the refinement of the first frame did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub refinement: Option<Refinement>,
+    /// What temporal smoothing did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub smoothing: Option<Smoothing>,
+    /// How smoothly a motion moves.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub acceleration: Option<Acceleration>,
+    /// Every frame of a motion.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub frames: Vec<FrameReport>,
+}
+
+/// A draped frame and when it is.
+#[derive(Clone, Copy, Debug)]
+pub struct Moment {
+    /// Number in the motion.
+    pub frame: usize,
+    /// Time [s].
+    pub seconds: f64,
+}
+
+impl Report {
+    /// Puts the report of `drapes` (at least one) together; `moments` are theirs if they are a motion, else empty.
+    ///
+    /// # Errors
+    /// When a score overflows: a garment has exploded.
+    pub fn new(
+        draper: &Draper,
+        outfit: &Outfit,
+        drapes: &[Drape],
+        moments: &[Moment],
+        body: BodyReport,
+        smoothing: Option<Smoothing>,
+    ) -> Result<Self, DraperError> {
+        let first = &drapes[0];
+        let mut milliseconds = PhaseTimes::default();
+        drapes.iter().for_each(|drape| milliseconds += drape.milliseconds);
+        for piece in &outfit.pieces {
+            milliseconds.preparation += piece.milliseconds.preparation;
+            milliseconds.embedding += piece.milliseconds.embedding;
+        }
+        let (certificate_before, (before, after)) = rayon::join(
+            || first.certificate_before(draper, outfit),
+            || {
+                let score = |stage| first.score(draper, outfit, stage);
+                rayon::join(|| score(Stage::BeforeResolve), || score(Stage::Result))
+            },
+        );
+        let frames = drapes.iter().zip(moments).map(|(drape, moment)| FrameReport {
+            frame: moment.frame,
+            seconds: moment.seconds,
+            milliseconds: drape.milliseconds,
+            certificate: drape.certificate.clone(),
+        });
+        let trained = draper.trained();
+        Ok(Self {
+            program: format!("clothcombo {}", env!("CARGO_PKG_VERSION")),
+            model: ModelReport {
+                folder: trained.folder.clone(),
+                step: trained.state.step,
+                checksum: trained.checksum().to_owned(),
+            },
+            body,
+            garments: garment_reports(outfit, drapes),
+            before: before?,
+            after: after?,
+            milliseconds,
+            certificate: combined(drapes),
+            certificate_before: Certificate { remaining: Vec::new(), ..certificate_before? },
+            refinement: first.refinement.clone(),
+            smoothing,
+            acceleration: acceleration(drapes, moments),
+            frames: frames.collect(),
+        })
+    }
+}
+
+/// Which state of a drape is meant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// What came to the post-process.
+    BeforeResolve,
+    /// The result.
+    Result,
+}
+
+impl Drape {
+    /// Scores this drape by the paper's energies (see [`crate::score`]).
+    ///
+    /// # Errors
+    /// When a value overflows.
+    pub fn score(&self, draper: &Draper, outfit: &Outfit, stage: Stage) -> Result<Score, DraperError> {
+        let refused = |e: &dyn std::fmt::Display| DatasetError::Data(e.to_string());
+        let body = TriMesh::new(self.body.clone(), draper.body().faces.to_vec()).map_err(|e| refused(&e))?;
+        let garments: Vec<DrapedGarment> = outfit
+            .pieces
+            .iter()
+            .zip(&self.garments)
+            .map(|(piece, drape)| DrapedGarment {
+                name: &piece.name,
+                rest: &piece.prepared.garment.rest,
+                positions: match stage {
+                    Stage::BeforeResolve => &drape.before,
+                    Stage::Result => &drape.positions,
+                },
+                canonical: None,
+            })
+            .collect();
+        Ok(score(&body, &garments, ScoreDistance::default()).map_err(|e| refused(&e))?)
+    }
+}
+
+fn garment_reports(outfit: &Outfit, drapes: &[Drape]) -> Vec<GarmentReport> {
+    let all: usize = outfit.pieces.iter().map(|p| p.prepared.vertex_count()).sum();
+    let report = |(index, piece): (usize, &super::Piece)| {
+        let vertices = piece.prepared.vertex_count();
+        let share = vertices as f64 / all.max(1) as f64;
+        let mut times = PhaseTimes {
+            preparation: piece.milliseconds.preparation,
+            embedding: piece.milliseconds.embedding,
+            ..PhaseTimes::default()
+        };
+        for drape in drapes {
+            let shared = drape.milliseconds;
+            let own: f64 = drape.garments.iter().map(|g| g.resolve_ms).sum();
+            times += PhaseTimes {
+                posing: share * shared.posing,
+                draping: share * shared.draping,
+                untangling: share * shared.untangling,
+                correcting: share * shared.correcting,
+                refine: share * shared.refine,
+                resolve: drape.garments[index].resolve_ms + share * (shared.resolve - own),
+                certificate: share * shared.certificate,
+                ..PhaseTimes::default()
+            };
+        }
+        GarmentReport {
+            name: piece.name.clone(),
+            given: piece.source.path.clone(),
+            given_vertices: piece.source.given.positions.len(),
+            vertices,
+            triangles: piece.prepared.garment.rest.face_count(),
+            category: piece.prepared.garment.category,
+            fit: piece.source.fit.clone(),
+            embedding_known: piece.embedding_known,
+            milliseconds: times,
+        }
+    };
+    outfit.pieces.iter().enumerate().map(report).collect()
+}
+
+/// One certificate for all frames.
+fn combined(drapes: &[Drape]) -> Certificate {
+    let mut sum = drapes[0].certificate.clone();
+    for more in drapes[1..].iter().map(|d| &d.certificate) {
+        sum.body_triangle_pairs += more.body_triangle_pairs;
+        sum.layer_triangle_pairs += more.layer_triangle_pairs;
+        sum.self_triangle_pairs += more.self_triangle_pairs;
+        sum.contour_length_mm += more.contour_length_mm;
+        sum.vertices_inside += more.vertices_inside;
+        sum.narrow_triangle_pairs += more.narrow_triangle_pairs;
+        sum.pinched.body_triangle_pairs += more.pinched.body_triangle_pairs;
+        sum.pinched.layer_triangle_pairs += more.pinched.layer_triangle_pairs;
+        sum.pinched.self_triangle_pairs += more.pinched.self_triangle_pairs;
+        sum.max_depth_mm = sum.max_depth_mm.max(more.max_depth_mm);
+        sum.mean_depth_mm = sum.mean_depth_mm.max(more.mean_depth_mm);
+        sum.order_violations = sum.order_violations.max(more.order_violations);
+        sum.strain_added = match (sum.strain_added, more.strain_added) {
+            (Some(a), Some(b)) => Some(a.max(b)),
+            (a, b) => a.or(b),
+        };
+        for (own, more) in sum.garments.iter_mut().zip(&more.garments) {
+            own.body_triangle_pairs += more.body_triangle_pairs;
+            own.layer_triangle_pairs += more.layer_triangle_pairs;
+            own.self_triangle_pairs += more.self_triangle_pairs;
+            own.strain_joule = own.strain_joule.max(more.strain_joule);
+        }
+        for (own, more) in sum.layers.iter_mut().zip(&more.layers) {
+            own.triangle_pairs += more.triangle_pairs;
+            own.order_violations = own.order_violations.max(more.order_violations);
+        }
+    }
+    if drapes.len() > 1 {
+        sum.remaining.clear();
+    }
+    sum
+}
