@@ -1,4 +1,4 @@
-//! Random designs: what a wardrobe holds of each category.
+//! Random designs of each category.
 
 use super::design::{
     FlareDesign, Front, GarmentDesign, Neckline, PleatDesign, SkirtDesign, SleeveDesign, TrousersDesign,
