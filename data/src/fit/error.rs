@@ -1,6 +1,8 @@
 //! Why a mesh is no garment of a body.
 
-use super::{MAX_VERTICES, MIN_TRIANGLES, MOST_STRETCH, Sitting, Unit};
+use super::placement::Unit;
+use super::settings::{MAX_VERTICES, MIN_TRIANGLES, MOST_STRETCH};
+use super::sitting::Sitting;
 use thiserror::Error;
 
 /// Why a mesh is not fitted.

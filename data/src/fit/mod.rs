@@ -9,13 +9,16 @@ mod placed;
 mod placement;
 mod report;
 mod search;
+mod settings;
+mod sitting;
 
 pub use coverage::off_trunk;
 pub use error::FitError;
 pub use placed::is_on_body;
 pub use placement::{Origin, Placement, Unit, UpAxis};
 pub use report::{BodyContact, Elements, FitReport, Piece, Repair, RepairKind};
-pub use search::Sitting;
+pub use settings::{FitSettings, MAX_VERTICES, MIN_TRIANGLES};
+pub use sitting::Sitting;
 
 use crate::asset::{Body, Category, Garment, Provenance};
 use crate::format::PolygonMesh;
@@ -28,32 +31,10 @@ use clothcombo_physics::contact::{self_triangle_pairs, triangle_pairs};
 use clothcombo_physics::vec3::{norm, sub};
 use clothcombo_physics::{Topology, TriMesh};
 use search::Search;
-
-/// Most vertices a garment may have after welding.
-pub const MAX_VERTICES: usize = 1_000_000;
-
-/// What is left longer than this many times its length by the push out of the body is stretched.
-const MOST_STRETCH: f64 = 1.5;
-/// Share of its edges from which a stretched garment does not fit.
-const MOST_STRETCHED: f64 = 0.1;
-/// Fewest triangles that can be a garment.
-pub const MIN_TRIANGLES: usize = 20;
+use settings::{MOST_STRETCH, MOST_STRETCHED};
 
 /// Least distance between a fitted vertex and the body [m]: the ε of the paper's body collision loss.
 const CLEARANCE: f64 = 0.002;
-
-/// What is known about a file; `None` is found out.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct FitSettings {
-    /// Unit of the file.
-    pub unit: Option<Unit>,
-    /// Up axis of the file.
-    pub up: Option<UpAxis>,
-    /// Whether the arms are lowered (A-pose) or not (T-pose).
-    pub arms_lowered: Option<bool>,
-    /// Category; otherwise guessed from the shape.
-    pub category: Option<Category>,
-}
 
 /// A fitted garment and how it came about.
 #[derive(Clone, Debug)]

@@ -1,7 +1,7 @@
 //! What fitting assumed and changed, element by element.
 
 use super::placement::{Origin, Placement};
-use super::search::Sitting;
+use super::sitting::Sitting;
 use crate::asset::Category;
 use crate::mesh::MeshMeasures;
 use serde::Serialize;

@@ -1,9 +1,9 @@
 //! The learned model of the whole base mesh: skin, joints and clothing helpers under one set of shape components.
 
-use super::AnnySettings;
 use super::people::{Components, enough_people, principal_components};
 use super::phenotype::{Phenotype, Targets};
 use super::rig::Rig;
+use super::settings::AnnySettings;
 use super::t_pose::t_pose;
 use super::wheel::{AnnyError, BASE_VERTEX_COUNT, BODY_VERTEX_COUNT, Wheel};
 use clothcombo_data::asset::{Body, BodyParts, SparseSkinWeights};

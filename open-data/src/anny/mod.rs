@@ -8,34 +8,18 @@ mod mean_mesh;
 mod people;
 mod phenotype;
 mod rig;
+mod settings;
 mod t_pose;
 mod wheel;
 
 pub use mean_mesh::BaseModel;
 pub use phenotype::Phenotype;
-pub use rig::Rig;
-pub use wheel::{AnnyError, BODY_VERTEX_COUNT};
+pub use settings::AnnySettings;
+pub use wheel::AnnyError;
 
 use clothcombo_data::asset::{Provenance, body_file::BodyFileError};
 use clothcombo_data::import::{Progress, Summary, refuse_overwriting};
 use std::path::Path;
-
-/// How the body model is learned from random people.
-#[derive(Clone, Debug, PartialEq)]
-pub struct AnnySettings {
-    /// Number of random adults.
-    pub people: usize,
-    /// Number of shape components kept.
-    pub shape_components: usize,
-    /// Seed of the random adults.
-    pub seed: u64,
-}
-
-impl Default for AnnySettings {
-    fn default() -> Self {
-        Self { people: 300, shape_components: 16, seed: 0 }
-    }
-}
 
 /// Where the body comes from, for its file.
 pub fn provenance() -> Provenance {

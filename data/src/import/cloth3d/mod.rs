@@ -22,7 +22,7 @@ use crate::dataset::garment_folder::{FolderGarment, GarmentFolderError, save_gar
 use crate::format::{FileError, NpzError, NpzWriter, PointCache, obj};
 use crate::mesh::contact;
 use clothcombo_physics::query::Surface;
-use manifest::{GarmentEntry, SampleEntry};
+use manifest::{AUTHOR, GarmentEntry, LICENCE, SampleEntry};
 use std::fs;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -106,8 +106,6 @@ impl Default for Cloth3dSettings {
 
 /// Of the simulations [frames/s].
 const FRAME_RATE: f64 = 30.0;
-const LICENCE: &str = "CLOTH3D terms of use (non-commercial research)";
-const AUTHOR: &str = "Bertiche, Madadi, Escalera (CLOTH3D)";
 
 struct Sample {
     name: String,

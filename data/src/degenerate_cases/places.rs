@@ -1,26 +1,29 @@
 //! Where a garment is, how large, and how many there are.
 
-use super::wardrobe::{Wardrobe, below, cloth};
-use super::{HardCase, HardCaseError, HardGarment, HardScene};
+use super::case::DegenerateCase;
+use super::fixture::{Fixture, below, cloth};
+use super::scene::{CaseError, CaseGarment, CaseScene};
 use clothcombo_physics::mesh::shapes::{mapped, tube};
 use clothcombo_physics::{TriMesh, vec3, vertex_normals};
 
 /// Layers of the deepest outfit.
 const LAYERS: usize = 12;
 
-pub(super) const CASES: &[HardCase] = &[
-    HardCase::bounded("inside the body", "The whole garment lies in the middle of the chest.", |w| {
+pub(super) const CASES: &[DegenerateCase] = &[
+    DegenerateCase::bounded("inside the body", "The whole garment lies in the middle of the chest.", |w| {
         let sheet = w.sheet();
         let middle = [w.chest[0], w.chest[1], 0.5 * w.chest[2]];
         let centre = w.before_chest([0.0; 3]);
         let posed = mapped(&sheet, |p| vec3::add_scaled(middle, 0.3, vec3::sub(p, centre)));
         w.two_layers(sheet, posed.positions().to_vec())
     }),
-    HardCase::bounded("far away", "The garment is 100 m from the body.", |w| moved(w, [60.0, 0.0, 80.0])),
-    HardCase::bounded("far behind", "The garment is 100 m behind the body.", |w| {
+    DegenerateCase::bounded("far away", "The garment is 100 m from the body.", |w| {
+        moved(w, [60.0, 0.0, 80.0])
+    }),
+    DegenerateCase::bounded("far behind", "The garment is 100 m behind the body.", |w| {
         moved(w, [0.0, 0.0, -100.0])
     }),
-    HardCase::bounded(
+    DegenerateCase::bounded(
         "exactly on the body",
         "A piece of the body's own surface: every distance is zero.",
         |w| {
@@ -31,12 +34,12 @@ pub(super) const CASES: &[HardCase] = &[
             w.scene(vec![inner, outer])
         },
     ),
-    HardCase::bounded(
+    DegenerateCase::bounded(
         "a million metres away",
         "Coordinates so large that f32 resolves six centimetres.",
         |w| moved(w, [1e6, 0.0, 0.0]),
     ),
-    HardCase::bounded(
+    DegenerateCase::bounded(
         "stretched to a million metres",
         "An explosion: every vertex is a thousand kilometres from the next.",
         |w| {
@@ -45,7 +48,7 @@ pub(super) const CASES: &[HardCase] = &[
             w.two_layers(sheet, posed)
         },
     ),
-    HardCase::bounded(
+    DegenerateCase::bounded(
         "50,000 vertices",
         "A cape from the trunk to metres around it, with a coarse garment over it.",
         |w| {
@@ -68,7 +71,7 @@ pub(super) const CASES: &[HardCase] = &[
             w.scene(vec![cloth("dense", dense, dense_posed), cloth("coarse", coarse, coarse_posed)])
         },
     ),
-    HardCase::bounded(
+    DegenerateCase::bounded(
         "12 layers",
         "Twelve T-shirts over each other, a millimetre apart, every other one on the wrong side.",
         |w| {
@@ -82,21 +85,21 @@ pub(super) const CASES: &[HardCase] = &[
                 };
                 let mut garment = shirt.garment.clone();
                 garment.holding = true;
-                HardGarment { canonical: moved(&shirt.canonical), posed: moved(&shirt.posed), garment }
+                CaseGarment { canonical: moved(&shirt.canonical), posed: moved(&shirt.posed), garment }
             };
             w.scene((0..LAYERS).map(layer).collect())
         },
     ),
 ];
 
-fn moved(w: &Wardrobe<'_>, by: [f64; 3]) -> Result<HardScene, HardCaseError> {
+fn moved(w: &Fixture<'_>, by: [f64; 3]) -> Result<CaseScene, CaseError> {
     let sheet = w.sheet();
     let posed = mapped(&sheet, |p| vec3::add(p, by)).positions().to_vec();
     w.two_layers(sheet, posed)
 }
 
 /// The faces of the zero body whose corners lie within 10 cm of the chest.
-fn chest_skin(w: &Wardrobe<'_>) -> Result<TriMesh, HardCaseError> {
+fn chest_skin(w: &Fixture<'_>) -> Result<TriMesh, CaseError> {
     let body = w.body.zero_body();
     let near = |v: u32| vec3::distance_squared(body.positions()[v as usize], w.chest) < 0.01;
     let mut number = vec![u32::MAX; body.vertex_count()];

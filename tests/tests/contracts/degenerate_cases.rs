@@ -1,8 +1,8 @@
-//! Every energy × every hard case: finite, bounded, the derivative of its value, the same in both precisions and for any
+//! Every energy × every degenerate case: finite, bounded, the derivative of its value, the same in both precisions and for any
 //! number of threads; or refused with the element at fault by name.
 
+use clothcombo_data::degenerate_cases::{DegenerateCases, Expectation, Outcome};
 use clothcombo_data::generate::mannequin;
-use clothcombo_data::hard_cases::{Expectation, HardCases, Outcome};
 use clothcombo_physics::Real;
 use clothcombo_physics::energy::{EnergySettings, SceneValue, Term, TermMap};
 
@@ -17,14 +17,14 @@ fn forms() -> [(&'static str, EnergySettings, &'static [Term]); 2] {
 #[test]
 fn every_case_keeps_its_promise() {
     let body = mannequin();
-    let cases = HardCases::new(&body).expect("a human body");
+    let cases = DegenerateCases::new(&body).expect("a human body");
     let mut faults = Vec::new();
     // Per term: how often it spoke, largest error against quotients, of f32 values that do not cancel, of f32 gradients.
     let mut spoke = TermMap::filled(0);
     let mut worst = TermMap::filled([0.0f64; 3]);
     let (mut lines, mut kinks) = (0, 0);
     for (form, settings, terms) in forms() {
-        for case in HardCases::all() {
+        for case in DegenerateCases::all() {
             let start = std::time::Instant::now();
             let report = cases.assess(case, &settings, terms);
             println!("{form:8} {:38} {:.2} s", case.name, start.elapsed().as_secs_f64());
@@ -61,14 +61,17 @@ fn every_case_keeps_its_promise() {
     println!("{kinks} of {lines} lines cross a kink");
     assert!(faults.is_empty(), "{} broken promises:\n{}", faults.len(), faults.join("\n"));
     // The suite means something: every term acts in most scenes, and few lines needed the check from both sides.
-    let scenes = HardCases::all().filter(|case| case.expectation == Expectation::Bounded).count();
+    let scenes = DegenerateCases::all().filter(|case| case.expectation == Expectation::Bounded).count();
     for (term, spoke) in spoke.iter() {
         assert!(*spoke * 2 > scenes, "{term} acts in {spoke} of {scenes} scenes only");
     }
     assert!(kinks * 10 < lines, "{kinks} of {lines} lines cross a kink");
 }
 
-fn with_threads<T: Real>(threads: usize, scene: &clothcombo_data::hard_cases::HardScene) -> SceneValue<T> {
+fn with_threads<T: Real>(
+    threads: usize,
+    scene: &clothcombo_data::degenerate_cases::CaseScene,
+) -> SceneValue<T> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
     let energy = scene.energy::<T>(&EnergySettings::default(), TermMap::filled(1.0)).expect("valid");
     pool.install(|| energy.evaluate(&scene.posed(), &scene.canonical()))
@@ -77,8 +80,8 @@ fn with_threads<T: Real>(threads: usize, scene: &clothcombo_data::hard_cases::Ha
 #[test]
 fn the_number_of_threads_leaves_no_trace() {
     let body = mannequin();
-    let cases = HardCases::new(&body).expect("a human body");
-    for case in HardCases::all().filter(|case| case.expectation == Expectation::Bounded) {
+    let cases = DegenerateCases::new(&body).expect("a human body");
+    for case in DegenerateCases::all().filter(|case| case.expectation == Expectation::Bounded) {
         let scene = cases.scene(case).expect("a scene");
         let (single, double) = (with_threads::<f32>(1, &scene), with_threads::<f64>(1, &scene));
         for threads in [2, 4] {

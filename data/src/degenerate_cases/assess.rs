@@ -1,6 +1,8 @@
-//! Does a case keep its promise? Every term, value and gradient, in both precisions, against quotients and bounds.
+//! Does the invariant of a case hold? Every term, value and gradient, in both precisions, against quotients and bounds.
 
-use super::{Expectation, HardCase, HardCaseError, HardCases, HardScene};
+use super::case::{DegenerateCase, Expectation};
+use super::scene::{CaseError, CaseScene};
+use super::suite::DegenerateCases;
 use clothcombo_physics::energy::gradient_bound::gradient_bound;
 use clothcombo_physics::energy::gradient_check::{
     GradientCheck, TOLERANCE, alone, check_gradient, largest_entry, raw_value,
@@ -88,14 +90,14 @@ pub enum Outcome {
     /// Every term was evaluated; `None` where the scene has no such term.
     Evaluated(Box<TermMap<Option<TermReport>>>),
     /// Loading refused it.
-    Refused(HardCaseError),
+    Refused(CaseError),
 }
 
 /// A case and what became of it.
 #[derive(Debug)]
 pub struct CaseReport {
     /// The case.
-    pub case: HardCase,
+    pub case: DegenerateCase,
     /// Vertices of all garments; 0 if there are none.
     pub vertices: usize,
     /// What became of it.
@@ -103,7 +105,7 @@ pub struct CaseReport {
 }
 
 impl CaseReport {
-    /// Every broken promise, with the term that broke it; empty if the case is good.
+    /// Every invariant that does not hold, with its term; empty if the case is good.
     pub fn faults(&self) -> Vec<String> {
         match (&self.outcome, self.case.expectation) {
             (Outcome::Evaluated(terms), Expectation::Bounded) => {
@@ -122,9 +124,9 @@ impl CaseReport {
     }
 }
 
-impl HardCases<'_> {
+impl DegenerateCases<'_> {
     /// Evaluates the given terms of a case; the others are left out of the report.
-    pub fn assess(&self, case: &HardCase, settings: &EnergySettings, terms: &[Term]) -> CaseReport {
+    pub fn assess(&self, case: &DegenerateCase, settings: &EnergySettings, terms: &[Term]) -> CaseReport {
         let evaluated =
             self.scene(case).and_then(|scene| Ok((scene.vertex_count(), assess(&scene, settings, terms)?)));
         let (vertices, outcome) = match evaluated {
@@ -136,10 +138,10 @@ impl HardCases<'_> {
 }
 
 fn assess(
-    scene: &HardScene,
+    scene: &CaseScene,
     settings: &EnergySettings,
     terms: &[Term],
-) -> Result<TermMap<Option<TermReport>>, HardCaseError> {
+) -> Result<TermMap<Option<TermReport>>, CaseError> {
     let single = Evaluated::<f32>::new(scene, settings)?;
     let double = Evaluated::<f64>::new(scene, settings)?;
     let check = match scene.vertex_count() {
@@ -188,7 +190,7 @@ struct Evaluated<T: Real> {
 }
 
 impl<T: Real> Evaluated<T> {
-    fn new(scene: &HardScene, settings: &EnergySettings) -> Result<Self, HardCaseError> {
+    fn new(scene: &CaseScene, settings: &EnergySettings) -> Result<Self, CaseError> {
         let energy = scene.energy(settings, TermMap::filled(0.0))?;
         Ok(Self { energy, posed: scene.posed(), canonical: scene.canonical() })
     }

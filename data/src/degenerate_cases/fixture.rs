@@ -1,6 +1,6 @@
-//! What hard cases are made of: a body, two garments that fit it, and a piece of cloth against its chest.
+//! What degenerate cases are made of: a body, two garments that fit it, and a piece of cloth against its chest.
 
-use super::{HardCaseError, HardGarment, HardScene};
+use super::scene::{CaseError, CaseGarment, CaseScene};
 use crate::asset::body::skin;
 use crate::asset::{Binding, BindingSettings, Body, Category, Garment, Pose, Provenance, skeleton};
 use crate::generate::{GarmentError, GarmentGenerator, GarmentSettings};
@@ -24,7 +24,7 @@ const GARMENT_VERTICES: usize = 220;
 
 /// Everything that the cases of one body share.
 #[derive(Debug)]
-pub(super) struct Wardrobe<'a> {
+pub(super) struct Fixture<'a> {
     pub body: &'a Body,
     /// Foremost point of the chest of the zero body [m].
     pub chest: [f64; 3],
@@ -32,7 +32,7 @@ pub(super) struct Wardrobe<'a> {
     trousers: (Garment, Binding),
 }
 
-impl<'a> Wardrobe<'a> {
+impl<'a> Fixture<'a> {
     pub(super) fn new(body: &'a Body) -> Result<Self, GarmentError> {
         let generator = GarmentGenerator::new(body)?;
         let settings = GarmentSettings { target_vertices: GARMENT_VERTICES, ..GarmentSettings::default() };
@@ -60,21 +60,21 @@ impl<'a> Wardrobe<'a> {
     }
 
     /// Two layers of the garment of rest shape `rest` at `posed` on the T-posed body, the outer one on the wrong side.
-    pub(super) fn two_layers(&self, rest: TriMesh, posed: Vec<[f64; 3]>) -> Result<HardScene, HardCaseError> {
+    pub(super) fn two_layers(&self, rest: TriMesh, posed: Vec<[f64; 3]>) -> Result<CaseScene, CaseError> {
         let inner = cloth("inner", rest, posed);
         let outer = below(&inner);
         self.scene(vec![inner, outer])
     }
 
     /// `garments` on the T-posed body.
-    pub(super) fn scene(&self, garments: Vec<HardGarment>) -> Result<HardScene, HardCaseError> {
+    pub(super) fn scene(&self, garments: Vec<CaseGarment>) -> Result<CaseScene, CaseError> {
         let pose = Pose::t_pose(self.body.joint_count());
-        let scene = HardScene { shape: Vec::new(), pose, body: self.body.zero_body(), garments };
+        let scene = CaseScene { shape: Vec::new(), pose, body: self.body.zero_body(), garments };
         finished(scene)
     }
 
     /// Trousers and T-shirt, each in two layers, on the body of shape `shape` in `pose`, as skinning leaves them.
-    pub(super) fn dressed(&self, shape: &[f64], pose: Pose) -> Result<HardScene, HardCaseError> {
+    pub(super) fn dressed(&self, shape: &[f64], pose: Pose) -> Result<CaseScene, CaseError> {
         let posed = self.body.posed(shape, &pose)?;
         let body = TriMesh::new(posed.positions, self.body.faces.to_vec())?;
         let garments = [&self.trousers, &self.t_shirt].into_iter().flat_map(|(garment, binding)| {
@@ -83,13 +83,13 @@ impl<'a> Wardrobe<'a> {
             [inner, outer]
         });
         let garments = garments.collect();
-        finished(HardScene { shape: shape.to_vec(), pose, body, garments })
+        finished(CaseScene { shape: shape.to_vec(), pose, body, garments })
     }
 
     /// The T-shirt on the T-posed body.
-    pub(super) fn t_shirt(&self) -> HardGarment {
+    pub(super) fn t_shirt(&self) -> CaseGarment {
         let rest = self.t_shirt.0.rest.positions().to_vec();
-        HardGarment { garment: self.t_shirt.0.clone(), canonical: raised(&rest), posed: rest }
+        CaseGarment { garment: self.t_shirt.0.clone(), canonical: raised(&rest), posed: rest }
     }
 
     fn skinned(
@@ -98,7 +98,7 @@ impl<'a> Wardrobe<'a> {
         binding: &Binding,
         shape: &[f64],
         bones: &[[[f64; 4]; 3]],
-    ) -> HardGarment {
+    ) -> CaseGarment {
         let mut canonical = garment.rest.positions().to_vec();
         for (p, moved) in canonical.iter_mut().zip(binding.shape_displacement(shape, self.body.shape_count)) {
             vec3::accumulate(p, moved);
@@ -109,15 +109,15 @@ impl<'a> Wardrobe<'a> {
         let (posed, canonical) = (posed.collect(), raised(&canonical));
         // Held whatever its height: the holding energy is to be tested here as well.
         let garment = Garment { holding: true, ..garment.clone() };
-        HardGarment { garment, canonical, posed }
+        CaseGarment { garment, canonical, posed }
     }
 }
 
 /// A garment that is nothing but its mesh, at `posed` after skinning and a little higher before.
-pub(super) fn cloth(name: &str, rest: TriMesh, posed: Vec<[f64; 3]>) -> HardGarment {
+pub(super) fn cloth(name: &str, rest: TriMesh, posed: Vec<[f64; 3]>) -> CaseGarment {
     let source = Provenance::default();
     let garment = Garment { name: name.to_string(), category: Category::Top, rest, holding: true, source };
-    HardGarment { garment, canonical: raised(&posed), posed }
+    CaseGarment { garment, canonical: raised(&posed), posed }
 }
 
 fn raised(positions: &[[f64; 3]]) -> Vec<[f64; 3]> {
@@ -125,11 +125,11 @@ fn raised(positions: &[[f64; 3]]) -> Vec<[f64; 3]> {
 }
 
 /// The same garment a millimetre below itself, where it should not be.
-pub(super) fn below(inner: &HardGarment) -> HardGarment {
+pub(super) fn below(inner: &CaseGarment) -> CaseGarment {
     let normals = vertex_normals(&inner.posed, inner.garment.rest.faces());
     let sunk = inner.posed.iter().zip(normals).map(|(p, n)| vec3::add_scaled(*p, -WRONG_SIDE, n));
     let garment = Garment { name: format!("{}, outer", inner.garment.name), ..inner.garment.clone() };
-    HardGarment { garment, canonical: inner.canonical.clone(), posed: sunk.collect() }
+    CaseGarment { garment, canonical: inner.canonical.clone(), posed: sunk.collect() }
 }
 
 /// `mesh` with vertex `v` at `p`.
@@ -139,7 +139,7 @@ pub(super) fn with_vertex(mesh: &TriMesh, v: usize, p: [f64; 3]) -> Result<TriMe
     mesh.with_positions(positions)
 }
 
-fn finished(scene: HardScene) -> Result<HardScene, HardCaseError> {
+fn finished(scene: CaseScene) -> Result<CaseScene, CaseError> {
     Ok(scene.rounded())
 }
 

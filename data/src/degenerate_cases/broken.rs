@@ -1,7 +1,8 @@
 //! Input that cannot be a garment: refused when it is loaded, with the element at fault by name.
 
-use super::wardrobe::with_vertex;
-use super::{Expectation, HardCase, HardCaseError, HardScene};
+use super::case::{DegenerateCase, Expectation};
+use super::fixture::{Fixture, with_vertex};
+use super::scene::{CaseError, CaseScene};
 use clothcombo_physics::TriMesh;
 use clothcombo_physics::mesh::shapes::mapped;
 
@@ -9,12 +10,12 @@ const fn refused(
     name: &'static str,
     description: &'static str,
     text: &'static str,
-    build: fn(&super::wardrobe::Wardrobe<'_>) -> Result<HardScene, HardCaseError>,
-) -> HardCase {
-    HardCase { name, description, expectation: Expectation::Refused(text), build }
+    build: fn(&Fixture<'_>) -> Result<CaseScene, CaseError>,
+) -> DegenerateCase {
+    DegenerateCase { name, description, expectation: Expectation::Refused(text), build }
 }
 
-pub(super) const CASES: &[HardCase] = &[
+pub(super) const CASES: &[DegenerateCase] = &[
     refused(
         "rest without area",
         "Every rest vertex lies on one line: nothing to measure strain by.",

@@ -1,10 +1,10 @@
 //! Bodies in poses and shapes where skin folds into skin.
 
-use super::HardCase;
+use super::case::DegenerateCase;
 use crate::asset::{Pose, skeleton};
 
-pub(super) const CASES: &[HardCase] = &[
-    HardCase::bounded(
+pub(super) const CASES: &[DegenerateCase] = &[
+    DegenerateCase::bounded(
         "knees and elbows bent by 150 degrees",
         "Calves press into thighs, forearms into upper arms.",
         |w| {
@@ -17,7 +17,7 @@ pub(super) const CASES: &[HardCase] = &[
             w.dressed(&[], pose(w.body.joint_count(), &degrees))
         },
     ),
-    HardCase::bounded(
+    DegenerateCase::bounded(
         "limbs pressed into the torso",
         "Arms cut into the trunk, thighs into each other and into the belly.",
         |w| {
@@ -30,10 +30,10 @@ pub(super) const CASES: &[HardCase] = &[
             w.dressed(&[], pose(w.body.joint_count(), &degrees))
         },
     ),
-    HardCase::bounded("shape +5", "Every shape number is 5, far beyond any person.", |w| {
+    DegenerateCase::bounded("shape +5", "Every shape number is 5, far beyond any person.", |w| {
         w.dressed(&vec![5.0; w.body.shape_count], Pose::t_pose(w.body.joint_count()))
     }),
-    HardCase::bounded("shape -5", "Every shape number is -5.", |w| {
+    DegenerateCase::bounded("shape -5", "Every shape number is -5.", |w| {
         w.dressed(&vec![-5.0; w.body.shape_count], Pose::t_pose(w.body.joint_count()))
     }),
 ];

@@ -1,15 +1,30 @@
-//! The scene of a hard case, and its energies in either precision.
+//! The scene of a degenerate case, and its energies in either precision.
 
-use crate::asset::{Garment, Pose};
+use crate::asset::{BodyError, Garment, Pose};
 use clothcombo_physics::energy::{
     EnergySettings, GarmentEnergies, SceneEnergy, SceneGarment, SceneLayers, TermMap,
 };
-use clothcombo_physics::{EnergyError, Real, Surface, Topology, TriMesh, vec3};
+use clothcombo_physics::{EnergyError, MeshError, Real, Surface, Topology, TriMesh, vec3};
 use std::sync::Arc;
+use thiserror::Error;
 
-/// One garment of a hard case.
+/// Why a case has no scene or no energies.
+#[derive(Debug, Error)]
+pub enum CaseError {
+    /// A mesh is refused.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// Energies are refused.
+    #[error(transparent)]
+    Energy(#[from] EnergyError),
+    /// A body is refused.
+    #[error(transparent)]
+    Body(#[from] BodyError),
+}
+
+/// One garment of a degenerate case.
 #[derive(Debug, Clone)]
-pub struct HardGarment {
+pub struct CaseGarment {
     /// The garment with its rest mesh.
     pub garment: Garment,
     /// Positions before skinning `[V, 3]` [m].
@@ -20,7 +35,7 @@ pub struct HardGarment {
 
 /// Garments on a posed body, from the body outwards.
 #[derive(Debug, Clone)]
-pub struct HardScene {
+pub struct CaseScene {
     /// Shape numbers of the body.
     pub shape: Vec<f64>,
     /// Its pose.
@@ -28,10 +43,10 @@ pub struct HardScene {
     /// The posed body [m].
     pub body: TriMesh,
     /// The garments.
-    pub garments: Vec<HardGarment>,
+    pub garments: Vec<CaseGarment>,
 }
 
-impl HardScene {
+impl CaseScene {
     /// The energies of the scene: every garment with `weights`, every pair of garments as layers.
     ///
     /// # Errors

@@ -1,7 +1,8 @@
 //! Rest shapes and topologies that a garment should not have, and files in the wrong unit.
 
-use super::wardrobe::{Wardrobe, cloth, with_vertex};
-use super::{HardCase, HardCaseError, HardScene};
+use super::case::DegenerateCase;
+use super::fixture::{Fixture, below, cloth, with_vertex};
+use super::scene::{CaseError, CaseScene};
 use clothcombo_physics::mesh::shapes::{mapped, union};
 use clothcombo_physics::{TriMesh, vec3};
 
@@ -9,13 +10,13 @@ use clothcombo_physics::{TriMesh, vec3};
 pub(super) const MIDDLE: usize = 24;
 pub(super) const BESIDE: usize = 25;
 
-pub(super) const CASES: &[HardCase] = &[
-    HardCase::bounded(
+pub(super) const CASES: &[DegenerateCase] = &[
+    DegenerateCase::bounded(
         "plain sheet",
         "A piece of cloth through the chest, stretched by 5 %: nothing hard, for comparison.",
         |w| stretched(w, w.sheet()),
     ),
-    HardCase::bounded(
+    DegenerateCase::bounded(
         "zero-area rest triangles",
         "Two neighbouring vertices share one place in the rest shape and nearly so in the drape.",
         |w| {
@@ -23,7 +24,7 @@ pub(super) const CASES: &[HardCase] = &[
             stretched(w, with_vertex(&sheet, MIDDLE, sheet.positions()[BESIDE])?)
         },
     ),
-    HardCase::bounded(
+    DegenerateCase::bounded(
         "zero-area rest triangles, opened",
         "The same rest shape, draped as if its triangles had their full area.",
         |w| {
@@ -32,7 +33,7 @@ pub(super) const CASES: &[HardCase] = &[
             w.two_layers(rest, sheet.positions().to_vec())
         },
     ),
-    HardCase::bounded(
+    DegenerateCase::bounded(
         "one needle rest triangle",
         "A rest vertex a nanometre beside its neighbour, draped with full triangles.",
         |w| {
@@ -41,7 +42,7 @@ pub(super) const CASES: &[HardCase] = &[
             w.two_layers(with_vertex(&sheet, MIDDLE, beside)?, sheet.positions().to_vec())
         },
     ),
-    HardCase::bounded(
+    DegenerateCase::bounded(
         "needle rest triangles",
         "Every rest triangle is a million times wider than high, the drape is an ordinary sheet.",
         |w| {
@@ -51,7 +52,7 @@ pub(super) const CASES: &[HardCase] = &[
             w.two_layers(needles, sheet.positions().to_vec())
         },
     ),
-    HardCase::bounded("non-manifold edge", "Three faces meet at one edge.", |w| {
+    DegenerateCase::bounded("non-manifold edge", "Three faces meet at one edge.", |w| {
         let sheet = w.sheet();
         let mut positions = sheet.positions().to_vec();
         positions.push(w.before_chest([0.0, 0.03, 0.02]));
@@ -60,19 +61,19 @@ pub(super) const CASES: &[HardCase] = &[
         let faces = sheet.faces().iter().copied().chain([[b, a, last]]).collect();
         stretched(w, TriMesh::new(positions, faces)?)
     }),
-    HardCase::bounded("flipped face", "One face is oriented against its neighbours.", |w| {
+    DegenerateCase::bounded("flipped face", "One face is oriented against its neighbours.", |w| {
         let sheet = w.sheet();
         let mut faces = sheet.faces().to_vec();
         faces[20].swap(0, 1);
         stretched(w, TriMesh::new(sheet.positions().to_vec(), faces)?)
     }),
-    HardCase::bounded("isolated vertex", "A vertex that no face uses.", |w| {
+    DegenerateCase::bounded("isolated vertex", "A vertex that no face uses.", |w| {
         let sheet = w.sheet();
         let mut positions = sheet.positions().to_vec();
         positions.push(w.before_chest([0.01, 0.02, 0.003]));
         stretched(w, TriMesh::new(positions, sheet.faces().to_vec())?)
     }),
-    HardCase::bounded("many components", "Every face is a component of its own.", |w| {
+    DegenerateCase::bounded("many components", "Every face is a component of its own.", |w| {
         let sheet = w.sheet();
         let single =
             (0..sheet.face_count()).map(|f| TriMesh::new(sheet.corners(f).to_vec(), vec![[0, 1, 2]]));
@@ -87,7 +88,7 @@ pub(super) const CASES: &[HardCase] = &[
         let posed = posed.collect();
         w.two_layers(rest, posed)
     }),
-    HardCase::bounded(
+    DegenerateCase::bounded(
         "one triangle",
         "The smallest garment: no hinge, and no two vertices without an edge.",
         |w| {
@@ -95,7 +96,7 @@ pub(super) const CASES: &[HardCase] = &[
             stretched(w, TriMesh::new(corners.to_vec(), vec![[0, 1, 2]])?)
         },
     ),
-    HardCase::bounded(
+    DegenerateCase::bounded(
         "rest a thousand times too large",
         "The rest shape was read in millimetres, the drape is in metres.",
         |w| {
@@ -103,7 +104,7 @@ pub(super) const CASES: &[HardCase] = &[
             w.two_layers(mapped(&sheet, |p| vec3::scale(p, 1e3)), sheet.positions().to_vec())
         },
     ),
-    HardCase::bounded(
+    DegenerateCase::bounded(
         "rest a thousand times too small",
         "The rest shape was divided by a thousand once too often, the drape is in metres.",
         |w| {
@@ -111,7 +112,7 @@ pub(super) const CASES: &[HardCase] = &[
             w.two_layers(mapped(&sheet, |p| vec3::scale(p, 1e-3)), sheet.positions().to_vec())
         },
     ),
-    HardCase::bounded(
+    DegenerateCase::bounded(
         "garment in millimetres",
         "Rest shape and drape are both in millimetres, on a body in metres.",
         |w| {
@@ -122,10 +123,10 @@ pub(super) const CASES: &[HardCase] = &[
 ];
 
 /// Two layers of `rest`, stretched by 5 % about its place before the chest.
-pub(super) fn stretched(w: &Wardrobe<'_>, rest: TriMesh) -> Result<HardScene, HardCaseError> {
+pub(super) fn stretched(w: &Fixture<'_>, rest: TriMesh) -> Result<CaseScene, CaseError> {
     let centre = w.before_chest([0.0; 3]);
     let posed = mapped(&rest, |p| vec3::add_scaled(centre, 1.05, vec3::sub(p, centre))).positions().to_vec();
     let inner = cloth("inner", rest, posed);
-    let outer = super::wardrobe::below(&inner);
+    let outer = below(&inner);
     w.scene(vec![inner, outer])
 }

@@ -1,25 +1,34 @@
 //! Drapes of an ordinary rest shape that should not happen and do.
 
+use super::case::DegenerateCase;
+use super::fixture::{Fixture, cloth, with_vertex};
 use super::rest_shapes::{BESIDE, MIDDLE};
-use super::wardrobe::{Wardrobe, cloth, with_vertex};
-use super::{HardCase, HardCaseError, HardScene};
+use super::scene::{CaseError, CaseScene};
 use clothcombo_physics::mesh::shapes::mapped;
 use clothcombo_physics::{TriMesh, vec3};
 use std::f64::consts::PI;
 
-pub(super) const CASES: &[HardCase] = &[
-    HardCase::bounded("inverted triangles", "A vertex is pushed past the far edge of its triangles.", |w| {
-        let sheet = w.sheet();
-        let [here, there] = [MIDDLE, BESIDE].map(|v| sheet.positions()[v]);
-        let past = vec3::add_scaled(here, 1.6, vec3::sub(there, here));
-        let posed = with_vertex(&sheet, MIDDLE, past)?;
-        w.two_layers(sheet, posed.positions().to_vec())
-    }),
-    HardCase::bounded("mirrored garment", "Left and right are exchanged, every triangle is inverted.", |w| {
-        let x = w.chest[0];
-        draped(w, |p| [2.0 * x - p[0], p[1], p[2]])
-    }),
-    HardCase::bounded(
+pub(super) const CASES: &[DegenerateCase] = &[
+    DegenerateCase::bounded(
+        "inverted triangles",
+        "A vertex is pushed past the far edge of its triangles.",
+        |w| {
+            let sheet = w.sheet();
+            let [here, there] = [MIDDLE, BESIDE].map(|v| sheet.positions()[v]);
+            let past = vec3::add_scaled(here, 1.6, vec3::sub(there, here));
+            let posed = with_vertex(&sheet, MIDDLE, past)?;
+            w.two_layers(sheet, posed.positions().to_vec())
+        },
+    ),
+    DegenerateCase::bounded(
+        "mirrored garment",
+        "Left and right are exchanged, every triangle is inverted.",
+        |w| {
+            let x = w.chest[0];
+            draped(w, |p| [2.0 * x - p[0], p[1], p[2]])
+        },
+    ),
+    DegenerateCase::bounded(
         "collapsed triangles",
         "Two neighbouring vertices of the drape share one place.",
         |w| {
@@ -28,7 +37,7 @@ pub(super) const CASES: &[HardCase] = &[
             w.two_layers(sheet, posed.positions().to_vec())
         },
     ),
-    HardCase::bounded(
+    DegenerateCase::bounded(
         "collapsed to a line",
         "All vertices lie on one straight line: no triangle has an area.",
         |w| {
@@ -36,11 +45,11 @@ pub(super) const CASES: &[HardCase] = &[
             draped(w, |p| [p[0], y, z])
         },
     ),
-    HardCase::bounded("collapsed to a point", "All vertices share one place.", |w| {
+    DegenerateCase::bounded("collapsed to a point", "All vertices share one place.", |w| {
         let point = w.before_chest([0.0; 3]);
         draped(w, |_| point)
     }),
-    HardCase::bounded(
+    DegenerateCase::bounded(
         "coincident vertices",
         "Two vertices that no edge joins share one place: the logarithm of zero.",
         |w| {
@@ -49,26 +58,28 @@ pub(super) const CASES: &[HardCase] = &[
             w.two_layers(sheet, posed.positions().to_vec())
         },
     ),
-    HardCase::bounded("hinge angle 0", "Two triangles in one plane.", |w| hinge(w, |p| p)),
-    HardCase::bounded(
+    DegenerateCase::bounded("hinge angle 0", "Two triangles in one plane.", |w| hinge(w, |p| p)),
+    DegenerateCase::bounded(
         "hinge angle pi",
         "Two triangles folded flat onto each other, the free corners in one place.",
         |w| hinge(w, |[x, y, z]| [x.abs(), y, z]),
     ),
-    HardCase::bounded("hinge angle pi, uneven", "The same with free corners that do not coincide.", |w| {
-        hinge(w, |[x, y, z]| [if x < 0.0 { -1.25 * x } else { x }, y, z])
-    }),
-    HardCase::bounded(
+    DegenerateCase::bounded(
+        "hinge angle pi, uneven",
+        "The same with free corners that do not coincide.",
+        |w| hinge(w, |[x, y, z]| [if x < 0.0 { -1.25 * x } else { x }, y, z]),
+    ),
+    DegenerateCase::bounded(
         "hinge angle just below pi",
         "Two triangles folded to within a milliradian of flat.",
         |w| hinge(w, |[x, y, z]| if x > 0.0 { turned([x, y, z], PI - 1e-3) } else { [x, y, z] }),
     ),
-    HardCase::bounded(
+    DegenerateCase::bounded(
         "collapsed hinge edge",
         "The edge about which two triangles fold has no length.",
         |w| hinge(w, |[x, _, z]| [x, 0.0, z]),
     ),
-    HardCase::bounded(
+    DegenerateCase::bounded(
         "folded in half",
         "A sheet lies on itself: many hinges at an angle of pi, many vertex pairs close by.",
         |w| {
@@ -76,7 +87,7 @@ pub(super) const CASES: &[HardCase] = &[
             draped(w, |p| if p[0] > x { [2.0 * x - p[0], p[1], p[2]] } else { p })
         },
     ),
-    HardCase::bounded(
+    DegenerateCase::bounded(
         "two layers in one place",
         "The outer garment has exactly the positions of the inner one.",
         |w| {
@@ -87,14 +98,14 @@ pub(super) const CASES: &[HardCase] = &[
     ),
 ];
 
-fn draped(w: &Wardrobe<'_>, f: impl Fn([f64; 3]) -> [f64; 3]) -> Result<HardScene, HardCaseError> {
+fn draped(w: &Fixture<'_>, f: impl Fn([f64; 3]) -> [f64; 3]) -> Result<CaseScene, CaseError> {
     let sheet = w.sheet();
     let posed = mapped(&sheet, f).positions().to_vec();
     w.two_layers(sheet, posed)
 }
 
 /// Two triangles about an edge along y before the chest, moved by `f` in a frame with the edge through the origin.
-fn hinge(w: &Wardrobe<'_>, f: impl Fn([f64; 3]) -> [f64; 3]) -> Result<HardScene, HardCaseError> {
+fn hinge(w: &Fixture<'_>, f: impl Fn([f64; 3]) -> [f64; 3]) -> Result<CaseScene, CaseError> {
     let corners = [[0.0, -0.02, 0.0], [0.0, 0.02, 0.0], [-0.03, 0.0, 0.0], [0.03, 0.0, 0.0]];
     let rest = corners.map(|p| w.before_chest(p)).to_vec();
     let posed = corners.map(|p| w.before_chest(f(p))).to_vec();
