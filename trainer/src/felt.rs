@@ -3,7 +3,7 @@
 use crate::scene::{LibraryGarment, PreparedBody, PreparedScene};
 use burn::tensor::Device;
 use clothcombo_model::FeltTensors;
-use clothcombo_physics::sensing::{DIRECTIONS, FEATURES, Rings, Sensed, sense};
+use clothcombo_physics::contact_features::{ContactFeatures, DIRECTIONS, FEATURES, Rings};
 use std::sync::Arc;
 
 /// Whether the garments of a scene feel each other.
@@ -39,7 +39,8 @@ pub fn felt(
     device: &Device,
 ) -> FeltTensors {
     let rings: Vec<&Rings> = scene.worn.iter().map(|worn| &worn.rings).collect();
-    let Sensed { features, directions } = sense(&body.energy, &rings, posed, contacts);
+    let ContactFeatures { features, directions } =
+        ContactFeatures::new(&body.energy, &rings, posed, contacts);
     let directions = directions.map(|posed| unposed(scene, body, &posed));
     FeltTensors::new(features, directions.each_ref().map(Vec::as_slice), device)
         .expect("every vertex of the scene has its features")

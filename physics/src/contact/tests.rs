@@ -182,7 +182,7 @@ fn faces_that_are_no_triangle_take_part_in_nothing() {
 }
 
 #[test]
-fn the_segment_of_two_triangles_is_where_they_cross() {
+fn the_segment_of_two_triangles_is_where_they_intersect() {
     let a = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
     let b = [[1.0, 1.0, -1.0], [1.0, 1.0, 1.0], [1.0, 5.0, 0.0]];
     let [mut p, mut q] = intersection_segment(&a, &b).unwrap();
@@ -209,7 +209,7 @@ fn sleeve(radius: f64, turn: f64) -> TriMesh {
 }
 
 #[test]
-fn two_tubes_around_a_ball_cross_it_in_two_circles_each() {
+fn two_tubes_around_a_ball_intersect_it_in_two_circles_each() {
     let (ball, inner, outer) = (icosphere(0.4, 4), sleeve(0.3, 0.1), sleeve(0.32, 0.2));
     let (ball_tree, sleeves) = (tree(&ball), [tree(&inner), tree(&outer)]);
     for (mesh, radius) in [(&inner, 0.3), (&outer, 0.32)] {
@@ -242,7 +242,7 @@ fn two_tubes_around_a_ball_cross_it_in_two_circles_each() {
 
 #[test]
 fn contours_survive_aligned_meshes() {
-    // Every crossing runs along edges and through vertices of both grids.
+    // Every contour runs along edges and through vertices of both grids.
     let flat = grid(1.0, 1.0, 8, 8);
     let upright = mapped(&grid(1.0, 1.0, 8, 8), |p| [p[0], 0.5, p[1] - 0.5]);
     let pairs = tree(&flat).pairs_with(&tree(&upright));

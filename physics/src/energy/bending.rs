@@ -5,7 +5,7 @@
 //! gradient is the classical one of the dihedral angle (Bridson et al. 2003; Grinspun et al. 2003). The triangles are
 //! oriented by the hinge and not by the faces, so that a flipped face does not bend.
 //!
-//! **At α = π** (one triangle folded flat onto the other) the energy is continuous and has a kink: unfolding to either side
+//! **At α = π** (one triangle folded flat onto the other) the energy is continuous but not smooth: unfolding to either side
 //! lowers it. The gradient there is that of one side.
 //!
 //! **Degenerate triangles** have no normal, and near them the angle turns arbitrarily fast: in a compressed fold, where

@@ -6,7 +6,7 @@ use super::bending::Bending;
 use super::body_collision::BodyCollision;
 use super::gravity::Gravity;
 use super::holding::{HeightRow, Holding};
-use super::layer_collision::InnerGarment;
+use super::layer_collision::InnerLayer;
 use super::repulsion::Repulsion;
 use super::strain::{Needle, Strain};
 use super::{CurvatureSink, EnergyError, EnergySettings, Term, Weighted};
@@ -46,7 +46,7 @@ pub trait GarmentTerm<T>: Debug + Send + Sync {
 #[derive(Debug)]
 pub struct GarmentEnergies<T: Real> {
     vertex_count: usize,
-    as_inner: InnerGarment,
+    as_inner: InnerLayer,
     terms: Vec<(Term, Box<dyn GarmentTerm<T>>)>,
 }
 
@@ -89,7 +89,7 @@ impl<T: Real> GarmentEnergies<T> {
         if holding {
             terms.push((Term::Holding, Box::new(Holding::new(rest, settings.holding_fraction))));
         }
-        Ok(Self { vertex_count, as_inner: InnerGarment::new(rest, topology, median_edge), terms })
+        Ok(Self { vertex_count, as_inner: InnerLayer::new(rest, topology, median_edge), terms })
     }
 
     /// Number of vertices.
@@ -108,7 +108,7 @@ impl<T: Real> GarmentEnergies<T> {
     }
 
     /// As others see it that lie on it.
-    pub(crate) fn as_inner(&self) -> &InnerGarment {
+    pub(crate) fn as_inner(&self) -> &InnerLayer {
         &self.as_inner
     }
 }

@@ -16,7 +16,7 @@
 //! `f64` and run in a fixed order: results are bit-identical for any number of threads.
 //!
 //! A ninth term is one new file, its name in [`Term`], its weight in the configuration, a bound of its gradient for the suite of
-//! hard cases, and one line where [`GarmentEnergies`] (or, for a pair of garments, [`SceneEnergy`]) lists what it evaluates; the
+//! degenerate cases, and one line where [`GarmentEnergies`] (or, for a pair of garments, [`SceneEnergy`]) lists what it evaluates; the
 //! finite-difference test walks the list.
 
 pub mod bending;

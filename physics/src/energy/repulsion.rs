@@ -8,7 +8,7 @@
 //! have no direction to part in and get none from each other. **At the radius** the printed term jumps from 4.6 to 0; this
 //! is kept, and the gradient is that of the pairs inside. [`EnergySettings::repulsion_continuous`] drops the jump without
 //! touching the gradient: pairs inside count `−log d²/r²`. Training, which follows gradients, cannot tell the two forms apart; a line
-//! search can, because in the printed form every pair that comes closer than the radius is a wall.
+//! search can, because in the printed form every pair that comes closer than the radius stops it.
 //!
 //! **No all-pairs work.** Vertices are sorted into cells of half or a quarter of the radius; those of one cell share a list of
 //! candidates, which the inner loop runs through in fixed lanes, with the widest vectors the processor has (the operations

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::curvature::{CurvatureSink, Scaled};
 use super::elements::GRAIN;
 use super::holding::{HeightRow, height_rows};
-use super::layer_collision::PosedInner;
+use super::layer_collision::PosedInnerLayer;
 use super::layer_distance::{BodyBuckets, LayerGaps, layer_distance};
 use super::touching::Touching;
 use super::{EnergyError, EnergySettings, GarmentEnergies, GarmentState, Term, TermMap, Weighted};
@@ -98,7 +98,7 @@ struct Shared<'a, T: Real> {
     state: GarmentState<'a, T>,
     gaps: Vec<Gap<T>>,
     buckets: Option<BodyBuckets>,
-    as_inner: Option<PosedInner<T>>,
+    as_inner: Option<PosedInnerLayer<T>>,
 }
 
 impl<T: Real> Shared<'_, T> {

@@ -1,6 +1,6 @@
-//! Which garments of a scene touch each other, and where: for the solver's curvature, and for the walls that contact has.
+//! Which garments of a scene touch each other, and where: for the solver's curvature, and for the discontinuities that contact has.
 
-use super::layer_collision::{InnerGarment, LayerContact, PosedInner};
+use super::layer_collision::{InnerLayer, LayerContact, PosedInnerLayer};
 use super::{SceneEnergy, SceneLayers, Term};
 use crate::real::Real;
 
@@ -20,8 +20,8 @@ pub struct LayerTouch {
 /// A pair of garments, the inner one ready for queries.
 pub(super) struct Touching<'a, T: Real> {
     pub pair: usize,
-    pub as_inner: &'a InnerGarment,
-    pub surface: PosedInner<T>,
+    pub as_inner: &'a InnerLayer,
+    pub surface: PosedInnerLayer<T>,
     pub outer: &'a [[T; 3]],
     /// Where the vertices of the inner and of the outer garment start.
     pub offsets: [usize; 2],

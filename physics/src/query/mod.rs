@@ -3,8 +3,8 @@
 pub mod brute_force;
 mod closest_point;
 mod closest_vertex;
-mod crossings;
 mod pseudo_normal;
+mod ray_intersections;
 mod surface;
 mod union;
 mod winding_number;

@@ -5,10 +5,10 @@ use super::error::LibraryError;
 use super::garment::LibraryGarment;
 use crate::config::Config;
 use clothcombo_data::asset::{Binding, BindingSettings, Body, Garment};
+use clothcombo_physics::contact_features::Rings;
 use clothcombo_physics::energy::{EnergySettings, GarmentEnergies};
 use clothcombo_physics::mesh::{Topology, TriMesh};
 use clothcombo_physics::operators::SurfaceOperators;
-use clothcombo_physics::sensing::Rings;
 use std::sync::Arc;
 
 /// Body and settings with which garments are prepared.

@@ -95,7 +95,7 @@ impl InnerVertices {
         Some((if length > 0.0 { scale(sum, 1.0 / length) } else { zero() }, length))
     }
 
-    /// As [`InnerGarment::evaluate`](super::InnerGarment::evaluate).
+    /// As [`InnerLayer::evaluate`](super::InnerLayer::evaluate).
     pub(super) fn evaluate<T: Real>(
         &self,
         inner: &[[T; 3]],
