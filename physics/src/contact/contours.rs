@@ -6,8 +6,8 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::intersections::TriangleTree;
-use super::triangle_pair::{SegmentEnd, segment_ends};
+use crate::query::triangle_pair::{SegmentEnd, segment_ends};
+use crate::query::triangle_tree::TriangleTree;
 use crate::vec3;
 
 /// One curve of intersection.

@@ -1,8 +1,8 @@
 //! The same queries without an accelerator, in O(V) or O(F) each: the oracles that the fast ones are tested against.
 
 use crate::mesh::FacesAtVertex;
-use crate::query::closest_point::closest_on_triangle;
 use crate::query::pseudo_normal::PseudoNormals;
+use crate::query::triangle_point::closest_on_triangle;
 use crate::query::{Distance, Gap};
 use crate::real::Real;
 use crate::vec3;

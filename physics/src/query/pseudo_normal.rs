@@ -1,7 +1,7 @@
 //! Angle-weighted pseudo-normals, computed where a query asks for one: few features are ever the closest, and a posed body is
 //! asked only until it moves.
 
-use super::Feature;
+use super::triangle_point::Feature;
 use crate::mesh::FacesAtVertex;
 use crate::vec3;
 

@@ -6,13 +6,13 @@
 //! is continuous, with slope 1 (1-Lipschitz): the unsigned distance is, and the sign changes only on the boundary of the
 //! union, all of which is among the triangles that are kept.
 //!
-//! **What is buried.** Triangles that intersect others (exact predicates, [`crate::contact`]) form the seams and are kept whole;
+//! **What is buried.** Triangles that intersect others (exact predicates) form the seams and are kept whole;
 //! they cut the rest into connected pieces, and each piece lies wholly in the boundary of the union or wholly in its inside.
 //! One winding number per piece says which.
 
 use super::ray_intersections::RayIntersections;
+use super::triangle_tree::TriangleTree;
 use super::{ClosestPoint, SurfacePoint};
-use crate::contact::TriangleTree;
 use crate::mesh::{DisjointSets, FacesAtVertex};
 use crate::vec3::{self, add, add_scaled, dot, normalized, scale, sub};
 

@@ -1,11 +1,13 @@
 //! The score of one draped scene.
 
 use crate::scene::PreparedScene;
-use clothcombo_physics::contact::{OrderViolations, Penetration, order_violations, penetration};
+use clothcombo_physics::contact::{
+    LayerOrder, OrderViolations, Penetration, PosedBody, Report, ReportGarment, Selection,
+};
 use clothcombo_physics::energy::{Term, TermMap};
-use clothcombo_physics::query::Surface;
+use clothcombo_physics::query::{Distance, Surface};
 
-/// Vertices deeper than this inside the body count as visibly wrong [m].
+/// Vertices deeper than this inside the body count as visibly wrong (m).
 pub const DEEP: f64 = 0.005;
 
 /// Positions of all garments of a scene on its first body, packed inner → outer.
@@ -28,7 +30,7 @@ pub struct SceneScore {
     pub total: f64,
     /// Garment vertices inside the body, by closest surface point.
     pub penetration: Penetration,
-    /// Wrong-side vertices over all pairs of layers that interact.
+    /// Layer-order violations by the nearest vertex, over all pairs of layers that interact.
     pub order: OrderViolations,
 }
 
@@ -49,14 +51,15 @@ pub fn score_scene(scene: &PreparedScene, body: &Surface<f64>, draped: &Draped) 
         }
     }
     let positions: Vec<[f64; 3]> = draped.posed.iter().map(|p| p.map(f64::from)).collect();
-    score.penetration = penetration(body, &positions, DEEP);
-
-    let parts = scene.parts(&positions);
-    for &(inner, outer) in &scene.contacts {
-        let faces = scene.worn[inner].garment.rest.faces();
-        let pair = order_violations(parts[inner], faces, parts[outer]);
-        score.order.counted += pair.counted;
-        score.order.violations += pair.violations;
-    }
+    let garments: Vec<ReportGarment> = scene
+        .parts(&positions)
+        .into_iter()
+        .zip(&scene.worn)
+        .map(|(positions, worn)| ReportGarment { positions, faces: worn.garment.rest.faces() })
+        .collect();
+    let order = LayerOrder::NearestVertex;
+    let selection = Selection { layers: &scene.contacts, order, triangles: false, body_itself: false };
+    let report = Report::count(&PosedBody::new(body, Distance::ClosestPoint), &garments, &selection);
+    (score.penetration, score.order) = (report.penetration(DEEP), report.order());
     score
 }

@@ -43,7 +43,6 @@ mod error;
 mod folds;
 mod follow;
 mod garment;
-mod inner_garment;
 mod near;
 mod obstacle;
 mod outfit;

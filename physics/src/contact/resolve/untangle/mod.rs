@@ -13,7 +13,7 @@ use super::obstacle::{BodyObstacle, Plane};
 use super::outfit::Outfit;
 use super::over::{Over, all_over, outward};
 use super::sides::Sides;
-use crate::contact::intersections::{KeptTree, TriangleTree};
+use crate::query::triangle_tree::{KeptTree, TriangleTree};
 use crate::vec3::dot;
 
 /// A half-space is remembered for a vertex that is nearer to it than this [m], or too close: smoothing may carry it there.

@@ -79,7 +79,7 @@ pub fn intersection_segment(a: &Triangle, b: &Triangle) -> Option<[[f64; 3]; 2]>
 
 /// One end of the segment in which two triangles intersect.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct SegmentEnd {
+pub(crate) struct SegmentEnd {
     /// Where it is (m), rounded.
     pub position: [f64; 3],
     /// The smallest part of the first triangle that holds it, as a set of corners (bit `i` = corner `i`): one bit is a
@@ -91,7 +91,7 @@ pub(super) struct SegmentEnd {
 
 /// Both ends of the common segment, with the exact parts of the triangles they lie on; `None` as in
 /// [`intersection_segment`].
-pub(super) fn segment_ends(a: &Triangle, b: &Triangle) -> Option<[SegmentEnd; 2]> {
+pub(crate) fn segment_ends(a: &Triangle, b: &Triangle) -> Option<[SegmentEnd; 2]> {
     let (of_b, of_a) = (sides(a, b), sides(b, a));
     if one_side(&of_b) || one_side(&of_a) || of_b == [0.0; 3] || of_a == [0.0; 3] {
         return None;
@@ -149,13 +149,13 @@ fn edge_intersection(
 }
 
 /// Corners of a face; `None` for an index out of range or a corner that is not finite.
-pub(super) fn corners(positions: &[[f64; 3]], face: [u32; 3]) -> Option<Triangle> {
+pub(crate) fn corners(positions: &[[f64; 3]], face: [u32; 3]) -> Option<Triangle> {
     let corner = |v: u32| positions.get(v as usize).copied().filter(|p| vec3::is_finite(*p));
     Some([corner(face[0])?, corner(face[1])?, corner(face[2])?])
 }
 
 /// Whether the triangle has area: exactly, its corners are not on one line.
-pub(super) fn has_area(triangle: &Triangle) -> bool {
+pub(crate) fn has_area(triangle: &Triangle) -> bool {
     flat_axis(triangle).is_some()
 }
 
