@@ -26,6 +26,7 @@ pub mod mesh;
 pub mod operators;
 pub mod query;
 pub mod real;
+mod rows;
 pub mod transform;
 pub mod vec3;
 

@@ -18,7 +18,7 @@
 //! | layer distance | `3M(r + D)²` | `d_inner < r`, `d_outer ≥ −D`, `M` vertices at most per bucket |
 
 use super::bending;
-use super::holding::HeightRow;
+use super::garment_term::HeightRow;
 use super::{EnergySettings, LayerContact, SceneEnergy, Term, layer_collision, repulsion};
 use crate::mesh::{Topology, TriMesh};
 use crate::real::Real;

@@ -11,7 +11,7 @@ use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
 use super::pseudo_normal::PseudoNormals;
 use super::triangle_point::{Feature, box_distance_squared, closest_on_triangle};
 use super::triangle_tree::TriangleTree;
-use crate::mesh::FacesAtVertex;
+use crate::rows::{CompressedRows, faces_at_vertices};
 use crate::vec3;
 
 /// The point of a surface closest to a query point.
@@ -59,7 +59,7 @@ pub struct ClosestPoint {
     bvh: Bvh,
     /// Leaf of the tree → face; none for one that is never closest.
     leaves: Vec<Option<u32>>,
-    at_vertex: FacesAtVertex,
+    at_vertex: CompressedRows<u32>,
 }
 
 impl std::fmt::Debug for ClosestPoint {
@@ -92,7 +92,7 @@ impl ClosestPoint {
     }
 
     fn on_tree(positions: Vec<[f64; 3]>, faces: Vec<[u32; 3]>, bvh: Bvh, leaves: Vec<Option<u32>>) -> Self {
-        let at_vertex = FacesAtVertex::of_some(positions.len(), &faces, leaves.iter().flatten().copied());
+        let at_vertex = faces_at_vertices(positions.len(), &faces, leaves.iter().flatten().copied());
         Self { positions, faces, bvh, leaves, at_vertex }
     }
 

@@ -14,7 +14,7 @@ mod union;
 mod winding_number;
 
 pub use closest_point::{ClosestPoint, SurfacePoint};
-pub use closest_vertex::{KdScalar, VertexIndex};
+pub use closest_vertex::VertexIndex;
 pub use surface::{Distance, Gap, Surface};
 pub use triangle_point::Feature;
 pub(crate) use triangle_point::closest_on_triangle;

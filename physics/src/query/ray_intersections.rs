@@ -1,5 +1,6 @@
 //! Winding numbers of closed surfaces, by the faces that a ray intersects.
 
+use crate::rows::CompressedRows;
 use crate::vec3::{cross, dot, sub};
 
 /// Cells of the grid for each face, at most…
@@ -79,9 +80,8 @@ fn is_left(a: [f64; 3], b: [f64; 3], p: [f64; 3]) -> bool {
 #[derive(Debug)]
 struct Columns {
     axes: [Axis; 2],
-    /// Where the faces of a cell begin, and one entry more.
-    first: Vec<u32>,
-    faces: Vec<u32>,
+    /// The faces of every cell.
+    faces: CompressedRows<u32>,
 }
 
 /// One side of the grid.
@@ -143,29 +143,14 @@ impl Columns {
         let cells = |[[low, high], [left, right]]: [[usize; 2]; 2]| {
             (low..=high).flat_map(move |row| (left..=right).map(move |column| row * axes[1].count + column))
         };
-        let mut first = vec![0; axes[0].count * axes[1].count + 1];
-        for cell in ranges.clone().flat_map(cells) {
-            first[cell + 1] += 1;
-        }
-        for cell in 1..first.len() {
-            first[cell] += first[cell - 1];
-        }
-        let mut next = first.clone();
-        let mut faces = vec![0; first[first.len() - 1] as usize];
-        for (face, range) in (0u32..).zip(ranges) {
-            for cell in cells(range) {
-                faces[next[cell] as usize] = face;
-                next[cell] += 1;
-            }
-        }
-        Self { axes, first, faces }
+        let keyed = (0u32..).zip(ranges).flat_map(|(face, range)| cells(range).map(move |cell| (cell, face)));
+        Self { axes, faces: CompressedRows::grouped(axes[0].count * axes[1].count, keyed) }
     }
 
     /// The faces in the cell of `p`, among them all whose box it is in.
     fn at(&self, p: [f64; 3]) -> &[u32] {
         let [row, column] = [0, 1].map(|k| self.axes[k].cell(p[k + 1]));
-        let cell = row * self.axes[1].count + column;
-        &self.faces[self.first[cell] as usize..self.first[cell + 1] as usize]
+        self.faces.row(row * self.axes[1].count + column)
     }
 }
 
@@ -230,7 +215,8 @@ mod tests {
         assert_eq!(rays.winding_number([0.3, 0.2, 0.1]), 401);
         assert_eq!(rays.winding_number([0.3, 0.2, 0.2]), 400);
         assert_eq!(rays.winding_number([100.0, 0.2, 0.1]), 0);
-        assert!(rays.columns.faces.len() <= ENTRIES_PER_FACE * mesh.faces().len());
+        let cells = &rays.columns.faces;
+        assert!(cells.range(cells.len() - 1).end <= ENTRIES_PER_FACE * mesh.faces().len());
     }
 
     #[test]

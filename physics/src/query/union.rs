@@ -13,7 +13,8 @@
 use super::ray_intersections::RayIntersections;
 use super::triangle_tree::TriangleTree;
 use super::{ClosestPoint, SurfacePoint};
-use crate::mesh::{DisjointSets, FacesAtVertex};
+use crate::mesh::DisjointSets;
+use crate::rows::faces_at_vertices;
 use crate::vec3::{self, add, add_scaled, dot, normalized, scale, sub};
 
 /// How far outside a triangle the side of its piece is asked for (m).
@@ -140,12 +141,12 @@ fn at_the_end(vertices: usize, faces: &[[u32; 3]], part: &[u32]) -> Vec<bool> {
 /// Which of some faces that are no seam have the outside of the union before them and its inside behind them. Those that are
 /// `isolated` are asked one by one.
 fn exposed(all: &RayIntersections, faces: &[[u32; 3]], is_seam: &[bool], is_isolated: &[bool]) -> Vec<bool> {
-    let at_vertex = FacesAtVertex::new(all.positions().len(), faces);
+    let at_vertex = faces_at_vertices(all.positions().len(), faces, 0..faces.len() as u32);
     let mut pieces = DisjointSets::new(faces.len());
     let is_joined = |f: u32| !is_seam[f as usize] && !is_isolated[f as usize];
     for (f, [a, b, c]) in (0u32..).zip(faces).filter(|(f, _)| is_joined(*f)) {
         for (from, to) in [(*a, *b), (*b, *c), (*c, *a)] {
-            let beside = at_vertex.of(from).iter().filter(|&&g| g > f && is_joined(g));
+            let beside = at_vertex.row(from as usize).iter().filter(|&&g| g > f && is_joined(g));
             beside.filter(|&&g| faces[g as usize].contains(&to)).for_each(|&g| pieces.join(f, g));
         }
     }

@@ -2,7 +2,8 @@
 
 use crate::contact::LayerTopology;
 use crate::energy::{EnergySettings, Material, strain::Strain};
-use crate::mesh::{FacesAtVertex, Topology, TriMesh};
+use crate::mesh::{Topology, TriMesh};
+use crate::rows::{CompressedRows, faces_at_vertices};
 use crate::vec3::{norm, sub};
 
 /// Everything about a garment that its positions do not change: made once, used for every frame and body.
@@ -15,7 +16,7 @@ pub struct RestGarment {
     /// For every face, the topology's edges between its corners k and k+1.
     pub(super) edges_of_faces: Vec<[u32; 3]>,
     pub(super) layer: LayerTopology,
-    faces_at: FacesAtVertex,
+    faces_at: CompressedRows<u32>,
     strain: Strain,
 }
 
@@ -34,7 +35,7 @@ impl RestGarment {
         let layer = LayerTopology::new(&topology, &edges_of_faces);
         let at = |v: u32| rest.positions()[v as usize];
         let edge_lengths = topology.edges.iter().map(|&[a, b]| norm(sub(at(a), at(b)))).collect();
-        let faces_at = FacesAtVertex::new(rest.vertex_count(), &faces);
+        let faces_at = faces_at_vertices(rest.vertex_count(), &faces, 0..faces.len() as u32);
         let strain = Strain::new(rest, &Material::default(), EnergySettings::default().needle_ratio);
         Self { faces, topology, edge_lengths, edges_of_faces, layer, faces_at, strain }
     }
@@ -51,7 +52,7 @@ impl RestGarment {
 
     /// Faces around vertex `v`, ascending.
     pub(super) fn faces_of(&self, v: u32) -> &[u32] {
-        self.faces_at.of(v)
+        self.faces_at.row(v as usize)
     }
 
     /// Strain energy at `positions` `[V, 3]` [J], of the default material.

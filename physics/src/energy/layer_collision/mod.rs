@@ -9,23 +9,13 @@ pub mod nearest_vertex;
 
 use std::sync::Arc;
 
-use super::{CurvatureSink, EnergySettings, Weighted};
+use super::{CurvatureSink, EnergySettings, LayerContact, Weighted};
 use crate::mesh::{Topology, TriMesh};
 use crate::query::ClosestPoint;
 use crate::real::Real;
 use crate::vec3::to_f64;
 use closest_point::InnerCloth;
 use nearest_vertex::{InnerVertices, PosedVertices};
-
-/// How the signed distance of an outer vertex to an inner garment is measured.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum LayerContact {
-    /// `(x − x_g)·n_g` with the nearest vertex `g` and its area-weighted normal: the paper's form.
-    #[default]
-    NearestVertex,
-    /// The distance to the closest point of the surface.
-    ClosestPoint,
-}
 
 /// What stays the same of a garment that others lie on.
 #[derive(Debug, Clone)]

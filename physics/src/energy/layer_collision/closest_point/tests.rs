@@ -1,8 +1,9 @@
 //! The closest-point form against brute force, and where the paper's form jumps. Its gradient and its curvature are checked with
 //! all others.
 
-use super::super::{InnerLayer, LayerContact};
+use super::super::InnerLayer;
 use super::*;
+use crate::energy::LayerContact;
 use crate::mesh::shapes::{self, SplitMix};
 use crate::query::brute_force;
 use crate::vec3::norm;
