@@ -2,6 +2,8 @@
 
 use super::body::{with_body, with_drawn};
 use super::certificate::Certificate;
+use super::garment::{at, check};
+use super::near::MARGIN;
 use super::obstacle::BodyObstacle;
 use super::{Layer, ResolveError};
 use crate::contact::{
@@ -9,13 +11,14 @@ use crate::contact::{
     all_layers,
 };
 use crate::query::Surface;
+use crate::vec3;
 
 /// Counts what intersects what. `layers` from the body outwards. The same for any number of threads.
 ///
 /// # Errors
 /// When positions do not fit their garment or are not finite, or the body has no surface.
 pub fn certify(body: &Surface<f64>, layers: &[Layer<'_>]) -> Result<Certificate, ResolveError> {
-    super::check(body, layers)?;
+    check(body, layers)?;
     Ok(certified_around(body, layers))
 }
 
@@ -65,4 +68,23 @@ impl ReportBody for BodyObstacle<'_> {
     fn is_pinched_at(&self, triangle: &Triangle) -> bool {
         self.is_pinch_at(triangle)
     }
+}
+
+/// The certificate of garments that went from `layers`, near which the body is `drawn`, to `positions`.
+pub(super) fn certified(
+    drawn: &BodyObstacle<'_>,
+    layers: &[Layer<'_>],
+    positions: &[Vec<[f64; 3]>],
+) -> Certificate {
+    let now = at(layers, positions);
+    match is_near(layers, positions) {
+        true => certificate(drawn, &now),
+        false => certified_around(drawn.surface, &now),
+    }
+}
+
+/// Whether nothing moved so far from `layers` that it could meet more of the body than what is near those.
+pub(super) fn is_near(layers: &[Layer<'_>], positions: &[Vec<[f64; 3]>]) -> bool {
+    let is_near = |(p, q): (&[f64; 3], &[f64; 3])| vec3::norm(vec3::sub(*q, *p)) <= MARGIN;
+    layers.iter().zip(positions).all(|(layer, moved)| layer.positions.iter().zip(moved).all(is_near))
 }

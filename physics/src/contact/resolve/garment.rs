@@ -1,10 +1,15 @@
 //! A garment as the post-process sees it: what its positions do not change, and where it is.
 
+use super::ResolveError;
 use crate::contact::LayerTopology;
 use crate::energy::{EnergySettings, Material, strain::Strain};
 use crate::mesh::{Topology, TriMesh};
+use crate::query::Surface;
 use crate::rows::{CompressedRows, faces_at_vertices};
-use crate::vec3::{norm, sub};
+use crate::vec3::{self, norm, sub};
+
+/// Positions farther from the origin than this are refused [m]: the exact predicates would hold, but no distance would.
+const FARTHEST: f64 = 1e3;
 
 /// Everything about a garment that its positions do not change: made once, used for every frame and body.
 #[derive(Debug)]
@@ -71,4 +76,33 @@ pub struct Layer<'a> {
     pub garment: &'a RestGarment,
     /// Where it is, `[V, 3]` [m].
     pub positions: &'a [[f64; 3]],
+}
+
+/// The same garments elsewhere.
+pub(super) fn at<'a>(layers: &[Layer<'a>], positions: &'a [Vec<[f64; 3]>]) -> Vec<Layer<'a>> {
+    layers.iter().zip(positions).map(|(l, positions)| Layer { garment: l.garment, positions }).collect()
+}
+
+/// Positions and faces of every garment.
+pub(super) fn triangles<'a>(layers: &[Layer<'a>]) -> Vec<(&'a [[f64; 3]], &'a [[u32; 3]])> {
+    layers.iter().map(|l| (l.positions, l.garment.faces.as_slice())).collect()
+}
+
+/// Whether the input can be worked on.
+pub(super) fn check(body: &Surface<f64>, layers: &[Layer<'_>]) -> Result<(), ResolveError> {
+    let is_near = |p: &[f64; 3]| vec3::is_finite(*p) && p.iter().all(|x| x.abs() <= FARTHEST);
+    let is_whole = |f: &[u32; 3]| f.iter().all(|&v| body.positions.get(v as usize).is_some_and(is_near));
+    if !body.faces.iter().any(is_whole) {
+        return Err(ResolveError::EmptyBody);
+    }
+    for (garment, layer) in layers.iter().enumerate() {
+        let (expected, found) = (layer.garment.vertex_count(), layer.positions.len());
+        if expected != found {
+            return Err(ResolveError::Count { garment, expected, found });
+        }
+        if let Some(vertex) = layer.positions.iter().position(|p| !is_near(p)) {
+            return Err(ResolveError::Position { garment, vertex, position: layer.positions[vertex] });
+        }
+    }
+    Ok(())
 }
