@@ -3,8 +3,8 @@
 use crate::dataset::{PreparedBody, PreparedGarment, PreparedScene};
 use burn::tensor::Device;
 use clothcombo_model::{ContactFeatureTensors, Mode};
+use clothcombo_physics::contact_features::{ContactFeatures, DIRECTIONS, FEATURES, Rings};
 use clothcombo_physics::energy::SceneEnergy;
-use clothcombo_physics::sensing::{DIRECTIONS, FEATURES, Rings, Sensed, sense};
 use std::sync::Arc;
 
 /// Whether the garments of a scene interact.
@@ -57,7 +57,8 @@ pub fn contact_features(
     device: &Device,
 ) -> ContactFeatureTensors {
     let rings: Vec<&Rings> = scene.garments.iter().map(|garment| &garment.rings).collect();
-    let Sensed { features, directions } = sense(&body.energy, &rings, posed, contacts);
+    let ContactFeatures { features, directions } =
+        ContactFeatures::new(&body.energy, &rings, posed, contacts);
     let directions = directions.map(|posed| unposed(scene, body, &posed));
     ContactFeatureTensors::new(features, directions.each_ref().map(Vec::as_slice), device)
         .expect("every vertex of the scene has its features")

@@ -6,9 +6,8 @@ use parry3d_f64::math::Vector;
 use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhNode, BvhWorkspace};
 use rayon::prelude::*;
 
-use crate::query::{box_distance_squared, closest_on_triangle};
-
 use super::triangle_pair::{Triangle, corners, has_area, mesh_triangles_intersect, triangles_intersect};
+use super::triangle_point::{box_distance_squared, closest_on_triangle};
 
 /// A mesh in a state, ready for intersection tests: positions `[V, 3]` (m), faces `[F, 3]`, and a tree over the faces.
 ///
@@ -24,7 +23,7 @@ pub struct TriangleTree<'a> {
 
 /// The tree of a [`TriangleTree`] without the mesh, to be kept while that moves.
 #[derive(Default)]
-pub(super) struct KeptTree {
+pub(crate) struct KeptTree {
     bvh: Bvh,
     kept: Vec<u32>,
 }
@@ -59,7 +58,7 @@ impl<'a> TriangleTree<'a> {
 
     /// As [`new`](Self::new), with the tree of the same faces elsewhere, whose boxes are fitted anew in O(F): for meshes that are
     /// still in about the same shape. Pairs are the same.
-    pub(super) fn refitted(tree: KeptTree, positions: &'a [[f64; 3]], faces: &'a [[u32; 3]]) -> Self {
+    pub(crate) fn refitted(tree: KeptTree, positions: &'a [[f64; 3]], faces: &'a [[u32; 3]]) -> Self {
         let KeptTree { mut bvh, kept } = tree;
         let boxes = triangle_boxes(positions, faces);
         if !boxes.iter().map(|(face, _)| face).eq(&kept) {
@@ -73,7 +72,7 @@ impl<'a> TriangleTree<'a> {
     }
 
     /// The tree alone, for [`refitted`](Self::refitted).
-    pub(super) fn into_kept(self) -> KeptTree {
+    pub(crate) fn into_kept(self) -> KeptTree {
         KeptTree { bvh: self.bvh, kept: self.kept }
     }
 
@@ -115,7 +114,7 @@ impl<'a> TriangleTree<'a> {
 
     /// Pairs (face of another mesh, face of this one that is `asked` for) that share a point, for some `faces` of the other mesh
     /// with `positions` and `all_faces`; in ascending order.
-    pub(super) fn pairs_of_faces(
+    pub(crate) fn pairs_of_faces(
         &self,
         positions: &[[f64; 3]],
         all_faces: &[[u32; 3]],
@@ -152,7 +151,7 @@ impl<'a> TriangleTree<'a> {
     }
 
     /// Those of [`self_pairs`](Self::self_pairs) in which one of `faces` takes part.
-    pub(super) fn self_pairs_of_faces(&self, faces: &[u32]) -> Vec<(u32, u32)> {
+    pub(crate) fn self_pairs_of_faces(&self, faces: &[u32]) -> Vec<(u32, u32)> {
         if self.bvh.is_empty() {
             return Vec::new();
         }
@@ -183,13 +182,13 @@ impl<'a> TriangleTree<'a> {
     }
 
     /// Faces whose box meets the box from `low` to `high`, in no particular order.
-    pub(super) fn faces_in_box(&self, low: [f64; 3], high: [f64; 3]) -> impl Iterator<Item = u32> {
+    pub(crate) fn faces_in_box(&self, low: [f64; 3], high: [f64; 3]) -> impl Iterator<Item = u32> {
         let probe = BvhNode::leaf(Aabb::new(Vector::from_array(low), Vector::from_array(high)), 0);
         self.bvh.leaves(move |node| node.intersects(&probe)).map(|leaf| self.kept[leaf as usize])
     }
 
     /// How far `p` is from the nearest of the faces that `may_be`, if that is nearer than `reach`.
-    pub(super) fn nearest(
+    pub(crate) fn nearest(
         &self,
         p: [f64; 3],
         reach: f64,
@@ -235,12 +234,12 @@ impl<'a> TriangleTree<'a> {
     }
 
     /// Corner indices of a face of the tree.
-    pub(super) fn face(&self, face: u32) -> [u32; 3] {
+    pub(crate) fn face(&self, face: u32) -> [u32; 3] {
         self.faces.get(face as usize).copied().unwrap_or([u32::MAX; 3])
     }
 
     /// Corners of a face of the tree.
-    pub(super) fn triangle(&self, face: u32) -> Option<Triangle> {
+    pub(crate) fn triangle(&self, face: u32) -> Option<Triangle> {
         corners(self.positions, self.face(face))
     }
 }

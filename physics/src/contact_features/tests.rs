@@ -6,13 +6,13 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 /// Garments of the given shapes at rest, on a body.
-struct Outfit {
+struct TestScene {
     scene: SceneEnergy<f32>,
     rings: Vec<Rings>,
     posed: Vec<[f32; 3]>,
 }
 
-impl Outfit {
+impl TestScene {
     fn new(body: &TriMesh, garments: &[TriMesh]) -> Self {
         let settings = EnergySettings::default();
         let topologies: Vec<Topology> = garments.iter().map(Topology::new).collect();
@@ -33,8 +33,8 @@ impl Outfit {
         Self { scene, rings, posed: positions.map(|p| p.map(|x| x as f32)).collect() }
     }
 
-    fn sense(&self, contacts: &[(usize, usize)]) -> Sensed {
-        sense(&self.scene, &self.rings.iter().collect::<Vec<_>>(), &self.posed, contacts)
+    fn features(&self, interactions: &[(usize, usize)]) -> ContactFeatures {
+        ContactFeatures::new(&self.scene, &self.rings.iter().collect::<Vec<_>>(), &self.posed, interactions)
     }
 
     fn strain(&self) -> f64 {
@@ -49,51 +49,51 @@ fn spheres(radii: [f64; 2]) -> [TriMesh; 2] {
     radii.map(|radius| shapes::icosphere(radius, 4))
 }
 
-/// What row `v` feels itself of the garments under it and over it.
-fn own(sensed: &Sensed, v: usize) -> [&[f32]; 2] {
-    let row = &sensed.features[FEATURES * v..FEATURES * (v + 1)];
-    [&row[..7], &row[7..14]]
+/// The local features of row `v`: of the garments under it and over it.
+fn local(found: &ContactFeatures, v: usize) -> [&[f32]; 2] {
+    let row = &found.features[FEATURES * v..FEATURES * (v + 1)];
+    [&row[..LAYER_FEATURES], &row[LAYER_FEATURES..2 * LAYER_FEATURES]]
 }
 
 #[test]
-fn a_centimetre_of_air_is_felt_from_both_sides() {
+fn a_centimetre_of_air_is_a_feature_of_both_garments() {
     let body = shapes::icosphere(0.09, 4);
-    let outfit = Outfit::new(&body, &spheres([0.10, 0.11]));
-    let sensed = outfit.sense(&[(0, 1)]);
-    let count = outfit.posed.len() / 2;
-    assert_eq!(sensed.features.len(), 2 * count * FEATURES);
+    let scene = TestScene::new(&body, &spheres([0.10, 0.11]));
+    let found = scene.features(&[(0, 1)]);
+    let count = scene.posed.len() / 2;
+    assert_eq!(found.features.len(), 2 * count * FEATURES);
     for v in 0..count {
-        let [[_, none, _, nothing, ..], over] = own(&sensed, v) else { panic!("seven numbers") };
+        let [[_, none, _, nothing, ..], over] = local(&found, v) else { panic!("seven numbers") };
         assert_eq!((*none, *nothing), (0.0, MOST as f32), "the inner one has none under it");
         assert!((over[3] - 1.0).abs() < CURVED, "{over:?}");
-        let [under, [_, none, ..]] = own(&sensed, count + v) else { panic!("seven numbers") };
+        let [under, [_, none, ..]] = local(&found, count + v) else { panic!("seven numbers") };
         assert!((under[3] - 1.0).abs() < CURVED && under[0] == 0.0 && *none == 0.0, "{under:?}");
-        let radial = normalized(to_f64(outfit.posed[count + v]));
-        assert!(distance_squared(to_f64(sensed.directions[0][count + v]), radial) < 1e-3);
-        assert!(distance_squared(to_f64(sensed.directions[2][count + v]), radial) < 1e-3);
-        assert_eq!(sensed.directions[1][count + v], [0.0; 3]);
+        let radial = normalized(to_f64(scene.posed[count + v]));
+        assert!(distance_squared(to_f64(found.directions[0][count + v]), radial) < 1e-3);
+        assert!(distance_squared(to_f64(found.directions[2][count + v]), radial) < 1e-3);
+        assert_eq!(found.directions[1][count + v], [0.0; 3]);
     }
-    let gap = |v: usize| sensed.features[FEATURES * v + 14];
+    let gap = |v: usize| found.features[FEATURES * v + 14];
     assert!((0..count).all(|v| (gap(v) - 1.0).abs() < CURVED && (gap(count + v) - 2.0).abs() < CURVED));
 }
 
 #[test]
-fn what_is_missing_to_the_right_side_is_felt_by_both() {
-    let outfit = Outfit::new(&shapes::icosphere(0.05, 3), &spheres([0.11, 0.10]));
-    let sensed = outfit.sense(&[(0, 1)]);
-    let count = outfit.posed.len() / 2;
+fn what_is_missing_to_the_right_order_is_a_feature_of_both() {
+    let scene = TestScene::new(&shapes::icosphere(0.05, 3), &spheres([0.11, 0.10]));
+    let found = scene.features(&[(0, 1)]);
+    let count = scene.posed.len() / 2;
     for v in 0..count {
         // A centimetre and the height wanted, by how near the sheet is.
         let expected = 1.4 * (1.0_f32 - 0.01 / 0.08).powi(2);
-        for felt in [own(&sensed, v)[1], own(&sensed, count + v)[0]] {
-            assert!((felt[0] - expected).abs() < CURVED && felt[0] == felt[1], "{felt:?}");
-            assert!((felt[3] + 1.0).abs() < CURVED);
+        for side in [local(&found, v)[1], local(&found, count + v)[0]] {
+            assert!((side[0] - expected).abs() < CURVED && side[0] == side[1], "{side:?}");
+            assert!((side[3] + 1.0).abs() < CURVED);
         }
     }
 }
 
 #[test]
-fn it_does_not_matter_where_the_scene_is() {
+fn rigid_motions_change_no_feature() {
     let (sine, cosine) = 0.7_f64.sin_cos();
     let moved =
         |p: [f64; 3]| [cosine * p[0] - sine * p[2] + 0.3, p[1] - 0.8, sine * p[0] + cosine * p[2] + 0.1];
@@ -106,10 +106,10 @@ fn it_does_not_matter_where_the_scene_is() {
     };
     let garments = [shapes::tube(0.1, 0.3, 24, 14), shapes::tube(0.105, 0.2, 20, 12)].map(bumpy);
     let body = bumpy(shapes::tube(0.08, 0.5, 20, 30));
-    let here = Outfit::new(&body, &garments).sense(&[(0, 1)]);
+    let here = TestScene::new(&body, &garments).features(&[(0, 1)]);
     let there =
-        Outfit::new(&shapes::mapped(&body, moved), &garments.each_ref().map(|g| shapes::mapped(g, moved)))
-            .sense(&[(0, 1)]);
+        TestScene::new(&shapes::mapped(&body, moved), &garments.each_ref().map(|g| shapes::mapped(g, moved)))
+            .features(&[(0, 1)]);
     for (a, b) in here.features.iter().zip(&there.features) {
         assert!((a - b).abs() < 2e-3, "{a} {b}");
     }
@@ -121,7 +121,7 @@ fn it_does_not_matter_where_the_scene_is() {
 }
 
 #[test]
-fn far_cloth_and_cloth_that_faces_the_other_way_are_not_felt() {
+fn far_cloth_and_cloth_that_faces_backwards_count_for_nothing() {
     let sheet = shapes::grid(0.2, 0.2, 11, 11);
     let at = |height: f64, flip: bool| {
         let moved = shapes::mapped(&sheet, |p| [p[0], p[1], p[2] + height]);
@@ -129,8 +129,8 @@ fn far_cloth_and_cloth_that_faces_the_other_way_are_not_felt() {
     };
     let body = shapes::tetrahedron();
     let near = |other: TriMesh| {
-        let sensed = Outfit::new(&body, &[sheet.clone(), other]).sense(&[(0, 1)]);
-        own(&sensed, 60)[1][2]
+        let found = TestScene::new(&body, &[sheet.clone(), other]).features(&[(0, 1)]);
+        local(&found, 60)[1][2]
     };
     assert!(near(at(0.01, false)) > 0.5);
     assert_eq!(near(at(0.01, true)), 0.0);
@@ -141,14 +141,13 @@ fn far_cloth_and_cloth_that_faces_the_other_way_are_not_felt() {
 fn height_over_a_plane_is_exact_and_beyond_the_hem_is_beside() {
     let sheet = shapes::mapped(&shapes::irregular_grid(0.4, 0.4, 21, 21, 0.3, 2), |p| [p[0], p[1], 0.0]);
     let rings = Rings::new(&Topology::new(&sheet));
-    let sheet =
-        Sheet { surface: Surface::from_mesh(&sheet), rings: &rings, median_edge: sheet.median_edge_length() };
+    let sheet = PosedGarment::new(Surface::from_mesh(&sheet), &rings, sheet.median_edge_length());
     for k in 0..40 {
         let (sine, cosine) = (TAU * f64::from(k) / 40.0).sin_cos();
         let p = [0.2 + 0.15 * cosine, 0.2 + 0.15 * sine, 0.02 * sine];
-        let felt = height(&sheet, p, [0.0, 0.0, 1.0]).expect("the sheet is near");
-        assert!((felt.height - p[2]).abs() < 1e-6);
-        assert!(felt.beside < 0.01, "within half an edge: {}", felt.beside);
+        let found = height(&sheet, p, [0.0, 0.0, 1.0]).expect("the sheet is near");
+        assert!((found.height - p[2]).abs() < 1e-6);
+        assert!(found.beside < 0.01, "within half an edge: {}", found.beside);
     }
     let beyond = height(&sheet, [-0.05, 0.2, 0.01], [0.0, 0.0, 1.0]).expect("the hem is near");
     assert!((beyond.height - 0.01).abs() < 1e-6 && (0.05..0.08).contains(&beyond.beside));
@@ -156,18 +155,18 @@ fn height_over_a_plane_is_exact_and_beyond_the_hem_is_beside() {
 
 #[test]
 fn a_vertex_that_is_nowhere_spoils_no_other() {
-    let mut outfit = Outfit::new(&shapes::icosphere(0.05, 3), &spheres([0.10, 0.11]));
-    let whole = outfit.sense(&[(0, 1)]);
-    outfit.posed[7] = [f32::NAN, 0.0, 0.0];
-    let sensed = outfit.sense(&[(0, 1)]);
-    assert_eq!(sensed.features.len(), whole.features.len());
-    let count = outfit.posed.len() / 2;
+    let mut scene = TestScene::new(&shapes::icosphere(0.05, 3), &spheres([0.10, 0.11]));
+    let whole = scene.features(&[(0, 1)]);
+    scene.posed[7] = [f32::NAN, 0.0, 0.0];
+    let found = scene.features(&[(0, 1)]);
+    assert_eq!(found.features.len(), whole.features.len());
+    let count = scene.posed.len() / 2;
     let p = spheres([0.10, 0.11])[0].positions()[7].map(|x| -x);
-    let distance = |v: usize| distance_squared(to_f64(outfit.posed[v]), p);
+    let distance = |v: usize| distance_squared(to_f64(scene.posed[v]), p);
     let others = (0..count).filter(|v| *v != 7);
     let opposite = others.min_by(|a, b| distance(*a).total_cmp(&distance(*b))).expect("a vertex");
     let row = FEATURES * opposite..FEATURES * (opposite + 1);
-    assert_eq!(sensed.features[row.clone()], whole.features[row]);
+    assert_eq!(found.features[row.clone()], whole.features[row]);
 }
 
 #[test]
@@ -190,26 +189,27 @@ fn means_keep_constants_and_patches_are_two_edges_wide() {
 }
 
 #[test]
-fn cloth_at_rest_feels_no_force_and_stretched_cloth_is_led_back() {
+fn cloth_at_rest_has_no_forces_and_those_of_stretched_cloth_lead_back() {
     let sheet = shapes::irregular_grid(0.3, 0.3, 16, 16, 0.2, 3);
-    let mut outfit = Outfit::new(&shapes::tetrahedron(), std::slice::from_ref(&sheet));
-    let forces = |sensed: &Sensed| -> Vec<Vec<[f32; 3]>> { sensed.directions[OUTWARDS..].to_vec() };
-    let still = forces(&outfit.sense(&[])).concat().concat();
+    let mut scene = TestScene::new(&shapes::tetrahedron(), std::slice::from_ref(&sheet));
+    let forces =
+        |found: &ContactFeatures| -> Vec<Vec<[f32; 3]>> { found.directions[OUTWARD_DIRECTIONS..].to_vec() };
+    let still = forces(&scene.features(&[])).concat().concat();
     assert!(still.iter().all(|f| f.abs() < 1e-3));
     // Stretched by a tenth, and shaken by a millimetre.
     let mut random = shapes::SplitMix::new(4);
-    for p in &mut outfit.posed {
+    for p in &mut scene.posed {
         *p = p.map(|x| 1.1 * x + 1e-3 * random.symmetric() as f32);
     }
-    let before = outfit.strain();
-    let stretched = outfit.posed.clone();
-    for (scale, forces) in forces(&outfit.sense(&[])).into_iter().enumerate() {
-        outfit.posed = stretched.clone();
-        for (p, f) in outfit.posed.iter_mut().zip(&forces) {
+    let before = scene.strain();
+    let stretched = scene.posed.clone();
+    for (scale, forces) in forces(&scene.features(&[])).into_iter().enumerate() {
+        scene.posed = stretched.clone();
+        for (p, f) in scene.posed.iter_mut().zip(&forces) {
             // A fifth of the displacement that the force stands for.
             *p = std::array::from_fn(|k| p[k] + 0.2 * 0.002 * f[k]);
         }
-        assert!(outfit.strain() < 0.99 * before, "scale {scale}: {} of {before}", outfit.strain());
+        assert!(scene.strain() < 0.99 * before, "scale {scale}: {} of {before}", scene.strain());
         assert!(forces.iter().all(|f| norm(to_f64(*f)) < 5.0));
     }
 }

@@ -8,7 +8,7 @@ use crate::vec3::{norm, scale, to_f64, zero};
 const PASSES: [usize; 2] = [4, 16];
 /// Scales of the forces.
 pub(super) const SCALES: usize = 1 + PASSES.len();
-/// Unit of the displacements that forces stand for [m], and how many of it they come to at most.
+/// Unit of the displacements that forces stand for (m), and how many of it they come to at most.
 const UNIT: f64 = 0.002;
 const MOST: f64 = 5.0;
 

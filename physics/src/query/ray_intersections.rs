@@ -1,5 +1,6 @@
-//! Winding numbers of closed surfaces, by the faces that a ray crosses.
+//! Winding numbers of closed surfaces, by the faces that a ray intersects.
 
+use crate::rows::CompressedRows;
 use crate::vec3::{cross, dot, sub};
 
 /// Cells of the grid for each face, at most…
@@ -7,18 +8,18 @@ const CELLS_PER_FACE: f64 = 0.5;
 /// …and entries in them: larger faces are in more cells, and a coarser grid is taken then.
 const ENTRIES_PER_FACE: usize = 16;
 
-/// Winding numbers of a closed surface, by the faces that a ray along +x crosses.
+/// Winding numbers of a closed surface, by the faces that a ray along +x intersects.
 ///
-/// Which faces it crosses is decided edge by edge, each with the same numbers from both of its faces: on a closed surface no
-/// crossing is missed or counted twice, whatever the rounding.
+/// Which faces it intersects is decided edge by edge, each with the same numbers from both of its faces: on a closed surface no
+/// intersection is missed or counted twice, whatever the rounding.
 #[derive(Debug)]
-pub(super) struct Crossings {
+pub(super) struct RayIntersections {
     positions: Vec<[f64; 3]>,
     faces: Vec<[u32; 3]>,
     columns: Columns,
 }
 
-impl Crossings {
+impl RayIntersections {
     /// `positions` `[V, 3]` (m), `faces` `[F, 3]` whose corners are finite.
     pub fn new(positions: Vec<[f64; 3]>, faces: Vec<[u32; 3]>) -> Self {
         let columns = Columns::new(&positions, &faces);
@@ -43,11 +44,11 @@ impl Crossings {
 
     /// How many parts `p` is inside of, where none is inside out. In O(faces along the ray).
     pub fn winding_number(&self, p: [f64; 3]) -> i32 {
-        self.columns.at(p).iter().map(|&face| self.crossing(self.faces[face as usize], p)).sum()
+        self.columns.at(p).iter().map(|&face| self.turns(self.faces[face as usize], p)).sum()
     }
 
     /// 1 where the ray from `p` leaves through `face`, −1 where it enters, 0 where it misses.
-    fn crossing(&self, face: [u32; 3], p: [f64; 3]) -> i32 {
+    fn turns(&self, face: [u32; 3], p: [f64; 3]) -> i32 {
         let corners = self.corners(face);
         // The winding number of the projected triangle: its edges past y = p.y, seen from p.
         let turns: i32 = (0..3)
@@ -79,9 +80,8 @@ fn is_left(a: [f64; 3], b: [f64; 3], p: [f64; 3]) -> bool {
 #[derive(Debug)]
 struct Columns {
     axes: [Axis; 2],
-    /// Where the faces of a cell begin, and one entry more.
-    first: Vec<u32>,
-    faces: Vec<u32>,
+    /// The faces of every cell.
+    faces: CompressedRows<u32>,
 }
 
 /// One side of the grid.
@@ -143,29 +143,14 @@ impl Columns {
         let cells = |[[low, high], [left, right]]: [[usize; 2]; 2]| {
             (low..=high).flat_map(move |row| (left..=right).map(move |column| row * axes[1].count + column))
         };
-        let mut first = vec![0; axes[0].count * axes[1].count + 1];
-        for cell in ranges.clone().flat_map(cells) {
-            first[cell + 1] += 1;
-        }
-        for cell in 1..first.len() {
-            first[cell] += first[cell - 1];
-        }
-        let mut next = first.clone();
-        let mut faces = vec![0; first[first.len() - 1] as usize];
-        for (face, range) in (0u32..).zip(ranges) {
-            for cell in cells(range) {
-                faces[next[cell] as usize] = face;
-                next[cell] += 1;
-            }
-        }
-        Self { axes, first, faces }
+        let keyed = (0u32..).zip(ranges).flat_map(|(face, range)| cells(range).map(move |cell| (cell, face)));
+        Self { axes, faces: CompressedRows::grouped(axes[0].count * axes[1].count, keyed) }
     }
 
     /// The faces in the cell of `p`, among them all whose box it is in.
     fn at(&self, p: [f64; 3]) -> &[u32] {
         let [row, column] = [0, 1].map(|k| self.axes[k].cell(p[k + 1]));
-        let cell = row * self.axes[1].count + column;
-        &self.faces[self.first[cell] as usize..self.first[cell + 1] as usize]
+        self.faces.row(row * self.axes[1].count + column)
     }
 }
 
@@ -176,8 +161,8 @@ mod tests {
     use crate::mesh::shapes::{self, SplitMix};
     use crate::query::brute_force;
 
-    fn crossings(mesh: &TriMesh) -> Crossings {
-        Crossings::new(mesh.positions().to_vec(), mesh.faces().to_vec())
+    fn rays(mesh: &TriMesh) -> RayIntersections {
+        RayIntersections::new(mesh.positions().to_vec(), mesh.faces().to_vec())
     }
 
     fn at(mesh: TriMesh, by: [f64; 3]) -> TriMesh {
@@ -195,14 +180,14 @@ mod tests {
             ball(0.1, [0.1; 3]),
         ];
         let mesh = shapes::union(&parts.each_ref());
-        let crossings = crossings(&mesh);
+        let rays = rays(&mesh);
         let (mut random, mut seen) = (SplitMix::new(3), [0; 4]);
         let points: Vec<[f64; 3]> =
             (0..500).map(|_| std::array::from_fn(|_| 0.9 * random.symmetric())).collect();
         // Few random points lie in three balls at once.
         for p in points.into_iter().chain([[0.1; 3], [0.12, 0.09, 0.1]]) {
             let expected = brute_force::winding_number(mesh.positions(), mesh.faces(), p).round() as i32;
-            assert_eq!(crossings.winding_number(p), expected);
+            assert_eq!(rays.winding_number(p), expected);
             seen[expected as usize] += 1;
         }
         assert!(seen.iter().all(|&n| n > 0), "{seen:?}");
@@ -212,10 +197,10 @@ mod tests {
     #[test]
     fn a_ray_through_a_vertex_counts_once() {
         let octahedron = shapes::icosphere(0.5, 0);
-        let crossings = crossings(&octahedron);
+        let rays = rays(&octahedron);
         for p in octahedron.positions() {
-            assert_eq!(crossings.winding_number([-2.0, p[1], p[2]]), 0);
-            assert_eq!(crossings.winding_number([0.01, 0.3 * p[1], 0.3 * p[2]]), 1);
+            assert_eq!(rays.winding_number([-2.0, p[1], p[2]]), 0);
+            assert_eq!(rays.winding_number([0.01, 0.3 * p[1], 0.3 * p[2]]), 1);
         }
     }
 
@@ -226,11 +211,12 @@ mod tests {
             (0..400).map(|i| at(shapes::icosphere(5.0 + 0.01 * f64::from(i), 0), [0.0; 3])).collect();
         parts.push(at(shapes::icosphere(0.01, 4), [0.3, 0.2, 0.1]));
         let mesh = shapes::union(&parts.iter().collect::<Vec<_>>());
-        let crossings = crossings(&mesh);
-        assert_eq!(crossings.winding_number([0.3, 0.2, 0.1]), 401);
-        assert_eq!(crossings.winding_number([0.3, 0.2, 0.2]), 400);
-        assert_eq!(crossings.winding_number([100.0, 0.2, 0.1]), 0);
-        assert!(crossings.columns.faces.len() <= ENTRIES_PER_FACE * mesh.faces().len());
+        let rays = rays(&mesh);
+        assert_eq!(rays.winding_number([0.3, 0.2, 0.1]), 401);
+        assert_eq!(rays.winding_number([0.3, 0.2, 0.2]), 400);
+        assert_eq!(rays.winding_number([100.0, 0.2, 0.1]), 0);
+        let cells = &rays.columns.faces;
+        assert!(cells.range(cells.len() - 1).end <= ENTRIES_PER_FACE * mesh.faces().len());
     }
 
     #[test]
@@ -239,9 +225,9 @@ mod tests {
         for mesh in
             [shapes::mapped(&flat, |[x, y, _]| [x, y, 0.0]), shapes::mapped(&flat, |[x, y, _]| [x, 0.0, y])]
         {
-            assert_eq!(crossings(&mesh).winding_number([0.2, 0.3, -0.1]), 0);
+            assert_eq!(rays(&mesh).winding_number([0.2, 0.3, -0.1]), 0);
         }
-        let none = Crossings::new(vec![[0.0; 3]], Vec::new());
+        let none = RayIntersections::new(vec![[0.0; 3]], Vec::new());
         assert_eq!((none.winding_number([0.0; 3]), none.winding_number([f64::NAN; 3])), (0, 0));
     }
 }

@@ -1,7 +1,8 @@
-//! Which garments of a scene touch each other, and where: for the solver's curvature, and for the walls that contact has.
+//! Curvature of the weighted sum of a scene, and where its garments touch: what the static solver needs besides the gradient.
 
-use super::layer_collision::{InnerGarment, LayerContact, PosedInner};
-use super::{SceneEnergy, SceneLayers, Term};
+use super::curvature::{CurvatureSink, Scaled};
+use super::layer_collision::{InnerLayer, PosedInnerLayer};
+use super::{LayerContact, SceneEnergy, SceneLayers, Term};
 use crate::real::Real;
 
 /// One vertex near an inner garment.
@@ -18,10 +19,10 @@ pub struct LayerTouch {
 }
 
 /// A pair of garments, the inner one ready for queries.
-pub(super) struct Touching<'a, T: Real> {
+struct Touching<'a, T: Real> {
     pub pair: usize,
-    pub as_inner: &'a InnerGarment,
-    pub surface: PosedInner<T>,
+    pub as_inner: &'a InnerLayer,
+    pub surface: PosedInnerLayer<T>,
     pub outer: &'a [[T; 3]],
     /// Where the vertices of the inner and of the outer garment start.
     pub offsets: [usize; 2],
@@ -29,6 +30,31 @@ pub(super) struct Touching<'a, T: Real> {
 }
 
 impl<T: Real> SceneEnergy<T> {
+    /// A positive semidefinite approximation of the second derivatives of the weighted sum with respect to posed positions,
+    /// vertices numbered as in `posed`; with respect to canonical ones for the holding energy of garments that are not pulled
+    /// back. Of the layer terms only the collision by the closest point has one.
+    ///
+    /// # Panics
+    /// As [`evaluate`](Self::evaluate).
+    pub fn curvature(&self, posed: &[[T; 3]], canonical: &[[T; 3]], sink: &mut dyn CurvatureSink) {
+        for (i, (garment, range)) in self.garments.iter().zip(self.ranges()).enumerate() {
+            let offset = range.start;
+            let canonical = canonical.get(range.clone()).unwrap_or(&[]);
+            let shared = self.share(i, &posed[range], canonical, &|_, weight| weight != 0.0);
+            for (term, energy) in garment.energies.terms() {
+                let weight = garment.weights[term];
+                if weight > 0.0 {
+                    energy.curvature(&shared.state(), &mut Scaled { sink, offset, weight });
+                }
+            }
+        }
+        for touching in self.touching(posed) {
+            let Touching { as_inner, surface, outer, offsets, weight, .. } = touching;
+            let mut sink = Scaled { sink, offset: 0, weight };
+            as_inner.curvature(&surface, outer, &self.settings, offsets, &mut sink);
+        }
+    }
+
     /// Whether [`curvature`](Self::curvature) couples vertices that touch at the moment.
     pub fn couples_garments(&self) -> bool {
         self.layers.iter().any(|pair| self.couples(pair))
@@ -56,7 +82,7 @@ impl<T: Real> SceneEnergy<T> {
     }
 
     /// The pairs that [`couples_garments`](Self::couples_garments) is about.
-    pub(super) fn touching<'a>(&'a self, posed: &'a [[T; 3]]) -> impl Iterator<Item = Touching<'a, T>> {
+    fn touching<'a>(&'a self, posed: &'a [[T; 3]]) -> impl Iterator<Item = Touching<'a, T>> {
         let ranges = self.ranges();
         let pairs = self.layers.iter().enumerate();
         pairs.filter(|(_, pair)| self.couples(pair)).map(move |(number, pair)| {

@@ -1,15 +1,15 @@
-//! What is left of the gradient where contact has a kink.
+//! What is left of the gradient where contact is not smooth.
 //!
-//! The distance to a body has a kink wherever two of its parts are equally near: over a concave edge, in an armpit. A vertex
+//! The distance to a body has no derivative wherever two of its parts are equally near: over a concave edge, in an armpit. A vertex
 //! that comes to rest there is pushed by both parts, but the gradient knows only one of them and cannot vanish. The
 //! minimum is where *some* convex combination of the forces on all sides balances the rest: zero lies in Clarke's
 //! subdifferential. Contact acts on each vertex apart, so the element of smallest norm of that set is found vertex by
 //! vertex: the point nearest to the origin in the hull of the forces sampled within [`RADIUS`] (Goldstein's
-//! ε-subdifferential). Where the forces within that radius agree, there is no kink, and the gradient stays as it is.
+//! ε-subdifferential). Where the forces within that radius agree, the point is smooth, and the gradient stays as it is.
 //!
-//! The solver moves vertices along the kinks they rest on, not across: the energy is smooth there (the U-space of Lemaréchal,
-//! Oustry and Sagastizábal, "The U-Lagrangian of a convex function", 2000). A vertex that is driven against a kink nearby is
-//! put on it ([`onto_kinks`]), where it is kept as long as the forces on both sides balance.
+//! The solver moves vertices along the nonsmooth sets they rest on, not across: the energy is smooth there (the U-space of Lemaréchal,
+//! Oustry and Sagastizábal, "The U-Lagrangian of a convex function", 2000). A vertex that is driven against a nonsmooth point nearby is
+//! put on it ([`onto_nonsmooth_points`]), where it is kept as long as the forces on both sides balance.
 
 use rayon::prelude::*;
 
@@ -17,11 +17,11 @@ use crate::energy::{SceneEnergy, Term};
 use crate::query::closest_on_triangle;
 use crate::vec3::{add, add_scaled, cross, dot, norm, norm_squared, scale, sub};
 
-/// How near a kink has to be [m].
+/// How near a nonsmooth point has to be (m).
 const RADIUS: f64 = 1e-7;
 
 /// Forces that differ by more than this share of the larger one within the radius belong to different parts of the body.
-const KINK: f64 = 1e-2;
+const DIFFERENT: f64 = 1e-2;
 
 /// Corners of a cube and its face centres.
 const DIRECTIONS: [[f64; 3]; 14] = [
@@ -41,50 +41,50 @@ const DIRECTIONS: [[f64; 3]; 14] = [
     [-0.577, -0.577, -0.577],
 ];
 
-/// How far the kink that a vertex is driven against may be for the vertex to be put on it [m], nearest first.
+/// How far the nonsmooth point that a vertex is driven against may be for the vertex to be put on it (m), nearest first.
 const REACH: [f64; 3] = [1e-6, 1e-5, 1e-4];
 
-/// Distance over which the forces of a single part of the body may turn [m]: they do not by less than reach over this.
+/// Distance over which the forces of a single part of the body may turn (m): they do not by less than reach over this.
 const TURN: f64 = 1e-3;
 
-/// Most parts of the body that are looked at in one kink.
+/// Most parts of the body that are looked at in one nonsmooth point.
 const MOST_SIDES: usize = 6;
 
-/// Halvings of the way to a kink.
+/// Halvings of the distance to a nonsmooth point.
 const HALVINGS: usize = 40;
 
 /// Directions whose rest after projection is shorter than this share are dependent on those before.
 const INDEPENDENT: f64 = 1e-2;
 
-/// A vertex that rests on a kink of the body collision.
-pub(super) struct Kink {
+/// A vertex that rests where the body collision is not smooth.
+pub(super) struct NonsmoothPoint {
     vertex: usize,
     /// The subgradient of smallest norm.
     gradient: [f64; 3],
-    /// Orthonormal directions across the kink, along which the forces that balance in it differ; a vertex that is driven
-    /// off the kink to one side has none.
+    /// Orthonormal directions across the nonsmooth set, along which the forces that balance in it differ; a vertex that is
+    /// driven off to one side has none.
     across: Vec<[f64; 3]>,
 }
 
-impl Kink {
+impl NonsmoothPoint {
     /// A vertex that is not to move at all.
     pub(super) fn held(vertex: usize, gradient: [f64; 3]) -> Self {
         Self { vertex, gradient, across: vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] }
     }
 
-    /// `x` without its part across the kink.
+    /// `x` without its part across the nonsmooth set.
     fn along(&self, x: [f64; 3]) -> [f64; 3] {
         self.across.iter().fold(x, |x, m| add_scaled(x, -dot(x, *m), *m))
     }
 }
 
-/// The vertices of `posed` that rest on a kink and whose part of `gradient`, which is that at `posed`, is longer than `least`.
-pub(super) fn kinks(
+/// The vertices of `posed` that rest on a nonsmooth point and whose part of `gradient`, which is that at `posed`, is longer than `least`.
+pub(super) fn nonsmooth_points(
     energy: &SceneEnergy<f64>,
     posed: &[[f64; 3]],
     gradient: &[[f64; 3]],
     least: f64,
-) -> Vec<Kink> {
+) -> Vec<NonsmoothPoint> {
     let at = |vertex: usize, force: &dyn Fn([f64; 3]) -> [f64; 3]| {
         let here = force(posed[vertex]);
         if here == [0.0; 3] {
@@ -111,13 +111,13 @@ pub(super) fn kinks(
                 across.push(scale(left, 1.0 / norm(left)));
             }
         }
-        Some(Kink { vertex, gradient: smallest, across })
+        Some(NonsmoothPoint { vertex, gradient: smallest, across })
     };
     in_contact(energy, gradient, least, at)
 }
 
-/// Where vertices that are driven against a kink nearby would rest on it.
-pub(super) fn onto_kinks(
+/// Where vertices that are driven against a nonsmooth point nearby would rest on it.
+pub(super) fn onto_nonsmooth_points(
     energy: &SceneEnergy<f64>,
     posed: &[[f64; 3]],
     gradient: &[[f64; 3]],
@@ -132,8 +132,8 @@ pub(super) fn onto_kinks(
         let beyond = |length: f64| force(add_scaled(posed[vertex], length, downhill));
         let mut near = 0.0;
         for reach in REACH {
-            // The forces turn a little with every step; a kink turns them at once.
-            let is_beyond = |length: f64| differ_by(beyond(length), here, KINK + reach / TURN);
+            // The forces turn a little with every step; a nonsmooth point turns them at once.
+            let is_beyond = |length: f64| differ_by(beyond(length), here, DIFFERENT + reach / TURN);
             if !is_beyond(reach) {
                 near = reach;
                 continue;
@@ -143,10 +143,10 @@ pub(super) fn onto_kinks(
                 let middle = 0.5 * (near + far);
                 if is_beyond(middle) { far = middle } else { near = middle }
             }
-            // Beyond the kink, the vertex must be driven back.
+            // Beyond the nonsmooth point, the vertex must be driven back.
             let there = add(sub(gradient[vertex], here), beyond(far + RADIUS));
-            let is_kink = differ(beyond(far + 0.1 * RADIUS), beyond((far - 0.1 * RADIUS).max(0.0)));
-            return (is_kink && far > 0.5 * RADIUS && dot(there, downhill) > 0.0)
+            let is_nonsmooth = differ(beyond(far + 0.1 * RADIUS), beyond((far - 0.1 * RADIUS).max(0.0)));
+            return (is_nonsmooth && far > 0.5 * RADIUS && dot(there, downhill) > 0.0)
                 .then(|| (vertex, add_scaled(posed[vertex], far, downhill)));
         }
         None
@@ -184,7 +184,7 @@ fn in_contact<R: Send>(
 
 /// Whether two forces belong to different parts of the body.
 fn differ(a: [f64; 3], b: [f64; 3]) -> bool {
-    differ_by(a, b, KINK)
+    differ_by(a, b, DIFFERENT)
 }
 
 /// Whether two forces differ by more than `share` of the larger.
@@ -192,17 +192,17 @@ fn differ_by(a: [f64; 3], b: [f64; 3], share: f64) -> bool {
     norm(sub(a, b)) > share * norm(a).max(norm(b))
 }
 
-/// Puts the smallest subgradients in the place of the gradients at `kinks`.
-pub(super) fn balance(kinks: &[Kink], gradient: &mut [[f64; 3]]) {
-    for kink in kinks {
-        gradient[kink.vertex] = kink.gradient;
+/// Puts the smallest subgradients in the place of the gradients at `points`.
+pub(super) fn balance(points: &[NonsmoothPoint], gradient: &mut [[f64; 3]]) {
+    for point in points {
+        gradient[point.vertex] = point.gradient;
     }
 }
 
-/// Takes what points across `kinks` out of `x`.
-pub(super) fn project(kinks: &[Kink], x: &mut [[f64; 3]]) {
-    for kink in kinks {
-        x[kink.vertex] = kink.along(x[kink.vertex]);
+/// Takes the components across `points` out of `x`.
+pub(super) fn project(points: &[NonsmoothPoint], x: &mut [[f64; 3]]) {
+    for point in points {
+        x[point.vertex] = point.along(x[point.vertex]);
     }
 }
 

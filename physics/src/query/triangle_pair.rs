@@ -3,7 +3,7 @@
 //! Every decision is the sign of a determinant of the given coordinates, evaluated by Shewchuk's adaptive predicates
 //! (crate `robust`): nothing is rounded, no tolerance exists, touching and coplanar triangles are decided like any other.
 //! The signs are exact as long as no product of three coordinates overflows or underflows (coordinates between 1e-80 and
-//! 1e80 in magnitude, or zero). Only *where* a crossing lies ([`intersection_segment`]) is rounded.
+//! 1e80 in magnitude, or zero). Only the *position* of an intersection ([`intersection_segment`]) is rounded.
 //!
 //! **Meaning.** A triangle is closed: its edges and corners belong to it. Two triangles intersect when they share at least
 //! one point. A triangle without area (corners on one line, or a corner that is not finite) intersects nothing: whatever
@@ -28,8 +28,8 @@ pub fn triangles_intersect(a: &Triangle, b: &Triangle) -> bool {
     if of_a == [0.0; 3] || of_b == [0.0; 3] {
         return flat_pair(a, b).is_some_and(|(a, b)| !separates(&a, &b) && !separates(&b, &a));
     }
-    // Planes that cross: the common part is a point or a segment whose ends lie on edges. An edge inside the other plane
-    // needs no look of its own: its ends and whatever crosses it belong to edges that leave the plane.
+    // Planes that intersect: the common part is a point or a segment whose ends lie on edges. An edge inside the other plane
+    // needs no look of its own: its ends and whatever intersects it belong to edges that leave the plane.
     (0..3).any(|i| straddles(of_a[i], of_a[(i + 1) % 3]) && line_meets(a[i], a[(i + 1) % 3], b))
         || (0..3).any(|j| straddles(of_b[j], of_b[(j + 1) % 3]) && line_meets(b[j], b[(j + 1) % 3], a))
 }
@@ -74,12 +74,12 @@ pub fn mesh_triangles_intersect(positions: &[[f64; 3]], face_a: [u32; 3], face_b
 ///
 /// `None` where they share nothing, a single point, or lie in one plane, or one of them has no area.
 pub fn intersection_segment(a: &Triangle, b: &Triangle) -> Option<[[f64; 3]; 2]> {
-    crossing(a, b).map(|ends| ends.map(|end| end.position))
+    segment_ends(a, b).map(|ends| ends.map(|end| end.position))
 }
 
-/// One end of the segment in which two triangles cross.
+/// One end of the segment in which two triangles intersect.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct CrossingEnd {
+pub(crate) struct SegmentEnd {
     /// Where it is (m), rounded.
     pub position: [f64; 3],
     /// The smallest part of the first triangle that holds it, as a set of corners (bit `i` = corner `i`): one bit is a
@@ -91,20 +91,20 @@ pub(super) struct CrossingEnd {
 
 /// Both ends of the common segment, with the exact parts of the triangles they lie on; `None` as in
 /// [`intersection_segment`].
-pub(super) fn crossing(a: &Triangle, b: &Triangle) -> Option<[CrossingEnd; 2]> {
+pub(crate) fn segment_ends(a: &Triangle, b: &Triangle) -> Option<[SegmentEnd; 2]> {
     let (of_b, of_a) = (sides(a, b), sides(b, a));
     if one_side(&of_b) || one_side(&of_a) || of_b == [0.0; 3] || of_a == [0.0; 3] {
         return None;
     }
-    let mut first: Option<CrossingEnd> = None;
+    let mut first: Option<SegmentEnd> = None;
     for swapped in [false, true] {
         let (one, other, heights) = if swapped { (b, a, &of_b) } else { (a, b, &of_a) };
         for i in 0..3 {
-            let Some((position, on_one, on_other)) = edge_crossing(one, i, heights, other) else {
+            let Some((position, on_one, on_other)) = edge_intersection(one, i, heights, other) else {
                 continue;
             };
             let (on_a, on_b) = if swapped { (on_other, on_one) } else { (on_one, on_other) };
-            let end = CrossingEnd { position, on_a, on_b };
+            let end = SegmentEnd { position, on_a, on_b };
             match first {
                 None => first = Some(end),
                 // Two ends of one segment never lie on the same pair of parts.
@@ -118,7 +118,7 @@ pub(super) fn crossing(a: &Triangle, b: &Triangle) -> Option<[CrossingEnd; 2]> {
 
 /// Where edge `i` of `one`, whose corners lie at `heights` over the plane of `other`, meets `other`: position, part of
 /// `one`, part of `other`.
-fn edge_crossing(
+fn edge_intersection(
     one: &Triangle,
     i: usize,
     heights: &[f64; 3],
@@ -149,13 +149,13 @@ fn edge_crossing(
 }
 
 /// Corners of a face; `None` for an index out of range or a corner that is not finite.
-pub(super) fn corners(positions: &[[f64; 3]], face: [u32; 3]) -> Option<Triangle> {
+pub(crate) fn corners(positions: &[[f64; 3]], face: [u32; 3]) -> Option<Triangle> {
     let corner = |v: u32| positions.get(v as usize).copied().filter(|p| vec3::is_finite(*p));
     Some([corner(face[0])?, corner(face[1])?, corner(face[2])?])
 }
 
 /// Whether the triangle has area: exactly, its corners are not on one line.
-pub(super) fn has_area(triangle: &Triangle) -> bool {
+pub(crate) fn has_area(triangle: &Triangle) -> bool {
     flat_axis(triangle).is_some()
 }
 
@@ -291,7 +291,7 @@ fn edge_signs(p: [f64; 3], q: [f64; 3], triangle: &Triangle) -> [f64; 3] {
     std::array::from_fn(|j| orient(p, q, triangle[j], triangle[(j + 1) % 3]))
 }
 
-/// Whether the line `pq`, which crosses the plane of the triangle, meets the triangle.
+/// Whether the line `pq`, which intersects the plane of the triangle, meets the triangle.
 #[inline]
 fn line_meets(p: [f64; 3], q: [f64; 3], triangle: &Triangle) -> bool {
     !mixed(&edge_signs(p, q, triangle))
