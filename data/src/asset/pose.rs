@@ -46,7 +46,7 @@ impl Pose {
     }
 
     /// The pose on a way from the T-pose, at 0, to this one, at 1, that faces where this one faces all the time.
-    pub fn on_the_way(&self, share: f64) -> Self {
+    pub fn from_t_pose(&self, share: f64) -> Self {
         if share == 1.0 || self.rotations.is_empty() {
             return self.clone();
         }
@@ -122,9 +122,9 @@ mod tests {
         for seed in 0..20 {
             let pose = random_pose(seed, 22);
             let (tilt, yaw) = pose.without_heading();
-            assert_eq!(pose.on_the_way(1.0), pose);
+            assert_eq!(pose.from_t_pose(1.0), pose);
             for share in [0.0, 0.3, 0.7] {
-                let (now, heading) = pose.on_the_way(share).without_heading();
+                let (now, heading) = pose.from_t_pose(share).without_heading();
                 let whole_turns = (heading - yaw) / std::f64::consts::TAU;
                 assert!((whole_turns - whole_turns.round()).abs() < 1e-9, "{heading} {yaw}");
                 let expected = tilt.scaled(share);

@@ -75,7 +75,7 @@ impl<'a> Dressing<'a> {
     fn stage(&self, scene: &PreparedScene, share: f64) -> Result<Waypoint, PostProcessError> {
         let mut draw = scene.sample.clone();
         for body in &mut draw.bodies {
-            body.pose = body.pose.on_the_way(share);
+            body.pose = body.pose.from_t_pose(share);
         }
         let scene = prepare(self.dataset, self.losses, draw, 1.0).map_err(DrapeError::from)?;
         Ok(Waypoint {

@@ -305,10 +305,10 @@ fn drape_all(
     bar: &ProgressBar,
 ) -> Result<Vec<Drape>, Failure> {
     let drapes = draper.drape_motion(outfit, &scenes.states, radius, |progress| match progress {
-        DrapeProgress::OnTheWay(share) if share < 1.0 => {
+        DrapeProgress::Continuation(share) if share < 1.0 => {
             bar.set_message(format!(" · sorting out crossings, {:.0} % of the way", 100.0 * share));
         }
-        DrapeProgress::OnTheWay(_) => bar.set_message(""),
+        DrapeProgress::Continuation(_) => bar.set_message(""),
         DrapeProgress::Draped => {
             bar.set_message("");
             bar.inc(1);

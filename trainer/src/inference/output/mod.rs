@@ -121,7 +121,7 @@ pub struct Show<'a> {
     pub all_frames: bool,
 }
 
-/// Times of writing [ms], by file.
+/// Times of writing (ms), by file.
 pub type WriteTimes = Vec<(&'static str, f64)>;
 
 /// Writes everything but the report into `folder`.

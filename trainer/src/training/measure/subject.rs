@@ -36,15 +36,15 @@ pub struct Subject {
 pub struct Profile {
     /// Steps that were measured.
     pub steps: usize,
-    /// Median time of a step, with the wait for its scene [ms].
+    /// Median time of a step, with the wait for its scene (ms).
     pub step_ms: f64,
-    /// Median time of every part [ms], in the order of [`PHASES`].
+    /// Median time of every part (ms), in the order of [`PHASES`].
     pub phases_ms: Vec<(&'static str, f64)>,
-    /// Median time to draw and prepare a scene [ms], which another thread does while a step computes.
+    /// Median time to draw and prepare a scene (ms), which another thread does while a step computes.
     pub prepare_ms: f64,
 }
 
-/// Times of one scene's parts, medians [ms], and memory.
+/// Times of one scene's parts, medians (ms), and memory.
 #[derive(Clone, Debug, Serialize)]
 pub struct Costs {
     /// All networks without gradients, embedding included.
@@ -62,7 +62,7 @@ pub struct Costs {
     pub drape_ms: f64,
     /// Value and gradient of each loss alone, with its own neighbour searches.
     pub terms_ms: BTreeMap<&'static str, f64>,
-    /// Largest resident memory of the process during whole steps [MiB]; absent where the system does not tell.
+    /// Largest resident memory of the process during whole steps (MiB); absent where the system does not tell.
     pub peak_mib: Option<f64>,
 }
 
