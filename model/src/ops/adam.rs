@@ -5,7 +5,7 @@ use burn::tensor::Tensor;
 use rayon::prelude::*;
 
 use super::host::{CHUNK_ELEMENTS, HostBackend, vectorised};
-use super::operation::{Kernel, run};
+use super::operation::{TensorKernel, run};
 use super::tensors::Tensors;
 
 /// Factors of one update; those of the bias correction are already in `step_size` and `epsilon`.
@@ -37,7 +37,7 @@ pub fn adam_step<const D: usize>(
 }
 
 /// Arguments: parameter, gradient, first and second moment. Results: parameter, first and second moment.
-impl Kernel for AdamFactors {
+impl TensorKernel for AdamFactors {
     fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
         let [parameter, gradient, first, second] = arguments.take();
         let average = |old, new, beta: f32| {

@@ -12,10 +12,10 @@ use burn::backend::{Backend, TensorMetadata};
 use burn::tensor::{Shape, Tensor};
 
 use super::composed::column_block;
-use super::operation::{ArgumentGradients, FusedOps, Kernel, Operation, Saved, apply};
+use super::operation::{ArgumentGradients, FusedOps, Operation, Saved, TensorKernel, apply};
 use super::tensors::Tensors;
 
-/// Gradients of the blocks of one matrix, on their way to the collector (which knows their type).
+/// Gradients of the blocks of one matrix, kept for the collector (which knows their type).
 #[derive(Clone, Debug)]
 struct ColumnGradients {
     blocks: Arc<Mutex<Vec<Option<Box<dyn Any + Send>>>>>,
@@ -66,7 +66,7 @@ pub fn split_columns(wide: Tensor<2>, width: usize, count: usize) -> Vec<Tensor<
 #[derive(Clone, Debug)]
 struct Collector(ColumnGradients);
 
-impl Kernel for Collector {
+impl TensorKernel for Collector {
     fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
         arguments
     }
@@ -86,7 +86,7 @@ struct Block {
     gradients: ColumnGradients,
 }
 
-impl Kernel for Block {
+impl TensorKernel for Block {
     fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
         let [wide] = arguments.take();
         let width = self.gradients.width;
