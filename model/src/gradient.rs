@@ -7,7 +7,7 @@ use burn::tensor::{Tensor, TensorData};
 use crate::ops::{scale_by, squared_norm};
 
 /// Scales all gradients of `module` so that their joint Euclidean norm is at most `max_norm` (`None`: leaves them), then by
-/// `share`, their weight in a mean of several. Returns the norm before as a tensor `[1]`, which nobody has to wait for; `None`
+/// `share`, their weight in a mean of several. Returns the norm before as a tensor `[1]`, without waiting for the device; `None`
 /// if no parameter has a gradient.
 ///
 /// burn's own clipping treats each tensor on its own; this is the norm over all parameters, as in the paper.

@@ -1,4 +1,4 @@
-//! Where the parameters of a network start.
+//! Initial parameters of a network.
 
 use burn::module::Param;
 use burn::tensor::{Device, Tensor, TensorData};
@@ -16,7 +16,7 @@ pub struct Initializer {
 }
 
 impl Initializer {
-    /// Draws from `seed`, for parameters on `device`.
+    /// A generator seeded with `seed`, for parameters on `device`.
     pub fn new(seed: u64, device: &Device) -> Self {
         Self { rng: ChaCha8Rng::seed_from_u64(seed), device: device.clone() }
     }
@@ -27,15 +27,13 @@ impl Initializer {
         self.fill(shape, |_, unit| bound * unit)
     }
 
-    /// A matrix of which column j is drawn from U(±bounds\[j\]).
-    pub(crate) fn uniform_columns(&mut self, rows: usize, bounds: &[f32]) -> Param<Tensor<2>> {
-        let columns = bounds.len().max(1);
-        self.fill([rows, bounds.len()], |entry, unit| bounds[entry % columns] * unit)
-    }
-
-    /// A row of which entry j is drawn from U(±bounds\[j\]).
-    pub(crate) fn uniform_row(&mut self, bounds: &[f32]) -> Param<Tensor<1>> {
-        self.fill([bounds.len()], |entry, unit| bounds[entry] * unit)
+    /// A matrix or row of which column j is drawn from U(±bounds\[j\]).
+    pub(crate) fn uniform_columns<const D: usize>(
+        &mut self,
+        shape: [usize; D],
+        bounds: &[f32],
+    ) -> Param<Tensor<D>> {
+        self.fill(shape, |entry, unit| bounds[entry % bounds.len()] * unit)
     }
 
     /// A parameter of zeros.

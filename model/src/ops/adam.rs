@@ -24,7 +24,7 @@ pub struct AdamFactors {
 /// The parameter and both moments after one update, `m ← β₁m + (1 − β₁)g`, `v ← β₂v + (1 − β₂)g²`,
 /// `p ← p − step·m / (√v + ε)`; all of one shape, none tracked by autodiff.
 ///
-/// Memory that nobody else holds is overwritten in place.
+/// Memory that no other tensor shares is overwritten in place.
 pub fn adam_step<const D: usize>(
     parameter: Tensor<D>,
     gradient: Tensor<D>,

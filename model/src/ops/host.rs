@@ -43,13 +43,13 @@ pub(super) trait HostBackend: Backend {
         None
     }
 
-    /// The elements of a matrix whose memory is nobody else's and holds nothing else, for writing in place; `None` if it is
-    /// not so, or they are not f32.
+    /// The elements of a matrix whose memory no other tensor shares and that fills its memory, for writing in place; `None`
+    /// otherwise, or if they are not f32.
     fn own_values_mut(_tensor: &mut FloatTensor<Self>) -> Option<&mut [f32]> {
         None
     }
 
-    /// `lhs·rhs`, plus the addend if there is one, in whose memory the result lies if nobody else holds it.
+    /// `lhs·rhs`, plus the addend if there is one, in the memory of the addend if no other tensor shares it.
     fn product(
         lhs: FloatTensor<Self>,
         rhs: FloatTensor<Self>,

@@ -17,7 +17,7 @@ pub fn squared_norm<const D: usize>(values: Tensor<D>) -> Tensor<1> {
     Tensor::from_dispatch(sum)
 }
 
-/// `values` times the only element of `factor` `[1]`, in place where nobody else holds them; not tracked by autodiff.
+/// `values` times the only element of `factor` `[1]`, in place if no other tensor shares them; not tracked by autodiff.
 pub fn scale_by<const D: usize>(values: Tensor<D>, factor: Tensor<1>) -> Tensor<D> {
     let [scaled] = run(&ScaleBy, [values.into_dispatch(), factor.into_dispatch()].into()).take();
     Tensor::from_dispatch(scaled)

@@ -1,6 +1,7 @@
 //! What a fused operation is, and how a backend runs, differentiates and records one.
 //!
-//! Nothing here knows a single operation: each lies in a file of its own, which calls [`apply`] (differentiable) or [`run`].
+//! An operation lies in a file of its own, which implements [`TensorKernel`] (and [`Operation`], if it is differentiable) and
+//! calls [`run`] (or [`apply`]). Nothing here depends on a single operation.
 
 // burn deprecates its ndarray backend but still ships it, and users ask for it.
 #![cfg_attr(feature = "ndarray", allow(deprecated))]
@@ -80,7 +81,7 @@ pub(super) fn run(kernel: &impl TensorKernel, arguments: Tensors<Dispatch>) -> T
     Dispatch::run(kernel, arguments)
 }
 
-/// The choice of a backend between the forms of a kernel.
+/// How a backend runs kernels: it chooses one of their forms.
 #[backend_extension(
     Flex: cfg(feature = "flex"),
     NdArray: cfg(feature = "ndarray"),

@@ -2,7 +2,7 @@
 //!
 //! burn's flex backend zeroes the memory of every product, copies it to aligned memory, and only then multiplies; for the
 //! narrow matrices of these networks (width 128) that takes a quarter of the time of the multiplication. Here the same one
-//! (crate `gemm`) writes into fresh memory, or adds to a matrix that nobody else holds.
+//! (crate `gemm`) writes into fresh memory, or adds to a matrix whose memory no other tensor shares.
 
 use burn::backend::Backend;
 use burn::backend::tensor::FloatTensor;
@@ -21,7 +21,7 @@ pub fn product(lhs: Tensor<2>, rhs: Tensor<2>) -> Tensor<2> {
     apply(MatrixProduct, [lhs, rhs])
 }
 
-/// `lhs·rhs + addend`: `[N,K]`, `[K,C]`, `[N,C]` → `[N,C]`; in the memory of `addend` where nobody else holds it.
+/// `lhs·rhs + addend`: `[N,K]`, `[K,C]`, `[N,C]` → `[N,C]`; in the memory of `addend` if no other tensor shares it.
 ///
 /// # Panics
 /// If the sizes disagree.

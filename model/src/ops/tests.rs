@@ -117,7 +117,7 @@ fn products_match_burns_own() {
             |[a, b, sum]| product_add(a, b, sum),
             |[a, b, sum]| a.matmul(b) + sum,
         );
-        // A sum that nobody else holds is added to in place.
+        // A sum whose memory no other tensor shares is added to in place.
         compare(
             [lhs, rhs],
             |[a, b]| product_add(a.clone(), b.clone(), product(a, b)),
