@@ -56,11 +56,9 @@ mod tests {
     use super::*;
     use crate::mesh::{TriMesh, shapes};
     use crate::query::Surface;
-    use crate::transform::Transform;
+    use crate::transform::IDENTITY;
     use crate::vec3::{add, norm};
     use std::sync::Arc;
-
-    const IDENTITY: Transform = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
 
     /// A sheet of 1.2 m in the plane y = `height`.
     fn sheet(height: f64) -> TriMesh {
