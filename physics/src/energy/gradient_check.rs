@@ -41,7 +41,7 @@ const RUNGS: usize = 9;
 /// First step in units of the shortest median edge.
 const FIRST_STEP: f64 = 1e-2;
 
-/// Edges longer than this do not lengthen the first step [m]: a rest shape in the wrong unit does not enlarge the body.
+/// Edges longer than this do not lengthen the first step (m): a rest shape in the wrong unit does not enlarge the body.
 const LONGEST_EDGE: f64 = 0.02;
 
 /// Directions in large scenes move this many vertices: with all of them some nearest vertex always changes.
@@ -100,7 +100,7 @@ impl GradientReport {
     }
 }
 
-/// Compares the gradient of `term` in `scene` with difference quotients at `posed` and `canonical` (`[ΣV, 3]` [m] each, as in
+/// Compares the gradient of `term` in `scene` with difference quotients at `posed` and `canonical` (`[ΣV, 3]` (m) each, as in
 /// [`SceneEnergy::evaluate`]). `None` if the scene has no such term: no garment is held, or no pair of layers.
 ///
 /// # Panics
@@ -133,8 +133,8 @@ pub fn check_gradient(
     })
 }
 
-/// The same for any function of positions: `value`, and value with `gradient`, at `positions` `[V, 3]` [m] of a mesh with edges
-/// of about `edge` [m].
+/// The same for any function of positions: `value`, and value with `gradient`, at `positions` `[V, 3]` (m) of a mesh with edges
+/// of about `edge` (m).
 pub fn check_function(
     value: &(dyn Fn(&[[f64; 3]]) -> f64 + Sync),
     gradient: &(dyn Fn(&[[f64; 3]]) -> (f64, Vec<[f64; 3]>) + Sync),
@@ -284,7 +284,7 @@ struct LineResult {
 
 struct Ladder {
     first: f64,
-    /// Steps are multiples of this [m].
+    /// Steps are multiples of this (m).
     unit: f64,
     scale: f64,
 }

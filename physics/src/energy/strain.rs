@@ -35,7 +35,7 @@ const NO_HEIGHT: f64 = 1e-12;
 pub(super) struct Needle {
     /// Least ratio of height to longest edge.
     pub ratio: f64,
-    /// Of the whole garment [m].
+    /// Of the whole garment (m).
     pub median_edge: f64,
 }
 
@@ -44,9 +44,9 @@ pub(super) struct Needle {
 struct RestTriangle {
     /// The face's vertices, turned so that the longest edge comes first.
     corners: [u32; 3],
-    /// Area × thickness [m³].
+    /// Area × thickness (m³).
     volume: f64,
-    /// The upper triangle `(0,0), (0,1), (1,1)` of the inverse of the 2×2 matrix of rest edges [1/m].
+    /// The upper triangle `(0,0), (0,1), (1,1)` of the inverse of the 2×2 matrix of rest edges (1/m).
     inverse: [f64; 3],
     /// `F₀ᵀF₀`: entries 11, 12, 22.
     metric: [f64; 3],
@@ -175,7 +175,7 @@ impl Strain {
         Self { mu: material.mu, lambda: material.lambda, triangles, corners_at }
     }
 
-    /// Energy [J] at `positions` `[V, 3]` [m]; adds its weighted gradient to `target`.
+    /// Energy (J) at `positions` `[V, 3]` (m); adds its weighted gradient to `target`.
     pub fn evaluate<T: Real>(&self, positions: &[[T; 3]], target: Option<Weighted<'_, T>>) -> f64 {
         let element = |t: usize| self.triangles[t].response(positions, self.mu, self.lambda);
         sum_elements(self.triangles.len(), &self.corners_at, element, target)

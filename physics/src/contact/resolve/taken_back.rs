@@ -10,7 +10,7 @@ use super::{Layer, Waypoint};
 use crate::query::VertexIndex;
 use crate::vec3::{add_scaled, sub};
 
-/// Within this distance of a crossing [m], in the T-pose, a drape is taken back wholly…
+/// Within this distance of a crossing (m), in the T-pose, a drape is taken back wholly…
 const REACH: f64 = 0.1;
 /// …and beyond this one not at all.
 const END: f64 = 3.0 * REACH;

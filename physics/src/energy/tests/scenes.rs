@@ -23,7 +23,7 @@ pub fn random(seed: u64) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(seed)
 }
 
-/// Moves every vertex by up to `amount` [m] per axis.
+/// Moves every vertex by up to `amount` (m) per axis.
 pub fn jittered(mesh: &TriMesh, amount: f64, seed: u64) -> TriMesh {
     let mut rng = random(seed);
     let positions = mesh.positions().iter().map(|p| p.map(|x| x + amount * rng.random_range(-1.0..1.0)));
@@ -65,7 +65,7 @@ pub fn narrowed<T: Real>(mesh: &TriMesh) -> Vec<[T; 3]> {
     mesh.positions().iter().map(|p| vec3::from_f64(*p)).collect()
 }
 
-/// A scene of `rest` garments, posed by random displacements of up to `amount` [m] per axis.
+/// A scene of `rest` garments, posed by random displacements of up to `amount` (m) per axis.
 pub fn scene_of<T: Real>(
     rest: Vec<TriMesh>,
     body: &TriMesh,

@@ -6,7 +6,6 @@ pub mod distance;
 pub mod error;
 pub mod generator;
 pub mod growth;
-pub mod operators;
 pub mod poses;
 pub mod stability;
 pub mod step;
@@ -36,8 +35,6 @@ pub enum Bench {
     Generator(generator::Arguments),
     /// How time and memory of a training step grow with vertices, layers, width and eigenpairs
     Growth(growth::Arguments),
-    /// What preparing a garment for DiffusionNet costs, and how exact its eigenpairs are
-    Operators(operators::Arguments),
     /// Self-intersections of posed bodies, their share and the cost of finding them
     Poses(poses::Arguments),
 }
@@ -57,7 +54,6 @@ pub fn run(bench: &Bench) -> Result<(), Report> {
         Bench::Tradeoff(arguments) => tradeoff::run(arguments),
         Bench::Generator(arguments) => generator::run(arguments),
         Bench::Growth(arguments) => growth::run(arguments),
-        Bench::Operators(arguments) => operators::run(arguments),
         Bench::Poses(arguments) => poses::run(arguments),
     }
 }

@@ -7,7 +7,7 @@ use super::super::relax::{LastPasses, no_farther, relax};
 use super::Untangling;
 use crate::vec3::{add, add_scaled, dot, norm, scale, sub};
 
-/// No contact asks for a longer step than this in a round [m].
+/// No contact asks for a longer step than this in a round (m).
 const LONGEST_STEP: f64 = 0.02;
 
 impl Untangling<'_> {
