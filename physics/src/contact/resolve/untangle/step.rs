@@ -70,7 +70,7 @@ impl Untangling<'_> {
             }
         };
         let (sweeps, stretch) = (self.settings.sweeps, self.stretch);
-        relax(outfit, &mut self.positions, &self.shape, &region, &contacts, sweeps, stretch, last);
+        relax(outfit, &mut self.positions, &self.shape, &region, &contacts, stretch, (sweeps, last));
         self.hold_back(&region);
         self.touch(&region);
     }
