@@ -1,4 +1,4 @@
-//! The draper as a library: two garments of the model's own wardrobe on three bodies.
+//! The draper as a library: two garments of the model's own data on three bodies.
 //!
 //! ```text
 //! cargo run --release --example drape -- runs/smoke
@@ -6,7 +6,7 @@
 
 use clothcombo_data::asset::Pose;
 use clothcombo_trainer::cli;
-use clothcombo_trainer::draper::{BodyState, Draper, DraperSettings, Stage};
+use clothcombo_trainer::inference::{BodyState, Draper, DraperSettings, Stage};
 use miette::{Report, miette};
 use std::path::PathBuf;
 
@@ -21,11 +21,11 @@ fn run() -> Result<(), Report> {
     let draper = Draper::load(model.as_deref(), &DraperSettings::default())?;
 
     // Garments the model knows by name; `SourceGarment::read` takes a mesh file, `SourceGarment::new` a garment in memory.
-    let closet = draper.closet(&[])?;
-    let [inner, outer, ..] = closet.names() else {
+    let catalog = draper.catalog(&[])?;
+    let [inner, outer, ..] = catalog.names() else {
         return Err(miette!("the model's own wardrobe is not there; use SourceGarment::read"));
     };
-    let sources = [inner, outer].map(|name| closet.find(name, draper.body(), None));
+    let sources = [inner, outer].map(|name| catalog.find(name, draper.body(), None));
     let outfit = draper.outfit(sources.into_iter().collect::<Result<_, _>>()?)?;
 
     // The garments are embedded once; every body costs only what depends on it.
@@ -35,12 +35,12 @@ fn run() -> Result<(), Report> {
     for shape in [-1.5, 0.0, 1.5] {
         let drape = draper.drape(&outfit, &BodyState::new(vec![shape], arms_lowered.clone()))?;
         let score = drape.score(&draper, &outfit, Stage::Result)?;
-        for (piece, garment) in outfit.pieces.iter().zip(&score.garments) {
+        for (garment, scored) in outfit.garments.iter().zip(&score.garments) {
             println!(
                 "shape {shape:>4}: {} has {:.2} % of {} vertices inside the body",
-                piece.name,
-                100.0 * garment.penetration.vertices_inside,
-                garment.vertices
+                garment.name,
+                100.0 * scored.penetration.vertices_inside,
+                scored.vertices
             );
         }
         println!(

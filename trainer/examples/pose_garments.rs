@@ -13,7 +13,7 @@ use clothcombo_data::asset::{Binding, BindingSettings, Body, Garment, Pose};
 use clothcombo_data::dataset::{load_garment_folder, load_motion_folder};
 use clothcombo_data::format::obj;
 use clothcombo_trainer::config::{self, Config};
-use clothcombo_trainer::{cli, scene};
+use clothcombo_trainer::{cli, dataset};
 use miette::{IntoDiagnostic, Report, miette};
 use std::path::PathBuf;
 
@@ -48,7 +48,7 @@ fn main() -> std::process::ExitCode {
 
 fn run(arguments: &Arguments) -> Result<(), Report> {
     let config = config::load(&arguments.config, &[])?;
-    let body = scene::load_body(&config.data.body, config.data.shape_components)?;
+    let body = dataset::load_body(&config.data.body, config.data.shape_components)?;
     let garments = named_garments(&config, &body, &arguments.garments)?;
     let posed = body.posed(&arguments.shape, &pose(&config, arguments)?).into_diagnostic()?;
     let start = &config.start;

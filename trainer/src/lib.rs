@@ -1,42 +1,25 @@
-//! The training framework: configuration, objective, schedule, loop, checkpoints, evaluation, and the two programs.
+//! The training framework: from a configuration to a trained model, from a model to draped garments, and the two programs.
+//!
+//! Rooms, from the ground up; each uses only those above it in this list:
+//!
+//! - [`system`]: what the machine provides: device, memory, threads, signals, paths.
+//! - [`picture`]: meshes and numbers in, pictures out.
+//! - [`config`]: TOML in, a checked [`Config`](config::Config) out.
+//! - [`dataset`]: the configuration in, prepared scenes out.
+//! - [`score`]: meshes in, the paper's energies and exact counts out.
+//! - [`run`]: events in; the run's folder with checkpoints, logs, curves and report out.
+//! - [`inference`]: a trained model, garments and a body in, draped garments out.
+//! - [`evaluation`]: a trained model and a dataset in, tables and figures out.
+//! - [`training`]: a configuration and a run folder in, a trained model out.
+//! - [`cli`]: the command lines of the two programs.
 
-pub mod allocator;
-pub mod average;
-pub mod checkpoint;
 pub mod cli;
-pub mod closed_pipe;
 pub mod config;
-mod correct;
-pub mod descent;
-pub mod device;
-pub mod drape;
-pub mod draper;
-pub mod estimate;
-pub mod evaluate;
-pub mod event;
-pub mod exact;
-pub mod felt;
-pub mod guard;
-pub mod incident;
-pub mod learner;
-pub mod measure;
-pub mod memory;
-pub mod objective;
-pub mod observer;
-pub mod one_core;
-pub mod paths;
+pub mod dataset;
+pub mod evaluation;
+pub mod inference;
 pub mod picture;
-pub mod report;
-pub mod run_dir;
-pub mod run_lock;
-pub mod run_summary;
-pub mod samples;
-pub mod scene;
-pub mod schedule;
+pub mod run;
 pub mod score;
-pub mod session;
-pub mod step_summary;
-pub mod stop;
-pub mod study;
-pub mod train_loop;
-pub mod world;
+pub mod system;
+pub mod training;

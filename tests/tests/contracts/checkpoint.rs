@@ -2,11 +2,11 @@
 
 use burn::store::{ModuleSnapshot, SafetensorsStore};
 use clothcombo_tests::{fuzz_cases, tiny_config};
-use clothcombo_trainer::checkpoint::{Checkpoint, CheckpointError};
-use clothcombo_trainer::device::Backend;
-use clothcombo_trainer::run_dir::RunDir;
-use clothcombo_trainer::scene::Library;
-use clothcombo_trainer::session::Session;
+use clothcombo_trainer::dataset::Dataset;
+use clothcombo_trainer::run::checkpoint::{Checkpoint, CheckpointError};
+use clothcombo_trainer::run::folder::RunDir;
+use clothcombo_trainer::system::device::Backend;
+use clothcombo_trainer::training::session::Session;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::fs;
@@ -16,9 +16,9 @@ use std::sync::Arc;
 /// A checkpoint of the untrained networks of the fixture.
 fn saved(folder: &tempfile::TempDir) -> PathBuf {
     let config = tiny_config(folder.path(), &["validation.single_scenes=0", "validation.layered_scenes=0"]);
-    let library = Arc::new(Library::load(&config, &|_, _, _| {}).unwrap());
+    let dataset = Arc::new(Dataset::load(&config, &|_, _, _| {}).unwrap());
     let run = RunDir::create(&folder.path().join("run"), &config).unwrap();
-    Session::new(run, config, library, &Backend::preferred().device()).unwrap().save().unwrap()
+    Session::new(run, config, dataset, &Backend::preferred().device()).unwrap().save().unwrap()
 }
 
 #[test]
@@ -133,9 +133,9 @@ fn files_of_two_whole_checkpoints_do_not_mix() {
     let other = tempfile::tempdir().unwrap();
     let config =
         tiny_config(other.path(), &["seed=4", "validation.single_scenes=0", "validation.layered_scenes=0"]);
-    let library = Arc::new(Library::load(&config, &|_, _, _| {}).unwrap());
+    let dataset = Arc::new(Dataset::load(&config, &|_, _, _| {}).unwrap());
     let run = RunDir::create(&other.path().join("run"), &config).unwrap();
-    let second = Session::new(run, config, library, &Backend::preferred().device()).unwrap().save().unwrap();
+    let second = Session::new(run, config, dataset, &Backend::preferred().device()).unwrap().save().unwrap();
     fs::copy(second.join("model.bpk"), first.join("model.bpk")).unwrap();
     assert!(Checkpoint::open(&first).unwrap_err().to_string().contains("model.bpk"));
 }

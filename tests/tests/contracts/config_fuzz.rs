@@ -4,7 +4,7 @@
 
 use clothcombo_tests::{TINY, fuzz_cases};
 use clothcombo_trainer::config::{ConfigError, parse, to_toml};
-use clothcombo_trainer::schedule::Schedule;
+use clothcombo_trainer::training::schedule::Schedule;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::path::Path;

@@ -78,16 +78,16 @@ fn brute_force(
     b: &Snapped,
     first_of_b: impl Fn(usize) -> usize + Sync,
     oracle: impl Fn(usize, usize) -> bool + Sync,
-    library: impl Fn(usize, usize) -> bool + Sync,
+    dataset: impl Fn(usize, usize) -> bool + Sync,
 ) -> Vec<(u32, u32)> {
     (0..a.boxes.len())
         .into_par_iter()
         .flat_map_iter(|i| {
             let near = (first_of_b(i)..b.boxes.len()).filter(move |&j| boxes_meet(&a.boxes[i], &b.boxes[j]));
-            let (oracle, library) = (&oracle, &library);
+            let (oracle, dataset) = (&oracle, &dataset);
             near.filter_map(move |j| {
                 let expected = oracle(i, j);
-                assert_eq!(library(i, j), expected, "triangles {i} and {j}");
+                assert_eq!(dataset(i, j), expected, "triangles {i} and {j}");
                 expected.then_some((i as u32, j as u32))
             })
         })
@@ -101,8 +101,8 @@ fn pairs_between(a: &Snapped, b: &Snapped) -> Vec<(u32, u32)> {
 
 fn pairs_within(a: &Snapped) -> Vec<(u32, u32)> {
     let faces = a.mesh.faces();
-    let library = |i: usize, j: usize| mesh_triangles_intersect(a.mesh.positions(), faces[i], faces[j]);
-    brute_force(a, a, |i| i + 1, |i, j| neighbours_meet(a, i, j), library)
+    let dataset = |i: usize, j: usize| mesh_triangles_intersect(a.mesh.positions(), faces[i], faces[j]);
+    brute_force(a, a, |i| i + 1, |i, j| neighbours_meet(a, i, j), dataset)
 }
 
 /// The report of `garments` on `body` against brute force, pair by pair.

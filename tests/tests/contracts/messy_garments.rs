@@ -4,11 +4,11 @@
 use clothcombo_data::asset::{Category, Pose};
 use clothcombo_data::generate::{GarmentGenerator, GarmentSettings};
 use clothcombo_tests::{fuzz_cases, tiny_config};
-use clothcombo_trainer::device::Backend;
-use clothcombo_trainer::draper::{BodyState, Draper, DraperSettings, SourceGarment};
-use clothcombo_trainer::run_dir::RunDir;
-use clothcombo_trainer::scene::Library;
-use clothcombo_trainer::session::Session;
+use clothcombo_trainer::dataset::Dataset;
+use clothcombo_trainer::inference::{BodyState, Draper, DraperSettings, SourceGarment};
+use clothcombo_trainer::run::folder::RunDir;
+use clothcombo_trainer::system::device::Backend;
+use clothcombo_trainer::training::session::Session;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::fmt::Write;
@@ -18,9 +18,9 @@ use std::sync::Arc;
 /// A draper with networks that have learned nothing.
 fn draper(folder: &Path) -> Draper {
     let config = tiny_config(folder, &[]);
-    let library = Arc::new(Library::load(&config, &|_, _, _| {}).unwrap());
+    let dataset = Arc::new(Dataset::load(&config, &|_, _, _| {}).unwrap());
     let run = RunDir::create(&folder.join("run"), &config).unwrap();
-    let session = Session::new(run, config, library, &Backend::preferred().device()).unwrap();
+    let session = Session::new(run, config, dataset, &Backend::preferred().device()).unwrap();
     Draper::load(Some(&session.save().unwrap()), &DraperSettings::default()).unwrap()
 }
 

@@ -2,16 +2,16 @@
 
 use clothcombo_data::format::obj;
 use clothcombo_tests::tiny_config;
-use clothcombo_trainer::checkpoint::{Checkpoint, TrainedModel};
 use clothcombo_trainer::config::Config;
-use clothcombo_trainer::device::Backend;
-use clothcombo_trainer::evaluate::ValidationSet;
-use clothcombo_trainer::event::{Observer, TrainEvent};
-use clothcombo_trainer::run_dir::RunDir;
-use clothcombo_trainer::scene::{Library, ValidationGroup};
-use clothcombo_trainer::session::Session;
-use clothcombo_trainer::stop::StopFlag;
-use clothcombo_trainer::train_loop::train;
+use clothcombo_trainer::dataset::{Dataset, ValidationGroup};
+use clothcombo_trainer::evaluation::ValidationSet;
+use clothcombo_trainer::run::checkpoint::{Checkpoint, TrainedModel};
+use clothcombo_trainer::run::event::{Observer, TrainEvent};
+use clothcombo_trainer::run::folder::RunDir;
+use clothcombo_trainer::system::device::Backend;
+use clothcombo_trainer::system::stop::StopFlag;
+use clothcombo_trainer::training::session::Session;
+use clothcombo_trainer::training::train_loop::train;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -29,7 +29,7 @@ impl Observer for StopAfter {
     }
 }
 
-/// Cannot write what it is told at step `.0`.
+/// Cannot write at step `.0`.
 struct FailsAt(u64);
 
 impl Observer for FailsAt {
@@ -41,15 +41,15 @@ impl Observer for FailsAt {
     }
 }
 
-fn run(config: &Config, library: &Arc<Library>, folder: &Path, resume: bool, stop_after: Option<u64>) {
+fn run(config: &Config, dataset: &Arc<Dataset>, folder: &Path, resume: bool, stop_after: Option<u64>) {
     let device = Backend::preferred().device();
     let mut session = if resume {
         let run = RunDir::resume(folder, config, &[]).unwrap();
         let checkpoint = Checkpoint::open(folder).unwrap();
-        Session::resume(run, config.clone(), library.clone(), &device, &checkpoint).unwrap()
+        Session::resume(run, config.clone(), dataset.clone(), &device, &checkpoint).unwrap()
     } else {
         let run = RunDir::create(folder, config).unwrap();
-        Session::new(run, config.clone(), library.clone(), &device).unwrap()
+        Session::new(run, config.clone(), dataset.clone(), &device).unwrap()
     };
     let stop = StopFlag::default();
     let mut observers: Vec<Box<dyn Observer>> = Vec::new();
@@ -67,15 +67,15 @@ fn read(run: &Path, file: &str) -> Vec<u8> {
 fn parts_equal_the_whole(overrides: &[&str], stops: &[u64], files: &[&str]) {
     let folder = tempfile::tempdir().unwrap();
     let config = tiny_config(folder.path(), overrides);
-    let library = Arc::new(Library::load(&config, &|_, _, _| {}).unwrap());
+    let dataset = Arc::new(Dataset::load(&config, &|_, _, _| {}).unwrap());
     let (whole, parts) = (folder.path().join("whole"), folder.path().join("parts"));
-    run(&config, &library, &whole, false, None);
+    run(&config, &dataset, &whole, false, None);
     for (i, stop) in stops.iter().enumerate() {
-        run(&config, &library, &parts, i > 0, Some(*stop));
+        run(&config, &dataset, &parts, i > 0, Some(*stop));
         assert!(!parts.join("checkpoints/step-00000060").exists());
         assert!(parts.join(format!("checkpoints/step-{stop:08}")).exists());
     }
-    run(&config, &library, &parts, true, None);
+    run(&config, &dataset, &parts, true, None);
     for file in files {
         assert!(read(&whole, file) == read(&parts, file), "{file} differs");
     }
@@ -121,9 +121,9 @@ fn skipped_steps_are_remembered() {
 fn a_run_starts_from_another_ones_parameters() {
     let folder = tempfile::tempdir().unwrap();
     let config = tiny_config(folder.path(), &["stages.0.steps=5"]);
-    let library = Arc::new(Library::load(&config, &|_, _, _| {}).unwrap());
+    let dataset = Arc::new(Dataset::load(&config, &|_, _, _| {}).unwrap());
     let first = folder.path().join("first");
-    run(&config, &library, &first, false, Some(5));
+    run(&config, &dataset, &first, false, Some(5));
     // The numbers behind the header, which holds the step as well.
     let parameters = |checkpoint: &Path| {
         let bytes = std::fs::read(checkpoint.join("model.safetensors")).unwrap();
@@ -136,7 +136,7 @@ fn a_run_starts_from_another_ones_parameters() {
         let overrides: Vec<&str> = [init.as_str()].into_iter().chain(overrides.iter().copied()).collect();
         let config = tiny_config(folder.path(), &overrides);
         let run = RunDir::create(&folder.path().join(name), &config).unwrap();
-        Session::new(run, config, library.clone(), &Backend::preferred().device())
+        Session::new(run, config, dataset.clone(), &Backend::preferred().device())
     };
     let session = further("second", &["seed=9"]).unwrap();
     assert!(parameters(&session.save().unwrap()) == parameters(&first.join("checkpoints/step-00000005")));
@@ -154,9 +154,9 @@ fn a_run_starts_from_another_ones_parameters() {
 fn a_further_run_draws_other_scenes_and_can_be_scored_on_the_same() {
     let folder = tempfile::tempdir().unwrap();
     let first = tiny_config(folder.path(), &[]);
-    let library = Library::load(&first, &|_, _, _| {}).unwrap();
+    let dataset = Dataset::load(&first, &|_, _, _| {}).unwrap();
     let scored = |overrides: &[&str]| {
-        let set = ValidationSet::new(&library, &tiny_config(folder.path(), overrides));
+        let set = ValidationSet::new(&dataset, &tiny_config(folder.path(), overrides));
         [ValidationGroup::Single, ValidationGroup::Layered].map(|group| set.draws(group).to_vec())
     };
     let same = format!("validation.seed={}", first.seed);
@@ -170,26 +170,26 @@ fn a_further_run_draws_other_scenes_and_can_be_scored_on_the_same() {
 fn what_was_trained_is_kept_when_something_beside_it_fails() {
     let folder = tempfile::tempdir().unwrap();
     let config = tiny_config(folder.path(), &[]);
-    let library = Arc::new(Library::load(&config, &|_, _, _| {}).unwrap());
+    let dataset = Arc::new(Dataset::load(&config, &|_, _, _| {}).unwrap());
     let place = folder.path().join("run");
     let run = RunDir::create(&place, &config).unwrap();
     let device = Backend::preferred().device();
-    let mut session = Session::new(run, config.clone(), library.clone(), &device).unwrap();
+    let mut session = Session::new(run, config.clone(), dataset.clone(), &device).unwrap();
     let mut observers: Vec<Box<dyn Observer>> = vec![Box::new(FailsAt(7))];
     let error = train(&mut session, &mut observers, &StopFlag::default()).unwrap_err();
     assert!(error.to_string().contains("disk is full"), "{error}");
     let kept = Checkpoint::open(&place).unwrap();
     assert_eq!(kept.state.step, 7);
-    assert_eq!(Session::resume(RunDir::follow(&place), config, library, &device, &kept).unwrap().step(), 7);
+    assert_eq!(Session::resume(RunDir::follow(&place), config, dataset, &device, &kept).unwrap().step(), 7);
 }
 
 #[test]
 fn a_run_does_not_go_on_with_other_data() {
     let folder = tempfile::tempdir().unwrap();
-    let generated = Library::load(&tiny_config(folder.path(), &[]), &|_, _, _| {}).unwrap();
+    let generated = Dataset::load(&tiny_config(folder.path(), &[]), &|_, _, _| {}).unwrap();
     let names: Vec<String> = (0..2)
         .map(|index| {
-            let garment = generated.wardrobe.garment(index).unwrap();
+            let garment = generated.garments.garment(index).unwrap();
             let name = format!("garment_{index}.obj");
             let rest = &garment.garment.rest;
             obj::save(&folder.path().join(&name), rest.positions(), rest.faces(), &[]).unwrap();
@@ -204,14 +204,14 @@ fn a_run_does_not_go_on_with_other_data() {
         let entry = |name: &String| format!("[[garment]]\nfile = {name:?}\ncategory = {category:?}\n");
         let manifest: String = names.iter().map(entry).collect();
         std::fs::write(folder.path().join("garments.toml"), manifest).unwrap();
-        Arc::new(Library::load(&config, &|_, _, _| {}).unwrap())
+        Arc::new(Dataset::load(&config, &|_, _, _| {}).unwrap())
     };
     let place = folder.path().join("run");
     run(&config, &load("dress"), &place, false, Some(5));
-    let resume = |library: Arc<Library>| {
+    let resume = |dataset: Arc<Dataset>| {
         let checkpoint = Checkpoint::open(&place).unwrap();
         let device = Backend::preferred().device();
-        Session::resume(RunDir::follow(&place), config.clone(), library, &device, &checkpoint)
+        Session::resume(RunDir::follow(&place), config.clone(), dataset, &device, &checkpoint)
     };
     assert_eq!(resume(load("dress")).unwrap().step(), 5);
     // Skin weights are smoothed farther on a dress.
@@ -223,15 +223,15 @@ fn a_run_does_not_go_on_with_other_data() {
 fn garments_that_were_trained_on_before_they_were_held_out_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let config = tiny_config(folder.path(), &["stages.0.steps=5"]);
-    let library = Arc::new(Library::load(&config, &|_, _, _| {}).unwrap());
+    let dataset = Arc::new(Dataset::load(&config, &|_, _, _| {}).unwrap());
     let first = folder.path().join("first");
-    run(&config, &library, &first, false, Some(5));
+    run(&config, &dataset, &first, false, Some(5));
     let trained = TrainedModel::open(&first).unwrap();
-    assert!(trained.known_of_held_out(&config, &library).is_empty());
+    assert!(trained.known_of_held_out(&config, &dataset).is_empty());
 
-    let name = library.wardrobe.card(library.split.training[0]).name.clone();
+    let name = dataset.garments.info(dataset.split.training[0]).name.clone();
     let config = tiny_config(folder.path(), &[&format!("data.held_out_garments=[{name:?}]")]);
-    let library = Library::load(&config, &|_, _, _| {}).unwrap();
-    let known = trained.known_of_held_out(&config, &library);
+    let dataset = Dataset::load(&config, &|_, _, _| {}).unwrap();
+    let known = trained.known_of_held_out(&config, &dataset);
     assert!(known.len() == 1 && known[0].contains(&name), "{known:?}");
 }

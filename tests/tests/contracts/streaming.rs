@@ -2,22 +2,24 @@
 
 use clothcombo_tests::tiny_config;
 use clothcombo_trainer::config::Config;
-use clothcombo_trainer::device::Backend;
-use clothcombo_trainer::drape::{WardrobeTensors, tensor_bytes};
-use clothcombo_trainer::run_dir::RunDir;
-use clothcombo_trainer::scene::{KeptBytes, Library, Wardrobe, load_body};
-use clothcombo_trainer::session::{Session, dimensions};
-use clothcombo_trainer::stop::StopFlag;
-use clothcombo_trainer::train_loop::train;
+use clothcombo_trainer::dataset::tensor_bytes;
+use clothcombo_trainer::dataset::{Dataset, GarmentStore, load_body};
+use clothcombo_trainer::inference::tensor_store::TensorStore;
+use clothcombo_trainer::run::folder::RunDir;
+use clothcombo_trainer::system::device::Backend;
+use clothcombo_trainer::system::lru_cache::KeptBytes;
+use clothcombo_trainer::system::stop::StopFlag;
+use clothcombo_trainer::training::session::Session;
+use clothcombo_trainer::training::train_loop::train;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Trains and returns the final parameters.
-fn trained(config: &Config, library: Library, folder: &Path) -> Vec<u8> {
+fn trained(config: &Config, dataset: Dataset, folder: &Path) -> Vec<u8> {
     let device = Backend::preferred().device();
     let run = RunDir::create(folder, config).unwrap();
-    let mut session = Session::new(run, config.clone(), Arc::new(library), &device).unwrap();
+    let mut session = Session::new(run, config.clone(), Arc::new(dataset), &device).unwrap();
     train(&mut session, &mut [], &StopFlag::default()).unwrap();
     fs::read(folder.join("checkpoints/step-00000060/model.safetensors")).unwrap()
 }
@@ -37,8 +39,8 @@ fn streamed(folder: &Path) -> Config {
     config
 }
 
-fn load(config: &Config) -> Library {
-    Library::load(config, &|_, _, _| {}).unwrap()
+fn load(config: &Config) -> Dataset {
+    Dataset::load(config, &|_, _, _| {}).unwrap()
 }
 
 #[test]
@@ -77,9 +79,9 @@ fn records_that_vanish_during_a_run_are_made_again() {
     let kept = tiny_config(folder.path(), &[]);
     let config = streamed(folder.path());
     let expected = trained(&kept, load(&kept), &folder.path().join("kept"));
-    let library = load(&config);
+    let dataset = load(&config);
     fs::remove_dir_all(folder.path().join("cache")).unwrap();
-    assert!(trained(&config, library, &folder.path().join("streamed")) == expected);
+    assert!(trained(&config, dataset, &folder.path().join("streamed")) == expected);
 }
 
 #[test]
@@ -87,7 +89,7 @@ fn shards_prepare_everything_once() {
     let folder = tempfile::tempdir().unwrap();
     let config = streamed(folder.path());
     let body = Arc::new(load_body("mannequin", 0).unwrap());
-    let prepare = |shard| Wardrobe::prepare(&config, body.clone(), shard, &|_, _, _| {}).unwrap();
+    let prepare = |shard| GarmentStore::prepare(&config, body.clone(), shard, &|_, _, _| {}).unwrap();
     assert_eq!((prepare([0, 2]).0, prepare([1, 2]).0), (2, 1));
     let first: Vec<_> = records(&folder.path().join("cache"))
         .iter()
@@ -107,7 +109,7 @@ fn a_full_cache_is_one_clear_message() {
     let folder = tempfile::tempdir().unwrap();
     let mut config = streamed(folder.path());
     config.data.cache.limit_gib = 1e-5;
-    let error = Library::load(&config, &|_, _, _| {}).err().unwrap().to_string();
+    let error = Dataset::load(&config, &|_, _, _| {}).err().unwrap().to_string();
     assert!(error.contains("limit") && error.contains("raise the limit"), "{error}");
 }
 
@@ -118,13 +120,13 @@ fn garments_and_their_tensors_stay_within_the_limits() {
     (config.data.memory_mib, config.data.device_memory_mib) = (4, 1);
     let generate = config.data.garments[0].generate.as_mut().unwrap();
     (generate.count, generate.vertices) = (12, 1000);
-    let library = Arc::new(load(&config));
-    let tensors = WardrobeTensors::new(library.clone(), dimensions(&library), &Backend::preferred().device());
+    let dataset = Arc::new(load(&config));
+    let tensors = TensorStore::new(dataset.clone(), dataset.dimensions(), &Backend::preferred().device());
     let mut whole = KeptBytes::default();
     for index in (0..12).chain(0..12) {
-        let garment = library.wardrobe.garment(index).unwrap();
+        let garment = dataset.garments.garment(index).unwrap();
         tensors.garment(index, &garment).unwrap();
-        let bytes = tensor_bytes(garment.vertex_count(), config.model.eigen_count, library.joints().len());
+        let bytes = tensor_bytes(garment.vertex_count(), config.model.eigen_count, dataset.joints().len());
         whole.total += garment.bytes() + bytes;
         whole.device += bytes;
     }
@@ -139,14 +141,14 @@ fn garments_and_their_tensors_stay_within_the_limits() {
 fn nothing_is_stored_of_shapes_without_shape_transfer() {
     let folder = tempfile::tempdir().unwrap();
     let mut config = streamed(folder.path());
-    let with = load(&config).wardrobe.garment(0).unwrap();
+    let with = load(&config).garments.garment(0).unwrap();
     assert_eq!(with.shape_directions.len(), with.vertex_count() * 3 * 8, "all components of the mannequin");
     config.data.shape_components = 2;
-    let few = load(&config).wardrobe.garment(0).unwrap();
+    let few = load(&config).garments.garment(0).unwrap();
     assert_eq!(few.shape_directions.len(), few.vertex_count() * 3 * 2);
     assert_eq!(few.start_positions(&[0.5, -1.0]), with.start_positions(&[0.5, -1.0]));
     config.start.shape_transfer = false;
-    let without = load(&config).wardrobe.garment(0).unwrap();
+    let without = load(&config).garments.garment(0).unwrap();
     assert!(without.shape_directions.is_empty());
     let rest = without.garment.rest.positions().iter().map(|p| p.map(|x| x as f32));
     assert_eq!(without.start_positions(&[0.5, -1.0]), rest.collect::<Vec<_>>());

@@ -3,6 +3,6 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    clothcombo_trainer::allocator::keep_freed_memory();
+    clothcombo_trainer::system::allocator::keep_freed_memory();
     clothcombo_trainer::cli::train::main()
 }

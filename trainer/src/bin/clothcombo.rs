@@ -39,8 +39,8 @@ enum Verb {
 }
 
 fn main() -> ExitCode {
-    clothcombo_trainer::allocator::keep_freed_memory();
-    clothcombo_trainer::closed_pipe::end_quietly();
+    clothcombo_trainer::system::allocator::keep_freed_memory();
+    clothcombo_trainer::system::closed_pipe::end_quietly();
     let arguments = Arguments::parse();
     arguments.verbosity.apply("info");
     cli::exit_code(match &arguments.verb {

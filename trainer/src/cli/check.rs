@@ -1,7 +1,7 @@
 //! `clothcombo check`: every file of a dataset, in one table.
 
 use crate::cli::verbosity::progress_bar;
-use crate::scene::load_body;
+use crate::dataset::load_body;
 use clap::Parser;
 use clothcombo_data::check::{Checker, FileCheck, GarmentCheck, Target, find_targets, is_body_file};
 use miette::{IntoDiagnostic, Report, miette};

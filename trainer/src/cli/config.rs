@@ -3,10 +3,10 @@
 use crate::cli::memory_table::print_memory;
 use crate::cli::train::load_under_bar;
 use crate::config::{ClipScope, Config, MOST_GARMENTS, StageConfig, Trains, load, schema};
-use crate::device::Backend;
-use crate::estimate::{StageTime, time_stages};
-use crate::memory::DataSizes;
-use crate::report::duration;
+use crate::dataset::DataSizes;
+use crate::run::report::duration;
+use crate::system::device::Backend;
+use crate::training::estimate::{StageTime, time_stages};
 use clap::{Parser, Subcommand};
 use clothcombo_physics::energy::Term;
 use miette::{IntoDiagnostic, Report};
@@ -29,7 +29,7 @@ pub enum Verb {
         clothcombo config check configs/paper.toml --garments 4300 --vertices 8000 --shape-components 300\n\n\
         Memory is estimated from the number of vertices of every garment, and the time from a few real steps of every stage \
         on this machine; both need the data. --no-timing looks at the file alone; --garments and --vertices state the memory \
-        for a wardrobe that is not at hand.")]
+        for a garments that is not at hand.")]
 pub struct CheckArguments {
     /// Configuration file (TOML)
     #[arg(value_name = "FILE")]
@@ -89,8 +89,8 @@ fn check(arguments: &CheckArguments) -> Result<(), Report> {
         return Ok(());
     }
     print_memory(&config, &DataSizes::of_named(&config)?)?;
-    let library = Arc::new(load_under_bar(&config)?);
-    let times = time_stages(&config, &library, &Backend::preferred().device(), arguments.timed_steps)?;
+    let dataset = Arc::new(load_under_bar(&config)?);
+    let times = time_stages(&config, &dataset, &Backend::preferred().device(), arguments.timed_steps)?;
     print_times(&config, &times);
     Ok(())
 }
@@ -110,7 +110,7 @@ fn print_plan(config: &Config) {
     for term in Term::ALL {
         println!("  {:<16} {}", term.name(), config.losses.weight(term));
     }
-    println!("  {:<16} {}", "garments alone", config.losses.alone);
+    println!("  {:<16} {}", "single garments", config.losses.single_garments);
     let o = &config.optimizer;
     println!(
         "\nAdam {} {} · gradient norm {} · average of the weights {}",

@@ -1,15 +1,15 @@
 //! `clothcombo eval`: everything a trained model is judged by, in one report.
 
-use crate::checkpoint::TrainedModel;
 use crate::cli::train::load_under_bar;
 use crate::cli::verbosity::{progress_bar, say};
 use crate::config::{Config, load};
-use crate::device::Backend;
-use crate::draper::shipped_model;
-use crate::paths::obstacle;
-use crate::report::html::utc;
-use crate::scene::Library;
-use crate::study::{Other, Page, Sizes, Study, Subject, study};
+use crate::dataset::Dataset;
+use crate::evaluation::study::{Other, Page, Sizes, Study, Subject, study};
+use crate::inference::shipped_model;
+use crate::run::checkpoint::TrainedModel;
+use crate::run::report::html::utc;
+use crate::system::device::Backend;
+use crate::system::paths::obstacle;
 use clap::Parser;
 use clothcombo_data::format::atomic;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
@@ -88,7 +88,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let subject = subject(arguments, &trained, config)?;
     let ablations = others(arguments, &arguments.ablation, &subject)?;
     let specific = others(arguments, &arguments.specific, &subject)?;
-    check_specific(&specific, &subject.library)?;
+    check_specific(&specific, &subject.dataset)?;
     check_ablations(&ablations, &subject)?;
     let unwritable = || format!("{}", folder.display());
     fs::create_dir_all(folder).into_diagnostic().wrap_err_with(unwritable)?;
@@ -139,8 +139,8 @@ fn check_output(folder: &Path) -> Result<(), Report> {
 
 fn subject(arguments: &Arguments, trained: &TrainedModel, mut config: Config) -> Result<Subject, Report> {
     config.validation.seed = arguments.seed.or(config.validation.seed);
-    let library = Arc::new(load_under_bar(&config)?);
-    let known = trained.known_of_held_out(&config, &library);
+    let dataset = Arc::new(load_under_bar(&config)?);
+    let known = trained.known_of_held_out(&config, &dataset);
     if !known.is_empty() {
         return Err(miette!(
             help = "evaluate it with the split of its own configuration: leave out --config and --set of data.split, \
@@ -150,7 +150,7 @@ fn subject(arguments: &Arguments, trained: &TrainedModel, mut config: Config) ->
             known.join("; it ")
         ));
     }
-    Subject::new(trained, config, library, &arguments.device.device())
+    Subject::new(trained, config, dataset, &arguments.device.device())
 }
 
 /// Further models, each with its own data, measured by the losses of `first` on scenes of its seed.
@@ -170,7 +170,7 @@ fn others(arguments: &Arguments, named: &[(String, PathBuf)], first: &Subject) -
 fn check_ablations(ablations: &[Other], first: &Subject) -> Result<(), Report> {
     let differs = |other: &&Other| {
         let [own, of_first] = [&other.subject, first];
-        own.library.fingerprint_of_windows() != of_first.library.fingerprint_of_windows()
+        own.dataset.fingerprint_of_windows() != of_first.dataset.fingerprint_of_windows()
             || own.config.data.shape_range != of_first.config.data.shape_range
     };
     match ablations.iter().find(differs) {
@@ -183,11 +183,11 @@ fn check_ablations(ablations: &[Other], first: &Subject) -> Result<(), Report> {
     }
 }
 
-fn check_specific(specific: &[Other], library: &Library) -> Result<(), Report> {
-    let knows = |name: &str| (0..library.wardrobe.len()).any(|g| library.wardrobe.card(g).name == name);
+fn check_specific(specific: &[Other], dataset: &Dataset) -> Result<(), Report> {
+    let knows = |name: &str| (0..dataset.garments.len()).any(|g| dataset.garments.info(g).name == name);
     for other in specific {
-        let wardrobe = &other.subject.library.wardrobe;
-        if let Some(stranger) = (0..wardrobe.len()).map(|g| &wardrobe.card(g).name).find(|name| !knows(name))
+        let garments = &other.subject.dataset.garments;
+        if let Some(stranger) = (0..garments.len()).map(|g| &garments.info(g).name).find(|name| !knows(name))
         {
             return Err(miette!(
                 help = "train the garment-specific model on a garment of the configuration's own data",

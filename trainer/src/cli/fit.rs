@@ -1,7 +1,7 @@
 //! `clothcombo fit`: any garment file onto any body.
 
-use crate::paths::{lossy, lossy_option};
-use crate::scene::load_body;
+use crate::dataset::load_body;
+use crate::system::paths::{lossy, lossy_option};
 use clap::{Parser, ValueEnum};
 use clothcombo_data::asset::Category;
 use clothcombo_data::fit::{FitReport, FitSettings, Unit, UpAxis, fit};

@@ -4,8 +4,8 @@ use super::wardrobe_sheet::{PER_ROW, wardrobe_sheet};
 use crate::cli::values::{at_least_one, picture_file};
 use crate::cli::verbosity::{progress_bar, say};
 use crate::config::MOST_GARMENTS;
+use crate::dataset::load_body;
 use crate::picture::save_png;
-use crate::scene::load_body;
 use clap::Parser;
 use clothcombo_data::asset::{Body, Category, Garment};
 use clothcombo_data::dataset::{
@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 #[derive(Parser)]
 #[command(
     after_help = "Examples:\n  clothcombo generate --count 48 --seed 7 --body datasets/open/body.npz -o datasets/generated\n  \
-                  clothcombo generate --count 4300 --picture wardrobe.png -o datasets/wardrobe\n\n\
+                  clothcombo generate --count 4300 --picture garments.png -o datasets/garments\n\n\
                   Garment i is a function of body, seed + i, category and --vertices alone. The same command again goes on where \
                   it was stopped: garments that are there are kept. --start adds more to a folder."
 )]

@@ -1,9 +1,11 @@
 //! What a run will need of memory, as a table and in a line.
 
 use crate::config::{Config, PoseEncoding};
-use crate::device::Backend;
-use crate::memory::{DataSizes, MemoryEstimate, available};
-use crate::report::gibibytes;
+use crate::dataset::DataSizes;
+use crate::run::memory::MemoryEstimate;
+use crate::system::device::Backend;
+use crate::system::memory::available;
+use crate::system::memory::gibibytes;
 use burn::module::Module;
 use clothcombo_model::{ClothCombo, Dimensions};
 use miette::{IntoDiagnostic, Report};

@@ -1,4 +1,4 @@
-//! The command lines of the two programs.
+//! The command lines. In: arguments. Out: the exit code of one of the two programs; one file or folder per verb.
 
 pub mod bench;
 pub mod check;
@@ -24,7 +24,7 @@ mod wardrobe_sheet;
 
 pub use verbosity::Verbosity;
 
-use crate::closed_pipe::tell;
+use crate::system::closed_pipe::tell;
 use miette::Report;
 
 /// Exit code of a program that ended with `result`; an error is printed once, with its place and hint.

@@ -3,7 +3,7 @@
 use crate::cli::train::PREPARING;
 use crate::cli::verbosity::{progress_bar, say};
 use crate::config::load;
-use crate::scene::{Wardrobe, load_body};
+use crate::dataset::{GarmentStore, load_body};
 use clap::Parser;
 use miette::Report;
 use std::path::PathBuf;
@@ -52,7 +52,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let config = load(&arguments.config, &arguments.overrides)?;
     let body = Arc::new(load_body(&config.data.body, config.data.shape_components)?);
     let bar = progress_bar(0, PREPARING);
-    let (garments, bytes) = Wardrobe::prepare(&config, body, arguments.shard.0, &|done, total, name| {
+    let (garments, bytes) = GarmentStore::prepare(&config, body, arguments.shard.0, &|done, total, name| {
         bar.set_length(total as u64);
         bar.set_position(done as u64);
         bar.set_message(name.to_owned());

@@ -1,9 +1,9 @@
 //! `clothcombo replay`: a step whose loss or gradient was not finite, once more.
 
 use crate::cli::train::load_under_bar;
-use crate::device::Backend;
-use crate::exact::Exact;
-use crate::incident::Incident;
+use crate::system::device::Backend;
+use crate::system::exact::Exact;
+use crate::training::incident::Incident;
 use clap::Parser;
 use miette::{Report, miette};
 use std::path::PathBuf;
@@ -38,8 +38,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let file = &arguments.file;
     let incident = Incident::read(file)?;
     let config = incident.configuration(file, &arguments.overrides)?;
-    let library = Arc::new(load_under_bar(&config)?);
-    let again = incident.replay(file, &config, &library, &arguments.device.device())?;
+    let dataset = Arc::new(load_under_bar(&config)?);
+    let again = incident.replay(file, &config, &dataset, &arguments.device.device())?;
 
     println!("step {} of stage {:?}, seed {}", incident.step, incident.stage, incident.seed);
     if let Some(injected) = incident.injected {

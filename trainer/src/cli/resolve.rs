@@ -2,11 +2,11 @@
 
 use crate::cli::interrupted::remove_on_signals;
 use crate::cli::post_process::PostProcessArguments;
-use crate::draper::UniqueNames;
-use crate::draper::output::Staged;
-use crate::paths::lossy;
+use crate::inference::UniqueNames;
+use crate::inference::output::Staged;
 use crate::picture::{DressedRow, draw_dressed, save_png};
 use crate::score::{DrapedGarment, Score, ScoreDistance, ScoreError, load_body, load_garment, score};
+use crate::system::paths::lossy;
 use clap::Parser;
 use clothcombo_data::format::obj::MovedObj;
 use clothcombo_data::format::{MeshFormat, load_mesh};

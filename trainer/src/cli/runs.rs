@@ -1,6 +1,6 @@
 //! `clothcombo runs`: all runs of a folder in one table.
 
-use crate::run_summary::{FoundRun, RunSummary, find_runs};
+use crate::run::summary::{FoundRun, RunSummary, find_runs};
 use clap::Parser;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use std::path::PathBuf;

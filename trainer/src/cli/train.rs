@@ -1,24 +1,24 @@
 //! `clothcombo-train`.
 
 use super::exit_code;
-use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::cli::memory_table::{memory_line, memory_warning};
 use crate::cli::verbosity::{Verbosity, is_quiet, progress_bar, say};
 use crate::config::{Config, load};
-use crate::device::Backend;
-use crate::event::Observer;
-use crate::memory::MemoryEstimate;
-use crate::observer::{
+use crate::dataset::{Dataset, FrameCounts};
+use crate::run::checkpoint::{Checkpoint, CheckpointError};
+use crate::run::event::Observer;
+use crate::run::folder::RunDir;
+use crate::run::memory::MemoryEstimate;
+use crate::run::observer::{
     CurvesObserver, History, HistoryObserver, LogObserver, MetricsObserver, ProgressObserver, ReportObserver,
     TensorBoardObserver,
 };
-use crate::report::gibibytes;
-use crate::run_dir::RunDir;
-use crate::scene::{FrameCounts, Library};
-use crate::session::Session;
-use crate::stop::StopFlag;
-use crate::train_loop::train;
-use crate::world::World;
+use crate::system::device::Backend;
+use crate::system::memory::gibibytes;
+use crate::system::stop::StopFlag;
+use crate::training::process_group::ProcessGroup;
+use crate::training::session::Session;
+use crate::training::train_loop::train;
 use clap::Parser;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use std::cell::RefCell;
@@ -108,33 +108,33 @@ fn run_of(path: &Path) -> Option<PathBuf> {
 
 /// The whole program, as one of the processes that a launcher may have started.
 pub fn main() -> ExitCode {
-    let world = match World::join() {
-        Ok(world) => Rc::new(world),
+    let group = match ProcessGroup::join() {
+        Ok(group) => Rc::new(group),
         Err(error) => return exit_code(Err(error.into())),
     };
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(message) => {
-            if world.leads() {
+            if group.is_rank_zero() {
                 // A closed terminal is no reason to fail differently.
                 let _ = message.print();
             }
             return ExitCode::from(u8::try_from(message.exit_code()).unwrap_or(2));
         }
     };
-    arguments.verbosity.or_quiet(!world.leads()).apply("warn");
-    match world.conclude(run(&arguments, &world)) {
+    arguments.verbosity.or_quiet(!group.is_rank_zero()).apply("warn");
+    match group.conclude(run(&arguments, &group)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(Some(report)) => exit_code(Err(report)),
         Err(None) => ExitCode::FAILURE,
     }
 }
 
-/// Trains as one of the processes in `world`, of which only the leader writes and prints.
+/// Trains as one of the processes in `group`, of which only the leader writes and prints.
 ///
 /// # Errors
 /// One report that names the file, key or garment at fault and how to mend it.
-fn run(arguments: &Arguments, world: &Rc<World>) -> Result<(), Report> {
+fn run(arguments: &Arguments, group: &Rc<ProcessGroup>) -> Result<(), Report> {
     let stop = StopFlag::on_signals().into_diagnostic().wrap_err("cannot listen for Ctrl-C")?;
     let named = arguments.named_run()?;
     let file = arguments.config_file(named.as_deref())?;
@@ -143,49 +143,49 @@ fn run(arguments: &Arguments, world: &Rc<World>) -> Result<(), Report> {
     let config = load(&file, &arguments.overrides)?;
     let existing = match &arguments.resume {
         Some(path) => {
-            let run = match world.leads() {
+            let run = match group.is_rank_zero() {
                 true => RunDir::resume(&root, &config, &arguments.allow_config_change)?,
                 false => RunDir::follow(&root),
             };
             Some((run, newest_or_none(path.as_deref().unwrap_or(&root))?))
         }
-        None if world.leads() => RunDir::refuse_occupied(&root).map(|()| None)?,
+        None if group.is_rank_zero() => RunDir::refuse_occupied(&root).map(|()| None)?,
         None => None,
     };
-    let library = Arc::new(load_library(&config)?);
+    let dataset = Arc::new(load_dataset(&config)?);
     let device = arguments.device.device();
     let (run, session) = match existing {
         Some((run, checkpoint)) => {
             let session = match &checkpoint {
-                Some(c) => Session::resume(run.clone(), config.clone(), library.clone(), &device, c)?,
-                None => Session::new(run.clone(), config.clone(), library.clone(), &device)?,
+                Some(c) => Session::resume(run.clone(), config.clone(), dataset.clone(), &device, c)?,
+                None => Session::new(run.clone(), config.clone(), dataset.clone(), &device)?,
             };
-            // Everybody has read the checkpoint before the leader moves others aside.
-            world.meet(false)?;
-            if world.leads() {
+            // Every process has read the checkpoint before rank zero moves others aside.
+            group.barrier(false)?;
+            if group.is_rank_zero() {
                 continue_run(&run, &config, checkpoint.as_ref())?;
             }
             (run, session)
         }
         None => {
-            let run = match world.leads() {
+            let run = match group.is_rank_zero() {
                 true => RunDir::create(&root, &config)?,
                 false => RunDir::follow(&root),
             };
-            let session = Session::new(run.clone(), config.clone(), library.clone(), &device)?;
+            let session = Session::new(run.clone(), config.clone(), dataset.clone(), &device)?;
             (run, session)
         }
     };
-    let mut session = session.shared_in(world.clone())?;
-    if !world.leads() {
+    let mut session = session.shared_in(group.clone())?;
+    if !group.is_rank_zero() {
         return train(&mut session, &mut [], &stop);
     }
-    run.write_split(&library.split_names())?;
+    run.write_split(&dataset.split_names())?;
     let memory = session.memory_estimate();
     if !is_quiet() {
         say(&format!("run folder {}", run.root().display()));
-        if world.is_shared() {
-            say(&format!("{} processes share every step", world.share().size));
+        if group.is_shared() {
+            say(&format!("{} processes share every step", group.partition().size));
         }
         if let Some(m) = memory {
             say(&memory_line(&m));
@@ -194,9 +194,9 @@ fn run(arguments: &Arguments, world: &Rc<World>) -> Result<(), Report> {
             }
         }
     }
-    let mut observers = observers(&run, &config, &library, session.step(), memory)?;
+    let mut observers = observers(&run, &config, &dataset, session.step(), memory)?;
     let result = train(&mut session, &mut observers, &stop);
-    let (host, device) = (library.memory.most(), session.tensors().memory().most());
+    let (host, device) = (dataset.memory.most(), session.tensors().memory().most());
     tracing::info!(
         "kept of garments at most {}, {} of it tensors and embeddings",
         gibibytes(host.total.max(device.total) as u64),
@@ -234,14 +234,14 @@ fn continue_run(run: &RunDir, config: &Config, checkpoint: Option<&Checkpoint>) 
 fn observers(
     run: &RunDir,
     config: &Config,
-    library: &Library,
+    dataset: &Dataset,
     step: u64,
     memory: Option<MemoryEstimate>,
 ) -> Result<Vec<Box<dyn Observer>>, Report> {
     // First, because it drops the lines after the checkpoint that the run continues from.
     let metrics = MetricsObserver::new(run, step, config.output.metrics_every)?;
     let history = Rc::new(RefCell::new(History::read(run)?));
-    let report = ReportObserver::new(run, config, library.licences(), memory, history.clone())?;
+    let report = ReportObserver::new(run, config, dataset.licences(), memory, history.clone())?;
     let mut observers: Vec<Box<dyn Observer>> = vec![
         Box::new(metrics),
         Box::new(LogObserver::new(run)?),
@@ -259,31 +259,31 @@ fn observers(
 }
 
 /// Loads the data of `config` under a bar.
-pub(crate) fn load_under_bar(config: &Config) -> Result<Library, Report> {
+pub(crate) fn load_under_bar(config: &Config) -> Result<Dataset, Report> {
     let bar = progress_bar(0, PREPARING);
-    let library = Library::load(config, &|done, total, name| {
+    let dataset = Dataset::load(config, &|done, total, name| {
         bar.set_length(total as u64);
         bar.set_position(done as u64);
         bar.set_message(name.to_owned());
     })?;
     bar.finish_and_clear();
-    Ok(library)
+    Ok(dataset)
 }
 
 /// The bar shown while garments are prepared.
 pub(crate) const PREPARING: &str = "preparing garments {bar:30} {pos}/{len} {msg}";
 
-fn load_library(config: &Config) -> Result<Library, Report> {
-    let library = load_under_bar(config)?;
+fn load_dataset(config: &Config) -> Result<Dataset, Report> {
+    let dataset = load_under_bar(config)?;
     if !is_quiet() {
         say(&format!(
             "body: {} · {} garments ({} not trained on) · {} joints · {} shape components{}",
-            library.body.name,
-            library.wardrobe.len(),
-            library.wardrobe.len() - library.split.training.len(),
-            library.joints().len(),
-            library.shape_count,
-            match library.poses.frame_counts() {
+            dataset.body.name,
+            dataset.garments.len(),
+            dataset.garments.len() - dataset.split.training.len(),
+            dataset.joints().len(),
+            dataset.shape_count,
+            match dataset.poses.frame_counts() {
                 Some(FrameCounts { training, windows, validation, test }) => format!(
                     " · {training} motion frames (never trained on: {windows} of held-out windows, {validation} of \
                      validation clips, {test} of test clips)"
@@ -292,7 +292,7 @@ fn load_library(config: &Config) -> Result<Library, Report> {
             }
         ));
     }
-    Ok(library)
+    Ok(dataset)
 }
 
 /// `runs/NAME`, or the first free `runs/NAME-2`, `-3`, …; when resuming, the last existing one.

@@ -1,6 +1,6 @@
 //! How much the programs say: the same flags for every verb.
 
-use crate::closed_pipe::tell;
+use crate::system::closed_pipe::tell;
 use clap::{ArgAction, Args};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;

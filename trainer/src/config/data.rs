@@ -1,8 +1,8 @@
 //! Where bodies, garments and poses come from, and the state the networks start from.
 
-use crate::scene::{KeptBytes, LibraryError};
+use crate::system::lru_cache::KeptBytes;
 use clothcombo_data::asset::Category;
-use clothcombo_data::cache::ArrayCache;
+use clothcombo_data::cache::{ArrayCache, CacheError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -21,7 +21,7 @@ pub struct DataConfig {
     #[serde(default = "shape_range")]
     pub shape_range: [f64; 2],
     /// Sources of garments, all used together.
-    pub garments: Vec<GarmentSource>,
+    pub garments: Vec<GarmentSourceConfig>,
     /// Garments of these names are for the final test: never trained on, and read by no validation, no choice of the best
     /// checkpoint and no picture of a run. `clothcombo eval` reads them.
     #[serde(default)]
@@ -97,7 +97,7 @@ impl Default for CacheConfig {
 /// One source of garments: a folder, or the generator.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct GarmentSource {
+pub struct GarmentSourceConfig {
     /// Folder of garments (OBJ, PLY, STL, glTF) with an optional `garments.toml`.
     #[serde(default)]
     pub folder: Option<PathBuf>,
@@ -281,10 +281,9 @@ impl DataConfig {
     ///
     /// # Errors
     /// When the folder cannot be used.
-    pub(crate) fn open_cache(&self) -> Result<Option<ArrayCache>, LibraryError> {
+    pub(crate) fn open_cache(&self) -> Result<Option<ArrayCache>, CacheError> {
         let limit = (self.cache.limit_gib * f64::from(1 << 30)) as u64;
-        let open = |folder: &PathBuf| ArrayCache::open(folder, limit).map_err(LibraryError::data);
-        self.cache.folder.as_ref().map(open).transpose()
+        self.cache.folder.as_ref().map(|folder| ArrayCache::open(folder, limit)).transpose()
     }
 
     /// What is inconsistent, as (place, what, hint).

@@ -1,4 +1,5 @@
-//! The configuration of a run: one TOML file, every key documented here with unit, default and reason.
+//! The configuration. In: a TOML file and overrides. Out: a checked [`Config`], every key of which is documented here with unit,
+//! default and reason, or an error that names file, line and key.
 //!
 //! Unknown keys are errors. Every value used is written back to `RUN/config.toml`.
 
@@ -16,7 +17,7 @@ mod stages;
 mod validation;
 
 pub use data::{
-    CacheConfig, DataConfig, GarmentSource, GenerateConfig, MOST_GARMENTS, PoseConfig, PoseEncoding,
+    CacheConfig, DataConfig, GarmentSourceConfig, GenerateConfig, MOST_GARMENTS, PoseConfig, PoseEncoding,
     SplitConfig, StartConfig,
 };
 pub use guard::{GuardConfig, InjectConfig, Injected};
@@ -26,7 +27,7 @@ pub use optimizer::{ClipScope, OptimizerConfig};
 pub use output::OutputConfig;
 pub use ramp::{Ramp, RampShape};
 pub use schema::schema;
-pub use stages::{StageConfig, Trains};
+pub use stages::{StageConfig, Trains, stage_starts};
 pub use validation::ValidationConfig;
 
 use clothcombo_model::{ModelConfig, ModelError};

@@ -240,12 +240,12 @@ fn garments_that_do_not_lie_on_the_body_as_they_are_are_fitted() {
         }
         _ => None,
     });
-    let wardrobe = folder.path().join("wardrobe");
-    fs::create_dir(&wardrobe).unwrap();
+    let garments = folder.path().join("wardrobe");
+    fs::create_dir(&garments).unwrap();
     fs::write(folder.path().join("turned.obj"), turned).unwrap();
-    fs::write(wardrobe.join("large.obj"), large).unwrap();
-    let (turned, wardrobe, out) = (at(&folder, "turned.obj"), at(&folder, "wardrobe"), at(&folder, "out"));
-    drape(&["--garments", &turned, "large", "--dataset", &wardrobe, "-o", &out]).assert().success();
+    fs::write(garments.join("large.obj"), large).unwrap();
+    let (turned, garments, out) = (at(&folder, "turned.obj"), at(&folder, "wardrobe"), at(&folder, "out"));
+    drape(&["--garments", &turned, "large", "--dataset", &garments, "-o", &out]).assert().success();
     let report = report(Path::new(&out));
     let fit = |garment: usize| &report["garments"][garment]["fit"];
     assert_eq!(fit(0)["repairs"][0]["kind"].as_str(), Some("turned_faces"), "{}", fit(0));

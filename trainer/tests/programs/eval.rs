@@ -134,7 +134,7 @@ fn a_quick_evaluation_holds_every_table_of_the_paper() {
     assert_eq!(layers, [1, 2, 3, 4, 5, 6, 7, 8, 12]);
     // One garment has nothing to untangle: the same strain as alone.
     assert_eq!(study["layers"][0]["strain"][0]["of_means"], 1.0);
-    assert_eq!(study["layers"][0]["strain_alone"], study["layers"][0]["strain_worn"]);
+    assert_eq!(study["layers"][0]["strain_alone"], study["layers"][0]["strain_in_outfit"]);
     // The same model under another name finds the same on the same scenes.
     let ablations = study["ablations"].as_array().unwrap();
     assert_eq!(ablations.len(), 2);

@@ -23,5 +23,5 @@ mod own_garments;
 mod resolve;
 mod run_safety;
 mod score;
-mod steady;
+mod temporal_filter;
 mod viewer;

@@ -110,9 +110,9 @@ fn memory_is_stated_for_a_wardrobe_that_is_not_at_hand() {
     let paper = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/paper.toml");
     let check =
         |more: &[&str]| clothcombo(&[&["config", "check", &paper.display().to_string()], more].concat());
-    let wardrobe = ["--garments", "4300", "--vertices", "8000", "--shape-components", "300"];
+    let garments = ["--garments", "4300", "--vertices", "8000", "--shape-components", "300"];
     let cached = ["--set", "data.cache.folder=\"somewhere\""];
-    let output = check(&[&wardrobe[..], &cached].concat());
+    let output = check(&[&garments[..], &cached].concat());
     assert!(output.status.success(), "{}", said(&output));
     let table = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(table.contains("4300 garments of 8000 vertices on average, 300 shape components"), "{table}");

@@ -3,8 +3,8 @@
 use crate::cli::train::load_under_bar;
 use crate::cli::values::{measuring_seconds, not_negative};
 use crate::cli::verbosity::say;
-use crate::device::Backend;
-use crate::measure::{Case, Subject};
+use crate::system::device::Backend;
+use crate::training::measure::{Case, Subject};
 use clap::{Parser, ValueEnum};
 use clothcombo_model::ClothCombo;
 use miette::{IntoDiagnostic, Report, miette};
@@ -64,8 +64,8 @@ struct Row {
 /// When a device fails, or disagrees with the first by more than is asked for.
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let config = Case::new(arguments.width, arguments.layers, arguments.vertices).config(&[])?;
-    let library = Arc::new(load_under_bar(&config)?);
-    let subject = |backend: Backend| Subject::new(config.clone(), library.clone(), 0, &backend.device());
+    let dataset = Arc::new(load_under_bar(&config)?);
+    let subject = |backend: Backend| Subject::new(config.clone(), dataset.clone(), 0, &backend.device());
     let first = subject(Backend::preferred())?;
     let scene = first.scene(0)?;
     let (loss, gradients) = first.loss_and_gradients(&scene)?;

@@ -2,18 +2,19 @@
 
 mod summary;
 
-use crate::checkpoint::TrainedModel;
 use crate::cli::post_process::PostProcessArguments;
 use crate::cli::train::load_under_bar;
 use crate::cli::values::at_least_one;
 use crate::cli::verbosity::progress_bar;
 use crate::config::{Config, load};
-use crate::device::Backend;
-use crate::drape::{Networks, WardrobeTensors};
-use crate::draper::UniqueNames;
-use crate::evaluate::certificates::{DrapedScene, Dressing, OutfitResult};
-use crate::one_core::each_on_one_core;
-use crate::scene::{Library, PreparedScene, SceneDraw, draw_outfit, prepare};
+use crate::dataset::{Dataset, PreparedScene, SceneSample, prepare, sample_outfit};
+use crate::evaluation::certificates::{DrapedScene, Dressing, OutfitResult};
+use crate::inference::UniqueNames;
+use crate::inference::networks::Networks;
+use crate::inference::tensor_store::TensorStore;
+use crate::run::checkpoint::TrainedModel;
+use crate::system::device::Backend;
+use crate::system::single_threaded::map_single_threaded;
 use clap::Parser;
 use clothcombo_data::format::obj;
 use clothcombo_physics::contact::resolve::ResolveSettings;
@@ -88,8 +89,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         // Nothing but the networks reads the eigenvectors, and most of the preparation is theirs.
         config.model.eigen_count = 1;
     }
-    let library = Arc::new(load_under_bar(&config)?);
-    let results = measure(arguments, &config, &library, checkpoint.as_ref(), &settings)?;
+    let dataset = Arc::new(load_under_bar(&config)?);
+    let results = measure(arguments, &config, &dataset, checkpoint.as_ref(), &settings)?;
     if arguments.json {
         let mut report = summary::report(&results, usize::from(arguments.layers));
         report["jobs"] = json!(arguments.jobs);
@@ -106,7 +107,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
 fn measure(
     arguments: &Arguments,
     config: &Config,
-    library: &Arc<Library>,
+    dataset: &Arc<Dataset>,
     checkpoint: Option<&TrainedModel>,
     settings: &ResolveSettings,
 ) -> Result<Vec<OutfitResult>, Report> {
@@ -114,9 +115,9 @@ fn measure(
     let networks = match checkpoint {
         None => None,
         Some(checkpoint) => {
-            checkpoint.check_fits(library)?;
+            checkpoint.check_fits(dataset)?;
             let device = Backend::preferred().device();
-            tensors = WardrobeTensors::new(library.clone(), checkpoint.state.dimensions(), &device);
+            tensors = TensorStore::new(dataset.clone(), checkpoint.state.dimensions(), &device);
             Some(Networks::new(checkpoint.networks(&device)?, &tensors))
         }
     };
@@ -125,18 +126,18 @@ fn measure(
         false => arguments.only.clone(),
     };
     let bar = progress_bar(draws.len(), "outfits {bar:30} {pos}/{len} · {eta} left");
-    let orders = orders(library, &arguments.orders)?;
-    let dressing = Dressing::new(library, &config.losses, networks.as_ref());
+    let orders = orders(dataset, &arguments.orders)?;
+    let dressing = Dressing::new(dataset, &config.losses, networks.as_ref());
     let resolve = |draw: usize| {
         let seed = arguments.seed.unwrap_or_else(|| config.validation_seed());
         let outfit = match orders.is_empty() {
-            true => draw_outfit(library, seed, draw as u64, usize::from(arguments.layers)),
+            true => sample_outfit(dataset, seed, draw as u64, usize::from(arguments.layers)),
             false => {
-                let body = draw_outfit(library, seed, (draw / orders.len()) as u64, 1);
-                SceneDraw { garments: orders[draw % orders.len()].clone(), ..body }
+                let body = sample_outfit(dataset, seed, (draw / orders.len()) as u64, 1);
+                SceneSample { garments: orders[draw % orders.len()].clone(), ..body }
             }
         };
-        let scene = prepare(library, &config.losses, outfit, 1.0)?;
+        let scene = prepare(dataset, &config.losses, outfit, 1.0)?;
         let draped = dressing.of(&scene, &dressing.drape(&scene)?);
         let (result, resolved) =
             OutfitResult::new(draw, &draped, settings).wrap_err_with(|| format!("draw {draw}"))?;
@@ -148,18 +149,18 @@ fn measure(
     };
     let results = match arguments.jobs {
         1 => draws.into_iter().map(resolve).collect::<Result<_, Report>>()?,
-        jobs => each_on_one_core(draws, Some(jobs), resolve)?,
+        jobs => map_single_threaded(draws, Some(jobs), resolve)?,
     };
     bar.finish_and_clear();
     Ok(results)
 }
 
 /// Every order of the garments called `names`; none for no name.
-fn orders(library: &Library, names: &[String]) -> Result<Vec<Vec<usize>>, Report> {
+fn orders(dataset: &Dataset, names: &[String]) -> Result<Vec<Vec<usize>>, Report> {
     if names.len() > 6 {
         return Err(miette!(help = "give at most six", "{} garments have too many orders", names.len()));
     }
-    let cards = || (0..library.wardrobe.len()).map(|i| library.wardrobe.card(i).name.as_str());
+    let cards = || (0..dataset.garments.len()).map(|i| dataset.garments.info(i).name.as_str());
     let find = |name: &String| {
         cards().position(|known| known == name).ok_or_else(|| {
             let all = cards().collect::<Vec<_>>().join(", ");
@@ -194,8 +195,8 @@ fn write_meshes(
     };
     save("body.obj".into(), &draped.body.positions, &draped.body.faces, "body".into())?;
     let mut names = UniqueNames::default();
-    for (i, worn) in scene.worn.iter().enumerate() {
-        let garment = &worn.garment;
+    for (i, garment) in scene.garments.iter().enumerate() {
+        let garment = &garment.garment;
         let name = names.take(&garment.name);
         let states = [
             ("rest", garment.rest.positions()),

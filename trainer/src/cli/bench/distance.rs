@@ -2,8 +2,8 @@
 
 use crate::cli::verbosity::progress_bar;
 use crate::config::PoseConfig;
-use crate::evaluate::{RegionErrors, SignErrorSettings, SignErrors, WrongSigns, hard_poses, sign_errors};
-use crate::scene::{HeldOut, PoseLibrary, load_body};
+use crate::dataset::{HeldOut, PoseLibrary, load_body};
+use crate::evaluation::{RegionErrors, SignErrorSettings, SignErrors, WrongSigns, hard_poses, sign_errors};
 use clap::Parser;
 use clothcombo_data::asset::{BODY_JOINT_COUNT, Body, Pose};
 use miette::{IntoDiagnostic, Report, miette};
@@ -96,9 +96,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
 
 fn draw(arguments: &Arguments, body: &Arc<Body>) -> Result<Vec<Pose>, Report> {
     let config = PoseConfig { motions: arguments.motions.clone(), ..PoseConfig::default() };
-    let library = PoseLibrary::new(&config, body)?;
+    let dataset = PoseLibrary::new(&config, body)?;
     let mut rng = ChaCha8Rng::seed_from_u64(arguments.seed);
-    Ok((0..arguments.poses).map(|_| library.draw_held_out(HeldOut::Windows, &mut rng)).collect())
+    Ok((0..arguments.poses).map(|_| dataset.draw_held_out(HeldOut::Windows, &mut rng)).collect())
 }
 
 /// Shares in percent, as Markdown; the farthest wrong point in millimetres.

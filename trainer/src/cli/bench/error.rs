@@ -1,21 +1,22 @@
 //! `clothcombo bench error`: how far drapes are from equilibrium.
 
-use crate::checkpoint::TrainedModel;
 use crate::cli::train::load_under_bar;
 use crate::cli::values::at_least_one;
 use crate::cli::verbosity::progress_bar;
 use crate::config::{Config, ValidationConfig, load};
-use crate::device::Backend;
-use crate::drape::{Networks, WardrobeTensors};
-use crate::draper::DraperError;
-use crate::evaluate::Spread;
-use crate::evaluate::certificates::Dressing;
-use crate::evaluate::equilibrium_error::{
+use crate::dataset::{Dataset, DatasetError, PreparedScene, ValidationGroup, prepare, sample_validation};
+use crate::evaluation::certificates::Dressing;
+use crate::evaluation::equilibrium_error::{
     Drapes, LBS, MethodError, SceneError, TermEnergies, converged, scene_error,
 };
-use crate::evaluate::reference::ReferenceScene;
-use crate::one_core::each_on_one_core;
-use crate::scene::{Library, LibraryError, PreparedScene, ValidationGroup, draw_validation, prepare};
+use crate::inference::DraperError;
+use crate::inference::networks::Networks;
+use crate::inference::reference::ReferenceScene;
+use crate::inference::tensor_store::TensorStore;
+use crate::run::checkpoint::TrainedModel;
+use crate::run::spread::Spread;
+use crate::system::device::Backend;
+use crate::system::single_threaded::map_single_threaded;
 use clap::Parser;
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use clothcombo_physics::equilibrium::SolverSettings;
@@ -92,12 +93,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     {
         return Err(DraperError::NoCorrections { steps: *steps }.into());
     }
-    let library = Arc::new(load_under_bar(&config)?);
+    let dataset = Arc::new(load_under_bar(&config)?);
     let seed = arguments.seed.unwrap_or_else(|| config.validation_seed());
-    let scenes = draw_scenes(&library, &config, [arguments.scenes, arguments.layers], seed)?;
+    let scenes = draw_scenes(&dataset, &config, [arguments.scenes, arguments.layers], seed)?;
     let networks: Vec<Option<Drapes>> = match &trained {
         Some(trained) => {
-            let drapes = drape(trained, &config, &library, &scenes, &arguments.corrections)?;
+            let drapes = drape(trained, &config, &dataset, &scenes, &arguments.corrections)?;
             drapes.into_iter().map(Some).collect()
         }
         None => scenes.iter().map(|_| None).collect(),
@@ -129,11 +130,11 @@ fn configuration(arguments: &Arguments, trained: Option<&TrainedModel>) -> Resul
 
 /// Random ones of the single-garment validation scenes: as many as the configuration has, or more if more are asked for.
 fn draw_scenes(
-    library: &Library,
+    dataset: &Dataset,
     config: &Config,
     [count, layers]: [usize; 2],
     seed: u64,
-) -> Result<Vec<PreparedScene>, LibraryError> {
+) -> Result<Vec<PreparedScene>, DatasetError> {
     let pool = config.validation.single_scenes.max(count);
     let validation = ValidationConfig {
         single_scenes: pool,
@@ -142,34 +143,34 @@ fn draw_scenes(
         ..config.validation.clone()
     };
     let group = if layers == 1 { ValidationGroup::Single } else { ValidationGroup::Layered };
-    let draws = draw_validation(library, seed, &validation, group);
+    let draws = sample_validation(dataset, seed, &validation, group);
     let chosen = index::sample(&mut ChaCha8Rng::seed_from_u64(seed), pool, count);
-    chosen.into_iter().map(|i| prepare(library, &config.losses, draws[i].clone(), 1.0)).collect()
+    chosen.into_iter().map(|i| prepare(dataset, &config.losses, draws[i].clone(), 1.0)).collect()
 }
 
 fn drape(
     trained: &TrainedModel,
     config: &Config,
-    library: &Arc<Library>,
+    dataset: &Arc<Dataset>,
     scenes: &[PreparedScene],
     corrections: &[usize],
 ) -> Result<Vec<Drapes>, Report> {
-    trained.check_fits(library)?;
+    trained.check_fits(dataset)?;
     let device = Backend::preferred().device();
-    let tensors = WardrobeTensors::new(library.clone(), trained.state.dimensions(), &device);
+    let tensors = TensorStore::new(dataset.clone(), trained.state.dimensions(), &device);
     let networks = Networks::new(trained.networks(&device)?, &tensors);
-    let dressing = Dressing::new(library, &config.losses, Some(&networks));
+    let dressing = Dressing::new(dataset, &config.losses, Some(&networks));
     let post_process = ResolveSettings { steps: WAY_STEPS, ..ResolveSettings::default() };
     let bar = progress_bar(scenes.len(), "draping {bar:30} {pos}/{len} · {eta} left");
     let drapes = scenes.iter().map(|scene| {
         let drape = networks.drape(scene)?;
         // Alone a garment is near enough to its equilibrium to start from; in an outfit that crosses, no force can tell where
         // cloth belongs.
-        let resolved = match scene.worn.len() {
+        let resolved = match scene.garments.len() {
             1 => None,
             _ => Some(dressing.of(scene, &drape.posed).resolved(&post_process)?.positions.concat()),
         };
-        let mut drapes = Drapes::new(&networks.drape_alone(scene)?, &drape, resolved);
+        let mut drapes = Drapes::new(&networks.drape_single_garments(scene)?, &drape, resolved);
         for &steps in corrections {
             let drape = networks.with_correction_steps(steps).drape(scene)?;
             drapes.steps.push((steps, drape.posed.iter().map(|p| p.map(f64::from)).collect()));
@@ -202,7 +203,7 @@ fn solve_all(
         bar.inc(1);
         result.into_diagnostic().wrap_err_with(|| format!("scene {i} ({name})"))
     };
-    let results = each_on_one_core((0..scenes.len()).collect(), arguments.jobs, solve_one);
+    let results = map_single_threaded((0..scenes.len()).collect(), arguments.jobs, solve_one);
     bar.finish_and_clear();
     results
 }

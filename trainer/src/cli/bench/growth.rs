@@ -2,8 +2,8 @@
 
 use crate::cli::values::{measuring_seconds, picture_file};
 use crate::cli::verbosity::progress_bar;
-use crate::measure::Case;
 use crate::picture::{Line, LinePanel, draw_lines, save_png};
+use crate::training::measure::Case;
 use clap::Parser;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use serde::Serialize;

@@ -1,6 +1,6 @@
 //! `clothcombo bench poses`: how many bodies run through themselves, and what it costs to find out.
 
-use crate::scene::load_body;
+use crate::dataset::load_body;
 use clap::Parser;
 use clothcombo_data::asset::{Body, Pose};
 use clothcombo_data::dataset::load_motion_folder;

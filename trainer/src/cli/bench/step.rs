@@ -4,9 +4,9 @@ use crate::cli::train::load_under_bar;
 use crate::cli::values::{at_least_one, measuring_seconds, picture_file};
 use crate::cli::verbosity::say;
 use crate::config::{Config, load};
-use crate::device::Backend;
-use crate::measure::{Case, Costs, PHASES, Profile, Subject, export};
 use crate::picture::{Bar, draw_bars, save_png};
+use crate::system::device::Backend;
+use crate::training::measure::{Case, Costs, PHASES, Profile, Subject, export};
 use clap::Parser;
 use clothcombo_physics::energy::Term;
 use miette::{IntoDiagnostic, Report, miette};
@@ -140,8 +140,8 @@ fn made_up(arguments: &Arguments) -> Result<Vec<Measured>, Report> {
     for case in cases {
         let config = case.config(&arguments.overrides)?;
         let case = case.of_config(&config);
-        let library = Arc::new(load_under_bar(&config)?);
-        let mut subject = Subject::new(config, library, 0, &arguments.device.device())?;
+        let dataset = Arc::new(load_under_bar(&config)?);
+        let mut subject = Subject::new(config, dataset, 0, &arguments.device.device())?;
         let name =
             std::iter::once(case.name()).chain(arguments.overrides.iter().cloned()).collect::<Vec<_>>();
         measured.push(measure(&mut subject, name.join(", "), Some(case), arguments)?);
@@ -188,9 +188,9 @@ fn stages(arguments: &Arguments, config: Config) -> Result<Vec<Measured>, Report
             names.len()
         ));
     }
-    let library = Arc::new(load_under_bar(&config)?);
+    let dataset = Arc::new(load_under_bar(&config)?);
     let stage = |index: usize| {
-        let mut subject = Subject::new(config.clone(), library.clone(), index, &arguments.device.device())?;
+        let mut subject = Subject::new(config.clone(), dataset.clone(), index, &arguments.device.device())?;
         measure(&mut subject, names[index].clone(), None, arguments)
     };
     chosen.into_iter().map(stage).collect()
@@ -218,8 +218,8 @@ fn measure(
             eigen_count,
             bodies,
         }),
-        layers: scene.worn.len(),
-        vertices: scene.worn.iter().map(|garment| garment.vertex_count()).sum(),
+        layers: scene.garments.len(),
+        vertices: scene.garments.iter().map(|garment| garment.vertex_count()).sum(),
         parameters: burn::module::Module::num_params(subject.model()),
         profile,
         costs,

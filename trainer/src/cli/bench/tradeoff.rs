@@ -1,18 +1,18 @@
 //! `clothcombo bench tradeoff`.
 
 use super::step::short;
-use crate::checkpoint::TrainedModel;
 use crate::cli::train::load_under_bar;
 use crate::cli::values::{measuring_seconds, picture_file};
 use crate::cli::verbosity::say;
 use crate::config::{Config, LossesConfig, ValidationConfig};
-use crate::device::Backend;
-use crate::drape::{Networks, WardrobeTensors};
-use crate::evaluate::Draped;
-use crate::measure::median_ms;
+use crate::dataset::{Dataset, PreparedScene, ValidationGroup, prepare, sample_validation};
+use crate::evaluation::median_ms;
+use crate::inference::Draped;
+use crate::inference::networks::Networks;
+use crate::inference::tensor_store::TensorStore;
 use crate::picture::{Line, LinePanel, draw_lines, save_png};
-use crate::scene::{Library, PreparedScene, ValidationGroup, draw_validation, prepare};
-use crate::session::state;
+use crate::run::checkpoint::TrainedModel;
+use crate::system::device::Backend;
 use burn::module::{Module, ModuleMapper, Param};
 use burn::tensor::{Tensor, TensorData, bf16, f16};
 use clap::Parser;
@@ -92,44 +92,44 @@ struct LossForm {
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let first = TrainedModel::open(&arguments.checkpoint[0])?;
     let config = first.config.clone();
-    let library = Arc::new(load_under_bar(&config)?);
-    let scenes = scenes(&library, &config, arguments)?;
-    let trained = networks(&first, &library)?;
+    let dataset = Arc::new(load_under_bar(&config)?);
+    let scenes = scenes(&dataset, &config, arguments)?;
+    let trained = networks(&first, &dataset)?;
 
     let k = config.model.eigen_count;
     let base = drapes(
         &format!("as trained, k = {k}"),
         k,
         trained.clone(),
-        &library,
+        &dataset,
         &scenes,
         None,
         arguments.seconds,
     )?;
     let mut rows = vec![base.clone()];
-    let mut add = |name: &str, k: usize, model: ClothCombo, library: &Arc<Library>| -> Result<(), Report> {
+    let mut add = |name: &str, k: usize, model: ClothCombo, dataset: &Arc<Dataset>| -> Result<(), Report> {
         say(&format!("measuring {name}"));
-        rows.push(drapes(name, k, model, library, &scenes, Some(&base), arguments.seconds)?);
+        rows.push(drapes(name, k, model, dataset, &scenes, Some(&base), arguments.seconds)?);
         Ok(())
     };
-    add("weights in bf16", k, trained.clone().map(&mut Rounded(|x| bf16::from_f32(x).to_f32())), &library)?;
-    add("weights in f16", k, trained.clone().map(&mut Rounded(|x| f16::from_f32(x).to_f32())), &library)?;
+    add("weights in bf16", k, trained.clone().map(&mut Rounded(|x| bf16::from_f32(x).to_f32())), &dataset)?;
+    add("weights in f16", k, trained.clone().map(&mut Rounded(|x| f16::from_f32(x).to_f32())), &dataset)?;
     for &count in arguments.eigen_counts.iter().filter(|count| **count != k) {
         let mut other = config.clone();
         other.model.eigen_count = count;
-        let library = Arc::new(load_under_bar(&other)?);
-        add(&format!("k = {count}"), count, trained.clone(), &library)?;
+        let dataset = Arc::new(load_under_bar(&other)?);
+        add(&format!("k = {count}"), count, trained.clone(), &dataset)?;
     }
     for path in &arguments.checkpoint[1..] {
         let other = TrainedModel::open(path)?;
         let model = &other.config.model;
         let own = Config { model: model.clone(), ..config.clone() };
-        let library = match model.eigen_count {
-            same if same == k => library.clone(),
+        let dataset = match model.eigen_count {
+            same if same == k => dataset.clone(),
             _ => Arc::new(load_under_bar(&own)?),
         };
         let name = format!("{} (width {})", path.display(), model.width);
-        add(&name, model.eigen_count, networks(&other, &library)?, &library)?;
+        add(&name, model.eigen_count, networks(&other, &dataset)?, &dataset)?;
     }
     let losses = loss_forms(&config.losses, &scenes, &base.draped, arguments.seconds)?;
     if let Some(path) = &arguments.picture {
@@ -145,7 +145,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     Ok(())
 }
 
-fn scenes(library: &Library, config: &Config, arguments: &Arguments) -> Result<Vec<PreparedScene>, Report> {
+fn scenes(dataset: &Dataset, config: &Config, arguments: &Arguments) -> Result<Vec<PreparedScene>, Report> {
     let validation = ValidationConfig {
         single_scenes: arguments.single_scenes,
         layered_scenes: arguments.layered_scenes,
@@ -153,8 +153,8 @@ fn scenes(library: &Library, config: &Config, arguments: &Arguments) -> Result<V
     };
     let mut scenes = Vec::new();
     for group in [ValidationGroup::Single, ValidationGroup::Layered] {
-        for draw in draw_validation(library, config.validation_seed(), &validation, group) {
-            scenes.push(prepare(library, &config.losses, draw, 1.0)?);
+        for draw in sample_validation(dataset, config.validation_seed(), &validation, group) {
+            scenes.push(prepare(dataset, &config.losses, draw, 1.0)?);
         }
     }
     match scenes.is_empty() {
@@ -163,8 +163,8 @@ fn scenes(library: &Library, config: &Config, arguments: &Arguments) -> Result<V
     }
 }
 
-fn networks(trained: &TrainedModel, library: &Library) -> Result<ClothCombo, Report> {
-    trained.check_fits(library)?;
+fn networks(trained: &TrainedModel, dataset: &Dataset) -> Result<ClothCombo, Report> {
+    trained.check_fits(dataset)?;
     Ok(trained.networks(&Backend::preferred().device())?)
 }
 
@@ -172,13 +172,13 @@ fn drapes(
     variant: &str,
     eigen_count: usize,
     model: ClothCombo,
-    library: &Arc<Library>,
+    dataset: &Arc<Dataset>,
     scenes: &[PreparedScene],
     base: Option<&Drapes>,
     seconds: f64,
 ) -> Result<Drapes, Report> {
     let device = Backend::preferred().device();
-    let tensors = WardrobeTensors::new(library.clone(), state(library, 0).dimensions(), &device);
+    let tensors = TensorStore::new(dataset.clone(), dataset.dimensions(), &device);
     let mut draped = Vec::with_capacity(scenes.len());
     let (mut ms, mut energy) = (0.0, 0.0);
     for scene in scenes {
@@ -277,9 +277,9 @@ fn evaluated<T: Real>(
     let scalars = |positions: &[[f32; 3]]| -> Vec<[T; 3]> {
         positions.iter().map(|p| p.map(|v| T::from_f64(f64::from(v)))).collect()
     };
-    let garment = |(worn, dressed): (&Arc<crate::scene::LibraryGarment>, &SceneGarment<f32>)| {
-        let mesh = &worn.garment.rest;
-        let energies = GarmentEnergies::new(mesh, &Topology::new(mesh), &settings, worn.garment.holding);
+    let garment = |(garment, dressed): (&Arc<crate::dataset::PreparedGarment>, &SceneGarment<f32>)| {
+        let mesh = &garment.garment.rest;
+        let energies = GarmentEnergies::new(mesh, &Topology::new(mesh), &settings, garment.garment.holding);
         Ok(SceneGarment {
             energies: Arc::new(energies.into_diagnostic()?),
             holding_reference: scalars(&dressed.holding_reference),
@@ -288,7 +288,7 @@ fn evaluated<T: Real>(
         })
     };
     let garments =
-        scene.worn.iter().zip(&narrow.garments).map(garment).collect::<Result<Vec<_>, Report>>()?;
+        scene.garments.iter().zip(&narrow.garments).map(garment).collect::<Result<Vec<_>, Report>>()?;
     let energy = SceneEnergy::<T> {
         body: Arc::new(Surface::new(scalars(&narrow.body.positions), narrow.body.faces.clone())),
         garments,

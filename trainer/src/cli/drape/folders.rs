@@ -1,6 +1,6 @@
 //! Where a drape keeps what it computes.
 
-use crate::paths::destination;
+use crate::system::paths::destination;
 use miette::{IntoDiagnostic, Report as Failure, miette};
 use std::path::{Path, PathBuf};
 

@@ -1,7 +1,7 @@
 //! One outfit to be draped, and the bodies it is draped on.
 
-use crate::draper::{BodyReport, BodyState, Draper, Moment, SourceGarment};
-use crate::scene::LibraryError;
+use crate::dataset::DatasetError;
+use crate::inference::{BodyReport, BodyState, Draper, Moment, SourceGarment};
 use clap::Args;
 use clothcombo_data::asset::{KnownShape, Motion, Pose, recover_body};
 use clothcombo_data::format::load_mesh;
@@ -102,7 +102,7 @@ impl Job {
             recovered_within_mm: None,
         };
         if let Some(path) = &scene.motion {
-            let motion = Motion::load(path).map_err(LibraryError::data)?;
+            let motion = Motion::load(path).map_err(DatasetError::data)?;
             let range = scene.frames.unwrap_or(FrameRange { first: 0, end: None });
             let end = range.end.unwrap_or(motion.poses.len());
             if range.first >= motion.poses.len() || end > motion.poses.len() {
@@ -153,13 +153,13 @@ fn file_and_frame(text: &str) -> (&str, &str) {
 fn one_pose(text: &str) -> Result<Pose, Failure> {
     let (path, frame) = file_and_frame(text);
     let frame = frame.parse().map_err(|_| miette!("--pose {text}: {frame:?} is no number of a frame"))?;
-    let motion = Motion::load(Path::new(path)).map_err(LibraryError::data)?;
+    let motion = Motion::load(Path::new(path)).map_err(DatasetError::data)?;
     motion.poses.get(frame).cloned().ok_or_else(|| no_frame(Path::new(path), frame, motion.poses.len()))
 }
 
 fn posed_body(draper: &Draper, scene: &SceneArguments, posed: &Path) -> Result<Scenes, Failure> {
     let body = draper.body();
-    let read = |path: &Path| Ok::<_, Failure>(load_mesh(path).map_err(LibraryError::data)?.positions);
+    let read = |path: &Path| Ok::<_, Failure>(load_mesh(path).map_err(DatasetError::data)?.positions);
     let surface = read(posed)?;
     let rest = scene.t_pose.as_deref().map(read).transpose()?;
     let known = match &rest {

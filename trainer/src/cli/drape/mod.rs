@@ -9,9 +9,9 @@ mod tell;
 use crate::cli::interrupted::remove_on_signals;
 use crate::cli::post_process::PostProcessArguments;
 use crate::cli::verbosity::{progress_bar, say};
-use crate::device::Backend;
-use crate::draper::output::{Show, Staged, write};
-use crate::draper::{Drape, DrapeProgress, Draper, DraperSettings, Moment, Outfit, Report, smooth};
+use crate::inference::output::{Show, Staged, write};
+use crate::inference::{Drape, DrapeProgress, Draper, DraperSettings, Moment, Outfit, Report, smooth};
+use crate::system::device::Backend;
 use clap::{ArgGroup, Parser, ValueEnum};
 use clothcombo_data::check::impossible_turn;
 use clothcombo_data::format::atomic;
@@ -31,7 +31,7 @@ use tell::{tell_order, tell_repairs, tell_shape};
         clothcombo drape --checkpoint runs/smoke --garments tee.obj coat.glb -o out\n  \
         clothcombo drape --garments tee.obj skirt.obj coat.obj --order 1,0,2 --shape 1.5,-0.5 --pose walk.npz:30 -o out\n  \
         clothcombo drape --garments tee.obj --motion walk.npz --frames 0..120 -o out\n  \
-        clothcombo drape --outfits wardrobe.toml -o out\n\n\
+        clothcombo drape --outfits garments.toml -o out\n\n\
         A garment is a mesh file (.obj, .ply, .stl, .gltf, .glb) or the name of one in --dataset or in the model's own data.\n\
         What does not lie on the body in metres, y up and T-pose is fitted first (see `clothcombo fit`); every repair is in\n\
         report.json. Outputs keep the vertices and polygons of the given files, in their order.\n\n\
@@ -153,7 +153,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     remove_on_signals(staged.folder());
     let clock = Instant::now();
     let draper = Draper::load(arguments.checkpoint.as_deref(), &settings)?;
-    let closet = draper.closet(&arguments.dataset)?;
+    let catalog = draper.catalog(&arguments.dataset)?;
     tracing::info!(
         "model {} (step {}), body {}: loaded in {:.1} s",
         draper.trained().folder.display(),
@@ -167,7 +167,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         1 => failure,
         _ => failure.wrap_err(format!("outfit {}", job.name)),
     };
-    let find = |name: &String| closet.find(name, draper.body(), arguments.fit.decided());
+    let find = |name: &String| catalog.find(name, draper.body(), arguments.fit.decided());
     let read = |job: &Job| {
         let sources = job.garments.iter().map(find).collect::<Result<Vec<_>, _>>()?;
         let sources = ordered(sources, job.order.as_deref())?;

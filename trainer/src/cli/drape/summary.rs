@@ -1,7 +1,7 @@
 //! The report of a drape as tables for the terminal.
 
 use crate::cli::table::{number, table};
-use crate::draper::{PhaseTimes, Report};
+use crate::inference::{PhaseTimes, Report};
 use crate::score::Score;
 
 const GARMENTS: [&str; 5] = ["garment", "vertices", "triangles", "fitted", "embedding"];

@@ -1,6 +1,6 @@
 //! What a user should know about the input, though it can be draped.
 
-use crate::draper::SourceGarment;
+use crate::inference::SourceGarment;
 use clothcombo_data::asset::{Garment, unwearable};
 
 pub(super) fn tell_shape(shape: &[f64], [low, high]: [f64; 2]) {

@@ -1,7 +1,7 @@
 //! Numbers of many outfits, as tables and as JSON.
 
-use crate::evaluate::Spread;
-use crate::evaluate::certificates::OutfitResult;
+use crate::evaluation::certificates::OutfitResult;
+use crate::run::spread::Spread;
 use serde_json::{Value, json};
 
 /// Outfits on a body with fewer pairs in pinched regions before the post-process are called hardly pinched.

@@ -1,0 +1,219 @@
+//! What a run draws its scenes from: body, garments, poses.
+
+use super::active_joints::ActiveJoints;
+use super::error::DatasetError;
+use super::garment_store::GarmentStore;
+use super::poses::{HeldOut, PoseLibrary};
+use super::split::{GarmentSplit, SplitNames};
+use crate::config::Config;
+use crate::system::lru_cache::MemoryBudget;
+use clothcombo_data::asset::{BODY_JOINT_COUNT, Body, BodyFileSettings, Pose, Provenance};
+use clothcombo_data::cache::{Key, KeyBuilder, body_key};
+use clothcombo_data::format::npz::NpzFile;
+use clothcombo_data::generate::mannequin;
+use clothcombo_model::{Dimensions, Graph};
+use std::path::Path;
+use std::sync::{Arc, OnceLock};
+
+/// What a run draws its scenes from.
+pub struct Dataset {
+    /// The body model.
+    pub body: Arc<Body>,
+    /// Where the body comes from.
+    pub body_source: Provenance,
+    /// All garments, in source order.
+    pub garments: GarmentStore,
+    /// Which garments are trained on.
+    pub split: GarmentSplit,
+    /// Poses.
+    pub poses: PoseLibrary,
+    /// Which garments of a scene have layer losses with each other (`model.graph`).
+    pub graph: Graph,
+    /// Memory for what is kept of garments and can be made again: garments of a streamed wardrobe, tensors, embeddings. A
+    /// device with memory of its own has a budget of its own.
+    pub memory: Arc<MemoryBudget>,
+    /// Shape components drawn.
+    pub shape_count: usize,
+    /// Range every component is drawn from.
+    pub shape_range: [f64; 2],
+    fingerprint: OnceLock<String>,
+}
+
+/// Reads `"mannequin"` or a body npz with at most `shape_components` components (0: all it has).
+///
+/// # Errors
+/// When the file is not a body model.
+pub fn load_body(name: &str, shape_components: usize) -> Result<Body, DatasetError> {
+    let settings = match shape_components {
+        0 => BodyFileSettings { shape_components: usize::MAX },
+        limit => BodyFileSettings { shape_components: limit },
+    };
+    match name {
+        "mannequin" => Ok(mannequin().with_shape_components(settings.shape_components)),
+        path => Body::load(Path::new(path), &settings).map_err(DatasetError::data),
+    }
+}
+
+/// Assets of one author under one licence.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LicenceLine {
+    /// `"body"`, `"garment"` or `"motion"`.
+    pub kind: &'static str,
+    /// Author, licence, and the source of the first of them; empty where unknown.
+    pub from: Provenance,
+    /// Number of assets.
+    pub count: usize,
+}
+
+/// What a fingerprint of this kind begins with; earlier ones looked at less, or split the poses otherwise.
+const FINGERPRINT: &str = "4:";
+
+/// Whether `text` is a [fingerprint](Dataset::fingerprint) as they are made now, and can be compared with another.
+pub fn is_fingerprint(text: &str) -> bool {
+    text.starts_with(FINGERPRINT)
+}
+
+/// What a body file says about where it comes from; empty where it says nothing.
+fn body_source(name: &str) -> Provenance {
+    if name == "mannequin" {
+        return Provenance {
+            source: "built in".into(),
+            author: "ClothCombo-rs".into(),
+            licence: "CC0-1.0".into(),
+        };
+    }
+    let Ok(mut file) = NpzFile::open(Path::new(name)) else { return Provenance::default() };
+    let mut text = |key: &str| {
+        let found = file.strings(key, "").ok().and_then(|array| array.data.into_iter().next());
+        found.unwrap_or_default()
+    };
+    Provenance { source: text("source"), author: text("author"), licence: text("licence") }
+}
+
+/// `key` with the poses of every one of `parts`.
+fn poses_key(mut key: KeyBuilder, parts: &[&[Pose]]) -> Key {
+    for part in parts {
+        key = key.number(part.len() as u64);
+        for pose in *part {
+            key = key.array(pose.rotations.as_flattened());
+        }
+    }
+    key.finish()
+}
+
+impl Dataset {
+    /// Loads and prepares everything `config` names. `progress(done, total, name)` is called per garment.
+    ///
+    /// # Errors
+    /// [`DatasetError`] names the file or garment at fault.
+    pub fn load(
+        config: &Config,
+        progress: &(dyn Fn(usize, usize, &str) + Sync),
+    ) -> Result<Self, DatasetError> {
+        let body = Arc::new(load_body(&config.data.body, config.data.shape_components)?);
+        if body.joint_count() < BODY_JOINT_COUNT {
+            return Err(DatasetError::FewJoints { name: body.name.clone(), joints: body.joint_count() });
+        }
+        let shape_count = match config.data.shape_components {
+            0 => body.shape_count,
+            asked if asked <= body.shape_count => asked,
+            asked => return Err(DatasetError::ShapeComponents { asked, available: body.shape_count }),
+        };
+        let poses = PoseLibrary::new(&config.data.poses, &body)?;
+        let memory = MemoryBudget::new(config.data.memory_limits());
+        let garments = GarmentStore::load(config, body.clone(), &memory, progress)?;
+        let names: Vec<&str> = (0..garments.len()).map(|i| garments.info(i).name.as_str()).collect();
+        let split = GarmentSplit::new(&names, &config.data)?;
+        Ok(Self {
+            body_source: body_source(&config.data.body),
+            body,
+            garments,
+            split,
+            poses,
+            graph: config.model.graph,
+            memory,
+            shape_count,
+            shape_range: config.data.shape_range,
+            fingerprint: OnceLock::new(),
+        })
+    }
+
+    /// Which garments and clips are for what, by name: what a run writes down.
+    pub fn split_names(&self) -> SplitNames {
+        let names = |indices: &[usize]| indices.iter().map(|&i| self.garments.info(i).name.clone()).collect();
+        let clips = self.poses.clips();
+        SplitNames {
+            training_garments: names(&self.split.training),
+            validation_garments: names(&self.split.validation),
+            test_garments: names(&self.split.test),
+            training_clips: clips.training,
+            validation_windows: clips.windows,
+            validation_clips: clips.validation,
+            test_clips: clips.test,
+        }
+    }
+
+    /// A fingerprint of what scenes are drawn from: garments (name, category, mesh), body and every frame of the poses with
+    /// what it is for. Equal data gives equal scenes.
+    pub fn fingerprint(&self) -> &str {
+        self.fingerprint.get_or_init(|| format!("{FINGERPRINT}{}", self.key()))
+    }
+
+    /// A fingerprint of what outfits in held-out windows are drawn from: garments, body, and the frames of the windows. Two models
+    /// for which it is the same can be asked about the same outfits, whatever else their poses were split into.
+    pub fn fingerprint_of_windows(&self) -> String {
+        poses_key(self.assets(), &[self.poses.held_out(HeldOut::Windows)]).to_string()
+    }
+
+    fn key(&self) -> Key {
+        poses_key(self.assets(), &self.poses.frames())
+    }
+
+    /// Body and garments.
+    fn assets(&self) -> KeyBuilder {
+        let body = &self.body;
+        let mut key = KeyBuilder::new("data")
+            .key(body_key(body))
+            .array(body.joint_template.as_flattened())
+            .array(&body.joint_shape_directions)
+            .array(body.pose_directions.as_deref().unwrap_or_default())
+            .number(self.shape_count as u64);
+        for card in (0..self.garments.len()).map(|i| self.garments.info(i)) {
+            key = key
+                .text(&card.name)
+                .text(card.category.name())
+                .number(u64::from(card.holding))
+                .key(card.mesh);
+        }
+        key
+    }
+
+    /// Under which terms the data may be used: body, garments, motions, one line per author and licence.
+    pub fn licences(&self) -> Vec<LicenceLine> {
+        let mut lines: Vec<LicenceLine> = Vec::new();
+        let mut add = |kind: &'static str, from: &Provenance| {
+            let same = |l: &&mut LicenceLine| {
+                (l.kind, &l.from.author, &l.from.licence) == (kind, &from.author, &from.licence)
+            };
+            match lines.iter_mut().find(same) {
+                Some(line) => line.count += 1,
+                None => lines.push(LicenceLine { kind, from: from.clone(), count: 1 }),
+            }
+        };
+        add("body", &self.body_source);
+        (0..self.garments.len()).for_each(|i| add("garment", &self.garments.info(i).source));
+        self.poses.sources().iter().for_each(|source| add("motion", source));
+        lines
+    }
+
+    /// Input sizes of networks that are trained on it.
+    pub fn dimensions(&self) -> Dimensions {
+        let joints = self.joints().len();
+        Dimensions { joints, shape: self.shape_count, pose: joints * self.poses.features_per_joint() }
+    }
+
+    /// Joints the networks see.
+    pub fn joints(&self) -> &ActiveJoints {
+        self.garments.joints()
+    }
+}

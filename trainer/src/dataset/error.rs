@@ -1,0 +1,176 @@
+//! Why the data of a run cannot be used.
+
+use crate::system::memory::gibibytes;
+use clothcombo_data::asset::BODY_JOINT_COUNT;
+use miette::Diagnostic;
+use std::error::Error as StdError;
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// Why the data of a run cannot be used.
+#[derive(Debug, Error, Diagnostic)]
+pub enum DatasetError {
+    /// A file is missing or wrong; the message names it and says how to fix it.
+    #[error("{0}")]
+    Data(String),
+    /// A garment cannot be prepared.
+    #[error("garment {name}: {reason}")]
+    #[diagnostic(help("`clothcombo check` lists every defect of a garment file"))]
+    Garment {
+        /// Its name.
+        name: String,
+        /// What is wrong.
+        reason: String,
+    },
+    /// A garment is over the configured limit.
+    #[error("garment {name} has {vertices} vertices, more than data.max_vertices = {limit}")]
+    #[diagnostic(help("raise data.max_vertices (memory grows with it), or decimate the garment"))]
+    TooLarge {
+        /// Its name.
+        name: String,
+        /// Its vertex count.
+        vertices: usize,
+        /// The limit.
+        limit: usize,
+    },
+    /// Without a cache all garments stay in memory, which is too small for them.
+    #[error(
+        "the {garments} garments take about {} of memory, of which {} are available",
+        gibibytes(*needed), gibibytes(*available)
+    )]
+    #[diagnostic(help(
+        "set data.cache.folder: what is computed from a garment is then kept on disk, and read when a scene needs it"
+    ))]
+    Memory {
+        /// Number of garments.
+        garments: usize,
+        /// What they take [bytes].
+        needed: u64,
+        /// What the system can give [bytes].
+        available: u64,
+    },
+    /// Records that were there are gone and cannot be written again.
+    #[error("the records of garment {name} vanished from cache {}", cache.display())]
+    #[diagnostic(help(
+        "something empties the folder during the run; give data.cache.folder one of its own, then --resume"
+    ))]
+    Vanished {
+        /// The garment.
+        name: String,
+        /// The folder.
+        cache: PathBuf,
+    },
+    /// There is nowhere to store what would be computed.
+    #[error("the configuration names no cache to prepare")]
+    #[diagnostic(help(
+        "set data.cache.folder, in the file or with --set data.cache.folder=\"datasets/cache/prepared\""
+    ))]
+    NoCache,
+    /// Nothing is left to train on.
+    #[error("all {0} garments are held out, none is left to train on")]
+    #[diagnostic(help("shorten data.held_out_garments"))]
+    AllHeldOut(usize),
+    /// A held-out name fits no garment.
+    #[error("data.held_out_garments names {name:?}, which is no garment of this run")]
+    #[diagnostic(help("the garments are: {available}"))]
+    UnknownHeldOut {
+        /// The name.
+        name: String,
+        /// The existing names.
+        available: String,
+    },
+    /// A held-out name fits no clip.
+    #[error("data.poses.{key} names {name:?}, which fits no clip in {}", folder.display())]
+    #[diagnostic(help("the clips are: {clips}"))]
+    UnknownClip {
+        /// The key.
+        key: &'static str,
+        /// The motion folder.
+        folder: PathBuf,
+        /// The name.
+        name: String,
+        /// The clips of the folder.
+        clips: String,
+    },
+    /// A clip is for validation and for the test.
+    #[error("clip {clip} is named by data.poses.validation_clips and by data.poses.test_clips")]
+    #[diagnostic(help("a clip is for one of them; a name stands for every clip whose name contains it"))]
+    ClipOfTwoSets {
+        /// The clip.
+        clip: String,
+    },
+    /// A wanted name fits no garment of its source.
+    #[error("data.garments[{source_index}].only names {name:?}, which is no garment of this source")]
+    #[diagnostic(help("the garments are: {available}"))]
+    UnknownOnly {
+        /// Number of the source in the configuration, from 0.
+        source_index: usize,
+        /// The name.
+        name: String,
+        /// The existing names.
+        available: String,
+    },
+    /// One side of the pose split is empty.
+    #[error("{}: {train} frames to train on and {held_out} held out", folder.display())]
+    #[diagnostic(help(
+        "both must be positive: change data.poses.validation_clips, test_clips, held_out_share, held_out_block or \
+         held_out_margin"
+    ))]
+    EmptySplit {
+        /// The motion folder.
+        folder: PathBuf,
+        /// Training frames.
+        train: usize,
+        /// Held-out frames.
+        held_out: usize,
+    },
+    /// Clips are weighted by their length in time, and some of these have none.
+    #[error("{}: at frame rates from {lowest:?} to {highest:?} a second the clips' lengths in time cannot be compared", folder.display())]
+    #[diagnostic(help(
+        "`clothcombo check` tells the frame rate of every motion; set mocap_framerate, for example to 30"
+    ))]
+    FrameRates {
+        /// The motion folder.
+        folder: PathBuf,
+        /// Lowest frame rate [1/s].
+        lowest: f64,
+        /// Highest frame rate [1/s].
+        highest: f64,
+    },
+    /// The skeleton is too small for the poses.
+    #[error("body {name} has {joints} joints, poses turn the {BODY_JOINT_COUNT} body joints of SMPL")]
+    #[diagnostic(help(
+        "use a body whose first joints are SMPL's: SMPL, SMPL-H, SMPL-X, or one imported by `clothcombo import`"
+    ))]
+    FewJoints {
+        /// The body.
+        name: String,
+        /// Its joints.
+        joints: usize,
+    },
+    /// More shape components are asked for than the body has.
+    #[error("data.shape_components = {asked}, but the body has {available}")]
+    #[diagnostic(help("use 0 to take all the body has"))]
+    ShapeComponents {
+        /// Asked for.
+        asked: usize,
+        /// Present.
+        available: usize,
+    },
+}
+
+impl DatasetError {
+    /// Wraps an error of the data crate, whose message already names file and remedy; causes are appended.
+    pub(crate) fn data(error: impl StdError) -> Self {
+        let mut text = error.to_string();
+        let mut source = error.source();
+        while let Some(cause) = source {
+            let cause_text = cause.to_string();
+            if !text.contains(&cause_text) {
+                text = format!("{text}: {cause_text}");
+            }
+            source = cause.source();
+        }
+        DatasetError::Data(text)
+    }
+}

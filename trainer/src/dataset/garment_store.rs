@@ -1,0 +1,269 @@
+//! All garments of a run, in memory or streamed from the cache.
+//!
+//! Without a cache everything is computed at the start and kept, if the machine has the memory. With one, what is expensive
+//! is computed once, a few garments at a time, and stored; a run keeps the garments it used last, within `data.memory_mib`,
+//! and reads the others again when a scene draws them: a wardrobe may be many times larger than memory, and the results are
+//! the same to the bit.
+
+use super::active_joints::ActiveJoints;
+use super::error::DatasetError;
+use super::garment_source::{GarmentLoader, GarmentSource};
+use super::prepared_garment::PreparedGarment;
+use super::preprocessor::{CachePolicy, Preprocessor};
+use crate::config::Config;
+use crate::dataset::DataSizes;
+use crate::system::allocator::return_freed_memory;
+use crate::system::lru_cache::{LruCache, MemoryBudget, Residence};
+use crate::system::memory::available;
+use clothcombo_data::asset::{Binding, Body, Category, Garment, Provenance};
+use clothcombo_data::cache::{ArrayCache, Key, mesh_key};
+use clothcombo_physics::operators::SurfaceOperators;
+use rayon::prelude::*;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// What is known of every garment without reading it.
+#[derive(Clone, Debug)]
+pub struct GarmentInfo {
+    /// Name, unique within a source.
+    pub name: String,
+    /// Category.
+    pub category: Category,
+    /// Whether the holding loss keeps its upper rim in place.
+    pub holding: bool,
+    /// Where it comes from.
+    pub source: Provenance,
+    /// Number of vertices.
+    pub vertices: usize,
+    /// Key of the rest mesh.
+    pub mesh: Key,
+}
+
+/// All garments of a run.
+pub struct GarmentStore {
+    infos: Vec<GarmentInfo>,
+    joints: ActiveJoints,
+    store: Store,
+}
+
+enum Store {
+    Kept { garments: Vec<Arc<PreparedGarment>>, operators: Vec<Arc<SurfaceOperators>> },
+    Streamed(Box<Streamed>),
+}
+
+struct Streamed {
+    recent: LruCache<PreparedGarment>,
+    sources: Vec<GarmentSource>,
+    preprocessor: Preprocessor,
+}
+
+/// What the first pass over a garment leaves.
+struct IndexEntry {
+    info: GarmentInfo,
+    largest_weights: Vec<f32>,
+    /// Without a cache.
+    kept: Option<(Garment, Binding, SurfaceOperators)>,
+}
+
+impl GarmentStore {
+    /// Reads or makes all garments `config` names, and computes what the cache does not hold. Those of a streamed wardrobe are
+    /// kept within `memory`. `progress(done, total, name)` is called per garment.
+    ///
+    /// # Errors
+    /// [`DatasetError`] names the file or garment at fault; [`DatasetError::Memory`] if the machine cannot hold garments that
+    /// are not streamed, before any of them is prepared.
+    pub fn load(
+        config: &Config,
+        body: Arc<Body>,
+        memory: &Arc<MemoryBudget>,
+        progress: &(dyn Fn(usize, usize, &str) + Sync),
+    ) -> Result<Self, DatasetError> {
+        let sources = GarmentSource::list(&config.data.garments)?;
+        let mut preprocessor = Preprocessor::new(config, body);
+        if let Some(cache) = config.data.open_cache().map_err(DatasetError::data)? {
+            preprocessor = preprocessor.with_cache(cache, CachePolicy::Required);
+        } else if let Some(available) = available() {
+            let sizes = DataSizes::of_listed(&sources, &preprocessor.body)?;
+            let (garments, needed) = (sources.len(), sizes.unstreamed_bytes(config));
+            if needed > available {
+                return Err(DatasetError::Memory { garments, needed, available });
+            }
+        }
+        let index = index_garments(&sources, &preprocessor, config.data.max_vertices, progress)?;
+
+        // Computing operators takes more than a step of small networks.
+        return_freed_memory();
+        let joints =
+            ActiveJoints::new(&preprocessor.body, index.iter().map(|entry| entry.largest_weights.as_slice()));
+        let infos = index.iter().map(|entry| entry.info.clone()).collect();
+        let store = match preprocessor.cache() {
+            Some(_) => Store::Streamed(Box::new(Streamed {
+                recent: LruCache::new(memory, Residence::Host),
+                sources,
+                preprocessor,
+            })),
+            None => {
+                let kept = index.into_par_iter().filter_map(|entry| entry.kept);
+                let parts = kept.map(|(garment, binding, operators)| {
+                    let garment = preprocessor.finish(garment, binding, &joints)?;
+                    Ok((Arc::new(garment), Arc::new(operators)))
+                });
+                let (garments, operators) =
+                    parts.collect::<Result<Vec<_>, DatasetError>>()?.into_iter().unzip();
+                Store::Kept { garments, operators }
+            }
+        };
+        Ok(Self { infos, joints, store })
+    }
+
+    /// Computes and stores what the cache of `config` does not hold of every `of`-th garment from garment `part` on, so
+    /// that several processes or machines may share the work. Doing it again costs only the reading of the garments.
+    /// Returns the number of garments looked at and the bytes in the cache.
+    ///
+    /// # Errors
+    /// [`DatasetError`] names the file or garment at fault, or the missing setting.
+    pub fn prepare(
+        config: &Config,
+        body: Arc<Body>,
+        [part, of]: [usize; 2],
+        progress: &(dyn Fn(usize, usize, &str) + Sync),
+    ) -> Result<(usize, u64), DatasetError> {
+        let cache = config.data.open_cache().map_err(DatasetError::data)?.ok_or(DatasetError::NoCache)?;
+        let sources: Vec<_> =
+            GarmentSource::list(&config.data.garments)?.into_iter().skip(part).step_by(of.max(1)).collect();
+        let preprocessor = Preprocessor::new(config, body).with_cache(cache, CachePolicy::Required);
+        index_garments(&sources, &preprocessor, config.data.max_vertices, progress)?;
+        Ok((sources.len(), preprocessor.cache().map_or(0, ArrayCache::used)))
+    }
+
+    /// Number of garments.
+    pub fn len(&self) -> usize {
+        self.infos.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.infos.is_empty()
+    }
+
+    /// What is known of garment `index` without reading it.
+    pub fn info(&self, index: usize) -> &GarmentInfo {
+        &self.infos[index]
+    }
+
+    /// Joints that carry any garment.
+    pub fn joints(&self) -> &ActiveJoints {
+        &self.joints
+    }
+
+    /// Garment `index`.
+    ///
+    /// # Errors
+    /// [`DatasetError`] when its records vanished from the cache and it cannot be made again.
+    pub fn garment(&self, index: usize) -> Result<Arc<PreparedGarment>, DatasetError> {
+        let streamed = match &self.store {
+            Store::Kept { garments, .. } => return Ok(garments[index].clone()),
+            Store::Streamed(streamed) => streamed,
+        };
+        if let Some(garment) = streamed.recent.get(index) {
+            return Ok(garment);
+        }
+        let garment = streamed.read(index, &self.infos[index], &self.joints)?;
+        let bytes = garment.bytes();
+        Ok(streamed.recent.insert(index, garment, bytes))
+    }
+
+    /// DiffusionNet's operators of garment `index`.
+    ///
+    /// # Errors
+    /// As [`garment`](Self::garment).
+    pub fn operators(&self, index: usize) -> Result<Arc<SurfaceOperators>, DatasetError> {
+        match &self.store {
+            Store::Kept { operators, .. } => Ok(operators[index].clone()),
+            Store::Streamed(streamed) => {
+                let info = &self.infos[index];
+                let get = || streamed.preprocessor.stored_operators(info.mesh);
+                streamed.get_or_restore(index, info, get).map(Arc::new)
+            }
+        }
+    }
+}
+
+impl Streamed {
+    fn read(
+        &self,
+        index: usize,
+        info: &GarmentInfo,
+        joints: &ActiveJoints,
+    ) -> Result<PreparedGarment, DatasetError> {
+        let get = || self.preprocessor.stored_binding(info.mesh, info.category);
+        let (rest, binding) = self.get_or_restore(index, info, get)?;
+        let GarmentInfo { name, category, holding, source, .. } = info.clone();
+        self.preprocessor.finish(Garment { name, category, rest, holding, source }, binding, joints)
+    }
+
+    /// A record of garment `index`, computed again where it was there at the start of the run and no longer is.
+    fn get_or_restore<T>(
+        &self,
+        index: usize,
+        info: &GarmentInfo,
+        get: impl Fn() -> Option<T>,
+    ) -> Result<T, DatasetError> {
+        if let Some(found) = get() {
+            return Ok(found);
+        }
+        let cache = self.preprocessor.cache().map_or(Path::new(""), ArrayCache::root);
+        tracing::warn!(cache = %cache.display(), "a record vanished during the run, computed anew");
+        let source = std::slice::from_ref(&self.sources[index]);
+        index_garments(source, &self.preprocessor, usize::MAX, &|_, _, _| {})?;
+        get().ok_or_else(|| DatasetError::Vanished { name: info.name.clone(), cache: cache.into() })
+    }
+}
+
+/// Makes every garment once: what is missing is computed, and stored or kept. Only as many as there are threads are in work at
+/// a time: one that waits for a part of its garment would begin another one.
+fn index_garments(
+    sources: &[GarmentSource],
+    preprocessor: &Preprocessor,
+    max_vertices: usize,
+    progress: &(dyn Fn(usize, usize, &str) + Sync),
+) -> Result<Vec<IndexEntry>, DatasetError> {
+    let loader = GarmentLoader::new(&preprocessor.body, sources)?;
+    let done = AtomicUsize::new(0);
+    let index = |source: &GarmentSource| {
+        let garment = loader.load(source)?;
+        let vertices = garment.rest.vertex_count();
+        if vertices > max_vertices {
+            return Err(DatasetError::TooLarge { name: garment.name, vertices, limit: max_vertices });
+        }
+        let info = GarmentInfo {
+            name: garment.name.clone(),
+            category: garment.category,
+            holding: garment.holding,
+            source: garment.source.clone(),
+            vertices,
+            mesh: mesh_key(&garment.rest),
+        };
+        let entry = match preprocessor.cache() {
+            Some(_) => {
+                let largest_weights = preprocessor.largest_weights(&garment, info.mesh)?;
+                preprocessor.store_operators(&garment.name, &garment.rest, info.mesh)?;
+                IndexEntry { info, largest_weights, kept: None }
+            }
+            None => {
+                let binding = preprocessor.binding(&garment, info.mesh)?;
+                let operators = preprocessor.operators(&garment.name, &garment.rest, info.mesh)?;
+                let largest_weights = binding.largest_weights(preprocessor.body.joint_count());
+                IndexEntry { info, largest_weights, kept: Some((garment, binding, operators)) }
+            }
+        };
+        progress(done.fetch_add(1, Ordering::Relaxed) + 1, sources.len(), &entry.info.name);
+        Ok(entry)
+    };
+    let mut entries = Vec::with_capacity(sources.len());
+    for at_once in sources.chunks(rayon::current_num_threads()) {
+        entries.par_extend(at_once.par_iter().map(index).collect::<Result<Vec<_>, _>>()?);
+    }
+    Ok(entries)
+}

@@ -1,0 +1,206 @@
+//! Turns a sample into numbers: posed body, bone transforms, start positions, and the scene's energies.
+
+use super::active_joints::ActiveJoints;
+use super::contents::Dataset;
+use super::error::DatasetError;
+use super::prepared_garment::PreparedGarment;
+use super::sampling::{BodySample, SceneSample};
+use super::skinning::skinning_transforms;
+use crate::config::LossesConfig;
+use crate::dataset::objective::scene_weights;
+use clothcombo_data::asset::{Body, Pose};
+use clothcombo_model::{Graph, OutfitTensors};
+use clothcombo_physics::energy::{EnergySettings, SceneEnergy, SceneGarment, SceneLayers};
+use clothcombo_physics::query::Surface;
+use clothcombo_physics::transform::Transform;
+use std::sync::Arc;
+
+/// One body of a prepared scene, with the garments' state on it; garments are packed inner → outer.
+pub struct PreparedBody {
+    /// Shape parameters, `[S]`.
+    pub shape: Vec<f32>,
+    /// Pose features of the active joints, `[P]`.
+    pub pose: Vec<f32>,
+    /// World transforms of the active joints relative to the T-pose.
+    pub bones: Vec<[[f64; 4]; 3]>,
+    /// Canonical start positions of all garments, `[ΣV, 3]`.
+    pub start: Vec<[f32; 3]>,
+    /// The losses of this scene.
+    pub energy: Arc<SceneEnergy<f32>>,
+}
+
+/// A scene ready for a step.
+pub struct PreparedScene {
+    /// What was sampled.
+    pub sample: SceneSample,
+    /// The garments themselves.
+    pub garments: Vec<Arc<PreparedGarment>>,
+    /// Pairs (inner, outer) of positions in `garments` that interact: those of [`contacts`].
+    pub contacts: Vec<(usize, usize)>,
+    /// Bodies.
+    pub bodies: Vec<PreparedBody>,
+    /// Weight of the losses of single garments, in addition to those of the outfit.
+    pub single_garments: f64,
+}
+
+impl PreparedScene {
+    /// What of `packed`, one value per vertex of all garments inner → outer, belongs to each garment.
+    pub fn parts<'a, T>(&self, packed: &'a [T]) -> Vec<&'a [T]> {
+        let mut rest = packed;
+        let part = |garment: &Arc<PreparedGarment>| {
+            let (own, tail) = rest.split_at(garment.vertex_count());
+            rest = tail;
+            own
+        };
+        self.garments.iter().map(part).collect()
+    }
+
+    /// Initial skinning of every vertex on the first body, canonical → posed, `[ΣV]`.
+    pub fn skinning_transforms(&self) -> Vec<Transform> {
+        skinning_transforms(&self.garments, &self.bodies[0].bones)
+    }
+
+    /// The first body in f64, for exact distances and intersections.
+    pub fn exact_body(&self) -> Surface<f64> {
+        let body = &self.bodies[0].energy.body;
+        Surface::new(body.positions.iter().map(|p| p.map(f64::from)).collect(), body.faces.clone())
+    }
+}
+
+/// Two garments whose rest bounding boxes are farther apart than this are not near [m].
+const CONTACT_MARGIN: f64 = 0.05;
+
+/// Prepares `sample`; loss weights are taken at `run_progress`.
+///
+/// # Errors
+/// [`DatasetError`] when a garment cannot be read.
+pub fn prepare(
+    dataset: &Dataset,
+    losses: &LossesConfig,
+    sample: SceneSample,
+    run_progress: f64,
+) -> Result<PreparedScene, DatasetError> {
+    let garments =
+        sample.garments.iter().map(|&g| dataset.garments.garment(g)).collect::<Result<Vec<_>, _>>()?;
+    let builder = SceneBuilder {
+        body: &dataset.body,
+        joints: dataset.joints(),
+        features: &|pose, joints| dataset.poses.features(pose, joints),
+        losses,
+        graph: dataset.graph,
+    };
+    Ok(builder.build(sample, garments, run_progress))
+}
+
+/// Everything but the garments and the bodies that a scene is prepared with.
+pub struct SceneBuilder<'a> {
+    /// The body model.
+    pub body: &'a Body,
+    /// The joints the networks see.
+    pub joints: &'a ActiveJoints,
+    /// Network input of a pose for some joints.
+    pub features: &'a (dyn Fn(&Pose, &[usize]) -> Vec<f32> + Sync),
+    /// The losses.
+    pub losses: &'a LossesConfig,
+    /// Which garments have layer losses with each other.
+    pub graph: Graph,
+}
+
+impl SceneBuilder<'_> {
+    /// Prepares `sample`, of `garments`; loss weights are taken at `run_progress`.
+    ///
+    /// # Panics
+    /// If a shape or pose is longer than the body allows.
+    pub fn build(
+        &self,
+        sample: SceneSample,
+        garments: Vec<Arc<PreparedGarment>>,
+        run_progress: f64,
+    ) -> PreparedScene {
+        let contacts = contacts(self.graph, &garments);
+        let settings =
+            EnergySettings { repulsion_sample: sample.repulsion_sample, ..self.losses.energy_settings() };
+        let bodies = sample
+            .bodies
+            .iter()
+            .map(|body| self.on_body(&garments, &contacts, body, &settings, run_progress))
+            .collect();
+        PreparedScene {
+            sample,
+            garments,
+            contacts,
+            bodies,
+            single_garments: self.losses.single_garments.at(run_progress),
+        }
+    }
+
+    fn on_body(
+        &self,
+        garments: &[Arc<PreparedGarment>],
+        contacts: &[(usize, usize)],
+        body: &BodySample,
+        settings: &EnergySettings,
+        run_progress: f64,
+    ) -> PreparedBody {
+        let Self { losses, .. } = self;
+        let posed = self.body.posed(&body.shape, &body.pose);
+        let posed = posed.expect("shapes and poses have the body's own dimensions");
+        let surface = Surface::new(
+            posed.positions.iter().map(|p| p.map(|v| v as f32)).collect(),
+            self.body.faces.clone(),
+        );
+        let bones: Vec<Transform> = self.joints.indices.iter().map(|&j| posed.bones[j]).collect();
+        let starts: Vec<Vec<[f32; 3]>> = garments.iter().map(|g| g.start_positions(&body.shape)).collect();
+        let counts: Vec<usize> = garments.iter().map(|g| g.vertex_count()).collect();
+        let weights = scene_weights(losses, run_progress, &counts, contacts);
+        let scene_garments = garments
+            .iter()
+            .zip(&starts)
+            .zip(weights.garments)
+            .map(|((g, start), weights)| SceneGarment {
+                energies: g.energies.clone(),
+                holding_reference: match losses.holding.relative {
+                    true => start.clone(),
+                    false => g.garment.rest.positions().iter().map(|p| p.map(|v| v as f32)).collect(),
+                },
+                pull_back: None,
+                weights,
+            })
+            .collect();
+        let layers = contacts
+            .iter()
+            .zip(weights.layers)
+            .map(|(&(inner, outer), weights)| SceneLayers { inner, outer, weights })
+            .collect();
+        let mut energy =
+            SceneEnergy { body: Arc::new(surface), garments: scene_garments, layers, settings: *settings };
+        if losses.holding.posed {
+            energy = energy.pulled_back(&skinning_transforms(garments, &bones));
+        }
+        PreparedBody {
+            shape: body.shape.iter().map(|v| *v as f32).collect(),
+            pose: (self.features)(&body.pose, &self.joints.indices),
+            bones,
+            start: starts.concat(),
+            energy: Arc::new(energy),
+        }
+    }
+}
+
+/// Pairs (inner, outer) of `garments`, inner → outer, that interact: all in the full graph, else those whose rest boxes are near
+/// enough for them ever to touch.
+pub fn contacts(graph: Graph, garments: &[Arc<PreparedGarment>]) -> Vec<(usize, usize)> {
+    let mut pairs = OutfitTensors::all_pairs(garments.len());
+    if graph == Graph::Near {
+        pairs.retain(|&(i, j)| are_near(&garments[i], &garments[j]));
+    }
+    pairs
+}
+
+fn are_near(a: &PreparedGarment, b: &PreparedGarment) -> bool {
+    let [(a_low, a_high), (b_low, b_high)] = [a, b].map(|g| g.garment.rest.bounds());
+    (0..3).all(|k| a_low[k] - CONTACT_MARGIN <= b_high[k] && b_low[k] - CONTACT_MARGIN <= a_high[k])
+}
+
+#[cfg(test)]
+mod tests;

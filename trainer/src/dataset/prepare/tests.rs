@@ -1,0 +1,52 @@
+use super::*;
+use crate::config::PoseEncoding;
+use crate::dataset::Preprocessor;
+use clothcombo_data::asset::{Binding, BindingSettings, Category, Garment, Provenance};
+use clothcombo_data::generate::mannequin;
+use clothcombo_physics::energy::Term;
+use clothcombo_physics::mesh::shapes::grid;
+
+/// A patch of cloth whose lowest corner has the height `low` [m].
+fn patch(preprocessor: &Preprocessor, joints: &ActiveJoints, low: f64) -> Arc<PreparedGarment> {
+    let flat = grid(0.2, 0.2, 4, 4);
+    let positions = flat.positions().iter().map(|[x, y, z]| [*x, y + low, z + 0.15]).collect();
+    let rest = flat.with_positions(positions).unwrap();
+    let (name, category) = (format!("patch at {low}"), Category::Top);
+    let garment = Garment { name, category, rest, holding: false, source: Provenance::default() };
+    let binding = Binding::new(&garment, &preprocessor.body, &preprocessor.binding);
+    Arc::new(preprocessor.finish(garment, binding, joints).unwrap())
+}
+
+#[test]
+fn distant_garments_are_a_pair_in_the_full_graph_only() {
+    let losses = LossesConfig::default();
+    let body = Arc::new(mannequin());
+    let preprocessor = Preprocessor {
+        body: body.clone(),
+        binding: BindingSettings::default(),
+        energy: losses.energy_settings(),
+        eigen_count: 4,
+        cache: None,
+    };
+    let joints = ActiveJoints::named(&body, &body.joint_names).unwrap();
+    // The second one begins 4 cm above the first; the third is 25 cm above that.
+    let garments = [0.0, 0.24, 0.69].map(|low| patch(&preprocessor, &joints, low)).to_vec();
+    let pairs = |graph| {
+        let builder = SceneBuilder {
+            body: &body,
+            joints: &joints,
+            features: &|pose, joints| PoseEncoding::RotationMatrix.features(pose, joints),
+            losses: &losses,
+            graph,
+        };
+        let bodies = vec![BodySample { shape: Vec::new(), pose: Pose::t_pose(body.joint_count()) }];
+        let draw = SceneSample { garments: vec![0, 1, 2], bodies, repulsion_sample: 0 };
+        let scene = builder.build(draw, garments.clone(), 1.0);
+        let layers = &scene.bodies[0].energy.layers;
+        assert!(layers.iter().all(|layer| layer.weights[Term::LayerCollision] > 0.0));
+        assert_eq!(scene.contacts, layers.iter().map(|layer| (layer.inner, layer.outer)).collect::<Vec<_>>());
+        scene.contacts
+    };
+    assert_eq!(pairs(Graph::Near), [(0, 1)]);
+    assert_eq!(pairs(Graph::Full), [(0, 1), (0, 2), (1, 2)]);
+}

@@ -1,0 +1,293 @@
+//! What the post-process makes of random outfits.
+
+use crate::config::LossesConfig;
+use crate::dataset::{Dataset, PreparedScene, prepare};
+use crate::inference::networks::Networks;
+use crate::inference::tensor_store::DrapeError;
+use clothcombo_data::asset::{Garment, unwearable};
+use clothcombo_physics::contact::resolve::{
+    Certificate, Layer, ResolveError, ResolveSettings, Resolved, RestGarment, Waypoint, certify,
+    resolve_along,
+};
+use clothcombo_physics::contact::{LayerOrder, PosedBody, Report, ReportGarment, Selection, all_layers};
+use clothcombo_physics::query::{Distance, Surface};
+use clothcombo_physics::transform::apply;
+use miette::Diagnostic;
+use serde::Serialize;
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+use thiserror::Error;
+
+/// Why a drape cannot be post-processed.
+#[derive(Debug, Error, Diagnostic)]
+pub enum PostProcessError {
+    /// A pose on the way cannot be draped.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Drape(#[from] DrapeError),
+    /// The drape is no valid scene.
+    #[error(transparent)]
+    Resolve(#[from] ResolveError),
+}
+
+/// What the post-process needs besides a drape: the data, who drapes other poses, and constants of garments.
+pub struct Dressing<'a> {
+    dataset: &'a Dataset,
+    losses: &'a LossesConfig,
+    networks: Option<&'a Networks<'a>>,
+    /// What drapes poses on the way from the T-pose: without corrections, which leaves fewer crossings (docs/resolve.md).
+    uncorrected: Option<Networks<'a>>,
+    known: Mutex<HashMap<usize, Arc<RestGarment>>>,
+}
+
+impl<'a> Dressing<'a> {
+    /// For scenes of `dataset`, draped by `networks`; without them by skinning.
+    pub fn new(dataset: &'a Dataset, losses: &'a LossesConfig, networks: Option<&'a Networks<'a>>) -> Self {
+        let uncorrected = networks.map(Networks::uncorrected);
+        Self { dataset, losses, networks, uncorrected, known: Mutex::default() }
+    }
+
+    /// A drape of `scene` from the packed positions of all garments on its first body.
+    pub fn of<'s>(&'s self, scene: &'s PreparedScene, packed: &[[f32; 3]]) -> DrapedScene<'s> {
+        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        let garment = scene.sample.garments.iter().zip(&scene.garments);
+        let rest = garment.map(|(&g, garment)| {
+            known.entry(g).or_insert_with(|| Arc::new(RestGarment::new(&garment.garment.rest))).clone()
+        });
+        DrapedScene {
+            dressing: self,
+            scene,
+            body: scene.exact_body(),
+            garments: rest.collect(),
+            positions: wide(scene, packed),
+        }
+    }
+
+    /// Packed positions of `scene` as they are draped.
+    ///
+    /// # Errors
+    /// When the networks do not take it.
+    pub fn drape(&self, scene: &PreparedScene) -> Result<Vec<[f32; 3]>, DrapeError> {
+        draped_by(self.networks, scene)
+    }
+
+    /// `scene` on the way from the T-pose.
+    fn stage(&self, scene: &PreparedScene, share: f64) -> Result<Waypoint, PostProcessError> {
+        let mut draw = scene.sample.clone();
+        for body in &mut draw.bodies {
+            body.pose = body.pose.on_the_way(share);
+        }
+        let scene = prepare(self.dataset, self.losses, draw, 1.0).map_err(DrapeError::from)?;
+        Ok(Waypoint {
+            body: Arc::new(scene.exact_body()),
+            draped: wide(&scene, &draped_by(self.uncorrected.as_ref(), &scene)?),
+            skinned: wide(&scene, &skinned(&scene)),
+            transforms: scene.skinning_transforms(),
+        })
+    }
+}
+
+/// Packed positions of `scene`: draped by `networks`, without them by skinning.
+fn draped_by(networks: Option<&Networks<'_>>, scene: &PreparedScene) -> Result<Vec<[f32; 3]>, DrapeError> {
+    match networks {
+        Some(networks) => Ok(networks.drape(scene)?.posed),
+        None => Ok(skinned(scene)),
+    }
+}
+
+/// Packed positions per garment.
+fn wide(scene: &PreparedScene, packed: &[[f32; 3]]) -> Vec<Vec<[f64; 3]>> {
+    let wide = |part: &[[f32; 3]]| part.iter().map(|p| p.map(f64::from)).collect();
+    scene.parts(packed).into_iter().map(wide).collect()
+}
+
+/// A scene's body and garments as the post-process takes them.
+pub struct DrapedScene<'a> {
+    dressing: &'a Dressing<'a>,
+    scene: &'a PreparedScene,
+    /// The posed body.
+    pub body: Surface<f64>,
+    /// Constants of the garments, inner → outer.
+    pub garments: Vec<Arc<RestGarment>>,
+    /// Their positions.
+    pub positions: Vec<Vec<[f64; 3]>>,
+}
+
+impl DrapedScene<'_> {
+    fn layers<'a>(&'a self, positions: &'a [Vec<[f64; 3]>]) -> Vec<Layer<'a>> {
+        let pairs = self.garments.iter().zip(positions);
+        pairs.map(|(garment, positions)| Layer { garment, positions }).collect()
+    }
+
+    /// Resolves it, if need be on a way from the T-pose.
+    ///
+    /// # Errors
+    /// When it is no valid scene, or another pose cannot be draped.
+    pub fn resolved(&self, settings: &ResolveSettings) -> Result<Resolved, PostProcessError> {
+        let stage_at = |share: f64| self.dressing.stage(self.scene, share);
+        let skinned = wide(self.scene, &skinned(self.scene));
+        resolve_along(&self.body, &self.layers(&self.positions), &skinned, settings, stage_at)
+    }
+
+    /// Whether the order of the garments can be garment ([`unwearable`]).
+    pub fn is_wearable(&self) -> bool {
+        let order: Vec<&Garment> = self.scene.garments.iter().map(|w| &w.garment).collect();
+        unwearable(&order).is_none()
+    }
+
+    /// What crosses before anything is done.
+    ///
+    /// # Errors
+    /// When it is no valid scene.
+    pub fn certificate(&self) -> Result<Certificate, ResolveError> {
+        certify(&self.body, &self.layers(&self.positions))
+    }
+
+    /// The same as numbers.
+    ///
+    /// # Errors
+    /// When it is no valid scene.
+    pub fn counts(&self) -> Result<Counts, ResolveError> {
+        Ok(Counts::new(&self.certificate()?, self.order_violations_nearest_vertex(&self.positions)))
+    }
+
+    /// Share of layer-order violations over all pairs of layers, by the nearest vertex: the definition of the score.
+    pub fn order_violations_nearest_vertex(&self, positions: &[Vec<[f64; 3]>]) -> f64 {
+        let garments: Vec<ReportGarment> = self
+            .garments
+            .iter()
+            .zip(positions)
+            .map(|(garment, positions)| ReportGarment { positions, faces: garment.faces() })
+            .collect();
+        let layers = all_layers(garments.len());
+        let order = LayerOrder::NearestVertex;
+        let selection = Selection { layers: &layers, order, triangles: false, body_itself: false };
+        Report::count(&PosedBody::new(&self.body, Distance::NearestVertex), &garments, &selection)
+            .order()
+            .share()
+    }
+}
+
+/// Linear blend skinning of the start state on the host, packed: what the networks start from.
+fn skinned(scene: &PreparedScene) -> Vec<[f32; 3]> {
+    let start = scene.bodies[0].start.iter().map(|p| p.map(f64::from));
+    scene.skinning_transforms().iter().zip(start).map(|(t, p)| apply(t, p).map(|x| x as f32)).collect()
+}
+
+/// The numbers of a certificate without its list.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Counts {
+    /// Exact pairs with the body.
+    pub body_triangle_pairs: usize,
+    /// Those of them where the body leaves hardly any room for cloth.
+    pub narrow_triangle_pairs: usize,
+    /// Exact pairs of two garments.
+    pub layer_triangle_pairs: usize,
+    /// Exact pairs of a garment with itself.
+    pub self_triangle_pairs: usize,
+    /// Pairs of all kinds where the body lies inside itself.
+    pub pinched_pairs: usize,
+    /// Length of the curves of intersection [mm].
+    pub contour_length_mm: f64,
+    /// Deepest vertex [mm].
+    pub max_depth_mm: f64,
+    /// Share of layer-order violations, by the closest surface point.
+    pub order_violations: f64,
+    /// The same by the nearest vertex: the paper's form.
+    pub order_violations_nearest_vertex: f64,
+}
+
+impl Counts {
+    /// Those of `certificate`.
+    pub fn new(certificate: &Certificate, order_violations_nearest_vertex: f64) -> Self {
+        Self {
+            body_triangle_pairs: certificate.body_triangle_pairs,
+            narrow_triangle_pairs: certificate.narrow_triangle_pairs,
+            layer_triangle_pairs: certificate.layer_triangle_pairs,
+            self_triangle_pairs: certificate.self_triangle_pairs,
+            pinched_pairs: certificate.pinched.count(),
+            contour_length_mm: certificate.contour_length_mm,
+            max_depth_mm: certificate.max_depth_mm,
+            order_violations: certificate.order_violations,
+            order_violations_nearest_vertex,
+        }
+    }
+
+    /// Whether no garment crosses the body or another garment.
+    pub fn is_clear(&self) -> bool {
+        self.body_triangle_pairs + self.layer_triangle_pairs == 0
+    }
+}
+
+/// One outfit.
+#[derive(Clone, Debug, Serialize)]
+pub struct OutfitResult {
+    /// Number of the draw.
+    pub draw: usize,
+    /// Names, inner → outer.
+    pub garments: Vec<String>,
+    /// Whether the order can be garment ([`unwearable`]).
+    pub is_wearable: bool,
+    /// Vertices per garment.
+    pub vertices: Vec<usize>,
+    /// Before the post-process.
+    pub before: Counts,
+    /// After it.
+    pub after: Counts,
+    /// Rise of the strain energy, as a share; none where there was no strain.
+    pub strain_added: Option<f64>,
+    /// Largest move of a vertex [mm].
+    pub largest_move_mm: f64,
+    /// Share of vertices that moved.
+    pub moved: f64,
+    /// Rounds per garment, of all attempts but those of the way and of easing.
+    pub rounds: Vec<usize>,
+    /// Steps from the T-pose that were tried; 0 where the drape could be mended as it was.
+    pub steps: usize,
+    /// Time per garment [ms].
+    pub milliseconds: Vec<f64>,
+    /// Time to prepare the body, once for all garments [ms].
+    pub body_milliseconds: f64,
+    /// Time of the certificate, once for all garments [ms].
+    pub certificate_milliseconds: f64,
+}
+
+impl OutfitResult {
+    /// Resolves `draped`.
+    ///
+    /// # Errors
+    /// When it is no valid scene, or another pose cannot be draped.
+    pub fn new(
+        draw: usize,
+        draped: &DrapedScene<'_>,
+        settings: &ResolveSettings,
+    ) -> Result<(Self, Resolved), PostProcessError> {
+        let scene = draped.scene;
+        let before = draped.counts()?;
+        let resolved = draped.resolved(settings)?;
+        let works = &resolved.garments;
+        let ms = |time: std::time::Duration| 1e3 * time.as_secs_f64();
+        let vertices: Vec<usize> = scene.garments.iter().map(|w| w.vertex_count()).collect();
+        let moved: usize = works.iter().map(|w| w.moved).sum();
+        let result = Self {
+            draw,
+            garments: scene.garments.iter().map(|w| w.garment.name.clone()).collect(),
+            is_wearable: draped.is_wearable(),
+            before,
+            after: Counts::new(
+                &resolved.certificate,
+                draped.order_violations_nearest_vertex(&resolved.positions),
+            ),
+            strain_added: resolved.certificate.strain_added,
+            largest_move_mm: 1e3 * works.iter().map(|w| w.largest_move).fold(0.0, f64::max),
+            moved: moved as f64 / vertices.iter().sum::<usize>().max(1) as f64,
+            rounds: works.iter().map(|w| w.rounds).collect(),
+            steps: resolved.steps,
+            milliseconds: works.iter().map(|w| ms(w.time)).collect(),
+            body_milliseconds: ms(resolved.body_time),
+            certificate_milliseconds: ms(resolved.certificate_time),
+            vertices,
+        };
+        Ok((result, resolved))
+    }
+}

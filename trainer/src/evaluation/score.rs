@@ -1,0 +1,77 @@
+//! The score of one draped scene, and of a method over many.
+
+use crate::dataset::PreparedScene;
+use crate::inference::Draped;
+use crate::run::spread::Spread;
+use crate::run::validation::MethodScore;
+use clothcombo_physics::contact::{
+    LayerOrder, OrderViolations, Penetration, PosedBody, Report, ReportGarment, Selection,
+};
+use clothcombo_physics::energy::{Term, TermMap};
+use clothcombo_physics::query::{Distance, Surface};
+
+/// Vertices deeper than this inside the body count as visibly wrong (m).
+pub const DEEP: f64 = 0.005;
+
+/// What one draped scene scores.
+#[derive(Clone, Debug, Default)]
+pub struct SceneScore {
+    /// Raw energies summed over garments and pairs.
+    pub raw: TermMap<f64>,
+    /// The same, weighted.
+    pub weighted: TermMap<f64>,
+    /// Weighted sum.
+    pub total: f64,
+    /// Garment vertices inside the body, by closest surface point.
+    pub penetration: Penetration,
+    /// Layer-order violations by the nearest vertex, over all pairs of layers that interact.
+    pub order: OrderViolations,
+}
+
+/// Scores `draped` on the first body of `scene`, whose surface in f64 is `body`.
+pub fn score_scene(scene: &PreparedScene, body: &Surface<f64>, draped: &Draped) -> SceneScore {
+    let energy = &scene.bodies[0].energy;
+    // Terms of weight 0 are scored as well: an ablation wants to see what it left out.
+    let value = energy.raw(&draped.posed, &draped.canonical);
+    let mut score = SceneScore::default();
+    let weights = energy.garments.iter().map(|g| &g.weights).chain(energy.layers.iter().map(|l| &l.weights));
+    for (raw, weights) in value.garments.iter().chain(&value.layers).zip(weights) {
+        for term in Term::ALL {
+            if let Some(v) = raw[term] {
+                score.raw[term] += v;
+                score.weighted[term] += v * weights[term];
+                score.total += v * weights[term];
+            }
+        }
+    }
+    let positions: Vec<[f64; 3]> = draped.posed.iter().map(|p| p.map(f64::from)).collect();
+    let garments: Vec<ReportGarment> = scene
+        .parts(&positions)
+        .into_iter()
+        .zip(&scene.garments)
+        .map(|(positions, garment)| ReportGarment { positions, faces: garment.garment.rest.faces() })
+        .collect();
+    let order = LayerOrder::NearestVertex;
+    let selection = Selection { layers: &scene.contacts, order, triangles: false, body_itself: false };
+    let report = Report::count(&PosedBody::new(body, Distance::ClosestPoint), &garments, &selection);
+    (score.penetration, score.order) = (report.penetration(DEEP), report.order());
+    score
+}
+
+/// Gathers the scores of `method` over scenes.
+pub fn method_score(method: &'static str, scenes: &[SceneScore]) -> MethodScore {
+    let over = |f: &dyn Fn(&SceneScore) -> f64| Spread::of(scenes.iter().map(f).collect());
+    let share = |part: &dyn Fn(&SceneScore) -> usize, whole: &dyn Fn(&SceneScore) -> usize| {
+        let (p, w): (usize, usize) = scenes.iter().fold((0, 0), |a, s| (a.0 + part(s), a.1 + whole(s)));
+        if w == 0 { 0.0 } else { p as f64 / w as f64 }
+    };
+    MethodScore {
+        method,
+        total: over(&|s| s.total),
+        raw: Term::ALL.into_iter().map(|t| (t.name(), over(&|s| s.raw[t]))).collect(),
+        weighted: Term::ALL.into_iter().map(|t| (t.name(), over(&|s| s.weighted[t]).mean)).collect(),
+        inside: share(&|s| s.penetration.inside, &|s| s.penetration.vertices),
+        deeper_than_5mm: share(&|s| s.penetration.deep, &|s| s.penetration.vertices),
+        wrong_side: share(&|s| s.order.violations, &|s| s.order.counted),
+    }
+}

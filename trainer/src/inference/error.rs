@@ -1,0 +1,233 @@
+//! Why something cannot be draped.
+
+use crate::dataset::DatasetError;
+use crate::run::checkpoint::CheckpointError;
+use clothcombo_data::asset::BodyError;
+use clothcombo_data::fit::FitError;
+use clothcombo_model::ModelError;
+use clothcombo_physics::contact::resolve::ResolveError;
+use clothcombo_physics::energy::EnergyError;
+use clothcombo_physics::equilibrium::EquilibriumError;
+use miette::Diagnostic;
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// Why something cannot be draped.
+#[derive(Debug, Error, Diagnostic)]
+pub enum DraperError {
+    /// No model was named and none is shipped.
+    #[error("no trained model: none was named, and there is none in {}", searched.join(", "))]
+    #[diagnostic(help(
+        "train one (clothcombo-train --config configs/smoke.toml takes about five minutes) and pass --checkpoint RUN, \
+         or a folder with model.safetensors, config.toml and state.json"
+    ))]
+    NoModel {
+        /// Where it was looked for.
+        searched: Vec<String>,
+    },
+    /// Several models are shipped.
+    #[error("several trained models in {}: {}", folder.display(), names.join(", "))]
+    #[diagnostic(help("name one with --checkpoint, for example --checkpoint {}/{}", folder.display(), names[0]))]
+    SeveralModels {
+        /// The folder.
+        folder: PathBuf,
+        /// Their names.
+        names: Vec<String>,
+    },
+    /// The model cannot be read.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Checkpoint(#[from] CheckpointError),
+    /// Body or garment folder cannot be read, or a garment not be prepared.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Dataset(#[from] DatasetError),
+    /// The body the model was trained on is not there.
+    #[error("the model was trained on body {body}, which is not there")]
+    #[diagnostic(help(
+        "put it beside the model as body.npz, run from the folder its path is relative to, or pass --body"
+    ))]
+    NoBody {
+        /// The path in the model's configuration.
+        body: String,
+    },
+    /// Correction steps were asked for from a model that has no correction networks.
+    #[error("{steps} correction steps, but the model has no correction networks")]
+    #[diagnostic(help(
+        "leave --corrections out; a [model] with corrections = 3 and a stage that trains them adds some"
+    ))]
+    NoCorrections {
+        /// Steps asked for.
+        steps: usize,
+    },
+    /// The body lacks joints the networks were trained on.
+    #[error("body '{body}' has no joint {}", missing.join(", "))]
+    #[diagnostic(help("use the body the model was trained on, or one with joints of the same names"))]
+    Joints {
+        /// The body.
+        body: String,
+        /// Names of the missing joints.
+        missing: Vec<String>,
+    },
+    /// Shape or pose do not fit the body.
+    #[error(transparent)]
+    Body(#[from] BodyError),
+    /// A shape parameter that makes no body.
+    #[error("shape parameter {value} makes no body: at most {most}, models are trained with about 2")]
+    Shape {
+        /// The parameter.
+        value: f64,
+        /// The largest one that is taken.
+        most: f64,
+    },
+    /// A number in shape or pose is not finite.
+    #[error("the {what} holds a number that is not finite")]
+    NotFinite {
+        /// Shape or pose.
+        what: &'static str,
+    },
+    /// Neither a file nor a known name.
+    #[error("no garment {name:?}: it is no file, and {}", match known.len() {
+        0 => "no folder of garments is known".to_owned(),
+        n => format!("none of the {n} known garments is called that"),
+    })]
+    #[diagnostic(help("{}", known_names(known)))]
+    UnknownGarment {
+        /// What was asked for.
+        name: String,
+        /// Garments known by name.
+        known: Vec<String>,
+    },
+    /// A mesh is no garment of this body.
+    #[error("{}: {reason}", path.display())]
+    #[diagnostic(help(
+        "`clothcombo fit` has settings for unit, axes and arm pose; `clothcombo check` lists defects"
+    ))]
+    Fit {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: FitError,
+    },
+    /// A mesh that is not to be fitted lies nowhere near the body.
+    #[error("{}: {what}", path.display())]
+    #[diagnostic(help("leave out --fit never: unit, axes and place are then found"))]
+    Place {
+        /// The file.
+        path: PathBuf,
+        /// What tells it.
+        what: String,
+    },
+    /// A garment is too fine.
+    #[error(
+        "garment '{name}' has {vertices} vertices, more than {} can be draped at once",
+        super::MAX_VERTICES
+    )]
+    #[diagnostic(help("decimate it first: the networks see no detail of a millimetre"))]
+    TooLarge {
+        /// The garment.
+        name: String,
+        /// Its vertices.
+        vertices: usize,
+    },
+    /// Too few or too many layers.
+    #[error("{count} garments; an outfit has 1 to {most}")]
+    Count {
+        /// Garments given.
+        count: usize,
+        /// Most garments.
+        most: usize,
+    },
+    /// A posed surface with another number of vertices than the body.
+    #[error("the posed body has {found} vertices, body '{body}' has {expected}")]
+    #[diagnostic(help("a posed mesh must have the vertices of the body model, in its order"))]
+    Surface {
+        /// The body model.
+        body: String,
+        /// Vertices given.
+        found: usize,
+        /// Vertices of the model.
+        expected: usize,
+    },
+    /// The networks do not take it.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The networks made something that is no number.
+    #[error("the networks moved garment '{garment}' to a place that is not finite")]
+    #[diagnostic(help(
+        "either the garment lies far from the body (metres, y up, about the origin: `clothcombo fit` finds unit and axes), or \
+         the model is damaged or was trained to divergence: try an earlier checkpoint"
+    ))]
+    Diverged {
+        /// The garment.
+        garment: String,
+    },
+    /// A garment without energies.
+    #[error(transparent)]
+    Energy(#[from] EnergyError),
+    /// Refinement failed.
+    #[error("refinement: {0}")]
+    Refine(EquilibriumError),
+    /// A garment came to the post-process far from the body.
+    #[error(
+        "post-process: garment '{garment}', vertex {vertex} (from 0) is at [{}, {}, {}]",
+        position[0], position[1], position[2]
+    )]
+    #[diagnostic(help(
+        "positions are finite, in metres, within a kilometre of the origin: check the garment's coordinates, `clothcombo fit` \
+         finds unit and axes"
+    ))]
+    Far {
+        /// The garment.
+        garment: String,
+        /// The vertex.
+        vertex: usize,
+        /// Where it is [m].
+        position: [f64; 3],
+    },
+    /// The post-process refused its input.
+    #[error("post-process: {0}")]
+    Resolve(ResolveError),
+}
+
+// Not as sources: their text is part of the message, and would be printed twice.
+impl From<EquilibriumError> for DraperError {
+    fn from(reason: EquilibriumError) -> Self {
+        Self::Refine(reason)
+    }
+}
+
+impl From<ResolveError> for DraperError {
+    fn from(reason: ResolveError) -> Self {
+        Self::Resolve(reason)
+    }
+}
+
+fn known_names(known: &[String]) -> String {
+    const SHOWN: usize = 12;
+    match known.len() {
+        0 => "pass a mesh file (.obj, .ply, .stl, .gltf, .glb), or --dataset FOLDER".to_owned(),
+        n if n > SHOWN => format!("for example {}, and {} more", known[..SHOWN].join(", "), n - SHOWN),
+        _ => format!("the garments are: {}", known.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::error::Error;
+
+    #[test]
+    fn a_cause_that_the_message_holds_is_no_source_as_well() {
+        let resolve = DraperError::from(ResolveError::EmptyBody);
+        let refine = DraperError::from(EquilibriumError::Count { what: "positions", expected: 2, found: 1 });
+        for error in [resolve, refine] {
+            assert!(error.to_string().contains(": ") && error.source().is_none(), "{error}");
+        }
+        let far = DraperError::Far { garment: "tee".into(), vertex: 7, position: [1e9, 0.0, 0.0] };
+        assert_eq!(
+            far.to_string(),
+            "post-process: garment 'tee', vertex 7 (from 0) is at [1000000000, 0, 0]"
+        );
+    }
+}

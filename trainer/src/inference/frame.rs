@@ -1,0 +1,146 @@
+//! One drape: networks, refinement, post-process.
+
+use super::motion::RetryPolicy;
+use super::networked::Networked;
+use super::{BodyState, Certificate, Drape, Draper, DraperError, GarmentDrape, Outfit, elapsed, refine};
+use crate::inference::reference::ReferenceScene;
+use clothcombo_physics::Surface;
+use clothcombo_physics::contact::resolve::{Resolved, Waypoint, resolve_after, resolve_along};
+use clothcombo_physics::vec3::{add_scaled, sub};
+use std::time::Instant;
+
+/// What is to be draped.
+#[derive(Clone, Copy)]
+pub(super) struct Frame<'a> {
+    pub body: &'a BodyState,
+    /// Where the post-process carries on from, if anywhere.
+    pub last: Option<Last<'a>>,
+}
+
+/// Another frame of the same motion, which a drape carries on from.
+#[derive(Clone, Copy)]
+pub(super) struct Last<'a> {
+    pub body: &'a BodyState,
+    pub drape: &'a Drape,
+    /// What carrying on may leave. Where it leaves more, the drape is also resolved by itself, and on a way from the T-pose: that
+    /// takes seconds.
+    pub bearable: RetryPolicy,
+}
+
+impl Draper {
+    /// Drapes `outfit` on `frame`, of which the networks have `made` this. `watch` is called for every pose that the post-process
+    /// looks at, with its share of the way there.
+    pub(super) fn drape_frame(
+        &self,
+        outfit: &Outfit,
+        frame: Frame<'_>,
+        made: Networked,
+        watch: &mut dyn FnMut(f64),
+    ) -> Result<Drape, DraperError> {
+        let Networked { scene, surface, heading, transforms, skinned, network, mut milliseconds } = made;
+
+        let clock = Instant::now();
+        let (before, refinement) = match self.settings.refine {
+            0 => (network.clone(), None),
+            steps => {
+                let mut energy = ReferenceScene::new(&self.trained.config.losses, &scene)?.energy;
+                energy.body = surface.clone();
+                let (positions, done) = refine(&energy.pulled_back(&transforms), &network, steps)?;
+                (positions, Some(done))
+            }
+        };
+        milliseconds.refine = elapsed(clock);
+
+        let clock = Instant::now();
+        let parts = outfit.split(&before);
+        let (resolved, times) = match self.settings.resolve {
+            true => {
+                let at_the_end = || Waypoint {
+                    body: surface.clone(),
+                    draped: parts.iter().map(|p| p.to_vec()).collect(),
+                    skinned: outfit.split(&skinned).into_iter().map(<[_]>::to_vec).collect(),
+                    transforms: transforms.clone(),
+                };
+                let done = self.resolved(outfit, frame, watch, &surface, &parts, &at_the_end);
+                let done = done.map_err(|error| outfit.named(error))?;
+                (done.positions, done.garments.iter().map(|g| 1e3 * g.time.as_secs_f64()).collect())
+            }
+            false => (parts.iter().map(|p| p.to_vec()).collect(), vec![0.0; parts.len()]),
+        };
+        milliseconds.resolve = elapsed(clock);
+
+        let (skinned, network) = (outfit.split(&skinned), outfit.split(&network));
+        let transforms = outfit.split(&transforms);
+        let garments = resolved
+            .into_iter()
+            .enumerate()
+            .map(|(g, positions)| GarmentDrape {
+                skinned: skinned[g].to_vec(),
+                network: network[g].to_vec(),
+                before: parts[g].to_vec(),
+                positions,
+                transforms: transforms[g].to_vec(),
+                resolve_ms: times[g],
+            })
+            .collect();
+        let mut drape = Drape {
+            body: surface.positions.clone(),
+            heading,
+            garments,
+            milliseconds,
+            refinement,
+            certificate: Certificate::default(),
+            surface: Some(surface),
+        };
+        let clock = Instant::now();
+        drape.settle(self, outfit)?;
+        drape.milliseconds.certificate = elapsed(clock);
+        Ok(drape)
+    }
+
+    /// The post-process, from the last frame on if there is one.
+    fn resolved(
+        &self,
+        outfit: &Outfit,
+        Frame { body, last }: Frame<'_>,
+        watch: &mut dyn FnMut(f64),
+        surface: &Surface<f64>,
+        parts: &[&[[f64; 3]]],
+        at_the_end: &dyn Fn() -> Waypoint,
+    ) -> Result<Resolved, DraperError> {
+        let (layers, settings) = (outfit.layers(parts), &self.settings.post_process);
+        let mut carried = None;
+        if let Some(Last { body: state, drape, bearable }) = last {
+            let between = |share: f64| {
+                watch(share);
+                match share {
+                    1.0 => Ok(at_the_end()),
+                    _ => {
+                        let place = add_scaled(state.place, share, sub(body.place, state.place));
+                        self.stage(&self.model, outfit, body, state.pose.between(&body.pose, share), place)
+                    }
+                }
+            };
+            carried = resolve_after(drape.reached(), surface, &layers, settings, between)?;
+            if let Some(done) = carried.take_if(|done| bearable.is_met(&done.certificate)) {
+                return Ok(done);
+            }
+        }
+        let from_t_pose = |share: f64| {
+            watch(share);
+            let pose = body.pose.on_the_way(share);
+            let stage = self.stage(&self.uncorrected, outfit, body, pose, body.place)?;
+            Ok::<_, DraperError>(match share {
+                // The surface is known here only.
+                1.0 => Waypoint { draped: stage.draped, ..at_the_end() },
+                _ => stage,
+            })
+        };
+        let anew = resolve_along(surface, &layers, &at_the_end().skinned, settings, from_t_pose)?;
+        // What carries on does not pop.
+        Ok(match carried {
+            Some(carried) => carried.or(anew),
+            None => anew,
+        })
+    }
+}

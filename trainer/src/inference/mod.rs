@@ -1,0 +1,259 @@
+//! Inference. In: a trained model, any garments in their order, any body. Out: draped garments, with a certificate of what still
+//! intersects.
+//!
+//! ```no_run
+//! use clothcombo_data::asset::Pose;
+//! use clothcombo_trainer::inference::{BodyState, Draper, DraperSettings};
+//! use std::path::Path;
+//!
+//! let draper = Draper::load(Some(Path::new("runs/smoke")), &DraperSettings::default())?;
+//! let catalog = draper.catalog(&[])?;
+//! let garments = ["t_shirt_000003", "skirt_000005"].map(|name| catalog.find(name, draper.body(), None));
+//! let outfit = draper.outfit(garments.into_iter().collect::<Result<_, _>>()?)?;
+//! let drape = draper.drape(&outfit, &BodyState::new(vec![1.0, -0.5], Pose::t_pose(22)))?;
+//! for (garment, draped) in outfit.garments.iter().zip(&drape.garments) {
+//!     println!("{}: {} vertices", garment.name, draped.positions.len());
+//! }
+//! # Ok::<(), clothcombo_trainer::inference::DraperError>(())
+//! ```
+//!
+//! [`Draper::outfit`] does what depends on the garments alone (binding, operators, embedding), once per garment and process,
+//! and once per machine with a cache; [`Draper::drape`] does what depends on the body: networks, optional refinement,
+//! post-process; [`Draper::drape_motion`] does it for the frames of a motion. The networks see the pose without its heading;
+//! positions come back in the frame of the given pose.
+
+mod acceleration;
+pub mod contact_features;
+mod correct;
+pub mod descent;
+mod drape;
+pub(crate) mod draped;
+mod embedded;
+mod error;
+mod frame;
+mod motion;
+mod names;
+mod networked;
+pub mod networks;
+mod outfit;
+pub mod output;
+mod phase_times;
+pub mod reference;
+mod refine;
+mod report;
+mod shipped;
+mod smooth;
+mod source;
+mod temporal_filter;
+pub mod tensor_store;
+
+pub use acceleration::{Acceleration, acceleration};
+pub use clothcombo_physics::contact::resolve::Certificate;
+pub use drape::{Drape, GarmentDrape};
+pub use draped::Draped;
+pub use embedded::GarmentTimes;
+pub use error::DraperError;
+pub use motion::DrapeProgress;
+pub use names::UniqueNames;
+pub use outfit::{MAX_GARMENTS, MAX_VERTICES, Outfit, OutfitGarment};
+pub use phase_times::PhaseTimes;
+pub use refine::{Refinement, refine};
+pub use report::{BodyReport, FrameReport, GarmentReport, ModelReport, Moment, Report, Stage};
+pub use shipped::shipped_model;
+pub use smooth::{Smoothing, smooth};
+pub use source::{GarmentCatalog, SourceGarment};
+
+use crate::dataset::{ActiveJoints, CachePolicy, DatasetError, Preprocessor, load_body};
+use crate::run::checkpoint::TrainedModel;
+use crate::system::device::Backend;
+use burn::tensor::Device;
+use clothcombo_data::asset::{Body, Pose};
+use clothcombo_data::cache::ArrayCache;
+use clothcombo_model::ClothCombo;
+use clothcombo_physics::contact::resolve::ResolveSettings;
+use embedded::EmbeddedGarments;
+use frame::Frame;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// How a [`Draper`] is set up.
+#[derive(Clone, Debug)]
+pub struct DraperSettings {
+    /// `"mannequin"` or a body npz; default: the body the model was trained on.
+    pub body: Option<String>,
+    /// Folder of the on-disk cache of bindings, operators and embeddings; none computes them anew in every process.
+    pub cache: Option<PathBuf>,
+    /// Largest size of the cache [bytes].
+    pub cache_limit: u64,
+    /// The compute device.
+    pub backend: Backend,
+    /// Correction steps at most; `None`: as many as the model's configuration says.
+    pub corrections: Option<usize>,
+    /// Steps of the static solver after the networks; 0 switches refinement off.
+    pub refine: usize,
+    /// Whether the post-process resolves what still intersects.
+    pub resolve: bool,
+    /// How it does that.
+    pub post_process: ResolveSettings,
+}
+
+impl Default for DraperSettings {
+    fn default() -> Self {
+        let backend = Backend::preferred();
+        let post_process = ResolveSettings::default();
+        Self {
+            body: None,
+            cache: None,
+            cache_limit: 10 << 30,
+            backend,
+            corrections: None,
+            refine: 0,
+            resolve: true,
+            post_process,
+        }
+    }
+}
+
+/// A body to be dressed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BodyState {
+    /// Shape parameters β; missing ones are 0.
+    pub shape: Vec<f64>,
+    /// Pose θ.
+    pub pose: Pose,
+    /// The posed surface `[V, 3]` [m] that counts for contact, where it is known better than by shape and pose: a scan, or
+    /// another program's correctives.
+    pub surface: Option<Vec<[f64; 3]>>,
+    /// Where its pelvis stands [m]; `surface` is there already.
+    pub place: [f64; 3],
+}
+
+impl BodyState {
+    /// The body model's own surface at this shape and pose.
+    pub fn new(shape: Vec<f64>, pose: Pose) -> Self {
+        Self { shape, pose, surface: None, place: [0.0; 3] }
+    }
+}
+
+/// A trained model with a body, ready to drape.
+pub struct Draper {
+    trained: TrainedModel,
+    model: ClothCombo,
+    /// The same without corrections, for poses on the way from the T-pose: that leaves fewer crossings (docs/resolve.md).
+    uncorrected: ClothCombo,
+    preprocessor: Preprocessor,
+    joints: ActiveJoints,
+    device: Device,
+    settings: DraperSettings,
+    embedded: EmbeddedGarments,
+}
+
+impl Draper {
+    /// Loads a model (see [`TrainedModel::open`]; without `model` the shipped one) and its body.
+    ///
+    /// # Errors
+    /// When there is no model, it cannot be read, or the body does not have its joints.
+    pub fn load(model: Option<&Path>, settings: &DraperSettings) -> Result<Self, DraperError> {
+        let trained = match model {
+            Some(path) => TrainedModel::open(path)?,
+            None => shipped_model()?,
+        };
+        let body = load_model_body(&trained, settings.body.as_deref())?;
+        let joints = ActiveJoints::named(&body, &trained.state.joints)
+            .map_err(|missing| DraperError::Joints { body: body.name.clone(), missing })?;
+        let device = settings.backend.device();
+        let mut model = trained.networks(&device)?;
+        if let Some(steps) = settings.corrections {
+            if steps > 0 && model.corrections.is_empty() {
+                return Err(DraperError::NoCorrections { steps });
+            }
+            model = model.with_correction_steps(steps);
+        }
+        let cache = settings.cache.as_deref().map(|folder| ArrayCache::open(folder, settings.cache_limit));
+        let cache = cache.transpose().map_err(DatasetError::data)?;
+        let mut preprocessor = Preprocessor::new(&trained.config, Arc::new(body));
+        if let Some(cache) = cache {
+            preprocessor = preprocessor.with_cache(cache, CachePolicy::Optional);
+        }
+        let settings = settings.clone();
+        Ok(Self {
+            trained,
+            uncorrected: model.clone().with_correction_steps(0),
+            model,
+            preprocessor,
+            joints,
+            device,
+            settings,
+            embedded: EmbeddedGarments::default(),
+        })
+    }
+
+    /// The body model.
+    pub fn body(&self) -> &Body {
+        &self.preprocessor.body
+    }
+
+    /// The trained model.
+    pub fn trained(&self) -> &TrainedModel {
+        &self.trained
+    }
+
+    /// How it was set up.
+    pub fn settings(&self) -> &DraperSettings {
+        &self.settings
+    }
+
+    /// Garments by name: those of `folders`, and those the model was trained on as far as they are there.
+    ///
+    /// # Errors
+    /// When a folder cannot be listed.
+    pub fn catalog(&self, folders: &[PathBuf]) -> Result<GarmentCatalog, DraperError> {
+        GarmentCatalog::new(folders, &self.trained.config)
+    }
+
+    /// Prepares and embeds garments, innermost first. A garment this draper has met before, by content, costs nothing.
+    ///
+    /// # Errors
+    /// For more garments than an outfit may have, or one that cannot be prepared.
+    pub fn outfit(&self, garments: Vec<SourceGarment>) -> Result<Outfit, DraperError> {
+        Outfit::check(&garments)?;
+        let embedded = garments.iter().map(|source| self.embedded.get(self, source));
+        let embedded = embedded.collect::<Result<_, _>>()?;
+        Outfit::new(self, garments, embedded)
+    }
+
+    /// Drapes `outfit` on `body`.
+    ///
+    /// # Errors
+    /// When shape or pose do not fit the body model, or the networks diverge.
+    pub fn drape(&self, outfit: &Outfit, body: &BodyState) -> Result<Drape, DraperError> {
+        let made = self.networked(&self.model, outfit, body)?;
+        self.drape_frame(outfit, Frame { body, last: None }, made, &mut |_| ())
+    }
+
+    fn dimensions(&self) -> clothcombo_model::Dimensions {
+        self.trained.state.dimensions()
+    }
+}
+
+fn load_model_body(trained: &TrainedModel, named: Option<&str>) -> Result<Body, DraperError> {
+    let beside = trained.folder.join("body.npz");
+    let own = &trained.config.data.body;
+    let name = match named {
+        Some(name) => name.to_owned(),
+        None if beside.is_file() => beside.display().to_string(),
+        None if own == "mannequin" => own.clone(),
+        None => {
+            // A run lies somewhere below the folder its paths are relative to.
+            let places = std::iter::once(Path::new("")).chain(trained.folder.ancestors());
+            let found = places.map(|place| place.join(own)).find(|path| path.is_file());
+            found.ok_or_else(|| DraperError::NoBody { body: own.clone() })?.display().to_string()
+        }
+    };
+    Ok(load_body(&name, trained.state.shape_count)?)
+}
+
+fn elapsed(clock: Instant) -> f64 {
+    1e3 * clock.elapsed().as_secs_f64()
+}

@@ -1,0 +1,197 @@
+//! A motion: each frame carries on from the one before, and what that leaves over from the one after.
+
+use super::frame::{Frame, Last};
+use super::temporal_filter::TemporalFilter;
+use super::{BodyState, Certificate, Drape, Draper, DraperError, Outfit};
+
+/// So many frames after one that was left with flaws only carry on: poses change slowly, and starting anew takes seconds.
+const FRAMES_CARRIED: usize = 15;
+
+/// Flaws that carrying on from another frame may leave.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RetryPolicy {
+    crossings: usize,
+    tears: usize,
+}
+
+impl RetryPolicy {
+    const NONE: Self = Self { crossings: 0, tears: 0 };
+    const ALL: Self = Self { crossings: usize::MAX, tears: usize::MAX };
+
+    /// After a frame of which starting anew left these: tears must not grow from frame to frame.
+    fn after(anew: &Certificate) -> Self {
+        Self { crossings: usize::MAX, tears: anew.tears().saturating_add(1) }
+    }
+
+    pub fn is_met(self, certificate: &Certificate) -> bool {
+        certificate.crossings() <= self.crossings && certificate.tears() <= self.tears
+    }
+}
+
+/// How far [`Draper::drape_motion`] is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum DrapeProgress {
+    /// The post-process looks at a pose at this share of the way to the frame: from the one before it, or, where that leaves
+    /// crossings, from the T-pose.
+    OnTheWay(f64),
+    /// One more frame is draped.
+    Draped,
+    /// The frame of this number is draped once more, from the one after it.
+    Again(usize),
+}
+
+impl Draper {
+    /// Drapes `outfit` on each of `bodies`, the frames of a motion. What the networks make is averaged over `radius` frames to each
+    /// side before the post-process; 0 takes each frame as it is. The post-process carries on from frame to frame; where a frame is
+    /// left with crossings or torn cloth, and the one after it with less and no crossings, it carries on backwards from that one as
+    /// well. `progress` is called on the way to each frame, after it, and before each that is draped once more.
+    ///
+    /// # Errors
+    /// When shape or pose do not fit the body model, or the networks diverge.
+    pub fn drape_motion(
+        &self,
+        outfit: &Outfit,
+        bodies: &[BodyState],
+        radius: usize,
+        mut progress: impl FnMut(DrapeProgress),
+    ) -> Result<Vec<Drape>, DraperError> {
+        let mut drapes: Vec<Drape> = Vec::with_capacity(bodies.len());
+        let (mut bearable, mut only_carried) = (RetryPolicy::NONE, 0);
+        let steady = TemporalFilter::new(self, outfit, bodies, radius);
+        for ((frame, body), made) in bodies.iter().enumerate().zip(steady) {
+            let last = drapes.last().map(|drape| Last { body: &bodies[frame - 1], drape, bearable });
+            let mut watch = |share| progress(DrapeProgress::OnTheWay(share));
+            let mut drape = self.drape_frame(outfit, Frame { body, last }, made?, &mut watch)?;
+            if !bearable.is_met(&drape.certificate) {
+                (bearable, only_carried) = (RetryPolicy::after(&drape.certificate), FRAMES_CARRIED);
+            } else if only_carried > 1 {
+                only_carried -= 1;
+            } else {
+                (bearable, only_carried) = (RetryPolicy::NONE, 0);
+            }
+            if bodies.len() > 1 {
+                drape.slim();
+            }
+            drapes.push(drape);
+            progress(DrapeProgress::Draped);
+        }
+        if !self.settings.resolve {
+            return Ok(drapes);
+        }
+        carry_back(
+            &mut drapes,
+            |drape| &drape.certificate,
+            |frame, own, after| {
+                progress(DrapeProgress::Again(frame));
+                let last = Last { body: &bodies[frame + 1], drape: after, bearable: RetryPolicy::ALL };
+                let mut watch = |share| progress(DrapeProgress::OnTheWay(share));
+                let body = &bodies[frame];
+                let mut made = self.networked(&self.model, outfit, body)?;
+                made.network = own.garments.iter().flat_map(|garment| &garment.network).copied().collect();
+                let mut again =
+                    self.drape_frame(outfit, Frame { body, last: Some(last) }, made, &mut watch)?;
+                again.slim();
+                if again.certificate.flaws() < own.certificate.flaws() {
+                    std::mem::swap(own, &mut again);
+                }
+                own.milliseconds += again.milliseconds;
+                for (garment, other) in own.garments.iter_mut().zip(&again.garments) {
+                    garment.resolve_ms += other.resolve_ms;
+                }
+                Ok::<_, DraperError>(())
+            },
+        )?;
+        Ok(drapes)
+    }
+}
+
+/// From the last frame to the first: `again` makes better what has flaws, from the frame after it, where that has fewer and no
+/// crossings.
+fn carry_back<T, E>(
+    frames: &mut [T],
+    certificate: impl Fn(&T) -> &Certificate,
+    mut again: impl FnMut(usize, &mut T, &T) -> Result<(), E>,
+) -> Result<(), E> {
+    for frame in (0..frames.len().saturating_sub(1)).rev() {
+        let (own, after) = frames.split_at_mut(frame + 1);
+        let (own, after) = (&mut own[frame], &after[0]);
+        let (now, next) = (certificate(own), certificate(after));
+        if next.flaws() < now.flaws() && next.crossings() == 0 {
+            again(frame, own, after)?;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn left(crossings: usize, strain: f64) -> Certificate {
+        Certificate { body_triangle_pairs: crossings, strain_added: Some(strain), ..Certificate::default() }
+    }
+
+    #[test]
+    fn after_a_frame_that_could_not_be_mended_crossings_are_borne_but_no_growing_tears() {
+        for (certificate, at_first, after_crossings, after_tears) in [
+            (left(0, 0.4), true, true, true),
+            (left(0, -0.4), true, true, true),
+            (left(3, 0.0), false, true, true),
+            (left(0, 0.6), false, true, true),
+            (left(0, 1.2), false, false, true),
+            (left(9, 3.0), false, false, false),
+        ] {
+            assert_eq!(RetryPolicy::NONE.is_met(&certificate), at_first, "{certificate:?}");
+            assert_eq!(
+                RetryPolicy::after(&left(7, 0.0)).is_met(&certificate),
+                after_crossings,
+                "{certificate:?}"
+            );
+            assert_eq!(
+                RetryPolicy::after(&left(0, 1.0)).is_met(&certificate),
+                after_tears,
+                "{certificate:?}"
+            );
+            assert!(RetryPolicy::ALL.is_met(&certificate));
+        }
+        assert!(RetryPolicy::after(&left(0, f64::INFINITY)).is_met(&left(1, f64::INFINITY)));
+    }
+
+    #[test]
+    fn frames_are_mended_from_clear_ones_after_them_as_far_as_that_goes() {
+        let crossings =
+            |frames: &[Certificate]| frames.iter().map(Certificate::crossings).collect::<Vec<_>>();
+        let mut frames = [5, 4, 3, 0, 2, 0, 7].map(|crossings| left(crossings, 0.0));
+        let mut asked = Vec::new();
+        let found: Result<(), String> = carry_back(
+            &mut frames,
+            |frame| frame,
+            |frame, own, after| {
+                assert_eq!(after.crossings(), 0);
+                asked.push((frame, own.crossings()));
+                *own = left(usize::from(frame == 1), 0.0);
+                Ok(())
+            },
+        );
+        assert!(found.is_ok());
+        assert_eq!(asked, [(4, 2), (2, 3), (1, 4)]);
+        assert_eq!(crossings(&frames), [5, 1, 0, 0, 0, 0, 7]);
+        // Torn cloth is mended as well, and from what is torn less.
+        let mut torn = [left(0, 2.0), left(0, 1.5), left(2, 0.0), left(0, 0.5)];
+        let mut asked = Vec::new();
+        let found: Result<(), String> = carry_back(
+            &mut torn,
+            |frame| frame,
+            |frame, own, _| {
+                asked.push(frame);
+                own.body_triangle_pairs = 0;
+                Ok(())
+            },
+        );
+        assert!(found.is_ok());
+        assert_eq!(asked, [2, 1, 0]);
+        let failed = carry_back(&mut frames, |frame| frame, |_, _, _| Err("an error comes back"));
+        assert_eq!(failed, Err("an error comes back"));
+        assert!(carry_back(&mut [], |frame: &Certificate| frame, |_, _, _| Err("none")).is_ok());
+    }
+}

@@ -1,0 +1,155 @@
+//! The networks at inference: a prepared scene in, positions on the host out.
+
+use super::contact_features::LayerInteraction;
+use super::correct::{corrected, skinned};
+use super::descent::Descent;
+use super::draped::Draped;
+use super::tensor_store::{DrapeError, KnownEmbeddings, TensorStore};
+use crate::dataset::PreparedScene;
+use burn::tensor::Tensor;
+use clothcombo_model::{BodyTensors, ClothCombo, Embeddings, Mode, OutfitTensors};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// The networks ready for inference; garments are embedded once.
+pub struct Networks<'a> {
+    model: ClothCombo,
+    tensors: &'a TensorStore,
+    embeddings: Arc<KnownEmbeddings>,
+}
+
+impl<'a> Networks<'a> {
+    /// Wraps a model without automatic differentiation.
+    pub fn new(model: ClothCombo, tensors: &'a TensorStore) -> Self {
+        Self { model, tensors, embeddings: Arc::new(tensors.kept_embeddings()) }
+    }
+
+    /// The same without corrections.
+    pub fn uncorrected(&self) -> Self {
+        self.with_correction_steps(0)
+    }
+
+    /// The same with at most `steps` correction steps.
+    pub fn with_correction_steps(&self, steps: usize) -> Self {
+        let model = self.model.clone().with_correction_steps(steps);
+        Self { model, tensors: self.tensors, embeddings: self.embeddings.clone() }
+    }
+
+    /// Drapes the garments of `scene` together on its first body.
+    ///
+    /// # Errors
+    /// When the scene's numbers are not finite.
+    pub fn drape(&self, scene: &PreparedScene) -> Result<Draped, DrapeError> {
+        self.on_first_body(scene, Mode::Layered, |on_body| {
+            drape_on(&self.model, on_body, LayerInteraction::Together).0
+        })
+    }
+
+    /// Drapes every garment of `scene` as a single garment.
+    ///
+    /// # Errors
+    /// When the scene's numbers are not finite.
+    pub fn drape_single_garments(&self, scene: &PreparedScene) -> Result<Draped, DrapeError> {
+        let interaction = LayerInteraction::SingleGarments;
+        self.on_first_body(scene, Mode::Single, |on_body| drape_on(&self.model, on_body, interaction).0)
+    }
+
+    fn on_first_body<T>(
+        &self,
+        scene: &PreparedScene,
+        mode: Mode,
+        drape: impl Fn(&OnBody<'_>) -> T,
+    ) -> Result<T, DrapeError> {
+        let outfit = self.tensors.outfit(scene)?;
+        let embeddings = self.tensors.embed(&self.model, scene, &outfit, &self.embeddings, mode)?;
+        let (body, start) = self.tensors.body(&scene.bodies[0])?;
+        Ok(drape(&OnBody { scene, outfit: &outfit, embeddings: &embeddings, body: &body, start }))
+    }
+
+    /// The energy of every garment of `scene`, with the pairs that it is part of, at the states that the correction steps take
+    /// from skinning on [J].
+    ///
+    /// # Errors
+    /// When the scene's numbers are not finite.
+    pub fn energies(&self, scene: &PreparedScene) -> Result<Vec<Vec<f64>>, DrapeError> {
+        self.on_first_body(scene, Mode::Layered, |on_body| {
+            let mut energies = Vec::new();
+            let mut watch = |descent: &Descent<'_>| energies.push(descent.energies().to_vec());
+            drape_watched(&self.model, on_body, LayerInteraction::Together, &mut watch);
+            energies
+        })
+    }
+
+    /// Linear blend skinning of the start state, which has learned nothing.
+    ///
+    /// # Errors
+    /// When the scene's numbers are not finite.
+    pub fn skin(&self, scene: &PreparedScene) -> Result<Draped, DrapeError> {
+        let (_, start) = self.tensors.body(&scene.bodies[0])?;
+        self.skin_from(scene, start)
+    }
+
+    /// Linear blend skinning of the rest garments, whatever the body's shape: the paper's baseline.
+    ///
+    /// # Errors
+    /// When the scene's numbers are not finite.
+    pub fn skin_rest(&self, scene: &PreparedScene) -> Result<Draped, DrapeError> {
+        let rest = self.tensors.outfit(scene)?.rest;
+        self.skin_from(scene, rest)
+    }
+
+    fn skin_from(&self, scene: &PreparedScene, start: Tensor<2>) -> Result<Draped, DrapeError> {
+        let outfit = self.tensors.outfit(scene)?;
+        let (body, _) = self.tensors.body(&scene.bodies[0])?;
+        Ok(skinned(start, outfit.skin_weights, &body))
+    }
+}
+
+/// An outfit with its embeddings on the first body of a scene.
+pub struct OnBody<'a> {
+    /// The scene.
+    pub scene: &'a PreparedScene,
+    /// Its garments.
+    pub outfit: &'a OutfitTensors,
+    /// Their embeddings.
+    pub embeddings: &'a Embeddings,
+    /// Its first body.
+    pub body: &'a BodyTensors,
+    /// Where the garments start on it `[ΣV, 3]` [m].
+    pub start: Tensor<2>,
+}
+
+/// Time of every phase of the networks, until its positions are on the host.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NetworkTimes {
+    /// The forward pass.
+    pub forward: Duration,
+    /// The correction steps.
+    pub corrections: Duration,
+}
+
+/// Lets `model` drape an outfit, all its garments together or each as a single garment, and correct the result.
+pub fn drape_on(
+    model: &ClothCombo,
+    on_body: &OnBody<'_>,
+    interaction: LayerInteraction,
+) -> (Draped, NetworkTimes) {
+    drape_watched(model, on_body, interaction, &mut |_| ())
+}
+
+/// The same; `watch` sees every state that the correction steps accept.
+fn drape_watched(
+    model: &ClothCombo,
+    on_body: &OnBody<'_>,
+    interaction: LayerInteraction,
+    watch: &mut dyn FnMut(&Descent<'_>),
+) -> (Draped, NetworkTimes) {
+    let OnBody { outfit, embeddings, body, start, .. } = on_body;
+    let clock = Instant::now();
+    let states = model.forward(outfit, embeddings, body, start.clone(), interaction.mode());
+    // On the host before the clock is read: devices compute behind the caller's back.
+    let uncorrected = Draped::of(states.last());
+    let forward = clock.elapsed();
+    let found = corrected(model, on_body, states, uncorrected, interaction, watch);
+    (found, NetworkTimes { forward, corrections: clock.elapsed() - forward })
+}

@@ -1,0 +1,130 @@
+//! Garments that are draped together, with everything that does not depend on the body.
+
+use super::Draper;
+use super::embedded::{EmbeddedGarment, GarmentTimes};
+use super::error::DraperError;
+use super::names::UniqueNames;
+use super::source::SourceGarment;
+use crate::dataset::{PreparedGarment, contacts};
+use clothcombo_model::{Embeddings, Mode, OutfitTensors};
+use clothcombo_physics::contact::resolve::{Layer, ResolveError, RestGarment};
+use std::sync::Arc;
+
+/// Most garments of an outfit.
+pub const MAX_GARMENTS: usize = 12;
+
+/// Most vertices of a garment: at the paper's sizes the operators of one take 2 kB a vertex, its embedding as much.
+pub const MAX_VERTICES: usize = 100_000;
+
+/// A garment of an outfit.
+#[derive(Clone)]
+pub struct OutfitGarment {
+    /// Name, unique within the outfit and fit to be a file name.
+    pub name: String,
+    /// As it was given.
+    pub source: Arc<SourceGarment>,
+    /// Ready for the networks.
+    pub prepared: Arc<PreparedGarment>,
+    /// As the post-process sees it.
+    pub rest: Arc<RestGarment>,
+    /// Whether the embedding was there already, in memory or in the cache.
+    pub embedding_known: bool,
+    /// What it cost this time.
+    pub milliseconds: GarmentTimes,
+}
+
+/// Garments that are draped together, innermost first, with everything that does not depend on the body.
+pub struct Outfit {
+    /// The garments.
+    pub garments: Vec<OutfitGarment>,
+    pub(super) tensors: OutfitTensors,
+    pub(super) embeddings: Embeddings,
+}
+
+impl Outfit {
+    /// Packs embedded garments, innermost first.
+    pub(super) fn new(
+        draper: &Draper,
+        sources: Vec<SourceGarment>,
+        embedded: Vec<EmbeddedGarment>,
+    ) -> Result<Self, DraperError> {
+        let prepared: Vec<Arc<PreparedGarment>> = embedded.iter().map(|e| e.prepared.clone()).collect();
+        let contacts = contacts(draper.trained.config.model.graph, &prepared);
+        let tensors = embedded.iter().map(|e| &e.tensors).collect::<Vec<_>>();
+        let tensors = OutfitTensors::new(&tensors, &contacts)?;
+        let embeddings = embedded.iter().map(|e| e.embedding.clone()).collect::<Vec<_>>();
+        let embeddings = draper.model.pack(&tensors, &embeddings, Mode::Layered)?;
+        let mut names = UniqueNames::default();
+        let garment = |(source, embedded): (SourceGarment, EmbeddedGarment)| OutfitGarment {
+            name: names.take(&source.garment.name),
+            source: Arc::new(source),
+            prepared: embedded.prepared,
+            rest: embedded.rest,
+            embedding_known: embedded.was_known,
+            milliseconds: embedded.milliseconds,
+        };
+        Ok(Self { garments: sources.into_iter().zip(embedded).map(garment).collect(), tensors, embeddings })
+    }
+
+    /// Whether `garments` are few and small enough to be an outfit: what [`Draper::outfit`] would say, at once.
+    ///
+    /// # Errors
+    /// When they are not.
+    pub fn check(garments: &[SourceGarment]) -> Result<(), DraperError> {
+        if garments.is_empty() || garments.len() > MAX_GARMENTS {
+            return Err(DraperError::Count { count: garments.len(), most: MAX_GARMENTS });
+        }
+        let sizes = garments.iter().map(|source| (&source.garment.name, source.garment.rest.vertex_count()));
+        match sizes.into_iter().find(|(_, vertices)| *vertices > MAX_VERTICES) {
+            Some((name, vertices)) => Err(DraperError::TooLarge { name: name.clone(), vertices }),
+            None => Ok(()),
+        }
+    }
+
+    /// Names, innermost first.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.garments.iter().map(|p| p.name.as_str())
+    }
+
+    pub(super) fn prepared(&self) -> Vec<Arc<PreparedGarment>> {
+        self.garments.iter().map(|p| p.prepared.clone()).collect()
+    }
+
+    /// The part of each garment of a packed `[ΣV]` array.
+    pub(super) fn split<'a, T>(&self, packed: &'a [T]) -> Vec<&'a [T]> {
+        let mut rest = packed;
+        let mut parts = Vec::with_capacity(self.garments.len());
+        for piece in &self.garments {
+            let (part, tail) = rest.split_at(piece.prepared.vertex_count());
+            parts.push(part);
+            rest = tail;
+        }
+        parts
+    }
+
+    /// Layers for the post-process, at the positions of each garment.
+    pub(super) fn layers<'a>(&'a self, positions: &[&'a [[f64; 3]]]) -> Vec<Layer<'a>> {
+        let pieces = self.garments.iter().zip(positions);
+        pieces.map(|(piece, positions)| Layer { garment: &piece.rest, positions }).collect()
+    }
+
+    /// `error` with the garment's name where the post-process knows only its number.
+    pub(super) fn named(&self, error: DraperError) -> DraperError {
+        match error {
+            DraperError::Resolve(ResolveError::Position { garment, vertex, position }) => {
+                let garment = self.garments.get(garment).map_or_else(String::new, |piece| piece.name.clone());
+                DraperError::Far { garment, vertex, position }
+            }
+            other => other,
+        }
+    }
+
+    pub(super) fn check_finite(&self, packed: &[[f64; 3]]) -> Result<(), DraperError> {
+        for (piece, part) in self.garments.iter().zip(self.split(packed)) {
+            if part.as_flattened().iter().any(|x| !x.is_finite()) {
+                return Err(DraperError::Diverged { garment: piece.name.clone() });
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,307 @@
+//! A folder that appears whole or not at all.
+
+use super::OutputError;
+use crate::system::paths::first_missing_folder;
+use std::collections::HashSet;
+use std::fs;
+use std::hash::{BuildHasher, RandomState};
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Lists the files of a folder that was written here, one relative path a line: `--replace` removes nothing else.
+const LIST: &str = ".clothcombo-files";
+
+/// A folder under a temporary name beside its target; removed again unless it is [committed](Self::commit).
+#[derive(Debug)]
+pub struct Staged {
+    target: PathBuf,
+    temporary: PathBuf,
+    replace: bool,
+    inputs: Vec<PathBuf>,
+    /// The outermost folder that was made for this one to lie in, if any was.
+    made: Option<PathBuf>,
+    is_committed: bool,
+}
+
+impl Staged {
+    /// Starts a folder that will become `target`, which must not exist or be empty, or hold what an earlier one held and
+    /// none of `inputs` if `replace`.
+    ///
+    /// # Errors
+    /// When something else is there, or the folder cannot be made.
+    pub fn new(target: &Path, replace: bool, inputs: &[PathBuf]) -> Result<Self, OutputError> {
+        let name = target.file_name().ok_or_else(|| OutputError::NoName { path: target.into() })?;
+        // A link to a folder stays a link.
+        let target = fs::canonicalize(target).unwrap_or_else(|_| target.to_owned());
+        check_free(&target, replace, inputs)?;
+        let number = RandomState::new().hash_one(0);
+        let temporary = target.with_file_name(format!(".{}.{number:016x}.tmp", name.to_string_lossy()));
+        let made = first_missing_folder(&temporary).map(Path::to_owned);
+        let staged = Self { target, temporary, replace, inputs: inputs.to_vec(), made, is_committed: false };
+        fs::create_dir_all(&staged.temporary)
+            .map_err(|reason| OutputError::Io { path: staged.temporary.clone(), reason })?;
+        Ok(staged)
+    }
+
+    /// Adds to what is read, for what is only known after the start.
+    ///
+    /// # Errors
+    /// When one of `inputs` lies in the folder that is to be replaced.
+    pub fn keep(&mut self, inputs: impl IntoIterator<Item = PathBuf>) -> Result<(), OutputError> {
+        self.inputs.extend(inputs);
+        check_free(&self.target, self.replace, &self.inputs)
+    }
+
+    /// Where to write.
+    pub fn folder(&self) -> &Path {
+        &self.temporary
+    }
+
+    /// Gives the folder its name. What was there before is removed only after that; what has come there since the start is
+    /// not, and the folder gets another name.
+    ///
+    /// # Errors
+    /// When it cannot be renamed, or not as was asked; what was there before is left as it was.
+    pub fn commit(mut self) -> Result<(), OutputError> {
+        let failed = |reason: io::Error| OutputError::Io { path: self.target.clone(), reason };
+        let list: String = files(&self.temporary).map_err(failed)?.iter().map(|f| format!("{f}\n")).collect();
+        fs::write(self.temporary.join(LIST), list).map_err(failed)?;
+        if let Err(reason) = check_free(&self.target, self.replace, &self.inputs) {
+            let instead = free_name(&self.target);
+            fs::rename(&self.temporary, &instead).map_err(failed)?;
+            self.is_committed = true;
+            return Err(OutputError::Meanwhile { reason: Box::new(reason), instead });
+        }
+        let earlier = self.temporary.with_extension("old");
+        let had_earlier = self.target.exists();
+        if had_earlier {
+            fs::rename(&self.target, &earlier).map_err(failed)?;
+        }
+        if let Err(reason) = fs::rename(&self.temporary, &self.target) {
+            if had_earlier {
+                // The first error is the one worth telling.
+                let _ = fs::rename(&earlier, &self.target);
+            }
+            return Err(failed(reason));
+        }
+        self.is_committed = true;
+        if had_earlier {
+            fs::remove_dir_all(&earlier)
+                .map_err(|reason| OutputError::Io { path: earlier.clone(), reason })?;
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Staged {
+    fn drop(&mut self) {
+        if !self.is_committed {
+            // Nothing can be done about a folder that cannot be removed; its name says that it is temporary.
+            let _ = fs::remove_dir_all(&self.temporary);
+            let Some(first) = &self.made else { return };
+            for folder in self.temporary.ancestors().skip(1).take_while(|folder| folder.starts_with(first)) {
+                // One that something else has come into stays.
+                let _ = fs::remove_dir(folder);
+            }
+        }
+    }
+}
+
+/// Whether there is nothing at `target`, or what may be replaced.
+fn check_free(target: &Path, replace: bool, inputs: &[PathBuf]) -> Result<(), OutputError> {
+    match fs::symlink_metadata(target).is_ok() && !is_empty_folder(target) {
+        true if replace => check_own(target, inputs),
+        true => Err(OutputError::Occupied { path: target.into() }),
+        false => Ok(()),
+    }
+}
+
+/// `target` with the first number that is not taken.
+fn free_name(target: &Path) -> PathBuf {
+    let name = target.file_name().unwrap_or_default().to_string_lossy();
+    let numbered = |number: usize| target.with_file_name(format!("{name}-{number}"));
+    (2..).map(numbered).find(|path| fs::symlink_metadata(path).is_err()).unwrap_or_else(|| numbered(2))
+}
+
+/// Whether all of `folder` was written here, and none of it is read now.
+fn check_own(folder: &Path, inputs: &[PathBuf]) -> Result<(), OutputError> {
+    let path = folder.to_owned();
+    let Ok(list) = fs::read_to_string(folder.join(LIST)) else {
+        return Err(OutputError::NotOurs { path });
+    };
+    let own: HashSet<&str> = list.lines().chain([LIST]).collect();
+    let found = files(folder).map_err(|reason| OutputError::Io { path: path.clone(), reason })?;
+    if let Some(file) = found.into_iter().find(|file| !own.contains(file.as_str())) {
+        return Err(OutputError::Foreign { path, file });
+    }
+    let is_inside = |input: &&PathBuf| fs::canonicalize(input).is_ok_and(|input| input.starts_with(folder));
+    match inputs.iter().find(is_inside) {
+        Some(input) => Err(OutputError::Input { path, input: input.clone() }),
+        None => Ok(()),
+    }
+}
+
+/// Everything in `folder` that is no folder, relative to it, in order.
+fn files(folder: &Path) -> io::Result<Vec<String>> {
+    let mut found = Vec::new();
+    let mut folders = vec![PathBuf::new()];
+    while let Some(inner) = folders.pop() {
+        for entry in fs::read_dir(folder.join(&inner))? {
+            let entry = entry?;
+            let path = inner.join(entry.file_name());
+            match entry.file_type()?.is_dir() {
+                true => folders.push(path),
+                false => found.push(path.to_string_lossy().into_owned()),
+            }
+        }
+    }
+    found.sort();
+    Ok(found)
+}
+
+fn is_empty_folder(path: &Path) -> bool {
+    fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let mut names: Vec<String> = fs::read_dir(folder)
+            .unwrap()
+            .map(|e| e.unwrap().file_name().to_string_lossy().into_owned())
+            .collect();
+        names.sort();
+        names
+    }
+
+    fn written(target: &Path, replace: bool, text: &str) -> Result<(), OutputError> {
+        let staged = Staged::new(target, replace, &[])?;
+        fs::create_dir_all(staged.folder().join("frames")).unwrap();
+        fs::write(staged.folder().join("frames/a.obj"), text).unwrap();
+        staged.commit()
+    }
+
+    #[test]
+    fn a_folder_appears_whole_and_an_abandoned_one_not_at_all() {
+        let place = tempfile::tempdir().unwrap();
+        let target = place.path().join("out");
+        let staged = Staged::new(&target, false, &[]).unwrap();
+        fs::write(staged.folder().join("a.obj"), "x").unwrap();
+        assert!(!target.exists());
+        drop(staged);
+        assert!(names(place.path()).is_empty());
+        written(&target, false, "1").unwrap();
+        assert_eq!(names(place.path()), ["out"]);
+        assert_eq!(names(&target), [LIST, "frames"]);
+        assert!(matches!(Staged::new(Path::new("/"), false, &[]), Err(OutputError::NoName { .. })));
+    }
+
+    #[test]
+    fn folders_made_for_an_abandoned_one_are_gone_unless_something_came_into_them() {
+        let place = tempfile::tempdir().unwrap();
+        let staged = || Staged::new(&place.path().join("a/b/out"), false, &[]).unwrap();
+        drop(staged());
+        assert!(names(place.path()).is_empty());
+        let begun = staged();
+        fs::write(place.path().join("a/note"), "x").unwrap();
+        drop(begun);
+        assert_eq!(
+            (names(place.path()), names(&place.path().join("a"))),
+            (vec!["a".into()], vec!["note".into()])
+        );
+        // What was there before stays, empty or not.
+        fs::create_dir(place.path().join("a/b")).unwrap();
+        drop(staged());
+        assert_eq!(names(&place.path().join("a")), ["b", "note"]);
+        staged().commit().unwrap();
+        assert_eq!(names(&place.path().join("a/b")), ["out"]);
+        // A file in the way: what was made up to it is gone too.
+        assert!(matches!(
+            Staged::new(&place.path().join("a/note/c/out"), false, &[]),
+            Err(OutputError::Io { .. })
+        ));
+        assert_eq!(names(&place.path().join("a")), ["b", "note"]);
+    }
+
+    #[test]
+    fn what_turns_out_to_be_read_is_not_replaced() {
+        let place = tempfile::tempdir().unwrap();
+        let target = place.path().join("out");
+        written(&target, false, "1").unwrap();
+        let mut staged = Staged::new(&target, true, &[]).unwrap();
+        staged.keep([place.path().join("elsewhere.obj")]).unwrap();
+        assert!(matches!(staged.keep([target.join("frames/a.obj")]), Err(OutputError::Input { .. })));
+        assert!(matches!(staged.keep([target.clone()]), Err(OutputError::Input { .. })));
+        drop(staged);
+        assert_eq!(names(place.path()), ["out"]);
+    }
+
+    #[test]
+    fn only_what_was_written_here_is_replaced_and_only_when_asked() {
+        let place = tempfile::tempdir().unwrap();
+        let target = place.path().join("out");
+        fs::create_dir(&target).unwrap();
+        written(&target, false, "1").unwrap();
+        assert!(matches!(written(&target, false, "2"), Err(OutputError::Occupied { .. })));
+        written(&target, true, "2").unwrap();
+        let file = target.join("frames/a.obj");
+        assert_eq!(fs::read_to_string(&file).unwrap(), "2");
+        // Neither what is read now is lost, nor what someone else has put there.
+        let reading = Staged::new(&target, true, std::slice::from_ref(&file));
+        assert!(matches!(reading, Err(OutputError::Input { .. })));
+        fs::write(target.join("frames/thesis.tex"), "x").unwrap();
+        let Err(OutputError::Foreign { file: foreign, .. }) = written(&target, true, "3") else {
+            panic!("a thesis was thrown away")
+        };
+        assert_eq!(Path::new(&foreign), Path::new("frames/thesis.tex"));
+        assert_eq!(names(&target.join("frames")), ["a.obj", "thesis.tex"]);
+        fs::remove_file(target.join(LIST)).unwrap();
+        assert!(matches!(written(&target, true, "3"), Err(OutputError::NotOurs { .. })));
+        assert_eq!(names(place.path()), ["out"]);
+    }
+
+    #[test]
+    fn what_comes_meanwhile_is_kept_and_so_is_the_result() {
+        let place = tempfile::tempdir().unwrap();
+        let target = place.path().join("out");
+        let begun = |replace| {
+            let staged = Staged::new(&target, replace, &[]).unwrap();
+            fs::write(staged.folder().join("a.obj"), "x").unwrap();
+            staged
+        };
+        // A file, then a folder with something in it, then something more in a folder that is to be replaced.
+        let staged = begun(false);
+        fs::write(&target, "mine").unwrap();
+        let Err(OutputError::Meanwhile { instead, .. }) = staged.commit() else { panic!("a file is gone") };
+        assert_eq!(fs::read_to_string(&target).unwrap(), "mine");
+        assert_eq!(names(&instead), [LIST, "a.obj"]);
+        fs::remove_file(&target).unwrap();
+        let staged = begun(false);
+        fs::create_dir(&target).unwrap();
+        fs::write(target.join("own.txt"), "mine").unwrap();
+        assert!(matches!(staged.commit(), Err(OutputError::Meanwhile { .. })));
+        assert_eq!(names(&target), ["own.txt"]);
+        fs::remove_dir_all(&target).unwrap();
+        begun(false).commit().unwrap();
+        let staged = begun(true);
+        fs::write(target.join("own.txt"), "mine").unwrap();
+        assert!(matches!(staged.commit(), Err(OutputError::Meanwhile { .. })));
+        assert_eq!(names(&target), [LIST, "a.obj", "own.txt"]);
+        assert_eq!(names(place.path()), ["out", "out-2", "out-3", "out-4"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_to_a_folder_stays_a_link() {
+        let place = tempfile::tempdir().unwrap();
+        let [real, link] = ["real", "link"].map(|name| place.path().join(name));
+        fs::create_dir(&real).unwrap();
+        std::os::unix::fs::symlink(&real, &link).unwrap();
+        written(&link, false, "1").unwrap();
+        written(&link, true, "2").unwrap();
+        assert!(link.is_symlink());
+        assert_eq!(fs::read_to_string(real.join("frames/a.obj")).unwrap(), "2");
+    }
+}

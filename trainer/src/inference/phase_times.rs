@@ -1,0 +1,63 @@
+//! Where the time of a drape goes.
+
+use serde::{Deserialize, Serialize};
+use std::ops::AddAssign;
+
+/// Wall time by phase [ms]; all garments together.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PhaseTimes {
+    /// Binding, constants of the energies, operators.
+    pub preparation: f64,
+    /// The embedding network, or reading what it made before.
+    pub embedding: f64,
+    /// Shape, pose and skinning transforms.
+    pub posing: f64,
+    /// The forward pass: single draping, skinning and untangling.
+    pub networks: f64,
+    /// The correction steps.
+    pub corrections: f64,
+    /// The static solver, if asked for.
+    pub refine: f64,
+    /// The post-process, without its certificate.
+    pub resolve: f64,
+    /// Counting all pairs of the result.
+    pub certificate: f64,
+}
+
+impl AddAssign for PhaseTimes {
+    fn add_assign(&mut self, other: Self) {
+        for (own, more) in [
+            (&mut self.preparation, other.preparation),
+            (&mut self.embedding, other.embedding),
+            (&mut self.posing, other.posing),
+            (&mut self.networks, other.networks),
+            (&mut self.corrections, other.corrections),
+            (&mut self.refine, other.refine),
+            (&mut self.resolve, other.resolve),
+            (&mut self.certificate, other.certificate),
+        ] {
+            *own += more;
+        }
+    }
+}
+
+impl PhaseTimes {
+    /// Every phase with its name, in order.
+    pub fn phases(&self) -> [(&'static str, f64); 8] {
+        [
+            ("preparation", self.preparation),
+            ("embedding", self.embedding),
+            ("posing", self.posing),
+            ("networks", self.networks),
+            ("corrections", self.corrections),
+            ("refine", self.refine),
+            ("resolve", self.resolve),
+            ("certificate", self.certificate),
+        ]
+    }
+
+    /// Sum of all phases.
+    pub fn total(&self) -> f64 {
+        self.phases().iter().map(|(_, ms)| ms).sum()
+    }
+}

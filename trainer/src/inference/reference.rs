@@ -1,0 +1,72 @@
+//! The scene that the static solver brings into equilibrium: what drapes are measured against.
+//!
+//! Its energy is that of the losses of the configuration with the weights they end with, in f64 and in the form without jumps
+//! ([`SceneEnergy::continuous`]); and garments are held by their posed positions, whatever the configuration says. Training uses
+//! the cheaper forms. Where two sheets of an inner garment are equally near, one on each side, the contact between garments still
+//! jumps.
+
+use crate::config::LossesConfig;
+use crate::dataset::PreparedScene;
+use clothcombo_physics::energy::{EnergyError, GarmentEnergies, SceneEnergy, SceneGarment, SceneLayers};
+use clothcombo_physics::mesh::Topology;
+use clothcombo_physics::query::Surface;
+use clothcombo_physics::transform::apply;
+use std::sync::Arc;
+
+/// A scene on its first body in f64, ready to be solved.
+pub struct ReferenceScene {
+    /// Names of the garments, inner → outer.
+    pub garments: Vec<String>,
+    /// Energy of posed positions.
+    pub energy: SceneEnergy<f64>,
+    /// Linear blend skinning of the rest garments, `[ΣV, 3]`.
+    pub skinned_rest: Vec<[f64; 3]>,
+    /// Linear blend skinning of the start state (with shape transfer), `[ΣV, 3]`.
+    pub skinned_start: Vec<[f64; 3]>,
+}
+
+impl ReferenceScene {
+    /// Takes over the body, the weights and the start of `scene`.
+    ///
+    /// # Errors
+    /// When a garment has no energies: it has no area, or a setting is out of range.
+    pub fn new(losses: &LossesConfig, scene: &PreparedScene) -> Result<Self, EnergyError> {
+        let settings = losses.energy_settings().continuous();
+        let body = &scene.bodies[0];
+        let start = wide(&body.start);
+        let mut rest = Vec::with_capacity(start.len());
+        let transforms = scene.skinning_transforms();
+        let mut garments = Vec::new();
+        for (garment, narrow) in scene.garments.iter().zip(&body.energy.garments) {
+            let mesh = &garment.garment.rest;
+            let energies =
+                GarmentEnergies::new(mesh, &Topology::new(mesh), &settings, garment.garment.holding)?;
+            garments.push(SceneGarment {
+                energies: Arc::new(energies),
+                holding_reference: wide(&narrow.holding_reference),
+                pull_back: None,
+                weights: narrow.weights,
+            });
+            rest.extend_from_slice(mesh.positions());
+        }
+        let layers = body.energy.layers.iter();
+        let layers =
+            layers.map(|l| SceneLayers { inner: l.inner, outer: l.outer, weights: l.weights }).collect();
+        let surface = &body.energy.body;
+        let skinned = |positions: &[[f64; 3]]| -> Vec<[f64; 3]> {
+            transforms.iter().zip(positions).map(|(t, p)| apply(t, *p)).collect()
+        };
+        let body = Arc::new(Surface::new(wide(&surface.positions), surface.faces.clone()));
+        Ok(Self {
+            garments: scene.garments.iter().map(|g| g.garment.name.clone()).collect(),
+            energy: SceneEnergy { body, garments, layers, settings }.continuous().pulled_back(&transforms),
+            skinned_rest: skinned(&rest),
+            skinned_start: skinned(&start),
+        })
+    }
+}
+
+/// In f64.
+pub(crate) fn wide(positions: &[[f32; 3]]) -> Vec<[f64; 3]> {
+    positions.iter().map(|p| p.map(f64::from)).collect()
+}

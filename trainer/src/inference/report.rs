@@ -1,0 +1,256 @@
+//! What a drape reports: `report.json`.
+
+use super::acceleration::{Acceleration, acceleration};
+use super::refine::Refinement;
+use super::{Drape, Draper, DraperError, Outfit, PhaseTimes, Smoothing};
+use crate::dataset::DatasetError;
+use crate::score::{DrapedGarment, Score, ScoreDistance, score};
+use crate::system::paths::{lossy, lossy_option};
+use clothcombo_data::asset::Category;
+use clothcombo_data::fit::FitReport;
+use clothcombo_physics::contact::resolve::Certificate;
+use clothcombo_physics::mesh::TriMesh;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// The model that draped.
+#[derive(Clone, Debug, Serialize)]
+pub struct ModelReport {
+    /// Its folder.
+    #[serde(serialize_with = "lossy")]
+    pub folder: PathBuf,
+    /// Steps it was trained for.
+    pub step: u64,
+    /// BLAKE3 checksum of its parameters.
+    pub checksum: String,
+}
+
+/// The body.
+#[derive(Clone, Debug, Serialize)]
+pub struct BodyReport {
+    /// Its name.
+    pub name: String,
+    /// Shape parameters β.
+    pub shape: Vec<f64>,
+    /// Where the pose comes from.
+    pub pose: String,
+    /// Vertices.
+    pub vertices: usize,
+    /// Triangles.
+    pub triangles: usize,
+    /// For a body recovered from meshes: mean distance of its vertices to theirs [mm].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub recovered_within_mm: Option<f64>,
+}
+
+/// One garment. The time of what treats all garments at once is shared by number of vertices.
+#[derive(Clone, Debug, Serialize)]
+pub struct GarmentReport {
+    /// Its name, and that of its file.
+    pub name: String,
+    /// The file it was read from, if it was.
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "lossy_option")]
+    pub given: Option<PathBuf>,
+    /// Vertices of the mesh as given.
+    pub given_vertices: usize,
+    /// Vertices that were draped.
+    pub vertices: usize,
+    /// Triangles.
+    pub triangles: usize,
+    /// Category.
+    pub category: Category,
+    /// What fitting assumed and repaired; none if the garment lay on the body as it was.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fit: Option<FitReport>,
+    /// Whether its embedding was known before.
+    pub embedding_known: bool,
+    /// Wall time, all frames together.
+    pub milliseconds: PhaseTimes,
+}
+
+/// One frame of a motion.
+#[derive(Clone, Debug, Serialize)]
+pub struct FrameReport {
+    /// Number in the motion.
+    pub frame: usize,
+    /// Its time [s].
+    pub seconds: f64,
+    /// Wall time.
+    pub milliseconds: PhaseTimes,
+    /// What is left.
+    pub certificate: Certificate,
+}
+
+/// Everything about a drape.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// The program.
+    pub program: String,
+    /// The model.
+    pub model: ModelReport,
+    /// The body.
+    pub body: BodyReport,
+    /// The garments, innermost first.
+    pub garments: Vec<GarmentReport>,
+    /// Score of the first frame before the post-process.
+    pub before: Score,
+    /// And of the result.
+    pub after: Score,
+    /// Wall time by phase, all garments and frames together.
+    pub milliseconds: PhaseTimes,
+    /// What is left: of a motion, numbers of pairs are sums over the frames, depths and strain the worst frame's, and the
+    /// lists are those of `frames`.
+    pub certificate: Certificate,
+    /// The same of what came to the post-process in the first frame, without the list of pairs.
+    pub certificate_before: Certificate,
+    /// What the refinement of the first frame did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub refinement: Option<Refinement>,
+    /// What temporal smoothing did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub smoothing: Option<Smoothing>,
+    /// How smoothly a motion moves.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub acceleration: Option<Acceleration>,
+    /// Every frame of a motion.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub frames: Vec<FrameReport>,
+}
+
+/// A draped frame and when it is.
+#[derive(Clone, Copy, Debug)]
+pub struct Moment {
+    /// Number in the motion.
+    pub frame: usize,
+    /// Time [s].
+    pub seconds: f64,
+}
+
+impl Report {
+    /// Puts the report of `drapes` (at least one) together; `moments` are theirs if they are a motion, else empty.
+    ///
+    /// # Errors
+    /// When a score overflows: a garment has exploded.
+    pub fn new(
+        draper: &Draper,
+        outfit: &Outfit,
+        drapes: &[Drape],
+        moments: &[Moment],
+        body: BodyReport,
+        smoothing: Option<Smoothing>,
+    ) -> Result<Self, DraperError> {
+        let first = &drapes[0];
+        let mut milliseconds = PhaseTimes::default();
+        drapes.iter().for_each(|drape| milliseconds += drape.milliseconds);
+        for garment in &outfit.garments {
+            milliseconds.preparation += garment.milliseconds.preparation;
+            milliseconds.embedding += garment.milliseconds.embedding;
+        }
+        let (certificate_before, (before, after)) = rayon::join(
+            || first.certificate_before(draper, outfit),
+            || {
+                let score = |stage| first.score(draper, outfit, stage);
+                rayon::join(|| score(Stage::BeforeResolve), || score(Stage::Result))
+            },
+        );
+        let frames = drapes.iter().zip(moments).map(|(drape, moment)| FrameReport {
+            frame: moment.frame,
+            seconds: moment.seconds,
+            milliseconds: drape.milliseconds,
+            certificate: drape.certificate.clone(),
+        });
+        let trained = draper.trained();
+        Ok(Self {
+            program: format!("clothcombo {}", env!("CARGO_PKG_VERSION")),
+            model: ModelReport {
+                folder: trained.folder.clone(),
+                step: trained.state.step,
+                checksum: trained.checksum().to_owned(),
+            },
+            body,
+            garments: garment_reports(outfit, drapes),
+            before: before?,
+            after: after?,
+            milliseconds,
+            certificate: Certificate::of_frames(drapes.iter().map(|drape| &drape.certificate)),
+            certificate_before: Certificate { remaining: Vec::new(), ..certificate_before? },
+            refinement: first.refinement.clone(),
+            smoothing,
+            acceleration: acceleration(drapes, moments),
+            frames: frames.collect(),
+        })
+    }
+}
+
+/// Which state of a drape is meant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// What came to the post-process.
+    BeforeResolve,
+    /// The result.
+    Result,
+}
+
+impl Drape {
+    /// Scores this drape by the paper's energies (see [`crate::score`]).
+    ///
+    /// # Errors
+    /// When a value overflows.
+    pub fn score(&self, draper: &Draper, outfit: &Outfit, stage: Stage) -> Result<Score, DraperError> {
+        let refused = |e: &dyn std::fmt::Display| DatasetError::Data(e.to_string());
+        let body = TriMesh::new(self.body.clone(), draper.body().faces.to_vec()).map_err(|e| refused(&e))?;
+        let garments: Vec<DrapedGarment> = outfit
+            .garments
+            .iter()
+            .zip(&self.garments)
+            .map(|(garment, drape)| DrapedGarment {
+                name: &garment.name,
+                rest: &garment.prepared.garment.rest,
+                positions: match stage {
+                    Stage::BeforeResolve => &drape.before,
+                    Stage::Result => &drape.positions,
+                },
+                canonical: None,
+            })
+            .collect();
+        Ok(score(&body, &garments, ScoreDistance::default()).map_err(|e| refused(&e))?)
+    }
+}
+
+fn garment_reports(outfit: &Outfit, drapes: &[Drape]) -> Vec<GarmentReport> {
+    let all: usize = outfit.garments.iter().map(|p| p.prepared.vertex_count()).sum();
+    let report = |(index, garment): (usize, &super::OutfitGarment)| {
+        let vertices = garment.prepared.vertex_count();
+        let share = vertices as f64 / all.max(1) as f64;
+        let mut times = PhaseTimes {
+            preparation: garment.milliseconds.preparation,
+            embedding: garment.milliseconds.embedding,
+            ..PhaseTimes::default()
+        };
+        for drape in drapes {
+            let shared = drape.milliseconds;
+            let own: f64 = drape.garments.iter().map(|g| g.resolve_ms).sum();
+            times += PhaseTimes {
+                posing: share * shared.posing,
+                networks: share * shared.networks,
+                corrections: share * shared.corrections,
+                refine: share * shared.refine,
+                resolve: drape.garments[index].resolve_ms + share * (shared.resolve - own),
+                certificate: share * shared.certificate,
+                ..PhaseTimes::default()
+            };
+        }
+        GarmentReport {
+            name: garment.name.clone(),
+            given: garment.source.path.clone(),
+            given_vertices: garment.source.given.positions.len(),
+            vertices,
+            triangles: garment.prepared.garment.rest.face_count(),
+            category: garment.prepared.garment.category,
+            fit: garment.source.fit.clone(),
+            embedding_known: garment.embedding_known,
+            milliseconds: times,
+        }
+    };
+    outfit.garments.iter().enumerate().map(report).collect()
+}

@@ -1,0 +1,190 @@
+//! A garment as it was given, and as the networks see it: which file or name, what was repaired, whose vertex is whose.
+
+use super::error::DraperError;
+use crate::config::Config;
+use crate::dataset::{DatasetError, GarmentLoader, GarmentSource};
+use crate::score::misplaced;
+use clothcombo_data::asset::{Body, Category, Garment, Provenance};
+use clothcombo_data::dataset::list_garment_folder;
+use clothcombo_data::fit::{FitReport, FitSettings, fit, is_on_body};
+use clothcombo_data::format::{PolygonMesh, load_mesh};
+use clothcombo_data::generate::GarmentGenerator;
+use clothcombo_data::mesh::MeshMeasures;
+use clothcombo_physics::mesh::{Topology, TriMesh};
+use clothcombo_physics::query::VertexIndex;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+/// A garment ready to be prepared for the networks.
+#[derive(Clone, Debug)]
+pub struct SourceGarment {
+    /// At rest on the zero body.
+    pub garment: Garment,
+    /// The mesh as it was given: what an output file repeats.
+    pub given: PolygonMesh,
+    /// Where it was read from, if it was.
+    pub path: Option<PathBuf>,
+    /// What fitting assumed and repaired, if it was not on the body already.
+    pub fit: Option<FitReport>,
+    /// For every given vertex the vertex of `garment` it follows.
+    follows: Vec<u32>,
+}
+
+impl SourceGarment {
+    /// A garment that already lies on the zero body.
+    pub fn new(garment: Garment) -> Self {
+        let mut given = PolygonMesh::with_positions(garment.rest.positions().to_vec());
+        garment.rest.faces().iter().for_each(|f| given.push(f));
+        let follows = (0..garment.rest.vertex_count() as u32).collect();
+        Self { garment, given, path: None, fit: None, follows }
+    }
+
+    /// Reads a mesh file. Where it does not lie on the zero body of `body` as it stands, or has defects, it is fitted
+    /// ([`clothcombo_data::fit`]); `always_fit` decides that beforehand.
+    ///
+    /// # Errors
+    /// Naming the file, when it is no mesh, or no garment of this body.
+    pub fn read(path: &Path, body: &Body, always_fit: Option<bool>) -> Result<Self, DraperError> {
+        let given = load_mesh(path).map_err(DatasetError::data)?;
+        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let placed = match always_fit {
+            Some(true) => None,
+            Some(false) => Some(given.to_tri_mesh(path).map_err(DatasetError::data)?),
+            None => given.to_tri_mesh(path).ok().filter(|mesh| is_clean(mesh) && is_on_body(mesh, body)),
+        };
+        if let Some(rest) = placed {
+            check_place(path, &rest, body)?;
+            let category = Category::guess(&rest, body);
+            let holding = Garment::needs_holding(&rest, body);
+            let follows = (0..rest.vertex_count() as u32).collect();
+            let garment = Garment { name, category, rest, holding, source: Provenance::default() };
+            return Ok(Self { garment, given, path: Some(path.into()), fit: None, follows });
+        }
+        let fitted = fit(&given, body, &FitSettings::default())
+            .map_err(|reason| DraperError::Fit { path: path.into(), reason })?;
+        let follows = followed(&given, &fitted.vertex_of_file);
+        let garment = Garment { name, ..fitted.garment };
+        Ok(Self { garment, given, path: Some(path.into()), fit: Some(fitted.report), follows })
+    }
+
+    /// Positions of the garment's vertices as positions of the given ones, in their order.
+    pub fn in_given_order(&self, positions: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        self.follows.iter().map(|v| positions[*v as usize]).collect()
+    }
+}
+
+/// Whether a mesh that is taken as it is lies somewhere near the zero body: if not, it crosses nothing, and looks like a good drape.
+fn check_place(path: &Path, rest: &TriMesh, body: &Body) -> Result<(), DraperError> {
+    match misplaced(rest, &body.zero_body()) {
+        Some(what) => Err(DraperError::Place { path: path.into(), what }),
+        None => Ok(()),
+    }
+}
+
+/// Whether a mesh needs no repair.
+fn is_clean(mesh: &TriMesh) -> bool {
+    MeshMeasures::new(mesh, &Topology::new(mesh)).defects.counts().is_empty()
+}
+
+/// A dropped vertex follows what became of the kept one nearest to it in the file.
+fn followed(given: &PolygonMesh, vertex_of_file: &[Option<u32>]) -> Vec<u32> {
+    let (positions, became): (Vec<[f64; 3]>, Vec<u32>) =
+        given.positions.iter().zip(vertex_of_file).filter_map(|(p, v)| Some((*p, (*v)?))).unzip();
+    let kept = VertexIndex::new(&positions);
+    given
+        .positions
+        .iter()
+        .zip(vertex_of_file)
+        .map(|(p, v)| v.unwrap_or_else(|| became[kept.nearest(*p).0 as usize]))
+        .collect()
+}
+
+/// Finds garments by name: those of the given folders and those a model was trained on.
+pub struct GarmentCatalog {
+    names: Vec<String>,
+    sources: HashMap<String, GarmentSource>,
+}
+
+impl GarmentCatalog {
+    /// `folders` first, then what `config` names; of two garments of one name the first counts. What the configuration names
+    /// but is not there is left out: a model may be used without the garments it was trained on.
+    ///
+    /// # Errors
+    /// When one of `folders` cannot be listed.
+    pub fn new(folders: &[PathBuf], config: &Config) -> Result<Self, DraperError> {
+        let mut catalog = Self { names: Vec::new(), sources: HashMap::new() };
+        for folder in folders {
+            let listed = list_garment_folder(folder).map_err(DatasetError::data)?;
+            catalog.extend(listed.into_iter().map(GarmentSource::File));
+        }
+        for source in &config.data.garments {
+            if let Ok(sources) = GarmentSource::list(std::slice::from_ref(source)) {
+                catalog.extend(sources);
+            }
+        }
+        Ok(catalog)
+    }
+
+    fn extend(&mut self, sources: impl IntoIterator<Item = GarmentSource>) {
+        for origin in sources {
+            let name = match &origin {
+                GarmentSource::File(listed) => listed.name.clone(),
+                GarmentSource::Generated { category, seed, .. } => GarmentGenerator::name(*category, *seed),
+            };
+            if !self.sources.contains_key(&name) {
+                self.names.push(name.clone());
+                self.sources.insert(name, origin);
+            }
+        }
+    }
+
+    /// All names, in order.
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// The garment of a file or, where there is no such file, of that name. A named one from a file is fitted like any other
+    /// file where it does not lie on this body: it may have been made for another one.
+    ///
+    /// # Errors
+    /// Naming the file or the unknown name.
+    pub fn find(
+        &self,
+        name: &str,
+        body: &Body,
+        always_fit: Option<bool>,
+    ) -> Result<SourceGarment, DraperError> {
+        let path = Path::new(name);
+        // A word without a dot or a slash is a name, not a file that happens to be missing.
+        let is_path = path.is_file()
+            || name.contains('/')
+            || (path.extension().is_some() && !self.sources.contains_key(name));
+        if is_path {
+            return SourceGarment::read(path, body, always_fit);
+        }
+        let origin = self.sources.get(name).ok_or_else(|| DraperError::UnknownGarment {
+            name: name.to_owned(),
+            known: self.names.clone(),
+        })?;
+        let loader = GarmentLoader::new(body, std::slice::from_ref(origin))?;
+        let GarmentSource::File(listed) = origin else {
+            return Ok(SourceGarment::new(loader.load(origin)?));
+        };
+        let made = loader.load(origin);
+        let must_fit = always_fit.unwrap_or_else(|| {
+            !made.as_ref().is_ok_and(|garment| is_clean(&garment.rest) && is_on_body(&garment.rest, body))
+        });
+        if must_fit {
+            let mut source = SourceGarment::read(&listed.path, body, Some(true))?;
+            source.garment.name.clone_from(&listed.name);
+            return Ok(source);
+        }
+        let garment = made?;
+        check_place(&listed.path, &garment.rest, body)?;
+        let mut source = SourceGarment::new(garment);
+        // Polygons as the file has them.
+        source.given = load_mesh(&listed.path).map_err(DatasetError::data)?;
+        source.path = Some(listed.path.clone());
+        Ok(source)
+    }
+}

@@ -1,0 +1,72 @@
+//! Networks that hold still: what they make of the frames of a motion, averaged over neighbouring frames.
+//!
+//! A network knows one pose at a time, and a correction is taken or not: from frame to frame a drape may jump by a millimetre
+//! where the body hardly moves. What is averaged is as in [`super::smooth`]; the post-process comes after it.
+
+use super::networked::Networked;
+use super::smooth::{averaged, binomial};
+use super::{BodyState, Draper, DraperError, Outfit};
+use clothcombo_physics::transform::{into_frame, out_of_frame};
+use clothcombo_physics::vec3::{add, sub};
+use std::collections::{BTreeMap, VecDeque};
+
+/// The frames of a motion as the networks make them, in order; each is made when it is first needed.
+pub(super) struct TemporalFilter<'a> {
+    draper: &'a Draper,
+    outfit: &'a Outfit,
+    bodies: &'a [BodyState],
+    weights: Vec<f64>,
+    /// The frame that comes next.
+    next: usize,
+    /// What was made of it and of frames after it.
+    made: VecDeque<Networked>,
+    /// Offsets from skinning in the frames of the skinning transforms, of those and of the frames before that are averaged.
+    offsets: BTreeMap<usize, Vec<[f64; 3]>>,
+}
+
+impl<'a> TemporalFilter<'a> {
+    /// For `bodies`, averaged over `radius` of them to each side.
+    pub fn new(draper: &'a Draper, outfit: &'a Outfit, bodies: &'a [BodyState], radius: usize) -> Self {
+        // One frame has no neighbours.
+        let radius = if bodies.len() > 1 { radius } else { 0 };
+        let (made, offsets) = (VecDeque::new(), BTreeMap::new());
+        Self { draper, outfit, bodies, weights: binomial(radius), next: 0, made, offsets }
+    }
+
+    /// Makes what is missing for the next frame.
+    fn make(&mut self) -> Result<(), DraperError> {
+        let radius = self.weights.len() / 2;
+        for frame in self.next + self.made.len()..self.bodies.len().min(self.next + radius + 1) {
+            let made = self.draper.networked(&self.draper.model, self.outfit, &self.bodies[frame])?;
+            if radius > 0 {
+                self.offsets.insert(frame, offsets(&made));
+            }
+            self.made.push_back(made);
+        }
+        self.offsets.retain(|frame, _| frame + radius >= self.next);
+        Ok(())
+    }
+}
+
+impl Iterator for TemporalFilter<'_> {
+    type Item = Result<Networked, DraperError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if let Err(error) = self.make() {
+            return Some(Err(error));
+        }
+        let mut made = self.made.pop_front()?;
+        if !self.offsets.is_empty() {
+            let mean = averaged(|other| &self.offsets[&other], self.bodies.len(), self.next, &self.weights);
+            let vertices = made.skinned.iter().zip(&made.transforms).zip(mean);
+            made.network = vertices.map(|((p, t), offset)| add(*p, out_of_frame(t, offset))).collect();
+        }
+        self.next += 1;
+        Some(Ok(made))
+    }
+}
+
+fn offsets(made: &Networked) -> Vec<[f64; 3]> {
+    let vertices = made.network.iter().zip(&made.skinned).zip(&made.transforms);
+    vertices.map(|((p, start), transform)| into_frame(transform, sub(*p, *start))).collect()
+}

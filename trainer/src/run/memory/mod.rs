@@ -1,0 +1,6 @@
+//! The memory that a run is expected to use, estimated before it starts.
+
+mod activations;
+mod estimate;
+
+pub use estimate::MemoryEstimate;

@@ -1,0 +1,74 @@
+//! `log.txt`: what happened in a run besides its steps, one line each.
+
+use crate::run::event::{Observer, TrainEvent};
+use crate::run::folder::RunDir;
+use miette::{IntoDiagnostic, Report, WrapErr};
+use std::fmt::Display;
+use std::fs::{File, OpenOptions};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Appends to the log of a run. Nothing is ever removed from it: a step that is repeated after a resume stands there twice.
+pub struct LogObserver {
+    path: PathBuf,
+    file: File,
+    start: Instant,
+}
+
+impl LogObserver {
+    /// Goes on with the log of `run`.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn new(run: &RunDir) -> Result<Self, Report> {
+        let path = run.log();
+        let opened = OpenOptions::new().create(true).append(true).open(&path);
+        let file = opened.into_diagnostic().wrap_err_with(|| cannot_write(&path))?;
+        Ok(Self { path, file, start: Instant::now() })
+    }
+
+    /// One line, with the seconds since the session began.
+    fn line(&mut self, text: impl Display) -> Result<(), Report> {
+        writeln!(self.file, "{:>10.1} s  {text}", self.start.elapsed().as_secs_f64())
+            .into_diagnostic()
+            .wrap_err_with(|| cannot_write(&self.path))
+    }
+}
+
+fn cannot_write(path: &Path) -> String {
+    format!("cannot write {}", path.display())
+}
+
+impl Observer for LogObserver {
+    fn observe(&mut self, event: &TrainEvent) -> Result<(), Report> {
+        match event {
+            TrainEvent::Started { step, total_steps } => {
+                self.line(format_args!("session starts after step {step} of {total_steps}"))
+            }
+            TrainEvent::StageStarted { name, step, steps } => {
+                self.line(format_args!("stage {name}: {steps} steps from step {step}"))
+            }
+            TrainEvent::Spike { step, norm, usual } => {
+                self.line(format_args!("step {step}: gradient norm {norm:.3e}, usually {usual:.3e}"))
+            }
+            TrainEvent::Skipped { step, count, file } => {
+                let file = file.map(|f| format!(", scene in {}", f.display())).unwrap_or_default();
+                self.line(format_args!(
+                    "step {step} skipped: loss or gradient not finite ({count} lately){file}"
+                ))
+            }
+            TrainEvent::Validated { step, report, .. } => match report.score() {
+                Some(score) => self.line(format_args!("validation after step {step}: score {score:.4}")),
+                None => self.line(format_args!("validation after step {step}")),
+            },
+            TrainEvent::CheckpointSaved { path, .. } => {
+                self.line(format_args!("checkpoint {}", path.display()))
+            }
+            TrainEvent::Interrupted { step } => self.line(format_args!("stopped after step {step}")),
+            TrainEvent::GaveUp { step } => self.line(format_args!("gave up after step {step}")),
+            TrainEvent::Finished { step } => self.line(format_args!("finished after step {step}")),
+            TrainEvent::Step(_) | TrainEvent::CheckpointDue { .. } | TrainEvent::SampleDrawn { .. } => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,303 @@
+//! `RUN/report.html`: everything worth knowing about a run on one page that needs nothing but itself.
+
+mod chart;
+pub mod html;
+
+use crate::dataset::LicenceLine;
+use crate::picture::StageBoundary;
+use crate::picture::axis::number_text;
+use crate::run::event::StepRecord;
+use crate::run::memory::MemoryEstimate;
+use crate::run::observer::History;
+use crate::system::memory::gibibytes;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use chart::Curve;
+use html::{escape, utc};
+use serde_json::Value;
+use std::fmt::Write;
+use std::path::Path;
+
+/// Where a run stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RunState {
+    /// It trains.
+    Running,
+    /// It was asked to stop.
+    Interrupted,
+    /// Too many of its steps were not finite.
+    GaveUp,
+    /// All steps are done.
+    Finished,
+}
+
+impl RunState {
+    /// In a word.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Running => "running",
+            Self::Interrupted => "interrupted",
+            Self::GaveUp => "gave up",
+            Self::Finished => "finished",
+        }
+    }
+}
+
+/// What the page is made of.
+pub struct Page<'a> {
+    /// Name of the run.
+    pub name: &'a str,
+    /// Where it stands.
+    pub state: RunState,
+    /// Steps of the whole run.
+    pub total_steps: u64,
+    /// When this page was made [s since 1970].
+    pub made: u64,
+    /// Steps per second of this session.
+    pub speed: Option<f64>,
+    /// Where stages begin.
+    pub stages: &'a [StageBoundary],
+    /// The logs.
+    pub history: &'a History,
+    /// The configuration, as TOML.
+    pub config: &'a str,
+    /// Terms of use of the data.
+    pub licences: &'a [LicenceLine],
+    /// Memory expected at the start.
+    pub memory: Option<MemoryEstimate>,
+    /// Most memory used so far [bytes].
+    pub peak: Option<u64>,
+}
+
+/// Sample sheets shown, newest first.
+const SAMPLES: usize = 2;
+
+const STYLE: &str = include_str!("report.css");
+
+impl Page<'_> {
+    /// The page.
+    pub fn html(&self) -> String {
+        let mut out = String::new();
+        let _ = writeln!(
+            out,
+            "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
+                <meta name=\"viewport\" content=\"width=device-width\">{}<title>{} – {}</title><style>{STYLE}</style></head>\n<body>",
+            // A page that is still being written looks for its next version.
+            if self.state == RunState::Running { "<meta http-equiv=\"refresh\" content=\"30\">" } else { "" },
+            escape(self.name),
+            self.state.name(),
+        );
+        out.push_str(&self.header());
+        out.push_str(&self.curves());
+        out.push_str(&self.validation());
+        out.push_str(&self.samples());
+        out.push_str(&self.licence_list());
+        let _ = writeln!(
+            out,
+            "<section id=\"config\"><h2>Configuration</h2><details><summary>every value used</summary><pre>{}</pre></details></section>",
+            escape(self.config)
+        );
+        out.push_str("</body></html>\n");
+        out
+    }
+
+    fn header(&self) -> String {
+        let step = self.history.last.as_ref().map_or(0, |(step, _)| *step);
+        let stage = self.history.last.as_ref().map_or("", |(_, stage)| stage.as_str());
+        let percent = 100.0 * step as f64 / self.total_steps.max(1) as f64;
+        let mut tiles = vec![("step", format!("{step} of {}", self.total_steps)), ("stage", escape(stage))];
+        if let Some(speed) = self.speed.filter(|s| *s > 0.0) {
+            tiles.push(("speed", format!("{} steps/s", number_text(speed, 3))));
+            if self.state == RunState::Running {
+                let left = (self.total_steps.saturating_sub(step)) as f64 / speed;
+                tiles.push(("time left", duration(left)));
+            }
+        }
+        if let Some(loss) = median_of_last(self.history.points("loss"), 100) {
+            tiles.push(("loss, median of 100", number_text(loss, 4)));
+        }
+        if let Some((step, score)) = self.history.best {
+            tiles.push(("best validation", format!("{} at step {step}", number_text(score, 4))));
+        }
+        tiles.push(("skipped steps", self.history.skipped.len().to_string()));
+        tiles.push(("gradient spikes", self.history.spikes.len().to_string()));
+        if let Some(peak) = self.peak {
+            let estimated =
+                self.memory.map(|m| format!(" (estimated {})", gibibytes(m.peak()))).unwrap_or_default();
+            tiles.push(("peak memory", format!("{}{estimated}", gibibytes(peak))));
+        }
+        let tiles: String = tiles
+            .iter()
+            .map(|(name, value)| format!("<div class=\"tile\"><small>{name}</small><b>{value}</b></div>"))
+            .collect();
+        format!(
+            "<header><h1>{} <span class=\"state {}\">{}</span></h1><p>as of {}</p>\
+                <div class=\"bar\"><i style=\"width:{percent:.1}%\"></i></div><div class=\"tiles\">{tiles}</div></header>\n",
+            escape(self.name),
+            self.state.name().replace(' ', "-"),
+            self.state.name(),
+            utc(self.made)
+        )
+    }
+
+    fn curves(&self) -> String {
+        let total = self.total_steps as f64;
+        let history = self.history;
+        let draw = |id: &str, title: &str, unit: &str, name: &str| {
+            let baseline = history.baselines.get(name).copied();
+            let curve = Curve { id, title, unit, points: history.points(name), baseline };
+            chart::curve(&curve, self.stages, total)
+        };
+        let mut out = String::from(
+            "<section id=\"curves\"><h2>Curves</h2><p class=\"legend\"><i class=\"l-curve\"></i>median \
+                <i class=\"l-band\"></i>5th to 95th percentile <i class=\"l-base\"></i>LBS alone (validation) \
+                <i class=\"l-stage\"></i>stage begins</p><div class=\"grid-of\">\n",
+        );
+        out.push_str(&draw("chart-loss", "loss", "weighted", "loss"));
+        out.push_str(&draw("chart-grad_norm", "gradient norm", "before clipping", "grad_norm"));
+        for name in StepRecord::term_names() {
+            out.push_str(&draw(&format!("chart-{name}"), &name.replace('_', " "), unit(name), name));
+        }
+        out.push_str(&draw("chart-lr", "learning rate", "", "lr"));
+        out.push_str(&self.time_split());
+        out.push_str("</div></section>\n");
+        out
+    }
+
+    /// Where the time of a step goes [ms].
+    fn time_split(&self) -> String {
+        let milliseconds = |name: &str| -> Vec<(f64, f64)> {
+            self.history.points(name).iter().map(|(step, s)| (*step, 1000.0 * s)).collect()
+        };
+        let parts =
+            ["wait_seconds", "forward_seconds", "backward_seconds", "update_seconds"].map(milliseconds);
+        let rest = milliseconds("seconds").into_iter().enumerate().map(|(i, (step, whole))| {
+            let known: f64 = parts.iter().filter_map(|p| Some(p.get(i)?.1)).sum();
+            (step, (whole - known).max(0.0))
+        });
+        let rest: Vec<(f64, f64)> = rest.collect();
+        let [wait, forward, backward, update] = parts;
+        let parts = [
+            ("forward", forward),
+            ("backward", backward),
+            ("update", update),
+            ("waiting for scenes", wait),
+            ("rest", rest),
+        ];
+        chart::stacked("chart-time", "time of a step", "ms", &parts, self.stages, self.total_steps as f64)
+    }
+
+    fn validation(&self) -> String {
+        let Some((step, report)) = self.history.validations.last() else { return String::new() };
+        let mut out = format!("<section id=\"validation\"><h2>Validation after step {step}</h2>\n");
+        for group in report["groups"].as_array().into_iter().flatten() {
+            let name = group["group"].as_str().unwrap_or_default();
+            let _ = write!(
+                out,
+                "<table><caption>{}, {} scenes</caption><tr><th>method</th><th>total</th><th>median</th><th>strain</th>\
+                    <th>bending</th><th>gravity</th><th>inside %</th><th>&gt; 5 mm %</th><th>wrong side %</th></tr>",
+                escape(name),
+                group["scenes"]
+            );
+            for method in group["methods"].as_array().into_iter().flatten() {
+                let number = |v: &Value| v.as_f64().map_or("–".into(), |v| number_text(v, 4));
+                let percent = |v: &Value| v.as_f64().map_or("–".into(), |v| format!("{:.2}", 100.0 * v));
+                let _ = write!(
+                    out,
+                    "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
+                    escape(method["method"].as_str().unwrap_or_default()),
+                    number(&method["total"]["mean"]),
+                    number(&method["total"]["median"]),
+                    number(&method["raw"]["strain"]["mean"]),
+                    number(&method["raw"]["bending"]["mean"]),
+                    number(&method["raw"]["gravity"]["mean"]),
+                    percent(&method["inside"]),
+                    percent(&method["deeper_than_5mm"]),
+                    percent(&method["wrong_side"]),
+                );
+            }
+            out.push_str("</table>\n");
+        }
+        out.push_str("</section>\n");
+        out
+    }
+
+    fn samples(&self) -> String {
+        let mut out = String::from("<section id=\"samples\"><h2>Samples</h2>\n");
+        let mut shown = 0;
+        for path in self.history.samples.iter().rev().take(SAMPLES) {
+            // A picture that was deleted is no reason to have no report.
+            let Ok(png) = std::fs::read(path) else { continue };
+            let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            let _ = writeln!(
+                out,
+                "<figure class=\"sample\"><figcaption>{}</figcaption><img alt=\"{}\" src=\"data:image/png;base64,{}\"></figure>",
+                escape(&name),
+                escape(&name),
+                STANDARD.encode(png)
+            );
+            shown += 1;
+        }
+        if shown == 0 {
+            out.push_str("<p>none drawn yet</p>");
+        }
+        out.push_str("</section>\n");
+        out
+    }
+
+    fn licence_list(&self) -> String {
+        let mut out = String::from(
+            "<section id=\"licences\"><h2>Data and licences</h2><table><tr><th>data</th><th>number</th><th>licence</th>\
+                <th>author</th><th>source</th></tr>",
+        );
+        for line in self.licences {
+            let known = |text: &str| if text.is_empty() { "unknown".to_owned() } else { escape(text) };
+            let and_others = if line.count > 1 { ", …" } else { "" };
+            let _ = write!(
+                out,
+                "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}{and_others}</td></tr>",
+                line.kind,
+                line.count,
+                known(&line.from.licence),
+                known(&line.from.author),
+                known(&line.from.source)
+            );
+        }
+        out.push_str("</table></section>\n");
+        out
+    }
+}
+
+/// What a raw energy is measured in.
+fn unit(term: &str) -> &'static str {
+    match term {
+        "strain" | "bending" | "gravity" => "J",
+        "holding" => "m²",
+        "repulsion" => "",
+        _ => "m³",
+    }
+}
+
+fn median_of_last(points: &[(f64, f64)], count: usize) -> Option<f64> {
+    let mut last: Vec<f64> =
+        points[points.len().saturating_sub(count)..].iter().map(|p| p.1).filter(|v| v.is_finite()).collect();
+    last.sort_by(f64::total_cmp);
+    last.get(last.len() / 2).copied()
+}
+
+/// Seconds as `3 h 20 min`, `20 min` or `45 s`.
+pub(crate) fn duration(seconds: f64) -> String {
+    match seconds {
+        s if !s.is_finite() => "unknown".into(),
+        s if s >= 172_800.0 => format!("{:.1} days", s / 86_400.0),
+        s if s >= 3600.0 => format!("{} h {} min", (s / 3600.0) as u64, (s / 60.0) as u64 % 60),
+        s if s >= 90.0 => format!("{:.0} min", s / 60.0),
+        s => format!("{s:.0} s"),
+    }
+}
+
+/// Name of a run: its folder.
+pub fn run_name(root: &Path) -> String {
+    let full = root.canonicalize().unwrap_or_else(|_| root.to_owned());
+    full.file_name().map_or_else(|| "run".into(), |n| n.to_string_lossy().into_owned())
+}

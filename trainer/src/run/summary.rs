@@ -1,0 +1,264 @@
+//! What a run folder says about its run, without loading any of its data.
+
+use crate::config::{Config, load};
+use crate::dataset::ValidationGroup;
+use crate::run::checkpoint::Checkpoint;
+use crate::run::lock::RunLock;
+use crate::run::observer::best_so_far;
+use crate::run::report::run_name;
+use crate::run::validation::Method;
+use crate::system::paths::lossy;
+use serde::Serialize;
+use serde_json::Value;
+use std::io::{self, BufRead, BufReader};
+use std::path::{Path, PathBuf};
+
+/// A run in a few numbers.
+#[derive(Clone, Debug, Serialize)]
+pub struct RunSummary {
+    /// Name of its folder.
+    pub name: String,
+    /// The folder.
+    #[serde(serialize_with = "lossy")]
+    pub path: PathBuf,
+    /// `"running"`, `"finished"` or `"stopped"`.
+    pub state: &'static str,
+    /// Steps logged.
+    pub step: u64,
+    /// Steps of the whole run.
+    pub total_steps: u64,
+    /// Name of the stage of the last step.
+    pub stage: String,
+    /// Median loss of the last 100 logged steps.
+    pub loss: Option<f64>,
+    /// Median time of the last 100 logged steps [s].
+    pub seconds_per_step: Option<f64>,
+    /// Steps skipped because loss or gradient was not finite.
+    pub skipped: u64,
+    /// Steps whose gradient norm was far above the usual one.
+    pub spikes: u64,
+    /// Step of the best validation.
+    pub best_step: Option<u64>,
+    /// Score of the best validation: mean total loss of the networks, mean over the groups.
+    pub best_score: Option<f64>,
+    /// Strain of the networks over that of skinning, last validation, single garments.
+    pub strain_ratio: Option<f64>,
+    /// Share of the vertices inside the body, last validation, single garments.
+    pub inside: Option<f64>,
+    /// Share of outer vertices on the wrong side of an inner layer, last validation, layered outfits.
+    pub wrong_side: Option<f64>,
+    /// Step of the newest whole checkpoint.
+    pub checkpoint: Option<u64>,
+    /// Seed.
+    pub seed: u64,
+}
+
+/// A run whose configuration cannot be read.
+#[derive(Clone, Debug, Serialize)]
+pub struct UnreadableRun {
+    /// Name of its folder.
+    pub name: String,
+    /// The folder.
+    #[serde(serialize_with = "lossy")]
+    pub path: PathBuf,
+    /// `"unreadable"`.
+    pub state: &'static str,
+    /// What is wrong.
+    pub error: String,
+}
+
+/// A run that was found.
+#[derive(Clone, Debug, Serialize)]
+#[serde(untagged)]
+pub enum FoundRun {
+    /// One that says how it went.
+    Whole(Box<RunSummary>),
+    /// One that is damaged.
+    Unreadable(UnreadableRun),
+}
+
+impl FoundRun {
+    /// Reads `root`; `None` if it is no run, which is a folder with checkpoints in it.
+    pub fn read(root: &Path) -> Option<Self> {
+        if !root.join("checkpoints").is_dir() {
+            return None;
+        }
+        Some(match load(&root.join(CONFIG), &[]) {
+            Ok(config) => Self::Whole(Box::new(RunSummary::read(root, &config))),
+            Err(error) => Self::Unreadable(UnreadableRun {
+                name: run_name(root),
+                path: root.to_owned(),
+                state: "unreadable",
+                error: error.to_string(),
+            }),
+        })
+    }
+
+    /// Name of its folder.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Whole(run) => &run.name,
+            Self::Unreadable(run) => &run.name,
+        }
+    }
+
+    /// Score of the best validation, if there was one.
+    pub fn best_score(&self) -> Option<f64> {
+        match self {
+            Self::Whole(run) => run.best_score,
+            Self::Unreadable(_) => None,
+        }
+    }
+}
+
+const CONFIG: &str = "config.toml";
+const LAST: usize = 100;
+
+impl RunSummary {
+    /// Reads the run in `root`, whose configuration is `config`.
+    fn read(root: &Path, config: &Config) -> Self {
+        let mut summary = Self::empty(root, config);
+        summary.read_steps(root);
+        summary.read_validations(root);
+        summary.checkpoint = Checkpoint::open(root).ok().map(|c| c.state.step);
+        let done = summary.step.max(summary.checkpoint.unwrap_or(0)) >= summary.total_steps;
+        summary.state = match (RunLock::is_held(root), done) {
+            (true, _) => "running",
+            (false, true) => "finished",
+            (false, false) => "stopped",
+        };
+        summary
+    }
+
+    fn empty(root: &Path, config: &Config) -> Self {
+        Self {
+            name: run_name(root),
+            path: root.to_owned(),
+            state: "stopped",
+            step: 0,
+            total_steps: config.total_steps(),
+            stage: String::new(),
+            loss: None,
+            seconds_per_step: None,
+            skipped: 0,
+            spikes: 0,
+            best_step: None,
+            best_score: None,
+            strain_ratio: None,
+            inside: None,
+            wrong_side: None,
+            checkpoint: None,
+            seed: config.seed,
+        }
+    }
+
+    fn read_steps(&mut self, root: &Path) {
+        let (mut losses, mut times) = (Vec::new(), Vec::new());
+        for line in values(&root.join("metrics.jsonl")) {
+            let Some(step) = line["step"].as_u64() else { continue };
+            self.step = step;
+            self.stage = line["stage"].as_str().unwrap_or_default().to_owned();
+            self.skipped += u64::from(line["skipped"].as_bool() == Some(true));
+            self.spikes += u64::from(line["spike"].as_bool() == Some(true));
+            losses.extend(line["loss"].as_f64());
+            times.extend(line["seconds"].as_f64());
+        }
+        self.loss = median(&losses);
+        self.seconds_per_step = median(&times);
+    }
+
+    fn read_validations(&mut self, root: &Path) {
+        for line in values(&root.join("validation.jsonl")) {
+            // Before the first step there is nothing to compare.
+            if line["step"].as_u64().is_none_or(|step| step == 0) {
+                continue;
+            }
+            (self.best_step, self.best_score) = best_so_far(&line).unzip();
+            for group in line["groups"].as_array().into_iter().flatten() {
+                let methods = group["methods"].as_array().map_or(&[][..], Vec::as_slice);
+                let skinning = methods.iter().find(|m| m["method"] == Method::StartSkinning.name());
+                let (Some(network), Some(skinning)) = (methods.last(), skinning) else { continue };
+                if group["group"] == ValidationGroup::Layered.name() {
+                    self.wrong_side = network["wrong_side"].as_f64();
+                } else if group["group"] == ValidationGroup::Single.name() {
+                    let strain = |m: &Value| m["raw"]["strain"]["mean"].as_f64();
+                    self.strain_ratio = strain(network).zip(strain(skinning)).map(|(a, b)| a / b);
+                    self.inside = network["inside"].as_f64();
+                }
+            }
+        }
+    }
+}
+
+/// The lines of a log that are whole.
+fn values(path: &Path) -> impl Iterator<Item = Value> {
+    let file = std::fs::File::open(path).ok();
+    let lines = file.into_iter().flat_map(|f| BufReader::new(f).lines().map_while(Result::ok));
+    lines.filter_map(|line| serde_json::from_str(&line).ok())
+}
+
+/// Median of the last values.
+fn median(values: &[f64]) -> Option<f64> {
+    let mut last = values[values.len().saturating_sub(LAST)..].to_vec();
+    last.sort_by(f64::total_cmp);
+    last.get(last.len() / 2).copied()
+}
+
+/// All runs in `folder`: the folder itself, if it is a run, else those below it, by name.
+///
+/// # Errors
+/// When the folder cannot be listed.
+pub fn find_runs(folder: &Path) -> io::Result<Vec<FoundRun>> {
+    // A folder of runs may have one that is called checkpoints.
+    if folder.join(CONFIG).exists()
+        && let Some(run) = FoundRun::read(folder)
+    {
+        return Ok(vec![run]);
+    }
+    let entries = std::fs::read_dir(folder)?.collect::<Result<Vec<_>, _>>()?;
+    let mut paths: Vec<PathBuf> = entries.into_iter().map(|e| e.path()).filter(|p| p.is_dir()).collect();
+    paths.sort();
+    Ok(paths.iter().filter_map(|p| FoundRun::read(p)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn damaged_runs_are_found_and_a_folder_that_is_not_there_is_an_error() {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, config) in [("broken", Some("seed = ")), ("lost", None)] {
+            std::fs::create_dir_all(folder.path().join(name).join("checkpoints")).unwrap();
+            if let Some(config) = config {
+                std::fs::write(folder.path().join(name).join(CONFIG), config).unwrap();
+            }
+        }
+        std::fs::create_dir(folder.path().join("no run")).unwrap();
+        let runs = find_runs(folder.path()).unwrap();
+        assert_eq!(runs.iter().map(FoundRun::name).collect::<Vec<_>>(), ["broken", "lost"]);
+        let json = serde_json::to_value(&runs).unwrap();
+        assert_eq!((&json[0]["state"], &json[1]["state"]), (&"unreadable".into(), &"unreadable".into()));
+        assert!(json[1]["error"].as_str().unwrap().contains("cannot read the configuration"), "{json}");
+        assert_eq!(find_runs(&folder.path().join("broken")).unwrap().len(), 1);
+        assert!(find_runs(&folder.path().join("no run")).unwrap().is_empty());
+        let missing = find_runs(&folder.path().join("missing")).unwrap_err();
+        assert_eq!(missing.kind(), io::ErrorKind::NotFound);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_run_of_any_name_can_be_told_as_json() {
+        use std::os::unix::ffi::OsStrExt;
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path().join(std::ffi::OsStr::from_bytes(b"run-\xff"));
+        std::fs::create_dir_all(root.join("checkpoints")).unwrap();
+        let broken = FoundRun::read(&root).unwrap();
+        assert!(serde_json::to_string(&broken).unwrap().contains("run-\u{fffd}"));
+        let config = "seed = 1\n[data]\n[[data.garments]]\ngenerate = { count = 2 }\n[[stages]]\nname = \"a\"\ntrains = \"single\"\nsteps = 1\n";
+        std::fs::write(root.join(CONFIG), config).unwrap();
+        let whole = FoundRun::read(&root).unwrap();
+        assert!(matches!(whole, FoundRun::Whole(_)), "{whole:?}");
+        assert!(serde_json::to_string(&whole).unwrap().contains("run-\u{fffd}"));
+    }
+}

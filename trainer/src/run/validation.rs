@@ -1,0 +1,133 @@
+//! What a validation finds, as it stands in `validation.jsonl`: scores of methods over groups of scenes.
+
+use super::spread::Spread;
+use clothcombo_physics::energy::Term;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::fmt;
+
+/// What is compared on a scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Method {
+    /// Linear blend skinning of the rest garment, the paper's baseline: nothing learned, body shape ignored.
+    RestSkinning,
+    /// Linear blend skinning of the start state (with shape transfer): what the networks start from.
+    StartSkinning,
+    /// The networks without untangling: every garment as a single garment.
+    Single,
+    /// All networks.
+    Network,
+}
+
+impl Method {
+    /// Name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::RestSkinning => "LBS of rest",
+            Self::StartSkinning => "LBS",
+            Self::Single => "single drape",
+            Self::Network => "network",
+        }
+    }
+}
+
+/// One method over all scenes of a group.
+#[derive(Clone, Debug, Serialize)]
+pub struct MethodScore {
+    /// Name of the method.
+    pub method: &'static str,
+    /// Weighted sum of all losses.
+    pub total: Spread,
+    /// Raw energies.
+    pub raw: BTreeMap<&'static str, Spread>,
+    /// Mean weighted energies.
+    pub weighted: BTreeMap<&'static str, f64>,
+    /// Share of the garment vertices inside the body.
+    pub inside: f64,
+    /// Share of the garment vertices deeper than 5 mm.
+    pub deeper_than_5mm: f64,
+    /// Share of outer vertices on the wrong side of an inner layer, among those within 5 cm of it.
+    pub wrong_side: f64,
+}
+
+/// All methods over one group of scenes; the baselines come first, the whole network last.
+#[derive(Clone, Debug, Serialize)]
+pub struct GroupReport {
+    /// Name of the group.
+    pub group: &'static str,
+    /// Number of scenes.
+    pub scenes: usize,
+    /// Scores per method.
+    pub methods: Vec<MethodScore>,
+}
+
+/// The result of one validation.
+#[derive(Clone, Debug, Serialize)]
+pub struct ValidationReport {
+    /// Groups of scenes.
+    pub groups: Vec<GroupReport>,
+}
+
+impl ValidationReport {
+    /// One number to compare networks by: mean total loss of the whole network, mean over the groups; less is better.
+    /// `None` without scenes, or where it is not finite.
+    pub fn score(&self) -> Option<f64> {
+        let totals: Vec<f64> =
+            self.groups.iter().filter_map(|g| Some(g.methods.last()?.total.mean)).collect();
+        let score = totals.iter().sum::<f64>() / totals.len() as f64;
+        score.is_finite().then_some(score)
+    }
+}
+
+impl fmt::Display for ValidationReport {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        for group in &self.groups {
+            writeln!(f, "{} ({} scenes; energies raw in J, mean per scene)", group.group, group.scenes)?;
+            writeln!(
+                f,
+                "  {:<15}{:>10}{:>10}{:>10}{:>10}{:>10}{:>12}{:>10}{:>10}{:>10}{:>10}",
+                "method",
+                "total",
+                "median",
+                "strain",
+                "bending",
+                "gravity",
+                "collision",
+                "holding",
+                "inside %",
+                ">5 mm %",
+                "wrong %"
+            )?;
+            for m in &group.methods {
+                let raw = |t: Term| m.raw[t.name()].mean;
+                writeln!(
+                    f,
+                    "  {:<15}{:>10.3}{:>10.3}{:>10.3}{:>10.4}{:>10.3}{:>12.2e}{:>10.4}{:>10.2}{:>10.2}{:>10.2}",
+                    m.method,
+                    m.total.mean,
+                    m.total.median,
+                    raw(Term::Strain),
+                    raw(Term::Bending),
+                    raw(Term::Gravity),
+                    raw(Term::BodyCollision),
+                    raw(Term::Holding),
+                    100.0 * m.inside,
+                    100.0 * m.deeper_than_5mm,
+                    100.0 * m.wrong_side
+                )?;
+            }
+            let Some((last, others)) = group.methods.split_last() else { continue };
+            for baseline in others {
+                writeln!(
+                    f,
+                    "  {} against {}: strain × {:.3}, total × {:.3}",
+                    last.method,
+                    baseline.method,
+                    last.raw[Term::Strain.name()].mean / baseline.raw[Term::Strain.name()].mean,
+                    last.total.mean / baseline.total.mean
+                )?;
+            }
+        }
+        Ok(())
+    }
+}

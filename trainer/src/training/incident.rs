@@ -1,0 +1,368 @@
+//! A step whose loss or gradient was not finite, as a file that can be replayed.
+//!
+//! ```text
+//! incidents/step-120.json   configuration, garments, shapes, poses, energies per term, loss, gradient norm
+//! incidents/step-120.bpk    the weights the step started from
+//! ```
+//! The scene is kept by its numbers, not by its seed alone: it replays even where the generator has changed since.
+
+use crate::config::{Config, ConfigError, Injected, Trains, parse, to_toml};
+use crate::dataset::{BodySample, Dataset, PreparedScene, SceneSample, prepare};
+use crate::inference::tensor_store::TensorStore;
+use crate::run::checkpoint::{checksum, save_model};
+use crate::system::exact::Exact;
+use crate::training::learner::{Learner, StepInput, StepOutput, new_optimizer};
+use crate::training::schedule::ScheduleAt;
+use burn::module::Module;
+use burn::store::ModuleRecord;
+use burn::tensor::Device;
+use clothcombo_data::asset::Pose;
+use clothcombo_data::format::atomic;
+use clothcombo_model::ClothCombo;
+use clothcombo_physics::energy::{Term, TermMap};
+use miette::Diagnostic;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use thiserror::Error;
+
+/// Version of the file; others are refused.
+const FORMAT: u32 = 2;
+
+/// Why an incident cannot be written, read or replayed.
+#[derive(Debug, Error, Diagnostic)]
+pub enum IncidentError {
+    /// The file system refused, or the content is wrong.
+    #[error("{}: {reason}", path.display())]
+    #[diagnostic(help("an incident is RUN/incidents/step-N.json with step-N.bpk beside it; copy both"))]
+    Unusable {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+    /// The data is not what it was.
+    #[error("garment {name:?} of the incident {reason}")]
+    #[diagnostic(help("restore the data of the run, or point to it with --set data.garments.0.folder=…"))]
+    DataChanged {
+        /// The garment.
+        name: String,
+        /// What is different.
+        reason: String,
+    },
+    /// The configuration inside cannot be used.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Config(#[from] ConfigError),
+    /// The scene cannot be prepared or draped.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Drape(#[from] crate::inference::tensor_store::DrapeError),
+}
+
+/// A step whose loss or gradient was not finite.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Incident {
+    /// Version of the file.
+    pub format: u32,
+    /// Steps done, this one included.
+    pub step: u64,
+    /// Name of the stage.
+    pub stage: String,
+    /// What was trained.
+    pub trains: Trains,
+    /// Seed of the run.
+    pub seed: u64,
+    /// Fraction of the run that was done, which the weights of the losses follow.
+    pub run_progress: Exact,
+    /// Adam's step size.
+    pub learning_rate: Exact,
+    /// Share of the full pose.
+    pub pose_scale: Exact,
+    /// What a test broke on purpose.
+    pub injected: Option<Injected>,
+    /// Weighted loss.
+    pub loss: Exact,
+    /// Global gradient norm before clipping, as in the log of the run.
+    pub gradient_norm: Exact,
+    /// The scenes of the step.
+    pub scenes: Vec<IncidentScene>,
+    /// File of the weights, beside this one.
+    pub weights: String,
+    /// BLAKE3 of that file.
+    pub weights_checksum: String,
+    /// The configuration, as TOML.
+    pub config: String,
+}
+
+/// Garments on bodies.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct IncidentScene {
+    /// Inner → outer.
+    pub garments: Vec<IncidentGarment>,
+    /// Bodies the garments were draped on.
+    pub bodies: Vec<IncidentBody>,
+    /// Number of the random sample of pairs that the repulsion looked at.
+    pub repulsion_sample: u32,
+}
+
+/// A garment, found again by its place and name.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct IncidentGarment {
+    /// Place in the wardrobe.
+    pub index: usize,
+    /// Name.
+    pub name: String,
+    /// Number of vertices.
+    pub vertices: usize,
+}
+
+/// One body with the energies of the garments on it.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct IncidentBody {
+    /// Shape parameters β.
+    pub shape: Vec<Exact>,
+    /// Pose θ: axis-angle per joint [rad].
+    pub pose: Vec<[Exact; 3]>,
+    /// Weighted sum of all energies.
+    pub total: Exact,
+    /// Raw energies of every garment.
+    pub garments: Vec<BTreeMap<String, Exact>>,
+    /// Raw energies of every pair of layers.
+    pub layers: Vec<BTreeMap<String, Exact>>,
+}
+
+/// What surrounds a step that failed.
+pub struct Circumstances<'a> {
+    /// Configuration of the run.
+    pub config: &'a Config,
+    /// Its data.
+    pub dataset: &'a Dataset,
+    /// Steps done, this one included.
+    pub step: u64,
+    /// The schedule at this step.
+    pub at: &'a ScheduleAt,
+    /// What a test broke on purpose.
+    pub injected: Option<Injected>,
+    /// The weights, which the step left alone.
+    pub model: &'a ClothCombo,
+}
+
+impl Incident {
+    /// Writes a failed step into `folder` and returns the file.
+    ///
+    /// # Errors
+    /// When a file cannot be written.
+    pub fn write(
+        folder: &Path,
+        around: &Circumstances,
+        scenes: &[PreparedScene],
+        output: &StepOutput,
+    ) -> Result<PathBuf, IncidentError> {
+        let path = folder.join(format!("step-{}.json", around.step));
+        let unusable = |reason: String| IncidentError::Unusable { path: path.clone(), reason };
+        std::fs::create_dir_all(folder).map_err(|e| unusable(e.to_string()))?;
+        let weights = format!("step-{}.bpk", around.step);
+        save_model(around.model, &folder.join(&weights)).map_err(unusable)?;
+        let weights_checksum = checksum(&folder.join(&weights)).map_err(|e| unusable(e.to_string()))?;
+        let stage = &around.config.stages[around.at.stage];
+        let incident = Self {
+            format: FORMAT,
+            step: around.step,
+            stage: stage.name.clone(),
+            trains: stage.trains,
+            seed: around.config.seed,
+            run_progress: around.at.run_progress.into(),
+            learning_rate: around.at.learning_rate.into(),
+            pose_scale: around.at.pose_scale.into(),
+            injected: around.injected,
+            loss: output.loss.into(),
+            gradient_norm: output.gradient_norm.into(),
+            scenes: describe(around.dataset, scenes, output),
+            weights,
+            weights_checksum,
+            config: to_toml(around.config).map_err(|e| unusable(e.to_string()))?,
+        };
+        let text = serde_json::to_vec_pretty(&incident).map_err(|e| unusable(e.to_string()))?;
+        atomic::write(&path, &text).map_err(|e| unusable(e.to_string()))?;
+        Ok(path)
+    }
+
+    /// Reads an incident.
+    ///
+    /// # Errors
+    /// When it is damaged or of another version.
+    pub fn read(path: &Path) -> Result<Self, IncidentError> {
+        let unusable = |reason: String| IncidentError::Unusable { path: path.to_owned(), reason };
+        let text = std::fs::read_to_string(path).map_err(|e| unusable(e.to_string()))?;
+        let tree: serde_json::Value =
+            serde_json::from_str(&text).map_err(|e| unusable(format!("is no incident: {e}")))?;
+        match tree["format"].as_u64() {
+            Some(version) if version == u64::from(FORMAT) => {}
+            _ => return Err(unusable(format!("is no incident of version {FORMAT}"))),
+        }
+        let incident: Self = serde_json::from_value(tree).map_err(|e| unusable(e.to_string()))?;
+        match incident.scenes.iter().all(|s| !s.garments.is_empty() && !s.bodies.is_empty()) {
+            true if !incident.scenes.is_empty() => Ok(incident),
+            _ => Err(unusable("has no scene".into())),
+        }
+    }
+
+    /// The configuration of the run, with `overrides`.
+    ///
+    /// # Errors
+    /// When it cannot be used.
+    pub fn configuration(&self, path: &Path, overrides: &[String]) -> Result<Config, IncidentError> {
+        Ok(parse(&self.config, path, overrides)?)
+    }
+
+    /// Computes the step again, from the weights beside `path`, and returns the incident that it makes now.
+    ///
+    /// # Errors
+    /// When weights or data are not what they were.
+    pub fn replay(
+        &self,
+        path: &Path,
+        config: &Config,
+        dataset: &Arc<Dataset>,
+        device: &Device,
+    ) -> Result<Self, IncidentError> {
+        let device = device.clone().autodiff();
+        let model = self.model(path, config, dataset, &device)?;
+        let mut scenes = Vec::with_capacity(self.scenes.len());
+        for scene in &self.scenes {
+            let draw = scene.to_sample(dataset, path)?;
+            let prepared = prepare(dataset, &config.losses, draw, self.run_progress.0);
+            scenes.push(prepared.map_err(crate::inference::tensor_store::DrapeError::from)?);
+        }
+        if self.injected == Some(Injected::Position) {
+            spoil_position(&mut scenes);
+        }
+        let tensors = TensorStore::new(dataset.clone(), dataset.dimensions(), &device);
+        let mut learner = Learner::new(model, new_optimizer(&config.optimizer), &config.optimizer);
+        let spoil = self.injected == Some(Injected::Gradient);
+        let input = StepInput { spoil_gradient: spoil, ..StepInput::whole(&tensors, &scenes, self.trains) };
+        let output = learner.train_step(&input, self.learning_rate.0)?;
+        Ok(Self {
+            loss: output.loss.into(),
+            gradient_norm: output.gradient_norm.into(),
+            scenes: describe(dataset, &scenes, &output),
+            ..self.clone()
+        })
+    }
+
+    fn model(
+        &self,
+        path: &Path,
+        config: &Config,
+        dataset: &Dataset,
+        device: &Device,
+    ) -> Result<ClothCombo, IncidentError> {
+        let file = path.with_file_name(&self.weights);
+        let unusable = |reason: String| IncidentError::Unusable { path: file.clone(), reason };
+        let sum = checksum(&file).map_err(|e| unusable(e.to_string()))?;
+        if sum != self.weights_checksum {
+            return Err(unusable("does not match its checksum".into()));
+        }
+        let record = ModuleRecord::load(&file).map_err(|e| unusable(e.to_string()))?;
+        ClothCombo::new(&config.model, &dataset.dimensions(), 0, device)
+            .map_err(|e| unusable(e.to_string()))?
+            .try_load_record(record)
+            .map_err(|e| unusable(e.to_string()))
+    }
+
+    /// All numbers that a replay must reproduce, by name, in order.
+    pub fn numbers(&self) -> Vec<(String, Exact)> {
+        let mut out = vec![("loss".to_owned(), self.loss), ("gradient norm".to_owned(), self.gradient_norm)];
+        for (s, scene) in self.scenes.iter().enumerate() {
+            for (b, body) in scene.bodies.iter().enumerate() {
+                let place = format!("scene {s}, body {b}");
+                out.push((format!("{place}: total"), body.total));
+                for (garment, energies) in scene.garments.iter().zip(&body.garments) {
+                    out.extend(energies.iter().map(|(t, v)| (format!("{place}, {}: {t}", garment.name), *v)));
+                }
+                for (pair, energies) in body.layers.iter().enumerate() {
+                    out.extend(energies.iter().map(|(t, v)| (format!("{place}, pair {pair}: {t}"), *v)));
+                }
+            }
+        }
+        out
+    }
+}
+
+/// Gives the first vertex of the first body a NaN coordinate.
+pub(crate) fn spoil_position(scenes: &mut [PreparedScene]) {
+    if let Some(vertex) = scenes.first_mut().and_then(|s| s.bodies.first_mut()?.start.first_mut()) {
+        vertex[0] = f32::NAN;
+    }
+}
+
+fn describe(dataset: &Dataset, scenes: &[PreparedScene], output: &StepOutput) -> Vec<IncidentScene> {
+    let energies = |values: &TermMap<Option<f64>>| -> BTreeMap<String, Exact> {
+        Term::ALL.into_iter().filter_map(|t| Some((t.name().to_owned(), Exact(values[t]?)))).collect()
+    };
+    let of_scene = |(scene, outputs): (&PreparedScene, &Vec<_>)| {
+        let garments = scene.sample.garments.iter().map(|&index| {
+            let card = dataset.garments.info(index);
+            IncidentGarment { index, name: card.name.clone(), vertices: card.vertices }
+        });
+        let bodies = scene.sample.bodies.iter().zip(outputs).map(
+            |(body, output): (&BodySample, &clothcombo_physics::autodiff::SceneLossOutput)| {
+                let value = output.value();
+                IncidentBody {
+                    shape: body.shape.iter().copied().map(Exact).collect(),
+                    pose: body.pose.rotations.iter().map(|r| r.map(Exact)).collect(),
+                    total: value.total.into(),
+                    garments: value.garments.iter().map(energies).collect(),
+                    layers: value.layers.iter().map(energies).collect(),
+                }
+            },
+        );
+        IncidentScene {
+            garments: garments.collect(),
+            bodies: bodies.collect(),
+            repulsion_sample: scene.sample.repulsion_sample,
+        }
+    };
+    scenes.iter().zip(&output.scenes).map(of_scene).collect()
+}
+
+impl IncidentScene {
+    /// The scene as it was sampled.
+    fn to_sample(&self, dataset: &Dataset, path: &Path) -> Result<SceneSample, IncidentError> {
+        let garments = self.garments.iter().map(|garment| {
+            let changed = |reason: String| IncidentError::DataChanged { name: garment.name.clone(), reason };
+            let is_it = |i: usize| dataset.garments.info(i).name == garment.name;
+            let index = Some(garment.index)
+                .filter(|&i| i < dataset.garments.len() && is_it(i))
+                .or_else(|| (0..dataset.garments.len()).find(|&i| is_it(i)))
+                .ok_or_else(|| changed("is not in the wardrobe any more".into()))?;
+            match dataset.garments.info(index).vertices {
+                found if found == garment.vertices => Ok(index),
+                found => Err(changed(format!("has {found} vertices now, it had {}", garment.vertices))),
+            }
+        });
+        let wrong = |reason: &str| IncidentError::Unusable { path: path.to_owned(), reason: reason.into() };
+        let bodies = self.bodies.iter().map(|body| {
+            let pose = Pose { rotations: body.pose.iter().map(|r| r.map(|v| v.0)).collect() };
+            if body.shape.len() != dataset.shape_count || pose.rotations.len() > dataset.body.joint_count() {
+                return Err(wrong("has a shape or pose that the body of the run does not take"));
+            }
+            let shape: Vec<f64> = body.shape.iter().map(|v| v.0).collect();
+            match shape.iter().chain(pose.rotations.as_flattened()).all(|v| v.is_finite()) {
+                true => Ok(BodySample { shape, pose }),
+                false => Err(wrong("has a shape or pose that is not finite")),
+            }
+        });
+        Ok(SceneSample {
+            garments: garments.collect::<Result<_, _>>()?,
+            bodies: bodies.collect::<Result<_, _>>()?,
+            repulsion_sample: self.repulsion_sample,
+        })
+    }
+}

@@ -1,0 +1,170 @@
+//! A scene, the networks and what they make of it, as files for an independent implementation.
+
+use super::subject::Subject;
+use crate::config::Trains;
+use crate::dataset::PreparedScene;
+use burn::store::{ModuleSnapshot, SafetensorsStore};
+use clothcombo_data::format::{NpzWriter, atomic};
+use clothcombo_physics::energy::{SceneEnergy, Term, TermMap};
+use clothcombo_physics::mesh::Topology;
+use clothcombo_physics::operators::{SparseMatrix, surface_gradient};
+use clothcombo_physics::query::Distance;
+use miette::{IntoDiagnostic, Report, WrapErr, miette};
+use serde_json::{Map, Value, json};
+use std::path::Path;
+
+/// The networks, as the names of their parameters begin.
+const NETWORKS: [&str; 5] = ["garment_encoder", "draping", "skinning", "untangling", "corrections"];
+
+/// Writes the first scene of the stage, on the first of its bodies, into `folder`: `model.safetensors` (parameters by their
+/// documented names), `scene.npz` (body, garments, operators, and the positions our networks find) and `scene.json` (sizes,
+/// settings, weights, switches, and our loss and gradient norms: of all networks and of each, 0 for one that is not trained).
+///
+/// # Errors
+/// When a file cannot be written, or the scene cannot be draped.
+pub fn export(subject: &Subject, folder: &Path) -> Result<(), Report> {
+    let mut scene = subject.scene(0)?;
+    scene.bodies.truncate(1);
+    std::fs::create_dir_all(folder)
+        .into_diagnostic()
+        .wrap_err_with(|| format!("cannot make the folder {}", folder.display()))?;
+    let mut model =
+        SafetensorsStore::from_file(folder.join("model.safetensors")).overwrite(true).clear_metadata();
+    subject.model().save_into(&mut model).map_err(|error| miette!("{}: {error}", folder.display()))?;
+    arrays(subject, &scene)?.save(&folder.join("scene.npz")).into_diagnostic()?;
+    let text = serde_json::to_string_pretty(&description(subject, &scene)?).into_diagnostic()?;
+    let path = folder.join("scene.json");
+    atomic::write(&path, text.as_bytes()).into_diagnostic().wrap_err_with(|| path.display().to_string())
+}
+
+fn arrays(subject: &Subject, scene: &PreparedScene) -> Result<NpzWriter, Report> {
+    let body = &scene.bodies[0];
+    let mut file = NpzWriter::new();
+    let mut positions = |key: &str, values: &[[f32; 3]]| {
+        file.f32(key, &[values.len(), 3], values.as_flattened());
+    };
+    positions("body.positions", &body.energy.body.positions);
+    positions("start", &body.start);
+    let [posed, canonical] = subject.host_drape(scene)?;
+    positions("expected.posed", &posed);
+    positions("expected.canonical", &canonical);
+    let faces = &body.energy.body.faces;
+    file.u32("body.faces", &[faces.len(), 3], faces.as_flattened());
+    file.f32("shape", &[body.shape.len()], &body.shape);
+    file.f32("pose", &[body.pose.len()], &body.pose);
+    let bones: Vec<f32> = body.bones.iter().flatten().flatten().map(|v| *v as f32).collect();
+    file.f32("bones", &[body.bones.len(), 12], &bones);
+    for (layer, ((&index, garment), dressed)) in
+        scene.sample.garments.iter().zip(&scene.garments).zip(&body.energy.garments).enumerate()
+    {
+        let key = |name: &str| format!("garment{layer}.{name}");
+        let rest = &garment.garment.rest;
+        let (vertices, joints) = (rest.vertex_count(), body.bones.len());
+        file.f64(&key("rest"), &[vertices, 3], rest.positions().as_flattened());
+        file.u32(&key("faces"), &[rest.face_count(), 3], rest.faces().as_flattened());
+        file.f32(&key("skin_weights"), &[vertices, joints], &garment.skin_weights);
+        let reference = &dressed.holding_reference;
+        file.f32(&key("holding_reference"), &[reference.len(), 3], reference.as_flattened());
+        let operators = subject.dataset().garments.operators(index)?;
+        let k = operators.eigen_count;
+        file.f64(&key("mass"), &[vertices], &operators.mass);
+        file.f64(&key("eigenvalues"), &[k], &operators.eigenvalues);
+        file.f32(&key("eigenvectors"), &[vertices, k], &operators.eigenvectors);
+        let gradient = surface_gradient(rest, &Topology::new(rest));
+        for (axis, matrix) in [("x", &gradient.x), ("y", &gradient.y)] {
+            let (rows, columns, values) = triplets(matrix);
+            file.u32(&key(&format!("gradient_{axis}.rows")), &[rows.len()], &rows);
+            file.u32(&key(&format!("gradient_{axis}.columns")), &[columns.len()], &columns);
+            file.f64(&key(&format!("gradient_{axis}.values")), &[values.len()], &values);
+        }
+    }
+    Ok(file)
+}
+
+fn triplets(matrix: &SparseMatrix) -> (Vec<u32>, Vec<u32>, Vec<f64>) {
+    let (mut rows, mut columns, mut values) = (Vec::new(), Vec::new(), Vec::new());
+    for row in 0..matrix.rows() {
+        let (in_row, of_row) = matrix.row(row);
+        rows.extend(std::iter::repeat_n(row as u32, in_row.len()));
+        columns.extend_from_slice(in_row);
+        values.extend_from_slice(of_row);
+    }
+    (rows, columns, values)
+}
+
+fn description(subject: &Subject, scene: &PreparedScene) -> Result<Value, Report> {
+    let energy = &scene.bodies[0].energy;
+    let (loss, gradients) = subject.loss_and_gradients(scene)?;
+    let squares = |values: &[f32]| values.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>();
+    let norm_below = |prefix: &str| {
+        let below = gradients.iter().filter(|(name, _)| name.starts_with(prefix));
+        below.map(|(_, values)| squares(values)).sum::<f64>().sqrt()
+    };
+    let norms: Map<String, Value> =
+        NETWORKS.into_iter().map(|name| (name.to_owned(), json!(norm_below(&format!("{name}."))))).collect();
+    let garments: Vec<Value> = scene
+        .garments
+        .iter()
+        .zip(&energy.garments)
+        .map(|(garment, dressed)| {
+            json!({
+                "name": garment.garment.name,
+                "vertices": garment.vertex_count(),
+                "held": dressed.energies.has_holding(),
+                "held_posed": dressed.pull_back.is_some(),
+                "weights": weights(&dressed.weights),
+            })
+        })
+        .collect();
+    let layers: Vec<Value> = energy
+        .layers
+        .iter()
+        .map(|pair| json!({ "inner": pair.inner, "outer": pair.outer, "weights": weights(&pair.weights) }))
+        .collect();
+    let config = subject.config();
+    Ok(json!({
+        "model": config.model,
+        "optimizer": config.optimizer,
+        "garments": garments,
+        "contacts": scene.contacts,
+        "layers": layers,
+        "settings": settings(energy),
+        "trains": subject.trains(),
+        "single_garments": if subject.trains() == Trains::All { scene.single_garments } else { 0.0 },
+        "expected": { "loss": loss, "gradient_norm": norm_below(""), "gradient_norms": norms },
+    }))
+}
+
+fn weights(map: &TermMap<f64>) -> Value {
+    Term::ALL
+        .into_iter()
+        .filter(|term| map[*term] != 0.0)
+        .map(|term| (term.name().to_owned(), json!(map[term])))
+        .collect()
+}
+
+fn settings(energy: &SceneEnergy<f32>) -> Value {
+    let s = &energy.settings;
+    json!({
+        "thickness": s.material.thickness,
+        "density": s.material.density,
+        "lambda": s.material.lambda,
+        "mu": s.material.mu,
+        "bending_stiffness": s.material.bending_stiffness,
+        "gravity": s.gravity_acceleration,
+        "body_epsilon": s.body_collision_epsilon,
+        "layer_epsilon": s.layer_collision_epsilon,
+        "radius": s.repulsion_radius,
+        "layer_radius": s.layer_distance_radius,
+        "holding_fraction": s.holding_fraction,
+        "gate_depth": s.layer_gate.map(|gate| gate.depth),
+        "gate_edges": s.layer_gate.map(|gate| gate.tangential_edges),
+        "distance": match s.distance {
+            Distance::NearestVertex => "nearest_vertex",
+            Distance::ClosestPoint => "closest_point",
+            Distance::Union => "union",
+        },
+        "repulsion_per_vertex": s.repulsion_normalised,
+        "repulsion_subset": s.repulsion_subset,
+    })
+}

@@ -1,0 +1,101 @@
+//! Time by part of a step, from the `tracing` spans of the networks and the learner.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+use tracing::span::Id;
+use tracing::{Level, Subscriber};
+use tracing_subscriber::Layer;
+use tracing_subscriber::filter::Targets;
+use tracing_subscriber::layer::{Context, SubscriberExt};
+use tracing_subscriber::registry::LookupSpan;
+
+/// What is left of a step beside the named parts.
+pub const OTHER: &str = "other";
+
+/// The parts of a step in their order: waiting for the scene, then the spans by name, then the rest.
+pub const PHASES: [&str; 14] = [
+    "data wait",
+    "tensors",
+    "embedding",
+    "vertex products",
+    "draping",
+    "skinning",
+    "untangling",
+    "contact features",
+    "corrections",
+    "energies",
+    "backward",
+    "clip",
+    "optimiser",
+    OTHER,
+];
+
+/// Seconds by span name.
+pub type SpanSeconds = BTreeMap<&'static str, f64>;
+
+/// Runs `work` and returns how long each span of the project was entered, on this thread and on those that `work` hands its
+/// subscriber to. A span within another one counts for itself alone.
+pub fn record_phases<R>(work: impl FnOnce() -> R) -> (R, SpanSeconds) {
+    let totals = Arc::new(Mutex::new(SpanSeconds::new()));
+    let targets = Targets::new()
+        .with_target("clothcombo_model", Level::TRACE)
+        .with_target("clothcombo_trainer", Level::TRACE);
+    let subscriber = tracing_subscriber::registry().with(SpanClock(totals.clone()).with_filter(targets));
+    let result = tracing::subscriber::with_default(subscriber, work);
+    let totals = totals.lock().unwrap_or_else(PoisonError::into_inner);
+    (result, totals.clone())
+}
+
+struct SpanClock(Arc<Mutex<SpanSeconds>>);
+
+struct Entered(Instant);
+
+impl<S: Subscriber + for<'a> LookupSpan<'a>> Layer<S> for SpanClock {
+    fn on_enter(&self, id: &Id, context: Context<'_, S>) {
+        if let Some(span) = context.span(id) {
+            span.extensions_mut().replace(Entered(Instant::now()));
+        }
+    }
+
+    fn on_exit(&self, id: &Id, context: Context<'_, S>) {
+        let Some(span) = context.span(id) else { return };
+        if let Some(Entered(start)) = span.extensions_mut().remove() {
+            let mut totals = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            let seconds = start.elapsed().as_secs_f64();
+            *totals.entry(span.name()).or_default() += seconds;
+            if let Some(outer) = span.parent() {
+                *totals.entry(outer.name()).or_default() -= seconds;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Duration;
+
+    #[test]
+    fn spans_are_added_up_by_name() {
+        let ((), times) = record_phases(|| {
+            for _ in 0..2 {
+                let _span = tracing::trace_span!("embedding").entered();
+                std::thread::sleep(Duration::from_millis(5));
+            }
+            tracing::trace_span!("clip").in_scope(|| ());
+        });
+        assert_eq!(times.keys().copied().collect::<Vec<_>>(), ["clip", "embedding"]);
+        assert!(times["embedding"] >= 0.01 && times["clip"] < times["embedding"]);
+    }
+
+    #[test]
+    fn a_span_within_another_one_counts_once() {
+        let ((), times) = record_phases(|| {
+            let _outer = tracing::trace_span!("corrections").entered();
+            tracing::trace_span!("contact features")
+                .in_scope(|| std::thread::sleep(Duration::from_millis(20)));
+        });
+        assert!(times["corrections"] >= 0.0 && times["corrections"] < times["contact features"], "{times:?}");
+    }
+}

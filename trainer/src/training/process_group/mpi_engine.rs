@@ -1,0 +1,39 @@
+//! The collective operations over MPI.
+
+use super::{ProcessGroupError, RankPartition};
+use mpi::Threading;
+use mpi::collective::SystemOperation;
+use mpi::environment::Universe;
+use mpi::topology::SimpleCommunicator;
+use mpi::traits::{Communicator, CommunicatorCollectives};
+
+/// MPI, ended when it is dropped; used from the thread that started it only.
+pub(super) struct Engine {
+    communicator: SimpleCommunicator,
+    _universe: Universe,
+}
+
+impl Engine {
+    pub(super) fn start() -> Result<Self, ProcessGroupError> {
+        // Other threads compute and read, but only this one exchanges anything.
+        let (universe, _) =
+            mpi::initialize_with_threading(Threading::Funneled).ok_or(ProcessGroupError::NotStarted)?;
+        Ok(Self { communicator: universe.world(), _universe: universe })
+    }
+
+    pub(super) fn partition(&self) -> RankPartition {
+        RankPartition { rank: self.communicator.rank() as usize, size: self.communicator.size() as usize }
+    }
+
+    pub(super) fn gather(&self, row: &[f64]) -> Vec<Vec<f64>> {
+        let mut all = vec![0.0; row.len() * self.share().size];
+        self.communicator.all_gather_into(row, &mut all);
+        all.chunks_exact(row.len().max(1)).map(<[f64]>::to_vec).collect()
+    }
+
+    pub(super) fn sum(&self, values: Vec<f32>) -> Vec<f32> {
+        let mut sums = vec![0.0; values.len()];
+        self.communicator.all_reduce_into(&values, &mut sums, SystemOperation::sum());
+        sums
+    }
+}

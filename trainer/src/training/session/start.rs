@@ -1,0 +1,128 @@
+//! How a run begins: anew, from a trained model, or from a checkpoint.
+
+use super::Session;
+use crate::config::Config;
+use crate::dataset::{Dataset, is_fingerprint};
+use crate::evaluation::ValidationSet;
+use crate::inference::tensor_store::TensorStore;
+use crate::run::checkpoint::{Checkpoint, CheckpointState, TrainedModel};
+use crate::run::folder::{RunDir, differing_keys};
+use crate::training::average::Average;
+use crate::training::guard::Guard;
+use crate::training::learner::{Learner, new_optimizer};
+use crate::training::schedule::Schedule;
+use burn::module::Module;
+use burn::tensor::Device;
+use clothcombo_model::ClothCombo;
+use miette::{IntoDiagnostic, Report, miette};
+use std::path::Path;
+use std::rc::Rc;
+use std::sync::Arc;
+
+impl Session {
+    /// A new run on `device` (named without automatic differentiation).
+    ///
+    /// # Errors
+    /// When the networks cannot be made, or the model they start from does not fit.
+    pub fn new(run: RunDir, config: Config, dataset: Arc<Dataset>, device: &Device) -> Result<Self, Report> {
+        let device = device.clone().autodiff();
+        let model = match &config.init_from {
+            None => ClothCombo::new(&config.model, &dataset.dimensions(), config.seed, &device)
+                .into_diagnostic()?,
+            Some(path) => {
+                let trained = TrainedModel::open(Path::new(path))?;
+                if trained.config.seed == config.seed {
+                    tracing::warn!(
+                        "{path} was trained with seed {}, too: its scenes come again; set another seed (and \
+                         validation.seed to this one, to score the same scenes)",
+                        config.seed
+                    );
+                }
+                trained.start_of(&config, &dataset, &device)?
+            }
+        };
+        let average = (config.optimizer.ema_decay > 0.0)
+            .then(|| Average::new(model.valid(), config.optimizer.ema_decay));
+        let learner = Learner::new(model, new_optimizer(&config.optimizer), &config.optimizer);
+        let start = CheckpointState::of(&dataset, 0);
+        Ok(Self::assemble(run, config, dataset, &device, learner, average, &start))
+    }
+
+    /// The run in `run`, from `checkpoint` on.
+    ///
+    /// # Errors
+    /// When the checkpoint was made with other data or networks.
+    pub fn resume(
+        run: RunDir,
+        config: Config,
+        dataset: Arc<Dataset>,
+        device: &Device,
+        checkpoint: &Checkpoint,
+    ) -> Result<Self, Report> {
+        let device = device.clone().autodiff();
+        let expected = CheckpointState::of(&dataset, 0);
+        let found = &checkpoint.state;
+        let dimensions = |s: &CheckpointState| (s.joints.clone(), s.shape_count, s.pose_features);
+        let same_data =
+            found.data == expected.data || !found.data.as_ref().is_some_and(|d| is_fingerprint(d));
+        if dimensions(found) != dimensions(&expected) || !same_data {
+            return Err(miette!(
+                help = "the body, garments or motions have changed since the run was started; restore them, or start a new run",
+                "the data no longer fits checkpoint {}",
+                checkpoint.path.display()
+            ));
+        }
+        if !found.data.as_ref().is_some_and(|d| is_fingerprint(d)) {
+            tracing::warn!(
+                "checkpoint {} cannot tell whether the data is still the same",
+                checkpoint.path.display()
+            );
+        }
+        let model = checkpoint.trained_model(&config, &device)?;
+        let average = match config.optimizer.ema_decay {
+            decay if decay > 0.0 => {
+                let kept = checkpoint.average(&config, &device)?;
+                Some(Average::new(kept.unwrap_or_else(|| model.clone()).valid(), decay))
+            }
+            _ => None,
+        };
+        let optimizer = checkpoint.optimizer(new_optimizer(&config.optimizer))?;
+        let learner = Learner::new(model, optimizer, &config.optimizer);
+        // A score of other losses or scenes cannot be beaten by one of these.
+        let scores = ["losses", "validation", "data", "seed"];
+        let changed = differing_keys(&checkpoint.config()?, &config);
+        let is_comparable = !changed.iter().any(|key| scores.iter().any(|part| key.starts_with(part)));
+        let best = found.best.filter(|_| is_comparable);
+        // What was changed may have fixed what went wrong before.
+        let incidents = if changed.is_empty() { found.incidents.clone() } else { Vec::new() };
+        let found = CheckpointState { best, incidents, ..found.clone() };
+        Ok(Self::assemble(run, config, dataset, &device, learner, average, &found))
+    }
+
+    fn assemble(
+        run: RunDir,
+        config: Config,
+        dataset: Arc<Dataset>,
+        device: &Device,
+        learner: Learner,
+        average: Option<Average>,
+        state: &CheckpointState,
+    ) -> Self {
+        Self {
+            tensors: Arc::new(TensorStore::new(dataset.clone(), dataset.dimensions(), device)),
+            validation: ValidationSet::new(&dataset, &config),
+            schedule: Schedule::new(&config),
+            guard: Guard::new(config.guard.clone(), &state.incidents),
+            best: state.best,
+            step: state.step,
+            saved_step: state.step,
+            owes_checkpoint: false,
+            config: Arc::new(config),
+            run,
+            dataset,
+            learner,
+            average,
+            group: Rc::default(),
+        }
+    }
+}
