@@ -172,7 +172,7 @@ impl SceneLossOutput {
     }
 }
 
-/// The weighted sum of all energies of a scene at `posed` and `canonical` positions, both `[ΣV, 3]` [m], garment after
+/// The weighted sum of all energies of a scene at `posed` and `canonical` positions, both `[ΣV, 3]` (m), garment after
 /// garment; differentiable in both.
 ///
 /// # Panics

@@ -1,5 +1,6 @@
 use super::*;
-use crate::energy::{EnergySettings, GarmentEnergies, Term, TermMap};
+use crate::energy::tests::scenes::{narrowed, scene_garment};
+use crate::energy::{EnergySettings, Term, TermMap};
 use crate::mesh::{Topology, TriMesh, shapes};
 use crate::vec3::{distance_squared, normalized, sub};
 use std::f64::consts::TAU;
@@ -15,22 +16,15 @@ struct TestScene {
 impl TestScene {
     fn new(body: &TriMesh, garments: &[TriMesh]) -> Self {
         let settings = EnergySettings::default();
-        let topologies: Vec<Topology> = garments.iter().map(Topology::new).collect();
-        let garment = |(mesh, topology)| SceneGarment {
-            energies: Arc::new(GarmentEnergies::new(mesh, topology, &settings, false).expect("a garment")),
-            holding_reference: Vec::new(),
-            pull_back: None,
-            weights: TermMap::filled(1.0),
-        };
+        let garment = |mesh| scene_garment(mesh, &settings, TermMap::filled(1.0), false);
         let scene = SceneEnergy {
             body: Arc::new(Surface::from_mesh(body)),
-            garments: garments.iter().zip(&topologies).map(garment).collect(),
+            garments: garments.iter().map(garment).collect(),
             layers: Vec::new(),
             settings,
         };
-        let rings = topologies.iter().map(Rings::new).collect();
-        let positions = garments.iter().flat_map(|g| g.positions());
-        Self { scene, rings, posed: positions.map(|p| p.map(|x| x as f32)).collect() }
+        let rings = garments.iter().map(|mesh| Rings::new(&Topology::new(mesh))).collect();
+        Self { scene, rings, posed: garments.iter().flat_map(narrowed).collect() }
     }
 
     fn features(&self, interactions: &[(usize, usize)]) -> ContactFeatures {

@@ -37,13 +37,13 @@ pub struct Bending {
     stiffness: f64,
     /// Edge start, edge end, opposite vertex of the first face, of the second.
     hinges: Vec<[u32; 4]>,
-    /// τ² of the two triangles of each hinge [m⁴].
+    /// τ² of the two triangles of each hinge (m⁴).
     collapse_squared: Vec<[f64; 2]>,
     corners_at: CompressedRows<u32>,
 }
 
 impl Bending {
-    /// Prepares the energy of a garment with rest shape `rest` and its `hinges`; `stiffness` [J/rad²].
+    /// Prepares the energy of a garment with rest shape `rest` and its `hinges`; `stiffness` (J/rad²).
     pub fn new(rest: &TriMesh, hinges: &[Hinge], stiffness: f64) -> Self {
         Self::with_median_edge(rest, hinges, stiffness, rest.median_edge_length())
     }
@@ -63,7 +63,7 @@ impl Bending {
         Self { stiffness, hinges, collapse_squared, corners_at }
     }
 
-    /// Energy [J] at `positions` `[V, 3]` [m]; adds its weighted gradient to `target`.
+    /// Energy (J) at `positions` `[V, 3]` (m); adds its weighted gradient to `target`.
     pub fn evaluate<T: Real>(&self, positions: &[[T; 3]], target: Option<Weighted<'_, T>>) -> f64 {
         let element = |h: usize| {
             let corners = self.hinges[h].map(|v| to_f64(positions[v as usize]));

@@ -26,7 +26,7 @@ impl<T: Real> Weighted<'_, T> {
     }
 }
 
-/// Energy [J] of one element and its derivative at the element's corners.
+/// Energy (J) of one element and its derivative at the element's corners.
 pub(crate) struct Response<T, const N: usize> {
     pub energy: f64,
     pub gradient: [[T; 3]; N],

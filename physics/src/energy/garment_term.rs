@@ -11,11 +11,11 @@ pub type HeightRow = [f64; 4];
 /// One garment at one moment, as its energies see it.
 #[derive(Debug, Clone, Copy)]
 pub struct GarmentState<'a, T> {
-    /// Posed positions `[V, 3]` [m].
+    /// Posed positions `[V, 3]` (m).
     pub posed: &'a [[T; 3]],
-    /// Canonical positions, before skinning `[V, 3]` [m].
+    /// Canonical positions, before skinning `[V, 3]` (m).
     pub canonical: &'a [[T; 3]],
-    /// Canonical positions that the holding energy measures against `[V, 3]` [m].
+    /// Canonical positions that the holding energy measures against `[V, 3]` (m).
     pub holding_reference: &'a [[T; 3]],
     /// Reads the heights of the holding energy off posed positions `[V]`; `None`: off canonical ones.
     pub pull_back: Option<&'a [HeightRow]>,

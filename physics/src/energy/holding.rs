@@ -49,7 +49,7 @@ impl Holding {
         &self.held
     }
 
-    /// Every held vertex with its height above the reference [m], and how that changes with the position it is read off.
+    /// Every held vertex with its height above the reference (m), and how that changes with the position it is read off.
     fn raised<'a, T: Real>(
         &'a self,
         state: &'a GarmentState<'_, T>,
@@ -70,7 +70,7 @@ impl Holding {
 }
 
 impl<T: Real> GarmentTerm<T> for Holding {
-    /// Energy [m²].
+    /// Energy (m²).
     fn evaluate(&self, state: &GarmentState<'_, T>, mut target: Option<Weighted<'_, T>>) -> f64 {
         let mut energy = 0.0;
         for (v, raised, along) in self.raised(state) {

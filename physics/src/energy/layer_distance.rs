@@ -40,7 +40,7 @@ pub(super) struct LayerGaps<'a, T> {
     pub buckets: &'a BodyBuckets,
 }
 
-/// Penalty [m³] of an inner garment farther from the body than an outer one; `radius` [m] as in the buckets. Adds its
+/// Penalty (m³) of an inner garment farther from the body than an outer one; `radius` (m) as in the buckets. Adds its
 /// weighted gradient to `targets`, the inner garment's first.
 pub(super) fn layer_distance<T: Real>(
     inner: LayerGaps<'_, T>,

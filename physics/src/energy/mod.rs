@@ -23,6 +23,7 @@ pub mod bending;
 pub mod body_collision;
 mod cell_grid;
 mod curvature;
+mod difference_quotient;
 mod elements;
 mod error;
 mod garment;

@@ -45,7 +45,7 @@ impl Repulsion {
         Self { excluded: CompressedRows::from_fn(topology.vertex_count(), excluded) }
     }
 
-    /// Energy at `positions` `[V, 3]` [m] by the `repulsion_…` of `settings`; adds its weighted gradient to `target`. A vertex
+    /// Energy at `positions` `[V, 3]` (m) by the `repulsion_…` of `settings`; adds its weighted gradient to `target`. A vertex
     /// that is not finite repels nothing.
     pub fn evaluate<T: Real>(
         &self,

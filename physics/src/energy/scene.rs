@@ -15,7 +15,7 @@ use crate::transform::Transform;
 pub struct SceneGarment<T: Real> {
     /// Its energies.
     pub energies: Arc<GarmentEnergies<T>>,
-    /// Canonical positions that the holding energy measures against `[V, 3]` [m]; may be empty for a garment that is not
+    /// Canonical positions that the holding energy measures against `[V, 3]` (m); may be empty for a garment that is not
     /// held.
     pub holding_reference: Vec<[T; 3]>,
     /// Heights before skinning as functions of posed positions `[V]`, which the holding energy then acts on

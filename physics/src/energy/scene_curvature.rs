@@ -14,7 +14,7 @@ pub struct LayerTouch {
     pub vertex: usize,
     /// The corners of the inner face it is nearest to, numbered alike.
     pub corners: [usize; 3],
-    /// Weighted energy [J].
+    /// Weighted energy (J).
     pub energy: f64,
 }
 

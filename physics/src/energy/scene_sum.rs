@@ -67,7 +67,7 @@ struct PairValue<T> {
 impl<T: Real> SceneEnergy<T> {
     /// Value and gradient of the weighted sum. Terms of weight 0 are not evaluated.
     ///
-    /// `posed` and `canonical` hold the vertices of all garments in order, `[ΣV, 3]` [m]; `canonical` may be empty when no
+    /// `posed` and `canonical` hold the vertices of all garments in order, `[ΣV, 3]` (m); `canonical` may be empty when no
     /// garment is held with a weight ([`needs_canonical`](Self::needs_canonical)).
     ///
     /// # Panics

@@ -35,7 +35,7 @@ const NO_HEIGHT: f64 = 1e-12;
 pub(super) struct Needle {
     /// Least ratio of height to longest edge.
     pub ratio: f64,
-    /// Of the whole garment [m].
+    /// Of the whole garment (m).
     pub median_edge: f64,
 }
 
@@ -44,9 +44,9 @@ pub(super) struct Needle {
 struct RestTriangle {
     /// The face's vertices, turned so that the longest edge comes first.
     corners: [u32; 3],
-    /// Area × thickness [m³].
+    /// Area × thickness (m³).
     volume: f64,
-    /// The upper triangle `(0,0), (0,1), (1,1)` of the inverse of the 2×2 matrix of rest edges [1/m].
+    /// The upper triangle `(0,0), (0,1), (1,1)` of the inverse of the 2×2 matrix of rest edges (1/m).
     inverse: [f64; 3],
     /// `F₀ᵀF₀`: entries 11, 12, 22.
     metric: [f64; 3],
@@ -95,13 +95,18 @@ impl RestTriangle {
         [scale(base, i00), add_scaled(scale(base, i01), i11, side)]
     }
 
+    /// The two columns of `F` and the entries 11, 12, 22 of `G`.
     #[inline(always)]
-    fn response<T: Real>(&self, positions: &[[T; 3]], mu: f64, lambda: f64) -> Response<T, 3> {
+    fn strain<T: Real>(&self, positions: &[[T; 3]]) -> ([[f64; 3]; 2], [f64; 3]) {
         let [a, b, c] = self.corners.map(|v| to_f64(positions[v as usize]));
         let [f1, f2] = self.deformation_gradient(sub(b, a), sub(c, a));
-        let g11 = 0.5 * (dot(f1, f1) - self.metric[0]);
-        let g12 = 0.5 * (dot(f1, f2) - self.metric[1]);
-        let g22 = 0.5 * (dot(f2, f2) - self.metric[2]);
+        let products = [dot(f1, f1), dot(f1, f2), dot(f2, f2)];
+        ([f1, f2], std::array::from_fn(|k| 0.5 * (products[k] - self.metric[k])))
+    }
+
+    #[inline(always)]
+    fn response<T: Real>(&self, positions: &[[T; 3]], mu: f64, lambda: f64) -> Response<T, 3> {
+        let ([f1, f2], [g11, g12, g22]) = self.strain(positions);
         let trace = g11 + g22;
         let density = 0.5 * lambda * trace * trace + mu * (g11 * g11 + 2.0 * g12 * g12 + g22 * g22);
 
@@ -117,16 +122,10 @@ impl RestTriangle {
         let at_a = scale(add(at_b, at_c), -1.0);
         Response { energy: self.volume * density, gradient: [at_a, at_b, at_c].map(crate::vec3::from_f64) }
     }
-}
 
-impl RestTriangle {
     /// See [`GarmentTerm::curvature`] of [`Strain`].
     fn curvature<T: Real>(&self, positions: &[[T; 3]], mu: f64, lambda: f64, sink: &mut dyn CurvatureSink) {
-        let [a, b, c] = self.corners.map(|v| to_f64(positions[v as usize]));
-        let [f1, f2] = self.deformation_gradient(sub(b, a), sub(c, a));
-        let g11 = 0.5 * (dot(f1, f1) - self.metric[0]);
-        let g12 = 0.5 * (dot(f1, f2) - self.metric[1]);
-        let g22 = 0.5 * (dot(f2, f2) - self.metric[2]);
+        let ([f1, f2], [g11, g12, g22]) = self.strain(positions);
         let trace = g11 + g22;
         let stress = [lambda * trace + 2.0 * mu * g11, 2.0 * mu * g12, lambda * trace + 2.0 * mu * g22];
         let [s11, s12, s22] = positive_part(stress);
@@ -176,7 +175,7 @@ impl Strain {
         Self { mu: material.mu, lambda: material.lambda, triangles, corners_at }
     }
 
-    /// Energy [J] at `positions` `[V, 3]` [m]; adds its weighted gradient to `target`.
+    /// Energy (J) at `positions` `[V, 3]` (m); adds its weighted gradient to `target`.
     pub fn evaluate<T: Real>(&self, positions: &[[T; 3]], target: Option<Weighted<'_, T>>) -> f64 {
         let element = |t: usize| self.triangles[t].response(positions, self.mu, self.lambda);
         sum_elements(self.triangles.len(), &self.corners_at, element, target)

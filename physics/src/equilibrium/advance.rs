@@ -21,11 +21,11 @@ const MOST_HELD: usize = 10;
 
 /// A state of the search.
 pub(super) struct State {
-    /// Posed positions [m].
+    /// Posed positions (m).
     pub positions: Vec<[f64; 3]>,
-    /// Weighted sum of all energies there [J].
+    /// Weighted sum of all energies there (J).
     pub energy: f64,
-    /// Its gradient [N].
+    /// Its gradient (N).
     pub gradient: Vec<[f64; 3]>,
 }
 

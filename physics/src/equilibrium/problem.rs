@@ -34,7 +34,7 @@ impl<'a> Problem<'a> {
         self.energy.vertex_count()
     }
 
-    /// Weighted sum of all energies at `posed` `[ΣV, 3]` [m].
+    /// Weighted sum of all energies at `posed` `[ΣV, 3]` (m).
     ///
     /// # Panics
     /// If `posed` does not have one entry per vertex.
@@ -42,7 +42,7 @@ impl<'a> Problem<'a> {
         self.energy.value(posed, &[]).total
     }
 
-    /// The same sum, and what every term adds to it [J], by its name.
+    /// The same sum, and what every term adds to it (J), by its name.
     ///
     /// # Panics
     /// As [`value`](Self::value).
@@ -73,7 +73,7 @@ impl<'a> Problem<'a> {
         self.evaluate(self.energy, posed)
     }
 
-    /// `Σ_t |w_t ∇E_t|` over the terms [N]: what a gradient is compared with (see [`super`]).
+    /// `Σ_t |w_t ∇E_t|` over the terms (N): what a gradient is compared with (see [`super`]).
     ///
     /// # Panics
     /// As [`value`](Self::value).

@@ -27,7 +27,7 @@ const LEAST_GAIN: f64 = 1e-9;
 /// Most times that vertices are held in one iteration.
 const MOST_HOLDS: usize = 8;
 
-/// Lowers the energy of `problem` from posed positions `start` `[ΣV, 3]` [m] until it cannot or may not be lowered any
+/// Lowers the energy of `problem` from posed positions `start` `[ΣV, 3]` (m) until it cannot or may not be lowered any
 /// more; [`Solution::stop`] says which. `observer` sees the start and every accepted step, and can end the search.
 ///
 /// The result is a function of its arguments alone, whatever the number of threads, unless time or the observer end it.

@@ -155,11 +155,6 @@ mod tests {
     use crate::mesh::shapes::{self, SplitMix};
     use crate::query::brute_force;
 
-    fn queries(count: usize, extent: f64, seed: u64) -> Vec<[f64; 3]> {
-        let mut random = SplitMix::new(seed);
-        (0..count).map(|_| std::array::from_fn(|_| extent * random.symmetric())).collect()
-    }
-
     /// A closed surface with sharp convex and concave edges: vertex and edge signs need the pseudo-normal here.
     fn spiky() -> TriMesh {
         let sphere = shapes::icosphere(0.5, 2);
@@ -179,7 +174,7 @@ mod tests {
     fn distance_equals_brute_force() {
         for mesh in [spiky(), shapes::tube(0.3, 0.8, 14, 9), shapes::irregular_grid(1.0, 1.0, 9, 9, 0.4, 3)] {
             let closest = ClosestPoint::new(mesh.positions().to_vec(), mesh.faces());
-            for p in queries(300, 1.0, 7) {
+            for p in SplitMix::new(7).points(300, 1.0) {
                 let found = closest.project(p).unwrap();
                 let expected = brute_force::distance_to_surface(mesh.positions(), mesh.faces(), p);
                 assert!((found.distance_squared.sqrt() - expected).abs() < 1e-12);
@@ -199,7 +194,7 @@ mod tests {
         let mesh = spiky();
         let closest = ClosestPoint::new(mesh.positions().to_vec(), mesh.faces());
         let mut inside_count = 0;
-        for p in queries(2000, 0.9, 4) {
+        for p in SplitMix::new(4).points(2000, 0.9) {
             let found = closest.project(p).unwrap();
             let inside = brute_force::winding_number(mesh.positions(), mesh.faces(), p) > 0.5;
             let below = vec3::dot(vec3::sub(p, found.position), found.normal) < 0.0;

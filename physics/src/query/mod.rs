@@ -4,6 +4,7 @@
 pub mod brute_force;
 mod closest_point;
 mod closest_vertex;
+pub mod grid_oracle;
 mod pseudo_normal;
 mod ray_intersections;
 mod surface;

@@ -171,19 +171,9 @@ mod tests {
 
     #[test]
     fn they_give_the_winding_number() {
-        // Three balls, each in each other, and a small one wholly inside.
-        let ball = |radius, by| at(shapes::icosphere(radius, 3), by);
-        let parts = [
-            ball(0.5, [0.0; 3]),
-            ball(0.4, [0.4, 0.05, 0.02]),
-            ball(0.3, [0.1, 0.5, 0.1]),
-            ball(0.1, [0.1; 3]),
-        ];
-        let mesh = shapes::union(&parts.each_ref());
+        let mesh = shapes::overlapping_balls();
         let rays = rays(&mesh);
-        let (mut random, mut seen) = (SplitMix::new(3), [0; 4]);
-        let points: Vec<[f64; 3]> =
-            (0..500).map(|_| std::array::from_fn(|_| 0.9 * random.symmetric())).collect();
+        let (points, mut seen) = (SplitMix::new(3).points(500, 0.9), [0; 4]);
         // Few random points lie in three balls at once.
         for p in points.into_iter().chain([[0.1; 3], [0.12, 0.09, 0.1]]) {
             let expected = brute_force::winding_number(mesh.positions(), mesh.faces(), p).round() as i32;

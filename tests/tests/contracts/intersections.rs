@@ -13,17 +13,16 @@ use clothcombo_physics::contact::{
 };
 use clothcombo_physics::mesh::TriMesh;
 use clothcombo_physics::query::Distance;
+use clothcombo_physics::query::grid_oracle::{self, GridPoint};
 use rayon::prelude::*;
 use std::path::Path;
 
 const GRID: f64 = (1u32 << 20) as f64;
 
-type Point = [i128; 3];
-
 /// A mesh on the grid, as numbers and as integers.
 struct Snapped {
     mesh: TriMesh,
-    points: Vec<Point>,
+    points: Vec<GridPoint>,
     /// Smallest and largest coordinates of every face.
     boxes: Vec<[[i32; 3]; 2]>,
 }
@@ -50,7 +49,7 @@ impl Snapped {
         }
     }
 
-    fn triangle(&self, face: usize) -> [Point; 3] {
+    fn triangle(&self, face: usize) -> [GridPoint; 3] {
         self.mesh.faces()[face].map(|v| self.points[v as usize])
     }
 
@@ -59,74 +58,13 @@ impl Snapped {
     }
 }
 
-fn sub(a: Point, b: Point) -> Point {
-    std::array::from_fn(|k| a[k] - b[k])
-}
-
-fn dot(a: Point, b: Point) -> i128 {
-    (0..3).map(|k| a[k] * b[k]).sum()
-}
-
-fn cross(a: Point, b: Point) -> Point {
-    std::array::from_fn(|k| a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3])
-}
-
-fn normal(t: &[Point; 3]) -> Point {
-    cross(sub(t[1], t[0]), sub(t[2], t[0]))
-}
-
-/// Whether a triangle or segment `a` and a triangle `b` share a point: no axis that could separate them does. Coordinates
-/// below 2²² keep every product below 2¹²⁰.
-fn meet(a: &[Point], b: &[Point; 3]) -> bool {
-    let edges =
-        |p: &[Point]| -> Vec<Point> { (0..p.len()).map(|i| sub(p[(i + 1) % p.len()], p[i])).collect() };
-    let mut axes = vec![normal(b)];
-    if let Ok(a) = <&[Point; 3]>::try_from(a) {
-        axes.push(normal(a));
-    }
-    for e in edges(a) {
-        axes.extend(edges(b).into_iter().map(|f| cross(e, f)));
-        axes.push(cross(normal(b), e));
-    }
-    axes.extend(edges(b).into_iter().map(|f| cross(normal(b), f)));
-    axes.iter().filter(|axis| **axis != [0; 3]).all(|&axis| {
-        let range = |points: &[Point]| {
-            let along = || points.iter().map(|&p| dot(axis, p));
-            (along().min().unwrap(), along().max().unwrap())
-        };
-        let ((a_low, a_high), (b_low, b_high)) = (range(a), range(b));
-        a_low <= b_high && b_low <= a_high
-    })
-}
-
-fn strangers_meet(a: &[Point; 3], b: &[Point; 3]) -> bool {
-    normal(a) != [0; 3] && normal(b) != [0; 3] && meet(a, b)
-}
-
-/// Two faces of one mesh, beyond the vertices they share.
+/// Two faces of one mesh. From a common corner through any other common point, a ray leaves one of the triangles first, by the
+/// edge opposite to the corner, and is then still in the other one.
 fn neighbours_meet(mesh: &Snapped, i: usize, j: usize) -> bool {
-    let (fa, fb) = (mesh.mesh.faces()[i], mesh.mesh.faces()[j]);
-    let (a, b) = (mesh.triangle(i), mesh.triangle(j));
-    if normal(&a) == [0; 3] || normal(&b) == [0; 3] {
-        return false;
-    }
-    let common: Vec<u32> = fa.iter().copied().filter(|v| fb.contains(v)).collect();
-    let others = |face: [u32; 3]| -> Vec<Point> {
-        face.iter().filter(|v| !common.contains(v)).map(|&v| mesh.points[v as usize]).collect()
-    };
-    match common[..] {
-        [] => meet(&a, &b),
-        // From the common corner through any other common point, a ray leaves one of the triangles first, by the edge
-        // opposite to the corner, and is then still in the other one.
-        [_] => meet(&others(fa), &b) || meet(&others(fb), &a),
-        [u, v] => {
-            let (u, v) = (mesh.points[u as usize], mesh.points[v as usize]);
-            let of = |p: Point| cross(sub(v, u), sub(p, u));
-            let (n, m) = (of(others(fa)[0]), of(others(fb)[0]));
-            cross(n, m) == [0; 3] && dot(n, m) > 0
-        }
-        _ => true,
-    }
+    let faces = [i, j].map(|face| mesh.mesh.faces()[face]);
+    grid_oracle::mesh_triangles_intersect(&mesh.points, faces, |a, b| {
+        grid_oracle::meet(&a[1..], b) || grid_oracle::meet(&b[1..], a)
+    })
 }
 
 fn boxes_meet(a: &[[i32; 3]; 2], b: &[[i32; 3]; 2]) -> bool {
@@ -157,7 +95,7 @@ fn brute_force(
 }
 
 fn pairs_between(a: &Snapped, b: &Snapped) -> Vec<(u32, u32)> {
-    let oracle = |i, j| strangers_meet(&a.triangle(i), &b.triangle(j));
+    let oracle = |i, j| grid_oracle::triangles_intersect(&a.triangle(i), &b.triangle(j));
     brute_force(a, b, |_| 0, oracle, |i, j| triangles_intersect(&a.mesh.corners(i), &b.mesh.corners(j)))
 }
 

@@ -57,7 +57,7 @@ impl<'a> Body<'a> {
         }
     }
 
-    /// How far every vertex gives way [m].
+    /// How far every vertex gives way (m).
     pub fn steps(&self) -> Vec<f64> {
         let none = || vec![0.0; self.drawn.surface.positions.len()];
         self.relief.map_or_else(none, |relief| relief.steps.clone())

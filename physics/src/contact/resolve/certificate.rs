@@ -24,11 +24,11 @@ pub struct Certificate {
     pub layer_triangle_pairs: usize,
     /// Pairs of triangles of one garment that share more than their common vertices.
     pub self_triangle_pairs: usize,
-    /// Length of the curves in which all those pairs cross [mm].
+    /// Length of the curves in which all those pairs cross (mm).
     pub contour_length_mm: f64,
-    /// Depth of the deepest vertex under the body's surface or under an inner garment [mm]; 0 when there is none.
+    /// Depth of the deepest vertex under the body's surface or under an inner garment (mm); 0 when there is none.
     pub max_depth_mm: f64,
-    /// Mean depth of the vertices that lie under one [mm].
+    /// Mean depth of the vertices that lie under one (mm).
     pub mean_depth_mm: f64,
     /// Vertices inside the body.
     pub vertices_inside: usize,
@@ -76,7 +76,7 @@ pub struct GarmentCertificate {
     pub layer_triangle_pairs: usize,
     /// Pairs with itself.
     pub self_triangle_pairs: usize,
-    /// Strain energy [J].
+    /// Strain energy (J).
     pub strain_joule: f64,
 }
 
@@ -261,7 +261,7 @@ impl Certificate {
         self.remaining.iter().filter(move |pair| !known.contains(pair))
     }
 
-    /// Strain energy of all garments [J].
+    /// Strain energy of all garments (J).
     pub(super) fn strain_joule(&self) -> f64 {
         self.garments.iter().map(|g| g.strain_joule).sum()
     }
@@ -281,12 +281,12 @@ impl Certificate {
     }
 }
 
-/// Strain energy of all garments [J].
+/// Strain energy of all garments (J).
 pub(super) fn strain_joule(layers: &[Layer<'_>]) -> f64 {
     layers.iter().map(|l| l.garment.strain_energy(l.positions)).sum()
 }
 
-/// Less strain energy than this [J] is rounding of a garment in its rest shape.
+/// Less strain energy than this (J) is rounding of a garment in its rest shape.
 const NO_STRAIN: f64 = 1e-9;
 /// A rise of the strain energy, as a share, from which cloth is torn.
 const TEAR: f64 = 0.5;

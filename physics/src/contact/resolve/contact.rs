@@ -11,7 +11,7 @@ pub(super) struct Plane {
     pub normal: [f64; 3],
     /// Where the surface is.
     pub offset: f64,
-    /// Signed distance of the point that asked [m].
+    /// Signed distance of the point that asked (m).
     pub distance: f64,
     /// Whether it may be violated without being a defect: it only keeps what is there.
     pub is_held: bool,
@@ -115,7 +115,7 @@ pub(super) struct Overlap {
     pub at_upper: [f64; 3],
     /// Its place in the lower triangle, straight below or above along the normal.
     pub at_lower: [f64; 3],
-    /// Height over the lower triangle, negative below [m].
+    /// Height over the lower triangle, negative below (m).
     pub height: f64,
 }
 

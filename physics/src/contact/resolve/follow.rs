@@ -25,7 +25,7 @@ use crate::transform::Transform;
 const STRAINED: f64 = 0.25;
 
 /// As [`super::resolve`], with a second way out, and for garments of which it is known where they are `skinned` alone,
-/// `[V, 3]` each [m]: what only the drape folds is laid out first. Where crossings of `layers` on `body` cannot be mended, the
+/// `[V, 3]` each (m): what only the drape folds is laid out first. Where crossings of `layers` on `body` cannot be mended, the
 /// garments are taken along from the stage at 0, the T-pose, to the stage at 1, on `body`; what `layers` differ by from the
 /// drape there is added along the way. Where that leaves crossings, they are taken once more with drapes that are taken back
 /// towards the skinned garments around them. Where crossings are left then and anything was laid out, all of it is tried with

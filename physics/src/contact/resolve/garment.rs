@@ -8,7 +8,7 @@ use crate::query::Surface;
 use crate::rows::{CompressedRows, faces_at_vertices};
 use crate::vec3::{self, norm, sub};
 
-/// Positions farther from the origin than this are refused [m]: the exact predicates would hold, but no distance would.
+/// Positions farther from the origin than this are refused (m): the exact predicates would hold, but no distance would.
 const FARTHEST: f64 = 1e3;
 
 /// Everything about a garment that its positions do not change: made once, used for every frame and body.
@@ -16,7 +16,7 @@ const FARTHEST: f64 = 1e3;
 pub struct RestGarment {
     pub(super) faces: Vec<[u32; 3]>,
     pub(super) topology: Topology,
-    /// Lengths of the topology's edges [m].
+    /// Lengths of the topology's edges (m).
     pub(super) edge_lengths: Vec<f64>,
     /// For every face, the topology's edges between its corners k and k+1.
     pub(super) edges_of_faces: Vec<[u32; 3]>,
@@ -60,7 +60,7 @@ impl RestGarment {
         self.faces_at.row(v as usize)
     }
 
-    /// Strain energy at `positions` `[V, 3]` [J], of the default material.
+    /// Strain energy at `positions` `[V, 3]` (J), of the default material.
     ///
     /// # Panics
     /// When there are fewer positions than vertices.
@@ -74,7 +74,7 @@ impl RestGarment {
 pub struct Layer<'a> {
     /// Its constants.
     pub garment: &'a RestGarment,
-    /// Where it is, `[V, 3]` [m].
+    /// Where it is, `[V, 3]` (m).
     pub positions: &'a [[f64; 3]],
 }
 

@@ -7,13 +7,13 @@ use crate::query::{ClosestPoint, FaceSide, Surface, SurfacePoint, UnionDistance}
 use crate::vec3::{add, add_scaled, dot, scale, sub};
 use std::sync::OnceLock;
 
-/// Below this distance [m] the direction from the closest point is rounding.
+/// Below this distance (m) the direction from the closest point is rounding.
 const CONTACT: f64 = 1e-9;
 
 /// What a point knows of the body.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BodyView {
-    /// Distance to the nearest exposed face, without sign [m].
+    /// Distance to the nearest exposed face, without sign (m).
     pub far: f64,
     /// The half-space it must stay in; `None` in a pinched region.
     pub plane: Option<Plane>,
@@ -120,7 +120,7 @@ impl<'a> BodyObstacle<'a> {
 }
 
 impl BodyObstacle<'_> {
-    /// The half-space a point inside the body has to reach by `way` (unit), at most `reach` [m] along it: that of the first
+    /// The half-space a point inside the body has to reach by `way` (unit), at most `reach` (m) along it: that of the first
     /// surface there. `None` where there is none, or where it is pinched.
     pub fn exit(&self, p: [f64; 3], way: [f64; 3], reach: f64) -> Option<Plane> {
         let end = add_scaled(p, reach, way);

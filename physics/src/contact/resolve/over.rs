@@ -32,7 +32,7 @@ pub(super) struct Over {
     pub face: [u32; 3],
     pub barycentric: [f64; 3],
     pub normal: [f64; 3],
-    /// Height over the sheet along `normal`, negative below [m].
+    /// Height over the sheet along `normal`, negative below (m).
     pub height: f64,
 }
 

@@ -41,9 +41,8 @@ pub(super) fn relax(
     shape: &[[f64; 3]],
     region: &[u32],
     contacts: &[Contact],
-    sweeps: usize,
     stretch: f64,
-    last: LastPasses,
+    (sweeps, last): (usize, LastPasses),
 ) {
     let mut may_move = vec![false; positions.len()];
     region.iter().for_each(|&v| may_move[v as usize] = true);

@@ -9,7 +9,7 @@ use crate::vec3;
 /// Garments that were resolved.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Resolved {
-    /// New positions of every garment, `[V, 3]` [m], in the order given.
+    /// New positions of every garment, `[V, 3]` (m), in the order given.
     pub positions: Vec<Vec<[f64; 3]>>,
     /// What is left.
     pub certificate: Certificate,
@@ -31,7 +31,7 @@ pub struct GarmentWork {
     pub rounds: usize,
     /// Vertices that moved.
     pub moved: usize,
-    /// The largest move [m].
+    /// The largest move (m).
     pub largest_move: f64,
     /// Its share, by vertices, of the wall time for all garments together.
     pub time: Duration,

@@ -10,7 +10,7 @@ use super::{Layer, Waypoint};
 use crate::query::VertexIndex;
 use crate::vec3::{add_scaled, sub};
 
-/// Within this distance of a crossing [m], in the T-pose, a drape is taken back wholly…
+/// Within this distance of a crossing (m), in the T-pose, a drape is taken back wholly…
 const REACH: f64 = 0.1;
 /// …and beyond this one not at all.
 const END: f64 = 3.0 * REACH;
@@ -56,11 +56,9 @@ mod tests {
     use super::*;
     use crate::mesh::{TriMesh, shapes};
     use crate::query::Surface;
-    use crate::transform::Transform;
+    use crate::transform::IDENTITY;
     use crate::vec3::{add, norm};
     use std::sync::Arc;
-
-    const IDENTITY: Transform = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
 
     /// A sheet of 1.2 m in the plane y = `height`.
     fn sheet(height: f64) -> TriMesh {

@@ -26,7 +26,7 @@ const GOOD_STEPS: usize = 4;
 const KEPT: f64 = 0.95;
 /// …and the share of the way from which on a step is long: shorter ones keep more.
 const FADING: f64 = 1.0 / 16.0;
-/// How much more the body may give way, or less, on a whole way [m]: about as fast as limbs move.
+/// How much more the body may give way, or less, on a whole way (m): about as fast as limbs move.
 const GIVING_WAY: f64 = 0.5;
 /// Crossings of garments with themselves may become more by this share, and by so many, in a short step.
 const OWN: (f64, usize) = (0.125, 4);
@@ -45,7 +45,7 @@ pub(super) struct Way<'a, 'b> {
 /// Somewhere on the way.
 struct Place {
     reached: Reached,
-    /// How far the body gave way there, per vertex [m]; none where that is not known.
+    /// How far the body gave way there, per vertex (m); none where that is not known.
     gave_way: Option<Vec<f64>>,
     /// Crossings of garments with themselves; none where they were not counted.
     own: Option<usize>,
@@ -78,7 +78,7 @@ impl Place {
 /// What is at a stage when all was done there.
 struct Arrived {
     untangled: Untangled,
-    /// How far the body gave way, per vertex [m].
+    /// How far the body gave way, per vertex (m).
     gave_way: Vec<f64>,
 }
 

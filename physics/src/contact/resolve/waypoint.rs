@@ -10,7 +10,7 @@ use crate::transform::Transform;
 pub struct Waypoint {
     /// The body.
     pub body: Arc<Surface<f64>>,
-    /// The drape on it, `[V, 3]` per garment [m].
+    /// The drape on it, `[V, 3]` per garment (m).
     pub draped: Vec<Vec<[f64; 3]>>,
     /// What that began from: the garments as skinning alone puts them.
     pub skinned: Vec<Vec<[f64; 3]>>,
@@ -20,7 +20,7 @@ pub struct Waypoint {
 
 /// Garments that are resolved, as far as they could be: where a way starts.
 pub struct Reached {
-    /// Their drape before that, `[V, 3]` each [m].
+    /// Their drape before that, `[V, 3]` each (m).
     pub draped: Vec<Vec<[f64; 3]>>,
     /// Where they are now.
     pub positions: Vec<Vec<[f64; 3]>>,

@@ -164,7 +164,7 @@ impl InnerCloth {
     }
 }
 
-/// `f`, `f′` and `6(ε − d)` at the signed distance `d`, with margin `epsilon`, faded out at −`depth` [m].
+/// `f`, `f′` and `6(ε − d)` at the signed distance `d`, with margin `epsilon`, faded out at −`depth` (m).
 fn penalty(d: f64, epsilon: f64, depth: f64) -> [f64; 3] {
     let excess = epsilon - d;
     if excess <= 0.0 || d <= -depth {

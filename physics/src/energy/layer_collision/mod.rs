@@ -44,12 +44,12 @@ impl InnerLayer {
         self.vertices.faces()
     }
 
-    /// Median edge of the rest shape [m].
+    /// Median edge of the rest shape (m).
     pub(crate) fn median_edge(&self) -> f64 {
         self.vertices.median_edge()
     }
 
-    /// Prepares the garment at `positions` `[V, 3]` [m] for queries.
+    /// Prepares the garment at `positions` `[V, 3]` (m) for queries.
     pub fn posed<T: Real>(&self, positions: &[[T; 3]], contact: LayerContact) -> PosedInnerLayer<T> {
         match contact {
             LayerContact::NearestVertex => PosedInnerLayer::Vertices(self.vertices.posed(positions)),
@@ -60,7 +60,7 @@ impl InnerLayer {
         }
     }
 
-    /// Penalty [m³] of the vertices of `outer` against this garment at `inner` (both `[V, 3]` [m]); adds its weighted gradient to
+    /// Penalty (m³) of the vertices of `outer` against this garment at `inner` (both `[V, 3]` (m)); adds its weighted gradient to
     /// `targets`, the inner garment's first.
     pub fn evaluate<T: Real>(
         &self,
@@ -79,7 +79,7 @@ impl InnerLayer {
     }
 
     /// The outer vertices that are nearer than the gate, with the corners of the inner faces that they are nearest to, and their penalty
-    /// [m³]; none by the nearest vertex.
+    /// (m³); none by the nearest vertex.
     pub(super) fn touches<T: Real>(
         &self,
         posed: &PosedInnerLayer<T>,

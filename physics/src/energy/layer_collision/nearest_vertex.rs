@@ -33,7 +33,7 @@ pub const COLLAPSE_FLOOR: f64 = 1e-6;
 pub struct InnerVertices {
     faces: Arc<[[u32; 3]]>,
     corners_at: CompressedRows<u32>,
-    /// τ² per vertex [m⁴].
+    /// τ² per vertex (m⁴).
     collapse_squared: Vec<f64>,
     median_edge: f64,
 }
@@ -42,7 +42,7 @@ pub struct InnerVertices {
 #[derive(Debug)]
 pub struct PosedVertices<T: Real> {
     index: VertexIndex<T>,
-    /// `N`, the sum of the faces' cross products [m²].
+    /// `N`, the sum of the faces' cross products (m²).
     area_normals: Vec<[f64; 3]>,
 }
 
@@ -69,7 +69,7 @@ impl InnerVertices {
         Self { faces, corners_at, collapse_squared, median_edge }
     }
 
-    /// Median edge of the rest shape [m].
+    /// Median edge of the rest shape (m).
     pub(super) fn median_edge(&self) -> f64 {
         self.median_edge
     }

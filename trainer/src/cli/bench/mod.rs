@@ -5,7 +5,6 @@ pub mod certificate;
 pub mod distance;
 pub mod error;
 pub mod growth;
-pub mod operators;
 pub mod poses;
 pub mod stability;
 pub mod step;
@@ -33,8 +32,6 @@ pub enum Bench {
     Tradeoff(tradeoff::Arguments),
     /// How time and memory of a training step grow with vertices, layers, width and eigenpairs
     Growth(growth::Arguments),
-    /// What preparing a garment for DiffusionNet costs, and how exact its eigenpairs are
-    Operators(operators::Arguments),
     /// Self-intersections of posed bodies, their share and the cost of finding them
     Poses(poses::Arguments),
 }
@@ -53,7 +50,6 @@ pub fn run(bench: &Bench) -> Result<(), Report> {
         Bench::Step(arguments) => step::run(arguments),
         Bench::Tradeoff(arguments) => tradeoff::run(arguments),
         Bench::Growth(arguments) => growth::run(arguments),
-        Bench::Operators(arguments) => operators::run(arguments),
         Bench::Poses(arguments) => poses::run(arguments),
     }
 }

@@ -4,11 +4,10 @@ use super::*;
 use crate::contact::TriangleTree;
 use crate::mesh::TriMesh;
 use crate::mesh::shapes;
+use crate::transform::IDENTITY;
 use crate::vec3::{add, norm};
 use std::sync::Arc;
 use std::time::Duration;
-
-const IDENTITY: Transform = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
 
 /// A knee that rises through a sheet that does not know of it: half a metre long at `size` 0.5, in the plane y = 0.
 fn rising(size: f64) -> (TriMesh, impl Fn(f64) -> Result<Waypoint, ResolveError>) {

@@ -11,9 +11,9 @@ const SWEEPS: usize = 100;
 /// …and its over-relaxation.
 const OVER: f64 = 1.7;
 
-/// How far around crossings cloth is laid out [m]: farther where some are left.
+/// How far around crossings cloth is laid out (m): farther where some are left.
 const REACH: [f64; 3] = [0.03, 0.06, 0.12];
-/// Crossings so near to those of the skinned garment, and to others where the body is pinched, are left [m]: in a closed crease
+/// Crossings so near to those of the skinned garment, and to others where the body is pinched, are left (m): in a closed crease
 /// skinning folds cloth as well, and is of no help.
 const CREASE: f64 = 0.06;
 /// A place is laid out if at most this share of its crossings is left.
@@ -57,7 +57,7 @@ struct Cloth<'a> {
     skinned: &'a [[f64; 3]],
     /// Vertices in a closed crease: they are left, since skinning folds the garment there as well.
     is_in_crease: Vec<bool>,
-    /// Strain energy of the drape [J].
+    /// Strain energy of the drape (J).
     energy: f64,
     /// Crossings of the drape outside of creases…
     found: Vec<(u32, u32)>,
@@ -120,7 +120,7 @@ impl<'a> Cloth<'a> {
         pairs
     }
 
-    /// Lays out what is left within `reach` [m] of crossings.
+    /// Lays out what is left within `reach` (m) of crossings.
     fn lay_out(&mut self, reach: f64) {
         self.seeds.extend(corners(&self.left, self.faces()));
         let around = self.outfit.neighbourhood(&self.seeds, rings(self.outfit, reach));
@@ -186,7 +186,7 @@ fn take(positions: &mut [[f64; 3]], place: &[u32], from: &[[f64; 3]]) {
     place.iter().for_each(|&v| positions[v as usize] = from[v as usize]);
 }
 
-/// Rings of neighbours that reach about so far [m] in the lone garment of `outfit`.
+/// Rings of neighbours that reach about so far (m) in the lone garment of `outfit`.
 fn rings(outfit: &Outfit<'_>, reach: f64) -> usize {
     let lengths = &outfit.layers[0].garment.edge_lengths;
     let mean = lengths.iter().sum::<f64>() / lengths.len() as f64;

@@ -16,7 +16,7 @@ use super::{Layer, ResolveSettings};
 use crate::query::triangle_tree::{KeptTree, TriangleTree};
 use crate::vec3::dot;
 
-/// A half-space is remembered for a vertex that is nearer to it than this [m], or too close: smoothing may carry it there.
+/// A half-space is remembered for a vertex that is nearer to it than this (m), or too close: smoothing may carry it there.
 const WATCH: f64 = 0.01;
 /// Rounds without progress after which an outfit is left as it is.
 const PATIENCE: usize = 8;
@@ -39,7 +39,7 @@ pub(super) struct Untangling<'a> {
     /// The shape that displacements are measured from: the input, with its crumples smoothed.
     shape: Vec<[f64; 3]>,
     pub positions: Vec<[f64; 3]>,
-    /// Distance of every vertex to the body's exposed surface, without sign [m].
+    /// Distance of every vertex to the body's exposed surface, without sign (m).
     far: Vec<f64>,
     /// What the body leaves to it; none where the body is pinched.
     planes: Vec<Option<Plane>>,
@@ -176,7 +176,7 @@ impl<'a> Untangling<'a> {
         (self.crossings.count() + wrong, wrong)
     }
 
-    /// Up to which distance half-spaces and sheets are remembered [m].
+    /// Up to which distance half-spaces and sheets are remembered (m).
     fn watch(&self) -> f64 {
         WATCH.max(self.settings.trigger * self.settings.gap)
     }

@@ -3,9 +3,7 @@ use std::sync::Arc;
 use super::*;
 use crate::mesh::shapes;
 use crate::query::Surface;
-use crate::transform::Transform;
-
-const IDENTITY: Transform = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
+use crate::transform::IDENTITY;
 
 #[test]
 fn changes_turn_with_the_skinning_and_fade() {
