@@ -6,7 +6,7 @@ use clothcombo_data::asset::{BindingSettings, Body, BodyFileSettings, Category, 
 use clothcombo_data::dataset::load_garment_folder;
 use clothcombo_data::format::{MatFile, MatValue, NpzFile, PointCache};
 use clothcombo_data::import::{
-    Cloth3dBodies, Cloth3dError, Cloth3dSettings, Summary, Thinning, import_cloth3d,
+    Cloth3dBodies, Cloth3dSettings, ImportError, Summary, Thinning, import_cloth3d,
 };
 use fixture::{files_in, fixture, no_progress, truncations};
 use std::fs;
@@ -16,7 +16,7 @@ fn body(name: &str) -> Body {
     Body::load(&fixture(&format!("cloth3d_bodies/{name}.npz")), &BodyFileSettings::default()).unwrap()
 }
 
-fn import(inputs: &[PathBuf], female: &Body, out: &Path, smooth: bool) -> Result<Summary, Cloth3dError> {
+fn import(inputs: &[PathBuf], female: &Body, out: &Path, smooth: bool) -> Result<Summary, ImportError> {
     let neutral = body("body_neutral");
     let bodies = Cloth3dBodies { target: &neutral, female: Some(female), male: None };
     let settings = Cloth3dSettings {

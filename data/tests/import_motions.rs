@@ -8,7 +8,7 @@ use clothcombo_data::dataset::load_motion_folder;
 use clothcombo_data::format::NpzFile;
 use clothcombo_data::generate::mannequin;
 use clothcombo_data::import::{
-    AmassSettings, DeepMimicSettings, Summary, Thinning, UpAxis, import_amass, import_deepmimic,
+    AmassSettings, RetargetSettings, Summary, Thinning, UpAxis, import_amass, import_deepmimic,
 };
 use fixture::{files_in, fixture, no_progress, truncations};
 use std::fs;
@@ -157,7 +157,7 @@ fn no_motion_takes_the_place_of_the_body() {
     let folder = tempfile::tempdir().unwrap();
     let body_file = folder.path().join("humanoid3d_random.npz");
     fs::write(&body_file, "the only copy").unwrap();
-    let settings = DeepMimicSettings { body_file: Some(body_file.clone()), ..DeepMimicSettings::default() };
+    let settings = RetargetSettings { body_file: Some(body_file.clone()), ..RetargetSettings::default() };
     let clip = [fixture("deepmimic/humanoid3d_random.txt")];
     let result = import_deepmimic(&clip, &mannequin(), folder.path(), &settings, &mut no_progress());
     let message = result.unwrap_err().to_string();
@@ -203,7 +203,7 @@ fn deepmimic_limbs_point_where_the_character_points_them() {
     let folder = tempfile::tempdir().unwrap();
     let body = mannequin();
     let files = ["humanoid3d_random.txt", "dog.txt", "cut.txt"].map(|f| fixture("deepmimic").join(f));
-    let settings = DeepMimicSettings { thinning: every_frame(), ..DeepMimicSettings::default() };
+    let settings = RetargetSettings { thinning: every_frame(), ..RetargetSettings::default() };
     let summary = import_deepmimic(&files, &body, folder.path(), &settings, &mut no_progress()).unwrap();
     let skipped: Vec<&str> = summary.skipped.iter().map(|(_, reason)| reason.as_str()).collect();
     assert!(skipped[0].contains("frame 0 has 8 numbers") && skipped[1].contains("EOF"), "{skipped:?}");

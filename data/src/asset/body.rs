@@ -11,12 +11,16 @@ use super::skin_weights::SparseSkinWeights;
 use clothcombo_physics::mesh::TriMesh;
 use rayon::prelude::*;
 use std::sync::Arc;
+use thiserror::Error;
 
-mod error;
 mod skinning;
 
-pub use error::BodyError;
 pub use skinning::{skin, transform, unskin};
+
+/// Why a body cannot be made or posed: its name, and the array, joint or vertex that is wrong.
+#[derive(Debug, Error)]
+#[error("{0}")]
+pub struct BodyError(String);
 
 /// Everything a body is made of; see [`Body`] for shapes and units.
 #[derive(Clone, Debug)]
@@ -113,13 +117,10 @@ impl Body {
             joint_names,
         } = parts;
         let (vertices, joints, k) = (template.len(), joint_template.len(), shape_count);
-        let check = |part, layout, found: usize, expected: usize| {
-            let body = name.clone();
-            if found == expected {
-                Ok(())
-            } else {
-                Err(BodyError::Shape { body, part, layout, found, expected })
-            }
+        let wrong = |message: String| BodyError(format!("body '{name}': {message}"));
+        let check = |part, layout, found: usize, expected: usize| match found == expected {
+            true => Ok(()),
+            false => Err(wrong(format!("{part} has {found} numbers, expected {expected} ({layout})"))),
         };
         check("the joint tree", "[J], J >= 1", parents.len(), joints.max(1))?;
         check("the list of joint names", "[J]", joint_names.len(), joints)?;
@@ -130,7 +131,7 @@ impl Body {
             check("the pose directions", "[V, 3, 9(J-1)]", p.len(), vertices * 27 * (joints - 1))?;
         }
         let finite = |part, position: Option<usize>| match position {
-            Some(index) => Err(BodyError::NonFinite { body: name.clone(), part, index }),
+            Some(index) => Err(wrong(format!("{part} holds a non-finite number at position {index}"))),
             None => Ok(()),
         };
         finite("the template", template.as_flattened().iter().position(|x| !x.is_finite()))?;
@@ -142,7 +143,9 @@ impl Body {
         }
         for (joint, parent) in parents.iter().enumerate() {
             if (joint == 0) != parent.is_none() || parent.is_some_and(|p| p >= joint) {
-                return Err(BodyError::Tree { body: name, joint, parent: *parent });
+                return Err(wrong(format!(
+                    "joint {joint} has parent {parent:?}; joint 0 must be the only root and parents must come first"
+                )));
             }
         }
         for vertex in 0..vertices {
@@ -155,7 +158,7 @@ impl Body {
             } else {
                 continue;
             };
-            return Err(BodyError::Weights { body: name, vertex, problem });
+            return Err(wrong(format!("skin weights of vertex {vertex} {problem}")));
         }
 
         // Pelvis to the origin: of the template, and of every shape direction.
@@ -174,8 +177,7 @@ impl Body {
                 row.iter_mut().zip(&pelvis_directions).for_each(|(x, p)| *x -= p);
             }
         }
-        let zero_body = TriMesh::new(template.clone(), faces.to_vec())
-            .map_err(|e| BodyError::Mesh { body: name.clone(), message: e.to_string() })?;
+        let zero_body = TriMesh::new(template.clone(), faces.to_vec()).map_err(|e| wrong(e.to_string()))?;
         Ok(Self {
             name,
             faces,
@@ -224,12 +226,15 @@ impl Body {
     /// The body of shape `beta` in T-pose; a short `beta` is continued with zeros.
     ///
     /// # Errors
-    /// [`BodyError::TooManyShapeNumbers`] if `beta` is longer than K.
+    /// [`BodyError`] if `beta` is longer than K.
     pub fn shaped(&self, beta: &[f64]) -> Result<ShapedBody, BodyError> {
         let k = self.shape_count;
         if beta.len() > k {
-            let body = self.name.clone();
-            return Err(BodyError::TooManyShapeNumbers { body, given: beta.len(), available: k });
+            return Err(BodyError(format!(
+                "{} shape numbers for body '{}', which has {k} shape components",
+                beta.len(),
+                self.name
+            )));
         }
         if beta.iter().all(|b| *b == 0.0) {
             return Ok(ShapedBody { positions: self.template.clone(), joints: self.joint_template.clone() });
@@ -293,8 +298,12 @@ impl Body {
     /// [`BodyError`] if `beta` or `pose` is longer than the body allows.
     pub fn posed(&self, beta: &[f64], pose: &Pose) -> Result<PosedBody, BodyError> {
         if pose.rotations.len() > self.joint_count() {
-            let (body, given) = (self.name.clone(), pose.rotations.len());
-            return Err(BodyError::TooManyJoints { body, given, available: self.joint_count() });
+            return Err(BodyError(format!(
+                "{} joint rotations for body '{}', which has {} joints",
+                pose.rotations.len(),
+                self.name,
+                self.joint_count()
+            )));
         }
         let ShapedBody { mut positions, joints } = self.shaped(beta)?;
         self.add_pose_correctives(&mut positions, pose);

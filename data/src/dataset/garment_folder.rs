@@ -18,62 +18,15 @@ mod write;
 pub use write::{garment_folder_files, refuse_unlisted, save_garment, save_garment_folder, save_manifest};
 
 use crate::asset::{Body, Category, Garment, Provenance};
-use crate::format::{FileError, MeshFileError, is_mesh_path, load_tri_mesh};
+use crate::format::{FileError, is_mesh_path, load_tri_mesh, toml_file};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use thiserror::Error;
 
 /// Name of the manifest in a garment folder.
 pub const MANIFEST: &str = "garments.toml";
-
-/// Why a garment folder cannot be used.
-#[derive(Debug, Error)]
-pub enum GarmentFolderError {
-    /// The folder, its manifest or a mesh cannot be read or written.
-    #[error(transparent)]
-    Io(#[from] FileError),
-    /// The manifest is not as it should be; the message shows line and column.
-    #[error("{}: {message}", path.display())]
-    Manifest {
-        /// The manifest.
-        path: PathBuf,
-        /// What the TOML reader said.
-        message: String,
-    },
-    /// A manifest entry is wrong.
-    #[error("{}: garment {entry} ('{file}'): {message}", path.display())]
-    Entry {
-        /// The manifest, or the folder without one.
-        path: PathBuf,
-        /// Number of the entry, from 1.
-        entry: usize,
-        /// Its file.
-        file: String,
-        /// What is wrong.
-        message: String,
-    },
-    /// No garment in it.
-    #[error("{}: no garments; put OBJ, PLY, STL or glTF files there, or list them in {MANIFEST}", path.display())]
-    Empty {
-        /// The folder.
-        path: PathBuf,
-    },
-    /// A folder without a list holds another garment.
-    #[error(
-        "{} is there already and would no longer be found: {MANIFEST}, which is written, lists only what is made; hint: choose another folder",
-        path.display()
-    )]
-    Unlisted {
-        /// The other garment's mesh.
-        path: PathBuf,
-    },
-    /// A mesh is unusable.
-    #[error(transparent)]
-    Mesh(#[from] MeshFileError),
-}
 
 /// A garment of a folder with its layer hint.
 #[derive(Clone, Debug)]
@@ -135,16 +88,16 @@ impl ListedGarment {
     /// Reads the mesh and tells its number of vertices.
     ///
     /// # Errors
-    /// [`MeshFileError`] naming file and line or element.
-    pub fn vertex_count(&self) -> Result<usize, MeshFileError> {
+    /// [`FileError`] naming file and line or element.
+    pub fn vertex_count(&self) -> Result<usize, FileError> {
         Ok(load_tri_mesh(&self.path)?.vertex_count())
     }
 
     /// Reads the mesh. `body` is needed for the guesses: category and the collarbone rule.
     ///
     /// # Errors
-    /// [`MeshFileError`] naming file and line or element.
-    pub fn load(&self, body: &Body) -> Result<FolderGarment, MeshFileError> {
+    /// [`FileError`] naming file and line or element.
+    pub fn load(&self, body: &Body) -> Result<FolderGarment, FileError> {
         let rest = load_tri_mesh(&self.path)?;
         let category = self.category.unwrap_or_else(|| Category::guess(&rest, body));
         let holding = self.holding.unwrap_or_else(|| Garment::needs_holding(&rest, body));
@@ -158,28 +111,26 @@ impl ListedGarment {
 /// guesses: category and the collarbone rule.
 ///
 /// # Errors
-/// [`GarmentFolderError`] naming folder, manifest entry, or mesh file and line or element.
-pub fn load_garment_folder(folder: &Path, body: &Body) -> Result<Vec<FolderGarment>, GarmentFolderError> {
+/// [`FileError`] naming folder, manifest entry, or mesh file and line or element.
+pub fn load_garment_folder(folder: &Path, body: &Body) -> Result<Vec<FolderGarment>, FileError> {
     let listed = list_garment_folder(folder)?;
-    Ok(listed.par_iter().map(|garment| garment.load(body)).collect::<Result<_, _>>()?)
+    listed.par_iter().map(|garment| garment.load(body)).collect()
 }
 
 /// Lists the garments of a folder without reading their meshes.
 ///
 /// # Errors
-/// [`GarmentFolderError`] naming folder or manifest entry.
-pub fn list_garment_folder(folder: &Path) -> Result<Vec<ListedGarment>, GarmentFolderError> {
+/// [`FileError`] naming folder or manifest entry.
+pub fn list_garment_folder(folder: &Path) -> Result<Vec<ListedGarment>, FileError> {
     let manifest_path = folder.join(MANIFEST);
     let entries = read_entries(folder)?;
     let place = if manifest_path.is_file() { manifest_path } else { folder.to_owned() };
     let mut names: HashMap<String, String> = HashMap::new();
     let mut garments = Vec::with_capacity(entries.len());
     for (number, entry) in entries.into_iter().enumerate() {
-        let wrong = |message: String| GarmentFolderError::Entry {
-            path: place.clone(),
-            entry: number + 1,
-            file: entry.file.clone(),
-            message,
+        let wrong = |message: String| {
+            let (number, file) = (number + 1, &entry.file);
+            FileError::content(&place)(format!("garment {number} ('{file}'): {message}"))
         };
         let path = folder.join(&entry.file);
         if !path.is_file() {
@@ -210,24 +161,25 @@ pub fn list_garment_folder(folder: &Path) -> Result<Vec<ListedGarment>, GarmentF
 }
 
 /// What the manifest lists or, without one, every mesh file of the folder; at least one.
-pub(crate) fn read_entries(folder: &Path) -> Result<Vec<ManifestEntry>, GarmentFolderError> {
+pub(crate) fn read_entries(folder: &Path) -> Result<Vec<ManifestEntry>, FileError> {
     let path = folder.join(MANIFEST);
-    let entries = match fs::read_to_string(&path) {
-        Ok(text) => manifest_from(&path, &text)?.garment,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => list_mesh_files(folder)?
+    let entries = match toml_file::load::<Manifest>(&path)? {
+        Some(manifest) => manifest.garment,
+        None => list_mesh_files(folder)?
             .into_iter()
             .map(|file| ManifestEntry { file, ..ManifestEntry::default() })
             .collect(),
-        Err(reason) => return Err(FileError { path, reason }.into()),
     };
     if entries.is_empty() {
-        return Err(GarmentFolderError::Empty { path: folder.into() });
+        return Err(FileError::content(folder)(format!(
+            "no garments; put OBJ, PLY, STL or glTF files there, or list them in {MANIFEST}"
+        )));
     }
     Ok(entries)
 }
 
-fn list_mesh_files(folder: &Path) -> Result<Vec<String>, GarmentFolderError> {
-    let failed = FileError::at(folder);
+fn list_mesh_files(folder: &Path) -> Result<Vec<String>, FileError> {
+    let failed = FileError::io(folder);
     let mut files = Vec::new();
     for entry in fs::read_dir(folder).map_err(&failed)? {
         let path = entry.map_err(&failed)?.path();
@@ -264,21 +216,10 @@ impl ManifestEntry {
 /// The entries of a folder's manifest; none where it has no manifest.
 ///
 /// # Errors
-/// [`GarmentFolderError`] if there is one that cannot be read.
-pub fn read_manifest(folder: &Path) -> Result<Vec<ManifestEntry>, GarmentFolderError> {
-    let path = folder.join(MANIFEST);
-    match fs::read_to_string(&path) {
-        Ok(text) => Ok(manifest_from(&path, &text)?.garment),
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(Vec::new()),
-        Err(reason) => Err(FileError { path, reason }.into()),
-    }
-}
-
-fn manifest_from(path: &Path, text: &str) -> Result<Manifest, GarmentFolderError> {
-    toml::from_str(text).map_err(|e| GarmentFolderError::Manifest {
-        path: path.into(),
-        message: e.to_string().trim_end().to_string(),
-    })
+/// [`FileError`] if there is one that cannot be read.
+pub fn read_manifest(folder: &Path) -> Result<Vec<ManifestEntry>, FileError> {
+    Ok(toml_file::load::<Manifest>(&folder.join(MANIFEST))?
+        .map_or_else(Vec::new, |manifest| manifest.garment))
 }
 
 #[cfg(test)]
@@ -344,7 +285,8 @@ mod tests {
 
         let own = folder_with(&[("shirt.obj", TRIANGLE)]);
         let refused = save_garment_folder(own.path(), &[named("a", 0.2)]).unwrap_err();
-        assert!(matches!(&refused, GarmentFolderError::Unlisted { path } if path.ends_with("shirt.obj")));
+        let refused = refused.to_string();
+        assert!(refused.contains("shirt.obj") && refused.contains("would no longer be found"), "{refused}");
         assert!(!own.path().join("a.obj").exists());
     }
 
@@ -383,8 +325,9 @@ mod tests {
         let message = load_garment_folder(folder.path(), &body).unwrap_err().to_string();
         assert!(["'tee.obj'", "'tee.ply'"].iter().all(|file| message.contains(file)), "{message}");
         let empty = folder_with(&[]);
-        assert!(matches!(load_garment_folder(empty.path(), &body), Err(GarmentFolderError::Empty { .. })));
+        let message = load_garment_folder(empty.path(), &body).unwrap_err().to_string();
+        assert!(message.contains("no garments"), "{message}");
         let missing = load_garment_folder(&empty.path().join("x"), &body).unwrap_err();
-        assert!(matches!(missing, GarmentFolderError::Io(_)));
+        assert!(missing.is_not_found());
     }
 }

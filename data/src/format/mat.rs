@@ -9,34 +9,7 @@ use super::npz::{Array, row_major_from_fortran};
 use flate2::read::ZlibDecoder;
 use std::fs;
 use std::io::Read;
-use std::path::{Path, PathBuf};
-use thiserror::Error;
-
-/// Why a MAT file cannot be used.
-#[derive(Debug, Error)]
-pub enum MatError {
-    /// The file cannot be read.
-    #[error(transparent)]
-    Io(#[from] FileError),
-    /// Not a MAT file of level 5.
-    #[error("{}: not a MAT-5 file ({reason})", path.display())]
-    NotMat5 {
-        /// The file.
-        path: PathBuf,
-        /// What it is instead, with a hint.
-        reason: String,
-    },
-    /// An element is damaged.
-    #[error("{}: {element} is damaged: {reason}", path.display())]
-    Damaged {
-        /// The file.
-        path: PathBuf,
-        /// Name of the variable, or its number.
-        element: String,
-        /// What is wrong.
-        reason: String,
-    },
-}
+use std::path::Path;
 
 /// The value of a variable, a field or a cell.
 #[derive(Clone, Debug, PartialEq)]
@@ -101,9 +74,9 @@ impl MatFile {
     /// Reads a file.
     ///
     /// # Errors
-    /// [`MatError`] naming file and variable.
-    pub fn load(path: &Path) -> Result<Self, MatError> {
-        let failed = FileError::at(path);
+    /// [`FileError`] naming file and variable.
+    pub fn load(path: &Path) -> Result<Self, FileError> {
+        let failed = FileError::io(path);
         let file = fs::File::open(path).map_err(&failed)?;
         let mut bytes = Vec::new();
         file.take(LARGEST + 1).read_to_end(&mut bytes).map_err(failed)?;
@@ -113,9 +86,10 @@ impl MatFile {
     /// Parses the bytes of a file; `path` is for messages only.
     ///
     /// # Errors
-    /// [`MatError`] naming file and variable.
-    pub fn parse(bytes: &[u8], path: &Path) -> Result<Self, MatError> {
-        let not = |reason: &str| MatError::NotMat5 { path: path.into(), reason: reason.into() };
+    /// [`FileError`] naming file and variable.
+    pub fn parse(bytes: &[u8], path: &Path) -> Result<Self, FileError> {
+        let wrong = FileError::content(path);
+        let not = |reason: &str| wrong(format!("not a MAT-5 file ({reason})"));
         if bytes.len() as u64 > LARGEST {
             return Err(not("larger than 256 MiB"));
         }
@@ -135,7 +109,7 @@ impl MatFile {
             let damaged = |(name, reason): (String, String)| {
                 let element =
                     if name.is_empty() { format!("variable {number}") } else { format!("variable '{name}'") };
-                MatError::Damaged { path: path.into(), element, reason }
+                wrong(format!("{element} is damaged: {reason}"))
             };
             let unnamed = |reason| damaged((String::new(), reason));
             let (kind, data) = rest.element().map_err(unnamed)?;

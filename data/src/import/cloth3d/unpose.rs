@@ -2,7 +2,7 @@
 
 use crate::asset::body::unskin;
 use crate::asset::rotation::{Matrix3, apply, matrix_from_axis_angle, product};
-use crate::asset::{Binding, BindingSettings, Body, BodyError, Category, Garment, Pose, Provenance};
+use crate::asset::{Binding, BindingSettings, Body, Category, Garment, Pose, Provenance};
 use crate::import::amass::Y_UP_FROM_Z_UP;
 use clothcombo_physics::TriMesh;
 
@@ -29,7 +29,7 @@ impl Unposing {
         let mut pose = Pose::t_pose(3);
         pose.rotations[1] = [0.0, 0.0, LEGS_APART];
         pose.rotations[2] = [0.0, 0.0, -LEGS_APART];
-        let posed = body.posed(shape, &pose).map_err(|e: BodyError| e.to_string())?;
+        let posed = body.posed(shape, &pose).map_err(|e| e.to_string())?;
         let mut displacement = Vec::with_capacity(3 * body.vertex_count());
         for (v, p) in posed.positions.iter().enumerate() {
             let (joints, weights) = body.skin_weights.row(v);
