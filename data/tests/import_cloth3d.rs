@@ -28,7 +28,7 @@ fn import(inputs: &[PathBuf], female: &Body, out: &Path, smooth: bool) -> Result
     import_cloth3d(inputs, &bodies, out, &settings, &mut no_progress())
 }
 
-/// Largest distance of a garment's vertices to where they lie on the zero body [m].
+/// Largest distance of a garment's vertices to where they lie on the zero body (m).
 fn deviation(positions: &[[f64; 3]], garment: &str) -> f64 {
     let mut expected = NpzFile::open(&fixture("expected_cloth3d.npz")).unwrap();
     let expected = expected.numbers(garment, "").unwrap();

@@ -110,7 +110,7 @@ fn a_wrong_up_axis_is_noticed_and_the_right_one_believed() {
     let files = [fixture("amass/CMU/02/jump_poses.npz")];
     let summary = import_amass(&files, folder.path(), &settings, &mut no_progress()).unwrap();
     assert!(summary.taken[0].1.contains("check the up axis"), "{summary:?}");
-    // Importing our own y-up motions as if they were z up is told.
+    // Importing our own y-up motions as if they were z up is reported.
     let y_up = folder.path().join("y_up.npz");
     let mut standing = Motion::load(&folder.path().join("jump.npz")).unwrap();
     standing.poses.iter_mut().for_each(|p| p.rotations[0] = [0.0, 0.3, 0.0]);

@@ -15,7 +15,7 @@ use clothcombo_physics::{Topology, TriMesh};
 pub struct GarmentResolution {
     /// Wanted number of vertices, as far as the edge length allows.
     pub vertices: usize,
-    /// Shortest and longest mean edge [m].
+    /// Shortest and longest mean edge (m).
     pub edge_length: [f64; 2],
 }
 
@@ -26,23 +26,23 @@ impl Default for GarmentResolution {
 }
 
 impl GarmentResolution {
-    /// Edge length [m] for a sheet of this area: a triangulation with edge length h has a vertex per h²·√3/2.
+    /// Edge length (m) for a sheet of this area: a triangulation with edge length h has a vertex per h²·√3/2.
     pub(super) fn edge_for(&self, area: f64) -> f64 {
         let [shortest, longest] = self.edge_length;
         (area / (self.vertices.max(3) as f64 * 0.75f64.sqrt())).sqrt().clamp(shortest, longest.max(shortest))
     }
 }
 
-/// Least distance between a garment vertex and the body at rest [m].
+/// Least distance between a garment vertex and the body at rest (m).
 const CLEARANCE: f64 = 0.004;
 
 /// Triangle limits a finished garment has to keep.
 const QUALITY: Quality = Quality { angle: 15.0, edge_ratio: [0.4, 2.5] };
 
-/// Angles below this refuse the garment [degrees]: bending and strain become singular.
+/// Angles below this refuse the garment (degrees): bending and strain become singular.
 const SLIVER: f64 = 4.0;
 
-/// A rim vertex where the rim turns by more than this is a corner and stays where it is [degrees].
+/// A rim vertex where the rim turns by more than this is a corner and stays where it is (degrees).
 const CORNER: f64 = 50.0;
 
 /// Bits from here on tell neighbouring corners of one rim apart; the ones below are the rims'.

@@ -91,7 +91,7 @@ impl Binding {
         largest
     }
 
-    /// Displacement of every garment vertex [m] for shape `beta` (a short one is continued with zeros); empty without shape
+    /// Displacement of every garment vertex (m) for shape `beta` (a short one is continued with zeros); empty without shape
     /// transfer.
     pub fn shape_displacement(&self, beta: &[f64], shape_count: usize) -> Vec<[f64; 3]> {
         if shape_count == 0 {
@@ -109,7 +109,7 @@ impl Binding {
     }
 
     /// Linear blend skinning of canonical `positions` `[V, 3]` (rest, or rest plus a displacement) by the bone transforms of
-    /// a posed body ([`Body::posed`]), `[V, 3]` [m].
+    /// a posed body ([`Body::posed`]), `[V, 3]` (m).
     pub fn skinned(&self, positions: &[[f64; 3]], bones: &[[[f64; 4]; 3]]) -> Vec<[f64; 3]> {
         let rows = self.skin_weights.chunks_exact(bones.len().max(1));
         positions
@@ -169,7 +169,7 @@ fn nearest_body_vertices(garment: &Garment, body: &Body, own_leg: bool) -> Vec<u
         .collect()
 }
 
-/// `iterations` times: every row half way towards the mean of its one-ring. Rows only mix along edges of the garment.
+/// `iterations` times: every row moves half of the distance to the mean of its one-ring. Rows only mix along edges of the garment.
 fn smooth(values: &mut Vec<f32>, columns: usize, topology: &Topology, iterations: usize) {
     let mut next = values.clone();
     for _ in 0..iterations {

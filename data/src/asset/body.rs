@@ -29,13 +29,13 @@ pub struct BodyParts {
     pub name: String,
     /// Triangles.
     pub faces: Arc<[[u32; 3]]>,
-    /// Vertices of the mean body in T-pose [m].
+    /// Vertices of the mean body in T-pose (m).
     pub template: Vec<[f64; 3]>,
     /// `[V × 3 × K]` row-major.
     pub shape_directions: Vec<f32>,
     /// K.
     pub shape_count: usize,
-    /// Joints of the mean body [m].
+    /// Joints of the mean body (m).
     pub joint_template: Vec<[f64; 3]>,
     /// `[J × 3 × K]` row-major.
     pub joint_shape_directions: Vec<f64>,
@@ -56,17 +56,17 @@ pub struct Body {
     pub name: String,
     /// Triangles.
     pub faces: Arc<[[u32; 3]]>,
-    /// Vertices of the mean ("zero") body in T-pose [m], pelvis at the origin.
+    /// Vertices of the mean ("zero") body in T-pose (m), pelvis at the origin.
     pub template: Vec<[f64; 3]>,
-    /// Displacement per unit of each shape component [m], `[V × 3 × K]` row-major.
+    /// Displacement per unit of each shape component (m), `[V × 3 × K]` row-major.
     pub shape_directions: Vec<f32>,
     /// Number of shape components K.
     pub shape_count: usize,
-    /// Joints of the zero body [m]; joint 0 is the origin.
+    /// Joints of the zero body (m); joint 0 is the origin.
     pub joint_template: Vec<[f64; 3]>,
-    /// Displacement of the joints per unit of each shape component [m], `[J × 3 × K]` row-major; zero for joint 0.
+    /// Displacement of the joints per unit of each shape component (m), `[J × 3 × K]` row-major; zero for joint 0.
     pub joint_shape_directions: Vec<f64>,
-    /// Pose-corrective displacements [m] per entry of `(R_1 … R_{J−1}) − I`, `[V × 3 × 9(J−1)]` row-major.
+    /// Pose-corrective displacements (m) per entry of `(R_1 … R_{J−1}) − I`, `[V × 3 × 9(J−1)]` row-major.
     pub pose_directions: Option<Vec<f32>>,
     /// Skin weights, sparse, each row summing to one.
     pub skin_weights: SparseSkinWeights,
@@ -77,7 +77,7 @@ pub struct Body {
     zero_body: TriMesh,
 }
 
-/// Vertices and joints of a shaped body in T-pose [m].
+/// Vertices and joints of a shaped body in T-pose (m).
 #[derive(Clone, Debug)]
 pub struct ShapedBody {
     /// Vertices.
@@ -86,7 +86,7 @@ pub struct ShapedBody {
     pub joints: Vec<[f64; 3]>,
 }
 
-/// A shaped and posed body [m].
+/// A shaped and posed body (m).
 #[derive(Clone, Debug)]
 pub struct PosedBody {
     /// Vertices.
@@ -194,7 +194,7 @@ impl Body {
         })
     }
 
-    /// The same body inside out: every face looks the other way.
+    /// The same body inside out: every face is turned over.
     pub(super) fn turned(self) -> Self {
         let zero_body = self.zero_body.turned();
         Self { faces: zero_body.faces().into(), zero_body, ..self }
@@ -359,7 +359,7 @@ impl Body {
         self.zero_body.clone()
     }
 
-    /// Height of the collarbone of the zero body [m]: the mean of the two collar joints, or, for a skeleton without them,
+    /// Height of the collarbone of the zero body (m): the mean of the two collar joints, or, for a skeleton without them,
     /// 18 % of the pelvis-to-top length below the top.
     pub fn collarbone_height(&self) -> f64 {
         let collars: Vec<f64> = ["left_collar", "right_collar"]

@@ -27,7 +27,7 @@ impl Default for BodyFileSettings {
 
 const HINT: &str = "a body is an SMPL, SMPL-H or SMPL-X npz with v_template, f, shapedirs, weights, kintree_table and J_regressor";
 
-/// What is told of a body whose faces look inwards.
+/// Warning about a body whose faces look inwards.
 pub(crate) const INSIDE_OUT: &str = "the body is inside out; its faces were turned";
 
 /// How many of SMPL-X's `shapedirs` are body shape; the rest are facial expression, which clothes do not see. Files with

@@ -9,14 +9,14 @@ use crate::format::{FileError, NpzFile, NpzWriter};
 use std::ops::RangeInclusive;
 use std::path::Path;
 
-/// Frame rates that a motion may have [frames/s]: from time lapse to high-speed cameras. Beyond them times and numbers of frames
+/// Frame rates that a motion may have (frames/s): from time lapse to high-speed cameras. Beyond them times and numbers of frames
 /// leave the range of their types.
 pub const FRAME_RATES: RangeInclusive<f64> = 0.01..=10_000.0;
 
-/// Largest component of a rotation vector in a motion [rad]: over a thousand turns, where f32 still tells a thousandth of a radian.
+/// Largest component of a rotation vector in a motion (rad): over a thousand turns, where f32 still tells a thousandth of a radian.
 pub const MAX_ANGLE: f64 = 1e4;
 
-/// Refuses a frame rate [frames/s] out of [`FRAME_RATES`].
+/// Refuses a frame rate (frames/s) out of [`FRAME_RATES`].
 pub(crate) fn check_frame_rate(rate: f64) -> Result<(), String> {
     if FRAME_RATES.contains(&rate) {
         return Ok(());

@@ -13,13 +13,13 @@ use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 use thiserror::Error;
 
-/// A mesh whose vertices are farther from the recovered body than this on average is no pose of it [m].
+/// A mesh whose vertices are farther from the recovered body than this on average is no pose of it (m).
 const FARTHEST: f64 = 0.03;
 /// Rounds over all bones.
 const ROUNDS: usize = 30;
 /// Bones have no say on vertices they carry less of than this.
 const LEAST_WEIGHT: f64 = 0.05;
-/// Weight of small shape numbers against close vertices [m²]: decides only what the vertices leave open.
+/// Weight of small shape numbers against close vertices (m²): decides only what the vertices leave open.
 const RIDGE: f64 = 1e-7;
 
 /// A body recovered from its vertices.
@@ -29,9 +29,9 @@ pub struct RecoveredBody {
     pub shape: Vec<f64>,
     /// Pose θ `[J]`.
     pub pose: Pose,
-    /// Where its pelvis stands [m].
+    /// Where its pelvis stands (m).
     pub place: [f64; 3],
-    /// Mean distance of the recovered vertices to the given ones [m].
+    /// Mean distance of the recovered vertices to the given ones (m).
     pub mean_distance: f64,
 }
 
@@ -65,13 +65,13 @@ impl Bone {
 /// What is known of the shape of a body.
 #[derive(Clone, Copy, Debug)]
 pub enum KnownShape<'a> {
-    /// The body in T-pose `[V, 3]` [m], anywhere.
+    /// The body in T-pose `[V, 3]` (m), anywhere.
     TPose(&'a [[f64; 3]]),
     /// Its shape parameters β.
     Parameters(&'a [f64]),
 }
 
-/// Recovers shape and pose from `posed` `[V, 3]` [m].
+/// Recovers shape and pose from `posed` `[V, 3]` (m).
 ///
 /// # Errors
 /// [`RecoverError`] if a mesh is not of this body's vertices, or no pose of the body.

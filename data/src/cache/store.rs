@@ -28,9 +28,9 @@ pub enum CacheError {
     Full {
         /// The folder.
         path: PathBuf,
-        /// Size of the record [MiB].
+        /// Size of the record (MiB).
         needed: u64,
-        /// The limit [MiB].
+        /// The limit (MiB).
         limit: u64,
     },
 }

@@ -5,7 +5,7 @@
 //! file = "Tank_Top_01.obj"   # relative to the folder; the only required key
 //! name = "Tank_Top_01"       # default: the file's name
 //! category = "top"           # dress | top | t_shirt | open_shirt | skirt | trousers; default: guessed from the shape
-//! layer = [1, 3]             # between which layers it is worn
+//! layer = [1, 3]             # lowest and highest layer it may be in
 //! holding = true             # default: the collarbone rule
 //! source = "…"
 //! author = "…"
@@ -33,7 +33,7 @@ pub const MANIFEST: &str = "garments.toml";
 pub struct FolderGarment {
     /// The garment.
     pub garment: Garment,
-    /// Lowest and highest layer it is worn in, if the manifest says so.
+    /// Lowest and highest layer it may be in, if the manifest says so.
     pub layer: Option<[u32; 2]>,
     /// Its mesh file.
     pub path: PathBuf,
@@ -78,7 +78,7 @@ pub struct ListedGarment {
     pub category: Option<Category>,
     /// Whether it is held, if the manifest says so.
     pub holding: Option<bool>,
-    /// Lowest and highest layer it is worn in, if the manifest says so.
+    /// Lowest and highest layer it may be in, if the manifest says so.
     pub layer: Option<[u32; 2]>,
     /// Where it comes from.
     pub source: Provenance,

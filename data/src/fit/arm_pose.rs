@@ -111,7 +111,7 @@ pub(super) mod tests {
     use crate::asset::body::skin;
     use crate::generate::{GarmentGenerator, GarmentSettings, mannequin};
 
-    /// A generated shirt skinned to lowered arms the way it would be draped.
+    /// A generated shirt skinned to lowered arms as draping does.
     pub(crate) fn lowered(garment: &Garment, body: &Body, degrees: f64) -> Vec<[f64; 3]> {
         let pose = ArmPose::new(body, degrees).pose;
         let bones = body.bone_transforms(&body.joint_template, &pose);

@@ -16,7 +16,7 @@ pub use coverage::off_trunk;
 pub use error::FitError;
 pub use placed::is_on_body;
 pub use placement::{Origin, Placement, Unit, UpAxis};
-pub use report::{BodyContact, Elements, FitReport, Piece, Repair, RepairKind};
+pub use report::{BodyContact, Elements, FitReport, MeshPiece, Repair, RepairKind};
 pub use settings::{FitSettings, MAX_VERTICES, MIN_TRIANGLES};
 pub use sitting::Sitting;
 
@@ -33,13 +33,13 @@ use clothcombo_physics::{Topology, TriMesh};
 use search::Search;
 use settings::{MOST_STRETCH, MOST_STRETCHED};
 
-/// Least distance between a fitted vertex and the body [m]: the ε of the paper's body collision loss.
+/// Least distance between a fitted vertex and the body (m): the ε of the paper's body collision loss.
 const CLEARANCE: f64 = 0.002;
 
 /// A fitted garment and how it came about.
 #[derive(Clone, Debug)]
 pub struct Fitted {
-    /// At rest on the zero body in T-pose [m]; name and source are the caller's.
+    /// At rest on the zero body in T-pose (m); name and source are the caller's.
     pub garment: Garment,
     /// What was assumed, repaired and measured.
     pub report: FitReport,
@@ -52,7 +52,7 @@ pub struct Fitted {
 struct Repaired {
     positions: Vec<[f64; 3]>,
     vertex_origin: Vec<u32>,
-    /// The other way round: see [`Fitted::vertex_of_file`].
+    /// The inverse: see [`Fitted::vertex_of_file`].
     vertex_of_file: Vec<Option<u32>>,
     faces: Vec<[u32; 3]>,
     face_origin: Vec<u32>,
@@ -278,8 +278,8 @@ fn refuse_other_things(positions: &[[f64; 3]], body: &Body, sitting: &Sitting) -
     Ok(())
 }
 
-fn pieces(mesh: &TriMesh, topology: &Topology) -> Vec<Piece> {
-    let empty = Piece { vertices: 0, triangles: 0, area: 0.0, boundary_loops: 0 };
+fn pieces(mesh: &TriMesh, topology: &Topology) -> Vec<MeshPiece> {
+    let empty = MeshPiece { vertices: 0, triangles: 0, area: 0.0, boundary_loops: 0 };
     let mut pieces = vec![empty; topology.component_count];
     let piece = |v: u32| topology.component_of_vertex[v as usize] as usize;
     topology.component_of_vertex.iter().for_each(|c| pieces[*c as usize].vertices += 1);

@@ -16,17 +16,17 @@ use clothcombo_physics::query::Distance;
 use clothcombo_physics::vec3::{add, cross, norm, scale, sub};
 use rayon::prelude::*;
 
-/// Arm angles tried first [degrees].
+/// Arm angles tried first (degrees).
 const ARM_ANGLES: [f64; 7] = [0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0];
 
-/// Costs in favour of the usual [m]: a worse fit by this much is still preferred.
+/// Costs in favour of the usual (m): a worse fit by this much is still preferred.
 const FACING_PRIOR: f64 = 0.003;
 const ARMS_PRIOR: f64 = 0.0008;
 
 /// Arms are taken for level as long as lowered ones are not better by this factor.
 const LEVEL_ARMS_PRIOR: f64 = 1.3;
 
-/// Directions around the trunk that are told apart.
+/// Number of directions around the trunk.
 const SECTORS: usize = 8;
 
 /// Sample points of a garment in the file's coordinates, evenly over its area.
@@ -66,7 +66,7 @@ pub(super) struct Search<'a> {
     trunk: Vec<[f64; 3]>,
     floor: f64,
     top: f64,
-    /// Largest extent of the body [m].
+    /// Largest extent of the body (m).
     pub reach: f64,
 }
 
@@ -96,7 +96,7 @@ impl<'a> Search<'a> {
         Self { body, arms, trunk, floor: low[1], top: high[1], reach }
     }
 
-    /// Whether a garment of this largest extent [m] can be worn on this body at all.
+    /// Whether a garment of this largest extent (m) can fit this body at all.
     pub fn is_plausible_extent(&self, extent: f64) -> bool {
         extent >= 0.07 * self.reach && extent <= 1.2 * self.reach
     }

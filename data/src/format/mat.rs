@@ -63,7 +63,7 @@ pub struct MatFile {
 }
 
 const HEADER: usize = 128;
-/// Metadata files are small; whatever decompresses to more than this is an attack or a mistake [bytes].
+/// Metadata files are small; whatever decompresses to more than this is an attack or a mistake (bytes).
 const LARGEST: u64 = 1 << 28;
 const DEEPEST: usize = 32;
 /// Codes of the data types ("mi…" in the format's description).

@@ -8,7 +8,7 @@ use clothcombo_physics::mesh::TriMesh;
 use std::path::Path;
 use std::{fs, io};
 
-/// Largest mesh file that is read [bytes]. A garment of 50,000 vertices takes about 5 MB as text.
+/// Largest mesh file that is read (bytes). A garment of 50,000 vertices takes about 5 MB as text.
 pub const MAX_FILE_BYTES: u64 = 256 << 20;
 
 /// Most vertices, and most polygons, a mesh file may hold. Scans have fewer; a network sees some thousand.

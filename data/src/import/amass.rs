@@ -3,7 +3,7 @@
 //! Mahmood et al., "AMASS: Archive of Motion Capture as Surface Shapes", 2019. The first 66 numbers of a row of `poses` are
 //! the root and the 21 body joints in either layout; hands, jaw, eyes, soft tissue, shape and translation are left out, because
 //! clothes are draped about the pelvis of a body of their own. The world's z axis is up there; the turn to y up goes into
-//! the root. The heading stays in the root, as in every motion file here; whoever draws poses removes it.
+//! the root. The heading stays in the root, as in every motion file here; whoever samples poses removes it.
 
 use super::motions::{Clip, NamedFile, named, stem, write_motions};
 use super::summary::{ImportError, Progress, Summary};
@@ -198,7 +198,7 @@ fn looks_y_up(poses: &[Pose]) -> bool {
     along_z(poses) < -0.7
 }
 
-/// Text or bytes, also the way Python prints bytes; empty if it is not there or something else.
+/// Text or bytes, also as Python prints bytes; empty if it is not there or something else.
 fn gender(file: &mut NpzFile) -> String {
     let text = file.text("gender").ok().flatten().unwrap_or_default();
     let text = text.strip_prefix("b'").and_then(|t| t.strip_suffix('\'')).unwrap_or(&text);

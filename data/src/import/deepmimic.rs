@@ -1,6 +1,6 @@
 //! DeepMimic motion text (`humanoid3d_*.txt`), retargeted to the 22 SMPL body joints.
 //!
-//! Peng et al., "DeepMimic", 2018. JSON with `Frames`, rows of 44: duration [s], root position, root rotation, then the joints of
+//! Peng et al., "DeepMimic", 2018. JSON with `Frames`, rows of 44: duration (s), root position, root rotation, then the joints of
 //! `ROW` relative to their parents: quaternions `w x y z`, and angles about z for knees and elbows. The character stands in y
 //! up, faces +x with its left towards −z, and rests with hanging arms.
 
@@ -47,7 +47,7 @@ const NECK: usize = 15;
 const WRISTS: [usize; 2] = [16, 17];
 const JOINTS: usize = 18;
 
-/// The character's joints at rest [m], in its own frame; only the limbs' directions matter.
+/// The character's joints at rest (m), in its own frame; only the limbs' directions matter.
 fn rest_positions() -> [[f64; 3]; JOINTS] {
     const SHOULDER: [f64; 3] = [-0.024, 0.4797, 0.1831];
     let mut rest = [[0.0; 3]; JOINTS];

@@ -125,7 +125,7 @@ impl LabelledTriangles {
         result
     }
 
-    /// Surface area [m²].
+    /// Surface area (m²).
     pub fn area(&self) -> f64 {
         self.faces
             .iter()

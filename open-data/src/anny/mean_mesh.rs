@@ -19,9 +19,9 @@ pub struct BaseModel {
     pub mesh: ObjMesh,
     /// Joints and weights.
     pub rig: Rig,
-    /// All base-mesh vertices of the mean person in T-pose [m], pelvis at the origin.
+    /// All base-mesh vertices of the mean person in T-pose (m), pelvis at the origin.
     pub mean_positions: Vec<[f64; 3]>,
-    /// What was measured on the way.
+    /// What was measured while learning.
     pub notes: Vec<String>,
     components: Components,
 }

@@ -29,7 +29,7 @@ pub fn provenance() -> Provenance {
     }
 }
 
-/// All base-mesh vertices and the 55 joints of one person in T-pose [m], pelvis at the origin: what the body model is learned
+/// All base-mesh vertices and the 55 joints of one person in T-pose (m), pelvis at the origin: what the body model is learned
 /// from, for comparison with other implementations.
 ///
 /// # Errors

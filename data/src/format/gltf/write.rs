@@ -22,7 +22,7 @@ pub struct SceneMesh<'a> {
     pub colour: [u8; 3],
     /// Triangles `[F, 3]`.
     pub faces: &'a [[u32; 3]],
-    /// Positions `[V, 3]` [m] of every frame, at least one.
+    /// Positions `[V, 3]` (m) of every frame, at least one.
     pub frames: Vec<&'a [[f64; 3]]>,
 }
 
@@ -35,7 +35,7 @@ pub fn save_glb(path: &Path, meshes: &[SceneMesh], times: &[f64]) -> Result<(), 
     atomic::write(path, &bytes).map_err(FileError::io(path))
 }
 
-/// The bytes of a `.glb`. `times` [s], ascending, are those of the frames; a single frame needs none.
+/// The bytes of a `.glb`. `times` (s), ascending, are those of the frames; a single frame needs none.
 ///
 /// # Errors
 /// The mesh that does not fit, and why.

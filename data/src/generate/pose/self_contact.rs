@@ -19,7 +19,7 @@ pub struct SelfContact {
     parts: Vec<Part>,
     /// Pairs of parts that are far enough apart on the skeleton.
     pairs: Vec<[usize; 2]>,
-    /// What the body crosses itself at rest [m].
+    /// What the body crosses itself at rest (m).
     rest: f64,
 }
 
@@ -62,7 +62,7 @@ impl SelfContact {
         contact
     }
 
-    /// Length [m] of the curves in which far-apart parts of the body run through each other at `positions` (its vertices),
+    /// Length (m) of the curves in which far-apart parts of the body run through each other at `positions` (its vertices),
     /// beyond what they do at rest. Triangles are tested exactly; 0 if nothing touches. Does not depend on how fine the
     /// body's mesh is: a hand through a thigh is about 0.3 m, a forearm through the trunk 0.5 m.
     pub fn contour_length(&self, positions: &[[f64; 3]]) -> f64 {

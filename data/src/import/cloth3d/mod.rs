@@ -57,10 +57,10 @@ impl Default for Cloth3dSettings {
     }
 }
 
-/// Of the simulations [frames/s].
+/// Of the simulations (frames/s).
 const FRAME_RATE: f64 = 30.0;
 
-struct Sample {
+struct SampleFolder {
     name: String,
     folder: PathBuf,
 }
@@ -165,7 +165,7 @@ fn has_smpl_shape(body: &Body) -> bool {
     matches!(body.joint_count(), 24 | 52)
 }
 
-fn find_samples(inputs: &[PathBuf]) -> Result<Vec<Sample>, FileError> {
+fn find_samples(inputs: &[PathBuf]) -> Result<Vec<SampleFolder>, FileError> {
     let mut folders = Vec::new();
     for input in inputs {
         if input.join("info.mat").is_file() {
@@ -188,12 +188,12 @@ fn find_samples(inputs: &[PathBuf]) -> Result<Vec<Sample>, FileError> {
         let name = full.file_name().map_or_else(|| "sample".into(), |n| n.to_string_lossy().into_owned());
         (folder, name)
     }));
-    Ok(named.into_iter().map(|NamedFile { path, name }| Sample { name, folder: path }).collect())
+    Ok(named.into_iter().map(|NamedFile { path, name }| SampleFolder { name, folder: path }).collect())
 }
 
 /// The garments of one sample; the inner error is the reason to skip it as a whole.
 fn import_sample(
-    sample: &Sample,
+    sample: &SampleFolder,
     bodies: &Cloth3dBodies<'_>,
     surface: &Surface<f64>,
     out: &Path,
@@ -255,7 +255,7 @@ fn about(garment: &Garment, item: &OutfitItem, inside: usize) -> String {
 }
 
 fn unposed_garment(
-    sample: &Sample,
+    sample: &SampleFolder,
     info: &SampleInfo,
     item: &OutfitItem,
     path: &Path,
@@ -304,7 +304,7 @@ fn provenance(what: &str) -> Provenance {
 
 /// Converts one point cache: number of frames, and the file written. A cache that cannot be used is skipped; the garment is not.
 fn convert_cache(
-    sample: &Sample,
+    sample: &SampleFolder,
     item: &OutfitItem,
     garment: &Garment,
     out: &Path,

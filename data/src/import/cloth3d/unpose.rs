@@ -6,7 +6,7 @@ use crate::asset::{Binding, BindingSettings, Body, Category, Garment, Pose, Prov
 use crate::import::amass::Y_UP_FROM_Z_UP;
 use clothcombo_physics::TriMesh;
 
-/// How far the legs are apart in the rest pose of CLOTH3D: θ₁ = (0, 0, 0.15), θ₂ = (0, 0, −0.15) [rad].
+/// How far the legs are apart in the rest pose of CLOTH3D: θ₁ = (0, 0, 0.15), θ₂ = (0, 0, −0.15) (rad).
 const LEGS_APART: f64 = 0.15;
 
 /// Takes garments from one sample's rest body to the zero body of the data set.
@@ -47,7 +47,7 @@ impl Unposing {
         Ok(Self { rest, bones: posed.bones })
     }
 
-    /// A garment at rest on the sample's body [m, y up], as it lies on the zero body in T-pose. Each vertex goes with the
+    /// A garment at rest on the sample's body (m, y up), as it lies on the zero body in T-pose. Each vertex goes with the
     /// body vertex nearest to it, smoothed over the garment as `settings` say.
     ///
     /// # Errors
