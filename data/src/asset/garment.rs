@@ -24,6 +24,11 @@ pub struct Garment {
 const LIFTED: f64 = 0.05;
 
 impl Garment {
+    /// A garment without a name or a source whose rim is not held.
+    pub fn new(category: Category, rest: TriMesh) -> Self {
+        Self { name: String::new(), category, rest, holding: false, source: Provenance::default() }
+    }
+
     /// Whether the garment can lie over `inner`. Cloth around each leg cannot lie over cloth that hangs between the legs, such
     /// as a skirt or a long coat: they would have to pass through each other at the crotch.
     fn can_lie_over(&self, inner: &Self) -> bool {
@@ -93,30 +98,23 @@ mod tests {
 
     #[test]
     fn legs_do_not_go_over_cloth_between_them() {
-        let garment = |category, rest: TriMesh| Garment {
-            name: String::new(),
-            category,
-            rest,
-            holding: false,
-            source: Provenance::default(),
-        };
         // Hips down to the crotch at -0.1, and a tube around each leg.
         let trousers = |ankle: f64| {
             let legs = [0.1, -0.1].map(|x| tube_from(x, 0.08, -0.1, ankle));
             let hips = tube_from(0.0, 0.2, 0.2, -0.1);
-            garment(Category::Trousers, union(&[&hips, &legs[0], &legs[1]]))
+            Garment::new(Category::Trousers, union(&[&hips, &legs[0], &legs[1]]))
         };
         let (long, short) = (trousers(-0.8), trousers(-0.3));
-        let skirt = garment(Category::Skirt, tube_from(0.0, 0.25, 0.1, -0.4));
-        let coat = garment(Category::OpenShirt, tube_from(0.0, 0.25, 0.5, -0.4));
-        let tee = garment(Category::TShirt, tube_from(0.0, 0.2, 0.5, -0.12));
+        let skirt = Garment::new(Category::Skirt, tube_from(0.0, 0.25, 0.1, -0.4));
+        let coat = Garment::new(Category::OpenShirt, tube_from(0.0, 0.25, 0.5, -0.4));
+        let tee = Garment::new(Category::TShirt, tube_from(0.0, 0.2, 0.5, -0.12));
         for hanging in [&skirt, &coat] {
             assert!(!long.can_lie_over(hanging) && !short.can_lie_over(hanging));
             assert!(hanging.can_lie_over(&long) && hanging.can_lie_over(&tee));
         }
         assert!(long.can_lie_over(&tee) && tee.can_lie_over(&long));
         assert!(short.can_lie_over(&long) && long.can_lie_over(&short));
-        let sleeve = garment(Category::Top, tube_from(0.5, 0.1, 0.0, -0.6));
+        let sleeve = Garment::new(Category::Top, tube_from(0.5, 0.1, 0.0, -0.6));
         assert!(long.can_lie_over(&sleeve), "nothing of it is between the legs");
         assert!(infeasible_pair(&[&tee, &long, &coat]).is_none());
         let [inner, outer] = infeasible_pair(&[&coat, &tee, &skirt, &long]).unwrap();

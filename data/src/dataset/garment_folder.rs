@@ -244,13 +244,8 @@ mod tests {
     fn saved_garments_load_again_with_everything() {
         let body = mannequin();
         let source = Provenance { source: "s".into(), author: "a \"b\"".into(), licence: "CC0-1.0".into() };
-        let garment = Garment {
-            name: "ring".into(),
-            category: Category::Skirt,
-            rest: tube(0.2, 0.3, 16, 4),
-            holding: true,
-            source,
-        };
+        let ring = Garment::new(Category::Skirt, tube(0.2, 0.3, 16, 4));
+        let garment = Garment { name: "ring".into(), holding: true, source, ..ring };
         let folder = tempfile::tempdir().unwrap();
         let saved = FolderGarment { garment, layer: Some([1, 3]), path: PathBuf::new() };
         let written = save_garment_folder(folder.path(), std::slice::from_ref(&saved)).unwrap();
@@ -271,9 +266,7 @@ mod tests {
     fn what_a_folder_lists_stays_listed_and_what_it_does_not_list_is_not_hidden() {
         let named = |name: &str, height: f64| {
             let rest = tube(0.1, height, 8, 4);
-            let source = Provenance::default();
-            let garment =
-                Garment { name: name.into(), category: Category::Top, rest, holding: false, source };
+            let garment = Garment { name: name.into(), ..Garment::new(Category::Top, rest) };
             FolderGarment { garment, layer: None, path: PathBuf::new() }
         };
         let folder = folder_with(&[]);

@@ -2,7 +2,7 @@
 
 use super::scene::{CaseError, CaseGarment, CaseScene};
 use crate::asset::body::skin;
-use crate::asset::{Binding, BindingSettings, Body, Category, Garment, Pose, Provenance, skeleton};
+use crate::asset::{Binding, BindingSettings, Body, Category, Garment, Pose, skeleton};
 use crate::generate::{GarmentError, GarmentGenerator, GarmentSettings};
 use clothcombo_physics::mesh::shapes;
 use clothcombo_physics::{MeshError, TriMesh, vec3, vertex_normals};
@@ -115,8 +115,7 @@ impl<'a> Fixture<'a> {
 
 /// A garment that is nothing but its mesh, at `posed` after skinning and a little higher before.
 pub(super) fn cloth(name: &str, rest: TriMesh, posed: Vec<[f64; 3]>) -> CaseGarment {
-    let source = Provenance::default();
-    let garment = Garment { name: name.to_string(), category: Category::Top, rest, holding: true, source };
+    let garment = Garment { name: name.to_string(), holding: true, ..Garment::new(Category::Top, rest) };
     CaseGarment { garment, canonical: raised(&posed), posed }
 }
 

@@ -1,6 +1,6 @@
 //! Bodies with lowered arms, and garments back from there to the T-pose.
 
-use crate::asset::{Binding, BindingSettings, Body, Category, Garment, Pose, Provenance, body};
+use crate::asset::{Binding, BindingSettings, Body, Category, Garment, Pose, body};
 use clothcombo_physics::TriMesh;
 use clothcombo_physics::query::Surface;
 
@@ -61,13 +61,7 @@ impl ArmPose {
         for round in 0..3 {
             let mesh = TriMesh::new(rest, faces.to_vec()).map_err(|e| e.to_string())?;
             let category = category.unwrap_or_else(|| Category::guess(&mesh, body));
-            let garment = Garment {
-                name: String::new(),
-                category,
-                rest: mesh,
-                holding: false,
-                source: Provenance::default(),
-            };
+            let garment = Garment::new(category, mesh);
             let binding = Binding::new(&garment, if round == 0 { &posed } else { &bare }, &settings);
             rest = positions
                 .iter()

@@ -20,7 +20,7 @@ pub use report::{BodyContact, Elements, FitReport, MeshPiece, Repair, RepairKind
 pub use settings::{FitSettings, MAX_VERTICES, MIN_TRIANGLES};
 pub use sitting::Sitting;
 
-use crate::asset::{Body, Category, Garment, Provenance};
+use crate::asset::{Body, Category, Garment};
 use crate::format::PolygonMesh;
 use crate::mesh::{
     AREA_SHARE, MeshMeasures, WELD_SHARE, clean_faces, contact, diagonal, join_faces, orient, outward_area,
@@ -134,8 +134,7 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
             self_triangle_pairs: self_triangle_pairs(rest.positions(), rest.faces()).len(),
         },
     };
-    let source = Provenance::default();
-    let garment = Garment { name: String::new(), category, rest, holding, source };
+    let garment = Garment { holding, ..Garment::new(category, rest) };
     Ok(Fitted { garment, report, vertex_of_file: sheet.vertex_of_file })
 }
 

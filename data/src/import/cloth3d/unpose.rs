@@ -2,7 +2,7 @@
 
 use crate::asset::body::unskin;
 use crate::asset::rotation::{Matrix3, apply, matrix_from_axis_angle, product};
-use crate::asset::{Binding, BindingSettings, Body, Category, Garment, Pose, Provenance};
+use crate::asset::{Binding, BindingSettings, Body, Category, Garment, Pose};
 use crate::import::amass::Y_UP_FROM_Z_UP;
 use clothcombo_physics::TriMesh;
 
@@ -58,13 +58,7 @@ impl Unposing {
         category: Category,
         settings: &BindingSettings,
     ) -> Result<Vec<[f64; 3]>, String> {
-        let garment = Garment {
-            name: String::new(),
-            category,
-            rest: mesh.clone(),
-            holding: false,
-            source: Provenance::default(),
-        };
+        let garment = Garment::new(category, mesh.clone());
         let binding = Binding::new(&garment, &self.rest, settings);
         // Without shape transfer it stays on the sample's body.
         let moved = binding.shape_displacement(&[1.0], 1);
