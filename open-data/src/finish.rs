@@ -4,7 +4,7 @@ use super::reference_surface::ReferenceSurface;
 use super::sheet_repair::boundary_loops;
 use clothcombo_data::mesh::LabelledTriangles;
 use clothcombo_data::mesh::{Contact, contact, push_out};
-use clothcombo_data::mesh::{EditableMesh, smallest_sine};
+use clothcombo_data::mesh::{EditableMesh, compact, smallest_sine};
 use clothcombo_data::mesh::{Quality, remesh};
 use clothcombo_physics::query::Surface;
 use clothcombo_physics::vec3::{add, dot, norm, normalized, scale, sub};
@@ -135,17 +135,9 @@ fn trim_ears(positions: &mut Vec<[f64; 3]>, faces: &mut Vec<[u32; 3]>) {
             break;
         }
     }
-    let mut number = vec![u32::MAX; positions.len()];
-    let mut kept = Vec::with_capacity(positions.len());
-    for v in faces.iter_mut().flatten() {
-        let slot = &mut number[*v as usize];
-        if *slot == u32::MAX {
-            *slot = kept.len() as u32;
-            kept.push(positions[*v as usize]);
-        }
-        *v = *slot;
-    }
-    *positions = kept;
+    let (used, compacted) = compact(faces.iter().copied(), positions.len());
+    *positions = used.iter().map(|v| positions[*v as usize]).collect();
+    *faces = compacted;
 }
 
 fn check(mesh: &TriMesh) -> Result<(), String> {

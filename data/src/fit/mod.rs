@@ -23,8 +23,8 @@ pub use sitting::Sitting;
 use crate::asset::{Body, Category, Garment};
 use crate::format::PolygonMesh;
 use crate::mesh::{
-    AREA_SHARE, MeshMeasures, WELD_SHARE, clean_faces, contact, diagonal, join_faces, orient, outward_area,
-    push_out, split_fans, triangulate, weld,
+    AREA_SHARE, MeshMeasures, WELD_SHARE, bounds, clean_faces, contact, diagonal, join_faces, orient,
+    outward_area, push_out, split_fans, triangulate, weld,
 };
 use arm_pose::ArmPose;
 use clothcombo_physics::contact::{self_triangle_pairs, triangle_pairs};
@@ -257,11 +257,8 @@ fn stretched(topology: &Topology, before: &[[f64; 3]], after: &[[f64; 3]]) -> f6
 
 fn refuse_other_things(positions: &[[f64; 3]], body: &Body, sitting: &Sitting) -> Result<(), FitError> {
     let (low, high) = body.zero_body().bounds();
-    let bound =
-        |a: usize, start: f64, pick: fn(f64, f64) -> f64| positions.iter().map(|p| p[a]).fold(start, pick);
-    let spans = |a: usize, slack: f64| {
-        bound(a, f64::MAX, f64::min) < low[a] + slack && bound(a, f64::MIN, f64::max) > high[a] - slack
-    };
+    let [lowest, highest] = bounds(positions);
+    let spans = |a: usize, slack: f64| lowest[a] < low[a] + slack && highest[a] > high[a] - slack;
     if spans(1, 0.04) && spans(0, 0.1) {
         return Err(FitError::Body);
     }

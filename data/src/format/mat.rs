@@ -6,6 +6,7 @@
 
 use super::error::FileError;
 use super::npz::{Array, row_major_from_fortran};
+use super::scalar::Scalar;
 use flate2::read::ZlibDecoder;
 use std::fs;
 use std::io::Read;
@@ -190,28 +191,20 @@ impl<'a> Reader<'a> {
 
 /// The cells of a numeric element.
 fn numbers(kind: u32, data: &[u8], big: bool) -> Result<Vec<f64>, String> {
-    let (width, convert): (usize, fn([u8; 8]) -> f64) = match kind {
-        1 => (1, |b| f64::from(b[0] as i8)),
-        2 | 16 => (1, |b| f64::from(b[0])),
-        3 => (2, |b| f64::from(i16::from_le_bytes([b[0], b[1]]))),
-        4 | 17 => (2, |b| f64::from(u16::from_le_bytes([b[0], b[1]]))),
-        5 => (4, |b| f64::from(i32::from_le_bytes([b[0], b[1], b[2], b[3]]))),
-        6 | 18 => (4, |b| f64::from(u32::from_le_bytes([b[0], b[1], b[2], b[3]]))),
-        7 => (4, |b| f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]]))),
-        9 => (8, f64::from_le_bytes),
-        12 => (8, |b| i64::from_le_bytes(b) as f64),
-        13 => (8, |b| u64::from_le_bytes(b) as f64),
+    let scalar = match kind {
+        1 => Scalar::I8,
+        2 | 16 => Scalar::U8,
+        3 => Scalar::I16,
+        4 | 17 => Scalar::U16,
+        5 => Scalar::I32,
+        6 | 18 => Scalar::U32,
+        7 => Scalar::F32,
+        9 => Scalar::F64,
+        12 => Scalar::I64,
+        13 => Scalar::U64,
         _ => return Err(format!("data type {kind} is not numeric")),
     };
-    let cells = data.chunks_exact(width).map(|cell| {
-        let mut little = [0u8; 8];
-        little[..width].copy_from_slice(cell);
-        if big {
-            little[..width].reverse();
-        }
-        convert(little)
-    });
-    Ok(cells.collect())
+    Ok(data.chunks_exact(scalar.bytes()).map(|cell| scalar.read(cell, big)).collect())
 }
 
 /// Name and value of a matrix element. The error carries the name, as far as it was read.

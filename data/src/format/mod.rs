@@ -10,6 +10,7 @@ pub mod obj;
 pub mod pc16;
 mod ply;
 mod polygon_mesh;
+mod scalar;
 mod stl;
 pub mod toml_file;
 

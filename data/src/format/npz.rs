@@ -3,6 +3,7 @@
 //! Object arrays are Python pickles, that is, programs; they are listed but never read.
 
 use super::error::FileError;
+use super::scalar::Scalar;
 use npyz::{DType, Endianness, NpyHeader, Order, TypeChar, TypeStr};
 use std::fmt::Display;
 use std::fs::File;
@@ -226,17 +227,14 @@ impl NpzFile {
         convert: fn(f64) -> T,
     ) -> Result<Array<T>, FileError> {
         let width = raw.kind.num_bytes().unwrap_or(0);
-        let Some(number) = number_reader(raw.kind.type_char(), width) else {
+        let Some(scalar) = scalar_type(raw.kind.type_char(), width) else {
             return Err(self.wrong_kind(key, &raw.kind, "integers or floats of at most 64 bits"));
         };
         let big = raw.kind.endianness() == Endianness::Big;
-        let data = raw.bytes.chunks_exact(width.max(1)).map(|cell| {
-            let mut little = [0u8; 8];
-            little[..width].copy_from_slice(cell);
-            if big {
-                little[..width].reverse();
-            }
-            convert(number(little))
+        let is_truth_value = raw.kind.type_char() == TypeChar::Bool;
+        let data = raw.bytes.chunks_exact(width).map(|cell| {
+            let number = scalar.read(cell, big);
+            convert(if is_truth_value { f64::from(u8::from(number != 0.0)) } else { number })
         });
         Ok(Array { data: to_row_major(data.collect(), &raw.shape, raw.order), shape: raw.shape })
     }
@@ -280,18 +278,20 @@ fn read_header(member: &mut impl Read) -> std::io::Result<NpyHeader> {
     NpyHeader::from_reader(&bytes[..])
 }
 
-/// The conversion of one little-endian cell, zero-padded to eight bytes.
-fn number_reader(kind: TypeChar, width: usize) -> Option<fn([u8; 8]) -> f64> {
+/// How the numbers of an array are stored; truth values as bytes.
+fn scalar_type(kind: TypeChar, width: usize) -> Option<Scalar> {
     Some(match (kind, width) {
-        (TypeChar::Bool, 1) => |b| f64::from(u8::from(b[0] != 0)),
-        (TypeChar::Int, 1) => |b| f64::from(b[0] as i8),
-        (TypeChar::Int, 2) => |b| f64::from(i16::from_le_bytes([b[0], b[1]])),
-        (TypeChar::Int, 4) => |b| f64::from(i32::from_le_bytes([b[0], b[1], b[2], b[3]])),
-        (TypeChar::Int, 8) => |b| i64::from_le_bytes(b) as f64,
-        (TypeChar::Uint, 1 | 2 | 4 | 8) => |b| u64::from_le_bytes(b) as f64,
-        (TypeChar::Float, 2) => |b| half::f16::from_le_bytes([b[0], b[1]]).to_f64(),
-        (TypeChar::Float, 4) => |b| f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]])),
-        (TypeChar::Float, 8) => f64::from_le_bytes,
+        (TypeChar::Int, 1) => Scalar::I8,
+        (TypeChar::Bool | TypeChar::Uint, 1) => Scalar::U8,
+        (TypeChar::Int, 2) => Scalar::I16,
+        (TypeChar::Uint, 2) => Scalar::U16,
+        (TypeChar::Int, 4) => Scalar::I32,
+        (TypeChar::Uint, 4) => Scalar::U32,
+        (TypeChar::Int, 8) => Scalar::I64,
+        (TypeChar::Uint, 8) => Scalar::U64,
+        (TypeChar::Float, 2) => Scalar::F16,
+        (TypeChar::Float, 4) => Scalar::F32,
+        (TypeChar::Float, 8) => Scalar::F64,
         _ => return None,
     })
 }
