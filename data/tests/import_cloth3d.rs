@@ -248,8 +248,6 @@ fn point_caches_are_exact_and_their_size_is_checked() {
         NpzFile::open(&fixture("expected_cloth3d.npz")).unwrap().numbers("Top_simulated_z_up", "").unwrap();
     assert_eq!([cache.frame_count(), cache.point_count, 3], expected.shape[..]);
     assert!(cache.positions.as_flattened().iter().zip(&expected.data).all(|(a, b)| f64::from(*a) == *b));
-    assert_eq!((cache.start, cache.rate), (0.0, 1.0));
-    assert_eq!(cache.frame(5).len(), cache.point_count);
     for cut in truncations(&path, 50) {
         let message = PointCache::load(&cut.path).unwrap_err().to_string();
         assert!(

@@ -12,10 +12,6 @@ use std::path::Path;
 /// Vertex positions over time, in the unit and axes of the file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointCache {
-    /// Number of the first frame.
-    pub start: f32,
-    /// Sampling rate as the file states it (often a step of 1 frame, not a frequency).
-    pub rate: f32,
     /// Points per frame.
     pub point_count: usize,
     /// Positions of all points, frame after frame.
@@ -72,20 +68,11 @@ impl PointCache {
             let (frame, point) = (at / point_count, at % point_count);
             return Err(content(format!("frame {frame}, point {point} is not finite")));
         }
-        let (start, rate) = (f32::from_le_bytes(word(20)), f32::from_le_bytes(word(24)));
-        Ok(Self { start, rate, point_count, positions })
+        Ok(Self { point_count, positions })
     }
 
     /// Number of frames.
     pub fn frame_count(&self) -> usize {
         self.positions.len() / self.point_count
-    }
-
-    /// The positions in one frame.
-    ///
-    /// # Panics
-    /// If `frame` is not below [`Self::frame_count`].
-    pub fn frame(&self, frame: usize) -> &[[f32; 3]] {
-        &self.positions[frame * self.point_count..(frame + 1) * self.point_count]
     }
 }

@@ -17,28 +17,19 @@ use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Which world axis is up in the files.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum UpAxis {
-    /// y, as here.
-    Y,
-    /// z, as AMASS and CLOTH3D have it.
-    Z,
-}
-
 /// How motions are imported.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AmassSettings {
     /// Which frames are kept.
     pub thinning: Thinning,
-    /// The files' up axis.
-    pub up: UpAxis,
+    /// Whether z is up in the files, as AMASS and CLOTH3D have it, instead of y.
+    pub z_up: bool,
 }
 
 impl Default for AmassSettings {
     fn default() -> Self {
         let thinning = Thinning { frame_rate: 30.0, static_threshold: 0.5f64.to_radians() };
-        Self { thinning, up: UpAxis::Z }
+        Self { thinning, z_up: true }
     }
 }
 
@@ -90,10 +81,7 @@ pub fn import_amass(
     summary.notes.push(format!(
         "kept are the root and the 21 body joints; {}; a frame that differs from the last one kept by less than {:.2}° in \
          every joint is dropped",
-        match settings.up {
-            UpAxis::Z => "the root was turned from z up to y up",
-            UpAxis::Y => "y was taken as the up axis",
-        },
+        if settings.z_up { "the root was turned from z up to y up" } else { "y was taken as the up axis" },
         settings.thinning.static_threshold.to_degrees()
     ));
     Ok(summary)
@@ -159,7 +147,7 @@ fn import_file(path: &Path, settings: &AmassSettings) -> Result<Clip, String> {
         return Err("it has no frames".into());
     }
     let rate = motion.frame_rate;
-    if settings.up == UpAxis::Z {
+    if settings.z_up {
         motion.poses.iter_mut().for_each(turn_root_to_y_up);
     }
     let lying = mean_uprightness(&motion.poses);
@@ -169,10 +157,7 @@ fn import_file(path: &Path, settings: &AmassSettings) -> Result<Clip, String> {
     if !subject.is_empty() {
         note.push_str(&format!(", {subject}"));
     }
-    let was_turned_wrongly = match settings.up {
-        UpAxis::Z => looks_y_up(&poses),
-        UpAxis::Y => stands_along_z(&poses),
-    };
+    let was_turned_wrongly = if settings.z_up { looks_y_up(&poses) } else { stands_along_z(&poses) };
     if lying < -0.2 || (lying.abs() < 0.2 && was_turned_wrongly) {
         note.push_str("; the body is not upright on average, check the up axis (--up)");
     }

@@ -11,7 +11,7 @@ pub mod smpl_family;
 mod summary;
 pub mod thinning;
 
-pub use amass::{AmassSettings, UpAxis, import_amass};
+pub use amass::{AmassSettings, import_amass};
 pub use bvh::import_bvh;
 pub use cloth3d::{Cloth3dBodies, Cloth3dSettings, import_cloth3d};
 pub use deepmimic::import_deepmimic;

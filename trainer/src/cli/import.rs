@@ -6,8 +6,8 @@ use crate::dataset::load_body;
 use clap::{Args, Subcommand, ValueEnum};
 use clothcombo_data::asset::{Body, BodyFileSettings, Provenance};
 use clothcombo_data::import::{
-    AmassSettings, Cloth3dBodies, Cloth3dSettings, RetargetSettings, Thinning, UpAxis, import_amass,
-    import_bvh, import_cloth3d, import_deepmimic, import_smpl_family,
+    AmassSettings, Cloth3dBodies, Cloth3dSettings, RetargetSettings, Thinning, import_amass, import_bvh,
+    import_cloth3d, import_deepmimic, import_smpl_family,
 };
 use miette::{IntoDiagnostic, Report};
 use std::path::PathBuf;
@@ -208,11 +208,7 @@ pub fn run(source: &Source) -> Result<(), Report> {
             import_smpl_family(&a.input, &a.output, &settings, &mut progress).into_diagnostic()?
         }
         Source::Amass(a) => {
-            let up = match a.up {
-                Up::Y => UpAxis::Y,
-                Up::Z => UpAxis::Z,
-            };
-            let settings = AmassSettings { thinning: a.thinning.thinning(), up };
+            let settings = AmassSettings { thinning: a.thinning.thinning(), z_up: matches!(a.up, Up::Z) };
             import_amass(&a.inputs, &a.output, &settings, &mut progress).into_diagnostic()?
         }
         Source::Cloth3d(a) => {

@@ -26,8 +26,6 @@ pub struct BvhJoint {
     pub offset: [f64; 3],
     /// Its channels in file order.
     pub channels: Vec<Channel>,
-    /// Offset of the end site below it, if there is one.
-    pub end: Option<[f64; 3]>,
 }
 
 /// A parsed file.
@@ -37,8 +35,6 @@ pub struct Bvh {
     pub joints: Vec<BvhJoint>,
     /// Seconds per frame.
     pub frame_time: f64,
-    /// What the header says the number of frames is; real files are off by one.
-    pub stated_frames: usize,
     channel_count: usize,
     values: Vec<f64>,
 }
@@ -117,7 +113,8 @@ impl Bvh {
         read_joint(&mut words, &mut joints, None, 0)?;
         words.expect("MOTION")?;
         words.expect("Frames:")?;
-        let stated_frames = words.number("the number of frames")?.max(0.0) as usize;
+        // Real files are off by one: the frames that are there count.
+        words.number("the number of frames")?;
         words.expect("Frame")?;
         words.expect("Time:")?;
         let frame_time = words.number("the frame time")?;
@@ -134,7 +131,7 @@ impl Bvh {
             );
         }
         values.truncate(values.len() / channel_count * channel_count);
-        Ok(Self { joints, frame_time, stated_frames, channel_count, values })
+        Ok(Self { joints, frame_time, channel_count, values })
     }
 
     /// Number of whole frames in the file.
@@ -232,7 +229,7 @@ fn read_joint(
         }
     }
     let index = joints.len();
-    joints.push(BvhJoint { name, parent, offset, channels, end: None });
+    joints.push(BvhJoint { name, parent, offset, channels });
     loop {
         match words.next("'}'")? {
             "}" => return Ok(()),
@@ -240,7 +237,7 @@ fn read_joint(
             w if w.eq_ignore_ascii_case("End") => {
                 words.expect("Site")?;
                 words.expect("{")?;
-                joints[index].end = Some(words.offset()?);
+                words.offset()?;
                 words.expect("}")?;
             }
             other => return Err(words.error(format!("expected JOINT, End Site or '}}', found '{other}'"))),
@@ -261,9 +258,8 @@ pub(crate) mod tests {
     #[test]
     fn reads_tree_and_all_frames_there_are() {
         let bvh = parse(SMALL).unwrap();
-        assert_eq!((bvh.frame_count(), bvh.stated_frames), (2, 1));
+        assert_eq!(bvh.frame_count(), 2);
         assert_eq!(bvh.joints[1].parent, Some(0));
-        assert_eq!(bvh.joints[1].end, Some([0.0, 1.0, 0.0]));
         assert_eq!(bvh.rest_positions(), [[0.0, 1.0, 0.0], [0.0, 3.0, 0.0]]);
         // Only angles have a limit.
         assert!(parse(&SMALL.replace("5 5 5", "5 1e6 5")).is_ok());
