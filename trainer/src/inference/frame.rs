@@ -128,7 +128,7 @@ impl Draper {
         }
         let from_t_pose = |share: f64| {
             watch(share);
-            let pose = body.pose.from_t_pose(share);
+            let pose = body.pose.scaled_keeping_heading(share);
             let stage = self.stage(&self.uncorrected, outfit, body, pose, body.place)?;
             Ok::<_, DraperError>(match share {
                 // The surface is known here only.

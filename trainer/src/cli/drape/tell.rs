@@ -1,7 +1,7 @@
 //! What a user should know about the input, though it can be draped.
 
 use crate::inference::SourceGarment;
-use clothcombo_data::asset::{Garment, unwearable};
+use clothcombo_data::asset::{Garment, infeasible_pair};
 
 pub(super) fn tell_shape(shape: &[f64], [low, high]: [f64; 2]) {
     if let Some(value) = shape.iter().find(|value| !(low..=high).contains(*value)) {
@@ -11,7 +11,7 @@ pub(super) fn tell_shape(shape: &[f64], [low, high]: [f64; 2]) {
 
 pub(super) fn tell_order(sources: &[SourceGarment]) {
     let order: Vec<&Garment> = sources.iter().map(|source| &source.garment).collect();
-    if let Some([inner, outer]) = unwearable(&order) {
+    if let Some([inner, outer]) = infeasible_pair(&order) {
         tracing::warn!(
             "{} cannot be worn over {}, which hangs between the legs: they will cross at the crotch",
             outer.name,
