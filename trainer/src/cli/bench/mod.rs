@@ -5,12 +5,9 @@ pub mod certificate;
 pub mod distance;
 pub mod error;
 pub mod generator;
-pub mod growth;
 pub mod operators;
-pub mod poses;
 pub mod stability;
 pub mod step;
-pub mod tradeoff;
 
 use clap::Subcommand;
 use miette::Report;
@@ -30,16 +27,10 @@ pub enum Bench {
     Stability(stability::Arguments),
     /// Where the time of a training step goes: parts, single networks, losses, memory
     Step(step::Arguments),
-    /// Speed against error: eigenpairs, half-precision weights, other networks; precision and distance of the losses
-    Tradeoff(tradeoff::Arguments),
     /// The generator's promises over many garments, with the failure rate and the time
     Generator(generator::Arguments),
-    /// How time and memory of a training step grow with vertices, layers, width and eigenpairs
-    Growth(growth::Arguments),
     /// What preparing a garment for DiffusionNet costs, and how exact its eigenpairs are
     Operators(operators::Arguments),
-    /// Self-intersections of posed bodies, their share and the cost of finding them
-    Poses(poses::Arguments),
 }
 
 /// Runs the bench.
@@ -54,10 +45,7 @@ pub fn run(bench: &Bench) -> Result<(), Report> {
         Bench::Error(arguments) => error::run(arguments),
         Bench::Stability(arguments) => stability::run(arguments),
         Bench::Step(arguments) => step::run(arguments),
-        Bench::Tradeoff(arguments) => tradeoff::run(arguments),
         Bench::Generator(arguments) => generator::run(arguments),
-        Bench::Growth(arguments) => growth::run(arguments),
         Bench::Operators(arguments) => operators::run(arguments),
-        Bench::Poses(arguments) => poses::run(arguments),
     }
 }
