@@ -1,10 +1,12 @@
 //! `clothcombo check`: every file of a dataset, in one table.
 
+use crate::cli::output::print_report;
+use crate::cli::table::{row, table};
 use crate::cli::verbosity::progress_bar;
 use crate::dataset::load_body;
 use clap::Parser;
 use clothcombo_data::check::{Checker, FileCheck, GarmentCheck, Target, find_targets, is_body_file};
-use miette::{IntoDiagnostic, Report, miette};
+use miette::{Report, miette};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -44,33 +46,26 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let body_name = arguments.body.clone().unwrap_or_else(|| only_body(&targets));
     let checker = Checker::new(load_body(&body_name, 0)?);
     let bar = progress_bar(targets.len(), "checking {bar:40} {pos}/{len} · {eta} left");
-    let files: Vec<FileCheck> = targets
-        .par_iter()
-        .map(|target| {
-            let file = checker.check(target);
-            bar.inc(1);
-            file
-        })
-        .collect();
+    let check = |target| {
+        let file = checker.check(target);
+        bar.inc(1);
+        file
+    };
+    let files: Vec<FileCheck> = targets.par_iter().map(check).collect();
     bar.finish_and_clear();
-    let unusable: Vec<&FileCheck> = files.iter().filter(|f| f.unusable.is_some()).collect();
-    if arguments.json {
-        let output = Output { body: &body_name, unusable: unusable.len(), files: &files };
-        println!("{}", serde_json::to_string_pretty(&output).into_diagnostic()?);
-    } else {
-        print_tables(&files, &body_name);
+    let unusable: Vec<&str> = files.iter().filter_map(|f| f.unusable.as_deref()).collect();
+    let output = Output { body: &body_name, unusable: unusable.len(), files: &files };
+    print_report(arguments.json, &output, text)?;
+    match unusable.is_empty() {
+        true => Ok(()),
+        false => Err(miette!(
+            help = "`clothcombo fit` repairs garments; other files must be exported or downloaded again",
+            "{} of {} files are unusable\n{}",
+            unusable.len(),
+            files.len(),
+            unusable.join("\n")
+        )),
     }
-    if unusable.is_empty() {
-        return Ok(());
-    }
-    let reasons: Vec<&str> = unusable.iter().filter_map(|f| f.unusable.as_deref()).collect();
-    Err(miette!(
-        help = "`clothcombo fit` repairs garments; other files must be exported or downloaded again",
-        "{} of {} files are unusable\n{}",
-        unusable.len(),
-        files.len(),
-        reasons.join("\n")
-    ))
 }
 
 /// The one body among the files, else the mannequin.
@@ -86,38 +81,17 @@ fn only_body(targets: &[Target]) -> String {
     }
 }
 
-fn print_tables(files: &[FileCheck], body: &str) {
+fn text(output: &Output<'_>) -> String {
+    let files = output.files;
     let name = |f: &FileCheck| f.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let width = files.iter().map(|f| name(f).chars().count()).max().unwrap_or(0).clamp(12, 40);
-    if files.iter().any(|f| f.garment.is_some()) {
-        println!(
-            "{:<width$} {:>7} {:>7} {:>3} {:>3} {:>19} {:>13} {:>5} {:>5} {:>8} {:>8} {:>6} {:>6} {:>6}  defects",
-            "garment",
-            "verts",
-            "tris",
-            "pcs",
-            "rim",
-            "edge mm (min–max)",
-            "category",
-            "layer",
-            "held",
-            "min mm",
-            "mid mm",
-            "inside",
-            "body×",
-            "self×"
-        );
-    }
+    let garments: Vec<_> =
+        files.iter().filter_map(|f| f.garment.as_ref().map(|g| garment_row(&name(f), g))).collect();
+    let mut lines = Vec::new();
     for file in files {
-        if let Some(garment) = &file.garment {
-            println!("{:<width$} {}", name(file), garment_row(garment));
-        }
-    }
-    for file in files {
+        let name = name(file);
         if let Some(b) = &file.body {
-            println!(
-                "body {}: {} vertices, {} triangles, {} joints, {} shape components, {:.2} m, skin weights sum to {:.4}–{:.4}",
-                name(file),
+            lines.push(format!(
+                "body {name}: {} vertices, {} triangles, {} joints, {} shape components, {:.2} m, skin weights sum to {:.4}–{:.4}",
                 b.vertices,
                 b.triangles,
                 b.joints,
@@ -125,38 +99,41 @@ fn print_tables(files: &[FileCheck], body: &str) {
                 b.height,
                 b.weight_sums[0],
                 b.weight_sums[1]
-            );
+            ));
         }
         if let Some(m) = &file.motion {
-            println!(
-                "motion {}: {} frames at {:.1}/s = {:.1} s, {} frames outside joint limits (by up to {:.0}°)",
-                name(file),
+            lines.push(format!(
+                "motion {name}: {} frames at {:.1}/s = {:.1} s, {} frames outside joint limits (by up to {:.0}°)",
                 m.frames,
                 m.frame_rate,
                 m.duration,
                 m.frames_outside_limits,
                 m.largest_excess_degrees
-            );
+            ));
         }
     }
     for file in files {
-        for warning in &file.warnings {
-            println!("warning {}: {warning}", name(file));
-        }
-        if let Some(reason) = &file.unusable {
-            println!("unusable {reason}");
-        }
+        lines.extend(file.warnings.iter().map(|warning| format!("warning {}: {warning}", name(file))));
+        lines.extend(file.unusable.iter().map(|reason| format!("unusable {reason}")));
     }
     let warned = files.iter().filter(|f| f.unusable.is_none() && !f.warnings.is_empty()).count();
-    let unusable = files.iter().filter(|f| f.unusable.is_some()).count();
-    println!(
-        "{} files against body '{body}': {} usable, {warned} of them with warnings, {unusable} unusable",
+    lines.push(format!(
+        "{} files against body '{}': {} usable, {warned} of them with warnings, {} unusable\n",
         files.len(),
-        files.len() - unusable
-    );
+        output.body,
+        files.len() - output.unusable,
+        output.unusable
+    ));
+    let head = ["garment", "verts", "tris", "pcs", "rim", "edge mm (min–max)", "category", "layer", "held"];
+    let further = ["min mm", "mid mm", "inside", "body×", "self×", "defects"];
+    let table = match garments.is_empty() {
+        true => String::new(),
+        false => table(&[&head[..], &further].concat(), &garments),
+    };
+    table + &lines.join("\n")
 }
 
-fn garment_row(g: &GarmentCheck) -> String {
+fn garment_row(name: &str, g: &GarmentCheck) -> Vec<String> {
     let guess = |text: String, guessed: bool| if guessed { format!("({text})") } else { text };
     let layer = match g.layer {
         [low, high] if high == low + 1 => format!("{low}+"),
@@ -164,9 +141,8 @@ fn garment_row(g: &GarmentCheck) -> String {
         [low, high] => format!("{low}–{high}"),
     };
     let m = &g.mesh;
-    let defects: usize = m.defects.counts().iter().map(|(n, _)| n).sum();
-    format!(
-        "{:>7} {:>7} {:>3} {:>3} {:>19} {:>13} {:>5} {:>5} {:>8.1} {:>8.1} {:>6} {:>6} {:>6}  {}",
+    row![
+        name,
         m.vertices,
         m.triangles,
         m.components,
@@ -175,11 +151,11 @@ fn garment_row(g: &GarmentCheck) -> String {
         guess(g.category.to_string(), g.category_guessed),
         guess(layer, g.layer_guessed),
         if g.holding { "yes" } else { "no" },
-        g.distance_min_mm,
-        g.distance_median_mm,
+        format!("{:.1}", g.distance_min_mm),
+        format!("{:.1}", g.distance_median_mm),
         g.inside,
         g.body_triangle_pairs,
         g.self_triangle_pairs,
-        defects
-    )
+        m.defects.counts().iter().map(|(n, _)| n).sum::<usize>()
+    ]
 }

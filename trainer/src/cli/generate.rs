@@ -2,7 +2,7 @@
 
 use super::wardrobe_sheet::{PER_ROW, wardrobe_sheet};
 use crate::cli::values::{at_least_one, picture_file};
-use crate::cli::verbosity::{progress_bar, say};
+use crate::cli::verbosity::{print_status, progress_bar};
 use crate::config::MOST_GARMENTS;
 use crate::dataset::load_body;
 use crate::picture::save_png;
@@ -104,10 +104,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         }
     }
     save_manifest(folder, entries).into_diagnostic()?;
-    say(&format!("{new} garments made, {kept} kept, in {}", folder.display()));
+    print_status(&format!("{new} garments made, {kept} kept, in {}", folder.display()));
     if let Some(path) = &arguments.picture {
         save_png(&wardrobe_sheet(&body, &order.for_picture(arguments)?), path).into_diagnostic()?;
-        say(&format!("picture {}", path.display()));
+        print_status(&format!("picture {}", path.display()));
     }
     match failures.first() {
         None => Ok(()),

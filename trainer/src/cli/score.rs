@@ -1,9 +1,10 @@
 //! `clothcombo score`: anyone's draped meshes, measured.
 
-use super::table::{number, table};
+use super::output::print_report;
+use super::table::{number, row, table};
 use crate::score::{MeshFiles, Score, ScoreDistance, TermValues, score_files};
 use clap::Parser;
-use miette::{IntoDiagnostic, Report};
+use miette::Report;
 use std::path::PathBuf;
 
 /// Scores draped garments: energies in the paper's printed form, penetration, exact intersections, layer order
@@ -44,13 +45,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let files = MeshFiles { body, rest, draped, canonical };
     let distance = if arguments.surface { ScoreDistance::Surface } else { ScoreDistance::NearestVertex };
     let score = score_files(&files, distance)?;
-    let text = if arguments.json {
-        serde_json::to_string_pretty(&score).into_diagnostic()? + "\n"
-    } else {
-        tables(&score)
-    };
-    print!("{text}");
-    Ok(())
+    print_report(arguments.json, &score, tables)
 }
 
 /// Terms of one garment, in the order of the columns.
@@ -82,14 +77,14 @@ fn tables(score: &Score) -> String {
     let contact: Vec<_> = garments()
         .map(|g| {
             let found = &g.penetration;
-            vec![
-                g.name.clone(),
-                g.vertices.to_string(),
-                g.triangles.to_string(),
+            row![
+                g.name,
+                g.vertices,
+                g.triangles,
                 format!("{:.2}", 100.0 * found.vertices_inside),
                 format!("{:.2}", found.max_depth_mm),
-                found.body_triangle_pairs.to_string(),
-                found.self_triangle_pairs.to_string(),
+                found.body_triangle_pairs,
+                found.self_triangle_pairs
             ]
         })
         .collect();
@@ -98,12 +93,12 @@ fn tables(score: &Score) -> String {
         .layers
         .iter()
         .map(|layer| {
-            vec![
+            row![
                 format!("{} under {}", name(layer.inner), name(layer.outer)),
                 number(layer.layer_collision),
                 number(layer.layer_distance),
-                layer.triangle_pairs.to_string(),
-                format!("{:.2}", 100.0 * layer.order_violations),
+                layer.triangle_pairs,
+                format!("{:.2}", 100.0 * layer.order_violations)
             ]
         })
         .collect();

@@ -177,7 +177,7 @@ impl Work<'_> {
                 Trains::Corrections => {
                     let feel: Feel<'_> = &|posed| {
                         let device = posed.device();
-                        trace_span!("feeling")
+                        trace_span!("contact features")
                             .in_scope(|| felt(scene, prepared, &scene.contacts, &to_host(posed), &device))
                     };
                     model.correct(&outfit, &embeddings, (start, &single), &untangled(), &body, feel)
