@@ -1,7 +1,7 @@
 //! `clothcombo check`: every file of a dataset, in one table.
 
 use crate::cli::output::print_report;
-use crate::cli::table::{row, table};
+use crate::cli::table::{Row, row, table};
 use crate::cli::verbosity::progress_bar;
 use crate::dataset::load_body;
 use clap::Parser;
@@ -84,7 +84,7 @@ fn only_body(targets: &[Target]) -> String {
 fn text(output: &Output<'_>) -> String {
     let files = output.files;
     let name = |f: &FileCheck| f.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let garments: Vec<_> =
+    let garments: Vec<Row> =
         files.iter().filter_map(|f| f.garment.as_ref().map(|g| garment_row(&name(f), g))).collect();
     let mut lines = Vec::new();
     for file in files {
@@ -124,16 +124,10 @@ fn text(output: &Output<'_>) -> String {
         files.len() - output.unusable,
         output.unusable
     ));
-    let head = ["garment", "verts", "tris", "pcs", "rim", "edge mm (min–max)", "category", "layer", "held"];
-    let further = ["min mm", "mid mm", "inside", "body×", "self×", "defects"];
-    let table = match garments.is_empty() {
-        true => String::new(),
-        false => table(&[&head[..], &further].concat(), &garments),
-    };
-    table + &lines.join("\n")
+    table(&garments) + &lines.join("\n")
 }
 
-fn garment_row(name: &str, g: &GarmentCheck) -> Vec<String> {
+fn garment_row(name: &str, g: &GarmentCheck) -> Row {
     let guess = |text: String, guessed: bool| if guessed { format!("({text})") } else { text };
     let layer = match g.layer {
         [low, high] if high == low + 1 => format!("{low}+"),
@@ -141,21 +135,21 @@ fn garment_row(name: &str, g: &GarmentCheck) -> Vec<String> {
         [low, high] => format!("{low}–{high}"),
     };
     let m = &g.mesh;
-    row![
-        name,
-        m.vertices,
-        m.triangles,
-        m.components,
-        m.boundary_loops,
-        format!("{:.1} ({:.1}–{:.1})", m.edge_median_mm, m.edge_min_mm, m.edge_max_mm),
-        guess(g.category.to_string(), g.category_guessed),
-        guess(layer, g.layer_guessed),
-        if g.holding { "yes" } else { "no" },
-        format!("{:.1}", g.distance_min_mm),
-        format!("{:.1}", g.distance_median_mm),
-        g.inside,
-        g.body_triangle_pairs,
-        g.self_triangle_pairs,
-        m.defects.counts().iter().map(|(n, _)| n).sum::<usize>()
-    ]
+    row! {
+        "garment" => name,
+        "verts" => m.vertices,
+        "tris" => m.triangles,
+        "pcs" => m.components,
+        "rim" => m.boundary_loops,
+        "edge mm (min–max)" => format!("{:.1} ({:.1}–{:.1})", m.edge_median_mm, m.edge_min_mm, m.edge_max_mm),
+        "category" => guess(g.category.to_string(), g.category_guessed),
+        "layer" => guess(layer, g.layer_guessed),
+        "held" => g.holding,
+        "min mm" => g.distance_min_mm,
+        "mid mm" => g.distance_median_mm,
+        "inside" => g.inside,
+        "body×" => g.body_triangle_pairs,
+        "self×" => g.self_triangle_pairs,
+        "defects" => m.defects.counts().iter().map(|(n, _)| n).sum::<usize>(),
+    }
 }

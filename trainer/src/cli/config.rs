@@ -168,10 +168,10 @@ fn print_times(config: &Config, times: &[StageTime]) {
     let mut rows: Vec<_> = stages()
         .map(|(stage, time)| {
             let ms = format!("{:.1}", 1000.0 * time.seconds_per_step);
-            row![stage.name, ms, duration(stage_seconds((stage, time)))]
+            row!["stage" => stage.name, "ms/step" => ms, "time" => duration(stage_seconds((stage, time)))]
         })
         .collect();
-    rows.push(row!["together", "", duration(stages().map(stage_seconds).sum())]);
-    print!("{}", table(&["", "ms/step", "time"], &rows));
+    rows.push(row!["" => "together", "" => "", "" => duration(stages().map(stage_seconds).sum())]);
+    print!("{}", table(&rows));
     println!("validation, pictures and checkpoints not counted");
 }

@@ -25,33 +25,36 @@ pub fn print_memory(config: &Config, sizes: &DataSizes) -> Result<(), Report> {
     );
     let (garments, operators) = match config.data.cache.folder.is_some() {
         true => (
-            format!("garments kept, of {}", gibibytes(gpu.all_garments)),
+            &*format!("garments kept, of {}", gibibytes(gpu.all_garments)),
             "operators, streamed from data.cache.folder",
         ),
-        false => (
-            "all garments, for want of data.cache.folder".to_owned(),
-            "operators of all garments, for the same reason",
-        ),
+        false => {
+            ("all garments, for want of data.cache.folder", "operators of all garments, for the same reason")
+        }
     };
-    let tensors = format!("tensors and embeddings kept, of {}", gibibytes(gpu.all_tensors));
-    let step = format!("the largest step ({})", largest_step(config));
-    let on_host: [(&str, fn(&MemoryEstimate) -> u64); 5] = [
-        ("program, body, list of garments", |m| m.program),
-        (&garments, |m| m.garments),
-        (operators, |m| m.operators),
-        ("scenes prepared in advance", |m| m.scenes),
-        ("at the start: garments being prepared", |m| m.preparation),
+    let row = |name: &str, host: Option<u64>, device: Option<u64>, processor: u64| {
+        let bytes = |bytes: Option<u64>| bytes.map_or(String::new(), gibibytes);
+        row! {
+            "" => name,
+            "GPU: host" => bytes(host),
+            "GPU: device" => bytes(device),
+            "CPU: host" => gibibytes(processor),
+        }
+    };
+    let on_host = |name: &str, of: fn(&MemoryEstimate) -> u64| row(name, Some(of(&gpu)), None, of(&cpu));
+    let on_device = |name: &str, of: fn(&MemoryEstimate) -> u64| row(name, None, Some(of(&gpu)), of(&cpu));
+    let rows = [
+        on_host("program, body, list of garments", |m| m.program),
+        on_host(garments, |m| m.garments),
+        on_host(operators, |m| m.operators),
+        on_host("scenes prepared in advance", |m| m.scenes),
+        on_host("at the start: garments being prepared", |m| m.preparation),
+        on_device(&format!("tensors and embeddings kept, of {}", gibibytes(gpu.all_tensors)), |m| m.tensors),
+        on_device("Adam's moments, copies of the parameters", |m| m.parameters),
+        on_device(&format!("the largest step ({})", largest_step(config)), |m| m.step),
+        row("together", Some(gpu.host()), Some(gpu.device()), cpu.peak()),
     ];
-    let on_device: [(&str, fn(&MemoryEstimate) -> u64); 3] = [
-        (&tensors, |m| m.tensors),
-        ("Adam's moments, copies of the parameters", |m| m.parameters),
-        (&step, |m| m.step),
-    ];
-    let on_host = on_host.map(|(name, of)| row![name, gibibytes(of(&gpu)), "", gibibytes(of(&cpu))]);
-    let on_device = on_device.map(|(name, of)| row![name, "", gibibytes(of(&gpu)), gibibytes(of(&cpu))]);
-    let [host, device, processor] = [gpu.host(), gpu.device(), cpu.peak()].map(gibibytes);
-    let rows = [&on_host[..], &on_device, &[row!["together", host, device, processor]]].concat();
-    print!("{}", table(&["", "GPU: host", "GPU: device", "CPU: host"], &rows));
+    print!("{}", table(&rows));
     if config.data.poses.motions.is_some() {
         println!("motions come on top: about 0.6 KiB a frame of 22 joints");
     }

@@ -56,10 +56,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         let same = a.same(*b);
         differing += usize::from(!same);
         if arguments.all || !same || !a.0.is_finite() {
-            rows.push(row![name, text(*a), text(*b), if same { "" } else { "differs" }]);
+            let differs = if same { "" } else { "differs" };
+            rows.push(row!["" => name, "recorded" => text(*a), "replayed" => text(*b), "" => differs]);
         }
     }
-    print!("{}", table(&["", "recorded", "replayed", ""], &rows));
+    print!("{}", table(&rows));
     if differing > 0 || then.len() != now.len() {
         return Err(miette!(
             help = "another program version, device or data gives other numbers; the scene is the same",

@@ -263,24 +263,21 @@ fn moved(garment: &Garment, positions: &[[f64; 3]]) -> Result<MovedObj, Report> 
 }
 
 fn text(report: &ResolveReport) -> String {
-    let both = [&report.certificate_before, &report.certificate];
-    let row = |what: &str, value: fn(&Certificate) -> String| {
-        let [before, after] = both.map(value);
-        row![what, before, after]
+    let row = |what: &str, value: fn(&Certificate) -> Option<f64>| {
+        let [before, after] = [&report.certificate_before, &report.certificate].map(value);
+        row!["" => what, "before" => before, "after" => after]
     };
     let rows = [
-        row("pairs with the body", |c| c.body_triangle_pairs.to_string()),
-        row("pairs between garments", |c| c.layer_triangle_pairs.to_string()),
-        row("pairs of a garment with itself", |c| c.self_triangle_pairs.to_string()),
-        row("pairs where the body is pinched", |c| c.pinched.count().to_string()),
-        row("length of the intersections [mm]", |c| format!("{:.2}", c.contour_length_mm)),
-        row("deepest vertex [mm]", |c| format!("{:.2}", c.max_depth_mm)),
-        row("vertices under an inner layer [%]", |c| format!("{:.3}", 100.0 * c.order_violations)),
-        row("strain added [%]", |c| {
-            c.strain_added.map_or("–".into(), |strain| format!("{:.3}", 100.0 * strain))
-        }),
+        row("pairs with the body", |c| Some(c.body_triangle_pairs as f64)),
+        row("pairs between garments", |c| Some(c.layer_triangle_pairs as f64)),
+        row("pairs of a garment with itself", |c| Some(c.self_triangle_pairs as f64)),
+        row("pairs where the body is pinched", |c| Some(c.pinched.count() as f64)),
+        row("length of the intersections [mm]", |c| Some(c.contour_length_mm)),
+        row("deepest vertex [mm]", |c| Some(c.max_depth_mm)),
+        row("vertices under an inner layer [%]", |c| Some(100.0 * c.order_violations)),
+        row("strain added [%]", |c| c.strain_added.map(|strain| 100.0 * strain)),
     ];
-    let mut text = table(&["", "before", "after"], &rows) + "\n";
+    let mut text = table(&rows) + "\n";
     for (garment, ms) in report.garments.iter().zip(&report.milliseconds.resolve) {
         text += &format!(
             "{}: {} vertices moved, at most {:.1} mm, {} rounds, {ms:.1} ms → {}\n",

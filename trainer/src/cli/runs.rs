@@ -1,7 +1,7 @@
 //! `clothcombo runs`: all runs of a folder in one table.
 
 use crate::cli::output::print_report;
-use crate::cli::table::{row, table};
+use crate::cli::table::{Row, row, table};
 use crate::run::summary::{FoundRun, RunSummary, find_runs};
 use clap::Parser;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
@@ -54,13 +54,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         runs.sort_by(|a, b| score(a).total_cmp(&score(b)));
     }
     print_report(arguments.json, &runs, |runs| {
-        let head = row!["run", "state", "step", "stage", "loss", "ms/step", "score", "at step", "strain ×"];
-        let further = row!["inside %", "wrong %", "skipped", "spikes", "checkpoint"];
         let readable = runs.iter().filter_map(|run| match run {
             FoundRun::Whole(run) => Some(table_row(run)),
             FoundRun::Unreadable(_) => None,
         });
-        let mut text = table(&[head, further].concat(), &readable.collect::<Vec<_>>());
+        let mut text = table(&readable.collect::<Vec<_>>());
         for run in runs {
             if let FoundRun::Unreadable(run) = run {
                 // On one line, as every run.
@@ -72,25 +70,21 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     })
 }
 
-fn table_row(r: &RunSummary) -> Vec<String> {
-    let or_dash = |value: Option<String>| value.unwrap_or_else(|| "–".into());
-    let number = |v: Option<f64>, digits: usize| or_dash(v.map(|v| format!("{v:.digits$}")));
-    let percent = |v: Option<f64>| number(v.map(|v| 100.0 * v), 2);
-    let step = |v: Option<u64>| or_dash(v.map(|v| v.to_string()));
-    row![
-        r.name,
-        r.state,
-        format!("{}/{}", r.step, r.total_steps),
-        r.stage,
-        number(r.loss, 3),
-        number(r.seconds_per_step.map(|s| 1000.0 * s), 1),
-        number(r.best_score, 3),
-        step(r.best_step),
-        number(r.strain_ratio, 3),
-        percent(r.inside),
-        percent(r.wrong_side),
-        r.skipped,
-        r.spikes,
-        step(r.checkpoint)
-    ]
+fn table_row(r: &RunSummary) -> Row {
+    row! {
+        "run" => r.name,
+        "state" => r.state,
+        "step" => format!("{}/{}", r.step, r.total_steps),
+        "stage" => r.stage,
+        "loss" => r.loss,
+        "ms/step" => r.seconds_per_step.map(|s| 1000.0 * s),
+        "score" => r.best_score,
+        "at step" => r.best_step,
+        "strain ×" => r.strain_ratio,
+        "inside %" => r.inside.map(|share| 100.0 * share),
+        "wrong %" => r.wrong_side.map(|share| 100.0 * share),
+        "skipped" => r.skipped,
+        "spikes" => r.spikes,
+        "checkpoint" => r.checkpoint,
+    }
 }

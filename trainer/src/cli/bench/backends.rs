@@ -2,10 +2,9 @@
 
 use crate::cli::loading::load_dataset;
 use crate::cli::output::print_report;
-use crate::cli::table::row;
+use crate::cli::table::{markdown, row};
 use crate::cli::values::{measuring_seconds, not_negative};
 use crate::cli::verbosity::print_status;
-use crate::evaluation::study::Table;
 use crate::system::device::Backend;
 use crate::training::measure::{BenchmarkRun, Case};
 use clap::{Parser, ValueEnum};
@@ -47,7 +46,7 @@ pub struct Arguments {
 }
 
 #[derive(Serialize)]
-struct Row {
+struct Measured {
     device: String,
     loss: f64,
     /// Relative difference to the first device.
@@ -87,7 +86,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
             .map(|((name, expected), (_, found))| (difference(found, expected), name));
         let worst = differences.max_by(|a, b| a.0.total_cmp(&b.0));
         let costs = run.costs(arguments.seconds, 1)?;
-        rows.push(Row {
+        rows.push(Measured {
             device: name(device),
             loss: found_loss,
             loss_difference: ((found_loss - loss) / loss).abs(),
@@ -97,8 +96,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
             step_ms: costs.step_ms,
         });
     }
-    print_report(arguments.json, &rows, |rows| table(rows))?;
-    let agrees = |row: &&Row| {
+    print_report(arguments.json, &rows, |rows| text(rows))?;
+    let agrees = |row: &&Measured| {
         row.loss_difference <= arguments.most_loss && row.gradient_difference <= arguments.most_gradient
     };
     match rows.iter().find(|row| !agrees(row)) {
@@ -131,29 +130,19 @@ fn difference(found: &[f32], expected: &[f32]) -> f64 {
     if apart == 0.0 { 0.0 } else { apart / norm(&mut expected.iter().map(|v| f64::from(*v))) }
 }
 
-fn table(rows: &[Row]) -> String {
-    let head = [
-        "device",
-        "loss",
-        "relative difference",
-        "largest relative gradient difference",
-        "of",
-        "forward [ms]",
-        "step [ms]",
-    ];
-    let mut table = Table::new("Devices with the same networks and scene", &head);
-    table.rows.extend(rows.iter().map(|r| {
-        row![
-            r.device,
-            format!("{:.6}", r.loss),
-            format!("{:.1e}", r.loss_difference),
-            format!("{:.1e}", r.gradient_difference),
-            r.parameter,
-            format!("{:.1}", r.forward_ms),
-            format!("{:.1}", r.step_ms)
-        ]
-    }));
-    table.markdown()
+fn text(rows: &[Measured]) -> String {
+    let row = |measured: &Measured| {
+        row! {
+            "device" => measured.device,
+            "loss" => format!("{:.6}", measured.loss),
+            "relative difference" => measured.loss_difference,
+            "largest relative gradient difference" => measured.gradient_difference,
+            "of" => measured.parameter,
+            "forward [ms]" => measured.forward_ms,
+            "step [ms]" => measured.step_ms,
+        }
+    };
+    markdown(&rows.iter().map(row).collect::<Vec<_>>())
 }
 
 #[cfg(test)]

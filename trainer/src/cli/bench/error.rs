@@ -3,7 +3,7 @@
 use crate::cli::loading::load_dataset;
 use crate::cli::model_arguments::ModelArguments;
 use crate::cli::output::print_report;
-use crate::cli::table::{number, row, table};
+use crate::cli::table::{row, table};
 use crate::cli::values::at_least_one;
 use crate::cli::verbosity::progress_bar;
 use crate::config::{Config, ValidationConfig};
@@ -335,33 +335,35 @@ impl Summary {
     }
 
     fn scene_table(&self) -> String {
-        let mut head = row!["scene", "garments", "vertices", "minimum J"];
-        head.extend(self.methods.iter().flat_map(|m| [format!("{} +J", m.method), "%".into(), "mm".into()]));
-        head.extend(row!["steps", "seconds", "rel. grad", "stop", "lowest from"]);
         let row = |scene: &SceneError| {
             let run = scene.reference_run();
-            let mut row = row![scene.scene, scene.garments.join(", "), scene.vertices, number(run.energy)];
-            row.extend(
-                scene.methods.iter().flat_map(|m| [m.excess, m.excess_percent, m.distance_mm].map(number)),
-            );
-            let start = if scene.minima_differ { " (minima differ)" } else { "" };
-            let start = format!("{}{start}", run.start);
-            row.extend(row![
-                run.iterations,
-                number(run.seconds),
-                number(run.relative_gradient),
-                run.stop,
-                start
-            ]);
+            let mut row = row! {
+                "scene" => scene.scene,
+                "garments" => scene.garments.join(", "),
+                "vertices" => scene.vertices,
+                "minimum J" => run.energy,
+            };
+            row.extend(scene.methods.iter().flat_map(|m| {
+                row![format!("{} +J", m.method) => m.excess, "%" => m.excess_percent, "mm" => m.distance_mm]
+            }));
+            row.extend(row! {
+                "steps" => run.iterations,
+                "seconds" => run.seconds,
+                "rel. grad" => run.relative_gradient,
+                "stop" => run.stop,
+                "lowest from" => run.start,
+                "" => if scene.minima_differ { "minima differ" } else { "" },
+            });
             row
         };
-        table(&head, &self.scenes.iter().map(row).collect::<Vec<_>>())
+        table(&self.scenes.iter().map(row).collect::<Vec<_>>())
     }
 
     fn spread_table(&self) -> String {
+        let scenes = format!("{} scenes", self.scenes.len());
         let mut rows = Vec::new();
         let mut add = |what: String, s: &Spread| {
-            rows.push(row![what, number(s.mean), number(s.median), number(s.p95)]);
+            rows.push(row![scenes => what, "mean" => s.mean, "median" => s.median, "95 %" => s.p95]);
         };
         for m in &self.methods {
             add(format!("{}: excess [J]", m.method), &m.excess);
@@ -372,29 +374,28 @@ impl Summary {
         }
         add("solver: steps".into(), &self.solver.iterations);
         add("solver: seconds".into(), &self.solver.seconds);
-        table(&[&format!("{} scenes", self.scenes.len()), "mean", "median", "95 %"], &rows)
+        table(&rows)
     }
 
     /// Every term of the energy, method by method.
     fn term_table(&self) -> String {
-        let energies = || {
-            let methods = self.methods.iter().map(|m| (m.method.as_str(), &m.terms));
-            methods.chain([("equilibrium", &self.reference_terms)])
+        let methods = self.methods.iter().map(|m| (m.method.as_str(), &m.terms));
+        let energies: Vec<_> = methods.chain([("equilibrium", &self.reference_terms)]).collect();
+        let terms: BTreeSet<&str> = energies.iter().flat_map(|(_, terms)| terms.keys().copied()).collect();
+        let row = |(name, values): &(&str, &TermEnergies)| {
+            let mut row = row!["method" => name];
+            for term in &terms {
+                row.extend(row![term => values.get(term).copied().unwrap_or(0.0)]);
+            }
+            row.extend(row!["sum" => values.values().sum::<f64>()]);
+            row
         };
-        let terms: BTreeSet<&str> = energies().flat_map(|(_, terms)| terms.keys().copied()).collect();
-        let head: Vec<&str> = ["method"].into_iter().chain(terms.iter().copied()).chain(["sum"]).collect();
-        let row = |(name, values): (&str, &TermEnergies)| {
-            let of_terms = terms.iter().map(|term| values.get(term).copied().unwrap_or(0.0));
-            [name.to_owned()].into_iter().chain(of_terms.chain([values.values().sum()]).map(number)).collect()
-        };
-        table(&head, &energies().map(row).collect::<Vec<_>>())
+        table(&energies.iter().map(row).collect::<Vec<_>>())
     }
 
     fn ratio_table(&self) -> String {
-        let row = |(layer, ratio): (usize, &StrainRatio)| {
-            row![layer + 1, number(ratio.equilibrium), ratio.network.map_or("–".to_owned(), number)]
-        };
-        let rows: Vec<_> = self.strain_ratios.iter().enumerate().map(row).collect();
-        table(&["layer", "equilibrium", "network"], &rows)
+        let ratios = self.strain_ratios.iter().enumerate();
+        let row = |(layer, ratio): (usize, &StrainRatio)| row!["layer" => layer + 1, "equilibrium" => ratio.equilibrium, "network" => ratio.network];
+        table(&ratios.map(row).collect::<Vec<_>>())
     }
 }

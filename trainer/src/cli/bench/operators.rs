@@ -1,6 +1,6 @@
 //! `clothcombo bench operators`: what preparing a garment for DiffusionNet costs, and how exact the eigenpairs are.
 
-use crate::cli::table::{number, table};
+use crate::cli::table::{row, table};
 use crate::cli::values::{at_least_one, measuring_seconds};
 use crate::dataset::DatasetError;
 use crate::evaluation::median_ms;
@@ -85,10 +85,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         println!("{}", serde_json::to_string_pretty(&found).into_diagnostic()?);
         return Ok(());
     }
-    let head = ["vertices", "eigenpairs", "time, one core [ms]", "largest residual", "off orthonormal"];
-    let row = [mesh.vertex_count(), operators.eigen_count].map(|n| n.to_string()).to_vec();
-    let row = [row, [ms, residual, orthogonality].map(number).to_vec()].concat();
-    print!("{}", table(&head, &[row]));
+    let row = row! {
+        "vertices" => mesh.vertex_count(),
+        "eigenpairs" => operators.eigen_count,
+        "time, one core [ms]" => ms,
+        "largest residual" => residual,
+        "off orthonormal" => orthogonality,
+    };
+    print!("{}", table(&[row]));
     println!("residual: |L φ − λ M φ| over (λ of the last pair) |M φ|; vectors are stored in f32");
     Ok(())
 }

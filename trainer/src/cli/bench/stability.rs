@@ -1,7 +1,7 @@
 //! `clothcombo bench stability`: the hard cases, one row each.
 
 use crate::cli::output::print_report;
-use crate::cli::table::{row, table};
+use crate::cli::table::{Row, row, table};
 use crate::cli::verbosity::progress_bar;
 use crate::dataset::load_body;
 use clap::Args;
@@ -36,13 +36,13 @@ pub struct Arguments {
 /// # Errors
 /// When the body cannot be read or a case violates the invariant.
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
-    let text = arguments.case.as_deref().unwrap_or_default();
-    let selected: Vec<_> = HardCases::all().filter(|case| case.name.contains(text)).collect();
+    let wanted = arguments.case.as_deref().unwrap_or_default();
+    let selected: Vec<_> = HardCases::all().filter(|case| case.name.contains(wanted)).collect();
     if selected.is_empty() {
         let names: Vec<&str> = HardCases::all().map(|case| case.name).collect();
         return Err(miette!(
             help = format!("the cases are: {}", names.join("; ")),
-            "no case is named like '{text}'"
+            "no case is named like '{wanted}'"
         ));
     }
     let body = load_body(&arguments.body, 0)?;
@@ -59,7 +59,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     bar.finish_and_clear();
     let rows: Vec<Value> = reports.iter().map(json_row).collect();
     let whole = json!({ "body": body.name, "printed": arguments.printed, "cases": rows });
-    print_report(arguments.json, &whole, |_| format!("{}\n{}", case_table(&reports), term_table(&reports)))?;
+    print_report(arguments.json, &whole, |_| text(&reports))?;
     let violations: Vec<String> = reports
         .iter()
         .flat_map(|report| report.faults().into_iter().map(|fault| format!("{}: {fault}", report.case.name)))
@@ -97,68 +97,62 @@ fn worst(terms: &TermMap<Option<TermReport>>, number: impl Fn(&TermReport) -> f6
     numbers.fold((0.0, "-"), |worst, next| if next.0 > worst.0 || next.0.is_nan() { next } else { worst })
 }
 
-fn case_table(reports: &[CaseReport]) -> String {
-    let head =
-        row!["case", "vertices", "finite", "max |g|", "of", "of bound", "FD error", "kinks", "f32 error"];
-    let row = |report: &CaseReport| {
-        let (name, faults) = (report.case.name, report.faults());
-        let kept =
-            if faults.is_empty() { "kept".to_owned() } else { format!("BROKEN: {}", faults.join("; ")) };
-        let terms = match &report.outcome {
-            Outcome::Evaluated(terms) => terms,
-            Outcome::Refused(error) => {
-                let refused = match report.case.expectation {
-                    Expectation::Refused(_) => "refused",
-                    Expectation::Bounded => "REFUSED",
-                };
-                return row![name, "", "", "", "", "", "", "", "", format!("{refused}: {error}  {kept}")];
-            }
-        };
-        let evaluated = || terms.iter().filter_map(|(_, term)| term.as_ref());
-        let (largest, of) = worst(terms, |r| r.largest_gradient);
-        let share = |r: &TermReport| match r.gradient_bound > 0.0 {
-            true => r.largest_gradient / r.gradient_bound,
-            false => 0.0,
-        };
-        row![
-            name,
-            report.vertices,
-            if evaluated().all(|r| r.finite) { "yes" } else { "NO" },
-            format!("{largest:.2e}"),
-            of,
-            scientific(worst(terms, share).0),
-            scientific(worst(terms, |r| r.gradient_error).0),
-            evaluated().map(|r| r.kinks).sum::<usize>(),
-            scientific(worst(terms, value_error).0),
-            kept
-        ]
-    };
-    table(&[head, row!["invariant"]].concat(), &reports.iter().map(row).collect::<Vec<_>>())
+fn text(reports: &[CaseReport]) -> String {
+    // Refused cases have other columns than evaluated ones.
+    let is_refused = |report: &&CaseReport| matches!(report.outcome, Outcome::Refused(_));
+    let (refused, evaluated): (Vec<_>, Vec<_>) = reports.iter().partition(is_refused);
+    let cases = |reports: Vec<&CaseReport>| table(&reports.into_iter().map(case_row).collect::<Vec<_>>());
+    let tables = [cases(evaluated), cases(refused), table(&Term::ALL.map(|term| term_row(term, reports)))];
+    tables.into_iter().filter(|table| !table.is_empty()).collect::<Vec<_>>().join("\n")
 }
 
-fn term_table(reports: &[CaseReport]) -> String {
-    let row = |term: Term| {
-        let of_term = || {
-            reports.iter().filter_map(|report| match &report.outcome {
-                Outcome::Evaluated(terms) => terms[term],
-                Outcome::Refused(_) => None,
-            })
-        };
-        let largest =
-            |number: fn(&TermReport) -> f64| scientific(of_term().map(|r| number(&r)).fold(0.0, f64::max));
-        row![
-            term,
-            largest(|r| r.gradient_error),
-            largest(value_error),
-            largest(|r| r.f32_gradient_error),
-            of_term().filter(TermReport::cancels).count()
-        ]
+fn case_row(report: &CaseReport) -> Row {
+    let faults = report.faults();
+    let kept = if faults.is_empty() { "kept".to_owned() } else { format!("BROKEN: {}", faults.join("; ")) };
+    let name = report.case.name;
+    let terms = match &report.outcome {
+        Outcome::Evaluated(terms) => terms,
+        Outcome::Refused(error) => {
+            let refused = match report.case.expectation {
+                Expectation::Refused(_) => "refused",
+                Expectation::Bounded => "REFUSED",
+            };
+            return row!["case" => name, "" => refused, "error" => error.to_string(), "invariant" => kept];
+        }
     };
-    table(&["term", "FD error", "f32 error", "f32 gradient", "cancels"], &Term::ALL.map(row))
+    let evaluated = || terms.iter().filter_map(|(_, term)| term.as_ref());
+    let (largest, of) = worst(terms, |r| r.largest_gradient);
+    let share =
+        |r: &TermReport| if r.gradient_bound > 0.0 { r.largest_gradient / r.gradient_bound } else { 0.0 };
+    row! {
+        "case" => name,
+        "vertices" => report.vertices,
+        "finite" => if evaluated().all(|r| r.finite) { "yes" } else { "NO" },
+        "max |g|" => largest,
+        "of" => of,
+        "of bound" => worst(terms, share).0,
+        "FD error" => worst(terms, |r| r.gradient_error).0,
+        "kinks" => evaluated().map(|r| r.kinks).sum::<usize>(),
+        "f32 error" => worst(terms, value_error).0,
+        "invariant" => kept,
+    }
 }
 
-fn scientific(value: f64) -> String {
-    format!("{value:.1e}")
+fn term_row(term: Term, reports: &[CaseReport]) -> Row {
+    let of_term = || {
+        reports.iter().filter_map(|report| match &report.outcome {
+            Outcome::Evaluated(terms) => terms[term],
+            Outcome::Refused(_) => None,
+        })
+    };
+    let largest = |number: fn(&TermReport) -> f64| of_term().map(|r| number(&r)).fold(0.0, f64::max);
+    row! {
+        "term" => term.name(),
+        "FD error" => largest(|r| r.gradient_error),
+        "f32 error" => largest(value_error),
+        "f32 gradient" => largest(|r| r.f32_gradient_error),
+        "cancels" => of_term().filter(TermReport::cancels).count(),
+    }
 }
 
 /// Relative error of the value in `f32`; a cancellation has none.

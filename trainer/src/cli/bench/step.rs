@@ -2,11 +2,10 @@
 
 use crate::cli::loading::load_dataset;
 use crate::cli::output::print_report;
-use crate::cli::table::row;
+use crate::cli::table::{Cell, Row, markdown, row};
 use crate::cli::values::{at_least_one, measuring_seconds, picture_file};
 use crate::cli::verbosity::print_status;
 use crate::config::{Config, load};
-use crate::evaluation::study::Table;
 use crate::picture::{Bar, draw_bars, save_png};
 use crate::system::device::Backend;
 use crate::training::measure::{BenchmarkRun, Case, Costs, PHASES, Profile, export};
@@ -222,64 +221,43 @@ fn short(ms: f64) -> String {
     }
 }
 
-fn short_or_dash(ms: Option<f64>) -> String {
-    ms.map_or("–".into(), short)
-}
-
 fn tables(measured: &[Measured]) -> String {
-    let phases = Table {
-        head: [&row!["case", "step"][..], &PHASES.map(str::to_owned)[..]].concat(),
-        rows: measured.iter().map(phase_row).collect(),
-        ..Table::new("Where the time of a training step goes, medians [ms]", &[])
-    };
-    let mut costs = Table::new(
-        "Parts of one scene, medians [ms]; scenes are prepared on another thread",
-        &[
-            "case",
-            "vertices",
-            "parameters",
-            "forward",
-            "forward + backward",
-            "step",
-            "step on several outfits",
-            "losses",
-            "drape again",
-            "prepare scene",
-            "peak memory [MiB]",
-        ],
-    );
-    costs.rows = measured.iter().map(cost_row).collect();
-    let terms = Table {
-        head: [&row!["case"][..], &Term::ALL.map(|term| term.name().to_owned())[..]].concat(),
-        rows: measured.iter().map(term_row).collect(),
-        ..Table::new("Every single loss, value and gradient [ms]", &[])
-    };
-    [phases, costs, terms].map(|table| table.markdown()).join("\n")
+    let rows = |row: fn(&Measured) -> Row| measured.iter().map(row).collect::<Vec<_>>();
+    format!(
+        "Where the time of a training step goes, medians [ms].\n\n{}\n\
+         Parts of one scene, medians [ms]; scenes are prepared on another thread.\n\n{}\n\
+         Every single loss, value and gradient [ms].\n\n{}",
+        markdown(&rows(phase_row)),
+        markdown(&rows(cost_row)),
+        markdown(&rows(term_row))
+    )
 }
 
-fn phase_row(m: &Measured) -> Vec<String> {
-    let phases = m.profile.phases_ms.iter().map(|(_, ms)| short(*ms));
-    [m.name.clone(), short(m.profile.step_ms)].into_iter().chain(phases).collect()
+fn phase_row(m: &Measured) -> Row {
+    let mut row = row!["case" => m.name, "step" => short(m.profile.step_ms)];
+    row.extend(m.profile.phases_ms.iter().map(|(name, ms)| ((*name).to_owned(), short(*ms))));
+    row
 }
 
-fn cost_row(m: &Measured) -> Vec<String> {
-    let c = &m.costs;
-    row![
-        m.name,
-        m.vertices,
-        m.parameters,
-        short(c.forward_ms),
-        short(c.forward_backward_ms),
-        short(c.step_ms),
-        short_or_dash(c.step_of_several_ms),
-        short(c.losses_ms),
-        short(c.drape_ms),
-        short(m.profile.prepare_ms),
-        c.peak_mib.map_or("–".into(), |mib| format!("{mib:.0}"))
-    ]
+fn cost_row(m: &Measured) -> Row {
+    row! {
+        "case" => m.name,
+        "vertices" => m.vertices,
+        "parameters" => m.parameters,
+        "forward" => short(m.costs.forward_ms),
+        "forward + backward" => short(m.costs.forward_backward_ms),
+        "step" => short(m.costs.step_ms),
+        "step on several outfits" => m.costs.step_of_several_ms.map(short),
+        "losses" => short(m.costs.losses_ms),
+        "drape again" => short(m.costs.drape_ms),
+        "prepare scene" => short(m.profile.prepare_ms),
+        "peak memory [MiB]" => m.costs.peak_mib.map(|mib| format!("{mib:.0}")),
+    }
 }
 
-fn term_row(m: &Measured) -> Vec<String> {
-    let times = Term::ALL.map(|term| short_or_dash(m.costs.terms_ms.get(term.name()).copied()));
-    [&[m.name.clone()][..], &times].concat()
+fn term_row(m: &Measured) -> Row {
+    let ms = |term: Term| m.costs.terms_ms.get(term.name()).map(|ms| short(*ms));
+    let mut row = row!["case" => m.name];
+    row.extend(Term::ALL.map(|term| (term.name().to_owned(), ms(term).text())));
+    row
 }

@@ -1,6 +1,6 @@
 //! Numbers of many outfits, as tables and as JSON.
 
-use crate::cli::table::{row, table};
+use crate::cli::table::{Row, row, table};
 use crate::evaluation::certificates::OutfitResult;
 use crate::run::spread::Spread;
 use serde::Serialize;
@@ -113,23 +113,22 @@ impl Summary {
         }
     }
 
-    fn row(&self, name: String) -> Vec<String> {
-        let percent = |share: f64| format!("{:.1}", 100.0 * share);
+    fn row(&self, name: String) -> Row {
         let order = self.order_violations_after.map_or(0.0, |s| s.mean);
         let strain = self.strain_added.map_or(0.0, |s| s.median);
         let time = self.milliseconds_per_garment.unwrap_or_default();
-        row![
-            name,
-            self.draws,
-            percent(self.clear_before),
-            percent(self.clear_after),
-            percent(self.clear_of_self_after),
-            percent(self.pinched_after),
-            format!("{:.3}", 100.0 * order),
-            format!("{:.2}", 100.0 * strain),
-            format!("{:.1}", time.median),
-            format!("{:.1}", time.p95)
-        ]
+        row! {
+            "outfits" => name,
+            "draws" => self.draws,
+            "clear %" => 100.0 * self.clear_before,
+            "after %" => 100.0 * self.clear_after,
+            "self %" => 100.0 * self.clear_of_self_after,
+            "pinched %" => 100.0 * self.pinched_after,
+            "order %" => 100.0 * order,
+            "strain %" => 100.0 * strain,
+            "p50 ms" => time.median,
+            "p95 ms" => time.p95,
+        }
     }
 }
 
@@ -139,14 +138,8 @@ pub(super) fn tables(results: &[OutfitResult], layers: usize) -> String {
     let by_count = (1..=most)
         .map(|count| (format!("{count} garments"), Summary::new(results, |r| r.garments.len() == count)));
     let groups = GROUPS.into_iter().map(|(_, name, belongs)| (name.into(), Summary::new(results, belongs)));
-    let rows: Vec<_> = by_count
-        .chain(groups)
-        .filter(|(_, group)| group.draws > 0)
-        .map(|(name, group)| group.row(name))
-        .collect();
-    let head = ["outfits", "draws", "clear %", "after %", "self %"];
-    let further = ["pinched %", "order %", "strain %", "p50 ms", "p95 ms"];
-    let mut text = table(&[head, further].concat(), &rows) + "\n";
+    let groups = by_count.chain(groups).filter(|(_, group)| group.draws > 0);
+    let groups: Vec<Row> = groups.map(|(name, group)| group.row(name)).collect();
 
     let all = Summary::new(results, |_| true);
     let spreads = [
@@ -155,30 +148,31 @@ pub(super) fn tables(results: &[OutfitResult], layers: usize) -> String {
         ("ms for the certificate", all.certificate_milliseconds),
         ("largest move [mm]", all.largest_move_mm),
     ];
-    let row = |(what, spread): (&str, Option<Spread>)| {
-        spread.map(|s| row![what, format!("{:.1}", s.median), format!("{:.1}", s.p95)])
-    };
-    text += &table(&["all outfits", "p50", "p95"], &spreads.into_iter().filter_map(row).collect::<Vec<_>>());
+    let spread = |(what, spread): (&str, Option<Spread>)| row!["all outfits" => what, "p50" => spread.map(|s| s.median), "p95" => spread.map(|s| s.p95)];
     let within = WITHIN.map(|s| format!("{:.0} % in {s} s", 100.0 * clear_within(results, s)));
-    text += &format!("clear, of all outfits:  {}\n", within.join(", "));
-
-    let rows: Vec<_> = failures(results).map(failure_row).collect();
-    if !rows.is_empty() {
-        let head = ["not clear", "body pairs", "narrow of these", "layer pairs", "pinched", "deepest [mm]"];
-        text += &format!("\n{}", table(&[&head[..], &["garments", ""]].concat(), &rows));
+    let mut text = format!(
+        "{}\n{}clear, of all outfits:  {}\n",
+        table(&groups),
+        table(&spreads.map(spread)),
+        within.join(", ")
+    );
+    let failures: Vec<Row> = failures(results).map(failure_row).collect();
+    if !failures.is_empty() {
+        text += &format!("\n{}", table(&failures));
     }
     text
 }
 
-fn failure_row(r: &OutfitResult) -> Vec<String> {
-    row![
-        r.draw,
-        format!("{} → {}", r.before.body_triangle_pairs, r.after.body_triangle_pairs),
-        r.after.narrow_triangle_pairs,
-        format!("{} → {}", r.before.layer_triangle_pairs, r.after.layer_triangle_pairs),
-        r.after.pinched_pairs,
-        format!("{:.1}", r.after.max_depth_mm),
-        r.garments.join(" < "),
-        if r.is_wearable { "" } else { "(infeasible order)" }
-    ]
+fn failure_row(r: &OutfitResult) -> Row {
+    let pairs = |before: usize, after: usize| format!("{before} → {after}");
+    row! {
+        "not clear" => r.draw,
+        "body pairs" => pairs(r.before.body_triangle_pairs, r.after.body_triangle_pairs),
+        "narrow of these" => r.after.narrow_triangle_pairs,
+        "layer pairs" => pairs(r.before.layer_triangle_pairs, r.after.layer_triangle_pairs),
+        "pinched" => r.after.pinched_pairs,
+        "deepest [mm]" => r.after.max_depth_mm,
+        "garments" => r.garments.join(" < "),
+        "" => if r.is_wearable { "" } else { "(infeasible order)" },
+    }
 }
