@@ -5,7 +5,9 @@ use crate::cli::table::{Row, row, table};
 use crate::cli::verbosity::progress_bar;
 use crate::dataset::load_body;
 use clap::Parser;
-use clothcombo_data::check::{Checker, FileCheck, GarmentCheck, Target, find_targets, is_body_file};
+use clothcombo_data::check::{
+    BodyCheck, Checker, FileCheck, GarmentCheck, MotionCheck, Target, find_targets, is_body_file,
+};
 use miette::{Report, miette};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -86,32 +88,11 @@ fn text(output: &Output<'_>) -> String {
     let name = |f: &FileCheck| f.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let garments: Vec<Row> =
         files.iter().filter_map(|f| f.garment.as_ref().map(|g| garment_row(&name(f), g))).collect();
+    let bodies: Vec<Row> =
+        files.iter().filter_map(|f| f.body.as_ref().map(|b| body_row(&name(f), b))).collect();
+    let motions: Vec<Row> =
+        files.iter().filter_map(|f| f.motion.as_ref().map(|m| motion_row(&name(f), m))).collect();
     let mut lines = Vec::new();
-    for file in files {
-        let name = name(file);
-        if let Some(b) = &file.body {
-            lines.push(format!(
-                "body {name}: {} vertices, {} triangles, {} joints, {} shape components, {:.2} m, skin weights sum to {:.4}–{:.4}",
-                b.vertices,
-                b.triangles,
-                b.joints,
-                b.shape_components,
-                b.height,
-                b.weight_sums[0],
-                b.weight_sums[1]
-            ));
-        }
-        if let Some(m) = &file.motion {
-            lines.push(format!(
-                "motion {name}: {} frames at {:.1}/s = {:.1} s, {} frames outside joint limits (by up to {:.0}°)",
-                m.frames,
-                m.frame_rate,
-                m.duration,
-                m.frames_outside_limits,
-                m.largest_excess_degrees
-            ));
-        }
-    }
     for file in files {
         lines.extend(file.warnings.iter().map(|warning| format!("warning {}: {warning}", name(file))));
         lines.extend(file.unusable.iter().map(|reason| format!("unusable {reason}")));
@@ -124,7 +105,30 @@ fn text(output: &Output<'_>) -> String {
         files.len() - output.unusable,
         output.unusable
     ));
-    table(&garments) + &lines.join("\n")
+    [garments, bodies, motions].map(|rows| table(&rows)).concat() + &lines.join("\n")
+}
+
+fn body_row(name: &str, b: &BodyCheck) -> Row {
+    row! {
+        "body" => name,
+        "verts" => b.vertices,
+        "tris" => b.triangles,
+        "joints" => b.joints,
+        "shape components" => b.shape_components,
+        "height m" => b.height,
+        "skin weights sum to" => format!("{:.4}–{:.4}", b.weight_sums[0], b.weight_sums[1]),
+    }
+}
+
+fn motion_row(name: &str, m: &MotionCheck) -> Row {
+    row! {
+        "motion" => name,
+        "frames" => m.frames,
+        "frames/s" => m.frame_rate,
+        "s" => m.duration,
+        "frames outside joint limits" => m.frames_outside_limits,
+        "by up to °" => m.largest_excess_degrees,
+    }
 }
 
 fn garment_row(name: &str, g: &GarmentCheck) -> Row {

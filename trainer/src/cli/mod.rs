@@ -3,6 +3,7 @@
 pub mod bench;
 pub mod check;
 pub mod config;
+mod contact_sheet;
 pub mod drape;
 pub mod eval;
 pub mod fit;
@@ -23,7 +24,6 @@ mod table;
 pub mod train;
 mod values;
 mod verbosity;
-mod wardrobe_sheet;
 
 pub use verbosity::Verbosity;
 

@@ -277,16 +277,15 @@ fn text(report: &ResolveReport) -> String {
         row("vertices under an inner layer [%]", |c| Some(100.0 * c.order_violations)),
         row("strain added [%]", |c| c.strain_added.map(|strain| 100.0 * strain)),
     ];
-    let mut text = table(&rows) + "\n";
-    for (garment, ms) in report.garments.iter().zip(&report.milliseconds.resolve) {
-        text += &format!(
-            "{}: {} vertices moved, at most {:.1} mm, {} rounds, {ms:.1} ms → {}\n",
-            garment.name,
-            garment.moved_vertices,
-            garment.largest_move_mm,
-            garment.rounds,
-            garment.output.display()
-        );
-    }
-    text
+    let garments = report.garments.iter().zip(&report.milliseconds.resolve).map(|(garment, ms)| {
+        row! {
+            "garment" => garment.name,
+            "moved vertices" => garment.moved_vertices,
+            "largest move [mm]" => garment.largest_move_mm,
+            "rounds" => garment.rounds,
+            "ms" => *ms,
+            "file" => garment.output.display().to_string(),
+        }
+    });
+    format!("{}\n{}", table(&rows), table(&garments.collect::<Vec<_>>()))
 }

@@ -38,16 +38,16 @@ fn run(
     stop: &StopFlag,
     kept: &mut u64,
 ) -> Result<(), Report> {
-    let mut tell = |event: &TrainEvent| observers.iter_mut().try_for_each(|o| o.observe(event));
+    let mut emit = |event: &TrainEvent| observers.iter_mut().try_for_each(|o| o.observe(event));
     let schedule = session.schedule().clone();
     let output = session.config().output.clone();
     let validate_every = session.config().validation.every;
     let first_step = session.step();
     let total_steps = schedule.total_steps();
 
-    tell(&TrainEvent::Started { step: first_step, total_steps })?;
+    emit(&TrainEvent::Started { step: first_step, total_steps })?;
     if first_step == 0 && session.is_rank_zero() {
-        tell(&TrainEvent::Validated { step: 0, report: &session.validate()?, best: None })?;
+        emit(&TrainEvent::Validated { step: 0, report: &session.validate()?, best: None })?;
     }
     let (tensors, config) = (session.tensors().clone(), session.shared_config());
     let scenes = prefetch(tensors, config, first_step, session.share())
@@ -60,26 +60,26 @@ fn run(
         let at = schedule.at(step);
         if at.first_of_stage || step == first_step {
             let stage = &schedule.stages()[at.stage];
-            tell(&TrainEvent::StageStarted { name: &stage.name, step, steps: stage.steps })?;
+            emit(&TrainEvent::StageStarted { name: &stage.name, step, steps: stage.steps })?;
         }
         let start = Instant::now();
         let prepared =
             scenes.next_item().ok_or_else(|| miette!("the thread that prepares scenes ended early"))??;
         let waited = start.elapsed();
         let report = session.step_on(prepared, &at, start, waited, stop)?;
-        tell(&TrainEvent::Step(&report.record))?;
+        emit(&TrainEvent::Step(&report.record))?;
 
         let done = step + 1;
         match report.verdict {
             Verdict::Fine => {}
             Verdict::Spike { usual } => {
-                tell(&TrainEvent::Spike { step: done, norm: report.record.grad_norm, usual })?;
+                emit(&TrainEvent::Spike { step: done, norm: report.record.grad_norm, usual })?;
             }
             Verdict::Skipped { count, is_over } => {
-                tell(&TrainEvent::Skipped { step: done, count, file: report.incident.as_deref() })?;
+                emit(&TrainEvent::Skipped { step: done, count, file: report.incident.as_deref() })?;
                 if is_over {
                     *kept = done;
-                    tell(&TrainEvent::GaveUp { step: done })?;
+                    emit(&TrainEvent::GaveUp { step: done })?;
                     return Err(session.gave_up(count));
                 }
             }
@@ -93,24 +93,24 @@ fn run(
             if at.last_of_stage || due(validate_every) {
                 let scores = session.validate()?;
                 is_best = session.note_validation(&scores) && output.keep_best;
-                tell(&TrainEvent::Validated { step: done, report: &scores, best: session.best() })?;
+                emit(&TrainEvent::Validated { step: done, report: &scores, best: session.best() })?;
             }
             if at.last_of_stage || due(output.sample_every) {
-                tell(&TrainEvent::SampleDrawn { path: &session.draw_sample()? })?;
+                emit(&TrainEvent::SampleDrawn { path: &session.draw_sample()? })?;
             }
             owed |= due(output.checkpoint_every);
             let is_time = owed && !matches!(report.verdict, Verdict::Skipped { .. });
             if at.last_of_stage || is_time || is_best || stopping {
                 owed = false;
-                tell(&TrainEvent::CheckpointDue { step: done })?;
+                emit(&TrainEvent::CheckpointDue { step: done })?;
                 // A save that failed would fail again.
                 *kept = done;
-                tell(&TrainEvent::CheckpointSaved { step: done, path: &session.save()? })?;
+                emit(&TrainEvent::CheckpointSaved { step: done, path: &session.save()? })?;
             }
         }
         if stopping && done < total_steps {
-            return tell(&TrainEvent::Interrupted { step: done });
+            return emit(&TrainEvent::Interrupted { step: done });
         }
     }
-    tell(&TrainEvent::Finished { step: total_steps })
+    emit(&TrainEvent::Finished { step: total_steps })
 }

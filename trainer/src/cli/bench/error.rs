@@ -3,14 +3,14 @@
 use crate::cli::loading::load_dataset;
 use crate::cli::model_arguments::ModelArguments;
 use crate::cli::output::print_report;
-use crate::cli::table::{row, table};
+use crate::cli::table::{Cell, row, table};
 use crate::cli::values::at_least_one;
 use crate::cli::verbosity::progress_bar;
 use crate::config::{Config, ValidationConfig};
 use crate::dataset::{Dataset, DatasetError, PreparedScene, ValidationGroup, prepare, sample_validation};
 use crate::evaluation::certificates::Dressing;
 use crate::evaluation::equilibrium_error::{
-    Drapes, LBS, MethodError, SceneError, SolverRun, TermEnergies, converged, scene_error,
+    Drapes, MethodError, SceneError, SolverRun, TermEnergies, converged, scene_error,
 };
 use crate::inference::DraperError;
 use crate::inference::networks::{Networks, TensorStore};
@@ -87,14 +87,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let dataset = load_dataset(&config)?;
     let seed = arguments.seed.unwrap_or_else(|| config.validation_seed());
     let scenes = sample_scenes(&dataset, &config, [arguments.scenes, arguments.layers], seed)?;
-    let networks: Vec<Option<Drapes>> = match &trained {
-        Some(trained) => {
-            let drapes = drape(trained, &config, &dataset, &scenes, &arguments.corrections)?;
-            drapes.into_iter().map(Some).collect()
-        }
-        None => scenes.iter().map(|_| None).collect(),
-    };
-    let errors = solve_all(arguments, &config, &scenes, &networks, &settings)?;
+    let drape = |trained| drape(trained, &config, &dataset, &scenes, &arguments.corrections);
+    let drapes = trained.as_ref().map(drape).transpose()?;
+    let errors = solve_all(arguments, &config, &scenes, drapes.as_deref(), &settings)?;
     print_report(arguments.json, &Summary::new(errors, &settings), Summary::tables)
 }
 
@@ -172,14 +167,14 @@ fn solve_all(
     arguments: &Arguments,
     config: &Config,
     scenes: &[PreparedScene],
-    networks: &[Option<Drapes>],
+    drapes: Option<&[Drapes]>,
     settings: &SolverSettings,
 ) -> Result<Vec<SceneError>, Report> {
     let bar = progress_bar(scenes.len(), "scenes {bar:30} {pos}/{len} · {eta} left · {msg}");
     let solve_one = |i: usize| -> Result<SceneError, Report> {
         let scene = ReferenceScene::new(&config.losses, &scenes[i]).into_diagnostic()?;
         let name = scene.garments.join(", ");
-        let result = scene_error(i, &scene, networks[i].as_ref(), settings, &mut |progress| {
+        let result = scene_error(i, &scene, drapes.map(|all| &all[i]), settings, &mut |progress| {
             let step = progress.step;
             bar.set_message(format!("{name}: iteration {}, {:.4} J", step.iteration, step.energy));
             ControlFlow::Continue(())
@@ -313,9 +308,11 @@ impl Summary {
         let (count, solver) = (self.scenes.len(), &self.solver);
         let stops: Vec<String> = solver.stops.iter().map(|(name, count)| format!("{count} {name}")).collect();
         let mut text = format!(
-            "{}\n{}\nconverged (relative gradient ≤ {:e}): {} of {count}; stops: {}\n",
+            "{}\n{}\nsolver: {} steps, {} s\nconverged (relative gradient ≤ {:e}): {} of {count}; stops: {}\n",
             self.scene_table(),
-            self.spread_table(),
+            self.method_table(),
+            solver.iterations.text(),
+            solver.seconds.text(),
             self.tolerance,
             solver.converged,
             stops.join(", ")
@@ -328,8 +325,10 @@ impl Summary {
         }
         text += &format!("\nmean of every energy, weighted [J]\n{}", self.term_table());
         if !self.strain_ratios.is_empty() {
+            let row = |(layer, ratio): (usize, &StrainRatio)| row!["layer" => layer + 1, "equilibrium" => ratio.equilibrium, "network" => ratio.network];
+            let rows: Vec<_> = self.strain_ratios.iter().enumerate().map(row).collect();
             text += "\nstrain in the outfit over that of the garment alone, medians\n";
-            text += &self.ratio_table();
+            text += &table(&rows);
         }
         text
     }
@@ -359,22 +358,16 @@ impl Summary {
         table(&self.scenes.iter().map(row).collect::<Vec<_>>())
     }
 
-    fn spread_table(&self) -> String {
-        let scenes = format!("{} scenes", self.scenes.len());
-        let mut rows = Vec::new();
-        let mut add = |what: String, s: &Spread| {
-            rows.push(row![scenes => what, "mean" => s.mean, "median" => s.median, "95 %" => s.p95]);
-        };
-        for m in &self.methods {
-            add(format!("{}: excess [J]", m.method), &m.excess);
-            if m.method != LBS {
-                add(format!("{}: excess [% of LBS]", m.method), &m.excess_percent);
+    fn method_table(&self) -> String {
+        let method = |m: &MethodSummary| {
+            row! {
+                "mean / median / 95 %" => m.method,
+                "excess [J]" => m.excess,
+                "excess [% of LBS]" => m.excess_percent,
+                "distance [mm]" => m.distance_mm,
             }
-            add(format!("{}: distance [mm]", m.method), &m.distance_mm);
-        }
-        add("solver: steps".into(), &self.solver.iterations);
-        add("solver: seconds".into(), &self.solver.seconds);
-        table(&rows)
+        };
+        table(&self.methods.iter().map(method).collect::<Vec<_>>())
     }
 
     /// Every term of the energy, method by method.
@@ -391,11 +384,5 @@ impl Summary {
             row
         };
         table(&energies.iter().map(row).collect::<Vec<_>>())
-    }
-
-    fn ratio_table(&self) -> String {
-        let ratios = self.strain_ratios.iter().enumerate();
-        let row = |(layer, ratio): (usize, &StrainRatio)| row!["layer" => layer + 1, "equilibrium" => ratio.equilibrium, "network" => ratio.network];
-        table(&ratios.map(row).collect::<Vec<_>>())
     }
 }

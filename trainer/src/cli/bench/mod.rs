@@ -17,13 +17,13 @@ use miette::Report;
 pub enum Bench {
     /// Whether all compute devices of this build agree on loss and gradients, and how fast they are
     Backends(backends::Arguments),
-    /// Random outfits taken out of body and each other: what is left, by exact count, what it changed, how long it took
+    /// The post-process on random outfits: exact intersections that are left, changes, time
     Certificate(certificate::Arguments),
     /// How often the sign of the distance to the body is wrong, by nearest vertex and by closest surface point
     Distance(distance::Arguments),
     /// Energy above the equilibrium and distance to it, for skinning and a trained network, on random scenes
     Error(error::Arguments),
-    /// Every energy on every hard case: finite, bounded, a true gradient, the same in both precisions
+    /// Every energy on every degenerate case: finite, bounded, a true gradient, the same in both precisions
     Stability(stability::Arguments),
     /// Where the time of a training step goes: parts, single networks, losses, memory
     Step(step::Arguments),
@@ -36,7 +36,7 @@ pub enum Bench {
 /// Runs the bench.
 ///
 /// # Errors
-/// When an input cannot be read or a promise does not hold.
+/// When an input cannot be read or a guarantee does not hold.
 pub fn run(bench: &Bench) -> Result<(), Report> {
     match bench {
         Bench::Backends(arguments) => backends::run(arguments),

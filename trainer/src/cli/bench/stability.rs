@@ -1,4 +1,4 @@
-//! `clothcombo bench stability`: the hard cases, one row each.
+//! `clothcombo bench stability`: the degenerate cases, one row each.
 
 use crate::cli::output::print_report;
 use crate::cli::table::{Row, row, table};

@@ -55,7 +55,7 @@ pub fn ask(subject: &Subject, question: usize, scenes: usize) -> Result<Vec<Nume
             dataset.clone(),
         ),
     ];
-    for count in [count.div_ceil(2), 2 * count] {
+    for count in [count.div_ceil(2), count.div_ceil(4)] {
         let mut config = config.clone();
         config.model.eigen_count = count;
         let dataset = Arc::new(Dataset::load(&config, &|_, _, _| {})?);
