@@ -237,8 +237,8 @@ fn write(folder: &Path, found: &Study, page: &Page) -> Result<(), Report> {
         page.sections.iter().map(|s| json!({ "title": s.title, "tables": s.tables })).collect();
     let json = json!({ "facts": page.facts, "study": found, "sections": tables });
     save(JSON, serde_json::to_string_pretty(&json).into_diagnostic()?.as_bytes())?;
-    for (name, _, png) in page.sections.iter().flat_map(|section| &section.pictures) {
-        save(name, png)?;
+    for figure in page.sections.iter().flat_map(|section| &section.figures) {
+        save(&figure.file, &figure.png)?;
     }
     save(MARKDOWN, page.markdown().as_bytes())?;
     save(HTML, page.html().as_bytes())

@@ -1,29 +1,23 @@
-//! Pictures of a run, made without a GPU: shaded renders of body and garments, labelled sheets of them, loss curves.
+//! Pictures of a run, made without a GPU: shaded renders of body and garments, labelled sheets of them,
+//! charts.
 //!
 //! Nothing here knows a network or a dataset: positions and faces come in as plain slices, pictures go out as
 //! [`image::RgbImage`], and [`save_png`] writes them whole or not at all. Input that cannot be drawn (a vertex that
 //! is not finite, a face that names no vertex) is left out of the picture: a training run must not end because one
 //! of its samples is ugly.
 
-pub(crate) mod axis;
-mod bars;
-mod canvas;
-mod curves;
-mod font;
-mod lines;
 mod outfits;
 mod palette;
 mod render;
 mod save;
 mod shade;
 mod sheet;
+pub(crate) mod svg;
 
 pub mod camera;
+pub mod chart;
 
-pub use bars::{Bar, draw_bars};
 pub use camera::{Camera, View};
-pub use curves::{Series, StageBoundary, draw_curves};
-pub use lines::{Line, LinePanel, draw_lines};
 pub use outfits::{DressedRow, MeshSlices, draw_dressed};
 pub use palette::{BODY_COLOUR, LAYER_COLOURS, layer_colour};
 pub use render::{Figure, render, render_with_camera};
@@ -63,12 +57,24 @@ pub enum PictureError {
         /// What the encoder said.
         source: image::ImageError,
     },
-    /// The plotting dataset refused a panel.
-    #[error("cannot draw the curve of `{series}`: {reason}")]
-    Plot {
-        /// Name of the series.
-        series: String,
-        /// What the dataset said.
-        reason: String,
-    },
+}
+
+pub use chart::Line;
+
+/// Charts that share a title.
+#[derive(Default)]
+pub struct LinePanel {
+    /// Title.
+    pub title: String,
+    /// Lines.
+    pub lines: Vec<Line>,
+}
+
+/// A picture of the panels.
+///
+/// # Errors
+/// Never.
+pub fn draw_lines(title: &str, panels: &[LinePanel]) -> Result<image::RgbImage, PictureError> {
+    let charts = panels.iter().map(|panel| chart::Chart::of_lines(&panel.title, &panel.lines)).collect();
+    Ok(chart::ChartGrid { title: title.to_owned(), legend: Vec::new(), charts }.draw())
 }

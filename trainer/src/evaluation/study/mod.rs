@@ -25,7 +25,7 @@ pub use extremes::Extreme;
 pub use gallery::Picture;
 pub use layers::LayerCount;
 pub use methods::{CategoryResult, Comparison, MethodResult, Methods};
-pub use page::{Page, Section};
+pub use page::{Figure, Page, Section};
 pub use pareto::{Pareto, Point, Sample};
 pub use sets::{DataSet, GarmentSet, Sets};
 pub use sizes::Sizes;

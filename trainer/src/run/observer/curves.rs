@@ -2,9 +2,11 @@
 
 use super::history::SharedHistory;
 use crate::config::{Config, stage_starts};
-use crate::picture::{Series, StageBoundary, draw_curves, save_png};
-use crate::run::event::{Observer, StepRecord, TrainEvent};
+use crate::picture::chart::{ChartGrid, StageBoundary, Steps};
+use crate::picture::save_png;
+use crate::run::event::{Observer, TrainEvent};
 use crate::run::folder::RunDir;
+use crate::run::report::charts;
 use miette::{IntoDiagnostic, Report};
 use std::path::PathBuf;
 
@@ -12,6 +14,7 @@ use std::path::PathBuf;
 pub struct CurvesObserver {
     path: PathBuf,
     stages: Vec<StageBoundary>,
+    total_steps: u64,
     history: SharedHistory,
     drawn_at: u64,
 }
@@ -19,21 +22,20 @@ pub struct CurvesObserver {
 impl CurvesObserver {
     /// Draws what `history` holds.
     pub fn new(run: &RunDir, config: &Config, history: SharedHistory) -> Self {
-        Self { path: run.curves(), stages: stage_boundaries(config), history, drawn_at: u64::MAX }
+        Self {
+            path: run.curves(),
+            stages: stage_boundaries(config),
+            total_steps: config.total_steps(),
+            history,
+            drawn_at: u64::MAX,
+        }
     }
 
     fn draw(&self) -> Result<(), Report> {
-        let history = self.history.borrow();
-        let series = |name: &'static str, unit: &str| Series {
-            name: name.to_owned(),
-            unit: unit.to_owned(),
-            points: history.points(name).to_vec(),
-            baseline: history.baselines.get(name).copied(),
-        };
-        let mut all = vec![series("loss", "weighted J"), series("grad_norm", "before clipping")];
-        all.extend(StepRecord::term_names().map(|n| series(n, "raw")));
-        let picture = draw_curves("Training", &all, &self.stages).into_diagnostic()?;
-        save_png(&picture, &self.path).into_diagnostic()
+        let steps = Steps { total: self.total_steps, stages: &self.stages };
+        let charts = charts(&self.history.borrow(), &steps).into_iter().map(|(_, chart)| chart);
+        let grid = ChartGrid { title: "Training".into(), legend: Steps::legend(), charts: charts.collect() };
+        save_png(&grid.draw(), &self.path).into_diagnostic()
     }
 }
 

@@ -4,7 +4,7 @@ use super::curves::stage_boundaries;
 use super::history::SharedHistory;
 use crate::config::{Config, to_toml};
 use crate::dataset::LicenceLine;
-use crate::picture::StageBoundary;
+use crate::picture::chart::StageBoundary;
 use crate::run::event::{Observer, TrainEvent};
 use crate::run::folder::RunDir;
 use crate::run::memory::MemoryEstimate;
