@@ -3,7 +3,7 @@
 use image::{Rgb, RgbImage};
 use std::fmt::Write;
 
-use super::svg::{draw_elements, fitted, text_width, write_text};
+use super::svg::{css_colour, draw_elements, fitted, text_width, write_text};
 
 const PAPER: Rgb<u8> = Rgb([250, 250, 249]);
 /// Space around text and between cells (pixels).
@@ -106,15 +106,14 @@ impl SheetRow {
         write_text(labels, "label", [left, baseline], TEXT, &label);
         let mut x =
             (left + text_width(&label, TEXT) + if label.is_empty() { 0.0 } else { 3.0 * gap }).round();
-        for LegendEntry { colour: [red, green, blue], name } in &self.legend {
+        for LegendEntry { colour, name } in &self.legend {
             let entry_width = patch + gap + text_width(name, TEXT);
             if x + entry_width > left + width {
                 break;
             }
-            let _ = write!(
-                labels,
-                r#"<path class="patch" fill="rgb({red},{green},{blue})" d="M{x} {top}h{patch}v{patch}h-{patch}Z"/>"#
-            );
+            let fill = css_colour(*colour);
+            let square = format!("M{x} {top}h{patch}v{patch}h-{patch}Z");
+            let _ = write!(labels, r#"<path class="patch" fill="{fill}" d="{square}"/>"#);
             write_text(labels, "label", [x + patch + gap, baseline], TEXT, name);
             x = (x + entry_width + 3.0 * gap).round();
         }

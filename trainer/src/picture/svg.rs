@@ -34,6 +34,11 @@ fn parsed(elements: &str) -> Tree {
     Tree::from_str(&svg, &OPTIONS).expect("elements with escaped text are well-formed")
 }
 
+/// A colour as the value of an attribute.
+pub(super) fn css_colour([red, green, blue]: [u8; 3]) -> String {
+    format!("rgb({red},{green},{blue})")
+}
+
 /// Writes `text` with its baseline starting, centred or ending at a point, as the CSS class says.
 pub(super) fn write_text(svg: &mut String, class: &str, [x, y]: [f64; 2], size: f64, text: &str) {
     let text = escape(text);

@@ -2,7 +2,7 @@
 
 use super::{Key, MARGIN, PAPER, SCALE, TEXT_SIZE, legend, legend_height};
 use crate::picture::palette::{LAYER_COLOURS, layer_colour};
-use crate::picture::svg::{draw_elements, fitted, write_text};
+use crate::picture::svg::{css_colour, draw_elements, fitted, write_text};
 use image::RgbImage;
 use std::fmt::Write;
 
@@ -27,7 +27,7 @@ pub struct Bar {
 /// Draws a bar of equal length per whole, divided by the shares of its parts, under a legend of the `parts`' names.
 pub fn draw_bars(title: &str, parts: &[&str], bars: &[Bar]) -> RgbImage {
     let keys: Vec<Key> =
-        parts.iter().enumerate().map(|(part, name)| Key::area(colour(part), *name)).collect();
+        parts.iter().enumerate().map(|(part, name)| Key::area(&colour(part), name)).collect();
     let top = 30.0 + legend_height(&keys, WIDTH);
     let bottom = top + STEP * bars.len() as f64;
     let (left, length) = (MARGIN + LABEL, WIDTH - 2.0 * MARGIN - LABEL - TOTAL);
@@ -61,8 +61,8 @@ pub fn draw_bars(title: &str, parts: &[&str], bars: &[Bar]) -> RgbImage {
 /// Attributes with the colour of a part: the palette, and when that is used up the same darker.
 fn colour(part: usize) -> String {
     let divisor = if part < LAYER_COLOURS.len() { 1 } else { 2 };
-    let [red, green, blue] = layer_colour(part).map(|channel| channel / divisor);
-    format!(r#"class="patch" fill="rgb({red},{green},{blue})""#)
+    let colour = layer_colour(part).map(|channel| channel / divisor);
+    format!(r#"class="patch" fill="{}""#, css_colour(colour))
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use super::axis::Axis;
 use super::{Chart, Key};
 use crate::picture::layer_colour;
+use crate::picture::svg::css_colour;
 
 /// One measured quantity.
 #[derive(Clone, Debug, Default)]
@@ -19,11 +20,9 @@ impl Chart {
         let drawable = |point: &&(f64, f64)| point.0.is_finite() && point.1.is_finite();
         let points = || lines.iter().flat_map(|line| &line.points).filter(drawable);
         let axes = [Axis::fitting(points().map(|p| p.0)), Axis::fitting(points().map(|p| p.1))];
-        let attributes = |class: &str, index: usize| {
-            let [red, green, blue] = layer_colour(index);
-            format!(r#"class="{class}" stroke="rgb({red},{green},{blue})""#)
-        };
-        let keys = lines.iter().enumerate().map(|(i, line)| Key::line(attributes("line", i), &line.name));
+        let attributes =
+            |class: &str, index| format!(r#"class="{class}" stroke="{}""#, css_colour(layer_colour(index)));
+        let keys = lines.iter().enumerate().map(|(i, line)| Key::line(&attributes("line", i), &line.name));
         let mut chart = Self::new(title, "", axes, keys.collect());
         for (index, line) in lines.iter().enumerate() {
             let points: Vec<(f64, f64)> = line.points.iter().filter(drawable).copied().collect();

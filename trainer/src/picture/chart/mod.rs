@@ -7,7 +7,8 @@ mod steps;
 
 pub use bars::{Bar, draw_bars};
 pub use lines::Line;
-pub use steps::{Curve, StageBoundary, Steps};
+pub(crate) use steps::median_of_last;
+pub use steps::{StageBoundary, Steps};
 
 use super::svg::{draw_elements, escape, fitted, text_width, write_text};
 use axis::Axis;
@@ -120,10 +121,8 @@ impl Chart {
 
 /// What a mark stands for.
 pub struct Key {
-    /// Attributes of the mark: its class, or its colour.
-    attributes: String,
-    /// Whether the mark is an area rather than a line.
-    is_area: bool,
+    /// A sample of the mark.
+    swatch: String,
     /// What it stands for.
     pub name: String,
 }
@@ -132,26 +131,17 @@ impl Key {
     /// Width and height of a swatch.
     const SWATCH: [f64; 2] = [20.0, 10.0];
 
-    fn line(attributes: impl Into<String>, name: impl Into<String>) -> Self {
-        Self { attributes: attributes.into(), is_area: false, name: name.into() }
+    fn line(attributes: &str, name: &str) -> Self {
+        Self { swatch: format!(r#"<path {attributes} d="M0 5h20"/>"#), name: name.to_owned() }
     }
 
-    fn area(attributes: impl Into<String>, name: impl Into<String>) -> Self {
-        Self { attributes: attributes.into(), is_area: true, name: name.into() }
+    fn area(attributes: &str, name: &str) -> Self {
+        Self { swatch: format!(r#"<path {attributes} d="M0 0h20v10h-20Z"/>"#), name: name.to_owned() }
     }
 
-    /// A sample of the mark as an element of a page.
+    /// The swatch as an element of a page.
     pub fn svg(&self) -> String {
-        element(Self::SWATCH, &self.name, &self.swatch([0.0; 2]))
-    }
-
-    fn swatch(&self, [left, top]: [f64; 2]) -> String {
-        let [width, height] = Self::SWATCH;
-        let attributes = &self.attributes;
-        match self.is_area {
-            true => format!(r#"<path {attributes} d="M{left:.1} {top}h{width}v{height}h-{width}Z"/>"#),
-            false => format!(r#"<path {attributes} d="M{left:.1} {}h{width}"/>"#, top + 0.5 * height),
-        }
+        element(Self::SWATCH, &self.name, &self.swatch)
     }
 }
 
@@ -176,10 +166,10 @@ fn legend_height(keys: &[Key], width: f64) -> f64 {
 
 fn legend(keys: &[Key], [left, top]: [f64; 2], width: f64) -> String {
     let mut svg = String::new();
-    for (key, [x, y]) in keys.iter().zip(legend_places(keys, width)) {
-        svg += &key.swatch([left + x, top + y]);
-        let after = left + x + Key::SWATCH[0] + 5.0;
-        write_text(&mut svg, "key", [after, top + y + 8.5], TEXT_SIZE, &key.name);
+    for (Key { swatch, name }, [x, y]) in keys.iter().zip(legend_places(keys, width)) {
+        let _ = write!(svg, r#"<g transform="translate({:.1} {})">{swatch}"#, left + x, top + y);
+        write_text(&mut svg, "key", [Key::SWATCH[0] + 5.0, 8.5], TEXT_SIZE, name);
+        svg += "</g>";
     }
     svg
 }

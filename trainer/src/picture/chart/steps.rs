@@ -22,24 +22,13 @@ pub struct StageBoundary {
     pub name: String,
 }
 
-/// A quantity over the steps.
-pub struct Curve<'a> {
-    /// Its name.
-    pub title: &'a str,
-    /// Its unit; empty for none.
-    pub unit: &'a str,
-    /// (step, value), ascending.
-    pub points: &'a [(f64, f64)],
-    /// The same quantity for linear blend skinning alone.
-    pub baseline: Option<f64>,
-}
-
 /// The steps of a run.
-pub struct Steps<'a> {
+#[derive(Clone, Debug)]
+pub struct Steps {
     /// Their number.
     pub total: u64,
-    /// Where stages begin.
-    pub stages: &'a [StageBoundary],
+    /// Where stages begin, ascending.
+    pub stages: Vec<StageBoundary>,
 }
 
 /// Values of one part of the run.
@@ -51,7 +40,7 @@ struct Bin {
     high: f64,
 }
 
-impl Steps<'_> {
+impl Steps {
     /// What the marks of [`Steps::curve`] stand for.
     pub fn legend() -> Vec<Key> {
         vec![
@@ -62,20 +51,21 @@ impl Steps<'_> {
         ]
     }
 
-    /// The median of a quantity in a band from the 5th to the 95th percentile, the baseline, and where stages begin.
-    pub fn curve(&self, curve: &Curve) -> Chart {
-        let bins = self.bins(curve.points);
+    /// The median of a quantity in a band from the 5th to the 95th percentile, its `baseline` with linear blend skinning
+    /// alone, and where stages begin. `points` are (step, value), ascending.
+    pub fn curve(&self, title: &str, unit: &str, points: &[(f64, f64)], baseline: Option<f64>) -> Chart {
+        let bins = self.bins(points);
         let line = |value: fn(&Bin) -> f64| bins.iter().map(|b| (b.step, value(b))).collect::<Vec<_>>();
         let [low, median, high] = [line(|b| b.low), line(|b| b.median), line(|b| b.high)];
-        let baseline = curve.baseline.filter(|value| value.is_finite());
+        let baseline = baseline.filter(|value| value.is_finite());
         let values = low.iter().chain(&high).map(|point| point.1).chain(baseline);
-        let mut chart = self.chart(curve.title, curve.unit, Axis::fitting(values), Vec::new());
+        let mut chart = self.chart(title, unit, Axis::fitting(values), Vec::new());
         chart.area(r#"class="band""#, &high, &low);
         if let Some(value) = baseline {
             chart.line(r#"class="baseline""#, &[(0.0, value), (self.total as f64, value)]);
         }
         chart.line(r#"class="curve""#, &median);
-        chart.latest = latest_text(latest(curve.points), baseline);
+        chart.latest = latest_text(points, baseline);
         chart
     }
 
@@ -83,7 +73,7 @@ impl Steps<'_> {
     pub fn stacked(&self, title: &str, unit: &str, parts: &[(&str, Vec<(f64, f64)>)]) -> Chart {
         let keys = parts.iter().enumerate().map(|(i, (name, points))| {
             let latest = number_text(latest(points).unwrap_or(0.0), 3);
-            Key::area(format!(r#"class="part{i}""#), format!("{name} {latest}"))
+            Key::area(&format!(r#"class="part{i}""#), &format!("{name} {latest}"))
         });
         let bins: Vec<Vec<Bin>> = parts.iter().map(|(_, points)| self.bins(points)).collect();
         let ground = bins.iter().take(1).flatten().map(|b| (b.step, 0.0)).collect();
@@ -151,27 +141,30 @@ fn sorted(points: &[(f64, f64)]) -> Vec<f64> {
     values
 }
 
-/// Where the curve is now: the median of its last fortieth, twenty points at least.
-fn latest(points: &[(f64, f64)]) -> Option<f64> {
-    let count = (points.len() / 40).max(20);
+/// The median of the last `count` values, of those that are finite.
+pub(crate) fn median_of_last(points: &[(f64, f64)], count: usize) -> Option<f64> {
     let mut values = sorted(&points[points.len().saturating_sub(count)..]);
     values.retain(|value| value.is_finite());
     values.get(values.len() / 2).copied()
 }
 
+/// Where the curve is now: the median of its last fortieth, twenty points at least.
+fn latest(points: &[(f64, f64)]) -> Option<f64> {
+    median_of_last(points, (points.len() / 40).max(20))
+}
+
 /// The latest value, beside the baseline.
-fn latest_text(latest: Option<f64>, baseline: Option<f64>) -> String {
-    let value = latest.map_or_else(|| "no data".into(), |value| number_text(value, 3));
-    let lbs = baseline.map(|baseline| {
-        let ratio = match latest {
-            Some(value) if value >= 0.0 && baseline > 0.0 => {
-                format!("{} × ", number_text(value / baseline, 2))
-            }
-            _ => String::new(),
-        };
-        format!(r#"<tspan class="lbs" dx="5">{ratio}LBS {}</tspan>"#, number_text(baseline, 3))
-    });
-    value + &lbs.unwrap_or_default()
+fn latest_text(points: &[(f64, f64)], baseline: Option<f64>) -> String {
+    let Some(value) = latest(points) else { return "no data".to_owned() };
+    let mut text = number_text(value, 3);
+    if let Some(baseline) = baseline {
+        text += r#"<tspan class="lbs" dx="5">"#;
+        if value >= 0.0 && baseline > 0.0 {
+            text += &format!("{} × ", number_text(value / baseline, 2));
+        }
+        text += &format!("LBS {}</tspan>", number_text(baseline, 3));
+    }
+    text
 }
 
 #[cfg(test)]
@@ -181,7 +174,7 @@ mod tests {
 
     #[test]
     fn bins_hold_the_spread_of_their_part_and_no_nan() {
-        let steps = Steps { total: 2400, stages: &[] };
+        let steps = Steps { total: 2400, stages: Vec::new() };
         let mut points: Vec<(f64, f64)> = (0..2400).map(|i| (f64::from(i), f64::from(i % 10))).collect();
         points[17].1 = f64::NAN;
         let bins = steps.bins(&points);
@@ -191,7 +184,7 @@ mod tests {
 
     #[test]
     fn bins_of_a_short_run_ignore_outliers_in_the_median_and_show_them_in_the_band() {
-        let steps = Steps { total: 100, stages: &[] };
+        let steps = Steps { total: 100, stages: Vec::new() };
         let mut points: Vec<(f64, f64)> =
             (0..100).map(|k| (f64::from(k), (f64::from(k) * 0.37).sin())).collect();
         points[50].1 = 1e9;
@@ -224,12 +217,12 @@ mod tests {
         ];
         for points in cases {
             for baseline in [None, Some(0.0), Some(-3.0), Some(2.0), Some(f64::NAN)] {
-                let stages = [
+                let stages = vec![
                     StageBoundary { step: 0.0, name: "one & two".into() },
                     StageBoundary { step: f64::NAN, name: "never".into() },
                 ];
-                let steps = Steps { total: 10, stages: &stages };
-                let curve = steps.curve(&Curve { title: "a < b", unit: "J", points: &points, baseline });
+                let steps = Steps { total: 10, stages };
+                let curve = steps.curve("a < b", "J", &points, baseline);
                 let svg = curve.svg();
                 assert!(svg.contains("a &lt; b") && svg.contains("one &amp; two"));
                 assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
@@ -244,8 +237,8 @@ mod tests {
         let points: Vec<(f64, f64)> =
             (0..400).map(|k| (f64::from(k), 50.0 * (-0.01 * f64::from(k)).exp())).collect();
         let count = |stages: &[StageBoundary], baseline, colour: [u8; 3]| {
-            let steps = Steps { total: 400, stages };
-            let charts = vec![steps.curve(&Curve { title: "strain", unit: "J", points: &points, baseline })];
+            let steps = Steps { total: 400, stages: stages.to_vec() };
+            let charts = vec![steps.curve("strain", "J", &points, baseline)];
             let picture = ChartGrid { title: "run".into(), legend: Vec::new(), charts }.draw();
             let near = |p: &&image::Rgb<u8>| p.0.iter().zip(colour).all(|(a, b)| a.abs_diff(b) < 40);
             picture.pixels().filter(near).count()

@@ -1,6 +1,6 @@
 //! The charts of a run: a quantity each, over the steps.
 
-use crate::picture::chart::{Chart, Curve, Steps};
+use crate::picture::chart::{Chart, Steps};
 use crate::run::event::StepRecord;
 use crate::run::observer::History;
 
@@ -8,7 +8,7 @@ use crate::run::observer::History;
 pub(crate) fn charts(history: &History, steps: &Steps) -> Vec<(&'static str, Chart)> {
     let draw = |name: &'static str, title: &str, unit: &str| {
         let baseline = history.baselines.get(name).copied();
-        (name, steps.curve(&Curve { title, unit, points: history.points(name), baseline }))
+        (name, steps.curve(title, unit, history.points(name), baseline))
     };
     let mut charts =
         vec![draw("loss", "loss", "weighted J"), draw("grad_norm", "gradient norm", "before clipping")];

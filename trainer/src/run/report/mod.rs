@@ -7,7 +7,7 @@ pub(super) use charts::charts;
 
 use crate::dataset::LicenceLine;
 use crate::picture::chart::axis::number_text;
-use crate::picture::chart::{StageBoundary, Steps};
+use crate::picture::chart::{Steps, median_of_last};
 use crate::picture::svg;
 use crate::run::memory::MemoryEstimate;
 use crate::run::observer::History;
@@ -51,13 +51,11 @@ pub struct Page<'a> {
     /// Where it stands.
     pub state: RunState,
     /// Steps of the whole run.
-    pub total_steps: u64,
+    pub steps: &'a Steps,
     /// When this page was made [s since 1970].
     pub made: u64,
     /// Steps per second of this session.
     pub speed: Option<f64>,
-    /// Where stages begin.
-    pub stages: &'a [StageBoundary],
     /// The logs.
     pub history: &'a History,
     /// The configuration, as TOML.
@@ -106,12 +104,12 @@ impl Page<'_> {
     fn header(&self) -> String {
         let step = self.history.last.as_ref().map_or(0, |(step, _)| *step);
         let stage = self.history.last.as_ref().map_or("", |(_, stage)| stage.as_str());
-        let percent = 100.0 * step as f64 / self.total_steps.max(1) as f64;
-        let mut tiles = vec![("step", format!("{step} of {}", self.total_steps)), ("stage", escape(stage))];
+        let percent = 100.0 * step as f64 / self.steps.total.max(1) as f64;
+        let mut tiles = vec![("step", format!("{step} of {}", self.steps.total)), ("stage", escape(stage))];
         if let Some(speed) = self.speed.filter(|s| *s > 0.0) {
             tiles.push(("speed", format!("{} steps/s", number_text(speed, 3))));
             if self.state == RunState::Running {
-                let left = (self.total_steps.saturating_sub(step)) as f64 / speed;
+                let left = (self.steps.total.saturating_sub(step)) as f64 / speed;
                 tiles.push(("time left", duration(left)));
             }
         }
@@ -147,8 +145,7 @@ impl Page<'_> {
             .iter()
             .map(|key| format!("<span>{}{}</span> ", key.svg(), escape(&key.name)))
             .collect();
-        let steps = Steps { total: self.total_steps, stages: self.stages };
-        let figures: String = charts(self.history, &steps)
+        let figures: String = charts(self.history, self.steps)
             .iter()
             .map(|(name, chart)| format!("<figure id=\"chart-{name}\">{}</figure>\n", chart.svg()))
             .collect();
@@ -236,13 +233,6 @@ impl Page<'_> {
         out.push_str("</table></section>\n");
         out
     }
-}
-
-fn median_of_last(points: &[(f64, f64)], count: usize) -> Option<f64> {
-    let mut last: Vec<f64> =
-        points[points.len().saturating_sub(count)..].iter().map(|p| p.1).filter(|v| v.is_finite()).collect();
-    last.sort_by(f64::total_cmp);
-    last.get(last.len() / 2).copied()
 }
 
 /// Seconds as `3 h 20 min`, `20 min` or `45 s`.
