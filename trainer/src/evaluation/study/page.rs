@@ -1,7 +1,8 @@
 //! The report as Markdown with pictures beside it, and as one HTML page that needs nothing but itself.
 
 use super::table::Table;
-use crate::picture::svg::{self, escape};
+use crate::picture::svg;
+use crate::run::report::html::escape;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 

@@ -103,7 +103,7 @@ impl Steps {
             let line = format!("M{x:.1} {top}V{bottom}");
             let tooltip = escape(name);
             let _ = write!(chart.marks, r#"<path class="stage" d="{line}"><title>{tooltip}</title></path>"#);
-            let shown = fitted(name, next - x - 4.0, STAGE_SIZE);
+            let shown = fitted(name, next - x - 6.0, STAGE_SIZE);
             if shown == *name || shown.chars().count() > 3 {
                 write_text(&mut chart.marks, "stage-name", [x, top - 3.0], STAGE_SIZE, &shown);
             }

@@ -50,7 +50,7 @@ pub struct Page<'a> {
     pub name: &'a str,
     /// Where it stands.
     pub state: RunState,
-    /// Steps of the whole run.
+    /// The steps of the run and its stages.
     pub steps: &'a Steps,
     /// When this page was made [s since 1970].
     pub made: u64,
