@@ -228,8 +228,8 @@ fn write(folder: &Path, found: &Study, page: &Page) -> Result<(), Report> {
         page.sections.iter().map(|s| json!({ "title": s.title, "tables": s.tables })).collect();
     let json = json!({ "facts": page.facts, "study": found, "sections": tables });
     write_json(&folder.join(JSON), &json)?;
-    for (name, _, png) in page.sections.iter().flat_map(|section| &section.pictures) {
-        write_file(&folder.join(name), png)?;
+    for figure in page.sections.iter().flat_map(|section| &section.figures) {
+        write_file(&folder.join(&figure.file), &figure.png)?;
     }
     write_file(&folder.join(MARKDOWN), page.markdown().as_bytes())?;
     write_file(&folder.join(HTML), page.html().as_bytes())

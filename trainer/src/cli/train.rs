@@ -11,7 +11,7 @@ use crate::run::event::Observer;
 use crate::run::folder::RunDir;
 use crate::run::memory::MemoryEstimate;
 use crate::run::observer::{
-    CurvesObserver, History, HistoryObserver, LogObserver, MetricsObserver, ProgressObserver, ReportObserver,
+    History, HistoryObserver, LogObserver, MetricsObserver, ProgressObserver, ReportObserver,
     TensorBoardObserver,
 };
 use crate::system::device::Backend;
@@ -241,12 +241,8 @@ fn observers(
     let metrics = MetricsObserver::new(run, step, config.output.metrics_every)?;
     let history = Rc::new(RefCell::new(History::read(run)?));
     let report = ReportObserver::new(run, config, dataset.licences(), memory, history.clone())?;
-    let mut observers: Vec<Box<dyn Observer>> = vec![
-        Box::new(metrics),
-        Box::new(LogObserver::new(run)?),
-        Box::new(HistoryObserver(history.clone())),
-        Box::new(CurvesObserver::new(run, config, history.clone())),
-    ];
+    let mut observers: Vec<Box<dyn Observer>> =
+        vec![Box::new(metrics), Box::new(LogObserver::new(run)?), Box::new(HistoryObserver(history.clone()))];
     if config.output.tensorboard {
         observers.push(Box::new(TensorBoardObserver::new(run, step, config.output.metrics_every)?));
     }

@@ -6,25 +6,18 @@
 //! is not finite, a face that names no vertex) is left out of the picture: a training run must not end because one
 //! of its samples is ugly.
 
-pub(crate) mod axis;
-mod bars;
-mod canvas;
-mod curves;
-mod font;
-mod lines;
 mod outfits;
 mod palette;
 mod render;
 mod save;
 mod shade;
 mod sheet;
+pub(crate) mod svg;
 
 pub mod camera;
+pub mod chart;
 
-pub use bars::{Bar, draw_bars};
 pub use camera::{Camera, View};
-pub use curves::{Series, StageBoundary, draw_curves};
-pub use lines::{Line, LinePanel, draw_lines};
 pub use outfits::{DressedRow, MeshSlices, draw_dressed};
 pub use palette::{BODY_COLOUR, LAYER_COLOURS, layer_colour};
 pub use render::{Figure, render, render_with_camera};
@@ -63,13 +56,5 @@ pub enum PictureError {
         height: u32,
         /// What the encoder said.
         source: image::ImageError,
-    },
-    /// The plotting library refused a panel.
-    #[error("cannot draw the curve of `{series}`: {reason}")]
-    Plot {
-        /// Name of the series.
-        series: String,
-        /// What the library said.
-        reason: String,
     },
 }

@@ -1,17 +1,17 @@
 //! Several pictures on one labelled sheet: a row per scene, a column per method and view.
 
 use image::{Rgb, RgbImage};
+use std::fmt::Write;
 
-use super::font::{CAPITAL_HEIGHT, draw_text, fitted, text_size};
+use super::svg::{css_colour, draw_elements, fitted, text_width, write_text};
 
 const PAPER: Rgb<u8> = Rgb([250, 250, 249]);
-const INK: Rgb<u8> = Rgb([52, 56, 62]);
-const SCALE: u32 = 2;
-/// Space around text and between cells [pixels].
+/// Space around text and between cells (pixels).
 const GAP: u32 = 8;
-const LINE: u32 = CAPITAL_HEIGHT * SCALE + 2 * GAP;
-/// Side of the colour patch of a legend entry [pixels].
-const PATCH: u32 = CAPITAL_HEIGHT * SCALE;
+/// Font size, height of capitals and of a line (pixels).
+const TEXT: f64 = 18.0;
+const CAPITAL: u32 = 14;
+const LINE: u32 = CAPITAL + 2 * GAP;
 
 /// A colour and what it stands for.
 #[derive(Clone, Debug)]
@@ -63,24 +63,26 @@ impl Sheet {
             GAP + title_height + heading_height + heights.iter().map(|h| LINE + h + GAP).sum::<u32>();
         let mut sheet = RgbImage::from_pixel(width, height, PAPER);
 
-        let left = i64::from(GAP);
-        let inner = width - 2 * GAP.min(width / 2);
+        let mut labels = String::new();
+        let left = f64::from(GAP);
+        let inner = f64::from(width) - 2.0 * left;
         let mut top = GAP;
         if !self.title.is_empty() {
-            draw_text(&mut sheet, [left, i64::from(top)], &fitted(&self.title, inner, SCALE), SCALE, INK);
+            let title = fitted(&self.title, inner, TEXT);
+            write_text(&mut labels, "label", [left, f64::from(top + CAPITAL)], TEXT, &title);
             top += title_height;
         }
         let mut x = GAP;
         for (heading, &column_width) in self.columns.iter().zip(&widths) {
-            let heading = fitted(heading, column_width, SCALE);
-            let indent = (column_width - text_size(&heading, SCALE)[0].min(column_width)) / 2;
-            draw_text(&mut sheet, [i64::from(x + indent), i64::from(top + GAP)], &heading, SCALE, INK);
+            let heading = fitted(heading, f64::from(column_width), TEXT);
+            let middle = f64::from(x) + 0.5 * f64::from(column_width);
+            write_text(&mut labels, "heading", [middle, f64::from(top + GAP + CAPITAL)], TEXT, &heading);
             x += column_width + GAP;
         }
         top += heading_height;
 
         for (row, row_height) in self.rows.iter().zip(heights) {
-            row.draw_label(&mut sheet, [GAP, top + GAP], inner);
+            row.write_label(&mut labels, [left, f64::from(top + GAP)], inner);
             top += LINE;
             let mut x = GAP;
             for (cell, column_width) in row.cells.iter().zip(&widths) {
@@ -90,30 +92,30 @@ impl Sheet {
             }
             top += row_height + GAP;
         }
+        draw_elements(&mut sheet, &labels, 1.0);
         sheet
     }
 }
 
 impl SheetRow {
     /// The label, then as many legend entries as fit into `width` pixels.
-    fn draw_label(&self, sheet: &mut RgbImage, [left, top]: [u32; 2], width: u32) {
-        let label = fitted(&self.label, width, SCALE);
-        draw_text(sheet, [i64::from(left), i64::from(top)], &label, SCALE, INK);
-        let mut x = left + text_size(&label, SCALE)[0] + if label.is_empty() { 0 } else { 3 * GAP };
-        for entry in &self.legend {
-            let entry_width = PATCH + GAP + text_size(&entry.name, SCALE)[0];
+    fn write_label(&self, labels: &mut String, [left, top]: [f64; 2], width: f64) {
+        let [gap, patch] = [GAP, CAPITAL].map(f64::from);
+        let baseline = top + patch;
+        let label = fitted(&self.label, width, TEXT);
+        write_text(labels, "label", [left, baseline], TEXT, &label);
+        let mut x =
+            (left + text_width(&label, TEXT) + if label.is_empty() { 0.0 } else { 3.0 * gap }).round();
+        for LegendEntry { colour, name } in &self.legend {
+            let entry_width = patch + gap + text_width(name, TEXT);
             if x + entry_width > left + width {
                 break;
             }
-            for dy in 0..PATCH {
-                for dx in 0..PATCH {
-                    if let Some(pixel) = sheet.get_pixel_mut_checked(x + dx, top + dy) {
-                        *pixel = Rgb(entry.colour);
-                    }
-                }
-            }
-            draw_text(sheet, [i64::from(x + PATCH + GAP), i64::from(top)], &entry.name, SCALE, INK);
-            x += entry_width + 3 * GAP;
+            let fill = css_colour(*colour);
+            let square = format!("M{x} {top}h{patch}v{patch}h-{patch}Z");
+            let _ = write!(labels, r#"<path class="patch" fill="{fill}" d="{square}"/>"#);
+            write_text(labels, "label", [x + patch + gap, baseline], TEXT, name);
+            x = (x + entry_width + 3.0 * gap).round();
         }
     }
 }
@@ -142,8 +144,8 @@ mod tests {
         };
         let picture = sheet.compose();
         assert_eq!(count(&picture, CELL), 120 * 40 + 30 * 70 + 50 * 50);
-        assert_eq!(count(&picture, Rgb([1, 2, 3])), (PATCH * PATCH) as usize);
-        assert!(count(&picture, INK) > 100);
+        assert_eq!(count(&picture, Rgb([1, 2, 3])), (CAPITAL * CAPITAL) as usize);
+        assert!(picture.pixels().filter(|p| p.0[0] < 70 && p.0[2] > p.0[0]).count() > 100, "text");
     }
 
     #[test]
@@ -152,7 +154,8 @@ mod tests {
         let row = SheetRow { label: "scene".into(), legend: vec![entry], cells: vec![RgbImage::new(90, 20)] };
         let picture = Sheet { rows: vec![row], ..Sheet::default() }.compose();
         assert_eq!(count(&picture, Rgb([1, 2, 3])), 0);
-        assert_eq!(count(&Sheet::default().compose(), INK), 0);
+        let empty = Sheet::default().compose();
+        assert_eq!(count(&empty, PAPER), (empty.width() * empty.height()) as usize);
         let only_labels = Sheet { title: "t".into(), columns: vec![], rows: vec![SheetRow::default()] };
         assert!(only_labels.compose().width() > 0);
     }

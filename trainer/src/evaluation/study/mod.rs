@@ -27,7 +27,7 @@ pub use gallery::Picture;
 pub use layers::LayerCount;
 pub use methods::{CategoryResult, Comparison, MethodResult, Methods};
 pub use numerics::NumericalChoice;
-pub use page::{Page, Section};
+pub use page::{Figure, Page, Section};
 pub use pareto::{Pareto, Point, Sample};
 pub use sets::{DataSet, GarmentSet, Sets};
 pub use sizes::Sizes;

@@ -1,6 +1,7 @@
 //! The report as Markdown with pictures beside it, and as one HTML page that needs nothing but itself.
 
 use super::table::Table;
+use crate::picture::svg;
 use crate::run::report::html::escape;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -16,8 +17,20 @@ pub struct Section {
     pub text: String,
     /// Tables.
     pub tables: Vec<Table>,
-    /// Pictures: file name, caption, PNG.
-    pub pictures: Vec<(String, String, Vec<u8>)>,
+    /// Charts and pictures.
+    pub figures: Vec<Figure>,
+}
+
+/// A picture beside the Markdown, and inside the page.
+pub struct Figure {
+    /// Name of its file.
+    pub file: String,
+    /// One sentence.
+    pub caption: String,
+    /// The file.
+    pub png: Vec<u8>,
+    /// The same as an element of the page, where it is a chart.
+    pub svg: Option<String>,
 }
 
 /// Everything, to be read.
@@ -43,11 +56,11 @@ impl Page {
                 text += &format!("{}\n\n", section.text);
             }
             let parts = section.tables.iter().map(Table::markdown);
-            let pictures = section
-                .pictures
+            let figures = section
+                .figures
                 .iter()
-                .map(|(file, caption, _)| format!("![{caption}]({file})\n\n{caption}\n"));
-            text += &parts.chain(pictures).collect::<Vec<_>>().join("\n");
+                .map(|Figure { file, caption, .. }| format!("![{caption}]({file})\n\n{caption}\n"));
+            text += &parts.chain(figures).collect::<Vec<_>>().join("\n");
         }
         text
     }
@@ -61,26 +74,28 @@ impl Page {
             .collect();
         let section = |section: &Section| {
             let tables: String = section.tables.iter().map(Table::html).collect();
-            let picture = |(_, caption, png): &(String, String, Vec<u8>)| {
-                let (caption, png) = (escape(caption), STANDARD.encode(png));
-                format!(
-                    "<figure class=\"sample\"><figcaption>{caption}</figcaption>\
-                     <img alt=\"{caption}\" src=\"data:image/png;base64,{png}\"></figure>\n"
-                )
+            let figure = |figure: &Figure| {
+                let caption = escape(&figure.caption);
+                let shown = figure.svg.clone().unwrap_or_else(|| {
+                    let png = STANDARD.encode(&figure.png);
+                    format!("<img alt=\"{caption}\" src=\"data:image/png;base64,{png}\">")
+                });
+                format!("<figure class=\"sample\"><figcaption>{caption}</figcaption>{shown}</figure>\n")
             };
-            let pictures: String = section.pictures.iter().map(picture).collect();
+            let figures: String = section.figures.iter().map(figure).collect();
             let text = if section.text.is_empty() {
                 String::new()
             } else {
                 format!("<p>{}</p>", escape(&section.text))
             };
-            format!("<section><h2>{}</h2>{text}{tables}{pictures}</section>\n", escape(&section.title))
+            format!("<section><h2>{}</h2>{text}{tables}{figures}</section>\n", escape(&section.title))
         };
         let sections: String = self.sections.iter().map(section).collect();
         format!(
             "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
-             <meta name=\"viewport\" content=\"width=device-width\"><title>{title}</title><style>{STYLE}</style></head>\n\
+             <meta name=\"viewport\" content=\"width=device-width\"><title>{title}</title><style>{STYLE}{}</style></head>\n\
              <body><header><h1>{title}</h1>{facts}</header>\n{sections}</body></html>\n",
+            svg::STYLE,
             title = escape(&self.title)
         )
     }

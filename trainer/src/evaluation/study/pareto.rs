@@ -10,7 +10,7 @@ use crate::evaluation::median_ms;
 use crate::inference::reference::ReferenceScene;
 use crate::inference::refine;
 use crate::inference::tensor_store::DrapeError;
-use crate::picture::{Line, LinePanel};
+use crate::picture::chart::{Chart, ChartGrid, Line};
 use crate::system::single_threaded::map_single_threaded;
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use clothcombo_physics::energy::Term;
@@ -299,28 +299,29 @@ impl Pareto {
     }
 
     /// As charts: excess energy and distance over time, both medians.
-    pub fn panels(&self) -> Vec<LinePanel> {
+    pub fn charts(&self) -> ChartGrid {
         let families: [(&str, fn(&str) -> bool); 3] = [
             ("LBS", |m| m.starts_with("LBS")),
             ("network, post-process, refinement", |m| m.starts_with("network")),
             ("solver from LBS", |m| m.starts_with("solver")),
         ];
-        let panel = |title: &str, value: fn(&Point) -> f64| LinePanel {
-            title: title.to_owned(),
-            lines: families
-                .iter()
-                .map(|(name, belongs)| {
-                    let family = self.points.iter().filter(|p| belongs(&p.method));
-                    let mut points: Vec<_> = family.map(|p| (p.ms.spread.median, value(p))).collect();
-                    // More steps may take no longer; a line that turns back is drawn with spikes.
-                    points.sort_by(|a, b| a.0.total_cmp(&b.0));
-                    Line { name: (*name).to_owned(), points }
-                })
-                .collect(),
+        let chart = |title: &str, value: fn(&Point) -> f64| {
+            let lines = families.map(|(name, belongs)| {
+                let family = self.points.iter().filter(|p| belongs(&p.method));
+                let mut points: Vec<_> = family.map(|p| (p.ms.spread.median, value(p))).collect();
+                // More steps may take no longer; a line that turns back is drawn with spikes.
+                points.sort_by(|a, b| a.0.total_cmp(&b.0));
+                Line { name: name.to_owned(), points }
+            });
+            Chart::of_lines(title, &lines)
         };
-        vec![
-            panel("excess energy [%] over time [ms]", |p| p.excess_percent.spread.median),
-            panel("distance [mm] over time [ms]", |p| p.distance_mm.spread.median),
-        ]
+        ChartGrid {
+            title: "Speed against error".to_owned(),
+            legend: Vec::new(),
+            charts: vec![
+                chart("excess energy (%) over time (ms)", |p| p.excess_percent.spread.median),
+                chart("distance (mm) over time (ms)", |p| p.distance_mm.spread.median),
+            ],
+        }
     }
 }

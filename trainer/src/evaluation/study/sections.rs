@@ -1,7 +1,9 @@
 //! The report of an evaluation: its parts, in the order of the paper.
 
-use super::{EmbeddingStudy, Section, Study, Table, Variant, extremes, layers, methods, numerics, variants};
-use crate::picture::{draw_lines, png_bytes};
+use super::{
+    EmbeddingStudy, Figure, Section, Study, Table, Variant, extremes, layers, methods, numerics, variants,
+};
+use crate::picture::png_bytes;
 use miette::{IntoDiagnostic, Report};
 
 impl Study {
@@ -14,7 +16,7 @@ impl Study {
             title: title.into(),
             text: text.into(),
             tables,
-            pictures: Vec::new(),
+            figures: Vec::new(),
         };
         let mut tables = vec![methods::summary(&self.methods)];
         tables.extend(self.methods.iter().enumerate().flat_map(|(i, methods)| methods.tables(i == 0)));
@@ -60,12 +62,13 @@ impl Study {
         }
         sections.push(section("Time per phase (Table 5)", "", vec![self.times.table()]));
         let mut pareto = section("Speed against error", "", vec![self.pareto.table()]);
-        let chart = draw_lines("Speed against error", &self.pareto.panels()).into_diagnostic()?;
-        pareto.pictures.push((
-            "pareto.png".into(),
-            "Medians; down and to the left is better.".into(),
-            png_bytes(&chart).into_diagnostic()?,
-        ));
+        let charts = self.pareto.charts();
+        pareto.figures.push(Figure {
+            file: "pareto.png".into(),
+            caption: "Medians; down and to the left is better.".into(),
+            png: png_bytes(&charts.draw()).into_diagnostic()?,
+            svg: Some(charts.svg()),
+        });
         sections.push(pareto);
         sections.push(section("Numerical choices", "", vec![numerics::table(&self.numerics)]));
         sections.push(section("Stability", "", vec![extremes::table(&self.extremes)]));
@@ -76,12 +79,12 @@ impl Study {
                 Vec::new(),
             );
             for picture in &self.pictures {
-                let file = format!("{}.png", picture.name);
-                gallery.pictures.push((
-                    file,
-                    picture.caption.clone(),
-                    png_bytes(&picture.image).into_diagnostic()?,
-                ));
+                gallery.figures.push(Figure {
+                    file: format!("{}.png", picture.name),
+                    caption: picture.caption.clone(),
+                    png: png_bytes(&picture.image).into_diagnostic()?,
+                    svg: None,
+                });
             }
             sections.push(gallery);
         }

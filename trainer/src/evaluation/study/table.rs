@@ -1,7 +1,7 @@
 //! A table that is written as Markdown and as HTML.
 
 use super::estimate::{Estimate, Proportion, Ratio};
-use crate::picture::axis::number_text;
+use crate::picture::chart::axis::number_text;
 use crate::run::report::html::escape;
 use serde::Serialize;
 

@@ -1,6 +1,5 @@
 //! Programs' eyes on a run: each observer turns events into one kind of output.
 
-mod curves;
 mod history;
 mod log;
 mod metrics;
@@ -8,7 +7,6 @@ mod progress;
 mod report;
 mod tensorboard;
 
-pub use curves::CurvesObserver;
 pub use history::{History, HistoryObserver, SharedHistory, best_so_far};
 pub use log::LogObserver;
 pub use metrics::MetricsObserver;

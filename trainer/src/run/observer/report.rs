@@ -1,27 +1,27 @@
-//! Keeps `RUN/report.html` fresh.
+//! Keeps `RUN/report.html` and `RUN/curves.png` fresh.
 
-use super::curves::stage_boundaries;
 use super::history::SharedHistory;
-use crate::config::{Config, to_toml};
+use crate::config::{Config, StageConfig, stage_starts, to_toml};
 use crate::dataset::LicenceLine;
-use crate::picture::StageBoundary;
+use crate::picture::chart::{ChartGrid, StageBoundary, Steps};
+use crate::picture::save_png;
 use crate::run::event::{Observer, TrainEvent};
 use crate::run::folder::RunDir;
 use crate::run::memory::MemoryEstimate;
-use crate::run::report::{Page, RunState, run_name};
+use crate::run::report::{Page, RunState, charts, run_name};
 use crate::system::memory::Memory;
 use clothcombo_data::format::atomic;
 use miette::{IntoDiagnostic, Report, WrapErr};
 use std::path::PathBuf;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-/// Writes the report of a run.
+/// Writes the report of a run, and at every checkpoint its charts as a picture.
 pub struct ReportObserver {
     path: PathBuf,
+    curves: PathBuf,
     name: String,
     config: String,
-    stages: Vec<StageBoundary>,
-    total_steps: u64,
+    steps: Steps,
     licences: Vec<LicenceLine>,
     memory: Option<MemoryEstimate>,
     history: SharedHistory,
@@ -45,10 +45,10 @@ impl ReportObserver {
         let every = config.output.report_every;
         Ok(Self {
             path: run.report(),
+            curves: run.curves(),
             name: run_name(run.root()),
             config: to_toml(config).into_diagnostic()?,
-            stages: stage_boundaries(config),
-            total_steps: config.total_steps(),
+            steps: steps(config),
             licences,
             memory,
             history,
@@ -66,10 +66,9 @@ impl ReportObserver {
         let page = Page {
             name: &self.name,
             state,
-            total_steps: self.total_steps,
+            steps: &self.steps,
             made: SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs()),
             speed: (done > 0).then(|| done as f64 / start.elapsed().as_secs_f64()),
-            stages: &self.stages,
             history: &history,
             config: &self.config,
             licences: &self.licences,
@@ -80,6 +79,20 @@ impl ReportObserver {
             .into_diagnostic()
             .wrap_err_with(|| format!("cannot write {}", self.path.display()))
     }
+
+    fn draw_curves(&self) -> Result<(), Report> {
+        let charts = charts(&self.history.borrow(), &self.steps).into_iter().map(|(_, chart)| chart);
+        let grid = ChartGrid { title: "Training".into(), legend: Steps::legend(), charts: charts.collect() };
+        save_png(&grid.draw(), &self.curves).into_diagnostic()
+    }
+}
+
+/// The steps of a run that `config` asks for.
+fn steps(config: &Config) -> Steps {
+    let stages = stage_starts(&config.stages).zip(&config.stages);
+    let boundary =
+        |(step, stage): (u64, &StageConfig)| StageBoundary { step: step as f64, name: stage.name.clone() };
+    Steps { total: config.total_steps(), stages: stages.map(boundary).collect() }
 }
 
 impl Observer for ReportObserver {
@@ -92,7 +105,9 @@ impl Observer for ReportObserver {
             TrainEvent::Step(_) if self.every.is_some_and(|every| self.written.elapsed() >= every) => {
                 self.write(RunState::Running)
             }
-            TrainEvent::Validated { .. } | TrainEvent::CheckpointSaved { .. } => {
+            TrainEvent::Validated { .. } => self.write(RunState::Running),
+            TrainEvent::CheckpointSaved { .. } => {
+                self.draw_curves()?;
                 self.write(RunState::Running)
             }
             TrainEvent::Interrupted { .. } => self.write(RunState::Interrupted),

@@ -1,18 +1,19 @@
 //! `RUN/report.html`: everything worth knowing about a run on one page that needs nothing but itself.
 
-mod chart;
+mod charts;
 pub mod html;
 
+pub(super) use charts::charts;
+
 use crate::dataset::LicenceLine;
-use crate::picture::StageBoundary;
-use crate::picture::axis::number_text;
-use crate::run::event::StepRecord;
+use crate::picture::chart::axis::number_text;
+use crate::picture::chart::{Steps, median_of_last};
+use crate::picture::svg;
 use crate::run::memory::MemoryEstimate;
 use crate::run::observer::History;
 use crate::system::memory::gibibytes;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use chart::Curve;
 use html::{escape, utc};
 use serde_json::Value;
 use std::fmt::Write;
@@ -49,14 +50,12 @@ pub struct Page<'a> {
     pub name: &'a str,
     /// Where it stands.
     pub state: RunState,
-    /// Steps of the whole run.
-    pub total_steps: u64,
+    /// The steps of the run and its stages.
+    pub steps: &'a Steps,
     /// When this page was made [s since 1970].
     pub made: u64,
     /// Steps per second of this session.
     pub speed: Option<f64>,
-    /// Where stages begin.
-    pub stages: &'a [StageBoundary],
     /// The logs.
     pub history: &'a History,
     /// The configuration, as TOML.
@@ -81,11 +80,12 @@ impl Page<'_> {
         let _ = writeln!(
             out,
             "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
-                <meta name=\"viewport\" content=\"width=device-width\">{}<title>{} – {}</title><style>{STYLE}</style></head>\n<body>",
+                <meta name=\"viewport\" content=\"width=device-width\">{}<title>{} – {}</title><style>{STYLE}{}</style></head>\n<body>",
             // A page that is still being written looks for its next version.
             if self.state == RunState::Running { "<meta http-equiv=\"refresh\" content=\"30\">" } else { "" },
             escape(self.name),
             self.state.name(),
+            svg::STYLE,
         );
         out.push_str(&self.header());
         out.push_str(&self.curves());
@@ -104,12 +104,12 @@ impl Page<'_> {
     fn header(&self) -> String {
         let step = self.history.last.as_ref().map_or(0, |(step, _)| *step);
         let stage = self.history.last.as_ref().map_or("", |(_, stage)| stage.as_str());
-        let percent = 100.0 * step as f64 / self.total_steps.max(1) as f64;
-        let mut tiles = vec![("step", format!("{step} of {}", self.total_steps)), ("stage", escape(stage))];
+        let percent = 100.0 * step as f64 / self.steps.total.max(1) as f64;
+        let mut tiles = vec![("step", format!("{step} of {}", self.steps.total)), ("stage", escape(stage))];
         if let Some(speed) = self.speed.filter(|s| *s > 0.0) {
             tiles.push(("speed", format!("{} steps/s", number_text(speed, 3))));
             if self.state == RunState::Running {
-                let left = (self.total_steps.saturating_sub(step)) as f64 / speed;
+                let left = (self.steps.total.saturating_sub(step)) as f64 / speed;
                 tiles.push(("time left", duration(left)));
             }
         }
@@ -141,50 +141,17 @@ impl Page<'_> {
     }
 
     fn curves(&self) -> String {
-        let total = self.total_steps as f64;
-        let history = self.history;
-        let draw = |id: &str, title: &str, unit: &str, name: &str| {
-            let baseline = history.baselines.get(name).copied();
-            let curve = Curve { id, title, unit, points: history.points(name), baseline };
-            chart::curve(&curve, self.stages, total)
-        };
-        let mut out = String::from(
-            "<section id=\"curves\"><h2>Curves</h2><p class=\"legend\"><i class=\"l-curve\"></i>median \
-                <i class=\"l-band\"></i>5th to 95th percentile <i class=\"l-base\"></i>LBS alone (validation) \
-                <i class=\"l-stage\"></i>stage begins</p><div class=\"grid-of\">\n",
-        );
-        out.push_str(&draw("chart-loss", "loss", "weighted", "loss"));
-        out.push_str(&draw("chart-grad_norm", "gradient norm", "before clipping", "grad_norm"));
-        for name in StepRecord::term_names() {
-            out.push_str(&draw(&format!("chart-{name}"), &name.replace('_', " "), unit(name), name));
-        }
-        out.push_str(&draw("chart-lr", "learning rate", "", "lr"));
-        out.push_str(&self.time_split());
-        out.push_str("</div></section>\n");
-        out
-    }
-
-    /// Where the time of a step goes [ms].
-    fn time_split(&self) -> String {
-        let milliseconds = |name: &str| -> Vec<(f64, f64)> {
-            self.history.points(name).iter().map(|(step, s)| (*step, 1000.0 * s)).collect()
-        };
-        let parts =
-            ["wait_seconds", "forward_seconds", "backward_seconds", "update_seconds"].map(milliseconds);
-        let rest = milliseconds("seconds").into_iter().enumerate().map(|(i, (step, whole))| {
-            let known: f64 = parts.iter().filter_map(|p| Some(p.get(i)?.1)).sum();
-            (step, (whole - known).max(0.0))
-        });
-        let rest: Vec<(f64, f64)> = rest.collect();
-        let [wait, forward, backward, update] = parts;
-        let parts = [
-            ("forward", forward),
-            ("backward", backward),
-            ("update", update),
-            ("waiting for scenes", wait),
-            ("rest", rest),
-        ];
-        chart::stacked("chart-time", "time of a step", "ms", &parts, self.stages, self.total_steps as f64)
+        let keys: String = Steps::legend()
+            .iter()
+            .map(|key| format!("<span>{}{}</span> ", key.svg(), escape(&key.name)))
+            .collect();
+        let figures: String = charts(self.history, self.steps)
+            .iter()
+            .map(|(name, chart)| format!("<figure id=\"chart-{name}\">{}</figure>\n", chart.svg()))
+            .collect();
+        format!(
+            "<section id=\"curves\"><h2>Curves</h2><p class=\"legend\">{keys}</p><div class=\"grid-of\">\n{figures}</div></section>\n"
+        )
     }
 
     fn validation(&self) -> String {
@@ -266,23 +233,6 @@ impl Page<'_> {
         out.push_str("</table></section>\n");
         out
     }
-}
-
-/// What a raw energy is measured in.
-fn unit(term: &str) -> &'static str {
-    match term {
-        "strain" | "bending" | "gravity" => "J",
-        "holding" => "m²",
-        "repulsion" => "",
-        _ => "m³",
-    }
-}
-
-fn median_of_last(points: &[(f64, f64)], count: usize) -> Option<f64> {
-    let mut last: Vec<f64> =
-        points[points.len().saturating_sub(count)..].iter().map(|p| p.1).filter(|v| v.is_finite()).collect();
-    last.sort_by(f64::total_cmp);
-    last.get(last.len() / 2).copied()
 }
 
 /// Seconds as `3 h 20 min`, `20 min` or `45 s`.

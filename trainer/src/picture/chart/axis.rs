@@ -1,11 +1,7 @@
-//! A linear or logarithmic axis with round ticks, as a `plotters` coordinate.
+//! A linear or logarithmic axis with round ticks.
 
-use std::ops::Range;
-
-use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
-
-/// Values of larger magnitude are not drawn; their differences and logarithms stay finite without them.
-pub(crate) const DRAWABLE_LIMIT: f64 = 1e30;
+/// The range of an axis ignores values of larger magnitude, so that differences and logarithms stay finite.
+const DRAWABLE_LIMIT: f64 = 1e30;
 /// Smallest ratio of largest to smallest value for which a logarithmic axis says more than a linear one.
 const LOG_RATIO: f64 = 3.0;
 /// Decades shown at most below the largest value.
@@ -52,19 +48,15 @@ impl Axis {
         Self { low: low - margin, high: high + margin, is_logarithmic: false }
     }
 
-    /// Position of `value` between the ends (0…1 inside).
+    /// Position of `value` from 0 to 1. A value outside the range is at the nearer end, one that is no number at the lower.
     pub(crate) fn share(&self, value: f64) -> f64 {
+        let value = value.max(self.low).min(self.high);
         if self.is_logarithmic {
             let low = self.low.log10();
-            (value.max(self.low).log10() - low) / (self.high.log10() - low)
+            (value.log10() - low) / (self.high.log10() - low)
         } else {
             (value - self.low) / (self.high - self.low)
         }
-    }
-
-    /// `value`, or the end of the axis beyond which it lies.
-    pub(crate) fn clamped(&self, value: f64) -> f64 {
-        value.clamp(self.low, self.high)
     }
 
     /// At most about `count` round values inside the range, ascending.
@@ -92,6 +84,16 @@ impl Axis {
             .flat_map(|decade| mantissas.iter().map(move |mantissa| mantissa * 10_f64.powi(decade)))
             .filter(|value| (self.low..=self.high).contains(value))
             .collect()
+    }
+
+    /// The label of a tick: as many digits as tell neighbouring ticks apart.
+    pub(crate) fn label(&self, tick: f64) -> String {
+        if self.is_logarithmic {
+            return number_text(tick, 2);
+        }
+        let (range, size) = (self.high - self.low, self.low.abs().max(self.high.abs()));
+        let digits = (size / range).log10().ceil().clamp(0.0, 8.0) as usize + 2;
+        if tick.abs() < 1e-9 * range { "0".to_owned() } else { number_text(tick, digits) }
     }
 }
 
@@ -135,41 +137,6 @@ pub(crate) fn number_text(value: f64, digits: usize) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
-impl Ranged for Axis {
-    type FormatOption = NoDefaultFormatting;
-    type ValueType = f64;
-
-    fn map(&self, value: &f64, (from, to): (i32, i32)) -> i32 {
-        let share = self.share(*value).clamp(-0.5, 1.5);
-        (f64::from(from) + share * f64::from(to - from)).round() as i32
-    }
-
-    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
-        self.ticks(hint.bold_points())
-    }
-
-    fn range(&self) -> Range<f64> {
-        self.low..self.high
-    }
-}
-
-impl ValueFormatter<f64> for Axis {
-    fn format(value: &f64) -> String {
-        number_text(*value, 3)
-    }
-
-    fn format_ext(&self, value: &f64) -> String {
-        if self.is_logarithmic {
-            return number_text(*value, 2);
-        }
-        // As many digits as tell neighbouring ticks apart.
-        let size = self.low.abs().max(self.high.abs());
-        let digits = (size / (self.high - self.low)).log10().ceil().clamp(0.0, 8.0) as usize + 2;
-        let near_zero = value.abs() < 1e-9 * (self.high - self.low);
-        if near_zero { "0".to_owned() } else { number_text(*value, digits) }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -187,7 +154,7 @@ mod tests {
             for &b in &wild {
                 let axis = fitting(&[a, b]);
                 assert!(axis.low < axis.high && (axis.high - axis.low).is_finite(), "{a} {b}: {axis:?}");
-                assert!((0.0..=1.0).contains(&axis.share(axis.clamped(1.0))));
+                assert!((0.0..=1.0).contains(&axis.share(1.0)));
             }
         }
     }
@@ -209,7 +176,7 @@ mod tests {
                 let ticks = axis.ticks(count);
                 assert!(ticks.len() >= 2 && ticks.len() <= count + 2, "{axis:?} {count}: {ticks:?}");
                 assert!(ticks.iter().all(|tick| (axis.low..=axis.high).contains(tick)));
-                let texts: Vec<String> = ticks.iter().map(|tick| axis.format_ext(tick)).collect();
+                let texts: Vec<String> = ticks.iter().map(|tick| axis.label(*tick)).collect();
                 for (tick, text) in ticks.iter().zip(&texts) {
                     let read: f64 = text.parse().unwrap();
                     assert!(

@@ -1,0 +1,62 @@
+//! Measured quantities over a size.
+
+use super::axis::Axis;
+use super::{Chart, Key};
+use crate::picture::layer_colour;
+use crate::picture::svg::css_colour;
+
+/// One measured quantity.
+#[derive(Clone, Debug, Default)]
+pub struct Line {
+    /// What it is, with its unit.
+    pub name: String,
+    /// (size, value); points that are not finite are left out.
+    pub points: Vec<(f64, f64)>,
+}
+
+impl Chart {
+    /// Quantities that share both axes, which are logarithmic where the values spread widely.
+    pub fn of_lines(title: &str, lines: &[Line]) -> Self {
+        let drawable = |point: &&(f64, f64)| point.0.is_finite() && point.1.is_finite();
+        let points = || lines.iter().flat_map(|line| &line.points).filter(drawable);
+        let axes = [Axis::fitting(points().map(|p| p.0)), Axis::fitting(points().map(|p| p.1))];
+        let attributes =
+            |class: &str, index| format!(r#"class="{class}" stroke="{}""#, css_colour(layer_colour(index)));
+        let keys = lines.iter().enumerate().map(|(i, line)| Key::line(&attributes("line", i), &line.name));
+        let mut chart = Self::new(title, "", axes, keys.collect());
+        for (index, line) in lines.iter().enumerate() {
+            let points: Vec<(f64, f64)> = line.points.iter().filter(drawable).copied().collect();
+            chart.line(&attributes("line", index), &points);
+            // A line of no length with round ends is a dot.
+            points.iter().for_each(|&point| chart.line(&attributes("dot", index), &[point, point]));
+        }
+        if points().next().is_none() {
+            chart.latest = "no data".into();
+        }
+        chart
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::ChartGrid;
+    use super::*;
+    use image::Rgb;
+
+    #[test]
+    fn every_line_is_drawn_in_its_colour_and_emptiness_is_said() {
+        let line = |factor: f64| Line {
+            name: format!("{factor} ms"),
+            points: vec![(1e3, factor), (2e3, 2.0 * factor), (2e4, 20.0 * factor), (f64::NAN, 1.0)],
+        };
+        let charts = vec![Chart::of_lines("vertices", &[line(1.0), line(3.0)]), Chart::of_lines("none", &[])];
+        assert!(!charts[0].svg().contains("no data") && charts[1].svg().contains("no data"));
+        let picture = ChartGrid { title: "growth".into(), legend: Vec::new(), charts }.draw();
+        for index in 0..2 {
+            let colour = Rgb(layer_colour(index));
+            let right: usize =
+                picture.enumerate_pixels().filter(|(x, y, p)| *x > 150 && *y > 130 && **p == colour).count();
+            assert!(right > 100, "line {index}: {right} pixels");
+        }
+    }
+}

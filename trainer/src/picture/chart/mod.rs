@@ -1,0 +1,259 @@
+//! Charts as SVG: inline in a page, or drawn as a picture.
+
+pub(crate) mod axis;
+mod bars;
+mod lines;
+mod steps;
+
+pub use bars::{Bar, draw_bars};
+pub use lines::Line;
+pub(crate) use steps::median_of_last;
+pub use steps::{StageBoundary, Steps};
+
+use super::svg::{draw_elements, escape, fitted, text_width, write_text};
+use axis::Axis;
+use image::{Rgb, RgbImage};
+use std::fmt::Write;
+
+/// Width and height of a chart; all lengths are in its units.
+const SIZE: [f64; 2] = [350.0, 200.0];
+/// Pixels per unit in a picture.
+const SCALE: f64 = 1.6;
+/// Space around the axes.
+const LEFT: f64 = 46.0;
+const RIGHT: f64 = 14.0;
+const TOP: f64 = 26.0;
+const BOTTOM: f64 = 22.0;
+/// Space between the edge and text.
+const MARGIN: f64 = 8.0;
+/// Font sizes, and the height of a line.
+const TITLE_SIZE: f64 = 12.0;
+const TEXT_SIZE: f64 = 10.0;
+const LINE_HEIGHT: f64 = 15.0;
+/// Ticks of an axis, at most about.
+const TICKS: usize = 7;
+
+const PAPER: Rgb<u8> = Rgb([255; 3]);
+
+/// A chart: a title, a legend, two axes and marks.
+pub struct Chart {
+    title: String,
+    unit: String,
+    /// Where the marks end, as SVG text.
+    latest: String,
+    axes: [Axis; 2],
+    legend: Vec<Key>,
+    /// Where the vertical axis ends.
+    top: f64,
+    marks: String,
+}
+
+impl Chart {
+    fn new(title: &str, unit: &str, axes: [Axis; 2], legend: Vec<Key>) -> Self {
+        let top = TOP + legend_height(&legend, SIZE[0]);
+        let [title, unit] = [title, unit].map(str::to_owned);
+        Self { title, unit, latest: String::new(), axes, legend, top, marks: String::new() }
+    }
+
+    /// Where a point stands; one outside the axes stands at their ends.
+    fn place(&self, (x, y): (f64, f64)) -> [f64; 2] {
+        let [right, bottom] = [SIZE[0] - RIGHT, SIZE[1] - BOTTOM];
+        let [x, y] = [self.axes[0].share(x), self.axes[1].share(y)];
+        [LEFT + x * (right - LEFT), bottom - y * (bottom - self.top)]
+    }
+
+    /// Adds a line through `points` with the given attributes.
+    fn line(&mut self, attributes: &str, points: &[(f64, f64)]) {
+        let path = self.path(points.iter());
+        let _ = write!(self.marks, r#"<path {attributes} d="{path}"/>"#);
+    }
+
+    /// Adds the area between two lines.
+    fn area(&mut self, attributes: &str, upper: &[(f64, f64)], lower: &[(f64, f64)]) {
+        if !upper.is_empty() {
+            let path = self.path(upper.iter().chain(lower.iter().rev()));
+            let _ = write!(self.marks, r#"<path {attributes} d="{path}Z"/>"#);
+        }
+    }
+
+    fn path<'a>(&self, points: impl Iterator<Item = &'a (f64, f64)>) -> String {
+        let places = points.map(|&point| self.place(point)).enumerate();
+        places.map(|(i, [x, y])| format!("{}{x:.1} {y:.1}", if i == 0 { "M" } else { "L" })).collect()
+    }
+
+    /// As an element of a page.
+    pub fn svg(&self) -> String {
+        element(SIZE, &self.title, &self.elements())
+    }
+
+    fn elements(&self) -> String {
+        let mut svg = String::new();
+        let [right, bottom] = [SIZE[0] - RIGHT, SIZE[1] - BOTTOM];
+        let [x, y] = &self.axes;
+        for tick in y.ticks(TICKS) {
+            let at = bottom - y.share(tick) * (bottom - self.top);
+            let _ = write!(svg, r#"<path class="grid" d="M{LEFT} {at:.1}H{right}"/>"#);
+            write_text(&mut svg, "y", [LEFT - 6.0, at + 3.5], TEXT_SIZE, &y.label(tick));
+        }
+        for tick in x.ticks(TICKS) {
+            let at = LEFT + x.share(tick) * (right - LEFT);
+            let _ = write!(svg, r#"<path class="grid" d="M{at:.1} {}V{bottom}"/>"#, self.top);
+            write_text(&mut svg, "x", [at, bottom + 14.0], TEXT_SIZE, &x.label(tick));
+        }
+        let _ = write!(svg, r#"<path class="frame" d="M{LEFT} {}V{bottom}H{right}"/>"#, self.top);
+        svg += &self.marks;
+        let unit = if self.unit.is_empty() { String::new() } else { format!("({})", self.unit) };
+        let after =
+            format!(r#"<tspan class="unit" dx="4" font-size="{TEXT_SIZE}">{}</tspan>"#, escape(&unit));
+        let _ = write!(
+            svg,
+            r#"<text class="title" x="{MARGIN}" y="16" font-size="{TITLE_SIZE}">{}{after}</text>"#,
+            escape(&self.title)
+        );
+        let _ = write!(
+            svg,
+            r#"<text class="latest" x="{right}" y="16" font-size="{TEXT_SIZE}">{}</text>"#,
+            self.latest
+        );
+        svg + &legend(&self.legend, [MARGIN, TOP], SIZE[0])
+    }
+}
+
+/// What a mark stands for.
+pub struct Key {
+    /// A sample of the mark.
+    swatch: String,
+    /// What it stands for.
+    pub name: String,
+}
+
+impl Key {
+    /// Width and height of a swatch.
+    const SWATCH: [f64; 2] = [20.0, 10.0];
+
+    fn line(attributes: &str, name: &str) -> Self {
+        Self { swatch: format!(r#"<path {attributes} d="M0 5h20"/>"#), name: name.to_owned() }
+    }
+
+    fn area(attributes: &str, name: &str) -> Self {
+        Self { swatch: format!(r#"<path {attributes} d="M0 0h20v10h-20Z"/>"#), name: name.to_owned() }
+    }
+
+    /// The swatch as an element of a page.
+    pub fn svg(&self) -> String {
+        element(Self::SWATCH, &self.name, &self.swatch)
+    }
+}
+
+/// Corners of the swatches of a legend as wide as `width`, relative to the first, with a margin on both sides.
+fn legend_places(keys: &[Key], width: f64) -> Vec<[f64; 2]> {
+    let [mut x, mut y] = [0.0; 2];
+    keys.iter()
+        .map(|key| {
+            let own = Key::SWATCH[0] + 5.0 + text_width(&key.name, TEXT_SIZE);
+            if x > 0.0 && x + own > width - 2.0 * MARGIN {
+                [x, y] = [0.0, y + LINE_HEIGHT];
+            }
+            x += own + 14.0;
+            [x - own - 14.0, y]
+        })
+        .collect()
+}
+
+fn legend_height(keys: &[Key], width: f64) -> f64 {
+    legend_places(keys, width).last().map_or(0.0, |[_, y]| y + LINE_HEIGHT + 4.0)
+}
+
+fn legend(keys: &[Key], [left, top]: [f64; 2], width: f64) -> String {
+    let mut svg = String::new();
+    for (Key { swatch, name }, [x, y]) in keys.iter().zip(legend_places(keys, width)) {
+        let _ = write!(svg, r#"<g transform="translate({:.1} {})">{swatch}"#, left + x, top + y);
+        write_text(&mut svg, "key", [Key::SWATCH[0] + 5.0, 8.5], TEXT_SIZE, name);
+        svg += "</g>";
+    }
+    svg
+}
+
+fn element([width, height]: [f64; 2], label: &str, elements: &str) -> String {
+    format!(
+        r#"<svg viewBox="0 0 {width} {height}" role="img" aria-label="{}">{elements}</svg>"#,
+        escape(label)
+    )
+}
+
+/// Charts side by side under a title and the legend that they share.
+pub struct ChartGrid {
+    /// Above the charts.
+    pub title: String,
+    /// Under the title.
+    pub legend: Vec<Key>,
+    /// From left to right, then from top to bottom.
+    pub charts: Vec<Chart>,
+}
+
+impl ChartGrid {
+    /// As an element of a page.
+    pub fn svg(&self) -> String {
+        element(self.size(), &self.title, &self.elements())
+    }
+
+    /// As a picture.
+    pub fn draw(&self) -> RgbImage {
+        let [width, height] = self.size().map(|side| (SCALE * side).round() as u32);
+        let mut picture = RgbImage::from_pixel(width, height, PAPER);
+        draw_elements(&mut picture, &self.elements(), SCALE as f32);
+        picture
+    }
+
+    fn columns(&self) -> usize {
+        match self.charts.len() {
+            0 | 1 => 1,
+            2 | 4 => 2,
+            _ => 3,
+        }
+    }
+
+    fn header(&self) -> f64 {
+        26.0 + legend_height(&self.legend, SIZE[0] * self.columns() as f64)
+    }
+
+    fn size(&self) -> [f64; 2] {
+        let columns = self.columns();
+        let rows = self.charts.len().div_ceil(columns);
+        [SIZE[0] * columns as f64, self.header() + SIZE[1] * rows as f64]
+    }
+
+    fn elements(&self) -> String {
+        let [width, _] = self.size();
+        let mut svg = String::new();
+        let title = fitted(&self.title, width - 2.0 * MARGIN, 14.0);
+        write_text(&mut svg, "title", [MARGIN, 19.0], 14.0, &title);
+        svg += &legend(&self.legend, [MARGIN, 28.0], width);
+        for (index, chart) in self.charts.iter().enumerate() {
+            let x = SIZE[0] * (index % self.columns()) as f64;
+            let y = self.header() + SIZE[1] * (index / self.columns()) as f64;
+            let _ = write!(svg, r#"<g transform="translate({x} {y})">{}</g>"#, chart.elements());
+        }
+        svg
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn charts_fill_a_grid() {
+        for (number, columns, rows) in [(1, 1, 1), (2, 2, 1), (3, 3, 1), (4, 2, 2), (9, 3, 3), (10, 3, 4)] {
+            let chart = |_| Chart::of_lines("a", &[Line { name: "b".into(), points: vec![(1.0, 2.0)] }]);
+            let grid = ChartGrid {
+                title: "run".into(),
+                legend: Vec::new(),
+                charts: (0..number).map(chart).collect(),
+            };
+            let pixels = SIZE.map(|side| (SCALE * side) as u32);
+            let header = (SCALE * grid.header()).round() as u32;
+            assert_eq!(grid.draw().dimensions(), (columns * pixels[0], rows * pixels[1] + header));
+        }
+    }
+}
