@@ -21,7 +21,7 @@ const TERMS_PER_PART: usize = 512;
 /// Parts of a sum at most.
 const MAX_TERM_PARTS: usize = 8;
 
-/// First element and strides of a matrix in memory.
+/// First element, row and column step of a matrix in memory.
 #[derive(Clone, Copy)]
 struct StridedMatrix {
     first: *const f32,
@@ -82,7 +82,7 @@ unsafe fn write(
     let (lhs, rhs) = (StridedMatrix::of(lhs), StridedMatrix::of(rhs));
     let work = rows.saturating_mul(inner).saturating_mul(columns);
     let size = [rows, inner, columns];
-    // SAFETY (all branches): the strides are those of the tensors, whose elements all lie in their storage; the rest is
+    // SAFETY (all branches): the steps are those of the tensors, whose elements all lie in their storage; the rest is
     // the caller's promise.
     if work < PARALLEL_FROM {
         unsafe { call_gemm(lhs, rhs, output, size, add, Parallelism::None) };

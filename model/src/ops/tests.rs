@@ -124,7 +124,7 @@ fn products_match_burns_own() {
             |[a, b]| a.matmul(b) * 2.0,
         );
     }
-    // Views with other strides and offsets.
+    // Views with other steps and offsets.
     compare(
         [[9, ROWS], [40, 9]],
         |[a, b]| product(a.transpose(), b.slice([3..12, 2..7])),

@@ -6,7 +6,7 @@ use crate::inference::networks::Networks;
 use crate::inference::tensor_store::DrapeError;
 use clothcombo_data::asset::{Garment, infeasible_pair};
 use clothcombo_physics::contact::resolve::{
-    Certificate, Layer, ResolveError, ResolveSettings, Resolved, RestGarment, Waypoint, certify,
+    Certificate, Layer, PathSample, ResolveError, ResolveSettings, Resolved, RestGarment, certify,
     resolve_along,
 };
 use clothcombo_physics::contact::{LayerOrder, PosedBody, Report, ReportGarment, Selection, all_layers};
@@ -72,13 +72,13 @@ impl<'a> Dressing<'a> {
     }
 
     /// `scene` on the way from the T-pose.
-    fn stage(&self, scene: &PreparedScene, share: f64) -> Result<Waypoint, PostProcessError> {
+    fn stage(&self, scene: &PreparedScene, share: f64) -> Result<PathSample, PostProcessError> {
         let mut draw = scene.sample.clone();
         for body in &mut draw.bodies {
             body.pose = body.pose.scaled_keeping_heading(share);
         }
         let scene = prepare(self.dataset, self.losses, draw, 1.0).map_err(DrapeError::from)?;
-        Ok(Waypoint {
+        Ok(PathSample {
             body: Arc::new(scene.exact_body()),
             draped: wide(&scene, &draped_by(self.uncorrected.as_ref(), &scene)?),
             skinned: wide(&scene, &skinned(&scene)),

@@ -5,7 +5,7 @@ use super::network_drape::NetworkDrape;
 use super::{BodyState, Certificate, Drape, Draper, DraperError, GarmentDrape, Outfit, elapsed, refine};
 use crate::inference::reference::ReferenceScene;
 use clothcombo_physics::Surface;
-use clothcombo_physics::contact::resolve::{Resolved, Waypoint, resolve_after, resolve_along};
+use clothcombo_physics::contact::resolve::{PathSample, Resolved, resolve_after, resolve_along};
 use clothcombo_physics::vec3::{add_scaled, sub};
 use std::time::Instant;
 
@@ -55,7 +55,7 @@ impl Draper {
         let parts = outfit.split(&before);
         let (resolved, times) = match self.settings.resolve {
             true => {
-                let final_sample = || Waypoint {
+                let final_sample = || PathSample {
                     body: surface.clone(),
                     draped: parts.iter().map(|p| p.to_vec()).collect(),
                     skinned: outfit.split(&skinned).into_iter().map(<[_]>::to_vec).collect(),
@@ -106,7 +106,7 @@ impl Draper {
         watch: &mut dyn FnMut(f64),
         surface: &Surface<f64>,
         parts: &[&[[f64; 3]]],
-        final_sample: &dyn Fn() -> Waypoint,
+        final_sample: &dyn Fn() -> PathSample,
     ) -> Result<Resolved, DraperError> {
         let (layers, settings) = (outfit.layers(parts), &self.settings.post_process);
         let mut carried = None;
@@ -132,7 +132,7 @@ impl Draper {
             let stage = self.stage(&self.uncorrected, outfit, body, pose, body.place)?;
             Ok::<_, DraperError>(match share {
                 // The surface is known here only.
-                1.0 => Waypoint { draped: stage.draped, ..final_sample() },
+                1.0 => PathSample { draped: stage.draped, ..final_sample() },
                 _ => stage,
             })
         };

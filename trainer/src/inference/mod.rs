@@ -140,7 +140,7 @@ impl BodyState {
 pub struct Draper {
     trained: TrainedModel,
     model: ClothCombo,
-    /// The same without corrections, for poses on the way from the T-pose: that leaves fewer crossings (docs/resolve.md).
+    /// The same without corrections, for samples of the continuation path from the T-pose: that leaves fewer intersections (docs/resolve.md).
     uncorrected: ClothCombo,
     preprocessor: Preprocessor,
     joints: ActiveJoints,

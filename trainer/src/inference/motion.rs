@@ -31,7 +31,7 @@ impl RetryPolicy {
 /// How far [`Draper::drape_motion`] is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum DrapeProgress {
-    /// The post-process looks at a pose at this share of the way to the frame: from the one before it, or, where that leaves
+    /// The post-process looks at a pose at this share of the continuation path to the frame: from the one before it, or, where that leaves
     /// crossings, from the T-pose.
     Continuation(f64),
     /// One more frame is draped.

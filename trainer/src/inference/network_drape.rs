@@ -8,7 +8,7 @@ use crate::inference::tensor_store::body_tensors;
 use clothcombo_data::asset::rotation::{Matrix3, apply, matrix_from_axis_angle};
 use clothcombo_data::asset::{Pose, PosedBody};
 use clothcombo_model::ClothCombo;
-use clothcombo_physics::contact::resolve::Waypoint;
+use clothcombo_physics::contact::resolve::PathSample;
 use clothcombo_physics::query::Surface;
 use clothcombo_physics::transform::{self, Transform};
 use clothcombo_physics::vec3::add;
@@ -92,12 +92,12 @@ impl Draper {
         body: &BodyState,
         pose: Pose,
         place: [f64; 3],
-    ) -> Result<Waypoint, DraperError> {
+    ) -> Result<PathSample, DraperError> {
         // A surface is known at the end only.
         let sample = BodyState { shape: body.shape.clone(), pose, surface: None, place };
         let made = self.network_drape(model, outfit, &sample)?;
         let parts = |packed| outfit.split(packed).into_iter().map(<[_]>::to_vec).collect();
-        Ok(Waypoint {
+        Ok(PathSample {
             body: made.surface,
             draped: parts(&made.network),
             skinned: parts(&made.skinned),

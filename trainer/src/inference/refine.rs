@@ -23,7 +23,7 @@ pub struct Refinement {
     pub energy_before: f64,
     /// And after (J); never more.
     pub energy_after: f64,
-    /// Farthest way of a vertex (mm).
+    /// Farthest displacement of a vertex (mm).
     pub largest_move_mm: f64,
 }
 

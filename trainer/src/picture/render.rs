@@ -82,7 +82,7 @@ pub fn render_with_camera(figures: &[Figure<'_>], camera: &Camera, size: [u32; 2
     shade(&samples, &colours)
 }
 
-/// A figure on its way into the picture.
+/// A figure as it is projected into the picture.
 struct ProjectedMesh {
     /// Per vertex; [`NOWHERE`] for one that is not drawn.
     vertices: Vec<Projected>,

@@ -13,7 +13,7 @@ struct Case {
     folder: TempDir,
 }
 
-/// A box without lid and floor, `half` wide each way, with texture coordinates.
+/// A box without lid and floor, `half` wide to each side, with texture coordinates.
 fn quad_box(half: f64, y: [f64; 2]) -> String {
     let mut text = String::from("# quads\no box\nvt 0 0\n");
     for y in y {

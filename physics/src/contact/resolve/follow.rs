@@ -17,7 +17,7 @@ use super::strides::Strides;
 use super::taken_back::{shares, taken_back};
 use super::unfold::Folds;
 use super::way::{Way, placed};
-use super::{Certificate, Layer, Reached, ResolveError, ResolveSettings, Resolved, Waypoint};
+use super::{Certificate, Layer, PathSample, Reached, ResolveError, ResolveSettings, Resolved};
 use crate::query::Surface;
 use crate::transform::Transform;
 
@@ -39,7 +39,7 @@ pub fn resolve_along<E: From<ResolveError>>(
     layers: &[Layer<'_>],
     skinned: &[Vec<[f64; 3]>],
     settings: &ResolveSettings,
-    mut stage_at: impl FnMut(f64) -> Result<Waypoint, E>,
+    mut stage_at: impl FnMut(f64) -> Result<PathSample, E>,
 ) -> Result<Resolved, E> {
     let start = Instant::now();
     settings.check()?;
@@ -85,7 +85,7 @@ fn taken_along<E: From<ResolveError>>(
     folds: &mut Option<Folds>,
     settings: &ResolveSettings,
     start: Instant,
-    stage_at: &mut impl FnMut(f64) -> Result<Waypoint, E>,
+    stage_at: &mut impl FnMut(f64) -> Result<PathSample, E>,
 ) -> Result<Resolved, E> {
     resolved_further(body, layers, settings, start, |room, mut best| {
         let is_late = || settings.is_late(start, layers.len());
@@ -99,7 +99,7 @@ fn taken_along<E: From<ResolveError>>(
             folds.add(&Folds::of(&t_pose.body, &at(layers, &t_pose.draped), &t_pose.skinned));
         }
         let folds = &*folds;
-        let laid_out = |stage: Waypoint| match folds {
+        let laid_out = |stage: PathSample| match folds {
             Some(folds) => folds.laid_out_at(stage, layers),
             None => stage,
         };
@@ -130,7 +130,7 @@ pub fn resolve_after<E: From<ResolveError>>(
     body: &Surface<f64>,
     layers: &[Layer<'_>],
     settings: &ResolveSettings,
-    mut stage_at: impl FnMut(f64) -> Result<Waypoint, E>,
+    mut stage_at: impl FnMut(f64) -> Result<PathSample, E>,
 ) -> Result<Option<Resolved>, E> {
     let start = Instant::now();
     settings.check()?;
@@ -158,7 +158,7 @@ pub fn resolve_after<E: From<ResolveError>>(
 }
 
 /// A stage, if everything on it fits the garments.
-fn checked(stage: Waypoint, layers: &[Layer<'_>]) -> Result<Waypoint, ResolveError> {
+fn checked(stage: PathSample, layers: &[Layer<'_>]) -> Result<PathSample, ResolveError> {
     for positions in [&stage.draped, &stage.skinned] {
         check(&stage.body, &placed(layers, positions)?)?;
     }

@@ -72,7 +72,7 @@ pub use follow::{resolve_after, resolve_along};
 pub use garment::{Layer, RestGarment};
 pub use resolved::{GarmentWork, Resolved};
 pub use settings::ResolveSettings;
-pub use waypoint::{Reached, Waypoint};
+pub use waypoint::{PathSample, Reached};
 
 use std::time::Instant;
 

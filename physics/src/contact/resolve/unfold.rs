@@ -13,7 +13,7 @@ use super::body::with_drawn;
 use super::garment::at;
 use super::obstacle::BodyObstacle;
 use super::outfit::Outfit;
-use super::{Layer, Waypoint};
+use super::{Layer, PathSample};
 use crate::contact::self_triangle_pairs;
 use crate::query::Surface;
 use places::{folded, smoothed};
@@ -63,7 +63,7 @@ impl Folds {
     }
 
     /// The drape of `layers` at `stage` without them.
-    pub fn laid_out_at(&self, mut stage: Waypoint, layers: &[Layer<'_>]) -> Waypoint {
+    pub fn laid_out_at(&self, mut stage: PathSample, layers: &[Layer<'_>]) -> PathSample {
         if !self.is_empty() {
             stage.draped = self.laid_out(&at(layers, &stage.draped), &stage.skinned);
         }

@@ -7,7 +7,7 @@ use crate::transform::Transform;
 
 /// What is somewhere along the way.
 #[derive(Clone)]
-pub struct Waypoint {
+pub struct PathSample {
     /// The body.
     pub body: Arc<Surface<f64>>,
     /// The drape on it, `[V, 3]` per garment (m).
@@ -24,7 +24,7 @@ pub struct Reached {
     pub draped: Vec<Vec<[f64; 3]>>,
     /// Where they are now.
     pub positions: Vec<Vec<[f64; 3]>>,
-    /// Skinning transforms, as in [`Waypoint`].
+    /// Skinning transforms, as in [`PathSample`].
     pub transforms: Vec<Transform>,
     /// Pairs with the body and between garments that are left in `positions`, but for narrow and pinched ones.
     pub crossings: usize,

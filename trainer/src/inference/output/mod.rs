@@ -65,7 +65,7 @@ pub enum OutputError {
     /// Something has come there since the start.
     #[error("while this ran, something else came: {reason}; the result is in {}", instead.display())]
     Meanwhile {
-        /// What is in the way.
+        /// What obstructs it.
         reason: Box<OutputError>,
         /// The folder that was made.
         instead: PathBuf,
