@@ -5,7 +5,7 @@ use super::scene::{CaseError, CaseScene};
 use super::suite::DegenerateCases;
 use clothcombo_physics::energy::gradient_bound::gradient_bound;
 use clothcombo_physics::energy::gradient_check::{
-    GradientCheck, TOLERANCE, alone, check_gradient, largest_entry, raw_value,
+    GradientCheck, TOLERANCE, check_gradient, largest_entry, raw_value, with_only,
 };
 use clothcombo_physics::energy::{EnergySettings, SceneEnergy, Term, TermMap};
 use clothcombo_physics::{Real, TriMesh};
@@ -161,7 +161,7 @@ fn assess(
         let numbers = [value, value_f32, largest, largest_f32];
         let pairs = gradient.as_flattened().iter().zip(gradient_f32.as_flattened());
         let difference = pairs.map(|(a, b)| (a - f64::from(*b)).abs()).fold(0.0, f64::max);
-        let is_canonical = alone(&double.energy, term).needs_canonical();
+        let is_canonical = with_only(&double.energy, term).needs_canonical();
         let positions = if is_canonical { &double.canonical } else { &double.posed };
         let extent = positions.as_flattened().iter().fold(1.0, |m: f64, x| m.max(x.abs()));
         let slope: f64 = gradient.as_flattened().iter().map(|g| g.abs()).sum();
@@ -174,7 +174,7 @@ fn assess(
             gradient_error: quotients.error,
             quotient_resolution: quotients.resolution,
             lines: quotients.lines,
-            kinks: quotients.kinks,
+            kinks: quotients.nonsmooth,
             f32_difference: (value_f32 - value).abs(),
             f32_rounding: ULPS * f64::from(f32::EPSILON) * extent * slope,
             f32_gradient_error: if difference == 0.0 { 0.0 } else { difference / largest },
@@ -197,7 +197,7 @@ impl<T: Real> Evaluated<T> {
 
     /// Raw value and gradient of one term.
     fn term(&self, term: Term) -> Option<(f64, Vec<[T; 3]>)> {
-        let energy = alone(&self.energy, term);
+        let energy = with_only(&self.energy, term);
         let value = energy.evaluate(&self.posed, &self.canonical);
         let raw = raw_value(&value, term)?;
         Some((raw, if energy.needs_canonical() { value.canonical_gradient } else { value.posed_gradient }))

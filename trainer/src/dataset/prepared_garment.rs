@@ -1,8 +1,8 @@
 //! A garment with everything that does not change during training.
 
 use clothcombo_data::asset::Garment;
+use clothcombo_physics::contact_features::Rings;
 use clothcombo_physics::energy::GarmentEnergies;
-use clothcombo_physics::sensing::Rings;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ pub struct PreparedGarment {
     pub garment: Garment,
     /// Constants of its energies.
     pub energies: Arc<GarmentEnergies<f32>>,
-    /// Neighbourhoods that it feels other garments over.
+    /// Neighbourhoods over which its contact features are gathered.
     pub rings: Rings,
     /// Initial skin weights of the active joints, `[V, J]`.
     pub skin_weights: Vec<f32>,

@@ -7,7 +7,8 @@ use crate::dataset::{
     Dataset, DatasetError, PreparedScene, SceneSample, ValidationGroup, prepare, sample_validation,
 };
 use crate::inference::Draped;
-use crate::inference::networks::{DrapeError, Networks};
+use crate::inference::networks::Networks;
+use crate::inference::tensor_store::DrapeError;
 use crate::run::validation::{GroupReport, Method, ValidationReport};
 use rayon::prelude::*;
 
@@ -87,7 +88,7 @@ impl ValidationSet {
                     let draped: &Draped = match method {
                         Method::RestSkinning => &networks.skin_rest(&scene)?,
                         Method::StartSkinning => &networks.skin(&scene)?,
-                        Method::Single => &networks.drape_alone(&scene)?,
+                        Method::Single => &networks.drape_single_garments(&scene)?,
                         Method::Network => &networks.drape(&scene)?,
                     };
                     scores.push(score_scene(&scene, &body, draped));

@@ -13,7 +13,7 @@ pub enum Method {
     RestSkinning,
     /// Linear blend skinning of the start state (with shape transfer): what the networks start from.
     StartSkinning,
-    /// The networks without untangling: every garment alone.
+    /// The networks without untangling: every garment as a single garment.
     Single,
     /// All networks.
     Network,

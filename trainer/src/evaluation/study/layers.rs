@@ -87,7 +87,7 @@ pub fn ask(
     let measured = |index: usize| -> Result<Measured, Report> {
         let draw = subject.draw([question, index], &all, layers, HeldOut::Windows);
         let scene = subject.prepare(draw)?;
-        let drapes = [networks.drape_alone(&scene)?, networks.drape(&scene)?];
+        let drapes = [networks.drape_single_garments(&scene)?, networks.drape(&scene)?];
         let [alone, draped] = drapes.each_ref().map(|drape| dressing.of(&scene, &drape.posed));
         let result =
             (index < resolved).then(|| OutfitResult::new(index, &draped, settings)).transpose()?.map(|r| r.0);

@@ -5,7 +5,7 @@ use super::sets::DataSet;
 use super::subject::{Measured, PAPER_COLLISION, Subject};
 use super::table::{Table, mean_and_median, mean_with_interval, number, percent, ratio_with_interval};
 use crate::dataset::{Dataset, SceneSample, round_robin};
-use crate::inference::networks::DrapeError;
+use crate::inference::tensor_store::DrapeError;
 use clothcombo_data::asset::Category;
 use clothcombo_physics::energy::Term;
 use serde::Serialize;

@@ -5,14 +5,17 @@ use crate::config::Config;
 use crate::dataset::{Dataset, HeldOut, PreparedScene, SceneSample, prepare, sample_evaluation};
 use crate::evaluation::{SceneScore, score_scene};
 use crate::inference::Draped;
-use crate::inference::networks::{DrapeError, Networks, TensorStore};
+use crate::inference::networks::Networks;
+use crate::inference::tensor_store::{DrapeError, TensorStore};
 use crate::run::checkpoint::TrainedModel;
 use burn::tensor::Device;
 use clothcombo_model::ClothCombo;
-use clothcombo_physics::contact::{Intersections, TriangleTree, self_collision};
+use clothcombo_physics::contact::{
+    self, Intersections, LayerOrder, PosedBody, ReportGarment, Selection, all_layers, self_collision,
+};
 use clothcombo_physics::energy::{EnergySettings, SceneEnergy, SceneLayers, Term, TermMap};
 use clothcombo_physics::mesh::Topology;
-use clothcombo_physics::query::Surface;
+use clothcombo_physics::query::{Distance, Surface};
 use miette::Report;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -128,20 +131,23 @@ impl<'a> Witness<'a> {
     /// Measures a drape of the scene.
     pub fn measure(&self, draped: &Draped) -> Measured {
         let positions: Vec<[f64; 3]> = draped.posed.iter().map(|p| p.map(f64::from)).collect();
-        let body = TriangleTree::new(&self.body.positions, &self.body.faces);
-        let parts = self.scene.parts(&positions).into_iter().zip(&self.scene.garments);
-        let trees: Vec<TriangleTree> =
-            parts.map(|(part, garment)| TriangleTree::new(part, garment.garment.rest.faces())).collect();
-        let pairs = (0..trees.len()).flat_map(|i| (i + 1..trees.len()).map(move |j| (i, j)));
-        let (own, self_collisions): (Vec<Intersections>, Vec<f64>) = trees
-            .iter()
-            .zip(&self.topologies)
-            .map(|(tree, topology)| {
-                let pairs = tree.self_pairs();
-                let degree = self_collision(tree, &pairs, topology, PAPER_REPULSION_RADIUS);
-                (Intersections::of_self_pairs(tree, &pairs), degree)
-            })
-            .unzip();
+        let garments: Vec<ReportGarment> = self
+            .scene
+            .parts(&positions)
+            .into_iter()
+            .zip(&self.scene.garments)
+            .map(|(positions, garment)| ReportGarment { positions, faces: garment.garment.rest.faces() })
+            .collect();
+        let layers = all_layers(garments.len());
+        let order = LayerOrder::NearestVertex;
+        let selection = Selection { layers: &layers, order, triangles: true, body_itself: false };
+        let body = PosedBody::new(&self.body, Distance::NearestVertex);
+        let report = contact::Report::count(&body, &garments, &selection);
+        let self_collisions = garments.iter().zip(&report.garments).zip(&self.topologies);
+        let self_collisions = self_collisions.map(|((garment, found), topology)| {
+            let ReportGarment { positions, faces } = *garment;
+            self_collision(positions, faces, &found.with_itself.pairs, topology, PAPER_REPULSION_RADIUS)
+        });
         let paper = self.paper.value(&draped.posed, &draped.canonical);
         let weighted = |values: &[TermMap<Option<f64>>], term: Term| -> f64 {
             PAPER_COLLISION_WEIGHT * values.iter().filter_map(|raw| raw[term]).sum::<f64>()
@@ -150,10 +156,10 @@ impl<'a> Witness<'a> {
             score: score_scene(self.scene, &self.body, draped),
             paper_collision: weighted(&paper.garments, Term::BodyCollision),
             paper_layer_collision: weighted(&paper.layers, Term::LayerCollision),
-            self_collision: self_collisions.into_iter().sum(),
-            body: trees.iter().map(|tree| Intersections::between(tree, &body)).sum(),
-            layers: pairs.map(|(i, j)| Intersections::between(&trees[i], &trees[j])).sum(),
-            own: own.into_iter().sum(),
+            self_collision: self_collisions.sum(),
+            body: report.garments.iter().map(|garment| garment.with_body.numbers()).sum(),
+            layers: report.layers.iter().map(|layer| layer.pairs.numbers()).sum(),
+            own: report.garments.iter().map(|garment| garment.with_itself.numbers()).sum(),
         }
     }
 }

@@ -4,8 +4,11 @@ use super::subject::Subject;
 use super::table::{Table, number};
 use crate::dataset::HeldOut;
 use crate::evaluation::certificates::Dressing;
+use crate::inference::Draped;
+use crate::inference::contact_features::LayerInteraction;
 use crate::inference::networks::{OnBody, drape_on};
 use crate::run::spread::Spread;
+use clothcombo_model::Mode;
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use miette::{IntoDiagnostic, Report};
 use serde::Serialize;
@@ -64,21 +67,30 @@ pub fn ask(
         let count = scene.garments.len() as f64;
         let ms = |time: Duration| 1e3 * time.as_secs_f64() / count;
         let clock = Instant::now();
-        let embeddings =
-            subject.tensors.embed(&subject.model, &scene, &outfit, &subject.tensors.embeddings())?;
+        let embeddings = subject.tensors.embed(
+            &subject.model,
+            &scene,
+            &outfit,
+            &subject.tensors.embeddings(),
+            Mode::Layered,
+        )?;
         // Reading a result waits for it on devices that compute behind the caller's back.
         let _ = embeddings.garment.clone().into_data();
         let embedding = ms(clock.elapsed());
-        let embeddings = subject.model.prepare_untangling(&outfit, embeddings);
         let (body, start) = subject.tensors.body(&scene.bodies[0]).into_diagnostic()?;
+        // Single draping by itself: what the forward pass takes longer is untangling.
+        let clock = Instant::now();
+        let single = subject.model.forward(&outfit, &embeddings, &body, start.clone(), Mode::Single);
+        let _ = Draped::of(single.last());
+        let single = clock.elapsed();
         let on_body = OnBody { scene: &scene, outfit: &outfit, embeddings: &embeddings, body: &body, start };
-        let (found, networks) = drape_on(&subject.model, &on_body);
+        let (found, networks) = drape_on(&subject.model, &on_body, LayerInteraction::Together);
         let draped = dressing.of(&scene, &found.posed);
         let resolved = draped.resolved(settings)?;
         let post: Duration = resolved.garments.iter().map(|g| g.time).sum();
         if index > 0 {
             let [draping, untangling, correcting] =
-                [networks.draping, networks.untangling, networks.correcting].map(ms);
+                [single, networks.forward.saturating_sub(single), networks.corrections].map(ms);
             let body = ms(resolved.body_time) * count;
             let times = [embedding, draping, untangling, correcting, ms(post), body];
             parts.iter_mut().zip(times).for_each(|(part, time)| part.push(time));

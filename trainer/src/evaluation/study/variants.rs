@@ -4,7 +4,7 @@ use super::methods::MethodResult;
 use super::subject::{Measured, PAPER_COLLISION, Subject};
 use super::table::{Table, mean_and_median, number, percent};
 use crate::dataset::HeldOut;
-use crate::inference::networks::DrapeError;
+use crate::inference::tensor_store::DrapeError;
 use clothcombo_physics::energy::Term;
 use serde::Serialize;
 
