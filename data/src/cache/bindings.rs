@@ -100,13 +100,13 @@ pub fn get_largest_weights(cache: &ArrayCache, key: Key) -> Option<Vec<f32>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::generate::{GarmentSettings, generate_garment, mannequin};
+    use crate::generate::garment::generated;
+    use crate::generate::mannequin;
 
     #[test]
     fn a_bound_garment_comes_back_bit_for_bit() {
         let body = mannequin();
-        let settings = GarmentSettings { target_vertices: 400, ..GarmentSettings::default() };
-        let garment = generate_garment(&body, Category::Top, 3, &settings).unwrap();
+        let garment = generated(&body, Category::Top, 3, 400);
         let how = BindingSettings::default();
         let binding = Binding::new(&garment, &body, &how);
         let folder = tempfile::tempdir().unwrap();

@@ -117,12 +117,12 @@ fn warnings(garment: &GarmentCheck, body: &Body) -> Vec<String> {
         ));
     } else if garment.inside > 0 || garment.body_triangle_pairs > 0 {
         warnings.push(format!(
-            "{} vertices inside the body at rest, {} triangle pairs",
+            "{} vertices inside the body at rest, {} intersecting triangle pairs",
             garment.inside, garment.body_triangle_pairs
         ));
     }
     if garment.self_triangle_pairs > 0 {
-        warnings.push(format!("{} triangle pairs with itself", garment.self_triangle_pairs));
+        warnings.push(format!("{} self-intersecting triangle pairs", garment.self_triangle_pairs));
     }
     warnings
 }

@@ -18,11 +18,10 @@ mod write;
 pub use write::{garment_folder_files, refuse_unlisted, save_garment, save_garment_folder, save_manifest};
 
 use crate::asset::{Body, Category, Garment, Provenance};
-use crate::format::{FileError, is_mesh_path, load_tri_mesh, toml_file};
+use crate::format::{FileError, folder, is_mesh_path, load_tri_mesh, toml_file};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Name of the manifest in a garment folder.
@@ -178,17 +177,9 @@ pub(crate) fn read_entries(folder: &Path) -> Result<Vec<ManifestEntry>, FileErro
     Ok(entries)
 }
 
-fn list_mesh_files(folder: &Path) -> Result<Vec<String>, FileError> {
-    let failed = FileError::io(folder);
-    let mut files = Vec::new();
-    for entry in fs::read_dir(folder).map_err(&failed)? {
-        let path = entry.map_err(&failed)?.path();
-        if let Some(name) = path.file_name().and_then(|n| n.to_str()).filter(|_| is_mesh_path(&path)) {
-            files.push(name.to_string());
-        }
-    }
-    files.sort();
-    Ok(files)
+fn list_mesh_files(path: &Path) -> Result<Vec<String>, FileError> {
+    let meshes = folder::entries(path)?.into_iter().filter(|file| is_mesh_path(file));
+    Ok(meshes.filter_map(|file| Some(file.file_name()?.to_str()?.to_string())).collect())
 }
 
 impl ManifestEntry {
@@ -227,6 +218,7 @@ mod tests {
     use super::*;
     use crate::generate::mannequin;
     use clothcombo_physics::mesh::shapes::tube;
+    use std::fs;
 
     fn folder_with(files: &[(&str, &str)]) -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();

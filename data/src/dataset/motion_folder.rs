@@ -1,27 +1,19 @@
 //! A folder of motion npz files.
 
 use crate::asset::Motion;
-use crate::format::FileError;
-use std::fs;
+use crate::format::{FileError, folder};
 use std::path::Path;
 
 /// Reads every `.npz` of a folder as a motion, sorted by file name.
 ///
 /// # Errors
 /// [`FileError`] naming folder, or file and key.
-pub fn load_motion_folder(folder: &Path) -> Result<Vec<Motion>, FileError> {
-    let failed = FileError::io(folder);
-    let mut files = Vec::new();
-    for entry in fs::read_dir(folder).map_err(&failed)? {
-        let path = entry.map_err(&failed)?.path();
-        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npz")) {
-            files.push(path);
-        }
-    }
+pub fn load_motion_folder(path: &Path) -> Result<Vec<Motion>, FileError> {
+    let mut files = folder::entries(path)?;
+    files.retain(|file| folder::has_extension(file, "npz"));
     if files.is_empty() {
         let message = "no motions; expected .npz files with poses and mocap_framerate";
-        return Err(FileError::content(folder)(message));
+        return Err(FileError::content(path)(message));
     }
-    files.sort();
-    files.iter().map(|f| Motion::load(f)).collect()
+    files.iter().map(|file| Motion::load(file)).collect()
 }

@@ -103,7 +103,8 @@ fn unskin(p: [f64; 3], weights: &[f32], bones: &[[[f64; 4]; 3]]) -> Option<[f64;
 pub(super) mod tests {
     use super::*;
     use crate::asset::body::skin;
-    use crate::generate::{GarmentGenerator, GarmentSettings, mannequin};
+    use crate::generate::garment::generated;
+    use crate::generate::mannequin;
 
     /// A generated shirt skinned to lowered arms as draping does.
     pub(crate) fn lowered(garment: &Garment, body: &Body, degrees: f64) -> Vec<[f64; 3]> {
@@ -118,8 +119,7 @@ pub(super) mod tests {
     #[test]
     fn sleeves_come_back_from_an_a_pose() {
         let body = mannequin();
-        let settings = GarmentSettings { target_vertices: 700, ..GarmentSettings::default() };
-        let shirt = GarmentGenerator::new(&body).unwrap().generate(Category::TShirt, 3, &settings).unwrap();
+        let shirt = generated(&body, Category::TShirt, 3, 700);
         let arms = ArmPose::new(&body, 40.0);
         let posed = lowered(&shirt, &body, 40.0);
         let back = arms.to_t_pose(&posed, shirt.rest.faces(), Some(shirt.category), &body).unwrap();

@@ -30,14 +30,14 @@ fn faces_outwards(mesh: &TriMesh, body: &Body) -> bool {
 mod tests {
     use super::*;
     use crate::asset::Category;
-    use crate::generate::{GarmentSettings, generate_garment, mannequin};
+    use crate::generate::garment::generated;
+    use crate::generate::mannequin;
 
     #[test]
     fn only_the_garment_as_it_was_made_lies_on_the_body() {
         let body = mannequin();
-        let settings = GarmentSettings { target_vertices: 300, ..GarmentSettings::default() };
         for category in [Category::TShirt, Category::Skirt, Category::Trousers] {
-            let rest = generate_garment(&body, category, 4, &settings).unwrap().rest;
+            let rest = generated(&body, category, 4, 300).rest;
             assert!(is_on_body(&rest, &body), "{category}");
             let changed = |change: fn([f64; 3]) -> [f64; 3]| {
                 rest.with_positions(rest.positions().iter().map(|p| change(*p)).collect()).unwrap()

@@ -265,8 +265,8 @@ impl fmt::Display for FitReport {
         }
         writeln!(
             f,
-            "contact   {} vertices were inside the body (up to {:.1} mm); now {}, closest {:.1} mm, {} triangle pairs with the \
-             body, {} with itself",
+            "contact   {} vertices were inside the body (up to {:.1} mm); now {}, closest {:.1} mm, {} triangle pairs intersect \
+             the body, {} each other",
             c.inside_before,
             c.depth_before_mm,
             c.inside_after,

@@ -1,14 +1,14 @@
 use super::arm_pose::tests::lowered;
 use super::*;
 use crate::asset::rotation;
-use crate::generate::{GarmentGenerator, GarmentSettings, mannequin};
+use crate::generate::garment::generated;
+use crate::generate::mannequin;
 use clothcombo_physics::mesh::shapes::{icosphere, tube};
 use clothcombo_physics::query::VertexIndex;
 use clothcombo_physics::vec3::{add, cross, dot, scale};
 
 fn garment(body: &Body, category: Category, seed: u64) -> Garment {
-    let settings = GarmentSettings { target_vertices: 500, ..GarmentSettings::default() };
-    GarmentGenerator::new(body).unwrap().generate(category, seed, &settings).unwrap()
+    generated(body, category, seed, 500)
 }
 
 /// The longest-sleeved of a few shirts: cap sleeves lie on the shoulder at any angle and would fit around the hips as well.

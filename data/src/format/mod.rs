@@ -2,6 +2,7 @@
 
 pub mod atomic;
 mod error;
+pub mod folder;
 mod gltf;
 mod load_mesh;
 pub mod mat;

@@ -306,7 +306,7 @@ pub(super) fn row_major_from_fortran<T: Clone>(data: Vec<T>, shape: &[usize]) ->
         return data;
     }
     // Walk the row-major positions; the first axis has stride one in Fortran order.
-    let offsets: Vec<usize> = shape.iter().scan(1, |s, n| Some(std::mem::replace(s, *s * n))).collect();
+    let steps: Vec<usize> = shape.iter().scan(1, |s, n| Some(std::mem::replace(s, *s * n))).collect();
     let mut index = vec![0; shape.len()];
     let mut source = 0;
     (0..data.len())
@@ -314,11 +314,11 @@ pub(super) fn row_major_from_fortran<T: Clone>(data: Vec<T>, shape: &[usize]) ->
             let value = data[source].clone();
             for axis in (0..shape.len()).rev() {
                 index[axis] += 1;
-                source += offsets[axis];
+                source += steps[axis];
                 if index[axis] < shape[axis] {
                     break;
                 }
-                source -= offsets[axis] * shape[axis];
+                source -= steps[axis] * shape[axis];
                 index[axis] = 0;
             }
             value

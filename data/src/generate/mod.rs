@@ -7,6 +7,6 @@ pub mod mannequin;
 mod parts;
 pub mod pose;
 
-pub use garment::{GarmentDesign, GarmentError, GarmentGenerator, GarmentSettings, generate_garment};
+pub use garment::{GarmentDesign, GarmentError, GarmentGenerator, GarmentSettings};
 pub use mannequin::mannequin;
 pub use pose::{PoseAugmentation, PoseSampler, SelfContact};

@@ -12,7 +12,7 @@ use crate::asset::motion::{along_z, stands_along_z};
 use crate::asset::rotation::{Matrix3, axis_angle_from_matrix, matrix_from_axis_angle, product};
 use crate::asset::{Motion, Pose, Provenance};
 use crate::check::impossible_turn;
-use crate::format::{FileError, NpzFile};
+use crate::format::{FileError, NpzFile, folder};
 use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -102,14 +102,8 @@ fn find(
     if depth > DEEPEST || !seen.insert(fs::canonicalize(path).map_err(&failed)?) {
         return Ok(());
     }
-    let mut entries = Vec::new();
-    for entry in fs::read_dir(path).map_err(&failed)? {
-        entries.push(entry.map_err(&failed)?.path());
-    }
-    entries.sort();
-    for entry in entries {
-        let is_npz = entry.extension().is_some_and(|e| e.eq_ignore_ascii_case("npz"));
-        if entry.is_dir() || is_npz {
+    for entry in folder::entries(path)? {
+        if entry.is_dir() || folder::has_extension(&entry, "npz") {
             find(&entry, found, seen, depth + 1)?;
         }
     }

@@ -6,7 +6,7 @@ use super::overwrite::refuse_overwriting;
 use super::summary::{ImportError, Progress, Summary};
 use crate::asset::body_file::{BodyFileSettings, INSIDE_OUT, shape_part};
 use crate::asset::{Body, Provenance};
-use crate::format::{FileError, NpzFile};
+use crate::format::{FileError, NpzFile, folder};
 use std::path::{Path, PathBuf};
 
 fn hint(models: &[PathBuf]) -> String {
@@ -137,7 +137,7 @@ fn refuse_what_is_no_npz(input: &Path) -> Result<(), FileError> {
         for path in std::fs::read_dir(input).into_iter().flatten().flatten().map(|entry| entry.path()) {
             // SMPL-H ships as {male,female,neutral}/model.npz.
             let inner = path.join("model.npz");
-            if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npz")) {
+            if folder::has_extension(&path, "npz") {
                 models.push(path);
             } else if inner.is_file() {
                 models.push(inner);
@@ -147,7 +147,7 @@ fn refuse_what_is_no_npz(input: &Path) -> Result<(), FileError> {
         let message = format!("this is a folder; name one model file in it{}", hint(&models));
         return Err(FileError::content(input)(message));
     }
-    if input.extension().is_some_and(|e| e.eq_ignore_ascii_case("pkl")) && input.is_file() {
+    if folder::has_extension(input, "pkl") && input.is_file() {
         return Err(FileError::content(input)(format!(
             "a Python pickle is a program and is never run here; convert it once with scripts/smpl_pickle_to_npz.py {} model.npz, \
              which takes the arrays only",

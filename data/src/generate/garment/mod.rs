@@ -48,20 +48,6 @@ pub struct GarmentGenerator<'a> {
     tree: TriangleTree<'a>,
 }
 
-/// One garment for `body`, the same for the same seed and settings. For many garments keep a [`GarmentGenerator`], which
-/// measures the body only once.
-///
-/// # Errors
-/// [`GarmentError`] if the body is unsuitable, a setting is out of range, or no design passed the checks.
-pub fn generate_garment(
-    body: &Body,
-    category: Category,
-    seed: u64,
-    settings: &GarmentSettings,
-) -> Result<Garment, GarmentError> {
-    GarmentGenerator::new(body)?.generate(category, seed, settings)
-}
-
 impl<'a> GarmentGenerator<'a> {
     /// Measures the zero body.
     ///
@@ -228,6 +214,13 @@ fn stream(seed: u64, category: Category, attempt: u64, purpose: u64) -> ChaCha8R
 /// Edge length of a triangulation of `area` with `vertices` nearly equilateral triangles' corners.
 fn edge_length(area: f64, vertices: f64) -> f64 {
     (area / (0.866 * vertices)).sqrt()
+}
+
+/// A garment of about `vertices` vertices for a test.
+#[cfg(test)]
+pub(crate) fn generated(body: &Body, category: Category, seed: u64, vertices: usize) -> Garment {
+    let settings = GarmentSettings { target_vertices: vertices, ..GarmentSettings::default() };
+    GarmentGenerator::new(body).unwrap().generate(category, seed, &settings).unwrap()
 }
 
 #[cfg(test)]

@@ -227,12 +227,11 @@ fn a_given_design_is_followed() {
 #[test]
 fn the_same_seed_gives_the_same_garment_for_any_number_of_threads() {
     let body = mannequin();
-    let settings = GarmentSettings { target_vertices: 400, ..GarmentSettings::default() };
-    let make = || generate_garment(&body, Category::TShirt, 11, &settings).unwrap();
+    let make = || generated(&body, Category::TShirt, 11, 400);
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     let three = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
     assert_eq!(one.install(make).rest, three.install(make).rest);
-    assert_ne!(make().rest, generate_garment(&body, Category::TShirt, 12, &settings).unwrap().rest);
+    assert_ne!(make().rest, generated(&body, Category::TShirt, 12, 400).rest);
 }
 
 #[test]

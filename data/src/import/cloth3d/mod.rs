@@ -13,13 +13,13 @@ pub use info::{Gender, OutfitItem, SampleInfo};
 pub use unpose::{Unposing, upright};
 
 use super::amass::turn_root_to_y_up;
-use super::motions::{Clip, NamedFile, write_motions};
+use super::motions::{Clip, NamedFile, named, write_motions};
 use super::overwrite::refuse_overwriting;
 use super::summary::{ImportError, Progress, Summary};
 use super::thinning::{Thinned, Thinning, thin};
 use crate::asset::{BindingSettings, Body, Category, Garment, Motion, Provenance};
 use crate::dataset::{FolderGarment, save_garment_folder};
-use crate::format::{FileError, NpzWriter, PointCache, obj};
+use crate::format::{FileError, NpzWriter, PointCache, folder, obj};
 use crate::mesh::contact;
 use clothcombo_physics::query::Surface;
 use manifest::{AUTHOR, GarmentEntry, LICENCE, SampleEntry};
@@ -60,11 +60,6 @@ impl Default for Cloth3dSettings {
 /// Of the simulations (frames/s).
 const FRAME_RATE: f64 = 30.0;
 
-struct SampleFolder {
-    name: String,
-    folder: PathBuf,
-}
-
 /// Imports samples to `out`: `garments/*.obj` with `garments.toml`, `motions/*.npz` with `motions.toml`, `cloth3d.toml` with what the
 /// samples say of themselves, and, if asked for, `sequences/*.npz`. `inputs` are sample folders, or folders of them.
 ///
@@ -99,7 +94,7 @@ pub fn import_cloth3d(
     // A file that is named without its folder lies in one, too.
     let folder = |file: &PathBuf| fs::canonicalize(file).ok()?.parent().map(Path::to_path_buf);
     let of_bodies = settings.body_files.iter().filter_map(folder);
-    refuse_overwriting(samples.iter().map(|sample| sample.folder.clone()).chain(of_bodies), outputs)?;
+    refuse_overwriting(samples.iter().map(|sample| sample.path.clone()).chain(of_bodies), outputs)?;
     let mut summary = Summary { notes: assumptions(bodies), ..Summary::default() };
     let surface = Surface::new(target.template.clone(), target.faces.clone());
     let (mut garments, mut entries) = (Vec::new(), Vec::new());
@@ -107,7 +102,7 @@ pub fn import_cloth3d(
         progress("unposing garments", done, samples.len());
         match import_sample(sample, bodies, &surface, out, settings, &mut garments, &mut summary)? {
             Ok(entry) => entries.push(entry),
-            Err(reason) => summary.skipped.push((sample.folder.display().to_string(), reason)),
+            Err(reason) => summary.skipped.push((sample.path.display().to_string(), reason)),
         }
     }
     progress("unposing garments", samples.len(), samples.len());
@@ -121,7 +116,7 @@ pub fn import_cloth3d(
     summary.written.extend(save_garment_folder(&out.join("garments"), &garments)?);
     let clips: Vec<NamedFile> = (samples.iter())
         .filter(|s| entries.iter().any(|e| e.name == s.name))
-        .map(|s| NamedFile { path: s.folder.join("info.mat"), name: s.name.clone() })
+        .map(|s| NamedFile { path: s.path.join("info.mat"), name: s.name.clone() })
         .collect();
     let import = |path: &Path| motion(path, settings);
     let motions = write_motions(&clips, None, &out.join("motions"), "info.mat files", &import, progress)?;
@@ -165,35 +160,25 @@ fn has_smpl_shape(body: &Body) -> bool {
     matches!(body.joint_count(), 24 | 52)
 }
 
-fn find_samples(inputs: &[PathBuf]) -> Result<Vec<SampleFolder>, FileError> {
-    let mut folders = Vec::new();
+fn find_samples(inputs: &[PathBuf]) -> Result<Vec<NamedFile>, FileError> {
+    let is_sample = |folder: &PathBuf| folder.join("info.mat").is_file();
+    let mut samples = Vec::new();
     for input in inputs {
-        if input.join("info.mat").is_file() {
-            folders.push(input.clone());
-            continue;
+        match is_sample(input) {
+            true => samples.push(input.clone()),
+            false => samples.extend(folder::entries(input)?.into_iter().filter(is_sample)),
         }
-        let failed = FileError::io(input);
-        let mut below = Vec::new();
-        for entry in fs::read_dir(input).map_err(&failed)? {
-            let folder = entry.map_err(&failed)?.path();
-            if folder.join("info.mat").is_file() {
-                below.push(folder);
-            }
-        }
-        below.sort();
-        folders.extend(below);
     }
-    let named = super::motions::named(folders.into_iter().map(|folder| {
+    Ok(named(samples.into_iter().map(|folder| {
         let full = fs::canonicalize(&folder).unwrap_or_else(|_| folder.clone());
         let name = full.file_name().map_or_else(|| "sample".into(), |n| n.to_string_lossy().into_owned());
         (folder, name)
-    }));
-    Ok(named.into_iter().map(|NamedFile { path, name }| SampleFolder { name, folder: path }).collect())
+    })))
 }
 
 /// The garments of one sample; the inner error is the reason to skip it as a whole.
 fn import_sample(
-    sample: &SampleFolder,
+    sample: &NamedFile,
     bodies: &Cloth3dBodies<'_>,
     surface: &Surface<f64>,
     out: &Path,
@@ -201,7 +186,7 @@ fn import_sample(
     garments: &mut Vec<FolderGarment>,
     summary: &mut Summary,
 ) -> Result<Result<SampleEntry, String>, ImportError> {
-    let info = match SampleInfo::load(&sample.folder.join("info.mat")) {
+    let info = match SampleInfo::load(&sample.path.join("info.mat")) {
         Ok(info) => info,
         Err(reason) => return Ok(Err(reason)),
     };
@@ -217,7 +202,7 @@ fn import_sample(
     };
     let mut entry = SampleEntry::new(&sample.name, &info);
     for item in &info.outfit {
-        let mesh_path = sample.folder.join(format!("{}.obj", item.name));
+        let mesh_path = sample.path.join(format!("{}.obj", item.name));
         match unposed_garment(sample, &info, item, &mesh_path, &unposing, bodies.target, settings) {
             Ok(garment) => {
                 let inside = contact(garment.rest.positions(), surface).inside;
@@ -255,7 +240,7 @@ fn about(garment: &Garment, item: &OutfitItem, inside: usize) -> String {
 }
 
 fn unposed_garment(
-    sample: &SampleFolder,
+    sample: &NamedFile,
     info: &SampleInfo,
     item: &OutfitItem,
     path: &Path,
@@ -304,13 +289,13 @@ fn provenance(what: &str) -> Provenance {
 
 /// Converts one point cache: number of frames, and the file written. A cache that cannot be used is skipped; the garment is not.
 fn convert_cache(
-    sample: &SampleFolder,
+    sample: &NamedFile,
     item: &OutfitItem,
     garment: &Garment,
     out: &Path,
     summary: &mut Summary,
 ) -> Result<(Option<usize>, Option<String>), ImportError> {
-    let path = sample.folder.join(format!("{}.pc16", item.name));
+    let path = sample.path.join(format!("{}.pc16", item.name));
     let mut skip = |reason: String| summary.skipped.push((path.display().to_string(), reason));
     let cache = match PointCache::load(&path) {
         Ok(cache) => cache,
