@@ -144,8 +144,7 @@ impl ModelConfig {
         let steps = self.correction_steps.unwrap_or(0);
         let expected = "left out without correction networks (corrections = 0)";
         check(steps == 0 || self.corrections > 0, "correction_steps", steps, expected)?;
-        let positive = [("omega_first", self.omega_first), ("omega_hidden", self.omega_hidden)];
-        for (key, value) in positive {
+        for (key, value) in [("omega_first", self.omega_first), ("omega_hidden", self.omega_hidden)] {
             check(value.is_finite() && value > 0.0, key, value, "a positive number")?;
         }
         let scales = [

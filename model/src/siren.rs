@@ -82,9 +82,9 @@ impl Modulator {
             .collect();
         let bound = fan_in_bound(sizes.width + latent);
         Self {
-            vertex: start.uniform_columns(sizes.vertex_latent, &bounds),
-            garment: start.uniform_columns(sizes.garment_latent, &bounds),
-            bias: start.uniform_row(&bounds),
+            vertex: start.uniform_columns([sizes.vertex_latent, columns], &bounds),
+            garment: start.uniform_columns([sizes.garment_latent, columns], &bounds),
+            bias: start.uniform_columns([columns], &bounds),
             hidden: (1..sizes.layers).map(|_| start.uniform([sizes.width, sizes.width], bound)).collect(),
             width: sizes.width,
         }

@@ -108,28 +108,24 @@ impl HostGarment {
     /// Only joints with `used[j]` carry weight.
     pub(crate) fn random(vertices: usize, eigen: usize, used: &[bool], seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let mut draw = |count: usize, low: f32, high: f32| -> Vec<f32> {
+        let mut sample = |count: usize, low: f32, high: f32| -> Vec<f32> {
             (0..count).map(|_| rng.random_range(low..high)).collect()
         };
-        let mass: Vec<f64> = draw(vertices, 1e-4, 3e-4).into_iter().map(f64::from).collect();
+        let mass: Vec<f64> = sample(vertices, 1e-4, 3e-4).into_iter().map(f64::from).collect();
         let size = 1.0 / (mass.iter().sum::<f64>().sqrt() as f32);
-        let mut skin_weights = draw(vertices * used.len(), 0.1, 1.0);
+        let mut skin_weights = sample(vertices * used.len(), 0.1, 1.0);
         for row in skin_weights.chunks_exact_mut(used.len()) {
-            for (weight, used) in row.iter_mut().zip(used) {
-                if !used {
-                    *weight = 0.0;
-                }
-            }
+            row.iter_mut().zip(used).filter(|(_, used)| !**used).for_each(|(weight, _)| *weight = 0.0);
             let sum: f32 = row.iter().sum();
             row.iter_mut().for_each(|weight| *weight /= sum);
         }
         Self {
-            rest: draw(vertices * 3, -0.6, 0.6),
+            rest: sample(vertices * 3, -0.6, 0.6),
             mass,
             eigenvalues: (0..eigen).map(|i| 15.0 * i as f64).collect(),
-            eigenvectors: draw(vertices * eigen, -size, size),
-            gradient_x: draw(vertices * eigen, -10.0 * size, 10.0 * size),
-            gradient_y: draw(vertices * eigen, -10.0 * size, 10.0 * size),
+            eigenvectors: sample(vertices * eigen, -size, size),
+            gradient_x: sample(vertices * eigen, -10.0 * size, 10.0 * size),
+            gradient_y: sample(vertices * eigen, -10.0 * size, 10.0 * size),
             skin_weights,
             joints: used.len(),
         }
@@ -172,12 +168,12 @@ impl HostGarment {
 
 /// Gradients of every parameter of a module under one loss, in visit order, with their names.
 pub(crate) fn parameter_gradients<M: Module>(module: &M, loss: Tensor<1>) -> Vec<(String, Vec<f32>)> {
-    struct Collect<'a> {
+    struct CollectGradients<'a> {
         gradients: &'a Gradients,
         path: Vec<String>,
         found: Vec<(String, Vec<f32>)>,
     }
-    impl ModuleVisitor for Collect<'_> {
+    impl ModuleVisitor for CollectGradients<'_> {
         fn enter_module(&mut self, name: &str, _: &str) {
             self.path.push(name.to_owned());
         }
@@ -191,7 +187,7 @@ pub(crate) fn parameter_gradients<M: Module>(module: &M, loss: Tensor<1>) -> Vec
         }
     }
     let gradients = loss.backward();
-    let mut collect = Collect { gradients: &gradients, path: Vec::new(), found: Vec::new() };
+    let mut collect = CollectGradients { gradients: &gradients, path: Vec::new(), found: Vec::new() };
     module.visit(&mut collect);
     collect.found
 }

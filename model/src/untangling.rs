@@ -59,20 +59,16 @@ impl Untangling {
         draping: Tensor<2>,
         vertex_product: Tensor<2>,
     ) -> Tensor<2> {
-        let all_pairs;
         let edges = match self.graph {
-            Graph::Near => outfit.edges.as_ref(),
-            Graph::Full => {
-                all_pairs = outfit.complete_edges();
-                all_pairs.as_ref()
-            }
+            Graph::Near => outfit.edges.clone(),
+            Graph::Full => outfit.complete_edges(),
         };
-        let [from_below, from_above] = self.net_forces(edges, &draping);
+        let [from_below, from_above] = self.net_forces(edges.as_ref(), &draping);
         let latent = Tensor::cat(vec![from_below, from_above, draping], 1);
         let values = self.displacement.forward(canonical, vertex_product, latent, &outfit.packing);
         let displacement = values * self.scale;
-        match edges.and_then(|edges| edges.touched.as_ref()) {
-            Some(touched) => displacement * touched.clone(),
+        match edges.and_then(|edges| edges.touched) {
+            Some(touched) => displacement * touched,
             None => displacement,
         }
     }

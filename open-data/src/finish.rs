@@ -4,7 +4,7 @@ use super::reference_surface::ReferenceSurface;
 use super::sheet_repair::boundary_loops;
 use clothcombo_data::mesh::LabelledTriangles;
 use clothcombo_data::mesh::{Contact, contact, push_out};
-use clothcombo_data::mesh::{EditableMesh, smallest_sine};
+use clothcombo_data::mesh::{EditableMesh, compact, smallest_sine};
 use clothcombo_data::mesh::{Quality, remesh};
 use clothcombo_physics::query::Surface;
 use clothcombo_physics::vec3::{add, dot, norm, normalized, scale, sub};
@@ -15,7 +15,7 @@ use clothcombo_physics::{Topology, TriMesh};
 pub struct GarmentResolution {
     /// Wanted number of vertices, as far as the edge length allows.
     pub vertices: usize,
-    /// Shortest and longest mean edge [m].
+    /// Shortest and longest mean edge (m).
     pub edge_length: [f64; 2],
 }
 
@@ -26,23 +26,23 @@ impl Default for GarmentResolution {
 }
 
 impl GarmentResolution {
-    /// Edge length [m] for a sheet of this area: a triangulation with edge length h has a vertex per h²·√3/2.
+    /// Edge length (m) for a sheet of this area: a triangulation with edge length h has a vertex per h²·√3/2.
     pub(super) fn edge_for(&self, area: f64) -> f64 {
         let [shortest, longest] = self.edge_length;
         (area / (self.vertices.max(3) as f64 * 0.75f64.sqrt())).sqrt().clamp(shortest, longest.max(shortest))
     }
 }
 
-/// Least distance between a garment vertex and the body at rest [m].
+/// Least distance between a garment vertex and the body at rest (m).
 const CLEARANCE: f64 = 0.004;
 
 /// Triangle limits a finished garment has to keep.
 const QUALITY: Quality = Quality { angle: 15.0, edge_ratio: [0.4, 2.5] };
 
-/// Angles below this refuse the garment [degrees]: bending and strain become singular.
+/// Angles below this refuse the garment (degrees): bending and strain become singular.
 const SLIVER: f64 = 4.0;
 
-/// A rim vertex where the rim turns by more than this is a corner and stays where it is [degrees].
+/// A rim vertex where the rim turns by more than this is a corner and stays where it is (degrees).
 const CORNER: f64 = 50.0;
 
 /// Bits from here on tell neighbouring corners of one rim apart; the ones below are the rims'.
@@ -135,17 +135,9 @@ fn trim_ears(positions: &mut Vec<[f64; 3]>, faces: &mut Vec<[u32; 3]>) {
             break;
         }
     }
-    let mut number = vec![u32::MAX; positions.len()];
-    let mut kept = Vec::with_capacity(positions.len());
-    for v in faces.iter_mut().flatten() {
-        let slot = &mut number[*v as usize];
-        if *slot == u32::MAX {
-            *slot = kept.len() as u32;
-            kept.push(positions[*v as usize]);
-        }
-        *v = *slot;
-    }
-    *positions = kept;
+    let (used, compacted) = compact(faces.iter().copied(), positions.len());
+    *positions = used.iter().map(|v| positions[*v as usize]).collect();
+    *faces = compacted;
 }
 
 fn check(mesh: &TriMesh) -> Result<(), String> {

@@ -12,24 +12,24 @@ use clothcombo_physics::{TriMesh, vertex_normals};
 /// Neckline of an upper garment.
 #[derive(Clone, Copy, Debug)]
 enum Neck {
-    /// Round, with this radius beside the neck and this depth in front [m].
+    /// Round, with this radius beside the neck and this depth in front (m).
     Round { width: f64, depth: f64 },
     /// V-shaped, with the same measures.
     Vee { width: f64, depth: f64 },
-    /// Closed around the neck at this height above the neck joint [m].
+    /// Closed around the neck at this height above the neck joint (m).
     Collar(f64),
 }
 
 /// Where sleeves end.
 #[derive(Clone, Copy, Debug)]
 enum Sleeve {
-    /// Armhole at the shoulder, this much inside the shoulder joint [m].
+    /// Armhole at the shoulder, this much inside the shoulder joint (m).
     None(f64),
-    /// Share of the way from shoulder (0) over elbow (1) to wrist (2).
+    /// Between shoulder (0), elbow (1) and wrist (2).
     To(f64),
 }
 
-/// Where a lower rim lies, as a share of the way between two joints.
+/// Where a lower rim lies, as a share of the distance between two joints.
 #[derive(Clone, Copy, Debug)]
 enum Level {
     /// From the hip joint (0) to the third spine joint (1).
@@ -46,8 +46,8 @@ enum Cut {
     Skirt { waist: Level, hem: Level, flare: f64 },
 }
 
-/// One garment: cut and ease (distance added to the helper) at the top and at the hem [m].
-struct Recipe {
+/// One garment: cut and ease (distance added to the helper) at the top and at the hem (m).
+struct HelperDesign {
     name: &'static str,
     category: Category,
     cut: Cut,
@@ -61,8 +61,8 @@ const fn upper(
     sleeve: Sleeve,
     neck: Neck,
     ease: [f64; 2],
-) -> Recipe {
-    Recipe {
+) -> HelperDesign {
+    HelperDesign {
         name,
         category,
         cut: Cut::Upper { hem: Level::Trunk(hem), sleeve, neck, open_in_front: false },
@@ -70,8 +70,8 @@ const fn upper(
     }
 }
 
-const fn lower(name: &'static str, waist: f64, hem: f64, ease: [f64; 2]) -> Recipe {
-    Recipe {
+const fn lower(name: &'static str, waist: f64, hem: f64, ease: [f64; 2]) -> HelperDesign {
+    HelperDesign {
         name,
         category: Category::Trousers,
         cut: Cut::Lower { waist: Level::Trunk(waist), hem: Level::Leg(hem) },
@@ -79,8 +79,8 @@ const fn lower(name: &'static str, waist: f64, hem: f64, ease: [f64; 2]) -> Reci
     }
 }
 
-const fn skirt(name: &'static str, waist: f64, hem: f64, flare: f64, ease: [f64; 2]) -> Recipe {
-    Recipe {
+const fn skirt(name: &'static str, waist: f64, hem: f64, flare: f64, ease: [f64; 2]) -> HelperDesign {
+    HelperDesign {
         name,
         category: Category::Skirt,
         cut: Cut::Skirt { waist: Level::Trunk(waist), hem: Level::Leg(hem), flare },
@@ -88,8 +88,8 @@ const fn skirt(name: &'static str, waist: f64, hem: f64, flare: f64, ease: [f64;
     }
 }
 
-const fn open(name: &'static str, hem: f64, sleeve: Sleeve, neck: Neck, ease: [f64; 2]) -> Recipe {
-    Recipe {
+const fn open(name: &'static str, hem: f64, sleeve: Sleeve, neck: Neck, ease: [f64; 2]) -> HelperDesign {
+    HelperDesign {
         name,
         category: Category::OpenShirt,
         cut: Cut::Upper { hem: Level::Trunk(hem), sleeve, neck, open_in_front: true },
@@ -98,7 +98,7 @@ const fn open(name: &'static str, hem: f64, sleeve: Sleeve, neck: Neck, ease: [f
 }
 
 #[rustfmt::skip]
-const RECIPES: &[Recipe] = &[
+const DESIGNS: &[HelperDesign] = &[
     upper("helper_tank_top", Category::Top, -0.10, Sleeve::None(0.035), Neck::Round { width: 0.095, depth: 0.10 }, [0.004, 0.010]),
     upper("helper_tank_top_loose", Category::Top, -0.20, Sleeve::None(0.030), Neck::Round { width: 0.100, depth: 0.13 }, [0.010, 0.025]),
     upper("helper_cropped_top", Category::Top, 0.55, Sleeve::None(0.030), Neck::Round { width: 0.100, depth: 0.09 }, [0.004, 0.010]),
@@ -138,7 +138,7 @@ pub(super) struct HelperGarment {
     pub result: Result<(TriMesh, Contact), String>,
 }
 
-/// Cuts every recipe from the two helper meshes, given at the zero body in T-pose.
+/// Cuts every design from the two helper meshes, given at the zero body in T-pose.
 pub(super) fn cut_helpers<'a>(
     tights: &'a LabelledTriangles,
     skirt: &'a LabelledTriangles,
@@ -146,11 +146,11 @@ pub(super) fn cut_helpers<'a>(
     surface: &'a Surface<f64>,
     resolution: &'a GarmentResolution,
 ) -> impl ExactSizeIterator<Item = HelperGarment> + 'a {
-    RECIPES.iter().map(move |recipe| HelperGarment {
-        name: recipe.name,
-        category: recipe.category,
-        result: cut(recipe, tights, skirt, body)
-            .and_then(|sheet| ease(sheet, recipe, body, surface))
+    DESIGNS.iter().map(move |design| HelperGarment {
+        name: design.name,
+        category: design.category,
+        result: cut(design, tights, skirt, body)
+            .and_then(|sheet| ease(sheet, design, body, surface))
             .and_then(|sheet| finish(sheet, surface, resolution)),
     })
 }
@@ -193,13 +193,13 @@ impl Marks {
 }
 
 fn cut(
-    recipe: &Recipe,
+    design: &HelperDesign,
     tights: &LabelledTriangles,
     skirt: &LabelledTriangles,
     body: &Body,
 ) -> Result<LabelledTriangles, String> {
     let marks = Marks::new(body)?;
-    let pieces = match recipe.cut {
+    let pieces = match design.cut {
         Cut::Upper { hem, sleeve, neck, open_in_front } => {
             let hem = marks.height(hem);
             let mut sheet = tights.clip(|p| p[1] - hem, 1).clip(|p| neckline(&marks, neck, p), 2);
@@ -263,7 +263,7 @@ fn sleeve_end(marks: &Marks, sleeve: Sleeve, p: [f64; 3]) -> f64 {
 /// Widens the cut sheet by its ease, growing from top to hem, and flares skirts.
 fn ease(
     mut sheet: LabelledTriangles,
-    recipe: &Recipe,
+    design: &HelperDesign,
     body: &Body,
     surface: &Surface<f64>,
 ) -> Result<LabelledTriangles, String> {
@@ -271,7 +271,7 @@ fn ease(
     let (top, bottom) =
         sheet.positions.iter().fold((f64::MIN, f64::MAX), |(t, b), p| (f64::max(t, p[1]), f64::min(b, p[1])));
     let length = (top - bottom).max(1e-6);
-    if let Cut::Skirt { flare, .. } = recipe.cut {
+    if let Cut::Skirt { flare, .. } = design.cut {
         // Flare turns the cloth about the waist; the axis runs through the middle of the body.
         let middle = sheet.positions.iter().map(|p| p[2]).sum::<f64>() / sheet.positions.len() as f64;
         for p in &mut sheet.positions {
@@ -292,15 +292,15 @@ fn ease(
             })
             .collect();
     }
-    let leg = matches!(recipe.cut, Cut::Lower { .. });
-    let [at_top, at_hem] = recipe.ease;
+    let leg = matches!(design.cut, Cut::Lower { .. });
+    let [at_top, at_hem] = design.ease;
     for (p, n) in sheet.positions.iter_mut().zip(&normals) {
         let t = (top - p[1]) / length;
         let wanted = at_top + (at_hem - at_top) * t;
         let gap = surface.gap(*p, Distance::ClosestPoint).gap;
         let side = p[0].signum();
         // The helper is already a little off the body: add what is missing to the ease.
-        let step = if !matches!(recipe.cut, Cut::Skirt { .. }) { (wanted - gap).max(0.0) } else { wanted };
+        let step = if !matches!(design.cut, Cut::Skirt { .. }) { (wanted - gap).max(0.0) } else { wanted };
         *p = add_scaled(*p, step, *n);
         if leg && p[1] < marks.hip[1] - 0.10 && p[0] * side < 0.003 {
             // Trouser legs do not reach through each other.

@@ -7,6 +7,6 @@ mod makehuman;
 mod reference_surface;
 mod sheet_repair;
 
-pub use anny::{AnnyError, AnnySettings, import_anny};
+pub use anny::{AnnySettings, import_anny};
 pub use finish::GarmentResolution;
-pub use makehuman::{MakeHumanError, MakeHumanSettings, import_makehuman};
+pub use makehuman::{MakeHumanSettings, import_makehuman};

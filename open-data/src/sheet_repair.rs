@@ -7,13 +7,13 @@ use clothcombo_physics::query::Surface;
 use clothcombo_physics::vec3::{add, norm, scale, sub};
 use std::collections::{HashMap, VecDeque};
 
-/// Vertices closer than this are one [m].
+/// Vertices closer than this are one (m).
 const WELD_DISTANCE: f64 = 1e-4;
 
-/// Faces of less than half this area [m²] are dropped.
+/// Faces of less than half this area (m²) are dropped.
 const LEAST_CROSS: f64 = 1e-10;
 
-/// Holes with a shorter rim are filled [m]: button holes and modelling slips.
+/// Holes with a shorter rim are filled (m): button holes and modelling slips.
 const SMALL_HOLE: f64 = 0.06;
 
 /// What was changed, in words.
@@ -240,7 +240,7 @@ mod tests {
         let (sheet, _) = run(mesh.positions(), mesh.faces()).unwrap();
         assert_eq!(sheet.faces.len(), mesh.face_count());
         assert_eq!(boundary_loops(&sheet.faces).len(), 2);
-        // Turned outward whichever way it came.
+        // Turned outward, however it came.
         let flipped: Vec<[u32; 3]> = mesh.faces().iter().map(|f| [f[0], f[2], f[1]]).collect();
         for faces in [mesh.faces(), &flipped] {
             let (sheet, _) = run(mesh.positions(), faces).unwrap();

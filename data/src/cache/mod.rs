@@ -14,5 +14,5 @@ mod store;
 pub use bindings::{binding_key, body_key, get_binding, get_largest_weights, put_binding};
 pub use embeddings::{StoredEmbedding, embedding_key, get_embedding, put_embedding};
 pub use operators::{get_operators, mesh_key, operators_key, put_operators};
-pub use record::{Element, Record, RecordError, StoredArray};
+pub use record::{Element, Record, StoredArray};
 pub use store::{ArrayCache, CacheError, Key, KeyBuilder};

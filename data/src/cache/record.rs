@@ -6,7 +6,6 @@ use safetensors::tensor::{Dtype, Metadata, SafeTensorError, SafeTensors, TensorV
 use std::collections::HashMap;
 use std::fs::File;
 use std::path::{Path, PathBuf};
-use thiserror::Error;
 
 /// Metadata entry of the hashes: a name and its hash on each line. One entry only, because the order of several is random.
 const HASHES: &str = "blake3";
@@ -45,22 +44,6 @@ impl<'a, T: Element> From<&'a [T]> for StoredArray<'a> {
     }
 }
 
-/// Why a record cannot be read.
-#[derive(Debug, Error)]
-pub enum RecordError {
-    /// The file cannot be opened or mapped.
-    #[error(transparent)]
-    Io(#[from] FileError),
-    /// The file is not whole or was changed.
-    #[error("{}: damaged cache record ({reason}); it is computed anew when the file is removed", path.display())]
-    Damaged {
-        /// The record.
-        path: PathBuf,
-        /// What does not fit.
-        reason: String,
-    },
-}
-
 /// A memory-mapped record.
 pub struct Record {
     path: PathBuf,
@@ -74,25 +57,24 @@ impl Record {
     /// Opens a record and checks its header; arrays are checked when they are read.
     ///
     /// # Errors
-    /// [`RecordError`] naming the file.
-    pub fn open(path: &Path) -> Result<Self, RecordError> {
-        let failed = FileError::at(path);
+    /// [`FileError`].
+    pub fn open(path: &Path) -> Result<Self, FileError> {
+        let failed = FileError::io(path);
         let file = File::open(path).map_err(&failed)?;
         // SAFETY: records are written under another name and renamed into place, and nobody writes to one afterwards, so
         // the mapped bytes do not change. (Whoever truncates a file of the cache by hand ends the process with SIGBUS,
         // as for every mapped file.)
         let map = unsafe { Mmap::map(&file) }.map_err(failed)?;
-        let (start, header) =
-            read_header(&map).map_err(|reason| RecordError::Damaged { path: path.into(), reason })?;
+        let (start, header) = read_header(&map).map_err(damaged(path))?;
         Ok(Self { path: path.into(), map, header, start })
     }
 
     /// The numbers of an array.
     ///
     /// # Errors
-    /// [`RecordError::Damaged`] if there is none of that name and type, or its bytes have changed.
-    pub fn array<T: Element>(&self, name: &str) -> Result<&[T], RecordError> {
-        let damaged = |reason: String| RecordError::Damaged { path: self.path.clone(), reason };
+    /// [`FileError::Content`] if there is none of that name and type, or its bytes have changed.
+    pub fn array<T: Element>(&self, name: &str) -> Result<&[T], FileError> {
+        let damaged = damaged(&self.path);
         let info = self.header.info(name).filter(|info| info.dtype == T::DTYPE);
         let info = info.ok_or_else(|| damaged(format!("it has no array {name:?} of {:?}", T::DTYPE)))?;
         let (from, to) = info.data_offsets;
@@ -106,6 +88,15 @@ impl Record {
     fn hash(&self, name: &str) -> Option<&str> {
         let hashes = self.header.metadata().as_ref()?.get(HASHES)?;
         hashes.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(' '))
+    }
+}
+
+/// What does not fit, for `map_err`.
+fn damaged(path: &Path) -> impl Fn(String) -> FileError + '_ {
+    |reason| {
+        FileError::content(path)(format!(
+            "damaged cache record ({reason}); it is computed anew when the file is removed"
+        ))
     }
 }
 
@@ -144,7 +135,7 @@ mod tests {
         .unwrap()
     }
 
-    fn open(bytes: &[u8]) -> Result<Record, RecordError> {
+    fn open(bytes: &[u8]) -> Result<Record, FileError> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("record");
         std::fs::write(&path, bytes).unwrap();
@@ -158,8 +149,8 @@ mod tests {
         assert_eq!(record.array::<u32>("faces").unwrap(), [0, 1, 2, 7]);
         assert_eq!(record.array::<f32>("basis").unwrap(), [0.25; 33]);
         assert!(record.array::<f32>("empty").unwrap().is_empty());
-        assert!(matches!(record.array::<f32>("mass"), Err(RecordError::Damaged { .. })), "another type");
-        assert!(matches!(record.array::<f32>("none"), Err(RecordError::Damaged { .. })));
+        assert!(matches!(record.array::<f32>("mass"), Err(FileError::Content { .. })), "another type");
+        assert!(matches!(record.array::<f32>("none"), Err(FileError::Content { .. })));
         assert_eq!(example(), example());
     }
 
@@ -203,6 +194,6 @@ mod tests {
         assert!(with_header(&entry("F32", "[4]", "[16,0]"), &[0; 16]).is_err());
         // Neither a hash nor a multiple of eight bytes before the numbers.
         let record = with_header(&entry("F32", "[4]", "[0,16]"), &[0; 16]).unwrap();
-        assert!(matches!(record.array::<f32>("a"), Err(RecordError::Damaged { .. })));
+        assert!(matches!(record.array::<f32>("a"), Err(FileError::Content { .. })));
     }
 }

@@ -1,7 +1,7 @@
 //! A folder of records.
 
-use super::record::{Record, RecordError, StoredArray, encode};
-use crate::format::atomic;
+use super::record::{Record, StoredArray, encode};
+use crate::format::{FileError, atomic};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -28,9 +28,9 @@ pub enum CacheError {
     Full {
         /// The folder.
         path: PathBuf,
-        /// Size of the record [MiB].
+        /// Size of the record (MiB).
         needed: u64,
-        /// The limit [MiB].
+        /// The limit (MiB).
         limit: u64,
     },
 }
@@ -135,13 +135,13 @@ impl ArrayCache {
 
     /// What `read` takes from the record of `key`; `None` if there is none, or it cannot be read. A damaged record is
     /// removed with a warning.
-    pub fn get<T>(&self, key: Key, read: impl FnOnce(&Record) -> Result<T, RecordError>) -> Option<T> {
+    pub fn get<T>(&self, key: Key, read: impl FnOnce(&Record) -> Result<T, FileError>) -> Option<T> {
         let path = self.path(key);
         match Record::open(&path).and_then(|record| read(&record)) {
             Ok(value) => Some(value),
-            Err(RecordError::Io(error)) if error.reason.kind() == io::ErrorKind::NotFound => None,
+            Err(error) if error.is_not_found() => None,
             // It may be a good one that cannot be read just now.
-            Err(error @ RecordError::Io(_)) => {
+            Err(error @ FileError::Io { .. }) => {
                 tracing::warn!("{error}; computed anew");
                 None
             }

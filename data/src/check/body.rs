@@ -20,7 +20,7 @@ pub struct BodyCheck {
     pub shape_components: usize,
     /// Whether it has pose-corrective blend shapes.
     pub pose_correctives: bool,
-    /// Height of the zero body [m].
+    /// Height of the zero body (m).
     pub height: f64,
     /// Smallest and largest sum of the skin weights of a vertex, as written in the file.
     pub weight_sums: [f64; 2],

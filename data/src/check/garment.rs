@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use std::path::Path;
 
-/// A garment farther from the body than this is not on it [m].
+/// A garment farther from the body than this is not on it (m).
 const OFF_BODY: f64 = 0.1;
 
 /// Measurements of a garment file.
@@ -29,9 +29,9 @@ pub struct GarmentCheck {
     pub layer_guessed: bool,
     /// Whether its rim is held: by the manifest, or because it lies wholly below the collarbone.
     pub holding: bool,
-    /// Least signed distance of a vertex to the body at rest [mm], negative inside.
+    /// Least signed distance of a vertex to the body at rest (mm), negative inside.
     pub distance_min_mm: f64,
-    /// Median distance [mm].
+    /// Median distance (mm).
     pub distance_median_mm: f64,
     /// Vertices inside the body.
     pub inside: usize,
@@ -41,7 +41,7 @@ pub struct GarmentCheck {
     pub self_triangle_pairs: usize,
 }
 
-/// The layers a garment is worn in, from its median distance to the body [m]: what lies closer than 8 mm goes under everything,
+/// The layers a garment goes into, from its median distance to the body (m): what lies closer than 8 mm goes under everything,
 /// what lies farther than 20 mm, or is open in front, over something.
 pub fn layer_guess(median_distance: f64, category: Category) -> [u32; 2] {
     let lowest = match median_distance {

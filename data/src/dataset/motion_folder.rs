@@ -1,35 +1,16 @@
 //! A folder of motion npz files.
 
 use crate::asset::Motion;
-use crate::asset::motion::MotionError;
 use crate::format::FileError;
 use std::fs;
-use std::path::{Path, PathBuf};
-use thiserror::Error;
-
-/// Why a motion folder cannot be used.
-#[derive(Debug, Error)]
-pub enum MotionFolderError {
-    /// The folder cannot be read.
-    #[error(transparent)]
-    Io(#[from] FileError),
-    /// No motion in it.
-    #[error("{}: no motions; expected .npz files with poses and mocap_framerate", path.display())]
-    Empty {
-        /// The folder.
-        path: PathBuf,
-    },
-    /// A file is unusable.
-    #[error(transparent)]
-    Motion(#[from] MotionError),
-}
+use std::path::Path;
 
 /// Reads every `.npz` of a folder as a motion, sorted by file name.
 ///
 /// # Errors
-/// [`MotionFolderError`] naming folder, or file and key.
-pub fn load_motion_folder(folder: &Path) -> Result<Vec<Motion>, MotionFolderError> {
-    let failed = FileError::at(folder);
+/// [`FileError`] naming folder, or file and key.
+pub fn load_motion_folder(folder: &Path) -> Result<Vec<Motion>, FileError> {
+    let failed = FileError::io(folder);
     let mut files = Vec::new();
     for entry in fs::read_dir(folder).map_err(&failed)? {
         let path = entry.map_err(&failed)?.path();
@@ -38,8 +19,9 @@ pub fn load_motion_folder(folder: &Path) -> Result<Vec<Motion>, MotionFolderErro
         }
     }
     if files.is_empty() {
-        return Err(MotionFolderError::Empty { path: folder.into() });
+        let message = "no motions; expected .npz files with poses and mocap_framerate";
+        return Err(FileError::content(folder)(message));
     }
     files.sort();
-    Ok(files.iter().map(|f| Motion::load(f)).collect::<Result<_, _>>()?)
+    files.iter().map(|f| Motion::load(f)).collect()
 }

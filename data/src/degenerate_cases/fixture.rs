@@ -2,21 +2,21 @@
 
 use super::scene::{CaseError, CaseGarment, CaseScene};
 use crate::asset::body::skin;
-use crate::asset::{Binding, BindingSettings, Body, Category, Garment, Pose, Provenance, skeleton};
+use crate::asset::{Binding, BindingSettings, Body, Category, Garment, Pose, skeleton};
 use crate::generate::{GarmentError, GarmentGenerator, GarmentSettings};
 use clothcombo_physics::mesh::shapes;
 use clothcombo_physics::{MeshError, TriMesh, vec3, vertex_normals};
 
-/// How far the outer layer of most cases lies below the inner one [m].
+/// How far the outer layer of most cases lies below the inner one (m).
 const WRONG_SIDE: f64 = 1e-3;
 
-/// How deep the piece of cloth cuts into the chest [m].
+/// How deep the piece of cloth cuts into the chest (m).
 const CHEST_DEPTH: f64 = 0.01;
 
-/// How strongly the piece of cloth is bent [1/m]: 2 cm at its sides.
+/// How strongly the piece of cloth is bent (1/m): 2 cm at its sides.
 const CURVATURE: f64 = 2.0;
 
-/// How far canonical positions are above those at rest, so that the holding energy has something to hold [m].
+/// How far canonical positions are above those at rest, so that the holding energy has something to hold (m).
 const RAISED: f64 = 5e-3;
 
 /// Vertices per generated garment, about.
@@ -26,7 +26,7 @@ const GARMENT_VERTICES: usize = 220;
 #[derive(Debug)]
 pub(super) struct Fixture<'a> {
     pub body: &'a Body,
-    /// Foremost point of the chest of the zero body [m].
+    /// Foremost point of the chest of the zero body (m).
     pub chest: [f64; 3],
     t_shirt: (Garment, Binding),
     trousers: (Garment, Binding),
@@ -115,8 +115,7 @@ impl<'a> Fixture<'a> {
 
 /// A garment that is nothing but its mesh, at `posed` after skinning and a little higher before.
 pub(super) fn cloth(name: &str, rest: TriMesh, posed: Vec<[f64; 3]>) -> CaseGarment {
-    let source = Provenance::default();
-    let garment = Garment { name: name.to_string(), category: Category::Top, rest, holding: true, source };
+    let garment = Garment { name: name.to_string(), holding: true, ..Garment::new(Category::Top, rest) };
     CaseGarment { garment, canonical: raised(&posed), posed }
 }
 

@@ -3,6 +3,7 @@
 use super::case::DegenerateCase;
 use super::fixture::{Fixture, below, cloth};
 use super::scene::{CaseError, CaseGarment, CaseScene};
+use crate::mesh::compact;
 use clothcombo_physics::mesh::shapes::{mapped, tube};
 use clothcombo_physics::{TriMesh, vec3, vertex_normals};
 
@@ -102,18 +103,8 @@ fn moved(w: &Fixture<'_>, by: [f64; 3]) -> Result<CaseScene, CaseError> {
 fn chest_skin(w: &Fixture<'_>) -> Result<TriMesh, CaseError> {
     let body = w.body.zero_body();
     let near = |v: u32| vec3::distance_squared(body.positions()[v as usize], w.chest) < 0.01;
-    let mut number = vec![u32::MAX; body.vertex_count()];
-    let mut positions = Vec::new();
-    let mut faces = Vec::new();
-    for face in body.faces().iter().filter(|face| face.iter().all(|v| near(*v))) {
-        faces.push(face.map(|v| {
-            let slot = &mut number[v as usize];
-            if *slot == u32::MAX {
-                *slot = positions.len() as u32;
-                positions.push(body.positions()[v as usize]);
-            }
-            *slot
-        }));
-    }
+    let faces = body.faces().iter().copied().filter(|face| face.iter().all(|v| near(*v)));
+    let (used, faces) = compact(faces, body.vertex_count());
+    let positions = used.iter().map(|v| body.positions()[*v as usize]).collect();
     Ok(TriMesh::new(positions, faces)?)
 }

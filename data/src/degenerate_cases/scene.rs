@@ -27,9 +27,9 @@ pub enum CaseError {
 pub struct CaseGarment {
     /// The garment with its rest mesh.
     pub garment: Garment,
-    /// Positions before skinning `[V, 3]` [m].
+    /// Positions before skinning `[V, 3]` (m).
     pub canonical: Vec<[f64; 3]>,
-    /// Positions on the posed body `[V, 3]` [m].
+    /// Positions on the posed body `[V, 3]` (m).
     pub posed: Vec<[f64; 3]>,
 }
 
@@ -40,7 +40,7 @@ pub struct CaseScene {
     pub shape: Vec<f64>,
     /// Its pose.
     pub pose: Pose,
-    /// The posed body [m].
+    /// The posed body (m).
     pub body: TriMesh,
     /// The garments.
     pub garments: Vec<CaseGarment>,

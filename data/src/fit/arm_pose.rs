@@ -1,6 +1,6 @@
 //! Bodies with lowered arms, and garments back from there to the T-pose.
 
-use crate::asset::{Binding, BindingSettings, Body, Category, Garment, Pose, Provenance, body};
+use crate::asset::{Binding, BindingSettings, Body, Category, Garment, Pose, body};
 use clothcombo_physics::TriMesh;
 use clothcombo_physics::query::Surface;
 
@@ -61,13 +61,7 @@ impl ArmPose {
         for round in 0..3 {
             let mesh = TriMesh::new(rest, faces.to_vec()).map_err(|e| e.to_string())?;
             let category = category.unwrap_or_else(|| Category::guess(&mesh, body));
-            let garment = Garment {
-                name: String::new(),
-                category,
-                rest: mesh,
-                holding: false,
-                source: Provenance::default(),
-            };
+            let garment = Garment::new(category, mesh);
             let binding = Binding::new(&garment, if round == 0 { &posed } else { &bare }, &settings);
             rest = positions
                 .iter()
@@ -111,7 +105,7 @@ pub(super) mod tests {
     use crate::asset::body::skin;
     use crate::generate::{GarmentGenerator, GarmentSettings, mannequin};
 
-    /// A generated shirt skinned to lowered arms the way it would be draped.
+    /// A generated shirt skinned to lowered arms as draping does.
     pub(crate) fn lowered(garment: &Garment, body: &Body, degrees: f64) -> Vec<[f64; 3]> {
         let pose = ArmPose::new(body, degrees).pose;
         let bones = body.bone_transforms(&body.joint_template, &pose);

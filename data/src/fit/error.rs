@@ -36,7 +36,7 @@ pub enum FitError {
         extent: f64,
         /// The unit, if given.
         unit: Option<Unit>,
-        /// Largest extent of the body [m].
+        /// Largest extent of the body (m).
         reach: f64,
     },
     /// Reaches from head to feet and to both hands.

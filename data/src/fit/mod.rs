@@ -16,15 +16,15 @@ pub use coverage::off_trunk;
 pub use error::FitError;
 pub use placed::is_on_body;
 pub use placement::{Origin, Placement, Unit, UpAxis};
-pub use report::{BodyContact, Elements, FitReport, Piece, Repair, RepairKind};
+pub use report::{BodyContact, Elements, FitReport, MeshPiece, Repair, RepairKind};
 pub use settings::{FitSettings, MAX_VERTICES, MIN_TRIANGLES};
 pub use sitting::Sitting;
 
-use crate::asset::{Body, Category, Garment, Provenance};
+use crate::asset::{Body, Category, Garment};
 use crate::format::PolygonMesh;
 use crate::mesh::{
-    AREA_SHARE, MeshMeasures, WELD_SHARE, clean_faces, contact, diagonal, join_faces, orient, outward_area,
-    push_out, split_fans, triangulate, weld,
+    AREA_SHARE, MeshMeasures, WELD_SHARE, bounds, clean_faces, contact, diagonal, join_faces, orient,
+    outward_area, push_out, split_fans, triangulate, weld,
 };
 use arm_pose::ArmPose;
 use clothcombo_physics::contact::{self_triangle_pairs, triangle_pairs};
@@ -33,13 +33,13 @@ use clothcombo_physics::{Topology, TriMesh};
 use search::Search;
 use settings::{MOST_STRETCH, MOST_STRETCHED};
 
-/// Least distance between a fitted vertex and the body [m]: the ε of the paper's body collision loss.
+/// Least distance between a fitted vertex and the body (m): the ε of the paper's body collision loss.
 const CLEARANCE: f64 = 0.002;
 
 /// A fitted garment and how it came about.
 #[derive(Clone, Debug)]
 pub struct Fitted {
-    /// At rest on the zero body in T-pose [m]; name and source are the caller's.
+    /// At rest on the zero body in T-pose (m); name and source are the caller's.
     pub garment: Garment,
     /// What was assumed, repaired and measured.
     pub report: FitReport,
@@ -52,7 +52,7 @@ pub struct Fitted {
 struct Repaired {
     positions: Vec<[f64; 3]>,
     vertex_origin: Vec<u32>,
-    /// The other way round: see [`Fitted::vertex_of_file`].
+    /// The inverse: see [`Fitted::vertex_of_file`].
     vertex_of_file: Vec<Option<u32>>,
     faces: Vec<[u32; 3]>,
     face_origin: Vec<u32>,
@@ -134,8 +134,7 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
             self_triangle_pairs: self_triangle_pairs(rest.positions(), rest.faces()).len(),
         },
     };
-    let source = Provenance::default();
-    let garment = Garment { name: String::new(), category, rest, holding, source };
+    let garment = Garment { holding, ..Garment::new(category, rest) };
     Ok(Fitted { garment, report, vertex_of_file: sheet.vertex_of_file })
 }
 
@@ -258,11 +257,8 @@ fn stretched(topology: &Topology, before: &[[f64; 3]], after: &[[f64; 3]]) -> f6
 
 fn refuse_other_things(positions: &[[f64; 3]], body: &Body, sitting: &Sitting) -> Result<(), FitError> {
     let (low, high) = body.zero_body().bounds();
-    let bound =
-        |a: usize, start: f64, pick: fn(f64, f64) -> f64| positions.iter().map(|p| p[a]).fold(start, pick);
-    let spans = |a: usize, slack: f64| {
-        bound(a, f64::MAX, f64::min) < low[a] + slack && bound(a, f64::MIN, f64::max) > high[a] - slack
-    };
+    let [lowest, highest] = bounds(positions);
+    let spans = |a: usize, slack: f64| lowest[a] < low[a] + slack && highest[a] > high[a] - slack;
     if spans(1, 0.04) && spans(0, 0.1) {
         return Err(FitError::Body);
     }
@@ -278,8 +274,8 @@ fn refuse_other_things(positions: &[[f64; 3]], body: &Body, sitting: &Sitting) -
     Ok(())
 }
 
-fn pieces(mesh: &TriMesh, topology: &Topology) -> Vec<Piece> {
-    let empty = Piece { vertices: 0, triangles: 0, area: 0.0, boundary_loops: 0 };
+fn pieces(mesh: &TriMesh, topology: &Topology) -> Vec<MeshPiece> {
+    let empty = MeshPiece { vertices: 0, triangles: 0, area: 0.0, boundary_loops: 0 };
     let mut pieces = vec![empty; topology.component_count];
     let piece = |v: u32| topology.component_of_vertex[v as usize] as usize;
     topology.component_of_vertex.iter().for_each(|c| pieces[*c as usize].vertices += 1);

@@ -7,7 +7,7 @@ use crate::mesh::outward_area;
 use clothcombo_physics::{Surface, Topology, TriMesh};
 
 /// Whether `mesh`, taken as it stands (metres, y up, pelvis at the origin, arms level), sits on the zero body of `body` as a
-/// garment does: most of it close to the surface or all the way round it, little of it inside, by the same judgement by which
+/// garment does: most of it close to the surface or all around it, little of it inside, by the same judgement by which
 /// [`fit`](super::fit) takes a placement; and every piece of it with its faces outwards.
 pub fn is_on_body(mesh: &TriMesh, body: &Body) -> bool {
     if mesh.face_count() < MIN_TRIANGLES {

@@ -12,21 +12,22 @@ use super::placement::{Origin, Placement, Unit, UpAxis};
 use super::settings::FitSettings;
 use super::sitting::Sitting;
 use crate::asset::{Body, skeleton};
+use crate::mesh::bounds;
 use clothcombo_physics::query::Distance;
 use clothcombo_physics::vec3::{add, cross, norm, scale, sub};
 use rayon::prelude::*;
 
-/// Arm angles tried first [degrees].
+/// Arm angles tried first (degrees).
 const ARM_ANGLES: [f64; 7] = [0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0];
 
-/// Costs in favour of the usual [m]: a worse fit by this much is still preferred.
+/// Costs in favour of the usual (m): a worse fit by this much is still preferred.
 const FACING_PRIOR: f64 = 0.003;
 const ARMS_PRIOR: f64 = 0.0008;
 
 /// Arms are taken for level as long as lowered ones are not better by this factor.
 const LEVEL_ARMS_PRIOR: f64 = 1.3;
 
-/// Directions around the trunk that are told apart.
+/// Number of directions around the trunk.
 const SECTORS: usize = 8;
 
 /// Sample points of a garment in the file's coordinates, evenly over its area.
@@ -66,7 +67,7 @@ pub(super) struct Search<'a> {
     trunk: Vec<[f64; 3]>,
     floor: f64,
     top: f64,
-    /// Largest extent of the body [m].
+    /// Largest extent of the body (m).
     pub reach: f64,
 }
 
@@ -96,7 +97,7 @@ impl<'a> Search<'a> {
         Self { body, arms, trunk, floor: low[1], top: high[1], reach }
     }
 
-    /// Whether a garment of this largest extent [m] can be worn on this body at all.
+    /// Whether a garment of this largest extent (m) can fit this body at all.
     pub fn is_plausible_extent(&self, extent: f64) -> bool {
         extent >= 0.07 * self.reach && extent <= 1.2 * self.reach
     }
@@ -180,6 +181,17 @@ impl<'a> Search<'a> {
         snug.map_or(Ok(()), |place| Err(FitError::OffTrunk { place }))
     }
 
+    /// Costs and numbers of the hypotheses, the best first.
+    fn ranked(&self, hypotheses: &[(Placement, usize)], samples: &Samples) -> Vec<(f64, usize)> {
+        let mut ranked: Vec<(f64, usize)> = hypotheses
+            .par_iter()
+            .enumerate()
+            .map(|(i, (placement, arm))| (self.judged(placement, &self.arms[*arm], samples).0, i))
+            .collect();
+        ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        ranked
+    }
+
     /// Cheap costs first, careful ones for the best few.
     fn pick(
         &self,
@@ -187,12 +199,7 @@ impl<'a> Search<'a> {
         coarse: &Samples,
         fine: &Samples,
     ) -> (Placement, usize, Sitting) {
-        let mut ranked: Vec<(f64, usize)> = hypotheses
-            .par_iter()
-            .enumerate()
-            .map(|(i, (placement, arm))| (self.judged(placement, &self.arms[*arm], coarse).0, i))
-            .collect();
-        ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let ranked = self.ranked(hypotheses, coarse);
         let mut best: Option<(f64, usize, Sitting)> = None;
         for (_, i) in ranked.iter().take(6) {
             let (placement, arm) = &hypotheses[*i];
@@ -221,11 +228,9 @@ impl<'a> Search<'a> {
                 let untranslated =
                     Placement { translation: [0.0; 3], origin: Origin::Elsewhere, ..*placement };
                 let points = untranslated.apply(&coarse.0);
-                let bound = |a: usize, start: f64, pick: fn(f64, f64) -> f64| {
-                    points.iter().map(|p| p[a]).fold(start, pick)
-                };
-                let middle = |a: usize| 0.5 * (bound(a, f64::MAX, f64::min) + bound(a, f64::MIN, f64::max));
-                let (x, y, z) = (middle(0), bound(1, f64::MIN, f64::max), middle(2));
+                let [low, high] = bounds(&points);
+                let middle = |a: usize| 0.5 * (low[a] + high[a]);
+                let (x, y, z) = (middle(0), high[1], middle(2));
                 let trunk_z = self.trunk.iter().map(|p| p[2]).sum::<f64>() / self.trunk.len().max(1) as f64;
                 (1..=heights).map(move |h| {
                     let top = self.floor + (self.top - self.floor) * f64::from(h) / f64::from(heights);
@@ -233,12 +238,7 @@ impl<'a> Search<'a> {
                 })
             })
             .collect();
-        let mut ranked: Vec<(f64, usize)> = started
-            .par_iter()
-            .enumerate()
-            .map(|(i, (placement, arm))| (self.judged(placement, &self.arms[*arm], coarse).0, i))
-            .collect();
-        ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let mut ranked = self.ranked(&started, coarse);
         ranked.truncate(12);
         let slid: Vec<(Placement, usize)> = ranked
             .par_iter()

@@ -8,7 +8,7 @@ mod buffers;
 mod document;
 mod write;
 
-pub use write::{GlbError, SceneMesh, encode_glb, save_glb};
+pub use write::{SceneMesh, encode_glb, save_glb};
 
 use super::polygon_mesh::{PolygonMesh, check_count};
 use buffers::Buffers;

@@ -1,7 +1,8 @@
 //! One entry that reads meshes of all formats: Wavefront OBJ, PLY, STL and glTF.
 
+use super::error::FileError;
 use super::obj::ObjMesh;
-use super::polygon_mesh::{MeshFileError, PolygonMesh, read_limited};
+use super::polygon_mesh::{PolygonMesh, read_limited};
 use super::{gltf, ply, stl};
 use clothcombo_physics::mesh::TriMesh;
 use std::path::Path;
@@ -52,8 +53,8 @@ pub fn is_mesh_path(path: &Path) -> bool {
 /// Reads a mesh file of any known format; the content decides where it is unmistakable, the extension otherwise.
 ///
 /// # Errors
-/// [`MeshFileError`] naming the file, the line or element, and what to do.
-pub fn load_mesh(path: &Path) -> Result<PolygonMesh, MeshFileError> {
+/// [`FileError`] naming the file, the line or element, and what to do.
+pub fn load_mesh(path: &Path) -> Result<PolygonMesh, FileError> {
     parse_mesh(&read_limited(path)?, path)
 }
 
@@ -61,26 +62,25 @@ pub fn load_mesh(path: &Path) -> Result<PolygonMesh, MeshFileError> {
 ///
 /// # Errors
 /// As [`load_mesh`].
-pub fn parse_mesh(bytes: &[u8], path: &Path) -> Result<PolygonMesh, MeshFileError> {
-    let content = |result: Result<PolygonMesh, String>| {
-        result
-            .and_then(PolygonMesh::checked)
-            .map_err(|message| MeshFileError::Content { path: path.into(), message })
+pub fn parse_mesh(bytes: &[u8], path: &Path) -> Result<PolygonMesh, FileError> {
+    let content = match MeshFormat::detect(path, bytes) {
+        Some(MeshFormat::Obj) => return Ok(ObjMesh::parse_bytes(bytes, path)?.into_polygon_mesh()),
+        Some(MeshFormat::Ply) => ply::parse(bytes),
+        Some(MeshFormat::Stl) => stl::parse(bytes),
+        Some(MeshFormat::Gltf) => gltf::parse(bytes, path),
+        None => Err(
+            "neither its name nor its content is that of a mesh; known are .obj, .ply, .stl, .gltf and .glb"
+                .into(),
+        ),
     };
-    match MeshFormat::detect(path, bytes) {
-        Some(MeshFormat::Obj) => Ok(ObjMesh::parse_bytes(bytes, path)?.into_polygon_mesh()),
-        Some(MeshFormat::Ply) => content(ply::parse(bytes)),
-        Some(MeshFormat::Stl) => content(stl::parse(bytes)),
-        Some(MeshFormat::Gltf) => content(gltf::parse(bytes, path)),
-        None => Err(MeshFileError::Format { path: path.into() }),
-    }
+    content.and_then(PolygonMesh::checked).map_err(FileError::content(path))
 }
 
 /// Reads a mesh file of any known format as triangles, repairing nothing.
 ///
 /// # Errors
-/// As [`load_mesh`], and [`MeshFileError::RepeatedCorner`].
-pub fn load_tri_mesh(path: &Path) -> Result<TriMesh, MeshFileError> {
+/// As [`load_mesh`], and if a face names a vertex twice.
+pub fn load_tri_mesh(path: &Path) -> Result<TriMesh, FileError> {
     load_mesh(path)?.to_tri_mesh(path)
 }
 

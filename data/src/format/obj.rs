@@ -8,8 +8,8 @@ mod statements;
 pub use moved::MovedObj;
 
 use super::atomic;
-use super::error::{FileError, LineError};
-use super::polygon_mesh::{MeshFileError, NO_FACES, PolygonMesh, check_count, read_limited};
+use super::error::FileError;
+use super::polygon_mesh::{NO_FACES, PolygonMesh, check_count, read_limited};
 use crate::mesh::fan;
 use clothcombo_physics::mesh::TriMesh;
 use statements::{Statement, statements};
@@ -36,24 +36,24 @@ impl ObjMesh {
     /// Parses OBJ text; `path` is for messages only. A face may name one vertex twice.
     ///
     /// # Errors
-    /// [`MeshFileError`] naming file and line.
-    pub fn parse(text: &str, path: &Path) -> Result<Self, MeshFileError> {
+    /// [`FileError`] naming file and line.
+    pub fn parse(text: &str, path: &Path) -> Result<Self, FileError> {
         Self::parse_bytes(text.as_bytes(), path)
     }
 
     /// As [`Self::parse`]. Names and comments may be in any encoding; numbers are ASCII.
-    pub(super) fn parse_bytes(bytes: &[u8], path: &Path) -> Result<Self, MeshFileError> {
+    pub(super) fn parse_bytes(bytes: &[u8], path: &Path) -> Result<Self, FileError> {
         let mut mesh = Self { groups: vec![String::new()], ..Self::default() };
         let mut group = 0;
         let mut number_of_group = HashMap::from([(String::new(), 0)]);
         for Statement { line, text, .. } in statements(bytes) {
             let text = String::from_utf8_lossy(&text);
             let mut words = text.split('#').next().unwrap_or_default().split_ascii_whitespace();
-            let wrong = |message: String| LineError { path: path.into(), line, message };
+            let wrong = FileError::line(path, line);
             match words.next() {
                 Some("v") => {
-                    check_count("vertices", mesh.positions.len() + 1).map_err(wrong)?;
-                    mesh.positions.push(vertex(words).map_err(wrong)?);
+                    check_count("vertices", mesh.positions.len() + 1).map_err(&wrong)?;
+                    mesh.positions.push(vertex(words).map_err(&wrong)?);
                 }
                 Some("f") => {
                     check_count("faces", mesh.polygons.len() + 1).map_err(&wrong)?;
@@ -62,9 +62,7 @@ impl ObjMesh {
                     let polygon = polygon.map_err(&wrong)?;
                     if polygon.len() < 3 {
                         let count = polygon.len();
-                        return Err(
-                            wrong(format!("a face needs at least 3 corners, this one has {count}")).into()
-                        );
+                        return Err(wrong(format!("a face needs at least 3 corners, this one has {count}")));
                     }
                     mesh.polygons.push(polygon);
                     mesh.group_of_polygon.push(group);
@@ -86,11 +84,11 @@ impl ObjMesh {
             if let Some(index) = polygon.iter().find(|i| **i as usize >= count) {
                 let index = u64::from(*index) + 1;
                 let message = format!("face names vertex {index}, but the file has {count} vertices");
-                return Err(LineError { path: path.into(), line: *line as usize, message }.into());
+                return Err(FileError::line(path, *line as usize)(message));
             }
         }
         if mesh.polygons.is_empty() {
-            return Err(MeshFileError::Content { path: path.into(), message: NO_FACES.into() });
+            return Err(FileError::content(path)(NO_FACES));
         }
         Ok(mesh)
     }
@@ -155,8 +153,8 @@ fn corner(word: &str, vertices_so_far: usize) -> Result<u32, String> {
 /// Reads an OBJ file as a triangle mesh.
 ///
 /// # Errors
-/// [`MeshFileError`] naming file and line.
-pub fn load(path: &Path) -> Result<TriMesh, MeshFileError> {
+/// [`FileError`] naming file and line.
+pub fn load(path: &Path) -> Result<TriMesh, FileError> {
     ObjMesh::parse_bytes(&read_limited(path)?, path)?.into_polygon_mesh().to_tri_mesh(path)
 }
 
@@ -199,7 +197,7 @@ pub fn save_polygons<'a>(
         }
         text.push('\n');
     }
-    atomic::write(path, text.as_bytes()).map_err(FileError::at(path))
+    atomic::write(path, text.as_bytes()).map_err(FileError::io(path))
 }
 
 #[cfg(test)]

@@ -1,74 +1,20 @@
-//! What every mesh reader gives: polygons as the file holds them, in its own unit and axes, or why it cannot be used.
+//! What every mesh reader gives: polygons as the file holds them, in its own unit and axes.
 //!
 //! What a file holds too much of is refused before memory is taken for it.
 
-use super::error::{FileError, LineError};
+use super::error::FileError;
 use crate::mesh::fan;
-use clothcombo_physics::mesh::{MeshError, TriMesh};
-use std::path::{Path, PathBuf};
+use clothcombo_physics::mesh::TriMesh;
+use std::path::Path;
 use std::{fs, io};
-use thiserror::Error;
 
-/// Largest mesh file that is read [bytes]. A garment of 50,000 vertices takes about 5 MB as text.
+/// Largest mesh file that is read (bytes). A garment of 50,000 vertices takes about 5 MB as text.
 pub const MAX_FILE_BYTES: u64 = 256 << 20;
 
 /// Most vertices, and most polygons, a mesh file may hold. Scans have fewer; a network sees some thousand.
 pub const MAX_ELEMENTS: usize = 8_000_000;
 
 pub(super) const NO_FACES: &str = "no faces; a point cloud is not a garment or body";
-
-/// Why a mesh file cannot be used.
-#[derive(Debug, Error)]
-pub enum MeshFileError {
-    /// The file cannot be read.
-    #[error(transparent)]
-    Io(#[from] FileError),
-    /// The name and the content tell no known format.
-    #[error("{}: neither its name nor its content is that of a mesh; known are .obj, .ply, .stl, .gltf and .glb", path.display())]
-    Format {
-        /// The file.
-        path: PathBuf,
-    },
-    /// Larger than any garment.
-    #[error("{}: {bytes} bytes; mesh files of more than {MAX_FILE_BYTES} bytes are not read, decimate the mesh first", path.display())]
-    TooLarge {
-        /// The file.
-        path: PathBuf,
-        /// Its size.
-        bytes: u64,
-    },
-    /// An OBJ line is wrong.
-    #[error(transparent)]
-    Line(#[from] LineError),
-    /// The content is wrong.
-    #[error("{}: {message}", path.display())]
-    Content {
-        /// The file.
-        path: PathBuf,
-        /// Element or line, what is wrong with it, and what to do.
-        message: String,
-    },
-    /// A face names one vertex twice.
-    #[error("{}{}: face {face} names vertex {vertex} twice (counted from 1); `clothcombo fit` removes such faces", path.display(), line.map(|l| format!(":{l}")).unwrap_or_default())]
-    RepeatedCorner {
-        /// The file.
-        path: PathBuf,
-        /// The line, from 1, where the format has lines.
-        line: Option<u32>,
-        /// The face, from 1.
-        face: usize,
-        /// The vertex, from 1.
-        vertex: u64,
-    },
-    /// Not a valid triangle mesh.
-    #[error("{}: {reason}", path.display())]
-    Mesh {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        reason: MeshError,
-    },
-}
 
 /// Positions as written in the file `[V, 3]`, finite, and polygons of three or more corners, every index below V. A polygon
 /// may name a vertex twice: repairing that is the caller's choice.
@@ -140,22 +86,24 @@ impl PolygonMesh {
     /// The polygons as fans of triangles; `path` is for messages only.
     ///
     /// # Errors
-    /// [`MeshFileError::RepeatedCorner`] or [`MeshFileError::Mesh`].
-    pub fn to_tri_mesh(&self, path: &Path) -> Result<TriMesh, MeshFileError> {
+    /// [`FileError`] if a face names a vertex twice or the faces make no mesh.
+    pub fn to_tri_mesh(&self, path: &Path) -> Result<TriMesh, FileError> {
         let mut faces = Vec::with_capacity(self.corners.len().saturating_sub(2 * self.ends.len()));
         for (face, polygon) in self.polygons().enumerate() {
             if let Some(vertex) = repeated(polygon) {
-                return Err(MeshFileError::RepeatedCorner {
-                    path: path.into(),
-                    line: self.lines.get(face).copied(),
-                    face: face + 1,
-                    vertex: u64::from(vertex) + 1,
+                let message = format!(
+                    "face {} names vertex {} twice (counted from 1); `clothcombo fit` removes such faces",
+                    face + 1,
+                    u64::from(vertex) + 1
+                );
+                return Err(match self.lines.get(face) {
+                    Some(line) => FileError::line(path, *line as usize)(message),
+                    None => FileError::content(path)(message),
                 });
             }
             faces.extend(fan(polygon));
         }
-        TriMesh::new(self.positions.clone(), faces)
-            .map_err(|reason| MeshFileError::Mesh { path: path.into(), reason })
+        TriMesh::new(self.positions.clone(), faces).map_err(FileError::content(path))
     }
 }
 
@@ -178,14 +126,18 @@ pub(super) fn check_count(what: &str, count: usize) -> Result<(), String> {
 }
 
 /// Reads a file whose size is checked first.
-pub(super) fn read_limited(path: &Path) -> Result<Vec<u8>, MeshFileError> {
-    let failed = FileError::at(path);
+pub(super) fn read_limited(path: &Path) -> Result<Vec<u8>, FileError> {
+    let failed = FileError::io(path);
     let metadata = fs::metadata(path).map_err(&failed)?;
     if !metadata.is_file() {
-        return Err(failed(io::Error::new(io::ErrorKind::InvalidInput, "not a regular file")).into());
+        return Err(failed(io::Error::new(io::ErrorKind::InvalidInput, "not a regular file")));
     }
     if metadata.len() > MAX_FILE_BYTES {
-        return Err(MeshFileError::TooLarge { path: path.into(), bytes: metadata.len() });
+        let message = format!(
+            "{} bytes; mesh files of more than {MAX_FILE_BYTES} bytes are not read, decimate the mesh first",
+            metadata.len()
+        );
+        return Err(FileError::content(path)(message));
     }
-    Ok(fs::read(path).map_err(failed)?)
+    fs::read(path).map_err(failed)
 }

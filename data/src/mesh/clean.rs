@@ -10,14 +10,33 @@ pub const WELD_SHARE: f64 = 1e-5;
 /// Faces whose edges have a cross product shorter than this share of the squared diagonal have no area.
 pub const AREA_SHARE: f64 = 1e-10;
 
+/// Lowest and highest coordinates of some points.
+pub fn bounds<'a>(points: impl IntoIterator<Item = &'a [f64; 3]>) -> [[f64; 3]; 2] {
+    let empty = [[f64::MAX; 3], [f64::MIN; 3]];
+    points.into_iter().fold(empty, |[low, high], p| {
+        [std::array::from_fn(|a| low[a].min(p[a])), std::array::from_fn(|a| high[a].max(p[a]))]
+    })
+}
+
+/// The vertices that `faces` use, in order of first use, and the faces over these.
+pub fn compact(faces: impl IntoIterator<Item = [u32; 3]>, vertices: usize) -> (Vec<u32>, Vec<[u32; 3]>) {
+    let (mut number, mut used) = (vec![u32::MAX; vertices], Vec::new());
+    let mut renumbered = |v: u32| {
+        let slot = &mut number[v as usize];
+        if *slot == u32::MAX {
+            *slot = used.len() as u32;
+            used.push(v);
+        }
+        *slot
+    };
+    let faces = faces.into_iter().map(|face| face.map(&mut renumbered)).collect();
+    (used, faces)
+}
+
 /// Length of the diagonal of the bounding box.
 pub fn diagonal(positions: &[[f64; 3]]) -> f64 {
-    let extent = |a: usize| {
-        let low = positions.iter().map(|p| p[a]).fold(f64::MAX, f64::min);
-        let high = positions.iter().map(|p| p[a]).fold(f64::MIN, f64::max);
-        high - low
-    };
-    if positions.is_empty() { 0.0 } else { norm([extent(0), extent(1), extent(2)]) }
+    let [low, high] = bounds(positions);
+    if positions.is_empty() { 0.0 } else { norm(sub(high, low)) }
 }
 
 /// A polygon as triangles around its first corner.

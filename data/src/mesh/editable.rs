@@ -2,6 +2,7 @@
 //!
 //! Vertices keep the labels of the [`LabelledTriangles`] the mesh is made of.
 
+use super::clean::compact;
 use super::labelled_triangles::LabelledTriangles;
 use super::triangle::{smallest_sine, triangle_normal};
 use clothcombo_physics::vec3::{add, dot, norm, sub};
@@ -35,19 +36,9 @@ impl EditableMesh {
 
     /// Living faces with vertices renumbered in order of first use.
     pub fn compact(&self) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
-        let mut number = vec![u32::MAX; self.positions.len()];
-        let (mut positions, mut faces) = (Vec::new(), Vec::new());
-        for face in self.faces.iter().filter(|f| **f != DEAD) {
-            faces.push(face.map(|v| {
-                let slot = &mut number[v as usize];
-                if *slot == u32::MAX {
-                    *slot = positions.len() as u32;
-                    positions.push(self.positions[v as usize]);
-                }
-                *slot
-            }));
-        }
-        (positions, faces)
+        let alive = self.faces.iter().copied().filter(|f| *f != DEAD);
+        let (used, faces) = compact(alive, self.positions.len());
+        (used.iter().map(|v| self.point(*v)).collect(), faces)
     }
 
     pub(super) fn incident(&self, v: u32) -> &[u32] {

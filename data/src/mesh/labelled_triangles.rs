@@ -3,6 +3,7 @@
 //! Each vertex carries a label: a bit set of the cut curves it lies on. Zero is an interior vertex, one bit a vertex of
 //! that boundary curve, several bits a corner where curves meet.
 
+use super::clean::compact;
 use clothcombo_physics::mesh::DisjointSets;
 use clothcombo_physics::vec3::{add, cross, norm, scale, sub};
 use std::collections::HashMap;
@@ -106,26 +107,17 @@ impl LabelledTriangles {
         let Some(best) = (0..area.len()).max_by(|a, b| area[*a].total_cmp(&area[*b])) else {
             return Self::default();
         };
-        let mut number = vec![u32::MAX; self.positions.len()];
-        let mut result = Self::default();
-        for face in &self.faces {
-            if components.root(face[0]) as usize != best {
-                continue;
-            }
-            result.faces.push(face.map(|v| {
-                let slot = &mut number[v as usize];
-                if *slot == u32::MAX {
-                    *slot = result.positions.len() as u32;
-                    result.positions.push(self.positions[v as usize]);
-                    result.labels.push(self.labels[v as usize]);
-                }
-                *slot
-            }));
+        let in_best = self.faces.iter().copied().filter(|f| components.root(f[0]) as usize == best);
+        let (used, faces) = compact(in_best, self.positions.len());
+        let used = || used.iter().map(|v| *v as usize);
+        Self {
+            positions: used().map(|v| self.positions[v]).collect(),
+            labels: used().map(|v| self.labels[v]).collect(),
+            faces,
         }
-        result
     }
 
-    /// Surface area [m²].
+    /// Surface area (m²).
     pub fn area(&self) -> f64 {
         self.faces
             .iter()

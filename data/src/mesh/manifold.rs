@@ -75,8 +75,8 @@ pub fn orient(faces: &mut [[u32; 3]], joined: &Joined) -> Vec<u32> {
                     continue;
                 }
                 let (a, b) = (original[f][i], original[f][(i + 1) % 3]);
-                let same_way = (0..3).any(|j| original[g][j] == a && original[g][(j + 1) % 3] == b);
-                state[g] = if same_way { 3 - state[f] } else { state[f] };
+                let same_orientation = (0..3).any(|j| original[g][j] == a && original[g][(j + 1) % 3] == b);
+                state[g] = if same_orientation { 3 - state[f] } else { state[f] };
                 piece.push(g);
                 queue.push_back(g);
             }
@@ -103,7 +103,7 @@ pub struct SplitMesh {
     pub faces: Vec<[u32; 3]>,
     /// For each vertex the one it was.
     pub origin: Vec<u32>,
-    /// Edges cut because their faces still run the same way (a Möbius band), as they were numbered before.
+    /// Edges cut because their faces have the same orientation there (a Möbius band), as they were numbered before.
     pub twisted: Vec<[u32; 2]>,
 }
 
@@ -121,8 +121,8 @@ pub fn split_fans(positions: &[[f64; 3]], faces: &[[u32; 3]], joined: &Joined) -
                 continue;
             };
             let (a, b) = (faces[f][i], faces[f][(i + 1) % 3]);
-            let same_way = (0..3).any(|j| faces[g][j] == a && faces[g][(j + 1) % 3] == b);
-            if same_way {
+            let same_orientation = (0..3).any(|j| faces[g][j] == a && faces[g][(j + 1) % 3] == b);
+            if same_orientation {
                 sheet.twisted.push([a.min(b), a.max(b)]);
                 continue;
             }
@@ -147,7 +147,7 @@ pub fn split_fans(positions: &[[f64; 3]], faces: &[[u32; 3]], joined: &Joined) -
     sheet
 }
 
-/// Per face the cosine between its normal and the direction away from the body, and its area [m²].
+/// Per face the cosine between its normal and the direction away from the body, and its area (m²).
 pub fn outwardness(positions: &[[f64; 3]], faces: &[[u32; 3]], body: &Surface<f64>) -> Vec<(f64, f64)> {
     faces
         .iter()
@@ -161,7 +161,7 @@ pub fn outwardness(positions: &[[f64; 3]], faces: &[[u32; 3]], body: &Surface<f6
         .collect()
 }
 
-/// Per piece its area that faces away from the body less what faces towards it [m²].
+/// Per piece its area that faces away from the body less what faces towards it (m²).
 pub fn outward_area(
     positions: &[[f64; 3]],
     faces: &[[u32; 3]],

@@ -16,11 +16,11 @@ pub struct MeshMeasures {
     pub components: usize,
     /// Boundary curves.
     pub boundary_loops: usize,
-    /// Median edge length [mm].
+    /// Median edge length (mm).
     pub edge_median_mm: f64,
-    /// Shortest edge [mm].
+    /// Shortest edge (mm).
     pub edge_min_mm: f64,
-    /// Longest edge [mm].
+    /// Longest edge (mm).
     pub edge_max_mm: f64,
     /// What is wrong with it.
     pub defects: MeshDefects,
@@ -31,7 +31,7 @@ pub struct MeshMeasures {
 pub struct MeshDefects {
     /// Edges with three or more triangles.
     pub non_manifold_edges: Vec<[u32; 2]>,
-    /// Edges whose two triangles run the same way, so that one of them faces inward.
+    /// Edges through which both triangles run in one direction, so that one of them faces inward.
     pub flipped_edges: Vec<[u32; 2]>,
     /// Triangles without area, or with the vertices of an earlier one.
     pub degenerate_triangles: Vec<u32>,

@@ -9,7 +9,10 @@ mod push_out;
 mod remesh;
 mod triangle;
 
-pub use clean::{AREA_SHARE, CleanFaces, WELD_SHARE, Welded, clean_faces, diagonal, fan, triangulate, weld};
+pub use clean::{
+    AREA_SHARE, CleanFaces, WELD_SHARE, Welded, bounds, clean_faces, compact, diagonal, fan, triangulate,
+    weld,
+};
 pub use editable::EditableMesh;
 pub use labelled_triangles::LabelledTriangles;
 pub use manifold::{Joined, SplitMesh, join_faces, orient, outward_area, outwardness, split_fans};

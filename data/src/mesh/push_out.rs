@@ -9,7 +9,7 @@ use rayon::prelude::*;
 pub struct Contact {
     /// Vertices inside the body.
     pub inside: usize,
-    /// Smallest gap of a vertex [m].
+    /// Smallest gap of a vertex (m).
     pub least_gap: f64,
 }
 
@@ -22,7 +22,7 @@ pub fn contact(positions: &[[f64; 3]], body: &Surface<f64>) -> Contact {
     }
 }
 
-/// Pushes vertices along the body's normal until every vertex is `clearance` [m] away and no face centre touches the body. The
+/// Pushes vertices along the body's normal until every vertex is `clearance` (m) away and no face centre touches the body. The
 /// displacement is smoothed over the garment, so that its neighbourhood comes along instead of leaving a dent.
 pub fn push_out(positions: &mut [[f64; 3]], faces: &[[u32; 3]], body: &Surface<f64>, clearance: f64) {
     let rings = one_rings(positions.len(), faces);

@@ -4,9 +4,9 @@ use burn::backend::Backend;
 use burn::backend::tensor::FloatTensor;
 use burn::tensor::Tensor;
 
-use super::composed::{broadcast_rows, concatenate, row_block};
+use super::composed::{add_optional, broadcast_rows, concatenate, row_block};
 use super::host::HostBackend;
-use super::operation::{ArgumentGradients, FusedOps, Kernel, Operation, Saved, Saves, apply};
+use super::operation::{ArgumentGradients, FusedOps, Operation, Saved, Saves, TensorKernel, apply};
 use super::tensors::Tensors;
 use crate::packing::Packing;
 
@@ -37,7 +37,7 @@ pub fn activate_residual(
     residual: Tensor<2>,
 ) -> Tensor<2> {
     let packing = Packing::new([input.dims()[0]]);
-    apply(Layer { activation, packing, has_residual: true }, [input, bias, residual])
+    apply(ActivatedSum { activation, packing, has_residual: true }, [input, bias, residual])
 }
 
 /// `activation(input + its garment's row)`: input `[ΣV,C]`, rows `[M,C]`.
@@ -47,7 +47,7 @@ pub fn activate_packed(
     rows: Tensor<2>,
     packing: &Packing,
 ) -> Tensor<2> {
-    apply(Layer { activation, packing: packing.clone(), has_residual: false }, [input, rows])
+    apply(ActivatedSum { activation, packing: packing.clone(), has_residual: false }, [input, rows])
 }
 
 /// `activation(a + b + its garment's row)`: matrices `[ΣV,C]`, rows `[M,C]`.
@@ -57,30 +57,30 @@ pub fn activate_packed_sum(
     rows: Tensor<2>,
     packing: &Packing,
 ) -> Tensor<2> {
-    apply(Layer { activation, packing: packing.clone(), has_residual: false }, [a, b, rows])
+    apply(ActivatedSum { activation, packing: packing.clone(), has_residual: false }, [a, b, rows])
 }
 
 /// Arguments: the matrices of the sum, the rows, and the residual if there is one.
 #[derive(Clone, Debug)]
-pub(super) struct Layer {
+pub(super) struct ActivatedSum {
     pub(super) activation: Activation,
     pub(super) packing: Packing,
     pub(super) has_residual: bool,
 }
 
-impl Layer {
+impl ActivatedSum {
     /// Matrices, rows, residual.
     fn split<B: Backend>(
         &self,
         Tensors(mut matrices): Tensors<B>,
     ) -> (Vec<FloatTensor<B>>, FloatTensor<B>, Option<FloatTensor<B>>) {
         let residual = self.has_residual.then(|| matrices.pop()).flatten();
-        let rows = matrices.pop().expect("a layer has rows");
+        let rows = matrices.pop().expect("rows for the garments");
         (matrices, rows, residual)
     }
 }
 
-impl<const N: usize> Operation<N> for Layer {
+impl<const N: usize> Operation<N> for ActivatedSum {
     /// Identity needs nothing. The result of ReLU is positive exactly where its argument was. Otherwise the argument of the
     /// activation is added up again.
     fn saves(&self, _: [bool; N]) -> Saves<N> {
@@ -90,7 +90,8 @@ impl<const N: usize> Operation<N> for Layer {
     }
 
     fn backward<B: FusedOps>(&self, saved: Saved<B, N>, gradient: FloatTensor<B>) -> ArgumentGradients<B, N> {
-        let [of_matrix, of_row] = B::run(&LayerGradients(self.clone()), saved.with(gradient.clone())).take();
+        let [of_matrix, of_row] =
+            B::run(&ActivatedSumGradients(self.clone()), saved.with(gradient.clone())).take();
         let matrices = N - 1 - usize::from(self.has_residual);
         let of_arguments = std::iter::repeat_n(of_matrix, matrices).chain([of_row, gradient]);
         let mut of_arguments = of_arguments.take(N);
@@ -98,7 +99,7 @@ impl<const N: usize> Operation<N> for Layer {
     }
 }
 
-impl Kernel for Layer {
+impl TensorKernel for ActivatedSum {
     fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
         let (matrices, rows, residual) = self.split(arguments);
         let sum = sum::<B>(matrices, rows, &self.packing);
@@ -107,11 +108,7 @@ impl Kernel for Layer {
             Activation::Relu => B::float_clamp_min(sum, 0.0.into()),
             Activation::Gelu => B::float_mul(sum.clone(), normal_distribution::<B>(sum)),
         };
-        let result = match residual {
-            Some(residual) => B::float_add(value, residual),
-            None => value,
-        };
-        [result].into()
+        [add_optional::<B>(value, residual)].into()
     }
 
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
@@ -125,11 +122,11 @@ impl Kernel for Layer {
 /// Arguments: what the activation was applied to, then the gradient of the result. The former is absent (identity), a
 /// matrix of the same sign (the result of ReLU), or the matrices and the rows that it is the sum of.
 #[derive(Clone, Debug)]
-pub(super) struct LayerGradients(pub(super) Layer);
+pub(super) struct ActivatedSumGradients(pub(super) ActivatedSum);
 
-impl Kernel for LayerGradients {
+impl TensorKernel for ActivatedSumGradients {
     fn composed<B: Backend>(&self, Tensors(mut arguments): Tensors<B>) -> Tensors<B> {
-        let Layer { activation, packing, .. } = &self.0;
+        let ActivatedSum { activation, packing, .. } = &self.0;
         let gradient = arguments.pop().expect("a gradient");
         let rows = if arguments.len() > 1 { arguments.pop() } else { None };
         let sum = match rows {

@@ -5,7 +5,7 @@ use burn::tensor::Tensor;
 use rayon::prelude::*;
 
 use super::host::{CHUNK_ELEMENTS, HostBackend, vectorised};
-use super::operation::{Kernel, run};
+use super::operation::{TensorKernel, run};
 use super::tensors::Tensors;
 
 /// Factors of one update; those of the bias correction are already in `step_size` and `epsilon`.
@@ -24,7 +24,7 @@ pub struct AdamFactors {
 /// The parameter and both moments after one update, `m ← β₁m + (1 − β₁)g`, `v ← β₂v + (1 − β₂)g²`,
 /// `p ← p − step·m / (√v + ε)`; all of one shape, none tracked by autodiff.
 ///
-/// Memory that nobody else holds is overwritten in place.
+/// Memory that no other tensor shares is overwritten in place.
 pub fn adam_step<const D: usize>(
     parameter: Tensor<D>,
     gradient: Tensor<D>,
@@ -37,7 +37,7 @@ pub fn adam_step<const D: usize>(
 }
 
 /// Arguments: parameter, gradient, first and second moment. Results: parameter, first and second moment.
-impl Kernel for AdamFactors {
+impl TensorKernel for AdamFactors {
     fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
         let [parameter, gradient, first, second] = arguments.take();
         let average = |old, new, beta: f32| {

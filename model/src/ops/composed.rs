@@ -14,10 +14,17 @@ pub(super) fn multiply_add<B: Backend>(
     rhs: FloatTensor<B>,
     addend: Option<FloatTensor<B>>,
 ) -> FloatTensor<B> {
-    let product = B::float_matmul(lhs, rhs);
+    add_optional::<B>(B::float_matmul(lhs, rhs), addend)
+}
+
+/// A tensor, plus the addend if there is one.
+pub(super) fn add_optional<B: Backend>(
+    tensor: FloatTensor<B>,
+    addend: Option<FloatTensor<B>>,
+) -> FloatTensor<B> {
     match addend {
-        Some(addend) => B::float_add(product, addend),
-        None => product,
+        Some(addend) => B::float_add(tensor, addend),
+        None => tensor,
     }
 }
 

@@ -42,14 +42,10 @@ impl StridedMatrix {
         Self { first, row_stride, column_stride }
     }
 
-    /// The matrix from row `row` on.
-    fn row(self, row: usize) -> Self {
-        Self { first: self.first.wrapping_offset(row as isize * self.row_stride), ..self }
-    }
-
-    /// The matrix from column `column` on.
-    fn column(self, column: usize) -> Self {
-        Self { first: self.first.wrapping_offset(column as isize * self.column_stride), ..self }
+    /// The matrix from row `row` and column `column` on.
+    fn from(self, row: usize, column: usize) -> Self {
+        let offset = row as isize * self.row_stride + column as isize * self.column_stride;
+        Self { first: self.first.wrapping_offset(offset), ..self }
     }
 }
 
@@ -96,7 +92,7 @@ unsafe fn write(
         let part = rows.div_ceil(rayon::current_num_threads()).max(ROWS_PER_PART);
         output.par_chunks_mut(part * columns).enumerate().for_each(|(i, output)| {
             let size = [output.len() / columns, inner, columns];
-            unsafe { call_gemm(lhs.row(i * part), rhs, output, size, add, Parallelism::None) };
+            unsafe { call_gemm(lhs.from(i * part, 0), rhs, output, size, add, Parallelism::None) };
         });
     } else {
         unsafe { call_gemm(lhs, rhs, output, size, add, Parallelism::Rayon(0)) };
@@ -122,7 +118,7 @@ unsafe fn write_by_terms(
         let first = i * part;
         let size = [rows, part.min(inner - first), columns];
         // SAFETY: a block of the promised matrices.
-        unsafe { call_gemm(lhs.column(first), rhs.row(first), sums, size, false, Parallelism::None) };
+        unsafe { call_gemm(lhs.from(0, first), rhs.from(first, 0), sums, size, false, Parallelism::None) };
     });
     // SAFETY: every part was written.
     unsafe { sums.set_len(count * parts) };

@@ -6,10 +6,10 @@ use burn::tensor::Tensor;
 
 use super::composed::block;
 use super::host::{
-    Chunk, HostBackend, MatrixView, NewPart, NewValues, Output, chunks, compute, for_each, vectorised,
+    Chunk, HostBackend, MatrixView, NewPart, NewValues, OutputMatrix, chunks, compute, for_each, vectorised,
 };
 use super::math::tanh;
-use super::operation::{ArgumentGradients, FusedOps, Kernel, Operation, Saved, Saves, apply};
+use super::operation::{ArgumentGradients, FusedOps, Operation, Saved, Saves, TensorKernel, apply};
 use super::tensors::Tensors;
 use crate::packing::Packing;
 
@@ -36,7 +36,7 @@ impl Operation<1> for GradientFeatures {
     }
 }
 
-impl Kernel for GradientFeatures {
+impl TensorKernel for GradientFeatures {
     fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
         let [mixed] = arguments.take();
         let [[x0, x1, x2], [y0, y1, y2]] = blocks::<B>(mixed);
@@ -46,15 +46,13 @@ impl Kernel for GradientFeatures {
     }
 
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
-        let device = arguments.device();
         let held = arguments.take().map(B::hold);
         let [mixed] = held.each_ref().map(B::view);
         let (vertices, width) = (mixed.rows() / 2, mixed.columns() / 3);
-        compute::<B, 1>(
-            &device,
+        compute(
             &Packing::new([vertices]),
             width,
-            [Output::Rows(width)],
+            [OutputMatrix::Rows(width)],
             #[inline(always)]
             |chunk, [output]| forward_chunk(mixed, vertices, chunk, output),
         )
@@ -98,7 +96,7 @@ fn forward_chunk(mixed: MatrixView<'_>, vertices: usize, chunk: &Chunk, output: 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FeatureGradients;
 
-impl Kernel for FeatureGradients {
+impl TensorKernel for FeatureGradients {
     fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
         let [mixed, output, gradient] = arguments.take();
         let [[x0, x1, x2], [y0, y1, y2]] = blocks::<B>(mixed);
@@ -114,7 +112,6 @@ impl Kernel for FeatureGradients {
     }
 
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
-        let device = arguments.device();
         let held = arguments.take().map(B::hold);
         let [mixed, output, gradient] = held.each_ref().map(B::view);
         let (vertices, columns) = (mixed.rows() / 2, mixed.columns());
@@ -132,7 +129,7 @@ impl Kernel for FeatureGradients {
                 || backward_chunk([mixed, output, gradient], vertices, chunk, first, second),
             );
         });
-        [B::matrix(result.finish(), columns, &device)].into()
+        [B::matrix(result.finish(), columns)].into()
     }
 }
 

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use burn::backend::Backend;
-use burn::backend::tensor::{Device, FloatTensor};
+use burn::backend::tensor::FloatTensor;
 use burn::tensor::TensorData;
 use rayon::prelude::*;
 
@@ -43,13 +43,13 @@ pub(super) trait HostBackend: Backend {
         None
     }
 
-    /// The elements of a matrix whose memory is nobody else's and holds nothing else, for writing in place; `None` if it is
-    /// not so, or they are not f32.
+    /// The elements of a matrix whose memory no other tensor shares and that fills its memory, for writing in place; `None`
+    /// otherwise, or if they are not f32.
     fn own_values_mut(_tensor: &mut FloatTensor<Self>) -> Option<&mut [f32]> {
         None
     }
 
-    /// `lhs·rhs`, plus the addend if there is one, in whose memory the result lies if nobody else holds it.
+    /// `lhs·rhs`, plus the addend if there is one, in the memory of the addend if no other tensor shares it.
     fn product(
         lhs: FloatTensor<Self>,
         rhs: FloatTensor<Self>,
@@ -59,9 +59,10 @@ pub(super) trait HostBackend: Backend {
     }
 
     /// A matrix from its elements.
-    fn matrix(values: Vec<f32>, columns: usize, device: &Device<Self>) -> FloatTensor<Self> {
+    fn matrix(values: Vec<f32>, columns: usize) -> FloatTensor<Self> {
         let rows = values.len() / columns.max(1);
-        Self::float_from_data(TensorData::new(values, [rows, columns]), device)
+        // The host is the only device of such a backend.
+        Self::float_from_data(TensorData::new(values, [rows, columns]), &Default::default())
     }
 }
 
@@ -108,7 +109,7 @@ pub(super) fn chunks(packing: &Packing, columns: usize) -> Vec<Chunk> {
 
 /// What the chunks of rows make one matrix of.
 #[derive(Clone, Copy)]
-pub(super) enum Output {
+pub(super) enum OutputMatrix {
     /// The same rows, of so many columns.
     Rows(usize),
     /// One row of so many columns per garment: its chunks' rows summed in order, in f64.
@@ -119,17 +120,16 @@ pub(super) enum Output {
 ///
 /// Chunks have about [`CHUNK_ELEMENTS`] elements in `columns` columns. Mark the kernel `#[inline(always)]`.
 pub(super) fn compute<B: HostBackend, const K: usize>(
-    device: &Device<B>,
     packing: &Packing,
     columns: usize,
-    outputs: [Output; K],
+    outputs: [OutputMatrix; K],
     kernel: impl Fn(&Chunk, [&mut [f32]; K]) + Sync,
 ) -> Tensors<B> {
     let chunks = chunks(packing, columns);
     let lengths = |output| {
         let length = |chunk: &Chunk| match output {
-            Output::Rows(columns) => chunk.rows.len() * columns,
-            Output::Sums(columns) => columns,
+            OutputMatrix::Rows(columns) => chunk.rows.len() * columns,
+            OutputMatrix::Sums(columns) => columns,
         };
         chunks.iter().map(length).collect()
     };
@@ -144,11 +144,11 @@ pub(super) fn compute<B: HostBackend, const K: usize>(
             || kernel(chunk, parts),
         );
     });
-    let matrix = |(output, values): (Output, NewValues)| match output {
-        Output::Rows(columns) => B::matrix(values.finish(), columns, device),
-        Output::Sums(columns) => {
+    let matrix = |(output, values): (OutputMatrix, NewValues)| match output {
+        OutputMatrix::Rows(columns) => B::matrix(values.finish(), columns),
+        OutputMatrix::Sums(columns) => {
             let sums = sum_partials(&values.finish(), &chunks, columns, packing.count());
-            B::matrix(sums, columns, device)
+            B::matrix(sums, columns)
         }
     };
     matrices.map(matrix).into()

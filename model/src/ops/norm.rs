@@ -5,7 +5,7 @@ use burn::tensor::{Shape, Tensor, TensorData};
 use rayon::prelude::*;
 
 use super::host::{CHUNK_ELEMENTS, HostBackend, vectorised};
-use super::operation::{Kernel, run};
+use super::operation::{TensorKernel, run};
 use super::tensors::Tensors;
 
 /// Lanes that add up in parallel; their sums are added in order.
@@ -17,15 +17,15 @@ pub fn squared_norm<const D: usize>(values: Tensor<D>) -> Tensor<1> {
     Tensor::from_dispatch(sum)
 }
 
-/// `values` times the only element of `factor` `[1]`, in place where nobody else holds them; not tracked by autodiff.
+/// `values` times the only element of `factor` `[1]`, in place if no other tensor shares them; not tracked by autodiff.
 pub fn scale_by<const D: usize>(values: Tensor<D>, factor: Tensor<1>) -> Tensor<D> {
-    let [scaled] = run(&Scale, [values.into_dispatch(), factor.into_dispatch()].into()).take();
+    let [scaled] = run(&ScaleBy, [values.into_dispatch(), factor.into_dispatch()].into()).take();
     Tensor::from_dispatch(scaled)
 }
 
 struct SquaredNorm;
 
-impl Kernel for SquaredNorm {
+impl TensorKernel for SquaredNorm {
     fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
         let [values] = arguments.take();
         // Row sums first: one running sum over a large weight would lose digits in f32.
@@ -37,7 +37,6 @@ impl Kernel for SquaredNorm {
     }
 
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
-        let device = arguments.device();
         let [mut tensor] = arguments.take();
         let Some(values) = B::values(&mut tensor) else { return self.composed([tensor].into()) };
         let parts: Vec<f64> = values
@@ -50,7 +49,7 @@ impl Kernel for SquaredNorm {
             })
             .collect();
         let sum = parts.into_iter().sum::<f64>() as f32;
-        [B::float_from_data(TensorData::new(vec![sum], [1]), &device)].into()
+        [B::float_from_data(TensorData::new(vec![sum], [1]), &Default::default())].into()
     }
 }
 
@@ -69,9 +68,9 @@ fn sum_of_squares(values: &[f32]) -> f64 {
 }
 
 /// Arguments: values, factor.
-struct Scale;
+struct ScaleBy;
 
-impl Kernel for Scale {
+impl TensorKernel for ScaleBy {
     fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
         let [values, factor] = arguments.take();
         let ones = vec![1; values.shape().num_dims()];

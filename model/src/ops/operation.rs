@@ -1,6 +1,7 @@
 //! What a fused operation is, and how a backend runs, differentiates and records one.
 //!
-//! Nothing here knows a single operation: each lies in a file of its own, which calls [`apply`] (differentiable) or [`run`].
+//! An operation lies in a file of its own, which implements [`TensorKernel`] (and [`Operation`], if it is differentiable) and
+//! calls [`run`] (or [`apply`]). Nothing here depends on a single operation.
 
 // burn deprecates its ndarray backend but still ships it, and users ask for it.
 #![cfg_attr(feature = "ndarray", allow(deprecated))]
@@ -24,7 +25,7 @@ use super::host::HostBackend;
 use super::tensors::Tensors;
 
 /// A function of tensors in two forms, which agree to rounding.
-pub(super) trait Kernel {
+pub(super) trait TensorKernel {
     /// Composed of a backend's own operations.
     fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B>;
 
@@ -35,7 +36,7 @@ pub(super) trait Kernel {
 }
 
 /// A kernel with one result and a derivative by its N arguments.
-pub(super) trait Operation<const N: usize>: Kernel + Clone + Debug + Send + 'static {
+pub(super) trait Operation<const N: usize>: TensorKernel + Clone + Debug + Send + 'static {
     /// What the backward pass reads, if the arguments marked in `tracked` need a gradient; nothing by default.
     fn saves(&self, _tracked: [bool; N]) -> Saves<N> {
         Saves { arguments: [false; N], result: false }
@@ -76,11 +77,11 @@ pub(super) fn apply<O: Operation<N>, const N: usize>(operation: O, arguments: [T
 }
 
 /// Runs a kernel and records nothing.
-pub(super) fn run(kernel: &impl Kernel, arguments: Tensors<Dispatch>) -> Tensors<Dispatch> {
+pub(super) fn run(kernel: &impl TensorKernel, arguments: Tensors<Dispatch>) -> Tensors<Dispatch> {
     Dispatch::run(kernel, arguments)
 }
 
-/// The choice of a backend between the forms of a kernel.
+/// How a backend runs kernels: it chooses one of their forms.
 #[backend_extension(
     Flex: cfg(feature = "flex"),
     NdArray: cfg(feature = "ndarray"),
@@ -89,7 +90,7 @@ pub(super) fn run(kernel: &impl Kernel, arguments: Tensors<Dispatch>) -> Tensors
 )]
 pub(super) trait FusedOps: Backend {
     /// See [`run`].
-    fn run<K: Kernel>(kernel: &K, #[extension_type] arguments: Tensors<Self>) -> Tensors<Self> {
+    fn run<K: TensorKernel>(kernel: &K, #[extension_type] arguments: Tensors<Self>) -> Tensors<Self> {
         kernel.composed(arguments)
     }
 
@@ -103,21 +104,21 @@ pub(super) trait FusedOps: Backend {
 
     /// The composed form, whose operations an autodiff backend records one by one.
     #[cfg(test)]
-    fn compose<K: Kernel>(kernel: &K, #[extension_type] arguments: Tensors<Self>) -> Tensors<Self> {
+    fn compose<K: TensorKernel>(kernel: &K, #[extension_type] arguments: Tensors<Self>) -> Tensors<Self> {
         kernel.composed(arguments)
     }
 }
 
 #[cfg(feature = "flex")]
 impl FusedOps for Flex {
-    fn run<K: Kernel>(kernel: &K, arguments: Tensors<Self>) -> Tensors<Self> {
+    fn run<K: TensorKernel>(kernel: &K, arguments: Tensors<Self>) -> Tensors<Self> {
         run_on_host(kernel, arguments)
     }
 }
 
 #[cfg(feature = "ndarray")]
 impl FusedOps for NdArray {
-    fn run<K: Kernel>(kernel: &K, arguments: Tensors<Self>) -> Tensors<Self> {
+    fn run<K: TensorKernel>(kernel: &K, arguments: Tensors<Self>) -> Tensors<Self> {
         run_on_host(kernel, arguments)
     }
 }
@@ -125,7 +126,7 @@ impl FusedOps for NdArray {
 #[cfg(any(feature = "wgpu", feature = "cuda"))]
 impl FusedOps for Cube {}
 
-fn run_on_host<B: HostBackend>(kernel: &impl Kernel, arguments: Tensors<B>) -> Tensors<B> {
+fn run_on_host<B: HostBackend>(kernel: &impl TensorKernel, arguments: Tensors<B>) -> Tensors<B> {
     match arguments.0.iter().all(|tensor| tensor.dtype() == DType::F32) {
         true => kernel.on_host(arguments),
         false => kernel.composed(arguments),
@@ -133,7 +134,7 @@ fn run_on_host<B: HostBackend>(kernel: &impl Kernel, arguments: Tensors<B>) -> T
 }
 
 impl<B: FusedOps, C: CheckpointStrategy> FusedOps for Autodiff<B, C> {
-    fn run<K: Kernel>(kernel: &K, arguments: Tensors<Self>) -> Tensors<Self> {
+    fn run<K: TensorKernel>(kernel: &K, arguments: Tensors<Self>) -> Tensors<Self> {
         let plain = arguments.0.into_iter().map(|tensor| tensor.into_primitive());
         let results = B::run(kernel, Tensors(plain.collect()));
         Tensors(results.0.into_iter().map(<FloatTensor<Self>>::new).collect())

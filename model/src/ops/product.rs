@@ -2,7 +2,7 @@
 //!
 //! burn's flex backend zeroes the memory of every product, copies it to aligned memory, and only then multiplies; for the
 //! narrow matrices of these networks (width 128) that takes a quarter of the time of the multiplication. Here the same one
-//! (crate `gemm`) writes into fresh memory, or adds to a matrix that nobody else holds.
+//! (crate `gemm`) writes into fresh memory, or adds to a matrix whose memory no other tensor shares.
 
 use burn::backend::Backend;
 use burn::backend::tensor::FloatTensor;
@@ -10,7 +10,7 @@ use burn::tensor::Tensor;
 
 use super::composed::multiply_add;
 use super::host::HostBackend;
-use super::operation::{ArgumentGradients, FusedOps, Kernel, Operation, Saved, Saves, apply};
+use super::operation::{ArgumentGradients, FusedOps, Operation, Saved, Saves, TensorKernel, apply};
 use super::tensors::Tensors;
 
 /// `lhs·rhs`: `[N,K]`, `[K,C]` → `[N,C]`.
@@ -18,39 +18,34 @@ use super::tensors::Tensors;
 /// # Panics
 /// If the inner sizes differ.
 pub fn product(lhs: Tensor<2>, rhs: Tensor<2>) -> Tensor<2> {
-    apply(Product, [lhs, rhs])
+    apply(MatrixProduct, [lhs, rhs])
 }
 
-/// `lhs·rhs + addend`: `[N,K]`, `[K,C]`, `[N,C]` → `[N,C]`; in the memory of `addend` where nobody else holds it.
+/// `lhs·rhs + addend`: `[N,K]`, `[K,C]`, `[N,C]` → `[N,C]`; in the memory of `addend` if no other tensor shares it.
 ///
 /// # Panics
 /// If the sizes disagree.
 pub fn product_add(lhs: Tensor<2>, rhs: Tensor<2>, addend: Tensor<2>) -> Tensor<2> {
-    apply(Product, [lhs, rhs, addend])
+    apply(MatrixProduct, [lhs, rhs, addend])
 }
 
 /// The factors, then the addend if there is one.
 #[derive(Clone, Copy, Debug)]
-struct Product;
+struct MatrixProduct;
 
-impl Kernel for Product {
+impl TensorKernel for MatrixProduct {
     fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
-        let ([lhs, rhs], addend) = factors(arguments);
+        let ([lhs, rhs], addend) = arguments.take_optional();
         [multiply_add::<B>(lhs, rhs, addend)].into()
     }
 
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
-        let ([lhs, rhs], addend) = factors(arguments);
+        let ([lhs, rhs], addend) = arguments.take_optional();
         [B::product(lhs, rhs, addend)].into()
     }
 }
 
-fn factors<B: Backend>(mut arguments: Tensors<B>) -> ([FloatTensor<B>; 2], Option<FloatTensor<B>>) {
-    let addend = if arguments.0.len() == 3 { arguments.0.pop() } else { None };
-    (arguments.take(), addend)
-}
-
-impl<const N: usize> Operation<N> for Product {
+impl<const N: usize> Operation<N> for MatrixProduct {
     /// Each factor, where the gradient of the other one is wanted.
     fn saves(&self, tracked: [bool; N]) -> Saves<N> {
         let mut arguments = [false; N];

@@ -4,9 +4,9 @@ use burn::backend::Backend;
 use burn::backend::tensor::FloatTensor;
 use burn::tensor::Tensor;
 
-use super::host::{Chunk, HostBackend, MatrixView, Output, compute};
+use super::host::{Chunk, HostBackend, MatrixView, OutputMatrix, compute};
 use super::math::sin_cos;
-use super::operation::{ArgumentGradients, FusedOps, Kernel, Operation, Saved, Saves, apply};
+use super::operation::{ArgumentGradients, FusedOps, Operation, Saved, Saves, TensorKernel, apply};
 use super::tensors::Tensors;
 use crate::packing::Packing;
 
@@ -34,7 +34,7 @@ impl Operation<3> for SineModulation {
     }
 }
 
-impl Kernel for SineModulation {
+impl TensorKernel for SineModulation {
     fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
         let [input, bias, gate] = arguments.take();
         let phase = B::float_mul_scalar(B::float_add(input, bias), self.omega.into());
@@ -42,31 +42,22 @@ impl Kernel for SineModulation {
     }
 
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
-        let device = arguments.device();
         let held = arguments.take().map(B::hold);
         let [input, bias, gate] = held.each_ref().map(B::view);
         let (bias, omega, columns) = (bias.row(0), self.omega as f32, input.columns());
         let packing = Packing::new([input.rows()]);
-        compute::<B, 1>(
-            &device,
+        compute(
             &packing,
             columns,
-            [Output::Rows(columns)],
+            [OutputMatrix::Rows(columns)],
             #[inline(always)]
-            |chunk, [output]| modulate(input, bias, gate, omega, chunk, output),
+            |chunk, [output]| modulate([input, gate], bias, omega, chunk, output),
         )
     }
 }
 
 #[inline(always)]
-fn modulate(
-    input: MatrixView<'_>,
-    bias: &[f32],
-    gate: MatrixView<'_>,
-    omega: f32,
-    chunk: &Chunk,
-    output: &mut [f32],
-) {
+fn modulate([input, gate]: [MatrixView<'_>; 2], bias: &[f32], omega: f32, chunk: &Chunk, output: &mut [f32]) {
     let columns = bias.len();
     for (row, output) in chunk.rows.clone().zip(output.chunks_exact_mut(columns)) {
         let (input, gate) = (&input.row(row)[..columns], &gate.row(row)[..columns]);
@@ -80,7 +71,7 @@ fn modulate(
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SineGradients(pub(super) SineModulation);
 
-impl Kernel for SineGradients {
+impl TensorKernel for SineGradients {
     fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
         let [input, bias, gate, gradient] = arguments.take();
         let omega = self.0.omega;
@@ -92,16 +83,14 @@ impl Kernel for SineGradients {
     }
 
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
-        let device = arguments.device();
         let held = arguments.take().map(B::hold);
         let [input, bias, gate, gradient] = held.each_ref().map(B::view);
         let (bias, omega, columns) = (bias.row(0), self.0.omega as f32, input.columns());
         let packing = Packing::new([input.rows()]);
-        compute::<B, 3>(
-            &device,
+        compute(
             &packing,
             columns,
-            [Output::Rows(columns), Output::Sums(columns), Output::Rows(columns)],
+            [OutputMatrix::Rows(columns), OutputMatrix::Sums(columns), OutputMatrix::Rows(columns)],
             #[inline(always)]
             |chunk, [of_input, of_bias, of_gate]| {
                 gradients([input, gate, gradient], bias, omega, chunk, of_input, of_bias, of_gate);

@@ -4,9 +4,9 @@ use burn::backend::Backend;
 use burn::backend::tensor::FloatTensor;
 use burn::tensor::Tensor;
 
-use super::composed::broadcast_rows;
-use super::host::{Chunk, HostBackend, MatrixView, Output, compute};
-use super::operation::{ArgumentGradients, FusedOps, Kernel, Operation, Saved, Saves, apply};
+use super::composed::{add_optional, broadcast_rows};
+use super::host::{Chunk, HostBackend, MatrixView, OutputMatrix, compute};
+use super::operation::{ArgumentGradients, FusedOps, Operation, Saved, Saves, TensorKernel, apply};
 use super::tensors::Tensors;
 use crate::packing::Packing;
 
@@ -44,10 +44,9 @@ impl Operation<3> for Projection {
     }
 }
 
-impl Kernel for Projection {
-    fn composed<B: Backend>(&self, mut arguments: Tensors<B>) -> Tensors<B> {
-        let base = if arguments.0.len() == 3 { arguments.0.pop() } else { None };
-        let [mask, values] = arguments.take();
+impl TensorKernel for Projection {
+    fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
+        let ([mask, values], base) = arguments.take_optional();
         let masked = B::float_mul(values, broadcast_rows::<B>(mask.clone(), &self.packing));
         let projected = if self.zero_sum {
             let count = B::float_clamp_min(B::float_sum_dim(mask.clone(), 1), 1.0.into());
@@ -58,24 +57,18 @@ impl Kernel for Projection {
             masked
         };
         let scaled = B::float_mul_scalar(projected, self.scale.into());
-        let result = match base {
-            Some(base) => B::float_add(scaled, base),
-            None => scaled,
-        };
-        [result].into()
+        [add_optional::<B>(scaled, base)].into()
     }
 
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
-        let device = arguments.device();
-        let held: Vec<_> = arguments.0.into_iter().map(B::hold).collect();
-        let [mask, values] = [&held[0], &held[1]].map(B::view);
-        let base = held.get(2).map(B::view);
+        let (held, base) = arguments.take_optional();
+        let (held, base) = (held.map(B::hold), base.map(B::hold));
+        let ([mask, values], base) = (held.each_ref().map(B::view), base.as_ref().map(B::view));
         let joints = values.columns();
-        compute::<B, 1>(
-            &device,
+        compute(
             &self.packing,
             joints,
-            [Output::Rows(joints)],
+            [OutputMatrix::Rows(joints)],
             #[inline(always)]
             |chunk, [output]| self.project(values, mask, base, chunk, output),
         )

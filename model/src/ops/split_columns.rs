@@ -1,8 +1,8 @@
 //! Cuts a wide matrix into column blocks, with a backward pass linear in its size.
 //!
 //! The gradient of an ordinary slice is the whole matrix, zero but for the slice, and one such matrix is added per block:
-//! quadratic in the number of blocks. Here every block leaves its gradient in a shared place, and one collector below all
-//! blocks joins them once.
+//! quadratic in the number of blocks. Here every block stores its gradient in one list, and a collector below all blocks
+//! joins them once.
 
 use std::any::Any;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -12,10 +12,10 @@ use burn::backend::{Backend, TensorMetadata};
 use burn::tensor::{Shape, Tensor};
 
 use super::composed::column_block;
-use super::operation::{ArgumentGradients, FusedOps, Kernel, Operation, Saved, apply};
+use super::operation::{ArgumentGradients, FusedOps, Operation, Saved, TensorKernel, apply};
 use super::tensors::Tensors;
 
-/// Gradients of the blocks of one matrix, on their way to the collector (which knows their type).
+/// Gradients of the blocks of one matrix, kept for the collector (which knows their type).
 #[derive(Clone, Debug)]
 struct ColumnGradients {
     blocks: Arc<Mutex<Vec<Option<Box<dyn Any + Send>>>>>,
@@ -27,8 +27,8 @@ impl ColumnGradients {
         Self { blocks: Arc::new(Mutex::new((0..count).map(|_| None).collect())), width }
     }
 
-    /// Leaves the gradient of a block; true if it is the first one to arrive.
-    fn leave<B: Backend>(&self, block: usize, gradient: FloatTensor<B>) -> bool {
+    /// Stores the gradient of a block; true if it is the first one.
+    fn store<B: Backend>(&self, block: usize, gradient: FloatTensor<B>) -> bool {
         let mut blocks = self.blocks.lock().unwrap_or_else(PoisonError::into_inner);
         let first = blocks.iter().all(Option::is_none);
         blocks[block] = Some(Box::new(gradient));
@@ -62,11 +62,11 @@ pub fn split_columns(wide: Tensor<2>, width: usize, count: usize) -> Vec<Tensor<
     (0..count).map(block).collect()
 }
 
-/// The wide matrix itself; the gradients of its blocks meet here.
+/// The wide matrix itself, which gets the joined gradients of its blocks.
 #[derive(Clone, Debug)]
 struct Collector(ColumnGradients);
 
-impl Kernel for Collector {
+impl TensorKernel for Collector {
     fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
         arguments
     }
@@ -86,7 +86,7 @@ struct Block {
     gradients: ColumnGradients,
 }
 
-impl Kernel for Block {
+impl TensorKernel for Block {
     fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
         let [wide] = arguments.take();
         let width = self.gradients.width;
@@ -97,7 +97,7 @@ impl Kernel for Block {
 impl Operation<1> for Block {
     fn backward<B: FusedOps>(&self, _: Saved<B, 1>, gradient: FloatTensor<B>) -> ArgumentGradients<B, 1> {
         let (device, dtype) = (gradient.device(), gradient.dtype());
-        let first = self.gradients.leave::<B>(self.index, gradient);
+        let first = self.gradients.store::<B>(self.index, gradient);
         [first.then(|| B::float_zeros(Shape::new([1]), &device, dtype.into()))]
     }
 }

@@ -1,9 +1,9 @@
 //! Arguments and results of a fused operation.
 
-use burn::backend::tensor::{Device, FloatTensor};
+use burn::backend::tensor::FloatTensor;
 use burn::backend::{
     Backend, BackendTensor, Dispatch, DispatchAutodiffContext, DispatchTensor, DispatchTensorKind,
-    ExtensionType, TensorMetadata,
+    ExtensionType,
 };
 
 /// Tensors of one backend, in order.
@@ -20,9 +20,10 @@ impl<B: Backend> Tensors<B> {
         self.0.try_into().unwrap_or_else(|_| panic!("{count} tensors, expected {N}"))
     }
 
-    /// Where the first tensor lies.
-    pub(super) fn device(&self) -> Device<B> {
-        self.0[0].device()
+    /// N tensors, and one more if there is one.
+    pub(super) fn take_optional<const N: usize>(mut self) -> ([FloatTensor<B>; N], Option<FloatTensor<B>>) {
+        let optional = if self.0.len() > N { self.0.pop() } else { None };
+        (self.take(), optional)
     }
 }
 

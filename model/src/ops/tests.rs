@@ -6,9 +6,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use burn::backend::Dispatch;
 use burn::tensor::{Device, Tensor};
 
-use super::activation::{Layer, LayerGradients};
+use super::activation::{ActivatedSum, ActivatedSumGradients};
 use super::gradient_features::{FeatureGradients, GradientFeatures};
-use super::operation::{FusedOps, Kernel, run};
+use super::operation::{FusedOps, TensorKernel, run};
 use super::sine_modulation::{SineGradients, SineModulation};
 use super::skin_correction::Projection;
 use super::tensors::Tensors;
@@ -38,7 +38,7 @@ fn joint_mask() -> Tensor<2> {
 }
 
 /// The result of a kernel composed of burn's differentiable operations.
-fn composed<const N: usize>(kernel: &impl Kernel, arguments: [Tensor<2>; N]) -> Tensor<2> {
+fn composed<const N: usize>(kernel: &impl TensorKernel, arguments: [Tensor<2>; N]) -> Tensor<2> {
     let arguments = Tensors::from(arguments.map(Tensor::into_dispatch));
     let [result] = Dispatch::compose(kernel, arguments).take();
     Tensor::from_dispatch(result)
@@ -65,7 +65,7 @@ fn compare<const N: usize>(
 }
 
 /// Compares the two forms of a kernel, of which all results are matrices.
-fn compare_forms<const N: usize>(kernel: &impl Kernel, arguments: [Tensor<2>; N]) {
+fn compare_forms<const N: usize>(kernel: &impl TensorKernel, arguments: [Tensor<2>; N]) {
     let arguments = || Tensors::from(arguments.clone().map(Tensor::into_dispatch));
     let (found, expected) = (run(kernel, arguments()), Dispatch::compose(kernel, arguments()));
     assert_eq!(found.0.len(), expected.0.len());
@@ -79,29 +79,29 @@ fn activations_match_the_composed_form() {
     for activation in ACTIVATIONS {
         for columns in [1, 7, 130] {
             let (matrix, row) = ([ROWS, columns], [1, columns]);
-            let layer = |has_residual| Layer { activation, packing: Packing::new([ROWS]), has_residual };
+            let sum = |has_residual| ActivatedSum { activation, packing: Packing::new([ROWS]), has_residual };
             compare(
                 [matrix, row],
                 |[input, bias]| activate(activation, input, bias),
-                |arguments| composed(&layer(false), arguments),
+                |arguments| composed(&sum(false), arguments),
             );
             compare(
                 [matrix, row, matrix],
                 |[input, bias, residual]| activate_residual(activation, input, bias, residual),
-                |arguments| composed(&layer(true), arguments),
+                |arguments| composed(&sum(true), arguments),
             );
         }
-        let layer = Layer { activation, packing: packing(), has_residual: false };
+        let sum = ActivatedSum { activation, packing: packing(), has_residual: false };
         let (matrix, rows) = ([ROWS, 9], [3, 9]);
         compare(
             [matrix, rows],
             |[input, rows]| activate_packed(activation, input, rows, &packing()),
-            |arguments| composed(&layer, arguments),
+            |arguments| composed(&sum, arguments),
         );
         compare(
             [matrix, matrix, rows],
             |[a, b, rows]| activate_packed_sum(activation, [a, b], rows, &packing()),
-            |arguments| composed(&layer, arguments),
+            |arguments| composed(&sum, arguments),
         );
     }
 }
@@ -117,7 +117,7 @@ fn products_match_burns_own() {
             |[a, b, sum]| product_add(a, b, sum),
             |[a, b, sum]| a.matmul(b) + sum,
         );
-        // A sum that nobody else holds is added to in place.
+        // A sum whose memory no other tensor shares is added to in place.
         compare(
             [lhs, rhs],
             |[a, b]| product_add(a.clone(), b.clone(), product(a, b)),
@@ -186,7 +186,8 @@ fn both_forms_of_every_gradient_agree() {
     let device = device().inner();
     let matrix = || random(ROWS, 9, &device);
     for activation in ACTIVATIONS {
-        let gradients = LayerGradients(Layer { activation, packing: packing(), has_residual: false });
+        let gradients =
+            ActivatedSumGradients(ActivatedSum { activation, packing: packing(), has_residual: false });
         compare_forms(&gradients, [matrix(), matrix(), random(3, 9, &device), matrix()]);
     }
     let gradients = SineGradients(SineModulation { omega: 3.0 });

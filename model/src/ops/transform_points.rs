@@ -5,8 +5,8 @@ use burn::backend::tensor::FloatTensor;
 use burn::tensor::Tensor;
 
 use super::composed::column_block;
-use super::host::{HostBackend, MatrixView, Output, compute};
-use super::operation::{ArgumentGradients, FusedOps, Kernel, Operation, Saved, Saves, apply};
+use super::host::{HostBackend, MatrixView, OutputMatrix, compute};
+use super::operation::{ArgumentGradients, FusedOps, Operation, Saved, Saves, TensorKernel, apply};
 use super::tensors::Tensors;
 use crate::packing::Packing;
 
@@ -29,7 +29,7 @@ impl Operation<2> for TransformPoints {
     }
 }
 
-impl Kernel for TransformPoints {
+impl TensorKernel for TransformPoints {
     fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
         let [transforms, points] = arguments.take();
         let axes = (0..3).map(|axis| {
@@ -40,14 +40,12 @@ impl Kernel for TransformPoints {
     }
 
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
-        let device = arguments.device();
         let held = arguments.take().map(B::hold);
         let [transforms, points] = held.each_ref().map(B::view);
-        compute::<B, 1>(
-            &device,
+        compute(
             &Packing::new([points.rows()]),
             12,
-            [Output::Rows(3)],
+            [OutputMatrix::Rows(3)],
             #[inline(always)]
             |chunk, [output]| {
                 for (row, output) in chunk.rows.clone().zip(output.chunks_exact_mut(3)) {
@@ -76,7 +74,7 @@ fn transform_parts<B: Backend>(transforms: &FloatTensor<B>, axis: usize) -> [Flo
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TransformGradients;
 
-impl Kernel for TransformGradients {
+impl TensorKernel for TransformGradients {
     fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
         let [transforms, points, gradient] = arguments.take();
         let axes = [0, 1, 2].map(|axis| {
@@ -91,14 +89,12 @@ impl Kernel for TransformGradients {
     }
 
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
-        let device = arguments.device();
         let held = arguments.take().map(B::hold);
         let [transforms, points, gradient] = held.each_ref().map(B::view);
-        compute::<B, 2>(
-            &device,
+        compute(
             &Packing::new([points.rows()]),
             12,
-            [Output::Rows(12), Output::Rows(3)],
+            [OutputMatrix::Rows(12), OutputMatrix::Rows(3)],
             #[inline(always)]
             |chunk, [of_transforms, of_points]| {
                 let rows = of_transforms.chunks_exact_mut(12).zip(of_points.chunks_exact_mut(3));

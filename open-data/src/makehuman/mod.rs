@@ -4,10 +4,7 @@
 //! offset. Its licence stands in its own file; only CC0 and CC-BY ones are taken.
 
 mod archive;
-mod error;
 mod proxy;
-
-pub use error::MakeHumanError;
 
 use crate::anny::{AnnySettings, BaseModel};
 use crate::finish::{GarmentResolution, finish, label_rim};
@@ -18,7 +15,7 @@ use clothcombo_data::asset::provenance::CUT_FROM_HELPERS;
 use clothcombo_data::asset::{Body, Category, Garment, Provenance};
 use clothcombo_data::dataset::garment_folder::{FolderGarment, garment_folder_files, save_garment_folder};
 use clothcombo_data::fit::off_trunk;
-use clothcombo_data::import::{Progress, Summary, refuse_overwriting};
+use clothcombo_data::import::{ImportError, Progress, Summary, refuse_overwriting};
 use clothcombo_data::mesh::LabelledTriangles;
 use clothcombo_data::mesh::{Contact, triangulate};
 use clothcombo_physics::TriMesh;
@@ -79,14 +76,14 @@ struct Taken {
 /// the helper meshes; writes OBJ files and `garments.toml` to `out`. Nothing is written unless all of it was read.
 ///
 /// # Errors
-/// [`MakeHumanError`] if package or wheel are unusable or the results cannot be written.
+/// [`ImportError`] if package or wheel are unusable or the results cannot be written.
 pub fn import_makehuman(
     package: &Path,
     wheel: &Path,
     out: &Path,
     settings: &MakeHumanSettings,
     progress: Progress<'_>,
-) -> Result<Summary, MakeHumanError> {
+) -> Result<Summary, ImportError> {
     progress("reading the garments", 0, 1);
     let proxies = read_proxies(package)?;
     progress("reading the garments", 1, 1);

@@ -90,7 +90,7 @@ impl Proxy {
         }
     }
 
-    /// Vertex positions [m] on a given base mesh; the offsets are decimetres.
+    /// Vertex positions (m) on a given base mesh; the offsets are decimetres.
     pub fn positions(&self, base: &[[f64; 3]]) -> Result<Vec<[f64; 3]>, String> {
         let mut positions = Vec::with_capacity(self.references.len());
         for ((references, weights), offset) in self.references.iter().zip(&self.weights).zip(&self.offsets) {

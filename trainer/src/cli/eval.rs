@@ -1,7 +1,7 @@
 //! `clothcombo eval`: everything a trained model is judged by, in one report.
 
-use crate::cli::train::load_under_bar;
-use crate::cli::verbosity::{progress_bar, say};
+use crate::cli::loading::load_dataset;
+use crate::cli::verbosity::{print_status, progress_bar};
 use crate::config::{Config, load};
 use crate::dataset::Dataset;
 use crate::evaluation::study::{Other, Page, Sizes, Study, Subject, study};
@@ -9,14 +9,13 @@ use crate::inference::shipped_model;
 use crate::run::checkpoint::TrainedModel;
 use crate::run::report::html::utc;
 use crate::system::device::Backend;
+use crate::system::files::{write_file, write_json};
 use crate::system::paths::obstacle;
 use clap::Parser;
-use clothcombo_data::format::atomic;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use serde_json::json;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 /// The paper's tables for a trained model, speed against error, stability, pictures
@@ -81,10 +80,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         Some(path) => TrainedModel::open(path)?,
         None => shipped_model()?,
     };
-    let config = match &arguments.config {
-        Some(file) => load(file, &arguments.overrides)?,
-        None => load(&trained.folder.join("config.toml"), &arguments.overrides)?,
-    };
+    let file = arguments.config.clone().unwrap_or_else(|| trained.config_file());
+    let config = load(&file, &arguments.overrides)?;
     let subject = subject(arguments, &trained, config)?;
     let ablations = others(arguments, &arguments.ablation, &subject)?;
     let specific = others(arguments, &arguments.specific, &subject)?;
@@ -106,7 +103,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
             bar.set_message(part.to_owned());
             // Off a terminal there is no bar.
             if bar.is_hidden() {
-                say(&format!("{:6.0} s  {part}", clock.elapsed().as_secs_f64()));
+                print_status(&format!("{:6.0} s  {part}", clock.elapsed().as_secs_f64()));
             }
         }
         None => bar.inc(1),
@@ -115,7 +112,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let page = page(&trained, &found, clock.elapsed().as_secs_f64())?;
     println!("{}", page.markdown());
     write(folder, &found, &page)?;
-    say(&format!("written: {}", folder.join(HTML).display()));
+    print_status(&format!("written: {}", folder.join(HTML).display()));
     Ok(())
 }
 
@@ -139,7 +136,7 @@ fn check_output(folder: &Path) -> Result<(), Report> {
 
 fn subject(arguments: &Arguments, trained: &TrainedModel, mut config: Config) -> Result<Subject, Report> {
     config.validation.seed = arguments.seed.or(config.validation.seed);
-    let dataset = Arc::new(load_under_bar(&config)?);
+    let dataset = load_dataset(&config)?;
     let known = trained.known_of_held_out(&config, &dataset);
     if !known.is_empty() {
         return Err(miette!(
@@ -226,20 +223,14 @@ fn page(trained: &TrainedModel, found: &Study, seconds: f64) -> Result<Page, Rep
 }
 
 fn write(folder: &Path, found: &Study, page: &Page) -> Result<(), Report> {
-    let save = |name: &str, bytes: &[u8]| {
-        let path = folder.join(name);
-        atomic::write(&path, bytes)
-            .into_diagnostic()
-            .wrap_err_with(|| format!("cannot write {}", path.display()))
-    };
-    // First what tells a later run that the folder is a report.
+    // First, because by this file a later evaluation recognises the folder as a report.
     let tables: Vec<_> =
         page.sections.iter().map(|s| json!({ "title": s.title, "tables": s.tables })).collect();
     let json = json!({ "facts": page.facts, "study": found, "sections": tables });
-    save(JSON, serde_json::to_string_pretty(&json).into_diagnostic()?.as_bytes())?;
+    write_json(&folder.join(JSON), &json)?;
     for (name, _, png) in page.sections.iter().flat_map(|section| &section.pictures) {
-        save(name, png)?;
+        write_file(&folder.join(name), png)?;
     }
-    save(MARKDOWN, page.markdown().as_bytes())?;
-    save(HTML, page.html().as_bytes())
+    write_file(&folder.join(MARKDOWN), page.markdown().as_bytes())?;
+    write_file(&folder.join(HTML), page.html().as_bytes())
 }

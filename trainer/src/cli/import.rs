@@ -6,8 +6,8 @@ use crate::dataset::load_body;
 use clap::{Args, Subcommand, ValueEnum};
 use clothcombo_data::asset::{Body, BodyFileSettings, Provenance};
 use clothcombo_data::import::{
-    AmassSettings, BvhImportSettings, Cloth3dBodies, Cloth3dSettings, DeepMimicSettings, Thinning, UpAxis,
-    import_amass, import_bvh, import_cloth3d, import_deepmimic, import_smpl_family,
+    AmassSettings, Cloth3dBodies, Cloth3dSettings, RetargetSettings, Thinning, import_amass, import_bvh,
+    import_cloth3d, import_deepmimic, import_smpl_family,
 };
 use miette::{IntoDiagnostic, Report};
 use std::path::PathBuf;
@@ -195,11 +195,10 @@ pub fn run(source: &Source) -> Result<(), Report> {
     let summary = match source {
         Source::Bvh(a) => {
             let body = load_body(&a.body, 0)?;
-            let settings = BvhImportSettings {
-                frame_rate: a.frame_rate,
+            let settings = RetargetSettings {
+                thinning: Thinning { frame_rate: a.frame_rate, static_threshold: 0.0 },
                 provenance: a.provenance.provenance(),
                 body_file: Some(PathBuf::from(&a.body)),
-                ..BvhImportSettings::default()
             };
             import_bvh(&a.files, &body, &a.output, &settings, &mut progress).into_diagnostic()?
         }
@@ -209,11 +208,7 @@ pub fn run(source: &Source) -> Result<(), Report> {
             import_smpl_family(&a.input, &a.output, &settings, &mut progress).into_diagnostic()?
         }
         Source::Amass(a) => {
-            let up = match a.up {
-                Up::Y => UpAxis::Y,
-                Up::Z => UpAxis::Z,
-            };
-            let settings = AmassSettings { thinning: a.thinning.thinning(), up };
+            let settings = AmassSettings { thinning: a.thinning.thinning(), z_up: matches!(a.up, Up::Z) };
             import_amass(&a.inputs, &a.output, &settings, &mut progress).into_diagnostic()?
         }
         Source::Cloth3d(a) => {
@@ -239,7 +234,7 @@ pub fn run(source: &Source) -> Result<(), Report> {
             let body = load_body(&a.body, 0)?;
             let provenance = a.provenance.provenance();
             let body_file = Some(PathBuf::from(&a.body));
-            let settings = DeepMimicSettings { thinning: a.thinning.thinning(), provenance, body_file };
+            let settings = RetargetSettings { thinning: a.thinning.thinning(), provenance, body_file };
             import_deepmimic(&a.files, &body, &a.output, &settings, &mut progress).into_diagnostic()?
         }
     };

@@ -1,8 +1,9 @@
 //! `clothcombo-train`.
 
 use super::exit_code;
+use crate::cli::loading::load_dataset;
 use crate::cli::memory_table::{memory_line, memory_warning};
-use crate::cli::verbosity::{Verbosity, is_quiet, progress_bar, say};
+use crate::cli::verbosity::{Verbosity, is_quiet, print_status};
 use crate::config::{Config, load};
 use crate::dataset::{Dataset, FrameCounts};
 use crate::run::checkpoint::{Checkpoint, CheckpointError};
@@ -25,7 +26,6 @@ use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::rc::Rc;
-use std::sync::Arc;
 
 /// Trains ClothCombo's four networks from a configuration file.
 #[derive(Parser)]
@@ -133,7 +133,7 @@ pub fn main() -> ExitCode {
 /// Trains as one of the processes in `group`, of which only the leader writes and prints.
 ///
 /// # Errors
-/// One report that names the file, key or garment at fault and how to mend it.
+/// One report that names the file, key or garment at fault and how to repair it.
 fn run(arguments: &Arguments, group: &Rc<ProcessGroup>) -> Result<(), Report> {
     let stop = StopFlag::on_signals().into_diagnostic().wrap_err("cannot listen for Ctrl-C")?;
     let named = arguments.named_run()?;
@@ -152,7 +152,8 @@ fn run(arguments: &Arguments, group: &Rc<ProcessGroup>) -> Result<(), Report> {
         None if group.is_rank_zero() => RunDir::refuse_occupied(&root).map(|()| None)?,
         None => None,
     };
-    let dataset = Arc::new(load_dataset(&config)?);
+    let dataset = load_dataset(&config)?;
+    print_data(&dataset);
     let device = arguments.device.device();
     let (run, session) = match existing {
         Some((run, checkpoint)) => {
@@ -182,16 +183,14 @@ fn run(arguments: &Arguments, group: &Rc<ProcessGroup>) -> Result<(), Report> {
     }
     run.write_split(&dataset.split_names())?;
     let memory = session.memory_estimate();
-    if !is_quiet() {
-        say(&format!("run folder {}", run.root().display()));
-        if group.is_shared() {
-            say(&format!("{} processes share every step", group.partition().size));
-        }
-        if let Some(m) = memory {
-            say(&memory_line(&m));
-            if let Some(warning) = memory_warning(&m) {
-                tracing::warn!("{warning}");
-            }
+    print_status(&format!("run folder {}", run.root().display()));
+    if group.is_shared() {
+        print_status(&format!("{} processes share every step", group.partition().size));
+    }
+    if let Some(memory) = &memory {
+        print_status(&memory_line(memory));
+        if let Some(warning) = memory_warning(memory) {
+            tracing::warn!("{warning}");
         }
     }
     let mut observers = observers(&run, &config, &dataset, session.step(), memory)?;
@@ -217,7 +216,7 @@ fn newest_or_none(path: &Path) -> Result<Option<Checkpoint>, CheckpointError> {
     }
 }
 
-/// Makes `config` the run's own and sets aside what the run did after `checkpoint`, telling about both.
+/// Makes `config` the run's own and sets aside what the run did after `checkpoint`, with a warning about each.
 fn continue_run(run: &RunDir, config: &Config, checkpoint: Option<&Checkpoint>) -> Result<(), Report> {
     let changed = run.adopt_config(config)?;
     if !changed.is_empty() {
@@ -258,41 +257,22 @@ fn observers(
     Ok(observers)
 }
 
-/// Loads the data of `config` under a bar.
-pub(crate) fn load_under_bar(config: &Config) -> Result<Dataset, Report> {
-    let bar = progress_bar(0, PREPARING);
-    let dataset = Dataset::load(config, &|done, total, name| {
-        bar.set_length(total as u64);
-        bar.set_position(done as u64);
-        bar.set_message(name.to_owned());
-    })?;
-    bar.finish_and_clear();
-    Ok(dataset)
-}
-
-/// The bar shown while garments are prepared.
-pub(crate) const PREPARING: &str = "preparing garments {bar:30} {pos}/{len} {msg}";
-
-fn load_dataset(config: &Config) -> Result<Dataset, Report> {
-    let dataset = load_under_bar(config)?;
-    if !is_quiet() {
-        say(&format!(
-            "body: {} · {} garments ({} not trained on) · {} joints · {} shape components{}",
-            dataset.body.name,
-            dataset.garments.len(),
-            dataset.garments.len() - dataset.split.training.len(),
-            dataset.joints().len(),
-            dataset.shape_count,
-            match dataset.poses.frame_counts() {
-                Some(FrameCounts { training, windows, validation, test }) => format!(
-                    " · {training} motion frames (never trained on: {windows} of held-out windows, {validation} of \
-                     validation clips, {test} of test clips)"
-                ),
-                None => " · sampled poses".into(),
-            }
-        ));
-    }
-    Ok(dataset)
+fn print_data(dataset: &Dataset) {
+    let frames = match dataset.poses.frame_counts() {
+        Some(FrameCounts { training, windows, validation, test }) => format!(
+            "{training} motion frames (never trained on: {windows} of held-out windows, {validation} of validation clips, \
+             {test} of test clips)"
+        ),
+        None => "sampled poses".into(),
+    };
+    print_status(&format!(
+        "body: {} · {} garments ({} not trained on) · {} joints · {} shape components · {frames}",
+        dataset.body.name,
+        dataset.garments.len(),
+        dataset.garments.len() - dataset.split.training.len(),
+        dataset.joints().len(),
+        dataset.shape_count
+    ));
 }
 
 /// `runs/NAME`, or the first free `runs/NAME-2`, `-3`, …; when resuming, the last existing one.

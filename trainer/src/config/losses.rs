@@ -57,7 +57,7 @@ impl Default for StrainLoss {
 pub struct BodyCollisionLoss {
     /// Factor on the raw value [1/m³ · J].
     pub weight: Ramp,
-    /// Distance to the body that a vertex should keep [m].
+    /// Distance to the body that a vertex should keep (m).
     pub epsilon: f64,
     /// How the distance is measured.
     pub distance: DistanceMode,
@@ -75,7 +75,7 @@ impl Default for BodyCollisionLoss {
 pub struct RepulsionLoss {
     /// Factor on the raw value.
     pub weight: Ramp,
-    /// Pairs farther apart than this do not repel [m].
+    /// Pairs farther apart than this do not repel (m).
     pub radius: f64,
     /// Divide the printed double sum by the vertex count.
     pub per_vertex: bool,
@@ -117,13 +117,13 @@ impl Default for HoldingLoss {
 pub struct LayerCollisionLoss {
     /// Factor on the raw value.
     pub weight: Ramp,
-    /// Gap that an outer vertex should keep to the inner garment [m].
+    /// Gap that an outer vertex should keep to the inner garment (m).
     pub epsilon: f64,
     /// Count a pair only when it is really one above the other; the printed form explodes past an open hem.
     pub gated: bool,
     /// Largest tangential offset of a counted pair, in median edge lengths of the inner garment.
     pub gate_tangential_edges: f64,
-    /// Largest distance of a counted pair [m].
+    /// Largest distance of a counted pair (m).
     pub gate_depth: f64,
 }
 
@@ -145,7 +145,7 @@ impl Default for LayerCollisionLoss {
 pub struct LayerDistanceLoss {
     /// Factor on the raw value.
     pub weight: Ramp,
-    /// Vertices farther than this from the body do not count [m].
+    /// Vertices farther than this from the body do not count (m).
     pub radius: f64,
 }
 
@@ -159,15 +159,15 @@ impl Default for LayerDistanceLoss {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MaterialConfig {
-    /// Thickness [m].
+    /// Thickness (m).
     pub thickness: f64,
-    /// Density [kg/m³].
+    /// Density (kg/m³).
     pub density: f64,
-    /// First Lamé constant λ [Pa].
+    /// First Lamé constant λ (Pa).
     pub lambda: f64,
-    /// Second Lamé constant μ [Pa].
+    /// Second Lamé constant μ (Pa).
     pub mu: f64,
-    /// Bending stiffness k [J].
+    /// Bending stiffness k (J).
     pub bending_stiffness: f64,
 }
 

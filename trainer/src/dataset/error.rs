@@ -44,9 +44,9 @@ pub enum DatasetError {
     Memory {
         /// Number of garments.
         garments: usize,
-        /// What they take [bytes].
+        /// What they take (bytes).
         needed: u64,
-        /// What the system can give [bytes].
+        /// What the system can give (bytes).
         available: u64,
     },
     /// Records that were there are gone and cannot be written again.
@@ -132,9 +132,9 @@ pub enum DatasetError {
     FrameRates {
         /// The motion folder.
         folder: PathBuf,
-        /// Lowest frame rate [1/s].
+        /// Lowest frame rate (1/s).
         lowest: f64,
-        /// Highest frame rate [1/s].
+        /// Highest frame rate (1/s).
         highest: f64,
     },
     /// The skeleton is too small for the poses.

@@ -67,7 +67,7 @@ impl PreparedScene {
     }
 }
 
-/// Two garments whose rest bounding boxes are farther apart than this are not near [m].
+/// Two garments whose rest bounding boxes are farther apart than this are not near (m).
 const CONTACT_MARGIN: f64 = 0.05;
 
 /// Prepares `sample`; loss weights are taken at `run_progress`.

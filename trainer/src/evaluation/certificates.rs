@@ -4,7 +4,7 @@ use crate::config::LossesConfig;
 use crate::dataset::{Dataset, PreparedScene, prepare};
 use crate::inference::networks::Networks;
 use crate::inference::tensor_store::DrapeError;
-use clothcombo_data::asset::{Garment, unwearable};
+use clothcombo_data::asset::{Garment, infeasible_pair};
 use clothcombo_physics::contact::resolve::{
     Certificate, Layer, ResolveError, ResolveSettings, Resolved, RestGarment, Waypoint, certify,
     resolve_along,
@@ -75,7 +75,7 @@ impl<'a> Dressing<'a> {
     fn stage(&self, scene: &PreparedScene, share: f64) -> Result<Waypoint, PostProcessError> {
         let mut draw = scene.sample.clone();
         for body in &mut draw.bodies {
-            body.pose = body.pose.on_the_way(share);
+            body.pose = body.pose.scaled_keeping_heading(share);
         }
         let scene = prepare(self.dataset, self.losses, draw, 1.0).map_err(DrapeError::from)?;
         Ok(Waypoint {
@@ -129,10 +129,10 @@ impl DrapedScene<'_> {
         resolve_along(&self.body, &self.layers(&self.positions), &skinned, settings, stage_at)
     }
 
-    /// Whether the order of the garments can be garment ([`unwearable`]).
+    /// Whether the order of the garments can be garment ([`infeasible_pair`]).
     pub fn is_wearable(&self) -> bool {
         let order: Vec<&Garment> = self.scene.garments.iter().map(|w| &w.garment).collect();
-        unwearable(&order).is_none()
+        infeasible_pair(&order).is_none()
     }
 
     /// What crosses before anything is done.
@@ -226,7 +226,7 @@ pub struct OutfitResult {
     pub draw: usize,
     /// Names, inner → outer.
     pub garments: Vec<String>,
-    /// Whether the order can be garment ([`unwearable`]).
+    /// Whether the order can be garment ([`infeasible_pair`]).
     pub is_wearable: bool,
     /// Vertices per garment.
     pub vertices: Vec<usize>,

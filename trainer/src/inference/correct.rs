@@ -88,7 +88,7 @@ fn take_networks(
     initial.clone() + (skin_weights.clone() - initial) * shares
 }
 
-/// Linear blend skinning of `canonical` `[ΣV, 3]` [m] by `weights` `[ΣV, J]`.
+/// Linear blend skinning of `canonical` `[ΣV, 3]` (m) by `weights` `[ΣV, J]`.
 pub(crate) fn skinned(canonical: Tensor<2>, weights: Tensor<2>, body: &BodyTensors) -> Draped {
     let posed = linear_blend_skinning(canonical.clone(), weights, body.bones.clone());
     Draped::of(&DrapeState { canonical, posed })

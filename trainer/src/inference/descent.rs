@@ -37,12 +37,12 @@ impl<'a> Descent<'a> {
         &self.state
     }
 
-    /// Energy of every garment with the pairs that it is part of [J]; infinite where it is not finite.
+    /// Energy of every garment with the pairs that it is part of (J); infinite where it is not finite.
     pub fn energies(&self) -> &[f64] {
         &self.energies
     }
 
-    /// Energy of the outfit [J]; infinite where it is not finite.
+    /// Energy of the outfit (J); infinite where it is not finite.
     pub fn total(&self) -> f64 {
         self.total
     }

@@ -16,7 +16,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-/// Wall time of what depends on the garment alone [ms].
+/// Wall time of what depends on the garment alone (ms).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GarmentTimes {
     /// Binding to the body, constants of the energies, operators.

@@ -33,7 +33,7 @@ mod error;
 mod frame;
 mod motion;
 mod names;
-mod networked;
+mod network_drape;
 pub mod networks;
 mod outfit;
 pub mod output;
@@ -84,7 +84,7 @@ pub struct DraperSettings {
     pub body: Option<String>,
     /// Folder of the on-disk cache of bindings, operators and embeddings; none computes them anew in every process.
     pub cache: Option<PathBuf>,
-    /// Largest size of the cache [bytes].
+    /// Largest size of the cache (bytes).
     pub cache_limit: u64,
     /// The compute device.
     pub backend: Backend,
@@ -122,10 +122,10 @@ pub struct BodyState {
     pub shape: Vec<f64>,
     /// Pose θ.
     pub pose: Pose,
-    /// The posed surface `[V, 3]` [m] that counts for contact, where it is known better than by shape and pose: a scan, or
+    /// The posed surface `[V, 3]` (m) that counts for contact, where it is known better than by shape and pose: a scan, or
     /// another program's correctives.
     pub surface: Option<Vec<[f64; 3]>>,
-    /// Where its pelvis stands [m]; `surface` is there already.
+    /// Where its pelvis stands (m); `surface` is there already.
     pub place: [f64; 3],
 }
 
@@ -228,7 +228,7 @@ impl Draper {
     /// # Errors
     /// When shape or pose do not fit the body model, or the networks diverge.
     pub fn drape(&self, outfit: &Outfit, body: &BodyState) -> Result<Drape, DraperError> {
-        let made = self.networked(&self.model, outfit, body)?;
+        let made = self.network_drape(&self.model, outfit, body)?;
         self.drape_frame(outfit, Frame { body, last: None }, made, &mut |_| ())
     }
 

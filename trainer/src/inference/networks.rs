@@ -67,7 +67,7 @@ impl<'a> Networks<'a> {
     }
 
     /// The energy of every garment of `scene`, with the pairs that it is part of, at the states that the correction steps take
-    /// from skinning on [J].
+    /// from skinning on (J).
     ///
     /// # Errors
     /// When the scene's numbers are not finite.
@@ -115,7 +115,7 @@ pub struct OnBody<'a> {
     pub embeddings: &'a Embeddings,
     /// Its first body.
     pub body: &'a BodyTensors,
-    /// Where the garments start on it `[ΣV, 3]` [m].
+    /// Where the garments start on it `[ΣV, 3]` (m).
     pub start: Tensor<2>,
 }
 

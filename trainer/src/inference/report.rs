@@ -38,7 +38,7 @@ pub struct BodyReport {
     pub vertices: usize,
     /// Triangles.
     pub triangles: usize,
-    /// For a body recovered from meshes: mean distance of its vertices to theirs [mm].
+    /// For a body recovered from meshes: mean distance of its vertices to theirs (mm).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub recovered_within_mm: Option<f64>,
 }
@@ -73,7 +73,7 @@ pub struct GarmentReport {
 pub struct FrameReport {
     /// Number in the motion.
     pub frame: usize,
-    /// Its time [s].
+    /// Its time (s).
     pub seconds: f64,
     /// Wall time.
     pub milliseconds: PhaseTimes,
@@ -122,7 +122,7 @@ pub struct Report {
 pub struct Moment {
     /// Number in the motion.
     pub frame: usize,
-    /// Time [s].
+    /// Time (s).
     pub seconds: f64,
 }
 

@@ -33,15 +33,15 @@ pub struct StepRecord {
     pub grad_norm: f64,
     /// Adam's step size.
     pub lr: f64,
-    /// Wall-clock time of the step [s].
+    /// Wall-clock time of the step (s).
     pub seconds: f64,
-    /// Part of `seconds` spent waiting for the scene to be prepared [s].
+    /// Part of `seconds` spent waiting for the scene to be prepared (s).
     pub wait_seconds: f64,
-    /// Part of `seconds` spent in networks and energies [s].
+    /// Part of `seconds` spent in networks and energies (s).
     pub forward_seconds: f64,
-    /// Part of `seconds` spent on gradients [s].
+    /// Part of `seconds` spent on gradients (s).
     pub backward_seconds: f64,
-    /// Part of `seconds` spent on clipping, Adam and the running average [s].
+    /// Part of `seconds` spent on clipping, Adam and the running average (s).
     pub update_seconds: f64,
     /// Whether loss or gradient was not finite and the parameters were left alone.
     #[serde(skip_serializing_if = "std::ops::Not::not")]

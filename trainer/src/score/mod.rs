@@ -66,7 +66,7 @@ pub struct Score {
 /// The definitions a score was made with.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ScoreSettings {
-    /// Margin ε of both collision energies [mm].
+    /// Margin ε of both collision energies (mm).
     pub epsilon_mm: f64,
     /// The distance to the body.
     pub distance: ScoreDistance,
@@ -101,7 +101,7 @@ pub struct GarmentScore {
 pub struct PenetrationScore {
     /// Share of the vertices inside the body, by the distance of [`ScoreSettings::distance`].
     pub vertices_inside: f64,
-    /// Largest depth of a vertex [mm]; 0 when none is inside.
+    /// Largest depth of a vertex (mm); 0 when none is inside.
     pub max_depth_mm: f64,
     /// Pairs of a garment triangle and a body triangle that share a point. Exact.
     pub body_triangle_pairs: usize,
@@ -116,9 +116,9 @@ pub struct LayerScore {
     pub inner: usize,
     /// Index of the garment over it.
     pub outer: usize,
-    /// Layer collision, ungated [m³].
+    /// Layer collision, ungated (m³).
     pub layer_collision: f64,
-    /// Layer distance [m³].
+    /// Layer distance (m³).
     pub layer_distance: f64,
     /// Pairs of triangles that share a point. Exact.
     pub triangle_pairs: usize,
@@ -134,7 +134,7 @@ pub struct DrapedGarment<'a> {
     pub name: &'a str,
     /// The undeformed garment.
     pub rest: &'a TriMesh,
-    /// Draped positions of the vertices of `rest`, `[V, 3]` [m].
+    /// Draped positions of the vertices of `rest`, `[V, 3]` (m).
     pub positions: &'a [[f64; 3]],
     /// The same before skinning, for the holding energy against `rest`, the paper's printed form; all garments have them or
     /// none.

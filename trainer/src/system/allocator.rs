@@ -1,6 +1,6 @@
 //! Memory that one step frees is kept for the next.
 
-/// Tells the C allocator to keep what is freed instead of giving it back to the system.
+/// Makes the C allocator keep what is freed instead of giving it back to the system.
 ///
 /// By default it asks the system for every large tensor anew, and the system hands over each page of it zeroed and by an
 /// interrupt: at width 128 that is two million interrupts in forty steps and a seventh of all processor time. Only where

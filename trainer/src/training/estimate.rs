@@ -17,7 +17,7 @@ use std::time::Instant;
 pub struct StageTime {
     /// Steps timed.
     pub steps: u64,
-    /// Mean time of a step [s], scenes prepared on another thread beside it.
+    /// Mean time of a step (s), scenes prepared on another thread beside it.
     pub seconds_per_step: f64,
 }
 

@@ -127,7 +127,7 @@ pub struct IncidentGarment {
 pub struct IncidentBody {
     /// Shape parameters β.
     pub shape: Vec<Exact>,
-    /// Pose θ: axis-angle per joint [rad].
+    /// Pose θ: axis-angle per joint (rad).
     pub pose: Vec<[Exact; 3]>,
     /// Weighted sum of all energies.
     pub total: Exact,

@@ -91,10 +91,6 @@ impl Session {
     pub fn config(&self) -> &Config {
         &self.config
     }
-    /// The configuration, shared.
-    pub fn shared_config(&self) -> Arc<Config> {
-        self.config.clone()
-    }
     /// The wardrobe.
     pub fn dataset(&self) -> &Arc<Dataset> {
         &self.dataset

@@ -103,7 +103,7 @@ fn skinning_and_a_network_are_measured_against_the_minimum() {
         .stderr(predicates::str::contains("no correction networks"));
     assert!(report["scenes"].as_array().unwrap().iter().all(|s| s["runs"].as_array().unwrap().len() == 2));
 
-    // Outfits start from the post-process as well, and tell the strain of their layers.
+    // Outfits start from the post-process as well, and report the strain of their layers.
     let outfits = ["--checkpoint", "run", "--layers", "2", "--iterations", "30"];
     let output = bench(&[&outfits[..], &["--json"]].concat(), folder.path()).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

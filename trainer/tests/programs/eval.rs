@@ -145,6 +145,10 @@ fn a_quick_evaluation_holds_every_table_of_the_paper() {
         let least = scene.as_array().unwrap().iter().map(|s| s["excess"].as_f64().unwrap());
         assert!(least.fold(f64::INFINITY, f64::min) >= -1e-9, "{scene}");
     }
+    let numerics = study["numerics"].as_array().unwrap();
+    assert_eq!(numerics.len(), 7);
+    assert!(numerics.iter().all(|choice| choice["ms"].as_f64() > Some(0.0)), "{numerics:?}");
+    assert!(numerics[1]["distance_mm"].as_f64() > Some(0.0) && numerics[0]["distance_mm"] == 0.0);
     for extreme in study["extremes"].as_array().unwrap() {
         assert_eq!((&extreme["not_finite"], &extreme["refused"]), (&0.into(), &0.into()), "{extreme}");
     }

@@ -77,7 +77,7 @@ fn what_cannot_be_made_or_written_is_refused_at_once() {
         ["generator", "--most-failures", "nan"],
         ["generator", "--most-failures", "2"],
         ["step", "--seconds", "0"],
-        ["growth", "--picture", "growth.md"],
+        ["step", "--picture", "step.md"],
     ] {
         let mut command = Command::cargo_bin("clothcombo").unwrap();
         command.arg("bench").args(bench).assert().code(2).stderr(contains(bench[1]));

@@ -1,6 +1,5 @@
 //! Writing `.npz` archives.
 
-use super::NpzError;
 use crate::format::atomic;
 use crate::format::error::FileError;
 use npyz::{DType, TypeStr, WriterBuilder};
@@ -96,12 +95,12 @@ impl NpzWriter {
     ///
     /// # Errors
     /// If an array did not fit its shape, or the file cannot be written.
-    pub fn save(self, path: &Path) -> Result<(), NpzError> {
-        let failed = FileError::at(path);
+    pub fn save(self, path: &Path) -> Result<(), FileError> {
+        let failed = FileError::io(path);
         if let Some(reason) = self.error {
-            return Err(failed(std::io::Error::other(reason)).into());
+            return Err(failed(std::io::Error::other(reason)));
         }
         let bytes = self.zip.finish().map_err(|e| failed(std::io::Error::other(e.to_string())))?;
-        Ok(atomic::write(path, bytes.get_ref()).map_err(failed)?)
+        atomic::write(path, bytes.get_ref()).map_err(failed)
     }
 }

@@ -1,6 +1,6 @@
 //! Garments of six categories for any body, designed by documented parameters or at random, cut and meshed for that body.
 //!
-//! Every garment is made the same way. A smooth solid around the body — hanging tubes around trunk, sleeves and legs, united with an
+//! Every garment is made alike. A smooth solid around the body — hanging tubes around trunk, sleeves and legs, united with an
 //! offset of the body itself — is polygonised, opened along cut surfaces (hem, cuffs, neckline, armholes, placket), and remeshed
 //! isotropically with every vertex kept on the solid and every boundary vertex on its cut. Being outside the body
 //! is thus part of the construction, hems are exact, and the random lattice, sizing and design make every
@@ -23,7 +23,7 @@ use super::isosurface::{Lattice, extract};
 use crate::asset::provenance::GENERATED;
 use crate::asset::{Body, Category, Garment, Provenance};
 use crate::mesh::{EditableMesh, LabelledTriangles, Quality, remesh};
-use cloth::Cloth;
+use cloth::ClothSurface;
 use clothcombo_physics::TriMesh;
 use clothcombo_physics::contact::TriangleTree;
 use cut::cut_pattern;
@@ -93,8 +93,8 @@ impl<'a> GarmentGenerator<'a> {
         self.first_that_passes(category, seed, settings, &random)
     }
 
-    /// A garment of the given design, with the promises of [`Self::generate`]. The seed decides about the mesh; other
-    /// triangulations are tried where one misses a promise.
+    /// A garment of the given design, with the guarantees of [`Self::generate`]. The seed decides about the mesh; other
+    /// triangulations are tried where one misses a guarantee.
     ///
     /// # Errors
     /// [`GarmentError::Setting`], and [`GarmentError::Exhausted`] for a design that does not work on this body.
@@ -193,7 +193,7 @@ impl<'a> GarmentGenerator<'a> {
         }
         quality::check_openings(&triangles.positions, &triangles.labels, &triangles.faces, pattern.openings)?;
 
-        let target = Cloth {
+        let target = ClothSurface {
             pattern: &pattern,
             edge_length: edge_length(triangles.area(), vertices),
             variation: settings.sizing_variation,

@@ -6,7 +6,7 @@ use super::fit::{BodyFit, Landmarks};
 use super::tube::{Tube, angle};
 use std::f64::consts::TAU;
 
-/// Keeps the part where the field is not negative [m, distance-like].
+/// Keeps the part where the field is not negative (m, distance-like).
 pub(super) type Cut = Box<dyn Fn([f64; 3]) -> f64 + Send + Sync>;
 
 /// A solid around a body, and where it is opened.
@@ -16,7 +16,7 @@ pub(super) struct Pattern<'a> {
     pub sleeves: Vec<(Tube, f64)>,
     pub trouser_legs: Option<[Tube; 2]>,
     pub leg_top: f64,
-    /// Distance the cloth keeps from the skin where no tube is wider [m].
+    /// Distance the cloth keeps from the skin where no tube is wider (m).
     pub clearance: f64,
     /// The curves along which the solid is opened; cut `i` has the label bit `1 << i`.
     pub cuts: Vec<Cut>,
@@ -34,13 +34,13 @@ pub(super) struct Column {
     pub bottom: f64,
 }
 
-/// Half the width of the gap between trouser legs [m].
+/// Half the width of the gap between trouser legs (m).
 const LEG_GAP: f64 = 0.007;
-/// Length over which a cuff is gathered [m].
+/// Length over which a cuff is gathered (m).
 const GATHER: f64 = 0.045;
-/// Width of a gathered cuff beyond the limb [m].
+/// Width of a gathered cuff beyond the limb (m).
 const CUFF_EASE: f64 = 0.008;
-/// Most a fold stands out [m].
+/// Most a fold stands out (m).
 const FOLD_HEIGHT: f64 = 0.045;
 /// Edges a fold needs to be seen.
 const EDGES_PER_FOLD: f64 = 6.0;
@@ -61,7 +61,7 @@ impl<'a> Pattern<'a> {
         }
     }
 
-    /// The solid whose surface is the cloth: negative inside [m].
+    /// The solid whose surface is the cloth: negative inside (m).
     pub fn field(&self, p: [f64; 3]) -> f64 {
         let mut f = self.fit.distance.distance(p) - self.clearance;
         if let Some(column) = &self.column {
@@ -124,7 +124,7 @@ impl Pleats {
         })
     }
 
-    /// Extra radius [m] at height `y`, angle `a`, where the column has radius `r`. Never negative: folds stand out.
+    /// Extra radius (m) at height `y`, angle `a`, where the column has radius `r`. Never negative: folds stand out.
     fn extra(&self, y: f64, a: f64, r: f64) -> f64 {
         let share = (self.from - y) / (self.from - self.to).max(0.05);
         if share <= 0.0 {
@@ -135,14 +135,14 @@ impl Pleats {
     }
 }
 
-/// Extra radius of a flared outline [m] at height `y`, starting at `from`.
+/// Extra radius of a flared outline (m) at height `y`, starting at `from`.
 pub(super) fn flared(flare: f64, from: f64, y: f64) -> f64 {
     let below = (from - y).max(0.0);
     // Starts tangentially so that there is no crease at the waist.
     flare * below * below / (below + 0.06)
 }
 
-/// Height [m] of `length` on the scale of designs: 0 the waist, 1 the crotch, 2 the ankle.
+/// Height (m) of `length` on the scale of designs: 0 the waist, 1 the crotch, 2 the ankle.
 pub(super) fn height(mark: &Landmarks, length: f64) -> f64 {
     if length <= 1.0 {
         mark.waist + (mark.crotch - mark.waist) * length

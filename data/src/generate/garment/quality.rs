@@ -24,7 +24,7 @@ pub(super) struct GarmentQuality {
     pub smallest_angle: f64,
     /// Shortest and longest edge, relative to the median edge.
     pub edge_ratio: [f64; 2],
-    /// Least signed distance of a vertex to the body [m], positive outside.
+    /// Least signed distance of a vertex to the body (m), positive outside.
     pub least_gap: f64,
     /// Pairs of a garment triangle and a body triangle that share a point, decided exactly.
     pub body_triangle_pairs: usize,

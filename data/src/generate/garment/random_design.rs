@@ -151,7 +151,7 @@ mod tests {
     use rand::SeedableRng;
 
     #[test]
-    fn a_wardrobe_has_every_kind_and_designs_survive_json() {
+    fn random_designs_have_every_kind_and_survive_json() {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let (mut pleats, mut plackets, mut cuffs, mut strapless) = (0, 0, 0, 0);
         for i in 0..600 {

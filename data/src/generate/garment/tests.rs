@@ -244,7 +244,8 @@ fn bad_settings_and_bodies_are_refused_with_a_reason() {
     assert!(message.contains("target_vertices") && message.contains("200"), "{message}");
     // A body lying on its back.
     let mut lying = body.clone();
-    for p in lying.template.iter_mut().chain(&mut lying.joint_template) {
+    let parts = &mut *lying;
+    for p in parts.template.iter_mut().chain(&mut parts.joint_template) {
         *p = [p[0], -p[2], p[1]];
     }
     let message = GarmentGenerator::new(&lying).unwrap_err().to_string();

@@ -15,7 +15,7 @@ use crate::mesh::{EditableMesh, LabelledTriangles, Quality, RemeshTarget, remesh
 
 pub use shape::SHAPE_COMPONENT_NAMES;
 
-/// Edge length of the mannequin's triangles [m].
+/// Edge length of the mannequin's triangles (m).
 const EDGE_LENGTH: f64 = 0.0183;
 
 struct Skin;
@@ -36,7 +36,7 @@ impl RemeshTarget for Skin {
 
 /// The neutral mannequin: about 1.70 m tall, T-pose, pelvis joint at the origin, y up, facing +z; 22 SMPL joints, a closed
 /// genus-0 surface of 5,000–7,000 vertices, and the shape components of [`SHAPE_COMPONENT_NAMES`] made for coefficients
-/// in [−2, 2].
+/// in `[−2, 2]`.
 pub fn mannequin() -> Body {
     let (positions, faces) = surface();
     let skin_weights = skinning::skin_weights(&positions, &faces);

@@ -2,21 +2,9 @@
 
 use crate::asset::motion::{MAX_ANGLE, check_frame_rate};
 use crate::asset::rotation::{self, Matrix3};
-use crate::format::{FileError, LineError};
+use crate::format::FileError;
 use std::fs;
 use std::path::Path;
-use thiserror::Error;
-
-/// Why a BVH file cannot be used.
-#[derive(Debug, Error)]
-pub enum BvhError {
-    /// The file cannot be read.
-    #[error(transparent)]
-    Io(#[from] FileError),
-    /// A line is wrong.
-    #[error(transparent)]
-    Line(#[from] LineError),
-}
 
 /// One motion channel: which axis, and whether it moves or turns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,8 +26,6 @@ pub struct BvhJoint {
     pub offset: [f64; 3],
     /// Its channels in file order.
     pub channels: Vec<Channel>,
-    /// Offset of the end site below it, if there is one.
-    pub end: Option<[f64; 3]>,
 }
 
 /// A parsed file.
@@ -49,8 +35,6 @@ pub struct Bvh {
     pub joints: Vec<BvhJoint>,
     /// Seconds per frame.
     pub frame_time: f64,
-    /// What the header says the number of frames is; real files are off by one.
-    pub stated_frames: usize,
     channel_count: usize,
     values: Vec<f64>,
 }
@@ -65,13 +49,13 @@ struct Words<'a> {
 }
 
 impl<'a> Words<'a> {
-    fn error(&self, message: String) -> LineError {
+    fn error(&self, message: String) -> FileError {
         let line =
             self.words.get(self.at.saturating_sub(1)).or(self.words.last()).map_or(1, |(line, _)| *line);
-        LineError { path: self.path.into(), line, message }
+        FileError::line(self.path, line)(message)
     }
 
-    fn next(&mut self, expected: &str) -> Result<&'a str, LineError> {
+    fn next(&mut self, expected: &str) -> Result<&'a str, FileError> {
         let word = self.words.get(self.at).map(|(_, word)| *word);
         self.at += 1;
         word.ok_or_else(|| self.error(format!("the file ends where {expected} should be")))
@@ -81,7 +65,7 @@ impl<'a> Words<'a> {
         self.words.get(self.at).map(|(_, word)| *word)
     }
 
-    fn expect(&mut self, expected: &str) -> Result<(), LineError> {
+    fn expect(&mut self, expected: &str) -> Result<(), FileError> {
         let word = self.next(&format!("'{expected}'"))?;
         if word.eq_ignore_ascii_case(expected) {
             return Ok(());
@@ -89,7 +73,7 @@ impl<'a> Words<'a> {
         Err(self.error(format!("expected '{expected}', found '{word}'")))
     }
 
-    fn number(&mut self, what: &str) -> Result<f64, LineError> {
+    fn number(&mut self, what: &str) -> Result<f64, FileError> {
         let word = self.next(what)?;
         match word.parse::<f64>() {
             Ok(x) if x.is_finite() => Ok(x),
@@ -97,7 +81,7 @@ impl<'a> Words<'a> {
         }
     }
 
-    fn offset(&mut self) -> Result<[f64; 3], LineError> {
+    fn offset(&mut self) -> Result<[f64; 3], FileError> {
         self.expect("OFFSET")?;
         Ok([self.number("an offset")?, self.number("an offset")?, self.number("an offset")?])
     }
@@ -107,17 +91,17 @@ impl Bvh {
     /// Reads a file.
     ///
     /// # Errors
-    /// [`BvhError`] naming file and line.
-    pub fn load(path: &Path) -> Result<Self, BvhError> {
-        let bytes = fs::read(path).map_err(FileError::at(path))?;
-        Ok(Self::parse(&String::from_utf8_lossy(&bytes), path)?)
+    /// [`FileError`] naming file and line.
+    pub fn load(path: &Path) -> Result<Self, FileError> {
+        let bytes = fs::read(path).map_err(FileError::io(path))?;
+        Self::parse(&String::from_utf8_lossy(&bytes), path)
     }
 
     /// Parses BVH text; `path` is for messages only. A last frame that is not whole is dropped.
     ///
     /// # Errors
-    /// [`LineError`] naming file and line.
-    pub fn parse(text: &str, path: &Path) -> Result<Self, LineError> {
+    /// [`FileError`] naming file and line.
+    pub fn parse(text: &str, path: &Path) -> Result<Self, FileError> {
         let lines = text.lines().enumerate();
         let words = lines
             .flat_map(|(n, line)| line.split_ascii_whitespace().map(move |word| (n + 1, word)))
@@ -129,7 +113,8 @@ impl Bvh {
         read_joint(&mut words, &mut joints, None, 0)?;
         words.expect("MOTION")?;
         words.expect("Frames:")?;
-        let stated_frames = words.number("the number of frames")?.max(0.0) as usize;
+        // Real files are off by one: the frames that are there count.
+        words.number("the number of frames")?;
         words.expect("Frame")?;
         words.expect("Time:")?;
         let frame_time = words.number("the frame time")?;
@@ -146,7 +131,7 @@ impl Bvh {
             );
         }
         values.truncate(values.len() / channel_count * channel_count);
-        Ok(Self { joints, frame_time, stated_frames, channel_count, values })
+        Ok(Self { joints, frame_time, channel_count, values })
     }
 
     /// Number of whole frames in the file.
@@ -193,7 +178,7 @@ impl Bvh {
 }
 
 /// The channel values of all frames. Angles no motion has are refused: their sines mean nothing.
-fn read_values(words: &mut Words, joints: &[BvhJoint]) -> Result<Vec<f64>, LineError> {
+fn read_values(words: &mut Words, joints: &[BvhJoint]) -> Result<Vec<f64>, FileError> {
     let limit = MAX_ANGLE.to_degrees();
     let channels: Vec<(&str, bool)> =
         joints.iter().flat_map(|j| j.channels.iter().map(|c| (j.name.as_str(), c.rotates))).collect();
@@ -217,7 +202,7 @@ fn read_joint(
     joints: &mut Vec<BvhJoint>,
     parent: Option<usize>,
     depth: usize,
-) -> Result<(), LineError> {
+) -> Result<(), FileError> {
     if depth > DEEPEST_TREE {
         return Err(words.error(format!("the joint tree is deeper than {DEEPEST_TREE}")));
     }
@@ -244,7 +229,7 @@ fn read_joint(
         }
     }
     let index = joints.len();
-    joints.push(BvhJoint { name, parent, offset, channels, end: None });
+    joints.push(BvhJoint { name, parent, offset, channels });
     loop {
         match words.next("'}'")? {
             "}" => return Ok(()),
@@ -252,7 +237,7 @@ fn read_joint(
             w if w.eq_ignore_ascii_case("End") => {
                 words.expect("Site")?;
                 words.expect("{")?;
-                joints[index].end = Some(words.offset()?);
+                words.offset()?;
                 words.expect("}")?;
             }
             other => return Err(words.error(format!("expected JOINT, End Site or '}}', found '{other}'"))),
@@ -273,9 +258,8 @@ pub(crate) mod tests {
     #[test]
     fn reads_tree_and_all_frames_there_are() {
         let bvh = parse(SMALL).unwrap();
-        assert_eq!((bvh.frame_count(), bvh.stated_frames), (2, 1));
+        assert_eq!(bvh.frame_count(), 2);
         assert_eq!(bvh.joints[1].parent, Some(0));
-        assert_eq!(bvh.joints[1].end, Some([0.0, 1.0, 0.0]));
         assert_eq!(bvh.rest_positions(), [[0.0, 1.0, 0.0], [0.0, 3.0, 0.0]]);
         // Only angles have a limit.
         assert!(parse(&SMALL.replace("5 5 5", "5 1e6 5")).is_ok());

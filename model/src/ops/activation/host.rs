@@ -1,22 +1,20 @@
-//! The layer in host memory, in vectors as wide as the processor's.
+//! The operation in host memory, in vectors as wide as the processor's.
 
-use burn::backend::TensorMetadata;
 use burn::backend::tensor::FloatTensor;
 
-use super::{Activation, Layer};
+use super::{ActivatedSum, Activation};
 use crate::ops::host::{
-    Chunk, HostBackend, MatrixView, Output, chunks, compute, for_each, split_mut, vectorised,
+    Chunk, HostBackend, MatrixView, OutputMatrix, chunks, compute, for_each, split_mut, vectorised,
 };
 use crate::ops::math;
 use crate::ops::tensors::Tensors;
 
 pub(super) fn forward<B: HostBackend>(
-    layer: &Layer,
+    operation: &ActivatedSum,
     mut matrices: Vec<FloatTensor<B>>,
     rows: FloatTensor<B>,
     residual: Option<FloatTensor<B>>,
 ) -> Tensors<B> {
-    let device = rows.device();
     let mut first = matrices.remove(0);
     let others: Vec<B::Held> = matrices.into_iter().map(B::hold).collect();
     let (rows, residual) = (B::hold(rows), residual.map(B::hold));
@@ -24,29 +22,28 @@ pub(super) fn forward<B: HostBackend>(
     let (rows, residual) = (B::view(&rows), residual.as_ref().map(B::view));
     let columns = rows.columns();
     if let Some(values) = B::own_values_mut(&mut first) {
-        let chunks = chunks(&layer.packing, columns);
+        let chunks = chunks(&operation.packing, columns);
         let tasks = chunks.iter().zip(split_mut(values, &chunks, columns)).collect();
         for_each(tasks, |(chunk, values): (&Chunk, &mut [f32])| {
             vectorised(
                 #[inline(always)]
-                || forward_chunk(&others, rows, residual, chunk, values, layer.activation),
+                || forward_chunk(&others, rows, residual, chunk, values, operation.activation),
             );
         });
         return [first].into();
     }
     let first = B::hold(first);
     let first = B::view(&first);
-    compute::<B, 1>(
-        &device,
-        &layer.packing,
+    compute(
+        &operation.packing,
         columns,
-        [Output::Rows(columns)],
+        [OutputMatrix::Rows(columns)],
         #[inline(always)]
         |chunk, [output]| {
             for (row, output) in chunk.rows.clone().zip(output.chunks_exact_mut(columns)) {
                 output.copy_from_slice(first.row(row));
             }
-            forward_chunk(&others, rows, residual, chunk, output, layer.activation);
+            forward_chunk(&others, rows, residual, chunk, output, operation.activation);
         },
     )
 }
@@ -100,13 +97,12 @@ fn map(output: &mut [f32], function: impl Fn(f32) -> f32) {
     }
 }
 
-/// Gradients of a matrix and of the rows; `activated` as in [`LayerGradients`](super::LayerGradients).
+/// Gradients of a matrix and of the rows; `activated` as in [`ActivatedSumGradients`](super::ActivatedSumGradients).
 pub(super) fn backward<B: HostBackend>(
-    layer: &Layer,
+    operation: &ActivatedSum,
     activated: Vec<FloatTensor<B>>,
     gradient: FloatTensor<B>,
 ) -> Tensors<B> {
-    let device = gradient.device();
     let identity = activated.is_empty().then(|| gradient.clone());
     let activated: Vec<B::Held> = activated.into_iter().map(B::hold).collect();
     let activated: Vec<MatrixView<'_>> = activated.iter().map(B::view).collect();
@@ -115,10 +111,9 @@ pub(super) fn backward<B: HostBackend>(
     let columns = gradient.columns();
     if let Some(identity) = identity {
         let [sums] = compute::<B, 1>(
-            &device,
-            &layer.packing,
+            &operation.packing,
             columns,
-            [Output::Sums(columns)],
+            [OutputMatrix::Sums(columns)],
             #[inline(always)]
             |chunk, [sums]| {
                 for row in chunk.rows.clone() {
@@ -129,14 +124,13 @@ pub(super) fn backward<B: HostBackend>(
         .take();
         return [identity, sums].into();
     }
-    compute::<B, 2>(
-        &device,
-        &layer.packing,
+    compute(
+        &operation.packing,
         columns,
-        [Output::Rows(columns), Output::Sums(columns)],
+        [OutputMatrix::Rows(columns), OutputMatrix::Sums(columns)],
         #[inline(always)]
         |chunk, [output, sums]| {
-            backward_chunk(&activated, gradient, chunk, output, sums, layer.activation);
+            backward_chunk(&activated, gradient, chunk, output, sums, operation.activation);
         },
     )
 }

@@ -66,12 +66,12 @@ impl HostBackend for Flex {
         rhs: FloatTensor<Self>,
         addend: Option<FloatTensor<Self>>,
     ) -> FloatTensor<Self> {
-        let (rows, columns, device) = (lhs.shape()[0], rhs.shape()[1], lhs.device());
+        let (rows, columns) = (lhs.shape()[0], rhs.shape()[1]);
         if rows * lhs.shape()[1] * columns == 0 {
             return multiply_add::<Self>(lhs, rhs, addend);
         }
         let Some(mut sum) = addend else {
-            return Self::matrix(gemm::product(&lhs, &rhs), columns, &device);
+            return Self::matrix(gemm::product(&lhs, &rhs), columns);
         };
         assert_eq!(sum.shape().as_slice(), [rows, columns], "the addend of a product has another size");
         if let Some(values) = Self::own_values_mut(&mut sum) {
@@ -80,6 +80,6 @@ impl HostBackend for Flex {
         }
         let mut values = Self::values(&mut sum).expect("f32").to_vec();
         gemm::add_product(&lhs, &rhs, &mut values);
-        Self::matrix(values, columns, &device)
+        Self::matrix(values, columns)
     }
 }

@@ -9,6 +9,7 @@ mod extremes;
 mod gallery;
 mod layers;
 mod methods;
+mod numerics;
 mod page;
 mod pareto;
 mod sections;
@@ -25,6 +26,7 @@ pub use extremes::Extreme;
 pub use gallery::Picture;
 pub use layers::LayerCount;
 pub use methods::{CategoryResult, Comparison, MethodResult, Methods};
+pub use numerics::NumericalChoice;
 pub use page::{Page, Section};
 pub use pareto::{Pareto, Point, Sample};
 pub use sets::{DataSet, GarmentSet, Sets};
@@ -70,6 +72,8 @@ pub struct Study {
     pub times: Times,
     /// Speed against error.
     pub pareto: Pareto,
+    /// Precision, eigenpairs, distance to the body.
+    pub numerics: Vec<NumericalChoice>,
     /// Far outside of what was trained on.
     pub extremes: Vec<Extreme>,
     /// Pictures.
@@ -150,6 +154,8 @@ pub fn study(
     let times = times::ask(subject, 6, sizes.times, &settings, &done)?;
     begin("speed against error");
     let pareto = pareto::ask(subject, 7, sizes.pareto, &settings, &done)?;
+    begin("numerical choices");
+    let numerics = numerics::ask(subject, 14, sizes.pareto)?;
     begin("stability");
     let extremes = extremes::ask(subject, 8, sizes.extremes, &settings, &done)?;
     begin("pictures");
@@ -165,6 +171,7 @@ pub fn study(
         specific: pairs,
         times,
         pareto,
+        numerics,
         extremes,
         pictures,
     })

@@ -1,6 +1,6 @@
 //! The report of an evaluation: its parts, in the order of the paper.
 
-use super::{EmbeddingStudy, Section, Study, Table, Variant, extremes, layers, methods, variants};
+use super::{EmbeddingStudy, Section, Study, Table, Variant, extremes, layers, methods, numerics, variants};
 use crate::picture::{draw_lines, png_bytes};
 use miette::{IntoDiagnostic, Report};
 
@@ -67,6 +67,7 @@ impl Study {
             png_bytes(&chart).into_diagnostic()?,
         ));
         sections.push(pareto);
+        sections.push(section("Numerical choices", "", vec![numerics::table(&self.numerics)]));
         sections.push(section("Stability", "", vec![extremes::table(&self.extremes)]));
         if !self.pictures.is_empty() {
             let mut gallery = section(

@@ -18,9 +18,8 @@ pub use staged::Staged;
 
 use super::{Drape, Draper, DraperError, Moment, Outfit, SourceGarment};
 use crate::picture::{BODY_COLOUR, PictureError, layer_colour};
-use clothcombo_data::format::FileError;
 use clothcombo_data::format::obj::{self, MovedObj};
-use clothcombo_data::format::{GlbError, SceneMesh, save_glb};
+use clothcombo_data::format::{FileError, SceneMesh, save_glb};
 use miette::Diagnostic;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -89,12 +88,9 @@ pub enum OutputError {
         /// The system's reason.
         reason: std::io::Error,
     },
-    /// An OBJ file.
+    /// An OBJ or the GLB file.
     #[error(transparent)]
-    Obj(#[from] FileError),
-    /// The GLB file.
-    #[error(transparent)]
-    Glb(#[from] GlbError),
+    File(#[from] FileError),
     /// The picture.
     #[error(transparent)]
     Picture(#[from] PictureError),
@@ -121,7 +117,7 @@ pub struct Show<'a> {
     pub all_frames: bool,
 }
 
-/// Times of writing [ms], by file.
+/// Times of writing (ms), by file.
 pub type WriteTimes = Vec<(&'static str, f64)>;
 
 /// Writes everything but the report into `folder`.

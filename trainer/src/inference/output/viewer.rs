@@ -27,7 +27,7 @@ const DATA: &str = "/*DATA*/";
 
 /// Stretch at the end of the strain scale.
 const STRAIN: f64 = 0.25;
-/// Ends of the scale of distances to the body [mm].
+/// Ends of the scale of distances to the body (mm).
 const GAP: [f64; 2] = [-10.0, 40.0];
 /// Most bytes of a page's scene; of a longer motion every so-manieth frame is shown.
 const MOST_BYTES: usize = 96 << 20;

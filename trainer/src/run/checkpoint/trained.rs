@@ -39,6 +39,11 @@ impl TrainedModel {
         })
     }
 
+    /// Where its configuration lies.
+    pub fn config_file(&self) -> PathBuf {
+        self.folder.join(CONFIG)
+    }
+
     /// The networks, on `device`.
     ///
     /// # Errors

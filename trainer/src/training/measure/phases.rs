@@ -10,7 +10,7 @@ use tracing_subscriber::filter::Targets;
 use tracing_subscriber::layer::{Context, SubscriberExt};
 use tracing_subscriber::registry::LookupSpan;
 
-/// What is left of a step beside the named parts.
+/// The rest of a step.
 pub const OTHER: &str = "other";
 
 /// The parts of a step in their order: waiting for the scene, then the spans by name, then the rest.
@@ -35,7 +35,7 @@ pub const PHASES: [&str; 14] = [
 pub type SpanSeconds = BTreeMap<&'static str, f64>;
 
 /// Runs `work` and returns how long each span of the project was entered, on this thread and on those that `work` hands its
-/// subscriber to. A span within another one counts for itself alone.
+/// subscriber to. The time of a span excludes that of the spans within it.
 pub fn record_phases<R>(work: impl FnOnce() -> R) -> (R, SpanSeconds) {
     let totals = Arc::new(Mutex::new(SpanSeconds::new()));
     let targets = Targets::new()

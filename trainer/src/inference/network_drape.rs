@@ -16,20 +16,20 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// An outfit on one body before any post-process; garments packed inner → outer.
-pub(super) struct Networked {
+pub(super) struct NetworkDrape {
     /// The scene the networks saw: the body facing +z, at the origin.
     pub scene: PreparedScene,
     /// The body where it stands.
     pub surface: Arc<Surface<f64>>,
-    /// Where it faces: angle about the vertical from +z towards +x [radians].
+    /// Where it faces: angle about the vertical from +z towards +x (radians).
     pub heading: f64,
     /// Blended skinning transform of every vertex, canonical → posed.
     pub transforms: Vec<Transform>,
-    /// Linear blend skinning of the start state [m].
+    /// Linear blend skinning of the start state (m).
     pub skinned: Vec<[f64; 3]>,
-    /// What the networks made of it [m].
+    /// What the networks made of it (m).
     pub network: Vec<[f64; 3]>,
-    /// Time for the body and the networks [ms].
+    /// Time for the body and the networks (ms).
     pub milliseconds: PhaseTimes,
 }
 
@@ -38,12 +38,12 @@ const MOST_SHAPE: f64 = 20.0;
 
 impl Draper {
     /// Poses the body and lets `model` drape `outfit` on it.
-    pub(super) fn networked(
+    pub(super) fn network_drape(
         &self,
         model: &ClothCombo,
         outfit: &Outfit,
         body: &BodyState,
-    ) -> Result<Networked, DraperError> {
+    ) -> Result<NetworkDrape, DraperError> {
         let clock = Instant::now();
         let (shape, posed) = self.posed(body)?;
         let mut surface = match &body.surface {
@@ -81,10 +81,10 @@ impl Draper {
             corrections: ms(times.corrections),
             ..PhaseTimes::default()
         };
-        Ok(Networked { scene, surface, heading, transforms, skinned, network, milliseconds })
+        Ok(NetworkDrape { scene, surface, heading, transforms, skinned, network, milliseconds })
     }
 
-    /// The same in `pose` and place, somewhere on the way to `body`, for the post-process.
+    /// The same in `pose` and place, a sample of the continuation path to `body`, for the post-process.
     pub(super) fn stage(
         &self,
         model: &ClothCombo,
@@ -94,8 +94,8 @@ impl Draper {
         place: [f64; 3],
     ) -> Result<Waypoint, DraperError> {
         // A surface is known at the end only.
-        let on_the_way = BodyState { shape: body.shape.clone(), pose, surface: None, place };
-        let made = self.networked(model, outfit, &on_the_way)?;
+        let sample = BodyState { shape: body.shape.clone(), pose, surface: None, place };
+        let made = self.network_drape(model, outfit, &sample)?;
         let parts = |packed| outfit.split(packed).into_iter().map(<[_]>::to_vec).collect();
         Ok(Waypoint {
             body: made.surface,

@@ -1,26 +1,26 @@
-//! What a user should know about the input, though it can be draped.
+//! Warnings about inputs that can be draped.
 
 use crate::inference::SourceGarment;
-use clothcombo_data::asset::{Garment, unwearable};
+use clothcombo_data::asset::{Garment, infeasible_pair};
 
-pub(super) fn tell_shape(shape: &[f64], [low, high]: [f64; 2]) {
+pub(super) fn warn_about_shape(shape: &[f64], [low, high]: [f64; 2]) {
     if let Some(value) = shape.iter().find(|value| !(low..=high).contains(*value)) {
         tracing::warn!("shape parameter {value}: the model was trained with {low} to {high}");
     }
 }
 
-pub(super) fn tell_order(sources: &[SourceGarment]) {
+pub(super) fn warn_about_order(sources: &[SourceGarment]) {
     let order: Vec<&Garment> = sources.iter().map(|source| &source.garment).collect();
-    if let Some([inner, outer]) = unwearable(&order) {
+    if let Some([inner, outer]) = infeasible_pair(&order) {
         tracing::warn!(
-            "{} cannot be worn over {}, which hangs between the legs: they will cross at the crotch",
+            "{} does not fit over {}, which hangs between the legs: they will intersect at the crotch",
             outer.name,
             inner.name
         );
     }
 }
 
-pub(super) fn tell_repairs(source: &SourceGarment) {
+pub(super) fn log_repairs(source: &SourceGarment) {
     let Some(fit) = &source.fit else { return };
     let name = &source.garment.name;
     tracing::info!("{name} fitted: {}", fit.assumptions().join("; "));

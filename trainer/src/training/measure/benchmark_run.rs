@@ -1,9 +1,10 @@
-//! A run whose steps are measured.
+//! A training run whose steps are measured.
 
 use super::phases::{OTHER, PHASES, record_phases};
 use crate::config::{ClipScope, Config, OptimizerConfig, Trains};
 use crate::dataset::{Dataset, Plan, PreparedScene, prepare, sample_training};
 use crate::evaluation::median_ms;
+use crate::inference::draped::to_host;
 use crate::inference::tensor_store::{DrapeError, KnownEmbeddings, TensorStore};
 use crate::run::spread::Spread;
 use crate::system::memory::Memory;
@@ -22,8 +23,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// A run whose steps are measured.
-pub struct Subject {
+/// A training run whose steps are measured.
+pub struct BenchmarkRun {
     config: Arc<Config>,
     tensors: Arc<TensorStore>,
     learner: Learner,
@@ -36,15 +37,15 @@ pub struct Subject {
 pub struct Profile {
     /// Steps that were measured.
     pub steps: usize,
-    /// Median time of a step, with the wait for its scene [ms].
+    /// Median time of a step, with the wait for its scene (ms).
     pub step_ms: f64,
-    /// Median time of every part [ms], in the order of [`PHASES`].
+    /// Median time of every part (ms), in the order of [`PHASES`].
     pub phases_ms: Vec<(&'static str, f64)>,
-    /// Median time to draw and prepare a scene [ms], which another thread does while a step computes.
+    /// Median time to sample and prepare a scene (ms). In training another thread does this while a step computes.
     pub prepare_ms: f64,
 }
 
-/// Times of one scene's parts, medians [ms], and memory.
+/// Median times of the parts of one scene (ms), and memory.
 #[derive(Clone, Debug, Serialize)]
 pub struct Costs {
     /// All networks without gradients, embedding included.
@@ -53,20 +54,19 @@ pub struct Costs {
     pub forward_backward_ms: f64,
     /// A whole step: networks, losses, backward pass, clip, Adam.
     pub step_ms: f64,
-    /// A step on several scenes (`accumulate`), which are computed beside each other where there are threads for it; absent
-    /// if none was asked for.
+    /// A step on several scenes (`accumulate`), in parallel where there are threads for it; absent if none was asked for.
     pub step_of_several_ms: Option<f64>,
     /// All losses with their gradient.
     pub losses_ms: f64,
-    /// Draping again what has been embedded and packed before, as for the next frame of a motion.
+    /// Draping an outfit whose embeddings are known, as for the next frame of a motion.
     pub drape_ms: f64,
-    /// Value and gradient of each loss alone, with its own neighbour searches.
+    /// Value and gradient of each single loss, with its own neighbour searches.
     pub terms_ms: BTreeMap<&'static str, f64>,
-    /// Largest resident memory of the process during whole steps [MiB]; absent where the system does not tell.
+    /// Largest resident memory of the process during whole steps (MiB); absent where the system does not report it.
     pub peak_mib: Option<f64>,
 }
 
-impl Subject {
+impl BenchmarkRun {
     /// A new run of stage `stage` of `config` on `device` (named without automatic differentiation).
     ///
     /// # Errors
@@ -79,7 +79,7 @@ impl Subject {
         let device = device.clone().autodiff();
         let dimensions = dataset.dimensions();
         let model = ClothCombo::new(&config.model, &dimensions, config.seed, &device).into_diagnostic()?;
-        let learner = Learner::new(model, new_optimizer(&config.optimizer), &config.optimizer);
+        let learner = new_learner(model, &config.optimizer);
         let tensors = Arc::new(TensorStore::new(dataset, dimensions, &device));
         Ok(Self { config: Arc::new(config), tensors, learner, device, first_step })
     }
@@ -94,14 +94,19 @@ impl Subject {
         self.tensors.dataset()
     }
 
-    /// The networks as they are now.
+    /// The networks.
     pub fn model(&self) -> &ClothCombo {
         self.learner.model()
     }
 
-    /// Exchanges the networks and forgets the optimiser's state.
-    pub fn set_model(&mut self, model: ClothCombo) {
-        self.learner = Learner::new(model, new_optimizer(&self.config.optimizer), &self.config.optimizer);
+    /// Takes the parameters of `other`, and a new optimiser.
+    ///
+    /// # Errors
+    /// When the networks differ in size.
+    pub fn copy_parameters(&mut self, other: &Self) -> Result<(), Report> {
+        let model = self.model().clone().try_load_record(other.model().clone().into_record());
+        self.learner = new_learner(model.map_err(|error| miette!("{error}"))?, &self.config.optimizer);
+        Ok(())
     }
 
     /// The scene of the stage's first step, or of `offset` steps later.
@@ -112,8 +117,8 @@ impl Subject {
         let step = self.first_step + offset;
         let at = Schedule::new(&self.config).at(step);
         let plan = Plan { stage: &self.config.stages[at.stage], progress: at.stage_progress };
-        let draw = sample_training(self.dataset(), self.config.seed, step, 0, plan);
-        Ok(prepare(self.dataset(), &self.config.losses, draw, at.run_progress)?)
+        let sample = sample_training(self.dataset(), self.config.seed, step, 0, plan);
+        Ok(prepare(self.dataset(), &self.config.losses, sample, at.run_progress)?)
     }
 
     /// Which networks the stage trains.
@@ -156,7 +161,7 @@ impl Subject {
             outcome?;
             let total = start.elapsed().as_secs_f64();
             times.insert(PHASES[0], wait);
-            // Parts of scenes that are computed beside each other add up to more than the step.
+            // The parts of scenes computed in parallel add up to more than the step.
             times.insert(OTHER, (total - times.values().sum::<f64>()).max(0.0));
             if step >= WARM_UP {
                 totals.push(1e3 * total);
@@ -176,9 +181,9 @@ impl Subject {
         Ok(Profile { steps, step_ms: Spread::of(totals).median, phases_ms, prepare_ms })
     }
 
-    /// Positions of the scene's garments on its first body, posed and canonical, on the device of `model`. Embeddings in
-    /// `known` are not computed again.
-    pub(super) fn drape(
+    /// Positions of the scene's garments on its first body, posed and canonical, `[ΣV, 3]` each (m), on the device of `model`.
+    /// `known` holds embeddings that need not be computed.
+    fn drape(
         &self,
         model: &ClothCombo,
         scene: &PreparedScene,
@@ -186,11 +191,11 @@ impl Subject {
     ) -> Result<[Tensor<2>; 2], DrapeError> {
         let outfit = self.tensors.outfit(scene)?;
         let embeddings = self.tensors.embed(model, scene, &outfit, known, self.trains().mode())?;
-        self.place(model, scene, &outfit, &embeddings)
+        self.drape_embedded(model, scene, &outfit, &embeddings)
     }
 
     /// The part of [`drape`](Self::drape) that depends on the body.
-    fn place(
+    fn drape_embedded(
         &self,
         model: &ClothCombo,
         scene: &PreparedScene,
@@ -209,14 +214,11 @@ impl Subject {
     /// When the scene's tensors cannot be made.
     pub fn host_drape(&self, scene: &PreparedScene) -> Result<[Vec<[f32; 3]>; 2], DrapeError> {
         let positions = self.drape(&self.model().valid(), scene, &self.tensors.embeddings())?;
-        Ok(positions.map(|tensor| {
-            let data = tensor.into_data();
-            data.as_slice::<f32>().expect("positions are f32").as_chunks::<3>().0.to_vec()
-        }))
+        Ok(positions.map(to_host))
     }
 
-    /// What a training step minimises on `scene`, and the gradient of every parameter before clipping, by name; empty for
-    /// those that the stage does not train.
+    /// The loss of a training step on `scene`, and the gradient of every parameter before clipping, by name. It is empty for
+    /// parameters that the stage does not train.
     ///
     /// # Errors
     /// When the scene's tensors cannot be made.
@@ -224,17 +226,21 @@ impl Subject {
         &self,
         scene: &PreparedScene,
     ) -> Result<(f64, Vec<(String, Vec<f32>)>), DrapeError> {
-        // Clipped after the mean, which is not made here.
+        // `ClipScope::Step` clips in the update, which is not made here.
         let unclipped = OptimizerConfig { clip: ClipScope::Step, ..self.config.optimizer.clone() };
-        let mut learner = Learner::new(self.model().clone(), new_optimizer(&unclipped), &unclipped);
-        let computed = learner.forward_backward(&StepInput::whole(
-            &self.tensors,
-            std::slice::from_ref(scene),
-            self.trains(),
-        ))?;
+        let mut learner = new_learner(self.model().clone(), &unclipped);
+        let input = StepInput::whole(&self.tensors, std::slice::from_ref(scene), self.trains());
+        let computed = learner.forward_backward(&input)?;
         let mut named = NamedGradients { gradients: computed.gradients, path: Vec::new(), found: Vec::new() };
         self.model().visit(&mut named);
         Ok((computed.loss, named.found))
+    }
+
+    fn step_ms(&mut self, scenes: &[PreparedScene], seconds: f64) -> Result<f64, DrapeError> {
+        let trains = self.trains();
+        median_ms(seconds, || {
+            self.learner.train_step(&StepInput::whole(&self.tensors, scenes, trains), 1e-4).map(drop)
+        })
     }
 
     /// Measures the parts of one scene, each for about `seconds`, and a step on it `several` times over.
@@ -244,20 +250,14 @@ impl Subject {
     pub fn costs(&mut self, seconds: f64, several: usize) -> Result<Costs, Report> {
         let scenes = [self.scene(0)?];
         let [scene] = &scenes;
-        let (trains, rate) = (self.trains(), 1e-4);
         let reset = Memory::reset_peak();
-        let step_ms = median_ms(seconds, || {
-            self.learner.train_step(&StepInput::whole(&self.tensors, &scenes, trains), rate).map(drop)
-        })?;
+        let step_ms = self.step_ms(&scenes, seconds)?;
         let peak_mib = Memory::now().filter(|_| reset).map(|memory| memory.peak as f64 / f64::from(1 << 20));
-
         let step_of_several_ms = match several {
             0 | 1 => None,
             _ => {
                 let scenes = (0..several).map(|_| self.scene(0)).collect::<Result<Vec<_>, _>>()?;
-                let input = StepInput::whole(&self.tensors, &scenes, trains);
-                let step = || self.learner.train_step(&input, rate).map(drop);
-                Some(median_ms(seconds, step)?)
+                Some(self.step_ms(&scenes, seconds)?)
             }
         };
 
@@ -265,11 +265,11 @@ impl Subject {
         let read = |positions: [Tensor<2>; 2]| positions.map(Tensor::into_data);
         let forward_ms =
             median_ms(seconds, || self.drape(&plain, scene, &self.tensors.embeddings()).map(read))?;
-        // What depends on the garments alone is kept, as for the frames of a motion.
         let outfit = self.tensors.outfit(scene)?;
         let known = self.tensors.embeddings();
         let embeddings = self.tensors.embed(&plain, scene, &outfit, &known, self.trains().mode())?;
-        let drape_ms = median_ms(seconds, || self.place(&plain, scene, &outfit, &embeddings).map(read))?;
+        let drape_ms =
+            median_ms(seconds, || self.drape_embedded(&plain, scene, &outfit, &embeddings).map(read))?;
 
         let count = scene.bodies[0].start.len();
         let pull: Vec<f32> = (0..3 * count).map(|i| (i * 37 % 101) as f32 / 50.0 - 1.0).collect();
@@ -288,8 +288,8 @@ impl Subject {
         let losses_ms = evaluate(energy)?;
         let mut terms_ms = BTreeMap::new();
         for term in Term::ALL {
-            if let Some(alone) = energy.only(term) {
-                terms_ms.insert(term.name(), evaluate(&alone)?);
+            if let Some(single) = energy.only(term) {
+                terms_ms.insert(term.name(), evaluate(&single)?);
             }
         }
         Ok(Costs {
@@ -303,6 +303,10 @@ impl Subject {
             peak_mib,
         })
     }
+}
+
+fn new_learner(model: ClothCombo, config: &OptimizerConfig) -> Learner {
+    Learner::new(model, new_optimizer(config), config)
 }
 
 struct NamedGradients {
