@@ -4,7 +4,7 @@
 //! finitely many trials at almost every nonsmooth point. A trial that is too long is followed by the minimum of the parabola through
 //! value and slope at the start and the value of the trial, kept away from the ends of the bracket.
 
-/// Armijo: the share of the decrease that the slope at the start promises.
+/// Armijo: the share of the decrease that the slope at the start predicts.
 const DECREASE: f64 = 1e-4;
 
 /// Wolfe: the share of the slope at the start that may remain.

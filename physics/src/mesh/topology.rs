@@ -72,11 +72,6 @@ impl Topology {
         self.rings.row(v)
     }
 
-    /// Whether an edge joins `a` and `b`.
-    pub fn are_adjacent(&self, a: u32, b: u32) -> bool {
-        self.ring(a as usize).binary_search(&b).is_ok()
-    }
-
     /// Number of vertices, unreferenced ones included.
     pub fn vertex_count(&self) -> usize {
         self.component_of_vertex.len()
@@ -233,7 +228,7 @@ mod tests {
         assert_eq!(topology.boundary_loops.iter().map(Vec::len).collect::<Vec<_>>(), [9, 9]);
         for chain in &topology.boundary_loops {
             for i in 0..chain.len() {
-                assert!(topology.are_adjacent(chain[i], chain[(i + 1) % chain.len()]));
+                assert!(topology.ring(chain[i] as usize).contains(&chain[(i + 1) % chain.len()]));
             }
         }
     }
@@ -244,8 +239,8 @@ mod tests {
         for v in 0..topology.vertex_count() {
             let ring = topology.ring(v);
             assert!(ring.windows(2).all(|w| w[0] < w[1]));
-            assert!(ring.iter().all(|&u| topology.are_adjacent(u, v as u32)));
-            assert!(!topology.are_adjacent(v as u32, v as u32));
+            assert!(ring.iter().all(|&u| topology.ring(u as usize).contains(&(v as u32))));
+            assert!(!ring.contains(&(v as u32)));
         }
     }
 

@@ -21,13 +21,6 @@ pub fn nearest<T: Real>(points: &[[T; 3]], p: [T; 3]) -> (u32, T) {
     best
 }
 
-/// Indices of the points at most `radius` from `p`, ascending.
-pub fn within<T: Real>(points: &[[T; 3]], p: [T; 3], radius: T) -> Vec<u32> {
-    (0..points.len() as u32)
-        .filter(|&i| vec3::distance_squared(points[i as usize], p) <= radius * radius)
-        .collect()
-}
-
 /// Distance (m) from `p` to the closest point of any triangle; infinite without a face.
 pub fn distance_to_surface(positions: &[[f64; 3]], faces: &[[u32; 3]], p: [f64; 3]) -> f64 {
     faces

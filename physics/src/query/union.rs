@@ -42,7 +42,6 @@ pub struct UnionDistance {
     /// Whether the normals at a face and its neighbours tell the side.
     is_sure: Vec<bool>,
     all: RayIntersections,
-    buried: usize,
 }
 
 impl UnionDistance {
@@ -82,13 +81,7 @@ impl UnionDistance {
             };
         }
         let kept = ClosestPoint::of_tree(tree, |face| sides[face as usize] != FaceSide::Buried);
-        let buried = sides.iter().filter(|side| **side == FaceSide::Buried).count();
-        Self { kept, sides, is_sure, all, buried }
-    }
-
-    /// Faces that lie in the inside of the union.
-    pub fn buried(&self) -> usize {
-        self.buried
+        Self { kept, sides, is_sure, all }
     }
 
     /// Where every face lies; faces that were left out, without area, or with a corner that is not finite, count as exposed.
