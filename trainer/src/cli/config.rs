@@ -4,7 +4,8 @@ use crate::cli::loading::load_dataset;
 use crate::cli::memory_table::print_memory;
 use crate::cli::output::print_json;
 use crate::cli::table::{row, table};
-use crate::config::{ClipScope, Config, MOST_GARMENTS, StageConfig, Trains, load, schema};
+use crate::cli::values::count;
+use crate::config::{ClipScope, Config, StageConfig, Trains, load, schema};
 use crate::dataset::DataSizes;
 use crate::run::report::duration;
 use crate::system::device::Backend;
@@ -45,21 +46,14 @@ pub struct CheckArguments {
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u64).range(1..=1000))]
     timed_steps: u64,
     /// State the memory for so many garments instead of those there are, on a body like SMPL-X; no data is loaded
-    #[arg(long, value_name = "N", requires = "vertices", value_parser = positive)]
+    #[arg(long, value_name = "N", requires = "vertices", value_parser = count)]
     garments: Option<usize>,
     /// Vertices of each of those garments
-    #[arg(long, value_name = "V", requires = "garments", value_parser = positive)]
+    #[arg(long, value_name = "V", requires = "garments", value_parser = count)]
     vertices: Option<usize>,
     /// Shape components of that body; default: data.shape_components or, where that takes all, the 300 of SMPL-X
     #[arg(long, value_name = "K", requires = "garments")]
     shape_components: Option<usize>,
-}
-
-fn positive(text: &str) -> Result<usize, String> {
-    match text.parse() {
-        Ok(number @ 1..=MOST_GARMENTS) => Ok(number),
-        _ => Err(format!("not a number from 1 to {MOST_GARMENTS}")),
-    }
 }
 
 /// Runs the verb.

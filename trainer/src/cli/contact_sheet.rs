@@ -6,7 +6,7 @@ use image::RgbImage;
 
 /// Garments in a row.
 pub const PER_ROW: usize = 8;
-/// Largest sides of one picture [pixels].
+/// Largest sides of one picture (pixels).
 const CELL: [f64; 2] = [190.0, 210.0];
 
 /// Up to [`PER_ROW`] garments of each category, seen from the front left.

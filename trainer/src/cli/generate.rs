@@ -1,9 +1,8 @@
 //! `clothcombo generate`: garments from nothing but a body.
 
 use super::contact_sheet::{PER_ROW, contact_sheet};
-use crate::cli::values::{at_least_one, picture_file};
+use crate::cli::values::{count, picture_file};
 use crate::cli::verbosity::{print_status, progress_bar};
-use crate::config::MOST_GARMENTS;
 use crate::dataset::load_body;
 use crate::picture::save_png;
 use clap::Parser;
@@ -29,7 +28,7 @@ use std::path::{Path, PathBuf};
 )]
 pub struct Arguments {
     /// Number of garments, at most 1000000
-    #[arg(long, default_value_t = 12, value_parser = garment_count)]
+    #[arg(long, default_value_t = 12, value_parser = count)]
     count: usize,
     /// Number of the first garment: makes garments START to START + COUNT - 1
     #[arg(long, default_value_t = 0)]
@@ -52,14 +51,6 @@ pub struct Arguments {
     /// Folder to write; one that holds garments is added to
     #[arg(short, long)]
     output: PathBuf,
-}
-
-/// As many garments as a configuration may ask for.
-fn garment_count(text: &str) -> Result<usize, String> {
-    match at_least_one(text)? {
-        count if count > MOST_GARMENTS => Err(format!("it must be at most {MOST_GARMENTS}")),
-        count => Ok(count),
-    }
 }
 
 /// Runs the verb.

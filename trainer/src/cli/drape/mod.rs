@@ -134,7 +134,7 @@ impl Fit {
     }
 }
 
-/// Frames this near to each other show the same cloth [s]; a little more than 0.05, for rounding.
+/// Frames this near to each other show the same cloth (s); a little more than 0.05, for rounding.
 const CLOSE_FRAMES: f64 = 0.050_001;
 
 /// Runs the verb.

@@ -5,7 +5,7 @@ use crate::config::{ClipScope, Config, OptimizerConfig, Trains};
 use crate::dataset::{Dataset, Plan, PreparedScene, prepare, sample_training};
 use crate::evaluation::median_ms;
 use crate::inference::draped::to_host;
-use crate::inference::tensor_store::{DrapeError, KnownEmbeddings, TensorStore};
+use crate::inference::tensor_store::{DrapeError, TensorStore};
 use crate::run::spread::Spread;
 use crate::system::memory::Memory;
 use crate::training::learner::{Learner, StepInput, drape_states, new_optimizer};
@@ -182,15 +182,10 @@ impl BenchmarkRun {
     }
 
     /// Positions of the scene's garments on its first body, posed and canonical, `[ΣV, 3]` each (m), on the device of `model`.
-    /// `known` holds embeddings that need not be computed.
-    fn drape(
-        &self,
-        model: &ClothCombo,
-        scene: &PreparedScene,
-        known: &KnownEmbeddings,
-    ) -> Result<[Tensor<2>; 2], DrapeError> {
+    fn drape(&self, model: &ClothCombo, scene: &PreparedScene) -> Result<[Tensor<2>; 2], DrapeError> {
         let outfit = self.tensors.outfit(scene)?;
-        let embeddings = self.tensors.embed(model, scene, &outfit, known, self.trains().mode())?;
+        let known = self.tensors.embeddings();
+        let embeddings = self.tensors.embed(model, scene, &outfit, &known, self.trains().mode())?;
         self.drape_embedded(model, scene, &outfit, &embeddings)
     }
 
@@ -213,8 +208,7 @@ impl BenchmarkRun {
     /// # Errors
     /// When the scene's tensors cannot be made.
     pub fn host_drape(&self, scene: &PreparedScene) -> Result<[Vec<[f32; 3]>; 2], DrapeError> {
-        let positions = self.drape(&self.model().valid(), scene, &self.tensors.embeddings())?;
-        Ok(positions.map(to_host))
+        Ok(self.drape(&self.model().valid(), scene)?.map(to_host))
     }
 
     /// The loss of a training step on `scene`, and the gradient of every parameter before clipping, by name. It is empty for
@@ -263,8 +257,7 @@ impl BenchmarkRun {
 
         let plain = self.model().valid();
         let read = |positions: [Tensor<2>; 2]| positions.map(Tensor::into_data);
-        let forward_ms =
-            median_ms(seconds, || self.drape(&plain, scene, &self.tensors.embeddings()).map(read))?;
+        let forward_ms = median_ms(seconds, || self.drape(&plain, scene).map(read))?;
         let outfit = self.tensors.outfit(scene)?;
         let known = self.tensors.embeddings();
         let embeddings = self.tensors.embed(&plain, scene, &outfit, &known, self.trains().mode())?;
@@ -275,7 +268,7 @@ impl BenchmarkRun {
         let pull: Vec<f32> = (0..3 * count).map(|i| (i * 37 % 101) as f32 / 50.0 - 1.0).collect();
         let pull = Tensor::<2>::from_data(TensorData::new(pull, [count, 3]), &self.device.clone().inner());
         let forward_backward_ms = median_ms(seconds, || {
-            let [posed, _] = self.drape(self.model(), scene, &self.tensors.embeddings())?;
+            let [posed, _] = self.drape(self.model(), scene)?;
             let gradients = (posed * pull.clone()).sum().backward();
             Ok::<_, DrapeError>(GradientsParams::from_grads(gradients, self.model()))
         })?;

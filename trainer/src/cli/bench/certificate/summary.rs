@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 /// Outfits on a body with fewer pairs in pinched regions before the post-process are called hardly pinched.
 const HARDLY_PINCHED: usize = 200;
 
-/// Times within which outfits are clear [s].
+/// Times within which outfits are clear (s).
 const WITHIN: [f64; 5] = [0.1, 1.0, 10.0, 60.0, 600.0];
 
 /// Groups of outfits: key in JSON, name in tables, what belongs to it.
@@ -48,12 +48,12 @@ fn clear_within(results: &[OutfitResult], seconds: f64) -> f64 {
     clear as f64 / results.len().max(1) as f64
 }
 
-/// The whole time of an outfit, for the body and for certificates too [ms].
+/// The whole time of an outfit, for the body and for certificates too (ms).
 fn time_of(result: &OutfitResult) -> f64 {
     result.body_milliseconds + result.milliseconds.iter().sum::<f64>() + result.certificate_milliseconds
 }
 
-/// That time shared out to the garments by vertices [ms].
+/// That time shared out to the garments by vertices (ms).
 fn per_garment(result: &OutfitResult) -> Vec<f64> {
     let per_vertex = per_vertex(result);
     result.vertices.iter().map(|&vertices| per_vertex * vertices as f64).collect()
@@ -148,7 +148,10 @@ pub(super) fn tables(results: &[OutfitResult], layers: usize) -> String {
         ("ms for the certificate", all.certificate_milliseconds),
         ("largest move [mm]", all.largest_move_mm),
     ];
-    let spread = |(what, spread): (&str, Option<Spread>)| row!["all outfits" => what, "p50" => spread.map(|s| s.median), "p95" => spread.map(|s| s.p95)];
+    let spread = |(what, spread): (&str, Option<Spread>)| {
+        let [median, p95] = [spread.map(|s| s.median), spread.map(|s| s.p95)];
+        row!["all outfits" => what, "p50" => median, "p95" => p95]
+    };
     let within = WITHIN.map(|s| format!("{:.0} % in {s} s", 100.0 * clear_within(results, s)));
     let mut text = format!(
         "{}\n{}clear, of all outfits:  {}\n",
