@@ -68,7 +68,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         "at step",
         "strain ×",
         "inside %",
-        "wrong %",
+        "order %",
         "skipped",
         "spikes",
         "checkpoint"
@@ -103,7 +103,7 @@ fn row(r: &RunSummary, width: usize) -> String {
         step(r.best_step),
         number(r.strain_ratio, 3),
         percent(r.inside),
-        percent(r.wrong_side),
+        percent(r.order_violations),
         r.skipped,
         r.spikes,
         step(r.checkpoint)

@@ -61,7 +61,7 @@ const RAW: [&str; 6] =
 const WEIGHTED: [&str; 6] = ["strain", "bending", "gravity", "collision", "repulsion", "holding"];
 const CONTACT: [&str; 7] =
     ["contact", "vertices", "triangles", "inside [%]", "depth [mm]", "body pairs", "self pairs"];
-const LAYERS: [&str; 5] = ["layers", "collision [m³]", "distance [m³]", "pairs", "wrong side [%]"];
+const LAYERS: [&str; 5] = ["layers", "collision [m³]", "distance [m³]", "pairs", "order violations [%]"];
 
 fn tables(score: &Score) -> String {
     let garments = || score.garments.iter();

@@ -22,7 +22,7 @@ pub struct SceneScore {
     pub total: f64,
     /// Garment vertices inside the body, by closest surface point.
     pub penetration: Penetration,
-    /// Wrong-side vertices over all pairs of layers that interact.
+    /// Layer-order violations over all pairs of layers that interact.
     pub order: OrderViolations,
 }
 
@@ -69,6 +69,6 @@ pub fn method_score(method: &'static str, scenes: &[SceneScore]) -> MethodScore 
         weighted: Term::ALL.into_iter().map(|t| (t.name(), over(&|s| s.weighted[t]).mean)).collect(),
         inside: share(&|s| s.penetration.inside, &|s| s.penetration.vertices),
         deeper_than_5mm: share(&|s| s.penetration.deep, &|s| s.penetration.vertices),
-        wrong_side: share(&|s| s.order.violations, &|s| s.order.counted),
+        order_violations: share(&|s| s.order.violations, &|s| s.order.counted),
     }
 }

@@ -7,7 +7,7 @@ use crate::config::{Config, ValidationConfig, load};
 use crate::dataset::{Dataset, DatasetError, PreparedScene, ValidationGroup, prepare, sample_validation};
 use crate::evaluation::certificates::Dressing;
 use crate::evaluation::equilibrium_error::{
-    Drapes, LBS, MethodError, SceneError, TermEnergies, converged, scene_error,
+    Drapes, MethodError, START, SceneError, TermEnergies, converged, scene_error,
 };
 use crate::inference::DraperError;
 use crate::inference::networks::{Networks, TensorStore};
@@ -235,9 +235,9 @@ fn summary(errors: &[SceneError], settings: &SolverSettings) -> serde_json::Valu
     let of_method = |method: &str| {
         json!({
             "method": method,
-            "excess": spread(errors, method, |m| m.excess),
-            "excess_percent": spread(errors, method, |m| m.excess_percent),
-            "distance_mm": spread(errors, method, |m| m.distance_mm),
+            "excess": spread(errors, method, |m| m.error.excess),
+            "excess_percent": spread(errors, method, |m| m.error.excess_percent),
+            "distance_mm": spread(errors, method, |m| m.error.distance_mm),
             "terms": mean_terms(errors, |e| terms_of(e, method)),
         })
     };
@@ -275,7 +275,7 @@ fn above_skinning(errors: &[SceneError]) -> Option<usize> {
     above.filter(|above| !above.is_empty()).map(|above| above.into_iter().filter(|above| *above).count())
 }
 
-/// Strain of a layer in the outfit over that of the same garment alone, medians over the scenes.
+/// Strain of a layer in the outfit over that of the single garment, medians over the scenes.
 #[derive(Serialize)]
 struct StrainRatio {
     /// In equilibrium.
@@ -290,9 +290,9 @@ fn strain_ratios(errors: &[SceneError]) -> Vec<StrainRatio> {
     let ratio = |layer: usize| {
         let of_layer = || errors.iter().map(move |e| &e.layers[layer]);
         let network: Vec<f64> =
-            of_layer().filter_map(|l| l.network.map(|[alone, outfit]| outfit / alone)).collect();
+            of_layer().filter_map(|l| l.network.map(|[single, outfit]| outfit / single)).collect();
         StrainRatio {
-            equilibrium: Spread::of(of_layer().map(|l| l.outfit / l.alone).collect()).median,
+            equilibrium: Spread::of(of_layer().map(|l| l.outfit / l.single_garment).collect()).median,
             network: (!network.is_empty()).then(|| Spread::of(network).median),
         }
     };
@@ -311,8 +311,14 @@ fn print_tables(errors: &[SceneError], settings: &SolverSettings) {
     for e in errors {
         let run = e.reference_run();
         print!("{:>5} {:<28}{:>9}{:>11.4}", e.scene, e.garments.join(", "), e.vertices, run.energy);
-        for m in &e.methods {
-            print!("{:>1$.4}{2:>9.1}{3:>8.2}", m.excess, width(&m.method), m.excess_percent, m.distance_mm);
+        for MethodError { method, error, .. } in &e.methods {
+            print!(
+                "{:>1$.4}{2:>9.1}{3:>8.2}",
+                error.excess,
+                width(method),
+                error.excess_percent,
+                error.distance_mm
+            );
         }
         println!(
             "{:>7}{:>9.2}{:>11.1e}  {:<11}{}{}",
@@ -324,15 +330,15 @@ fn print_tables(errors: &[SceneError], settings: &SolverSettings) {
             if e.minima_differ { " (minima differ)" } else { "" }
         );
     }
-    println!("\n{:<30}{:>12}{:>12}{:>12}", format!("{} scenes", errors.len()), "mean", "median", "95 %");
+    println!("\n{:<46}{:>12}{:>12}{:>12}", format!("{} scenes", errors.len()), "mean", "median", "95 %");
     let line =
-        |what: String, s: Spread| println!("{what:<30}{:>12.4}{:>12.4}{:>12.4}", s.mean, s.median, s.p95);
+        |what: String, s: Spread| println!("{what:<46}{:>12.4}{:>12.4}{:>12.4}", s.mean, s.median, s.p95);
     for name in &names {
-        line(format!("{name}: excess [J]"), spread(errors, name, |m| m.excess));
-        if *name != LBS {
-            line(format!("{name}: excess [% of LBS]"), spread(errors, name, |m| m.excess_percent));
+        line(format!("{name}: excess [J]"), spread(errors, name, |m| m.error.excess));
+        if *name != START {
+            line(format!("{name}: excess [% of {START}]"), spread(errors, name, |m| m.error.excess_percent));
         }
-        line(format!("{name}: distance [mm]"), spread(errors, name, |m| m.distance_mm));
+        line(format!("{name}: distance [mm]"), spread(errors, name, |m| m.error.distance_mm));
     }
     line(
         "solver: steps".into(),
@@ -351,13 +357,13 @@ fn print_tables(errors: &[SceneError], settings: &SolverSettings) {
         println!("starts that end in different minima: {differ} of {}", errors.len());
     }
     if let Some(above) = above_skinning(errors) {
-        println!("networks above skinning with shape transfer: {above} of {}", errors.len());
+        println!("networks above {START}: {above} of {}", errors.len());
     }
     print_terms(errors, &names);
     let ratios = strain_ratios(errors);
     if !ratios.is_empty() {
         println!(
-            "\nstrain in the outfit over that of the garment alone, medians\n{:>6}{:>14}{:>10}",
+            "\nstrain in the outfit over that of the single garment, medians\n{:>6}{:>14}{:>10}",
             "layer", "equilibrium", "network"
         );
     }

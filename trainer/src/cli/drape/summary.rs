@@ -93,7 +93,7 @@ fn scores(report: &Report) -> String {
 fn layers(report: &Report) -> String {
     let first = of_first_frame(report, "layers");
     let after = report.frames.first().map_or(&report.certificate, |frame| &frame.certificate);
-    let head = [first.as_str(), "pairs before", "after", "wrong side before [%]", "after [%]"];
+    let head = [first.as_str(), "pairs before", "after", "layer-order violations before [%]", "after [%]"];
     let name = |i: usize| &report.garments[i].name;
     let rows: Vec<_> = report
         .certificate_before

@@ -150,7 +150,7 @@ impl Page<'_> {
         };
         let mut out = String::from(
             "<section id=\"curves\"><h2>Curves</h2><p class=\"legend\"><i class=\"l-curve\"></i>median \
-                <i class=\"l-band\"></i>5th to 95th percentile <i class=\"l-base\"></i>LBS alone (validation) \
+                <i class=\"l-band\"></i>5th to 95th percentile <i class=\"l-base\"></i>skinning (validation) \
                 <i class=\"l-stage\"></i>stage begins</p><div class=\"grid-of\">\n",
         );
         out.push_str(&draw("chart-loss", "loss", "weighted", "loss"));
@@ -195,7 +195,7 @@ impl Page<'_> {
             let _ = write!(
                 out,
                 "<table><caption>{}, {} scenes</caption><tr><th>method</th><th>total</th><th>median</th><th>strain</th>\
-                    <th>bending</th><th>gravity</th><th>inside %</th><th>&gt; 5 mm %</th><th>wrong side %</th></tr>",
+                    <th>bending</th><th>gravity</th><th>inside %</th><th>&gt; 5 mm %</th><th>layer-order violations %</th></tr>",
                 escape(name),
                 group["scenes"]
             );
@@ -213,7 +213,7 @@ impl Page<'_> {
                     number(&method["raw"]["gravity"]["mean"]),
                     percent(&method["inside"]),
                     percent(&method["deeper_than_5mm"]),
-                    percent(&method["wrong_side"]),
+                    percent(&method["order_violations"]),
                 );
             }
             out.push_str("</table>\n");

@@ -4,20 +4,35 @@ use super::table::Table;
 use crate::run::report::html::escape;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use serde_json::Value;
 
-const STYLE: &str = include_str!("../../run/report/report.css");
+const STYLE: &str = include_str!("../run/report/report.css");
 
 /// A part of the report.
 #[derive(Default)]
 pub struct Section {
+    /// Its name in `eval.json`.
+    pub key: &'static str,
+    /// Its numbers, more than the tables show.
+    pub numbers: Value,
     /// Its heading.
-    pub title: String,
-    /// A sentence on what is asked; may be empty.
+    pub title: &'static str,
+    /// What a reader has to know; may be empty.
     pub text: String,
     /// Tables.
     pub tables: Vec<Table>,
-    /// Pictures: file name, caption, PNG.
-    pub pictures: Vec<(String, String, Vec<u8>)>,
+    /// Pictures.
+    pub pictures: Vec<Picture>,
+}
+
+/// A picture of the report.
+pub struct Picture {
+    /// Name of its file.
+    pub file: String,
+    /// One sentence.
+    pub caption: String,
+    /// The file.
+    pub png: Vec<u8>,
 }
 
 /// Everything, to be read.
@@ -43,10 +58,9 @@ impl Page {
                 text += &format!("{}\n\n", section.text);
             }
             let parts = section.tables.iter().map(Table::markdown);
-            let pictures = section
-                .pictures
-                .iter()
-                .map(|(file, caption, _)| format!("![{caption}]({file})\n\n{caption}\n"));
+            let picture =
+                |Picture { file, caption, .. }: &Picture| format!("![{caption}]({file})\n\n{caption}\n");
+            let pictures = section.pictures.iter().map(picture);
             text += &parts.chain(pictures).collect::<Vec<_>>().join("\n");
         }
         text
@@ -61,8 +75,8 @@ impl Page {
             .collect();
         let section = |section: &Section| {
             let tables: String = section.tables.iter().map(Table::html).collect();
-            let picture = |(_, caption, png): &(String, String, Vec<u8>)| {
-                let (caption, png) = (escape(caption), STANDARD.encode(png));
+            let picture = |picture: &Picture| {
+                let (caption, png) = (escape(&picture.caption), STANDARD.encode(&picture.png));
                 format!(
                     "<figure class=\"sample\"><figcaption>{caption}</figcaption>\
                      <img alt=\"{caption}\" src=\"data:image/png;base64,{png}\"></figure>\n"
@@ -74,7 +88,7 @@ impl Page {
             } else {
                 format!("<p>{}</p>", escape(&section.text))
             };
-            format!("<section><h2>{}</h2>{text}{tables}{pictures}</section>\n", escape(&section.title))
+            format!("<section><h2>{}</h2>{text}{tables}{pictures}</section>\n", escape(section.title))
         };
         let sections: String = self.sections.iter().map(section).collect();
         format!(

@@ -1,6 +1,6 @@
 //! A table that is written as Markdown and as HTML.
 
-use super::estimate::{Estimate, Proportion, Ratio};
+use super::{Estimate, Proportion, Ratio};
 use crate::picture::axis::number_text;
 use crate::run::report::html::escape;
 use serde::Serialize;
@@ -18,17 +18,38 @@ pub struct Table {
     pub rows: Vec<Vec<String>>,
 }
 
+/// A column: its heading, and the cell of a row.
+pub type Column<'a, R> = (&'a str, &'a dyn Fn(&R) -> String);
+
 impl Table {
-    /// An empty table.
-    pub fn new(title: impl Into<String>, head: &[&str]) -> Self {
-        let head = head.iter().map(|h| (*h).to_owned()).collect();
-        Self { title: title.into(), note: String::new(), head, rows: Vec::new() }
+    /// A row for each of `rows`.
+    pub fn new<R>(title: impl Into<String>, rows: &[R], columns: &[Column<'_, R>]) -> Self {
+        let cells = |row: &R| columns.iter().map(|(_, cell)| cell(row)).collect();
+        Self {
+            title: title.into(),
+            note: String::new(),
+            head: columns.iter().map(|(heading, _)| (*heading).to_owned()).collect(),
+            rows: rows.iter().map(cells).collect(),
+        }
     }
 
     /// With a note under its title.
-    pub fn with_note(mut self, note: impl Into<String>) -> Self {
-        self.note = note.into();
+    pub fn with_note(self, note: impl Into<String>) -> Self {
+        Self { note: note.into(), ..self }
+    }
+
+    /// With a further row; cells that it lacks are empty.
+    pub fn with_row<C: Into<String>>(mut self, cells: impl IntoIterator<Item = C>) -> Self {
+        let mut row: Vec<String> = cells.into_iter().map(C::into).collect();
+        row.resize(self.head.len(), String::new());
+        self.rows.push(row);
         self
+    }
+
+    /// Adds a column to the right of the others.
+    pub fn add_column(&mut self, heading: &str, cells: impl Iterator<Item = String>) {
+        self.head.push(heading.to_owned());
+        self.rows.iter_mut().zip(cells).for_each(|(row, cell)| row.push(cell));
     }
 
     /// As Markdown: a bold title, the note, the table.
@@ -64,7 +85,26 @@ impl Table {
 
 /// Mean [95 % interval of the mean].
 pub fn mean_with_interval(e: &Estimate) -> String {
-    format!("{} [{}, {}]", number(e.spread.mean), number(e.interval[0]), number(e.interval[1]))
+    with_interval(e.spread.mean, e.interval, number)
+}
+
+/// Median [95 % interval of the mean].
+pub fn median_with_interval(e: &Estimate) -> String {
+    with_interval(e.spread.median, e.interval, number)
+}
+
+/// Mean of shares in percent [95 % interval of the mean].
+pub fn percent_with_interval(e: &Estimate) -> String {
+    with_interval(e.spread.mean, e.interval, percent)
+}
+
+/// Ratio of means [95 % interval].
+pub fn ratio_with_interval(r: &Ratio) -> String {
+    with_interval(r.of_means, r.interval, number)
+}
+
+fn with_interval(value: f64, [low, high]: [f64; 2], text: fn(f64) -> String) -> String {
+    format!("{} [{}, {}]", text(value), text(low), text(high))
 }
 
 /// Mean (median).
@@ -72,14 +112,9 @@ pub fn mean_and_median(e: &Estimate) -> String {
     format!("{} ({})", number(e.spread.mean), number(e.spread.median))
 }
 
-/// Ratio of means [95 % interval].
-pub fn ratio_with_interval(r: &Ratio) -> String {
-    format!("{} [{}, {}]", number(r.of_means), number(r.interval[0]), number(r.interval[1]))
-}
-
-/// Mean of shares in percent [95 % interval of the mean].
-pub fn percent_with_interval(e: &Estimate) -> String {
-    format!("{} [{}, {}]", percent(e.spread.mean), percent(e.interval[0]), percent(e.interval[1]))
+/// Mean (median) of shares in percent.
+pub fn percent_and_median(e: &Estimate) -> String {
+    format!("{} ({})", percent(e.spread.mean), percent(e.spread.median))
 }
 
 /// Count of all [95 % interval in percent, without decimals].
@@ -95,7 +130,7 @@ pub fn number(value: f64) -> String {
 
 /// A share in percent.
 pub fn percent(share: f64) -> String {
-    if share.is_nan() { "–".to_owned() } else { number_text(100.0 * share, 3) }
+    number(100.0 * share)
 }
 
 #[cfg(test)]
@@ -104,8 +139,12 @@ mod tests {
 
     #[test]
     fn both_forms_hold_every_cell_and_no_markup_of_the_data() {
-        let mut table = Table::new("A <title>", &["name", "mm"]).with_note("a note");
-        table.rows.push(vec!["a|b <i>".into(), number(1.5)]);
+        let table = Table::new(
+            "A <title>",
+            &["a|b <i>"],
+            &[("name", &|name| (*name).into()), ("mm", &|_| number(1.5))],
+        )
+        .with_note("a note");
         let (markdown, html) = (table.markdown(), table.html());
         assert!(markdown.contains("| a\\|b <i> | 1.5 |") && markdown.contains("|---|---:|"), "{markdown}");
         assert!(

@@ -1,0 +1,89 @@
+//! Table 5: the time of every phase per garment.
+
+use super::{Evaluator, Section, Table, number};
+use crate::inference::networks::{OnBody, drape_on};
+use crate::run::spread::Spread;
+use miette::{IntoDiagnostic, Report};
+use serde_json::json;
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+/// The phases, and the paper's times of them. Per garment, but for the preparation of the body, which is once per outfit.
+const PHASES: [(&str, &str); 6] = [
+    ("embedding, once", "27"),
+    ("single draping", "0.6"),
+    ("untangling", "0.4"),
+    ("corrections", "–"),
+    ("post-process", "200–300"),
+    ("body of the post-process, once", "–"),
+];
+
+/// Garments of an outfit that is timed.
+const LAYERS: usize = 3;
+
+/// Wall time of every phase of random outfits, all threads, one outfit at a time.
+pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
+    let Evaluator { model, post_process, settings, counts, .. } = evaluator;
+    let outfits = counts.timed;
+    let tensors = &model.tensors;
+    let mut times: [Vec<f64>; PHASES.len()] = Default::default();
+    let (mut vertices, mut garments) = (0, 0);
+    // The first outfit warms up: buffers, threads, files.
+    for index in 0..=outfits {
+        let scene = model.prepare(&model.sample_outfit([6, index], LAYERS))?;
+        let outfit = tensors.outfit(&scene)?;
+        let count = scene.garments.len();
+        let milliseconds = |time: Duration| 1e3 * time.as_secs_f64();
+        let per_garment = |time: Duration| milliseconds(time) / count as f64;
+        let clock = Instant::now();
+        let embeddings = tensors.embed(&model.model, &scene, &outfit, &tensors.embeddings())?;
+        // Reading a result waits for it on devices that compute behind the caller's back.
+        let _ = embeddings.garment.clone().into_data();
+        let embedding = clock.elapsed();
+        let embeddings = model.model.prepare_untangling(&outfit, embeddings);
+        let (body, start) = tensors.body(&scene.bodies[0]).into_diagnostic()?;
+        let on_body = OnBody { scene: &scene, outfit: &outfit, embeddings: &embeddings, body: &body, start };
+        let (draped, networks) = drape_on(&model.model, &on_body);
+        let resolved = post_process.of(&scene, &draped.posed).resolved(settings)?;
+        if index > 0 {
+            // The body's preparation is part of the garments' time only where a continuation path needs it again.
+            let post_process = resolved.garments.iter().map(|g| g.time).sum();
+            let phases =
+                [embedding, networks.draping, networks.untangling, networks.correcting, post_process];
+            let phases = phases.map(per_garment).into_iter().chain([milliseconds(resolved.body_time)]);
+            times.iter_mut().zip(phases).for_each(|(times, time)| times.push(time));
+            vertices += scene.garments.iter().map(|garment| garment.vertex_count()).sum::<usize>();
+            garments += count;
+            evaluator.scene_done();
+        }
+    }
+    let vertices = vertices as f64 / garments.max(1) as f64;
+    let threads = rayon::current_num_threads();
+    let spreads = times.map(Spread::of);
+    let mut table = Table::new(
+        format!("Time per garment [ms]: {outfits} outfits of {LAYERS} garments, {vertices:.0} vertices each in the mean"),
+        &["this model", "paper"],
+        &[("", &|name| (*name).to_owned())],
+    )
+    .with_note(format!(
+        "Median (95th percentile), {threads} threads. The paper's times are for 8,000 vertices on a GPU."
+    ));
+    for ((phase, paper), spread) in PHASES.into_iter().zip(&spreads) {
+        let ours = format!("{} ({})", number(spread.median), number(spread.p95));
+        table.add_column(phase, [ours, paper.to_owned()].into_iter());
+    }
+    let phases: BTreeMap<_, _> = PHASES.into_iter().map(|(phase, _)| phase).zip(spreads).collect();
+    Ok(vec![Section {
+        key: "times",
+        numbers: json!({
+            "outfits": outfits,
+            "layers": LAYERS,
+            "vertices": vertices,
+            "threads": threads,
+            "milliseconds": phases,
+        }),
+        title: "Time per phase (Table 5)",
+        tables: vec![table],
+        ..Section::default()
+    }])
+}

@@ -1,0 +1,250 @@
+//! Speed against error: time per drape against energy above the converged minimum and distance to it.
+
+use super::equilibrium_error::StateError;
+use super::page::Picture;
+use super::table::median_with_interval;
+use super::{Estimate, Evaluator, Metric, ModelUnderTest, Section, Table, drape_by, median_ms};
+use crate::dataset::PreparedScene;
+use crate::inference::networks::{DrapeError, Networks};
+use crate::inference::reference::{ReferenceScene, wide};
+use crate::inference::refine;
+use crate::picture::{Line, LinePanel, draw_lines, png_bytes};
+use crate::run::validation::Method;
+use crate::system::single_threaded::map_single_threaded;
+use clothcombo_physics::energy::Term;
+use clothcombo_physics::equilibrium::{Problem, SolverSettings, solve};
+use miette::{IntoDiagnostic, Report};
+use serde::Serialize;
+use serde_json::json;
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+/// Iterations of the solver from LBS + shape transfer.
+const SOLVER: [usize; 5] = [10, 30, 100, 300, 1000];
+/// Steps of the refinement of the networks' drape.
+const REFINEMENT: [usize; 3] = [10, 30, 100];
+/// Repetitions of a fast method last this long (s).
+const SECONDS: f64 = 0.05;
+
+/// One method on one scene.
+#[derive(Serialize)]
+struct MethodSample {
+    method: String,
+    /// Wall time of a drape (ms).
+    milliseconds: f64,
+    /// Percent are of the excess of LBS.
+    #[serde(flatten)]
+    error: StateError,
+    /// Strain (J).
+    strain: f64,
+}
+
+/// What is estimated of a method.
+const METRICS: [Metric<MethodSample>; 5] = [
+    ("milliseconds", |s| s.milliseconds),
+    ("excess", |s| s.error.excess),
+    ("excess_percent", |s| s.error.excess_percent),
+    ("distance_mm", |s| s.error.distance_mm),
+    ("strain", |s| s.strain),
+];
+
+/// One method over all scenes.
+#[derive(Serialize)]
+struct Point {
+    method: String,
+    #[serde(flatten)]
+    metrics: BTreeMap<&'static str, Estimate>,
+    /// Whether no other method is both faster and nearer to the minimum in energy, by medians.
+    on_front: bool,
+}
+
+/// A state of the garments, and how long it took.
+struct State {
+    method: String,
+    milliseconds: f64,
+    positions: Vec<[f64; 3]>,
+}
+
+/// Scenes of one garment draped by all methods. The networks are timed with all threads, one scene at a time; the solver and the
+/// refinement on one thread per scene.
+pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
+    let Evaluator { model, counts, .. } = *evaluator;
+    let draped = |index: usize| {
+        let scene = model.prepare(&model.sample_outfit([7, index], 1))?;
+        let states = fast_methods(evaluator, &scene)?;
+        Ok::<_, Report>((scene, states))
+    };
+    let draped = (0..counts.pareto).map(draped).collect::<Result<Vec<_>, _>>()?;
+    let solved = map_single_threaded(draped, None, |(scene, states)| {
+        let solved = solved(model, &scene, states);
+        evaluator.scene_done();
+        solved
+    })?;
+    let (samples, are_equilibria): (Vec<_>, Vec<bool>) = solved.into_iter().unzip();
+    let converged = are_equilibria.into_iter().filter(|is_equilibrium| *is_equilibrium).count();
+    let points = points(&samples);
+    let table = table(&points, counts.pareto).with_note(format!(
+        "Medians [95 % interval of the mean]. Excess and distance: to the lowest state that the solver found from LBS + shape \
+         transfer or from the network, {converged} of {} of them equilibria. Networks on {} threads, solver and refinement on one.",
+        counts.pareto,
+        rayon::current_num_threads()
+    ));
+    let chart = draw_lines("Speed against error", &panels(&points)).into_diagnostic()?;
+    Ok(vec![Section {
+        key: "pareto",
+        numbers: json!({
+            "scenes": counts.pareto, "converged": converged, "points": points, "samples": samples
+        }),
+        title: "Speed against error",
+        tables: vec![table],
+        pictures: vec![Picture {
+            file: "pareto.png".into(),
+            caption: "Medians; down and to the left is better.".into(),
+            png: png_bytes(&chart).into_diagnostic()?,
+        }],
+        ..Section::default()
+    }])
+}
+
+/// Skinning, networks, networks with post-process.
+fn fast_methods(evaluator: &Evaluator<'_>, scene: &PreparedScene) -> Result<Vec<State>, Report> {
+    let Evaluator { model, networks, post_process, settings, .. } = evaluator;
+    // The garment is embedded in the first, unmeasured drape, as for the next frame of a motion.
+    let timed = |name: String, method: Method, networks: &Networks<'_>| -> Result<State, DrapeError> {
+        let milliseconds = median_ms(SECONDS, || drape_by(networks, &[method], scene))?;
+        let positions = wide(&drape_by(networks, &[method], scene)?[0].posed);
+        Ok(State { method: name, milliseconds, positions })
+    };
+    let mut states = Vec::new();
+    for method in [Method::Lbs, Method::LbsWithShapeTransfer] {
+        states.push(timed(method.name().to_owned(), method, networks)?);
+    }
+    for corrections in 0..model.model.correction_steps {
+        let name = match corrections {
+            0 => "network, uncorrected".to_owned(),
+            1 => "network, 1 correction".to_owned(),
+            _ => format!("network, {corrections} corrections"),
+        };
+        states.push(timed(name, Method::Network, &networks.with_correction_steps(corrections))?);
+    }
+    let network = timed(Method::Network.name().to_owned(), Method::Network, networks)?;
+    let draped = networks.drape(scene)?;
+    // Once: it may take seconds.
+    let clock = Instant::now();
+    let resolved = post_process.of(scene, &draped.posed).resolved(settings)?.positions.concat();
+    let milliseconds = network.milliseconds + 1e3 * clock.elapsed().as_secs_f64();
+    states.push(network);
+    states.push(State { method: "network + post-process".into(), milliseconds, positions: resolved });
+    Ok(states)
+}
+
+/// Adds refinement and solver to the fast methods, and measures all of them against the lowest state found; also whether
+/// that state is an equilibrium.
+fn solved(
+    model: &ModelUnderTest,
+    scene: &PreparedScene,
+    mut states: Vec<State>,
+) -> Result<(Vec<MethodSample>, bool), Report> {
+    let reference = ReferenceScene::new(&model.config.losses, scene).into_diagnostic()?;
+    let problem = Problem::new(&reference.energy).into_diagnostic()?;
+    let of = |method: Method| {
+        let state = states.iter().find(|state| state.method == method.name()).expect("it is a fast method");
+        (state.positions.clone(), state.milliseconds)
+    };
+    let (lbs, _) = of(Method::Lbs);
+    let (_, start_milliseconds) = of(Method::LbsWithShapeTransfer);
+    let (network, network_milliseconds) = of(Method::Network);
+    for steps in REFINEMENT {
+        let clock = Instant::now();
+        let (positions, _) = refine(&reference.energy, &network, steps).into_diagnostic()?;
+        let milliseconds = network_milliseconds + 1e3 * clock.elapsed().as_secs_f64();
+        states.push(State { method: format!("network + {steps} steps"), milliseconds, positions });
+    }
+    let settings = SolverSettings::default();
+    let mut iterations = SOLVER.into_iter().peekable();
+    let mut add = |iterations: usize, milliseconds: f64, positions: &[[f64; 3]]| {
+        states.push(State {
+            method: format!("solver, {iterations} iterations"),
+            milliseconds: start_milliseconds + milliseconds,
+            positions: positions.to_vec(),
+        });
+    };
+    let from_start = solve(&problem, &reference.skinned_start, &settings, &mut |progress| {
+        if let Some(reached) = iterations.next_if(|&next| progress.step.iteration >= next) {
+            add(reached, progress.step.milliseconds, progress.positions);
+        }
+        ControlFlow::Continue(())
+    })
+    .into_diagnostic()?;
+    // A solver that is done early has nothing better to offer for more iterations.
+    iterations.for_each(|more| add(more, from_start.last().milliseconds, &from_start.positions));
+    let from_network =
+        solve(&problem, &network, &settings, &mut |_| ControlFlow::Continue(())).into_diagnostic()?;
+    let minimum = if from_network.energy() < from_start.energy() { &from_network } else { &from_start };
+    let excess_of_lbs = problem.value(&lbs) - minimum.energy();
+    let sample = |State { method, milliseconds, positions }: State| MethodSample {
+        method,
+        milliseconds,
+        error: StateError::new(problem.value(&positions), &positions, minimum, excess_of_lbs),
+        strain: reference.energy.raw(&positions, &positions).garments[0][Term::Strain].unwrap_or(0.0),
+    };
+    let is_equilibrium = minimum.relative_gradient <= settings.tolerance;
+    Ok((states.into_iter().map(sample).collect(), is_equilibrium))
+}
+
+fn points(samples: &[Vec<MethodSample>]) -> Vec<Point> {
+    let point = |method: usize| {
+        let scenes: Vec<&MethodSample> = samples.iter().map(|scene| &scene[method]).collect();
+        let metrics = Estimate::of_metrics(&scenes, &METRICS);
+        Point { method: scenes[0].method.clone(), metrics, on_front: false }
+    };
+    let mut points: Vec<Point> = (0..samples.first().map_or(0, Vec::len)).map(point).collect();
+    let of_point = |p: &Point| ["milliseconds", "excess"].map(|metric| p.metrics[metric].spread.median);
+    let medians: Vec<[f64; 2]> = points.iter().map(of_point).collect();
+    for (point, own) in points.iter_mut().zip(&medians) {
+        point.on_front = !medians.iter().any(|other| other[0] < own[0] && other[1] < own[1]);
+    }
+    points
+}
+
+fn table(points: &[Point], scenes: usize) -> Table {
+    let median = |point: &Point, metric: &str| median_with_interval(&point.metrics[metric]);
+    Table::new(
+        format!("Speed against error over {scenes} scenes of one garment"),
+        points,
+        &[
+            ("method", &|p| p.method.clone()),
+            ("time [ms]", &|p| median(p, "milliseconds")),
+            ("excess energy [J]", &|p| median(p, "excess")),
+            ("excess [% of LBS]", &|p| median(p, "excess_percent")),
+            ("distance [mm]", &|p| median(p, "distance_mm")),
+            ("strain [J]", &|p| median(p, "strain")),
+            ("on the front", &|p| if p.on_front { "yes" } else { "no" }.to_owned()),
+        ],
+    )
+}
+
+/// Excess energy and distance over time, both medians.
+fn panels(points: &[Point]) -> Vec<LinePanel> {
+    let families = [
+        ("LBS", "LBS"),
+        ("network", "network, post-process, refinement"),
+        ("solver", "solver from LBS + shape transfer"),
+    ];
+    let panel = |title: &str, metric: &str| {
+        let line = |(prefix, name): (&str, &str)| {
+            let family = points.iter().filter(|p| p.method.starts_with(prefix)).map(|p| &p.metrics);
+            let mut points: Vec<_> =
+                family.map(|m| (m["milliseconds"].spread.median, m[metric].spread.median)).collect();
+            // More steps may take no longer; a line that turns back is drawn with spikes.
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            Line { name: name.to_owned(), points }
+        };
+        LinePanel { title: title.to_owned(), lines: families.map(line).to_vec() }
+    };
+    vec![
+        panel("excess energy [%] over time [ms]", "excess_percent"),
+        panel("distance [mm] over time [ms]", "distance_mm"),
+    ]
+}
