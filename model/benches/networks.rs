@@ -9,7 +9,7 @@ use burn::module::Module;
 use burn::tensor::{Device, Distribution, Tensor};
 use clothcombo_model::ops::{Activation, activate_residual, sine_modulation};
 use clothcombo_model::{
-    BodyTensors, ClothCombo, Dimensions, GarmentArrays, GarmentTensors, ModelConfig, OutfitTensors,
+    BodyTensors, ClothCombo, Dimensions, GarmentArrays, GarmentTensors, Mode, ModelConfig, OutfitTensors,
 };
 use criterion::{BenchmarkId, Criterion};
 
@@ -82,39 +82,23 @@ fn networks(criterion: &mut Criterion, vertices: usize, config: &ModelConfig) {
         let outfit = OutfitTensors::new(&garments, &OutfitTensors::all_pairs(count)).expect("valid outfit");
         let start = || outfit.rest.clone();
         let embedded: Vec<_> = (0..count).map(|_| plain.encode(&one)).collect();
-        let packed = plain.pack(&outfit, &embedded).expect("matching");
-        let packed = plain.prepare_untangling(&outfit, packed);
-        let single = plain.drape_single(&outfit, &packed, &body, start());
-        group.bench_function(BenchmarkId::new("drape_single forward (packed)", count), |bencher| {
-            bencher
-                .iter(|| black_box(plain.drape_single(&outfit, &packed, &body, start()).posed.into_data()));
-        });
-        group.bench_function(BenchmarkId::new("pack+drape_single forward+backward", count), |bencher| {
-            bencher.iter(|| {
-                let packed = model.pack(&outfit, &embedded).expect("matching");
-                black_box(model.drape_single(&outfit, &packed, &body, start()).posed.sum().backward())
-            });
-        });
-        if count > 1 {
-            group.bench_function(BenchmarkId::new("untangle forward (packed)", count), |bencher| {
-                bencher
-                    .iter(|| black_box(plain.untangle(&outfit, &packed, &single, &body).posed.into_data()));
-            });
-            group.bench_function(BenchmarkId::new("untangle forward+backward (frozen)", count), |bencher| {
+        let packed = plain.pack(&outfit, &embedded, Mode::Layered).expect("matching");
+        for mode in [Mode::Single, Mode::Layered] {
+            group.bench_function(BenchmarkId::new(format!("{mode:?} forward (packed)"), count), |bencher| {
                 bencher.iter(|| {
-                    let packed = model.prepare_untangling(&outfit, packed.clone());
-                    black_box(model.untangle(&outfit, &packed, &single, &body).posed.sum().backward())
+                    let states = plain.forward(&outfit, &packed, &body, start(), mode);
+                    black_box(states.last().posed.clone().into_data())
+                });
+            });
+            group.bench_function(BenchmarkId::new(format!("{mode:?} forward+backward"), count), |bencher| {
+                bencher.iter(|| {
+                    let embedded: Vec<_> = (0..count).map(|_| model.encode(&one)).collect();
+                    let packed = model.pack(&outfit, &embedded, mode).expect("matching");
+                    let states = model.forward(&outfit, &packed, &body, start(), mode);
+                    black_box(states.last().posed.clone().sum().backward())
                 });
             });
         }
-        group.bench_function(BenchmarkId::new("end to end forward+backward", count), |bencher| {
-            bencher.iter(|| {
-                let embedded: Vec<_> = (0..count).map(|_| model.encode(&one)).collect();
-                let packed = model.pack(&outfit, &embedded).expect("matching");
-                let single = model.drape_single(&outfit, &packed, &body, start());
-                black_box(model.untangle(&outfit, &packed, &single, &body).posed.sum().backward())
-            });
-        });
     }
     group.finish();
 }

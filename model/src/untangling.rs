@@ -54,7 +54,7 @@ impl Untangling {
         self.graph == Graph::Full || outfit.has_contacts()
     }
 
-    /// Displacements Δx_m `[ΣV,3]` in metres; `None` if [no garment is displaced](Self::acts_on).
+    /// Displacements Δx_m `[ΣV,3]` (m).
     ///
     /// [`Graph::Near`] connects the contacts of `outfit`: exactly zero on garments without one. [`Graph::Full`] connects all
     /// garments, whatever the contacts.
@@ -65,11 +65,8 @@ impl Untangling {
         outfit: &OutfitTensors,
         canonical: Tensor<2>,
         draping: Tensor<2>,
-        vertex_product: impl FnOnce() -> Tensor<2>,
-    ) -> Option<Tensor<2>> {
-        if !self.acts_on(outfit) {
-            return None;
-        }
+        vertex_product: Tensor<2>,
+    ) -> Tensor<2> {
         let all_pairs;
         let edges = match self.graph {
             Graph::Near => outfit.edges.as_ref(),
@@ -80,12 +77,12 @@ impl Untangling {
         };
         let [from_below, from_above] = self.net_forces(edges, &draping);
         let latent = Tensor::cat(vec![from_below, from_above, draping], 1);
-        let values = self.displacement.forward(canonical, vertex_product(), latent, &outfit.segments);
+        let values = self.displacement.forward(canonical, vertex_product, latent, &outfit.segments);
         let displacement = values * self.scale;
-        Some(match edges.and_then(|edges| edges.touched.as_ref()) {
+        match edges.and_then(|edges| edges.touched.as_ref()) {
             Some(touched) => displacement * touched.clone(),
             None => displacement,
-        })
+        }
     }
 
     /// Both halves `[M,width]` of the net forces f^i: from the layers below and above. Zero without edges.

@@ -1,5 +1,5 @@
 //! Exact intersections of garments and bodies against brute force over all pairs of triangles, decided twice: by the
-//! dataset's own exact test and by separating axes in 128-bit integers, which share no formula with it.
+//! library's own exact test and by separating axes in 128-bit integers, which share no formula with it.
 //!
 //! Positions are put on a grid of 2⁻²⁰ m (about a micrometre), where integers hold them exactly.
 

@@ -29,7 +29,7 @@ impl Observer for StopAfter {
     }
 }
 
-/// Cannot write what it is told at step `.0`.
+/// Cannot write at step `.0`.
 struct FailsAt(u64);
 
 impl Observer for FailsAt {

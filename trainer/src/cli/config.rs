@@ -110,7 +110,7 @@ fn print_plan(config: &Config) {
     for term in Term::ALL {
         println!("  {:<16} {}", term.name(), config.losses.weight(term));
     }
-    println!("  {:<16} {}", "garments alone", config.losses.alone);
+    println!("  {:<16} {}", "single garments", config.losses.single_garments);
     let o = &config.optimizer;
     println!(
         "\nAdam {} {} · gradient norm {} · average of the weights {}",

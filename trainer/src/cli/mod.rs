@@ -1,4 +1,4 @@
-//! The command lines of the two programs.
+//! The command lines. In: arguments. Out: the exit code of one of the two programs; one file or folder per verb.
 
 pub mod bench;
 pub mod check;

@@ -108,33 +108,33 @@ fn run_of(path: &Path) -> Option<PathBuf> {
 
 /// The whole program, as one of the processes that a launcher may have started.
 pub fn main() -> ExitCode {
-    let world = match ProcessGroup::join() {
-        Ok(world) => Rc::new(world),
+    let group = match ProcessGroup::join() {
+        Ok(group) => Rc::new(group),
         Err(error) => return exit_code(Err(error.into())),
     };
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(message) => {
-            if world.is_rank_zero() {
+            if group.is_rank_zero() {
                 // A closed terminal is no reason to fail differently.
                 let _ = message.print();
             }
             return ExitCode::from(u8::try_from(message.exit_code()).unwrap_or(2));
         }
     };
-    arguments.verbosity.or_quiet(!world.is_rank_zero()).apply("warn");
-    match world.conclude(run(&arguments, &world)) {
+    arguments.verbosity.or_quiet(!group.is_rank_zero()).apply("warn");
+    match group.conclude(run(&arguments, &group)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(Some(report)) => exit_code(Err(report)),
         Err(None) => ExitCode::FAILURE,
     }
 }
 
-/// Trains as one of the processes in `world`, of which only the leader writes and prints.
+/// Trains as one of the processes in `group`, of which only the leader writes and prints.
 ///
 /// # Errors
 /// One report that names the file, key or garment at fault and how to mend it.
-fn run(arguments: &Arguments, world: &Rc<ProcessGroup>) -> Result<(), Report> {
+fn run(arguments: &Arguments, group: &Rc<ProcessGroup>) -> Result<(), Report> {
     let stop = StopFlag::on_signals().into_diagnostic().wrap_err("cannot listen for Ctrl-C")?;
     let named = arguments.named_run()?;
     let file = arguments.config_file(named.as_deref())?;
@@ -143,16 +143,16 @@ fn run(arguments: &Arguments, world: &Rc<ProcessGroup>) -> Result<(), Report> {
     let config = load(&file, &arguments.overrides)?;
     let existing = match &arguments.resume {
         Some(path) => {
-            let run = match world.is_rank_zero() {
+            let run = match group.is_rank_zero() {
                 true => RunDir::resume(&root, &config, &arguments.allow_config_change)?,
                 false => RunDir::follow(&root),
             };
             Some((run, newest_or_none(path.as_deref().unwrap_or(&root))?))
         }
-        None if world.is_rank_zero() => RunDir::refuse_occupied(&root).map(|()| None)?,
+        None if group.is_rank_zero() => RunDir::refuse_occupied(&root).map(|()| None)?,
         None => None,
     };
-    let dataset = Arc::new(load_library(&config)?);
+    let dataset = Arc::new(load_dataset(&config)?);
     let device = arguments.device.device();
     let (run, session) = match existing {
         Some((run, checkpoint)) => {
@@ -160,15 +160,15 @@ fn run(arguments: &Arguments, world: &Rc<ProcessGroup>) -> Result<(), Report> {
                 Some(c) => Session::resume(run.clone(), config.clone(), dataset.clone(), &device, c)?,
                 None => Session::new(run.clone(), config.clone(), dataset.clone(), &device)?,
             };
-            // Everybody has read the checkpoint before the leader moves others aside.
-            world.meet(false)?;
-            if world.is_rank_zero() {
+            // Every process has read the checkpoint before rank zero moves others aside.
+            group.barrier(false)?;
+            if group.is_rank_zero() {
                 continue_run(&run, &config, checkpoint.as_ref())?;
             }
             (run, session)
         }
         None => {
-            let run = match world.is_rank_zero() {
+            let run = match group.is_rank_zero() {
                 true => RunDir::create(&root, &config)?,
                 false => RunDir::follow(&root),
             };
@@ -176,16 +176,16 @@ fn run(arguments: &Arguments, world: &Rc<ProcessGroup>) -> Result<(), Report> {
             (run, session)
         }
     };
-    let mut session = session.shared_in(world.clone())?;
-    if !world.is_rank_zero() {
+    let mut session = session.shared_in(group.clone())?;
+    if !group.is_rank_zero() {
         return train(&mut session, &mut [], &stop);
     }
     run.write_split(&dataset.split_names())?;
     let memory = session.memory_estimate();
     if !is_quiet() {
         say(&format!("run folder {}", run.root().display()));
-        if world.is_shared() {
-            say(&format!("{} processes share every step", world.share().size));
+        if group.is_shared() {
+            say(&format!("{} processes share every step", group.partition().size));
         }
         if let Some(m) = memory {
             say(&memory_line(&m));
@@ -273,7 +273,7 @@ pub(crate) fn load_under_bar(config: &Config) -> Result<Dataset, Report> {
 /// The bar shown while garments are prepared.
 pub(crate) const PREPARING: &str = "preparing garments {bar:30} {pos}/{len} {msg}";
 
-fn load_library(config: &Config) -> Result<Dataset, Report> {
+fn load_dataset(config: &Config) -> Result<Dataset, Report> {
     let dataset = load_under_bar(config)?;
     if !is_quiet() {
         say(&format!(

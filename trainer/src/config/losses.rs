@@ -191,11 +191,11 @@ pub struct LossesConfig {
     /// Collision and layer-collision weights are multiplied by this over the garment's vertex count: the sums run over
     /// vertices and the paper's weights belong to about 8,000 of them. 0 switches it off.
     pub reference_vertices: f64,
-    /// Weight, beside the loss of the outfit, of the losses that every garment of it has when it is draped alone, before
+    /// Weight, beside the loss of the outfit, of the losses that every garment of it has when it is draped as a single garment, before
     /// untangling. Counts where all networks are trained at once: what is gained for outfits need not be lost for
-    /// garments worn alone. A scene in which nothing can touch has the same losses twice, 1 + `alone` times in all. 0, the
+    /// single garments. A scene in which nothing can touch has the same losses twice, 1 + `single_garments` times in all. 0, the
     /// default, is the paper's.
-    pub alone: Ramp,
+    pub single_garments: Ramp,
     /// StVK strain.
     pub strain: StrainLoss,
     /// Bending.
@@ -221,7 +221,7 @@ impl Default for LossesConfig {
         let plain = |w: f64| PlainLoss { weight: w.into() };
         Self {
             reference_vertices: 8000.0,
-            alone: 0.0.into(),
+            single_garments: 0.0.into(),
             strain: StrainLoss::default(),
             bending: plain(5.0),
             gravity: plain(1.0),
@@ -253,7 +253,7 @@ impl LossesConfig {
     /// What is wrong, as (key, what, hint).
     pub(super) fn problem(&self) -> Option<(String, String, String)> {
         let weights = Term::ALL.into_iter().map(|t| (format!("losses.{}.weight", t.name()), self.weight(t)));
-        let mut weights = weights.chain([("losses.alone".to_owned(), &self.alone)]);
+        let mut weights = weights.chain([("losses.single_garments".to_owned(), &self.single_garments)]);
         let is_weight = |w: f64| w >= 0.0 && w.is_finite();
         if let Some((key, _)) = weights.find(|(_, w)| !(is_weight(w.from) && is_weight(w.to))) {
             return Some((key, "must be a number from 0 on".into(), "0 switches it off".into()));

@@ -10,7 +10,7 @@ use thiserror::Error;
 /// Why the data of a run cannot be used.
 #[derive(Debug, Error, Diagnostic)]
 pub enum DatasetError {
-    /// A file is missing or wrong; the message names it and says how to mend it.
+    /// A file is missing or wrong; the message names it and says how to fix it.
     #[error("{0}")]
     Data(String),
     /// A garment cannot be prepared.
@@ -127,7 +127,7 @@ pub enum DatasetError {
     /// Clips are weighted by their length in time, and some of these have none.
     #[error("{}: at frame rates from {lowest:?} to {highest:?} a second the clips' lengths in time cannot be compared", folder.display())]
     #[diagnostic(help(
-        "`clothcombo check` tells the frame rate of every motion; mend mocap_framerate, for example to 30"
+        "`clothcombo check` tells the frame rate of every motion; set mocap_framerate, for example to 30"
     ))]
     FrameRates {
         /// The motion folder.
@@ -160,7 +160,7 @@ pub enum DatasetError {
 }
 
 impl DatasetError {
-    /// Wraps an error of the data crate, whose message already names file and mend; causes are appended.
+    /// Wraps an error of the data crate, whose message already names file and remedy; causes are appended.
     pub(crate) fn data(error: impl StdError) -> Self {
         let mut text = error.to_string();
         let mut source = error.source();

@@ -13,7 +13,7 @@ pub struct PreparedGarment {
     pub garment: Garment,
     /// Constants of its energies.
     pub energies: Arc<GarmentEnergies<f32>>,
-    /// Neighbourhoods that it feels other garments over.
+    /// Neighbourhoods over which its contact features are gathered.
     pub rings: Rings,
     /// Initial skin weights of the active joints, `[V, J]`.
     pub skin_weights: Vec<f32>,

@@ -2,7 +2,8 @@
 
 use crate::config::LossesConfig;
 use crate::dataset::{Dataset, PreparedScene, prepare};
-use crate::inference::networks::{DrapeError, Networks};
+use crate::inference::networks::Networks;
+use crate::inference::tensor_store::DrapeError;
 use clothcombo_data::asset::{Garment, unwearable};
 use clothcombo_physics::contact::resolve::{
     Certificate, Layer, ResolveError, ResolveSettings, Resolved, RestGarment, Waypoint, certify,

@@ -1,8 +1,11 @@
 //! Table 5: the time of every phase per garment.
 
 use super::{Evaluator, Section, Table, number};
+use crate::inference::Draped;
+use crate::inference::contact_features::LayerInteraction;
 use crate::inference::networks::{OnBody, drape_on};
 use crate::run::spread::Spread;
+use clothcombo_model::Mode;
 use miette::{IntoDiagnostic, Report};
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -36,20 +39,25 @@ pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
         let milliseconds = |time: Duration| 1e3 * time.as_secs_f64();
         let per_garment = |time: Duration| milliseconds(time) / count as f64;
         let clock = Instant::now();
-        let embeddings = tensors.embed(&model.model, &scene, &outfit, &tensors.embeddings())?;
+        let embeddings =
+            tensors.embed(&model.model, &scene, &outfit, &tensors.embeddings(), Mode::Layered)?;
         // Reading a result waits for it on devices that compute behind the caller's back.
         let _ = embeddings.garment.clone().into_data();
         let embedding = clock.elapsed();
-        let embeddings = model.model.prepare_untangling(&outfit, embeddings);
         let (body, start) = tensors.body(&scene.bodies[0]).into_diagnostic()?;
+        // Single draping by itself: what the forward pass takes longer is untangling.
+        let clock = Instant::now();
+        let single = model.model.forward(&outfit, &embeddings, &body, start.clone(), Mode::Single);
+        let _ = Draped::of(single.last());
+        let single = clock.elapsed();
         let on_body = OnBody { scene: &scene, outfit: &outfit, embeddings: &embeddings, body: &body, start };
-        let (draped, networks) = drape_on(&model.model, &on_body);
+        let (draped, networks) = drape_on(&model.model, &on_body, LayerInteraction::Together);
         let resolved = post_process.of(&scene, &draped.posed).resolved(settings)?;
         if index > 0 {
             // The body's preparation is part of the garments' time only where a continuation path needs it again.
             let post_process = resolved.garments.iter().map(|g| g.time).sum();
-            let phases =
-                [embedding, networks.draping, networks.untangling, networks.correcting, post_process];
+            let untangling = networks.forward.saturating_sub(single);
+            let phases = [embedding, single, untangling, networks.corrections, post_process];
             let phases = phases.map(per_garment).into_iter().chain([milliseconds(resolved.body_time)]);
             times.iter_mut().zip(phases).for_each(|(times, time)| times.push(time));
             vertices += scene.garments.iter().map(|garment| garment.vertex_count()).sum::<usize>();

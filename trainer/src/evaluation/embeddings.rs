@@ -4,9 +4,11 @@ use super::table::mean_and_median;
 use super::{Estimate, Evaluator, GarmentSet, MethodResult, PAPER_COLLISION, Scenes, Section, Table};
 use crate::dataset::{HeldOut, PreparedScene};
 use crate::inference::Draped;
-use crate::inference::networks::{DrapeError, OnBody, drape_on};
+use crate::inference::contact_features::LayerInteraction;
+use crate::inference::networks::{OnBody, drape_on};
+use crate::inference::tensor_store::DrapeError;
 use burn::tensor::{Int, Tensor};
-use clothcombo_model::{ClothCombo, GarmentEmbedding};
+use clothcombo_model::{ClothCombo, GarmentEmbedding, Mode};
 use clothcombo_physics::energy::Term;
 use miette::Report;
 use serde_json::{Value, json};
@@ -70,10 +72,10 @@ fn evaluate(evaluator: &Evaluator<'_>, scenes: &Scenes) -> Result<(Value, Table)
         let different = resampled(embed(other(garment))?, correct.vertex.dims()[0]);
         let kinds = [correct, different, zero];
         let drape = |(model, embedding): (&ClothCombo, &GarmentEmbedding)| -> Result<Draped, DrapeError> {
-            let embeddings = model.pack(&outfit, std::slice::from_ref(embedding))?;
+            let embeddings = model.pack(&outfit, std::slice::from_ref(embedding), Mode::Layered)?;
             let (outfit, body) = (&outfit, &body);
             let on_body = OnBody { scene, outfit, embeddings: &embeddings, body, start: start.clone() };
-            Ok(drape_on(model, &on_body).0)
+            Ok(drape_on(model, &on_body, LayerInteraction::Together).0)
         };
         models.iter().flat_map(|model| kinds.iter().map(move |kind| (model, kind))).map(drape).collect()
     };

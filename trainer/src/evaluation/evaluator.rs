@@ -6,7 +6,8 @@ use super::model_under_test::ModelUnderTest;
 use super::scene_evaluation::evaluate;
 use crate::dataset::{PreparedScene, SceneSample};
 use crate::inference::Draped;
-use crate::inference::networks::{DrapeError, Networks};
+use crate::inference::networks::Networks;
+use crate::inference::tensor_store::DrapeError;
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use serde::Serialize;
 

@@ -5,7 +5,8 @@ use crate::config::Config;
 use crate::dataset::{
     Dataset, DatasetError, HeldOut, PreparedScene, SceneSample, prepare, sample_evaluation,
 };
-use crate::inference::networks::{Networks, TensorStore};
+use crate::inference::networks::Networks;
+use crate::inference::tensor_store::TensorStore;
 use crate::run::checkpoint::TrainedModel;
 use burn::tensor::Device;
 use clothcombo_model::ClothCombo;

@@ -2,7 +2,8 @@
 
 use crate::dataset::{DatasetError, GARMENTS_AT_ONCE, PreparedScene, SceneSample};
 use crate::inference::Draped;
-use crate::inference::networks::{DrapeError, Networks};
+use crate::inference::networks::Networks;
+use crate::inference::tensor_store::DrapeError;
 use crate::run::validation::Method;
 use rayon::prelude::*;
 
@@ -39,7 +40,7 @@ pub fn drape_by(
     let drape = |method: &Method| match method {
         Method::Lbs => networks.skin_rest(scene),
         Method::LbsWithShapeTransfer => networks.skin(scene),
-        Method::SingleGarments => networks.drape_alone(scene),
+        Method::SingleGarments => networks.drape_single_garments(scene),
         Method::Network => networks.drape(scene),
     };
     methods.iter().map(drape).collect()

@@ -4,7 +4,7 @@ use super::certificates::OutfitResult;
 use super::{Evaluator, Section, Table, drape_by, hard_poses, number, percent};
 use crate::dataset::{BodySample, PreparedScene, SceneSample};
 use crate::inference::Draped;
-use crate::inference::networks::DrapeError;
+use crate::inference::tensor_store::DrapeError;
 use crate::run::spread::Spread;
 use crate::run::validation::Method;
 use crate::system::single_threaded::map_single_threaded;

@@ -7,7 +7,8 @@ use crate::dataset::{
     Dataset, DatasetError, PreparedScene, SceneSample, ValidationGroup, prepare, sample_validation,
 };
 use crate::inference::Draped;
-use crate::inference::networks::{DrapeError, Networks};
+use crate::inference::networks::Networks;
+use crate::inference::tensor_store::DrapeError;
 use crate::run::validation::{GroupReport, Method, ValidationReport};
 
 /// All validation scenes, as samples: they are prepared when they are scored, so that a large dataset need not be in memory.

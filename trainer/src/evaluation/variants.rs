@@ -6,7 +6,7 @@ use super::{
     drape_by, number, percent,
 };
 use crate::dataset::HeldOut;
-use crate::inference::networks::DrapeError;
+use crate::inference::tensor_store::DrapeError;
 use crate::run::validation::Method;
 use clothcombo_physics::energy::Term;
 use miette::Report;

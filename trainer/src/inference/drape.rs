@@ -6,7 +6,7 @@ use clothcombo_physics::contact::resolve::{Certificate, Reached, certify};
 use clothcombo_physics::transform::Transform;
 use std::sync::Arc;
 
-/// One garment on one body, vertices as in its [`Piece`](super::Piece).
+/// One garment on one body, vertices as in its [`OutfitGarment`](super::OutfitGarment).
 #[derive(Clone, Debug)]
 pub struct GarmentDrape {
     /// Linear blend skinning of the start state, which has learned nothing `[V, 3]` [m].

@@ -2,7 +2,9 @@
 
 use super::{BodyState, Draper, DraperError, Outfit, PhaseTimes, elapsed};
 use crate::dataset::{BodySample, PreparedScene, SceneBuilder, SceneSample};
-use crate::inference::networks::{OnBody, body_tensors, drape_on};
+use crate::inference::contact_features::LayerInteraction;
+use crate::inference::networks::{OnBody, drape_on};
+use crate::inference::tensor_store::body_tensors;
 use clothcombo_data::asset::rotation::{Matrix3, apply, matrix_from_axis_angle};
 use clothcombo_data::asset::{Pose, PosedBody};
 use clothcombo_model::ClothCombo;
@@ -61,7 +63,7 @@ impl Draper {
 
         let (outfit_tensors, embeddings) = (&outfit.tensors, &outfit.embeddings);
         let on_body = OnBody { scene: &scene, outfit: outfit_tensors, embeddings, body: &tensors, start };
-        let (draped, times) = drape_on(model, &on_body);
+        let (draped, times) = drape_on(model, &on_body, LayerInteraction::Together);
 
         // The body may be turned about the vertical: what the networks made turns with it, to where everything else happens.
         let turn = matrix_from_axis_angle([0.0, yaw, 0.0]);
@@ -75,9 +77,8 @@ impl Draper {
         let ms = |time: Duration| 1e3 * time.as_secs_f64();
         let milliseconds = PhaseTimes {
             posing,
-            draping: ms(times.draping),
-            untangling: ms(times.untangling),
-            correcting: ms(times.correcting),
+            networks: ms(times.forward),
+            corrections: ms(times.corrections),
             ..PhaseTimes::default()
         };
         Ok(Networked { scene, surface, heading, transforms, skinned, network, milliseconds })
@@ -114,7 +115,7 @@ impl Draper {
             graph: self.trained.config.model.graph,
         };
         let sample = SceneSample {
-            garments: (0..outfit.pieces.len()).collect(),
+            garments: (0..outfit.garments.len()).collect(),
             bodies: vec![body],
             repulsion_sample: 0,
         };

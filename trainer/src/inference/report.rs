@@ -142,9 +142,9 @@ impl Report {
         let first = &drapes[0];
         let mut milliseconds = PhaseTimes::default();
         drapes.iter().for_each(|drape| milliseconds += drape.milliseconds);
-        for piece in &outfit.pieces {
-            milliseconds.preparation += piece.milliseconds.preparation;
-            milliseconds.embedding += piece.milliseconds.embedding;
+        for garment in &outfit.garments {
+            milliseconds.preparation += garment.milliseconds.preparation;
+            milliseconds.embedding += garment.milliseconds.embedding;
         }
         let (certificate_before, (before, after)) = rayon::join(
             || first.certificate_before(draper, outfit),
@@ -200,12 +200,12 @@ impl Drape {
         let refused = |e: &dyn std::fmt::Display| DatasetError::Data(e.to_string());
         let body = TriMesh::new(self.body.clone(), draper.body().faces.to_vec()).map_err(|e| refused(&e))?;
         let garments: Vec<DrapedGarment> = outfit
-            .pieces
+            .garments
             .iter()
             .zip(&self.garments)
-            .map(|(piece, drape)| DrapedGarment {
-                name: &piece.name,
-                rest: &piece.prepared.garment.rest,
+            .map(|(garment, drape)| DrapedGarment {
+                name: &garment.name,
+                rest: &garment.prepared.garment.rest,
                 positions: match stage {
                     Stage::BeforeResolve => &drape.before,
                     Stage::Result => &drape.positions,
@@ -218,13 +218,13 @@ impl Drape {
 }
 
 fn garment_reports(outfit: &Outfit, drapes: &[Drape]) -> Vec<GarmentReport> {
-    let all: usize = outfit.pieces.iter().map(|p| p.prepared.vertex_count()).sum();
-    let report = |(index, piece): (usize, &super::Piece)| {
-        let vertices = piece.prepared.vertex_count();
+    let all: usize = outfit.garments.iter().map(|p| p.prepared.vertex_count()).sum();
+    let report = |(index, garment): (usize, &super::OutfitGarment)| {
+        let vertices = garment.prepared.vertex_count();
         let share = vertices as f64 / all.max(1) as f64;
         let mut times = PhaseTimes {
-            preparation: piece.milliseconds.preparation,
-            embedding: piece.milliseconds.embedding,
+            preparation: garment.milliseconds.preparation,
+            embedding: garment.milliseconds.embedding,
             ..PhaseTimes::default()
         };
         for drape in drapes {
@@ -232,9 +232,8 @@ fn garment_reports(outfit: &Outfit, drapes: &[Drape]) -> Vec<GarmentReport> {
             let own: f64 = drape.garments.iter().map(|g| g.resolve_ms).sum();
             times += PhaseTimes {
                 posing: share * shared.posing,
-                draping: share * shared.draping,
-                untangling: share * shared.untangling,
-                correcting: share * shared.correcting,
+                networks: share * shared.networks,
+                corrections: share * shared.corrections,
                 refine: share * shared.refine,
                 resolve: drape.garments[index].resolve_ms + share * (shared.resolve - own),
                 certificate: share * shared.certificate,
@@ -242,18 +241,18 @@ fn garment_reports(outfit: &Outfit, drapes: &[Drape]) -> Vec<GarmentReport> {
             };
         }
         GarmentReport {
-            name: piece.name.clone(),
-            given: piece.source.path.clone(),
-            given_vertices: piece.source.given.positions.len(),
+            name: garment.name.clone(),
+            given: garment.source.path.clone(),
+            given_vertices: garment.source.given.positions.len(),
             vertices,
-            triangles: piece.prepared.garment.rest.face_count(),
-            category: piece.prepared.garment.category,
-            fit: piece.source.fit.clone(),
-            embedding_known: piece.embedding_known,
+            triangles: garment.prepared.garment.rest.face_count(),
+            category: garment.prepared.garment.category,
+            fit: garment.source.fit.clone(),
+            embedding_known: garment.embedding_known,
             milliseconds: times,
         }
     };
-    outfit.pieces.iter().enumerate().map(report).collect()
+    outfit.garments.iter().enumerate().map(report).collect()
 }
 
 /// One certificate for all frames.

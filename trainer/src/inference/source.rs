@@ -166,11 +166,11 @@ impl GarmentCatalog {
             name: name.to_owned(),
             known: self.names.clone(),
         })?;
-        let maker = GarmentLoader::new(body, std::slice::from_ref(origin))?;
+        let loader = GarmentLoader::new(body, std::slice::from_ref(origin))?;
         let GarmentSource::File(listed) = origin else {
-            return Ok(SourceGarment::new(maker.make(origin)?));
+            return Ok(SourceGarment::new(loader.load(origin)?));
         };
-        let made = maker.make(origin);
+        let made = loader.load(origin);
         let must_fit = always_fit.unwrap_or_else(|| {
             !made.as_ref().is_ok_and(|garment| is_clean(&garment.rest) && is_on_body(&garment.rest, body))
         });

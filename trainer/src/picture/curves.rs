@@ -64,7 +64,7 @@ pub struct StageBoundary {
 /// the latest median beside the name. No series gives a picture that says so.
 ///
 /// # Errors
-/// [`PictureError::Plot`] if the plotting dataset refuses a panel.
+/// [`PictureError::Plot`] if the plotting library refuses a panel.
 pub fn draw_curves(
     title: &str,
     series: &[Series],

@@ -50,7 +50,7 @@ pub struct LinePanel {
 /// Draws the panels two to a row under a title.
 ///
 /// # Errors
-/// [`PictureError::Plot`] if the plotting dataset refuses a panel.
+/// [`PictureError::Plot`] if the plotting library refuses a panel.
 pub fn draw_lines(title: &str, panels: &[LinePanel]) -> Result<RgbImage, PictureError> {
     let columns = panels.len().clamp(1, 2) as u32;
     let rows = (panels.len() as u32).div_ceil(columns).max(1);

@@ -1,4 +1,5 @@
-//! Pictures of a run, made without a GPU: shaded renders of body and garments, labelled sheets of them, loss curves.
+//! Pictures. In: positions, faces and numbers. Out: shaded renders of bodies and garments, labelled sheets of them, charts; all made
+//! without a GPU.
 //!
 //! Nothing here knows a network or a dataset: positions and faces come in as plain slices, pictures go out as
 //! [`image::RgbImage`], and [`save_png`] writes them whole or not at all. Input that cannot be drawn (a vertex that
@@ -63,12 +64,12 @@ pub enum PictureError {
         /// What the encoder said.
         source: image::ImageError,
     },
-    /// The plotting dataset refused a panel.
+    /// The plotting library refused a panel.
     #[error("cannot draw the curve of `{series}`: {reason}")]
     Plot {
         /// Name of the series.
         series: String,
-        /// What the dataset said.
+        /// What the library said.
         reason: String,
     },
 }

@@ -1,5 +1,5 @@
-//! The score of anyone's draped garments, as JSON contract and dataset: every energy in the paper's printed form
-//! ([`EnergySettings::printed`]), penetration of the body, exact triangle intersections, order of the layers.
+//! Scores of anyone's draped garments. In: meshes of a body and of garments at rest and draped. Out: every energy in the paper's
+//! printed form ([`EnergySettings::printed`]), penetration of the body, exact triangle intersections, order of the layers.
 //!
 //! Nothing is measured here: energies come from [`SceneEnergy::raw`], intersections from [`IntersectionReport`]. This file
 //! fixes the definitions and the form of the answer.
@@ -74,7 +74,7 @@ pub struct ScoreSettings {
     pub distance: ScoreDistance,
 }
 
-/// What the body does on its own: no garment can mend it, so it is counted against none.
+/// What the body does on its own: no garment can change it, so it is counted against none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct BodyScore {
     /// Pairs of its triangles that intersect.

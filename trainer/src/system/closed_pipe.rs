@@ -2,7 +2,7 @@
 
 use std::io::Write;
 
-/// A line on stderr, where it can be written: what is made does not depend on what can be told of it.
+/// A line on stderr, where it can be written: what is made does not depend on what can be printed.
 pub fn tell(line: impl std::fmt::Display) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }

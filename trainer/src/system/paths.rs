@@ -1,4 +1,4 @@
-//! Paths: where they lead, what is in their way, and how they are told.
+//! Paths: where they lead, what obstructs them, and how they are printed.
 
 use serde::Serializer;
 use std::path::{Component, Path, PathBuf};
@@ -23,7 +23,7 @@ pub fn destination(path: &Path) -> io::Result<PathBuf> {
     Ok(found)
 }
 
-/// What is in the way of `folder`: something that is no folder, in its place or in that of one it lies in.
+/// What obstructs `folder`: something that is no folder, in its place or in that of one it lies in.
 pub fn obstacle(folder: &Path) -> Option<&Path> {
     folder.ancestors().find(|path| path.exists()).filter(|path| !path.is_dir())
 }

@@ -1,4 +1,4 @@
-//! Work on many items, a core for each: times of items that are measured beside each other.
+//! Work on many items, a core for each: times of items that are measured in parallel.
 
 use miette::{IntoDiagnostic, Report};
 use rayon::ThreadPoolBuilder;

@@ -10,8 +10,9 @@ use crate::evaluation::equilibrium_error::{
     Drapes, MethodError, START, SceneError, TermEnergies, converged, scene_error,
 };
 use crate::inference::DraperError;
-use crate::inference::networks::{Networks, TensorStore};
+use crate::inference::networks::Networks;
 use crate::inference::reference::ReferenceScene;
+use crate::inference::tensor_store::TensorStore;
 use crate::run::checkpoint::TrainedModel;
 use crate::run::spread::Spread;
 use crate::system::device::Backend;
@@ -169,7 +170,7 @@ fn drape(
             1 => None,
             _ => Some(dressing.of(scene, &drape.posed).resolved(&post_process)?.positions.concat()),
         };
-        let mut drapes = Drapes::new(&networks.drape_alone(scene)?, &drape, resolved);
+        let mut drapes = Drapes::new(&networks.drape_single_garments(scene)?, &drape, resolved);
         for &steps in corrections {
             let drape = networks.with_correction_steps(steps).drape(scene)?;
             drapes.steps.push((steps, drape.posed.iter().map(|p| p.map(f64::from)).collect()));

@@ -26,6 +26,7 @@ fn distant_garments_are_a_pair_in_the_full_graph_only() {
         binding: BindingSettings::default(),
         energy: losses.energy_settings(),
         eigen_count: 4,
+        cache: None,
     };
     let joints = ActiveJoints::named(&body, &body.joint_names).unwrap();
     // The second one begins 4 cm above the first; the third is 25 cm above that.

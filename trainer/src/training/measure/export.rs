@@ -130,7 +130,7 @@ fn description(subject: &Subject, scene: &PreparedScene) -> Result<Value, Report
         "layers": layers,
         "settings": settings(energy),
         "trains": subject.trains(),
-        "alone": if subject.trains() == Trains::All { scene.alone } else { 0.0 },
+        "single_garments": if subject.trains() == Trains::All { scene.single_garments } else { 0.0 },
         "expected": { "loss": loss, "gradient_norm": norm_below(""), "gradient_norms": norms },
     }))
 }

@@ -22,7 +22,7 @@ pub const PHASES: [&str; 14] = [
     "draping",
     "skinning",
     "untangling",
-    "feeling",
+    "contact features",
     "corrections",
     "energies",
     "backward",
@@ -93,8 +93,9 @@ mod tests {
     fn a_span_within_another_one_counts_once() {
         let ((), times) = record_phases(|| {
             let _outer = tracing::trace_span!("corrections").entered();
-            tracing::trace_span!("feeling").in_scope(|| std::thread::sleep(Duration::from_millis(20)));
+            tracing::trace_span!("contact features")
+                .in_scope(|| std::thread::sleep(Duration::from_millis(20)));
         });
-        assert!(times["corrections"] >= 0.0 && times["corrections"] < times["feeling"], "{times:?}");
+        assert!(times["corrections"] >= 0.0 && times["corrections"] < times["contact features"], "{times:?}");
     }
 }

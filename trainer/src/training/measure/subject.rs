@@ -4,19 +4,17 @@ use super::phases::{OTHER, PHASES, record_phases};
 use crate::config::{ClipScope, Config, OptimizerConfig, Trains};
 use crate::dataset::{Dataset, Plan, PreparedScene, prepare, sample_training};
 use crate::evaluation::median_ms;
-use crate::inference::contact_features::felt;
-use crate::inference::draped::to_host;
-use crate::inference::networks::{DrapeError, KnownEmbeddings, TensorStore};
+use crate::inference::tensor_store::{DrapeError, KnownEmbeddings, TensorStore};
 use crate::run::spread::Spread;
 use crate::system::memory::Memory;
-use crate::training::learner::{Learner, new_optimizer};
+use crate::training::learner::{Learner, StepInput, drape_states, new_optimizer};
 use crate::training::process_group::RankPartition;
 use crate::training::scenes::prefetch;
 use crate::training::schedule::Schedule;
 use burn::module::Module;
 use burn::optim::GradientsParams;
 use burn::tensor::{Device, Tensor, TensorData};
-use clothcombo_model::{ClothCombo, Embeddings, Feel, LayeredDrape, OutfitTensors};
+use clothcombo_model::{ClothCombo, DrapeState, Embeddings, OutfitTensors};
 use clothcombo_physics::energy::{SceneEnergy, Term};
 use miette::{IntoDiagnostic, Report, miette};
 use serde::Serialize;
@@ -152,7 +150,8 @@ impl Subject {
             let rate = schedule.at(self.first_step + step as u64).learning_rate;
             let trains = self.trains();
             let (outcome, mut times) = record_phases(|| {
-                self.learner.step(&self.tensors, &step_scenes, trains, rate, false).map(drop)
+                let input = StepInput::whole(&self.tensors, &step_scenes, trains);
+                self.learner.train_step(&input, rate).map(drop)
             });
             outcome?;
             let total = start.elapsed().as_secs_f64();
@@ -186,7 +185,7 @@ impl Subject {
         known: &KnownEmbeddings,
     ) -> Result<[Tensor<2>; 2], DrapeError> {
         let outfit = self.tensors.outfit(scene)?;
-        let embeddings = self.tensors.embed(model, scene, &outfit, known)?;
+        let embeddings = self.tensors.embed(model, scene, &outfit, known, self.trains().mode())?;
         self.place(model, scene, &outfit, &embeddings)
     }
 
@@ -198,23 +197,9 @@ impl Subject {
         outfit: &OutfitTensors,
         embeddings: &Embeddings,
     ) -> Result<[Tensor<2>; 2], DrapeError> {
-        let (body, start) = self.tensors.body(&scene.bodies[0])?;
-        let single = model.drape_single(outfit, embeddings, &body, start.clone());
-        if self.trains() == Trains::Single {
-            return Ok([single.posed, single.canonical]);
-        }
-        let layered = model.untangle(outfit, embeddings, &single, &body);
-        let feel: Feel<'_> = &|posed| {
-            let device = posed.device();
-            felt(scene, &scene.bodies[0], &scene.contacts, &to_host(posed), &device)
-        };
-        let corrected = match self.trains() {
-            Trains::Corrections => {
-                model.correct(outfit, embeddings, (start, &single), &layered, &body, feel).pop()
-            }
-            Trains::Single | Trains::Untangling | Trains::All => None,
-        };
-        let LayeredDrape { posed, canonical } = corrected.unwrap_or(layered);
+        let states =
+            drape_states(model, &self.tensors, scene, &scene.bodies[0], (outfit, embeddings), self.trains())?;
+        let DrapeState { posed, canonical } = states.last().clone();
         Ok([posed, canonical])
     }
 
@@ -242,8 +227,11 @@ impl Subject {
         // Clipped after the mean, which is not made here.
         let unclipped = OptimizerConfig { clip: ClipScope::Step, ..self.config.optimizer.clone() };
         let mut learner = Learner::new(self.model().clone(), new_optimizer(&unclipped), &unclipped);
-        let computed =
-            learner.compute(&self.tensors, std::slice::from_ref(scene), 1, self.trains(), false)?;
+        let computed = learner.forward_backward(&StepInput::whole(
+            &self.tensors,
+            std::slice::from_ref(scene),
+            self.trains(),
+        ))?;
         let mut named = NamedGradients { gradients: computed.gradients, path: Vec::new(), found: Vec::new() };
         self.model().visit(&mut named);
         Ok((computed.loss, named.found))
@@ -258,15 +246,17 @@ impl Subject {
         let [scene] = &scenes;
         let (trains, rate) = (self.trains(), 1e-4);
         let reset = Memory::reset_peak();
-        let step_ms =
-            median_ms(seconds, || self.learner.step(&self.tensors, &scenes, trains, rate, false).map(drop))?;
+        let step_ms = median_ms(seconds, || {
+            self.learner.train_step(&StepInput::whole(&self.tensors, &scenes, trains), rate).map(drop)
+        })?;
         let peak_mib = Memory::now().filter(|_| reset).map(|memory| memory.peak as f64 / f64::from(1 << 20));
 
         let step_of_several_ms = match several {
             0 | 1 => None,
             _ => {
                 let scenes = (0..several).map(|_| self.scene(0)).collect::<Result<Vec<_>, _>>()?;
-                let step = || self.learner.step(&self.tensors, &scenes, trains, rate, false).map(drop);
+                let input = StepInput::whole(&self.tensors, &scenes, trains);
+                let step = || self.learner.train_step(&input, rate).map(drop);
                 Some(median_ms(seconds, step)?)
             }
         };
@@ -277,8 +267,8 @@ impl Subject {
             median_ms(seconds, || self.drape(&plain, scene, &self.tensors.embeddings()).map(read))?;
         // What depends on the garments alone is kept, as for the frames of a motion.
         let outfit = self.tensors.outfit(scene)?;
-        let embeddings = self.tensors.embed(&plain, scene, &outfit, &self.tensors.embeddings())?;
-        let embeddings = plain.prepare_untangling(&outfit, embeddings);
+        let known = self.tensors.embeddings();
+        let embeddings = self.tensors.embed(&plain, scene, &outfit, &known, self.trains().mode())?;
         let drape_ms = median_ms(seconds, || self.place(&plain, scene, &outfit, &embeddings).map(read))?;
 
         let count = scene.bodies[0].start.len();

@@ -18,18 +18,17 @@ fn full(contacts: &[(usize, usize)]) -> Scene {
 
 #[test]
 fn the_full_graph_connects_garments_without_contact() {
-    let (_, near) = scene(&OutfitTensors::all_pairs(3)).drape(&model(3).valid());
+    let near = scene(&OutfitTensors::all_pairs(3)).drape(&model(3).valid());
     for contacts in [&[][..], &[(0, 2)]] {
         let scene = full(contacts);
-        let (single, found) = scene.drape(&scene.model.valid());
-        assert_eq!(values(&found.posed), values(&near.posed));
-        let moved = values(&(found.canonical - single.canonical));
+        let found = scene.drape(&scene.model.valid());
+        assert_eq!(values(&found.last().posed), values(&near.last().posed));
+        let moved = values(&(found.last().canonical.clone() - found.single.canonical));
         for range in scene.outfit.ranges() {
             let of = &moved[3 * range.start..3 * range.end];
             assert!(of.iter().any(|value| value.abs() > 1e-5), "a garment stays where it is");
         }
-        let prepared = scene.model.prepare_untangling(&scene.outfit, scene.embeddings(&scene.model));
-        assert!(prepared.untangling_product.is_some());
+        assert!(scene.embeddings(&scene.model).untangling_product.is_some());
     }
 }
 
@@ -43,18 +42,19 @@ fn the_full_graph_displaces_a_single_garment_without_force() {
     };
     let scene = outfit_of(full(&[]));
     let model = scene.model.valid();
-    let (single, found) = scene.drape(&model);
-    let zero = single.draping_embedding.zeros_like();
-    let latent = Tensor::cat(vec![zero.clone(), zero, single.draping_embedding.clone()], 1);
+    let found = scene.drape(&model);
+    let single = found.single.canonical.clone();
+    let zero = found.draping_embedding.zeros_like();
+    let latent = Tensor::cat(vec![zero.clone(), zero, found.draping_embedding.clone()], 1);
     let displacement = model.untangling.displacement.forward(
-        single.canonical.clone(),
+        single.clone(),
         model.untangling.vertex_product(scene.embeddings(&model).vertex),
         latent,
         &scene.outfit.segments,
     );
     assert!(values(&displacement).iter().any(|value| value.abs() > 1e-5));
-    let expected = single.canonical + displacement * config().untangling_scale;
-    assert_close(&found.canonical, &expected, 1e-6);
+    let expected = single + displacement * config().untangling_scale;
+    assert_close(&found.last().canonical, &expected, 1e-6);
 
     // No edge, no force network; everything else of the untangling phase learns.
     let gradients = parameter_gradients(&scene.model, scene.loss(&scene.model));
@@ -63,8 +63,7 @@ fn the_full_graph_displaces_a_single_garment_without_force() {
     }
 
     let near = outfit_of(super::scene(&[]));
-    let (single, found) = near.drape(&near.model.valid());
-    assert_eq!(values(&found.canonical), values(&single.canonical));
+    assert!(near.drape(&near.model.valid()).layered.is_none());
 }
 
 #[test]
@@ -77,10 +76,10 @@ fn skinning_on_all_joints_corrects_joints_that_the_garment_does_not_use() {
             })
         };
         let scene = with(SkinningJoints::All);
-        let found = scene.drape(&scene.model.valid()).0.skin_weights;
+        let found = scene.drape(&scene.model.valid()).skin_weights;
         let mut unmasked = with(SkinningJoints::Bound);
         unmasked.outfit.joint_mask = unmasked.outfit.joint_mask.ones_like();
-        let expected = unmasked.drape(&unmasked.model.valid()).0.skin_weights;
+        let expected = unmasked.drape(&unmasked.model.valid()).skin_weights;
         assert_eq!(values(&found), values(&expected));
         for (garment, range) in
             scene.garments.iter().zip(scene.outfit.ranges()).filter(|(_, r)| r.start != 41)
@@ -108,12 +107,10 @@ fn without_vertex_embedding_every_network_sees_the_garment_embedding_instead() {
     corrections(&mut whole);
 
     let states = |scene: &Scene, embeddings: Embeddings| {
-        let (model, outfit, body) = (&scene.model, &scene.outfit, &scene.body);
-        let start = outfit.rest.clone();
-        let single = model.drape_single(outfit, &embeddings, body, start.clone());
-        let layered = model.untangle(outfit, &embeddings, &single, body);
-        let corrected = model.correct(outfit, &embeddings, (start, &single), &layered, body, &felt).pop();
-        [single.posed, single.skin_weights, layered.posed, corrected.expect("two corrections").posed]
+        let states = scene.corrected(&scene.model, &embeddings);
+        let corrected = states.last().posed.clone();
+        let layered = states.layered.expect("three garments that can touch").posed;
+        [states.single.posed, states.skin_weights, layered, corrected]
     };
     let found = states(&ablated, ablated.embeddings(&ablated.model));
     let plain = whole.garments.iter().map(|garment| {
@@ -121,8 +118,10 @@ fn without_vertex_embedding_every_network_sees_the_garment_embedding_instead() {
         embedding.vertex = embedding.garment.clone().repeat_dim(0, garment.vertex_count());
         embedding
     });
-    let embeddings =
-        whole.model.pack(&whole.outfit, &plain.collect::<Vec<_>>()).expect("matching embeddings");
+    let embeddings = whole
+        .model
+        .pack(&whole.outfit, &plain.collect::<Vec<_>>(), Mode::Layered)
+        .expect("matching embeddings");
     let expected = states(&whole, embeddings);
     let with_vertex_embedding = states(&whole, whole.embeddings(&whole.model));
     for ((found, expected), other) in found.iter().zip(&expected).zip(with_vertex_embedding) {

@@ -1,10 +1,10 @@
 use super::*;
-use crate::linear_blend_skinning;
 use crate::testing::{
     HostGarment, assert_close, assert_gradients_close, change_parameter, device, parameter_gradients,
     uniform, values, weighting,
 };
-use burn::module::{Module, ModuleVisitor};
+use crate::{Dimensions, GarmentTensors, Initializer, ModelConfig, ModelError};
+use burn::module::{Module, ModuleVisitor, Param};
 
 mod switches;
 
@@ -73,18 +73,19 @@ fn scene(contacts: &[(usize, usize)]) -> Scene {
 impl Scene {
     fn embeddings(&self, model: &ClothCombo) -> Embeddings {
         let garments: Vec<_> = self.garments.iter().map(|garment| model.encode(garment)).collect();
-        model.pack(&self.outfit, &garments).expect("matching embeddings")
+        model.pack(&self.outfit, &garments, Mode::Layered).expect("matching embeddings")
     }
 
-    fn drape(&self, model: &ClothCombo) -> (SingleDrape, LayeredDrape) {
-        let embeddings = self.embeddings(model);
-        let single = model.drape_single(&self.outfit, &embeddings, &self.body, self.outfit.rest.clone());
-        let layered = model.untangle(&self.outfit, &embeddings, &single, &self.body);
-        (single, layered)
+    fn drape(&self, model: &ClothCombo) -> DrapeStates {
+        self.drape_on(model, &self.embeddings(model), &self.body)
+    }
+
+    fn drape_on(&self, model: &ClothCombo, embeddings: &Embeddings, body: &BodyTensors) -> DrapeStates {
+        model.forward(&self.outfit, embeddings, body, self.outfit.rest.clone(), Mode::Layered)
     }
 
     fn loss(&self, model: &ClothCombo) -> Tensor<1> {
-        loss(self.drape(model).1.posed)
+        loss(self.drape(model).last().posed.clone())
     }
 }
 
@@ -117,7 +118,7 @@ fn every_parameter_gets_a_gradient_and_it_matches_finite_differences() {
         let index = index.expect("not empty");
         let value = |change: f32| -> f64 {
             let changed = change_parameter(scene.model.clone(), name, index, change).valid();
-            let posed = scene.drape(&changed).1.posed;
+            let posed = scene.drape(&changed).last().posed.clone();
             let weights = values(&weighting(posed.dims(), &posed.device()));
             values(&posed).iter().zip(weights).map(|(p, w)| f64::from(*p) * f64::from(w)).sum()
         };
@@ -131,29 +132,30 @@ fn every_parameter_gets_a_gradient_and_it_matches_finite_differences() {
 }
 
 #[test]
-fn a_packed_outfit_drapes_as_its_garments_alone() {
+fn a_packed_outfit_drapes_as_its_single_garments() {
     let scene = scene(&[]);
     let model = scene.model.valid();
-    let (single, _) = scene.drape(&model);
+    let packed = scene.drape(&model);
     for (garment, range) in scene.garments.iter().zip(scene.outfit.ranges()) {
         let outfit = OutfitTensors::new(&[garment], &[]).expect("one garment");
-        let embeddings = model.pack(&outfit, &[model.encode(garment)]).expect("matching");
-        let alone = model.drape_single(&outfit, &embeddings, &scene.body, outfit.rest.clone());
+        let embeddings =
+            model.pack(&outfit, &[model.encode(garment)], Mode::Single).expect("matching embeddings");
+        let by_itself = model.forward(&outfit, &embeddings, &scene.body, outfit.rest.clone(), Mode::Single);
         let rows = |packed: &Tensor<2>| packed.clone().narrow(0, range.start, range.len());
-        assert_close(&rows(&single.posed), &alone.posed, 1e-5);
-        assert_close(&rows(&single.canonical), &alone.canonical, 1e-5);
-        assert_close(&rows(&single.skin_weights), &alone.skin_weights, 1e-5);
+        assert_close(&rows(&packed.single.posed), &by_itself.single.posed, 1e-5);
+        assert_close(&rows(&packed.single.canonical), &by_itself.single.canonical, 1e-5);
+        assert_close(&rows(&packed.skin_weights), &by_itself.skin_weights, 1e-5);
     }
 }
 
 #[test]
 fn skin_weights_sum_to_one_and_stay_on_each_garments_joints() {
     let scene = scene(&[]);
-    let (single, _) = scene.drape(&scene.model.valid());
-    let sums = single.skin_weights.clone().sum_dim(1);
+    let skin_weights = scene.drape(&scene.model.valid()).skin_weights;
+    let sums = skin_weights.clone().sum_dim(1);
     assert_close(&sums, &sums.ones_like(), 1e-5);
     for (garment, range) in scene.garments.iter().zip(scene.outfit.ranges()) {
-        let weights = single.skin_weights.clone().narrow(0, range.start, range.len());
+        let weights = skin_weights.clone().narrow(0, range.start, range.len());
         let outside = weights.clone() * (garment.joint_mask.clone() * -1.0 + 1.0);
         assert_eq!(values(&outside).iter().filter(|value| **value != 0.0).count(), 0);
         let moved = weights - garment.skin_weights.clone();
@@ -164,8 +166,8 @@ fn skin_weights_sum_to_one_and_stay_on_each_garments_joints() {
 #[test]
 fn garments_that_touch_nothing_do_not_move_and_others_do() {
     let scene = scene(&[(0, 2)]);
-    let (single, layered) = scene.drape(&scene.model.valid());
-    let moved = values(&(layered.canonical - single.canonical));
+    let states = scene.drape(&scene.model.valid());
+    let moved = values(&(states.last().canonical.clone() - states.single.canonical));
     let ranges = scene.outfit.ranges();
     let of = |garment: usize| &moved[3 * ranges[garment].start..3 * ranges[garment].end];
     assert!(of(1).iter().all(|value| *value == 0.0));
@@ -173,11 +175,11 @@ fn garments_that_touch_nothing_do_not_move_and_others_do() {
 }
 
 #[test]
-fn without_contact_the_single_drape_is_returned_and_untangling_gets_no_gradient() {
+fn without_contact_the_single_drape_is_the_last_state_and_untangling_gets_no_gradient() {
     let scene = scene(&[]);
-    let (single, layered) = scene.drape(&scene.model);
-    assert_eq!(values(&single.posed.inner()), values(&layered.posed.clone().inner()));
-    let gradients = parameter_gradients(&scene.model, loss(layered.posed));
+    let states = scene.drape(&scene.model);
+    assert!(states.layered.is_none());
+    let gradients = parameter_gradients(&scene.model, loss(states.last().posed.clone()));
     for (name, gradient) in gradients {
         assert_eq!(gradient.is_empty(), name.starts_with("untangling"), "{name}");
     }
@@ -188,8 +190,8 @@ fn without_contact_the_single_drape_is_returned_and_untangling_gets_no_gradient(
 fn forces_follow_the_layer_order() {
     let scene = scene(&[(0, 1), (2, 1)]);
     let model = scene.model.valid();
-    let (single, layered) = scene.drape(&model);
-    let embedding = |garment: usize| single.draping_embedding.clone().narrow(0, garment, 1);
+    let states = scene.drape(&model);
+    let embedding = |garment: usize| states.draping_embedding.clone().narrow(0, garment, 1);
     let force =
         |i: usize, j: usize| model.untangling.force.forward(Tensor::cat(vec![embedding(i), embedding(j)], 1));
     let zero = || embedding(0).zeros_like();
@@ -203,25 +205,18 @@ fn forces_follow_the_layer_order() {
     );
     let embeddings = scene.embeddings(&model);
     let product = model.untangling.vertex_product(embeddings.vertex);
-    let displacement = model.untangling.displacement.forward(
-        single.canonical.clone(),
-        product,
-        latent,
-        &scene.outfit.segments,
-    );
-    assert_close(&layered.canonical, &(single.canonical + displacement * config().untangling_scale), 1e-5);
+    let single = states.single.canonical.clone();
+    let displacement =
+        model.untangling.displacement.forward(single.clone(), product, latent, &scene.outfit.segments);
+    assert_close(&states.last().canonical, &(single + displacement * config().untangling_scale), 1e-5);
 }
 
 #[test]
 fn a_frozen_first_stage_trains_the_untangling_alone_with_the_same_gradient() {
     let scene = scene(&OutfitTensors::all_pairs(3));
     let expected = parameter_gradients(&scene.model.untangling, scene.loss(&scene.model));
-    let frozen = scene.model.valid();
-    let embeddings = scene.embeddings(&frozen);
-    let single = frozen.drape_single(&scene.outfit, &embeddings, &scene.body, scene.outfit.rest.clone());
-    let embeddings = scene.model.prepare_untangling(&scene.outfit, embeddings);
-    let layered = scene.model.untangle(&scene.outfit, &embeddings, &single, &scene.body);
-    let found = parameter_gradients(&scene.model.untangling, loss(layered.posed));
+    let frozen = ClothCombo { untangling: scene.model.untangling.clone(), ..scene.model.valid() };
+    let found = parameter_gradients(&scene.model.untangling, scene.loss(&frozen));
     assert_gradients_close(&found, &expected, 1e-5);
 }
 
@@ -230,10 +225,9 @@ fn scenes_that_share_embeddings_add_up() {
     let scene = scene(&OutfitTensors::all_pairs(3));
     let bodies = [body(0.0), body(0.4)];
     let drape = |embeddings: &Embeddings, body: &BodyTensors| {
-        let single = scene.model.drape_single(&scene.outfit, embeddings, body, scene.outfit.rest.clone());
-        loss(scene.model.untangle(&scene.outfit, embeddings, &single, body).posed)
+        loss(scene.drape_on(&scene.model, embeddings, body).last().posed.clone())
     };
-    let shared = scene.model.prepare_untangling(&scene.outfit, scene.embeddings(&scene.model));
+    let shared = scene.embeddings(&scene.model);
     let together = drape(&shared, &bodies[0]) + drape(&shared, &bodies[1]);
     let together = parameter_gradients(&scene.model, together);
     let apart =
@@ -340,10 +334,10 @@ fn wrong_sizes_are_named() {
     ));
 }
 
-/// What is felt: irregular, and by the positions.
-fn felt(posed: Tensor<2>) -> FeltTensors {
+/// Contact features: irregular, and by the positions.
+fn features(posed: &Tensor<2>) -> FeltTensors {
     let (rows, device) = (posed.dims()[0], posed.device());
-    let positions = values(&posed);
+    let positions = values(posed);
     let directions: [Vec<[f32; 3]>; FeltTensors::DIRECTIONS] = std::array::from_fn(|k| {
         let values = values(&uniform(rows, 3, 1.0, 11 + k as u64, &device));
         values.as_chunks::<3>().0.to_vec()
@@ -371,46 +365,56 @@ fn scene_with_corrections(trained: bool) -> Scene {
 }
 
 impl Scene {
-    fn corrected(&self, model: &ClothCombo, feel: Feel<'_>) -> (LayeredDrape, Vec<LayeredDrape>) {
-        let embeddings = self.embeddings(model);
-        let start = self.outfit.rest.clone();
-        let single = model.drape_single(&self.outfit, &embeddings, &self.body, start.clone());
-        let layered = model.untangle(&self.outfit, &embeddings, &single, &self.body);
-        let states = model.correct(&self.outfit, &embeddings, (start, &single), &layered, &self.body, feel);
-        (layered, states)
+    /// The drape with every correction network's step.
+    fn corrected(&self, model: &ClothCombo, embeddings: &Embeddings) -> DrapeStates {
+        let mut states = self.drape_on(model, embeddings, &self.body);
+        for _ in 0..model.corrections.len() {
+            let features = features(&states.last().posed.clone().detach());
+            model.correct(&self.outfit, embeddings, &self.body, &mut states, features);
+        }
+        states
     }
 }
 
 #[test]
 fn untrained_corrections_correct_nothing() {
     let scene = scene_with_corrections(false);
-    let (layered, states) = scene.corrected(&scene.model, &felt);
-    assert_eq!(states.len(), 2);
-    for state in states {
+    let states = scene.corrected(&scene.model, &scene.embeddings(&scene.model));
+    let layered = states.layered.expect("three garments that can touch");
+    assert_eq!(states.corrected.len(), 2);
+    for state in states.corrected {
         assert_close(&state.canonical, &layered.canonical, 1e-6);
         assert_close(&state.posed, &layered.posed, 1e-6);
     }
-    let plain = scene_with_corrections(false).model;
-    let none = plain.with_corrections(&config(), &mut Initializer::new(5, &device()));
-    assert!(scene.corrected(&none, &|_| panic!("nobody is there to feel")).1.is_empty());
 }
 
 #[test]
-fn every_correction_feels_where_the_one_before_led() {
+fn correction_networks_take_turns_from_the_last_state() {
     let scene = scene_with_corrections(true);
-    let asked = std::cell::RefCell::new(Vec::new());
-    let (layered, states) = scene.corrected(&scene.model, &|posed| {
-        asked.borrow_mut().push(values(&posed));
-        felt(posed)
-    });
-    assert_eq!(asked.into_inner(), [values(&layered.posed), values(&states[0].posed)]);
-    assert!(values(&states[1].posed) != values(&states[0].posed));
+    let model = scene.model.valid();
+    let embeddings = scene.embeddings(&model);
+    let step = |states: &mut DrapeStates| {
+        let features = features(&states.last().posed);
+        model.correct(&scene.outfit, &embeddings, &scene.body, states, features);
+        values(&states.last().posed)
+    };
+    let mut states = scene.drape_on(&model, &embeddings, &scene.body);
+    let first = step(&mut states);
+    let (second, of_first) = (step(&mut states), states.corrected[0].clone());
+    assert!(second != first);
+    // The third step is the first network's again, from wherever the state was put.
+    states.replace_last(states.layered.clone().expect("three garments that can touch"));
+    assert_eq!(step(&mut states), first);
+    states.replace_last(of_first);
+    assert_eq!(step(&mut states), second);
 }
 
 #[test]
 fn a_correction_has_its_own_gradient_and_gives_nothing_back() {
     let scene = scene_with_corrections(true);
-    let state = |model: &ClothCombo, k: usize| scene.corrected(model, &felt).1.swap_remove(k);
+    let state = |model: &ClothCombo, k: usize| {
+        scene.corrected(model, &scene.embeddings(model)).corrected.swap_remove(k)
+    };
     for k in [0, 1] {
         let gradients = parameter_gradients(&scene.model, loss(state(&scene.model, k).posed));
         for (name, gradient) in &gradients {
@@ -436,7 +440,7 @@ fn a_correction_has_its_own_gradient_and_gives_nothing_back() {
 }
 
 #[test]
-fn what_is_felt_has_one_row_per_vertex() {
+fn contact_features_have_one_row_per_vertex() {
     let directions = [[0.0; 3]; 4];
     let wrong = FeltTensors::new(vec![0.0; 3], [directions.as_slice(); FeltTensors::DIRECTIONS], &device());
     assert!(matches!(wrong, Err(ModelError::Length { array: "felt features", .. })));
