@@ -8,7 +8,7 @@ use crate::inference::reference::wide;
 use clothcombo_physics::contact::{Intersections, TriangleTree, self_collision};
 use clothcombo_physics::energy::{EnergySettings, SceneEnergy, SceneLayers, Term, TermMap};
 use clothcombo_physics::mesh::Topology;
-use serde::Serialize;
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
 /// One drape of a scene.
@@ -98,17 +98,6 @@ fn paper_collisions(scene: &SceneEnergy<f32>) -> SceneEnergy<f32> {
     paper
 }
 
-/// One method over all scenes.
-#[derive(Clone, Debug, Serialize)]
-pub struct MethodResult {
-    /// Its name.
-    pub method: &'static str,
-    raw: BTreeMap<&'static str, Estimate>,
-    weighted: BTreeMap<&'static str, Estimate>,
-    #[serde(flatten)]
-    metrics: BTreeMap<&'static str, Estimate>,
-}
-
 /// What is estimated besides the energies.
 const METRICS: [Metric<DrapeMetrics>; 9] = [
     ("total", |m| m.score.total),
@@ -128,33 +117,16 @@ impl DrapeMetrics {
     }
 }
 
-impl MethodResult {
-    /// Of one drape per scene.
-    pub fn new(method: &'static str, scenes: &[&DrapeMetrics]) -> Self {
-        let energies = |terms: fn(&SceneScore) -> &TermMap<f64>| {
-            let of = |term: Term| Estimate::of(scenes.iter().map(|m| terms(&m.score)[term]));
-            Term::ALL.into_iter().map(|term| (term.name(), of(term))).collect()
-        };
-        Self {
-            method,
-            raw: energies(|score| &score.raw),
-            weighted: energies(|score| &score.weighted),
-            metrics: Estimate::of_metrics(scenes, &METRICS),
-        }
-    }
-
-    /// An energy as it is: strain, bending and gravity (J).
-    pub fn raw(&self, term: Term) -> &Estimate {
-        &self.raw[term.name()]
-    }
-
-    /// An energy times its weight (J).
-    pub fn weighted(&self, term: Term) -> &Estimate {
-        &self.weighted[term.name()]
-    }
-
-    /// What [`METRICS`] calls `name`.
-    pub fn metric(&self, name: &str) -> &Estimate {
-        &self.metrics[name]
-    }
+/// Estimates of one drape per scene: the energies as they are (strain, bending and gravity in J) and times their weights (J), and
+/// the [`METRICS`].
+pub fn estimates(method: &str, scenes: &[&DrapeMetrics]) -> Value {
+    let energies = |terms: fn(&SceneScore) -> &TermMap<f64>| -> BTreeMap<&str, Estimate> {
+        let of = |term: Term| Estimate::of(scenes.iter().map(|m| terms(&m.score)[term]));
+        Term::ALL.into_iter().map(|term| (term.name(), of(term))).collect()
+    };
+    let mut estimates = json!(Estimate::of_metrics(scenes, &METRICS));
+    estimates["method"] = json!(method);
+    estimates["raw"] = json!(energies(|score| &score.raw));
+    estimates["weighted"] = json!(energies(|score| &score.weighted));
+    estimates
 }

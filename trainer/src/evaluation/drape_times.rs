@@ -1,6 +1,7 @@
 //! Table 5: the time of every phase per garment.
 
-use super::{Evaluator, Section, Table, number};
+use super::table::{Column, median_and_p95, plain};
+use super::{Evaluator, Section, Table};
 use crate::inference::Draped;
 use crate::inference::contact_features::LayerInteraction;
 use crate::inference::networks::{OnBody, drape_on};
@@ -8,18 +9,19 @@ use crate::run::spread::Spread;
 use clothcombo_model::Mode;
 use miette::{IntoDiagnostic, Report};
 use serde_json::json;
-use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-/// The phases, and the paper's times of them. Per garment, but for the preparation of the body, which is once per outfit.
-const PHASES: [(&str, &str); 6] = [
-    ("embedding, once", "27"),
-    ("single draping", "0.6"),
-    ("untangling", "0.4"),
-    ("corrections", "–"),
-    ("post-process", "200–300"),
-    ("body of the post-process, once", "–"),
+/// The phases. Times are per garment, but for the preparation of the body, which is once per outfit.
+const PHASES: [Column<'_>; 6] = [
+    ("embedding, once", "/milliseconds/embedding", median_and_p95),
+    ("single draping", "/milliseconds/single", median_and_p95),
+    ("untangling", "/milliseconds/untangling", median_and_p95),
+    ("corrections", "/milliseconds/corrections", median_and_p95),
+    ("post-process", "/milliseconds/post_process", median_and_p95),
+    ("body of the post-process, once", "/milliseconds/body", median_and_p95),
 ];
+/// The paper's Table 5.
+const PAPER: [&str; 7] = ["paper", "27", "0.6", "0.4", "–", "200–300", "–"];
 
 /// Garments of an outfit that is timed.
 const LAYERS: usize = 3;
@@ -67,31 +69,29 @@ pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
     }
     let vertices = vertices as f64 / garments.max(1) as f64;
     let threads = rayon::current_num_threads();
-    let spreads = times.map(Spread::of);
-    let mut table = Table::new(
-        format!("Time per garment [ms]: {outfits} outfits of {LAYERS} garments, {vertices:.0} vertices each in the mean"),
-        &["this model", "paper"],
-        &[("", &|name| (*name).to_owned())],
-    )
-    .with_note(format!(
-        "Median (95th percentile), {threads} threads. The paper's times are for 8,000 vertices on a GPU."
-    ));
-    for ((phase, paper), spread) in PHASES.into_iter().zip(&spreads) {
-        let ours = format!("{} ({})", number(spread.median), number(spread.p95));
-        table.add_column(phase, [ours, paper.to_owned()].into_iter());
-    }
-    let phases: BTreeMap<_, _> = PHASES.into_iter().map(|(phase, _)| phase).zip(spreads).collect();
-    Ok(vec![Section {
-        key: "times",
-        numbers: json!({
-            "outfits": outfits,
-            "layers": LAYERS,
-            "vertices": vertices,
-            "threads": threads,
-            "milliseconds": phases,
-        }),
-        title: "Time per phase (Table 5)",
-        tables: vec![table],
-        ..Section::default()
-    }])
+    let [embedding, single, untangling, corrections, post_process, body] = times.map(Spread::of);
+    let numbers = json!({
+        "name": "this model",
+        "outfits": outfits,
+        "layers": LAYERS,
+        "vertices": vertices,
+        "threads": threads,
+        "milliseconds": {
+            "embedding": embedding,
+            "single": single,
+            "untangling": untangling,
+            "corrections": corrections,
+            "post_process": post_process,
+            "body": body,
+        },
+    });
+    let title = format!(
+        "Time per garment [ms]: {outfits} outfits of {LAYERS} garments, {vertices:.0} vertices each in the mean"
+    );
+    let columns = [[("", "/name", plain as fn(&_) -> _)].as_slice(), &PHASES].concat();
+    let table =
+        Table::new(title, std::slice::from_ref(&numbers), &columns).with_row(PAPER).with_note(format!(
+            "Median (95th percentile), {threads} threads. The paper's times are for 8,000 vertices on a GPU."
+        ));
+    Ok(vec![Section::new("times", "Time per phase (Table 5)", "", numbers, vec![table])])
 }

@@ -1,7 +1,7 @@
 //! Table 1: what the networks make of a garment with a wrong embedding.
 
-use super::table::mean_and_median;
-use super::{Estimate, Evaluator, GarmentSet, MethodResult, PAPER_COLLISION, Scenes, Section, Table};
+use super::table::{Column, mean_and_median, plain};
+use super::{Evaluator, GarmentSet, PAPER_COLLISION, Scenes, Section, Table, estimates};
 use crate::dataset::{HeldOut, PreparedScene};
 use crate::inference::Draped;
 use crate::inference::contact_features::LayerInteraction;
@@ -29,24 +29,17 @@ pub fn scene_count(evaluator: &Evaluator<'_>) -> usize {
 
 /// The three kinds of embedding on every set.
 pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
-    let results =
+    let sets =
         scenes(evaluator).iter().map(|scenes| evaluate(evaluator, scenes)).collect::<Result<Vec<_>, _>>()?;
-    let (numbers, tables): (Vec<Value>, Vec<Table>) = results.into_iter().unzip();
-    Ok(vec![Section {
-        key: "embeddings",
-        numbers: json!(numbers),
-        title: "Embeddings (Table 1)",
-        text: "The networks without corrections compare with the paper: corrections see where the cloth lies and are accepted as far as they \
-               lower the energy, which repairs what a wrong embedding does."
-            .into(),
-        tables,
-        ..Section::default()
-    }])
+    let text = "The networks without corrections compare with the paper: corrections see where the cloth lies and are accepted as far as they \
+                lower the energy, which repairs what a wrong embedding does.";
+    let tables = sets.iter().map(table).collect();
+    Ok(vec![Section::new("embeddings", "Embeddings (Table 1)", text, sets, tables)])
 }
 
-/// Numbers and table of one set. The other garment is of another category where there is one; vertex i of V takes the embedding
+/// One set. The other garment is of another category where there is one; vertex i of V takes the embedding
 /// of its vertex i V'/V.
-fn evaluate(evaluator: &Evaluator<'_>, scenes: &Scenes) -> Result<(Value, Table), DrapeError> {
+fn evaluate(evaluator: &Evaluator<'_>, scenes: &Scenes) -> Result<Value, DrapeError> {
     let model = evaluator.model;
     let garments = &model.dataset.garments;
     let embed = |garment: usize| -> Result<GarmentEmbedding, DrapeError> {
@@ -80,25 +73,20 @@ fn evaluate(evaluator: &Evaluator<'_>, scenes: &Scenes) -> Result<(Value, Table)
         models.iter().flat_map(|model| kinds.iter().map(move |kind| (model, kind))).map(drape).collect()
     };
     let measured = evaluator.measure(model, &scenes.samples(evaluator), drape)?;
-    let result = |drape: usize| {
-        let of_kind: Vec<_> = measured.iter().map(|drapes| &drapes[drape]).collect();
-        MethodResult::new(KINDS[drape % KINDS.len()], &of_kind)
+    let kinds = |models: &[ClothCombo], first: usize| -> Vec<Value> {
+        let kinds = KINDS.iter().enumerate().filter(|_| !models.is_empty());
+        let of_kind = |kind: usize| measured.iter().map(|drapes| &drapes[first + kind]).collect::<Vec<_>>();
+        kinds.map(|(kind, name)| estimates(name, &of_kind(kind))).collect()
     };
-    let results: Vec<MethodResult> = (0..models.len() * KINDS.len()).map(result).collect();
-    let (kinds, corrected) = results.split_at(KINDS.len());
-    let title = scenes.set.title(&model.dataset);
-    let collision = model.collision_form(Term::BodyCollision);
-    let numbers = json!({
-        "title": title,
+    Ok(json!({
+        "title": scenes.set.title(&model.dataset),
         "set": scenes.set,
         "scenes": scenes.count,
-        "collision": collision,
-        "kinds": kinds,
-        // Empty for a model without corrections.
-        "corrected": corrected,
-    });
-    let title = format!("{title}: energies [J] with correct and wrong embeddings, {} scenes", scenes.count);
-    Ok((numbers, table(title, &collision, [kinds, corrected])))
+        // Weight and margin as the model's configuration has them.
+        "collision": model.collision_form(Term::BodyCollision),
+        "kinds": kinds(&models[..1], 0),
+        "corrected": kinds(&models[1..], KINDS.len()),
+    }))
 }
 
 /// The same embedding for `count` vertices.
@@ -109,31 +97,36 @@ fn resampled(embedding: GarmentEmbedding, count: usize) -> GarmentEmbedding {
     GarmentEmbedding { vertex: embedding.vertex.select(0, rows), garment: embedding.garment }
 }
 
-/// An energy, and what the paper's Table 1 has for correct, different and zero.
-type Row<'a> = (&'a str, &'a dyn Fn(&MethodResult) -> Estimate, [&'a str; 3]);
+/// The paper's Table 1.
+const PAPER: [[&str; 6]; 3] = [
+    ["paper: correct", "0.899", "0.081", "–", "0.57", "-0.623"],
+    ["paper: different", "2.77e14", "5.5e5", "–", "109", "-0.553"],
+    ["paper: zero", "179", "0.116", "–", "187", "-0.57"],
+];
 
-/// With the paper's numbers.
-fn table(title: String, collision: &str, [kinds, corrected]: [&[MethodResult]; 2]) -> Table {
-    let own = format!("collision ({collision})");
-    let paper = format!("collision ({PAPER_COLLISION})");
-    let rows: [Row<'_>; 5] = [
-        ("strain", &|kind| *kind.raw(Term::Strain), ["0.899", "2.77e14", "179"]),
-        ("bending", &|kind| *kind.raw(Term::Bending), ["0.081", "5.5e5", "0.116"]),
-        (&own, &|kind| *kind.weighted(Term::BodyCollision), ["–"; 3]),
-        (&paper, &|kind| *kind.metric("paper_collision"), ["0.57", "109", "187"]),
-        ("gravity", &|kind| *kind.raw(Term::Gravity), ["-0.623", "-0.553", "-0.57"]),
+fn table(set: &Value) -> Table {
+    let columns: [Column<'_>; 6] = [
+        ("energy", "/method", plain),
+        ("strain", "/raw/strain", mean_and_median),
+        ("bending", "/raw/bending", mean_and_median),
+        (&format!("collision ({})", plain(&set["collision"])), "/weighted/body_collision", mean_and_median),
+        (&format!("collision ({PAPER_COLLISION})"), "/paper_collision", mean_and_median),
+        ("gravity", "/raw/gravity", mean_and_median),
     ];
-    let mut table = Table::new(title, &rows, &[("energy", &|(energy, ..)| (*energy).to_owned())]).with_note(
-        "Means over the scenes (medians); single garments, by the networks without corrections and, in further columns, with.",
+    let named = |group: &str, prefix: &str| -> Vec<Value> {
+        let mut kinds = set[group].as_array().expect("a list").clone();
+        kinds
+            .iter_mut()
+            .for_each(|kind| kind["method"] = json!(format!("{prefix}{}", plain(&kind["method"]))));
+        kinds
+    };
+    let rows = [named("kinds", ""), named("corrected", "with corrections: ")].concat();
+    let title = format!(
+        "{}: energies [J] with correct and wrong embeddings, {} scenes",
+        plain(&set["title"]),
+        set["scenes"]
     );
-    for (group, kinds) in [("", kinds), ("with corrections: ", corrected)] {
-        for kind in kinds {
-            let cells = rows.iter().map(|(_, value, _)| mean_and_median(&value(kind)));
-            table.add_column(&format!("{group}{}", kind.method), cells);
-        }
-    }
-    for (i, kind) in KINDS.iter().enumerate() {
-        table.add_column(&format!("paper: {kind}"), rows.iter().map(|(.., paper)| paper[i].to_owned()));
-    }
-    table
+    PAPER.into_iter().fold(Table::new(title, &rows, &columns), Table::with_row).transposed().with_note(
+        "Means over the scenes (medians); single garments, by the networks without corrections and, in further columns, with.",
+    )
 }

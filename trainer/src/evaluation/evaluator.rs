@@ -90,23 +90,10 @@ pub struct Evaluator<'a> {
     /// Models trained on a single garment.
     pub specific: &'a [NamedModel],
     pub counts: SceneCounts,
-    progress: Progress<'a>,
+    pub progress: Progress<'a>,
 }
 
-impl<'a> Evaluator<'a> {
-    /// Of `model`, whose networks are `networks`.
-    pub fn new(
-        model: &'a ModelUnderTest,
-        networks: &'a Networks<'a>,
-        [ablations, specific]: [&'a [NamedModel]; 2],
-        counts: SceneCounts,
-        progress: Progress<'a>,
-    ) -> Self {
-        let post_process = Dressing::new(&model.dataset, &model.config.losses, Some(networks));
-        let settings = ResolveSettings { steps: counts.continuation_steps, ..ResolveSettings::default() };
-        Self { model, networks, post_process, settings, ablations, specific, counts, progress }
-    }
-
+impl Evaluator<'_> {
     /// Moves the progress on by a scene.
     pub fn scene_done(&self) {
         (self.progress)(None);

@@ -3,13 +3,14 @@
 use super::page::Picture;
 use super::sample_picture::picture_of;
 use super::{Evaluator, ModelUnderTest, Section};
-use crate::dataset::{BodySample, HeldOut, SceneSample};
+use crate::dataset::{BodySample, HeldOut, PreparedScene, SceneSample};
 use crate::inference::Draped;
 use crate::picture::{LegendEntry, Sheet, SheetRow, View, layer_colour, png_bytes};
 use clothcombo_data::asset::{Category, Pose};
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use image::RgbImage;
 use miette::{IntoDiagnostic, Report};
+use serde_json::Value;
 
 /// Number of pictures.
 pub const COUNT: usize = 5;
@@ -17,6 +18,8 @@ pub const COUNT: usize = 5;
 const COLUMNS: usize = 5;
 /// Bodies sampled for them: neighbouring frames of a motion would show the same pose twice.
 const CANDIDATES: usize = 8;
+
+const VIEWS: [View; 2] = [View::ThreeQuarter, View::Back];
 
 /// A garment by its index on every layer, and the body.
 type Outfit = (Vec<usize>, BodySample);
@@ -39,6 +42,8 @@ pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
     let mean = BodySample { shape: vec![0.0; model.dataset.shape_count], pose: t_pose };
     let body = |i: usize| model.sample([9, i], &[0], 1, HeldOut::Windows).bodies.remove(0);
     let bodies = unlike((0..CANDIDATES).map(body).collect());
+    let in_t_pose = |b: &BodySample| BodySample { pose: mean.pose.clone(), ..b.clone() };
+    let of_mean_shape = |b: &BodySample| BodySample { shape: mean.shape.clone(), ..b.clone() };
     let three @ [a, b, c] = [shirt(0), skirt(0), over(0)];
     let orders = [[a, b, c], [a, c, b], [b, a, c], [b, c, a], [c, a, b]];
     // Numbered as the legend lists them.
@@ -58,19 +63,13 @@ pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
             "shapes",
             "The same outfit on bodies of random shape.",
             numbered("body"),
-            bodies
-                .iter()
-                .map(|b| (three.to_vec(), BodySample { pose: mean.pose.clone(), ..b.clone() }))
-                .collect(),
+            bodies.iter().map(|b| (three.to_vec(), in_t_pose(b))).collect(),
         ),
         (
             "poses",
             "The same outfit in poses of held-out windows.",
             numbered("pose"),
-            bodies
-                .iter()
-                .map(|b| (three.to_vec(), BodySample { shape: mean.shape.clone(), ..b.clone() }))
-                .collect(),
+            bodies.iter().map(|b| (three.to_vec(), of_mean_shape(b))).collect(),
         ),
         (
             "layers",
@@ -90,13 +89,10 @@ pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
         evaluator.scene_done();
         Ok::<_, Report>(Picture { file: format!("{name}.png"), caption: caption.to_owned(), png })
     };
-    Ok(vec![Section {
-        title: "Gallery",
-        text: "After the post-process. Names in the legend stand for garments, colours without names for layers from inner to outer."
-            .into(),
-        pictures: sheets.into_iter().map(picture).collect::<Result<_, _>>()?,
-        ..Section::default()
-    }])
+    let text = "After the post-process. Names in the legend stand for garments, colours without names for layers from inner to outer.";
+    let mut section = Section::new("gallery", "Gallery", text, Value::Null, Vec::new());
+    section.pictures = sheets.into_iter().map(picture).collect::<Result<_, _>>()?;
+    Ok(vec![section])
 }
 
 /// As many bodies as a sheet has columns: the first one, then always that whose pose is least like those before.
@@ -133,8 +129,7 @@ impl ModelUnderTest {
 /// Outfits from left to right; seen from the front, then from the back. Where all of them hold the same garments a colour
 /// stands for a garment, otherwise for a layer.
 fn sheet(evaluator: &Evaluator<'_>, outfits: &[Outfit], columns: Vec<String>) -> Result<RgbImage, Report> {
-    let mut rows = [View::ThreeQuarter, View::Back]
-        .map(|view| SheetRow { label: view.name().to_owned(), ..SheetRow::default() });
+    let mut rows = VIEWS.map(|view| SheetRow { label: view.name().to_owned(), ..SheetRow::default() });
     // The first of them: legend and numbers follow its order.
     let longest = outfits.iter().rev().map(|(garments, _)| garments).max_by_key(|garments| garments.len());
     let same = longest
@@ -144,8 +139,10 @@ fn sheet(evaluator: &Evaluator<'_>, outfits: &[Outfit], columns: Vec<String>) ->
             let found = same.and_then(|all| all.iter().position(|g| *g == garments[layer]));
             layer_colour(found.unwrap_or(layer))
         };
-        let pictures = views(evaluator, garments, body, &colour)?;
-        rows.iter_mut().zip(pictures).for_each(|(row, picture)| row.cells.push(picture));
+        let (scene, draped) = resolved(evaluator, garments, body)?;
+        for (row, view) in rows.iter_mut().zip(VIEWS) {
+            row.cells.push(picture_of(&scene, &draped, view, &colour));
+        }
     }
     // Names are given where a colour means the same garment all along.
     let grows = |all: &Vec<usize>| outfits.iter().all(|(garments, _)| all.starts_with(garments));
@@ -157,19 +154,17 @@ fn sheet(evaluator: &Evaluator<'_>, outfits: &[Outfit], columns: Vec<String>) ->
 }
 
 /// An outfit draped and resolved.
-fn views(
+fn resolved(
     evaluator: &Evaluator<'_>,
     garments: &[usize],
     body: &BodySample,
-    colour: &dyn Fn(usize) -> [u8; 3],
-) -> Result<[RgbImage; 2], Report> {
+) -> Result<(PreparedScene, Draped), Report> {
     let sample = SceneSample { garments: garments.to_vec(), bodies: vec![body.clone()], repulsion_sample: 0 };
     let scene = evaluator.model.prepare(&sample)?;
     let draped = evaluator.networks.drape(&scene)?;
     let resolved = evaluator.post_process.of(&scene, &draped.posed).resolved(&ResolveSettings::default())?;
     let posed = resolved.positions.concat().into_iter().map(|p| p.map(|v| v as f32)).collect();
-    let draped = Draped { posed, ..draped };
-    Ok([View::ThreeQuarter, View::Back].map(|view| picture_of(&scene, &draped, view, colour)))
+    Ok((scene, Draped { posed, ..draped }))
 }
 
 #[cfg(test)]

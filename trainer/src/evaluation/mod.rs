@@ -36,15 +36,17 @@ pub use sign_error::{RegionErrors, SignErrorSettings, SignErrors, WrongSigns, ha
 pub use timing::median_ms;
 pub use validation::ValidationSet;
 
-use drape_metrics::{DrapeMetrics, MethodResult, PAPER_COLLISION};
+use certificates::Dressing;
+use clothcombo_physics::contact::resolve::ResolveSettings;
+use drape_metrics::{DrapeMetrics, PAPER_COLLISION, estimates};
 use estimate::{Estimate, Metric, Proportion, Ratio};
 use evaluator::Evaluator;
 use miette::Report;
 use page::Section;
 use scene_evaluation::drape_by;
 use serde_json::{Value, json};
-use sets::{GarmentSet, SceneSet, Scenes};
-use table::{Table, number, percent};
+use sets::{GarmentSet, Scenes};
+use table::Table;
 
 /// Everything that was measured of a model.
 pub struct Evaluation {
@@ -91,7 +93,16 @@ impl Evaluation {
         progress: Progress<'_>,
     ) -> Result<Self, Report> {
         let networks = model.networks();
-        let evaluator = Evaluator::new(model, &networks, [ablations, specific], counts, progress);
+        let evaluator = Evaluator {
+            model,
+            networks: &networks,
+            post_process: Dressing::new(&model.dataset, &model.config.losses, Some(&networks)),
+            settings: ResolveSettings { steps: counts.continuation_steps, ..ResolveSettings::default() },
+            ablations,
+            specific,
+            counts,
+            progress,
+        };
         let scenes = PARTS.iter().map(|part| (part.scenes)(&evaluator)).sum();
         let mut sections = Vec::new();
         for part in &PARTS {

@@ -1,12 +1,12 @@
 //! A trained model with the data it is evaluated on.
 
-use super::number;
 use crate::config::Config;
 use crate::dataset::{
     Dataset, DatasetError, HeldOut, PreparedScene, SceneSample, prepare, sample_evaluation,
 };
 use crate::inference::networks::Networks;
 use crate::inference::tensor_store::TensorStore;
+use crate::picture::axis::number_text;
 use crate::run::checkpoint::TrainedModel;
 use burn::tensor::Device;
 use clothcombo_model::ClothCombo;
@@ -59,7 +59,7 @@ impl ModelUnderTest {
             vertices if vertices > 0.0 => format!(" · {vertices}/N"),
             _ => String::new(),
         };
-        format!("as trained: {}{scale}, ε {} mm", losses.weight(term).at(1.0), number(1e3 * epsilon))
+        format!("as trained: {}{scale}, ε {} mm", losses.weight(term).at(1.0), number_text(1e3 * epsilon, 3))
     }
 
     /// All garments of the dataset, by their indices.

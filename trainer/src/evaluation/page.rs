@@ -9,20 +9,32 @@ use serde_json::Value;
 const STYLE: &str = include_str!("../run/report/report.css");
 
 /// A part of the report.
-#[derive(Default)]
 pub struct Section {
     /// Its name in `eval.json`.
     pub key: &'static str,
-    /// Its numbers, more than the tables show.
-    pub numbers: Value,
     /// Its heading.
     pub title: &'static str,
     /// What a reader has to know; may be empty.
-    pub text: String,
-    /// Tables.
+    text: String,
+    /// Its numbers: what the tables show, and more.
+    pub numbers: Value,
+    /// Views of the numbers.
     pub tables: Vec<Table>,
     /// Pictures.
     pub pictures: Vec<Picture>,
+}
+
+impl Section {
+    /// Without pictures.
+    pub fn new(
+        key: &'static str,
+        title: &'static str,
+        text: &str,
+        numbers: impl Into<Value>,
+        tables: Vec<Table>,
+    ) -> Self {
+        Self { key, title, text: text.to_owned(), numbers: numbers.into(), tables, pictures: Vec::new() }
+    }
 }
 
 /// A picture of the report.

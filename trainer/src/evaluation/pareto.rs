@@ -2,7 +2,7 @@
 
 use super::equilibrium_error::StateError;
 use super::page::Picture;
-use super::table::median_with_interval;
+use super::table::{Column, median_with_interval, plain};
 use super::{Estimate, Evaluator, Metric, ModelUnderTest, Section, Table, drape_by, median_ms};
 use crate::dataset::PreparedScene;
 use crate::inference::networks::Networks;
@@ -16,8 +16,7 @@ use clothcombo_physics::energy::Term;
 use clothcombo_physics::equilibrium::{Problem, SolverSettings, solve};
 use miette::{IntoDiagnostic, Report};
 use serde::Serialize;
-use serde_json::json;
-use std::collections::BTreeMap;
+use serde_json::{Value, json};
 use std::ops::ControlFlow;
 use std::time::Instant;
 
@@ -49,16 +48,6 @@ const METRICS: [Metric<MethodSample>; 5] = [
     ("distance_mm", |s| s.error.distance_mm),
     ("strain", |s| s.strain),
 ];
-
-/// One method over all scenes.
-#[derive(Serialize)]
-struct Point {
-    method: String,
-    #[serde(flatten)]
-    metrics: BTreeMap<&'static str, Estimate>,
-    /// Whether no other method is both faster and nearer to the minimum in energy, by medians.
-    on_front: bool,
-}
 
 /// A state of the garments, and how long it took.
 struct State {
@@ -92,20 +81,20 @@ pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
         rayon::current_num_threads()
     ));
     let chart = draw_lines("Speed against error", &panels(&points)).into_diagnostic()?;
-    Ok(vec![Section {
-        key: "pareto",
-        numbers: json!({
-            "scenes": counts.pareto, "converged": converged, "points": points, "samples": samples
-        }),
-        title: "Speed against error",
-        tables: vec![table],
-        pictures: vec![Picture {
-            file: "pareto.png".into(),
-            caption: "Medians; down and to the left is better.".into(),
-            png: png_bytes(&chart).into_diagnostic()?,
-        }],
-        ..Section::default()
-    }])
+    let numbers = json!({
+        "scenes": counts.pareto,
+        // How many of the reference solutions did (relative gradient within the solver's tolerance).
+        "converged": converged,
+        "points": points,
+        "samples": samples,
+    });
+    let mut section = Section::new("pareto", "Speed against error", "", numbers, vec![table]);
+    section.pictures.push(Picture {
+        file: "pareto.png".into(),
+        caption: "Medians; down and to the left is better.".into(),
+        png: png_bytes(&chart).into_diagnostic()?,
+    });
+    Ok(vec![section])
 }
 
 /// Skinning, networks, networks with post-process.
@@ -194,40 +183,44 @@ fn solved(
     Ok((states.into_iter().map(sample).collect(), is_equilibrium))
 }
 
-fn points(samples: &[Vec<MethodSample>]) -> Vec<Point> {
+/// One per method, with estimates over all scenes.
+fn points(samples: &[Vec<MethodSample>]) -> Vec<Value> {
     let point = |method: usize| {
         let scenes: Vec<&MethodSample> = samples.iter().map(|scene| &scene[method]).collect();
-        let metrics = Estimate::of_metrics(&scenes, &METRICS);
-        Point { method: scenes[0].method.clone(), metrics, on_front: false }
+        let mut point = json!(Estimate::of_metrics(&scenes, &METRICS));
+        point["method"] = json!(scenes[0].method);
+        point
     };
-    let mut points: Vec<Point> = (0..samples.first().map_or(0, Vec::len)).map(point).collect();
-    let of_point = |p: &Point| ["milliseconds", "excess"].map(|metric| p.metrics[metric].spread.median);
+    let mut points: Vec<Value> = (0..samples.first().map_or(0, Vec::len)).map(point).collect();
+    let of_point = |point: &Value| ["milliseconds", "excess"].map(|metric| median(point, metric));
     let medians: Vec<[f64; 2]> = points.iter().map(of_point).collect();
     for (point, own) in points.iter_mut().zip(&medians) {
-        point.on_front = !medians.iter().any(|other| other[0] < own[0] && other[1] < own[1]);
+        let is_beaten = medians.iter().any(|other| other[0] < own[0] && other[1] < own[1]);
+        point["on_front"] = json!(!is_beaten);
     }
     points
 }
 
-fn table(points: &[Point], scenes: usize) -> Table {
-    let median = |point: &Point, metric: &str| median_with_interval(&point.metrics[metric]);
-    Table::new(
-        format!("Speed against error over {scenes} scenes of one garment"),
-        points,
-        &[
-            ("method", &|p| p.method.clone()),
-            ("time [ms]", &|p| median(p, "milliseconds")),
-            ("excess energy [J]", &|p| median(p, "excess")),
-            ("excess [% of LBS]", &|p| median(p, "excess_percent")),
-            ("distance [mm]", &|p| median(p, "distance_mm")),
-            ("strain [J]", &|p| median(p, "strain")),
-            ("on the front", &|p| if p.on_front { "yes" } else { "no" }.to_owned()),
-        ],
-    )
+fn median(point: &Value, metric: &str) -> f64 {
+    point[metric]["median"].as_f64().unwrap_or(f64::NAN)
+}
+
+fn table(points: &[Value], scenes: usize) -> Table {
+    let columns: [Column<'_>; 7] = [
+        ("method", "/method", plain),
+        ("time [ms]", "/milliseconds", median_with_interval),
+        ("excess energy [J]", "/excess", median_with_interval),
+        ("excess [% of LBS]", "/excess_percent", median_with_interval),
+        ("distance [mm]", "/distance_mm", median_with_interval),
+        ("strain [J]", "/strain", median_with_interval),
+        // No other method is both faster and nearer to the minimum in energy, by medians.
+        ("on the front", "/on_front", plain),
+    ];
+    Table::new(format!("Speed against error over {scenes} scenes of one garment"), points, &columns)
 }
 
 /// Excess energy and distance over time, both medians.
-fn panels(points: &[Point]) -> Vec<LinePanel> {
+fn panels(points: &[Value]) -> Vec<LinePanel> {
     let families = [
         ("LBS", "LBS"),
         ("network", "network, post-process, refinement"),
@@ -235,9 +228,9 @@ fn panels(points: &[Point]) -> Vec<LinePanel> {
     ];
     let panel = |title: &str, metric: &str| {
         let line = |(prefix, name): (&str, &str)| {
-            let family = points.iter().filter(|p| p.method.starts_with(prefix)).map(|p| &p.metrics);
+            let family = points.iter().filter(|point| plain(&point["method"]).starts_with(prefix));
             let mut points: Vec<_> =
-                family.map(|m| (m["milliseconds"].spread.median, m[metric].spread.median)).collect();
+                family.map(|point| (median(point, "milliseconds"), median(point, metric))).collect();
             // More steps may take no longer; a line that turns back is drawn with spikes.
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
             Line { name: name.to_owned(), points }

@@ -1,6 +1,7 @@
 //! The sets of garments and poses that an evaluation keeps apart: what was trained on, what validation looked at, and the test
 //! set, which no run reads.
 
+use super::table::{Column, plain};
 use super::{Evaluator, Section, Table};
 use crate::dataset::{Dataset, HeldOut, SceneSample, round_robin};
 use miette::Report;
@@ -115,41 +116,36 @@ pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
     let independent_name = "independent test garments (of the test garments, those that are neither generated nor cut from helper meshes)";
     let run = "every validation of the run (choice of the best checkpoint, pictures)";
     let evaluation = "this evaluation only";
-    let rows: [(&str, &[String], &str); 8] = [
-        ("training garments", &split.training_garments, "training, validation"),
-        ("validation garments", &split.validation_garments, run),
-        ("test garments", &split.test_garments, evaluation),
-        (independent_name, &independent, evaluation),
-        ("training clips", &split.training_clips, "training"),
-        (&windows_name, &windows, run),
-        ("validation clips", &split.validation_clips, run),
-        ("test clips", &split.test_clips, evaluation),
+    let row = |set: &str, names: &[String], read_by: &str| {
+        // The training garments are too many to be listed.
+        let which = if set == "training garments" { String::new() } else { names.join(", ") };
+        json!({ "set": set, "number": names.len(), "read_by": read_by, "which": which })
+    };
+    let mut rows = vec![
+        row("training garments", &split.training_garments, "training, validation"),
+        row("validation garments", &split.validation_garments, run),
+        row("test garments", &split.test_garments, evaluation),
+        row(independent_name, &independent, evaluation),
     ];
-    let table = Table::new(
-        "What is in which set",
-        if margin.is_some() { &rows } else { &rows[..4] },
-        &[
-            ("set", &|(set, ..)| (*set).to_owned()),
-            ("number", &|(_, names, _)| names.len().to_string()),
-            ("read by", &|(_, _, read_by)| (*read_by).to_owned()),
-            // The training garments are too many to be listed.
-            ("which", &|(set, names, _)| match *set {
-                "training garments" => String::new(),
-                _ => names.join(", "),
-            }),
-        ],
-    );
+    if margin.is_some() {
+        rows.extend([
+            row("training clips", &split.training_clips, "training"),
+            row(&windows_name, &windows, run),
+            row("validation clips", &split.validation_clips, run),
+            row("test clips", &split.test_clips, evaluation),
+        ]);
+    }
+    let columns: [Column<'_>; 4] = [
+        ("set", "/set", plain),
+        ("number", "/number", plain),
+        ("read by", "/read_by", plain),
+        ("which", "/which", plain),
+    ];
+    let table = Table::new("What is in which set", &rows, &columns);
     let mut numbers = json!(split);
     numbers["independent_test_garments"] = json!(independent);
     numbers["held_out_margin"] = json!(margin);
-    Ok(vec![Section {
-        key: "sets",
-        numbers,
-        title: "Sets",
-        text: "A run trains on the training set and scores the validation set; only this evaluation reads the test set. Bodies have random \
-               shapes within the range of the configuration."
-            .into(),
-        tables: vec![table],
-        ..Section::default()
-    }])
+    let text = "A run trains on the training set and scores the validation set; only this evaluation reads the test set. Bodies have random shapes \
+                within the range of the configuration.";
+    Ok(vec![Section::new("sets", "Sets", text, numbers, vec![table])])
 }

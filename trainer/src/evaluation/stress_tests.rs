@@ -1,7 +1,8 @@
 //! Stress tests: bodies, poses and stacks far outside of the training data, through networks and post-process.
 
 use super::certificates::OutfitResult;
-use super::{Evaluator, Section, Table, drape_by, hard_poses, number, percent};
+use super::table::{Column, number, percent, plain};
+use super::{Evaluator, Section, Table, drape_by, hard_poses};
 use crate::dataset::{BodySample, PreparedScene, SceneSample};
 use crate::inference::Draped;
 use crate::inference::tensor_store::DrapeError;
@@ -11,28 +12,7 @@ use crate::system::single_threaded::map_single_threaded;
 use clothcombo_data::asset::Pose;
 use clothcombo_physics::energy::Term;
 use miette::Report;
-use serde::Serialize;
-use serde_json::json;
-
-/// What happened to the scenes of one case.
-#[derive(Serialize)]
-struct StressTest {
-    case: String,
-    scenes: usize,
-    /// Scenes with a position that is not finite.
-    not_finite: usize,
-    /// Scenes that networks or post-process refused, with the reason of one of them.
-    refused: usize,
-    reason: Option<String>,
-    /// Strain of the networks' drape over that of LBS + shape transfer, median over the scenes.
-    strain_ratio: f64,
-    /// Farthest any vertex is from where LBS + shape transfer puts it (mm).
-    farthest_mm: f64,
-    /// Share of scenes without an intersection with the body or between garments after the post-process.
-    intersection_free: f64,
-    /// Deepest vertex after the post-process (mm), median over the scenes.
-    depth_mm: f64,
-}
+use serde_json::{Value, json};
 
 struct Case {
     name: String,
@@ -59,7 +39,9 @@ struct Outcome {
     is_not_finite: bool,
     /// Why networks or post-process refused it.
     refused: Option<String>,
+    /// Strain of the networks' drape over that of LBS + shape transfer.
     strain_ratio: Option<f64>,
+    /// Farthest any vertex is from where LBS + shape transfer puts it (mm).
     farthest_mm: Option<f64>,
     /// Whether nothing intersects after the post-process, and the deepest vertex then (mm).
     resolved: Option<(bool, f64)>,
@@ -78,15 +60,22 @@ pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
     // Those with the most layers, which take longest, come last and are begun first.
     let items = (0..cases.len()).flat_map(|case| (0..scenes).map(move |index| (case, index))).rev();
     let mut outcomes = map_single_threaded(items.collect(), None, outcome)?;
-    let of_case = |case: Case| StressTest::of(case.name, &outcomes.split_off(outcomes.len() - scenes));
-    let tests: Vec<StressTest> = cases.into_iter().map(of_case).collect();
-    Ok(vec![Section {
-        key: "stress_tests",
-        numbers: json!(tests),
-        title: "Stress tests",
-        tables: vec![table(&tests)],
-        ..Section::default()
-    }])
+    let of_case = |case: Case| statistics(&case.name, &outcomes.split_off(outcomes.len() - scenes));
+    let tests: Vec<Value> = cases.into_iter().map(of_case).collect();
+    let columns: [Column<'_>; 9] = [
+        ("case", "/case", plain),
+        ("scenes", "/scenes", plain),
+        ("not finite", "/not_finite", plain),
+        ("refused", "/refused", plain),
+        ("reason", "/reason", plain),
+        ("strain over LBS + shape transfer, median", "/strain_ratio", number),
+        ("farthest from LBS + shape transfer [mm]", "/farthest_mm", number),
+        ("intersection-free after the post-process [%]", "/intersection_free", percent),
+        ("deepest after it [mm], median", "/depth_mm", number),
+    ];
+    let table = Table::new("Stress tests: far outside of the training data", &tests, &columns)
+        .with_note("Table 3 has 7 and 8 layers, which training has not either.");
+    Ok(vec![Section::new("stress_tests", "Stress tests", "", tests, vec![table])])
 }
 
 impl Case {
@@ -134,46 +123,24 @@ fn outcome(evaluator: &Evaluator<'_>, scene: &PreparedScene, index: usize) -> Re
     })
 }
 
-impl StressTest {
-    fn of(case: String, outcomes: &[Outcome]) -> Self {
-        // Not a number where nothing came of a case: none is no good result.
-        let median = |value: fn(&Outcome) -> Option<f64>| match outcomes.iter().filter_map(value).collect() {
-            values if Vec::is_empty(&values) => f64::NAN,
-            values => Spread::of(values).median,
-        };
-        let count = |holds: fn(&Outcome) -> bool| outcomes.iter().filter(|outcome| holds(outcome)).count();
-        let intersection_free = count(|o| o.resolved.is_some_and(|(is_free, _)| is_free));
-        Self {
-            case,
-            scenes: outcomes.len(),
-            not_finite: count(|o| o.is_not_finite),
-            refused: count(|o| o.refused.is_some()),
-            reason: outcomes.iter().rev().find_map(|o| o.refused.clone()),
-            strain_ratio: median(|o| o.strain_ratio),
-            farthest_mm: outcomes.iter().filter_map(|o| o.farthest_mm).fold(0.0, f64::max),
-            intersection_free: intersection_free as f64 / outcomes.len() as f64,
-            depth_mm: median(|o| o.resolved.map(|(_, depth_mm)| depth_mm)),
-        }
-    }
-}
-
-fn table(tests: &[StressTest]) -> Table {
-    Table::new(
-        "Stress tests: far outside of the training data",
-        tests,
-        &[
-            ("case", &|t| t.case.clone()),
-            ("scenes", &|t| t.scenes.to_string()),
-            ("not finite", &|t| t.not_finite.to_string()),
-            ("refused", &|t| match &t.reason {
-                Some(reason) => format!("{} ({reason})", t.refused),
-                None => t.refused.to_string(),
-            }),
-            ("strain over LBS + shape transfer, median", &|t| number(t.strain_ratio)),
-            ("farthest from LBS + shape transfer [mm]", &|t| number(t.farthest_mm)),
-            ("intersection-free after the post-process [%]", &|t| percent(t.intersection_free)),
-            ("deepest after it [mm], median", &|t| number(t.depth_mm)),
-        ],
-    )
-    .with_note("Table 3 has 7 and 8 layers, which training has not either.")
+fn statistics(case: &str, outcomes: &[Outcome]) -> Value {
+    // Not a number where nothing came of a case: none is no good result.
+    let median = |value: fn(&Outcome) -> Option<f64>| match outcomes.iter().filter_map(value).collect() {
+        values if Vec::is_empty(&values) => f64::NAN,
+        values => Spread::of(values).median,
+    };
+    let count = |holds: fn(&Outcome) -> bool| outcomes.iter().filter(|outcome| holds(outcome)).count();
+    let intersection_free = count(|o| o.resolved.is_some_and(|(is_free, _)| is_free));
+    json!({
+        "case": case,
+        "scenes": outcomes.len(),
+        "not_finite": count(|o| o.is_not_finite),
+        "refused": count(|o| o.refused.is_some()),
+        // Of one of them.
+        "reason": outcomes.iter().rev().find_map(|o| o.refused.as_ref()),
+        "strain_ratio": median(|o| o.strain_ratio),
+        "farthest_mm": outcomes.iter().filter_map(|o| o.farthest_mm).fold(0.0, f64::max),
+        "intersection_free": intersection_free as f64 / outcomes.len() as f64,
+        "depth_mm": median(|o| o.resolved.map(|(_, depth_mm)| depth_mm)),
+    })
 }

@@ -1,9 +1,9 @@
-//! A table that is written as Markdown and as HTML.
+//! A table of values of `eval.json`, written as Markdown and as HTML.
 
-use super::{Estimate, Proportion, Ratio};
 use crate::picture::axis::number_text;
 use crate::run::report::html::escape;
 use serde::Serialize;
+use serde_json::Value;
 
 /// Rows under a heading.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -18,18 +18,23 @@ pub struct Table {
     pub rows: Vec<Vec<String>>,
 }
 
-/// A column: its heading, and the cell of a row.
-pub type Column<'a, R> = (&'a str, &'a dyn Fn(&R) -> String);
+/// A column: its heading, the JSON pointer of its value in a row, and how the value is written.
+pub type Column<'a> = (&'a str, &'a str, fn(&Value) -> String);
 
 impl Table {
-    /// A row for each of `rows`.
-    pub fn new<R>(title: impl Into<String>, rows: &[R], columns: &[Column<'_, R>]) -> Self {
-        let cells = |row: &R| columns.iter().map(|(_, cell)| cell(row)).collect();
+    /// A view of `rows`.
+    ///
+    /// # Panics
+    /// If a row lacks a value, which may be null.
+    pub fn new(title: impl Into<String>, rows: &[Value], columns: &[Column<'_>]) -> Self {
+        let cell = |row: &Value, (_, pointer, text): &Column<'_>| {
+            text(row.pointer(pointer).unwrap_or_else(|| panic!("no {pointer} in {row}")))
+        };
         Self {
             title: title.into(),
             note: String::new(),
-            head: columns.iter().map(|(heading, _)| (*heading).to_owned()).collect(),
-            rows: rows.iter().map(cells).collect(),
+            head: columns.iter().map(|(heading, ..)| (*heading).to_owned()).collect(),
+            rows: rows.iter().map(|row| columns.iter().map(|column| cell(row, column)).collect()).collect(),
         }
     }
 
@@ -46,10 +51,12 @@ impl Table {
         self
     }
 
-    /// Adds a column to the right of the others.
-    pub fn add_column(&mut self, heading: &str, cells: impl Iterator<Item = String>) {
-        self.head.push(heading.to_owned());
-        self.rows.iter_mut().zip(cells).for_each(|(row, cell)| row.push(cell));
+    /// With rows and columns exchanged.
+    pub fn transposed(self) -> Self {
+        let lines: Vec<Vec<String>> = [self.head].into_iter().chain(self.rows).collect();
+        let column = |i: usize| lines.iter().map(|line| line[i].clone()).collect();
+        let rows = (1..lines[0].len()).map(column).collect();
+        Self { head: column(0), rows, ..self }
     }
 
     /// As Markdown: a bold title, the note, the table.
@@ -83,73 +90,100 @@ impl Table {
     }
 }
 
-/// Mean [95 % interval of the mean].
-pub fn mean_with_interval(e: &Estimate) -> String {
-    with_interval(e.spread.mean, e.interval, number)
-}
-
-/// Median [95 % interval of the mean].
-pub fn median_with_interval(e: &Estimate) -> String {
-    with_interval(e.spread.median, e.interval, number)
-}
-
-/// Mean of shares in percent [95 % interval of the mean].
-pub fn percent_with_interval(e: &Estimate) -> String {
-    with_interval(e.spread.mean, e.interval, percent)
-}
-
-/// Ratio of means [95 % interval].
-pub fn ratio_with_interval(r: &Ratio) -> String {
-    with_interval(r.of_means, r.interval, number)
-}
-
-fn with_interval(value: f64, [low, high]: [f64; 2], text: fn(f64) -> String) -> String {
-    format!("{} [{}, {}]", text(value), text(low), text(high))
-}
-
-/// Mean (median).
-pub fn mean_and_median(e: &Estimate) -> String {
-    format!("{} ({})", number(e.spread.mean), number(e.spread.median))
-}
-
-/// Mean (median) of shares in percent.
-pub fn percent_and_median(e: &Estimate) -> String {
-    format!("{} ({})", percent(e.spread.mean), percent(e.spread.median))
-}
-
-/// Count of all [95 % interval in percent, without decimals].
-pub fn share_text(share: &Proportion) -> String {
-    let [low, high] = share.interval.map(|end| 100.0 * end);
-    format!("{} of {} [{low:.0}, {high:.0}]", share.count, share.of)
+/// As it is: a name, a count, yes or no.
+pub fn plain(value: &Value) -> String {
+    match value {
+        Value::String(text) => text.clone(),
+        Value::Bool(is_so) => if *is_so { "yes" } else { "no" }.to_owned(),
+        Value::Null => String::new(),
+        _ => value.to_string(),
+    }
 }
 
 /// Three significant digits.
-pub fn number(value: f64) -> String {
-    if value.is_nan() { "–".to_owned() } else { number_text(value, 3) }
+pub fn number(value: &Value) -> String {
+    value.as_f64().map_or("–".to_owned(), |value| number_text(value, 3))
 }
 
 /// A share in percent.
-pub fn percent(share: f64) -> String {
-    number(100.0 * share)
+pub fn percent(share: &Value) -> String {
+    share.as_f64().map_or("–".to_owned(), |share| number_text(100.0 * share, 3))
+}
+
+/// Mean (median) of an estimate.
+pub fn mean_and_median(estimate: &Value) -> String {
+    format!("{} ({})", number(&estimate["mean"]), number(&estimate["median"]))
+}
+
+/// The same of shares in percent.
+pub fn percent_and_median(estimate: &Value) -> String {
+    format!("{} ({})", percent(&estimate["mean"]), percent(&estimate["median"]))
+}
+
+/// Median (95th percentile) of a spread.
+pub fn median_and_p95(spread: &Value) -> String {
+    format!("{} ({})", number(&spread["median"]), number(&spread["p95"]))
+}
+
+/// Mean of an estimate [95 % interval of the mean].
+pub fn mean_with_interval(estimate: &Value) -> String {
+    with_interval(estimate, "mean", number)
+}
+
+/// The same of shares in percent.
+pub fn percent_with_interval(estimate: &Value) -> String {
+    with_interval(estimate, "mean", percent)
+}
+
+/// Median of an estimate [95 % interval of the mean].
+pub fn median_with_interval(estimate: &Value) -> String {
+    with_interval(estimate, "median", number)
+}
+
+/// Ratio of means [95 % interval].
+pub fn ratio_with_interval(ratio: &Value) -> String {
+    with_interval(ratio, "of_means", number)
+}
+
+fn with_interval(value: &Value, middle: &str, text: fn(&Value) -> String) -> String {
+    match value {
+        Value::Null => "–".to_owned(),
+        _ => {
+            let [low, high] = [0, 1].map(|end| text(&value["interval"][end]));
+            format!("{} [{low}, {high}]", text(&value[middle]))
+        }
+    }
+}
+
+/// Count of all of a proportion [95 % interval in percent, without decimals].
+pub fn proportion(value: &Value) -> String {
+    let end = |i: usize| 100.0 * value["interval"][i].as_f64().unwrap_or(f64::NAN);
+    match value {
+        Value::Null => "–".to_owned(),
+        _ => format!("{} of {} [{:.0}, {:.0}]", value["count"], value["of"], end(0), end(1)),
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use serde_json::json;
 
     #[test]
     fn both_forms_hold_every_cell_and_no_markup_of_the_data() {
-        let table = Table::new(
-            "A <title>",
-            &["a|b <i>"],
-            &[("name", &|name| (*name).into()), ("mm", &|_| number(1.5))],
-        )
-        .with_note("a note");
+        let rows = [json!({ "name": "a|b <i>", "depth": { "mean": 1.5 } })];
+        let columns: [Column<'_>; 2] = [("name", "/name", plain), ("mm", "/depth/mean", number)];
+        let table = Table::new("A <title>", &rows, &columns).with_note("a note");
         let (markdown, html) = (table.markdown(), table.html());
         assert!(markdown.contains("| a\\|b <i> | 1.5 |") && markdown.contains("|---|---:|"), "{markdown}");
         assert!(
             html.contains("a|b &lt;i&gt;") && html.contains("A &lt;title&gt;") && !html.contains("<i>"),
             "{html}"
+        );
+        let transposed = table.transposed();
+        assert_eq!(
+            (transposed.head, transposed.rows),
+            (vec!["name".into(), "a|b <i>".into()], vec![vec!["mm".into(), "1.5".into()]])
         );
     }
 }

@@ -1,34 +1,15 @@
 //! Table 4 and the garment-specific reference: other models on the same scenes.
 
-use super::table::mean_and_median;
+use super::table::{Column, mean_and_median, number, percent, plain};
 use super::{
-    DrapeMetrics, Evaluator, MethodResult, ModelUnderTest, NamedModel, PAPER_COLLISION, Section, Table,
-    drape_by, number, percent,
+    DrapeMetrics, Evaluator, ModelUnderTest, NamedModel, PAPER_COLLISION, Section, Table, drape_by, estimates,
 };
 use crate::dataset::HeldOut;
 use crate::inference::tensor_store::DrapeError;
 use crate::run::validation::Method;
 use clothcombo_physics::energy::Term;
 use miette::Report;
-use serde::Serialize;
-use serde_json::json;
-
-/// One model on the scenes.
-#[derive(Clone, Serialize)]
-struct VariantResult {
-    name: String,
-    /// Width of its networks.
-    width: usize,
-    /// Steps of its configuration; of a model that was trained on from another, those of the last part.
-    steps: u64,
-    result: MethodResult,
-    /// Weight and margin of the collision with the body, and of that between garments, that all models are measured with.
-    collisions: [String; 2],
-    /// Share of outer vertices that violate the layer order, by the nearest vertex; mean over the scenes.
-    order_violations: f64,
-    /// Intersecting triangle pairs between garments, mean over the scenes.
-    layer_pairs: f64,
-}
+use serde_json::{Value, json};
 
 pub fn scene_count(evaluator: &Evaluator<'_>) -> usize {
     let Evaluator { ablations, specific, counts, .. } = evaluator;
@@ -50,14 +31,8 @@ pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
                     post-process. Layer-order violations by the nearest vertex. Self-collision: (1/N) Σ −log d² (d in m) over pairs of vertices of \
                     one garment that no edge joins, are closer than 0.1 m and both belong to triangles that intersect another triangle of the \
                     garment, summed over the garments; the paper does not print its normalisation, so that its values compare among themselves only.";
-        let table = table("Ablations", &variants).with_note(note);
-        sections.push(Section {
-            key: "ablations",
-            numbers: json!(variants),
-            title: "Ablations (Table 4)",
-            tables: vec![PAPER.into_iter().fold(table, Table::with_row)],
-            ..Section::default()
-        });
+        let table = PAPER.into_iter().fold(table("Ablations", &variants), Table::with_row).with_note(note);
+        sections.push(Section::new("ablations", "Ablations (Table 4)", "", variants, vec![table]));
     }
     if !specific.is_empty() {
         let mut pairs = Vec::new();
@@ -71,25 +46,23 @@ pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
                 evaluate(evaluator, other, name, 200 + i, [1, 1], &other.garments())?,
             ]);
         }
-        let table = table("One model for all garments and one per garment", &pairs.concat());
-        sections.push(Section {
-            key: "specific",
-            numbers: json!(pairs),
-            title: "Garment-specific models (Table 2)",
-            text: specific_text(&pairs),
-            tables: vec![table.with_note("Means (medians) over the same bodies in held-out windows.")],
-            ..Section::default()
-        });
+        let table = table("One model for all garments and one per garment", &pairs.concat())
+            .with_note("Means (medians) over the same bodies in held-out windows.");
+        let (title, text) = ("Garment-specific models (Table 2)", specific_text(&pairs));
+        sections.push(Section::new("specific", title, &text, pairs, vec![table]));
     }
     Ok(sections)
 }
 
 /// What the comparison with garment-specific models shows and what not.
-fn specific_text(pairs: &[[VariantResult; 2]]) -> String {
+fn specific_text(pairs: &[[Value; 2]]) -> String {
     let models = pairs.iter().map(|[general, specific]| {
         format!(
             "{} (width {}, {} steps; the model for all garments has width {})",
-            specific.name, specific.width, specific.steps, general.width
+            plain(&specific["name"]),
+            specific["width"],
+            specific["steps"],
+            general["width"]
         )
     });
     format!(
@@ -109,7 +82,7 @@ fn evaluate(
     stream: usize,
     [low, high]: [usize; 2],
     pool: &[usize],
-) -> Result<VariantResult, DrapeError> {
+) -> Result<Value, DrapeError> {
     let sample =
         |index: usize| model.sample([stream, index], pool, low + index % (high - low + 1), HeldOut::Windows);
     let count = if pool.is_empty() { 0 } else { evaluator.counts.variants };
@@ -120,15 +93,19 @@ fn evaluate(
     let mean = |value: &dyn Fn(&DrapeMetrics) -> f64| {
         measured.iter().map(value).sum::<f64>() / measured.len().max(1) as f64
     };
-    Ok(VariantResult {
-        name: name.to_owned(),
-        width: model.config.model.width,
-        steps: model.config.total_steps(),
-        collisions: [Term::BodyCollision, Term::LayerCollision].map(|term| model.collision_form(term)),
-        order_violations: mean(&|m| m.score.order.share()),
-        layer_pairs: mean(&|m| m.layers.pairs as f64),
-        result: MethodResult::new(Method::Network.name(), &measured.iter().collect::<Vec<_>>()),
-    })
+    let collisions = [Term::BodyCollision, Term::LayerCollision].map(|term| model.collision_form(term));
+    Ok(json!({
+        "name": name,
+        "width": model.config.model.width,
+        // Of a model that was trained on from another, those of the last part.
+        "steps": model.config.total_steps(),
+        "result": estimates(Method::Network.name(), &measured.iter().collect::<Vec<_>>()),
+        // Weight and margin that all models are measured with.
+        "collisions": collisions,
+        // Share of outer vertices by the nearest vertex, and triangle pairs between garments; means over the scenes.
+        "order_violations": mean(&|m| m.score.order.share()),
+        "layer_pairs": mean(&|m| m.layers.pairs as f64),
+    }))
 }
 
 /// The paper's Table 4: strain, bending, collision with the body, collision between garments, self-collision.
@@ -140,26 +117,22 @@ const PAPER: [[&str; 8]; 5] = [
     ["paper: without S", "3.43", "0.181", "–", "0.901", "–", "0.312", "0.922"],
 ];
 
-fn table(title: &str, variants: &[VariantResult]) -> Table {
-    let [own, own_layers] = variants.first().map(|v| v.collisions.clone()).unwrap_or_default();
-    let metric = |v: &VariantResult, name: &str| mean_and_median(v.result.metric(name));
-    let weighted = |v: &VariantResult, term: Term| mean_and_median(v.result.weighted(term));
-    Table::new(
-        title,
-        variants,
-        &[
-            ("model", &|v| v.name.clone()),
-            ("strain", &|v| mean_and_median(v.result.raw(Term::Strain))),
-            ("bending", &|v| mean_and_median(v.result.raw(Term::Bending))),
-            (&format!("collision ({own})"), &|v| weighted(v, Term::BodyCollision)),
-            (&format!("collision ({PAPER_COLLISION})"), &|v| metric(v, "paper_collision")),
-            (&format!("layer collision ({own_layers})"), &|v| weighted(v, Term::LayerCollision)),
-            (&format!("layer collision ({PAPER_COLLISION})"), &|v| metric(v, "paper_layer_collision")),
-            ("self-collision", &|v| metric(v, "self_collision")),
-            ("total", &|v| metric(v, "total")),
-            ("self-intersecting pairs", &|v| metric(v, "self_pairs")),
-            ("pairs between garments", &|v| number(v.layer_pairs)),
-            ("layer-order violations [%]", &|v| percent(v.order_violations)),
-        ],
-    )
+fn table(title: &str, variants: &[Value]) -> Table {
+    let [own, own_layers] =
+        [0, 1].map(|i| variants.first().map_or(String::new(), |variant| plain(&variant["collisions"][i])));
+    let columns: [Column<'_>; 12] = [
+        ("model", "/name", plain),
+        ("strain", "/result/raw/strain", mean_and_median),
+        ("bending", "/result/raw/bending", mean_and_median),
+        (&format!("collision ({own})"), "/result/weighted/body_collision", mean_and_median),
+        (&format!("collision ({PAPER_COLLISION})"), "/result/paper_collision", mean_and_median),
+        (&format!("layer collision ({own_layers})"), "/result/weighted/layer_collision", mean_and_median),
+        (&format!("layer collision ({PAPER_COLLISION})"), "/result/paper_layer_collision", mean_and_median),
+        ("self-collision", "/result/self_collision", mean_and_median),
+        ("total", "/result/total", mean_and_median),
+        ("self-intersecting pairs", "/result/self_pairs", mean_and_median),
+        ("pairs between garments", "/layer_pairs", number),
+        ("layer-order violations [%]", "/order_violations", percent),
+    ];
+    Table::new(title, variants, &columns)
 }
