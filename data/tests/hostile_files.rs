@@ -5,7 +5,8 @@ mod fixture;
 mod hostile;
 
 use clothcombo_data::asset::{BindingSettings, Body, BodyFileSettings, Motion};
-use clothcombo_data::format::{Bvh, MatFile, NpzFile, PointCache};
+use clothcombo_data::format::{MatFile, NpzFile, PointCache};
+use clothcombo_data::import::bvh::Bvh;
 use clothcombo_data::import::{
     AmassSettings, Cloth3dBodies, Cloth3dSettings, DeepMimicSettings, Summary, Thinning, import_amass,
     import_cloth3d, import_deepmimic, import_smpl_family,

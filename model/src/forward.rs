@@ -4,9 +4,9 @@ use burn::tensor::Tensor;
 use tracing::trace_span;
 
 use crate::cloth_combo::{ClothCombo, Embeddings};
-use crate::correction::Given;
+use crate::correction::Conditioning;
 use crate::linear_blend_skinning::linear_blend_skinning;
-use crate::tensors::{BodyTensors, FeltTensors, OutfitTensors};
+use crate::tensors::{BodyTensors, ContactFeatureTensors, OutfitTensors};
 
 /// How far a forward pass goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,7 +74,7 @@ impl ClothCombo {
             outfit.rest.clone(),
             embeddings.draping_product.clone(),
             draping_embedding.clone(),
-            &outfit.segments,
+            &outfit.packing,
         );
         let canonical = displacement + start.clone();
         drop(span);
@@ -109,13 +109,13 @@ impl ClothCombo {
         embeddings: &Embeddings,
         body: &BodyTensors,
         states: &mut DrapeStates,
-        features: FeltTensors,
+        features: ContactFeatureTensors,
     ) {
         let _span = trace_span!("corrections").entered();
         let network = &self.corrections[states.corrected.len() % self.corrections.len()];
         let [vertex, draping, skin_weights] =
             [&embeddings.vertex, &states.draping_embedding, &states.skin_weights].map(|t| t.clone().detach());
-        let given = Given { vertex: &vertex, draping: &draping, segments: &outfit.segments };
+        let given = Conditioning { vertex: &vertex, draping: &draping, packing: &outfit.packing };
         let displacement = states.last().canonical.clone().detach() - states.start.clone();
         let canonical = network.correct(displacement, features, &given) + states.start.clone();
         states.corrected.push(posed(canonical, &skin_weights, body));

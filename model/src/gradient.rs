@@ -170,7 +170,8 @@ mod tests {
         assert_eq!(squares(&layer, &gradients_of_bucket(&layer, &bucket)), expected);
 
         gradients.remove::<1>(layer.bias.id);
-        let alone = gradients_of_bucket(&layer, &gradient_bucket(&layer, &gradients));
-        assert!(alone.get::<1>(layer.bias.id).is_none() && alone.get::<2>(layer.weight.id).is_some());
+        let without_bias = gradients_of_bucket(&layer, &gradient_bucket(&layer, &gradients));
+        assert!(without_bias.get::<1>(layer.bias.id).is_none());
+        assert!(without_bias.get::<2>(layer.weight.id).is_some());
     }
 }

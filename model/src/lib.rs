@@ -7,7 +7,7 @@
 //! S    skinning          x, z_s, z_v → skin weight correction ΔW
 //! F_f  untangling        z_s^i, z_s^j → force f^ij
 //! D_m  untangling        x_s, f^i, z_s, z_v → displacement Δx_m                        (modulated SIREN)
-//!      corrections       what every vertex feels, z_s, z_v → corrected displacement    (not in the paper)
+//!      corrections       contact features, z_s, z_v → corrected displacement          (not in the paper)
 //! ```
 //!
 //! No files and no energies here: arrays come in as host slices ([`GarmentTensors`], [`BodyTensors`]), positions go out as
@@ -29,6 +29,7 @@ mod linear;
 mod linear_blend_skinning;
 mod mlp;
 pub mod ops;
+mod packing;
 mod siren;
 mod skinning;
 mod tensors;
@@ -49,7 +50,8 @@ pub use initializer::Initializer;
 pub use linear::Linear;
 pub use linear_blend_skinning::linear_blend_skinning;
 pub use mlp::ResidualMlp;
+pub use packing::Packing;
 pub use siren::{ModulatedSiren, Modulator, SirenSizes};
 pub use skinning::Skinning;
-pub use tensors::{BodyTensors, FeltTensors, GarmentArrays, GarmentTensors, OutfitTensors};
+pub use tensors::{BodyTensors, ContactFeatureTensors, GarmentArrays, GarmentTensors, OutfitTensors};
 pub use untangling::Untangling;

@@ -1,11 +1,14 @@
 //! What the tests of this crate share.
 
+use std::ops::Range;
+
 use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
 use burn::tensor::{Device, Gradients, Tensor, TensorData};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::initializer::Initializer;
+use crate::packing::Packing;
 use crate::tensors::{GarmentArrays, GarmentTensors};
 
 /// The autodiff device the tests run on.
@@ -43,19 +46,32 @@ pub(crate) fn assert_close(found: &Tensor<2>, expected: &Tensor<2>, tolerance: f
 }
 
 /// Output of a function and the gradients of all its inputs under a fixed random weighting of the output.
-pub(crate) fn gradients_of(
-    inputs: &[Tensor<2>],
-    function: impl Fn(Vec<Tensor<2>>) -> Tensor<2>,
-) -> (Tensor<2>, Vec<Tensor<2>>) {
-    let inputs: Vec<_> = inputs.iter().map(|input| input.clone().detach().require_grad()).collect();
+pub(crate) fn gradients_of<const N: usize>(
+    inputs: &[Tensor<2>; N],
+    function: impl Fn([Tensor<2>; N]) -> Tensor<2>,
+) -> (Tensor<2>, [Tensor<2>; N]) {
+    let inputs = inputs.each_ref().map(|input| input.clone().detach().require_grad());
     let output = function(inputs.clone());
-    let weights = weighting(output.dims(), &output.device());
-    let gradients = (output.clone() * weights).sum().backward();
-    let gradients = inputs.iter().map(|input| match input.grad(&gradients) {
+    let gradients = loss(output.clone()).backward();
+    let gradients = inputs.map(|input| match input.grad(&gradients) {
         Some(gradient) => gradient,
-        None => input.clone().inner().zeros_like(),
+        None => input.inner().zeros_like(),
     });
-    (output.inner(), gradients.collect())
+    (output.inner(), gradients)
+}
+
+/// Gives every row its garment's row of `[M,C]`: `[ΣV,C]`.
+pub(crate) fn broadcast(rows: Tensor<2>, packing: &Packing) -> Tensor<2> {
+    let of_garment = |(garment, range): (usize, Range<usize>)| {
+        rows.clone().narrow(0, garment, 1).repeat_dim(0, range.len())
+    };
+    Tensor::cat(packing.ranges().enumerate().map(of_garment).collect(), 0)
+}
+
+/// Sum of all elements with irregular weights.
+pub(crate) fn loss(output: Tensor<2>) -> Tensor<1> {
+    let weights = weighting(output.dims(), &output.device());
+    (output * weights).sum()
 }
 
 /// The same irregular weights for the same shape.
@@ -197,6 +213,34 @@ pub(crate) fn assert_gradients_close(
                 "{name}: {found} {expected} (scale {scale})"
             );
         }
+    }
+}
+
+/// Fails unless the largest gradient of every named parameter of `module`, under the [`loss`] of `output`, is the difference
+/// quotient of one of the `steps`: short steps are lost in the rounding of f32, long ones pass kinks of the activations.
+#[track_caller]
+pub(crate) fn assert_gradients_match_differences<M: Module>(
+    module: &M,
+    names: &[&str],
+    steps: &[f32],
+    tolerance: f64,
+    output: impl Fn(&M) -> Tensor<2>,
+) {
+    let gradients = parameter_gradients(module, loss(output(module)));
+    for name in names {
+        let (_, gradient) = gradients.iter().find(|(found, _)| found == name).expect("documented name");
+        let index = (0..gradient.len()).max_by(|&a, &b| gradient[a].abs().total_cmp(&gradient[b].abs()));
+        let index = index.expect("not empty");
+        let value = |change: f32| -> f64 {
+            let output = output(&change_parameter(module.clone(), name, index, change).valid());
+            let weights = values(&weighting(output.dims(), &output.device()));
+            values(&output).iter().zip(weights).map(|(x, w)| f64::from(*x) * f64::from(w)).sum()
+        };
+        let slope = |step: &f32| (value(*step) - value(-step)) / f64::from(2.0 * step);
+        let slopes: Vec<f64> = steps.iter().map(slope).collect();
+        let found = f64::from(gradient[index]);
+        let fits = slopes.iter().any(|slope| (slope - found).abs() < tolerance * found.abs());
+        assert!(fits, "{name}[{index}]: {found} {slopes:?}");
     }
 }
 

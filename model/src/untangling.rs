@@ -28,17 +28,9 @@ pub struct Untangling {
 impl Untangling {
     pub(crate) fn new(config: &ModelConfig, start: &mut Initializer) -> Self {
         let (width, hidden) = (config.width, config.mlp_layers - 1);
-        let sizes = SirenSizes {
-            layers: config.siren_layers,
-            width: config.siren_width,
-            garment_latent: 3 * width,
-            vertex_latent: config.embedding,
-            omega_first: config.omega_first,
-            omega_hidden: config.omega_hidden,
-        };
         Self {
             force: ResidualMlp::new(2 * width, width, hidden, width, start),
-            displacement: ModulatedSiren::new(&sizes, start),
+            displacement: ModulatedSiren::new(&SirenSizes::new(config, 3 * width), start),
             scale: config.untangling_scale,
             graph: config.graph,
         }
@@ -77,7 +69,7 @@ impl Untangling {
         };
         let [from_below, from_above] = self.net_forces(edges, &draping);
         let latent = Tensor::cat(vec![from_below, from_above, draping], 1);
-        let values = self.displacement.forward(canonical, vertex_product, latent, &outfit.segments);
+        let values = self.displacement.forward(canonical, vertex_product, latent, &outfit.packing);
         let displacement = values * self.scale;
         match edges.and_then(|edges| edges.touched.as_ref()) {
             Some(touched) => displacement * touched.clone(),

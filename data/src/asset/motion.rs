@@ -6,24 +6,12 @@ use super::provenance::Provenance;
 use super::rotation::matrix_from_axis_angle;
 use super::skeleton::{BODY_JOINT_COUNT, BODY_JOINT_NAMES};
 use crate::format::npz::{NpzError, NpzFile, NpzWriter};
-use std::ops::RangeInclusive;
 use std::path::Path;
 
 mod error;
 
-pub use error::{MotionDefect, MotionError};
-
-/// Frame rates that a motion may have [frames/s]: from time lapse to high-speed cameras. Beyond them times and numbers of frames
-/// leave the range of their types.
-pub const FRAME_RATES: RangeInclusive<f64> = 0.01..=10_000.0;
-
-/// Largest component of a rotation vector in a motion [rad]: over a thousand turns, where f32 still tells a thousandth of a radian.
-pub const MAX_ANGLE: f64 = 1e4;
-
-/// Refuses a frame rate [frames/s] out of [`FRAME_RATES`].
-pub(crate) fn check_frame_rate(rate: f64) -> Result<(), MotionDefect> {
-    if FRAME_RATES.contains(&rate) { Ok(()) } else { Err(MotionDefect::FrameRate { rate }) }
-}
+pub(crate) use error::check_frame_rate;
+pub use error::{FRAME_RATES, MAX_ANGLE, MotionDefect, MotionError};
 
 /// A clip of motion: poses of the 22 body joints at a constant rate.
 #[derive(Clone, Debug, PartialEq)]

@@ -16,7 +16,7 @@ pub struct Provenance {
 /// How the source of a garment made by the generator begins.
 pub(crate) const GENERATED: &str = "generated for ";
 /// What the source of a garment cut from helper meshes of the body contains.
-pub(crate) const CUT_FROM_HELPERS: &str = "cut from the clothing helpers";
+pub const CUT_FROM_HELPERS: &str = "cut from the clothing helpers";
 
 impl Provenance {
     /// Whether this project made the garment, by its generator or from helper meshes of the body. Garments of one maker are

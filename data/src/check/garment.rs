@@ -1,10 +1,9 @@
 //! A garment file: the mesh, what it is, and how it lies on the body.
 
-use super::FileCheck;
-use super::measures::MeshMeasures;
 use super::targets::ManifestHints;
 use crate::asset::{Body, Category, Garment};
 use crate::format::load_tri_mesh;
+use crate::mesh::MeshMeasures;
 use clothcombo_physics::Topology;
 use clothcombo_physics::contact::{self_triangle_pairs, triangle_pairs};
 use clothcombo_physics::query::{Distance, Surface};
@@ -54,17 +53,18 @@ pub fn layer_guess(median_distance: f64, category: Category) -> [u32; 2] {
     [lowest, lowest + 1]
 }
 
-pub(super) fn check(path: &Path, hints: &ManifestHints, body: &Body, surface: &Surface<f64>) -> FileCheck {
-    let mesh = match load_tri_mesh(path) {
-        Ok(mesh) => mesh,
-        Err(e) => return FileCheck::unusable(path, e),
-    };
+/// Measurements and warnings, or why the garment cannot be used.
+pub(super) fn check(
+    path: &Path,
+    hints: &ManifestHints,
+    body: &Body,
+    surface: &Surface<f64>,
+) -> Result<(GarmentCheck, Vec<String>), String> {
+    let mesh = load_tri_mesh(path).map_err(|e| e.to_string())?;
     let area = mesh.area();
     if !(area > 0.0 && area.is_finite()) {
-        return FileCheck::unusable(
-            path,
-            format!("{}: no area: all {} triangles are collapsed", path.display(), mesh.face_count()),
-        );
+        let triangles = mesh.face_count();
+        return Err(format!("{}: no area: all {triangles} triangles are collapsed", path.display()));
     }
     let topology = Topology::new(&mesh);
     let mut gaps: Vec<f64> = mesh
@@ -95,10 +95,8 @@ pub(super) fn check(path: &Path, hints: &ManifestHints, body: &Body, surface: &S
         .len(),
         self_triangle_pairs: self_triangle_pairs(mesh.positions(), mesh.faces()).len(),
     };
-    let mut file = FileCheck::new(path);
-    file.warnings = warnings(&garment, body);
-    file.garment = Some(garment);
-    file
+    let warnings = warnings(&garment, body);
+    Ok((garment, warnings))
 }
 
 fn warnings(garment: &GarmentCheck, body: &Body) -> Vec<String> {

@@ -1,6 +1,5 @@
 //! A motion file.
 
-use super::FileCheck;
 use crate::asset::{BODY_JOINT_NAMES, Motion, Pose};
 use crate::generate::pose::JOINT_LIMITS;
 use serde::Serialize;
@@ -52,14 +51,12 @@ pub fn impossible_turn<'a>(poses: impl IntoIterator<Item = &'a Pose>) -> Option<
     })
 }
 
-pub(super) fn check(path: &Path) -> FileCheck {
+/// Measurements and warnings, or why the motion cannot be used.
+pub(super) fn check(path: &Path) -> Result<(MotionCheck, Vec<String>), String> {
     // NaN, wrong shapes and rates are refused here, with frame and joint.
-    let motion = match Motion::load(path) {
-        Ok(motion) => motion,
-        Err(e) => return FileCheck::unusable(path, e),
-    };
+    let motion = Motion::load(path).map_err(|e| e.to_string())?;
     if motion.poses.is_empty() {
-        return FileCheck::unusable(path, format!("{}: no frames", path.display()));
+        return Err(format!("{}: no frames", path.display()));
     }
     let mut check = MotionCheck {
         frames: motion.poses.len(),
@@ -80,8 +77,5 @@ pub(super) fn check(path: &Path) -> FileCheck {
         }
         check.frames_outside_limits += usize::from(outside);
     }
-    let mut file = FileCheck::new(path);
-    file.warnings.extend(impossible_turn(&motion.poses));
-    file.motion = Some(check);
-    file
+    Ok((check, impossible_turn(&motion.poses).into_iter().collect()))
 }

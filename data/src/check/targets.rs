@@ -2,7 +2,7 @@
 
 use crate::asset::Category;
 use crate::dataset::garment_folder::{MANIFEST, list_garment_folder, read_entries};
-use crate::format::mesh::is_mesh_path;
+use crate::format::is_mesh_path;
 use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -15,12 +15,10 @@
 
 mod write;
 
-pub(crate) use write::garment_folder_files;
-pub use write::{refuse_unlisted, save_garment, save_garment_folder, save_manifest};
+pub use write::{garment_folder_files, refuse_unlisted, save_garment, save_garment_folder, save_manifest};
 
 use crate::asset::{Body, Category, Garment, Provenance};
-use crate::format::mesh::{MeshFileError, is_mesh_path, load_tri_mesh};
-use crate::format::obj::ObjError;
+use crate::format::{FileError, MeshFileError, is_mesh_path, load_tri_mesh};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -34,14 +32,9 @@ pub const MANIFEST: &str = "garments.toml";
 /// Why a garment folder cannot be used.
 #[derive(Debug, Error)]
 pub enum GarmentFolderError {
-    /// The folder or manifest cannot be read or written.
-    #[error("{}: {reason}", path.display())]
-    Io {
-        /// File or folder.
-        path: PathBuf,
-        /// What the system said.
-        reason: std::io::Error,
-    },
+    /// The folder, its manifest or a mesh cannot be read or written.
+    #[error(transparent)]
+    Io(#[from] FileError),
     /// The manifest is not as it should be; the message shows line and column.
     #[error("{}: {message}", path.display())]
     Manifest {
@@ -80,9 +73,6 @@ pub enum GarmentFolderError {
     /// A mesh is unusable.
     #[error(transparent)]
     Mesh(#[from] MeshFileError),
-    /// A mesh cannot be written.
-    #[error(transparent)]
-    Obj(#[from] ObjError),
 }
 
 /// A garment of a folder with its layer hint.
@@ -228,7 +218,7 @@ pub(crate) fn read_entries(folder: &Path) -> Result<Vec<ManifestEntry>, GarmentF
             .into_iter()
             .map(|file| ManifestEntry { file, ..ManifestEntry::default() })
             .collect(),
-        Err(reason) => return Err(GarmentFolderError::Io { path, reason }),
+        Err(reason) => return Err(FileError { path, reason }.into()),
     };
     if entries.is_empty() {
         return Err(GarmentFolderError::Empty { path: folder.into() });
@@ -237,10 +227,10 @@ pub(crate) fn read_entries(folder: &Path) -> Result<Vec<ManifestEntry>, GarmentF
 }
 
 fn list_mesh_files(folder: &Path) -> Result<Vec<String>, GarmentFolderError> {
-    let failed = |reason| GarmentFolderError::Io { path: folder.into(), reason };
+    let failed = FileError::at(folder);
     let mut files = Vec::new();
-    for entry in fs::read_dir(folder).map_err(failed)? {
-        let path = entry.map_err(failed)?.path();
+    for entry in fs::read_dir(folder).map_err(&failed)? {
+        let path = entry.map_err(&failed)?.path();
         if let Some(name) = path.file_name().and_then(|n| n.to_str()).filter(|_| is_mesh_path(&path)) {
             files.push(name.to_string());
         }
@@ -280,7 +270,7 @@ pub fn read_manifest(folder: &Path) -> Result<Vec<ManifestEntry>, GarmentFolderE
     match fs::read_to_string(&path) {
         Ok(text) => Ok(manifest_from(&path, &text)?.garment),
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(Vec::new()),
-        Err(reason) => Err(GarmentFolderError::Io { path, reason }),
+        Err(reason) => Err(FileError { path, reason }.into()),
     }
 }
 
@@ -395,6 +385,6 @@ mod tests {
         let empty = folder_with(&[]);
         assert!(matches!(load_garment_folder(empty.path(), &body), Err(GarmentFolderError::Empty { .. })));
         let missing = load_garment_folder(&empty.path().join("x"), &body).unwrap_err();
-        assert!(matches!(missing, GarmentFolderError::Io { .. }));
+        assert!(matches!(missing, GarmentFolderError::Io(_)));
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::asset::Motion;
 use crate::asset::motion::MotionError;
+use crate::format::FileError;
 use std::fs;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -10,13 +11,8 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum MotionFolderError {
     /// The folder cannot be read.
-    #[error("{}: {reason}", path.display())]
-    Io {
-        /// The folder.
-        path: PathBuf,
-        /// What the system said.
-        reason: std::io::Error,
-    },
+    #[error(transparent)]
+    Io(#[from] FileError),
     /// No motion in it.
     #[error("{}: no motions; expected .npz files with poses and mocap_framerate", path.display())]
     Empty {
@@ -33,10 +29,10 @@ pub enum MotionFolderError {
 /// # Errors
 /// [`MotionFolderError`] naming folder, or file and key.
 pub fn load_motion_folder(folder: &Path) -> Result<Vec<Motion>, MotionFolderError> {
-    let failed = |reason| MotionFolderError::Io { path: folder.into(), reason };
+    let failed = FileError::at(folder);
     let mut files = Vec::new();
-    for entry in fs::read_dir(folder).map_err(failed)? {
-        let path = entry.map_err(failed)?.path();
+    for entry in fs::read_dir(folder).map_err(&failed)? {
+        let path = entry.map_err(&failed)?.path();
         if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npz")) {
             files.push(path);
         }

@@ -3,59 +3,38 @@
 //! Nothing is changed silently: [`FitReport`] lists what was assumed and every element that was touched.
 
 mod arm_pose;
-mod clean;
+mod coverage;
 mod error;
-mod manifold;
 mod placed;
 mod placement;
-mod push_out;
 mod report;
 mod search;
+mod settings;
+mod sitting;
 
+pub use coverage::off_trunk;
 pub use error::FitError;
 pub use placed::is_on_body;
 pub use placement::{Origin, Placement, Unit, UpAxis};
 pub use report::{BodyContact, Elements, FitReport, Piece, Repair, RepairKind};
-pub use search::Sitting;
-
-pub(crate) use clean::{clean_faces, triangulate, weld};
-pub(crate) use manifold::{SplitSheet, join_faces, orient, outward_area, outwardness, split_fans};
-pub(crate) use push_out::{Contact, contact, one_rings, push_out};
+pub use settings::{FitSettings, MAX_VERTICES, MIN_TRIANGLES};
+pub use sitting::Sitting;
 
 use crate::asset::{Body, Category, Garment, Provenance};
-use crate::check::measures::{AREA_SHARE, MeshMeasures, WELD_SHARE, diagonal};
 use crate::format::PolygonMesh;
+use crate::mesh::{
+    AREA_SHARE, MeshMeasures, WELD_SHARE, clean_faces, contact, diagonal, join_faces, orient, outward_area,
+    push_out, split_fans, triangulate, weld,
+};
 use arm_pose::ArmPose;
 use clothcombo_physics::contact::{self_triangle_pairs, triangle_pairs};
 use clothcombo_physics::vec3::{norm, sub};
 use clothcombo_physics::{Topology, TriMesh};
 use search::Search;
-
-/// Most vertices a garment may have after welding.
-pub const MAX_VERTICES: usize = 1_000_000;
-
-/// What is left longer than this many times its length by the push out of the body is stretched.
-const MOST_STRETCH: f64 = 1.5;
-/// Share of its edges from which a stretched garment does not fit.
-const MOST_STRETCHED: f64 = 0.1;
-/// Fewest triangles that can be a garment.
-pub const MIN_TRIANGLES: usize = 20;
+use settings::{MOST_STRETCH, MOST_STRETCHED};
 
 /// Least distance between a fitted vertex and the body [m]: the ε of the paper's body collision loss.
 const CLEARANCE: f64 = 0.002;
-
-/// What is known about a file; `None` is found out.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct FitSettings {
-    /// Unit of the file.
-    pub unit: Option<Unit>,
-    /// Up axis of the file.
-    pub up: Option<UpAxis>,
-    /// Whether the arms are lowered (A-pose) or not (T-pose).
-    pub arms_lowered: Option<bool>,
-    /// Category; otherwise guessed from the shape.
-    pub category: Option<Category>,
-}
 
 /// A fitted garment and how it came about.
 #[derive(Clone, Debug)]
@@ -287,7 +266,9 @@ fn refuse_other_things(positions: &[[f64; 3]], body: &Body, sitting: &Sitting) -
     if spans(1, 0.04) && spans(0, 0.1) {
         return Err(FitError::Body);
     }
-    worn_where(positions, body).map_err(|place| FitError::Worn { place })?;
+    if let Some(place) = off_trunk(positions, body) {
+        return Err(FitError::OffTrunk { place });
+    }
     if sitting.wrap < 0.5 || sitting.mean_distance > 0.3 {
         return Err(FitError::OffBody { sitting: *sitting });
     }
@@ -295,22 +276,6 @@ fn refuse_other_things(positions: &[[f64; 3]], body: &Body, sitting: &Sitting) -
         return Err(FitError::Inside { sitting: *sitting });
     }
     Ok(())
-}
-
-/// Refuses what does not clothe the trunk or the hips; the error says where it is worn instead.
-pub(crate) fn worn_where(positions: &[[f64; 3]], body: &Body) -> Result<(), &'static str> {
-    let joint = |j: usize| body.joint_template.get(j).copied().unwrap_or([0.0; 3]);
-    let (neck, knee, shoulder) = (joint(12), joint(4), joint(16));
-    let all = |test: &dyn Fn(&[f64; 3]) -> bool| positions.iter().all(test);
-    if all(&|p| p[1] > neck[1]) {
-        Err("worn on the head")
-    } else if all(&|p| p[1] < knee[1]) {
-        Err("worn on the feet")
-    } else if all(&|p| p[0].abs() > shoulder[0]) {
-        Err("worn on the arms only")
-    } else {
-        Ok(())
-    }
 }
 
 fn pieces(mesh: &TriMesh, topology: &Topology) -> Vec<Piece> {

@@ -1,9 +1,9 @@
 //! What fitting assumed and changed, element by element.
 
 use super::placement::{Origin, Placement};
-use super::search::Sitting;
+use super::sitting::Sitting;
 use crate::asset::Category;
-use crate::check::MeshMeasures;
+use crate::mesh::MeshMeasures;
 use serde::Serialize;
 use std::fmt;
 

@@ -6,13 +6,15 @@
 //! also moved to where it fits best.
 
 use super::arm_pose::ArmPose;
+use super::coverage::off_trunk;
+use super::error::FitError;
 use super::placement::{Origin, Placement, Unit, UpAxis};
-use super::{FitError, FitSettings, worn_where};
+use super::settings::FitSettings;
+use super::sitting::Sitting;
 use crate::asset::{Body, skeleton};
 use clothcombo_physics::query::Distance;
 use clothcombo_physics::vec3::{add, cross, norm, scale, sub};
 use rayon::prelude::*;
-use serde::Serialize;
 
 /// Arm angles tried first [degrees].
 const ARM_ANGLES: [f64; 7] = [0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0];
@@ -26,33 +28,6 @@ const LEVEL_ARMS_PRIOR: f64 = 1.3;
 
 /// Directions around the trunk that are told apart.
 const SECTORS: usize = 8;
-
-/// How well a placed garment sits.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Sitting {
-    /// Mean distance of the cloth to the body, inside or outside [m].
-    pub mean_distance: f64,
-    /// Share of the cloth inside the body, 0–1.
-    pub inside: f64,
-    /// Share of the directions around the trunk in which there is cloth, 0–1, at the best height.
-    pub wrap: f64,
-    #[serde(skip)]
-    pub(super) cost: f64,
-}
-
-impl Sitting {
-    fn is_good(&self) -> bool {
-        let is_close = self.inside < 0.12 && self.wrap >= 0.75 && self.mean_distance < 0.06;
-        // A wide skirt is far from the legs, but goes all the way round and is nowhere inside.
-        let is_wide = self.inside < 0.01 && self.wrap == 1.0 && self.mean_distance < 0.25;
-        is_close || is_wide
-    }
-
-    /// Whether the cloth follows the trunk, be it partly inside: made for another body, but no hat and no shoe.
-    fn is_around_trunk(&self) -> bool {
-        self.wrap >= 0.75 && self.mean_distance < 0.02
-    }
-}
 
 /// Sample points of a garment in the file's coordinates, evenly over its area.
 pub(super) struct Samples(Vec<[f64; 3]>);
@@ -197,12 +172,12 @@ impl<'a> Search<'a> {
             .par_iter()
             .filter_map(|(placement, arm)| {
                 let points = placement.apply(&samples.0);
-                let place = worn_where(&points, self.body).err()?;
+                let place = off_trunk(&points, self.body)?;
                 let sitting = self.sitting(&points, &self.arms[*arm]);
                 (sitting.mean_distance < 0.04 && sitting.inside < 0.25).then_some(place)
             })
             .find_first(|_| true);
-        snug.map_or(Ok(()), |place| Err(FitError::Worn { place }))
+        snug.map_or(Ok(()), |place| Err(FitError::OffTrunk { place }))
     }
 
     /// Cheap costs first, careful ones for the best few.

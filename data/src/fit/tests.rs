@@ -313,5 +313,5 @@ fn what_is_no_garment_is_refused_with_the_reason() {
     let hat: Vec<[f64; 3]> =
         ring.positions().iter().map(|p| [p[0], p[1] + head[1] + 0.1, p[2] + head[2]]).collect();
     let error = refused(&mesh(&ring.with_positions(hat).unwrap()), &metres);
-    assert_eq!(error, FitError::Worn { place: "worn on the head" });
+    assert_eq!(error, FitError::OffTrunk { place: "it covers the head only" });
 }

@@ -4,6 +4,7 @@
 //! Read are numbers, text, structures and cells, compressed or not, in either byte order; what else there is (sparse
 //! matrices, functions, objects) is kept as [`MatValue::Other`] with its name.
 
+use super::error::FileError;
 use super::npz::{Array, row_major_from_fortran};
 use flate2::read::ZlibDecoder;
 use std::fs;
@@ -15,13 +16,8 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum MatError {
     /// The file cannot be read.
-    #[error("{}: {reason}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        reason: std::io::Error,
-    },
+    #[error(transparent)]
+    Io(#[from] FileError),
     /// Not a MAT file of level 5.
     #[error("{}: not a MAT-5 file ({reason})", path.display())]
     NotMat5 {
@@ -107,8 +103,8 @@ impl MatFile {
     /// # Errors
     /// [`MatError`] naming file and variable.
     pub fn load(path: &Path) -> Result<Self, MatError> {
-        let failed = |reason| MatError::Io { path: path.into(), reason };
-        let file = fs::File::open(path).map_err(failed)?;
+        let failed = FileError::at(path);
+        let file = fs::File::open(path).map_err(&failed)?;
         let mut bytes = Vec::new();
         file.take(LARGEST + 1).read_to_end(&mut bytes).map_err(failed)?;
         Self::parse(&bytes, path)

@@ -2,6 +2,7 @@
 //!
 //! Object arrays are Python pickles, that is, programs; they are listed but never read.
 
+use super::error::FileError;
 use npyz::{DType, Endianness, NpyHeader, Order, TypeChar, TypeStr};
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -42,7 +43,7 @@ impl NpzFile {
     /// # Errors
     /// If the file cannot be opened or is not a zip archive.
     pub fn open(path: &Path) -> Result<Self, NpzError> {
-        let file = File::open(path).map_err(|reason| NpzError::Io { path: path.into(), reason })?;
+        let file = File::open(path).map_err(FileError::at(path))?;
         let archive = ZipArchive::new(BufReader::new(file))
             .map_err(|e| NpzError::NotAnArchive { path: path.into(), reason: e.to_string() })?;
         Ok(Self { path: path.into(), archive })

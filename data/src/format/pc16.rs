@@ -3,6 +3,7 @@
 //! Layout, little-endian: `POINTCACHE2\0`, i32 version = 1, i32 points, f32 first frame, f32 rate, i32 frames, then
 //! f16 `[frames × points × 3]`.
 
+use super::error::FileError;
 use half::f16;
 use std::fs;
 use std::io::Read;
@@ -13,13 +14,8 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum PointCacheError {
     /// The file cannot be read.
-    #[error("{}: {reason}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        reason: std::io::Error,
-    },
+    #[error(transparent)]
+    Io(#[from] FileError),
     /// The header is not one of a point cache.
     #[error("{}: {reason}; a .pc16 file starts with POINTCACHE2, version 1", path.display())]
     Header {
@@ -76,15 +72,15 @@ impl PointCache {
     /// # Errors
     /// [`PointCacheError`] naming the file and what is wrong with it.
     pub fn load(path: &Path) -> Result<Self, PointCacheError> {
-        let failed = |reason| PointCacheError::Io { path: path.into(), reason };
+        let failed = FileError::at(path);
         let wrong = |reason: String| PointCacheError::Header { path: path.into(), reason };
-        let mut file = fs::File::open(path).map_err(failed)?;
-        let size = file.metadata().map_err(failed)?.len();
+        let mut file = fs::File::open(path).map_err(&failed)?;
+        let size = file.metadata().map_err(&failed)?.len();
         let mut header = [0u8; HEADER];
         if size < HEADER as u64 {
             return Err(wrong(format!("{size} bytes are less than a header")));
         }
-        file.read_exact(&mut header).map_err(failed)?;
+        file.read_exact(&mut header).map_err(&failed)?;
         if !header.starts_with(MAGIC) {
             return Err(wrong("it is not a point cache".into()));
         }
@@ -104,7 +100,7 @@ impl PointCache {
             return Err(PointCacheError::Size { path: path.into(), points, frames, found: size, expected });
         }
         let mut bytes = Vec::new();
-        file.read_to_end(&mut bytes).map_err(failed)?;
+        file.read_to_end(&mut bytes).map_err(&failed)?;
         let half =
             |cell: &[u8], axis: usize| f16::from_le_bytes([cell[2 * axis], cell[2 * axis + 1]]).to_f32();
         let positions: Vec<[f32; 3]> =

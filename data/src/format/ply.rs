@@ -2,7 +2,7 @@
 //!
 //! Own reader: every count of the header is checked against the bytes that follow before memory is taken for it.
 
-use super::mesh::{PolygonMesh, check_count};
+use super::polygon_mesh::{PolygonMesh, check_count};
 
 /// Scalar types under both of their names.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -12,7 +12,7 @@ use crate::asset::motion::{MotionError, along_z, stands_along_z};
 use crate::asset::rotation::{Matrix3, axis_angle_from_matrix, matrix_from_axis_angle, product};
 use crate::asset::{Motion, Pose, Provenance};
 use crate::check::impossible_turn;
-use crate::format::{NpzError, NpzFile};
+use crate::format::{FileError, NpzError, NpzFile};
 use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -106,17 +106,17 @@ fn find(
     seen: &mut HashSet<PathBuf>,
     depth: usize,
 ) -> Result<(), MotionImportError> {
-    let failed = |reason| MotionImportError::Io { path: path.into(), reason };
-    if !fs::metadata(path).map_err(failed)?.is_dir() {
+    let failed = FileError::at(path);
+    if !fs::metadata(path).map_err(&failed)?.is_dir() {
         found.push(path.into());
         return Ok(());
     }
-    if depth > DEEPEST || !seen.insert(fs::canonicalize(path).map_err(failed)?) {
+    if depth > DEEPEST || !seen.insert(fs::canonicalize(path).map_err(&failed)?) {
         return Ok(());
     }
     let mut entries = Vec::new();
-    for entry in fs::read_dir(path).map_err(failed)? {
-        entries.push(entry.map_err(failed)?.path());
+    for entry in fs::read_dir(path).map_err(&failed)? {
+        entries.push(entry.map_err(&failed)?.path());
     }
     entries.sort();
     for entry in entries {

@@ -2,6 +2,10 @@
 //!
 //! The skeletons known are those in `NAMINGS`, named after collections that use them; see [`super::retarget`] for how they are matched.
 
+mod hierarchy;
+
+pub use hierarchy::{Bvh, BvhError, BvhJoint, Channel};
+
 use super::motions::{
     Clip, MotionImportError, named, provenance_of, require_body_joints, stem, write_motions,
 };
@@ -10,7 +14,6 @@ use super::thinning::{Thinned, Thinning, largest_turn, thin};
 use super::{Progress, Summary};
 use crate::asset::skeleton::BODY_JOINT_COUNT;
 use crate::asset::{Body, Motion, Pose, Provenance};
-use crate::format::{Bvh, BvhError};
 use std::path::{Path, PathBuf};
 
 /// How motion is imported.

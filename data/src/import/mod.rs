@@ -1,33 +1,25 @@
 //! Importers: somebody else's files become this project's bodies, garments and motions.
 
 pub mod amass;
-pub mod anny;
 pub mod bvh;
 pub mod cloth3d;
 pub mod deepmimic;
-mod finish;
-mod helper_garments;
-pub mod makehuman;
 pub mod motions;
 mod overwrite;
-mod reference_surface;
 pub mod retarget;
-mod sheet_repair;
 pub mod smpl_family;
 pub mod thinning;
 
 pub use amass::{AmassSettings, UpAxis, import_amass};
-pub use anny::{AnnyError, AnnySettings, import_anny};
 pub use bvh::{BvhImportSettings, import_bvh};
 pub use cloth3d::{Cloth3dBodies, Cloth3dError, Cloth3dSettings, import_cloth3d};
 pub use deepmimic::{DeepMimicSettings, import_deepmimic};
-pub use finish::GarmentResolution;
-pub use makehuman::{MakeHumanError, MakeHumanSettings, import_makehuman};
 pub use motions::MotionImportError;
-pub use overwrite::OverwriteError;
+pub use overwrite::{OverwriteError, refuse_overwriting};
 pub use smpl_family::{SmplFamilyError, import_smpl_family};
 pub use thinning::Thinning;
 
+use std::fmt;
 use std::path::PathBuf;
 
 /// What an importer did.
@@ -41,6 +33,25 @@ pub struct Summary {
     pub notes: Vec<String>,
     /// The files written.
     pub written: Vec<PathBuf>,
+}
+
+/// One line per item and the counts.
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (name, about) in &self.taken {
+            writeln!(f, "taken    {name}: {about}")?;
+        }
+        for (name, reason) in &self.skipped {
+            writeln!(f, "skipped  {name}: {reason}")?;
+        }
+        for note in &self.notes {
+            writeln!(f, "note     {note}")?;
+        }
+        for file in &self.written {
+            writeln!(f, "written  {}", file.display())?;
+        }
+        write!(f, "{} taken, {} skipped", self.taken.len(), self.skipped.len())
+    }
 }
 
 /// Called with what is being done, how much of it is done, and how much there is.

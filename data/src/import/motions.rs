@@ -15,7 +15,7 @@ use super::overwrite::{OverwriteError, refuse_overwriting};
 use super::{Progress, Summary};
 use crate::asset::motion::MotionError;
 use crate::asset::{Body, Motion, Provenance, skeleton::BODY_JOINT_COUNT};
-use crate::format::atomic;
+use crate::format::{FileError, atomic};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
@@ -51,13 +51,8 @@ pub enum MotionImportError {
         reason: String,
     },
     /// A folder or the manifest cannot be read or written.
-    #[error("{}: {reason}", path.display())]
-    Io {
-        /// File or folder.
-        path: PathBuf,
-        /// What the system said.
-        reason: std::io::Error,
-    },
+    #[error(transparent)]
+    Io(#[from] FileError),
     /// The manifest that is already there is not one.
     #[error("{}: {message}; remove it or choose another folder", path.display())]
     Manifest {
@@ -226,7 +221,7 @@ fn read_manifest(out: &Path) -> Result<Manifest, MotionImportError> {
         Ok(text) => toml::from_str(&text)
             .map_err(|e| MotionImportError::Manifest { path, message: e.to_string().trim_end().to_string() }),
         Err(e) if e.kind() == ErrorKind::NotFound => Ok(Manifest::default()),
-        Err(reason) => Err(MotionImportError::Io { path, reason }),
+        Err(reason) => Err(FileError { path, reason }.into()),
     }
 }
 
@@ -235,7 +230,6 @@ fn write_manifest(out: &Path, mut manifest: Manifest) -> Result<PathBuf, MotionI
     manifest.motion.sort_by(|a, b| a.file.cmp(&b.file));
     let text = toml::to_string(&manifest)
         .map_err(|e| MotionImportError::Manifest { path: path.clone(), message: e.to_string() })?;
-    atomic::write(&path, text.as_bytes())
-        .map_err(|reason| MotionImportError::Io { path: path.clone(), reason })?;
+    atomic::write(&path, text.as_bytes()).map_err(FileError::at(&path))?;
     Ok(path)
 }

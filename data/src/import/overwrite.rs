@@ -16,7 +16,10 @@ pub struct OverwriteError {
 }
 
 /// Refuses outputs that are inputs, by whatever path they are named. Folders as inputs are compared with folders as outputs.
-pub(super) fn refuse_overwriting<I: AsRef<Path>, O: AsRef<Path>>(
+///
+/// # Errors
+/// [`OverwriteError`] names the input and the output that are one file.
+pub fn refuse_overwriting<I: AsRef<Path>, O: AsRef<Path>>(
     inputs: impl IntoIterator<Item = I>,
     outputs: impl IntoIterator<Item = O>,
 ) -> Result<(), OverwriteError> {

@@ -207,7 +207,7 @@ fn forces_follow_the_layer_order() {
     let product = model.untangling.vertex_product(embeddings.vertex);
     let single = states.single.canonical.clone();
     let displacement =
-        model.untangling.displacement.forward(single.clone(), product, latent, &scene.outfit.segments);
+        model.untangling.displacement.forward(single.clone(), product, latent, &scene.outfit.packing);
     assert_close(&states.last().canonical, &(single + displacement * config().untangling_scale), 1e-5);
 }
 
@@ -335,18 +335,21 @@ fn wrong_sizes_are_named() {
 }
 
 /// Contact features: irregular, and by the positions.
-fn features(posed: &Tensor<2>) -> FeltTensors {
+fn features(posed: &Tensor<2>) -> ContactFeatureTensors {
     let (rows, device) = (posed.dims()[0], posed.device());
     let positions = values(posed);
-    let directions: [Vec<[f32; 3]>; FeltTensors::DIRECTIONS] = std::array::from_fn(|k| {
+    let directions: [Vec<[f32; 3]>; ContactFeatureTensors::DIRECTIONS] = std::array::from_fn(|k| {
         let values = values(&uniform(rows, 3, 1.0, 11 + k as u64, &device));
         values.as_chunks::<3>().0.to_vec()
     });
-    let mut features = values(&uniform(rows, FeltTensors::FEATURES, 2.0, 30, &device));
-    for (row, position) in features.chunks_exact_mut(FeltTensors::FEATURES).zip(positions.chunks_exact(3)) {
+    let mut features = values(&uniform(rows, ContactFeatureTensors::FEATURES, 2.0, 30, &device));
+    for (row, position) in
+        features.chunks_exact_mut(ContactFeatureTensors::FEATURES).zip(positions.chunks_exact(3))
+    {
         row[0] = position[0].clamp(-5.0, 5.0);
     }
-    FeltTensors::new(features, directions.each_ref().map(Vec::as_slice), &device).expect("equal rows")
+    ContactFeatureTensors::new(features, directions.each_ref().map(Vec::as_slice), &device)
+        .expect("equal rows")
 }
 
 /// A scene whose model has two correction networks; their output layers start at zero or, `trained`, with other numbers.
@@ -442,6 +445,10 @@ fn a_correction_has_its_own_gradient_and_gives_nothing_back() {
 #[test]
 fn contact_features_have_one_row_per_vertex() {
     let directions = [[0.0; 3]; 4];
-    let wrong = FeltTensors::new(vec![0.0; 3], [directions.as_slice(); FeltTensors::DIRECTIONS], &device());
-    assert!(matches!(wrong, Err(ModelError::Length { array: "felt features", .. })));
+    let wrong = ContactFeatureTensors::new(
+        vec![0.0; 3],
+        [directions.as_slice(); ContactFeatureTensors::DIRECTIONS],
+        &device(),
+    );
+    assert!(matches!(wrong, Err(ModelError::Length { array: "contact features", .. })));
 }

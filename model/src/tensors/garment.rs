@@ -10,7 +10,7 @@ use crate::error::{ModelError, check_array};
 /// V vertices, k eigenpairs, J active joints.
 #[derive(Clone, Copy, Debug)]
 pub struct GarmentArrays<'a> {
-    /// Rest positions `[V,3]` in metres.
+    /// Rest positions `[V,3]` (m).
     pub rest: &'a [f32],
     /// Lumped vertex masses `[V]` (area, m²; only ratios matter in the embedding average).
     pub mass: &'a [f64],
@@ -29,7 +29,7 @@ pub struct GarmentArrays<'a> {
 /// Constant tensors of one garment (V vertices, k eigenpairs, J active joints).
 #[derive(Clone, Debug)]
 pub struct GarmentTensors {
-    /// Rest positions `[V,3]` in metres.
+    /// Rest positions `[V,3]` (m).
     pub rest: Tensor<2>,
     /// Vertex masses over their sum `[1,V]`: the row that averages vertex features.
     pub mass: Tensor<2>,

@@ -4,6 +4,7 @@
 use super::*;
 use crate::mesh::TriMesh;
 use crate::mesh::shapes::{SplitMix, grid, icosphere, irregular_grid, mapped, tube, union};
+use crate::query::{Distance, Surface};
 
 type Point = [i128; 3];
 
@@ -182,7 +183,7 @@ fn faces_that_are_no_triangle_take_part_in_nothing() {
 }
 
 #[test]
-fn the_segment_of_two_triangles_is_where_they_cross() {
+fn the_segment_of_two_triangles_is_where_they_intersect() {
     let a = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
     let b = [[1.0, 1.0, -1.0], [1.0, 1.0, 1.0], [1.0, 5.0, 0.0]];
     let [mut p, mut q] = intersection_segment(&a, &b).unwrap();
@@ -209,9 +210,9 @@ fn sleeve(radius: f64, turn: f64) -> TriMesh {
 }
 
 #[test]
-fn two_tubes_around_a_ball_cross_it_in_two_circles_each() {
+fn two_tubes_around_a_ball_intersect_it_in_two_circles_each() {
     let (ball, inner, outer) = (icosphere(0.4, 4), sleeve(0.3, 0.1), sleeve(0.32, 0.2));
-    let (ball_tree, sleeves) = (tree(&ball), [tree(&inner), tree(&outer)]);
+    let ball_tree = tree(&ball);
     for (mesh, radius) in [(&inner, 0.3), (&outer, 0.32)] {
         let pairs = tree(mesh).pairs_with(&ball_tree);
         let expected: Vec<(u32, u32)> = (0..mesh.face_count())
@@ -228,21 +229,46 @@ fn two_tubes_around_a_ball_cross_it_in_two_circles_each() {
             assert!((contour.length / circle - 1.0).abs() < 0.01, "{} {circle}", contour.length);
         }
     }
-    let report = IntersectionReport::new(&ball_tree, &sleeves);
-    assert!(report.garment_body.iter().all(|g| g.pairs > 100));
-    assert_eq!(report.garment_garment.len(), 1);
-    assert_eq!(report.garment_garment[0].intersections, Intersections::default());
-    assert_eq!(report.body_self, Intersections::default());
-    assert_eq!(report.garment_self, [Intersections::default(); 2]);
-    assert!((report.total().contour_length / (std::f64::consts::TAU * 1.24) - 1.0).abs() < 0.01);
-    assert!(!report.is_clear());
+    let report = report(&ball, &[&inner, &outer]);
+    assert!(report.garments.iter().all(|g| g.with_body.pairs.len() > 100 && g.depths.len() > 100));
+    assert!(report.garments.iter().all(|g| g.with_itself == TrianglePairs::default()));
+    let [layer] = &report.layers[..] else { panic!("one pair of layers: {:?}", report.layers) };
+    assert_eq!((layer.inner, layer.outer, &layer.pairs), (0, 1, &TrianglePairs::default()));
+    assert_eq!((layer.counted, layer.order().violations), (outer.vertex_count(), 0));
+    assert_eq!(report.body_itself, Intersections::default());
+    let circles = std::f64::consts::TAU * 1.24;
+    assert!((report.intersections().contour_length / circles - 1.0).abs() < 0.01);
     let far = mapped(&ball, |p| [p[0] + 5.0, p[1], p[2]]);
-    assert!(IntersectionReport::new(&tree(&far), &sleeves).is_clear());
+    let apart = self::report(&far, &[&outer, &inner]);
+    assert_eq!((apart.intersections().pairs, apart.penetration(0.0).inside), (0, 0));
+    assert_eq!(apart.order().share(), 1.0);
+}
+
+fn report(body: &TriMesh, garments: &[&TriMesh]) -> Report {
+    let garments: Vec<ReportGarment<'_>> =
+        garments.iter().map(|g| ReportGarment { positions: g.positions(), faces: g.faces() }).collect();
+    let order = LayerOrder::NearestVertex;
+    let selection = Selection { layers: &[(0, 1)], order, triangles: true, body_itself: true };
+    Report::count(&PosedBody::new(&Surface::from_mesh(body), Distance::ClosestPoint), &garments, &selection)
+}
+
+#[test]
+fn points_inside_a_sphere_are_counted_with_their_depth() {
+    let sphere = icosphere(1.0, 4);
+    let points = [[0.0, 0.0, 0.0], [0.0, 0.9, 0.0], [1.5, 0.0, 0.0], [0.0, 0.0, -0.995]];
+    let garment = ReportGarment { positions: &points, faces: &[[0, 1, 2]] };
+    let order = LayerOrder::NearestVertex;
+    let selection = Selection { layers: &[], order, triangles: false, body_itself: false };
+    let surface = Surface::from_mesh(&sphere);
+    let report = Report::count(&PosedBody::new(&surface, Distance::ClosestPoint), &[garment], &selection);
+    let p = report.penetration(0.05);
+    assert_eq!((p.vertices, p.inside, p.deep), (4, 3, 2));
+    assert!((p.max_depth - 1.0).abs() < 0.01, "{p:?}");
 }
 
 #[test]
 fn contours_survive_aligned_meshes() {
-    // Every crossing runs along edges and through vertices of both grids.
+    // Every contour runs along edges and through vertices of both grids.
     let flat = grid(1.0, 1.0, 8, 8);
     let upright = mapped(&grid(1.0, 1.0, 8, 8), |p| [p[0], 0.5, p[1] - 0.5]);
     let pairs = tree(&flat).pairs_with(&tree(&upright));

@@ -1,4 +1,4 @@
-//! How large the gradient of each term can be at a vertex, whatever the shape: the promise behind "bounded".
+//! How large the gradient of each term can be at a vertex, whatever the shape: the invariant behind "bounded".
 //!
 //! Every bound is a closed formula in the size of the scene and the constants of the regularisation, derived from the
 //! triangle inequality; none divides by a deformed length, area or distance, so that no degenerate shape can make it infinite.
@@ -18,7 +18,7 @@
 //! | layer distance | `3M(r + D)²` | `d_inner < r`, `d_outer ≥ −D`, `M` vertices at most per bucket |
 
 use super::bending;
-use super::holding::HeightRow;
+use super::garment_term::HeightRow;
 use super::{EnergySettings, LayerContact, SceneEnergy, Term, layer_collision, repulsion};
 use crate::mesh::{Topology, TriMesh};
 use crate::real::Real;

@@ -15,12 +15,12 @@
 //! noise, so it counts at least as much as the largest entry after every coordinate moved by a random amount of up to one
 //! hundredth of an edge. A term that is silent there as well must be exactly constant.
 //!
-//! **Kinks.** Nearest vertices, the repulsion's radius and the gates change in jumps, and the angle of a hinge has a kink at
-//! π: there is no derivative there. A line is excused from the central check only if the jump is *shown*: the gradient, or
+//! **Nonsmooth points.** Nearest vertices, the repulsion's radius and the gates change in jumps, and the angle of a hinge is
+//! not smooth at π: there is no derivative there. A line is excused from the central check only if the jump is *shown*: the gradient, or
 //! the part of the value that the gradient does not explain (the residual of the trapezoid rule), must differ between the
 //! two ends of the line and fail to shrink with its length. Of a differentiable function both shrink at least linearly,
 //! even if the gradient is wrong. On such a line both sides are checked instead, each with quotients that stay on it. At
-//! the kink itself no derivative exists; what the term returns there is the gradient of one of its sides, and bounded by
+//! the point itself no derivative exists; what the term returns there is the gradient of one of its sides, and bounded by
 //! [`super::gradient_bound`] like any other.
 
 use rayon::prelude::*;
@@ -89,8 +89,8 @@ pub struct GradientReport {
     pub resolution: f64,
     /// Lines compared.
     pub lines: usize,
-    /// How many of them were compared on both sides of a kink.
-    pub kinks: usize,
+    /// How many of them were compared on both sides of a nonsmooth point.
+    pub nonsmooth: usize,
 }
 
 impl GradientReport {
@@ -112,7 +112,7 @@ pub fn check_gradient(
     canonical: &[[f64; 3]],
     settings: &GradientCheck,
 ) -> Option<GradientReport> {
-    let scene = alone(scene, term);
+    let scene = with_only(scene, term);
     raw_value(&scene.value(posed, canonical), term)?;
     let edges = scene.garments.iter().map(|g| g.energies.as_inner().median_edge());
     let edge = edges.fold(LONGEST_EDGE, f64::min);
@@ -175,7 +175,7 @@ pub fn check_function(
         error: worst(|r| r.error),
         resolution: if scale > 0.0 { worst(|r| r.resolution) } else { 0.0 },
         lines: results.len(),
-        kinks: results.iter().filter(|r| r.kink).count(),
+        nonsmooth: results.iter().filter(|r| r.is_nonsmooth).count(),
     }
 }
 
@@ -186,7 +186,7 @@ pub fn raw_value<T>(value: &SceneValue<T>, term: Term) -> Option<f64> {
 }
 
 /// `scene` with weight 1 for `term` and 0 for all others.
-pub fn alone<T: crate::Real>(scene: &SceneEnergy<T>, term: Term) -> SceneEnergy<T> {
+pub fn with_only<T: crate::Real>(scene: &SceneEnergy<T>, term: Term) -> SceneEnergy<T> {
     let weights = TermMap::from_fn(|t| if t == term { 1.0 } else { 0.0 });
     let mut scene = scene.clone();
     scene.garments.iter_mut().for_each(|g| g.weights = weights);
@@ -279,7 +279,7 @@ struct Quotient {
 struct LineResult {
     error: f64,
     resolution: f64,
-    kink: bool,
+    is_nonsmooth: bool,
 }
 
 struct Ladder {
@@ -294,7 +294,7 @@ impl Ladder {
         let expected = along(gradient, line);
         let quotient = self.quotient(probe, line, 0.0, self.first);
         let error = (quotient.derivative - expected).abs();
-        let result = LineResult { error, resolution: quotient.uncertainty, kink: false };
+        let result = LineResult { error, resolution: quotient.uncertainty, is_nonsmooth: false };
         if error <= TOLERANCE * self.scale || !self.jumps(probe, line) {
             return result;
         }
@@ -302,7 +302,7 @@ impl Ladder {
         LineResult {
             error: nan_max(left.error, right.error),
             resolution: left.resolution.max(right.resolution),
-            kink: true,
+            is_nonsmooth: true,
         }
     }
 
@@ -326,16 +326,16 @@ impl Ladder {
         })
     }
 
-    /// The check on one side of a kink: the best of several distances from it, with quotients that do not reach it.
+    /// The check on one side of a nonsmooth point: the best of several distances from it, with quotients that do not reach it.
     fn side(&self, probe: &Probe<'_>, line: &Line, side: f64) -> LineResult {
-        let mut best = LineResult { error: f64::INFINITY, resolution: 0.0, kink: true };
+        let mut best = LineResult { error: f64::INFINITY, resolution: 0.0, is_nonsmooth: true };
         for distance in self.steps(self.first) {
             let centre = side * distance;
             let expected = along(&probe.evaluate(line, centre).1, line);
             let quotient = self.quotient(probe, line, centre, 0.5 * distance);
             let error = (quotient.derivative - expected).abs();
             if error < best.error {
-                best = LineResult { error, resolution: quotient.uncertainty, kink: true };
+                best = LineResult { error, resolution: quotient.uncertainty, is_nonsmooth: true };
             }
             if best.error <= TOLERANCE * self.scale {
                 break;
@@ -397,10 +397,10 @@ mod tests {
     #[test]
     fn a_derivative_passes_and_one_that_is_a_little_off_does_not() {
         let good = report(f64::exp, f64::exp, 0.4);
-        assert!(good.passes() && good.kinks == 0 && good.error < 1e-8, "{good:?}");
+        assert!(good.passes() && good.nonsmooth == 0 && good.error < 1e-8, "{good:?}");
         let off = report(f64::exp, |x| x.exp() * (1.0 + 5e-6), 0.4);
         // A line along all 18 coordinates at once adds up their errors: √18 times 5e-6.
-        assert!(!off.passes() && off.error < 2.5e-5 && off.kinks == 0, "{off:?}");
+        assert!(!off.passes() && off.error < 2.5e-5 && off.nonsmooth == 0, "{off:?}");
     }
 
     #[test]
@@ -411,15 +411,15 @@ mod tests {
     }
 
     #[test]
-    fn kinks_and_jumps_are_checked_on_both_sides() {
+    fn nonsmooth_points_and_jumps_are_checked_on_both_sides() {
         for (f, slope) in [
             (f64::abs as fn(f64) -> f64, f64::signum as fn(f64) -> f64),
             (|x| x.sin() + f64::from(x > 0.0), f64::cos),
         ] {
             let good = report(f, slope, 0.0);
-            assert!(good.passes() && good.kinks > 0, "{good:?}");
+            assert!(good.passes() && good.nonsmooth > 0, "{good:?}");
         }
-        // A kink is no excuse for a wrong slope beside it, nor is a claimed kink where the function has none.
+        // A nonsmooth point is no excuse for a wrong slope beside it, nor is a claimed one where the function is smooth.
         let wrong = report(f64::abs, |x| x.signum() * 1.001, 0.0);
         assert!(!wrong.passes(), "{wrong:?}");
         let invented = report(|x| x, |x| 1.0 + 0.1 * x.signum(), 0.0);

@@ -1,8 +1,17 @@
 //! The switches and constants of the energies.
 
-use super::layer_collision::LayerContact;
 use super::{EnergyError, Material};
 use crate::query::Distance;
+
+/// How the signed distance of an outer vertex to an inner garment is measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum LayerContact {
+    /// `(x − x_g)·n_g` with the nearest vertex `g` and its area-weighted normal: the paper's form.
+    #[default]
+    NearestVertex,
+    /// The distance to the closest point of the surface.
+    ClosestPoint,
+}
 
 /// Which outer vertices take part in the layer collision.
 ///

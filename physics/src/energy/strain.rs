@@ -11,10 +11,11 @@
 //! same, such a triangle measures `G = ½(FᵀF − F₀ᵀF₀)`, `F₀` being its `F` in the rest shape; for every other triangle
 //! `F₀ᵀF₀ = I`. A ratio of 0 is the printed form. A triangle without area has no energy in either.
 
-use super::elements::{Incidence, Response, sum_elements};
+use super::elements::{Response, sum_elements};
 use super::{CurvatureSink, GarmentState, GarmentTerm, Material, Weighted};
 use crate::mesh::TriMesh;
 use crate::real::Real;
+use crate::rows::{CompressedRows, corners_at_vertices};
 use crate::vec3::{add, add_scaled, dot, norm, scale, sub, to_f64};
 
 /// The strain energy of one garment.
@@ -23,7 +24,7 @@ pub struct Strain {
     mu: f64,
     lambda: f64,
     triangles: Vec<RestTriangle>,
-    incidence: Incidence,
+    corners_at: CompressedRows<u32>,
 }
 
 /// A triangle with a smaller ratio of height to longest edge has no area: corners on a line round to heights of about 1e-16.
@@ -171,14 +172,14 @@ impl Strain {
             .map(|&face| RestTriangle::new(rest.positions(), face, material.thickness, needle))
             .collect();
         let corners: Vec<[u32; 3]> = triangles.iter().map(|t| t.corners).collect();
-        let incidence = Incidence::new(rest.vertex_count(), &corners);
-        Self { mu: material.mu, lambda: material.lambda, triangles, incidence }
+        let corners_at = corners_at_vertices(rest.vertex_count(), &corners);
+        Self { mu: material.mu, lambda: material.lambda, triangles, corners_at }
     }
 
     /// Energy [J] at `positions` `[V, 3]` [m]; adds its weighted gradient to `target`.
     pub fn evaluate<T: Real>(&self, positions: &[[T; 3]], target: Option<Weighted<'_, T>>) -> f64 {
         let element = |t: usize| self.triangles[t].response(positions, self.mu, self.lambda);
-        sum_elements(self.triangles.len(), &self.incidence, element, target)
+        sum_elements(self.triangles.len(), &self.corners_at, element, target)
     }
 }
 

@@ -13,7 +13,7 @@ pub enum Stop {
     Time,
     /// No step along the descent direction lowers the energy, even with a fresh preconditioner and an empty memory, or
     /// the last 60 steps together gained less than a billionth of what all gained: some vertices rest against a jump of
-    /// the energy, or creep along kinks.
+    /// the energy, or creep along nonsmooth points.
     Stalled,
     /// A vertex went farther from its start than allowed: nothing holds that part of the garment.
     Escaped,

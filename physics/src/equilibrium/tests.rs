@@ -1,4 +1,4 @@
-//! The solver against analytic answers, a dense oracle, and its own promises.
+//! The solver against analytic answers, a dense oracle, and its own invariants.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -91,7 +91,7 @@ const STIFF_CONTACT: f64 = 2e4;
 
 #[test]
 fn a_strip_under_its_own_weight_stretches_as_the_material_says() {
-    // Held at the top (with λ = 0 and weightless bending, so that columns of cloth stretch alone).
+    // Held at the top (with λ = 0 and weightless bending, so that columns of cloth stretch independently).
     let mut settings = settings();
     settings.material.lambda = 0.0;
     settings.material.density = 4260.0;
@@ -122,7 +122,7 @@ fn a_strip_under_its_own_weight_stretches_as_the_material_says() {
         / samples as f64;
     let ys = solution.positions.iter().map(|p| p[1]);
     let found = ys.clone().fold(f64::MIN, f64::max) - ys.fold(f64::MAX, f64::min);
-    assert!(length > 1.03 * height, "the load must be felt: {length}");
+    assert!(length > 1.03 * height, "the load must show: {length}");
     assert!((found / length - 1.0).abs() < 1e-3, "{found} {length}");
 }
 
@@ -175,7 +175,7 @@ fn a_skirt_comes_to_rest_on_a_cone() {
 
 #[test]
 fn a_sheet_comes_to_rest_in_a_valley() {
-    // Two slopes meet in a crease, over which the distance has a kink.
+    // Two slopes meet in a crease, over which the distance is not smooth.
     let valley = shapes::mapped(&shapes::grid(0.6, 0.6, 12, 12), |[x, y, _]| {
         [x - 0.3, 0.5 * (x - 0.3).abs(), 0.3 - y]
     });
@@ -225,7 +225,7 @@ fn cloth_comes_to_rest_on_other_cloth() {
     let problem = Problem::new(&energy).unwrap();
     let start = [inner.positions(), outer.positions()].concat();
     let solution = run(&problem, &start, &SolverSettings::default());
-    // Not to the last digit: only kinks of the contact with the body are known to the solver.
+    // Not to the last digit: the solver only knows the nonsmooth points of the contact with the body.
     assert!(solution.relative_gradient < 1e-3, "{:?} {}", solution.last(), solution.relative_gradient);
     assert_monotone(&solution);
     // The lower sheet carries the upper one.

@@ -369,10 +369,10 @@ mod tests {
         let point = shapes::mapped(&shapes::grid(1.0, 1.0, 18, 18), |_| [2.0, 2.0, 2.0]);
         let line = shapes::mapped(&shapes::grid(1.0, 1.0, 18, 18), |[x, y, _]| [4.0 + x + y, 0.0, 0.0]);
         let mesh = shapes::union(&[&sheet, &point, &line]);
-        let (basis, alone) = (basis_of(&mesh, 24), basis_of(&sheet, 24));
-        assert_eq!(basis.values, alone.values);
-        assert_eq!(basis.vectors[..alone.vectors.len()], alone.vectors);
-        assert!(basis.vectors[alone.vectors.len()..].iter().all(|v| *v == 0.0));
+        let (basis, single) = (basis_of(&mesh, 24), basis_of(&sheet, 24));
+        assert_eq!(basis.values, single.values);
+        assert_eq!(basis.vectors[..single.vectors.len()], single.vectors);
+        assert!(basis.vectors[single.vectors.len()..].iter().all(|v| *v == 0.0));
     }
 
     #[test]

@@ -1,10 +1,10 @@
 //! The same queries without an accelerator, in O(V) or O(F) each: the oracles that the fast ones are tested against.
 
-use crate::mesh::FacesAtVertex;
-use crate::query::closest_point::closest_on_triangle;
 use crate::query::pseudo_normal::PseudoNormals;
+use crate::query::triangle_point::closest_on_triangle;
 use crate::query::{Distance, Gap};
 use crate::real::Real;
+use crate::rows::faces_at_vertices;
 use crate::vec3;
 
 pub use crate::query::winding_number::winding_number;
@@ -64,7 +64,7 @@ pub fn gap(
                 .min_by(|a, b| a.1.distance_squared.total_cmp(&b.1.distance_squared))
                 .expect("a surface has faces");
             let face = faces[index];
-            let at_vertex = &FacesAtVertex::new(positions.len(), faces);
+            let at_vertex = &faces_at_vertices(positions.len(), faces, 0..faces.len() as u32);
             let normal = PseudoNormals { positions, faces, at_vertex }.at(index as u32, found.feature);
             let offset = vec3::sub(p, found.position);
             let sign = if vec3::dot(offset, normal) < 0.0 { -1.0 } else { 1.0 };

@@ -255,7 +255,7 @@ mod tests {
                             surface.gap(q, distance)
                         })
                         .collect();
-                    // The distance has kinks where the nearest feature changes; there it has no derivative.
+                    // Where the nearest feature changes, the distance has no derivative.
                     if moved.iter().any(|g| g.vertex != here.vertex || g.gap.signum() != here.gap.signum()) {
                         continue;
                     }

@@ -6,10 +6,13 @@
 use clothcombo_data::asset::{Binding, BindingSettings, Body, BodyFileSettings, Category, Garment, Pose};
 use clothcombo_data::dataset::{load_garment_folder, load_motion_folder};
 use clothcombo_data::generate::{GarmentGenerator, GarmentSettings, mannequin};
+use clothcombo_physics::Surface;
 use clothcombo_physics::contact::{
-    IntersectionReport, TriangleTree, mesh_triangles_intersect, triangles_intersect,
+    LayerOrder, PosedBody, Report, ReportGarment, Selection, TriangleTree, all_layers,
+    mesh_triangles_intersect, triangles_intersect,
 };
 use clothcombo_physics::mesh::TriMesh;
+use clothcombo_physics::query::Distance;
 use rayon::prelude::*;
 use std::path::Path;
 
@@ -167,14 +170,25 @@ fn pairs_within(a: &Snapped) -> Vec<(u32, u32)> {
 /// The report of `garments` on `body` against brute force, pair by pair.
 fn check(body: &Snapped, garments: &[Snapped]) {
     let trees: Vec<TriangleTree> = garments.iter().map(Snapped::tree).collect();
-    let report = IntersectionReport::new(&body.tree(), &trees);
+    let meshes: Vec<ReportGarment> = garments
+        .iter()
+        .map(|g| ReportGarment { positions: g.mesh.positions(), faces: g.mesh.faces() })
+        .collect();
+    let selection = Selection {
+        layers: &all_layers(garments.len()),
+        order: LayerOrder::NearestVertex,
+        triangles: true,
+        body_itself: true,
+    };
+    let surface = Surface::from_mesh(&body.mesh);
+    let report = Report::count(&PosedBody::new(&surface, Distance::ClosestPoint), &meshes, &selection);
     let mut total = 0;
     for (i, garment) in garments.iter().enumerate() {
         let (with_body, with_itself) = (pairs_between(garment, body), pairs_within(garment));
         assert_eq!(trees[i].pairs_with(&body.tree()), with_body);
         assert_eq!(trees[i].self_pairs(), with_itself);
-        assert_eq!(report.garment_body[i].pairs, with_body.len());
-        assert_eq!(report.garment_self[i].pairs, with_itself.len());
+        assert_eq!(report.garments[i].with_body.pairs, with_body);
+        assert_eq!(report.garments[i].with_itself.pairs, with_itself);
         println!(
             "garment {i}: {} triangles, {} pairs with the body of {}, {} with itself",
             garment.boxes.len(),
@@ -184,19 +198,22 @@ fn check(body: &Snapped, garments: &[Snapped]) {
         );
         total += with_body.len() + with_itself.len();
     }
-    for layer in &report.garment_garment {
-        let pairs = pairs_between(&garments[layer.inner], &garments[layer.outer]);
-        assert_eq!(trees[layer.inner].pairs_with(&trees[layer.outer]), pairs);
-        assert_eq!(layer.intersections.pairs, pairs.len());
+    for layer in &report.layers {
+        let pairs = pairs_between(&garments[layer.outer], &garments[layer.inner]);
+        assert_eq!(trees[layer.outer].pairs_with(&trees[layer.inner]), pairs);
+        assert_eq!(layer.pairs.pairs, pairs);
         println!("garments {} and {}: {} pairs", layer.inner, layer.outer, pairs.len());
         total += pairs.len();
     }
     let of_the_body = pairs_within(body);
-    assert_eq!(report.body_self.pairs, of_the_body.len());
+    assert_eq!(report.body_itself.pairs, of_the_body.len());
     println!("body with itself: {} pairs, in no total", of_the_body.len());
     // What the body does to itself is in no sum.
-    assert_eq!(report.total().pairs, total);
-    assert!(report.garment_body.iter().all(|g| g.pairs > 0), "garments that touch nothing test nothing");
+    assert_eq!(report.intersections().pairs, total);
+    assert!(
+        report.garments.iter().all(|g| !g.with_body.pairs.is_empty()),
+        "garments that touch nothing test nothing"
+    );
 }
 
 /// `garments` skinned onto the posed body.

@@ -48,7 +48,7 @@ pub struct Arguments {
     replace: bool,
     #[command(flatten)]
     post_process: PostProcessArguments,
-    /// Leave crossings of a garment with itself alone
+    /// Leave self-intersections of garments as they are
     #[arg(long)]
     keep_self: bool,
     /// Print the report as JSON instead of tables
@@ -286,7 +286,7 @@ fn table(report: &ResolveReport) -> String {
     };
     line("pairs where the body is pinched", pinched(before), pinched(after));
     line(
-        "length of the crossings [mm]",
+        "length of the intersection curves [mm]",
         millimetres(before.contour_length_mm),
         millimetres(after.contour_length_mm),
     );

@@ -61,7 +61,8 @@ const RAW: [&str; 6] =
 const WEIGHTED: [&str; 6] = ["strain", "bending", "gravity", "collision", "repulsion", "holding"];
 const CONTACT: [&str; 7] =
     ["contact", "vertices", "triangles", "inside [%]", "depth [mm]", "body pairs", "self pairs"];
-const LAYERS: [&str; 5] = ["layers", "collision [m³]", "distance [m³]", "pairs", "order violations [%]"];
+const LAYERS: [&str; 5] =
+    ["layers", "collision [m³]", "distance [m³]", "pairs", "order violations, nearest vertex [%]"];
 
 fn tables(score: &Score) -> String {
     let garments = || score.garments.iter();
@@ -103,7 +104,7 @@ fn tables(score: &Score) -> String {
                 number(layer.layer_collision),
                 number(layer.layer_distance),
                 layer.triangle_pairs.to_string(),
-                format!("{:.2}", 100.0 * layer.order_violations),
+                format!("{:.2}", 100.0 * layer.order_violations_nearest_vertex),
             ]
         })
         .collect();

@@ -46,15 +46,6 @@ pub fn measuring_seconds(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A part of a whole, 0 to 1.
-pub fn share(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(share) if (0.0..=1.0).contains(&share) => Ok(share),
-        Ok(_) => Err("it must be between 0 and 1".into()),
-        Err(_) => Err("it is no number".into()),
-    }
-}
-
 /// A finite number greater than 0.
 pub fn positive(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|x: &f64| x.is_finite() && *x > 0.0).ok_or_else(|| "not a number above 0".into())
@@ -95,9 +86,8 @@ mod tests {
     fn numbers_have_bounds() {
         for text in ["nan", "inf", "-1", "1e30", "x", ""] {
             assert!(measuring_seconds(text).is_err(), "{text}");
-            assert!(share(text).is_err(), "{text}");
         }
-        assert_eq!((measuring_seconds("0.5"), share("0"), share("1")), (Ok(0.5), Ok(0.0), Ok(1.0)));
+        assert_eq!(measuring_seconds("0.5"), Ok(0.5));
         for text in ["nan", "inf", "-1", "x"] {
             assert!(positive(text).is_err() && not_negative(text).is_err(), "{text}");
         }

@@ -1,8 +1,8 @@
 //! A garment with everything that does not change during training.
 
 use clothcombo_data::asset::Garment;
+use clothcombo_physics::contact_features::Rings;
 use clothcombo_physics::energy::GarmentEnergies;
-use clothcombo_physics::sensing::Rings;
 use rayon::prelude::*;
 use std::sync::Arc;
 

@@ -9,10 +9,10 @@ use clothcombo_data::cache::{
     ArrayCache, CacheError, Key, binding_key, body_key, get_binding, get_largest_weights, get_operators,
     operators_key, put_binding, put_operators,
 };
+use clothcombo_physics::contact_features::Rings;
 use clothcombo_physics::energy::{EnergySettings, GarmentEnergies};
 use clothcombo_physics::mesh::{Topology, TriMesh};
 use clothcombo_physics::operators::SurfaceOperators;
-use clothcombo_physics::sensing::Rings;
 use std::sync::Arc;
 
 /// Body and settings with which garments are prepared, and the cache of what that computes, if there is one.

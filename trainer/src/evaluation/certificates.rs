@@ -9,8 +9,8 @@ use clothcombo_physics::contact::resolve::{
     Certificate, Layer, ResolveError, ResolveSettings, Resolved, RestGarment, Waypoint, certify,
     resolve_along,
 };
-use clothcombo_physics::contact::{OrderViolations, order_violations};
-use clothcombo_physics::query::Surface;
+use clothcombo_physics::contact::{LayerOrder, PosedBody, Report, ReportGarment, Selection, all_layers};
+use clothcombo_physics::query::{Distance, Surface};
 use clothcombo_physics::transform::apply;
 use miette::Diagnostic;
 use serde::Serialize;
@@ -148,20 +148,23 @@ impl DrapedScene<'_> {
     /// # Errors
     /// When it is no valid scene.
     pub fn counts(&self) -> Result<Counts, ResolveError> {
-        Ok(Counts::new(&self.certificate()?, self.order_by_vertices(&self.positions)))
+        Ok(Counts::new(&self.certificate()?, self.order_violations_nearest_vertex(&self.positions)))
     }
 
-    /// Share of wrong-side vertices over all pairs of layers, by the nearest vertex: the definition of the score.
-    pub fn order_by_vertices(&self, positions: &[Vec<[f64; 3]>]) -> f64 {
-        let mut sum = OrderViolations::default();
-        for (outer, over) in positions.iter().enumerate() {
-            for (garment, under) in self.garments.iter().zip(&positions[..outer]) {
-                let pair = order_violations(under, garment.faces(), over);
-                sum.counted += pair.counted;
-                sum.violations += pair.violations;
-            }
-        }
-        sum.share()
+    /// Share of layer-order violations over all pairs of layers, by the nearest vertex: the definition of the score.
+    pub fn order_violations_nearest_vertex(&self, positions: &[Vec<[f64; 3]>]) -> f64 {
+        let garments: Vec<ReportGarment> = self
+            .garments
+            .iter()
+            .zip(positions)
+            .map(|(garment, positions)| ReportGarment { positions, faces: garment.faces() })
+            .collect();
+        let layers = all_layers(garments.len());
+        let order = LayerOrder::NearestVertex;
+        let selection = Selection { layers: &layers, order, triangles: false, body_itself: false };
+        Report::count(&PosedBody::new(&self.body, Distance::NearestVertex), &garments, &selection)
+            .order()
+            .share()
     }
 }
 
@@ -188,15 +191,15 @@ pub struct Counts {
     pub contour_length_mm: f64,
     /// Deepest vertex [mm].
     pub max_depth_mm: f64,
-    /// Share of wrong-side vertices by the closest surface point.
+    /// Share of layer-order violations, by the closest surface point.
     pub order_violations: f64,
-    /// Share of wrong-side vertices by the nearest vertex.
-    pub order_violations_by_vertices: f64,
+    /// The same by the nearest vertex: the paper's form.
+    pub order_violations_nearest_vertex: f64,
 }
 
 impl Counts {
     /// Those of `certificate`.
-    pub fn new(certificate: &Certificate, order_violations_by_vertices: f64) -> Self {
+    pub fn new(certificate: &Certificate, order_violations_nearest_vertex: f64) -> Self {
         Self {
             body_triangle_pairs: certificate.body_triangle_pairs,
             narrow_triangle_pairs: certificate.narrow_triangle_pairs,
@@ -206,7 +209,7 @@ impl Counts {
             contour_length_mm: certificate.contour_length_mm,
             max_depth_mm: certificate.max_depth_mm,
             order_violations: certificate.order_violations,
-            order_violations_by_vertices,
+            order_violations_nearest_vertex,
         }
     }
 
@@ -271,7 +274,10 @@ impl OutfitResult {
             garments: scene.garments.iter().map(|w| w.garment.name.clone()).collect(),
             is_wearable: draped.is_wearable(),
             before,
-            after: Counts::new(&resolved.certificate, draped.order_by_vertices(&resolved.positions)),
+            after: Counts::new(
+                &resolved.certificate,
+                draped.order_violations_nearest_vertex(&resolved.positions),
+            ),
             strain_added: resolved.certificate.strain_added,
             largest_move_mm: 1e3 * works.iter().map(|w| w.largest_move).fold(0.0, f64::max),
             moved: moved as f64 / vertices.iter().sum::<usize>().max(1) as f64,

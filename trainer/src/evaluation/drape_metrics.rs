@@ -5,9 +5,12 @@ use super::{Estimate, Metric};
 use crate::dataset::PreparedScene;
 use crate::inference::Draped;
 use crate::inference::reference::wide;
-use clothcombo_physics::contact::{Intersections, TriangleTree, self_collision};
+use clothcombo_physics::contact::{
+    self, Intersections, LayerOrder, PosedBody, ReportGarment, Selection, all_layers, self_collision,
+};
 use clothcombo_physics::energy::{EnergySettings, SceneEnergy, SceneLayers, Term, TermMap};
 use clothcombo_physics::mesh::Topology;
+use clothcombo_physics::query::Distance;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
@@ -40,21 +43,23 @@ const PAPER_COLLISION_WEIGHT: f64 = 250.0;
 /// Measures drapes of `scene` on its first body.
 pub fn measure(scene: &PreparedScene, drapes: &[Draped]) -> Vec<DrapeMetrics> {
     let surface = scene.exact_body();
-    let body = TriangleTree::new(&surface.positions, &surface.faces);
+    let body = PosedBody::new(&surface, Distance::NearestVertex);
+    let layers = all_layers(scene.garments.len());
+    let order = LayerOrder::NearestVertex;
+    let selection = Selection { layers: &layers, order, triangles: true, body_itself: false };
     let paper = paper_collisions(&scene.bodies[0].energy);
     let topologies: Vec<_> = scene.garments.iter().map(|g| Topology::new(&g.garment.rest)).collect();
     let measured = |draped: &Draped| {
         let positions = wide(&draped.posed);
         let parts = scene.parts(&positions).into_iter().zip(&scene.garments);
-        let trees: Vec<TriangleTree> =
-            parts.map(|(part, garment)| TriangleTree::new(part, garment.garment.rest.faces())).collect();
-        let layer_pairs = (0..trees.len()).flat_map(|i| (i + 1..trees.len()).map(move |j| (i, j)));
-        let self_intersections = trees.iter().zip(&topologies).map(|(tree, topology)| {
-            let pairs = tree.self_pairs();
-            let degree = self_collision(tree, &pairs, topology, PAPER_REPULSION_RADIUS);
-            (Intersections::of_self_pairs(tree, &pairs), degree)
+        let garments: Vec<ReportGarment> = parts
+            .map(|(positions, garment)| ReportGarment { positions, faces: garment.garment.rest.faces() })
+            .collect();
+        let report = contact::Report::count(&body, &garments, &selection);
+        let degrees = garments.iter().zip(&report.garments).zip(&topologies);
+        let degrees = degrees.map(|((&ReportGarment { positions, faces }, found), topology)| {
+            self_collision(positions, faces, &found.with_itself.pairs, topology, PAPER_REPULSION_RADIUS)
         });
-        let (own, degrees): (Vec<Intersections>, Vec<f64>) = self_intersections.unzip();
         let paper = paper.value(&draped.posed, &draped.canonical);
         let weighted = |values: &[TermMap<Option<f64>>], term: Term| -> f64 {
             PAPER_COLLISION_WEIGHT * values.iter().filter_map(|raw| raw[term]).sum::<f64>()
@@ -63,10 +68,10 @@ pub fn measure(scene: &PreparedScene, drapes: &[Draped]) -> Vec<DrapeMetrics> {
             score: score_scene(scene, &surface, draped),
             paper_collision: weighted(&paper.garments, Term::BodyCollision),
             paper_layer_collision: weighted(&paper.layers, Term::LayerCollision),
-            self_collision: degrees.into_iter().sum(),
-            body: trees.iter().map(|tree| Intersections::between(tree, &body)).sum(),
-            layers: layer_pairs.map(|(i, j)| Intersections::between(&trees[i], &trees[j])).sum(),
-            own: own.into_iter().sum(),
+            self_collision: degrees.sum(),
+            body: report.garments.iter().map(|garment| garment.with_body.numbers()).sum(),
+            layers: report.layers.iter().map(|layer| layer.pairs.numbers()).sum(),
+            own: report.garments.iter().map(|garment| garment.with_itself.numbers()).sum(),
         }
     };
     drapes.iter().map(measured).collect()

@@ -2,9 +2,9 @@
 
 use crate::dataset::{PreparedBody, PreparedGarment, PreparedScene};
 use burn::tensor::Device;
-use clothcombo_model::{FeltTensors, Mode};
+use clothcombo_model::{ContactFeatureTensors, Mode};
+use clothcombo_physics::contact_features::{ContactFeatures, DIRECTIONS, FEATURES, Rings};
 use clothcombo_physics::energy::SceneEnergy;
-use clothcombo_physics::sensing::{DIRECTIONS, FEATURES, Rings, Sensed, sense};
 use std::sync::Arc;
 
 /// Whether the garments of a scene interact.
@@ -43,7 +43,8 @@ impl LayerInteraction {
     }
 }
 
-const _: () = assert!(FEATURES == FeltTensors::FEATURES && DIRECTIONS == FeltTensors::DIRECTIONS);
+const _: () =
+    assert!(FEATURES == ContactFeatureTensors::FEATURES && DIRECTIONS == ContactFeatureTensors::DIRECTIONS);
 
 /// Contact features of the garments of `scene` at `posed` `[ΣV, 3]` (m) on `body`, as tensors on `device`.
 ///
@@ -54,11 +55,12 @@ pub fn contact_features(
     contacts: &[(usize, usize)],
     posed: &[[f32; 3]],
     device: &Device,
-) -> FeltTensors {
+) -> ContactFeatureTensors {
     let rings: Vec<&Rings> = scene.garments.iter().map(|garment| &garment.rings).collect();
-    let Sensed { features, directions } = sense(&body.energy, &rings, posed, contacts);
+    let ContactFeatures { features, directions } =
+        ContactFeatures::new(&body.energy, &rings, posed, contacts);
     let directions = directions.map(|posed| unposed(scene, body, &posed));
-    FeltTensors::new(features, directions.each_ref().map(Vec::as_slice), device)
+    ContactFeatureTensors::new(features, directions.each_ref().map(Vec::as_slice), device)
         .expect("every vertex of the scene has its features")
 }
 

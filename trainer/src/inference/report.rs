@@ -172,7 +172,7 @@ impl Report {
             before: before?,
             after: after?,
             milliseconds,
-            certificate: combined(drapes),
+            certificate: Certificate::of_frames(drapes.iter().map(|drape| &drape.certificate)),
             certificate_before: Certificate { remaining: Vec::new(), ..certificate_before? },
             refinement: first.refinement.clone(),
             smoothing,
@@ -253,41 +253,4 @@ fn garment_reports(outfit: &Outfit, drapes: &[Drape]) -> Vec<GarmentReport> {
         }
     };
     outfit.garments.iter().enumerate().map(report).collect()
-}
-
-/// One certificate for all frames.
-fn combined(drapes: &[Drape]) -> Certificate {
-    let mut sum = drapes[0].certificate.clone();
-    for more in drapes[1..].iter().map(|d| &d.certificate) {
-        sum.body_triangle_pairs += more.body_triangle_pairs;
-        sum.layer_triangle_pairs += more.layer_triangle_pairs;
-        sum.self_triangle_pairs += more.self_triangle_pairs;
-        sum.contour_length_mm += more.contour_length_mm;
-        sum.vertices_inside += more.vertices_inside;
-        sum.narrow_triangle_pairs += more.narrow_triangle_pairs;
-        sum.pinched.body_triangle_pairs += more.pinched.body_triangle_pairs;
-        sum.pinched.layer_triangle_pairs += more.pinched.layer_triangle_pairs;
-        sum.pinched.self_triangle_pairs += more.pinched.self_triangle_pairs;
-        sum.max_depth_mm = sum.max_depth_mm.max(more.max_depth_mm);
-        sum.mean_depth_mm = sum.mean_depth_mm.max(more.mean_depth_mm);
-        sum.order_violations = sum.order_violations.max(more.order_violations);
-        sum.strain_added = match (sum.strain_added, more.strain_added) {
-            (Some(a), Some(b)) => Some(a.max(b)),
-            (a, b) => a.or(b),
-        };
-        for (own, more) in sum.garments.iter_mut().zip(&more.garments) {
-            own.body_triangle_pairs += more.body_triangle_pairs;
-            own.layer_triangle_pairs += more.layer_triangle_pairs;
-            own.self_triangle_pairs += more.self_triangle_pairs;
-            own.strain_joule = own.strain_joule.max(more.strain_joule);
-        }
-        for (own, more) in sum.layers.iter_mut().zip(&more.layers) {
-            own.triangle_pairs += more.triangle_pairs;
-            own.order_violations = own.order_violations.max(more.order_violations);
-        }
-    }
-    if drapes.len() > 1 {
-        sum.remaining.clear();
-    }
-    sum
 }

@@ -119,7 +119,7 @@ fn json_has_the_documented_shape_and_quads_are_scored() {
             "layer_collision",
             "layer_distance",
             "triangle_pairs",
-            "order_violations"
+            "order_violations_nearest_vertex"
         ])
     );
     assert_eq!((layers[0]["inner"].as_u64(), layers[0]["outer"].as_u64()), (Some(0), Some(1)));

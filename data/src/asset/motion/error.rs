@@ -1,10 +1,22 @@
-//! What can be wrong with a motion.
+//! What a motion may hold, and what can be wrong with it.
 
-use super::{FRAME_RATES, MAX_ANGLE};
 use crate::asset::skeleton::BODY_JOINT_NAMES;
 use crate::format::NpzError;
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use thiserror::Error;
+
+/// Frame rates that a motion may have [frames/s]: from time lapse to high-speed cameras. Beyond them times and numbers of frames
+/// leave the range of their types.
+pub const FRAME_RATES: RangeInclusive<f64> = 0.01..=10_000.0;
+
+/// Largest component of a rotation vector in a motion [rad]: over a thousand turns, where f32 still tells a thousandth of a radian.
+pub const MAX_ANGLE: f64 = 1e4;
+
+/// Refuses a frame rate [frames/s] out of [`FRAME_RATES`].
+pub(crate) fn check_frame_rate(rate: f64) -> Result<(), MotionDefect> {
+    if FRAME_RATES.contains(&rate) { Ok(()) } else { Err(MotionDefect::FrameRate { rate }) }
+}
 
 /// Why a motion file cannot be used.
 #[derive(Debug, Error)]

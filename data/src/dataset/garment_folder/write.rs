@@ -2,9 +2,7 @@
 
 use super::{FolderGarment, GarmentFolderError, MANIFEST, Manifest, ManifestEntry, read_manifest};
 use crate::asset::Garment;
-use crate::format::atomic;
-use crate::format::mesh::is_mesh_path;
-use crate::format::obj;
+use crate::format::{FileError, atomic, is_mesh_path, obj};
 use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -35,13 +33,12 @@ pub fn save_manifest(folder: &Path, entries: Vec<ManifestEntry>) -> Result<PathB
     let path = folder.join(MANIFEST);
     let text = toml::to_string(&Manifest { garment: entries })
         .map_err(|e| GarmentFolderError::Manifest { path: path.clone(), message: e.to_string() })?;
-    atomic::write(&path, text.as_bytes())
-        .map_err(|reason| GarmentFolderError::Io { path: path.clone(), reason })?;
+    atomic::write(&path, text.as_bytes()).map_err(FileError::at(&path))?;
     Ok(path)
 }
 
 /// The files that [`save_garment_folder`] writes.
-pub(crate) fn garment_folder_files(folder: &Path, garments: &[FolderGarment]) -> Vec<PathBuf> {
+pub fn garment_folder_files(folder: &Path, garments: &[FolderGarment]) -> Vec<PathBuf> {
     let files = garments.iter().map(|g| format!("{}.obj", g.garment.name));
     files.chain([MANIFEST.into()]).map(|file| folder.join(file)).collect()
 }

@@ -1,7 +1,7 @@
 //! The bytes behind glTF accessors: the binary chunk, `data:` URIs, files beside the document.
 
-use super::super::mesh::{check_count, read_limited};
 use super::document::{Accessor, Document};
+use crate::format::polygon_mesh::{check_count, read_limited};
 use base64::Engine;
 use base64::alphabet::STANDARD;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};

@@ -8,22 +8,18 @@
 //! the writer needs no more.
 
 use crate::format::atomic;
+use crate::format::error::FileError;
 use clothcombo_physics::vertex_normals;
 use serde_json::{Value, json};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use thiserror::Error;
 
 /// Why a scene cannot be written.
 #[derive(Debug, Error)]
 pub enum GlbError {
-    /// The file system refused.
-    #[error("{}: {reason}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        reason: std::io::Error,
-    },
+    /// The file cannot be written.
+    #[error(transparent)]
+    Io(#[from] FileError),
     /// Frames of different sizes, or another number of them than of times.
     #[error("mesh '{mesh}' has {found}, expected {expected}")]
     Frames {
@@ -71,7 +67,7 @@ pub struct SceneMesh<'a> {
 /// As [`encode_glb`], or when the file cannot be written.
 pub fn save_glb(path: &Path, meshes: &[SceneMesh], times: &[f64]) -> Result<(), GlbError> {
     let bytes = encode_glb(meshes, times)?;
-    atomic::write(path, &bytes).map_err(|reason| GlbError::Io { path: path.into(), reason })
+    Ok(atomic::write(path, &bytes).map_err(FileError::at(path))?)
 }
 
 /// The bytes of a `.glb`. `times` [s], ascending, are those of the frames; a single frame needs none.

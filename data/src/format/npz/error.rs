@@ -1,19 +1,15 @@
 //! What can be wrong with an archive.
 
+use crate::format::error::FileError;
 use std::path::PathBuf;
 use thiserror::Error;
 
 /// Why an npz archive or an array in it cannot be used.
 #[derive(Debug, Error)]
 pub enum NpzError {
-    /// The file cannot be opened or read.
-    #[error("{}: {reason}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        reason: std::io::Error,
-    },
+    /// The file cannot be opened, read or written.
+    #[error(transparent)]
+    Io(#[from] FileError),
     /// Not a zip archive.
     #[error("{}: not an npz archive ({reason}); npz files are zip archives made by numpy.savez, and pickles (.pkl) are never executed", path.display())]
     NotAnArchive {

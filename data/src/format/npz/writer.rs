@@ -2,6 +2,7 @@
 
 use super::NpzError;
 use crate::format::atomic;
+use crate::format::error::FileError;
 use npyz::{DType, TypeStr, WriterBuilder};
 use std::io::{Cursor, Write};
 use std::path::Path;
@@ -96,11 +97,11 @@ impl NpzWriter {
     /// # Errors
     /// If an array did not fit its shape, or the file cannot be written.
     pub fn save(self, path: &Path) -> Result<(), NpzError> {
-        let failed = |reason| NpzError::Io { path: path.into(), reason };
+        let failed = FileError::at(path);
         if let Some(reason) = self.error {
-            return Err(failed(std::io::Error::other(reason)));
+            return Err(failed(std::io::Error::other(reason)).into());
         }
         let bytes = self.zip.finish().map_err(|e| failed(std::io::Error::other(e.to_string())))?;
-        atomic::write(path, bytes.get_ref()).map_err(failed)
+        Ok(atomic::write(path, bytes.get_ref()).map_err(failed)?)
     }
 }

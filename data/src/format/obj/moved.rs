@@ -1,7 +1,7 @@
 //! A garment's own file for where the garment is now.
 
 use super::super::atomic;
-use super::super::mesh::read_limited;
+use super::super::polygon_mesh::read_limited;
 use super::statements::one_per_line;
 use std::io;
 use std::path::Path;

@@ -1,8 +1,8 @@
 //! The surface that the remesher keeps a garment to, and how long its edges are there.
 
 use super::super::field;
-use super::super::remesh::Target;
 use super::pattern::Pattern;
+use crate::mesh::RemeshTarget;
 use clothcombo_physics::vec3::dot;
 
 /// The surface that the remesher keeps to.
@@ -14,7 +14,7 @@ pub(super) struct Cloth<'a> {
     pub waves: [[f64; 4]; 3],
 }
 
-impl Target for Cloth<'_> {
+impl RemeshTarget for Cloth<'_> {
     fn project(&self, mut point: [f64; 3], label: u32) -> [f64; 3] {
         let reach = self.edge_length;
         if label == 0 {

@@ -1,7 +1,7 @@
 //! What the generator measures on a body: tubes around trunk, legs and arms, landmarks, and the distance to its surface.
 
-use super::GarmentError;
 use super::distance_grid::DistanceGrid;
+use super::settings::GarmentError;
 use super::tube::Tube;
 use crate::asset::{BODY_JOINT_COUNT, Body};
 use crate::generate::parts::dominant_joints;

@@ -10,10 +10,8 @@ mod skinning;
 
 use super::field;
 use super::isosurface::{Lattice, extract};
-use super::labelled_triangles::LabelledTriangles;
-use super::remesh::{Quality, Target, remesh};
-use super::sheet::Sheet;
 use crate::asset::{BODY_JOINT_COUNT, BODY_JOINT_NAMES, BODY_JOINT_PARENTS, Body, BodyParts};
+use crate::mesh::{EditableMesh, LabelledTriangles, Quality, RemeshTarget, remesh};
 
 pub use shape::SHAPE_COMPONENT_NAMES;
 
@@ -22,7 +20,7 @@ const EDGE_LENGTH: f64 = 0.0183;
 
 struct Skin;
 
-impl Target for Skin {
+impl RemeshTarget for Skin {
     fn project(&self, point: [f64; 3], _label: u32) -> [f64; 3] {
         field::project(anatomy::field, point, 2, 0.02)
     }
@@ -66,7 +64,7 @@ fn surface() -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
     let values = lattice.sample(anatomy::field);
     let (positions, faces) = extract(&lattice, &values);
     let labels = vec![0; positions.len()];
-    let mut sheet = Sheet::new(LabelledTriangles { positions, labels, faces });
+    let mut sheet = EditableMesh::new(LabelledTriangles { positions, labels, faces });
     let quality = Quality { angle: 22.0, edge_ratio: [0.4, 2.5] };
     remesh(&mut sheet, &Skin, 5, quality);
     sheet.compact()

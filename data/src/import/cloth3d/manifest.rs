@@ -8,6 +8,9 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
+pub(super) const LICENCE: &str = "CLOTH3D terms of use (non-commercial research)";
+pub(super) const AUTHOR: &str = "Bertiche, Madadi, Escalera (CLOTH3D)";
+
 #[derive(Serialize, Deserialize)]
 struct Manifest {
     source: String,
@@ -67,8 +70,8 @@ pub(super) fn add(path: &Path, sample: Vec<SampleEntry>) -> io::Result<()> {
     all.extend(sample);
     let manifest = Manifest {
         source: "CLOTH3D / CLOTH3D++".into(),
-        author: super::AUTHOR.into(),
-        licence: super::LICENCE.into(),
+        author: AUTHOR.into(),
+        licence: LICENCE.into(),
         sample: all,
     };
     let text = toml::to_string(&manifest).map_err(io::Error::other)?;

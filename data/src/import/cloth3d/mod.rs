@@ -19,10 +19,10 @@ use super::thinning::{Thinned, Thinning, thin};
 use super::{Progress, Summary};
 use crate::asset::{BindingSettings, Body, Category, Garment, Motion, Provenance};
 use crate::dataset::garment_folder::{FolderGarment, GarmentFolderError, save_garment_folder};
-use crate::fit::contact;
-use crate::format::{NpzError, NpzWriter, PointCache, obj};
+use crate::format::{FileError, NpzError, NpzWriter, PointCache, obj};
+use crate::mesh::contact;
 use clothcombo_physics::query::Surface;
-use manifest::{GarmentEntry, SampleEntry};
+use manifest::{AUTHOR, GarmentEntry, LICENCE, SampleEntry};
 use std::fs;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -31,13 +31,8 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum Cloth3dError {
     /// A folder cannot be read, or a file not be written.
-    #[error("{}: {reason}", path.display())]
-    Io {
-        /// File or folder.
-        path: PathBuf,
-        /// What the system said.
-        reason: std::io::Error,
-    },
+    #[error(transparent)]
+    Io(#[from] FileError),
     /// No sample.
     #[error("{}: no CLOTH3D sample; a sample folder holds info.mat", inputs.join(", "))]
     NoSample {
@@ -111,8 +106,6 @@ impl Default for Cloth3dSettings {
 
 /// Of the simulations [frames/s].
 const FRAME_RATE: f64 = 30.0;
-const LICENCE: &str = "CLOTH3D terms of use (non-commercial research)";
-const AUTHOR: &str = "Bertiche, Madadi, Escalera (CLOTH3D)";
 
 struct Sample {
     name: String,
@@ -175,7 +168,7 @@ pub fn import_cloth3d(
     summary.notes.extend(motions.notes);
     summary.written.extend(motions.written);
     let path = out.join("cloth3d.toml");
-    manifest::add(&path, entries).map_err(|reason| Cloth3dError::Io { path: path.clone(), reason })?;
+    manifest::add(&path, entries).map_err(FileError::at(&path))?;
     summary.written.push(path);
     Ok(summary)
 }
@@ -217,10 +210,10 @@ fn find_samples(inputs: &[PathBuf]) -> Result<Vec<Sample>, Cloth3dError> {
             folders.push(input.clone());
             continue;
         }
-        let failed = |reason| Cloth3dError::Io { path: input.clone(), reason };
+        let failed = FileError::at(input);
         let mut below = Vec::new();
-        for entry in fs::read_dir(input).map_err(failed)? {
-            let folder = entry.map_err(failed)?.path();
+        for entry in fs::read_dir(input).map_err(&failed)? {
+            let folder = entry.map_err(&failed)?.path();
             if folder.join("info.mat").is_file() {
                 below.push(folder);
             }

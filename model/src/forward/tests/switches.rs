@@ -50,7 +50,7 @@ fn the_full_graph_displaces_a_single_garment_without_force() {
         single.clone(),
         model.untangling.vertex_product(scene.embeddings(&model).vertex),
         latent,
-        &scene.outfit.segments,
+        &scene.outfit.packing,
     );
     assert!(values(&displacement).iter().any(|value| value.abs() > 1e-5));
     let expected = single + displacement * config().untangling_scale;

@@ -9,14 +9,15 @@ use std::time::Instant;
 
 use super::body::Body;
 use super::certificate::strain_joule;
+use super::count::certified;
+use super::garment::at;
 use super::obstacle::BodyObstacle;
 use super::outfit::Outfit;
 use super::relax::{keep_length, no_farther};
 use super::relief::Room;
 use super::sides::Sides;
-use super::{
-    Certificate, Crossed, Layer, RemainingPair, ResolveSettings, Resolved, at, certified, untangled_keeping,
-};
+use super::untangle::untangled_keeping;
+use super::{Certificate, Crossed, Layer, RemainingPair, ResolveSettings, Resolved};
 use crate::contact::self_triangle_pairs;
 use crate::vec3::distance_squared;
 

@@ -6,48 +6,23 @@
 //! shallow, and the nearest way out is right. Where a step leaves more crossings than there were, a shorter one is
 //! tried.
 
-use std::sync::Arc;
 use std::time::Instant;
 
+use super::attempt::{resolved_further, settled};
 use super::body::{Body, with_body, with_drawn};
 use super::ease::{TIMES, TIMES_IN_FRAME};
-use super::resolved::settled;
+use super::garment::{at, check};
 use super::stages::Stages;
 use super::strides::Strides;
 use super::taken_back::{shares, taken_back};
 use super::unfold::Folds;
 use super::way::{Way, placed};
-use super::{Certificate, Layer, ResolveError, ResolveSettings, Resolved, at, check, resolved_further};
+use super::{Certificate, Layer, Reached, ResolveError, ResolveSettings, Resolved, Waypoint};
 use crate::query::Surface;
 use crate::transform::Transform;
 
 /// A rise of the strain energy, as a share, that is only accepted where the way leaves crossings.
 const STRAINED: f64 = 0.25;
-
-/// What is somewhere along the way.
-#[derive(Clone)]
-pub struct Waypoint {
-    /// The body.
-    pub body: Arc<Surface<f64>>,
-    /// The drape on it, `[V, 3]` per garment [m].
-    pub draped: Vec<Vec<[f64; 3]>>,
-    /// What that began from: the garments as skinning alone puts them.
-    pub skinned: Vec<Vec<[f64; 3]>>,
-    /// Skinning transforms of all vertices, garment after garment, from one and the same state.
-    pub transforms: Vec<Transform>,
-}
-
-/// Garments that are resolved, as far as they could be: where a way starts.
-pub struct Reached {
-    /// Their drape before that, `[V, 3]` each [m].
-    pub draped: Vec<Vec<[f64; 3]>>,
-    /// Where they are now.
-    pub positions: Vec<Vec<[f64; 3]>>,
-    /// Skinning transforms, as in [`Waypoint`].
-    pub transforms: Vec<Transform>,
-    /// Pairs with the body and between garments that are left in `positions`, but for narrow and pinched ones.
-    pub crossings: usize,
-}
 
 /// As [`super::resolve`], with a second way out, and for garments of which it is known where they are `skinned` alone,
 /// `[V, 3]` each [m]: what only the drape folds is laid out first. Where crossings of `layers` on `body` cannot be mended, the

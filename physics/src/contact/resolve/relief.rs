@@ -9,7 +9,7 @@
 use rayon::prelude::*;
 
 use super::contact::{along_line, normal_of};
-use super::obstacle::BodyObstacle;
+use super::obstacle::{BodyObstacle, touching};
 use crate::contact::{Triangle, TriangleTree};
 use crate::query::{FaceSide, Surface};
 use crate::vec3::{add_scaled, dot};
@@ -96,6 +96,20 @@ impl Relief {
         let positions = moved.map(|((p, n), step)| add_scaled(*p, -step, *n)).collect();
         let gave_way: Vec<bool> = scaled.iter().map(|s| *s > 0.0).collect();
         Some(Self { surface: Surface::new(positions, body.faces.clone()), gave_way, steps, pinched })
+    }
+}
+
+impl<'a> BodyObstacle<'a> {
+    /// The body after it gave way. Where it only meets itself because of that, it is to be respected as it was.
+    pub fn relieved(relief: &'a Relief, near: &'a [bool]) -> Self {
+        let mut obstacle = Self::pinched_where(&relief.surface, near, |v| relief.pinched[v as usize]);
+        obstacle.gives_way(relief);
+        obstacle
+    }
+
+    /// Notes which faces give way.
+    pub fn gives_way(&mut self, relief: &Relief) {
+        self.gave_way = touching(&self.surface.faces, &relief.gave_way);
     }
 }
 

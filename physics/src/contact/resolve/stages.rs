@@ -5,8 +5,7 @@
 //! The drape at the end may be more than what is known of the stages: networks may have corrected it, a solver may have refined
 //! it. What it differs by from the stage at 1 is faded in along the way, in the frames of the skinning transforms.
 
-use super::Layer;
-use super::follow::Waypoint;
+use super::{Layer, Waypoint};
 use crate::transform::{into_frame, out_of_frame};
 use crate::vec3::{add_scaled, sub};
 

@@ -3,17 +3,16 @@
 use std::sync::OnceLock;
 use std::time::Instant;
 
+use super::attempt::settled;
 use super::body::{Body, with_body_after, with_drawn};
-use super::follow::{Reached, Waypoint};
+use super::garment::{at, check};
 use super::obstacle::BodyObstacle;
 use super::outfit::Outfit;
 use super::relief::{Before, Room};
-use super::resolved::settled;
 use super::sides::Sides;
 use super::strides::Strides;
-use super::{
-    Layer, ResolveError, ResolveSettings, Resolved, Untangled, at, check, untangled, untangled_keeping,
-};
+use super::untangle::{Untangled, untangled, untangled_keeping};
+use super::{Layer, Reached, ResolveError, ResolveSettings, Resolved, Waypoint};
 use crate::contact::self_triangle_pairs;
 use crate::transform::{into_frame, out_of_frame};
 use crate::vec3::{add, scale, sub};

@@ -55,7 +55,7 @@ fn a_seam_that_leaves_the_part_still_parts_inside_from_outside() {
         let part = UnionDistance::of_tree(&TriangleTree::of_part(positions, faces, |f, _| is_part(f)));
         for f in (0..faces.len() as u32).filter(|f| is_part(*f)) {
             let (expected, found) = (whole.sides()[f as usize], part.sides()[f as usize]);
-            // A face that only crosses what was left out is no seam any more.
+            // A face that only intersects what was left out is no seam any more.
             assert!(expected == found || expected == FaceSide::Seam, "cut {cut}, face {f}: {found:?}");
         }
     }

@@ -4,7 +4,6 @@ pub mod backends;
 pub mod certificate;
 pub mod distance;
 pub mod error;
-pub mod generator;
 pub mod growth;
 pub mod operators;
 pub mod poses;
@@ -32,8 +31,6 @@ pub enum Bench {
     Step(step::Arguments),
     /// Speed against error: eigenpairs, half-precision weights, other networks; precision and distance of the losses
     Tradeoff(tradeoff::Arguments),
-    /// The generator's promises over many garments, with the failure rate and the time
-    Generator(generator::Arguments),
     /// How time and memory of a training step grow with vertices, layers, width and eigenpairs
     Growth(growth::Arguments),
     /// What preparing a garment for DiffusionNet costs, and how exact its eigenpairs are
@@ -55,7 +52,6 @@ pub fn run(bench: &Bench) -> Result<(), Report> {
         Bench::Stability(arguments) => stability::run(arguments),
         Bench::Step(arguments) => step::run(arguments),
         Bench::Tradeoff(arguments) => tradeoff::run(arguments),
-        Bench::Generator(arguments) => generator::run(arguments),
         Bench::Growth(arguments) => growth::run(arguments),
         Bench::Operators(arguments) => operators::run(arguments),
         Bench::Poses(arguments) => poses::run(arguments),

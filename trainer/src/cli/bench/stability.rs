@@ -1,9 +1,9 @@
-//! `clothcombo bench stability`: the hard cases, one row each.
+//! `clothcombo bench stability`: the degenerate cases, one row each.
 
 use crate::cli::verbosity::progress_bar;
 use crate::dataset::load_body;
 use clap::Args;
-use clothcombo_data::hard_cases::{CaseReport, Expectation, HardCases, Outcome, TermReport};
+use clothcombo_data::degenerate_cases::{CaseReport, DegenerateCases, Expectation, Outcome, TermReport};
 use clothcombo_physics::energy::{EnergySettings, Term, TermMap};
 use miette::{IntoDiagnostic, Report, miette};
 use serde_json::{Value, json};
@@ -35,9 +35,9 @@ pub struct Arguments {
 /// When the body cannot be read or a case breaks its promise.
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let wanted = |name: &str| arguments.case.as_ref().is_none_or(|text| name.contains(text.as_str()));
-    let selected: Vec<_> = HardCases::all().filter(|case| wanted(case.name)).collect();
+    let selected: Vec<_> = DegenerateCases::all().filter(|case| wanted(case.name)).collect();
     if selected.is_empty() {
-        let names: Vec<&str> = HardCases::all().map(|case| case.name).collect();
+        let names: Vec<&str> = DegenerateCases::all().map(|case| case.name).collect();
         let text = arguments.case.as_deref().unwrap_or_default();
         return Err(miette!(
             help = format!("the cases are: {}", names.join("; ")),
@@ -46,8 +46,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     }
     let body = load_body(&arguments.body, 0)?;
     let settings = if arguments.printed { EnergySettings::printed() } else { EnergySettings::default() };
-    let cases = HardCases::new(&body).into_diagnostic()?;
-    let bar = progress_bar(selected.len(), "hard cases {bar:40} {pos}/{len} {msg}");
+    let cases = DegenerateCases::new(&body).into_diagnostic()?;
+    let bar = progress_bar(selected.len(), "degenerate cases {bar:40} {pos}/{len} {msg}");
     let reports: Vec<CaseReport> = selected
         .into_iter()
         .map(|case| {

@@ -306,7 +306,7 @@ fn drape_all(
 ) -> Result<Vec<Drape>, Failure> {
     let drapes = draper.drape_motion(outfit, &scenes.states, radius, |progress| match progress {
         DrapeProgress::OnTheWay(share) if share < 1.0 => {
-            bar.set_message(format!(" · sorting out crossings, {:.0} % of the way", 100.0 * share));
+            bar.set_message(format!(" · resolving intersections, {:.0} % of the path", 100.0 * share));
         }
         DrapeProgress::OnTheWay(_) => bar.set_message(""),
         DrapeProgress::Draped => {

@@ -18,7 +18,8 @@ pub use staged::Staged;
 
 use super::{Drape, Draper, DraperError, Moment, Outfit, SourceGarment};
 use crate::picture::{BODY_COLOUR, PictureError, layer_colour};
-use clothcombo_data::format::obj::{self, MovedObj, ObjError};
+use clothcombo_data::format::FileError;
+use clothcombo_data::format::obj::{self, MovedObj};
 use clothcombo_data::format::{GlbError, SceneMesh, save_glb};
 use miette::Diagnostic;
 use std::path::{Path, PathBuf};
@@ -90,7 +91,7 @@ pub enum OutputError {
     },
     /// An OBJ file.
     #[error(transparent)]
-    Obj(#[from] ObjError),
+    Obj(#[from] FileError),
     /// The GLB file.
     #[error(transparent)]
     Glb(#[from] GlbError),

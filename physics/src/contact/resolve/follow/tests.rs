@@ -5,6 +5,7 @@ use crate::contact::TriangleTree;
 use crate::mesh::TriMesh;
 use crate::mesh::shapes;
 use crate::vec3::{add, norm};
+use std::sync::Arc;
 use std::time::Duration;
 
 const IDENTITY: Transform = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];

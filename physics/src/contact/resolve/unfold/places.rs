@@ -3,8 +3,13 @@
 use super::super::Layer;
 use super::super::obstacle::BodyObstacle;
 use super::super::outfit::Outfit;
-use super::smoothed;
 use crate::contact::self_triangle_pairs;
+use crate::vec3::{add, add_scaled, scale, sub};
+
+/// Sweeps of the smoothing…
+const SWEEPS: usize = 100;
+/// …and its over-relaxation.
+const OVER: f64 = 1.7;
 
 /// How far around crossings cloth is laid out [m]: farther where some are left.
 const REACH: [f64; 3] = [0.03, 0.06, 0.12];
@@ -229,4 +234,23 @@ fn places(outfit: &Outfit<'_>, region: &[u32]) -> Vec<Vec<u32>> {
         places.push(place);
     }
     places
+}
+
+/// The lone garment of `outfit` with what it adds to `skinned` harmonic in `region`: over-relaxed Gauss–Seidel in a fixed order.
+pub(super) fn smoothed(outfit: &Outfit<'_>, skinned: &[[f64; 3]], region: &[u32]) -> Vec<[f64; 3]> {
+    let mut positions = outfit.layers[0].positions.to_vec();
+    let mut added: Vec<[f64; 3]> = positions.iter().zip(skinned).map(|(p, s)| sub(*p, *s)).collect();
+    for _ in 0..SWEEPS {
+        for &v in region {
+            let ring = outfit.ring(v);
+            let share = 1.0 / ring.len().max(1) as f64;
+            let mean = scale(ring.fold([0.0; 3], |sum, n| add(sum, added[n as usize])), share);
+            let now = added[v as usize];
+            added[v as usize] = add_scaled(now, OVER, sub(mean, now));
+        }
+    }
+    for &v in region {
+        positions[v as usize] = add(skinned[v as usize], added[v as usize]);
+    }
+    positions
 }

@@ -75,7 +75,8 @@ fn summary(results: &[OutfitResult], counts: impl Fn(&OutfitResult) -> bool) -> 
         "clear_of_self_after": share(&|r| r.after.self_triangle_pairs == 0),
         "pinched_after": share(&|r| r.after.pinched_pairs > 0),
         "order_violations_after": spread(&chosen, |r| vec![r.after.order_violations]),
-        "order_violations_by_vertices_after": spread(&chosen, |r| vec![r.after.order_violations_by_vertices]),
+        "order_violations_nearest_vertex_after":
+            spread(&chosen, |r| vec![r.after.order_violations_nearest_vertex]),
         "strain_added": spread(&chosen, |r| r.strain_added.into_iter().collect()),
         "milliseconds_per_garment": spread(&chosen, per_garment),
         "milliseconds_per_8000_vertices": spread(&chosen, per_8000_vertices),
