@@ -21,15 +21,16 @@ COLUMNS = {
     "Training garments, held-out windows: energies [J], means": [
         "total", "strain", "bending", "collision (as", "collision (paper",
     ],
-    "Training garments, held-out windows: contact": ["vertices inside", "pairs with the body", "pairs with itself"],
+    "Training garments, held-out windows: contact": ["vertices inside", "pairs with the body", "self-intersecting pairs"],
     "Training garments, held-out windows: energies [J] with correct and wrong embeddings": [
         "correct", "different", "zero", "paper: correct", "paper: different", "paper: zero",
     ],
     "Strain of each layer": ["1", "2", "3", "4", "5", "6"],
     "Order and contact of the layers": [
-        "strain of a garment alone", "in the outfit", "untangled", "pairs between", "wrong side then", "clear then",
+        "strain of a single garment", "in the outfit", "untangled", "pairs between", "layer-order violations then",
+        "intersection-free then",
     ],
-    "Ablations": ["strain", "layer collision", "wrong side"],
+    "Ablations": ["strain", "layer collision", "layer-order violations"],
     "Time per garment": ["embedding", "single draping", "untangling", "corrections", "post-process"],
     "Speed against error": ["time", "excess energy", "distance", "strain"],
 }

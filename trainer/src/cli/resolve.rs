@@ -272,7 +272,7 @@ fn text(report: &ResolveReport) -> String {
         row("pairs between garments", |c| Some(c.layer_triangle_pairs as f64)),
         row("pairs of a garment with itself", |c| Some(c.self_triangle_pairs as f64)),
         row("pairs where the body is pinched", |c| Some(c.pinched.count() as f64)),
-        row("length of the intersections [mm]", |c| Some(c.contour_length_mm)),
+        row("length of the intersection curves [mm]", |c| Some(c.contour_length_mm)),
         row("deepest vertex [mm]", |c| Some(c.max_depth_mm)),
         row("vertices under an inner layer [%]", |c| Some(100.0 * c.order_violations)),
         row("strain added [%]", |c| c.strain_added.map(|strain| 100.0 * strain)),

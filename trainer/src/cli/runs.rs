@@ -82,7 +82,7 @@ fn table_row(r: &RunSummary) -> Row {
         "at step" => r.best_step,
         "strain ×" => r.strain_ratio,
         "inside %" => r.inside.map(|share| 100.0 * share),
-        "wrong %" => r.wrong_side.map(|share| 100.0 * share),
+        "order %" => r.order_violations.map(|share| 100.0 * share),
         "skipped" => r.skipped,
         "spikes" => r.spikes,
         "checkpoint" => r.checkpoint,

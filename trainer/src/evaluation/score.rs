@@ -72,6 +72,6 @@ pub fn method_score(method: &'static str, scenes: &[SceneScore]) -> MethodScore 
         weighted: Term::ALL.into_iter().map(|t| (t.name(), over(&|s| s.weighted[t]).mean)).collect(),
         inside: share(&|s| s.penetration.inside, &|s| s.penetration.vertices),
         deeper_than_5mm: share(&|s| s.penetration.deep, &|s| s.penetration.vertices),
-        wrong_side: share(&|s| s.order.violations, &|s| s.order.counted),
+        order_violations: share(&|s| s.order.violations, &|s| s.order.counted),
     }
 }

@@ -4,7 +4,7 @@ use crate::config::Config;
 use crate::dataset::DataSizes;
 use crate::dataset::Dataset;
 use crate::evaluation::ValidationSet;
-use crate::evaluation::samples;
+use crate::evaluation::sample_picture;
 use crate::inference::networks::Networks;
 use crate::inference::tensor_store::TensorStore;
 use crate::run::checkpoint::{Best, Checkpoint, CheckpointState, Snapshot};
@@ -137,7 +137,7 @@ impl Session {
     pub fn draw_sample(&self) -> Result<PathBuf, Report> {
         let path = self.run.sample(self.step);
         let count = self.config.output.sample_scenes;
-        samples::draw(&self.dataset, &self.validation, &self.networks(), count, &path)?;
+        sample_picture::draw(&self.dataset, &self.validation, &self.networks(), count, &path)?;
         Ok(path)
     }
 

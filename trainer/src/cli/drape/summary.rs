@@ -84,7 +84,7 @@ fn layers(report: &Report) -> String {
             first => format!("{} under {}", name(before.inner), name(before.outer)),
             "pairs before" => before.triangle_pairs,
             "after" => after.triangle_pairs,
-            "wrong side before [%]" => 100.0 * before.order_violations,
+            "layer-order violations before [%]" => 100.0 * before.order_violations,
             "after [%]" => 100.0 * after.order_violations,
         }
     });

@@ -112,7 +112,7 @@ impl Summary {
                 "minimum J" => run.energy,
             };
             row.extend(scene.methods.iter().flat_map(|m| {
-                row![format!("{} +J", m.method) => m.excess, "%" => m.excess_percent, "mm" => m.distance_mm]
+                row![format!("{} +J", m.method) => m.error.excess, "%" => m.error.excess_percent, "mm" => m.error.distance_mm]
             }));
             row.extend(row! {
                 "steps" => run.iterations,
@@ -162,9 +162,9 @@ impl MethodSummary {
         let spread = |value: fn(&MethodError) -> f64| Spread::of(found().map(value).collect());
         Self {
             method: scenes[0].methods[index].method.clone(),
-            excess: spread(|m| m.excess),
-            excess_percent: spread(|m| m.excess_percent),
-            distance_mm: spread(|m| m.distance_mm),
+            excess: spread(|m| m.error.excess),
+            excess_percent: spread(|m| m.error.excess_percent),
+            distance_mm: spread(|m| m.error.distance_mm),
             terms: mean_terms(found().map(|m| &m.terms)),
         }
     }
@@ -203,7 +203,7 @@ fn strain_ratios(scenes: &[SceneError]) -> Vec<StrainRatio> {
         let network: Vec<f64> =
             of_layer().filter_map(|l| l.network.map(|[alone, outfit]| outfit / alone)).collect();
         StrainRatio {
-            equilibrium: Spread::of(of_layer().map(|l| l.outfit / l.alone).collect()).median,
+            equilibrium: Spread::of(of_layer().map(|l| l.outfit / l.single_garment).collect()).median,
             network: (!network.is_empty()).then(|| Spread::of(network).median),
         }
     };

@@ -1,7 +1,7 @@
 //! Time and error of numerical choices: precision of the weights, eigenpairs, distance to the body.
 
-use super::subject::Subject;
-use super::table::{Table, number};
+use super::table::{Column, number, plain};
+use super::{Evaluator, ModelUnderTest, Section, Table};
 use crate::dataset::{Dataset, HeldOut, PreparedScene};
 use crate::evaluation::equilibrium_error::mean_distance;
 use crate::evaluation::median_ms;
@@ -14,34 +14,31 @@ use burn::tensor::{Tensor, TensorData, bf16, f16};
 use clothcombo_physics::energy::SceneEnergy;
 use clothcombo_physics::query::Distance;
 use miette::Report;
-use serde::Serialize;
+use serde_json::{Value, json};
 use std::sync::Arc;
 
 /// Repetitions of a measurement last this long (s).
 const SECONDS: f64 = 0.05;
 
-/// What one choice gives on all scenes.
-#[derive(Clone, Debug, Serialize)]
-pub struct NumericalChoice {
-    /// Its name.
-    pub name: String,
-    /// Mean time of a scene (ms): to embed and drape it, or for its losses with their gradient.
-    pub ms: f64,
-    /// Energy of all scenes (J).
-    pub energy: f64,
-    /// Mean distance from the vertices draped by the model as trained (mm); none for losses.
-    pub distance_mm: Option<f64>,
-}
+const COLUMNS: [Column<'_>; 4] = [
+    ("choice", "/name", plain),
+    ("time [ms]", "/milliseconds", number),
+    ("energy [J]", "/energy", number),
+    ("distance from the drape as trained [mm]", "/distance_mm", number),
+];
 
-/// Drapes `scenes` scenes of one to three garments by variants of the networks, and evaluates both distances of the losses.
+/// Drapes scenes of one to three garments by variants of the networks, and evaluates both distances of the losses.
 ///
 /// # Errors
 /// When a scene cannot be draped, or the data not be prepared for another number of eigenpairs.
-pub fn ask(subject: &Subject, question: usize, scenes: usize) -> Result<Vec<NumericalChoice>, Report> {
-    let Subject { config, dataset, model, .. } = subject;
-    let all: Vec<usize> = (0..dataset.garments.len()).collect();
-    let sample = |i: usize| subject.draw([question, i], &all, 1 + i % 3, HeldOut::Windows);
-    let scenes = (0..scenes).map(|i| subject.prepare(sample(i))).collect::<Result<Vec<_>, _>>()?;
+pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
+    let ModelUnderTest { config, dataset, model, .. } = evaluator.model;
+    let garments = evaluator.model.garments();
+    let scene = |i: usize| {
+        let sample = evaluator.model.sample([14, i], &garments, 1 + i % 3, HeldOut::Windows);
+        evaluator.model.prepare(&sample)
+    };
+    let scenes = (0..evaluator.counts.pareto).map(scene).collect::<Result<Vec<_>, _>>()?;
     let count = config.model.eigen_count;
     let mut variants = vec![
         (format!("network as trained, {count} eigenpairs"), model.clone(), dataset.clone()),
@@ -73,12 +70,13 @@ pub fn ask(subject: &Subject, question: usize, scenes: usize) -> Result<Vec<Nume
         let vertices = |drapes: &[Draped]| drapes.iter().flat_map(|d| wide(&d.posed)).collect::<Vec<_>>();
         let distance = mean_distance(&vertices(&drapes), &vertices(expected));
         let energies = scenes.iter().zip(&drapes);
-        choices.push(NumericalChoice {
-            name,
-            ms: mean_ms(scenes.iter(), drape)?,
-            energy: energies.map(|(s, d)| s.bodies[0].energy.value(&d.posed, &d.canonical).total).sum(),
-            distance_mm: Some(1e3 * distance),
-        });
+        let energies = energies.map(|(s, d)| s.bodies[0].energy.value(&d.posed, &d.canonical).total);
+        choices.push(json!({
+            "name": name,
+            "milliseconds": mean_ms(scenes.iter(), drape)?,
+            "energy": energies.sum::<f64>(),
+            "distance_mm": 1e3 * distance,
+        }));
     }
     let drapes = as_trained.unwrap_or_default();
     for (name, distance) in
@@ -93,14 +91,17 @@ pub fn ask(subject: &Subject, question: usize, scenes: usize) -> Result<Vec<Nume
         let evaluate = |(energy, draped): (&SceneEnergy<f32>, &Draped)| {
             Ok::<_, Report>(energy.evaluate(&draped.posed, &draped.canonical))
         };
-        choices.push(NumericalChoice {
-            name: format!("losses, distance to the {name} of the body"),
-            ms: mean_ms(energies.iter().zip(&drapes), evaluate)?,
-            energy: energies.iter().zip(&drapes).map(|(e, d)| e.value(&d.posed, &d.canonical).total).sum(),
-            distance_mm: None,
-        });
+        let of_drapes = energies.iter().zip(&drapes).map(|(e, d)| e.value(&d.posed, &d.canonical).total);
+        choices.push(json!({
+            "name": format!("losses, distance to the {name} of the body"),
+            "milliseconds": mean_ms(energies.iter().zip(&drapes), evaluate)?,
+            "energy": of_drapes.sum::<f64>(),
+            "distance_mm": Value::Null,
+        }));
     }
-    Ok(choices)
+    let table = Table::new("Numerical choices: time and error", &choices, &COLUMNS)
+        .with_note("Networks: embedding and draping a scene. Losses: all of a scene with their gradient.");
+    Ok(vec![Section::new("numerics", "Numerical choices", "", choices, vec![table])])
 }
 
 /// Mean over the items of the median time of `run` (ms).
@@ -124,15 +125,4 @@ impl ModuleMapper for Rounded {
         let rounded: Vec<f32> = values.into_iter().map(self.0).collect();
         Param::from_mapped_value(id, Tensor::from_data(TensorData::new(rounded, shape), &device), mapper)
     }
-}
-
-/// The choices as a table.
-pub fn table(choices: &[NumericalChoice]) -> Table {
-    let head = ["choice", "time [ms]", "energy [J]", "distance from the drape as trained [mm]"];
-    let mut table = Table::new("Numerical choices: time and error", &head)
-        .with_note("Networks: embedding and draping a scene. Losses: all of a scene with their gradient.");
-    let distance = |c: &NumericalChoice| number(c.distance_mm.unwrap_or(f64::NAN));
-    let row = |c: &NumericalChoice| vec![c.name.clone(), number(c.ms), number(c.energy), distance(c)];
-    table.rows = choices.iter().map(row).collect();
-    table
 }

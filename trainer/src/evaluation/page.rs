@@ -5,24 +5,41 @@ use crate::picture::svg;
 use crate::run::report::html::escape;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use serde_json::Value;
 
-const STYLE: &str = include_str!("../../run/report/report.css");
+const STYLE: &str = include_str!("../run/report/report.css");
 
 /// A part of the report.
-#[derive(Default)]
 pub struct Section {
+    /// Its name in `eval.json`.
+    pub key: &'static str,
     /// Its heading.
-    pub title: String,
-    /// A sentence on what is asked; may be empty.
-    pub text: String,
-    /// Tables.
+    pub title: &'static str,
+    /// What a reader has to know; may be empty.
+    text: String,
+    /// Its numbers: what the tables show, and more.
+    pub numbers: Value,
+    /// Views of the numbers.
     pub tables: Vec<Table>,
-    /// Charts and pictures.
-    pub figures: Vec<Figure>,
+    /// Pictures.
+    pub pictures: Vec<Picture>,
 }
 
-/// A picture beside the Markdown, and inside the page.
-pub struct Figure {
+impl Section {
+    /// Without pictures.
+    pub fn new(
+        key: &'static str,
+        title: &'static str,
+        text: &str,
+        numbers: impl Into<Value>,
+        tables: Vec<Table>,
+    ) -> Self {
+        Self { key, title, text: text.to_owned(), numbers: numbers.into(), tables, pictures: Vec::new() }
+    }
+}
+
+/// A picture of the report.
+pub struct Picture {
     /// Name of its file.
     pub file: String,
     /// One sentence.
@@ -56,11 +73,10 @@ impl Page {
                 text += &format!("{}\n\n", section.text);
             }
             let parts = section.tables.iter().map(Table::markdown);
-            let figures = section
-                .figures
-                .iter()
-                .map(|Figure { file, caption, .. }| format!("![{caption}]({file})\n\n{caption}\n"));
-            text += &parts.chain(figures).collect::<Vec<_>>().join("\n");
+            let picture =
+                |Picture { file, caption, .. }: &Picture| format!("![{caption}]({file})\n\n{caption}\n");
+            let pictures = section.pictures.iter().map(picture);
+            text += &parts.chain(pictures).collect::<Vec<_>>().join("\n");
         }
         text
     }
@@ -74,21 +90,21 @@ impl Page {
             .collect();
         let section = |section: &Section| {
             let tables: String = section.tables.iter().map(Table::html).collect();
-            let figure = |figure: &Figure| {
-                let caption = escape(&figure.caption);
-                let shown = figure.svg.clone().unwrap_or_else(|| {
-                    let png = STANDARD.encode(&figure.png);
+            let picture = |picture: &Picture| {
+                let caption = escape(&picture.caption);
+                let shown = picture.svg.clone().unwrap_or_else(|| {
+                    let png = STANDARD.encode(&picture.png);
                     format!("<img alt=\"{caption}\" src=\"data:image/png;base64,{png}\">")
                 });
                 format!("<figure class=\"sample\"><figcaption>{caption}</figcaption>{shown}</figure>\n")
             };
-            let figures: String = section.figures.iter().map(figure).collect();
+            let pictures: String = section.pictures.iter().map(picture).collect();
             let text = if section.text.is_empty() {
                 String::new()
             } else {
                 format!("<p>{}</p>", escape(&section.text))
             };
-            format!("<section><h2>{}</h2>{text}{tables}{figures}</section>\n", escape(&section.title))
+            format!("<section><h2>{}</h2>{text}{tables}{pictures}</section>\n", escape(section.title))
         };
         let sections: String = self.sections.iter().map(section).collect();
         format!(

@@ -1,17 +1,21 @@
 //! The sample picture of a run: validation scenes before and after the networks, front and back.
 
+use super::scene_evaluation::drape_by;
+use super::validation::ValidationSet;
 use crate::dataset::{Dataset, PreparedScene, ValidationGroup};
-use crate::evaluation::ValidationSet;
 use crate::inference::Draped;
 use crate::inference::networks::Networks;
+use crate::inference::reference::wide;
 use crate::picture::{
     BODY_COLOUR, Figure, LegendEntry, Sheet, SheetRow, View, layer_colour, render, save_png,
 };
+use crate::run::validation::Method;
 use miette::{IntoDiagnostic, Report};
 use std::path::Path;
 
-/// Width and height of one picture [pixels].
+/// Width and height of one picture (pixels).
 const CELL: [u32; 2] = [300, 460];
+const VIEWS: [View; 2] = [View::Front, View::Back];
 
 /// Draws `count` single and `count` layered validation scenes, evenly chosen, to `path`.
 ///
@@ -24,36 +28,31 @@ pub fn draw(
     count: usize,
     path: &Path,
 ) -> Result<(), Report> {
+    let methods = [validation.skinning(), Method::Network];
     let mut rows = Vec::new();
     for group in [ValidationGroup::Single, ValidationGroup::Layered] {
-        let draws = validation.draws(group);
-        let count = count.min(draws.len());
+        let samples = validation.samples(group);
+        let count = count.min(samples.len());
         for i in 0..count {
-            // One further in each part: layer counts come in turn, and equal strides would always meet the same one.
-            let draw = &draws[(i * draws.len() / count + i) % draws.len()];
-            rows.push(row(networks, &validation.prepare(dataset, draw)?)?);
+            // One further in each part: layer counts are round-robin, and equal steps would always meet the same one.
+            let sample = &samples[(i * samples.len() / count + i) % samples.len()];
+            rows.push(row(networks, &methods, &validation.prepare(dataset, sample)?)?);
         }
     }
-    let heading = |m: &str, v: &str| format!("{m}, {v}");
-    let columns = ["LBS", "network"].iter().flat_map(|m| ["front", "back"].map(|v| heading(m, v))).collect();
+    let columns = methods.iter().flat_map(|m| VIEWS.map(|v| format!("{}, {}", m.name(), v.name()))).collect();
     let sheet = Sheet { title: String::new(), columns, rows };
     save_png(&sheet.compose(), path).into_diagnostic()
 }
 
-fn row(networks: &Networks, scene: &PreparedScene) -> Result<SheetRow, Report> {
-    let names: Vec<&str> = scene.garments.iter().map(|g| g.garment.name.as_str()).collect();
-    let skinned = networks.skin(scene)?;
-    let draped = networks.drape(scene)?;
-    let cells = [&skinned, &draped]
-        .into_iter()
-        .flat_map(|d| [View::Front, View::Back].map(|view| picture_of(scene, d, view, &layer_colour)))
+fn row(networks: &Networks, methods: &[Method], scene: &PreparedScene) -> Result<SheetRow, Report> {
+    let drapes = drape_by(networks, methods, scene)?;
+    let pictures = |d| VIEWS.map(|view| picture_of(scene, d, view, &layer_colour));
+    let cells = drapes.iter().flat_map(pictures).collect();
+    let garments = scene.garments.iter().enumerate();
+    let legend = garments
+        .map(|(i, garment)| LegendEntry { colour: layer_colour(i), name: garment.garment.name.clone() })
         .collect();
-    let legend = names
-        .iter()
-        .enumerate()
-        .map(|(i, name)| LegendEntry { colour: layer_colour(i), name: (*name).to_owned() })
-        .collect();
-    let label = match names.len() {
+    let label = match scene.garments.len() {
         1 => "1 garment".to_owned(),
         several => format!("{several} garments, inner to outer"),
     };
@@ -67,7 +66,6 @@ pub(crate) fn picture_of(
     view: View,
     colour: &dyn Fn(usize) -> [u8; 3],
 ) -> image::RgbImage {
-    let wide = |p: &[[f32; 3]]| p.iter().map(|p| p.map(f64::from)).collect::<Vec<_>>();
     let body = &scene.bodies[0].energy.body;
     let body_positions = wide(&body.positions);
     let positions = wide(&draped.posed);

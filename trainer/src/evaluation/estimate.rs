@@ -4,6 +4,10 @@ use crate::run::spread::Spread;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// A quantity of a scene: its name in `eval.json` and its value.
+pub type Metric<S> = (&'static str, fn(&S) -> f64);
 
 /// Resamples of the bootstrap: the ends of a 95 % interval are then steady to a few percent of its width.
 const RESAMPLES: usize = 1000;
@@ -23,10 +27,18 @@ pub struct Estimate {
 
 impl Estimate {
     /// Of one value per scene; all zero without scenes.
-    pub fn of(values: &[f64]) -> Self {
-        let interval =
-            bootstrap(values.len(), |draw| draw.iter().map(|&i| values[i]).sum::<f64>() / draw.len() as f64);
-        Self { scenes: values.len(), spread: Spread::of(values.to_vec()), interval }
+    pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
+        let values: Vec<f64> = values.into_iter().collect();
+        let interval = bootstrap(values.len(), |resample| {
+            resample.iter().map(|&i| values[i]).sum::<f64>() / resample.len() as f64
+        });
+        Self { scenes: values.len(), interval, spread: Spread::of(values) }
+    }
+
+    /// Of every metric over the same scenes.
+    pub fn of_metrics<S>(scenes: &[&S], metrics: &[Metric<S>]) -> BTreeMap<&'static str, Self> {
+        let estimate = |&(name, value): &Metric<S>| (name, Self::of(scenes.iter().map(|scene| value(scene))));
+        metrics.iter().map(estimate).collect()
     }
 }
 
@@ -37,20 +49,20 @@ pub struct Ratio {
     pub of_means: f64,
     /// Median over median.
     pub of_medians: f64,
-    /// 95 % confidence interval of the ratio of means: the bootstrap draws scenes, so that what makes both large cancels.
+    /// 95 % confidence interval of the ratio of means: the bootstrap resamples scenes, so that what makes both large cancels.
     pub interval: [f64; 2],
 }
 
 impl Ratio {
     /// Of `above` over `below`, values of the same scenes; not finite where `below` is zero on all of them.
     pub fn of(above: &[f64], below: &[f64]) -> Self {
-        let sum = |values: &[f64], draw: &[usize]| draw.iter().map(|&i| values[i]).sum::<f64>();
+        let sum = |values: &[f64], scenes: &[usize]| scenes.iter().map(|&i| values[i]).sum::<f64>();
         let all: Vec<usize> = (0..above.len()).collect();
         let medians = [above, below].map(|v| Spread::of(v.to_vec()).median);
         Self {
             of_means: sum(above, &all) / sum(below, &all),
             of_medians: medians[0] / medians[1],
-            interval: bootstrap(above.len(), |draw| sum(above, draw) / sum(below, draw)),
+            interval: bootstrap(above.len(), |resample| sum(above, resample) / sum(below, resample)),
         }
     }
 }
@@ -92,11 +104,11 @@ fn bootstrap(count: usize, statistic: impl Fn(&[usize]) -> f64) -> [f64; 2] {
         return [0.0; 2];
     }
     let mut rng = ChaCha8Rng::seed_from_u64(0);
-    let mut draw = vec![0; count];
+    let mut resample = vec![0; count];
     let mut found: Vec<f64> = (0..RESAMPLES)
         .map(|_| {
-            draw.iter_mut().for_each(|i| *i = rng.random_range(0..count));
-            statistic(&draw)
+            resample.iter_mut().for_each(|i| *i = rng.random_range(0..count));
+            statistic(&resample)
         })
         .collect();
     found.retain(|statistic| !statistic.is_nan());
@@ -118,7 +130,7 @@ mod tests {
         let normal = Normal::new(5.0, 2.0).unwrap();
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         let values: Vec<f64> = (0..400).map(|_| normal.sample(&mut rng)).collect();
-        let estimate = Estimate::of(&values);
+        let estimate = Estimate::of(values);
         let half = 0.5 * (estimate.interval[1] - estimate.interval[0]);
         assert!((half - 1.96 * 2.0 / 20.0).abs() < 0.03, "{half}");
         assert!(estimate.interval[0] < estimate.spread.mean && estimate.spread.mean < estimate.interval[1]);
@@ -132,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn six_of_six_tell_little() {
+    fn the_interval_of_six_of_six_is_wide() {
         // Wilson's interval of 6 of 6 and of 5 of 6.
         let shares = [[true; 6], [true, true, true, true, true, false]].map(Proportion::new);
         let expected = [[0.6097, 1.0], [0.4365, 0.9699]];
@@ -145,7 +157,7 @@ mod tests {
     #[test]
     fn nothing_is_no_error() {
         assert_eq!(Proportion::new([]).interval, [0.0, 1.0]);
-        assert_eq!(Estimate::of(&[]).interval, [0.0; 2]);
+        assert_eq!(Estimate::of([]).interval, [0.0; 2]);
         assert!(Ratio::of(&[], &[]).of_means.is_nan());
     }
 }
