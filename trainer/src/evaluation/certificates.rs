@@ -21,7 +21,7 @@ use thiserror::Error;
 /// Why a drape cannot be post-processed.
 #[derive(Debug, Error, Diagnostic)]
 pub enum PostProcessError {
-    /// A pose on the way cannot be draped.
+    /// A pose of the continuation path cannot be draped.
     #[error(transparent)]
     #[diagnostic(transparent)]
     Drape(#[from] DrapeError),
@@ -35,7 +35,7 @@ pub struct Dressing<'a> {
     dataset: &'a Dataset,
     losses: &'a LossesConfig,
     networks: Option<&'a Networks<'a>>,
-    /// What drapes poses on the way from the T-pose: without corrections, which leaves fewer crossings (docs/resolve.md).
+    /// What drapes poses between the T-pose and the scene: without corrections, which leaves fewer intersections (docs/resolve.md).
     uncorrected: Option<Networks<'a>>,
     known: Mutex<HashMap<usize, Arc<RestGarment>>>,
 }
@@ -71,13 +71,13 @@ impl<'a> Dressing<'a> {
         draped_by(self.networks, scene)
     }
 
-    /// `scene` on the way from the T-pose.
+    /// `scene` in a pose between the T-pose and its own.
     fn stage(&self, scene: &PreparedScene, share: f64) -> Result<PathSample, PostProcessError> {
-        let mut draw = scene.sample.clone();
-        for body in &mut draw.bodies {
+        let mut sample = scene.sample.clone();
+        for body in &mut sample.bodies {
             body.pose = body.pose.scaled_keeping_heading(share);
         }
-        let scene = prepare(self.dataset, self.losses, draw, 1.0).map_err(DrapeError::from)?;
+        let scene = prepare(self.dataset, self.losses, sample, 1.0).map_err(DrapeError::from)?;
         Ok(PathSample {
             body: Arc::new(scene.exact_body()),
             draped: wide(&scene, &draped_by(self.uncorrected.as_ref(), &scene)?),
@@ -129,7 +129,7 @@ impl DrapedScene<'_> {
         resolve_along(&self.body, &self.layers(&self.positions), &skinned, settings, stage_at)
     }
 
-    /// Whether the order of the garments can be garment ([`infeasible_pair`]).
+    /// Whether the order of the garments is feasible ([`infeasible_pair`]).
     pub fn is_wearable(&self) -> bool {
         let order: Vec<&Garment> = self.scene.garments.iter().map(|w| &w.garment).collect();
         infeasible_pair(&order).is_none()
@@ -226,7 +226,7 @@ pub struct OutfitResult {
     pub draw: usize,
     /// Names, inner → outer.
     pub garments: Vec<String>,
-    /// Whether the order can be garment ([`infeasible_pair`]).
+    /// Whether the order is feasible ([`infeasible_pair`]).
     pub is_wearable: bool,
     /// Vertices per garment.
     pub vertices: Vec<usize>,
@@ -242,7 +242,7 @@ pub struct OutfitResult {
     pub moved: f64,
     /// Rounds per garment, of all attempts but those of the way and of easing.
     pub rounds: Vec<usize>,
-    /// Steps from the T-pose that were tried; 0 where the drape could be mended as it was.
+    /// Steps from the T-pose that were tried; 0 where the drape could be resolved as it was.
     pub steps: usize,
     /// Time per garment [ms].
     pub milliseconds: Vec<f64>,

@@ -25,11 +25,11 @@ pub struct DrapeMetrics {
     pub paper_layer_collision: f64,
     /// The paper's degree of self-collision ([`self_collision`]), summed over the garments.
     pub self_collision: f64,
-    /// With the body.
+    /// Intersections with the body.
     pub body: Intersections,
-    /// Of garments with each other.
+    /// Intersections of garments with each other.
     pub layers: Intersections,
-    /// Of garments with themselves.
+    /// Self-intersections.
     pub own: Intersections,
 }
 

@@ -73,10 +73,9 @@ fn evaluate(evaluator: &Evaluator<'_>, scenes: &Scenes) -> Result<Value, DrapeEr
         models.iter().flat_map(|model| kinds.iter().map(move |kind| (model, kind))).map(drape).collect()
     };
     let measured = evaluator.measure(model, &scenes.samples(evaluator), drape)?;
-    let kinds = |models: &[ClothCombo], first: usize| -> Vec<Value> {
-        let kinds = KINDS.iter().enumerate().filter(|_| !models.is_empty());
+    let kinds = |first: usize| -> Vec<Value> {
         let of_kind = |kind: usize| measured.iter().map(|drapes| &drapes[first + kind]).collect::<Vec<_>>();
-        kinds.map(|(kind, name)| estimates(name, &of_kind(kind))).collect()
+        KINDS.iter().enumerate().map(|(kind, name)| estimates(name, &of_kind(kind))).collect()
     };
     Ok(json!({
         "title": scenes.set.title(&model.dataset),
@@ -84,8 +83,8 @@ fn evaluate(evaluator: &Evaluator<'_>, scenes: &Scenes) -> Result<Value, DrapeEr
         "scenes": scenes.count,
         // Weight and margin as the model's configuration has them.
         "collision": model.collision_form(Term::BodyCollision),
-        "kinds": kinds(&models[..1], 0),
-        "corrected": kinds(&models[1..], KINDS.len()),
+        "kinds": kinds(0),
+        "corrected": if models.len() > 1 { kinds(KINDS.len()) } else { Vec::new() },
     }))
 }
 

@@ -22,10 +22,9 @@ pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
     let Evaluator { model, ablations, specific, .. } = *evaluator;
     let mut sections = Vec::new();
     if !ablations.is_empty() {
-        let pool = |model: &ModelUnderTest| model.garments();
-        let mut variants = vec![evaluate(evaluator, model, "this model", 5, [1, 4], &pool(model))?];
+        let mut variants = vec![evaluate(evaluator, model, "this model", 5, [1, 4], &model.garments())?];
         for NamedModel { name, model } in ablations {
-            variants.push(evaluate(evaluator, model, name, 5, [1, 4], &pool(model))?);
+            variants.push(evaluate(evaluator, model, name, 5, [1, 4], &model.garments())?);
         }
         let note = "Means (medians) over outfits of 1 to 4 garments of all sets in held-out windows, the same for every model; before the \
                     post-process. Layer-order violations by the nearest vertex. Self-collision: (1/N) Σ −log d² (d in m) over pairs of vertices of \
