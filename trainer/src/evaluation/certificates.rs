@@ -119,7 +119,7 @@ impl DrapedScene<'_> {
         pairs.map(|(garment, positions)| Layer { garment, positions }).collect()
     }
 
-    /// Resolves it, if need be on a way from the T-pose.
+    /// Resolves it, if need be on a continuation path from the T-pose.
     ///
     /// # Errors
     /// When it is no valid scene, or another pose cannot be draped.
@@ -240,7 +240,7 @@ pub struct OutfitResult {
     pub largest_move_mm: f64,
     /// Share of vertices that moved.
     pub moved: f64,
-    /// Rounds per garment, of all attempts but those of the way and of easing.
+    /// Rounds per garment, of all attempts but those of the continuation path and of relaxing strain.
     pub rounds: Vec<usize>,
     /// Steps from the T-pose that were tried; 0 where the drape could be resolved as it was.
     pub steps: usize,

@@ -43,7 +43,7 @@ struct SolverSummary {
     relative_gradient: Spread,
 }
 
-/// Strain of a layer in the outfit over that of the same garment alone, medians over the scenes.
+/// Strain of a layer in the outfit over that of the single garment, medians over the scenes.
 #[derive(Serialize)]
 struct StrainRatio {
     /// In equilibrium.
@@ -96,7 +96,7 @@ impl Summary {
                 row!["layer" => layer + 1, "equilibrium" => *equilibrium, "network" => *network]
             };
             let rows: Vec<_> = self.strain_ratios.iter().enumerate().map(row).collect();
-            text += "\nstrain in the outfit over that of the garment alone, medians\n";
+            text += "\nstrain in the outfit over that of the single garment, medians\n";
             text += &table(&rows);
         }
         text
