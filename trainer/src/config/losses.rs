@@ -55,7 +55,7 @@ impl Default for StrainLoss {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct BodyCollisionLoss {
-    /// Factor on the raw value [1/m³ · J].
+    /// Factor on the raw value (1/m³ · J).
     pub weight: Ramp,
     /// Distance to the body that a vertex should keep (m).
     pub epsilon: f64,

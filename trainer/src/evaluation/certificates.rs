@@ -187,9 +187,9 @@ pub struct Counts {
     pub self_triangle_pairs: usize,
     /// Pairs of all kinds where the body lies inside itself.
     pub pinched_pairs: usize,
-    /// Length of the curves of intersection [mm].
+    /// Length of the curves of intersection (mm).
     pub contour_length_mm: f64,
-    /// Deepest vertex [mm].
+    /// Deepest vertex (mm).
     pub max_depth_mm: f64,
     /// Share of layer-order violations, by the closest surface point.
     pub order_violations: f64,
@@ -236,7 +236,7 @@ pub struct OutfitResult {
     pub after: Counts,
     /// Rise of the strain energy, as a share; none where there was no strain.
     pub strain_added: Option<f64>,
-    /// Largest move of a vertex [mm].
+    /// Largest move of a vertex (mm).
     pub largest_move_mm: f64,
     /// Share of vertices that moved.
     pub moved: f64,
@@ -244,11 +244,11 @@ pub struct OutfitResult {
     pub rounds: Vec<usize>,
     /// Steps from the T-pose that were tried; 0 where the drape could be resolved as it was.
     pub steps: usize,
-    /// Time per garment [ms].
+    /// Time per garment (ms).
     pub milliseconds: Vec<f64>,
-    /// Time to prepare the body, once for all garments [ms].
+    /// Time to prepare the body, once for all garments (ms).
     pub body_milliseconds: f64,
-    /// Time of the certificate, once for all garments [ms].
+    /// Time of the certificate, once for all garments (ms).
     pub certificate_milliseconds: f64,
 }
 

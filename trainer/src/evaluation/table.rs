@@ -125,7 +125,7 @@ pub fn median_and_p95(spread: &Value) -> String {
     format!("{} ({})", number(&spread["median"]), number(&spread["p95"]))
 }
 
-/// Mean of an estimate [95 % interval of the mean].
+/// Mean of an estimate (95 % interval of the mean).
 pub fn mean_with_interval(estimate: &Value) -> String {
     with_interval(estimate, "mean", number)
 }
@@ -135,12 +135,12 @@ pub fn percent_with_interval(estimate: &Value) -> String {
     with_interval(estimate, "mean", percent)
 }
 
-/// Median of an estimate [95 % interval of the mean].
+/// Median of an estimate (95 % interval of the mean).
 pub fn median_with_interval(estimate: &Value) -> String {
     with_interval(estimate, "median", number)
 }
 
-/// Ratio of means [95 % interval].
+/// Ratio of means (95 % interval).
 pub fn ratio_with_interval(ratio: &Value) -> String {
     with_interval(ratio, "of_means", number)
 }
@@ -155,7 +155,7 @@ fn with_interval(value: &Value, middle: &str, text: fn(&Value) -> String) -> Str
     }
 }
 
-/// Count of all of a proportion [95 % interval in percent, without decimals].
+/// Count of all of a proportion (95 % interval in percent, without decimals).
 pub fn proportion(value: &Value) -> String {
     let end = |i: usize| 100.0 * value["interval"][i].as_f64().unwrap_or(f64::NAN);
     match value {

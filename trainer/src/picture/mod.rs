@@ -50,9 +50,9 @@ pub enum PictureError {
     /// The PNG encoder refused the picture.
     #[error("cannot encode a picture of {width}x{height} pixels as PNG: {source}")]
     Encode {
-        /// Width [pixels].
+        /// Width (pixels).
         width: u32,
-        /// Height [pixels].
+        /// Height (pixels).
         height: u32,
         /// What the encoder said.
         source: image::ImageError,

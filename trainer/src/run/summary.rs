@@ -31,7 +31,7 @@ pub struct RunSummary {
     pub stage: String,
     /// Median loss of the last 100 logged steps.
     pub loss: Option<f64>,
-    /// Median time of the last 100 logged steps [s].
+    /// Median time of the last 100 logged steps (s).
     pub seconds_per_step: Option<f64>,
     /// Steps skipped because loss or gradient was not finite.
     pub skipped: u64,

@@ -88,7 +88,7 @@ pub struct GarmentScore {
     pub vertices: usize,
     /// Number of triangles.
     pub triangles: usize,
-    /// Energies of one garment [J, m³, 1, m²]; holding only where canonical positions are given.
+    /// Energies of one garment (J, m³, 1, m²); holding only where canonical positions are given.
     pub raw: TermValues,
     /// The same times the paper's weights, whatever the number of vertices.
     pub weighted: TermValues,

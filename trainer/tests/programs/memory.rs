@@ -51,7 +51,7 @@ sample_scenes = 0
     file
 }
 
-/// Peak of the resident memory and its estimate [MiB] as the report of a run says them.
+/// Peak of the resident memory and its estimate (MiB) as the report of a run says them.
 #[cfg(target_os = "linux")]
 fn peak_and_estimate(run: &Path) -> [f64; 2] {
     let page = std::fs::read_to_string(run.join("report.html")).unwrap();

@@ -52,7 +52,7 @@ pub struct Page<'a> {
     pub state: RunState,
     /// The steps of the run and its stages.
     pub steps: &'a Steps,
-    /// When this page was made [s since 1970].
+    /// When this page was made (s since 1970).
     pub made: u64,
     /// Steps per second of this session.
     pub speed: Option<f64>,
@@ -64,7 +64,7 @@ pub struct Page<'a> {
     pub licences: &'a [LicenceLine],
     /// Memory expected at the start.
     pub memory: Option<MemoryEstimate>,
-    /// Most memory used so far [bytes].
+    /// Most memory used so far (bytes).
     pub peak: Option<u64>,
 }
 
