@@ -23,7 +23,6 @@ pub mod sample_picture;
 mod scene_evaluation;
 mod score;
 mod sets;
-mod sign_error;
 mod stress_tests;
 mod table;
 mod timing;
@@ -33,7 +32,6 @@ mod variants;
 pub use evaluator::{NamedModel, Progress, SceneCounts};
 pub use model_under_test::ModelUnderTest;
 pub use page::Page;
-pub use sign_error::{RegionErrors, SignErrorSettings, SignErrors, WrongSigns, hard_poses, sign_errors};
 pub use timing::median_ms;
 pub use validation::ValidationSet;
 

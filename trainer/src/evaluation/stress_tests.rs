@@ -2,7 +2,7 @@
 
 use super::certificates::OutfitResult;
 use super::table::{Column, number, percent, plain};
-use super::{Evaluator, Section, Table, drape_by, hard_poses};
+use super::{Evaluator, Section, Table, drape_by};
 use crate::dataset::{BodySample, PreparedScene, SceneSample};
 use crate::inference::Draped;
 use crate::inference::tensor_store::DrapeError;
@@ -10,6 +10,7 @@ use crate::run::spread::Spread;
 use crate::run::validation::Method;
 use crate::system::single_threaded::map_single_threaded;
 use clothcombo_data::asset::Pose;
+use clothcombo_data::generate::pose::folded_poses;
 use clothcombo_physics::energy::Term;
 use miette::Report;
 use serde_json::{Value, json};
@@ -22,7 +23,7 @@ struct Case {
 }
 
 fn cases() -> Vec<Case> {
-    let poses = hard_poses().into_iter().map(|(name, pose)| (name.to_owned(), 1, None, Some(pose)));
+    let poses = folded_poses().into_iter().map(|(name, pose)| (name.to_owned(), 1, None, Some(pose)));
     let shapes = [-5.0, 5.0].map(|beta| (format!("all shapes at β = {beta:+}"), 1, Some(beta), None));
     let layers = [("12 layers".to_owned(), 12, None, None)];
     let cases = poses.chain(shapes).chain(layers);

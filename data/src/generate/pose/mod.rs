@@ -1,11 +1,13 @@
 //! Random poses: sampled within the limits of human joints, or varied from recorded ones.
 
 mod augmentation;
+mod folded;
 mod limits;
 mod sampler;
 mod self_contact;
 
 pub use augmentation::PoseAugmentation;
+pub use folded::folded_poses;
 pub use limits::{JOINT_LIMITS, JointLimits, is_within_limits, limited};
 pub use sampler::PoseSampler;
 pub use self_contact::SelfContact;

@@ -2,7 +2,6 @@
 
 pub mod backends;
 pub mod certificate;
-pub mod distance;
 pub mod error;
 pub mod stability;
 pub mod step;
@@ -17,8 +16,6 @@ pub enum Bench {
     Backends(backends::Arguments),
     /// The post-process on random outfits: exact intersections that are left, changes, time
     Certificate(certificate::Arguments),
-    /// How often the sign of the distance to the body is wrong, by nearest vertex and by closest surface point
-    Distance(distance::Arguments),
     /// Energy above the equilibrium and distance to it, for skinning and a trained network, on random scenes
     Error(error::Arguments),
     /// Every energy on every degenerate case: finite, bounded, a true gradient, the same in both precisions
@@ -35,7 +32,6 @@ pub fn run(bench: &Bench) -> Result<(), Report> {
     match bench {
         Bench::Backends(arguments) => backends::run(arguments),
         Bench::Certificate(arguments) => certificate::run(arguments),
-        Bench::Distance(arguments) => distance::run(arguments),
         Bench::Error(arguments) => error::run(arguments),
         Bench::Stability(arguments) => stability::run(arguments),
         Bench::Step(arguments) => step::run(arguments),
