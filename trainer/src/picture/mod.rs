@@ -58,23 +58,3 @@ pub enum PictureError {
         source: image::ImageError,
     },
 }
-
-pub use chart::Line;
-
-/// Charts that share a title.
-#[derive(Default)]
-pub struct LinePanel {
-    /// Title.
-    pub title: String,
-    /// Lines.
-    pub lines: Vec<Line>,
-}
-
-/// A picture of the panels.
-///
-/// # Errors
-/// Never.
-pub fn draw_lines(title: &str, panels: &[LinePanel]) -> Result<image::RgbImage, PictureError> {
-    let charts = panels.iter().map(|panel| chart::Chart::of_lines(&panel.title, &panel.lines)).collect();
-    Ok(chart::ChartGrid { title: title.to_owned(), legend: Vec::new(), charts }.draw())
-}
