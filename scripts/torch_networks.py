@@ -156,8 +156,8 @@ class ClothCombo(nn.Module):
         mean = [(garment.mass[:, None] * z).sum(0) / garment.mass.sum() for garment, z in zip(outfit.garments, vertex)]
         return torch.cat(vertex), torch.stack(mean)
 
-    def forward(self, outfit, embeddings=None, alone=False):
-        """Posed and canonical positions [ΣV,3]; with `alone` also those of every garment draped alone."""
+    def forward(self, outfit, embeddings=None, with_single=False):
+        """Posed and canonical positions [ΣV,3]; with `with_single` also those of the single garments."""
         vertex, garment = self.encode(outfit) if embeddings is None else embeddings
         config, of = self.config, outfit.of_vertex
         body = torch.cat([outfit.shape, outfit.pose])[None].expand(len(garment), -1)
@@ -173,9 +173,9 @@ class ClothCombo(nn.Module):
         transforms = torch.einsum("vj,jab->vab", outfit.weights + config["skinning_scale"] * raw, outfit.bones)
         pose = lambda x: torch.einsum("vab,vb->va", transforms[:, :, :3], x) + transforms[:, :, 3]
         moves = bool(outfit.touched.any())
-        single = (pose(canonical), canonical) if alone or not moves else ()
+        single = (pose(canonical), canonical) if with_single or not moves else ()
         if not moves:
-            return single + single if alone else single
+            return single + single if with_single else single
         i, j = outfit.edges
         forces = self.force(torch.cat([draping[i], draping[j]], dim=1))
         below, above = torch.zeros_like(draping), torch.zeros_like(draping)

@@ -5,9 +5,10 @@ mod fixture;
 mod hostile;
 
 use clothcombo_data::asset::{BindingSettings, Body, BodyFileSettings, Motion};
-use clothcombo_data::format::{Bvh, MatFile, NpzFile, PointCache};
+use clothcombo_data::format::{MatFile, NpzFile, PointCache};
+use clothcombo_data::import::bvh::Bvh;
 use clothcombo_data::import::{
-    AmassSettings, Cloth3dBodies, Cloth3dSettings, DeepMimicSettings, Summary, Thinning, import_amass,
+    AmassSettings, Cloth3dBodies, Cloth3dSettings, RetargetSettings, Summary, Thinning, import_amass,
     import_cloth3d, import_deepmimic, import_smpl_family,
 };
 use fixture::{fixture, no_progress};
@@ -116,7 +117,7 @@ fn bodies_and_motions() {
     let made = Slot::new("x.npz");
     let body = Body::load(&fixture("cloth3d_bodies/body_neutral.npz"), &BodyFileSettings::default()).unwrap();
     let text = [fixture("deepmimic/humanoid3d_random.txt")];
-    import_deepmimic(&text, &body, &made.out(), &DeepMimicSettings::default(), &mut no_progress()).unwrap();
+    import_deepmimic(&text, &body, &made.out(), &RetargetSettings::default(), &mut no_progress()).unwrap();
     let seeds = [fs::read(made.out().join("humanoid3d_random.npz")).unwrap()];
     survive("motion.npz", &seeds, 0.2..1.0, 64 * MEGABYTE, damaged_npz, |bytes| {
         reason(Motion::load(slot.with(bytes)))
@@ -146,7 +147,7 @@ fn motions_of_others() {
     let seeds = [bytes_of("deepmimic/humanoid3d_random.txt")];
     survive("spin.txt", &seeds, 0.2..1.0, 16 * MEGABYTE, damaged, |bytes| {
         let files = [slot.with(bytes).to_owned()];
-        let settings = DeepMimicSettings::default();
+        let settings = RetargetSettings::default();
         outcome(import_deepmimic(&files, &body, &slot.out(), &settings, &mut no_progress()))
     });
     let slot = Slot::new("jump_poses.npz");

@@ -2,7 +2,7 @@
 
 mod hostile;
 
-use clothcombo_data::format::mesh::parse_mesh;
+use clothcombo_data::format::parse_mesh;
 use hostile::{damaged, survive};
 use std::path::Path;
 

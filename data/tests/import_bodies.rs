@@ -12,7 +12,7 @@ use std::path::Path;
 
 const ALL: BodyFileSettings = BodyFileSettings { shape_components: usize::MAX };
 
-/// Largest distance between our posed vertices and the expected ones [m].
+/// Largest distance between our posed vertices and the expected ones (m).
 fn deviation(body: &Body, name: &str) -> f64 {
     let mut expected = NpzFile::open(&fixture("expected_bodies.npz")).unwrap();
     let mut array = |what: &str| expected.numbers(&format!("{name}_{what}"), "").unwrap();

@@ -6,7 +6,7 @@ use clothcombo_data::asset::{BindingSettings, Body, BodyFileSettings, Category, 
 use clothcombo_data::dataset::load_garment_folder;
 use clothcombo_data::format::{MatFile, MatValue, NpzFile, PointCache};
 use clothcombo_data::import::{
-    Cloth3dBodies, Cloth3dError, Cloth3dSettings, Summary, Thinning, import_cloth3d,
+    Cloth3dBodies, Cloth3dSettings, ImportError, Summary, Thinning, import_cloth3d,
 };
 use fixture::{files_in, fixture, no_progress, truncations};
 use std::fs;
@@ -16,7 +16,7 @@ fn body(name: &str) -> Body {
     Body::load(&fixture(&format!("cloth3d_bodies/{name}.npz")), &BodyFileSettings::default()).unwrap()
 }
 
-fn import(inputs: &[PathBuf], female: &Body, out: &Path, smooth: bool) -> Result<Summary, Cloth3dError> {
+fn import(inputs: &[PathBuf], female: &Body, out: &Path, smooth: bool) -> Result<Summary, ImportError> {
     let neutral = body("body_neutral");
     let bodies = Cloth3dBodies { target: &neutral, female: Some(female), male: None };
     let settings = Cloth3dSettings {
@@ -28,7 +28,7 @@ fn import(inputs: &[PathBuf], female: &Body, out: &Path, smooth: bool) -> Result
     import_cloth3d(inputs, &bodies, out, &settings, &mut no_progress())
 }
 
-/// Largest distance of a garment's vertices to where they lie on the zero body [m].
+/// Largest distance of a garment's vertices to where they lie on the zero body (m).
 fn deviation(positions: &[[f64; 3]], garment: &str) -> f64 {
     let mut expected = NpzFile::open(&fixture("expected_cloth3d.npz")).unwrap();
     let expected = expected.numbers(garment, "").unwrap();
@@ -248,8 +248,6 @@ fn point_caches_are_exact_and_their_size_is_checked() {
         NpzFile::open(&fixture("expected_cloth3d.npz")).unwrap().numbers("Top_simulated_z_up", "").unwrap();
     assert_eq!([cache.frame_count(), cache.point_count, 3], expected.shape[..]);
     assert!(cache.positions.as_flattened().iter().zip(&expected.data).all(|(a, b)| f64::from(*a) == *b));
-    assert_eq!((cache.start, cache.rate), (0.0, 1.0));
-    assert_eq!(cache.frame(5).len(), cache.point_count);
     for cut in truncations(&path, 50) {
         let message = PointCache::load(&cut.path).unwrap_err().to_string();
         assert!(

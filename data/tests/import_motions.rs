@@ -8,7 +8,7 @@ use clothcombo_data::dataset::load_motion_folder;
 use clothcombo_data::format::NpzFile;
 use clothcombo_data::generate::mannequin;
 use clothcombo_data::import::{
-    AmassSettings, DeepMimicSettings, Summary, Thinning, UpAxis, import_amass, import_deepmimic,
+    AmassSettings, RetargetSettings, Summary, Thinning, import_amass, import_deepmimic,
 };
 use fixture::{files_in, fixture, no_progress, truncations};
 use std::fs;
@@ -19,7 +19,7 @@ fn every_frame() -> Thinning {
 }
 
 fn amass(out: &Path, thinning: Thinning) -> Summary {
-    let settings = AmassSettings { thinning, up: UpAxis::Z };
+    let settings = AmassSettings { thinning, z_up: true };
     import_amass(&[fixture("amass")], out, &settings, &mut no_progress()).unwrap()
 }
 
@@ -106,16 +106,16 @@ fn the_rate_is_reduced_and_standing_still_dropped() {
 #[test]
 fn a_wrong_up_axis_is_noticed_and_the_right_one_believed() {
     let folder = tempfile::tempdir().unwrap();
-    let settings = AmassSettings { thinning: every_frame(), up: UpAxis::Y };
+    let settings = AmassSettings { thinning: every_frame(), z_up: false };
     let files = [fixture("amass/CMU/02/jump_poses.npz")];
     let summary = import_amass(&files, folder.path(), &settings, &mut no_progress()).unwrap();
     assert!(summary.taken[0].1.contains("check the up axis"), "{summary:?}");
-    // Importing our own y-up motions as if they were z up is told.
+    // Importing our own y-up motions as if they were z up is reported.
     let y_up = folder.path().join("y_up.npz");
     let mut standing = Motion::load(&folder.path().join("jump.npz")).unwrap();
     standing.poses.iter_mut().for_each(|p| p.rotations[0] = [0.0, 0.3, 0.0]);
     standing.save(&y_up).unwrap();
-    let settings = AmassSettings { thinning: every_frame(), up: UpAxis::Z };
+    let settings = AmassSettings { thinning: every_frame(), z_up: true };
     let summary = import_amass(&[y_up], &folder.path().join("out"), &settings, &mut no_progress()).unwrap();
     assert!(summary.taken[0].1.contains("check the up axis"), "{summary:?}");
 }
@@ -157,7 +157,7 @@ fn no_motion_takes_the_place_of_the_body() {
     let folder = tempfile::tempdir().unwrap();
     let body_file = folder.path().join("humanoid3d_random.npz");
     fs::write(&body_file, "the only copy").unwrap();
-    let settings = DeepMimicSettings { body_file: Some(body_file.clone()), ..DeepMimicSettings::default() };
+    let settings = RetargetSettings { body_file: Some(body_file.clone()), ..RetargetSettings::default() };
     let clip = [fixture("deepmimic/humanoid3d_random.txt")];
     let result = import_deepmimic(&clip, &mannequin(), folder.path(), &settings, &mut no_progress());
     let message = result.unwrap_err().to_string();
@@ -169,8 +169,7 @@ fn no_motion_takes_the_place_of_the_body() {
 fn rates_that_no_motion_may_have_are_not_written() {
     let folder = tempfile::tempdir().unwrap();
     // 60 frames/s, of which every millionth frame is asked for.
-    let slow =
-        AmassSettings { thinning: Thinning { frame_rate: 1e-9, static_threshold: 0.0 }, up: UpAxis::Z };
+    let slow = AmassSettings { thinning: Thinning { frame_rate: 1e-9, static_threshold: 0.0 }, z_up: true };
     let files = [fixture("amass/CMU/02/jump_poses.npz")];
     let message = import_amass(&files, folder.path(), &slow, &mut no_progress()).unwrap_err().to_string();
     assert!(message.contains("expected 0.01 to 10000"), "{message}");
@@ -203,7 +202,7 @@ fn deepmimic_limbs_point_where_the_character_points_them() {
     let folder = tempfile::tempdir().unwrap();
     let body = mannequin();
     let files = ["humanoid3d_random.txt", "dog.txt", "cut.txt"].map(|f| fixture("deepmimic").join(f));
-    let settings = DeepMimicSettings { thinning: every_frame(), ..DeepMimicSettings::default() };
+    let settings = RetargetSettings { thinning: every_frame(), ..RetargetSettings::default() };
     let summary = import_deepmimic(&files, &body, folder.path(), &settings, &mut no_progress()).unwrap();
     let skipped: Vec<&str> = summary.skipped.iter().map(|(_, reason)| reason.as_str()).collect();
     assert!(skipped[0].contains("frame 0 has 8 numbers") && skipped[1].contains("EOF"), "{skipped:?}");

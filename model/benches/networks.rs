@@ -1,17 +1,17 @@
-//! Times of the networks, forward and with the backward pass, and of the fused operations beside burn's own.
+//! Times of the networks, forward and with the backward pass, and of the fused operations next to burn's own.
 //!
 //! `cargo bench -p clothcombo-model --features flex [-- FILTER]`; `RAYON_NUM_THREADS` sets the threads.
 
-use std::hint::black_box;
 use std::time::Duration;
 
 use burn::module::Module;
 use burn::tensor::{Device, Distribution, Tensor};
 use clothcombo_model::ops::{Activation, activate_residual, sine_modulation};
 use clothcombo_model::{
-    BodyTensors, ClothCombo, Dimensions, GarmentArrays, GarmentTensors, ModelConfig, OutfitTensors,
+    BodyTensors, ClothCombo, Dimensions, GarmentArrays, GarmentTensors, Mode, ModelConfig, OutfitTensors,
 };
-use criterion::{BenchmarkId, Criterion};
+use criterion::measurement::WallTime;
+use criterion::{BenchmarkGroup, BenchmarkId, Criterion};
 
 const DIMENSIONS: Dimensions = Dimensions { joints: 22, shape: 16, pose: 132 };
 
@@ -71,52 +71,38 @@ fn networks(criterion: &mut Criterion, vertices: usize, config: &ModelConfig) {
     group.sample_size(15).measurement_time(Duration::from_secs(2)).warm_up_time(Duration::from_millis(500));
 
     let plain = model.valid();
-    group.bench_function("encode forward", |bencher| {
-        bencher.iter(|| black_box(plain.encode(&one).vertex.into_data()));
-    });
-    group.bench_function("encode forward+backward", |bencher| {
-        bencher.iter(|| black_box(model.encode(&one).vertex.sum().backward()));
-    });
+    time(&mut group, "encode forward", 1, || plain.encode(&one).vertex.into_data());
+    time(&mut group, "encode forward+backward", 1, || model.encode(&one).vertex.sum().backward());
     for count in [1, 3] {
         let garments = vec![&one; count];
         let outfit = OutfitTensors::new(&garments, &OutfitTensors::all_pairs(count)).expect("valid outfit");
         let start = || outfit.rest.clone();
         let embedded: Vec<_> = (0..count).map(|_| plain.encode(&one)).collect();
-        let packed = plain.pack(&outfit, &embedded).expect("matching");
-        let packed = plain.prepare_untangling(&outfit, packed);
-        let single = plain.drape_single(&outfit, &packed, &body, start());
-        group.bench_function(BenchmarkId::new("drape_single forward (packed)", count), |bencher| {
-            bencher
-                .iter(|| black_box(plain.drape_single(&outfit, &packed, &body, start()).posed.into_data()));
-        });
-        group.bench_function(BenchmarkId::new("pack+drape_single forward+backward", count), |bencher| {
-            bencher.iter(|| {
-                let packed = model.pack(&outfit, &embedded).expect("matching");
-                black_box(model.drape_single(&outfit, &packed, &body, start()).posed.sum().backward())
+        let packed = plain.pack(&outfit, &embedded, Mode::Layered).expect("matching");
+        for mode in [Mode::Single, Mode::Layered] {
+            time(&mut group, &format!("{mode:?} forward (packed)"), count, || {
+                let states = plain.forward(&outfit, &packed, &body, start(), mode);
+                states.last().posed.clone().into_data()
             });
-        });
-        if count > 1 {
-            group.bench_function(BenchmarkId::new("untangle forward (packed)", count), |bencher| {
-                bencher
-                    .iter(|| black_box(plain.untangle(&outfit, &packed, &single, &body).posed.into_data()));
-            });
-            group.bench_function(BenchmarkId::new("untangle forward+backward (frozen)", count), |bencher| {
-                bencher.iter(|| {
-                    let packed = model.prepare_untangling(&outfit, packed.clone());
-                    black_box(model.untangle(&outfit, &packed, &single, &body).posed.sum().backward())
-                });
+            time(&mut group, &format!("{mode:?} forward+backward"), count, || {
+                let embedded: Vec<_> = (0..count).map(|_| model.encode(&one)).collect();
+                let packed = model.pack(&outfit, &embedded, mode).expect("matching");
+                let states = model.forward(&outfit, &packed, &body, start(), mode);
+                states.last().posed.clone().sum().backward()
             });
         }
-        group.bench_function(BenchmarkId::new("end to end forward+backward", count), |bencher| {
-            bencher.iter(|| {
-                let embedded: Vec<_> = (0..count).map(|_| model.encode(&one)).collect();
-                let packed = model.pack(&outfit, &embedded).expect("matching");
-                let single = model.drape_single(&outfit, &packed, &body, start());
-                black_box(model.untangle(&outfit, &packed, &single, &body).posed.sum().backward())
-            });
-        });
     }
     group.finish();
+}
+
+/// Times a function of so many garments.
+fn time<T>(
+    group: &mut BenchmarkGroup<'_, WallTime>,
+    name: &str,
+    garments: usize,
+    mut run: impl FnMut() -> T,
+) {
+    group.bench_function(BenchmarkId::new(name, garments), |bencher| bencher.iter(&mut run));
 }
 
 fn operations(criterion: &mut Criterion) {
@@ -126,32 +112,30 @@ fn operations(criterion: &mut Criterion) {
             Tensor::<2>::random([rows, columns], Distribution::Normal(0.0, 1.0), &device).require_grad()
         };
         let (input, bias, gate) = (tensor(rows), tensor(1), tensor(rows));
+        let arguments = || (input.clone(), bias.clone(), gate.clone());
         let mut group = criterion.benchmark_group(format!("operation {rows}x{columns}"));
         group
             .sample_size(10)
             .measurement_time(Duration::from_secs(1))
             .warm_up_time(Duration::from_millis(200));
-        group.bench_function("sine modulation, fused", |bencher| {
-            bencher.iter(|| {
-                black_box(sine_modulation(input.clone(), bias.clone(), gate.clone(), 1.0).sum().backward())
-            });
+        let mut time = |name: &str, operation: &dyn Fn() -> Tensor<2>| {
+            group.bench_function(name, |bencher| bencher.iter(|| operation().sum().backward()));
+        };
+        time("sine modulation, fused", &|| {
+            let (input, bias, gate) = arguments();
+            sine_modulation(input, bias, gate, 1.0)
         });
-        group.bench_function("sine modulation, composed", |bencher| {
-            bencher
-                .iter(|| black_box(((input.clone() + bias.clone()).sin() * gate.clone()).sum().backward()));
+        time("sine modulation, composed", &|| {
+            let (input, bias, gate) = arguments();
+            (input + bias).sin() * gate
         });
-        group.bench_function("gelu, fused", |bencher| {
-            bencher.iter(|| {
-                let output = activate_residual(Activation::Gelu, input.clone(), bias.clone(), gate.clone());
-                black_box(output.sum().backward())
-            });
+        time("gelu, fused", &|| {
+            let (input, bias, gate) = arguments();
+            activate_residual(Activation::Gelu, input, bias, gate)
         });
-        group.bench_function("gelu, composed", |bencher| {
-            bencher.iter(|| {
-                let sum = input.clone() + bias.clone();
-                let output = burn::tensor::activation::gelu(sum) + gate.clone();
-                black_box(output.sum().backward())
-            });
+        time("gelu, composed", &|| {
+            let (input, bias, gate) = arguments();
+            burn::tensor::activation::gelu(input + bias) + gate
         });
         group.finish();
     }

@@ -139,30 +139,13 @@ impl ModelConfig {
             ("correction_width", self.correction_width, 1),
         ];
         for (key, value, minimum) in sizes {
-            if value < minimum {
-                return Err(ModelError::Config {
-                    key,
-                    value: value.to_string(),
-                    expected: format!("at least {minimum}"),
-                });
-            }
+            check(value >= minimum, key, value, &format!("at least {minimum}"))?;
         }
-        if let Some(steps) = self.correction_steps.filter(|steps| *steps > 0 && self.corrections == 0) {
-            return Err(ModelError::Config {
-                key: "correction_steps",
-                value: steps.to_string(),
-                expected: "left out without correction networks (corrections = 0)".into(),
-            });
-        }
-        let positive = [("omega_first", self.omega_first), ("omega_hidden", self.omega_hidden)];
-        for (key, value) in positive {
-            if !(value.is_finite() && value > 0.0) {
-                return Err(ModelError::Config {
-                    key,
-                    value: value.to_string(),
-                    expected: "a positive number".into(),
-                });
-            }
+        let steps = self.correction_steps.unwrap_or(0);
+        let expected = "left out without correction networks (corrections = 0)";
+        check(steps == 0 || self.corrections > 0, "correction_steps", steps, expected)?;
+        for (key, value) in [("omega_first", self.omega_first), ("omega_hidden", self.omega_hidden)] {
+            check(value.is_finite() && value > 0.0, key, value, "a positive number")?;
         }
         let scales = [
             ("displacement_scale", self.displacement_scale),
@@ -170,15 +153,16 @@ impl ModelConfig {
             ("skinning_scale", self.skinning_scale),
         ];
         for (key, value) in scales {
-            if !value.is_finite() {
-                return Err(ModelError::Config {
-                    key,
-                    value: value.to_string(),
-                    expected: "a finite number".into(),
-                });
-            }
+            check(value.is_finite(), key, value, "a finite number")?;
         }
         Ok(())
+    }
+}
+
+fn check(valid: bool, key: &'static str, value: impl ToString, expected: &str) -> Result<(), ModelError> {
+    match valid {
+        true => Ok(()),
+        false => Err(ModelError::Config { key, value: value.to_string(), expected: expected.into() }),
     }
 }
 

@@ -6,7 +6,7 @@ use burn::tensor::Tensor;
 use crate::config::{Dimensions, ModelConfig};
 use crate::initializer::Initializer;
 use crate::mlp::ResidualMlp;
-use crate::ops::Segments;
+use crate::packing::Packing;
 use crate::siren::{ModulatedSiren, SirenSizes};
 use crate::tensors::BodyTensors;
 
@@ -27,17 +27,9 @@ impl Draping {
     pub(crate) fn new(config: &ModelConfig, dimensions: &Dimensions, start: &mut Initializer) -> Self {
         let inputs = config.embedding + dimensions.shape + dimensions.pose;
         let (width, hidden) = (config.width, config.mlp_layers - 1);
-        let sizes = SirenSizes {
-            layers: config.siren_layers,
-            width: config.siren_width,
-            garment_latent: config.width,
-            vertex_latent: config.embedding,
-            omega_first: config.omega_first,
-            omega_hidden: config.omega_hidden,
-        };
         Self {
             embedding: ResidualMlp::new(inputs, width, hidden, width, start),
-            displacement: ModulatedSiren::new(&sizes, start),
+            displacement: ModulatedSiren::new(&SirenSizes::new(config, width), start),
             scale: config.displacement_scale,
         }
     }
@@ -58,14 +50,14 @@ impl Draping {
         self.displacement.modulator.vertex_product(vertex)
     }
 
-    /// Displacements Δx_s `[ΣV,3]` in metres.
+    /// Displacements Δx_s `[ΣV,3]` (m).
     pub fn displace(
         &self,
         rest: Tensor<2>,
         vertex_product: Tensor<2>,
         draping: Tensor<2>,
-        segments: &Segments,
+        packing: &Packing,
     ) -> Tensor<2> {
-        self.displacement.forward(rest, vertex_product, draping, segments) * self.scale
+        self.displacement.forward(rest, vertex_product, draping, packing) * self.scale
     }
 }

@@ -75,8 +75,13 @@ pub(crate) fn check_array(
     layout: &'static str,
 ) -> Result<(), ModelError> {
     check_length(array, values.len(), expected, layout)?;
-    match values.iter().position(|value| !value.is_finite()) {
-        Some(index) => Err(ModelError::NotFinite { array, index, value: f64::from(values[index]) }),
+    check_finite(array, values)
+}
+
+/// Checks that all elements are finite.
+pub(crate) fn check_finite<T: Copy + Into<f64>>(array: &'static str, values: &[T]) -> Result<(), ModelError> {
+    match values.iter().map(|&value| value.into()).enumerate().find(|(_, value)| !value.is_finite()) {
+        Some((index, value)) => Err(ModelError::NotFinite { array, index, value }),
         None => Ok(()),
     }
 }

@@ -30,7 +30,7 @@ pub struct GarmentEmbedding {
 }
 
 impl GarmentEmbedding {
-    /// About how much memory it takes [bytes].
+    /// About how much memory it takes (bytes).
     pub fn bytes(&self) -> usize {
         let [vertices, width] = self.vertex.dims();
         4 * width * (vertices + 1)

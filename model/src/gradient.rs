@@ -7,7 +7,7 @@ use burn::tensor::{Tensor, TensorData};
 use crate::ops::{scale_by, squared_norm};
 
 /// Scales all gradients of `module` so that their joint Euclidean norm is at most `max_norm` (`None`: leaves them), then by
-/// `share`, their weight in a mean of several. Returns the norm before as a tensor `[1]`, which nobody has to wait for; `None`
+/// `share`, their weight in a mean of several. Returns the norm before as a tensor `[1]`, without waiting for the device; `None`
 /// if no parameter has a gradient.
 ///
 /// burn's own clipping treats each tensor on its own; this is the norm over all parameters, as in the paper.
@@ -23,7 +23,7 @@ pub fn clip_global_norm<M: Module>(
         None => norm.ones_like(),
     };
     // A share of 1 changes no bit.
-    module.visit(&mut Scale { gradients, factor: clip * share });
+    module.visit(&mut ScaleGradients { gradients, factor: clip * share });
     Some(norm)
 }
 
@@ -47,12 +47,12 @@ impl ModuleVisitor for SquaredNorms<'_> {
     }
 }
 
-struct Scale<'a> {
+struct ScaleGradients<'a> {
     gradients: &'a mut GradientsParams,
     factor: Tensor<1>,
 }
 
-impl ModuleVisitor for Scale<'_> {
+impl ModuleVisitor for ScaleGradients<'_> {
     fn visit_float<const D: usize>(&mut self, parameter: &Param<Tensor<D>>) {
         if let Some(gradient) = self.gradients.remove::<D>(parameter.id) {
             self.gradients.register::<D>(parameter.id, scale_by(gradient, self.factor.clone()));
@@ -75,7 +75,7 @@ pub fn gradient_bucket<M: Module>(module: &M, gradients: &GradientsParams) -> Ve
 /// If the bucket is of another module.
 pub fn gradients_of_bucket<M: Module>(module: &M, bucket: &[f32]) -> GradientsParams {
     let (values, present) = bucket.split_at(module.num_params());
-    let mut unpack = Unpack { gradients: GradientsParams::new(), values, present };
+    let mut unpack = Unpack { gradients: GradientsParams::new(), values, present: present.iter() };
     module.visit(&mut unpack);
     unpack.gradients
 }
@@ -102,7 +102,7 @@ impl ModuleVisitor for Pack<'_> {
 struct Unpack<'a> {
     gradients: GradientsParams,
     values: &'a [f32],
-    present: &'a [f32],
+    present: std::slice::Iter<'a, f32>,
 }
 
 impl ModuleVisitor for Unpack<'_> {
@@ -110,9 +110,7 @@ impl ModuleVisitor for Unpack<'_> {
         let shape = parameter.lazy_shape();
         let (values, rest) = self.values.split_at(shape.num_elements());
         self.values = rest;
-        let (present, rest) = self.present.split_at(1);
-        self.present = rest;
-        if present[0] > 0.0 {
+        if self.present.next().is_some_and(|present| *present > 0.0) {
             let data = TensorData::new(values.to_vec(), shape);
             let gradient = Tensor::<D>::from_data(data, &parameter.lazy_device().without_autodiff());
             self.gradients.register::<D>(parameter.id, gradient);
@@ -170,7 +168,8 @@ mod tests {
         assert_eq!(squares(&layer, &gradients_of_bucket(&layer, &bucket)), expected);
 
         gradients.remove::<1>(layer.bias.id);
-        let alone = gradients_of_bucket(&layer, &gradient_bucket(&layer, &gradients));
-        assert!(alone.get::<1>(layer.bias.id).is_none() && alone.get::<2>(layer.weight.id).is_some());
+        let without_bias = gradients_of_bucket(&layer, &gradient_bucket(&layer, &gradients));
+        assert!(without_bias.get::<1>(layer.bias.id).is_none());
+        assert!(without_bias.get::<2>(layer.weight.id).is_some());
     }
 }

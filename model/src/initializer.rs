@@ -1,14 +1,14 @@
-//! Where the parameters of a network start.
+//! Initial parameters of a network.
 
 use burn::module::Param;
 use burn::tensor::{Device, Tensor, TensorData};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Draws the first values of parameters, in the order they are asked for.
+/// Samples the first values of parameters, which require gradients where the device has autodiff, in the order of the calls.
 ///
 /// The generator is its own and not burn's, which is one for the whole process: a seed gives the same parameters on every
-/// device, and whatever else draws or trains beside.
+/// device, whatever else samples or trains in parallel.
 #[derive(Debug)]
 pub struct Initializer {
     rng: ChaCha8Rng,
@@ -16,7 +16,7 @@ pub struct Initializer {
 }
 
 impl Initializer {
-    /// Draws from `seed`, for parameters on `device`.
+    /// A generator seeded with `seed`, for parameters on `device`.
     pub fn new(seed: u64, device: &Device) -> Self {
         Self { rng: ChaCha8Rng::seed_from_u64(seed), device: device.clone() }
     }
@@ -27,20 +27,18 @@ impl Initializer {
         self.fill(shape, |_, unit| bound * unit)
     }
 
-    /// A matrix of which column j is drawn from U(±bounds\[j\]).
-    pub(crate) fn uniform_columns(&mut self, rows: usize, bounds: &[f32]) -> Param<Tensor<2>> {
-        let columns = bounds.len().max(1);
-        self.fill([rows, bounds.len()], |entry, unit| bounds[entry % columns] * unit)
-    }
-
-    /// A row of which entry j is drawn from U(±bounds\[j\]).
-    pub(crate) fn uniform_row(&mut self, bounds: &[f32]) -> Param<Tensor<1>> {
-        self.fill([bounds.len()], |entry, unit| bounds[entry] * unit)
+    /// A matrix or row of which column j is drawn from U(±bounds\[j\]).
+    pub(crate) fn uniform_columns<const D: usize>(
+        &mut self,
+        shape: [usize; D],
+        bounds: &[f32],
+    ) -> Param<Tensor<D>> {
+        self.fill(shape, |entry, unit| bounds[entry % bounds.len()] * unit)
     }
 
     /// A parameter of zeros.
     pub(crate) fn zeros<const D: usize>(&self, shape: [usize; D]) -> Param<Tensor<D>> {
-        parameter(Tensor::zeros(shape, &self.device))
+        Param::from_tensor(Tensor::zeros(shape, &self.device))
     }
 
     /// Entries from their number and a draw from U(±1).
@@ -51,16 +49,11 @@ impl Initializer {
     ) -> Param<Tensor<D>> {
         let count = shape.iter().product();
         let values: Vec<f32> = (0..count).map(|i| entry(i, self.rng.random_range(-1.0..1.0))).collect();
-        parameter(Tensor::from_data(TensorData::new(values, shape), &self.device))
+        Param::from_tensor(Tensor::from_data(TensorData::new(values, shape), &self.device))
     }
 }
 
 /// Bound 1/√fan_in of the uniform distribution a linear layer starts from.
 pub(crate) fn fan_in_bound(fan_in: usize) -> f64 {
     1.0 / (fan_in.max(1) as f64).sqrt()
-}
-
-/// A trainable parameter; it requires gradients where the device has autodiff.
-fn parameter<const D: usize>(value: Tensor<D>) -> Param<Tensor<D>> {
-    Param::from_tensor(value)
 }

@@ -7,7 +7,7 @@
 //! S    skinning          x, z_s, z_v → skin weight correction ΔW
 //! F_f  untangling        z_s^i, z_s^j → force f^ij
 //! D_m  untangling        x_s, f^i, z_s, z_v → displacement Δx_m                        (modulated SIREN)
-//!      corrections       what every vertex feels, z_s, z_v → corrected displacement    (not in the paper)
+//!      corrections       contact features, z_s, z_v → corrected displacement          (not in the paper)
 //! ```
 //!
 //! No files and no energies here: arrays come in as host slices ([`GarmentTensors`], [`BodyTensors`]), positions go out as
@@ -15,11 +15,13 @@
 //! output is differentiable, with a plain one (or after `valid()`) nothing is recorded.
 
 mod adam;
+mod cloth_combo;
 mod config;
 mod correction;
 pub mod diffusion_net;
 mod draping;
 mod error;
+mod forward;
 mod garment_encoder;
 mod gradient;
 mod initializer;
@@ -27,7 +29,7 @@ mod linear;
 mod linear_blend_skinning;
 mod mlp;
 pub mod ops;
-mod pipeline;
+mod packing;
 mod siren;
 mod skinning;
 mod tensors;
@@ -36,18 +38,20 @@ mod testing;
 mod untangling;
 
 pub use adam::FusedAdam;
+pub use cloth_combo::{ClothCombo, Embeddings};
 pub use config::{Dimensions, Graph, ModelConfig, SkinningJoints};
 pub use correction::Correction;
 pub use draping::Draping;
 pub use error::ModelError;
+pub use forward::{DrapeState, DrapeStates, Mode};
 pub use garment_encoder::{GarmentEmbedding, GarmentEncoder};
 pub use gradient::{clip_global_norm, gradient_bucket, gradients_of_bucket};
 pub use initializer::Initializer;
 pub use linear::Linear;
 pub use linear_blend_skinning::linear_blend_skinning;
 pub use mlp::ResidualMlp;
-pub use pipeline::{ClothCombo, Embeddings, Feel, LayeredDrape, SingleDrape};
+pub use packing::Packing;
 pub use siren::{ModulatedSiren, Modulator, SirenSizes};
 pub use skinning::Skinning;
-pub use tensors::{BodyTensors, FeltTensors, GarmentArrays, GarmentTensors, OutfitTensors};
+pub use tensors::{BodyTensors, ContactFeatureTensors, GarmentArrays, GarmentTensors, OutfitTensors};
 pub use untangling::Untangling;

@@ -14,11 +14,11 @@
 use burn::module::{Module, Param};
 use burn::tensor::Tensor;
 
+use crate::config::ModelConfig;
 use crate::initializer::{Initializer, fan_in_bound};
 use crate::linear::Linear;
-use crate::ops::{
-    Activation, Segments, product, segment_activate, segment_activate_sum, sine_modulation, split_columns,
-};
+use crate::ops::{Activation, activate_packed, activate_packed_sum, product, sine_modulation, split_columns};
+use crate::packing::Packing;
 
 /// Sizes and frequencies of a [`ModulatedSiren`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,6 +35,20 @@ pub struct SirenSizes {
     pub omega_first: f64,
     /// w0 of the others.
     pub omega_hidden: f64,
+}
+
+impl SirenSizes {
+    /// D_s and D_m, which differ in the latent of a garment.
+    pub(crate) fn new(config: &ModelConfig, garment_latent: usize) -> Self {
+        Self {
+            layers: config.siren_layers,
+            width: config.siren_width,
+            garment_latent,
+            vertex_latent: config.embedding,
+            omega_first: config.omega_first,
+            omega_hidden: config.omega_hidden,
+        }
+    }
 }
 
 /// The gates m_l.
@@ -68,9 +82,9 @@ impl Modulator {
             .collect();
         let bound = fan_in_bound(sizes.width + latent);
         Self {
-            vertex: start.uniform_columns(sizes.vertex_latent, &bounds),
-            garment: start.uniform_columns(sizes.garment_latent, &bounds),
-            bias: start.uniform_row(&bounds),
+            vertex: start.uniform_columns([sizes.vertex_latent, columns], &bounds),
+            garment: start.uniform_columns([sizes.garment_latent, columns], &bounds),
+            bias: start.uniform_columns([columns], &bounds),
             hidden: (1..sizes.layers).map(|_| start.uniform([sizes.width, sizes.width], bound)).collect(),
             width: sizes.width,
         }
@@ -82,7 +96,7 @@ impl Modulator {
     }
 
     /// The gates m_0 … m_{L−1}, each `[N, width]`.
-    fn gates(&self, vertex_product: Tensor<2>, garment: Tensor<2>, segments: &Segments) -> Vec<Tensor<2>> {
+    fn gates(&self, vertex_product: Tensor<2>, garment: Tensor<2>, packing: &Packing) -> Vec<Tensor<2>> {
         let layers = self.hidden.len() + 1;
         let rows = product(garment, self.garment.val()) + self.bias.val().unsqueeze();
         let rows = split_columns(rows, self.width, layers);
@@ -90,10 +104,10 @@ impl Modulator {
         let mut gates: Vec<Tensor<2>> = Vec::with_capacity(layers);
         for (layer, (fixed, row)) in products.into_iter().zip(rows).enumerate() {
             let gate = match layer.checked_sub(1) {
-                None => segment_activate(Activation::Relu, fixed, row, segments),
+                None => activate_packed(Activation::Relu, fixed, row, packing),
                 Some(previous) => {
                     let inner = product(gates[previous].clone(), self.hidden[previous].val());
-                    segment_activate_sum(Activation::Relu, [inner, fixed], row, segments)
+                    activate_packed_sum(Activation::Relu, [inner, fixed], row, packing)
                 }
             };
             gates.push(gate);
@@ -149,9 +163,9 @@ impl ModulatedSiren {
         coordinates: Tensor<2>,
         vertex_product: Tensor<2>,
         garment: Tensor<2>,
-        segments: &Segments,
+        packing: &Packing,
     ) -> Tensor<2> {
-        let gates = self.modulator.gates(vertex_product, garment, segments);
+        let gates = self.modulator.gates(vertex_product, garment, packing);
         let mut features = coordinates;
         for (layer, (sine, gate)) in self.sine.iter().zip(gates).enumerate() {
             let omega = if layer == 0 { self.omega_first } else { self.omega_hidden };

@@ -7,7 +7,7 @@ use crate::config::{Dimensions, ModelConfig, SkinningJoints};
 use crate::initializer::{Initializer, fan_in_bound};
 use crate::linear::Linear;
 use crate::mlp::residual_pairs;
-use crate::ops::{Activation, product, product_add, segment_activate, skin_correction};
+use crate::ops::{Activation, activate_packed, product, product_add, skin_correction};
 use crate::tensors::OutfitTensors;
 
 /// S: (x, z_s, z_v) → ΔW.
@@ -65,14 +65,14 @@ impl Skinning {
         vertex_product: Tensor<2>,
         draping: Tensor<2>,
     ) -> Tensor<2> {
-        let segments = &outfit.segments;
+        let packing = &outfit.packing;
         let rows = product(draping, self.garment.val()) + self.bias.val().unsqueeze();
-        let features = segment_activate(Activation::Gelu, vertex_product, rows, segments);
+        let features = activate_packed(Activation::Gelu, vertex_product, rows, packing);
         let raw = self.output.forward(residual_pairs(&self.hidden, features));
         let mask = match self.joints {
             SkinningJoints::Bound => outfit.joint_mask.clone(),
             SkinningJoints::All => outfit.joint_mask.ones_like(),
         };
-        skin_correction(outfit.skin_weights.clone(), raw, mask, segments, self.scale, self.zero_sum)
+        skin_correction(outfit.skin_weights.clone(), raw, mask, packing, self.scale, self.zero_sum)
     }
 }

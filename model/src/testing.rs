@@ -1,11 +1,14 @@
 //! What the tests of this crate share.
 
+use std::ops::Range;
+
 use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
 use burn::tensor::{Device, Gradients, Tensor, TensorData};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::initializer::Initializer;
+use crate::packing::Packing;
 use crate::tensors::{GarmentArrays, GarmentTensors};
 
 /// The autodiff device the tests run on.
@@ -43,19 +46,32 @@ pub(crate) fn assert_close(found: &Tensor<2>, expected: &Tensor<2>, tolerance: f
 }
 
 /// Output of a function and the gradients of all its inputs under a fixed random weighting of the output.
-pub(crate) fn gradients_of(
-    inputs: &[Tensor<2>],
-    function: impl Fn(Vec<Tensor<2>>) -> Tensor<2>,
-) -> (Tensor<2>, Vec<Tensor<2>>) {
-    let inputs: Vec<_> = inputs.iter().map(|input| input.clone().detach().require_grad()).collect();
+pub(crate) fn gradients_of<const N: usize>(
+    inputs: &[Tensor<2>; N],
+    function: impl Fn([Tensor<2>; N]) -> Tensor<2>,
+) -> (Tensor<2>, [Tensor<2>; N]) {
+    let inputs = inputs.each_ref().map(|input| input.clone().detach().require_grad());
     let output = function(inputs.clone());
-    let weights = weighting(output.dims(), &output.device());
-    let gradients = (output.clone() * weights).sum().backward();
-    let gradients = inputs.iter().map(|input| match input.grad(&gradients) {
+    let gradients = loss(output.clone()).backward();
+    let gradients = inputs.map(|input| match input.grad(&gradients) {
         Some(gradient) => gradient,
-        None => input.clone().inner().zeros_like(),
+        None => input.inner().zeros_like(),
     });
-    (output.inner(), gradients.collect())
+    (output.inner(), gradients)
+}
+
+/// Gives every row its garment's row of `[M,C]`: `[ΣV,C]`.
+pub(crate) fn broadcast(rows: Tensor<2>, packing: &Packing) -> Tensor<2> {
+    let of_garment = |(garment, range): (usize, Range<usize>)| {
+        rows.clone().narrow(0, garment, 1).repeat_dim(0, range.len())
+    };
+    Tensor::cat(packing.ranges().enumerate().map(of_garment).collect(), 0)
+}
+
+/// Sum of all elements with irregular weights.
+pub(crate) fn loss(output: Tensor<2>) -> Tensor<1> {
+    let weights = weighting(output.dims(), &output.device());
+    (output * weights).sum()
 }
 
 /// The same irregular weights for the same shape.
@@ -92,28 +108,24 @@ impl HostGarment {
     /// Only joints with `used[j]` carry weight.
     pub(crate) fn random(vertices: usize, eigen: usize, used: &[bool], seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let mut draw = |count: usize, low: f32, high: f32| -> Vec<f32> {
+        let mut sample = |count: usize, low: f32, high: f32| -> Vec<f32> {
             (0..count).map(|_| rng.random_range(low..high)).collect()
         };
-        let mass: Vec<f64> = draw(vertices, 1e-4, 3e-4).into_iter().map(f64::from).collect();
+        let mass: Vec<f64> = sample(vertices, 1e-4, 3e-4).into_iter().map(f64::from).collect();
         let size = 1.0 / (mass.iter().sum::<f64>().sqrt() as f32);
-        let mut skin_weights = draw(vertices * used.len(), 0.1, 1.0);
+        let mut skin_weights = sample(vertices * used.len(), 0.1, 1.0);
         for row in skin_weights.chunks_exact_mut(used.len()) {
-            for (weight, used) in row.iter_mut().zip(used) {
-                if !used {
-                    *weight = 0.0;
-                }
-            }
+            row.iter_mut().zip(used).filter(|(_, used)| !**used).for_each(|(weight, _)| *weight = 0.0);
             let sum: f32 = row.iter().sum();
             row.iter_mut().for_each(|weight| *weight /= sum);
         }
         Self {
-            rest: draw(vertices * 3, -0.6, 0.6),
+            rest: sample(vertices * 3, -0.6, 0.6),
             mass,
             eigenvalues: (0..eigen).map(|i| 15.0 * i as f64).collect(),
-            eigenvectors: draw(vertices * eigen, -size, size),
-            gradient_x: draw(vertices * eigen, -10.0 * size, 10.0 * size),
-            gradient_y: draw(vertices * eigen, -10.0 * size, 10.0 * size),
+            eigenvectors: sample(vertices * eigen, -size, size),
+            gradient_x: sample(vertices * eigen, -10.0 * size, 10.0 * size),
+            gradient_y: sample(vertices * eigen, -10.0 * size, 10.0 * size),
             skin_weights,
             joints: used.len(),
         }
@@ -156,12 +168,12 @@ impl HostGarment {
 
 /// Gradients of every parameter of a module under one loss, in visit order, with their names.
 pub(crate) fn parameter_gradients<M: Module>(module: &M, loss: Tensor<1>) -> Vec<(String, Vec<f32>)> {
-    struct Collect<'a> {
+    struct CollectGradients<'a> {
         gradients: &'a Gradients,
         path: Vec<String>,
         found: Vec<(String, Vec<f32>)>,
     }
-    impl ModuleVisitor for Collect<'_> {
+    impl ModuleVisitor for CollectGradients<'_> {
         fn enter_module(&mut self, name: &str, _: &str) {
             self.path.push(name.to_owned());
         }
@@ -175,7 +187,7 @@ pub(crate) fn parameter_gradients<M: Module>(module: &M, loss: Tensor<1>) -> Vec
         }
     }
     let gradients = loss.backward();
-    let mut collect = Collect { gradients: &gradients, path: Vec::new(), found: Vec::new() };
+    let mut collect = CollectGradients { gradients: &gradients, path: Vec::new(), found: Vec::new() };
     module.visit(&mut collect);
     collect.found
 }
@@ -197,6 +209,34 @@ pub(crate) fn assert_gradients_close(
                 "{name}: {found} {expected} (scale {scale})"
             );
         }
+    }
+}
+
+/// Fails unless the largest gradient of every named parameter of `module`, under the [`loss`] of `output`, is the difference
+/// quotient of one of the `steps`: short steps are lost in the rounding of f32, long ones pass kinks of the activations.
+#[track_caller]
+pub(crate) fn assert_gradients_match_differences<M: Module>(
+    module: &M,
+    names: &[&str],
+    steps: &[f32],
+    tolerance: f64,
+    output: impl Fn(&M) -> Tensor<2>,
+) {
+    let gradients = parameter_gradients(module, loss(output(module)));
+    for name in names {
+        let (_, gradient) = gradients.iter().find(|(found, _)| found == name).expect("documented name");
+        let index = (0..gradient.len()).max_by(|&a, &b| gradient[a].abs().total_cmp(&gradient[b].abs()));
+        let index = index.expect("not empty");
+        let value = |change: f32| -> f64 {
+            let output = output(&change_parameter(module.clone(), name, index, change).valid());
+            let weights = values(&weighting(output.dims(), &output.device()));
+            values(&output).iter().zip(weights).map(|(x, w)| f64::from(*x) * f64::from(w)).sum()
+        };
+        let slope = |step: &f32| (value(*step) - value(-step)) / f64::from(2.0 * step);
+        let slopes: Vec<f64> = steps.iter().map(slope).collect();
+        let found = f64::from(gradient[index]);
+        let fits = slopes.iter().any(|slope| (slope - found).abs() < tolerance * found.abs());
+        assert!(fits, "{name}[{index}]: {found} {slopes:?}");
     }
 }
 

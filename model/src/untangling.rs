@@ -28,17 +28,9 @@ pub struct Untangling {
 impl Untangling {
     pub(crate) fn new(config: &ModelConfig, start: &mut Initializer) -> Self {
         let (width, hidden) = (config.width, config.mlp_layers - 1);
-        let sizes = SirenSizes {
-            layers: config.siren_layers,
-            width: config.siren_width,
-            garment_latent: 3 * width,
-            vertex_latent: config.embedding,
-            omega_first: config.omega_first,
-            omega_hidden: config.omega_hidden,
-        };
         Self {
             force: ResidualMlp::new(2 * width, width, hidden, width, start),
-            displacement: ModulatedSiren::new(&sizes, start),
+            displacement: ModulatedSiren::new(&SirenSizes::new(config, 3 * width), start),
             scale: config.untangling_scale,
             graph: config.graph,
         }
@@ -54,7 +46,7 @@ impl Untangling {
         self.graph == Graph::Full || outfit.has_contacts()
     }
 
-    /// Displacements Δx_m `[ΣV,3]` in metres; `None` if [no garment is displaced](Self::acts_on).
+    /// Displacements Δx_m `[ΣV,3]` (m).
     ///
     /// [`Graph::Near`] connects the contacts of `outfit`: exactly zero on garments without one. [`Graph::Full`] connects all
     /// garments, whatever the contacts.
@@ -65,27 +57,20 @@ impl Untangling {
         outfit: &OutfitTensors,
         canonical: Tensor<2>,
         draping: Tensor<2>,
-        vertex_product: impl FnOnce() -> Tensor<2>,
-    ) -> Option<Tensor<2>> {
-        if !self.acts_on(outfit) {
-            return None;
-        }
-        let all_pairs;
+        vertex_product: Tensor<2>,
+    ) -> Tensor<2> {
         let edges = match self.graph {
-            Graph::Near => outfit.edges.as_ref(),
-            Graph::Full => {
-                all_pairs = outfit.complete_edges();
-                all_pairs.as_ref()
-            }
+            Graph::Near => outfit.edges.clone(),
+            Graph::Full => outfit.complete_edges(),
         };
-        let [from_below, from_above] = self.net_forces(edges, &draping);
+        let [from_below, from_above] = self.net_forces(edges.as_ref(), &draping);
         let latent = Tensor::cat(vec![from_below, from_above, draping], 1);
-        let values = self.displacement.forward(canonical, vertex_product(), latent, &outfit.segments);
+        let values = self.displacement.forward(canonical, vertex_product, latent, &outfit.packing);
         let displacement = values * self.scale;
-        Some(match edges.and_then(|edges| edges.touched.as_ref()) {
-            Some(touched) => displacement * touched.clone(),
+        match edges.and_then(|edges| edges.touched) {
+            Some(touched) => displacement * touched,
             None => displacement,
-        })
+        }
     }
 
     /// Both halves `[M,width]` of the net forces f^i: from the layers below and above. Zero without edges.

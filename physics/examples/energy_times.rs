@@ -9,9 +9,7 @@
 mod scenes;
 
 use std::error::Error;
-use std::hint::black_box;
 use std::path::Path;
-use std::time::{Duration, Instant};
 
 use clothcombo_physics::Term;
 use scenes::{Growth, Scene};
@@ -60,24 +58,16 @@ fn options() -> Result<Options, Box<dyn Error>> {
     Ok(options)
 }
 
-/// Median time [ms] of `run` over about `seconds`, at least 5 times, after one run to warm up; with `processor_time` of
-/// the time that this process had a processor, which other work on the machine hardly changes.
-fn time_ms<R>(options: &Options, mut run: impl FnMut() -> R) -> f64 {
-    black_box(run());
-    let (start, mut times) = (Instant::now(), Vec::new());
-    while times.len() < 5 || start.elapsed() < Duration::from_secs_f64(options.seconds) {
-        let (before, busy_before) = (Instant::now(), options.processor_time.then(processor_ms));
-        black_box(run());
-        times.push(match busy_before {
-            Some(busy_before) => processor_ms() - busy_before,
-            None => before.elapsed().as_secs_f64() * 1e3,
-        });
+/// Median time (ms) of `run`; with `processor_time` of the time that this process had a processor, which other work on the
+/// machine hardly changes.
+fn time_ms<R>(options: &Options, run: impl FnMut() -> R) -> f64 {
+    match options.processor_time {
+        true => scenes::median_ms(options.seconds, processor_ms, run),
+        false => scenes::median_ms(options.seconds, scenes::wall_ms(), run),
     }
-    times.sort_by(f64::total_cmp);
-    times[times.len() / 2]
 }
 
-/// Time [ms] that the threads of this process have run; NaN where the system does not tell.
+/// Time (ms) that the threads of this process have run; NaN where the system does not tell.
 fn processor_ms() -> f64 {
     let Ok(threads) = std::fs::read_dir("/proc/self/task") else { return f64::NAN };
     let run_time = |thread: std::fs::DirEntry| {

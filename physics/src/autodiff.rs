@@ -29,13 +29,13 @@ pub trait HostEnergy: Debug + Send + Sync {
     /// Value and gradient at `x`, the row-major entries of a tensor; the gradient has the length of `x`.
     fn evaluate(&self, x: &[f32]) -> (f64, Vec<f32>);
 
-    /// The value alone, for passes that need no gradient.
+    /// The value only, for passes that need no gradient.
     fn value(&self, x: &[f32]) -> f64 {
         self.evaluate(x).0
     }
 }
 
-/// The operation as burn dispatches it; [`host_energy`] is the way to call it.
+/// The operation as burn dispatches it; call it as [`host_energy`].
 #[backend_extension(
     Flex: cfg(feature = "flex"),
     NdArray: cfg(feature = "ndarray"),
@@ -172,7 +172,7 @@ impl SceneLossOutput {
     }
 }
 
-/// The weighted sum of all energies of a scene at `posed` and `canonical` positions, both `[ΣV, 3]` [m], garment after
+/// The weighted sum of all energies of a scene at `posed` and `canonical` positions, both `[ΣV, 3]` (m), garment after
 /// garment; differentiable in both.
 ///
 /// # Panics

@@ -10,22 +10,23 @@
 //! | [`operators`] | the DiffusionNet precompute: mass, Laplacian, gradients, eigenbasis |
 //! | [`energy`] | the eight energies, their gradients, and the weighted sum over a scene |
 //! | [`contact`] | penetration of the body, order of layers, exact intersections and their contours |
+//! | [`contact_features`] | where every vertex of an outfit lies against the other layers: input of the correction networks |
 //! | [`equilibrium`] | static drape: direct minimisation of the same energies from any start |
-//! | [`query`] | nearest vertex and closest surface point, accelerated, with brute-force oracles |
-//! | [`sensing`] | what every vertex of an outfit feels of the other garments, for the contact network |
+//! | [`query`] | nearest vertex, closest surface point, winding numbers, triangle intersections |
 //! | [`transform`] | affine maps, as skinning blends them |
 //! | `autodiff` | the energies as one differentiable burn operation (feature `autodiff`) |
 
 #[cfg(feature = "autodiff")]
 pub mod autodiff;
 pub mod contact;
+pub mod contact_features;
 pub mod energy;
 pub mod equilibrium;
 pub mod mesh;
 pub mod operators;
 pub mod query;
 pub mod real;
-pub mod sensing;
+mod rows;
 pub mod transform;
 pub mod vec3;
 

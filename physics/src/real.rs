@@ -3,9 +3,8 @@
 use std::fmt::{Debug, Display};
 use std::iter::Sum;
 
+use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use num_traits::{Float, FloatConst, NumAssign};
-
-use crate::query::KdScalar;
 
 /// A floating-point scalar: `f32` (training) or `f64` (reference, precompute).
 ///
@@ -43,3 +42,55 @@ impl Real for f64 {
         self
     }
 }
+
+/// Scalars for which there is a kd-tree: `f32` and `f64`. Use it through [`crate::VertexIndex`].
+pub trait KdScalar: Sized {
+    /// The tree over points of this scalar.
+    #[doc(hidden)]
+    type Tree: Debug + Send + Sync;
+
+    /// Builds the tree; `None` for no points. Item `i` is the position in `points`, which must be finite.
+    #[doc(hidden)]
+    fn build_tree(points: &[[Self; 3]]) -> Option<Self::Tree>;
+
+    /// Item and squared distance of the nearest point; any one of several equally near.
+    #[doc(hidden)]
+    fn nearest(tree: &Self::Tree, point: [Self; 3]) -> (u32, Self);
+
+    /// Calls `visit` for every item at a squared distance of at most `radius_squared`, in no particular order.
+    #[doc(hidden)]
+    fn visit_within(tree: &Self::Tree, point: [Self; 3], radius_squared: Self, visit: impl FnMut(u32));
+}
+
+macro_rules! impl_kd_scalar {
+    ($scalar:ty) => {
+        impl KdScalar for $scalar {
+            type Tree = ImmutableKdTree<$scalar, 3>;
+
+            fn build_tree(points: &[[Self; 3]]) -> Option<Self::Tree> {
+                // The one error of an immutable tree is more points than `u32` can number, which no mesh has.
+                if points.is_empty() { None } else { ImmutableKdTree::new_from_slice(points).ok() }
+            }
+
+            fn nearest(tree: &Self::Tree, point: [Self; 3]) -> (u32, Self) {
+                let found = tree.query(&point).nearest_one::<SquaredEuclidean<$scalar>>().execute();
+                (found.item, found.distance)
+            }
+
+            fn visit_within(
+                tree: &Self::Tree,
+                point: [Self; 3],
+                radius_squared: Self,
+                mut visit: impl FnMut(u32),
+            ) {
+                tree.query(&point)
+                    .within::<SquaredEuclidean<$scalar>>(radius_squared)
+                    .unsorted()
+                    .visit(|found| visit(found.item));
+            }
+        }
+    };
+}
+
+impl_kd_scalar!(f32);
+impl_kd_scalar!(f64);

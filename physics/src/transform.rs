@@ -5,6 +5,9 @@ use crate::vec3::{cross, dot, scale, sub};
 /// An affine map `x ↦ A x + t` as the rows of `[A t]`.
 pub type Transform = [[f64; 4]; 3];
 
+/// The map that changes nothing.
+pub const IDENTITY: Transform = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
+
 /// `A p + t`.
 pub fn apply(transform: &Transform, p: [f64; 3]) -> [f64; 3] {
     transform.map(|[a, b, c, d]| a * p[0] + b * p[1] + c * p[2] + d)

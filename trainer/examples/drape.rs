@@ -1,4 +1,4 @@
-//! The draper as a dataset: two garments of the model's own wardrobe on three bodies.
+//! The draper as a library: two garments of the model's own data on three bodies.
 //!
 //! ```text
 //! cargo run --release --example drape -- runs/smoke
@@ -35,12 +35,12 @@ fn run() -> Result<(), Report> {
     for shape in [-1.5, 0.0, 1.5] {
         let drape = draper.drape(&outfit, &BodyState::new(vec![shape], arms_lowered.clone()))?;
         let score = drape.score(&draper, &outfit, Stage::Result)?;
-        for (piece, garment) in outfit.pieces.iter().zip(&score.garments) {
+        for (garment, scored) in outfit.garments.iter().zip(&score.garments) {
             println!(
                 "shape {shape:>4}: {} has {:.2} % of {} vertices inside the body",
-                piece.name,
-                100.0 * garment.penetration.vertices_inside,
-                garment.vertices
+                garment.name,
+                100.0 * scored.penetration.vertices_inside,
+                scored.vertices
             );
         }
         println!(

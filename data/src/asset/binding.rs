@@ -91,7 +91,7 @@ impl Binding {
         largest
     }
 
-    /// Displacement of every garment vertex [m] for shape `beta` (a short one is continued with zeros); empty without shape
+    /// Displacement of every garment vertex (m) for shape `beta` (a short one is continued with zeros); empty without shape
     /// transfer.
     pub fn shape_displacement(&self, beta: &[f64], shape_count: usize) -> Vec<[f64; 3]> {
         if shape_count == 0 {
@@ -109,7 +109,7 @@ impl Binding {
     }
 
     /// Linear blend skinning of canonical `positions` `[V, 3]` (rest, or rest plus a displacement) by the bone transforms of
-    /// a posed body ([`Body::posed`]), `[V, 3]` [m].
+    /// a posed body ([`Body::posed`]), `[V, 3]` (m).
     pub fn skinned(&self, positions: &[[f64; 3]], bones: &[[[f64; 4]; 3]]) -> Vec<[f64; 3]> {
         let rows = self.skin_weights.chunks_exact(bones.len().max(1));
         positions
@@ -169,7 +169,7 @@ fn nearest_body_vertices(garment: &Garment, body: &Body, own_leg: bool) -> Vec<u
         .collect()
 }
 
-/// `iterations` times: every row half way towards the mean of its one-ring. Rows only mix along edges of the garment.
+/// `iterations` times: every row moves half of the distance to the mean of its one-ring. Rows only mix along edges of the garment.
 fn smooth(values: &mut Vec<f32>, columns: usize, topology: &Topology, iterations: usize) {
     let mut next = values.clone();
     for _ in 0..iterations {
@@ -194,7 +194,6 @@ fn smooth(values: &mut Vec<f32>, columns: usize, topology: &Topology, iterations
 #[cfg(test)]
 mod tests {
     use super::super::pose::Pose;
-    use super::super::provenance::Provenance;
     use super::*;
     use crate::generate::mannequin;
     use clothcombo_physics::TriMesh;
@@ -208,14 +207,10 @@ mod tests {
         mesh.with_positions(moved).unwrap()
     }
 
-    fn garment(rest: TriMesh, category: Category) -> Garment {
-        Garment { name: "g".into(), category, rest, holding: false, source: Provenance::default() }
-    }
-
     #[test]
     fn weights_are_a_partition_of_unity_smoothed_or_not() {
         let body = mannequin();
-        let skirt = garment(tube_at(0.0, 0.0, 0.05, 0.5, 0.25), Category::Skirt);
+        let skirt = Garment::new(Category::Skirt, tube_at(0.0, 0.0, 0.05, 0.5, 0.25));
         for smooth in [false, true] {
             let binding =
                 Binding::new(&skirt, &body, &BindingSettings { smooth, ..BindingSettings::default() });
@@ -230,7 +225,7 @@ mod tests {
     fn a_garment_on_the_skin_moves_with_the_body() {
         let body = mannequin();
         // A garment that is a piece of the body's own surface has its weights and shape displacements.
-        let shirt = garment(body.zero_body(), Category::Top);
+        let shirt = Garment::new(Category::Top, body.zero_body());
         let plain = BindingSettings { smooth: false, ..BindingSettings::default() };
         let binding = Binding::new(&shirt, &body, &plain);
         let mut pose = Pose::t_pose(body.joint_count());
@@ -249,7 +244,7 @@ mod tests {
     #[test]
     fn without_smoothing_a_vertex_takes_the_nearest_body_vertex_as_it_is() {
         let body = mannequin();
-        let shirt = garment(tube_at(0.0, 0.0, 0.3, 0.25, 0.2), Category::Top);
+        let shirt = Garment::new(Category::Top, tube_at(0.0, 0.0, 0.3, 0.25, 0.2));
         let plain = BindingSettings { smooth: false, ..BindingSettings::default() };
         let binding = Binding::new(&shirt, &body, &plain);
         let dense = body.skin_weights.to_dense(body.joint_count());
@@ -280,10 +275,10 @@ mod tests {
         let knee = body.joint_template[4];
         let left = tube_at(knee[0], knee[2], knee[1] + 0.15, 0.3, 0.09);
         let right = tube_at(-knee[0], knee[2], knee[1] + 0.15, 0.3, 0.09);
-        let both = garment(union(&[&left, &right]), Category::Trousers);
+        let both = Garment::new(Category::Trousers, union(&[&left, &right]));
         let settings = BindingSettings { smoothing_iterations: 500, ..BindingSettings::default() };
         let binding = Binding::new(&both, &body, &settings);
-        let alone = Binding::new(&garment(left.clone(), Category::Trousers), &body, &settings);
+        let alone = Binding::new(&Garment::new(Category::Trousers, left.clone()), &body, &settings);
         let n = left.vertex_count() * body.joint_count();
         assert_eq!(binding.skin_weights[..n], alone.skin_weights);
         // Each leg keeps its own leg, even after many iterations.
@@ -302,7 +297,7 @@ mod tests {
                 .fold(0.0, f32::max)
         };
         let raw = Binding::new(
-            &garment(left.clone(), Category::Trousers),
+            &Garment::new(Category::Trousers, left.clone()),
             &body,
             &BindingSettings { smooth: false, ..settings.clone() },
         );
@@ -312,7 +307,7 @@ mod tests {
     #[test]
     fn shape_displacement_is_linear_in_beta() {
         let body = mannequin();
-        let top = garment(tube_at(0.0, 0.0, 0.3, 0.2, 0.2), Category::Top);
+        let top = Garment::new(Category::Top, tube_at(0.0, 0.0, 0.3, 0.2, 0.2));
         let binding = Binding::new(&top, &body, &BindingSettings::default());
         let k = body.shape_count;
         let one = binding.shape_displacement(&[1.0, 0.5], k);

@@ -9,60 +9,39 @@ use super::rotation::{self, Matrix3, matrix_from_axis_angle};
 use super::skeleton;
 use super::skin_weights::SparseSkinWeights;
 use clothcombo_physics::mesh::TriMesh;
+use clothcombo_physics::vec3::{add, sub};
 use rayon::prelude::*;
+use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
+use thiserror::Error;
 
-mod error;
 mod skinning;
 
-pub use error::BodyError;
 pub use skinning::{skin, transform, unskin};
 
-/// Everything a body is made of; see [`Body`] for shapes and units.
+/// Why a body cannot be made or posed: its name, and the array, joint or vertex that is wrong.
+#[derive(Debug, Error)]
+#[error("{0}")]
+pub struct BodyError(String);
+
+/// Everything a body is made of: V vertices, J joints, K shape components.
 #[derive(Clone, Debug)]
 pub struct BodyParts {
     /// Name used in messages and reports.
     pub name: String,
     /// Triangles.
     pub faces: Arc<[[u32; 3]]>,
-    /// Vertices of the mean body in T-pose [m].
+    /// Vertices of the mean ("zero") body in T-pose (m).
     pub template: Vec<[f64; 3]>,
-    /// `[V × 3 × K]` row-major.
-    pub shape_directions: Vec<f32>,
-    /// K.
-    pub shape_count: usize,
-    /// Joints of the mean body [m].
-    pub joint_template: Vec<[f64; 3]>,
-    /// `[J × 3 × K]` row-major.
-    pub joint_shape_directions: Vec<f64>,
-    /// `[V × 3 × 9(J−1)]` row-major, if the body has pose-corrective blend shapes.
-    pub pose_directions: Option<Vec<f32>>,
-    /// Skin weights of every vertex.
-    pub skin_weights: SparseSkinWeights,
-    /// Parent of each joint.
-    pub parents: Vec<Option<usize>>,
-    /// Name of each joint.
-    pub joint_names: Vec<String>,
-}
-
-/// A parametric body: V vertices, J joints, K shape components.
-#[derive(Clone, Debug)]
-pub struct Body {
-    /// Name used in messages and reports.
-    pub name: String,
-    /// Triangles.
-    pub faces: Arc<[[u32; 3]]>,
-    /// Vertices of the mean ("zero") body in T-pose [m], pelvis at the origin.
-    pub template: Vec<[f64; 3]>,
-    /// Displacement per unit of each shape component [m], `[V × 3 × K]` row-major.
+    /// Displacement per unit of each shape component (m), `[V × 3 × K]` row-major.
     pub shape_directions: Vec<f32>,
     /// Number of shape components K.
     pub shape_count: usize,
-    /// Joints of the zero body [m]; joint 0 is the origin.
+    /// Joints of the zero body (m).
     pub joint_template: Vec<[f64; 3]>,
-    /// Displacement of the joints per unit of each shape component [m], `[J × 3 × K]` row-major; zero for joint 0.
+    /// Displacement of the joints per unit of each shape component (m), `[J × 3 × K]` row-major.
     pub joint_shape_directions: Vec<f64>,
-    /// Pose-corrective displacements [m] per entry of `(R_1 … R_{J−1}) − I`, `[V × 3 × 9(J−1)]` row-major.
+    /// Pose-corrective displacements (m) per entry of `(R_1 … R_{J−1}) − I`, `[V × 3 × 9(J−1)]` row-major.
     pub pose_directions: Option<Vec<f32>>,
     /// Skin weights, sparse, each row summing to one.
     pub skin_weights: SparseSkinWeights,
@@ -70,10 +49,30 @@ pub struct Body {
     pub parents: Vec<Option<usize>>,
     /// Name of each joint.
     pub joint_names: Vec<String>,
+}
+
+/// A parametric body: parts that fit together, its pelvis (joint 0) at the origin for every shape.
+#[derive(Clone, Debug)]
+pub struct Body {
+    parts: BodyParts,
     zero_body: TriMesh,
 }
 
-/// Vertices and joints of a shaped body in T-pose [m].
+impl Deref for Body {
+    type Target = BodyParts;
+
+    fn deref(&self) -> &BodyParts {
+        &self.parts
+    }
+}
+
+impl DerefMut for Body {
+    fn deref_mut(&mut self) -> &mut BodyParts {
+        &mut self.parts
+    }
+}
+
+/// Vertices and joints of a shaped body in T-pose (m).
 #[derive(Clone, Debug)]
 pub struct ShapedBody {
     /// Vertices.
@@ -82,7 +81,7 @@ pub struct ShapedBody {
     pub joints: Vec<[f64; 3]>,
 }
 
-/// A shaped and posed body [m].
+/// A shaped and posed body (m).
 #[derive(Clone, Debug)]
 pub struct PosedBody {
     /// Vertices.
@@ -98,55 +97,48 @@ impl Body {
     ///
     /// # Errors
     /// [`BodyError`] naming the array, joint or vertex that is wrong.
-    pub fn new(parts: BodyParts) -> Result<Self, BodyError> {
-        let BodyParts {
-            name,
-            faces,
-            mut template,
-            mut shape_directions,
-            shape_count,
-            mut joint_template,
-            mut joint_shape_directions,
-            pose_directions,
-            skin_weights,
-            parents,
-            joint_names,
-        } = parts;
-        let (vertices, joints, k) = (template.len(), joint_template.len(), shape_count);
-        let check = |part, layout, found: usize, expected: usize| {
-            let body = name.clone();
-            if found == expected {
-                Ok(())
-            } else {
-                Err(BodyError::Shape { body, part, layout, found, expected })
-            }
+    pub fn new(mut parts: BodyParts) -> Result<Self, BodyError> {
+        let name = parts.name.clone();
+        let (vertices, joints, k) = (parts.template.len(), parts.joint_template.len(), parts.shape_count);
+        let wrong = |message: String| BodyError(format!("body '{name}': {message}"));
+        let check = |part, layout, found: usize, expected: usize| match found == expected {
+            true => Ok(()),
+            false => Err(wrong(format!("{part} has {found} numbers, expected {expected} ({layout})"))),
         };
-        check("the joint tree", "[J], J >= 1", parents.len(), joints.max(1))?;
-        check("the list of joint names", "[J]", joint_names.len(), joints)?;
-        check("the shape directions", "[V, 3, K]", shape_directions.len(), vertices * 3 * k)?;
-        check("the joint shape directions", "[J, 3, K]", joint_shape_directions.len(), joints * 3 * k)?;
-        check("the skin weights", "[V, J]", skin_weights.vertex_count(), vertices)?;
-        if let Some(p) = &pose_directions {
+        check("the joint tree", "[J], J >= 1", parts.parents.len(), joints.max(1))?;
+        check("the list of joint names", "[J]", parts.joint_names.len(), joints)?;
+        check("the shape directions", "[V, 3, K]", parts.shape_directions.len(), vertices * 3 * k)?;
+        check("the joint shape directions", "[J, 3, K]", parts.joint_shape_directions.len(), joints * 3 * k)?;
+        check("the skin weights", "[V, J]", parts.skin_weights.vertex_count(), vertices)?;
+        if let Some(p) = &parts.pose_directions {
             check("the pose directions", "[V, 3, 9(J-1)]", p.len(), vertices * 27 * (joints - 1))?;
         }
         let finite = |part, position: Option<usize>| match position {
-            Some(index) => Err(BodyError::NonFinite { body: name.clone(), part, index }),
+            Some(index) => Err(wrong(format!("{part} holds a non-finite number at position {index}"))),
             None => Ok(()),
         };
-        finite("the template", template.as_flattened().iter().position(|x| !x.is_finite()))?;
-        finite("the joint template", joint_template.as_flattened().iter().position(|x| !x.is_finite()))?;
-        finite("the shape directions", shape_directions.iter().position(|x| !x.is_finite()))?;
-        finite("the joint shape directions", joint_shape_directions.iter().position(|x| !x.is_finite()))?;
-        if let Some(p) = &pose_directions {
+        finite("the template", parts.template.as_flattened().iter().position(|x| !x.is_finite()))?;
+        finite(
+            "the joint template",
+            parts.joint_template.as_flattened().iter().position(|x| !x.is_finite()),
+        )?;
+        finite("the shape directions", parts.shape_directions.iter().position(|x| !x.is_finite()))?;
+        finite(
+            "the joint shape directions",
+            parts.joint_shape_directions.iter().position(|x| !x.is_finite()),
+        )?;
+        if let Some(p) = &parts.pose_directions {
             finite("the pose directions", p.iter().position(|x| !x.is_finite()))?;
         }
-        for (joint, parent) in parents.iter().enumerate() {
+        for (joint, parent) in parts.parents.iter().enumerate() {
             if (joint == 0) != parent.is_none() || parent.is_some_and(|p| p >= joint) {
-                return Err(BodyError::Tree { body: name, joint, parent: *parent });
+                return Err(wrong(format!(
+                    "joint {joint} has parent {parent:?}; joint 0 must be the only root and parents must come first"
+                )));
             }
         }
         for vertex in 0..vertices {
-            let (row_joints, row) = skin_weights.row(vertex);
+            let (row_joints, row) = parts.skin_weights.row(vertex);
             let sum = row.iter().fold(0.0f32, |sum, w| sum + w);
             let problem = if row.is_empty() || sum.is_nan() || (sum - 1.0).abs() > 1e-3 {
                 format!("sum to {sum} instead of 1")
@@ -155,47 +147,33 @@ impl Body {
             } else {
                 continue;
             };
-            return Err(BodyError::Weights { body: name, vertex, problem });
+            return Err(wrong(format!("skin weights of vertex {vertex} {problem}")));
         }
 
         // Pelvis to the origin: of the template, and of every shape direction.
-        let pelvis = joint_template[0];
-        for p in template.iter_mut().chain(&mut joint_template) {
-            for a in 0..3 {
-                p[a] -= pelvis[a];
-            }
+        let pelvis = parts.joint_template[0];
+        for p in parts.template.iter_mut().chain(&mut parts.joint_template) {
+            *p = sub(*p, pelvis);
         }
-        let pelvis_directions = joint_shape_directions[..3 * k].to_vec();
+        let pelvis_directions = parts.joint_shape_directions[..3 * k].to_vec();
         if k > 0 && pelvis_directions.iter().any(|x| *x != 0.0) {
-            for row in shape_directions.chunks_exact_mut(3 * k) {
+            for row in parts.shape_directions.chunks_exact_mut(3 * k) {
                 row.iter_mut().zip(&pelvis_directions).for_each(|(x, p)| *x = (f64::from(*x) - p) as f32);
             }
-            for row in joint_shape_directions.chunks_exact_mut(3 * k) {
+            for row in parts.joint_shape_directions.chunks_exact_mut(3 * k) {
                 row.iter_mut().zip(&pelvis_directions).for_each(|(x, p)| *x -= p);
             }
         }
-        let zero_body = TriMesh::new(template.clone(), faces.to_vec())
-            .map_err(|e| BodyError::Mesh { body: name.clone(), message: e.to_string() })?;
-        Ok(Self {
-            name,
-            faces,
-            template,
-            shape_directions,
-            shape_count,
-            joint_template,
-            joint_shape_directions,
-            pose_directions,
-            skin_weights,
-            parents,
-            joint_names,
-            zero_body,
-        })
+        let zero_body =
+            TriMesh::new(parts.template.clone(), parts.faces.to_vec()).map_err(|e| wrong(e.to_string()))?;
+        Ok(Self { parts, zero_body })
     }
 
-    /// The same body inside out: every face looks the other way.
-    pub(super) fn turned(self) -> Self {
-        let zero_body = self.zero_body.turned();
-        Self { faces: zero_body.faces().into(), zero_body, ..self }
+    /// The same body inside out: every face is turned over.
+    pub(super) fn turned(mut self) -> Self {
+        self.zero_body = self.zero_body.turned();
+        self.parts.faces = self.zero_body.faces().into();
+        self
     }
 
     /// The same body with its first `count` shape components, or all it has.
@@ -224,12 +202,15 @@ impl Body {
     /// The body of shape `beta` in T-pose; a short `beta` is continued with zeros.
     ///
     /// # Errors
-    /// [`BodyError::TooManyShapeNumbers`] if `beta` is longer than K.
+    /// [`BodyError`] if `beta` is longer than K.
     pub fn shaped(&self, beta: &[f64]) -> Result<ShapedBody, BodyError> {
         let k = self.shape_count;
         if beta.len() > k {
-            let body = self.name.clone();
-            return Err(BodyError::TooManyShapeNumbers { body, given: beta.len(), available: k });
+            return Err(BodyError(format!(
+                "{} shape numbers for body '{}', which has {k} shape components",
+                beta.len(),
+                self.name
+            )));
         }
         if beta.iter().all(|b| *b == 0.0) {
             return Ok(ShapedBody { positions: self.template.clone(), joints: self.joint_template.clone() });
@@ -265,9 +246,8 @@ impl Body {
             let local = matrix_from_axis_angle(pose.rotation(j));
             match self.parents.get(j).copied().flatten() {
                 Some(p) => {
-                    let offset = std::array::from_fn(|a| joint[a] - joints[p][a]);
-                    let turned = rotation::apply(&rotations[p], offset);
-                    places.push(std::array::from_fn(|a| places[p][a] + turned[a]));
+                    let turned = rotation::apply(&rotations[p], sub(*joint, joints[p]));
+                    places.push(add(places[p], turned));
                     rotations.push(rotation::product(&rotations[p], &local));
                 }
                 None => {
@@ -293,8 +273,12 @@ impl Body {
     /// [`BodyError`] if `beta` or `pose` is longer than the body allows.
     pub fn posed(&self, beta: &[f64], pose: &Pose) -> Result<PosedBody, BodyError> {
         if pose.rotations.len() > self.joint_count() {
-            let (body, given) = (self.name.clone(), pose.rotations.len());
-            return Err(BodyError::TooManyJoints { body, given, available: self.joint_count() });
+            return Err(BodyError(format!(
+                "{} joint rotations for body '{}', which has {} joints",
+                pose.rotations.len(),
+                self.name,
+                self.joint_count()
+            )));
         }
         let ShapedBody { mut positions, joints } = self.shaped(beta)?;
         self.add_pose_correctives(&mut positions, pose);
@@ -350,7 +334,7 @@ impl Body {
         self.zero_body.clone()
     }
 
-    /// Height of the collarbone of the zero body [m]: the mean of the two collar joints, or, for a skeleton without them,
+    /// Height of the collarbone of the zero body (m): the mean of the two collar joints, or, for a skeleton without them,
     /// 18 % of the pelvis-to-top length below the top.
     pub fn collarbone_height(&self) -> f64 {
         let collars: Vec<f64> = ["left_collar", "right_collar"]

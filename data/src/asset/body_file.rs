@@ -4,69 +4,13 @@
 //! `J_regressor`; optionally `posedirs` and `joint_names`. Written: the same keys with `J_template` and `J_shapedirs`, plus
 //! `source`, `author` and `licence`.
 
-use super::body::{Body, BodyError, BodyParts};
+use super::body::{Body, BodyParts};
 use super::provenance::Provenance;
 use super::skeleton::{self, BODY_JOINT_NAMES};
 use super::skin_weights::SparseSkinWeights;
-use crate::format::npz::{Array, NpzError, NpzFile, NpzWriter};
+use crate::format::{FileError, NpzFile, NpzWriter};
 use clothcombo_physics::mesh::is_inside_out;
-use std::path::{Path, PathBuf};
-use thiserror::Error;
-
-/// Why a body file cannot be used.
-#[derive(Debug, Error)]
-pub enum BodyFileError {
-    /// The archive or one of its arrays is unusable.
-    #[error(transparent)]
-    Npz(#[from] NpzError),
-    /// The arrays do not make a body.
-    #[error("{}: {reason}", path.display())]
-    Body {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        reason: BodyError,
-    },
-    /// A face names a vertex that is not there.
-    #[error("{}: key 'f', face {face} names vertex {vertex}, but there are {vertices} vertices", path.display())]
-    Face {
-        /// The file.
-        path: PathBuf,
-        /// The face.
-        face: usize,
-        /// The vertex it names.
-        vertex: f64,
-        /// How many there are.
-        vertices: usize,
-    },
-    /// Joints in another order than that of SMPL, by which poses name them.
-    #[error(
-        "{}: key 'joint_names', joint {found} is '{name}', which must be joint {expected}; poses go by the order of SMPL",
-        path.display()
-    )]
-    JointOrder {
-        /// The file.
-        path: PathBuf,
-        /// The joint.
-        name: &'static str,
-        /// Its number there.
-        found: usize,
-        /// Its number in SMPL.
-        expected: usize,
-    },
-    /// A vertex or joint is named by a fraction.
-    #[error("{}: key '{key}', {place} is {value}, which is no whole number; vertices and joints are numbered 0, 1, 2 …", path.display())]
-    Fraction {
-        /// The file.
-        path: PathBuf,
-        /// The key.
-        key: &'static str,
-        /// Which of its numbers.
-        place: String,
-        /// Its value.
-        value: f64,
-    },
-}
+use std::path::Path;
 
 /// How to read a body file.
 #[derive(Clone, Debug, PartialEq)]
@@ -83,7 +27,7 @@ impl Default for BodyFileSettings {
 
 const HINT: &str = "a body is an SMPL, SMPL-H or SMPL-X npz with v_template, f, shapedirs, weights, kintree_table and J_regressor";
 
-/// What is told of a body whose faces look inwards.
+/// Warning about a body whose faces look inwards.
 pub(crate) const INSIDE_OUT: &str = "the body is inside out; its faces were turned";
 
 /// How many of SMPL-X's `shapedirs` are body shape; the rest are facial expression, which clothes do not see. Files with
@@ -101,8 +45,8 @@ impl Body {
     /// closed and inside out, its faces are turned, and a warning says so.
     ///
     /// # Errors
-    /// [`BodyFileError`] naming file and key.
-    pub fn load(path: &Path, settings: &BodyFileSettings) -> Result<Self, BodyFileError> {
+    /// [`FileError`] naming file and key.
+    pub fn load(path: &Path, settings: &BodyFileSettings) -> Result<Self, FileError> {
         let (body, was_inside_out) = Self::load_turned(path, settings)?;
         if was_inside_out {
             tracing::warn!("{}: {INSIDE_OUT}", path.display());
@@ -111,29 +55,26 @@ impl Body {
     }
 
     /// As [`Self::load`], with whether the body was inside out instead of the warning.
-    pub(crate) fn load_turned(
-        path: &Path,
-        settings: &BodyFileSettings,
-    ) -> Result<(Self, bool), BodyFileError> {
+    pub(crate) fn load_turned(path: &Path, settings: &BodyFileSettings) -> Result<(Self, bool), FileError> {
         let body = Self::load_as_written(path, settings)?;
         let is_inside_out = is_inside_out(&body.zero_body());
         Ok((if is_inside_out { body.turned() } else { body }, is_inside_out))
     }
 
-    fn load_as_written(path: &Path, settings: &BodyFileSettings) -> Result<Self, BodyFileError> {
+    fn load_as_written(path: &Path, settings: &BodyFileSettings) -> Result<Self, FileError> {
+        let wrong = FileError::content(path);
         let mut file = NpzFile::open(path)?;
-        let template = points(path, "v_template", file.numbers("v_template", HINT)?)?;
+        let template = points(&mut file, "v_template")?;
         let vertices = template.len();
-        let faces = faces(path, file.numbers("f", HINT)?, vertices)?;
-        let parents = parents(path, file.numbers("kintree_table", HINT)?)?;
+        let faces = faces(&mut file, vertices)?;
+        let parents = parents(&mut file)?;
         let joints = parents.len();
 
         let directions = file.numbers_f32("shapedirs", HINT)?;
         let components = match directions.shape[..] {
             [v, 3, k] if v == vertices => k,
             _ => {
-                return Err(shape_error(
-                    path,
+                return Err(file.wrong_shape(
                     "shapedirs",
                     &directions.shape,
                     &format!("[{vertices}, 3, components]"),
@@ -146,18 +87,17 @@ impl Body {
 
         let weights = file.numbers_f32("weights", HINT)?;
         if weights.shape != [vertices, joints] {
-            return Err(shape_error(path, "weights", &weights.shape, &format!("[{vertices}, {joints}]")));
+            return Err(file.wrong_shape("weights", &weights.shape, &format!("[{vertices}, {joints}]")));
         }
         let (joint_template, joint_shape_directions) = if file.contains("J_template") {
-            let joint_template = points(path, "J_template", file.numbers("J_template", HINT)?)?;
+            let joint_template = points(&mut file, "J_template")?;
             if joint_template.len() != joints {
                 let found = [joint_template.len(), 3];
-                return Err(shape_error(path, "J_template", &found, &format!("[{joints}, 3]")));
+                return Err(file.wrong_shape("J_template", &found, &format!("[{joints}, 3]")));
             }
             let d = file.numbers("J_shapedirs", "J_template goes with J_shapedirs")?;
             if d.shape != [joints, 3, components] {
-                return Err(shape_error(
-                    path,
+                return Err(file.wrong_shape(
                     "J_shapedirs",
                     &d.shape,
                     &format!("[{joints}, 3, {components}]"),
@@ -167,7 +107,7 @@ impl Body {
         } else {
             let r = file.numbers("J_regressor", HINT)?;
             if r.shape != [joints, vertices] {
-                return Err(shape_error(path, "J_regressor", &r.shape, &format!("[{joints}, {vertices}]")));
+                return Err(file.wrong_shape("J_regressor", &r.shape, &format!("[{joints}, {vertices}]")));
             }
             regress_joints(&r.data, &template, &shape_directions, shape_count)
         };
@@ -175,20 +115,20 @@ impl Body {
             let p = file.numbers_f32("posedirs", HINT)?;
             let expected = [vertices, 3, 9 * (joints - 1)];
             if p.shape != expected {
-                return Err(shape_error(path, "posedirs", &p.shape, &format!("{expected:?}")));
+                return Err(file.wrong_shape("posedirs", &p.shape, &format!("{expected:?}")));
             }
             p.data.iter().any(|x| *x != 0.0).then_some(p.data)
         } else {
             None
         };
-        let joint_names = match file.contains("joint_names").then(|| file.strings("joint_names", HINT)) {
-            Some(Ok(names)) if names.data.len() == joints => names.data,
-            _ => skeleton::joint_names(joints),
-        };
+        let names = file.texts("joint_names").ok().flatten().filter(|names| names.len() == joints);
+        let joint_names = names.unwrap_or_else(|| skeleton::joint_names(joints));
         for (expected, name) in BODY_JOINT_NAMES.into_iter().enumerate() {
             let found = joint_names.iter().position(|n| n == name).unwrap_or(expected);
             if found != expected {
-                return Err(BodyFileError::JointOrder { path: path.into(), name, found, expected });
+                return Err(wrong(format!(
+                    "key 'joint_names', joint {found} is '{name}', which must be joint {expected}; poses go by the order of SMPL"
+                )));
             }
         }
         let name = path.file_stem().map_or_else(|| "body".into(), |s| s.to_string_lossy().into_owned());
@@ -205,14 +145,14 @@ impl Body {
             parents,
             joint_names,
         })
-        .map_err(|reason| BodyFileError::Body { path: path.into(), reason })
+        .map_err(FileError::content(path))
     }
 
     /// Writes the body as npz (keys as [`Body::load`] reads them, `f32` throughout but for the joints).
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn save(&self, path: &Path, source: &Provenance) -> Result<(), BodyFileError> {
+    pub fn save(&self, path: &Path, source: &Provenance) -> Result<(), FileError> {
         let (v, j, k) = (self.vertex_count(), self.joint_count(), self.shape_count);
         let parents = self.parents.iter().map(|p| p.map_or(-1, |p| p as i64)).chain(0..j as i64);
         let template: Vec<f32> = self.template.as_flattened().iter().map(|x| *x as f32).collect();
@@ -224,56 +164,60 @@ impl Body {
             .i64("kintree_table", &[2, j], &parents.collect::<Vec<_>>())
             .f64("J_template", &[j, 3], self.joint_template.as_flattened())
             .f64("J_shapedirs", &[j, 3, k], &self.joint_shape_directions)
-            .strings("joint_names", &[j], &self.joint_names)
-            .strings("source", &[], &[&source.source])
-            .strings("author", &[], &[&source.author])
-            .strings("licence", &[], &[&source.licence]);
+            .strings("joint_names", &[j], &self.joint_names);
+        source.write(&mut npz);
         if let Some(p) = &self.pose_directions {
             npz.f32("posedirs", &[v, 3, 9 * (j - 1)], p);
         }
-        Ok(npz.save(path)?)
+        npz.save(path)
     }
 }
 
-fn shape_error(path: &Path, key: &str, found: &[usize], expected: &str) -> BodyFileError {
-    NpzError::Shape { path: path.into(), key: key.into(), found: found.into(), expected: expected.into() }
-        .into()
-}
-
-fn points(path: &Path, key: &str, array: Array<f64>) -> Result<Vec<[f64; 3]>, BodyFileError> {
+fn points(file: &mut NpzFile, key: &str) -> Result<Vec<[f64; 3]>, FileError> {
+    let array = file.numbers(key, HINT)?;
     match array.shape[..] {
         [n, 3] if n > 0 => Ok(array.data.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect()),
-        _ => Err(shape_error(path, key, &array.shape, "[n, 3], n >= 1")),
+        _ => Err(file.wrong_shape(key, &array.shape, "[n, 3], n >= 1")),
     }
 }
 
-fn faces(path: &Path, array: Array<f64>, vertices: usize) -> Result<Vec<[u32; 3]>, BodyFileError> {
+fn faces(file: &mut NpzFile, vertices: usize) -> Result<Vec<[u32; 3]>, FileError> {
+    let array = file.numbers("f", HINT)?;
     if !matches!(array.shape[..], [_, 3]) {
-        return Err(shape_error(path, "f", &array.shape, "[faces, 3]"));
+        return Err(file.wrong_shape("f", &array.shape, "[faces, 3]"));
     }
     let is_vertex = |i: f64| i >= 0.0 && i < vertices as f64 && i.fract() == 0.0;
     if let Some(at) = array.data.iter().position(|i| !is_vertex(*i)) {
         let (face, vertex) = (at / 3, array.data[at]);
         if vertex.fract() != 0.0 {
             let place = format!("corner {} of face {face}", at % 3);
-            return Err(BodyFileError::Fraction { path: path.into(), key: "f", place, value: vertex });
+            return Err(fraction(file, "f", &place, vertex));
         }
-        return Err(BodyFileError::Face { path: path.into(), face, vertex, vertices });
+        let message =
+            format!("key 'f', face {face} names vertex {vertex}, but there are {vertices} vertices");
+        return Err(FileError::content(file.path())(message));
     }
     Ok(array.data.chunks_exact(3).map(|f| [f[0] as u32, f[1] as u32, f[2] as u32]).collect())
 }
 
+fn fraction(file: &NpzFile, key: &str, place: &str, value: f64) -> FileError {
+    FileError::content(file.path())(format!(
+        "key '{key}', {place} is {value}, which is no whole number; vertices and joints are numbered 0, 1, 2 …"
+    ))
+}
+
 /// The parent of each joint, from the first row of the table. The root's is −1, or 2³² − 1 where the table is unsigned; anything
 /// that is no joint is "none".
-fn parents(path: &Path, tree: Array<f64>) -> Result<Vec<Option<usize>>, BodyFileError> {
+fn parents(file: &mut NpzFile) -> Result<Vec<Option<usize>>, FileError> {
+    let tree = file.numbers("kintree_table", HINT)?;
     let joints = match tree.shape[..] {
         [2, joints] if joints > 0 => joints,
-        _ => return Err(shape_error(path, "kintree_table", &tree.shape, "[2, joints]")),
+        _ => return Err(file.wrong_shape("kintree_table", &tree.shape, "[2, joints]")),
     };
     let parents = &tree.data[..joints];
     if let Some(joint) = parents.iter().position(|p| p.fract() != 0.0) {
-        let (key, place) = ("kintree_table", format!("the parent of joint {joint}"));
-        return Err(BodyFileError::Fraction { path: path.into(), key, place, value: parents[joint] });
+        let place = format!("the parent of joint {joint}");
+        return Err(fraction(file, "kintree_table", &place, parents[joint]));
     }
     let is_joint = |p: f64| p >= 0.0 && p < joints as f64;
     Ok((parents.iter().enumerate())

@@ -104,7 +104,7 @@ impl Category {
     }
 }
 
-/// No face crosses x = 0 in front at the chest and half-way down.
+/// No face crosses x = 0 in front at the chest and in the middle of its height.
 fn is_open_in_front(rest: &TriMesh, chest: f64, belly: f64) -> bool {
     let points = rest.positions();
     let middle = points.iter().map(|p| p[2]).sum::<f64>() / points.len() as f64;

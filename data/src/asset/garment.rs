@@ -5,7 +5,7 @@ use super::category::Category;
 use super::provenance::Provenance;
 use clothcombo_physics::mesh::TriMesh;
 
-/// A garment: its rest mesh lies on the zero body in T-pose, in the body's frame [m].
+/// A garment: its rest mesh lies on the zero body in T-pose, in the body's frame (m).
 #[derive(Clone, Debug)]
 pub struct Garment {
     /// Name, unique within a dataset.
@@ -20,13 +20,18 @@ pub struct Garment {
     pub source: Provenance,
 }
 
-/// Cloth that hangs lower than this below a crotch [m] is not lifted over it.
+/// Cloth that hangs lower than this below a crotch (m) is not lifted over it.
 const LIFTED: f64 = 0.05;
 
 impl Garment {
-    /// Whether the garment can be worn over `inner`. Cloth around each leg cannot lie over cloth that hangs between the legs, such
+    /// A garment without a name or a source whose rim is not held.
+    pub fn new(category: Category, rest: TriMesh) -> Self {
+        Self { name: String::new(), category, rest, holding: false, source: Provenance::default() }
+    }
+
+    /// Whether the garment can lie over `inner`. Cloth around each leg cannot lie over cloth that hangs between the legs, such
     /// as a skirt or a long coat: they would have to pass through each other at the crotch.
-    fn can_be_worn_over(&self, inner: &Self) -> bool {
+    fn can_lie_over(&self, inner: &Self) -> bool {
         if self.category != Category::Trousers || inner.category == Category::Trousers {
             return true;
         }
@@ -44,14 +49,14 @@ impl Garment {
     }
 }
 
-/// The first two of `order`, inner → outer, of which the second cannot be worn over the first.
-pub fn unwearable<'a>(order: &[&'a Garment]) -> Option<[&'a Garment; 2]> {
+/// The first two of `order`, inner → outer, of which the second cannot lie over the first.
+pub fn infeasible_pair<'a>(order: &[&'a Garment]) -> Option<[&'a Garment; 2]> {
     let mut pairs =
         (0..order.len()).flat_map(|outer| (0..outer).map(move |inner| [order[inner], order[outer]]));
-    pairs.find(|[inner, outer]| !outer.can_be_worn_over(inner))
+    pairs.find(|[inner, outer]| !outer.can_lie_over(inner))
 }
 
-/// Height of the lowest cloth in the plane between left and right, x = 0 [m]: the crotch of trousers, the hem of everything else.
+/// Height of the lowest cloth in the plane between left and right, x = 0 (m): the crotch of trousers, the hem of everything else.
 /// `None` where no cloth crosses it.
 fn lowest_in_the_middle(rest: &TriMesh) -> Option<f64> {
     let at = |v: u32| rest.positions()[v as usize];
@@ -93,33 +98,26 @@ mod tests {
 
     #[test]
     fn legs_do_not_go_over_cloth_between_them() {
-        let garment = |category, rest: TriMesh| Garment {
-            name: String::new(),
-            category,
-            rest,
-            holding: false,
-            source: Provenance::default(),
-        };
         // Hips down to the crotch at -0.1, and a tube around each leg.
         let trousers = |ankle: f64| {
             let legs = [0.1, -0.1].map(|x| tube_from(x, 0.08, -0.1, ankle));
             let hips = tube_from(0.0, 0.2, 0.2, -0.1);
-            garment(Category::Trousers, union(&[&hips, &legs[0], &legs[1]]))
+            Garment::new(Category::Trousers, union(&[&hips, &legs[0], &legs[1]]))
         };
         let (long, short) = (trousers(-0.8), trousers(-0.3));
-        let skirt = garment(Category::Skirt, tube_from(0.0, 0.25, 0.1, -0.4));
-        let coat = garment(Category::OpenShirt, tube_from(0.0, 0.25, 0.5, -0.4));
-        let tee = garment(Category::TShirt, tube_from(0.0, 0.2, 0.5, -0.12));
+        let skirt = Garment::new(Category::Skirt, tube_from(0.0, 0.25, 0.1, -0.4));
+        let coat = Garment::new(Category::OpenShirt, tube_from(0.0, 0.25, 0.5, -0.4));
+        let tee = Garment::new(Category::TShirt, tube_from(0.0, 0.2, 0.5, -0.12));
         for hanging in [&skirt, &coat] {
-            assert!(!long.can_be_worn_over(hanging) && !short.can_be_worn_over(hanging));
-            assert!(hanging.can_be_worn_over(&long) && hanging.can_be_worn_over(&tee));
+            assert!(!long.can_lie_over(hanging) && !short.can_lie_over(hanging));
+            assert!(hanging.can_lie_over(&long) && hanging.can_lie_over(&tee));
         }
-        assert!(long.can_be_worn_over(&tee) && tee.can_be_worn_over(&long));
-        assert!(short.can_be_worn_over(&long) && long.can_be_worn_over(&short));
-        let sleeve = garment(Category::Top, tube_from(0.5, 0.1, 0.0, -0.6));
-        assert!(long.can_be_worn_over(&sleeve), "nothing of it is between the legs");
-        assert!(unwearable(&[&tee, &long, &coat]).is_none());
-        let [inner, outer] = unwearable(&[&coat, &tee, &skirt, &long]).unwrap();
+        assert!(long.can_lie_over(&tee) && tee.can_lie_over(&long));
+        assert!(short.can_lie_over(&long) && long.can_lie_over(&short));
+        let sleeve = Garment::new(Category::Top, tube_from(0.5, 0.1, 0.0, -0.6));
+        assert!(long.can_lie_over(&sleeve), "nothing of it is between the legs");
+        assert!(infeasible_pair(&[&tee, &long, &coat]).is_none());
+        let [inner, outer] = infeasible_pair(&[&coat, &tee, &skirt, &long]).unwrap();
         assert!(std::ptr::eq(inner, &coat) && std::ptr::eq(outer, &long));
     }
 }

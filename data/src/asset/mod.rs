@@ -17,7 +17,7 @@ pub use binding::{Binding, BindingSettings};
 pub use body::{Body, BodyError, BodyParts, PosedBody, ShapedBody};
 pub use body_file::BodyFileSettings;
 pub use category::Category;
-pub use garment::{Garment, unwearable};
+pub use garment::{Garment, infeasible_pair};
 pub use motion::Motion;
 pub use pose::Pose;
 pub use provenance::Provenance;

@@ -5,24 +5,28 @@ use super::pose::Pose;
 use super::provenance::Provenance;
 use super::rotation::matrix_from_axis_angle;
 use super::skeleton::{BODY_JOINT_COUNT, BODY_JOINT_NAMES};
-use crate::format::npz::{NpzError, NpzFile, NpzWriter};
+use crate::format::{FileError, NpzFile, NpzWriter};
 use std::ops::RangeInclusive;
 use std::path::Path;
 
-mod error;
-
-pub use error::{MotionDefect, MotionError};
-
-/// Frame rates that a motion may have [frames/s]: from time lapse to high-speed cameras. Beyond them times and numbers of frames
+/// Frame rates that a motion may have (frames/s): from time lapse to high-speed cameras. Beyond them times and numbers of frames
 /// leave the range of their types.
 pub const FRAME_RATES: RangeInclusive<f64> = 0.01..=10_000.0;
 
-/// Largest component of a rotation vector in a motion [rad]: over a thousand turns, where f32 still tells a thousandth of a radian.
+/// Largest component of a rotation vector in a motion (rad): over a thousand turns, where f32 still tells a thousandth of a radian.
 pub const MAX_ANGLE: f64 = 1e4;
 
-/// Refuses a frame rate [frames/s] out of [`FRAME_RATES`].
-pub(crate) fn check_frame_rate(rate: f64) -> Result<(), MotionDefect> {
-    if FRAME_RATES.contains(&rate) { Ok(()) } else { Err(MotionDefect::FrameRate { rate }) }
+/// Refuses a frame rate (frames/s) out of [`FRAME_RATES`].
+pub(crate) fn check_frame_rate(rate: f64) -> Result<(), String> {
+    if FRAME_RATES.contains(&rate) {
+        return Ok(());
+    }
+    Err(format!(
+        "a frame rate (mocap_framerate) of {rate:?} frames per second, expected {} to {}; is it the duration of a frame, or \
+         another unit?",
+        FRAME_RATES.start(),
+        FRAME_RATES.end()
+    ))
 }
 
 /// A clip of motion: poses of the 22 body joints at a constant rate.
@@ -58,8 +62,8 @@ impl Motion {
     /// Reads a motion npz. Of more than 22 joints those of the body are kept: those that `joint_names` says, or else the first.
     ///
     /// # Errors
-    /// [`MotionError`] naming file, key or frame.
-    pub fn load(path: &Path) -> Result<Self, MotionError> {
+    /// [`FileError`] naming file, key or frame.
+    pub fn load(path: &Path) -> Result<Self, FileError> {
         let (motion, columns) = Self::load_with_columns(path)?;
         if columns > 3 * BODY_JOINT_COUNT && stands_along_z(&motion.poses) {
             tracing::warn!(
@@ -74,59 +78,55 @@ impl Motion {
     ///
     /// # Errors
     /// As [`Self::load`].
-    pub fn load_with_columns(path: &Path) -> Result<(Self, usize), MotionError> {
+    pub fn load_with_columns(path: &Path) -> Result<(Self, usize), FileError> {
         let mut file = NpzFile::open(path)?;
         let poses = file.numbers("poses", HINT)?;
         let columns = match poses.shape[..] {
             [_, columns] if columns >= 3 * BODY_JOINT_COUNT && columns % 3 == 0 => columns,
             _ => {
-                let (key, found) = ("poses".into(), poses.shape);
-                return Err(NpzError::Shape {
-                    path: path.into(),
-                    key,
-                    found,
-                    expected: "[frames, 66 or more, three for each joint]".into(),
-                }
-                .into());
+                let expected = "[frames, 66 or more, three for each joint]";
+                return Err(file.wrong_shape("poses", &poses.shape, expected));
             }
         };
         let key = if file.contains(RATE_KEYS[1]) { RATE_KEYS[1] } else { RATE_KEYS[0] };
         let frame_rate = file.numbers(key, HINT)?.data.first().copied().unwrap_or(f64::NAN);
         // Names that are no text (pickled ones), as none at all, say nothing.
-        let names = match file.strings("joint_names", HINT) {
-            Ok(names) => names.data,
-            Err(NpzError::Missing { .. } | NpzError::Kind { .. }) => Vec::new(),
-            Err(damaged) => return Err(damaged.into()),
-        };
-        let places =
-            places(&names, columns / 3).map_err(|joint| MotionError::Joint { path: path.into(), joint })?;
+        let names = file.texts("joint_names")?.unwrap_or_default();
+        let places = places(&names, columns / 3).map_err(|joint| {
+            FileError::content(path)(format!(
+                "key 'joint_names' names no '{joint}'; the 22 joints of the body are named as in SMPL, in any order"
+            ))
+        })?;
         let pose = |row: &[f64]| Pose {
             rotations: places.map(|place| [row[3 * place], row[3 * place + 1], row[3 * place + 2]]).to_vec(),
         };
         let poses = poses.data.chunks_exact(columns).map(pose).collect();
-        let mut text = |key: &str| match file.strings(key, HINT) {
-            Ok(array) => array.data.into_iter().next().unwrap_or_default(),
-            Err(_) => String::new(),
-        };
-        let source = Provenance { source: text("source"), author: text("author"), licence: text("licence") };
         let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-        let motion = Self { name, frame_rate, poses, source };
-        motion.check().map_err(|defect| MotionError::Defect { path: path.into(), defect })?;
+        let motion = Self { name, frame_rate, poses, source: Provenance::read(&mut file) };
+        motion.check().map_err(FileError::content(path))?;
         Ok((motion, columns))
     }
 
     /// Checks frame rate and angles: what is read and what is written must pass.
-    pub(crate) fn check(&self) -> Result<(), MotionDefect> {
+    pub(crate) fn check(&self) -> Result<(), String> {
         check_frame_rate(self.frame_rate)?;
+        let name = |joint: usize| BODY_JOINT_NAMES.get(joint).copied().unwrap_or("of no body");
         for (frame, pose) in self.poses.iter().enumerate() {
             for (joint, rotation) in pose.rotations.iter().enumerate() {
                 if rotation.iter().any(|x| !x.is_finite()) {
-                    return Err(MotionDefect::NonFinite { frame, joint });
+                    return Err(format!(
+                        "frame {frame}, joint {joint} ({}) has a non-finite rotation",
+                        name(joint)
+                    ));
                 }
                 // By component, not by length: rounded to f32 in a file they pass still.
                 let angle = rotation.iter().fold(0.0f64, |largest, x| largest.max(x.abs()));
                 if angle > MAX_ANGLE {
-                    return Err(MotionDefect::Angle { frame, joint, angle });
+                    return Err(format!(
+                        "frame {frame}, joint {joint} ({}) turns by {angle:?} rad, more than the {MAX_ANGLE} rad of any motion; \
+                         is the file damaged, or in another format?",
+                        name(joint)
+                    ));
                 }
             }
         }
@@ -137,7 +137,7 @@ impl Motion {
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn save(&self, path: &Path) -> Result<(), MotionError> {
+    pub fn save(&self, path: &Path) -> Result<(), FileError> {
         let rows: Vec<f32> = self
             .poses
             .iter()
@@ -147,11 +147,9 @@ impl Motion {
         let mut npz = NpzWriter::new();
         npz.f32("poses", &[self.poses.len(), 3 * BODY_JOINT_COUNT], &rows)
             .f64("mocap_framerate", &[], &[self.frame_rate])
-            .strings("joint_names", &[BODY_JOINT_COUNT], &BODY_JOINT_NAMES)
-            .strings("source", &[], &[&self.source.source])
-            .strings("author", &[], &[&self.source.author])
-            .strings("licence", &[], &[&self.source.licence]);
-        Ok(npz.save(path)?)
+            .strings("joint_names", &[BODY_JOINT_COUNT], &BODY_JOINT_NAMES);
+        self.source.write(&mut npz);
+        npz.save(path)
     }
 }
 

@@ -25,7 +25,7 @@ impl Pose {
     }
 
     /// Splits the root rotation into a turn about the world's vertical axis and the rest (swing–twist decomposition):
-    /// `root = turn(yaw) · remaining`. Returns the pose with the remaining root and the yaw in (−π, π].
+    /// `root = turn(yaw) · remaining`. Returns the pose with the remaining root and the yaw in `(−π, π]`.
     ///
     /// Gravity does not see the heading, so the networks need not either.
     pub fn without_heading(&self) -> (Self, f64) {
@@ -36,7 +36,7 @@ impl Pose {
         if norm < 1e-12 {
             return (self.clone(), 0.0);
         }
-        // q and −q are the same rotation: a non-negative w keeps the yaw in (−π, π].
+        // q and −q are the same rotation: a non-negative w keeps the yaw in `(−π, π]`.
         let (w, y) = if q[0] < 0.0 { (-q[0], -q[2]) } else { (q[0], q[2]) };
         let twist = normalized_quaternion([w, 0.0, y, 0.0]);
         let yaw = 2.0 * y.atan2(w);
@@ -45,8 +45,8 @@ impl Pose {
         (pose, yaw)
     }
 
-    /// The pose on a way from the T-pose, at 0, to this one, at 1, that faces where this one faces all the time.
-    pub fn on_the_way(&self, share: f64) -> Self {
+    /// As [`Self::scaled`], but the pose faces where this one faces at every scale.
+    pub fn scaled_keeping_heading(&self, share: f64) -> Self {
         if share == 1.0 || self.rotations.is_empty() {
             return self.clone();
         }
@@ -58,8 +58,8 @@ impl Pose {
         pose
     }
 
-    /// The pose at `share` of the way from this one to `other`. Joint vectors are mixed linearly, so that poses within limits
-    /// that are boxes stay within them; the root, which may face anywhere, turns the short way.
+    /// The pose between this one, at `share` 0, and `other`, at 1. Joint vectors are mixed linearly, so that poses within limits
+    /// that are boxes stay within them; the root, which may face anywhere, turns by the smaller angle.
     pub fn between(&self, other: &Self, share: f64) -> Self {
         let mut result = self.clone();
         for (joint, rotation) in result.rotations.iter_mut().enumerate() {
@@ -118,13 +118,13 @@ mod tests {
     }
 
     #[test]
-    fn on_its_way_a_pose_keeps_its_heading() {
+    fn a_scaled_pose_keeps_its_heading() {
         for seed in 0..20 {
             let pose = random_pose(seed, 22);
             let (tilt, yaw) = pose.without_heading();
-            assert_eq!(pose.on_the_way(1.0), pose);
+            assert_eq!(pose.scaled_keeping_heading(1.0), pose);
             for share in [0.0, 0.3, 0.7] {
-                let (now, heading) = pose.on_the_way(share).without_heading();
+                let (now, heading) = pose.scaled_keeping_heading(share).without_heading();
                 let whole_turns = (heading - yaw) / std::f64::consts::TAU;
                 assert!((whole_turns - whole_turns.round()).abs() < 1e-9, "{heading} {yaw}");
                 let expected = tilt.scaled(share);

@@ -27,7 +27,7 @@ pub fn matrix_from_axis_angle(r: [f64; 3]) -> Matrix3 {
     m
 }
 
-/// The axis-angle vector of a rotation matrix, angle in [0, π].
+/// The axis-angle vector of a rotation matrix, angle in `[0, π]`.
 pub fn axis_angle_from_matrix(m: &Matrix3) -> [f64; 3] {
     axis_angle_from_quaternion(quaternion_from_matrix(m))
 }
@@ -39,7 +39,7 @@ pub fn quaternion_from_axis_angle(r: [f64; 3]) -> [f64; 4] {
     [(0.5 * angle).cos(), s * r[0], s * r[1], s * r[2]]
 }
 
-/// Axis-angle vector of a quaternion (normalised here), angle in [0, π].
+/// Axis-angle vector of a quaternion (normalised here), angle in `[0, π]`.
 pub fn axis_angle_from_quaternion(q: [f64; 4]) -> [f64; 3] {
     let q = normalized_quaternion(if q[0] < 0.0 { q.map(|x| -x) } else { q });
     let s = (q[1] * q[1] + q[2] * q[2] + q[3] * q[3]).sqrt();

@@ -1,6 +1,6 @@
 //! Records of garments bound to a body: the rest mesh, its skin weights and shape displacements.
 
-use super::{Array, ArrayCache, CacheError, Key, KeyBuilder};
+use super::{ArrayCache, CacheError, Key, KeyBuilder};
 use crate::asset::{Binding, BindingSettings, Body, Category};
 use clothcombo_physics::mesh::TriMesh;
 
@@ -56,12 +56,12 @@ pub fn put_binding(
     cache.put(
         key,
         &[
-            ("positions", Array::F64(rest.positions().as_flattened())),
-            ("faces", Array::U32(rest.faces().as_flattened())),
-            ("joints", Array::U32(&used)),
-            ("largest_weights", Array::F32(&largest)),
-            ("skin_weights", Array::F32(&weights)),
-            ("shape_directions", Array::F32(&binding.shape_directions)),
+            ("positions", rest.positions().as_flattened().into()),
+            ("faces", rest.faces().as_flattened().into()),
+            ("joints", used.as_slice().into()),
+            ("largest_weights", largest.as_slice().into()),
+            ("skin_weights", weights.as_slice().into()),
+            ("shape_directions", binding.shape_directions.as_slice().into()),
         ],
     )
 }
@@ -70,11 +70,11 @@ pub fn put_binding(
 pub fn get_binding(cache: &ArrayCache, key: Key, joints: usize) -> Option<(TriMesh, Binding)> {
     let (positions, faces, used, weights, shape_directions) = cache.get(key, |record| {
         Ok((
-            record.f64("positions")?.as_chunks::<3>().0.to_vec(),
-            record.u32("faces")?.as_chunks::<3>().0.to_vec(),
-            record.u32("joints")?.to_vec(),
-            record.f32("skin_weights")?.to_vec(),
-            record.f32("shape_directions")?.to_vec(),
+            record.array("positions")?.as_chunks::<3>().0.to_vec(),
+            record.array("faces")?.as_chunks::<3>().0.to_vec(),
+            record.array::<u32>("joints")?.to_vec(),
+            record.array::<f32>("skin_weights")?.to_vec(),
+            record.array("shape_directions")?.to_vec(),
         ))
     })?;
     // The bytes are those that were stored, and the key holds the body: anything else is another program's record.
@@ -94,19 +94,19 @@ pub fn get_binding(cache: &ArrayCache, key: Key, joints: usize) -> Option<(TriMe
 
 /// The largest weight of every joint on a stored garment; `None` if it is not stored.
 pub fn get_largest_weights(cache: &ArrayCache, key: Key) -> Option<Vec<f32>> {
-    cache.get(key, |record| Ok(record.f32("largest_weights")?.to_vec()))
+    cache.get(key, |record| Ok(record.array("largest_weights")?.to_vec()))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::generate::{GarmentSettings, generate_garment, mannequin};
+    use crate::generate::garment::generated;
+    use crate::generate::mannequin;
 
     #[test]
     fn a_bound_garment_comes_back_bit_for_bit() {
         let body = mannequin();
-        let settings = GarmentSettings { target_vertices: 400, ..GarmentSettings::default() };
-        let garment = generate_garment(&body, Category::Top, 3, &settings).unwrap();
+        let garment = generated(&body, Category::Top, 3, 400);
         let how = BindingSettings::default();
         let binding = Binding::new(&garment, &body, &how);
         let folder = tempfile::tempdir().unwrap();

@@ -1,6 +1,6 @@
 //! Records of embeddings that trained networks made of garments.
 
-use super::{Array, ArrayCache, CacheError, Key, KeyBuilder};
+use super::{ArrayCache, CacheError, Key, KeyBuilder};
 
 /// The key of the embedding of a mesh by the networks whose parameters have the checksum `model`.
 pub fn embedding_key(mesh: Key, model: &str, eigen_count: usize) -> Key {
@@ -22,15 +22,15 @@ pub struct StoredEmbedding {
 /// [`CacheError`] when the folder is full or cannot be written to.
 pub fn put_embedding(cache: &ArrayCache, key: Key, embedding: &StoredEmbedding) -> Result<(), CacheError> {
     let StoredEmbedding { vertex, garment } = embedding;
-    cache.put(key, &[("vertex", Array::F32(vertex)), ("garment", Array::F32(garment))])
+    cache.put(key, &[("vertex", vertex.as_slice().into()), ("garment", garment.as_slice().into())])
 }
 
 /// Reads the embedding of a mesh of `vertices` vertices; `None` if it is not stored.
 pub fn get_embedding(cache: &ArrayCache, key: Key, vertices: usize) -> Option<StoredEmbedding> {
     let found = cache.get(key, |record| {
         Ok(StoredEmbedding {
-            vertex: record.f32("vertex")?.to_vec(),
-            garment: record.f32("garment")?.to_vec(),
+            vertex: record.array("vertex")?.to_vec(),
+            garment: record.array("garment")?.to_vec(),
         })
     })?;
     // The bytes are those that were stored; any other size is another program's record.

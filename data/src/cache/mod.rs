@@ -1,6 +1,6 @@
 //! What is expensive to compute from a garment, kept on disk under the hash of everything it was computed from.
 //!
-//! A key is the BLAKE3 hash of the inputs and of [`FORMAT`]: a changed mesh, setting or layout of the records is another
+//! A key is the BLAKE3 hash of the inputs and of the version of the computation: a changed mesh, setting or version is another
 //! key, so nothing ever has to be invalidated. Records appear whole (temporary name, then rename) and are never changed
 //! afterwards, so any number of processes and machines may share one folder; two that compute the same record write the
 //! same bytes. Records are memory-mapped and every array is checked against its own hash when it is read.
@@ -14,8 +14,5 @@ mod store;
 pub use bindings::{binding_key, body_key, get_binding, get_largest_weights, put_binding};
 pub use embeddings::{StoredEmbedding, embedding_key, get_embedding, put_embedding};
 pub use operators::{get_operators, mesh_key, operators_key, put_operators};
-pub use record::{Array, Record, RecordError};
+pub use record::{Element, Record, StoredArray};
 pub use store::{ArrayCache, CacheError, Key, KeyBuilder};
-
-/// Version of the layout of the records and of the computations behind them; part of every key.
-pub const FORMAT: u32 = 1;

@@ -1,6 +1,6 @@
 //! Records of DiffusionNet's operators.
 
-use super::{Array, ArrayCache, CacheError, Key, KeyBuilder};
+use super::{ArrayCache, CacheError, Key, KeyBuilder};
 use clothcombo_physics::mesh::TriMesh;
 use clothcombo_physics::operators::SurfaceOperators;
 
@@ -22,11 +22,11 @@ pub fn put_operators(cache: &ArrayCache, key: Key, operators: &SurfaceOperators)
     cache.put(
         key,
         &[
-            ("mass", Array::F64(&operators.mass)),
-            ("eigenvalues", Array::F64(&operators.eigenvalues)),
-            ("eigenvectors", Array::F32(&operators.eigenvectors)),
-            ("gradient_x_basis", Array::F32(&operators.gradient_x_basis)),
-            ("gradient_y_basis", Array::F32(&operators.gradient_y_basis)),
+            ("mass", operators.mass.as_slice().into()),
+            ("eigenvalues", operators.eigenvalues.as_slice().into()),
+            ("eigenvectors", operators.eigenvectors.as_slice().into()),
+            ("gradient_x_basis", operators.gradient_x_basis.as_slice().into()),
+            ("gradient_y_basis", operators.gradient_y_basis.as_slice().into()),
         ],
     )
 }
@@ -34,16 +34,16 @@ pub fn put_operators(cache: &ArrayCache, key: Key, operators: &SurfaceOperators)
 /// Reads operators; `None` if they are not stored.
 pub fn get_operators(cache: &ArrayCache, key: Key) -> Option<SurfaceOperators> {
     cache.get(key, |record| {
-        let mass = record.f64("mass")?.to_vec();
-        let eigenvalues = record.f64("eigenvalues")?.to_vec();
+        let mass = record.array("mass")?.to_vec();
+        let eigenvalues = record.array("eigenvalues")?.to_vec();
         Ok(SurfaceOperators {
             vertex_count: mass.len(),
             eigen_count: eigenvalues.len(),
             mass,
             eigenvalues,
-            eigenvectors: record.f32("eigenvectors")?.to_vec(),
-            gradient_x_basis: record.f32("gradient_x_basis")?.to_vec(),
-            gradient_y_basis: record.f32("gradient_y_basis")?.to_vec(),
+            eigenvectors: record.array("eigenvectors")?.to_vec(),
+            gradient_x_basis: record.array("gradient_x_basis")?.to_vec(),
+            gradient_y_basis: record.array("gradient_y_basis")?.to_vec(),
         })
     })
 }

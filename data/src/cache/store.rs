@@ -1,8 +1,7 @@
 //! A folder of records.
 
-use super::record::{Array, Record, RecordError};
-use super::{FORMAT, record};
-use crate::format::atomic;
+use super::record::{Record, StoredArray, encode};
+use crate::format::{FileError, atomic};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -29,12 +28,15 @@ pub enum CacheError {
     Full {
         /// The folder.
         path: PathBuf,
-        /// Size of the record [MiB].
+        /// Size of the record (MiB).
         needed: u64,
-        /// The limit [MiB].
+        /// The limit (MiB).
         limit: u64,
     },
 }
+
+/// Version of the computations behind the records; part of every key.
+const VERSION: u64 = 1;
 
 /// Name of a record: the hash of what it was computed from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -53,7 +55,7 @@ pub struct KeyBuilder(blake3::Hasher);
 impl KeyBuilder {
     /// Starts a key for one kind of record.
     pub fn new(kind: &str) -> Self {
-        Self(blake3::Hasher::new()).text(kind).number(u64::from(FORMAT))
+        Self(blake3::Hasher::new()).text(kind).number(VERSION)
     }
 
     /// A text.
@@ -128,18 +130,18 @@ impl ArrayCache {
 
     fn path(&self, key: Key) -> PathBuf {
         let hex = key.0.to_hex();
-        self.root.join(&hex[..2]).join(&hex[2..])
+        self.root.join(&hex[..2]).join(format!("{}.safetensors", &hex[2..]))
     }
 
     /// What `read` takes from the record of `key`; `None` if there is none, or it cannot be read. A damaged record is
     /// removed with a warning.
-    pub fn get<T>(&self, key: Key, read: impl FnOnce(&Record) -> Result<T, RecordError>) -> Option<T> {
+    pub fn get<T>(&self, key: Key, read: impl FnOnce(&Record) -> Result<T, FileError>) -> Option<T> {
         let path = self.path(key);
         match Record::open(&path).and_then(|record| read(&record)) {
             Ok(value) => Some(value),
-            Err(RecordError::Io { reason, .. }) if reason.kind() == io::ErrorKind::NotFound => None,
+            Err(error) if error.is_not_found() => None,
             // It may be a good one that cannot be read just now.
-            Err(error @ RecordError::Io { .. }) => {
+            Err(error @ FileError::Io { .. }) => {
                 tracing::warn!("{error}; computed anew");
                 None
             }
@@ -167,12 +169,13 @@ impl ArrayCache {
     ///
     /// # Errors
     /// [`CacheError`] when the folder is full or cannot be written to; nothing half-written is left.
-    pub fn put(&self, key: Key, arrays: &[(&str, Array<'_>)]) -> Result<(), CacheError> {
+    pub fn put(&self, key: Key, arrays: &[(&str, StoredArray<'_>)]) -> Result<(), CacheError> {
         let path = self.path(key);
         if path.exists() {
             return Ok(());
         }
-        let bytes = record::encode(arrays);
+        let failed = |reason| CacheError::Io { path: path.clone(), reason };
+        let bytes = encode(arrays).map_err(|e| failed(io::Error::other(e.to_string())))?;
         let size = bytes.len() as u64;
         if self.used() + size > self.limit {
             let mib = |bytes: u64| bytes.div_ceil(1 << 20);
@@ -182,7 +185,7 @@ impl ArrayCache {
                 limit: mib(self.limit),
             });
         }
-        atomic::write(&path, &bytes).map_err(|reason| CacheError::Io { path, reason })?;
+        atomic::write(&path, &bytes).map_err(failed)?;
         self.used.fetch_add(size, Ordering::Relaxed);
         Ok(())
     }
@@ -210,18 +213,18 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let cache = ArrayCache::open(folder.path(), 1 << 20).unwrap();
         assert!(!cache.contains(key(1)));
-        cache.put(key(1), &[("a", Array::U32(&[1, 2, 3]))]).unwrap();
+        cache.put(key(1), &[("a", [1u32, 2, 3][..].into())]).unwrap();
         let again = ArrayCache::open(folder.path(), 1 << 20).unwrap();
         assert_eq!(again.used(), cache.used());
-        assert_eq!(again.get(key(1), |r| Ok(r.u32("a")?.to_vec())), Some(vec![1, 2, 3]));
+        assert_eq!(again.get(key(1), |r| Ok(r.array("a")?.to_vec())), Some(vec![1, 2, 3]));
 
         let path = again.path(key(1));
         let mut bytes = fs::read(&path).unwrap();
         *bytes.last_mut().unwrap() ^= 1;
         fs::write(&path, bytes).unwrap();
-        assert_eq!(again.get(key(1), |r| Ok(r.u32("a")?.to_vec())), None);
+        assert_eq!(again.get(key(1), |r| Ok(r.array::<u32>("a")?.to_vec())), None);
         assert!(!path.exists(), "the damaged record is gone");
-        again.put(key(1), &[("a", Array::U32(&[1, 2, 3]))]).unwrap();
+        again.put(key(1), &[("a", [1u32, 2, 3][..].into())]).unwrap();
         assert!(again.contains(key(1)));
     }
 
@@ -230,8 +233,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let cache = ArrayCache::open(folder.path(), 1 << 20).unwrap();
         let large = vec![0.0f32; 150_000];
-        cache.put(key(1), &[("a", Array::F32(&large))]).unwrap();
-        let error = cache.put(key(2), &[("a", Array::F32(&large))]).unwrap_err();
+        cache.put(key(1), &[("a", large.as_slice().into())]).unwrap();
+        let error = cache.put(key(2), &[("a", large.as_slice().into())]).unwrap_err();
         assert!(matches!(error, CacheError::Full { .. }) && error.to_string().contains("limit of 1 MiB"));
         assert!(cache.contains(key(1)) && !cache.contains(key(2)));
     }
@@ -245,8 +248,8 @@ mod tests {
             for _ in 0..4 {
                 scope.spawn(|| {
                     for i in 0..20 {
-                        cache.put(key(i), &[("a", Array::F32(&values))]).unwrap();
-                        assert_eq!(cache.get(key(i), |r| Ok(r.f32("a")?.to_vec())).as_ref(), Some(&values));
+                        cache.put(key(i), &[("a", values.as_slice().into())]).unwrap();
+                        assert_eq!(cache.get(key(i), |r| Ok(r.array("a")?.to_vec())).as_ref(), Some(&values));
                     }
                 });
             }

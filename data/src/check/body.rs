@@ -1,6 +1,5 @@
 //! A body file.
 
-use super::FileCheck;
 use crate::asset::body_file::INSIDE_OUT;
 use crate::asset::{BODY_JOINT_COUNT, Body, BodyFileSettings};
 use crate::format::NpzFile;
@@ -21,7 +20,7 @@ pub struct BodyCheck {
     pub shape_components: usize,
     /// Whether it has pose-corrective blend shapes.
     pub pose_correctives: bool,
-    /// Height of the zero body [m].
+    /// Height of the zero body (m).
     pub height: f64,
     /// Smallest and largest sum of the skin weights of a vertex, as written in the file.
     pub weight_sums: [f64; 2],
@@ -35,17 +34,12 @@ pub struct BodyCheck {
     pub inside_out: bool,
 }
 
-pub(super) fn check(path: &Path, npz: &mut NpzFile) -> FileCheck {
+/// Measurements and warnings, or why the body cannot be used.
+pub(super) fn check(path: &Path, npz: &mut NpzFile) -> Result<(BodyCheck, Vec<String>), String> {
     let settings = BodyFileSettings { shape_components: usize::MAX };
-    let (body, was_inside_out) = match Body::load_turned(path, &settings) {
-        Ok(loaded) => loaded,
-        Err(e) => return FileCheck::unusable(path, e),
-    };
+    let (body, was_inside_out) = Body::load_turned(path, &settings).map_err(|e| e.to_string())?;
     // The loader normalises each row: the sums are those of the file.
-    let weights = match npz.numbers_f32("weights", "") {
-        Ok(weights) => weights.data,
-        Err(e) => return FileCheck::unusable(path, e),
-    };
+    let weights = npz.numbers_f32("weights", "").map_err(|e| e.to_string())?.data;
     let sums = weights
         .chunks_exact(body.joint_count().max(1))
         .map(|row| row.iter().map(|w| f64::from(*w)).sum::<f64>());
@@ -53,7 +47,6 @@ pub(super) fn check(path: &Path, npz: &mut NpzFile) -> FileCheck {
     let mesh = body.zero_body();
     let topology = Topology::new(&mesh);
     let (low, high) = mesh.bounds();
-    let mut file = FileCheck::new(path);
     let check = BodyCheck {
         vertices: body.vertex_count(),
         triangles: body.faces.len(),
@@ -67,30 +60,38 @@ pub(super) fn check(path: &Path, npz: &mut NpzFile) -> FileCheck {
         non_manifold_edges: topology.non_manifold_edges.len(),
         inside_out: was_inside_out,
     };
-    if check.joints < BODY_JOINT_COUNT {
-        file.unusable = Some(format!(
+    let warnings = warnings(&check);
+    Ok((check, warnings))
+}
+
+/// Why training would refuse the body, if it would.
+pub(super) fn unusable(check: &BodyCheck, path: &Path) -> Option<String> {
+    (check.joints < BODY_JOINT_COUNT).then(|| {
+        format!(
             "{}: {} joints; poses turn the {BODY_JOINT_COUNT} body joints of SMPL",
             path.display(),
             check.joints
-        ));
-    }
-    if weight_sums.iter().any(|s| (s - 1.0).abs() > 1e-3) {
-        let [low, high] = weight_sums;
-        file.warnings
-            .push(format!("skin weights sum to {low:.4}–{high:.4} instead of 1; they are normalised"));
+        )
+    })
+}
+
+fn warnings(check: &BodyCheck) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let [low, high] = check.weight_sums;
+    if [low, high].iter().any(|s| (s - 1.0).abs() > 1e-3) {
+        warnings.push(format!("skin weights sum to {low:.4}–{high:.4} instead of 1; they are normalised"));
     }
     if !(0.4..=2.8).contains(&check.height) {
-        file.warnings.push(format!("{:.2} m high: are the units metres and y up?", check.height));
+        warnings.push(format!("{:.2} m high: are the units metres and y up?", check.height));
     }
     if check.inside_out {
-        file.warnings.push(INSIDE_OUT.into());
+        warnings.push(INSIDE_OUT.into());
     }
     if check.boundary_loops > 0 {
-        file.warnings.push(format!("{} holes in the surface", check.boundary_loops));
+        warnings.push(format!("{} holes in the surface", check.boundary_loops));
     }
     if check.non_manifold_edges > 0 {
-        file.warnings.push(format!("{} non-manifold edges", check.non_manifold_edges));
+        warnings.push(format!("{} non-manifold edges", check.non_manifold_edges));
     }
-    file.body = Some(check);
-    file
+    warnings
 }

@@ -1,10 +1,9 @@
 //! A garment file: the mesh, what it is, and how it lies on the body.
 
-use super::FileCheck;
-use super::measures::MeshMeasures;
 use super::targets::ManifestHints;
 use crate::asset::{Body, Category, Garment};
 use crate::format::load_tri_mesh;
+use crate::mesh::MeshMeasures;
 use clothcombo_physics::Topology;
 use clothcombo_physics::contact::{self_triangle_pairs, triangle_pairs};
 use clothcombo_physics::query::{Distance, Surface};
@@ -12,7 +11,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use std::path::Path;
 
-/// A garment farther from the body than this is not on it [m].
+/// A garment farther from the body than this is not on it (m).
 const OFF_BODY: f64 = 0.1;
 
 /// Measurements of a garment file.
@@ -30,9 +29,9 @@ pub struct GarmentCheck {
     pub layer_guessed: bool,
     /// Whether its rim is held: by the manifest, or because it lies wholly below the collarbone.
     pub holding: bool,
-    /// Least signed distance of a vertex to the body at rest [mm], negative inside.
+    /// Least signed distance of a vertex to the body at rest (mm), negative inside.
     pub distance_min_mm: f64,
-    /// Median distance [mm].
+    /// Median distance (mm).
     pub distance_median_mm: f64,
     /// Vertices inside the body.
     pub inside: usize,
@@ -42,7 +41,7 @@ pub struct GarmentCheck {
     pub self_triangle_pairs: usize,
 }
 
-/// The layers a garment is worn in, from its median distance to the body [m]: what lies closer than 8 mm goes under everything,
+/// The layers a garment goes into, from its median distance to the body (m): what lies closer than 8 mm goes under everything,
 /// what lies farther than 20 mm, or is open in front, over something.
 pub fn layer_guess(median_distance: f64, category: Category) -> [u32; 2] {
     let lowest = match median_distance {
@@ -54,17 +53,18 @@ pub fn layer_guess(median_distance: f64, category: Category) -> [u32; 2] {
     [lowest, lowest + 1]
 }
 
-pub(super) fn check(path: &Path, hints: &ManifestHints, body: &Body, surface: &Surface<f64>) -> FileCheck {
-    let mesh = match load_tri_mesh(path) {
-        Ok(mesh) => mesh,
-        Err(e) => return FileCheck::unusable(path, e),
-    };
+/// Measurements and warnings, or why the garment cannot be used.
+pub(super) fn check(
+    path: &Path,
+    hints: &ManifestHints,
+    body: &Body,
+    surface: &Surface<f64>,
+) -> Result<(GarmentCheck, Vec<String>), String> {
+    let mesh = load_tri_mesh(path).map_err(|e| e.to_string())?;
     let area = mesh.area();
     if !(area > 0.0 && area.is_finite()) {
-        return FileCheck::unusable(
-            path,
-            format!("{}: no area: all {} triangles are collapsed", path.display(), mesh.face_count()),
-        );
+        let triangles = mesh.face_count();
+        return Err(format!("{}: no area: all {triangles} triangles are collapsed", path.display()));
     }
     let topology = Topology::new(&mesh);
     let mut gaps: Vec<f64> = mesh
@@ -95,10 +95,8 @@ pub(super) fn check(path: &Path, hints: &ManifestHints, body: &Body, surface: &S
         .len(),
         self_triangle_pairs: self_triangle_pairs(mesh.positions(), mesh.faces()).len(),
     };
-    let mut file = FileCheck::new(path);
-    file.warnings = warnings(&garment, body);
-    file.garment = Some(garment);
-    file
+    let warnings = warnings(&garment, body);
+    Ok((garment, warnings))
 }
 
 fn warnings(garment: &GarmentCheck, body: &Body) -> Vec<String> {
@@ -119,12 +117,12 @@ fn warnings(garment: &GarmentCheck, body: &Body) -> Vec<String> {
         ));
     } else if garment.inside > 0 || garment.body_triangle_pairs > 0 {
         warnings.push(format!(
-            "{} vertices inside the body at rest, {} triangle pairs",
+            "{} vertices inside the body at rest, {} intersecting triangle pairs",
             garment.inside, garment.body_triangle_pairs
         ));
     }
     if garment.self_triangle_pairs > 0 {
-        warnings.push(format!("{} triangle pairs with itself", garment.self_triangle_pairs));
+        warnings.push(format!("{} self-intersecting triangle pairs", garment.self_triangle_pairs));
     }
     warnings
 }

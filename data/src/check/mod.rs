@@ -4,13 +4,11 @@
 
 mod body;
 mod garment;
-pub(crate) mod measures;
 mod motion;
 mod targets;
 
 pub use body::BodyCheck;
 pub use garment::{GarmentCheck, layer_guess};
-pub use measures::{MeshDefects, MeshMeasures};
 pub use motion::{MotionCheck, impossible_turn};
 pub use targets::{ManifestHints, Target, find_targets};
 
@@ -59,10 +57,6 @@ impl FileCheck {
             motion: None,
         }
     }
-
-    fn unusable(path: &Path, reason: impl ToString) -> Self {
-        Self { unusable: Some(reason.to_string()), ..Self::new(path) }
-    }
 }
 
 /// Checks files against one body.
@@ -83,35 +77,35 @@ impl Checker {
 
     /// Checks one file.
     pub fn check(&self, target: &Target) -> FileCheck {
-        match target {
-            Target::Garment { path, entry } => garment::check(path, entry, &self.body, &self.surface),
-            Target::Npz { path } => check_npz(path),
-            Target::Unlisted { path } => {
+        let file = FileCheck::new(target.path());
+        let checked = match target {
+            Target::Garment { path, entry } => garment::check(path, entry, &self.body, &self.surface)
+                .map(|(check, warnings)| FileCheck { garment: Some(check), warnings, ..file.clone() }),
+            Target::Npz { path } => check_npz(&file, path),
+            Target::Unlisted { .. } => {
                 let warning = format!("not in the {MANIFEST} beside it, so no dataset takes it");
-                FileCheck { warnings: vec![warning], ..FileCheck::new(path) }
+                Ok(FileCheck { warnings: vec![warning], ..file.clone() })
             }
-            Target::Unusable { path, reason } => FileCheck::unusable(path, reason),
-        }
+            Target::Unusable { reason, .. } => Err(reason.clone()),
+        };
+        checked.unwrap_or_else(|reason| FileCheck { unusable: Some(reason), ..file })
     }
 }
 
-fn check_npz(path: &Path) -> FileCheck {
-    let mut file = match NpzFile::open(path) {
-        Ok(file) => file,
-        Err(e) => return FileCheck::unusable(path, e),
-    };
-    if file.contains("v_template") {
-        body::check(path, &mut file)
-    } else if file.contains("poses") {
-        motion::check(path)
-    } else if file.contains("positions") && file.contains("f") {
+fn check_npz(file: &FileCheck, path: &Path) -> Result<FileCheck, String> {
+    let mut npz = NpzFile::open(path).map_err(|e| e.to_string())?;
+    if npz.contains("v_template") {
+        let (check, warnings) = body::check(path, &mut npz)?;
+        let unusable = body::unusable(&check, path);
+        Ok(FileCheck { body: Some(check), warnings, unusable, ..file.clone() })
+    } else if npz.contains("poses") {
+        let (check, warnings) = motion::check(path)?;
+        Ok(FileCheck { motion: Some(check), warnings, ..file.clone() })
+    } else if npz.contains("positions") && npz.contains("f") {
         let warning = "a simulated sequence: training does not read it".into();
-        FileCheck { warnings: vec![warning], ..FileCheck::new(path) }
+        Ok(FileCheck { warnings: vec![warning], ..file.clone() })
     } else {
-        FileCheck::unusable(
-            path,
-            format!("{}: neither a body (no key 'v_template') nor a motion (no key 'poses')", path.display()),
-        )
+        Err(format!("{}: neither a body (no key 'v_template') nor a motion (no key 'poses')", path.display()))
     }
 }
 

@@ -1,6 +1,5 @@
 //! A motion file.
 
-use super::FileCheck;
 use crate::asset::{BODY_JOINT_NAMES, Motion, Pose};
 use crate::generate::pose::JOINT_LIMITS;
 use serde::Serialize;
@@ -14,25 +13,25 @@ pub struct MotionCheck {
     pub frames: usize,
     /// Frames per second.
     pub frame_rate: f64,
-    /// Duration [s].
+    /// Duration (s).
     pub duration: f64,
     /// Frames in which a joint is outside its range of motion by more than a degree.
     pub frames_outside_limits: usize,
     /// Frames outside the range of motion, by joint.
     pub joints_outside_limits: BTreeMap<String, usize>,
-    /// Largest excess over a limit [degrees].
+    /// Largest excess over a limit (degrees).
     pub largest_excess_degrees: f64,
 }
 
 /// Recorded motion exceeds the limits of single angles by tens of degrees in a frame or other; no joint does by this much
-/// [degrees].
+/// (degrees).
 const IMPOSSIBLE: f64 = 90.0;
 
-/// Excess over a limit that is measurement noise [degrees].
+/// Excess over a limit that is measurement noise (degrees).
 const TOLERANCE: f64 = 1.0;
 
-/// How far every joint but the pelvis is outside its range of motion, in the angle that is farthest [degrees]; 0 within. The
-/// heading of the pelvis is free, and falls and floor poses turn it any way.
+/// How far every joint but the pelvis is outside its range of motion, in the angle that is farthest (degrees); 0 within. The
+/// heading of the pelvis is free, and falls and floor poses turn it anyhow.
 fn excesses(pose: &Pose) -> impl Iterator<Item = (usize, f64)> + '_ {
     (1..JOINT_LIMITS.len()).map(|joint| {
         let (rotation, limits) = (pose.rotation(joint), &JOINT_LIMITS[joint]);
@@ -44,7 +43,7 @@ fn excesses(pose: &Pose) -> impl Iterator<Item = (usize, f64)> + '_ {
     })
 }
 
-/// What to tell about poses in which a joint turns as none does; `None` if there is nothing.
+/// A warning about poses in which a joint turns as none does; `None` if there are none.
 pub fn impossible_turn<'a>(poses: impl IntoIterator<Item = &'a Pose>) -> Option<String> {
     let excess = poses.into_iter().flat_map(excesses).map(|(_, excess)| excess).fold(0.0, f64::max);
     (excess > IMPOSSIBLE).then(|| {
@@ -52,14 +51,12 @@ pub fn impossible_turn<'a>(poses: impl IntoIterator<Item = &'a Pose>) -> Option<
     })
 }
 
-pub(super) fn check(path: &Path) -> FileCheck {
+/// Measurements and warnings, or why the motion cannot be used.
+pub(super) fn check(path: &Path) -> Result<(MotionCheck, Vec<String>), String> {
     // NaN, wrong shapes and rates are refused here, with frame and joint.
-    let motion = match Motion::load(path) {
-        Ok(motion) => motion,
-        Err(e) => return FileCheck::unusable(path, e),
-    };
+    let motion = Motion::load(path).map_err(|e| e.to_string())?;
     if motion.poses.is_empty() {
-        return FileCheck::unusable(path, format!("{}: no frames", path.display()));
+        return Err(format!("{}: no frames", path.display()));
     }
     let mut check = MotionCheck {
         frames: motion.poses.len(),
@@ -80,8 +77,5 @@ pub(super) fn check(path: &Path) -> FileCheck {
         }
         check.frames_outside_limits += usize::from(outside);
     }
-    let mut file = FileCheck::new(path);
-    file.warnings.extend(impossible_turn(&motion.poses));
-    file.motion = Some(check);
-    file
+    Ok((check, impossible_turn(&motion.poses).into_iter().collect()))
 }

@@ -2,7 +2,7 @@
 
 use crate::asset::Category;
 use crate::dataset::garment_folder::{MANIFEST, list_garment_folder, read_entries};
-use crate::format::mesh::is_mesh_path;
+use crate::format::{folder, is_mesh_path};
 use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -95,32 +95,30 @@ fn file_target(path: &Path) -> Option<Target> {
     if is_mesh_path(path) {
         return Some(Target::Garment { path: path.into(), entry: ManifestHints::default() });
     }
-    let is_npz = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npz"));
-    is_npz.then(|| Target::Npz { path: path.into() })
+    folder::has_extension(path, "npz").then(|| Target::Npz { path: path.into() })
 }
 
 /// `seen`: the folders that were visited, by their real paths; links may lead back.
-fn visit(folder: &Path, depth: usize, seen: &mut HashSet<PathBuf>, targets: &mut Vec<Target>) {
-    if !seen.insert(fs::canonicalize(folder).unwrap_or_else(|_| folder.into())) {
+fn visit(path: &Path, depth: usize, seen: &mut HashSet<PathBuf>, targets: &mut Vec<Target>) {
+    if !seen.insert(fs::canonicalize(path).unwrap_or_else(|_| path.into())) {
         return;
     }
-    let wrong = |reason: String| Target::Unusable { path: folder.into(), reason };
-    let mut children: Vec<PathBuf> = match fs::read_dir(folder) {
-        Ok(entries) => entries.filter_map(|e| Some(e.ok()?.path())).collect(),
-        Err(e) => return targets.push(wrong(format!("{}: {e}", folder.display()))),
+    let wrong = |reason: String| Target::Unusable { path: path.into(), reason };
+    let children = match folder::entries(path) {
+        Ok(children) => children,
+        Err(e) => return targets.push(wrong(e.to_string())),
     };
-    children.sort();
-    let manifest = folder.join(MANIFEST);
+    let manifest = path.join(MANIFEST);
     let has_manifest = manifest.exists();
     // None where a manifest cannot be read, too: it is among the targets, and leaves nothing out.
     let mut listed: Option<HashSet<PathBuf>> = None;
     if has_manifest {
-        match read_entries(folder) {
+        match read_entries(path) {
             Ok(entries) => {
                 let before = targets.len();
-                listed = Some(entries.iter().map(|entry| folder.join(entry.file())).collect());
+                listed = Some(entries.iter().map(|entry| path.join(entry.file())).collect());
                 targets.extend(entries.into_iter().map(|entry| {
-                    let path = folder.join(entry.file());
+                    let path = path.join(entry.file());
                     if path.is_file() {
                         let (category, layer, holding) = (entry.category, entry.layer, entry.holding);
                         Target::Garment { path, entry: ManifestHints { category, layer, holding } }
@@ -132,7 +130,7 @@ fn visit(folder: &Path, depth: usize, seen: &mut HashSet<PathBuf>, targets: &mut
                 }));
                 // What it lists is there, but training may refuse the list.
                 if targets[before..].iter().all(|target| matches!(target, Target::Garment { .. }))
-                    && let Err(e) = list_garment_folder(folder)
+                    && let Err(e) = list_garment_folder(path)
                 {
                     targets.push(Target::Unusable { path: manifest, reason: e.to_string() });
                 }

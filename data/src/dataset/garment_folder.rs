@@ -5,7 +5,7 @@
 //! file = "Tank_Top_01.obj"   # relative to the folder; the only required key
 //! name = "Tank_Top_01"       # default: the file's name
 //! category = "top"           # dress | top | t_shirt | open_shirt | skirt | trousers; default: guessed from the shape
-//! layer = [1, 3]             # between which layers it is worn
+//! layer = [1, 3]             # lowest and highest layer it may be in
 //! holding = true             # default: the collarbone rule
 //! source = "…"
 //! author = "…"
@@ -15,82 +15,24 @@
 
 mod write;
 
-pub(crate) use write::garment_folder_files;
-pub use write::{refuse_unlisted, save_garment, save_garment_folder, save_manifest};
+pub use write::{garment_folder_files, refuse_unlisted, save_garment, save_garment_folder, save_manifest};
 
 use crate::asset::{Body, Category, Garment, Provenance};
-use crate::format::mesh::{MeshFileError, is_mesh_path, load_tri_mesh};
-use crate::format::obj::ObjError;
+use crate::format::{FileError, folder, is_mesh_path, load_tri_mesh, toml_file};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
-use std::fs;
 use std::path::{Path, PathBuf};
-use thiserror::Error;
 
 /// Name of the manifest in a garment folder.
 pub const MANIFEST: &str = "garments.toml";
-
-/// Why a garment folder cannot be used.
-#[derive(Debug, Error)]
-pub enum GarmentFolderError {
-    /// The folder or manifest cannot be read or written.
-    #[error("{}: {reason}", path.display())]
-    Io {
-        /// File or folder.
-        path: PathBuf,
-        /// What the system said.
-        reason: std::io::Error,
-    },
-    /// The manifest is not as it should be; the message shows line and column.
-    #[error("{}: {message}", path.display())]
-    Manifest {
-        /// The manifest.
-        path: PathBuf,
-        /// What the TOML reader said.
-        message: String,
-    },
-    /// A manifest entry is wrong.
-    #[error("{}: garment {entry} ('{file}'): {message}", path.display())]
-    Entry {
-        /// The manifest, or the folder without one.
-        path: PathBuf,
-        /// Number of the entry, from 1.
-        entry: usize,
-        /// Its file.
-        file: String,
-        /// What is wrong.
-        message: String,
-    },
-    /// No garment in it.
-    #[error("{}: no garments; put OBJ, PLY, STL or glTF files there, or list them in {MANIFEST}", path.display())]
-    Empty {
-        /// The folder.
-        path: PathBuf,
-    },
-    /// A folder without a list holds another garment.
-    #[error(
-        "{} is there already and would no longer be found: {MANIFEST}, which is written, lists only what is made; hint: choose another folder",
-        path.display()
-    )]
-    Unlisted {
-        /// The other garment's mesh.
-        path: PathBuf,
-    },
-    /// A mesh is unusable.
-    #[error(transparent)]
-    Mesh(#[from] MeshFileError),
-    /// A mesh cannot be written.
-    #[error(transparent)]
-    Obj(#[from] ObjError),
-}
 
 /// A garment of a folder with its layer hint.
 #[derive(Clone, Debug)]
 pub struct FolderGarment {
     /// The garment.
     pub garment: Garment,
-    /// Lowest and highest layer it is worn in, if the manifest says so.
+    /// Lowest and highest layer it may be in, if the manifest says so.
     pub layer: Option<[u32; 2]>,
     /// Its mesh file.
     pub path: PathBuf,
@@ -135,7 +77,7 @@ pub struct ListedGarment {
     pub category: Option<Category>,
     /// Whether it is held, if the manifest says so.
     pub holding: Option<bool>,
-    /// Lowest and highest layer it is worn in, if the manifest says so.
+    /// Lowest and highest layer it may be in, if the manifest says so.
     pub layer: Option<[u32; 2]>,
     /// Where it comes from.
     pub source: Provenance,
@@ -145,16 +87,16 @@ impl ListedGarment {
     /// Reads the mesh and tells its number of vertices.
     ///
     /// # Errors
-    /// [`MeshFileError`] naming file and line or element.
-    pub fn vertex_count(&self) -> Result<usize, MeshFileError> {
+    /// [`FileError`] naming file and line or element.
+    pub fn vertex_count(&self) -> Result<usize, FileError> {
         Ok(load_tri_mesh(&self.path)?.vertex_count())
     }
 
     /// Reads the mesh. `body` is needed for the guesses: category and the collarbone rule.
     ///
     /// # Errors
-    /// [`MeshFileError`] naming file and line or element.
-    pub fn load(&self, body: &Body) -> Result<FolderGarment, MeshFileError> {
+    /// [`FileError`] naming file and line or element.
+    pub fn load(&self, body: &Body) -> Result<FolderGarment, FileError> {
         let rest = load_tri_mesh(&self.path)?;
         let category = self.category.unwrap_or_else(|| Category::guess(&rest, body));
         let holding = self.holding.unwrap_or_else(|| Garment::needs_holding(&rest, body));
@@ -168,28 +110,26 @@ impl ListedGarment {
 /// guesses: category and the collarbone rule.
 ///
 /// # Errors
-/// [`GarmentFolderError`] naming folder, manifest entry, or mesh file and line or element.
-pub fn load_garment_folder(folder: &Path, body: &Body) -> Result<Vec<FolderGarment>, GarmentFolderError> {
+/// [`FileError`] naming folder, manifest entry, or mesh file and line or element.
+pub fn load_garment_folder(folder: &Path, body: &Body) -> Result<Vec<FolderGarment>, FileError> {
     let listed = list_garment_folder(folder)?;
-    Ok(listed.par_iter().map(|garment| garment.load(body)).collect::<Result<_, _>>()?)
+    listed.par_iter().map(|garment| garment.load(body)).collect()
 }
 
 /// Lists the garments of a folder without reading their meshes.
 ///
 /// # Errors
-/// [`GarmentFolderError`] naming folder or manifest entry.
-pub fn list_garment_folder(folder: &Path) -> Result<Vec<ListedGarment>, GarmentFolderError> {
+/// [`FileError`] naming folder or manifest entry.
+pub fn list_garment_folder(folder: &Path) -> Result<Vec<ListedGarment>, FileError> {
     let manifest_path = folder.join(MANIFEST);
     let entries = read_entries(folder)?;
     let place = if manifest_path.is_file() { manifest_path } else { folder.to_owned() };
     let mut names: HashMap<String, String> = HashMap::new();
     let mut garments = Vec::with_capacity(entries.len());
     for (number, entry) in entries.into_iter().enumerate() {
-        let wrong = |message: String| GarmentFolderError::Entry {
-            path: place.clone(),
-            entry: number + 1,
-            file: entry.file.clone(),
-            message,
+        let wrong = |message: String| {
+            let (number, file) = (number + 1, &entry.file);
+            FileError::content(&place)(format!("garment {number} ('{file}'): {message}"))
         };
         let path = folder.join(&entry.file);
         if !path.is_file() {
@@ -220,33 +160,26 @@ pub fn list_garment_folder(folder: &Path) -> Result<Vec<ListedGarment>, GarmentF
 }
 
 /// What the manifest lists or, without one, every mesh file of the folder; at least one.
-pub(crate) fn read_entries(folder: &Path) -> Result<Vec<ManifestEntry>, GarmentFolderError> {
+pub(crate) fn read_entries(folder: &Path) -> Result<Vec<ManifestEntry>, FileError> {
     let path = folder.join(MANIFEST);
-    let entries = match fs::read_to_string(&path) {
-        Ok(text) => manifest_from(&path, &text)?.garment,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => list_mesh_files(folder)?
+    let entries = match toml_file::load::<Manifest>(&path)? {
+        Some(manifest) => manifest.garment,
+        None => list_mesh_files(folder)?
             .into_iter()
             .map(|file| ManifestEntry { file, ..ManifestEntry::default() })
             .collect(),
-        Err(reason) => return Err(GarmentFolderError::Io { path, reason }),
     };
     if entries.is_empty() {
-        return Err(GarmentFolderError::Empty { path: folder.into() });
+        return Err(FileError::content(folder)(format!(
+            "no garments; put OBJ, PLY, STL or glTF files there, or list them in {MANIFEST}"
+        )));
     }
     Ok(entries)
 }
 
-fn list_mesh_files(folder: &Path) -> Result<Vec<String>, GarmentFolderError> {
-    let failed = |reason| GarmentFolderError::Io { path: folder.into(), reason };
-    let mut files = Vec::new();
-    for entry in fs::read_dir(folder).map_err(failed)? {
-        let path = entry.map_err(failed)?.path();
-        if let Some(name) = path.file_name().and_then(|n| n.to_str()).filter(|_| is_mesh_path(&path)) {
-            files.push(name.to_string());
-        }
-    }
-    files.sort();
-    Ok(files)
+fn list_mesh_files(path: &Path) -> Result<Vec<String>, FileError> {
+    let meshes = folder::entries(path)?.into_iter().filter(|file| is_mesh_path(file));
+    Ok(meshes.filter_map(|file| Some(file.file_name()?.to_str()?.to_string())).collect())
 }
 
 impl ManifestEntry {
@@ -274,21 +207,10 @@ impl ManifestEntry {
 /// The entries of a folder's manifest; none where it has no manifest.
 ///
 /// # Errors
-/// [`GarmentFolderError`] if there is one that cannot be read.
-pub fn read_manifest(folder: &Path) -> Result<Vec<ManifestEntry>, GarmentFolderError> {
-    let path = folder.join(MANIFEST);
-    match fs::read_to_string(&path) {
-        Ok(text) => Ok(manifest_from(&path, &text)?.garment),
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(Vec::new()),
-        Err(reason) => Err(GarmentFolderError::Io { path, reason }),
-    }
-}
-
-fn manifest_from(path: &Path, text: &str) -> Result<Manifest, GarmentFolderError> {
-    toml::from_str(text).map_err(|e| GarmentFolderError::Manifest {
-        path: path.into(),
-        message: e.to_string().trim_end().to_string(),
-    })
+/// [`FileError`] if there is one that cannot be read.
+pub fn read_manifest(folder: &Path) -> Result<Vec<ManifestEntry>, FileError> {
+    Ok(toml_file::load::<Manifest>(&folder.join(MANIFEST))?
+        .map_or_else(Vec::new, |manifest| manifest.garment))
 }
 
 #[cfg(test)]
@@ -296,6 +218,7 @@ mod tests {
     use super::*;
     use crate::generate::mannequin;
     use clothcombo_physics::mesh::shapes::tube;
+    use std::fs;
 
     fn folder_with(files: &[(&str, &str)]) -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();
@@ -313,13 +236,8 @@ mod tests {
     fn saved_garments_load_again_with_everything() {
         let body = mannequin();
         let source = Provenance { source: "s".into(), author: "a \"b\"".into(), licence: "CC0-1.0".into() };
-        let garment = Garment {
-            name: "ring".into(),
-            category: Category::Skirt,
-            rest: tube(0.2, 0.3, 16, 4),
-            holding: true,
-            source,
-        };
+        let ring = Garment::new(Category::Skirt, tube(0.2, 0.3, 16, 4));
+        let garment = Garment { name: "ring".into(), holding: true, source, ..ring };
         let folder = tempfile::tempdir().unwrap();
         let saved = FolderGarment { garment, layer: Some([1, 3]), path: PathBuf::new() };
         let written = save_garment_folder(folder.path(), std::slice::from_ref(&saved)).unwrap();
@@ -340,9 +258,7 @@ mod tests {
     fn what_a_folder_lists_stays_listed_and_what_it_does_not_list_is_not_hidden() {
         let named = |name: &str, height: f64| {
             let rest = tube(0.1, height, 8, 4);
-            let source = Provenance::default();
-            let garment =
-                Garment { name: name.into(), category: Category::Top, rest, holding: false, source };
+            let garment = Garment { name: name.into(), ..Garment::new(Category::Top, rest) };
             FolderGarment { garment, layer: None, path: PathBuf::new() }
         };
         let folder = folder_with(&[]);
@@ -354,7 +270,8 @@ mod tests {
 
         let own = folder_with(&[("shirt.obj", TRIANGLE)]);
         let refused = save_garment_folder(own.path(), &[named("a", 0.2)]).unwrap_err();
-        assert!(matches!(&refused, GarmentFolderError::Unlisted { path } if path.ends_with("shirt.obj")));
+        let refused = refused.to_string();
+        assert!(refused.contains("shirt.obj") && refused.contains("would no longer be found"), "{refused}");
         assert!(!own.path().join("a.obj").exists());
     }
 
@@ -393,8 +310,9 @@ mod tests {
         let message = load_garment_folder(folder.path(), &body).unwrap_err().to_string();
         assert!(["'tee.obj'", "'tee.ply'"].iter().all(|file| message.contains(file)), "{message}");
         let empty = folder_with(&[]);
-        assert!(matches!(load_garment_folder(empty.path(), &body), Err(GarmentFolderError::Empty { .. })));
+        let message = load_garment_folder(empty.path(), &body).unwrap_err().to_string();
+        assert!(message.contains("no garments"), "{message}");
         let missing = load_garment_folder(&empty.path().join("x"), &body).unwrap_err();
-        assert!(matches!(missing, GarmentFolderError::Io { .. }));
+        assert!(missing.is_not_found());
     }
 }

@@ -4,7 +4,7 @@ pub mod garment_folder;
 pub mod motion_folder;
 
 pub use garment_folder::{
-    FolderGarment, GarmentFolderError, ListedGarment, ManifestEntry, list_garment_folder,
-    load_garment_folder, read_manifest, refuse_unlisted, save_garment, save_garment_folder, save_manifest,
+    FolderGarment, ListedGarment, ManifestEntry, list_garment_folder, load_garment_folder, read_manifest,
+    refuse_unlisted, save_garment, save_garment_folder, save_manifest,
 };
-pub use motion_folder::{MotionFolderError, load_motion_folder};
+pub use motion_folder::load_motion_folder;

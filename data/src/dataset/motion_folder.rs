@@ -1,49 +1,19 @@
 //! A folder of motion npz files.
 
 use crate::asset::Motion;
-use crate::asset::motion::MotionError;
-use std::fs;
-use std::path::{Path, PathBuf};
-use thiserror::Error;
-
-/// Why a motion folder cannot be used.
-#[derive(Debug, Error)]
-pub enum MotionFolderError {
-    /// The folder cannot be read.
-    #[error("{}: {reason}", path.display())]
-    Io {
-        /// The folder.
-        path: PathBuf,
-        /// What the system said.
-        reason: std::io::Error,
-    },
-    /// No motion in it.
-    #[error("{}: no motions; expected .npz files with poses and mocap_framerate", path.display())]
-    Empty {
-        /// The folder.
-        path: PathBuf,
-    },
-    /// A file is unusable.
-    #[error(transparent)]
-    Motion(#[from] MotionError),
-}
+use crate::format::{FileError, folder};
+use std::path::Path;
 
 /// Reads every `.npz` of a folder as a motion, sorted by file name.
 ///
 /// # Errors
-/// [`MotionFolderError`] naming folder, or file and key.
-pub fn load_motion_folder(folder: &Path) -> Result<Vec<Motion>, MotionFolderError> {
-    let failed = |reason| MotionFolderError::Io { path: folder.into(), reason };
-    let mut files = Vec::new();
-    for entry in fs::read_dir(folder).map_err(failed)? {
-        let path = entry.map_err(failed)?.path();
-        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npz")) {
-            files.push(path);
-        }
-    }
+/// [`FileError`] naming folder, or file and key.
+pub fn load_motion_folder(path: &Path) -> Result<Vec<Motion>, FileError> {
+    let mut files = folder::entries(path)?;
+    files.retain(|file| folder::has_extension(file, "npz"));
     if files.is_empty() {
-        return Err(MotionFolderError::Empty { path: folder.into() });
+        let message = "no motions; expected .npz files with poses and mocap_framerate";
+        return Err(FileError::content(path)(message));
     }
-    files.sort();
-    Ok(files.iter().map(|f| Motion::load(f)).collect::<Result<_, _>>()?)
+    files.iter().map(|file| Motion::load(file)).collect()
 }

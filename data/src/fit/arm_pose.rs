@@ -1,6 +1,6 @@
 //! Bodies with lowered arms, and garments back from there to the T-pose.
 
-use crate::asset::{Binding, BindingSettings, Body, Category, Garment, Pose, Provenance, body};
+use crate::asset::{Binding, BindingSettings, Body, Category, Garment, Pose, body};
 use clothcombo_physics::TriMesh;
 use clothcombo_physics::query::Surface;
 
@@ -61,13 +61,7 @@ impl ArmPose {
         for round in 0..3 {
             let mesh = TriMesh::new(rest, faces.to_vec()).map_err(|e| e.to_string())?;
             let category = category.unwrap_or_else(|| Category::guess(&mesh, body));
-            let garment = Garment {
-                name: String::new(),
-                category,
-                rest: mesh,
-                holding: false,
-                source: Provenance::default(),
-            };
+            let garment = Garment::new(category, mesh);
             let binding = Binding::new(&garment, if round == 0 { &posed } else { &bare }, &settings);
             rest = positions
                 .iter()
@@ -109,9 +103,10 @@ fn unskin(p: [f64; 3], weights: &[f32], bones: &[[[f64; 4]; 3]]) -> Option<[f64;
 pub(super) mod tests {
     use super::*;
     use crate::asset::body::skin;
-    use crate::generate::{GarmentGenerator, GarmentSettings, mannequin};
+    use crate::generate::garment::generated;
+    use crate::generate::mannequin;
 
-    /// A generated shirt skinned to lowered arms the way it would be draped.
+    /// A generated shirt skinned to lowered arms as draping does.
     pub(crate) fn lowered(garment: &Garment, body: &Body, degrees: f64) -> Vec<[f64; 3]> {
         let pose = ArmPose::new(body, degrees).pose;
         let bones = body.bone_transforms(&body.joint_template, &pose);
@@ -124,8 +119,7 @@ pub(super) mod tests {
     #[test]
     fn sleeves_come_back_from_an_a_pose() {
         let body = mannequin();
-        let settings = GarmentSettings { target_vertices: 700, ..GarmentSettings::default() };
-        let shirt = GarmentGenerator::new(&body).unwrap().generate(Category::TShirt, 3, &settings).unwrap();
+        let shirt = generated(&body, Category::TShirt, 3, 700);
         let arms = ArmPose::new(&body, 40.0);
         let posed = lowered(&shirt, &body, 40.0);
         let back = arms.to_t_pose(&posed, shirt.rest.faces(), Some(shirt.category), &body).unwrap();

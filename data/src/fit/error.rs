@@ -1,6 +1,8 @@
 //! Why a mesh is no garment of a body.
 
-use super::{MAX_VERTICES, MIN_TRIANGLES, MOST_STRETCH, Sitting, Unit};
+use super::placement::Unit;
+use super::settings::{MAX_VERTICES, MIN_TRIANGLES, MOST_STRETCH};
+use super::sitting::Sitting;
 use thiserror::Error;
 
 /// Why a mesh is not fitted.
@@ -34,16 +36,16 @@ pub enum FitError {
         extent: f64,
         /// The unit, if given.
         unit: Option<Unit>,
-        /// Largest extent of the body [m].
+        /// Largest extent of the body (m).
         reach: f64,
     },
     /// Reaches from head to feet and to both hands.
     #[error("not a garment: it reaches from the crown to the soles and to both hands, as a body does")]
     Body,
-    /// Worn where none of the six categories is.
+    /// Covers neither trunk nor hips, as each of the six categories does.
     #[error("not one of the six garment categories: {place}")]
-    Worn {
-        /// Where it is worn.
+    OffTrunk {
+        /// Where it lies.
         place: &'static str,
     },
     /// No cloth around the trunk.

@@ -3,64 +3,43 @@
 //! Nothing is changed silently: [`FitReport`] lists what was assumed and every element that was touched.
 
 mod arm_pose;
-mod clean;
+mod coverage;
 mod error;
-mod manifold;
 mod placed;
 mod placement;
-mod push_out;
 mod report;
 mod search;
+mod settings;
+mod sitting;
 
+pub use coverage::off_trunk;
 pub use error::FitError;
 pub use placed::is_on_body;
 pub use placement::{Origin, Placement, Unit, UpAxis};
-pub use report::{BodyContact, Elements, FitReport, Piece, Repair, RepairKind};
-pub use search::Sitting;
+pub use report::{BodyContact, Elements, FitReport, MeshPiece, Repair, RepairKind};
+pub use settings::{FitSettings, MAX_VERTICES, MIN_TRIANGLES};
+pub use sitting::Sitting;
 
-pub(crate) use clean::{clean_faces, triangulate, weld};
-pub(crate) use manifold::{SplitSheet, join_faces, orient, outward_area, outwardness, split_fans};
-pub(crate) use push_out::{Contact, contact, one_rings, push_out};
-
-use crate::asset::{Body, Category, Garment, Provenance};
-use crate::check::measures::{AREA_SHARE, MeshMeasures, WELD_SHARE, diagonal};
+use crate::asset::{Body, Category, Garment};
 use crate::format::PolygonMesh;
+use crate::mesh::{
+    AREA_SHARE, MeshMeasures, WELD_SHARE, bounds, clean_faces, contact, diagonal, join_faces, orient,
+    outward_area, push_out, split_fans, triangulate, weld,
+};
 use arm_pose::ArmPose;
 use clothcombo_physics::contact::{self_triangle_pairs, triangle_pairs};
 use clothcombo_physics::vec3::{norm, sub};
 use clothcombo_physics::{Topology, TriMesh};
 use search::Search;
+use settings::{MOST_STRETCH, MOST_STRETCHED};
 
-/// Most vertices a garment may have after welding.
-pub const MAX_VERTICES: usize = 1_000_000;
-
-/// What is left longer than this many times its length by the push out of the body is stretched.
-const MOST_STRETCH: f64 = 1.5;
-/// Share of its edges from which a stretched garment does not fit.
-const MOST_STRETCHED: f64 = 0.1;
-/// Fewest triangles that can be a garment.
-pub const MIN_TRIANGLES: usize = 20;
-
-/// Least distance between a fitted vertex and the body [m]: the ε of the paper's body collision loss.
+/// Least distance between a fitted vertex and the body (m): the ε of the paper's body collision loss.
 const CLEARANCE: f64 = 0.002;
-
-/// What is known about a file; `None` is found out.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct FitSettings {
-    /// Unit of the file.
-    pub unit: Option<Unit>,
-    /// Up axis of the file.
-    pub up: Option<UpAxis>,
-    /// Whether the arms are lowered (A-pose) or not (T-pose).
-    pub arms_lowered: Option<bool>,
-    /// Category; otherwise guessed from the shape.
-    pub category: Option<Category>,
-}
 
 /// A fitted garment and how it came about.
 #[derive(Clone, Debug)]
 pub struct Fitted {
-    /// At rest on the zero body in T-pose [m]; name and source are the caller's.
+    /// At rest on the zero body in T-pose (m); name and source are the caller's.
     pub garment: Garment,
     /// What was assumed, repaired and measured.
     pub report: FitReport,
@@ -73,7 +52,7 @@ pub struct Fitted {
 struct Repaired {
     positions: Vec<[f64; 3]>,
     vertex_origin: Vec<u32>,
-    /// The other way round: see [`Fitted::vertex_of_file`].
+    /// The inverse: see [`Fitted::vertex_of_file`].
     vertex_of_file: Vec<Option<u32>>,
     faces: Vec<[u32; 3]>,
     face_origin: Vec<u32>,
@@ -155,8 +134,7 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
             self_triangle_pairs: self_triangle_pairs(rest.positions(), rest.faces()).len(),
         },
     };
-    let source = Provenance::default();
-    let garment = Garment { name: String::new(), category, rest, holding, source };
+    let garment = Garment { holding, ..Garment::new(category, rest) };
     Ok(Fitted { garment, report, vertex_of_file: sheet.vertex_of_file })
 }
 
@@ -279,15 +257,14 @@ fn stretched(topology: &Topology, before: &[[f64; 3]], after: &[[f64; 3]]) -> f6
 
 fn refuse_other_things(positions: &[[f64; 3]], body: &Body, sitting: &Sitting) -> Result<(), FitError> {
     let (low, high) = body.zero_body().bounds();
-    let bound =
-        |a: usize, start: f64, pick: fn(f64, f64) -> f64| positions.iter().map(|p| p[a]).fold(start, pick);
-    let spans = |a: usize, slack: f64| {
-        bound(a, f64::MAX, f64::min) < low[a] + slack && bound(a, f64::MIN, f64::max) > high[a] - slack
-    };
+    let [lowest, highest] = bounds(positions);
+    let spans = |a: usize, slack: f64| lowest[a] < low[a] + slack && highest[a] > high[a] - slack;
     if spans(1, 0.04) && spans(0, 0.1) {
         return Err(FitError::Body);
     }
-    worn_where(positions, body).map_err(|place| FitError::Worn { place })?;
+    if let Some(place) = off_trunk(positions, body) {
+        return Err(FitError::OffTrunk { place });
+    }
     if sitting.wrap < 0.5 || sitting.mean_distance > 0.3 {
         return Err(FitError::OffBody { sitting: *sitting });
     }
@@ -297,24 +274,8 @@ fn refuse_other_things(positions: &[[f64; 3]], body: &Body, sitting: &Sitting) -
     Ok(())
 }
 
-/// Refuses what does not clothe the trunk or the hips; the error says where it is worn instead.
-pub(crate) fn worn_where(positions: &[[f64; 3]], body: &Body) -> Result<(), &'static str> {
-    let joint = |j: usize| body.joint_template.get(j).copied().unwrap_or([0.0; 3]);
-    let (neck, knee, shoulder) = (joint(12), joint(4), joint(16));
-    let all = |test: &dyn Fn(&[f64; 3]) -> bool| positions.iter().all(test);
-    if all(&|p| p[1] > neck[1]) {
-        Err("worn on the head")
-    } else if all(&|p| p[1] < knee[1]) {
-        Err("worn on the feet")
-    } else if all(&|p| p[0].abs() > shoulder[0]) {
-        Err("worn on the arms only")
-    } else {
-        Ok(())
-    }
-}
-
-fn pieces(mesh: &TriMesh, topology: &Topology) -> Vec<Piece> {
-    let empty = Piece { vertices: 0, triangles: 0, area: 0.0, boundary_loops: 0 };
+fn pieces(mesh: &TriMesh, topology: &Topology) -> Vec<MeshPiece> {
+    let empty = MeshPiece { vertices: 0, triangles: 0, area: 0.0, boundary_loops: 0 };
     let mut pieces = vec![empty; topology.component_count];
     let piece = |v: u32| topology.component_of_vertex[v as usize] as usize;
     topology.component_of_vertex.iter().for_each(|c| pieces[*c as usize].vertices += 1);

@@ -1,15 +1,16 @@
 //! Does a garment already lie on a body, in metres and T-pose, so that nothing has to be found out?
 
 use super::search::{Samples, Search};
-use super::{FitSettings, outward_area};
+use super::settings::{FitSettings, MIN_TRIANGLES};
 use crate::asset::Body;
+use crate::mesh::outward_area;
 use clothcombo_physics::{Surface, Topology, TriMesh};
 
 /// Whether `mesh`, taken as it stands (metres, y up, pelvis at the origin, arms level), sits on the zero body of `body` as a
-/// garment does: most of it close to the surface or all the way round it, little of it inside, by the same judgement by which
+/// garment does: most of it close to the surface or all around it, little of it inside, by the same judgement by which
 /// [`fit`](super::fit) takes a placement; and every piece of it with its faces outwards.
 pub fn is_on_body(mesh: &TriMesh, body: &Body) -> bool {
-    if mesh.face_count() < super::MIN_TRIANGLES {
+    if mesh.face_count() < MIN_TRIANGLES {
         return false;
     }
     let settings = FitSettings { arms_lowered: Some(false), ..FitSettings::default() };
@@ -29,14 +30,14 @@ fn faces_outwards(mesh: &TriMesh, body: &Body) -> bool {
 mod tests {
     use super::*;
     use crate::asset::Category;
-    use crate::generate::{GarmentSettings, generate_garment, mannequin};
+    use crate::generate::garment::generated;
+    use crate::generate::mannequin;
 
     #[test]
     fn only_the_garment_as_it_was_made_lies_on_the_body() {
         let body = mannequin();
-        let settings = GarmentSettings { target_vertices: 300, ..GarmentSettings::default() };
         for category in [Category::TShirt, Category::Skirt, Category::Trousers] {
-            let rest = generate_garment(&body, category, 4, &settings).unwrap().rest;
+            let rest = generated(&body, category, 4, 300).rest;
             assert!(is_on_body(&rest, &body), "{category}");
             let changed = |change: fn([f64; 3]) -> [f64; 3]| {
                 rest.with_positions(rest.positions().iter().map(|p| change(*p)).collect()).unwrap()

@@ -127,13 +127,13 @@ pub struct Placement {
     pub unit: Unit,
     /// Up axis of the file.
     pub up: UpAxis,
-    /// Turn about the vertical after the up axis [degrees]: 0, 90, 180 or 270.
+    /// Turn about the vertical after the up axis (degrees): 0, 90, 180 or 270.
     pub facing_degrees: u16,
     /// Where the file's origin is.
     pub origin: Origin,
-    /// Translation after scaling and turning [m].
+    /// Translation after scaling and turning (m).
     pub translation: [f64; 3],
-    /// How far the arms of the garment hang below the horizontal [degrees]; 0 is a T-pose.
+    /// How far the arms of the garment hang below the horizontal (degrees); 0 is a T-pose.
     pub arm_angle_degrees: f64,
 }
 

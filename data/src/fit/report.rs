@@ -1,9 +1,9 @@
 //! What fitting assumed and changed, element by element.
 
 use super::placement::{Origin, Placement};
-use super::search::Sitting;
+use super::sitting::Sitting;
 use crate::asset::Category;
-use crate::check::MeshMeasures;
+use crate::mesh::MeshMeasures;
 use serde::Serialize;
 use std::fmt;
 
@@ -107,12 +107,12 @@ pub struct Repair {
 
 /// A connected piece of the fitted garment.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Piece {
+pub struct MeshPiece {
     /// Vertices.
     pub vertices: usize,
     /// Triangles.
     pub triangles: usize,
-    /// Area [m²].
+    /// Area (m²).
     pub area: f64,
     /// Boundary curves; none means a closed piece, such as a button.
     pub boundary_loops: usize,
@@ -123,13 +123,13 @@ pub struct Piece {
 pub struct BodyContact {
     /// Vertices inside the body before pushing out.
     pub inside_before: usize,
-    /// Deepest of them [mm].
+    /// Deepest of them (mm).
     pub depth_before_mm: f64,
     /// Vertices inside the body after it.
     pub inside_after: usize,
-    /// Least distance of a vertex to the body after it [mm].
+    /// Least distance of a vertex to the body after it (mm).
     pub least_distance_mm: f64,
-    /// Largest move of a vertex [mm].
+    /// Largest move of a vertex (mm).
     pub largest_move_mm: f64,
     /// Garment and body triangles that intersect afterwards (exact).
     pub body_triangle_pairs: usize,
@@ -153,7 +153,7 @@ pub struct FitReport {
     /// Edges that still have more than two faces, by vertices of the file.
     pub unrepaired_edges: Vec<[u32; 2]>,
     /// Connected pieces, the largest first.
-    pub pieces: Vec<Piece>,
+    pub pieces: Vec<MeshPiece>,
     /// Category, given or guessed from the shape.
     pub category: Category,
     /// Whether it lies wholly below the collarbone, so that its rim is held.
@@ -170,7 +170,7 @@ const MISFIT_INSIDE: f64 = 0.1;
 const MISFIT_DEPTH_MM: f64 = 30.0;
 
 impl FitReport {
-    /// What to tell of a garment that does not lie on the body as clothes do; `None` of one that does.
+    /// Why the garment does not lie on the body as clothes do; `None` if it does.
     pub fn misfit(&self) -> Option<String> {
         let BodyContact { inside_before, depth_before_mm, .. } = self.contact;
         let inside = inside_before as f64 / self.mesh.vertices.max(1) as f64;
@@ -265,8 +265,8 @@ impl fmt::Display for FitReport {
         }
         writeln!(
             f,
-            "contact   {} vertices were inside the body (up to {:.1} mm); now {}, closest {:.1} mm, {} triangle pairs with the \
-             body, {} with itself",
+            "contact   {} vertices were inside the body (up to {:.1} mm); now {}, closest {:.1} mm, {} triangle pairs intersect \
+             the body, {} each other",
             c.inside_before,
             c.depth_before_mm,
             c.inside_after,

@@ -6,53 +6,29 @@
 //! also moved to where it fits best.
 
 use super::arm_pose::ArmPose;
+use super::coverage::off_trunk;
+use super::error::FitError;
 use super::placement::{Origin, Placement, Unit, UpAxis};
-use super::{FitError, FitSettings, worn_where};
+use super::settings::FitSettings;
+use super::sitting::Sitting;
 use crate::asset::{Body, skeleton};
+use crate::mesh::bounds;
 use clothcombo_physics::query::Distance;
 use clothcombo_physics::vec3::{add, cross, norm, scale, sub};
 use rayon::prelude::*;
-use serde::Serialize;
 
-/// Arm angles tried first [degrees].
+/// Arm angles tried first (degrees).
 const ARM_ANGLES: [f64; 7] = [0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0];
 
-/// Costs in favour of the usual [m]: a worse fit by this much is still preferred.
+/// Costs in favour of the usual (m): a worse fit by this much is still preferred.
 const FACING_PRIOR: f64 = 0.003;
 const ARMS_PRIOR: f64 = 0.0008;
 
 /// Arms are taken for level as long as lowered ones are not better by this factor.
 const LEVEL_ARMS_PRIOR: f64 = 1.3;
 
-/// Directions around the trunk that are told apart.
+/// Number of directions around the trunk.
 const SECTORS: usize = 8;
-
-/// How well a placed garment sits.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Sitting {
-    /// Mean distance of the cloth to the body, inside or outside [m].
-    pub mean_distance: f64,
-    /// Share of the cloth inside the body, 0–1.
-    pub inside: f64,
-    /// Share of the directions around the trunk in which there is cloth, 0–1, at the best height.
-    pub wrap: f64,
-    #[serde(skip)]
-    pub(super) cost: f64,
-}
-
-impl Sitting {
-    fn is_good(&self) -> bool {
-        let is_close = self.inside < 0.12 && self.wrap >= 0.75 && self.mean_distance < 0.06;
-        // A wide skirt is far from the legs, but goes all the way round and is nowhere inside.
-        let is_wide = self.inside < 0.01 && self.wrap == 1.0 && self.mean_distance < 0.25;
-        is_close || is_wide
-    }
-
-    /// Whether the cloth follows the trunk, be it partly inside: made for another body, but no hat and no shoe.
-    fn is_around_trunk(&self) -> bool {
-        self.wrap >= 0.75 && self.mean_distance < 0.02
-    }
-}
 
 /// Sample points of a garment in the file's coordinates, evenly over its area.
 pub(super) struct Samples(Vec<[f64; 3]>);
@@ -91,7 +67,7 @@ pub(super) struct Search<'a> {
     trunk: Vec<[f64; 3]>,
     floor: f64,
     top: f64,
-    /// Largest extent of the body [m].
+    /// Largest extent of the body (m).
     pub reach: f64,
 }
 
@@ -121,7 +97,7 @@ impl<'a> Search<'a> {
         Self { body, arms, trunk, floor: low[1], top: high[1], reach }
     }
 
-    /// Whether a garment of this largest extent [m] can be worn on this body at all.
+    /// Whether a garment of this largest extent (m) can fit this body at all.
     pub fn is_plausible_extent(&self, extent: f64) -> bool {
         extent >= 0.07 * self.reach && extent <= 1.2 * self.reach
     }
@@ -197,12 +173,23 @@ impl<'a> Search<'a> {
             .par_iter()
             .filter_map(|(placement, arm)| {
                 let points = placement.apply(&samples.0);
-                let place = worn_where(&points, self.body).err()?;
+                let place = off_trunk(&points, self.body)?;
                 let sitting = self.sitting(&points, &self.arms[*arm]);
                 (sitting.mean_distance < 0.04 && sitting.inside < 0.25).then_some(place)
             })
             .find_first(|_| true);
-        snug.map_or(Ok(()), |place| Err(FitError::Worn { place }))
+        snug.map_or(Ok(()), |place| Err(FitError::OffTrunk { place }))
+    }
+
+    /// Costs and numbers of the hypotheses, the best first.
+    fn ranked(&self, hypotheses: &[(Placement, usize)], samples: &Samples) -> Vec<(f64, usize)> {
+        let mut ranked: Vec<(f64, usize)> = hypotheses
+            .par_iter()
+            .enumerate()
+            .map(|(i, (placement, arm))| (self.judged(placement, &self.arms[*arm], samples).0, i))
+            .collect();
+        ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        ranked
     }
 
     /// Cheap costs first, careful ones for the best few.
@@ -212,12 +199,7 @@ impl<'a> Search<'a> {
         coarse: &Samples,
         fine: &Samples,
     ) -> (Placement, usize, Sitting) {
-        let mut ranked: Vec<(f64, usize)> = hypotheses
-            .par_iter()
-            .enumerate()
-            .map(|(i, (placement, arm))| (self.judged(placement, &self.arms[*arm], coarse).0, i))
-            .collect();
-        ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let ranked = self.ranked(hypotheses, coarse);
         let mut best: Option<(f64, usize, Sitting)> = None;
         for (_, i) in ranked.iter().take(6) {
             let (placement, arm) = &hypotheses[*i];
@@ -246,11 +228,9 @@ impl<'a> Search<'a> {
                 let untranslated =
                     Placement { translation: [0.0; 3], origin: Origin::Elsewhere, ..*placement };
                 let points = untranslated.apply(&coarse.0);
-                let bound = |a: usize, start: f64, pick: fn(f64, f64) -> f64| {
-                    points.iter().map(|p| p[a]).fold(start, pick)
-                };
-                let middle = |a: usize| 0.5 * (bound(a, f64::MAX, f64::min) + bound(a, f64::MIN, f64::max));
-                let (x, y, z) = (middle(0), bound(1, f64::MIN, f64::max), middle(2));
+                let [low, high] = bounds(&points);
+                let middle = |a: usize| 0.5 * (low[a] + high[a]);
+                let (x, y, z) = (middle(0), high[1], middle(2));
                 let trunk_z = self.trunk.iter().map(|p| p[2]).sum::<f64>() / self.trunk.len().max(1) as f64;
                 (1..=heights).map(move |h| {
                     let top = self.floor + (self.top - self.floor) * f64::from(h) / f64::from(heights);
@@ -258,12 +238,7 @@ impl<'a> Search<'a> {
                 })
             })
             .collect();
-        let mut ranked: Vec<(f64, usize)> = started
-            .par_iter()
-            .enumerate()
-            .map(|(i, (placement, arm))| (self.judged(placement, &self.arms[*arm], coarse).0, i))
-            .collect();
-        ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let mut ranked = self.ranked(&started, coarse);
         ranked.truncate(12);
         let slid: Vec<(Placement, usize)> = ranked
             .par_iter()

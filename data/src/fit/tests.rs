@@ -1,17 +1,17 @@
 use super::arm_pose::tests::lowered;
 use super::*;
 use crate::asset::rotation;
-use crate::generate::{GarmentGenerator, GarmentSettings, mannequin};
+use crate::generate::garment::generated;
+use crate::generate::mannequin;
 use clothcombo_physics::mesh::shapes::{icosphere, tube};
 use clothcombo_physics::query::VertexIndex;
 use clothcombo_physics::vec3::{add, cross, dot, scale};
 
 fn garment(body: &Body, category: Category, seed: u64) -> Garment {
-    let settings = GarmentSettings { target_vertices: 500, ..GarmentSettings::default() };
-    GarmentGenerator::new(body).unwrap().generate(category, seed, &settings).unwrap()
+    generated(body, category, seed, 500)
 }
 
-/// The longest-sleeved of a few shirts: cap sleeves lie on the shoulder at any angle and are as well worn around the hips.
+/// The longest-sleeved of a few shirts: cap sleeves lie on the shoulder at any angle and would fit around the hips as well.
 fn long_sleeved(body: &Body) -> Garment {
     let reach = |g: &Garment| g.rest.bounds().1[0];
     let shirts = (1..=5).map(|seed| garment(body, Category::TShirt, seed));
@@ -48,7 +48,7 @@ fn recovery(fitted: &Garment, original: &Garment) -> (f64, f64) {
 #[test]
 fn every_unit_up_axis_and_facing_is_found_and_the_garment_recovered() {
     let body = mannequin();
-    let wardrobe = [
+    let garments = [
         garment(&body, Category::TShirt, 1),
         garment(&body, Category::Trousers, 2),
         garment(&body, Category::Dress, 3),
@@ -59,7 +59,7 @@ fn every_unit_up_axis_and_facing_is_found_and_the_garment_recovered() {
     let mut number = 0;
     for up in UpAxis::ALL {
         for unit in Unit::ALL {
-            let original = &wardrobe[(number + number / 5) % wardrobe.len()];
+            let original = &garments[(number + number / 5) % garments.len()];
             let on_floor = number % 2 == 1;
             let placement = Placement {
                 unit,
@@ -103,7 +103,7 @@ fn a_garment_with_its_origin_elsewhere_is_moved_onto_the_body() {
     assert!(error < 0.03, "{error}");
 }
 
-/// A soup with every defect that fitting mends, in centimetres, z up, arms 40° down.
+/// A soup with every defect that fitting repairs, in centimetres, z up, arms 40° down.
 struct Messy {
     file: PolygonMesh,
     flap_edge: [[f64; 3]; 2],
@@ -268,17 +268,17 @@ fn what_was_inside_the_body_is_pushed_out_and_listed() {
 }
 
 #[test]
-fn a_garment_that_lies_wrongly_is_told_of() {
+fn a_garment_that_lies_wrongly_is_reported() {
     let body = mannequin();
     let shirt = long_sleeved(&body);
     let faces = || shirt.rest.faces().iter().map(<[u32; 3]>::as_slice);
-    let told = |change: fn([f64; 3]) -> [f64; 3]| {
+    let misfit_of = |change: fn([f64; 3]) -> [f64; 3]| {
         let positions = shirt.rest.positions().iter().map(|p| change(*p)).collect();
         let report = fit(&polygons(positions, faces()), &body, &FitSettings::default()).unwrap().report;
         (report.misfit(), report.contact)
     };
-    assert_eq!(told(|p| p).0, None);
-    let (misfit, contact) = told(|[x, y, z]| [0.7 * (x + z), y, 0.7 * (z - x)]);
+    assert_eq!(misfit_of(|p| p).0, None);
+    let (misfit, contact) = misfit_of(|[x, y, z]| [0.7 * (x + z), y, 0.7 * (z - x)]);
     assert!(misfit.is_some_and(|text| text.contains("inside the body")), "{contact:?}");
 }
 
@@ -307,11 +307,11 @@ fn what_is_no_garment_is_refused_with_the_reason() {
     assert!(matches!(error, FitError::Extent { unit: Some(Unit::M), .. }), "{error}");
     assert!(error.to_string().contains("the body is"), "{error}");
 
-    // A ring around the head, where it is worn.
+    // A ring around the head.
     let head = body.joint_template[15];
     let ring = tube(0.11, 0.05, 24, 3);
     let hat: Vec<[f64; 3]> =
         ring.positions().iter().map(|p| [p[0], p[1] + head[1] + 0.1, p[2] + head[2]]).collect();
     let error = refused(&mesh(&ring.with_positions(hat).unwrap()), &metres);
-    assert_eq!(error, FitError::Worn { place: "worn on the head" });
+    assert_eq!(error, FitError::OffTrunk { place: "it covers the head only" });
 }

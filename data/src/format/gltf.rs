@@ -8,10 +8,9 @@ mod buffers;
 mod document;
 mod write;
 
-pub use write::{GlbError, SceneMesh, encode_glb, save_glb};
+pub use write::{SceneMesh, encode_glb, save_glb};
 
-use super::mesh::{PolygonMesh, check_count};
-use crate::asset::body::transform;
+use super::polygon_mesh::{PolygonMesh, check_count};
 use buffers::Buffers;
 use document::{Document, Node, Primitive};
 use std::collections::HashMap;
@@ -141,6 +140,10 @@ fn product(a: &Affine, b: &Affine) -> Affine {
             if c == 3 { linear + a[r][3] } else { linear }
         })
     })
+}
+
+fn transform(m: &Affine, p: [f64; 3]) -> [f64; 3] {
+    m.map(|row| row[0] * p[0] + row[1] * p[1] + row[2] * p[2] + row[3])
 }
 
 fn is_mirrored(m: &Affine) -> bool {

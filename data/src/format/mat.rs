@@ -4,43 +4,13 @@
 //! Read are numbers, text, structures and cells, compressed or not, in either byte order; what else there is (sparse
 //! matrices, functions, objects) is kept as [`MatValue::Other`] with its name.
 
+use super::error::FileError;
 use super::npz::{Array, row_major_from_fortran};
+use super::scalar::Scalar;
 use flate2::read::ZlibDecoder;
 use std::fs;
 use std::io::Read;
-use std::path::{Path, PathBuf};
-use thiserror::Error;
-
-/// Why a MAT file cannot be used.
-#[derive(Debug, Error)]
-pub enum MatError {
-    /// The file cannot be read.
-    #[error("{}: {reason}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        reason: std::io::Error,
-    },
-    /// Not a MAT file of level 5.
-    #[error("{}: not a MAT-5 file ({reason})", path.display())]
-    NotMat5 {
-        /// The file.
-        path: PathBuf,
-        /// What it is instead, with a hint.
-        reason: String,
-    },
-    /// An element is damaged.
-    #[error("{}: {element} is damaged: {reason}", path.display())]
-    Damaged {
-        /// The file.
-        path: PathBuf,
-        /// Name of the variable, or its number.
-        element: String,
-        /// What is wrong.
-        reason: String,
-    },
-}
+use std::path::Path;
 
 /// The value of a variable, a field or a cell.
 #[derive(Clone, Debug, PartialEq)]
@@ -94,7 +64,7 @@ pub struct MatFile {
 }
 
 const HEADER: usize = 128;
-/// Metadata files are small; whatever decompresses to more than this is an attack or a mistake [bytes].
+/// Metadata files are small; whatever decompresses to more than this is an attack or a mistake (bytes).
 const LARGEST: u64 = 1 << 28;
 const DEEPEST: usize = 32;
 /// Codes of the data types ("mi…" in the format's description).
@@ -105,10 +75,10 @@ impl MatFile {
     /// Reads a file.
     ///
     /// # Errors
-    /// [`MatError`] naming file and variable.
-    pub fn load(path: &Path) -> Result<Self, MatError> {
-        let failed = |reason| MatError::Io { path: path.into(), reason };
-        let file = fs::File::open(path).map_err(failed)?;
+    /// [`FileError`] naming file and variable.
+    pub fn load(path: &Path) -> Result<Self, FileError> {
+        let failed = FileError::io(path);
+        let file = fs::File::open(path).map_err(&failed)?;
         let mut bytes = Vec::new();
         file.take(LARGEST + 1).read_to_end(&mut bytes).map_err(failed)?;
         Self::parse(&bytes, path)
@@ -117,9 +87,10 @@ impl MatFile {
     /// Parses the bytes of a file; `path` is for messages only.
     ///
     /// # Errors
-    /// [`MatError`] naming file and variable.
-    pub fn parse(bytes: &[u8], path: &Path) -> Result<Self, MatError> {
-        let not = |reason: &str| MatError::NotMat5 { path: path.into(), reason: reason.into() };
+    /// [`FileError`] naming file and variable.
+    pub fn parse(bytes: &[u8], path: &Path) -> Result<Self, FileError> {
+        let wrong = FileError::content(path);
+        let not = |reason: &str| wrong(format!("not a MAT-5 file ({reason})"));
         if bytes.len() as u64 > LARGEST {
             return Err(not("larger than 256 MiB"));
         }
@@ -139,7 +110,7 @@ impl MatFile {
             let damaged = |(name, reason): (String, String)| {
                 let element =
                     if name.is_empty() { format!("variable {number}") } else { format!("variable '{name}'") };
-                MatError::Damaged { path: path.into(), element, reason }
+                wrong(format!("{element} is damaged: {reason}"))
             };
             let unnamed = |reason| damaged((String::new(), reason));
             let (kind, data) = rest.element().map_err(unnamed)?;
@@ -220,28 +191,20 @@ impl<'a> Reader<'a> {
 
 /// The cells of a numeric element.
 fn numbers(kind: u32, data: &[u8], big: bool) -> Result<Vec<f64>, String> {
-    let (width, convert): (usize, fn([u8; 8]) -> f64) = match kind {
-        1 => (1, |b| f64::from(b[0] as i8)),
-        2 | 16 => (1, |b| f64::from(b[0])),
-        3 => (2, |b| f64::from(i16::from_le_bytes([b[0], b[1]]))),
-        4 | 17 => (2, |b| f64::from(u16::from_le_bytes([b[0], b[1]]))),
-        5 => (4, |b| f64::from(i32::from_le_bytes([b[0], b[1], b[2], b[3]]))),
-        6 | 18 => (4, |b| f64::from(u32::from_le_bytes([b[0], b[1], b[2], b[3]]))),
-        7 => (4, |b| f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]]))),
-        9 => (8, f64::from_le_bytes),
-        12 => (8, |b| i64::from_le_bytes(b) as f64),
-        13 => (8, |b| u64::from_le_bytes(b) as f64),
+    let scalar = match kind {
+        1 => Scalar::I8,
+        2 | 16 => Scalar::U8,
+        3 => Scalar::I16,
+        4 | 17 => Scalar::U16,
+        5 => Scalar::I32,
+        6 | 18 => Scalar::U32,
+        7 => Scalar::F32,
+        9 => Scalar::F64,
+        12 => Scalar::I64,
+        13 => Scalar::U64,
         _ => return Err(format!("data type {kind} is not numeric")),
     };
-    let cells = data.chunks_exact(width).map(|cell| {
-        let mut little = [0u8; 8];
-        little[..width].copy_from_slice(cell);
-        if big {
-            little[..width].reverse();
-        }
-        convert(little)
-    });
-    Ok(cells.collect())
+    Ok(data.chunks_exact(scalar.bytes()).map(|cell| scalar.read(cell, big)).collect())
 }
 
 /// Name and value of a matrix element. The error carries the name, as far as it was read.

@@ -1,20 +1,25 @@
 //! File formats. Each reader names file, element or line, and what to do, when it refuses something.
 
 pub mod atomic;
-pub mod bvh;
+mod error;
+pub mod folder;
 mod gltf;
+mod load_mesh;
 pub mod mat;
-pub mod mesh;
 pub mod npz;
 pub mod obj;
 pub mod pc16;
 mod ply;
+mod polygon_mesh;
+mod scalar;
 mod stl;
+pub mod toml_file;
 
-pub use bvh::{Bvh, BvhError};
-pub use gltf::{GlbError, SceneMesh, encode_glb, save_glb};
-pub use mat::{MatError, MatFile, MatValue};
-pub use mesh::{MeshFileError, MeshFormat, PolygonMesh, load_mesh, load_tri_mesh};
-pub use npz::{Array, NpzError, NpzFile, NpzWriter};
-pub use obj::{ObjError, ObjMesh};
-pub use pc16::{PointCache, PointCacheError};
+pub use error::FileError;
+pub use gltf::{SceneMesh, encode_glb, save_glb};
+pub use load_mesh::{MESH_EXTENSIONS, MeshFormat, is_mesh_path, load_mesh, load_tri_mesh, parse_mesh};
+pub use mat::{MatFile, MatValue};
+pub use npz::{Array, NpzFile, NpzWriter};
+pub use obj::ObjMesh;
+pub use pc16::PointCache;
+pub use polygon_mesh::{MAX_ELEMENTS, MAX_FILE_BYTES, PolygonMesh};

@@ -2,16 +2,17 @@
 //!
 //! Object arrays are Python pickles, that is, programs; they are listed but never read.
 
+use super::error::FileError;
+use super::scalar::Scalar;
 use npyz::{DType, Endianness, NpyHeader, Order, TypeChar, TypeStr};
+use std::fmt::Display;
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 use zip::ZipArchive;
 
-mod error;
 mod writer;
 
-pub use error::NpzError;
 pub use writer::NpzWriter;
 
 /// A dense array, row-major whatever the order in the file was.
@@ -41,10 +42,14 @@ impl NpzFile {
     ///
     /// # Errors
     /// If the file cannot be opened or is not a zip archive.
-    pub fn open(path: &Path) -> Result<Self, NpzError> {
-        let file = File::open(path).map_err(|reason| NpzError::Io { path: path.into(), reason })?;
+    pub fn open(path: &Path) -> Result<Self, FileError> {
+        let file = File::open(path).map_err(FileError::io(path))?;
         let archive = ZipArchive::new(BufReader::new(file))
-            .map_err(|e| NpzError::NotAnArchive { path: path.into(), reason: e.to_string() })?;
+            .map_err(|e| {
+                FileError::content(path)(format!(
+                    "not an npz archive ({e}); npz files are zip archives made by numpy.savez, and pickles (.pkl) are never executed"
+                ))
+            })?;
         Ok(Self { path: path.into(), archive })
     }
 
@@ -67,36 +72,57 @@ impl NpzFile {
         self.archive.index_for_name(&npyz::npz::file_name_from_array_name(key)).is_some()
     }
 
-    /// Whether the array of that name is an object array, that is, a Python pickle; reads its header only.
+    /// Whether the array of that name is an object array, that is, a Python pickle.
     pub fn is_pickled(&mut self, key: &str) -> bool {
-        let Some(index) = self.archive.index_for_name(&npyz::npz::file_name_from_array_name(key)) else {
-            return false;
-        };
-        let header = self.archive.by_index(index).ok().and_then(|mut member| read_header(&mut member).ok());
-        header.is_some_and(|h| matches!(h.dtype(), DType::Plain(kind) if kind.uses_pickled_array()))
+        let header = self.header(key, "");
+        header.is_ok_and(|h| matches!(h.dtype(), DType::Plain(kind) if kind.uses_pickled_array()))
     }
 
-    /// The shape of an array; reads its header only.
+    /// Whether the array of that name is text.
+    fn is_text(&mut self, key: &str) -> Result<bool, FileError> {
+        let header = self.header(key, "")?;
+        let is_text = |kind: &TypeStr| matches!(kind.type_char(), TypeChar::ByteStr | TypeChar::UnicodeStr);
+        Ok(matches!(header.dtype(), DType::Plain(kind) if is_text(&kind)))
+    }
+
+    /// The shape of an array.
     ///
     /// # Errors
-    /// [`NpzError`] naming file and key.
-    pub fn shape(&mut self, key: &str) -> Result<Vec<usize>, NpzError> {
-        let Some(index) = self.archive.index_for_name(&npyz::npz::file_name_from_array_name(key)) else {
-            let (key, hint) = (key.into(), String::new());
-            return Err(NpzError::Missing { path: self.path.clone(), key, hint, present: self.keys() });
-        };
-        let header = (self.archive.by_index(index).map_err(|e| e.to_string()))
-            .and_then(|mut member| read_header(&mut member).map_err(|e| e.to_string()));
-        let shape =
-            header.map(|h| h.shape().iter().map(|n| usize::try_from(*n).unwrap_or(usize::MAX)).collect());
-        shape.map_err(|reason| NpzError::Damaged { path: self.path.clone(), key: key.into(), reason })
+    /// [`FileError`] naming file and key.
+    pub fn shape(&mut self, key: &str) -> Result<Vec<usize>, FileError> {
+        let header = self.header(key, "")?;
+        Ok(header.shape().iter().map(|n| usize::try_from(*n).unwrap_or(usize::MAX)).collect())
+    }
+
+    /// The header of an array.
+    fn header(&mut self, key: &str, hint: &str) -> Result<NpyHeader, FileError> {
+        let damaged = damaged(&self.path, key);
+        let mut member = self.archive.by_index(self.index(key, hint)?).map_err(|e| damaged(e.to_string()))?;
+        read_header(&mut member).map_err(|e| damaged(e.to_string()))
+    }
+
+    fn index(&self, key: &str, hint: &str) -> Result<usize, FileError> {
+        let index = self.archive.index_for_name(&npyz::npz::file_name_from_array_name(key));
+        index.ok_or_else(|| {
+            let present = self.keys().join(", ");
+            self.wrong(format!("key '{key}' is missing; {hint}; keys present: {present}"))
+        })
+    }
+
+    fn wrong(&self, message: String) -> FileError {
+        FileError::content(&self.path)(message)
+    }
+
+    /// An array has another shape than `expected`.
+    pub fn wrong_shape(&self, key: &str, found: &[usize], expected: &str) -> FileError {
+        self.wrong(format!("key '{key}' has shape {found:?}, expected {expected}"))
     }
 
     /// A numeric or boolean array, converted to `f64`. `hint` says what kind of file was expected, should the key be missing.
     ///
     /// # Errors
-    /// [`NpzError`] naming file and key.
-    pub fn numbers(&mut self, key: &str, hint: &str) -> Result<Array<f64>, NpzError> {
+    /// [`FileError`] naming file and key.
+    pub fn numbers(&mut self, key: &str, hint: &str) -> Result<Array<f64>, FileError> {
         let raw = self.raw(key, hint)?;
         self.decode(key, raw, |x| x)
     }
@@ -104,8 +130,8 @@ impl NpzFile {
     /// As [`Self::numbers`], converted to `f32`: half the memory for large arrays.
     ///
     /// # Errors
-    /// [`NpzError`] naming file and key.
-    pub fn numbers_f32(&mut self, key: &str, hint: &str) -> Result<Array<f32>, NpzError> {
+    /// [`FileError`] naming file and key.
+    pub fn numbers_f32(&mut self, key: &str, hint: &str) -> Result<Array<f32>, FileError> {
         let raw = self.raw(key, hint)?;
         self.decode(key, raw, |x| x as f32)
     }
@@ -113,8 +139,8 @@ impl NpzFile {
     /// An array of text (`<U…`) or bytes (`|S…`), as strings.
     ///
     /// # Errors
-    /// [`NpzError`] naming file and key.
-    pub fn strings(&mut self, key: &str, hint: &str) -> Result<Array<String>, NpzError> {
+    /// [`FileError`] naming file and key.
+    pub fn strings(&mut self, key: &str, hint: &str) -> Result<Array<String>, FileError> {
         let raw = self.raw(key, hint)?;
         let width = raw.kind.num_bytes().unwrap_or(0).max(1);
         let big = raw.kind.endianness() == Endianness::Big;
@@ -135,38 +161,42 @@ impl NpzFile {
         let data: Option<Vec<String>> = raw.bytes.chunks_exact(width).map(text).collect();
         match data {
             Some(data) => Ok(Array { data: to_row_major(data, &raw.shape, raw.order), shape: raw.shape }),
-            None => Err(self.kind_error(key, &raw.kind, "text (<U or |S)")),
+            None => Err(self.wrong_kind(key, &raw.kind, "text (<U or |S)")),
         }
     }
 
-    fn kind_error(&self, key: &str, kind: &TypeStr, expected: &'static str) -> NpzError {
-        NpzError::Kind { path: self.path.clone(), key: key.into(), found: format!("{kind}"), expected }
+    /// The first text of an array; `None` where there is no array of that name, or none of text.
+    ///
+    /// # Errors
+    /// [`FileError`] naming file and key of an array that is damaged.
+    pub fn text(&mut self, key: &str) -> Result<Option<String>, FileError> {
+        Ok(self.texts(key)?.and_then(|texts| texts.into_iter().next()))
     }
 
-    fn raw(&mut self, key: &str, hint: &str) -> Result<RawArray, NpzError> {
-        let path = self.path.clone();
-        let damaged = |reason: String| NpzError::Damaged { path: path.clone(), key: key.into(), reason };
-        let Some(index) = self.archive.index_for_name(&npyz::npz::file_name_from_array_name(key)) else {
-            let (key, hint) = (key.into(), hint.into());
-            return Err(NpzError::Missing { path: self.path.clone(), key, hint, present: self.keys() });
-        };
-        let mut member = self.archive.by_index(index).map_err(|e| damaged(e.to_string()))?;
-        let header = read_header(&mut member).map_err(|e| damaged(e.to_string()))?;
+    /// As [`Self::text`], all of them.
+    ///
+    /// # Errors
+    /// As [`Self::text`].
+    pub fn texts(&mut self, key: &str) -> Result<Option<Vec<String>>, FileError> {
+        if !self.contains(key) || !self.is_text(key)? {
+            return Ok(None);
+        }
+        Ok(Some(self.strings(key, "")?.data))
+    }
+
+    fn wrong_kind(&self, key: &str, found: impl Display, expected: &str) -> FileError {
+        self.wrong(format!("key '{key}' has dtype {found}, expected {expected}"))
+    }
+
+    fn raw(&mut self, key: &str, hint: &str) -> Result<RawArray, FileError> {
+        let damaged = damaged(&self.path, key);
+        let header = self.header(key, hint)?;
         let DType::Plain(kind) = header.dtype() else {
-            return Err(NpzError::Kind {
-                path: self.path.clone(),
-                key: key.into(),
-                found: header.dtype().descr(),
-                expected: "a plain array, not a structured one",
-            });
+            return Err(self.wrong_kind(key, header.dtype().descr(), "a plain array, not a structured one"));
         };
         if kind.uses_pickled_array() {
-            return Err(NpzError::Kind {
-                path: self.path.clone(),
-                key: key.into(),
-                found: "object (a Python pickle)".into(),
-                expected: "plain numbers or text; pickles are never executed",
-            });
+            let expected = "plain numbers or text; pickles are never executed";
+            return Err(self.wrong_kind(key, "object (a Python pickle)", expected));
         }
         let width = kind.num_bytes().ok_or_else(|| damaged(format!("dtype {kind} has no size")))?;
         let shape: Option<Vec<usize>> = header.shape().iter().map(|n| usize::try_from(*n).ok()).collect();
@@ -179,6 +209,8 @@ impl NpzFile {
         };
         let count = count.filter(|bytes| *bytes <= most);
         let count = count.ok_or_else(|| damaged(format!("shape {shape:?} does not fit in memory")))?;
+        let mut member = self.archive.by_index(self.index(key, hint)?).map_err(|e| damaged(e.to_string()))?;
+        read_header(&mut member).map_err(|e| damaged(e.to_string()))?;
         // Grows with what is there, so that a lying header cannot reserve memory.
         let mut bytes = Vec::new();
         member.take(count as u64).read_to_end(&mut bytes).map_err(|e| damaged(e.to_string()))?;
@@ -188,22 +220,30 @@ impl NpzFile {
         Ok(RawArray { kind, shape, order: header.order(), bytes })
     }
 
-    fn decode<T: Copy>(&self, key: &str, raw: RawArray, convert: fn(f64) -> T) -> Result<Array<T>, NpzError> {
+    fn decode<T: Copy>(
+        &self,
+        key: &str,
+        raw: RawArray,
+        convert: fn(f64) -> T,
+    ) -> Result<Array<T>, FileError> {
         let width = raw.kind.num_bytes().unwrap_or(0);
-        let Some(number) = number_reader(raw.kind.type_char(), width) else {
-            return Err(self.kind_error(key, &raw.kind, "integers or floats of at most 64 bits"));
+        let Some(scalar) = scalar_type(raw.kind.type_char(), width) else {
+            return Err(self.wrong_kind(key, &raw.kind, "integers or floats of at most 64 bits"));
         };
         let big = raw.kind.endianness() == Endianness::Big;
-        let data = raw.bytes.chunks_exact(width.max(1)).map(|cell| {
-            let mut little = [0u8; 8];
-            little[..width].copy_from_slice(cell);
-            if big {
-                little[..width].reverse();
-            }
-            convert(number(little))
+        let is_truth_value = raw.kind.type_char() == TypeChar::Bool;
+        let data = raw.bytes.chunks_exact(width).map(|cell| {
+            let number = scalar.read(cell, big);
+            convert(if is_truth_value { f64::from(u8::from(number != 0.0)) } else { number })
         });
         Ok(Array { data: to_row_major(data.collect(), &raw.shape, raw.order), shape: raw.shape })
     }
+}
+
+/// What is wrong with the array of `key`, for `map_err`.
+fn damaged(path: &Path, key: &str) -> impl Fn(String) -> FileError + use<> {
+    let (path, key) = (path.to_path_buf(), key.to_string());
+    move |reason| FileError::content(&path)(format!("key '{key}' cannot be read: {reason}"))
 }
 
 /// More numbers than any model or motion holds (SMPL-X's largest array has 15 million); a deflated file of a few kilobytes
@@ -238,18 +278,20 @@ fn read_header(member: &mut impl Read) -> std::io::Result<NpyHeader> {
     NpyHeader::from_reader(&bytes[..])
 }
 
-/// The conversion of one little-endian cell, zero-padded to eight bytes.
-fn number_reader(kind: TypeChar, width: usize) -> Option<fn([u8; 8]) -> f64> {
+/// How the numbers of an array are stored; truth values as bytes.
+fn scalar_type(kind: TypeChar, width: usize) -> Option<Scalar> {
     Some(match (kind, width) {
-        (TypeChar::Bool, 1) => |b| f64::from(u8::from(b[0] != 0)),
-        (TypeChar::Int, 1) => |b| f64::from(b[0] as i8),
-        (TypeChar::Int, 2) => |b| f64::from(i16::from_le_bytes([b[0], b[1]])),
-        (TypeChar::Int, 4) => |b| f64::from(i32::from_le_bytes([b[0], b[1], b[2], b[3]])),
-        (TypeChar::Int, 8) => |b| i64::from_le_bytes(b) as f64,
-        (TypeChar::Uint, 1 | 2 | 4 | 8) => |b| u64::from_le_bytes(b) as f64,
-        (TypeChar::Float, 2) => |b| half::f16::from_le_bytes([b[0], b[1]]).to_f64(),
-        (TypeChar::Float, 4) => |b| f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]])),
-        (TypeChar::Float, 8) => f64::from_le_bytes,
+        (TypeChar::Int, 1) => Scalar::I8,
+        (TypeChar::Bool | TypeChar::Uint, 1) => Scalar::U8,
+        (TypeChar::Int, 2) => Scalar::I16,
+        (TypeChar::Uint, 2) => Scalar::U16,
+        (TypeChar::Int, 4) => Scalar::I32,
+        (TypeChar::Uint, 4) => Scalar::U32,
+        (TypeChar::Int, 8) => Scalar::I64,
+        (TypeChar::Uint, 8) => Scalar::U64,
+        (TypeChar::Float, 2) => Scalar::F16,
+        (TypeChar::Float, 4) => Scalar::F32,
+        (TypeChar::Float, 8) => Scalar::F64,
         _ => return None,
     })
 }
@@ -264,7 +306,7 @@ pub(super) fn row_major_from_fortran<T: Clone>(data: Vec<T>, shape: &[usize]) ->
         return data;
     }
     // Walk the row-major positions; the first axis has stride one in Fortran order.
-    let strides: Vec<usize> = shape.iter().scan(1, |s, n| Some(std::mem::replace(s, *s * n))).collect();
+    let steps: Vec<usize> = shape.iter().scan(1, |s, n| Some(std::mem::replace(s, *s * n))).collect();
     let mut index = vec![0; shape.len()];
     let mut source = 0;
     (0..data.len())
@@ -272,11 +314,11 @@ pub(super) fn row_major_from_fortran<T: Clone>(data: Vec<T>, shape: &[usize]) ->
             let value = data[source].clone();
             for axis in (0..shape.len()).rev() {
                 index[axis] += 1;
-                source += strides[axis];
+                source += steps[axis];
                 if index[axis] < shape[axis] {
                     break;
                 }
-                source -= strides[axis] * shape[axis];
+                source -= steps[axis] * shape[axis];
                 index[axis] = 0;
             }
             value

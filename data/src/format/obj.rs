@@ -8,42 +8,14 @@ mod statements;
 pub use moved::MovedObj;
 
 use super::atomic;
-use super::mesh::{MeshFileError, PolygonMesh, check_count, fan, read_limited};
+use super::error::FileError;
+use super::polygon_mesh::{NO_FACES, PolygonMesh, check_count, read_limited};
+use crate::mesh::fan;
 use clothcombo_physics::mesh::TriMesh;
 use statements::{Statement, statements};
 use std::collections::HashMap;
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
-use thiserror::Error;
-
-/// Why an OBJ file cannot be used.
-#[derive(Debug, Error)]
-pub enum ObjError {
-    /// The file cannot be read or written.
-    #[error("{}: {reason}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        reason: std::io::Error,
-    },
-    /// A line is wrong.
-    #[error("{}:{line}: {message}", path.display())]
-    Line {
-        /// The file.
-        path: PathBuf,
-        /// The line, from 1; the first one of a statement that goes over several.
-        line: usize,
-        /// What is wrong with it.
-        message: String,
-    },
-    /// No faces.
-    #[error("{}: no faces; a point cloud is not a garment or body", path.display())]
-    Empty {
-        /// The file.
-        path: PathBuf,
-    },
-}
+use std::path::Path;
 
 /// An OBJ file: positions as written, polygons with three or more corners, and the group each polygon is in.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -64,24 +36,24 @@ impl ObjMesh {
     /// Parses OBJ text; `path` is for messages only. A face may name one vertex twice.
     ///
     /// # Errors
-    /// [`ObjError`] naming file and line.
-    pub fn parse(text: &str, path: &Path) -> Result<Self, ObjError> {
+    /// [`FileError`] naming file and line.
+    pub fn parse(text: &str, path: &Path) -> Result<Self, FileError> {
         Self::parse_bytes(text.as_bytes(), path)
     }
 
     /// As [`Self::parse`]. Names and comments may be in any encoding; numbers are ASCII.
-    pub(super) fn parse_bytes(bytes: &[u8], path: &Path) -> Result<Self, ObjError> {
+    pub(super) fn parse_bytes(bytes: &[u8], path: &Path) -> Result<Self, FileError> {
         let mut mesh = Self { groups: vec![String::new()], ..Self::default() };
         let mut group = 0;
         let mut number_of_group = HashMap::from([(String::new(), 0)]);
         for Statement { line, text, .. } in statements(bytes) {
             let text = String::from_utf8_lossy(&text);
             let mut words = text.split('#').next().unwrap_or_default().split_ascii_whitespace();
-            let wrong = |message: String| ObjError::Line { path: path.into(), line, message };
+            let wrong = FileError::line(path, line);
             match words.next() {
                 Some("v") => {
-                    check_count("vertices", mesh.positions.len() + 1).map_err(wrong)?;
-                    mesh.positions.push(vertex(words).map_err(wrong)?);
+                    check_count("vertices", mesh.positions.len() + 1).map_err(&wrong)?;
+                    mesh.positions.push(vertex(words).map_err(&wrong)?);
                 }
                 Some("f") => {
                     check_count("faces", mesh.polygons.len() + 1).map_err(&wrong)?;
@@ -89,10 +61,8 @@ impl ObjMesh {
                         words.map(|word| corner(word, mesh.positions.len())).collect();
                     let polygon = polygon.map_err(&wrong)?;
                     if polygon.len() < 3 {
-                        return Err(wrong(format!(
-                            "a face needs at least 3 corners, this one has {}",
-                            polygon.len()
-                        )));
+                        let count = polygon.len();
+                        return Err(wrong(format!("a face needs at least 3 corners, this one has {count}")));
                     }
                     mesh.polygons.push(polygon);
                     mesh.group_of_polygon.push(group);
@@ -111,14 +81,14 @@ impl ObjMesh {
         // Faces may come before their vertices, so the range is checked at the end.
         let count = mesh.positions.len();
         for (polygon, line) in mesh.polygons.iter().zip(&mesh.lines) {
-            let wrong = |message: String| ObjError::Line { path: path.into(), line: *line as usize, message };
             if let Some(index) = polygon.iter().find(|i| **i as usize >= count) {
                 let index = u64::from(*index) + 1;
-                return Err(wrong(format!("face names vertex {index}, but the file has {count} vertices")));
+                let message = format!("face names vertex {index}, but the file has {count} vertices");
+                return Err(FileError::line(path, *line as usize)(message));
             }
         }
         if mesh.polygons.is_empty() {
-            return Err(ObjError::Empty { path: path.into() });
+            return Err(FileError::content(path)(NO_FACES));
         }
         Ok(mesh)
     }
@@ -183,8 +153,8 @@ fn corner(word: &str, vertices_so_far: usize) -> Result<u32, String> {
 /// Reads an OBJ file as a triangle mesh.
 ///
 /// # Errors
-/// [`MeshFileError`] naming file and line.
-pub fn load(path: &Path) -> Result<TriMesh, MeshFileError> {
+/// [`FileError`] naming file and line.
+pub fn load(path: &Path) -> Result<TriMesh, FileError> {
     ObjMesh::parse_bytes(&read_limited(path)?, path)?.into_polygon_mesh().to_tri_mesh(path)
 }
 
@@ -197,7 +167,7 @@ pub fn save(
     positions: &[[f64; 3]],
     faces: &[[u32; 3]],
     comments: &[String],
-) -> Result<(), ObjError> {
+) -> Result<(), FileError> {
     save_polygons(path, positions, faces.iter().map(|f| f.as_slice()), comments)
 }
 
@@ -210,7 +180,7 @@ pub fn save_polygons<'a>(
     positions: &[[f64; 3]],
     polygons: impl IntoIterator<Item = &'a [u32]>,
     comments: &[String],
-) -> Result<(), ObjError> {
+) -> Result<(), FileError> {
     let mut text = String::with_capacity(positions.len() * 64);
     for comment in comments {
         for line in comment.lines() {
@@ -227,7 +197,7 @@ pub fn save_polygons<'a>(
         }
         text.push('\n');
     }
-    atomic::write(path, text.as_bytes()).map_err(|reason| ObjError::Io { path: path.into(), reason })
+    atomic::write(path, text.as_bytes()).map_err(FileError::io(path))
 }
 
 #[cfg(test)]

@@ -2,44 +2,22 @@
 //!
 //! Own reader: every count of the header is checked against the bytes that follow before memory is taken for it.
 
-use super::mesh::{PolygonMesh, check_count};
+use super::polygon_mesh::{PolygonMesh, check_count};
+use super::scalar::Scalar;
 
-/// Scalar types under both of their names.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Scalar {
-    I8,
-    U8,
-    I16,
-    U16,
-    I32,
-    U32,
-    F32,
-    F64,
-}
-
-impl Scalar {
-    fn parse(name: &str) -> Option<Self> {
-        Some(match name {
-            "char" | "int8" => Self::I8,
-            "uchar" | "uint8" => Self::U8,
-            "short" | "int16" => Self::I16,
-            "ushort" | "uint16" => Self::U16,
-            "int" | "int32" => Self::I32,
-            "uint" | "uint32" => Self::U32,
-            "float" | "float32" => Self::F32,
-            "double" | "float64" => Self::F64,
-            _ => return None,
-        })
-    }
-
-    fn bytes(self) -> usize {
-        match self {
-            Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
-            Self::I32 | Self::U32 | Self::F32 => 4,
-            Self::F64 => 8,
-        }
-    }
+/// A scalar type under either of its names.
+fn scalar_type(name: &str) -> Option<Scalar> {
+    Some(match name {
+        "char" | "int8" => Scalar::I8,
+        "uchar" | "uint8" => Scalar::U8,
+        "short" | "int16" => Scalar::I16,
+        "ushort" | "uint16" => Scalar::U16,
+        "int" | "int32" => Scalar::I32,
+        "uint" | "uint32" => Scalar::U32,
+        "float" | "float32" => Scalar::F32,
+        "double" | "float64" => Scalar::F64,
+        _ => return None,
+    })
 }
 
 #[derive(Debug)]
@@ -81,24 +59,9 @@ impl Values<'_> {
             return self.next_word();
         }
         let size = scalar.bytes();
-        let raw = self.bytes.get(self.at..self.at + size).ok_or("the file ends here (truncated?)")?;
+        let cell = self.bytes.get(self.at..self.at + size).ok_or("the file ends here (truncated?)")?;
         self.at += size;
-        let mut little = [0u8; 8];
-        little[..size].copy_from_slice(raw);
-        if self.encoding == Encoding::Big {
-            little[..size].reverse();
-        }
-        let [a, b, c, d, ..] = little;
-        Ok(match scalar {
-            Scalar::I8 => f64::from(a as i8),
-            Scalar::U8 => f64::from(a),
-            Scalar::I16 => f64::from(i16::from_le_bytes([a, b])),
-            Scalar::U16 => f64::from(u16::from_le_bytes([a, b])),
-            Scalar::I32 => f64::from(i32::from_le_bytes([a, b, c, d])),
-            Scalar::U32 => f64::from(u32::from_le_bytes([a, b, c, d])),
-            Scalar::F32 => f64::from(f32::from_le_bytes([a, b, c, d])),
-            Scalar::F64 => f64::from_le_bytes(little),
-        })
+        Ok(scalar.read(cell, self.encoding == Encoding::Big))
     }
 
     fn next_word(&mut self) -> Result<f64, String> {
@@ -261,7 +224,7 @@ fn header(bytes: &[u8]) -> Result<(Encoding, Vec<Element>, usize), String> {
             ["property", ref words @ ..] => {
                 let element = elements.last_mut().ok_or_else(|| wrong("property without element".into()))?;
                 let scalar = |name: &str| {
-                    Scalar::parse(name).ok_or_else(|| wrong(format!("unknown scalar type '{name}'")))
+                    scalar_type(name).ok_or_else(|| wrong(format!("unknown scalar type '{name}'")))
                 };
                 let property = match *words {
                     ["list", list, value, name] => {

@@ -1,6 +1,6 @@
 //! STL (stereolithography), ASCII and binary. Triangles without shared vertices: corners at the same position become one.
 
-use super::mesh::{PolygonMesh, check_count};
+use super::polygon_mesh::{PolygonMesh, check_count};
 use std::collections::HashMap;
 
 /// Bytes before the triangles of a binary file: 80 of header, 4 of count.

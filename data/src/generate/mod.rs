@@ -3,16 +3,10 @@
 mod field;
 pub mod garment;
 mod isosurface;
-pub(crate) mod labelled_triangles;
 pub mod mannequin;
 mod parts;
 pub mod pose;
-pub(crate) mod remesh;
-pub(crate) mod sheet;
 
-pub use garment::{
-    GarmentDesign, GarmentError, GarmentGenerator, GarmentQuality, GarmentSettings, GeneratedGarment, Survey,
-    generate_garment,
-};
+pub use garment::{GarmentDesign, GarmentError, GarmentGenerator, GarmentSettings};
 pub use mannequin::mannequin;
 pub use pose::{PoseAugmentation, PoseSampler, SelfContact};

@@ -3,42 +3,33 @@
 //! Mahmood et al., "AMASS: Archive of Motion Capture as Surface Shapes", 2019. The first 66 numbers of a row of `poses` are
 //! the root and the 21 body joints in either layout; hands, jaw, eyes, soft tissue, shape and translation are left out, because
 //! clothes are draped about the pelvis of a body of their own. The world's z axis is up there; the turn to y up goes into
-//! the root. The heading stays in the root, as in every motion file here; whoever draws poses removes it.
+//! the root. The heading stays in the root, as in every motion file here; whoever samples poses removes it.
 
-use super::motions::{Clip, Input, MotionImportError, named, stem, write_motions};
+use super::motions::{Clip, NamedFile, named, stem, write_motions};
+use super::summary::{ImportError, Progress, Summary};
 use super::thinning::{Thinned, Thinning, thin};
-use super::{Progress, Summary};
-use crate::asset::motion::{MotionError, along_z, stands_along_z};
+use crate::asset::motion::{along_z, stands_along_z};
 use crate::asset::rotation::{Matrix3, axis_angle_from_matrix, matrix_from_axis_angle, product};
 use crate::asset::{Motion, Pose, Provenance};
 use crate::check::impossible_turn;
-use crate::format::{NpzError, NpzFile};
+use crate::format::{FileError, NpzFile, folder};
 use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
-
-/// Which world axis is up in the files.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum UpAxis {
-    /// y, as here.
-    Y,
-    /// z, as AMASS and CLOTH3D have it.
-    Z,
-}
 
 /// How motions are imported.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AmassSettings {
     /// Which frames are kept.
     pub thinning: Thinning,
-    /// The files' up axis.
-    pub up: UpAxis,
+    /// Whether z is up in the files, as AMASS and CLOTH3D have it, instead of y.
+    pub z_up: bool,
 }
 
 impl Default for AmassSettings {
     fn default() -> Self {
         let thinning = Thinning { frame_rate: 30.0, static_threshold: 0.5f64.to_radians() };
-        Self { thinning, up: UpAxis::Z }
+        Self { thinning, z_up: true }
     }
 }
 
@@ -66,8 +57,8 @@ pub fn import_amass(
     out: &Path,
     settings: &AmassSettings,
     progress: Progress<'_>,
-) -> Result<Summary, MotionImportError> {
-    let mut files: Vec<Input> = Vec::new();
+) -> Result<Summary, ImportError> {
+    let mut files: Vec<NamedFile> = Vec::new();
     progress("looking for motions", 0, 1);
     for input in inputs {
         let mut found = Vec::new();
@@ -76,13 +67,13 @@ pub fn import_amass(
             fs::canonicalize(out).ok().filter(|out| fs::canonicalize(input).ok().as_ref() != Some(out));
         let mut seen = HashSet::from_iter(below);
         find(input, &mut found, &mut seen, 0)?;
-        files.extend(found.into_iter().map(|path| Input { name: clip_name(input, &path), path }));
+        files.extend(found.into_iter().map(|path| NamedFile { name: clip_name(input, &path), path }));
     }
     progress("looking for motions", 1, 1);
     if files.is_empty() {
         let shown: Vec<String> = inputs.iter().map(|i| i.display().to_string()).collect();
         let where_ = if shown.is_empty() { String::new() } else { format!("{}: ", shown.join(", ")) };
-        return Err(MotionImportError::NoInput { where_, expected: EXPECTED });
+        return Err(ImportError::Refused(format!("{where_}no {EXPECTED} found")));
     }
     let files = named(files.into_iter().map(|f| (f.path, f.name)));
     let import = |file: &Path| import_file(file, settings);
@@ -90,10 +81,7 @@ pub fn import_amass(
     summary.notes.push(format!(
         "kept are the root and the 21 body joints; {}; a frame that differs from the last one kept by less than {:.2}° in \
          every joint is dropped",
-        match settings.up {
-            UpAxis::Z => "the root was turned from z up to y up",
-            UpAxis::Y => "y was taken as the up axis",
-        },
+        if settings.z_up { "the root was turned from z up to y up" } else { "y was taken as the up axis" },
         settings.thinning.static_threshold.to_degrees()
     ));
     Ok(summary)
@@ -105,23 +93,17 @@ fn find(
     found: &mut Vec<PathBuf>,
     seen: &mut HashSet<PathBuf>,
     depth: usize,
-) -> Result<(), MotionImportError> {
-    let failed = |reason| MotionImportError::Io { path: path.into(), reason };
-    if !fs::metadata(path).map_err(failed)?.is_dir() {
+) -> Result<(), FileError> {
+    let failed = FileError::io(path);
+    if !fs::metadata(path).map_err(&failed)?.is_dir() {
         found.push(path.into());
         return Ok(());
     }
-    if depth > DEEPEST || !seen.insert(fs::canonicalize(path).map_err(failed)?) {
+    if depth > DEEPEST || !seen.insert(fs::canonicalize(path).map_err(&failed)?) {
         return Ok(());
     }
-    let mut entries = Vec::new();
-    for entry in fs::read_dir(path).map_err(failed)? {
-        entries.push(entry.map_err(failed)?.path());
-    }
-    entries.sort();
-    for entry in entries {
-        let is_npz = entry.extension().is_some_and(|e| e.eq_ignore_ascii_case("npz"));
-        if entry.is_dir() || is_npz {
+    for entry in folder::entries(path)? {
+        if entry.is_dir() || folder::has_extension(&entry, "npz") {
             find(&entry, found, seen, depth + 1)?;
         }
     }
@@ -154,15 +136,12 @@ fn import_file(path: &Path, settings: &AmassSettings) -> Result<Clip, String> {
         _ => "unknown layout",
     };
     drop(file);
-    let (mut motion, columns) = Motion::load_with_columns(path).map_err(|e| match e {
-        MotionError::Npz(e) => short(e, path),
-        other => strip(&other.to_string(), path),
-    })?;
+    let (mut motion, columns) = Motion::load_with_columns(path).map_err(|e| short(e, path))?;
     if motion.poses.is_empty() {
         return Err("it has no frames".into());
     }
     let rate = motion.frame_rate;
-    if settings.up == UpAxis::Z {
+    if settings.z_up {
         motion.poses.iter_mut().for_each(turn_root_to_y_up);
     }
     let lying = mean_uprightness(&motion.poses);
@@ -172,10 +151,7 @@ fn import_file(path: &Path, settings: &AmassSettings) -> Result<Clip, String> {
     if !subject.is_empty() {
         note.push_str(&format!(", {subject}"));
     }
-    let was_turned_wrongly = match settings.up {
-        UpAxis::Z => looks_y_up(&poses),
-        UpAxis::Y => stands_along_z(&poses),
-    };
+    let was_turned_wrongly = if settings.z_up { looks_y_up(&poses) } else { stands_along_z(&poses) };
     if lying < -0.2 || (lying.abs() < 0.2 && was_turned_wrongly) {
         note.push_str("; the body is not upright on average, check the up axis (--up)");
     }
@@ -201,10 +177,9 @@ fn looks_y_up(poses: &[Pose]) -> bool {
     along_z(poses) < -0.7
 }
 
-/// Text or bytes, also the way Python prints bytes; empty if it is not there or something else.
+/// Text or bytes, also as Python prints bytes; empty if it is not there or something else.
 fn gender(file: &mut NpzFile) -> String {
-    let Ok(array) = file.strings("gender", "") else { return String::new() };
-    let text = array.data.into_iter().next().unwrap_or_default();
+    let text = file.text("gender").ok().flatten().unwrap_or_default();
     let text = text.strip_prefix("b'").and_then(|t| t.strip_suffix('\'')).unwrap_or(&text);
     text.trim().to_ascii_lowercase()
 }
@@ -221,13 +196,9 @@ fn provenance(path: &Path) -> Provenance {
 }
 
 /// The message without the path, which the summary shows beside it.
-fn short(error: NpzError, path: &Path) -> String {
-    strip(&error.to_string(), path)
-}
-
-fn strip(message: &str, path: &Path) -> String {
-    let prefix = format!("{}: ", path.display());
-    message.strip_prefix(&prefix).unwrap_or(message).to_string()
+fn short(error: FileError, path: &Path) -> String {
+    let (message, prefix) = (error.to_string(), format!("{}: ", path.display()));
+    message.strip_prefix(&prefix).unwrap_or(&message).to_string()
 }
 
 #[cfg(test)]

@@ -2,41 +2,21 @@
 //!
 //! The skeletons known are those in `NAMINGS`, named after collections that use them; see [`super::retarget`] for how they are matched.
 
-use super::motions::{
-    Clip, MotionImportError, named, provenance_of, require_body_joints, stem, write_motions,
-};
+mod hierarchy;
+
+pub use hierarchy::{Bvh, BvhJoint, Channel};
+
+use super::motions::{RetargetSettings, Retargeted, write_retargeted};
 use super::retarget::Retarget;
-use super::thinning::{Thinned, Thinning, largest_turn, thin};
-use super::{Progress, Summary};
+use super::summary::{ImportError, Progress, Summary};
+use super::thinning::largest_turn;
 use crate::asset::skeleton::BODY_JOINT_COUNT;
-use crate::asset::{Body, Motion, Pose, Provenance};
-use crate::format::{Bvh, BvhError};
+use crate::asset::{Body, Pose};
 use std::path::{Path, PathBuf};
 
-/// How motion is imported.
-#[derive(Clone, Debug, PartialEq)]
-pub struct BvhImportSettings {
-    /// Every n-th frame is kept, with the n that comes nearest to this rate [frames/s].
-    pub frame_rate: f64,
-    /// Drop a first frame that jumps to the second one by more than this angle [rad] and by more than ten times the usual
-    /// step: some collections insert a T-pose there.
-    pub inserted_frame_angle: f64,
-    /// Where the motions come from; the file itself does not say.
-    pub provenance: Provenance,
-    /// The file that the body came from, which no motion may take the place of.
-    pub body_file: Option<PathBuf>,
-}
-
-impl Default for BvhImportSettings {
-    fn default() -> Self {
-        Self {
-            frame_rate: 60.0,
-            inserted_frame_angle: 0.2,
-            provenance: Provenance::default(),
-            body_file: None,
-        }
-    }
-}
+/// A first frame is dropped that jumps to the second one by more than this angle (rad) and by more than ten times the usual
+/// step: some collections insert a T-pose there.
+const INSERTED_FRAME_ANGLE: f64 = 0.2;
 
 /// A skeleton naming: the BVH joint for each of the 22 body joints, empty where there is none (it then follows its parent).
 struct Naming {
@@ -95,7 +75,7 @@ pub fn retarget(bvh: &Bvh, joints: &[[f64; 3]]) -> Option<Vec<Pose>> {
 }
 
 /// Whether the first frame does not belong to the motion.
-fn first_frame_is_inserted(poses: &[Pose], settings: &BvhImportSettings) -> bool {
+fn first_frame_is_inserted(poses: &[Pose]) -> bool {
     if poses.len() < 3 {
         return false;
     }
@@ -103,7 +83,7 @@ fn first_frame_is_inserted(poses: &[Pose], settings: &BvhImportSettings) -> bool
         poses.windows(2).skip(1).take(200).map(|w| largest_turn(&w[0], &w[1], 1)).collect();
     steps.sort_by(f64::total_cmp);
     let jump = largest_turn(&poses[0], &poses[1], 1);
-    jump > settings.inserted_frame_angle && jump > 10.0 * steps[steps.len() / 2]
+    jump > INSERTED_FRAME_ANGLE && jump > 10.0 * steps[steps.len() / 2]
 }
 
 /// Imports BVH files as motion npz files in the folder `out`, retargeted to `body`. Files that cannot be used are skipped with
@@ -115,21 +95,15 @@ pub fn import_bvh(
     files: &[PathBuf],
     body: &Body,
     out: &Path,
-    settings: &BvhImportSettings,
+    settings: &RetargetSettings,
     progress: Progress<'_>,
-) -> Result<Summary, MotionImportError> {
-    const EXPECTED: &str = "BVH files";
-    if files.is_empty() {
-        return Err(MotionImportError::NoInput { where_: String::new(), expected: EXPECTED });
-    }
-    require_body_joints(body)?;
-    let inputs = named(files.iter().map(|f| (f.clone(), stem(f))));
-    let import = |file: &Path| import_file(file, body, settings);
-    write_motions(&inputs, settings.body_file.as_deref(), out, EXPECTED, &import, progress)
+) -> Result<Summary, ImportError> {
+    let read = |file: &Path| read_file(file, body);
+    write_retargeted(files, body, out, settings, "BVH files", &read, progress)
 }
 
-fn import_file(file: &Path, body: &Body, settings: &BvhImportSettings) -> Result<Clip, String> {
-    let bvh = Bvh::load(file).map_err(|e: BvhError| e.to_string())?;
+fn read_file(file: &Path, body: &Body) -> Result<Retargeted, String> {
+    let bvh = Bvh::load(file).map_err(|e| e.to_string())?;
     let (Some(mut poses), Some((naming, _))) = (retarget(&bvh, &body.joint_template), naming_of(&bvh)) else {
         let known: Vec<&str> = NAMINGS.iter().map(|n| n.name).collect();
         let names: Vec<&str> = bvh.joints.iter().take(6).map(|j| j.name.as_str()).collect();
@@ -139,18 +113,16 @@ fn import_file(file: &Path, body: &Body, settings: &BvhImportSettings) -> Result
             known.join(", ")
         ));
     };
-    let mut note = String::new();
-    if first_frame_is_inserted(&poses, settings) {
+    let inserted = first_frame_is_inserted(&poses);
+    if inserted {
         poses.remove(0);
-        note.push_str("; dropped frame 0, which jumps to frame 1");
     }
-    let rate = 1.0 / bvh.frame_time;
-    let thinning = Thinning { frame_rate: settings.frame_rate, static_threshold: 0.0 };
-    let Thinned { poses, frame_rate, note: kept } = thin(poses, rate, &thinning);
-    let note = format!("{} skeleton, {kept}{note}", naming.name);
-    let source = provenance_of(file, &settings.provenance);
-    let motion = Motion { name: String::new(), frame_rate, poses, source };
-    Ok(Clip { motion, subject: String::new(), note })
+    Ok(Retargeted {
+        poses,
+        frame_rate: 1.0 / bvh.frame_time,
+        skeleton: format!("{} skeleton", naming.name),
+        remark: if inserted { "; dropped frame 0, which jumps to frame 1" } else { "" },
+    })
 }
 
 #[cfg(test)]
@@ -158,6 +130,7 @@ mod tests {
     use super::*;
     use crate::asset::rotation::{apply, matrix_from_axis_angle};
     use crate::asset::skeleton::BODY_JOINT_PARENTS;
+    use crate::asset::{Motion, Provenance};
     use std::fmt::Write as _;
 
     /// A mocapbank-like skeleton whose rest joints are `rest` (body order), with the given local rotations in degrees
@@ -279,8 +252,10 @@ mod tests {
         std::fs::write(&clip, synthetic(&t_pose_joints(), &[[[0.0; 3]; BODY_JOINT_COUNT]; 3])).unwrap();
         let body = crate::generate::mannequin();
         let imported = |provenance: Provenance| {
-            let settings = BvhImportSettings { provenance, ..BvhImportSettings::default() };
-            import_file(&clip, &body, &settings).unwrap().motion.source
+            let settings = RetargetSettings { provenance, ..RetargetSettings::default() };
+            let (files, out) = ([clip.clone()], folder.path().join("out"));
+            import_bvh(&files, &body, &out, &settings, &mut |_, _, _| ()).unwrap();
+            Motion::load(&out.join("walk.npz")).unwrap().source
         };
         let own = imported(Provenance::default());
         assert_eq!((own.source.as_str(), own.author.as_str(), own.licence.as_str()), ("walk", "", ""));
@@ -296,10 +271,9 @@ mod tests {
             pose
         };
         let smooth: Vec<Pose> = (0..50).map(|i| pose(1.0 + 0.01 * i as f64)).collect();
-        let settings = BvhImportSettings::default();
-        assert!(!first_frame_is_inserted(&smooth, &settings));
+        assert!(!first_frame_is_inserted(&smooth));
         let mut inserted = smooth.clone();
         inserted.insert(0, pose(0.0));
-        assert!(first_frame_is_inserted(&inserted, &settings));
+        assert!(first_frame_is_inserted(&inserted));
     }
 }

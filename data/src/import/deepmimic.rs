@@ -1,48 +1,23 @@
 //! DeepMimic motion text (`humanoid3d_*.txt`), retargeted to the 22 SMPL body joints.
 //!
-//! Peng et al., "DeepMimic", 2018. JSON with `Frames`, rows of 44: duration [s], root position, root rotation, then the joints of
+//! Peng et al., "DeepMimic", 2018. JSON with `Frames`, rows of 44: duration (s), root position, root rotation, then the joints of
 //! `ROW` relative to their parents: quaternions `w x y z`, and angles about z for knees and elbows. The character stands in y
 //! up, faces +x with its left towards −z, and rests with hanging arms.
 
-use super::motions::{
-    Clip, MotionImportError, named, provenance_of, require_body_joints, stem, write_motions,
-};
+use super::motions::{RetargetSettings, Retargeted, write_retargeted};
 use super::retarget::{JointMap, Retarget};
-use super::thinning::{Thinned, Thinning, thin};
-use super::{Progress, Summary};
+use super::summary::{ImportError, Progress, Summary};
+use crate::asset::Body;
 use crate::asset::motion::{MAX_ANGLE, check_frame_rate};
 use crate::asset::rotation::{Matrix3, axis_angle_from_quaternion, matrix_from_axis_angle, product};
-use crate::asset::{Body, Motion, Provenance};
 use serde::Deserialize;
 use std::fs;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
-/// How DeepMimic motions are imported.
-#[derive(Clone, Debug, PartialEq)]
-pub struct DeepMimicSettings {
-    /// Which frames are kept.
-    pub thinning: Thinning,
-    /// Where the clips come from; the text itself does not say.
-    pub provenance: Provenance,
-    /// The file that the body came from, which no motion may take the place of.
-    pub body_file: Option<PathBuf>,
-}
-
-impl Default for DeepMimicSettings {
-    fn default() -> Self {
-        Self {
-            thinning: Thinning { frame_rate: 60.0, static_threshold: 0.0 },
-            provenance: Provenance::default(),
-            body_file: None,
-        }
-    }
-}
-
 const COLUMNS: usize = 44;
 /// Column of the root's rotation.
 const ROOT: usize = 4;
-const EXPECTED: &str = "DeepMimic motions";
 /// Lengths that a quaternion may have: the published clips hold interpolated ones from 0.58 to 1.12, which are normalised, as
 /// DeepMimic itself does.
 const LENGTHS: RangeInclusive<f64> = 0.5..=1.5;
@@ -72,7 +47,7 @@ const NECK: usize = 15;
 const WRISTS: [usize; 2] = [16, 17];
 const JOINTS: usize = 18;
 
-/// The character's joints at rest [m], in its own frame; only the limbs' directions matter.
+/// The character's joints at rest (m), in its own frame; only the limbs' directions matter.
 fn rest_positions() -> [[f64; 3]; JOINTS] {
     const SHOULDER: [f64; 3] = [-0.024, 0.4797, 0.1831];
     let mut rest = [[0.0; 3]; JOINTS];
@@ -180,27 +155,21 @@ pub fn import_deepmimic(
     files: &[PathBuf],
     body: &Body,
     out: &Path,
-    settings: &DeepMimicSettings,
+    settings: &RetargetSettings,
     progress: Progress<'_>,
-) -> Result<Summary, MotionImportError> {
-    if files.is_empty() {
-        return Err(MotionImportError::NoInput { where_: String::new(), expected: EXPECTED });
-    }
-    require_body_joints(body)?;
-    let retarget = Retarget::new(MAP, &rest_positions(), &body.joint_template);
-    let inputs = named(files.iter().map(|f| (f.clone(), stem(f))));
-    let import = |file: &Path| -> Result<Clip, String> {
+) -> Result<Summary, ImportError> {
+    let read = |file: &Path| -> Result<Retargeted, String> {
         let bytes = fs::read(file).map_err(|e| e.to_string())?;
         let frames = parse(&String::from_utf8_lossy(&bytes))?;
-        let rate = frame_rate(&frames)?;
-        let poses = frames.iter().map(|row| retarget.pose(&world_rotations(row))).collect();
-        let Thinned { poses, frame_rate, note } = thin(poses, rate, &settings.thinning);
-        let note = format!("DeepMimic humanoid, {note}");
-        let source = provenance_of(file, &settings.provenance);
-        let motion = Motion { name: String::new(), frame_rate, poses, source };
-        Ok(Clip { motion, subject: String::new(), note })
+        let retarget = Retarget::new(MAP, &rest_positions(), &body.joint_template);
+        Ok(Retargeted {
+            frame_rate: frame_rate(&frames)?,
+            poses: frames.iter().map(|row| retarget.pose(&world_rotations(row))).collect(),
+            skeleton: "DeepMimic humanoid".into(),
+            remark: "",
+        })
     };
-    write_motions(&inputs, settings.body_file.as_deref(), out, EXPECTED, &import, progress)
+    write_retargeted(files, body, out, settings, "DeepMimic motions", &read, progress)
 }
 
 #[cfg(test)]

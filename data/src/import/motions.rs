@@ -11,83 +11,77 @@
 //! licence = "…"
 //! ```
 
-use super::overwrite::{OverwriteError, refuse_overwriting};
-use super::{Progress, Summary};
-use crate::asset::motion::MotionError;
-use crate::asset::{Body, Motion, Provenance, skeleton::BODY_JOINT_COUNT};
-use crate::format::atomic;
+use super::overwrite::refuse_overwriting;
+use super::summary::{ImportError, Progress, Summary};
+use super::thinning::{Thinned, Thinning, thin};
+use crate::asset::{Body, Motion, Pose, Provenance, skeleton::BODY_JOINT_COUNT};
+use crate::format::{FileError, toml_file};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
-use std::fs;
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
-use thiserror::Error;
 
 /// Name of the manifest in a motion folder.
 pub const MANIFEST: &str = "motions.toml";
 
-/// Why motions cannot be imported at all. What is wrong with a single file stands in the summary.
-#[derive(Debug, Error)]
-pub enum MotionImportError {
-    /// No input.
-    #[error("{where_}no {expected} found")]
-    NoInput {
-        /// The inputs and a colon, or nothing.
-        where_: String,
-        /// What was looked for.
-        expected: &'static str,
-    },
-    /// None of the inputs could be used.
-    #[error("none of the {count} {expected} could be used; the first, {first}: {reason}")]
-    NothingUsable {
-        /// How many there were.
-        count: usize,
-        /// What they should be.
-        expected: &'static str,
-        /// The first of them.
-        first: String,
-        /// Its problem.
-        reason: String,
-    },
-    /// A folder or the manifest cannot be read or written.
-    #[error("{}: {reason}", path.display())]
-    Io {
-        /// File or folder.
-        path: PathBuf,
-        /// What the system said.
-        reason: std::io::Error,
-    },
-    /// The manifest that is already there is not one.
-    #[error("{}: {message}; remove it or choose another folder", path.display())]
-    Manifest {
-        /// The manifest.
-        path: PathBuf,
-        /// What the TOML reader said.
-        message: String,
-    },
-    /// A result cannot be written.
-    #[error(transparent)]
-    Motion(#[from] MotionError),
-    /// An input would be written over.
-    #[error(transparent)]
-    Overwrite(#[from] OverwriteError),
-    /// The body lacks joints.
-    #[error("body '{body}' has {joints} joints; retargeting needs the {BODY_JOINT_COUNT} SMPL body joints")]
-    Body {
-        /// The body.
-        body: String,
-        /// How many joints it has.
-        joints: usize,
-    },
+/// How motions of other skeletons are imported.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RetargetSettings {
+    /// Which frames are kept.
+    pub thinning: Thinning,
+    /// Where the motions come from; the files themselves do not say.
+    pub provenance: Provenance,
+    /// The file that the body came from, which no motion may take the place of.
+    pub body_file: Option<PathBuf>,
 }
 
-/// Refuses bodies without the 22 joints motions are carried over to.
-pub(super) fn require_body_joints(body: &Body) -> Result<(), MotionImportError> {
-    if body.joint_count() < BODY_JOINT_COUNT {
-        return Err(MotionImportError::Body { body: body.name.clone(), joints: body.joint_count() });
+impl Default for RetargetSettings {
+    fn default() -> Self {
+        let thinning = Thinning { frame_rate: 60.0, static_threshold: 0.0 };
+        Self { thinning, provenance: Provenance::default(), body_file: None }
     }
-    Ok(())
+}
+
+/// The motion of another skeleton, carried over to the body joints.
+pub(super) struct Retargeted {
+    pub poses: Vec<Pose>,
+    /// Frames per second.
+    pub frame_rate: f64,
+    /// What the skeleton is called.
+    pub skeleton: String,
+    /// What else to say, or nothing.
+    pub remark: &'static str,
+}
+
+/// Imports each file with `retarget` as a motion of `body`; see [`write_motions`].
+pub(super) fn write_retargeted(
+    files: &[PathBuf],
+    body: &Body,
+    out: &Path,
+    settings: &RetargetSettings,
+    expected: &str,
+    retarget: &(dyn Fn(&Path) -> Result<Retargeted, String> + Sync),
+    progress: Progress<'_>,
+) -> Result<Summary, ImportError> {
+    if files.is_empty() {
+        return Err(ImportError::Refused(format!("no {expected} found")));
+    }
+    if body.joint_count() < BODY_JOINT_COUNT {
+        return Err(ImportError::Refused(format!(
+            "body '{}' has {} joints; retargeting needs the {BODY_JOINT_COUNT} SMPL body joints",
+            body.name,
+            body.joint_count()
+        )));
+    }
+    let inputs = named(files.iter().map(|f| (f.clone(), stem(f))));
+    let import = |file: &Path| {
+        let Retargeted { poses, frame_rate, skeleton, remark } = retarget(file)?;
+        let Thinned { poses, frame_rate, note } = thin(poses, frame_rate, &settings.thinning);
+        let source = provenance_of(file, &settings.provenance);
+        let motion = Motion { name: String::new(), frame_rate, poses, source };
+        Ok(Clip { motion, subject: String::new(), note: format!("{skeleton}, {note}{remark}") })
+    };
+    write_motions(&inputs, settings.body_file.as_deref(), out, expected, &import, progress)
 }
 
 /// A clip made from one file.
@@ -102,7 +96,7 @@ pub(super) struct Clip {
 
 /// A file and the name its clip gets.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Input {
+pub(super) struct NamedFile {
     pub path: PathBuf,
     pub name: String,
 }
@@ -120,13 +114,12 @@ struct Entry {
     frame_rate: f64,
     #[serde(default, skip_serializing_if = "String::is_empty")]
     subject: String,
-    source: String,
-    author: String,
-    licence: String,
+    #[serde(flatten)]
+    source: Provenance,
 }
 
 /// Names clips after their files; equal names get a number.
-pub(super) fn named(files: impl IntoIterator<Item = (PathBuf, String)>) -> Vec<Input> {
+pub(super) fn named(files: impl IntoIterator<Item = (PathBuf, String)>) -> Vec<NamedFile> {
     let mut taken = HashSet::new();
     let mut inputs = Vec::new();
     for (path, wanted) in files {
@@ -136,7 +129,7 @@ pub(super) fn named(files: impl IntoIterator<Item = (PathBuf, String)>) -> Vec<I
             name = format!("{wanted}_{number}");
             number += 1;
         }
-        inputs.push(Input { path, name });
+        inputs.push(NamedFile { path, name });
     }
     inputs
 }
@@ -147,7 +140,7 @@ pub(super) fn stem(path: &Path) -> String {
 }
 
 /// Where the motion of `file` comes from: what was given, with the file's name.
-pub(super) fn provenance_of(file: &Path, given: &Provenance) -> Provenance {
+fn provenance_of(file: &Path, given: &Provenance) -> Provenance {
     let source = match given.source.as_str() {
         "" => stem(file),
         source => format!("{source} ({})", stem(file)),
@@ -158,13 +151,13 @@ pub(super) fn provenance_of(file: &Path, given: &Provenance) -> Provenance {
 /// Imports each file with `import`, several at a time; writes the clips to `out` and records them in its manifest. What cannot
 /// be used is skipped with its reason. Nothing is written over an input, nor over `body_file`.
 pub(super) fn write_motions(
-    inputs: &[Input],
+    inputs: &[NamedFile],
     body_file: Option<&Path>,
     out: &Path,
-    expected: &'static str,
+    expected: &str,
     import: &(dyn Fn(&Path) -> Result<Clip, String> + Sync),
     progress: Progress<'_>,
-) -> Result<Summary, MotionImportError> {
+) -> Result<Summary, ImportError> {
     let written = |name: &str| out.join(format!("{name}.npz"));
     let outputs = inputs.iter().map(|input| written(&input.name)).chain([out.join(MANIFEST)]);
     refuse_overwriting(inputs.iter().map(|input| input.path.as_path()).chain(body_file), outputs)?;
@@ -173,14 +166,11 @@ pub(super) fn write_motions(
     let (mut done, mut frames, mut seconds) = (0, 0, 0.0);
     for chunk in inputs.chunks(16) {
         let clips: Vec<_> = chunk.par_iter().map(|input| import(&input.path)).collect();
-        for (Input { path, name }, clip) in chunk.iter().zip(clips) {
+        for (NamedFile { path, name }, clip) in chunk.iter().zip(clips) {
             done += 1;
             progress("importing motions", done, inputs.len());
             // What no motion file may hold is not written either.
-            let valid = clip.and_then(|clip| match clip.motion.check() {
-                Ok(()) => Ok(clip),
-                Err(defect) => Err(defect.to_string()),
-            });
+            let valid = clip.and_then(|clip| clip.motion.check().map(|()| clip));
             let Clip { mut motion, subject, note } = match valid {
                 Ok(clip) => clip,
                 Err(reason) => {
@@ -201,15 +191,15 @@ pub(super) fn write_motions(
                 frames: motion.poses.len(),
                 frame_rate: motion.frame_rate,
                 subject,
-                source: motion.source.source,
-                author: motion.source.author,
-                licence: motion.source.licence,
+                source: motion.source,
             });
         }
     }
     if let (Some((first, reason)), true) = (summary.skipped.first(), summary.taken.is_empty()) {
-        let (first, reason) = (first.clone(), reason.clone());
-        return Err(MotionImportError::NothingUsable { count: inputs.len(), expected, first, reason });
+        return Err(ImportError::Refused(format!(
+            "none of the {} {expected} could be used; the first, {first}: {reason}",
+            inputs.len()
+        )));
     }
     summary.written.push(write_manifest(out, manifest)?);
     summary.notes.push(format!(
@@ -220,22 +210,18 @@ pub(super) fn write_motions(
     Ok(summary)
 }
 
-fn read_manifest(out: &Path) -> Result<Manifest, MotionImportError> {
-    let path = out.join(MANIFEST);
-    match fs::read_to_string(&path) {
-        Ok(text) => toml::from_str(&text)
-            .map_err(|e| MotionImportError::Manifest { path, message: e.to_string().trim_end().to_string() }),
-        Err(e) if e.kind() == ErrorKind::NotFound => Ok(Manifest::default()),
-        Err(reason) => Err(MotionImportError::Io { path, reason }),
+fn read_manifest(out: &Path) -> Result<Manifest, FileError> {
+    match toml_file::load(&out.join(MANIFEST)) {
+        Err(FileError::Content { path, message }) => {
+            Err(FileError::content(&path)(format!("{message}; remove it or choose another folder")))
+        }
+        manifest => Ok(manifest?.unwrap_or_default()),
     }
 }
 
-fn write_manifest(out: &Path, mut manifest: Manifest) -> Result<PathBuf, MotionImportError> {
+fn write_manifest(out: &Path, mut manifest: Manifest) -> Result<PathBuf, FileError> {
     let path = out.join(MANIFEST);
     manifest.motion.sort_by(|a, b| a.file.cmp(&b.file));
-    let text = toml::to_string(&manifest)
-        .map_err(|e| MotionImportError::Manifest { path: path.clone(), message: e.to_string() })?;
-    atomic::write(&path, text.as_bytes())
-        .map_err(|reason| MotionImportError::Io { path: path.clone(), reason })?;
+    toml_file::save(&path, &manifest)?;
     Ok(path)
 }

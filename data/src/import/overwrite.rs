@@ -1,25 +1,18 @@
 //! No importer writes over what it reads: the input may be the only copy.
 
+use super::summary::ImportError;
 use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use thiserror::Error;
-
-/// A result would take the place of an input.
-#[derive(Debug, Error)]
-#[error("{} would be written over the input {}; choose another folder or file with -o", output.display(), input.display())]
-pub struct OverwriteError {
-    /// What would be written.
-    pub output: PathBuf,
-    /// What is read.
-    pub input: PathBuf,
-}
 
 /// Refuses outputs that are inputs, by whatever path they are named. Folders as inputs are compared with folders as outputs.
-pub(super) fn refuse_overwriting<I: AsRef<Path>, O: AsRef<Path>>(
+///
+/// # Errors
+/// [`ImportError`] naming the input and the output that are one file.
+pub fn refuse_overwriting<I: AsRef<Path>, O: AsRef<Path>>(
     inputs: impl IntoIterator<Item = I>,
     outputs: impl IntoIterator<Item = O>,
-) -> Result<(), OverwriteError> {
+) -> Result<(), ImportError> {
     // What is not there yet is no input.
     let outputs: HashMap<PathBuf, O> = (outputs.into_iter())
         .filter_map(|output| Some((fs::canonicalize(output.as_ref()).ok()?, output)))
@@ -27,7 +20,11 @@ pub(super) fn refuse_overwriting<I: AsRef<Path>, O: AsRef<Path>>(
     for input in inputs {
         let input = input.as_ref();
         if let Some(output) = fs::canonicalize(input).ok().and_then(|real| outputs.get(&real)) {
-            return Err(OverwriteError { output: output.as_ref().into(), input: input.into() });
+            return Err(ImportError::Refused(format!(
+                "{} would be written over the input {}; choose another folder or file with -o",
+                output.as_ref().display(),
+                input.display()
+            )));
         }
     }
     Ok(())

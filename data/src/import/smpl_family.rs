@@ -2,41 +2,12 @@
 //!
 //! The reading is [`Body::load`]'s; here the model is recognised, and said what was taken, what was left out and why.
 
-use super::overwrite::{OverwriteError, refuse_overwriting};
-use super::{Progress, Summary};
-use crate::asset::body_file::{BodyFileError, BodyFileSettings, INSIDE_OUT, shape_part};
+use super::overwrite::refuse_overwriting;
+use super::summary::{ImportError, Progress, Summary};
+use crate::asset::body_file::{BodyFileSettings, INSIDE_OUT, shape_part};
 use crate::asset::{Body, Provenance};
-use crate::format::NpzFile;
+use crate::format::{FileError, NpzFile, folder};
 use std::path::{Path, PathBuf};
-use thiserror::Error;
-
-/// Why a model file cannot be imported.
-#[derive(Debug, Error)]
-pub enum SmplFamilyError {
-    /// The file is not a usable body model, or the result cannot be written.
-    #[error(transparent)]
-    Body(#[from] BodyFileError),
-    /// An input would be written over.
-    #[error(transparent)]
-    Overwrite(#[from] OverwriteError),
-    /// A pickle, which is a program.
-    #[error(
-        "{}: a Python pickle is a program and is never run here; convert it once with scripts/smpl_pickle_to_npz.py {} model.npz, \
-         which takes the arrays only", path.display(), path.display()
-    )]
-    Pickle {
-        /// The file.
-        path: PathBuf,
-    },
-    /// A folder instead of a file.
-    #[error("{}: this is a folder; name one model file in it{}", path.display(), hint(models))]
-    Folder {
-        /// The folder.
-        path: PathBuf,
-        /// Model files below it.
-        models: Vec<PathBuf>,
-    },
-}
 
 fn hint(models: &[PathBuf]) -> String {
     if models.is_empty() {
@@ -98,18 +69,18 @@ const TAKEN: [&str; 12] = [
 /// Imports one SMPL, SMPL-H or SMPL-X npz as the body npz `out`, with at most `settings.shape_components` shape components.
 ///
 /// # Errors
-/// [`SmplFamilyError`] naming file and key.
+/// [`ImportError`] naming file and key.
 pub fn import_smpl_family(
     input: &Path,
     out: &Path,
     settings: &BodyFileSettings,
     progress: Progress<'_>,
-) -> Result<Summary, SmplFamilyError> {
+) -> Result<Summary, ImportError> {
     refuse_what_is_no_npz(input)?;
     refuse_overwriting([input], [out])?;
     progress("reading the model", 0, 2);
     let (body, was_inside_out) = Body::load_turned(input, settings)?;
-    let mut file = NpzFile::open(input).map_err(BodyFileError::from)?;
+    let mut file = NpzFile::open(input)?;
     let model = MODELS.iter().find(|m| (m.vertices, m.joints) == (body.vertex_count(), body.joint_count()));
     let provenance = provenance(&mut file, model, input);
     progress("writing the body", 1, 2);
@@ -160,33 +131,35 @@ pub fn import_smpl_family(
     Ok(summary)
 }
 
-fn refuse_what_is_no_npz(input: &Path) -> Result<(), SmplFamilyError> {
+fn refuse_what_is_no_npz(input: &Path) -> Result<(), FileError> {
     if input.is_dir() {
         let mut models = Vec::new();
         for path in std::fs::read_dir(input).into_iter().flatten().flatten().map(|entry| entry.path()) {
             // SMPL-H ships as {male,female,neutral}/model.npz.
             let inner = path.join("model.npz");
-            if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npz")) {
+            if folder::has_extension(&path, "npz") {
                 models.push(path);
             } else if inner.is_file() {
                 models.push(inner);
             }
         }
         models.sort();
-        return Err(SmplFamilyError::Folder { path: input.into(), models });
+        let message = format!("this is a folder; name one model file in it{}", hint(&models));
+        return Err(FileError::content(input)(message));
     }
-    if input.extension().is_some_and(|e| e.eq_ignore_ascii_case("pkl")) && input.is_file() {
-        return Err(SmplFamilyError::Pickle { path: input.into() });
+    if folder::has_extension(input, "pkl") && input.is_file() {
+        return Err(FileError::content(input)(format!(
+            "a Python pickle is a program and is never run here; convert it once with scripts/smpl_pickle_to_npz.py {} model.npz, \
+             which takes the arrays only",
+            input.display()
+        )));
     }
     Ok(())
 }
 
 /// What the file says itself, or what is known of the published model.
 fn provenance(file: &mut NpzFile, model: Option<&Model>, input: &Path) -> Provenance {
-    let mut text = |key: &str| -> String {
-        file.strings(key, "").ok().and_then(|a| a.data.into_iter().next()).unwrap_or_default()
-    };
-    let own = Provenance { source: text("source"), author: text("author"), licence: text("licence") };
+    let own = Provenance::read(file);
     if own != Provenance::default() {
         return own;
     }

@@ -6,9 +6,9 @@ use crate::asset::rotation::{axis_angle_from_matrix, matrix_from_axis_angle, pro
 /// Which frames are kept.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Thinning {
-    /// Every n-th frame is kept, with the n that comes nearest to this rate [frames/s].
+    /// Every n-th frame is kept, with the n that comes nearest to this rate (frames/s).
     pub frame_rate: f64,
-    /// A frame that differs from the last one kept by less than this in every joint is dropped [rad]; 0 keeps all, and with
+    /// A frame that differs from the last one kept by less than this in every joint is dropped (rad); 0 keeps all, and with
     /// them a constant rate.
     pub static_threshold: f64,
 }
@@ -18,7 +18,7 @@ pub struct Thinning {
 pub struct Thinned {
     /// The frames kept.
     pub poses: Vec<Pose>,
-    /// Rate of the frames but for the static ones [frames/s].
+    /// Rate of the frames but for the static ones (frames/s).
     pub frame_rate: f64,
     /// What was kept of what: "120 of 243 frames at 60 frames/s (every 2nd, 2 static ones dropped)".
     pub note: String,
@@ -72,7 +72,7 @@ fn ordinal_ending(number: usize) -> &'static str {
     }
 }
 
-/// Largest angle by which any joint from `first` on turns between two poses [rad].
+/// Largest angle by which any joint from `first` on turns between two poses (rad).
 pub fn largest_turn(a: &Pose, b: &Pose, first: usize) -> f64 {
     a.rotations.iter().zip(&b.rotations).skip(first).fold(0.0, |largest, (x, y)| {
         let turn = product(&transpose(&matrix_from_axis_angle(*x)), &matrix_from_axis_angle(*y));

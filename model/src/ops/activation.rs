@@ -1,23 +1,16 @@
-//! `activation(sum of matrices + one row per segment) + residual` in one pass.
+//! `activation(sum of matrices + one row per garment) + residual` in one pass.
 
-use std::sync::Arc;
-
-use burn::backend::autodiff::checkpoint::{base::Checkpointer, strategy::CheckpointStrategy};
-use burn::backend::autodiff::grads::Gradients;
-use burn::backend::autodiff::ops::{Backward, NodeGuard, Ops, OpsKind};
+use burn::backend::Backend;
 use burn::backend::tensor::FloatTensor;
-use burn::backend::{Autodiff, Backend, Dispatch};
 use burn::tensor::Tensor;
 
-use super::backend::FusedOps;
-use super::kernels::Kernels;
-use super::segments::{SegmentEnds, Segments};
+use super::composed::{add_optional, broadcast_rows, concatenate, row_block};
+use super::host::HostBackend;
+use super::operation::{ArgumentGradients, FusedOps, Operation, Saved, Saves, TensorKernel, apply};
+use super::tensors::Tensors;
+use crate::packing::Packing;
 
 mod host;
-mod tensors;
-
-pub(super) use host::{host_backward, host_forward};
-pub(super) use tensors::{backward, broadcast_rows, forward};
 
 /// Pointwise activation of a fused layer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,8 +25,8 @@ pub enum Activation {
 
 /// `activation(input + bias)`: input `[N,C]`, bias `[1,C]`.
 pub fn activate(activation: Activation, input: Tensor<2>, bias: Tensor<2>) -> Tensor<2> {
-    let ends = one_segment(&input);
-    dispatch(Dispatch::activate(input.into_dispatch(), bias.into_dispatch(), ends, activation))
+    let packing = Packing::new([input.dims()[0]]);
+    activate_packed(activation, input, bias, &packing)
 }
 
 /// `activation(input + bias) + residual`: matrices `[N,C]`, bias `[1,C]`.
@@ -43,126 +36,137 @@ pub fn activate_residual(
     bias: Tensor<2>,
     residual: Tensor<2>,
 ) -> Tensor<2> {
-    let ends = one_segment(&input);
-    dispatch(Dispatch::activate_residual(
-        input.into_dispatch(),
-        bias.into_dispatch(),
-        residual.into_dispatch(),
-        ends,
-        activation,
-    ))
+    let packing = Packing::new([input.dims()[0]]);
+    apply(ActivatedSum { activation, packing, has_residual: true }, [input, bias, residual])
 }
 
-/// `activation(input + its segment's row)`: input `[N,C]`, rows `[M,C]`.
-pub fn segment_activate(
+/// `activation(input + its garment's row)`: input `[ΣV,C]`, rows `[M,C]`.
+pub fn activate_packed(
     activation: Activation,
     input: Tensor<2>,
     rows: Tensor<2>,
-    segments: &Segments,
+    packing: &Packing,
 ) -> Tensor<2> {
-    let ends = segments.ends().clone();
-    dispatch(Dispatch::activate(input.into_dispatch(), rows.into_dispatch(), ends, activation))
+    apply(ActivatedSum { activation, packing: packing.clone(), has_residual: false }, [input, rows])
 }
 
-/// `activation(a + b + its segment's row)`: matrices `[N,C]`, rows `[M,C]`.
-pub fn segment_activate_sum(
+/// `activation(a + b + its garment's row)`: matrices `[ΣV,C]`, rows `[M,C]`.
+pub fn activate_packed_sum(
     activation: Activation,
-    terms: [Tensor<2>; 2],
+    [a, b]: [Tensor<2>; 2],
     rows: Tensor<2>,
-    segments: &Segments,
+    packing: &Packing,
 ) -> Tensor<2> {
-    let [a, b] = terms;
-    dispatch(Dispatch::activate_two(
-        a.into_dispatch(),
-        b.into_dispatch(),
-        rows.into_dispatch(),
-        segments.ends().clone(),
-        activation,
-    ))
+    apply(ActivatedSum { activation, packing: packing.clone(), has_residual: false }, [a, b, rows])
 }
 
-fn dispatch(tensor: burn::backend::DispatchTensor) -> Tensor<2> {
-    Tensor::from_dispatch(tensor)
+/// Arguments: the matrices of the sum, the rows, and the residual if there is one.
+#[derive(Clone, Debug)]
+pub(super) struct ActivatedSum {
+    pub(super) activation: Activation,
+    pub(super) packing: Packing,
+    pub(super) has_residual: bool,
 }
 
-fn one_segment(input: &Tensor<2>) -> SegmentEnds {
-    Arc::from([input.dims()[0]])
-}
-
-/// Gradients of the operation's arguments: of every term (and they are equal), and of the rows.
-pub(super) type ActivationGradients<B> = (FloatTensor<B>, FloatTensor<B>);
-
-/// What the backward pass needs of the forward one.
-#[derive(Debug)]
-pub(super) enum Saved<B: Backend> {
-    /// Identity: nothing.
-    Nothing,
-    /// ReLU without residual: its output is positive exactly where its input was.
-    Output(FloatTensor<B>),
-    /// Otherwise the argument of the activation is added up again.
-    Arguments(Vec<FloatTensor<B>>, FloatTensor<B>),
-}
-
-impl<B: Backend> Clone for Saved<B> {
-    fn clone(&self) -> Self {
-        match self {
-            Self::Nothing => Self::Nothing,
-            Self::Output(output) => Self::Output(output.clone()),
-            Self::Arguments(terms, rows) => Self::Arguments(terms.clone(), rows.clone()),
-        }
+impl ActivatedSum {
+    /// Matrices, rows, residual.
+    fn split<B: Backend>(
+        &self,
+        Tensors(mut matrices): Tensors<B>,
+    ) -> (Vec<FloatTensor<B>>, FloatTensor<B>, Option<FloatTensor<B>>) {
+        let residual = self.has_residual.then(|| matrices.pop()).flatten();
+        let rows = matrices.pop().expect("rows for the garments");
+        (matrices, rows, residual)
     }
 }
 
-/// N parents: the terms, then the rows, then the residual if there is one.
-#[derive(Debug)]
-struct ActivationBackward<const N: usize>;
+impl<const N: usize> Operation<N> for ActivatedSum {
+    /// Identity needs nothing. The result of ReLU is positive exactly where its argument was. Otherwise the argument of the
+    /// activation is added up again.
+    fn saves(&self, _: [bool; N]) -> Saves<N> {
+        let result = self.activation == Activation::Relu && !self.has_residual;
+        let sum = self.activation != Activation::Identity && !result;
+        Saves { arguments: std::array::from_fn(|i| sum && !(self.has_residual && i + 1 == N)), result }
+    }
 
-impl<B: Kernels, const N: usize> Backward<B, N> for ActivationBackward<N> {
-    type State = (Saved<B>, SegmentEnds, Activation, usize);
-
-    fn backward(self, ops: Ops<Self::State, N>, grads: &mut Gradients, _: &mut Checkpointer) {
-        let (saved, ends, activation, terms) = ops.state;
-        let gradient = grads.consume::<B>(&ops.node);
-        let residual = gradient.clone();
-        let (input, rows) = B::activation_backward(saved, gradient, &ends, activation);
-        for (index, parent) in ops.parents.into_iter().enumerate() {
-            let Some(parent) = parent else { continue };
-            let gradient = match index.cmp(&terms) {
-                std::cmp::Ordering::Less => input.clone(),
-                std::cmp::Ordering::Equal => rows.clone(),
-                std::cmp::Ordering::Greater => residual.clone(),
-            };
-            grads.register::<B>(parent.id, gradient);
-        }
+    fn backward<B: FusedOps>(&self, saved: Saved<B, N>, gradient: FloatTensor<B>) -> ArgumentGradients<B, N> {
+        let [of_matrix, of_row] =
+            B::run(&ActivatedSumGradients(self.clone()), saved.with(gradient.clone())).take();
+        let matrices = N - 1 - usize::from(self.has_residual);
+        let of_arguments = std::iter::repeat_n(of_matrix, matrices).chain([of_row, gradient]);
+        let mut of_arguments = of_arguments.take(N);
+        std::array::from_fn(|_| of_arguments.next())
     }
 }
 
-/// Runs the operation and records it if any parent is tracked.
-pub(super) fn record<B: Kernels, C: CheckpointStrategy, const N: usize>(
-    parents: [NodeGuard; N],
-    terms: Vec<FloatTensor<B>>,
-    rows: FloatTensor<B>,
-    residual: Option<FloatTensor<B>>,
-    ends: SegmentEnds,
-    activation: Activation,
-) -> FloatTensor<Autodiff<B, C>> {
-    let prepared = Backward::<B, N>::prepare::<C>(ActivationBackward::<N>, parents);
-    match prepared.compute_bound().stateful() {
-        OpsKind::UnTracked(operation) => {
-            operation.finish(B::activation(terms, rows, residual, &ends, activation))
-        }
-        OpsKind::Tracked(operation) => {
-            let count = terms.len();
-            let plain_relu = activation == Activation::Relu && residual.is_none();
-            let arguments = (activation != Activation::Identity && !plain_relu)
-                .then(|| Saved::Arguments(terms.clone(), rows.clone()));
-            let output = B::activation(terms, rows, residual, &ends, activation);
-            let saved = match arguments {
-                Some(arguments) => arguments,
-                None if plain_relu => Saved::Output(output.clone()),
-                None => Saved::Nothing,
-            };
-            operation.finish((saved, ends, activation, count), output)
-        }
+impl TensorKernel for ActivatedSum {
+    fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
+        let (matrices, rows, residual) = self.split(arguments);
+        let sum = sum::<B>(matrices, rows, &self.packing);
+        let value = match self.activation {
+            Activation::Identity => sum,
+            Activation::Relu => B::float_clamp_min(sum, 0.0.into()),
+            Activation::Gelu => B::float_mul(sum.clone(), normal_distribution::<B>(sum)),
+        };
+        [add_optional::<B>(value, residual)].into()
     }
+
+    fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
+        let (matrices, rows, residual) = self.split(arguments);
+        host::forward::<B>(self, matrices, rows, residual)
+    }
+}
+
+/// Gradients of every matrix (they are equal) and of the rows.
+///
+/// Arguments: what the activation was applied to, then the gradient of the result. The former is absent (identity), a
+/// matrix of the same sign (the result of ReLU), or the matrices and the rows that it is the sum of.
+#[derive(Clone, Debug)]
+pub(super) struct ActivatedSumGradients(pub(super) ActivatedSum);
+
+impl TensorKernel for ActivatedSumGradients {
+    fn composed<B: Backend>(&self, Tensors(mut arguments): Tensors<B>) -> Tensors<B> {
+        let ActivatedSum { activation, packing, .. } = &self.0;
+        let gradient = arguments.pop().expect("a gradient");
+        let rows = if arguments.len() > 1 { arguments.pop() } else { None };
+        let sum = match rows {
+            Some(rows) => Some(sum::<B>(arguments, rows, packing)),
+            None => arguments.pop(),
+        };
+        let of_matrix = match (activation, sum) {
+            (Activation::Identity, _) | (_, None) => gradient,
+            // The sign of max(x, 0) is the derivative: one above zero, zero elsewhere.
+            (Activation::Relu, Some(sum)) => {
+                B::float_mul(B::float_sign(B::float_clamp_min(sum, 0.0.into())), gradient)
+            }
+            (Activation::Gelu, Some(sum)) => {
+                let square = B::float_mul(sum.clone(), sum.clone());
+                let density = B::float_exp(B::float_mul_scalar(square, (-0.5).into()));
+                let density = B::float_mul_scalar(
+                    density,
+                    (0.5 * std::f64::consts::FRAC_2_SQRT_PI * std::f64::consts::FRAC_1_SQRT_2).into(),
+                );
+                let slope = B::float_add(normal_distribution::<B>(sum.clone()), B::float_mul(sum, density));
+                B::float_mul(slope, gradient)
+            }
+        };
+        let of_row = |rows| B::float_sum_dim(row_block::<B>(of_matrix.clone(), rows), 0);
+        let of_rows = concatenate::<B>(packing.ranges().map(of_row).collect());
+        [of_matrix, of_rows].into()
+    }
+
+    fn on_host<B: HostBackend>(&self, Tensors(mut arguments): Tensors<B>) -> Tensors<B> {
+        let gradient = arguments.pop().expect("a gradient");
+        host::backward::<B>(&self.0, arguments, gradient)
+    }
+}
+
+fn sum<B: Backend>(matrices: Vec<FloatTensor<B>>, rows: FloatTensor<B>, packing: &Packing) -> FloatTensor<B> {
+    let shared = broadcast_rows::<B>(rows, packing);
+    matrices.into_iter().fold(shared, |sum, matrix| B::float_add(matrix, sum))
+}
+
+fn normal_distribution<B: Backend>(x: FloatTensor<B>) -> FloatTensor<B> {
+    let erf = B::float_erf(B::float_mul_scalar(x, std::f64::consts::FRAC_1_SQRT_2.into()));
+    B::float_add_scalar(B::float_mul_scalar(erf, 0.5.into()), 0.5.into())
 }

@@ -1,12 +1,12 @@
 //! One Adam update of a parameter and both its moments, in a single pass over memory.
 
-use burn::backend::tensor::FloatTensor;
-use burn::backend::{Backend, Dispatch};
+use burn::backend::Backend;
 use burn::tensor::Tensor;
 use rayon::prelude::*;
 
-use super::backend::FusedOps;
 use super::host::{CHUNK_ELEMENTS, HostBackend, vectorised};
+use super::operation::{TensorKernel, run};
+use super::tensors::Tensors;
 
 /// Factors of one update; those of the bias correction are already in `step_size` and `epsilon`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,48 +24,54 @@ pub struct AdamFactors {
 /// The parameter and both moments after one update, `m ← β₁m + (1 − β₁)g`, `v ← β₂v + (1 − β₂)g²`,
 /// `p ← p − step·m / (√v + ε)`; all of one shape, none tracked by autodiff.
 ///
-/// Memory that nobody else holds is overwritten in place.
+/// Memory that no other tensor shares is overwritten in place.
 pub fn adam_step<const D: usize>(
     parameter: Tensor<D>,
     gradient: Tensor<D>,
     [first, second]: [Tensor<D>; 2],
     factors: AdamFactors,
 ) -> (Tensor<D>, [Tensor<D>; 2]) {
-    let (parameter, first, second) = Dispatch::adam_step(
-        parameter.into_dispatch(),
-        gradient.into_dispatch(),
-        first.into_dispatch(),
-        second.into_dispatch(),
-        factors,
-    );
-    (Tensor::from_dispatch(parameter), [Tensor::from_dispatch(first), Tensor::from_dispatch(second)])
+    let arguments = [parameter, gradient, first, second].map(Tensor::into_dispatch);
+    let [parameter, first, second] = run(&factors, arguments.into()).take().map(Tensor::from_dispatch);
+    (parameter, [first, second])
 }
 
-/// Parameter, first and second moment.
-pub(super) type Updated<B> = (FloatTensor<B>, FloatTensor<B>, FloatTensor<B>);
+/// Arguments: parameter, gradient, first and second moment. Results: parameter, first and second moment.
+impl TensorKernel for AdamFactors {
+    fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
+        let [parameter, gradient, first, second] = arguments.take();
+        let average = |old, new, beta: f32| {
+            let kept = B::float_mul_scalar(old, f64::from(beta).into());
+            B::float_add(kept, B::float_mul_scalar(new, f64::from(1.0 - beta).into()))
+        };
+        let square = B::float_mul(gradient.clone(), gradient.clone());
+        let first = average(first, gradient, self.beta_1);
+        let second = average(second, square, self.beta_2);
+        let root = B::float_add_scalar(B::float_sqrt(second.clone()), f64::from(self.epsilon).into());
+        let step = B::float_div(B::float_mul_scalar(first.clone(), f64::from(self.step_size).into()), root);
+        [B::float_sub(parameter, step), first, second].into()
+    }
 
-/// The update in place, or nothing changed and `false` where the memory is not f32 on the host.
-pub(super) fn host<B: HostBackend>(
-    parameter: &mut FloatTensor<B>,
-    gradient: &mut FloatTensor<B>,
-    moments: [&mut FloatTensor<B>; 2],
-    factors: AdamFactors,
-) -> bool {
-    let [first, second] = moments;
-    let (Some(p), Some(g), Some(m), Some(v)) =
-        (B::values_mut(parameter), B::values(gradient), B::values_mut(first), B::values_mut(second))
-    else {
-        return false;
-    };
-    let parts = p.par_chunks_mut(CHUNK_ELEMENTS).zip(g.par_chunks(CHUNK_ELEMENTS));
-    let moments = m.par_chunks_mut(CHUNK_ELEMENTS).zip(v.par_chunks_mut(CHUNK_ELEMENTS));
-    parts.zip(moments).for_each(|((p, g), (m, v))| {
-        vectorised(
-            #[inline(always)]
-            || update(p, g, m, v, factors),
-        );
-    });
-    true
+    fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
+        let [mut parameter, mut gradient, mut first, mut second] = arguments.take();
+        let (Some(p), Some(g), Some(m), Some(v)) = (
+            B::values_mut(&mut parameter),
+            B::values(&mut gradient),
+            B::values_mut(&mut first),
+            B::values_mut(&mut second),
+        ) else {
+            return self.composed([parameter, gradient, first, second].into());
+        };
+        let parts = p.par_chunks_mut(CHUNK_ELEMENTS).zip(g.par_chunks(CHUNK_ELEMENTS));
+        let moments = m.par_chunks_mut(CHUNK_ELEMENTS).zip(v.par_chunks_mut(CHUNK_ELEMENTS));
+        parts.zip(moments).for_each(|((p, g), (m, v))| {
+            vectorised(
+                #[inline(always)]
+                || update(p, g, m, v, *self),
+            );
+        });
+        [parameter, first, second].into()
+    }
 }
 
 #[inline(always)]
@@ -79,24 +85,4 @@ fn update(p: &mut [f32], g: &[f32], m: &mut [f32], v: &mut [f32], factors: AdamF
         v[i] = v[i] * beta_2 + g[i] * g[i] * rest_2;
         p[i] -= step_size * m[i] / (v[i].sqrt() + epsilon);
     }
-}
-
-/// The same from a backend's own operations.
-pub(super) fn tensor_form<B: Backend>(
-    parameter: FloatTensor<B>,
-    gradient: FloatTensor<B>,
-    first: FloatTensor<B>,
-    second: FloatTensor<B>,
-    factors: AdamFactors,
-) -> Updated<B> {
-    let average = |old, new, beta: f32| {
-        let kept = B::float_mul_scalar(old, f64::from(beta).into());
-        B::float_add(kept, B::float_mul_scalar(new, f64::from(1.0 - beta).into()))
-    };
-    let square = B::float_mul(gradient.clone(), gradient.clone());
-    let first = average(first, gradient, factors.beta_1);
-    let second = average(second, square, factors.beta_2);
-    let root = B::float_add_scalar(B::float_sqrt(second.clone()), f64::from(factors.epsilon).into());
-    let step = B::float_div(B::float_mul_scalar(first.clone(), f64::from(factors.step_size).into()), root);
-    (B::float_sub(parameter, step), first, second)
 }

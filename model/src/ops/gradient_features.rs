@@ -1,16 +1,17 @@
 //! Gradient features of DiffusionNet: `tanh(Re(conj(g) ⊙ A g))` per channel, from gradients mixed in advance.
 
-use burn::backend::autodiff::checkpoint::{base::Checkpointer, strategy::CheckpointStrategy};
-use burn::backend::autodiff::grads::Gradients;
-use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
 use burn::backend::tensor::FloatTensor;
-use burn::backend::{Autodiff, Backend, Dispatch, TensorMetadata};
-use burn::tensor::{Slice, Tensor};
+use burn::backend::{Backend, TensorMetadata};
+use burn::tensor::Tensor;
 
-use super::backend::FusedOps;
-use super::host::{Chunk, HostBackend, NewValues, Rows, chunks, for_each, part_lengths, vectorised};
-use super::kernels::Kernels;
+use super::composed::block;
+use super::host::{
+    Chunk, HostBackend, MatrixView, NewPart, NewValues, OutputMatrix, chunks, compute, for_each, vectorised,
+};
 use super::math::tanh;
+use super::operation::{ArgumentGradients, FusedOps, Operation, Saved, Saves, TensorKernel, apply};
+use super::tensors::Tensors;
+use crate::packing::Packing;
 
 /// `[2V,3C]` → `[V,C]`.
 ///
@@ -18,27 +19,55 @@ use super::math::tanh;
 /// gradient g itself, g times the real part of A and g times its imaginary part. With `x0 x1 x2` and `y0 y1 y2` for the six
 /// blocks the result is `tanh(x0 (x1 − y2) + y0 (y1 + x2))`.
 pub fn gradient_features(mixed: Tensor<2>) -> Tensor<2> {
-    Tensor::from_dispatch(Dispatch::gradient_features(mixed.into_dispatch()))
+    apply(GradientFeatures, [mixed])
 }
 
-// ---------------------------------------------------------------------------------------------------------- host memory
+/// Argument: mixed gradients.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct GradientFeatures;
 
-pub(super) fn host_forward<B: HostBackend>(mixed: FloatTensor<B>) -> FloatTensor<B> {
-    let device = mixed.device();
-    let mixed = B::hold(mixed);
-    let mixed = B::rows(&mixed);
-    let (vertices, width) = (mixed.count() / 2, mixed.columns() / 3);
-    let chunks = chunks(&[vertices], width);
-    let mut output = NewValues::new(vertices * width);
-    let tasks: Vec<_> = chunks.iter().zip(output.parts(part_lengths(&chunks, width))).collect();
-    for_each(tasks, |(chunk, output)| {
-        let output = output.zeroed();
-        vectorised(
+impl Operation<1> for GradientFeatures {
+    fn saves(&self, _: [bool; 1]) -> Saves<1> {
+        Saves { arguments: [true], result: true }
+    }
+
+    fn backward<B: FusedOps>(&self, saved: Saved<B, 1>, gradient: FloatTensor<B>) -> ArgumentGradients<B, 1> {
+        B::run(&FeatureGradients, saved.with(gradient)).take().map(Some)
+    }
+}
+
+impl TensorKernel for GradientFeatures {
+    fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
+        let [mixed] = arguments.take();
+        let [[x0, x1, x2], [y0, y1, y2]] = blocks::<B>(mixed);
+        let real = B::float_mul(x0, B::float_sub(x1, y2));
+        let imaginary = B::float_mul(y0, B::float_add(y1, x2));
+        [B::float_tanh(B::float_add(real, imaginary))].into()
+    }
+
+    fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
+        let held = arguments.take().map(B::hold);
+        let [mixed] = held.each_ref().map(B::view);
+        let (vertices, width) = (mixed.rows() / 2, mixed.columns() / 3);
+        compute(
+            &Packing::new([vertices]),
+            width,
+            [OutputMatrix::Rows(width)],
             #[inline(always)]
-            || forward_chunk(mixed, vertices, chunk, output),
-        );
-    });
-    B::matrix(output.finish(), width, &device)
+            |chunk, [output]| forward_chunk(mixed, vertices, chunk, output),
+        )
+    }
+}
+
+/// The six blocks `[[x0, x1, x2], [y0, y1, y2]]`.
+fn blocks<B: Backend>(mixed: FloatTensor<B>) -> [[FloatTensor<B>; 3]; 2] {
+    let (vertices, width) = (mixed.shape()[0] / 2, mixed.shape()[1] / 3);
+    [0, 1].map(|axis| {
+        [0, 1, 2].map(|part| {
+            let rows = axis * vertices..(axis + 1) * vertices;
+            block::<B>(mixed.clone(), rows, part * width..(part + 1) * width)
+        })
+    })
 }
 
 #[inline(always)]
@@ -50,7 +79,7 @@ fn thirds(row: &[f32]) -> [&[f32]; 3] {
 }
 
 #[inline(always)]
-fn forward_chunk(mixed: Rows<'_>, vertices: usize, chunk: &Chunk, output: &mut [f32]) {
+fn forward_chunk(mixed: MatrixView<'_>, vertices: usize, chunk: &Chunk, output: &mut [f32]) {
     let width = mixed.columns() / 3;
     for (vertex, output) in chunk.rows.clone().zip(output.chunks_exact_mut(width)) {
         let [x0, x1, x2] = thirds(mixed.row(vertex));
@@ -63,35 +92,50 @@ fn forward_chunk(mixed: Rows<'_>, vertices: usize, chunk: &Chunk, output: &mut [
     }
 }
 
-pub(super) fn host_backward<B: HostBackend>(
-    mixed: FloatTensor<B>,
-    output: FloatTensor<B>,
-    gradient: FloatTensor<B>,
-) -> FloatTensor<B> {
-    let device = mixed.device();
-    let (mixed, output, gradient) = (B::hold(mixed), B::hold(output), B::hold(gradient));
-    let (mixed, output, gradient) = (B::rows(&mixed), B::rows(&output), B::rows(&gradient));
-    let vertices = mixed.count() / 2;
-    let columns = mixed.columns();
-    let chunks = chunks(&[vertices], columns);
-    let mut result = NewValues::new(mixed.count() * columns);
-    let lengths = || part_lengths(&chunks, columns);
-    let mut first = result.parts(lengths().chain(lengths()));
-    let second = first.split_off(chunks.len());
-    let tasks: Vec<_> = chunks.iter().zip(first.into_iter().zip(second)).collect();
-    for_each(tasks, |(chunk, (first, second))| {
-        let (first, second) = (first.zeroed(), second.zeroed());
-        vectorised(
-            #[inline(always)]
-            || backward_chunk([mixed, output, gradient], vertices, chunk, first, second),
-        );
-    });
-    B::matrix(result.finish(), columns, &device)
+/// Gradient of the mixed gradients from these, the features and the gradient of the features.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FeatureGradients;
+
+impl TensorKernel for FeatureGradients {
+    fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
+        let [mixed, output, gradient] = arguments.take();
+        let [[x0, x1, x2], [y0, y1, y2]] = blocks::<B>(mixed);
+        let square = B::float_mul(output.clone(), output);
+        let slope = B::float_sub(gradient.clone(), B::float_mul(gradient, square));
+        let of_x0 = B::float_mul(slope.clone(), B::float_sub(x1, y2));
+        let of_y0 = B::float_mul(slope.clone(), B::float_add(y1, x2));
+        let of_x1 = B::float_mul(slope.clone(), x0);
+        let of_y1 = B::float_mul(slope, y0);
+        let first = B::float_cat(vec![of_x0, of_x1.clone(), of_y1.clone()], 1);
+        let second = B::float_cat(vec![of_y0, of_y1, B::float_neg(of_x1)], 1);
+        [B::float_cat(vec![first, second], 0)].into()
+    }
+
+    fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
+        let held = arguments.take().map(B::hold);
+        let [mixed, output, gradient] = held.each_ref().map(B::view);
+        let (vertices, columns) = (mixed.rows() / 2, mixed.columns());
+        let chunks = chunks(&Packing::new([vertices]), columns);
+        // Every task writes rows of both axes of the one matrix.
+        let lengths: Vec<usize> = chunks.iter().map(|chunk| chunk.rows.len() * columns).collect();
+        let mut result = NewValues::new([lengths.clone(), lengths].concat());
+        let mut first = result.parts();
+        let second = first.split_off(chunks.len());
+        let tasks = chunks.iter().zip(first.into_iter().zip(second)).collect();
+        for_each(tasks, |(chunk, (first, second)): (&Chunk, (NewPart<'_>, NewPart<'_>))| {
+            let (first, second) = (first.zeroed(), second.zeroed());
+            vectorised(
+                #[inline(always)]
+                || backward_chunk([mixed, output, gradient], vertices, chunk, first, second),
+            );
+        });
+        [B::matrix(result.finish(), columns)].into()
+    }
 }
 
 #[inline(always)]
 fn backward_chunk(
-    [mixed, output, gradient]: [Rows<'_>; 3],
+    [mixed, output, gradient]: [MatrixView<'_>; 3],
     vertices: usize,
     chunk: &Chunk,
     first: &mut [f32],
@@ -104,87 +148,19 @@ fn backward_chunk(
         let [x0, x1, x2] = thirds(mixed.row(vertex));
         let [y0, y1, y2] = thirds(mixed.row(vertices + vertex));
         let (output, gradient) = (&output.row(vertex)[..width], &gradient.row(vertex)[..width]);
-        let (to_x0, rest) = first.split_at_mut(width);
-        let (to_x1, to_x2) = rest.split_at_mut(width);
-        let (to_y0, rest) = second.split_at_mut(width);
-        let (to_y1, to_y2) = rest.split_at_mut(width);
-        let (to_x2, to_y2) = (&mut to_x2[..width], &mut to_y2[..width]);
+        let (of_x0, rest) = first.split_at_mut(width);
+        let (of_x1, of_x2) = rest.split_at_mut(width);
+        let (of_y0, rest) = second.split_at_mut(width);
+        let (of_y1, of_y2) = rest.split_at_mut(width);
+        let (of_x2, of_y2) = (&mut of_x2[..width], &mut of_y2[..width]);
         for channel in 0..width {
             let slope = gradient[channel] * (-output[channel]).mul_add(output[channel], 1.0);
-            to_x0[channel] = slope * (x1[channel] - y2[channel]);
-            to_y0[channel] = slope * (y1[channel] + x2[channel]);
-            to_x1[channel] = slope * x0[channel];
-            to_y2[channel] = -slope * x0[channel];
-            to_y1[channel] = slope * y0[channel];
-            to_x2[channel] = slope * y0[channel];
-        }
-    }
-}
-
-// ---------------------------------------------------------------------------------------------------------- any backend
-
-/// The six blocks `[[x0, x1, x2], [y0, y1, y2]]`.
-fn blocks<B: Backend>(mixed: FloatTensor<B>) -> [[FloatTensor<B>; 3]; 2] {
-    let (vertices, width) = (mixed.shape()[0] / 2, mixed.shape()[1] / 3);
-    [0, 1].map(|axis| {
-        [0, 1, 2].map(|part| {
-            let rows = Slice::from(axis * vertices..(axis + 1) * vertices);
-            B::float_slice(mixed.clone(), &[rows, Slice::from(part * width..(part + 1) * width)])
-        })
-    })
-}
-
-pub(super) fn forward<B: Backend>(mixed: FloatTensor<B>) -> FloatTensor<B> {
-    let [[x0, x1, x2], [y0, y1, y2]] = blocks::<B>(mixed);
-    let real = B::float_mul(x0, B::float_sub(x1, y2));
-    let imaginary = B::float_mul(y0, B::float_add(y1, x2));
-    B::float_tanh(B::float_add(real, imaginary))
-}
-
-pub(super) fn backward<B: Backend>(
-    mixed: FloatTensor<B>,
-    output: FloatTensor<B>,
-    gradient: FloatTensor<B>,
-) -> FloatTensor<B> {
-    let [[x0, x1, x2], [y0, y1, y2]] = blocks::<B>(mixed);
-    let square = B::float_mul(output.clone(), output);
-    let slope = B::float_sub(gradient.clone(), B::float_mul(gradient, square));
-    let to_x0 = B::float_mul(slope.clone(), B::float_sub(x1, y2));
-    let to_y0 = B::float_mul(slope.clone(), B::float_add(y1, x2));
-    let to_x1 = B::float_mul(slope.clone(), x0);
-    let to_y1 = B::float_mul(slope, y0);
-    let first = B::float_cat(vec![to_x0, to_x1.clone(), to_y1.clone()], 1);
-    let second = B::float_cat(vec![to_y0, to_y1, B::float_neg(to_x1)], 1);
-    B::float_cat(vec![first, second], 0)
-}
-
-// ------------------------------------------------------------------------------------------------------------- autodiff
-
-#[derive(Debug)]
-struct FeaturesBackward;
-
-impl<B: Kernels> Backward<B, 1> for FeaturesBackward {
-    type State = (FloatTensor<B>, FloatTensor<B>);
-
-    fn backward(self, ops: Ops<Self::State, 1>, grads: &mut Gradients, _: &mut Checkpointer) {
-        let (mixed, output) = ops.state;
-        let gradient = grads.consume::<B>(&ops.node);
-        if let [Some(parent)] = ops.parents {
-            grads.register::<B>(parent.id, B::gradient_features_backward(mixed, output, gradient));
-        }
-    }
-}
-
-/// Runs the operation and records it if its argument is tracked.
-pub(super) fn record<B: Kernels, C: CheckpointStrategy>(
-    mixed: FloatTensor<Autodiff<B, C>>,
-) -> FloatTensor<Autodiff<B, C>> {
-    let (mixed, node) = mixed.into_parts();
-    match Backward::<B, 1>::prepare::<C>(FeaturesBackward, [node]).compute_bound().stateful() {
-        OpsKind::UnTracked(operation) => operation.finish(B::gradient_features_forward(mixed)),
-        OpsKind::Tracked(operation) => {
-            let output = B::gradient_features_forward(mixed.clone());
-            operation.finish((mixed, output.clone()), output)
+            of_x0[channel] = slope * (x1[channel] - y2[channel]);
+            of_y0[channel] = slope * (y1[channel] + x2[channel]);
+            of_x1[channel] = slope * x0[channel];
+            of_y2[channel] = -slope * x0[channel];
+            of_y1[channel] = slope * y0[channel];
+            of_x2[channel] = slope * y0[channel];
         }
     }
 }

@@ -4,12 +4,19 @@ use std::mem::MaybeUninit;
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use burn::backend::tensor::{Device, FloatTensor};
-use burn::backend::{Backend, TensorMetadata};
-use burn::tensor::{DType, TensorData};
+use burn::backend::Backend;
+use burn::backend::tensor::FloatTensor;
+use burn::tensor::TensorData;
 use rayon::prelude::*;
 
-use super::segments::ranges;
+use super::composed::multiply_add;
+use super::tensors::Tensors;
+use crate::packing::Packing;
+
+#[cfg(feature = "flex")]
+mod flex;
+#[cfg(feature = "ndarray")]
+mod ndarray;
 
 /// Elements one task works on: about a second-level cache, so that small tensors stay on one thread.
 pub(super) const CHUNK_ELEMENTS: usize = 1 << 14;
@@ -22,8 +29,8 @@ pub(super) trait HostBackend: Backend {
     /// Holds a matrix for reading, copying only if its rows are not contiguous.
     fn hold(tensor: FloatTensor<Self>) -> Self::Held;
 
-    /// The rows of a held matrix.
-    fn rows(held: &Self::Held) -> Rows<'_>;
+    /// Read access to a held matrix.
+    fn view(held: &Self::Held) -> MatrixView<'_>;
 
     /// All elements of a tensor of any shape in row-major order, which is made so if it is not. `None` if the elements are
     /// not f32 or the backend does not lend them.
@@ -36,68 +43,115 @@ pub(super) trait HostBackend: Backend {
         None
     }
 
-    /// The elements of a matrix whose memory is nobody else's and holds nothing else, for writing in place; `None` if it is
-    /// not so, or they are not f32.
+    /// The elements of a matrix whose memory no other tensor shares and that fills its memory, for writing in place; `None`
+    /// otherwise, or if they are not f32.
     fn own_values_mut(_tensor: &mut FloatTensor<Self>) -> Option<&mut [f32]> {
         None
     }
 
-    /// A matrix from its elements.
-    fn matrix(values: Vec<f32>, columns: usize, device: &Device<Self>) -> FloatTensor<Self> {
-        let rows = values.len() / columns.max(1);
-        Self::float_from_data(TensorData::new(values, [rows, columns]), device)
+    /// `lhs·rhs`, plus the addend if there is one, in the memory of the addend if no other tensor shares it.
+    fn product(
+        lhs: FloatTensor<Self>,
+        rhs: FloatTensor<Self>,
+        addend: Option<FloatTensor<Self>>,
+    ) -> FloatTensor<Self> {
+        multiply_add::<Self>(lhs, rhs, addend)
     }
-}
 
-/// Whether the kernels, which are written for f32, apply.
-pub(super) fn all_f32<B: Backend>(tensors: &[&FloatTensor<B>]) -> bool {
-    tensors.iter().all(|tensor| tensor.dtype() == DType::F32)
+    /// A matrix from its elements.
+    fn matrix(values: Vec<f32>, columns: usize) -> FloatTensor<Self> {
+        let rows = values.len() / columns.max(1);
+        // The host is the only device of such a backend.
+        Self::float_from_data(TensorData::new(values, [rows, columns]), &Default::default())
+    }
 }
 
 /// Read access to a matrix whose rows are contiguous.
 #[derive(Clone, Copy)]
-pub(super) struct Rows<'a> {
+pub(super) struct MatrixView<'a> {
     values: &'a [f32],
-    stride: usize,
+    row_stride: usize,
     columns: usize,
-    count: usize,
+    rows: usize,
 }
 
-impl<'a> Rows<'a> {
+impl<'a> MatrixView<'a> {
     pub(super) fn columns(&self) -> usize {
         self.columns
     }
 
-    pub(super) fn count(&self) -> usize {
-        self.count
+    pub(super) fn rows(&self) -> usize {
+        self.rows
     }
 
     #[inline(always)]
     pub(super) fn row(&self, row: usize) -> &'a [f32] {
-        &self.values[row * self.stride..row * self.stride + self.columns]
+        &self.values[row * self.row_stride..row * self.row_stride + self.columns]
     }
 }
 
-/// A run of rows inside one segment.
+/// A run of rows inside one garment.
 #[derive(Clone, Debug)]
 pub(super) struct Chunk {
-    pub(super) segment: usize,
+    pub(super) garment: usize,
     pub(super) rows: Range<usize>,
 }
 
-/// Cuts segments into chunks whose size depends on the number of columns only.
-pub(super) fn chunks(ends: &[usize], columns: usize) -> Vec<Chunk> {
+/// Cuts packed rows into chunks whose size depends on the number of columns only.
+pub(super) fn chunks(packing: &Packing, columns: usize) -> Vec<Chunk> {
     let step = (CHUNK_ELEMENTS / columns.max(1)).max(1);
-    let mut chunks = Vec::new();
-    for (segment, range) in ranges(ends).enumerate() {
-        let mut start = range.start;
-        while start < range.end {
-            let end = (start + step).min(range.end);
-            chunks.push(Chunk { segment, rows: start..end });
-            start = end;
+    let of_garment = |(garment, rows): (usize, Range<usize>)| {
+        let end = rows.end;
+        rows.step_by(step).map(move |start| Chunk { garment, rows: start..(start + step).min(end) })
+    };
+    packing.ranges().enumerate().flat_map(of_garment).collect()
+}
+
+/// What the chunks of rows make one matrix of.
+#[derive(Clone, Copy)]
+pub(super) enum OutputMatrix {
+    /// The same rows, of so many columns.
+    Rows(usize),
+    /// One row of so many columns per garment: its chunks' rows summed in order, in f64.
+    Sums(usize),
+}
+
+/// Matrices whose parts `kernel` writes chunk by chunk, in parallel and vectorised; it finds zeros there.
+///
+/// Chunks have about [`CHUNK_ELEMENTS`] elements in `columns` columns. Mark the kernel `#[inline(always)]`.
+pub(super) fn compute<B: HostBackend, const K: usize>(
+    packing: &Packing,
+    columns: usize,
+    outputs: [OutputMatrix; K],
+    kernel: impl Fn(&Chunk, [&mut [f32]; K]) + Sync,
+) -> Tensors<B> {
+    let chunks = chunks(packing, columns);
+    let lengths = |output| {
+        let length = |chunk: &Chunk| match output {
+            OutputMatrix::Rows(columns) => chunk.rows.len() * columns,
+            OutputMatrix::Sums(columns) => columns,
+        };
+        chunks.iter().map(length).collect()
+    };
+    let mut matrices = outputs.map(|output| (output, NewValues::new(lengths(output))));
+    let mut parts = matrices.each_mut().map(|(_, values)| values.parts().into_iter());
+    let mut next = || parts.each_mut().map(|parts| parts.next().expect("every chunk has a part"));
+    let tasks = chunks.iter().map(|chunk| (chunk, next())).collect();
+    for_each(tasks, |(chunk, parts)| {
+        let parts = parts.map(NewPart::zeroed);
+        vectorised(
+            #[inline(always)]
+            || kernel(chunk, parts),
+        );
+    });
+    let matrix = |(output, values): (OutputMatrix, NewValues)| match output {
+        OutputMatrix::Rows(columns) => B::matrix(values.finish(), columns),
+        OutputMatrix::Sums(columns) => {
+            let sums = sum_partials(&values.finish(), &chunks, columns, packing.count());
+            B::matrix(sums, columns)
         }
-    }
-    chunks
+    };
+    matrices.map(matrix).into()
 }
 
 /// The part of `values` (rows of `columns` elements) that belongs to each chunk.
@@ -106,62 +160,58 @@ pub(super) fn split_mut<'a>(
     chunks: &[Chunk],
     columns: usize,
 ) -> Vec<&'a mut [f32]> {
-    let mut parts = Vec::with_capacity(chunks.len());
-    for chunk in chunks {
-        let (part, rest) = values.split_at_mut(chunk.rows.len() * columns);
-        parts.push(part);
+    let next = |chunk: &Chunk| {
+        let (part, rest) = std::mem::take(&mut values).split_at_mut(chunk.rows.len() * columns);
         values = rest;
-    }
-    parts
-}
-
-/// Elements of the part of a matrix that belongs to each chunk.
-pub(super) fn part_lengths(chunks: &[Chunk], columns: usize) -> impl Iterator<Item = usize> + '_ {
-    chunks.iter().map(move |chunk| chunk.rows.len() * columns)
+        part
+    };
+    chunks.iter().map(next).collect()
 }
 
 /// Elements of a new matrix. Its memory is not zeroed in one pass before the work: the task that computes a part zeroes
-/// that part, in its own cache and beside the others.
+/// that part, in its own cache and in parallel with the others.
 pub(super) struct NewValues {
     values: Vec<f32>,
-    count: usize,
+    lengths: Vec<usize>,
     zeroed: AtomicUsize,
 }
 
 /// A run of elements of [`NewValues`].
-pub(super) struct Part<'a> {
+pub(super) struct NewPart<'a> {
     memory: &'a mut [MaybeUninit<f32>],
     zeroed: &'a AtomicUsize,
 }
 
 impl NewValues {
-    pub(super) fn new(count: usize) -> Self {
-        Self { values: Vec::with_capacity(count), count, zeroed: AtomicUsize::new(0) }
+    /// Consecutive parts of the given lengths.
+    pub(super) fn new(lengths: Vec<usize>) -> Self {
+        Self { values: Vec::with_capacity(lengths.iter().sum()), lengths, zeroed: AtomicUsize::new(0) }
     }
 
-    /// Consecutive parts of the given lengths, which must make up all of it.
-    pub(super) fn parts(&mut self, lengths: impl IntoIterator<Item = usize>) -> Vec<Part<'_>> {
+    /// The parts, to be written once.
+    pub(super) fn parts(&mut self) -> Vec<NewPart<'_>> {
         *self.zeroed.get_mut() = 0;
         let zeroed = &self.zeroed;
-        let mut memory = &mut self.values.spare_capacity_mut()[..self.count];
-        let next = |length| {
-            let (part, rest) = std::mem::take(&mut memory).split_at_mut(length);
+        let mut memory = self.values.spare_capacity_mut();
+        let next = |length: &usize| {
+            let (part, rest) = std::mem::take(&mut memory).split_at_mut(*length);
             memory = rest;
-            Part { memory: part, zeroed }
+            NewPart { memory: part, zeroed }
         };
-        lengths.into_iter().map(next).collect()
+        self.lengths.iter().map(next).collect()
     }
 
     /// The elements, once every part has been written.
     pub(super) fn finish(mut self) -> Vec<f32> {
-        assert_eq!(*self.zeroed.get_mut(), self.count, "every part of a matrix is written");
+        let count = self.lengths.iter().sum();
+        assert_eq!(*self.zeroed.get_mut(), count, "every part of a matrix is written");
         // SAFETY: parts do not overlap and each counts its elements once, when they have been written: all have been.
-        unsafe { self.values.set_len(self.count) };
+        unsafe { self.values.set_len(count) };
         self.values
     }
 }
 
-impl<'a> Part<'a> {
+impl<'a> NewPart<'a> {
     #[inline(always)]
     pub(super) fn zeroed(self) -> &'a mut [f32] {
         self.memory.fill(MaybeUninit::new(0.0));
@@ -196,108 +246,14 @@ pub(super) fn vectorised<R>(kernel: impl FnOnce() -> R) -> R {
     kernel()
 }
 
-/// Adds the rows of `partial` (one per chunk) into one row per segment, in chunk order, in f64.
-pub(super) fn sum_partials(partial: &[f32], chunks: &[Chunk], columns: usize, segments: usize) -> Vec<f32> {
-    let mut sums = vec![0.0_f64; segments * columns];
+/// Adds the rows of `partial` (one per chunk) into one row per garment, in chunk order, in f64.
+fn sum_partials(partial: &[f32], chunks: &[Chunk], columns: usize, garments: usize) -> Vec<f32> {
+    let mut sums = vec![0.0_f64; garments * columns];
     for (chunk, row) in chunks.iter().zip(partial.chunks_exact(columns.max(1))) {
-        let sum = &mut sums[chunk.segment * columns..(chunk.segment + 1) * columns];
+        let sum = &mut sums[chunk.garment * columns..(chunk.garment + 1) * columns];
         for (sum, value) in sum.iter_mut().zip(row) {
             *sum += f64::from(*value);
         }
     }
     sums.into_iter().map(|sum| sum as f32).collect()
-}
-
-#[cfg(feature = "flex")]
-mod flex {
-    use burn::backend::Flex;
-
-    use super::*;
-
-    /// Where the elements lie once the tensor has been made contiguous; `None` if they are not f32.
-    fn contiguous(tensor: &mut FloatTensor<Flex>) -> Option<Range<usize>> {
-        if tensor.dtype() != DType::F32 {
-            return None;
-        }
-        if !tensor.layout().is_contiguous() {
-            *tensor = tensor.to_contiguous();
-        }
-        let start = tensor.layout().start_offset();
-        Some(start..start + tensor.layout().num_elements())
-    }
-
-    impl HostBackend for Flex {
-        type Held = FloatTensor<Flex>;
-
-        fn hold(tensor: FloatTensor<Self>) -> Self::Held {
-            let strides = tensor.layout().strides();
-            // A block of columns of a wider matrix is read in place.
-            let contiguous_rows =
-                strides.len() == 2 && (strides[1] == 1 || tensor.layout().shape()[1] == 1) && strides[0] >= 0;
-            if contiguous_rows { tensor } else { tensor.to_contiguous() }
-        }
-
-        fn values(tensor: &mut FloatTensor<Self>) -> Option<&[f32]> {
-            let range = contiguous(tensor)?;
-            tensor.storage::<f32>().get(range)
-        }
-
-        fn values_mut(tensor: &mut FloatTensor<Self>) -> Option<&mut [f32]> {
-            let range = contiguous(tensor)?;
-            tensor.storage_mut::<f32>().get_mut(range)
-        }
-
-        fn own_values_mut(tensor: &mut FloatTensor<Self>) -> Option<&mut [f32]> {
-            let layout = tensor.layout();
-            let whole = tensor.dtype() == DType::F32 && layout.is_contiguous() && layout.start_offset() == 0;
-            let count = layout.num_elements();
-            (whole && tensor.is_unique())
-                .then(|| tensor.storage_mut::<f32>())
-                .filter(|values| values.len() == count)
-        }
-
-        fn rows(held: &Self::Held) -> Rows<'_> {
-            let layout = held.layout();
-            let [count, columns] = [layout.shape()[0], layout.shape()[1]];
-            Rows {
-                values: &held.storage::<f32>()[layout.start_offset()..],
-                stride: layout.strides()[0] as usize,
-                columns,
-                count,
-            }
-        }
-    }
-}
-
-// burn deprecates the backend but still ships it, and users ask for it.
-#[cfg(feature = "ndarray")]
-#[allow(deprecated)]
-mod ndarray {
-    use burn::backend::NdArray;
-    use burn::backend::ops::FloatTensorOps;
-
-    use super::*;
-
-    /// Elements copied out of the array, with its shape.
-    pub(in crate::ops) struct Copied {
-        values: Vec<f32>,
-        columns: usize,
-    }
-
-    impl HostBackend for NdArray {
-        type Held = Copied;
-
-        fn hold(tensor: FloatTensor<Self>) -> Self::Held {
-            let columns = tensor.shape()[1];
-            let data = burn::backend::read_sync(Self::float_into_data(tensor));
-            // Reading host memory cannot fail, and the caller has checked the element type.
-            let values = data.ok().and_then(|data| data.try_into_vec::<f32>().ok()).unwrap_or_default();
-            Copied { values, columns }
-        }
-
-        fn rows(held: &Self::Held) -> Rows<'_> {
-            let columns = held.columns;
-            Rows { values: &held.values, stride: columns, columns, count: held.values.len() / columns.max(1) }
-        }
-    }
 }

@@ -1,38 +1,37 @@
 //! Operations the networks are made of, fused where burn's own are slow.
 //!
-//! Each file holds one operation: what it computes, its kernel for host memory (vectorised for the CPU found at run time,
-//! parallel over fixed row chunks, hence bit-identical for any number of threads), its composition of backend operations
-//! for every other device, and its hand-written backward pass. `tensor_form` composes the same mathematics from burn's own
-//! differentiable operations and is what the tests compare with.
+//! Each file holds one operation: what it computes, composed of the operations of any backend and in one pass over host
+//! memory (vectorised for the CPU found at run time, parallel over fixed row chunks, hence bit-identical for any number of
+//! threads), and its hand-written backward pass. Below them lie `operation` (how a backend runs and records one), `host`
+//! (loops over rows), `composed`, `math` and `gemm`, which know no operation.
 
 // Without a backend in host memory nothing runs the host kernels.
 #![cfg_attr(not(any(feature = "flex", feature = "ndarray")), allow(dead_code, unused_imports))]
 
 mod activation;
 mod adam;
-mod backend;
+mod composed;
+#[cfg(feature = "flex")]
+mod gemm;
 mod gradient_features;
 mod host;
-mod kernels;
 mod math;
 mod norm;
+mod operation;
 mod product;
-mod segments;
 mod sine_modulation;
 mod skin_correction;
 mod split_columns;
-#[cfg(test)]
-pub(crate) mod tensor_form;
+mod tensors;
 #[cfg(test)]
 mod tests;
 mod transform_points;
 
-pub use activation::{Activation, activate, activate_residual, segment_activate, segment_activate_sum};
+pub use activation::{Activation, activate, activate_packed, activate_packed_sum, activate_residual};
 pub use adam::{AdamFactors, adam_step};
 pub use gradient_features::gradient_features;
 pub use norm::{scale_by, squared_norm};
 pub use product::{product, product_add};
-pub use segments::Segments;
 pub use sine_modulation::sine_modulation;
 pub use skin_correction::skin_correction;
 pub use split_columns::split_columns;

@@ -1,25 +1,23 @@
 //! Cuts a wide matrix into column blocks, with a backward pass linear in its size.
 //!
 //! The gradient of an ordinary slice is the whole matrix, zero but for the slice, and one such matrix is added per block:
-//! quadratic in the number of blocks. Here every block leaves its gradient in a shared place, and one collector below all
-//! blocks joins them once.
+//! quadratic in the number of blocks. Here every block stores its gradient in one list, and a collector below all blocks
+//! joins them once.
 
 use std::any::Any;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use burn::backend::autodiff::checkpoint::{base::Checkpointer, strategy::CheckpointStrategy};
-use burn::backend::autodiff::grads::Gradients;
-use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
 use burn::backend::tensor::FloatTensor;
-use burn::backend::{Autodiff, Backend, Dispatch, TensorMetadata};
-use burn::tensor::{Shape, Slice, Tensor};
+use burn::backend::{Backend, TensorMetadata};
+use burn::tensor::{Shape, Tensor};
 
-use super::backend::FusedOps;
-use super::kernels::Kernels;
+use super::composed::column_block;
+use super::operation::{ArgumentGradients, FusedOps, Operation, Saved, TensorKernel, apply};
+use super::tensors::Tensors;
 
-/// Gradients of the blocks of one matrix, on their way to the collector (which knows their type).
+/// Gradients of the blocks of one matrix, kept for the collector (which knows their type).
 #[derive(Clone, Debug)]
-pub(super) struct ColumnGradients {
+struct ColumnGradients {
     blocks: Arc<Mutex<Vec<Option<Box<dyn Any + Send>>>>>,
     width: usize,
 }
@@ -29,8 +27,8 @@ impl ColumnGradients {
         Self { blocks: Arc::new(Mutex::new((0..count).map(|_| None).collect())), width }
     }
 
-    /// Leaves the gradient of a block; true if it is the first one to arrive.
-    fn leave<B: Backend>(&self, block: usize, gradient: FloatTensor<B>) -> bool {
+    /// Stores the gradient of a block; true if it is the first one.
+    fn store<B: Backend>(&self, block: usize, gradient: FloatTensor<B>) -> bool {
         let mut blocks = self.blocks.lock().unwrap_or_else(PoisonError::into_inner);
         let first = blocks.iter().all(Option::is_none);
         blocks[block] = Some(Box::new(gradient));
@@ -59,78 +57,47 @@ pub fn split_columns(wide: Tensor<2>, width: usize, count: usize) -> Vec<Tensor<
         return vec![wide];
     }
     let gradients = ColumnGradients::new(count, width);
-    let collector = Dispatch::column_collector(wide.into_dispatch(), gradients.clone());
-    (0..count)
-        .map(|block| {
-            Tensor::from_dispatch(Dispatch::column_block(collector.clone(), block, gradients.clone()))
-        })
-        .collect()
+    let collected = apply(Collector(gradients.clone()), [wide]);
+    let block = |index| apply(Block { index, gradients: gradients.clone() }, [collected.clone()]);
+    (0..count).map(block).collect()
 }
 
-pub(super) fn block<B: Backend>(
-    wide: FloatTensor<B>,
-    block: usize,
-    gradients: &ColumnGradients,
-) -> FloatTensor<B> {
-    let (rows, width) = (wide.shape()[0], gradients.width);
-    B::float_slice(wide, &[Slice::from(0..rows), Slice::from(block * width..(block + 1) * width)])
-}
+/// The wide matrix itself, which gets the joined gradients of its blocks.
+#[derive(Clone, Debug)]
+struct Collector(ColumnGradients);
 
-// ------------------------------------------------------------------------------------------------------------- autodiff
-
-#[derive(Debug)]
-struct CollectorBackward;
-
-impl<B: Backend> Backward<B, 1> for CollectorBackward {
-    type State = ColumnGradients;
-
-    fn backward(self, ops: Ops<Self::State, 1>, grads: &mut Gradients, _: &mut Checkpointer) {
-        // What the blocks registered is only a sign that they have run.
-        let _ = grads.consume::<B>(&ops.node);
-        if let ([Some(parent)], Some(gradient)) = (ops.parents, ops.state.join::<B>()) {
-            grads.register::<B>(parent.id, gradient);
-        }
+impl TensorKernel for Collector {
+    fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
+        arguments
     }
 }
 
-#[derive(Debug)]
-struct BlockBackward;
-
-impl<B: Backend> Backward<B, 1> for BlockBackward {
-    type State = (ColumnGradients, usize);
-
-    fn backward(self, ops: Ops<Self::State, 1>, grads: &mut Gradients, _: &mut Checkpointer) {
-        let (gradients, block) = ops.state;
-        let gradient = grads.consume::<B>(&ops.node);
-        let (device, dtype) = (gradient.device(), gradient.dtype());
-        if let [Some(collector)] = ops.parents
-            && gradients.leave::<B>(block, gradient)
-        {
-            grads.register::<B>(collector.id, B::float_zeros(Shape::new([1]), &device, dtype.into()));
-        }
+impl Operation<1> for Collector {
+    /// The gradient that the blocks registered is only a sign that they have run.
+    fn backward<B: FusedOps>(&self, _: Saved<B, 1>, _: FloatTensor<B>) -> ArgumentGradients<B, 1> {
+        [self.0.join::<B>()]
     }
 }
 
-pub(super) fn record_collector<B: Kernels, C: CheckpointStrategy>(
-    wide: FloatTensor<Autodiff<B, C>>,
-    gradients: ColumnGradients,
-) -> FloatTensor<Autodiff<B, C>> {
-    let (wide, node) = wide.into_parts();
-    match Backward::<B, 1>::prepare::<C>(CollectorBackward, [node]).compute_bound().stateful() {
-        OpsKind::UnTracked(operation) => operation.finish(wide),
-        OpsKind::Tracked(operation) => operation.finish(gradients, wide),
-    }
-}
-
-pub(super) fn record_block<B: Kernels, C: CheckpointStrategy>(
-    wide: FloatTensor<Autodiff<B, C>>,
+/// One block of columns of the collected matrix.
+#[derive(Clone, Debug)]
+struct Block {
     index: usize,
     gradients: ColumnGradients,
-) -> FloatTensor<Autodiff<B, C>> {
-    let (wide, node) = wide.into_parts();
-    let output = block::<B>(wide, index, &gradients);
-    match Backward::<B, 1>::prepare::<C>(BlockBackward, [node]).compute_bound().stateful() {
-        OpsKind::UnTracked(operation) => operation.finish(output),
-        OpsKind::Tracked(operation) => operation.finish((gradients, index), output),
+}
+
+impl TensorKernel for Block {
+    fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
+        let [wide] = arguments.take();
+        let width = self.gradients.width;
+        [column_block::<B>(wide, self.index * width..(self.index + 1) * width)].into()
+    }
+}
+
+impl Operation<1> for Block {
+    fn backward<B: FusedOps>(&self, _: Saved<B, 1>, gradient: FloatTensor<B>) -> ArgumentGradients<B, 1> {
+        let (device, dtype) = (gradient.device(), gradient.dtype());
+        let first = self.gradients.store::<B>(self.index, gradient);
+        [first.then(|| B::float_zeros(Shape::new([1]), &device, dtype.into()))]
     }
 }

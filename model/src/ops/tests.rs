@@ -1,15 +1,28 @@
-//! Every fused operation against its tensor form: values and all gradients, and against finite differences in f64 where the
-//! tensor form itself could be wrong.
+//! Every fused operation against its composed form, which burn differentiates: values and all gradients; and against finite
+//! differences in f64 where the composed form itself could be wrong.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use burn::backend::Dispatch;
 use burn::tensor::{Device, Tensor};
 
+use super::activation::{ActivatedSum, ActivatedSumGradients};
+use super::gradient_features::{FeatureGradients, GradientFeatures};
+use super::operation::{FusedOps, TensorKernel, run};
+use super::sine_modulation::{SineGradients, SineModulation};
+use super::skin_correction::Projection;
+use super::tensors::Tensors;
+use super::transform_points::{TransformGradients, TransformPoints};
 use super::*;
+use crate::packing::Packing;
 use crate::testing::{assert_close, device, gradients_of, uniform};
 
 const ROWS: usize = 70;
-const LENGTHS: [usize; 3] = [40, 1, 29];
+const ACTIVATIONS: [Activation; 3] = [Activation::Identity, Activation::Relu, Activation::Gelu];
+
+fn packing() -> Packing {
+    Packing::new([40, 1, 29])
+}
 
 /// Different values at every call.
 fn random(rows: usize, columns: usize, device: &Device) -> Tensor<2> {
@@ -18,154 +31,178 @@ fn random(rows: usize, columns: usize, device: &Device) -> Tensor<2> {
     if device.is_autodiff() { tensor.autodiff() } else { tensor }
 }
 
+/// One garment's joints in every row.
+fn joint_mask() -> Tensor<2> {
+    let rows = [[1.0, 0.0, 1.0, 1.0], [0.0, 0.0, 1.0, 0.0], [1.0, 1.0, 1.0, 1.0]];
+    Tensor::from_floats(rows, &device().inner())
+}
+
+/// The result of a kernel composed of burn's differentiable operations.
+fn composed<const N: usize>(kernel: &impl TensorKernel, arguments: [Tensor<2>; N]) -> Tensor<2> {
+    let arguments = Tensors::from(arguments.map(Tensor::into_dispatch));
+    let [result] = Dispatch::compose(kernel, arguments).take();
+    Tensor::from_dispatch(result)
+}
+
 /// Runs both forms on the same random inputs, weighs their outputs with the same random matrix, and compares outputs and
 /// the gradients of all inputs.
-fn compare(
-    shapes: &[[usize; 2]],
-    fused: impl Fn(Vec<Tensor<2>>) -> Tensor<2>,
-    tensor_form: impl Fn(Vec<Tensor<2>>) -> Tensor<2>,
+fn compare<const N: usize>(
+    shapes: [[usize; 2]; N],
+    fused: impl Fn([Tensor<2>; N]) -> Tensor<2>,
+    composed: impl Fn([Tensor<2>; N]) -> Tensor<2>,
 ) {
     let device = device();
-    let inputs: Vec<_> = shapes.iter().map(|[rows, columns]| random(*rows, *columns, &device)).collect();
+    let inputs = shapes.map(|[rows, columns]| random(rows, columns, &device));
     let (fused_output, fused_gradients) = gradients_of(&inputs, &fused);
-    let (output, gradients) = gradients_of(&inputs, &tensor_form);
+    let (output, gradients) = gradients_of(&inputs, &composed);
     assert_close(&fused_output, &output, 2e-6);
     for (fused, expected) in fused_gradients.iter().zip(&gradients) {
         assert_close(fused, expected, 1e-5);
     }
-    // A plain device takes the path without recording.
-    let plain = fused(inputs.into_iter().map(Tensor::inner).collect());
+    // A plain device takes the branch without recording.
+    let plain = fused(inputs.map(Tensor::inner));
     assert_close(&plain, &output, 2e-6);
 }
 
+/// Compares the two forms of a kernel, of which all results are matrices.
+fn compare_forms<const N: usize>(kernel: &impl TensorKernel, arguments: [Tensor<2>; N]) {
+    let arguments = || Tensors::from(arguments.clone().map(Tensor::into_dispatch));
+    let (found, expected) = (run(kernel, arguments()), Dispatch::compose(kernel, arguments()));
+    assert_eq!(found.0.len(), expected.0.len());
+    for (found, expected) in found.0.into_iter().zip(expected.0) {
+        assert_close(&Tensor::from_dispatch(found), &Tensor::from_dispatch(expected), 1e-5);
+    }
+}
+
 #[test]
-fn activations_match_the_tensor_form() {
-    for activation in [Activation::Identity, Activation::Relu, Activation::Gelu] {
+fn activations_match_the_composed_form() {
+    for activation in ACTIVATIONS {
         for columns in [1, 7, 130] {
-            let matrix = [ROWS, columns];
-            let row = [1, columns];
+            let (matrix, row) = ([ROWS, columns], [1, columns]);
+            let sum = |has_residual| ActivatedSum { activation, packing: Packing::new([ROWS]), has_residual };
             compare(
-                &[matrix, row],
-                |t| activate(activation, t[0].clone(), t[1].clone()),
-                |t| tensor_form::apply(activation, t[0].clone() + t[1].clone()),
+                [matrix, row],
+                |[input, bias]| activate(activation, input, bias),
+                |arguments| composed(&sum(false), arguments),
             );
             compare(
-                &[matrix, row, matrix],
-                |t| activate_residual(activation, t[0].clone(), t[1].clone(), t[2].clone()),
-                |t| tensor_form::apply(activation, t[0].clone() + t[1].clone()) + t[2].clone(),
+                [matrix, row, matrix],
+                |[input, bias, residual]| activate_residual(activation, input, bias, residual),
+                |arguments| composed(&sum(true), arguments),
             );
         }
+        let sum = ActivatedSum { activation, packing: packing(), has_residual: false };
+        let (matrix, rows) = ([ROWS, 9], [3, 9]);
+        compare(
+            [matrix, rows],
+            |[input, rows]| activate_packed(activation, input, rows, &packing()),
+            |arguments| composed(&sum, arguments),
+        );
+        compare(
+            [matrix, matrix, rows],
+            |[a, b, rows]| activate_packed_sum(activation, [a, b], rows, &packing()),
+            |arguments| composed(&sum, arguments),
+        );
     }
 }
 
 #[test]
-fn products_match_the_tensor_form() {
+fn products_match_burns_own() {
     for [rows, inner, columns] in [[ROWS, 9, 33], [1, 1, 1], [300, 200, 190]] {
+        let (lhs, rhs) = ([rows, inner], [inner, columns]);
+        compare([lhs, rhs], |[a, b]| product(a, b), |[a, b]| a.matmul(b));
+        // The sum is held by the test, so that it must be left as it is; its gradient is that of the result.
         compare(
-            &[[rows, inner], [inner, columns]],
-            |t| product(t[0].clone(), t[1].clone()),
-            |t| t[0].clone().matmul(t[1].clone()),
+            [lhs, rhs, [rows, columns]],
+            |[a, b, sum]| product_add(a, b, sum),
+            |[a, b, sum]| a.matmul(b) + sum,
         );
-        // The sum is held by the test, so that it must be left alone; its gradient is that of the result.
+        // A sum whose memory no other tensor shares is added to in place.
         compare(
-            &[[rows, inner], [inner, columns], [rows, columns]],
-            |t| product_add(t[0].clone(), t[1].clone(), t[2].clone()),
-            |t| t[0].clone().matmul(t[1].clone()) + t[2].clone(),
-        );
-        // A sum that nobody else holds is added to in place.
-        compare(
-            &[[rows, inner], [inner, columns]],
-            |t| product_add(t[0].clone(), t[1].clone(), product(t[0].clone(), t[1].clone())),
-            |t| t[0].clone().matmul(t[1].clone()) * 2.0,
+            [lhs, rhs],
+            |[a, b]| product_add(a.clone(), b.clone(), product(a, b)),
+            |[a, b]| a.matmul(b) * 2.0,
         );
     }
-    // Matrices that lie in memory some other way.
+    // Views with other steps and offsets.
     compare(
-        &[[9, ROWS], [40, 9]],
-        |t| product(t[0].clone().transpose(), t[1].clone().slice([3..12, 2..7])),
-        |t| t[0].clone().transpose().matmul(t[1].clone().slice([3..12, 2..7])),
+        [[9, ROWS], [40, 9]],
+        |[a, b]| product(a.transpose(), b.slice([3..12, 2..7])),
+        |[a, b]| a.transpose().matmul(b.slice([3..12, 2..7])),
     );
 }
 
 #[test]
-fn segment_activations_match_the_tensor_form() {
-    let segments = Segments::new(LENGTHS);
-    for activation in [Activation::Identity, Activation::Relu, Activation::Gelu] {
-        compare(
-            &[[ROWS, 9], [3, 9]],
-            |t| segment_activate(activation, t[0].clone(), t[1].clone(), &segments),
-            |t| {
-                tensor_form::apply(activation, t[0].clone() + tensor_form::broadcast(t[1].clone(), &segments))
-            },
-        );
-        compare(
-            &[[ROWS, 9], [ROWS, 9], [3, 9]],
-            |t| segment_activate_sum(activation, [t[0].clone(), t[1].clone()], t[2].clone(), &segments),
-            |t| {
-                let rows = tensor_form::broadcast(t[2].clone(), &segments);
-                tensor_form::apply(activation, t[0].clone() + t[1].clone() + rows)
-            },
-        );
-    }
-}
-
-#[test]
-fn sine_modulation_matches_the_tensor_form() {
+fn sine_modulation_matches_the_composed_form() {
     for omega in [1.0, 30.0] {
         compare(
-            &[[ROWS, 33], [1, 33], [ROWS, 33]],
-            |t| sine_modulation(t[0].clone(), t[1].clone(), t[2].clone(), omega),
-            |t| tensor_form::sine_modulation(t[0].clone(), t[1].clone(), t[2].clone(), omega),
+            [[ROWS, 33], [1, 33], [ROWS, 33]],
+            |[input, bias, gate]| sine_modulation(input, bias, gate, omega),
+            |arguments| composed(&SineModulation { omega }, arguments),
         );
     }
 }
 
 #[test]
-fn gradient_features_match_the_tensor_form() {
+fn gradient_features_match_the_composed_form() {
+    compare([[2 * ROWS, 15]], |[mixed]| gradient_features(mixed), |mixed| composed(&GradientFeatures, mixed));
+}
+
+#[test]
+fn point_transforms_match_the_composed_form() {
     compare(
-        &[[2 * ROWS, 15]],
-        |t| gradient_features(t[0].clone()),
-        |t| tensor_form::gradient_features(t[0].clone()),
+        [[ROWS, 12], [ROWS, 3]],
+        |[transforms, points]| transform_points(transforms, points),
+        |arguments| composed(&TransformPoints, arguments),
     );
 }
 
 #[test]
-fn point_transforms_match_the_tensor_form() {
-    compare(
-        &[[ROWS, 12], [ROWS, 3]],
-        |t| transform_points(t[0].clone(), t[1].clone()),
-        |t| tensor_form::transform_points(t[0].clone(), t[1].clone()),
-    );
-}
-
-#[test]
-fn skin_correction_matches_the_tensor_form_and_keeps_row_sums() {
-    let segments = Segments::new(LENGTHS);
-    let mask = || {
-        let rows = [[1.0, 0.0, 1.0, 1.0], [0.0, 0.0, 1.0, 0.0], [1.0, 1.0, 1.0, 1.0]];
-        Tensor::<2>::from_floats(rows, &device().inner())
-    };
+fn skin_correction_matches_the_composed_form_and_keeps_row_sums() {
     for zero_sum in [true, false] {
+        let projection = Projection { packing: packing(), scale: 0.3, zero_sum };
         compare(
-            &[[ROWS, 4], [ROWS, 4]],
-            |t| skin_correction(t[0].clone(), t[1].clone(), mask(), &segments, 0.3, zero_sum),
-            |t| tensor_form::skin_correction(t[0].clone(), t[1].clone(), mask(), &segments, 0.3, zero_sum),
+            [[ROWS, 4], [ROWS, 4]],
+            |[weights, raw]| skin_correction(weights, raw, joint_mask(), &packing(), 0.3, zero_sum),
+            |[weights, raw]| composed(&projection, [joint_mask(), raw, weights]),
         );
     }
     let plain = device().inner();
     let (weights, raw) = (random(ROWS, 4, &plain), random(ROWS, 4, &plain));
-    let corrected = skin_correction(weights.clone(), raw, mask(), &segments, 0.3, true);
+    let corrected = skin_correction(weights.clone(), raw, joint_mask(), &packing(), 0.3, true);
     assert_close(&corrected.sum_dim(1), &weights.sum_dim(1), 1e-5);
 }
 
 #[test]
 fn split_columns_matches_slices_even_if_a_block_is_unused_or_used_twice() {
     let product = |blocks: Vec<Tensor<2>>| blocks[0].clone() * blocks[2].clone() + blocks[2].clone().sin();
-    compare(
-        &[[ROWS, 12]],
-        |t| product(split_columns(t[0].clone(), 3, 4)),
-        |t| product(tensor_form::split_columns(t[0].clone(), 3, 4)),
-    );
+    let slices = |wide: Tensor<2>| (0..4).map(|block| wide.clone().narrow(1, block * 3, 3)).collect();
+    compare([[ROWS, 12]], |[wide]| product(split_columns(wide, 3, 4)), |[wide]| product(slices(wide)));
+}
+
+/// The gradients that other backends compose.
+#[test]
+fn both_forms_of_every_gradient_agree() {
+    let device = device().inner();
+    let matrix = || random(ROWS, 9, &device);
+    for activation in ACTIVATIONS {
+        let gradients =
+            ActivatedSumGradients(ActivatedSum { activation, packing: packing(), has_residual: false });
+        compare_forms(&gradients, [matrix(), matrix(), random(3, 9, &device), matrix()]);
+    }
+    let gradients = SineGradients(SineModulation { omega: 3.0 });
+    compare_forms(&gradients, [matrix(), random(1, 9, &device), matrix(), matrix()]);
+    let mixed = random(2 * ROWS, 9, &device);
+    let features = gradient_features(mixed.clone());
+    compare_forms(&FeatureGradients, [mixed, features, random(ROWS, 3, &device)]);
+    let points = || random(ROWS, 3, &device);
+    compare_forms(&TransformGradients, [random(ROWS, 12, &device), points(), points()]);
+    for zero_sum in [true, false] {
+        let projection = Projection { packing: packing(), scale: 0.4, zero_sum };
+        compare_forms(&projection, [joint_mask(), random(ROWS, 4, &device)]);
+    }
+    let factors = AdamFactors { beta_1: 0.9, beta_2: 0.99, step_size: 0.1, epsilon: 1e-6 };
+    compare_forms(&factors, [matrix(), matrix(), matrix(), matrix().square()]);
 }
 
 #[test]
@@ -178,7 +215,7 @@ fn kernels_read_column_blocks_in_place() {
     assert_close(&activate(Activation::Gelu, block(&wide), bias), &expected, 0.0);
     let transposed = random(10, ROWS, &device).transpose();
     let bias = random(1, 10, &device);
-    let expected = tensor_form::apply(Activation::Relu, transposed.clone() + bias.clone());
+    let expected = burn::tensor::activation::relu(transposed.clone() + bias.clone());
     assert_close(&activate(Activation::Relu, transposed, bias), &expected, 1e-6);
 }
 
@@ -194,7 +231,7 @@ fn an_untracked_argument_is_a_constant() {
     assert_close(&input.grad(&gradients).expect("tracked"), &expected, 1e-5);
 }
 
-/// Gradients of the two activations with a kink or a special function, by central differences in f64.
+/// Central differences in f64, by Simpson integration of the density of Φ.
 #[test]
 fn gelu_gradient_matches_finite_differences() {
     let device = device();
@@ -204,23 +241,16 @@ fn gelu_gradient_matches_finite_differences() {
     let bias = Tensor::<2>::zeros([1, 1], &device);
     let gradient = input.grad(&activate(Activation::Gelu, input.clone(), bias).sum().backward());
     let gradient = crate::testing::values(&gradient.expect("tracked"));
-    // Φ by Simpson integration of the density.
     let gelu = |x: f64| {
-        let steps = 2_000;
-        let width = x / f64::from(steps);
+        const STEPS: u32 = 2_000;
+        let width = x / f64::from(STEPS);
         let density = |t: f64| (-0.5 * t * t).exp() / (2.0 * std::f64::consts::PI).sqrt();
-        let sum: f64 = (0..=steps)
-            .map(|i| {
-                let weight = if i == 0 || i == steps {
-                    1.0
-                } else if i % 2 == 1 {
-                    4.0
-                } else {
-                    2.0
-                };
-                weight * density(f64::from(i) * width)
-            })
-            .sum();
+        let weight = |i| match i {
+            0 | STEPS => 1.0,
+            _ if i % 2 == 1 => 4.0,
+            _ => 2.0,
+        };
+        let sum: f64 = (0..=STEPS).map(|i| weight(i) * density(f64::from(i) * width)).sum();
         x * (0.5 + sum * width / 3.0)
     };
     for (x, slope) in values.iter().zip(gradient) {
@@ -233,114 +263,14 @@ fn gelu_gradient_matches_finite_differences() {
 #[test]
 fn results_do_not_depend_on_the_number_of_threads() {
     let device = device();
-    let inputs = vec![random(900, 70, &device), random(1, 70, &device), random(900, 70, &device)];
+    let inputs = [random(900, 70, &device), random(1, 70, &device), random(900, 70, &device)];
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-        pool.install(|| {
-            gradients_of(&inputs, |t| sine_modulation(t[0].clone(), t[1].clone(), t[2].clone(), 3.0))
-        })
+        pool.install(|| gradients_of(&inputs, |[input, bias, gate]| sine_modulation(input, bias, gate, 3.0)))
     };
     let ((output_one, gradients_one), (output_many, gradients_many)) = (run(1), run(5));
     assert_close(&output_one, &output_many, 0.0);
     for (one, many) in gradients_one.iter().zip(&gradients_many) {
         assert_close(one, many, 0.0);
-    }
-}
-
-#[cfg(feature = "flex")]
-mod any_backend {
-    //! The compositions that other backends run, on flex.
-
-    use burn::backend::Flex;
-    use burn::backend::ops::FloatTensorOps;
-    use burn::backend::tensor::FloatTensor;
-    use burn::tensor::TensorData;
-
-    use super::super::{activation, gradient_features, sine_modulation, skin_correction, transform_points};
-    use super::*;
-
-    fn primitive(rows: usize, columns: usize, seed: u32) -> FloatTensor<Flex> {
-        let mut state = u64::from(seed) * 7_919 + 1;
-        let values: Vec<f32> = (0..rows * columns)
-            .map(|_| {
-                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-                (state >> 40) as f32 / (1u64 << 22) as f32 - 2.0
-            })
-            .collect();
-        Flex::float_from_data(TensorData::new(values, [rows, columns]), &Default::default())
-    }
-
-    fn values(tensor: FloatTensor<Flex>) -> Vec<f32> {
-        let data = burn::backend::read_sync(Flex::float_into_data(tensor)).expect("host memory");
-        data.try_to_vec().expect("f32")
-    }
-
-    fn same(a: FloatTensor<Flex>, b: FloatTensor<Flex>) {
-        let (a, b) = (values(a), values(b));
-        assert_eq!(a.len(), b.len());
-        for (a, b) in a.iter().zip(&b) {
-            assert!((a - b).abs() <= 1e-5 * (1.0 + a.abs()), "{a} {b}");
-        }
-    }
-
-    #[test]
-    fn compositions_match_the_host_kernels() {
-        let ends = [40, 41, ROWS];
-        let matrix = |seed| primitive(ROWS, 9, seed);
-        for kind in [Activation::Identity, Activation::Relu, Activation::Gelu] {
-            let (terms, rows) = (vec![matrix(1), matrix(2)], primitive(3, 9, 3));
-            let residual = || Some(matrix(4));
-            same(
-                activation::forward::<Flex>(terms.clone(), rows.clone(), residual(), &ends, kind),
-                activation::host_forward::<Flex>(terms.clone(), rows.clone(), residual(), &ends, kind),
-            );
-            let saved = || activation::Saved::<Flex>::Arguments(terms.clone(), rows.clone());
-            let expected = activation::host_backward::<Flex>(saved(), matrix(5), &ends, kind);
-            let found = activation::backward::<Flex>(saved(), matrix(5), &ends, kind);
-            same(found.0, expected.0);
-            same(found.1, expected.1);
-        }
-
-        let bias = || primitive(1, 9, 6);
-        same(
-            sine_modulation::forward::<Flex>(matrix(1), bias(), matrix(2), 3.0),
-            sine_modulation::host_forward::<Flex>(matrix(1), bias(), matrix(2), 3.0),
-        );
-        let found = sine_modulation::backward::<Flex>(matrix(1), bias(), matrix(2), matrix(3), 3.0);
-        let expected = sine_modulation::host_backward::<Flex>(matrix(1), bias(), matrix(2), matrix(3), 3.0);
-        same(found.0, expected.0);
-        same(found.1, expected.1);
-        same(found.2, expected.2);
-
-        let mixed = || primitive(2 * ROWS, 9, 7);
-        let output = gradient_features::host_forward::<Flex>(mixed());
-        same(gradient_features::forward::<Flex>(mixed()), output.clone());
-        let gradient = || primitive(ROWS, 3, 8);
-        same(
-            gradient_features::backward::<Flex>(mixed(), output.clone(), gradient()),
-            gradient_features::host_backward::<Flex>(mixed(), output, gradient()),
-        );
-
-        let (transforms, points) = (|| primitive(ROWS, 12, 9), || primitive(ROWS, 3, 10));
-        same(
-            transform_points::forward::<Flex>(transforms(), points()),
-            transform_points::host_forward::<Flex>(transforms(), points()),
-        );
-        let found = transform_points::backward::<Flex>(transforms(), points(), gradient());
-        let expected = transform_points::host_backward::<Flex>(transforms(), points(), gradient());
-        same(found.0, expected.0);
-        same(found.1, expected.1);
-
-        let mask = || {
-            let rows = vec![1.0f32, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0];
-            Flex::float_from_data(TensorData::new(rows, [3, 3]), &Default::default())
-        };
-        for zero_sum in [true, false] {
-            let projection = skin_correction::Projection { scale: 0.4, zero_sum };
-            same(
-                skin_correction::project::<Flex>(points(), mask(), Some(gradient()), &ends, projection),
-                skin_correction::host_project::<Flex>(points(), mask(), Some(gradient()), &ends, projection),
-            );
-        }
     }
 }

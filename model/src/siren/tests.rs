@@ -1,8 +1,7 @@
 use super::*;
-use crate::ops::tensor_form;
 use crate::testing::{
-    assert_close, assert_gradients_close, change_parameter, device, parameter_gradients, seeded, uniform,
-    weighting,
+    assert_close, assert_gradients_close, assert_gradients_match_differences, broadcast, device, loss,
+    parameter_gradients, seeded, uniform, values,
 };
 
 const SIZES: SirenSizes = SirenSizes {
@@ -14,59 +13,52 @@ const SIZES: SirenSizes = SirenSizes {
     omega_hidden: 1.0,
 };
 
-/// Small enough to cross few of the gates' kinks.
-const STEP: f32 = 2.5e-4;
-
-struct Case {
+struct SirenCase {
     siren: ModulatedSiren,
     coordinates: Tensor<2>,
     vertex: Tensor<2>,
     garment: Tensor<2>,
-    segments: Segments,
+    packing: Packing,
 }
 
-fn case() -> Case {
+fn case() -> SirenCase {
     let device = device();
-    Case {
+    SirenCase {
         siren: seeded(11, |start| ModulatedSiren::new(&SIZES, start)),
         coordinates: uniform(60, 3, 0.8, 1, &device),
         vertex: uniform(60, 7, 2.0, 2, &device),
         garment: uniform(3, 5, 2.0, 3, &device),
-        segments: Segments::new([20, 33, 7]),
+        packing: Packing::new([20, 33, 7]),
     }
 }
 
-impl Case {
+impl SirenCase {
     fn split(&self) -> Tensor<2> {
         self.of(&self.siren)
     }
 
     fn of(&self, siren: &ModulatedSiren) -> Tensor<2> {
         let product = siren.modulator.vertex_product(self.vertex.clone());
-        siren.forward(self.coordinates.clone(), product, self.garment.clone(), &self.segments)
+        siren.forward(self.coordinates.clone(), product, self.garment.clone(), &self.packing)
     }
 
     /// The network as published: [previous gate, garment row, vertex row] concatenated and multiplied with whole weights.
     fn concatenated(&self) -> Tensor<2> {
         let modulator = &self.siren.modulator;
-        let rows = tensor_form::broadcast(self.garment.clone(), &self.segments);
+        let rows = broadcast(self.garment.clone(), &self.packing);
         let latent = Tensor::cat(vec![rows, self.vertex.clone()], 1);
         let mut gate: Option<Tensor<2>> = None;
         let mut features = self.coordinates.clone();
         for (layer, sine) in self.siren.sine.iter().enumerate() {
-            let columns = layer * SIZES.width..(layer + 1) * SIZES.width;
-            let block = |weight: Tensor<2>| {
-                let rows = weight.dims()[0];
-                weight.slice([0..rows, columns.clone()])
-            };
+            let block = |weight: Tensor<2>| weight.narrow(1, layer * SIZES.width, SIZES.width);
             let mut weight = vec![block(modulator.garment.val()), block(modulator.vertex.val())];
             let mut input = vec![latent.clone()];
             if let Some(previous) = gate {
                 weight.insert(0, modulator.hidden[layer - 1].val());
                 input.insert(0, previous);
             }
-            let bias: Tensor<2> = modulator.bias.val().slice([columns.clone()]).unsqueeze();
-            let sum = Tensor::cat(input, 1).matmul(Tensor::cat(weight, 0)) + bias;
+            let sum = Tensor::cat(input, 1).matmul(Tensor::cat(weight, 0))
+                + block(modulator.bias.val().unsqueeze());
             let opened = burn::tensor::activation::relu(sum);
             let omega = if layer == 0 { SIZES.omega_first } else { SIZES.omega_hidden };
             let phase = features.matmul(sine.weight.val()) + sine.bias.val().unsqueeze();
@@ -76,11 +68,6 @@ impl Case {
         let output = &self.siren.output;
         features.matmul(output.weight.val()) + output.bias.val().unsqueeze()
     }
-}
-
-fn loss(output: Tensor<2>) -> Tensor<1> {
-    let weights = weighting(output.dims(), &output.device());
-    (output * weights).sum()
 }
 
 #[test]
@@ -97,7 +84,6 @@ fn split_latents_equal_the_concatenated_form_in_values_and_gradients() {
 #[test]
 fn gradients_match_finite_differences() {
     let case = case();
-    let gradients = parameter_gradients(&case.siren, loss(case.split()));
     let parameters = [
         "modulator.vertex",
         "modulator.garment",
@@ -107,38 +93,25 @@ fn gradients_match_finite_differences() {
         "sine.2.bias",
         "output.weight",
     ];
-    for name in parameters {
-        let (_, gradient) = gradients.iter().find(|(found, _)| found == name).expect("documented name");
-        let index = (0..gradient.len()).max_by(|&a, &b| gradient[a].abs().total_cmp(&gradient[b].abs()));
-        let index = index.expect("not empty");
-        let value = |change: f32| -> f64 {
-            let changed = change_parameter(case.siren.clone(), name, index, change).valid();
-            f64::from(loss(case.of(&changed)).into_scalar::<f32>())
-        };
-        let slope = (value(STEP) - value(-STEP)) / f64::from(2.0 * STEP);
-        let found = f64::from(gradient[index]);
-        assert!((slope - found).abs() < 2e-2 * found.abs(), "{name}[{index}]: {found} {slope}");
-    }
+    // Short enough to cross few of the gates' kinks.
+    let steps = [2.5e-4];
+    assert_gradients_match_differences(&case.siren, &parameters, &steps, 2e-2, |siren| case.of(siren));
 }
 
 #[test]
 fn weights_start_within_the_bounds_of_the_concatenated_layers() {
     let siren = case().siren.valid();
     let width = SIZES.width;
-    let columns = |weight: &Tensor<2>, block: usize| {
-        let rows = weight.dims()[0];
-        let block = weight.clone().slice([0..rows, block * width..(block + 1) * width]);
-        crate::testing::values(&block).into_iter().fold(0.0f32, |largest, value| largest.max(value.abs()))
+    let largest = |weight: Tensor<2>| {
+        values(&weight).into_iter().fold(0.0f32, |largest, value| largest.max(value.abs()))
     };
+    let of_layer = |weight: &Tensor<2>, layer: usize| largest(weight.clone().narrow(1, layer * width, width));
     let latent = (SIZES.garment_latent + SIZES.vertex_latent) as f32;
     let (first, later) = (1.0 / latent.sqrt(), 1.0 / (latent + width as f32).sqrt());
     for weight in [siren.modulator.vertex.val(), siren.modulator.garment.val()] {
-        assert!((0.8 * first..=first).contains(&columns(&weight, 0)));
-        assert!((0.8 * later..=later).contains(&columns(&weight, 2)));
+        assert!((0.8 * first..=first).contains(&of_layer(&weight, 0)));
+        assert!((0.8 * later..=later).contains(&of_layer(&weight, 2)));
     }
-    let largest = |weight: Tensor<2>| {
-        crate::testing::values(&weight).into_iter().fold(0.0f32, |largest, value| largest.max(value.abs()))
-    };
     assert!((0.25..=1.0 / 3.0).contains(&largest(siren.sine[0].weight.val())));
     let hidden = (6.0 / width as f32).sqrt();
     assert!((0.9 * hidden..=hidden).contains(&largest(siren.sine[1].weight.val())));

@@ -3,14 +3,14 @@
 use burn::tensor::{Device, Tensor};
 
 use super::matrix;
-use crate::error::{ModelError, check_array};
+use crate::error::{ModelError, check_array, check_finite};
 
 /// Host arrays a garment's tensors are made from; matrices are row-major.
 ///
 /// V vertices, k eigenpairs, J active joints.
 #[derive(Clone, Copy, Debug)]
 pub struct GarmentArrays<'a> {
-    /// Rest positions `[V,3]` in metres.
+    /// Rest positions `[V,3]` (m).
     pub rest: &'a [f32],
     /// Lumped vertex masses `[V]` (area, m²; only ratios matter in the embedding average).
     pub mass: &'a [f64],
@@ -29,7 +29,7 @@ pub struct GarmentArrays<'a> {
 /// Constant tensors of one garment (V vertices, k eigenpairs, J active joints).
 #[derive(Clone, Debug)]
 pub struct GarmentTensors {
-    /// Rest positions `[V,3]` in metres.
+    /// Rest positions `[V,3]` (m).
     pub rest: Tensor<2>,
     /// Vertex masses over their sum `[1,V]`: the row that averages vertex features.
     pub mass: Tensor<2>,
@@ -80,17 +80,10 @@ impl GarmentTensors {
                 projection[column * vertices + vertex] = value as f32;
             }
         }
-        let mut gradient = Vec::with_capacity(2 * cells);
-        gradient.extend_from_slice(arrays.gradient_x_basis);
-        gradient.extend_from_slice(arrays.gradient_y_basis);
-        let mut joint_mask = vec![0.0_f32; joints];
-        for row in arrays.skin_weights.chunks_exact(joints.max(1)) {
-            for (mask, &weight) in joint_mask.iter_mut().zip(row) {
-                if weight != 0.0 {
-                    *mask = 1.0;
-                }
-            }
-        }
+        let gradient = [arrays.gradient_x_basis, arrays.gradient_y_basis].concat();
+        let moves =
+            |joint| arrays.skin_weights.iter().skip(joint).step_by(joints).any(|weight| *weight != 0.0);
+        let joint_mask = (0..joints).map(|joint| if moves(joint) { 1.0 } else { 0.0 }).collect();
         Ok(Self {
             rest: matrix(arrays.rest.to_vec(), vertices, 3, device),
             mass: matrix(average, 1, vertices, device),
@@ -116,12 +109,5 @@ impl GarmentTensors {
     /// Number of active joints J.
     pub fn joint_count(&self) -> usize {
         self.skin_weights.dims()[1]
-    }
-}
-
-fn check_finite(array: &'static str, values: &[f64]) -> Result<(), ModelError> {
-    match values.iter().position(|value| !value.is_finite()) {
-        Some(index) => Err(ModelError::NotFinite { array, index, value: values[index] }),
-        None => Ok(()),
     }
 }

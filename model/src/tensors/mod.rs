@@ -1,15 +1,15 @@
-//! Constant tensors the networks read: one garment, the garments worn together, one posed body.
+//! Constant tensors the networks read: one garment, the garments of an outfit, one posed body.
 //!
 //! All of them live on a plain (non-autodiff) device; an operation that combines them with tracked tensors treats them as
 //! constants, so the same tensors serve training and inference.
 
 mod body;
-mod felt;
+mod contact_features;
 mod garment;
 mod outfit;
 
 pub use body::BodyTensors;
-pub use felt::FeltTensors;
+pub use contact_features::ContactFeatureTensors;
 pub use garment::{GarmentArrays, GarmentTensors};
 pub use outfit::OutfitTensors;
 pub(crate) use outfit::{ForceEdges, stack_rows};

@@ -1,12 +1,12 @@
-//! The garments worn together, packed into one set of tensors.
+//! The garments of one outfit, packed into one set of tensors.
 
 use std::ops::Range;
 
-use burn::tensor::Tensor;
+use burn::tensor::{Device, Tensor};
 
 use super::{GarmentTensors, matrix};
 use crate::error::ModelError;
-use crate::ops::Segments;
+use crate::packing::Packing;
 
 /// Which garments press on which: one row per ordered pair.
 #[derive(Clone, Debug)]
@@ -26,13 +26,13 @@ pub(crate) struct ForceEdges {
 /// M garments, inner to outer, packed along the vertices (ΣV of them).
 #[derive(Clone, Debug)]
 pub struct OutfitTensors {
-    /// Rest positions `[ΣV,3]` in metres: the coordinates the networks see.
+    /// Rest positions `[ΣV,3]` (m): the coordinates the networks see.
     pub rest: Tensor<2>,
     /// Initial skin weights `[ΣV,J]`.
     pub skin_weights: Tensor<2>,
     /// Active joints of each garment, 0 or 1 `[M,J]`.
     pub joint_mask: Tensor<2>,
-    pub(crate) segments: Segments,
+    pub(crate) packing: Packing,
     pub(crate) edges: Option<ForceEdges>,
 }
 
@@ -46,10 +46,8 @@ impl OutfitTensors {
     /// or twice the same.
     pub fn new(garments: &[&GarmentTensors], contacts: &[(usize, usize)]) -> Result<Self, ModelError> {
         let Some(first) = garments.first() else {
-            return Err(ModelError::Outfit {
-                garment: 0,
-                reason: "an outfit needs at least one garment".into(),
-            });
+            let reason = "an outfit needs at least one garment".into();
+            return Err(ModelError::Outfit { garment: 0, reason });
         };
         for (garment, tensors) in garments.iter().enumerate() {
             if tensors.joint_count() != first.joint_count() {
@@ -59,26 +57,24 @@ impl OutfitTensors {
             }
         }
         let count = garments.len();
-        let mut pairs = Vec::with_capacity(contacts.len());
-        for &(a, b) in contacts {
-            let highest = a.max(b);
-            if highest >= count || a == b {
-                let reason = format!("contact ({a}, {b}) needs two different garments below {count}");
-                return Err(ModelError::Outfit { garment: highest, reason });
-            }
-            pairs.push((a.min(b), highest));
+        if let Some(&(a, b)) = contacts.iter().find(|(a, b)| a == b || *a.max(b) >= count) {
+            let reason = format!("contact ({a}, {b}) needs two different garments below {count}");
+            return Err(ModelError::Outfit { garment: a.max(b), reason });
         }
+        let mut pairs: Vec<_> = contacts.iter().map(|&(a, b)| (a.min(b), a.max(b))).collect();
         pairs.sort_unstable();
         pairs.dedup();
 
-        let device = first.rest.device();
-        let segments = Segments::new(garments.iter().map(|garment| garment.vertex_count()));
-        let edges = ForceEdges::new(&pairs, &segments, &device);
+        let packing = Packing::new(garments.iter().map(|garment| garment.vertex_count()));
+        let edges = ForceEdges::new(&pairs, &packing, &first.rest.device());
+        let stack = |field: fn(&GarmentTensors) -> &Tensor<2>| {
+            stack_rows(garments.iter().map(|garment| field(garment).clone()).collect())
+        };
         Ok(Self {
-            rest: stack(garments, |garment| &garment.rest),
-            skin_weights: stack(garments, |garment| &garment.skin_weights),
-            joint_mask: stack(garments, |garment| &garment.joint_mask),
-            segments,
+            rest: stack(|garment| &garment.rest),
+            skin_weights: stack(|garment| &garment.skin_weights),
+            joint_mask: stack(|garment| &garment.joint_mask),
+            packing,
             edges,
         })
     }
@@ -90,17 +86,17 @@ impl OutfitTensors {
 
     /// Number of vertices of all garments, ΣV.
     pub fn vertex_count(&self) -> usize {
-        self.segments.rows()
+        self.packing.rows()
     }
 
     /// Rows of each garment in the packed tensors.
     pub fn ranges(&self) -> Vec<Range<usize>> {
-        self.segments.ranges()
+        self.packing.ranges().collect()
     }
 
-    /// How the packed rows belong to the garments.
-    pub fn segments(&self) -> &Segments {
-        &self.segments
+    /// Where the rows of each garment lie in the packed tensors.
+    pub fn packing(&self) -> &Packing {
+        &self.packing
     }
 
     /// Whether any two garments can touch.
@@ -110,63 +106,56 @@ impl OutfitTensors {
 
     /// Edges between all garments, whatever the contacts; `None` for a single one.
     pub(crate) fn complete_edges(&self) -> Option<ForceEdges> {
-        ForceEdges::new(&Self::all_pairs(self.segments.count()), &self.segments, &self.rest.device())
+        ForceEdges::new(&Self::all_pairs(self.packing.count()), &self.packing, &self.rest.device())
     }
 }
 
 impl ForceEdges {
-    fn new(pairs: &[(usize, usize)], segments: &Segments, device: &burn::tensor::Device) -> Option<Self> {
+    fn new(pairs: &[(usize, usize)], packing: &Packing, device: &Device) -> Option<Self> {
         if pairs.is_empty() {
             return None;
         }
-        let garments = segments.count();
         // (receiver, sender), both directions of every contact.
         let edges: Vec<(usize, usize)> = pairs.iter().flat_map(|&(a, b)| [(a, b), (b, a)]).collect();
-        let one_hot = |rows: usize, columns: usize, ones: &mut dyn Iterator<Item = (usize, usize)>| {
-            let mut values = vec![0.0_f32; rows * columns];
-            for (row, column) in ones {
-                values[row * columns + column] = 1.0;
-            }
-            matrix(values, rows, columns, device)
-        };
-        let count = edges.len();
+        let (garments, count) = (packing.count(), edges.len());
         let numbered = || edges.iter().copied().enumerate();
-        let receiver = one_hot(count, garments, &mut numbered().map(|(edge, (i, _))| (edge, i)));
-        let sender = one_hot(count, garments, &mut numbered().map(|(edge, (_, j))| (edge, j)));
-        let from_below = one_hot(
-            garments,
-            count,
-            &mut numbered().filter(|(_, (i, j))| j < i).map(|(edge, (i, _))| (i, edge)),
-        );
-        let from_above = one_hot(
-            garments,
-            count,
-            &mut numbered().filter(|(_, (i, j))| j > i).map(|(edge, (i, _))| (i, edge)),
-        );
-        let mut has_edge = vec![false; garments];
-        for &(receiver, _) in &edges {
-            has_edge[receiver] = true;
-        }
+        let sums = |below: bool| {
+            let from_side = numbered().filter(|(_, (i, j))| (j < i) == below);
+            one_hot([garments, count], from_side.map(|(edge, (i, _))| (i, edge)), device)
+        };
+        let has_edge: Vec<bool> =
+            (0..garments).map(|garment| edges.iter().any(|&(i, _)| i == garment)).collect();
         let touched = (!has_edge.iter().all(|&edge| edge)).then(|| {
-            let mut rows = vec![0.0_f32; segments.rows()];
-            for (range, _) in segments.ranges().into_iter().zip(&has_edge).filter(|(_, edge)| **edge) {
+            let mut rows = vec![0.0_f32; packing.rows()];
+            for (range, _) in packing.ranges().zip(&has_edge).filter(|(_, edge)| **edge) {
                 rows[range].fill(1.0);
             }
-            matrix(rows, segments.rows(), 1, device)
+            matrix(rows, packing.rows(), 1, device)
         });
-        Some(Self { receiver, sender, from_below, from_above, touched })
+        Some(Self {
+            receiver: one_hot([count, garments], numbered().map(|(edge, (i, _))| (edge, i)), device),
+            sender: one_hot([count, garments], numbered().map(|(edge, (_, j))| (edge, j)), device),
+            from_below: sums(true),
+            from_above: sums(false),
+            touched,
+        })
     }
 }
 
-/// Concatenates one tensor of every garment along the rows; a lone garment's tensor is shared, not copied.
-pub(crate) fn stack(
-    garments: &[&GarmentTensors],
-    field: impl Fn(&GarmentTensors) -> &Tensor<2>,
+/// A matrix of zeros but for ones at the given (row, column).
+fn one_hot(
+    [rows, columns]: [usize; 2],
+    ones: impl Iterator<Item = (usize, usize)>,
+    device: &Device,
 ) -> Tensor<2> {
-    stack_rows(garments.iter().map(|garment| field(garment).clone()).collect())
+    let mut values = vec![0.0_f32; rows * columns];
+    for (row, column) in ones {
+        values[row * columns + column] = 1.0;
+    }
+    matrix(values, rows, columns, device)
 }
 
-/// Concatenates along the rows; a lone tensor is returned as it is.
+/// Concatenates along the rows; a lone tensor is shared, not copied.
 pub(crate) fn stack_rows(mut tensors: Vec<Tensor<2>>) -> Tensor<2> {
     match tensors.len() {
         1 => tensors.remove(0),

@@ -6,7 +6,9 @@
 #![allow(dead_code)] // Each bench and example uses its part.
 
 use std::f64::consts::TAU;
+use std::hint::black_box;
 use std::sync::Arc;
+use std::time::Instant;
 
 use clothcombo_physics::energy::{GarmentEnergies, LayerGate, SceneEnergy, SceneGarment, SceneLayers};
 use clothcombo_physics::mesh::shapes;
@@ -23,7 +25,7 @@ const HEIGHT: f64 = 0.88;
 const RADIUS: f64 = 1.0 / (TAU * HEIGHT);
 const TORSO: [f64; 3] = [0.20, 0.60, 0.16];
 
-/// Height of the middle of the torso over the origin [m]: heights must not cancel in the gravity.
+/// Height of the middle of the torso over the origin (m): heights must not cancel in the gravity.
 const MIDDLE: f64 = 0.3;
 
 /// What stays the same when a garment gets more vertices.
@@ -68,7 +70,7 @@ pub fn body(vertices: usize, growth: Growth) -> TriMesh {
     shapes::mapped(&all, |[x, y, z]| [x, y + MIDDLE, z].map(|x| scale * x))
 }
 
-/// A garment of about `vertices` vertices, `offset` [m] farther out than one that touches the body.
+/// A garment of about `vertices` vertices, `offset` (m) farther out than one that touches the body.
 pub fn garment(vertices: usize, growth: Growth, offset: f64) -> Dressed {
     let scale = scale(vertices, growth);
     // Equilateral triangles: an area of √3/2 e² per vertex.
@@ -91,6 +93,25 @@ pub fn garment(vertices: usize, growth: Growth, offset: f64) -> Dressed {
         })
         .collect();
     Dressed { rest, posed }
+}
+
+/// Milliseconds since this was called.
+pub fn wall_ms() -> impl Fn() -> f64 {
+    let start = Instant::now();
+    move || 1e3 * start.elapsed().as_secs_f64()
+}
+
+/// Median time (ms) of `run` by `clock` over about `seconds`, at least 5 times, after one run to warm up.
+pub fn median_ms<R>(seconds: f64, clock: impl Fn() -> f64, mut run: impl FnMut() -> R) -> f64 {
+    black_box(run());
+    let (start, mut times) = (Instant::now(), Vec::new());
+    while times.len() < 5 || start.elapsed().as_secs_f64() < seconds {
+        let before = clock();
+        black_box(run());
+        times.push(clock() - before);
+    }
+    times.sort_by(f64::total_cmp);
+    times[times.len() / 2]
 }
 
 /// Positions in the scalar of training.

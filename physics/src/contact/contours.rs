@@ -1,13 +1,13 @@
-//! The curves in which two surfaces cross.
+//! The curves in which two surfaces intersect.
 //!
-//! Each pair of crossing triangles gives a segment. Its ends are named by the parts of the two meshes they lie on (a vertex,
+//! Each intersecting triangle pair gives a segment. Its ends are named by the parts of the two meshes they lie on (a vertex,
 //! an edge, a face of each), decided exactly; segments are chained where the names agree, so that rounding never tears a
 //! curve. Triangles that lie in one plane or share a single point give no segment.
 
 use std::collections::{HashMap, HashSet};
 
-use super::intersections::TriangleTree;
-use super::triangle_pair::{CrossingEnd, crossing};
+use crate::query::triangle_pair::{SegmentEnd, segment_ends};
+use crate::query::triangle_tree::TriangleTree;
 use crate::vec3;
 
 /// One curve of intersection.
@@ -21,7 +21,7 @@ pub struct Contour {
     pub length: f64,
 }
 
-/// Chains the crossings of `pairs`, as found by [`TriangleTree::pairs_with`], into contours.
+/// Chains the segments of `pairs`, as found by [`TriangleTree::pairs_with`], into contours.
 ///
 /// A contour is open where it leaves a surface through its boundary, or where more than two segments meet.
 pub fn contours(a: &TriangleTree, b: &TriangleTree, pairs: &[(u32, u32)]) -> Vec<Contour> {
@@ -74,10 +74,10 @@ fn chained(
 ) -> Vec<Contour> {
     let mut found = Segments::default();
     for &(face_a, face_b) in pairs {
-        let ends = a.triangle(face_a).zip(b.triangle(face_b)).and_then(|(a, b)| crossing(&a, &b));
+        let ends = a.triangle(face_a).zip(b.triangle(face_b)).and_then(|(a, b)| segment_ends(&a, &b));
         let Some(ends) = ends else { continue };
         let (corners_a, corners_b) = (a.face(face_a), b.face(face_b));
-        let [p, q] = ends.map(|CrossingEnd { position, on_a, on_b }| {
+        let [p, q] = ends.map(|SegmentEnd { position, on_a, on_b }| {
             found.point(canonical((part(corners_a, on_a), part(corners_b, on_b))), position)
         });
         found.join(p, q);

@@ -1,21 +1,26 @@
-//! What lies on the wrong side or crosses: garment vertices inside the body, outer layers below inner ones, and triangles
-//! that intersect, decided exactly.
+//! What intersects, penetrates or lies in the wrong order: garment vertices inside the body, outer layers under inner ones, and
+//! triangles that intersect, decided exactly. A [`Report`] counts all of it.
 
 mod contours;
-mod intersections;
-mod order;
+mod inner_surface;
+mod layer_order;
 mod penetration;
 mod report;
 pub mod resolve;
 mod self_collision;
 #[cfg(test)]
 mod tests;
-mod triangle_pair;
 
+pub use crate::query::triangle_pair::{
+    Triangle, intersection_segment, mesh_triangles_intersect, triangles_intersect,
+};
+pub use crate::query::triangle_tree::{TriangleTree, self_triangle_pairs, triangle_pairs};
 pub use contours::{Contour, contours, self_contours};
-pub use intersections::{TriangleTree, self_triangle_pairs, triangle_pairs};
-pub use order::{ORDER_RADIUS, OrderViolations, order_violations};
-pub use penetration::{Penetration, penetration, penetration_by};
-pub use report::{IntersectionReport, Intersections, LayerIntersections};
+pub use inner_surface::LayerTopology;
+pub use layer_order::{LayerOrder, ORDER_RADIUS, OrderViolations};
+pub use penetration::Penetration;
+pub use report::{
+    GarmentReport, Intersections, LayerReport, PosedBody, Report, ReportBody, ReportGarment, Selection,
+    TrianglePairs, all_layers,
+};
 pub use self_collision::self_collision;
-pub use triangle_pair::{Triangle, intersection_segment, mesh_triangles_intersect, triangles_intersect};

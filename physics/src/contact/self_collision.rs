@@ -4,21 +4,25 @@
 use crate::energy::{EnergySettings, repulsion::Repulsion};
 use crate::mesh::Topology;
 
-use super::intersections::TriangleTree;
-
 /// `(1/N) Σ −log d²` (d in metres) over unordered pairs of vertices that no edge joins, are closer than `radius` (m), and both
 /// belong to triangles that intersect another triangle of the garment. N counts all vertices of the garment, as in the
 /// repulsion; 0 without a self-intersection.
 ///
-/// `pairs` are those of [`TriangleTree::self_pairs`], `topology` is that of the garment.
-pub fn self_collision(mesh: &TriangleTree, pairs: &[(u32, u32)], topology: &Topology, radius: f64) -> f64 {
+/// `pairs` are the intersecting ones of the `faces` of the garment at `positions` (m), `topology` is that of the garment.
+pub fn self_collision(
+    positions: &[[f64; 3]],
+    faces: &[[u32; 3]],
+    pairs: &[(u32, u32)],
+    topology: &Topology,
+    radius: f64,
+) -> f64 {
     if pairs.is_empty() {
         return 0.0;
     }
     // A vertex that is not finite repels nothing.
-    let mut penetrating = vec![[f64::NAN; 3]; mesh.positions().len()];
-    for vertex in pairs.iter().flat_map(|&(a, b)| [a, b]).flat_map(|face| mesh.face(face)) {
-        penetrating[vertex as usize] = mesh.positions()[vertex as usize];
+    let mut penetrating = vec![[f64::NAN; 3]; positions.len()];
+    for vertex in pairs.iter().flat_map(|&(a, b)| [a, b]).flat_map(|face| faces[face as usize]) {
+        penetrating[vertex as usize] = positions[vertex as usize];
     }
     let settings = EnergySettings { repulsion_radius: radius, ..EnergySettings::default() };
     Repulsion::new(topology).evaluate(&penetrating, &settings, None)
@@ -28,6 +32,7 @@ pub fn self_collision(mesh: &TriangleTree, pairs: &[(u32, u32)], topology: &Topo
 mod tests {
     use super::*;
     use crate::mesh::TriMesh;
+    use crate::query::triangle_tree::self_triangle_pairs;
 
     /// Two triangles that pierce each other at right angles, and a third one beside them; no edge joins two of them.
     const POSITIONS: [[f64; 3]; 9] = [
@@ -45,9 +50,8 @@ mod tests {
 
     fn degree(positions: &[[f64; 3]]) -> (usize, f64) {
         let mesh = TriMesh::new(POSITIONS.to_vec(), FACES.to_vec()).unwrap();
-        let tree = TriangleTree::new(positions, &FACES);
-        let pairs = tree.self_pairs();
-        (pairs.len(), self_collision(&tree, &pairs, &Topology::new(&mesh), 0.1))
+        let pairs = self_triangle_pairs(positions, &FACES);
+        (pairs.len(), self_collision(positions, &FACES, &pairs, &Topology::new(&mesh), 0.1))
     }
 
     #[test]

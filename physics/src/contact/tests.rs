@@ -1,83 +1,20 @@
-//! Exact intersections against an oracle in integers: separating axes on coordinates of at most 2^20, which share no
-//! formula with the determinants under test.
+//! Exact intersections against an oracle in integers.
 
 use super::*;
 use crate::mesh::TriMesh;
 use crate::mesh::shapes::{SplitMix, grid, icosphere, irregular_grid, mapped, tube, union};
+use crate::query::grid_oracle::{self, GridPoint};
+use crate::query::{Distance, Surface};
 
-type Point = [i128; 3];
+type Point = GridPoint;
 
-fn sub(a: Point, b: Point) -> Point {
-    std::array::from_fn(|k| a[k] - b[k])
-}
-
-fn dot(a: Point, b: Point) -> i128 {
-    (0..3).map(|k| a[k] * b[k]).sum()
-}
-
-fn cross(a: Point, b: Point) -> Point {
-    std::array::from_fn(|k| a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3])
-}
-
-fn normal(t: &[Point]) -> Point {
-    cross(sub(t[1], t[0]), sub(t[2], t[0]))
-}
-
-/// Whether a triangle or segment `a` and a triangle `b` share a point: no axis that could separate them does.
-fn oracle_meet(a: &[Point], b: &[Point; 3]) -> bool {
-    let edges =
-        |p: &[Point]| -> Vec<Point> { (0..p.len()).map(|i| sub(p[(i + 1) % p.len()], p[i])).collect() };
-    let mut axes = vec![normal(b)];
-    if a.len() == 3 {
-        axes.push(normal(a));
-    }
-    for e in edges(a) {
-        axes.extend(edges(b).into_iter().map(|f| cross(e, f)));
-        axes.push(cross(normal(b), e));
-    }
-    axes.extend(edges(b).into_iter().map(|f| cross(normal(b), f)));
-    axes.iter().filter(|axis| **axis != [0; 3]).all(|&axis| {
-        let range = |points: &[Point]| {
-            let along = || points.iter().map(|&p| dot(axis, p));
-            (along().min().unwrap(), along().max().unwrap())
-        };
-        let ((a_low, a_high), (b_low, b_high)) = (range(a), range(b));
-        a_low <= b_high && b_low <= a_high
+/// Two faces of one mesh. A common ray of both cones passes the far edge of the first; a far copy of the second reaches all of
+/// that edge.
+fn oracle_neighbours(points: &[Point], faces: [[u32; 3]; 2]) -> bool {
+    grid_oracle::mesh_triangles_intersect(points, faces, |&[apex, p, q], &[_, r, s]| {
+        let far = |p: Point| -> Point { std::array::from_fn(|k| apex[k] + 1_000_000 * (p[k] - apex[k])) };
+        grid_oracle::meet(&[p, q], &[apex, far(r), far(s)])
     })
-}
-
-fn oracle_strangers(a: &[Point; 3], b: &[Point; 3]) -> bool {
-    normal(a) != [0; 3] && normal(b) != [0; 3] && oracle_meet(a, b)
-}
-
-/// Two faces of one mesh: cones for one common vertex, normals for a common edge.
-fn oracle_neighbours(points: &[Point], fa: [u32; 3], fb: [u32; 3]) -> bool {
-    let (a, b) = (fa.map(|v| points[v as usize]), fb.map(|v| points[v as usize]));
-    if normal(&a) == [0; 3] || normal(&b) == [0; 3] {
-        return false;
-    }
-    let common: Vec<u32> = fa.iter().copied().filter(|v| fb.contains(v)).collect();
-    let rest = |face: [u32; 3]| -> Vec<Point> {
-        face.iter().filter(|v| !common.contains(v)).map(|&v| points[v as usize]).collect()
-    };
-    match common[..] {
-        [] => oracle_meet(&a, &b),
-        [v] => {
-            // A common ray of both cones passes the far edge of `a`; a far copy of `b` reaches all of that edge.
-            let apex = points[v as usize];
-            let far =
-                |p: &Point| -> Point { std::array::from_fn(|k| apex[k] + 1_000_000 * (p[k] - apex[k])) };
-            let reach = rest(fb);
-            oracle_meet(&rest(fa), &[apex, far(&reach[0]), far(&reach[1])])
-        }
-        [u, v] => {
-            let (u, v) = (points[u as usize], points[v as usize]);
-            let of = |p: Point| cross(sub(v, u), sub(p, u));
-            let (n, m) = (of(rest(fa)[0]), of(rest(fb)[0]));
-            cross(n, m) == [0; 3] && dot(n, m) > 0
-        }
-        _ => true,
-    }
 }
 
 fn as_floats(points: &[Point]) -> Vec<[f64; 3]> {
@@ -103,7 +40,7 @@ fn pairs_equal_the_exact_oracle_on_a_thousand_pairs_of_small_meshes() {
         let mut expected = Vec::new();
         for (i, fa) in (0u32..).zip(&f) {
             for (j, fb) in (0u32..).zip(&g) {
-                if oracle_strangers(&corners(&p, fa), &corners(&q, fb)) {
+                if grid_oracle::triangles_intersect(&corners(&p, fa), &corners(&q, fb)) {
                     expected.push((i, j));
                 }
             }
@@ -120,7 +57,7 @@ fn pairs_equal_the_exact_oracle_on_a_thousand_pairs_of_small_meshes() {
         let mut expected = Vec::new();
         for (i, fa) in (0u32..).zip(&f) {
             for (j, fb) in (0u32..).zip(&f).skip(i as usize + 1) {
-                if oracle_neighbours(&p, *fa, *fb) {
+                if oracle_neighbours(&p, [*fa, *fb]) {
                     expected.push((i, j));
                     neighbours += usize::from(fa.iter().any(|v| fb.contains(v)));
                 }
@@ -146,7 +83,7 @@ fn signs_far_below_rounding_are_right() {
         let moved: Point = std::array::from_fn(|k| middle[k] + i128::from(random.next_u64() % 3) - 1);
         let b = [moved, q, r];
         let floats = |t: [Point; 3]| t.map(|p| p.map(|x| x as f64));
-        let expected = oracle_strangers(&a, &b);
+        let expected = grid_oracle::triangles_intersect(&a, &b);
         assert_eq!(triangles_intersect(&floats(a), &floats(b)), expected);
         assert_eq!(triangles_intersect(&floats(b), &floats(a)), expected);
         hits += usize::from(expected);
@@ -182,7 +119,7 @@ fn faces_that_are_no_triangle_take_part_in_nothing() {
 }
 
 #[test]
-fn the_segment_of_two_triangles_is_where_they_cross() {
+fn the_segment_of_two_triangles_is_where_they_intersect() {
     let a = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
     let b = [[1.0, 1.0, -1.0], [1.0, 1.0, 1.0], [1.0, 5.0, 0.0]];
     let [mut p, mut q] = intersection_segment(&a, &b).unwrap();
@@ -209,9 +146,9 @@ fn sleeve(radius: f64, turn: f64) -> TriMesh {
 }
 
 #[test]
-fn two_tubes_around_a_ball_cross_it_in_two_circles_each() {
+fn two_tubes_around_a_ball_intersect_it_in_two_circles_each() {
     let (ball, inner, outer) = (icosphere(0.4, 4), sleeve(0.3, 0.1), sleeve(0.32, 0.2));
-    let (ball_tree, sleeves) = (tree(&ball), [tree(&inner), tree(&outer)]);
+    let ball_tree = tree(&ball);
     for (mesh, radius) in [(&inner, 0.3), (&outer, 0.32)] {
         let pairs = tree(mesh).pairs_with(&ball_tree);
         let expected: Vec<(u32, u32)> = (0..mesh.face_count())
@@ -228,21 +165,46 @@ fn two_tubes_around_a_ball_cross_it_in_two_circles_each() {
             assert!((contour.length / circle - 1.0).abs() < 0.01, "{} {circle}", contour.length);
         }
     }
-    let report = IntersectionReport::new(&ball_tree, &sleeves);
-    assert!(report.garment_body.iter().all(|g| g.pairs > 100));
-    assert_eq!(report.garment_garment.len(), 1);
-    assert_eq!(report.garment_garment[0].intersections, Intersections::default());
-    assert_eq!(report.body_self, Intersections::default());
-    assert_eq!(report.garment_self, [Intersections::default(); 2]);
-    assert!((report.total().contour_length / (std::f64::consts::TAU * 1.24) - 1.0).abs() < 0.01);
-    assert!(!report.is_clear());
+    let report = report(&ball, &[&inner, &outer]);
+    assert!(report.garments.iter().all(|g| g.with_body.pairs.len() > 100 && g.depths.len() > 100));
+    assert!(report.garments.iter().all(|g| g.with_itself == TrianglePairs::default()));
+    let [layer] = &report.layers[..] else { panic!("one pair of layers: {:?}", report.layers) };
+    assert_eq!((layer.inner, layer.outer, &layer.pairs), (0, 1, &TrianglePairs::default()));
+    assert_eq!((layer.counted, layer.order().violations), (outer.vertex_count(), 0));
+    assert_eq!(report.body_itself, Intersections::default());
+    let circles = std::f64::consts::TAU * 1.24;
+    assert!((report.intersections().contour_length / circles - 1.0).abs() < 0.01);
     let far = mapped(&ball, |p| [p[0] + 5.0, p[1], p[2]]);
-    assert!(IntersectionReport::new(&tree(&far), &sleeves).is_clear());
+    let apart = self::report(&far, &[&outer, &inner]);
+    assert_eq!((apart.intersections().pairs, apart.penetration(0.0).inside), (0, 0));
+    assert_eq!(apart.order().share(), 1.0);
+}
+
+fn report(body: &TriMesh, garments: &[&TriMesh]) -> Report {
+    let garments: Vec<ReportGarment<'_>> =
+        garments.iter().map(|g| ReportGarment { positions: g.positions(), faces: g.faces() }).collect();
+    let order = LayerOrder::NearestVertex;
+    let selection = Selection { layers: &[(0, 1)], order, triangles: true, body_itself: true };
+    Report::count(&PosedBody::new(&Surface::from_mesh(body), Distance::ClosestPoint), &garments, &selection)
+}
+
+#[test]
+fn points_inside_a_sphere_are_counted_with_their_depth() {
+    let sphere = icosphere(1.0, 4);
+    let points = [[0.0, 0.0, 0.0], [0.0, 0.9, 0.0], [1.5, 0.0, 0.0], [0.0, 0.0, -0.995]];
+    let garment = ReportGarment { positions: &points, faces: &[[0, 1, 2]] };
+    let order = LayerOrder::NearestVertex;
+    let selection = Selection { layers: &[], order, triangles: false, body_itself: false };
+    let surface = Surface::from_mesh(&sphere);
+    let report = Report::count(&PosedBody::new(&surface, Distance::ClosestPoint), &[garment], &selection);
+    let p = report.penetration(0.05);
+    assert_eq!((p.vertices, p.inside, p.deep), (4, 3, 2));
+    assert!((p.max_depth - 1.0).abs() < 0.01, "{p:?}");
 }
 
 #[test]
 fn contours_survive_aligned_meshes() {
-    // Every crossing runs along edges and through vertices of both grids.
+    // Every contour runs along edges and through vertices of both grids.
     let flat = grid(1.0, 1.0, 8, 8);
     let upright = mapped(&grid(1.0, 1.0, 8, 8), |p| [p[0], 0.5, p[1] - 0.5]);
     let pairs = tree(&flat).pairs_with(&tree(&upright));

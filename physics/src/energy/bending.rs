@@ -5,7 +5,7 @@
 //! gradient is the classical one of the dihedral angle (Bridson et al. 2003; Grinspun et al. 2003). The triangles are
 //! oriented by the hinge and not by the faces, so that a flipped face does not bend.
 //!
-//! **At α = π** (one triangle folded flat onto the other) the energy is continuous and has a kink: unfolding to either side
+//! **At α = π** (one triangle folded flat onto the other) the energy is continuous but not smooth: unfolding to either side
 //! lowers it. The gradient there is that of one side.
 //!
 //! **Degenerate triangles** have no normal, and near them the angle turns arbitrarily fast: in a compressed fold, where
@@ -16,10 +16,11 @@
 //! the others of its mesh, has the printed energy, one without area none, and the gradient is bounded and the exact derivative everywhere.
 
 use super::curvature::outer;
-use super::elements::{Incidence, Response, sum_elements};
+use super::elements::{Response, sum_elements};
 use super::{CurvatureSink, GarmentState, GarmentTerm, Weighted};
 use crate::mesh::{Hinge, TriMesh};
 use crate::real::Real;
+use crate::rows::{CompressedRows, corners_at_vertices};
 use crate::vec3::{
     add, add_scaled, cross, dot, from_f64, neg, norm, norm_squared, normalized, scale, sub, to_f64,
 };
@@ -36,13 +37,13 @@ pub struct Bending {
     stiffness: f64,
     /// Edge start, edge end, opposite vertex of the first face, of the second.
     hinges: Vec<[u32; 4]>,
-    /// τ² of the two triangles of each hinge [m⁴].
+    /// τ² of the two triangles of each hinge (m⁴).
     collapse_squared: Vec<[f64; 2]>,
-    incidence: Incidence,
+    corners_at: CompressedRows<u32>,
 }
 
 impl Bending {
-    /// Prepares the energy of a garment with rest shape `rest` and its `hinges`; `stiffness` [J/rad²].
+    /// Prepares the energy of a garment with rest shape `rest` and its `hinges`; `stiffness` (J/rad²).
     pub fn new(rest: &TriMesh, hinges: &[Hinge], stiffness: f64) -> Self {
         Self::with_median_edge(rest, hinges, stiffness, rest.median_edge_length())
     }
@@ -58,18 +59,18 @@ impl Bending {
         let collapse_squared = hinges.iter().map(|h| h.faces.map(collapse)).collect();
         let hinges: Vec<[u32; 4]> =
             hinges.iter().map(|h| [h.edge[0], h.edge[1], h.opposite[0], h.opposite[1]]).collect();
-        let incidence = Incidence::new(rest.vertex_count(), &hinges);
-        Self { stiffness, hinges, collapse_squared, incidence }
+        let corners_at = corners_at_vertices(rest.vertex_count(), &hinges);
+        Self { stiffness, hinges, collapse_squared, corners_at }
     }
 
-    /// Energy [J] at `positions` `[V, 3]` [m]; adds its weighted gradient to `target`.
+    /// Energy (J) at `positions` `[V, 3]` (m); adds its weighted gradient to `target`.
     pub fn evaluate<T: Real>(&self, positions: &[[T; 3]], target: Option<Weighted<'_, T>>) -> f64 {
         let element = |h: usize| {
             let corners = self.hinges[h].map(|v| to_f64(positions[v as usize]));
             let (energy, gradient) = hinge(corners, self.collapse_squared[h], self.stiffness);
             Response { energy, gradient: gradient.map(from_f64) }
         };
-        sum_elements(self.hinges.len(), &self.incidence, element, target)
+        sum_elements(self.hinges.len(), &self.corners_at, element, target)
     }
 }
 

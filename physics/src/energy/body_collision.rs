@@ -14,7 +14,7 @@ use crate::vec3::{scale, to_f64};
 #[derive(Debug, Clone, Copy)]
 pub struct BodyCollision;
 
-/// Penalty [m³] for the signed distances `gaps` of the vertices, with margin `epsilon` [m]; adds its weighted gradient to
+/// Penalty (m³) for the signed distances `gaps` of the vertices, with margin `epsilon` (m); adds its weighted gradient to
 /// `target`.
 pub fn body_collision<T: Real>(gaps: &[Gap<T>], epsilon: f64, mut target: Option<Weighted<'_, T>>) -> f64 {
     let mut energy = 0.0;

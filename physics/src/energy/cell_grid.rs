@@ -33,7 +33,7 @@ const KEY_BITS: u32 = 21;
 const KEY_MARGIN: i64 = CELLS_PER_RADIUS[1];
 
 impl<T: Real> CellGrid<T> {
-    /// Sorts `positions` [m] for sums over pairs closer than `radius` [m].
+    /// Sorts `positions` (m) for sums over pairs closer than `radius` (m).
     pub(crate) fn new(positions: &[[T; 3]], radius: f64) -> Self {
         let [coarse, fine] = CELLS_PER_RADIUS;
         let grid = Self::with_cells(positions, radius, coarse);

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use crate::real::Real;
+use crate::rows::CompressedRows;
 use crate::vec3;
 
 /// Work items per task: enough to pay for a task, few enough to share.
@@ -25,39 +26,7 @@ impl<T: Real> Weighted<'_, T> {
     }
 }
 
-/// For every vertex, the corners of elements that it is: slot `N·element + corner`, ascending.
-#[derive(Debug, Clone)]
-pub(crate) struct Incidence {
-    offsets: Vec<u32>,
-    slots: Vec<u32>,
-}
-
-impl Incidence {
-    /// Every index in `elements` must be below `vertex_count`.
-    pub(crate) fn new<const N: usize>(vertex_count: usize, elements: &[[u32; N]]) -> Self {
-        let mut offsets = vec![0u32; vertex_count + 1];
-        for &v in elements.as_flattened() {
-            offsets[v as usize + 1] += 1;
-        }
-        for v in 0..vertex_count {
-            offsets[v + 1] += offsets[v];
-        }
-        let mut next = offsets.clone();
-        let mut slots = vec![0u32; elements.len() * N];
-        for (slot, &v) in elements.as_flattened().iter().enumerate() {
-            slots[next[v as usize] as usize] = slot as u32;
-            next[v as usize] += 1;
-        }
-        Self { offsets, slots }
-    }
-
-    #[inline(always)]
-    pub(crate) fn slots(&self, v: usize) -> &[u32] {
-        &self.slots[self.offsets[v] as usize..self.offsets[v + 1] as usize]
-    }
-}
-
-/// Energy [J] of one element and its derivative at the element's corners.
+/// Energy (J) of one element and its derivative at the element's corners.
 pub(crate) struct Response<T, const N: usize> {
     pub energy: f64,
     pub gradient: [[T; 3]; N],
@@ -69,7 +38,7 @@ pub(crate) struct Response<T, const N: usize> {
 /// its corners in order: how the work was shared leaves no trace.
 pub(crate) fn sum_elements<T: Real, const N: usize>(
     count: usize,
-    incidence: &Incidence,
+    corners_at: &CompressedRows<u32>,
     element: impl Fn(usize) -> Response<T, N> + Send + Sync,
     target: Option<Weighted<'_, T>>,
 ) -> f64 {
@@ -83,7 +52,7 @@ pub(crate) fn sum_elements<T: Real, const N: usize>(
     let weight = T::from_f64(target.weight);
     target.gradient.par_iter_mut().with_min_len(GRAIN).enumerate().for_each(|(v, gradient)| {
         let mut sum = vec3::zero();
-        for &slot in incidence.slots(v) {
+        for &slot in corners_at.row(v) {
             let slot = slot as usize;
             vec3::accumulate(&mut sum, responses[slot / N].gradient[slot % N]);
         }

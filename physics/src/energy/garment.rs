@@ -1,52 +1,21 @@
 //! Everything about one garment that its positions do not change.
 
-use std::fmt::Debug;
-
 use super::bending::Bending;
 use super::body_collision::BodyCollision;
 use super::gravity::Gravity;
-use super::holding::{HeightRow, Holding};
-use super::layer_collision::InnerGarment;
+use super::holding::Holding;
+use super::layer_collision::InnerLayer;
 use super::repulsion::Repulsion;
 use super::strain::{Needle, Strain};
-use super::{CurvatureSink, EnergyError, EnergySettings, Term, Weighted};
+use super::{EnergyError, EnergySettings, GarmentTerm, Term};
 use crate::mesh::{Topology, TriMesh};
-use crate::query::Gap;
 use crate::real::Real;
-
-/// One garment at one moment, as its energies see it.
-#[derive(Debug, Clone, Copy)]
-pub struct GarmentState<'a, T> {
-    /// Posed positions `[V, 3]` [m].
-    pub posed: &'a [[T; 3]],
-    /// Canonical positions, before skinning `[V, 3]` [m].
-    pub canonical: &'a [[T; 3]],
-    /// Canonical positions that the holding energy measures against `[V, 3]` [m].
-    pub holding_reference: &'a [[T; 3]],
-    /// Reads the heights of the holding energy off posed positions `[V]`; `None`: off canonical ones.
-    pub pull_back: Option<&'a [HeightRow]>,
-    /// Signed distance of every posed vertex to the body `[V]`; empty when no active term needs it.
-    pub gaps: &'a [Gap<T>],
-    /// Constants of the scene.
-    pub settings: &'a EnergySettings,
-}
-
-/// An energy of one garment.
-pub trait GarmentTerm<T>: Debug + Send + Sync {
-    /// Its raw value; adds `weight·∂E/∂positions` to the target, positions being canonical for
-    /// the holding energy without [`GarmentState::pull_back`], else posed.
-    fn evaluate(&self, state: &GarmentState<'_, T>, target: Option<Weighted<'_, T>>) -> f64;
-
-    /// Adds a positive semidefinite approximation of its second derivatives; nothing for a term that is linear or whose
-    /// second derivative has either sign everywhere.
-    fn curvature(&self, _state: &GarmentState<'_, T>, _sink: &mut dyn CurvatureSink) {}
-}
 
 /// The energies of one garment, ready to be evaluated at any positions. Made once per garment and shared by `Arc`.
 #[derive(Debug)]
 pub struct GarmentEnergies<T: Real> {
     vertex_count: usize,
-    as_inner: InnerGarment,
+    as_inner: InnerLayer,
     terms: Vec<(Term, Box<dyn GarmentTerm<T>>)>,
 }
 
@@ -89,7 +58,7 @@ impl<T: Real> GarmentEnergies<T> {
         if holding {
             terms.push((Term::Holding, Box::new(Holding::new(rest, settings.holding_fraction))));
         }
-        Ok(Self { vertex_count, as_inner: InnerGarment::new(rest, topology, median_edge), terms })
+        Ok(Self { vertex_count, as_inner: InnerLayer::new(rest, topology, median_edge), terms })
     }
 
     /// Number of vertices.
@@ -108,7 +77,7 @@ impl<T: Real> GarmentEnergies<T> {
     }
 
     /// As others see it that lie on it.
-    pub(crate) fn as_inner(&self) -> &InnerGarment {
+    pub(crate) fn as_inner(&self) -> &InnerLayer {
         &self.as_inner
     }
 }

@@ -1,4 +1,4 @@
-//! How large the gradient of each term can be at a vertex, whatever the shape: the promise behind "bounded".
+//! How large the gradient of each term can be at a vertex, whatever the shape: the invariant behind "bounded".
 //!
 //! Every bound is a closed formula in the size of the scene and the constants of the regularisation, derived from the
 //! triangle inequality; none divides by a deformed length, area or distance, so that no degenerate shape can make it infinite.
@@ -18,7 +18,7 @@
 //! | layer distance | `3M(r + D)²` | `d_inner < r`, `d_outer ≥ −D`, `M` vertices at most per bucket |
 
 use super::bending;
-use super::holding::HeightRow;
+use super::garment_term::HeightRow;
 use super::{EnergySettings, LayerContact, SceneEnergy, Term, layer_collision, repulsion};
 use crate::mesh::{Topology, TriMesh};
 use crate::real::Real;
@@ -28,7 +28,7 @@ use crate::vec3::{distance_squared, norm, sub, to_f64};
 const ROUNDING: f64 = 1.001;
 
 /// A bound on every entry of the gradient of `term` (weight 1) in `scene`, whose garments have the rest shapes `rest`, at
-/// `posed` and `canonical` (`[ΣV, 3]` [m]); see the module for the formulas. Infinite where there is none, NaN if a position is not
+/// `posed` and `canonical` (`[ΣV, 3]` (m)); see the module for the formulas. Infinite where there is none, NaN if a position is not
 /// finite.
 ///
 /// # Panics

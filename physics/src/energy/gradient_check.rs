@@ -4,44 +4,23 @@
 //! move many vertices at once, the analytic derivative with central differences. A walk over [`Term::ALL`] covers a ninth
 //! term without a change here: the check knows values and gradients, not formulas.
 //!
-//! **Step.** No single step suits a logarithm near contact and a polynomial a kilometre away. Quotients of a falling ladder
-//! of steps are extrapolated to zero (Ridders, "Accurate computation of F'(x) and F'(x)F''(x)", 1982), and the entry with the
-//! smallest error estimate is taken; the estimate includes the rounding of the value and never looks at the gradient that
-//! is being tested.
-//!
 //! Positions and steps are multiples of one power of two, so that a step moves a coordinate by exactly what it is divided by.
 //!
 //! **Scale.** Errors are relative to the largest entry of the term's gradient in the scene. At a minimum that is rounding
 //! noise, so it counts at least as much as the largest entry after every coordinate moved by a random amount of up to one
 //! hundredth of an edge. A term that is silent there as well must be exactly constant.
-//!
-//! **Kinks.** Nearest vertices, the repulsion's radius and the gates change in jumps, and the angle of a hinge has a kink at
-//! π: there is no derivative there. A line is excused from the central check only if the jump is *shown*: the gradient, or
-//! the part of the value that the gradient does not explain (the residual of the trapezoid rule), must differ between the
-//! two ends of the line and fail to shrink with its length. Of a differentiable function both shrink at least linearly,
-//! even if the gradient is wrong. On such a line both sides are checked instead, each with quotients that stay on it. At
-//! the kink itself no derivative exists; what the term returns there is the gradient of one of its sides, and bounded by
-//! [`super::gradient_bound`] like any other.
 
 use rayon::prelude::*;
 
+pub use super::difference_quotient::TOLERANCE;
+use super::difference_quotient::{Ladder, Line, LineResult, Probe, nan_max};
 use super::{SceneEnergy, SceneValue, Term, TermMap};
 use crate::mesh::shapes::SplitMix;
-use crate::vec3;
-
-/// Largest relative difference between a gradient and its quotients that counts as agreement.
-pub const TOLERANCE: f64 = 1e-6;
-
-/// Ratio of one step of the ladder to the next.
-const LADDER: f64 = 4.0;
-
-/// Steps of the ladder.
-const RUNGS: usize = 9;
 
 /// First step in units of the shortest median edge.
 const FIRST_STEP: f64 = 1e-2;
 
-/// Edges longer than this do not lengthen the first step [m]: a rest shape in the wrong unit does not enlarge the body.
+/// Edges longer than this do not lengthen the first step (m): a rest shape in the wrong unit does not enlarge the body.
 const LONGEST_EDGE: f64 = 0.02;
 
 /// Directions in large scenes move this many vertices: with all of them some nearest vertex always changes.
@@ -52,9 +31,6 @@ const QUANTUM_BITS: f64 = 50.0;
 
 /// Components of a direction are multiples of one over this.
 const COMPONENTS: f64 = 64.0;
-
-/// Uncertainty of a quotient, in units of the tolerance, below which no further step is tried.
-const ENOUGH: f64 = 0.02;
 
 /// How much is compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -89,8 +65,8 @@ pub struct GradientReport {
     pub resolution: f64,
     /// Lines compared.
     pub lines: usize,
-    /// How many of them were compared on both sides of a kink.
-    pub kinks: usize,
+    /// How many of them were compared on both sides of a nonsmooth point.
+    pub nonsmooth: usize,
 }
 
 impl GradientReport {
@@ -100,7 +76,7 @@ impl GradientReport {
     }
 }
 
-/// Compares the gradient of `term` in `scene` with difference quotients at `posed` and `canonical` (`[ΣV, 3]` [m] each, as in
+/// Compares the gradient of `term` in `scene` with difference quotients at `posed` and `canonical` (`[ΣV, 3]` (m) each, as in
 /// [`SceneEnergy::evaluate`]). `None` if the scene has no such term: no garment is held, or no pair of layers.
 ///
 /// # Panics
@@ -112,7 +88,7 @@ pub fn check_gradient(
     canonical: &[[f64; 3]],
     settings: &GradientCheck,
 ) -> Option<GradientReport> {
-    let scene = alone(scene, term);
+    let scene = with_only(scene, term);
     raw_value(&scene.value(posed, canonical), term)?;
     let edges = scene.garments.iter().map(|g| g.energies.as_inner().median_edge());
     let edge = edges.fold(LONGEST_EDGE, f64::min);
@@ -133,8 +109,8 @@ pub fn check_gradient(
     })
 }
 
-/// The same for any function of positions: `value`, and value with `gradient`, at `positions` `[V, 3]` [m] of a mesh with edges
-/// of about `edge` [m].
+/// The same for any function of positions: `value`, and value with `gradient`, at `positions` `[V, 3]` (m) of a mesh with edges
+/// of about `edge` (m).
 pub fn check_function(
     value: &(dyn Fn(&[[f64; 3]]) -> f64 + Sync),
     gradient: &(dyn Fn(&[[f64; 3]]) -> (f64, Vec<[f64; 3]>) + Sync),
@@ -175,7 +151,7 @@ pub fn check_function(
         error: worst(|r| r.error),
         resolution: if scale > 0.0 { worst(|r| r.resolution) } else { 0.0 },
         lines: results.len(),
-        kinks: results.iter().filter(|r| r.kink).count(),
+        nonsmooth: results.iter().filter(|r| r.is_nonsmooth).count(),
     }
 }
 
@@ -186,7 +162,7 @@ pub fn raw_value<T>(value: &SceneValue<T>, term: Term) -> Option<f64> {
 }
 
 /// `scene` with weight 1 for `term` and 0 for all others.
-pub fn alone<T: crate::Real>(scene: &SceneEnergy<T>, term: Term) -> SceneEnergy<T> {
+pub fn with_only<T: crate::Real>(scene: &SceneEnergy<T>, term: Term) -> SceneEnergy<T> {
     let weights = TermMap::from_fn(|t| if t == term { 1.0 } else { 0.0 });
     let mut scene = scene.clone();
     scene.garments.iter_mut().for_each(|g| g.weights = weights);
@@ -198,14 +174,6 @@ pub fn alone<T: crate::Real>(scene: &SceneEnergy<T>, term: Term) -> SceneEnergy<
 pub fn largest_entry<T: crate::Real>(gradient: &[[T; 3]]) -> f64 {
     gradient.as_flattened().iter().map(|g| crate::Real::to_f64(*g).abs()).fold(0.0, nan_max)
 }
-
-/// The larger one; NaN if either is, where `f64::max` would hide it.
-fn nan_max(a: f64, b: f64) -> f64 {
-    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
-}
-
-/// A direction: coordinates `3·vertex + axis` and their components.
-type Line = Vec<(usize, f64)>;
 
 fn lines(gradient: &[[f64; 3]], settings: &GradientCheck, random: &mut SplitMix) -> Vec<Line> {
     let count = 3 * gradient.len();
@@ -240,146 +208,6 @@ fn lines(gradient: &[[f64; 3]], settings: &GradientCheck, random: &mut SplitMix)
     lines
 }
 
-/// A function at positions that can be moved.
-struct Probe<'a> {
-    value: &'a (dyn Fn(&[[f64; 3]]) -> f64 + Sync),
-    gradient: &'a (dyn Fn(&[[f64; 3]]) -> (f64, Vec<[f64; 3]>) + Sync),
-    positions: &'a [[f64; 3]],
-}
-
-impl Probe<'_> {
-    fn moved(&self, line: &[(usize, f64)], t: f64) -> Vec<[f64; 3]> {
-        let mut positions = self.positions.to_vec();
-        for &(c, component) in line {
-            positions[c / 3][c % 3] += t * component;
-        }
-        positions
-    }
-
-    fn evaluate(&self, line: &[(usize, f64)], t: f64) -> (f64, Vec<[f64; 3]>) {
-        (self.gradient)(&self.moved(line, t))
-    }
-
-    fn value(&self, line: &[(usize, f64)], t: f64) -> f64 {
-        (self.value)(&self.moved(line, t))
-    }
-}
-
-fn along(gradient: &[[f64; 3]], line: &[(usize, f64)]) -> f64 {
-    line.iter().map(|&(c, component)| gradient[c / 3][c % 3] * component).sum()
-}
-
-/// A derivative by quotients, and how far off it may be by its own estimate.
-#[derive(Debug, Clone, Copy)]
-struct Quotient {
-    derivative: f64,
-    uncertainty: f64,
-}
-
-struct LineResult {
-    error: f64,
-    resolution: f64,
-    kink: bool,
-}
-
-struct Ladder {
-    first: f64,
-    /// Steps are multiples of this [m].
-    unit: f64,
-    scale: f64,
-}
-
-impl Ladder {
-    fn check(&self, probe: &Probe<'_>, line: &Line, gradient: &[[f64; 3]]) -> LineResult {
-        let expected = along(gradient, line);
-        let quotient = self.quotient(probe, line, 0.0, self.first);
-        let error = (quotient.derivative - expected).abs();
-        let result = LineResult { error, resolution: quotient.uncertainty, kink: false };
-        if error <= TOLERANCE * self.scale || !self.jumps(probe, line) {
-            return result;
-        }
-        let [left, right] = [-1.0, 1.0].map(|side| self.side(probe, line, side));
-        LineResult {
-            error: nan_max(left.error, right.error),
-            resolution: left.resolution.max(right.resolution),
-            kink: true,
-        }
-    }
-
-    /// Whether something jumps at the origin of the line: see the module.
-    fn jumps(&self, probe: &Probe<'_>, line: &Line) -> bool {
-        let across = |h: f64| {
-            let [(low, before), (high, after)] = [-h, h].map(|t| probe.evaluate(line, t));
-            let pairs = before.iter().zip(&after);
-            let gradient = pairs.map(|(a, b)| vec3::norm(vec3::sub(*a, *b))).fold(0.0, nan_max);
-            let explained = h * (along(&before, line) + along(&after, line));
-            let noise = 8.0 * f64::EPSILON * (low.abs() + high.abs());
-            let residual = (high - low - explained).abs();
-            (gradient, if residual > noise { residual } else { 0.0 })
-        };
-        // A jump persists, everything else shrinks at least in proportion.
-        let persists = |wide: f64, narrow: f64| narrow > 2.0 / LADDER * wide;
-        let steps: Vec<f64> = self.steps(self.first).collect();
-        steps.windows(2).rev().any(|pair| {
-            let (wide, narrow) = (across(pair[0]), across(pair[1]));
-            (persists(wide.0, narrow.0) && narrow.0 > TOLERANCE * self.scale) || persists(wide.1, narrow.1)
-        })
-    }
-
-    /// The check on one side of a kink: the best of several distances from it, with quotients that do not reach it.
-    fn side(&self, probe: &Probe<'_>, line: &Line, side: f64) -> LineResult {
-        let mut best = LineResult { error: f64::INFINITY, resolution: 0.0, kink: true };
-        for distance in self.steps(self.first) {
-            let centre = side * distance;
-            let expected = along(&probe.evaluate(line, centre).1, line);
-            let quotient = self.quotient(probe, line, centre, 0.5 * distance);
-            let error = (quotient.derivative - expected).abs();
-            if error < best.error {
-                best = LineResult { error, resolution: quotient.uncertainty, kink: true };
-            }
-            if best.error <= TOLERANCE * self.scale {
-                break;
-            }
-        }
-        best
-    }
-
-    fn steps(&self, first: f64) -> impl Iterator<Item = f64> {
-        let unit = self.unit;
-        let rounded = move |k: i32| (first * LADDER.powi(-k) / unit).round() * unit;
-        (0..RUNGS as i32).map(rounded).filter(|h: &f64| *h > 0.0)
-    }
-
-    /// Ridders' extrapolation of central differences about `centre`.
-    fn quotient(&self, probe: &Probe<'_>, line: &Line, centre: f64, first: f64) -> Quotient {
-        let mut best = Quotient { derivative: 0.0, uncertainty: f64::INFINITY };
-        let mut previous: Vec<f64> = Vec::new();
-        for h in self.steps(first) {
-            let (low, high) = (probe.value(line, centre - h), probe.value(line, centre + h));
-            let rounding = f64::EPSILON * (low.abs() + high.abs()) / h;
-            let mut row = vec![(high - low) / (2.0 * h)];
-            let mut factor = 1.0;
-            for column in 1..=previous.len() {
-                factor *= LADDER * LADDER;
-                let finer = row[column - 1];
-                let extrapolated = (factor * finer - previous[column - 1]) / (factor - 1.0);
-                let spread =
-                    nan_max((extrapolated - finer).abs(), (extrapolated - previous[column - 1]).abs());
-                let uncertainty = spread + rounding;
-                if uncertainty < best.uncertainty {
-                    best = Quotient { derivative: extrapolated, uncertainty };
-                }
-                row.push(extrapolated);
-            }
-            previous = row;
-            if previous.len() >= 3 && best.uncertainty <= ENOUGH * TOLERANCE * self.scale {
-                break;
-            }
-        }
-        best
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -397,10 +225,10 @@ mod tests {
     #[test]
     fn a_derivative_passes_and_one_that_is_a_little_off_does_not() {
         let good = report(f64::exp, f64::exp, 0.4);
-        assert!(good.passes() && good.kinks == 0 && good.error < 1e-8, "{good:?}");
+        assert!(good.passes() && good.nonsmooth == 0 && good.error < 1e-8, "{good:?}");
         let off = report(f64::exp, |x| x.exp() * (1.0 + 5e-6), 0.4);
         // A line along all 18 coordinates at once adds up their errors: √18 times 5e-6.
-        assert!(!off.passes() && off.error < 2.5e-5 && off.kinks == 0, "{off:?}");
+        assert!(!off.passes() && off.error < 2.5e-5 && off.nonsmooth == 0, "{off:?}");
     }
 
     #[test]
@@ -411,15 +239,15 @@ mod tests {
     }
 
     #[test]
-    fn kinks_and_jumps_are_checked_on_both_sides() {
+    fn nonsmooth_points_and_jumps_are_checked_on_both_sides() {
         for (f, slope) in [
             (f64::abs as fn(f64) -> f64, f64::signum as fn(f64) -> f64),
             (|x| x.sin() + f64::from(x > 0.0), f64::cos),
         ] {
             let good = report(f, slope, 0.0);
-            assert!(good.passes() && good.kinks > 0, "{good:?}");
+            assert!(good.passes() && good.nonsmooth > 0, "{good:?}");
         }
-        // A kink is no excuse for a wrong slope beside it, nor is a claimed kink where the function has none.
+        // A nonsmooth point is no excuse for a wrong slope beside it, nor is a claimed one where the function is smooth.
         let wrong = report(f64::abs, |x| x.signum() * 1.001, 0.0);
         assert!(!wrong.passes(), "{wrong:?}");
         let invented = report(|x| x, |x| 1.0 + 0.1 * x.signum(), 0.0);

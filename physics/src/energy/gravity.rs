@@ -10,12 +10,12 @@ use crate::real::Real;
 /// The potential energy of one garment.
 #[derive(Debug, Clone)]
 pub struct Gravity {
-    /// Mass × acceleration of every vertex [N].
+    /// Mass × acceleration of every vertex (N).
     weights: Vec<f64>,
 }
 
 impl Gravity {
-    /// Lumps the rest mass of `rest` at its vertices; `acceleration` [m/s²] points along −y.
+    /// Lumps the rest mass of `rest` at its vertices; `acceleration` (m/s²) points along −y.
     pub fn new(rest: &TriMesh, material: &Material, acceleration: f64) -> Self {
         let mut weights = vec![0.0; rest.vertex_count()];
         for (f, face) in rest.faces().iter().enumerate() {
@@ -27,7 +27,7 @@ impl Gravity {
         Self { weights }
     }
 
-    /// Energy [J] at `positions` `[V, 3]` [m]; adds its weighted gradient to `target`.
+    /// Energy (J) at `positions` `[V, 3]` (m); adds its weighted gradient to `target`.
     pub fn evaluate<T: Real>(&self, positions: &[[T; 3]], target: Option<Weighted<'_, T>>) -> f64 {
         if let Some(mut target) = target {
             for (v, weight) in self.weights.iter().enumerate() {

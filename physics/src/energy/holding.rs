@@ -10,14 +10,12 @@
 //! The paper's `y_ref` is the rest garment; training measures against the shape-transferred rest, because the printed form
 //! punishes a garment for following its body: [`super::SceneGarment::holding_reference`].
 
+use super::garment_term::HeightRow;
 use super::{CurvatureSink, GarmentState, GarmentTerm, Weighted};
 use crate::mesh::TriMesh;
 use crate::real::Real;
 use crate::transform::{Transform, inverse};
 use crate::vec3::{scale, to_f64};
-
-/// The height before skinning as an affine function of a posed position: the second row of `T₀⁻¹`, `y = r·(x̂, 1)`.
-pub type HeightRow = [f64; 4];
 
 /// Blended transforms with a smaller determinant have no height before skinning: half a turn between two bones flattens the
 /// cloth that both carry. One of 0.05 belongs to bones of equal weight at 154°, beyond every joint limit.
@@ -51,7 +49,7 @@ impl Holding {
         &self.held
     }
 
-    /// Every held vertex with its height above the reference [m], and how that changes with the position it is read off.
+    /// Every held vertex with its height above the reference (m), and how that changes with the position it is read off.
     fn raised<'a, T: Real>(
         &'a self,
         state: &'a GarmentState<'_, T>,
@@ -72,7 +70,7 @@ impl Holding {
 }
 
 impl<T: Real> GarmentTerm<T> for Holding {
-    /// Energy [m²].
+    /// Energy (m²).
     fn evaluate(&self, state: &GarmentState<'_, T>, mut target: Option<Weighted<'_, T>>) -> f64 {
         let mut energy = 0.0;
         for (v, raised, along) in self.raised(state) {

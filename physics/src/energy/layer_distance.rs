@@ -11,45 +11,18 @@ use super::Weighted;
 use super::elements::GRAIN;
 use crate::query::Gap;
 use crate::real::Real;
+use crate::rows::CompressedRows;
 use crate::vec3::{scale, to_f64};
 
-/// The vertices of one garment near the body, by nearest body vertex. Made once per evaluation.
-#[derive(Debug)]
-pub struct BodyBuckets {
-    offsets: Vec<u32>,
-    /// Signed distances [m], bucket by bucket, in vertex order within a bucket.
-    gaps: Vec<f64>,
-}
+/// Signed distances (m) of the vertices closer to the body than a radius, by nearest body vertex, in vertex order.
+pub(super) struct BodyBuckets(CompressedRows<f64>);
 
 impl BodyBuckets {
-    /// Sorts the vertices with signed distances `gaps` below `radius` [m] into one bucket per body vertex.
+    /// Sorts the vertices with signed distances `gaps` below `radius` (m) into one bucket per body vertex.
     pub fn new<T: Real>(gaps: &[Gap<T>], body_vertex_count: usize, radius: f64) -> Self {
-        let near = || gaps.iter().filter(|gap| counts(gap, body_vertex_count, radius));
-        let mut offsets = vec![0u32; body_vertex_count + 1];
-        for gap in near() {
-            offsets[gap.vertex as usize + 1] += 1;
-        }
-        for b in 0..body_vertex_count {
-            offsets[b + 1] += offsets[b];
-        }
-        let mut next = offsets.clone();
-        let mut sorted = vec![0.0; offsets[body_vertex_count] as usize];
-        for gap in near() {
-            let at = &mut next[gap.vertex as usize];
-            sorted[*at as usize] = gap.gap.to_f64();
-            *at += 1;
-        }
-        Self { offsets, gaps: sorted }
-    }
-
-    #[inline(always)]
-    fn at(&self, body_vertex: u32) -> &[f64] {
-        let b = body_vertex as usize;
-        &self.gaps[self.offsets[b] as usize..self.offsets[b + 1] as usize]
-    }
-
-    fn body_vertex_count(&self) -> usize {
-        self.offsets.len() - 1
+        let near = gaps.iter().filter(|gap| counts(gap, body_vertex_count, radius));
+        let keyed = near.map(|gap| (gap.vertex as usize, gap.gap.to_f64()));
+        Self(CompressedRows::grouped(body_vertex_count, keyed))
     }
 }
 
@@ -59,17 +32,17 @@ fn counts<T: Real>(gap: &Gap<T>, body_vertex_count: usize, radius: f64) -> bool 
 }
 
 /// One garment of a pair: its vertices' distances to the body and their buckets.
-#[derive(Debug, Clone, Copy)]
-pub struct LayerGaps<'a, T> {
+#[derive(Clone, Copy)]
+pub(super) struct LayerGaps<'a, T> {
     /// Signed distance per vertex `[V]`.
     pub gaps: &'a [Gap<T>],
     /// Made from `gaps`, the body and the radius.
     pub buckets: &'a BodyBuckets,
 }
 
-/// Penalty [m³] of an inner garment farther from the body than an outer one; `radius` [m] as in the buckets. Adds its
+/// Penalty (m³) of an inner garment farther from the body than an outer one; `radius` (m) as in the buckets. Adds its
 /// weighted gradient to `targets`, the inner garment's first.
-pub fn layer_distance<T: Real>(
+pub(super) fn layer_distance<T: Real>(
     inner: LayerGaps<'_, T>,
     outer: LayerGaps<'_, T>,
     radius: f64,
@@ -100,17 +73,17 @@ fn partners<T: Real>(
     radius: f64,
     sign: f64,
 ) -> Vec<(f64, f64)> {
-    let body_vertex_count = against.buckets.body_vertex_count();
+    let buckets = &against.buckets.0;
     of.gaps
         .par_iter()
         .with_min_len(GRAIN)
         .map(|gap| {
-            if !counts(gap, body_vertex_count, radius) {
+            if !counts(gap, buckets.len(), radius) {
                 return (0.0, 0.0);
             }
             let here = gap.gap.to_f64();
             let (mut energy, mut slope) = (0.0, 0.0);
-            for other in against.buckets.at(gap.vertex) {
+            for other in buckets.row(gap.vertex as usize) {
                 let excess = (sign * (here - other)).max(0.0);
                 energy += excess * excess * excess;
                 slope += 3.0 * excess * excess;

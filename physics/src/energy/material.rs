@@ -7,15 +7,15 @@
 /// ratio of 0.485 in plane stress.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Material {
-    /// Thickness [m].
+    /// Thickness (m).
     pub thickness: f64,
-    /// Density [kg/m³].
+    /// Density (kg/m³).
     pub density: f64,
-    /// Second Lamé constant μ [Pa].
+    /// Second Lamé constant μ (Pa).
     pub mu: f64,
-    /// First Lamé constant λ [Pa].
+    /// First Lamé constant λ (Pa).
     pub lambda: f64,
-    /// Bending stiffness k of a hinge [J/rad²]; the paper's weight of 5 is not part of it.
+    /// Bending stiffness k of a hinge (J/rad²); the paper's weight of 5 is not part of it.
     pub bending_stiffness: f64,
 }
 

@@ -16,16 +16,18 @@
 //! `f64` and run in a fixed order: results are bit-identical for any number of threads.
 //!
 //! A ninth term is one new file, its name in [`Term`], its weight in the configuration, a bound of its gradient for the suite of
-//! hard cases, and one line where [`GarmentEnergies`] (or, for a pair of garments, [`SceneEnergy`]) lists what it evaluates; the
+//! degenerate cases, and one line where [`GarmentEnergies`] (or, for a pair of garments, [`SceneEnergy`]) lists what it evaluates; the
 //! finite-difference test walks the list.
 
 pub mod bending;
 pub mod body_collision;
 mod cell_grid;
 mod curvature;
+mod difference_quotient;
 mod elements;
 mod error;
 mod garment;
+mod garment_term;
 pub mod gradient_bound;
 pub mod gradient_check;
 pub mod gravity;
@@ -36,20 +38,22 @@ mod material;
 mod pair_kernel;
 pub mod repulsion;
 mod scene;
+mod scene_curvature;
+mod scene_sum;
 mod settings;
 pub mod strain;
 mod term;
 #[cfg(test)]
 pub(crate) mod tests;
-mod touching;
 
 pub use curvature::CurvatureSink;
 pub use elements::Weighted;
 pub use error::EnergyError;
-pub use garment::{GarmentEnergies, GarmentState, GarmentTerm};
-pub use layer_collision::LayerContact;
+pub use garment::GarmentEnergies;
+pub use garment_term::{GarmentState, GarmentTerm};
 pub use material::Material;
-pub use scene::{SceneEnergy, SceneGarment, SceneLayers, SceneValue, weighted};
-pub use settings::{EnergySettings, LayerGate};
+pub use scene::{SceneEnergy, SceneGarment, SceneLayers};
+pub use scene_curvature::LayerTouch;
+pub use scene_sum::{SceneValue, weighted};
+pub use settings::{EnergySettings, LayerContact, LayerGate};
 pub use term::{Term, TermMap};
-pub use touching::LayerTouch;

@@ -5,7 +5,7 @@ use std::ops::Range;
 use crate::real::Real;
 use crate::vec3::{accumulate, from_f64, scale, sub, zero};
 
-/// δ [m]: below this distance, a fifth of the cloth's thickness, the logarithm continues as a line in `d²`.
+/// δ (m): below this distance, a fifth of the cloth's thickness, the logarithm continues as a line in `d²`.
 pub const CONTACT_DISTANCE: f64 = 1e-4;
 
 /// Candidates per step of the inner loop.
@@ -23,7 +23,7 @@ pub(super) struct Kernel<T> {
     pub least_energy: f64,
     radius_squared: T,
     contact_squared: T,
-    /// What `d²` is multiplied with inside the logarithm [1/m²].
+    /// What `d²` is multiplied with inside the logarithm (1/m²).
     unit: T,
 }
 
@@ -44,7 +44,7 @@ fn vectorised(kernel: impl FnOnce()) {
 pub(super) type VertexResponse<T> = (f64, [T; 3]);
 
 impl<T: Real> Kernel<T> {
-    /// Pairs closer than `radius` [m] count `−log(unit·d²)`.
+    /// Pairs closer than `radius` (m) count `−log(unit·d²)`.
     pub fn new(radius: f64, unit: f64) -> Self {
         Self {
             radius,

@@ -8,7 +8,7 @@
 //! have no direction to part in and get none from each other. **At the radius** the printed term jumps from 4.6 to 0; this
 //! is kept, and the gradient is that of the pairs inside. [`EnergySettings::repulsion_continuous`] drops the jump without
 //! touching the gradient: pairs inside count `−log d²/r²`. Training, which follows gradients, cannot tell the two forms apart; a line
-//! search can, because in the printed form every pair that comes closer than the radius is a wall.
+//! search can, because in the printed form every pair that comes closer than the radius stops it.
 //!
 //! **No all-pairs work.** Vertices are sorted into cells of half or a quarter of the radius; those of one cell share a list of
 //! candidates, which the inner loop runs through in fixed lanes, with the widest vectors the processor has (the operations
@@ -26,6 +26,7 @@ use super::{EnergySettings, GarmentState, GarmentTerm, Weighted};
 use crate::mesh::Topology;
 use crate::mesh::shapes::SplitMix;
 use crate::real::Real;
+use crate::rows::CompressedRows;
 use crate::vec3::{axpy, sub, zero};
 
 pub use super::pair_kernel::CONTACT_DISTANCE;
@@ -34,41 +35,17 @@ pub use super::pair_kernel::CONTACT_DISTANCE;
 #[derive(Debug, Clone)]
 pub struct Repulsion {
     /// Per vertex those that do not count: itself and its neighbours.
-    excluded: Rows,
-}
-
-/// Compressed rows of vertex indices.
-#[derive(Debug, Clone)]
-struct Rows {
-    offsets: Vec<u32>,
-    vertices: Vec<u32>,
-}
-
-impl Rows {
-    fn from_fn<I: IntoIterator<Item = u32>>(count: usize, row: impl Fn(usize) -> I) -> Self {
-        let (mut offsets, mut vertices) = (Vec::with_capacity(count + 1), Vec::new());
-        offsets.push(0);
-        for v in 0..count {
-            vertices.extend(row(v));
-            offsets.push(vertices.len() as u32);
-        }
-        Self { offsets, vertices }
-    }
-
-    #[inline(always)]
-    fn row(&self, v: usize) -> &[u32] {
-        &self.vertices[self.offsets[v] as usize..self.offsets[v + 1] as usize]
-    }
+    excluded: CompressedRows<u32>,
 }
 
 impl Repulsion {
     /// For a garment with this topology.
     pub fn new(topology: &Topology) -> Self {
         let excluded = |v| topology.ring(v).iter().copied().chain([v as u32]);
-        Self { excluded: Rows::from_fn(topology.vertex_count(), excluded) }
+        Self { excluded: CompressedRows::from_fn(topology.vertex_count(), excluded) }
     }
 
-    /// Energy at `positions` `[V, 3]` [m] by the `repulsion_…` of `settings`; adds its weighted gradient to `target`. A vertex
+    /// Energy at `positions` `[V, 3]` (m) by the `repulsion_…` of `settings`; adds its weighted gradient to `target`. A vertex
     /// that is not finite repels nothing.
     pub fn evaluate<T: Real>(
         &self,
@@ -141,7 +118,11 @@ impl Sample {
 }
 
 /// Twice the sum over close pairs and, per vertex, its derivative.
-fn all_pairs<T: Real>(positions: &[[T; 3]], excluded: &Rows, kernel: Kernel<T>) -> (f64, Vec<(u32, [T; 3])>) {
+fn all_pairs<T: Real>(
+    positions: &[[T; 3]],
+    excluded: &CompressedRows<u32>,
+    kernel: Kernel<T>,
+) -> (f64, Vec<(u32, [T; 3])>) {
     let grid = CellGrid::new(positions, kernel.radius);
     let per_cell: Vec<Vec<VertexResponse<T>>> = (0..grid.cell_count())
         .into_par_iter()
@@ -172,7 +153,7 @@ fn all_pairs<T: Real>(positions: &[[T; 3]], excluded: &Rows, kernel: Kernel<T>) 
 /// The same over the pairs of `sample`.
 fn sampled_pairs<T: Real>(
     positions: &[[T; 3]],
-    excluded: &Rows,
+    excluded: &CompressedRows<u32>,
     sample: &Sample,
     kernel: Kernel<T>,
 ) -> (f64, Vec<(u32, [T; 3])>) {

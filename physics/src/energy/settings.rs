@@ -1,8 +1,17 @@
 //! The switches and constants of the energies.
 
-use super::layer_collision::LayerContact;
 use super::{EnergyError, Material};
 use crate::query::Distance;
+
+/// How the signed distance of an outer vertex to an inner garment is measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum LayerContact {
+    /// `(x − x_g)·n_g` with the nearest vertex `g` and its area-weighted normal: the paper's form.
+    #[default]
+    NearestVertex,
+    /// The distance to the closest point of the surface.
+    ClosestPoint,
+}
 
 /// Which outer vertices take part in the layer collision.
 ///
@@ -12,7 +21,7 @@ use crate::query::Distance;
 pub struct LayerGate {
     /// Largest offset along the inner surface, in median edge lengths of the inner garment at rest.
     pub tangential_edges: f64,
-    /// Largest |d| [m].
+    /// Largest |d| (m).
     pub depth: f64,
 }
 
@@ -30,13 +39,13 @@ pub struct EnergySettings {
     /// Rest triangles flatter than this ratio of height to longest edge are measured by the strain as if they had it: else a
     /// needle is a spring of unbounded stiffness. 0: as printed in the paper, which has no floor.
     pub needle_ratio: f64,
-    /// Margin ε between garment and body [m]; paper: 0.002.
+    /// Margin ε between garment and body (m); paper: 0.002.
     pub body_collision_epsilon: f64,
-    /// Margin ε between two garments [m]; paper: 0.002.
+    /// Margin ε between two garments (m); paper: 0.002.
     pub layer_collision_epsilon: f64,
     /// How the distance to the body is measured; paper: nearest vertex.
     pub distance: Distance,
-    /// Vertices of one garment repel each other below this distance [m]; paper: 0.1.
+    /// Vertices of one garment repel each other below this distance (m); paper: 0.1.
     pub repulsion_radius: f64,
     /// Whether the repulsion is divided by the number of vertices, which the paper's magnitudes need; off: as printed.
     pub repulsion_normalised: bool,
@@ -49,14 +58,14 @@ pub struct EnergySettings {
     /// The same repulsion forces from an energy without the printed form's jump at the radius: what a solver with a line
     /// search needs. Off (default): as printed.
     pub repulsion_continuous: bool,
-    /// Gravitational acceleration [m/s²], along −y.
+    /// Gravitational acceleration (m/s²), along −y.
     pub gravity_acceleration: f64,
     /// How the distance to an inner garment is measured; paper: nearest vertex.
     pub layer_contact: LayerContact,
     /// Which outer vertices the layer collision counts; `None`: all, as printed in the paper. By the closest point, cloth that
     /// lies deeper than the gate has faded out, and `None` stands for the default.
     pub layer_gate: Option<LayerGate>,
-    /// The layer distance counts vertices closer to the body than this [m]; paper: 0.1.
+    /// The layer distance counts vertices closer to the body than this (m); paper: 0.1.
     pub layer_distance_radius: f64,
     /// Share of the vertices, highest at rest first, that the holding energy holds; paper: 0.1.
     pub holding_fraction: f64,

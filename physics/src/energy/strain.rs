@@ -11,10 +11,11 @@
 //! same, such a triangle measures `G = ½(FᵀF − F₀ᵀF₀)`, `F₀` being its `F` in the rest shape; for every other triangle
 //! `F₀ᵀF₀ = I`. A ratio of 0 is the printed form. A triangle without area has no energy in either.
 
-use super::elements::{Incidence, Response, sum_elements};
+use super::elements::{Response, sum_elements};
 use super::{CurvatureSink, GarmentState, GarmentTerm, Material, Weighted};
 use crate::mesh::TriMesh;
 use crate::real::Real;
+use crate::rows::{CompressedRows, corners_at_vertices};
 use crate::vec3::{add, add_scaled, dot, norm, scale, sub, to_f64};
 
 /// The strain energy of one garment.
@@ -23,7 +24,7 @@ pub struct Strain {
     mu: f64,
     lambda: f64,
     triangles: Vec<RestTriangle>,
-    incidence: Incidence,
+    corners_at: CompressedRows<u32>,
 }
 
 /// A triangle with a smaller ratio of height to longest edge has no area: corners on a line round to heights of about 1e-16.
@@ -34,7 +35,7 @@ const NO_HEIGHT: f64 = 1e-12;
 pub(super) struct Needle {
     /// Least ratio of height to longest edge.
     pub ratio: f64,
-    /// Of the whole garment [m].
+    /// Of the whole garment (m).
     pub median_edge: f64,
 }
 
@@ -43,9 +44,9 @@ pub(super) struct Needle {
 struct RestTriangle {
     /// The face's vertices, turned so that the longest edge comes first.
     corners: [u32; 3],
-    /// Area × thickness [m³].
+    /// Area × thickness (m³).
     volume: f64,
-    /// The upper triangle `(0,0), (0,1), (1,1)` of the inverse of the 2×2 matrix of rest edges [1/m].
+    /// The upper triangle `(0,0), (0,1), (1,1)` of the inverse of the 2×2 matrix of rest edges (1/m).
     inverse: [f64; 3],
     /// `F₀ᵀF₀`: entries 11, 12, 22.
     metric: [f64; 3],
@@ -94,13 +95,18 @@ impl RestTriangle {
         [scale(base, i00), add_scaled(scale(base, i01), i11, side)]
     }
 
+    /// The two columns of `F` and the entries 11, 12, 22 of `G`.
     #[inline(always)]
-    fn response<T: Real>(&self, positions: &[[T; 3]], mu: f64, lambda: f64) -> Response<T, 3> {
+    fn strain<T: Real>(&self, positions: &[[T; 3]]) -> ([[f64; 3]; 2], [f64; 3]) {
         let [a, b, c] = self.corners.map(|v| to_f64(positions[v as usize]));
         let [f1, f2] = self.deformation_gradient(sub(b, a), sub(c, a));
-        let g11 = 0.5 * (dot(f1, f1) - self.metric[0]);
-        let g12 = 0.5 * (dot(f1, f2) - self.metric[1]);
-        let g22 = 0.5 * (dot(f2, f2) - self.metric[2]);
+        let products = [dot(f1, f1), dot(f1, f2), dot(f2, f2)];
+        ([f1, f2], std::array::from_fn(|k| 0.5 * (products[k] - self.metric[k])))
+    }
+
+    #[inline(always)]
+    fn response<T: Real>(&self, positions: &[[T; 3]], mu: f64, lambda: f64) -> Response<T, 3> {
+        let ([f1, f2], [g11, g12, g22]) = self.strain(positions);
         let trace = g11 + g22;
         let density = 0.5 * lambda * trace * trace + mu * (g11 * g11 + 2.0 * g12 * g12 + g22 * g22);
 
@@ -116,16 +122,10 @@ impl RestTriangle {
         let at_a = scale(add(at_b, at_c), -1.0);
         Response { energy: self.volume * density, gradient: [at_a, at_b, at_c].map(crate::vec3::from_f64) }
     }
-}
 
-impl RestTriangle {
     /// See [`GarmentTerm::curvature`] of [`Strain`].
     fn curvature<T: Real>(&self, positions: &[[T; 3]], mu: f64, lambda: f64, sink: &mut dyn CurvatureSink) {
-        let [a, b, c] = self.corners.map(|v| to_f64(positions[v as usize]));
-        let [f1, f2] = self.deformation_gradient(sub(b, a), sub(c, a));
-        let g11 = 0.5 * (dot(f1, f1) - self.metric[0]);
-        let g12 = 0.5 * (dot(f1, f2) - self.metric[1]);
-        let g22 = 0.5 * (dot(f2, f2) - self.metric[2]);
+        let ([f1, f2], [g11, g12, g22]) = self.strain(positions);
         let trace = g11 + g22;
         let stress = [lambda * trace + 2.0 * mu * g11, 2.0 * mu * g12, lambda * trace + 2.0 * mu * g22];
         let [s11, s12, s22] = positive_part(stress);
@@ -171,14 +171,14 @@ impl Strain {
             .map(|&face| RestTriangle::new(rest.positions(), face, material.thickness, needle))
             .collect();
         let corners: Vec<[u32; 3]> = triangles.iter().map(|t| t.corners).collect();
-        let incidence = Incidence::new(rest.vertex_count(), &corners);
-        Self { mu: material.mu, lambda: material.lambda, triangles, incidence }
+        let corners_at = corners_at_vertices(rest.vertex_count(), &corners);
+        Self { mu: material.mu, lambda: material.lambda, triangles, corners_at }
     }
 
-    /// Energy [J] at `positions` `[V, 3]` [m]; adds its weighted gradient to `target`.
+    /// Energy (J) at `positions` `[V, 3]` (m); adds its weighted gradient to `target`.
     pub fn evaluate<T: Real>(&self, positions: &[[T; 3]], target: Option<Weighted<'_, T>>) -> f64 {
         let element = |t: usize| self.triangles[t].response(positions, self.mu, self.lambda);
-        sum_elements(self.triangles.len(), &self.incidence, element, target)
+        sum_elements(self.triangles.len(), &self.corners_at, element, target)
     }
 }
 

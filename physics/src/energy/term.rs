@@ -5,21 +5,21 @@ use std::ops::{Index, IndexMut};
 /// One of the eight energies. Its name is its file name and its key in a configuration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Term {
-    /// Saint Venant–Kirchhoff membrane energy [J].
+    /// Saint Venant–Kirchhoff membrane energy (J).
     Strain,
-    /// Hinge energy [J].
+    /// Hinge energy (J).
     Bending,
-    /// Potential energy in the field of the Earth [J].
+    /// Potential energy in the field of the Earth (J).
     Gravity,
-    /// Cubic penalty of garment vertices closer to the body than a margin [m³].
+    /// Cubic penalty of garment vertices closer to the body than a margin (m³).
     BodyCollision,
-    /// Logarithmic repulsion between vertices of one garment [1].
+    /// Logarithmic repulsion between vertices of one garment (1).
     Repulsion,
-    /// Squared vertical displacement of the garment's upper edge, before skinning [m²].
+    /// Squared vertical displacement of the garment's upper edge, before skinning (m²).
     Holding,
-    /// Cubic penalty of outer vertices below the inner garment [m³].
+    /// Cubic penalty of outer vertices below the inner garment (m³).
     LayerCollision,
-    /// Cubic penalty of an inner garment farther from the body than the outer one [m³].
+    /// Cubic penalty of an inner garment farther from the body than the outer one (m³).
     LayerDistance,
 }
 

@@ -1,17 +1,17 @@
-//! One step of the search, and who stands in its way.
+//! One step of the search, and the vertices that block it.
 
-use super::kinks::{Kink, project};
-use super::lbfgs::{Memory, product};
+use super::lbfgs::{Lbfgs, product};
 use super::line_search::{Trial, search};
+use super::nonsmooth::{NonsmoothPoint, project};
 use super::preconditioner::Preconditioner;
 use super::{Problem, SolverSettings};
 use crate::energy::LayerTouch;
 use crate::vec3::{add_scaled, dot, is_finite, norm_squared, sub};
 use std::collections::{HashMap, HashSet};
 
-/// How far ahead the forces are looked at where no step goes downhill [m]: past a kink that is hit at once, and not past much
-/// else.
-const GLANCE: f64 = 1e-6;
+/// How far ahead the forces are looked at where no step goes downhill (m): past a nonsmooth point that is hit at once, and not
+/// past much else.
+const LOOK_AHEAD_STEP: f64 = 1e-6;
 
 /// A shorter step, in units of what the quasi-Newton matrix asks for, is not its curvature's fault.
 const SHORT: f64 = 0.1;
@@ -21,11 +21,11 @@ const MOST_HELD: usize = 10;
 
 /// A state of the search.
 pub(super) struct State {
-    /// Posed positions [m].
+    /// Posed positions (m).
     pub positions: Vec<[f64; 3]>,
-    /// Weighted sum of all energies there [J].
+    /// Weighted sum of all energies there (J).
     pub energy: f64,
-    /// Its gradient [N].
+    /// Its gradient (N).
     pub gradient: Vec<[f64; 3]>,
 }
 
@@ -34,24 +34,24 @@ pub(super) struct Model<'a> {
     /// The subgradient of smallest norm.
     pub gradient: &'a [[f64; 3]],
     /// Where vertices move along, not across.
-    pub kinks: &'a [Kink],
+    pub nonsmooth: &'a [NonsmoothPoint],
     /// What the last steps taught.
-    pub memory: &'a Memory,
+    pub memory: &'a Lbfgs,
     /// What the terms know of the curvature.
     pub preconditioner: &'a Preconditioner,
 }
 
-/// Who stands in the way of a step.
+/// The vertices that block a step.
 #[derive(Debug, Default)]
 pub(super) struct Blocked {
     /// Vertices whose forces turn against the step.
     pub turned: Vec<usize>,
-    /// Vertices at a wall: beyond it another part of a garment is nearest, with them on its wrong side.
-    pub walls: Vec<usize>,
+    /// Vertices at a discontinuity: beyond it another part of a garment is nearest, and they violate its layer order.
+    pub at_discontinuities: Vec<usize>,
 }
 
-/// One step downhill along the kinks of `model`, and the vertices that made it short, if it is; if there is no step along the
-/// direction of its memory, the vertices that stand in the way.
+/// One step downhill along the nonsmooth points of `model`, and the vertices that made it short, if it is; if there is no step
+/// along the direction of its memory, the vertices that block it.
 pub(super) fn advance(
     problem: &Problem<'_>,
     state: &State,
@@ -61,9 +61,9 @@ pub(super) fn advance(
 ) -> Result<(State, Vec<usize>), Blocked> {
     // −P H P g is downhill for every projection P.
     let mut along = model.gradient.to_vec();
-    project(model.kinks, &mut along);
+    project(model.nonsmooth, &mut along);
     let mut direction = model.memory.direction(&along, |q| model.preconditioner.apply(q));
-    project(model.kinks, &mut direction);
+    project(model.nonsmooth, &mut direction);
     let slope = product(&direction, model.gradient);
     let reach = longest(&direction);
     if !(slope < 0.0 && reach.is_finite()) {
@@ -89,10 +89,10 @@ pub(super) fn advance(
             Ok((trial.state, slowed))
         }
         _ => {
-            let ahead = evaluate(GLANCE / reach).state;
+            let ahead = evaluate(LOOK_AHEAD_STEP / reach).state;
             Err(Blocked {
                 turned: turned_against(&direction, model.gradient, &ahead.gradient),
-                walls: walls(problem, state, &ahead),
+                at_discontinuities: at_discontinuities(problem, state, &ahead),
             })
         }
     }
@@ -111,13 +111,13 @@ fn turned_against(direction: &[[f64; 3]], here: &[[f64; 3]], ahead: &[[f64; 3]])
         needed
     });
     let held: Vec<usize> = held.copied().collect();
-    // Where everything turns, nothing is in the way of the rest.
+    // Where everything turns, nothing blocks the rest.
     if held.len() > direction.len() / MOST_HELD { Vec::new() } else { held }
 }
 
 /// The vertices whose contact with other garments costs more `ahead` than `here`, most first: as many as must be held for the
 /// energy to fall, with the faces that they are nearest to.
-fn walls(problem: &Problem<'_>, here: &State, ahead: &State) -> Vec<usize> {
+fn at_discontinuities(problem: &Problem<'_>, here: &State, ahead: &State) -> Vec<usize> {
     let touches = [here, ahead].map(|state| problem.layer_touches(&state.positions));
     let mut rises: HashMap<(usize, usize), f64> = HashMap::new();
     for (touches, sign) in touches.iter().zip([-1.0, 1.0]) {
@@ -155,9 +155,9 @@ mod tests {
     use crate::mesh::shapes;
 
     #[test]
-    fn a_vertex_half_way_between_two_sheets_is_at_a_wall() {
-        // Two sheets of one garment, 2 cm apart, that both look up. Half way between them the upper one becomes the nearer, and
-        // a vertex of another garment is on its wrong side at once.
+    fn a_vertex_in_the_middle_between_two_sheets_is_at_a_discontinuity() {
+        // Two sheets of one garment, 2 cm apart, that both look up. In the middle the upper one becomes the nearer, and a
+        // vertex of another garment violates its layer order at once.
         let sheet = |height: f64, size: f64, cells: usize| {
             let grid = shapes::grid(size, size, cells, cells);
             shapes::mapped(&grid, |[x, y, _]| [x - 0.5 * size, height, 0.5 * size - y])
@@ -183,7 +183,7 @@ mod tests {
         assert_eq!(here.energy, 0.0);
         let ahead = moved(count + 12, 0.0101);
         assert!(ahead.energy > 0.0);
-        let found = walls(&problem, &here, &ahead);
+        let found = at_discontinuities(&problem, &here, &ahead);
         assert!(
             found.contains(&(count + 12)) && !found.iter().any(|v| *v > count && *v != count + 12),
             "{found:?}"
@@ -191,8 +191,8 @@ mod tests {
         // With corners of a face of both sheets.
         let heights: HashSet<_> = found.iter().map(|v| (1e3 * scene.posed[*v][1]).round() as i64).collect();
         assert_eq!(heights, HashSet::from([0, 10, 20]));
-        // No other side, no wall.
-        assert!(walls(&problem, &here, &moved(count + 12, 0.0095)).is_empty());
+        // No other side, no discontinuity.
+        assert!(at_discontinuities(&problem, &here, &moved(count + 12, 0.0095)).is_empty());
     }
 
     #[test]

@@ -4,11 +4,11 @@ use std::collections::VecDeque;
 
 use crate::vec3::dot;
 
-/// Pairs whose curvature `s·y` is below this times `|s||y|` say nothing that rounding or a kink could not have said.
+/// Pairs whose curvature `s·y` is below this times `|s||y|` say nothing that rounding or a nonsmooth point could not have said.
 const SMALLEST_CURVATURE: f64 = 1e-8;
 
 /// Remembered steps `s` and gradient changes `y`, oldest first.
-pub(super) struct Memory {
+pub(super) struct Lbfgs {
     capacity: usize,
     pairs: VecDeque<Pair>,
 }
@@ -20,7 +20,7 @@ struct Pair {
     rho: f64,
 }
 
-impl Memory {
+impl Lbfgs {
     pub fn new(capacity: usize) -> Self {
         Self { capacity, pairs: VecDeque::with_capacity(capacity) }
     }

@@ -1,10 +1,10 @@
 //! A step length with Armijo's decrease and the weak Wolfe slope, by bracketing.
 //!
 //! Lewis and Overton, "Nonsmooth optimization via quasi-Newton methods" (Math. Prog. 2013), algorithm 2.6: it ends after
-//! finitely many trials at almost every kink. A trial that is too long is followed by the minimum of the parabola through
+//! finitely many trials at almost every nonsmooth point. A trial that is too long is followed by the minimum of the parabola through
 //! value and slope at the start and the value of the trial, kept away from the ends of the bracket.
 
-/// Armijo: the share of the decrease that the slope at the start promises.
+/// Armijo: the share of the decrease that the slope at the start predicts.
 const DECREASE: f64 = 1e-4;
 
 /// Wolfe: the share of the slope at the start that may remain.
@@ -93,16 +93,16 @@ mod tests {
     }
 
     #[test]
-    fn steps_over_a_kink_and_stops_before_a_wall() {
-        // |t − 0.3| − …: the slope condition can only hold beyond the kink.
-        let kink = |t: f64| if t < 0.3 { (0.3 - t, -1.0) } else { (2.0 * (t - 0.3), 2.0) };
-        let (t, found) = search(0.3, -1.0, 10.0, trial(kink)).unwrap();
+    fn steps_over_a_nonsmooth_point_and_stops_before_a_discontinuity() {
+        // |t − 0.3| − …: the slope condition can only hold beyond the nonsmooth point.
+        let bent = |t: f64| if t < 0.3 { (0.3 - t, -1.0) } else { (2.0 * (t - 0.3), 2.0) };
+        let (t, found) = search(0.3, -1.0, 10.0, trial(bent)).unwrap();
         assert!(t > 0.3 && found.value < 0.3);
-        // Falls to the wall at 0.2, where it jumps up: only decrease can be had.
-        let wall = |t: f64| if t < 0.2 { (-t, -1.0) } else { (100.0, -1.0) };
-        let (t, found) = search(0.0, -1.0, 10.0, trial(wall)).unwrap();
+        // Falls to the discontinuity at 0.2, where it jumps up: only decrease can be had.
+        let jump = |t: f64| if t < 0.2 { (-t, -1.0) } else { (100.0, -1.0) };
+        let (t, found) = search(0.0, -1.0, 10.0, trial(jump)).unwrap();
         assert!(t < 0.2 && t > 0.19 && found.value < 0.0);
-        // The wall is where we are.
+        // The discontinuity is where we are.
         assert!(search(0.0, -1.0, 10.0, trial(|_| (1.0, -1.0))).is_none());
         assert!(search(0.0, -1.0, 10.0, trial(|_| (f64::NAN, f64::NAN))).is_none());
     }

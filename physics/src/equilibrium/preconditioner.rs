@@ -6,6 +6,7 @@ use super::Problem;
 use crate::energy::CurvatureSink;
 use crate::operators::SparseMatrix;
 use crate::operators::cholesky::Cholesky;
+use crate::rows::CompressedRows;
 
 /// Multiple of the identity that is added, in units of the mean diagonal entry: what no term holds (a rigid motion, a fold
 /// that opens) would be a step of any length otherwise.
@@ -16,9 +17,8 @@ const LARGEST_SHIFT: f64 = 1.0;
 
 /// A sparse symmetric matrix of 3×3 blocks, and its factor.
 pub(super) struct Preconditioner {
-    /// Compressed rows of vertices.
-    offsets: Vec<usize>,
-    columns: Vec<u32>,
+    /// The vertices that every vertex has a block with.
+    blocks: CompressedRows<u32>,
     /// The same matrix over coordinates.
     matrix: SparseMatrix,
     factor: Option<Cholesky>,
@@ -37,25 +37,19 @@ impl Preconditioner {
         pairs.extend((0..count as u32).map(|v| [v, v]));
         pairs.sort_unstable();
         pairs.dedup();
-        let mut offsets = vec![0; count + 1];
-        for [row, _] in &pairs {
-            offsets[*row as usize + 1] += 1;
-        }
-        for v in 0..count {
-            offsets[v + 1] += offsets[v];
-        }
-        let columns: Vec<u32> = pairs.iter().map(|[_, column]| *column).collect();
+        let keyed = pairs.iter().map(|[row, column]| (*row as usize, *column));
+        let blocks = CompressedRows::grouped(count, keyed);
         let mut triplets = Vec::with_capacity(9 * pairs.len());
         for row in 0..count {
             for r in 0..3 {
-                for &column in &columns[offsets[row]..offsets[row + 1]] {
+                for &column in blocks.row(row) {
                     triplets.extend((0..3).map(|c| (3 * row as u32 + r, 3 * column + c, 0.0)));
                 }
             }
         }
         let matrix = SparseMatrix::from_triplets(3 * count, 3 * count, triplets);
         let factor = Cholesky::analysed(&matrix);
-        Self { offsets, columns, matrix, factor, usable: false, factorisations: 0 }
+        Self { blocks, matrix, factor, usable: false, factorisations: 0 }
     }
 
     /// Assembles and factorises at `posed`; for an outfit also finds anew which entries there are, since garments touch elsewhere
@@ -105,8 +99,8 @@ impl Preconditioner {
     }
 
     fn try_slot(&self, row: usize, column: usize, r: usize) -> Option<usize> {
-        let range = self.offsets[row]..self.offsets[row + 1];
-        let at = self.columns[range.clone()].binary_search(&(column as u32)).ok()?;
+        let range = self.blocks.range(row);
+        let at = self.blocks.row(row).binary_search(&(column as u32)).ok()?;
         Some(9 * range.start + 3 * (r * range.len() + at))
     }
 }

@@ -1,7 +1,7 @@
 //! The energy of a scene as a function of posed positions alone.
 
 use super::EquilibriumError;
-use super::kinks::{self, Kink};
+use super::nonsmooth::{self, NonsmoothPoint};
 use crate::energy::{CurvatureSink, LayerTouch, SceneEnergy, Term};
 use crate::vec3::norm_squared;
 use std::collections::BTreeMap;
@@ -19,7 +19,7 @@ impl<'a> Problem<'a> {
     ///
     /// # Errors
     /// When the scene does not pass its check, or a garment is held at canonical positions
-    /// ([`SceneEnergy::pulled_back`] mends that).
+    /// ([`SceneEnergy::pulled_back`] avoids that).
     pub fn new(energy: &'a SceneEnergy<f64>) -> Result<Self, EquilibriumError> {
         energy.check()?;
         if energy.needs_canonical() {
@@ -34,7 +34,7 @@ impl<'a> Problem<'a> {
         self.energy.vertex_count()
     }
 
-    /// Weighted sum of all energies at `posed` `[ΣV, 3]` [m].
+    /// Weighted sum of all energies at `posed` `[ΣV, 3]` (m).
     ///
     /// # Panics
     /// If `posed` does not have one entry per vertex.
@@ -42,7 +42,7 @@ impl<'a> Problem<'a> {
         self.energy.value(posed, &[]).total
     }
 
-    /// The same sum, and what every term adds to it [J], by its name.
+    /// The same sum, and what every term adds to it (J), by its name.
     ///
     /// # Panics
     /// As [`value`](Self::value).
@@ -73,7 +73,7 @@ impl<'a> Problem<'a> {
         self.evaluate(self.energy, posed)
     }
 
-    /// `Σ_t |w_t ∇E_t|` over the terms [N]: what a gradient is compared with (see [`super`]).
+    /// `Σ_t |w_t ∇E_t|` over the terms (N): what a gradient is compared with (see [`super`]).
     ///
     /// # Panics
     /// As [`value`](Self::value).
@@ -90,26 +90,31 @@ impl<'a> Problem<'a> {
         relative(self.unbalanced_norm(posed, &gradient), self.force_scale(posed))
     }
 
-    /// Norm of `gradient`, which is that at `posed`, without what balances at kinks.
+    /// Norm of `gradient`, which is that at `posed`, without what balances at nonsmooth points.
     pub(super) fn unbalanced_norm(&self, posed: &[[f64; 3]], gradient: &[[f64; 3]]) -> f64 {
         let mut gradient = gradient.to_vec();
-        kinks::balance(&self.kinks(posed, &gradient, 0.0), &mut gradient);
+        nonsmooth::balance(&self.nonsmooth_points(posed, &gradient, 0.0), &mut gradient);
         norm(&gradient)
     }
 
-    /// Vertices that rest on a kink, see [`kinks::kinks`].
-    pub(super) fn kinks(&self, posed: &[[f64; 3]], gradient: &[[f64; 3]], least: f64) -> Vec<Kink> {
-        kinks::kinks(self.energy, posed, gradient, least)
+    /// Vertices that rest on a nonsmooth point, see [`nonsmooth::nonsmooth_points`].
+    pub(super) fn nonsmooth_points(
+        &self,
+        posed: &[[f64; 3]],
+        gradient: &[[f64; 3]],
+        least: f64,
+    ) -> Vec<NonsmoothPoint> {
+        nonsmooth::nonsmooth_points(self.energy, posed, gradient, least)
     }
 
-    /// Positions with the vertices that are driven against a kink on it; `None` if there is no such vertex.
-    pub(super) fn onto_kinks(
+    /// Positions with the vertices that are driven against a nonsmooth point on it; `None` if there is no such vertex.
+    pub(super) fn onto_nonsmooth_points(
         &self,
         posed: &[[f64; 3]],
         gradient: &[[f64; 3]],
         least: f64,
     ) -> Option<Vec<[f64; 3]>> {
-        let moved = kinks::onto_kinks(self.energy, posed, gradient, least);
+        let moved = nonsmooth::onto_nonsmooth_points(self.energy, posed, gradient, least);
         let mut positions = posed.to_vec();
         moved.iter().for_each(|(v, p)| positions[*v] = *p);
         (!moved.is_empty()).then_some(positions)

@@ -13,10 +13,10 @@ pub struct SolverSettings {
     pub iterations: usize,
     /// Most wall time; `None`: no limit. Looked at between iterations.
     pub time: Option<Duration>,
-    /// No vertex moves farther than this in one step [m]. Default 5 cm: a garment stays in its valley instead of jumping
+    /// No vertex moves farther than this in one step (m). Default 5 cm: a garment stays in its valley instead of jumping
     /// through the body.
     pub step_bound: f64,
-    /// No vertex goes farther than this from its start [m], but for the step that leads there; `None`: no bound. Where the bound is
+    /// No vertex goes farther than this from its start (m), but for the step that leads there; `None`: no bound. Where the bound is
     /// passed the solver stops as [`super::Stop::Escaped`]. Default 1 m: what nothing holds falls for ever.
     pub escape_distance: Option<f64>,
     /// Iterations between two factorisations of the preconditioner.

@@ -13,7 +13,7 @@ pub enum Stop {
     Time,
     /// No step along the descent direction lowers the energy, even with a fresh preconditioner and an empty memory, or
     /// the last 60 steps together gained less than a billionth of what all gained: some vertices rest against a jump of
-    /// the energy, or creep along kinks.
+    /// the energy, or creep along nonsmooth points.
     Stalled,
     /// A vertex went farther from its start than allowed: nothing holds that part of the garment.
     Escaped,
@@ -46,15 +46,15 @@ impl fmt::Display for Stop {
 pub struct Step {
     /// Accepted steps so far.
     pub iteration: usize,
-    /// Weighted sum of all energies [J]; never above the one before.
+    /// Weighted sum of all energies (J); never above the one before.
     pub energy: f64,
-    /// Euclidean norm of its gradient over all coordinates [N].
+    /// Euclidean norm of its gradient over all coordinates (N).
     pub gradient_norm: f64,
-    /// Largest displacement of a vertex in this step [m].
+    /// Largest displacement of a vertex in this step (m).
     pub displacement: f64,
     /// Evaluations of value and gradient so far.
     pub evaluations: usize,
-    /// Wall time so far [ms].
+    /// Wall time so far (ms).
     pub milliseconds: f64,
 }
 
@@ -63,14 +63,14 @@ pub struct Step {
 pub struct Progress<'a> {
     /// Where the solver is.
     pub step: &'a Step,
-    /// Posed positions there `[ΣV, 3]` [m].
+    /// Posed positions there `[ΣV, 3]` (m).
     pub positions: &'a [[f64; 3]],
 }
 
 /// The result of [`super::solve`].
 #[derive(Debug, Clone)]
 pub struct Solution {
-    /// Posed positions of the last, lowest state `[ΣV, 3]` [m].
+    /// Posed positions of the last, lowest state `[ΣV, 3]` (m).
     pub positions: Vec<[f64; 3]>,
     /// Why it is the last.
     pub stop: Stop,
@@ -88,7 +88,7 @@ impl Solution {
         self.history.last().expect("the history holds the start")
     }
 
-    /// Weighted sum of all energies at the end [J].
+    /// Weighted sum of all energies at the end (J).
     pub fn energy(&self) -> f64 {
         self.last().energy
     }

@@ -4,8 +4,8 @@ use std::ops::ControlFlow;
 use std::time::Instant;
 
 use super::advance::{Model, State, advance, longest};
-use super::kinks::{Kink, balance};
-use super::lbfgs::Memory;
+use super::lbfgs::Lbfgs;
+use super::nonsmooth::{NonsmoothPoint, balance};
 use super::preconditioner::Preconditioner;
 use super::problem::{norm, relative};
 use super::{EquilibriumError, Problem, Progress, Solution, SolverSettings, Step, Stop};
@@ -15,7 +15,7 @@ use crate::vec3::{distance_squared, is_finite, sub};
 /// each term.
 const LOOK_EVERY: usize = 10;
 
-/// The iteration from which on vertices are kept on kinks: before, they only pass.
+/// The iteration from which on vertices are kept on nonsmooth points: before, they only pass.
 const FIRST_LOOK: usize = 10;
 
 /// Progress is judged over this many iterations.
@@ -27,7 +27,7 @@ const LEAST_GAIN: f64 = 1e-9;
 /// Most times that vertices are held in one iteration.
 const MOST_HOLDS: usize = 8;
 
-/// Lowers the energy of `problem` from posed positions `start` `[ΣV, 3]` [m] until it cannot or may not be lowered any
+/// Lowers the energy of `problem` from posed positions `start` `[ΣV, 3]` (m) until it cannot or may not be lowered any
 /// more; [`Solution::stop`] says which. `observer` sees the start and every accepted step, and can end the search.
 ///
 /// The result is a function of its arguments alone, whatever the number of threads, unless time or the observer end it.
@@ -53,12 +53,12 @@ pub fn solve(
     };
     let mut force_scale = problem.force_scale(start);
     let mut preconditioner: Option<Preconditioner> = None;
-    let mut memory = Memory::new(settings.memory);
+    let mut memory = Lbfgs::new(settings.memory);
     let mut age = 0;
-    // Vertices before kinks that made the last step short.
-    let mut in_the_way: Vec<usize> = Vec::new();
-    // Vertices at walls: held until the next look.
-    let mut at_walls: Vec<usize> = Vec::new();
+    // Vertices before nonsmooth points that made the last step short.
+    let mut blocking: Vec<usize> = Vec::new();
+    // Vertices at discontinuities: held until the next look.
+    let mut at_discontinuities: Vec<usize> = Vec::new();
     // The positions before the last step, and the gradient there.
     let mut last: Option<(Vec<[f64; 3]>, Vec<[f64; 3]>)> = None;
     let mut history = Vec::new();
@@ -66,13 +66,13 @@ pub fn solve(
     let stop = loop {
         if step.iteration.is_multiple_of(LOOK_EVERY) && step.iteration > 0 {
             force_scale = problem.force_scale(&state.positions);
-            at_walls.clear();
+            at_discontinuities.clear();
         }
         // Vertices of a smaller gradient than this may all be wrong together.
         let least = 0.1 * settings.tolerance * force_scale / (state.positions.len() as f64).sqrt();
-        let looks_at_kinks = step.iteration >= FIRST_LOOK;
-        if looks_at_kinks
-            && let Some(positions) = problem.onto_kinks(&state.positions, &state.gradient, least)
+        let looks_at_nonsmooth = step.iteration >= FIRST_LOOK;
+        if looks_at_nonsmooth
+            && let Some(positions) = problem.onto_nonsmooth_points(&state.positions, &state.gradient, least)
         {
             let (energy, gradient) = problem.value_and_gradient(&positions);
             step.evaluations += 1;
@@ -86,12 +86,12 @@ pub fn solve(
         if observer(&Progress { step: &step, positions: &state.positions }).is_break() {
             break Stop::Cancelled;
         }
-        let mut kinks: Vec<Kink> = match looks_at_kinks {
-            true => problem.kinks(&state.positions, &state.gradient, least),
+        let mut nonsmooth: Vec<NonsmoothPoint> = match looks_at_nonsmooth {
+            true => problem.nonsmooth_points(&state.positions, &state.gradient, least),
             false => Vec::new(),
         };
         let mut balanced = state.gradient.clone();
-        balance(&kinks, &mut balanced);
+        balance(&nonsmooth, &mut balanced);
         let residual = norm(&balanced);
         if let Some((positions, gradient)) = last.take() {
             memory.push(difference(&state.positions, &positions), difference(&balanced, &gradient));
@@ -124,38 +124,46 @@ pub fn solve(
             Preconditioner::new(problem, start)
         });
         // They had the last step, the others have this one.
-        kinks.extend(in_the_way.drain(..).map(|vertex| Kink::held(vertex, balanced[vertex])));
-        kinks.extend(at_walls.iter().map(|&vertex| Kink::held(vertex, balanced[vertex])));
-        let (mut holds, mut kinks_were_wrong) = (0, false);
+        nonsmooth.extend(blocking.drain(..).map(|vertex| NonsmoothPoint::held(vertex, balanced[vertex])));
+        nonsmooth
+            .extend(at_discontinuities.iter().map(|&vertex| NonsmoothPoint::held(vertex, balanced[vertex])));
+        let (mut holds, mut nonsmooth_was_wrong) = (0, false);
         let next = loop {
             if age >= settings.refactorise_every {
                 preconditioner.refresh(problem, &state.positions);
                 age = 0;
             }
-            let model = Model { gradient: &balanced, kinks: &kinks, memory: &memory, preconditioner };
+            let model = Model { gradient: &balanced, nonsmooth: &nonsmooth, memory: &memory, preconditioner };
             let blocked = match advance(problem, &state, &model, settings, &mut step.evaluations) {
                 Ok((next, slowed)) => {
-                    in_the_way = slowed;
+                    blocking = slowed;
                     break Some(next);
                 }
                 Err(blocked) => blocked,
             };
-            if !blocked.walls.is_empty() && holds < MOST_HOLDS && !kinks_were_wrong {
-                kinks.extend(blocked.walls.iter().map(|&vertex| Kink::held(vertex, balanced[vertex])));
-                at_walls.extend(blocked.walls);
+            if !blocked.at_discontinuities.is_empty() && holds < MOST_HOLDS && !nonsmooth_was_wrong {
+                nonsmooth.extend(
+                    blocked
+                        .at_discontinuities
+                        .iter()
+                        .map(|&vertex| NonsmoothPoint::held(vertex, balanced[vertex])),
+                );
+                at_discontinuities.extend(blocked.at_discontinuities);
                 holds += 1;
             } else if age > 0 || !memory.is_empty() {
                 memory.clear();
                 age = settings.refactorise_every;
-            } else if !blocked.turned.is_empty() && holds < MOST_HOLDS && !kinks_were_wrong {
-                // A few vertices before a kink hold up all others: for once without them.
-                kinks.extend(blocked.turned.into_iter().map(|vertex| Kink::held(vertex, balanced[vertex])));
+            } else if !blocked.turned.is_empty() && holds < MOST_HOLDS && !nonsmooth_was_wrong {
+                // A few vertices before a nonsmooth point hold up all others: for once without them.
+                nonsmooth.extend(
+                    blocked.turned.into_iter().map(|vertex| NonsmoothPoint::held(vertex, balanced[vertex])),
+                );
                 holds += 1;
-            } else if !kinks.is_empty() && !kinks_were_wrong {
-                // The model of the kinks was wrong somewhere: once without.
-                kinks.clear();
+            } else if !nonsmooth.is_empty() && !nonsmooth_was_wrong {
+                // The model of the nonsmooth points was wrong somewhere: once without.
+                nonsmooth.clear();
                 balanced.clone_from(&state.gradient);
-                kinks_were_wrong = true;
+                nonsmooth_was_wrong = true;
             } else {
                 break None;
             }

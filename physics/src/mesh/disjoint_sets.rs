@@ -7,7 +7,7 @@ pub struct DisjointSets {
 }
 
 impl DisjointSets {
-    /// Every number alone.
+    /// Every number in a set of its own.
     pub fn new(count: usize) -> Self {
         Self { parent: (0..count as u32).collect() }
     }
@@ -18,7 +18,7 @@ impl DisjointSets {
         self.parent[a.max(b) as usize] = a.min(b);
     }
 
-    /// The lowest member of the set of `member`. Paths are halved on the way, so that the next question is shorter.
+    /// The lowest member of the set of `member`. Paths are halved, so that the next query is faster.
     pub fn root(&mut self, mut member: u32) -> u32 {
         while self.parent[member as usize] != member {
             self.parent[member as usize] = self.parent[self.parent[member as usize] as usize];

@@ -1,7 +1,6 @@
 //! Triangle meshes: validated storage, normals, topology, and analytic shapes for tests.
 
 mod disjoint_sets;
-mod faces_at_vertex;
 mod normals;
 pub mod shapes;
 mod stretch;
@@ -10,7 +9,6 @@ mod tri_mesh;
 mod volume;
 
 pub use disjoint_sets::DisjointSets;
-pub(crate) use faces_at_vertex::FacesAtVertex;
 pub use normals::vertex_normals;
 pub use stretch::vertex_stretch;
 pub use topology::{Hinge, Topology};

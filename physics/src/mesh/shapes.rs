@@ -165,6 +165,15 @@ fn icosahedron_faces(positions: &[[f64; 3]]) -> Vec<[u32; 3]> {
     faces
 }
 
+/// Three balls, each in each other, and a small one wholly inside.
+#[cfg(test)]
+pub(crate) fn overlapping_balls() -> TriMesh {
+    let ball = |radius, at: [f64; 3]| mapped(&icosphere(radius, 3), |p| vec3::add(p, at));
+    let parts =
+        [ball(0.5, [0.0; 3]), ball(0.4, [0.4, 0.05, 0.02]), ball(0.3, [0.1, 0.5, 0.1]), ball(0.1, [0.1; 3])];
+    union(&parts.each_ref())
+}
+
 fn built(positions: Vec<[f64; 3]>, faces: Vec<[u32; 3]>) -> TriMesh {
     TriMesh::new(positions, faces).expect("analytic shapes need finite dimensions")
 }
@@ -188,6 +197,12 @@ impl SplitMix {
     /// Uniform in [−1, 1).
     pub(crate) fn symmetric(&mut self) -> f64 {
         (self.next_u64() >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+
+    /// Points uniform in [−extent, extent)³.
+    #[cfg(test)]
+    pub(crate) fn points(mut self, count: usize, extent: f64) -> Vec<[f64; 3]> {
+        (0..count).map(|_| std::array::from_fn(|_| extent * self.symmetric())).collect()
     }
 }
 

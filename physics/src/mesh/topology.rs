@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use crate::mesh::tri_mesh::unique_edges;
 use crate::mesh::{DisjointSets, TriMesh};
+use crate::rows::CompressedRows;
 
 /// An interior edge with the two triangles that fold about it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,8 +42,7 @@ pub struct Topology {
     pub unreferenced: Vec<u32>,
     /// Edges with three or more faces, sorted.
     pub non_manifold_edges: Vec<[u32; 2]>,
-    ring_offsets: Vec<u32>,
-    ring_vertices: Vec<u32>,
+    rings: CompressedRows<u32>,
 }
 
 impl Topology {
@@ -52,11 +52,9 @@ impl Topology {
         let faces = mesh.faces();
         let edges = unique_edges(faces);
         let (hinges, boundary, non_manifold_edges) = classify_edges(faces);
-        let (ring_offsets, ring_vertices) = one_rings(vertex_count, &edges);
+        let rings = one_rings(vertex_count, &edges);
         let (component_of_vertex, component_count) = components(vertex_count, &edges);
-        let unreferenced = (0..vertex_count as u32)
-            .filter(|&v| ring_offsets[v as usize] == ring_offsets[v as usize + 1])
-            .collect();
+        let unreferenced = (0..vertex_count as u32).filter(|&v| rings.row(v as usize).is_empty()).collect();
         Self {
             edges,
             hinges,
@@ -65,19 +63,13 @@ impl Topology {
             component_count,
             unreferenced,
             non_manifold_edges,
-            ring_offsets,
-            ring_vertices,
+            rings,
         }
     }
 
     /// Neighbours of vertex `v` along edges, ascending.
     pub fn ring(&self, v: usize) -> &[u32] {
-        &self.ring_vertices[self.ring_offsets[v] as usize..self.ring_offsets[v + 1] as usize]
-    }
-
-    /// Whether an edge joins `a` and `b`.
-    pub fn are_adjacent(&self, a: u32, b: u32) -> bool {
-        self.ring(a as usize).binary_search(&b).is_ok()
+        self.rings.row(v)
     }
 
     /// Number of vertices, unreferenced ones included.
@@ -124,29 +116,12 @@ fn classify_edges(faces: &[[u32; 3]]) -> (Vec<Hinge>, Vec<[u32; 2]>, Vec<[u32; 2
     (hinges, boundary, non_manifold)
 }
 
-/// Compressed rows of neighbours, each ascending. `edges` must be sorted and unique.
-fn one_rings(vertex_count: usize, edges: &[[u32; 2]]) -> (Vec<u32>, Vec<u32>) {
-    let mut offsets = vec![0u32; vertex_count + 1];
-    for edge in edges {
-        for &v in edge {
-            offsets[v as usize + 1] += 1;
-        }
-    }
-    for v in 0..vertex_count {
-        offsets[v + 1] += offsets[v];
-    }
-    let mut next = offsets.clone();
-    let mut vertices = vec![0u32; 2 * edges.len()];
+/// Neighbours of every vertex, each row ascending. `edges` must be sorted and unique.
+fn one_rings(vertex_count: usize, edges: &[[u32; 2]]) -> CompressedRows<u32> {
     // Lower neighbours first (edges sorted by their low end, then high), then higher ones: each row ends up ascending.
-    for &[low, high] in edges {
-        vertices[next[high as usize] as usize] = low;
-        next[high as usize] += 1;
-    }
-    for &[low, high] in edges {
-        vertices[next[low as usize] as usize] = high;
-        next[low as usize] += 1;
-    }
-    (offsets, vertices)
+    let lower = edges.iter().map(|&[low, high]| (high as usize, low));
+    let higher = edges.iter().map(|&[low, high]| (low as usize, high));
+    CompressedRows::grouped(vertex_count, lower.chain(higher))
 }
 
 /// Components numbered in the order of their lowest vertices.
@@ -253,7 +228,7 @@ mod tests {
         assert_eq!(topology.boundary_loops.iter().map(Vec::len).collect::<Vec<_>>(), [9, 9]);
         for chain in &topology.boundary_loops {
             for i in 0..chain.len() {
-                assert!(topology.are_adjacent(chain[i], chain[(i + 1) % chain.len()]));
+                assert!(topology.ring(chain[i] as usize).contains(&chain[(i + 1) % chain.len()]));
             }
         }
     }
@@ -264,8 +239,8 @@ mod tests {
         for v in 0..topology.vertex_count() {
             let ring = topology.ring(v);
             assert!(ring.windows(2).all(|w| w[0] < w[1]));
-            assert!(ring.iter().all(|&u| topology.are_adjacent(u, v as u32)));
-            assert!(!topology.are_adjacent(v as u32, v as u32));
+            assert!(ring.iter().all(|&u| topology.ring(u as usize).contains(&(v as u32))));
+            assert!(!ring.contains(&(v as u32)));
         }
     }
 

@@ -173,7 +173,7 @@ impl TriMesh {
         (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max)
     }
 
-    /// The same mesh inside out: every face looks the other way.
+    /// The same mesh inside out: every face is turned over.
     pub fn turned(&self) -> Self {
         let faces = self.faces.iter().map(|&[a, b, c]| [a, c, b]).collect();
         Self { positions: self.positions.clone(), faces }

@@ -13,7 +13,7 @@ pub fn is_closed(faces: &[[u32; 3]]) -> bool {
     edges.chunk_by(|a, b| a == b).all(|same| same.len() % 2 == 0)
 }
 
-/// Volume that a closed surface encloses [m³]: negative if its faces look inwards.
+/// Volume that a closed surface encloses (m³): negative if its faces look inwards.
 pub fn signed_volume(mesh: &TriMesh) -> f64 {
     // Near the surface, so that little cancels.
     let origin = mesh.bounds().0;

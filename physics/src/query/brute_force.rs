@@ -1,10 +1,10 @@
 //! The same queries without an accelerator, in O(V) or O(F) each: the oracles that the fast ones are tested against.
 
-use crate::mesh::FacesAtVertex;
-use crate::query::closest_point::closest_on_triangle;
 use crate::query::pseudo_normal::PseudoNormals;
+use crate::query::triangle_point::closest_on_triangle;
 use crate::query::{Distance, Gap};
 use crate::real::Real;
+use crate::rows::faces_at_vertices;
 use crate::vec3;
 
 pub use crate::query::winding_number::winding_number;
@@ -19,13 +19,6 @@ pub fn nearest<T: Real>(points: &[[T; 3]], p: [T; 3]) -> (u32, T) {
         }
     }
     best
-}
-
-/// Indices of the points at most `radius` from `p`, ascending.
-pub fn within<T: Real>(points: &[[T; 3]], p: [T; 3], radius: T) -> Vec<u32> {
-    (0..points.len() as u32)
-        .filter(|&i| vec3::distance_squared(points[i as usize], p) <= radius * radius)
-        .collect()
 }
 
 /// Distance (m) from `p` to the closest point of any triangle; infinite without a face.
@@ -64,7 +57,7 @@ pub fn gap(
                 .min_by(|a, b| a.1.distance_squared.total_cmp(&b.1.distance_squared))
                 .expect("a surface has faces");
             let face = faces[index];
-            let at_vertex = &FacesAtVertex::new(positions.len(), faces);
+            let at_vertex = &faces_at_vertices(positions.len(), faces, 0..faces.len() as u32);
             let normal = PseudoNormals { positions, faces, at_vertex }.at(index as u32, found.feature);
             let offset = vec3::sub(p, found.position);
             let sign = if vec3::dot(offset, normal) < 0.0 { -1.0 } else { 1.0 };

@@ -1,65 +1,9 @@
-//! Nearest vertex and vertices within a radius, on a kd-tree.
-
-use std::fmt::Debug;
-
-use kiddo::{ImmutableKdTree, SquaredEuclidean};
+//! Nearest vertex, on a kd-tree.
 
 use crate::real::Real;
 use crate::vec3;
 
-/// Scalars for which there is a kd-tree: `f32` and `f64`. Use it through [`VertexIndex`].
-pub trait KdScalar: Sized {
-    /// The tree over points of this scalar.
-    #[doc(hidden)]
-    type Tree: Debug + Send + Sync;
-
-    /// Builds the tree; `None` for no points. Item `i` is the position in `points`, which must be finite.
-    #[doc(hidden)]
-    fn build_tree(points: &[[Self; 3]]) -> Option<Self::Tree>;
-
-    /// Item and squared distance of the nearest point; any one of several equally near.
-    #[doc(hidden)]
-    fn nearest(tree: &Self::Tree, point: [Self; 3]) -> (u32, Self);
-
-    /// Calls `visit` for every item at a squared distance of at most `radius_squared`, in no particular order.
-    #[doc(hidden)]
-    fn visit_within(tree: &Self::Tree, point: [Self; 3], radius_squared: Self, visit: impl FnMut(u32));
-}
-
-macro_rules! impl_kd_scalar {
-    ($scalar:ty) => {
-        impl KdScalar for $scalar {
-            type Tree = ImmutableKdTree<$scalar, 3>;
-
-            fn build_tree(points: &[[Self; 3]]) -> Option<Self::Tree> {
-                // The one error of an immutable tree is more points than `u32` can number, which no mesh has.
-                if points.is_empty() { None } else { ImmutableKdTree::new_from_slice(points).ok() }
-            }
-
-            fn nearest(tree: &Self::Tree, point: [Self; 3]) -> (u32, Self) {
-                let found = tree.query(&point).nearest_one::<SquaredEuclidean<$scalar>>().execute();
-                (found.item, found.distance)
-            }
-
-            fn visit_within(
-                tree: &Self::Tree,
-                point: [Self; 3],
-                radius_squared: Self,
-                mut visit: impl FnMut(u32),
-            ) {
-                tree.query(&point)
-                    .within::<SquaredEuclidean<$scalar>>(radius_squared)
-                    .unsorted()
-                    .visit(|found| visit(found.item));
-            }
-        }
-    };
-}
-
-impl_kd_scalar!(f32);
-impl_kd_scalar!(f64);
-
-/// A fixed set of points `[N, 3]` (m), ready for nearest-point and radius queries.
+/// A fixed set of points `[N, 3]` (m), ready for nearest-point queries.
 #[derive(Debug)]
 pub struct VertexIndex<T: Real> {
     tree: Option<T::Tree>,
@@ -93,17 +37,6 @@ impl<T: Real> VertexIndex<T> {
         (self.original(item), distance)
     }
 
-    /// Indices of the points at most `radius` (m) from `p`, ascending; `found` is cleared first.
-    pub fn within(&self, p: [T; 3], radius: T, found: &mut Vec<u32>) {
-        found.clear();
-        let Some(tree) = &self.tree else { return };
-        if !vec3::is_finite(p) || radius.is_nan() || radius < T::zero() {
-            return;
-        }
-        T::visit_within(tree, p, radius * radius, |item| found.push(self.original(item)));
-        found.sort_unstable();
-    }
-
     fn original(&self, item: u32) -> u32 {
         self.kept.as_ref().map_or(item, |kept| kept[item as usize])
     }
@@ -125,22 +58,19 @@ mod tests {
         (0..count).map(|_| std::array::from_fn(|_| T::from_f64(extent * random.symmetric()))).collect()
     }
 
-    /// Both queries against exhaustive search, bit for bit.
-    fn agree<T: Real>(points: &[[T; 3]], queries: &[[T; 3]], radius: f64) {
+    /// The query against exhaustive search, bit for bit.
+    fn agree<T: Real>(points: &[[T; 3]], queries: &[[T; 3]]) {
         let index = VertexIndex::new(points);
-        let mut found = Vec::new();
         for &p in queries {
             assert_eq!(index.nearest(p), brute_force::nearest(points, p));
-            index.within(p, T::from_f64(radius), &mut found);
-            assert_eq!(found, brute_force::within(points, p, T::from_f64(radius)));
         }
     }
 
     #[test]
     fn equals_brute_force_in_both_precisions() {
         for (count, seed) in [(1, 1), (2, 2), (31, 3), (33, 4), (700, 5), (5000, 6)] {
-            agree::<f32>(&random_points(count, 1.0, seed), &random_points(200, 1.3, seed + 100), 0.2);
-            agree::<f64>(&random_points(count, 1.0, seed), &random_points(200, 1.3, seed + 100), 0.2);
+            agree::<f32>(&random_points(count, 1.0, seed), &random_points(200, 1.3, seed + 100));
+            agree::<f64>(&random_points(count, 1.0, seed), &random_points(200, 1.3, seed + 100));
         }
     }
 
@@ -150,33 +80,33 @@ mod tests {
         let lattice: Vec<[f32; 3]> =
             (0..1728).map(|i| [(i % 12) as f32, (i / 12 % 12) as f32, (i / 144) as f32]).collect();
         let centres: Vec<[f32; 3]> = lattice.iter().map(|p| p.map(|x| x + 0.5)).collect();
-        agree(&lattice, &centres, 0.9);
-        agree(&lattice, &lattice, 1.0);
+        agree(&lattice, &centres);
+        agree(&lattice, &lattice);
         let mirrored: Vec<[f32; 3]> = lattice.iter().rev().copied().collect();
-        agree(&mirrored, &centres, 0.9);
+        agree(&mirrored, &centres);
     }
 
     #[test]
     fn survives_many_identical_points_and_planes() {
         let queries = random_points::<f32>(40, 1.0, 8);
-        agree(&vec![[0.25f32, -0.5, 0.75]; 10_000], &queries, 0.9);
+        agree(&vec![[0.25f32, -0.5, 0.75]; 10_000], &queries);
         // A plane: 10,000 equal coordinates on one axis. A line: on two.
         let plane: Vec<[f32; 3]> =
             shapes::grid(1.0, 1.0, 99, 99).positions().iter().map(|p| p.map(|x| x as f32)).collect();
-        agree(&plane, &queries, 0.2);
+        agree(&plane, &queries);
         let line: Vec<[f32; 3]> = plane.iter().map(|p| [p[0], 0.0, 0.0]).collect();
-        agree(&line, &queries, 0.2);
+        agree(&line, &queries);
         // Half of the points in one place, the rest spread out.
         let mut mixed = random_points::<f32>(3000, 1.0, 9);
         mixed.extend(vec![[0.1f32, 0.1, 0.1]; 3000]);
-        agree(&mixed, &queries, 0.3);
+        agree(&mixed, &queries);
     }
 
     #[test]
     fn huge_and_tiny_coordinates() {
         for extent in [1e-6, 1e6] {
             let points = random_points::<f32>(2000, extent, 12);
-            agree(&points, &random_points(100, extent, 13), 0.2 * extent);
+            agree(&points, &random_points(100, extent, 13));
         }
         // Squared distances overflow: any answer, but a valid one.
         let index = VertexIndex::new(&random_points::<f32>(100, 1e30, 17));
@@ -191,7 +121,7 @@ mod tests {
         for i in (0..500).step_by(7) {
             points[i][i % 3] = if i % 2 == 0 { f64::NAN } else { f64::INFINITY };
         }
-        agree(&points, &random_points(100, 1.0, 15), 0.4);
+        agree(&points, &random_points(100, 1.0, 15));
     }
 
     #[test]
@@ -199,14 +129,7 @@ mod tests {
         let index = VertexIndex::new(&random_points::<f32>(50, 1.0, 16));
         let (item, distance) = index.nearest([f32::NAN, 0.0, 0.0]);
         assert!(item < 50 && distance.is_nan());
-        let mut found = vec![3];
-        index.within([f32::INFINITY, 0.0, 0.0], 1.0, &mut found);
-        assert!(found.is_empty());
-        index.within([0.0; 3], -1.0, &mut found);
-        assert!(found.is_empty());
         let empty = VertexIndex::<f32>::new(&[]);
         assert_eq!(empty.nearest([0.0; 3]), (u32::MAX, f32::INFINITY));
-        empty.within([0.0; 3], 1.0, &mut found);
-        assert!(found.is_empty());
     }
 }

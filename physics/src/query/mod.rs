@@ -1,17 +1,23 @@
-//! Distance queries: nearest vertex (kd-tree), closest surface point (bounding-volume tree), and their oracles.
+//! Queries on points and surfaces: nearest vertex (kd-tree), closest surface point and intersecting triangles
+//! (bounding-volume tree), winding numbers, and their oracles.
 
 pub mod brute_force;
 mod closest_point;
 mod closest_vertex;
-mod crossings;
+pub mod grid_oracle;
 mod pseudo_normal;
+mod ray_intersections;
 mod surface;
+pub(crate) mod triangle_pair;
+mod triangle_point;
+pub(crate) mod triangle_tree;
 mod union;
 mod winding_number;
 
-pub use closest_point::{ClosestPoint, Feature, SurfacePoint};
-pub(crate) use closest_point::{box_distance_squared, closest_on_triangle};
-pub use closest_vertex::{KdScalar, VertexIndex};
+pub use closest_point::{ClosestPoint, SurfacePoint};
+pub use closest_vertex::VertexIndex;
 pub use surface::{Distance, Gap, Surface};
+pub use triangle_point::Feature;
+pub(crate) use triangle_point::closest_on_triangle;
 pub use union::{FaceSide, UnionDistance};
 pub use winding_number::{winding_number, winding_numbers};

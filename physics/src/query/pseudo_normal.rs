@@ -1,8 +1,8 @@
 //! Angle-weighted pseudo-normals, computed where a query asks for one: few features are ever the closest, and a posed body is
 //! asked only until it moves.
 
-use super::Feature;
-use crate::mesh::FacesAtVertex;
+use super::triangle_point::Feature;
+use crate::rows::CompressedRows;
 use crate::vec3;
 
 /// A sum of unit normals shorter than this is rounding: the faces lie on each other.
@@ -13,7 +13,7 @@ const VANISHED: f64 = 1e-9;
 pub(super) struct PseudoNormals<'a> {
     pub positions: &'a [[f64; 3]],
     pub faces: &'a [[u32; 3]],
-    pub at_vertex: &'a FacesAtVertex,
+    pub at_vertex: &'a CompressedRows<u32>,
 }
 
 impl PseudoNormals<'_> {
@@ -37,7 +37,7 @@ impl PseudoNormals<'_> {
     pub fn vertex(&self, v: u32) -> [f64; 3] {
         let here = self.positions[v as usize];
         let mut sum = [0.0; 3];
-        for &f in self.at_vertex.of(v) {
+        for &f in self.at_vertex.row(v as usize) {
             let face = self.faces[f as usize];
             // A face that has the vertex twice has no area and adds nothing.
             let corner = face.iter().position(|&w| w == v).unwrap_or(0);
@@ -51,7 +51,7 @@ impl PseudoNormals<'_> {
 
     /// That of the edge from `a` to `b`: the sum over the faces that share it; where it vanishes, that of its ends.
     pub fn edge(&self, a: u32, b: u32) -> [f64; 3] {
-        let shared = self.at_vertex.of(a).iter().filter(|f| self.faces[**f as usize].contains(&b));
+        let shared = self.at_vertex.row(a as usize).iter().filter(|f| self.faces[**f as usize].contains(&b));
         let sum = shared.fold([0.0; 3], |sum, &f| vec3::add(sum, self.face(f)));
         if vec3::norm_squared(sum) < VANISHED * VANISHED {
             vec3::normalized(vec3::add(self.vertex(a), self.vertex(b)))
@@ -65,6 +65,7 @@ impl PseudoNormals<'_> {
 mod tests {
     use super::*;
     use crate::mesh::shapes;
+    use crate::rows::faces_at_vertices;
 
     /// Sums over all faces, edge by edge and corner by corner, without an index.
     #[test]
@@ -74,7 +75,7 @@ mod tests {
         // A face without area, and one that folds back onto another: the normals of their edges vanish.
         faces.push([0, 0, 1]);
         faces.push([faces[5][1], faces[5][0], faces[5][2]]);
-        let at_vertex = FacesAtVertex::new(positions.len(), &faces);
+        let at_vertex = faces_at_vertices(positions.len(), &faces, 0..faces.len() as u32);
         let normals = PseudoNormals { positions: &positions, faces: &faces, at_vertex: &at_vertex };
         let close = |a: [f64; 3], b: [f64; 3]| assert!(vec3::norm(vec3::sub(a, b)) < 1e-12, "{a:?} {b:?}");
         let mut at = vec![[0.0; 3]; positions.len()];

@@ -192,17 +192,12 @@ mod tests {
     use crate::mesh::shapes::{self, SplitMix};
     use crate::query::brute_force;
 
-    fn queries(count: usize, extent: f64, seed: u64) -> Vec<[f64; 3]> {
-        let mut random = SplitMix::new(seed);
-        (0..count).map(|_| std::array::from_fn(|_| extent * random.symmetric())).collect()
-    }
-
     #[test]
     fn gap_equals_brute_force() {
         let meshes = [shapes::icosphere(0.5, 3), shapes::tube(0.3, 0.7, 20, 12), shapes::tetrahedron()];
         for mesh in meshes {
             let surface = Surface::<f64>::from_mesh(&mesh);
-            for p in queries(400, 0.9, 2) {
+            for p in SplitMix::new(2).points(400, 0.9) {
                 for distance in [Distance::NearestVertex, Distance::ClosestPoint] {
                     let expected =
                         brute_force::gap(mesh.positions(), mesh.faces(), &surface.normals, p, distance);
@@ -223,7 +218,7 @@ mod tests {
             .filter(|face| face.iter().all(|&v| ball.positions()[v as usize][0] <= 0.1))
             .collect();
         let surface = Surface::<f64>::new(ball.positions().to_vec(), half.into());
-        for p in queries(50, 0.9, 4) {
+        for p in SplitMix::new(4).points(50, 0.9) {
             let (union, closest) = (surface.gap(p, Distance::Union), surface.gap(p, Distance::ClosestPoint));
             assert_eq!((union.gap, union.gradient), (closest.gap, closest.gradient));
             assert!(union.gap.is_finite());
@@ -233,7 +228,7 @@ mod tests {
     #[test]
     fn gap_of_a_sphere_is_the_distance_to_it() {
         let surface = Surface::<f64>::from_mesh(&shapes::icosphere(0.5, 4));
-        for p in queries(300, 0.8, 3) {
+        for p in SplitMix::new(3).points(300, 0.8) {
             let exact = vec3::norm(p) - 0.5;
             assert!((surface.gap(p, Distance::ClosestPoint).gap - exact).abs() < 2e-3);
         }
@@ -246,7 +241,7 @@ mod tests {
             let surface = Surface::<f64>::from_mesh(&mesh);
             for distance in [Distance::NearestVertex, Distance::ClosestPoint] {
                 let mut checked = 0;
-                for p in queries(200, 0.9, 5) {
+                for p in SplitMix::new(5).points(200, 0.9) {
                     let here = surface.gap(p, distance);
                     let moved: Vec<Gap<f64>> = (0..6)
                         .map(|k| {
@@ -255,7 +250,7 @@ mod tests {
                             surface.gap(q, distance)
                         })
                         .collect();
-                    // The distance has kinks where the nearest feature changes; there it has no derivative.
+                    // Where the nearest feature changes, the distance has no derivative.
                     if moved.iter().any(|g| g.vertex != here.vertex || g.gap.signum() != here.gap.signum()) {
                         continue;
                     }
@@ -287,7 +282,7 @@ mod tests {
     fn from_afar_both_precisions_see_the_same_vertex_and_side() {
         let mesh = shapes::icosphere(0.5, 3);
         let (single, double) = (Surface::<f32>::from_mesh(&mesh), Surface::<f64>::from_mesh(&mesh));
-        for p in queries(50, 1.0, 7) {
+        for p in SplitMix::new(7).points(50, 1.0) {
             for distance in [1e2, 1e4, 1e6, 1e9] {
                 let far = vec3::from_f64::<f32>(vec3::scale(p, distance));
                 let gap = single.gap(far, Distance::NearestVertex).gap;

@@ -6,19 +6,20 @@
 //! is continuous, with slope 1 (1-Lipschitz): the unsigned distance is, and the sign changes only on the boundary of the
 //! union, all of which is among the triangles that are kept.
 //!
-//! **What is buried.** Triangles that intersect others (exact predicates, [`crate::contact`]) form the seams and are kept whole;
+//! **What is buried.** Triangles that intersect others (exact predicates) form the seams and are kept whole;
 //! they cut the rest into connected pieces, and each piece lies wholly in the boundary of the union or wholly in its inside.
 //! One winding number per piece says which.
 
-use super::crossings::Crossings;
+use super::ray_intersections::RayIntersections;
+use super::triangle_tree::TriangleTree;
 use super::{ClosestPoint, SurfacePoint};
-use crate::contact::TriangleTree;
-use crate::mesh::{DisjointSets, FacesAtVertex};
+use crate::mesh::DisjointSets;
+use crate::rows::faces_at_vertices;
 use crate::vec3::{self, add, add_scaled, dot, normalized, scale, sub};
 
-/// How far outside a triangle the side of its piece is asked for [m].
+/// How far outside a triangle the side of its piece is asked for (m).
 const LOOK_OUT: f64 = 1e-8;
-/// Rings of faces where a part of a surface ends that may cross what does not belong to it.
+/// Rings of faces where a part of a surface ends that may intersect what does not belong to it.
 const END_RINGS: usize = 2;
 
 /// Where a face of a surface lies, seen from the union of the surface's parts.
@@ -26,7 +27,7 @@ const END_RINGS: usize = 2;
 pub enum FaceSide {
     /// On the boundary of the union.
     Exposed,
-    /// It crosses another face: partly on the boundary, partly inside.
+    /// It intersects another face: partly on the boundary, partly inside.
     Seam,
     /// Inside another part.
     Buried,
@@ -40,8 +41,7 @@ pub struct UnionDistance {
     sides: Vec<FaceSide>,
     /// Whether the normals at a face and its neighbours tell the side.
     is_sure: Vec<bool>,
-    all: Crossings,
-    buried: usize,
+    all: RayIntersections,
 }
 
 impl UnionDistance {
@@ -56,17 +56,17 @@ impl UnionDistance {
     pub(crate) fn of_tree(tree: &TriangleTree<'_>) -> Self {
         let (positions, faces, part) = (tree.positions(), tree.all_faces(), tree.part());
         let part_faces: Vec<[u32; 3]> = part.iter().map(|&f| faces[f as usize]).collect();
-        let mut crosses = vec![false; faces.len()];
+        let mut intersects = vec![false; faces.len()];
         for (a, b) in tree.self_pairs() {
-            crosses[a as usize] = true;
-            crosses[b as usize] = true;
+            intersects[a as usize] = true;
+            intersects[b as usize] = true;
         }
-        let is_seam: Vec<bool> = part.iter().map(|&f| crosses[f as usize]).collect();
+        let is_seam: Vec<bool> = part.iter().map(|&f| intersects[f as usize]).collect();
         let is_whole = |face: &[u32; 3]| face.iter().all(|&v| vec3::is_finite(positions[v as usize]));
         let whole = faces.iter().copied().filter(is_whole).collect();
-        let all = Crossings::new(positions.to_vec(), whole);
-        let is_alone = at_the_end(positions.len(), faces, part);
-        let is_exposed = exposed(&all, &part_faces, &is_seam, &is_alone);
+        let all = RayIntersections::new(positions.to_vec(), whole);
+        let is_isolated = at_the_end(positions.len(), faces, part);
+        let is_exposed = exposed(&all, &part_faces, &is_seam, &is_isolated);
         let mut is_sure_vertex = vec![true; positions.len()];
         for (face, _) in part_faces.iter().zip(&is_exposed).filter(|(_, exposed)| !**exposed) {
             face.iter().for_each(|&v| is_sure_vertex[v as usize] = false);
@@ -81,13 +81,7 @@ impl UnionDistance {
             };
         }
         let kept = ClosestPoint::of_tree(tree, |face| sides[face as usize] != FaceSide::Buried);
-        let buried = sides.iter().filter(|side| **side == FaceSide::Buried).count();
-        Self { kept, sides, is_sure, all, buried }
-    }
-
-    /// Faces that lie in the inside of the union.
-    pub fn buried(&self) -> usize {
-        self.buried
+        Self { kept, sides, is_sure, all }
     }
 
     /// Where every face lies; faces that were left out, without area, or with a corner that is not finite, count as exposed.
@@ -117,7 +111,7 @@ impl UnionDistance {
     }
 }
 
-/// Which faces of a `part` are where it ends. What they cross may not belong to it, so that they do not tell of their
+/// Which faces of a `part` are where it ends. What they intersect may not belong to it, so that they do not decide their
 /// neighbours' side.
 fn at_the_end(vertices: usize, faces: &[[u32; 3]], part: &[u32]) -> Vec<bool> {
     if part.len() == faces.len() {
@@ -138,14 +132,14 @@ fn at_the_end(vertices: usize, faces: &[[u32; 3]], part: &[u32]) -> Vec<bool> {
 }
 
 /// Which of some faces that are no seam have the outside of the union before them and its inside behind them. Those that are
-/// `alone` are asked one by one.
-fn exposed(all: &Crossings, faces: &[[u32; 3]], is_seam: &[bool], is_alone: &[bool]) -> Vec<bool> {
-    let at_vertex = FacesAtVertex::new(all.positions().len(), faces);
+/// `isolated` are asked one by one.
+fn exposed(all: &RayIntersections, faces: &[[u32; 3]], is_seam: &[bool], is_isolated: &[bool]) -> Vec<bool> {
+    let at_vertex = faces_at_vertices(all.positions().len(), faces, 0..faces.len() as u32);
     let mut pieces = DisjointSets::new(faces.len());
-    let is_joined = |f: u32| !is_seam[f as usize] && !is_alone[f as usize];
+    let is_joined = |f: u32| !is_seam[f as usize] && !is_isolated[f as usize];
     for (f, [a, b, c]) in (0u32..).zip(faces).filter(|(f, _)| is_joined(*f)) {
         for (from, to) in [(*a, *b), (*b, *c), (*c, *a)] {
-            let beside = at_vertex.of(from).iter().filter(|&&g| g > f && is_joined(g));
+            let beside = at_vertex.row(from as usize).iter().filter(|&&g| g > f && is_joined(g));
             beside.filter(|&&g| faces[g as usize].contains(&to)).for_each(|&g| pieces.join(f, g));
         }
     }

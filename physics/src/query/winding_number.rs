@@ -110,11 +110,6 @@ mod tests {
         solid_angle / (4.0 * std::f64::consts::PI)
     }
 
-    fn points(count: usize, extent: f64, seed: u64) -> Vec<[f64; 3]> {
-        let mut random = SplitMix::new(seed);
-        (0..count).map(|_| std::array::from_fn(|_| extent * random.symmetric())).collect()
-    }
-
     #[test]
     fn a_point_on_an_edge_takes_nothing_from_the_other_triangles() {
         // Corners on the axes: the middle of an edge between opposite corners of the base is on two faces.
@@ -129,7 +124,7 @@ mod tests {
     fn one_inside_a_sphere_and_zero_outside() {
         let sphere = shapes::icosphere(0.5, 3);
         let mut inside = 0;
-        for p in points(500, 0.8, 1) {
+        for p in SplitMix::new(1).points(500, 0.8) {
             let distance = vec3::norm(p);
             // Between the faces' planes and the sphere through the vertices lies a shell of neither.
             if (0.49..=0.5).contains(&distance) {
@@ -169,7 +164,7 @@ mod tests {
             (sheet.positions(), sheet.faces()),
         ];
         for (positions, faces) in cases {
-            for p in points(200, 0.9, 5) {
+            for p in SplitMix::new(5).points(200, 0.9) {
                 let expected = by_definition(positions, faces, p);
                 assert!((winding_number(positions, faces, p) - expected).abs() < 1e-10, "at {p:?}");
             }

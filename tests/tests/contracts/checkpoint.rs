@@ -73,7 +73,7 @@ fn every_damaged_file_is_refused_by_name() {
 
 const FILES: [&str; 5] = ["model.safetensors", "model.bpk", "optimizer.bpk", "config.toml", "state.json"];
 
-/// Damages one file of `checkpoint` in a random way that changes it, and says how.
+/// Damages one file of `checkpoint` at random so that it changes, and says how.
 fn damage(checkpoint: &Path, rng: &mut ChaCha8Rng) -> String {
     let file = FILES[rng.random_range(0..FILES.len())];
     let path = checkpoint.join(file);

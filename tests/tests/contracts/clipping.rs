@@ -2,59 +2,48 @@
 
 use burn::module::{Module, ModuleVisitor, Param};
 use burn::tensor::Tensor;
-use clothcombo_model::{ClothCombo, gradient_bucket};
-use clothcombo_tests::{loss_and_gradient, tiny_config};
-use clothcombo_trainer::config::{ClipScope, Config, OptimizerConfig, Trains};
-use clothcombo_trainer::dataset::{Dataset, PreparedScene};
-use clothcombo_trainer::inference::networks::TensorStore;
-use clothcombo_trainer::system::device::Backend;
-use clothcombo_trainer::training::learner::{Learner, StepOutcome, new_optimizer};
-use clothcombo_trainer::training::process_group::RankPartition;
-use clothcombo_trainer::training::scenes::prepare_step;
-use clothcombo_trainer::training::schedule::Schedule;
-use clothcombo_trainer::training::step_summary::StepSummary;
-use std::sync::Arc;
+use clothcombo_model::gradient_bucket;
+use clothcombo_tests::{Untrained, loss_and_gradient};
+use clothcombo_trainer::config::{ClipScope, OptimizerConfig, Trains};
+use clothcombo_trainer::dataset::PreparedScene;
+use clothcombo_trainer::run::event::StepRecord;
+use clothcombo_trainer::training::learner::{Learner, StepInput, StepOutput};
 
 struct Setting {
-    config: Config,
-    tensors: TensorStore,
-    model: ClothCombo,
+    run: Untrained,
     scenes: Vec<PreparedScene>,
 }
 
 /// A usual scene and one whose garment starts so far from its shape that its gradient is huge.
 fn setting(folder: &std::path::Path) -> Setting {
-    let config = tiny_config(folder, &["stages.0.accumulate=2", "optimizer.ema_decay=0.0"]);
-    let dataset = Arc::new(Dataset::load(&config, &|_, _, _| {}).unwrap());
-    let device = Backend::preferred().device().autodiff();
-    let dimensions = dataset.dimensions();
-    let tensors = TensorStore::new(dataset.clone(), dimensions, &device);
-    let model = ClothCombo::new(&config.model, &dimensions, config.seed, &device).unwrap();
-    let mut scenes =
-        prepare_step(&dataset, &config, &Schedule::new(&config), 0, RankPartition::WHOLE).unwrap();
+    let run = Untrained::new(folder, &["stages.0.accumulate=2", "optimizer.ema_decay=0.0"]);
+    let mut scenes = run.scenes(0);
     for start in scenes[1].bodies.iter_mut().flat_map(|body| &mut body.start) {
         *start = start.map(|x| 4.0 * x);
     }
-    Setting { config, tensors, model, scenes }
+    Setting { run, scenes }
 }
 
 impl Setting {
     fn learner(&self, clip: ClipScope, clip_norm: f64) -> Learner {
-        let config = OptimizerConfig { clip, clip_norm, ..self.config.optimizer.clone() };
-        Learner::new(self.model.clone(), new_optimizer(&config), &config)
+        self.run.learner_with(&OptimizerConfig { clip, clip_norm, ..self.run.config.optimizer.clone() })
+    }
+
+    fn input<'a>(&'a self, scenes: &'a [PreparedScene]) -> StepInput<'a> {
+        StepInput::whole(&self.run.tensors, scenes, Trains::Single)
     }
 
     /// The gradient that a step on `scenes` takes, before Adam.
     fn gradient(&self, clip: ClipScope, clip_norm: f64, scenes: &[PreparedScene]) -> Vec<f32> {
-        loss_and_gradient(self.learner(clip, clip_norm), &self.tensors, scenes, Trains::Single).1
+        loss_and_gradient(self.learner(clip, clip_norm), &self.run.tensors, scenes, Trains::Single).1
     }
 
-    fn stepped(&self, clip: ClipScope, scenes: &[PreparedScene]) -> (StepOutcome, Vec<f32>) {
+    fn stepped(&self, clip: ClipScope, scenes: &[PreparedScene]) -> (StepOutput, Vec<f32>) {
         let mut learner = self.learner(clip, 1.0);
-        let outcome = learner.step(&self.tensors, scenes, Trains::Single, 1e-3, false).unwrap();
+        let output = learner.train_step(&self.input(scenes), 1e-3).unwrap();
         let mut values = Values(Vec::new());
         learner.model().visit(&mut values);
-        (outcome, values.0)
+        (output, values.0)
     }
 }
 
@@ -109,15 +98,15 @@ fn the_shares_of_processes_add_up_to_the_step_of_one() {
     for scene in &setting.scenes {
         let mut learner = setting.learner(ClipScope::Scene, 1.0);
         let scenes = std::slice::from_ref(scene);
-        let computed = learner.compute(&setting.tensors, scenes, 2, Trains::Single, false).unwrap();
-        let bucket = gradient_bucket(learner.model(), &computed.gradients);
+        let output = learner.forward_backward(&StepInput { total: 2, ..setting.input(scenes) }).unwrap();
+        let bucket = gradient_bucket(learner.model(), &output.gradients);
         sum.iter_mut().zip(&bucket).for_each(|(sum, part)| *sum += part);
-        norms.push(StepSummary::of(scenes, &computed, 2).to_row());
+        norms.push(StepRecord::of(scenes, &output, 2).to_row());
     }
     let largest = whole.iter().fold(0.0_f32, |m, v| m.max(v.abs()));
     assert!(whole.iter().zip(&sum).all(|(a, b)| (a - b).abs() <= 1e-5 * largest));
     let norm = setting.stepped(ClipScope::Scene, &setting.scenes).0.gradient_norm;
-    let joined = StepSummary::joined(&norms).largest_norm;
+    let joined = StepRecord::joined(&norms).grad_norm;
     assert!((joined - norm).abs() <= 1e-5 * norm, "{joined} {norm}");
 }
 
@@ -137,12 +126,12 @@ fn one_scene_is_clipped_alike_to_the_bit() {
 fn the_norm_of_a_step_is_that_of_what_is_clipped_and_one_broken_scene_skips_it() {
     let folder = tempfile::tempdir().unwrap();
     let mut setting = setting(folder.path());
-    let alone: Vec<f64> = (setting.scenes.iter())
+    let single: Vec<f64> = (setting.scenes.iter())
         .map(|scene| norm(&setting.gradient(ClipScope::Step, 1.0, std::slice::from_ref(scene))))
         .collect();
     let together = norm(&setting.gradient(ClipScope::Step, 1.0, &setting.scenes));
     let near = |a: f64, b: f64| (a - b).abs() <= 1e-4 * b;
-    assert!(near(setting.stepped(ClipScope::Scene, &setting.scenes).0.gradient_norm, alone[1]));
+    assert!(near(setting.stepped(ClipScope::Scene, &setting.scenes).0.gradient_norm, single[1]));
     assert!(near(setting.stepped(ClipScope::Step, &setting.scenes).0.gradient_norm, together));
 
     let before = setting.learner(ClipScope::Scene, 1.0);
@@ -152,8 +141,8 @@ fn the_norm_of_a_step_is_that_of_what_is_clipped_and_one_broken_scene_skips_it()
         let vertex = setting.scenes[broken].bodies[0].start[0];
         setting.scenes[broken].bodies[0].start[0][0] = f32::NAN;
         for clip in [ClipScope::Scene, ClipScope::Step] {
-            let (outcome, after) = setting.stepped(clip, &setting.scenes);
-            assert!(outcome.skipped && !outcome.gradient_norm.is_finite() && after == values.0, "{clip:?}");
+            let (output, after) = setting.stepped(clip, &setting.scenes);
+            assert!(output.skipped && !output.gradient_norm.is_finite() && after == values.0, "{clip:?}");
         }
         setting.scenes[broken].bodies[0].start[0] = vertex;
     }

@@ -65,7 +65,7 @@ fn the_configuration_of_the_paper_has_the_papers_values() {
         (&losses.holding.weight, 100.0),
         (&losses.layer_collision.weight, 250.0),
         (&losses.layer_distance.weight, 25_000.0),
-        (&losses.alone, 0.0),
+        (&losses.single_garments, 0.0),
     ];
     for (weight, expected) in weights {
         assert!([0.0, 0.5, 1.0].iter().all(|&progress| weight.at(progress) == expected), "{expected}");

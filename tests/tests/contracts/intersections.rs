@@ -1,26 +1,28 @@
 //! Exact intersections of garments and bodies against brute force over all pairs of triangles, decided twice: by the
-//! dataset's own exact test and by separating axes in 128-bit integers, which share no formula with it.
+//! library's own exact test and by separating axes in 128-bit integers, which share no formula with it.
 //!
 //! Positions are put on a grid of 2⁻²⁰ m (about a micrometre), where integers hold them exactly.
 
 use clothcombo_data::asset::{Binding, BindingSettings, Body, BodyFileSettings, Category, Garment, Pose};
 use clothcombo_data::dataset::{load_garment_folder, load_motion_folder};
 use clothcombo_data::generate::{GarmentGenerator, GarmentSettings, mannequin};
+use clothcombo_physics::Surface;
 use clothcombo_physics::contact::{
-    IntersectionReport, TriangleTree, mesh_triangles_intersect, triangles_intersect,
+    LayerOrder, PosedBody, Report, ReportGarment, Selection, TriangleTree, all_layers,
+    mesh_triangles_intersect, triangles_intersect,
 };
 use clothcombo_physics::mesh::TriMesh;
+use clothcombo_physics::query::Distance;
+use clothcombo_physics::query::grid_oracle::{self, GridPoint};
 use rayon::prelude::*;
 use std::path::Path;
 
 const GRID: f64 = (1u32 << 20) as f64;
 
-type Point = [i128; 3];
-
 /// A mesh on the grid, as numbers and as integers.
 struct Snapped {
     mesh: TriMesh,
-    points: Vec<Point>,
+    points: Vec<GridPoint>,
     /// Smallest and largest coordinates of every face.
     boxes: Vec<[[i32; 3]; 2]>,
 }
@@ -47,7 +49,7 @@ impl Snapped {
         }
     }
 
-    fn triangle(&self, face: usize) -> [Point; 3] {
+    fn triangle(&self, face: usize) -> [GridPoint; 3] {
         self.mesh.faces()[face].map(|v| self.points[v as usize])
     }
 
@@ -56,74 +58,13 @@ impl Snapped {
     }
 }
 
-fn sub(a: Point, b: Point) -> Point {
-    std::array::from_fn(|k| a[k] - b[k])
-}
-
-fn dot(a: Point, b: Point) -> i128 {
-    (0..3).map(|k| a[k] * b[k]).sum()
-}
-
-fn cross(a: Point, b: Point) -> Point {
-    std::array::from_fn(|k| a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3])
-}
-
-fn normal(t: &[Point; 3]) -> Point {
-    cross(sub(t[1], t[0]), sub(t[2], t[0]))
-}
-
-/// Whether a triangle or segment `a` and a triangle `b` share a point: no axis that could separate them does. Coordinates
-/// below 2²² keep every product below 2¹²⁰.
-fn meet(a: &[Point], b: &[Point; 3]) -> bool {
-    let edges =
-        |p: &[Point]| -> Vec<Point> { (0..p.len()).map(|i| sub(p[(i + 1) % p.len()], p[i])).collect() };
-    let mut axes = vec![normal(b)];
-    if let Ok(a) = <&[Point; 3]>::try_from(a) {
-        axes.push(normal(a));
-    }
-    for e in edges(a) {
-        axes.extend(edges(b).into_iter().map(|f| cross(e, f)));
-        axes.push(cross(normal(b), e));
-    }
-    axes.extend(edges(b).into_iter().map(|f| cross(normal(b), f)));
-    axes.iter().filter(|axis| **axis != [0; 3]).all(|&axis| {
-        let range = |points: &[Point]| {
-            let along = || points.iter().map(|&p| dot(axis, p));
-            (along().min().unwrap(), along().max().unwrap())
-        };
-        let ((a_low, a_high), (b_low, b_high)) = (range(a), range(b));
-        a_low <= b_high && b_low <= a_high
-    })
-}
-
-fn strangers_meet(a: &[Point; 3], b: &[Point; 3]) -> bool {
-    normal(a) != [0; 3] && normal(b) != [0; 3] && meet(a, b)
-}
-
-/// Two faces of one mesh, beyond the vertices they share.
+/// Two faces of one mesh. From a common corner through any other common point, a ray leaves one of the triangles first, by the
+/// edge opposite to the corner, and is then still in the other one.
 fn neighbours_meet(mesh: &Snapped, i: usize, j: usize) -> bool {
-    let (fa, fb) = (mesh.mesh.faces()[i], mesh.mesh.faces()[j]);
-    let (a, b) = (mesh.triangle(i), mesh.triangle(j));
-    if normal(&a) == [0; 3] || normal(&b) == [0; 3] {
-        return false;
-    }
-    let common: Vec<u32> = fa.iter().copied().filter(|v| fb.contains(v)).collect();
-    let others = |face: [u32; 3]| -> Vec<Point> {
-        face.iter().filter(|v| !common.contains(v)).map(|&v| mesh.points[v as usize]).collect()
-    };
-    match common[..] {
-        [] => meet(&a, &b),
-        // From the common corner through any other common point, a ray leaves one of the triangles first, by the edge
-        // opposite to the corner, and is then still in the other one.
-        [_] => meet(&others(fa), &b) || meet(&others(fb), &a),
-        [u, v] => {
-            let (u, v) = (mesh.points[u as usize], mesh.points[v as usize]);
-            let of = |p: Point| cross(sub(v, u), sub(p, u));
-            let (n, m) = (of(others(fa)[0]), of(others(fb)[0]));
-            cross(n, m) == [0; 3] && dot(n, m) > 0
-        }
-        _ => true,
-    }
+    let faces = [i, j].map(|face| mesh.mesh.faces()[face]);
+    grid_oracle::mesh_triangles_intersect(&mesh.points, faces, |a, b| {
+        grid_oracle::meet(&a[1..], b) || grid_oracle::meet(&b[1..], a)
+    })
 }
 
 fn boxes_meet(a: &[[i32; 3]; 2], b: &[[i32; 3]; 2]) -> bool {
@@ -154,7 +95,7 @@ fn brute_force(
 }
 
 fn pairs_between(a: &Snapped, b: &Snapped) -> Vec<(u32, u32)> {
-    let oracle = |i, j| strangers_meet(&a.triangle(i), &b.triangle(j));
+    let oracle = |i, j| grid_oracle::triangles_intersect(&a.triangle(i), &b.triangle(j));
     brute_force(a, b, |_| 0, oracle, |i, j| triangles_intersect(&a.mesh.corners(i), &b.mesh.corners(j)))
 }
 
@@ -167,14 +108,25 @@ fn pairs_within(a: &Snapped) -> Vec<(u32, u32)> {
 /// The report of `garments` on `body` against brute force, pair by pair.
 fn check(body: &Snapped, garments: &[Snapped]) {
     let trees: Vec<TriangleTree> = garments.iter().map(Snapped::tree).collect();
-    let report = IntersectionReport::new(&body.tree(), &trees);
+    let meshes: Vec<ReportGarment> = garments
+        .iter()
+        .map(|g| ReportGarment { positions: g.mesh.positions(), faces: g.mesh.faces() })
+        .collect();
+    let selection = Selection {
+        layers: &all_layers(garments.len()),
+        order: LayerOrder::NearestVertex,
+        triangles: true,
+        body_itself: true,
+    };
+    let surface = Surface::from_mesh(&body.mesh);
+    let report = Report::count(&PosedBody::new(&surface, Distance::ClosestPoint), &meshes, &selection);
     let mut total = 0;
     for (i, garment) in garments.iter().enumerate() {
         let (with_body, with_itself) = (pairs_between(garment, body), pairs_within(garment));
         assert_eq!(trees[i].pairs_with(&body.tree()), with_body);
         assert_eq!(trees[i].self_pairs(), with_itself);
-        assert_eq!(report.garment_body[i].pairs, with_body.len());
-        assert_eq!(report.garment_self[i].pairs, with_itself.len());
+        assert_eq!(report.garments[i].with_body.pairs, with_body);
+        assert_eq!(report.garments[i].with_itself.pairs, with_itself);
         println!(
             "garment {i}: {} triangles, {} pairs with the body of {}, {} with itself",
             garment.boxes.len(),
@@ -184,19 +136,22 @@ fn check(body: &Snapped, garments: &[Snapped]) {
         );
         total += with_body.len() + with_itself.len();
     }
-    for layer in &report.garment_garment {
-        let pairs = pairs_between(&garments[layer.inner], &garments[layer.outer]);
-        assert_eq!(trees[layer.inner].pairs_with(&trees[layer.outer]), pairs);
-        assert_eq!(layer.intersections.pairs, pairs.len());
+    for layer in &report.layers {
+        let pairs = pairs_between(&garments[layer.outer], &garments[layer.inner]);
+        assert_eq!(trees[layer.outer].pairs_with(&trees[layer.inner]), pairs);
+        assert_eq!(layer.pairs.pairs, pairs);
         println!("garments {} and {}: {} pairs", layer.inner, layer.outer, pairs.len());
         total += pairs.len();
     }
     let of_the_body = pairs_within(body);
-    assert_eq!(report.body_self.pairs, of_the_body.len());
+    assert_eq!(report.body_itself.pairs, of_the_body.len());
     println!("body with itself: {} pairs, in no total", of_the_body.len());
     // What the body does to itself is in no sum.
-    assert_eq!(report.total().pairs, total);
-    assert!(report.garment_body.iter().all(|g| g.pairs > 0), "garments that touch nothing test nothing");
+    assert_eq!(report.intersections().pairs, total);
+    assert!(
+        report.garments.iter().all(|g| !g.with_body.pairs.is_empty()),
+        "garments that touch nothing test nothing"
+    );
 }
 
 /// `garments` skinned onto the posed body.

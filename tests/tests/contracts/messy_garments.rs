@@ -1,4 +1,4 @@
-//! Garments as strangers have them: damaged in the ways of exporters and modellers, each either draped, repairs listed, or
+//! Garments as strangers have them: damaged as exporters and modellers do, each either draped, repairs listed, or
 //! refused with a reason that names the file. `scripts/fuzz.sh` runs many more.
 
 use clothcombo_data::asset::{Category, Pose};

@@ -29,7 +29,7 @@ impl Observer for StopAfter {
     }
 }
 
-/// Cannot write what it is told at step `.0`.
+/// Cannot write at step `.0`.
 struct FailsAt(u64);
 
 impl Observer for FailsAt {
@@ -157,7 +157,7 @@ fn a_further_run_draws_other_scenes_and_can_be_scored_on_the_same() {
     let dataset = Dataset::load(&first, &|_, _, _| {}).unwrap();
     let scored = |overrides: &[&str]| {
         let set = ValidationSet::new(&dataset, &tiny_config(folder.path(), overrides));
-        [ValidationGroup::Single, ValidationGroup::Layered].map(|group| set.draws(group).to_vec())
+        [ValidationGroup::Single, ValidationGroup::Layered].map(|group| set.samples(group).to_vec())
     };
     let same = format!("validation.seed={}", first.seed);
     let [other, known] = [scored(&["seed=9"]), scored(&["seed=9", &same])];

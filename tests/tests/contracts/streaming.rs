@@ -4,7 +4,7 @@ use clothcombo_tests::tiny_config;
 use clothcombo_trainer::config::Config;
 use clothcombo_trainer::dataset::tensor_bytes;
 use clothcombo_trainer::dataset::{Dataset, GarmentStore, load_body};
-use clothcombo_trainer::inference::networks::TensorStore;
+use clothcombo_trainer::inference::tensor_store::TensorStore;
 use clothcombo_trainer::run::folder::RunDir;
 use clothcombo_trainer::system::device::Backend;
 use clothcombo_trainer::system::lru_cache::KeptBytes;

@@ -1,10 +1,14 @@
 //! `clothcombo check`: every file of a dataset, in one table.
 
+use crate::cli::output::print_report;
+use crate::cli::table::{Row, row, table};
 use crate::cli::verbosity::progress_bar;
 use crate::dataset::load_body;
 use clap::Parser;
-use clothcombo_data::check::{Checker, FileCheck, GarmentCheck, Target, find_targets, is_body_file};
-use miette::{IntoDiagnostic, Report, miette};
+use clothcombo_data::check::{
+    BodyCheck, Checker, FileCheck, GarmentCheck, MotionCheck, Target, find_targets, is_body_file,
+};
+use miette::{Report, miette};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -44,33 +48,26 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let body_name = arguments.body.clone().unwrap_or_else(|| only_body(&targets));
     let checker = Checker::new(load_body(&body_name, 0)?);
     let bar = progress_bar(targets.len(), "checking {bar:40} {pos}/{len} · {eta} left");
-    let files: Vec<FileCheck> = targets
-        .par_iter()
-        .map(|target| {
-            let file = checker.check(target);
-            bar.inc(1);
-            file
-        })
-        .collect();
+    let check = |target| {
+        let file = checker.check(target);
+        bar.inc(1);
+        file
+    };
+    let files: Vec<FileCheck> = targets.par_iter().map(check).collect();
     bar.finish_and_clear();
-    let unusable: Vec<&FileCheck> = files.iter().filter(|f| f.unusable.is_some()).collect();
-    if arguments.json {
-        let output = Output { body: &body_name, unusable: unusable.len(), files: &files };
-        println!("{}", serde_json::to_string_pretty(&output).into_diagnostic()?);
-    } else {
-        print_tables(&files, &body_name);
+    let unusable: Vec<&str> = files.iter().filter_map(|f| f.unusable.as_deref()).collect();
+    let output = Output { body: &body_name, unusable: unusable.len(), files: &files };
+    print_report(arguments.json, &output, text)?;
+    match unusable.is_empty() {
+        true => Ok(()),
+        false => Err(miette!(
+            help = "`clothcombo fit` repairs garments; other files must be exported or downloaded again",
+            "{} of {} files are unusable\n{}",
+            unusable.len(),
+            files.len(),
+            unusable.join("\n")
+        )),
     }
-    if unusable.is_empty() {
-        return Ok(());
-    }
-    let reasons: Vec<&str> = unusable.iter().filter_map(|f| f.unusable.as_deref()).collect();
-    Err(miette!(
-        help = "`clothcombo fit` repairs garments; other files must be exported or downloaded again",
-        "{} of {} files are unusable\n{}",
-        unusable.len(),
-        files.len(),
-        reasons.join("\n")
-    ))
 }
 
 /// The one body among the files, else the mannequin.
@@ -86,77 +83,55 @@ fn only_body(targets: &[Target]) -> String {
     }
 }
 
-fn print_tables(files: &[FileCheck], body: &str) {
+fn text(output: &Output<'_>) -> String {
+    let files = output.files;
     let name = |f: &FileCheck| f.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let width = files.iter().map(|f| name(f).chars().count()).max().unwrap_or(0).clamp(12, 40);
-    if files.iter().any(|f| f.garment.is_some()) {
-        println!(
-            "{:<width$} {:>7} {:>7} {:>3} {:>3} {:>19} {:>13} {:>5} {:>5} {:>8} {:>8} {:>6} {:>6} {:>6}  defects",
-            "garment",
-            "verts",
-            "tris",
-            "pcs",
-            "rim",
-            "edge mm (min–max)",
-            "category",
-            "layer",
-            "held",
-            "min mm",
-            "mid mm",
-            "inside",
-            "body×",
-            "self×"
-        );
-    }
+    let garments: Vec<Row> =
+        files.iter().filter_map(|f| f.garment.as_ref().map(|g| garment_row(&name(f), g))).collect();
+    let bodies: Vec<Row> =
+        files.iter().filter_map(|f| f.body.as_ref().map(|b| body_row(&name(f), b))).collect();
+    let motions: Vec<Row> =
+        files.iter().filter_map(|f| f.motion.as_ref().map(|m| motion_row(&name(f), m))).collect();
+    let mut lines = Vec::new();
     for file in files {
-        if let Some(garment) = &file.garment {
-            println!("{:<width$} {}", name(file), garment_row(garment));
-        }
-    }
-    for file in files {
-        if let Some(b) = &file.body {
-            println!(
-                "body {}: {} vertices, {} triangles, {} joints, {} shape components, {:.2} m, skin weights sum to {:.4}–{:.4}",
-                name(file),
-                b.vertices,
-                b.triangles,
-                b.joints,
-                b.shape_components,
-                b.height,
-                b.weight_sums[0],
-                b.weight_sums[1]
-            );
-        }
-        if let Some(m) = &file.motion {
-            println!(
-                "motion {}: {} frames at {:.1}/s = {:.1} s, {} frames outside joint limits (by up to {:.0}°)",
-                name(file),
-                m.frames,
-                m.frame_rate,
-                m.duration,
-                m.frames_outside_limits,
-                m.largest_excess_degrees
-            );
-        }
-    }
-    for file in files {
-        for warning in &file.warnings {
-            println!("warning {}: {warning}", name(file));
-        }
-        if let Some(reason) = &file.unusable {
-            println!("unusable {reason}");
-        }
+        lines.extend(file.warnings.iter().map(|warning| format!("warning {}: {warning}", name(file))));
+        lines.extend(file.unusable.iter().map(|reason| format!("unusable {reason}")));
     }
     let warned = files.iter().filter(|f| f.unusable.is_none() && !f.warnings.is_empty()).count();
-    let unusable = files.iter().filter(|f| f.unusable.is_some()).count();
-    println!(
-        "{} files against body '{body}': {} usable, {warned} of them with warnings, {unusable} unusable",
+    lines.push(format!(
+        "{} files against body '{}': {} usable, {warned} of them with warnings, {} unusable\n",
         files.len(),
-        files.len() - unusable
-    );
+        output.body,
+        files.len() - output.unusable,
+        output.unusable
+    ));
+    [garments, bodies, motions].map(|rows| table(&rows)).concat() + &lines.join("\n")
 }
 
-fn garment_row(g: &GarmentCheck) -> String {
+fn body_row(name: &str, b: &BodyCheck) -> Row {
+    row! {
+        "body" => name,
+        "verts" => b.vertices,
+        "tris" => b.triangles,
+        "joints" => b.joints,
+        "shape components" => b.shape_components,
+        "height m" => b.height,
+        "skin weights sum to" => format!("{:.4}–{:.4}", b.weight_sums[0], b.weight_sums[1]),
+    }
+}
+
+fn motion_row(name: &str, m: &MotionCheck) -> Row {
+    row! {
+        "motion" => name,
+        "frames" => m.frames,
+        "frames/s" => m.frame_rate,
+        "s" => m.duration,
+        "frames outside joint limits" => m.frames_outside_limits,
+        "by up to °" => m.largest_excess_degrees,
+    }
+}
+
+fn garment_row(name: &str, g: &GarmentCheck) -> Row {
     let guess = |text: String, guessed: bool| if guessed { format!("({text})") } else { text };
     let layer = match g.layer {
         [low, high] if high == low + 1 => format!("{low}+"),
@@ -164,22 +139,21 @@ fn garment_row(g: &GarmentCheck) -> String {
         [low, high] => format!("{low}–{high}"),
     };
     let m = &g.mesh;
-    let defects: usize = m.defects.counts().iter().map(|(n, _)| n).sum();
-    format!(
-        "{:>7} {:>7} {:>3} {:>3} {:>19} {:>13} {:>5} {:>5} {:>8.1} {:>8.1} {:>6} {:>6} {:>6}  {}",
-        m.vertices,
-        m.triangles,
-        m.components,
-        m.boundary_loops,
-        format!("{:.1} ({:.1}–{:.1})", m.edge_median_mm, m.edge_min_mm, m.edge_max_mm),
-        guess(g.category.to_string(), g.category_guessed),
-        guess(layer, g.layer_guessed),
-        if g.holding { "yes" } else { "no" },
-        g.distance_min_mm,
-        g.distance_median_mm,
-        g.inside,
-        g.body_triangle_pairs,
-        g.self_triangle_pairs,
-        defects
-    )
+    row! {
+        "garment" => name,
+        "verts" => m.vertices,
+        "tris" => m.triangles,
+        "pcs" => m.components,
+        "rim" => m.boundary_loops,
+        "edge mm (min–max)" => format!("{:.1} ({:.1}–{:.1})", m.edge_median_mm, m.edge_min_mm, m.edge_max_mm),
+        "category" => guess(g.category.to_string(), g.category_guessed),
+        "layer" => guess(layer, g.layer_guessed),
+        "held" => g.holding,
+        "min mm" => g.distance_min_mm,
+        "mid mm" => g.distance_median_mm,
+        "inside" => g.inside,
+        "body×" => g.body_triangle_pairs,
+        "self×" => g.self_triangle_pairs,
+        "defects" => m.defects.counts().iter().map(|(n, _)| n).sum::<usize>(),
+    }
 }

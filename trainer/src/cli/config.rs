@@ -1,17 +1,19 @@
 //! `clothcombo config`: what a configuration may say, and what one comes to.
 
+use crate::cli::loading::load_dataset;
 use crate::cli::memory_table::print_memory;
-use crate::cli::train::load_under_bar;
-use crate::config::{ClipScope, Config, MOST_GARMENTS, StageConfig, Trains, load, schema};
+use crate::cli::output::print_json;
+use crate::cli::table::{row, table};
+use crate::cli::values::count;
+use crate::config::{ClipScope, Config, StageConfig, Trains, load, schema};
 use crate::dataset::DataSizes;
 use crate::run::report::duration;
 use crate::system::device::Backend;
 use crate::training::estimate::{StageTime, time_stages};
 use clap::{Parser, Subcommand};
 use clothcombo_physics::energy::Term;
-use miette::{IntoDiagnostic, Report};
+use miette::Report;
 use std::path::PathBuf;
-use std::sync::Arc;
 
 /// What a configuration may say, and what one comes to
 #[derive(Subcommand)]
@@ -44,21 +46,14 @@ pub struct CheckArguments {
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u64).range(1..=1000))]
     timed_steps: u64,
     /// State the memory for so many garments instead of those there are, on a body like SMPL-X; no data is loaded
-    #[arg(long, value_name = "N", requires = "vertices", value_parser = positive)]
+    #[arg(long, value_name = "N", requires = "vertices", value_parser = count)]
     garments: Option<usize>,
     /// Vertices of each of those garments
-    #[arg(long, value_name = "V", requires = "garments", value_parser = positive)]
+    #[arg(long, value_name = "V", requires = "garments", value_parser = count)]
     vertices: Option<usize>,
     /// Shape components of that body; default: data.shape_components or, where that takes all, the 300 of SMPL-X
     #[arg(long, value_name = "K", requires = "garments")]
     shape_components: Option<usize>,
-}
-
-fn positive(text: &str) -> Result<usize, String> {
-    match text.parse() {
-        Ok(number @ 1..=MOST_GARMENTS) => Ok(number),
-        _ => Err(format!("not a number from 1 to {MOST_GARMENTS}")),
-    }
 }
 
 /// Runs the verb.
@@ -67,10 +62,7 @@ fn positive(text: &str) -> Result<usize, String> {
 /// When the configuration or, for the time, its data cannot be used.
 pub fn run(verb: &Verb) -> Result<(), Report> {
     match verb {
-        Verb::Schema => {
-            println!("{}", serde_json::to_string_pretty(&schema()).into_diagnostic()?);
-            Ok(())
-        }
+        Verb::Schema => print_json(&schema()),
         Verb::Check(arguments) => check(arguments),
     }
 }
@@ -89,7 +81,7 @@ fn check(arguments: &CheckArguments) -> Result<(), Report> {
         return Ok(());
     }
     print_memory(&config, &DataSizes::of_named(&config)?)?;
-    let dataset = Arc::new(load_under_bar(&config)?);
+    let dataset = load_dataset(&config)?;
     let times = time_stages(&config, &dataset, &Backend::preferred().device(), arguments.timed_steps)?;
     print_times(&config, &times);
     Ok(())
@@ -110,7 +102,7 @@ fn print_plan(config: &Config) {
     for term in Term::ALL {
         println!("  {:<16} {}", term.name(), config.losses.weight(term));
     }
-    println!("  {:<16} {}", "garments alone", config.losses.alone);
+    println!("  {:<16} {}", "single garments", config.losses.single_garments);
     let o = &config.optimizer;
     println!(
         "\nAdam {} {} · gradient norm {} · average of the weights {}",
@@ -162,25 +154,18 @@ fn step(stage: &StageConfig) -> String {
 }
 
 fn print_times(config: &Config, times: &[StageTime]) {
-    println!(
-        "\nestimated time on this machine ({} timed steps per stage)",
-        times.first().map_or(0, |t| t.steps)
-    );
-    let mut total = 0.0;
-    for (stage, time) in config.stages.iter().zip(times) {
-        let seconds = time.seconds_per_step * stage.steps as f64;
-        total += seconds;
-        println!(
-            "  {:<24} {:>9.1} ms/step {:>14}",
-            stage.name,
-            1000.0 * time.seconds_per_step,
-            duration(seconds)
-        );
-    }
-    println!(
-        "  {:<24} {:>17} {:>14} (validation, pictures and checkpoints not counted)",
-        "together",
-        "",
-        duration(total)
-    );
+    let steps = times.first().map_or(0, |t| t.steps);
+    println!("\nestimated time on this machine ({steps} timed steps per stage)");
+    let stage_seconds =
+        |(stage, time): (&StageConfig, &StageTime)| time.seconds_per_step * stage.steps as f64;
+    let stages = || config.stages.iter().zip(times);
+    let mut rows: Vec<_> = stages()
+        .map(|(stage, time)| {
+            let ms = format!("{:.1}", 1000.0 * time.seconds_per_step);
+            row!["stage" => stage.name, "ms/step" => ms, "time" => duration(stage_seconds((stage, time)))]
+        })
+        .collect();
+    rows.push(row!["" => "together", "" => "", "" => duration(stages().map(stage_seconds).sum())]);
+    print!("{}", table(&rows));
+    println!("validation, pictures and checkpoints not counted");
 }

@@ -1,27 +1,26 @@
 //! `clothcombo eval`: everything a trained model is judged by, in one report.
 
-use crate::cli::train::load_under_bar;
-use crate::cli::verbosity::{progress_bar, say};
+use crate::cli::loading::load_dataset;
+use crate::cli::verbosity::{print_status, progress_bar};
 use crate::config::{Config, load};
 use crate::dataset::Dataset;
-use crate::evaluation::study::{Other, Page, Sizes, Study, Subject, study};
+use crate::evaluation::{Evaluation, ModelUnderTest, NamedModel, Page, SceneCounts};
 use crate::inference::shipped_model;
 use crate::run::checkpoint::TrainedModel;
 use crate::run::report::html::utc;
 use crate::system::device::Backend;
+use crate::system::files::{write_file, write_json};
 use crate::system::paths::obstacle;
 use clap::Parser;
-use clothcombo_data::format::atomic;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
-use serde_json::json;
+use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
-/// The paper's tables for a trained model, speed against error, stability, pictures
+/// The paper's tables for a trained model, speed against error, stress tests, pictures
 ///
-/// Writes eval.json, eval.md and report.html, one page that needs no network. Scenes are drawn from the seed. Training, validation
+/// Writes eval.json, eval.md and report.html, one page that needs no network. Scenes are sampled from the seed. Training, validation
 /// and test set (the latter read by no run) are reported one by one.
 #[derive(Parser)]
 #[command(after_help = "Examples:\n  clothcombo eval -o report\n  \
@@ -41,7 +40,7 @@ pub struct Arguments {
     /// Folder of the report; an earlier report in it is replaced
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// A few scenes per question and no gallery: minutes instead of a quarter of an hour
+    /// A few scenes per part and no gallery: minutes instead of a quarter of an hour
     #[arg(long)]
     quick: bool,
     /// A model trained on the same data with a part left out, for the ablation table; repeatable
@@ -81,15 +80,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         Some(path) => TrainedModel::open(path)?,
         None => shipped_model()?,
     };
-    let config = match &arguments.config {
-        Some(file) => load(file, &arguments.overrides)?,
-        None => load(&trained.folder.join("config.toml"), &arguments.overrides)?,
-    };
-    let subject = subject(arguments, &trained, config)?;
-    let ablations = others(arguments, &arguments.ablation, &subject)?;
-    let specific = others(arguments, &arguments.specific, &subject)?;
-    check_specific(&specific, &subject.dataset)?;
-    check_ablations(&ablations, &subject)?;
+    let file = arguments.config.clone().unwrap_or_else(|| trained.config_file());
+    let config = load(&file, &arguments.overrides)?;
+    let model = model(arguments, &trained, config)?;
+    let ablations = named_models(arguments, &arguments.ablation, &model)?;
+    let specific = named_models(arguments, &arguments.specific, &model)?;
+    check_specific(&specific, &model.dataset)?;
+    check_ablations(&ablations, &model)?;
     let unwritable = || format!("{}", folder.display());
     fs::create_dir_all(folder).into_diagnostic().wrap_err_with(unwritable)?;
     // Now, not after all the work.
@@ -97,25 +94,26 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let written = fs::write(&probe, "").and_then(|()| fs::remove_file(&probe));
     written.into_diagnostic().wrap_err_with(unwritable)?;
 
-    let sizes = if arguments.quick { Sizes::QUICK } else { Sizes::FULL };
+    let counts = SceneCounts::new(arguments.quick);
     let bar = progress_bar(0, "{bar:30} {pos}/{len} · {elapsed} · {msg}");
     let clock = Instant::now();
-    let found = study(&subject, &ablations, &specific, sizes, &|part, steps| match part {
-        Some(part) => {
-            bar.set_length(steps as u64);
+    let evaluation = Evaluation::run(&model, &ablations, &specific, counts, &|part| match part {
+        Some((part, scenes)) => {
+            bar.set_length(scenes as u64);
             bar.set_message(part.to_owned());
             // Off a terminal there is no bar.
             if bar.is_hidden() {
-                say(&format!("{:6.0} s  {part}", clock.elapsed().as_secs_f64()));
+                print_status(&format!("{:6.0} s  {part}", clock.elapsed().as_secs_f64()));
             }
         }
         None => bar.inc(1),
     })?;
     bar.finish_and_clear();
-    let page = page(&trained, &found, clock.elapsed().as_secs_f64())?;
+    let numbers = evaluation.numbers();
+    let page = page(&trained, evaluation, clock.elapsed().as_secs_f64());
     println!("{}", page.markdown());
-    write(folder, &found, &page)?;
-    say(&format!("written: {}", folder.join(HTML).display()));
+    write(folder, &numbers, &page)?;
+    print_status(&format!("written: {}", folder.join(HTML).display()));
     Ok(())
 }
 
@@ -125,9 +123,9 @@ fn check_output(folder: &Path) -> Result<(), Report> {
         return Err(miette!(help = "choose another folder with -o", "{} is no folder", file.display()));
     }
     let occupied = fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
-    let read = |text: String| serde_json::from_str::<serde_json::Value>(&text).ok();
+    let read = |text: String| serde_json::from_str::<Value>(&text).ok();
     let earlier = fs::read_to_string(folder.join(JSON)).ok().and_then(read);
-    if occupied && earlier.is_none_or(|report| report["study"].is_null()) {
+    if occupied && earlier.is_none_or(|report| report["evaluation"].is_null()) {
         return Err(miette!(
             help = "choose another folder with -o",
             "{} holds files that are no evaluation",
@@ -137,9 +135,13 @@ fn check_output(folder: &Path) -> Result<(), Report> {
     Ok(())
 }
 
-fn subject(arguments: &Arguments, trained: &TrainedModel, mut config: Config) -> Result<Subject, Report> {
+fn model(
+    arguments: &Arguments,
+    trained: &TrainedModel,
+    mut config: Config,
+) -> Result<ModelUnderTest, Report> {
     config.validation.seed = arguments.seed.or(config.validation.seed);
-    let dataset = Arc::new(load_under_bar(&config)?);
+    let dataset = load_dataset(&config)?;
     let known = trained.known_of_held_out(&config, &dataset);
     if !known.is_empty() {
         return Err(miette!(
@@ -150,26 +152,30 @@ fn subject(arguments: &Arguments, trained: &TrainedModel, mut config: Config) ->
             known.join("; it ")
         ));
     }
-    Subject::new(trained, config, dataset, &arguments.device.device())
+    ModelUnderTest::new(trained, config, dataset, &arguments.device.device())
 }
 
 /// Further models, each with its own data, measured by the losses of `first` on scenes of its seed.
-fn others(arguments: &Arguments, named: &[(String, PathBuf)], first: &Subject) -> Result<Vec<Other>, Report> {
-    let other = |(name, path): &(String, PathBuf)| {
+fn named_models(
+    arguments: &Arguments,
+    named: &[(String, PathBuf)],
+    first: &ModelUnderTest,
+) -> Result<Vec<NamedModel>, Report> {
+    let named_model = |(name, path): &(String, PathBuf)| {
         let trained = TrainedModel::open(path)?;
         let mut config = trained.config.clone();
         config.losses = first.config.losses.clone();
         config.validation.seed = Some(first.config.validation_seed());
-        let subject = subject(arguments, &trained, config).wrap_err_with(|| name.clone())?;
-        Ok(Other { name: name.clone(), subject })
+        let model = model(arguments, &trained, config).wrap_err_with(|| name.clone())?;
+        Ok(NamedModel { name: name.clone(), model })
     };
-    named.iter().map(other).collect()
+    named.iter().map(named_model).collect()
 }
 
-/// Ablations are compared on the same outfits, which are drawn from a model's own data: all garments, in held-out windows.
-fn check_ablations(ablations: &[Other], first: &Subject) -> Result<(), Report> {
-    let differs = |other: &&Other| {
-        let [own, of_first] = [&other.subject, first];
+/// Ablations are compared on the same outfits, which are sampled from a model's own data: all garments, in held-out windows.
+fn check_ablations(ablations: &[NamedModel], first: &ModelUnderTest) -> Result<(), Report> {
+    let differs = |other: &&NamedModel| {
+        let [own, of_first] = [&other.model, first];
         own.dataset.fingerprint_of_windows() != of_first.dataset.fingerprint_of_windows()
             || own.config.data.shape_range != of_first.config.data.shape_range
     };
@@ -183,12 +189,11 @@ fn check_ablations(ablations: &[Other], first: &Subject) -> Result<(), Report> {
     }
 }
 
-fn check_specific(specific: &[Other], dataset: &Dataset) -> Result<(), Report> {
+fn check_specific(specific: &[NamedModel], dataset: &Dataset) -> Result<(), Report> {
     let knows = |name: &str| (0..dataset.garments.len()).any(|g| dataset.garments.info(g).name == name);
     for other in specific {
-        let garments = &other.subject.dataset.garments;
-        if let Some(stranger) = (0..garments.len()).map(|g| &garments.info(g).name).find(|name| !knows(name))
-        {
+        let names = other.model.names(&other.model.garments());
+        if let Some(stranger) = names.iter().find(|name| !knows(name)) {
             return Err(miette!(
                 help = "train the garment-specific model on a garment of the configuration's own data",
                 "{}: the data of the evaluated model has no garment {stranger:?}",
@@ -199,10 +204,10 @@ fn check_specific(specific: &[Other], dataset: &Dataset) -> Result<(), Report> {
     Ok(())
 }
 
-fn page(trained: &TrainedModel, found: &Study, seconds: f64) -> Result<Page, Report> {
+fn page(trained: &TrainedModel, evaluation: Evaluation, seconds: f64) -> Page {
     let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs());
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    Ok(Page {
+    Page {
         title: format!("Evaluation of {}", trained.folder.display()),
         facts: vec![
             ("command", format!("clothcombo {}", arguments.join(" "))),
@@ -215,31 +220,25 @@ fn page(trained: &TrainedModel, found: &Study, seconds: f64) -> Result<Page, Rep
                     trained.config.model.width
                 ),
             ),
-            ("seed", found.seed.to_string()),
+            ("seed", evaluation.seed.to_string()),
             (
                 "made",
                 format!("{}, in {:.0} s on {} threads", utc(now), seconds, rayon::current_num_threads()),
             ),
         ],
-        sections: found.sections()?,
-    })
+        sections: evaluation.sections,
+    }
 }
 
-fn write(folder: &Path, found: &Study, page: &Page) -> Result<(), Report> {
-    let save = |name: &str, bytes: &[u8]| {
-        let path = folder.join(name);
-        atomic::write(&path, bytes)
-            .into_diagnostic()
-            .wrap_err_with(|| format!("cannot write {}", path.display()))
-    };
-    // First what tells a later run that the folder is a report.
+fn write(folder: &Path, numbers: &Value, page: &Page) -> Result<(), Report> {
+    // First, because by this file a later evaluation recognises the folder as a report.
     let tables: Vec<_> =
         page.sections.iter().map(|s| json!({ "title": s.title, "tables": s.tables })).collect();
-    let json = json!({ "facts": page.facts, "study": found, "sections": tables });
-    save(JSON, serde_json::to_string_pretty(&json).into_diagnostic()?.as_bytes())?;
-    for figure in page.sections.iter().flat_map(|section| &section.figures) {
-        save(&figure.file, &figure.png)?;
+    let json = json!({ "facts": page.facts, "evaluation": numbers, "sections": tables });
+    write_json(&folder.join(JSON), &json)?;
+    for picture in page.sections.iter().flat_map(|section| &section.pictures) {
+        write_file(&folder.join(&picture.file), &picture.png)?;
     }
-    save(MARKDOWN, page.markdown().as_bytes())?;
-    save(HTML, page.html().as_bytes())
+    write_file(&folder.join(MARKDOWN), page.markdown().as_bytes())?;
+    write_file(&folder.join(HTML), page.html().as_bytes())
 }

@@ -1,5 +1,6 @@
 //! `clothcombo fit`: any garment file onto any body.
 
+use crate::cli::output::print_report;
 use crate::dataset::load_body;
 use crate::system::paths::{lossy, lossy_option};
 use clap::{Parser, ValueEnum};
@@ -116,19 +117,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         comments.extend(report.assumptions().into_iter().map(|a| format!("assumed: {a}")));
         obj::save(output, rest.positions(), rest.faces(), &comments).into_diagnostic()?;
     }
-    if arguments.json {
-        let output = Output {
-            garment: &arguments.garment,
-            body: &body.name,
-            output: arguments.output.as_deref(),
-            report,
-        };
-        println!("{}", serde_json::to_string_pretty(&output).into_diagnostic()?);
-    } else {
-        println!("{report}");
-        if let Some(output) = &arguments.output {
-            println!("written   {}", output.display());
-        }
-    }
-    Ok(())
+    let output =
+        Output { garment: &arguments.garment, body: &body.name, output: arguments.output.as_deref(), report };
+    print_report(arguments.json, &output, |output| match output.output {
+        Some(file) => format!("{report}\nwritten   {}\n", file.display()),
+        None => format!("{report}\n"),
+    })
 }

@@ -1,9 +1,8 @@
 //! `clothcombo generate`: garments from nothing but a body.
 
-use super::wardrobe_sheet::{PER_ROW, wardrobe_sheet};
-use crate::cli::values::{at_least_one, picture_file};
-use crate::cli::verbosity::{progress_bar, say};
-use crate::config::MOST_GARMENTS;
+use super::contact_sheet::{PER_ROW, contact_sheet};
+use crate::cli::values::{count, picture_file};
+use crate::cli::verbosity::{print_status, progress_bar};
 use crate::dataset::load_body;
 use crate::picture::save_png;
 use clap::Parser;
@@ -15,7 +14,7 @@ use clothcombo_data::format::obj;
 use clothcombo_data::generate::{GarmentGenerator, GarmentSettings};
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use rayon::prelude::*;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
@@ -29,7 +28,7 @@ use std::path::{Path, PathBuf};
 )]
 pub struct Arguments {
     /// Number of garments, at most 1000000
-    #[arg(long, default_value_t = 12, value_parser = garment_count)]
+    #[arg(long, default_value_t = 12, value_parser = count)]
     count: usize,
     /// Number of the first garment: makes garments START to START + COUNT - 1
     #[arg(long, default_value_t = 0)]
@@ -54,14 +53,6 @@ pub struct Arguments {
     output: PathBuf,
 }
 
-/// As many garments as a configuration may ask for.
-fn garment_count(text: &str) -> Result<usize, String> {
-    match at_least_one(text)? {
-        count if count > MOST_GARMENTS => Err(format!("it must be at most {MOST_GARMENTS}")),
-        count => Ok(count),
-    }
-}
-
 /// Runs the verb.
 ///
 /// # Errors
@@ -69,32 +60,30 @@ fn garment_count(text: &str) -> Result<usize, String> {
 /// not be made; all others are written before that is said.
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let body = load_body(&arguments.body, 0)?;
-    let order = Order::new(arguments, &body)?;
+    let maker = GarmentMaker::new(arguments, &body)?;
+    let wanted: Vec<WantedGarment> =
+        (0..arguments.count as u64).map(|i| maker.wanted(arguments, i)).collect();
     let folder = &arguments.output;
     // Before anything is made: a folder that holds other garments stays as it is.
-    (0..arguments.count as u64).try_for_each(|i| order.check(arguments.start.wrapping_add(i)))?;
-    refuse_unlisted(folder, &order.paths(arguments)).into_diagnostic()?;
+    wanted.iter().try_for_each(|garment| maker.check(garment))?;
+    refuse_unlisted(folder, &wanted.iter().map(|g| g.path.clone()).collect()).into_diagnostic()?;
     let mut entries = read_manifest(folder).into_diagnostic()?;
     let listed: HashSet<String> = entries.iter().map(|e| e.file().to_string()).collect();
-    let bar = progress_bar(arguments.count, "garments {bar:40} {pos}/{len} · {eta} left");
-    let done: Vec<Made> = (0..arguments.count)
-        .into_par_iter()
-        .with_max_len(1)
-        .map(|i| {
-            let made = order.fill(arguments.start.wrapping_add(i as u64), &listed);
-            bar.inc(1);
-            made
-        })
-        .collect::<Result<_, _>>()?;
+    let bar = progress_bar(wanted.len(), "garments {bar:40} {pos}/{len} · {eta} left");
+    let make = |garment| {
+        let made = maker.make(garment, &listed);
+        bar.inc(1);
+        made
+    };
+    let made: Vec<Made> = wanted.par_iter().with_max_len(1).map(make).collect::<Result<_, _>>()?;
     bar.finish_and_clear();
 
     let (mut new, mut kept, mut failures) = (0, 0, Vec::new());
-    for made in done {
+    for made in made {
         match made {
-            Made::Listed => kept += 1,
-            Made::Found(entry) => {
+            Made::Kept(unlisted) => {
                 kept += 1;
-                entries.push(*entry);
+                entries.extend(unlisted.map(|entry| *entry));
             }
             Made::New(entry) => {
                 new += 1;
@@ -104,10 +93,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         }
     }
     save_manifest(folder, entries).into_diagnostic()?;
-    say(&format!("{new} garments made, {kept} kept, in {}", folder.display()));
+    print_status(&format!("{new} garments made, {kept} kept, in {}", folder.display()));
     if let Some(path) = &arguments.picture {
-        save_png(&wardrobe_sheet(&body, &order.for_picture(arguments)?), path).into_diagnostic()?;
-        say(&format!("picture {}", path.display()));
+        save_png(&contact_sheet(&body, &maker.for_picture(&wanted)?), path).into_diagnostic()?;
+        print_status(&format!("picture {}", path.display()));
     }
     match failures.first() {
         None => Ok(()),
@@ -120,115 +109,98 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     }
 }
 
-/// What became of one garment.
+/// Result for one garment.
 enum Made {
-    /// It is there, and the manifest lists it.
-    Listed,
-    /// Left by a run that was stopped before it wrote the manifest.
-    Found(Box<ManifestEntry>),
+    /// It exists. A run that was stopped before it wrote the manifest leaves garments that need an entry.
+    Kept(Option<Box<ManifestEntry>>),
     New(Box<ManifestEntry>),
     Failed(String),
 }
 
-/// What is to be made, and where.
-struct Order<'a> {
+struct WantedGarment {
+    category: Category,
+    seed: u64,
+    path: PathBuf,
+}
+
+struct GarmentMaker<'a> {
     body: &'a Body,
     generator: GarmentGenerator<'a>,
-    categories: Vec<Category>,
     settings: GarmentSettings,
-    seed: u64,
     folder: &'a Path,
 }
 
-impl<'a> Order<'a> {
+impl<'a> GarmentMaker<'a> {
     fn new(arguments: &'a Arguments, body: &'a Body) -> Result<Self, Report> {
-        let categories = match &arguments.categories[..] {
-            [] => Category::ALL.to_vec(),
-            some => some.to_vec(),
-        };
         let settings = GarmentSettings { target_vertices: arguments.vertices, ..GarmentSettings::default() };
         settings.check().into_diagnostic()?;
         let generator = GarmentGenerator::new(body).into_diagnostic()?;
-        Ok(Self { body, generator, categories, settings, seed: arguments.seed, folder: &arguments.output })
+        Ok(Self { body, generator, settings, folder: &arguments.output })
     }
 
-    fn category_and_seed(&self, index: u64) -> (Category, u64) {
-        let category = self.categories[(index % self.categories.len() as u64) as usize];
-        (category, self.seed.wrapping_add(index))
+    /// Garment `i` of this run.
+    fn wanted(&self, arguments: &Arguments, i: u64) -> WantedGarment {
+        let categories = match &arguments.categories[..] {
+            [] => &Category::ALL,
+            some => some,
+        };
+        let index = arguments.start.wrapping_add(i);
+        let category = categories[(index % categories.len() as u64) as usize];
+        let seed = arguments.seed.wrapping_add(index);
+        let path = self.folder.join(format!("{}.obj", GarmentGenerator::name(category, seed)));
+        WantedGarment { category, seed, path }
     }
 
-    fn path(&self, category: Category, seed: u64) -> PathBuf {
-        self.folder.join(format!("{}.obj", GarmentGenerator::name(category, seed)))
-    }
-
-    /// Refuses a folder in which another garment has the name of garment `index`.
-    fn check(&self, index: u64) -> Result<(), Report> {
-        let (category, seed) = self.category_and_seed(index);
-        let path = self.path(category, seed);
+    /// Refuses a folder in which another garment has the name of this one.
+    fn check(&self, WantedGarment { seed, path, .. }: &WantedGarment) -> Result<(), Report> {
         match path.exists() {
-            true => check_source(&path, &self.generator.provenance(seed, &self.settings).source),
+            true => check_source(path, &self.generator.provenance(*seed, &self.settings).source),
             false => Ok(()),
         }
     }
 
-    /// Where all garments that are asked for lie.
-    fn paths(&self, arguments: &Arguments) -> HashSet<PathBuf> {
-        (0..arguments.count as u64)
-            .map(|i| self.category_and_seed(arguments.start.wrapping_add(i)))
-            .map(|(category, seed)| self.path(category, seed))
-            .collect()
-    }
-
-    /// Makes garment `index` unless it is there.
-    fn fill(&self, index: u64, listed: &HashSet<String>) -> Result<Made, Report> {
-        let (category, seed) = self.category_and_seed(index);
-        let path = self.path(category, seed);
+    /// Makes a garment unless it exists.
+    fn make(&self, wanted: &WantedGarment, listed: &HashSet<String>) -> Result<Made, Report> {
+        let WantedGarment { category, seed, path } = wanted;
+        let in_folder = |garment| FolderGarment { garment, layer: None, path: PathBuf::new() };
         if path.exists() {
-            if path.file_name().is_some_and(|name| listed.contains(&*name.to_string_lossy())) {
-                return Ok(Made::Listed);
-            }
-            let entry = ManifestEntry::of(&self.as_entry(self.load(category, seed)?));
-            return Ok(Made::Found(Box::new(entry)));
+            let is_listed = path.file_name().is_some_and(|name| listed.contains(&*name.to_string_lossy()));
+            return Ok(Made::Kept(match is_listed {
+                true => None,
+                false => Some(Box::new(ManifestEntry::of(&in_folder(self.load(wanted)?)))),
+            }));
         }
-        match self.generator.generate(category, seed, &self.settings) {
+        match self.generator.generate(*category, *seed, &self.settings) {
             Ok(garment) => {
-                let entry = save_garment(self.folder, &self.as_entry(garment)).into_diagnostic()?;
+                let entry = save_garment(self.folder, &in_folder(garment)).into_diagnostic()?;
                 Ok(Made::New(Box::new(entry)))
             }
             Err(e) => Ok(Made::Failed(e.to_string())),
         }
     }
 
-    fn as_entry(&self, garment: Garment) -> FolderGarment {
-        FolderGarment { garment, layer: None, path: PathBuf::new() }
-    }
-
-    /// A garment written before.
-    fn load(&self, category: Category, seed: u64) -> Result<Garment, Report> {
-        let rest = obj::load(&self.path(category, seed)).into_diagnostic()?;
+    /// Reads a garment that exists.
+    fn load(&self, WantedGarment { category, seed, path }: &WantedGarment) -> Result<Garment, Report> {
+        let rest = obj::load(path).into_diagnostic()?;
         Ok(Garment {
-            name: GarmentGenerator::name(category, seed),
-            category,
+            name: GarmentGenerator::name(*category, *seed),
+            category: *category,
             holding: Garment::needs_holding(&rest, self.body),
             rest,
-            source: self.generator.provenance(seed, &self.settings),
+            source: self.generator.provenance(*seed, &self.settings),
         })
     }
 
     /// The first garments of each category.
-    fn for_picture(&self, arguments: &Arguments) -> Result<Vec<Garment>, Report> {
-        let mut shown = Vec::new();
-        for i in 0..arguments.count as u64 {
-            let (category, seed) = self.category_and_seed(arguments.start.wrapping_add(i));
-            let in_row = shown.iter().filter(|g: &&Garment| g.category == category).count();
-            if in_row < PER_ROW && self.path(category, seed).exists() {
-                shown.push(self.load(category, seed)?);
-            }
-            if shown.len() == PER_ROW * self.categories.len() {
-                break;
-            }
-        }
-        Ok(shown)
+    fn for_picture(&self, wanted: &[WantedGarment]) -> Result<Vec<Garment>, Report> {
+        let mut counts = HashMap::new();
+        let is_shown = |garment: &&WantedGarment| {
+            let count: &mut usize = counts.entry(garment.category).or_default();
+            let is_shown = *count < PER_ROW && garment.path.exists();
+            *count += usize::from(is_shown);
+            is_shown
+        };
+        wanted.iter().filter(is_shown).map(|garment| self.load(garment)).collect()
     }
 }
 

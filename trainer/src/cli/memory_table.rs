@@ -1,11 +1,11 @@
 //! What a run will need of memory, as a table and in a line.
 
+use crate::cli::table::{row, table};
 use crate::config::{Config, PoseEncoding};
 use crate::dataset::DataSizes;
 use crate::run::memory::MemoryEstimate;
 use crate::system::device::Backend;
-use crate::system::memory::available;
-use crate::system::memory::gibibytes;
+use crate::system::memory::{available, gibibytes};
 use burn::module::Module;
 use clothcombo_model::{ClothCombo, Dimensions};
 use miette::{IntoDiagnostic, Report};
@@ -23,39 +23,43 @@ pub fn print_memory(config: &Config, sizes: &DataSizes) -> Result<(), Report> {
         total / count.max(1),
         sizes.shape_components
     );
-    let row = |name: &str, cells: [String; 3]| {
-        let [host, device, processor] = cells;
-        println!("  {name:<46} {host:>12} {device:>12} {processor:>12}");
+    let (garments, operators) = match config.data.cache.folder.is_some() {
+        true => (
+            &*format!("garments kept, of {}", gibibytes(gpu.all_garments)),
+            "operators, streamed from data.cache.folder",
+        ),
+        false => {
+            ("all garments, for want of data.cache.folder", "operators of all garments, for the same reason")
+        }
     };
-    let on_host = |name: &str, of: &dyn Fn(&MemoryEstimate) -> u64| {
-        row(name, [gibibytes(of(&gpu)), String::new(), gibibytes(of(&cpu))]);
+    let row = |name: &str, host: Option<u64>, device: Option<u64>, processor: u64| {
+        let bytes = |bytes: Option<u64>| bytes.map_or(String::new(), gibibytes);
+        row! {
+            "" => name,
+            "GPU: host" => bytes(host),
+            "GPU: device" => bytes(device),
+            "CPU: host" => gibibytes(processor),
+        }
     };
-    let on_device = |name: &str, of: &dyn Fn(&MemoryEstimate) -> u64| {
-        row(name, [String::new(), gibibytes(of(&gpu)), gibibytes(of(&cpu))]);
-    };
-    row("", ["with a GPU:", "on the", "CPU backend:"].map(String::from));
-    row("", ["host", "device", "host"].map(String::from));
-    on_host("program, body, list of garments", &|m| m.program);
-    let streams = config.data.cache.folder.is_some();
-    match streams {
-        true => on_host(&format!("garments kept, of {}", gibibytes(gpu.all_garments)), &|m| m.garments),
-        false => on_host("all garments, for want of data.cache.folder", &|m| m.garments),
-    }
-    match streams {
-        true => on_host("operators, streamed from data.cache.folder", &|_| 0),
-        false => on_host("operators of all garments, for the same reason", &|m| m.operators),
-    }
-    on_host("scenes prepared in advance", &|m| m.scenes);
-    on_host("at the start: garments being prepared", &|m| m.preparation);
-    on_device(&format!("tensors and embeddings kept, of {}", gibibytes(gpu.all_tensors)), &|m| m.tensors);
-    on_device("Adam's moments, copies of the parameters", &|m| m.parameters);
-    on_device(&format!("the largest step ({})", largest_step(config)), &|m| m.step);
-    row("together", [gpu.host(), gpu.device(), cpu.peak()].map(gibibytes));
+    let on_host = |name: &str, of: fn(&MemoryEstimate) -> u64| row(name, Some(of(&gpu)), None, of(&cpu));
+    let on_device = |name: &str, of: fn(&MemoryEstimate) -> u64| row(name, None, Some(of(&gpu)), of(&cpu));
+    let rows = [
+        on_host("program, body, list of garments", |m| m.program),
+        on_host(garments, |m| m.garments),
+        on_host(operators, |m| m.operators),
+        on_host("scenes prepared in advance", |m| m.scenes),
+        on_host("at the start: garments being prepared", |m| m.preparation),
+        on_device(&format!("tensors and embeddings kept, of {}", gibibytes(gpu.all_tensors)), |m| m.tensors),
+        on_device("Adam's moments, copies of the parameters", |m| m.parameters),
+        on_device(&format!("the largest step ({})", largest_step(config)), |m| m.step),
+        row("together", Some(gpu.host()), Some(gpu.device()), cpu.peak()),
+    ];
+    print!("{}", table(&rows));
     if config.data.poses.motions.is_some() {
-        println!("  motions come on top: about 0.6 KiB a frame of 22 joints");
+        println!("motions come on top: about 0.6 KiB a frame of 22 joints");
     }
     if let Some(available) = available() {
-        println!("  available on this machine: {}", gibibytes(available));
+        println!("available on this machine: {}", gibibytes(available));
     }
     Ok(())
 }

@@ -1,15 +1,19 @@
-//! The command lines of the two programs.
+//! The command lines. In: arguments. Out: the exit code of one of the two programs; one file or folder per verb.
 
 pub mod bench;
 pub mod check;
 pub mod config;
+mod contact_sheet;
 pub mod drape;
 pub mod eval;
 pub mod fit;
 pub mod generate;
 pub mod import;
 mod interrupted;
+mod loading;
 mod memory_table;
+mod model_arguments;
+mod output;
 mod post_process;
 pub mod prepare;
 pub mod replay;
@@ -20,11 +24,10 @@ mod table;
 pub mod train;
 mod values;
 mod verbosity;
-mod wardrobe_sheet;
 
 pub use verbosity::Verbosity;
 
-use crate::system::closed_pipe::tell;
+use crate::system::closed_pipe::print_stderr;
 use miette::Report;
 
 /// Exit code of a program that ended with `result`; an error is printed once, with its place and hint.
@@ -32,7 +35,7 @@ pub fn exit_code(result: Result<(), Report>) -> std::process::ExitCode {
     match result {
         Ok(()) => std::process::ExitCode::SUCCESS,
         Err(report) => {
-            tell(format_args!("{report:?}"));
+            print_stderr(format_args!("{report:?}"));
             std::process::ExitCode::FAILURE
         }
     }

@@ -8,11 +8,11 @@ use std::time::Duration;
 /// What the post-process is to do.
 #[derive(Args)]
 pub struct PostProcessArguments {
-    /// Gap that a garment gets where the post-process has to move it [mm]; up to three times as much where that does not end all
-    /// crossings, three tenths of it between parts of the body that leave no room for more
+    /// Gap that a garment gets where the post-process has to move it (mm); up to three times as much where that does not end all
+    /// intersections, three tenths of it between parts of the body that leave no clearance for more
     #[arg(long = "gap", alias = "gap-mm", default_value_t = 1.0, value_name = "MM", value_parser = gap_mm)]
     pub gap_mm: f64,
-    /// Time per garment after which the post-process begins nothing new and returns the best it has [s]; default: none
+    /// Time per garment after which the post-process begins nothing new and returns the best it has (s); default: none
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub time_limit: Option<Duration>,
 }

@@ -1,7 +1,7 @@
 //! `clothcombo prepare`: fills the cache of a configuration before training.
 
-use crate::cli::train::PREPARING;
-use crate::cli::verbosity::{progress_bar, say};
+use crate::cli::loading::under_preparation_bar;
+use crate::cli::verbosity::print_status;
 use crate::config::load;
 use crate::dataset::{GarmentStore, load_body};
 use clap::Parser;
@@ -51,14 +51,10 @@ impl FromStr for Shard {
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let config = load(&arguments.config, &arguments.overrides)?;
     let body = Arc::new(load_body(&config.data.body, config.data.shape_components)?);
-    let bar = progress_bar(0, PREPARING);
-    let (garments, bytes) = GarmentStore::prepare(&config, body, arguments.shard.0, &|done, total, name| {
-        bar.set_length(total as u64);
-        bar.set_position(done as u64);
-        bar.set_message(name.to_owned());
-    })?;
-    bar.finish_and_clear();
-    say(&format!("{garments} garments prepared · {:.1} MiB in the cache", bytes as f64 / f64::from(1 << 20)));
+    let (garments, bytes) =
+        under_preparation_bar(|progress| GarmentStore::prepare(&config, body, arguments.shard.0, progress))?;
+    let mib = bytes as f64 / f64::from(1 << 20);
+    print_status(&format!("{garments} garments prepared · {mib:.1} MiB in the cache"));
     Ok(())
 }
 

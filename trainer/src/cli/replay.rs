@@ -1,13 +1,13 @@
 //! `clothcombo replay`: a step whose loss or gradient was not finite, once more.
 
-use crate::cli::train::load_under_bar;
+use crate::cli::loading::load_dataset;
+use crate::cli::table::{row, table};
 use crate::system::device::Backend;
 use crate::system::exact::Exact;
 use crate::training::incident::Incident;
 use clap::Parser;
 use miette::{Report, miette};
 use std::path::PathBuf;
-use std::sync::Arc;
 
 /// Computes a step that was skipped (RUN/incidents/step-N.json) again and compares every energy
 #[derive(Parser)]
@@ -38,7 +38,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let file = &arguments.file;
     let incident = Incident::read(file)?;
     let config = incident.configuration(file, &arguments.overrides)?;
-    let dataset = Arc::new(load_under_bar(&config)?);
+    let dataset = load_dataset(&config)?;
     let again = incident.replay(file, &config, &dataset, &arguments.device.device())?;
 
     println!("step {} of stage {:?}, seed {}", incident.step, incident.stage, incident.seed);
@@ -51,14 +51,16 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     }
     let (then, now) = (incident.numbers(), again.numbers());
     let mut differing = 0;
-    println!("{:<52} {:>22} {:>22}", "", "recorded", "replayed");
+    let mut rows = Vec::new();
     for ((name, a), (_, b)) in then.iter().zip(&now) {
         let same = a.same(*b);
         differing += usize::from(!same);
         if arguments.all || !same || !a.0.is_finite() {
-            println!("{name:<52} {:>22} {:>22}{}", text(*a), text(*b), if same { "" } else { "  differs" });
+            let differs = if same { "" } else { "differs" };
+            rows.push(row!["" => name, "recorded" => text(*a), "replayed" => text(*b), "" => differs]);
         }
     }
+    print!("{}", table(&rows));
     if differing > 0 || then.len() != now.len() {
         return Err(miette!(
             help = "another program version, device or data gives other numbers; the scene is the same",

@@ -1,7 +1,9 @@
 //! `clothcombo resolve`: anyone's garments taken out of anyone's body, and out of each other.
 
 use crate::cli::interrupted::remove_on_signals;
+use crate::cli::output::print_report;
 use crate::cli::post_process::PostProcessArguments;
+use crate::cli::table::{row, table};
 use crate::inference::UniqueNames;
 use crate::inference::output::Staged;
 use crate::picture::{DressedRow, draw_dressed, save_png};
@@ -27,7 +29,7 @@ use std::time::Duration;
 #[command(
     after_help = "Files are meshes of any topology in metres, y up (OBJ, PLY, STL, glTF); nothing is trained or fitted.\n\
                   Vertices of an OBJ file move, its normals go, its materials come along; faces, groups and texture\n\
-                  coordinates stay. What cannot be mended is listed in report.json.\n\n\
+                  coordinates stay. What cannot be resolved is listed in report.json.\n\n\
                   Example (inner to outer):\n  clothcombo resolve --body body.obj --garments tee.obj coat.obj -o resolved"
 )]
 pub struct Arguments {
@@ -48,7 +50,7 @@ pub struct Arguments {
     replace: bool,
     #[command(flatten)]
     post_process: PostProcessArguments,
-    /// Leave crossings of a garment with itself alone
+    /// Leave self-intersections of the garments
     #[arg(long)]
     keep_self: bool,
     /// Print the report as JSON instead of tables
@@ -102,7 +104,7 @@ impl Garment {
 /// Runs the verb.
 ///
 /// # Errors
-/// When a file cannot be read or written, or meshes do not fit together. Crossings that stay are a result, not an error.
+/// When a file cannot be read or written, or meshes do not fit together. Intersections that stay are a result, not an error.
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let settings =
         ResolveSettings { self_contact: !arguments.keep_self, ..arguments.post_process.settings() };
@@ -156,12 +158,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
             .collect(),
     };
     write(staged, &body, &garments, &resolved, &report)?;
-    if arguments.json {
-        println!("{}", serde_json::to_string_pretty(&report).into_diagnostic()?);
-    } else {
-        print!("{}", table(&report));
-    }
-    Ok(())
+    print_report(arguments.json, &report, text)
 }
 
 fn load_garments(arguments: &Arguments, body: &TriMesh) -> Result<Vec<Garment>, Report> {
@@ -265,51 +262,30 @@ fn moved(garment: &Garment, positions: &[[f64; 3]]) -> Result<MovedObj, Report> 
     Ok(MovedObj { obj: text.into_bytes(), mtl: None })
 }
 
-fn table(report: &ResolveReport) -> String {
-    let (before, after) = (&report.certificate_before, &report.certificate);
-    let mut text = format!("{:<34}{:>12}{:>12}\n", "", "before", "after");
-    let mut line = |what: &str, a: String, b: String| {
-        let _ = writeln!(text, "{what:<34}{a:>12}{b:>12}");
+fn text(report: &ResolveReport) -> String {
+    let row = |what: &str, value: fn(&Certificate) -> Option<f64>| {
+        let [before, after] = [&report.certificate_before, &report.certificate].map(value);
+        row!["" => what, "before" => before, "after" => after]
     };
-    let count = |n: usize| n.to_string();
-    let millimetres = |x: f64| format!("{x:.2}");
-    line("pairs with the body", count(before.body_triangle_pairs), count(after.body_triangle_pairs));
-    line("pairs between garments", count(before.layer_triangle_pairs), count(after.layer_triangle_pairs));
-    line(
-        "pairs of a garment with itself",
-        count(before.self_triangle_pairs),
-        count(after.self_triangle_pairs),
-    );
-    let pinched = |c: &Certificate| {
-        let p = &c.pinched;
-        count(p.body_triangle_pairs + p.layer_triangle_pairs + p.self_triangle_pairs)
-    };
-    line("pairs where the body is pinched", pinched(before), pinched(after));
-    line(
-        "length of the crossings [mm]",
-        millimetres(before.contour_length_mm),
-        millimetres(after.contour_length_mm),
-    );
-    line("deepest vertex [mm]", millimetres(before.max_depth_mm), millimetres(after.max_depth_mm));
-    let percent = |x: f64| format!("{:.3}", 100.0 * x);
-    line(
-        "vertices under an inner layer [%]",
-        percent(before.order_violations),
-        percent(after.order_violations),
-    );
-    let strain = after.strain_added.map_or("-".into(), percent);
-    line("strain added [%]", String::new(), strain);
-    text.push('\n');
-    for (garment, ms) in report.garments.iter().zip(&report.milliseconds.resolve) {
-        let _ = writeln!(
-            text,
-            "{}: {} vertices moved, at most {:.1} mm, {} rounds, {ms:.1} ms → {}",
-            garment.name,
-            garment.moved_vertices,
-            garment.largest_move_mm,
-            garment.rounds,
-            garment.output.display()
-        );
-    }
-    text
+    let rows = [
+        row("pairs with the body", |c| Some(c.body_triangle_pairs as f64)),
+        row("pairs between garments", |c| Some(c.layer_triangle_pairs as f64)),
+        row("pairs of a garment with itself", |c| Some(c.self_triangle_pairs as f64)),
+        row("pairs where the body is pinched", |c| Some(c.pinched.count() as f64)),
+        row("length of the intersection curves [mm]", |c| Some(c.contour_length_mm)),
+        row("deepest vertex [mm]", |c| Some(c.max_depth_mm)),
+        row("vertices under an inner layer [%]", |c| Some(100.0 * c.order_violations)),
+        row("strain added [%]", |c| c.strain_added.map(|strain| 100.0 * strain)),
+    ];
+    let garments = report.garments.iter().zip(&report.milliseconds.resolve).map(|(garment, ms)| {
+        row! {
+            "garment" => garment.name,
+            "moved vertices" => garment.moved_vertices,
+            "largest move [mm]" => garment.largest_move_mm,
+            "rounds" => garment.rounds,
+            "ms" => *ms,
+            "file" => garment.output.display().to_string(),
+        }
+    });
+    format!("{}\n{}", table(&rows), table(&garments.collect::<Vec<_>>()))
 }

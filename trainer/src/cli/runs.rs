@@ -1,5 +1,7 @@
 //! `clothcombo runs`: all runs of a folder in one table.
 
+use crate::cli::output::print_report;
+use crate::cli::table::{Row, row, table};
 use crate::run::summary::{FoundRun, RunSummary, find_runs};
 use clap::Parser;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
@@ -51,61 +53,38 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         let score = |r: &FoundRun| r.best_score().unwrap_or(f64::INFINITY);
         runs.sort_by(|a, b| score(a).total_cmp(&score(b)));
     }
-    if arguments.json {
-        println!("{}", serde_json::to_string_pretty(&runs).into_diagnostic()?);
-        return Ok(());
-    }
-    let width = runs.iter().map(|r| r.name().chars().count()).max().unwrap_or(0).clamp(3, 32);
-    println!(
-        "{:<width$} {:<10} {:>17} {:<18} {:>9} {:>8} {:>9} {:>9} {:>8} {:>8} {:>8} {:>7} {:>6} {:>10}",
-        "run",
-        "state",
-        "step",
-        "stage",
-        "loss",
-        "ms/step",
-        "score",
-        "at step",
-        "strain ×",
-        "inside %",
-        "wrong %",
-        "skipped",
-        "spikes",
-        "checkpoint"
-    );
-    for run in &runs {
-        match run {
-            FoundRun::Whole(run) => println!("{}", row(run, width)),
-            FoundRun::Unreadable(run) => {
+    print_report(arguments.json, &runs, |runs| {
+        let readable = runs.iter().filter_map(|run| match run {
+            FoundRun::Whole(run) => Some(table_row(run)),
+            FoundRun::Unreadable(_) => None,
+        });
+        let mut text = table(&readable.collect::<Vec<_>>());
+        for run in runs {
+            if let FoundRun::Unreadable(run) = run {
                 // On one line, as every run.
                 let error = run.error.split_whitespace().collect::<Vec<_>>().join(" ");
-                println!("{:<width$} {:<10} {error}", run.name, run.state);
+                text += &format!("{}  {}  {error}\n", run.name, run.state);
             }
         }
-    }
-    Ok(())
+        text
+    })
 }
 
-fn row(r: &RunSummary, width: usize) -> String {
-    let or_dash = |value: Option<String>| value.unwrap_or_else(|| "–".into());
-    let number = |v: Option<f64>, digits: usize| or_dash(v.map(|v| format!("{v:.digits$}")));
-    let percent = |v: Option<f64>| or_dash(v.map(|v| format!("{:.2}", 100.0 * v)));
-    let step = |v: Option<u64>| or_dash(v.map(|v| v.to_string()));
-    format!(
-        "{:<width$} {:<10} {:>17} {:<18} {:>9} {:>8} {:>9} {:>9} {:>8} {:>8} {:>8} {:>7} {:>6} {:>10}",
-        r.name,
-        r.state,
-        format!("{}/{}", r.step, r.total_steps),
-        r.stage,
-        number(r.loss, 3),
-        number(r.seconds_per_step.map(|s| 1000.0 * s), 1),
-        number(r.best_score, 3),
-        step(r.best_step),
-        number(r.strain_ratio, 3),
-        percent(r.inside),
-        percent(r.wrong_side),
-        r.skipped,
-        r.spikes,
-        step(r.checkpoint)
-    )
+fn table_row(r: &RunSummary) -> Row {
+    row! {
+        "run" => r.name,
+        "state" => r.state,
+        "step" => format!("{}/{}", r.step, r.total_steps),
+        "stage" => r.stage,
+        "loss" => r.loss,
+        "ms/step" => r.seconds_per_step.map(|s| 1000.0 * s),
+        "score" => r.best_score,
+        "at step" => r.best_step,
+        "strain ×" => r.strain_ratio,
+        "inside %" => r.inside.map(|share| 100.0 * share),
+        "order %" => r.order_violations.map(|share| 100.0 * share),
+        "skipped" => r.skipped,
+        "spikes" => r.spikes,
+        "checkpoint" => r.checkpoint,
+    }
 }

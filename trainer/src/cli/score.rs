@@ -1,9 +1,10 @@
 //! `clothcombo score`: anyone's draped meshes, measured.
 
-use super::table::{number, table};
+use super::output::print_report;
+use super::table::{Row, row, table};
 use crate::score::{MeshFiles, Score, ScoreDistance, TermValues, score_files};
 use clap::Parser;
-use miette::{IntoDiagnostic, Report};
+use miette::Report;
 use std::path::PathBuf;
 
 /// Scores draped garments: energies in the paper's printed form, penetration, exact intersections, layer order
@@ -44,74 +45,69 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let files = MeshFiles { body, rest, draped, canonical };
     let distance = if arguments.surface { ScoreDistance::Surface } else { ScoreDistance::NearestVertex };
     let score = score_files(&files, distance)?;
-    let text = if arguments.json {
-        serde_json::to_string_pretty(&score).into_diagnostic()? + "\n"
-    } else {
-        tables(&score)
-    };
-    print!("{text}");
-    Ok(())
+    print_report(arguments.json, &score, tables)
 }
 
-/// Terms of one garment, in the order of the columns.
-const TERMS: [&str; 6] = ["strain", "bending", "gravity", "body_collision", "repulsion", "holding"];
-
-const RAW: [&str; 6] =
-    ["strain [J]", "bending [J]", "gravity [J]", "collision [m³]", "repulsion [1]", "holding [m²]"];
-const WEIGHTED: [&str; 6] = ["strain", "bending", "gravity", "collision", "repulsion", "holding"];
-const CONTACT: [&str; 7] =
-    ["contact", "vertices", "triangles", "inside [%]", "depth [mm]", "body pairs", "self pairs"];
-const LAYERS: [&str; 5] = ["layers", "collision [m³]", "distance [m³]", "pairs", "wrong side [%]"];
+/// Terms of one garment in the order of their columns: name, heading, unit.
+const TERMS: [(&str, &str, &str); 6] = [
+    ("strain", "strain", "J"),
+    ("bending", "bending", "J"),
+    ("gravity", "gravity", "J"),
+    ("body_collision", "collision", "m³"),
+    ("repulsion", "repulsion", "1"),
+    ("holding", "holding", "m²"),
+];
 
 fn tables(score: &Score) -> String {
     let garments = || score.garments.iter();
-    // Holding comes last, and only with canonical meshes.
-    let is_held = garments().any(|g| g.raw.contains_key(TERMS[TERMS.len() - 1]));
-    let terms = if is_held { &TERMS[..] } else { &TERMS[..TERMS.len() - 1] };
-    let head = |first: &str, names: &[&'static str], last: Option<&'static str>| -> Vec<String> {
-        let names = names.iter().take(terms.len()).copied().chain(last);
-        [first].into_iter().chain(names).map(str::to_owned).collect()
+    // Holding needs canonical meshes.
+    let has = |term: &str| garments().any(|g| g.raw.contains_key(term));
+    let terms = || TERMS.iter().filter(|(term, ..)| has(term));
+    let raw_row = |name: &str, values: &TermValues| {
+        let mut row = row!["raw" => name];
+        for (term, heading, unit) in terms() {
+            row.extend(row![format!("{heading} [{unit}]") => values.get(*term).copied()]);
+        }
+        row
     };
-    let term_row = |name: &str, values: &TermValues, with_sum| term_row(name, values, terms, with_sum);
-    let mut raw: Vec<_> = garments().map(|g| term_row(&g.name, &g.raw, false)).collect();
-    let mut weighted: Vec<_> = garments().map(|g| term_row(&g.name, &g.weighted, true)).collect();
+    let weighted_row = |name: &str, values: &TermValues| {
+        let mut row = row!["weighted [J]" => name];
+        for (term, heading, _) in terms() {
+            row.extend(row![heading => values.get(*term).copied()]);
+        }
+        row.extend(row!["sum" => values.values().sum::<f64>()]);
+        row
+    };
+    let mut raw: Vec<Row> = garments().map(|g| raw_row(&g.name, &g.raw)).collect();
+    let mut weighted: Vec<Row> = garments().map(|g| weighted_row(&g.name, &g.weighted)).collect();
     if score.garments.len() > 1 {
-        raw.push(term_row("all", &sum(garments().map(|g| &g.raw)), false));
-        weighted.push(term_row("all", &sum(garments().map(|g| &g.weighted)), true));
+        raw.push(raw_row("all", &sum(garments().map(|g| &g.raw))));
+        weighted.push(weighted_row("all", &sum(garments().map(|g| &g.weighted))));
     }
-    let contact: Vec<_> = garments()
-        .map(|g| {
-            let found = &g.penetration;
-            vec![
-                g.name.clone(),
-                g.vertices.to_string(),
-                g.triangles.to_string(),
-                format!("{:.2}", 100.0 * found.vertices_inside),
-                format!("{:.2}", found.max_depth_mm),
-                found.body_triangle_pairs.to_string(),
-                found.self_triangle_pairs.to_string(),
-            ]
-        })
-        .collect();
+    let contact = garments().map(|g| {
+        row! {
+            "contact" => g.name,
+            "vertices" => g.vertices,
+            "triangles" => g.triangles,
+            "inside [%]" => 100.0 * g.penetration.vertices_inside,
+            "depth [mm]" => g.penetration.max_depth_mm,
+            "body pairs" => g.penetration.body_triangle_pairs,
+            "self pairs" => g.penetration.self_triangle_pairs,
+        }
+    });
     let name = |i: usize| &score.garments[i].name;
-    let layers: Vec<_> = score
-        .layers
-        .iter()
-        .map(|layer| {
-            vec![
-                format!("{} under {}", name(layer.inner), name(layer.outer)),
-                number(layer.layer_collision),
-                number(layer.layer_distance),
-                layer.triangle_pairs.to_string(),
-                format!("{:.2}", 100.0 * layer.order_violations),
-            ]
-        })
-        .collect();
-    let raw = table(&head("raw", &RAW, None), &raw);
-    let weighted = table(&head("weighted [J]", &WEIGHTED, Some("sum")), &weighted);
-    let mut text = [raw, weighted, table(&CONTACT, &contact)].join("\n");
-    if !layers.is_empty() {
-        text += &format!("\n{}", table(&LAYERS, &layers));
+    let layers = score.layers.iter().map(|layer| {
+        row! {
+            "layers" => format!("{} under {}", name(layer.inner), name(layer.outer)),
+            "collision [m³]" => layer.layer_collision,
+            "distance [m³]" => layer.layer_distance,
+            "pairs" => layer.triangle_pairs,
+            "order violations, nearest vertex [%]" => 100.0 * layer.order_violations_nearest_vertex,
+        }
+    });
+    let mut text = [raw, weighted, contact.collect()].map(|rows| table(&rows)).join("\n");
+    if !score.layers.is_empty() {
+        text += &format!("\n{}", table(&layers.collect::<Vec<_>>()));
     }
     let distance = match score.settings.distance {
         ScoreDistance::NearestVertex => "the nearest vertex",
@@ -129,10 +125,4 @@ fn sum<'a>(of: impl Iterator<Item = &'a TermValues>) -> TermValues {
         *sums.entry(term.clone()).or_default() += value;
     }
     sums
-}
-
-fn term_row(name: &str, values: &TermValues, terms: &[&str], with_sum: bool) -> Vec<String> {
-    let value = |term: &&str| values.get(*term).map_or_else(String::new, |v| number(*v));
-    let sum = with_sum.then(|| number(values.values().sum()));
-    [name.to_owned()].into_iter().chain(terms.iter().map(value)).chain(sum).collect()
 }

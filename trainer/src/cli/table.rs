@@ -1,4 +1,64 @@
-//! Tables for the terminal.
+//! Tables for the terminal and for Markdown.
+
+use crate::run::spread::Spread;
+
+/// A row of a table: headings with the cells below them.
+pub(crate) type Row = Vec<(String, String)>;
+
+/// A [`Row`] from `heading => value` pairs.
+macro_rules! row {
+    ($($heading:expr => $value:expr),* $(,)?) => {
+        vec![$(($heading.to_string(), $crate::cli::table::Cell::text(&$value))),*]
+    };
+}
+pub(crate) use row;
+
+/// A value that a table can show.
+pub(crate) trait Cell {
+    /// The text of the cell.
+    fn text(&self) -> String;
+}
+
+macro_rules! cell_as_displayed {
+    ($($kind:ty),*) => {
+        $(impl Cell for $kind {
+            fn text(&self) -> String {
+                self.to_string()
+            }
+        })*
+    };
+}
+cell_as_displayed!(str, String, usize, u64);
+
+impl Cell for f64 {
+    fn text(&self) -> String {
+        number(*self)
+    }
+}
+
+impl Cell for bool {
+    fn text(&self) -> String {
+        if *self { "yes" } else { "no" }.to_owned()
+    }
+}
+
+impl<T: Cell> Cell for Option<T> {
+    fn text(&self) -> String {
+        self.as_ref().map_or_else(|| "–".to_owned(), Cell::text)
+    }
+}
+
+impl<T: Cell + ?Sized> Cell for &T {
+    fn text(&self) -> String {
+        (*self).text()
+    }
+}
+
+impl Cell for Spread {
+    fn text(&self) -> String {
+        [self.mean, self.median, self.p95].map(number).join(" / ")
+    }
+}
 
 /// Four significant digits.
 pub(crate) fn number(value: f64) -> String {
@@ -12,20 +72,46 @@ pub(crate) fn number(value: f64) -> String {
     }
 }
 
-/// Rows under a heading: the first column to the left, the others to the right.
-pub(crate) fn table(head: &[impl AsRef<str>], rows: &[Vec<String>]) -> String {
-    let head: Vec<String> = head.iter().map(|cell| cell.as_ref().to_owned()).collect();
-    let lines = || [&head].into_iter().chain(rows);
-    let width = |column: usize| lines().map(|row| row[column].chars().count()).max().unwrap_or(0);
-    let widths: Vec<usize> = (0..head.len()).map(width).collect();
+/// The headings of the first of `rows`, and the cells of all below them. Columns of numbers are aligned on the right, others and
+/// the first one on the left. No rows make no table.
+pub(crate) fn table(rows: &[Row]) -> String {
+    let lines = lines(rows);
+    let width = |column: usize| lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0);
+    let is_numeric = |column: usize| column > 0 && lines[1..].iter().all(|line| looks_numeric(line[column]));
+    let columns: Vec<(usize, bool)> =
+        (0..lines.first().map_or(0, Vec::len)).map(|i| (width(i), is_numeric(i))).collect();
     let mut text = String::new();
-    for line in lines() {
-        for (column, (cell, width)) in line.iter().zip(&widths).enumerate() {
-            text += &if column == 0 { format!("{cell:<width$}") } else { format!("  {cell:>width$}") };
-        }
+    for line in &lines {
+        let cells = line.iter().zip(&columns).map(|(cell, &(width, is_numeric))| match is_numeric {
+            true => format!("{cell:>width$}"),
+            false => format!("{cell:<width$}"),
+        });
+        text += cells.collect::<Vec<_>>().join("  ").trim_end();
         text.push('\n');
     }
     text
+}
+
+/// The same in Markdown.
+pub(crate) fn markdown(rows: &[Row]) -> String {
+    let mut lines: Vec<String> =
+        lines(rows).iter().map(|cells| format!("| {} |\n", cells.join(" | "))).collect();
+    let columns = rows.first().map_or(0, Vec::len);
+    lines.insert(1.min(lines.len()), format!("|---|{}\n", "---:|".repeat(columns.saturating_sub(1))));
+    lines.concat()
+}
+
+/// Headings and cells.
+fn lines(rows: &[Row]) -> Vec<Vec<&str>> {
+    let head = rows.first().map(|row| row.iter().map(|(heading, _)| heading.as_str()).collect());
+    let cells = rows.iter().map(|row| row.iter().map(|(_, cell)| cell.as_str()).collect());
+    head.into_iter().chain(cells).collect()
+}
+
+/// Whether a cell holds a number, nothing, or the dash of a missing number.
+fn looks_numeric(cell: &str) -> bool {
+    let unsigned = cell.trim_start_matches(['+', '-', '–', '(']);
+    unsigned.is_empty() || unsigned.starts_with(|c: char| c.is_ascii_digit())
 }
 
 #[cfg(test)]
@@ -48,8 +134,16 @@ mod tests {
 
     #[test]
     fn columns_are_aligned() {
-        let owned = |row: &[&str]| row.iter().map(|c| (*c).to_owned()).collect::<Vec<_>>();
-        let text = table(&["raw", "ε [mm]"], &[owned(&["a long name", "1"]), owned(&["b", "12345678"])]);
-        assert_eq!(text, "raw            ε [mm]\na long name         1\nb            12345678\n");
+        let rows =
+            [row!["raw" => "a long name", "ε [mm]" => 1_usize], row!["raw" => "b", "ε [mm]" => "12345678"]];
+        assert_eq!(table(&rows), "raw            ε [mm]\na long name         1\nb            12345678\n");
+        let row = |mm: Option<f64>, end: &str| row!["case" => "a", "mm" => mm, "end" => end];
+        let rows = [row(None, "kept"), row(Some(-1.5), "")];
+        assert_eq!(table(&rows), "case      mm  end\na          –  kept\na     -1.500\n");
+        assert_eq!(
+            markdown(&rows),
+            "| case | mm | end |\n|---|---:|---:|\n| a | – | kept |\n| a | -1.500 |  |\n"
+        );
+        assert_eq!(table(&[]), "");
     }
 }

@@ -1,8 +1,9 @@
 //! `clothcombo-train`.
 
 use super::exit_code;
+use crate::cli::loading::load_dataset;
 use crate::cli::memory_table::{memory_line, memory_warning};
-use crate::cli::verbosity::{Verbosity, is_quiet, progress_bar, say};
+use crate::cli::verbosity::{Verbosity, is_quiet, print_status};
 use crate::config::{Config, load};
 use crate::dataset::{Dataset, FrameCounts};
 use crate::run::checkpoint::{Checkpoint, CheckpointError};
@@ -25,7 +26,6 @@ use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::rc::Rc;
-use std::sync::Arc;
 
 /// Trains ClothCombo's four networks from a configuration file.
 #[derive(Parser)]
@@ -108,33 +108,33 @@ fn run_of(path: &Path) -> Option<PathBuf> {
 
 /// The whole program, as one of the processes that a launcher may have started.
 pub fn main() -> ExitCode {
-    let world = match ProcessGroup::join() {
-        Ok(world) => Rc::new(world),
+    let group = match ProcessGroup::join() {
+        Ok(group) => Rc::new(group),
         Err(error) => return exit_code(Err(error.into())),
     };
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(message) => {
-            if world.is_rank_zero() {
+            if group.is_rank_zero() {
                 // A closed terminal is no reason to fail differently.
                 let _ = message.print();
             }
             return ExitCode::from(u8::try_from(message.exit_code()).unwrap_or(2));
         }
     };
-    arguments.verbosity.or_quiet(!world.is_rank_zero()).apply("warn");
-    match world.conclude(run(&arguments, &world)) {
+    arguments.verbosity.or_quiet(!group.is_rank_zero()).apply("warn");
+    match group.conclude(run(&arguments, &group)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(Some(report)) => exit_code(Err(report)),
         Err(None) => ExitCode::FAILURE,
     }
 }
 
-/// Trains as one of the processes in `world`, of which only the leader writes and prints.
+/// Trains as one of the processes in `group`, of which only the leader writes and prints.
 ///
 /// # Errors
-/// One report that names the file, key or garment at fault and how to mend it.
-fn run(arguments: &Arguments, world: &Rc<ProcessGroup>) -> Result<(), Report> {
+/// One report that names the file, key or garment at fault and how to repair it.
+fn run(arguments: &Arguments, group: &Rc<ProcessGroup>) -> Result<(), Report> {
     let stop = StopFlag::on_signals().into_diagnostic().wrap_err("cannot listen for Ctrl-C")?;
     let named = arguments.named_run()?;
     let file = arguments.config_file(named.as_deref())?;
@@ -143,16 +143,17 @@ fn run(arguments: &Arguments, world: &Rc<ProcessGroup>) -> Result<(), Report> {
     let config = load(&file, &arguments.overrides)?;
     let existing = match &arguments.resume {
         Some(path) => {
-            let run = match world.is_rank_zero() {
+            let run = match group.is_rank_zero() {
                 true => RunDir::resume(&root, &config, &arguments.allow_config_change)?,
                 false => RunDir::follow(&root),
             };
             Some((run, newest_or_none(path.as_deref().unwrap_or(&root))?))
         }
-        None if world.is_rank_zero() => RunDir::refuse_occupied(&root).map(|()| None)?,
+        None if group.is_rank_zero() => RunDir::refuse_occupied(&root).map(|()| None)?,
         None => None,
     };
-    let dataset = Arc::new(load_library(&config)?);
+    let dataset = load_dataset(&config)?;
+    print_data(&dataset);
     let device = arguments.device.device();
     let (run, session) = match existing {
         Some((run, checkpoint)) => {
@@ -160,15 +161,15 @@ fn run(arguments: &Arguments, world: &Rc<ProcessGroup>) -> Result<(), Report> {
                 Some(c) => Session::resume(run.clone(), config.clone(), dataset.clone(), &device, c)?,
                 None => Session::new(run.clone(), config.clone(), dataset.clone(), &device)?,
             };
-            // Everybody has read the checkpoint before the leader moves others aside.
-            world.meet(false)?;
-            if world.is_rank_zero() {
+            // Every process has read the checkpoint before rank zero moves others aside.
+            group.barrier(false)?;
+            if group.is_rank_zero() {
                 continue_run(&run, &config, checkpoint.as_ref())?;
             }
             (run, session)
         }
         None => {
-            let run = match world.is_rank_zero() {
+            let run = match group.is_rank_zero() {
                 true => RunDir::create(&root, &config)?,
                 false => RunDir::follow(&root),
             };
@@ -176,22 +177,20 @@ fn run(arguments: &Arguments, world: &Rc<ProcessGroup>) -> Result<(), Report> {
             (run, session)
         }
     };
-    let mut session = session.shared_in(world.clone())?;
-    if !world.is_rank_zero() {
+    let mut session = session.shared_in(group.clone())?;
+    if !group.is_rank_zero() {
         return train(&mut session, &mut [], &stop);
     }
     run.write_split(&dataset.split_names())?;
     let memory = session.memory_estimate();
-    if !is_quiet() {
-        say(&format!("run folder {}", run.root().display()));
-        if world.is_shared() {
-            say(&format!("{} processes share every step", world.share().size));
-        }
-        if let Some(m) = memory {
-            say(&memory_line(&m));
-            if let Some(warning) = memory_warning(&m) {
-                tracing::warn!("{warning}");
-            }
+    print_status(&format!("run folder {}", run.root().display()));
+    if group.is_shared() {
+        print_status(&format!("{} processes share every step", group.partition().size));
+    }
+    if let Some(memory) = &memory {
+        print_status(&memory_line(memory));
+        if let Some(warning) = memory_warning(memory) {
+            tracing::warn!("{warning}");
         }
     }
     let mut observers = observers(&run, &config, &dataset, session.step(), memory)?;
@@ -217,7 +216,7 @@ fn newest_or_none(path: &Path) -> Result<Option<Checkpoint>, CheckpointError> {
     }
 }
 
-/// Makes `config` the run's own and sets aside what the run did after `checkpoint`, telling about both.
+/// Makes `config` the run's own and sets aside what the run did after `checkpoint`, with a warning about each.
 fn continue_run(run: &RunDir, config: &Config, checkpoint: Option<&Checkpoint>) -> Result<(), Report> {
     let changed = run.adopt_config(config)?;
     if !changed.is_empty() {
@@ -254,41 +253,22 @@ fn observers(
     Ok(observers)
 }
 
-/// Loads the data of `config` under a bar.
-pub(crate) fn load_under_bar(config: &Config) -> Result<Dataset, Report> {
-    let bar = progress_bar(0, PREPARING);
-    let dataset = Dataset::load(config, &|done, total, name| {
-        bar.set_length(total as u64);
-        bar.set_position(done as u64);
-        bar.set_message(name.to_owned());
-    })?;
-    bar.finish_and_clear();
-    Ok(dataset)
-}
-
-/// The bar shown while garments are prepared.
-pub(crate) const PREPARING: &str = "preparing garments {bar:30} {pos}/{len} {msg}";
-
-fn load_library(config: &Config) -> Result<Dataset, Report> {
-    let dataset = load_under_bar(config)?;
-    if !is_quiet() {
-        say(&format!(
-            "body: {} · {} garments ({} not trained on) · {} joints · {} shape components{}",
-            dataset.body.name,
-            dataset.garments.len(),
-            dataset.garments.len() - dataset.split.training.len(),
-            dataset.joints().len(),
-            dataset.shape_count,
-            match dataset.poses.frame_counts() {
-                Some(FrameCounts { training, windows, validation, test }) => format!(
-                    " · {training} motion frames (never trained on: {windows} of held-out windows, {validation} of \
-                     validation clips, {test} of test clips)"
-                ),
-                None => " · sampled poses".into(),
-            }
-        ));
-    }
-    Ok(dataset)
+fn print_data(dataset: &Dataset) {
+    let frames = match dataset.poses.frame_counts() {
+        Some(FrameCounts { training, windows, validation, test }) => format!(
+            "{training} motion frames (never trained on: {windows} of held-out windows, {validation} of validation clips, \
+             {test} of test clips)"
+        ),
+        None => "sampled poses".into(),
+    };
+    print_status(&format!(
+        "body: {} · {} garments ({} not trained on) · {} joints · {} shape components · {frames}",
+        dataset.body.name,
+        dataset.garments.len(),
+        dataset.garments.len() - dataset.split.training.len(),
+        dataset.joints().len(),
+        dataset.shape_count
+    ));
 }
 
 /// `runs/NAME`, or the first free `runs/NAME-2`, `-3`, …; when resuming, the last existing one.

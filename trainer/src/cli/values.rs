@@ -1,5 +1,6 @@
 //! What the values of flags must be, where the type alone does not say it.
 
+use crate::config::MOST_GARMENTS;
 use crate::system::paths::obstacle;
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use clothcombo_physics::contact::resolve::ResolveSettings;
@@ -15,57 +16,49 @@ pub fn at_least_one(text: &str) -> Result<usize, String> {
     }
 }
 
-/// A time [s].
-pub fn seconds(text: &str) -> Result<Duration, String> {
+/// Number of garments or of vertices: at most as many as the garments that a configuration may ask for.
+pub fn count(text: &str) -> Result<usize, String> {
+    match at_least_one(text)? {
+        count if count > MOST_GARMENTS => Err(format!("it must be at most {MOST_GARMENTS}")),
+        count => Ok(count),
+    }
+}
+
+/// A number for which `is_valid` holds; `expected` says so in words.
+fn number(text: &str, is_valid: impl Fn(f64) -> bool, expected: &str) -> Result<f64, String> {
     match text.parse() {
-        Ok(seconds) if seconds > 0.0 => {
-            Duration::try_from_secs_f64(seconds).map_err(|_| "it is too long".into())
-        }
-        Ok(_) => Err("it must be greater than 0".into()),
+        Ok(number) if is_valid(number) => Ok(number),
+        Ok(_) => Err(format!("it must be {expected}")),
         Err(_) => Err("it is no number".into()),
     }
 }
 
-/// A gap between garments [mm], in the bounds of the post-process.
+/// A time (s).
+pub fn seconds(text: &str) -> Result<Duration, String> {
+    let seconds = number(text, |seconds| seconds > 0.0, "greater than 0")?;
+    Duration::try_from_secs_f64(seconds).map_err(|_| "it is too long".into())
+}
+
+/// A gap between garments (mm), in the bounds of the post-process.
 pub fn gap_mm(text: &str) -> Result<f64, String> {
     const MOST: f64 = 1e3 * ResolveSettings::LARGEST_GAP;
-    match text.parse() {
-        Ok(gap) if gap > 0.0 && gap <= MOST => Ok(gap),
-        Ok(_) => Err(format!("it must be greater than 0 and at most {MOST} mm")),
-        Err(_) => Err("it is no number".into()),
-    }
+    number(text, |gap| gap > 0.0 && gap <= MOST, &format!("greater than 0 and at most {MOST} mm"))
 }
 
-/// Time spent on one measurement, at most a day [s].
+/// Time spent on one measurement, at most a day (s).
 pub fn measuring_seconds(text: &str) -> Result<f64, String> {
     const DAY: f64 = 86_400.0;
-    match text.parse() {
-        Ok(seconds) if seconds > 0.0 && seconds <= DAY => Ok(seconds),
-        Ok(_) => Err(format!("it must be greater than 0 and at most {DAY}")),
-        Err(_) => Err("it is no number".into()),
-    }
-}
-
-/// A part of a whole, 0 to 1.
-pub fn share(text: &str) -> Result<f64, String> {
-    match text.parse() {
-        Ok(share) if (0.0..=1.0).contains(&share) => Ok(share),
-        Ok(_) => Err("it must be between 0 and 1".into()),
-        Err(_) => Err("it is no number".into()),
-    }
+    number(text, |seconds| seconds > 0.0 && seconds <= DAY, &format!("greater than 0 and at most {DAY}"))
 }
 
 /// A finite number greater than 0.
 pub fn positive(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|x: &f64| x.is_finite() && *x > 0.0).ok_or_else(|| "not a number above 0".into())
+    number(text, |x| x.is_finite() && x > 0.0, "a finite number above 0")
 }
 
 /// A finite number from 0 up.
 pub fn not_negative(text: &str) -> Result<f64, String> {
-    text.parse()
-        .ok()
-        .filter(|x: &f64| x.is_finite() && *x >= 0.0)
-        .ok_or_else(|| "not a number from 0 up".into())
+    number(text, |x| x.is_finite() && x >= 0.0, "a finite number from 0 up")
 }
 
 /// A PNG file that can be made: a picture is written at the end of the work, over what has its name. Its folder need not be
@@ -95,9 +88,8 @@ mod tests {
     fn numbers_have_bounds() {
         for text in ["nan", "inf", "-1", "1e30", "x", ""] {
             assert!(measuring_seconds(text).is_err(), "{text}");
-            assert!(share(text).is_err(), "{text}");
         }
-        assert_eq!((measuring_seconds("0.5"), share("0"), share("1")), (Ok(0.5), Ok(0.0), Ok(1.0)));
+        assert_eq!(measuring_seconds("0.5"), Ok(0.5));
         for text in ["nan", "inf", "-1", "x"] {
             assert!(positive(text).is_err() && not_negative(text).is_err(), "{text}");
         }

@@ -1,8 +1,8 @@
 //! How much the programs say: the same flags for every verb.
 
-use crate::system::closed_pipe::tell;
+use crate::system::closed_pipe::print_stderr;
 use clap::{ArgAction, Args};
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicBool, Ordering};
 use tracing_subscriber::EnvFilter;
@@ -55,18 +55,18 @@ pub(crate) fn is_quiet() -> bool {
     QUIET.load(Ordering::Relaxed)
 }
 
-/// A bar on stderr for `length` steps, none with `--quiet` or off a terminal.
+/// A bar on stderr for `length` steps, which goes when it ends; none with `--quiet` or off a terminal.
 pub(crate) fn progress_bar(length: usize, template: &str) -> ProgressBar {
     if is_quiet() {
         return ProgressBar::hidden();
     }
     let style = ProgressStyle::with_template(template).expect("templates of this crate are valid");
-    ProgressBar::new(length as u64).with_style(style)
+    ProgressBar::new(length as u64).with_style(style).with_finish(ProgressFinish::AndClear)
 }
 
 /// One line on stderr, none with `--quiet`.
-pub(crate) fn say(line: &str) {
+pub(crate) fn print_status(line: &str) {
     if !is_quiet() {
-        tell(line);
+        print_stderr(line);
     }
 }

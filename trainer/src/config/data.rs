@@ -38,7 +38,7 @@ pub struct DataConfig {
     /// reading and computing; 1 GiB holds 60 garments of 8,000 vertices. Without a cache all garments stay in memory.
     #[serde(default = "memory_mib")]
     pub memory_mib: usize,
-    /// Memory on the device for tensors of garments (operators, skin weights) and their embeddings [MiB], with a cache or
+    /// Memory on the device for tensors of garments (operators, skin weights) and their embeddings (MiB), with a cache or
     /// without; on a CPU backend a part of `memory_mib`. Those of the scene in work always fit. 4 GiB leaves 20 GiB of a card
     /// of 24 to the paper's networks and the largest of their scenes.
     #[serde(default = "device_memory_mib")]
@@ -84,7 +84,7 @@ pub struct SplitConfig {
 pub struct CacheConfig {
     /// Folder, made if needed; none keeps everything in memory.
     pub folder: Option<PathBuf>,
-    /// Largest size of the folder [GiB]; a garment of 8,000 vertices takes about 14 MiB with 128 eigenvectors.
+    /// Largest size of the folder (GiB); a garment of 8,000 vertices takes about 14 MiB with 128 eigenvectors.
     pub limit_gib: f64,
 }
 
@@ -159,14 +159,14 @@ pub struct PoseConfig {
     /// block of `held_out_block` in every `1 / held_out_share`, rounded, at most every second one. A clip shorter than half of
     /// `held_out_block / held_out_share` is trained on whole.
     pub held_out_share: f64,
-    /// Length of such a window [s]; long against the time in which a pose changes.
+    /// Length of such a window (s); long against the time in which a pose changes.
     pub held_out_block: f64,
-    /// Time on both sides of such a window that is neither trained on nor validated [s]. Frames next door show nearly the same
+    /// Time on both sides of such a window that is neither trained on nor validated (s). Frames next door show nearly the same
     /// pose; 1 s later a moving body is in another one. It is taken from the trained part.
     pub held_out_margin: f64,
     /// Mirror, interpolation between frames of any clips, exchange of limbs between frames, scaling of joints, noise.
     pub augmentation: bool,
-    /// Training poses in which far-apart parts of the body run through each other are drawn again: the most length [m]
+    /// Training poses in which far-apart parts of the body run through each other are drawn again: the most length (m)
     /// of the curves of intersection that is let pass. 0.1 leaves a hand that brushes a thigh and takes out a forearm
     /// in the belly, where no garment can be draped. 10 or more looks at no pose and costs nothing.
     pub max_self_intersection: f64,
@@ -270,7 +270,7 @@ impl Default for StartConfig {
 pub const MOST_GARMENTS: usize = 1_000_000;
 
 impl DataConfig {
-    /// Memory for what can be made again [bytes]; garments of a run without a cache cannot.
+    /// Memory for what can be made again (bytes); garments of a run without a cache cannot.
     pub(crate) fn memory_limits(&self) -> KeptBytes {
         let bytes = |mib: usize| mib.saturating_mul(1 << 20);
         let total = if self.cache.folder.is_some() { bytes(self.memory_mib) } else { usize::MAX };

@@ -69,7 +69,7 @@ pub enum ConfigError {
         place: String,
         /// What is wrong.
         what: String,
-        /// How to mend it.
+        /// How to fix it.
         #[help]
         hint: String,
         /// The text of the file with the value.
@@ -294,7 +294,7 @@ mod tests {
     fn contradictions_are_named() {
         let f = written(&SMALL.replace("steps = 10", "steps = 10\nlayers = [1, 3]"));
         assert!(load(f.path(), &[]).unwrap_err().to_string().contains("stages[0].layers"));
-        for key in ["losses.alone", "losses.strain.weight", "losses.reference_vertices"] {
+        for key in ["losses.single_garments", "losses.strain.weight", "losses.reference_vertices"] {
             for value in ["-1", "nan", "inf"] {
                 let e = load(written(SMALL).path(), &[format!("{key}={value}")]).unwrap_err();
                 assert!(e.to_string().contains(key), "{e}");

@@ -55,9 +55,9 @@ impl Default for StrainLoss {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct BodyCollisionLoss {
-    /// Factor on the raw value [1/m³ · J].
+    /// Factor on the raw value (1/m³ · J).
     pub weight: Ramp,
-    /// Distance to the body that a vertex should keep [m].
+    /// Distance to the body that a vertex should keep (m).
     pub epsilon: f64,
     /// How the distance is measured.
     pub distance: DistanceMode,
@@ -75,7 +75,7 @@ impl Default for BodyCollisionLoss {
 pub struct RepulsionLoss {
     /// Factor on the raw value.
     pub weight: Ramp,
-    /// Pairs farther apart than this do not repel [m].
+    /// Pairs farther apart than this do not repel (m).
     pub radius: f64,
     /// Divide the printed double sum by the vertex count.
     pub per_vertex: bool,
@@ -117,13 +117,13 @@ impl Default for HoldingLoss {
 pub struct LayerCollisionLoss {
     /// Factor on the raw value.
     pub weight: Ramp,
-    /// Gap that an outer vertex should keep to the inner garment [m].
+    /// Gap that an outer vertex should keep to the inner garment (m).
     pub epsilon: f64,
     /// Count a pair only when it is really one above the other; the printed form explodes past an open hem.
     pub gated: bool,
     /// Largest tangential offset of a counted pair, in median edge lengths of the inner garment.
     pub gate_tangential_edges: f64,
-    /// Largest distance of a counted pair [m].
+    /// Largest distance of a counted pair (m).
     pub gate_depth: f64,
 }
 
@@ -145,7 +145,7 @@ impl Default for LayerCollisionLoss {
 pub struct LayerDistanceLoss {
     /// Factor on the raw value.
     pub weight: Ramp,
-    /// Vertices farther than this from the body do not count [m].
+    /// Vertices farther than this from the body do not count (m).
     pub radius: f64,
 }
 
@@ -159,15 +159,15 @@ impl Default for LayerDistanceLoss {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct MaterialConfig {
-    /// Thickness [m].
+    /// Thickness (m).
     pub thickness: f64,
-    /// Density [kg/m³].
+    /// Density (kg/m³).
     pub density: f64,
-    /// First Lamé constant λ [Pa].
+    /// First Lamé constant λ (Pa).
     pub lambda: f64,
-    /// Second Lamé constant μ [Pa].
+    /// Second Lamé constant μ (Pa).
     pub mu: f64,
-    /// Bending stiffness k [J].
+    /// Bending stiffness k (J).
     pub bending_stiffness: f64,
 }
 
@@ -191,11 +191,11 @@ pub struct LossesConfig {
     /// Collision and layer-collision weights are multiplied by this over the garment's vertex count: the sums run over
     /// vertices and the paper's weights belong to about 8,000 of them. 0 switches it off.
     pub reference_vertices: f64,
-    /// Weight, beside the loss of the outfit, of the losses that every garment of it has when it is draped alone, before
+    /// Weight, beside the loss of the outfit, of the losses that every garment of it has when it is draped as a single garment, before
     /// untangling. Counts where all networks are trained at once: what is gained for outfits need not be lost for
-    /// garments worn alone. A scene in which nothing can touch has the same losses twice, 1 + `alone` times in all. 0, the
+    /// single garments. A scene in which nothing can touch has the same losses twice, 1 + `single_garments` times in all. 0, the
     /// default, is the paper's.
-    pub alone: Ramp,
+    pub single_garments: Ramp,
     /// StVK strain.
     pub strain: StrainLoss,
     /// Bending.
@@ -221,7 +221,7 @@ impl Default for LossesConfig {
         let plain = |w: f64| PlainLoss { weight: w.into() };
         Self {
             reference_vertices: 8000.0,
-            alone: 0.0.into(),
+            single_garments: 0.0.into(),
             strain: StrainLoss::default(),
             bending: plain(5.0),
             gravity: plain(1.0),
@@ -253,7 +253,7 @@ impl LossesConfig {
     /// What is wrong, as (key, what, hint).
     pub(super) fn problem(&self) -> Option<(String, String, String)> {
         let weights = Term::ALL.into_iter().map(|t| (format!("losses.{}.weight", t.name()), self.weight(t)));
-        let mut weights = weights.chain([("losses.alone".to_owned(), &self.alone)]);
+        let mut weights = weights.chain([("losses.single_garments".to_owned(), &self.single_garments)]);
         let is_weight = |w: f64| w >= 0.0 && w.is_finite();
         if let Some((key, _)) = weights.find(|(_, w)| !(is_weight(w.from) && is_weight(w.to))) {
             return Some((key, "must be a number from 0 on".into(), "0 switches it off".into()));

@@ -1,4 +1,5 @@
-//! The configuration of a run: one TOML file, every key documented here with unit, default and reason.
+//! The configuration. In: a TOML file and overrides. Out: a checked [`Config`], every key of which is documented here with unit,
+//! default and reason, or an error that names file, line and key.
 //!
 //! Unknown keys are errors. Every value used is written back to `RUN/config.toml`.
 

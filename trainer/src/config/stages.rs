@@ -1,6 +1,7 @@
 //! One stage of training: what learns, how long, on how many layers.
 
 use super::ramp::{Ramp, RampShape};
+use clothcombo_model::Mode;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -19,6 +20,14 @@ pub enum Trains {
 }
 
 impl Trains {
+    /// How far the forward pass goes.
+    pub fn mode(self) -> Mode {
+        match self {
+            Self::Single => Mode::Single,
+            Self::Untangling | Self::All | Self::Corrections => Mode::Layered,
+        }
+    }
+
     /// Whether the first stage stays as it is.
     pub fn freezes(self) -> bool {
         matches!(self, Self::Untangling | Self::Corrections)
@@ -57,7 +66,7 @@ pub struct StageConfig {
     #[serde(default = "one", alias = "scenes_per_step")]
     pub bodies: usize,
     /// Scenes with garments of their own whose gradients are averaged before one update (gradient accumulation). They are
-    /// computed beside each other: on two cores a step with 2 takes 1.3 to 1.8 times as long as one with 1. The gradient is
+    /// computed in parallel: on two cores a step with 2 takes 1.3 to 1.8 times as long as one with 1. The gradient is
     /// less noisy. Processes of one run share the scenes.
     #[serde(default = "one")]
     pub accumulate: usize,
@@ -133,7 +142,7 @@ impl StageConfig {
                 "use layers = [1, 1], or trains = \"all\"",
             )
         } else if self.trains == Trains::Untangling && low < 2 {
-            says("layers", "one garment alone has nothing to untangle", "use at least 2 layers")
+            says("layers", "a single garment has nothing to untangle", "use at least 2 layers")
         } else if high > MOST_LAYERS {
             says("layers", "are more garments than anyone wears", "the paper goes up to 6, 32 are allowed")
         } else if !(0.0..=1.0).contains(&self.layer_curriculum) {

@@ -10,7 +10,7 @@ use thiserror::Error;
 /// Why the data of a run cannot be used.
 #[derive(Debug, Error, Diagnostic)]
 pub enum DatasetError {
-    /// A file is missing or wrong; the message names it and says how to mend it.
+    /// A file is missing or wrong; the message names it and says how to fix it.
     #[error("{0}")]
     Data(String),
     /// A garment cannot be prepared.
@@ -44,9 +44,9 @@ pub enum DatasetError {
     Memory {
         /// Number of garments.
         garments: usize,
-        /// What they take [bytes].
+        /// What they take (bytes).
         needed: u64,
-        /// What the system can give [bytes].
+        /// What the system can give (bytes).
         available: u64,
     },
     /// Records that were there are gone and cannot be written again.
@@ -127,14 +127,14 @@ pub enum DatasetError {
     /// Clips are weighted by their length in time, and some of these have none.
     #[error("{}: at frame rates from {lowest:?} to {highest:?} a second the clips' lengths in time cannot be compared", folder.display())]
     #[diagnostic(help(
-        "`clothcombo check` tells the frame rate of every motion; mend mocap_framerate, for example to 30"
+        "`clothcombo check` tells the frame rate of every motion; set mocap_framerate, for example to 30"
     ))]
     FrameRates {
         /// The motion folder.
         folder: PathBuf,
-        /// Lowest frame rate [1/s].
+        /// Lowest frame rate (1/s).
         lowest: f64,
-        /// Highest frame rate [1/s].
+        /// Highest frame rate (1/s).
         highest: f64,
     },
     /// The skeleton is too small for the poses.
@@ -160,7 +160,7 @@ pub enum DatasetError {
 }
 
 impl DatasetError {
-    /// Wraps an error of the data crate, whose message already names file and mend; causes are appended.
+    /// Wraps an error of the data crate, whose message already names file and remedy; causes are appended.
     pub(crate) fn data(error: impl StdError) -> Self {
         let mut text = error.to_string();
         let mut source = error.source();

@@ -97,7 +97,7 @@ impl<'a> GarmentLoader<'a> {
     ///
     /// # Errors
     /// [`DatasetError`] naming the file and line, or the design that failed.
-    pub fn make(&self, origin: &GarmentSource) -> Result<Garment, DatasetError> {
+    pub fn load(&self, origin: &GarmentSource) -> Result<Garment, DatasetError> {
         match origin {
             GarmentSource::File(listed) => Ok(listed.load(self.body).map_err(DatasetError::data)?.garment),
             GarmentSource::Generated { category, seed, settings } => {

@@ -9,19 +9,17 @@ use super::active_joints::ActiveJoints;
 use super::error::DatasetError;
 use super::garment_source::{GarmentLoader, GarmentSource};
 use super::prepared_garment::PreparedGarment;
-use super::preprocessor::Preprocessor;
+use super::preprocessor::{CachePolicy, Preprocessor};
 use crate::config::Config;
 use crate::dataset::DataSizes;
 use crate::system::allocator::return_freed_memory;
 use crate::system::lru_cache::{LruCache, MemoryBudget, Residence};
 use crate::system::memory::available;
 use clothcombo_data::asset::{Binding, Body, Category, Garment, Provenance};
-use clothcombo_data::cache::{
-    ArrayCache, Key, binding_key, body_key, get_binding, get_largest_weights, get_operators, mesh_key,
-    operators_key, put_binding, put_operators,
-};
+use clothcombo_data::cache::{ArrayCache, Key, mesh_key};
 use clothcombo_physics::operators::SurfaceOperators;
 use rayon::prelude::*;
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -44,7 +42,7 @@ pub struct GarmentInfo {
 
 /// All garments of a run.
 pub struct GarmentStore {
-    cards: Vec<GarmentInfo>,
+    infos: Vec<GarmentInfo>,
     joints: ActiveJoints,
     store: Store,
 }
@@ -54,16 +52,7 @@ enum Store {
     Streamed(Box<Streamed>),
 }
 
-/// What a garment's records are stored under.
-#[derive(Clone, Copy)]
-struct Keys {
-    binding: Key,
-    operators: Key,
-}
-
 struct Streamed {
-    cache: ArrayCache,
-    keys: Vec<Keys>,
     recent: LruCache<PreparedGarment>,
     sources: Vec<GarmentSource>,
     preprocessor: Preprocessor,
@@ -71,10 +60,10 @@ struct Streamed {
 
 /// What the first pass over a garment leaves.
 struct IndexEntry {
-    card: GarmentInfo,
+    info: GarmentInfo,
     largest_weights: Vec<f32>,
+    /// Without a cache.
     kept: Option<(Garment, Binding, SurfaceOperators)>,
-    keys: Option<Keys>,
 }
 
 impl GarmentStore {
@@ -91,45 +80,41 @@ impl GarmentStore {
         progress: &(dyn Fn(usize, usize, &str) + Sync),
     ) -> Result<Self, DatasetError> {
         let sources = GarmentSource::list(&config.data.garments)?;
-        let preprocessor = Preprocessor::new(config, body);
-        let cache = config.data.open_cache().map_err(DatasetError::data)?;
-        if cache.is_none()
-            && let Some(available) = available()
-        {
+        let mut preprocessor = Preprocessor::new(config, body);
+        if let Some(cache) = config.data.open_cache().map_err(DatasetError::data)? {
+            preprocessor = preprocessor.with_cache(cache, CachePolicy::Required);
+        } else if let Some(available) = available() {
             let sizes = DataSizes::of_listed(&sources, &preprocessor.body)?;
             let (garments, needed) = (sources.len(), sizes.unstreamed_bytes(config));
             if needed > available {
                 return Err(DatasetError::Memory { garments, needed, available });
             }
         }
-        let looks =
-            index_garments(&sources, &preprocessor, cache.as_ref(), config.data.max_vertices, progress)?;
+        let index = index_garments(&sources, &preprocessor, config.data.max_vertices, progress)?;
 
         // Computing operators takes more than a step of small networks.
         return_freed_memory();
         let joints =
-            ActiveJoints::new(&preprocessor.body, looks.iter().map(|l| l.largest_weights.as_slice()));
-        let cards = looks.iter().map(|l| l.card.clone()).collect();
-        let store = match cache {
-            Some(cache) => Store::Streamed(Box::new(Streamed {
-                cache,
-                keys: looks.iter().filter_map(|l| l.keys).collect(),
+            ActiveJoints::new(&preprocessor.body, index.iter().map(|entry| entry.largest_weights.as_slice()));
+        let infos = index.iter().map(|entry| entry.info.clone()).collect();
+        let store = match preprocessor.cache() {
+            Some(_) => Store::Streamed(Box::new(Streamed {
                 recent: LruCache::new(memory, Residence::Host),
                 sources,
                 preprocessor,
             })),
             None => {
-                let parts =
-                    looks.into_par_iter().filter_map(|l| l.kept).map(|(garment, binding, operators)| {
-                        let garment = preprocessor.finish(garment, binding, &joints)?;
-                        Ok((Arc::new(garment), Arc::new(operators)))
-                    });
+                let kept = index.into_par_iter().filter_map(|entry| entry.kept);
+                let parts = kept.map(|(garment, binding, operators)| {
+                    let garment = preprocessor.finish(garment, binding, &joints)?;
+                    Ok((Arc::new(garment), Arc::new(operators)))
+                });
                 let (garments, operators) =
                     parts.collect::<Result<Vec<_>, DatasetError>>()?.into_iter().unzip();
                 Store::Kept { garments, operators }
             }
         };
-        Ok(Self { cards, joints, store })
+        Ok(Self { infos, joints, store })
     }
 
     /// Computes and stores what the cache of `config` does not hold of every `of`-th garment from garment `part` on, so
@@ -147,24 +132,24 @@ impl GarmentStore {
         let cache = config.data.open_cache().map_err(DatasetError::data)?.ok_or(DatasetError::NoCache)?;
         let sources: Vec<_> =
             GarmentSource::list(&config.data.garments)?.into_iter().skip(part).step_by(of.max(1)).collect();
-        let preprocessor = Preprocessor::new(config, body);
-        index_garments(&sources, &preprocessor, Some(&cache), config.data.max_vertices, progress)?;
-        Ok((sources.len(), cache.used()))
+        let preprocessor = Preprocessor::new(config, body).with_cache(cache, CachePolicy::Required);
+        index_garments(&sources, &preprocessor, config.data.max_vertices, progress)?;
+        Ok((sources.len(), preprocessor.cache().map_or(0, ArrayCache::used)))
     }
 
     /// Number of garments.
     pub fn len(&self) -> usize {
-        self.cards.len()
+        self.infos.len()
     }
 
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
-        self.cards.is_empty()
+        self.infos.is_empty()
     }
 
     /// What is known of garment `index` without reading it.
     pub fn info(&self, index: usize) -> &GarmentInfo {
-        &self.cards[index]
+        &self.infos[index]
     }
 
     /// Joints that carry any garment.
@@ -184,7 +169,7 @@ impl GarmentStore {
         if let Some(garment) = streamed.recent.get(index) {
             return Ok(garment);
         }
-        let garment = streamed.read(index, &self.cards[index], &self.joints)?;
+        let garment = streamed.read(index, &self.infos[index], &self.joints)?;
         let bytes = garment.bytes();
         Ok(streamed.recent.insert(index, garment, bytes))
     }
@@ -197,12 +182,9 @@ impl GarmentStore {
         match &self.store {
             Store::Kept { operators, .. } => Ok(operators[index].clone()),
             Store::Streamed(streamed) => {
-                if let Some(operators) = get_operators(&streamed.cache, streamed.keys[index].operators) {
-                    return Ok(Arc::new(operators));
-                }
-                streamed.restore(index)?;
-                let again = get_operators(&streamed.cache, streamed.keys[index].operators);
-                again.map(Arc::new).ok_or_else(|| streamed.lost(&self.cards[index]))
+                let info = &self.infos[index];
+                let get = || streamed.preprocessor.stored_operators(info.mesh);
+                streamed.get_or_restore(index, info, get).map(Arc::new)
             }
         }
     }
@@ -212,30 +194,30 @@ impl Streamed {
     fn read(
         &self,
         index: usize,
-        card: &GarmentInfo,
+        info: &GarmentInfo,
         joints: &ActiveJoints,
     ) -> Result<PreparedGarment, DatasetError> {
-        let get = || get_binding(&self.cache, self.keys[index].binding, self.preprocessor.body.joint_count());
-        let (rest, binding) = match get() {
-            Some(found) => found,
-            None => {
-                self.restore(index)?;
-                get().ok_or_else(|| self.lost(card))?
-            }
-        };
-        let GarmentInfo { name, category, holding, source, .. } = card.clone();
+        let get = || self.preprocessor.stored_binding(info.mesh, info.category);
+        let (rest, binding) = self.get_or_restore(index, info, get)?;
+        let GarmentInfo { name, category, holding, source, .. } = info.clone();
         self.preprocessor.finish(Garment { name, category, rest, holding, source }, binding, joints)
     }
 
-    /// Computes the records of a garment again that were there at the start of the run and no longer are.
-    fn restore(&self, index: usize) -> Result<(), DatasetError> {
-        tracing::warn!(cache = %self.cache.root().display(), "a record vanished during the run, computed anew");
-        let origin = std::slice::from_ref(&self.sources[index]);
-        index_garments(origin, &self.preprocessor, Some(&self.cache), usize::MAX, &|_, _, _| {}).map(|_| ())
-    }
-
-    fn lost(&self, card: &GarmentInfo) -> DatasetError {
-        DatasetError::Vanished { name: card.name.clone(), cache: self.cache.root().into() }
+    /// A record of garment `index`, computed again where it was there at the start of the run and no longer is.
+    fn get_or_restore<T>(
+        &self,
+        index: usize,
+        info: &GarmentInfo,
+        get: impl Fn() -> Option<T>,
+    ) -> Result<T, DatasetError> {
+        if let Some(found) = get() {
+            return Ok(found);
+        }
+        let cache = self.preprocessor.cache().map_or(Path::new(""), ArrayCache::root);
+        tracing::warn!(cache = %cache.display(), "a record vanished during the run, computed anew");
+        let source = std::slice::from_ref(&self.sources[index]);
+        index_garments(source, &self.preprocessor, usize::MAX, &|_, _, _| {})?;
+        get().ok_or_else(|| DatasetError::Vanished { name: info.name.clone(), cache: cache.into() })
     }
 }
 
@@ -244,20 +226,18 @@ impl Streamed {
 fn index_garments(
     sources: &[GarmentSource],
     preprocessor: &Preprocessor,
-    cache: Option<&ArrayCache>,
     max_vertices: usize,
     progress: &(dyn Fn(usize, usize, &str) + Sync),
 ) -> Result<Vec<IndexEntry>, DatasetError> {
-    let maker = GarmentLoader::new(&preprocessor.body, sources)?;
-    let body = cache.map(|_| body_key(&preprocessor.body));
+    let loader = GarmentLoader::new(&preprocessor.body, sources)?;
     let done = AtomicUsize::new(0);
-    let look = |origin: &GarmentSource| {
-        let garment = maker.make(origin)?;
+    let index = |source: &GarmentSource| {
+        let garment = loader.load(source)?;
         let vertices = garment.rest.vertex_count();
         if vertices > max_vertices {
             return Err(DatasetError::TooLarge { name: garment.name, vertices, limit: max_vertices });
         }
-        let card = GarmentInfo {
+        let info = GarmentInfo {
             name: garment.name.clone(),
             category: garment.category,
             holding: garment.holding,
@@ -265,48 +245,25 @@ fn index_garments(
             vertices,
             mesh: mesh_key(&garment.rest),
         };
-        let look = match (cache, body) {
-            (Some(cache), Some(body)) => stored(card, &garment, preprocessor, cache, body)?,
-            _ => {
-                let binding = Binding::new(&garment, &preprocessor.body, &preprocessor.binding);
-                let operators = preprocessor.operators(&garment.name, &garment.rest)?;
+        let entry = match preprocessor.cache() {
+            Some(_) => {
+                let largest_weights = preprocessor.largest_weights(&garment, info.mesh)?;
+                preprocessor.store_operators(&garment.name, &garment.rest, info.mesh)?;
+                IndexEntry { info, largest_weights, kept: None }
+            }
+            None => {
+                let binding = preprocessor.binding(&garment, info.mesh)?;
+                let operators = preprocessor.operators(&garment.name, &garment.rest, info.mesh)?;
                 let largest_weights = binding.largest_weights(preprocessor.body.joint_count());
-                IndexEntry { card, largest_weights, kept: Some((garment, binding, operators)), keys: None }
+                IndexEntry { info, largest_weights, kept: Some((garment, binding, operators)) }
             }
         };
-        progress(done.fetch_add(1, Ordering::Relaxed) + 1, sources.len(), &look.card.name);
-        Ok(look)
+        progress(done.fetch_add(1, Ordering::Relaxed) + 1, sources.len(), &entry.info.name);
+        Ok(entry)
     };
-    let mut looks = Vec::with_capacity(sources.len());
+    let mut entries = Vec::with_capacity(sources.len());
     for at_once in sources.chunks(rayon::current_num_threads()) {
-        looks.par_extend(at_once.par_iter().map(look).collect::<Result<Vec<_>, _>>()?);
+        entries.par_extend(at_once.par_iter().map(index).collect::<Result<Vec<_>, _>>()?);
     }
-    Ok(looks)
-}
-
-fn stored(
-    card: GarmentInfo,
-    garment: &Garment,
-    preprocessor: &Preprocessor,
-    cache: &ArrayCache,
-    body: Key,
-) -> Result<IndexEntry, DatasetError> {
-    let joints = preprocessor.body.joint_count();
-    let keys = Keys {
-        binding: binding_key(card.mesh, body, garment.category, &preprocessor.binding),
-        operators: operators_key(card.mesh, preprocessor.eigen_count),
-    };
-    let largest_weights = match get_largest_weights(cache, keys.binding) {
-        Some(largest) if largest.len() == joints => largest,
-        _ => {
-            let binding = Binding::new(garment, &preprocessor.body, &preprocessor.binding);
-            put_binding(cache, keys.binding, &garment.rest, &binding, joints).map_err(DatasetError::data)?;
-            binding.largest_weights(joints)
-        }
-    };
-    if !cache.contains(keys.operators) {
-        let operators = preprocessor.operators(&garment.name, &garment.rest)?;
-        put_operators(cache, keys.operators, &operators).map_err(DatasetError::data)?;
-    }
-    Ok(IndexEntry { card, largest_weights, kept: None, keys: Some(keys) })
+    Ok(entries)
 }

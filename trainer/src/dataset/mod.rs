@@ -1,4 +1,5 @@
-//! From a step number to everything the networks and the energies need: draw, prepare, hand over.
+//! The data of a run. In: a configuration. Out: body, garments and poses ([`Dataset`]), samples of scenes as pure functions of seed and
+//! step, and prepared scenes with their energies.
 
 mod active_joints;
 mod contents;
@@ -24,7 +25,7 @@ pub use garment_store::{GarmentInfo, GarmentStore};
 pub use poses::{ClipSplit, FrameCounts, HeldOut, PoseLibrary, SelfIntersecting, Window};
 pub use prepare::{PreparedBody, PreparedScene, SceneBuilder, contacts, prepare};
 pub use prepared_garment::PreparedGarment;
-pub use preprocessor::Preprocessor;
+pub use preprocessor::{CachePolicy, Preprocessor};
 pub use sampling::{
     BodySample, Plan, SceneSample, ValidationGroup, round_robin, sample_evaluation, sample_outfit,
     sample_training, sample_validation,

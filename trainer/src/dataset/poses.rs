@@ -29,7 +29,7 @@ pub struct PoseLibrary {
 struct Filter {
     body: Arc<Body>,
     contact: SelfContact,
-    /// Longest curves of intersection that pass [m].
+    /// Longest curves of intersection that pass (m).
     limit: f64,
 }
 
@@ -42,11 +42,11 @@ pub struct SelfIntersecting {
     pub touching: f64,
     /// Share above the limit, which is drawn again, 0–1.
     pub above_limit: f64,
-    /// The limit [m].
+    /// The limit (m).
     pub limit: f64,
 }
 
-/// From this limit on nothing is filtered [m].
+/// From this limit on nothing is filtered (m).
 const NO_FILTER: f64 = 10.0;
 /// Poses drawn before the least self-intersecting one is taken as it is.
 const DRAWS: usize = 8;
@@ -269,7 +269,7 @@ impl PoseLibrary {
 }
 
 impl Filter {
-    /// Length of the curves of self-intersection [m].
+    /// Length of the curves of self-intersection (m).
     fn measure(&self, pose: &Pose) -> f64 {
         // Only a pose longer than the body's joint list is refused, and those joints are left out.
         self.contact.of_pose(&self.body, pose).unwrap_or(0.0)

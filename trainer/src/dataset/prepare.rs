@@ -39,8 +39,8 @@ pub struct PreparedScene {
     pub contacts: Vec<(usize, usize)>,
     /// Bodies.
     pub bodies: Vec<PreparedBody>,
-    /// Weight of the losses of the garments draped alone, beside those of the outfit.
-    pub alone: f64,
+    /// Weight of the losses of single garments, in addition to those of the outfit.
+    pub single_garments: f64,
 }
 
 impl PreparedScene {
@@ -67,7 +67,7 @@ impl PreparedScene {
     }
 }
 
-/// Two garments whose rest bounding boxes are farther apart than this are not near [m].
+/// Two garments whose rest bounding boxes are farther apart than this are not near (m).
 const CONTACT_MARGIN: f64 = 0.05;
 
 /// Prepares `sample`; loss weights are taken at `run_progress`.
@@ -125,7 +125,13 @@ impl SceneBuilder<'_> {
             .iter()
             .map(|body| self.on_body(&garments, &contacts, body, &settings, run_progress))
             .collect();
-        PreparedScene { sample, garments, contacts, bodies, alone: self.losses.alone.at(run_progress) }
+        PreparedScene {
+            sample,
+            garments,
+            contacts,
+            bodies,
+            single_garments: self.losses.single_garments.at(run_progress),
+        }
     }
 
     fn on_body(

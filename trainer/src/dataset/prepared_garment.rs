@@ -1,8 +1,8 @@
 //! A garment with everything that does not change during training.
 
 use clothcombo_data::asset::Garment;
+use clothcombo_physics::contact_features::Rings;
 use clothcombo_physics::energy::GarmentEnergies;
-use clothcombo_physics::sensing::Rings;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -13,15 +13,15 @@ pub struct PreparedGarment {
     pub garment: Garment,
     /// Constants of its energies.
     pub energies: Arc<GarmentEnergies<f32>>,
-    /// Neighbourhoods that it feels other garments over.
+    /// Neighbourhoods over which its contact features are gathered.
     pub rings: Rings,
     /// Initial skin weights of the active joints, `[V, J]`.
     pub skin_weights: Vec<f32>,
-    /// Shape displacement per unit β, `[V, 3, K]` [m], K being the shape components of the body; empty without shape transfer.
+    /// Shape displacement per unit β, `[V, 3, K]` (m), K being the shape components of the body; empty without shape transfer.
     pub shape_directions: Vec<f32>,
 }
 
-/// Constants of the energies per vertex [bytes], and its neighbourhoods; measured on garments of 8,000 vertices.
+/// Constants of the energies per vertex (bytes), and its neighbourhoods; measured on garments of 8,000 vertices.
 const ENERGIES: usize = 1050;
 
 impl PreparedGarment {
@@ -50,14 +50,14 @@ impl PreparedGarment {
             .collect()
     }
 
-    /// About how much memory it takes [bytes].
+    /// About how much memory it takes (bytes).
     pub fn bytes(&self) -> usize {
         let mesh = self.vertex_count() * 24 + self.garment.rest.face_count() * 12;
         mesh + self.vertex_count() * ENERGIES + 4 * (self.skin_weights.len() + self.shape_directions.len())
     }
 
     /// About how much memory a garment of `vertices` vertices takes with `joints` joints and `shape_components` transferred
-    /// shape components [bytes].
+    /// shape components (bytes).
     pub fn expected_bytes(vertices: usize, joints: usize, shape_components: usize) -> usize {
         vertices * (48 + ENERGIES + 4 * (joints + 3 * shape_components))
     }

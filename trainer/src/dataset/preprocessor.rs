@@ -4,15 +4,18 @@ use super::active_joints::ActiveJoints;
 use super::error::DatasetError;
 use super::prepared_garment::PreparedGarment;
 use crate::config::Config;
-use clothcombo_data::asset::{Binding, BindingSettings, Body, Garment};
+use clothcombo_data::asset::{Binding, BindingSettings, Body, Category, Garment};
+use clothcombo_data::cache::{
+    ArrayCache, CacheError, Key, binding_key, body_key, get_binding, get_largest_weights, get_operators,
+    operators_key, put_binding, put_operators,
+};
+use clothcombo_physics::contact_features::Rings;
 use clothcombo_physics::energy::{EnergySettings, GarmentEnergies};
 use clothcombo_physics::mesh::{Topology, TriMesh};
 use clothcombo_physics::operators::SurfaceOperators;
-use clothcombo_physics::sensing::Rings;
 use std::sync::Arc;
 
-/// Body and settings with which garments are prepared.
-#[derive(Clone)]
+/// Body and settings with which garments are prepared, and the cache of what that computes, if there is one.
 pub struct Preprocessor {
     /// The body garments are bound to.
     pub body: Arc<Body>,
@@ -22,10 +25,27 @@ pub struct Preprocessor {
     pub energy: EnergySettings,
     /// Eigenpairs a garment is described with.
     pub eigen_count: usize,
+    pub(super) cache: Option<GarmentCache>,
+}
+
+/// Bindings, operators and embeddings on disk, by the content of the rest mesh.
+pub(super) struct GarmentCache {
+    arrays: ArrayCache,
+    body: Key,
+    policy: CachePolicy,
+}
+
+/// What it means when something cannot be stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CachePolicy {
+    /// An error: what is not stored cannot be read again.
+    Required,
+    /// A warning: the next run is slower, this one is not wrong.
+    Optional,
 }
 
 impl Preprocessor {
-    /// That of a run with `config` on `body`.
+    /// That of a run with `config` on `body`, without a cache.
     pub fn new(config: &Config, body: Arc<Body>) -> Self {
         let start = &config.start;
         Self {
@@ -38,16 +58,122 @@ impl Preprocessor {
             },
             energy: config.losses.energy_settings(),
             eigen_count: config.model.eigen_count,
+            cache: None,
         }
     }
 
-    /// DiffusionNet's operators of a rest mesh.
+    /// The same with a cache.
+    pub fn with_cache(self, arrays: ArrayCache, policy: CachePolicy) -> Self {
+        let body = body_key(&self.body);
+        Self { cache: Some(GarmentCache { arrays, body, policy }), ..self }
+    }
+
+    /// The cache.
+    pub fn cache(&self) -> Option<&ArrayCache> {
+        self.cache.as_ref().map(|cache| &cache.arrays)
+    }
+
+    /// Takes note of what could not be stored, as the policy of the cache says.
     ///
     /// # Errors
-    /// When the mesh has none, by the garment's name.
-    pub fn operators(&self, name: &str, rest: &TriMesh) -> Result<SurfaceOperators, DatasetError> {
-        SurfaceOperators::new(rest, self.eigen_count)
-            .map_err(|e| DatasetError::Garment { name: name.to_owned(), reason: e.to_string() })
+    /// `stored`'s, where storing is required.
+    pub fn check_stored(&self, stored: Result<(), CacheError>) -> Result<(), DatasetError> {
+        match (stored, self.cache.as_ref().map(|cache| cache.policy)) {
+            (Err(error), Some(CachePolicy::Required)) => Err(DatasetError::data(error)),
+            (Err(error), _) => {
+                tracing::warn!("{error}");
+                Ok(())
+            }
+            (Ok(()), _) => Ok(()),
+        }
+    }
+
+    /// The binding of a garment whose rest mesh has the key `mesh`: from the cache, or computed and stored there.
+    ///
+    /// # Errors
+    /// When it cannot be stored although it must be.
+    pub fn binding(&self, garment: &Garment, mesh: Key) -> Result<Binding, DatasetError> {
+        match self.stored_binding(mesh, garment.category) {
+            Some((_, binding)) => Ok(binding),
+            None => self.compute_binding(garment, mesh),
+        }
+    }
+
+    /// The largest skin weight of every joint; the binding comes from the cache, or is computed and stored there.
+    ///
+    /// # Errors
+    /// As [`binding`](Self::binding).
+    pub fn largest_weights(&self, garment: &Garment, mesh: Key) -> Result<Vec<f32>, DatasetError> {
+        let joints = self.body.joint_count();
+        let stored = self.cache.as_ref().and_then(|cache| {
+            get_largest_weights(&cache.arrays, self.binding_key(cache, mesh, garment.category))
+        });
+        match stored {
+            Some(largest) if largest.len() == joints => Ok(largest),
+            _ => Ok(self.compute_binding(garment, mesh)?.largest_weights(joints)),
+        }
+    }
+
+    fn compute_binding(&self, garment: &Garment, mesh: Key) -> Result<Binding, DatasetError> {
+        let binding = Binding::new(garment, &self.body, &self.binding);
+        if let Some(cache) = &self.cache {
+            let key = self.binding_key(cache, mesh, garment.category);
+            let joints = self.body.joint_count();
+            self.check_stored(put_binding(&cache.arrays, key, &garment.rest, &binding, joints))?;
+        }
+        Ok(binding)
+    }
+
+    /// The rest mesh and the binding that the cache has of it.
+    pub fn stored_binding(&self, mesh: Key, category: Category) -> Option<(TriMesh, Binding)> {
+        let cache = self.cache.as_ref()?;
+        get_binding(&cache.arrays, self.binding_key(cache, mesh, category), self.body.joint_count())
+    }
+
+    fn binding_key(&self, cache: &GarmentCache, mesh: Key, category: Category) -> Key {
+        binding_key(mesh, cache.body, category, &self.binding)
+    }
+
+    /// DiffusionNet's operators of a rest mesh of key `mesh`: from the cache, or computed and stored there.
+    ///
+    /// # Errors
+    /// When the mesh has none, by the garment's `name`; and as [`binding`](Self::binding).
+    pub fn operators(&self, name: &str, rest: &TriMesh, mesh: Key) -> Result<SurfaceOperators, DatasetError> {
+        match self.stored_operators(mesh) {
+            Some(operators) => Ok(operators),
+            None => self.compute_operators(name, rest, mesh),
+        }
+    }
+
+    /// Computes the operators that [`operators`](Self::operators) would have to compute, and stores them.
+    ///
+    /// # Errors
+    /// As [`operators`](Self::operators).
+    pub fn store_operators(&self, name: &str, rest: &TriMesh, mesh: Key) -> Result<(), DatasetError> {
+        let key = operators_key(mesh, self.eigen_count);
+        match self.cache().is_some_and(|cache| cache.contains(key)) {
+            true => Ok(()),
+            false => self.compute_operators(name, rest, mesh).map(drop),
+        }
+    }
+
+    fn compute_operators(
+        &self,
+        name: &str,
+        rest: &TriMesh,
+        mesh: Key,
+    ) -> Result<SurfaceOperators, DatasetError> {
+        let operators = SurfaceOperators::new(rest, self.eigen_count)
+            .map_err(|e| DatasetError::Garment { name: name.to_owned(), reason: e.to_string() })?;
+        if let Some(cache) = self.cache() {
+            self.check_stored(put_operators(cache, operators_key(mesh, self.eigen_count), &operators))?;
+        }
+        Ok(operators)
+    }
+
+    /// The operators that the cache has of the rest mesh of key `mesh`.
+    pub fn stored_operators(&self, mesh: Key) -> Option<SurfaceOperators> {
+        get_operators(self.cache()?, operators_key(mesh, self.eigen_count))
     }
 
     /// Puts a garment and its binding together for networks that see `joints`.

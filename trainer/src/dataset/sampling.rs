@@ -104,21 +104,21 @@ pub fn sample_outfit(dataset: &Dataset, seed: u64, index: u64, most: usize) -> S
     scored(garments, BodySample { shape: shape(dataset, &mut rng), pose })
 }
 
-/// Scenes of an evaluation lie behind the outfits; every question has a block of streams of its own.
-const STUDY_STREAM: u64 = VALIDATION_STREAM + (32 << 32);
+/// Scenes of an evaluation lie behind the outfits.
+const EVALUATION_STREAM: u64 = VALIDATION_STREAM + (32 << 32);
 
-/// Scene `index` of question number `question` of an evaluation: `layers` garments of `pool` in random order, on a body in a
+/// Scene `index` of block `stream` of an evaluation's random streams: `layers` garments of `pool` in random order, on a body in a
 /// pose of `poses`.
 pub fn sample_evaluation(
     dataset: &Dataset,
     seed: u64,
-    [question, index]: [usize; 2],
+    [stream, index]: [usize; 2],
     pool: &[usize],
     layers: usize,
     poses: HeldOut,
 ) -> SceneSample {
-    let mut rng = generator(seed, STUDY_STREAM + ((question as u64) << 32) + index as u64);
-    // The body first: with it, a question asked of two wardrobes is asked on the same bodies.
+    let mut rng = generator(seed, EVALUATION_STREAM + ((stream as u64) << 32) + index as u64);
+    // The body first: with it, two datasets get the same bodies.
     let body =
         BodySample { shape: shape(dataset, &mut rng), pose: dataset.poses.draw_held_out(poses, &mut rng) };
     scored(garments(pool, layers, &mut rng), body)

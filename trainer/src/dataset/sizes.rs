@@ -77,7 +77,7 @@ impl DataSizes {
         }
     }
 
-    /// Memory that everything about the garments takes in a run of `config` without a cache [bytes], but for what only the
+    /// Memory that everything about the garments takes in a run of `config` without a cache (bytes), but for what only the
     /// device has.
     pub fn unstreamed_bytes(&self, config: &Config) -> u64 {
         // Before the joints in use are known, weights of all joints are there.
@@ -85,19 +85,19 @@ impl DataSizes {
         self.sum(|v| self.garment_bytes(config, v) + operator_bytes(config, v) + weights(v))
     }
 
-    /// Memory of a garment of `vertices` vertices on the host [bytes].
+    /// Memory of a garment of `vertices` vertices on the host (bytes).
     pub(crate) fn garment_bytes(&self, config: &Config, vertices: usize) -> usize {
         let transferred = if config.start.shape_transfer { self.shape_components } else { 0 };
         PreparedGarment::expected_bytes(vertices, self.joints, transferred)
     }
 
-    /// Memory of its tensors and, `embeddings` times over, of its embedding [bytes].
+    /// Memory of its tensors and, `embeddings` times over, of its embedding (bytes).
     pub(crate) fn device_bytes(&self, config: &Config, vertices: usize, embeddings: usize) -> usize {
         tensor_bytes(vertices, config.model.eigen_count, self.joints)
             + 4 * embeddings * config.model.embedding * (vertices + 1)
     }
 
-    /// Memory of the body and the list of garments [bytes].
+    /// Memory of the body and the list of garments (bytes).
     pub(crate) fn lasting_bytes(&self) -> u64 {
         let per_vertex = 3 * (self.shape_components + 9 * self.body_joints.saturating_sub(1)) * 4 + 100;
         (self.body_vertices * per_vertex + self.vertices.len() * CARD) as u64
@@ -116,7 +116,7 @@ impl DataSizes {
     }
 }
 
-/// Memory of DiffusionNet's operators of a garment on the host [bytes].
+/// Memory of DiffusionNet's operators of a garment on the host (bytes).
 pub(crate) fn operator_bytes(config: &Config, vertices: usize) -> usize {
     12 * vertices * config.model.eigen_count + 8 * vertices
 }

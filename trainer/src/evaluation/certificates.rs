@@ -2,14 +2,15 @@
 
 use crate::config::LossesConfig;
 use crate::dataset::{Dataset, PreparedScene, prepare};
-use crate::inference::networks::{DrapeError, Networks};
-use clothcombo_data::asset::{Garment, unwearable};
+use crate::inference::networks::Networks;
+use crate::inference::tensor_store::DrapeError;
+use clothcombo_data::asset::{Garment, infeasible_pair};
 use clothcombo_physics::contact::resolve::{
-    Certificate, Layer, ResolveError, ResolveSettings, Resolved, RestGarment, Waypoint, certify,
+    Certificate, Layer, PathSample, ResolveError, ResolveSettings, Resolved, RestGarment, certify,
     resolve_along,
 };
-use clothcombo_physics::contact::{OrderViolations, order_violations};
-use clothcombo_physics::query::Surface;
+use clothcombo_physics::contact::{LayerOrder, PosedBody, Report, ReportGarment, Selection, all_layers};
+use clothcombo_physics::query::{Distance, Surface};
 use clothcombo_physics::transform::apply;
 use miette::Diagnostic;
 use serde::Serialize;
@@ -20,7 +21,7 @@ use thiserror::Error;
 /// Why a drape cannot be post-processed.
 #[derive(Debug, Error, Diagnostic)]
 pub enum PostProcessError {
-    /// A pose on the way cannot be draped.
+    /// A pose of the continuation path cannot be draped.
     #[error(transparent)]
     #[diagnostic(transparent)]
     Drape(#[from] DrapeError),
@@ -34,7 +35,7 @@ pub struct Dressing<'a> {
     dataset: &'a Dataset,
     losses: &'a LossesConfig,
     networks: Option<&'a Networks<'a>>,
-    /// What drapes poses on the way from the T-pose: without corrections, which leaves fewer crossings (docs/resolve.md).
+    /// What drapes poses between the T-pose and the scene: without corrections, which leaves fewer intersections (docs/resolve.md).
     uncorrected: Option<Networks<'a>>,
     known: Mutex<HashMap<usize, Arc<RestGarment>>>,
 }
@@ -70,14 +71,14 @@ impl<'a> Dressing<'a> {
         draped_by(self.networks, scene)
     }
 
-    /// `scene` on the way from the T-pose.
-    fn stage(&self, scene: &PreparedScene, share: f64) -> Result<Waypoint, PostProcessError> {
-        let mut draw = scene.sample.clone();
-        for body in &mut draw.bodies {
-            body.pose = body.pose.on_the_way(share);
+    /// `scene` in a pose between the T-pose and its own.
+    fn stage(&self, scene: &PreparedScene, share: f64) -> Result<PathSample, PostProcessError> {
+        let mut sample = scene.sample.clone();
+        for body in &mut sample.bodies {
+            body.pose = body.pose.scaled_keeping_heading(share);
         }
-        let scene = prepare(self.dataset, self.losses, draw, 1.0).map_err(DrapeError::from)?;
-        Ok(Waypoint {
+        let scene = prepare(self.dataset, self.losses, sample, 1.0).map_err(DrapeError::from)?;
+        Ok(PathSample {
             body: Arc::new(scene.exact_body()),
             draped: wide(&scene, &draped_by(self.uncorrected.as_ref(), &scene)?),
             skinned: wide(&scene, &skinned(&scene)),
@@ -118,7 +119,7 @@ impl DrapedScene<'_> {
         pairs.map(|(garment, positions)| Layer { garment, positions }).collect()
     }
 
-    /// Resolves it, if need be on a way from the T-pose.
+    /// Resolves it, if need be on a continuation path from the T-pose.
     ///
     /// # Errors
     /// When it is no valid scene, or another pose cannot be draped.
@@ -128,10 +129,10 @@ impl DrapedScene<'_> {
         resolve_along(&self.body, &self.layers(&self.positions), &skinned, settings, stage_at)
     }
 
-    /// Whether the order of the garments can be garment ([`unwearable`]).
+    /// Whether the order of the garments is feasible ([`infeasible_pair`]).
     pub fn is_wearable(&self) -> bool {
         let order: Vec<&Garment> = self.scene.garments.iter().map(|w| &w.garment).collect();
-        unwearable(&order).is_none()
+        infeasible_pair(&order).is_none()
     }
 
     /// What crosses before anything is done.
@@ -147,20 +148,23 @@ impl DrapedScene<'_> {
     /// # Errors
     /// When it is no valid scene.
     pub fn counts(&self) -> Result<Counts, ResolveError> {
-        Ok(Counts::new(&self.certificate()?, self.order_by_vertices(&self.positions)))
+        Ok(Counts::new(&self.certificate()?, self.order_violations_nearest_vertex(&self.positions)))
     }
 
-    /// Share of wrong-side vertices over all pairs of layers, by the nearest vertex: the definition of the score.
-    pub fn order_by_vertices(&self, positions: &[Vec<[f64; 3]>]) -> f64 {
-        let mut sum = OrderViolations::default();
-        for (outer, over) in positions.iter().enumerate() {
-            for (garment, under) in self.garments.iter().zip(&positions[..outer]) {
-                let pair = order_violations(under, garment.faces(), over);
-                sum.counted += pair.counted;
-                sum.violations += pair.violations;
-            }
-        }
-        sum.share()
+    /// Share of layer-order violations over all pairs of layers, by the nearest vertex: the definition of the score.
+    pub fn order_violations_nearest_vertex(&self, positions: &[Vec<[f64; 3]>]) -> f64 {
+        let garments: Vec<ReportGarment> = self
+            .garments
+            .iter()
+            .zip(positions)
+            .map(|(garment, positions)| ReportGarment { positions, faces: garment.faces() })
+            .collect();
+        let layers = all_layers(garments.len());
+        let order = LayerOrder::NearestVertex;
+        let selection = Selection { layers: &layers, order, triangles: false, body_itself: false };
+        Report::count(&PosedBody::new(&self.body, Distance::NearestVertex), &garments, &selection)
+            .order()
+            .share()
     }
 }
 
@@ -183,19 +187,19 @@ pub struct Counts {
     pub self_triangle_pairs: usize,
     /// Pairs of all kinds where the body lies inside itself.
     pub pinched_pairs: usize,
-    /// Length of the curves of intersection [mm].
+    /// Length of the curves of intersection (mm).
     pub contour_length_mm: f64,
-    /// Deepest vertex [mm].
+    /// Deepest vertex (mm).
     pub max_depth_mm: f64,
-    /// Share of wrong-side vertices by the closest surface point.
+    /// Share of layer-order violations, by the closest surface point.
     pub order_violations: f64,
-    /// Share of wrong-side vertices by the nearest vertex.
-    pub order_violations_by_vertices: f64,
+    /// The same by the nearest vertex: the paper's form.
+    pub order_violations_nearest_vertex: f64,
 }
 
 impl Counts {
     /// Those of `certificate`.
-    pub fn new(certificate: &Certificate, order_violations_by_vertices: f64) -> Self {
+    pub fn new(certificate: &Certificate, order_violations_nearest_vertex: f64) -> Self {
         Self {
             body_triangle_pairs: certificate.body_triangle_pairs,
             narrow_triangle_pairs: certificate.narrow_triangle_pairs,
@@ -205,7 +209,7 @@ impl Counts {
             contour_length_mm: certificate.contour_length_mm,
             max_depth_mm: certificate.max_depth_mm,
             order_violations: certificate.order_violations,
-            order_violations_by_vertices,
+            order_violations_nearest_vertex,
         }
     }
 
@@ -222,7 +226,7 @@ pub struct OutfitResult {
     pub draw: usize,
     /// Names, inner → outer.
     pub garments: Vec<String>,
-    /// Whether the order can be garment ([`unwearable`]).
+    /// Whether the order is feasible ([`infeasible_pair`]).
     pub is_wearable: bool,
     /// Vertices per garment.
     pub vertices: Vec<usize>,
@@ -232,19 +236,19 @@ pub struct OutfitResult {
     pub after: Counts,
     /// Rise of the strain energy, as a share; none where there was no strain.
     pub strain_added: Option<f64>,
-    /// Largest move of a vertex [mm].
+    /// Largest move of a vertex (mm).
     pub largest_move_mm: f64,
     /// Share of vertices that moved.
     pub moved: f64,
-    /// Rounds per garment, of all attempts but those of the way and of easing.
+    /// Rounds per garment, of all attempts but those of the continuation path and of relaxing strain.
     pub rounds: Vec<usize>,
-    /// Steps from the T-pose that were tried; 0 where the drape could be mended as it was.
+    /// Steps from the T-pose that were tried; 0 where the drape could be resolved as it was.
     pub steps: usize,
-    /// Time per garment [ms].
+    /// Time per garment (ms).
     pub milliseconds: Vec<f64>,
-    /// Time to prepare the body, once for all garments [ms].
+    /// Time to prepare the body, once for all garments (ms).
     pub body_milliseconds: f64,
-    /// Time of the certificate, once for all garments [ms].
+    /// Time of the certificate, once for all garments (ms).
     pub certificate_milliseconds: f64,
 }
 
@@ -270,7 +274,10 @@ impl OutfitResult {
             garments: scene.garments.iter().map(|w| w.garment.name.clone()).collect(),
             is_wearable: draped.is_wearable(),
             before,
-            after: Counts::new(&resolved.certificate, draped.order_by_vertices(&resolved.positions)),
+            after: Counts::new(
+                &resolved.certificate,
+                draped.order_violations_nearest_vertex(&resolved.positions),
+            ),
             strain_added: resolved.certificate.strain_added,
             largest_move_mm: 1e3 * works.iter().map(|w| w.largest_move).fold(0.0, f64::max),
             moved: moved as f64 / vertices.iter().sum::<usize>().max(1) as f64,

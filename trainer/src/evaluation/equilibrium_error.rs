@@ -1,11 +1,12 @@
 //! How far a drape is from the equilibrium of its scene: energy above the minimum, and distance to the minimiser.
 //!
-//! The reference is the state of lowest energy that the static solver of `clothcombo_physics` finds from linear blend skinning
-//! and, if there are networks, from their drape and from what the post-process makes of it. All methods are measured by one
-//! function of posed positions ([`super::reference`]).
+//! The reference is the state of lowest energy that the static solver of `clothcombo_physics` finds from linear blend skinning with
+//! shape transfer and, if there are networks, from their drape and from what the post-process makes of it. All methods are
+//! measured by one function of posed positions ([`crate::inference::reference`]).
 
 use crate::inference::Draped;
 use crate::inference::reference::{ReferenceScene, wide};
+use crate::run::validation::Method;
 use clothcombo_physics::energy::Term;
 use clothcombo_physics::equilibrium::{
     EquilibriumError, Problem, Progress, Solution, SolverSettings, Stop, solve,
@@ -14,27 +15,48 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
-/// Two minima are told apart when their energies differ by more than this share of what the solver gained.
+/// Two minima differ when their energies do by more than this share of what the solver gained.
 const SAME_MINIMUM: f64 = 1e-3;
 
-/// Energy and distance of one method on one scene.
+/// How far a state is from the minimum.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct StateError {
+    /// Weighted sum of all energies (J).
+    pub energy: f64,
+    /// Above the minimum (J).
+    pub excess: f64,
+    /// The same in percent of what a baseline has above it.
+    pub excess_percent: f64,
+    /// Mean distance of the vertices to the minimiser (mm).
+    pub distance_mm: f64,
+}
+
+impl StateError {
+    /// Of `positions` with `energy`; the baseline has `baseline_excess` above `minimum`.
+    pub fn new(energy: f64, positions: &[[f64; 3]], minimum: &Solution, baseline_excess: f64) -> Self {
+        let excess = energy - minimum.energy();
+        Self {
+            energy,
+            excess,
+            excess_percent: if baseline_excess > 0.0 { 100.0 * excess / baseline_excess } else { 0.0 },
+            distance_mm: 1e3 * mean_distance(positions, &minimum.positions),
+        }
+    }
+}
+
+/// One method on one scene.
 #[derive(Clone, Debug, Serialize)]
 pub struct MethodError {
     /// Name of the method.
     pub method: String,
-    /// Weighted sum of all energies [J].
-    pub energy: f64,
-    /// What every energy adds to it [J], by its name.
+    /// Percent are of the excess of LBS + shape transfer.
+    #[serde(flatten)]
+    pub error: StateError,
+    /// What every energy adds to the sum (J), by its name.
     pub terms: TermEnergies,
-    /// Above the reference [J].
-    pub excess: f64,
-    /// The same in percent of what LBS has above the reference.
-    pub excess_percent: f64,
-    /// Mean distance of the vertices to the reference [mm].
-    pub distance_mm: f64,
 }
 
-/// Weighted energies [J] by their names; those that a scene does not have are left out.
+/// Weighted energies (J) by their names; those that a scene does not have are left out.
 pub type TermEnergies = BTreeMap<&'static str, f64>;
 
 /// One run of the solver.
@@ -42,9 +64,9 @@ pub type TermEnergies = BTreeMap<&'static str, f64>;
 pub struct SolverRun {
     /// Where it started.
     pub start: &'static str,
-    /// Energy at the end [J].
+    /// Energy at the end (J).
     pub energy: f64,
-    /// What every energy adds to it [J].
+    /// What every energy adds to it (J).
     pub terms: TermEnergies,
     /// Why it stopped there.
     pub stop: &'static str,
@@ -56,7 +78,7 @@ pub struct SolverRun {
     pub iterations: usize,
     /// Evaluations of value and gradient.
     pub evaluations: usize,
-    /// Wall time [s].
+    /// Wall time (s).
     pub seconds: f64,
 }
 
@@ -71,7 +93,7 @@ pub struct SceneError {
     pub vertices: usize,
     /// All methods.
     pub methods: Vec<MethodError>,
-    /// All runs of the solver; the first is from LBS.
+    /// All runs of the solver; the first is from LBS + shape transfer.
     pub runs: Vec<SolverRun>,
     /// Which run ended lowest: the reference.
     pub reference: usize,
@@ -81,10 +103,10 @@ pub struct SceneError {
     pub layers: Vec<LayerStrain>,
 }
 
-/// What networks make of a scene, `[ΣV, 3]` [m] each.
+/// What networks make of a scene, `[ΣV, 3]` (m) each.
 pub struct Drapes {
-    /// Every garment draped alone.
-    pub single: Vec<[f64; 3]>,
+    /// Single garments.
+    pub single_garments: Vec<[f64; 3]>,
     /// After untangling.
     pub layered: Vec<[f64; 3]>,
     /// After the post-process, if it was run.
@@ -95,19 +117,20 @@ pub struct Drapes {
 
 impl Drapes {
     /// Of networks, and what the post-process made of it.
-    pub fn new(alone: &Draped, together: &Draped, resolved: Option<Vec<[f64; 3]>>) -> Self {
-        Self { single: wide(&alone.posed), layered: wide(&together.posed), resolved, steps: Vec::new() }
+    pub fn new(single_garments: &Draped, layered: &Draped, resolved: Option<Vec<[f64; 3]>>) -> Self {
+        let [single_garments, layered] = [single_garments, layered].map(|draped| wide(&draped.posed));
+        Self { single_garments, layered, resolved, steps: Vec::new() }
     }
 }
 
-/// Strain of one garment of an outfit [J].
+/// Strain of one garment of an outfit (J).
 #[derive(Clone, Debug, Serialize)]
 pub struct LayerStrain {
-    /// Worn alone, in the equilibrium that was found.
-    pub alone: f64,
+    /// As a single garment, in the equilibrium that was found.
+    pub single_garment: f64,
     /// In the reference of the outfit.
     pub outfit: f64,
-    /// Draped by the networks, alone and in the outfit.
+    /// Draped by the networks, as a single garment and in the outfit.
     pub network: Option<[f64; 2]>,
 }
 
@@ -120,8 +143,8 @@ impl SceneError {
     /// Whether the networks end above skinning with shape transfer, by more than the rounding of positions in f32; `None`
     /// without networks.
     pub fn is_above_skinning(&self) -> Option<bool> {
-        let energy = |name: &str| Some(self.methods.iter().find(|m| m.method == name)?.energy);
-        let (network, skinning) = (energy(NETWORK)?, energy(LBS)?);
+        let energy = |name: &str| Some(self.methods.iter().find(|m| m.method == name)?.error.energy);
+        let (network, skinning) = (energy(NETWORK)?, energy(START)?);
         Some(network - skinning > ROUNDING * skinning.abs().max(1.0))
     }
 }
@@ -129,12 +152,11 @@ impl SceneError {
 /// Relative difference of energies at positions that were rounded to f32 (measured: at most 4e-7).
 const ROUNDING: f64 = 1e-5;
 
-/// Name of the networks' drape in reports.
-pub const NETWORK: &str = "network";
-/// Name of linear blend skinning of the start state in reports.
-pub const LBS: &str = "LBS";
+const NETWORK: &str = Method::Network.name();
+/// Name of the skinning that the networks start from in reports.
+pub const START: &str = Method::LbsWithShapeTransfer.name();
 
-/// Solves `scene` from linear blend skinning and from `network`'s drape, and measures every method against the lower end.
+/// Solves `scene` from LBS + shape transfer and from `network`'s drape, and measures every method against the lower end.
 ///
 /// # Errors
 /// When the scene cannot be solved at all: its skinning is singular, or its energy is not finite at a start.
@@ -146,7 +168,8 @@ pub fn scene_error(
     observer: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
 ) -> Result<SceneError, EquilibriumError> {
     let problem = Problem::new(&scene.energy)?;
-    let mut states = vec![("LBS of rest", scene.skinned_rest.clone()), (LBS, scene.skinned_start.clone())];
+    let mut states =
+        vec![(Method::Lbs.name(), scene.skinned_rest.clone()), (START, scene.skinned_start.clone())];
     states.extend(network.map(|drapes| (NETWORK, drapes.layered.clone())));
     let resolved = network.and_then(|drapes| drapes.resolved.clone());
     states.extend(resolved.map(|resolved| ("network + post-process", resolved)));
@@ -161,10 +184,7 @@ pub fn scene_error(
 
     let measure = |method: String, positions: &[[f64; 3]]| {
         let (energy, terms) = problem.terms(positions);
-        let excess = energy - minimum.energy();
-        let excess_percent = if gained > 0.0 { 100.0 * excess / gained } else { 0.0 };
-        let distance_mm = 1e3 * mean_distance(positions, &minimum.positions);
-        MethodError { method, energy, terms, excess, excess_percent, distance_mm }
+        MethodError { method, error: StateError::new(energy, positions, minimum, gained), terms }
     };
     let steps = network.iter().flat_map(|drapes| &drapes.steps);
     let steps = steps.map(|(steps, positions)| (format!("network, {steps} corrections"), positions));
@@ -186,10 +206,10 @@ pub fn scene_error(
 /// Which solution has the lowest energy.
 fn lowest(solutions: &[(&'static str, Solution)]) -> usize {
     let energies = solutions.iter().map(|(_, s)| s.energy());
-    energies.enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).expect("there is a run from LBS").0
+    energies.enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).expect("there is a run from skinning").0
 }
 
-/// Strain of every garment in the outfit at `minimum`, and alone in the equilibrium found for it.
+/// Strain of every garment in the outfit at `minimum`, and as a single garment in the equilibrium found for it.
 fn layer_strains(
     scene: &ReferenceScene,
     minimum: &[[f64; 3]],
@@ -200,25 +220,24 @@ fn layer_strains(
     if scene.energy.garments.len() < 2 {
         return Ok(Vec::new());
     }
-    let alone = scene.energy.without_layers();
-    let problem = Problem::new(&alone)?;
-    let mut solutions = vec![(LBS, solve(&problem, &scene.skinned_start, settings, observer)?)];
+    let single_garments = scene.energy.without_layers();
+    let problem = Problem::new(&single_garments)?;
+    let mut solutions = vec![(START, solve(&problem, &scene.skinned_start, settings, observer)?)];
     if let Some(drapes) = network {
-        solutions.push((NETWORK, solve(&problem, &drapes.single, settings, observer)?));
+        solutions.push((NETWORK, solve(&problem, &drapes.single_garments, settings, observer)?));
     }
     let strain = |positions: &[[f64; 3]]| -> Vec<f64> {
-        let raw = alone.raw(positions, positions).garments;
+        let raw = single_garments.raw(positions, positions).garments;
         raw.iter().map(|terms| terms[Term::Strain].unwrap_or(0.0)).collect()
     };
-    let [in_outfit, by_itself] = [minimum, &solutions[lowest(&solutions)].1.positions].map(strain);
-    let drapes = network.map(|drapes| [&drapes.single, &drapes.layered].map(|d| strain(d)));
-    Ok((0..in_outfit.len())
-        .map(|g| LayerStrain {
-            alone: by_itself[g],
-            outfit: in_outfit[g],
-            network: drapes.as_ref().map(|[single, together]| [single[g], together[g]]),
-        })
-        .collect())
+    let [outfit, single_garment] = [minimum, &solutions[lowest(&solutions)].1.positions].map(strain);
+    let drapes = network.map(|drapes| [&drapes.single_garments, &drapes.layered].map(|d| strain(d)));
+    let layer = |g: usize| LayerStrain {
+        single_garment: single_garment[g],
+        outfit: outfit[g],
+        network: drapes.as_ref().map(|drapes| drapes.each_ref().map(|strains| strains[g])),
+    };
+    Ok((0..outfit.len()).map(layer).collect())
 }
 
 fn solver_run(problem: &Problem<'_>, start: &'static str, solution: &Solution) -> SolverRun {
@@ -244,8 +263,8 @@ pub fn converged(run: &SolverRun) -> bool {
     run.stop == Stop::Converged.name()
 }
 
-/// Mean distance of two states of the same vertices [m].
-pub(crate) fn mean_distance(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
+/// Mean distance of two states of the same vertices (m).
+pub fn mean_distance(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
     let sum: f64 =
         a.iter().zip(b).map(|(a, b)| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()).sum();
     sum / a.len().max(1) as f64

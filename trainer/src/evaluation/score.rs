@@ -4,11 +4,13 @@ use crate::dataset::PreparedScene;
 use crate::inference::Draped;
 use crate::run::spread::Spread;
 use crate::run::validation::MethodScore;
-use clothcombo_physics::contact::{OrderViolations, Penetration, order_violations, penetration};
+use clothcombo_physics::contact::{
+    LayerOrder, OrderViolations, Penetration, PosedBody, Report, ReportGarment, Selection,
+};
 use clothcombo_physics::energy::{Term, TermMap};
-use clothcombo_physics::query::Surface;
+use clothcombo_physics::query::{Distance, Surface};
 
-/// Vertices deeper than this inside the body count as visibly wrong [m].
+/// Vertices deeper than this inside the body count as visibly wrong (m).
 pub const DEEP: f64 = 0.005;
 
 /// What one draped scene scores.
@@ -22,7 +24,7 @@ pub struct SceneScore {
     pub total: f64,
     /// Garment vertices inside the body, by closest surface point.
     pub penetration: Penetration,
-    /// Wrong-side vertices over all pairs of layers that interact.
+    /// Layer-order violations by the nearest vertex, over all pairs of layers that interact.
     pub order: OrderViolations,
 }
 
@@ -43,15 +45,16 @@ pub fn score_scene(scene: &PreparedScene, body: &Surface<f64>, draped: &Draped) 
         }
     }
     let positions: Vec<[f64; 3]> = draped.posed.iter().map(|p| p.map(f64::from)).collect();
-    score.penetration = penetration(body, &positions, DEEP);
-
-    let parts = scene.parts(&positions);
-    for &(inner, outer) in &scene.contacts {
-        let faces = scene.garments[inner].garment.rest.faces();
-        let pair = order_violations(parts[inner], faces, parts[outer]);
-        score.order.counted += pair.counted;
-        score.order.violations += pair.violations;
-    }
+    let garments: Vec<ReportGarment> = scene
+        .parts(&positions)
+        .into_iter()
+        .zip(&scene.garments)
+        .map(|(positions, garment)| ReportGarment { positions, faces: garment.garment.rest.faces() })
+        .collect();
+    let order = LayerOrder::NearestVertex;
+    let selection = Selection { layers: &scene.contacts, order, triangles: false, body_itself: false };
+    let report = Report::count(&PosedBody::new(body, Distance::ClosestPoint), &garments, &selection);
+    (score.penetration, score.order) = (report.penetration(DEEP), report.order());
     score
 }
 
@@ -69,6 +72,6 @@ pub fn method_score(method: &'static str, scenes: &[SceneScore]) -> MethodScore 
         weighted: Term::ALL.into_iter().map(|t| (t.name(), over(&|s| s.weighted[t]).mean)).collect(),
         inside: share(&|s| s.penetration.inside, &|s| s.penetration.vertices),
         deeper_than_5mm: share(&|s| s.penetration.deep, &|s| s.penetration.vertices),
-        wrong_side: share(&|s| s.order.violations, &|s| s.order.counted),
+        order_violations: share(&|s| s.order.violations, &|s| s.order.counted),
     }
 }

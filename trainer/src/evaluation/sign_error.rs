@@ -16,7 +16,7 @@ use serde::Serialize;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Points this far under a piece of surface [m] are asked whether it is the body's outside: less than a finger's thickness,
+/// Points this far under a piece of surface (m) are asked whether it is the body's outside: less than a finger's thickness,
 /// far more than rounding.
 const PROBE_DEPTH: f64 = 1e-3;
 
@@ -25,7 +25,7 @@ const PROBE_DEPTH: f64 = 1e-3;
 pub struct SignErrorSettings {
     /// Points per pose.
     pub points: usize,
-    /// Largest distance from the surface [m].
+    /// Largest distance from the surface (m).
     pub band: f64,
     /// Seed of the points; pose `i` uses `seed + i`.
     pub seed: u64,
@@ -44,7 +44,7 @@ pub struct WrongSigns {
     pub wrong: usize,
     /// Those of them that are farther than 2 mm, the collision margin of the paper, from the surface.
     pub wrong_beyond_2mm: usize,
-    /// Largest distance from the surface at which the sign was wrong [m].
+    /// Largest distance from the surface at which the sign was wrong (m).
     pub farthest: f64,
 }
 
@@ -86,9 +86,9 @@ pub struct SignErrors {
     pub apart: RegionErrors,
     /// Near surface that lies inside another part of the body or is turned inside out, or inside two parts at once.
     pub overlapping: RegionErrors,
-    /// Mean time of 1,000 nearest-vertex queries, on one thread [ms].
+    /// Mean time of 1,000 nearest-vertex queries, on one thread (ms).
     pub nearest_vertex_ms: f64,
-    /// Mean time of 1,000 closest-point queries, on one thread [ms].
+    /// Mean time of 1,000 closest-point queries, on one thread (ms).
     pub closest_point_ms: f64,
 }
 

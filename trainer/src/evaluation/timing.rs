@@ -4,7 +4,7 @@ use crate::run::spread::Spread;
 use std::hint::black_box;
 use std::time::Instant;
 
-/// Median time [ms] of `run` over at least 3 and about `seconds` of repetitions, after one to warm up.
+/// Median time (ms) of `run` over at least 3 and about `seconds` of repetitions, after one to warm up.
 ///
 /// # Errors
 /// The first error of `run`.

@@ -5,7 +5,7 @@ use super::{Drape, GarmentDrape};
 use crate::run::spread::Spread;
 use serde::{Deserialize, Serialize};
 
-/// Accelerations over all vertices and inner frames of a motion [m/s²].
+/// Accelerations over all vertices and inner frames of a motion (m/s²).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Acceleration {
     /// 95th percentile of the result.

@@ -1,47 +1,66 @@
-//! What the vertices of a scene feel, for the correction networks.
+//! Contact features of a scene, for the correction networks.
 
 use crate::dataset::{PreparedBody, PreparedGarment, PreparedScene};
 use burn::tensor::Device;
-use clothcombo_model::FeltTensors;
-use clothcombo_physics::sensing::{DIRECTIONS, FEATURES, Rings, Sensed, sense};
+use clothcombo_model::{ContactFeatureTensors, Mode};
+use clothcombo_physics::contact_features::{ContactFeatures, DIRECTIONS, FEATURES, Rings};
+use clothcombo_physics::energy::SceneEnergy;
 use std::sync::Arc;
 
-/// Whether the garments of a scene feel each other.
+/// Whether the garments of a scene interact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LayerInteraction {
-    /// Every garment is draped by itself.
-    Alone,
-    /// All are worn together.
+    /// Every garment is draped as a single garment.
+    SingleGarments,
+    /// All garments are draped together.
     Together,
 }
 
 impl LayerInteraction {
-    /// The pairs (inner, outer) of `scene` that feel each other.
+    /// How far the forward pass goes.
+    pub fn mode(self) -> Mode {
+        match self {
+            Self::SingleGarments => Mode::Single,
+            Self::Together => Mode::Layered,
+        }
+    }
+
+    /// The pairs (inner, outer) of `scene` that interact.
     pub fn contacts(self, scene: &PreparedScene) -> &[(usize, usize)] {
         match self {
-            Self::Alone => &[],
+            Self::SingleGarments => &[],
             Self::Together => &scene.contacts,
+        }
+    }
+
+    /// The energy of `scene` on its first body, with the layer losses of the pairs that interact.
+    pub fn energy(self, scene: &PreparedScene) -> SceneEnergy<f32> {
+        let energy = &scene.bodies[0].energy;
+        match self {
+            Self::SingleGarments => energy.without_layers(),
+            Self::Together => (**energy).clone(),
         }
     }
 }
 
-const _: () = assert!(FEATURES == FeltTensors::FEATURES && DIRECTIONS == FeltTensors::DIRECTIONS);
+const _: () =
+    assert!(FEATURES == ContactFeatureTensors::FEATURES && DIRECTIONS == ContactFeatureTensors::DIRECTIONS);
 
-/// What the vertices of the garments of `scene` feel at `posed` `[ΣV, 3]` [m] on `body`, as tensors on `device`.
+/// Contact features of the garments of `scene` at `posed` `[ΣV, 3]` (m) on `body`, as tensors on `device`.
 ///
-/// `contacts` are the pairs (inner, outer) that feel each other: those of the scene, or none for garments that are draped by
-/// themselves.
-pub fn felt(
+/// `contacts` are the pairs (inner, outer) that interact: those of the scene, or none for single garments.
+pub fn contact_features(
     scene: &PreparedScene,
     body: &PreparedBody,
     contacts: &[(usize, usize)],
     posed: &[[f32; 3]],
     device: &Device,
-) -> FeltTensors {
+) -> ContactFeatureTensors {
     let rings: Vec<&Rings> = scene.garments.iter().map(|garment| &garment.rings).collect();
-    let Sensed { features, directions } = sense(&body.energy, &rings, posed, contacts);
+    let ContactFeatures { features, directions } =
+        ContactFeatures::new(&body.energy, &rings, posed, contacts);
     let directions = directions.map(|posed| unposed(scene, body, &posed));
-    FeltTensors::new(features, directions.each_ref().map(Vec::as_slice), device)
+    ContactFeatureTensors::new(features, directions.each_ref().map(Vec::as_slice), device)
         .expect("every vertex of the scene has its features")
 }
 

@@ -10,22 +10,23 @@
 //!
 //! So no garment ends above skinning, and more steps never raise its energy.
 
-use crate::inference::Draped;
-use crate::inference::contact_features::{LayerInteraction, felt};
-use crate::inference::descent::{BACKTRACKING, Descent, WHOLE};
-use crate::inference::draped::{draped, to_device};
-use crate::inference::networks::OnBody;
-use burn::tensor::{Device, Tensor, TensorData};
-use clothcombo_model::{BodyTensors, ClothCombo, OutfitTensors, SingleDrape, linear_blend_skinning};
+use super::contact_features::{LayerInteraction, contact_features};
+use super::descent::{BACKTRACKING, Descent, WHOLE};
+use super::draped::{Draped, to_device};
+use super::networks::OnBody;
+use burn::tensor::{Tensor, TensorData};
+use clothcombo_model::{
+    BodyTensors, ClothCombo, DrapeState, DrapeStates, OutfitTensors, linear_blend_skinning,
+};
 
-/// The state that the correction steps of `model` lead to, `uncorrected` being the networks' drape: that itself where the model
-/// takes no such step. `watch` sees every state that was accepted, skinning first.
+/// The state that the correction steps of `model` lead to from `states`, whose last one is `uncorrected`: that itself where the
+/// model takes no such step. `watch` sees every state that was accepted, skinning first.
 pub(crate) fn corrected(
     model: &ClothCombo,
     on_body: &OnBody<'_>,
-    single: &SingleDrape,
+    mut states: DrapeStates,
     uncorrected: Draped,
-    company: LayerInteraction,
+    interaction: LayerInteraction,
     watch: &mut dyn FnMut(&Descent<'_>),
 ) -> Draped {
     let OnBody { scene, outfit, embeddings, body, start } = on_body;
@@ -33,26 +34,19 @@ pub(crate) fn corrected(
     if networks == 0 || model.correction_steps == 0 {
         return uncorrected;
     }
-    let (prepared, device) = (&scene.bodies[0], start.device());
-    let energy = match company {
-        LayerInteraction::Together => (*prepared.energy).clone(),
-        LayerInteraction::Alone => prepared.energy.without_layers(),
-    };
-    let energy = energy.continuous().pulled_back(&scene.skinning_transforms());
+    let device = start.device();
+    let energy = interaction.energy(scene).continuous().pulled_back(&scene.skinning_transforms());
     let mut descent = Descent::new(&energy, skinned(start.clone(), outfit.skin_weights.clone(), body));
     watch(&descent);
-    let skin_weights = take_networks(&mut descent, &uncorrected, single, outfit, body, &device);
-    let single = &SingleDrape { skin_weights, ..single.clone() };
+    states.skin_weights = take_networks(&mut descent, &uncorrected, &states.skin_weights, outfit, body);
     watch(&descent);
     let mut idle = 0;
-    for step in 0..model.correction_steps {
-        let Draped { canonical, posed } = descent.state();
-        let felt = felt(scene, prepared, company.contacts(scene), posed, &device);
-        let canonical = to_device(canonical, &device);
-        let network = step % networks;
-        let given = (start.clone(), single);
-        let state = model.correct_once(network, outfit, embeddings, given, canonical, body, felt);
-        let shares = descent.advance(&draped(&state.canonical, &state.posed), &BACKTRACKING);
+    for _ in 0..model.correction_steps {
+        states.replace_last(descent.state().upload(&device));
+        let posed = &descent.state().posed;
+        let features = contact_features(scene, &scene.bodies[0], interaction.contacts(scene), posed, &device);
+        model.correct(outfit, embeddings, body, &mut states, features);
+        let shares = descent.advance(&Draped::of(states.last()), &BACKTRACKING);
         watch(&descent);
         idle = if shares.iter().any(|share| *share > 0.0) { 0 } else { idle + 1 };
         if idle == networks {
@@ -66,21 +60,21 @@ pub(crate) fn corrected(
 fn take_networks(
     descent: &mut Descent<'_>,
     uncorrected: &Draped,
-    single: &SingleDrape,
+    skin_weights: &Tensor<2>,
     outfit: &OutfitTensors,
     body: &BodyTensors,
-    device: &Device,
 ) -> Tensor<2> {
+    let device = &skin_weights.device();
     let mut of_delta = descent.advance(uncorrected, &WHOLE);
     if of_delta.iter().all(|share| *share == 1.0) {
-        return single.skin_weights.clone();
+        return skin_weights.clone();
     }
     let initial = outfit.skin_weights.clone();
     let has_delta: Vec<bool> = of_delta.iter().map(|share| *share > 0.0).collect();
     let without = skinned(to_device(&uncorrected.canonical, device), initial.clone(), body);
     descent.advance_some(&without, &BACKTRACKING, |garment| !has_delta[garment]);
     let canonical = to_device(&descent.state().canonical, device);
-    let with = skinned(canonical, single.skin_weights.clone(), body);
+    let with = skinned(canonical, skin_weights.clone(), body);
     let shares = descent.advance_some(&with, &BACKTRACKING, |garment| !has_delta[garment]);
     of_delta
         .iter_mut()
@@ -91,10 +85,11 @@ fn take_networks(
         outfit.ranges().iter().zip(&of_delta).flat_map(|(rows, share)| vec![*share; rows.len()]).collect();
     let count = rows.len();
     let shares = Tensor::<2>::from_data(TensorData::new(rows, [count, 1]), device);
-    initial.clone() + (single.skin_weights.clone() - initial) * shares
+    initial.clone() + (skin_weights.clone() - initial) * shares
 }
 
-/// Linear blend skinning of `canonical` `[ΣV, 3]` [m] by `weights` `[ΣV, J]`.
+/// Linear blend skinning of `canonical` `[ΣV, 3]` (m) by `weights` `[ΣV, J]`.
 pub(crate) fn skinned(canonical: Tensor<2>, weights: Tensor<2>, body: &BodyTensors) -> Draped {
-    draped(&canonical, &linear_blend_skinning(canonical.clone(), weights, body.bones.clone()))
+    let posed = linear_blend_skinning(canonical.clone(), weights, body.bones.clone());
+    Draped::of(&DrapeState { canonical, posed })
 }

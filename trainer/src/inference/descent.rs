@@ -13,7 +13,7 @@ use std::collections::BTreeSet;
 
 /// Backtracking: a step that goes too far along a direction that is right is halved, and halved again.
 pub const BACKTRACKING: [f32; 3] = [1.0, 0.5, 0.25];
-/// All the way or not at all, for a proposal that is a place rather than a direction.
+/// All of it or nothing, for a proposal that is a place rather than a direction.
 pub const WHOLE: [f32; 1] = [1.0];
 
 /// A state of an outfit whose energies only fall.
@@ -37,12 +37,12 @@ impl<'a> Descent<'a> {
         &self.state
     }
 
-    /// Energy of every garment with the pairs that it is part of [J]; infinite where it is not finite.
+    /// Energy of every garment with the pairs that it is part of (J); infinite where it is not finite.
     pub fn energies(&self) -> &[f64] {
         &self.energies
     }
 
-    /// Energy of the outfit [J]; infinite where it is not finite.
+    /// Energy of the outfit (J); infinite where it is not finite.
     pub fn total(&self) -> f64 {
         self.total
     }
@@ -233,7 +233,7 @@ mod tests {
 
     #[test]
     fn what_one_garment_gains_is_not_paid_by_its_neighbour() {
-        // The inner tube, stretched in its way, would relax outwards through the outer one, which stays where it is.
+        // The inner tube, stretched across it, would relax outwards through the outer one, which stays where it is.
         let (energy, rest) = scene(&[0.13, 0.12], &[[0, 1]]);
         let start = stretched(&rest, &[0.8, 1.0]);
         let mut descent = Descent::new(&energy, start.clone());
@@ -242,7 +242,7 @@ mod tests {
         let after = descent.energies();
         assert!(after.iter().zip(&before).all(|(after, before)| after <= before), "{before:?} {after:?}");
         assert!(shares[0] < 1.0, "{shares:?}");
-        // Without the pair it would have gone all the way.
+        // Without the pair it would have moved the whole distance.
         let (free, _) = scene(&[0.13, 0.12], &[]);
         let mut descent = Descent::new(&free, start);
         assert_eq!(descent.advance(&stretched(&rest, &[1.0, 1.0]), &BACKTRACKING)[0], 1.0);

@@ -6,29 +6,29 @@ use clothcombo_physics::contact::resolve::{Certificate, Reached, certify};
 use clothcombo_physics::transform::Transform;
 use std::sync::Arc;
 
-/// One garment on one body, vertices as in its [`Piece`](super::Piece).
+/// One garment on one body, vertices as in its [`OutfitGarment`](super::OutfitGarment).
 #[derive(Clone, Debug)]
 pub struct GarmentDrape {
-    /// Linear blend skinning of the start state, which has learned nothing `[V, 3]` [m].
+    /// Linear blend skinning of the start state, which has learned nothing `[V, 3]` (m).
     pub skinned: Vec<[f64; 3]>,
-    /// What the networks made of it, in a motion averaged over frames if that was asked for `[V, 3]` [m].
+    /// What the networks made of it, in a motion averaged over frames if that was asked for `[V, 3]` (m).
     pub network: Vec<[f64; 3]>,
-    /// What came to the post-process: of the networks, or refined `[V, 3]` [m].
+    /// What came to the post-process: of the networks, or refined `[V, 3]` (m).
     pub before: Vec<[f64; 3]>,
-    /// The result `[V, 3]` [m].
+    /// The result `[V, 3]` (m).
     pub positions: Vec<[f64; 3]>,
     /// Blended skinning transform of every vertex, canonical → posed.
     pub transforms: Vec<Transform>,
-    /// Wall time of the post-process [ms].
+    /// Wall time of the post-process (ms).
     pub resolve_ms: f64,
 }
 
 /// An outfit on one body.
 #[derive(Clone, Debug)]
 pub struct Drape {
-    /// The posed body `[V, 3]` [m].
+    /// The posed body `[V, 3]` (m).
     pub body: Vec<[f64; 3]>,
-    /// Where it faces: angle about the vertical from +z towards +x [radians].
+    /// Where it faces: angle about the vertical from +z towards +x (radians).
     pub heading: f64,
     /// The garments, inner → outer.
     pub garments: Vec<GarmentDrape>,

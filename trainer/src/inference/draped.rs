@@ -1,6 +1,7 @@
 //! Positions of draped garments on the host.
 
 use burn::tensor::{Device, Tensor, TensorData};
+use clothcombo_model::DrapeState;
 
 /// Positions of all garments of a scene on its first body, packed inner → outer.
 #[derive(Clone, Debug)]
@@ -11,9 +12,16 @@ pub struct Draped {
     pub posed: Vec<[f32; 3]>,
 }
 
-/// Positions on the host.
-pub(crate) fn draped(canonical: &Tensor<2>, posed: &Tensor<2>) -> Draped {
-    Draped { canonical: to_host(canonical.clone()), posed: to_host(posed.clone()) }
+impl Draped {
+    /// A state of the networks on the host.
+    pub fn of(state: &DrapeState) -> Self {
+        Self { canonical: to_host(state.canonical.clone()), posed: to_host(state.posed.clone()) }
+    }
+
+    /// The same on `device`.
+    pub(crate) fn upload(&self, device: &Device) -> DrapeState {
+        DrapeState { canonical: to_device(&self.canonical, device), posed: to_device(&self.posed, device) }
+    }
 }
 
 /// Positions as a tensor `[N, 3]`.

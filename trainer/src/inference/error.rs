@@ -182,7 +182,7 @@ pub enum DraperError {
         garment: String,
         /// The vertex.
         vertex: usize,
-        /// Where it is [m].
+        /// Where it is (m).
         position: [f64; 3],
     },
     /// The post-process refused its input.

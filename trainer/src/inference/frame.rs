@@ -1,11 +1,11 @@
 //! One drape: networks, refinement, post-process.
 
 use super::motion::RetryPolicy;
-use super::networked::Networked;
+use super::network_drape::NetworkDrape;
 use super::{BodyState, Certificate, Drape, Draper, DraperError, GarmentDrape, Outfit, elapsed, refine};
 use crate::inference::reference::ReferenceScene;
 use clothcombo_physics::Surface;
-use clothcombo_physics::contact::resolve::{Resolved, Waypoint, resolve_after, resolve_along};
+use clothcombo_physics::contact::resolve::{PathSample, Resolved, resolve_after, resolve_along};
 use clothcombo_physics::vec3::{add_scaled, sub};
 use std::time::Instant;
 
@@ -14,30 +14,30 @@ use std::time::Instant;
 pub(super) struct Frame<'a> {
     pub body: &'a BodyState,
     /// Where the post-process carries on from, if anywhere.
-    pub last: Option<Last<'a>>,
+    pub last: Option<PreviousFrame<'a>>,
 }
 
 /// Another frame of the same motion, which a drape carries on from.
 #[derive(Clone, Copy)]
-pub(super) struct Last<'a> {
+pub(super) struct PreviousFrame<'a> {
     pub body: &'a BodyState,
     pub drape: &'a Drape,
-    /// What carrying on may leave. Where it leaves more, the drape is also resolved by itself, and on a way from the T-pose: that
-    /// takes seconds.
-    pub bearable: RetryPolicy,
+    /// What carrying on may leave. Where it leaves more, the drape is also resolved anew, on a continuation path from the T-pose:
+    /// that takes seconds.
+    pub retry: RetryPolicy,
 }
 
 impl Draper {
     /// Drapes `outfit` on `frame`, of which the networks have `made` this. `watch` is called for every pose that the post-process
-    /// looks at, with its share of the way there.
+    /// looks at, with its share of the path there.
     pub(super) fn drape_frame(
         &self,
         outfit: &Outfit,
         frame: Frame<'_>,
-        made: Networked,
+        made: NetworkDrape,
         watch: &mut dyn FnMut(f64),
     ) -> Result<Drape, DraperError> {
-        let Networked { scene, surface, heading, transforms, skinned, network, mut milliseconds } = made;
+        let NetworkDrape { scene, surface, heading, transforms, skinned, network, mut milliseconds } = made;
 
         let clock = Instant::now();
         let (before, refinement) = match self.settings.refine {
@@ -55,13 +55,13 @@ impl Draper {
         let parts = outfit.split(&before);
         let (resolved, times) = match self.settings.resolve {
             true => {
-                let at_the_end = || Waypoint {
+                let final_sample = || PathSample {
                     body: surface.clone(),
                     draped: parts.iter().map(|p| p.to_vec()).collect(),
                     skinned: outfit.split(&skinned).into_iter().map(<[_]>::to_vec).collect(),
                     transforms: transforms.clone(),
                 };
-                let done = self.resolved(outfit, frame, watch, &surface, &parts, &at_the_end);
+                let done = self.resolved(outfit, frame, watch, &surface, &parts, &final_sample);
                 let done = done.map_err(|error| outfit.named(error))?;
                 (done.positions, done.garments.iter().map(|g| 1e3 * g.time.as_secs_f64()).collect())
             }
@@ -106,15 +106,15 @@ impl Draper {
         watch: &mut dyn FnMut(f64),
         surface: &Surface<f64>,
         parts: &[&[[f64; 3]]],
-        at_the_end: &dyn Fn() -> Waypoint,
+        final_sample: &dyn Fn() -> PathSample,
     ) -> Result<Resolved, DraperError> {
         let (layers, settings) = (outfit.layers(parts), &self.settings.post_process);
         let mut carried = None;
-        if let Some(Last { body: state, drape, bearable }) = last {
+        if let Some(PreviousFrame { body: state, drape, retry }) = last {
             let between = |share: f64| {
                 watch(share);
                 match share {
-                    1.0 => Ok(at_the_end()),
+                    1.0 => Ok(final_sample()),
                     _ => {
                         let place = add_scaled(state.place, share, sub(body.place, state.place));
                         self.stage(&self.model, outfit, body, state.pose.between(&body.pose, share), place)
@@ -122,21 +122,21 @@ impl Draper {
                 }
             };
             carried = resolve_after(drape.reached(), surface, &layers, settings, between)?;
-            if let Some(done) = carried.take_if(|done| bearable.is_met(&done.certificate)) {
+            if let Some(done) = carried.take_if(|done| retry.is_met(&done.certificate)) {
                 return Ok(done);
             }
         }
         let from_t_pose = |share: f64| {
             watch(share);
-            let pose = body.pose.on_the_way(share);
+            let pose = body.pose.scaled_keeping_heading(share);
             let stage = self.stage(&self.uncorrected, outfit, body, pose, body.place)?;
             Ok::<_, DraperError>(match share {
                 // The surface is known here only.
-                1.0 => Waypoint { draped: stage.draped, ..at_the_end() },
+                1.0 => PathSample { draped: stage.draped, ..final_sample() },
                 _ => stage,
             })
         };
-        let anew = resolve_along(surface, &layers, &at_the_end().skinned, settings, from_t_pose)?;
+        let anew = resolve_along(surface, &layers, &final_sample().skinned, settings, from_t_pose)?;
         // What carries on does not pop.
         Ok(match carried {
             Some(carried) => carried.or(anew),

@@ -1,4 +1,5 @@
-//! Any body, any garments, in order: the trained networks as a dataset.
+//! Inference. In: a trained model, any garments in their order, any body. Out: draped garments, with a certificate of what still
+//! intersects.
 //!
 //! ```no_run
 //! use clothcombo_data::asset::Pose;
@@ -10,8 +11,8 @@
 //! let garments = ["t_shirt_000003", "skirt_000005"].map(|name| catalog.find(name, draper.body(), None));
 //! let outfit = draper.outfit(garments.into_iter().collect::<Result<_, _>>()?)?;
 //! let drape = draper.drape(&outfit, &BodyState::new(vec![1.0, -0.5], Pose::t_pose(22)))?;
-//! for (piece, draped) in outfit.pieces.iter().zip(&drape.garments) {
-//!     println!("{}: {} vertices", piece.name, draped.positions.len());
+//! for (garment, draped) in outfit.garments.iter().zip(&drape.garments) {
+//!     println!("{}: {} vertices", garment.name, draped.positions.len());
 //! }
 //! # Ok::<(), clothcombo_trainer::inference::DraperError>(())
 //! ```
@@ -27,11 +28,12 @@ mod correct;
 pub mod descent;
 mod drape;
 pub(crate) mod draped;
+mod embedded;
 mod error;
 mod frame;
 mod motion;
 mod names;
-mod networked;
+mod network_drape;
 pub mod networks;
 mod outfit;
 pub mod output;
@@ -43,15 +45,17 @@ mod shipped;
 mod smooth;
 mod source;
 mod temporal_filter;
+pub mod tensor_store;
 
 pub use acceleration::{Acceleration, acceleration};
 pub use clothcombo_physics::contact::resolve::Certificate;
 pub use drape::{Drape, GarmentDrape};
 pub use draped::Draped;
+pub use embedded::GarmentTimes;
 pub use error::DraperError;
 pub use motion::DrapeProgress;
 pub use names::UniqueNames;
-pub use outfit::{MAX_GARMENTS, MAX_VERTICES, Outfit, Piece, PieceTimes};
+pub use outfit::{MAX_GARMENTS, MAX_VERTICES, Outfit, OutfitGarment};
 pub use phase_times::PhaseTimes;
 pub use refine::{Refinement, refine};
 pub use report::{BodyReport, FrameReport, GarmentReport, ModelReport, Moment, Report, Stage};
@@ -59,16 +63,16 @@ pub use shipped::shipped_model;
 pub use smooth::{Smoothing, smooth};
 pub use source::{GarmentCatalog, SourceGarment};
 
-use crate::dataset::{ActiveJoints, DatasetError, Preprocessor, load_body};
+use crate::dataset::{ActiveJoints, CachePolicy, DatasetError, Preprocessor, load_body};
 use crate::run::checkpoint::TrainedModel;
 use crate::system::device::Backend;
 use burn::tensor::Device;
 use clothcombo_data::asset::{Body, Pose};
-use clothcombo_data::cache::{ArrayCache, Key, body_key};
+use clothcombo_data::cache::ArrayCache;
 use clothcombo_model::ClothCombo;
 use clothcombo_physics::contact::resolve::ResolveSettings;
+use embedded::EmbeddedGarments;
 use frame::Frame;
-use outfit::KnownGarments;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -80,7 +84,7 @@ pub struct DraperSettings {
     pub body: Option<String>,
     /// Folder of the on-disk cache of bindings, operators and embeddings; none computes them anew in every process.
     pub cache: Option<PathBuf>,
-    /// Largest size of the cache [bytes].
+    /// Largest size of the cache (bytes).
     pub cache_limit: u64,
     /// The compute device.
     pub backend: Backend,
@@ -118,10 +122,10 @@ pub struct BodyState {
     pub shape: Vec<f64>,
     /// Pose θ.
     pub pose: Pose,
-    /// The posed surface `[V, 3]` [m] that counts for contact, where it is known better than by shape and pose: a scan, or
+    /// The posed surface `[V, 3]` (m) that counts for contact, where it is known better than by shape and pose: a scan, or
     /// another program's correctives.
     pub surface: Option<Vec<[f64; 3]>>,
-    /// Where its pelvis stands [m]; `surface` is there already.
+    /// Where its pelvis stands (m); `surface` is there already.
     pub place: [f64; 3],
 }
 
@@ -136,13 +140,13 @@ impl BodyState {
 pub struct Draper {
     trained: TrainedModel,
     model: ClothCombo,
-    /// The same without corrections, for poses on the way from the T-pose: that leaves fewer crossings (docs/resolve.md).
+    /// The same without corrections, for samples of the continuation path from the T-pose: that leaves fewer intersections (docs/resolve.md).
     uncorrected: ClothCombo,
     preprocessor: Preprocessor,
     joints: ActiveJoints,
     device: Device,
     settings: DraperSettings,
-    known: KnownGarments,
+    embedded: EmbeddedGarments,
 }
 
 impl Draper {
@@ -168,8 +172,10 @@ impl Draper {
         }
         let cache = settings.cache.as_deref().map(|folder| ArrayCache::open(folder, settings.cache_limit));
         let cache = cache.transpose().map_err(DatasetError::data)?;
-        let key: Option<Key> = cache.as_ref().map(|_| body_key(&body));
-        let preprocessor = Preprocessor::new(&trained.config, Arc::new(body));
+        let mut preprocessor = Preprocessor::new(&trained.config, Arc::new(body));
+        if let Some(cache) = cache {
+            preprocessor = preprocessor.with_cache(cache, CachePolicy::Optional);
+        }
         let settings = settings.clone();
         Ok(Self {
             trained,
@@ -179,7 +185,7 @@ impl Draper {
             joints,
             device,
             settings,
-            known: KnownGarments::new(cache.zip(key)),
+            embedded: EmbeddedGarments::default(),
         })
     }
 
@@ -211,7 +217,10 @@ impl Draper {
     /// # Errors
     /// For more garments than an outfit may have, or one that cannot be prepared.
     pub fn outfit(&self, garments: Vec<SourceGarment>) -> Result<Outfit, DraperError> {
-        self.known.outfit(self, garments)
+        Outfit::check(&garments)?;
+        let embedded = garments.iter().map(|source| self.embedded.get(self, source));
+        let embedded = embedded.collect::<Result<_, _>>()?;
+        Outfit::new(self, garments, embedded)
     }
 
     /// Drapes `outfit` on `body`.
@@ -219,7 +228,7 @@ impl Draper {
     /// # Errors
     /// When shape or pose do not fit the body model, or the networks diverge.
     pub fn drape(&self, outfit: &Outfit, body: &BodyState) -> Result<Drape, DraperError> {
-        let made = self.networked(&self.model, outfit, body)?;
+        let made = self.network_drape(&self.model, outfit, body)?;
         self.drape_frame(outfit, Frame { body, last: None }, made, &mut |_| ())
     }
 

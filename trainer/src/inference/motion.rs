@@ -1,11 +1,11 @@
 //! A motion: each frame carries on from the one before, and what that leaves over from the one after.
 
-use super::frame::{Frame, Last};
+use super::frame::{Frame, PreviousFrame};
 use super::temporal_filter::TemporalFilter;
 use super::{BodyState, Certificate, Drape, Draper, DraperError, Outfit};
 
 /// So many frames after one that was left with flaws only carry on: poses change slowly, and starting anew takes seconds.
-const FRAMES_CARRIED: usize = 15;
+const FRAMES_WITHOUT_RETRY: usize = 15;
 
 /// Flaws that carrying on from another frame may leave.
 #[derive(Clone, Copy, Debug)]
@@ -31,9 +31,9 @@ impl RetryPolicy {
 /// How far [`Draper::drape_motion`] is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum DrapeProgress {
-    /// The post-process looks at a pose at this share of the way to the frame: from the one before it, or, where that leaves
+    /// The post-process looks at a pose at this share of the continuation path to the frame: from the one before it, or, where that leaves
     /// crossings, from the T-pose.
-    OnTheWay(f64),
+    Continuation(f64),
     /// One more frame is draped.
     Draped,
     /// The frame of this number is draped once more, from the one after it.
@@ -44,7 +44,7 @@ impl Draper {
     /// Drapes `outfit` on each of `bodies`, the frames of a motion. What the networks make is averaged over `radius` frames to each
     /// side before the post-process; 0 takes each frame as it is. The post-process carries on from frame to frame; where a frame is
     /// left with crossings or torn cloth, and the one after it with less and no crossings, it carries on backwards from that one as
-    /// well. `progress` is called on the way to each frame, after it, and before each that is draped once more.
+    /// well. `progress` is called on the path to each frame, after it, and before each that is draped once more.
     ///
     /// # Errors
     /// When shape or pose do not fit the body model, or the networks diverge.
@@ -56,18 +56,19 @@ impl Draper {
         mut progress: impl FnMut(DrapeProgress),
     ) -> Result<Vec<Drape>, DraperError> {
         let mut drapes: Vec<Drape> = Vec::with_capacity(bodies.len());
-        let (mut bearable, mut only_carried) = (RetryPolicy::NONE, 0);
-        let steady = TemporalFilter::new(self, outfit, bodies, radius);
-        for ((frame, body), made) in bodies.iter().enumerate().zip(steady) {
-            let last = drapes.last().map(|drape| Last { body: &bodies[frame - 1], drape, bearable });
-            let mut watch = |share| progress(DrapeProgress::OnTheWay(share));
+        let (mut retry, mut frames_without_retry) = (RetryPolicy::NONE, 0);
+        let filtered = TemporalFilter::new(self, outfit, bodies, radius);
+        for ((frame, body), made) in bodies.iter().enumerate().zip(filtered) {
+            let last = drapes.last().map(|drape| PreviousFrame { body: &bodies[frame - 1], drape, retry });
+            let mut watch = |share| progress(DrapeProgress::Continuation(share));
             let mut drape = self.drape_frame(outfit, Frame { body, last }, made?, &mut watch)?;
-            if !bearable.is_met(&drape.certificate) {
-                (bearable, only_carried) = (RetryPolicy::after(&drape.certificate), FRAMES_CARRIED);
-            } else if only_carried > 1 {
-                only_carried -= 1;
+            if !retry.is_met(&drape.certificate) {
+                (retry, frames_without_retry) =
+                    (RetryPolicy::after(&drape.certificate), FRAMES_WITHOUT_RETRY);
+            } else if frames_without_retry > 1 {
+                frames_without_retry -= 1;
             } else {
-                (bearable, only_carried) = (RetryPolicy::NONE, 0);
+                (retry, frames_without_retry) = (RetryPolicy::NONE, 0);
             }
             if bodies.len() > 1 {
                 drape.slim();
@@ -83,10 +84,10 @@ impl Draper {
             |drape| &drape.certificate,
             |frame, own, after| {
                 progress(DrapeProgress::Again(frame));
-                let last = Last { body: &bodies[frame + 1], drape: after, bearable: RetryPolicy::ALL };
-                let mut watch = |share| progress(DrapeProgress::OnTheWay(share));
+                let last = PreviousFrame { body: &bodies[frame + 1], drape: after, retry: RetryPolicy::ALL };
+                let mut watch = |share| progress(DrapeProgress::Continuation(share));
                 let body = &bodies[frame];
-                let mut made = self.networked(&self.model, outfit, body)?;
+                let mut made = self.network_drape(&self.model, outfit, body)?;
                 made.network = own.garments.iter().flat_map(|garment| &garment.network).copied().collect();
                 let mut again =
                     self.drape_frame(outfit, Frame { body, last: Some(last) }, made, &mut watch)?;
@@ -105,7 +106,7 @@ impl Draper {
     }
 }
 
-/// From the last frame to the first: `again` makes better what has flaws, from the frame after it, where that has fewer and no
+/// From the last frame to the first: `again` improves what has flaws, from the frame after it, where that has fewer and no
 /// crossings.
 fn carry_back<T, E>(
     frames: &mut [T],
@@ -132,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn after_a_frame_that_could_not_be_mended_crossings_are_borne_but_no_growing_tears() {
+    fn after_a_frame_with_flaws_crossings_are_allowed_but_no_growing_tears() {
         for (certificate, at_first, after_crossings, after_tears) in [
             (left(0, 0.4), true, true, true),
             (left(0, -0.4), true, true, true),
@@ -158,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_are_mended_from_clear_ones_after_them_as_far_as_that_goes() {
+    fn frames_with_flaws_are_improved_from_clear_ones_after_them() {
         let crossings =
             |frames: &[Certificate]| frames.iter().map(Certificate::crossings).collect::<Vec<_>>();
         let mut frames = [5, 4, 3, 0, 2, 0, 7].map(|crossings| left(crossings, 0.0));
@@ -176,7 +177,7 @@ mod tests {
         assert!(found.is_ok());
         assert_eq!(asked, [(4, 2), (2, 3), (1, 4)]);
         assert_eq!(crossings(&frames), [5, 1, 0, 0, 0, 0, 7]);
-        // Torn cloth is mended as well, and from what is torn less.
+        // Torn cloth is improved as well, from cloth that is torn less.
         let mut torn = [left(0, 2.0), left(0, 1.5), left(2, 0.0), left(0, 0.5)];
         let mut asked = Vec::new();
         let found: Result<(), String> = carry_back(

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
 
-/// Wall time by phase [ms]; all garments together.
+/// Wall time by phase (ms); all garments together.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PhaseTimes {
     /// Binding, constants of the energies, operators.
@@ -12,12 +12,10 @@ pub struct PhaseTimes {
     pub embedding: f64,
     /// Shape, pose and skinning transforms.
     pub posing: f64,
-    /// Every garment on its own.
-    pub draping: f64,
-    /// The garments against each other.
-    pub untangling: f64,
-    /// The correction networks.
-    pub correcting: f64,
+    /// The forward pass: single draping, skinning and untangling.
+    pub networks: f64,
+    /// The correction steps.
+    pub corrections: f64,
     /// The static solver, if asked for.
     pub refine: f64,
     /// The post-process, without its certificate.
@@ -32,9 +30,8 @@ impl AddAssign for PhaseTimes {
             (&mut self.preparation, other.preparation),
             (&mut self.embedding, other.embedding),
             (&mut self.posing, other.posing),
-            (&mut self.draping, other.draping),
-            (&mut self.untangling, other.untangling),
-            (&mut self.correcting, other.correcting),
+            (&mut self.networks, other.networks),
+            (&mut self.corrections, other.corrections),
             (&mut self.refine, other.refine),
             (&mut self.resolve, other.resolve),
             (&mut self.certificate, other.certificate),
@@ -46,14 +43,13 @@ impl AddAssign for PhaseTimes {
 
 impl PhaseTimes {
     /// Every phase with its name, in order.
-    pub fn phases(&self) -> [(&'static str, f64); 9] {
+    pub fn phases(&self) -> [(&'static str, f64); 8] {
         [
             ("preparation", self.preparation),
             ("embedding", self.embedding),
             ("posing", self.posing),
-            ("draping", self.draping),
-            ("untangling", self.untangling),
-            ("correcting", self.correcting),
+            ("networks", self.networks),
+            ("corrections", self.corrections),
             ("refine", self.refine),
             ("resolve", self.resolve),
             ("certificate", self.certificate),

@@ -9,7 +9,7 @@ use std::ops::ControlFlow;
 /// No vertex moves farther than this in one step [m]: less than the thickness of a limb, so that no vertex passes through
 /// one.
 const STEP_BOUND: f64 = 0.005;
-/// Refinement ends where a vertex has come farther than this from where the networks left it [m].
+/// Refinement ends where a vertex has come farther than this from where the networks left it (m).
 const REACH: f64 = 0.05;
 
 /// What the refinement did.
@@ -19,15 +19,15 @@ pub struct Refinement {
     pub steps: usize,
     /// Why it stopped.
     pub stop: String,
-    /// Weighted sum of all energies before [J].
+    /// Weighted sum of all energies before (J).
     pub energy_before: f64,
-    /// And after [J]; never more.
+    /// And after (J); never more.
     pub energy_after: f64,
-    /// Farthest way of a vertex [mm].
+    /// Farthest displacement of a vertex (mm).
     pub largest_move_mm: f64,
 }
 
-/// Lowers `energy` from `start` `[ΣV, 3]` [m] for at most `steps` steps.
+/// Lowers `energy` from `start` `[ΣV, 3]` (m) for at most `steps` steps.
 ///
 /// # Errors
 /// When the energy at the start is not finite.

@@ -38,7 +38,7 @@ pub struct BodyReport {
     pub vertices: usize,
     /// Triangles.
     pub triangles: usize,
-    /// For a body recovered from meshes: mean distance of its vertices to theirs [mm].
+    /// For a body recovered from meshes: mean distance of its vertices to theirs (mm).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub recovered_within_mm: Option<f64>,
 }
@@ -73,7 +73,7 @@ pub struct GarmentReport {
 pub struct FrameReport {
     /// Number in the motion.
     pub frame: usize,
-    /// Its time [s].
+    /// Its time (s).
     pub seconds: f64,
     /// Wall time.
     pub milliseconds: PhaseTimes,
@@ -122,7 +122,7 @@ pub struct Report {
 pub struct Moment {
     /// Number in the motion.
     pub frame: usize,
-    /// Time [s].
+    /// Time (s).
     pub seconds: f64,
 }
 
@@ -142,9 +142,9 @@ impl Report {
         let first = &drapes[0];
         let mut milliseconds = PhaseTimes::default();
         drapes.iter().for_each(|drape| milliseconds += drape.milliseconds);
-        for piece in &outfit.pieces {
-            milliseconds.preparation += piece.milliseconds.preparation;
-            milliseconds.embedding += piece.milliseconds.embedding;
+        for garment in &outfit.garments {
+            milliseconds.preparation += garment.milliseconds.preparation;
+            milliseconds.embedding += garment.milliseconds.embedding;
         }
         let (certificate_before, (before, after)) = rayon::join(
             || first.certificate_before(draper, outfit),
@@ -172,7 +172,7 @@ impl Report {
             before: before?,
             after: after?,
             milliseconds,
-            certificate: combined(drapes),
+            certificate: Certificate::of_frames(drapes.iter().map(|drape| &drape.certificate)),
             certificate_before: Certificate { remaining: Vec::new(), ..certificate_before? },
             refinement: first.refinement.clone(),
             smoothing,
@@ -200,12 +200,12 @@ impl Drape {
         let refused = |e: &dyn std::fmt::Display| DatasetError::Data(e.to_string());
         let body = TriMesh::new(self.body.clone(), draper.body().faces.to_vec()).map_err(|e| refused(&e))?;
         let garments: Vec<DrapedGarment> = outfit
-            .pieces
+            .garments
             .iter()
             .zip(&self.garments)
-            .map(|(piece, drape)| DrapedGarment {
-                name: &piece.name,
-                rest: &piece.prepared.garment.rest,
+            .map(|(garment, drape)| DrapedGarment {
+                name: &garment.name,
+                rest: &garment.prepared.garment.rest,
                 positions: match stage {
                     Stage::BeforeResolve => &drape.before,
                     Stage::Result => &drape.positions,
@@ -218,13 +218,13 @@ impl Drape {
 }
 
 fn garment_reports(outfit: &Outfit, drapes: &[Drape]) -> Vec<GarmentReport> {
-    let all: usize = outfit.pieces.iter().map(|p| p.prepared.vertex_count()).sum();
-    let report = |(index, piece): (usize, &super::Piece)| {
-        let vertices = piece.prepared.vertex_count();
+    let all: usize = outfit.garments.iter().map(|p| p.prepared.vertex_count()).sum();
+    let report = |(index, garment): (usize, &super::OutfitGarment)| {
+        let vertices = garment.prepared.vertex_count();
         let share = vertices as f64 / all.max(1) as f64;
         let mut times = PhaseTimes {
-            preparation: piece.milliseconds.preparation,
-            embedding: piece.milliseconds.embedding,
+            preparation: garment.milliseconds.preparation,
+            embedding: garment.milliseconds.embedding,
             ..PhaseTimes::default()
         };
         for drape in drapes {
@@ -232,9 +232,8 @@ fn garment_reports(outfit: &Outfit, drapes: &[Drape]) -> Vec<GarmentReport> {
             let own: f64 = drape.garments.iter().map(|g| g.resolve_ms).sum();
             times += PhaseTimes {
                 posing: share * shared.posing,
-                draping: share * shared.draping,
-                untangling: share * shared.untangling,
-                correcting: share * shared.correcting,
+                networks: share * shared.networks,
+                corrections: share * shared.corrections,
                 refine: share * shared.refine,
                 resolve: drape.garments[index].resolve_ms + share * (shared.resolve - own),
                 certificate: share * shared.certificate,
@@ -242,53 +241,16 @@ fn garment_reports(outfit: &Outfit, drapes: &[Drape]) -> Vec<GarmentReport> {
             };
         }
         GarmentReport {
-            name: piece.name.clone(),
-            given: piece.source.path.clone(),
-            given_vertices: piece.source.given.positions.len(),
+            name: garment.name.clone(),
+            given: garment.source.path.clone(),
+            given_vertices: garment.source.given.positions.len(),
             vertices,
-            triangles: piece.prepared.garment.rest.face_count(),
-            category: piece.prepared.garment.category,
-            fit: piece.source.fit.clone(),
-            embedding_known: piece.embedding_known,
+            triangles: garment.prepared.garment.rest.face_count(),
+            category: garment.prepared.garment.category,
+            fit: garment.source.fit.clone(),
+            embedding_known: garment.embedding_known,
             milliseconds: times,
         }
     };
-    outfit.pieces.iter().enumerate().map(report).collect()
-}
-
-/// One certificate for all frames.
-fn combined(drapes: &[Drape]) -> Certificate {
-    let mut sum = drapes[0].certificate.clone();
-    for more in drapes[1..].iter().map(|d| &d.certificate) {
-        sum.body_triangle_pairs += more.body_triangle_pairs;
-        sum.layer_triangle_pairs += more.layer_triangle_pairs;
-        sum.self_triangle_pairs += more.self_triangle_pairs;
-        sum.contour_length_mm += more.contour_length_mm;
-        sum.vertices_inside += more.vertices_inside;
-        sum.narrow_triangle_pairs += more.narrow_triangle_pairs;
-        sum.pinched.body_triangle_pairs += more.pinched.body_triangle_pairs;
-        sum.pinched.layer_triangle_pairs += more.pinched.layer_triangle_pairs;
-        sum.pinched.self_triangle_pairs += more.pinched.self_triangle_pairs;
-        sum.max_depth_mm = sum.max_depth_mm.max(more.max_depth_mm);
-        sum.mean_depth_mm = sum.mean_depth_mm.max(more.mean_depth_mm);
-        sum.order_violations = sum.order_violations.max(more.order_violations);
-        sum.strain_added = match (sum.strain_added, more.strain_added) {
-            (Some(a), Some(b)) => Some(a.max(b)),
-            (a, b) => a.or(b),
-        };
-        for (own, more) in sum.garments.iter_mut().zip(&more.garments) {
-            own.body_triangle_pairs += more.body_triangle_pairs;
-            own.layer_triangle_pairs += more.layer_triangle_pairs;
-            own.self_triangle_pairs += more.self_triangle_pairs;
-            own.strain_joule = own.strain_joule.max(more.strain_joule);
-        }
-        for (own, more) in sum.layers.iter_mut().zip(&more.layers) {
-            own.triangle_pairs += more.triangle_pairs;
-            own.order_violations = own.order_violations.max(more.order_violations);
-        }
-    }
-    if drapes.len() > 1 {
-        sum.remaining.clear();
-    }
-    sum
+    outfit.garments.iter().enumerate().map(report).collect()
 }

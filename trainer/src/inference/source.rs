@@ -5,11 +5,11 @@ use crate::config::Config;
 use crate::dataset::{DatasetError, GarmentLoader, GarmentSource};
 use crate::score::misplaced;
 use clothcombo_data::asset::{Body, Category, Garment, Provenance};
-use clothcombo_data::check::MeshMeasures;
 use clothcombo_data::dataset::list_garment_folder;
 use clothcombo_data::fit::{FitReport, FitSettings, fit, is_on_body};
 use clothcombo_data::format::{PolygonMesh, load_mesh};
 use clothcombo_data::generate::GarmentGenerator;
+use clothcombo_data::mesh::MeshMeasures;
 use clothcombo_physics::mesh::{Topology, TriMesh};
 use clothcombo_physics::query::VertexIndex;
 use std::collections::HashMap;
@@ -166,11 +166,11 @@ impl GarmentCatalog {
             name: name.to_owned(),
             known: self.names.clone(),
         })?;
-        let maker = GarmentLoader::new(body, std::slice::from_ref(origin))?;
+        let loader = GarmentLoader::new(body, std::slice::from_ref(origin))?;
         let GarmentSource::File(listed) = origin else {
-            return Ok(SourceGarment::new(maker.make(origin)?));
+            return Ok(SourceGarment::new(loader.load(origin)?));
         };
-        let made = maker.make(origin);
+        let made = loader.load(origin);
         let must_fit = always_fit.unwrap_or_else(|| {
             !made.as_ref().is_ok_and(|garment| is_clean(&garment.rest) && is_on_body(&garment.rest, body))
         });

@@ -1,9 +1,9 @@
-//! Networks that hold still: what they make of the frames of a motion, averaged over neighbouring frames.
+//! Temporal filter: what the networks make of the frames of a motion, averaged over neighbouring frames.
 //!
 //! A network knows one pose at a time, and a correction is taken or not: from frame to frame a drape may jump by a millimetre
 //! where the body hardly moves. What is averaged is as in [`super::smooth`]; the post-process comes after it.
 
-use super::networked::Networked;
+use super::network_drape::NetworkDrape;
 use super::smooth::{averaged, binomial};
 use super::{BodyState, Draper, DraperError, Outfit};
 use clothcombo_physics::transform::{into_frame, out_of_frame};
@@ -19,7 +19,7 @@ pub(super) struct TemporalFilter<'a> {
     /// The frame that comes next.
     next: usize,
     /// What was made of it and of frames after it.
-    made: VecDeque<Networked>,
+    made: VecDeque<NetworkDrape>,
     /// Offsets from skinning in the frames of the skinning transforms, of those and of the frames before that are averaged.
     offsets: BTreeMap<usize, Vec<[f64; 3]>>,
 }
@@ -37,7 +37,7 @@ impl<'a> TemporalFilter<'a> {
     fn make(&mut self) -> Result<(), DraperError> {
         let radius = self.weights.len() / 2;
         for frame in self.next + self.made.len()..self.bodies.len().min(self.next + radius + 1) {
-            let made = self.draper.networked(&self.draper.model, self.outfit, &self.bodies[frame])?;
+            let made = self.draper.network_drape(&self.draper.model, self.outfit, &self.bodies[frame])?;
             if radius > 0 {
                 self.offsets.insert(frame, offsets(&made));
             }
@@ -49,7 +49,7 @@ impl<'a> TemporalFilter<'a> {
 }
 
 impl Iterator for TemporalFilter<'_> {
-    type Item = Result<Networked, DraperError>;
+    type Item = Result<NetworkDrape, DraperError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         if let Err(error) = self.make() {
@@ -66,7 +66,7 @@ impl Iterator for TemporalFilter<'_> {
     }
 }
 
-fn offsets(made: &Networked) -> Vec<[f64; 3]> {
+fn offsets(made: &NetworkDrape) -> Vec<[f64; 3]> {
     let vertices = made.network.iter().zip(&made.skinned).zip(&made.transforms);
     vertices.map(|((p, start), transform)| into_frame(transform, sub(*p, *start))).collect()
 }

@@ -32,7 +32,7 @@ pub enum View {
 }
 
 impl View {
-    /// Azimuth and elevation [radians].
+    /// Azimuth and elevation (radians).
     pub fn angles(self) -> (f64, f64) {
         let level = 4_f64.to_radians();
         match self {
@@ -66,9 +66,9 @@ pub struct Camera {
     /// Rows: right, up and towards the camera, in world coordinates.
     axes: [[f64; 3]; 3],
     centre: [f64; 3],
-    /// From the centre to the eye [m].
+    /// From the centre to the eye (m).
     distance: f64,
-    /// Depths [m] that map to −1 and +1.
+    /// Depths (m) that map to −1 and +1.
     near: f64,
     far: f64,
     /// Centre and half extents of the picture on the plane at depth 1.
@@ -152,7 +152,7 @@ impl Camera {
         camera
     }
 
-    /// Position relative to the framed centre along right, up and towards the camera [m].
+    /// Position relative to the framed centre along right, up and towards the camera (m).
     fn to_camera(&self, p: [f64; 3]) -> [f64; 3] {
         let offset: [f64; 3] = std::array::from_fn(|axis| p[axis] - self.centre[axis]);
         self.rotate(offset)
@@ -163,7 +163,7 @@ impl Camera {
         self.axes.map(|row| row[0] * direction[0] + row[1] * direction[1] + row[2] * direction[2])
     }
 
-    /// Where a world position [m] lies in the picture; `None` if it is not finite or outside the depth range.
+    /// Where a world position (m) lies in the picture; `None` if it is not finite or outside the depth range.
     pub fn project(&self, p: [f64; 3]) -> Option<Projected> {
         let [x, y, z] = self.to_camera(p);
         let depth = self.distance - z;
@@ -178,7 +178,7 @@ impl Camera {
         Some(Projected { ndc, depth: 2.0 * (near - 1.0 / depth) / (near - far) - 1.0 })
     }
 
-    /// Inverse of the depth of [`Self::project`]: distance towards the camera from the framed centre [m].
+    /// Inverse of the depth of [`Self::project`]: distance towards the camera from the framed centre (m).
     pub fn height_of_depth(&self, depth: f64) -> f64 {
         let (near, far) = (1.0 / self.near, 1.0 / self.far);
         self.distance - 1.0 / (near - 0.5 * (depth + 1.0) * (near - far))

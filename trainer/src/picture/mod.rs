@@ -1,5 +1,5 @@
-//! Pictures of a run, made without a GPU: shaded renders of body and garments, labelled sheets of them,
-//! charts.
+//! Pictures. In: positions, faces and numbers. Out: shaded renders of bodies and garments, labelled sheets of them, charts; all made
+//! without a GPU.
 //!
 //! Nothing here knows a network or a dataset: positions and faces come in as plain slices, pictures go out as
 //! [`image::RgbImage`], and [`save_png`] writes them whole or not at all. Input that cannot be drawn (a vertex that
@@ -50,9 +50,9 @@ pub enum PictureError {
     /// The PNG encoder refused the picture.
     #[error("cannot encode a picture of {width}x{height} pixels as PNG: {source}")]
     Encode {
-        /// Width [pixels].
+        /// Width (pixels).
         width: u32,
-        /// Height [pixels].
+        /// Height (pixels).
         height: u32,
         /// What the encoder said.
         source: image::ImageError,

@@ -8,13 +8,13 @@ use super::palette::{BODY_COLOUR, layer_colour};
 use super::render::{Figure, render};
 use super::sheet::{LegendEntry, Sheet, SheetRow};
 
-/// Width and height of one view [pixels].
+/// Width and height of one view (pixels).
 const CELL: [u32; 2] = [340, 540];
 /// Garments named on one line of the legend, from inner to outer.
 const NAMES_PER_LINE: usize = 3;
 const VIEWS: [View; 3] = [View::Front, View::Back, View::ThreeQuarter];
 
-/// Positions [m] and faces of a mesh.
+/// Positions (m) and faces of a mesh.
 pub type MeshSlices<'a> = (&'a [[f64; 3]], &'a [[u32; 3]]);
 
 /// A dressed body.
@@ -24,7 +24,7 @@ pub struct DressedRow<'a> {
     pub label: String,
     /// The body.
     pub body: MeshSlices<'a>,
-    /// Where it faces: the angle about the vertical from +z towards +x [rad].
+    /// Where it faces: the angle about the vertical from +z towards +x (rad).
     pub heading: f64,
     /// Its garments, innermost first.
     pub garments: Vec<MeshSlices<'a>>,

@@ -17,14 +17,14 @@ use super::shade::{Sample, Samples, shade};
 const BANDS: usize = 8;
 /// Samples per pixel along each axis while the picture stays below [`SAMPLE_LIMIT`].
 const SUPERSAMPLING: u32 = 2;
-/// Samples of the whole picture above which it is drawn with one sample per pixel [samples].
+/// Samples of the whole picture above which it is drawn with one sample per pixel (samples).
 const SAMPLE_LIMIT: u64 = 1 << 25;
-/// Largest side of a picture [pixels].
+/// Largest side of a picture (pixels).
 const SIDE_LIMIT: u32 = 16_384;
 /// Bounding boxes one figure may fill, in pictures. Only cloth that has blown up needs more; without the limit its
 /// thousands of picture-sized triangles would take minutes.
 const FILL_BUDGET: f64 = 24.0;
-/// Distance from the middle of the picture [half pictures] beyond which a vertex is not drawn: the rasteriser counts
+/// Distance from the middle of the picture (half pictures) beyond which a vertex is not drawn: the rasteriser counts
 /// pixels in 32 bits and must never see one that does not fit.
 const REACH: f64 = 1000.0;
 /// In place of a vertex that is not drawn; no face refers to it.
@@ -33,7 +33,7 @@ const NOWHERE: Projected = Projected { ndc: [0.0; 2], depth: 2.0 };
 /// A triangle mesh to draw.
 #[derive(Clone, Copy, Debug)]
 pub struct Figure<'a> {
-    /// Vertex positions [m]. A vertex that is not finite, or very far off, leaves its faces out of the picture.
+    /// Vertex positions (m). A vertex that is not finite, or very far off, leaves its faces out of the picture.
     pub positions: &'a [[f64; 3]],
     /// Vertex indices per face, counter-clockwise seen from outside. A face that names no vertex is left out.
     pub faces: &'a [[u32; 3]],
@@ -82,7 +82,7 @@ pub fn render_with_camera(figures: &[Figure<'_>], camera: &Camera, size: [u32; 2
     shade(&samples, &colours)
 }
 
-/// A figure on its way into the picture.
+/// A figure as it is projected into the picture.
 struct ProjectedMesh {
     /// Per vertex; [`NOWHERE`] for one that is not drawn.
     vertices: Vec<Projected>,

@@ -14,12 +14,12 @@ const GROUND: [f32; 3] = [0.16, 0.15, 0.14];
 /// Light the back of a surface keeps, and how far its colour goes to grey.
 const BACK_LIGHT: f32 = 0.36;
 const BACK_GREY: f32 = 0.35;
-/// Reach of contact shade [m] and its strength.
+/// Reach of contact shade (m) and its strength.
 const CONTACT_REACH: f32 = 0.04;
 const CONTACT_STRENGTH: f32 = 1.9;
 /// Samples of contact shade around each visible sample.
 const CONTACT_SAMPLES: usize = 10;
-/// Step towards the camera that draws an outline within one figure [m], and what an outline leaves of the light.
+/// Step towards the camera that draws an outline within one figure (m), and what an outline leaves of the light.
 const OUTLINE_STEP: f32 = 0.015;
 const OUTLINE_LIGHT: f32 = 0.58;
 /// Background: middle and edge of the picture (sRGB).
@@ -72,7 +72,7 @@ impl Sample {
 
 /// A rasterised picture before lighting.
 pub(super) struct Samples {
-    /// Width and height [samples].
+    /// Width and height (samples).
     pub(super) size: [usize; 2],
     /// Samples per pixel along each axis.
     pub(super) supersampling: usize,
@@ -80,7 +80,7 @@ pub(super) struct Samples {
     pub(super) pixels_per_metre: f32,
     /// Row-major.
     pub(super) surface: Vec<Sample>,
-    /// Distance towards the camera [m], row-major.
+    /// Distance towards the camera (m), row-major.
     pub(super) height: Vec<f32>,
 }
 
@@ -142,7 +142,7 @@ fn lit(
     })
 }
 
-/// Offsets [samples] of the contact-shade samples in four turns, one per position in a 2×2 block, so that averaging
+/// Offsets (samples) of the contact-shade samples in four turns, one per position in a 2×2 block, so that averaging
 /// over a pixel multiplies their number.
 fn contact_offsets(pixels_per_metre: f32) -> [Vec<[i32; 2]>; 4] {
     // A wild camera (everything in one point, or kilometres wide) must not sample the whole picture or one sample.

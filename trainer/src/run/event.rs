@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// One optimiser step, as it stands in `metrics.jsonl`.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct StepRecord {
     /// Steps done, this one included (the first step is 1).
     pub step: u64,
@@ -19,8 +19,8 @@ pub struct StepRecord {
     pub layers: usize,
     /// Share of the full pose.
     pub pose_scale: f64,
-    /// Weighted sum that was minimised, mean over the step's bodies: that of `weighted` and, where `losses.alone` counts, the
-    /// losses of the garments draped alone. Where corrections learn, it is the mean over what each of them leads to, and the
+    /// Weighted sum that was minimised, mean over the step's bodies: that of `weighted` and, where `losses.single_garments` counts, the
+    /// losses of the single garments. Where corrections learn, it is the mean over what each of them leads to, and the
     /// energies below are those of the last.
     pub loss: f64,
     /// Raw energies, summed over garments or pairs, mean over the step's bodies; terms that were not evaluated are
@@ -33,15 +33,15 @@ pub struct StepRecord {
     pub grad_norm: f64,
     /// Adam's step size.
     pub lr: f64,
-    /// Wall-clock time of the step [s].
+    /// Wall-clock time of the step (s).
     pub seconds: f64,
-    /// Part of `seconds` spent waiting for the scene to be prepared [s].
+    /// Part of `seconds` spent waiting for the scene to be prepared (s).
     pub wait_seconds: f64,
-    /// Part of `seconds` spent in networks and energies [s].
+    /// Part of `seconds` spent in networks and energies (s).
     pub forward_seconds: f64,
-    /// Part of `seconds` spent on gradients [s].
+    /// Part of `seconds` spent on gradients (s).
     pub backward_seconds: f64,
-    /// Part of `seconds` spent on clipping, Adam and the running average [s].
+    /// Part of `seconds` spent on clipping, Adam and the running average (s).
     pub update_seconds: f64,
     /// Whether loss or gradient was not finite and the parameters were left alone.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
@@ -146,4 +146,15 @@ pub trait Observer {
     /// # Errors
     /// When something cannot be written; the run then ends with this error.
     fn observe(&mut self, event: &TrainEvent) -> Result<(), Report>;
+}
+
+/// The observers of a run.
+pub type Observers = [Box<dyn Observer>];
+
+/// Shows `event` to every observer, in order.
+///
+/// # Errors
+/// The first one of an observer.
+pub fn emit(observers: &mut Observers, event: &TrainEvent) -> Result<(), Report> {
+    observers.iter_mut().try_for_each(|observer| observer.observe(event))
 }

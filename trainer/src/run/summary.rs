@@ -31,7 +31,7 @@ pub struct RunSummary {
     pub stage: String,
     /// Median loss of the last 100 logged steps.
     pub loss: Option<f64>,
-    /// Median time of the last 100 logged steps [s].
+    /// Median time of the last 100 logged steps (s).
     pub seconds_per_step: Option<f64>,
     /// Steps skipped because loss or gradient was not finite.
     pub skipped: u64,
@@ -45,8 +45,8 @@ pub struct RunSummary {
     pub strain_ratio: Option<f64>,
     /// Share of the vertices inside the body, last validation, single garments.
     pub inside: Option<f64>,
-    /// Share of outer vertices on the wrong side of an inner layer, last validation, layered outfits.
-    pub wrong_side: Option<f64>,
+    /// Share of outer vertices that violate the layer order, last validation, layered outfits.
+    pub order_violations: Option<f64>,
     /// Step of the newest whole checkpoint.
     pub checkpoint: Option<u64>,
     /// Seed.
@@ -146,7 +146,7 @@ impl RunSummary {
             best_score: None,
             strain_ratio: None,
             inside: None,
-            wrong_side: None,
+            order_violations: None,
             checkpoint: None,
             seed: config.seed,
         }
@@ -176,10 +176,11 @@ impl RunSummary {
             (self.best_step, self.best_score) = best_so_far(&line).unzip();
             for group in line["groups"].as_array().into_iter().flatten() {
                 let methods = group["methods"].as_array().map_or(&[][..], Vec::as_slice);
-                let skinning = methods.iter().find(|m| m["method"] == Method::StartSkinning.name());
-                let (Some(network), Some(skinning)) = (methods.last(), skinning) else { continue };
+                let (Some(network), Some(skinning)) = (methods.last(), Method::start_of(methods)) else {
+                    continue;
+                };
                 if group["group"] == ValidationGroup::Layered.name() {
-                    self.wrong_side = network["wrong_side"].as_f64();
+                    self.order_violations = network["order_violations"].as_f64();
                 } else if group["group"] == ValidationGroup::Single.name() {
                     let strain = |m: &Value| m["raw"]["strain"]["mean"].as_f64();
                     self.strain_ratio = strain(network).zip(strain(skinning)).map(|(a, b)| a / b);
@@ -248,7 +249,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn a_run_of_any_name_can_be_told_as_json() {
+    fn a_run_of_any_name_can_be_written_as_json() {
         use std::os::unix::ffi::OsStrExt;
         let folder = tempfile::tempdir().unwrap();
         let root = folder.path().join(std::ffi::OsStr::from_bytes(b"run-\xff"));

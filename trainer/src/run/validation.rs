@@ -3,6 +3,7 @@
 use super::spread::Spread;
 use clothcombo_physics::energy::Term;
 use serde::Serialize;
+use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fmt;
 
@@ -10,24 +11,32 @@ use std::fmt;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Method {
     /// Linear blend skinning of the rest garment, the paper's baseline: nothing learned, body shape ignored.
-    RestSkinning,
-    /// Linear blend skinning of the start state (with shape transfer): what the networks start from.
-    StartSkinning,
-    /// The networks without untangling: every garment alone.
-    Single,
+    Lbs,
+    /// Linear blend skinning of the start state, where the networks start unless the configuration has no shape transfer.
+    LbsWithShapeTransfer,
+    /// The networks on every garment by itself.
+    SingleGarments,
     /// All networks.
     Network,
 }
 
 impl Method {
     /// Name in tables.
-    pub fn name(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
-            Self::RestSkinning => "LBS of rest",
-            Self::StartSkinning => "LBS",
-            Self::Single => "single drape",
+            Self::Lbs => "LBS",
+            Self::LbsWithShapeTransfer => "LBS + shape transfer",
+            Self::SingleGarments => "single garments",
             Self::Network => "network",
         }
+    }
+
+    /// Of the methods of a group in `validation.jsonl`, the skinning that the networks start from: the last baseline.
+    pub fn start_of(methods: &[Value]) -> Option<&Value> {
+        let is_skinning = |method: &&Value| {
+            [Self::Lbs, Self::LbsWithShapeTransfer].iter().any(|skinning| method["method"] == skinning.name())
+        };
+        methods.iter().rfind(is_skinning)
     }
 }
 
@@ -46,8 +55,8 @@ pub struct MethodScore {
     pub inside: f64,
     /// Share of the garment vertices deeper than 5 mm.
     pub deeper_than_5mm: f64,
-    /// Share of outer vertices on the wrong side of an inner layer, among those within 5 cm of it.
-    pub wrong_side: f64,
+    /// Share of outer vertices that violate the layer order, among those within 5 cm of an inner layer.
+    pub order_violations: f64,
 }
 
 /// All methods over one group of scenes; the baselines come first, the whole network last.
@@ -85,7 +94,7 @@ impl fmt::Display for ValidationReport {
             writeln!(f, "{} ({} scenes; energies raw in J, mean per scene)", group.group, group.scenes)?;
             writeln!(
                 f,
-                "  {:<15}{:>10}{:>10}{:>10}{:>10}{:>10}{:>12}{:>10}{:>10}{:>10}{:>10}",
+                "  {:<21}{:>10}{:>10}{:>10}{:>10}{:>10}{:>12}{:>10}{:>10}{:>10}{:>13}",
                 "method",
                 "total",
                 "median",
@@ -96,13 +105,13 @@ impl fmt::Display for ValidationReport {
                 "holding",
                 "inside %",
                 ">5 mm %",
-                "wrong %"
+                "violations %"
             )?;
             for m in &group.methods {
                 let raw = |t: Term| m.raw[t.name()].mean;
                 writeln!(
                     f,
-                    "  {:<15}{:>10.3}{:>10.3}{:>10.3}{:>10.4}{:>10.3}{:>12.2e}{:>10.4}{:>10.2}{:>10.2}{:>10.2}",
+                    "  {:<21}{:>10.3}{:>10.3}{:>10.3}{:>10.4}{:>10.3}{:>12.2e}{:>10.4}{:>10.2}{:>10.2}{:>13.2}",
                     m.method,
                     m.total.mean,
                     m.total.median,
@@ -113,7 +122,7 @@ impl fmt::Display for ValidationReport {
                     raw(Term::Holding),
                     100.0 * m.inside,
                     100.0 * m.deeper_than_5mm,
-                    100.0 * m.wrong_side
+                    100.0 * m.order_violations
                 )?;
             }
             let Some((last, others)) = group.methods.split_last() else { continue };

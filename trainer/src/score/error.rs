@@ -1,6 +1,6 @@
 //! What can be wrong with meshes to be scored.
 
-use clothcombo_data::format::MeshFileError;
+use clothcombo_data::format::FileError;
 use clothcombo_physics::energy::EnergyError;
 use clothcombo_physics::mesh::MeshError;
 use miette::Diagnostic;
@@ -18,7 +18,7 @@ pub enum ScoreError {
     ))]
     File {
         /// What the reader said.
-        reason: MeshFileError,
+        reason: FileError,
     },
     /// Every garment needs all its files.
     #[error("{rest} rest meshes (--rest) but {found} {what} meshes (--{what})")]
@@ -127,8 +127,8 @@ pub enum ScoreError {
     },
 }
 
-impl From<MeshFileError> for ScoreError {
-    fn from(reason: MeshFileError) -> Self {
+impl From<FileError> for ScoreError {
+    fn from(reason: FileError) -> Self {
         ScoreError::File { reason }
     }
 }

@@ -1,7 +1,7 @@
-//! The score of anyone's draped garments, as JSON contract and dataset: every energy in the paper's printed form
-//! ([`EnergySettings::printed`]), penetration of the body, exact triangle intersections, order of the layers.
+//! Scores of anyone's draped garments. In: meshes of a body and of garments at rest and draped. Out: every energy in the paper's
+//! printed form ([`EnergySettings::printed`]), penetration of the body, exact triangle intersections, order of the layers.
 //!
-//! Nothing is measured here: energies come from [`SceneEnergy::raw`], intersections from [`IntersectionReport`]. This file
+//! Nothing is measured here: energies come from [`SceneEnergy::raw`], contacts from [`contact::Report`](Report). This file
 //! fixes the definitions and the form of the answer.
 
 mod error;
@@ -17,9 +17,7 @@ pub(crate) use place::misplaced;
 
 use crate::config::LossesConfig;
 use crate::dataset::objective::scene_weights;
-use clothcombo_physics::contact::{
-    IntersectionReport, LayerIntersections, TriangleTree, order_violations, penetration_by,
-};
+use clothcombo_physics::contact::{LayerOrder, PosedBody, Report, ReportGarment, Selection};
 use clothcombo_physics::energy::{
     EnergySettings, GarmentEnergies, SceneEnergy, SceneGarment, SceneLayers, Term, TermMap,
 };
@@ -68,13 +66,13 @@ pub struct Score {
 /// The definitions a score was made with.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ScoreSettings {
-    /// Margin ε of both collision energies [mm].
+    /// Margin ε of both collision energies (mm).
     pub epsilon_mm: f64,
     /// The distance to the body.
     pub distance: ScoreDistance,
 }
 
-/// What the body does on its own: no garment can mend it, so it is counted against none.
+/// Intersections of the body with itself: no garment can avoid them, so they are counted against none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct BodyScore {
     /// Pairs of its triangles that intersect.
@@ -90,7 +88,7 @@ pub struct GarmentScore {
     pub vertices: usize,
     /// Number of triangles.
     pub triangles: usize,
-    /// Energies of one garment [J, m³, 1, m²]; holding only where canonical positions are given.
+    /// Energies of one garment (J, m³, 1, m²); holding only where canonical positions are given.
     pub raw: TermValues,
     /// The same times the paper's weights, whatever the number of vertices.
     pub weighted: TermValues,
@@ -103,7 +101,7 @@ pub struct GarmentScore {
 pub struct PenetrationScore {
     /// Share of the vertices inside the body, by the distance of [`ScoreSettings::distance`].
     pub vertices_inside: f64,
-    /// Largest depth of a vertex [mm]; 0 when none is inside.
+    /// Largest depth of a vertex (mm); 0 when none is inside.
     pub max_depth_mm: f64,
     /// Pairs of a garment triangle and a body triangle that share a point. Exact.
     pub body_triangle_pairs: usize,
@@ -118,14 +116,15 @@ pub struct LayerScore {
     pub inner: usize,
     /// Index of the garment over it.
     pub outer: usize,
-    /// Layer collision, ungated [m³].
+    /// Layer collision, ungated (m³).
     pub layer_collision: f64,
-    /// Layer distance [m³].
+    /// Layer distance (m³).
     pub layer_distance: f64,
     /// Pairs of triangles that share a point. Exact.
     pub triangle_pairs: usize,
-    /// Share of the outer vertices within 5 cm of the inner garment whose gap to its nearest vertex is negative.
-    pub order_violations: f64,
+    /// Share of the outer vertices within 5 cm of the inner garment that violate the order of the layers: their gap to the nearest
+    /// inner vertex is negative (the paper's form).
+    pub order_violations_nearest_vertex: f64,
 }
 
 /// A garment to be scored.
@@ -135,7 +134,7 @@ pub struct DrapedGarment<'a> {
     pub name: &'a str,
     /// The undeformed garment.
     pub rest: &'a TriMesh,
-    /// Draped positions of the vertices of `rest`, `[V, 3]` [m].
+    /// Draped positions of the vertices of `rest`, `[V, 3]` (m).
     pub positions: &'a [[f64; 3]],
     /// The same before skinning, for the holding energy against `rest`, the paper's printed form; all garments have them or
     /// none.
@@ -178,14 +177,15 @@ pub fn score(
     let canonical: Option<Vec<&[[f64; 3]]>> = garments.iter().map(|g| g.canonical).collect();
     let value = scene.raw(&posed, &canonical.map_or(Vec::new(), |parts| parts.concat()));
 
-    let body_tree = TriangleTree::new(body.positions(), body.faces());
-    let trees: Vec<TriangleTree> =
-        garments.iter().map(|g| TriangleTree::new(g.positions, g.rest.faces())).collect();
-    let intersections = IntersectionReport::new(&body_tree, &trees);
+    let meshes: Vec<ReportGarment> =
+        garments.iter().map(|g| ReportGarment { positions: g.positions, faces: g.rest.faces() }).collect();
+    let order = LayerOrder::NearestVertex;
+    let selection = Selection { layers: &pairs, order, triangles: true, body_itself: true };
+    let report = Report::count(&PosedBody::new(&surface, distance.into()), &meshes, &selection);
 
     let garment_scores =
         garments.iter().enumerate().map(|(i, garment)| -> Result<GarmentScore, ScoreError> {
-            let inside = penetration_by(&surface, garment.positions, 0.0, distance.into());
+            let (found, inside) = (&report.garments[i], report.garments[i].penetration(0.0));
             Ok(GarmentScore {
                 name: garment.name.to_owned(),
                 vertices: garment.rest.vertex_count(),
@@ -195,30 +195,27 @@ pub fn score(
                 penetration: PenetrationScore {
                     vertices_inside: inside.inside as f64 / inside.vertices as f64,
                     max_depth_mm: 1e3 * inside.max_depth,
-                    body_triangle_pairs: intersections.garment_body[i].pairs,
-                    self_triangle_pairs: intersections.garment_self[i].pairs,
+                    body_triangle_pairs: found.with_body.pairs.len(),
+                    self_triangle_pairs: found.with_itself.pairs.len(),
                 },
             })
         });
-    let crossings = intersections.garment_garment.iter();
     let layer_scores =
-        value.layers.iter().zip(crossings).map(|(raw, crossing)| -> Result<LayerScore, ScoreError> {
-            let &LayerIntersections { inner, outer, intersections } = crossing;
-            let [under, over] = [&garments[inner], &garments[outer]];
-            let raw = named(&format!("{} under {}", under.name, over.name), raw, |_| 1.0)?;
+        value.layers.iter().zip(&report.layers).map(|(raw, layer)| -> Result<LayerScore, ScoreError> {
+            let [under, over] = [layer.inner, layer.outer].map(|garment| garments[garment].name);
+            let raw = named(&format!("{under} under {over}"), raw, |_| 1.0)?;
             Ok(LayerScore {
-                inner,
-                outer,
+                inner: layer.inner,
+                outer: layer.outer,
                 layer_collision: raw[Term::LayerCollision.name()],
                 layer_distance: raw[Term::LayerDistance.name()],
-                triangle_pairs: intersections.pairs,
-                order_violations: order_violations(under.positions, under.rest.faces(), over.positions)
-                    .share(),
+                triangle_pairs: layer.pairs.pairs.len(),
+                order_violations_nearest_vertex: layer.order().share(),
             })
         });
     Ok(Score {
         settings: ScoreSettings { epsilon_mm: 1e3 * settings.body_collision_epsilon, distance },
-        body: BodyScore { self_triangle_pairs: intersections.body_self.pairs },
+        body: BodyScore { self_triangle_pairs: report.body_itself.pairs },
         garments: garment_scores.collect::<Result<_, ScoreError>>()?,
         layers: layer_scores.collect::<Result<_, ScoreError>>()?,
     })

@@ -2,7 +2,7 @@
 
 use clothcombo_physics::mesh::TriMesh;
 
-/// Larger bodies than this are not in metres [m].
+/// Larger bodies than this are not in metres (m).
 const TALLEST: f64 = 20.0;
 /// Sizes of a garment that are refused, as shares of the body's.
 const LARGEST: f64 = 5.0;

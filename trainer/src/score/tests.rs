@@ -40,12 +40,15 @@ fn a_garment_at_rest_over_its_body_has_no_strain_and_crosses_nothing() {
         assert_eq!(garment.penetration.vertices_inside, 0.0);
     }
     let layer = right.layers[0];
-    assert_eq!((layer.inner, layer.outer, layer.triangle_pairs, layer.order_violations), (0, 1, 0, 0.0));
+    assert_eq!(
+        (layer.inner, layer.outer, layer.triangle_pairs, layer.order_violations_nearest_vertex),
+        (0, 1, 0, 0.0)
+    );
     assert_eq!((layer.layer_collision, layer.layer_distance), (0.0, 0.0));
 
-    // The same in the wrong order: every vertex that has the other garment beside it is on the wrong side.
+    // The same in the wrong order: every vertex near the other garment violates it.
     let wrong = score(&body, &[garments[1], garments[0]], ScoreDistance::Surface).unwrap();
-    assert!(wrong.layers[0].order_violations > 0.99, "{:?}", wrong.layers);
+    assert!(wrong.layers[0].order_violations_nearest_vertex > 0.99, "{:?}", wrong.layers);
     assert!(wrong.layers[0].layer_collision > 0.0 && wrong.layers[0].layer_distance > 0.0);
     assert_eq!(wrong.garments[0].raw, right.garments[1].raw);
 }

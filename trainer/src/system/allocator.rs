@@ -1,10 +1,10 @@
 //! Memory that one step frees is kept for the next.
 
-/// Tells the C allocator to keep what is freed instead of giving it back to the system.
+/// Makes the C allocator keep what is freed instead of giving it back to the system.
 ///
 /// By default it asks the system for every large tensor anew, and the system hands over each page of it zeroed and by an
 /// interrupt: at width 128 that is two million interrupts in forty steps and a seventh of all processor time. Only where
-/// the C dataset is GNU's; others are left as they are. Call it before any other thread exists.
+/// the C library is GNU's; others are left as they are. Call it before any other thread exists.
 pub fn keep_freed_memory() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     // SAFETY: `mallopt` sets numbers inside the allocator and touches no memory of ours.

@@ -2,8 +2,8 @@
 
 use std::io::Write;
 
-/// A line on stderr, where it can be written: what is made does not depend on what can be told of it.
-pub fn tell(line: impl std::fmt::Display) {
+/// Prints a line on stderr. Ignores errors: the results do not depend on messages about them.
+pub fn print_stderr(line: impl std::fmt::Display) {
     let _ = writeln!(std::io::stderr(), "{line}");
 }
 
@@ -19,7 +19,7 @@ pub fn end_quietly() {
     let usual = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| match info.payload_as_str() {
         Some(text) if text.starts_with("failed printing to stdout") => {
-            tell(text);
+            print_stderr(text);
             std::process::exit(1);
         }
         _ => usual(info),

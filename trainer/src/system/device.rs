@@ -43,7 +43,7 @@ impl Backend {
 }
 
 /// Whether `device` (with or without automatic differentiation) is this machine's processor, where several threads can
-/// compute beside each other.
+/// compute in parallel.
 pub fn is_processor(device: &Device) -> bool {
     let device = device.clone().inner();
     let is = |backend: &Backend| match backend {

@@ -1,6 +1,6 @@
 //! Memory of this process and of the machine.
 
-/// Memory of this process [bytes].
+/// Memory of this process (bytes).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Memory {
     /// In use now.

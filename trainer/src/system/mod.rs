@@ -4,6 +4,7 @@ pub mod allocator;
 pub mod closed_pipe;
 pub mod device;
 pub mod exact;
+pub mod files;
 pub mod lru_cache;
 pub mod memory;
 pub mod paths;

@@ -1,4 +1,4 @@
-//! Paths: where they lead, what is in their way, and how they are told.
+//! Paths: where they lead, what blocks them, and their form in JSON.
 
 use serde::Serializer;
 use std::path::{Component, Path, PathBuf};
@@ -23,7 +23,7 @@ pub fn destination(path: &Path) -> io::Result<PathBuf> {
     Ok(found)
 }
 
-/// What is in the way of `folder`: something that is no folder, in its place or in that of one it lies in.
+/// What blocks `folder`: something that is no folder, in its place or in that of one it lies in.
 pub fn obstacle(folder: &Path) -> Option<&Path> {
     folder.ancestors().find(|path| path.exists()).filter(|path| !path.is_dir())
 }
@@ -80,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_in_the_way_and_what_is_missing_is_found() {
+    fn what_blocks_a_folder_and_what_is_missing_is_found() {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         fs::write(at("file"), "x").unwrap();

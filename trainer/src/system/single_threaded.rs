@@ -1,4 +1,4 @@
-//! Work on many items, a core for each: times of items that are measured beside each other.
+//! Work on many items in parallel, a core for each, so that the times of the items mean something.
 
 use miette::{IntoDiagnostic, Report};
 use rayon::ThreadPoolBuilder;
@@ -67,7 +67,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_failure_by_order_is_told() {
+    fn the_first_failure_by_order_is_returned() {
         let results = map_single_threaded(vec![1, 2, 3, 4], Some(2), |i| {
             if i % 2 == 0 { Err(miette!("item {i}")) } else { Ok(i) }
         });

@@ -2,8 +2,8 @@
 
 use crate::config::Config;
 use crate::dataset::Dataset;
-use crate::inference::networks::{DrapeError, TensorStore};
-use crate::training::learner::{Learner, new_optimizer};
+use crate::inference::tensor_store::{DrapeError, TensorStore};
+use crate::training::learner::{Learner, StepInput, new_optimizer};
 use crate::training::process_group::RankPartition;
 use crate::training::scenes::prepare_step;
 use crate::training::schedule::Schedule;
@@ -17,7 +17,7 @@ use std::time::Instant;
 pub struct StageTime {
     /// Steps timed.
     pub steps: u64,
-    /// Mean time of a step [s], scenes prepared on another thread beside it.
+    /// Mean time of a step (s), scenes prepared on another thread beside it.
     pub seconds_per_step: f64,
 }
 
@@ -48,7 +48,8 @@ pub fn time_stages(
             let scenes = prepare_step(dataset, config, &schedule, step, RankPartition::WHOLE)?;
             let prepared = Instant::now();
             // A rate of zero would be no step; this one moves nothing that matters.
-            learner.step(&tensors, &scenes, stage.trains, 1e-12, false)?;
+            let input = StepInput::whole(&tensors, &scenes, stage.trains);
+            learner.train_step(&input, 1e-12)?;
             if i > 0 {
                 preparing += (prepared - start).as_secs_f64();
                 computing += prepared.elapsed().as_secs_f64();

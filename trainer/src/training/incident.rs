@@ -8,10 +8,10 @@
 
 use crate::config::{Config, ConfigError, Injected, Trains, parse, to_toml};
 use crate::dataset::{BodySample, Dataset, PreparedScene, SceneSample, prepare};
-use crate::inference::networks::TensorStore;
+use crate::inference::tensor_store::TensorStore;
 use crate::run::checkpoint::{checksum, save_model};
 use crate::system::exact::Exact;
-use crate::training::learner::{Learner, StepOutcome, new_optimizer};
+use crate::training::learner::{Learner, StepInput, StepOutput, new_optimizer};
 use crate::training::schedule::ScheduleAt;
 use burn::module::Module;
 use burn::store::ModuleRecord;
@@ -58,7 +58,7 @@ pub enum IncidentError {
     /// The scene cannot be prepared or draped.
     #[error(transparent)]
     #[diagnostic(transparent)]
-    Drape(#[from] crate::inference::networks::DrapeError),
+    Drape(#[from] crate::inference::tensor_store::DrapeError),
 }
 
 /// A step whose loss or gradient was not finite.
@@ -127,7 +127,7 @@ pub struct IncidentGarment {
 pub struct IncidentBody {
     /// Shape parameters β.
     pub shape: Vec<Exact>,
-    /// Pose θ: axis-angle per joint [rad].
+    /// Pose θ: axis-angle per joint (rad).
     pub pose: Vec<[Exact; 3]>,
     /// Weighted sum of all energies.
     pub total: Exact,
@@ -162,7 +162,7 @@ impl Incident {
         folder: &Path,
         around: &Circumstances,
         scenes: &[PreparedScene],
-        outcome: &StepOutcome,
+        output: &StepOutput,
     ) -> Result<PathBuf, IncidentError> {
         let path = folder.join(format!("step-{}.json", around.step));
         let unusable = |reason: String| IncidentError::Unusable { path: path.clone(), reason };
@@ -181,9 +181,9 @@ impl Incident {
             learning_rate: around.at.learning_rate.into(),
             pose_scale: around.at.pose_scale.into(),
             injected: around.injected,
-            loss: outcome.loss.into(),
-            gradient_norm: outcome.gradient_norm.into(),
-            scenes: describe(around.dataset, scenes, outcome),
+            loss: output.loss.into(),
+            gradient_norm: output.gradient_norm.into(),
+            scenes: describe(around.dataset, scenes, output),
             weights,
             weights_checksum,
             config: to_toml(around.config).map_err(|e| unusable(e.to_string()))?,
@@ -238,7 +238,7 @@ impl Incident {
         for scene in &self.scenes {
             let draw = scene.to_sample(dataset, path)?;
             let prepared = prepare(dataset, &config.losses, draw, self.run_progress.0);
-            scenes.push(prepared.map_err(crate::inference::networks::DrapeError::from)?);
+            scenes.push(prepared.map_err(crate::inference::tensor_store::DrapeError::from)?);
         }
         if self.injected == Some(Injected::Position) {
             spoil_position(&mut scenes);
@@ -246,11 +246,12 @@ impl Incident {
         let tensors = TensorStore::new(dataset.clone(), dataset.dimensions(), &device);
         let mut learner = Learner::new(model, new_optimizer(&config.optimizer), &config.optimizer);
         let spoil = self.injected == Some(Injected::Gradient);
-        let outcome = learner.step(&tensors, &scenes, self.trains, self.learning_rate.0, spoil)?;
+        let input = StepInput { spoil_gradient: spoil, ..StepInput::whole(&tensors, &scenes, self.trains) };
+        let output = learner.train_step(&input, self.learning_rate.0)?;
         Ok(Self {
-            loss: outcome.loss.into(),
-            gradient_norm: outcome.gradient_norm.into(),
-            scenes: describe(dataset, &scenes, &outcome),
+            loss: output.loss.into(),
+            gradient_norm: output.gradient_norm.into(),
+            scenes: describe(dataset, &scenes, &output),
             ..self.clone()
         })
     }
@@ -301,7 +302,7 @@ pub(crate) fn spoil_position(scenes: &mut [PreparedScene]) {
     }
 }
 
-fn describe(dataset: &Dataset, scenes: &[PreparedScene], outcome: &StepOutcome) -> Vec<IncidentScene> {
+fn describe(dataset: &Dataset, scenes: &[PreparedScene], output: &StepOutput) -> Vec<IncidentScene> {
     let energies = |values: &TermMap<Option<f64>>| -> BTreeMap<String, Exact> {
         Term::ALL.into_iter().filter_map(|t| Some((t.name().to_owned(), Exact(values[t]?)))).collect()
     };
@@ -328,7 +329,7 @@ fn describe(dataset: &Dataset, scenes: &[PreparedScene], outcome: &StepOutcome) 
             repulsion_sample: scene.sample.repulsion_sample,
         }
     };
-    scenes.iter().zip(&outcome.scenes).map(of_scene).collect()
+    scenes.iter().zip(&output.scenes).map(of_scene).collect()
 }
 
 impl IncidentScene {

@@ -10,5 +10,5 @@ pub mod process_group;
 pub mod scenes;
 pub mod schedule;
 pub mod session;
-pub mod step_summary;
+pub mod step_record;
 pub mod train_loop;

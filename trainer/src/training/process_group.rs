@@ -1,11 +1,11 @@
-//! The processes that train one run together, or the one that trains alone.
+//! The processes that train one run together, or the single one.
 //!
 //! Data-parallel training over MPI (Cargo feature `mpi`): every process holds the same networks, computes its share of a
-//! step's scenes, and takes the same optimiser step on the sum of all gradients. Only the leader writes and prints.
+//! step's scenes, and takes the same optimiser step on the sum of all gradients. Only rank zero writes and prints.
 //!
-//! All processes call the same collective operations in the same order. To keep that so when one of them fails, everyone
-//! meets before each exchange ([`ProcessGroup::meet`]) and once at the end ([`ProcessGroup::conclude`]): a process with an error goes
-//! straight to the latter, and the others learn of it at whichever meeting they are waiting in.
+//! All processes call the same collective operations in the same order. To keep that so when one of them fails, there is a
+//! barrier before each exchange ([`ProcessGroup::barrier`]) and one at the end ([`ProcessGroup::conclude`]): a process with an
+//! error goes straight to the latter, and the others learn of it at whichever barrier they wait.
 
 use miette::{Diagnostic, Report};
 use thiserror::Error;
@@ -80,9 +80,9 @@ pub enum ProcessGroupError {
     },
 }
 
-/// What one process brings to a meeting.
+/// What one process brings to a barrier.
 #[derive(Clone, Copy)]
-enum Attendance {
+enum Status {
     /// It goes on, and may ask for a stop.
     Fine { stop: bool },
     /// It has an error to report.
@@ -90,7 +90,7 @@ enum Attendance {
 }
 
 impl ProcessGroup {
-    /// Joins the processes started by the same launcher; alone where there is none.
+    /// Joins the processes started by the same launcher; a group of one where there is none.
     ///
     /// # Errors
     /// When MPI does not start, or this build knows none and several processes were started.
@@ -105,53 +105,53 @@ impl ProcessGroup {
     }
 
     /// Which scenes this process computes.
-    pub fn share(&self) -> RankPartition {
+    pub fn partition(&self) -> RankPartition {
         #[cfg(feature = "mpi")]
         if let Some(engine) = &self.engine {
-            return engine.share();
+            return engine.partition();
         }
         RankPartition::WHOLE
     }
 
     /// Whether this process writes and prints.
     pub fn is_rank_zero(&self) -> bool {
-        self.share().rank == 0
+        self.partition().rank == 0
     }
 
     /// Whether there are several processes.
     pub fn is_shared(&self) -> bool {
-        self.share().size > 1
+        self.partition().size > 1
     }
 
     /// Waits for all processes; whether any of them asks for a `stop`.
     ///
     /// # Errors
     /// When another process failed; this one has nothing to report then.
-    pub fn meet(&self, stop: bool) -> Result<bool, FailedElsewhere> {
-        self.attend(Attendance::Fine { stop })
+    pub fn barrier(&self, stop: bool) -> Result<bool, FailedElsewhere> {
+        self.exchange_status(Status::Fine { stop })
     }
 
-    /// The last meeting: `result` of the whole program, without an error that another process reports.
+    /// The last barrier: `result` of the whole program, without an error that another process reports.
     ///
     /// # Errors
     /// `Some` report where this process is the one to print it, `None` where another one does.
     pub fn conclude(&self, result: Result<(), Report>) -> Result<(), Option<Report>> {
         match result {
-            Ok(()) => self.attend(Attendance::Fine { stop: false }).map(drop).map_err(|_| None),
-            // It learned of the failure at a meeting; the one that failed awaits nobody any more.
+            Ok(()) => self.exchange_status(Status::Fine { stop: false }).map(drop).map_err(|_| None),
+            // It learned of the failure at a barrier; the one that failed awaits nobody any more.
             Err(report) if report.downcast_ref::<FailedElsewhere>().is_some() => Err(None),
-            Err(report) => match self.attend(Attendance::Failed) {
-                Err(FailedElsewhere { rank }) if rank != self.share().rank => Err(None),
+            Err(report) => match self.exchange_status(Status::Failed) {
+                Err(FailedElsewhere { rank }) if rank != self.partition().rank => Err(None),
                 _ => Err(Some(report)),
             },
         }
     }
 
     /// The first failed process is the one that reports; it hears of itself as well.
-    fn attend(&self, attendance: Attendance) -> Result<bool, FailedElsewhere> {
-        let (failed, stop) = match attendance {
-            Attendance::Fine { stop } => (0.0, f64::from(u8::from(stop))),
-            Attendance::Failed => (1.0, 0.0),
+    fn exchange_status(&self, status: Status) -> Result<bool, FailedElsewhere> {
+        let (failed, stop) = match status {
+            Status::Fine { stop } => (0.0, f64::from(u8::from(stop))),
+            Status::Failed => (1.0, 0.0),
         };
         let rows = self.gather(&[failed, stop]);
         match rows.iter().position(|row| row[0] != 0.0) {
@@ -199,14 +199,14 @@ mod tests {
     }
 
     #[test]
-    fn a_process_alone_meets_itself_and_reports_its_own_errors() {
-        let world = ProcessGroup::default();
-        assert!(world.is_rank_zero() && !world.is_shared());
-        assert!(!world.meet(false).unwrap() && world.meet(true).unwrap());
-        assert_eq!(world.sum(vec![1.0, 2.0]), [1.0, 2.0]);
-        assert!(world.conclude(Ok(())).is_ok());
-        let found = world.conclude(Err(miette::miette!("broken"))).unwrap_err();
+    fn a_single_process_passes_its_own_barriers_and_reports_its_own_errors() {
+        let group = ProcessGroup::default();
+        assert!(group.is_rank_zero() && !group.is_shared());
+        assert!(!group.barrier(false).unwrap() && group.barrier(true).unwrap());
+        assert_eq!(group.sum(vec![1.0, 2.0]), [1.0, 2.0]);
+        assert!(group.conclude(Ok(())).is_ok());
+        let found = group.conclude(Err(miette::miette!("broken"))).unwrap_err();
         assert_eq!(found.expect("its own").to_string(), "broken");
-        assert!(world.conclude(Err(FailedElsewhere { rank: 3 }.into())).unwrap_err().is_none());
+        assert!(group.conclude(Err(FailedElsewhere { rank: 3 }.into())).unwrap_err().is_none());
     }
 }

@@ -4,7 +4,7 @@ use super::process_group::RankPartition;
 use super::schedule::Schedule;
 use crate::config::Config;
 use crate::dataset::{Dataset, DatasetError, Plan, PreparedScene, SCENES_AHEAD, prepare, sample_training};
-use crate::inference::networks::{DrapeError, TensorStore};
+use crate::inference::tensor_store::{DrapeError, TensorStore};
 use crate::system::prefetch::Prefetch;
 use std::sync::Arc;
 

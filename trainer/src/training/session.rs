@@ -1,11 +1,12 @@
-//! A run in progress: everything the training loop acts on.
+//! A run in progress: everything the training loop acts on, and the parts of a step.
 
 use crate::config::Config;
 use crate::dataset::DataSizes;
 use crate::dataset::Dataset;
 use crate::evaluation::ValidationSet;
-use crate::evaluation::samples;
-use crate::inference::networks::{Networks, TensorStore};
+use crate::evaluation::sample_picture;
+use crate::inference::networks::Networks;
+use crate::inference::tensor_store::TensorStore;
 use crate::run::checkpoint::{Best, Checkpoint, CheckpointState, Snapshot};
 use crate::run::folder::RunDir;
 use crate::run::memory::MemoryEstimate;
@@ -15,7 +16,7 @@ use crate::system::memory::Memory;
 use crate::training::average::Average;
 use crate::training::guard::Guard;
 use crate::training::learner::Learner;
-use crate::training::process_group::{ProcessGroup, ProcessGroupError, RankPartition};
+use crate::training::process_group::{ProcessGroup, ProcessGroupError};
 use crate::training::schedule::Schedule;
 use burn::module::Module;
 use miette::Report;
@@ -23,10 +24,10 @@ use std::path::PathBuf;
 use std::rc::Rc;
 use std::sync::Arc;
 
+mod incidents;
+mod milestones;
 mod start;
 mod step;
-
-pub use step::StepReport;
 
 /// A run in progress.
 pub struct Session {
@@ -41,16 +42,20 @@ pub struct Session {
     guard: Guard,
     best: Option<Best>,
     step: u64,
-    world: Rc<ProcessGroup>,
+    /// The last step that need not be saved any more.
+    saved_step: u64,
+    /// A checkpoint that was due after a skipped step waits for one that is not: the parameters may be at fault.
+    owes_checkpoint: bool,
+    group: Rc<ProcessGroup>,
 }
 
 impl Session {
-    /// The same run as one of the processes in `world`.
+    /// The same run as one of the processes in `group`.
     ///
     /// # Errors
     /// When they cannot share the scenes of every stage equally.
-    pub fn shared_in(mut self, world: Rc<ProcessGroup>) -> Result<Self, ProcessGroupError> {
-        let size = world.share().size;
+    pub fn shared_in(mut self, group: Rc<ProcessGroup>) -> Result<Self, ProcessGroupError> {
+        let size = group.partition().size;
         match self.schedule.stages().iter().find(|stage| stage.accumulate % size != 0) {
             Some(stage) => Err(ProcessGroupError::UnequalShares {
                 stage: stage.name.clone(),
@@ -58,20 +63,20 @@ impl Session {
                 size,
             }),
             None => {
-                self.world = world;
+                self.group = group;
                 Ok(self)
             }
         }
     }
 
-    /// Which scenes of a step this process computes.
-    pub fn share(&self) -> RankPartition {
-        self.world.share()
+    /// Whether no other process takes part.
+    pub fn is_single_process(&self) -> bool {
+        !self.group.is_shared()
     }
 
     /// Whether this process writes and prints.
     pub fn is_rank_zero(&self) -> bool {
-        self.world.is_rank_zero()
+        self.group.is_rank_zero()
     }
 
     /// Steps done.
@@ -85,10 +90,6 @@ impl Session {
     /// The configuration.
     pub fn config(&self) -> &Config {
         &self.config
-    }
-    /// The configuration, shared.
-    pub fn shared_config(&self) -> Arc<Config> {
-        self.config.clone()
     }
     /// The wardrobe.
     pub fn dataset(&self) -> &Arc<Dataset> {
@@ -136,7 +137,7 @@ impl Session {
     pub fn draw_sample(&self) -> Result<PathBuf, Report> {
         let path = self.run.sample(self.step);
         let count = self.config.output.sample_scenes;
-        samples::draw(&self.dataset, &self.validation, &self.networks(), count, &path)?;
+        sample_picture::draw(&self.dataset, &self.validation, &self.networks(), count, &path)?;
         Ok(path)
     }
 

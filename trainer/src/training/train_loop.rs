@@ -1,12 +1,9 @@
 //! The training loop, top to bottom.
 
-use super::scenes::prefetch;
-use crate::run::event::{Observer, TrainEvent};
+use super::session::Session;
+use crate::run::event::{Observers, TrainEvent, emit};
 use crate::system::stop::StopFlag;
-use crate::training::guard::Verdict;
-use crate::training::process_group::RankPartition;
-use crate::training::session::Session;
-use miette::{IntoDiagnostic, Report, WrapErr, miette};
+use miette::{Report, miette};
 use std::time::Instant;
 
 /// Trains from the session's step to the end of the schedule, or until `stop` is requested of any process of the run. When
@@ -14,103 +11,49 @@ use std::time::Instant;
 ///
 /// # Errors
 /// When something cannot be written, or the numbers stop being finite.
-pub fn train(
-    session: &mut Session,
-    observers: &mut [Box<dyn Observer>],
-    stop: &StopFlag,
-) -> Result<(), Report> {
-    let mut kept = session.step();
-    let result = run(session, observers, stop, &mut kept);
-    if result.is_err() && session.is_rank_zero() && session.step() > kept {
-        let step = session.step();
-        match session.save() {
-            Ok(path) => tracing::warn!("step {step} is saved as {}: continue with --resume", path.display()),
-            Err(error) => tracing::warn!("step {step} could not be saved: {error}"),
-        }
+pub fn train(session: &mut Session, observers: &mut Observers, stop: &StopFlag) -> Result<(), Report> {
+    let result = run(session, observers, stop);
+    if result.is_err() {
+        session.rescue();
     }
     result
 }
 
-/// The loop. `kept`: the last step that needs not be saved any more.
-fn run(
-    session: &mut Session,
-    observers: &mut [Box<dyn Observer>],
-    stop: &StopFlag,
-    kept: &mut u64,
-) -> Result<(), Report> {
-    let mut tell = |event: &TrainEvent| observers.iter_mut().try_for_each(|o| o.observe(event));
+fn run(session: &mut Session, observers: &mut Observers, stop: &StopFlag) -> Result<(), Report> {
     let schedule = session.schedule().clone();
-    let output = session.config().output.clone();
-    let validate_every = session.config().validation.every;
-    let first_step = session.step();
-    let total_steps = schedule.total_steps();
-
-    tell(&TrainEvent::Started { step: first_step, total_steps })?;
+    let (first_step, total_steps) = (session.step(), schedule.total_steps());
+    emit(observers, &TrainEvent::Started { step: first_step, total_steps })?;
     if first_step == 0 && session.is_rank_zero() {
-        tell(&TrainEvent::Validated { step: 0, report: &session.validate()?, best: None })?;
+        emit(observers, &TrainEvent::Validated { step: 0, report: &session.validate()?, best: None })?;
     }
-    let (tensors, config) = (session.tensors().clone(), session.shared_config());
-    let scenes = prefetch(tensors, config, first_step, session.share())
-        .into_diagnostic()
-        .wrap_err("cannot start the thread that prepares scenes")?;
+    let prefetched = session.prefetch()?;
 
-    // A checkpoint that is due after a skipped step waits for one that is not: the parameters may be at fault.
-    let mut owed = false;
     for step in first_step..total_steps {
         let at = schedule.at(step);
         if at.first_of_stage || step == first_step {
             let stage = &schedule.stages()[at.stage];
-            tell(&TrainEvent::StageStarted { name: &stage.name, step, steps: stage.steps })?;
+            emit(observers, &TrainEvent::StageStarted { name: &stage.name, step, steps: stage.steps })?;
         }
         let start = Instant::now();
-        let prepared =
-            scenes.next_item().ok_or_else(|| miette!("the thread that prepares scenes ended early"))??;
+        let scenes = prefetched.next_item();
+        let mut scenes = scenes.ok_or_else(|| miette!("the thread that prepares scenes ended early"))??;
         let waited = start.elapsed();
-        let report = session.step_on(prepared, &at, start, waited, stop)?;
-        tell(&TrainEvent::Step(&report.record))?;
 
-        let done = step + 1;
-        match report.verdict {
-            Verdict::Fine => {}
-            Verdict::Spike { usual } => {
-                tell(&TrainEvent::Spike { step: done, norm: report.record.grad_norm, usual })?;
-            }
-            Verdict::Skipped { count, is_over } => {
-                tell(&TrainEvent::Skipped { step: done, count, file: report.incident.as_deref() })?;
-                if is_over {
-                    *kept = done;
-                    tell(&TrainEvent::GaveUp { step: done })?;
-                    return Err(session.gave_up(count));
-                }
-            }
-        }
-        // Alone nobody has to agree: a request that came since counts for this step.
-        let stopping = report.stopping || (session.share() == RankPartition::WHOLE && stop.requested());
-        let due = |every: u64| every > 0 && done % every == 0;
-        // The others go on to the next step, where they wait for the leader.
-        if session.is_rank_zero() {
-            let mut is_best = false;
-            if at.last_of_stage || due(validate_every) {
-                let scores = session.validate()?;
-                is_best = session.note_validation(&scores) && output.keep_best;
-                tell(&TrainEvent::Validated { step: done, report: &scores, best: session.best() })?;
-            }
-            if at.last_of_stage || due(output.sample_every) {
-                tell(&TrainEvent::SampleDrawn { path: &session.draw_sample()? })?;
-            }
-            owed |= due(output.checkpoint_every);
-            let is_time = owed && !matches!(report.verdict, Verdict::Skipped { .. });
-            if at.last_of_stage || is_time || is_best || stopping {
-                owed = false;
-                tell(&TrainEvent::CheckpointDue { step: done })?;
-                // A save that failed would fail again.
-                *kept = done;
-                tell(&TrainEvent::CheckpointSaved { step: done, path: &session.save()? })?;
-            }
-        }
-        if stopping && done < total_steps {
-            return tell(&TrainEvent::Interrupted { step: done });
+        let mut output = session.forward_backward(&mut scenes, &at)?;
+        let mut stopping = session.barrier(stop)?;
+        let mut record = session.all_reduce(&scenes, &mut output, &at);
+        session.clip(&mut output);
+        session.optimizer_step(&mut output, &at);
+
+        let verdict = session.watch(&mut record, &output, start, waited);
+        emit(observers, &TrainEvent::Step(&record))?;
+        session.react(verdict, &record, &at, (scenes, output), observers)?;
+        // A single process need not agree with others: a request that came since counts for this step.
+        stopping |= session.is_single_process() && stop.requested();
+        session.milestones(&at, record.skipped, stopping, observers)?;
+        if stopping && step + 1 < total_steps {
+            return emit(observers, &TrainEvent::Interrupted { step: step + 1 });
         }
     }
-    tell(&TrainEvent::Finished { step: total_steps })
+    emit(observers, &TrainEvent::Finished { step: total_steps })
 }

@@ -1,5 +1,6 @@
 //! Wrong input gets one clear message and exit code 1, and leaves no run folder behind.
 
+use crate::common::assert_fails;
 use assert_cmd::Command;
 use std::path::Path;
 use tempfile::TempDir;
@@ -35,13 +36,7 @@ impl Case {
             .args(extra)
             .output()
             .unwrap();
-        let message = String::from_utf8_lossy(&output.stderr).replace("\n  │ ", "");
-        assert_eq!(output.status.code(), Some(1), "{message}");
-        assert!(!message.contains("panicked"), "{message}");
-        let flat: String = message.split_whitespace().filter(|w| *w != "│").collect::<Vec<_>>().join(" ");
-        for word in words {
-            assert!(flat.contains(word), "{word:?} is missing in:\n{message}");
-        }
+        assert_fails(&output, 1, words);
         assert!(!Path::new(&run).exists(), "a run folder was left behind");
     }
 }

@@ -75,7 +75,7 @@ fn skinning_and_a_network_are_measured_against_the_minimum() {
     let output =
         bench(&["--config", "tiny.toml", "--iterations", "150", "--json"], folder.path()).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    check(&serde_json::from_slice(&output.stdout).unwrap(), &["LBS of rest", "LBS"]);
+    check(&serde_json::from_slice(&output.stdout).unwrap(), &["LBS", "LBS + shape transfer"]);
 
     Command::cargo_bin("clothcombo-train")
         .unwrap()
@@ -89,7 +89,7 @@ fn skinning_and_a_network_are_measured_against_the_minimum() {
             .unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
-    check(&report, &["LBS of rest", "LBS", "network", "network, 0 corrections"]);
+    check(&report, &["LBS", "LBS + shape transfer", "network", "network, 0 corrections"]);
     let above = report["scenes"].as_array().unwrap().iter().filter(|s| {
         let energy = |i: usize| s["methods"][i]["energy"].as_f64().unwrap();
         energy(2) > energy(1) + 1e-5 * energy(1).abs().max(1.0)
@@ -103,12 +103,12 @@ fn skinning_and_a_network_are_measured_against_the_minimum() {
         .stderr(predicates::str::contains("no correction networks"));
     assert!(report["scenes"].as_array().unwrap().iter().all(|s| s["runs"].as_array().unwrap().len() == 2));
 
-    // Outfits start from the post-process as well, and tell the strain of their layers.
+    // Outfits start from the post-process as well, and report the strain of their layers.
     let outfits = ["--checkpoint", "run", "--layers", "2", "--iterations", "30"];
     let output = bench(&[&outfits[..], &["--json"]].concat(), folder.path()).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
-    check(&report, &["LBS of rest", "LBS", "network", "network + post-process"]);
+    check(&report, &["LBS", "LBS + shape transfer", "network", "network + post-process"]);
     for scene in report["scenes"].as_array().unwrap() {
         assert_eq!(scene["garments"].as_array().unwrap().len(), 2);
         assert_eq!(scene["runs"].as_array().unwrap().len(), 3);
@@ -121,7 +121,7 @@ fn skinning_and_a_network_are_measured_against_the_minimum() {
     );
     let output = bench(&outfits, folder.path()).output().unwrap();
     let text = String::from_utf8(output.stdout).unwrap();
-    assert!(text.contains("strain in the outfit over that of the garment alone"), "{text}");
+    assert!(text.contains("strain in the outfit over that of the single garment"), "{text}");
 
     // One iteration converges nowhere: said in the table, and still a result.
     let output = bench(&["--config", "tiny.toml", "--iterations", "1"], folder.path()).output().unwrap();

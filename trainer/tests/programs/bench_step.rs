@@ -113,20 +113,24 @@ fn a_stage_of_a_configuration_is_exported_as_it_is_trained() {
         exported(folder.path(), name, &arguments.iter().map(String::as_str).collect::<Vec<_>>(), set)
     };
     let single = of("single", "0", &[]);
-    assert_eq!((&single["trains"], &single["alone"]), (&"single".into(), &0.0.into()));
+    assert_eq!((&single["trains"], &single["single_garments"]), (&"single".into(), &0.0.into()));
     assert_eq!(number(&single["expected"]["gradient_norms"]["untangling"]), 0.0);
 
-    // Training end to end with the garments alone: the whole of its loss.
+    // Training end to end with the single garments: the whole of its loss.
     let outfits = ["stages.2.layers=[3, 3]"];
     let all = of("all", "2", &outfits);
-    let alone = of("alone", "2", &[outfits[0], "losses.alone=0.5"]);
-    assert_eq!((&alone["trains"], number(&alone["alone"])), (&"all".into(), 0.5));
-    assert_eq!(alone["garments"].as_array().unwrap().len(), 3);
-    assert!(alone["expected"]["loss"] != all["expected"]["loss"]);
-    assert!(alone["expected"]["gradient_norms"]["skinning"] != all["expected"]["gradient_norms"]["skinning"]);
+    let with_single = of("with_single", "2", &[outfits[0], "losses.single_garments=0.5"]);
+    assert_eq!((&with_single["trains"], number(&with_single["single_garments"])), (&"all".into(), 0.5));
+    assert_eq!(with_single["garments"].as_array().unwrap().len(), 3);
+    assert!(with_single["expected"]["loss"] != all["expected"]["loss"]);
+    assert!(
+        with_single["expected"]["gradient_norms"]["skinning"]
+            != all["expected"]["gradient_norms"]["skinning"]
+    );
     assert_eq!(
-        alone["expected"]["gradient_norms"]["untangling"], all["expected"]["gradient_norms"]["untangling"],
-        "garments alone do not know of it"
+        with_single["expected"]["gradient_norms"]["untangling"],
+        all["expected"]["gradient_norms"]["untangling"],
+        "single garments do not depend on it"
     );
 
     let path = config.display().to_string();

@@ -43,6 +43,16 @@ pub fn said(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
+/// Checks that a program failed with `code` and without a panic, and that its message holds every one of `words`.
+pub fn assert_fails(output: &Output, code: i32, words: &[&str]) {
+    let message = said(output);
+    assert_eq!(output.status.code(), Some(code), "{message}");
+    assert!(!message.contains("panicked"), "{message}");
+    for word in words {
+        assert!(holds(&message, word), "{word:?} is missing in:\n{message}");
+    }
+}
+
 /// Whether `message` holds `words`, wherever its lines are broken: errors are printed to fit a terminal.
 pub fn holds(message: &str, words: &str) -> bool {
     let squeezed = |text: &str| text.chars().filter(|c| !c.is_whitespace() && *c != '│').collect::<String>();

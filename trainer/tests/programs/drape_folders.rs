@@ -36,12 +36,12 @@ fn a_dataset_of_any_name_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     drape(&["--garments", TEE, "-o", &out.display().to_string()]).assert().success();
-    let dataset = folder.path().join(std::ffi::OsStr::from_bytes(b"wardrobe-\xff"));
+    let dataset = folder.path().join(std::ffi::OsStr::from_bytes(b"garments-\xff"));
     fs::create_dir(&dataset).unwrap();
     fs::copy(out.join(format!("{TEE}.obj")), dataset.join("own.obj")).unwrap();
     let again = folder.path().join("again");
     let mut named = drape(&["--garments", "own", "-o", &again.display().to_string()]);
     named.arg("--dataset").arg(&dataset).assert().success();
     let given = report(&again)["garments"][0]["given"].as_str().unwrap().to_owned();
-    assert!(given.contains("wardrobe-\u{fffd}"), "{given}");
+    assert!(given.contains("garments-\u{fffd}"), "{given}");
 }

@@ -1,4 +1,4 @@
-//! What goes into `clothcombo drape`: garments in any unit and orientation, wrong input, models, and a signal half way.
+//! What goes into `clothcombo drape`: garments in any unit and orientation, wrong input, models, and a signal in the middle.
 
 use crate::common::holds;
 use crate::drape::{SKIRT, TEE, at, drape, failure, report, run_folder, save_motion};
@@ -240,11 +240,11 @@ fn garments_that_do_not_lie_on_the_body_as_they_are_are_fitted() {
         }
         _ => None,
     });
-    let garments = folder.path().join("wardrobe");
+    let garments = folder.path().join("garments");
     fs::create_dir(&garments).unwrap();
     fs::write(folder.path().join("turned.obj"), turned).unwrap();
     fs::write(garments.join("large.obj"), large).unwrap();
-    let (turned, garments, out) = (at(&folder, "turned.obj"), at(&folder, "wardrobe"), at(&folder, "out"));
+    let (turned, garments, out) = (at(&folder, "turned.obj"), at(&folder, "garments"), at(&folder, "out"));
     drape(&["--garments", &turned, "large", "--dataset", &garments, "-o", &out]).assert().success();
     let report = report(Path::new(&out));
     let fit = |garment: usize| &report["garments"][garment]["fit"];

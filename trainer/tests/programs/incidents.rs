@@ -87,7 +87,7 @@ fn a_diverged_run_names_a_checkpoint_from_before_and_goes_on_from_it() {
     let message = said(&output);
     assert_eq!(output.status.code(), Some(1), "{message}");
     assert!(holds(&message, "last good checkpoint") && holds(&message, "step-00000020"), "{message}");
-    let mended = ["--set", "stages.1.learning_rate=1e-4", "--allow-config-change", "stages"];
-    let output = resume(&run, 1).args(mended).output().unwrap();
+    let repaired = ["--set", "stages.1.learning_rate=1e-4", "--allow-config-change", "stages"];
+    let output = resume(&run, 1).args(repaired).output().unwrap();
     assert!(output.status.success(), "{}", said(&output));
 }

@@ -17,7 +17,7 @@ fn body_of_300_components(path: &Path) {
     body.save(path, &Provenance::default()).unwrap();
 }
 
-/// A wardrobe of `count` garments on a body of 300 shape components, without shape transfer as in `configs/paper.toml`.
+/// `count` garments on a body of 300 shape components, without shape transfer as in `configs/paper.toml`.
 fn config(folder: &Path, count: usize, vertices: usize) -> std::path::PathBuf {
     let body = folder.join("body.npz");
     body_of_300_components(&body);
@@ -51,7 +51,7 @@ sample_scenes = 0
     file
 }
 
-/// Peak of the resident memory and its estimate [MiB] as the report of a run says them.
+/// Peak of the resident memory and its estimate (MiB) as the report of a run says them.
 #[cfg(target_os = "linux")]
 fn peak_and_estimate(run: &Path) -> [f64; 2] {
     let page = std::fs::read_to_string(run.join("report.html")).unwrap();
@@ -106,7 +106,7 @@ fn garments_that_no_machine_holds_are_refused_before_anything_is_made() {
 }
 
 #[test]
-fn memory_is_stated_for_a_wardrobe_that_is_not_at_hand() {
+fn memory_is_stated_for_garments_that_are_not_at_hand() {
     let paper = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs/paper.toml");
     let check =
         |more: &[&str]| clothcombo(&[&["config", "check", &paper.display().to_string()], more].concat());

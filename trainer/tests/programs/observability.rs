@@ -71,7 +71,7 @@ fn the_report_is_whole_and_needs_nothing_else() {
         "CC0-1.0",
         "siren_width = 16",
         "Validation after step 60",
-        "LBS of rest",
+        "LBS + shape transfer",
         "peak memory",
     ] {
         assert!(html.contains(words), "{words}");

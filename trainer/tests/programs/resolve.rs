@@ -1,5 +1,6 @@
 //! `clothcombo resolve`: what it writes, and what it says to files it cannot use.
 
+use crate::common::{assert_fails, said};
 use assert_cmd::Command;
 use clothcombo_data::format::{ObjMesh, load_tri_mesh};
 use clothcombo_physics::contact::TriangleTree;
@@ -49,14 +50,9 @@ impl Case {
     /// Must exit with 1, write nothing and print one message that holds every one of `words`.
     fn must_fail(&self, garments: &[&str], extra: &[&str], words: &[&str]) {
         let output = self.command(garments, extra).output().unwrap();
-        let message = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(1), "{message}");
+        assert_fails(&output, 1, words);
         assert!(output.stdout.is_empty() && !self.path("resolved").exists());
-        assert!(!message.contains("panicked") && message.matches('×').count() == 1, "{message}");
-        let flat = message.split_whitespace().filter(|w| *w != "│").collect::<Vec<_>>().join(" ");
-        for word in words {
-            assert!(flat.contains(word), "{word:?} is missing in:\n{message}");
-        }
+        assert_eq!(said(&output).matches('×').count(), 1, "{}", said(&output));
     }
 }
 

@@ -1,18 +1,9 @@
 //! What can go wrong around a run folder: one clear message, exit 1, and what was there stays whole.
 
-use crate::common::{clothcombo, holds, resume, said, start, tiny, trainer};
+use crate::common::{assert_fails, clothcombo, resume, said, start, tiny, trainer};
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Command;
 use std::time::{Duration, Instant};
-
-fn must_fail(output: &Output, words: &[&str]) {
-    let message = said(output);
-    assert_eq!(output.status.code(), Some(1), "{message}");
-    assert!(!message.contains("panicked"), "{message}");
-    for word in words {
-        assert!(holds(&message, word), "{word:?} is missing in: {message}");
-    }
-}
 
 /// Names and contents of the checkpoints of a run.
 fn checkpoints(run: &Path) -> Vec<(String, Vec<u8>)> {
@@ -39,8 +30,8 @@ fn a_second_run_in_the_same_folder() {
         std::thread::sleep(Duration::from_millis(20));
     }
     let owner = format!("process {}", first.id());
-    must_fail(&resume(&run, 1).output().unwrap(), &["is in use", &owner, "--run-dir"]);
-    must_fail(&start(&config, &run, 1).args(long).output().unwrap(), &["already holds a run"]);
+    assert_fails(&resume(&run, 1).output().unwrap(), 1, &["is in use", &owner, "--run-dir"]);
+    assert_fails(&start(&config, &run, 1).args(long).output().unwrap(), 1, &["already holds a run"]);
     let listed = clothcombo(&["runs", &run.display().to_string()]);
     assert!(String::from_utf8_lossy(&listed.stdout).contains("running"));
     first.kill().unwrap();
@@ -67,7 +58,11 @@ fn a_full_disk_during_a_save() {
         .env("NO_COLOR", "1")
         .output()
         .unwrap();
-    must_fail(&output, &["cannot write the checkpoint", "step-00000065", "File too large", "untouched"]);
+    assert_fails(
+        &output,
+        1,
+        &["cannot write the checkpoint", "step-00000065", "File too large", "untouched"],
+    );
     assert_eq!(checkpoints(&run), before, "the checkpoints before are intact");
     let again = resume(&run, 1).output().unwrap();
     assert!(again.status.success(), "{}", said(&again));
@@ -79,7 +74,7 @@ fn a_folder_that_cannot_be_written() {
     let config = tiny(folder.path(), "");
     // Nobody, not even root, makes folders in /proc.
     let output = start(&config, Path::new("/proc/run"), 1).output().unwrap();
-    must_fail(&output, &["cannot write /proc/run", "writable"]);
+    assert_fails(&output, 1, &["cannot write /proc/run", "writable"]);
 }
 
 #[test]
@@ -91,14 +86,23 @@ fn a_changed_configuration_and_an_older_checkpoint() {
     let model = std::fs::read(run.join("checkpoints/step-00000060/model.bpk")).unwrap();
 
     let changed = ["--set", "losses.strain.weight=3.0", "--set", "stages.2.steps=21"];
-    must_fail(
+    assert_fails(
         &resume(&run, 1).args(changed).output().unwrap(),
+        1,
         &["losses.strain.weight", "stages[2].steps", "--allow-config-change"],
     );
     let path = run.join("checkpoints/step-00000050").display().to_string();
     let elsewhere = folder.path().join("elsewhere").display().to_string();
-    must_fail(&trainer(1, &["--resume", &path, "--run-dir", &elsewhere]).output().unwrap(), &["belongs to"]);
-    must_fail(&trainer(1, &["--resume", &elsewhere]).output().unwrap(), &["neither a run nor a checkpoint"]);
+    assert_fails(
+        &trainer(1, &["--resume", &path, "--run-dir", &elsewhere]).output().unwrap(),
+        1,
+        &["belongs to"],
+    );
+    assert_fails(
+        &trainer(1, &["--resume", &elsewhere]).output().unwrap(),
+        1,
+        &["neither a run nor a checkpoint"],
+    );
 
     // From the older checkpoint the same steps lead to the same networks; the newer ones were set aside.
     assert!(trainer(1, &["--resume", &path]).status().unwrap().success());
@@ -119,6 +123,6 @@ fn a_garment_over_the_vertex_limit() {
     let config = tiny(folder.path(), "");
     let run = folder.path().join("run");
     let output = start(&config, &run, 1).args(["--set", "data.max_vertices=100"]).output().unwrap();
-    must_fail(&output, &["vertices", "data.max_vertices = 100"]);
+    assert_fails(&output, 1, &["vertices", "data.max_vertices = 100"]);
     assert!(!run.exists());
 }

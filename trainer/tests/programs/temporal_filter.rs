@@ -1,4 +1,4 @@
-//! Motions of the dataset's `Draper`: what the networks make is averaged over frames.
+//! Motions of the library's `Draper`: what the networks make is averaged over frames.
 
 use crate::drape::{SKIRT, TEE, run_folder};
 use clothcombo_data::asset::Pose;

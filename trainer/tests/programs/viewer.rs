@@ -1,30 +1,10 @@
 //! The viewer in a real browser: it draws, counts what it draws, and asks the network for nothing. Skipped, with a word on
 //! stderr, where no Chromium is installed; `CHROMIUM` names one that is not on the path.
 
-use crate::common::with_small_networks;
-use assert_cmd::Command as Program;
+use crate::drape::{SKIRT, TEE, drape};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-
-const CONFIG: &str = r#"
-seed = 2
-[data]
-[[data.garments]]
-generate = { count = 2, seed = 3, vertices = 250, categories = ["t_shirt", "skirt"] }
-[[stages]]
-name = "all"
-trains = "all"
-steps = 2
-layers = [2, 2]
-learning_rate = 1e-4
-[validation]
-single_scenes = 1
-layered_scenes = 1
-layers = [2, 2]
-[output]
-sample_scenes = 1
-"#;
 
 fn chromium() -> Option<PathBuf> {
     let named = std::env::var_os("CHROMIUM").map(PathBuf::from);
@@ -62,21 +42,8 @@ fn the_viewer_draws_every_layer_and_stage_in_chromium() {
         return;
     };
     let folder = tempfile::tempdir().unwrap();
-    let config = folder.path().join("config.toml");
-    fs::write(&config, with_small_networks(CONFIG)).unwrap();
-    let (run, out) = (folder.path().join("run"), folder.path().join("out"));
-    let train = Program::cargo_bin("clothcombo-train")
-        .unwrap()
-        .arg("--quiet")
-        .arg("--config")
-        .arg(&config)
-        .arg("--run-dir")
-        .arg(&run)
-        .output();
-    assert!(train.unwrap().status.success());
-    let mut drape = Program::cargo_bin("clothcombo").unwrap();
-    drape.args(["drape", "--no-cache", "--garments", "skirt_000004", "t_shirt_000003", "--checkpoint"]);
-    drape.arg(&run).arg("-o").arg(&out).assert().success();
+    let out = folder.path().join("out");
+    drape(&["--garments", SKIRT, TEE, "-o", &out.display().to_string()]).assert().success();
     let report: serde_json::Value =
         serde_json::from_slice(&fs::read(out.join("report.json")).unwrap()).unwrap();
     let triangles = |value: &serde_json::Value| value["triangles"].as_u64().unwrap();

@@ -26,7 +26,7 @@ fn what_is_saved_loads_again() {
     assert_eq!(loaded.joint_template, body.joint_template);
     assert_eq!(loaded.joint_shape_directions, body.joint_shape_directions);
     assert_eq!(loaded.pose_directions, body.pose_directions);
-    assert_eq!((loaded.parents, loaded.joint_names), (body.parents, body.joint_names));
+    assert_eq!((&loaded.parents, &loaded.joint_names), (&body.parents, &body.joint_names));
     for (a, b) in loaded.template.iter().flatten().zip(body.template.iter().flatten()) {
         assert!((a - b).abs() < 1e-7);
     }

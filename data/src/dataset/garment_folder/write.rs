@@ -1,10 +1,8 @@
 //! Writes a folder of garments.
 
-use super::{FolderGarment, GarmentFolderError, MANIFEST, Manifest, ManifestEntry, read_manifest};
+use super::{FolderGarment, MANIFEST, Manifest, ManifestEntry, read_manifest};
 use crate::asset::Garment;
-use crate::format::atomic;
-use crate::format::mesh::is_mesh_path;
-use crate::format::obj;
+use crate::format::{FileError, is_mesh_path, obj, toml_file};
 use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -14,7 +12,7 @@ use std::path::{Path, PathBuf};
 ///
 /// # Errors
 /// If the file cannot be written.
-pub fn save_garment(folder: &Path, garment: &FolderGarment) -> Result<ManifestEntry, GarmentFolderError> {
+pub fn save_garment(folder: &Path, garment: &FolderGarment) -> Result<ManifestEntry, FileError> {
     let entry = ManifestEntry::of(garment);
     let Garment { name, category, rest, .. } = &garment.garment;
     let comments = [
@@ -31,17 +29,14 @@ pub fn save_garment(folder: &Path, garment: &FolderGarment) -> Result<ManifestEn
 ///
 /// # Errors
 /// If it cannot be written.
-pub fn save_manifest(folder: &Path, entries: Vec<ManifestEntry>) -> Result<PathBuf, GarmentFolderError> {
+pub fn save_manifest(folder: &Path, entries: Vec<ManifestEntry>) -> Result<PathBuf, FileError> {
     let path = folder.join(MANIFEST);
-    let text = toml::to_string(&Manifest { garment: entries })
-        .map_err(|e| GarmentFolderError::Manifest { path: path.clone(), message: e.to_string() })?;
-    atomic::write(&path, text.as_bytes())
-        .map_err(|reason| GarmentFolderError::Io { path: path.clone(), reason })?;
+    toml_file::save(&path, &Manifest { garment: entries })?;
     Ok(path)
 }
 
 /// The files that [`save_garment_folder`] writes.
-pub(crate) fn garment_folder_files(folder: &Path, garments: &[FolderGarment]) -> Vec<PathBuf> {
+pub fn garment_folder_files(folder: &Path, garments: &[FolderGarment]) -> Vec<PathBuf> {
     let files = garments.iter().map(|g| format!("{}.obj", g.garment.name));
     files.chain([MANIFEST.into()]).map(|file| folder.join(file)).collect()
 }
@@ -49,14 +44,17 @@ pub(crate) fn garment_folder_files(folder: &Path, garments: &[FolderGarment]) ->
 /// Refuses a `folder` without a list in which a mesh lies that is none of `files`: the list that is to be written would hide it.
 ///
 /// # Errors
-/// [`GarmentFolderError::Unlisted`] names the mesh.
-pub fn refuse_unlisted(folder: &Path, files: &HashSet<PathBuf>) -> Result<(), GarmentFolderError> {
+/// [`FileError`] naming the mesh.
+pub fn refuse_unlisted(folder: &Path, files: &HashSet<PathBuf>) -> Result<(), FileError> {
     if folder.join(MANIFEST).exists() {
         return Ok(());
     }
     let there = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
     match there.filter(|path| is_mesh_path(path)).find(|path| !files.contains(path)) {
-        Some(path) => Err(GarmentFolderError::Unlisted { path }),
+        Some(path) => Err(FileError::content(&path)(format!(
+            "it is there already and would no longer be found: {MANIFEST}, which is written, lists only what is made; hint: \
+             choose another folder"
+        ))),
         None => Ok(()),
     }
 }
@@ -66,10 +64,7 @@ pub fn refuse_unlisted(folder: &Path, files: &HashSet<PathBuf>) -> Result<(), Ga
 ///
 /// # Errors
 /// If the folder holds garments that it does not list, its manifest cannot be read, or a file cannot be written.
-pub fn save_garment_folder(
-    folder: &Path,
-    garments: &[FolderGarment],
-) -> Result<Vec<PathBuf>, GarmentFolderError> {
+pub fn save_garment_folder(folder: &Path, garments: &[FolderGarment]) -> Result<Vec<PathBuf>, FileError> {
     let files = garment_folder_files(folder, garments);
     refuse_unlisted(folder, &files.iter().cloned().collect())?;
     let mut entries = read_manifest(folder)?;

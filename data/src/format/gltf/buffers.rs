@@ -1,10 +1,12 @@
 //! The bytes behind glTF accessors: the binary chunk, `data:` URIs, files beside the document.
 
-use super::super::mesh::{check_count, read_limited};
 use super::document::{Accessor, Document};
+use crate::format::polygon_mesh::{check_count, read_limited};
+use crate::format::scalar::Scalar;
 use base64::Engine;
 use base64::alphabet::STANDARD;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
+use percent_encoding::percent_decode_str;
 use std::borrow::Cow;
 use std::path::{Component, Path, PathBuf};
 
@@ -36,9 +38,7 @@ impl<'a> Buffers<'a> {
         check_count("vertices", item.count)?;
         let mut positions = Vec::new();
         self.for_each(document, accessor, item, 12, |raw| {
-            positions.push(std::array::from_fn(|a| {
-                f64::from(f32::from_le_bytes([raw[4 * a], raw[4 * a + 1], raw[4 * a + 2], raw[4 * a + 3]]))
-            }));
+            positions.push(std::array::from_fn(|a| Scalar::F32.read(&raw[4 * a..4 * a + 4], false)));
         })?;
         Ok(positions)
     }
@@ -46,10 +46,10 @@ impl<'a> Buffers<'a> {
     /// A SCALAR of unsigned integers.
     pub fn indices(&mut self, document: &Document, accessor: usize) -> Result<Vec<u32>, String> {
         let item = get_accessor(document, accessor)?;
-        let size = match (item.component_type, item.kind.as_str()) {
-            (U8, "SCALAR") => 1,
-            (U16, "SCALAR") => 2,
-            (U32, "SCALAR") => 4,
+        let scalar = match (item.component_type, item.kind.as_str()) {
+            (U8, "SCALAR") => Scalar::U8,
+            (U16, "SCALAR") => Scalar::U16,
+            (U32, "SCALAR") => Scalar::U32,
             _ => {
                 return Err(format!(
                     "accessor {accessor} is no SCALAR of unsigned integers, as indices must be"
@@ -57,13 +57,8 @@ impl<'a> Buffers<'a> {
             }
         };
         let mut indices = Vec::new();
-        self.for_each(document, accessor, item, size, |raw| {
-            indices.push(match raw {
-                [a] => u32::from(*a),
-                [a, b] => u32::from(u16::from_le_bytes([*a, *b])),
-                [a, b, c, d] => u32::from_le_bytes([*a, *b, *c, *d]),
-                _ => 0,
-            });
+        self.for_each(document, accessor, item, scalar.bytes(), |raw| {
+            indices.push(scalar.read(raw, false) as u32);
         })?;
         Ok(indices)
     }
@@ -141,8 +136,8 @@ impl<'a> Buffers<'a> {
 
     /// A file in the folder of the document, or below it: a document must not reach elsewhere.
     fn external(&self, uri: &str) -> Result<Vec<u8>, String> {
-        let name = percent_decoded(uri);
-        let relative = Path::new(&name);
+        let name = percent_decode_str(uri).decode_utf8_lossy();
+        let relative = Path::new(name.as_ref());
         let stays = relative.components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
         if name.contains("://") || !stays {
             return Err(format!("buffer '{uri}' is no file beside the document"));
@@ -168,32 +163,12 @@ fn decode_data_uri(data: &str, index: usize) -> Result<Vec<u8>, String> {
         .ok_or_else(|| format!("buffer {index} is a data URI that is not valid base64"))
 }
 
-fn percent_decoded(uri: &str) -> String {
-    let raw = uri.as_bytes();
-    let mut decoded = Vec::with_capacity(raw.len());
-    let mut i = 0;
-    while i < raw.len() {
-        let hex = |b: u8| char::from(b).to_digit(16);
-        match (raw[i], raw.get(i + 1).and_then(|b| hex(*b)), raw.get(i + 2).and_then(|b| hex(*b))) {
-            (b'%', Some(high), Some(low)) => {
-                decoded.push((16 * high + low) as u8);
-                i += 3;
-            }
-            (byte, ..) => {
-                decoded.push(byte);
-                i += 1;
-            }
-        }
-    }
-    String::from_utf8_lossy(&decoded).into_owned()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn base64_with_or_without_padding_and_percent_codes_decode() {
+    fn base64_with_or_without_padding_decodes() {
         for (text, bytes) in
             [("", &b""[..]), ("Zg==", b"f"), ("Zm8=", b"fo"), ("Zm9vYg", b"foob"), ("+/8=", b"\xfb\xff")]
         {
@@ -203,6 +178,5 @@ mod tests {
             decode_data_uri("data:;base64,Zm9v!", 0).is_err()
                 && decode_data_uri("data:;base64,Z", 0).is_err()
         );
-        assert_eq!(percent_decoded("a%20b%2"), "a b%2");
     }
 }

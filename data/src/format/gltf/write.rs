@@ -8,49 +8,10 @@
 //! the writer needs no more.
 
 use crate::format::atomic;
+use crate::format::error::FileError;
 use clothcombo_physics::vertex_normals;
 use serde_json::{Value, json};
-use std::path::{Path, PathBuf};
-use thiserror::Error;
-
-/// Why a scene cannot be written.
-#[derive(Debug, Error)]
-pub enum GlbError {
-    /// The file system refused.
-    #[error("{}: {reason}", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// What the system said.
-        reason: std::io::Error,
-    },
-    /// Frames of different sizes, or another number of them than of times.
-    #[error("mesh '{mesh}' has {found}, expected {expected}")]
-    Frames {
-        /// The mesh.
-        mesh: String,
-        /// What it has.
-        found: String,
-        /// What it should have.
-        expected: String,
-    },
-    /// A position that is not a number.
-    #[error("mesh '{mesh}', frame {frame}: vertex {vertex} is not finite")]
-    NotFinite {
-        /// The mesh.
-        mesh: String,
-        /// The frame.
-        frame: usize,
-        /// The vertex.
-        vertex: usize,
-    },
-    /// The format counts bytes in 32 bits.
-    #[error("the scene takes {bytes} bytes, a .glb holds at most 4 GiB; leave out frames")]
-    TooLarge {
-        /// Its size.
-        bytes: usize,
-    },
-}
+use std::path::Path;
 
 /// One mesh of a scene.
 #[derive(Clone, Debug)]
@@ -61,7 +22,7 @@ pub struct SceneMesh<'a> {
     pub colour: [u8; 3],
     /// Triangles `[F, 3]`.
     pub faces: &'a [[u32; 3]],
-    /// Positions `[V, 3]` [m] of every frame, at least one.
+    /// Positions `[V, 3]` (m) of every frame, at least one.
     pub frames: Vec<&'a [[f64; 3]]>,
 }
 
@@ -69,16 +30,16 @@ pub struct SceneMesh<'a> {
 ///
 /// # Errors
 /// As [`encode_glb`], or when the file cannot be written.
-pub fn save_glb(path: &Path, meshes: &[SceneMesh], times: &[f64]) -> Result<(), GlbError> {
-    let bytes = encode_glb(meshes, times)?;
-    atomic::write(path, &bytes).map_err(|reason| GlbError::Io { path: path.into(), reason })
+pub fn save_glb(path: &Path, meshes: &[SceneMesh], times: &[f64]) -> Result<(), FileError> {
+    let bytes = encode_glb(meshes, times).map_err(FileError::content(path))?;
+    atomic::write(path, &bytes).map_err(FileError::io(path))
 }
 
-/// The bytes of a `.glb`. `times` [s], ascending, are those of the frames; a single frame needs none.
+/// The bytes of a `.glb`. `times` (s), ascending, are those of the frames; a single frame needs none.
 ///
 /// # Errors
-/// [`GlbError`] naming the mesh that does not fit.
-pub fn encode_glb(meshes: &[SceneMesh], times: &[f64]) -> Result<Vec<u8>, GlbError> {
+/// The mesh that does not fit, and why.
+pub fn encode_glb(meshes: &[SceneMesh], times: &[f64]) -> Result<Vec<u8>, String> {
     let frames = times.len().max(1);
     let mut file = File::default();
     // Every mesh moves by the same weights: one sampler serves all.
@@ -90,9 +51,9 @@ pub fn encode_glb(meshes: &[SceneMesh], times: &[f64]) -> Result<Vec<u8>, GlbErr
     file.finish(sampler)
 }
 
-fn check(mesh: &SceneMesh, frames: usize) -> Result<(), GlbError> {
+fn check(mesh: &SceneMesh, frames: usize) -> Result<(), String> {
     let wrong = |found: String, expected: String| {
-        Err(GlbError::Frames { mesh: mesh.name.to_owned(), found, expected })
+        Err(format!("mesh '{}' has {found}, expected {expected}", mesh.name))
     };
     if mesh.frames.len() != frames {
         return wrong(format!("{} frames", mesh.frames.len()), format!("{frames}"));
@@ -103,7 +64,7 @@ fn check(mesh: &SceneMesh, frames: usize) -> Result<(), GlbError> {
             return wrong(format!("{} vertices in frame {frame}", positions.len()), format!("{vertices}"));
         }
         if let Some(vertex) = positions.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
-            return Err(GlbError::NotFinite { mesh: mesh.name.to_owned(), frame, vertex });
+            return Err(format!("mesh '{}', frame {frame}: vertex {vertex} is not finite", mesh.name));
         }
     }
     if let Some(corner) = mesh.faces.iter().flatten().find(|v| **v as usize >= vertices) {
@@ -223,7 +184,7 @@ impl File {
         }));
     }
 
-    fn finish(self, sampler: Option<[usize; 2]>) -> Result<Vec<u8>, GlbError> {
+    fn finish(self, sampler: Option<[usize; 2]>) -> Result<Vec<u8>, String> {
         let count = self.nodes.len();
         let mut document = json!({
             "asset": { "version": "2.0", "generator": "ClothCombo-rs" },
@@ -249,7 +210,10 @@ impl File {
         let mut text = document.to_string().into_bytes();
         text.resize(text.len().next_multiple_of(4), b' ');
         let total = 12 + 8 + text.len() + 8 + self.binary.len();
-        let Ok(total_word) = u32::try_from(total) else { return Err(GlbError::TooLarge { bytes: total }) };
+        // The format counts bytes in 32 bits.
+        let total_word = u32::try_from(total).map_err(|_| {
+            format!("the scene takes {total} bytes, a .glb holds at most 4 GiB; leave out frames")
+        })?;
         let mut bytes = Vec::with_capacity(total);
         bytes.extend_from_slice(b"glTF");
         for word in [2, total_word, text.len() as u32, 0x4E4F_534A] {
@@ -395,7 +359,7 @@ mod tests {
         broken[3][1] = f64::NAN;
         let mesh = |frames| SceneMesh { name: "tee", colour: [0; 3], faces: sheet.faces(), frames };
         let whole = sheet.positions();
-        let message = |mesh: SceneMesh, times: &[f64]| encode_glb(&[mesh], times).unwrap_err().to_string();
+        let message = |mesh: SceneMesh, times: &[f64]| encode_glb(&[mesh], times).unwrap_err();
         assert!(message(mesh(vec![whole, &broken]), &[0.0, 1.0]).contains("'tee', frame 1: vertex 3"));
         assert!(message(mesh(vec![whole, &whole[1..]]), &[0.0, 1.0]).contains("8 vertices in frame 1"));
         assert!(message(mesh(vec![whole]), &[0.0, 1.0]).contains("1 frames"));

@@ -1,7 +1,7 @@
 //! Writing `.npz` archives.
 
-use super::NpzError;
 use crate::format::atomic;
+use crate::format::error::FileError;
 use npyz::{DType, TypeStr, WriterBuilder};
 use std::io::{Cursor, Write};
 use std::path::Path;
@@ -95,8 +95,8 @@ impl NpzWriter {
     ///
     /// # Errors
     /// If an array did not fit its shape, or the file cannot be written.
-    pub fn save(self, path: &Path) -> Result<(), NpzError> {
-        let failed = |reason| NpzError::Io { path: path.into(), reason };
+    pub fn save(self, path: &Path) -> Result<(), FileError> {
+        let failed = FileError::io(path);
         if let Some(reason) = self.error {
             return Err(failed(std::io::Error::other(reason)));
         }

@@ -1,7 +1,8 @@
 //! A garment's own file for where the garment is now.
 
 use super::super::atomic;
-use super::super::mesh::read_limited;
+use super::super::folder::has_extension;
+use super::super::polygon_mesh::read_limited;
 use super::statements::one_per_line;
 use std::io;
 use std::path::Path;
@@ -125,7 +126,7 @@ fn libraries_of(names: &str, folder: &Path) -> Vec<u8> {
     let read = |name: &str| {
         let path = folder.join(portable(name));
         // Whatever else a file may name is not for a folder that is given away.
-        let is_library = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mtl"));
+        let is_library = has_extension(&path, "mtl");
         let bytes = is_library.then(|| read_limited(&path).ok()).flatten()?;
         Some((path.parent().unwrap_or(folder).to_owned(), bytes))
     };

@@ -1,20 +1,20 @@
 //! The surface that the remesher keeps a garment to, and how long its edges are there.
 
 use super::super::field;
-use super::super::remesh::Target;
 use super::pattern::Pattern;
+use crate::mesh::RemeshTarget;
 use clothcombo_physics::vec3::dot;
 
 /// The surface that the remesher keeps to.
-pub(super) struct Cloth<'a> {
+pub(super) struct ClothSurface<'a> {
     pub pattern: &'a Pattern<'a>,
     pub edge_length: f64,
     pub variation: f64,
-    /// Wave vectors [1/m] and phases of the sizing, in whole turns.
+    /// Wave vectors (1/m) and phases of the sizing, in whole turns.
     pub waves: [[f64; 4]; 3],
 }
 
-impl Target for Cloth<'_> {
+impl RemeshTarget for ClothSurface<'_> {
     fn project(&self, mut point: [f64; 3], label: u32) -> [f64; 3] {
         let reach = self.edge_length;
         if label == 0 {

@@ -38,15 +38,15 @@ pub struct SkirtDesign {
     pub rise: f64,
     /// Hem on the length scale, 1.1–1.95.
     pub length: f64,
-    /// Ease at the hips [m], 6–16 mm.
+    /// Ease at the hips (m), 6–16 mm.
     pub ease: f64,
     /// Share by which the outline falls straight below the widest place instead of following the body, 0–1.
     pub hang: f64,
     /// Flare and pleats.
     pub skirt: FlareDesign,
-    /// Slope of the rim from back to front [m/m], ±0.08.
+    /// Slope of the rim from back to front (m/m), ±0.08.
     pub rim_tilt: f64,
-    /// Slope of the hem from back to front [m/m], ±0.04.
+    /// Slope of the hem from back to front (m/m), ±0.04.
     pub hem_tilt: f64,
 }
 
@@ -57,19 +57,19 @@ pub struct TrousersDesign {
     pub rise: f64,
     /// Hem on the length scale, 1.1 (hot pants) – 1.97.
     pub length: f64,
-    /// How far the crotch seam hangs below the body [m], 12–35 mm.
+    /// How far the crotch seam hangs below the body (m), 12–35 mm.
     pub drop: f64,
-    /// Ease of the seat [m], 6–18 mm.
+    /// Ease of the seat (m), 6–18 mm.
     pub ease: f64,
-    /// Ease of the legs [m], 7–24 mm.
+    /// Ease of the legs (m), 7–24 mm.
     pub leg_ease: f64,
     /// Share by which the legs fall straight from the thigh, 0–1: tights to straight legs.
     pub hang: f64,
-    /// Extra radius at the ankle [m], −10 (tapered) – 70 mm (bell bottoms), growing from the knee.
+    /// Extra radius at the ankle (m), −10 (tapered) – 70 mm (bell bottoms), growing from the knee.
     pub flare: f64,
     /// Share by which the last 5 cm are gathered to the leg, 0 (hem) – 1 (cuff).
     pub cuff: f64,
-    /// Slope of the rim from back to front [m/m], ±0.08.
+    /// Slope of the rim from back to front (m/m), ±0.08.
     pub rim_tilt: f64,
 }
 
@@ -86,7 +86,7 @@ pub struct UpperDesign {
     pub hang: f64,
     /// Flare and pleats below the waist.
     pub skirt: FlareDesign,
-    /// Slope of the hem from back to front [m/m], ±0.1.
+    /// Slope of the hem from back to front (m/m), ±0.1.
     pub hem_tilt: f64,
     /// The upper edge.
     pub neckline: Neckline,
@@ -99,7 +99,7 @@ pub struct UpperDesign {
 /// How the outline of a skirt leaves the body.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FlareDesign {
-    /// Extra radius per metre of height [m/m], 0–0.55.
+    /// Extra radius per metre of height (m/m), 0–0.55.
     pub flare: f64,
     /// Folds around the hem.
     pub pleats: Option<PleatDesign>,
@@ -112,9 +112,9 @@ pub struct PleatDesign {
     pub count: u32,
     /// Height of a fold from valley to ridge as a share of its width, 0–0.25.
     pub depth: f64,
-    /// Where on the way from waist to hem they are fully formed: near 0 pressed from the waistband on, 1 soft folds at the hem.
+    /// Where between waist and hem they are fully formed: near 0 pressed from the waistband on, 1 soft folds at the hem.
     pub formed: f64,
-    /// Angle of the first ridge [rad].
+    /// Angle of the first ridge (rad).
     pub phase: f64,
 }
 
@@ -124,25 +124,25 @@ pub struct PleatDesign {
 pub enum Neckline {
     /// A level edge below the armpits.
     Strapless {
-        /// Distance below the armpit [m], 25–50 mm.
+        /// Distance below the armpit (m), 25–50 mm.
         drop: f64,
-        /// Slope from back to front [m/m], ±0.06.
+        /// Slope from back to front (m/m), ±0.06.
         tilt: f64,
     },
     /// An opening for the neck, with shoulders or straps.
     Neck {
-        /// Half the opening beyond the side of the neck [m], 24–90 mm; narrower where the strap needs the width.
+        /// Half the opening beyond the side of the neck (m), 24–90 mm; narrower where the strap needs the width.
         width: f64,
-        /// Depth in front below the base of the neck [m], 5–110 mm.
+        /// Depth in front below the base of the neck (m), 5–110 mm.
         depth: f64,
-        /// Depth at the back [m], 0–50 mm.
+        /// Depth at the back (m), 0–50 mm.
         depth_back: f64,
         /// Shape: 1 a V, 2 round, 3 and more square.
         power: f64,
         /// Where the armhole cuts the shoulder, as a share of the shoulder's width, 0.8–0.97; with sleeves it only limits
         /// the opening.
         armhole: f64,
-        /// How far an armhole without sleeve reaches below the armpit [m], 15–35 mm.
+        /// How far an armhole without sleeve reaches below the armpit (m), 15–35 mm.
         armhole_drop: f64,
     },
 }
@@ -152,15 +152,15 @@ pub enum Neckline {
 pub struct SleeveDesign {
     /// End of the sleeve: 0 at the shoulder, 1 at the wrist; 0.2–0.97.
     pub length: f64,
-    /// Ease beyond that of the looseness [m], 0–6 mm.
+    /// Ease beyond that of the looseness (m), 0–6 mm.
     pub ease: f64,
     /// Share by which the sleeve keeps its width towards the wrist, 0–0.8.
     pub hang: f64,
-    /// Extra radius at the end [m], −4 – 35 mm, growing from the shoulder.
+    /// Extra radius at the end (m), −4 – 35 mm, growing from the shoulder.
     pub flare: f64,
-    /// Extra radius at the armhole [m], 0–12 mm.
+    /// Extra radius at the armhole (m), 0–12 mm.
     pub armhole: f64,
-    /// Slope of the edge [m/m], ±0.15.
+    /// Slope of the edge (m/m), ±0.15.
     pub tilt: f64,
     /// Share by which the last 5 cm are gathered to the arm, 0 (open edge) – 1 (cuff).
     pub cuff: f64,
@@ -174,16 +174,16 @@ pub enum Front {
     Closed,
     /// A placket: a slit down from the neckline.
     Placket {
-        /// How far it opens below the neckline [m], 60–180 mm.
+        /// How far it opens below the neckline (m), 60–180 mm.
         length: f64,
-        /// Half its width [m], 9–20 mm; wider where the triangles could not show it.
+        /// Half its width (m), 9–20 mm; wider where the triangles could not show it.
         half_width: f64,
     },
-    /// Open all the way down, as a jacket or an unbuttoned shirt.
+    /// Open down to the hem, as a jacket or an unbuttoned shirt.
     Open {
-        /// Half the distance of the edges at the neck [m], 6–20 mm.
+        /// Half the distance of the edges at the neck (m), 6–20 mm.
         gap: f64,
-        /// How much farther apart they are per metre down [m/m], 0–0.12.
+        /// How much farther apart they are per metre down (m/m), 0–0.12.
         widening: f64,
     },
 }

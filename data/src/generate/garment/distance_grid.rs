@@ -9,16 +9,16 @@ use super::super::isosurface::Lattice;
 use clothcombo_physics::vec3::{add, cross, dot, norm_squared, scale, sub};
 use std::collections::VecDeque;
 
-/// Trilinearly interpolated signed distance [m], positive outside.
+/// Trilinearly interpolated signed distance (m), positive outside.
 #[derive(Debug, Clone)]
 pub(super) struct DistanceGrid {
     lattice: Lattice,
     values: Vec<f32>,
 }
 
-/// Node spacing [m].
+/// Node spacing (m).
 const STEP: f64 = 0.012;
-/// Distances are clamped to this value [m].
+/// Distances are clamped to this value (m).
 const BAND: f64 = 0.06;
 
 impl DistanceGrid {
@@ -91,7 +91,7 @@ impl DistanceGrid {
         Self { lattice, values }
     }
 
-    /// Signed distance at `p` [m], clamped to the band of 6 cm.
+    /// Signed distance at `p` (m), clamped to the band of 6 cm.
     pub fn distance(&self, p: [f64; 3]) -> f64 {
         let mut cell = [0; 3];
         let mut t = [0.0; 3];

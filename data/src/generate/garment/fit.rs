@@ -1,13 +1,13 @@
 //! What the generator measures on a body: tubes around trunk, legs and arms, landmarks, and the distance to its surface.
 
-use super::GarmentError;
 use super::distance_grid::DistanceGrid;
+use super::settings::GarmentError;
 use super::tube::Tube;
 use crate::asset::{BODY_JOINT_COUNT, Body};
 use crate::generate::parts::dominant_joints;
 use clothcombo_physics::query::Surface;
 
-/// Heights and widths of the zero body [m].
+/// Heights and widths of the zero body (m).
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Landmarks {
     pub ankle: f64,
@@ -42,7 +42,7 @@ pub(super) struct BodyFit {
     pub surface: Surface<f64>,
 }
 
-/// No vertex of a body is farther from the pelvis [m].
+/// No vertex of a body is farther from the pelvis (m).
 const FARTHEST: f64 = 5.0;
 
 impl BodyFit {

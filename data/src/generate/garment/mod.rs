@@ -1,36 +1,34 @@
-//! A wardrobe for any body: garments of six categories, designed by documented parameters or by chance, cut and meshed for the
-//! body that shall wear them.
+//! Garments of six categories for any body, designed by documented parameters or at random, cut and meshed for that body.
 //!
-//! Every garment is made the same way. A smooth solid around the body — hanging tubes around trunk, sleeves and legs, united with an
+//! Every garment is made alike. A smooth solid around the body — hanging tubes around trunk, sleeves and legs, united with an
 //! offset of the body itself — is polygonised, opened along cut surfaces (hem, cuffs, neckline, armholes, placket), and remeshed
 //! isotropically with every vertex kept on the solid and every boundary vertex on its cut. Being outside the body
 //! is thus part of the construction, hems are exact, and the random lattice, sizing and design make every
 //! triangulation a different one.
 
 mod cloth;
+mod cut;
 mod design;
 mod distance_grid;
 mod fit;
+mod lower;
 mod pattern;
 mod quality;
+mod random_design;
 mod settings;
-mod survey;
 mod tube;
 mod upper;
-mod wardrobe;
 
 use super::isosurface::{Lattice, extract};
-use super::labelled_triangles::LabelledTriangles;
-use super::remesh::{Quality, remesh};
-use super::sheet::Sheet;
 use crate::asset::provenance::GENERATED;
 use crate::asset::{Body, Category, Garment, Provenance};
-use cloth::Cloth;
+use crate::mesh::{EditableMesh, LabelledTriangles, Quality, remesh};
+use cloth::ClothSurface;
 use clothcombo_physics::TriMesh;
 use clothcombo_physics::contact::TriangleTree;
-use clothcombo_physics::vec3::norm;
+use cut::cut_pattern;
 use fit::BodyFit;
-use pattern::Pattern;
+use quality::GarmentQuality;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -38,9 +36,7 @@ pub use design::{
     FlareDesign, Front, GarmentDesign, Neckline, PleatDesign, SkirtDesign, SleeveDesign, TrousersDesign,
     UpperDesign,
 };
-pub use quality::GarmentQuality;
 pub use settings::{GarmentError, GarmentSettings};
-pub use survey::{CategorySurvey, Survey};
 
 /// Generates garments for one body; measures the body once.
 #[derive(Debug)]
@@ -50,31 +46,6 @@ pub struct GarmentGenerator<'a> {
     body_hash: String,
     fit: BodyFit,
     tree: TriangleTree<'a>,
-}
-
-/// A garment with the story of its making.
-#[derive(Debug, Clone)]
-pub struct GeneratedGarment {
-    /// The garment.
-    pub garment: Garment,
-    /// Its design.
-    pub design: GarmentDesign,
-    /// What was wrong with the designs tried before it; none of them was kept.
-    pub rejected: Vec<String>,
-}
-
-/// One garment for `body`, the same for the same seed and settings. For many garments keep a [`GarmentGenerator`], which
-/// measures the body only once.
-///
-/// # Errors
-/// [`GarmentError`] if the body is unsuitable, a setting is out of range, or no design passed the checks.
-pub fn generate_garment(
-    body: &Body,
-    category: Category,
-    seed: u64,
-    settings: &GarmentSettings,
-) -> Result<Garment, GarmentError> {
-    GarmentGenerator::new(body)?.generate(category, seed, settings)
 }
 
 impl<'a> GarmentGenerator<'a> {
@@ -104,39 +75,12 @@ impl<'a> GarmentGenerator<'a> {
         seed: u64,
         settings: &GarmentSettings,
     ) -> Result<Garment, GarmentError> {
-        Ok(self.generate_traced(category, seed, settings)?.garment)
+        let random = |attempt| GarmentDesign::random(category, &mut stream(seed, category, attempt, 0));
+        self.first_that_passes(category, seed, settings, &random)
     }
 
-    /// As [`Self::generate`], with the design and the rejected attempts.
-    ///
-    /// # Errors
-    /// As [`Self::generate`].
-    pub fn generate_traced(
-        &self,
-        category: Category,
-        seed: u64,
-        settings: &GarmentSettings,
-    ) -> Result<GeneratedGarment, GarmentError> {
-        settings.check()?;
-        let mut rejected = Vec::new();
-        for attempt in 0..settings.attempts as u64 {
-            let design = GarmentDesign::random(category, &mut stream(seed, category, attempt, 0));
-            match self.attempt(&design, seed, attempt, settings) {
-                Ok(rest) => {
-                    return Ok(GeneratedGarment {
-                        garment: self.garment(category, seed, settings, rest),
-                        design,
-                        rejected,
-                    });
-                }
-                Err(reason) => rejected.push(reason),
-            }
-        }
-        Err(exhausted(category, seed, rejected))
-    }
-
-    /// A garment of the given design, with the promises of [`Self::generate`]. The seed decides about the mesh; other
-    /// triangulations are tried where one misses a promise.
+    /// A garment of the given design, with the guarantees of [`Self::generate`]. The seed decides about the mesh; other
+    /// triangulations are tried where one misses a guarantee.
     ///
     /// # Errors
     /// [`GarmentError::Setting`], and [`GarmentError::Exhausted`] for a design that does not work on this body.
@@ -146,15 +90,26 @@ impl<'a> GarmentGenerator<'a> {
         seed: u64,
         settings: &GarmentSettings,
     ) -> Result<Garment, GarmentError> {
+        self.first_that_passes(design.category(), seed, settings, &|_| design.clone())
+    }
+
+    /// The garment of the first attempt that passes all checks.
+    fn first_that_passes(
+        &self,
+        category: Category,
+        seed: u64,
+        settings: &GarmentSettings,
+        design: &dyn Fn(u64) -> GarmentDesign,
+    ) -> Result<Garment, GarmentError> {
         settings.check()?;
-        let mut rejected = Vec::new();
+        let mut last = String::new();
         for attempt in 0..settings.attempts as u64 {
-            match self.attempt(design, seed, attempt, settings) {
-                Ok(rest) => return Ok(self.garment(design.category(), seed, settings, rest)),
-                Err(reason) => rejected.push(reason),
+            match self.attempt(&design(attempt), seed, attempt, settings) {
+                Ok(rest) => return Ok(self.garment(category, seed, settings, rest)),
+                Err(reason) => last = reason,
             }
         }
-        Err(exhausted(design.category(), seed, rejected))
+        Err(GarmentError::Exhausted { category, seed, attempts: settings.attempts, last })
     }
 
     /// The name of the garment of a seed.
@@ -202,7 +157,7 @@ impl<'a> GarmentGenerator<'a> {
             _ => 0.8,
         };
         let guess = edge_length(area, vertices);
-        let pattern = Pattern::new(&self.fit, design, guess, settings.clearance);
+        let pattern = cut_pattern(&self.fit, design, guess, settings.clearance);
 
         let step = (0.6 * guess).clamp(0.008, 0.018);
         let mut low = pattern.bounds[0];
@@ -224,7 +179,7 @@ impl<'a> GarmentGenerator<'a> {
         }
         quality::check_openings(&triangles.positions, &triangles.labels, &triangles.faces, pattern.openings)?;
 
-        let target = Cloth {
+        let target = ClothSurface {
             pattern: &pattern,
             edge_length: edge_length(triangles.area(), vertices),
             variation: settings.sizing_variation,
@@ -234,7 +189,7 @@ impl<'a> GarmentGenerator<'a> {
                 })
             }),
         };
-        let mut sheet = Sheet::new(triangles);
+        let mut sheet = EditableMesh::new(triangles);
         let limits = Quality { angle: 15.0, edge_ratio: [0.4, 2.5] };
         remesh(&mut sheet, &target, 6, limits);
         let (positions, faces) = sheet.compact();
@@ -243,8 +198,8 @@ impl<'a> GarmentGenerator<'a> {
         Ok(rest)
     }
 
-    /// Measures a mesh against the promises of the generator.
-    pub fn quality(&self, rest: &TriMesh) -> GarmentQuality {
+    /// Measures a mesh against the guarantees of the generator.
+    fn quality(&self, rest: &TriMesh) -> GarmentQuality {
         GarmentQuality::measure(rest, &self.fit.surface, &self.tree)
     }
 }
@@ -256,19 +211,16 @@ fn stream(seed: u64, category: Category, attempt: u64, purpose: u64) -> ChaCha8R
     rng
 }
 
-fn exhausted(category: Category, seed: u64, mut rejected: Vec<String>) -> GarmentError {
-    let attempts = rejected.len();
-    GarmentError::Exhausted { category, seed, attempts, last: rejected.pop().unwrap_or_default() }
-}
-
 /// Edge length of a triangulation of `area` with `vertices` nearly equilateral triangles' corners.
 fn edge_length(area: f64, vertices: f64) -> f64 {
     (area / (0.866 * vertices)).sqrt()
 }
 
-/// Length of an edge [m].
-fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
-    norm([a[0] - b[0], a[1] - b[1], a[2] - b[2]])
+/// A garment of about `vertices` vertices for a test.
+#[cfg(test)]
+pub(crate) fn generated(body: &Body, category: Category, seed: u64, vertices: usize) -> Garment {
+    let settings = GarmentSettings { target_vertices: vertices, ..GarmentSettings::default() };
+    GarmentGenerator::new(body).unwrap().generate(category, seed, &settings).unwrap()
 }
 
 #[cfg(test)]

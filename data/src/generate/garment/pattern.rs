@@ -1,23 +1,22 @@
-//! A design on a body: a solid around the body and the cuts that open it.
+//! A garment before it is meshed: a solid around the body and the cuts that open it.
 
 use super::super::field::{smooth_min, smooth_step};
-use super::design::{FlareDesign, GarmentDesign, SkirtDesign, TrousersDesign};
+use super::design::FlareDesign;
 use super::fit::{BodyFit, Landmarks};
 use super::tube::{Tube, angle};
-use super::upper;
 use std::f64::consts::TAU;
 
-/// Keeps the part where the field is not negative [m, distance-like].
+/// Keeps the part where the field is not negative (m, distance-like).
 pub(super) type Cut = Box<dyn Fn([f64; 3]) -> f64 + Send + Sync>;
 
-/// A garment before it is meshed.
+/// A solid around a body, and where it is opened.
 pub(super) struct Pattern<'a> {
     pub fit: &'a BodyFit,
     pub column: Option<Column>,
     pub sleeves: Vec<(Tube, f64)>,
-    trouser_legs: Option<[Tube; 2]>,
-    leg_top: f64,
-    /// Distance the cloth keeps from the skin where no tube is wider [m].
+    pub trouser_legs: Option<[Tube; 2]>,
+    pub leg_top: f64,
+    /// Distance the cloth keeps from the skin where no tube is wider (m).
     pub clearance: f64,
     /// The curves along which the solid is opened; cut `i` has the label bit `1 << i`.
     pub cuts: Vec<Cut>,
@@ -35,43 +34,34 @@ pub(super) struct Column {
     pub bottom: f64,
 }
 
-/// Half the width of the gap between trouser legs [m].
+/// Half the width of the gap between trouser legs (m).
 const LEG_GAP: f64 = 0.007;
-/// Length over which a cuff is gathered [m].
+/// Length over which a cuff is gathered (m).
 const GATHER: f64 = 0.045;
-/// Width of a gathered cuff beyond the limb [m].
+/// Width of a gathered cuff beyond the limb (m).
 const CUFF_EASE: f64 = 0.008;
-/// Most a fold stands out [m].
+/// Most a fold stands out (m).
 const FOLD_HEIGHT: f64 = 0.045;
 /// Edges a fold needs to be seen.
 const EDGES_PER_FOLD: f64 = 6.0;
 
 impl<'a> Pattern<'a> {
-    /// Cuts `design` for a body; `edge_length` [m] is what the mesh will have, which seams, straps and pleats have to respect,
-    /// `clearance` [m] the least distance from the skin.
-    pub fn new(fit: &'a BodyFit, design: &GarmentDesign, edge_length: f64, clearance: f64) -> Self {
-        // A flat triangle over a limb of 5 cm radius dips this much below its corners.
-        let sag = edge_length * edge_length / (8.0 * 0.05);
-        let mut pattern = Pattern {
+    /// A pattern without cuts yet, whose cloth keeps `clearance` (m) from the body.
+    pub fn blank(fit: &'a BodyFit, clearance: f64) -> Self {
+        Pattern {
             fit,
             column: None,
             sleeves: Vec::new(),
             trouser_legs: None,
             leg_top: 0.0,
-            clearance: clearance + sag,
+            clearance,
             cuts: Vec::new(),
             openings: 0,
             bounds: [[0.0; 3]; 2],
-        };
-        match design {
-            GarmentDesign::Skirt(skirt) => cut_skirt(&mut pattern, skirt, edge_length, sag),
-            GarmentDesign::Trousers(trousers) => cut_trousers(&mut pattern, trousers, sag),
-            GarmentDesign::Upper(design) => upper::cut(&mut pattern, design, edge_length, sag),
         }
-        pattern
     }
 
-    /// The solid whose surface is the cloth: negative inside [m].
+    /// The solid whose surface is the cloth: negative inside (m).
     pub fn field(&self, p: [f64; 3]) -> f64 {
         let mut f = self.fit.distance.distance(p) - self.clearance;
         if let Some(column) = &self.column {
@@ -134,7 +124,7 @@ impl Pleats {
         })
     }
 
-    /// Extra radius [m] at height `y`, angle `a`, where the column has radius `r`. Never negative: folds stand out.
+    /// Extra radius (m) at height `y`, angle `a`, where the column has radius `r`. Never negative: folds stand out.
     fn extra(&self, y: f64, a: f64, r: f64) -> f64 {
         let share = (self.from - y) / (self.from - self.to).max(0.05);
         if share <= 0.0 {
@@ -145,14 +135,14 @@ impl Pleats {
     }
 }
 
-/// Extra radius of a flared outline [m] at height `y`, starting at `from`.
+/// Extra radius of a flared outline (m) at height `y`, starting at `from`.
 pub(super) fn flared(flare: f64, from: f64, y: f64) -> f64 {
     let below = (from - y).max(0.0);
     // Starts tangentially so that there is no crease at the waist.
     flare * below * below / (below + 0.06)
 }
 
-/// Height [m] of `length` on the scale of designs: 0 the waist, 1 the crotch, 2 the ankle.
+/// Height (m) of `length` on the scale of designs: 0 the waist, 1 the crotch, 2 the ankle.
 pub(super) fn height(mark: &Landmarks, length: f64) -> f64 {
     if length <= 1.0 {
         mark.waist + (mark.crotch - mark.waist) * length
@@ -193,45 +183,4 @@ pub(super) fn column_bounds(tube: &Tube, low: f64, high: f64) -> [[f64; 3]; 2] {
         }
     }
     bounds
-}
-
-fn cut_skirt(pattern: &mut Pattern, design: &SkirtDesign, edge_length: f64, sag: f64) {
-    let mark = &pattern.fit.landmarks;
-    let low = mark.waist - 0.35 * (mark.waist - mark.hip);
-    let waist = low + (mark.waist + 0.01 - low) * design.rise;
-    let hem = height(mark, design.length).min(mark.crotch - 0.06);
-    let from = mark.waist - 0.03;
-    let flare = design.skirt.flare;
-    let tube = (pattern.fit.column.clone())
-        .hang(mark.waist, |_| design.hang)
-        .map(|y, _, r| r + design.ease + sag + flared(flare, from, y));
-    let pleats = Pleats::new(&design.skirt, &tube, waist.min(from), hem, edge_length);
-    pattern.bounds = column_bounds(&tube, hem - 0.05, waist + 0.05);
-    pattern.column = Some(Column { tube, pleats, top: waist + 0.10, bottom: f64::MIN });
-    pattern.cuts = vec![level(waist, -1.0, design.rim_tilt), level(hem, 1.0, design.hem_tilt)];
-    pattern.openings = 2;
-}
-
-fn cut_trousers(pattern: &mut Pattern, design: &TrousersDesign, sag: f64) {
-    let mark = pattern.fit.landmarks;
-    let low = mark.waist - 0.5 * (mark.waist - mark.hip);
-    let waist = low + (mark.waist + 0.01 - low) * design.rise;
-    let hem = height(&mark, design.length).min(mark.crotch - design.drop - 0.055);
-    let tube = pattern.fit.column.clone().hang(mark.waist, |_| 0.5).map(|_, _, r| r + design.ease + sag);
-    pattern.bounds = column_bounds(&tube, hem - 0.05, waist + 0.05);
-    pattern.bounds[0][0] -= 0.06;
-    pattern.bounds[1][0] += 0.06;
-    pattern.column =
-        Some(Column { tube, pleats: None, top: waist + 0.10, bottom: mark.crotch - design.drop });
-    pattern.leg_top = mark.crotch + 0.05;
-    let run = mark.knee - mark.ankle;
-    pattern.trouser_legs = Some(std::array::from_fn(|side| {
-        let limb = &pattern.fit.legs[side];
-        let leg = limb.clone().hang(mark.crotch, |_| design.hang).map(|y, _, r| {
-            r + design.leg_ease + sag + (design.flare * (mark.knee - y) / run).clamp(-0.004, 0.08)
-        });
-        leg.map_with(limb, |y, r, limb| gathered(r, limb, design.cuff, y - hem, sag))
-    }));
-    pattern.cuts = vec![level(waist, -1.0, design.rim_tilt), level(hem, 1.0, 0.0)];
-    pattern.openings = 3;
 }

@@ -1,17 +1,15 @@
-//! What a generated garment promises, measured: topology, triangle shapes, and no contact with the body.
+//! What the generator guarantees of a garment, measured: topology, triangle shapes, and no contact with the body.
 
-use super::super::remesh::Quality;
-use super::super::sheet::{smallest_sine, triangle_normal};
-use super::distance;
+use crate::mesh::{Quality, smallest_sine, triangle_normal};
 use clothcombo_physics::contact::TriangleTree;
 use clothcombo_physics::query::{Distance, Surface};
-use clothcombo_physics::vec3::{dot, norm};
+use clothcombo_physics::vec3::{dot, norm, sub};
 use clothcombo_physics::{Topology, TriMesh};
 use std::collections::HashSet;
 
 /// Measurements of a garment at rest on the body it was made for.
 #[derive(Debug, Clone, PartialEq)]
-pub struct GarmentQuality {
+pub(super) struct GarmentQuality {
     /// Number of vertices.
     pub vertices: usize,
     /// Connected components.
@@ -26,7 +24,7 @@ pub struct GarmentQuality {
     pub smallest_angle: f64,
     /// Shortest and longest edge, relative to the median edge.
     pub edge_ratio: [f64; 2],
-    /// Least signed distance of a vertex to the body [m], positive outside.
+    /// Least signed distance of a vertex to the body (m), positive outside.
     pub least_gap: f64,
     /// Pairs of a garment triangle and a body triangle that share a point, decided exactly.
     pub body_triangle_pairs: usize,
@@ -47,7 +45,7 @@ impl GarmentQuality {
         let mut lengths: Vec<f64> = topology
             .edges
             .iter()
-            .map(|[a, b]| distance(positions[*a as usize], positions[*b as usize]))
+            .map(|[a, b]| norm(sub(positions[*a as usize], positions[*b as usize])))
             .collect();
         lengths.sort_by(f64::total_cmp);
         let median = lengths[lengths.len() / 2];

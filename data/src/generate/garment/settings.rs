@@ -10,7 +10,7 @@ pub struct GarmentSettings {
     pub target_vertices: usize,
     /// Relative spread of the number of vertices over seeds, 0–0.5. Default 0.25.
     pub resolution_spread: f64,
-    /// Least distance between cloth and skin at rest [m]. Default 5 mm.
+    /// Least distance between cloth and skin at rest (m). Default 5 mm.
     pub clearance: f64,
     /// Relative variation of the edge length within a garment, 0–0.25. Default 0.15: the triangulation is
     /// irregular, so that a network cannot learn it.

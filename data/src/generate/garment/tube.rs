@@ -4,7 +4,7 @@ use super::super::field::smooth_step;
 
 /// Directions per outline.
 pub(super) const DIRECTIONS: usize = 32;
-/// Distance between slices [m].
+/// Distance between slices (m).
 pub(super) const SLICE: f64 = 0.015;
 
 /// Outlines along a coordinate axis. In slice coordinates a point is `(s, u, v)`: `s = side · p[axis]`, and `u`, `v` the
@@ -16,7 +16,7 @@ pub(super) struct Tube {
     start: f64,
     /// Middle of each slice in (u, v).
     pub centres: Vec<[f64; 2]>,
-    /// Radius [m] per slice and direction.
+    /// Radius (m) per slice and direction.
     pub radii: Vec<[f64; DIRECTIONS]>,
 }
 
@@ -142,7 +142,7 @@ impl Tube {
         low + t * (high - low)
     }
 
-    /// Distance-like value to the tube's side [m], negative inside; the ends are open.
+    /// Distance-like value to the tube's side (m), negative inside; the ends are open.
     pub fn value(&self, p: [f64; 3]) -> f64 {
         self.value_of_wider(p, |_, _, _| 0.0)
     }

@@ -73,7 +73,7 @@ pub(super) fn cut(pattern: &mut Pattern, design: &UpperDesign, edge_length: f64,
     pattern.cuts.push(level(hem, 1.0, design.hem_tilt));
 }
 
-/// The neckline. Returns the top of the garment and the height of the neckline's lowest point in front [m].
+/// The neckline. Returns the top of the garment and the height of the neckline's lowest point in front (m).
 fn cut_neck(pattern: &mut Pattern, neckline: &Neckline, armhole: f64, edge_length: f64) -> (f64, f64) {
     let Neckline::Neck { width, depth, depth_back, power, .. } = *neckline else {
         return (0.0, 0.0);
@@ -101,7 +101,7 @@ fn cut_neck(pattern: &mut Pattern, neckline: &Neckline, armhole: f64, edge_lengt
     (side + 0.06, front)
 }
 
-/// Sleeves and their ends. Returns the distance of the ends from the middle [m].
+/// Sleeves and their ends. Returns the distance of the ends from the middle (m).
 fn cut_sleeves(pattern: &mut Pattern, design: &SleeveDesign, loose: f64, sag: f64) -> f64 {
     let fit = pattern.fit;
     let mark = fit.landmarks;

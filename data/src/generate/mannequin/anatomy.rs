@@ -6,7 +6,7 @@
 use super::super::field::smooth_min;
 use clothcombo_physics::vec3::{add, dot, norm, scale, sub};
 
-/// Rest joints in SMPL order [m].
+/// Rest joints in SMPL order (m).
 pub(super) const JOINTS: [[f64; 3]; 22] = [
     [0.0, 0.0, 0.0],
     [0.082, -0.085, -0.005],
@@ -158,7 +158,7 @@ fn head(p: [f64; 3]) -> f64 {
     smooth_min(face, nose, 0.025)
 }
 
-/// Field of the whole mannequin [m], negative inside. The surface is smooth; the value is a distance only near it.
+/// Field of the whole mannequin (m), negative inside. The surface is smooth; the value is a distance only near it.
 pub(super) fn field(p: [f64; 3]) -> f64 {
     let q = [p[0].abs(), p[1], p[2]];
     let mut f = torso(p);

@@ -10,19 +10,17 @@ mod skinning;
 
 use super::field;
 use super::isosurface::{Lattice, extract};
-use super::labelled_triangles::LabelledTriangles;
-use super::remesh::{Quality, Target, remesh};
-use super::sheet::Sheet;
 use crate::asset::{BODY_JOINT_COUNT, BODY_JOINT_NAMES, BODY_JOINT_PARENTS, Body, BodyParts};
+use crate::mesh::{EditableMesh, LabelledTriangles, Quality, RemeshTarget, remesh};
 
 pub use shape::SHAPE_COMPONENT_NAMES;
 
-/// Edge length of the mannequin's triangles [m].
+/// Edge length of the mannequin's triangles (m).
 const EDGE_LENGTH: f64 = 0.0183;
 
 struct Skin;
 
-impl Target for Skin {
+impl RemeshTarget for Skin {
     fn project(&self, point: [f64; 3], _label: u32) -> [f64; 3] {
         field::project(anatomy::field, point, 2, 0.02)
     }
@@ -38,7 +36,7 @@ impl Target for Skin {
 
 /// The neutral mannequin: about 1.70 m tall, T-pose, pelvis joint at the origin, y up, facing +z; 22 SMPL joints, a closed
 /// genus-0 surface of 5,000–7,000 vertices, and the shape components of [`SHAPE_COMPONENT_NAMES`] made for coefficients
-/// in [−2, 2].
+/// in `[−2, 2]`.
 pub fn mannequin() -> Body {
     let (positions, faces) = surface();
     let skin_weights = skinning::skin_weights(&positions, &faces);
@@ -66,7 +64,7 @@ fn surface() -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
     let values = lattice.sample(anatomy::field);
     let (positions, faces) = extract(&lattice, &values);
     let labels = vec![0; positions.len()];
-    let mut sheet = Sheet::new(LabelledTriangles { positions, labels, faces });
+    let mut sheet = EditableMesh::new(LabelledTriangles { positions, labels, faces });
     let quality = Quality { angle: 22.0, edge_ratio: [0.4, 2.5] };
     remesh(&mut sheet, &Skin, 5, quality);
     sheet.compact()

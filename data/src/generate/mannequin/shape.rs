@@ -6,7 +6,7 @@ use super::anatomy;
 use crate::asset::SparseSkinWeights;
 use clothcombo_physics::mesh::vertex_normals;
 
-/// What each shape component changes; one unit is about one standard deviation, coefficients belong in [−2, 2].
+/// What each shape component changes; one unit is about one standard deviation, coefficients belong in `[−2, 2]`.
 pub const SHAPE_COMPONENT_NAMES: [&str; 8] =
     ["height", "girth", "shoulder_width", "hip_width", "leg_length", "arm_length", "torso_length", "belly"];
 
@@ -18,7 +18,7 @@ fn soft_sign(x: f64, width: f64) -> f64 {
     t * (1.5 - 0.5 * t * t)
 }
 
-/// Displacement [m] of a point of space per unit of each component.
+/// Displacement (m) of a point of space per unit of each component.
 fn space(p: [f64; 3]) -> [[f64; 3]; COUNT] {
     let side = |width| soft_sign(p[0], width);
     let upper = smooth_step(0.16, 0.40, p[1]);
@@ -41,7 +41,7 @@ fn space(p: [f64; 3]) -> [[f64; 3]; COUNT] {
     ]
 }
 
-/// Displacement [m] along the normal per unit of each component, by the joint a vertex follows.
+/// Displacement (m) along the normal per unit of each component, by the joint a vertex follows.
 fn thickness(p: [f64; 3], n: [f64; 3], joint: usize) -> [f64; COUNT] {
     let girth = match joint {
         0 | 3 | 6 => 0.0135,

@@ -28,14 +28,14 @@ fn bones() -> Vec<Bone> {
             _ => 0.035,
         };
         match child {
-            // The pelvis owns the way to the hips only in part: the groin bends there.
+            // The pelvis owns only a part of the bone to the hips: the groin bends there.
             1 | 2 => {
                 to = add(from, scale(sub(to, from), 0.55));
                 radius = 0.10;
             }
             // The chest ends below the neck, which would otherwise own no skin.
             12 => to = add(from, scale(sub(to, from), 0.55)),
-            // The collars carry the shoulder, the chest the way to the collars.
+            // The collars carry the shoulder, the chest the bones to the collars.
             13 | 14 => from = add(from, scale(sub(to, from), 0.2)),
             _ => {}
         }
@@ -63,7 +63,7 @@ pub(super) fn skin_weights(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Sparse
     let mut ring = vec![Vec::new(); positions.len()];
     for face in faces {
         for corner in 0..3 {
-            // On a closed, consistently oriented surface every neighbour is met exactly once this way.
+            // On a closed, consistently oriented surface every neighbour is met exactly once.
             ring[face[corner] as usize].push(face[(corner + 1) % 3] as usize);
         }
     }

@@ -11,7 +11,7 @@ use rand_distr::{Distribution, StandardNormal};
 pub struct PoseAugmentation {
     /// Probability of mirroring left and right. Default 0.5.
     pub mirror: f64,
-    /// Probability of going a random part of the way to another pose, perhaps of another clip: fills the gaps between
+    /// Probability of mixing with another pose, perhaps of another clip, by a random share: fills the gaps between
     /// recordings. Default 0.25.
     pub interpolation: f64,
     /// Probability of taking the legs or the arms from another pose. Default 0.5.
@@ -37,21 +37,21 @@ impl PoseAugmentation {
         Self { mirror: 0.0, interpolation: 0.0, limb_swap: 0.0, scale: [1.0, 1.0], noise_degrees: 0.0 }
     }
 
-    /// A variation of the body joints of `pose`, perhaps on the way to `other` or with limbs from it. Noise and scale carry no component beyond
+    /// A variation of the body joints of `pose`, perhaps mixed with `other` or with limbs from it. Noise and scale carry no component beyond
     /// its joint limit, or beyond the recorded value where the recording itself exceeds the limit. Joints past
     /// the 22 body joints are mirrored but otherwise kept.
     pub fn apply<R: Rng + ?Sized>(&self, pose: &Pose, other: &Pose, rng: &mut R) -> Pose {
         let mirrored =
-            |pose: &Pose, draw: f64| if draw < self.mirror { pose.mirrored() } else { pose.clone() };
-        // The number of draws does not depend on their outcome, so that streams stay aligned.
-        let draws: [f64; 6] = std::array::from_fn(|_| rng.random::<f64>());
-        let mut result = mirrored(pose, draws[0]);
-        let other = mirrored(other, draws[1]);
-        if draws[4] < self.interpolation {
-            result = result.between(&other, draws[5]);
+            |pose: &Pose, sample: f64| if sample < self.mirror { pose.mirrored() } else { pose.clone() };
+        // The number of samples does not depend on their values, so that streams stay aligned.
+        let samples: [f64; 6] = std::array::from_fn(|_| rng.random::<f64>());
+        let mut result = mirrored(pose, samples[0]);
+        let other = mirrored(other, samples[1]);
+        if samples[4] < self.interpolation {
+            result = result.between(&other, samples[5]);
         }
-        if draws[2] < self.limb_swap {
-            let limbs = if draws[3] < 0.5 { LEGS } else { ARMS };
+        if samples[2] < self.limb_swap {
+            let limbs = if samples[3] < 0.5 { LEGS } else { ARMS };
             for joint in limbs {
                 if joint < result.rotations.len() {
                     result.rotations[joint] = other.rotation(joint);

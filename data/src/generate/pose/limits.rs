@@ -27,7 +27,7 @@ const fn mirrored(l: JointLimits) -> JointLimits {
 
 // x: flexion is negative (thigh forward); y: turn; z: abduction is positive on the left.
 const HIP: JointLimits = limits([-115.0, 25.0], [-35.0, 40.0], [-12.0, 40.0]);
-// x: flexion, one way only.
+// x: flexion, in one direction only.
 const KNEE: JointLimits = limits([0.0, 135.0], [-8.0, 8.0], [-5.0, 5.0]);
 // x: toes down is positive.
 const ANKLE: JointLimits = limits([-20.0, 40.0], [-15.0, 15.0], [-15.0, 15.0]);
@@ -39,7 +39,7 @@ const NECK: JointLimits = limits([-22.0, 28.0], [-35.0, 35.0], [-20.0, 20.0]);
 const COLLAR: JointLimits = limits([-8.0, 8.0], [-18.0, 12.0], [-8.0, 22.0]);
 // z: the arm hangs at about −75 and points up at about 80; y: across the chest is negative; x: twist.
 const SHOULDER: JointLimits = limits([-75.0, 75.0], [-105.0, 45.0], [-88.0, 80.0]);
-// y: flexion is negative on the left, one way only; x: turning the forearm.
+// y: flexion is negative on the left, in one direction only; x: turning the forearm.
 const ELBOW: JointLimits = limits([-70.0, 60.0], [-140.0, 0.0], [-6.0, 6.0]);
 const WRIST: JointLimits = limits([-15.0, 15.0], [-25.0, 20.0], [-60.0, 60.0]);
 

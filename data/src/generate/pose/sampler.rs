@@ -257,13 +257,13 @@ mod tests {
     #[test]
     fn poses_are_within_limits_deterministic_and_varied() {
         let sampler = PoseSampler { random_heading: true, ..PoseSampler::default() };
-        let draw = |seed| {
+        let sample = |seed| {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             (0..500).map(|_| sampler.sample(&mut rng)).collect::<Vec<_>>()
         };
-        let poses = draw(7);
-        assert_eq!(poses, draw(7));
-        assert_ne!(poses, draw(8));
+        let poses = sample(7);
+        assert_eq!(poses, sample(7));
+        assert_ne!(poses, sample(8));
         assert!(poses.iter().all(|p| p.rotations.len() == 22 && is_within_limits(p)));
         // Every major joint uses a good part of its range.
         for joint in [1, 2, 4, 5, 16, 17, 18, 19] {

@@ -6,6 +6,7 @@
 
 use crate::asset::{BODY_JOINT_COUNT, Body, BodyError, Pose};
 use crate::generate::parts::dominant_joints;
+use crate::mesh::{bounds, compact};
 use clothcombo_physics::contact::{TriangleTree, intersection_segment};
 use clothcombo_physics::vec3::{norm, sub};
 
@@ -19,7 +20,7 @@ pub struct SelfContact {
     parts: Vec<Part>,
     /// Pairs of parts that are far enough apart on the skeleton.
     pairs: Vec<[usize; 2]>,
-    /// What the body crosses itself at rest [m].
+    /// What the body crosses itself at rest (m).
     rest: f64,
 }
 
@@ -37,20 +38,13 @@ impl SelfContact {
     pub fn new(body: &Body) -> Self {
         let owner = dominant_joints(body);
         let count = body.joint_count().min(BODY_JOINT_COUNT);
-        let mut parts = vec![Part::default(); count];
-        let mut local = vec![vec![u32::MAX; body.vertex_count()]; count];
-        for face in body.faces.iter() {
-            let joint = owner[face[0] as usize];
-            let (part, local) = (&mut parts[joint], &mut local[joint]);
-            part.faces.push(face.map(|v| {
-                let slot = &mut local[v as usize];
-                if *slot == u32::MAX {
-                    *slot = part.vertices.len() as u32;
-                    part.vertices.push(v);
-                }
-                *slot
-            }));
-        }
+        let parts: Vec<Part> = (0..count)
+            .map(|joint| {
+                let faces = body.faces.iter().copied().filter(|face| owner[face[0] as usize] == joint);
+                let (vertices, faces) = compact(faces, body.vertex_count());
+                Part { vertices, faces }
+            })
+            .collect();
         let distance = joint_distances(&body.parents, count);
         let pairs = (0..count)
             .flat_map(|a| (a + 1..count).map(move |b| [a, b]))
@@ -62,11 +56,13 @@ impl SelfContact {
         contact
     }
 
-    /// Length [m] of the curves in which far-apart parts of the body run through each other at `positions` (its vertices),
+    /// Length (m) of the curves in which far-apart parts of the body run through each other at `positions` (its vertices),
     /// beyond what they do at rest. Triangles are tested exactly; 0 if nothing touches. Does not depend on how fine the
     /// body's mesh is: a hand through a thigh is about 0.3 m, a forearm through the trunk 0.5 m.
     pub fn contour_length(&self, positions: &[[f64; 3]]) -> f64 {
-        let bounds: Vec<[[f64; 3]; 2]> = self.parts.iter().map(|part| part.bounds(positions)).collect();
+        let bounds: Vec<[[f64; 3]; 2]> = (self.parts.iter())
+            .map(|part| bounds(part.vertices.iter().map(|v| &positions[*v as usize])))
+            .collect();
         let close: Vec<[usize; 2]> = (self.pairs.iter().copied())
             .filter(|[a, b]| {
                 (0..3).all(|x| bounds[*a][0][x] <= bounds[*b][1][x] && bounds[*b][0][x] <= bounds[*a][1][x])
@@ -106,20 +102,6 @@ impl SelfContact {
         let known = pose.rotations.len().min(body.joint_count());
         let pose = Pose { rotations: pose.rotations[..known].to_vec() };
         Ok(self.contour_length(&body.posed(&[], &pose)?.positions))
-    }
-}
-
-impl Part {
-    fn bounds(&self, positions: &[[f64; 3]]) -> [[f64; 3]; 2] {
-        let mut bounds = [[f64::MAX; 3], [f64::MIN; 3]];
-        for v in &self.vertices {
-            let p = positions[*v as usize];
-            for axis in 0..3 {
-                bounds[0][axis] = bounds[0][axis].min(p[axis]);
-                bounds[1][axis] = bounds[1][axis].max(p[axis]);
-            }
-        }
-        bounds
     }
 }
 

@@ -42,7 +42,7 @@ pub struct SampleInfo {
     pub shape: Vec<f64>,
     /// Gender.
     pub gender: Gender,
-    /// Turn about the vertical axis that the rest garments carry [rad].
+    /// Turn about the vertical axis that the rest garments carry (rad).
     pub zrot: f64,
     /// Tightness of the upper and lower garment, as the data set defines it.
     pub tightness: Vec<f64>,

@@ -2,11 +2,12 @@
 
 use super::info::SampleInfo;
 use crate::asset::Category;
-use crate::format::atomic;
+use crate::format::{FileError, toml_file};
 use serde::{Deserialize, Serialize};
-use std::fs;
-use std::io;
 use std::path::Path;
+
+pub(super) const LICENCE: &str = "CLOTH3D terms of use (non-commercial research)";
+pub(super) const AUTHOR: &str = "Bertiche, Madadi, Escalera (CLOTH3D)";
 
 #[derive(Serialize, Deserialize)]
 struct Manifest {
@@ -57,20 +58,15 @@ impl SampleEntry {
 }
 
 /// Adds samples to the manifest, in place of earlier ones of the same names; it is written whole or not at all.
-pub(super) fn add(path: &Path, sample: Vec<SampleEntry>) -> io::Result<()> {
-    let mut all: Vec<SampleEntry> = match fs::read_to_string(path) {
-        Ok(text) => toml::from_str::<Manifest>(&text).map_err(io::Error::other)?.sample,
-        Err(reason) if reason.kind() == io::ErrorKind::NotFound => Vec::new(),
-        Err(reason) => return Err(reason),
-    };
+pub(super) fn add(path: &Path, sample: Vec<SampleEntry>) -> Result<(), FileError> {
+    let mut all = toml_file::load::<Manifest>(path)?.map_or_else(Vec::new, |manifest| manifest.sample);
     all.retain(|known| sample.iter().all(|new| new.name != known.name));
     all.extend(sample);
     let manifest = Manifest {
         source: "CLOTH3D / CLOTH3D++".into(),
-        author: super::AUTHOR.into(),
-        licence: super::LICENCE.into(),
+        author: AUTHOR.into(),
+        licence: LICENCE.into(),
         sample: all,
     };
-    let text = toml::to_string(&manifest).map_err(io::Error::other)?;
-    atomic::write(path, text.as_bytes())
+    toml_file::save(path, &manifest)
 }

@@ -13,70 +13,18 @@ pub use info::{Gender, OutfitItem, SampleInfo};
 pub use unpose::{Unposing, upright};
 
 use super::amass::turn_root_to_y_up;
-use super::motions::{Clip, Input, MotionImportError, write_motions};
-use super::overwrite::{OverwriteError, refuse_overwriting};
+use super::motions::{Clip, NamedFile, named, write_motions};
+use super::overwrite::refuse_overwriting;
+use super::summary::{ImportError, Progress, Summary};
 use super::thinning::{Thinned, Thinning, thin};
-use super::{Progress, Summary};
 use crate::asset::{BindingSettings, Body, Category, Garment, Motion, Provenance};
-use crate::dataset::garment_folder::{FolderGarment, GarmentFolderError, save_garment_folder};
-use crate::fit::contact;
-use crate::format::{NpzError, NpzWriter, PointCache, obj};
+use crate::dataset::{FolderGarment, save_garment_folder};
+use crate::format::{FileError, NpzWriter, PointCache, folder, obj};
+use crate::mesh::contact;
 use clothcombo_physics::query::Surface;
-use manifest::{GarmentEntry, SampleEntry};
+use manifest::{AUTHOR, GarmentEntry, LICENCE, SampleEntry};
 use std::fs;
 use std::path::{Path, PathBuf};
-use thiserror::Error;
-
-/// Why CLOTH3D samples cannot be imported at all. What is wrong with a single one stands in the summary.
-#[derive(Debug, Error)]
-pub enum Cloth3dError {
-    /// A folder cannot be read, or a file not be written.
-    #[error("{}: {reason}", path.display())]
-    Io {
-        /// File or folder.
-        path: PathBuf,
-        /// What the system said.
-        reason: std::io::Error,
-    },
-    /// No sample.
-    #[error("{}: no CLOTH3D sample; a sample folder holds info.mat", inputs.join(", "))]
-    NoSample {
-        /// The folders given.
-        inputs: Vec<String>,
-    },
-    /// No garment could be used.
-    #[error("no garment of {samples} samples could be used; the first, {first}: {reason}")]
-    NothingUsable {
-        /// How many samples there were.
-        samples: usize,
-        /// The first thing skipped.
-        first: String,
-        /// Its problem.
-        reason: String,
-    },
-    /// A gendered body is another mesh than the target.
-    #[error(
-        "body '{body}' is not the same mesh as body '{target}'; give the files of one model, for example three of SMPL's"
-    )]
-    Bodies {
-        /// The gendered body.
-        body: String,
-        /// The target.
-        target: String,
-    },
-    /// The garments cannot be written.
-    #[error(transparent)]
-    Folder(#[from] GarmentFolderError),
-    /// The motions cannot be written.
-    #[error(transparent)]
-    Motions(#[from] MotionImportError),
-    /// A sequence cannot be written.
-    #[error(transparent)]
-    Npz(#[from] NpzError),
-    /// An input would be written over.
-    #[error(transparent)]
-    Overwrite(#[from] OverwriteError),
-}
 
 /// The bodies involved: SMPL or SMPL-H, because the samples' shape numbers are SMPL's.
 #[derive(Clone, Copy, Debug)]
@@ -109,45 +57,44 @@ impl Default for Cloth3dSettings {
     }
 }
 
-/// Of the simulations [frames/s].
+/// Of the simulations (frames/s).
 const FRAME_RATE: f64 = 30.0;
-const LICENCE: &str = "CLOTH3D terms of use (non-commercial research)";
-const AUTHOR: &str = "Bertiche, Madadi, Escalera (CLOTH3D)";
-
-struct Sample {
-    name: String,
-    folder: PathBuf,
-}
 
 /// Imports samples to `out`: `garments/*.obj` with `garments.toml`, `motions/*.npz` with `motions.toml`, `cloth3d.toml` with what the
 /// samples say of themselves, and, if asked for, `sequences/*.npz`. `inputs` are sample folders, or folders of them.
 ///
 /// # Errors
-/// [`Cloth3dError`] if there is no sample, none of its garments can be used, or a result cannot be written.
+/// [`ImportError`] if there is no sample, none of its garments can be used, or a result cannot be written.
 pub fn import_cloth3d(
     inputs: &[PathBuf],
     bodies: &Cloth3dBodies<'_>,
     out: &Path,
     settings: &Cloth3dSettings,
     progress: Progress<'_>,
-) -> Result<Summary, Cloth3dError> {
+) -> Result<Summary, ImportError> {
     let target = bodies.target;
     for body in bodies.female.iter().chain(&bodies.male) {
         if body.vertex_count() != target.vertex_count() || body.faces != target.faces {
-            return Err(Cloth3dError::Bodies { body: body.name.clone(), target: target.name.clone() });
+            return Err(ImportError::Refused(format!(
+                "body '{}' is not the same mesh as body '{}'; give the files of one model, for example three of SMPL's",
+                body.name, target.name
+            )));
         }
     }
     let samples = find_samples(inputs)?;
     if samples.is_empty() {
-        let inputs = inputs.iter().map(|i| i.display().to_string()).collect();
-        return Err(Cloth3dError::NoSample { inputs });
+        let inputs: Vec<String> = inputs.iter().map(|i| i.display().to_string()).collect();
+        return Err(ImportError::Refused(format!(
+            "{}: no CLOTH3D sample; a sample folder holds info.mat",
+            inputs.join(", ")
+        )));
     }
     // Inputs lie in the samples' folders, results in these: none meet unless the folders do.
     let outputs = ["garments", "motions", "sequences"].map(|folder| out.join(folder));
     // A file that is named without its folder lies in one, too.
     let folder = |file: &PathBuf| fs::canonicalize(file).ok()?.parent().map(Path::to_path_buf);
     let of_bodies = settings.body_files.iter().filter_map(folder);
-    refuse_overwriting(samples.iter().map(|sample| sample.folder.clone()).chain(of_bodies), outputs)?;
+    refuse_overwriting(samples.iter().map(|sample| sample.path.clone()).chain(of_bodies), outputs)?;
     let mut summary = Summary { notes: assumptions(bodies), ..Summary::default() };
     let surface = Surface::new(target.template.clone(), target.faces.clone());
     let (mut garments, mut entries) = (Vec::new(), Vec::new());
@@ -155,18 +102,21 @@ pub fn import_cloth3d(
         progress("unposing garments", done, samples.len());
         match import_sample(sample, bodies, &surface, out, settings, &mut garments, &mut summary)? {
             Ok(entry) => entries.push(entry),
-            Err(reason) => summary.skipped.push((sample.folder.display().to_string(), reason)),
+            Err(reason) => summary.skipped.push((sample.path.display().to_string(), reason)),
         }
     }
     progress("unposing garments", samples.len(), samples.len());
     if garments.is_empty() {
         let (first, reason) = summary.skipped.first().cloned().unwrap_or_default();
-        return Err(Cloth3dError::NothingUsable { samples: samples.len(), first, reason });
+        return Err(ImportError::Refused(format!(
+            "no garment of {} samples could be used; the first, {first}: {reason}",
+            samples.len()
+        )));
     }
     summary.written.extend(save_garment_folder(&out.join("garments"), &garments)?);
-    let clips: Vec<Input> = (samples.iter())
+    let clips: Vec<NamedFile> = (samples.iter())
         .filter(|s| entries.iter().any(|e| e.name == s.name))
-        .map(|s| Input { path: s.folder.join("info.mat"), name: s.name.clone() })
+        .map(|s| NamedFile { path: s.path.join("info.mat"), name: s.name.clone() })
         .collect();
     let import = |path: &Path| motion(path, settings);
     let motions = write_motions(&clips, None, &out.join("motions"), "info.mat files", &import, progress)?;
@@ -175,7 +125,7 @@ pub fn import_cloth3d(
     summary.notes.extend(motions.notes);
     summary.written.extend(motions.written);
     let path = out.join("cloth3d.toml");
-    manifest::add(&path, entries).map_err(|reason| Cloth3dError::Io { path: path.clone(), reason })?;
+    manifest::add(&path, entries)?;
     summary.written.push(path);
     Ok(summary)
 }
@@ -210,43 +160,33 @@ fn has_smpl_shape(body: &Body) -> bool {
     matches!(body.joint_count(), 24 | 52)
 }
 
-fn find_samples(inputs: &[PathBuf]) -> Result<Vec<Sample>, Cloth3dError> {
-    let mut folders = Vec::new();
+fn find_samples(inputs: &[PathBuf]) -> Result<Vec<NamedFile>, FileError> {
+    let is_sample = |folder: &PathBuf| folder.join("info.mat").is_file();
+    let mut samples = Vec::new();
     for input in inputs {
-        if input.join("info.mat").is_file() {
-            folders.push(input.clone());
-            continue;
+        match is_sample(input) {
+            true => samples.push(input.clone()),
+            false => samples.extend(folder::entries(input)?.into_iter().filter(is_sample)),
         }
-        let failed = |reason| Cloth3dError::Io { path: input.clone(), reason };
-        let mut below = Vec::new();
-        for entry in fs::read_dir(input).map_err(failed)? {
-            let folder = entry.map_err(failed)?.path();
-            if folder.join("info.mat").is_file() {
-                below.push(folder);
-            }
-        }
-        below.sort();
-        folders.extend(below);
     }
-    let named = super::motions::named(folders.into_iter().map(|folder| {
+    Ok(named(samples.into_iter().map(|folder| {
         let full = fs::canonicalize(&folder).unwrap_or_else(|_| folder.clone());
         let name = full.file_name().map_or_else(|| "sample".into(), |n| n.to_string_lossy().into_owned());
         (folder, name)
-    }));
-    Ok(named.into_iter().map(|Input { path, name }| Sample { name, folder: path }).collect())
+    })))
 }
 
 /// The garments of one sample; the inner error is the reason to skip it as a whole.
 fn import_sample(
-    sample: &Sample,
+    sample: &NamedFile,
     bodies: &Cloth3dBodies<'_>,
     surface: &Surface<f64>,
     out: &Path,
     settings: &Cloth3dSettings,
     garments: &mut Vec<FolderGarment>,
     summary: &mut Summary,
-) -> Result<Result<SampleEntry, String>, Cloth3dError> {
-    let info = match SampleInfo::load(&sample.folder.join("info.mat")) {
+) -> Result<Result<SampleEntry, String>, ImportError> {
+    let info = match SampleInfo::load(&sample.path.join("info.mat")) {
         Ok(info) => info,
         Err(reason) => return Ok(Err(reason)),
     };
@@ -262,7 +202,7 @@ fn import_sample(
     };
     let mut entry = SampleEntry::new(&sample.name, &info);
     for item in &info.outfit {
-        let mesh_path = sample.folder.join(format!("{}.obj", item.name));
+        let mesh_path = sample.path.join(format!("{}.obj", item.name));
         match unposed_garment(sample, &info, item, &mesh_path, &unposing, bodies.target, settings) {
             Ok(garment) => {
                 let inside = contact(garment.rest.positions(), surface).inside;
@@ -300,7 +240,7 @@ fn about(garment: &Garment, item: &OutfitItem, inside: usize) -> String {
 }
 
 fn unposed_garment(
-    sample: &Sample,
+    sample: &NamedFile,
     info: &SampleInfo,
     item: &OutfitItem,
     path: &Path,
@@ -349,13 +289,13 @@ fn provenance(what: &str) -> Provenance {
 
 /// Converts one point cache: number of frames, and the file written. A cache that cannot be used is skipped; the garment is not.
 fn convert_cache(
-    sample: &Sample,
+    sample: &NamedFile,
     item: &OutfitItem,
     garment: &Garment,
     out: &Path,
     summary: &mut Summary,
-) -> Result<(Option<usize>, Option<String>), Cloth3dError> {
-    let path = sample.folder.join(format!("{}.pc16", item.name));
+) -> Result<(Option<usize>, Option<String>), ImportError> {
+    let path = sample.path.join(format!("{}.pc16", item.name));
     let mut skip = |reason: String| summary.skipped.push((path.display().to_string(), reason));
     let cache = match PointCache::load(&path) {
         Ok(cache) => cache,
@@ -375,10 +315,8 @@ fn convert_cache(
     let mut npz = NpzWriter::new();
     npz.f32("positions", &[cache.frame_count(), vertices, 3], &positions)
         .u32("f", &[garment.rest.face_count(), 3], garment.rest.faces().as_flattened())
-        .f64("frame_rate", &[], &[FRAME_RATE])
-        .strings("source", &[], &[&garment.source.source])
-        .strings("author", &[], &[&garment.source.author])
-        .strings("licence", &[], &[&garment.source.licence]);
+        .f64("frame_rate", &[], &[FRAME_RATE]);
+    garment.source.write(&mut npz);
     npz.save(&out.join(&file))?;
     summary.written.push(out.join(&file));
     Ok((Some(cache.frame_count()), Some(file)))

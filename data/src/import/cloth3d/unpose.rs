@@ -2,11 +2,11 @@
 
 use crate::asset::body::unskin;
 use crate::asset::rotation::{Matrix3, apply, matrix_from_axis_angle, product};
-use crate::asset::{Binding, BindingSettings, Body, BodyError, Category, Garment, Pose, Provenance};
+use crate::asset::{Binding, BindingSettings, Body, Category, Garment, Pose};
 use crate::import::amass::Y_UP_FROM_Z_UP;
 use clothcombo_physics::TriMesh;
 
-/// How far the legs are apart in the rest pose of CLOTH3D: θ₁ = (0, 0, 0.15), θ₂ = (0, 0, −0.15) [rad].
+/// How far the legs are apart in the rest pose of CLOTH3D: θ₁ = (0, 0, 0.15), θ₂ = (0, 0, −0.15) (rad).
 const LEGS_APART: f64 = 0.15;
 
 /// Takes garments from one sample's rest body to the zero body of the data set.
@@ -29,7 +29,7 @@ impl Unposing {
         let mut pose = Pose::t_pose(3);
         pose.rotations[1] = [0.0, 0.0, LEGS_APART];
         pose.rotations[2] = [0.0, 0.0, -LEGS_APART];
-        let posed = body.posed(shape, &pose).map_err(|e: BodyError| e.to_string())?;
+        let posed = body.posed(shape, &pose).map_err(|e| e.to_string())?;
         let mut displacement = Vec::with_capacity(3 * body.vertex_count());
         for (v, p) in posed.positions.iter().enumerate() {
             let (joints, weights) = body.skin_weights.row(v);
@@ -47,7 +47,7 @@ impl Unposing {
         Ok(Self { rest, bones: posed.bones })
     }
 
-    /// A garment at rest on the sample's body [m, y up], as it lies on the zero body in T-pose. Each vertex goes with the
+    /// A garment at rest on the sample's body (m, y up), as it lies on the zero body in T-pose. Each vertex goes with the
     /// body vertex nearest to it, smoothed over the garment as `settings` say.
     ///
     /// # Errors
@@ -58,13 +58,7 @@ impl Unposing {
         category: Category,
         settings: &BindingSettings,
     ) -> Result<Vec<[f64; 3]>, String> {
-        let garment = Garment {
-            name: String::new(),
-            category,
-            rest: mesh.clone(),
-            holding: false,
-            source: Provenance::default(),
-        };
+        let garment = Garment::new(category, mesh.clone());
         let binding = Binding::new(&garment, &self.rest, settings);
         // Without shape transfer it stays on the sample's body.
         let moved = binding.shape_displacement(&[1.0], 1);

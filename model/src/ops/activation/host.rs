@@ -1,74 +1,73 @@
-//! The operation on host memory, in vectors as wide as the processor's.
+//! The operation in host memory, in vectors as wide as the processor's.
 
-use burn::backend::TensorMetadata;
 use burn::backend::tensor::FloatTensor;
 
-use super::{Activation, ActivationGradients, Saved};
+use super::{ActivatedSum, Activation};
 use crate::ops::host::{
-    Chunk, HostBackend, NewValues, Rows, chunks, for_each, part_lengths, split_mut, sum_partials, vectorised,
+    Chunk, HostBackend, MatrixView, OutputMatrix, chunks, compute, for_each, split_mut, vectorised,
 };
 use crate::ops::math;
+use crate::ops::tensors::Tensors;
 
-pub(in crate::ops) fn host_forward<B: HostBackend>(
-    mut terms: Vec<FloatTensor<B>>,
+pub(super) fn forward<B: HostBackend>(
+    operation: &ActivatedSum,
+    mut matrices: Vec<FloatTensor<B>>,
     rows: FloatTensor<B>,
     residual: Option<FloatTensor<B>>,
-    ends: &[usize],
-    activation: Activation,
-) -> FloatTensor<B> {
-    let device = rows.device();
-    let mut first = terms.remove(0);
-    let terms: Vec<B::Held> = terms.into_iter().map(B::hold).collect();
+) -> Tensors<B> {
+    let mut first = matrices.remove(0);
+    let others: Vec<B::Held> = matrices.into_iter().map(B::hold).collect();
     let (rows, residual) = (B::hold(rows), residual.map(B::hold));
-    let terms: Vec<Rows<'_>> = terms.iter().map(B::rows).collect();
-    let (rows, residual) = (B::rows(&rows), residual.as_ref().map(B::rows));
+    let others: Vec<MatrixView<'_>> = others.iter().map(B::view).collect();
+    let (rows, residual) = (B::view(&rows), residual.as_ref().map(B::view));
     let columns = rows.columns();
-    let chunks = chunks(ends, columns);
-    let run = |chunk: &Chunk, output: &mut [f32]| {
-        vectorised(
-            #[inline(always)]
-            || forward_chunk(&terms, rows, residual, chunk, output, activation),
-        );
-    };
     if let Some(values) = B::own_values_mut(&mut first) {
-        let tasks: Vec<_> = chunks.iter().zip(split_mut(values, &chunks, columns)).collect();
-        for_each(tasks, |(chunk, values)| run(chunk, values));
-        return first;
+        let chunks = chunks(&operation.packing, columns);
+        let tasks = chunks.iter().zip(split_mut(values, &chunks, columns)).collect();
+        for_each(tasks, |(chunk, values): (&Chunk, &mut [f32])| {
+            vectorised(
+                #[inline(always)]
+                || forward_chunk(&others, rows, residual, chunk, values, operation.activation),
+            );
+        });
+        return [first].into();
     }
     let first = B::hold(first);
-    let first = B::rows(&first);
-    let mut output = NewValues::new(first.count() * columns);
-    let tasks: Vec<_> = chunks.iter().zip(output.parts(part_lengths(&chunks, columns))).collect();
-    for_each(tasks, |(chunk, part)| {
-        let output = part.zeroed();
-        for (row, output) in chunk.rows.clone().zip(output.chunks_exact_mut(columns)) {
-            output.copy_from_slice(first.row(row));
-        }
-        run(chunk, output);
-    });
-    B::matrix(output.finish(), columns, &device)
+    let first = B::view(&first);
+    compute(
+        &operation.packing,
+        columns,
+        [OutputMatrix::Rows(columns)],
+        #[inline(always)]
+        |chunk, [output]| {
+            for (row, output) in chunk.rows.clone().zip(output.chunks_exact_mut(columns)) {
+                output.copy_from_slice(first.row(row));
+            }
+            forward_chunk(&others, rows, residual, chunk, output, operation.activation);
+        },
+    )
 }
 
-/// `output`, which holds the first term, becomes the result.
+/// `output`, which holds the first matrix, becomes the result.
 #[inline(always)]
 fn forward_chunk(
-    terms: &[Rows<'_>],
-    rows: Rows<'_>,
-    residual: Option<Rows<'_>>,
+    others: &[MatrixView<'_>],
+    rows: MatrixView<'_>,
+    residual: Option<MatrixView<'_>>,
     chunk: &Chunk,
     output: &mut [f32],
     activation: Activation,
 ) {
     let columns = rows.columns();
-    let shared = rows.row(chunk.segment);
+    let shared = rows.row(chunk.garment);
     for (row, output) in chunk.rows.clone().zip(output.chunks_exact_mut(columns)) {
         add(output, shared);
-        for term in terms {
-            add(output, term.row(row));
+        for matrix in others {
+            add(output, matrix.row(row));
         }
         match activation {
             Activation::Identity => {}
-            Activation::Relu => map(output, math_relu),
+            Activation::Relu => map(output, relu),
             Activation::Gelu => map(output, math::gelu),
         }
         if let Some(residual) = residual {
@@ -78,21 +77,9 @@ fn forward_chunk(
 }
 
 #[inline(always)]
-fn math_relu(x: f32) -> f32 {
+fn relu(x: f32) -> f32 {
     // Not `max`: a NaN must stay visible.
     if x < 0.0 { 0.0 } else { x }
-}
-
-#[inline(always)]
-fn sum_row(terms: &[Rows<'_>], shared: &[f32], row: usize, output: &mut [f32]) {
-    let first = &terms[0].row(row)[..output.len()];
-    let shared = &shared[..output.len()];
-    for column in 0..output.len() {
-        output[column] = first[column] + shared[column];
-    }
-    for term in &terms[1..] {
-        add(output, term.row(row));
-    }
 }
 
 #[inline(always)]
@@ -110,86 +97,85 @@ fn map(output: &mut [f32], function: impl Fn(f32) -> f32) {
     }
 }
 
-pub(in crate::ops) fn host_backward<B: HostBackend>(
-    saved: Saved<B>,
+/// Gradients of a matrix and of the rows; `activated` as in [`ActivatedSumGradients`](super::ActivatedSumGradients).
+pub(super) fn backward<B: HostBackend>(
+    operation: &ActivatedSum,
+    activated: Vec<FloatTensor<B>>,
     gradient: FloatTensor<B>,
-    ends: &[usize],
-    activation: Activation,
-) -> ActivationGradients<B> {
-    let device = gradient.device();
-    let identity = matches!(saved, Saved::Nothing).then(|| gradient.clone());
-    let (terms, rows) = match saved {
-        Saved::Nothing => (Vec::new(), None),
-        Saved::Output(output) => (vec![B::hold(output)], None),
-        Saved::Arguments(terms, rows) => (terms.into_iter().map(B::hold).collect(), Some(B::hold(rows))),
-    };
-    let terms: Vec<Rows<'_>> = terms.iter().map(B::rows).collect();
-    let rows = rows.as_ref().map(B::rows);
+) -> Tensors<B> {
+    let identity = activated.is_empty().then(|| gradient.clone());
+    let activated: Vec<B::Held> = activated.into_iter().map(B::hold).collect();
+    let activated: Vec<MatrixView<'_>> = activated.iter().map(B::view).collect();
     let gradient = B::hold(gradient);
-    let gradient = B::rows(&gradient);
+    let gradient = B::view(&gradient);
     let columns = gradient.columns();
-    let chunks = chunks(ends, columns);
-    let mut partial = vec![0.0; chunks.len() * columns];
-    let sums = partial.chunks_exact_mut(columns.max(1));
-
-    let input = if let Some(input) = identity {
-        for_each(chunks.iter().zip(sums).collect(), |(chunk, sums): (&Chunk, &mut [f32])| {
-            vectorised(
-                #[inline(always)]
-                || {
-                    for row in chunk.rows.clone() {
-                        add(sums, gradient.row(row));
-                    }
-                },
-            );
-        });
-        input
-    } else {
-        let mut input = NewValues::new(gradient.count() * columns);
-        let parts = input.parts(part_lengths(&chunks, columns));
-        let tasks: Vec<_> = chunks.iter().zip(parts).zip(sums).collect();
-        for_each(tasks, |((chunk, input), sums)| {
-            let input = input.zeroed();
-            vectorised(
-                #[inline(always)]
-                || backward_chunk(&terms, rows, gradient, chunk, input, sums, activation),
-            );
-        });
-        B::matrix(input.finish(), columns, &device)
-    };
-    let sums = sum_partials(&partial, &chunks, columns, ends.len());
-    (input, B::matrix(sums, columns, &device))
+    if let Some(identity) = identity {
+        let [sums] = compute::<B, 1>(
+            &operation.packing,
+            columns,
+            [OutputMatrix::Sums(columns)],
+            #[inline(always)]
+            |chunk, [sums]| {
+                for row in chunk.rows.clone() {
+                    add(sums, gradient.row(row));
+                }
+            },
+        )
+        .take();
+        return [identity, sums].into();
+    }
+    compute(
+        &operation.packing,
+        columns,
+        [OutputMatrix::Rows(columns), OutputMatrix::Sums(columns)],
+        #[inline(always)]
+        |chunk, [output, sums]| {
+            backward_chunk(&activated, gradient, chunk, output, sums, operation.activation);
+        },
+    )
 }
 
 #[inline(always)]
 fn backward_chunk(
-    terms: &[Rows<'_>],
-    rows: Option<Rows<'_>>,
-    gradient: Rows<'_>,
+    activated: &[MatrixView<'_>],
+    gradient: MatrixView<'_>,
     chunk: &Chunk,
-    input: &mut [f32],
+    output: &mut [f32],
     sums: &mut [f32],
     activation: Activation,
 ) {
-    for (row, input) in chunk.rows.clone().zip(input.chunks_exact_mut(sums.len())) {
-        let gradient = &gradient.row(row)[..input.len()];
-        match rows {
-            None => input.copy_from_slice(&terms[0].row(row)[..gradient.len()]),
-            Some(rows) => sum_row(terms, rows.row(chunk.segment), row, input),
+    for (row, output) in chunk.rows.clone().zip(output.chunks_exact_mut(sums.len())) {
+        let gradient = &gradient.row(row)[..output.len()];
+        match activated {
+            [activated] => output.copy_from_slice(&activated.row(row)[..gradient.len()]),
+            [matrices @ .., rows] => sum_row(matrices, rows.row(chunk.garment), row, output),
+            [] => {}
         }
         match activation {
-            Activation::Identity => input.copy_from_slice(gradient),
+            Activation::Identity => output.copy_from_slice(gradient),
             Activation::Relu => {
-                for column in 0..input.len() {
-                    input[column] = if input[column] > 0.0 { gradient[column] } else { 0.0 };
+                for column in 0..output.len() {
+                    output[column] = if output[column] > 0.0 { gradient[column] } else { 0.0 };
                 }
             }
             Activation::Gelu => {
-                for column in 0..input.len() {
-                    input[column] = math::gelu_derivative(input[column]) * gradient[column];
+                for column in 0..output.len() {
+                    output[column] = math::gelu_derivative(output[column]) * gradient[column];
                 }
             }
         }
-        add(sums, input);
+        add(sums, output);
+    }
+}
+
+#[inline(always)]
+fn sum_row(matrices: &[MatrixView<'_>], shared: &[f32], row: usize, output: &mut [f32]) {
+    let first = &matrices[0].row(row)[..output.len()];
+    let shared = &shared[..output.len()];
+    for column in 0..output.len() {
+        output[column] = first[column] + shared[column];
+    }
+    for matrix in &matrices[1..] {
+        add(output, matrix.row(row));
     }
 }

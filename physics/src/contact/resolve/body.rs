@@ -2,10 +2,11 @@
 
 use std::cell::OnceCell;
 
+use super::Layer;
+use super::garment::triangles;
 use super::near::near_cloth;
 use super::obstacle::BodyObstacle;
 use super::relief::{Before, Relief, Room};
-use super::{Layer, triangles};
 use crate::query::Surface;
 
 /// Calls `with` the body of `surface` as it is drawn, near `layers`: the same garments once or, in several places, more often.
@@ -56,7 +57,7 @@ impl<'a> Body<'a> {
         }
     }
 
-    /// How far every vertex gives way [m].
+    /// How far every vertex gives way (m).
     pub fn steps(&self) -> Vec<f64> {
         let none = || vec![0.0; self.drawn.surface.positions.len()];
         self.relief.map_or_else(none, |relief| relief.steps.clone())

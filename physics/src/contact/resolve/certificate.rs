@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Layer;
 use super::obstacle::BodyObstacle;
+use crate::contact::{Report, TrianglePairs};
 
 /// Proof of the state of dressed garments: every number comes from exact predicates over all pairs of triangles, or (depths)
 /// from the closest surface point of every vertex.
@@ -23,11 +24,11 @@ pub struct Certificate {
     pub layer_triangle_pairs: usize,
     /// Pairs of triangles of one garment that share more than their common vertices.
     pub self_triangle_pairs: usize,
-    /// Length of the curves in which all those pairs cross [mm].
+    /// Length of the curves in which all those pairs cross (mm).
     pub contour_length_mm: f64,
-    /// Depth of the deepest vertex under the body's surface or under an inner garment [mm]; 0 when there is none.
+    /// Depth of the deepest vertex under the body's surface or under an inner garment (mm); 0 when there is none.
     pub max_depth_mm: f64,
-    /// Mean depth of the vertices that lie under one [mm].
+    /// Mean depth of the vertices that lie under one (mm).
     pub mean_depth_mm: f64,
     /// Vertices inside the body.
     pub vertices_inside: usize,
@@ -75,7 +76,7 @@ pub struct GarmentCertificate {
     pub layer_triangle_pairs: usize,
     /// Pairs with itself.
     pub self_triangle_pairs: usize,
-    /// Strain energy [J].
+    /// Strain energy (J).
     pub strain_joule: f64,
 }
 
@@ -120,6 +121,96 @@ pub struct RemainingPair {
 }
 
 impl Certificate {
+    /// A view of `report`, whose layers are all pairs of garments, by outer, then inner index; `strains`: the strain energy of
+    /// every garment (J).
+    pub(super) fn new(report: &Report, strains: impl Iterator<Item = f64>) -> Self {
+        let mut found = Self::default();
+        let mut depths: Vec<f64> = Vec::new();
+        for ((garment, of_garment), strain_joule) in report.garments.iter().enumerate().zip(strains) {
+            let mut own = GarmentCertificate { strain_joule, ..GarmentCertificate::default() };
+            depths.extend(&of_garment.depths);
+            own.body_triangle_pairs = found.list(garment, Crossed::Body, &of_garment.with_body);
+            for layer in report.layers.iter().filter(|layer| layer.outer == garment) {
+                depths.extend(&layer.depths);
+                own.layer_triangle_pairs += found.list(garment, Crossed::Layer(layer.inner), &layer.pairs);
+                found.layers.push(LayerCertificate {
+                    inner: layer.inner,
+                    outer: layer.outer,
+                    triangle_pairs: layer.pairs.pairs.len(),
+                    order_violations: layer.order().share(),
+                });
+            }
+            own.self_triangle_pairs = found.list(garment, Crossed::Itself, &of_garment.with_itself);
+            found.body_triangle_pairs += own.body_triangle_pairs;
+            found.layer_triangle_pairs += own.layer_triangle_pairs;
+            found.self_triangle_pairs += own.self_triangle_pairs;
+            found.pinched.body_triangle_pairs += of_garment.with_body.pinched.len();
+            found.pinched.self_triangle_pairs += of_garment.with_itself.pinched.len();
+            found.vertices_inside += of_garment.depths.len();
+            found.garments.push(own);
+        }
+        found.pinched.layer_triangle_pairs = report.layers.iter().map(|l| l.pairs.pinched.len()).sum();
+        found.max_depth_mm = 1e3 * depths.iter().fold(0.0, |a: f64, b| a.max(*b));
+        // The sum of none is −0.
+        found.mean_depth_mm = 1e3 * depths.iter().fold(0.0, |sum, d| sum + d) / depths.len().max(1) as f64;
+        found.order_violations = report.order().share();
+        found
+    }
+
+    /// Lists pairs of garment `garment` and returns how many are not pinched.
+    fn list(&mut self, garment: usize, crosses: Crossed, found: &TrianglePairs) -> usize {
+        self.contour_length_mm += 1e3 * found.contour_length;
+        for (pairs, is_pinched) in [(&found.pairs, false), (&found.pinched, true)] {
+            self.remaining.extend(pairs.iter().map(|&(f, g)| RemainingPair {
+                garment,
+                triangle: f as usize,
+                crosses,
+                other_triangle: g as usize,
+                is_pinched,
+            }));
+        }
+        found.pairs.len()
+    }
+
+    /// One certificate for several `frames` of the same garments: numbers of pairs are sums, depths and strain the worst
+    /// frame's; of more than one frame no pair is listed.
+    pub fn of_frames<'a>(frames: impl IntoIterator<Item = &'a Self>) -> Self {
+        let mut frames = frames.into_iter();
+        let Some(first) = frames.next() else { return Self::default() };
+        frames.fold(first.clone(), |sum, frame| sum.with_frame(frame))
+    }
+
+    fn with_frame(mut self, more: &Self) -> Self {
+        self.body_triangle_pairs += more.body_triangle_pairs;
+        self.narrow_triangle_pairs += more.narrow_triangle_pairs;
+        self.layer_triangle_pairs += more.layer_triangle_pairs;
+        self.self_triangle_pairs += more.self_triangle_pairs;
+        self.contour_length_mm += more.contour_length_mm;
+        self.vertices_inside += more.vertices_inside;
+        self.pinched.body_triangle_pairs += more.pinched.body_triangle_pairs;
+        self.pinched.layer_triangle_pairs += more.pinched.layer_triangle_pairs;
+        self.pinched.self_triangle_pairs += more.pinched.self_triangle_pairs;
+        self.max_depth_mm = self.max_depth_mm.max(more.max_depth_mm);
+        self.mean_depth_mm = self.mean_depth_mm.max(more.mean_depth_mm);
+        self.order_violations = self.order_violations.max(more.order_violations);
+        self.strain_added = match (self.strain_added, more.strain_added) {
+            (Some(a), Some(b)) => Some(a.max(b)),
+            (a, b) => a.or(b),
+        };
+        for (own, more) in self.garments.iter_mut().zip(&more.garments) {
+            own.body_triangle_pairs += more.body_triangle_pairs;
+            own.layer_triangle_pairs += more.layer_triangle_pairs;
+            own.self_triangle_pairs += more.self_triangle_pairs;
+            own.strain_joule = own.strain_joule.max(more.strain_joule);
+        }
+        for (own, more) in self.layers.iter_mut().zip(&more.layers) {
+            own.triangle_pairs += more.triangle_pairs;
+            own.order_violations = own.order_violations.max(more.order_violations);
+        }
+        self.remaining.clear();
+        self
+    }
+
     /// Pairs that are not pinched.
     pub fn pairs(&self) -> usize {
         self.body_triangle_pairs + self.layer_triangle_pairs + self.self_triangle_pairs
@@ -170,7 +261,7 @@ impl Certificate {
         self.remaining.iter().filter(move |pair| !known.contains(pair))
     }
 
-    /// Strain energy of all garments [J].
+    /// Strain energy of all garments (J).
     pub(super) fn strain_joule(&self) -> f64 {
         self.garments.iter().map(|g| g.strain_joule).sum()
     }
@@ -190,12 +281,12 @@ impl Certificate {
     }
 }
 
-/// Strain energy of all garments [J].
+/// Strain energy of all garments (J).
 pub(super) fn strain_joule(layers: &[Layer<'_>]) -> f64 {
     layers.iter().map(|l| l.garment.strain_energy(l.positions)).sum()
 }
 
-/// Less strain energy than this [J] is rounding of a garment in its rest shape.
+/// Less strain energy than this (J) is rounding of a garment in its rest shape.
 const NO_STRAIN: f64 = 1e-9;
 /// A rise of the strain energy, as a share, from which cloth is torn.
 const TEAR: f64 = 0.5;

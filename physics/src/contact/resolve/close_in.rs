@@ -4,11 +4,13 @@
 use std::time::Instant;
 
 use super::body::Body;
+use super::count::certified;
+use super::garment::at;
 use super::outfit::Outfit;
 use super::relief::Room;
-use super::resolved::certified;
 use super::sides::Sides;
-use super::{Layer, ResolveSettings, Resolved, at, untangled, untangled_keeping};
+use super::untangle::{untangled, untangled_keeping};
+use super::{Layer, ResolveSettings, Resolved};
 
 /// Longest and shortest step, as shares of the room that the body made, by which it is taken back.
 const STEPS: (f64, f64) = (1.0 / 4.0, 1.0 / 32.0);

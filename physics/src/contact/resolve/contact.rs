@@ -1,8 +1,28 @@
 //! Linear conditions on a garment's vertices, and where two triangles that cross ask for them.
 
-use super::obstacle::Plane;
 use crate::contact::Triangle;
+use crate::query::SurfacePoint;
 use crate::vec3::{add_scaled, axpy, cross, dot, norm_squared, normalized, sub};
+
+/// The half-space that the surface nearest to a point leaves to it: `normal·x ≥ offset`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Plane {
+    /// Unit normal, away from the obstacle.
+    pub normal: [f64; 3],
+    /// Where the surface is.
+    pub offset: f64,
+    /// Signed distance of the point that asked (m).
+    pub distance: f64,
+    /// Whether it may be violated without being a defect: it only keeps what is there.
+    pub is_held: bool,
+}
+
+impl Plane {
+    pub fn at(found: &SurfacePoint, normal: [f64; 3], distance: f64, is_held: bool) -> Self {
+        let offset = dot(normal, found.position);
+        Self { normal, offset, distance, is_held }
+    }
+}
 
 /// `Σ weight·(vertex·normal) ≥ target` over up to six vertices.
 #[derive(Debug, Clone, Copy)]
@@ -95,7 +115,7 @@ pub(super) struct Overlap {
     pub at_upper: [f64; 3],
     /// Its place in the lower triangle, straight below or above along the normal.
     pub at_lower: [f64; 3],
-    /// Height over the lower triangle, negative below [m].
+    /// Height over the lower triangle, negative below (m).
     pub height: f64,
 }
 

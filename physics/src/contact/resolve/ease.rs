@@ -9,14 +9,15 @@ use std::time::Instant;
 
 use super::body::Body;
 use super::certificate::strain_joule;
+use super::count::certified;
+use super::garment::at;
 use super::obstacle::BodyObstacle;
 use super::outfit::Outfit;
 use super::relax::{keep_length, no_farther};
 use super::relief::Room;
 use super::sides::Sides;
-use super::{
-    Certificate, Crossed, Layer, RemainingPair, ResolveSettings, Resolved, at, certified, untangled_keeping,
-};
+use super::untangle::untangled_keeping;
+use super::{Certificate, Crossed, Layer, RemainingPair, ResolveSettings, Resolved};
 use crate::contact::self_triangle_pairs;
 use crate::vec3::distance_squared;
 
@@ -37,7 +38,7 @@ const LEAST_GAIN_OF_LONG: f64 = 0.01;
 const LEAST_GAIN_OF_ALL: f64 = 0.05;
 /// Passes over the edges each time.
 const PASSES: usize = 20;
-/// Farthest that a vertex is moved each time [m]: no limb is so thin that cloth could get to its other side.
+/// Farthest that a vertex is moved each time (m): no limb is so thin that cloth could get to its other side.
 const FARTHEST: f64 = 0.002;
 /// Rounds in which the contacts are met again.
 const ROUNDS: usize = 8;
@@ -121,7 +122,7 @@ fn own_crossings(layers: &[Layer<'_>], body: &BodyObstacle<'_>) -> usize {
 struct Cloth<'a> {
     outfit: Outfit<'a>,
     may_move: Vec<bool>,
-    /// Farthest that a vertex is moved [m].
+    /// Farthest that a vertex is moved (m).
     farthest: f64,
     /// Whether edges that are too short stay so.
     only_stretched: bool,
@@ -153,7 +154,7 @@ impl<'a> Cloth<'a> {
         (0..self.outfit.len()).map(|g| self.outfit.part(&eased, g).to_vec()).collect()
     }
 
-    /// Edges of which an end may move, the first one: packed vertices and the rest length [m].
+    /// Edges of which an end may move, the first one: packed vertices and the rest length (m).
     fn edges(&self) -> Vec<(usize, usize, f64)> {
         let of_garment = |g: usize| {
             let garment = self.outfit.layers[g].garment;
@@ -217,7 +218,7 @@ mod tests {
         (Surface::from_mesh(&ball), RestGarment::new(&sheet), sheet.positions().to_vec())
     }
 
-    /// The sheet with the vertices of one half moved at random by up to `most` [m] along the ball.
+    /// The sheet with the vertices of one half moved at random by up to `most` (m) along the ball.
     fn pulled(sheet: &[[f64; 3]], most: f64) -> Vec<[f64; 3]> {
         let mut random = SplitMix::new(5);
         let mut pull = |p: &[f64; 3]| {

@@ -6,51 +6,26 @@
 //! shallow, and the nearest way out is right. Where a step leaves more crossings than there were, a shorter one is
 //! tried.
 
-use std::sync::Arc;
 use std::time::Instant;
 
+use super::attempt::{resolved_further, settled};
 use super::body::{Body, with_body, with_drawn};
 use super::ease::{TIMES, TIMES_IN_FRAME};
-use super::resolved::settled;
+use super::garment::{at, check};
 use super::stages::Stages;
 use super::strides::Strides;
 use super::taken_back::{shares, taken_back};
 use super::unfold::Folds;
 use super::way::{Way, placed};
-use super::{Certificate, Layer, ResolveError, ResolveSettings, Resolved, at, check, resolved_further};
+use super::{Certificate, Layer, PathSample, Reached, ResolveError, ResolveSettings, Resolved};
 use crate::query::Surface;
 use crate::transform::Transform;
 
 /// A rise of the strain energy, as a share, that is only accepted where the way leaves crossings.
 const STRAINED: f64 = 0.25;
 
-/// What is somewhere along the way.
-#[derive(Clone)]
-pub struct Waypoint {
-    /// The body.
-    pub body: Arc<Surface<f64>>,
-    /// The drape on it, `[V, 3]` per garment [m].
-    pub draped: Vec<Vec<[f64; 3]>>,
-    /// What that began from: the garments as skinning alone puts them.
-    pub skinned: Vec<Vec<[f64; 3]>>,
-    /// Skinning transforms of all vertices, garment after garment, from one and the same state.
-    pub transforms: Vec<Transform>,
-}
-
-/// Garments that are resolved, as far as they could be: where a way starts.
-pub struct Reached {
-    /// Their drape before that, `[V, 3]` each [m].
-    pub draped: Vec<Vec<[f64; 3]>>,
-    /// Where they are now.
-    pub positions: Vec<Vec<[f64; 3]>>,
-    /// Skinning transforms, as in [`Waypoint`].
-    pub transforms: Vec<Transform>,
-    /// Pairs with the body and between garments that are left in `positions`, but for narrow and pinched ones.
-    pub crossings: usize,
-}
-
 /// As [`super::resolve`], with a second way out, and for garments of which it is known where they are `skinned` alone,
-/// `[V, 3]` each [m]: what only the drape folds is laid out first. Where crossings of `layers` on `body` cannot be mended, the
+/// `[V, 3]` each (m): what only the drape folds is laid out first. Where crossings of `layers` on `body` cannot be mended, the
 /// garments are taken along from the stage at 0, the T-pose, to the stage at 1, on `body`; what `layers` differ by from the
 /// drape there is added along the way. Where that leaves crossings, they are taken once more with drapes that are taken back
 /// towards the skinned garments around them. Where crossings are left then and anything was laid out, all of it is tried with
@@ -64,7 +39,7 @@ pub fn resolve_along<E: From<ResolveError>>(
     layers: &[Layer<'_>],
     skinned: &[Vec<[f64; 3]>],
     settings: &ResolveSettings,
-    mut stage_at: impl FnMut(f64) -> Result<Waypoint, E>,
+    mut stage_at: impl FnMut(f64) -> Result<PathSample, E>,
 ) -> Result<Resolved, E> {
     let start = Instant::now();
     settings.check()?;
@@ -110,7 +85,7 @@ fn taken_along<E: From<ResolveError>>(
     folds: &mut Option<Folds>,
     settings: &ResolveSettings,
     start: Instant,
-    stage_at: &mut impl FnMut(f64) -> Result<Waypoint, E>,
+    stage_at: &mut impl FnMut(f64) -> Result<PathSample, E>,
 ) -> Result<Resolved, E> {
     resolved_further(body, layers, settings, start, |room, mut best| {
         let is_late = || settings.is_late(start, layers.len());
@@ -124,7 +99,7 @@ fn taken_along<E: From<ResolveError>>(
             folds.add(&Folds::of(&t_pose.body, &at(layers, &t_pose.draped), &t_pose.skinned));
         }
         let folds = &*folds;
-        let laid_out = |stage: Waypoint| match folds {
+        let laid_out = |stage: PathSample| match folds {
             Some(folds) => folds.laid_out_at(stage, layers),
             None => stage,
         };
@@ -155,7 +130,7 @@ pub fn resolve_after<E: From<ResolveError>>(
     body: &Surface<f64>,
     layers: &[Layer<'_>],
     settings: &ResolveSettings,
-    mut stage_at: impl FnMut(f64) -> Result<Waypoint, E>,
+    mut stage_at: impl FnMut(f64) -> Result<PathSample, E>,
 ) -> Result<Option<Resolved>, E> {
     let start = Instant::now();
     settings.check()?;
@@ -183,7 +158,7 @@ pub fn resolve_after<E: From<ResolveError>>(
 }
 
 /// A stage, if everything on it fits the garments.
-fn checked(stage: Waypoint, layers: &[Layer<'_>]) -> Result<Waypoint, ResolveError> {
+fn checked(stage: PathSample, layers: &[Layer<'_>]) -> Result<PathSample, ResolveError> {
     for positions in [&stage.draped, &stage.skinned] {
         check(&stage.body, &placed(layers, positions)?)?;
     }

@@ -1,23 +1,27 @@
 //! A garment as the post-process sees it: what its positions do not change, and where it is.
 
+use super::ResolveError;
+use crate::contact::LayerTopology;
 use crate::energy::{EnergySettings, Material, strain::Strain};
-use crate::mesh::{FacesAtVertex, Topology, TriMesh};
-use crate::vec3::{norm, sub};
+use crate::mesh::{Topology, TriMesh};
+use crate::query::Surface;
+use crate::rows::{CompressedRows, faces_at_vertices};
+use crate::vec3::{self, norm, sub};
+
+/// Positions farther from the origin than this are refused (m): the exact predicates would hold, but no distance would.
+const FARTHEST: f64 = 1e3;
 
 /// Everything about a garment that its positions do not change: made once, used for every frame and body.
 #[derive(Debug)]
 pub struct RestGarment {
     pub(super) faces: Vec<[u32; 3]>,
     pub(super) topology: Topology,
-    /// Lengths of the topology's edges [m].
+    /// Lengths of the topology's edges (m).
     pub(super) edge_lengths: Vec<f64>,
     /// For every face, the topology's edges between its corners k and k+1.
     pub(super) edges_of_faces: Vec<[u32; 3]>,
-    /// Vertices on an edge with one face.
-    pub(super) is_border: Vec<bool>,
-    /// For every face, which of its edges (corner k → k+1) have no second face: bit k.
-    pub(super) border_edges: Vec<u8>,
-    faces_at: FacesAtVertex,
+    pub(super) layer: LayerTopology,
+    faces_at: CompressedRows<u32>,
     strain: Strain,
 }
 
@@ -33,25 +37,17 @@ impl RestGarment {
         };
         let edges_of_faces: Vec<[u32; 3]> =
             faces.iter().map(|&[a, b, c]| [[a, b], [b, c], [c, a]].map(edge_between)).collect();
-        let mut faces_at_edge = vec![0; topology.edges.len()];
-        edges_of_faces.iter().flatten().for_each(|&e| faces_at_edge[e as usize] += 1);
-        let is_single = |e: u32| faces_at_edge[e as usize] == 1;
-        let mut is_border = vec![false; rest.vertex_count()];
-        for (edge, faces) in topology.edges.iter().zip(&faces_at_edge) {
-            edge.iter().for_each(|&v| is_border[v as usize] |= *faces == 1);
-        }
-        let bits = |edges: &[u32; 3]| (0..3).fold(0, |bits, k| bits | u8::from(is_single(edges[k])) << k);
-        let border_edges = edges_of_faces.iter().map(bits).collect();
+        let layer = LayerTopology::new(&topology, &edges_of_faces);
         let at = |v: u32| rest.positions()[v as usize];
         let edge_lengths = topology.edges.iter().map(|&[a, b]| norm(sub(at(a), at(b)))).collect();
-        let faces_at = FacesAtVertex::new(rest.vertex_count(), &faces);
+        let faces_at = faces_at_vertices(rest.vertex_count(), &faces, 0..faces.len() as u32);
         let strain = Strain::new(rest, &Material::default(), EnergySettings::default().needle_ratio);
-        Self { faces, topology, edge_lengths, edges_of_faces, is_border, border_edges, faces_at, strain }
+        Self { faces, topology, edge_lengths, edges_of_faces, layer, faces_at, strain }
     }
 
     /// Number of vertices.
     pub fn vertex_count(&self) -> usize {
-        self.is_border.len()
+        self.topology.vertex_count()
     }
 
     /// Faces `[F, 3]`.
@@ -61,10 +57,10 @@ impl RestGarment {
 
     /// Faces around vertex `v`, ascending.
     pub(super) fn faces_of(&self, v: u32) -> &[u32] {
-        self.faces_at.of(v)
+        self.faces_at.row(v as usize)
     }
 
-    /// Strain energy at `positions` `[V, 3]` [J], of the default material.
+    /// Strain energy at `positions` `[V, 3]` (J), of the default material.
     ///
     /// # Panics
     /// When there are fewer positions than vertices.
@@ -78,6 +74,35 @@ impl RestGarment {
 pub struct Layer<'a> {
     /// Its constants.
     pub garment: &'a RestGarment,
-    /// Where it is, `[V, 3]` [m].
+    /// Where it is, `[V, 3]` (m).
     pub positions: &'a [[f64; 3]],
+}
+
+/// The same garments elsewhere.
+pub(super) fn at<'a>(layers: &[Layer<'a>], positions: &'a [Vec<[f64; 3]>]) -> Vec<Layer<'a>> {
+    layers.iter().zip(positions).map(|(l, positions)| Layer { garment: l.garment, positions }).collect()
+}
+
+/// Positions and faces of every garment.
+pub(super) fn triangles<'a>(layers: &[Layer<'a>]) -> Vec<(&'a [[f64; 3]], &'a [[u32; 3]])> {
+    layers.iter().map(|l| (l.positions, l.garment.faces.as_slice())).collect()
+}
+
+/// Whether the input can be worked on.
+pub(super) fn check(body: &Surface<f64>, layers: &[Layer<'_>]) -> Result<(), ResolveError> {
+    let is_near = |p: &[f64; 3]| vec3::is_finite(*p) && p.iter().all(|x| x.abs() <= FARTHEST);
+    let is_whole = |f: &[u32; 3]| f.iter().all(|&v| body.positions.get(v as usize).is_some_and(is_near));
+    if !body.faces.iter().any(is_whole) {
+        return Err(ResolveError::EmptyBody);
+    }
+    for (garment, layer) in layers.iter().enumerate() {
+        let (expected, found) = (layer.garment.vertex_count(), layer.positions.len());
+        if expected != found {
+            return Err(ResolveError::Count { garment, expected, found });
+        }
+        if let Some(vertex) = layer.positions.iter().position(|p| !is_near(p)) {
+            return Err(ResolveError::Position { garment, vertex, position: layer.positions[vertex] });
+        }
+    }
+    Ok(())
 }

@@ -3,14 +3,14 @@
 use crate::vec3::is_finite;
 use std::ops::Range;
 
-/// Cells in which cloth is looked for [m].
+/// Cells in which cloth is looked for (m).
 const CELL: f64 = 0.05;
 /// What lies in a cell with cloth, or so many cells beside one along each axis, is near.
 const REACH: usize = 2;
 /// Cloth over a box of more cells, 125 m³ here, is near everything.
 const MOST_CELLS: f64 = 1e6;
 
-/// So far cloth may move [m] and still meet nothing of the body but what is near; a little less than all, for rounding.
+/// So far cloth may move (m) and still meet nothing of the body but what is near; a little less than all, for rounding.
 pub(super) const MARGIN: f64 = REACH as f64 * CELL * (1.0 - 1e-9);
 
 /// Which vertices of a surface belong to a face near a triangle of the cloth, given as positions and faces of each garment;
@@ -39,7 +39,7 @@ pub(super) fn near_cloth(
 
 /// A box of cells, of which some are full.
 struct Cells {
-    /// Its lowest corner [m].
+    /// Its lowest corner (m).
     low: [f64; 3],
     count: [usize; 3],
     /// Along z first, then y.

@@ -1,40 +1,19 @@
 //! The posed body as what garments have to stay outside of.
 
-use super::contact::{along_line, normal_of};
+use super::contact::{Plane, along_line, normal_of};
 use super::near::MARGIN;
-use super::relief::Relief;
 use crate::contact::{Triangle, TriangleTree};
 use crate::query::{ClosestPoint, FaceSide, Surface, SurfacePoint, UnionDistance};
 use crate::vec3::{add, add_scaled, dot, scale, sub};
 use std::sync::OnceLock;
 
-/// Below this distance [m] the direction from the closest point is rounding.
+/// Below this distance (m) the direction from the closest point is rounding.
 const CONTACT: f64 = 1e-9;
-
-/// The half-space that the surface nearest to a point leaves to it: `normal·x ≥ offset`.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Plane {
-    /// Unit normal, away from the obstacle.
-    pub normal: [f64; 3],
-    /// Where the surface is.
-    pub offset: f64,
-    /// Signed distance of the point that asked [m].
-    pub distance: f64,
-    /// Whether it may be violated without being a defect: it only keeps what is there.
-    pub is_held: bool,
-}
-
-impl Plane {
-    fn at(found: &SurfacePoint, normal: [f64; 3], distance: f64, is_held: bool) -> Self {
-        let offset = dot(normal, found.position);
-        Self { normal, offset, distance, is_held }
-    }
-}
 
 /// What a point knows of the body.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BodyView {
-    /// Distance to the nearest exposed face, without sign [m].
+    /// Distance to the nearest exposed face, without sign (m).
     pub far: f64,
     /// The half-space it must stay in; `None` in a pinched region.
     pub plane: Option<Plane>,
@@ -51,7 +30,7 @@ pub(super) struct BodyObstacle<'a> {
     is_pinched: Vec<bool>,
     has_pinched: bool,
     /// Faces that give way.
-    gave_way: Vec<bool>,
+    pub(super) gave_way: Vec<bool>,
     /// Of a surface without a border: inside and outside are known everywhere.
     pub union: Option<UnionDistance>,
     /// All faces near cloth; made when it is first asked.
@@ -67,14 +46,11 @@ impl<'a> BodyObstacle<'a> {
         Self::pinched_where(surface, near, |_| true)
     }
 
-    /// The body after it gave way. Where it only meets itself because of that, it is to be respected as it was.
-    pub fn relieved(relief: &'a Relief, near: &'a [bool]) -> Self {
-        let mut obstacle = Self::pinched_where(&relief.surface, near, |v| relief.pinched[v as usize]);
-        obstacle.gives_way(relief);
-        obstacle
-    }
-
-    fn pinched_where(surface: &'a Surface<f64>, near: &'a [bool], may_be: impl Fn(u32) -> bool) -> Self {
+    pub(super) fn pinched_where(
+        surface: &'a Surface<f64>,
+        near: &'a [bool],
+        may_be: impl Fn(u32) -> bool,
+    ) -> Self {
         let faces = &surface.faces;
         let is_part = |f: u32| faces[f as usize].iter().any(|&v| near[v as usize]);
         let tree = TriangleTree::of_part(&surface.positions, faces, |f, _| is_part(f));
@@ -89,11 +65,6 @@ impl<'a> BodyObstacle<'a> {
         let has_pinched = is_pinched.contains(&true);
         let gave_way = Vec::new();
         Self { tree, is_pinched, has_pinched, gave_way, union, all: OnceLock::new(), surface, near }
-    }
-
-    /// Notes which faces give way.
-    pub fn gives_way(&mut self, relief: &Relief) {
-        self.gave_way = touching(&self.surface.faces, &relief.gave_way);
     }
 
     /// Whether face `f` is pinched.
@@ -149,7 +120,7 @@ impl<'a> BodyObstacle<'a> {
 }
 
 impl BodyObstacle<'_> {
-    /// The half-space a point inside the body has to reach by `way` (unit), at most `reach` [m] along it: that of the first
+    /// The half-space a point inside the body has to reach by `way` (unit), at most `reach` (m) along it: that of the first
     /// surface there. `None` where there is none, or where it is pinched.
     pub fn exit(&self, p: [f64; 3], way: [f64; 3], reach: f64) -> Option<Plane> {
         let end = add_scaled(p, reach, way);
@@ -171,7 +142,7 @@ impl BodyObstacle<'_> {
 }
 
 /// Which faces have a corner that is `touched`.
-fn touching(faces: &[[u32; 3]], touched: &[bool]) -> Vec<bool> {
+pub(super) fn touching(faces: &[[u32; 3]], touched: &[bool]) -> Vec<bool> {
     faces.iter().map(|face| face.iter().any(|&v| touched[v as usize])).collect()
 }
 

@@ -7,7 +7,6 @@
 use rayon::prelude::*;
 
 use super::contact::{Contact, along_line, is_tiny, normal_of, overlap};
-use super::inner_garment::facing;
 use super::outfit::Outfit;
 use crate::contact::{Triangle, TriangleTree};
 use crate::mesh::vertex_normals;
@@ -33,7 +32,7 @@ pub(super) struct Over {
     pub face: [u32; 3],
     pub barycentric: [f64; 3],
     pub normal: [f64; 3],
-    /// Height over the sheet along `normal`, negative below [m].
+    /// Height over the sheet along `normal`, negative below (m).
     pub height: f64,
 }
 
@@ -174,7 +173,7 @@ pub(super) fn outward(
     for g in 0..outfit.len() {
         let (garment, start) = (outfit.layers[g].garment, outfit.vertices(g).start);
         let own = outfit.part(positions, g);
-        let facing = facing(garment, own, |v| away(start + v as u32));
+        let facing = garment.layer.facing(own, &garment.faces, |v| away(start + v as u32));
         let normals = vertex_normals(own, &garment.faces);
         all.extend(normals.iter().zip(&facing).map(|(normal, side)| scale(*normal, *side)));
     }

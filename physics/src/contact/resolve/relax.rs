@@ -35,15 +35,15 @@ impl LastPasses {
 /// Moves the vertices of `region` until `contacts` are met, by a displacement from `shape` that is smooth over the garment,
 /// keeps its edge lengths, and is left as it is outside. Gauss–Seidel in a fixed order: smoothing, lengths, contacts; in the end
 /// as many passes over the contacts alone as `last` allows.
+#[expect(clippy::too_many_arguments, reason = "replaced together with this module")]
 pub(super) fn relax(
     cloth: &Outfit<'_>,
     positions: &mut [[f64; 3]],
     shape: &[[f64; 3]],
     region: &[u32],
     contacts: &[Contact],
-    sweeps: usize,
     stretch: f64,
-    last: LastPasses,
+    (sweeps, last): (usize, LastPasses),
 ) {
     let mut may_move = vec![false; positions.len()];
     region.iter().for_each(|&v| may_move[v as usize] = true);

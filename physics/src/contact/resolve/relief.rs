@@ -9,24 +9,24 @@
 use rayon::prelude::*;
 
 use super::contact::{along_line, normal_of};
-use super::obstacle::BodyObstacle;
+use super::obstacle::{BodyObstacle, touching};
 use crate::contact::{Triangle, TriangleTree};
 use crate::query::{FaceSide, Surface};
 use crate::vec3::{add_scaled, dot};
 
-/// Distance that two parts of the body that look at each other keep [m], for what straight triangles need to go round a limb…
+/// Distance that two parts of the body that look at each other keep (m), for what straight triangles need to go round a limb…
 const ROOM: f64 = 0.006;
-/// …and for the two sheets of each garment [m].
+/// …and for the two sheets of each garment (m).
 const ROOM_PER_GARMENT: f64 = 0.002;
 /// Two surfaces look at each other where their normals have a cosine below this.
 const FACING: f64 = -0.3;
-/// Farthest that the surface of another part is looked for [m].
+/// Farthest that the surface of another part is looked for (m).
 const DEEPEST: f64 = 0.08;
-/// Farthest that a vertex gives way [m].
+/// Farthest that a vertex gives way (m).
 const LONGEST_STEP: f64 = 0.04;
 /// Rings of neighbours that give way along, each half as far.
 const RINGS: usize = 2;
-/// How far outside the surface a vertex is asked whether it is inside another part [m].
+/// How far outside the surface a vertex is asked whether it is inside another part (m).
 const LOOK_OUT: f64 = 1e-6;
 
 /// Where a body gives way: where it lies inside itself, and wherever else two parts are too near to each other for cloth.
@@ -54,9 +54,9 @@ impl Room {
 /// How a body gave way a step before.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Before<'a> {
-    /// By how much, per vertex [m].
+    /// By how much, per vertex (m).
     pub steps: &'a [f64],
-    /// By how much that may change [m]: what looks back at a vertex may be another surface all of a sudden.
+    /// By how much that may change (m): what looks back at a vertex may be another surface all of a sudden.
     pub most: f64,
 }
 
@@ -66,7 +66,7 @@ pub(super) struct Relief {
     pub surface: Surface<f64>,
     /// Vertices that gave way.
     pub gave_way: Vec<bool>,
-    /// By how much [m], with all the room there is.
+    /// By how much (m), with all the room there is.
     pub steps: Vec<f64>,
     /// Corners of faces that were inside another part, or crossed one, before.
     pub pinched: Vec<bool>,
@@ -99,7 +99,21 @@ impl Relief {
     }
 }
 
-/// How far every vertex steps back, against its normal [m]; only those `near` cloth and around them do. Also the corners of
+impl<'a> BodyObstacle<'a> {
+    /// The body after it gave way. Where it only meets itself because of that, it is to be respected as it was.
+    pub fn relieved(relief: &'a Relief, near: &'a [bool]) -> Self {
+        let mut obstacle = Self::pinched_where(&relief.surface, near, |v| relief.pinched[v as usize]);
+        obstacle.gives_way(relief);
+        obstacle
+    }
+
+    /// Notes which faces give way.
+    pub fn gives_way(&mut self, relief: &Relief) {
+        self.gave_way = touching(&self.surface.faces, &relief.gave_way);
+    }
+}
+
+/// How far every vertex steps back, against its normal (m); only those `near` cloth and around them do. Also the corners of
 /// faces inside another part, or crossing one. `None` without an inside.
 fn steps(drawn: &BodyObstacle<'_>, room: f64, is_deep: bool) -> Option<(Vec<f64>, Vec<bool>)> {
     let BodyObstacle { surface, near, tree, .. } = drawn;

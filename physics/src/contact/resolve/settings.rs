@@ -7,7 +7,7 @@ use super::ResolveError;
 /// Settings of [`super::resolve`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ResolveSettings {
-    /// Distance from the body that a vertex gets when it has to move [m], a tenth more in each round up to three times as much;
+    /// Distance from the body that a vertex gets when it has to move (m), a tenth more in each round up to three times as much;
     /// the same over an inner garment, half of it where triangles cross; three tenths between parts of the body that are too
     /// near to each other for more. Default 1 mm.
     pub gap: f64,
@@ -20,10 +20,10 @@ pub struct ResolveSettings {
     pub rounds: usize,
     /// Sweeps of the relaxation in a round. Default 20.
     pub sweeps: usize,
-    /// Deepest that an outer vertex may lie below an inner layer and still be brought back over it [m]. Default 5 cm, as far as
+    /// Deepest that an outer vertex may lie below an inner layer and still be brought back over it (m). Default 5 cm, as far as
     /// the order of layers is judged.
     pub reach: f64,
-    /// Farthest that any vertex may be moved [m]. Default 6 cm: what asks for more (an order that cannot be worn, a part of the
+    /// Farthest that any vertex may be moved (m). Default 6 cm: what asks for more (an order that cannot be worn, a part of the
     /// body inside another one) would tear the garment instead of mending it, and is left and listed.
     pub farthest: f64,
     /// Longest that an edge should get, as a share of its length in the input. Default 1.15: cloth gives a little, and a place
@@ -71,7 +71,7 @@ impl Default for ResolveSettings {
 }
 
 impl ResolveSettings {
-    /// The largest `gap` [m].
+    /// The largest `gap` (m).
     pub const LARGEST_GAP: f64 = 0.05;
 
     /// Whether what began at `start` has had its time.

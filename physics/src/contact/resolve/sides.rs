@@ -15,7 +15,7 @@ use super::outfit::Outfit;
 use crate::contact::TriangleTree;
 use crate::vec3::{cross, dot, norm_squared, scale, sub};
 
-/// What is nearer than this [m] may meet in a step.
+/// What is nearer than this (m) may meet in a step.
 const WATCH: f64 = 0.006;
 /// How far beyond a face or an edge, as a share of it, what lies beside it may slide over it in a step.
 const BESIDE: f64 = 0.25;
@@ -38,7 +38,7 @@ struct OfVertex {
     vertex: u32,
     face: [u32; 3],
     side: f64,
-    /// How far from it [m].
+    /// How far from it (m).
     gap: f64,
 }
 
@@ -47,7 +47,7 @@ struct OfVertex {
 struct OfEdges {
     edges: [[u32; 2]; 2],
     side: f64,
-    /// How far apart [m].
+    /// How far apart (m).
     gap: f64,
 }
 
@@ -226,7 +226,7 @@ struct Over {
     /// Its place in the face, straight below it.
     at: [f64; 3],
     normal: [f64; 3],
-    /// Over the face along its normal [m].
+    /// Over the face along its normal (m).
     height: f64,
 }
 
@@ -252,7 +252,7 @@ struct Past {
     at: [f64; 2],
     /// Along the cross product of the two.
     normal: [f64; 3],
-    /// Of the first over the second along the normal [m].
+    /// Of the first over the second along the normal (m).
     height: f64,
 }
 

@@ -5,8 +5,7 @@
 //! The drape at the end may be more than what is known of the stages: networks may have corrected it, a solver may have refined
 //! it. What it differs by from the stage at 1 is faded in along the way, in the frames of the skinning transforms.
 
-use super::Layer;
-use super::follow::Waypoint;
+use super::{Layer, PathSample};
 use crate::transform::{into_frame, out_of_frame};
 use crate::vec3::{add_scaled, sub};
 
@@ -18,12 +17,12 @@ pub(super) struct Stages<'a> {
     end: &'a [Layer<'a>],
     /// None before a stage was asked for.
     last: Option<Last>,
-    kept: Vec<(f64, Waypoint)>,
+    kept: Vec<(f64, PathSample)>,
 }
 
 /// The end of the way.
 struct Last {
-    stage: Waypoint,
+    stage: PathSample,
     /// What the drape there differs by from what is known of the stages, in the frames of all vertices.
     difference: Vec<[f64; 3]>,
 }
@@ -38,8 +37,8 @@ impl<'a> Stages<'a> {
     pub fn at<E>(
         &mut self,
         share: f64,
-        mut made: impl FnMut(f64) -> Result<Waypoint, E>,
-    ) -> Result<Waypoint, E> {
+        mut made: impl FnMut(f64) -> Result<PathSample, E>,
+    ) -> Result<PathSample, E> {
         let last = match &mut self.last {
             Some(last) => last,
             None => {
@@ -65,7 +64,7 @@ impl<'a> Stages<'a> {
 
 impl Last {
     /// Of the drape `end`, on what is known of the stage there.
-    fn of(mut stage: Waypoint, end: &[Layer<'_>]) -> Self {
+    fn of(mut stage: PathSample, end: &[Layer<'_>]) -> Self {
         let pairs = end.iter().zip(&stage.draped).flat_map(|(end, draped)| end.positions.iter().zip(draped));
         let in_frame = |((p, q), transform): ((&[f64; 3], &[f64; 3]), _)| into_frame(transform, sub(*p, *q));
         let difference = pairs.zip(&stage.transforms).map(in_frame).collect();
@@ -73,7 +72,7 @@ impl Last {
         Self { stage, difference }
     }
 
-    fn faded_in(&self, share: f64, mut stage: Waypoint) -> Waypoint {
+    fn faded_in(&self, share: f64, mut stage: PathSample) -> PathSample {
         let difference = self.difference.iter().zip(&stage.transforms);
         for (p, (offset, transform)) in stage.draped.iter_mut().flatten().zip(difference) {
             *p = add_scaled(*p, share, out_of_frame(transform, *offset));
@@ -92,10 +91,10 @@ mod tests {
     use std::sync::Arc;
 
     /// A stage where cloth at rest has been turned about the vertical by `angle`.
-    fn turned(rest: &[[f64; 3]], angle: f64) -> Waypoint {
+    fn turned(rest: &[[f64; 3]], angle: f64) -> PathSample {
         let (s, c) = angle.sin_cos();
         let turn = |[x, y, z]: [f64; 3]| [c * x + s * z, y, c * z - s * x];
-        Waypoint {
+        PathSample {
             body: Arc::new(Surface::from_mesh(&shapes::tetrahedron())),
             draped: vec![rest.iter().map(|p| turn(*p)).collect()],
             skinned: Vec::new(),

@@ -6,11 +6,11 @@
 use rayon::prelude::*;
 
 use super::certificate::{Certificate, Crossed};
-use super::{Layer, Waypoint};
+use super::{Layer, PathSample};
 use crate::query::VertexIndex;
 use crate::vec3::{add_scaled, sub};
 
-/// Within this distance of a crossing [m], in the T-pose, a drape is taken back wholly…
+/// Within this distance of a crossing (m), in the T-pose, a drape is taken back wholly…
 const REACH: f64 = 0.1;
 /// …and beyond this one not at all.
 const END: f64 = 3.0 * REACH;
@@ -34,7 +34,7 @@ pub(super) fn shares(left: &Certificate, layers: &[Layer<'_>], places: &[Vec<[f6
 }
 
 /// The drape at `stage`, by `shares` taken back to where it began.
-pub(super) fn taken_back(mut stage: Waypoint, shares: &[Vec<f64>]) -> Waypoint {
+pub(super) fn taken_back(mut stage: PathSample, shares: &[Vec<f64>]) -> PathSample {
     for ((draped, skinned), shares) in stage.draped.iter_mut().zip(&stage.skinned).zip(shares) {
         for ((p, start), share) in draped.iter_mut().zip(skinned).zip(shares) {
             *p = add_scaled(*p, *share, sub(*start, *p));
@@ -56,11 +56,9 @@ mod tests {
     use super::*;
     use crate::mesh::{TriMesh, shapes};
     use crate::query::Surface;
-    use crate::transform::Transform;
+    use crate::transform::IDENTITY;
     use crate::vec3::{add, norm};
     use std::sync::Arc;
-
-    const IDENTITY: Transform = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
 
     /// A sheet of 1.2 m in the plane y = `height`.
     fn sheet(height: f64) -> TriMesh {
@@ -113,8 +111,8 @@ mod tests {
             |p: &[f64; 3]| add(*p, [0.0, 0.01 - 0.2 * (-(norm([p[0], 0.0, p[2]]) / 0.1).powi(2)).exp(), 0.0]);
         let draped = vec![inner.positions().to_vec(), outer.positions().iter().map(sunk).collect()];
         let ball = Arc::new(Surface::from_mesh(&shapes::icosphere(0.08, 3)));
-        let stage = |skinned: [&TriMesh; 2]| -> Result<Waypoint, ResolveError> {
-            Ok(Waypoint {
+        let stage = |skinned: [&TriMesh; 2]| -> Result<PathSample, ResolveError> {
+            Ok(PathSample {
                 body: ball.clone(),
                 draped: draped.clone(),
                 skinned: skinned.map(|mesh| mesh.positions().to_vec()).to_vec(),

@@ -4,7 +4,7 @@ use super::*;
 use crate::contact::{mesh_triangles_intersect, triangles_intersect};
 use crate::mesh::TriMesh;
 use crate::mesh::shapes::{self, SplitMix};
-use crate::vec3::{add, add_scaled, norm, scale};
+use crate::vec3::{self, add, add_scaled, norm, scale};
 use std::f64::consts::FRAC_PI_2;
 use std::time::Duration;
 

@@ -10,18 +10,13 @@ mod places;
 use rayon::prelude::*;
 
 use super::body::with_drawn;
+use super::garment::at;
 use super::obstacle::BodyObstacle;
 use super::outfit::Outfit;
-use super::{Layer, Waypoint, at};
+use super::{Layer, PathSample};
 use crate::contact::self_triangle_pairs;
 use crate::query::Surface;
-use crate::vec3::{add, add_scaled, scale, sub};
-use places::folded;
-
-/// Sweeps of the smoothing…
-const SWEEPS: usize = 100;
-/// …and its over-relaxation.
-const OVER: f64 = 1.7;
+use places::{folded, smoothed};
 
 /// Where garments are to be laid out: vertices of each, ascending.
 #[derive(Debug, Clone, PartialEq)]
@@ -68,31 +63,12 @@ impl Folds {
     }
 
     /// The drape of `layers` at `stage` without them.
-    pub fn laid_out_at(&self, mut stage: Waypoint, layers: &[Layer<'_>]) -> Waypoint {
+    pub fn laid_out_at(&self, mut stage: PathSample, layers: &[Layer<'_>]) -> PathSample {
         if !self.is_empty() {
             stage.draped = self.laid_out(&at(layers, &stage.draped), &stage.skinned);
         }
         stage
     }
-}
-
-/// The lone garment of `outfit` with what it adds to `skinned` harmonic in `region`: over-relaxed Gauss–Seidel in a fixed order.
-fn smoothed(outfit: &Outfit<'_>, skinned: &[[f64; 3]], region: &[u32]) -> Vec<[f64; 3]> {
-    let mut positions = outfit.layers[0].positions.to_vec();
-    let mut added: Vec<[f64; 3]> = positions.iter().zip(skinned).map(|(p, s)| sub(*p, *s)).collect();
-    for _ in 0..SWEEPS {
-        for &v in region {
-            let ring = outfit.ring(v);
-            let share = 1.0 / ring.len().max(1) as f64;
-            let mean = scale(ring.fold([0.0; 3], |sum, n| add(sum, added[n as usize])), share);
-            let now = added[v as usize];
-            added[v as usize] = add_scaled(now, OVER, sub(mean, now));
-        }
-    }
-    for &v in region {
-        positions[v as usize] = add(skinned[v as usize], added[v as usize]);
-    }
-    positions
 }
 
 #[cfg(test)]

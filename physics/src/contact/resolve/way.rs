@@ -3,17 +3,16 @@
 use std::sync::OnceLock;
 use std::time::Instant;
 
+use super::attempt::settled;
 use super::body::{Body, with_body_after, with_drawn};
-use super::follow::{Reached, Waypoint};
+use super::garment::{at, check};
 use super::obstacle::BodyObstacle;
 use super::outfit::Outfit;
 use super::relief::{Before, Room};
-use super::resolved::settled;
 use super::sides::Sides;
 use super::strides::Strides;
-use super::{
-    Layer, ResolveError, ResolveSettings, Resolved, Untangled, at, check, untangled, untangled_keeping,
-};
+use super::untangle::{Untangled, untangled, untangled_keeping};
+use super::{Layer, PathSample, Reached, ResolveError, ResolveSettings, Resolved};
 use crate::contact::self_triangle_pairs;
 use crate::transform::{into_frame, out_of_frame};
 use crate::vec3::{add, scale, sub};
@@ -27,7 +26,7 @@ const GOOD_STEPS: usize = 4;
 const KEPT: f64 = 0.95;
 /// …and the share of the way from which on a step is long: shorter ones keep more.
 const FADING: f64 = 1.0 / 16.0;
-/// How much more the body may give way, or less, on a whole way [m]: about as fast as limbs move.
+/// How much more the body may give way, or less, on a whole way (m): about as fast as limbs move.
 const GIVING_WAY: f64 = 0.5;
 /// Crossings of garments with themselves may become more by this share, and by so many, in a short step.
 const OWN: (f64, usize) = (0.125, 4);
@@ -46,7 +45,7 @@ pub(super) struct Way<'a, 'b> {
 /// Somewhere on the way.
 struct Place {
     reached: Reached,
-    /// How far the body gave way there, per vertex [m]; none where that is not known.
+    /// How far the body gave way there, per vertex (m); none where that is not known.
     gave_way: Option<Vec<f64>>,
     /// Crossings of garments with themselves; none where they were not counted.
     own: Option<usize>,
@@ -57,8 +56,8 @@ struct Place {
 }
 
 impl Place {
-    fn new(stage: Waypoint, Arrived { untangled, gave_way }: Arrived, sides_before: Option<Sides>) -> Self {
-        let Waypoint { draped, transforms, .. } = stage;
+    fn new(stage: PathSample, Arrived { untangled, gave_way }: Arrived, sides_before: Option<Sides>) -> Self {
+        let PathSample { draped, transforms, .. } = stage;
         let Untangled { positions, crossings, own, .. } = untangled;
         let reached = Reached { draped, positions, transforms, crossings };
         Self { reached, gave_way: Some(gave_way), own: Some(own), sides: OnceLock::new(), sides_before }
@@ -79,7 +78,7 @@ impl Place {
 /// What is at a stage when all was done there.
 struct Arrived {
     untangled: Untangled,
-    /// How far the body gave way, per vertex [m].
+    /// How far the body gave way, per vertex (m).
     gave_way: Vec<f64>,
 }
 
@@ -89,8 +88,8 @@ impl Way<'_, '_> {
     pub fn improve<E: From<ResolveError>>(
         &self,
         best: &mut Resolved,
-        t_pose: Waypoint,
-        stage_at: impl FnMut(f64) -> Result<Waypoint, E>,
+        t_pose: PathSample,
+        stage_at: impl FnMut(f64) -> Result<PathSample, E>,
     ) -> Result<(), E> {
         let (layers, settings) = (self.layers, self.settings);
         let start = std::slice::from_ref(&t_pose.draped);
@@ -131,7 +130,7 @@ impl Way<'_, '_> {
     pub fn follow<E: From<ResolveError>>(
         &self,
         reached: Reached,
-        stage_at: impl FnMut(f64) -> Result<Waypoint, E>,
+        stage_at: impl FnMut(f64) -> Result<PathSample, E>,
     ) -> Result<(Option<Untangled>, usize), E> {
         let sides = OnceLock::new();
         self.go(Place { reached, gave_way: None, own: None, sides, sides_before: None }, stage_at)
@@ -140,7 +139,7 @@ impl Way<'_, '_> {
     fn go<E: From<ResolveError>>(
         &self,
         mut place: Place,
-        mut stage_at: impl FnMut(f64) -> Result<Waypoint, E>,
+        mut stage_at: impl FnMut(f64) -> Result<PathSample, E>,
     ) -> Result<(Option<Untangled>, usize), E> {
         let Strides { longest, shortest, keeping, .. } = self.strides;
         check(self.end.drawn.surface, &placed(self.layers, &place.reached.draped)?)?;
@@ -186,7 +185,7 @@ impl Way<'_, '_> {
     fn arrive(
         &self,
         place: &Place,
-        stage: &Waypoint,
+        stage: &PathSample,
         step: f64,
         is_shortest: bool,
         is_last: bool,
@@ -245,7 +244,7 @@ fn with_all_own(mut found: Untangled, layers: &[Layer<'_>], settings: &ResolveSe
 /// as `before`.
 fn on_stage(
     layers: &[Layer<'_>],
-    stage: &Waypoint,
+    stage: &PathSample,
     starts: &[Vec<Vec<[f64; 3]>>],
     (room, before): (Room, Option<Before<'_>>),
     is_enough: impl Fn(&Untangled) -> bool,
@@ -285,7 +284,7 @@ pub(super) fn placed<'a>(
 }
 
 /// The drape at `stage` with what the post-process had changed before, turned as skinning turns it.
-fn carried(reached: &Reached, stage: &Waypoint, kept: f64) -> Vec<Vec<[f64; 3]>> {
+fn carried(reached: &Reached, stage: &PathSample, kept: f64) -> Vec<Vec<[f64; 3]>> {
     let mut transforms = reached.transforms.iter().zip(&stage.transforms);
     let garments = stage.draped.iter().zip(&reached.draped).zip(&reached.positions);
     garments

@@ -51,7 +51,7 @@ impl InnerCloth {
         Self { inside }
     }
 
-    /// As [`InnerGarment::evaluate`](super::InnerGarment::evaluate).
+    /// As [`InnerLayer::evaluate`](super::InnerLayer::evaluate).
     pub fn evaluate<T: Real>(
         &self,
         closest: &ClosestPoint,
@@ -75,7 +75,7 @@ impl InnerCloth {
         contacts.iter().map(|contact| contact.share * contact.penalty[0]).sum()
     }
 
-    /// As [`InnerGarment::touches`](super::InnerGarment::touches).
+    /// As [`InnerLayer::touches`](super::InnerLayer::touches).
     pub fn touches<T: Real>(
         &self,
         closest: &ClosestPoint,
@@ -164,7 +164,7 @@ impl InnerCloth {
     }
 }
 
-/// `f`, `f′` and `6(ε − d)` at the signed distance `d`, with margin `epsilon`, faded out at −`depth` [m].
+/// `f`, `f′` and `6(ε − d)` at the signed distance `d`, with margin `epsilon`, faded out at −`depth` (m).
 fn penalty(d: f64, epsilon: f64, depth: f64) -> [f64; 3] {
     let excess = epsilon - d;
     if excess <= 0.0 || d <= -depth {

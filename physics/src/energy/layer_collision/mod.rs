@@ -9,7 +9,7 @@ pub mod nearest_vertex;
 
 use std::sync::Arc;
 
-use super::{CurvatureSink, EnergySettings, Weighted};
+use super::{CurvatureSink, EnergySettings, LayerContact, Weighted};
 use crate::mesh::{Topology, TriMesh};
 use crate::query::ClosestPoint;
 use crate::real::Real;
@@ -17,33 +17,23 @@ use crate::vec3::to_f64;
 use closest_point::InnerCloth;
 use nearest_vertex::{InnerVertices, PosedVertices};
 
-/// How the signed distance of an outer vertex to an inner garment is measured.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum LayerContact {
-    /// `(x − x_g)·n_g` with the nearest vertex `g` and its area-weighted normal: the paper's form.
-    #[default]
-    NearestVertex,
-    /// The distance to the closest point of the surface.
-    ClosestPoint,
-}
-
 /// What stays the same of a garment that others lie on.
 #[derive(Debug, Clone)]
-pub struct InnerGarment {
+pub struct InnerLayer {
     vertices: InnerVertices,
     cloth: InnerCloth,
 }
 
 /// An inner garment in its present position: made once per evaluation, used by every pair that it is the inner one of.
 #[derive(Debug)]
-pub enum PosedInner<T: Real> {
+pub enum PosedInnerLayer<T: Real> {
     /// For [`LayerContact::NearestVertex`].
     Vertices(PosedVertices<T>),
     /// For [`LayerContact::ClosestPoint`].
     Cloth(ClosestPoint),
 }
 
-impl InnerGarment {
+impl InnerLayer {
     pub(super) fn new(rest: &TriMesh, topology: &Topology, median_edge: f64) -> Self {
         let vertices = InnerVertices::with_median_edge(rest, median_edge);
         Self { vertices, cloth: InnerCloth::new(rest, topology) }
@@ -54,49 +44,51 @@ impl InnerGarment {
         self.vertices.faces()
     }
 
-    /// Median edge of the rest shape [m].
+    /// Median edge of the rest shape (m).
     pub(crate) fn median_edge(&self) -> f64 {
         self.vertices.median_edge()
     }
 
-    /// Prepares the garment at `positions` `[V, 3]` [m] for queries.
-    pub fn posed<T: Real>(&self, positions: &[[T; 3]], contact: LayerContact) -> PosedInner<T> {
+    /// Prepares the garment at `positions` `[V, 3]` (m) for queries.
+    pub fn posed<T: Real>(&self, positions: &[[T; 3]], contact: LayerContact) -> PosedInnerLayer<T> {
         match contact {
-            LayerContact::NearestVertex => PosedInner::Vertices(self.vertices.posed(positions)),
+            LayerContact::NearestVertex => PosedInnerLayer::Vertices(self.vertices.posed(positions)),
             LayerContact::ClosestPoint => {
                 let positions = positions.iter().map(|p| to_f64(*p)).collect();
-                PosedInner::Cloth(ClosestPoint::new(positions, self.vertices.faces()))
+                PosedInnerLayer::Cloth(ClosestPoint::new(positions, self.vertices.faces()))
             }
         }
     }
 
-    /// Penalty [m³] of the vertices of `outer` against this garment at `inner` (both `[V, 3]` [m]); adds its weighted gradient to
+    /// Penalty (m³) of the vertices of `outer` against this garment at `inner` (both `[V, 3]` (m)); adds its weighted gradient to
     /// `targets`, the inner garment's first.
     pub fn evaluate<T: Real>(
         &self,
         inner: &[[T; 3]],
-        posed: &PosedInner<T>,
+        posed: &PosedInnerLayer<T>,
         outer: &[[T; 3]],
         settings: &EnergySettings,
         targets: Option<[Weighted<'_, T>; 2]>,
     ) -> f64 {
         match posed {
-            PosedInner::Vertices(posed) => self.vertices.evaluate(inner, posed, outer, settings, targets),
-            PosedInner::Cloth(closest) => self.cloth.evaluate(closest, outer, settings, targets),
+            PosedInnerLayer::Vertices(posed) => {
+                self.vertices.evaluate(inner, posed, outer, settings, targets)
+            }
+            PosedInnerLayer::Cloth(closest) => self.cloth.evaluate(closest, outer, settings, targets),
         }
     }
 
     /// The outer vertices that are nearer than the gate, with the corners of the inner faces that they are nearest to, and their penalty
-    /// [m³]; none by the nearest vertex.
+    /// (m³); none by the nearest vertex.
     pub(super) fn touches<T: Real>(
         &self,
-        posed: &PosedInner<T>,
+        posed: &PosedInnerLayer<T>,
         outer: &[[T; 3]],
         settings: &EnergySettings,
     ) -> Vec<(usize, [u32; 3], f64)> {
         match posed {
-            PosedInner::Vertices(_) => Vec::new(),
-            PosedInner::Cloth(closest) => self.cloth.touches(closest, outer, settings),
+            PosedInnerLayer::Vertices(_) => Vec::new(),
+            PosedInnerLayer::Cloth(closest) => self.cloth.touches(closest, outer, settings),
         }
     }
 
@@ -104,13 +96,13 @@ impl InnerGarment {
     /// solver gets far with it.
     pub(super) fn curvature<T: Real>(
         &self,
-        posed: &PosedInner<T>,
+        posed: &PosedInnerLayer<T>,
         outer: &[[T; 3]],
         settings: &EnergySettings,
         offsets: [usize; 2],
         sink: &mut dyn CurvatureSink,
     ) {
-        if let PosedInner::Cloth(closest) = posed {
+        if let PosedInnerLayer::Cloth(closest) = posed {
             self.cloth.curvature(closest, outer, settings, offsets, sink);
         }
     }

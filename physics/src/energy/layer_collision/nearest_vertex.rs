@@ -14,11 +14,12 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use crate::energy::elements::{GRAIN, Incidence};
+use crate::energy::elements::GRAIN;
 use crate::energy::{EnergySettings, LayerGate, Weighted};
 use crate::mesh::TriMesh;
 use crate::query::VertexIndex;
 use crate::real::Real;
+use crate::rows::{CompressedRows, corners_at_vertices};
 use crate::vec3::{accumulate, add, axpy, cross, dot, norm, norm_squared, scale, sub, to_f64, zero};
 
 /// τ in units of `|N|` at rest.
@@ -31,8 +32,8 @@ pub const COLLAPSE_FLOOR: f64 = 1e-6;
 #[derive(Debug, Clone)]
 pub struct InnerVertices {
     faces: Arc<[[u32; 3]]>,
-    incidence: Incidence,
-    /// τ² per vertex [m⁴].
+    corners_at: CompressedRows<u32>,
+    /// τ² per vertex (m⁴).
     collapse_squared: Vec<f64>,
     median_edge: f64,
 }
@@ -41,7 +42,7 @@ pub struct InnerVertices {
 #[derive(Debug)]
 pub struct PosedVertices<T: Real> {
     index: VertexIndex<T>,
-    /// `N`, the sum of the faces' cross products [m²].
+    /// `N`, the sum of the faces' cross products (m²).
     area_normals: Vec<[f64; 3]>,
 }
 
@@ -59,16 +60,16 @@ const NO_CONTACT: Contact = Contact { inner: 0, energy: 0.0, slope: 0.0 };
 impl InnerVertices {
     pub(super) fn with_median_edge(rest: &TriMesh, median_edge: f64) -> Self {
         let faces: Arc<[[u32; 3]]> = rest.faces().into();
-        let incidence = Incidence::new(rest.vertex_count(), &faces);
+        let corners_at = corners_at_vertices(rest.vertex_count(), &faces);
         let floor = COLLAPSE_FLOOR * median_edge * median_edge;
-        let collapse_squared = area_normals(rest.positions(), &faces, &incidence)
+        let collapse_squared = area_normals(rest.positions(), &faces, &corners_at)
             .into_iter()
             .map(|n| (COLLAPSE_RATIO * norm(n)).max(floor).powi(2))
             .collect();
-        Self { faces, incidence, collapse_squared, median_edge }
+        Self { faces, corners_at, collapse_squared, median_edge }
     }
 
-    /// Median edge of the rest shape [m].
+    /// Median edge of the rest shape (m).
     pub(super) fn median_edge(&self) -> f64 {
         self.median_edge
     }
@@ -80,14 +81,14 @@ impl InnerVertices {
     pub(super) fn posed<T: Real>(&self, positions: &[[T; 3]]) -> PosedVertices<T> {
         PosedVertices {
             index: VertexIndex::new(positions),
-            area_normals: area_normals(positions, &self.faces, &self.incidence),
+            area_normals: area_normals(positions, &self.faces, &self.corners_at),
         }
     }
 
     /// The regularised normal `n` and `√(|N|² + τ²)`; `None` without faces.
     #[inline(always)]
     fn normal<T: Real>(&self, posed: &PosedVertices<T>, v: usize) -> Option<([f64; 3], f64)> {
-        if self.incidence.slots(v).is_empty() {
+        if self.corners_at.row(v).is_empty() {
             return None;
         }
         let sum = posed.area_normals[v];
@@ -95,7 +96,7 @@ impl InnerVertices {
         Some((if length > 0.0 { scale(sum, 1.0 / length) } else { zero() }, length))
     }
 
-    /// As [`InnerGarment::evaluate`](super::InnerGarment::evaluate).
+    /// As [`InnerLayer::evaluate`](super::InnerLayer::evaluate).
     pub(super) fn evaluate<T: Real>(
         &self,
         inner: &[[T; 3]],
@@ -171,7 +172,7 @@ impl InnerVertices {
         let weight = target.weight;
         target.gradient.par_iter_mut().with_min_len(GRAIN).enumerate().for_each(|(v, gradient)| {
             let mut sum = zero();
-            for &slot in self.incidence.slots(v) {
+            for &slot in self.corners_at.row(v) {
                 let (face, corner) = (self.faces[slot as usize / 3], slot as usize % 3);
                 let [wa, wb, wc] = face.map(|v| by_normal[v as usize]);
                 let w = add(wa, add(wb, wc));
@@ -187,7 +188,11 @@ impl InnerVertices {
     }
 }
 
-fn area_normals<T: Real>(positions: &[[T; 3]], faces: &[[u32; 3]], incidence: &Incidence) -> Vec<[f64; 3]> {
+fn area_normals<T: Real>(
+    positions: &[[T; 3]],
+    faces: &[[u32; 3]],
+    corners_at: &CompressedRows<u32>,
+) -> Vec<[f64; 3]> {
     let crosses: Vec<[f64; 3]> = faces
         .par_iter()
         .with_min_len(4 * GRAIN)
@@ -201,7 +206,7 @@ fn area_normals<T: Real>(positions: &[[T; 3]], faces: &[[u32; 3]], incidence: &I
         .with_min_len(4 * GRAIN)
         .map(|v| {
             let mut sum = zero();
-            for &slot in incidence.slots(v) {
+            for &slot in corners_at.row(v) {
                 accumulate(&mut sum, crosses[slot as usize / 3]);
             }
             sum

@@ -1,4 +1,4 @@
-//! Every gradient against difference quotients in `f64`, on random scenes and for every switch. The suite of hard cases runs
+//! Every gradient against difference quotients in `f64`, on random scenes and for every switch. The suite of degenerate cases runs
 //! through the same check in the workspace's `tests` crate.
 
 use super::scenes::{Scene, only, pulled_back, scene};
@@ -15,11 +15,14 @@ fn check_scene(scene: Scene<f64>, term: Term, seed: u64, what: &str) {
     let check = GradientCheck { coordinates: 100, directions: 6, seed: seed + 7 };
     let report = check_gradient(&scene.energy, term, &scene.posed, &scene.canonical, &check);
     let report = report.unwrap_or_else(|| panic!("{term} is not in the scene"));
-    println!("{term:>16} {what:<24} relative gradient error {:.2e}, {} kinks", report.error, report.kinks);
+    println!(
+        "{term:>16} {what:<24} relative gradient error {:.2e}, {} nonsmooth lines",
+        report.error, report.nonsmooth
+    );
     assert!(report.largest > 0.0, "{term} is silent in the random scene");
     assert!(report.passes(), "{term} {what}: {report:?}");
-    // In general position kinks are rare: the central check is the rule.
-    assert!(report.kinks * 20 <= report.lines, "{term} {what}: {report:?}");
+    // In general position nonsmooth points are rare: the central check is the rule.
+    assert!(report.nonsmooth * 20 <= report.lines, "{term} {what}: {report:?}");
     // Only the space that the term is about has a gradient.
     let value = scene.energy.evaluate(&scene.posed, &scene.canonical);
     let other =

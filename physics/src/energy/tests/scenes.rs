@@ -23,7 +23,7 @@ pub fn random(seed: u64) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(seed)
 }
 
-/// Moves every vertex by up to `amount` [m] per axis.
+/// Moves every vertex by up to `amount` (m) per axis.
 pub fn jittered(mesh: &TriMesh, amount: f64, seed: u64) -> TriMesh {
     let mut rng = random(seed);
     let positions = mesh.positions().iter().map(|p| p.map(|x| x + amount * rng.random_range(-1.0..1.0)));
@@ -48,7 +48,24 @@ pub fn scene<T: Real>(settings: EnergySettings, weights: TermMap<f64>, seed: u64
     scene_of(rest, &body(seed), settings, weights, 0.008, seed)
 }
 
-/// A scene of `rest` garments, posed by random displacements of up to `amount` [m] per axis.
+/// A garment that is measured against its rest shape.
+pub fn scene_garment<T: Real>(
+    rest: &TriMesh,
+    settings: &EnergySettings,
+    weights: TermMap<f64>,
+    is_held: bool,
+) -> SceneGarment<T> {
+    let energies =
+        GarmentEnergies::new(rest, &Topology::new(rest), settings, is_held).expect("valid garment");
+    SceneGarment { energies: Arc::new(energies), holding_reference: narrowed(rest), pull_back: None, weights }
+}
+
+/// Positions in the scalar of a scene.
+pub fn narrowed<T: Real>(mesh: &TriMesh) -> Vec<[T; 3]> {
+    mesh.positions().iter().map(|p| vec3::from_f64(*p)).collect()
+}
+
+/// A scene of `rest` garments, posed by random displacements of up to `amount` (m) per axis.
 pub fn scene_of<T: Real>(
     rest: Vec<TriMesh>,
     body: &TriMesh,
@@ -57,22 +74,12 @@ pub fn scene_of<T: Real>(
     amount: f64,
     seed: u64,
 ) -> Scene<T> {
-    let convert =
-        |mesh: &TriMesh| mesh.positions().iter().map(|p| vec3::from_f64(*p)).collect::<Vec<[T; 3]>>();
-    let mut garments = Vec::new();
-    let (mut posed, mut canonical) = (Vec::new(), Vec::new());
-    for (i, mesh) in rest.iter().enumerate() {
-        let topology = Topology::new(mesh);
-        let energies = GarmentEnergies::new(mesh, &topology, &settings, true).expect("valid garment");
-        posed.extend(convert(&jittered(mesh, amount, seed + 100 + i as u64)));
-        canonical.extend(convert(&jittered(mesh, amount, seed + 200 + i as u64)));
-        garments.push(SceneGarment {
-            energies: Arc::new(energies),
-            holding_reference: convert(mesh),
-            pull_back: None,
-            weights,
-        });
-    }
+    let garments = rest.iter().map(|mesh| scene_garment(mesh, &settings, weights, true)).collect();
+    let positions = |first: u64| {
+        let garments = (seed + first..).zip(&rest);
+        garments.flat_map(|(seed, mesh)| narrowed(&jittered(mesh, amount, seed))).collect()
+    };
+    let (posed, canonical) = (positions(100), positions(200));
     let pairs = (0..rest.len()).flat_map(|outer| (0..outer).map(move |inner| (inner, outer)));
     let layers = pairs.map(|(inner, outer)| SceneLayers { inner, outer, weights }).collect();
     let energy = SceneEnergy { body: Arc::new(Surface::from_mesh(body)), garments, layers, settings };

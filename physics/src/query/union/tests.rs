@@ -1,29 +1,19 @@
 use super::*;
-use crate::mesh::TriMesh;
 use crate::mesh::shapes::{self, SplitMix};
 use crate::query::{Distance, Surface, brute_force};
 
-fn points(count: usize, seed: u64) -> Vec<[f64; 3]> {
-    let mut random = SplitMix::new(seed);
-    (0..count).map(|_| std::array::from_fn(|_| 0.9 * random.symmetric())).collect()
-}
-
-/// Three balls, each in each other, and a small one wholly inside.
-fn balls() -> TriMesh {
-    let ball = |radius, at: [f64; 3]| shapes::mapped(&shapes::icosphere(radius, 3), |p| vec3::add(p, at));
-    let parts =
-        [ball(0.5, [0.0; 3]), ball(0.4, [0.4, 0.05, 0.02]), ball(0.3, [0.1, 0.5, 0.1]), ball(0.1, [0.1; 3])];
-    shapes::union(&parts.each_ref())
+fn buried(union: &UnionDistance) -> usize {
+    union.sides().iter().filter(|side| **side == FaceSide::Buried).count()
 }
 
 #[test]
 fn the_distance_is_continuous_and_its_sign_that_of_the_union() {
-    let mesh = balls();
+    let mesh = shapes::overlapping_balls();
     let surface = Surface::<f64>::from_mesh(&mesh);
     let union = UnionDistance::new(mesh.positions(), mesh.faces());
-    assert!(union.buried() > 1280, "the small ball and the lenses: {}", union.buried());
+    assert!(buried(&union) > 1280, "the small ball and the lenses: {}", buried(&union));
     let mut jumps_of_the_closest_point = 0;
-    for p in points(300, 11) {
+    for p in SplitMix::new(11).points(300, 0.9) {
         // Along a line from p to the centre.
         let line: Vec<[f64; 3]> = (0..=400).map(|i| scale(p, 1.0 - f64::from(i) / 400.0)).collect();
         let gaps = |distance| -> Vec<f64> { line.iter().map(|q| surface.gap(*q, distance).gap).collect() };
@@ -55,7 +45,7 @@ fn a_seam_that_leaves_the_part_still_parts_inside_from_outside() {
         let part = UnionDistance::of_tree(&TriangleTree::of_part(positions, faces, |f, _| is_part(f)));
         for f in (0..faces.len() as u32).filter(|f| is_part(*f)) {
             let (expected, found) = (whole.sides()[f as usize], part.sides()[f as usize]);
-            // A face that only crosses what was left out is no seam any more.
+            // A face that only intersects what was left out is no seam any more.
             assert!(expected == found || expected == FaceSide::Seam, "cut {cut}, face {f}: {found:?}");
         }
     }
@@ -63,14 +53,14 @@ fn a_seam_that_leaves_the_part_still_parts_inside_from_outside() {
 
 #[test]
 fn a_part_answers_as_the_whole_does_near_it() {
-    let mesh = balls();
+    let mesh = shapes::overlapping_balls();
     let (positions, faces) = (mesh.positions(), mesh.faces());
     let whole = UnionDistance::new(positions, faces);
     let is_part = |f: u32| faces[f as usize].iter().any(|&v| positions[v as usize][0] > 0.1);
     let part = UnionDistance::of_tree(&TriangleTree::of_part(positions, faces, |f, _| is_part(f)));
-    assert!(part.buried() > 0 && part.buried() < whole.buried());
+    assert!(buried(&part) > 0 && buried(&part) < buried(&whole));
     let mut asked = 0;
-    for p in points(400, 17).into_iter().filter(|p| p[0] > 0.2) {
+    for p in SplitMix::new(17).points(400, 0.9).into_iter().filter(|p| p[0] > 0.2) {
         let (a, is_inside) = whole.project(p).unwrap();
         // The part is all there is in reach.
         if a.distance_squared.sqrt() < p[0] - 0.1 {
@@ -91,8 +81,8 @@ fn a_part_answers_as_the_whole_does_near_it() {
 fn without_intersections_nothing_differs() {
     let mesh = shapes::icosphere(0.5, 3);
     let surface = Surface::<f64>::from_mesh(&mesh);
-    assert_eq!(surface.union_distance().buried(), 0);
-    for p in points(300, 5) {
+    assert_eq!(buried(surface.union_distance()), 0);
+    for p in SplitMix::new(5).points(300, 0.9) {
         let (a, b) = (surface.gap(p, Distance::Union), surface.gap(p, Distance::ClosestPoint));
         assert_eq!((a.gap, a.gradient), (b.gap, b.gradient));
     }

@@ -1,15 +1,15 @@
 //! `clothcombo bench backends`.
 
-use crate::cli::train::load_under_bar;
+use crate::cli::loading::load_dataset;
+use crate::cli::output::print_report;
+use crate::cli::table::{markdown, row};
 use crate::cli::values::{measuring_seconds, not_negative};
-use crate::cli::verbosity::say;
+use crate::cli::verbosity::print_status;
 use crate::system::device::Backend;
-use crate::training::measure::{Case, Subject};
+use crate::training::measure::{BenchmarkRun, Case};
 use clap::{Parser, ValueEnum};
-use clothcombo_model::ClothCombo;
-use miette::{IntoDiagnostic, Report, miette};
+use miette::{Report, miette};
 use serde::Serialize;
-use std::sync::Arc;
 
 /// Whether all compute devices of this build agree on loss and gradients, and how fast they are
 #[derive(Parser)]
@@ -31,7 +31,7 @@ pub struct Arguments {
     /// Vertices per garment, about
     #[arg(long, default_value_t = 700)]
     vertices: usize,
-    /// Time spent on each single measurement [s]
+    /// Time spent on each single measurement (s)
     #[arg(long, default_value_t = 1.0, value_parser = measuring_seconds)]
     seconds: f64,
     /// Largest relative difference of the loss
@@ -46,7 +46,7 @@ pub struct Arguments {
 }
 
 #[derive(Serialize)]
-struct Row {
+struct Measured {
     device: String,
     loss: f64,
     /// Relative difference to the first device.
@@ -64,31 +64,29 @@ struct Row {
 /// When a device fails, or disagrees with the first by more than is asked for.
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let config = Case::new(arguments.width, arguments.layers, arguments.vertices).config(&[])?;
-    let dataset = Arc::new(load_under_bar(&config)?);
-    let subject = |backend: Backend| Subject::new(config.clone(), dataset.clone(), 0, &backend.device());
-    let first = subject(Backend::preferred())?;
+    let dataset = load_dataset(&config)?;
+    let run_on = |backend: Backend| BenchmarkRun::new(config.clone(), dataset.clone(), 0, &backend.device());
+    let first = run_on(Backend::preferred())?;
     let scene = first.scene(0)?;
     let (loss, gradients) = first.loss_and_gradients(&scene)?;
-    let mut devices = vec![Backend::preferred()];
-    let asked = match arguments.devices.as_slice() {
+    let wanted = match arguments.devices.as_slice() {
         [] => Backend::value_variants(),
-        asked => asked,
+        devices => devices,
     };
-    devices.extend(asked.iter().filter(|device| **device != Backend::preferred()));
-    let mut rows = Vec::with_capacity(devices.len());
-    for device in devices {
-        say(&format!("measuring {}", name(device)));
-        let mut subject = subject(device)?;
-        let same = copy(first.model(), subject.model())?;
-        subject.set_model(same);
-        let (found_loss, found) = subject.loss_and_gradients(&scene)?;
+    let others = wanted.iter().copied().filter(|device| *device != Backend::preferred());
+    let mut rows = Vec::new();
+    for device in [Backend::preferred()].into_iter().chain(others) {
+        print_status(&format!("measuring {}", name(device)));
+        let mut run = run_on(device)?;
+        run.copy_parameters(&first)?;
+        let (found_loss, found) = run.loss_and_gradients(&scene)?;
         let differences = gradients
             .iter()
             .zip(&found)
             .map(|((name, expected), (_, found))| (difference(found, expected), name));
         let worst = differences.max_by(|a, b| a.0.total_cmp(&b.0));
-        let costs = subject.costs(arguments.seconds, 1)?;
-        rows.push(Row {
+        let costs = run.costs(arguments.seconds, 1)?;
+        rows.push(Measured {
             device: name(device),
             loss: found_loss,
             loss_difference: ((found_loss - loss) / loss).abs(),
@@ -98,8 +96,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
             step_ms: costs.step_ms,
         });
     }
-    print(&rows, arguments.json)?;
-    let agrees = |row: &&Row| {
+    print_report(arguments.json, &rows, |rows| text(rows))?;
+    let agrees = |row: &&Measured| {
         row.loss_difference <= arguments.most_loss && row.gradient_difference <= arguments.most_gradient
     };
     match rows.iter().find(|row| !agrees(row)) {
@@ -122,12 +120,6 @@ fn name(backend: Backend) -> String {
     backend.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
 }
 
-/// The networks `of` on the device of `like`.
-fn copy(of: &ClothCombo, like: &ClothCombo) -> Result<ClothCombo, Report> {
-    use burn::module::Module;
-    like.clone().try_load_record(of.clone().into_record()).map_err(|error| miette!("{error}"))
-}
-
 /// Norm of the difference over the norm of `expected`; infinite where the sizes differ.
 fn difference(found: &[f32], expected: &[f32]) -> f64 {
     if found.len() != expected.len() {
@@ -138,28 +130,19 @@ fn difference(found: &[f32], expected: &[f32]) -> f64 {
     if apart == 0.0 { 0.0 } else { apart / norm(&mut expected.iter().map(|v| f64::from(*v))) }
 }
 
-fn print(rows: &[Row], json: bool) -> Result<(), Report> {
-    if json {
-        println!("{}", serde_json::to_string_pretty(rows).into_diagnostic()?);
-        return Ok(());
-    }
-    println!(
-        "| device | loss | relative difference | largest relative gradient difference | of | forward [ms] | step [ms] |"
-    );
-    println!("|---|---:|---:|---:|---|---:|---:|");
-    for row in rows {
-        println!(
-            "| {} | {:.6} | {:.1e} | {:.1e} | {} | {:.1} | {:.1} |",
-            row.device,
-            row.loss,
-            row.loss_difference,
-            row.gradient_difference,
-            row.parameter,
-            row.forward_ms,
-            row.step_ms
-        );
-    }
-    Ok(())
+fn text(rows: &[Measured]) -> String {
+    let row = |measured: &Measured| {
+        row! {
+            "device" => measured.device,
+            "loss" => format!("{:.6}", measured.loss),
+            "relative difference" => measured.loss_difference,
+            "largest relative gradient difference" => measured.gradient_difference,
+            "of" => measured.parameter,
+            "forward [ms]" => measured.forward_ms,
+            "step [ms]" => measured.step_ms,
+        }
+    };
+    markdown(&rows.iter().map(row).collect::<Vec<_>>())
 }
 
 #[cfg(test)]

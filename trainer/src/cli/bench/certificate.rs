@@ -2,15 +2,18 @@
 
 mod summary;
 
+use crate::cli::loading::load_dataset;
+use crate::cli::model_arguments::ModelArguments;
+use crate::cli::output::print_report;
 use crate::cli::post_process::PostProcessArguments;
-use crate::cli::train::load_under_bar;
 use crate::cli::values::at_least_one;
 use crate::cli::verbosity::progress_bar;
-use crate::config::{Config, load};
+use crate::config::Config;
 use crate::dataset::{Dataset, PreparedScene, SceneSample, prepare, sample_outfit};
 use crate::evaluation::certificates::{DrapedScene, Dressing, OutfitResult};
 use crate::inference::UniqueNames;
-use crate::inference::networks::{Networks, TensorStore};
+use crate::inference::networks::Networks;
+use crate::inference::tensor_store::TensorStore;
 use crate::run::checkpoint::TrainedModel;
 use crate::system::device::Backend;
 use crate::system::single_threaded::map_single_threaded;
@@ -24,8 +27,7 @@ use std::sync::Arc;
 
 /// The post-process on random outfits: exact pairs before and after, strain added, time
 ///
-/// Shapes are drawn from the configuration's range, poses from validation clips, 1 to --layers garments of the whole
-/// wardrobe in random order.
+/// Shapes are sampled from the configuration's range, poses from validation clips, 1 to --layers of all garments in random order.
 #[derive(Parser)]
 #[command(after_help = "Examples:\n  clothcombo bench certificate --draws 500\n  \
         clothcombo bench certificate --checkpoint runs/open --json > certificate.json\n  \
@@ -33,28 +35,21 @@ use std::sync::Arc;
         clothcombo bench certificate --only 17 --meshes /tmp/draw-17\n  \
         clothcombo bench certificate --draws 24 --orders helper_tee,helper_vest,Coat,helper_shorts")]
 pub struct Arguments {
-    /// Configuration (TOML); default: that of the checkpoint, else configs/open.toml
-    #[arg(long, value_name = "FILE")]
-    config: Option<PathBuf>,
-    /// Overrides one value of the configuration; repeatable
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    overrides: Vec<String>,
-    /// Run, checkpoint or folder of a trained model (models/default); default: skinning with shape transfer drapes
-    #[arg(long, value_name = "DIR")]
-    checkpoint: Option<PathBuf>,
+    #[command(flatten)]
+    model: ModelArguments,
     /// Random outfits
     #[arg(long, default_value_t = 500, value_parser = at_least_one)]
     draws: usize,
     /// Most garments of an outfit
     #[arg(long, default_value_t = 6, value_parser = clap::value_parser!(u8).range(1..=12))]
     layers: u8,
-    /// These garments in every order instead of random ones: draw i wears order i mod n! on the body of draw i / n!
+    /// These garments in every order instead of random ones: draw i has order i mod n! on the body of draw i / n!
     #[arg(long, value_delimiter = ',', value_name = "NAME,NAME,…")]
     orders: Vec<String>,
     /// Only these draws, by number from 0
     #[arg(long, value_delimiter = ',')]
     only: Vec<usize>,
-    /// Outfits beside each other, a core for each; 1: one after the other, each with all cores
+    /// Outfits resolved in parallel, a core for each; 1: one after the other, each with all cores
     #[arg(long, default_value_t = 1, value_parser = at_least_one)]
     jobs: usize,
     /// Seed of the draws; default: that of the configuration
@@ -73,34 +68,25 @@ pub struct Arguments {
 /// Runs the verb.
 ///
 /// # Errors
-/// When the configuration, its data or the checkpoint cannot be read. Crossings that stay are a result, not an error.
+/// When the configuration, its data or the checkpoint cannot be read. Intersections that stay are a result, not an error.
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let settings = arguments.post_process.settings();
     settings.check().into_diagnostic()?;
-    let checkpoint = arguments.checkpoint.as_deref().map(TrainedModel::open).transpose()?;
-    let file = match (&arguments.config, &checkpoint) {
-        (Some(file), _) => file.clone(),
-        (None, Some(checkpoint)) => checkpoint.folder.join("config.toml"),
-        (None, None) => Path::new("configs").join("open.toml"),
-    };
-    let mut config = load(&file, &arguments.overrides)?;
+    let checkpoint = arguments.model.open()?;
+    let mut config = arguments.model.config(checkpoint.as_ref())?;
     if checkpoint.is_none() {
         // Nothing but the networks reads the eigenvectors, and most of the preparation is theirs.
         config.model.eigen_count = 1;
     }
-    let dataset = Arc::new(load_under_bar(&config)?);
+    let dataset = load_dataset(&config)?;
     let results = measure(arguments, &config, &dataset, checkpoint.as_ref(), &settings)?;
-    if arguments.json {
-        let mut report = summary::report(&results, usize::from(arguments.layers));
-        report["jobs"] = json!(arguments.jobs);
-        report["gap_mm"] = json!(arguments.post_process.gap_mm);
-        report["time_limit_s"] = json!(arguments.post_process.time_limit.map(|t| t.as_secs_f64()));
-        report["drape"] = json!(if checkpoint.is_some() { "network" } else { "skinning" });
-        println!("{}", serde_json::to_string_pretty(&report).into_diagnostic()?);
-    } else {
-        summary::print_tables(&results, usize::from(arguments.layers));
-    }
-    Ok(())
+    let layers = usize::from(arguments.layers);
+    let mut report = summary::report(&results, layers);
+    report["jobs"] = json!(arguments.jobs);
+    report["gap_mm"] = json!(arguments.post_process.gap_mm);
+    report["time_limit_s"] = json!(arguments.post_process.time_limit.map(|t| t.as_secs_f64()));
+    report["drape"] = json!(if checkpoint.is_some() { "network" } else { "skinning" });
+    print_report(arguments.json, &report, |_| summary::tables(&results, layers))
 }
 
 fn measure(
@@ -146,12 +132,10 @@ fn measure(
         bar.inc(1);
         Ok(result)
     };
-    let results = match arguments.jobs {
-        1 => draws.into_iter().map(resolve).collect::<Result<_, Report>>()?,
-        jobs => map_single_threaded(draws, Some(jobs), resolve)?,
-    };
-    bar.finish_and_clear();
-    Ok(results)
+    match arguments.jobs {
+        1 => draws.into_iter().map(resolve).collect(),
+        jobs => map_single_threaded(draws, Some(jobs), resolve),
+    }
 }
 
 /// Every order of the garments called `names`; none for no name.
@@ -159,10 +143,10 @@ fn orders(dataset: &Dataset, names: &[String]) -> Result<Vec<Vec<usize>>, Report
     if names.len() > 6 {
         return Err(miette!(help = "give at most six", "{} garments have too many orders", names.len()));
     }
-    let cards = || (0..dataset.garments.len()).map(|i| dataset.garments.info(i).name.as_str());
+    let known = || (0..dataset.garments.len()).map(|i| dataset.garments.info(i).name.as_str());
     let find = |name: &String| {
-        cards().position(|known| known == name).ok_or_else(|| {
-            let all = cards().collect::<Vec<_>>().join(", ");
+        known().position(|known| known == name).ok_or_else(|| {
+            let all = known().collect::<Vec<_>>().join(", ");
             miette!(help = format!("the garments are: {all}"), "no garment is called {name:?}")
         })
     };

@@ -31,7 +31,7 @@ pub struct Arguments {
     /// Points per pose
     #[arg(long, default_value_t = 2000)]
     points: usize,
-    /// Largest distance of a point from the surface [m]
+    /// Largest distance of a point from the surface (m)
     #[arg(long, default_value_t = 0.05)]
     band: f64,
     /// Seed of poses and points

@@ -1,19 +1,21 @@
 //! `clothcombo bench step`.
 
-use crate::cli::train::load_under_bar;
+use crate::cli::loading::load_dataset;
+use crate::cli::output::print_report;
+use crate::cli::table::{Cell, Row, markdown, row};
 use crate::cli::values::{at_least_one, measuring_seconds, picture_file};
-use crate::cli::verbosity::say;
+use crate::cli::verbosity::print_status;
 use crate::config::{Config, load};
 use crate::picture::chart::{Bar, draw_bars};
 use crate::picture::save_png;
 use crate::system::device::Backend;
-use crate::training::measure::{Case, Costs, PHASES, Profile, Subject, export};
+use crate::training::measure::{BenchmarkRun, Case, Costs, PHASES, Profile, export};
+use burn::module::Module;
 use clap::Parser;
 use clothcombo_physics::energy::Term;
 use miette::{IntoDiagnostic, Report, miette};
 use serde::Serialize;
 use std::path::PathBuf;
-use std::sync::Arc;
 
 /// Where the time of a training step goes
 #[derive(Parser)]
@@ -24,13 +26,13 @@ use std::sync::Arc;
         Two threads and fewer: RAYON_NUM_THREADS=2. Nothing else should run meanwhile."
 )]
 pub struct Arguments {
-    /// Measures the stages of this configuration instead of made-up runs
+    /// Measures the stages of this configuration instead of synthetic runs
     #[arg(long, value_name = "FILE", conflicts_with_all = ["widths", "layers", "vertices", "eigen_count", "blocks", "bodies"])]
     config: Option<PathBuf>,
     /// With --config: only this stage, counted from 0 as in stages.0
     #[arg(long, value_name = "N", requires = "config")]
     stage: Option<usize>,
-    /// Overrides one value of the configuration or of every made-up run, for example losses.strain.weight=2; repeatable
+    /// Overrides one value of the configuration or of every synthetic run, for example losses.strain.weight=2; repeatable
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
     /// Widths of the networks; the number of DiffusionNet blocks and eigenpairs goes with them
@@ -51,13 +53,13 @@ pub struct Arguments {
     /// Bodies per step, which share the garments' embeddings
     #[arg(long, value_delimiter = ',', default_values_t = [1])]
     bodies: Vec<usize>,
-    /// Also times a step on this many outfits (accumulate), which are computed beside each other
+    /// Also times a step on this many outfits (accumulate), which are computed in parallel
     #[arg(long, value_name = "OUTFITS", default_value_t = 1)]
     accumulate: usize,
     /// Training steps that are profiled
     #[arg(long, default_value_t = 10, value_parser = at_least_one)]
     steps: usize,
-    /// Time spent on each single measurement [s]
+    /// Time spent on each single measurement (s)
     #[arg(long, default_value_t = 1.0, value_parser = measuring_seconds)]
     seconds: f64,
     /// Compute device
@@ -74,33 +76,20 @@ pub struct Arguments {
     json: bool,
 }
 
-/// What was measured of one case.
+/// Results of one case.
 #[derive(Clone, Debug, Serialize)]
-pub(crate) struct Measured {
-    /// What it is.
-    pub name: String,
-    /// Its sizes; absent for a stage of a configuration.
-    pub sizes: Option<Sizes>,
+struct Measured {
+    name: String,
+    /// Absent for a stage of a configuration.
+    sizes: Option<Case>,
     /// Garments of the measured scene.
-    pub layers: usize,
+    layers: usize,
     /// Vertices of all its garments.
-    pub vertices: usize,
+    vertices: usize,
     /// Parameters of all networks.
-    pub parameters: usize,
-    /// Where the time of a step goes.
-    pub profile: Profile,
-    /// Single parts.
-    pub costs: Costs,
-}
-
-/// The sizes a case was asked for.
-#[derive(Clone, Copy, Debug, Serialize)]
-pub(crate) struct Sizes {
-    pub vertices: usize,
-    pub layers: usize,
-    pub width: usize,
-    pub eigen_count: usize,
-    pub bodies: usize,
+    parameters: usize,
+    profile: Profile,
+    costs: Costs,
 }
 
 /// Runs the verb.
@@ -110,25 +99,20 @@ pub(crate) struct Sizes {
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let measured = match &arguments.config {
         Some(file) => stages(arguments, load(file, &arguments.overrides)?)?,
-        None => made_up(arguments)?,
+        None => synthetic(arguments)?,
     };
     if let Some(path) = &arguments.picture {
         save_png(&picture(&measured), path).into_diagnostic()?;
     }
-    if arguments.json {
-        let report = serde_json::json!({
-            "threads": rayon::current_num_threads(),
-            "device": format!("{:?}", arguments.device).to_lowercase(),
-            "cases": measured,
-        });
-        println!("{}", serde_json::to_string_pretty(&report).into_diagnostic()?);
-    } else {
-        print_tables(&measured);
-    }
-    Ok(())
+    let report = serde_json::json!({
+        "threads": rayon::current_num_threads(),
+        "device": format!("{:?}", arguments.device).to_lowercase(),
+        "cases": &measured,
+    });
+    print_report(arguments.json, &report, |_| tables(&measured))
 }
 
-fn made_up(arguments: &Arguments) -> Result<Vec<Measured>, Report> {
+fn synthetic(arguments: &Arguments) -> Result<Vec<Measured>, Report> {
     let cases = cases(arguments);
     if arguments.export.is_some() && cases.len() != 1 {
         return Err(miette!(
@@ -137,38 +121,32 @@ fn made_up(arguments: &Arguments) -> Result<Vec<Measured>, Report> {
             cases.len()
         ));
     }
-    let mut measured = Vec::with_capacity(cases.len());
-    for case in cases {
+    let measured = cases.into_iter().map(|case| {
         let config = case.config(&arguments.overrides)?;
         let case = case.of_config(&config);
-        let dataset = Arc::new(load_under_bar(&config)?);
-        let mut subject = Subject::new(config, dataset, 0, &arguments.device.device())?;
-        let name =
-            std::iter::once(case.name()).chain(arguments.overrides.iter().cloned()).collect::<Vec<_>>();
-        measured.push(measure(&mut subject, name.join(", "), Some(case), arguments)?);
-    }
-    Ok(measured)
+        let dataset = load_dataset(&config)?;
+        let mut run = BenchmarkRun::new(config, dataset, 0, &arguments.device.device())?;
+        let name = [&[case.name()][..], arguments.overrides.as_slice()].concat().join(", ");
+        measure(&mut run, name, Some(case), arguments)
+    });
+    measured.collect()
 }
 
+/// Every combination of the sizes.
 fn cases(arguments: &Arguments) -> Vec<Case> {
-    let mut cases = Vec::new();
-    for &width in &arguments.widths {
-        for &layers in &arguments.layers {
-            for &vertices in &arguments.vertices {
-                for &bodies in &arguments.bodies {
-                    let case = Case::new(width, layers, vertices);
-                    let case = Case { bodies, blocks: arguments.blocks.unwrap_or(case.blocks), ..case };
-                    match arguments.eigen_count.as_slice() {
-                        [] => cases.push(case),
-                        counts => {
-                            cases.extend(counts.iter().map(|&eigen_count| Case { eigen_count, ..case }))
-                        }
-                    }
-                }
-            }
-        }
+    let Arguments { widths, layers, vertices, bodies, eigen_count, .. } = arguments;
+    let sizes = widths.iter().flat_map(|&width| {
+        let of_layers = move |&layers: &usize| vertices.iter().map(move |&v| Case::new(width, layers, v));
+        layers.iter().flat_map(of_layers)
+    });
+    let sizes = sizes.flat_map(|case| bodies.iter().map(move |&bodies| Case { bodies, ..case }));
+    let sizes = sizes.map(|case| Case { blocks: arguments.blocks.unwrap_or(case.blocks), ..case });
+    match eigen_count.as_slice() {
+        [] => sizes.collect(),
+        counts => sizes
+            .flat_map(|case| counts.iter().map(move |&eigen_count| Case { eigen_count, ..case }))
+            .collect(),
     }
-    cases
 }
 
 fn stages(arguments: &Arguments, config: Config) -> Result<Vec<Measured>, Report> {
@@ -189,39 +167,33 @@ fn stages(arguments: &Arguments, config: Config) -> Result<Vec<Measured>, Report
             names.len()
         ));
     }
-    let dataset = Arc::new(load_under_bar(&config)?);
+    let dataset = load_dataset(&config)?;
     let stage = |index: usize| {
-        let mut subject = Subject::new(config.clone(), dataset.clone(), index, &arguments.device.device())?;
-        measure(&mut subject, names[index].clone(), None, arguments)
+        let mut run = BenchmarkRun::new(config.clone(), dataset.clone(), index, &arguments.device.device())?;
+        measure(&mut run, names[index].clone(), None, arguments)
     };
     chosen.into_iter().map(stage).collect()
 }
 
 fn measure(
-    subject: &mut Subject,
+    run: &mut BenchmarkRun,
     name: String,
-    case: Option<Case>,
+    sizes: Option<Case>,
     arguments: &Arguments,
 ) -> Result<Measured, Report> {
     if let Some(folder) = &arguments.export {
-        export(subject, folder)?;
+        export(run, folder)?;
     }
-    say(&format!("measuring {name}"));
-    let scene = subject.scene(0)?;
-    let costs = subject.costs(arguments.seconds, arguments.accumulate)?;
-    let profile = subject.profile(arguments.steps)?;
+    print_status(&format!("measuring {name}"));
+    let scene = run.scene(0)?;
+    let costs = run.costs(arguments.seconds, arguments.accumulate)?;
+    let profile = run.profile(arguments.steps)?;
     Ok(Measured {
         name,
-        sizes: case.map(|Case { vertices, layers, width, eigen_count, bodies, .. }| Sizes {
-            vertices,
-            layers,
-            width,
-            eigen_count,
-            bodies,
-        }),
+        sizes,
         layers: scene.garments.len(),
         vertices: scene.garments.iter().map(|garment| garment.vertex_count()).sum(),
-        parameters: burn::module::Module::num_params(subject.model()),
+        parameters: run.model().num_params(),
         profile,
         costs,
     })
@@ -240,7 +212,7 @@ fn picture(measured: &[Measured]) -> image::RgbImage {
 }
 
 /// Three digits.
-pub(crate) fn short(ms: f64) -> String {
+fn short(ms: f64) -> String {
     match ms {
         ms if ms < 0.0005 => "0".into(),
         ms if ms < 1.0 => format!("{ms:.3}"),
@@ -250,39 +222,43 @@ pub(crate) fn short(ms: f64) -> String {
     }
 }
 
-fn print_tables(measured: &[Measured]) {
-    println!("Where the time of a training step goes, medians [ms].\n");
-    println!("| case | step | {} |", PHASES.join(" | "));
-    println!("|---|{}", "---:|".repeat(PHASES.len() + 1));
-    for m in measured {
-        let phases: Vec<String> = m.profile.phases_ms.iter().map(|(_, ms)| short(*ms)).collect();
-        println!("| {} | {} | {} |", m.name, short(m.profile.step_ms), phases.join(" | "));
+fn tables(measured: &[Measured]) -> String {
+    let rows = |row: fn(&Measured) -> Row| measured.iter().map(row).collect::<Vec<_>>();
+    format!(
+        "Where the time of a training step goes, medians [ms].\n\n{}\n\
+         Parts of one scene, medians [ms]; scenes are prepared on another thread.\n\n{}\n\
+         Every single loss, value and gradient [ms].\n\n{}",
+        markdown(&rows(phase_row)),
+        markdown(&rows(cost_row)),
+        markdown(&rows(term_row))
+    )
+}
+
+fn phase_row(m: &Measured) -> Row {
+    let mut row = row!["case" => m.name, "step" => short(m.profile.step_ms)];
+    row.extend(m.profile.phases_ms.iter().map(|(name, ms)| ((*name).to_owned(), short(*ms))));
+    row
+}
+
+fn cost_row(m: &Measured) -> Row {
+    row! {
+        "case" => m.name,
+        "vertices" => m.vertices,
+        "parameters" => m.parameters,
+        "forward" => short(m.costs.forward_ms),
+        "forward + backward" => short(m.costs.forward_backward_ms),
+        "step" => short(m.costs.step_ms),
+        "step on several outfits" => m.costs.step_of_several_ms.map(short),
+        "losses" => short(m.costs.losses_ms),
+        "drape again" => short(m.costs.drape_ms),
+        "prepare scene" => short(m.profile.prepare_ms),
+        "peak memory [MiB]" => m.costs.peak_mib.map(|mib| format!("{mib:.0}")),
     }
-    println!("\nParts of one scene, medians [ms]; scenes are prepared on another thread.\n");
-    println!(
-        "| case | vertices | parameters | forward | forward + backward | step | step on several outfits | losses | drape again | prepare scene | peak memory [MiB] |"
-    );
-    println!("|---|{}", "---:|".repeat(10));
-    for m in measured {
-        let c = &m.costs;
-        let several = c.step_of_several_ms.map_or("–".into(), short);
-        let [before, after] = [
-            [c.forward_ms, c.forward_backward_ms, c.step_ms],
-            [c.losses_ms, c.drape_ms, m.profile.prepare_ms],
-        ]
-        .map(|times| times.map(short).join(" | "));
-        let peak = c.peak_mib.map_or("–".into(), |mib| format!("{mib:.0}"));
-        println!(
-            "| {} | {} | {} | {before} | {several} | {after} | {peak} |",
-            m.name, m.vertices, m.parameters
-        );
-    }
-    println!("\nEvery loss alone, value and gradient [ms].\n");
-    println!("| case | {} |", Term::ALL.map(Term::name).join(" | "));
-    println!("|---|{}", "---:|".repeat(Term::COUNT));
-    for m in measured {
-        let times =
-            Term::ALL.map(|term| m.costs.terms_ms.get(term.name()).map_or("–".into(), |ms| short(*ms)));
-        println!("| {} | {} |", m.name, times.join(" | "));
-    }
+}
+
+fn term_row(m: &Measured) -> Row {
+    let ms = |term: Term| m.costs.terms_ms.get(term.name()).map(|ms| short(*ms));
+    let mut row = row!["case" => m.name];
+    row.extend(Term::ALL.map(|term| (term.name().to_owned(), ms(term).text())));
+    row
 }

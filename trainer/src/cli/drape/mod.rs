@@ -4,25 +4,27 @@ mod folders;
 mod job;
 mod outfits;
 mod summary;
-mod tell;
+mod warnings;
 
 use crate::cli::interrupted::remove_on_signals;
+use crate::cli::output::print_json;
 use crate::cli::post_process::PostProcessArguments;
-use crate::cli::verbosity::{progress_bar, say};
+use crate::cli::verbosity::{print_status, progress_bar};
 use crate::inference::output::{Show, Staged, write};
 use crate::inference::{Drape, DrapeProgress, Draper, DraperSettings, Moment, Outfit, Report, smooth};
 use crate::system::device::Backend;
+use crate::system::files::write_json;
 use clap::{ArgGroup, Parser, ValueEnum};
 use clothcombo_data::check::impossible_turn;
-use clothcombo_data::format::atomic;
 use folders::{check_cache, user_cache};
 use indicatif::ProgressBar;
 use job::{Job, Scenes, ordered};
-use miette::{IntoDiagnostic, Report as Failure, WrapErr, miette};
+use miette::{IntoDiagnostic, Report as Failure, miette};
 use serde_json::json;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-use tell::{tell_order, tell_repairs, tell_shape};
+use warnings::{log_repairs, warn_about_order, warn_about_shape};
 
 /// Drapes garments on a body, innermost first: OBJ, GLB, picture, viewer and a report with a certificate
 #[derive(Parser)]
@@ -132,7 +134,7 @@ impl Fit {
     }
 }
 
-/// Frames this near to each other show the same cloth [s]; a little more than 0.05, for rounding.
+/// Frames this near to each other show the same cloth (s); a little more than 0.05, for rounding.
 const CLOSE_FRAMES: f64 = 0.050_001;
 
 /// Runs the verb.
@@ -162,7 +164,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         clock.elapsed().as_secs_f64()
     );
     let clock = Instant::now();
-    // All of it is read before anything is draped: a wrong name in the last outfit is told at once.
+    // Everything is read before anything is draped, so that a wrong name in the last outfit fails at once.
     let blame = |job: &Job, failure: Failure| match jobs.len() {
         1 => failure,
         _ => failure.wrap_err(format!("outfit {}", job.name)),
@@ -172,12 +174,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         let sources = job.garments.iter().map(find).collect::<Result<Vec<_>, _>>()?;
         let sources = ordered(sources, job.order.as_deref())?;
         Outfit::check(&sources)?;
-        sources.iter().for_each(tell_repairs);
-        tell_order(&sources);
+        sources.iter().for_each(log_repairs);
+        warn_about_order(&sources);
         let scenes = job.scenes(&draper)?;
         // The frames of a motion are alike in what may be wrong with them.
         scenes.states.first().map_or(Ok(()), |state| draper.check_body(state))?;
-        tell_shape(&scenes.body.shape, draper.trained().config.data.shape_range);
+        warn_about_shape(&scenes.body.shape, draper.trained().config.data.shape_range);
         if let Some(turn) = impossible_turn(scenes.states.iter().map(|state| &state.pose)) {
             tracing::warn!("{}: {turn}", scenes.body.pose);
         }
@@ -214,7 +216,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     staged.commit()?;
     print(arguments, &reports)?;
     let seconds = clock.elapsed().as_secs_f64();
-    say(&format!("{} draped and written in {seconds:.2} s after loading", arguments.output.display()));
+    print_status(&format!(
+        "{} draped and written in {seconds:.2} s after loading",
+        arguments.output.display()
+    ));
     Ok(())
 }
 
@@ -305,10 +310,13 @@ fn drape_all(
     bar: &ProgressBar,
 ) -> Result<Vec<Drape>, Failure> {
     let drapes = draper.drape_motion(outfit, &scenes.states, radius, |progress| match progress {
-        DrapeProgress::OnTheWay(share) if share < 1.0 => {
-            bar.set_message(format!(" · sorting out crossings, {:.0} % of the way", 100.0 * share));
+        DrapeProgress::Continuation(share) if share < 1.0 => {
+            bar.set_message(format!(
+                " · resolving intersections, {:.0} % of the continuation path",
+                100.0 * share
+            ));
         }
-        DrapeProgress::OnTheWay(_) => bar.set_message(""),
+        DrapeProgress::Continuation(_) => bar.set_message(""),
         DrapeProgress::Draped => {
             bar.set_message("");
             bar.inc(1);
@@ -322,30 +330,20 @@ fn drape_all(
     Ok(drapes)
 }
 
-fn write_json(path: &Path, value: &impl serde::Serialize) -> Result<(), Failure> {
-    let text = serde_json::to_vec_pretty(value).into_diagnostic()?;
-    atomic::write(path, &text).into_diagnostic().wrap_err_with(|| format!("cannot write {}", path.display()))
-}
-
 fn print(arguments: &Arguments, reports: &[(&str, Report)]) -> Result<(), Failure> {
-    let text = match (arguments.json, reports) {
-        (true, [(_, only)]) => serde_json::to_string_pretty(only).into_diagnostic()? + "\n",
+    match (arguments.json, reports) {
+        (true, [(_, only)]) => return print_json(only),
         (true, several) => {
-            let all: serde_json::Map<_, _> = several
-                .iter()
-                .map(|(name, report)| Ok(((*name).to_owned(), serde_json::to_value(report)?)))
-                .collect::<Result<_, serde_json::Error>>()
-                .into_diagnostic()?;
-            serde_json::to_string_pretty(&all).into_diagnostic()? + "\n"
+            return print_json(
+                &several.iter().map(|(name, report)| (name, report)).collect::<BTreeMap<_, _>>(),
+            );
         }
-        (false, [(_, only)]) => summary::tables(only),
-        (false, several) => several
-            .iter()
-            .map(|(name, report)| format!("{name}\n{}", summary::tables(report)))
-            .collect::<Vec<_>>()
-            .join("\n"),
-    };
-    print!("{text}");
+        (false, [(_, only)]) => print!("{}", summary::tables(only)),
+        (false, several) => {
+            let texts = several.iter().map(|(name, report)| format!("{name}\n{}", summary::tables(report)));
+            print!("{}", texts.collect::<Vec<_>>().join("\n"));
+        }
+    }
     Ok(())
 }
 

@@ -1,11 +1,16 @@
 //! The report of a drape as tables for the terminal.
 
-use crate::cli::table::{number, table};
+use crate::cli::table::{Cell, number, row, table};
 use crate::inference::{PhaseTimes, Report};
 use crate::score::Score;
 
-const GARMENTS: [&str; 5] = ["garment", "vertices", "triangles", "fitted", "embedding"];
-const TERMS: [&str; 5] = ["strain", "bending", "gravity", "body_collision", "repulsion"];
+const TERMS: [(&str, &str); 5] = [
+    ("strain", "strain [J]"),
+    ("bending", "bending [J]"),
+    ("gravity", "gravity [J]"),
+    ("body_collision", "collision [m³]"),
+    ("repulsion", "repulsion [1]"),
+];
 
 pub(super) fn tables(report: &Report) -> String {
     let mut parts = vec![garments(report), times(report), scores(report)];
@@ -17,41 +22,34 @@ pub(super) fn tables(report: &Report) -> String {
 }
 
 fn garments(report: &Report) -> String {
-    let rows: Vec<_> = report
-        .garments
-        .iter()
-        .map(|g| {
-            vec![
-                g.name.clone(),
-                g.vertices.to_string(),
-                g.triangles.to_string(),
-                match &g.fit {
-                    Some(fit) => format!(
-                        "yes, {} kind{} of repair",
-                        fit.repairs.len(),
-                        if fit.repairs.len() == 1 { "" } else { "s" }
-                    ),
-                    None => "no".to_owned(),
-                },
-                if g.embedding_known { "known" } else { "made" }.to_owned(),
-            ]
-        })
-        .collect();
-    table(&GARMENTS, &rows)
+    let rows = report.garments.iter().map(|g| {
+        let repairs = g.fit.as_ref().map(|fit| fit.repairs.len());
+        row! {
+            "garment" => g.name,
+            "vertices" => g.vertices,
+            "triangles" => g.triangles,
+            "fitted" => match repairs {
+                Some(1) => "yes, 1 kind of repair".to_owned(),
+                Some(count) => format!("yes, {count} kinds of repair"),
+                None => "no".to_owned(),
+            },
+            "embedding" => if g.embedding_known { "known" } else { "made" },
+        }
+    });
+    table(&rows.collect::<Vec<_>>())
 }
 
 fn times(report: &Report) -> String {
-    let names = report.milliseconds.phases().map(|(name, _)| name);
-    let head: Vec<&str> = ["time [ms]"].into_iter().chain(names).chain(["sum"]).collect();
     let row = |name: &str, times: &PhaseTimes| {
-        let numbers = times.phases().map(|(_, ms)| ms).into_iter().chain([times.total()]);
-        [name.to_owned()].into_iter().chain(numbers.map(|ms| format!("{ms:.1}"))).collect()
+        let mut row = row!["time [ms]" => name];
+        row.extend(times.phases().map(|(phase, ms)| (phase.to_string(), format!("{ms:.1}"))));
+        row.extend(row!["sum" => format!("{:.1}", times.total())]);
+        row
     };
-    let mut rows: Vec<Vec<String>> = report.garments.iter().map(|g| row(&g.name, &g.milliseconds)).collect();
     let frames = report.frames.len();
     let all = if frames > 1 { format!("all, {frames} frames") } else { "all".to_owned() };
-    rows.push(row(&all, &report.milliseconds));
-    table(&head, &rows)
+    let garments = report.garments.iter().map(|g| row(&g.name, &g.milliseconds));
+    table(&garments.chain([row(&all, &report.milliseconds)]).collect::<Vec<_>>())
 }
 
 /// Scores, and what the layers were before, are those of a motion's first frame.
@@ -61,56 +59,36 @@ fn of_first_frame(report: &Report, what: &str) -> String {
 
 fn scores(report: &Report) -> String {
     let first = of_first_frame(report, "score");
-    let head = [
-        first.as_str(),
-        "state",
-        "strain [J]",
-        "bending [J]",
-        "gravity [J]",
-        "collision [m³]",
-        "repulsion [1]",
-    ];
-    let contact = ["inside [%]", "depth [mm]", "body pairs", "self pairs"];
-    let head: Vec<&str> = head.into_iter().chain(contact).collect();
     let row = |score: &Score, state: &str, index: usize| {
         let garment = &score.garments[index];
-        let terms = TERMS.map(|term| garment.raw.get(term).map_or_else(String::new, |v| number(*v)));
-        let found = &garment.penetration;
-        let contact = [
-            format!("{:.2}", 100.0 * found.vertices_inside),
-            format!("{:.2}", found.max_depth_mm),
-            found.body_triangle_pairs.to_string(),
-            found.self_triangle_pairs.to_string(),
-        ];
-        [garment.name.clone(), state.to_owned()].into_iter().chain(terms).chain(contact).collect::<Vec<_>>()
+        let mut row = row![first => garment.name, "state" => state];
+        row.extend(TERMS.map(|(term, heading)| (heading.to_owned(), garment.raw.get(term).text())));
+        row.extend(row! {
+            "inside [%]" => 100.0 * garment.penetration.vertices_inside,
+            "depth [mm]" => garment.penetration.max_depth_mm,
+            "body pairs" => garment.penetration.body_triangle_pairs,
+            "self pairs" => garment.penetration.self_triangle_pairs,
+        });
+        row
     };
-    let rows: Vec<_> = (0..report.garments.len())
-        .flat_map(|i| [row(&report.before, "before", i), row(&report.after, "after", i)])
-        .collect();
-    table(&head, &rows)
+    let both = |i| [row(&report.before, "before", i), row(&report.after, "after", i)];
+    table(&(0..report.garments.len()).flat_map(both).collect::<Vec<_>>())
 }
 
 fn layers(report: &Report) -> String {
     let first = of_first_frame(report, "layers");
     let after = report.frames.first().map_or(&report.certificate, |frame| &frame.certificate);
-    let head = [first.as_str(), "pairs before", "after", "wrong side before [%]", "after [%]"];
     let name = |i: usize| &report.garments[i].name;
-    let rows: Vec<_> = report
-        .certificate_before
-        .layers
-        .iter()
-        .zip(&after.layers)
-        .map(|(before, after)| {
-            vec![
-                format!("{} under {}", name(before.inner), name(before.outer)),
-                before.triangle_pairs.to_string(),
-                after.triangle_pairs.to_string(),
-                format!("{:.2}", 100.0 * before.order_violations),
-                format!("{:.2}", 100.0 * after.order_violations),
-            ]
-        })
-        .collect();
-    table(&head, &rows)
+    let rows = report.certificate_before.layers.iter().zip(&after.layers).map(|(before, after)| {
+        row! {
+            first => format!("{} under {}", name(before.inner), name(before.outer)),
+            "pairs before" => before.triangle_pairs,
+            "after" => after.triangle_pairs,
+            "layer-order violations before [%]" => 100.0 * before.order_violations,
+            "after [%]" => 100.0 * after.order_violations,
+        }
+    });
+    table(&rows.collect::<Vec<_>>())
 }
 
 fn certificate(report: &Report) -> String {

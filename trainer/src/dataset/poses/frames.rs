@@ -29,7 +29,7 @@ pub struct ClipSplit {
 pub struct Window {
     /// The clip.
     pub clip: String,
-    /// Begin and end in it [s].
+    /// Begin and end in it (s).
     pub seconds: [f64; 2],
 }
 

@@ -6,7 +6,7 @@ use clothcombo_data::generate::mannequin;
 use clothcombo_physics::energy::Term;
 use clothcombo_physics::mesh::shapes::grid;
 
-/// A patch of cloth whose lowest corner has the height `low` [m].
+/// A patch of cloth whose lowest corner has the height `low` (m).
 fn patch(preprocessor: &Preprocessor, joints: &ActiveJoints, low: f64) -> Arc<PreparedGarment> {
     let flat = grid(0.2, 0.2, 4, 4);
     let positions = flat.positions().iter().map(|[x, y, z]| [*x, y + low, z + 0.15]).collect();
@@ -26,6 +26,7 @@ fn distant_garments_are_a_pair_in_the_full_graph_only() {
         binding: BindingSettings::default(),
         energy: losses.energy_settings(),
         eigen_count: 4,
+        cache: None,
     };
     let joints = ActiveJoints::named(&body, &body.joint_names).unwrap();
     // The second one begins 4 cm above the first; the third is 25 cm above that.

@@ -18,8 +18,8 @@ pub use staged::Staged;
 
 use super::{Drape, Draper, DraperError, Moment, Outfit, SourceGarment};
 use crate::picture::{BODY_COLOUR, PictureError, layer_colour};
-use clothcombo_data::format::obj::{self, MovedObj, ObjError};
-use clothcombo_data::format::{GlbError, SceneMesh, save_glb};
+use clothcombo_data::format::obj::{self, MovedObj};
+use clothcombo_data::format::{FileError, SceneMesh, save_glb};
 use miette::Diagnostic;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -65,7 +65,7 @@ pub enum OutputError {
     /// Something has come there since the start.
     #[error("while this ran, something else came: {reason}; the result is in {}", instead.display())]
     Meanwhile {
-        /// What is in the way.
+        /// What obstructs it.
         reason: Box<OutputError>,
         /// The folder that was made.
         instead: PathBuf,
@@ -88,12 +88,9 @@ pub enum OutputError {
         /// The system's reason.
         reason: std::io::Error,
     },
-    /// An OBJ file.
+    /// An OBJ or the GLB file.
     #[error(transparent)]
-    Obj(#[from] ObjError),
-    /// The GLB file.
-    #[error(transparent)]
-    Glb(#[from] GlbError),
+    File(#[from] FileError),
     /// The picture.
     #[error(transparent)]
     Picture(#[from] PictureError),
@@ -120,7 +117,7 @@ pub struct Show<'a> {
     pub all_frames: bool,
 }
 
-/// Times of writing [ms], by file.
+/// Times of writing (ms), by file.
 pub type WriteTimes = Vec<(&'static str, f64)>;
 
 /// Writes everything but the report into `folder`.
@@ -137,7 +134,7 @@ pub fn write(folder: &Path, show: &Show) -> Result<WriteTimes, OutputError> {
     let picture = || {
         timed(|| {
             crate::picture::save_png(&picture::draw(show), &folder.join("picture.png"))?;
-            if show.outfit.pieces.len() > 1 {
+            if show.outfit.garments.len() > 1 {
                 crate::picture::save_png(&picture::draw_layers(show), &folder.join("layers.png"))?;
             }
             Ok(())
@@ -166,10 +163,10 @@ fn write_frame(folder: &Path, show: &Show, drape: &Drape) -> Result<Vec<String>,
     let mut lost = Vec::new();
     let body = show.draper.body();
     obj::save(&folder.join("body.obj"), &drape.body, &body.faces, &[format!("body {}", body.name)])?;
-    for (layer, (piece, garment)) in show.outfit.pieces.iter().zip(&drape.garments).enumerate() {
-        let source = &piece.source;
+    for (layer, (garment, draped)) in show.outfit.garments.iter().zip(&drape.garments).enumerate() {
+        let source = &garment.source;
         let mut comments =
-            vec![format!("{}, layer {layer} (0 = innermost), draped on {}", piece.name, body.name)];
+            vec![format!("{}, layer {layer} (0 = innermost), draped on {}", garment.name, body.name)];
         let from = &source.garment.source;
         // Garments under CC BY ask for their author's name wherever they go.
         for (what, value) in [("source", &from.source), ("author", &from.author), ("licence", &from.licence)]
@@ -178,18 +175,18 @@ fn write_frame(folder: &Path, show: &Show, drape: &Drape) -> Result<Vec<String>,
                 comments.push(format!("{what}: {value}"));
             }
         }
-        let positions = source.in_given_order(&garment.positions);
-        let path = folder.join(format!("{}.obj", piece.name));
-        let moved = as_given(source, &positions, &piece.name, &comments).unwrap_or_else(|reason| {
+        let positions = source.in_given_order(&draped.positions);
+        let path = folder.join(format!("{}.obj", garment.name));
+        let moved = as_given(source, &positions, &garment.name, &comments).unwrap_or_else(|reason| {
             lost.push(format!(
                 "{} is written without texture coordinates, groups and materials: {reason}",
-                piece.name
+                garment.name
             ));
             None
         });
         match moved {
             Some(moved) => {
-                moved.save(folder, &piece.name).map_err(|reason| OutputError::Io { path, reason })?
+                moved.save(folder, &garment.name).map_err(|reason| OutputError::Io { path, reason })?
             }
             None => obj::save_polygons(&path, &positions, source.given.polygons(), &comments)?,
         }
@@ -230,11 +227,11 @@ fn write_scene(path: &Path, show: &Show) -> Result<(), OutputError> {
         faces: &show.draper.body().faces,
         frames: show.drapes.iter().map(|d| d.body.as_slice()).collect(),
     }];
-    for (layer, piece) in show.outfit.pieces.iter().enumerate() {
+    for (layer, garment) in show.outfit.garments.iter().enumerate() {
         meshes.push(SceneMesh {
-            name: &piece.name,
+            name: &garment.name,
             colour: layer_colour(layer),
-            faces: piece.prepared.garment.rest.faces(),
+            faces: garment.prepared.garment.rest.faces(),
             frames: show.drapes.iter().map(|d| d.garments[layer].positions.as_slice()).collect(),
         });
     }

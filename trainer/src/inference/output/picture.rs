@@ -26,7 +26,7 @@ pub(super) fn draw_layers(show: &Show) -> RgbImage {
 
 fn row<'a>(show: &'a Show, frame: usize) -> DressedRow<'a> {
     let drape = &show.drapes[frame];
-    let pieces = show.outfit.pieces.iter().zip(&drape.garments);
+    let garments = show.outfit.garments.iter().zip(&drape.garments);
     DressedRow {
         label: show
             .moments
@@ -34,7 +34,9 @@ fn row<'a>(show: &'a Show, frame: usize) -> DressedRow<'a> {
             .map_or(String::new(), |m| format!("frame {}, {:.2} s", m.frame, m.seconds)),
         body: (&drape.body, &show.draper.body().faces),
         heading: drape.heading,
-        garments: pieces.map(|(piece, g)| (&g.positions[..], piece.prepared.garment.rest.faces())).collect(),
+        garments: garments
+            .map(|(garment, g)| (&g.positions[..], garment.prepared.garment.rest.faces()))
+            .collect(),
         innermost: 0,
     }
 }

@@ -217,7 +217,7 @@ mod tests {
         assert_eq!(names(&place.path().join("a")), ["b", "note"]);
         staged().commit().unwrap();
         assert_eq!(names(&place.path().join("a/b")), ["out"]);
-        // A file in the way: what was made up to it is gone too.
+        // A file obstructs it: what was made up to it is gone too.
         assert!(matches!(
             Staged::new(&place.path().join("a/note/c/out"), false, &[]),
             Err(OutputError::Io { .. })

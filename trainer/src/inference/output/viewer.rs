@@ -27,7 +27,7 @@ const DATA: &str = "/*DATA*/";
 
 /// Stretch at the end of the strain scale.
 const STRAIN: f64 = 0.25;
-/// Ends of the scale of distances to the body [mm].
+/// Ends of the scale of distances to the body (mm).
 const GAP: [f64; 2] = [-10.0, 40.0];
 /// Most bytes of a page's scene; of a longer motion every so-manieth frame is shown.
 const MOST_BYTES: usize = 96 << 20;
@@ -46,9 +46,9 @@ fn page(show: &Show) -> Result<String, OutputError> {
         vec![pack(&mut binary, json!({ "name": "body", "colour": BODY_COLOUR, "layer": -1 }), body, |s| {
             stages.iter().map(|stage| (stage.body, still(stage))).for_each(s)
         })];
-    for (layer, piece) in show.outfit.pieces.iter().enumerate() {
-        let about = json!({ "name": piece.name, "colour": layer_colour(layer), "layer": layer });
-        meshes.push(pack(&mut binary, about, piece.prepared.garment.rest.faces(), |s| {
+    for (layer, garment) in show.outfit.garments.iter().enumerate() {
+        let about = json!({ "name": garment.name, "colour": layer_colour(layer), "layer": layer });
+        meshes.push(pack(&mut binary, about, garment.prepared.garment.rest.faces(), |s| {
             stages.iter().map(|stage| (stage.garments[layer], stage.heat[layer].clone())).for_each(s)
         }));
     }
@@ -104,7 +104,7 @@ fn stages<'a>(show: &Show<'a>) -> Result<Vec<Stage<'a>>, DraperError> {
     }
     let frames = show.drapes.len();
     let vertices: usize = show.draper.body().vertex_count()
-        + show.outfit.pieces.iter().map(|p| p.prepared.vertex_count()).sum::<usize>();
+        + show.outfit.garments.iter().map(|p| p.prepared.vertex_count()).sum::<usize>();
     let every = (8 * vertices * frames).div_ceil(MOST_BYTES).max(1);
     if every > 1 {
         tracing::info!("viewer.html shows every {every}th of {frames} frames; scene.glb holds all");
@@ -141,7 +141,7 @@ fn stage<'a>(
     };
     let crossing = crossing_vertices(show, certificate);
     let heat = garments.iter().enumerate().map(|(layer, positions)| {
-        let strain = vertex_stretch(&show.outfit.pieces[layer].prepared.garment.rest, positions);
+        let strain = vertex_stretch(&show.outfit.garments[layer].prepared.garment.rest, positions);
         let gaps: Vec<f64> =
             positions.par_iter().with_min_len(256).map(|p| surface.gap(*p, Distance::Union).gap).collect();
         let bytes = strain.iter().zip(gaps).zip(&crossing[layer]).flat_map(|((strain, gap), crosses)| {
@@ -155,11 +155,11 @@ fn stage<'a>(
 
 /// Per garment whether a vertex belongs to a triangle that intersects something.
 fn crossing_vertices(show: &Show, certificate: &Certificate) -> Vec<Vec<bool>> {
-    let pieces = &show.outfit.pieces;
+    let garments = &show.outfit.garments;
     let mut crossing: Vec<Vec<bool>> =
-        pieces.iter().map(|p| vec![false; p.prepared.vertex_count()]).collect();
+        garments.iter().map(|p| vec![false; p.prepared.vertex_count()]).collect();
     let mut mark = |garment: usize, triangle: usize| {
-        if let Some(face) = pieces[garment].prepared.garment.rest.faces().get(triangle) {
+        if let Some(face) = garments[garment].prepared.garment.rest.faces().get(triangle) {
             face.iter().for_each(|v| crossing[garment][*v as usize] = true);
         }
     };

@@ -39,6 +39,11 @@ impl TrainedModel {
         })
     }
 
+    /// Where its configuration lies.
+    pub fn config_file(&self) -> PathBuf {
+        self.folder.join(CONFIG)
+    }
+
     /// The networks, on `device`.
     ///
     /// # Errors
@@ -84,7 +89,7 @@ impl TrainedModel {
 
     /// What `config` holds out of `dataset`, its data, although these networks were trained on it, or what it keeps for the
     /// test although the validation of their run looked at it, in words: scores would be those of known garments or poses.
-    /// Only where the garments come from the same sources, or the motions from the same folder, can it be told.
+    /// Only where the garments come from the same sources, or the motions from the same folder, is that known.
     pub fn known_of_held_out(&self, config: &Config, dataset: &Dataset) -> Vec<String> {
         let mut found = Vec::new();
         let (trained, data) = (&self.config.data, &config.data);

@@ -21,7 +21,7 @@ const PER_CORRECTION: f64 = 12.0;
 const PER_JOINT: f64 = 5.0;
 /// For the energies; fitted.
 const PER_VERTEX: f64 = 300.0;
-/// What comes on top: buffers of the operation in work, gradients on their way, and gaps that the allocator leaves.
+/// The rest: buffers of the operation in work, gradients in transit, and gaps that the allocator leaves.
 const MARGIN: f64 = 1.1;
 
 /// Bytes of a scene of `stage` at its peak, whose garments have `vertices` vertices, `embedded` of them in distinct garments.

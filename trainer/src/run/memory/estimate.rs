@@ -5,7 +5,7 @@ use crate::config::{Config, StageConfig};
 use crate::dataset::sizes::{DataSizes, operator_bytes};
 use crate::dataset::{GARMENTS_AT_ONCE, SCENES_AHEAD};
 
-/// Memory a run is expected to use at its peak [bytes].
+/// Memory a run is expected to use at its peak (bytes).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MemoryEstimate {
     /// Host: program, body, list of garments, networks as they are made.

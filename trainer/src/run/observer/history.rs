@@ -12,9 +12,6 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::rc::Rc;
 
-/// What the baseline lines show: skinning of the start state, which has learned nothing.
-const BASELINE: Method = Method::StartSkinning;
-
 /// Quantities of a step besides the energies.
 const SCALARS: [&str; 8] = [
     "loss",
@@ -32,7 +29,7 @@ const SCALARS: [&str; 8] = [
 pub struct History {
     /// Steps of the curves, by quantity: the raw energies and [`SCALARS`].
     points: BTreeMap<&'static str, Vec<(f64, f64)>>,
-    /// Raw energies that skinning alone has on the validation scenes.
+    /// Raw energies on the validation scenes of the skinning that the networks start from.
     pub baselines: BTreeMap<&'static str, f64>,
     /// Validations: step and report, as in `validation.jsonl`.
     pub validations: Vec<(u64, Value)>,
@@ -107,10 +104,8 @@ impl History {
     fn note_validation(&mut self, step: u64, report: Value) {
         if self.baselines.is_empty() {
             for group in report["groups"].as_array().into_iter().flatten() {
-                let methods = group["methods"].as_array().into_iter().flatten();
-                let Some(baseline) = methods.into_iter().find(|m| m["method"] == BASELINE.name()) else {
-                    continue;
-                };
+                let methods = group["methods"].as_array().map_or(&[][..], Vec::as_slice);
+                let Some(baseline) = Method::start_of(methods) else { continue };
                 for name in terms_of(group["group"].as_str().unwrap_or_default()) {
                     if let Some(v) = baseline["raw"][name]["mean"].as_f64() {
                         self.baselines.insert(name, v);

@@ -3,7 +3,7 @@
 use super::history::SharedHistory;
 use crate::run::event::{Observer, TrainEvent};
 use crate::run::folder::RunDir;
-use crate::system::closed_pipe::tell;
+use crate::system::closed_pipe::print_stderr;
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::Report;
 use std::io::IsTerminal;
@@ -45,10 +45,10 @@ impl ProgressObserver {
     }
 
     /// Prints `text` above the bar.
-    fn say(&self, text: &str) {
+    fn print_line(&self, text: &str) {
         match &self.bar {
             Some(bar) => bar.println(text),
-            None => tell(text),
+            None => print_stderr(text),
         }
     }
 
@@ -59,7 +59,7 @@ impl ProgressObserver {
         self.last_line = Instant::now();
         let per_second = (step - self.started_at) as f64 / self.start.elapsed().as_secs_f64();
         let left = Duration::from_secs_f64((self.total - step) as f64 / per_second.max(1e-9));
-        tell(format_args!(
+        print_stderr(format_args!(
             "{} · step {step}/{} · {per_second:.1} steps/s · {} left · {}",
             self.stage,
             self.total,
@@ -110,7 +110,7 @@ impl Observer for ProgressObserver {
             }
             TrainEvent::StageStarted { name, step, steps } => {
                 self.stage = (*name).to_owned();
-                self.say(&format!("stage {name}: {steps} steps from step {step}"));
+                self.print_line(&format!("stage {name}: {steps} steps from step {step}"));
                 if let Some(bar) = &self.bar {
                     bar.set_prefix((*name).to_owned());
                 }
@@ -129,22 +129,27 @@ impl Observer for ProgressObserver {
                 }
             }
             TrainEvent::Validated { step, report, .. } => {
-                self.say(&format!("validation after step {step}\n{report}"));
+                self.print_line(&format!("validation after step {step}\n{report}"));
             }
             TrainEvent::Skipped { step, count, file } => {
                 let file = file.map(|f| format!(", scene in {}", f.display())).unwrap_or_default();
-                self.say(&format!("step {step} skipped: loss or gradient not finite ({count} lately){file}"));
+                self.print_line(&format!(
+                    "step {step} skipped: loss or gradient not finite ({count} lately){file}"
+                ));
             }
             // Dozens of them are usual where poses are hard, and clipping makes them harmless: counted, and listed in the log.
             TrainEvent::Spike { .. } | TrainEvent::CheckpointDue { .. } => {}
             TrainEvent::CheckpointSaved { path, .. } => {
                 if !self.terminal {
-                    self.say(&format!("checkpoint {}", path.display()));
+                    self.print_line(&format!("checkpoint {}", path.display()));
                 }
             }
-            TrainEvent::SampleDrawn { path } => self.say(&format!("picture {}", path.display())),
+            TrainEvent::SampleDrawn { path } => self.print_line(&format!("picture {}", path.display())),
             TrainEvent::Interrupted { step } => {
-                self.say(&format!("stopped after step {step}; continue with --resume{}", self.listed()));
+                self.print_line(&format!(
+                    "stopped after step {step}; continue with --resume{}",
+                    self.listed()
+                ));
                 if let Some(bar) = self.bar.take() {
                     bar.abandon();
                 }
@@ -158,7 +163,7 @@ impl Observer for ProgressObserver {
                 if let Some(bar) = self.bar.take() {
                     bar.finish();
                 }
-                tell(format_args!(
+                print_stderr(format_args!(
                     "finished after step {step} in {:.0} s{}",
                     self.start.elapsed().as_secs_f64(),
                     self.listed()

@@ -52,7 +52,7 @@ pub struct Page<'a> {
     pub state: RunState,
     /// The steps of the run and its stages.
     pub steps: &'a Steps,
-    /// When this page was made [s since 1970].
+    /// When this page was made (s since 1970).
     pub made: u64,
     /// Steps per second of this session.
     pub speed: Option<f64>,
@@ -64,7 +64,7 @@ pub struct Page<'a> {
     pub licences: &'a [LicenceLine],
     /// Memory expected at the start.
     pub memory: Option<MemoryEstimate>,
-    /// Most memory used so far [bytes].
+    /// Most memory used so far (bytes).
     pub peak: Option<u64>,
 }
 
@@ -162,7 +162,7 @@ impl Page<'_> {
             let _ = write!(
                 out,
                 "<table><caption>{}, {} scenes</caption><tr><th>method</th><th>total</th><th>median</th><th>strain</th>\
-                    <th>bending</th><th>gravity</th><th>inside %</th><th>&gt; 5 mm %</th><th>wrong side %</th></tr>",
+                    <th>bending</th><th>gravity</th><th>inside %</th><th>&gt; 5 mm %</th><th>layer-order violations %</th></tr>",
                 escape(name),
                 group["scenes"]
             );
@@ -180,7 +180,7 @@ impl Page<'_> {
                     number(&method["raw"]["gravity"]["mean"]),
                     percent(&method["inside"]),
                     percent(&method["deeper_than_5mm"]),
-                    percent(&method["wrong_side"]),
+                    percent(&method["order_violations"]),
                 );
             }
             out.push_str("</table>\n");

@@ -1,23 +1,24 @@
-//! Networks and optimiser: one step on prepared scenes.
+//! Networks and optimiser: forward, backward, clip, step.
 
 mod scene;
 mod workers;
 
 use crate::config::{ClipScope, OptimizerConfig, Trains};
 use crate::dataset::PreparedScene;
-use crate::inference::networks::{DrapeError, TensorStore};
+use crate::inference::tensor_store::{DrapeError, KnownEmbeddings, TensorStore};
 use crate::system::device::is_processor;
 use burn::module::Module;
 use burn::optim::{GradientsAccumulator, GradientsParams, ModuleOptimizer};
-use clothcombo_model::{ClothCombo, FusedAdam, clip_global_norm};
+use burn::tensor::Tensor;
+use clothcombo_model::{ClothCombo, FusedAdam, GarmentEmbedding, clip_global_norm};
 use clothcombo_physics::autodiff::SceneLossOutput;
-use scene::{Asked, Frozen, Work, norm_of};
-use std::time::Instant;
+use scene::SceneStep;
+use std::ops::AddAssign;
+use std::time::{Duration, Instant};
 use tracing::trace_span;
 use workers::Workers;
 
-pub use scene::StepTimes;
-pub(crate) use scene::larger;
+pub use scene::drape_states;
 
 /// Trains the networks.
 pub struct Learner {
@@ -26,40 +27,83 @@ pub struct Learner {
     clip: ClipScope,
     max_norm: Option<f64>,
     frozen: Option<Frozen>,
-    /// Scenes computed beside each other.
-    at_once: usize,
+    /// Scenes computed in parallel.
+    parallel_scenes: usize,
     workers: Workers,
 }
 
-/// Loss and gradients of scenes, before the update.
-pub struct Computed {
-    /// Their part of the weighted loss.
-    pub loss: f64,
-    /// Energies per scene and body.
-    pub scenes: Vec<Vec<SceneLossOutput>>,
-    /// Their part of the gradient, clipped already where every scene is ([`ClipScope::Scene`]); empty when nothing in the
-    /// scenes depends on what is trained.
-    pub gradients: GradientsParams,
-    /// Largest gradient norm of a scene before clipping, where every scene is clipped; else 0. Not finite if that of any
-    /// scene is not.
-    pub largest_norm: f64,
-    /// Where the time went.
-    pub times: StepTimes,
+/// The networks before a stage that freezes some, with the embeddings they made.
+struct Frozen {
+    model: ClothCombo,
+    embeddings: KnownEmbeddings,
+    /// What the stage trains.
+    while_training: Trains,
 }
 
-/// What a step found.
-pub struct StepOutcome {
-    /// Weighted loss, mean over the bodies of a scene, mean over the scenes.
+/// What one process computes of a step.
+#[derive(Clone, Copy)]
+pub struct StepInput<'a> {
+    /// Constant tensors of the garments.
+    pub tensors: &'a TensorStore,
+    /// Scenes that this process computes.
+    pub scenes: &'a [PreparedScene],
+    /// Scenes of the whole step: each weighs 1 / `total`.
+    pub total: usize,
+    /// Which networks learn.
+    pub trains: Trains,
+    /// Makes the gradient NaN, for tests of what happens then.
+    pub spoil_gradient: bool,
+}
+
+impl<'a> StepInput<'a> {
+    /// A step of `scenes` and no others.
+    pub fn whole(tensors: &'a TensorStore, scenes: &'a [PreparedScene], trains: Trains) -> Self {
+        Self { tensors, scenes, total: scenes.len(), trains, spoil_gradient: false }
+    }
+}
+
+/// What a step has computed so far: of one scene, of several, of all; before and after the update.
+#[derive(Default)]
+pub struct StepOutput {
+    /// Weighted loss: mean over the bodies of a scene, summed over scenes with their weights.
     pub loss: f64,
     /// Energies per scene and body.
     pub scenes: Vec<Vec<SceneLossOutput>>,
-    /// Global gradient norm before clipping: the largest of the scenes' where every scene is clipped, else that of their mean;
-    /// 0 when nothing in the scenes depends on what is trained.
+    /// Gradient of `loss`; empty when nothing in the scenes depends on what is trained.
+    pub gradients: GradientsParams,
+    /// Gradient norm before clipping: the largest of the scenes' where every scene is clipped ([`ClipScope::Scene`]), else that
+    /// of `gradients` once they are clipped, 0 before. NaN if that of any scene is.
     pub gradient_norm: f64,
     /// Whether the parameters were left alone because loss or gradient was not finite.
     pub skipped: bool,
     /// Where the time went.
     pub times: StepTimes,
+}
+
+/// Wall-clock time by part of a step; honest on backends that compute at once (the CPU ones). Of scenes that were computed in
+/// parallel the slowest counts.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct StepTimes {
+    /// Networks and energies.
+    pub forward: Duration,
+    /// Gradients.
+    pub backward: Duration,
+    /// Clipping, Adam, the running average.
+    pub update: Duration,
+}
+
+impl StepTimes {
+    fn total(&self) -> Duration {
+        self.forward + self.backward + self.update
+    }
+}
+
+impl AddAssign for StepTimes {
+    fn add_assign(&mut self, other: Self) {
+        self.forward += other.forward;
+        self.backward += other.backward;
+        self.update += other.update;
+    }
 }
 
 /// The optimiser of a run without any state yet.
@@ -71,14 +115,15 @@ impl Learner {
     /// Trains `model` (on a device with automatic differentiation) with `optimizer`.
     pub fn new(model: ClothCombo, optimizer: ModuleOptimizer, config: &OptimizerConfig) -> Self {
         // A GPU computes one scene after the other anyway.
-        let at_once = if model.devices().iter().all(is_processor) { rayon::current_num_threads() } else { 1 };
+        let parallel_scenes =
+            if model.devices().iter().all(is_processor) { rayon::current_num_threads() } else { 1 };
         Self {
             model,
             optimizer,
             clip: config.clip,
             max_norm: config.max_norm(),
             frozen: None,
-            at_once,
+            parallel_scenes,
             workers: Workers::default(),
         }
     }
@@ -93,106 +138,111 @@ impl Learner {
         &self.optimizer
     }
 
-    /// One optimiser step on the mean loss of `scenes`. `spoil_gradient` makes the gradient NaN, for tests of what happens
-    /// then.
+    /// A whole step of one process: forward, backward, clip, optimiser step.
     ///
     /// # Errors
     /// When a scene's tensors cannot be made.
-    pub fn step(
+    pub fn train_step(
         &mut self,
-        tensors: &TensorStore,
-        scenes: &[PreparedScene],
-        trains: Trains,
+        input: &StepInput<'_>,
         learning_rate: f64,
-        spoil_gradient: bool,
-    ) -> Result<StepOutcome, DrapeError> {
-        let computed = self.compute(tensors, scenes, scenes.len(), trains, spoil_gradient)?;
-        Ok(self.update(computed, trains, learning_rate))
+    ) -> Result<StepOutput, DrapeError> {
+        let mut output = self.forward_backward(input)?;
+        self.clip(&mut output);
+        self.step(&mut output, input.trains, learning_rate);
+        Ok(output)
     }
 
-    /// Loss and gradients of `scenes`, which are some of the `total` scenes of a step. On a processor as many of them are
-    /// computed beside each other as there are threads.
+    /// Loss and gradients. On a processor as many scenes are computed in parallel as there are threads.
     ///
     /// # Errors
     /// When a scene's tensors cannot be made.
-    pub fn compute(
-        &mut self,
-        tensors: &TensorStore,
-        scenes: &[PreparedScene],
-        total: usize,
-        trains: Trains,
-        spoil_gradient: bool,
-    ) -> Result<Computed, DrapeError> {
-        self.frozen = self.frozen.take().filter(|frozen| frozen.while_training == trains);
-        if trains.freezes() && self.frozen.is_none() {
-            self.frozen = Some(Frozen {
-                model: self.model.valid(),
-                embeddings: tensors.kept_embeddings(),
-                while_training: trains,
-            });
-        }
-        let frozen = |scene| match &self.frozen {
-            // Here, with all threads, whatever scene meets a garment first: else the last bits would depend on the order.
-            Some(Frozen { model, embeddings, .. }) => {
-                tensors.encode(model, scene, embeddings).map(|embeddings| Some((model, embeddings)))
-            }
-            None => Ok(None),
-        };
-        let asked = scenes.iter().map(|scene| Ok(Asked { scene, frozen: frozen(scene)? }));
-        let asked: Vec<Asked<'_>> = asked.collect::<Result<_, DrapeError>>()?;
-        let (clip, max_norm) = (self.clip, self.max_norm);
-        let work = Work { tensors, trains, share: 1.0 / total as f64, clip, max_norm, spoil_gradient };
-        let mut computed = Computed {
-            loss: 0.0,
-            scenes: Vec::with_capacity(scenes.len()),
-            gradients: GradientsParams::new(),
-            largest_norm: 0.0,
-            times: StepTimes::default(),
-        };
+    pub fn forward_backward(&mut self, input: &StepInput<'_>) -> Result<StepOutput, DrapeError> {
+        self.freeze(input);
+        let step = SceneStep::new(input, self.clip, self.max_norm, self.frozen.as_ref().map(|f| &f.model));
+        let jobs =
+            input.scenes.iter().map(|scene| Ok((scene, self.frozen_embeddings(input.tensors, scene)?)));
+        let jobs = jobs.collect::<Result<Vec<_>, DrapeError>>()?;
+        let mut output = StepOutput::default();
         let mut sum = GradientsAccumulator::<ClothCombo>::new();
-        for at_once in asked.chunks(self.at_once) {
-            let parts = match at_once {
-                [asked] => vec![work.compute(&self.model, asked)?],
-                several => work.compute_beside(&self.model, several, &mut self.workers)?,
+        for parallel in jobs.chunks(self.parallel_scenes) {
+            let parts = match parallel {
+                [job] => vec![step.compute(&self.model, job)?],
+                several => step.compute_in_parallel(&self.model, several, &mut self.workers)?,
             };
-            computed.times += StepTimes::longest(parts.iter().map(|part| part.times));
+            output.times +=
+                parts.iter().map(|part| part.times).max_by_key(StepTimes::total).unwrap_or_default();
             for part in parts {
-                computed.loss += part.loss;
-                computed.largest_norm = larger(computed.largest_norm, part.norm);
-                computed.scenes.push(part.bodies);
-                match part.gradients {
-                    None => {}
-                    Some(gradients) if scenes.len() == 1 => computed.gradients = gradients,
-                    Some(gradients) => sum.accumulate(&self.model, gradients),
+                output.loss += part.loss;
+                output.gradient_norm = larger(output.gradient_norm, part.gradient_norm);
+                output.scenes.extend(part.scenes);
+                if input.scenes.len() == 1 {
+                    output.gradients = part.gradients;
+                } else if !part.gradients.is_empty() {
+                    sum.accumulate(&self.model, part.gradients);
                 }
             }
         }
-        if scenes.len() > 1 {
-            computed.gradients = sum.grads();
+        if input.scenes.len() > 1 {
+            output.gradients = sum.grads();
         }
-        Ok(computed)
+        Ok(output)
     }
 
-    /// The optimiser step on gradients of the whole step.
-    pub fn update(&mut self, computed: Computed, trains: Trains, learning_rate: f64) -> StepOutcome {
-        let Computed { loss, scenes, mut gradients, largest_norm, times } = computed;
-        let mut outcome = StepOutcome { loss, scenes, gradient_norm: 0.0, skipped: !loss.is_finite(), times };
-        if gradients.is_empty() {
-            return outcome;
-        }
+    /// Scales the gradient of the whole step down to the largest norm allowed, where that is not done scene by scene.
+    pub fn clip(&self, output: &mut StepOutput) {
         let start = Instant::now();
-        outcome.gradient_norm = match self.clip {
-            ClipScope::Scene => largest_norm,
-            ClipScope::Step => trace_span!("clip")
-                .in_scope(|| norm_of(clip_global_norm(&self.model, &mut gradients, self.max_norm, 1.0))),
-        };
-        outcome.skipped = !(outcome.loss.is_finite() && outcome.gradient_norm.is_finite());
-        if !outcome.skipped {
+        if self.clip == ClipScope::Step {
+            let _span = trace_span!("clip").entered();
+            output.gradient_norm =
+                norm_of(clip_global_norm(&self.model, &mut output.gradients, self.max_norm, 1.0));
+        }
+        output.times.update += start.elapsed();
+    }
+
+    /// Moves the parameters, unless loss or gradient is not finite.
+    pub fn step(&mut self, output: &mut StepOutput, trains: Trains, learning_rate: f64) {
+        let start = Instant::now();
+        output.skipped = !(output.loss.is_finite() && output.gradient_norm.is_finite());
+        if !output.skipped && !output.gradients.is_empty() {
             let _span = trace_span!("optimiser").entered();
+            let gradients = std::mem::take(&mut output.gradients);
             let model = self.optimizer.step(learning_rate, self.model.clone(), gradients);
             self.model = if trains.freezes() { model } else { model.clamp_diffusion_times() };
         }
-        outcome.times.update += start.elapsed();
-        outcome
+        output.times.update += start.elapsed();
     }
+
+    /// Keeps the networks that the stage freezes as they are at its first step.
+    fn freeze(&mut self, input: &StepInput<'_>) {
+        self.frozen = self.frozen.take().filter(|frozen| frozen.while_training == input.trains);
+        if input.trains.freezes() && self.frozen.is_none() {
+            self.frozen = Some(Frozen {
+                model: self.model.valid(),
+                embeddings: input.tensors.kept_embeddings(),
+                while_training: input.trains,
+            });
+        }
+    }
+
+    /// What frozen networks make of the garments of `scene`. Here, with all threads, whatever scene meets a garment first: else
+    /// the last bits would depend on the order.
+    fn frozen_embeddings(
+        &self,
+        tensors: &TensorStore,
+        scene: &PreparedScene,
+    ) -> Result<Option<Vec<GarmentEmbedding>>, DrapeError> {
+        let encode = |frozen: &Frozen| tensors.encode(&frozen.model, scene, &frozen.embeddings);
+        self.frozen.as_ref().map(encode).transpose()
+    }
+}
+
+/// A gradient norm on the host; 0 of no gradient.
+fn norm_of(norm: Option<Tensor<1>>) -> f64 {
+    norm.map_or(0.0, |norm| f64::from(norm.into_scalar::<f32>()))
+}
+
+/// The larger of two norms; NaN if either is, which `f64::max` would drop.
+pub(super) fn larger(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a > b { a } else { b }
 }

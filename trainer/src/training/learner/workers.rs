@@ -1,4 +1,4 @@
-//! The processor's threads in equal shares, for work that is done beside each other.
+//! The processor's threads in equal shares, for work that is done in parallel.
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::collections::BTreeMap;

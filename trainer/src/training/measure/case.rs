@@ -1,30 +1,33 @@
-//! A made-up training run of a given size, on built-in data.
+//! A synthetic training run of a given size, on built-in data.
 
 use crate::config::{Config, ConfigError, Trains, parse};
+use serde::Serialize;
 use std::path::Path;
 
 /// Sizes of a run to measure.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Case {
     /// Vertices per garment, about.
     pub vertices: usize,
     /// Garments of every scene.
     pub layers: usize,
-    /// Width of all networks but S, whose is at most 128.
+    /// Width of all networks; that of S is at most 128.
     pub width: usize,
     /// DiffusionNet blocks.
+    #[serde(skip)]
     pub blocks: usize,
     /// Laplacian eigenpairs per garment.
     pub eigen_count: usize,
     /// Bodies per step.
     pub bodies: usize,
     /// Which networks learn.
+    #[serde(skip)]
     pub trains: Trains,
 }
 
 impl Case {
-    /// Networks of `width` with the depth and the eigenpairs that go with it: from 256 on the paper's (512: all its sizes),
-    /// below those of `configs/open.toml`.
+    /// Networks of `width`. From 256 on they have the paper's depth and eigenpairs (512: all its sizes), below those of
+    /// `configs/open.toml`.
     pub fn new(width: usize, layers: usize, vertices: usize) -> Self {
         let (blocks, eigen_count) = match width {
             0..=64 => (4, 48),
@@ -34,11 +37,11 @@ impl Case {
         Self { vertices, layers, width, blocks, eigen_count, bodies: 1, trains: Trains::All }
     }
 
-    /// The run: generated garments on the built-in body, all losses over all pairs of vertices, as printed in the paper; with
-    /// `overrides` (`a.b=value`), as of a configuration that is read.
+    /// The configuration: generated garments on the built-in body, all losses over all pairs of vertices, as printed in the
+    /// paper. `overrides` (`a.b=value`) change it as they change a file.
     ///
     /// # Errors
-    /// A size out of range or an override that is none, named.
+    /// Names the size that is out of range, or the override that is wrong.
     pub fn config(&self, overrides: &[String]) -> Result<Config, ConfigError> {
         let Self { vertices, layers, width, blocks, eigen_count, bodies, trains } = *self;
         let skinning_width = width.min(128);
@@ -75,10 +78,10 @@ impl Case {
             bodies = {bodies}
             "#
         );
-        parse(&text, Path::new("the made-up run"), overrides)
+        parse(&text, Path::new("the synthetic run"), overrides)
     }
 
-    /// The sizes that `config`, the run of this case with overrides, has in the end.
+    /// The sizes of `config`, which is the configuration of this case with overrides.
     pub fn of_config(self, config: &Config) -> Self {
         let stage = &config.stages[0];
         Self {
@@ -92,7 +95,7 @@ impl Case {
         }
     }
 
-    /// What it is, in a few words.
+    /// Its sizes as text.
     pub fn name(&self) -> String {
         let Self { vertices, layers, width, eigen_count, bodies, .. } = self;
         let several = if *bodies > 1 { format!(", {bodies} bodies") } else { String::new() };

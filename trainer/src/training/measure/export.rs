@@ -1,10 +1,11 @@
-//! A scene, the networks and what they make of it, as files for an independent implementation.
+//! A scene, the networks and their results, as files for an independent implementation.
 
-use super::subject::Subject;
+use super::benchmark_run::BenchmarkRun;
 use crate::config::Trains;
 use crate::dataset::PreparedScene;
+use crate::system::files::write_json;
 use burn::store::{ModuleSnapshot, SafetensorsStore};
-use clothcombo_data::format::{NpzWriter, atomic};
+use clothcombo_data::format::NpzWriter;
 use clothcombo_physics::energy::{SceneEnergy, Term, TermMap};
 use clothcombo_physics::mesh::Topology;
 use clothcombo_physics::operators::{SparseMatrix, surface_gradient};
@@ -13,7 +14,7 @@ use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
-/// The networks, as the names of their parameters begin.
+/// Prefixes of the parameters' names, network by network.
 const NETWORKS: [&str; 5] = ["garment_encoder", "draping", "skinning", "untangling", "corrections"];
 
 /// Writes the first scene of the stage, on the first of its bodies, into `folder`: `model.safetensors` (parameters by their
@@ -22,22 +23,20 @@ const NETWORKS: [&str; 5] = ["garment_encoder", "draping", "skinning", "untangli
 ///
 /// # Errors
 /// When a file cannot be written, or the scene cannot be draped.
-pub fn export(subject: &Subject, folder: &Path) -> Result<(), Report> {
-    let mut scene = subject.scene(0)?;
+pub fn export(run: &BenchmarkRun, folder: &Path) -> Result<(), Report> {
+    let mut scene = run.scene(0)?;
     scene.bodies.truncate(1);
     std::fs::create_dir_all(folder)
         .into_diagnostic()
         .wrap_err_with(|| format!("cannot make the folder {}", folder.display()))?;
     let mut model =
         SafetensorsStore::from_file(folder.join("model.safetensors")).overwrite(true).clear_metadata();
-    subject.model().save_into(&mut model).map_err(|error| miette!("{}: {error}", folder.display()))?;
-    arrays(subject, &scene)?.save(&folder.join("scene.npz")).into_diagnostic()?;
-    let text = serde_json::to_string_pretty(&description(subject, &scene)?).into_diagnostic()?;
-    let path = folder.join("scene.json");
-    atomic::write(&path, text.as_bytes()).into_diagnostic().wrap_err_with(|| path.display().to_string())
+    run.model().save_into(&mut model).map_err(|error| miette!("{}: {error}", folder.display()))?;
+    arrays(run, &scene)?.save(&folder.join("scene.npz")).into_diagnostic()?;
+    write_json(&folder.join("scene.json"), &description(run, &scene)?)
 }
 
-fn arrays(subject: &Subject, scene: &PreparedScene) -> Result<NpzWriter, Report> {
+fn arrays(run: &BenchmarkRun, scene: &PreparedScene) -> Result<NpzWriter, Report> {
     let body = &scene.bodies[0];
     let mut file = NpzWriter::new();
     let mut positions = |key: &str, values: &[[f32; 3]]| {
@@ -45,7 +44,7 @@ fn arrays(subject: &Subject, scene: &PreparedScene) -> Result<NpzWriter, Report>
     };
     positions("body.positions", &body.energy.body.positions);
     positions("start", &body.start);
-    let [posed, canonical] = subject.host_drape(scene)?;
+    let [posed, canonical] = run.host_drape(scene)?;
     positions("expected.posed", &posed);
     positions("expected.canonical", &canonical);
     let faces = &body.energy.body.faces;
@@ -54,7 +53,7 @@ fn arrays(subject: &Subject, scene: &PreparedScene) -> Result<NpzWriter, Report>
     file.f32("pose", &[body.pose.len()], &body.pose);
     let bones: Vec<f32> = body.bones.iter().flatten().flatten().map(|v| *v as f32).collect();
     file.f32("bones", &[body.bones.len(), 12], &bones);
-    for (layer, ((&index, garment), dressed)) in
+    for (layer, ((&index, garment), scene_garment)) in
         scene.sample.garments.iter().zip(&scene.garments).zip(&body.energy.garments).enumerate()
     {
         let key = |name: &str| format!("garment{layer}.{name}");
@@ -63,9 +62,9 @@ fn arrays(subject: &Subject, scene: &PreparedScene) -> Result<NpzWriter, Report>
         file.f64(&key("rest"), &[vertices, 3], rest.positions().as_flattened());
         file.u32(&key("faces"), &[rest.face_count(), 3], rest.faces().as_flattened());
         file.f32(&key("skin_weights"), &[vertices, joints], &garment.skin_weights);
-        let reference = &dressed.holding_reference;
+        let reference = &scene_garment.holding_reference;
         file.f32(&key("holding_reference"), &[reference.len(), 3], reference.as_flattened());
-        let operators = subject.dataset().garments.operators(index)?;
+        let operators = run.dataset().garments.operators(index)?;
         let k = operators.eigen_count;
         file.f64(&key("mass"), &[vertices], &operators.mass);
         file.f64(&key("eigenvalues"), &[k], &operators.eigenvalues);
@@ -92,9 +91,9 @@ fn triplets(matrix: &SparseMatrix) -> (Vec<u32>, Vec<u32>, Vec<f64>) {
     (rows, columns, values)
 }
 
-fn description(subject: &Subject, scene: &PreparedScene) -> Result<Value, Report> {
+fn description(run: &BenchmarkRun, scene: &PreparedScene) -> Result<Value, Report> {
     let energy = &scene.bodies[0].energy;
-    let (loss, gradients) = subject.loss_and_gradients(scene)?;
+    let (loss, gradients) = run.loss_and_gradients(scene)?;
     let squares = |values: &[f32]| values.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>();
     let norm_below = |prefix: &str| {
         let below = gradients.iter().filter(|(name, _)| name.starts_with(prefix));
@@ -106,13 +105,13 @@ fn description(subject: &Subject, scene: &PreparedScene) -> Result<Value, Report
         .garments
         .iter()
         .zip(&energy.garments)
-        .map(|(garment, dressed)| {
+        .map(|(garment, scene_garment)| {
             json!({
                 "name": garment.garment.name,
                 "vertices": garment.vertex_count(),
-                "held": dressed.energies.has_holding(),
-                "held_posed": dressed.pull_back.is_some(),
-                "weights": weights(&dressed.weights),
+                "held": scene_garment.energies.has_holding(),
+                "held_posed": scene_garment.pull_back.is_some(),
+                "weights": weights(&scene_garment.weights),
             })
         })
         .collect();
@@ -121,7 +120,7 @@ fn description(subject: &Subject, scene: &PreparedScene) -> Result<Value, Report
         .iter()
         .map(|pair| json!({ "inner": pair.inner, "outer": pair.outer, "weights": weights(&pair.weights) }))
         .collect();
-    let config = subject.config();
+    let config = run.config();
     Ok(json!({
         "model": config.model,
         "optimizer": config.optimizer,
@@ -129,8 +128,8 @@ fn description(subject: &Subject, scene: &PreparedScene) -> Result<Value, Report
         "contacts": scene.contacts,
         "layers": layers,
         "settings": settings(energy),
-        "trains": subject.trains(),
-        "alone": if subject.trains() == Trains::All { scene.alone } else { 0.0 },
+        "trains": run.trains(),
+        "single_garments": if run.trains() == Trains::All { scene.single_garments } else { 0.0 },
         "expected": { "loss": loss, "gradient_norm": norm_below(""), "gradient_norms": norms },
     }))
 }

@@ -1,11 +1,11 @@
-//! What training and draping cost: time by part of a step, time beside other implementations, memory.
+//! What training and draping cost: time by part of a step, memory, and files for comparison with other implementations.
 
+mod benchmark_run;
 mod case;
 mod export;
 mod phases;
-mod subject;
 
+pub use benchmark_run::{BenchmarkRun, Costs, Profile};
 pub use case::Case;
 pub use export::export;
 pub use phases::{OTHER, PHASES, SpanSeconds, record_phases};
-pub use subject::{Costs, Profile, Subject};

@@ -10,7 +10,7 @@ use tracing_subscriber::filter::Targets;
 use tracing_subscriber::layer::{Context, SubscriberExt};
 use tracing_subscriber::registry::LookupSpan;
 
-/// What is left of a step beside the named parts.
+/// The rest of a step.
 pub const OTHER: &str = "other";
 
 /// The parts of a step in their order: waiting for the scene, then the spans by name, then the rest.
@@ -22,7 +22,7 @@ pub const PHASES: [&str; 14] = [
     "draping",
     "skinning",
     "untangling",
-    "feeling",
+    "contact features",
     "corrections",
     "energies",
     "backward",
@@ -35,7 +35,7 @@ pub const PHASES: [&str; 14] = [
 pub type SpanSeconds = BTreeMap<&'static str, f64>;
 
 /// Runs `work` and returns how long each span of the project was entered, on this thread and on those that `work` hands its
-/// subscriber to. A span within another one counts for itself alone.
+/// subscriber to. The time of a span excludes that of the spans within it.
 pub fn record_phases<R>(work: impl FnOnce() -> R) -> (R, SpanSeconds) {
     let totals = Arc::new(Mutex::new(SpanSeconds::new()));
     let targets = Targets::new()
@@ -93,8 +93,9 @@ mod tests {
     fn a_span_within_another_one_counts_once() {
         let ((), times) = record_phases(|| {
             let _outer = tracing::trace_span!("corrections").entered();
-            tracing::trace_span!("feeling").in_scope(|| std::thread::sleep(Duration::from_millis(20)));
+            tracing::trace_span!("contact features")
+                .in_scope(|| std::thread::sleep(Duration::from_millis(20)));
         });
-        assert!(times["corrections"] >= 0.0 && times["corrections"] < times["feeling"], "{times:?}");
+        assert!(times["corrections"] >= 0.0 && times["corrections"] < times["contact features"], "{times:?}");
     }
 }

@@ -21,7 +21,7 @@ impl Engine {
         Ok(Self { communicator: universe.world(), _universe: universe })
     }
 
-    pub(super) fn share(&self) -> RankPartition {
+    pub(super) fn partition(&self) -> RankPartition {
         RankPartition { rank: self.communicator.rank() as usize, size: self.communicator.size() as usize }
     }
 

@@ -4,7 +4,7 @@ use super::Session;
 use crate::config::Config;
 use crate::dataset::{Dataset, is_fingerprint};
 use crate::evaluation::ValidationSet;
-use crate::inference::networks::TensorStore;
+use crate::inference::tensor_store::TensorStore;
 use crate::run::checkpoint::{Checkpoint, CheckpointState, TrainedModel};
 use crate::run::folder::{RunDir, differing_keys};
 use crate::training::average::Average;
@@ -93,7 +93,7 @@ impl Session {
         let changed = differing_keys(&checkpoint.config()?, &config);
         let is_comparable = !changed.iter().any(|key| scores.iter().any(|part| key.starts_with(part)));
         let best = found.best.filter(|_| is_comparable);
-        // What was changed may be the mend for what went wrong before.
+        // What was changed may have fixed what went wrong before.
         let incidents = if changed.is_empty() { found.incidents.clone() } else { Vec::new() };
         let found = CheckpointState { best, incidents, ..found.clone() };
         Ok(Self::assemble(run, config, dataset, &device, learner, average, &found))
@@ -115,12 +115,14 @@ impl Session {
             guard: Guard::new(config.guard.clone(), &state.incidents),
             best: state.best,
             step: state.step,
+            saved_step: state.step,
+            owes_checkpoint: false,
             config: Arc::new(config),
             run,
             dataset,
             learner,
             average,
-            world: Rc::default(),
+            group: Rc::default(),
         }
     }
 }

@@ -4,19 +4,19 @@ use super::*;
 use crate::contact::TriangleTree;
 use crate::mesh::TriMesh;
 use crate::mesh::shapes;
+use crate::transform::IDENTITY;
 use crate::vec3::{add, norm};
+use std::sync::Arc;
 use std::time::Duration;
 
-const IDENTITY: Transform = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
-
 /// A knee that rises through a sheet that does not know of it: half a metre long at `size` 0.5, in the plane y = 0.
-fn rising(size: f64) -> (TriMesh, impl Fn(f64) -> Result<Waypoint, ResolveError>) {
+fn rising(size: f64) -> (TriMesh, impl Fn(f64) -> Result<PathSample, ResolveError>) {
     let grid = shapes::irregular_grid(size, size, 24, 24, 0.25, 4);
     let sheet = shapes::mapped(&grid, |[x, y, _]| [y - 0.5 * size, 0.0, x - 0.5 * size]);
     let (ball, draped) = (shapes::icosphere(0.08, 3), sheet.positions().to_vec());
     let stage_at = move |share: f64| {
         let knee = shapes::mapped(&ball, |p| add(p, [0.0, 0.18 * share - 0.1, 0.0]));
-        Ok(Waypoint {
+        Ok(PathSample {
             body: Arc::new(Surface::from_mesh(&knee)),
             draped: vec![draped.clone()],
             skinned: vec![draped.clone()],
@@ -27,12 +27,12 @@ fn rising(size: f64) -> (TriMesh, impl Fn(f64) -> Result<Waypoint, ResolveError>
 }
 
 /// Where a way starts that has no crossing yet.
-fn untouched(stage: Waypoint, positions: Vec<Vec<[f64; 3]>>) -> Reached {
-    let Waypoint { draped, transforms, .. } = stage;
+fn untouched(stage: PathSample, positions: Vec<Vec<[f64; 3]>>) -> Reached {
+    let PathSample { draped, transforms, .. } = stage;
     Reached { draped, positions, transforms, crossings: 0 }
 }
 
-fn end<E>(stage_at: &impl Fn(f64) -> Result<Waypoint, E>) -> Waypoint {
+fn end<E>(stage_at: &impl Fn(f64) -> Result<PathSample, E>) -> PathSample {
     stage_at(1.0).unwrap_or_else(|_| unreachable!("made without errors"))
 }
 
@@ -148,7 +148,7 @@ fn errors_of_a_stage_come_back() {
     let first = stage_at(0.0).unwrap();
     let body = first.body.clone();
     let start = untouched(first, vec![sheet.positions().to_vec()]);
-    let broken = |_: f64| Err::<Waypoint, _>(ResolveError::EmptyBody);
+    let broken = |_: f64| Err::<PathSample, _>(ResolveError::EmptyBody);
     assert!(resolve_after(start, &body, &layers, &ResolveSettings::default(), broken).is_err());
 }
 

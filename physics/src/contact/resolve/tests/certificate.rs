@@ -1,6 +1,8 @@
 //! What a certificate counts.
 
 use super::*;
+use crate::contact::resolve::body::with_drawn;
+use crate::contact::resolve::count::certified;
 
 /// Depths under the body and under inner layers are counted apart.
 #[test]

@@ -3,12 +3,17 @@
 use super::super::Layer;
 use super::super::obstacle::BodyObstacle;
 use super::super::outfit::Outfit;
-use super::smoothed;
 use crate::contact::self_triangle_pairs;
+use crate::vec3::{add, add_scaled, scale, sub};
 
-/// How far around crossings cloth is laid out [m]: farther where some are left.
+/// Sweeps of the smoothing…
+const SWEEPS: usize = 100;
+/// …and its over-relaxation.
+const OVER: f64 = 1.7;
+
+/// How far around crossings cloth is laid out (m): farther where some are left.
 const REACH: [f64; 3] = [0.03, 0.06, 0.12];
-/// Crossings so near to those of the skinned garment, and to others where the body is pinched, are left [m]: in a closed crease
+/// Crossings so near to those of the skinned garment, and to others where the body is pinched, are left (m): in a closed crease
 /// skinning folds cloth as well, and is of no help.
 const CREASE: f64 = 0.06;
 /// A place is laid out if at most this share of its crossings is left.
@@ -52,7 +57,7 @@ struct Cloth<'a> {
     skinned: &'a [[f64; 3]],
     /// Vertices in a closed crease: they are left, since skinning folds the garment there as well.
     is_in_crease: Vec<bool>,
-    /// Strain energy of the drape [J].
+    /// Strain energy of the drape (J).
     energy: f64,
     /// Crossings of the drape outside of creases…
     found: Vec<(u32, u32)>,
@@ -115,7 +120,7 @@ impl<'a> Cloth<'a> {
         pairs
     }
 
-    /// Lays out what is left within `reach` [m] of crossings.
+    /// Lays out what is left within `reach` (m) of crossings.
     fn lay_out(&mut self, reach: f64) {
         self.seeds.extend(corners(&self.left, self.faces()));
         let around = self.outfit.neighbourhood(&self.seeds, rings(self.outfit, reach));
@@ -181,7 +186,7 @@ fn take(positions: &mut [[f64; 3]], place: &[u32], from: &[[f64; 3]]) {
     place.iter().for_each(|&v| positions[v as usize] = from[v as usize]);
 }
 
-/// Rings of neighbours that reach about so far [m] in the lone garment of `outfit`.
+/// Rings of neighbours that reach about so far (m) in the lone garment of `outfit`.
 fn rings(outfit: &Outfit<'_>, reach: f64) -> usize {
     let lengths = &outfit.layers[0].garment.edge_lengths;
     let mean = lengths.iter().sum::<f64>() / lengths.len() as f64;
@@ -229,4 +234,23 @@ fn places(outfit: &Outfit<'_>, region: &[u32]) -> Vec<Vec<u32>> {
         places.push(place);
     }
     places
+}
+
+/// The lone garment of `outfit` with what it adds to `skinned` harmonic in `region`: over-relaxed Gauss–Seidel in a fixed order.
+pub(super) fn smoothed(outfit: &Outfit<'_>, skinned: &[[f64; 3]], region: &[u32]) -> Vec<[f64; 3]> {
+    let mut positions = outfit.layers[0].positions.to_vec();
+    let mut added: Vec<[f64; 3]> = positions.iter().zip(skinned).map(|(p, s)| sub(*p, *s)).collect();
+    for _ in 0..SWEEPS {
+        for &v in region {
+            let ring = outfit.ring(v);
+            let share = 1.0 / ring.len().max(1) as f64;
+            let mean = scale(ring.fold([0.0; 3], |sum, n| add(sum, added[n as usize])), share);
+            let now = added[v as usize];
+            added[v as usize] = add_scaled(now, OVER, sub(mean, now));
+        }
+    }
+    for &v in region {
+        positions[v as usize] = add(skinned[v as usize], added[v as usize]);
+    }
+    positions
 }

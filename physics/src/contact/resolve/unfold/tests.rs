@@ -6,7 +6,7 @@ use super::super::{ResolveSettings, Resolved, RestGarment, certify};
 use super::places::STRAINED;
 use super::*;
 use crate::mesh::{TriMesh, shapes};
-use crate::vec3::norm;
+use crate::vec3::{add_scaled, norm, sub};
 
 /// A sheet of 40 cm in the plane y = 0, around the origin.
 fn sheet() -> TriMesh {

@@ -6,17 +6,17 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use super::ResolveSettings;
-use super::contact::Contact;
+use super::contact::{Contact, Plane};
 use super::detect::Crossings;
-use super::obstacle::{BodyObstacle, Plane};
+use super::obstacle::BodyObstacle;
 use super::outfit::Outfit;
 use super::over::{Over, all_over, outward};
 use super::sides::Sides;
-use crate::contact::intersections::{KeptTree, TriangleTree};
+use super::{Layer, ResolveSettings};
+use crate::query::triangle_tree::{KeptTree, TriangleTree};
 use crate::vec3::dot;
 
-/// A half-space is remembered for a vertex that is nearer to it than this [m], or too close: smoothing may carry it there.
+/// A half-space is remembered for a vertex that is nearer to it than this (m), or too close: smoothing may carry it there.
 const WATCH: f64 = 0.01;
 /// Rounds without progress after which an outfit is left as it is.
 const PATIENCE: usize = 8;
@@ -39,7 +39,7 @@ pub(super) struct Untangling<'a> {
     /// The shape that displacements are measured from: the input, with its crumples smoothed.
     shape: Vec<[f64; 3]>,
     pub positions: Vec<[f64; 3]>,
-    /// Distance of every vertex to the body's exposed surface, without sign [m].
+    /// Distance of every vertex to the body's exposed surface, without sign (m).
     far: Vec<f64>,
     /// What the body leaves to it; none where the body is pinched.
     planes: Vec<Option<Plane>>,
@@ -176,7 +176,7 @@ impl<'a> Untangling<'a> {
         (self.crossings.count() + wrong, wrong)
     }
 
-    /// Up to which distance half-spaces and sheets are remembered [m].
+    /// Up to which distance half-spaces and sheets are remembered (m).
     fn watch(&self) -> f64 {
         WATCH.max(self.settings.trigger * self.settings.gap)
     }
@@ -264,5 +264,46 @@ impl<'a> Untangling<'a> {
     /// Pairs of garments with themselves that are left.
     pub fn own_crossings(&self) -> usize {
         self.crossings.own.len()
+    }
+}
+
+/// What untangling left.
+#[derive(Clone, Default)]
+pub(super) struct Untangled {
+    pub positions: Vec<Vec<[f64; 3]>>,
+    pub rounds: usize,
+    /// Pairs with the body where it is drawn and between garments, but for pinched ones.
+    pub crossings: usize,
+    /// Pairs with the body, where it gives way too.
+    pub with_body: usize,
+    /// Pairs of garments with themselves; on a way pinched ones too.
+    pub own: usize,
+}
+
+pub(super) fn untangled(
+    body: &BodyObstacle<'_>,
+    layers: &[Layer<'_>],
+    settings: &ResolveSettings,
+) -> Untangled {
+    untangled_keeping(None, body, layers, settings)
+}
+
+/// [`untangled`] where the order of sheets is known from a step before.
+pub(super) fn untangled_keeping(
+    sides: Option<&Sides>,
+    body: &BodyObstacle<'_>,
+    layers: &[Layer<'_>],
+    settings: &ResolveSettings,
+) -> Untangled {
+    let outfit = Outfit::new(layers);
+    let mut untangling = Untangling::new(&outfit, body, settings, sides);
+    let rounds = untangling.run();
+    let positions = (0..outfit.len()).map(|g| outfit.part(&untangling.positions, g).to_vec()).collect();
+    Untangled {
+        positions,
+        rounds,
+        crossings: untangling.crossings(),
+        with_body: untangling.body_crossings(),
+        own: untangling.own_crossings(),
     }
 }

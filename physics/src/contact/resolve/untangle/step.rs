@@ -7,7 +7,7 @@ use super::super::relax::{LastPasses, no_farther, relax};
 use super::Untangling;
 use crate::vec3::{add, add_scaled, dot, norm, scale, sub};
 
-/// No contact asks for a longer step than this in a round [m].
+/// No contact asks for a longer step than this in a round (m).
 const LONGEST_STEP: f64 = 0.02;
 
 impl Untangling<'_> {
@@ -70,7 +70,7 @@ impl Untangling<'_> {
             }
         };
         let (sweeps, stretch) = (self.settings.sweeps, self.stretch);
-        relax(outfit, &mut self.positions, &self.shape, &region, &contacts, sweeps, stretch, last);
+        relax(outfit, &mut self.positions, &self.shape, &region, &contacts, stretch, (sweeps, last));
         self.hold_back(&region);
         self.touch(&region);
     }

@@ -3,20 +3,18 @@ use std::sync::Arc;
 use super::*;
 use crate::mesh::shapes;
 use crate::query::Surface;
-use crate::transform::Transform;
-
-const IDENTITY: Transform = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
+use crate::transform::IDENTITY;
 
 #[test]
 fn changes_turn_with_the_skinning_and_fade() {
     let quarter = [[0.0, -1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
-    let stage = |drape: [f64; 3], transform| Waypoint {
+    let stage = |drape: [f64; 3], transform| PathSample {
         body: Arc::new(Surface::from_mesh(&shapes::tetrahedron())),
         draped: vec![vec![drape]],
         skinned: vec![vec![drape]],
         transforms: vec![transform],
     };
-    let Waypoint { draped, transforms, .. } = stage([1.0, 0.0, 0.0], IDENTITY);
+    let PathSample { draped, transforms, .. } = stage([1.0, 0.0, 0.0], IDENTITY);
     let reached = Reached { draped, positions: vec![vec![[1.2, 0.0, 0.4]]], transforms, crossings: 0 };
     let next = stage([0.0, 1.0, 0.0], quarter);
     let found = carried(&reached, &next, 0.5)[0][0];

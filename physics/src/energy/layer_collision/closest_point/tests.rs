@@ -1,8 +1,9 @@
 //! The closest-point form against brute force, and where the paper's form jumps. Its gradient and its curvature are checked with
 //! all others.
 
-use super::super::{InnerGarment, LayerContact};
+use super::super::InnerLayer;
 use super::*;
+use crate::energy::LayerContact;
 use crate::mesh::shapes::{self, SplitMix};
 use crate::query::brute_force;
 use crate::vec3::norm;
@@ -13,8 +14,8 @@ fn settings() -> EnergySettings {
     EnergySettings { layer_collision_epsilon: EPSILON, ..EnergySettings::default() }
 }
 
-fn garment(mesh: &TriMesh) -> InnerGarment {
-    InnerGarment::new(mesh, &Topology::new(mesh), mesh.median_edge_length())
+fn garment(mesh: &TriMesh) -> InnerLayer {
+    InnerLayer::new(mesh, &Topology::new(mesh), mesh.median_edge_length())
 }
 
 #[test]

@@ -1,0 +1,296 @@
+//! Biovision hierarchy (BVH) motion capture: a joint tree with rest offsets, and channel values per frame.
+
+use crate::asset::motion::{MAX_ANGLE, check_frame_rate};
+use crate::asset::rotation::{self, Matrix3};
+use crate::format::FileError;
+use std::fs;
+use std::path::Path;
+
+/// One motion channel: which axis, and whether it moves or turns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Channel {
+    /// 0, 1, 2 for x, y, z.
+    pub axis: usize,
+    /// Turn (degrees) or move (file units).
+    pub rotates: bool,
+}
+
+/// One joint of the tree.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BvhJoint {
+    /// Name in the file.
+    pub name: String,
+    /// Parent, before this one in the list.
+    pub parent: Option<usize>,
+    /// Rest offset from the parent (file units).
+    pub offset: [f64; 3],
+    /// Its channels in file order.
+    pub channels: Vec<Channel>,
+}
+
+/// A parsed file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bvh {
+    /// Joints, parents first.
+    pub joints: Vec<BvhJoint>,
+    /// Seconds per frame.
+    pub frame_time: f64,
+    channel_count: usize,
+    values: Vec<f64>,
+}
+
+/// Deeper trees than any skeleton are damage.
+const DEEPEST_TREE: usize = 256;
+
+struct Words<'a> {
+    words: Vec<(usize, &'a str)>,
+    at: usize,
+    path: &'a Path,
+}
+
+impl<'a> Words<'a> {
+    fn error(&self, message: String) -> FileError {
+        let line =
+            self.words.get(self.at.saturating_sub(1)).or(self.words.last()).map_or(1, |(line, _)| *line);
+        FileError::line(self.path, line)(message)
+    }
+
+    fn next(&mut self, expected: &str) -> Result<&'a str, FileError> {
+        let word = self.words.get(self.at).map(|(_, word)| *word);
+        self.at += 1;
+        word.ok_or_else(|| self.error(format!("the file ends where {expected} should be")))
+    }
+
+    fn peek(&self) -> Option<&'a str> {
+        self.words.get(self.at).map(|(_, word)| *word)
+    }
+
+    fn expect(&mut self, expected: &str) -> Result<(), FileError> {
+        let word = self.next(&format!("'{expected}'"))?;
+        if word.eq_ignore_ascii_case(expected) {
+            return Ok(());
+        }
+        Err(self.error(format!("expected '{expected}', found '{word}'")))
+    }
+
+    fn number(&mut self, what: &str) -> Result<f64, FileError> {
+        let word = self.next(what)?;
+        match word.parse::<f64>() {
+            Ok(x) if x.is_finite() => Ok(x),
+            _ => Err(self.error(format!("'{word}' is not a finite number ({what})"))),
+        }
+    }
+
+    fn offset(&mut self) -> Result<[f64; 3], FileError> {
+        self.expect("OFFSET")?;
+        Ok([self.number("an offset")?, self.number("an offset")?, self.number("an offset")?])
+    }
+}
+
+impl Bvh {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// [`FileError`] naming file and line.
+    pub fn load(path: &Path) -> Result<Self, FileError> {
+        let bytes = fs::read(path).map_err(FileError::io(path))?;
+        Self::parse(&String::from_utf8_lossy(&bytes), path)
+    }
+
+    /// Parses BVH text; `path` is for messages only. A last frame that is not whole is dropped.
+    ///
+    /// # Errors
+    /// [`FileError`] naming file and line.
+    pub fn parse(text: &str, path: &Path) -> Result<Self, FileError> {
+        let lines = text.lines().enumerate();
+        let words = lines
+            .flat_map(|(n, line)| line.split_ascii_whitespace().map(move |word| (n + 1, word)))
+            .collect();
+        let mut words = Words { words, at: 0, path };
+        words.expect("HIERARCHY")?;
+        words.expect("ROOT")?;
+        let mut joints = Vec::new();
+        read_joint(&mut words, &mut joints, None, 0)?;
+        words.expect("MOTION")?;
+        words.expect("Frames:")?;
+        // Real files are off by one: the frames that are there count.
+        words.number("the number of frames")?;
+        words.expect("Frame")?;
+        words.expect("Time:")?;
+        let frame_time = words.number("the frame time")?;
+        if frame_time <= 0.0 {
+            return Err(words.error(format!("frame time {frame_time} is not positive")));
+        }
+        check_frame_rate(1.0 / frame_time)
+            .map_err(|defect| words.error(format!("a frame time of {frame_time:?} s means {defect}")))?;
+        let channel_count: usize = joints.iter().map(|j: &BvhJoint| j.channels.len()).sum();
+        let mut values = read_values(&mut words, &joints)?;
+        if channel_count == 0 || values.len() < channel_count {
+            return Err(
+                words.error(format!("no whole frame: {} values for {channel_count} channels", values.len()))
+            );
+        }
+        values.truncate(values.len() / channel_count * channel_count);
+        Ok(Self { joints, frame_time, channel_count, values })
+    }
+
+    /// Number of whole frames in the file.
+    pub fn frame_count(&self) -> usize {
+        self.values.len() / self.channel_count.max(1)
+    }
+
+    /// Index of a joint by name.
+    pub fn joint(&self, name: &str) -> Option<usize> {
+        self.joints.iter().position(|j| j.name == name)
+    }
+
+    /// Rest position of every joint: offsets summed from the root, no rotation.
+    pub fn rest_positions(&self) -> Vec<[f64; 3]> {
+        let mut rest: Vec<[f64; 3]> = Vec::with_capacity(self.joints.len());
+        for joint in &self.joints {
+            let parent = joint.parent.map_or([0.0; 3], |p| rest[p]);
+            rest.push(std::array::from_fn(|a| parent[a] + joint.offset[a]));
+        }
+        rest
+    }
+
+    /// World rotation of every joint in one frame: channel rotations multiplied in file order, down the tree. A frame past the
+    /// end is at rest.
+    pub fn world_rotations(&self, frame: usize) -> Vec<Matrix3> {
+        let start = frame.saturating_mul(self.channel_count);
+        let values = self.values.get(start..start.saturating_add(self.channel_count)).unwrap_or_default();
+        let mut values = values.iter();
+        let mut world: Vec<Matrix3> = Vec::with_capacity(self.joints.len());
+        for joint in &self.joints {
+            let mut rotation = joint.parent.map_or(rotation::IDENTITY, |p| world[p]);
+            for channel in &joint.channels {
+                let value = values.next().copied().unwrap_or(0.0);
+                if channel.rotates {
+                    let mut turn = [0.0; 3];
+                    turn[channel.axis] = value.to_radians();
+                    rotation = rotation::product(&rotation, &rotation::matrix_from_axis_angle(turn));
+                }
+            }
+            world.push(rotation);
+        }
+        world
+    }
+}
+
+/// The channel values of all frames. Angles no motion has are refused: their sines mean nothing.
+fn read_values(words: &mut Words, joints: &[BvhJoint]) -> Result<Vec<f64>, FileError> {
+    let limit = MAX_ANGLE.to_degrees();
+    let channels: Vec<(&str, bool)> =
+        joints.iter().flat_map(|j| j.channels.iter().map(|c| (j.name.as_str(), c.rotates))).collect();
+    let mut values = Vec::with_capacity(words.words.len().saturating_sub(words.at));
+    while words.peek().is_some() {
+        let value = words.number("a channel value")?;
+        if let Some((name, true)) = channels.get(values.len() % channels.len().max(1))
+            && value.abs() > limit
+        {
+            return Err(words.error(format!(
+                "joint '{name}' turns by {value:?} degrees, more than the {limit:.0} of any motion; is the file damaged?"
+            )));
+        }
+        values.push(value);
+    }
+    Ok(values)
+}
+
+fn read_joint(
+    words: &mut Words,
+    joints: &mut Vec<BvhJoint>,
+    parent: Option<usize>,
+    depth: usize,
+) -> Result<(), FileError> {
+    if depth > DEEPEST_TREE {
+        return Err(words.error(format!("the joint tree is deeper than {DEEPEST_TREE}")));
+    }
+    let name = words.next("a joint name")?.to_string();
+    words.expect("{")?;
+    let offset = words.offset()?;
+    let mut channels = Vec::new();
+    if words.peek().is_some_and(|w| w.eq_ignore_ascii_case("CHANNELS")) {
+        words.at += 1;
+        let count = words.number("the number of channels")?;
+        if !(0.0..=6.0).contains(&count) {
+            return Err(words.error(format!("{count} channels; a joint has at most 6")));
+        }
+        for _ in 0..count as usize {
+            let word = words.next("a channel")?;
+            let axis =
+                word.bytes().next().and_then(|c| b"XYZ".iter().position(|x| *x == c.to_ascii_uppercase()));
+            let lower = word.to_ascii_lowercase();
+            let rotates = lower.ends_with("rotation");
+            let Some(axis) = axis.filter(|_| rotates || lower.ends_with("position")) else {
+                return Err(words.error(format!("'{word}' is not a channel, for example Xrotation")));
+            };
+            channels.push(Channel { axis, rotates });
+        }
+    }
+    let index = joints.len();
+    joints.push(BvhJoint { name, parent, offset, channels });
+    loop {
+        match words.next("'}'")? {
+            "}" => return Ok(()),
+            w if w.eq_ignore_ascii_case("JOINT") => read_joint(words, joints, Some(index), depth + 1)?,
+            w if w.eq_ignore_ascii_case("End") => {
+                words.expect("Site")?;
+                words.expect("{")?;
+                words.offset()?;
+                words.expect("}")?;
+            }
+            other => return Err(words.error(format!("expected JOINT, End Site or '}}', found '{other}'"))),
+        }
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    pub(crate) const SMALL: &str = "HIERARCHY\nROOT Hips\n{\n OFFSET 0 1 0\n CHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation Xrotation\n JOINT Chest\n {\n  OFFSET 0 2 0\n  CHANNELS 3 Zrotation Xrotation Yrotation\n  End Site\n  {\n   OFFSET 0 1 0\n  }\n }\n}\nMOTION\nFrames: 1\nFrame Time: 0.0083333\n0 0 0 90 0 0 0 90 0\n5 5 5 0 90 0 0 0 0\n";
+
+    fn parse(text: &str) -> Result<Bvh, String> {
+        Bvh::parse(text, Path::new("walk.bvh")).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn reads_tree_and_all_frames_there_are() {
+        let bvh = parse(SMALL).unwrap();
+        assert_eq!(bvh.frame_count(), 2);
+        assert_eq!(bvh.joints[1].parent, Some(0));
+        assert_eq!(bvh.rest_positions(), [[0.0, 1.0, 0.0], [0.0, 3.0, 0.0]]);
+        // Only angles have a limit.
+        assert!(parse(&SMALL.replace("5 5 5", "5 1e6 5")).is_ok());
+    }
+
+    #[test]
+    fn rotations_follow_the_channel_order_down_the_tree() {
+        let bvh = parse(SMALL).unwrap();
+        let world = bvh.world_rotations(0);
+        let close = |a: [f64; 3], b: [f64; 3]| a.iter().zip(b).all(|(x, y)| (x - y).abs() < 1e-12);
+        assert!(close(rotation::apply(&world[0], [1.0, 0.0, 0.0]), [0.0, 1.0, 0.0]));
+        // Chest turns 90° about its own x inside the turned hips: y → z, then the hips leave z.
+        assert!(close(rotation::apply(&world[1], [0.0, 1.0, 0.0]), [0.0, 0.0, 1.0]));
+        assert!(close(rotation::apply(&bvh.world_rotations(1)[0], [0.0, 0.0, 1.0]), [1.0, 0.0, 0.0]));
+    }
+
+    #[test]
+    fn defects_name_their_line() {
+        for (text, line, part) in [
+            (SMALL.replace("0 2 0", "0 x 0"), 8, "'x' is not a finite number"),
+            (SMALL.replace("Yrotation Xrotation\n", "Yrotation Wrotation\n"), 5, "not a channel"),
+            (SMALL.replace("Frame Time: 0.0083333", "Frame Time: 0"), 18, "not positive"),
+            (SMALL.replace("Frame Time: 0.0083333", "Frame Time: 1e-320"), 18, "expected 0.01 to 10000"),
+            (SMALL.replace("Frame Time: 0.0083333", "Frame Time: 1e300"), 18, "expected 0.01 to 10000"),
+            (SMALL.replace("90 0 0 0 90 0", "90 0 0 0 nan 0"), 19, "'nan'"),
+            (SMALL.replace("90 0 0 0 90 0", "90 0 0 0 9e20 0"), 19, "joint 'Chest' turns by"),
+            (SMALL.split("MOTION").next().unwrap().into(), 15, "the file ends"),
+            (SMALL.replace("CHANNELS 6", "CHANNELS 999999999"), 5, "at most 6"),
+        ] {
+            let message = parse(&text).unwrap_err();
+            assert!(message.starts_with(&format!("walk.bvh:{line}:")) && message.contains(part), "{message}");
+        }
+    }
+}

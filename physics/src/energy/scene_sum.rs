@@ -1,0 +1,262 @@
+//! The weighted sum of all energies of a scene, with its gradient.
+
+use rayon::prelude::*;
+
+use super::elements::GRAIN;
+use super::layer_collision::PosedInnerLayer;
+use super::layer_distance::{BodyBuckets, LayerGaps, layer_distance};
+use super::{GarmentState, SceneEnergy, SceneLayers, Term, TermMap, Weighted};
+use crate::query::Gap;
+use crate::real::Real;
+use crate::vec3;
+
+/// Values and gradients of a [`SceneEnergy`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct SceneValue<T> {
+    /// `Σ weight·raw`.
+    pub total: f64,
+    /// `∂total/∂posed` `[ΣV, 3]`; empty if no gradient was asked for.
+    pub posed_gradient: Vec<[T; 3]>,
+    /// `∂total/∂canonical` `[ΣV, 3]`; empty if no gradient was asked for.
+    pub canonical_gradient: Vec<[T; 3]>,
+    /// Raw value of every term of every garment; `None`: not evaluated.
+    pub garments: Vec<TermMap<Option<f64>>>,
+    /// Raw value of every layer term of every pair; `None`: not evaluated.
+    pub layers: Vec<TermMap<Option<f64>>>,
+}
+
+/// `Σ weight·raw` over the terms that were evaluated.
+pub fn weighted(weights: &TermMap<f64>, raw: &TermMap<Option<f64>>) -> f64 {
+    let terms = raw.iter().filter(|(term, _)| weights[*term] != 0.0);
+    terms.filter_map(|(term, value)| value.map(|v| weights[term] * v)).sum()
+}
+
+/// Which terms a run evaluates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Selection {
+    /// Those with a weight.
+    Weighted,
+    /// All that there is input for.
+    All,
+}
+
+/// What several terms share of a garment at its present positions.
+pub(super) struct Shared<'a, T: Real> {
+    state: GarmentState<'a, T>,
+    gaps: Vec<Gap<T>>,
+    buckets: Option<BodyBuckets>,
+    as_inner: Option<PosedInnerLayer<T>>,
+}
+
+impl<T: Real> Shared<'_, T> {
+    pub fn state(&self) -> GarmentState<'_, T> {
+        GarmentState { gaps: &self.gaps, ..self.state }
+    }
+
+    fn layer_gaps(&self) -> Option<LayerGaps<'_, T>> {
+        self.buckets.as_ref().map(|buckets| LayerGaps { gaps: &self.gaps, buckets })
+    }
+}
+
+/// Raw values of one pair and its weighted gradients at the inner and the outer garment.
+struct PairValue<T> {
+    raw: TermMap<Option<f64>>,
+    gradients: Option<[Vec<[T; 3]>; 2]>,
+}
+
+impl<T: Real> SceneEnergy<T> {
+    /// Value and gradient of the weighted sum. Terms of weight 0 are not evaluated.
+    ///
+    /// `posed` and `canonical` hold the vertices of all garments in order, `[ΣV, 3]` (m); `canonical` may be empty when no
+    /// garment is held with a weight ([`needs_canonical`](Self::needs_canonical)).
+    ///
+    /// # Panics
+    /// If a length is not that of the scene, or a scene does not pass [`check`](Self::check): these are errors of the
+    /// calling code, not of its input.
+    pub fn evaluate(&self, posed: &[[T; 3]], canonical: &[[T; 3]]) -> SceneValue<T> {
+        self.run(posed, canonical, Selection::Weighted, true)
+    }
+
+    /// The same value, without gradients.
+    ///
+    /// # Panics
+    /// As [`evaluate`](Self::evaluate).
+    pub fn value(&self, posed: &[[T; 3]], canonical: &[[T; 3]]) -> SceneValue<T> {
+        self.run(posed, canonical, Selection::Weighted, false)
+    }
+
+    /// All raw values, whatever the weights, without gradients: what a score reports. A garment that is not held has no
+    /// holding energy, and none has one if `canonical` is empty.
+    ///
+    /// # Panics
+    /// As [`evaluate`](Self::evaluate).
+    pub fn raw(&self, posed: &[[T; 3]], canonical: &[[T; 3]]) -> SceneValue<T> {
+        self.run(posed, canonical, Selection::All, false)
+    }
+
+    fn run(
+        &self,
+        posed: &[[T; 3]],
+        canonical: &[[T; 3]],
+        selection: Selection,
+        with_gradient: bool,
+    ) -> SceneValue<T> {
+        let count = self.vertex_count();
+        assert_eq!(posed.len(), count, "posed positions of all garments of the scene");
+        assert!(
+            canonical.len() == count
+                || canonical.is_empty() && (selection == Selection::All || !self.needs_canonical()),
+            "{} canonical positions for the {count} vertices of the scene",
+            canonical.len()
+        );
+        let is_active = |_: Term, weight: f64| match selection {
+            Selection::Weighted => weight != 0.0,
+            Selection::All => true,
+        };
+        let shared: Vec<Shared<'_, T>> = self
+            .ranges()
+            .into_par_iter()
+            .enumerate()
+            .map(|(i, range)| {
+                self.share(i, &posed[range.clone()], canonical.get(range).unwrap_or(&[]), &is_active)
+            })
+            .collect();
+
+        let gradient_count = if with_gradient { count } else { 0 };
+        let mut posed_gradient = vec![vec3::zero(); gradient_count];
+        let mut canonical_gradient = vec![vec3::zero(); gradient_count];
+        let garments: Vec<TermMap<Option<f64>>> = self
+            .garments
+            .par_iter()
+            .zip(&shared)
+            .zip(self.split(&mut posed_gradient))
+            .zip(self.split(&mut canonical_gradient))
+            .map(|(((garment, shared), mut posed_gradient), mut canonical_gradient)| {
+                let mut raw = TermMap::default();
+                for (term, energy) in garment.energies.terms() {
+                    let weight = garment.weights[term];
+                    let is_canonical = garment.is_canonical(term);
+                    if !is_active(term, weight) || is_canonical && canonical.is_empty() {
+                        continue;
+                    }
+                    let space = if is_canonical { &mut canonical_gradient } else { &mut posed_gradient };
+                    let target = space.as_deref_mut().map(|gradient| Weighted { weight, gradient });
+                    raw[term] = Some(energy.evaluate(&shared.state(), target));
+                }
+                raw
+            })
+            .collect();
+
+        let pairs: Vec<PairValue<T>> =
+            self.layers.par_iter().map(|pair| self.pair(pair, &shared, &is_active, with_gradient)).collect();
+        if with_gradient {
+            let ranges = self.ranges();
+            for (pair, value) in self.layers.iter().zip(&pairs) {
+                let Some(gradients) = &value.gradients else { continue };
+                for (garment, gradient) in [pair.inner, pair.outer].into_iter().zip(gradients) {
+                    for (sum, g) in posed_gradient[ranges[garment].clone()].iter_mut().zip(gradient) {
+                        vec3::accumulate(sum, *g);
+                    }
+                }
+            }
+        }
+        let layers: Vec<TermMap<Option<f64>>> = pairs.into_iter().map(|pair| pair.raw).collect();
+        let total =
+            self.garments.iter().zip(&garments).map(|(g, raw)| weighted(&g.weights, raw)).sum::<f64>()
+                + self.layers.iter().zip(&layers).map(|(l, raw)| weighted(&l.weights, raw)).sum::<f64>();
+        SceneValue { total, posed_gradient, canonical_gradient, garments, layers }
+    }
+
+    /// One slice per garment of a packed gradient; `None` for an empty one.
+    fn split<'g>(&self, mut gradient: &'g mut [[T; 3]]) -> Vec<Option<&'g mut [[T; 3]]>> {
+        let wanted = !gradient.is_empty();
+        let mut slices = Vec::with_capacity(self.garments.len());
+        for garment in &self.garments {
+            slices.push(if wanted {
+                let (head, tail) =
+                    std::mem::take(&mut gradient).split_at_mut(garment.energies.vertex_count());
+                gradient = tail;
+                Some(head)
+            } else {
+                None
+            });
+        }
+        slices
+    }
+
+    /// Everything that more than one term needs of garment `i`, each part only if an active term does.
+    pub(super) fn share<'a>(
+        &'a self,
+        i: usize,
+        posed: &'a [[T; 3]],
+        canonical: &'a [[T; 3]],
+        is_active: &(impl Fn(Term, f64) -> bool + Sync),
+    ) -> Shared<'a, T> {
+        let garment = &self.garments[i];
+        let in_pair = |term: Term, is_side: fn(&SceneLayers, usize) -> bool| {
+            self.layers.iter().any(|pair| is_side(pair, i) && is_active(term, pair.weights[term]))
+        };
+        let in_distance = in_pair(Term::LayerDistance, |pair, i| pair.inner == i || pair.outer == i);
+        let is_inner = in_pair(Term::LayerCollision, |pair, i| pair.inner == i);
+        let needs_gaps = in_distance || is_active(Term::BodyCollision, garment.weights[Term::BodyCollision]);
+
+        let gaps: Vec<Gap<T>> = if needs_gaps {
+            let gap = |p: &[T; 3]| self.body.gap(*p, self.settings.distance);
+            posed.par_iter().with_min_len(GRAIN / 4).map(gap).collect()
+        } else {
+            Vec::new()
+        };
+        let body_vertex_count = self.body.positions.len();
+        let radius = self.settings.layer_distance_radius;
+        Shared {
+            state: GarmentState {
+                posed,
+                canonical,
+                holding_reference: &garment.holding_reference,
+                pull_back: garment.pull_back.as_deref(),
+                gaps: &[],
+                settings: &self.settings,
+            },
+            buckets: in_distance.then(|| BodyBuckets::new(&gaps, body_vertex_count, radius)),
+            gaps,
+            as_inner: is_inner.then(|| garment.energies.as_inner().posed(posed, self.settings.layer_contact)),
+        }
+    }
+
+    fn pair(
+        &self,
+        pair: &SceneLayers,
+        shared: &[Shared<'_, T>],
+        is_active: &(impl Fn(Term, f64) -> bool + Sync),
+        with_gradient: bool,
+    ) -> PairValue<T> {
+        let (inner, outer) = (&shared[pair.inner], &shared[pair.outer]);
+        let zeros = |of: &Shared<'_, T>| vec![vec3::zero(); of.state.posed.len()];
+        let mut gradients = with_gradient.then(|| [zeros(inner), zeros(outer)]);
+        let mut raw = TermMap::default();
+        for (term, &weight) in pair.weights.iter() {
+            if !term.is_layer_term() || !is_active(term, weight) {
+                continue;
+            }
+            let targets = gradients
+                .as_mut()
+                .map(|[a, b]| [Weighted { weight, gradient: a }, Weighted { weight, gradient: b }]);
+            raw[term] = match term {
+                Term::LayerCollision => inner.as_inner.as_ref().map(|posed_inner| {
+                    self.garments[pair.inner].energies.as_inner().evaluate(
+                        inner.state.posed,
+                        posed_inner,
+                        outer.state.posed,
+                        &self.settings,
+                        targets,
+                    )
+                }),
+                Term::LayerDistance => inner.layer_gaps().zip(outer.layer_gaps()).map(|(inner, outer)| {
+                    layer_distance(inner, outer, self.settings.layer_distance_radius, targets)
+                }),
+                _ => None,
+            };
+        }
+        PairValue { raw, gradients }
+    }
+}

@@ -1,0 +1,33 @@
+//! Warnings about inputs that can be draped.
+
+use crate::inference::SourceGarment;
+use clothcombo_data::asset::{Garment, infeasible_pair};
+
+pub(super) fn warn_about_shape(shape: &[f64], [low, high]: [f64; 2]) {
+    if let Some(value) = shape.iter().find(|value| !(low..=high).contains(*value)) {
+        tracing::warn!("shape parameter {value}: the model was trained with {low} to {high}");
+    }
+}
+
+pub(super) fn warn_about_order(sources: &[SourceGarment]) {
+    let order: Vec<&Garment> = sources.iter().map(|source| &source.garment).collect();
+    if let Some([inner, outer]) = infeasible_pair(&order) {
+        tracing::warn!(
+            "{} does not fit over {}, which hangs between the legs: they will intersect at the crotch",
+            outer.name,
+            inner.name
+        );
+    }
+}
+
+pub(super) fn log_repairs(source: &SourceGarment) {
+    let Some(fit) = &source.fit else { return };
+    let name = &source.garment.name;
+    tracing::info!("{name} fitted: {}", fit.assumptions().join("; "));
+    for repair in &fit.repairs {
+        tracing::info!("{name} repaired: {} ({})", repair.kind.text(), repair.count);
+    }
+    if let Some(misfit) = fit.misfit() {
+        tracing::warn!("{name} does not fit this body: {misfit} Look at the picture.");
+    }
+}

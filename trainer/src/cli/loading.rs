@@ -1,0 +1,24 @@
+//! Loading data under a progress bar.
+
+use super::verbosity::progress_bar;
+use crate::config::Config;
+use crate::dataset::{Dataset, DatasetError};
+use std::sync::Arc;
+
+/// Runs `prepare` under a bar. `prepare` gets a callback that takes the garments done, all garments and the name of one.
+pub(super) fn under_preparation_bar<T>(prepare: impl FnOnce(&(dyn Fn(usize, usize, &str) + Sync)) -> T) -> T {
+    let bar = progress_bar(0, "preparing garments {bar:30} {pos}/{len} {msg}");
+    prepare(&|done, total, name| {
+        bar.set_length(total as u64);
+        bar.set_position(done as u64);
+        bar.set_message(name.to_owned());
+    })
+}
+
+/// Loads the data of `config` under a bar.
+///
+/// # Errors
+/// Names the garment or file at fault.
+pub(super) fn load_dataset(config: &Config) -> Result<Arc<Dataset>, DatasetError> {
+    under_preparation_bar(|progress| Dataset::load(config, progress)).map(Arc::new)
+}

@@ -1,0 +1,183 @@
+//! What the networks make of an outfit on one body, brought to where the body stands.
+
+use super::{BodyState, Draper, DraperError, Outfit, PhaseTimes, elapsed};
+use crate::dataset::{BodySample, PreparedScene, SceneBuilder, SceneSample};
+use crate::inference::contact_features::LayerInteraction;
+use crate::inference::networks::{OnBody, drape_on};
+use crate::inference::tensor_store::body_tensors;
+use clothcombo_data::asset::rotation::{Matrix3, apply, matrix_from_axis_angle};
+use clothcombo_data::asset::{Pose, PosedBody};
+use clothcombo_model::ClothCombo;
+use clothcombo_physics::contact::resolve::PathSample;
+use clothcombo_physics::query::Surface;
+use clothcombo_physics::transform::{self, Transform};
+use clothcombo_physics::vec3::add;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// An outfit on one body before any post-process; garments packed inner → outer.
+pub(super) struct NetworkDrape {
+    /// The scene the networks saw: the body facing +z, at the origin.
+    pub scene: PreparedScene,
+    /// The body where it stands.
+    pub surface: Arc<Surface<f64>>,
+    /// Where it faces: angle about the vertical from +z towards +x (radians).
+    pub heading: f64,
+    /// Blended skinning transform of every vertex, canonical → posed.
+    pub transforms: Vec<Transform>,
+    /// Linear blend skinning of the start state (m).
+    pub skinned: Vec<[f64; 3]>,
+    /// What the networks made of it (m).
+    pub network: Vec<[f64; 3]>,
+    /// Time for the body and the networks (ms).
+    pub milliseconds: PhaseTimes,
+}
+
+/// Shape parameters are standard deviations: with a larger one there is no body any more.
+const MOST_SHAPE: f64 = 20.0;
+
+impl Draper {
+    /// Poses the body and lets `model` drape `outfit` on it.
+    pub(super) fn network_drape(
+        &self,
+        model: &ClothCombo,
+        outfit: &Outfit,
+        body: &BodyState,
+    ) -> Result<NetworkDrape, DraperError> {
+        let clock = Instant::now();
+        let (shape, posed) = self.posed(body)?;
+        let mut surface = match &body.surface {
+            Some(given) => self.checked_surface(given)?.to_vec(),
+            None => posed.positions.iter().map(|p| add(*p, body.place)).collect(),
+        };
+        super::drape::round(&mut surface);
+        let surface = Arc::new(Surface::new(surface, self.body().faces.clone()));
+        let (facing, heading) = body.pose.without_heading();
+        let (facing, yaw) = match self.trained.config.data.poses.remove_heading {
+            true => (facing, heading),
+            false => (body.pose.clone(), 0.0),
+        };
+        let scene = self.scene(outfit, BodySample { shape, pose: facing });
+        let (tensors, start) = body_tensors(&scene.bodies[0], &self.dimensions(), &self.device)?;
+        let posing = elapsed(clock);
+
+        let (outfit_tensors, embeddings) = (&outfit.tensors, &outfit.embeddings);
+        let on_body = OnBody { scene: &scene, outfit: outfit_tensors, embeddings, body: &tensors, start };
+        let (draped, times) = drape_on(model, &on_body, LayerInteraction::Together);
+
+        // The body may be turned about the vertical: what the networks made turns with it, to where everything else happens.
+        let turn = matrix_from_axis_angle([0.0, yaw, 0.0]);
+        let transforms: Vec<Transform> =
+            scene.skinning_transforms().iter().map(|t| turned(&turn, t, body.place)).collect();
+        let start = scene.bodies[0].start.iter().map(|p| p.map(f64::from));
+        let skinned = transforms.iter().zip(start).map(|(t, p)| transform::apply(t, p)).collect();
+        let network: Vec<[f64; 3]> =
+            draped.posed.iter().map(|p| add(apply(&turn, p.map(f64::from)), body.place)).collect();
+        outfit.check_finite(&network)?;
+        let ms = |time: Duration| 1e3 * time.as_secs_f64();
+        let milliseconds = PhaseTimes {
+            posing,
+            networks: ms(times.forward),
+            corrections: ms(times.corrections),
+            ..PhaseTimes::default()
+        };
+        Ok(NetworkDrape { scene, surface, heading, transforms, skinned, network, milliseconds })
+    }
+
+    /// The same in `pose` and place, a sample of the continuation path to `body`, for the post-process.
+    pub(super) fn stage(
+        &self,
+        model: &ClothCombo,
+        outfit: &Outfit,
+        body: &BodyState,
+        pose: Pose,
+        place: [f64; 3],
+    ) -> Result<PathSample, DraperError> {
+        // A surface is known at the end only.
+        let sample = BodyState { shape: body.shape.clone(), pose, surface: None, place };
+        let made = self.network_drape(model, outfit, &sample)?;
+        let parts = |packed| outfit.split(packed).into_iter().map(<[_]>::to_vec).collect();
+        Ok(PathSample {
+            body: made.surface,
+            draped: parts(&made.network),
+            skinned: parts(&made.skinned),
+            transforms: made.transforms,
+        })
+    }
+
+    fn scene(&self, outfit: &Outfit, body: BodySample) -> PreparedScene {
+        let encoding = self.trained.config.data.poses.encoding;
+        let builder = SceneBuilder {
+            body: self.body(),
+            joints: &self.joints,
+            features: &|pose, joints| encoding.features(pose, joints),
+            losses: &self.trained.config.losses,
+            graph: self.trained.config.model.graph,
+        };
+        let sample = SceneSample {
+            garments: (0..outfit.garments.len()).collect(),
+            bodies: vec![body],
+            repulsion_sample: 0,
+        };
+        let mut scene = builder.build(sample, outfit.prepared(), 1.0);
+        // A body with fewer components than the networks know has the others at their mean.
+        scene.bodies[0].shape.resize(self.trained.state.shape_count, 0.0);
+        scene
+    }
+
+    /// The shape with all its parameters, and the body model's own surface.
+    fn posed(&self, body: &BodyState) -> Result<(Vec<f64>, PosedBody), DraperError> {
+        let shape = self.checked_shape(&body.shape)?;
+        if body.pose.rotations.as_flattened().iter().chain(&body.place).any(|x| !x.is_finite()) {
+            return Err(DraperError::NotFinite { what: "pose" });
+        }
+        let posed = self.body().posed(&shape, &body.pose)?;
+        Ok((shape, posed))
+    }
+
+    /// Whether `body` can be dressed: what [`drape`](Self::drape) would say, at once.
+    ///
+    /// # Errors
+    /// When shape, pose or surface do not fit the body model.
+    pub fn check_body(&self, body: &BodyState) -> Result<(), DraperError> {
+        self.posed(body)?;
+        body.surface.as_deref().map_or(Ok(()), |given| self.checked_surface(given).map(|_| ()))
+    }
+
+    fn checked_shape(&self, shape: &[f64]) -> Result<Vec<f64>, DraperError> {
+        if shape.iter().any(|x| !x.is_finite()) {
+            return Err(DraperError::NotFinite { what: "shape" });
+        }
+        if let Some(value) = shape.iter().find(|x| x.abs() > MOST_SHAPE) {
+            return Err(DraperError::Shape { value: *value, most: MOST_SHAPE });
+        }
+        let mut shape = shape.to_vec();
+        let count = self.body().shape_count;
+        // Longer ones are refused by the body, by name.
+        if shape.len() < count {
+            shape.resize(count, 0.0);
+        }
+        Ok(shape)
+    }
+
+    fn checked_surface<'a>(&self, surface: &'a [[f64; 3]]) -> Result<&'a [[f64; 3]], DraperError> {
+        let (found, expected) = (surface.len(), self.body().vertex_count());
+        if found != expected {
+            return Err(DraperError::Surface { body: self.body().name.clone(), found, expected });
+        }
+        match surface.as_flattened().iter().all(|x| x.is_finite()) {
+            true => Ok(surface),
+            false => Err(DraperError::NotFinite { what: "posed body" }),
+        }
+    }
+}
+
+/// `turn` after `transform`, then a move to `place`.
+fn turned(turn: &Matrix3, transform: &Transform, place: [f64; 3]) -> Transform {
+    std::array::from_fn(|r| {
+        std::array::from_fn(|c| {
+            let value: f64 = (0..3).map(|k| turn[r][k] * transform[k][c]).sum();
+            if c == 3 { value + place[r] } else { value }
+        })
+    })
+}
