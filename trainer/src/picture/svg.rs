@@ -9,6 +9,7 @@ use std::sync::{Arc, LazyLock};
 /// How the classes of the elements look, for pages that hold charts as well as for pictures.
 pub(crate) const STYLE: &str = include_str!("svg.css");
 
+/// The font is Inter 4.1, cut to Latin, Greek, arrows and mathematical signs.
 static OPTIONS: LazyLock<Options<'static>> = LazyLock::new(|| {
     let mut fonts = fontdb::Database::new();
     fonts.load_font_data(include_bytes!("font/Inter-Regular.ttf").to_vec());
