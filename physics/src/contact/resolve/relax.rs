@@ -35,7 +35,6 @@ impl LastPasses {
 /// Moves the vertices of `region` until `contacts` are met, by a displacement from `shape` that is smooth over the garment,
 /// keeps its edge lengths, and is left as it is outside. Gauss–Seidel in a fixed order: smoothing, lengths, contacts; in the end
 /// as many passes over the contacts alone as `last` allows.
-#[expect(clippy::too_many_arguments, reason = "replaced together with this module")]
 pub(super) fn relax(
     cloth: &Outfit<'_>,
     positions: &mut [[f64; 3]],
