@@ -8,7 +8,7 @@
 //! takes the mannequin. Without a folder of motions it measures sampled poses only.
 
 use clothcombo_data::asset::{Body, BodyFileSettings, Pose};
-use clothcombo_data::dataset::load_motion_folder;
+use clothcombo_data::folders::load_motion_folder;
 use clothcombo_data::generate::{PoseAugmentation, PoseSampler, SelfContact, mannequin};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -5,9 +5,9 @@
 pub mod asset;
 pub mod cache;
 pub mod check;
-pub mod dataset;
 pub mod degenerate_cases;
 pub mod fit;
+pub mod folders;
 pub mod format;
 pub mod generate;
 pub mod import;

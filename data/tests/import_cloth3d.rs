@@ -3,7 +3,7 @@
 mod fixture;
 
 use clothcombo_data::asset::{BindingSettings, Body, BodyFileSettings, Category, Motion};
-use clothcombo_data::dataset::load_garment_folder;
+use clothcombo_data::folders::load_garment_folder;
 use clothcombo_data::format::{MatFile, MatValue, NpzFile, PointCache};
 use clothcombo_data::import::{
     Cloth3dBodies, Cloth3dSettings, ImportError, Summary, Thinning, import_cloth3d,

@@ -4,7 +4,7 @@ mod fixture;
 
 use clothcombo_data::asset::rotation::matrix_from_axis_angle;
 use clothcombo_data::asset::{Motion, Pose};
-use clothcombo_data::dataset::load_motion_folder;
+use clothcombo_data::folders::load_motion_folder;
 use clothcombo_data::format::NpzFile;
 use clothcombo_data::generate::mannequin;
 use clothcombo_data::import::{

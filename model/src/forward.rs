@@ -33,8 +33,8 @@ pub struct DrapeStates {
     pub start: Tensor<2>,
     /// x_s and V_s, after single draping.
     pub single: DrapeState,
-    /// x_m and V_m, after untangling; absent where a pass ends before, or where [untangling leaves the outfit
-    /// alone](crate::Untangling::acts_on).
+    /// x_m and V_m, after untangling; absent where a pass ends before, or where [untangling does not
+    /// act](crate::Untangling::acts_on).
     pub layered: Option<DrapeState>,
     /// After every correction step.
     pub corrected: Vec<DrapeState>,

@@ -110,7 +110,7 @@ impl ModuleVisitor for Unpack<'_> {
         let shape = parameter.lazy_shape();
         let (values, rest) = self.values.split_at(shape.num_elements());
         self.values = rest;
-        if self.present.next().is_some_and(|present| *present > 0.0) {
+        if *self.present.next().expect("a flag for every parameter") > 0.0 {
             let data = TensorData::new(values.to_vec(), shape);
             let gradient = Tensor::<D>::from_data(data, &parameter.lazy_device().without_autodiff());
             self.gradients.register::<D>(parameter.id, gradient);

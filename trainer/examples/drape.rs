@@ -20,10 +20,10 @@ fn run() -> Result<(), Report> {
     let model = std::env::args().nth(1).map(PathBuf::from);
     let draper = Draper::load(model.as_deref(), &DraperSettings::default())?;
 
-    // Garments the model knows by name; `SourceGarment::read` takes a mesh file, `SourceGarment::new` a garment in memory.
+    // Garments the model knows by name; `GivenGarment::read` takes a mesh file, `GivenGarment::new` a garment in memory.
     let catalog = draper.catalog(&[])?;
     let [inner, outer, ..] = catalog.names() else {
-        return Err(miette!("the model's own wardrobe is not there; use SourceGarment::read"));
+        return Err(miette!("the model's own garments are not there; use GivenGarment::read"));
     };
     let sources = [inner, outer].map(|name| catalog.find(name, draper.body(), None));
     let outfit = draper.outfit(sources.into_iter().collect::<Result<_, _>>()?)?;

@@ -10,7 +10,7 @@
 
 use clap::Parser;
 use clothcombo_data::asset::{Binding, BindingSettings, Body, Garment, Pose};
-use clothcombo_data::dataset::{load_garment_folder, load_motion_folder};
+use clothcombo_data::folders::{load_garment_folder, load_motion_folder};
 use clothcombo_data::format::obj;
 use clothcombo_trainer::config::{self, Config};
 use clothcombo_trainer::{cli, dataset};

@@ -91,6 +91,9 @@ impl KeyBuilder {
     }
 }
 
+/// Extension of a record.
+const EXTENSION: &str = "safetensors";
+
 /// The store. Cheap to share by reference; all methods may be called from many threads.
 #[derive(Debug)]
 pub struct ArrayCache {
@@ -112,8 +115,9 @@ impl ArrayCache {
         for shelf in fs::read_dir(root).map_err(failed)? {
             let shelf = shelf.map_err(failed)?.path();
             let Ok(files) = fs::read_dir(&shelf) else { continue };
-            // A file that another process removes meanwhile counts nothing.
-            used += files.flatten().filter_map(|f| f.metadata().ok()).map(|m| m.len()).sum::<u64>();
+            // Files of earlier forms of the cache are never read again. One that another process removes meanwhile counts nothing.
+            let records = files.flatten().filter(|f| f.path().extension().is_some_and(|e| e == EXTENSION));
+            used += records.filter_map(|f| f.metadata().ok()).map(|m| m.len()).sum::<u64>();
         }
         Ok(Self { root: root.into(), limit: limit_bytes, used: AtomicU64::new(used) })
     }
@@ -130,7 +134,7 @@ impl ArrayCache {
 
     fn path(&self, key: Key) -> PathBuf {
         let hex = key.0.to_hex();
-        self.root.join(&hex[..2]).join(format!("{}.safetensors", &hex[2..]))
+        self.root.join(&hex[..2]).join(&hex[2..]).with_extension(EXTENSION)
     }
 
     /// What `read` takes from the record of `key`; `None` if there is none, or it cannot be read. A damaged record is
@@ -160,7 +164,7 @@ impl ArrayCache {
         }
     }
 
-    /// Whether there is a record of `key` whose table is whole.
+    /// Whether there is a record of `key` whose table can be read; its arrays are checked when they are.
     pub fn contains(&self, key: Key) -> bool {
         self.get(key, |_| Ok(())).is_some()
     }

@@ -13,7 +13,7 @@ pub use motion::{MotionCheck, impossible_turn};
 pub use targets::{ManifestHints, Target, find_targets};
 
 use crate::asset::Body;
-use crate::dataset::garment_folder::MANIFEST;
+use crate::folders::garment_folder::MANIFEST;
 use crate::format::NpzFile;
 use clothcombo_physics::Surface;
 use serde::Serialize;

@@ -1,7 +1,7 @@
 //! Which files a list of paths means.
 
 use crate::asset::Category;
-use crate::dataset::garment_folder::{MANIFEST, list_garment_folder, read_entries};
+use crate::folders::garment_folder::{MANIFEST, list_garment_folder, read_entries};
 use crate::format::{folder, is_mesh_path};
 use std::collections::HashSet;
 use std::fs;

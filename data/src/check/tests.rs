@@ -1,6 +1,6 @@
 use super::*;
 use crate::asset::{Category, Garment, Motion, Pose, Provenance};
-use crate::dataset::{FolderGarment, save_garment_folder};
+use crate::folders::{FolderGarment, save_garment_folder};
 use crate::format::npz::NpzWriter;
 use crate::format::obj;
 use crate::generate::{GarmentGenerator, GarmentSettings, mannequin};

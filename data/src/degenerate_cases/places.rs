@@ -74,7 +74,7 @@ pub(super) const CASES: &[DegenerateCase] = &[
     ),
     DegenerateCase::bounded(
         "12 layers",
-        "Twelve T-shirts over each other, a millimetre apart, every other one on the wrong side.",
+        "Twelve T-shirts over each other, a millimetre apart, every other one in the wrong order.",
         |w| {
             let shirt = w.t_shirt();
             let normals = vertex_normals(&shirt.posed, shirt.garment.rest.faces());

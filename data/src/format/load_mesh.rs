@@ -88,7 +88,7 @@ pub fn load_tri_mesh(path: &Path) -> Result<TriMesh, FileError> {
 mod tests {
     use super::*;
     use crate::asset::{Body, BodyFileSettings, Motion};
-    use crate::dataset::{load_garment_folder, load_motion_folder};
+    use crate::folders::{load_garment_folder, load_motion_folder};
     use crate::format::{MatFile, PointCache};
     use crate::generate::mannequin;
     use crate::import::bvh::Bvh;

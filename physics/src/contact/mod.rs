@@ -20,7 +20,7 @@ pub use inner_surface::LayerTopology;
 pub use layer_order::{LayerOrder, ORDER_RADIUS, OrderViolations};
 pub use penetration::Penetration;
 pub use report::{
-    GarmentReport, Intersections, LayerReport, PosedBody, Report, ReportBody, ReportGarment, Selection,
+    CountedBody, GarmentReport, Intersections, LayerReport, Report, ReportBody, ReportGarment, Selection,
     TrianglePairs, all_layers,
 };
 pub use self_collision::self_collision;

@@ -36,20 +36,20 @@ pub trait ReportBody: Sync {
 }
 
 /// A posed body that counts everywhere, by one [`Distance`].
-pub struct PosedBody<'a> {
+pub struct CountedBody<'a> {
     surface: &'a Surface<f64>,
     distance: Distance,
     tree: OnceLock<TriangleTree<'a>>,
 }
 
-impl<'a> PosedBody<'a> {
+impl<'a> CountedBody<'a> {
     /// Penetration counts by `distance`.
     pub fn new(surface: &'a Surface<f64>, distance: Distance) -> Self {
         Self { surface, distance, tree: OnceLock::new() }
     }
 }
 
-impl ReportBody for PosedBody<'_> {
+impl ReportBody for CountedBody<'_> {
     fn tree(&self) -> &TriangleTree<'_> {
         self.tree.get_or_init(|| TriangleTree::new(&self.surface.positions, &self.surface.faces))
     }

@@ -185,7 +185,7 @@ fn report(body: &TriMesh, garments: &[&TriMesh]) -> Report {
         garments.iter().map(|g| ReportGarment { positions: g.positions(), faces: g.faces() }).collect();
     let order = LayerOrder::NearestVertex;
     let selection = Selection { layers: &[(0, 1)], order, triangles: true, body_itself: true };
-    Report::count(&PosedBody::new(&Surface::from_mesh(body), Distance::ClosestPoint), &garments, &selection)
+    Report::count(&CountedBody::new(&Surface::from_mesh(body), Distance::ClosestPoint), &garments, &selection)
 }
 
 #[test]
@@ -196,7 +196,7 @@ fn points_inside_a_sphere_are_counted_with_their_depth() {
     let order = LayerOrder::NearestVertex;
     let selection = Selection { layers: &[], order, triangles: false, body_itself: false };
     let surface = Surface::from_mesh(&sphere);
-    let report = Report::count(&PosedBody::new(&surface, Distance::ClosestPoint), &[garment], &selection);
+    let report = Report::count(&CountedBody::new(&surface, Distance::ClosestPoint), &[garment], &selection);
     let p = report.penetration(0.05);
     assert_eq!((p.vertices, p.inside, p.deep), (4, 3, 2));
     assert!((p.max_depth - 1.0).abs() < 0.01, "{p:?}");

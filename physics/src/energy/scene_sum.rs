@@ -254,7 +254,12 @@ impl<T: Real> SceneEnergy<T> {
                 Term::LayerDistance => inner.layer_gaps().zip(outer.layer_gaps()).map(|(inner, outer)| {
                     layer_distance(inner, outer, self.settings.layer_distance_radius, targets)
                 }),
-                _ => None,
+                Term::Strain
+                | Term::Bending
+                | Term::Gravity
+                | Term::BodyCollision
+                | Term::Repulsion
+                | Term::Holding => None,
             };
         }
         PairValue { raw, gradients }

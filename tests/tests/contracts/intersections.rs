@@ -4,11 +4,11 @@
 //! Positions are put on a grid of 2⁻²⁰ m (about a micrometre), where integers hold them exactly.
 
 use clothcombo_data::asset::{Binding, BindingSettings, Body, BodyFileSettings, Category, Garment, Pose};
-use clothcombo_data::dataset::{load_garment_folder, load_motion_folder};
+use clothcombo_data::folders::{load_garment_folder, load_motion_folder};
 use clothcombo_data::generate::{GarmentGenerator, GarmentSettings, mannequin};
 use clothcombo_physics::Surface;
 use clothcombo_physics::contact::{
-    LayerOrder, PosedBody, Report, ReportGarment, Selection, TriangleTree, all_layers,
+    CountedBody, LayerOrder, Report, ReportGarment, Selection, TriangleTree, all_layers,
     mesh_triangles_intersect, triangles_intersect,
 };
 use clothcombo_physics::mesh::TriMesh;
@@ -78,16 +78,16 @@ fn brute_force(
     b: &Snapped,
     first_of_b: impl Fn(usize) -> usize + Sync,
     oracle: impl Fn(usize, usize) -> bool + Sync,
-    dataset: impl Fn(usize, usize) -> bool + Sync,
+    ours: impl Fn(usize, usize) -> bool + Sync,
 ) -> Vec<(u32, u32)> {
     (0..a.boxes.len())
         .into_par_iter()
         .flat_map_iter(|i| {
             let near = (first_of_b(i)..b.boxes.len()).filter(move |&j| boxes_meet(&a.boxes[i], &b.boxes[j]));
-            let (oracle, dataset) = (&oracle, &dataset);
+            let (oracle, ours) = (&oracle, &ours);
             near.filter_map(move |j| {
                 let expected = oracle(i, j);
-                assert_eq!(dataset(i, j), expected, "triangles {i} and {j}");
+                assert_eq!(ours(i, j), expected, "triangles {i} and {j}");
                 expected.then_some((i as u32, j as u32))
             })
         })
@@ -101,8 +101,8 @@ fn pairs_between(a: &Snapped, b: &Snapped) -> Vec<(u32, u32)> {
 
 fn pairs_within(a: &Snapped) -> Vec<(u32, u32)> {
     let faces = a.mesh.faces();
-    let dataset = |i: usize, j: usize| mesh_triangles_intersect(a.mesh.positions(), faces[i], faces[j]);
-    brute_force(a, a, |i| i + 1, |i, j| neighbours_meet(a, i, j), dataset)
+    let ours = |i: usize, j: usize| mesh_triangles_intersect(a.mesh.positions(), faces[i], faces[j]);
+    brute_force(a, a, |i| i + 1, |i, j| neighbours_meet(a, i, j), ours)
 }
 
 /// The report of `garments` on `body` against brute force, pair by pair.
@@ -119,7 +119,7 @@ fn check(body: &Snapped, garments: &[Snapped]) {
         body_itself: true,
     };
     let surface = Surface::from_mesh(&body.mesh);
-    let report = Report::count(&PosedBody::new(&surface, Distance::ClosestPoint), &meshes, &selection);
+    let report = Report::count(&CountedBody::new(&surface, Distance::ClosestPoint), &meshes, &selection);
     let mut total = 0;
     for (i, garment) in garments.iter().enumerate() {
         let (with_body, with_itself) = (pairs_between(garment, body), pairs_within(garment));

@@ -5,7 +5,7 @@ use clothcombo_data::asset::{Category, Pose};
 use clothcombo_data::generate::{GarmentGenerator, GarmentSettings};
 use clothcombo_tests::{fuzz_cases, tiny_config};
 use clothcombo_trainer::dataset::Dataset;
-use clothcombo_trainer::inference::{BodyState, Draper, DraperSettings, SourceGarment};
+use clothcombo_trainer::inference::{BodyState, Draper, DraperSettings, GivenGarment};
 use clothcombo_trainer::run::folder::RunDir;
 use clothcombo_trainer::system::device::Backend;
 use clothcombo_trainer::training::session::Session;
@@ -111,7 +111,7 @@ fn messy_garments_are_draped_or_refused_by_name() {
         }
         let path = folder.path().join("messy.obj");
         std::fs::write(&path, mesh.obj()).unwrap();
-        let result = SourceGarment::read(&path, draper.body(), None).and_then(|source| {
+        let result = GivenGarment::read(&path, draper.body(), None).and_then(|source| {
             let is_fitted = source.fit.is_some();
             let given = mesh.positions.len();
             let outfit = draper.outfit(vec![source.clone()])?;

@@ -1,4 +1,4 @@
-//! A wardrobe streamed from the cache trains to the same bits as one kept in memory, whatever happens to the cache.
+//! A dataset streamed from the cache trains to the same bits as one kept in memory, whatever happens to the cache.
 
 use clothcombo_tests::tiny_config;
 use clothcombo_trainer::config::Config;

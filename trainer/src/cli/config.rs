@@ -31,7 +31,7 @@ pub enum Verb {
         clothcombo config check configs/paper.toml --garments 4300 --vertices 8000 --shape-components 300\n\n\
         Memory is estimated from the number of vertices of every garment, and the time from a few real steps of every stage \
         on this machine; both need the data. --no-timing looks at the file alone; --garments and --vertices state the memory \
-        for a garments that is not at hand.")]
+        for a dataset that is not at hand.")]
 pub struct CheckArguments {
     /// Configuration file (TOML)
     #[arg(value_name = "FILE")]

@@ -1,13 +1,13 @@
 //! `clothcombo generate`: garments from nothing but a body.
 
-use super::contact_sheet::{PER_ROW, contact_sheet};
+use super::garment_sheet::{PER_ROW, garment_sheet};
 use crate::cli::values::{count, picture_file};
 use crate::cli::verbosity::{print_status, progress_bar};
 use crate::dataset::load_body;
 use crate::picture::save_png;
 use clap::Parser;
 use clothcombo_data::asset::{Body, Category, Garment};
-use clothcombo_data::dataset::{
+use clothcombo_data::folders::{
     FolderGarment, ManifestEntry, read_manifest, refuse_unlisted, save_garment, save_manifest,
 };
 use clothcombo_data::format::obj;
@@ -95,7 +95,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     save_manifest(folder, entries).into_diagnostic()?;
     print_status(&format!("{new} garments made, {kept} kept, in {}", folder.display()));
     if let Some(path) = &arguments.picture {
-        save_png(&contact_sheet(&body, &maker.for_picture(&wanted)?), path).into_diagnostic()?;
+        save_png(&garment_sheet(&body, &maker.for_picture(&wanted)?), path).into_diagnostic()?;
         print_status(&format!("picture {}", path.display()));
     }
     match failures.first() {

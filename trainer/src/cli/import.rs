@@ -101,7 +101,7 @@ pub struct ThinningArguments {
     /// Frames per second kept
     #[arg(long, visible_alias = "fps", default_value_t = 30.0, value_parser = positive)]
     frame_rate: f64,
-    /// Drop frames that differ from the last one kept by less than this in every joint [degrees]: enough to train on, but slow
+    /// Drop frames that differ from the last one kept by less than this in every joint (degrees): enough to train on, but slow
     /// movement then plays faster; 0 keeps all, and with them the timing
     #[arg(long, default_value_t = 0.5, value_parser = not_negative)]
     static_threshold: f64,

@@ -3,10 +3,10 @@
 pub mod bench;
 pub mod check;
 pub mod config;
-mod contact_sheet;
 pub mod drape;
 pub mod eval;
 pub mod fit;
+mod garment_sheet;
 pub mod generate;
 pub mod import;
 mod interrupted;

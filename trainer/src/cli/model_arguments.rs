@@ -14,7 +14,7 @@ pub struct ModelArguments {
     /// Overrides one value of the configuration, for example losses.body_collision.epsilon=0.004; repeatable
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub overrides: Vec<String>,
-    /// Run, checkpoint or folder of a trained model (models/default); default: linear blend skinning alone
+    /// Run, checkpoint or folder of a trained model (models/default); default: LBS + shape transfer
     #[arg(long, value_name = "DIR")]
     checkpoint: Option<PathBuf>,
 }

@@ -67,7 +67,7 @@ struct ResolveReport {
     certificate_before: Certificate,
     certificate: Certificate,
     milliseconds: Milliseconds,
-    garments: Vec<GarmentReport>,
+    garments: Vec<ResolvedGarment>,
 }
 
 #[derive(Serialize)]
@@ -78,7 +78,7 @@ struct Milliseconds {
 }
 
 #[derive(Serialize)]
-struct GarmentReport {
+struct ResolvedGarment {
     name: String,
     #[serde(serialize_with = "lossy")]
     output: PathBuf,
@@ -148,7 +148,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         garments: garments
             .iter()
             .zip(&resolved.garments)
-            .map(|(garment, work)| GarmentReport {
+            .map(|(garment, work)| ResolvedGarment {
                 name: garment.name.clone(),
                 output: arguments.output.join(garment.file()),
                 rounds: work.rounds,

@@ -33,7 +33,7 @@ pub struct DataConfig {
     /// start and kept in memory.
     #[serde(default)]
     pub cache: CacheConfig,
-    /// Memory for what is kept of garments that are streamed from the cache [MiB]: meshes, energies and bindings and, on a CPU
+    /// Memory for what is kept of garments that are streamed from the cache (MiB): meshes, energies and bindings and, on a CPU
     /// backend, their tensors and embeddings as well. Garments of the scenes in work count and always stay. More only saves
     /// reading and computing; 1 GiB holds 60 garments of 8,000 vertices. Without a cache all garments stay in memory.
     #[serde(default = "memory_mib")]

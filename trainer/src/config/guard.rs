@@ -1,4 +1,4 @@
-//! When a run counts as poisoned.
+//! What happens to steps that are not finite, and to gradient spikes.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -68,7 +68,7 @@ pub struct Config {
     /// What a run leaves behind, and how often.
     #[serde(default)]
     pub output: OutputConfig,
-    /// When a run counts as poisoned.
+    /// What happens to steps that are not finite, and to gradient spikes.
     #[serde(default)]
     pub guard: GuardConfig,
 }

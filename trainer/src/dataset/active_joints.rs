@@ -1,4 +1,4 @@
-//! The joints a wardrobe needs: those that carry any garment. Hands, feet and face never enter the networks.
+//! The joints a dataset needs: those that carry any garment. Hands, feet and face never enter the networks.
 
 use clothcombo_data::asset::Body;
 

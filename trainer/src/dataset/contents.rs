@@ -29,7 +29,7 @@ pub struct Dataset {
     pub poses: PoseLibrary,
     /// Which garments of a scene have layer losses with each other (`model.graph`).
     pub graph: Graph,
-    /// Memory for what is kept of garments and can be made again: garments of a streamed wardrobe, tensors, embeddings. A
+    /// Memory for what is kept of garments and can be made again: garments of a streamed dataset, tensors, embeddings. A
     /// device with memory of its own has a budget of its own.
     pub memory: Arc<MemoryBudget>,
     /// Shape components drawn.

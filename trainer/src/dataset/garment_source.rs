@@ -3,7 +3,7 @@
 use super::error::DatasetError;
 use crate::config::GarmentSourceConfig;
 use clothcombo_data::asset::{Body, Category, Garment};
-use clothcombo_data::dataset::{ListedGarment, list_garment_folder};
+use clothcombo_data::folders::{ListedGarment, list_garment_folder};
 use clothcombo_data::generate::{GarmentGenerator, GarmentSettings};
 
 /// A garment that can be read or made at any time, always the same.

@@ -2,7 +2,7 @@
 //!
 //! Without a cache everything is computed at the start and kept, if the machine has the memory. With one, what is expensive
 //! is computed once, a few garments at a time, and stored; a run keeps the garments it used last, within `data.memory_mib`,
-//! and reads the others again when a scene draws them: a wardrobe may be many times larger than memory, and the results are
+//! and reads the others again when a scene draws them: a dataset may be many times larger than memory, and the results are
 //! the same to the bit.
 
 use super::active_joints::ActiveJoints;
@@ -67,7 +67,7 @@ struct IndexEntry {
 }
 
 impl GarmentStore {
-    /// Reads or makes all garments `config` names, and computes what the cache does not hold. Those of a streamed wardrobe are
+    /// Reads or makes all garments `config` names, and computes what the cache does not hold. Those of a streamed dataset are
     /// kept within `memory`. `progress(done, total, name)` is called per garment.
     ///
     /// # Errors

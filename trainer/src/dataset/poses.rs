@@ -5,7 +5,7 @@ mod frames;
 use super::error::DatasetError;
 use crate::config::{PoseConfig, PoseEncoding};
 use clothcombo_data::asset::{Body, Pose, Provenance};
-use clothcombo_data::dataset::load_motion_folder;
+use clothcombo_data::folders::load_motion_folder;
 use clothcombo_data::generate::{PoseAugmentation, PoseSampler, SelfContact};
 use frames::Frames;
 pub use frames::{ClipSplit, Window};
@@ -241,7 +241,7 @@ impl PoseLibrary {
     ///
     /// # Panics
     /// If there are none of this `kind` ([`has`](Self::has)).
-    pub fn draw_held_out(&self, kind: HeldOut, rng: &mut ChaCha8Rng) -> Pose {
+    pub fn sample_held_out(&self, kind: HeldOut, rng: &mut ChaCha8Rng) -> Pose {
         let pose = match &self.source {
             Source::Sampler(sampler) => sampler.sample(rng),
             Source::Frames(frames) => {

@@ -91,7 +91,7 @@ pub fn sample_training(dataset: &Dataset, seed: u64, step: u64, scene: usize, pl
 /// Its block of streams lies behind those of the validation groups.
 const OUTFIT_STREAM: u64 = VALIDATION_STREAM + (16 << 32);
 
-/// Outfit `index`: 1 to `most` garments (one more from each outfit to the next) of the whole wardrobe, held-out ones among
+/// Outfit `index`: 1 to `most` garments (one more from each outfit to the next) of the whole dataset, held-out ones among
 /// them, in random order, on a body in a pose of a validation clip, or of a held-out window where there are none. The test
 /// clips stay unread: the post-process is tuned on these outfits.
 pub fn sample_outfit(dataset: &Dataset, seed: u64, index: u64, most: usize) -> SceneSample {
@@ -100,7 +100,7 @@ pub fn sample_outfit(dataset: &Dataset, seed: u64, index: u64, most: usize) -> S
     let garments = garments(&all, 1 + index as usize % most.max(1), &mut rng);
     let clips = HeldOut::ValidationClips;
     let poses = if dataset.poses.has(clips) { clips } else { HeldOut::Windows };
-    let pose = dataset.poses.draw_held_out(poses, &mut rng);
+    let pose = dataset.poses.sample_held_out(poses, &mut rng);
     scored(garments, BodySample { shape: shape(dataset, &mut rng), pose })
 }
 
@@ -120,7 +120,7 @@ pub fn sample_evaluation(
     let mut rng = generator(seed, EVALUATION_STREAM + ((stream as u64) << 32) + index as u64);
     // The body first: with it, two datasets get the same bodies.
     let body =
-        BodySample { shape: shape(dataset, &mut rng), pose: dataset.poses.draw_held_out(poses, &mut rng) };
+        BodySample { shape: shape(dataset, &mut rng), pose: dataset.poses.sample_held_out(poses, &mut rng) };
     scored(garments(pool, layers, &mut rng), body)
 }
 
@@ -195,7 +195,7 @@ pub fn sample_validation(
                 ValidationGroup::UnseenGarment => one(&dataset.split.validation, i),
                 ValidationGroup::Single | ValidationGroup::UnseenMotion => one(&dataset.split.training, i),
             };
-            let pose = dataset.poses.draw_held_out(poses, &mut rng);
+            let pose = dataset.poses.sample_held_out(poses, &mut rng);
             scored(garments, BodySample { shape: shape(dataset, &mut rng), pose })
         })
         .collect()

@@ -52,7 +52,7 @@ impl DataSizes {
         Ok(Self::of_body(sources.par_iter().map(GarmentSource::vertices).collect::<Result<_, _>>()?, body))
     }
 
-    /// Those of a wardrobe that is not at hand, on a body like SMPL-X.
+    /// Those of a dataset that is not at hand, on a body like SMPL-X.
     pub fn assumed(garments: usize, vertices: usize, shape_components: usize) -> Self {
         let [body_vertices, body_faces, body_joints] = SMPL_X;
         Self {
@@ -121,7 +121,7 @@ pub(crate) fn operator_bytes(config: &Config, vertices: usize) -> usize {
     12 * vertices * config.model.eigen_count + 8 * vertices
 }
 
-/// Memory of the tensors of a garment [bytes]: Φ, ΦᵀM and both gradient products, skin weights, rest positions and masses.
+/// Memory of the tensors of a garment (bytes): Φ, ΦᵀM and both gradient products, skin weights, rest positions and masses.
 pub fn tensor_bytes(vertices: usize, eigen_count: usize, joints: usize) -> usize {
     4 * vertices * (4 * eigen_count + joints + 4)
 }

@@ -5,7 +5,7 @@ use super::poses::Window;
 use crate::config::DataConfig;
 use serde::Serialize;
 
-/// Garments by what they are for; indices into the wardrobe, ascending.
+/// Garments by what they are for; indices into the dataset, ascending.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GarmentSplit {
     /// Trained on.

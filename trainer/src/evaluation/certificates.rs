@@ -1,4 +1,4 @@
-//! What the post-process makes of random outfits.
+//! The post-process of an evaluation's scenes.
 
 use crate::config::LossesConfig;
 use crate::dataset::{Dataset, PreparedScene, prepare};
@@ -9,7 +9,7 @@ use clothcombo_physics::contact::resolve::{
     Certificate, Layer, PathSample, ResolveError, ResolveSettings, Resolved, RestGarment, certify,
     resolve_along,
 };
-use clothcombo_physics::contact::{LayerOrder, PosedBody, Report, ReportGarment, Selection, all_layers};
+use clothcombo_physics::contact::{CountedBody, LayerOrder, Report, ReportGarment, Selection, all_layers};
 use clothcombo_physics::query::{Distance, Surface};
 use clothcombo_physics::transform::apply;
 use miette::Diagnostic;
@@ -31,7 +31,7 @@ pub enum PostProcessError {
 }
 
 /// What the post-process needs besides a drape: the data, who drapes other poses, and constants of garments.
-pub struct Dressing<'a> {
+pub struct PostProcessor<'a> {
     dataset: &'a Dataset,
     losses: &'a LossesConfig,
     networks: Option<&'a Networks<'a>>,
@@ -40,7 +40,7 @@ pub struct Dressing<'a> {
     known: Mutex<HashMap<usize, Arc<RestGarment>>>,
 }
 
-impl<'a> Dressing<'a> {
+impl<'a> PostProcessor<'a> {
     /// For scenes of `dataset`, draped by `networks`; without them by skinning.
     pub fn new(dataset: &'a Dataset, losses: &'a LossesConfig, networks: Option<&'a Networks<'a>>) -> Self {
         let uncorrected = networks.map(Networks::uncorrected);
@@ -103,7 +103,7 @@ fn wide(scene: &PreparedScene, packed: &[[f32; 3]]) -> Vec<Vec<[f64; 3]>> {
 
 /// A scene's body and garments as the post-process takes them.
 pub struct DrapedScene<'a> {
-    dressing: &'a Dressing<'a>,
+    dressing: &'a PostProcessor<'a>,
     scene: &'a PreparedScene,
     /// The posed body.
     pub body: Surface<f64>,
@@ -130,12 +130,12 @@ impl DrapedScene<'_> {
     }
 
     /// Whether the order of the garments is feasible ([`infeasible_pair`]).
-    pub fn is_wearable(&self) -> bool {
+    pub fn is_feasible(&self) -> bool {
         let order: Vec<&Garment> = self.scene.garments.iter().map(|w| &w.garment).collect();
         infeasible_pair(&order).is_none()
     }
 
-    /// What crosses before anything is done.
+    /// What intersects before anything is done.
     ///
     /// # Errors
     /// When it is no valid scene.
@@ -162,7 +162,7 @@ impl DrapedScene<'_> {
         let layers = all_layers(garments.len());
         let order = LayerOrder::NearestVertex;
         let selection = Selection { layers: &layers, order, triangles: false, body_itself: false };
-        Report::count(&PosedBody::new(&self.body, Distance::NearestVertex), &garments, &selection)
+        Report::count(&CountedBody::new(&self.body, Distance::NearestVertex), &garments, &selection)
             .order()
             .share()
     }
@@ -213,7 +213,7 @@ impl Counts {
         }
     }
 
-    /// Whether no garment crosses the body or another garment.
+    /// Whether no garment intersects the body or another garment.
     pub fn is_clear(&self) -> bool {
         self.body_triangle_pairs + self.layer_triangle_pairs == 0
     }
@@ -222,12 +222,12 @@ impl Counts {
 /// One outfit.
 #[derive(Clone, Debug, Serialize)]
 pub struct OutfitResult {
-    /// Number of the draw.
-    pub draw: usize,
+    /// Number of the outfit.
+    pub outfit: usize,
     /// Names, inner → outer.
     pub garments: Vec<String>,
     /// Whether the order is feasible ([`infeasible_pair`]).
-    pub is_wearable: bool,
+    pub is_feasible: bool,
     /// Vertices per garment.
     pub vertices: Vec<usize>,
     /// Before the post-process.
@@ -258,7 +258,7 @@ impl OutfitResult {
     /// # Errors
     /// When it is no valid scene, or another pose cannot be draped.
     pub fn new(
-        draw: usize,
+        outfit: usize,
         draped: &DrapedScene<'_>,
         settings: &ResolveSettings,
     ) -> Result<(Self, Resolved), PostProcessError> {
@@ -270,9 +270,9 @@ impl OutfitResult {
         let vertices: Vec<usize> = scene.garments.iter().map(|w| w.vertex_count()).collect();
         let moved: usize = works.iter().map(|w| w.moved).sum();
         let result = Self {
-            draw,
+            outfit,
             garments: scene.garments.iter().map(|w| w.garment.name.clone()).collect(),
-            is_wearable: draped.is_wearable(),
+            is_feasible: draped.is_feasible(),
             before,
             after: Counts::new(
                 &resolved.certificate,

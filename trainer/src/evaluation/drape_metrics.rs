@@ -6,7 +6,7 @@ use crate::dataset::PreparedScene;
 use crate::inference::Draped;
 use crate::inference::reference::wide;
 use clothcombo_physics::contact::{
-    self, Intersections, LayerOrder, PosedBody, ReportGarment, Selection, all_layers, self_collision,
+    self, CountedBody, Intersections, LayerOrder, ReportGarment, Selection, all_layers, self_collision,
 };
 use clothcombo_physics::energy::{EnergySettings, SceneEnergy, SceneLayers, Term, TermMap};
 use clothcombo_physics::mesh::Topology;
@@ -43,7 +43,7 @@ const PAPER_COLLISION_WEIGHT: f64 = 250.0;
 /// Measures drapes of `scene` on its first body.
 pub fn measure(scene: &PreparedScene, drapes: &[Draped]) -> Vec<DrapeMetrics> {
     let surface = scene.exact_body();
-    let body = PosedBody::new(&surface, Distance::NearestVertex);
+    let body = CountedBody::new(&surface, Distance::NearestVertex);
     let layers = all_layers(scene.garments.len());
     let order = LayerOrder::NearestVertex;
     let selection = Selection { layers: &layers, order, triangles: true, body_itself: false };

@@ -1,6 +1,6 @@
 //! Means over scenes, and how sure they are.
 
-use crate::run::spread::Spread;
+use crate::run::spread::{Spread, number_or_text};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
@@ -46,8 +46,10 @@ impl Estimate {
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Ratio {
     /// Mean over mean.
+    #[serde(serialize_with = "number_or_text")]
     pub of_means: f64,
     /// Median over median.
+    #[serde(serialize_with = "number_or_text")]
     pub of_medians: f64,
     /// 95 % confidence interval of the ratio of means: the bootstrap resamples scenes, so that what makes both large cancels.
     pub interval: [f64; 2],

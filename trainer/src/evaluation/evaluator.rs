@@ -1,6 +1,6 @@
 //! What the parts of an evaluation share.
 
-use super::certificates::Dressing;
+use super::certificates::PostProcessor;
 use super::drape_metrics::{DrapeMetrics, measure};
 use super::model_under_test::ModelUnderTest;
 use super::scene_evaluation::evaluate;
@@ -82,7 +82,7 @@ pub type Progress<'a> = &'a (dyn Fn(Option<(&str, usize)>) + Sync);
 pub struct Evaluator<'a> {
     pub model: &'a ModelUnderTest,
     pub networks: &'a Networks<'a>,
-    pub post_process: Dressing<'a>,
+    pub post_process: PostProcessor<'a>,
     /// How the post-process runs.
     pub settings: ResolveSettings,
     /// Models trained with a part left out on the same data.

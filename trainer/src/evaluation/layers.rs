@@ -82,7 +82,7 @@ fn evaluate(
             false => None,
         };
         let outfit = Outfit {
-            is_feasible: draped.is_wearable(),
+            is_feasible: draped.is_feasible(),
             strain: raw(&drapes[0])
                 .iter()
                 .zip(&raw(&drapes[1]))

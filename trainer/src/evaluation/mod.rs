@@ -35,7 +35,7 @@ pub use page::Page;
 pub use timing::median_ms;
 pub use validation::ValidationSet;
 
-use certificates::Dressing;
+use certificates::PostProcessor;
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use drape_metrics::{DrapeMetrics, PAPER_COLLISION, estimates};
 use estimate::{Estimate, Metric, Proportion, Ratio};
@@ -96,7 +96,7 @@ impl Evaluation {
         let evaluator = Evaluator {
             model,
             networks: &networks,
-            post_process: Dressing::new(&model.dataset, &model.config.losses, Some(&networks)),
+            post_process: PostProcessor::new(&model.dataset, &model.config.losses, Some(&networks)),
             settings: ResolveSettings { steps: counts.continuation_steps, ..ResolveSettings::default() },
             ablations,
             specific,

@@ -5,7 +5,7 @@ use crate::inference::Draped;
 use crate::run::spread::Spread;
 use crate::run::validation::MethodScore;
 use clothcombo_physics::contact::{
-    LayerOrder, OrderViolations, Penetration, PosedBody, Report, ReportGarment, Selection,
+    CountedBody, LayerOrder, OrderViolations, Penetration, Report, ReportGarment, Selection,
 };
 use clothcombo_physics::energy::{Term, TermMap};
 use clothcombo_physics::query::{Distance, Surface};
@@ -53,7 +53,7 @@ pub fn score_scene(scene: &PreparedScene, body: &Surface<f64>, draped: &Draped) 
         .collect();
     let order = LayerOrder::NearestVertex;
     let selection = Selection { layers: &scene.contacts, order, triangles: false, body_itself: false };
-    let report = Report::count(&PosedBody::new(body, Distance::ClosestPoint), &garments, &selection);
+    let report = Report::count(&CountedBody::new(body, Distance::ClosestPoint), &garments, &selection);
     (score.penetration, score.order) = (report.penetration(DEEP), report.order());
     score
 }
@@ -72,6 +72,6 @@ pub fn method_score(method: &'static str, scenes: &[SceneScore]) -> MethodScore 
         weighted: Term::ALL.into_iter().map(|t| (t.name(), over(&|s| s.weighted[t]).mean)).collect(),
         inside: share(&|s| s.penetration.inside, &|s| s.penetration.vertices),
         deeper_than_5mm: share(&|s| s.penetration.deep, &|s| s.penetration.vertices),
-        order_violations: share(&|s| s.order.violations, &|s| s.order.counted),
+        order_violations_nearest_vertex: share(&|s| s.order.violations, &|s| s.order.counted),
     }
 }

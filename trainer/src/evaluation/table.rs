@@ -100,9 +100,12 @@ pub fn plain(value: &Value) -> String {
     }
 }
 
-/// Three significant digits.
+/// Three significant digits; what is not finite by its name.
 pub fn number(value: &Value) -> String {
-    value.as_f64().map_or("–".to_owned(), |value| number_text(value, 3))
+    match value {
+        Value::String(text) => text.clone(),
+        _ => value.as_f64().map_or("–".to_owned(), |value| number_text(value, 3)),
+    }
 }
 
 /// A share in percent.

@@ -102,7 +102,7 @@ fn evaluate(
         // Weight and margin that all models are measured with.
         "collisions": collisions,
         // Share of outer vertices by the nearest vertex, and triangle pairs between garments; means over the scenes.
-        "order_violations": mean(&|m| m.score.order.share()),
+        "order_violations_nearest_vertex": mean(&|m| m.score.order.share()),
         "layer_pairs": mean(&|m| m.layers.pairs as f64),
     }))
 }
@@ -131,7 +131,7 @@ fn table(title: &str, variants: &[Value]) -> Table {
         ("total", "/result/total", mean_and_median),
         ("self-intersecting pairs", "/result/self_pairs", mean_and_median),
         ("pairs between garments", "/layer_pairs", number),
-        ("layer-order violations [%]", "/order_violations", percent),
+        ("layer-order violations [%]", "/order_violations_nearest_vertex", percent),
     ];
     Table::new(title, variants, &columns)
 }

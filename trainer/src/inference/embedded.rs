@@ -2,7 +2,7 @@
 //! with a cache.
 
 use super::error::DraperError;
-use super::source::SourceGarment;
+use super::source::GivenGarment;
 use super::tensor_store::garment_tensors;
 use super::{Draper, elapsed};
 use crate::dataset::PreparedGarment;
@@ -44,7 +44,7 @@ pub(super) struct EmbeddedGarments(Mutex<HashMap<Key, EmbeddedGarment>>);
 
 impl EmbeddedGarments {
     /// The garment as the networks need it, made if it was not met before.
-    pub fn get(&self, draper: &Draper, source: &SourceGarment) -> Result<EmbeddedGarment, DraperError> {
+    pub fn get(&self, draper: &Draper, source: &GivenGarment) -> Result<EmbeddedGarment, DraperError> {
         let garment = &source.garment;
         let mesh = mesh_key(&garment.rest);
         let key = KeyBuilder::new("embedded").key(mesh).text(garment.category.name());

@@ -58,10 +58,10 @@ pub use names::UniqueNames;
 pub use outfit::{MAX_GARMENTS, MAX_VERTICES, Outfit, OutfitGarment};
 pub use phase_times::PhaseTimes;
 pub use refine::{Refinement, refine};
-pub use report::{BodyReport, FrameReport, GarmentReport, ModelReport, Moment, Report, Stage};
+pub use report::{BodyReport, DrapedGarmentReport, FrameReport, ModelReport, Moment, Report, Stage};
 pub use shipped::shipped_model;
 pub use smooth::{Smoothing, smooth};
-pub use source::{GarmentCatalog, SourceGarment};
+pub use source::{GarmentCatalog, GivenGarment};
 
 use crate::dataset::{ActiveJoints, CachePolicy, DatasetError, Preprocessor, load_body};
 use crate::run::checkpoint::TrainedModel;
@@ -216,7 +216,7 @@ impl Draper {
     ///
     /// # Errors
     /// For more garments than an outfit may have, or one that cannot be prepared.
-    pub fn outfit(&self, garments: Vec<SourceGarment>) -> Result<Outfit, DraperError> {
+    pub fn outfit(&self, garments: Vec<GivenGarment>) -> Result<Outfit, DraperError> {
         Outfit::check(&garments)?;
         let embedded = garments.iter().map(|source| self.embedded.get(self, source));
         let embedded = embedded.collect::<Result<_, _>>()?;

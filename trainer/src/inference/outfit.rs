@@ -4,7 +4,7 @@ use super::Draper;
 use super::embedded::{EmbeddedGarment, GarmentTimes};
 use super::error::DraperError;
 use super::names::UniqueNames;
-use super::source::SourceGarment;
+use super::source::GivenGarment;
 use crate::dataset::{PreparedGarment, contacts};
 use clothcombo_model::{Embeddings, Mode, OutfitTensors};
 use clothcombo_physics::contact::resolve::{Layer, ResolveError, RestGarment};
@@ -22,7 +22,7 @@ pub struct OutfitGarment {
     /// Name, unique within the outfit and fit to be a file name.
     pub name: String,
     /// As it was given.
-    pub source: Arc<SourceGarment>,
+    pub source: Arc<GivenGarment>,
     /// Ready for the networks.
     pub prepared: Arc<PreparedGarment>,
     /// As the post-process sees it.
@@ -45,7 +45,7 @@ impl Outfit {
     /// Packs embedded garments, innermost first.
     pub(super) fn new(
         draper: &Draper,
-        sources: Vec<SourceGarment>,
+        sources: Vec<GivenGarment>,
         embedded: Vec<EmbeddedGarment>,
     ) -> Result<Self, DraperError> {
         let prepared: Vec<Arc<PreparedGarment>> = embedded.iter().map(|e| e.prepared.clone()).collect();
@@ -55,7 +55,7 @@ impl Outfit {
         let embeddings = embedded.iter().map(|e| e.embedding.clone()).collect::<Vec<_>>();
         let embeddings = draper.model.pack(&tensors, &embeddings, Mode::Layered)?;
         let mut names = UniqueNames::default();
-        let garment = |(source, embedded): (SourceGarment, EmbeddedGarment)| OutfitGarment {
+        let garment = |(source, embedded): (GivenGarment, EmbeddedGarment)| OutfitGarment {
             name: names.take(&source.garment.name),
             source: Arc::new(source),
             prepared: embedded.prepared,
@@ -70,7 +70,7 @@ impl Outfit {
     ///
     /// # Errors
     /// When they are not.
-    pub fn check(garments: &[SourceGarment]) -> Result<(), DraperError> {
+    pub fn check(garments: &[GivenGarment]) -> Result<(), DraperError> {
         if garments.is_empty() || garments.len() > MAX_GARMENTS {
             return Err(DraperError::Count { count: garments.len(), most: MAX_GARMENTS });
         }

@@ -45,7 +45,7 @@ pub struct BodyReport {
 
 /// One garment. The time of what treats all garments at once is shared by number of vertices.
 #[derive(Clone, Debug, Serialize)]
-pub struct GarmentReport {
+pub struct DrapedGarmentReport {
     /// Its name, and that of its file.
     pub name: String,
     /// The file it was read from, if it was.
@@ -91,7 +91,7 @@ pub struct Report {
     /// The body.
     pub body: BodyReport,
     /// The garments, innermost first.
-    pub garments: Vec<GarmentReport>,
+    pub garments: Vec<DrapedGarmentReport>,
     /// Score of the first frame before the post-process.
     pub before: Score,
     /// And of the result.
@@ -217,7 +217,7 @@ impl Drape {
     }
 }
 
-fn garment_reports(outfit: &Outfit, drapes: &[Drape]) -> Vec<GarmentReport> {
+fn garment_reports(outfit: &Outfit, drapes: &[Drape]) -> Vec<DrapedGarmentReport> {
     let all: usize = outfit.garments.iter().map(|p| p.prepared.vertex_count()).sum();
     let report = |(index, garment): (usize, &super::OutfitGarment)| {
         let vertices = garment.prepared.vertex_count();
@@ -240,7 +240,7 @@ fn garment_reports(outfit: &Outfit, drapes: &[Drape]) -> Vec<GarmentReport> {
                 ..PhaseTimes::default()
             };
         }
-        GarmentReport {
+        DrapedGarmentReport {
             name: garment.name.clone(),
             given: garment.source.path.clone(),
             given_vertices: garment.source.given.positions.len(),

@@ -5,8 +5,8 @@ use crate::config::Config;
 use crate::dataset::{DatasetError, GarmentLoader, GarmentSource};
 use crate::score::misplaced;
 use clothcombo_data::asset::{Body, Category, Garment, Provenance};
-use clothcombo_data::dataset::list_garment_folder;
 use clothcombo_data::fit::{FitReport, FitSettings, fit, is_on_body};
+use clothcombo_data::folders::list_garment_folder;
 use clothcombo_data::format::{PolygonMesh, load_mesh};
 use clothcombo_data::generate::GarmentGenerator;
 use clothcombo_data::mesh::MeshMeasures;
@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 
 /// A garment ready to be prepared for the networks.
 #[derive(Clone, Debug)]
-pub struct SourceGarment {
+pub struct GivenGarment {
     /// At rest on the zero body.
     pub garment: Garment,
     /// The mesh as it was given: what an output file repeats.
@@ -30,7 +30,7 @@ pub struct SourceGarment {
     follows: Vec<u32>,
 }
 
-impl SourceGarment {
+impl GivenGarment {
     /// A garment that already lies on the zero body.
     pub fn new(garment: Garment) -> Self {
         let mut given = PolygonMesh::with_positions(garment.rest.positions().to_vec());
@@ -73,7 +73,7 @@ impl SourceGarment {
     }
 }
 
-/// Whether a mesh that is taken as it is lies somewhere near the zero body: if not, it crosses nothing, and looks like a good drape.
+/// Whether a mesh that is taken as it is lies somewhere near the zero body: if not, it intersects nothing, and looks like a good drape.
 fn check_place(path: &Path, rest: &TriMesh, body: &Body) -> Result<(), DraperError> {
     match misplaced(rest, &body.zero_body()) {
         Some(what) => Err(DraperError::Place { path: path.into(), what }),
@@ -153,14 +153,14 @@ impl GarmentCatalog {
         name: &str,
         body: &Body,
         always_fit: Option<bool>,
-    ) -> Result<SourceGarment, DraperError> {
+    ) -> Result<GivenGarment, DraperError> {
         let path = Path::new(name);
         // A word without a dot or a slash is a name, not a file that happens to be missing.
         let is_path = path.is_file()
             || name.contains('/')
             || (path.extension().is_some() && !self.sources.contains_key(name));
         if is_path {
-            return SourceGarment::read(path, body, always_fit);
+            return GivenGarment::read(path, body, always_fit);
         }
         let origin = self.sources.get(name).ok_or_else(|| DraperError::UnknownGarment {
             name: name.to_owned(),
@@ -168,20 +168,20 @@ impl GarmentCatalog {
         })?;
         let loader = GarmentLoader::new(body, std::slice::from_ref(origin))?;
         let GarmentSource::File(listed) = origin else {
-            return Ok(SourceGarment::new(loader.load(origin)?));
+            return Ok(GivenGarment::new(loader.load(origin)?));
         };
         let made = loader.load(origin);
         let must_fit = always_fit.unwrap_or_else(|| {
             !made.as_ref().is_ok_and(|garment| is_clean(&garment.rest) && is_on_body(&garment.rest, body))
         });
         if must_fit {
-            let mut source = SourceGarment::read(&listed.path, body, Some(true))?;
+            let mut source = GivenGarment::read(&listed.path, body, Some(true))?;
             source.garment.name.clone_from(&listed.name);
             return Ok(source);
         }
         let garment = made?;
         check_place(&listed.path, &garment.rest, body)?;
-        let mut source = SourceGarment::new(garment);
+        let mut source = GivenGarment::new(garment);
         // Polygons as the file has them.
         source.given = load_mesh(&listed.path).map_err(DatasetError::data)?;
         source.path = Some(listed.path.clone());

@@ -31,7 +31,7 @@ pub enum DrapeError {
 /// Embeddings of one state of the networks, by garment; threads share it.
 pub type KnownEmbeddings = LruCache<GarmentEmbedding>;
 
-/// The constant tensors of a wardrobe on one device, made when a garment is first drawn.
+/// The constant tensors of garments on one device, made when a garment is first used.
 pub struct TensorStore {
     dataset: Arc<Dataset>,
     memory: Arc<MemoryBudget>,

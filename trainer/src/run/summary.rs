@@ -180,7 +180,7 @@ impl RunSummary {
                     continue;
                 };
                 if group["group"] == ValidationGroup::Layered.name() {
-                    self.order_violations = network["order_violations"].as_f64();
+                    self.order_violations = network["order_violations_nearest_vertex"].as_f64();
                 } else if group["group"] == ValidationGroup::Single.name() {
                     let strain = |m: &Value| m["raw"]["strain"]["mean"].as_f64();
                     self.strain_ratio = strain(network).zip(strain(skinning)).map(|(a, b)| a / b);

@@ -56,7 +56,7 @@ pub struct MethodScore {
     /// Share of the garment vertices deeper than 5 mm.
     pub deeper_than_5mm: f64,
     /// Share of outer vertices that violate the layer order, among those within 5 cm of an inner layer.
-    pub order_violations: f64,
+    pub order_violations_nearest_vertex: f64,
 }
 
 /// All methods over one group of scenes; the baselines come first, the whole network last.
@@ -122,7 +122,7 @@ impl fmt::Display for ValidationReport {
                     raw(Term::Holding),
                     100.0 * m.inside,
                     100.0 * m.deeper_than_5mm,
-                    100.0 * m.order_violations
+                    100.0 * m.order_violations_nearest_vertex
                 )?;
             }
             let Some((last, others)) = group.methods.split_last() else { continue };

@@ -17,7 +17,7 @@ pub(crate) use place::misplaced;
 
 use crate::config::LossesConfig;
 use crate::dataset::objective::scene_weights;
-use clothcombo_physics::contact::{LayerOrder, PosedBody, Report, ReportGarment, Selection};
+use clothcombo_physics::contact::{CountedBody, LayerOrder, Report, ReportGarment, Selection};
 use clothcombo_physics::energy::{
     EnergySettings, GarmentEnergies, SceneEnergy, SceneGarment, SceneLayers, Term, TermMap,
 };
@@ -181,7 +181,7 @@ pub fn score(
         garments.iter().map(|g| ReportGarment { positions: g.positions, faces: g.rest.faces() }).collect();
     let order = LayerOrder::NearestVertex;
     let selection = Selection { layers: &pairs, order, triangles: true, body_itself: true };
-    let report = Report::count(&PosedBody::new(&surface, distance.into()), &meshes, &selection);
+    let report = Report::count(&CountedBody::new(&surface, distance.into()), &meshes, &selection);
 
     let garment_scores =
         garments.iter().enumerate().map(|(i, garment)| -> Result<GarmentScore, ScoreError> {

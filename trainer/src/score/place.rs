@@ -1,4 +1,4 @@
-//! Whether meshes are in one unit and one place: what is not crosses nothing, which would look like a good result.
+//! Whether meshes are in one unit and one place: what is not intersects nothing, which would look like a good result.
 
 use clothcombo_physics::mesh::TriMesh;
 

@@ -113,7 +113,7 @@ pub struct IncidentScene {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct IncidentGarment {
-    /// Place in the wardrobe.
+    /// Place in the dataset.
     pub index: usize,
     /// Name.
     pub name: String,
@@ -236,8 +236,8 @@ impl Incident {
         let model = self.model(path, config, dataset, &device)?;
         let mut scenes = Vec::with_capacity(self.scenes.len());
         for scene in &self.scenes {
-            let draw = scene.to_sample(dataset, path)?;
-            let prepared = prepare(dataset, &config.losses, draw, self.run_progress.0);
+            let sample = scene.to_sample(dataset, path)?;
+            let prepared = prepare(dataset, &config.losses, sample, self.run_progress.0);
             scenes.push(prepared.map_err(crate::inference::tensor_store::DrapeError::from)?);
         }
         if self.injected == Some(Injected::Position) {
@@ -341,7 +341,7 @@ impl IncidentScene {
             let index = Some(garment.index)
                 .filter(|&i| i < dataset.garments.len() && is_it(i))
                 .or_else(|| (0..dataset.garments.len()).find(|&i| is_it(i)))
-                .ok_or_else(|| changed("is not in the wardrobe any more".into()))?;
+                .ok_or_else(|| changed("is not in the dataset any more".into()))?;
             match dataset.garments.info(index).vertices {
                 found if found == garment.vertices => Ok(index),
                 found => Err(changed(format!("has {found} vertices now, it had {}", garment.vertices))),

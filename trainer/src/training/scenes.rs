@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// Scenes in step order, prepared on another thread.
 pub type Scenes = Prefetch<Vec<PreparedScene>, DrapeError>;
 
-/// Draws and prepares the scenes of `step` that are in `share`, as its stage asks for.
+/// Samples and prepares the scenes of `step` that are in `share`, as its stage asks for.
 ///
 /// # Errors
 /// When a garment cannot be read.
@@ -26,8 +26,8 @@ pub fn prepare_step(
     let stage = &config.stages[at.stage];
     let plan = Plan { stage, progress: at.stage_progress };
     let scenes = (0..stage.accumulate).filter(|scene| share.has(*scene));
-    let draws = scenes.map(|i| sample_training(dataset, config.seed, step, i, plan));
-    draws.map(|draw| prepare(dataset, &config.losses, draw, at.run_progress)).collect()
+    let samples = scenes.map(|i| sample_training(dataset, config.seed, step, i, plan));
+    samples.map(|sample| prepare(dataset, &config.losses, sample, at.run_progress)).collect()
 }
 
 /// Starts preparing the scenes in `share` from `first_step` to the end of the schedule, with the tensors of their garments.

@@ -91,7 +91,7 @@ impl Session {
     pub fn config(&self) -> &Config {
         &self.config
     }
-    /// The wardrobe.
+    /// The dataset.
     pub fn dataset(&self) -> &Arc<Dataset> {
         &self.dataset
     }
@@ -103,7 +103,7 @@ impl Session {
         let estimate = MemoryEstimate::new(&self.config, &sizes, model.num_params(), on_processor);
         Some(estimate.after_start(Memory::now()?.resident, streams))
     }
-    /// The constant tensors of the wardrobe.
+    /// The constant tensors of the garments.
     pub fn tensors(&self) -> &Arc<TensorStore> {
         &self.tensors
     }

@@ -118,9 +118,9 @@ fn what_is_written_is_clear_and_has_the_topology_it_came_with() {
         let (before, others_before) = parse(case.path(name));
         let (after, others_after) = parse(case.path("out").join(name));
         let name = name.trim_end_matches(".obj");
-        let dataset = format!("{name}.mtl");
-        assert!(others_before.iter().map(|l| l.replace("tube.mtl", &dataset)).eq(others_after));
-        let mtl = fs::read_to_string(case.path("out").join(dataset)).unwrap();
+        let material_file = format!("{name}.mtl");
+        assert!(others_before.iter().map(|l| l.replace("tube.mtl", &material_file)).eq(others_after));
+        let mtl = fs::read_to_string(case.path("out").join(material_file)).unwrap();
         assert!(mtl.starts_with("newmtl wool\nKd 1 0 0\n"), "{mtl}");
         assert_eq!(before.polygons, after.polygons);
         assert_eq!(before.positions.len(), after.positions.len());

@@ -18,7 +18,7 @@ use super::overwrite::refuse_overwriting;
 use super::summary::{ImportError, Progress, Summary};
 use super::thinning::{Thinned, Thinning, thin};
 use crate::asset::{BindingSettings, Body, Category, Garment, Motion, Provenance};
-use crate::dataset::{FolderGarment, save_garment_folder};
+use crate::folders::{FolderGarment, save_garment_folder};
 use crate::format::{FileError, NpzWriter, PointCache, folder, obj};
 use crate::mesh::contact;
 use clothcombo_physics::query::Surface;

@@ -10,7 +10,7 @@ use crate::cli::values::at_least_one;
 use crate::cli::verbosity::progress_bar;
 use crate::config::Config;
 use crate::dataset::{Dataset, PreparedScene, SceneSample, prepare, sample_outfit};
-use crate::evaluation::certificates::{DrapedScene, Dressing, OutfitResult};
+use crate::evaluation::certificates::{DrapedScene, OutfitResult, PostProcessor};
 use crate::inference::UniqueNames;
 use crate::inference::networks::Networks;
 use crate::inference::tensor_store::TensorStore;
@@ -29,35 +29,35 @@ use std::sync::Arc;
 ///
 /// Shapes are sampled from the configuration's range, poses from validation clips, 1 to --layers of all garments in random order.
 #[derive(Parser)]
-#[command(after_help = "Examples:\n  clothcombo bench certificate --draws 500\n  \
+#[command(after_help = "Examples:\n  clothcombo bench certificate --outfits 500\n  \
         clothcombo bench certificate --checkpoint runs/open --json > certificate.json\n  \
         clothcombo bench certificate --checkpoint models/default --jobs 2\n  \
-        clothcombo bench certificate --only 17 --meshes /tmp/draw-17\n  \
-        clothcombo bench certificate --draws 24 --orders helper_tee,helper_vest,Coat,helper_shorts")]
+        clothcombo bench certificate --only 17 --meshes /tmp/outfit-17\n  \
+        clothcombo bench certificate --outfits 24 --orders helper_tee,helper_vest,Coat,helper_shorts")]
 pub struct Arguments {
     #[command(flatten)]
     model: ModelArguments,
     /// Random outfits
     #[arg(long, default_value_t = 500, value_parser = at_least_one)]
-    draws: usize,
+    outfits: usize,
     /// Most garments of an outfit
     #[arg(long, default_value_t = 6, value_parser = clap::value_parser!(u8).range(1..=12))]
     layers: u8,
-    /// These garments in every order instead of random ones: draw i has order i mod n! on the body of draw i / n!
+    /// These garments in every order instead of random ones: outfit i has order i mod n! on the body of outfit i / n!
     #[arg(long, value_delimiter = ',', value_name = "NAME,NAME,…")]
     orders: Vec<String>,
-    /// Only these draws, by number from 0
+    /// Only these outfits, by number from 0
     #[arg(long, value_delimiter = ',')]
     only: Vec<usize>,
     /// Outfits resolved in parallel, a core for each; 1: one after the other, each with all cores
     #[arg(long, default_value_t = 1, value_parser = at_least_one)]
     jobs: usize,
-    /// Seed of the draws; default: that of the configuration
+    /// Seed of the outfits; default: that of the configuration
     #[arg(long)]
     seed: Option<u64>,
     #[command(flatten)]
     post_process: PostProcessArguments,
-    /// Writes body and garments (rest, draped, resolved) of every draw as OBJ under this folder
+    /// Writes body and garments (rest, draped, resolved) of every outfit as OBJ under this folder
     #[arg(long, value_name = "DIR")]
     meshes: Option<PathBuf>,
     /// Print JSON instead of tables
@@ -106,35 +106,35 @@ fn measure(
             Some(Networks::new(checkpoint.networks(&device)?, &tensors))
         }
     };
-    let draws: Vec<usize> = match arguments.only.is_empty() {
-        true => (0..arguments.draws).collect(),
+    let outfits: Vec<usize> = match arguments.only.is_empty() {
+        true => (0..arguments.outfits).collect(),
         false => arguments.only.clone(),
     };
-    let bar = progress_bar(draws.len(), "outfits {bar:30} {pos}/{len} · {eta} left");
+    let bar = progress_bar(outfits.len(), "outfits {bar:30} {pos}/{len} · {eta} left");
     let orders = orders(dataset, &arguments.orders)?;
-    let dressing = Dressing::new(dataset, &config.losses, networks.as_ref());
-    let resolve = |draw: usize| {
+    let post_process = PostProcessor::new(dataset, &config.losses, networks.as_ref());
+    let resolve = |outfit: usize| {
         let seed = arguments.seed.unwrap_or_else(|| config.validation_seed());
-        let outfit = match orders.is_empty() {
-            true => sample_outfit(dataset, seed, draw as u64, usize::from(arguments.layers)),
+        let sample = match orders.is_empty() {
+            true => sample_outfit(dataset, seed, outfit as u64, usize::from(arguments.layers)),
             false => {
-                let body = sample_outfit(dataset, seed, (draw / orders.len()) as u64, 1);
-                SceneSample { garments: orders[draw % orders.len()].clone(), ..body }
+                let body = sample_outfit(dataset, seed, (outfit / orders.len()) as u64, 1);
+                SceneSample { garments: orders[outfit % orders.len()].clone(), ..body }
             }
         };
-        let scene = prepare(dataset, &config.losses, outfit, 1.0)?;
-        let draped = dressing.of(&scene, &dressing.drape(&scene)?);
+        let scene = prepare(dataset, &config.losses, sample, 1.0)?;
+        let draped = post_process.of(&scene, &post_process.drape(&scene)?);
         let (result, resolved) =
-            OutfitResult::new(draw, &draped, settings).wrap_err_with(|| format!("draw {draw}"))?;
+            OutfitResult::new(outfit, &draped, settings).wrap_err_with(|| format!("outfit {outfit}"))?;
         if let Some(folder) = &arguments.meshes {
-            write_meshes(&folder.join(format!("{draw:04}")), &scene, &draped, &resolved.positions)?;
+            write_meshes(&folder.join(format!("{outfit:04}")), &scene, &draped, &resolved.positions)?;
         }
         bar.inc(1);
         Ok(result)
     };
     match arguments.jobs {
-        1 => draws.into_iter().map(resolve).collect(),
-        jobs => map_single_threaded(draws, Some(jobs), resolve),
+        1 => outfits.into_iter().map(resolve).collect(),
+        jobs => map_single_threaded(outfits, Some(jobs), resolve),
     }
 }
 

@@ -9,7 +9,7 @@ use crate::cli::values::at_least_one;
 use crate::cli::verbosity::progress_bar;
 use crate::config::{Config, ValidationConfig};
 use crate::dataset::{Dataset, DatasetError, PreparedScene, ValidationGroup, prepare, sample_validation};
-use crate::evaluation::certificates::Dressing;
+use crate::evaluation::certificates::PostProcessor;
 use crate::evaluation::equilibrium_error::{Drapes, SceneError, scene_error};
 use crate::inference::DraperError;
 use crate::inference::networks::Networks;
@@ -139,7 +139,7 @@ fn drape(
     let device = Backend::preferred().device();
     let tensors = TensorStore::new(dataset.clone(), trained.state.dimensions(), &device);
     let networks = Networks::new(trained.networks(&device)?, &tensors);
-    let dressing = Dressing::new(dataset, &config.losses, Some(&networks));
+    let dressing = PostProcessor::new(dataset, &config.losses, Some(&networks));
     let post_process = ResolveSettings { steps: CONTINUATION_STEPS, ..ResolveSettings::default() };
     let bar = progress_bar(scenes.len(), "draping {bar:30} {pos}/{len} · {eta} left");
     let drapes = scenes.iter().map(|scene| {

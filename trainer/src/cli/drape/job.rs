@@ -1,7 +1,7 @@
 //! One outfit to be draped, and the bodies it is draped on.
 
 use crate::dataset::DatasetError;
-use crate::inference::{BodyReport, BodyState, Draper, Moment, SourceGarment};
+use crate::inference::{BodyReport, BodyState, Draper, GivenGarment, Moment};
 use clap::Args;
 use clothcombo_data::asset::{KnownShape, Motion, Pose, recover_body};
 use clothcombo_data::format::load_mesh;
@@ -189,9 +189,9 @@ fn posed_body(draper: &Draper, scene: &SceneArguments, posed: &Path) -> Result<S
 
 /// `sources` in the order of `numbers`.
 pub(super) fn ordered(
-    sources: Vec<SourceGarment>,
+    sources: Vec<GivenGarment>,
     numbers: Option<&[usize]>,
-) -> Result<Vec<SourceGarment>, Failure> {
+) -> Result<Vec<GivenGarment>, Failure> {
     let Some(numbers) = numbers else { return Ok(sources) };
     let mut sorted = numbers.to_vec();
     sorted.sort_unstable();
@@ -208,7 +208,7 @@ pub(super) fn ordered(
             sources.len()
         ));
     }
-    let mut sources: Vec<Option<SourceGarment>> = sources.into_iter().map(Some).collect();
+    let mut sources: Vec<Option<GivenGarment>> = sources.into_iter().map(Some).collect();
     Ok(numbers.iter().filter_map(|n| sources[*n].take()).collect())
 }
 

@@ -33,7 +33,7 @@ use warnings::{log_repairs, warn_about_order, warn_about_shape};
         clothcombo drape --checkpoint runs/smoke --garments tee.obj coat.glb -o out\n  \
         clothcombo drape --garments tee.obj skirt.obj coat.obj --order 1,0,2 --shape 1.5,-0.5 --pose walk.npz:30 -o out\n  \
         clothcombo drape --garments tee.obj --motion walk.npz --frames 0..120 -o out\n  \
-        clothcombo drape --outfits garments.toml -o out\n\n\
+        clothcombo drape --outfits outfits.toml -o out\n\n\
         A garment is a mesh file (.obj, .ply, .stl, .gltf, .glb) or the name of one in --dataset or in the model's own data.\n\
         What does not lie on the body in metres, y up and T-pose is fitted first (see `clothcombo fit`); every repair is in\n\
         report.json. Outputs keep the vertices and polygons of the given files, in their order.\n\n\
@@ -52,7 +52,7 @@ pub struct Arguments {
     /// Garments, innermost first: mesh files or names
     #[arg(long, num_args = 1.., value_name = "GARMENT", required_unless_present = "outfits", conflicts_with = "outfits")]
     garments: Vec<String>,
-    /// Wears the garments in another order: their numbers from 0, innermost first
+    /// Drapes the garments in another order: their numbers from 0, innermost first
     #[arg(long, value_delimiter = ',', value_name = "NUMBERS", conflicts_with = "outfits")]
     order: Option<Vec<usize>>,
     /// Several outfits in one process, from a TOML file; each garment is embedded once

@@ -1,6 +1,6 @@
 //! Warnings about inputs that can be draped.
 
-use crate::inference::SourceGarment;
+use crate::inference::GivenGarment;
 use clothcombo_data::asset::{Garment, infeasible_pair};
 
 pub(super) fn warn_about_shape(shape: &[f64], [low, high]: [f64; 2]) {
@@ -9,7 +9,7 @@ pub(super) fn warn_about_shape(shape: &[f64], [low, high]: [f64; 2]) {
     }
 }
 
-pub(super) fn warn_about_order(sources: &[SourceGarment]) {
+pub(super) fn warn_about_order(sources: &[GivenGarment]) {
     let order: Vec<&Garment> = sources.iter().map(|source| &source.garment).collect();
     if let Some([inner, outer]) = infeasible_pair(&order) {
         tracing::warn!(
@@ -20,7 +20,7 @@ pub(super) fn warn_about_order(sources: &[SourceGarment]) {
     }
 }
 
-pub(super) fn log_repairs(source: &SourceGarment) {
+pub(super) fn log_repairs(source: &GivenGarment) {
     let Some(fit) = &source.fit else { return };
     let name = &source.garment.name;
     tracing::info!("{name} fitted: {}", fit.assumptions().join("; "));

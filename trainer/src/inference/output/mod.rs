@@ -16,7 +16,7 @@ mod viewer;
 
 pub use staged::Staged;
 
-use super::{Drape, Draper, DraperError, Moment, Outfit, SourceGarment};
+use super::{Drape, Draper, DraperError, GivenGarment, Moment, Outfit};
 use crate::picture::{BODY_COLOUR, PictureError, layer_colour};
 use clothcombo_data::format::obj::{self, MovedObj};
 use clothcombo_data::format::{FileError, SceneMesh, save_glb};
@@ -199,7 +199,7 @@ fn write_frame(folder: &Path, show: &Show, drape: &Drape) -> Result<Vec<String>,
 /// # Errors
 /// Naming the file, when it cannot be read any more, or is no longer what was read.
 fn as_given(
-    source: &SourceGarment,
+    source: &GivenGarment,
     positions: &[[f64; 3]],
     name: &str,
     comments: &[String],
@@ -255,9 +255,9 @@ mod tests {
         let garment = generator.generate(Category::TShirt, 0, &settings).unwrap();
         let positions = garment.rest.positions().to_vec();
         obj::save(&path, &positions, garment.rest.faces(), &[]).unwrap();
-        let mut source = SourceGarment::new(garment);
+        let mut source = GivenGarment::new(garment);
         let given =
-            |source: &SourceGarment| as_given(source, &positions, "tee", &[]).map(|moved| moved.is_some());
+            |source: &GivenGarment| as_given(source, &positions, "tee", &[]).map(|moved| moved.is_some());
         assert_eq!(given(&source), Ok(false), "of no file there is nothing to repeat");
         source.path = Some(path.clone());
         assert_eq!(given(&source), Ok(true));

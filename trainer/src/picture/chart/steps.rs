@@ -46,7 +46,7 @@ impl Steps {
         vec![
             Key::line(r#"class="curve""#, "median"),
             Key::area(r#"class="band""#, "5th to 95th percentile"),
-            Key::line(r#"class="baseline""#, "LBS alone (validation)"),
+            Key::line(r#"class="baseline""#, "LBS + shape transfer (validation)"),
             Key::line(r#"class="stage""#, "stage begins"),
         ]
     }
@@ -162,7 +162,7 @@ fn latest_text(points: &[(f64, f64)], baseline: Option<f64>) -> String {
         if value >= 0.0 && baseline > 0.0 {
             text += &format!("{} × ", number_text(value / baseline, 2));
         }
-        text += &format!("LBS {}</tspan>", number_text(baseline, 3));
+        text += &format!("LBS + shape {}</tspan>", number_text(baseline, 3));
     }
     text
 }

@@ -25,7 +25,7 @@ pub struct MemoryEstimate {
     /// Device: what the largest scene, or several in parallel, keep of networks and energies for the backward pass; or the
     /// update of the parameters, the scenes of a validation or a picture, where one of these takes more.
     pub step: u64,
-    /// What the garments of the whole wardrobe would take on the host, if all were kept.
+    /// What the garments of the whole dataset would take on the host, if all were kept.
     pub all_garments: u64,
     /// What their tensors and embeddings would take on the device.
     pub all_tensors: u64,

@@ -203,7 +203,7 @@ impl TensorBoardObserver {
                     let tag = |what: &str| format!("validation, {}/{what}", group.group);
                     values.push((tag("total"), network.total.mean));
                     values.push((tag("inside the body"), network.inside));
-                    values.push((tag("layer-order violations"), network.order_violations));
+                    values.push((tag("layer-order violations"), network.order_violations_nearest_vertex));
                     values.extend(network.raw.iter().map(|(name, spread)| (tag(name), spread.mean)));
                 }
                 self.events.scalars(*step, values.iter().map(|(n, v)| (n.as_str(), *v)))?;

@@ -180,7 +180,7 @@ impl Page<'_> {
                     number(&method["raw"]["gravity"]["mean"]),
                     percent(&method["inside"]),
                     percent(&method["deeper_than_5mm"]),
-                    percent(&method["order_violations"]),
+                    percent(&method["order_violations_nearest_vertex"]),
                 );
             }
             out.push_str("</table>\n");

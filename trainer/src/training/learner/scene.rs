@@ -170,14 +170,11 @@ pub fn drape_states(
 
 /// The networks of a step: those that learn from `model`, those that the stage freezes from `frozen`.
 fn with_frozen(model: &ClothCombo, frozen: Option<&ClothCombo>, trains: Trains) -> ClothCombo {
-    match (frozen, trains) {
-        (Some(frozen), Trains::Untangling) => {
-            ClothCombo { untangling: model.untangling.clone(), ..frozen.clone() }
-        }
-        (Some(frozen), Trains::Corrections) => {
-            ClothCombo { corrections: model.corrections.clone(), ..frozen.clone() }
-        }
-        _ => model.clone(),
+    let frozen = || frozen.expect("kept at the first step of a stage that freezes").clone();
+    match trains {
+        Trains::Single | Trains::All => model.clone(),
+        Trains::Untangling => ClothCombo { untangling: model.untangling.clone(), ..frozen() },
+        Trains::Corrections => ClothCombo { corrections: model.corrections.clone(), ..frozen() },
     }
 }
 

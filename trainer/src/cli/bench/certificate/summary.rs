@@ -17,12 +17,12 @@ type Group = (&'static str, &'static str, fn(&OutfitResult) -> bool);
 
 const GROUPS: [Group; 4] = [
     ("all", "all", |_| true),
-    ("wearable", "in a feasible order", |r| r.is_wearable),
+    ("wearable", "in a feasible order", |r| r.is_feasible),
     ("in_one_go", "no path needed", |r| r.steps == 0),
     ("hardly_pinched", "on a hardly pinched body", |r| r.before.pinched_pairs < HARDLY_PINCHED),
 ];
 
-/// All numbers, with every draw.
+/// All numbers, with every outfit.
 pub(super) fn report(results: &[OutfitResult], layers: usize) -> Value {
     let by_layers = (1..=layers).map(|layers| Summary::new(results, |r| r.garments.len() == layers));
     let mut report = json!({
@@ -30,7 +30,7 @@ pub(super) fn report(results: &[OutfitResult], layers: usize) -> Value {
         "clear_within": WITHIN
             .map(|seconds| json!({ "seconds": seconds, "share": clear_within(results, seconds) })),
         "failures": failures(results).collect::<Vec<_>>(),
-        "draws": results,
+        "outfits": results,
     });
     for (key, _, belongs) in GROUPS {
         report[key] = json!(Summary::new(results, belongs));
@@ -70,7 +70,7 @@ fn per_vertex(result: &OutfitResult) -> f64 {
 /// A group of outfits: shares of them, and spreads over them.
 #[derive(Serialize)]
 struct Summary {
-    draws: usize,
+    outfits: usize,
     clear_before: f64,
     clear_after: f64,
     clear_of_self_after: f64,
@@ -97,7 +97,7 @@ impl Summary {
             (!all.is_empty()).then(|| Spread::of(all))
         };
         Self {
-            draws: chosen.len(),
+            outfits: chosen.len(),
             clear_before: share(|r| r.before.is_clear()),
             clear_after: share(|r| r.after.is_clear()),
             clear_of_self_after: share(|r| r.after.self_triangle_pairs == 0),
@@ -119,7 +119,7 @@ impl Summary {
         let time = self.milliseconds_per_garment.unwrap_or_default();
         row! {
             "outfits" => name,
-            "draws" => self.draws,
+            "outfits" => self.outfits,
             "clear %" => 100.0 * self.clear_before,
             "after %" => 100.0 * self.clear_after,
             "self %" => 100.0 * self.clear_of_self_after,
@@ -138,7 +138,7 @@ pub(super) fn tables(results: &[OutfitResult], layers: usize) -> String {
     let by_count = (1..=most)
         .map(|count| (format!("{count} garments"), Summary::new(results, |r| r.garments.len() == count)));
     let groups = GROUPS.into_iter().map(|(_, name, belongs)| (name.into(), Summary::new(results, belongs)));
-    let groups = by_count.chain(groups).filter(|(_, group)| group.draws > 0);
+    let groups = by_count.chain(groups).filter(|(_, group)| group.outfits > 0);
     let groups: Vec<Row> = groups.map(|(name, group)| group.row(name)).collect();
 
     let all = Summary::new(results, |_| true);
@@ -169,13 +169,13 @@ pub(super) fn tables(results: &[OutfitResult], layers: usize) -> String {
 fn failure_row(r: &OutfitResult) -> Row {
     let pairs = |before: usize, after: usize| format!("{before} → {after}");
     row! {
-        "not clear" => r.draw,
+        "not clear" => r.outfit,
         "body pairs" => pairs(r.before.body_triangle_pairs, r.after.body_triangle_pairs),
         "narrow of these" => r.after.narrow_triangle_pairs,
         "layer pairs" => pairs(r.before.layer_triangle_pairs, r.after.layer_triangle_pairs),
         "pinched" => r.after.pinched_pairs,
         "deepest [mm]" => r.after.max_depth_mm,
         "garments" => r.garments.join(" < "),
-        "" => if r.is_wearable { "" } else { "(infeasible order)" },
+        "" => if r.is_feasible { "" } else { "(infeasible order)" },
     }
 }

@@ -132,7 +132,7 @@ impl Summary {
             row! {
                 "mean / median / 95 %" => m.method,
                 "excess [J]" => m.excess,
-                "excess [% of LBS]" => m.excess_percent,
+                "excess [% of LBS + shape transfer]" => m.excess_percent,
                 "distance [mm]" => m.distance_mm,
             }
         };

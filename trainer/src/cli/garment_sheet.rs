@@ -10,7 +10,7 @@ pub const PER_ROW: usize = 8;
 const CELL: [f64; 2] = [190.0, 210.0];
 
 /// Up to [`PER_ROW`] garments of each category, seen from the front left.
-pub fn contact_sheet(body: &Body, garments: &[Garment]) -> RgbImage {
+pub fn garment_sheet(body: &Body, garments: &[Garment]) -> RgbImage {
     let mut sheet = Sheet::default();
     for category in Category::ALL {
         let row: Vec<&Garment> = garments.iter().filter(|g| g.category == category).take(PER_ROW).collect();
