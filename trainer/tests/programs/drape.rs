@@ -147,7 +147,7 @@ fn a_posed_outfit_leaves_every_output_and_each_reads_back() {
     let output = drape(&arguments).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let table = String::from_utf8_lossy(&output.stdout);
-    assert!(table.contains("certificate:") && table.contains(TEE) && table.contains("untangling"), "{table}");
+    assert!(table.contains("certificate:") && table.contains(TEE) && table.contains("networks"), "{table}");
 
     let out = Path::new(&out);
     let given = load_mesh(Path::new(&band)).unwrap();
