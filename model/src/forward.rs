@@ -6,16 +6,8 @@ use tracing::trace_span;
 use crate::cloth_combo::{ClothCombo, Embeddings};
 use crate::correction::Conditioning;
 use crate::linear_blend_skinning::linear_blend_skinning;
+use crate::mode::Mode;
 use crate::tensors::{BodyTensors, ContactFeatureTensors, OutfitTensors};
-
-/// How far a forward pass goes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mode {
-    /// Every garment by itself.
-    Single,
-    /// Every garment by itself, then all of them against each other.
-    Layered,
-}
 
 /// Positions of the garments of an outfit.
 #[derive(Clone, Debug)]

@@ -5,7 +5,8 @@ use super::{Evaluator, GarmentSet, PAPER_COLLISION, Scenes, Section, Table, esti
 use crate::dataset::{HeldOut, PreparedScene};
 use crate::inference::Draped;
 use crate::inference::contact_features::LayerInteraction;
-use crate::inference::networks::{OnBody, drape_on};
+use crate::inference::networks::drape_on;
+use crate::inference::on_body::OnBody;
 use crate::inference::tensor_store::DrapeError;
 use burn::tensor::{Int, Tensor};
 use clothcombo_model::{ClothCombo, GarmentEmbedding, Mode};

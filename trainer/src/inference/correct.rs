@@ -13,7 +13,7 @@
 use super::contact_features::{LayerInteraction, contact_features};
 use super::descent::{BACKTRACKING, Descent, WHOLE};
 use super::draped::{Draped, to_device};
-use super::networks::OnBody;
+use super::on_body::OnBody;
 use burn::tensor::{Tensor, TensorData};
 use clothcombo_model::{
     BodyTensors, ClothCombo, DrapeState, DrapeStates, OutfitTensors, linear_blend_skinning,

@@ -35,6 +35,7 @@ mod motion;
 mod names;
 mod network_drape;
 pub mod networks;
+pub mod on_body;
 mod outfit;
 pub mod output;
 mod phase_times;

@@ -3,7 +3,8 @@
 use super::{BodyState, Draper, DraperError, Outfit, PhaseTimes, elapsed};
 use crate::dataset::{BodySample, PreparedScene, SceneBuilder, SceneSample};
 use crate::inference::contact_features::LayerInteraction;
-use crate::inference::networks::{OnBody, drape_on};
+use crate::inference::networks::drape_on;
+use crate::inference::on_body::OnBody;
 use crate::inference::tensor_store::body_tensors;
 use clothcombo_data::asset::rotation::{Matrix3, apply, matrix_from_axis_angle};
 use clothcombo_data::asset::{Pose, PosedBody};

@@ -4,10 +4,11 @@ use super::contact_features::LayerInteraction;
 use super::correct::{corrected, skinned};
 use super::descent::Descent;
 use super::draped::Draped;
+use super::on_body::OnBody;
 use super::tensor_store::{DrapeError, KnownEmbeddings, TensorStore};
 use crate::dataset::PreparedScene;
 use burn::tensor::Tensor;
-use clothcombo_model::{BodyTensors, ClothCombo, Embeddings, Mode, OutfitTensors};
+use clothcombo_model::{ClothCombo, Mode};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -103,20 +104,6 @@ impl<'a> Networks<'a> {
         let (body, _) = self.tensors.body(&scene.bodies[0])?;
         Ok(skinned(start, outfit.skin_weights, &body))
     }
-}
-
-/// An outfit with its embeddings on the first body of a scene.
-pub struct OnBody<'a> {
-    /// The scene.
-    pub scene: &'a PreparedScene,
-    /// Its garments.
-    pub outfit: &'a OutfitTensors,
-    /// Their embeddings.
-    pub embeddings: &'a Embeddings,
-    /// Its first body.
-    pub body: &'a BodyTensors,
-    /// Where the garments start on it `[ΣV, 3]` (m).
-    pub start: Tensor<2>,
 }
 
 /// Time of every phase of the networks, until its positions are on the host.
