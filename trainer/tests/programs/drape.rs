@@ -177,7 +177,7 @@ fn a_posed_outfit_leaves_every_output_and_each_reads_back() {
     let names: Vec<_> =
         report["garments"].as_array().unwrap().iter().map(|g| g["name"].as_str().unwrap()).collect();
     assert_eq!(names, [SKIRT, TEE, "band"]);
-    for phase in ["embedding", "draping", "untangling", "resolve"] {
+    for phase in ["embedding", "networks", "resolve"] {
         let all = report["milliseconds"][phase].as_f64().unwrap();
         let parts = report["garments"].as_array().unwrap().iter();
         let sum: f64 = parts.map(|g| g["milliseconds"][phase].as_f64().unwrap()).sum();
