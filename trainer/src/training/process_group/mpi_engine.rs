@@ -26,7 +26,7 @@ impl Engine {
     }
 
     pub(super) fn gather(&self, row: &[f64]) -> Vec<Vec<f64>> {
-        let mut all = vec![0.0; row.len() * self.share().size];
+        let mut all = vec![0.0; row.len() * self.partition().size];
         self.communicator.all_gather_into(row, &mut all);
         all.chunks_exact(row.len().max(1)).map(<[f64]>::to_vec).collect()
     }
