@@ -195,6 +195,8 @@ pub struct LossesConfig {
     /// untangling. Counts where all networks are trained at once: what is gained for outfits need not be lost for
     /// single garments. A scene in which nothing can touch has the same losses twice, 1 + `single_garments` times in all. 0, the
     /// default, is the paper's.
+    // Configurations of earlier runs are sealed in their checkpoints, and have this key by its earlier name.
+    #[serde(alias = "alone")]
     pub single_garments: Ramp,
     /// StVK strain.
     pub strain: StrainLoss,
