@@ -177,7 +177,7 @@ mod tests {
         assert!(found.is_ok());
         assert_eq!(asked, [(4, 2), (2, 3), (1, 4)]);
         assert_eq!(crossings(&frames), [5, 1, 0, 0, 0, 0, 7]);
-        // Torn cloth is improved as well, from cloth that is torn less.
+        // So is excess strain, from a frame that has less of it.
         let mut torn = [left(0, 2.0), left(0, 1.5), left(2, 0.0), left(0, 0.5)];
         let mut asked = Vec::new();
         let found: Result<(), String> = carry_back(
