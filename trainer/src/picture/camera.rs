@@ -22,7 +22,7 @@ pub enum View {
     Side,
     /// Between front and left side, from slightly above.
     ThreeQuarter,
-    /// Any direction [radians]: azimuth from the front (+z) towards the subject's left (+x), elevation above level.
+    /// Any direction (radians): azimuth from the front (+z) towards the subject's left (+x), elevation above level.
     Orbit {
         /// Angle around y.
         azimuth: f64,

@@ -26,7 +26,7 @@ impl Memory {
     }
 }
 
-/// What the system can still give to this process [bytes]: what it says is available, or what a control group (a container)
+/// What the system can still give to this process (bytes): what it says is available, or what a control group (a container)
 /// allows at most; `None` where it does not say.
 pub fn available() -> Option<u64> {
     let free = std::fs::read_to_string("/proc/meminfo").ok().and_then(|text| {
