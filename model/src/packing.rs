@@ -36,6 +36,14 @@ impl Packing {
         self.offsets[self.count()]
     }
 
+    /// What of `packed`, one value per row, belongs to each garment.
+    ///
+    /// # Panics
+    /// If there are fewer values than rows.
+    pub fn parts<'a, T>(&self, packed: &'a [T]) -> Vec<&'a [T]> {
+        self.ranges().map(|rows| &packed[rows]).collect()
+    }
+
     /// The rows of every garment.
     pub fn ranges(&self) -> impl ExactSizeIterator<Item = Range<usize>> + '_ {
         self.offsets.windows(2).map(|ends| ends[0]..ends[1])

@@ -149,6 +149,18 @@ fn a_packed_outfit_drapes_as_its_single_garments() {
 }
 
 #[test]
+fn a_layered_pass_needs_no_embeddings_that_were_packed_for_it() {
+    let scene = scene(&OutfitTensors::all_pairs(3));
+    let model = scene.model.valid();
+    let garments: Vec<_> = scene.garments.iter().map(|garment| model.encode(garment)).collect();
+    let single = model.pack(&scene.outfit, &garments, Mode::Single).expect("matching embeddings");
+    assert!(single.untangling_product.is_none());
+    let [found, expected] =
+        [single, scene.embeddings(&model)].map(|embeddings| scene.drape_on(&model, &embeddings, &scene.body));
+    assert_eq!(values(&found.last().posed), values(&expected.last().posed));
+}
+
+#[test]
 fn skin_weights_sum_to_one_and_stay_on_each_garments_joints() {
     let scene = scene(&[]);
     let skin_weights = scene.drape(&scene.model.valid()).skin_weights;

@@ -1,4 +1,4 @@
-//! What a run draws its scenes from: body, garments, poses.
+//! What the scenes of a run are sampled from: body, garments, poses.
 
 use super::active_joints::ActiveJoints;
 use super::error::DatasetError;
@@ -15,7 +15,7 @@ use clothcombo_model::{Dimensions, Graph};
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
-/// What a run draws its scenes from.
+/// What the scenes of a run are sampled from.
 pub struct Dataset {
     /// The body model.
     pub body: Arc<Body>,
@@ -32,9 +32,9 @@ pub struct Dataset {
     /// Memory for what is kept of garments and can be made again: garments of a streamed dataset, tensors, embeddings. A
     /// device with memory of its own has a budget of its own.
     pub memory: Arc<MemoryBudget>,
-    /// Shape components drawn.
+    /// Shape components sampled.
     pub shape_count: usize,
-    /// Range every component is drawn from.
+    /// Range every component is sampled from.
     pub shape_range: [f64; 2],
     fingerprint: OnceLock<String>,
 }
@@ -153,13 +153,13 @@ impl Dataset {
         }
     }
 
-    /// A fingerprint of what scenes are drawn from: garments (name, category, mesh), body and every frame of the poses with
+    /// A fingerprint of what scenes are sampled from: garments (name, category, mesh), body and every frame of the poses with
     /// what it is for. Equal data gives equal scenes.
     pub fn fingerprint(&self) -> &str {
         self.fingerprint.get_or_init(|| format!("{FINGERPRINT}{}", self.key()))
     }
 
-    /// A fingerprint of what outfits in held-out windows are drawn from: garments, body, and the frames of the windows. Two models
+    /// A fingerprint of what outfits in held-out windows are sampled from: garments, body, and the frames of the windows. Two models
     /// for which it is the same can be asked about the same outfits, whatever else their poses were split into.
     pub fn fingerprint_of_windows(&self) -> String {
         poses_key(self.assets(), &[self.poses.held_out(HeldOut::Windows)]).to_string()
@@ -178,12 +178,12 @@ impl Dataset {
             .array(&body.joint_shape_directions)
             .array(body.pose_directions.as_deref().unwrap_or_default())
             .number(self.shape_count as u64);
-        for card in (0..self.garments.len()).map(|i| self.garments.info(i)) {
+        for info in (0..self.garments.len()).map(|i| self.garments.info(i)) {
             key = key
-                .text(&card.name)
-                .text(card.category.name())
-                .number(u64::from(card.holding))
-                .key(card.mesh);
+                .text(&info.name)
+                .text(info.category.name())
+                .number(u64::from(info.holding))
+                .key(info.mesh);
         }
         key
     }

@@ -2,7 +2,7 @@
 //!
 //! Without a cache everything is computed at the start and kept, if the machine has the memory. With one, what is expensive
 //! is computed once, a few garments at a time, and stored; a run keeps the garments it used last, within `data.memory_mib`,
-//! and reads the others again when a scene draws them: a dataset may be many times larger than memory, and the results are
+//! and reads the others again when a scene samples them: a dataset may be many times larger than memory, and the results are
 //! the same to the bit.
 
 use super::active_joints::ActiveJoints;

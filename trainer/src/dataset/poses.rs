@@ -49,7 +49,7 @@ pub struct SelfIntersecting {
 /// From this limit on nothing is filtered (m).
 const NO_FILTER: f64 = 10.0;
 /// Poses drawn before the least self-intersecting one is taken as it is.
-const DRAWS: usize = 8;
+const ATTEMPTS: usize = 8;
 /// Poses drawn to report the share of self-intersecting ones.
 const REPORTED_POSES: usize = 64;
 
@@ -207,7 +207,7 @@ impl PoseLibrary {
         let mut pose = self.draw_unfiltered(scale, rng);
         let Some(filter) = &self.filter else { return pose };
         let mut length = filter.measure(&pose);
-        for _ in 1..DRAWS {
+        for _ in 1..ATTEMPTS {
             if length <= filter.limit {
                 break;
             }

@@ -9,7 +9,7 @@ use super::skinning::skinning_transforms;
 use crate::config::LossesConfig;
 use crate::dataset::objective::scene_weights;
 use clothcombo_data::asset::{Body, Pose};
-use clothcombo_model::{Graph, OutfitTensors};
+use clothcombo_model::{Graph, OutfitTensors, Packing};
 use clothcombo_physics::energy::{EnergySettings, SceneEnergy, SceneGarment, SceneLayers};
 use clothcombo_physics::query::Surface;
 use clothcombo_physics::transform::Transform;
@@ -46,13 +46,7 @@ pub struct PreparedScene {
 impl PreparedScene {
     /// What of `packed`, one value per vertex of all garments inner → outer, belongs to each garment.
     pub fn parts<'a, T>(&self, packed: &'a [T]) -> Vec<&'a [T]> {
-        let mut rest = packed;
-        let part = |garment: &Arc<PreparedGarment>| {
-            let (own, tail) = rest.split_at(garment.vertex_count());
-            rest = tail;
-            own
-        };
-        self.garments.iter().map(part).collect()
+        Packing::new(self.garments.iter().map(|garment| garment.vertex_count())).parts(packed)
     }
 
     /// Initial skinning of every vertex on the first body, canonical → posed, `[ΣV]`.

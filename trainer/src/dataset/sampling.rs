@@ -33,7 +33,7 @@ pub struct SceneSample {
     pub repulsion_sample: u32,
 }
 
-/// The part of the schedule a draw depends on.
+/// The part of the schedule a sample depends on.
 #[derive(Clone, Copy, Debug)]
 pub struct Plan<'a> {
     /// The stage.
@@ -124,7 +124,7 @@ pub fn sample_evaluation(
     scored(garments(pool, layers, &mut rng), body)
 }
 
-/// What a validation scene is drawn for. No group samples a garment or a clip of the test set.
+/// What a validation scene is sampled for. No group samples a garment or a clip of the test set.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ValidationGroup {
     /// One trained garment, held-out windows of the trained clips.

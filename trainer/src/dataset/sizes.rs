@@ -26,7 +26,7 @@ pub struct DataSizes {
 const SMPL_X: [usize; 3] = [10_475, 20_908, 55];
 
 /// Bytes of what is known of a garment without reading it: name, provenance, keys, where its file is.
-const CARD: usize = 1536;
+const GARMENT_INFO: usize = 1536;
 
 impl DataSizes {
     /// Those of data that is loaded.
@@ -100,7 +100,7 @@ impl DataSizes {
     /// Memory of the body and the list of garments (bytes).
     pub(crate) fn lasting_bytes(&self) -> u64 {
         let per_vertex = 3 * (self.shape_components + 9 * self.body_joints.saturating_sub(1)) * 4 + 100;
-        (self.body_vertices * per_vertex + self.vertices.len() * CARD) as u64
+        (self.body_vertices * per_vertex + self.vertices.len() * GARMENT_INFO) as u64
     }
 
     /// The sum of `bytes` over all garments.

@@ -55,7 +55,7 @@ impl<'a> PostProcessor<'a> {
             known.entry(g).or_insert_with(|| Arc::new(RestGarment::new(&garment.garment.rest))).clone()
         });
         DrapedScene {
-            dressing: self,
+            post_processor: self,
             scene,
             body: scene.exact_body(),
             garments: rest.collect(),
@@ -103,7 +103,7 @@ fn wide(scene: &PreparedScene, packed: &[[f32; 3]]) -> Vec<Vec<[f64; 3]>> {
 
 /// A scene's body and garments as the post-process takes them.
 pub struct DrapedScene<'a> {
-    dressing: &'a PostProcessor<'a>,
+    post_processor: &'a PostProcessor<'a>,
     scene: &'a PreparedScene,
     /// The posed body.
     pub body: Surface<f64>,
@@ -124,7 +124,7 @@ impl DrapedScene<'_> {
     /// # Errors
     /// When it is no valid scene, or another pose cannot be draped.
     pub fn resolved(&self, settings: &ResolveSettings) -> Result<Resolved, PostProcessError> {
-        let stage_at = |share: f64| self.dressing.stage(self.scene, share);
+        let stage_at = |share: f64| self.post_processor.stage(self.scene, share);
         let skinned = wide(self.scene, &skinned(self.scene));
         resolve_along(&self.body, &self.layers(&self.positions), &skinned, settings, stage_at)
     }

@@ -92,14 +92,7 @@ impl Outfit {
 
     /// The part of each garment of a packed `[ΣV]` array.
     pub(super) fn split<'a, T>(&self, packed: &'a [T]) -> Vec<&'a [T]> {
-        let mut rest = packed;
-        let mut parts = Vec::with_capacity(self.garments.len());
-        for piece in &self.garments {
-            let (part, tail) = rest.split_at(piece.prepared.vertex_count());
-            parts.push(part);
-            rest = tail;
-        }
-        parts
+        self.tensors.packing().parts(packed)
     }
 
     /// Layers for the post-process, at the positions of each garment.

@@ -308,8 +308,8 @@ fn describe(dataset: &Dataset, scenes: &[PreparedScene], output: &StepOutput) ->
     };
     let of_scene = |(scene, outputs): (&PreparedScene, &Vec<_>)| {
         let garments = scene.sample.garments.iter().map(|&index| {
-            let card = dataset.garments.info(index);
-            IncidentGarment { index, name: card.name.clone(), vertices: card.vertices }
+            let info = dataset.garments.info(index);
+            IncidentGarment { index, name: info.name.clone(), vertices: info.vertices }
         });
         let bodies = scene.sample.bodies.iter().zip(outputs).map(
             |(body, output): (&BodySample, &clothcombo_physics::autodiff::SceneLossOutput)| {

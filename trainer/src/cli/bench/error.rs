@@ -139,7 +139,7 @@ fn drape(
     let device = Backend::preferred().device();
     let tensors = TensorStore::new(dataset.clone(), trained.state.dimensions(), &device);
     let networks = Networks::new(trained.networks(&device)?, &tensors);
-    let dressing = PostProcessor::new(dataset, &config.losses, Some(&networks));
+    let post_processor = PostProcessor::new(dataset, &config.losses, Some(&networks));
     let post_process = ResolveSettings { steps: CONTINUATION_STEPS, ..ResolveSettings::default() };
     let bar = progress_bar(scenes.len(), "draping {bar:30} {pos}/{len} · {eta} left");
     let drapes = scenes.iter().map(|scene| {
@@ -147,7 +147,7 @@ fn drape(
         // A single garment is near enough to its equilibrium to start from. Forces cannot resolve an outfit that intersects itself.
         let resolved = match scene.garments.len() {
             1 => None,
-            _ => Some(dressing.of(scene, &drape.posed).resolved(&post_process)?.positions.concat()),
+            _ => Some(post_processor.of(scene, &drape.posed).resolved(&post_process)?.positions.concat()),
         };
         let mut drapes = Drapes::new(&networks.drape_single_garments(scene)?, &drape, resolved);
         for &steps in corrections {

@@ -64,9 +64,9 @@ fn no_run_draws_a_test_garment_or_a_test_clip_and_the_evaluation_does() {
     for group in ValidationGroup::ALL {
         let (mut clips, mut garments) = (BTreeSet::new(), BTreeSet::new());
         for seed in 0..50 {
-            for draw in sample_validation(&dataset, seed, &scenes, group) {
-                clips.extend(draw.bodies.iter().map(clip_of));
-                garments.extend(draw.garments);
+            for sample in sample_validation(&dataset, seed, &scenes, group) {
+                clips.extend(sample.bodies.iter().map(clip_of));
+                garments.extend(sample.garments);
             }
         }
         let of = |part: &[usize]| part.iter().copied().collect::<BTreeSet<usize>>();
@@ -82,13 +82,13 @@ fn no_run_draws_a_test_garment_or_a_test_clip_and_the_evaluation_does() {
     }
     let plan = Plan { stage: &config.stages[0], progress: 1.0 };
     for step in 0..500 {
-        let draw = sample_training(&dataset, 1, step, 0, plan);
-        assert!(["walk", "reach"].contains(&clip_of(&draw.bodies[0])));
-        assert!(draw.garments.iter().all(|g| split.training.contains(g)));
+        let sample = sample_training(&dataset, 1, step, 0, plan);
+        assert!(["walk", "reach"].contains(&clip_of(&sample.bodies[0])));
+        assert!(sample.garments.iter().all(|g| split.training.contains(g)));
     }
     for index in 0..50 {
-        let draw = sample_evaluation(&dataset, 1, [0, index], &split.test, 1, HeldOut::TestClips);
-        assert_eq!(clip_of(&draw.bodies[0]), "jump");
+        let sample = sample_evaluation(&dataset, 1, [0, index], &split.test, 1, HeldOut::TestClips);
+        assert_eq!(clip_of(&sample.bodies[0]), "jump");
         // The outfits that the post-process is tuned on leave the test clips alone.
         assert_eq!(clip_of(&sample_outfit(&dataset, 1, index as u64, 2).bodies[0]), "dance");
     }
@@ -99,9 +99,9 @@ fn without_a_validation_set_its_groups_are_empty() {
     let folder = tempfile::tempdir().unwrap();
     let (_, mut dataset) = dataset(folder.path());
     dataset.split.validation.clear();
-    let draws = |group| sample_validation(&dataset, 1, &ValidationConfig::default(), group).len();
-    assert_eq!(draws(ValidationGroup::UnseenGarment), 0);
-    assert_eq!(draws(ValidationGroup::UnseenMotion), ValidationConfig::default().unseen_scenes);
+    let count = |group| sample_validation(&dataset, 1, &ValidationConfig::default(), group).len();
+    assert_eq!(count(ValidationGroup::UnseenGarment), 0);
+    assert_eq!(count(ValidationGroup::UnseenMotion), ValidationConfig::default().unseen_scenes);
 }
 
 #[test]
