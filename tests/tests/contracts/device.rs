@@ -78,7 +78,7 @@ fn a_checkpoint_of_another_device_goes_on_with_a_note_and_loses_nothing() {
         let last = Checkpoint::open(&root).unwrap();
         assert_eq!((last.state.step, last.state.device_name()), (6, &*session.device_name()));
         let log = std::fs::read_to_string(root.join("log.txt")).unwrap();
-        (std::fs::read(last.path.join("model.bpk")).unwrap(), log)
+        (std::fs::read(last.path.join("model.safetensors")).unwrap(), log)
     };
     let (same, quiet) = end_of("same", None);
     let (moved, told) = end_of("moved", Some("Some GPU (wgpu:7, Vulkan)"));

@@ -24,18 +24,7 @@ fn device_of_a_backend_that_is_not_compiled_in_names_feature_and_command() {
         for verb in [
             &["drape", "--garments", "tee.obj", "-o", &out][..],
             &["bench", "step", "--widths", "8"],
-            &[
-                "bench",
-                "backends",
-                "--devices",
-                device,
-                "--width",
-                "8",
-                "--vertices",
-                "100",
-                "--seconds",
-                "0.01",
-            ],
+            &["bench", "backends", "--devices", device],
             &["config", "check", &config],
         ] {
             let named = if verb.contains(&"--devices") { &[][..] } else { &["--device", device] };
@@ -68,10 +57,8 @@ fn device_auto_is_the_default_and_stands_in_log_and_report() {
     };
     let runs = [train("usual", &[]), train("auto", &["--device", "auto"])];
     let read = |run: &std::path::Path, file: &str| std::fs::read(run.join(file)).unwrap();
-    for file in ["model.bpk", "optimizer.bpk", "state.json"] {
-        let file = format!("checkpoints/step-00000060/{file}");
-        assert!(read(&runs[0], &file) == read(&runs[1], &file), "{file}");
-    }
+    let model = "checkpoints/step-00000060/model.safetensors";
+    assert!(read(&runs[0], model) == read(&runs[1], model));
     if cfg!(all(feature = "flex", not(any(feature = "wgpu", feature = "cuda")))) {
         let log = String::from_utf8(read(&runs[1], "log.txt")).unwrap();
         assert!(log.contains("device: processor (flex)"), "{log}");

@@ -5,8 +5,9 @@ use crate::cli::output::print_report;
 use crate::cli::table::{markdown, row};
 use crate::cli::values::{measuring_seconds, not_negative};
 use crate::cli::verbosity::print_status;
-use crate::system::device::DeviceChoice;
+use crate::system::device::{DeviceChoice, DeviceError};
 use crate::training::measure::{BenchmarkRun, Case};
+use burn::tensor::Device;
 use clap::Parser;
 use miette::{Report, miette};
 use serde::Serialize;
@@ -63,20 +64,21 @@ struct Measured {
 /// # Errors
 /// When a device fails, or disagrees with the first by more than is asked for.
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
-    let config = Case::new(arguments.width, arguments.layers, arguments.vertices).config(&[])?;
-    let dataset = load_dataset(&config)?;
-    let run_on = |choice: DeviceChoice| -> Result<BenchmarkRun, Report> {
-        BenchmarkRun::new(config.clone(), dataset.clone(), 0, &choice.open()?)
-    };
     let all = DeviceChoice::of_this_build();
-    let first = run_on(all[0])?;
-    let scene = first.scene(0)?;
-    let (loss, gradients) = first.loss_and_gradients(&scene)?;
     let wanted = if arguments.devices.is_empty() { &all } else { &arguments.devices };
     let others = wanted.iter().copied().filter(|choice| *choice != all[0]);
+    // All before the first is measured: one that is not there is known at once.
+    let opened = [all[0]].into_iter().chain(others).map(|choice| Ok((choice, choice.open()?)));
+    let devices = opened.collect::<Result<Vec<_>, DeviceError>>()?;
+    let config = Case::new(arguments.width, arguments.layers, arguments.vertices).config(&[])?;
+    let dataset = load_dataset(&config)?;
+    let run_on = |device: &Device| BenchmarkRun::new(config.clone(), dataset.clone(), 0, device);
+    let first = run_on(&devices[0].1)?;
+    let scene = first.scene(0)?;
+    let (loss, gradients) = first.loss_and_gradients(&scene)?;
     let mut rows = Vec::new();
-    for device in [all[0]].into_iter().chain(others) {
-        print_status(&format!("measuring {device}"));
+    for (choice, device) in &devices {
+        print_status(&format!("measuring {choice}"));
         let mut run = run_on(device)?;
         run.copy_parameters(&first)?;
         let (found_loss, found) = run.loss_and_gradients(&scene)?;
@@ -87,7 +89,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         let worst = differences.max_by(|a, b| a.0.total_cmp(&b.0));
         let costs = run.costs(arguments.seconds, 1)?;
         rows.push(Measured {
-            device: device.to_string(),
+            device: choice.to_string(),
             loss: found_loss,
             loss_difference: ((found_loss - loss) / loss).abs(),
             gradient_difference: worst.as_ref().map_or(0.0, |worst| worst.0),
