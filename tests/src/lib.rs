@@ -5,7 +5,7 @@ use clothcombo_model::{ClothCombo, gradient_bucket};
 use clothcombo_trainer::config::{Config, OptimizerConfig, Trains, load};
 use clothcombo_trainer::dataset::{Dataset, PreparedScene};
 use clothcombo_trainer::inference::tensor_store::TensorStore;
-use clothcombo_trainer::system::device::Backend;
+use clothcombo_trainer::system::device::default_device;
 use clothcombo_trainer::training::learner::{Learner, StepInput, new_optimizer};
 use clothcombo_trainer::training::process_group::RankPartition;
 use clothcombo_trainer::training::scenes::prepare_step;
@@ -56,7 +56,7 @@ impl Untrained {
     pub fn new(folder: &Path, overrides: &[&str]) -> Self {
         let config = tiny_config(folder, overrides);
         let dataset = Arc::new(Dataset::load(&config, &|_, _, _| {}).expect("built-in data"));
-        let device = Backend::preferred().device().autodiff();
+        let device = default_device().autodiff();
         let dimensions = dataset.dimensions();
         let tensors = TensorStore::new(dataset.clone(), dimensions, &device);
         let model = ClothCombo::new(&config.model, &dimensions, config.seed, &device).expect("valid sizes");

@@ -5,7 +5,7 @@ use clothcombo_tests::{fuzz_cases, tiny_config};
 use clothcombo_trainer::dataset::Dataset;
 use clothcombo_trainer::run::checkpoint::{Checkpoint, CheckpointError};
 use clothcombo_trainer::run::folder::RunDir;
-use clothcombo_trainer::system::device::Backend;
+use clothcombo_trainer::system::device::default_device;
 use clothcombo_trainer::training::session::Session;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -18,7 +18,7 @@ fn saved(folder: &tempfile::TempDir) -> PathBuf {
     let config = tiny_config(folder.path(), &["validation.single_scenes=0", "validation.layered_scenes=0"]);
     let dataset = Arc::new(Dataset::load(&config, &|_, _, _| {}).unwrap());
     let run = RunDir::create(&folder.path().join("run"), &config).unwrap();
-    Session::new(run, config, dataset, &Backend::preferred().device()).unwrap().save().unwrap()
+    Session::new(run, config, dataset, &default_device()).unwrap().save().unwrap()
 }
 
 #[test]
@@ -34,7 +34,7 @@ fn it_restores_the_networks_from_nothing_but_its_folder() {
 
     let checkpoint = Checkpoint::open(&elsewhere).unwrap();
     let config = checkpoint.config().unwrap();
-    let model = checkpoint.model(&config, &Backend::preferred().device()).unwrap();
+    let model = checkpoint.model(&config, &default_device()).unwrap();
     // Both stored forms hold the same parameters, under the same names.
     let again = folder.path().join("again.safetensors");
     let mut store = SafetensorsStore::from_file(&again)
@@ -135,7 +135,7 @@ fn files_of_two_whole_checkpoints_do_not_mix() {
         tiny_config(other.path(), &["seed=4", "validation.single_scenes=0", "validation.layered_scenes=0"]);
     let dataset = Arc::new(Dataset::load(&config, &|_, _, _| {}).unwrap());
     let run = RunDir::create(&other.path().join("run"), &config).unwrap();
-    let second = Session::new(run, config, dataset, &Backend::preferred().device()).unwrap().save().unwrap();
+    let second = Session::new(run, config, dataset, &default_device()).unwrap().save().unwrap();
     fs::copy(second.join("model.bpk"), first.join("model.bpk")).unwrap();
     assert!(Checkpoint::open(&first).unwrap_err().to_string().contains("model.bpk"));
 }

@@ -6,6 +6,7 @@ mod config_fuzz;
 mod configs;
 mod corrections;
 mod degenerate_cases;
+mod device;
 mod frozen;
 mod graph;
 mod intersections;

@@ -7,7 +7,7 @@ use clothcombo_tests::{fuzz_cases, tiny_config};
 use clothcombo_trainer::dataset::Dataset;
 use clothcombo_trainer::inference::{BodyState, Draper, DraperSettings, GivenGarment};
 use clothcombo_trainer::run::folder::RunDir;
-use clothcombo_trainer::system::device::Backend;
+use clothcombo_trainer::system::device::default_device;
 use clothcombo_trainer::training::session::Session;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -20,7 +20,7 @@ fn draper(folder: &Path) -> Draper {
     let config = tiny_config(folder, &[]);
     let dataset = Arc::new(Dataset::load(&config, &|_, _, _| {}).unwrap());
     let run = RunDir::create(&folder.join("run"), &config).unwrap();
-    let session = Session::new(run, config, dataset, &Backend::preferred().device()).unwrap();
+    let session = Session::new(run, config, dataset, &default_device()).unwrap();
     Draper::load(Some(&session.save().unwrap()), &DraperSettings::default()).unwrap()
 }
 

@@ -8,7 +8,7 @@ use clothcombo_trainer::evaluation::ValidationSet;
 use clothcombo_trainer::run::checkpoint::{Checkpoint, TrainedModel};
 use clothcombo_trainer::run::event::{Observer, TrainEvent};
 use clothcombo_trainer::run::folder::RunDir;
-use clothcombo_trainer::system::device::Backend;
+use clothcombo_trainer::system::device::default_device;
 use clothcombo_trainer::system::stop::StopFlag;
 use clothcombo_trainer::training::session::Session;
 use clothcombo_trainer::training::train_loop::train;
@@ -16,7 +16,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// Asks for a stop once `after` steps are done.
-struct StopAfter(u64, StopFlag);
+pub struct StopAfter(pub u64, pub StopFlag);
 
 impl Observer for StopAfter {
     fn observe(&mut self, event: &TrainEvent) -> Result<(), miette::Report> {
@@ -42,7 +42,7 @@ impl Observer for FailsAt {
 }
 
 fn run(config: &Config, dataset: &Arc<Dataset>, folder: &Path, resume: bool, stop_after: Option<u64>) {
-    let device = Backend::preferred().device();
+    let device = default_device();
     let mut session = if resume {
         let run = RunDir::resume(folder, config, &[]).unwrap();
         let checkpoint = Checkpoint::open(folder).unwrap();
@@ -136,14 +136,14 @@ fn a_run_starts_from_another_ones_parameters() {
         let overrides: Vec<&str> = [init.as_str()].into_iter().chain(overrides.iter().copied()).collect();
         let config = tiny_config(folder.path(), &overrides);
         let run = RunDir::create(&folder.path().join(name), &config).unwrap();
-        Session::new(run, config, dataset.clone(), &Backend::preferred().device())
+        Session::new(run, config, dataset.clone(), &default_device())
     };
     let session = further("second", &["seed=9"]).unwrap();
     assert!(parameters(&session.save().unwrap()) == parameters(&first.join("checkpoints/step-00000005")));
 
     // Corrections may be new, and change nothing yet.
     let corrected = further("corrected", &["model.corrections=2"]).unwrap().save().unwrap();
-    let model = TrainedModel::open(&corrected).unwrap().networks(&Backend::preferred().device()).unwrap();
+    let model = TrainedModel::open(&corrected).unwrap().networks(&default_device()).unwrap();
     assert_eq!(model.corrections.len(), 2);
 
     let refused = further("third", &["model.width=24"]).err().expect("other sizes do not fit");
@@ -173,7 +173,7 @@ fn what_was_trained_is_kept_when_something_beside_it_fails() {
     let dataset = Arc::new(Dataset::load(&config, &|_, _, _| {}).unwrap());
     let place = folder.path().join("run");
     let run = RunDir::create(&place, &config).unwrap();
-    let device = Backend::preferred().device();
+    let device = default_device();
     let mut session = Session::new(run, config.clone(), dataset.clone(), &device).unwrap();
     let mut observers: Vec<Box<dyn Observer>> = vec![Box::new(FailsAt(7))];
     let error = train(&mut session, &mut observers, &StopFlag::default()).unwrap_err();
@@ -210,7 +210,7 @@ fn a_run_does_not_go_on_with_other_data() {
     run(&config, &load("dress"), &place, false, Some(5));
     let resume = |dataset: Arc<Dataset>| {
         let checkpoint = Checkpoint::open(&place).unwrap();
-        let device = Backend::preferred().device();
+        let device = default_device();
         Session::resume(RunDir::follow(&place), config.clone(), dataset, &device, &checkpoint)
     };
     assert_eq!(resume(load("dress")).unwrap().step(), 5);

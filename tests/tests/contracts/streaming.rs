@@ -6,7 +6,7 @@ use clothcombo_trainer::dataset::tensor_bytes;
 use clothcombo_trainer::dataset::{Dataset, GarmentStore, load_body};
 use clothcombo_trainer::inference::tensor_store::TensorStore;
 use clothcombo_trainer::run::folder::RunDir;
-use clothcombo_trainer::system::device::Backend;
+use clothcombo_trainer::system::device::default_device;
 use clothcombo_trainer::system::lru_cache::KeptBytes;
 use clothcombo_trainer::system::stop::StopFlag;
 use clothcombo_trainer::training::session::Session;
@@ -17,7 +17,7 @@ use std::sync::Arc;
 
 /// Trains and returns the final parameters.
 fn trained(config: &Config, dataset: Dataset, folder: &Path) -> Vec<u8> {
-    let device = Backend::preferred().device();
+    let device = default_device();
     let run = RunDir::create(folder, config).unwrap();
     let mut session = Session::new(run, config.clone(), Arc::new(dataset), &device).unwrap();
     train(&mut session, &mut [], &StopFlag::default()).unwrap();
@@ -121,7 +121,7 @@ fn garments_and_their_tensors_stay_within_the_limits() {
     let generate = config.data.garments[0].generate.as_mut().unwrap();
     (generate.count, generate.vertices) = (12, 1000);
     let dataset = Arc::new(load(&config));
-    let tensors = TensorStore::new(dataset.clone(), dataset.dimensions(), &Backend::preferred().device());
+    let tensors = TensorStore::new(dataset.clone(), dataset.dimensions(), &default_device());
     let mut whole = KeptBytes::default();
     for index in (0..12).chain(0..12) {
         let garment = dataset.garments.garment(index).unwrap();

@@ -40,6 +40,7 @@ enum Verb {
 
 fn main() -> ExitCode {
     clothcombo_trainer::system::allocator::keep_freed_memory();
+    clothcombo_trainer::system::device::prefer_processor();
     clothcombo_trainer::system::closed_pipe::end_quietly();
     let arguments = Arguments::parse();
     arguments.verbosity.apply("info");

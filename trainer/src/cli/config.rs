@@ -1,5 +1,6 @@
 //! `clothcombo config`: what a configuration may say, and what one comes to.
 
+use crate::cli::device_argument::DeviceArgument;
 use crate::cli::loading::load_dataset;
 use crate::cli::memory_table::print_memory;
 use crate::cli::output::print_json;
@@ -8,7 +9,6 @@ use crate::cli::values::count;
 use crate::config::{ClipScope, Config, StageConfig, Trains, load, schema};
 use crate::dataset::DataSizes;
 use crate::run::report::duration;
-use crate::system::device::Backend;
 use crate::training::estimate::{StageTime, time_stages};
 use clap::{Parser, Subcommand};
 use clothcombo_physics::energy::Term;
@@ -45,6 +45,8 @@ pub struct CheckArguments {
     /// Steps timed per stage
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u64).range(1..=1000))]
     timed_steps: u64,
+    #[command(flatten)]
+    device: DeviceArgument,
     /// State the memory for so many garments instead of those there are, on a body like SMPL-X; no data is loaded
     #[arg(long, value_name = "N", requires = "vertices", value_parser = count)]
     garments: Option<usize>,
@@ -80,9 +82,10 @@ fn check(arguments: &CheckArguments) -> Result<(), Report> {
     if arguments.no_timing {
         return Ok(());
     }
+    let device = arguments.device.open()?;
     print_memory(&config, &DataSizes::of_named(&config)?)?;
     let dataset = load_dataset(&config)?;
-    let times = time_stages(&config, &dataset, &Backend::preferred().device(), arguments.timed_steps)?;
+    let times = time_stages(&config, &dataset, &device, arguments.timed_steps)?;
     print_times(&config, &times);
     Ok(())
 }

@@ -1,5 +1,6 @@
 //! `clothcombo eval`: everything a trained model is judged by, in one report.
 
+use crate::cli::device_argument::DeviceArgument;
 use crate::cli::loading::load_dataset;
 use crate::cli::verbosity::{print_status, progress_bar};
 use crate::config::{Config, load};
@@ -8,9 +9,10 @@ use crate::evaluation::{Evaluation, ModelUnderTest, NamedModel, Page, SceneCount
 use crate::inference::shipped_model;
 use crate::run::checkpoint::TrainedModel;
 use crate::run::report::html::utc;
-use crate::system::device::Backend;
+use crate::system::device::name;
 use crate::system::files::{write_file, write_json};
 use crate::system::paths::obstacle;
+use burn::tensor::Device;
 use clap::Parser;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use serde_json::{Value, json};
@@ -52,9 +54,8 @@ pub struct Arguments {
     /// Seed of the scenes; default: that of validation in the configuration
     #[arg(long)]
     seed: Option<u64>,
-    /// The compute device
-    #[arg(long, value_enum, default_value_t = Backend::preferred())]
-    device: Backend,
+    #[command(flatten)]
+    device: DeviceArgument,
 }
 
 fn named(text: &str) -> Result<(String, PathBuf), String> {
@@ -82,9 +83,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     };
     let file = arguments.config.clone().unwrap_or_else(|| trained.config_file());
     let config = load(&file, &arguments.overrides)?;
-    let model = model(arguments, &trained, config)?;
-    let ablations = named_models(arguments, &arguments.ablation, &model)?;
-    let specific = named_models(arguments, &arguments.specific, &model)?;
+    let device = arguments.device.open()?;
+    let model = model(arguments, &trained, config, &device)?;
+    let ablations = named_models(arguments, &arguments.ablation, &model, &device)?;
+    let specific = named_models(arguments, &arguments.specific, &model, &device)?;
     check_specific(&specific, &model.dataset)?;
     check_ablations(&ablations, &model)?;
     let unwritable = || format!("{}", folder.display());
@@ -110,7 +112,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     })?;
     bar.finish_and_clear();
     let numbers = evaluation.numbers();
-    let page = page(&trained, evaluation, clock.elapsed().as_secs_f64());
+    let page = page(&trained, evaluation, &device, clock.elapsed().as_secs_f64());
     println!("{}", page.markdown());
     write(folder, &numbers, &page)?;
     print_status(&format!("written: {}", folder.join(HTML).display()));
@@ -139,6 +141,7 @@ fn model(
     arguments: &Arguments,
     trained: &TrainedModel,
     mut config: Config,
+    device: &Device,
 ) -> Result<ModelUnderTest, Report> {
     config.validation.seed = arguments.seed.or(config.validation.seed);
     let dataset = load_dataset(&config)?;
@@ -152,7 +155,7 @@ fn model(
             known.join("; it ")
         ));
     }
-    ModelUnderTest::new(trained, config, dataset, &arguments.device.device())
+    ModelUnderTest::new(trained, config, dataset, device)
 }
 
 /// Further models, each with its own data, measured by the losses of `first` on scenes of its seed.
@@ -160,13 +163,14 @@ fn named_models(
     arguments: &Arguments,
     named: &[(String, PathBuf)],
     first: &ModelUnderTest,
+    device: &Device,
 ) -> Result<Vec<NamedModel>, Report> {
     let named_model = |(name, path): &(String, PathBuf)| {
         let trained = TrainedModel::open(path)?;
         let mut config = trained.config.clone();
         config.losses = first.config.losses.clone();
         config.validation.seed = Some(first.config.validation_seed());
-        let model = model(arguments, &trained, config).wrap_err_with(|| name.clone())?;
+        let model = model(arguments, &trained, config, device).wrap_err_with(|| name.clone())?;
         Ok(NamedModel { name: name.clone(), model })
     };
     named.iter().map(named_model).collect()
@@ -204,7 +208,7 @@ fn check_specific(specific: &[NamedModel], dataset: &Dataset) -> Result<(), Repo
     Ok(())
 }
 
-fn page(trained: &TrainedModel, evaluation: Evaluation, seconds: f64) -> Page {
+fn page(trained: &TrainedModel, evaluation: Evaluation, device: &Device, seconds: f64) -> Page {
     let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs());
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     Page {
@@ -220,6 +224,7 @@ fn page(trained: &TrainedModel, evaluation: Evaluation, seconds: f64) -> Page {
                     trained.config.model.width
                 ),
             ),
+            ("device", name(device)),
             ("seed", evaluation.seed.to_string()),
             (
                 "made",

@@ -4,7 +4,7 @@ use crate::cli::table::{row, table};
 use crate::config::{Config, PoseEncoding};
 use crate::dataset::DataSizes;
 use crate::run::memory::MemoryEstimate;
-use crate::system::device::Backend;
+use crate::system::device::default_device;
 use crate::system::memory::{available, gibibytes};
 use burn::module::Module;
 use clothcombo_model::{ClothCombo, Dimensions};
@@ -78,7 +78,7 @@ fn parameter_count(config: &Config, sizes: &DataSizes) -> Result<usize, Report> 
     };
     let dimensions =
         Dimensions { joints: sizes.joints, shape: sizes.shape_components, pose: per_joint * sizes.joints };
-    let model = ClothCombo::new(&config.model, &dimensions, config.seed, &Backend::preferred().device());
+    let model = ClothCombo::new(&config.model, &dimensions, config.seed, &default_device());
     Ok(model.into_diagnostic()?.num_params())
 }
 

@@ -3,6 +3,7 @@
 pub mod bench;
 pub mod check;
 pub mod config;
+mod device_argument;
 pub mod drape;
 pub mod eval;
 pub mod fit;

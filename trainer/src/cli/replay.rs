@@ -1,8 +1,8 @@
 //! `clothcombo replay`: a step whose loss or gradient was not finite, once more.
 
+use crate::cli::device_argument::DeviceArgument;
 use crate::cli::loading::load_dataset;
 use crate::cli::table::{row, table};
-use crate::system::device::Backend;
 use crate::system::exact::Exact;
 use crate::training::incident::Incident;
 use clap::Parser;
@@ -22,9 +22,8 @@ pub struct Arguments {
     /// Overrides one value of the run's configuration, for data that has moved; repeatable
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Compute device
-    #[arg(long, value_enum, default_value_t = Backend::preferred())]
-    device: Backend,
+    #[command(flatten)]
+    device: DeviceArgument,
     /// Every number, not only those that are not finite or differ
     #[arg(long, short)]
     all: bool,
@@ -38,8 +37,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let file = &arguments.file;
     let incident = Incident::read(file)?;
     let config = incident.configuration(file, &arguments.overrides)?;
+    let device = arguments.device.open()?;
     let dataset = load_dataset(&config)?;
-    let again = incident.replay(file, &config, &dataset, &arguments.device.device())?;
+    let again = incident.replay(file, &config, &dataset, &device)?;
 
     println!("step {} of stage {:?}, seed {}", incident.step, incident.stage, incident.seed);
     if let Some(injected) = incident.injected {

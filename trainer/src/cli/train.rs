@@ -1,6 +1,7 @@
 //! `clothcombo-train`.
 
 use super::exit_code;
+use crate::cli::device_argument::DeviceArgument;
 use crate::cli::loading::load_dataset;
 use crate::cli::memory_table::{memory_line, memory_warning};
 use crate::cli::verbosity::{Verbosity, is_quiet, print_status};
@@ -14,7 +15,6 @@ use crate::run::observer::{
     History, HistoryObserver, LogObserver, MetricsObserver, ProgressObserver, ReportObserver,
     TensorBoardObserver,
 };
-use crate::system::device::Backend;
 use crate::system::memory::gibibytes;
 use crate::system::stop::StopFlag;
 use crate::training::process_group::ProcessGroup;
@@ -45,7 +45,8 @@ pub struct Arguments {
     /// Overrides one value, for example losses.strain.weight=2.0 or stages.0.steps=500; repeatable
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Continues a run from its newest whole checkpoint, or from the checkpoint PATH; PATH may also be the run folder
+    /// Continues a run from its newest whole checkpoint, or from the checkpoint PATH; PATH may also be the run folder. It continues
+    /// to the bit only on the device the checkpoint is from, with as many threads
     #[arg(long, value_name = "PATH", num_args = 0..=1)]
     resume: Option<Option<PathBuf>>,
     /// With --resume: keys whose values may differ from the run's own, separated by commas; a section allows all in it
@@ -54,9 +55,8 @@ pub struct Arguments {
     /// Folder of the run; default: runs/NAME-OF-CONFIG, numbered when taken, or the folder that PATH lies in
     #[arg(long, value_name = "DIR")]
     run_dir: Option<PathBuf>,
-    /// Compute device; a run continues to the bit only on the device it was started on, with as many threads
-    #[arg(long, value_enum, default_value_t = Backend::preferred())]
-    device: Backend,
+    #[command(flatten)]
+    device: DeviceArgument,
     #[command(flatten)]
     verbosity: Verbosity,
 }
@@ -152,9 +152,9 @@ fn run(arguments: &Arguments, group: &Rc<ProcessGroup>) -> Result<(), Report> {
         None if group.is_rank_zero() => RunDir::refuse_occupied(&root).map(|()| None)?,
         None => None,
     };
+    let device = arguments.device.open()?;
     let dataset = load_dataset(&config)?;
     print_data(&dataset);
-    let device = arguments.device.device();
     let (run, session) = match existing {
         Some((run, checkpoint)) => {
             let session = match &checkpoint {
@@ -193,7 +193,7 @@ fn run(arguments: &Arguments, group: &Rc<ProcessGroup>) -> Result<(), Report> {
             tracing::warn!("{warning}");
         }
     }
-    let mut observers = observers(&run, &config, &dataset, session.step(), memory)?;
+    let mut observers = observers(&run, &config, &session, memory)?;
     let result = train(&mut session, &mut observers, &stop);
     let (host, device) = (dataset.memory.most(), session.tensors().memory().most());
     tracing::info!(
@@ -233,16 +233,18 @@ fn continue_run(run: &RunDir, config: &Config, checkpoint: Option<&Checkpoint>) 
 fn observers(
     run: &RunDir,
     config: &Config,
-    dataset: &Dataset,
-    step: u64,
+    session: &Session,
     memory: Option<MemoryEstimate>,
 ) -> Result<Vec<Box<dyn Observer>>, Report> {
+    let (step, device) = (session.step(), session.device_name());
+    let log = LogObserver::new(run, &device, session.earlier_device())?;
     // First, because it drops the lines after the checkpoint that the run continues from.
     let metrics = MetricsObserver::new(run, step, config.output.metrics_every)?;
     let history = Rc::new(RefCell::new(History::read(run)?));
-    let report = ReportObserver::new(run, config, dataset.licences(), memory, history.clone())?;
+    let licences = session.dataset().licences();
+    let report = ReportObserver::new(run, config, device, licences, memory, history.clone())?;
     let mut observers: Vec<Box<dyn Observer>> =
-        vec![Box::new(metrics), Box::new(LogObserver::new(run)?), Box::new(HistoryObserver(history.clone()))];
+        vec![Box::new(metrics), Box::new(log), Box::new(HistoryObserver(history.clone()))];
     if config.output.tensorboard {
         observers.push(Box::new(TensorBoardObserver::new(run, step, config.output.metrics_every)?));
     }

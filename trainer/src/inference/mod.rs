@@ -66,7 +66,7 @@ pub use source::{GarmentCatalog, GivenGarment};
 
 use crate::dataset::{ActiveJoints, CachePolicy, DatasetError, Preprocessor, load_body};
 use crate::run::checkpoint::TrainedModel;
-use crate::system::device::Backend;
+use crate::system::device::default_device;
 use burn::tensor::Device;
 use clothcombo_data::asset::{Body, Pose};
 use clothcombo_data::cache::ArrayCache;
@@ -87,8 +87,8 @@ pub struct DraperSettings {
     pub cache: Option<PathBuf>,
     /// Largest size of the cache (bytes).
     pub cache_limit: u64,
-    /// The compute device.
-    pub backend: Backend,
+    /// The compute device, without automatic differentiation.
+    pub device: Device,
     /// Correction steps at most; `None`: as many as the model's configuration says.
     pub corrections: Option<usize>,
     /// Steps of the static solver after the networks; 0 switches refinement off.
@@ -101,13 +101,12 @@ pub struct DraperSettings {
 
 impl Default for DraperSettings {
     fn default() -> Self {
-        let backend = Backend::preferred();
         let post_process = ResolveSettings::default();
         Self {
             body: None,
             cache: None,
             cache_limit: 10 << 30,
-            backend,
+            device: default_device(),
             corrections: None,
             refine: 0,
             resolve: true,
@@ -163,7 +162,7 @@ impl Draper {
         let body = load_model_body(&trained, settings.body.as_deref())?;
         let joints = ActiveJoints::named(&body, &trained.state.joints)
             .map_err(|missing| DraperError::Joints { body: body.name.clone(), missing })?;
-        let device = settings.backend.device();
+        let device = settings.device.clone();
         let mut model = trained.networks(&device)?;
         if let Some(steps) = settings.corrections {
             if steps > 0 && model.corrections.is_empty() {

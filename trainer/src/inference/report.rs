@@ -5,6 +5,7 @@ use super::refine::Refinement;
 use super::{Drape, Draper, DraperError, Outfit, PhaseTimes, Smoothing};
 use crate::dataset::DatasetError;
 use crate::score::{DrapedGarment, Score, ScoreDistance, score};
+use crate::system::device::name;
 use crate::system::paths::{lossy, lossy_option};
 use clothcombo_data::asset::Category;
 use clothcombo_data::fit::FitReport;
@@ -86,6 +87,8 @@ pub struct FrameReport {
 pub struct Report {
     /// The program.
     pub program: String,
+    /// Name of the device that the networks ran on.
+    pub device: String,
     /// The model.
     pub model: ModelReport,
     /// The body.
@@ -162,6 +165,7 @@ impl Report {
         let trained = draper.trained();
         Ok(Self {
             program: format!("clothcombo {}", env!("CARGO_PKG_VERSION")),
+            device: name(&draper.settings().device),
             model: ModelReport {
                 folder: trained.folder.clone(),
                 step: trained.state.step,

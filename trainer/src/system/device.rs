@@ -1,61 +1,118 @@
-//! The compute devices a build can train on.
+//! The compute devices: what `--device` may name, which of them this build and machine have, what they are called.
+//!
+//! ```text
+//! DeviceChoice ──open──▶ burn's Device ──name──▶ "NVIDIA H100 80GB HBM3 (wgpu:0, Vulkan)"
+//! ```
+
+#[cfg(any(feature = "wgpu", feature = "cuda", test))]
+mod adapter;
+mod choice;
+#[cfg(feature = "cuda")]
+mod cuda;
+mod error;
+#[cfg(feature = "wgpu")]
+mod wgpu;
+
+pub use choice::{DeviceChoice, DeviceSpelling};
+pub use error::DeviceError;
 
 use burn::tensor::Device;
-use clap::ValueEnum;
+use std::sync::Mutex;
 
-/// Backend names on the command line; each needs the Cargo feature of the same name.
-#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
-pub enum Backend {
-    /// burn's CPU backend (default).
+/// Whether this build can use a GPU at all.
+pub const HAS_GPU_BACKEND: bool = cfg!(any(feature = "wgpu", feature = "cuda"));
+
+/// What burn's usual backend for the processor is called.
+pub const FLEX: &str = "processor (flex)";
+
+/// Names of the GPUs opened so far: burn tells them only of a device that it opens.
+static OPENED: Mutex<Vec<(Device, String)>> = Mutex::new(Vec::new());
+
+/// The device of everything that names none: the processor, or in a build without it the GPU that burn takes first. It has
+/// no automatic differentiation.
+#[allow(unreachable_code)]
+pub fn default_device() -> Device {
     #[cfg(feature = "flex")]
-    Flex,
-    /// burn's older CPU backend on the ndarray crate.
+    return Device::flex();
     #[cfg(feature = "ndarray")]
-    Ndarray,
-    /// Any GPU through WebGPU.
-    #[cfg(feature = "wgpu")]
-    Wgpu,
-    /// NVIDIA GPUs.
+    return ndarray();
     #[cfg(feature = "cuda")]
-    Cuda,
+    return Device::cuda(0);
+    #[cfg(feature = "wgpu")]
+    return Device::wgpu(burn::tensor::DeviceKind::DefaultDevice);
 }
 
-impl Backend {
-    /// The backend used when none is named: the first compiled in.
-    pub fn preferred() -> Self {
-        Self::value_variants()[0]
-    }
+#[cfg(feature = "ndarray")]
+#[allow(deprecated)] // burn marks it as succeeded by flex; users may still choose it
+fn ndarray() -> Device {
+    Device::ndarray()
+}
 
-    /// The device, without automatic differentiation.
-    pub fn device(self) -> Device {
-        match self {
-            #[cfg(feature = "flex")]
-            Self::Flex => Device::flex(),
-            #[cfg(feature = "ndarray")]
-            #[allow(deprecated)] // burn marks it as succeeded by flex; users may still choose it
-            Self::Ndarray => Device::ndarray(),
-            #[cfg(feature = "wgpu")]
-            Self::Wgpu => Device::wgpu(burn::tensor::DeviceKind::DefaultDevice),
-            #[cfg(feature = "cuda")]
-            Self::Cuda => Device::cuda(0),
+/// Whether `device` (with or without automatic differentiation) is this machine's processor, where several threads can
+/// compute in parallel. A software adapter of `wgpu` is not: it is driven like a GPU.
+pub fn is_processor(device: &Device) -> bool {
+    processor_backend(device).is_some()
+}
+
+/// The backend that computes on the processor, if `device` is it.
+fn processor_backend(device: &Device) -> Option<&'static str> {
+    let device = device.clone().inner();
+    #[cfg(feature = "flex")]
+    if device == Device::flex() {
+        return Some("flex");
+    }
+    #[cfg(feature = "ndarray")]
+    if device == ndarray() {
+        return Some("ndarray");
+    }
+    let _ = device;
+    None
+}
+
+/// What `device` is called in logs and reports, such as `processor (flex)` or `NVIDIA H100 80GB HBM3 (wgpu:0, Vulkan)`. A GPU
+/// has its name from [`DeviceChoice::open`]; opened in another way, it goes by burn's.
+pub fn name(device: &Device) -> String {
+    match processor_backend(device) {
+        Some(backend) => format!("processor ({backend})"),
+        None => {
+            opened_name(&device.clone().inner()).unwrap_or_else(|| format!("{:?}", device.clone().inner()))
         }
     }
 }
 
-/// Whether `device` (with or without automatic differentiation) is this machine's processor, where several threads can
-/// compute in parallel.
-pub fn is_processor(device: &Device) -> bool {
-    let device = device.clone().inner();
-    let is = |backend: &Backend| match backend {
-        #[cfg(feature = "flex")]
-        Backend::Flex => backend.device() == device,
-        #[cfg(feature = "ndarray")]
-        Backend::Ndarray => backend.device() == device,
-        #[cfg(any(feature = "wgpu", feature = "cuda"))]
-        _ => false,
+fn opened_name(device: &Device) -> Option<String> {
+    let opened = OPENED.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    opened.iter().find(|(other, _)| other == device).map(|(_, name)| name.clone())
+}
+
+/// Keeps burn from opening a GPU for a run on the processor: it reads Adam's moments on its own default device, which in a
+/// build with GPUs is one of them. The moments move to their parameters' device at the next step, whatever that is.
+///
+/// To be called first of all in a program, while it has one thread.
+pub fn prefer_processor() {
+    let processor = match () {
+        () if cfg!(feature = "flex") => "flex",
+        () if cfg!(feature = "ndarray") => "ndarray",
+        () => return,
     };
-    Backend::value_variants().iter().any(is)
+    if HAS_GPU_BACKEND && std::env::var_os("BURN_DEVICE").is_none() {
+        // SAFETY: no other thread reads the environment, since there is none yet.
+        unsafe { std::env::set_var("BURN_DEVICE", processor) };
+    }
 }
 
 #[cfg(not(any(feature = "flex", feature = "ndarray", feature = "wgpu", feature = "cuda")))]
 compile_error!("choose at least one backend feature: flex, ndarray, wgpu or cuda");
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[cfg(feature = "flex")]
+    fn device_of_the_processor_is_known_with_and_without_automatic_differentiation() {
+        let device = default_device();
+        assert!(is_processor(&device) && is_processor(&device.clone().autodiff()));
+        assert_eq!(name(&device.autodiff()), "processor (flex)");
+    }
+}

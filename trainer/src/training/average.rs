@@ -61,7 +61,7 @@ impl ModuleMapper for Blend {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::system::device::Backend;
+    use crate::system::device::default_device;
     use clothcombo_model::{Dimensions, ModelConfig};
 
     struct Doubled;
@@ -89,7 +89,7 @@ mod tests {
 
     #[test]
     fn it_moves_towards_the_weights_by_one_minus_the_decay() {
-        let device = Backend::preferred().device().autodiff();
+        let device = default_device().autodiff();
         let config = ModelConfig {
             width: 4,
             embedding: 4,

@@ -11,7 +11,7 @@ use crate::run::checkpoint::{Best, Checkpoint, CheckpointState, Snapshot};
 use crate::run::folder::RunDir;
 use crate::run::memory::MemoryEstimate;
 use crate::run::validation::ValidationReport;
-use crate::system::device::is_processor;
+use crate::system::device::{is_processor, name};
 use crate::system::memory::Memory;
 use crate::training::average::Average;
 use crate::training::guard::Guard;
@@ -19,6 +19,7 @@ use crate::training::learner::Learner;
 use crate::training::process_group::{ProcessGroup, ProcessGroupError};
 use crate::training::schedule::Schedule;
 use burn::module::Module;
+use burn::tensor::Device;
 use miette::Report;
 use std::path::PathBuf;
 use std::rc::Rc;
@@ -47,6 +48,9 @@ pub struct Session {
     /// A checkpoint that was due after a skipped step waits for one that is not: the parameters may be at fault.
     owes_checkpoint: bool,
     group: Rc<ProcessGroup>,
+    device: Device,
+    /// Name of the device that the run came from, where it is another.
+    earlier_device: Option<String>,
 }
 
 impl Session {
@@ -94,6 +98,14 @@ impl Session {
     /// The dataset.
     pub fn dataset(&self) -> &Arc<Dataset> {
         &self.dataset
+    }
+    /// What the device is called that the run computes on.
+    pub fn device_name(&self) -> String {
+        name(&self.device)
+    }
+    /// What the device is called that the run was computed on before it moved to this one.
+    pub fn earlier_device(&self) -> Option<&str> {
+        self.earlier_device.as_deref()
     }
     /// Memory the run is expected to use; `None` where the system does not tell what is in use already.
     pub fn memory_estimate(&self) -> Option<MemoryEstimate> {
@@ -146,7 +158,7 @@ impl Session {
     /// # Errors
     /// When it cannot be written; earlier checkpoints are untouched.
     pub fn save(&self) -> Result<PathBuf, Report> {
-        let mut state = CheckpointState::of(&self.dataset, self.step);
+        let mut state = CheckpointState::of(&self.dataset, self.step).on_device(&self.device_name());
         state.best = self.best;
         state.incidents = self.guard.incidents();
         let snapshot = Snapshot {

@@ -7,6 +7,7 @@ mod bench_stability;
 mod bench_step;
 mod check;
 mod common;
+mod device;
 mod drape;
 mod drape_folders;
 mod drape_input;

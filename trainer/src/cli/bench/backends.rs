@@ -5,9 +5,10 @@ use crate::cli::output::print_report;
 use crate::cli::table::{markdown, row};
 use crate::cli::values::{measuring_seconds, not_negative};
 use crate::cli::verbosity::print_status;
-use crate::system::device::Backend;
+use crate::system::device::{DeviceChoice, DeviceError};
 use crate::training::measure::{BenchmarkRun, Case};
-use clap::{Parser, ValueEnum};
+use burn::tensor::Device;
+use clap::Parser;
 use miette::{Report, miette};
 use serde::Serialize;
 
@@ -19,9 +20,9 @@ use serde::Serialize;
         the norm of the parameter's gradient on the first device."
 )]
 pub struct Arguments {
-    /// Devices to compare with the first of this build; default: all of this build
-    #[arg(long, value_enum, value_delimiter = ',')]
-    devices: Vec<Backend>,
+    /// Devices to compare with the first of this build, named as for --device; default: one of each backend of this build
+    #[arg(long, value_name = "DEVICE,…", value_delimiter = ',')]
+    devices: Vec<DeviceChoice>,
     /// Width of the networks
     #[arg(long, default_value_t = 48)]
     width: usize,
@@ -63,20 +64,21 @@ struct Measured {
 /// # Errors
 /// When a device fails, or disagrees with the first by more than is asked for.
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
+    let all = DeviceChoice::of_this_build();
+    let wanted = if arguments.devices.is_empty() { &all } else { &arguments.devices };
+    let others = wanted.iter().copied().filter(|choice| *choice != all[0]);
+    // All before the first is measured: one that is not there is known at once.
+    let opened = [all[0]].into_iter().chain(others).map(|choice| Ok((choice, choice.open()?)));
+    let devices = opened.collect::<Result<Vec<_>, DeviceError>>()?;
     let config = Case::new(arguments.width, arguments.layers, arguments.vertices).config(&[])?;
     let dataset = load_dataset(&config)?;
-    let run_on = |backend: Backend| BenchmarkRun::new(config.clone(), dataset.clone(), 0, &backend.device());
-    let first = run_on(Backend::preferred())?;
+    let run_on = |device: &Device| BenchmarkRun::new(config.clone(), dataset.clone(), 0, device);
+    let first = run_on(&devices[0].1)?;
     let scene = first.scene(0)?;
     let (loss, gradients) = first.loss_and_gradients(&scene)?;
-    let wanted = match arguments.devices.as_slice() {
-        [] => Backend::value_variants(),
-        devices => devices,
-    };
-    let others = wanted.iter().copied().filter(|device| *device != Backend::preferred());
     let mut rows = Vec::new();
-    for device in [Backend::preferred()].into_iter().chain(others) {
-        print_status(&format!("measuring {}", name(device)));
+    for (choice, device) in &devices {
+        print_status(&format!("measuring {choice}"));
         let mut run = run_on(device)?;
         run.copy_parameters(&first)?;
         let (found_loss, found) = run.loss_and_gradients(&scene)?;
@@ -87,7 +89,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         let worst = differences.max_by(|a, b| a.0.total_cmp(&b.0));
         let costs = run.costs(arguments.seconds, 1)?;
         rows.push(Measured {
-            device: name(device),
+            device: choice.to_string(),
             loss: found_loss,
             loss_difference: ((found_loss - loss) / loss).abs(),
             gradient_difference: worst.as_ref().map_or(0.0, |worst| worst.0),
@@ -114,10 +116,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
             arguments.most_gradient
         )),
     }
-}
-
-fn name(backend: Backend) -> String {
-    backend.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
 }
 
 /// Norm of the difference over the norm of `expected`; infinite where the sizes differ.

@@ -2,6 +2,7 @@
 
 mod summary;
 
+use crate::cli::device_argument::DeviceArgument;
 use crate::cli::loading::load_dataset;
 use crate::cli::model_arguments::ModelArguments;
 use crate::cli::output::print_report;
@@ -15,7 +16,6 @@ use crate::inference::UniqueNames;
 use crate::inference::networks::Networks;
 use crate::inference::tensor_store::TensorStore;
 use crate::run::checkpoint::TrainedModel;
-use crate::system::device::Backend;
 use crate::system::single_threaded::map_single_threaded;
 use clap::Parser;
 use clothcombo_data::format::obj;
@@ -60,6 +60,8 @@ pub struct Arguments {
     /// Writes body and garments (rest, draped, resolved) of every outfit as OBJ under this folder
     #[arg(long, value_name = "DIR")]
     meshes: Option<PathBuf>,
+    #[command(flatten)]
+    device: DeviceArgument,
     /// Print JSON instead of tables
     #[arg(long)]
     json: bool,
@@ -101,7 +103,7 @@ fn measure(
         None => None,
         Some(checkpoint) => {
             checkpoint.check_fits(dataset)?;
-            let device = Backend::preferred().device();
+            let device = arguments.device.open()?;
             tensors = TensorStore::new(dataset.clone(), checkpoint.state.dimensions(), &device);
             Some(Networks::new(checkpoint.networks(&device)?, &tensors))
         }

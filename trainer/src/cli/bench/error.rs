@@ -2,6 +2,7 @@
 
 mod summary;
 
+use crate::cli::device_argument::DeviceArgument;
 use crate::cli::loading::load_dataset;
 use crate::cli::model_arguments::ModelArguments;
 use crate::cli::output::print_report;
@@ -16,7 +17,6 @@ use crate::inference::networks::Networks;
 use crate::inference::reference::ReferenceScene;
 use crate::inference::tensor_store::TensorStore;
 use crate::run::checkpoint::TrainedModel;
-use crate::system::device::Backend;
 use crate::system::single_threaded::map_single_threaded;
 use clap::Parser;
 use clothcombo_physics::contact::resolve::ResolveSettings;
@@ -57,6 +57,8 @@ pub struct Arguments {
     /// Also measures the networks after these numbers of correction steps, for example 0,1,2,4,8
     #[arg(long, value_name = "STEPS", value_delimiter = ',', requires = "checkpoint")]
     corrections: Vec<usize>,
+    #[command(flatten)]
+    device: DeviceArgument,
     /// Print JSON instead of a table
     #[arg(long)]
     json: bool,
@@ -85,7 +87,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let dataset = load_dataset(&config)?;
     let seed = arguments.seed.unwrap_or_else(|| config.validation_seed());
     let scenes = sample_scenes(&dataset, &config, [arguments.scenes, arguments.layers], seed)?;
-    let drape = |trained| drape(trained, &config, &dataset, &scenes, &arguments.corrections);
+    let drape = |trained| drape(arguments, trained, &config, &dataset, &scenes);
     let drapes = trained.as_ref().map(drape).transpose()?;
     let errors = solve_all(arguments, &config, &scenes, drapes.as_deref(), &settings)?;
     print_report(arguments.json, &Summary::new(errors, &settings), Summary::tables)
@@ -129,14 +131,14 @@ fn sample_scenes(
 }
 
 fn drape(
+    arguments: &Arguments,
     trained: &TrainedModel,
     config: &Config,
     dataset: &Arc<Dataset>,
     scenes: &[PreparedScene],
-    corrections: &[usize],
 ) -> Result<Vec<Drapes>, Report> {
     trained.check_fits(dataset)?;
-    let device = Backend::preferred().device();
+    let device = arguments.device.open()?;
     let tensors = TensorStore::new(dataset.clone(), trained.state.dimensions(), &device);
     let networks = Networks::new(trained.networks(&device)?, &tensors);
     let post_processor = PostProcessor::new(dataset, &config.losses, Some(&networks));
@@ -150,7 +152,7 @@ fn drape(
             _ => Some(post_processor.of(scene, &drape.posed).resolved(&post_process)?.positions.concat()),
         };
         let mut drapes = Drapes::new(&networks.drape_single_garments(scene)?, &drape, resolved);
-        for &steps in corrections {
+        for &steps in &arguments.corrections {
             let drape = networks.with_correction_steps(steps).drape(scene)?;
             drapes.steps.push((steps, drape.posed.iter().map(|p| p.map(f64::from)).collect()));
         }

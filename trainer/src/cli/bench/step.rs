@@ -1,5 +1,6 @@
 //! `clothcombo bench step`.
 
+use crate::cli::device_argument::DeviceArgument;
 use crate::cli::loading::load_dataset;
 use crate::cli::output::print_report;
 use crate::cli::table::{Cell, Row, markdown, row};
@@ -8,9 +9,10 @@ use crate::cli::verbosity::print_status;
 use crate::config::{Config, load};
 use crate::picture::chart::{Bar, draw_bars};
 use crate::picture::save_png;
-use crate::system::device::Backend;
+use crate::system::device::name;
 use crate::training::measure::{BenchmarkRun, Case, Costs, PHASES, Profile, export};
 use burn::module::Module;
+use burn::tensor::Device;
 use clap::Parser;
 use clothcombo_physics::energy::Term;
 use miette::{IntoDiagnostic, Report, miette};
@@ -62,9 +64,8 @@ pub struct Arguments {
     /// Time spent on each single measurement (s)
     #[arg(long, default_value_t = 1.0, value_parser = measuring_seconds)]
     seconds: f64,
-    /// Compute device
-    #[arg(long, value_enum, default_value_t = Backend::preferred())]
-    device: Backend,
+    #[command(flatten)]
+    device: DeviceArgument,
     /// Writes the shares of a step as stacked bars (PNG)
     #[arg(long, value_name = "FILE", value_parser = picture_file())]
     picture: Option<PathBuf>,
@@ -97,22 +98,23 @@ struct Measured {
 /// # Errors
 /// When the configuration or its data cannot be read, a size is out of range, or an output cannot be written.
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
+    let device = arguments.device.open()?;
     let measured = match &arguments.config {
-        Some(file) => stages(arguments, load(file, &arguments.overrides)?)?,
-        None => synthetic(arguments)?,
+        Some(file) => stages(arguments, load(file, &arguments.overrides)?, &device)?,
+        None => synthetic(arguments, &device)?,
     };
     if let Some(path) = &arguments.picture {
         save_png(&picture(&measured), path).into_diagnostic()?;
     }
     let report = serde_json::json!({
         "threads": rayon::current_num_threads(),
-        "device": format!("{:?}", arguments.device).to_lowercase(),
+        "device": name(&device),
         "cases": &measured,
     });
     print_report(arguments.json, &report, |_| tables(&measured))
 }
 
-fn synthetic(arguments: &Arguments) -> Result<Vec<Measured>, Report> {
+fn synthetic(arguments: &Arguments, device: &Device) -> Result<Vec<Measured>, Report> {
     let cases = cases(arguments);
     if arguments.export.is_some() && cases.len() != 1 {
         return Err(miette!(
@@ -125,7 +127,7 @@ fn synthetic(arguments: &Arguments) -> Result<Vec<Measured>, Report> {
         let config = case.config(&arguments.overrides)?;
         let case = case.of_config(&config);
         let dataset = load_dataset(&config)?;
-        let mut run = BenchmarkRun::new(config, dataset, 0, &arguments.device.device())?;
+        let mut run = BenchmarkRun::new(config, dataset, 0, device)?;
         let name = [&[case.name()][..], arguments.overrides.as_slice()].concat().join(", ");
         measure(&mut run, name, Some(case), arguments)
     });
@@ -149,7 +151,7 @@ fn cases(arguments: &Arguments) -> Vec<Case> {
     }
 }
 
-fn stages(arguments: &Arguments, config: Config) -> Result<Vec<Measured>, Report> {
+fn stages(arguments: &Arguments, config: Config, device: &Device) -> Result<Vec<Measured>, Report> {
     let names: Vec<String> = config.stages.iter().map(|stage| stage.name.clone()).collect();
     let all =
         || names.iter().enumerate().map(|(i, name)| format!("{i} {name:?}")).collect::<Vec<_>>().join(", ");
@@ -169,7 +171,7 @@ fn stages(arguments: &Arguments, config: Config) -> Result<Vec<Measured>, Report
     }
     let dataset = load_dataset(&config)?;
     let stage = |index: usize| {
-        let mut run = BenchmarkRun::new(config.clone(), dataset.clone(), index, &arguments.device.device())?;
+        let mut run = BenchmarkRun::new(config.clone(), dataset.clone(), index, device)?;
         measure(&mut run, names[index].clone(), None, arguments)
     };
     chosen.into_iter().map(stage).collect()

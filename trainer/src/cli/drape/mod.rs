@@ -6,13 +6,13 @@ mod outfits;
 mod summary;
 mod warnings;
 
+use crate::cli::device_argument::DeviceArgument;
 use crate::cli::interrupted::remove_on_signals;
 use crate::cli::output::print_json;
 use crate::cli::post_process::PostProcessArguments;
 use crate::cli::verbosity::{print_status, progress_bar};
 use crate::inference::output::{Show, Staged, write};
 use crate::inference::{Drape, DrapeProgress, Draper, DraperSettings, Moment, Outfit, Report, smooth};
-use crate::system::device::Backend;
 use crate::system::files::write_json;
 use clap::{ArgGroup, Parser, ValueEnum};
 use clothcombo_data::check::impossible_turn;
@@ -96,9 +96,8 @@ pub struct Arguments {
     /// Prints the report as JSON instead of tables
     #[arg(long)]
     json: bool,
-    /// Compute device
-    #[arg(long, value_enum, default_value_t = Backend::preferred())]
-    device: Backend,
+    #[command(flatten)]
+    device: DeviceArgument,
     /// Folder to make
     #[arg(short, long, value_name = "FOLDER")]
     output: PathBuf,
@@ -148,7 +147,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     {
         return Err(miette!(help = "give --motion FILE, or leave --smooth out", "--smooth without a motion"));
     }
-    let settings = settings(arguments);
+    let settings = settings(arguments)?;
     check_cache(settings.cache.as_deref(), &arguments.output)?;
     let inputs: Vec<PathBuf> = jobs.iter().flat_map(Job::files).chain(arguments.inputs()).collect();
     let mut staged = Staged::new(&arguments.output, arguments.replace, &inputs)?;
@@ -235,21 +234,21 @@ fn jobs(arguments: &Arguments) -> Result<Vec<Job>, Failure> {
     }
 }
 
-fn settings(arguments: &Arguments) -> DraperSettings {
+fn settings(arguments: &Arguments) -> Result<DraperSettings, Failure> {
     let cache = match arguments.no_cache {
         true => None,
         false => arguments.cache.clone().or_else(user_cache),
     };
-    DraperSettings {
+    Ok(DraperSettings {
         body: arguments.body.clone(),
         cache,
-        backend: arguments.device,
+        device: arguments.device.open()?,
         corrections: arguments.corrections,
         refine: arguments.refine,
         resolve: !arguments.no_resolve,
         post_process: arguments.post_process.settings(),
         ..DraperSettings::default()
-    }
+    })
 }
 
 /// Frames to each side over which a motion is smoothed: where nothing else is asked for, two of frames that are

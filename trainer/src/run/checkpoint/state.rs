@@ -1,6 +1,7 @@
 //! What a checkpoint says about itself, sealed against damage.
 
 use crate::dataset::Dataset;
+use crate::system::device::FLEX;
 use crate::system::exact::Exact;
 use clothcombo_model::Dimensions;
 use serde::{Deserialize, Serialize};
@@ -33,6 +34,9 @@ pub struct CheckpointState {
     /// Recent steps that were skipped because their loss or gradient was not finite.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub incidents: Vec<u64>,
+    /// Name of the device it was computed on, where that is another than the usual [`FLEX`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub device: Option<String>,
     /// BLAKE3 checksum of each file.
     pub checksums: BTreeMap<String, String>,
 }
@@ -59,6 +63,7 @@ impl CheckpointState {
             data: None,
             best: None,
             incidents: Vec::new(),
+            device: None,
             checksums: BTreeMap::new(),
         }
     }
@@ -69,6 +74,18 @@ impl CheckpointState {
         let mut state = Self::new(step, names.collect(), dataset.shape_count, dataset.dimensions().pose);
         state.data = Some(dataset.fingerprint().to_owned());
         state
+    }
+
+    /// The same, computed on the device of this name.
+    #[must_use]
+    pub fn on_device(mut self, name: &str) -> Self {
+        self.device = (name != FLEX).then(|| name.to_owned());
+        self
+    }
+
+    /// Name of the device it was computed on.
+    pub fn device_name(&self) -> &str {
+        self.device.as_deref().unwrap_or(FLEX)
     }
 
     /// Input sizes of the networks.

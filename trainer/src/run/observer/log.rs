@@ -13,19 +13,22 @@ use std::time::Instant;
 pub struct LogObserver {
     path: PathBuf,
     file: File,
+    /// What the session says of its device.
+    device: String,
     start: Instant,
 }
 
 impl LogObserver {
-    /// Goes on with the log of `run`.
+    /// Goes on with the log of `run`, now computed on `device`; `earlier` is where it was before, if that was elsewhere.
     ///
     /// # Errors
     /// When it cannot be written.
-    pub fn new(run: &RunDir) -> Result<Self, Report> {
+    pub fn new(run: &RunDir, device: &str, earlier: Option<&str>) -> Result<Self, Report> {
         let path = run.log();
         let opened = OpenOptions::new().create(true).append(true).open(&path);
         let file = opened.into_diagnostic().wrap_err_with(|| cannot_write(&path))?;
-        Ok(Self { path, file, start: Instant::now() })
+        let device = earlier.map_or_else(|| device.to_owned(), |earlier| moved(earlier, device));
+        Ok(Self { path, file, device, start: Instant::now() })
     }
 
     /// One line, with the seconds since the session began.
@@ -36,6 +39,11 @@ impl LogObserver {
     }
 }
 
+/// What to say of a run that moved from one device to another.
+pub fn moved(earlier: &str, now: &str) -> String {
+    format!("{now}; the checkpoint was computed on {earlier}: the run goes on, its last bits may differ")
+}
+
 fn cannot_write(path: &Path) -> String {
     format!("cannot write {}", path.display())
 }
@@ -44,7 +52,8 @@ impl Observer for LogObserver {
     fn observe(&mut self, event: &TrainEvent) -> Result<(), Report> {
         match event {
             TrainEvent::Started { step, total_steps } => {
-                self.line(format_args!("session starts after step {step} of {total_steps}"))
+                self.line(format_args!("session starts after step {step} of {total_steps}"))?;
+                self.line(format!("device: {}", self.device))
             }
             TrainEvent::StageStarted { name, step, steps } => {
                 self.line(format_args!("stage {name}: {steps} steps from step {step}"))

@@ -8,7 +8,7 @@ mod report;
 mod tensorboard;
 
 pub use history::{History, HistoryObserver, SharedHistory, best_so_far};
-pub use log::LogObserver;
+pub use log::{LogObserver, moved};
 pub use metrics::MetricsObserver;
 pub use progress::ProgressObserver;
 pub use report::ReportObserver;

@@ -21,6 +21,7 @@ pub struct ReportObserver {
     curves: PathBuf,
     name: String,
     config: String,
+    device: String,
     steps: Steps,
     licences: Vec<LicenceLine>,
     memory: Option<MemoryEstimate>,
@@ -31,13 +32,15 @@ pub struct ReportObserver {
 }
 
 impl ReportObserver {
-    /// A page about what `history` holds. `memory` is what the run was expected to need.
+    /// A page about what `history` holds. `device` is the name of the one it runs on, `memory` what the run was
+    /// expected to need.
     ///
     /// # Errors
     /// When the configuration has no text.
     pub fn new(
         run: &RunDir,
         config: &Config,
+        device: String,
         licences: Vec<LicenceLine>,
         memory: Option<MemoryEstimate>,
         history: SharedHistory,
@@ -48,6 +51,7 @@ impl ReportObserver {
             curves: run.curves(),
             name: run_name(run.root()),
             config: to_toml(config).into_diagnostic()?,
+            device,
             steps: steps(config),
             licences,
             memory,
@@ -71,6 +75,7 @@ impl ReportObserver {
             speed: (done > 0).then(|| done as f64 / start.elapsed().as_secs_f64()),
             history: &history,
             config: &self.config,
+            device: &self.device,
             licences: &self.licences,
             memory: self.memory,
             peak: Memory::now().map(|m| m.peak),

@@ -60,6 +60,8 @@ pub struct Page<'a> {
     pub history: &'a History,
     /// The configuration, as TOML.
     pub config: &'a str,
+    /// Name of the device it runs on.
+    pub device: &'a str,
     /// Terms of use of the data.
     pub licences: &'a [LicenceLine],
     /// Memory expected at the start.
@@ -119,6 +121,7 @@ impl Page<'_> {
         if let Some((step, score)) = self.history.best {
             tiles.push(("best validation", format!("{} at step {step}", number_text(score, 4))));
         }
+        tiles.push(("device", escape(self.device)));
         tiles.push(("skipped steps", self.history.skipped.len().to_string()));
         tiles.push(("gradient spikes", self.history.spikes.len().to_string()));
         if let Some(peak) = self.peak {

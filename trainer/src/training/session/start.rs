@@ -7,6 +7,8 @@ use crate::evaluation::ValidationSet;
 use crate::inference::tensor_store::TensorStore;
 use crate::run::checkpoint::{Checkpoint, CheckpointState, TrainedModel};
 use crate::run::folder::{RunDir, differing_keys};
+use crate::run::observer::moved;
+use crate::system::device::name;
 use crate::training::average::Average;
 use crate::training::guard::Guard;
 use crate::training::learner::{Learner, new_optimizer};
@@ -44,7 +46,7 @@ impl Session {
         let average = (config.optimizer.ema_decay > 0.0)
             .then(|| Average::new(model.valid(), config.optimizer.ema_decay));
         let learner = Learner::new(model, new_optimizer(&config.optimizer), &config.optimizer);
-        let start = CheckpointState::of(&dataset, 0);
+        let start = CheckpointState::of(&dataset, 0).on_device(&name(&device));
         Ok(Self::assemble(run, config, dataset, &device, learner, average, &start))
     }
 
@@ -78,6 +80,9 @@ impl Session {
                 checkpoint.path.display()
             );
         }
+        if found.device_name() != name(&device) {
+            tracing::warn!("device: {}", moved(found.device_name(), &name(&device)));
+        }
         let model = checkpoint.trained_model(&config, &device)?;
         let average = match config.optimizer.ema_decay {
             decay if decay > 0.0 => {
@@ -108,7 +113,10 @@ impl Session {
         average: Option<Average>,
         state: &CheckpointState,
     ) -> Self {
+        let earlier_device = Some(state.device_name()).filter(|earlier| *earlier != name(device));
         Self {
+            earlier_device: earlier_device.map(str::to_owned),
+            device: device.clone(),
             tensors: Arc::new(TensorStore::new(dataset.clone(), dataset.dimensions(), device)),
             validation: ValidationSet::new(&dataset, &config),
             schedule: Schedule::new(&config),

@@ -1,0 +1,49 @@
+//! NVIDIA's GPUs, as CUDA numbers them.
+
+use super::adapter::{Adapter, AdapterKind, numbered};
+use super::{DeviceError, OPENED, opened_name};
+use burn::tensor::{Device, DeviceType};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+const HINT: &str =
+    "install NVIDIA's driver and check CUDA_VISIBLE_DEVICES, or compute on the processor with --device flex";
+
+/// GPU number `index`, or the first.
+///
+/// # Errors
+/// When there is none, or it cannot be opened.
+pub(super) fn open(index: Option<usize>) -> Result<Device, DeviceError> {
+    let count = Device::enumerate(DeviceType::Cuda).len();
+    open_numbered(numbered("cuda", index, count, HINT, || listed(count))?)
+}
+
+/// The first GPU if there is one, for `--device auto`.
+pub(super) fn open_hardware() -> Option<Result<Device, DeviceError>> {
+    (!Device::enumerate(DeviceType::Cuda).is_empty()).then(|| open_numbered(0))
+}
+
+fn open_numbered(index: usize) -> Result<Device, DeviceError> {
+    let device = Device::cuda(index);
+    if opened_name(&device).is_some() {
+        return Ok(device);
+    }
+    // The driver's refusal is a panic of burn's.
+    let identity = catch_unwind(AssertUnwindSafe(|| device.identity())).map_err(|_| {
+        DeviceError::CannotOpen { device: format!("cuda:{index}"), reason: "the driver refuses it".into() }
+    })?;
+    let name = identity.map(|identity| identity.name).unwrap_or_default();
+    let name = format!("{name} (cuda:{index})");
+    OPENED.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).push((device.clone(), name));
+    Ok(device)
+}
+
+/// The GPUs with their names, which only an open one tells.
+fn listed(count: usize) -> Vec<Adapter> {
+    let adapter = |index| {
+        let opened = open_numbered(index).map(|device| opened_name(&device).unwrap_or_default());
+        let name = opened.unwrap_or_else(|error| error.to_string());
+        let name = name.split(" (cuda:").next().unwrap_or_default().to_owned();
+        Adapter { choice: format!("cuda:{index}"), name, kind: AdapterKind::Discrete }
+    };
+    (0..count).map(adapter).collect()
+}

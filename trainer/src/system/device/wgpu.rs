@@ -1,0 +1,89 @@
+//! The adapters of WebGPU, all of the one graphics API that burn settles on: on Linux Vulkan where it has any.
+
+use super::adapter::{Adapter, AdapterKind, numbered};
+use super::{DeviceError, OPENED, opened_name};
+use burn::tensor::wgpu::WgpuInitError;
+use burn::tensor::{Device, DeviceKind, DeviceType};
+
+const HINT: &str = "install the GPU's Vulkan driver and the Vulkan loader (Debian: libvulkan1; mesa-vulkan-drivers for AMD and \
+     Intel GPUs and for an adapter in software), or compute on the processor with --device flex";
+
+/// An adapter, as burn selects it.
+type Selector = (AdapterKind, DeviceKind);
+
+/// All adapters in the order of their numbers, hardware first. Opens none.
+fn selectors() -> Vec<Selector> {
+    let found = Device::enumerate(DeviceType::Wgpu);
+    // burn numbers the adapters of every kind from 0, and the adapters in software not at all.
+    let of_kind = |kind: AdapterKind, selector: fn(usize) -> DeviceKind| {
+        let selectors = (0..found.len()).map(selector);
+        let is_there = |selector: &DeviceKind| found.contains(&Device::wgpu(selector.clone()));
+        selectors.take_while(is_there).map(move |selector| (kind, selector)).collect::<Vec<_>>()
+    };
+    let mut all = of_kind(AdapterKind::Discrete, DeviceKind::DiscreteGpu);
+    all.extend(of_kind(AdapterKind::Integrated, DeviceKind::IntegratedGpu));
+    all.extend(of_kind(AdapterKind::Virtual, DeviceKind::VirtualGpu));
+    if found.contains(&Device::wgpu(DeviceKind::Cpu)) {
+        all.push((AdapterKind::Software, DeviceKind::Cpu));
+    }
+    if all.is_empty() && !found.is_empty() {
+        // burn has no selector for adapters that do not say what they are; its default is the best of them.
+        all.push((AdapterKind::Other, DeviceKind::DefaultDevice));
+    }
+    all
+}
+
+/// The adapter number `index`, or the first.
+///
+/// # Errors
+/// When there is none, or it cannot be opened.
+pub(super) fn open(index: Option<usize>) -> Result<Device, DeviceError> {
+    let selectors = selectors();
+    let index = numbered("wgpu", index, selectors.len(), HINT, || listed(&selectors))?;
+    open_selected(index, &selectors[index].1)
+}
+
+/// The first adapter if it is a GPU, for `--device auto`.
+pub(super) fn open_hardware() -> Option<Result<Device, DeviceError>> {
+    let selectors = selectors();
+    let (kind, selector) = selectors.first()?;
+    kind.is_hardware().then(|| open_selected(0, selector))
+}
+
+fn open_selected(index: usize, selector: &DeviceKind) -> Result<Device, DeviceError> {
+    let device = Device::wgpu(selector.clone());
+    if opened_name(&device).is_some() {
+        return Ok(device);
+    }
+    let name = match Device::wgpu_options().device_kind(selector.clone()).init_with_setup() {
+        Ok((_, setup)) => {
+            let adapter = setup.adapter.get_info();
+            format!("{} (wgpu:{index}, {:?})", adapter.name, adapter.backend)
+        }
+        // A tensor has opened it before.
+        Err(WgpuInitError::Registration { .. }) => {
+            let identity = device.identity().map(|identity| identity.name);
+            format!("{} (wgpu:{index})", identity.unwrap_or_default())
+        }
+        Err(error) => {
+            return Err(DeviceError::CannotOpen {
+                device: format!("wgpu:{index}"),
+                reason: error.to_string(),
+            });
+        }
+    };
+    OPENED.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).push((device.clone(), name));
+    Ok(device)
+}
+
+/// The adapters with their names, which only an open one tells.
+fn listed(selectors: &[Selector]) -> Vec<Adapter> {
+    let adapter = |(index, (kind, selector)): (usize, &Selector)| {
+        let opened = open_selected(index, selector);
+        let name = opened.map(|device| opened_name(&device).unwrap_or_default());
+        let name = name.unwrap_or_else(|error| error.to_string());
+        let name = name.split(" (wgpu:").next().unwrap_or_default().to_owned();
+        Adapter { choice: format!("wgpu:{index}"), name, kind: *kind }
+    };
+    selectors.iter().enumerate().map(adapter).collect()
+}
