@@ -18,6 +18,7 @@ SETTINGS = {
 GARMENT_TERMS = ["strain", "bending", "gravity", "body_collision", "repulsion", "holding"]
 LAYER_TERMS = ["layer_collision", "layer_distance"]
 _mode = "use_mm_for_euclid_dist_if_necessary"
+_device = "cpu"
 
 
 def set_exact(exact):
@@ -25,8 +26,18 @@ def set_exact(exact):
     _mode = "donot_use_mm_for_euclid_dist" if exact else "use_mm_for_euclid_dist_if_necessary"
 
 
+def set_device(device):
+    """Where everything made from here on lies."""
+    global _device
+    _device = device
+
+
 def narrow(array):
-    return torch.from_numpy(np.ascontiguousarray(array, np.float32))
+    return torch.from_numpy(np.ascontiguousarray(array, np.float32)).to(_device)
+
+
+def indices(array):
+    return torch.from_numpy(np.ascontiguousarray(array, np.int64)).to(_device)
 
 
 def normals(x, faces):
@@ -40,7 +51,7 @@ class Body:
 
     def __init__(self, positions, faces):
         self.positions = narrow(positions)
-        self.normals = normals(self.positions, torch.from_numpy(faces.astype(np.int64)))
+        self.normals = normals(self.positions, indices(faces))
 
     def gaps(self, x):
         """Signed distance of every point along the normal of the nearest body vertex, and that vertex."""
@@ -56,7 +67,8 @@ class Garment:
         self.settings = settings
         faces = faces.astype(np.int64)
         self.count = count = len(rest)
-        self.faces = torch.from_numpy(faces)
+        self.faces = indices(faces)
+        self.identity = torch.eye(2, device=_device)
         a, b, c = (rest[faces[:, k]] for k in range(3))
         area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
         first = (b - a) / np.linalg.norm(b - a, axis=1)[:, None]
@@ -72,42 +84,44 @@ class Garment:
         np.add.at(mass, faces.ravel(), np.repeat(area * settings["thickness"] * settings["density"] / 3, 3))
         self.weight = narrow(mass * settings["gravity"])
 
-        half = {}
-        for face in faces:
-            for k in range(3):
-                half[(face[k], face[(k + 1) % 3])] = face[(k + 2) % 3]
-        hinges = [(p, q, o, half[q, p]) for (p, q), o in half.items() if p < q and (q, p) in half]
-        self.hinges = torch.from_numpy(np.array(hinges))
-        pairs = np.array(list(half))
-        apart = torch.ones((count, count), dtype=torch.bool)
-        apart[pairs[:, 0], pairs[:, 1]] = False
-        apart[pairs[:, 1], pairs[:, 0]] = False
+        # Half-edges face by face, each with the vertex opposite; an edge of two faces, its lower vertex first, is a hinge.
+        p, q, opposite = faces.ravel(), np.roll(faces, -1, 1).ravel(), np.roll(faces, -2, 1).ravel()
+        half, twin = p * count + q, q * count + p
+        order = np.argsort(half)
+        place = order[np.searchsorted(half, twin, sorter=order).clip(max=len(half) - 1)]
+        inner = (half[place] == twin) & (p < q)
+        self.hinges = indices(np.stack([p, q, opposite, opposite[place]], 1)[inner])
+        pairs = np.stack([p, q], 1)
+        apart = torch.ones((count, count), dtype=torch.bool, device=_device)
+        first, second = indices(p), indices(q)
+        apart[first, second] = False
+        apart[second, first] = False
         apart.fill_diagonal_(False)
         self.apart = apart
         unique = np.unique(np.sort(pairs, axis=1), axis=0)
         lengths = np.sort(np.linalg.norm(rest[unique[:, 0]] - rest[unique[:, 1]], axis=1))
         self.median_edge = float(lengths[len(lengths) // 2])
         held = np.argsort(-rest[:, 1], kind="stable")[: math.ceil(settings["holding_fraction"] * count - 1e-9)]
-        self.held = torch.from_numpy(held.copy())
+        self.held = indices(held)
         self.reference = narrow(reference)
         self.rows = None
 
     def pull_back(self, weights, bones):
         """Heights are read off posed positions from here on, undone by the initial skinning [V,J] of bones [J,3,4]."""
         blended = np.einsum("vj,jab->vab", weights.astype(np.float64), bones.astype(np.float64))
-        held = self.held.numpy()
+        held = self.held.cpu().numpy()
         linear = blended[held, :, :3]
         is_flat = np.abs(np.linalg.det(linear)) < 0.05
         linear[is_flat] = np.eye(3)
         row = np.linalg.inv(linear)[:, 1, :]
         shift = -(row * blended[held, :, 3]).sum(1)
-        self.held = self.held[torch.from_numpy(~is_flat)]
+        self.held = indices(held[~is_flat])
         self.rows = narrow(np.concatenate([row, shift[:, None]], axis=1)[~is_flat])
 
     def strain(self, x):
         a, b, c = (x[self.faces[:, k]] for k in range(3))
         f = torch.stack([b - a, c - a], dim=2) @ self.inverse
-        g = 0.5 * (f.transpose(1, 2) @ f - torch.eye(2))
+        g = 0.5 * (f.transpose(1, 2) @ f - self.identity)
         trace = g[:, 0, 0] + g[:, 1, 1]
         return (self.volume * (0.5 * self.settings["lambda"] * trace**2 + self.settings["mu"] * (g * g).sum((1, 2)))).sum()
 
@@ -127,7 +141,7 @@ class Garment:
     def repulsion(self, x):
         distance = torch.cdist(x, x, compute_mode=_mode)
         close = (distance < self.settings["radius"]) & self.apart
-        pairs = -torch.log(torch.where(close, distance, torch.ones(())) ** 2).sum() / 2
+        pairs = -torch.log(torch.where(close, distance, distance.new_ones(())) ** 2).sum() / 2
         return pairs / self.count if self.settings["repulsion_per_vertex"] else pairs
 
     def holding(self, x, y):
