@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """Training and draping beside the same networks and losses in PyTorch, on the same cores or GPU: Markdown tables and JSON.
 
-Called by scripts/bench_vs_torch.sh and gpu_check.sh. For every case `clothcombo bench step` writes out a scene and its networks; PyTorch
-(torch_networks.py, torch_losses.py) loads both, and its positions, loss and gradient norm of every network must agree with
-ours before anything is timed. Then both sides run in turn with the same number of threads; medians over all rounds are
-printed. A run with switches that are not implemented here is refused, and they are named.
+Called by scripts/bench_vs_torch.sh and gpu_check.sh. For every case `clothcombo bench step` writes out a scene and its
+networks; PyTorch (torch_networks.py, torch_losses.py) loads both, and its positions, loss and gradient norm of every network
+must agree with ours before anything is timed. Then both sides run in turn with the same number of threads; medians over all
+rounds are printed. A run with switches that are not implemented here is refused, and they are named.
 
     python3 scripts/bench_torch.py --ours target/release/clothcombo --widths 128 --layers 1,3
     python3 scripts/bench_torch.py --config configs/paper.toml --stage 1 --set model.width=64 --check

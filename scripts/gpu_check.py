@@ -76,8 +76,10 @@ def steps(work, log, report):
         result = read(work / f"step-{name}.json")
         if result and result["cases"]:
             case = result["cases"][0]
-            found[name] = {"device": result["device"], "threads": result["threads"], "memory": memory(work / f"step-{name}.memory")}
-            found[name] |= {"steps_per_second": 1e3 / case["costs"]["step_ms"], **case}
+            found[name] = {
+                "device": result["device"], "threads": result["threads"], "memory": memory(work / f"step-{name}.memory"),
+                "steps_per_second": 1e3 / case["costs"]["step_ms"], **case,
+            }
     paper = [found[name]["costs"]["step_ms"] for name in CASES[:6] if name in found]
     if len(paper) == 6:
         found["paper-mean"] = {"step_ms": statistics.mean(paper), "steps_per_second": 1e3 / statistics.mean(paper)}
@@ -116,11 +118,9 @@ def profile(work, log, report):
     for path in sorted(work.glob("profile-*.json")):
         if (result := read(path)) and result["cases"]:
             case = result["cases"][0]
-            found[f"{result['threads']} threads"] = {"step_ms": case["profile"]["step_ms"], "shares_ms": shares(case), **case["profile"]}
-    line = "; ".join(
-        f"{name}: {case['step_ms']:.0f} ms = " + ", ".join(f"{part} {ms:.0f}" for part, ms in case["shares_ms"].items() if ms >= 0.5)
-        for name, case in found.items()
-    )
+            found[f"{result['threads']} threads"] = {"shares_ms": shares(case), **case["profile"]}
+    parts = lambda case: ", ".join(f"{part} {ms:.0f}" for part, ms in case["shares_ms"].items() if ms >= 0.5)
+    line = "; ".join(f"{name}: {case['step_ms']:.0f} ms = {parts(case)}" for name, case in found.items())
     return bool(found), line or "no result", found
 
 
@@ -191,7 +191,8 @@ def stage(out, work, number, name, began, code):
         ok, line, found = False, f"{type(error).__name__}: {error}", {}
     ok = ok and code == 0
     seconds = time.time() - began
-    report[name] = {"stage": number, "ok": ok, "seconds": round(seconds, 1), "exit_code": code, "summary": line, "found": found}
+    report[name] = {"stage": number, "ok": ok, "seconds": round(seconds, 1), "exit_code": code, "summary": line}
+    report[name]["found"] = found
     print(f"{number} {name}: {'ok' if ok else 'FAILED'}, {seconds:.0f} s: {line}", flush=True)
     if not ok:
         report[name]["end_of_log"] = log[-40:]
@@ -214,8 +215,8 @@ def table(head, rows):
 def write_report(out):
     report = read(out / "report.json") or {}
     stages = sorted(report.items(), key=lambda item: item[1]["stage"])
-    text = [table(["stage", "result", "seconds", "found"],
-                  [[f"{s['stage']} {name}", "ok" if s["ok"] else "failed", f"{s['seconds']:.0f}", s["summary"]] for name, s in stages])]
+    rows = [[f"{s['stage']} {name}", "ok" if s["ok"] else "failed", f"{s['seconds']:.0f}", s["summary"]] for name, s in stages]
+    text = [table(["stage", "result", "seconds", "found"], rows)]
     found = lambda name: report.get(name, {}).get("found", {})
     ours, theirs = found("steps"), found("pytorch")
     rows = []
@@ -229,19 +230,24 @@ def write_report(out):
         device = mine and mine["memory"]
         rows.append([
             name, str((mine or torch)["vertices"]), number(ms, ".1f"), number(ms and 1e3 / ms, ".2f"),
-            number(step.get("torch_ms"), ".1f"), ratio("torch_ms"), number(step.get("torch_tf32_ms"), ".1f"), ratio("torch_tf32_ms"),
+            number(step.get("torch_ms"), ".1f"), ratio("torch_ms"),
+            number(step.get("torch_tf32_ms"), ".1f"), ratio("torch_tf32_ms"),
             number(mine and mine["costs"]["peak_mib"]), number(device and device["peak_mib"] - device["before_mib"]),
             number(torch and torch["peak_mib"]["torch"]),
         ])
     if "paper-mean" in ours:
         mean = ours["paper-mean"]
-        rows.append(["paper, mean of M = 1 to 6", "", f"{mean['step_ms']:.1f}", f"{mean['steps_per_second']:.2f}"] + [""] * 7)
+        cells = [f"{mean['step_ms']:.1f}", f"{mean['steps_per_second']:.2f}"]
+        rows.append(["paper, mean of M = 1 to 6", "", *cells] + [""] * 7)
     if rows:
-        text.append("A training step. Ratios: PyTorch's time over ours. Device memory is what nvidia-smi sees, of PyTorch what its tensors take.\n")
-        text.append(table(["case", "vertices", "ours [ms]", "steps/s", "PyTorch f32 [ms]", "ratio", "TF32 [ms]", "ratio", "host [MiB]",
-                           "device [MiB]", "PyTorch [MiB]"], rows))
-    keys = {"forward": "forward_ms", "forward + backward": "forward_backward_ms", "step": "step_ms", "losses": "losses_ms",
-            "drape again": "drape_ms"}
+        text.append("A training step. Ratios: PyTorch's time over ours. Device memory is what nvidia-smi sees besides what was in use\n"
+                    "before; of PyTorch it is what its tensors take (on a processor: what the process takes).\n")
+        text.append(table(["case", "vertices", "ours [ms]", "steps/s", "PyTorch f32 [ms]", "ratio", "TF32 [ms]", "ratio",
+                           "host [MiB]", "device [MiB]", "PyTorch [MiB]"], rows))
+    keys = {
+        "forward": "forward_ms", "forward + backward": "forward_backward_ms", "step": "step_ms", "losses": "losses_ms",
+        "drape again": "drape_ms",
+    }
     rows = [
         [f"{name}, {part}", number(ours[name]["costs"][key] if name in ours else None, ".2f")]
         + [number(theirs[name]["parts"][part].get(side), ".2f") for side in ("torch_ms", "torch_tf32_ms")]
@@ -252,7 +258,7 @@ def write_report(out):
     profiles = found("profile")
     if profiles:
         parts = list(next(iter(profiles.values()))["shares_ms"])
-        text.append("Where a step goes, M = 3 [ms]; the device is waited for after every part, which makes the step a little slower.\n")
+        text.append("Where a step goes, M = 3 [ms]. Waiting for the device after every part makes the step a little slower.\n")
         text.append(table(["threads", "step", *parts], [
             [name, f"{p['step_ms']:.1f}", *(f"{p['shares_ms'][part]:.1f}" for part in parts)] for name, p in profiles.items()]))
     (out / "report.md").write_text("\n".join(text))

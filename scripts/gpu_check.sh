@@ -113,8 +113,9 @@ environment() {
     nvidia-smi || true
     vulkaninfo --summary || true
     "$python" -c 'import sys, torch; print("Python", sys.version.split()[0], "PyTorch", torch.__version__)' || true
-    # The program's own log names the adapter it takes.
-    RUST_LOG=info limited "$ours" bench step --widths 8 --layers 1 --vertices 200 --steps 1 --seconds 0.01 --device "$device"
+    # What the program's graphics library says of adapters is not in its usual log.
+    RUST_LOG=wgpu_core::instance=debug limited "$ours" bench step --widths 8 --layers 1 --vertices 200 --steps 1 \
+        --seconds 0.01 --device "$device"
 }
 
 agreement() {
@@ -142,8 +143,9 @@ pytorch() {
         case_arguments "$name"
         rm -f "$work/torch-$name.json"
         # One process a case: one that runs out of memory takes no other with it.
-        with_memory "$work/torch-$name.memory" "$python" scripts/bench_torch.py --ours "$ours" --no-ours-timing --torch-device "$torch_device" "${tf32[@]}" \
-            --threads "$threads" --rounds 1 --seconds "$seconds" --json "$work/torch-$name.json" "${arguments[@]}" || code=$?
+        with_memory "$work/torch-$name.memory" "$python" scripts/bench_torch.py --ours "$ours" --no-ours-timing \
+            --torch-device "$torch_device" "${tf32[@]}" --threads "$threads" --rounds 1 --seconds "$seconds" \
+            --json "$work/torch-$name.json" "${arguments[@]}" || code=$?
     done
     return "$code"
 }

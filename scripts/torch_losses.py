@@ -93,9 +93,9 @@ class Garment:
         self.hinges = indices(np.stack([p, q, opposite, opposite[place]], 1)[inner])
         pairs = np.stack([p, q], 1)
         apart = torch.ones((count, count), dtype=torch.bool, device=_device)
-        first, second = indices(p), indices(q)
-        apart[first, second] = False
-        apart[second, first] = False
+        i, j = indices(p), indices(q)
+        apart[i, j] = False
+        apart[j, i] = False
         apart.fill_diagonal_(False)
         self.apart = apart
         unique = np.unique(np.sort(pairs, axis=1), axis=0)
