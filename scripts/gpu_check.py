@@ -240,8 +240,8 @@ def write_report(out):
         cells = [f"{mean['step_ms']:.1f}", f"{mean['steps_per_second']:.2f}"]
         rows.append(["paper, mean of M = 1 to 6", "", *cells] + [""] * 7)
     if rows:
-        text.append("A training step. Ratios: PyTorch's time over ours. Device memory is what nvidia-smi sees besides what was in use\n"
-                    "before; of PyTorch it is what its tensors take (on a processor: what the process takes).\n")
+        text.append("A training step. Ratios: PyTorch's time over ours. Device memory is what nvidia-smi sees besides what was in\n"
+                    "use before; of PyTorch it is what its tensors take (on a processor: what the process takes).\n")
         text.append(table(["case", "vertices", "ours [ms]", "steps/s", "PyTorch f32 [ms]", "ratio", "TF32 [ms]", "ratio",
                            "host [MiB]", "device [MiB]", "PyTorch [MiB]"], rows))
     keys = {
