@@ -164,7 +164,7 @@ def main():
     parser.add_argument("--seconds", type=float, default=0.3, help="per measurement")
     parser.add_argument("--no-torch", action="store_true")
     parser.add_argument("--no-growth", action="store_true")
-    parser.add_argument("--exact-cdist", action="store_true", help="cdist without its matrix product: slower, more exact")
+    parser.add_argument("--exact-cdist", action="store_true", help="time the forms that are compared: slower, more exact")
     options = parser.parse_args()
     if not options.no_torch:
         global torch, losses

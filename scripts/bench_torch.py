@@ -1,13 +1,18 @@
 #!/usr/bin/env python3
-"""Training and draping beside the same networks and losses in PyTorch, on the same cores: Markdown tables and JSON.
+"""Training and draping beside the same networks and losses in PyTorch, on the same cores or GPU: Markdown tables and JSON.
 
-Called by scripts/bench_vs_torch.sh. For every case `clothcombo bench step` writes out a scene and its networks; PyTorch
-(torch_networks.py, torch_losses.py) loads both, and its positions, loss and gradient norm of every network must agree with
-ours before anything is timed. Then both sides run in turn with the same number of threads; medians over all rounds are
-printed. A run with switches that are not implemented here is refused, and they are named.
+Called by scripts/bench_vs_torch.sh and gpu_check.sh. For every case `clothcombo bench step` writes out a scene and its
+networks; PyTorch (torch_networks.py, torch_losses.py) loads both, and its positions, loss and gradient norm of every network
+must agree with ours before anything is timed. Then both sides run in turn with the same number of threads; medians over all
+rounds are printed. A run with switches that are not implemented here is refused, and they are named.
 
     python3 scripts/bench_torch.py --ours target/release/clothcombo --widths 128 --layers 1,3
     python3 scripts/bench_torch.py --config configs/paper.toml --stage 1 --set model.width=64 --check
+    python3 scripts/bench_torch.py --torch-device cuda --tf32 --device wgpu --widths 512 --vertices 8000 --json cases.jsonl
+
+The scene is always written by our first device, the processor, so that the check needs no GPU of ours. It is compared in f32 (TF32
+off); `--tf32` times both. Nothing is chunked on any device: counted by hand, the dense distances of six garments of 8,000 vertices
+take about 10 GB.
 
 forward             all networks without gradients, the garments' embedding included
 forward + backward  the same with autodiff, from a fixed gradient at the positions
@@ -15,7 +20,8 @@ step                networks, losses, backward pass, clip of the global norm to 
 step on two outfits  the same with the gradients of two outfits accumulated before clip and Adam
 losses              all losses and their gradient at fixed positions
 drape again         all networks but the embedding, which is kept
-memory              largest resident memory of a process that trains (VmHWM after the first step's set-up)
+memory              largest resident memory of a process that trains (VmHWM after the first step's set-up); of PyTorch on a GPU
+                    the most that its tensors take there
 """
 
 import argparse
@@ -54,6 +60,7 @@ PARTS = {
     "losses": "losses_ms",
     "drape again": "drape_ms",
 }
+SIDES = {"ours_ms": "ours", "torch_ms": "PyTorch", "torch_tf32_ms": "PyTorch with TF32"}
 
 
 class GarmentTensors:
@@ -67,7 +74,7 @@ class GarmentTensors:
         for axis in "xy":
             places = np.stack([read(f"gradient_{axis}.rows"), read(f"gradient_{axis}.columns")]).astype(np.int64)
             values = losses.narrow(read(f"gradient_{axis}.values"))
-            matrix = torch.sparse_coo_tensor(torch.from_numpy(places), values, (count, count)).coalesce()
+            matrix = torch.sparse_coo_tensor(losses.indices(places), values, (count, count)).coalesce()
             setattr(self, f"gradient_{axis}", matrix)
 
 
@@ -82,14 +89,18 @@ class Outfit:
         self.mask = torch.stack([(g.weights != 0).any(0).float() for g in self.garments])
         if about["model"]["skinning_joints"] == "all":
             self.mask = torch.ones_like(self.mask)
-        self.of_vertex = torch.repeat_interleave(torch.arange(count), torch.tensor([len(g.rest) for g in self.garments]))
+        self.of_vertex = losses.indices(np.repeat(np.arange(count), [len(g.rest) for g in self.garments]))
         self.start, self.shape, self.pose = (losses.narrow(arrays[k]) for k in ("start", "shape", "pose"))
         self.bones = losses.narrow(arrays["bones"]).reshape(-1, 3, 4)
         self.contacts = about["contacts"]
         both = [(a, b) for a, b in self.contacts] + [(b, a) for a, b in self.contacts]
-        self.edges = torch.tensor(both, dtype=torch.long).reshape(-1, 2).T
-        self.touched = torch.zeros((count, 1))
-        self.touched[slice(None) if about["model"]["graph"] == "full" else self.edges[0]] = 1
+        self.edges = losses.indices(np.array(both, np.int64).reshape(-1, 2).T)
+        i, j = self.edges
+        self.from_below, self.from_above = (j < i).nonzero()[:, 0], (j > i).nonzero()[:, 0]
+        self.touched = torch.zeros((count, 1), device=self.rest.device)
+        self.touched[slice(None) if about["model"]["graph"] == "full" else i] = 1
+        # On the host, so that no step waits for a GPU to say it.
+        self.moves = bool(self.touched.any())
 
 
 def not_implemented(about):
@@ -118,7 +129,9 @@ class Scene:
             raise SystemExit("the PyTorch side does not implement " + ", ".join(unknown))
         arrays = self.arrays = np.load(f"{folder}/scene.npz")
         self.outfit = Outfit(arrays, self.about)
-        self.model = ClothCombo(read_safetensors(f"{folder}/model.safetensors"), self.about["model"])
+        parameters = read_safetensors(f"{folder}/model.safetensors")
+        self.parameters = sum(p.numel() for p in parameters.values())
+        self.model = ClothCombo(parameters, self.about["model"]).to(self.outfit.rest.device)
         optimizer = self.about["optimizer"]
         self.clip_norm = optimizer["clip_norm"]
         self.optimizer = torch.optim.Adam(
@@ -135,7 +148,7 @@ class Scene:
                 garment.pull_back(part(i, "skin_weights"), arrays["bones"].reshape(-1, 3, 4))
         self.sizes = [garment.count for garment in self.garments]
         count = sum(self.sizes)
-        self.pull = ((torch.arange(3 * count) * 37 % 101) / 50 - 1).reshape(count, 3)
+        self.pull = losses.narrow(np.arange(3 * count) * 37 % 101 / 50 - 1).reshape(count, 3)
 
     def loss(self, posed, canonical, layers=True):
         x, y = posed.split(self.sizes), canonical.split(self.sizes)
@@ -197,7 +210,7 @@ class Scene:
         expected = self.about["expected"]
         wrong = []
         for name, found in [("posed", posed), ("canonical", canonical)]:
-            difference = float(np.abs(found.numpy() - self.arrays[f"expected.{name}"]).max())
+            difference = float(np.abs(found.cpu().numpy() - self.arrays[f"expected.{name}"]).max())
             if not difference < 1e-5:
                 wrong.append(f"{name} positions differ by {difference:.2g} m")
         compared = [("loss", self.gradients(), expected["loss"])]
@@ -227,12 +240,34 @@ class Scene:
 
 def median_ms(run, seconds):
     run()
+    settle()
     times, start = [], time.perf_counter()
     while len(times) < 3 or time.perf_counter() - start < seconds:
         before = time.perf_counter()
         run()
+        settle()
         times.append(1e3 * (time.perf_counter() - before))
     return statistics.median(times)
+
+
+def settle():
+    """Waits for a GPU."""
+    if torch.cuda.is_initialized():
+        torch.cuda.synchronize()
+
+
+def set_tf32(on):
+    torch.set_float32_matmul_precision("high" if on else "highest")
+
+
+def peak_device_mib(scene):
+    """Largest allocated memory of the GPU while `scene` trains three steps, and what the allocator holds for it."""
+    scene.optimizer.zero_grad()
+    torch.cuda.empty_cache()
+    torch.cuda.reset_peak_memory_stats()
+    for _ in range(3):
+        scene.step()
+    return torch.cuda.max_memory_allocated() / 2**20, torch.cuda.max_memory_reserved() / 2**20
 
 
 def peak_mib(folder):
@@ -247,45 +282,61 @@ def peak_mib(folder):
 
 
 def ours(options, case, folder=None):
+    """Our times, or with `folder` only the files of the case."""
     command = [options.ours, "bench", "step", "--json", "--steps", "3", "--seconds", str(options.seconds)]
+    if options.device and not folder:
+        command += ["--device", options.device]
     # Clipped once a step, as PyTorch's users do.
     command += ["--accumulate", "2", "--set", "optimizer.clip=step", *case]
     for setting in options.set:
         command += ["--set", setting]
     if folder:
-        command += ["--export", folder]
+        command += ["--export", folder, "--export-only"]
     environment = dict(os.environ, RAYON_NUM_THREADS=str(options.threads))
     output = subprocess.run(command, env=environment, check=True, stdout=subprocess.PIPE, text=True).stdout
-    return json.loads(output)["cases"][0]
+    return None if folder else json.loads(output)["cases"][0]
 
 
 def compare(options, case):
     with tempfile.TemporaryDirectory() as folder:
-        mine = [ours(options, case, folder)]
+        start = time.perf_counter()
+        ours(options, case, folder)
+        exported = time.perf_counter()
         scene = Scene(folder)
-        agreement = scene.check()
+        settle()
+        prepared = time.perf_counter()
+        set_tf32(False)
         about = {
-            "width": scene.about["model"]["width"], "layers": len(scene.about["garments"]), "vertices": mine[0]["vertices"],
-            "parameters": mine[0]["parameters"], "agreement": agreement,
+            "width": scene.about["model"]["width"], "layers": len(scene.about["garments"]), "vertices": sum(scene.sizes),
+            "parameters": scene.parameters, "torch_device": options.torch_device, "agreement": scene.check(),
+            "export_s": exported - start, "prepare_s": prepared - exported,
         }
-        print(f"width {about['width']}, M = {about['layers']}: agreement {agreement}", file=sys.stderr)
+        print(f"width {about['width']}, M = {about['layers']}: agreement {about['agreement']}", file=sys.stderr)
         if options.check:
             return about
-        theirs = [scene.times(options.seconds)]
-        for _ in range(1, options.rounds):
-            mine.append(ours(options, case))
+        mine, theirs, tf32 = [], [], []
+        for _ in range(options.rounds):
+            if not options.no_ours_timing:
+                mine.append(ours(options, case))
             theirs.append(scene.times(options.seconds))
-        command = [sys.executable, __file__, "--peak-of", folder, "--threads", str(options.threads)]
-        peak = float(subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout)
-    middle = lambda values: statistics.median(values)
-    parts = {
-        name: {"ours_ms": middle([m["costs"][key] for m in mine]), "torch_ms": middle([t[name] for t in theirs])}
-        for name, key in PARTS.items()
-    }
-    return {
-        **about, "rounds": options.rounds, "parts": parts,
-        "peak_mib": {"ours": middle([m["costs"]["peak_mib"] for m in mine]), "torch": peak},
-    }
+            if options.tf32:
+                set_tf32(True)
+                tf32.append(scene.times(options.seconds))
+                set_tf32(False)
+        peak = {}
+        if options.torch_device == "cuda":
+            peak["torch"], peak["torch_reserved"] = peak_device_mib(scene)
+        else:
+            command = [sys.executable, __file__, "--peak-of", folder, "--threads", str(options.threads)]
+            peak["torch"] = float(subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout)
+            if mine:
+                peak["ours"] = statistics.median(m["costs"]["peak_mib"] for m in mine)
+    parts = {}
+    for name, key in PARTS.items():
+        sides = {"ours_ms": [m["costs"][key] for m in mine]}
+        sides |= {"torch_ms": [t[name] for t in theirs], "torch_tf32_ms": [t[name] for t in tf32]}
+        parts[name] = {side: statistics.median(times) for side, times in sides.items() if times}
+    return {**about, "rounds": options.rounds, "parts": parts, "peak_mib": peak}
 
 
 def milliseconds(x):
@@ -299,10 +350,12 @@ def print_tables(cases):
     for case in cases:
         cells = []
         for name in names:
-            mine, theirs = case["parts"][name]["ours_ms"], case["parts"][name]["torch_ms"]
-            cells.append(f"{milliseconds(mine)} / {milliseconds(theirs)} = **{theirs / mine:.1f}×**")
+            part = case["parts"][name]
+            cells.append(" / ".join(milliseconds(part[side]) for side in SIDES if side in part))
+            if "ours_ms" in part:
+                cells[-1] += f" = **{part['torch_ms'] / part['ours_ms']:.1f}×**"
         peak = case["peak_mib"]
-        cells.append(f"{peak['ours']:.0f} / {peak['torch']:.0f}")
+        cells.append(" / ".join(f"{peak[side]:.0f}" for side in ("ours", "torch") if side in peak))
         print(f"| {case['width']} | {case['layers']} | {case['vertices']} | " + " | ".join(cells) + " |")
 
 
@@ -317,6 +370,10 @@ def main():
     parser.add_argument("--stage", default="0", help="with --config: which one, from 0")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="overrides one value; repeatable")
     parser.add_argument("--check", action="store_true", help="only compare positions, loss and gradients")
+    parser.add_argument("--torch-device", choices=["cpu", "cuda"], default="cpu", help="where PyTorch computes")
+    parser.add_argument("--tf32", action="store_true", help="also time PyTorch with TF32 matrix products, on a GPU")
+    parser.add_argument("--device", help="where we compute, as of clothcombo bench step --device")
+    parser.add_argument("--no-ours-timing", action="store_true", help="time PyTorch only; the check stays")
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--rounds", type=int, default=2)
     parser.add_argument("--seconds", type=float, default=1.0, help="per measurement and round")
@@ -324,6 +381,7 @@ def main():
     parser.add_argument("--peak-of", help=argparse.SUPPRESS)
     options = parser.parse_args()
     torch.set_num_threads(options.threads)
+    losses.set_device(options.torch_device)
     if options.peak_of:
         return print(peak_mib(options.peak_of))
     made_up = [
@@ -338,7 +396,9 @@ def main():
                 file.write(json.dumps(cases[-1]) + "\n")
     if options.check:
         return
-    print(f"PyTorch {torch.__version__}, {options.threads} threads, ours / PyTorch [ms]\n")
+    sides = [label for side, label in SIDES.items() if side in cases[0]["parts"]["step"]]
+    where = torch.cuda.get_device_name() if options.torch_device == "cuda" else f"{options.threads} threads"
+    print(f"PyTorch {torch.__version__}, {where}, {' / '.join(sides)} [ms]\n")
     print_tables(cases)
 
 

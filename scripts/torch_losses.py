@@ -2,7 +2,8 @@
 faces and hinges, gradients by autograd, f32. Everything that positions do not change is computed beforehand, as in ours.
 
 cdist's default, a matrix product, is faster than the exact form, although in f32 it is off by up to 0.3 mm and now and then
-takes a neighbour for the nearest vertex; `set_exact(True)` switches to the exact form.
+takes a neighbour for the nearest vertex. Bending is the printed one, which ours leaves where a triangle collapses to less than
+a twentieth of its area. `set_exact(True)` switches both to ours, to compare values and gradients; timed are the authors' forms.
 """
 
 import math
@@ -17,16 +18,28 @@ SETTINGS = {
 }
 GARMENT_TERMS = ["strain", "bending", "gravity", "body_collision", "repulsion", "holding"]
 LAYER_TERMS = ["layer_collision", "layer_distance"]
+EXACT = "donot_use_mm_for_euclid_dist"
 _mode = "use_mm_for_euclid_dist_if_necessary"
+_device = "cpu"
 
 
 def set_exact(exact):
     global _mode
-    _mode = "donot_use_mm_for_euclid_dist" if exact else "use_mm_for_euclid_dist_if_necessary"
+    _mode = EXACT if exact else "use_mm_for_euclid_dist_if_necessary"
+
+
+def set_device(device):
+    """Where everything made from here on lies."""
+    global _device
+    _device = device
 
 
 def narrow(array):
-    return torch.from_numpy(np.ascontiguousarray(array, np.float32))
+    return torch.from_numpy(np.ascontiguousarray(array, np.float32)).to(_device)
+
+
+def indices(array):
+    return torch.from_numpy(np.ascontiguousarray(array, np.int64)).to(_device)
 
 
 def normals(x, faces):
@@ -40,7 +53,7 @@ class Body:
 
     def __init__(self, positions, faces):
         self.positions = narrow(positions)
-        self.normals = normals(self.positions, torch.from_numpy(faces.astype(np.int64)))
+        self.normals = normals(self.positions, indices(faces))
 
     def gaps(self, x):
         """Signed distance of every point along the normal of the nearest body vertex, and that vertex."""
@@ -56,7 +69,8 @@ class Garment:
         self.settings = settings
         faces = faces.astype(np.int64)
         self.count = count = len(rest)
-        self.faces = torch.from_numpy(faces)
+        self.faces = indices(faces)
+        self.identity = torch.eye(2, device=_device)
         a, b, c = (rest[faces[:, k]] for k in range(3))
         area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
         first = (b - a) / np.linalg.norm(b - a, axis=1)[:, None]
@@ -72,42 +86,47 @@ class Garment:
         np.add.at(mass, faces.ravel(), np.repeat(area * settings["thickness"] * settings["density"] / 3, 3))
         self.weight = narrow(mass * settings["gravity"])
 
-        half = {}
-        for face in faces:
-            for k in range(3):
-                half[(face[k], face[(k + 1) % 3])] = face[(k + 2) % 3]
-        hinges = [(p, q, o, half[q, p]) for (p, q), o in half.items() if p < q and (q, p) in half]
-        self.hinges = torch.from_numpy(np.array(hinges))
-        pairs = np.array(list(half))
-        apart = torch.ones((count, count), dtype=torch.bool)
-        apart[pairs[:, 0], pairs[:, 1]] = False
-        apart[pairs[:, 1], pairs[:, 0]] = False
+        # Half-edges face by face, each with the vertex opposite; an edge of two faces, its lower vertex first, is a hinge.
+        p, q, opposite = faces.ravel(), np.roll(faces, -1, 1).ravel(), np.roll(faces, -2, 1).ravel()
+        half, twin = p * count + q, q * count + p
+        order = np.argsort(half)
+        place = order[np.searchsorted(half, twin, sorter=order).clip(max=len(half) - 1)]
+        inner = (half[place] == twin) & (p < q)
+        self.hinges = indices(np.stack([p, q, opposite, opposite[place]], 1)[inner])
+        pairs = np.stack([p, q], 1)
+        apart = torch.ones((count, count), dtype=torch.bool, device=_device)
+        i, j = indices(p), indices(q)
+        apart[i, j] = False
+        apart[j, i] = False
         apart.fill_diagonal_(False)
         self.apart = apart
         unique = np.unique(np.sort(pairs, axis=1), axis=0)
         lengths = np.sort(np.linalg.norm(rest[unique[:, 0]] - rest[unique[:, 1]], axis=1))
         self.median_edge = float(lengths[len(lengths) // 2])
+        a, b, c, d = (rest[self.hinges[:, k].cpu().numpy()] for k in range(4))
+        doubled = [np.linalg.norm(np.cross(b - a, e - a), axis=1) for e in (c, d)]
+        self.collapse = narrow(np.maximum(0.05 * np.stack(doubled), 1e-3 * self.median_edge**2))
         held = np.argsort(-rest[:, 1], kind="stable")[: math.ceil(settings["holding_fraction"] * count - 1e-9)]
-        self.held = torch.from_numpy(held.copy())
+        self.held = indices(held)
         self.reference = narrow(reference)
         self.rows = None
 
     def pull_back(self, weights, bones):
         """Heights are read off posed positions from here on, undone by the initial skinning [V,J] of bones [J,3,4]."""
         blended = np.einsum("vj,jab->vab", weights.astype(np.float64), bones.astype(np.float64))
-        held = self.held.numpy()
+        held = self.held.cpu().numpy()
         linear = blended[held, :, :3]
         is_flat = np.abs(np.linalg.det(linear)) < 0.05
         linear[is_flat] = np.eye(3)
         row = np.linalg.inv(linear)[:, 1, :]
         shift = -(row * blended[held, :, 3]).sum(1)
-        self.held = self.held[torch.from_numpy(~is_flat)]
+        self.held = indices(held[~is_flat])
         self.rows = narrow(np.concatenate([row, shift[:, None]], axis=1)[~is_flat])
 
     def strain(self, x):
         a, b, c = (x[self.faces[:, k]] for k in range(3))
         f = torch.stack([b - a, c - a], dim=2) @ self.inverse
-        g = 0.5 * (f.transpose(1, 2) @ f - torch.eye(2))
+        g = 0.5 * (f.transpose(1, 2) @ f - self.identity)
         trace = g[:, 0, 0] + g[:, 1, 1]
         return (self.volume * (0.5 * self.settings["lambda"] * trace**2 + self.settings["mu"] * (g * g).sum((1, 2)))).sum()
 
@@ -116,7 +135,12 @@ class Garment:
         n1, n2 = torch.linalg.cross(b - a, c - a), torch.linalg.cross(d - a, b - a)
         edge = (b - a) / (b - a).norm(dim=1, keepdim=True)
         angle = torch.atan2((torch.linalg.cross(n1, n2) * edge).sum(1), (n1 * n2).sum(1))
-        return 0.5 * self.settings["bending_stiffness"] * (angle**2).sum()
+        energy = angle**2
+        if _mode == EXACT:
+            for n, collapse in zip((n1, n2), self.collapse):
+                t = ((n / collapse[:, None]) ** 2).sum(1).clamp(max=1)
+                energy = energy * t**2 * (6 - 8 * t + 3 * t**2)
+        return 0.5 * self.settings["bending_stiffness"] * energy.sum()
 
     def gravity(self, x):
         return (self.weight * x[:, 1]).sum()
@@ -127,7 +151,7 @@ class Garment:
     def repulsion(self, x):
         distance = torch.cdist(x, x, compute_mode=_mode)
         close = (distance < self.settings["radius"]) & self.apart
-        pairs = -torch.log(torch.where(close, distance, torch.ones(())) ** 2).sum() / 2
+        pairs = -torch.log(torch.where(close, distance, distance.new_ones(())) ** 2).sum() / 2
         return pairs / self.count if self.settings["repulsion_per_vertex"] else pairs
 
     def holding(self, x, y):

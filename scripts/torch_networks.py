@@ -172,15 +172,15 @@ class ClothCombo(nn.Module):
             raw = raw - mask * raw.sum(1, keepdim=True) / mask.sum(1, keepdim=True)
         transforms = torch.einsum("vj,jab->vab", outfit.weights + config["skinning_scale"] * raw, outfit.bones)
         pose = lambda x: torch.einsum("vab,vb->va", transforms[:, :, :3], x) + transforms[:, :, 3]
-        moves = bool(outfit.touched.any())
+        moves = outfit.moves
         single = (pose(canonical), canonical) if with_single or not moves else ()
         if not moves:
             return single + single if with_single else single
         i, j = outfit.edges
         forces = self.force(torch.cat([draping[i], draping[j]], dim=1))
         below, above = torch.zeros_like(draping), torch.zeros_like(draping)
-        below = below.index_add(0, i[j < i], forces[j < i])
-        above = above.index_add(0, i[j > i], forces[j > i])
+        below = below.index_add(0, i[outfit.from_below], forces[outfit.from_below])
+        above = above.index_add(0, i[outfit.from_above], forces[outfit.from_above])
         latent = torch.cat([torch.cat([below, above, draping], dim=1)[of], vertex], dim=1)
         moved = self.untangling(canonical, latent) * config["untangling_scale"] * outfit.touched[of]
         return (pose(canonical + moved), canonical + moved) + single

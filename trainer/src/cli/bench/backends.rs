@@ -6,11 +6,12 @@ use crate::cli::table::{markdown, row};
 use crate::cli::values::{measuring_seconds, not_negative};
 use crate::cli::verbosity::print_status;
 use crate::system::device::{DeviceChoice, DeviceError};
-use crate::training::measure::{BenchmarkRun, Case};
+use crate::training::measure::{BenchmarkRun, Case, NETWORKS};
 use burn::tensor::Device;
 use clap::Parser;
 use miette::{Report, miette};
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// Whether all compute devices of this build agree on loss and gradients, and how fast they are
 #[derive(Parser)]
@@ -52,7 +53,11 @@ struct Measured {
     loss: f64,
     /// Relative difference to the first device.
     loss_difference: f64,
-    /// Largest relative difference over the parameters, and whose it is.
+    /// Largest difference of a coordinate of a draped vertex, posed or canonical (m).
+    position_difference_m: f64,
+    /// Relative differences of the gradients of every network, of all its parameters together; null where there is none.
+    gradient_differences: BTreeMap<&'static str, Option<f64>>,
+    /// Largest relative difference over single parameters, and whose it is.
     gradient_difference: f64,
     parameter: String,
     forward_ms: f64,
@@ -76,6 +81,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let first = run_on(&devices[0].1)?;
     let scene = first.scene(0)?;
     let (loss, gradients) = first.loss_and_gradients(&scene)?;
+    let positions = first.host_drape(&scene)?;
     let mut rows = Vec::new();
     for (choice, device) in &devices {
         print_status(&format!("measuring {choice}"));
@@ -87,11 +93,17 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
             .zip(&found)
             .map(|((name, expected), (_, found))| (difference(found, expected), name));
         let worst = differences.max_by(|a, b| a.0.total_cmp(&b.0));
+        let found_positions = run.host_drape(&scene)?;
         let costs = run.costs(arguments.seconds, 1)?;
         rows.push(Measured {
             device: choice.to_string(),
             loss: found_loss,
             loss_difference: ((found_loss - loss) / loss).abs(),
+            position_difference_m: largest_distance(&found_positions, &positions),
+            gradient_differences: NETWORKS
+                .into_iter()
+                .map(|network| (network, network_difference(network, &found, &gradients)))
+                .collect(),
             gradient_difference: worst.as_ref().map_or(0.0, |worst| worst.0),
             parameter: worst.map(|worst| worst.1.clone()).unwrap_or_default(),
             forward_ms: costs.forward_ms,
@@ -118,6 +130,32 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     }
 }
 
+/// Largest difference of two coordinates; infinite where the sizes differ.
+fn largest_distance(found: &[Vec<[f32; 3]>; 2], expected: &[Vec<[f32; 3]>; 2]) -> f64 {
+    let pairs = found.iter().zip(expected);
+    if pairs.clone().any(|(a, b)| a.len() != b.len()) {
+        return f64::INFINITY;
+    }
+    let coordinates = pairs.flat_map(|(a, b)| a.as_flattened().iter().zip(b.as_flattened()));
+    coordinates
+        .map(|(a, b)| f64::from((a - b).abs()))
+        .fold(0.0, |a: f64, b| if b > a || b.is_nan() { b } else { a })
+}
+
+/// The [`difference`] over all parameters of a network; `None` where it has no gradient.
+fn network_difference(
+    network: &str,
+    found: &[(String, Vec<f32>)],
+    expected: &[(String, Vec<f32>)],
+) -> Option<f64> {
+    let join = |gradients: &[(String, Vec<f32>)]| -> Vec<f32> {
+        let of_network = gradients.iter().filter(|(name, _)| name.split('.').next() == Some(network));
+        of_network.flat_map(|(_, values)| values.iter().copied()).collect()
+    };
+    let expected = join(expected);
+    (!expected.is_empty()).then(|| difference(&join(found), &expected))
+}
+
 /// Norm of the difference over the norm of `expected`; infinite where the sizes differ.
 fn difference(found: &[f32], expected: &[f32]) -> f64 {
     if found.len() != expected.len() {
@@ -134,6 +172,7 @@ fn text(rows: &[Measured]) -> String {
             "device" => measured.device,
             "loss" => format!("{:.6}", measured.loss),
             "relative difference" => measured.loss_difference,
+            "positions [m]" => measured.position_difference_m,
             "largest relative gradient difference" => measured.gradient_difference,
             "of" => measured.parameter,
             "forward [ms]" => measured.forward_ms,

@@ -72,6 +72,9 @@ pub struct Arguments {
     /// Writes scene, networks and results of the only case or stage into a folder, for scripts/bench_torch.py
     #[arg(long, value_name = "DIR")]
     export: Option<PathBuf>,
+    /// With --export: measures nothing
+    #[arg(long, requires = "export")]
+    export_only: bool,
     /// Print JSON instead of Markdown tables
     #[arg(long)]
     json: bool,
@@ -103,6 +106,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         Some(file) => stages(arguments, load(file, &arguments.overrides)?, &device)?,
         None => synthetic(arguments, &device)?,
     };
+    if arguments.export_only {
+        return Ok(());
+    }
     if let Some(path) = &arguments.picture {
         save_png(&picture(&measured), path).into_diagnostic()?;
     }
@@ -131,7 +137,7 @@ fn synthetic(arguments: &Arguments, device: &Device) -> Result<Vec<Measured>, Re
         let name = [&[case.name()][..], arguments.overrides.as_slice()].concat().join(", ");
         measure(&mut run, name, Some(case), arguments)
     });
-    measured.collect()
+    flattened(measured)
 }
 
 /// Every combination of the sizes.
@@ -174,23 +180,27 @@ fn stages(arguments: &Arguments, config: Config, device: &Device) -> Result<Vec<
         let mut run = BenchmarkRun::new(config.clone(), dataset.clone(), index, device)?;
         measure(&mut run, names[index].clone(), None, arguments)
     };
-    chosen.into_iter().map(stage).collect()
+    flattened(chosen.into_iter().map(stage))
 }
 
+/// Nothing where a case is only exported.
 fn measure(
     run: &mut BenchmarkRun,
     name: String,
     sizes: Option<Case>,
     arguments: &Arguments,
-) -> Result<Measured, Report> {
+) -> Result<Option<Measured>, Report> {
     if let Some(folder) = &arguments.export {
         export(run, folder)?;
+    }
+    if arguments.export_only {
+        return Ok(None);
     }
     print_status(&format!("measuring {name}"));
     let scene = run.scene(0)?;
     let costs = run.costs(arguments.seconds, arguments.accumulate)?;
     let profile = run.profile(arguments.steps)?;
-    Ok(Measured {
+    Ok(Some(Measured {
         name,
         sizes,
         layers: scene.garments.len(),
@@ -198,7 +208,13 @@ fn measure(
         parameters: run.model().num_params(),
         profile,
         costs,
-    })
+    }))
+}
+
+fn flattened(
+    measured: impl Iterator<Item = Result<Option<Measured>, Report>>,
+) -> Result<Vec<Measured>, Report> {
+    measured.filter_map(Result::transpose).collect()
 }
 
 fn picture(measured: &[Measured]) -> image::RgbImage {

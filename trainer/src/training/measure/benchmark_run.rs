@@ -154,11 +154,15 @@ impl BenchmarkRun {
             let wait = start.elapsed().as_secs_f64();
             let rate = schedule.at(self.first_step + step as u64).learning_rate;
             let trains = self.trains();
-            let (outcome, mut times) = record_phases(|| {
+            let device = self.device.clone();
+            // What fails in waiting fails again in the wait after the step, which returns the error.
+            let wait_for_spans = move || drop(device.sync());
+            let (outcome, mut times) = record_phases(wait_for_spans, || {
                 let input = StepInput::whole(&self.tensors, &step_scenes, trains);
                 self.learner.train_step(&input, rate).map(drop)
             });
             outcome?;
+            self.settle()?;
             let total = start.elapsed().as_secs_f64();
             times.insert(PHASES[0], wait);
             // The parts of scenes computed in parallel add up to more than the step.
@@ -230,10 +234,16 @@ impl BenchmarkRun {
         Ok((computed.loss, named.found))
     }
 
-    fn step_ms(&mut self, scenes: &[PreparedScene], seconds: f64) -> Result<f64, DrapeError> {
+    /// Waits until the device has computed everything: a GPU is only told what to do.
+    fn settle(&self) -> Result<(), Report> {
+        self.device.sync().map_err(|error| miette!("{error:?}"))
+    }
+
+    fn step_ms(&mut self, scenes: &[PreparedScene], seconds: f64) -> Result<f64, Report> {
         let trains = self.trains();
         median_ms(seconds, || {
-            self.learner.train_step(&StepInput::whole(&self.tensors, scenes, trains), 1e-4).map(drop)
+            self.learner.train_step(&StepInput::whole(&self.tensors, scenes, trains), 1e-4)?;
+            self.settle()
         })
     }
 
@@ -270,7 +280,9 @@ impl BenchmarkRun {
         let forward_backward_ms = median_ms(seconds, || {
             let [posed, _] = self.drape(self.model(), scene)?;
             let gradients = (posed * pull.clone()).sum().backward();
-            Ok::<_, DrapeError>(GradientsParams::from_grads(gradients, self.model()))
+            let gradients = GradientsParams::from_grads(gradients, self.model());
+            self.settle()?;
+            Ok::<_, Report>(gradients)
         })?;
 
         let [posed, canonical] = self.host_drape(scene)?;

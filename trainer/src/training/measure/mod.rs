@@ -7,5 +7,5 @@ mod phases;
 
 pub use benchmark_run::{BenchmarkRun, Costs, Profile};
 pub use case::Case;
-pub use export::export;
+pub use export::{NETWORKS, export};
 pub use phases::{OTHER, PHASES, SpanSeconds, record_phases};

@@ -35,23 +35,31 @@ pub const PHASES: [&str; 14] = [
 pub type SpanSeconds = BTreeMap<&'static str, f64>;
 
 /// Runs `work` and returns how long each span of the project was entered, on this thread and on those that `work` hands its
-/// subscriber to. The time of a span excludes that of the spans within it.
-pub fn record_phases<R>(work: impl FnOnce() -> R) -> (R, SpanSeconds) {
+/// subscriber to. The time of a span excludes that of the spans within it. `settle` runs at the end of each: it waits for a device
+/// that computes on its own, whose time would else be in the next span that reads a result.
+pub fn record_phases<R>(
+    settle: impl Fn() + Send + Sync + 'static,
+    work: impl FnOnce() -> R,
+) -> (R, SpanSeconds) {
     let totals = Arc::new(Mutex::new(SpanSeconds::new()));
     let targets = Targets::new()
         .with_target("clothcombo_model", Level::TRACE)
         .with_target("clothcombo_trainer", Level::TRACE);
-    let subscriber = tracing_subscriber::registry().with(SpanClock(totals.clone()).with_filter(targets));
+    let subscriber = tracing_subscriber::registry()
+        .with(SpanClock { totals: totals.clone(), settle }.with_filter(targets));
     let result = tracing::subscriber::with_default(subscriber, work);
     let totals = totals.lock().unwrap_or_else(PoisonError::into_inner);
     (result, totals.clone())
 }
 
-struct SpanClock(Arc<Mutex<SpanSeconds>>);
+struct SpanClock<F> {
+    totals: Arc<Mutex<SpanSeconds>>,
+    settle: F,
+}
 
 struct Entered(Instant);
 
-impl<S: Subscriber + for<'a> LookupSpan<'a>> Layer<S> for SpanClock {
+impl<S: Subscriber + for<'a> LookupSpan<'a>, F: Fn() + Send + Sync + 'static> Layer<S> for SpanClock<F> {
     fn on_enter(&self, id: &Id, context: Context<'_, S>) {
         if let Some(span) = context.span(id) {
             span.extensions_mut().replace(Entered(Instant::now()));
@@ -60,8 +68,9 @@ impl<S: Subscriber + for<'a> LookupSpan<'a>> Layer<S> for SpanClock {
 
     fn on_exit(&self, id: &Id, context: Context<'_, S>) {
         let Some(span) = context.span(id) else { return };
+        (self.settle)();
         if let Some(Entered(start)) = span.extensions_mut().remove() {
-            let mut totals = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut totals = self.totals.lock().unwrap_or_else(PoisonError::into_inner);
             let seconds = start.elapsed().as_secs_f64();
             *totals.entry(span.name()).or_default() += seconds;
             if let Some(outer) = span.parent() {
@@ -78,24 +87,30 @@ mod tests {
 
     #[test]
     fn spans_are_added_up_by_name() {
-        let ((), times) = record_phases(|| {
-            for _ in 0..2 {
-                let _span = tracing::trace_span!("embedding").entered();
-                std::thread::sleep(Duration::from_millis(5));
-            }
-            tracing::trace_span!("clip").in_scope(|| ());
-        });
+        let ((), times) = record_phases(
+            || (),
+            || {
+                for _ in 0..2 {
+                    let _span = tracing::trace_span!("embedding").entered();
+                    std::thread::sleep(Duration::from_millis(5));
+                }
+                tracing::trace_span!("clip").in_scope(|| ());
+            },
+        );
         assert_eq!(times.keys().copied().collect::<Vec<_>>(), ["clip", "embedding"]);
         assert!(times["embedding"] >= 0.01 && times["clip"] < times["embedding"]);
     }
 
     #[test]
     fn a_span_within_another_one_counts_once() {
-        let ((), times) = record_phases(|| {
-            let _outer = tracing::trace_span!("corrections").entered();
-            tracing::trace_span!("contact features")
-                .in_scope(|| std::thread::sleep(Duration::from_millis(20)));
-        });
+        let ((), times) = record_phases(
+            || (),
+            || {
+                let _outer = tracing::trace_span!("corrections").entered();
+                tracing::trace_span!("contact features")
+                    .in_scope(|| std::thread::sleep(Duration::from_millis(20)));
+            },
+        );
         assert!(times["corrections"] >= 0.0 && times["corrections"] < times["contact features"], "{times:?}");
     }
 }
