@@ -1,5 +1,6 @@
 //! Gradients of all parameters at once.
 
+use burn::backend::DispatchTensor;
 use burn::module::{Module, ModuleVisitor, Param};
 use burn::optim::GradientsParams;
 use burn::tensor::{Tensor, TensorData};
@@ -29,20 +30,20 @@ pub fn clip_global_norm<M: Module>(
 
 /// Euclidean norm `[1]` of all gradients of `module`, `None` if there is none.
 fn global_norm<M: Module>(module: &M, gradients: &GradientsParams) -> Option<Tensor<1>> {
-    let mut squares = SquaredNorms { gradients, parts: Vec::new() };
-    module.visit(&mut squares);
-    (!squares.parts.is_empty()).then(|| Tensor::cat(squares.parts, 0).sum().sqrt())
+    let mut all = Collect { gradients, found: Vec::new() };
+    module.visit(&mut all);
+    (!all.found.is_empty()).then(|| squared_norm(all.found).sqrt())
 }
 
-struct SquaredNorms<'a> {
+struct Collect<'a> {
     gradients: &'a GradientsParams,
-    parts: Vec<Tensor<1>>,
+    found: Vec<DispatchTensor>,
 }
 
-impl ModuleVisitor for SquaredNorms<'_> {
+impl ModuleVisitor for Collect<'_> {
     fn visit_float<const D: usize>(&mut self, parameter: &Param<Tensor<D>>) {
         if let Some(gradient) = self.gradients.get::<D>(parameter.id) {
-            self.parts.push(squared_norm(gradient));
+            self.found.push(gradient.into_dispatch());
         }
     }
 }

@@ -4,7 +4,8 @@
 use super::gpu;
 #[cfg(feature = "gpu")]
 use burn::backend::Cube;
-use burn::backend::{Backend, TensorMetadata};
+use burn::backend::tensor::FloatTensor;
+use burn::backend::{Backend, DispatchTensor, TensorMetadata};
 use burn::tensor::{Shape, Tensor, TensorData};
 use rayon::prelude::*;
 
@@ -15,9 +16,9 @@ use super::tensors::Tensors;
 /// Lanes that add up in parallel; their sums are added in order.
 const LANES: usize = 16;
 
-/// Sum of squares `[1]`, not tracked by autodiff.
-pub fn squared_norm<const D: usize>(values: Tensor<D>) -> Tensor<1> {
-    let [sum] = run(&SquaredNorm, [values.into_dispatch()].into()).take();
+/// Sum `[1]` of the squares of all entries of some tensors, at least one; not tracked by autodiff.
+pub fn squared_norm(tensors: Vec<DispatchTensor>) -> Tensor<1> {
+    let [sum] = run(&SquaredNorm, Tensors(tensors)).take();
     Tensor::from_dispatch(sum)
 }
 
@@ -31,36 +32,47 @@ struct SquaredNorm;
 
 impl TensorKernel for SquaredNorm {
     fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
-        let [values] = arguments.take();
-        // Row sums first: one running sum over a large weight would lose digits in f32.
-        let shape = values.shape();
-        let columns = shape[shape.num_dims() - 1].max(1);
-        let rows = shape.num_elements() / columns;
-        let squares = B::float_reshape(B::float_mul(values.clone(), values), Shape::new([rows, columns]));
-        [B::float_reshape(B::float_sum(B::float_sum_dim(squares, 1)), Shape::new([1]))].into()
+        [sum::<B>(arguments.0.into_iter().map(squares::<B>).collect())].into()
     }
 
     #[cfg(feature = "gpu")]
     fn on_gpu(&self, arguments: Tensors<Cube>) -> Tensors<Cube> {
-        let [values] = arguments.take();
-        [gpu::squared_norm(values)].into()
+        [gpu::squared_norm(arguments.0)].into()
     }
 
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
-        let [mut tensor] = arguments.take();
-        let Some(values) = B::values(&mut tensor) else { return self.composed([tensor].into()) };
-        let parts: Vec<f64> = values
-            .par_chunks(CHUNK_ELEMENTS)
-            .map(|chunk| {
-                vectorised(
-                    #[inline(always)]
-                    || sum_of_squares(chunk),
-                )
-            })
-            .collect();
-        let sum = parts.into_iter().sum::<f64>() as f32;
-        [B::float_from_data(TensorData::new(vec![sum], [1]), &Default::default())].into()
+        [sum::<B>(arguments.0.into_iter().map(squares_on_host::<B>).collect())].into()
     }
+}
+
+/// The sum `[1]` of several sums `[1]`.
+fn sum<B: Backend>(parts: Vec<FloatTensor<B>>) -> FloatTensor<B> {
+    B::float_reshape(B::float_sum(B::float_cat(parts, 0)), Shape::new([1]))
+}
+
+/// Sum of squares `[1]`.
+fn squares<B: Backend>(values: FloatTensor<B>) -> FloatTensor<B> {
+    // Row sums first: one running sum over a large weight would lose digits in f32.
+    let shape = values.shape();
+    let columns = shape[shape.num_dims() - 1].max(1);
+    let rows = shape.num_elements() / columns;
+    let squares = B::float_reshape(B::float_mul(values.clone(), values), Shape::new([rows, columns]));
+    B::float_reshape(B::float_sum(B::float_sum_dim(squares, 1)), Shape::new([1]))
+}
+
+fn squares_on_host<B: HostBackend>(mut tensor: FloatTensor<B>) -> FloatTensor<B> {
+    let Some(values) = B::values(&mut tensor) else { return squares::<B>(tensor) };
+    let parts: Vec<f64> = values
+        .par_chunks(CHUNK_ELEMENTS)
+        .map(|chunk| {
+            vectorised(
+                #[inline(always)]
+                || sum_of_squares(chunk),
+            )
+        })
+        .collect();
+    let sum = parts.into_iter().sum::<f64>() as f32;
+    B::float_from_data(TensorData::new(vec![sum], [1]), &Default::default())
 }
 
 #[inline(always)]

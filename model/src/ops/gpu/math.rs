@@ -12,7 +12,7 @@ pub(super) fn sin_cos<N: Size>(x: Vector<f32, N>) -> (Vector<f32, N>, Vector<f32
     #[unroll]
     for lane in 0..N::value() {
         let x = x.extract(lane);
-        let quotient = f32::round(x * 0.636_619_77_f32);
+        let quotient = f32::round(x * std::f32::consts::FRAC_2_PI);
         let remainder = fma(quotient, -1.570_312_5_f32, x);
         let remainder = fma(quotient, -4.837_513e-4_f32, remainder);
         let remainder = fma(quotient, -7.549_79e-8_f32, remainder);

@@ -1,26 +1,33 @@
 //! Squared norm and scaling of a gradient.
 
-use burn::backend::{Backend, Cube, TensorMetadata};
+use burn::backend::TensorMetadata;
 use burn::tensor::Shape;
 use burn_cubecl::cubecl;
+use burn_cubecl::kernel::into_contiguous;
 use cubecl::prelude::*;
 
-use super::{GpuTensor, Matrix, UNITS, empty, groups};
+use super::{GpuTensor, UNITS, empty, groups};
 
-/// Entries that one unit adds up.
-const PER_UNIT: usize = 64;
+/// Most groups that add up one tensor.
+const MOST_GROUPS: usize = 64;
 
+/// Every group adds up its share of the entries, or of their squares.
 #[cube(launch_unchecked)]
-fn sums(values: &[f32], partial: &mut [f32], count: usize, #[comptime] squared: bool) {
+fn sums(
+    values: &[f32],
+    partial: &mut [f32],
+    count: usize,
+    offset: usize,
+    groups: usize,
+    #[comptime] squared: bool,
+) {
     let mut shared = Shared::<[f32]>::new_slice(comptime!(UNITS as usize));
     let mut sum = 0.0f32;
-    let start = CUBE_POS_X as usize * comptime!(UNITS as usize * PER_UNIT) + UNIT_POS as usize;
-    for i in 0..PER_UNIT {
-        let at = start + i * comptime!(UNITS as usize);
-        if at < count {
-            let value = values[at];
-            sum += if squared { value * value } else { value };
-        }
+    let mut at = CUBE_POS_X as usize * comptime!(UNITS as usize) + UNIT_POS as usize;
+    while at < count {
+        let value = values[at];
+        sum += if squared { value * value } else { value };
+        at += groups * comptime!(UNITS as usize);
     }
     shared[UNIT_POS as usize] = sum;
     sync_cube();
@@ -34,33 +41,42 @@ fn sums(values: &[f32], partial: &mut [f32], count: usize, #[comptime] squared: 
         half /= 2;
     }
     if UNIT_POS == 0 {
-        partial[CUBE_POS_X as usize] = shared[0];
+        partial[offset + CUBE_POS_X as usize] = shared[0];
     }
 }
 
-/// Sum of squares `[1]`.
-pub(in super::super) fn squared_norm(values: GpuTensor) -> GpuTensor {
-    let values = Matrix::new(values).tensor;
-    let mut count = values.shape().num_elements();
-    let (mut values, mut squared) = (values, true);
-    while squared || count > 1 {
-        let groups = count.div_ceil(UNITS as usize * PER_UNIT).max(1);
-        let partial = empty(&values, Shape::new([groups]));
-        // SAFETY: units beyond the last entry read nothing.
-        unsafe {
-            sums::launch_unchecked(
-                &values.client,
-                CubeCount::Static(groups as u32, 1, 1),
-                CubeDim::new_1d(UNITS),
-                super::buffer(&values, count, 1),
-                super::buffer(&partial, groups, 1),
-                count,
-                squared,
-            );
-        }
-        (values, count, squared) = (partial, groups, false);
+fn launch_sums(values: &GpuTensor, partial: &GpuTensor, offset: usize, groups: usize, squared: bool) {
+    let (count, partials) = (values.shape().num_elements(), partial.shape().num_elements());
+    // SAFETY: units beyond the last entry read nothing, and `partial` has an entry for every group from `offset` on.
+    unsafe {
+        sums::launch_unchecked(
+            &values.client,
+            CubeCount::Static(groups as u32, 1, 1),
+            CubeDim::new_1d(UNITS),
+            super::buffer(values, count, 1),
+            super::buffer(partial, partials, 1),
+            count,
+            offset,
+            groups,
+            squared,
+        );
     }
-    values
+}
+
+/// Sum of squares `[1]` of all tensors, at least one.
+pub(in super::super) fn squared_norm(tensors: Vec<GpuTensor>) -> GpuTensor {
+    let tensors: Vec<GpuTensor> = tensors.into_iter().map(into_contiguous).collect();
+    let groups =
+        |tensor: &GpuTensor| tensor.shape().num_elements().div_ceil(4 * UNITS as usize).clamp(1, MOST_GROUPS);
+    let partial = empty(&tensors[0], Shape::new([tensors.iter().map(groups).sum()]));
+    let mut offset = 0;
+    for tensor in &tensors {
+        launch_sums(tensor, &partial, offset, groups(tensor), true);
+        offset += groups(tensor);
+    }
+    let sum = empty(&partial, Shape::new([1]));
+    launch_sums(&partial, &sum, 0, 1, false);
+    sum
 }
 
 #[cube(launch_unchecked)]
@@ -74,7 +90,7 @@ fn scaled(values: &[f32], factor: &[f32], output: &mut [f32], count: usize) {
 /// `values` times the only element of `factor`.
 pub(in super::super) fn scale(values: GpuTensor, factor: GpuTensor) -> GpuTensor {
     let shape = values.shape();
-    let [values, factor] = [values, factor].map(|tensor| Matrix::new(tensor).tensor);
+    let [values, factor] = [values, factor].map(into_contiguous);
     let output = empty(&values, shape.clone());
     let count = shape.num_elements();
     let (groups, dim) = groups(&values.client, count);

@@ -1,7 +1,7 @@
 //! Products on matrix units (tensor cores), which multiply in bf16 and add in f32.
 //!
 //! Each factor is split into a high and a low part of eight bits each, `x = h + l + O(2⁻¹⁷ x)`, and three products are added up,
-//! `l·h' + h·l' + h·h'`: the relative error of a term is about 2⁻¹⁶, in the range of f32.
+//! `l·h' + h·l' + h·h'`: the relative error of a term is below 2⁻¹⁶, in the range of f32.
 
 use burn_cubecl::cubecl;
 use cubecl::client::Client;
@@ -67,10 +67,18 @@ fn write_tile<N: Size>(
         let position = UNIT_POS as usize + i * UNITS;
         let at = position / per_line * pitch + position % per_line;
         let value = registers[i];
-        let rounded = Vector::<bf16, N>::cast_from(value);
-        high[at] = rounded;
-        low[at] = Vector::<bf16, N>::cast_from(value - Vector::<f32, N>::cast_from(rounded));
+        let rounded = rounded_to_bf16::<N>(value);
+        high[at] = Vector::<bf16, N>::cast_from(rounded);
+        low[at] = Vector::<bf16, N>::cast_from(rounded_to_bf16::<N>(value - rounded));
     }
+}
+
+/// To the nearest: casts of the graphics APIs may cut digits off, which costs a bit of each part and makes errors add up.
+#[cube]
+fn rounded_to_bf16<N: Size>(value: Vector<f32, N>) -> Vector<f32, N> {
+    let half = Vector::<u32, N>::new(0x8000);
+    let kept = Vector::<u32, N>::new(0xffff_0000);
+    Vector::<f32, N>::reinterpret((Vector::<u32, N>::reinterpret(value) + half) & kept)
 }
 
 /// The fragment of a tile that starts at `row` and `column`.
