@@ -10,7 +10,7 @@ rounds are printed. A run with switches that are not implemented here is refused
     python3 scripts/bench_torch.py --config configs/paper.toml --stage 1 --set model.width=64 --check
     python3 scripts/bench_torch.py --torch-device cuda --tf32 --device wgpu --widths 512 --vertices 8000 --json cases.jsonl
 
-The scene is always written by our first device, the processor, so that the check needs no GPU of ours. It is compared in f32 (TF32
+The scene is always written by flex, the processor, so that the check needs no GPU of ours. It is compared in f32 (TF32
 off); `--tf32` times both. Nothing is chunked on any device: counted by hand, the dense distances of six garments of 8,000 vertices
 take about 10 GB.
 
@@ -284,8 +284,9 @@ def peak_mib(folder):
 def ours(options, case, folder=None):
     """Our times, or with `folder` only the files of the case."""
     command = [options.ours, "bench", "step", "--json", "--steps", "3", "--seconds", str(options.seconds)]
-    if options.device and not folder:
-        command += ["--device", options.device]
+    device = "flex" if folder else options.device
+    if device:
+        command += ["--device", device]
     # Clipped once a step, as PyTorch's users do.
     command += ["--accumulate", "2", "--set", "optimizer.clip=step", *case]
     for setting in options.set:
