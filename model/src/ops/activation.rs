@@ -1,6 +1,10 @@
 //! `activation(sum of matrices + one row per garment) + residual` in one pass.
 
+#[cfg(feature = "gpu")]
+use super::gpu;
 use burn::backend::Backend;
+#[cfg(feature = "gpu")]
+use burn::backend::Cube;
 use burn::backend::tensor::FloatTensor;
 use burn::tensor::Tensor;
 
@@ -13,7 +17,7 @@ use crate::packing::Packing;
 mod host;
 
 /// Pointwise activation of a fused layer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Activation {
     /// The sum itself.
     Identity,
@@ -111,6 +115,12 @@ impl TensorKernel for ActivatedSum {
         [add_optional::<B>(value, residual)].into()
     }
 
+    #[cfg(feature = "gpu")]
+    fn on_gpu(&self, arguments: Tensors<Cube>) -> Tensors<Cube> {
+        let (matrices, rows, residual) = self.split(arguments);
+        [gpu::activated_sum(self.activation, &self.packing, matrices, rows, residual)].into()
+    }
+
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
         let (matrices, rows, residual) = self.split(arguments);
         host::forward::<B>(self, matrices, rows, residual)
@@ -153,6 +163,15 @@ impl TensorKernel for ActivatedSumGradients {
         let of_row = |rows| B::float_sum_dim(row_block::<B>(of_matrix.clone(), rows), 0);
         let of_rows = concatenate::<B>(packing.ranges().map(of_row).collect());
         [of_matrix, of_rows].into()
+    }
+
+    #[cfg(feature = "gpu")]
+    fn on_gpu(&self, arguments: Tensors<Cube>) -> Tensors<Cube> {
+        let Tensors(mut arguments) = arguments;
+        let gradient = arguments.pop().expect("a gradient");
+        let (of_matrix, of_rows) =
+            gpu::activated_sum_gradients(self.0.activation, &self.0.packing, arguments, gradient);
+        [of_matrix, concatenate::<Cube>(of_rows)].into()
     }
 
     fn on_host<B: HostBackend>(&self, Tensors(mut arguments): Tensors<B>) -> Tensors<B> {

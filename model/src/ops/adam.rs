@@ -1,6 +1,10 @@
 //! One Adam update of a parameter and both its moments, in a single pass over memory.
 
+#[cfg(feature = "gpu")]
+use super::gpu;
 use burn::backend::Backend;
+#[cfg(feature = "gpu")]
+use burn::backend::Cube;
 use burn::tensor::Tensor;
 use rayon::prelude::*;
 
@@ -50,6 +54,11 @@ impl TensorKernel for AdamFactors {
         let root = B::float_add_scalar(B::float_sqrt(second.clone()), f64::from(self.epsilon).into());
         let step = B::float_div(B::float_mul_scalar(first.clone(), f64::from(self.step_size).into()), root);
         [B::float_sub(parameter, step), first, second].into()
+    }
+
+    #[cfg(feature = "gpu")]
+    fn on_gpu(&self, arguments: Tensors<Cube>) -> Tensors<Cube> {
+        gpu::adam(arguments.take(), *self).into()
     }
 
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {

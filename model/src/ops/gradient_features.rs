@@ -1,5 +1,9 @@
 //! Gradient features of DiffusionNet: `tanh(Re(conj(g) ⊙ A g))` per channel, from gradients mixed in advance.
 
+#[cfg(feature = "gpu")]
+use super::gpu;
+#[cfg(feature = "gpu")]
+use burn::backend::Cube;
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Backend, TensorMetadata};
 use burn::tensor::Tensor;
@@ -43,6 +47,12 @@ impl TensorKernel for GradientFeatures {
         let real = B::float_mul(x0, B::float_sub(x1, y2));
         let imaginary = B::float_mul(y0, B::float_add(y1, x2));
         [B::float_tanh(B::float_add(real, imaginary))].into()
+    }
+
+    #[cfg(feature = "gpu")]
+    fn on_gpu(&self, arguments: Tensors<Cube>) -> Tensors<Cube> {
+        let [mixed] = arguments.take();
+        [gpu::gradient_features(mixed)].into()
     }
 
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
@@ -109,6 +119,11 @@ impl TensorKernel for FeatureGradients {
         let first = B::float_cat(vec![of_x0, of_x1.clone(), of_y1.clone()], 1);
         let second = B::float_cat(vec![of_y0, of_y1, B::float_neg(of_x1)], 1);
         [B::float_cat(vec![first, second], 0)].into()
+    }
+
+    #[cfg(feature = "gpu")]
+    fn on_gpu(&self, arguments: Tensors<Cube>) -> Tensors<Cube> {
+        [gpu::feature_gradients(arguments.take())].into()
     }
 
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {

@@ -13,6 +13,8 @@ mod adam;
 mod composed;
 #[cfg(feature = "flex")]
 mod gemm;
+#[cfg(feature = "gpu")]
+mod gpu;
 mod gradient_features;
 mod host;
 mod math;

@@ -1,5 +1,9 @@
 //! Squared norm and scaling of a gradient, each one pass over memory.
 
+#[cfg(feature = "gpu")]
+use super::gpu;
+#[cfg(feature = "gpu")]
+use burn::backend::Cube;
 use burn::backend::{Backend, TensorMetadata};
 use burn::tensor::{Shape, Tensor, TensorData};
 use rayon::prelude::*;
@@ -34,6 +38,12 @@ impl TensorKernel for SquaredNorm {
         let rows = shape.num_elements() / columns;
         let squares = B::float_reshape(B::float_mul(values.clone(), values), Shape::new([rows, columns]));
         [B::float_reshape(B::float_sum(B::float_sum_dim(squares, 1)), Shape::new([1]))].into()
+    }
+
+    #[cfg(feature = "gpu")]
+    fn on_gpu(&self, arguments: Tensors<Cube>) -> Tensors<Cube> {
+        let [values] = arguments.take();
+        [gpu::squared_norm(values)].into()
     }
 
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
@@ -75,6 +85,12 @@ impl TensorKernel for ScaleBy {
         let [values, factor] = arguments.take();
         let ones = vec![1; values.shape().num_dims()];
         [B::float_mul(values, B::float_reshape(factor, Shape::from(ones)))].into()
+    }
+
+    #[cfg(feature = "gpu")]
+    fn on_gpu(&self, arguments: Tensors<Cube>) -> Tensors<Cube> {
+        let [values, factor] = arguments.take();
+        [gpu::scale(values, factor)].into()
     }
 
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {

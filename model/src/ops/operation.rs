@@ -8,7 +8,7 @@
 
 use std::fmt::Debug;
 
-#[cfg(any(feature = "wgpu", feature = "cuda"))]
+#[cfg(feature = "gpu")]
 use burn::backend::Cube;
 #[cfg(feature = "flex")]
 use burn::backend::Flex;
@@ -18,16 +18,22 @@ use burn::backend::autodiff::checkpoint::{base::Checkpointer, strategy::Checkpoi
 use burn::backend::autodiff::grads::Gradients;
 use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
 use burn::backend::tensor::FloatTensor;
-use burn::backend::{Autodiff, Backend, Dispatch, TensorMetadata, backend_extension};
-use burn::tensor::{DType, Tensor};
+use burn::backend::{Autodiff, Backend, Dispatch, backend_extension};
+use burn::tensor::Tensor;
 
 use super::host::HostBackend;
 use super::tensors::Tensors;
 
-/// A function of tensors in two forms, which agree to rounding.
+/// A function of tensors in three forms, which agree to rounding.
 pub(super) trait TensorKernel {
     /// Composed of a backend's own operations.
     fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B>;
+
+    /// On f32 in the memory of a GPU, in few kernels.
+    #[cfg(feature = "gpu")]
+    fn on_gpu(&self, arguments: Tensors<Cube>) -> Tensors<Cube> {
+        self.composed(arguments)
+    }
 
     /// On f32 in host memory, in one pass.
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
@@ -85,7 +91,7 @@ pub(super) fn run(kernel: &impl TensorKernel, arguments: Tensors<Dispatch>) -> T
 #[backend_extension(
     Flex: cfg(feature = "flex"),
     NdArray: cfg(feature = "ndarray"),
-    Cube: cfg(any(feature = "wgpu", feature = "cuda")),
+    Cube: cfg(feature = "gpu"),
     Autodiff
 )]
 pub(super) trait FusedOps: Backend {
@@ -123,11 +129,18 @@ impl FusedOps for NdArray {
     }
 }
 
-#[cfg(any(feature = "wgpu", feature = "cuda"))]
-impl FusedOps for Cube {}
+#[cfg(feature = "gpu")]
+impl FusedOps for Cube {
+    fn run<K: TensorKernel>(kernel: &K, arguments: Tensors<Self>) -> Tensors<Self> {
+        match arguments.are_f32() {
+            true => kernel.on_gpu(arguments),
+            false => kernel.composed(arguments),
+        }
+    }
+}
 
 fn run_on_host<B: HostBackend>(kernel: &impl TensorKernel, arguments: Tensors<B>) -> Tensors<B> {
-    match arguments.0.iter().all(|tensor| tensor.dtype() == DType::F32) {
+    match arguments.are_f32() {
         true => kernel.on_host(arguments),
         false => kernel.composed(arguments),
     }

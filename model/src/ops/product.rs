@@ -4,10 +4,16 @@
 //! narrow matrices of these networks (width 128) that takes a quarter of the time of the multiplication. Here the same one
 //! (crate `gemm`) writes into fresh memory, or adds to a matrix whose memory no other tensor shares.
 
+#[cfg(feature = "gpu")]
+use super::gpu;
 use burn::backend::Backend;
+#[cfg(feature = "gpu")]
+use burn::backend::Cube;
 use burn::backend::tensor::FloatTensor;
 use burn::tensor::Tensor;
 
+#[cfg(feature = "gpu")]
+use super::composed::add_optional;
 use super::composed::multiply_add;
 use super::host::HostBackend;
 use super::operation::{ArgumentGradients, FusedOps, Operation, Saved, Saves, TensorKernel, apply};
@@ -37,6 +43,12 @@ impl TensorKernel for MatrixProduct {
     fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
         let ([lhs, rhs], addend) = arguments.take_optional();
         [multiply_add::<B>(lhs, rhs, addend)].into()
+    }
+
+    #[cfg(feature = "gpu")]
+    fn on_gpu(&self, arguments: Tensors<Cube>) -> Tensors<Cube> {
+        let ([lhs, rhs], addend) = arguments.take_optional();
+        [add_optional::<Cube>(gpu::product(lhs, rhs), addend)].into()
     }
 
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {

@@ -1,6 +1,10 @@
 //! `sin(w0·(input + bias)) ⊙ gate`: one layer of a modulated SIREN after its matrix product.
 
+#[cfg(feature = "gpu")]
+use super::gpu;
 use burn::backend::Backend;
+#[cfg(feature = "gpu")]
+use burn::backend::Cube;
 use burn::backend::tensor::FloatTensor;
 use burn::tensor::Tensor;
 
@@ -39,6 +43,11 @@ impl TensorKernel for SineModulation {
         let [input, bias, gate] = arguments.take();
         let phase = B::float_mul_scalar(B::float_add(input, bias), self.omega.into());
         [B::float_mul(B::float_sin(phase), gate)].into()
+    }
+
+    #[cfg(feature = "gpu")]
+    fn on_gpu(&self, arguments: Tensors<Cube>) -> Tensors<Cube> {
+        [gpu::sine_modulation(arguments.take(), self.omega)].into()
     }
 
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
@@ -80,6 +89,11 @@ impl TensorKernel for SineGradients {
         let slope = B::float_mul_scalar(B::float_cos(phase), omega.into());
         let of_input = B::float_mul(slope, B::float_mul(gate, gradient));
         [of_input.clone(), B::float_sum_dim(of_input, 0), of_gate].into()
+    }
+
+    #[cfg(feature = "gpu")]
+    fn on_gpu(&self, arguments: Tensors<Cube>) -> Tensors<Cube> {
+        gpu::sine_gradients(arguments.take(), self.0.omega).into()
     }
 
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {

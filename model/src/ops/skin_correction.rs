@@ -1,6 +1,10 @@
 //! Skin weights plus a correction restricted to the joints a garment uses.
 
+#[cfg(feature = "gpu")]
+use super::gpu;
 use burn::backend::Backend;
+#[cfg(feature = "gpu")]
+use burn::backend::Cube;
 use burn::backend::tensor::FloatTensor;
 use burn::tensor::Tensor;
 
@@ -58,6 +62,12 @@ impl TensorKernel for Projection {
         };
         let scaled = B::float_mul_scalar(projected, self.scale.into());
         [add_optional::<B>(scaled, base)].into()
+    }
+
+    #[cfg(feature = "gpu")]
+    fn on_gpu(&self, arguments: Tensors<Cube>) -> Tensors<Cube> {
+        let (mask_and_values, base) = arguments.take_optional();
+        [gpu::projection(mask_and_values, base, &self.packing, self.scale, self.zero_sum)].into()
     }
 
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {

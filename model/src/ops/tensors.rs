@@ -3,8 +3,9 @@
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{
     Backend, BackendTensor, Dispatch, DispatchAutodiffContext, DispatchTensor, DispatchTensorKind,
-    ExtensionType,
+    ExtensionType, TensorMetadata,
 };
+use burn::tensor::DType;
 
 /// Tensors of one backend, in order.
 pub(super) struct Tensors<B: Backend>(pub(super) Vec<FloatTensor<B>>);
@@ -18,6 +19,10 @@ impl<B: Backend> Tensors<B> {
     pub(super) fn take<const N: usize>(self) -> [FloatTensor<B>; N] {
         let count = self.0.len();
         self.0.try_into().unwrap_or_else(|_| panic!("{count} tensors, expected {N}"))
+    }
+
+    pub(super) fn are_f32(&self) -> bool {
+        self.0.iter().all(|tensor| tensor.dtype() == DType::F32)
     }
 
     /// N tensors, and one more if there is one.

@@ -1,6 +1,10 @@
 //! Points moved by their own affine transforms.
 
+#[cfg(feature = "gpu")]
+use super::gpu;
 use burn::backend::Backend;
+#[cfg(feature = "gpu")]
+use burn::backend::Cube;
 use burn::backend::tensor::FloatTensor;
 use burn::tensor::Tensor;
 
@@ -37,6 +41,11 @@ impl TensorKernel for TransformPoints {
             B::float_add(B::float_sum_dim(B::float_mul(linear, points.clone()), 1), offset)
         });
         [B::float_cat(axes.collect(), 1)].into()
+    }
+
+    #[cfg(feature = "gpu")]
+    fn on_gpu(&self, arguments: Tensors<Cube>) -> Tensors<Cube> {
+        [gpu::transform_points(arguments.take())].into()
     }
 
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
@@ -86,6 +95,11 @@ impl TensorKernel for TransformGradients {
         let [(x, of_x), (y, of_y), (z, of_z)] = axes;
         let of_transforms = B::float_cat([x, y, z].into_iter().flatten().collect(), 1);
         [of_transforms, B::float_add(B::float_add(of_x, of_y), of_z)].into()
+    }
+
+    #[cfg(feature = "gpu")]
+    fn on_gpu(&self, arguments: Tensors<Cube>) -> Tensors<Cube> {
+        gpu::transform_gradients(arguments.take()).into()
     }
 
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {

@@ -1,0 +1,66 @@
+//! One Adam update.
+
+use burn_cubecl::cubecl;
+use cubecl::prelude::*;
+
+use super::super::adam::AdamFactors;
+use super::{GpuTensor, Matrix, empty, groups};
+use burn::backend::TensorMetadata;
+
+#[cube(launch_unchecked)]
+fn update(
+    parameter: &[f32],
+    gradient: &[f32],
+    first: &[f32],
+    second: &[f32],
+    new_parameter: &mut [f32],
+    new_first: &mut [f32],
+    new_second: &mut [f32],
+    count: usize,
+    beta_1: f32,
+    beta_2: f32,
+    step_size: f32,
+    epsilon: f32,
+) {
+    let i = ABSOLUTE_POS;
+    if i < count {
+        let g = gradient[i];
+        let m = first[i] * beta_1 + g * (1.0 - beta_1);
+        let v = second[i] * beta_2 + g * g * (1.0 - beta_2);
+        new_first[i] = m;
+        new_second[i] = v;
+        new_parameter[i] = parameter[i] - step_size * m / (f32::sqrt(v) + epsilon);
+    }
+}
+
+/// Parameter and both moments after an update; see [`adam_step`](super::super::adam_step).
+pub(in super::super) fn adam(arguments: [GpuTensor; 4], factors: AdamFactors) -> [GpuTensor; 3] {
+    let shape = arguments[0].shape();
+    let [parameter, gradient, first, second] = arguments.map(Matrix::new);
+    let count = shape.num_elements();
+    let results = [(); 3].map(|()| empty(&parameter.tensor, shape.clone()));
+    let outputs = results.clone().map(Matrix::new);
+    let (groups, dim) = groups(parameter.client(), count);
+    let AdamFactors { beta_1, beta_2, step_size, epsilon } = factors;
+    // SAFETY: units beyond the last entry do nothing.
+    unsafe {
+        update::launch_unchecked(
+            parameter.client(),
+            groups,
+            dim,
+            parameter.argument(1),
+            gradient.argument(1),
+            first.argument(1),
+            second.argument(1),
+            outputs[0].argument(1),
+            outputs[1].argument(1),
+            outputs[2].argument(1),
+            count,
+            beta_1,
+            beta_2,
+            step_size,
+            epsilon,
+        );
+    }
+    results
+}

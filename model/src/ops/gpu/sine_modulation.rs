@@ -1,0 +1,113 @@
+//! One layer of a modulated SIREN after its matrix product.
+
+use burn_cubecl::cubecl;
+use cubecl::prelude::*;
+
+use super::column_sums::{BLOCK, ROW_STEP, blocks, column, end_row, first_row, total, write_block};
+use super::math::sin_cos;
+use super::{GpuTensor, Matrix, groups};
+
+#[cube(launch_unchecked)]
+fn forward<N: Size>(
+    input: &[Vector<f32, N>],
+    bias: &[Vector<f32, N>],
+    gate: &[Vector<f32, N>],
+    output: &mut [Vector<f32, N>],
+    count: usize,
+    vectors: usize,
+    omega: f32,
+) {
+    let i = ABSOLUTE_POS;
+    if i < count {
+        let phase = (input[i] + bias[i % vectors]) * Vector::<f32, N>::new(omega);
+        let (sine, _cosine) = sin_cos::<N>(phase);
+        output[i] = sine * gate[i];
+    }
+}
+
+/// `sin(omega·(input + bias)) ⊙ gate`: input and gate `[N,C]`, bias `[1,C]`.
+pub(in super::super) fn sine_modulation([input, bias, gate]: [GpuTensor; 3], omega: f64) -> GpuTensor {
+    let [input, bias, gate] = [input, bias, gate].map(Matrix::new);
+    let output = input.empty(input.rows, input.columns);
+    let width = input.width();
+    let vectors = input.columns / width;
+    let (count, dim) = groups(input.client(), input.rows * vectors);
+    // SAFETY: units beyond the last entry do nothing.
+    unsafe {
+        forward::launch_unchecked(
+            input.client(),
+            count,
+            dim,
+            width,
+            input.argument(width),
+            bias.argument(width),
+            gate.argument(width),
+            output.argument(width),
+            input.rows * vectors,
+            vectors,
+            omega as f32,
+        );
+    }
+    output.tensor
+}
+
+#[cube(launch_unchecked)]
+fn backward<N: Size>(
+    input: &[Vector<f32, N>],
+    bias: &[Vector<f32, N>],
+    gate: &[Vector<f32, N>],
+    gradient: &[Vector<f32, N>],
+    of_input: &mut [Vector<f32, N>],
+    of_gate: &mut [Vector<f32, N>],
+    partial: &mut [Vector<f32, N>],
+    rows: usize,
+    vectors: usize,
+    omega: f32,
+) {
+    let omega = Vector::<f32, N>::new(omega);
+    let mut sum = Vector::<f32, N>::new(0.0);
+    if column() < vectors {
+        let shift = bias[column()];
+        let mut row = first_row(0);
+        let end = end_row(0, rows);
+        while row < end {
+            let i = row * vectors + column();
+            let (sine, cosine) = sin_cos::<N>((input[i] + shift) * omega);
+            let inner = omega * cosine * gate[i] * gradient[i];
+            of_gate[i] = sine * gradient[i];
+            of_input[i] = inner;
+            sum += inner;
+            row += ROW_STEP;
+        }
+    }
+    write_block::<N>(sum, partial, vectors);
+}
+
+/// Gradients of input, bias and gate from these and the gradient of the result.
+pub(in super::super) fn sine_gradients(arguments: [GpuTensor; 4], omega: f64) -> [GpuTensor; 3] {
+    let [input, bias, gate, gradient] = arguments.map(Matrix::new);
+    let (rows, columns, width) = (input.rows, input.columns, input.width());
+    let [of_input, of_gate] = [(); 2].map(|()| input.empty(rows, columns));
+    let partial = input.empty(rows.div_ceil(BLOCK), columns);
+    let (count, dim) = blocks(rows, columns / width);
+    // SAFETY: units beyond the last column or row do nothing.
+    unsafe {
+        backward::launch_unchecked(
+            input.client(),
+            count,
+            dim,
+            width,
+            input.argument(width),
+            bias.argument(width),
+            gate.argument(width),
+            gradient.argument(width),
+            of_input.argument(width),
+            of_gate.argument(width),
+            partial.argument(width),
+            rows,
+            columns / width,
+            omega as f32,
+        );
+    }
+    [of_input.tensor, total(partial).tensor, of_gate.tensor]
+}
