@@ -10,6 +10,7 @@
 
 mod activation;
 mod adam;
+mod blend;
 mod composed;
 #[cfg(feature = "flex")]
 mod gemm;
@@ -31,6 +32,7 @@ mod transform_points;
 
 pub use activation::{Activation, activate, activate_packed, activate_packed_sum, activate_residual};
 pub use adam::{AdamFactors, adam_step};
+pub use blend::blend;
 pub use gradient_features::gradient_features;
 pub use norm::{scale_by, squared_norm};
 pub use product::{product, product_add};

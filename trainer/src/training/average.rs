@@ -4,6 +4,7 @@ use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
 use burn::optim::GradientsParams;
 use burn::tensor::Tensor;
 use clothcombo_model::ClothCombo;
+use clothcombo_model::ops::blend;
 
 /// `average ← d · average + (1 − d) · weights` after every step; d grows from 0.1 to `decay` over the first steps, so that
 /// the random start is soon forgotten.
@@ -51,7 +52,7 @@ impl ModuleMapper for Blend {
     fn map_float<const D: usize>(&mut self, parameter: Param<Tensor<D>>) -> Param<Tensor<D>> {
         let (id, value, mapper) = parameter.consume();
         let value = match self.weights.remove::<D>(id) {
-            Some(new) => value * self.decay + new * (1.0 - self.decay),
+            Some(new) => blend(value, new, self.decay),
             None => value,
         };
         Param::from_mapped_value(id, value, mapper)

@@ -6,6 +6,7 @@
 
 mod activation;
 mod adam;
+mod blend;
 mod column_sums;
 mod gradient_features;
 mod math;
@@ -25,6 +26,7 @@ use cubecl::prelude::*;
 
 pub(super) use activation::{activated_sum, activated_sum_gradients};
 pub(super) use adam::adam;
+pub(super) use blend::blend;
 pub(super) use gradient_features::{feature_gradients, gradient_features};
 pub(super) use norm::{scale, squared_norm};
 pub(super) use product::product;
