@@ -48,6 +48,12 @@ fn ndarray() -> Device {
     Device::ndarray()
 }
 
+/// Scenes of a step that are computed at once: on a processor as many as there are threads; on a GPU two, so that the
+/// host computes the energies of one while the device computes the networks of the other.
+pub fn scenes_at_once(is_processor: bool) -> usize {
+    if is_processor { rayon::current_num_threads() } else { 2 }
+}
+
 /// Whether `device` (with or without automatic differentiation) is this machine's processor, where several threads can
 /// compute in parallel. A software adapter of `wgpu` is not: it is driven like a GPU.
 pub fn is_processor(device: &Device) -> bool {

@@ -4,6 +4,7 @@ use super::activations::of_scene;
 use crate::config::{Config, StageConfig};
 use crate::dataset::sizes::{DataSizes, operator_bytes};
 use crate::dataset::{GARMENTS_AT_ONCE, SCENES_AHEAD};
+use crate::system::device::scenes_at_once;
 
 /// Memory a run is expected to use at its peak (bytes).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,7 +60,7 @@ impl MemoryEstimate {
         let limits = config.data.memory_limits();
         let network = 4 * parameters as u64;
         let threads = rayon::current_num_threads();
-        let at_once = |s: &StageConfig| if is_processor { s.accumulate.min(threads) } else { 1 };
+        let at_once = |s: &StageConfig| s.accumulate.min(scenes_at_once(is_processor));
 
         let layers = config.stages.iter().map(|s| s.layers[1]).max().unwrap_or(1);
         let garments_of = |s: &StageConfig| s.accumulate * s.layers[1];

@@ -6,7 +6,7 @@ mod workers;
 use crate::config::{ClipScope, OptimizerConfig, Trains};
 use crate::dataset::PreparedScene;
 use crate::inference::tensor_store::{DrapeError, KnownEmbeddings, TensorStore};
-use crate::system::device::is_processor;
+use crate::system::device::{is_processor, scenes_at_once};
 use burn::module::Module;
 use burn::optim::{GradientsAccumulator, GradientsParams, ModuleOptimizer};
 use burn::tensor::Tensor;
@@ -114,9 +114,7 @@ pub fn new_optimizer(config: &OptimizerConfig) -> ModuleOptimizer {
 impl Learner {
     /// Trains `model` (on a device with automatic differentiation) with `optimizer`.
     pub fn new(model: ClothCombo, optimizer: ModuleOptimizer, config: &OptimizerConfig) -> Self {
-        // A GPU computes one scene after the other anyway.
-        let parallel_scenes =
-            if model.devices().iter().all(is_processor) { rayon::current_num_threads() } else { 1 };
+        let parallel_scenes = scenes_at_once(model.devices().iter().all(is_processor));
         Self {
             model,
             optimizer,
@@ -153,7 +151,7 @@ impl Learner {
         Ok(output)
     }
 
-    /// Loss and gradients. On a processor as many scenes are computed in parallel as there are threads.
+    /// Loss and gradients, of [several scenes at once](scenes_at_once).
     ///
     /// # Errors
     /// When a scene's tensors cannot be made.
