@@ -244,13 +244,12 @@ impl BenchmarkRun {
         // The memory of a GPU takes a few steps to find its sizes.
         const WARM_UP: usize = 8;
         let trains = self.trains();
+        let warm_up = if is_processor(&self.device) { 0 } else { WARM_UP };
         let mut step = || {
             self.learner.train_step(&StepInput::whole(&self.tensors, scenes, trains), 1e-4)?;
             self.settle()
         };
-        if !is_processor(&self.device) {
-            (0..WARM_UP).try_for_each(|_| step())?;
-        }
+        (0..warm_up).try_for_each(|_| step())?;
         median_ms(seconds, step)
     }
 
