@@ -7,7 +7,6 @@ use burn::tensor::Tensor;
 
 #[cfg(feature = "gpu")]
 use super::gpu;
-use super::host::HostBackend;
 use super::operation::{TensorKernel, run};
 use super::tensors::Tensors;
 
@@ -18,8 +17,8 @@ pub fn blend<const D: usize>(old: Tensor<D>, new: Tensor<D>, decay: f64) -> Tens
 }
 
 /// Arguments: old, new.
-pub(super) struct Blend {
-    pub(super) decay: f64,
+struct Blend {
+    decay: f64,
 }
 
 impl TensorKernel for Blend {
@@ -32,9 +31,5 @@ impl TensorKernel for Blend {
     #[cfg(feature = "gpu")]
     fn on_gpu(&self, arguments: Tensors<Cube>) -> Tensors<Cube> {
         [gpu::blend(arguments.take(), self.decay)].into()
-    }
-
-    fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
-        self.composed(arguments)
     }
 }

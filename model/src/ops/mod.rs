@@ -1,7 +1,7 @@
 //! Operations the networks are made of, fused where burn's own are slow.
 //!
-//! Each file holds one operation: what it computes, composed of the operations of any backend and in one pass over host
-//! memory (vectorised for the CPU found at run time, parallel over fixed row chunks, hence bit-identical for any number of
+//! Each file holds one operation: what it computes, composed of the operations of any backend, as kernels of a GPU (`gpu`), and
+//! in one pass over host memory (vectorised for the CPU found at run time, parallel over fixed row chunks, hence bit-identical for any number of
 //! threads), and its hand-written backward pass. Below them lie `operation` (how a backend runs and records one), `host`
 //! (loops over rows), `composed`, `math` and `gemm`, which know no operation.
 

@@ -16,7 +16,10 @@ use super::tensors::Tensors;
 /// Lanes that add up in parallel; their sums are added in order.
 const LANES: usize = 16;
 
-/// Sum `[1]` of the squares of all entries of some tensors, at least one; not tracked by autodiff.
+/// Sum `[1]` of the squares of all entries of some tensors; not tracked by autodiff.
+///
+/// # Panics
+/// If there is no tensor.
 pub fn squared_norm(tensors: Vec<DispatchTensor>) -> Tensor<1> {
     let [sum] = run(&SquaredNorm, Tensors(tensors)).take();
     Tensor::from_dispatch(sum)

@@ -1,4 +1,4 @@
-//! Matrix products written straight into their place.
+//! Matrix products: on a GPU as in `gpu::product`, in host memory written straight into their place.
 //!
 //! burn's flex backend zeroes the memory of every product, copies it to aligned memory, and only then multiplies; for the
 //! narrow matrices of these networks (width 128) that takes a quarter of the time of the multiplication. Here the same one

@@ -15,8 +15,10 @@ struct Form {
     activation: Activation,
     /// Whether there is a second matrix.
     second: bool,
-    /// Whether there is a residual (forward), or rows to add (backward).
-    more: bool,
+    /// Whether there is a residual, in the forward pass.
+    residual: bool,
+    /// Whether the rows of the garments are added, in the backward pass; the forward pass always does.
+    rows: bool,
 }
 
 #[cube]
@@ -61,18 +63,18 @@ fn forward<N: Size>(
     output: &mut [Vector<f32, N>],
     start: usize,
     end: usize,
-    row: usize,
+    garment: usize,
     vectors: usize,
     #[comptime] form: Form,
 ) {
     let i = start + ABSOLUTE_POS;
     if i < end {
-        let mut sum = first[i] + rows[row * vectors + (i - start) % vectors];
+        let mut sum = first[i] + rows[garment * vectors + (i - start) % vectors];
         if form.second {
             sum += second[i];
         }
         let mut value = activated::<N>(sum, form.activation);
-        if form.more {
+        if form.residual {
             value += residual[i];
         }
         output[i] = value;
@@ -80,7 +82,7 @@ fn forward<N: Size>(
 }
 
 /// See [`activate_residual`](super::super::activate_residual) and its siblings; one or two matrices.
-pub(in super::super) fn activated_sum(
+pub(in crate::ops) fn activated_sum(
     activation: Activation,
     packing: &Packing,
     matrices: Vec<GpuTensor>,
@@ -90,10 +92,13 @@ pub(in super::super) fn activated_sum(
     let matrices: Vec<Matrix> = matrices.into_iter().map(Matrix::new).collect();
     let (rows, residual) = (Matrix::new(rows), residual.map(Matrix::new));
     let (first, second) = (&matrices[0], matrices.get(1));
+    first.assert_like(second.into_iter().chain(&residual));
+    rows.assert_size(packing.count(), first.columns);
+    assert_eq!(packing.rows(), first.rows, "packed rows");
     let output = first.empty(first.rows, first.columns);
     let width = first.width();
     let vectors = first.columns / width;
-    let form = Form { activation, second: second.is_some(), more: residual.is_some() };
+    let form = Form { activation, second: second.is_some(), residual: residual.is_some(), rows: true };
     for (garment, range) in packing.ranges().enumerate() {
         let (count, dim) = groups(first.client(), range.len() * vectors);
         // SAFETY: units beyond the last row of the garment do nothing.
@@ -143,7 +148,7 @@ fn backward<N: Size>(
             if form.second {
                 sum += second[i];
             }
-            if form.more {
+            if form.rows {
                 sum += rows[garment * vectors + column()];
             }
             let value = gradient[i] * slope::<N>(sum, form.activation);
@@ -157,7 +162,7 @@ fn backward<N: Size>(
 
 /// Gradients of every matrix, and of the row of every garment. `sum` is what the activation was applied to: nothing (identity),
 /// one matrix of the same sign (the result of ReLU), or one or two matrices and the rows.
-pub(in super::super) fn activated_sum_gradients(
+pub(in crate::ops) fn activated_sum_gradients(
     activation: Activation,
     packing: &Packing,
     mut sum: Vec<GpuTensor>,
@@ -170,10 +175,13 @@ pub(in super::super) fn activated_sum_gradients(
         let of_rows = packing.ranges().map(|rows| total_of(&gradient, rows).tensor).collect();
         return (gradient.tensor, of_rows);
     };
+    gradient.assert_like(&matrices);
+    rows.iter().for_each(|rows| rows.assert_size(packing.count(), gradient.columns));
+    assert_eq!(packing.rows(), gradient.rows, "packed rows");
     let output = gradient.empty(gradient.rows, gradient.columns);
     let width = gradient.width();
     let vectors = gradient.columns / width;
-    let form = Form { activation, second: matrices.len() > 1, more: rows.is_some() };
+    let form = Form { activation, second: matrices.len() > 1, residual: false, rows: rows.is_some() };
     let mut of_rows = Vec::with_capacity(packing.count());
     for (garment, range) in packing.ranges().enumerate() {
         let partial = gradient.empty(range.len().div_ceil(BLOCK), gradient.columns);

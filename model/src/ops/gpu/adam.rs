@@ -34,9 +34,10 @@ fn update(
 }
 
 /// Parameter and both moments after an update; see [`adam_step`](super::super::adam_step).
-pub(in super::super) fn adam(arguments: [GpuTensor; 4], factors: AdamFactors) -> [GpuTensor; 3] {
+pub(in crate::ops) fn adam(arguments: [GpuTensor; 4], factors: AdamFactors) -> [GpuTensor; 3] {
     let shape = arguments[0].shape();
     let [parameter, gradient, first, second] = arguments.map(Matrix::new);
+    parameter.assert_like([&gradient, &first, &second]);
     let count = shape.num_elements();
     let results = [(); 3].map(|()| empty(&parameter.tensor, shape.clone()));
     let outputs = results.clone().map(Matrix::new);

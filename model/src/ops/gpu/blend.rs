@@ -16,7 +16,7 @@ fn weighted_mean(old: &[f32], new: &[f32], output: &mut [f32], count: usize, dec
 }
 
 /// See [`blend`](super::super::blend()).
-pub(in super::super) fn blend(arguments: [GpuTensor; 2], decay: f64) -> GpuTensor {
+pub(in crate::ops) fn blend(arguments: [GpuTensor; 2], decay: f64) -> GpuTensor {
     let shape = arguments[0].shape();
     let [old, new] = arguments.map(into_contiguous);
     let output = empty(&old, shape.clone());

@@ -7,9 +7,10 @@ use cubecl::prelude::*;
 
 use super::{Matrix, UNITS};
 
-/// Columns (of whole vectors) and rows that one group works on at a time.
+/// Columns (of whole vectors) that one group works on at a time.
 const LANES: usize = 32;
-const ROWS: usize = UNITS as usize / LANES;
+/// Rows that one group works on at a time: how far those of a unit are apart.
+pub(super) const ROW_STEP: usize = UNITS as usize / LANES;
 
 /// Rows whose sum one group makes.
 pub(super) const BLOCK: usize = 256;
@@ -26,7 +27,7 @@ pub(super) fn column() -> usize {
     CUBE_POS_X as usize * LANES + UNIT_POS as usize % LANES
 }
 
-/// The first row of this unit in a matrix that starts at row `start`; it takes every [`ROWS`]th from there.
+/// The first row of this unit in a matrix that starts at row `start`; it takes every [`ROW_STEP`]th from there.
 #[cube]
 pub(super) fn first_row(start: usize) -> usize {
     start + CUBE_POS_Y as usize * BLOCK + UNIT_POS as usize / LANES
@@ -48,7 +49,7 @@ pub(super) fn write_block<N: Size>(sum: Vector<f32, N>, partial: &mut [Vector<f3
     if UNIT_POS < LANES as u32 {
         let mut total = sum;
         #[unroll]
-        for row in 1..ROWS {
+        for row in 1..ROW_STEP {
             total += sums[row * LANES + UNIT_POS as usize];
         }
         if column() < vectors {
@@ -56,9 +57,6 @@ pub(super) fn write_block<N: Size>(sum: Vector<f32, N>, partial: &mut [Vector<f3
         }
     }
 }
-
-/// How far a unit's rows are apart.
-pub(super) const ROW_STEP: usize = ROWS;
 
 #[cube(launch_unchecked)]
 fn column_sums<N: Size>(

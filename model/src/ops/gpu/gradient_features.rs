@@ -24,7 +24,7 @@ fn forward<N: Size>(
 }
 
 /// See [`gradient_features`](super::super::gradient_features()).
-pub(in super::super) fn gradient_features(mixed: GpuTensor) -> GpuTensor {
+pub(in crate::ops) fn gradient_features(mixed: GpuTensor) -> GpuTensor {
     let mixed = Matrix::new(mixed);
     let output = mixed.empty(mixed.rows / 2, mixed.columns / 3);
     let width = output.width();
@@ -73,8 +73,10 @@ fn backward<N: Size>(
 }
 
 /// Gradient of the mixed gradients from these, the features and the gradient of the features.
-pub(in super::super) fn feature_gradients(arguments: [GpuTensor; 3]) -> GpuTensor {
+pub(in crate::ops) fn feature_gradients(arguments: [GpuTensor; 3]) -> GpuTensor {
     let [mixed, features, gradient] = arguments.map(Matrix::new);
+    features.assert_like([&gradient]);
+    mixed.assert_size(2 * features.rows, 3 * features.columns);
     let of_mixed = mixed.empty(mixed.rows, mixed.columns);
     let width = features.width();
     let vectors = features.columns / width;

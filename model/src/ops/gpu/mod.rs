@@ -1,8 +1,12 @@
 //! The operations as kernels for GPUs, written once in CubeCL for every graphics API and for CUDA.
 //!
-//! Every kernel reads and writes whole matrices `[rows, columns]` in row-major order, four entries at a time where the rows have
-//! a multiple of four. Sums over rows are added up block by block in a fixed order, so that results do not change from run to
-//! run.
+//! Kernels read and write whole matrices `[rows, columns]` in row-major order; those that most time goes to take four entries at
+//! a time where the rows have a multiple of four. They test their indices against the sizes of one matrix, so the functions that
+//! launch them test that the others agree. Sums over rows are added up block by block in a fixed order, so that results do not
+//! change from run to run.
+
+// Kernels take their sizes one by one, and CubeCL does not know every method of the integers.
+#![allow(clippy::too_many_arguments, clippy::manual_is_multiple_of)]
 
 mod activation;
 mod adam;
@@ -58,6 +62,18 @@ impl Matrix {
         Self { tensor, rows, columns }
     }
 
+    /// # Panics
+    /// If another matrix has other sizes; kernels do not look.
+    fn assert_like<'a>(&self, others: impl IntoIterator<Item = &'a Self>) {
+        others.into_iter().for_each(|other| other.assert_size(self.rows, self.columns));
+    }
+
+    /// # Panics
+    /// If it has other sizes; kernels do not look.
+    fn assert_size(&self, rows: usize, columns: usize) {
+        assert_eq!([self.rows, self.columns], [rows, columns], "rows and columns of an argument");
+    }
+
     /// Uninitialised memory on the device of `self`.
     fn empty(&self, rows: usize, columns: usize) -> Self {
         let tensor = empty(&self.tensor, Shape::new([rows, columns]));
@@ -85,8 +101,10 @@ fn empty(like: &GpuTensor, shape: Shape) -> GpuTensor {
     GpuTensor::new_contiguous(like.client.clone(), like.device.clone(), shape, handle, like.dtype)
 }
 
+/// All `count` entries of a tensor in row-major order.
 fn buffer(tensor: &GpuTensor, count: usize, width: usize) -> BufferArg {
-    // SAFETY: the memory of the tensor has `count` entries, and every kernel here tests its indices against its sizes.
+    assert_eq!(tensor.shape().num_elements(), count, "entries of an argument");
+    // SAFETY: the memory of the tensor has `count` entries.
     unsafe { BufferArg::from_raw_parts(tensor.handle.clone(), count / width) }
 }
 

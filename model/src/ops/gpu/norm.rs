@@ -64,7 +64,7 @@ fn launch_sums(values: &GpuTensor, partial: &GpuTensor, offset: usize, groups: u
 }
 
 /// Sum of squares `[1]` of all tensors, at least one.
-pub(in super::super) fn squared_norm(tensors: Vec<GpuTensor>) -> GpuTensor {
+pub(in crate::ops) fn squared_norm(tensors: Vec<GpuTensor>) -> GpuTensor {
     let tensors: Vec<GpuTensor> = tensors.into_iter().map(into_contiguous).collect();
     let groups =
         |tensor: &GpuTensor| tensor.shape().num_elements().div_ceil(4 * UNITS as usize).clamp(1, MOST_GROUPS);
@@ -88,7 +88,7 @@ fn scaled(values: &[f32], factor: &[f32], output: &mut [f32], count: usize) {
 }
 
 /// `values` times the only element of `factor`.
-pub(in super::super) fn scale(values: GpuTensor, factor: GpuTensor) -> GpuTensor {
+pub(in crate::ops) fn scale(values: GpuTensor, factor: GpuTensor) -> GpuTensor {
     let shape = values.shape();
     let [values, factor] = [values, factor].map(into_contiguous);
     let output = empty(&values, shape.clone());

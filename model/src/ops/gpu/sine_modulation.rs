@@ -26,8 +26,10 @@ fn forward<N: Size>(
 }
 
 /// `sin(omega·(input + bias)) ⊙ gate`: input and gate `[N,C]`, bias `[1,C]`.
-pub(in super::super) fn sine_modulation([input, bias, gate]: [GpuTensor; 3], omega: f64) -> GpuTensor {
+pub(in crate::ops) fn sine_modulation([input, bias, gate]: [GpuTensor; 3], omega: f64) -> GpuTensor {
     let [input, bias, gate] = [input, bias, gate].map(Matrix::new);
+    input.assert_like([&gate]);
+    bias.assert_size(1, input.columns);
     let output = input.empty(input.rows, input.columns);
     let width = input.width();
     let vectors = input.columns / width;
@@ -84,8 +86,10 @@ fn backward<N: Size>(
 }
 
 /// Gradients of input, bias and gate from these and the gradient of the result.
-pub(in super::super) fn sine_gradients(arguments: [GpuTensor; 4], omega: f64) -> [GpuTensor; 3] {
+pub(in crate::ops) fn sine_gradients(arguments: [GpuTensor; 4], omega: f64) -> [GpuTensor; 3] {
     let [input, bias, gate, gradient] = arguments.map(Matrix::new);
+    input.assert_like([&gate, &gradient]);
+    bias.assert_size(1, input.columns);
     let (rows, columns, width) = (input.rows, input.columns, input.width());
     let [of_input, of_gate] = [(); 2].map(|()| input.empty(rows, columns));
     let partial = input.empty(rows.div_ceil(BLOCK), columns);

@@ -45,7 +45,7 @@ fn project(
 }
 
 /// `base + scale·P(values)`; see [`skin_correction`](super::super::skin_correction()).
-pub(in super::super) fn projection(
+pub(in crate::ops) fn projection(
     [mask, values]: [GpuTensor; 2],
     base: Option<GpuTensor>,
     packing: &Packing,
@@ -54,6 +54,9 @@ pub(in super::super) fn projection(
 ) -> GpuTensor {
     let [mask, values] = [mask, values].map(Matrix::new);
     let base = base.map(Matrix::new);
+    values.assert_like(&base);
+    mask.assert_size(packing.count(), values.columns);
+    assert_eq!(packing.rows(), values.rows, "packed rows");
     let output = values.empty(values.rows, values.columns);
     for (garment, range) in packing.ranges().enumerate() {
         let (count, dim) = groups(values.client(), range.len());

@@ -23,8 +23,10 @@ fn forward(transforms: &[f32], points: &[f32], output: &mut [f32], rows: usize) 
 }
 
 /// `R_n p_n + t_n`; see [`transform_points`](super::super::transform_points()).
-pub(in super::super) fn transform_points(arguments: [GpuTensor; 2]) -> GpuTensor {
+pub(in crate::ops) fn transform_points(arguments: [GpuTensor; 2]) -> GpuTensor {
     let [transforms, points] = arguments.map(Matrix::new);
+    points.assert_size(points.rows, 3);
+    transforms.assert_size(points.rows, 12);
     let output = points.empty(points.rows, 3);
     let (count, dim) = groups(points.client(), points.rows);
     // SAFETY: units beyond the last row do nothing.
@@ -75,8 +77,11 @@ fn backward(
 }
 
 /// Gradients of transforms and points from these and the gradient of the result.
-pub(in super::super) fn transform_gradients(arguments: [GpuTensor; 3]) -> [GpuTensor; 2] {
+pub(in crate::ops) fn transform_gradients(arguments: [GpuTensor; 3]) -> [GpuTensor; 2] {
     let [transforms, points, gradient] = arguments.map(Matrix::new);
+    points.assert_size(points.rows, 3);
+    points.assert_like([&gradient]);
+    transforms.assert_size(points.rows, 12);
     let of_transforms = points.empty(points.rows, 12);
     let of_points = points.empty(points.rows, 3);
     let (count, dim) = groups(points.client(), points.rows);

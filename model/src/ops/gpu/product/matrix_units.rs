@@ -1,7 +1,7 @@
 //! Products on matrix units (tensor cores), which multiply in bf16 and add in f32.
 //!
 //! Each factor is split into a high and a low part of eight bits each, `x = h + l + O(2⁻¹⁷ x)`, and three products are added up,
-//! `l·h' + h·l' + h·h'`: the relative error of a term is below 2⁻¹⁶, in the range of f32.
+//! `l·h' + h·l' + h·h'`: the relative error of a term is below 2⁻¹⁶ for factors between 10⁻³⁶ and 3·10³⁸. Infinities make NaN.
 
 use burn_cubecl::cubecl;
 use cubecl::client::Client;
@@ -28,14 +28,18 @@ const FRAGMENTS: [usize; 2] = [TILE / PLANES[0] / FRAGMENT, TILE / PLANES[1] / F
 /// Entries between the lines of a tile, so that they start in different banks of memory.
 const PADDING: usize = 8;
 
-/// Whether a device has units for this.
+/// Bytes of shared memory: both factors' tiles in two parts, with the padding that is larger, and the bounce.
+const SHARED: usize = 4 * 2 * TILE * (DEPTH + PADDING) + 4 * UNITS / PLANE * FRAGMENT * FRAGMENT;
+
+/// Whether a device has units for this, and groups large enough.
 pub(super) fn are_in(client: &Client) -> bool {
     let [bf16, f32] = [FloatKind::BF16, FloatKind::F32].map(ElemType::Float);
     let size = FRAGMENT as u32;
     let wanted = MmaConfig { a_type: bf16, b_type: bf16, cd_type: f32, m: size, n: size, k: size };
     let hardware = &client.properties().hardware;
     let planes = [hardware.plane_size_min, hardware.plane_size_max];
-    planes == [PLANE as u32; 2] && client.features().matmul.cmma.contains(&wanted)
+    let is_large = hardware.max_shared_memory_size >= SHARED && hardware.max_units_per_cube as usize >= UNITS;
+    is_large && planes == [PLANE as u32; 2] && client.features().matmul.cmma.contains(&wanted)
 }
 
 /// How the factors lie in memory.
@@ -76,9 +80,16 @@ fn write_tile<N: Size>(
 /// To the nearest: casts of the graphics APIs may cut digits off, which costs a bit of each part and makes errors add up.
 #[cube]
 fn rounded_to_bf16<N: Size>(value: Vector<f32, N>) -> Vector<f32, N> {
-    let half = Vector::<u32, N>::new(0x8000);
-    let kept = Vector::<u32, N>::new(0xffff_0000);
-    Vector::<f32, N>::reinterpret((Vector::<u32, N>::reinterpret(value) + half) & kept)
+    let mut result = Vector::<f32, N>::empty();
+    #[unroll]
+    for lane in 0..N::value() {
+        let bits = u32::reinterpret(value.extract(lane));
+        let rounded = (bits + 0x8000) & 0xffff_0000;
+        // The carry would make a zero of a NaN whose bits are all ones.
+        let is_nan = (bits & 0x7fff_ffff) > 0x7f80_0000;
+        result.insert(lane, f32::reinterpret(select(is_nan, 0x7fc0_0000u32, rounded)));
+    }
+    result
 }
 
 /// The fragment of a tile that starts at `row` and `column`.

@@ -17,17 +17,23 @@ use factor::{Factor, Sizes};
 const ENOUGH_GROUPS: usize = 264;
 /// Terms of a sum below which cutting it further costs more than it gains.
 const SMALLEST_CHUNK: usize = 128;
+/// Both kernels' tiles divide it.
+const CHUNK_MULTIPLE: usize = 32;
 /// Rows and columns of the result that one group computes.
 const TILE: usize = 128;
 
 /// `lhs·rhs`, from matrices in memory as they are or transposed; other views are copied first.
-pub(in super::super) fn product(lhs: GpuTensor, rhs: GpuTensor) -> GpuTensor {
+///
+/// # Panics
+/// If the inner sizes differ, or a factor is empty.
+pub(in crate::ops) fn product(lhs: GpuTensor, rhs: GpuTensor) -> GpuTensor {
     let (lhs, rhs) = (Factor::new(lhs), Factor::new(rhs));
     let sizes = Sizes::new(&lhs, &rhs);
+    assert!(sizes.rows.min(sizes.columns).min(sizes.depth) > 0, "a product of an empty matrix");
     let tiles = sizes.rows.div_ceil(TILE) * sizes.columns.div_ceil(TILE);
-    let most = ENOUGH_GROUPS.div_ceil(tiles).min(sizes.depth.div_ceil(SMALLEST_CHUNK)).max(1);
-    let chunk = sizes.depth.div_ceil(most).next_multiple_of(matrix_units::DEPTH);
-    let chunks = sizes.depth.div_ceil(chunk).max(1);
+    let most = ENOUGH_GROUPS.div_ceil(tiles).min(sizes.depth.div_ceil(SMALLEST_CHUNK));
+    let chunk = sizes.depth.div_ceil(most).next_multiple_of(CHUNK_MULTIPLE);
+    let chunks = sizes.depth.div_ceil(chunk);
     let output = lhs.matrix.empty(chunks, sizes.rows * sizes.columns);
     let groups = CubeCount::Static(
         sizes.columns.div_ceil(TILE) as u32,
