@@ -79,6 +79,9 @@ fn column_sums<N: Size>(
 }
 
 /// The sum `[1,C]` of all rows of a matrix `[R,C]`.
+///
+/// # Panics
+/// If there are no rows.
 pub(super) fn total(matrix: Matrix) -> Matrix {
     match matrix.rows {
         1 => matrix,
@@ -87,7 +90,11 @@ pub(super) fn total(matrix: Matrix) -> Matrix {
 }
 
 /// The sum `[1,C]` of some rows of a matrix `[R,C]`.
+///
+/// # Panics
+/// If there are no rows.
 pub(super) fn total_of(matrix: &Matrix, rows: Range<usize>) -> Matrix {
+    assert!(!rows.is_empty(), "a sum of no rows");
     let width = matrix.width();
     let partial = matrix.empty(rows.len().div_ceil(BLOCK), matrix.columns);
     let (count, dim) = blocks(rows.len(), matrix.columns / width);

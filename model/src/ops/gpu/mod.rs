@@ -104,6 +104,7 @@ fn empty(like: &GpuTensor, shape: Shape) -> GpuTensor {
 /// All `count` entries of a tensor in row-major order.
 fn buffer(tensor: &GpuTensor, count: usize, width: usize) -> BufferArg {
     assert_eq!(tensor.shape().num_elements(), count, "entries of an argument");
+    assert!(u32::try_from(count).is_ok(), "{count} entries: kernels count them in 32 bits");
     // SAFETY: the memory of the tensor has `count` entries.
     unsafe { BufferArg::from_raw_parts(tensor.handle.clone(), count / width) }
 }

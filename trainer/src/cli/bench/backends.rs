@@ -42,6 +42,9 @@ pub struct Arguments {
     /// Largest relative difference of a parameter's gradient
     #[arg(long, default_value_t = 1e-3, value_parser = not_negative)]
     most_gradient: f64,
+    /// Largest difference of a coordinate of the drapes (m)
+    #[arg(long, default_value_t = 1e-4, value_parser = not_negative)]
+    most_position: f64,
     /// Print JSON instead of a Markdown table
     #[arg(long)]
     json: bool,
@@ -112,20 +115,25 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     }
     print_report(arguments.json, &rows, |rows| text(rows))?;
     let agrees = |row: &&Measured| {
-        row.loss_difference <= arguments.most_loss && row.gradient_difference <= arguments.most_gradient
+        row.loss_difference <= arguments.most_loss
+            && row.gradient_difference <= arguments.most_gradient
+            && row.position_difference_m <= arguments.most_position
     };
     match rows.iter().find(|row| !agrees(row)) {
         None => Ok(()),
         Some(row) => Err(miette!(
             help = "small networks and scenes agree best: --width 32 --vertices 400",
-            "{} disagrees with {}: loss by {:.2e}, the gradient of {} by {:.2e} (at most {:.0e} and {:.0e})",
+            "{} disagrees with {}: loss by {:.2e}, the gradient of {} by {:.2e}, positions by {:.2e} m (at most {:.0e}, \
+             {:.0e} and {:.0e} m)",
             row.device,
             rows[0].device,
             row.loss_difference,
             row.parameter,
             row.gradient_difference,
+            row.position_difference_m,
             arguments.most_loss,
-            arguments.most_gradient
+            arguments.most_gradient,
+            arguments.most_position
         )),
     }
 }

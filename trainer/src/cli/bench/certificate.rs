@@ -17,6 +17,7 @@ use crate::inference::networks::Networks;
 use crate::inference::tensor_store::TensorStore;
 use crate::run::checkpoint::TrainedModel;
 use crate::system::single_threaded::map_single_threaded;
+use burn::tensor::Device;
 use clap::Parser;
 use clothcombo_data::format::obj;
 use clothcombo_physics::contact::resolve::ResolveSettings;
@@ -75,13 +76,15 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let settings = arguments.post_process.settings();
     settings.check().into_diagnostic()?;
     let checkpoint = arguments.model.open()?;
+    // Before the data: a device that is not there is known at once.
+    let device = checkpoint.as_ref().map(|_| arguments.device.open()).transpose()?;
     let mut config = arguments.model.config(checkpoint.as_ref())?;
     if checkpoint.is_none() {
         // Nothing but the networks reads the eigenvectors, and most of the preparation is theirs.
         config.model.eigen_count = 1;
     }
     let dataset = load_dataset(&config)?;
-    let results = measure(arguments, &config, &dataset, checkpoint.as_ref(), &settings)?;
+    let results = measure(arguments, &config, &dataset, checkpoint.as_ref().zip(device.as_ref()), &settings)?;
     let layers = usize::from(arguments.layers);
     let mut report = summary::report(&results, layers);
     report["jobs"] = json!(arguments.jobs);
@@ -95,17 +98,16 @@ fn measure(
     arguments: &Arguments,
     config: &Config,
     dataset: &Arc<Dataset>,
-    checkpoint: Option<&TrainedModel>,
+    checkpoint: Option<(&TrainedModel, &Device)>,
     settings: &ResolveSettings,
 ) -> Result<Vec<OutfitResult>, Report> {
     let tensors;
     let networks = match checkpoint {
         None => None,
-        Some(checkpoint) => {
+        Some((checkpoint, device)) => {
             checkpoint.check_fits(dataset)?;
-            let device = arguments.device.open()?;
-            tensors = TensorStore::new(dataset.clone(), checkpoint.state.dimensions(), &device);
-            Some(Networks::new(checkpoint.networks(&device)?, &tensors))
+            tensors = TensorStore::new(dataset.clone(), checkpoint.state.dimensions(), device);
+            Some(Networks::new(checkpoint.networks(device)?, &tensors))
         }
     };
     let outfits: Vec<usize> = match arguments.only.is_empty() {

@@ -18,6 +18,7 @@ use crate::inference::reference::ReferenceScene;
 use crate::inference::tensor_store::TensorStore;
 use crate::run::checkpoint::TrainedModel;
 use crate::system::single_threaded::map_single_threaded;
+use burn::tensor::Device;
 use clap::Parser;
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use clothcombo_physics::equilibrium::SolverSettings;
@@ -83,12 +84,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     if let Some(trained) = &trained {
         check_model(arguments, trained)?;
     }
+    // Before the data: a device that is not there is known at once.
+    let device = trained.as_ref().map(|_| arguments.device.open()).transpose()?;
     let config = arguments.model.config(trained.as_ref())?;
     let dataset = load_dataset(&config)?;
     let seed = arguments.seed.unwrap_or_else(|| config.validation_seed());
     let scenes = sample_scenes(&dataset, &config, [arguments.scenes, arguments.layers], seed)?;
-    let drape = |trained| drape(arguments, trained, &config, &dataset, &scenes);
-    let drapes = trained.as_ref().map(drape).transpose()?;
+    let drape = |(trained, device)| drape(arguments, (trained, device), &config, &dataset, &scenes);
+    let drapes = trained.as_ref().zip(device.as_ref()).map(drape).transpose()?;
     let errors = solve_all(arguments, &config, &scenes, drapes.as_deref(), &settings)?;
     print_report(arguments.json, &Summary::new(errors, &settings), Summary::tables)
 }
@@ -132,15 +135,14 @@ fn sample_scenes(
 
 fn drape(
     arguments: &Arguments,
-    trained: &TrainedModel,
+    (trained, device): (&TrainedModel, &Device),
     config: &Config,
     dataset: &Arc<Dataset>,
     scenes: &[PreparedScene],
 ) -> Result<Vec<Drapes>, Report> {
     trained.check_fits(dataset)?;
-    let device = arguments.device.open()?;
-    let tensors = TensorStore::new(dataset.clone(), trained.state.dimensions(), &device);
-    let networks = Networks::new(trained.networks(&device)?, &tensors);
+    let tensors = TensorStore::new(dataset.clone(), trained.state.dimensions(), device);
+    let networks = Networks::new(trained.networks(device)?, &tensors);
     let post_processor = PostProcessor::new(dataset, &config.losses, Some(&networks));
     let post_process = ResolveSettings { steps: CONTINUATION_STEPS, ..ResolveSettings::default() };
     let bar = progress_bar(scenes.len(), "draping {bar:30} {pos}/{len} · {eta} left");

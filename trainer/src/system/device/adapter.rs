@@ -5,6 +5,8 @@ use std::fmt;
 
 /// What an adapter is, best first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+// CUDA knows graphics cards only.
+#[cfg_attr(not(feature = "wgpu"), allow(dead_code))]
 pub(super) enum AdapterKind {
     /// A graphics card.
     Discrete,
@@ -20,6 +22,7 @@ pub(super) enum AdapterKind {
 
 impl AdapterKind {
     /// Whether `--device auto` may take it.
+    #[cfg_attr(not(feature = "wgpu"), allow(dead_code))]
     pub(super) fn is_hardware(self) -> bool {
         matches!(self, Self::Discrete | Self::Integrated)
     }

@@ -62,6 +62,8 @@ struct Entered(Instant);
 impl<S: Subscriber + for<'a> LookupSpan<'a>, F: Fn() + Send + Sync + 'static> Layer<S> for SpanClock<F> {
     fn on_enter(&self, id: &Id, context: Context<'_, S>) {
         if let Some(span) = context.span(id) {
+            // What was asked of the device before is not this span's.
+            (self.settle)();
             span.extensions_mut().replace(Entered(Instant::now()));
         }
     }

@@ -19,6 +19,10 @@ const ENOUGH_GROUPS: usize = 264;
 const SMALLEST_CHUNK: usize = 128;
 /// Both kernels' tiles divide it.
 const CHUNK_MULTIPLE: usize = 32;
+const _: () = assert!(CHUNK_MULTIPLE % matrix_units::DEPTH == 0 && CHUNK_MULTIPLE % plain::DEPTH == 0);
+/// Entries of a result beyond which its tiles keep a GPU busy anyway, and adding up chunks would need more groups along a
+/// dimension than the graphics APIs grant (65,535, for 32 entries each).
+const LARGEST_CHUNKED: usize = 32 * 65_535;
 /// Rows and columns of the result that one group computes.
 const TILE: usize = 128;
 
@@ -31,7 +35,10 @@ pub(in crate::ops) fn product(lhs: GpuTensor, rhs: GpuTensor) -> GpuTensor {
     let sizes = Sizes::new(&lhs, &rhs);
     assert!(sizes.rows.min(sizes.columns).min(sizes.depth) > 0, "a product of an empty matrix");
     let tiles = sizes.rows.div_ceil(TILE) * sizes.columns.div_ceil(TILE);
-    let most = ENOUGH_GROUPS.div_ceil(tiles).min(sizes.depth.div_ceil(SMALLEST_CHUNK));
+    let most = match sizes.rows * sizes.columns {
+        ..=LARGEST_CHUNKED => ENOUGH_GROUPS.div_ceil(tiles).min(sizes.depth.div_ceil(SMALLEST_CHUNK)),
+        _ => 1,
+    };
     let chunk = sizes.depth.div_ceil(most).next_multiple_of(CHUNK_MULTIPLE);
     let chunks = sizes.depth.div_ceil(chunk);
     let output = lhs.matrix.empty(chunks, sizes.rows * sizes.columns);

@@ -1,4 +1,4 @@
-//! Products on any GPU: every unit adds up 8×8 entries of its group's tile in registers.
+//! Products without matrix units: every unit adds up 8×8 entries of its group's tile in registers.
 
 use burn_cubecl::cubecl;
 use cubecl::prelude::*;
@@ -7,7 +7,7 @@ use super::factor::{Factor, Sizes};
 use super::{Matrix, TILE};
 
 /// Terms of the sum that a tile holds.
-const DEPTH: usize = 16;
+pub(super) const DEPTH: usize = 16;
 /// Units of a group, and of a line of them.
 const UNITS: usize = 256;
 const LINE: usize = 16;
