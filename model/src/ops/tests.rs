@@ -1,5 +1,7 @@
 //! Every fused operation against its composed form, which burn differentiates: values and all gradients; and against finite
-//! differences in f64 where the composed form itself could be wrong.
+//! differences in f64 where the composed form itself could be wrong. `exact` holds the kernels against f64 at many sizes.
+//!
+//! A build with `--no-default-features --features wgpu` tests the kernels of GPUs.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -16,6 +18,8 @@ use super::transform_points::{TransformGradients, TransformPoints};
 use super::*;
 use crate::packing::Packing;
 use crate::testing::{assert_close, device, gradients_of, uniform};
+
+mod exact;
 
 const ROWS: usize = 70;
 const ACTIVATIONS: [Activation; 3] = [Activation::Identity, Activation::Relu, Activation::Gelu];
@@ -260,6 +264,27 @@ fn gelu_gradient_matches_finite_differences() {
     }
 }
 
+/// A repeated run gives the same bits: an exact resume depends on it.
+#[test]
+fn results_are_the_same_every_time() {
+    let device = device();
+    let inputs = [random(900, 70, &device), random(70, 9, &device), random(1, 9, &device)];
+    let run = || {
+        gradients_of(&inputs, |[input, weight, bias]| {
+            activate(Activation::Gelu, product(input, weight), bias)
+        })
+    };
+    let (output, gradients) = run();
+    for _ in 0..3 {
+        let (other_output, other_gradients) = run();
+        assert_close(&output, &other_output, 0.0);
+        for (gradient, other) in gradients.iter().zip(&other_gradients) {
+            assert_close(gradient, other, 0.0);
+        }
+    }
+}
+
+#[cfg(any(feature = "flex", feature = "ndarray"))]
 #[test]
 fn results_do_not_depend_on_the_number_of_threads() {
     let device = device();
