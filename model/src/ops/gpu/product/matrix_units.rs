@@ -76,9 +76,12 @@ fn write_tile<N: Size>(
 /// To the nearest: casts of the graphics APIs may cut digits off, which costs a bit of each part and makes errors add up.
 #[cube]
 fn rounded_to_bf16<N: Size>(value: Vector<f32, N>) -> Vector<f32, N> {
-    let half = Vector::<u32, N>::new(0x8000);
-    let kept = Vector::<u32, N>::new(0xffff_0000);
-    Vector::<f32, N>::reinterpret((Vector::<u32, N>::reinterpret(value) + half) & kept)
+    let bits = Vector::<u32, N>::reinterpret(value);
+    let most = Vector::<u32, N>::new(0x7fff_ffff);
+    // The NaN that NVIDIA's units make has all these bits: one more would carry into the sign and leave a zero.
+    let magnitude = clamp_max((bits & most) + Vector::<u32, N>::new(0x8000), most);
+    let sign = bits & Vector::<u32, N>::new(0x8000_0000);
+    Vector::<f32, N>::reinterpret((magnitude & Vector::<u32, N>::new(0x7fff_0000)) | sign)
 }
 
 /// The fragment of a tile that starts at `row` and `column`.
