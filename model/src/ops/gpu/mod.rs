@@ -4,6 +4,11 @@
 //! a multiple of four. Sums over rows are added up block by block in a fixed order, so that results do not change from run to
 //! run.
 
+// A kernel takes its buffers and sizes one by one.
+#![allow(clippy::too_many_arguments)]
+// CubeCL knows `%`, but not `is_multiple_of`.
+#![allow(clippy::manual_is_multiple_of)]
+
 mod activation;
 mod adam;
 mod blend;
