@@ -9,7 +9,7 @@
 # training    all four stages of configs/smoke.toml, five tiny steps of each, with checkpoints
 # resume      again from the checkpoint after ten of those steps: the same networks, bit for bit
 #
-# Builds in target-gpu, most of an hour on two busy cores: that is why CI does not run this. wgpu takes the first adapter it
+# Builds in target-gpu, about an hour on two busy cores: that is why CI does not run this. wgpu takes the first adapter it
 # finds; without a GPU that may be Mesa's software one (Debian: mesa-vulkan-drivers libvulkan1), which wants the sizes here and
 # WGSL: the SPIR-V of the feature vulkan crashes it.
 #
@@ -102,16 +102,16 @@ for feature in ${features//,/ }; do
     esac
     if [[ $feature =~ ^(wgpu|vulkan|cuda)$ ]]; then
         if [ -n "$built" ] && [ -z "${KERNEL_TESTS:-}" ]; then
-            echo "$feature, kernels: left out, KERNEL_TESTS is unset"
+            echo "$feature kernels: left out, KERNEL_TESTS is unset"
         else
-            check "$feature, kernels" kernels "$feature"
+            check "$feature kernels" kernels "$feature"
         fi
     fi
     [[ " $devices " == *" $device "* ]] || devices="$devices $device"
 done
 for device in $devices; do
-    check "$device, agreement" agreement "$device"
-    check "$device, training" training "$device"
-    check "$device, resume" resume "$device"
+    check "$device agreement" agreement "$device"
+    check "$device training" training "$device"
+    check "$device resume" resume "$device"
 done
 [ -z "$failed" ] || { echo "failed: ${failed#, }"; exit 1; }
