@@ -14,7 +14,8 @@ use crate::testing::{device, uniform};
 /// A result, relative to its largest entry.
 const OUTPUT: f64 = 2e-6;
 /// A product of matrices. Matrix units, which builds for GPUs use where there are some, keep 2⁻¹⁵ of every term.
-const PRODUCT: f64 = if cfg!(any(feature = "vulkan", feature = "cuda")) { 1.0 / 32_768.0 } else { 2e-6 };
+pub(super) const PRODUCT: f64 =
+    if cfg!(any(feature = "vulkan", feature = "cuda")) { 1.0 / 32_768.0 } else { 2e-6 };
 /// A sum over many rows.
 const SUM: f64 = 1e-5;
 
