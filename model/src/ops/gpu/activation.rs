@@ -171,7 +171,8 @@ pub(in crate::ops) fn activated_sum_gradients(
     let gradient = Matrix::new(gradient);
     let rows = if sum.len() > 1 { sum.pop() } else { None }.map(Matrix::new);
     let matrices: Vec<Matrix> = sum.into_iter().map(Matrix::new).collect();
-    let Some(first) = matrices.first() else {
+    // The slope of identity is one wherever it is taken.
+    let Some(first) = matrices.first().filter(|_| activation != Activation::Identity) else {
         let of_rows = packing.ranges().map(|rows| total_of(&gradient, rows).tensor).collect();
         return (gradient.tensor, of_rows);
     };

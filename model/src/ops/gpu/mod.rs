@@ -7,6 +7,10 @@
 
 // Kernels take their sizes one by one, and CubeCL does not know every method of the integers.
 #![allow(clippy::too_many_arguments, clippy::manual_is_multiple_of)]
+// A kernel takes its buffers and sizes one by one.
+#![allow(clippy::too_many_arguments)]
+// CubeCL knows `%`, but not `is_multiple_of`.
+#![allow(clippy::manual_is_multiple_of)]
 
 mod activation;
 mod adam;
