@@ -30,20 +30,29 @@
 # The first use of a GPU compiles its kernels, and CUBECL_AUTOTUNE_LEVEL=minimal (the default here) keeps the search for the
 # fastest ones short.
 set -uo pipefail
-case ${1:--h} in
+usage() {
+    echo "$1; see scripts/gpu_check.sh -h" >&2
+    exit 2
+}
+case ${1:-} in
+    "" | -[!h]*) usage "name a folder for the report" ;;
     -h | --help) sed -n '2,/^set /{/^set /d;s/^# \{0,1\}//;p}' "$0"; exit 0 ;;
 esac
-mkdir -p "$1"
-out=$(cd "$1" && pwd)
+out=$(mkdir -p "$1" && cd "$1" && pwd) || usage "cannot make the folder $1"
 for name in CLOTHCOMBO CLOTHCOMBO_TRAIN; do
-    [ -z "${!name:-}" ] || printf -v "$name" %s "$(realpath "${!name}")"
+    [ -n "${!name:-}" ] || continue
+    [ -x "${!name}" ] || usage "$name=${!name} is no program"
+    printf -v "$name" %s "$(realpath "${!name}")"
 done
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 device=${DEVICE:-wgpu} torch_device=${TORCH_DEVICE:-cuda} size=${SIZE:-full} python=${PYTHON:-python3}
 stages=${STAGES:-1 2 3 4 5 6 7}
 work=${WORK:-$out/work}
-mkdir -p "$work"
-work=$(cd "$work" && pwd)
+work=$(mkdir -p "$work" && cd "$work" && pwd) || usage "cannot make the folder $work"
+[[ $size = full || $size = tiny ]] || usage "SIZE=$size is neither full nor tiny"
+[[ $stages =~ ^[1-7](\ [1-7])*$ ]] || usage "STAGES=$stages are not some of 1 2 3 4 5 6 7"
+[[ ${LIMIT:-480} =~ ^[0-9]+$ ]] || usage "LIMIT=$LIMIT is no number of seconds"
+command -v "$python" >/dev/null || usage "PYTHON=$python is no program"
 cache=(--set "data.cache.folder=$work/cache")
 export LC_ALL=C CUBECL_AUTOTUNE_LEVEL=${CUBECL_AUTOTUNE_LEVEL:-minimal}
 
@@ -181,9 +190,11 @@ resume() {
     limited "$train" --config configs/smoke.toml --device "$device" --run-dir "$run" --quiet "${few[@]}" "${cache[@]}" \
         --set validation.single_scenes=1 --set validation.unseen_scenes=0 --set validation.layered_scenes=1 \
         --set output.checkpoint_every=10 --set output.keep_checkpoints=9 --set output.sample_scenes=1 || return
-    cp "$run/checkpoints/step-00000020/model.safetensors" "$work/uninterrupted.safetensors"
+    # Where the time is up a training saves, and ends well.
+    cp "$run/checkpoints/step-00000020/model.safetensors" "$work/uninterrupted.safetensors" || return
+    rm -r "$run/checkpoints/step-00000020"
     limited "$train" --resume "$run/checkpoints/step-00000010" --device "$device" --quiet || return
-    cp "$run/checkpoints/step-00000020/model.safetensors" "$work/resumed.safetensors"
+    cp "$run/checkpoints/step-00000020/model.safetensors" "$work/resumed.safetensors" || return
     cmp "$work/uninterrupted.safetensors" "$work/resumed.safetensors"
 }
 

@@ -36,6 +36,13 @@ impl Verbosity {
             (false, 1) => "info,clothcombo_trainer=debug",
             (false, _) => "debug",
         };
+        // Hundreds of thousands of lines about the kernels of a GPU; RUST_LOG brings them back.
+        let default = match self.quiet {
+            true => default.to_owned(),
+            false => format!(
+                "{default},naga=warn,wgpu_core=warn,wgpu_hal=warn,cubecl_wgpu=warn,cubecl_runtime=warn"
+            ),
+        };
         let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(default));
         // What it warns of, characters that the font of the pictures lacks, is seen in the pictures as boxes.
         let filter = filter.add_directive("usvg=error".parse().expect("it is a directive"));

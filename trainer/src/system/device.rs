@@ -25,8 +25,15 @@ pub const HAS_GPU_BACKEND: bool = cfg!(any(feature = "wgpu", feature = "cuda"));
 /// What burn's usual backend for the processor is called.
 pub const FLEX: &str = "processor (flex)";
 
-/// Names of the GPUs opened so far: burn tells them only of a device that it opens.
-static OPENED: Mutex<Vec<(Device, String)>> = Mutex::new(Vec::new());
+/// A GPU that was opened: burn tells nothing of one that it has not opened itself.
+struct Opened {
+    device: Device,
+    name: String,
+    /// Largest memory that a kernel can be given at once (bytes), where the device has such a limit.
+    largest_buffer: Option<u64>,
+}
+
+static OPENED: Mutex<Vec<Opened>> = Mutex::new(Vec::new());
 
 /// The device of everything that names none: the processor, or in a build without it the GPU that burn takes first. It has
 /// no automatic differentiation.
@@ -86,9 +93,31 @@ pub fn name(device: &Device) -> String {
     }
 }
 
+/// What `read` finds of a GPU that was opened.
+fn opened<T>(device: &Device, read: impl FnOnce(&Opened) -> T) -> Option<T> {
+    let all = OPENED.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    all.iter().find(|opened| opened.device == *device).map(read)
+}
+
 fn opened_name(device: &Device) -> Option<String> {
-    let opened = OPENED.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-    opened.iter().find(|(other, _)| other == device).map(|(_, name)| name.clone())
+    opened(device, |opened| opened.name.clone())
+}
+
+#[cfg(any(feature = "wgpu", feature = "cuda"))]
+fn remember(opened: Opened) {
+    OPENED.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).push(opened);
+}
+
+/// Refuses what needs a tensor of more `bytes` than a kernel on `device` (with or without automatic differentiation) can read.
+///
+/// # Errors
+/// When it does.
+pub fn check_largest(device: &Device, bytes: u64) -> Result<(), DeviceError> {
+    let device = device.clone().inner();
+    match opened(&device, |opened| opened.largest_buffer).flatten() {
+        Some(limit) if bytes > limit => Err(DeviceError::TooLarge { device: name(&device), bytes, limit }),
+        _ => Ok(()),
+    }
 }
 
 /// Keeps burn from opening a GPU for a run on the processor: it reads Adam's moments on its own default device, which in a

@@ -1,6 +1,7 @@
 //! What one step keeps of the networks and energies for its backward pass, counted from their operations.
 
 use crate::config::{Config, StageConfig, Trains};
+use crate::dataset::sizes::DataSizes;
 
 // Values per vertex and channel, as the operations in `clothcombo_model` keep them.
 
@@ -33,6 +34,17 @@ pub(super) fn of_scene(
 ) -> f64 {
     let embedding = if stage.trains.freezes() { 0.0 } else { per_embedded_vertex(config) };
     4.0 * MARGIN * (embedding * embedded as f64 + per_vertex(config, stage, joints) * vertices as f64)
+}
+
+/// Bytes of the largest tensor of a step: the product of all modulator layers with the z_v of the largest outfit, or the mixed
+/// gradients of its largest garment.
+pub fn largest_tensor(config: &Config, sizes: &DataSizes) -> u64 {
+    let m = &config.model;
+    let layers = config.stages.iter().map(|stage| stage.layers[1]).max().unwrap_or(1);
+    let outfit = sizes.largest(layers);
+    let modulator = outfit.iter().sum::<usize>() * m.siren_layers * m.siren_width;
+    let gradients = outfit.first().map_or(0, |largest| largest * 2 * 3 * m.diffusion_width);
+    4 * modulator.max(gradients) as u64
 }
 
 /// Values per vertex of the embedding network.

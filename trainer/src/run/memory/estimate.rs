@@ -147,6 +147,7 @@ impl MemoryEstimate {
 mod tests {
     use super::*;
     use crate::config::parse;
+    use crate::run::memory::largest_tensor;
     use std::path::Path;
 
     fn paper(more: &[&str]) -> Config {
@@ -168,6 +169,7 @@ mod tests {
         assert!(gpu.host() < 60 * GIB && gpu.device() < 22 * GIB, "{gpu:?}");
         assert!(gpu.all_garments > 35 * GIB && gpu.all_tensors > 100 * GIB, "{gpu:?}");
         assert!(gpu.step > 8 * GIB, "six garments of 8,000 vertices at width 512: {gpu:?}");
+        assert_eq!(largest_tensor(&config, &sizes), 6 * 8000 * 6 * 512 * 4);
         let cpu = MemoryEstimate::new(&config, &sizes, PARAMETERS, true);
         assert!(cpu.peak() < 60 * GIB && cpu.garments + cpu.tensors < 2 * GIB, "{cpu:?}");
     }

@@ -3,4 +3,5 @@
 mod activations;
 mod estimate;
 
+pub use activations::largest_tensor;
 pub use estimate::MemoryEstimate;

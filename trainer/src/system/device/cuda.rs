@@ -1,7 +1,7 @@
 //! NVIDIA's GPUs, as CUDA numbers them.
 
 use super::adapter::{Adapter, AdapterKind, numbered};
-use super::{DeviceError, OPENED, opened_name};
+use super::{DeviceError, Opened, opened_name, remember};
 use burn::tensor::{Device, DeviceType};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -33,7 +33,7 @@ fn open_numbered(index: usize) -> Result<Device, DeviceError> {
     })?;
     let name = identity.map(|identity| identity.name).unwrap_or_default();
     let name = format!("{name} (cuda:{index})");
-    OPENED.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).push((device.clone(), name));
+    remember(Opened { device: device.clone(), name, largest_buffer: None });
     Ok(device)
 }
 

@@ -42,4 +42,21 @@ pub enum DeviceError {
         /// What the driver says.
         reason: String,
     },
+    /// A tensor is larger than the device's kernels can read.
+    #[error(
+        "the largest outfit needs a tensor of {} MiB, and {device} grants {} MiB at once",
+        bytes.div_ceil(1 << 20),
+        limit >> 20
+    )]
+    #[diagnostic(help(
+        "fewer garments per outfit (layers) or vertices, a smaller model.siren_width, or --device flex"
+    ))]
+    TooLarge {
+        /// The device as it is named.
+        device: String,
+        /// Size of the tensor (bytes).
+        bytes: u64,
+        /// The most that the device grants (bytes).
+        limit: u64,
+    },
 }

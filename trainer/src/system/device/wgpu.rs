@@ -1,7 +1,7 @@
 //! The adapters of WebGPU, all of the one graphics API that burn settles on: on Linux Vulkan where it has any.
 
 use super::adapter::{Adapter, AdapterKind, numbered};
-use super::{DeviceError, OPENED, opened_name};
+use super::{DeviceError, Opened, opened_name, remember};
 use burn::tensor::wgpu::WgpuInitError;
 use burn::tensor::{Device, DeviceKind, DeviceType};
 
@@ -55,15 +55,26 @@ fn open_selected(index: usize, selector: &DeviceKind) -> Result<Device, DeviceEr
     if opened_name(&device).is_some() {
         return Ok(device);
     }
-    let name = match Device::wgpu_options().device_kind(selector.clone()).init_with_setup() {
+    let (name, largest_buffer) = match Device::wgpu_options().device_kind(selector.clone()).init_with_setup()
+    {
         Ok((_, setup)) => {
             let adapter = setup.adapter.get_info();
-            format!("{} (wgpu:{index}, {:?})", adapter.name, adapter.backend)
+            let api = format!("{:?}", adapter.backend);
+            // What burn falls back to without a driver of the other APIs: slow, and never tried.
+            if api == "Gl" {
+                return Err(DeviceError::CannotOpen {
+                    device: format!("wgpu:{index}"),
+                    reason: format!("{} is there through OpenGL only; {HINT}", adapter.name),
+                });
+            }
+            let limits = setup.device.limits();
+            let largest = limits.max_buffer_size.min(limits.max_storage_buffer_binding_size);
+            (format!("{} (wgpu:{index}, {api})", adapter.name), Some(largest))
         }
         // A tensor has opened it before.
         Err(WgpuInitError::Registration { .. }) => {
             let identity = device.identity().map(|identity| identity.name);
-            format!("{} (wgpu:{index})", identity.unwrap_or_default())
+            (format!("{} (wgpu:{index})", identity.unwrap_or_default()), None)
         }
         Err(error) => {
             return Err(DeviceError::CannotOpen {
@@ -72,7 +83,7 @@ fn open_selected(index: usize, selector: &DeviceKind) -> Result<Device, DeviceEr
             });
         }
     };
-    OPENED.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).push((device.clone(), name));
+    remember(Opened { device: device.clone(), name, largest_buffer });
     Ok(device)
 }
 

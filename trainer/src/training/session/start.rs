@@ -2,13 +2,15 @@
 
 use super::Session;
 use crate::config::Config;
+use crate::dataset::sizes::DataSizes;
 use crate::dataset::{Dataset, is_fingerprint};
 use crate::evaluation::ValidationSet;
 use crate::inference::tensor_store::TensorStore;
 use crate::run::checkpoint::{Checkpoint, CheckpointState, TrainedModel};
 use crate::run::folder::{RunDir, differing_keys};
+use crate::run::memory::largest_tensor;
 use crate::run::observer::moved;
-use crate::system::device::name;
+use crate::system::device::{check_largest, name};
 use crate::training::average::Average;
 use crate::training::guard::Guard;
 use crate::training::learner::{Learner, new_optimizer};
@@ -27,6 +29,7 @@ impl Session {
     /// # Errors
     /// When the networks cannot be made, or the model they start from does not fit.
     pub fn new(run: RunDir, config: Config, dataset: Arc<Dataset>, device: &Device) -> Result<Self, Report> {
+        check_largest(device, largest_tensor(&config, &DataSizes::of(&dataset)))?;
         let device = device.clone().autodiff();
         let model = match &config.init_from {
             None => ClothCombo::new(&config.model, &dataset.dimensions(), config.seed, &device)
@@ -61,6 +64,7 @@ impl Session {
         device: &Device,
         checkpoint: &Checkpoint,
     ) -> Result<Self, Report> {
+        check_largest(device, largest_tensor(&config, &DataSizes::of(&dataset)))?;
         let device = device.clone().autodiff();
         let expected = CheckpointState::of(&dataset, 0);
         let found = &checkpoint.state;
