@@ -5,8 +5,6 @@
 //! launch them test that the others agree. Sums over rows are added up block by block in a fixed order, so that results do not
 //! change from run to run.
 
-// Kernels take their sizes one by one, and CubeCL does not know every method of the integers.
-#![allow(clippy::too_many_arguments, clippy::manual_is_multiple_of)]
 // A kernel takes its buffers and sizes one by one.
 #![allow(clippy::too_many_arguments)]
 // CubeCL knows `%`, but not `is_multiple_of`.
