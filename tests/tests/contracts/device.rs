@@ -81,12 +81,12 @@ fn a_checkpoint_of_another_device_goes_on_with_a_note_and_loses_nothing() {
         (std::fs::read(last.path.join("model.safetensors")).unwrap(), log)
     };
     let (same, quiet) = end_of("same", None);
-    let (moved, told) = end_of("moved", Some("Some GPU (wgpu:7, Vulkan)"));
+    let (moved, noted) = end_of("moved", Some("Some GPU (wgpu:7, Vulkan)"));
     assert!(same == moved, "where a checkpoint is from changes no number");
     let note = format!(
         "device: {}; the checkpoint was computed on Some GPU (wgpu:7, Vulkan): the run goes on, its last bits may differ",
         name(&device)
     );
-    assert!(told.contains(&note), "{told}");
+    assert!(noted.contains(&note), "{noted}");
     assert!(!quiet.contains("may differ"), "{quiet}");
 }

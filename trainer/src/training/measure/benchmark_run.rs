@@ -235,7 +235,7 @@ impl BenchmarkRun {
         Ok((computed.loss, named.found))
     }
 
-    /// Waits until the device has computed everything: a GPU is only told what to do.
+    /// Waits until the device has computed everything: a GPU gets its work and computes later.
     fn settle(&self) -> Result<(), Report> {
         self.device.sync().map_err(|error| miette!("{error:?}"))
     }
