@@ -37,6 +37,13 @@ impl Factor {
     }
 }
 
+/// Which factors lie transposed in memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) struct Transposed {
+    pub(super) lhs: bool,
+    pub(super) rhs: bool,
+}
+
 /// Rows and columns of a product, and the terms of each of its sums.
 #[derive(Clone, Copy)]
 pub(super) struct Sizes {

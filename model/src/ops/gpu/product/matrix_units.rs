@@ -12,8 +12,8 @@ use cubecl::ir::{ElemType, FloatKind};
 use cubecl::prelude::*;
 use half::bf16;
 
-use super::factor::{Factor, Sizes, read_tile};
-use super::{Matrix, TILE};
+use super::factor::{Transposed, read_tile};
+use super::{TILE, UNITS};
 
 /// Terms of the sum that a tile holds.
 pub(super) const DEPTH: usize = 32;
@@ -23,7 +23,7 @@ const FRAGMENT: usize = 16;
 const PLANE: usize = 32;
 /// Planes of a group, along rows and columns of its tile.
 const PLANES: [usize; 2] = [2, 4];
-const UNITS: usize = PLANES[0] * PLANES[1] * PLANE;
+const _: () = assert!(PLANES[0] * PLANES[1] * PLANE == UNITS);
 /// Fragments of the result that a plane computes, along rows and columns.
 const FRAGMENTS: [usize; 2] = [TILE / PLANES[0] / FRAGMENT, TILE / PLANES[1] / FRAGMENT];
 /// Entries between the lines of a tile, so that they start in different banks of memory.
@@ -41,13 +41,6 @@ pub(super) fn are_in(client: &Client) -> bool {
     let planes = [hardware.plane_size_min, hardware.plane_size_max];
     let is_large = hardware.max_shared_memory_size >= SHARED && hardware.max_units_per_cube as usize >= UNITS;
     is_large && planes == [PLANE as u32; 2] && client.features().matmul.cmma.contains(&wanted)
-}
-
-/// How the factors lie in memory.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-struct Transposed {
-    lhs: bool,
-    rhs: bool,
 }
 
 /// The lines of a tile in memory, and the entries of each.
@@ -114,8 +107,9 @@ fn fragment<N: Size>(
     result
 }
 
+/// Writes the sums over every chunk of terms to a row of `output`.
 #[cube(launch_unchecked)]
-fn multiply<N: Size>(
+pub(super) fn multiply<N: Size>(
     lhs: &[Vector<f32, N>],
     rhs: &[Vector<f32, N>],
     output: &mut [f32],
@@ -299,35 +293,6 @@ fn read_factors<N: Size>(
         read_tile::<N>(rhs, rhs_registers, unit, column_start, columns, at, end, depth, DEPTH, count, UNITS);
     } else {
         read_tile::<N>(rhs, rhs_registers, unit, at, end, column_start, columns, columns, TILE, count, UNITS);
-    }
-}
-
-/// Writes the sums over every chunk of terms to a row of `output`.
-pub(super) fn launch(
-    groups: CubeCount,
-    lhs: &Factor,
-    rhs: &Factor,
-    output: &Matrix,
-    sizes: Sizes,
-    chunk: usize,
-) {
-    let width = lhs.matrix.width().min(rhs.matrix.width());
-    // SAFETY: entries outside of the factors are zeros that are not read, and none outside of the result is written.
-    unsafe {
-        multiply::launch_unchecked(
-            output.client(),
-            groups,
-            CubeDim::new_1d(UNITS as u32),
-            width,
-            lhs.matrix.argument(width),
-            rhs.matrix.argument(width),
-            output.argument(1),
-            sizes.rows,
-            sizes.columns,
-            sizes.depth,
-            chunk,
-            Transposed { lhs: lhs.transposed, rhs: rhs.transposed },
-        );
     }
 }
 

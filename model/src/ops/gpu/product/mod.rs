@@ -11,7 +11,7 @@ use burn_cubecl::cubecl;
 use cubecl::prelude::*;
 
 use super::{GpuTensor, Matrix};
-use factor::{Factor, Sizes};
+use factor::{Factor, Sizes, Transposed};
 
 /// Groups that keep a large GPU busy: two on each of its 132 multiprocessors.
 const ENOUGH_GROUPS: usize = 264;
@@ -23,6 +23,8 @@ const _: () = assert!(CHUNK_MULTIPLE % matrix_units::DEPTH == 0 && CHUNK_MULTIPL
 /// Entries of a result beyond which its tiles keep a GPU busy anyway, and adding up chunks would need more groups along a
 /// dimension than the graphics APIs grant (65,535, for 32 entries each).
 const LARGEST_CHUNKED: usize = 32 * 65_535;
+/// Units of a group, of either kernel.
+const UNITS: usize = 256;
 /// Rows and columns of the result that one group computes.
 const TILE: usize = 128;
 
@@ -47,9 +49,27 @@ pub(in crate::ops) fn product(lhs: GpuTensor, rhs: GpuTensor) -> GpuTensor {
         sizes.rows.div_ceil(TILE) as u32,
         chunks as u32,
     );
-    match matrix_units::are_in(lhs.matrix.client()) {
-        true => matrix_units::launch(groups, &lhs, &rhs, &output, sizes, chunk),
-        false => plain::launch(groups, &lhs, &rhs, &output, sizes, chunk),
+    let multiply = match matrix_units::are_in(output.client()) {
+        true => matrix_units::multiply::launch_unchecked,
+        false => plain::multiply::launch_unchecked,
+    };
+    let width = lhs.matrix.width().min(rhs.matrix.width());
+    // SAFETY: entries outside of the factors are zeros that are not read, and none outside of the result is written.
+    unsafe {
+        multiply(
+            output.client(),
+            groups,
+            CubeDim::new_1d(UNITS as u32),
+            width,
+            lhs.matrix.argument(width),
+            rhs.matrix.argument(width),
+            output.argument(1),
+            sizes.rows,
+            sizes.columns,
+            sizes.depth,
+            chunk,
+            Transposed { lhs: lhs.transposed, rhs: rhs.transposed },
+        );
     }
     let sum = super::column_sums::total(output).tensor;
     GpuTensor::new_contiguous(

@@ -3,13 +3,12 @@
 use burn_cubecl::cubecl;
 use cubecl::prelude::*;
 
-use super::factor::{Factor, Sizes};
-use super::{Matrix, TILE};
+use super::factor::Transposed;
+use super::{TILE, UNITS};
 
 /// Terms of the sum that a tile holds.
 pub(super) const DEPTH: usize = 16;
-/// Units of a group, and of a line of them.
-const UNITS: usize = 256;
+/// Units of a line of a group.
 const LINE: usize = 16;
 /// Units that read one factor; the others read the other one.
 const READERS: usize = UNITS / 2;
@@ -92,8 +91,9 @@ fn write_block(
     }
 }
 
+/// Writes the sums over every chunk of terms to a row of `output`.
 #[cube(launch_unchecked)]
-fn multiply<N: Size>(
+pub(super) fn multiply<N: Size>(
     lhs: &[Vector<f32, N>],
     rhs: &[Vector<f32, N>],
     output: &mut [f32],
@@ -101,8 +101,7 @@ fn multiply<N: Size>(
     columns: usize,
     depth: usize,
     chunk: usize,
-    #[comptime] lhs_transposed: bool,
-    #[comptime] rhs_transposed: bool,
+    #[comptime] transposed: Transposed,
 ) {
     let mut lhs_tile =
         Shared::<[Vector<f32, Const<4>>]>::new_aligned_slice(comptime!(DEPTH * PITCH), 16usize);
@@ -134,15 +133,14 @@ fn multiply<N: Size>(
         depth,
         at,
         end,
-        lhs_transposed,
-        rhs_transposed,
+        transposed,
     );
     while at < end {
         sync_cube();
         if unit < READERS {
-            write_block(&block, &mut lhs_tile, unit, !lhs_transposed);
+            write_block(&block, &mut lhs_tile, unit, !transposed.lhs);
         } else {
-            write_block(&block, &mut rhs_tile, unit - READERS, rhs_transposed);
+            write_block(&block, &mut rhs_tile, unit - READERS, transposed.rhs);
         }
         sync_cube();
         at += DEPTH;
@@ -159,8 +157,7 @@ fn multiply<N: Size>(
                 depth,
                 at,
                 end,
-                lhs_transposed,
-                rhs_transposed,
+                transposed,
             );
         }
         #[unroll]
@@ -215,45 +212,14 @@ fn read_factors<N: Size>(
     depth: usize,
     at: usize,
     end: usize,
-    #[comptime] lhs_transposed: bool,
-    #[comptime] rhs_transposed: bool,
+    #[comptime] transposed: Transposed,
 ) {
     let unit = UNIT_POS as usize;
     if unit < READERS {
-        let pitch = if comptime!(lhs_transposed) { rows } else { depth };
-        read_block::<N>(lhs, block, unit, row_start, rows, at, end, !lhs_transposed, pitch);
+        let pitch = if comptime!(transposed.lhs) { rows } else { depth };
+        read_block::<N>(lhs, block, unit, row_start, rows, at, end, !transposed.lhs, pitch);
     } else {
-        let pitch = if comptime!(rhs_transposed) { depth } else { columns };
-        read_block::<N>(rhs, block, unit - READERS, column_start, columns, at, end, rhs_transposed, pitch);
-    }
-}
-
-/// Writes the sums over every chunk of terms to a row of `output`.
-pub(super) fn launch(
-    groups: CubeCount,
-    lhs: &Factor,
-    rhs: &Factor,
-    output: &Matrix,
-    sizes: Sizes,
-    chunk: usize,
-) {
-    let width = lhs.matrix.width().min(rhs.matrix.width());
-    // SAFETY: entries outside of the factors are zeros that are not read, and none outside of the result is written.
-    unsafe {
-        multiply::launch_unchecked(
-            output.client(),
-            groups,
-            CubeDim::new_1d(UNITS as u32),
-            width,
-            lhs.matrix.argument(width),
-            rhs.matrix.argument(width),
-            output.argument(1),
-            sizes.rows,
-            sizes.columns,
-            sizes.depth,
-            chunk,
-            lhs.transposed,
-            rhs.transposed,
-        );
+        let pitch = if comptime!(transposed.rhs) { depth } else { columns };
+        read_block::<N>(rhs, block, unit - READERS, column_start, columns, at, end, transposed.rhs, pitch);
     }
 }

@@ -2,6 +2,7 @@ use burn::backend::{Backend, Cube};
 use burn::tensor::{Tensor, TensorData};
 
 use super::*;
+use crate::ops::gpu::{Matrix, groups};
 use crate::ops::operation::{TensorKernel, run};
 use crate::ops::tensors::Tensors;
 use crate::testing::device;
@@ -25,7 +26,7 @@ impl TensorKernel for Rounding {
         let values = Matrix::new(values);
         let output = values.empty(values.rows, values.columns);
         let count = values.rows * values.columns / 4;
-        let (groups, dim) = crate::ops::gpu::groups(values.client(), count);
+        let (groups, dim) = groups(values.client(), count);
         // SAFETY: units beyond the last vector do nothing.
         unsafe {
             round::launch_unchecked(
