@@ -24,4 +24,24 @@ pub struct FitSettings {
     pub arms_lowered: Option<bool>,
     /// Category; otherwise guessed from the shape.
     pub category: Option<Category>,
+    /// Where the file's origin lies on the body, from the pelvis of the zero body (m, x to the left, y up, z forward).
+    pub offset: Option<[f64; 3]>,
+    /// Turn about the vertical (degrees, counter-clockwise seen from above).
+    pub turn_degrees: Option<f64>,
+    /// Which surfaces are the garment.
+    pub keep: Keep,
+    /// Largest distance between borders that are joined (m); otherwise only borders that coincide are.
+    pub join_seams: Option<f64>,
+}
+
+/// Which of a file's surfaces are the garment.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Keep {
+    /// All of them; cloth with thickness is refused.
+    #[default]
+    All,
+    /// The connected piece with the largest area.
+    Largest,
+    /// The outer sheet of cloth with thickness.
+    Outer,
 }

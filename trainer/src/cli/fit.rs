@@ -104,6 +104,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
             ArmPose::Auto => None,
         },
         category: arguments.category,
+        ..FitSettings::default()
     };
     let fitted = fit(&file, &body, &settings)
         .map_err(|e| miette!("{} on body '{}': {e}", arguments.garment.display(), body.name))?;
