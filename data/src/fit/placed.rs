@@ -1,7 +1,6 @@
 //! Does a garment already lie on a body, in metres and T-pose, so that nothing has to be found out?
 
-use super::search::{Samples, Search};
-use super::settings::{FitSettings, MIN_TRIANGLES};
+use super::settings::MIN_TRIANGLES;
 use crate::asset::Body;
 use crate::mesh::outward_area;
 use clothcombo_physics::{Surface, Topology, TriMesh};
@@ -13,10 +12,7 @@ pub fn is_on_body(mesh: &TriMesh, body: &Body) -> bool {
     if mesh.face_count() < MIN_TRIANGLES {
         return false;
     }
-    let settings = FitSettings { arms_lowered: Some(false), ..FitSettings::default() };
-    let search = Search::new(body, &settings);
-    let samples = Samples::new(mesh.positions(), mesh.faces(), 600);
-    search.sits_well(&samples) && faces_outwards(mesh, body)
+    faces_outwards(mesh, body)
 }
 
 /// Whether the area of every piece faces away from the body more than towards it.

@@ -1,5 +1,6 @@
 //! How a file's coordinates become the body's: unit, up axis, facing, origin.
 
+use super::settings::FitSettings;
 use crate::asset::rotation::{self, Matrix3};
 use clothcombo_physics::vec3::{add, scale};
 use serde::Serialize;
@@ -20,11 +21,13 @@ pub enum Unit {
     Mm,
     /// Inch.
     Inch,
+    /// Foot.
+    Foot,
 }
 
 impl Unit {
     /// All units.
-    pub const ALL: [Self; 5] = [Self::M, Self::Dm, Self::Cm, Self::Mm, Self::Inch];
+    pub const ALL: [Self; 6] = [Self::M, Self::Dm, Self::Cm, Self::Mm, Self::Inch, Self::Foot];
 
     /// Metres per unit.
     pub fn metres(self) -> f64 {
@@ -34,10 +37,11 @@ impl Unit {
             Self::Cm => 0.01,
             Self::Mm => 0.001,
             Self::Inch => 0.0254,
+            Self::Foot => 0.3048,
         }
     }
 
-    /// `m`, `dm`, `cm`, `mm` or `inch`.
+    /// `m`, `dm`, `cm`, `mm`, `inch` or `foot`.
     pub fn name(self) -> &'static str {
         match self {
             Self::M => "m",
@@ -45,6 +49,7 @@ impl Unit {
             Self::Cm => "cm",
             Self::Mm => "mm",
             Self::Inch => "inch",
+            Self::Foot => "foot",
         }
     }
 }
@@ -127,8 +132,8 @@ pub struct Placement {
     pub unit: Unit,
     /// Up axis of the file.
     pub up: UpAxis,
-    /// Turn about the vertical after the up axis (degrees): 0, 90, 180 or 270.
-    pub facing_degrees: u16,
+    /// Turn about the vertical after the up axis (degrees, counter-clockwise seen from above).
+    pub turn_degrees: f64,
     /// Where the file's origin is.
     pub origin: Origin,
     /// Translation after scaling and turning (m).
@@ -138,13 +143,52 @@ pub struct Placement {
 }
 
 impl Placement {
+    /// Of a file that needs none: metres, y up, the front forward, the pelvis at the origin, level arms.
+    pub const AS_GIVEN: Self = Self {
+        unit: Unit::M,
+        up: UpAxis::Y,
+        turn_degrees: 0.0,
+        origin: Origin::Pelvis,
+        translation: [0.0; 3],
+        arm_angle_degrees: 0.0,
+    };
+
+    /// Logarithm of how usual such a file is, up to a constant; what `settings` say has no say.
+    pub(super) fn log_prior(&self, settings: &FitSettings) -> f64 {
+        let unit = match (settings.unit, self.unit) {
+            (Some(_), _) | (_, Unit::M) => 0.0,
+            (_, Unit::Cm | Unit::Mm) => -0.5,
+            _ => -2.0,
+        };
+        let up = match (settings.up, self.up) {
+            (Some(_), _) | (_, UpAxis::Y) => 0.0,
+            (_, UpAxis::Z) => -0.5,
+            _ => -2.0,
+        };
+        let turn = match settings.turn_degrees {
+            None if self.turn_degrees != 0.0 => -2.0,
+            _ => 0.0,
+        };
+        let arms = match settings.arms_lowered {
+            None if self.arm_angle_degrees != 0.0 => -1.5,
+            _ => 0.0,
+        };
+        let origin = match (settings.offset, self.origin) {
+            (Some(_), _) | (_, Origin::Pelvis) => 0.0,
+            (_, Origin::Floor) => -0.5,
+            _ => -4.0,
+        };
+        unit + up + turn + arms + origin
+    }
+
     /// The turn without scale and translation.
     pub fn turn(&self) -> Matrix3 {
-        let (s, c) = match self.facing_degrees {
-            90 => (1.0, 0.0),
-            180 => (0.0, -1.0),
-            270 => (-1.0, 0.0),
-            _ => (0.0, 1.0),
+        // Quarter turns are exact.
+        let (s, c) = match self.turn_degrees {
+            90.0 => (1.0, 0.0),
+            180.0 => (0.0, -1.0),
+            270.0 => (-1.0, 0.0),
+            degrees => degrees.to_radians().sin_cos(),
         };
         rotation::product(&[[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]], &self.up.to_y_up())
     }
@@ -163,11 +207,11 @@ mod tests {
     #[test]
     fn every_turn_is_a_rotation_that_puts_the_up_axis_up() {
         for up in UpAxis::ALL {
-            for facing_degrees in [0, 90, 180, 270] {
+            for turn_degrees in [0.0, 90.0, 180.0, 270.0] {
                 let placement = Placement {
                     unit: Unit::Cm,
                     up,
-                    facing_degrees,
+                    turn_degrees,
                     origin: Origin::Pelvis,
                     translation: [0.0; 3],
                     arm_angle_degrees: 0.0,

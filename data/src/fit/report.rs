@@ -201,8 +201,8 @@ impl FitReport {
             0.0 => "T-pose".to_string(),
             a => format!("A-pose: the arms hang {a:.0}° below the horizontal; raised to the T-pose"),
         };
-        let facing = match p.facing_degrees {
-            0 => "front".to_string(),
+        let facing = match p.turn_degrees {
+            0.0 => "front".to_string(),
             turn => format!("turned by {turn}° about the vertical"),
         };
         vec![

@@ -1,100 +1,65 @@
-//! Finds the placement under which a garment wraps the body best.
+//! Finds where a garment belongs on the body: unit, axes, origin, turn and arm pose are scored together.
 //!
-//! Every unit, up axis, facing, arm angle and origin is a hypothesis. Its cost is the mean distance of sample points of the
-//! garment to the body, four times as much inside as outside, plus a share for the directions around the trunk in which there is
-//! no cloth. A file made for this body (its origin at the pelvis or on the floor) is taken as it stands; otherwise the garment is
-//! also moved to where it fits best.
+//! A hypothesis is scored by the log-posterior: how likely the gaps between cloth and body are for worn clothes
+//! ([`likelihood`](super::likelihood)), how usual such a file is, and whether limbs pass through openings instead of
+//! cloth ([`anatomy`](super::anatomy)).
 
-use super::arm_pose::ArmPose;
-use super::coverage::off_trunk;
-use super::error::FitError;
+use super::anatomy::{Opening, Skeleton};
+use super::body_field::{ArmTurn, BodyField};
+use super::likelihood::{log_likelihood, rough_log_likelihood};
 use super::placement::{Origin, Placement, Unit, UpAxis};
+use super::samples::Samples;
 use super::settings::FitSettings;
-use super::sitting::Sitting;
-use crate::asset::{Body, skeleton};
+use crate::asset::Body;
 use crate::mesh::bounds;
-use clothcombo_physics::query::Distance;
-use clothcombo_physics::vec3::{add, cross, norm, scale, sub};
+use clothcombo_physics::vec3::add;
 use rayon::prelude::*;
 
+/// Independent samples a garment is worth: neighbouring cloth lies alike.
+const EVIDENCE: f64 = 40.0;
 /// Arm angles tried first (degrees).
-const ARM_ANGLES: [f64; 7] = [0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0];
+const ARM_ANGLES: [f64; 6] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0];
+/// Heights tried first (m apart).
+const HEIGHT_STEP: f64 = 0.04;
+/// Log-prior against a garment through whose openings no limbs pass.
+const UNWORN: f64 = 100.0;
+/// Clothes are as wide on the left as on the right within this (m).
+const SYMMETRY: f64 = 0.02;
+/// Log-prior against a bone that passes through cloth.
+const CROSSING: f64 = 8.0;
 
-/// Costs in favour of the usual (m): a worse fit by this much is still preferred.
-const FACING_PRIOR: f64 = 0.003;
-const ARMS_PRIOR: f64 = 0.0008;
+/// A garment in the file's coordinates.
+pub(super) struct Cloth<'a> {
+    pub positions: &'a [[f64; 3]],
+    pub faces: &'a [[u32; 3]],
+    pub borders: &'a [Vec<u32>],
+}
 
-/// Arms are taken for level as long as lowered ones are not better by this factor.
-const LEVEL_ARMS_PRIOR: f64 = 1.3;
-
-/// Number of directions around the trunk.
-const SECTORS: usize = 8;
-
-/// Sample points of a garment in the file's coordinates, evenly over its area.
-pub(super) struct Samples(Vec<[f64; 3]>);
-
-impl Samples {
-    pub fn new(positions: &[[f64; 3]], faces: &[[u32; 3]], count: usize) -> Self {
-        let corners = |f: &[u32; 3]| f.map(|v| positions[v as usize]);
-        let mut sum = 0.0;
-        let cumulative: Vec<f64> = faces
-            .iter()
-            .map(|f| {
-                let [a, b, c] = corners(f);
-                sum += norm(cross(sub(b, a), sub(c, a)));
-                sum
-            })
-            .collect();
-        let points = (0..count)
-            .map(|k| {
-                let wanted = (k as f64 + 0.5) / count as f64 * sum;
-                let face = cumulative.partition_point(|s| *s < wanted).min(faces.len() - 1);
-                let [a, b, c] = corners(&faces[face]);
-                // A low-discrepancy sequence folded into the triangle.
-                let (u, v) = ((k as f64 * 0.754_877_666).fract(), (k as f64 * 0.569_840_291).fract());
-                let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
-                add(a, add(scale(sub(b, a), u), scale(sub(c, a), v)))
-            })
-            .collect();
-        Self(points)
-    }
+/// A placement and what speaks for it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Candidate {
+    pub placement: Placement,
+    /// Mean log-likelihood of the gaps.
+    pub fit: f64,
+    /// Log-posterior up to a constant.
+    pub score: f64,
+    pub crossings: usize,
+    /// Height of the upper rim before the translation (m), if the garment hangs from one.
+    pub rim: Option<f64>,
+    pub is_worn: bool,
 }
 
 /// The body as the search sees it.
-pub(super) struct Search<'a> {
-    body: &'a Body,
-    pub arms: Vec<ArmPose>,
-    trunk: Vec<[f64; 3]>,
-    floor: f64,
-    top: f64,
+pub(super) struct Search {
+    field: BodyField,
+    skeleton: Skeleton,
     /// Largest extent of the body (m).
     pub reach: f64,
 }
 
-impl<'a> Search<'a> {
-    pub fn new(body: &'a Body, settings: &FitSettings) -> Self {
-        let arms = ARM_ANGLES
-            .into_par_iter()
-            .filter(|degrees| match settings.arms_lowered {
-                None => true,
-                Some(lowered) => lowered == (*degrees != 0.0),
-            })
-            .map(|degrees| {
-                let arm = ArmPose::new(body, degrees);
-                arm.surface.closest_point();
-                arm
-            })
-            .collect();
-        let trunk = ["pelvis", "spine1", "spine2", "spine3"]
-            .iter()
-            .filter_map(|name| {
-                let named = body.joint_names.iter().position(|n| n == name);
-                named.or(skeleton::joint_index(name)).and_then(|j| body.joint_template.get(j)).copied()
-            })
-            .collect();
-        let (low, high) = body.zero_body().bounds();
-        let reach = body.zero_body().extent();
-        Self { body, arms, trunk, floor: low[1], top: high[1], reach }
+impl Search {
+    pub fn new(body: &Body) -> Self {
+        Self { field: BodyField::new(body), skeleton: Skeleton::new(body), reach: body.zero_body().extent() }
     }
 
     /// Whether a garment of this largest extent (m) can fit this body at all.
@@ -102,248 +67,260 @@ impl<'a> Search<'a> {
         extent >= 0.07 * self.reach && extent <= 1.2 * self.reach
     }
 
-    /// The best placement, and how the garment sits then. `extent`: largest extent of the file in its unit, plausible in at
-    /// least one of the units allowed.
-    pub fn best(
-        &self,
-        positions: &[[f64; 3]],
-        faces: &[[u32; 3]],
-        extent: f64,
-        settings: &FitSettings,
-    ) -> Result<(Placement, Sitting), FitError> {
-        let coarse = Samples::new(positions, faces, 250);
-        let fine = Samples::new(positions, faces, 1200);
-        let units: Vec<Unit> = Unit::ALL
-            .into_iter()
-            .filter(|u| {
-                settings.unit.is_none_or(|s| s == *u) && self.is_plausible_extent(extent * u.metres())
-            })
-            .collect();
+    /// Candidates, the best first; distinct ones only.
+    pub fn candidates(&self, cloth: &Cloth, extent: f64, settings: &FitSettings) -> Vec<Candidate> {
+        let coarse = Samples::new(cloth.positions, cloth.faces, 200);
+        let fine = Samples::new(cloth.positions, cloth.faces, 1000);
+        let units = Unit::ALL.into_iter().filter(|u| {
+            settings.unit.is_none_or(|s| s == *u) && self.is_plausible_extent(extent * u.metres())
+        });
         let ups: Vec<UpAxis> = settings.up.map_or(UpAxis::ALL.to_vec(), |up| vec![up]);
-        let mut hypotheses = Vec::new();
-        for &unit in &units {
+        let turns = settings.turn_degrees.map_or(vec![0.0, 90.0, 180.0, 270.0], |turn| vec![turn]);
+        let arms: Vec<f64> = (ARM_ANGLES.into_iter())
+            .filter(|a| settings.arms_lowered.is_none_or(|lowered| lowered == (*a != 0.0)))
+            .collect();
+        let mut turned = Vec::new();
+        for unit in units {
             for &up in &ups {
-                for facing_degrees in [0, 90, 180, 270] {
-                    for arm in 0..self.arms.len() {
-                        for origin in [Origin::Pelvis, Origin::Floor] {
-                            let y = if origin == Origin::Floor { self.floor } else { 0.0 };
-                            let placement = Placement {
-                                unit,
-                                up,
-                                facing_degrees,
-                                origin,
-                                translation: [0.0, y, 0.0],
-                                arm_angle_degrees: self.arms[arm].degrees,
-                            };
-                            hypotheses.push((placement, arm));
-                        }
-                    }
+                for &turn_degrees in &turns {
+                    turned.push(Placement { unit, up, turn_degrees, ..Placement::AS_GIVEN });
                 }
             }
         }
-        let (mut placement, mut arm, mut sitting) = self.pick(&hypotheses, &coarse, &fine);
-        if !sitting.is_good() {
-            if !sitting.is_around_trunk() {
-                self.refuse_hats_and_shoes(&hypotheses, &coarse)?;
-            }
-            let (moved, moved_arm, moved_sitting) = self.moved(&hypotheses, &coarse, &fine);
-            // The file's own origin is right more often than not; a garment that then sits well is better evidence.
-            let clearly = if moved_sitting.is_good() { 0.8 } else { 0.7 };
-            if moved_sitting.cost < clearly * sitting.cost - 0.005 {
-                (placement, arm, sitting) = (moved, moved_arm, moved_sitting);
-            }
-        }
-        if let Some(degrees) = self.arm_angle(&placement, &fine) {
-            placement.arm_angle_degrees = degrees;
-        }
-        if placement.arm_angle_degrees != self.arms[arm].degrees {
-            let arm = ArmPose::new(self.body, placement.arm_angle_degrees);
-            sitting = self.judged(&placement, &arm, &fine).1;
-        }
-        Ok((placement, sitting))
-    }
-
-    /// What lies close to the body as it stands, but on head, feet or arms, must not be blown up until it goes around the trunk.
-    fn refuse_hats_and_shoes(
-        &self,
-        hypotheses: &[(Placement, usize)],
-        samples: &Samples,
-    ) -> Result<(), FitError> {
-        let snug = hypotheses
+        let refined: Vec<Candidate> = turned
             .par_iter()
-            .filter_map(|(placement, arm)| {
-                let points = placement.apply(&samples.0);
-                let place = off_trunk(&points, self.body)?;
-                let sitting = self.sitting(&points, &self.arms[*arm]);
-                (sitting.mean_distance < 0.04 && sitting.inside < 0.25).then_some(place)
-            })
-            .find_first(|_| true);
-        snug.map_or(Ok(()), |place| Err(FitError::OffTrunk { place }))
-    }
-
-    /// Costs and numbers of the hypotheses, the best first.
-    fn ranked(&self, hypotheses: &[(Placement, usize)], samples: &Samples) -> Vec<(f64, usize)> {
-        let mut ranked: Vec<(f64, usize)> = hypotheses
-            .par_iter()
-            .enumerate()
-            .map(|(i, (placement, arm))| (self.judged(placement, &self.arms[*arm], samples).0, i))
-            .collect();
-        ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        ranked
-    }
-
-    /// Cheap costs first, careful ones for the best few.
-    fn pick(
-        &self,
-        hypotheses: &[(Placement, usize)],
-        coarse: &Samples,
-        fine: &Samples,
-    ) -> (Placement, usize, Sitting) {
-        let ranked = self.ranked(hypotheses, coarse);
-        let mut best: Option<(f64, usize, Sitting)> = None;
-        for (_, i) in ranked.iter().take(6) {
-            let (placement, arm) = &hypotheses[*i];
-            let (judged, sitting) = self.judged(placement, &self.arms[*arm], fine);
-            if best.is_none_or(|(b, ..)| judged < b) {
-                best = Some((judged, *i, sitting));
-            }
-        }
-        let (_, i, sitting) = best.unwrap_or((f64::MAX, 0, Sitting::default()));
-        (hypotheses[i].0, hypotheses[i].1, sitting)
-    }
-
-    /// The best placement whose translation is free: the garment is centred and tried at several heights, then slid along the
-    /// three axes as long as that helps.
-    fn moved(
-        &self,
-        hypotheses: &[(Placement, usize)],
-        coarse: &Samples,
-        fine: &Samples,
-    ) -> (Placement, usize, Sitting) {
-        let heights = 16;
-        let started: Vec<(Placement, usize)> = hypotheses
-            .iter()
-            .filter(|(p, _)| p.origin == Origin::Pelvis)
-            .flat_map(|(placement, arm)| {
-                let untranslated =
-                    Placement { translation: [0.0; 3], origin: Origin::Elsewhere, ..*placement };
-                let points = untranslated.apply(&coarse.0);
-                let [low, high] = bounds(&points);
-                let middle = |a: usize| 0.5 * (low[a] + high[a]);
-                let (x, y, z) = (middle(0), high[1], middle(2));
-                let trunk_z = self.trunk.iter().map(|p| p[2]).sum::<f64>() / self.trunk.len().max(1) as f64;
-                (1..=heights).map(move |h| {
-                    let top = self.floor + (self.top - self.floor) * f64::from(h) / f64::from(heights);
-                    (Placement { translation: [-x, top - y, trunk_z - z], ..untranslated }, *arm)
+            .flat_map_iter(|base| {
+                let mut started = self.started(base, &arms, &coarse, settings);
+                started.sort_by(|a, b| b.score.total_cmp(&a.score));
+                started.truncate(60);
+                let mut worn: Vec<Candidate> =
+                    started.into_iter().map(|c| self.with_openings(c, cloth)).filter(|c| c.is_worn).collect();
+                worn = self.distinct(worn);
+                worn.truncate(8);
+                worn.into_iter().map(|c| {
+                    let c = self.with_openings(self.refined(&c, &coarse, settings, 0.04, 0.01), cloth);
+                    self.with_openings(self.refined(&c, &coarse, settings, 0.019, 0.004), cloth)
                 })
             })
             .collect();
-        let mut ranked = self.ranked(&started, coarse);
-        ranked.truncate(12);
-        let slid: Vec<(Placement, usize)> = ranked
+        let mut refined = refined;
+        refined.sort_by(|a, b| b.score.total_cmp(&a.score));
+        let mut distinct = self.distinct(refined);
+        distinct.truncate(12);
+        distinct.extend(self.given(&turned, &fine, settings));
+        let mut last: Vec<Candidate> = distinct
             .par_iter()
-            .map(|(judged, i)| {
-                let (mut placement, arm) = started[*i];
-                let (mut best, mut step) = (*judged, 0.04);
-                while step > 0.0008 {
-                    let mut better = false;
-                    for axis in [1, 2, 0] {
-                        for sign in [-1.0, 1.0] {
-                            let mut trial = placement;
-                            trial.translation[axis] += sign * step;
-                            let (judged, _) = self.judged(&trial, &self.arms[arm], coarse);
-                            if judged < best {
-                                (placement, best, better) = (trial, judged, true);
-                            }
-                        }
+            .map(|c| {
+                let c = match c.placement.origin {
+                    Origin::Elsewhere => self.refined(c, &fine, settings, 0.01, 0.0005),
+                    _ => {
+                        let c = self.with_openings(self.scored(c.placement, &fine, settings), cloth);
+                        let rim = c.rim.map_or(0.0, |y| self.rim_prior(y + c.placement.translation[1]));
+                        Candidate { score: c.score + rim, ..c }
                     }
-                    if !better {
-                        step *= 0.5;
-                    }
-                }
-                (placement, arm)
+                };
+                self.with_anatomy(c, cloth)
             })
             .collect();
-        self.pick(&slid, fine, fine)
+        last.sort_by(|a, b| b.score.total_cmp(&a.score));
+        last
     }
 
-    /// How far the arms hang, from the sleeves alone: the angle at which they lie around the arms most evenly, in the sense of the
-    /// mean squared distance. Level arms if lowered ones are not clearly better, or if there are no sleeves; `None` if level arms
-    /// are excluded and there are no sleeves to tell.
-    fn arm_angle(&self, placement: &Placement, fine: &Samples) -> Option<f64> {
-        let shoulder = self.body.joint_template.get(skeleton::joint_index("left_shoulder")?)?;
-        let sleeves: Vec<[f64; 3]> = placement
-            .apply(&fine.0)
-            .into_iter()
-            .filter(|p| p[0].abs() > shoulder[0].abs() + 0.03 && (p[1] - shoulder[1]).abs() < 0.35)
+    /// Files as they stand: their origin at one of the usual points.
+    fn given(&self, turned: &[Placement], fine: &Samples, settings: &FitSettings) -> Vec<Candidate> {
+        if settings.offset.is_some() || settings.arms_lowered == Some(true) {
+            return Vec::new();
+        }
+        let mut given: Vec<Candidate> = turned
+            .par_iter()
+            .flat_map_iter(|base| {
+                [Origin::Pelvis, Origin::Floor].map(|origin| {
+                    let y = if origin == Origin::Floor { self.field.low[1] } else { 0.0 };
+                    self.scored(Placement { origin, translation: [0.0, y, 0.0], ..*base }, fine, settings)
+                })
+            })
             .collect();
-        let level = self.arms.iter().find(|a| a.degrees == 0.0);
-        if sleeves.len() < fine.0.len() / 30 {
-            return level.map(|_| 0.0);
-        }
-        let unevenness = |arm: &ArmPose| {
-            let squared = |p: &[f64; 3]| {
-                let gap = arm.surface.gap(*p, Distance::ClosestPoint).gap;
-                if gap < 0.0 { 16.0 * gap * gap } else { gap * gap }
+        given.sort_by(|a, b| b.score.total_cmp(&a.score));
+        given.truncate(4);
+        given
+    }
+
+    /// The best height for every arm angle.
+    fn started(&self, base: &Placement, arms: &[f64], coarse: &Samples, settings: &FitSettings) -> Vec<Candidate> {
+        let points = base.apply(&coarse.0);
+        let [low, high] = bounds(&points);
+        let [x, z] = [0, 2].map(|a| 0.5 * (low[a] + high[a]));
+        let heights = ((self.field.high[1] - self.field.low[1]) / HEIGHT_STEP) as usize;
+        let mut all = Vec::new();
+        for &arm_angle_degrees in arms {
+            let at = |h: usize| {
+                let top = self.field.low[1] + 0.2 + (h / 3) as f64 * HEIGHT_STEP;
+                let forward = [0.0, 0.05, -0.05][h % 3];
+                let translation = settings.offset.unwrap_or([-x, top - high[1], self.field.spine_z - z + forward]);
+                let p = Placement { translation, arm_angle_degrees, origin: Origin::Elsewhere, ..*base };
+                self.roughly_scored(p, &points, settings)
             };
-            sleeves.iter().map(squared).sum::<f64>()
+            let mut tried: Vec<Candidate> =
+                (0..if settings.offset.is_some() { 1 } else { 3 * heights }).map(at).collect();
+            tried.sort_by(|a, b| b.score.total_cmp(&a.score));
+            all.extend(tried.into_iter().take(16));
+        }
+        all
+    }
+
+    fn scored(&self, placement: Placement, samples: &Samples, settings: &FitSettings) -> Candidate {
+        let points = Placement { translation: [0.0; 3], ..placement }.apply(&samples.0);
+        self.scored_at(placement, &points, settings)
+    }
+
+    /// By the blunt likelihood, in which a garment some centimetres from its place still counts.
+    fn roughly_scored(&self, placement: Placement, points: &[[f64; 3]], settings: &FitSettings) -> Candidate {
+        let arms = ArmTurn::new(placement.arm_angle_degrees);
+        let gaps = points.iter().map(|p| self.field.gap(add(*p, placement.translation), arms));
+        let fit = rough_log_likelihood(gaps, EVIDENCE);
+        let score = fit + placement.log_prior(settings);
+        Candidate { placement, fit, score, crossings: 0, rim: None, is_worn: true }
+    }
+
+    /// `points`: scaled and turned, not yet translated.
+    fn scored_at(&self, placement: Placement, points: &[[f64; 3]], settings: &FitSettings) -> Candidate {
+        let arms = ArmTurn::new(placement.arm_angle_degrees);
+        let gaps = points.iter().map(|p| self.field.gap(add(*p, placement.translation), arms));
+        let fit = log_likelihood(gaps, EVIDENCE);
+        let middle = points.iter().map(|p| p[0]).fold(f64::MIN, f64::max) + points.iter().map(|p| p[0]).fold(f64::MAX, f64::min);
+        let aside = (0.5 * middle + placement.translation[0]) / SYMMETRY;
+        let score = fit + placement.log_prior(settings) - (0.5 * aside * aside).min(8.0);
+        Candidate { placement, fit, score, crossings: 0, rim: None, is_worn: true }
+    }
+
+    /// Slid along the three axes, and the arms turned, as long as that helps.
+    fn refined(&self, start: &Candidate, samples: &Samples, settings: &FitSettings, from: f64, to: f64) -> Candidate {
+        let points = Placement { translation: [0.0; 3], ..start.placement }.apply(&samples.0);
+        let rough = from > 0.02;
+        let scored = |placement: Placement| {
+            let mut c = if rough { self.roughly_scored(placement, &points, settings) } else { self.scored_at(placement, &points, settings) };
+            c.rim = start.rim;
+            c.score += c.rim.map_or(0.0, |y| self.rim_prior(y + placement.translation[1]));
+            c
         };
-        let costs: Vec<(f64, f64)> = self.arms.par_iter().map(|a| (unevenness(a), a.degrees)).collect();
-        let (least, coarse) = costs.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
-        if coarse == 0.0 || level.is_some_and(|a| unevenness(a) < LEVEL_ARMS_PRIOR * least) {
-            return Some(0.0);
-        }
-        // Golden-section search around it.
-        let ratio = 0.618_034;
-        let at = |degrees: f64| (unevenness(&ArmPose::new(self.body, degrees)), degrees);
-        let (mut low, mut high) = (coarse - 9.0, coarse + 9.0);
-        let (mut a, mut b) = (at(high - ratio * (high - low)), at(low + ratio * (high - low)));
-        for _ in 0..6 {
-            if a.0 < b.0 {
-                high = b.1;
-                b = a;
-                a = at(high - ratio * (high - low));
-            } else {
-                low = a.1;
-                a = b;
-                b = at(low + ratio * (high - low));
+        let mut best = scored(start.placement);
+        let mut step = from;
+        while step > to {
+            let mut is_better = false;
+            for axis in [1, 2, 0, 3] {
+                for sign in [-1.0, 1.0] {
+                    let mut trial = best.placement;
+                    match axis {
+                        3 if trial.arm_angle_degrees == 0.0 || settings.arms_lowered == Some(false) => continue,
+                        // A sleeve is half a metre long.
+                        3 => trial.arm_angle_degrees = (trial.arm_angle_degrees + sign * (2.0 * step).to_degrees()).clamp(3.0, 85.0),
+                        _ if settings.offset.is_some() => continue,
+                        _ => trial.translation[axis] += sign * step,
+                    }
+                    let trial = scored(trial);
+                    if trial.score > best.score {
+                        (best, is_better) = (trial, true);
+                    }
+                }
+            }
+            if !is_better {
+                step *= 0.5;
             }
         }
-        Some([a, b, (least, coarse)].into_iter().min_by(|x, y| x.0.total_cmp(&y.0))?.1)
+        best
     }
 
-    /// Cost with the preferences for the usual, and what it was made of.
-    fn judged(&self, placement: &Placement, arm: &ArmPose, samples: &Samples) -> (f64, Sitting) {
-        let sitting = self.sitting(&placement.apply(&samples.0), arm);
-        let facing = if placement.facing_degrees == 0 { 0.0 } else { FACING_PRIOR };
-        let arms = if arm.degrees == 0.0 { 0.0 } else { ARMS_PRIOR };
-        (sitting.cost + facing + arms, sitting)
-    }
-
-    /// Whether a garment sits well as it stands, on the body with the first of the arm angles.
-    pub(super) fn sits_well(&self, samples: &Samples) -> bool {
-        self.arms.first().is_some_and(|arm| self.sitting(&samples.0, arm).is_good())
-    }
-
-    fn sitting(&self, points: &[[f64; 3]], arm: &ArmPose) -> Sitting {
-        let n = points.len().max(1) as f64;
-        let mut sitting = Sitting::default();
-        for p in points {
-            let gap = arm.surface.gap(*p, Distance::ClosestPoint).gap;
-            sitting.mean_distance += gap.abs() / n;
-            sitting.inside += f64::from(u8::from(gap < 0.0)) / n;
-            sitting.cost += if gap < 0.0 { (-4.0 * gap).min(0.6) } else { gap.min(0.4) } / n;
-        }
-        for centre in &self.trunk {
-            let mut sectors = [false; SECTORS];
-            for p in points.iter().filter(|p| (p[1] - centre[1]).abs() < 0.08) {
-                let turn = (p[0] - centre[0]).atan2(p[2] - centre[2]) / std::f64::consts::TAU;
-                sectors[((turn.rem_euclid(1.0) * SECTORS as f64) as usize).min(SECTORS - 1)] = true;
+    /// What each border goes around, `points` being its vertices on the body. A border that runs through the body goes around
+    /// nothing.
+    fn openings(&self, placement: &Placement, cloth: &Cloth) -> Vec<(Opening, f64)> {
+        let arms = ArmTurn::new(placement.arm_angle_degrees);
+        let of_border = |border: &Vec<u32>| {
+            let points: Vec<[f64; 3]> = border.iter().map(|v| cloth.positions[*v as usize]).collect();
+            let points = placement.apply(&points);
+            let height = points.iter().map(|p| p[1]).sum::<f64>() / points.len().max(1) as f64;
+            let inside = points.iter().filter(|p| self.field.gap(**p, arms).0 < -0.012).count();
+            match 4 * inside > points.len() {
+                true => (Opening::Nothing, height),
+                false => (self.skeleton.opening(&points, arms), height),
             }
-            let share = sectors.iter().filter(|s| **s).count() as f64 / SECTORS as f64;
-            sitting.wrap = sitting.wrap.max(share);
+        };
+        cloth.borders.iter().map(of_border).collect()
+    }
+
+    /// Whether limbs pass through its openings, and which height its upper rim has if it hangs from one.
+    fn with_openings(&self, mut candidate: Candidate, cloth: &Cloth) -> Candidate {
+        let openings = self.openings(&candidate.placement, cloth);
+        let count = |wanted: Opening| openings.iter().filter(|(o, _)| *o == wanted).count();
+        let has = |wanted: Opening| count(wanted) > 0;
+        let others = [Opening::Neck, Opening::LeftArm, Opening::RightArm, Opening::LeftLeg, Opening::RightLeg, Opening::Several];
+        let arms = has(Opening::LeftArm) && has(Opening::RightArm);
+        let is_around = count(Opening::Trunk) >= 2 || (has(Opening::Trunk) && others.into_iter().any(has)) || arms;
+        // Only sleeves and armholes tell how arms hang.
+        let is_worn = is_around && (arms || has(Opening::Several) || candidate.placement.arm_angle_degrees == 0.0);
+        if candidate.is_worn && !is_worn {
+            candidate.score -= UNWORN;
         }
-        sitting.cost += 0.2 * (1.0 - sitting.wrap);
-        sitting
+        candidate.is_worn = is_worn;
+        candidate.rim = None;
+        if !has(Opening::Neck) && !arms {
+            let heights = openings.iter().filter(|(o, _)| *o == Opening::Trunk).map(|(_, y)| y - candidate.placement.translation[1]);
+            candidate.rim = heights.max_by(f64::total_cmp);
+        }
+        candidate
+    }
+
+    /// Log-density of the height of an upper rim (m): at the waist, or above the chest.
+    fn rim_prior(&self, height: f64) -> f64 {
+        let normal = |middle: f64, spread: f64| (-0.5 * ((height - middle) / spread).powi(2)).exp() / (spread * 2.5066);
+        let [waist, chest] = self.field.rims;
+        (0.6 * normal(waist, 0.035) + 0.35 * normal(chest, 0.03) + 0.02).ln() - 5.0f64.ln()
+    }
+
+    fn with_anatomy(&self, candidate: Candidate, cloth: &Cloth) -> Candidate {
+        let mut candidate = self.with_openings(candidate, cloth);
+        let arms = ArmTurn::new(candidate.placement.arm_angle_degrees);
+        let placed = candidate.placement.apply(cloth.positions);
+        candidate.crossings = self.skeleton.crossings(&placed, cloth.faces, arms);
+        candidate.score -= CROSSING * candidate.crossings as f64;
+        candidate
+    }
+
+    pub fn judge(&self, p: Placement, cloth: &Cloth, settings: &FitSettings) -> Candidate {
+        let fine = Samples::new(cloth.positions, cloth.faces, 1000);
+        let mut c = self.with_openings(self.scored(p, &fine, settings), cloth);
+        c.score += c.rim.map_or(0.0, |y| self.rim_prior(y + c.placement.translation[1]));
+        self.with_anatomy(c, cloth)
+    }
+
+    pub fn debug(&self, p: &Placement, cloth: &Cloth) {
+        let fine = Samples::new(cloth.positions, cloth.faces, 2000);
+        let arms = ArmTurn::new(p.arm_angle_degrees);
+        let mut bins = [0; 20];
+        let mut all: Vec<f64> = p.apply(&fine.0).into_iter().map(|q| self.field.gap(q, arms).0).collect();
+        all.sort_by(f64::total_cmp);
+        let q: Vec<f64> = [20, 40, 100, 200, 400, 1000].map(|i| (all[i] * 1e4).round() / 10.0).to_vec();
+        eprintln!("Q {q:?}");
+        for q in p.apply(&fine.0) {
+            let g = self.field.gap(q, arms).0;
+            bins[(((g + 0.01) / 0.003).max(0.0) as usize).min(19)] += 1;
+        }
+        eprintln!("      {:?} {:?}", p.translation, bins);
+    }
+
+    /// Without those close to a better one.
+    fn distinct(&self, ranked: Vec<Candidate>) -> Vec<Candidate> {
+        let mut kept: Vec<Candidate> = Vec::new();
+        for c in ranked {
+            let is_new = |kept: &Candidate| {
+                let (a, b) = (&kept.placement, &c.placement);
+                (a.unit, a.up, a.turn_degrees) != (b.unit, b.up, b.turn_degrees)
+                    || ((a.arm_angle_degrees - b.arm_angle_degrees).abs() > 8.0 && (kept.fit - c.fit).abs() > 0.5)
+                    || (0..3).any(|k| (a.translation[k] - b.translation[k]).abs() > 0.02)
+            };
+            if kept.iter().all(is_new) {
+                kept.push(c);
+            }
+        }
+        kept
     }
 }

@@ -2,7 +2,6 @@
 
 mod field;
 pub mod garment;
-mod isosurface;
 pub mod mannequin;
 mod parts;
 pub mod pose;

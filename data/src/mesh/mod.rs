@@ -1,7 +1,9 @@
 //! Meshes in the making: from polygon soup to manifold pieces, cut along fields, remeshed, measured.
 
 mod clean;
+mod distance_grid;
 mod editable;
+mod isosurface;
 mod labelled_triangles;
 mod manifold;
 mod measures;
@@ -13,7 +15,9 @@ pub use clean::{
     AREA_SHARE, CleanFaces, WELD_SHARE, Welded, bounds, clean_faces, compact, diagonal, fan, triangulate,
     weld,
 };
+pub(crate) use distance_grid::DistanceGrid;
 pub use editable::EditableMesh;
+pub(crate) use isosurface::{Lattice, extract};
 pub use labelled_triangles::LabelledTriangles;
 pub use manifold::{Joined, SplitMesh, join_faces, orient, outward_area, outwardness, split_fans};
 pub use measures::{MeshDefects, MeshMeasures};

@@ -1,15 +1,15 @@
 //! What the generator measures on a body: tubes around trunk, legs and arms, landmarks, and the distance to its surface.
 
-use super::distance_grid::DistanceGrid;
 use super::settings::GarmentError;
 use super::tube::Tube;
 use crate::asset::{BODY_JOINT_COUNT, Body};
 use crate::generate::parts::dominant_joints;
+use crate::mesh::DistanceGrid;
 use clothcombo_physics::query::Surface;
 
 /// Heights and widths of the zero body (m).
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Landmarks {
+pub(crate) struct Landmarks {
     pub ankle: f64,
     pub knee: f64,
     pub crotch: f64,
@@ -28,7 +28,7 @@ pub(super) struct Landmarks {
 
 /// A body measured for garments.
 #[derive(Debug)]
-pub(super) struct BodyFit {
+pub(crate) struct BodyFit {
     pub landmarks: Landmarks,
     /// Trunk and both legs together, vertical.
     pub column: Tube,
@@ -41,6 +41,11 @@ pub(super) struct BodyFit {
     pub distance: DistanceGrid,
     pub surface: Surface<f64>,
 }
+
+/// Node spacing of the distance grid (m).
+const GRID_STEP: f64 = 0.012;
+/// Largest distance the grid tells (m).
+const GRID_BAND: f64 = 0.06;
 
 /// No vertex of a body is farther from the pelvis (m).
 const FARTHEST: f64 = 5.0;
@@ -152,7 +157,7 @@ impl BodyFit {
             neck,
             neck_width,
         };
-        let distance = DistanceGrid::new(&body.template, &body.faces);
+        let distance = DistanceGrid::new(&body.template, &body.faces, GRID_STEP, GRID_BAND);
         let surface = Surface::new(body.template.clone(), body.faces.clone());
         Ok(Self { landmarks, column, legs, arms, shoulder_line, distance, surface })
     }

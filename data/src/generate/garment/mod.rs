@@ -9,20 +9,18 @@
 mod cloth;
 mod cut;
 mod design;
-mod distance_grid;
-mod fit;
+pub(crate) mod fit;
 mod lower;
 mod pattern;
 mod quality;
 mod random_design;
 mod settings;
-mod tube;
+pub(crate) mod tube;
 mod upper;
 
-use super::isosurface::{Lattice, extract};
 use crate::asset::provenance::GENERATED;
 use crate::asset::{Body, Category, Garment, Provenance};
-use crate::mesh::{EditableMesh, LabelledTriangles, Quality, remesh};
+use crate::mesh::{EditableMesh, LabelledTriangles, Lattice, Quality, extract, remesh};
 use cloth::ClothSurface;
 use clothcombo_physics::TriMesh;
 use clothcombo_physics::contact::TriangleTree;

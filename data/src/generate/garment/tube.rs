@@ -3,14 +3,14 @@
 use super::super::field::smooth_step;
 
 /// Directions per outline.
-pub(super) const DIRECTIONS: usize = 32;
+pub(crate) const DIRECTIONS: usize = 32;
 /// Distance between slices (m).
-pub(super) const SLICE: f64 = 0.015;
+pub(crate) const SLICE: f64 = 0.015;
 
 /// Outlines along a coordinate axis. In slice coordinates a point is `(s, u, v)`: `s = side · p[axis]`, and `u`, `v` the
 /// other two axes in cyclic order.
 #[derive(Debug, Clone)]
-pub(super) struct Tube {
+pub(crate) struct Tube {
     axis: usize,
     side: f64,
     start: f64,
@@ -203,7 +203,7 @@ impl Tube {
 }
 
 /// Angle of direction `i` in the (u, v) plane.
-pub(super) fn angle(i: usize) -> f64 {
+pub(crate) fn angle(i: usize) -> f64 {
     i as f64 * std::f64::consts::TAU / DIRECTIONS as f64
 }
 

@@ -9,9 +9,8 @@ mod shape;
 mod skinning;
 
 use super::field;
-use super::isosurface::{Lattice, extract};
 use crate::asset::{BODY_JOINT_COUNT, BODY_JOINT_NAMES, BODY_JOINT_PARENTS, Body, BodyParts};
-use crate::mesh::{EditableMesh, LabelledTriangles, Quality, RemeshTarget, remesh};
+use crate::mesh::{EditableMesh, LabelledTriangles, Lattice, Quality, RemeshTarget, extract, remesh};
 
 pub use shape::SHAPE_COMPONENT_NAMES;
 

@@ -1,39 +1,37 @@
 //! Signed distance to a closed body surface on a regular grid.
 //!
-//! The generator asks for the distance to the body a million times per garment; a grid answers in constant time. Node
-//! values are exact within 2 cm of the surface, right to about a millimetre within a wider band, and constant beyond.
+//! The generator and the placement search ask for the distance to the body a million times per garment; a grid answers in
+//! constant time. Node values are exact within two steps of the surface, right to about a millimetre within a wider band, and
+//! constant beyond.
 //! The inside is what rays in two of three axis directions call inside, so that a small hole in a scanned body costs
 //! nothing.
 
-use super::super::isosurface::Lattice;
+use super::isosurface::Lattice;
 use clothcombo_physics::vec3::{add, cross, dot, norm_squared, scale, sub};
 use std::collections::VecDeque;
 
 /// Trilinearly interpolated signed distance (m), positive outside.
 #[derive(Debug, Clone)]
-pub(super) struct DistanceGrid {
+pub(crate) struct DistanceGrid {
     lattice: Lattice,
     values: Vec<f32>,
+    band: f64,
 }
 
-/// Node spacing (m).
-const STEP: f64 = 0.012;
-/// Distances are clamped to this value (m).
-const BAND: f64 = 0.06;
-
 impl DistanceGrid {
-    pub fn new(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Self {
+    /// Nodes are `step` (m) apart; distances are clamped to `band` (m).
+    pub fn new(positions: &[[f64; 3]], faces: &[[u32; 3]], step: f64, band: f64) -> Self {
         let (mut low, mut high) = ([f64::MAX; 3], [f64::MIN; 3]);
         for p in positions {
             for axis in 0..3 {
-                low[axis] = low[axis].min(p[axis] - BAND - STEP);
-                high[axis] = high[axis].max(p[axis] + BAND + STEP);
+                low[axis] = low[axis].min(p[axis] - band - step);
+                high[axis] = high[axis].max(p[axis] + band + step);
             }
         }
-        let lattice = Lattice::covering(low, high, STEP);
+        let lattice = Lattice::covering(low, high, step);
         let corners = |f: usize| faces[f].map(|v| positions[v as usize]);
         let mut nearest = vec![u32::MAX; lattice.len()];
-        let mut squared = vec![BAND * BAND; lattice.len()];
+        let mut squared = vec![band * band; lattice.len()];
         let mut front = VecDeque::new();
         for f in 0..faces.len() {
             let triangle = corners(f);
@@ -88,17 +86,30 @@ impl DistanceGrid {
             .zip(inside)
             .map(|(d, votes)| if votes >= 2 { -d.sqrt() as f32 } else { d.sqrt() as f32 })
             .collect();
-        Self { lattice, values }
+        Self { lattice, values, band }
     }
 
-    /// Signed distance at `p` (m), clamped to the band of 6 cm.
+    /// Takes the smaller of the distance and `other` (m) at every node.
+    pub fn unite(&mut self, other: impl Fn([f64; 3]) -> f64) {
+        let [nx, ny, nz] = self.lattice.nodes;
+        for k in 0..nz {
+            for j in 0..ny {
+                for i in 0..nx {
+                    let value = &mut self.values[self.lattice.index([i, j, k])];
+                    *value = value.min(other(self.lattice.position([i, j, k])) as f32);
+                }
+            }
+        }
+    }
+
+    /// Signed distance at `p` (m), clamped to the band.
     pub fn distance(&self, p: [f64; 3]) -> f64 {
         let mut cell = [0; 3];
         let mut t = [0.0; 3];
         for axis in 0..3 {
-            let x = (p[axis] - self.lattice.origin[axis]) / STEP;
+            let x = (p[axis] - self.lattice.origin[axis]) / self.lattice.step;
             if !(x >= 0.0 && x < (self.lattice.nodes[axis] - 1) as f64) {
-                return BAND;
+                return self.band;
             }
             cell[axis] = x as usize;
             t[axis] = x - cell[axis] as f64;
@@ -221,17 +232,17 @@ mod tests {
         let field = |p: [f64; 3]| norm_squared(p).sqrt() - radius;
         let lattice = Lattice::covering([-0.2; 3], [0.2; 3], 0.01);
         let (mut positions, faces) =
-            super::super::super::isosurface::extract(&lattice, &lattice.sample(field));
+            super::super::isosurface::extract(&lattice, &lattice.sample(field));
         for p in &mut positions {
             *p = scale(*p, radius / norm_squared(*p).sqrt());
         }
-        let grid = DistanceGrid::new(&positions, &faces);
+        let grid = DistanceGrid::new(&positions, &faces, 0.012, 0.06);
         for i in 0..500 {
             let t = i as f64;
             let direction = [(t * 0.37).sin(), (t * 0.73).cos(), (t * 1.31).sin()];
             let p = scale(direction, (radius - 0.02 + 0.00014 * t) / norm_squared(direction).sqrt());
             assert!((grid.distance(p) - field(p)).abs() < 8e-4, "{p:?}: {} {}", grid.distance(p), field(p));
         }
-        assert_eq!(grid.distance([3.0, 0.0, 0.0]), BAND);
+        assert_eq!(grid.distance([3.0, 0.0, 0.0]), 0.06);
     }
 }

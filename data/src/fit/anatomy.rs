@@ -1,0 +1,127 @@
+//! Which parts of the body pass through the openings of a garment, and whether bones pass through its cloth.
+
+use super::body_field::{ArmTurn, joint};
+use crate::asset::Body;
+use clothcombo_physics::vec3::{add, cross, dot, scale, sub};
+
+/// The ends of the body, each with the joints on the way there from the pelvis.
+const LIMBS: [&[&str]; 5] = [
+    &["pelvis", "spine1", "spine2", "spine3", "neck", "head"],
+    &["pelvis", "spine1", "spine2", "spine3", "left_collar", "left_shoulder", "left_elbow", "left_wrist"],
+    &["pelvis", "spine1", "spine2", "spine3", "right_collar", "right_shoulder", "right_elbow", "right_wrist"],
+    &["pelvis", "left_hip", "left_knee", "left_ankle"],
+    &["pelvis", "right_hip", "right_knee", "right_ankle"],
+];
+/// How far limbs are extended beyond their last joint (m).
+const BEYOND: f64 = 20.0;
+
+/// What an opening of a garment goes around.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Opening {
+    Neck,
+    LeftArm,
+    RightArm,
+    LeftLeg,
+    RightLeg,
+    /// The trunk, or both legs together.
+    Trunk,
+    /// Several limbs at once, such as the neck and an arm.
+    Several,
+    /// No part of the body.
+    Nothing,
+}
+
+/// The bones of the zero body with level arms, from the pelvis to the five ends.
+pub(super) struct Skeleton {
+    limbs: [Vec<[f64; 3]>; 5],
+    shoulders: [Option<[f64; 3]>; 2],
+}
+
+type Segment = [[f64; 3]; 2];
+
+impl Skeleton {
+    pub fn new(body: &Body) -> Self {
+        Self {
+            limbs: LIMBS.map(|names| names.iter().filter_map(|n| joint(body, n)).collect()),
+            shoulders: ["left_shoulder", "right_shoulder"].map(|n| joint(body, n)),
+        }
+    }
+
+    /// Bones of every limb, the arms lowered, and the ray beyond its end.
+    fn bones(&self, arms: ArmTurn) -> [(Vec<Segment>, Option<Segment>); 5] {
+        std::array::from_fn(|limb| {
+            let mut points = self.limbs[limb].clone();
+            if let (1 | 2, Some(shoulder)) = (limb, self.shoulders[(limb + 1) % 2]) {
+                let from = points.iter().position(|p| *p == shoulder).unwrap_or(points.len());
+                let side = if limb == 1 { 1.0 } else { -1.0 };
+                points[from..].iter_mut().for_each(|p| *p = arms.lowered(*p, shoulder, side));
+            }
+            let bones: Vec<Segment> = points.windows(2).map(|pair| [pair[0], pair[1]]).collect();
+            let beyond = bones.last().map(|[a, b]| {
+                let along = sub(*b, *a);
+                [*b, add(*b, scale(along, BEYOND / dot(along, along).sqrt().max(1e-9)))]
+            });
+            (bones, beyond)
+        })
+    }
+
+    /// How many bones pass through cloth.
+    pub fn crossings(&self, positions: &[[f64; 3]], faces: &[[u32; 3]], arms: ArmTurn) -> usize {
+        let mut bones: Vec<Segment> = self.bones(arms).into_iter().flat_map(|(bones, _)| bones).collect();
+        bones.sort_by(|a, b| a.as_flattened().partial_cmp(b.as_flattened()).unwrap_or(std::cmp::Ordering::Equal));
+        bones.dedup();
+        let (mut low, mut high) = ([f64::MAX; 3], [f64::MIN; 3]);
+        for p in bones.as_flattened() {
+            (0..3).for_each(|k| (low[k], high[k]) = (low[k].min(p[k]), high[k].max(p[k])));
+        }
+        let crossed = |bone: &&Segment| {
+            faces.iter().any(|f| {
+                let corners = f.map(|v| positions[v as usize]);
+                let is_near = (0..3).all(|k| {
+                    let (least, most) = (bone[0][k].min(bone[1][k]), bone[0][k].max(bone[1][k]));
+                    corners.iter().any(|c| c[k] <= most) && corners.iter().any(|c| c[k] >= least)
+                });
+                is_near && passes_through(bone, &corners) != 0
+            })
+        };
+        bones.iter().filter(crossed).count()
+    }
+
+    /// What a closed border goes around: the limbs whose ends its spanning surface separates from the other ends.
+    pub fn opening(&self, border: &[[f64; 3]], arms: ArmTurn) -> Opening {
+        let centre = scale(border.iter().fold([0.0; 3], |s, p| add(s, *p)), 1.0 / border.len().max(1) as f64);
+        let through = self.bones(arms).map(|(bones, beyond)| {
+            let segments = bones.iter().chain(&beyond);
+            segments
+                .map(|segment| {
+                    let fan = (0..border.len()).map(|i| [border[i], border[(i + 1) % border.len()], centre]);
+                    fan.map(|triangle| passes_through(segment, &triangle)).sum::<i32>()
+                })
+                .sum::<i32>()
+        });
+        let apart = |limb: usize| through[limb] != through[0];
+        match [apart(1), apart(2), apart(3), apart(4)] {
+            [false, false, false, false] => Opening::Nothing,
+            [true, true, true, true] => Opening::Neck,
+            [true, false, false, false] => Opening::LeftArm,
+            [false, true, false, false] => Opening::RightArm,
+            [false, false, true, false] => Opening::LeftLeg,
+            [false, false, false, true] => Opening::RightLeg,
+            [false, false, true, true] => Opening::Trunk,
+            _ => Opening::Several,
+        }
+    }
+}
+
+/// +1 or −1 where the segment passes through the triangle along or against its normal, else 0.
+fn passes_through([a, b]: &Segment, [p, q, r]: &[[f64; 3]; 3]) -> i32 {
+    let normal = cross(sub(*q, *p), sub(*r, *p));
+    let (from, to) = (dot(normal, sub(*a, *p)), dot(normal, sub(*b, *p)));
+    if (from < 0.0) == (to < 0.0) {
+        return 0;
+    }
+    let direction = sub(*b, *a);
+    let side = |u: [f64; 3], v: [f64; 3]| dot(direction, cross(sub(u, *a), sub(v, *a))) > 0.0;
+    let sides = [side(*p, *q), side(*q, *r), side(*r, *p)];
+    if sides == [true; 3] || sides == [false; 3] { if to > from { 1 } else { -1 } } else { 0 }
+}

@@ -1,0 +1,222 @@
+//! The T-posed body as the placement search sees it: signed distances on grids, with arms that turn at the shoulders.
+
+use crate::asset::{Body, skeleton};
+use crate::mesh::DistanceGrid;
+use clothcombo_physics::vec3::{add, norm, scale, sub};
+use clothcombo_physics::{Topology, TriMesh};
+
+/// Node spacing of the grids (m).
+const STEP: f64 = 0.02;
+/// Largest distance the grids tell (m): cloth farther away says nothing about where it belongs.
+const BAND: f64 = 0.25;
+
+/// Signed distance to the body with its arms lowered by any angle.
+///
+/// Trunk and arms are closed surfaces of their own; the distance to their union is the least of the three.
+pub(super) struct BodyField {
+    trunk: DistanceGrid,
+    arms: Vec<Arm>,
+    levels: [f64; 2],
+    pub rims: [f64; 2],
+    /// Lowest and highest corner of the zero body (m).
+    pub low: [f64; 3],
+    pub high: [f64; 3],
+    /// Mean z of the spine (m).
+    pub spine_z: f64,
+}
+
+struct Arm {
+    /// +1 for the left arm, −1 for the right one.
+    side: f64,
+    shoulder: [f64; 3],
+    /// Radius of the cut through the shoulder (m): the deltoid stays round when the arm turns.
+    radius: f64,
+    distance: DistanceGrid,
+}
+
+/// Sine and cosine of the angle by which arms hang below the horizontal.
+#[derive(Clone, Copy)]
+pub(super) struct ArmTurn {
+    sine: f64,
+    cosine: f64,
+}
+
+impl ArmTurn {
+    pub fn new(degrees: f64) -> Self {
+        let (sine, cosine) = degrees.to_radians().sin_cos();
+        Self { sine, cosine }
+    }
+
+    /// A point of the lowered arm of this side, raised to the T-pose.
+    fn raised(self, p: [f64; 3], shoulder: [f64; 3], side: f64) -> [f64; 3] {
+        let [x, y, z] = sub(p, shoulder);
+        let sine = side * self.sine;
+        add(shoulder, [self.cosine * x - sine * y, sine * x + self.cosine * y, z])
+    }
+
+    /// The inverse of [`ArmTurn::raised`].
+    pub fn lowered(self, p: [f64; 3], shoulder: [f64; 3], side: f64) -> [f64; 3] {
+        Self { sine: -self.sine, ..self }.raised(p, shoulder, side)
+    }
+}
+
+impl BodyField {
+    pub fn new(body: &Body) -> Self {
+        let side_of_joint = arm_sides(body);
+        let side = |face: &[u32; 3]| {
+            let mut share = [0.0; 2];
+            for v in face {
+                let (joints, weights) = body.skin_weights.row(*v as usize);
+                for (joint, weight) in joints.iter().zip(weights) {
+                    if let Some(side) = side_of_joint[usize::from(*joint)] {
+                        share[side] += f64::from(*weight) / 3.0;
+                    }
+                }
+            }
+            (0..2).find(|s| share[*s] > 0.5)
+        };
+        let mut parts: [Vec<[u32; 3]>; 3] = Default::default();
+        body.faces.iter().for_each(|f| parts[side(f).unwrap_or(2)].push(*f));
+        let [left, right, trunk] = &parts;
+        let distance = |faces: &[[u32; 3]]| {
+            let (positions, faces, radius) = closed(&body.template, faces);
+            (DistanceGrid::new(&positions, &faces, STEP, BAND), radius)
+        };
+        let (mut trunk, (left, right)) = rayon::join(
+            || distance(trunk).0,
+            || rayon::join(|| arm(body, left, 0, &distance), || arm(body, right, 1, &distance)),
+        );
+        let mut levels = [-0.1, 0.15];
+        let mut rims = [0.15, 0.35];
+        if let Ok(fit) = crate::generate::garment::fit::BodyFit::new(body)
+            && std::env::var("NOFORM").is_err()
+        {
+            let (bottom, top) = (fit.landmarks.crotch, fit.landmarks.armpit - 0.02);
+            rims = [fit.landmarks.waist - 0.03, fit.landmarks.armpit - 0.035];
+            levels = [fit.landmarks.crotch, fit.landmarks.waist];
+            trunk.unite(|p| if p[1] > bottom && p[1] < top { fit.column.value(p) } else { f64::MAX });
+            if std::env::var("FIT_DEBUG").is_ok() {
+                eprintln!("{:?}", fit.landmarks);
+            }
+        }
+        let (low, high) = body.zero_body().bounds();
+        let spine = ["pelvis", "spine1", "spine2", "spine3"].map(|name| joint(body, name));
+        let spine: Vec<f64> = spine.into_iter().flatten().map(|p| p[2]).collect();
+        let spine_z = spine.iter().sum::<f64>() / spine.len().max(1) as f64;
+        Self { rims, levels, trunk, arms: left.into_iter().chain(right).collect(), low, high, spine_z }
+    }
+
+    /// Signed distance of `p` to the body (m), outside positive, at most the band of the grids.
+    pub fn gap(&self, p: [f64; 3], arms: ArmTurn) -> (f64, usize) {
+        let mut gap = self.trunk.distance(p);
+        let mut part = self.levels.iter().filter(|l| **l < p[1]).count();
+        for arm in &self.arms {
+            let raised = arms.raised(p, arm.shoulder, arm.side);
+            let d = arm.distance.distance(raised).min(norm(sub(p, arm.shoulder)) - arm.radius);
+            if d < gap {
+                (gap, part) = (d, 3);
+            }
+        }
+        (gap, part)
+    }
+}
+
+fn arm(
+    body: &Body,
+    faces: &[[u32; 3]],
+    side: usize,
+    distance: &dyn Fn(&[[u32; 3]]) -> (DistanceGrid, f64),
+) -> Option<Arm> {
+    let shoulder = joint(body, SHOULDERS[side]).filter(|_| !faces.is_empty())?;
+    let (distance, radius) = distance(faces);
+    Some(Arm { side: [1.0, -1.0][side], shoulder, radius: 0.9 * radius, distance })
+}
+
+/// Names of the joints that lower the left and the right arm.
+const SHOULDERS: [&str; 2] = ["left_shoulder", "right_shoulder"];
+
+/// Where a joint of the zero body lies (m), by its SMPL name.
+pub(super) fn joint(body: &Body, name: &str) -> Option<[f64; 3]> {
+    let named = body.joint_names.iter().position(|n| n == name);
+    named.or(skeleton::joint_index(name)).and_then(|j| body.joint_template.get(j)).copied()
+}
+
+/// For every joint whether it belongs to the left (0) or right (1) arm, from the shoulder on.
+fn arm_sides(body: &Body) -> Vec<Option<usize>> {
+    let mut sides: Vec<Option<usize>> = Vec::with_capacity(body.joint_count());
+    for (joint, name) in body.joint_names.iter().enumerate() {
+        let own = SHOULDERS.iter().position(|s| s == name);
+        sides.push(own.or(body.parents[joint].and_then(|parent| sides[parent])));
+    }
+    sides
+}
+
+/// Faces with every border closed by a fan around its centroid, and the mean radius of the longest border (m).
+fn closed(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> (Vec<[f64; 3]>, Vec<[u32; 3]>, f64) {
+    let mut number = vec![u32::MAX; positions.len()];
+    let mut used = Vec::new();
+    let mut all: Vec<[u32; 3]> = faces
+        .iter()
+        .map(|f| {
+            f.map(|v| {
+                if number[v as usize] == u32::MAX {
+                    number[v as usize] = used.len() as u32;
+                    used.push(positions[v as usize]);
+                }
+                number[v as usize]
+            })
+        })
+        .collect();
+    let (mut longest, mut radius) = (0, 0.0);
+    let Ok(mesh) = TriMesh::new(used.clone(), all.clone()) else { return (used, all, radius) };
+    for border in Topology::new(&mesh).boundary_loops {
+        let count = border.len() as f64;
+        let sum = border.iter().fold([0.0; 3], |sum, v| add(sum, used[*v as usize]));
+        let centre = scale(sum, 1.0 / count);
+        if border.len() > longest {
+            longest = border.len();
+            radius = border.iter().map(|v| norm(sub(used[*v as usize], centre))).sum::<f64>() / count;
+        }
+        let tip = used.len() as u32;
+        used.push(centre);
+        all.extend((0..border.len()).map(|i| [border[(i + 1) % border.len()], border[i], tip]));
+    }
+    (used, all, radius)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::arm_pose::ArmPose;
+    use super::*;
+    use crate::generate::mannequin;
+    use clothcombo_physics::query::Distance;
+
+    #[test]
+    fn distances_agree_with_the_surface_for_level_and_lowered_arms() {
+        let body = mannequin();
+        let field = BodyField::new(&body);
+        for degrees in [0.0, 45.0] {
+            let (turn, posed) = (ArmTurn::new(degrees), ArmPose::new(&body, degrees));
+            let mut errors: Vec<f64> = (0..3000)
+                .map(|i| {
+                    let t = [0.754_877_666, 0.569_840_291, 0.438_579_021].map(|s| (s * f64::from(i)).fract());
+                    let p = std::array::from_fn(|k| field.low[k] + t[k] * (field.high[k] - field.low[k]));
+                    let exact = posed.surface.gap(p, Distance::ClosestPoint).gap;
+                    (field.gap(p, turn).0 - exact.min(BAND)).abs()
+                })
+                .collect();
+            errors.sort_by(f64::total_cmp);
+            assert!(errors[2700] < 0.004, "{degrees}°: 90 % within {}", errors[2700]);
+        }
+    }
+
+    #[test]
+    fn lowering_undoes_raising() {
+        let turn = ArmTurn::new(33.0);
+        let (p, shoulder) = ([0.4, 0.1, 0.3], [0.2, 0.5, 0.0]);
+        let there = turn.lowered(p, shoulder, -1.0);
+        assert!(norm(sub(turn.raised(there, shoulder, -1.0), p)) < 1e-12);
+        let hand = turn.lowered([0.8, 0.5, 0.0], shoulder, 1.0);
+        assert!(hand[1] < 0.5 && hand[0] > 0.2, "a lowered left hand is below the shoulder: {hand:?}");
+    }
+}
