@@ -13,7 +13,7 @@ const NEARER: f64 = 0.0015;
 /// Scale of what lies there (m).
 const LYING: [f64; 4] = [0.002, 0.004, 0.008, 0.016];
 /// Mean distance where it hangs (m).
-const HANGING: f64 = 0.08;
+const HANGING: f64 = 0.2;
 /// Mean depth where it is inside (m).
 const DEPTH: f64 = 0.01;
 /// Shares of what lies, hangs and is inside.
@@ -34,13 +34,14 @@ static TABLE: LazyLock<Vec<[f32; KINDS]>> = LazyLock::new(|| {
 
 /// Logarithm of the density of a gap (1/m).
 fn log_density(gap: f64, ease: f64, spread: f64) -> f64 {
+    let (nearer, hang, depth, share) = (env("NEARER", 0.0015), env("HANG", 0.2), env("DEPTH", 0.01), env("INS", 0.06));
     let from = gap - ease;
-    let lying = (-from.max(0.0) / spread).exp() * (from.min(0.0) / NEARER).exp() / (spread + NEARER);
+    let lying = (-from.max(0.0) / spread).exp() * (from.min(0.0) / nearer).exp() / (spread + nearer);
     let [hanging, inside] = match gap >= 0.0 {
-        true => [(-gap / HANGING).exp() / HANGING, 0.0],
-        false => [0.0, (gap / DEPTH).exp() / DEPTH],
+        true => [(-gap / hang).exp() / hang, 0.0],
+        false => [0.0, (gap / depth).exp() / depth],
     };
-    (SHARES[0] * lying + SHARES[1] * hanging + SHARES[2] * inside).max(1e-9).ln()
+    (SHARES[0] * lying + SHARES[1] * hanging + share * inside).max(1e-9).ln()
 }
 
 /// Logarithm of the density of the gaps (m) at each part of the body, at the most likely ease and spread of each part.
@@ -50,9 +51,11 @@ pub(super) fn log_likelihood(gaps: impl ExactSizeIterator<Item = (f64, usize)>, 
     for (gap, part) in gaps {
         sums[part].iter_mut().zip(&TABLE[row(gap)]).for_each(|(s, l)| *s += l);
     }
-    let score = |(k, sum): (usize, &f32)| evidence * f64::from(*sum) / count - EASES[k % EASES.len()] / USUAL_EASE;
+    let score = |(k, sum): (usize, &f32)| evidence * f64::from(*sum) / count - EASES[k % EASES.len()] / *USUAL;
     sums.iter().map(|sums| sums.iter().enumerate().map(score).fold(f64::MIN, f64::max)).sum()
 }
+
+static USUAL: LazyLock<f64> = LazyLock::new(|| env("USUAL", 0.01));
 
 /// Parts of the body on which cloth may lie differently: legs, hips, chest, arms.
 pub(super) const PARTS: usize = 4;
@@ -78,4 +81,8 @@ static ROUGH: LazyLock<Vec<f32>> = LazyLock::new(|| {
 
 fn row(gap: f64) -> usize {
     ((gap - LOW) / RESOLUTION + 0.5).clamp(0.0, (ROWS - 1) as f64) as usize
+}
+
+pub(super) fn env(name: &str, default: f64) -> f64 {
+    std::env::var(name).ok().and_then(|s| s.parse().ok()).unwrap_or(default)
 }

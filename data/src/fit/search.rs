@@ -16,6 +16,7 @@ use clothcombo_physics::vec3::add;
 use rayon::prelude::*;
 
 /// Independent samples a garment is worth: neighbouring cloth lies alike.
+static RIM_EVIDENCE: std::sync::LazyLock<f64> = std::sync::LazyLock::new(|| super::likelihood::env("RIME", 8.0));
 const EVIDENCE: f64 = 40.0;
 /// Arm angles tried first (degrees).
 const ARM_ANGLES: [f64; 6] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0];
@@ -44,8 +45,8 @@ pub(super) struct Candidate {
     /// Log-posterior up to a constant.
     pub score: f64,
     pub crossings: usize,
-    /// Height of the upper rim before the translation (m), if the garment hangs from one.
-    pub rim: Option<f64>,
+    /// The border that is its upper rim, if the garment hangs from one.
+    pub rim: Option<usize>,
     pub is_worn: bool,
 }
 
@@ -93,13 +94,17 @@ impl Search {
                 let mut started = self.started(base, &arms, &coarse, settings);
                 started.sort_by(|a, b| b.score.total_cmp(&a.score));
                 started.truncate(60);
+                let mut from_rims = self.started_from_rims(base, &coarse, cloth, settings);
+                from_rims.sort_by(|a, b| b.score.total_cmp(&a.score));
+                from_rims.truncate(6);
+                from_rims.extend(started);
                 let mut worn: Vec<Candidate> =
-                    started.into_iter().map(|c| self.with_openings(c, cloth)).filter(|c| c.is_worn).collect();
+                    from_rims.into_iter().map(|c| self.with_openings(c, cloth)).filter(|c| c.is_worn).collect();
                 worn = self.distinct(worn);
-                worn.truncate(8);
+                worn.truncate(10);
                 worn.into_iter().map(|c| {
-                    let c = self.with_openings(self.refined(&c, &coarse, settings, 0.04, 0.01), cloth);
-                    self.with_openings(self.refined(&c, &coarse, settings, 0.019, 0.004), cloth)
+                    let c = self.with_openings(self.refined(&c, &coarse, settings, cloth, 0.04, 0.01), cloth);
+                    self.with_openings(self.refined(&c, &coarse, settings, cloth, 0.019, 0.004), cloth)
                 })
             })
             .collect();
@@ -112,11 +117,10 @@ impl Search {
             .par_iter()
             .map(|c| {
                 let c = match c.placement.origin {
-                    Origin::Elsewhere => self.refined(c, &fine, settings, 0.01, 0.0005),
+                    Origin::Elsewhere => self.refined(c, &fine, settings, cloth, 0.01, 0.0005),
                     _ => {
                         let c = self.with_openings(self.scored(c.placement, &fine, settings), cloth);
-                        let rim = c.rim.map_or(0.0, |y| self.rim_prior(y + c.placement.translation[1]));
-                        Candidate { score: c.score + rim, ..c }
+                        self.with_rim(c, cloth)
                     }
                 };
                 self.with_anatomy(c, cloth)
@@ -168,6 +172,34 @@ impl Search {
         all
     }
 
+    /// Each of the longest borders around the trunk, at every height.
+    fn started_from_rims(&self, base: &Placement, coarse: &Samples, cloth: &Cloth, settings: &FitSettings) -> Vec<Candidate> {
+        if settings.offset.is_some() || settings.arms_lowered == Some(true) {
+            return Vec::new();
+        }
+        let points = base.apply(&coarse.0);
+        let mut borders: Vec<usize> = (0..cloth.borders.len()).collect();
+        borders.sort_by_key(|b| std::cmp::Reverse(cloth.borders[*b].len()));
+        let mut all = Vec::new();
+        for &border in borders.iter().take(3) {
+            let of = Candidate { placement: *base, fit: 0.0, score: 0.0, crossings: 0, rim: Some(border), is_worn: true };
+            let rim = self.rim_points(&of, cloth);
+            let sum = rim.iter().fold([0.0; 3], |sum, p| add(sum, *p));
+            let centre = sum.map(|x| x / rim.len().max(1) as f64);
+            for height in 0..20 {
+                let y = self.field.rims[0] - 0.15 + 0.025 * f64::from(height);
+                for forward in [0.0, 0.03] {
+                    let translation = [-centre[0], y - centre[1], self.field.spine_z + forward - centre[2]];
+                    let p = Placement { translation, origin: Origin::Elsewhere, ..*base };
+                    let scored = self.roughly_scored(p, &points, settings);
+                    let score = scored.score + self.rim_score(&rim, &p);
+                    all.push(Candidate { rim: Some(border), score, ..scored });
+                }
+            }
+        }
+        all
+    }
+
     fn scored(&self, placement: Placement, samples: &Samples, settings: &FitSettings) -> Candidate {
         let points = Placement { translation: [0.0; 3], ..placement }.apply(&samples.0);
         self.scored_at(placement, &points, settings)
@@ -194,13 +226,14 @@ impl Search {
     }
 
     /// Slid along the three axes, and the arms turned, as long as that helps.
-    fn refined(&self, start: &Candidate, samples: &Samples, settings: &FitSettings, from: f64, to: f64) -> Candidate {
+    fn refined(&self, start: &Candidate, samples: &Samples, settings: &FitSettings, cloth: &Cloth, from: f64, to: f64) -> Candidate {
         let points = Placement { translation: [0.0; 3], ..start.placement }.apply(&samples.0);
         let rough = from > 0.02;
+        let rim = self.rim_points(start, cloth);
         let scored = |placement: Placement| {
             let mut c = if rough { self.roughly_scored(placement, &points, settings) } else { self.scored_at(placement, &points, settings) };
             c.rim = start.rim;
-            c.score += c.rim.map_or(0.0, |y| self.rim_prior(y + placement.translation[1]));
+            c.score += self.rim_score(&rim, &placement);
             c
         };
         let mut best = scored(start.placement);
@@ -263,10 +296,34 @@ impl Search {
         candidate.is_worn = is_worn;
         candidate.rim = None;
         if !has(Opening::Neck) && !arms {
-            let heights = openings.iter().filter(|(o, _)| *o == Opening::Trunk).map(|(_, y)| y - candidate.placement.translation[1]);
-            candidate.rim = heights.max_by(f64::total_cmp);
+            let trunk = openings.iter().enumerate().filter(|(_, (o, _))| *o == Opening::Trunk);
+            candidate.rim = trunk.max_by(|a, b| a.1.1.total_cmp(&b.1.1)).map(|(border, _)| border);
         }
         candidate
+    }
+
+    /// What speaks for the upper rim: it lies on the body, all around, at the waist or above the chest.
+    fn rim_score(&self, rim: &[[f64; 3]], placement: &Placement) -> f64 {
+        if rim.is_empty() {
+            return 0.0;
+        }
+        let arms = ArmTurn::new(placement.arm_angle_degrees);
+        let height = rim.iter().map(|p| p[1]).sum::<f64>() / rim.len() as f64 + placement.translation[1];
+        let gaps = rim.iter().map(|p| (self.field.gap(add(*p, placement.translation), arms).0, 0));
+        log_likelihood(gaps, *RIM_EVIDENCE) + self.rim_prior(height)
+    }
+
+    /// At most 60 points of the rim, scaled and turned, not translated.
+    fn rim_points(&self, candidate: &Candidate, cloth: &Cloth) -> Vec<[f64; 3]> {
+        let Some(border) = candidate.rim.map(|i| &cloth.borders[i]) else { return Vec::new() };
+        let stride = border.len().div_ceil(60);
+        let points: Vec<[f64; 3]> = border.iter().step_by(stride).map(|v| cloth.positions[*v as usize]).collect();
+        Placement { translation: [0.0; 3], ..candidate.placement }.apply(&points)
+    }
+
+    fn with_rim(&self, candidate: Candidate, cloth: &Cloth) -> Candidate {
+        let rim = self.rim_points(&candidate, cloth);
+        Candidate { score: candidate.score + self.rim_score(&rim, &candidate.placement), ..candidate }
     }
 
     /// Log-density of the height of an upper rim (m): at the waist, or above the chest.
@@ -287,12 +344,14 @@ impl Search {
 
     pub fn judge(&self, p: Placement, cloth: &Cloth, settings: &FitSettings) -> Candidate {
         let fine = Samples::new(cloth.positions, cloth.faces, 1000);
-        let mut c = self.with_openings(self.scored(p, &fine, settings), cloth);
-        c.score += c.rim.map_or(0.0, |y| self.rim_prior(y + c.placement.translation[1]));
-        self.with_anatomy(c, cloth)
+        let c = self.with_openings(self.scored(p, &fine, settings), cloth);
+        self.with_anatomy(self.with_rim(c, cloth), cloth)
     }
 
     pub fn debug(&self, p: &Placement, cloth: &Cloth) {
+        for (b, (o, y)) in cloth.borders.iter().zip(self.openings(p, cloth)) {
+            eprintln!("border {} {o:?} {y:.3}", b.len());
+        }
         let fine = Samples::new(cloth.positions, cloth.faces, 2000);
         let arms = ArmTurn::new(p.arm_angle_degrees);
         let mut bins = [0; 20];
