@@ -7,6 +7,7 @@ mod manifold;
 mod measures;
 mod push_out;
 mod remesh;
+mod seams;
 mod triangle;
 
 pub use clean::{
@@ -19,4 +20,5 @@ pub use manifold::{Joined, SplitMesh, join_faces, orient, outward_area, outwardn
 pub use measures::{MeshDefects, MeshMeasures};
 pub use push_out::{Contact, contact, one_rings, push_out};
 pub use remesh::{Quality, RemeshTarget, remesh};
+pub use seams::{COINCIDE_SHARE, JoinedSheet, Seam, join_seams, median_border_edge, open_seams};
 pub use triangle::{smallest_sine, triangle_normal};
