@@ -3,7 +3,7 @@
 use super::placement::{Origin, Placement};
 use super::sitting::Sitting;
 use crate::asset::Category;
-use crate::mesh::MeshMeasures;
+use crate::mesh::{MeshMeasures, Seam};
 use serde::Serialize;
 use std::fmt;
 
@@ -27,6 +27,12 @@ pub enum RepairKind {
     SplitVertices,
     /// Edges were cut because the surface has only one side (a Möbius band).
     CutOneSidedEdges,
+    /// Faces of the inner sheet and the rims of thick cloth were dropped.
+    DroppedInnerSheet,
+    /// Faces of all pieces but the largest were dropped.
+    DroppedPieces,
+    /// Vertices of borders that run along each other were joined.
+    JoinedSeams,
     /// Faces were turned, to agree with their neighbours and to face away from the body.
     TurnedFaces,
     /// Vertices were moved out of the body, or away from it to the least distance.
@@ -45,6 +51,9 @@ impl RepairKind {
             Self::CutNonManifoldEdges => "cut non-manifold edges",
             Self::SplitVertices => "split vertices that only touch",
             Self::CutOneSidedEdges => "cut edges of a one-sided surface",
+            Self::DroppedInnerSheet => "dropped the inner sheet and rims of thick cloth",
+            Self::DroppedPieces => "dropped all pieces but the largest",
+            Self::JoinedSeams => "joined vertices of open seams",
             Self::TurnedFaces => "turned faces",
             Self::PushedOut => "pushed vertices out of the body",
         }
@@ -118,6 +127,74 @@ pub struct MeshPiece {
     pub boundary_loops: usize,
 }
 
+impl fmt::Display for MeshPiece {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { vertices, triangles, area, boundary_loops } = self;
+        write!(f, "{vertices} vertices, {triangles} triangles, {area:.4} m², ")?;
+        match boundary_loops {
+            0 => write!(f, "closed"),
+            1 => write!(f, "1 boundary loop"),
+            n => write!(f, "{n} boundary loops"),
+        }
+    }
+}
+
+/// Two borders of the file that run along each other.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct SeamReport {
+    /// Whether they were joined.
+    pub joined: bool,
+    /// Length (mm).
+    pub length_mm: f64,
+    /// Median distance between the borders (mm).
+    pub gap_mm: f64,
+    /// Largest distance between them (mm).
+    pub widest_mm: f64,
+    /// First and last vertex of one of the borders in the file, counted from 0.
+    pub vertices: [u32; 2],
+}
+
+impl SeamReport {
+    /// `metres` of the file's unit; the ends are vertices of the file.
+    pub(super) fn new(seam: &Seam, metres: f64, joined: bool) -> Self {
+        let [length_mm, gap_mm, widest_mm] =
+            [seam.length, seam.gap, seam.widest].map(|length| 1e3 * metres * length);
+        Self { joined, length_mm, gap_mm, widest_mm, vertices: seam.ends }
+    }
+}
+
+/// Seams in the report: how many of them are named one by one.
+const SHOWN_SEAMS: usize = 8;
+
+/// The joined or the open ones of `seams` in words; nothing if there are none.
+fn write_seams(f: &mut fmt::Formatter<'_>, seams: &[SeamReport], joined: bool) -> fmt::Result {
+    let found: Vec<&SeamReport> = seams.iter().filter(|seam| seam.joined == joined).collect();
+    if found.is_empty() {
+        return Ok(());
+    }
+    let count = if found.len() == 1 { "1 seam".to_owned() } else { format!("{} seams", found.len()) };
+    let (head, verb) = if joined { ("repaired  joined", "ran") } else { ("open     ", "run") };
+    writeln!(f, "{head} {count}: borders that {verb} along each other")?;
+    for seam in found.iter().take(SHOWN_SEAMS) {
+        let [first, last] = seam.vertices;
+        writeln!(
+            f,
+            "          {:.0} mm long, {:.2} mm apart, between vertices {first} and {last}",
+            seam.length_mm, seam.gap_mm
+        )?;
+    }
+    if found.len() > SHOWN_SEAMS {
+        writeln!(f, "          and {} more", found.len() - SHOWN_SEAMS)?;
+    }
+    let widest = found.iter().map(|seam| seam.widest_mm).fold(0.0, f64::max);
+    match joined {
+        true => Ok(()),
+        false => {
+            writeln!(f, "          join them with --join-seams {:.0}mm", (1.05 * widest).ceil().max(1.0))
+        }
+    }
+}
+
 /// Where the fitted garment and the body meet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct BodyContact {
@@ -150,6 +227,10 @@ pub struct FitReport {
     pub sitting: Sitting,
     /// All repairs, in the order they were made.
     pub repairs: Vec<Repair>,
+    /// Seams that were joined, and those that stay open.
+    pub seams: Vec<SeamReport>,
+    /// Pieces that were left out on request, the largest first.
+    pub dropped_pieces: Vec<MeshPiece>,
     /// Edges that still have more than two faces, by vertices of the file.
     pub unrepaired_edges: Vec<[u32; 2]>,
     /// Connected pieces, the largest first.
@@ -237,19 +318,13 @@ impl fmt::Display for FitReport {
         for [a, b] in &self.unrepaired_edges {
             writeln!(f, "warning   edge {a}–{b} still has more than two faces")?;
         }
+        write_seams(f, &self.seams, true)?;
+        write_seams(f, &self.seams, false)?;
+        for piece in &self.dropped_pieces {
+            writeln!(f, "dropped   {piece}")?;
+        }
         for (number, piece) in self.pieces.iter().enumerate() {
-            writeln!(
-                f,
-                "piece {number:<3} {} vertices, {} triangles, {:.4} m², {}",
-                piece.vertices,
-                piece.triangles,
-                piece.area,
-                match piece.boundary_loops {
-                    0 => "closed".into(),
-                    1 => "1 boundary loop".into(),
-                    n => format!("{n} boundary loops"),
-                }
-            )?;
+            writeln!(f, "piece {number:<3} {piece}")?;
         }
         let (m, c) = (&self.mesh, &self.contact);
         writeln!(

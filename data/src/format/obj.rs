@@ -3,12 +3,15 @@
 //! Own parser, because a message must name the line: the usual libraries report neither it nor the offending index.
 
 mod moved;
+mod repaired;
 mod statements;
 
 pub use moved::MovedObj;
+pub use repaired::RepairedForm;
 
 use super::atomic;
 use super::error::FileError;
+use super::file_face::FileFace;
 use super::polygon_mesh::{NO_FACES, PolygonMesh, check_count, read_limited};
 use crate::mesh::fan;
 use clothcombo_physics::mesh::TriMesh;
@@ -194,6 +197,44 @@ pub fn save_polygons<'a>(
         text.push('f');
         for corner in polygon {
             let _ = write!(text, " {}", u64::from(*corner) + 1);
+        }
+        text.push('\n');
+    }
+    atomic::write(path, text.as_bytes()).map_err(FileError::io(path))
+}
+
+/// As [`save`], with faces that came of a file's faces, and the texture coordinates that belong to that file's vertices, if it has
+/// any. `polygons` are the file's, corners 0-based.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn save_file_faces(
+    path: &Path,
+    positions: &[[f64; 3]],
+    faces: &[FileFace],
+    file: &PolygonMesh,
+    comments: &[String],
+) -> Result<(), FileError> {
+    let mut text = String::with_capacity(positions.len() * 64);
+    for line in comments.iter().flat_map(|comment| comment.lines()) {
+        let _ = writeln!(text, "# {line}");
+    }
+    for [x, y, z] in positions {
+        let _ = writeln!(text, "v {x:.7} {y:.7} {z:.7}");
+    }
+    for [u, v] in &file.texture {
+        let _ = writeln!(text, "vt {u:.6} {v:.6}");
+    }
+    let polygons: Vec<&[u32]> = file.polygons().collect();
+    for face in faces {
+        text.push('f');
+        let polygon = polygons.get(face.face as usize).copied().unwrap_or_default();
+        for [vertex, corner] in &face.corners {
+            let _ = write!(text, " {}", u64::from(*vertex) + 1);
+            let named = polygon.get(*corner as usize).filter(|v| file.texture.len() > **v as usize);
+            if let Some(named) = named {
+                let _ = write!(text, "/{}", u64::from(*named) + 1);
+            }
         }
         text.push('\n');
     }

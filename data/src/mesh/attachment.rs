@@ -30,10 +30,13 @@ impl Attachment {
 
     /// Where the point is on a sheet at `positions` with these unit vertex `normals`.
     pub fn position(&self, positions: &[[f64; 3]], normals: &[[f64; 3]]) -> [f64; 3] {
-        if self.offset == [0.0; 3] && self.weights[0] == 1.0 {
+        if self.weights[0] == 1.0 && self.offset == [0.0; 3] {
             return positions[self.corners[0] as usize];
         }
         let foot = blend(self.corners, self.weights, positions);
+        if self.offset == [0.0; 3] {
+            return foot;
+        }
         let axes = frame(self.corners, self.weights, positions, normals);
         axes.iter().zip(self.offset).fold(foot, |p, (axis, length)| add_scaled(p, length, *axis))
     }

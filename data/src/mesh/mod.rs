@@ -14,8 +14,8 @@ mod triangle;
 
 pub use attachment::{Attachment, attach};
 pub use clean::{
-    AREA_SHARE, CleanFaces, WELD_SHARE, Welded, bounds, clean_faces, compact, diagonal, fan, triangulate,
-    weld,
+    AREA_SHARE, CleanFaces, Triangulated, WELD_SHARE, Welded, bounds, clean_faces, compact, diagonal, fan,
+    triangulate, weld,
 };
 pub use editable::EditableMesh;
 pub use labelled_triangles::LabelledTriangles;

@@ -13,7 +13,7 @@ use runs::{runs, seams};
 use stitch::stitch;
 
 /// Borders closer than this share of the median border edge coincide.
-pub const COINCIDE_SHARE: f64 = 0.1;
+pub const COINCIDE_SHARE: f64 = 0.05;
 /// Fewest edges, of median length, along which borders run for a seam.
 const LEAST_EDGES: f64 = 2.0;
 /// A seam is longer than this many times the gap.

@@ -69,7 +69,7 @@ fn panels_that_nearly_coincide_become_the_garment_again() {
         let panels = cut(&whole, |[x, _, z]| u32::from(x > 0.013) + 2 * u32::from(z > 0.004));
         assert!(shape(&panels).0 > 1);
         let (exact, _) = joined(&panels, Some(1e-6));
-        let (again, seams) = joined(&jittered(&panels, 0.025 * edge, seed), None);
+        let (again, seams) = joined(&jittered(&panels, 0.012 * edge, seed), None);
         assert_eq!(shape(&again), shape(&exact), "{category}");
         assert_eq!(shape(&again), shape(&whole), "{category}: {seams:?}");
         assert_eq!(again.face_count(), whole.face_count());
@@ -77,7 +77,7 @@ fn panels_that_nearly_coincide_become_the_garment_again() {
         let index = clothcombo_physics::query::VertexIndex::new(whole.positions());
         for p in again.positions() {
             let nearest = whole.positions()[index.nearest(*p).0 as usize];
-            assert!(norm(sub(*p, nearest)) < 0.1 * edge, "{category}");
+            assert!(norm(sub(*p, nearest)) < 0.05 * edge, "{category}");
         }
     }
 }
@@ -92,7 +92,7 @@ fn a_panel_that_was_turned_inside_out_is_joined() {
         .iter()
         .map(|f| if topology.component_of_vertex[f[0] as usize] == 1 { [f[0], f[2], f[1]] } else { *f });
     let turned = TriMesh::new(panels.positions().to_vec(), turned.collect()).unwrap();
-    let (again, _) = joined(&jittered(&turned, 0.02 * whole.median_edge_length(), 1), None);
+    let (again, _) = joined(&jittered(&turned, 0.012 * whole.median_edge_length(), 1), None);
     assert_eq!(shape(&again), shape(&whole));
     assert!(is_clean(&again));
 }

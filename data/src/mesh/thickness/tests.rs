@@ -55,7 +55,7 @@ fn the_outer_sheet_of_any_thickness_is_the_garment() {
 }
 
 #[test]
-fn sheets_without_rims_and_inside_out_solids_are_told_apart() {
+fn sheets_without_rims_are_told_apart() {
     let garment = generated(&mannequin(), Category::TShirt, 2, 700).rest;
     let (positions, polygons) = solidified(&garment, 0.004);
     let sheets = triangles(&polygons[..2 * garment.face_count()]);
