@@ -74,7 +74,7 @@ pub enum FitError {
     },
     /// Two sheets, where a garment is one.
     #[error(
-        "cloth with thickness: two sheets {thickness:.2e} apart in the file's unit ({:.1} % of its size) that face away from each \
+        "cloth with thickness: two sheets {thickness:.4} apart in the file's unit ({:.1} % of its size) that face away from each \
          other, where a garment is one sheet; --keep outer takes the outer one", 100.0 * share
     )]
     Thickness {
