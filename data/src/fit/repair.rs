@@ -95,7 +95,7 @@ fn manifold(file: &PolygonMesh) -> Result<Sheet, FitError> {
     made.crowded.iter().chain(&made.twisted).flatten().for_each(|w| at_cut[*w as usize] = true);
     let touching = (0..kept.len() as u32).filter(|w| kept[*w as usize] > 1 && !at_cut[*w as usize]);
     sheet.note(RepairKind::SplitVertices, Elements::Vertices(touching.map(file_vertex).collect()));
-    sheet.to_file_order(file);
+    sheet.number_as_file(file);
     Ok(sheet)
 }
 
@@ -174,7 +174,7 @@ fn join(sheet: &mut Sheet, file: &PolygonMesh, reach: Option<f64>) {
     sheet.seams.extend(named);
     sheet.split_faces(positions, faces, &parent, &became);
     oriented(sheet);
-    sheet.to_file_order(file);
+    sheet.number_as_file(file);
 }
 
 /// What needs the unit: joins borders within the distance that is asked for and lists the seams that stay open. `metres` of

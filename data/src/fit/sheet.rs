@@ -93,7 +93,7 @@ impl Sheet {
     }
 
     /// Leaves out vertices without a face and numbers the others as the file does.
-    pub fn to_file_order(&mut self, file: &PolygonMesh) {
+    pub fn number_as_file(&mut self, file: &PolygonMesh) {
         let polygons: Vec<&[u32]> = file.polygons().collect();
         let mut origin = vec![u32::MAX; self.positions.len()];
         // Corners that split an edge tell of a vertex only if nothing else does.
@@ -146,7 +146,7 @@ impl Sheet {
         self.corners = kept.iter().map(|f| self.corners[*f]).collect();
         self.turned = kept.iter().map(|f| self.turned[*f]).collect();
         self.dropped_faces.extend(&dropped);
-        self.to_file_order(file);
+        self.number_as_file(file);
         dropped
     }
 

@@ -11,7 +11,9 @@ const FOLDED: f64 = 0.9;
 /// Two points of one loop face each other only if the way along it is this many times the distance: a corner is no seam.
 const DETOUR: f64 = 3.0;
 /// A longer edge, in cells of the grid, is no part of a seam.
-const LONGEST: f64 = 1e4;
+const LONGEST: f64 = 128.0;
+/// More edges in one cell of the grid are a heap, not a seam: comparing all of them would not end.
+const CROWD: usize = 512;
 
 /// An edge with one face, in the face's direction.
 #[derive(Clone, Copy, Debug)]
@@ -127,7 +129,7 @@ impl<'a> Borders<'a> {
             for step in 0..=steps as u32 {
                 let at = add_scaled(start, edge.length * f64::from(step) / steps, edge.direction);
                 let list = self.grid.entry(at.map(|x| (x / self.cell).floor() as i64)).or_default();
-                if list.last() != Some(&number) {
+                if list.last() != Some(&number) && list.len() < CROWD {
                     list.push(number);
                 }
             }

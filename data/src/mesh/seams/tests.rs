@@ -83,6 +83,17 @@ fn panels_that_nearly_coincide_become_the_garment_again() {
 }
 
 #[test]
+fn sewn_garments_have_nothing_to_join() {
+    let body = mannequin();
+    for category in Category::ALL {
+        for seed in 1..5 {
+            let rest = generated(&body, category, seed, 300 * seed as usize).rest;
+            assert_eq!(join_seams(rest.positions(), rest.faces(), None), None, "{category} {seed}");
+        }
+    }
+}
+
+#[test]
 fn a_panel_that_was_turned_inside_out_is_joined() {
     let whole = generated(&mannequin(), Category::Skirt, 3, 400).rest;
     let panels = cut(&whole, |[x, ..]| u32::from(x > 0.0));

@@ -122,7 +122,7 @@ fn garment(value: toml::Value, hints: &FitSettings) -> Result<WantedGarment, Str
             Ok(WantedGarment { hints: entry.settings(hints)?, name: entry.file })
         }
         other => Err(format!(
-            "a {} is neither a name nor a table such as {{ file = \"tee.obj\", unit = \"cm\" }}",
+            "it is of type {}, neither a name nor a table such as {{ file = \"tee.obj\", unit = \"cm\" }}",
             other.type_str()
         )),
     }
@@ -225,7 +225,7 @@ mod tests {
             ("[[outfit]]\ngarments = []\nframes = \"9..1\"\n", "9..1"),
             ("[[outfit]]\ngarments = []\nframes = \"0..4\"\n", "no motion"),
             ("[[outfit]]\ngarments = []\npose = \"a\"\nmotion = \"b\"\n", "both"),
-            ("[[outfit]]\ngarments = [3]\n", "garment 1: a integer"),
+            ("[[outfit]]\ngarments = [3]\n", "garment 1: it is of type integer"),
             ("[[outfit]]\ngarments = [{ unit = \"cm\" }]\n", "file"),
             ("[[outfit]]\ngarments = [{ file = \"a\", size = 4 }]\n", "size"),
             ("[[outfit]]\ngarments = [\"b\", { file = \"a\", unit = \"ell\" }]\n", "garment 2: unit: 'ell'"),
