@@ -291,6 +291,24 @@ mod tests {
     }
 
     #[test]
+    fn faces_of_a_file_keep_its_texture_coordinates() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.obj");
+        let mut file = PolygonMesh::with_positions(vec![[0.0; 3]; 5]);
+        file.texture = vec![[0.0, 0.25], [1.0, 0.5], [1.0, 1.0], [0.5, 0.5]];
+        file.push(&[4, 3, 1, 0]);
+        // Its third vertex was left out.
+        let faces = [FileFace { face: 0, corners: vec![[3, 0], [2, 1], [1, 2], [0, 3]] }];
+        save_file_faces(&path, &[[1.0; 3]; 4], &faces, &file, &["skirt".into()]).unwrap();
+        let text = fs::read_to_string(&path).unwrap();
+        assert!(
+            text.starts_with("# skirt\nv 1.0000000") && text.contains("vt 0.000000 0.250000\n"),
+            "{text}"
+        );
+        assert!(text.ends_with("\nf 4 3/4 2/2 1/1\n"), "{text}");
+    }
+
+    #[test]
     fn what_is_saved_loads_again() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a/b.obj");

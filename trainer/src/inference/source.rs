@@ -9,7 +9,7 @@ use clothcombo_data::fit::{FitReport, FitSettings, fit, in_file_order, is_on_bod
 use clothcombo_data::folders::list_garment_folder;
 use clothcombo_data::format::{PolygonMesh, load_mesh};
 use clothcombo_data::generate::GarmentGenerator;
-use clothcombo_data::mesh::{Attachment, MeshMeasures};
+use clothcombo_data::mesh::{Attachment, MeshMeasures, thickness};
 use clothcombo_physics::mesh::{Topology, TriMesh};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -55,7 +55,11 @@ impl GivenGarment {
         let placed = match always_fit {
             Some(true) => None,
             Some(false) => Some(given.to_tri_mesh(path).map_err(DatasetError::data)?),
-            None => given.to_tri_mesh(path).ok().filter(|mesh| is_clean(mesh) && is_on_body(mesh, body)),
+            None => {
+                let lies =
+                    |mesh: &TriMesh| has_no_defects(mesh) && !needs_repair(mesh) && is_on_body(mesh, body);
+                given.to_tri_mesh(path).ok().filter(lies)
+            }
         };
         if let Some(rest) = placed {
             check_place(path, &rest, body)?;
@@ -86,9 +90,9 @@ fn check_place(path: &Path, rest: &TriMesh, body: &Body) -> Result<(), DraperErr
     }
 }
 
-/// Whether a mesh needs no repair.
-fn is_clean(mesh: &TriMesh) -> bool {
-    MeshMeasures::new(mesh, &Topology::new(mesh)).defects.counts().is_empty() && !needs_repair(mesh)
+/// Whether every edge, face and vertex of a mesh is as it should be.
+fn has_no_defects(mesh: &TriMesh) -> bool {
+    MeshMeasures::new(mesh, &Topology::new(mesh)).defects.counts().is_empty()
 }
 
 /// Finds garments by name: those of the given folders and those a model was trained on.
@@ -166,7 +170,13 @@ impl GarmentCatalog {
         };
         let made = loader.load(origin);
         let must_fit = always_fit.unwrap_or_else(|| {
-            !made.as_ref().is_ok_and(|garment| is_clean(&garment.rest) && is_on_body(&garment.rest, body))
+            // A model is used with the borders that it was trained with; they are not joined anew.
+            let lies = |rest: &TriMesh| {
+                has_no_defects(rest)
+                    && thickness(rest.positions(), rest.faces()).is_none()
+                    && is_on_body(rest, body)
+            };
+            !made.as_ref().is_ok_and(|garment| lies(&garment.rest))
         });
         if must_fit {
             let mut source = GivenGarment::read(&listed.path, body, Some(true), hints)?;

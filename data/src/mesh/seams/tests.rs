@@ -199,3 +199,37 @@ fn a_slit_closes_up_to_its_tip() {
     assert_eq!(again.vertex_count(), slit.vertex_count());
     assert_eq!(seams.len(), 1);
 }
+
+#[test]
+fn no_soup_makes_an_edge_with_three_faces_or_a_face_without_area() {
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    let mut changed = 0;
+    for case in 0..300 {
+        let count = rng.random_range(8..60);
+        let positions: Vec<[f64; 3]> = (0..count)
+            .map(|_| {
+                std::array::from_fn(|_| f64::from(rng.random_range(0..4)) + rng.random_range(-0.02..0.02))
+            })
+            .collect();
+        let soup: Vec<[u32; 3]> = (0..rng.random_range(20..80))
+            .map(|_| std::array::from_fn(|_| rng.random_range(0..count as u32)))
+            .collect();
+        let clean = crate::mesh::clean_faces(&positions, &soup, 1e-9);
+        let mut faces: Vec<[u32; 3]> = clean.kept.iter().map(|f| soup[*f as usize]).collect();
+        let (links, _) = join_faces(&positions, &faces);
+        orient(&mut faces, &links);
+        let split = split_fans(&positions, &faces, &links);
+        for reach in [None, Some(0.3), Some(2.0)] {
+            let Some(sheet) = join_seams(&split.positions, &split.faces, reach) else { continue };
+            changed += 1;
+            assert_eq!(sheet.faces.len(), sheet.parent.len());
+            assert!(
+                crate::mesh::clean_faces(&sheet.positions, &sheet.faces, 0.0).degenerate.is_empty(),
+                "{case}"
+            );
+            let mesh = TriMesh::new(sheet.positions, sheet.faces).unwrap();
+            assert!(Topology::new(&mesh).non_manifold_edges.is_empty(), "{case}");
+        }
+    }
+    assert!(changed > 100, "{changed}");
+}
