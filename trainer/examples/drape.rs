@@ -5,6 +5,7 @@
 //! ```
 
 use clothcombo_data::asset::Pose;
+use clothcombo_data::fit::FitSettings;
 use clothcombo_trainer::cli;
 use clothcombo_trainer::inference::{BodyState, Draper, DraperSettings, Stage};
 use miette::{Report, miette};
@@ -25,7 +26,7 @@ fn run() -> Result<(), Report> {
     let [inner, outer, ..] = catalog.names() else {
         return Err(miette!("the model's own garments are not there; use GivenGarment::read"));
     };
-    let sources = [inner, outer].map(|name| catalog.find(name, draper.body(), None));
+    let sources = [inner, outer].map(|name| catalog.find(name, draper.body(), None, &FitSettings::default()));
     let outfit = draper.outfit(sources.into_iter().collect::<Result<_, _>>()?)?;
 
     // The garments are embedded once; every body costs only what depends on it.

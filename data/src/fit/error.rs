@@ -72,6 +72,23 @@ pub enum FitError {
         /// Share of the edges.
         share: f64,
     },
+    /// Two sheets, where a garment is one.
+    #[error(
+        "cloth with thickness: two sheets {thickness:.4} apart in the file's unit ({:.1} % of its size) that face away from each \
+         other, where a garment is one sheet; --keep outer takes the outer one", 100.0 * share
+    )]
+    Thickness {
+        /// Median distance of the sheets in the file's unit.
+        thickness: f64,
+        /// The same as a share of the diagonal.
+        share: f64,
+    },
+    /// Thick cloth whose sheets cannot be told apart.
+    #[error(
+        "cloth with thickness whose outer and inner sheet cannot be told apart: delete the inner sheet and the rims in a modelling \
+         program"
+    )]
+    Sheets,
     /// No mesh after the repairs.
     #[error("no mesh is left: {0}")]
     Mesh(String),

@@ -15,24 +15,27 @@ mod report;
 mod samples;
 mod search;
 mod settings;
+mod sheet;
 mod sitting;
 
 pub use coverage::off_trunk;
 pub use error::FitError;
 pub use placed::is_on_body;
 pub use placement::{Origin, Placement, Unit, UpAxis};
-pub use report::{BodyContact, Elements, FitReport, MeshPiece, Repair, RepairKind};
+pub use repair::needs_repair;
+pub use report::{BodyContact, Elements, FitReport, MeshPiece, Repair, RepairKind, SeamReport};
 pub use settings::{FitSettings, Keep, MAX_VERTICES, MIN_TRIANGLES};
 pub use sitting::Sitting;
 
 use crate::asset::{Body, Category, Garment};
-use crate::format::PolygonMesh;
-use crate::mesh::{MeshMeasures, bounds, contact, push_out};
+use crate::format::{FileFace, PolygonMesh};
+use crate::mesh::{Attachment, MeshMeasures, bounds, contact, push_out};
 use arm_pose::ArmPose;
 use clothcombo_physics::contact::{self_triangle_pairs, triangle_pairs};
+use clothcombo_physics::mesh::vertex_normals;
 use clothcombo_physics::vec3::{norm, sub};
 use clothcombo_physics::{Topology, TriMesh};
-use repair::{repair, turn_outward};
+use repair::{finish_seams, repair, turn_outward};
 use search::{Cloth, Search};
 use settings::{MOST_STRETCH, MOST_STRETCHED};
 
@@ -50,6 +53,31 @@ pub struct Fitted {
     /// For every vertex of the file the vertex it became; `None` for one that was dropped. A vertex that was split became
     /// several, of which this is the first.
     pub vertex_of_file: Vec<Option<u32>>,
+    /// For every vertex of the file the place on the garment that it follows, dropped or not.
+    pub follows: Vec<Attachment>,
+    /// For every vertex of the garment the first vertex of the file that became it; ascending.
+    pub vertex_origin: Vec<u32>,
+    /// The garment's faces as polygons of the file where they still are, else as triangles; ascending by the file's face. As fans
+    /// around their first corners they are the garment's triangles.
+    pub file_faces: Vec<FileFace>,
+}
+
+impl Fitted {
+    /// Positions of the file's vertices, in their order, when the garment's are at `positions` (m).
+    pub fn in_file_order(&self, positions: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        in_file_order(&self.follows, positions, self.garment.rest.faces())
+    }
+}
+
+/// Positions (m) of the vertices of a file that follow a garment of `faces` at `positions`.
+pub fn in_file_order(follows: &[Attachment], positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Vec<[f64; 3]> {
+    // Most garments have no vertex that needs them.
+    let is_vertex = |place: &Attachment| place.offset == [0.0; 3];
+    let normals = match follows.iter().all(is_vertex) {
+        true => Vec::new(),
+        false => vertex_normals(positions, faces),
+    };
+    follows.iter().map(|place| place.position(positions, &normals)).collect()
 }
 
 /// Fits a mesh to the zero body of `body`.
@@ -57,7 +85,7 @@ pub struct Fitted {
 /// # Errors
 /// [`FitError`] if the mesh is not a garment of this body, with the reason.
 pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fitted, FitError> {
-    let mut sheet = repair(file)?;
+    let mut sheet = repair(file, settings)?;
     let mesh = TriMesh::new(sheet.positions.clone(), sheet.faces.clone())
         .map_err(|e| FitError::Mesh(e.to_string()))?;
     let topology = Topology::new(&mesh);
@@ -90,6 +118,12 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
     }
     let Some(placement) = candidates.first().map(|c| c.placement) else { return Err(FitError::Closed) };
     let sitting = Sitting::default();
+    let metres = placement.unit.metres();
+    let seams = finish_seams(&mut sheet, file, settings, metres);
+    let follows = sheet.followed(file, metres);
+    let mesh = TriMesh::new(sheet.positions.clone(), sheet.faces.clone())
+        .map_err(|e| FitError::Mesh(e.to_string()))?;
+    let topology = Topology::new(&mesh);
     let placed = placement.apply(&sheet.positions);
     let arms = ArmPose::new(body, placement.arm_angle_degrees);
     let mut positions =
@@ -116,12 +150,18 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
     let category = settings.category.unwrap_or_else(|| Category::guess(&rest, body));
     let holding = Garment::needs_holding(&rest, body);
     let of_file = |e: &[u32; 2]| e.map(|v| sheet.vertex_origin[v as usize]);
+    let dropped_pieces = sheet.dropped_pieces.iter();
+    let dropped_pieces =
+        dropped_pieces.map(|p| MeshPiece { area: p.area * metres * metres, ..p.clone() }).collect();
+    let file_faces = sheet.file_faces(file);
     let report = FitReport {
         file_vertices: file.positions.len(),
         file_faces: file.polygon_count(),
         placement,
         sitting,
         repairs: sheet.repairs,
+        seams,
+        dropped_pieces,
         unrepaired_edges: topology.non_manifold_edges.iter().map(of_file).collect(),
         pieces: pieces(&rest, &topology),
         category,
@@ -144,7 +184,8 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
         },
     };
     let garment = Garment { holding, ..Garment::new(category, rest) };
-    Ok(Fitted { garment, report, vertex_of_file: sheet.vertex_of_file })
+    let (vertex_of_file, vertex_origin) = (sheet.vertex_of_file, sheet.vertex_origin);
+    Ok(Fitted { garment, report, vertex_of_file, follows, vertex_origin, file_faces })
 }
 
 /// Share of the edges that became longer than [`MOST_STRETCH`] times what they were.

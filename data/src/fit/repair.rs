@@ -1,52 +1,51 @@
-//! Repairs that need no body: from the polygons of a file to triangles of manifold pieces that agree on a direction.
+//! Repairs that need no body: from the polygons of a file to triangles of manifold pieces that agree on a direction, of one sheet,
+//! with their seams joined.
 
 use super::error::FitError;
-use super::report::{Elements, Repair, RepairKind};
-use super::settings::{MAX_VERTICES, MIN_TRIANGLES};
+use super::report::{Elements, MeshPiece, RepairKind, SeamReport};
+use super::settings::{FitSettings, Keep, MAX_VERTICES, MIN_TRIANGLES};
+use super::sheet::{Corner, Sheet};
 use crate::format::PolygonMesh;
 use crate::mesh::{
-    AREA_SHARE, WELD_SHARE, clean_faces, diagonal, join_faces, orient, outward_area, split_fans, triangulate,
-    weld,
+    AREA_SHARE, JoinedSheet, Seam, WELD_SHARE, clean_faces, diagonal, join_faces, join_seams, open_seams,
+    orient, outer_sheet, outward_area, split_fans, thickness, triangulate, weld,
 };
-use clothcombo_physics::{Surface, Topology};
+use clothcombo_physics::mesh::is_inside_out;
+use clothcombo_physics::{Surface, Topology, TriMesh};
 
-/// Repaired faces in the file's coordinates, each vertex and face with its number in the file.
-pub(super) struct Repaired {
-    pub positions: Vec<[f64; 3]>,
-    pub vertex_origin: Vec<u32>,
-    /// The inverse: see [`Fitted::vertex_of_file`].
-    pub vertex_of_file: Vec<Option<u32>>,
-    pub faces: Vec<[u32; 3]>,
-    pub face_origin: Vec<u32>,
-    /// Faces turned so far.
-    pub turned: Vec<bool>,
-    pub repairs: Vec<Repair>,
-}
+/// Borders at most this far apart (m) are named as an open seam.
+const OPEN_GAP: f64 = 0.01;
+/// They are at least this long (m).
+const OPEN_LENGTH: f64 = 0.06;
+/// The outer sheet of cloth with thickness has from one to the other share of the area.
+const OUTER_SHARE: [f64; 2] = [0.3, 0.7];
 
-impl Repaired {
-    /// Adds a repair of some elements, if there are any.
-    pub fn note(&mut self, kind: RepairKind, elements: Elements) {
-        let elements = match elements {
-            Elements::Vertices(mut list) => {
-                list.sort_unstable();
-                list.dedup();
-                Elements::Vertices(list)
-            }
-            Elements::Faces(mut list) => {
-                list.sort_unstable();
-                list.dedup();
-                Elements::Faces(list)
-            }
-            Elements::Edges(list) => Elements::Edges(list),
-        };
-        if !elements.is_empty() {
-            self.repairs.push(Repair { kind, count: elements.len(), elements });
+/// Everything that needs neither body nor unit: weld, triangulate, drop, cut, orient each piece; keep what is asked for; join
+/// borders that coincide.
+pub(super) fn repair(file: &PolygonMesh, settings: &FitSettings) -> Result<Sheet, FitError> {
+    let mut sheet = manifold(file)?;
+    match settings.keep {
+        Keep::All => refuse_thickness(&sheet)?,
+        Keep::Largest => {
+            keep_largest(&mut sheet, file);
+            refuse_thickness(&sheet)?;
         }
+        Keep::Outer => keep_outer(&mut sheet, file)?,
     }
+    if sheet.faces.len() < MIN_TRIANGLES {
+        return Err(FitError::TooFewTriangles { triangles: sheet.faces.len() });
+    }
+    join(&mut sheet, file, None);
+    Ok(sheet)
 }
 
-/// Everything that needs no body: weld, triangulate, drop, cut, orient each piece.
-pub(super) fn repair(file: &PolygonMesh) -> Result<Repaired, FitError> {
+/// Whether a mesh that may lie on the body as it is should be fitted first: it has borders that coincide, or thickness.
+pub fn needs_repair(mesh: &TriMesh) -> bool {
+    let (positions, faces) = (mesh.positions(), mesh.faces());
+    join_seams(positions, faces, None).is_some() || thickness(positions, faces).is_some()
+}
+
+fn manifold(file: &PolygonMesh) -> Result<Sheet, FitError> {
     let mut used = vec![false; file.positions.len()];
     file.polygons().flatten().for_each(|v| used[*v as usize] = true);
     let used_vertices: Vec<u32> = (0..used.len() as u32).filter(|v| used[*v as usize]).collect();
@@ -62,36 +61,21 @@ pub(super) fn repair(file: &PolygonMesh) -> Result<Repaired, FitError> {
     let mut compact = vec![u32::MAX; file.positions.len()];
     used_vertices.iter().zip(&welded.number).for_each(|(v, w)| compact[*v as usize] = *w);
 
-    let (file_faces, polygon_of) = triangulate(&file.positions, file.polygons());
-    let renumbered: Vec<[u32; 3]> = file_faces.iter().map(|f| f.map(|v| compact[v as usize])).collect();
+    let cut = triangulate(&file.positions, file.polygons());
+    let renumbered: Vec<[u32; 3]> = cut.faces.iter().map(|f| f.map(|v| compact[v as usize])).collect();
     let clean = clean_faces(&welded.positions, &renumbered, AREA_SHARE * diagonal * diagonal);
     if clean.kept.len() < MIN_TRIANGLES {
         return Err(FitError::TooFewTriangles { triangles: clean.kept.len() });
     }
-    let mut faces: Vec<[u32; 3]> = clean.kept.iter().map(|f| renumbered[*f as usize]).collect();
-    let face_origin: Vec<u32> = clean.kept.iter().map(|f| polygon_of[*f as usize]).collect();
-    let (joined, crowded) = join_faces(&welded.positions, &faces);
-    let turned_faces = orient(&mut faces, &joined);
-    let split = split_fans(&welded.positions, &faces, &joined);
+    let faces: Vec<[u32; 3]> = clean.kept.iter().map(|f| renumbered[*f as usize]).collect();
+    let corners = clean.kept.iter().map(|f| cut.corners[*f as usize].map(Corner::own)).collect();
+    let face_origin = clean.kept.iter().map(|f| cut.polygon[*f as usize]).collect();
+    let mut sheet = Sheet::new(welded.positions, faces, face_origin, corners, compact);
+    let made = oriented(&mut sheet);
 
     let file_vertex = |w: u32| used_vertices[welded.origin[w as usize] as usize];
-    let mut first_of_welded = vec![None; welded.positions.len()];
-    for (v, w) in split.origin.iter().enumerate().rev() {
-        first_of_welded[*w as usize] = Some(v as u32);
-    }
-    let mut turned = vec![false; faces.len()];
-    turned_faces.iter().for_each(|f| turned[*f as usize] = true);
-    let mut sheet = Repaired {
-        vertex_origin: split.origin.iter().map(|w| file_vertex(*w)).collect(),
-        vertex_of_file: compact.iter().map(|w| first_of_welded.get(*w as usize).copied().flatten()).collect(),
-        positions: split.positions,
-        faces: split.faces,
-        face_origin,
-        turned,
-        repairs: Vec::new(),
-    };
-    let mut kept = vec![0u8; welded.positions.len()];
-    split.origin.iter().for_each(|w| kept[*w as usize] = kept[*w as usize].saturating_add(1));
+    let mut kept = vec![0u8; welded.origin.len()];
+    made.origin.iter().for_each(|w| kept[*w as usize] = kept[*w as usize].saturating_add(1));
     let of_file = |e: &[u32; 2]| e.map(file_vertex);
     let unused = (0..used.len() as u32).filter(|v| !used[*v as usize]);
     let lost = (0..kept.len() as u32).filter(|w| kept[*w as usize] == 0).map(file_vertex);
@@ -100,34 +84,142 @@ pub(super) fn repair(file: &PolygonMesh) -> Result<Repaired, FitError> {
     sheet.note(RepairKind::WeldedVertices, Elements::Vertices(merged));
     let large = file.polygons().enumerate().filter(|(_, p)| p.len() > 3).map(|(i, _)| i as u32).collect();
     sheet.note(RepairKind::TriangulatedFaces, Elements::Faces(large));
-    let polygons = |list: &[u32]| Elements::Faces(list.iter().map(|f| polygon_of[*f as usize]).collect());
+    let polygons = |list: &[u32]| Elements::Faces(list.iter().map(|f| cut.polygon[*f as usize]).collect());
     sheet.note(RepairKind::DroppedDegenerateFaces, polygons(&clean.degenerate));
     sheet.note(RepairKind::DroppedRepeatedFaces, polygons(&clean.repeated));
-    sheet.note(RepairKind::CutNonManifoldEdges, Elements::Edges(crowded.iter().map(of_file).collect()));
-    sheet.note(RepairKind::CutOneSidedEdges, Elements::Edges(split.twisted.iter().map(of_file).collect()));
+    let edges = |list: &[[u32; 2]]| Elements::Edges(list.iter().map(of_file).collect());
+    sheet.note(RepairKind::CutNonManifoldEdges, edges(&made.crowded));
+    sheet.note(RepairKind::CutOneSidedEdges, edges(&made.twisted));
     // Ends of edges that were cut are split as a matter of course.
     let mut at_cut = vec![false; kept.len()];
-    crowded.iter().chain(&split.twisted).flatten().for_each(|w| at_cut[*w as usize] = true);
+    made.crowded.iter().chain(&made.twisted).flatten().for_each(|w| at_cut[*w as usize] = true);
     let touching = (0..kept.len() as u32).filter(|w| kept[*w as usize] > 1 && !at_cut[*w as usize]);
     sheet.note(RepairKind::SplitVertices, Elements::Vertices(touching.map(file_vertex).collect()));
+    sheet.number_as_file(file);
     Ok(sheet)
+}
+
+/// What was done to make a sheet of manifold pieces; vertices as they were before.
+struct Oriented {
+    origin: Vec<u32>,
+    crowded: Vec<[u32; 2]>,
+    twisted: Vec<[u32; 2]>,
+}
+
+/// Cuts where more than two faces meet, gives each piece one direction and vertices of its own.
+fn oriented(sheet: &mut Sheet) -> Oriented {
+    let (joined, crowded) = join_faces(&sheet.positions, &sheet.faces);
+    for f in orient(&mut sheet.faces, &joined) {
+        sheet.corners[f as usize].swap(1, 2);
+        sheet.turned[f as usize] ^= true;
+    }
+    let split = split_fans(&sheet.positions, &sheet.faces, &joined);
+    (sheet.positions, sheet.faces) = (split.positions, split.faces);
+    Oriented { origin: split.origin, crowded, twisted: split.twisted }
+}
+
+fn refuse_thickness(sheet: &Sheet) -> Result<(), FitError> {
+    match thickness(&sheet.positions, &sheet.outward_faces()) {
+        Some(thickness) => {
+            let share = thickness / diagonal(&sheet.positions);
+            Err(FitError::Thickness { thickness, share })
+        }
+        None => Ok(()),
+    }
+}
+
+/// Keeps the outer sheet of cloth with thickness; cloth without it stays as it is.
+fn keep_outer(sheet: &mut Sheet, file: &PolygonMesh) -> Result<(), FitError> {
+    let faces = sheet.outward_faces();
+    if thickness(&sheet.positions, &faces).is_none() {
+        return Ok(());
+    }
+    let outer = outer_sheet(&sheet.positions, &faces);
+    let mut is_outer = vec![false; faces.len()];
+    outer.iter().for_each(|f| is_outer[*f as usize] = true);
+    let area = |list: &mut dyn Iterator<Item = usize>| list.map(|f| sheet.area(f)).sum::<f64>();
+    let all = area(&mut (0..faces.len()));
+    let kept = area(&mut (0..faces.len()).filter(|f| is_outer[*f]));
+    if !(OUTER_SHARE[0] * all..=OUTER_SHARE[1] * all).contains(&kept) {
+        return Err(FitError::Sheets);
+    }
+    let dropped = sheet.drop_faces(|f| is_outer[f], file);
+    sheet.note(RepairKind::DroppedInnerSheet, Elements::Faces(dropped));
+    Ok(())
+}
+
+/// Keeps the connected piece with the largest area and lists the others.
+fn keep_largest(sheet: &mut Sheet, file: &PolygonMesh) {
+    let (pieces, piece_of_face) = sheet.pieces();
+    let Some(largest) = (0..pieces.len()).max_by(|a, b| pieces[*a].area.total_cmp(&pieces[*b].area)) else {
+        return;
+    };
+    let mut others: Vec<MeshPiece> =
+        pieces.into_iter().enumerate().filter(|(number, _)| *number != largest).map(|(_, p)| p).collect();
+    others.sort_by(|a, b| b.area.total_cmp(&a.area));
+    let dropped = sheet.drop_faces(|f| piece_of_face[f] == largest, file);
+    sheet.note(RepairKind::DroppedPieces, Elements::Faces(dropped));
+    sheet.dropped_pieces = others;
+}
+
+/// Joins borders within `reach` (in the file's unit), without it those that coincide.
+fn join(sheet: &mut Sheet, file: &PolygonMesh, reach: Option<f64>) {
+    let Some(joined) = join_seams(&sheet.positions, &sheet.faces, reach) else { return };
+    let JoinedSheet { positions, faces, parent, became, seams } = joined;
+    let touched: Vec<u32> = (0..became.len() as u32).filter(|v| became[*v as usize] != *v).collect();
+    let touched = touched.iter().flat_map(|v| [*v, became[*v as usize]]);
+    let touched = touched.map(|v| sheet.vertex_origin[v as usize]).collect();
+    sheet.note(RepairKind::JoinedSeams, Elements::Vertices(touched));
+    let named: Vec<Seam> = seams.iter().filter(|s| s.is_joined).map(|s| sheet.named(s)).collect();
+    sheet.seams.extend(named);
+    sheet.split_faces(positions, faces, &parent, &became);
+    oriented(sheet);
+    sheet.number_as_file(file);
+}
+
+/// What needs the unit: joins borders within the distance that is asked for and lists the seams that stay open. `metres` of
+/// the file's unit.
+pub(super) fn finish_seams(
+    sheet: &mut Sheet,
+    file: &PolygonMesh,
+    settings: &FitSettings,
+    metres: f64,
+) -> Vec<SeamReport> {
+    if let Some(distance) = settings.join_seams {
+        join(sheet, file, Some(distance / metres));
+    }
+    let open = open_seams(&sheet.positions, &sheet.faces, OPEN_GAP / metres, OPEN_LENGTH / metres);
+    let open = open.iter().map(|seam| SeamReport::new(&sheet.named(seam), metres, false));
+    sheet.seams.iter().map(|seam| SeamReport::new(seam, metres, true)).chain(open).collect()
 }
 
 /// Turns every piece whose area faces the body more than away from it, and reports all faces that differ from the file.
 pub(super) fn turn_outward(
-    sheet: &mut Repaired,
+    sheet: &mut Sheet,
     positions: &[[f64; 3]],
     topology: &Topology,
     body: &Surface<f64>,
 ) {
     let outward = outward_area(positions, &sheet.faces, topology, body);
     let piece = |f: &[u32; 3]| topology.component_of_vertex[f[0] as usize] as usize;
-    for (f, turned) in sheet.faces.iter_mut().zip(&mut sheet.turned) {
-        if outward[piece(f)] < 0.0 {
-            f.swap(1, 2);
-            *turned = !*turned;
+    for (f, face) in sheet.faces.iter_mut().enumerate() {
+        if outward[piece(face)] < 0.0 {
+            face.swap(1, 2);
+            sheet.corners[f].swap(1, 2);
+            sheet.turned[f] ^= true;
         }
     }
     let turned = (0..sheet.faces.len()).filter(|f| sheet.turned[*f]).map(|f| sheet.face_origin[f]).collect();
     sheet.note(RepairKind::TurnedFaces, Elements::Faces(turned));
+}
+
+impl Sheet {
+    /// Faces with their front outside where they enclose something: behind them is the cloth.
+    fn outward_faces(&self) -> Vec<[u32; 3]> {
+        let mesh = TriMesh::new(self.positions.clone(), self.faces.clone());
+        match mesh.is_ok_and(|mesh| is_inside_out(&mesh)) {
+            true => self.faces.iter().map(|[a, b, c]| [*a, *c, *b]).collect(),
+            false => self.faces.clone(),
+        }
+    }
 }

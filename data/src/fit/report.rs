@@ -1,9 +1,14 @@
 //! What fitting assumed and changed, element by element.
 
+mod seams;
+
+pub use seams::SeamReport;
+
 use super::placement::{Origin, Placement};
 use super::sitting::Sitting;
 use crate::asset::Category;
 use crate::mesh::MeshMeasures;
+use seams::write_seams;
 use serde::Serialize;
 use std::fmt;
 
@@ -27,6 +32,12 @@ pub enum RepairKind {
     SplitVertices,
     /// Edges were cut because the surface has only one side (a Möbius band).
     CutOneSidedEdges,
+    /// Faces of the inner sheet and the rims of thick cloth were dropped.
+    DroppedInnerSheet,
+    /// Faces of all pieces but the largest were dropped.
+    DroppedPieces,
+    /// Vertices of borders that run along each other were joined.
+    JoinedSeams,
     /// Faces were turned, to agree with their neighbours and to face away from the body.
     TurnedFaces,
     /// Vertices were moved out of the body, or away from it to the least distance.
@@ -45,6 +56,9 @@ impl RepairKind {
             Self::CutNonManifoldEdges => "cut non-manifold edges",
             Self::SplitVertices => "split vertices that only touch",
             Self::CutOneSidedEdges => "cut edges of a one-sided surface",
+            Self::DroppedInnerSheet => "dropped the inner sheet and rims of thick cloth",
+            Self::DroppedPieces => "dropped all pieces but the largest",
+            Self::JoinedSeams => "joined vertices of open seams",
             Self::TurnedFaces => "turned faces",
             Self::PushedOut => "pushed vertices out of the body",
         }
@@ -118,6 +132,18 @@ pub struct MeshPiece {
     pub boundary_loops: usize,
 }
 
+impl fmt::Display for MeshPiece {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { vertices, triangles, area, boundary_loops } = self;
+        write!(f, "{vertices} vertices, {triangles} triangles, {area:.4} m², ")?;
+        match boundary_loops {
+            0 => write!(f, "closed"),
+            1 => write!(f, "1 boundary loop"),
+            n => write!(f, "{n} boundary loops"),
+        }
+    }
+}
+
 /// Where the fitted garment and the body meet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct BodyContact {
@@ -150,6 +176,10 @@ pub struct FitReport {
     pub sitting: Sitting,
     /// All repairs, in the order they were made.
     pub repairs: Vec<Repair>,
+    /// Seams that were joined, and those that stay open.
+    pub seams: Vec<SeamReport>,
+    /// Pieces that were left out on request, the largest first.
+    pub dropped_pieces: Vec<MeshPiece>,
     /// Edges that still have more than two faces, by vertices of the file.
     pub unrepaired_edges: Vec<[u32; 2]>,
     /// Connected pieces, the largest first.
@@ -237,19 +267,13 @@ impl fmt::Display for FitReport {
         for [a, b] in &self.unrepaired_edges {
             writeln!(f, "warning   edge {a}–{b} still has more than two faces")?;
         }
+        write_seams(f, &self.seams, true)?;
+        write_seams(f, &self.seams, false)?;
+        for piece in &self.dropped_pieces {
+            writeln!(f, "dropped   {piece}")?;
+        }
         for (number, piece) in self.pieces.iter().enumerate() {
-            writeln!(
-                f,
-                "piece {number:<3} {} vertices, {} triangles, {:.4} m², {}",
-                piece.vertices,
-                piece.triangles,
-                piece.area,
-                match piece.boundary_loops {
-                    0 => "closed".into(),
-                    1 => "1 boundary loop".into(),
-                    n => format!("{n} boundary loops"),
-                }
-            )?;
+            writeln!(f, "piece {number:<3} {piece}")?;
         }
         let (m, c) = (&self.mesh, &self.contact);
         writeln!(

@@ -2,6 +2,7 @@
 
 use super::placement::{Unit, UpAxis};
 use crate::asset::Category;
+use std::str::FromStr;
 
 /// Most vertices a garment may have after welding.
 pub const MAX_VERTICES: usize = 1_000_000;
@@ -44,4 +45,17 @@ pub enum Keep {
     Largest,
     /// The outer sheet of cloth with thickness.
     Outer,
+}
+
+impl FromStr for Keep {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "all" => Ok(Self::All),
+            "largest" => Ok(Self::Largest),
+            "outer" => Ok(Self::Outer),
+            _ => Err(format!("'{text}' is none of all, largest, outer")),
+        }
+    }
 }

@@ -174,6 +174,18 @@ fn add_primitive(
             let positions = buffers.positions(document, accessor)?;
             check_count("vertices", base + positions.len())?;
             let own = (base as u32, positions.len() as u32);
+            let texture = primitive.attributes.get("TEXCOORD_0");
+            // Coordinates that cannot be read are no reason to refuse a mesh.
+            let texture = texture.and_then(|accessor| buffers.texture(document, *accessor, positions.len()));
+            match texture {
+                Some(texture) => {
+                    mesh.texture.resize(base, [0.0; 2]);
+                    // v counts from the upper edge here.
+                    mesh.texture.extend(texture.into_iter().map(|[u, v]| [u, 1.0 - v]));
+                }
+                None if !mesh.texture.is_empty() => mesh.texture.resize(base + positions.len(), [0.0; 2]),
+                None => {}
+            }
             mesh.positions.extend(positions.into_iter().map(|p| transform(place, p)));
             vertices.insert(accessor, own);
             own

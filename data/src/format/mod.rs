@@ -2,6 +2,7 @@
 
 pub mod atomic;
 mod error;
+mod file_face;
 pub mod folder;
 mod gltf;
 mod load_mesh;
@@ -16,10 +17,11 @@ mod stl;
 pub mod toml_file;
 
 pub use error::FileError;
+pub use file_face::FileFace;
 pub use gltf::{SceneMesh, encode_glb, save_glb};
 pub use load_mesh::{MESH_EXTENSIONS, MeshFormat, is_mesh_path, load_mesh, load_tri_mesh, parse_mesh};
 pub use mat::{MatFile, MatValue};
 pub use npz::{Array, NpzFile, NpzWriter};
 pub use obj::ObjMesh;
 pub use pc16::PointCache;
-pub use polygon_mesh::{MAX_ELEMENTS, MAX_FILE_BYTES, PolygonMesh};
+pub use polygon_mesh::{MAX_ELEMENTS, MAX_FILE_BYTES, PolygonMesh, read_limited as read_mesh_file};

@@ -3,12 +3,15 @@
 //! Own parser, because a message must name the line: the usual libraries report neither it nor the offending index.
 
 mod moved;
+mod repaired;
 mod statements;
 
 pub use moved::MovedObj;
+pub use repaired::RepairedForm;
 
 use super::atomic;
 use super::error::FileError;
+use super::file_face::FileFace;
 use super::polygon_mesh::{NO_FACES, PolygonMesh, check_count, read_limited};
 use crate::mesh::fan;
 use clothcombo_physics::mesh::TriMesh;
@@ -200,6 +203,44 @@ pub fn save_polygons<'a>(
     atomic::write(path, text.as_bytes()).map_err(FileError::io(path))
 }
 
+/// As [`save`], with faces that came of a file's faces, and the texture coordinates that belong to that file's vertices, if it has
+/// any. `polygons` are the file's, corners 0-based.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn save_file_faces(
+    path: &Path,
+    positions: &[[f64; 3]],
+    faces: &[FileFace],
+    file: &PolygonMesh,
+    comments: &[String],
+) -> Result<(), FileError> {
+    let mut text = String::with_capacity(positions.len() * 64);
+    for line in comments.iter().flat_map(|comment| comment.lines()) {
+        let _ = writeln!(text, "# {line}");
+    }
+    for [x, y, z] in positions {
+        let _ = writeln!(text, "v {x:.7} {y:.7} {z:.7}");
+    }
+    for [u, v] in &file.texture {
+        let _ = writeln!(text, "vt {u:.6} {v:.6}");
+    }
+    let polygons: Vec<&[u32]> = file.polygons().collect();
+    for face in faces {
+        text.push('f');
+        let polygon = polygons.get(face.face as usize).copied().unwrap_or_default();
+        for [vertex, corner] in &face.corners {
+            let _ = write!(text, " {}", u64::from(*vertex) + 1);
+            let named = polygon.get(*corner as usize).filter(|v| file.texture.len() > **v as usize);
+            if let Some(named) = named {
+                let _ = write!(text, "/{}", u64::from(*named) + 1);
+            }
+        }
+        text.push('\n');
+    }
+    atomic::write(path, text.as_bytes()).map_err(FileError::io(path))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -247,6 +288,24 @@ mod tests {
         let collapsed = parse(&format!("{SQUARE}f 1 2 3\nf 1 2 2\n")).unwrap().into_polygon_mesh();
         let message = collapsed.to_tri_mesh(Path::new("shirt.obj")).unwrap_err().to_string();
         assert!(message.starts_with("shirt.obj:7: face 2 names vertex 2 twice"), "{message}");
+    }
+
+    #[test]
+    fn faces_of_a_file_keep_its_texture_coordinates() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.obj");
+        let mut file = PolygonMesh::with_positions(vec![[0.0; 3]; 5]);
+        file.texture = vec![[0.0, 0.25], [1.0, 0.5], [1.0, 1.0], [0.5, 0.5]];
+        file.push(&[4, 3, 1, 0]);
+        // Its third vertex was left out.
+        let faces = [FileFace { face: 0, corners: vec![[3, 0], [2, 1], [1, 2], [0, 3]] }];
+        save_file_faces(&path, &[[1.0; 3]; 4], &faces, &file, &["skirt".into()]).unwrap();
+        let text = fs::read_to_string(&path).unwrap();
+        assert!(
+            text.starts_with("# skirt\nv 1.0000000") && text.contains("vt 0.000000 0.250000\n"),
+            "{text}"
+        );
+        assert!(text.ends_with("\nf 4 3/4 2/2 1/1\n"), "{text}");
     }
 
     #[test]

@@ -24,6 +24,8 @@ pub struct PolygonMesh {
     pub positions: Vec<[f64; 3]>,
     /// Line of each polygon from 1; empty for formats without lines.
     pub lines: Vec<u32>,
+    /// Texture coordinates of each vertex, v up; empty where the format or the file has none by vertex.
+    pub texture: Vec<[f64; 2]>,
     corners: Vec<u32>,
     ends: Vec<u32>,
 }
@@ -126,7 +128,10 @@ pub(super) fn check_count(what: &str, count: usize) -> Result<(), String> {
 }
 
 /// Reads a file whose size is checked first.
-pub(super) fn read_limited(path: &Path) -> Result<Vec<u8>, FileError> {
+///
+/// # Errors
+/// When it cannot be read, or is larger than [`MAX_FILE_BYTES`].
+pub fn read_limited(path: &Path) -> Result<Vec<u8>, FileError> {
     let failed = FileError::io(path);
     let metadata = fs::metadata(path).map_err(&failed)?;
     if !metadata.is_file() {

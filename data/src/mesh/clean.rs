@@ -1,7 +1,7 @@
 //! Polygons of any file → triangles over welded vertices, each remembering where it came from.
 
-use super::triangle::smallest_sine;
-use clothcombo_physics::vec3::{cross, norm, norm_squared, sub};
+use super::triangle::{smallest_sine, triangle_normal};
+use clothcombo_physics::vec3::{cross, dot, norm, norm_squared, sub};
 use std::collections::{HashMap, HashSet};
 
 /// Vertices closer than this share of a mesh's diagonal are one.
@@ -44,26 +44,50 @@ pub fn fan(polygon: &[u32]) -> impl Iterator<Item = [u32; 3]> + '_ {
     polygon.get(1..).unwrap_or_default().windows(2).map(|w| [polygon[0], w[0], w[1]])
 }
 
-/// Triangles and the polygon each of them is part of. Quads are cut by the diagonal that leaves the larger smallest angle,
-/// larger polygons into fans.
+/// A quad is cut by its second diagonal where the first one folds it, or the second leaves a smallest angle with a sine this many
+/// times larger: every reader of quads takes the first one, and a quad that is nearly a rectangle must not change with rounding.
+const WORTH_ANOTHER: f64 = 2.0;
+
+/// Triangles of polygons.
+#[derive(Debug, Default)]
+pub struct Triangulated {
+    /// Triangles, those of one polygon one after the other.
+    pub faces: Vec<[u32; 3]>,
+    /// The polygon that each of them is part of.
+    pub polygon: Vec<u32>,
+    /// For each corner of a triangle the corner of that polygon.
+    pub corners: Vec<[u32; 3]>,
+}
+
+/// Cuts polygons into fans around their first corner; quads around their second one where that is much better.
 pub fn triangulate<'a>(
     positions: &[[f64; 3]],
     polygons: impl IntoIterator<Item = &'a [u32]>,
-) -> (Vec<[u32; 3]>, Vec<u32>) {
-    let sine = |f: [u32; 3]| smallest_sine(f.map(|v| positions[v as usize]));
-    let (mut faces, mut origin) = (Vec::new(), Vec::new());
+) -> Triangulated {
+    let mut result = Triangulated::default();
     for (number, polygon) in polygons.into_iter().enumerate() {
-        match *polygon {
-            [a, b, c, d] => {
-                let (one, two) = ([[a, b, c], [a, c, d]], [[a, b, d], [b, c, d]]);
-                let worst = |pair: [[u32; 3]; 2]| sine(pair[0]).min(sine(pair[1]));
-                faces.extend(if worst(one) >= worst(two) { one } else { two });
-            }
-            _ => faces.extend(fan(polygon)),
+        let count = polygon.len() as u32;
+        let fan_around = |first: u32| {
+            (1..count.saturating_sub(1)).map(move |i| [0, i, i + 1].map(|k| (first + k) % count))
+        };
+        let worst = |first: u32| {
+            let sine = |t: [u32; 3]| smallest_sine(t.map(|k| positions[polygon[k as usize] as usize]));
+            fan_around(first).map(sine).fold(f64::MAX, f64::min)
+        };
+        let is_folded = |first: u32| {
+            let normal = |t: [u32; 3]| triangle_normal(t.map(|k| positions[polygon[k as usize] as usize]));
+            let normals: Vec<[f64; 3]> = fan_around(first).map(normal).collect();
+            normals.windows(2).any(|pair| dot(pair[0], pair[1]) < 0.0)
+        };
+        let is_better = || worst(1) > WORTH_ANOTHER * worst(0) || is_folded(0);
+        let first = u32::from(count == 4 && is_better() && !is_folded(1));
+        for triangle in fan_around(first) {
+            result.faces.push(triangle.map(|k| polygon[k as usize]));
+            result.corners.push(triangle);
         }
-        origin.resize(faces.len(), number as u32);
+        result.polygon.resize(result.faces.len(), number as u32);
     }
-    (faces, origin)
+    result
 }
 
 /// Vertices with near ones merged into the first of them.
@@ -162,11 +186,17 @@ mod tests {
     #[test]
     fn quads_take_the_better_diagonal_and_every_triangle_knows_its_polygon() {
         let positions =
-            [[0.0, 0.0, 0.0], [1.0, -0.2, 0.0], [3.0, 0.0, 0.0], [1.0, 0.2, 0.0], [0.0, 9.0, 0.0]];
+            [[0.0, 0.0, 0.0], [1.0, -0.02, 0.0], [2.0, 0.0, 0.0], [1.0, 0.5, 0.0], [0.0, 9.0, 0.0]];
         let polygons = [&[0u32, 1, 2, 3][..], &[0, 2, 4], &[0, 1, 2, 3, 4]];
-        let (faces, origin) = triangulate(&positions, polygons);
-        assert_eq!(faces, [[0, 1, 3], [1, 2, 3], [0, 2, 4], [0, 1, 2], [0, 2, 3], [0, 3, 4]]);
-        assert_eq!(origin, [0, 0, 1, 2, 2, 2]);
+        let made = triangulate(&positions, polygons);
+        assert_eq!(made.faces, [[1, 2, 3], [1, 3, 0], [0, 2, 4], [0, 1, 2], [0, 2, 3], [0, 3, 4]]);
+        assert_eq!(made.polygon, [0, 0, 1, 2, 2, 2]);
+        assert_eq!(made.corners[..3], [[1, 2, 3], [1, 3, 0], [0, 1, 2]]);
+        // Concave at its second corner: the first diagonal runs outside. A rectangle keeps its first one, however it is rounded.
+        let dart = [[0.0, 0.0, 0.0], [1.0, 0.8, 0.0], [2.0, 0.0, 0.0], [1.0, 2.0, 0.0]];
+        assert_eq!(triangulate(&dart, [&[0u32, 1, 2, 3][..]]).faces, [[1, 2, 3], [1, 3, 0]]);
+        let square = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.1, 1.0, 0.0], [0.0, 1.0, 0.0]];
+        assert_eq!(triangulate(&square, [&[0u32, 1, 2, 3][..]]).faces, [[0, 1, 2], [0, 2, 3]]);
     }
 
     #[test]

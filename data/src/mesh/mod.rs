@@ -1,5 +1,6 @@
 //! Meshes in the making: from polygon soup to manifold pieces, cut along fields, remeshed, measured.
 
+mod attachment;
 mod clean;
 mod distance_grid;
 mod editable;
@@ -9,11 +10,14 @@ mod manifold;
 mod measures;
 mod push_out;
 mod remesh;
+mod seams;
+mod thickness;
 mod triangle;
 
+pub use attachment::{Attachment, attach};
 pub use clean::{
-    AREA_SHARE, CleanFaces, WELD_SHARE, Welded, bounds, clean_faces, compact, diagonal, fan, triangulate,
-    weld,
+    AREA_SHARE, CleanFaces, Triangulated, WELD_SHARE, Welded, bounds, clean_faces, compact, diagonal, fan,
+    triangulate, weld,
 };
 pub(crate) use distance_grid::DistanceGrid;
 pub use editable::EditableMesh;
@@ -23,4 +27,8 @@ pub use manifold::{Joined, SplitMesh, join_faces, orient, outward_area, outwardn
 pub use measures::{MeshDefects, MeshMeasures};
 pub use push_out::{Contact, contact, one_rings, push_out};
 pub use remesh::{Quality, RemeshTarget, remesh};
+pub use seams::{COINCIDE_SHARE, JoinedSheet, Seam, join_seams, median_border_edge, open_seams};
+#[cfg(test)]
+pub(crate) use thickness::tests::solidified;
+pub use thickness::{outer_sheet, thickness};
 pub use triangle::{smallest_sine, triangle_normal};

@@ -16,8 +16,8 @@ use clothcombo_data::asset::{Body, Category, Garment, Provenance};
 use clothcombo_data::fit::off_trunk;
 use clothcombo_data::folders::garment_folder::{FolderGarment, garment_folder_files, save_garment_folder};
 use clothcombo_data::import::{ImportError, Progress, Summary, refuse_overwriting};
+use clothcombo_data::mesh::Contact;
 use clothcombo_data::mesh::LabelledTriangles;
-use clothcombo_data::mesh::{Contact, triangulate};
 use clothcombo_physics::TriMesh;
 use clothcombo_physics::query::Surface;
 use proxy::Proxy;
@@ -137,7 +137,7 @@ fn import_proxy(
     if let Some(place) = off_trunk(&positions, body) {
         return Err(refuse(format!("not one of the six garment categories: {place}")));
     }
-    let (faces, _) = triangulate(&positions, proxy.polygons.iter().map(Vec::as_slice));
+    let faces = proxy.triangles(&positions);
     let (mut sheet, mut repairs) = sheet_repair::repair(&positions, &faces, surface).map_err(refuse)?;
     let edge = settings.resolution.edge_for(sheet.area());
     label_rim(&mut sheet, 2, edge);

@@ -1,5 +1,6 @@
 //! One clothing proxy: three.js JSON (format 3.1) whose metadata ties its vertices to the base mesh.
 
+use clothcombo_data::mesh::{fan, smallest_sine};
 use serde::Deserialize;
 
 #[derive(Deserialize)]
@@ -68,6 +69,23 @@ impl Proxy {
             weights,
             offsets,
         })
+    }
+
+    /// The faces as triangles: quads are cut by the diagonal that leaves the larger smallest angle, larger faces into fans.
+    pub fn triangles(&self, positions: &[[f64; 3]]) -> Vec<[u32; 3]> {
+        let sine = |f: &[u32; 3]| smallest_sine(f.map(|v| positions[v as usize]));
+        let mut faces = Vec::new();
+        for polygon in &self.polygons {
+            match polygon[..] {
+                [a, b, c, d] => {
+                    let (one, two) = ([[a, b, c], [a, c, d]], [[a, b, d], [b, c, d]]);
+                    let worst = |pair: &[[u32; 3]; 2]| sine(&pair[0]).min(sine(&pair[1]));
+                    faces.extend(if worst(&one) >= worst(&two) { one } else { two });
+                }
+                _ => faces.extend(fan(polygon)),
+            }
+        }
+        faces
     }
 
     /// The SPDX-like name of an open licence, or why it is none.

@@ -2,6 +2,7 @@
 //! refused with a reason that names the file. `scripts/fuzz.sh` runs many more.
 
 use clothcombo_data::asset::{Category, Pose};
+use clothcombo_data::fit::FitSettings;
 use clothcombo_data::generate::{GarmentGenerator, GarmentSettings};
 use clothcombo_tests::{fuzz_cases, tiny_config};
 use clothcombo_trainer::dataset::Dataset;
@@ -111,16 +112,17 @@ fn messy_garments_are_draped_or_refused_by_name() {
         }
         let path = folder.path().join("messy.obj");
         std::fs::write(&path, mesh.obj()).unwrap();
-        let result = GivenGarment::read(&path, draper.body(), None).and_then(|source| {
-            let is_fitted = source.fit.is_some();
-            let given = mesh.positions.len();
-            let outfit = draper.outfit(vec![source.clone()])?;
-            let drape = draper.drape(&outfit, &BodyState::new(vec![1.0], Pose::t_pose(22)))?;
-            let positions = source.in_given_order(&drape.garments[0].positions);
-            assert_eq!(positions.len(), given, "case {case}: a vertex of the file was lost");
-            assert!(positions.as_flattened().iter().all(|x| x.is_finite()), "case {case}");
-            Ok(is_fitted)
-        });
+        let result =
+            GivenGarment::read(&path, draper.body(), None, &FitSettings::default()).and_then(|source| {
+                let is_fitted = source.fit.is_some();
+                let given = mesh.positions.len();
+                let outfit = draper.outfit(vec![source.clone()])?;
+                let drape = draper.drape(&outfit, &BodyState::new(vec![1.0], Pose::t_pose(22)))?;
+                let positions = source.in_given_order(&drape.garments[0].positions);
+                assert_eq!(positions.len(), given, "case {case}: a vertex of the file was lost");
+                assert!(positions.as_flattened().iter().all(|x| x.is_finite()), "case {case}");
+                Ok(is_fitted)
+            });
         match result {
             Ok(is_fitted) => {
                 draped += 1;

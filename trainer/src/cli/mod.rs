@@ -7,6 +7,7 @@ mod device_argument;
 pub mod drape;
 pub mod eval;
 pub mod fit;
+mod fit_arguments;
 mod garment_sheet;
 pub mod generate;
 pub mod import;

@@ -259,7 +259,7 @@ fn moved(garment: &Garment, positions: &[[f64; 3]]) -> Result<MovedObj, Report> 
         });
         text.push('\n');
     }
-    Ok(MovedObj { obj: text.into_bytes(), mtl: None })
+    Ok(MovedObj { obj: text.into_bytes(), mtl: None, libraries: Vec::new() })
 }
 
 fn text(report: &ResolveReport) -> String {

@@ -101,7 +101,8 @@ pub enum DraperError {
     /// A mesh is no garment of this body.
     #[error("{}: {reason}", path.display())]
     #[diagnostic(help(
-        "`clothcombo fit` has settings for unit, axes and arm pose; `clothcombo check` lists defects"
+        "say what is known of the file: --unit, --up, --arms, --category, --offset, --turn, --keep, --join-seams (as for `clothcombo \
+         fit`); `clothcombo check` lists defects"
     ))]
     Fit {
         /// The file.

@@ -3,12 +3,14 @@
 //!
 //! ```no_run
 //! use clothcombo_data::asset::Pose;
+//! use clothcombo_data::fit::FitSettings;
 //! use clothcombo_trainer::inference::{BodyState, Draper, DraperSettings};
 //! use std::path::Path;
 //!
 //! let draper = Draper::load(Some(Path::new("runs/smoke")), &DraperSettings::default())?;
 //! let catalog = draper.catalog(&[])?;
-//! let garments = ["t_shirt_000003", "skirt_000005"].map(|name| catalog.find(name, draper.body(), None));
+//! let hints = FitSettings::default();
+//! let garments = ["t_shirt_000003", "skirt_000005"].map(|name| catalog.find(name, draper.body(), None, &hints));
 //! let outfit = draper.outfit(garments.into_iter().collect::<Result<_, _>>()?)?;
 //! let drape = draper.drape(&outfit, &BodyState::new(vec![1.0, -0.5], Pose::t_pose(22)))?;
 //! for (garment, draped) in outfit.garments.iter().zip(&drape.garments) {

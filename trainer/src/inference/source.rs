@@ -5,13 +5,12 @@ use crate::config::Config;
 use crate::dataset::{DatasetError, GarmentLoader, GarmentSource};
 use crate::score::misplaced;
 use clothcombo_data::asset::{Body, Category, Garment, Provenance};
-use clothcombo_data::fit::{FitReport, FitSettings, fit, is_on_body};
+use clothcombo_data::fit::{FitReport, FitSettings, fit, in_file_order, is_on_body, needs_repair};
 use clothcombo_data::folders::list_garment_folder;
 use clothcombo_data::format::{PolygonMesh, load_mesh};
 use clothcombo_data::generate::GarmentGenerator;
-use clothcombo_data::mesh::MeshMeasures;
+use clothcombo_data::mesh::{Attachment, MeshMeasures, thickness};
 use clothcombo_physics::mesh::{Topology, TriMesh};
-use clothcombo_physics::query::VertexIndex;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -26,8 +25,8 @@ pub struct GivenGarment {
     pub path: Option<PathBuf>,
     /// What fitting assumed and repaired, if it was not on the body already.
     pub fit: Option<FitReport>,
-    /// For every given vertex the vertex of `garment` it follows.
-    follows: Vec<u32>,
+    /// For every given vertex the place on `garment` that it follows.
+    follows: Vec<Attachment>,
 }
 
 impl GivenGarment {
@@ -35,41 +34,51 @@ impl GivenGarment {
     pub fn new(garment: Garment) -> Self {
         let mut given = PolygonMesh::with_positions(garment.rest.positions().to_vec());
         garment.rest.faces().iter().for_each(|f| given.push(f));
-        let follows = (0..garment.rest.vertex_count() as u32).collect();
+        let follows = (0..garment.rest.vertex_count() as u32).map(Attachment::to_vertex).collect();
         Self { garment, given, path: None, fit: None, follows }
     }
 
-    /// Reads a mesh file. Where it does not lie on the zero body of `body` as it stands, or has defects, it is fitted
-    /// ([`clothcombo_data::fit`]); `always_fit` decides that beforehand.
+    /// Reads a mesh file. Where it does not lie on the zero body of `body` as it stands, has defects, open seams or thickness, or
+    /// where `hints` say anything, it is fitted ([`clothcombo_data::fit`]); `always_fit` decides that beforehand.
     ///
     /// # Errors
     /// Naming the file, when it is no mesh, or no garment of this body.
-    pub fn read(path: &Path, body: &Body, always_fit: Option<bool>) -> Result<Self, DraperError> {
+    pub fn read(
+        path: &Path,
+        body: &Body,
+        always_fit: Option<bool>,
+        hints: &FitSettings,
+    ) -> Result<Self, DraperError> {
+        let always_fit = always_fit.or((*hints != FitSettings::default()).then_some(true));
         let given = load_mesh(path).map_err(DatasetError::data)?;
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let placed = match always_fit {
             Some(true) => None,
             Some(false) => Some(given.to_tri_mesh(path).map_err(DatasetError::data)?),
-            None => given.to_tri_mesh(path).ok().filter(|mesh| is_clean(mesh) && is_on_body(mesh, body)),
+            None => {
+                let lies =
+                    |mesh: &TriMesh| has_no_defects(mesh) && !needs_repair(mesh) && is_on_body(mesh, body);
+                given.to_tri_mesh(path).ok().filter(lies)
+            }
         };
         if let Some(rest) = placed {
             check_place(path, &rest, body)?;
             let category = Category::guess(&rest, body);
             let holding = Garment::needs_holding(&rest, body);
-            let follows = (0..rest.vertex_count() as u32).collect();
+            let follows = (0..rest.vertex_count() as u32).map(Attachment::to_vertex).collect();
             let garment = Garment { name, category, rest, holding, source: Provenance::default() };
             return Ok(Self { garment, given, path: Some(path.into()), fit: None, follows });
         }
-        let fitted = fit(&given, body, &FitSettings::default())
-            .map_err(|reason| DraperError::Fit { path: path.into(), reason })?;
-        let follows = followed(&given, &fitted.vertex_of_file);
+        let fitted =
+            fit(&given, body, hints).map_err(|reason| DraperError::Fit { path: path.into(), reason })?;
+        let follows = fitted.follows;
         let garment = Garment { name, ..fitted.garment };
         Ok(Self { garment, given, path: Some(path.into()), fit: Some(fitted.report), follows })
     }
 
     /// Positions of the garment's vertices as positions of the given ones, in their order.
     pub fn in_given_order(&self, positions: &[[f64; 3]]) -> Vec<[f64; 3]> {
-        self.follows.iter().map(|v| positions[*v as usize]).collect()
+        in_file_order(&self.follows, positions, self.garment.rest.faces())
     }
 }
 
@@ -81,22 +90,9 @@ fn check_place(path: &Path, rest: &TriMesh, body: &Body) -> Result<(), DraperErr
     }
 }
 
-/// Whether a mesh needs no repair.
-fn is_clean(mesh: &TriMesh) -> bool {
+/// Whether every edge, face and vertex of a mesh is as it should be.
+fn has_no_defects(mesh: &TriMesh) -> bool {
     MeshMeasures::new(mesh, &Topology::new(mesh)).defects.counts().is_empty()
-}
-
-/// A dropped vertex follows what became of the kept one nearest to it in the file.
-fn followed(given: &PolygonMesh, vertex_of_file: &[Option<u32>]) -> Vec<u32> {
-    let (positions, became): (Vec<[f64; 3]>, Vec<u32>) =
-        given.positions.iter().zip(vertex_of_file).filter_map(|(p, v)| Some((*p, (*v)?))).unzip();
-    let kept = VertexIndex::new(&positions);
-    given
-        .positions
-        .iter()
-        .zip(vertex_of_file)
-        .map(|(p, v)| v.unwrap_or_else(|| became[kept.nearest(*p).0 as usize]))
-        .collect()
 }
 
 /// Finds garments by name: those of the given folders and those a model was trained on.
@@ -144,7 +140,8 @@ impl GarmentCatalog {
     }
 
     /// The garment of a file or, where there is no such file, of that name. A named one from a file is fitted like any other
-    /// file where it does not lie on this body: it may have been made for another one.
+    /// file where it does not lie on this body: it may have been made for another one. `hints` are about files; they do not make
+    /// a named garment be fitted that lies on the body already.
     ///
     /// # Errors
     /// Naming the file or the unknown name.
@@ -153,6 +150,7 @@ impl GarmentCatalog {
         name: &str,
         body: &Body,
         always_fit: Option<bool>,
+        hints: &FitSettings,
     ) -> Result<GivenGarment, DraperError> {
         let path = Path::new(name);
         // A word without a dot or a slash is a name, not a file that happens to be missing.
@@ -160,7 +158,7 @@ impl GarmentCatalog {
             || name.contains('/')
             || (path.extension().is_some() && !self.sources.contains_key(name));
         if is_path {
-            return GivenGarment::read(path, body, always_fit);
+            return GivenGarment::read(path, body, always_fit, hints);
         }
         let origin = self.sources.get(name).ok_or_else(|| DraperError::UnknownGarment {
             name: name.to_owned(),
@@ -172,10 +170,16 @@ impl GarmentCatalog {
         };
         let made = loader.load(origin);
         let must_fit = always_fit.unwrap_or_else(|| {
-            !made.as_ref().is_ok_and(|garment| is_clean(&garment.rest) && is_on_body(&garment.rest, body))
+            // A model is used with the borders that it was trained with; they are not joined anew.
+            let lies = |rest: &TriMesh| {
+                has_no_defects(rest)
+                    && thickness(rest.positions(), rest.faces()).is_none()
+                    && is_on_body(rest, body)
+            };
+            !made.as_ref().is_ok_and(|garment| lies(&garment.rest))
         });
         if must_fit {
-            let mut source = GivenGarment::read(&listed.path, body, Some(true))?;
+            let mut source = GivenGarment::read(&listed.path, body, Some(true), hints)?;
             source.garment.name.clone_from(&listed.name);
             return Ok(source);
         }

@@ -13,6 +13,7 @@ mod drape_folders;
 mod drape_input;
 mod eval;
 mod fit;
+mod garment_files;
 mod generate;
 mod import_programs;
 mod incidents;

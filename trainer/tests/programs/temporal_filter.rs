@@ -2,6 +2,7 @@
 
 use crate::drape::{SKIRT, TEE, run_folder};
 use clothcombo_data::asset::Pose;
+use clothcombo_data::fit::FitSettings;
 use clothcombo_physics::transform::{into_frame, out_of_frame};
 use clothcombo_physics::vec3::{add, distance_squared, scale, sub};
 use clothcombo_trainer::inference::{BodyState, Drape, Draper, DraperSettings};
@@ -20,7 +21,8 @@ fn draped(radius: usize) -> Vec<Drape> {
     let settings = DraperSettings { resolve: false, ..DraperSettings::default() };
     let draper = Draper::load(Some(run_folder()), &settings).unwrap();
     let catalog = draper.catalog(&[]).unwrap();
-    let garments = [TEE, SKIRT].map(|name| catalog.find(name, draper.body(), None).unwrap());
+    let hints = FitSettings::default();
+    let garments = [TEE, SKIRT].map(|name| catalog.find(name, draper.body(), None, &hints).unwrap());
     let outfit = draper.outfit(garments.into()).unwrap();
     draper.drape_motion(&outfit, &bodies(), radius, |_| ()).unwrap()
 }

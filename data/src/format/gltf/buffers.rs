@@ -43,6 +43,19 @@ impl<'a> Buffers<'a> {
         Ok(positions)
     }
 
+    /// `count` times a VEC2 of finite floats; `None` for anything else.
+    pub fn texture(&mut self, document: &Document, accessor: usize, count: usize) -> Option<Vec<[f64; 2]>> {
+        let item = get_accessor(document, accessor).ok()?;
+        if item.component_type != F32 || item.kind != "VEC2" || item.count != count {
+            return None;
+        }
+        let mut texture: Vec<[f64; 2]> = Vec::new();
+        let read = self.for_each(document, accessor, item, 8, |raw| {
+            texture.push(std::array::from_fn(|a| Scalar::F32.read(&raw[4 * a..4 * a + 4], false)));
+        });
+        read.ok().filter(|()| texture.as_flattened().iter().all(|x| x.is_finite())).map(|()| texture)
+    }
+
     /// A SCALAR of unsigned integers.
     pub fn indices(&mut self, document: &Document, accessor: usize) -> Result<Vec<u32>, String> {
         let item = get_accessor(document, accessor)?;

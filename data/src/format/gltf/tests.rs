@@ -121,3 +121,29 @@ fn an_index_past_its_own_vertices_reads_no_other_primitives_ones() {
     let message = parse(&glb(&json, &bytes), Path::new("x.glb")).unwrap_err();
     assert!(message.contains("primitive 2: names vertex 4, but has 4 vertices"), "{message}");
 }
+
+#[test]
+fn texture_coordinates_are_read_by_vertex_with_v_up() {
+    let accessor = r#"{"bufferView":0,"componentType":5126,"count":4,"type":"VEC2"}"#;
+    let textured = |accessor: &str| {
+        let json = document("").replacen(r#"{"POSITION":0}"#, r#"{"POSITION":0,"TEXCOORD_0":4}"#, 1).replace(
+            r#"],
+        "bufferViews""#,
+            &format!(
+                r#",{accessor}],
+        "bufferViews""#
+            ),
+        );
+        parse(&glb(&json, &payload()), Path::new("x.glb")).unwrap()
+    };
+    let mesh = textured(accessor);
+    assert_eq!(mesh.texture[..4], [[0.0, 1.0], [0.0, 0.0], [0.0, 1.0], [1.0, 0.0]]);
+    // The second mesh has none of its own.
+    assert_eq!(mesh.texture[4..], [[0.0; 2]; 4]);
+    // What is no texture coordinate for every vertex is read over.
+    for wrong in
+        [accessor.replace('4', "3"), accessor.replace("VEC2", "VEC3"), accessor.replace("5126", "5121")]
+    {
+        assert!(textured(&wrong).texture.is_empty(), "{wrong}");
+    }
+}

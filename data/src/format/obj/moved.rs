@@ -5,7 +5,7 @@ use super::super::folder::has_extension;
 use super::super::polygon_mesh::read_limited;
 use super::statements::one_per_line;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Statements of a material library that name a texture, but for those that begin with `map_`.
 const TEXTURES: [&str; 5] = ["bump", "disp", "decal", "refl", "norm"];
@@ -17,6 +17,8 @@ pub struct MovedObj {
     pub obj: Vec<u8>,
     /// Its material libraries in one; none where it names none that can be read.
     pub mtl: Option<Vec<u8>>,
+    /// Where those were read.
+    pub libraries: Vec<PathBuf>,
 }
 
 impl MovedObj {
@@ -57,16 +59,20 @@ fn with_positions(bytes: &[u8], positions: &[[f64; 3]]) -> Result<Vec<u8>, usize
             out.extend_from_slice(format!("v {x} {y} {z}").as_bytes());
         }
         count += 1;
-        // Behind the third coordinate, the line's end included.
-        let mut rest = line;
-        for _ in 0..4 {
-            let start = rest.iter().position(|b| !b.is_ascii_whitespace()).unwrap_or(rest.len());
-            let length = rest[start..].iter().position(|b| b.is_ascii_whitespace() || *b == b'#');
-            rest = &rest[start + length.unwrap_or(rest.len() - start)..];
-        }
-        out.extend_from_slice(rest);
+        out.extend_from_slice(behind_coordinates(line));
     }
     if count == positions.len() { Ok(out) } else { Err(count) }
+}
+
+/// What a vertex has behind its third coordinate, the line's end included.
+pub(super) fn behind_coordinates(line: &[u8]) -> &[u8] {
+    let mut rest = line;
+    for _ in 0..4 {
+        let start = rest.iter().position(|b| !b.is_ascii_whitespace()).unwrap_or(rest.len());
+        let length = rest[start..].iter().position(|b| b.is_ascii_whitespace() || *b == b'#');
+        rest = &rest[start + length.unwrap_or(rest.len() - start)..];
+    }
+    rest
 }
 
 /// The bytes of an OBJ file without its normals, which other positions make wrong; programs that read it compute them anew.
@@ -97,17 +103,17 @@ fn without_normals(bytes: &[u8]) -> Vec<u8> {
 
 /// The OBJ file of `bytes`, from `folder`, with one material library instead of those it names. What cannot be read becomes a
 /// comment: by its name another garment's library might be found.
-fn with_materials(bytes: &[u8], folder: &Path, name: &str) -> MovedObj {
+pub(super) fn with_materials(bytes: &[u8], folder: &Path, name: &str) -> MovedObj {
     let (mut obj, mut mtl) = (Vec::with_capacity(bytes.len()), None::<Vec<u8>>);
+    let mut libraries = Vec::new();
     for line in bytes.split_inclusive(|b| *b == b'\n') {
         let text = String::from_utf8_lossy(line);
-        let libraries =
-            text.trim().strip_prefix("mtllib").filter(|rest| rest.starts_with(char::is_whitespace));
-        let Some(names) = libraries else {
+        let names = text.trim().strip_prefix("mtllib").filter(|rest| rest.starts_with(char::is_whitespace));
+        let Some(names) = names else {
             obj.extend_from_slice(line);
             continue;
         };
-        let found = libraries_of(names.trim(), folder);
+        let found = libraries_of(names.trim(), folder, &mut libraries);
         if found.is_empty() {
             obj.extend_from_slice(b"# not found: ");
             obj.extend_from_slice(line);
@@ -118,16 +124,18 @@ fn with_materials(bytes: &[u8], folder: &Path, name: &str) -> MovedObj {
         }
         mtl.get_or_insert_default().extend(found);
     }
-    MovedObj { obj, mtl }
+    MovedObj { obj, mtl, libraries }
 }
 
-/// All material libraries, seen from `folder`, that can be read of those in `names`: one name with spaces, or several.
-fn libraries_of(names: &str, folder: &Path) -> Vec<u8> {
-    let read = |name: &str| {
+/// All material libraries, seen from `folder`, that can be read of those in `names`: one name with spaces, or several. Their paths
+/// are added to `paths`.
+fn libraries_of(names: &str, folder: &Path, paths: &mut Vec<PathBuf>) -> Vec<u8> {
+    let mut read = |name: &str| {
         let path = folder.join(portable(name));
         // Whatever else a file may name is not for a folder that is given away.
         let is_library = has_extension(&path, "mtl");
         let bytes = is_library.then(|| read_limited(&path).ok()).flatten()?;
+        paths.push(path.clone());
         Some((path.parent().unwrap_or(folder).to_owned(), bytes))
     };
     let libraries = match read(names) {
@@ -263,7 +271,7 @@ mod tests {
         let moved = |text: &str| {
             MovedObj::new(&folder.path().join("x.obj"), text.as_bytes(), &[[0.0; 3]], "x").unwrap()
         };
-        let MovedObj { obj, mtl } = moved("v 0 0 0\nusemtl a\n");
+        let MovedObj { obj, mtl, .. } = moved("v 0 0 0\nusemtl a\n");
         assert_eq!((obj.as_slice(), mtl), (b"v 0 0 0\nusemtl a\n".as_slice(), None));
         // A folder is no library.
         fs::create_dir(folder.path().join("a.mtl")).unwrap();

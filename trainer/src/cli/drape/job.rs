@@ -4,6 +4,7 @@ use crate::dataset::DatasetError;
 use crate::inference::{BodyReport, BodyState, Draper, GivenGarment, Moment};
 use clap::Args;
 use clothcombo_data::asset::{KnownShape, Motion, Pose, recover_body};
+use clothcombo_data::fit::FitSettings;
 use clothcombo_data::format::load_mesh;
 use miette::{Report as Failure, miette};
 use std::path::{Path, PathBuf};
@@ -60,13 +61,22 @@ impl FromStr for FrameRange {
     }
 }
 
+/// A garment that is asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct WantedGarment {
+    /// File or name.
+    pub name: String,
+    /// What is known about it.
+    pub hints: FitSettings,
+}
+
 /// One outfit to be draped.
 #[derive(Clone, Debug)]
 pub(super) struct Job {
     /// Name of its folder among several.
     pub name: String,
-    /// Files or names, innermost first.
-    pub garments: Vec<String>,
+    /// Innermost first.
+    pub garments: Vec<WantedGarment>,
     /// Another order.
     pub order: Option<Vec<usize>>,
     /// The body.
@@ -87,7 +97,7 @@ impl Job {
         let SceneArguments { pose, motion, posed, t_pose, .. } = &self.scene;
         let pose = pose.iter().map(|pose| PathBuf::from(file_and_frame(pose).0));
         let scene = pose.chain([motion, posed, t_pose].into_iter().flatten().cloned());
-        self.garments.iter().map(PathBuf::from).chain(scene)
+        self.garments.iter().map(|garment| PathBuf::from(&garment.name)).chain(scene)
     }
 
     /// Reads pose, motion or meshes.

@@ -7,6 +7,7 @@ mod summary;
 mod warnings;
 
 use crate::cli::device_argument::DeviceArgument;
+use crate::cli::fit_arguments::FitArguments;
 use crate::cli::interrupted::remove_on_signals;
 use crate::cli::output::print_json;
 use crate::cli::post_process::PostProcessArguments;
@@ -16,9 +17,10 @@ use crate::inference::{Drape, DrapeProgress, Draper, DraperSettings, Moment, Out
 use crate::system::files::write_json;
 use clap::{ArgGroup, Parser, ValueEnum};
 use clothcombo_data::check::impossible_turn;
+use clothcombo_data::fit::FitSettings;
 use folders::{check_cache, user_cache};
 use indicatif::ProgressBar;
-use job::{Job, Scenes, ordered};
+use job::{Job, Scenes, WantedGarment, ordered};
 use miette::{IntoDiagnostic, Report as Failure, miette};
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -36,9 +38,11 @@ use warnings::{log_repairs, warn_about_order, warn_about_shape};
         clothcombo drape --outfits outfits.toml -o out\n\n\
         A garment is a mesh file (.obj, .ply, .stl, .gltf, .glb) or the name of one in --dataset or in the model's own data.\n\
         What does not lie on the body in metres, y up and T-pose is fitted first (see `clothcombo fit`); every repair is in\n\
-        report.json. Outputs keep the vertices and polygons of the given files, in their order.\n\n\
+        report.json. Hints about files (--unit, --up, --arms, --category, --offset, --turn, --keep, --join-seams) are about all\n\
+        of the call; a file with a hint is always fitted. Outputs keep the vertices and polygons of the given files, in their\n\
+        order: what --keep leaves out follows the cloth.\n\n\
         --outfits takes a TOML file:\n  \
-        [[outfit]]\n  name = \"monday\"\n  garments = [\"tee.obj\", \"coat.obj\"]\n  shape = [1.0]       # optional, as are pose, \
+        [[outfit]]\n  name = \"monday\"\n  garments = [{ file = \"tee.obj\", unit = \"cm\" }, \"coat.obj\"]   # hints, or a name alone\n  shape = [1.0]       # optional, as are pose, \
         motion, frames, every")]
 pub struct Arguments {
     /// Run, checkpoint folder or model.safetensors; default: the model in the folder models
@@ -64,6 +68,8 @@ pub struct Arguments {
     /// Whether mesh files are fitted to the body
     #[arg(long, value_enum, default_value_t = Fit::Auto)]
     fit: Fit,
+    #[command(flatten)]
+    hints: FitArguments,
     /// Correction steps at most, each taken as far as it lowers the energy; the correction networks take turns. 0 leaves the
     /// networks' drape as it is [default: model.correction_steps of the model]
     #[arg(long, value_name = "STEPS")]
@@ -168,9 +174,18 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         1 => failure,
         _ => failure.wrap_err(format!("outfit {}", job.name)),
     };
-    let find = |name: &String| catalog.find(name, draper.body(), arguments.fit.decided());
+    let find = |garment: &WantedGarment| {
+        let WantedGarment { name, hints } = garment;
+        match arguments.fit == Fit::Never && *hints != FitSettings::default() {
+            true => Err(miette!(
+                help = "leave --fit never out",
+                "{name}: --fit never takes garments as they are, so that nothing can be said about their files"
+            )),
+            false => Ok(catalog.find(name, draper.body(), arguments.fit.decided(), hints)?),
+        }
+    };
     let read = |job: &Job| {
-        let sources = job.garments.iter().map(find).collect::<Result<Vec<_>, _>>()?;
+        let sources = job.garments.iter().map(find).collect::<Result<Vec<_>, Failure>>()?;
         let sources = ordered(sources, job.order.as_deref())?;
         Outfit::check(&sources)?;
         sources.iter().for_each(log_repairs);
@@ -224,10 +239,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 fn jobs(arguments: &Arguments) -> Result<Vec<Job>, Failure> {
     match &arguments.outfits {
-        Some(file) => outfits::read(file, &arguments.scene),
+        Some(file) => outfits::read(file, &arguments.scene, &arguments.hints.settings()),
         None => Ok(vec![Job {
             name: "outfit".to_owned(),
-            garments: arguments.garments.clone(),
+            garments: (arguments.garments.iter())
+                .map(|name| WantedGarment { name: name.clone(), hints: arguments.hints.settings() })
+                .collect(),
             order: arguments.order.clone(),
             scene: arguments.scene.clone(),
         }]),

@@ -1,6 +1,8 @@
 //! A TOML file of outfits.
 
-use super::job::{Job, SceneArguments};
+use super::job::{Job, SceneArguments, WantedGarment};
+use crate::cli::fit_arguments::GarmentEntry;
+use clothcombo_data::fit::FitSettings;
 use miette::{IntoDiagnostic, Report as Failure, WrapErr, miette};
 use serde::Deserialize;
 use std::collections::HashSet;
@@ -19,7 +21,8 @@ struct Outfits {
 #[serde(deny_unknown_fields)]
 struct Entry {
     name: Option<String>,
-    garments: Vec<String>,
+    /// Names, or tables with a file and hints.
+    garments: Vec<toml::Value>,
     order: Option<Vec<usize>>,
     shape: Option<Vec<f64>>,
     pose: Option<String>,
@@ -28,9 +31,9 @@ struct Entry {
     every: Option<u32>,
 }
 
-/// Reads the outfits of `file`. What an outfit does not say about the body is taken from `scene`; paths are relative to the
-/// file's folder, or to the working folder where there is no such file.
-pub(super) fn read(file: &Path, scene: &SceneArguments) -> Result<Vec<Job>, Failure> {
+/// Reads the outfits of `file`. What an outfit does not say about the body is taken from `scene`, and what it does not say about a
+/// garment from `hints`; paths are relative to the file's folder, or to the working folder where there is no such file.
+pub(super) fn read(file: &Path, scene: &SceneArguments, hints: &FitSettings) -> Result<Vec<Job>, Failure> {
     let text = std::fs::read_to_string(file)
         .into_diagnostic()
         .wrap_err_with(|| format!("cannot read {}", file.display()))?;
@@ -86,7 +89,12 @@ pub(super) fn read(file: &Path, scene: &SceneArguments) -> Result<Vec<Job>, Fail
         if entry.garments.is_empty() {
             return Err(wrong("it has no garments".to_owned()));
         }
-        let garments = entry.garments.iter().map(|g| beside(g)).collect();
+        let garments = entry.garments.into_iter().enumerate().map(|(number, value)| {
+            let wanted =
+                garment(value, hints).map_err(|what| wrong(format!("garment {}: {what}", number + 1)))?;
+            Ok(WantedGarment { name: beside(&wanted.name), ..wanted })
+        });
+        let garments = garments.collect::<Result<Vec<_>, Failure>>()?;
         Ok(Job { name, garments, order: entry.order, scene: own })
     });
     let jobs = jobs.collect::<Result<Vec<_>, _>>()?;
@@ -102,6 +110,22 @@ pub(super) fn read(file: &Path, scene: &SceneArguments) -> Result<Vec<Job>, Fail
         ));
     }
     Ok(jobs)
+}
+
+/// A name, or a table with a file and hints.
+fn garment(value: toml::Value, hints: &FitSettings) -> Result<WantedGarment, String> {
+    match value {
+        toml::Value::String(name) => Ok(WantedGarment { name, hints: hints.clone() }),
+        toml::Value::Table(table) => {
+            let entry: GarmentEntry =
+                table.try_into().map_err(|e: toml::de::Error| e.message().to_owned())?;
+            Ok(WantedGarment { hints: entry.settings(hints)?, name: entry.file })
+        }
+        other => Err(format!(
+            "it is of type {}, neither a name nor a table such as {{ file = \"tee.obj\", unit = \"cm\" }}",
+            other.type_str()
+        )),
+    }
 }
 
 /// Whether `name` can be that of a folder on every system, beside the report of all outfits. One that begins with a dot would
@@ -128,6 +152,7 @@ fn pose_beside(pose: &str, beside: impl Fn(&str) -> String) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use clothcombo_data::fit::{Keep, Unit};
 
     fn read_text(text: &str) -> Result<Vec<Job>, String> {
         let folder = tempfile::tempdir().unwrap();
@@ -135,7 +160,7 @@ mod tests {
         let file = folder.path().join("outfits.toml");
         std::fs::write(&file, text).unwrap();
         let scene = SceneArguments { shape: vec![0.5], every: Some(3), ..SceneArguments::default() };
-        read(&file, &scene).map_err(|e| e.to_string())
+        read(&file, &scene, &FitSettings::default()).map_err(|e| e.to_string())
     }
 
     #[test]
@@ -146,11 +171,23 @@ mod tests {
         )
         .unwrap();
         assert_eq!(jobs[0].name, "outfit-1");
-        assert!(jobs[0].garments[0].ends_with("/tee.obj") && jobs[0].garments[1] == "coat");
+        assert!(jobs[0].garments[0].name.ends_with("/tee.obj") && jobs[0].garments[1].name == "coat");
         // It does not move: what --every says is for the other.
         assert_eq!((&jobs[0].scene.shape, jobs[0].scene.every), (&vec![0.5], None));
         assert_eq!((&jobs[1].scene.shape, jobs[1].scene.every), (&vec![1.0], Some(1)));
         assert_eq!(jobs[1].scene.frames, "2..4".parse().ok());
+    }
+
+    #[test]
+    fn a_garment_may_come_with_hints() {
+        let jobs = read_text(
+            "[[outfit]]\ngarments = [{ file = \"tee.obj\", unit = \"cm\", keep = \"outer\" }, \"coat\"]\nmotion = \"walk.npz\"\n",
+        )
+        .unwrap();
+        let [tee, coat] = &jobs[0].garments[..] else { panic!("{jobs:?}") };
+        assert!(tee.name.ends_with("/tee.obj"));
+        assert_eq!((tee.hints.unit, tee.hints.keep), (Some(Unit::Cm), Keep::Outer));
+        assert_eq!(coat.hints, FitSettings::default());
     }
 
     #[test]
@@ -188,6 +225,10 @@ mod tests {
             ("[[outfit]]\ngarments = []\nframes = \"9..1\"\n", "9..1"),
             ("[[outfit]]\ngarments = []\nframes = \"0..4\"\n", "no motion"),
             ("[[outfit]]\ngarments = []\npose = \"a\"\nmotion = \"b\"\n", "both"),
+            ("[[outfit]]\ngarments = [3]\n", "garment 1: it is of type integer"),
+            ("[[outfit]]\ngarments = [{ unit = \"cm\" }]\n", "file"),
+            ("[[outfit]]\ngarments = [{ file = \"a\", size = 4 }]\n", "size"),
+            ("[[outfit]]\ngarments = [\"b\", { file = \"a\", unit = \"ell\" }]\n", "garment 2: unit: 'ell'"),
             ("outfit = []\n", "no outfit"),
             ("[[outfit]]\ngarments = [\"a\"]\n", "no outfit of"),
         ] {

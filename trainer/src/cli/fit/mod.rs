@@ -1,0 +1,112 @@
+//! `clothcombo fit`: any garment file onto any body.
+
+mod output;
+
+use super::fit_arguments::{Arms, FitArguments};
+use crate::cli::output::print_report;
+use crate::dataset::load_body;
+use crate::system::paths::{lossy, lossy_option};
+use clap::Parser;
+use clothcombo_data::fit::{FitReport, FitSettings, fit};
+use miette::{Report, miette};
+use output::{Form, check_output, read, save};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Fits a garment file to a body: finds unit, axes and arm pose, repairs the mesh, says everything it did
+#[derive(Parser)]
+#[command(
+    after_help = "Examples:\n  clothcombo fit shirt.glb --body datasets/open/body.npz -o shirt.obj\n  \
+        clothcombo fit coat.obj --unit cm --up z --json\n  \
+        clothcombo fit thick.obj --keep outer -o thin.obj\n\n\
+        Reads OBJ, PLY, STL and glTF. Without -o nothing is written: the report alone is printed.\n\n\
+        The OBJ is in metres, y up, at rest on the zero body in T-pose, and needs no further repair: `check`, `drape` and training\n\
+        take it as it is. It has the file's own faces (quads too), texture coordinates, groups, materials and order of vertices,\n\
+        except where that would be wrong: vertices and faces that were dropped are left out, vertices that were welded or joined\n\
+        are one, and faces whose parts were dropped, cut or split are triangles. --triangles writes the triangles alone,\n\
+        --with-thickness all of the file's vertices and faces, with both sheets of thick cloth."
+)]
+pub struct Arguments {
+    /// Garment: .obj, .ply, .stl, .gltf or .glb
+    garment: PathBuf,
+    /// Body to fit it to: "mannequin" or a body npz
+    #[arg(long, default_value = "mannequin")]
+    body: String,
+    /// OBJ to write, with its materials beside it
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+    /// Writes the repaired triangles alone, as they enter training
+    #[arg(long, requires = "output")]
+    triangles: bool,
+    /// Writes all vertices and faces of the file: what --keep left out follows the sheet that was kept, as thick as it was. Such a
+    /// file is for looking at, not for training
+    #[arg(long, requires_all = ["output", "keep"], conflicts_with = "triangles")]
+    with_thickness: bool,
+    #[command(flatten)]
+    hints: FitArguments,
+    /// The earlier name of --arms
+    #[arg(long, hide = true, conflicts_with = "arms", value_name = "ARMS")]
+    pose: Option<String>,
+    /// Print the report as JSON; elements are counted from 0
+    #[arg(long)]
+    json: bool,
+}
+
+impl Arguments {
+    fn settings(&self) -> Result<FitSettings, Report> {
+        let settings = self.hints.settings();
+        let arms = match self.pose.as_deref() {
+            None => return Ok(settings),
+            Some("auto") => None,
+            Some(pose) => Some(pose.parse::<Arms>().map_err(|e| miette!("--pose: {e}, auto"))?),
+        };
+        Ok(FitSettings { arms_lowered: arms.map(|arms| arms == Arms::A), ..settings })
+    }
+
+    fn form(&self) -> Form {
+        match (self.triangles, self.with_thickness) {
+            (true, _) => Form::Triangles,
+            (_, true) => Form::Whole,
+            _ => Form::Repaired,
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct Output<'a> {
+    #[serde(serialize_with = "lossy")]
+    garment: &'a Path,
+    body: &'a str,
+    #[serde(serialize_with = "lossy_option")]
+    output: Option<&'a Path>,
+    #[serde(flatten)]
+    report: &'a FitReport,
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// When a file cannot be read or written, or the mesh is no garment of this body.
+pub fn run(arguments: &Arguments) -> Result<(), Report> {
+    let settings = arguments.settings()?;
+    arguments.output.as_deref().map_or(Ok(()), |output| check_output(output, &arguments.garment))?;
+    let body = load_body(&arguments.body, 0)?;
+    let given = read(&arguments.garment)?;
+    let fitted = fit(&given.mesh, &body, &settings)
+        .map_err(|e| miette!("{} on body '{}': {e}", arguments.garment.display(), body.name))?;
+    let report = &fitted.report;
+    if let Some(output) = &arguments.output {
+        let mut comments = vec![
+            format!("fitted to body '{}': metres, y up, at rest in T-pose", body.name),
+            format!("from {}", arguments.garment.file_name().unwrap_or_default().to_string_lossy()),
+        ];
+        comments.extend(report.assumptions().into_iter().map(|a| format!("assumed: {a}")));
+        save(output, &given, &fitted, arguments.form(), &comments)?;
+    }
+    let output =
+        Output { garment: &arguments.garment, body: &body.name, output: arguments.output.as_deref(), report };
+    print_report(arguments.json, &output, |output| match output.output {
+        Some(file) => format!("{report}\nwritten   {}\n", file.display()),
+        None => format!("{report}\n"),
+    })
+}

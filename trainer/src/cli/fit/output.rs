@@ -1,0 +1,120 @@
+//! What `clothcombo fit` writes.
+
+use clothcombo_data::fit::Fitted;
+use clothcombo_data::format::obj::{MovedObj, RepairedForm, save_file_faces};
+use clothcombo_data::format::{
+    FileError, FileFace, MeshFormat, PolygonMesh, atomic, obj, parse_mesh, read_mesh_file,
+};
+use miette::{IntoDiagnostic, Report, miette};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// A garment file.
+pub(super) struct Given {
+    pub mesh: PolygonMesh,
+    path: PathBuf,
+    /// An OBJ file, whose statements can be repeated.
+    obj: Option<Vec<u8>>,
+}
+
+/// Which faces are written.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Form {
+    /// The file's, as far as they are still true.
+    Repaired,
+    /// Triangles.
+    Triangles,
+    /// The file's, all of them.
+    Whole,
+}
+
+/// Nothing but an OBJ is written, and never over the garment as it was given or its materials.
+pub(super) fn check_output(output: &Path, garment: &Path) -> Result<(), Report> {
+    if !output.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) {
+        let help = format!("for example -o {}", output.with_extension("obj").display());
+        return Err(miette!(help = help, "{}: the fitted garment is written as .obj", output.display()));
+    }
+    let is_same = fs::canonicalize(output).ok().is_some_and(|o| fs::canonicalize(garment).ok() == Some(o));
+    match is_same {
+        true => Err(miette!(help = "give -o another name", "{} is the garment itself", output.display())),
+        false => Ok(()),
+    }
+}
+
+/// Reads a garment file once, so that what is written is what was fitted.
+pub(super) fn read(path: &Path) -> Result<Given, Report> {
+    let bytes = read_mesh_file(path).into_diagnostic()?;
+    let mesh = parse_mesh(&bytes, path).into_diagnostic()?;
+    let is_obj = MeshFormat::detect(path, &bytes) == Some(MeshFormat::Obj);
+    Ok(Given { mesh, path: path.into(), obj: is_obj.then_some(bytes) })
+}
+
+/// Writes a fitted garment in one of its forms, with leading `comments`.
+pub(super) fn save(
+    output: &Path,
+    given: &Given,
+    fitted: &Fitted,
+    form: Form,
+    comments: &[String],
+) -> Result<(), Report> {
+    let rest = &fitted.garment.rest;
+    // Materials are named in the file: by a name that can be written there.
+    let name = output.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let moved = match (form, &given.obj) {
+        (Form::Triangles, _) => {
+            return obj::save(output, rest.positions(), rest.faces(), comments).into_diagnostic();
+        }
+        (Form::Repaired, Some(bytes)) => {
+            let (positions, origin) = (rest.positions(), &fitted.vertex_origin);
+            let form = RepairedForm { positions, vertex_origin: origin, faces: &fitted.file_faces };
+            MovedObj::repaired(&given.path, bytes, &form, &name).ok()
+        }
+        (Form::Whole, Some(bytes)) => {
+            let positions = fitted.in_file_order(rest.positions());
+            MovedObj::new(&given.path, bytes, &positions, &name).ok()
+        }
+        (Form::Repaired, None) => {
+            return save_file_faces(output, rest.positions(), &fitted.file_faces, &given.mesh, comments)
+                .into_diagnostic();
+        }
+        (Form::Whole, None) => {
+            let positions = fitted.in_file_order(rest.positions());
+            let whole = |(face, polygon): (usize, &[u32])| FileFace {
+                face: face as u32,
+                corners: polygon.iter().copied().zip(0..).map(<[u32; 2]>::from).collect(),
+            };
+            let faces: Vec<FileFace> = given.mesh.polygons().enumerate().map(whole).collect();
+            return save_file_faces(output, &positions, &faces, &given.mesh, comments).into_diagnostic();
+        }
+    };
+    let moved = moved.ok_or_else(|| {
+        miette!(
+            help = "--triangles writes the garment without texture coordinates, groups and materials",
+            "{} cannot be repeated statement by statement",
+            given.path.display()
+        )
+    })?;
+    let lines = comments.iter().flat_map(|comment| comment.lines());
+    let mut bytes: Vec<u8> = lines.flat_map(|line| format!("# {line}\n").into_bytes()).collect();
+    bytes.extend_from_slice(b"# what follows is the file as it was given, fitted and without normals\n");
+    bytes.extend_from_slice(&moved.obj);
+    if let Some(mtl) = &moved.mtl {
+        let materials = output.with_file_name(format!("{name}.mtl"));
+        check_materials(&materials, &moved.libraries)?;
+        atomic::write(&materials, mtl).map_err(FileError::io(&materials)).into_diagnostic()?;
+    }
+    atomic::write(output, &bytes).map_err(FileError::io(output)).into_diagnostic()
+}
+
+/// Refuses materials that would be written over those of the garment.
+fn check_materials(materials: &Path, libraries: &[PathBuf]) -> Result<(), Report> {
+    let place = fs::canonicalize(materials).ok();
+    match place.is_some() && libraries.iter().any(|library| fs::canonicalize(library).ok() == place) {
+        true => Err(miette!(
+            help = "give -o another name or folder",
+            "{} are the garment's own materials, and would be written over",
+            materials.display()
+        )),
+        false => Ok(()),
+    }
+}
