@@ -1,5 +1,6 @@
 //! `clothcombo eval`: everything a trained model is judged by, in one report.
 
+use crate::cli::data_check::check_data;
 use crate::cli::device_argument::DeviceArgument;
 use crate::cli::loading::load_dataset;
 use crate::cli::verbosity::{print_status, progress_bar};
@@ -144,6 +145,7 @@ fn model(
     device: &Device,
 ) -> Result<ModelUnderTest, Report> {
     config.validation.seed = arguments.seed.or(config.validation.seed);
+    check_data(&config)?;
     let dataset = load_dataset(&config)?;
     let known = trained.known_of_held_out(&config, &dataset);
     if !known.is_empty() {
