@@ -112,6 +112,9 @@ impl ArrayCache {
     /// [`CacheError::Io`].
     pub fn open(root: &Path, limit_bytes: u64) -> Result<Self, CacheError> {
         let failed = |reason| CacheError::Io { path: root.into(), reason };
+        if root.is_file() {
+            return Err(failed(io::Error::new(io::ErrorKind::NotADirectory, "it is a file, not a folder")));
+        }
         fs::create_dir_all(root).map_err(failed)?;
         let mut used = 0;
         for shelf in fs::read_dir(root).map_err(failed)? {

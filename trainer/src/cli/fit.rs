@@ -1,6 +1,8 @@
 //! `clothcombo fit`: any garment file onto any body.
 
 use crate::cli::output::print_report;
+use crate::cli::values::file_to_make;
+use crate::cli::verbosity::spinner;
 use crate::dataset::load_body;
 use crate::system::paths::{lossy, lossy_option};
 use clap::{Parser, ValueEnum};
@@ -26,7 +28,7 @@ pub struct Arguments {
     #[arg(long, default_value = "mannequin")]
     body: String,
     /// OBJ to write: metres, y up, at rest on the zero body in T-pose; triangles only, without texture coordinates
-    #[arg(short, long)]
+    #[arg(short, long, value_parser = file_to_make())]
     output: Option<PathBuf>,
     /// Unit of the file: m, dm, cm, mm, inch or auto
     #[arg(long, default_value = "auto", value_parser = automatic::<Unit>)]
@@ -105,7 +107,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         },
         category: arguments.category,
     };
-    let fitted = fit(&file, &body, &settings)
+    let fitted = spinner("fitting", || fit(&file, &body, &settings))
         .map_err(|e| miette!("{} on body '{}': {e}", arguments.garment.display(), body.name))?;
     let report = &fitted.report;
     if let Some(output) = &arguments.output {
