@@ -124,7 +124,12 @@ impl ArrayCache {
             let records = files.flatten().filter(|f| f.path().extension().is_some_and(|e| e == EXTENSION));
             used += records.filter_map(|f| f.metadata().ok()).map(|m| m.len()).sum::<u64>();
         }
-        Ok(Self { root: root.into(), limit: limit_bytes, used: AtomicU64::new(used), has_warned: AtomicBool::new(false) })
+        Ok(Self {
+            root: root.into(),
+            limit: limit_bytes,
+            used: AtomicU64::new(used),
+            has_warned: AtomicBool::new(false),
+        })
     }
 
     /// The folder.
@@ -162,7 +167,9 @@ impl ArrayCache {
                         self.warn(&format!("{error}; removed, computed anew"));
                     }
                     // It is computed anew each time: slow, not wrong.
-                    Err(reason) => self.warn(&format!("{error}; computed anew, it cannot be removed: {reason}")),
+                    Err(reason) => {
+                        self.warn(&format!("{error}; computed anew, it cannot be removed: {reason}"))
+                    }
                 }
                 None
             }

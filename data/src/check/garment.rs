@@ -103,7 +103,11 @@ pub(super) fn check(
     };
     let misplaced = misplacement(&mesh, body, &gaps);
     let warnings = warnings(&garment);
-    Ok(Checked { garment, warnings, misplaced: misplaced.map(|reason| format!("{}: {reason}", path.display())) })
+    Ok(Checked {
+        garment,
+        warnings,
+        misplaced: misplaced.map(|reason| format!("{}: {reason}", path.display())),
+    })
 }
 
 fn warnings(garment: &GarmentCheck) -> Vec<String> {

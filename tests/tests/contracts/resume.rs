@@ -205,7 +205,8 @@ fn a_run_does_not_go_on_with_other_data() {
         let entry = |name: &String| format!("[[garment]]\nfile = {name:?}\ncategory = {category:?}\n");
         let manifest: String = names.iter().map(entry).collect();
         std::fs::write(folder.path().join("garments.toml"), manifest).unwrap();
-        let joints = Checkpoint::open(&folder.path().join("run")).ok().map(|checkpoint| checkpoint.state.joints);
+        let joints =
+            Checkpoint::open(&folder.path().join("run")).ok().map(|checkpoint| checkpoint.state.joints);
         Arc::new(Dataset::load_for(&config, joints.as_deref(), &|_, _, _| {}).unwrap())
     };
     let place = folder.path().join("run");
@@ -223,7 +224,8 @@ fn a_run_does_not_go_on_with_other_data() {
     for allowed in [&[][..], &["data.poses"]] {
         let refused = resume(load("top"), allowed).err().expect("another category has other skin weights");
         let refused = format!("{refused} {}", refused.help().unwrap());
-        let words = ["garment garment_0: top", "dress", "in the checkpoint", "--allow-config-change data.garments"];
+        let words =
+            ["garment garment_0: top", "dress", "in the checkpoint", "--allow-config-change data.garments"];
         assert!(words.iter().all(|word| refused.contains(word)), "{refused}");
     }
     assert_eq!(resume(load("top"), &["data"]).unwrap().step(), 5, "it may");

@@ -123,7 +123,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
 /// Before anything is loaded: whether the report may be written where it is wanted.
 fn check_output(folder: &Path) -> Result<(), Report> {
     if let Some(file) = obstacle(folder) {
-        return Err(miette!(help = "choose another folder with -o", "{} is a file, not a folder", file.display()));
+        return Err(miette!(
+            help = "choose another folder with -o",
+            "{} is a file, not a folder",
+            file.display()
+        ));
     }
     let occupied = fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
     let read = |text: String| serde_json::from_str::<Value>(&text).ok();

@@ -67,7 +67,9 @@ mod tests {
         assert_eq!(config.data.garments[0].folder, Some(base.path().join("clothes")));
         assert_eq!(config.init_from, Some(base.path().join("models/a").display().to_string()));
         let written = to_toml(&config).unwrap();
-        for line in ["body = \"body.npz\"", "folder = \"clothes\"", "folder = \"/var/cache/x\"", "\"models/a\""] {
+        for line in
+            ["body = \"body.npz\"", "folder = \"clothes\"", "folder = \"/var/cache/x\"", "\"models/a\""]
+        {
             assert!(written.contains(line), "{line} is missing in {written}");
         }
         assert_eq!(to_toml(&read(&written, &[])).unwrap(), written);

@@ -10,7 +10,7 @@ use clothcombo_data::check::{Checker, FileCheck, ManifestHints, Target, implausi
 use clothcombo_data::folders::{ListedGarment, list_motion_folder};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// What was found out about the files of a configuration. Generated garments need no check.
@@ -82,11 +82,11 @@ impl DataCheck {
         };
         let found: Vec<FileCheck> = files.par_iter().map(check).collect();
         let mut all = Self { files: files.len(), ..Self::default() };
-        for (file, FileCheck { path, unusable, warnings, .. }) in files.iter().zip(found) {
-            if let Some(reason) = unusable {
-                all.faults.push(fault(file, &path, &reason, &config.data.body));
-            } else if !warnings.is_empty() {
-                all.warnings.push(FileWarnings { file: path, warnings });
+        for (file, found) in files.iter().zip(found) {
+            if let Some(reason) = &found.unusable {
+                all.faults.push(fault(file, &found, reason, &config.data.body));
+            } else if !found.warnings.is_empty() {
+                all.warnings.push(FileWarnings { file: found.path, warnings: found.warnings });
             }
         }
         Ok(all)
@@ -116,13 +116,36 @@ fn body_fault(body: &Body, file: &str) -> Option<Fault> {
     })
 }
 
-fn fault(file: &Checked, path: &Path, reason: &str, body: &str) -> Fault {
-    // The table has the file in a column of its own.
-    let shown = path.display().to_string();
-    let what = reason.strip_prefix(&shown).map_or(reason, |rest| rest.strip_prefix(": ").unwrap_or(rest));
-    let remedy = match &file.target {
-        Target::Garment { .. } => format!("clothcombo fit {shown} --body {body} -o {}.obj", file.name),
-        _ => "convert it again, or take it out of the folder".into(),
+fn fault(file: &Checked, found: &FileCheck, reason: &str, body: &str) -> Fault {
+    let path = found.path.display().to_string();
+    let remedy = match found.garment {
+        Some(_) => format!("clothcombo fit {path} --body {body} -o {}.obj", file.name),
+        None => "export or convert it again, or take it out of the data".into(),
     };
-    Fault { name: file.name.clone(), file: path.into(), what: what.to_owned(), remedy }
+    Fault { name: file.name.clone(), file: found.path.clone(), what: without_path(reason, &path), remedy }
+}
+
+/// `reason` without the file that it begins with, which has a column of its own in the table.
+fn without_path(reason: &str, path: &str) -> String {
+    let Some(rest) = reason.strip_prefix(path).and_then(|rest| rest.strip_prefix(':')) else {
+        return reason.to_owned();
+    };
+    match rest.strip_prefix(' ') {
+        Some(rest) => rest.to_owned(),
+        None => format!("line {rest}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reason_loses_its_file_and_keeps_its_line() {
+        for (reason, short) in
+            [("a.obj: torn", "torn"), ("a.obj:2: no number", "line 2: no number"), ("torn", "torn")]
+        {
+            assert_eq!(without_path(reason, "a.obj"), short);
+        }
+    }
 }

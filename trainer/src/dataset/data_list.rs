@@ -86,7 +86,8 @@ impl DataList {
             }
         }));
         let files = dataset.motions.as_deref().and_then(|folder| list_motion_folder(folder).ok());
-        let clips: Vec<Datum> = files.unwrap_or_default().par_iter().map(|file| clip(file, dataset)).collect();
+        let clips: Vec<Datum> =
+            files.unwrap_or_default().par_iter().map(|file| clip(file, dataset)).collect();
         all.extend(clips);
         Self(all)
     }
@@ -127,7 +128,8 @@ fn clip(file: &Path, dataset: &Dataset) -> Datum {
         () if clips.test.contains(&name) => "for the test",
         () => "for training",
     };
-    let digest = fs::read(file).map_or_else(|e| e.to_string(), |bytes| blake3::hash(&bytes).to_hex().to_string());
+    let digest =
+        fs::read(file).map_or_else(|e| e.to_string(), |bytes| blake3::hash(&bytes).to_hex().to_string());
     Datum { kind: Kind::Clip, name, is: format!("{purpose}, {}", short(&digest)) }
 }
 
@@ -142,7 +144,11 @@ mod tests {
     #[test]
     fn changes_are_told_by_name_with_both_values() {
         let list = |all: &[(Kind, &str, &str)]| {
-            DataList(all.iter().map(|(kind, name, is)| Datum { kind: *kind, name: (*name).into(), is: (*is).into() }).collect())
+            DataList(
+                all.iter()
+                    .map(|(kind, name, is)| Datum { kind: *kind, name: (*name).into(), is: (*is).into() })
+                    .collect(),
+            )
         };
         let before = list(&[(Kind::Body, "b", "1"), (Kind::Garment, "tee", "2"), (Kind::Clip, "walk", "3")]);
         let now = list(&[(Kind::Body, "b", "1"), (Kind::Garment, "tee", "5"), (Kind::Garment, "coat", "4")]);

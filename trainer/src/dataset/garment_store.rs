@@ -20,8 +20,8 @@ use clothcombo_data::cache::{ArrayCache, Key, mesh_key};
 use clothcombo_physics::operators::SurfaceOperators;
 use rayon::prelude::*;
 use std::path::Path;
-use std::sync::{Arc, OnceLock};
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, OnceLock};
 
 /// What is known of every garment without reading it.
 #[derive(Clone, Debug)]

@@ -158,10 +158,16 @@ mod tests {
             let overrides: Vec<String> = overrides.iter().map(|o| (*o).to_owned()).collect();
             parse(text, Path::new("small.toml"), &overrides).unwrap()
         };
-        let changed =
-            config(&["model.width=32", "init_from=\"/models/a\"", "output.keep_checkpoints=9", "data.memory_mib=7"]);
-        let found: Vec<String> =
-            differences(&changed, &config(&[])).iter().map(|d| d.text("the configuration", "the run")).collect();
+        let changed = config(&[
+            "model.width=32",
+            "init_from=\"/models/a\"",
+            "output.keep_checkpoints=9",
+            "data.memory_mib=7",
+        ]);
+        let found: Vec<String> = differences(&changed, &config(&[]))
+            .iter()
+            .map(|d| d.text("the configuration", "the run"))
+            .collect();
         let width = config(&[]).model.width;
         assert_eq!(
             found,

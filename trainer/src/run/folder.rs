@@ -179,8 +179,8 @@ impl RunDir {
         }
         let run = Self::locked(root)?;
         let own = load(&run.config(), &[])?;
-        let allowed = AllowedChanges::new(allowed, &[&own, config])
-            .map_err(|key| RunDirError::UnknownKey { key })?;
+        let allowed =
+            AllowedChanges::new(allowed, &[&own, config]).map_err(|key| RunDirError::UnknownKey { key })?;
         let mut changes = differences(config, &own);
         changes.retain(|change| !allowed.covers(&change.key));
         if !changes.is_empty() {

@@ -74,7 +74,9 @@ pub enum CheckpointError {
         "init_from: the networks are not those of model {}:{}",
         path.display(), listed(changes.iter().map(|change| change.text("the configuration", "the model")))
     )]
-    #[diagnostic(help("a run that starts from a model has its networks: give [model] its values, or leave init_from out"))]
+    #[diagnostic(help(
+        "a run that starts from a model has its networks: give [model] its values, or leave init_from out"
+    ))]
     OtherStart {
         /// The model.
         path: PathBuf,

@@ -283,7 +283,8 @@ fn write(
     save_model(snapshot.model, &folder.join(MODEL_EXACT))?;
     snapshot.optimizer.save(folder.join(OPTIMIZER)).map_err(|e| e.to_string())?;
     fs::write(folder.join(CONFIG), to_toml(config).map_err(|e| e.to_string())?).map_err(text)?;
-    fs::write(folder.join(DATA), serde_json::to_vec(snapshot.data).map_err(|e| e.to_string())?).map_err(text)?;
+    fs::write(folder.join(DATA), serde_json::to_vec(snapshot.data).map_err(|e| e.to_string())?)
+        .map_err(text)?;
     let mut files = REQUIRED.to_vec();
     files.push(DATA);
     if let Some(average) = snapshot.average {

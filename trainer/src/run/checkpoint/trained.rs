@@ -1,6 +1,8 @@
 //! A trained model, apart from the run that made it.
 
-use super::{CONFIG, CheckpointError, CheckpointState, MODEL_EXCHANGE, newest, other_networks, read_state, verify};
+use super::{
+    CONFIG, CheckpointError, CheckpointState, MODEL_EXCHANGE, newest, other_networks, read_state, verify,
+};
 use crate::config::{Config, PoseConfig, load};
 use crate::dataset::{Dataset, GarmentPurpose, purpose};
 use burn::store::{ModuleSnapshot, SafetensorsStore};

@@ -3,8 +3,8 @@
 use super::Session;
 use super::data_change::changed_data;
 use crate::config::Config;
-use crate::dataset::sizes::DataSizes;
 use crate::dataset::Dataset;
+use crate::dataset::sizes::DataSizes;
 use crate::evaluation::ValidationSet;
 use crate::inference::tensor_store::TensorStore;
 use crate::run::checkpoint::{Checkpoint, CheckpointState, TrainedModel};
@@ -90,7 +90,8 @@ impl Session {
         // A score of other losses or scenes cannot be beaten by one of these.
         let scores = ["losses", "validation", "data", "seed"];
         let changed = differing_keys(&checkpoint.config()?, &config);
-        let is_comparable = changed_data.is_empty() && !changed.iter().any(|key| scores.iter().any(|part| key.starts_with(part)));
+        let is_comparable = changed_data.is_empty()
+            && !changed.iter().any(|key| scores.iter().any(|part| key.starts_with(part)));
         let best = found.best.filter(|_| is_comparable);
         // What was changed may have fixed what went wrong before.
         let is_unchanged = changed.is_empty() && changed_data.is_empty();
