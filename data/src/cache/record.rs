@@ -93,11 +93,7 @@ impl Record {
 
 /// What does not fit, for `map_err`.
 fn damaged(path: &Path) -> impl Fn(String) -> FileError + '_ {
-    |reason| {
-        FileError::content(path)(format!(
-            "damaged cache record ({reason}); it is computed anew when the file is removed"
-        ))
-    }
+    |reason| FileError::content(path)(format!("damaged cache record ({reason})"))
 }
 
 /// The bytes of a record.

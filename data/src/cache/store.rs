@@ -5,7 +5,7 @@ use crate::format::{FileError, atomic};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use thiserror::Error;
 
 /// Why the cache cannot be used.
@@ -101,6 +101,8 @@ pub struct ArrayCache {
     limit: u64,
     /// Bytes in the folder, as far as this process knows.
     used: AtomicU64,
+    /// Whether a record that cannot be read was told of: where one is damaged others are, and one warning is enough.
+    has_warned: AtomicBool,
 }
 
 impl ArrayCache {
@@ -110,6 +112,9 @@ impl ArrayCache {
     /// [`CacheError::Io`].
     pub fn open(root: &Path, limit_bytes: u64) -> Result<Self, CacheError> {
         let failed = |reason| CacheError::Io { path: root.into(), reason };
+        if root.is_file() {
+            return Err(failed(io::Error::new(io::ErrorKind::NotADirectory, "it is a file, not a folder")));
+        }
         fs::create_dir_all(root).map_err(failed)?;
         let mut used = 0;
         for shelf in fs::read_dir(root).map_err(failed)? {
@@ -119,7 +124,12 @@ impl ArrayCache {
             let records = files.flatten().filter(|f| f.path().extension().is_some_and(|e| e == EXTENSION));
             used += records.filter_map(|f| f.metadata().ok()).map(|m| m.len()).sum::<u64>();
         }
-        Ok(Self { root: root.into(), limit: limit_bytes, used: AtomicU64::new(used) })
+        Ok(Self {
+            root: root.into(),
+            limit: limit_bytes,
+            used: AtomicU64::new(used),
+            has_warned: AtomicBool::new(false),
+        })
     }
 
     /// The folder.
@@ -138,7 +148,7 @@ impl ArrayCache {
     }
 
     /// What `read` takes from the record of `key`; `None` if there is none, or it cannot be read. A damaged record is
-    /// removed with a warning.
+    /// removed, the first with a warning.
     pub fn get<T>(&self, key: Key, read: impl FnOnce(&Record) -> Result<T, FileError>) -> Option<T> {
         let path = self.path(key);
         match Record::open(&path).and_then(|record| read(&record)) {
@@ -146,7 +156,7 @@ impl ArrayCache {
             Err(error) if error.is_not_found() => None,
             // It may be a good one that cannot be read just now.
             Err(error @ FileError::Io { .. }) => {
-                tracing::warn!("{error}; computed anew");
+                self.warn(&format!("{error}; computed anew"));
                 None
             }
             Err(error) => {
@@ -154,13 +164,22 @@ impl ArrayCache {
                 match fs::remove_file(&path) {
                     Ok(()) => {
                         self.used.fetch_sub(size.min(self.used()), Ordering::Relaxed);
-                        tracing::warn!("{error}; removed");
+                        self.warn(&format!("{error}; removed, computed anew"));
                     }
                     // It is computed anew each time: slow, not wrong.
-                    Err(reason) => tracing::warn!("{error}; it cannot be removed: {reason}"),
+                    Err(reason) => {
+                        self.warn(&format!("{error}; computed anew, it cannot be removed: {reason}"))
+                    }
                 }
                 None
             }
+        }
+    }
+
+    fn warn(&self, message: &str) {
+        match self.has_warned.swap(true, Ordering::Relaxed) {
+            false => tracing::warn!("{message}; so are others that cannot be read"),
+            true => tracing::debug!("{message}"),
         }
     }
 

@@ -64,8 +64,19 @@ pub(super) fn check(path: &Path, npz: &mut NpzFile) -> Result<(BodyCheck, Vec<St
     Ok((check, warnings))
 }
 
+/// Heights of a body in metres, from a small child to a giant.
+const HEIGHTS: std::ops::RangeInclusive<f64> = 0.4..=2.8;
+
+/// Why a body of this height (m) is none in metres, if so.
+pub fn implausible_height(height: f64) -> Option<String> {
+    (!HEIGHTS.contains(&height)).then(|| format!("{height:.2} m high: are the units metres and y up?"))
+}
+
 /// Why training would refuse the body, if it would.
 pub(super) fn unusable(check: &BodyCheck, path: &Path) -> Option<String> {
+    if let Some(reason) = implausible_height(check.height) {
+        return Some(format!("{}: {reason}", path.display()));
+    }
     (check.joints < BODY_JOINT_COUNT).then(|| {
         format!(
             "{}: {} joints; poses turn the {BODY_JOINT_COUNT} body joints of SMPL",
@@ -80,9 +91,6 @@ fn warnings(check: &BodyCheck) -> Vec<String> {
     let [low, high] = check.weight_sums;
     if [low, high].iter().any(|s| (s - 1.0).abs() > 1e-3) {
         warnings.push(format!("skin weights sum to {low:.4}–{high:.4} instead of 1; they are normalised"));
-    }
-    if !(0.4..=2.8).contains(&check.height) {
-        warnings.push(format!("{:.2} m high: are the units metres and y up?", check.height));
     }
     if check.inside_out {
         warnings.push(INSIDE_OUT.into());

@@ -1,5 +1,6 @@
 //! A garment file: the mesh, what it is, and how it lies on the body.
 
+use super::placement::misplacement;
 use super::targets::ManifestHints;
 use crate::asset::{Body, Category, Garment};
 use crate::format::load_tri_mesh;
@@ -10,9 +11,6 @@ use clothcombo_physics::query::{Distance, Surface};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::path::Path;
-
-/// A garment farther from the body than this is not on it (m).
-const OFF_BODY: f64 = 0.1;
 
 /// Measurements of a garment file.
 #[derive(Clone, Debug, Serialize)]
@@ -53,13 +51,21 @@ pub fn layer_guess(median_distance: f64, category: Category) -> [u32; 2] {
     [lowest, lowest + 1]
 }
 
+/// A garment that could be measured.
+pub(super) struct Checked {
+    pub garment: GarmentCheck,
+    pub warnings: Vec<String>,
+    /// Why it is of no use where it lies, if so.
+    pub misplaced: Option<String>,
+}
+
 /// Measurements and warnings, or why the garment cannot be used.
 pub(super) fn check(
     path: &Path,
     hints: &ManifestHints,
     body: &Body,
     surface: &Surface<f64>,
-) -> Result<(GarmentCheck, Vec<String>), String> {
+) -> Result<Checked, String> {
     let mesh = load_tri_mesh(path).map_err(|e| e.to_string())?;
     let area = mesh.area();
     if !(area > 0.0 && area.is_finite()) {
@@ -95,27 +101,22 @@ pub(super) fn check(
         .len(),
         self_triangle_pairs: self_triangle_pairs(mesh.positions(), mesh.faces()).len(),
     };
-    let warnings = warnings(&garment, body);
-    Ok((garment, warnings))
+    let misplaced = misplacement(&mesh, body, &gaps);
+    let warnings = warnings(&garment);
+    Ok(Checked {
+        garment,
+        warnings,
+        misplaced: misplaced.map(|reason| format!("{}: {reason}", path.display())),
+    })
 }
 
-fn warnings(garment: &GarmentCheck, body: &Body) -> Vec<String> {
+fn warnings(garment: &GarmentCheck) -> Vec<String> {
     let mut warnings: Vec<String> =
         garment.mesh.defects.counts().into_iter().map(|(n, name)| format!("{n} {name}")).collect();
     if garment.mesh.boundary_loops == 0 {
         warnings.push("closed: a garment has openings".into());
     }
-    if garment.distance_min_mm > 1e3 * OFF_BODY {
-        warnings.push(format!(
-            "not on body '{}': {:.0} mm away; `clothcombo fit` moves, scales and turns it",
-            body.name, garment.distance_min_mm
-        ));
-    } else if 2 * garment.inside > garment.mesh.vertices {
-        warnings.push(format!(
-            "mostly inside body '{}': wrong unit or body? `clothcombo fit` finds out",
-            body.name
-        ));
-    } else if garment.inside > 0 || garment.body_triangle_pairs > 0 {
+    if garment.inside > 0 || garment.body_triangle_pairs > 0 {
         warnings.push(format!(
             "{} vertices inside the body at rest, {} intersecting triangle pairs",
             garment.inside, garment.body_triangle_pairs

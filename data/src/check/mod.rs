@@ -5,9 +5,10 @@
 mod body;
 mod garment;
 mod motion;
+mod placement;
 mod targets;
 
-pub use body::BodyCheck;
+pub use body::{BodyCheck, implausible_height};
 pub use garment::{GarmentCheck, layer_guess};
 pub use motion::{MotionCheck, impossible_turn};
 pub use targets::{ManifestHints, Target, find_targets};
@@ -79,8 +80,14 @@ impl Checker {
     pub fn check(&self, target: &Target) -> FileCheck {
         let file = FileCheck::new(target.path());
         let checked = match target {
-            Target::Garment { path, entry } => garment::check(path, entry, &self.body, &self.surface)
-                .map(|(check, warnings)| FileCheck { garment: Some(check), warnings, ..file.clone() }),
+            Target::Garment { path, entry } => garment::check(path, entry, &self.body, &self.surface).map(
+                |garment::Checked { garment, warnings, misplaced }| FileCheck {
+                    garment: Some(garment),
+                    warnings,
+                    unusable: misplaced,
+                    ..file.clone()
+                },
+            ),
             Target::Npz { path } => check_npz(&file, path),
             Target::Unlisted { .. } => {
                 let warning = format!("not in the {MANIFEST} beside it, so no dataset takes it");
@@ -100,7 +107,8 @@ fn check_npz(file: &FileCheck, path: &Path) -> Result<FileCheck, String> {
         Ok(FileCheck { body: Some(check), warnings, unusable, ..file.clone() })
     } else if npz.contains("poses") {
         let (check, warnings) = motion::check(path)?;
-        Ok(FileCheck { motion: Some(check), warnings, ..file.clone() })
+        let unusable = motion::unusable(&check, path);
+        Ok(FileCheck { motion: Some(check), warnings, unusable, ..file.clone() })
     } else if npz.contains("positions") && npz.contains("f") {
         let warning = "a simulated sequence: training does not read it".into();
         Ok(FileCheck { warnings: vec![warning], ..file.clone() })

@@ -51,6 +51,21 @@ pub fn impossible_turn<'a>(poses: impl IntoIterator<Item = &'a Pose>) -> Option<
     })
 }
 
+/// Excess over a limit that no file of angles in radians has (degrees): a whole turn.
+const NOT_RADIANS: f64 = 360.0;
+
+/// Why training would refuse the motion, if it would.
+pub(super) fn unusable(check: &MotionCheck, path: &Path) -> Option<String> {
+    let reason = match (check.frames, check.largest_excess_degrees) {
+        (1, _) => "a single frame is no motion; join still poses in one file".to_owned(),
+        (_, excess) if excess > NOT_RADIANS => {
+            format!("joints turn {excess:.0}° beyond their range: angles in degrees?")
+        }
+        _ => return None,
+    };
+    Some(format!("{}: {reason}", path.display()))
+}
+
 /// Measurements and warnings, or why the motion cannot be used.
 pub(super) fn check(path: &Path) -> Result<(MotionCheck, Vec<String>), String> {
     // NaN, wrong shapes and rates are refused here, with frame and joint.

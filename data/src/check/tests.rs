@@ -59,7 +59,10 @@ fn a_dataset_with_good_and_bad_files_is_told_apart() {
         .filter(|f| f.unusable.is_some())
         .map(|f| f.path.file_name().unwrap().to_str().unwrap())
         .collect();
-    assert_eq!(unusable, ["broken.stl", "cut.npz", "garments.toml", "missing"]);
+    assert_eq!(
+        unusable,
+        ["broken.stl", "centimetres.obj", "tight.obj", "cut.npz", "garments.toml", "missing"]
+    );
     assert!(by_name(&files, "sequence.npz").warnings[0].contains("simulated sequence"));
     let unlisted = by_name(&files, "unlisted.obj");
     assert!(unlisted.garment.is_none() && unlisted.warnings.iter().any(|w| w.contains("garments.toml")));
@@ -73,7 +76,8 @@ fn a_dataset_with_good_and_bad_files_is_told_apart() {
     assert!(check.distance_min_mm > 3.0 && check.distance_median_mm > check.distance_min_mm);
     let tight = by_name(&files, "tight.obj").garment.as_ref().unwrap();
     assert!(tight.inside > 0 && tight.body_triangle_pairs > 0 && tight.category_guessed);
-    assert!(by_name(&files, "centimetres.obj").warnings.iter().any(|w| w.contains("clothcombo fit")));
+    let centimetres = by_name(&files, "centimetres.obj");
+    assert!(centimetres.unusable.as_ref().unwrap().contains("not in metres"), "{centimetres:?}");
 
     let body = by_name(&files, "body.npz").body.as_ref().unwrap();
     assert_eq!((body.joints, body.components, body.boundary_loops), (checker.body.joint_count(), 1, 0));

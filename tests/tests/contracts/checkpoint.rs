@@ -71,7 +71,8 @@ fn every_damaged_file_is_refused_by_name() {
     assert!(matches!(Checkpoint::open(&path), Err(CheckpointError::Missing { .. })));
 }
 
-const FILES: [&str; 5] = ["model.safetensors", "model.bpk", "optimizer.bpk", "config.toml", "state.json"];
+const FILES: [&str; 6] =
+    ["model.safetensors", "model.bpk", "optimizer.bpk", "config.toml", "data.json", "state.json"];
 
 /// Damages one file of `checkpoint` at random so that it changes, and says how.
 fn damage(checkpoint: &Path, rng: &mut ChaCha8Rng) -> String {

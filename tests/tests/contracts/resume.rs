@@ -6,6 +6,7 @@ use clothcombo_trainer::config::Config;
 use clothcombo_trainer::dataset::{Dataset, ValidationGroup};
 use clothcombo_trainer::evaluation::ValidationSet;
 use clothcombo_trainer::run::checkpoint::{Checkpoint, TrainedModel};
+use clothcombo_trainer::run::difference::AllowedChanges;
 use clothcombo_trainer::run::event::{Observer, TrainEvent};
 use clothcombo_trainer::run::folder::RunDir;
 use clothcombo_trainer::system::device::default_device;
@@ -204,19 +205,30 @@ fn a_run_does_not_go_on_with_other_data() {
         let entry = |name: &String| format!("[[garment]]\nfile = {name:?}\ncategory = {category:?}\n");
         let manifest: String = names.iter().map(entry).collect();
         std::fs::write(folder.path().join("garments.toml"), manifest).unwrap();
-        Arc::new(Dataset::load(&config, &|_, _, _| {}).unwrap())
+        let joints =
+            Checkpoint::open(&folder.path().join("run")).ok().map(|checkpoint| checkpoint.state.joints);
+        Arc::new(Dataset::load_for(&config, joints.as_deref(), &|_, _, _| {}).unwrap())
     };
     let place = folder.path().join("run");
     run(&config, &load("dress"), &place, false, Some(5));
-    let resume = |dataset: Arc<Dataset>| {
+    let resume = |dataset: Arc<Dataset>, allowed: &[&str]| {
         let checkpoint = Checkpoint::open(&place).unwrap();
         let device = default_device();
-        Session::resume(RunDir::follow(&place), config.clone(), dataset, &device, &checkpoint)
+        let allowed: Vec<String> = allowed.iter().map(|key| (*key).to_owned()).collect();
+        let allowed = AllowedChanges::new(&allowed, &[&config]).unwrap();
+        let run = RunDir::follow(&place).allowing(allowed);
+        Session::resume(run, config.clone(), dataset, &device, &checkpoint)
     };
-    assert_eq!(resume(load("dress")).unwrap().step(), 5);
+    assert_eq!(resume(load("dress"), &[]).unwrap().step(), 5);
     // Skin weights are smoothed farther on a dress.
-    let refused = resume(load("top")).err().expect("another category has other skin weights");
-    assert!(refused.to_string().contains("no longer fits"), "{refused}");
+    for allowed in [&[][..], &["data.poses"]] {
+        let refused = resume(load("top"), allowed).err().expect("another category has other skin weights");
+        let refused = format!("{refused} {}", refused.help().unwrap());
+        let words =
+            ["garment garment_0: top", "dress", "in the checkpoint", "--allow-config-change data.garments"];
+        assert!(words.iter().all(|word| refused.contains(word)), "{refused}");
+    }
+    assert_eq!(resume(load("top"), &["data"]).unwrap().step(), 5, "it may");
 }
 
 #[test]

@@ -105,12 +105,22 @@ fn shards_prepare_everything_once() {
 }
 
 #[test]
-fn a_full_cache_is_one_clear_message() {
+fn a_cache_that_cannot_be_used_changes_no_bit() {
     let folder = tempfile::tempdir().unwrap();
+    let kept = tiny_config(folder.path(), &[]);
+    let expected = trained(&kept, load(&kept), &folder.path().join("kept"));
+    // Full from the start, full after a few records, and no folder at all.
     let mut config = streamed(folder.path());
-    config.data.cache.limit_gib = 1e-5;
-    let error = Dataset::load(&config, &|_, _, _| {}).err().unwrap().to_string();
-    assert!(error.contains("limit") && error.contains("raise the limit"), "{error}");
+    for (name, limit) in [("full", 1e-9), ("nearly", 2e-4)] {
+        config.data.cache.limit_gib = limit;
+        assert!(trained(&config, load(&config), &folder.path().join(name)) == expected, "{name}");
+    }
+    fs::write(folder.path().join("file"), "").unwrap();
+    config.data.cache.folder = Some(folder.path().join("file/cache"));
+    assert!(trained(&config, load(&config), &folder.path().join("none")) == expected);
+    let body = Arc::new(load_body("mannequin", 0).unwrap());
+    let error = GarmentStore::prepare(&config, body, [0, 1], &|_, _, _| {}).unwrap_err().to_string();
+    assert!(error.contains("file/cache"), "filling it is what `prepare` is for: {error}");
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! `clothcombo eval`: everything a trained model is judged by, in one report.
 
+use crate::cli::data_check::check_data;
 use crate::cli::device_argument::DeviceArgument;
 use crate::cli::loading::load_dataset;
 use crate::cli::verbosity::{print_status, progress_bar};
@@ -122,7 +123,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
 /// Before anything is loaded: whether the report may be written where it is wanted.
 fn check_output(folder: &Path) -> Result<(), Report> {
     if let Some(file) = obstacle(folder) {
-        return Err(miette!(help = "choose another folder with -o", "{} is no folder", file.display()));
+        return Err(miette!(
+            help = "choose another folder with -o",
+            "{} is a file, not a folder",
+            file.display()
+        ));
     }
     let occupied = fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
     let read = |text: String| serde_json::from_str::<Value>(&text).ok();
@@ -144,6 +149,7 @@ fn model(
     device: &Device,
 ) -> Result<ModelUnderTest, Report> {
     config.validation.seed = arguments.seed.or(config.validation.seed);
+    check_data(&config)?;
     let dataset = load_dataset(&config)?;
     let known = trained.known_of_held_out(&config, &dataset);
     if !known.is_empty() {

@@ -1,7 +1,7 @@
 //! `clothcombo generate`: garments from nothing but a body.
 
 use super::garment_sheet::{PER_ROW, garment_sheet};
-use crate::cli::values::{count, picture_file};
+use crate::cli::values::{count, folder_to_make, picture_file};
 use crate::cli::verbosity::{print_status, progress_bar};
 use crate::dataset::load_body;
 use crate::picture::save_png;
@@ -49,7 +49,7 @@ pub struct Arguments {
     #[arg(long, value_parser = picture_file())]
     picture: Option<PathBuf>,
     /// Folder to write; one that holds garments is added to
-    #[arg(short, long)]
+    #[arg(short, long, value_parser = folder_to_make())]
     output: PathBuf,
 }
 

@@ -1,6 +1,6 @@
 //! `clothcombo import`: other people's files become this project's bodies, garments and motions.
 
-use crate::cli::values::{not_negative, positive};
+use crate::cli::values::{file_to_make, folder_to_make, not_negative, positive};
 use crate::cli::verbosity::progress_bar;
 use crate::dataset::load_body;
 use clap::{Args, Subcommand, ValueEnum};
@@ -58,7 +58,7 @@ pub struct BvhArguments {
     #[command(flatten)]
     provenance: ProvenanceArguments,
     /// Folder to write
-    #[arg(short, long)]
+    #[arg(short, long, value_parser = folder_to_make())]
     output: PathBuf,
 }
 
@@ -91,7 +91,7 @@ pub struct SmplxArguments {
     #[arg(long, default_value_t = 16)]
     components: usize,
     /// Body npz to write
-    #[arg(short, long)]
+    #[arg(short, long, value_parser = file_to_make())]
     output: PathBuf,
 }
 
@@ -134,7 +134,7 @@ pub struct AmassArguments {
     #[arg(long, value_enum, default_value = "z")]
     up: Up,
     /// Folder to write
-    #[arg(short, long)]
+    #[arg(short, long, value_parser = folder_to_make())]
     output: PathBuf,
 }
 
@@ -159,7 +159,7 @@ pub struct Cloth3dArguments {
     #[command(flatten)]
     thinning: ThinningArguments,
     /// Folder to write
-    #[arg(short, long)]
+    #[arg(short, long, value_parser = folder_to_make())]
     output: PathBuf,
 }
 
@@ -177,7 +177,7 @@ pub struct DeepmimicArguments {
     #[command(flatten)]
     provenance: ProvenanceArguments,
     /// Folder to write
-    #[arg(short, long)]
+    #[arg(short, long, value_parser = folder_to_make())]
     output: PathBuf,
 }
 

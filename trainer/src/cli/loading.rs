@@ -20,5 +20,16 @@ pub(super) fn under_preparation_bar<T>(prepare: impl FnOnce(&(dyn Fn(usize, usiz
 /// # Errors
 /// Names the garment or file at fault.
 pub(super) fn load_dataset(config: &Config) -> Result<Arc<Dataset>, DatasetError> {
-    under_preparation_bar(|progress| Dataset::load(config, progress)).map(Arc::new)
+    load_dataset_for(config, None)
+}
+
+/// As [`load_dataset`], for networks that see the joints of these names.
+///
+/// # Errors
+/// As [`load_dataset`].
+pub(super) fn load_dataset_for(
+    config: &Config,
+    joints: Option<&[String]>,
+) -> Result<Arc<Dataset>, DatasetError> {
+    under_preparation_bar(|progress| Dataset::load_for(config, joints, progress)).map(Arc::new)
 }

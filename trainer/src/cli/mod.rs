@@ -3,6 +3,7 @@
 pub mod bench;
 pub mod check;
 pub mod config;
+mod data_check;
 mod device_argument;
 pub mod drape;
 pub mod eval;

@@ -1,5 +1,6 @@
 //! `clothcombo prepare`: fills the cache of a configuration before training.
 
+use crate::cli::data_check::check_data;
 use crate::cli::loading::under_preparation_bar;
 use crate::cli::verbosity::print_status;
 use crate::config::load;
@@ -50,6 +51,7 @@ impl FromStr for Shard {
 /// When the configuration or a garment is wrong, or the cache cannot be written.
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let config = load(&arguments.config, &arguments.overrides)?;
+    check_data(&config)?;
     let body = Arc::new(load_body(&config.data.body, config.data.shape_components)?);
     let (garments, bytes) =
         under_preparation_bar(|progress| GarmentStore::prepare(&config, body, arguments.shard.0, progress))?;

@@ -4,6 +4,7 @@ use crate::cli::interrupted::remove_on_signals;
 use crate::cli::output::print_report;
 use crate::cli::post_process::PostProcessArguments;
 use crate::cli::table::{row, table};
+use crate::cli::verbosity::spinner;
 use crate::inference::UniqueNames;
 use crate::inference::output::Staged;
 use crate::picture::{DressedRow, draw_dressed, save_png};
@@ -122,8 +123,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         .zip(&garments)
         .map(|(garment, read)| Layer { garment, positions: read.draped.positions() })
         .collect();
-    let certificate_before = certify(&surface, &layers).into_diagnostic()?;
-    let resolved = resolve(&surface, &layers, &settings).into_diagnostic()?;
+    let certificate_before =
+        spinner("counting intersections", || certify(&surface, &layers)).into_diagnostic()?;
+    let resolved = spinner("resolving", || resolve(&surface, &layers, &settings)).into_diagnostic()?;
     let scored = |positions: &dyn Fn(usize) -> Vec<[f64; 3]>| -> Result<Score, Report> {
         let all: Vec<Vec<[f64; 3]>> = (0..garments.len()).map(positions).collect();
         let draped: Vec<DrapedGarment> = garments
@@ -136,8 +138,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let ms = |time: Duration| 1e3 * time.as_secs_f64();
     let report = ResolveReport {
         gap_mm: arguments.post_process.gap_mm,
-        before: scored(&|i| garments[i].draped.positions().to_vec())?,
-        after: scored(&|i| resolved.positions[i].clone())?,
+        before: spinner("scoring", || scored(&|i| garments[i].draped.positions().to_vec()))?,
+        after: spinner("scoring", || scored(&|i| resolved.positions[i].clone()))?,
         certificate_before,
         certificate: resolved.certificate.clone(),
         milliseconds: Milliseconds {
@@ -157,7 +159,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
             })
             .collect(),
     };
-    write(staged, &body, &garments, &resolved, &report)?;
+    spinner("writing", || write(staged, &body, &garments, &resolved, &report))?;
     print_report(arguments.json, &report, text)
 }
 

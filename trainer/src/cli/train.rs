@@ -1,13 +1,13 @@
 //! `clothcombo-train`.
 
+mod origin;
+
 use super::exit_code;
 use crate::cli::device_argument::DeviceArgument;
-use crate::cli::loading::load_dataset;
 use crate::cli::memory_table::{memory_line, memory_warning};
 use crate::cli::verbosity::{Verbosity, is_quiet, print_status};
 use crate::config::{Config, load};
 use crate::dataset::{Dataset, FrameCounts};
-use crate::run::checkpoint::{Checkpoint, CheckpointError};
 use crate::run::event::Observer;
 use crate::run::folder::RunDir;
 use crate::run::memory::MemoryEstimate;
@@ -15,6 +15,7 @@ use crate::run::observer::{
     History, HistoryObserver, LogObserver, MetricsObserver, ProgressObserver, ReportObserver,
     TensorBoardObserver,
 };
+use crate::system::files::write_json;
 use crate::system::memory::gibibytes;
 use crate::system::stop::StopFlag;
 use crate::training::process_group::ProcessGroup;
@@ -22,6 +23,7 @@ use crate::training::session::Session;
 use crate::training::train_loop::train;
 use clap::Parser;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
+use origin::{Loaded, Origin};
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -36,7 +38,8 @@ use std::rc::Rc;
         clothcombo-train --run-dir runs/wide --resume\n  \
         clothcombo-train --resume runs/wide/checkpoints/step-00004000\n  \
         clothcombo-train --resume runs/wide --set stages.2.steps=9000 --allow-config-change stages\n\n\
-        Ctrl-C or SIGTERM saves a checkpoint and exits 0; a second one ends at once."
+        Ctrl-C, SIGTERM, SIGHUP or SIGUSR1 saves a checkpoint and exits 0; a second Ctrl-C or SIGTERM ends at once. Relative paths in \
+        a configuration are relative to the folder in which the run is started; it resumes from any."
 )]
 pub struct Arguments {
     /// Configuration file (TOML); optional with --resume --run-dir, which use the run's own
@@ -49,7 +52,8 @@ pub struct Arguments {
     /// to the bit only on the device the checkpoint is from, with as many threads
     #[arg(long, value_name = "PATH", num_args = 0..=1)]
     resume: Option<Option<PathBuf>>,
-    /// With --resume: keys whose values may differ from the run's own, separated by commas; a section allows all in it
+    /// With --resume: keys whose values may differ from the run's own, separated by commas; a section allows all in it. data,
+    /// data.body, data.garments and data.poses also allow other files
     #[arg(long, value_name = "KEYS", value_delimiter = ',', requires = "resume")]
     allow_config_change: Vec<String>,
     /// Folder of the run; default: runs/NAME-OF-CONFIG, numbered when taken, or the folder that PATH lies in
@@ -139,49 +143,20 @@ fn run(arguments: &Arguments, group: &Rc<ProcessGroup>) -> Result<(), Report> {
     let named = arguments.named_run()?;
     let file = arguments.config_file(named.as_deref())?;
     let root = named.unwrap_or_else(|| default_run_dir(&file, arguments.resume.is_some()));
-    // What is wrong with the folder is said before minutes are spent on data; wrong data leaves no folder behind.
     let config = load(&file, &arguments.overrides)?;
-    let existing = match &arguments.resume {
-        Some(path) => {
-            let run = match group.is_rank_zero() {
-                true => RunDir::resume(&root, &config, &arguments.allow_config_change)?,
-                false => RunDir::follow(&root),
-            };
-            Some((run, newest_or_none(path.as_deref().unwrap_or(&root))?))
-        }
-        None if group.is_rank_zero() => RunDir::refuse_occupied(&root).map(|()| None)?,
-        None => None,
-    };
+    // All that can be wrong is found out before anything is made.
+    let origin = Origin::find(arguments, &root, &config, group)?;
     let device = arguments.device.open()?;
-    let dataset = load_dataset(&config)?;
+    let Loaded { dataset, check } = origin.load_data(&config, group)?;
     print_data(&dataset);
-    let (run, session) = match existing {
-        Some((run, checkpoint)) => {
-            let session = match &checkpoint {
-                Some(c) => Session::resume(run.clone(), config.clone(), dataset.clone(), &device, c)?,
-                None => Session::new(run.clone(), config.clone(), dataset.clone(), &device)?,
-            };
-            // Every process has read the checkpoint before rank zero moves others aside.
-            group.barrier(false)?;
-            if group.is_rank_zero() {
-                continue_run(&run, &config, checkpoint.as_ref())?;
-            }
-            (run, session)
-        }
-        None => {
-            let run = match group.is_rank_zero() {
-                true => RunDir::create(&root, &config)?,
-                false => RunDir::follow(&root),
-            };
-            let session = Session::new(run.clone(), config.clone(), dataset.clone(), &device)?;
-            (run, session)
-        }
-    };
-    let mut session = session.shared_in(group.clone())?;
+    let (run, mut session) = origin.begin(&root, &config, &dataset, &device, group)?;
     if !group.is_rank_zero() {
         return train(&mut session, &mut [], &stop);
     }
     run.write_split(&dataset.split_names())?;
+    if let Some(check) = &check {
+        write_json(&run.data_check(), check)?;
+    }
     let memory = session.memory_estimate();
     print_status(&format!("run folder {}", run.root().display()));
     if group.is_shared() {
@@ -202,32 +177,6 @@ fn run(arguments: &Arguments, group: &Rc<ProcessGroup>) -> Result<(), Report> {
         gibibytes(device.device as u64)
     );
     result
-}
-
-/// The checkpoint at `path`, or the newest whole one of the run there; `None` where the run was killed before its first.
-fn newest_or_none(path: &Path) -> Result<Option<Checkpoint>, CheckpointError> {
-    match Checkpoint::open(path) {
-        Ok(checkpoint) => Ok(Some(checkpoint)),
-        Err(CheckpointError::Missing { .. }) => {
-            tracing::warn!("{} holds no checkpoint yet: the run starts anew", path.display());
-            Ok(None)
-        }
-        Err(error) => Err(error),
-    }
-}
-
-/// Makes `config` the run's own and sets aside what the run did after `checkpoint`, with a warning about each.
-fn continue_run(run: &RunDir, config: &Config, checkpoint: Option<&Checkpoint>) -> Result<(), Report> {
-    let changed = run.adopt_config(config)?;
-    if !changed.is_empty() {
-        tracing::warn!("the run goes on with other values of {}", changed.join(", "));
-    }
-    let abandoned = checkpoint.map_or(Ok(0), |c| c.abandon_later(run))?;
-    if abandoned > 0 {
-        let folder = run.checkpoints();
-        tracing::warn!("{abandoned} later checkpoints are now {}/abandoned-step-…", folder.display());
-    }
-    Ok(())
 }
 
 fn observers(

@@ -67,17 +67,34 @@ pub fn picture_file() -> impl TypedValueParser<Value = PathBuf> {
     PathBufValueParser::new().try_map(checked_picture)
 }
 
+/// A folder that is there or can be made.
+pub fn folder_to_make() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(|path| match obstacle(&path) {
+        Some(file) => Err(format!("{} is a file, not a folder", file.display())),
+        None => Ok(path),
+    })
+}
+
+/// A file that is there or can be made.
+pub fn file_to_make() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(checked_file)
+}
+
+fn checked_file(path: PathBuf) -> Result<PathBuf, String> {
+    if path.is_dir() {
+        return Err("it is a folder, not a file".into());
+    }
+    match path.parent().and_then(obstacle) {
+        Some(other) => Err(format!("{} is a file, not a folder", other.display())),
+        None => Ok(path),
+    }
+}
+
 fn checked_picture(path: PathBuf) -> Result<PathBuf, String> {
     if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png")) {
         return Err(format!("pictures are PNG: for example {}", path.with_extension("png").display()));
     }
-    if path.is_dir() {
-        return Err("it is a folder".into());
-    }
-    match path.parent().and_then(obstacle) {
-        Some(other) => Err(format!("{} is no folder", other.display())),
-        None => Ok(path),
-    }
+    checked_file(path)
 }
 
 #[cfg(test)]
@@ -111,8 +128,8 @@ mod tests {
             ("thesis.tex", "thesis.png"),
             ("png", "PNG"),
             ("folder.png", "folder"),
-            ("notes/a.png", "notes is no folder"),
-            ("notes/deep/a.png", "notes is no folder"),
+            ("notes/a.png", "notes is a file, not a folder"),
+            ("notes/deep/a.png", "notes is a file, not a folder"),
         ] {
             let message = checked_picture(at(bad)).unwrap_err();
             assert!(message.contains(word), "{message}");

@@ -5,7 +5,11 @@ use clap::{ArgAction, Args};
 use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 use tracing_subscriber::EnvFilter;
+
+/// Time between two pictures of a spinner.
+const TICK: Duration = Duration::from_millis(200);
 
 /// Belongs to the process, like the log.
 static QUIET: AtomicBool = AtomicBool::new(false);
@@ -69,6 +73,14 @@ pub(crate) fn progress_bar(length: usize, template: &str) -> ProgressBar {
     }
     let style = ProgressStyle::with_template(template).expect("templates of this crate are valid");
     ProgressBar::new(length as u64).with_style(style).with_finish(ProgressFinish::AndClear)
+}
+
+/// Runs `work` under a spinner that says what is done and for how long; none with `--quiet` or off a terminal.
+pub(crate) fn spinner<T>(what: &str, work: impl FnOnce() -> T) -> T {
+    let bar = progress_bar(1, "{spinner} {msg} · {elapsed}");
+    bar.set_message(what.to_owned());
+    bar.enable_steady_tick(TICK);
+    work()
 }
 
 /// One line on stderr, none with `--quiet`.

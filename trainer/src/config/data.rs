@@ -2,7 +2,6 @@
 
 use crate::system::lru_cache::KeptBytes;
 use clothcombo_data::asset::Category;
-use clothcombo_data::cache::{ArrayCache, CacheError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -277,13 +276,9 @@ impl DataConfig {
         KeptBytes { total, device: bytes(self.device_memory_mib) }
     }
 
-    /// The cache of the run, if it has one.
-    ///
-    /// # Errors
-    /// When the folder cannot be used.
-    pub(crate) fn open_cache(&self) -> Result<Option<ArrayCache>, CacheError> {
-        let limit = (self.cache.limit_gib * f64::from(1 << 30)) as u64;
-        self.cache.folder.as_ref().map(|folder| ArrayCache::open(folder, limit)).transpose()
+    /// Largest size of the cache (bytes).
+    pub(crate) fn cache_limit(&self) -> u64 {
+        (self.cache.limit_gib * f64::from(1 << 30)) as u64
     }
 
     /// What is inconsistent, as (place, what, hint).

@@ -100,6 +100,7 @@ pub fn parse(text: &str, path: &Path, overrides: &[String]) -> Result<Config, Co
     let tree = toml::de::Deserializer::from(sources.tree()?);
     let mut config = Config::deserialize(tree).map_err(|error| sources.invalid(&error))?;
     let of_the_files = config.problem();
+    config = config.with_absolute_paths();
     if !overrides.is_empty() {
         let mut tree: toml::Value = toml::Value::try_from(&config)
             .map_err(|e| ConfigError::BadOverride { setting: String::new(), message: e.to_string() })?;
@@ -108,6 +109,9 @@ pub fn parse(text: &str, path: &Path, overrides: &[String]) -> Result<Config, Co
             apply(&mut tree, setting).map_err(bad)?;
             config = tree.clone().try_into().map_err(|e: toml::de::Error| bad(with_new_name(e.message())))?;
         }
+        let base = config.base.take();
+        // What is typed is relative to where it is typed.
+        config = Config { base, ..config.with_absolute_paths() };
     }
     match config.problem() {
         None => Ok(config),
@@ -126,7 +130,7 @@ pub fn parse(text: &str, path: &Path, overrides: &[String]) -> Result<Config, Co
 /// # Errors
 /// When a value has no TOML form (an integer beyond 2⁶³).
 pub fn to_toml(config: &Config) -> Result<String, toml::ser::Error> {
-    toml::to_string_pretty(config)
+    toml::to_string_pretty(&config.with_relative_paths())
 }
 
 /// The beginning of an override, which may be as long as the command line.
@@ -204,7 +208,7 @@ mod tests {
         )
         .unwrap();
         assert_eq!((c.stages[0].steps, c.losses.strain.weight.at(0.0)), (7, 2.0));
-        assert_eq!(c.data.body, "some.npz");
+        assert!(c.data.body.ends_with("/some.npz"), "{}", c.data.body);
     }
 
     #[test]

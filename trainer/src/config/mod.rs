@@ -9,6 +9,7 @@ mod load;
 mod losses;
 mod optimizer;
 mod output;
+mod paths;
 mod ramp;
 mod renamed;
 mod schema;
@@ -33,6 +34,7 @@ pub use validation::ValidationConfig;
 use clothcombo_model::{ModelConfig, ModelError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
 
 /// A whole run.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
@@ -40,6 +42,10 @@ use serde::{Deserialize, Serialize};
 pub struct Config {
     /// Everything random follows from this number: the same seed gives the same run, bit for bit. At most 2⁶³ − 1.
     pub seed: u64,
+    /// Folder that relative paths are relative to, where it exists; else the working folder. A run writes down the folder in which
+    /// it was started, and so resumes from anywhere.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub base: Option<PathBuf>,
     /// Run, checkpoint or model folder whose parameters the networks start with, to train a model further on other data or
     /// another schedule; absent: random ones. Sizes of the networks, body, joints and pose encoding must be its own, but a model
     /// without correction networks may be given some. Give such

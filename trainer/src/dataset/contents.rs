@@ -1,6 +1,7 @@
 //! What the scenes of a run are sampled from: body, garments, poses.
 
 use super::active_joints::ActiveJoints;
+use super::data_list::DataList;
 use super::error::DatasetError;
 use super::garment_store::GarmentStore;
 use super::poses::{HeldOut, PoseLibrary};
@@ -12,7 +13,7 @@ use clothcombo_data::cache::{Key, KeyBuilder, body_key};
 use clothcombo_data::format::npz::NpzFile;
 use clothcombo_data::generate::mannequin;
 use clothcombo_model::{Dimensions, Graph};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 /// What the scenes of a run are sampled from.
@@ -36,7 +37,10 @@ pub struct Dataset {
     pub shape_count: usize,
     /// Range every component is sampled from.
     pub shape_range: [f64; 2],
+    /// Folder of the motions, if poses come from motions.
+    pub(super) motions: Option<PathBuf>,
     fingerprint: OnceLock<String>,
+    list: OnceLock<DataList>,
 }
 
 /// Reads `"mannequin"` or a body npz with at most `shape_components` components (0: all it has).
@@ -110,6 +114,18 @@ impl Dataset {
         config: &Config,
         progress: &(dyn Fn(usize, usize, &str) + Sync),
     ) -> Result<Self, DatasetError> {
+        Self::load_for(config, None, progress)
+    }
+
+    /// As [`load`](Self::load), for networks that see the joints of these names, whatever joints carry the garments.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load), and when the body lacks one of the joints.
+    pub fn load_for(
+        config: &Config,
+        joints: Option<&[String]>,
+        progress: &(dyn Fn(usize, usize, &str) + Sync),
+    ) -> Result<Self, DatasetError> {
         let body = Arc::new(load_body(&config.data.body, config.data.shape_components)?);
         if body.joint_count() < BODY_JOINT_COUNT {
             return Err(DatasetError::FewJoints { name: body.name.clone(), joints: body.joint_count() });
@@ -121,7 +137,7 @@ impl Dataset {
         };
         let poses = PoseLibrary::new(&config.data.poses, &body)?;
         let memory = MemoryBudget::new(config.data.memory_limits());
-        let garments = GarmentStore::load(config, body.clone(), &memory, progress)?;
+        let garments = GarmentStore::load(config, body.clone(), joints, &memory, progress)?;
         let names: Vec<&str> = (0..garments.len()).map(|i| garments.info(i).name.as_str()).collect();
         let split = GarmentSplit::new(&names, &config.data)?;
         Ok(Self {
@@ -134,7 +150,9 @@ impl Dataset {
             memory,
             shape_count,
             shape_range: config.data.shape_range,
+            motions: config.data.poses.motions.clone(),
             fingerprint: OnceLock::new(),
+            list: OnceLock::new(),
         })
     }
 
@@ -157,6 +175,11 @@ impl Dataset {
     /// what it is for. Equal data gives equal scenes.
     pub fn fingerprint(&self) -> &str {
         self.fingerprint.get_or_init(|| format!("{FINGERPRINT}{}", self.key()))
+    }
+
+    /// What the data consists of, by name.
+    pub fn list(&self) -> &DataList {
+        self.list.get_or_init(|| DataList::of(self))
     }
 
     /// A fingerprint of what outfits in held-out windows are sampled from: garments, body, and the frames of the windows. Two models

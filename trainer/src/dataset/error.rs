@@ -49,17 +49,6 @@ pub enum DatasetError {
         /// What the system can give (bytes).
         available: u64,
     },
-    /// Records that were there are gone and cannot be written again.
-    #[error("the records of garment {name} vanished from cache {}", cache.display())]
-    #[diagnostic(help(
-        "something empties the folder during the run; give data.cache.folder one of its own, then --resume"
-    ))]
-    Vanished {
-        /// The garment.
-        name: String,
-        /// The folder.
-        cache: PathBuf,
-    },
     /// There is nowhere to store what would be computed.
     #[error("the configuration names no cache to prepare")]
     #[diagnostic(help(
@@ -147,6 +136,15 @@ pub enum DatasetError {
         name: String,
         /// Its joints.
         joints: usize,
+    },
+    /// The networks see joints that the body lacks.
+    #[error("body {body} has no joint {}, which the networks were trained with", missing.join(", "))]
+    #[diagnostic(help("use the body of the checkpoint, or train a new model"))]
+    MissingJoints {
+        /// The body.
+        body: String,
+        /// The joints.
+        missing: Vec<String>,
     },
     /// More shape components are asked for than the body has.
     #[error("data.shape_components = {asked}, but the body has {available}")]

@@ -9,7 +9,7 @@ use super::active_joints::ActiveJoints;
 use super::error::DatasetError;
 use super::garment_source::{GarmentLoader, GarmentSource};
 use super::prepared_garment::PreparedGarment;
-use super::preprocessor::{CachePolicy, Preprocessor};
+use super::preprocessor::Preprocessor;
 use crate::config::Config;
 use crate::dataset::DataSizes;
 use crate::system::allocator::return_freed_memory;
@@ -20,8 +20,8 @@ use clothcombo_data::cache::{ArrayCache, Key, mesh_key};
 use clothcombo_physics::operators::SurfaceOperators;
 use rayon::prelude::*;
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, OnceLock};
 
 /// What is known of every garment without reading it.
 #[derive(Clone, Debug)]
@@ -44,14 +44,17 @@ pub struct GarmentInfo {
 pub struct GarmentStore {
     infos: Vec<GarmentInfo>,
     joints: ActiveJoints,
-    store: Store,
+    /// Of each garment, what stays in memory: everything without a cache, nothing of what a cache has.
+    kept: Vec<Option<Kept>>,
+    streamed: Streamed,
 }
 
-enum Store {
-    Kept { garments: Vec<Arc<PreparedGarment>>, operators: Vec<Arc<SurfaceOperators>> },
-    Streamed(Box<Streamed>),
+struct Kept {
+    garment: Arc<PreparedGarment>,
+    operators: Arc<SurfaceOperators>,
 }
 
+/// Reads from the cache, and makes again what is not there.
 struct Streamed {
     recent: LruCache<PreparedGarment>,
     sources: Vec<GarmentSource>,
@@ -62,13 +65,14 @@ struct Streamed {
 struct IndexEntry {
     info: GarmentInfo,
     largest_weights: Vec<f32>,
-    /// Without a cache.
+    /// What is in no cache.
     kept: Option<(Garment, Binding, SurfaceOperators)>,
 }
 
 impl GarmentStore {
     /// Reads or makes all garments `config` names, and computes what the cache does not hold. Those of a streamed dataset are
-    /// kept within `memory`. `progress(done, total, name)` is called per garment.
+    /// kept within `memory`. The networks see the joints that carry the garments or, if given, those of the names `joints`.
+    /// `progress(done, total, name)` is called per garment. A cache that cannot be used costs time and memory only.
     ///
     /// # Errors
     /// [`DatasetError`] names the file or garment at fault; [`DatasetError::Memory`] if the machine cannot hold garments that
@@ -76,45 +80,49 @@ impl GarmentStore {
     pub fn load(
         config: &Config,
         body: Arc<Body>,
+        joints: Option<&[String]>,
         memory: &Arc<MemoryBudget>,
         progress: &(dyn Fn(usize, usize, &str) + Sync),
     ) -> Result<Self, DatasetError> {
         let sources = GarmentSource::list(&config.data.garments)?;
         let mut preprocessor = Preprocessor::new(config, body);
-        if let Some(cache) = config.data.open_cache().map_err(DatasetError::data)? {
-            preprocessor = preprocessor.with_cache(cache, CachePolicy::Required);
-        } else if let Some(available) = available() {
-            let sizes = DataSizes::of_listed(&sources, &preprocessor.body)?;
-            let (garments, needed) = (sources.len(), sizes.unstreamed_bytes(config));
-            if needed > available {
-                return Err(DatasetError::Memory { garments, needed, available });
-            }
+        if let Some(folder) = &config.data.cache.folder {
+            preprocessor = preprocessor.with_cache_in(folder, config.data.cache_limit());
         }
-        let index = index_garments(&sources, &preprocessor, config.data.max_vertices, progress)?;
+        let check_memory = || {
+            let Some(available) = available() else { return Ok(()) };
+            let needed = DataSizes::of_listed(&sources, &preprocessor.body)?.unstreamed_bytes(config);
+            match needed > available {
+                true => Err(DatasetError::Memory { garments: sources.len(), needed, available }),
+                false => Ok(()),
+            }
+        };
+        if preprocessor.cache().is_none() {
+            check_memory()?;
+        }
+        let index =
+            index_garments(&sources, &preprocessor, config.data.max_vertices, &check_memory, progress)?;
 
         // Computing operators takes more than a step of small networks.
         return_freed_memory();
-        let joints =
-            ActiveJoints::new(&preprocessor.body, index.iter().map(|entry| entry.largest_weights.as_slice()));
-        let infos = index.iter().map(|entry| entry.info.clone()).collect();
-        let store = match preprocessor.cache() {
-            Some(_) => Store::Streamed(Box::new(Streamed {
-                recent: LruCache::new(memory, Residence::Host),
-                sources,
-                preprocessor,
-            })),
-            None => {
-                let kept = index.into_par_iter().filter_map(|entry| entry.kept);
-                let parts = kept.map(|(garment, binding, operators)| {
-                    let garment = preprocessor.finish(garment, binding, &joints)?;
-                    Ok((Arc::new(garment), Arc::new(operators)))
-                });
-                let (garments, operators) =
-                    parts.collect::<Result<Vec<_>, DatasetError>>()?.into_iter().unzip();
-                Store::Kept { garments, operators }
-            }
+        let joints = match joints {
+            Some(names) => ActiveJoints::named(&preprocessor.body, names).map_err(|missing| {
+                DatasetError::MissingJoints { body: preprocessor.body.name.clone(), missing }
+            })?,
+            None => ActiveJoints::new(
+                &preprocessor.body,
+                index.iter().map(|entry| entry.largest_weights.as_slice()),
+            ),
         };
-        Ok(Self { infos, joints, store })
+        let infos = index.iter().map(|entry| entry.info.clone()).collect();
+        let finish = |entry: IndexEntry| {
+            let Some((garment, binding, operators)) = entry.kept else { return Ok(None) };
+            let garment = preprocessor.finish(garment, binding, &joints)?;
+            Ok(Some(Kept { garment: Arc::new(garment), operators: Arc::new(operators) }))
+        };
+        let kept = index.into_par_iter().map(finish).collect::<Result<Vec<_>, DatasetError>>()?;
+        let recent = LruCache::new(memory, Residence::Host);
+        Ok(Self { infos, joints, kept, streamed: Streamed { recent, sources, preprocessor } })
     }
 
     /// Computes and stores what the cache of `config` does not hold of every `of`-th garment from garment `part` on, so
@@ -129,11 +137,14 @@ impl GarmentStore {
         [part, of]: [usize; 2],
         progress: &(dyn Fn(usize, usize, &str) + Sync),
     ) -> Result<(usize, u64), DatasetError> {
-        let cache = config.data.open_cache().map_err(DatasetError::data)?.ok_or(DatasetError::NoCache)?;
+        let folder = config.data.cache.folder.as_ref().ok_or(DatasetError::NoCache)?;
+        let cache = ArrayCache::open(folder, config.data.cache_limit()).map_err(DatasetError::data)?;
         let sources: Vec<_> =
             GarmentSource::list(&config.data.garments)?.into_iter().skip(part).step_by(of.max(1)).collect();
-        let preprocessor = Preprocessor::new(config, body).with_cache(cache, CachePolicy::Required);
-        index_garments(&sources, &preprocessor, config.data.max_vertices, progress)?;
+        let preprocessor = Preprocessor::new(config, body).with_cache(cache);
+        // What is not stored was prepared for nothing.
+        let stop = || Err(DatasetError::Data(preprocessor.store_failure().unwrap_or_default().to_owned()));
+        index_garments(&sources, &preprocessor, config.data.max_vertices, &stop, progress)?;
         Ok((sources.len(), preprocessor.cache().map_or(0, ArrayCache::used)))
     }
 
@@ -162,10 +173,10 @@ impl GarmentStore {
     /// # Errors
     /// [`DatasetError`] when its records vanished from the cache and it cannot be made again.
     pub fn garment(&self, index: usize) -> Result<Arc<PreparedGarment>, DatasetError> {
-        let streamed = match &self.store {
-            Store::Kept { garments, .. } => return Ok(garments[index].clone()),
-            Store::Streamed(streamed) => streamed,
-        };
+        if let Some(kept) = &self.kept[index] {
+            return Ok(kept.garment.clone());
+        }
+        let streamed = &self.streamed;
         if let Some(garment) = streamed.recent.get(index) {
             return Ok(garment);
         }
@@ -179,13 +190,9 @@ impl GarmentStore {
     /// # Errors
     /// As [`garment`](Self::garment).
     pub fn operators(&self, index: usize) -> Result<Arc<SurfaceOperators>, DatasetError> {
-        match &self.store {
-            Store::Kept { operators, .. } => Ok(operators[index].clone()),
-            Store::Streamed(streamed) => {
-                let info = &self.infos[index];
-                let get = || streamed.preprocessor.stored_operators(info.mesh);
-                streamed.get_or_restore(index, info, get).map(Arc::new)
-            }
+        match &self.kept[index] {
+            Some(kept) => Ok(kept.operators.clone()),
+            None => self.streamed.operators(index, &self.infos[index]).map(Arc::new),
         }
     }
 }
@@ -197,40 +204,61 @@ impl Streamed {
         info: &GarmentInfo,
         joints: &ActiveJoints,
     ) -> Result<PreparedGarment, DatasetError> {
-        let get = || self.preprocessor.stored_binding(info.mesh, info.category);
-        let (rest, binding) = self.get_or_restore(index, info, get)?;
+        let (rest, binding) = match self.preprocessor.stored_binding(info.mesh, info.category) {
+            Some(found) => found,
+            None => {
+                let garment = self.again(index)?;
+                let binding = self.preprocessor.binding(&garment, info.mesh);
+                (garment.rest, binding)
+            }
+        };
         let GarmentInfo { name, category, holding, source, .. } = info.clone();
         self.preprocessor.finish(Garment { name, category, rest, holding, source }, binding, joints)
     }
 
-    /// A record of garment `index`, computed again where it was there at the start of the run and no longer is.
-    fn get_or_restore<T>(
-        &self,
-        index: usize,
-        info: &GarmentInfo,
-        get: impl Fn() -> Option<T>,
-    ) -> Result<T, DatasetError> {
-        if let Some(found) = get() {
-            return Ok(found);
+    fn operators(&self, index: usize, info: &GarmentInfo) -> Result<SurfaceOperators, DatasetError> {
+        match self.preprocessor.stored_operators(info.mesh) {
+            Some(operators) => Ok(operators),
+            None => self.preprocessor.operators(&info.name, &self.again(index)?.rest, info.mesh),
         }
+    }
+
+    /// Garment `index`, whose record was there at the start of the run and no longer is.
+    fn again(&self, index: usize) -> Result<Garment, DatasetError> {
         let cache = self.preprocessor.cache().map_or(Path::new(""), ArrayCache::root);
         tracing::warn!(cache = %cache.display(), "a record vanished during the run, computed anew");
-        let source = std::slice::from_ref(&self.sources[index]);
-        index_garments(source, &self.preprocessor, usize::MAX, &|_, _, _| {})?;
-        get().ok_or_else(|| DatasetError::Vanished { name: info.name.clone(), cache: cache.into() })
+        let source = &self.sources[index];
+        GarmentLoader::new(&self.preprocessor.body, std::slice::from_ref(source))?.load(source)
     }
 }
 
 /// Makes every garment once: what is missing is computed, and stored or kept. Only as many as there are threads are in work at
-/// a time: one that waits for a part of its garment would begin another one.
+/// a time: one that waits for a part of its garment would begin another one. `may_keep` is asked before the first garment is
+/// kept because it could not be stored.
 fn index_garments(
     sources: &[GarmentSource],
     preprocessor: &Preprocessor,
     max_vertices: usize,
+    may_keep: &(dyn Fn() -> Result<(), DatasetError> + Sync),
     progress: &(dyn Fn(usize, usize, &str) + Sync),
 ) -> Result<Vec<IndexEntry>, DatasetError> {
     let loader = GarmentLoader::new(&preprocessor.body, sources)?;
     let done = AtomicUsize::new(0);
+    let asked = OnceLock::new();
+    let has_failed = || preprocessor.cache().is_none() || preprocessor.store_failure().is_some();
+    let stored = |garment: &Garment, info: &GarmentInfo| {
+        if !has_failed() {
+            let largest_weights = preprocessor.largest_weights(garment, info.mesh);
+            preprocessor.store_operators(&garment.name, &garment.rest, info.mesh)?;
+            if !has_failed() {
+                return Ok(Some(IndexEntry { info: info.clone(), largest_weights, kept: None }));
+            }
+        }
+        if preprocessor.store_failure().is_some() && asked.set(()).is_ok() {
+            may_keep()?;
+        }
+        Ok(None)
+    };
     let index = |source: &GarmentSource| {
         let garment = loader.load(source)?;
         let vertices = garment.rest.vertex_count();
@@ -245,14 +273,10 @@ fn index_garments(
             vertices,
             mesh: mesh_key(&garment.rest),
         };
-        let entry = match preprocessor.cache() {
-            Some(_) => {
-                let largest_weights = preprocessor.largest_weights(&garment, info.mesh)?;
-                preprocessor.store_operators(&garment.name, &garment.rest, info.mesh)?;
-                IndexEntry { info, largest_weights, kept: None }
-            }
+        let entry = match stored(&garment, &info)? {
+            Some(entry) => entry,
             None => {
-                let binding = preprocessor.binding(&garment, info.mesh)?;
+                let binding = preprocessor.binding(&garment, info.mesh);
                 let operators = preprocessor.operators(&garment.name, &garment.rest, info.mesh)?;
                 let largest_weights = binding.largest_weights(preprocessor.body.joint_count());
                 IndexEntry { info, largest_weights, kept: Some((garment, binding, operators)) }

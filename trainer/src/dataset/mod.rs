@@ -3,6 +3,8 @@
 
 mod active_joints;
 mod contents;
+mod data_check;
+mod data_list;
 mod error;
 mod garment_source;
 mod garment_store;
@@ -19,13 +21,15 @@ mod split;
 
 pub use active_joints::ActiveJoints;
 pub use contents::{Dataset, LicenceLine, is_fingerprint, load_body};
+pub use data_check::{DataCheck, Fault, FileWarnings};
+pub use data_list::{DataChange, DataList};
 pub use error::DatasetError;
 pub use garment_source::{GarmentLoader, GarmentSource};
 pub use garment_store::{GarmentInfo, GarmentStore};
 pub use poses::{ClipSplit, FrameCounts, HeldOut, PoseLibrary, SelfIntersecting, Window};
 pub use prepare::{PreparedBody, PreparedScene, SceneBuilder, contacts, prepare};
 pub use prepared_garment::PreparedGarment;
-pub use preprocessor::{CachePolicy, Preprocessor};
+pub use preprocessor::Preprocessor;
 pub use sampling::{
     BodySample, Plan, SceneSample, ValidationGroup, round_robin, sample_evaluation, sample_outfit,
     sample_training, sample_validation,

@@ -13,7 +13,8 @@ use clothcombo_physics::contact_features::Rings;
 use clothcombo_physics::energy::{EnergySettings, GarmentEnergies};
 use clothcombo_physics::mesh::{Topology, TriMesh};
 use clothcombo_physics::operators::SurfaceOperators;
-use std::sync::Arc;
+use std::path::Path;
+use std::sync::{Arc, OnceLock};
 
 /// Body and settings with which garments are prepared, and the cache of what that computes, if there is one.
 pub struct Preprocessor {
@@ -32,16 +33,8 @@ pub struct Preprocessor {
 pub(super) struct GarmentCache {
     arrays: ArrayCache,
     body: Key,
-    policy: CachePolicy,
-}
-
-/// What it means when something cannot be stored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CachePolicy {
-    /// An error: what is not stored cannot be read again.
-    Required,
-    /// A warning: the next run is slower, this one is not wrong.
-    Optional,
+    /// Why something could not be stored; nothing more is stored then.
+    failure: OnceLock<String>,
 }
 
 impl Preprocessor {
@@ -63,9 +56,20 @@ impl Preprocessor {
     }
 
     /// The same with a cache.
-    pub fn with_cache(self, arrays: ArrayCache, policy: CachePolicy) -> Self {
+    pub fn with_cache(self, arrays: ArrayCache) -> Self {
         let body = body_key(&self.body);
-        Self { cache: Some(GarmentCache { arrays, body, policy }), ..self }
+        Self { cache: Some(GarmentCache { arrays, body, failure: OnceLock::new() }), ..self }
+    }
+
+    /// The same with the cache in `folder`, of at most `limit` bytes; without one, and with a warning, if it cannot be used.
+    pub fn with_cache_in(self, folder: &Path, limit: u64) -> Self {
+        match ArrayCache::open(folder, limit) {
+            Ok(cache) => self.with_cache(cache),
+            Err(error) => {
+                tracing::warn!("{error}; going on without a cache");
+                self
+            }
+        }
     }
 
     /// The cache.
@@ -73,55 +77,54 @@ impl Preprocessor {
         self.cache.as_ref().map(|cache| &cache.arrays)
     }
 
-    /// Takes note of what could not be stored, as the policy of the cache says.
-    ///
-    /// # Errors
-    /// `stored`'s, where storing is required.
-    pub fn check_stored(&self, stored: Result<(), CacheError>) -> Result<(), DatasetError> {
-        match (stored, self.cache.as_ref().map(|cache| cache.policy)) {
-            (Err(error), Some(CachePolicy::Required)) => Err(DatasetError::data(error)),
-            (Err(error), _) => {
-                tracing::warn!("{error}");
-                Ok(())
+    /// Stores something, unless that failed before. A cache only saves time: what cannot be stored is a warning, the first time.
+    pub fn store(&self, put: impl FnOnce(&ArrayCache) -> Result<(), CacheError>) {
+        let Some(cache) = self.cache.as_ref().filter(|cache| cache.failure.get().is_none()) else { return };
+        if let Err(error) = put(&cache.arrays) {
+            let mut is_first = false;
+            cache.failure.get_or_init(|| {
+                is_first = true;
+                error.to_string()
+            });
+            if is_first {
+                tracing::warn!("{error}; nothing more is stored");
             }
-            (Ok(()), _) => Ok(()),
         }
     }
 
+    /// Why nothing more is stored, if so.
+    pub fn store_failure(&self) -> Option<&str> {
+        self.cache.as_ref()?.failure.get().map(String::as_str)
+    }
+
     /// The binding of a garment whose rest mesh has the key `mesh`: from the cache, or computed and stored there.
-    ///
-    /// # Errors
-    /// When it cannot be stored although it must be.
-    pub fn binding(&self, garment: &Garment, mesh: Key) -> Result<Binding, DatasetError> {
+    pub fn binding(&self, garment: &Garment, mesh: Key) -> Binding {
         match self.stored_binding(mesh, garment.category) {
-            Some((_, binding)) => Ok(binding),
+            Some((_, binding)) => binding,
             None => self.compute_binding(garment, mesh),
         }
     }
 
     /// The largest skin weight of every joint; the binding comes from the cache, or is computed and stored there.
-    ///
-    /// # Errors
-    /// As [`binding`](Self::binding).
-    pub fn largest_weights(&self, garment: &Garment, mesh: Key) -> Result<Vec<f32>, DatasetError> {
+    pub fn largest_weights(&self, garment: &Garment, mesh: Key) -> Vec<f32> {
         let joints = self.body.joint_count();
         let stored = self.cache.as_ref().and_then(|cache| {
             get_largest_weights(&cache.arrays, self.binding_key(cache, mesh, garment.category))
         });
         match stored {
-            Some(largest) if largest.len() == joints => Ok(largest),
-            _ => Ok(self.compute_binding(garment, mesh)?.largest_weights(joints)),
+            Some(largest) if largest.len() == joints => largest,
+            _ => self.compute_binding(garment, mesh).largest_weights(joints),
         }
     }
 
-    fn compute_binding(&self, garment: &Garment, mesh: Key) -> Result<Binding, DatasetError> {
+    fn compute_binding(&self, garment: &Garment, mesh: Key) -> Binding {
         let binding = Binding::new(garment, &self.body, &self.binding);
         if let Some(cache) = &self.cache {
             let key = self.binding_key(cache, mesh, garment.category);
             let joints = self.body.joint_count();
-            self.check_stored(put_binding(&cache.arrays, key, &garment.rest, &binding, joints))?;
+            self.store(|arrays| put_binding(arrays, key, &garment.rest, &binding, joints));
         }
-        Ok(binding)
+        binding
     }
 
     /// The rest mesh and the binding that the cache has of it.
@@ -137,7 +140,7 @@ impl Preprocessor {
     /// DiffusionNet's operators of a rest mesh of key `mesh`: from the cache, or computed and stored there.
     ///
     /// # Errors
-    /// When the mesh has none, by the garment's `name`; and as [`binding`](Self::binding).
+    /// When the mesh has none, by the garment's `name`.
     pub fn operators(&self, name: &str, rest: &TriMesh, mesh: Key) -> Result<SurfaceOperators, DatasetError> {
         match self.stored_operators(mesh) {
             Some(operators) => Ok(operators),
@@ -165,9 +168,7 @@ impl Preprocessor {
     ) -> Result<SurfaceOperators, DatasetError> {
         let operators = SurfaceOperators::new(rest, self.eigen_count)
             .map_err(|e| DatasetError::Garment { name: name.to_owned(), reason: e.to_string() })?;
-        if let Some(cache) = self.cache() {
-            self.check_stored(put_operators(cache, operators_key(mesh, self.eigen_count), &operators))?;
-        }
+        self.store(|cache| put_operators(cache, operators_key(mesh, self.eigen_count), &operators));
         Ok(operators)
     }
 

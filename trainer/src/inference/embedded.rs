@@ -56,7 +56,7 @@ impl EmbeddedGarments {
         }
         let clock = Instant::now();
         let preprocessor = &draper.preprocessor;
-        let binding = preprocessor.binding(garment, mesh)?;
+        let binding = preprocessor.binding(garment, mesh);
         let prepared = Arc::new(preprocessor.finish(garment.clone(), binding, &draper.joints)?);
         let rest = Arc::new(RestGarment::new(&garment.rest));
         let operators = preprocessor.operators(&garment.name, &garment.rest, mesh)?;
@@ -95,7 +95,7 @@ fn embedding(
     let [vertex, garment] = [&embedding.vertex, &embedding.garment].map(|tensor| tensor.clone().into_data());
     if let (Ok(vertex), Ok(garment)) = (vertex.as_slice::<f32>(), garment.as_slice::<f32>()) {
         let stored = StoredEmbedding { vertex: vertex.to_vec(), garment: garment.to_vec() };
-        draper.preprocessor.check_stored(put_embedding(cache, key, &stored))?;
+        draper.preprocessor.store(|cache| put_embedding(cache, key, &stored));
     }
     Ok((embedding, false))
 }

@@ -66,12 +66,11 @@ pub use shipped::shipped_model;
 pub use smooth::{Smoothing, smooth};
 pub use source::{GarmentCatalog, GivenGarment};
 
-use crate::dataset::{ActiveJoints, CachePolicy, DatasetError, Preprocessor, load_body};
+use crate::dataset::{ActiveJoints, Preprocessor, load_body};
 use crate::run::checkpoint::TrainedModel;
 use crate::system::device::default_device;
 use burn::tensor::Device;
 use clothcombo_data::asset::{Body, Pose};
-use clothcombo_data::cache::ArrayCache;
 use clothcombo_model::ClothCombo;
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use embedded::EmbeddedGarments;
@@ -172,11 +171,9 @@ impl Draper {
             }
             model = model.with_correction_steps(steps);
         }
-        let cache = settings.cache.as_deref().map(|folder| ArrayCache::open(folder, settings.cache_limit));
-        let cache = cache.transpose().map_err(DatasetError::data)?;
         let mut preprocessor = Preprocessor::new(&trained.config, Arc::new(body));
-        if let Some(cache) = cache {
-            preprocessor = preprocessor.with_cache(cache, CachePolicy::Optional);
+        if let Some(folder) = &settings.cache {
+            preprocessor = preprocessor.with_cache_in(folder, settings.cache_limit);
         }
         let settings = settings.clone();
         Ok(Self {

@@ -1,83 +1,27 @@
 //! The folder of a run: where everything lies, created whole or not at all.
 
-use crate::config::{Config, ConfigError, load, to_toml};
+mod error;
+
+pub use error::RunDirError;
+
+use crate::config::{Config, load, to_toml};
 use crate::dataset::SplitNames;
+use crate::run::difference::{AllowedChanges, differences, differing_keys};
 use crate::run::lock::{LockError, RunLock};
+use crate::system::files::check_writable;
+use crate::system::paths::{first_missing_folder, obstacle};
 use clothcombo_data::format::atomic;
-use miette::Diagnostic;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use thiserror::Error;
-
-/// Why a run folder cannot be used.
-#[derive(Debug, Error, Diagnostic)]
-pub enum RunDirError {
-    /// The folder already holds a run.
-    #[error("{} already holds a run", path.display())]
-    #[diagnostic(help("continue it with --resume, or choose another folder with --run-dir"))]
-    Occupied {
-        /// The folder.
-        path: PathBuf,
-    },
-    /// There is nothing to resume.
-    #[error("{} holds no run to resume", path.display())]
-    #[diagnostic(help("start one without --resume"))]
-    Missing {
-        /// The folder.
-        path: PathBuf,
-    },
-    /// The configuration differs from the one the run was started with.
-    #[error("the configuration differs from the run's own in: {}", keys.join(", "))]
-    #[diagnostic(help(
-        "resume with the configuration the run was started with ({}), allow the change with --allow-config-change {}, or \
-            start a new run",
-        path.display(), keys.join(",")
-    ))]
-    ConfigChanged {
-        /// The run's configuration.
-        path: PathBuf,
-        /// The differing keys.
-        keys: Vec<String>,
-    },
-    /// Another process trains in the folder.
-    #[error("{} is in use: {owner} trains in it", path.display())]
-    #[diagnostic(help("wait for it or stop it, or choose another folder with --run-dir"))]
-    InUse {
-        /// The folder.
-        path: PathBuf,
-        /// Who holds it.
-        owner: String,
-    },
-    /// A key that may change is none that differs.
-    #[error("--allow-config-change names {key:?}, which is no key of the configuration")]
-    #[diagnostic(help(
-        "keys look like stages, optimizer.clip_norm or stages[0].steps; a section allows all in it"
-    ))]
-    UnknownKey {
-        /// The key as given.
-        key: String,
-    },
-    /// The run's own configuration cannot be read.
-    #[error(transparent)]
-    #[diagnostic(transparent)]
-    Config(#[from] ConfigError),
-    /// The file system refused.
-    #[error("cannot write {}: {reason}", path.display())]
-    #[diagnostic(help("check that the folder is writable and the disk is not full"))]
-    Io {
-        /// The file or folder.
-        path: PathBuf,
-        /// The system's reason.
-        reason: io::Error,
-    },
-}
 
 /// Paths inside `RUN/`, and the right to write there.
 #[derive(Clone, Debug)]
 pub struct RunDir {
     root: PathBuf,
+    /// What may change when the run goes on.
+    allowed: AllowedChanges,
     /// Held as long as any clone lives; a process that follows another holds none.
     _lock: Option<Arc<RunLock>>,
 }
@@ -86,8 +30,25 @@ impl RunDir {
     /// Creates a new run folder with its `config.toml`.
     ///
     /// # Errors
-    /// When the folder already holds a run, is in use or cannot be written.
+    /// When the folder already holds a run, is in use or cannot be written; nothing that was made is left then.
     pub fn create(root: &Path, config: &Config) -> Result<Self, RunDirError> {
+        let made = first_missing_folder(&root.join(CONFIG)).map(Path::to_owned);
+        let created = Self::create_in(root, config);
+        // A folder that another process uses by now is not ours.
+        let is_ours = !matches!(created, Err(RunDirError::Occupied { .. } | RunDirError::InUse { .. }));
+        if let (Err(_), true, Some(first)) = (&created, is_ours, made) {
+            if root.starts_with(&first) {
+                let _ = fs::remove_dir_all(root);
+            }
+            // One that something else has come into stays.
+            root.ancestors().skip(1).take_while(|folder| folder.starts_with(&first)).for_each(|folder| {
+                let _ = fs::remove_dir(folder);
+            });
+        }
+        created
+    }
+
+    fn create_in(root: &Path, config: &Config) -> Result<Self, RunDirError> {
         Self::refuse_occupied(root)?;
         fs::create_dir_all(root).map_err(|e| io_error(root, e))?;
         let run = Self::locked(root)?;
@@ -100,16 +61,34 @@ impl RunDir {
         Ok(run)
     }
 
-    /// The folder of a run that another process of the same run writes.
+    /// The folder of a run that somebody else makes or writes.
     pub fn follow(root: &Path) -> Self {
-        Self { root: root.to_owned(), _lock: None }
+        Self { root: root.to_owned(), allowed: AllowedChanges::default(), _lock: None }
+    }
+
+    /// The folder of a run that another process resumes, which may change in the keys `allowed`.
+    #[must_use]
+    pub fn allowing(self, allowed: AllowedChanges) -> Self {
+        Self { allowed, ..self }
+    }
+
+    /// Checks that a run could be made in `root`, and makes nothing.
+    ///
+    /// # Errors
+    /// When one lives there, or the folder could not be made or written to.
+    pub fn check_free(root: &Path) -> Result<(), RunDirError> {
+        Self::refuse_occupied(root)?;
+        if let Some(file) = obstacle(root) {
+            return Err(RunDirError::Obstacle { path: root.to_owned(), file: file.to_owned() });
+        }
+        check_writable(root).map_err(|e| io_error(root, e))
     }
 
     /// Checks that no run lives in `root`.
     ///
     /// # Errors
     /// When one does.
-    pub fn refuse_occupied(root: &Path) -> Result<(), RunDirError> {
+    fn refuse_occupied(root: &Path) -> Result<(), RunDirError> {
         match root.join(CONFIG).exists() {
             true => Err(RunDirError::Occupied { path: root.to_owned() }),
             false => Ok(()),
@@ -128,15 +107,19 @@ impl RunDir {
         }
         let run = Self::locked(root)?;
         let own = load(&run.config(), &[])?;
-        if let Some(key) = allowed.iter().find(|key| !is_known(key, &[&own, config])) {
-            return Err(RunDirError::UnknownKey { key: key.clone() });
+        let allowed =
+            AllowedChanges::new(allowed, &[&own, config]).map_err(|key| RunDirError::UnknownKey { key })?;
+        let mut changes = differences(config, &own);
+        changes.retain(|change| !allowed.covers(&change.key));
+        if !changes.is_empty() {
+            return Err(RunDirError::ConfigChanged { path: run.config(), changes });
         }
-        let is_allowed = |key: &String| allowed.iter().any(|a| covers(a, key));
-        let keys: Vec<String> = differing_keys(&own, config).into_iter().filter(|k| !is_allowed(k)).collect();
-        if !keys.is_empty() {
-            return Err(RunDirError::ConfigChanged { path: run.config(), keys });
-        }
-        Ok(run)
+        Ok(run.allowing(allowed))
+    }
+
+    /// What may change while the run goes on.
+    pub fn allowed(&self) -> &AllowedChanges {
+        &self.allowed
     }
 
     /// Makes `config` the run's own. Returns the keys that change; if there are any that matter, the configuration before is
@@ -162,7 +145,7 @@ impl RunDir {
             LockError::Held { owner } => RunDirError::InUse { path: root.to_owned(), owner },
             LockError::Io { path, reason } => RunDirError::Io { path, reason },
         })?;
-        let run = Self { root: root.to_owned(), _lock: Some(Arc::new(lock)) };
+        let run = Self { _lock: Some(Arc::new(lock)), ..Self::follow(root) };
         [run.root.clone(), run.checkpoints(), run.samples(), run.incidents()].iter().for_each(|f| sweep(f));
         Ok(run)
     }
@@ -226,6 +209,10 @@ impl RunDir {
     pub fn incidents(&self) -> PathBuf {
         self.root.join("incidents")
     }
+    /// What was found out about the files of its data.
+    pub fn data_check(&self) -> PathBuf {
+        self.root.join("check.json")
+    }
     /// Checkpoints.
     pub fn checkpoints(&self) -> PathBuf {
         self.root.join("checkpoints")
@@ -272,65 +259,28 @@ pub fn truncate_log(path: &Path, step: u64) -> io::Result<()> {
     atomic::write(path, out.as_bytes())
 }
 
-/// Whether the allowance `allowed` covers `key`: the key itself, or a section it lies in.
-fn covers(allowed: &str, key: &str) -> bool {
-    key.strip_prefix(allowed).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
-}
-
-/// Whether `key` names a value or section of one of `configs`.
-fn is_known(key: &str, configs: &[&Config]) -> bool {
-    configs.iter().any(|config| {
-        let tree = toml::Value::try_from(*config).ok();
-        let mut node = tree.as_ref();
-        for part in key.split(['.', '[']) {
-            node = match (node, part.strip_suffix(']')) {
-                (Some(node), Some(index)) => index.parse::<usize>().ok().and_then(|i| node.get(i)),
-                (Some(node), None) => node.get(part),
-                (None, _) => None,
-            };
-        }
-        node.is_some()
-    })
-}
-
-/// Keys whose values differ, as dotted paths. What only concerns output may change between sessions.
-pub(crate) fn differing_keys(a: &Config, b: &Config) -> Vec<String> {
-    fn walk(path: &str, a: Option<&toml::Value>, b: Option<&toml::Value>, out: &mut Vec<String>) {
-        match (a, b) {
-            (Some(toml::Value::Table(a)), Some(toml::Value::Table(b))) => {
-                let names: std::collections::BTreeSet<_> = a.keys().chain(b.keys()).collect();
-                for name in names {
-                    let path = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
-                    walk(&path, a.get(name), b.get(name), out);
-                }
-            }
-            (Some(toml::Value::Array(a)), Some(toml::Value::Array(b))) if a.len() == b.len() => {
-                for (i, (a, b)) in a.iter().zip(b).enumerate() {
-                    walk(&format!("{path}[{i}]"), Some(a), Some(b), out);
-                }
-            }
-            (a, b) if a == b => {}
-            _ => out.push(path.to_owned()),
-        }
-    }
-    let value = |c: &Config| {
-        let mut c = c.clone();
-        c.output = crate::config::OutputConfig::default();
-        // Where things are kept and when a run gives up changes no result.
-        c.guard = crate::config::GuardConfig { inject: c.guard.inject, ..Default::default() };
-        c.data.cache = crate::config::CacheConfig::default();
-        (c.data.memory_mib, c.data.device_memory_mib) = (1, 1);
-        toml::Value::try_from(c).ok()
-    };
-    let mut out = Vec::new();
-    walk("", value(a).as_ref(), value(b).as_ref(), &mut out);
-    out
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::config::parse;
+
+    #[test]
+    fn a_folder_that_cannot_be_made_whole_leaves_nothing() {
+        let place = tempfile::tempdir().unwrap();
+        let root = place.path().join("a/b/run");
+        // No file system has such a name; the folders around it are made before that is found out.
+        let unwritable = root.join("r".repeat(300));
+        assert!(matches!(RunDir::create(&unwritable, &config(&[])), Err(RunDirError::Io { .. })));
+        assert!(!place.path().join("a").exists());
+        fs::create_dir_all(&root).unwrap();
+        fs::write(root.join("note"), "mine").unwrap();
+        assert!(RunDir::create(&unwritable, &config(&[])).is_err());
+        assert!(root.join("note").exists());
+        let file = root.join("note/run");
+        assert!(matches!(RunDir::check_free(&file), Err(RunDirError::Obstacle { .. })));
+        RunDir::check_free(&place.path().join("new/run")).unwrap();
+        assert!(!place.path().join("new").exists());
+    }
 
     const SMALL: &str = "seed = 1\n[data]\n[[data.garments]]\ngenerate = { count = 2 }\n[[stages]]\nname = \"single\"\n\
         trains = \"single\"\nsteps = 10\n";
@@ -350,7 +300,10 @@ mod tests {
             RunDir::resume(folder.path(), &changed, &allowed)
         };
         match resume(&["stages[0].steps"]).unwrap_err() {
-            RunDirError::ConfigChanged { keys, .. } => assert_eq!(keys, ["losses.strain.weight"]),
+            RunDirError::ConfigChanged { changes, .. } => {
+                let changes: Vec<_> = changes.iter().map(|change| change.text("new", "old")).collect();
+                assert_eq!(changes, ["losses.strain.weight: 2.0 in new, 1.0 in old"]);
+            }
             other => panic!("{other}"),
         }
         assert!(matches!(resume(&["stagse"]).unwrap_err(), RunDirError::UnknownKey { .. }));

@@ -2,6 +2,7 @@
 //! metrics, logs, curves and report, and what a later program reads of it.
 
 pub mod checkpoint;
+pub mod difference;
 pub mod event;
 pub mod folder;
 pub mod lock;

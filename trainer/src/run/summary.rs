@@ -2,7 +2,7 @@
 
 use crate::config::{Config, load};
 use crate::dataset::ValidationGroup;
-use crate::run::checkpoint::Checkpoint;
+use crate::run::checkpoint::{Checkpoint, CheckpointError};
 use crate::run::lock::RunLock;
 use crate::run::observer::best_so_far;
 use crate::run::report::run_name;
@@ -53,7 +53,7 @@ pub struct RunSummary {
     pub seed: u64,
 }
 
-/// A run whose configuration cannot be read.
+/// A run whose configuration or checkpoints cannot be read.
 #[derive(Clone, Debug, Serialize)]
 pub struct UnreadableRun {
     /// Name of its folder.
@@ -78,19 +78,27 @@ pub enum FoundRun {
 }
 
 impl FoundRun {
-    /// Reads `root`; `None` if it is no run, which is a folder with checkpoints in it.
+    /// Reads `root`; `None` if it is no run, which is a folder with checkpoints or the log of a run in it. A run whose
+    /// configuration or checkpoints cannot be read is damaged.
     pub fn read(root: &Path) -> Option<Self> {
-        if !root.join("checkpoints").is_dir() {
+        if !MARKS.iter().any(|mark| root.join(mark).exists()) {
             return None;
         }
-        Some(match load(&root.join(CONFIG), &[]) {
-            Ok(config) => Self::Whole(Box::new(RunSummary::read(root, &config))),
-            Err(error) => Self::Unreadable(UnreadableRun {
-                name: run_name(root),
-                path: root.to_owned(),
-                state: "unreadable",
-                error: error.to_string(),
-            }),
+        let checkpoint = match Checkpoint::open(root) {
+            Err(CheckpointError::Missing { .. }) => Ok(None),
+            found => found.map(Some),
+        };
+        let config = load(&root.join(CONFIG), &[]).map_err(|error| error.to_string());
+        let unreadable = |error: String| {
+            let (name, path) = (run_name(root), root.to_owned());
+            Self::Unreadable(UnreadableRun { name, path, state: "unreadable", error })
+        };
+        Some(match (config, checkpoint) {
+            (Ok(config), Ok(checkpoint)) => {
+                Self::Whole(Box::new(RunSummary::read(root, &config, checkpoint.as_ref())))
+            }
+            (Err(error), _) => unreadable(error),
+            (_, Err(error)) => unreadable(error.to_string()),
         })
     }
 
@@ -112,15 +120,17 @@ impl FoundRun {
 }
 
 const CONFIG: &str = "config.toml";
+/// What only a run has.
+const MARKS: [&str; 3] = ["checkpoints", "lock", "metrics.jsonl"];
 const LAST: usize = 100;
 
 impl RunSummary {
     /// Reads the run in `root`, whose configuration is `config`.
-    fn read(root: &Path, config: &Config) -> Self {
+    fn read(root: &Path, config: &Config, checkpoint: Option<&Checkpoint>) -> Self {
         let mut summary = Self::empty(root, config);
         summary.read_steps(root);
         summary.read_validations(root);
-        summary.checkpoint = Checkpoint::open(root).ok().map(|c| c.state.step);
+        summary.checkpoint = checkpoint.map(|c| c.state.step);
         let done = summary.step.max(summary.checkpoint.unwrap_or(0)) >= summary.total_steps;
         summary.state = match (RunLock::is_held(root), done) {
             (true, _) => "running",
@@ -226,6 +236,8 @@ pub fn find_runs(folder: &Path) -> io::Result<Vec<FoundRun>> {
 mod tests {
     use super::*;
 
+    const SMALL: &str = "seed = 1\n[data]\n[[data.garments]]\ngenerate = { count = 2 }\n[[stages]]\nname = \"a\"\ntrains = \"single\"\nsteps = 1\n";
+
     #[test]
     fn damaged_runs_are_found_and_a_folder_that_is_not_there_is_an_error() {
         let folder = tempfile::tempdir().unwrap();
@@ -235,11 +247,16 @@ mod tests {
                 std::fs::write(folder.path().join(name).join(CONFIG), config).unwrap();
             }
         }
+        let [cut, empty] = ["cut", "damaged/checkpoints/step-00000001"].map(|name| folder.path().join(name));
+        [&cut, &empty].iter().for_each(|path| std::fs::create_dir_all(path).unwrap());
+        std::fs::write(cut.join("lock"), "process 1\n").unwrap();
+        std::fs::write(folder.path().join("damaged").join(CONFIG), SMALL).unwrap();
         std::fs::create_dir(folder.path().join("no run")).unwrap();
         let runs = find_runs(folder.path()).unwrap();
-        assert_eq!(runs.iter().map(FoundRun::name).collect::<Vec<_>>(), ["broken", "lost"]);
+        assert_eq!(runs.iter().map(FoundRun::name).collect::<Vec<_>>(), ["broken", "cut", "damaged", "lost"]);
         let json = serde_json::to_value(&runs).unwrap();
-        assert_eq!((&json[0]["state"], &json[1]["state"]), (&"unreadable".into(), &"unreadable".into()));
+        assert!((0..4).all(|i| json[i]["state"] == "unreadable"), "{json}");
+        assert!(json[2]["error"].as_str().unwrap().contains("step-00000001: state.json"), "{json}");
         assert!(json[1]["error"].as_str().unwrap().contains("cannot read the configuration"), "{json}");
         assert_eq!(find_runs(&folder.path().join("broken")).unwrap().len(), 1);
         assert!(find_runs(&folder.path().join("no run")).unwrap().is_empty());
@@ -256,8 +273,7 @@ mod tests {
         std::fs::create_dir_all(root.join("checkpoints")).unwrap();
         let broken = FoundRun::read(&root).unwrap();
         assert!(serde_json::to_string(&broken).unwrap().contains("run-\u{fffd}"));
-        let config = "seed = 1\n[data]\n[[data.garments]]\ngenerate = { count = 2 }\n[[stages]]\nname = \"a\"\ntrains = \"single\"\nsteps = 1\n";
-        std::fs::write(root.join(CONFIG), config).unwrap();
+        std::fs::write(root.join(CONFIG), SMALL).unwrap();
         let whole = FoundRun::read(&root).unwrap();
         assert!(matches!(whole, FoundRun::Whole(_)), "{whole:?}");
         assert!(serde_json::to_string(&whole).unwrap().contains("run-\u{fffd}"));

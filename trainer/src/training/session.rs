@@ -25,6 +25,7 @@ use std::path::PathBuf;
 use std::rc::Rc;
 use std::sync::Arc;
 
+mod data_change;
 mod incidents;
 mod milestones;
 mod start;
@@ -165,6 +166,7 @@ impl Session {
             model: self.learner.model(),
             average: self.average.as_ref().map(Average::model),
             optimizer: self.learner.optimizer(),
+            data: self.dataset.list(),
         };
         Ok(Checkpoint::save(&self.run, &self.config, state, &snapshot)?.path)
     }

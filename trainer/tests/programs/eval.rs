@@ -192,6 +192,6 @@ fn a_file_in_the_place_of_the_report_is_an_error_before_anything_is_loaded() {
         // The model is not there either: it would be missed first.
         let output = clothcombo(&["eval", "--checkpoint", "nowhere", "-o", output.to_str().unwrap()]);
         assert_eq!(output.status.code(), Some(1));
-        assert!(holds(&said(&output), "thesis.tex is no folder"), "{}", said(&output));
+        assert!(holds(&said(&output), "thesis.tex is a file, not a folder"), "{}", said(&output));
     }
 }

@@ -1,7 +1,7 @@
-//! SIGTERM saves a checkpoint and exits 0; `--resume` continues from it.
+//! SIGTERM, SIGHUP and SIGUSR1 save a checkpoint and exit 0; `--resume` continues from it.
 
 use crate::common::with_small_networks;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
 use std::time::{Duration, Instant};
 
@@ -21,15 +21,20 @@ layered_scenes = 0
 
 fn start(config: &Path, run: &Path, resume: bool) -> Child {
     let mut command = Command::new(env!("CARGO_BIN_EXE_clothcombo-train"));
-    command.arg("--config").arg(config).arg("--run-dir").arg(run).arg("--quiet");
+    command.args(arguments(config, run));
     if resume {
         command.arg("--resume");
     }
     command.spawn().unwrap()
 }
 
-/// Waits until the run has taken its initial validation, then asks it to stop; returns its exit code.
-fn stop_when_running(mut child: Child, run: &Path) -> Option<i32> {
+fn arguments(config: &Path, run: &Path) -> Vec<String> {
+    let [config, run] = [config, run].map(|path| path.display().to_string());
+    vec!["--config".into(), config, "--run-dir".into(), run, "--quiet".into()]
+}
+
+/// Waits until the run has taken its initial validation and some steps.
+fn wait_until_running(child: &mut Child, run: &Path) {
     let deadline = Instant::now() + Duration::from_secs(60);
     while !run.join("validation.jsonl").exists()
         || std::fs::metadata(run.join("validation.jsonl")).unwrap().len() == 0
@@ -39,9 +44,54 @@ fn stop_when_running(mut child: Child, run: &Path) -> Option<i32> {
         std::thread::sleep(Duration::from_millis(20));
     }
     std::thread::sleep(Duration::from_millis(300));
-    let killed = Command::new("kill").arg("-TERM").arg(child.id().to_string()).status().unwrap();
-    assert!(killed.success());
+}
+
+fn send(child: &Child, signal: &str) {
+    let sent = Command::new("kill").arg(format!("-{signal}")).arg(child.id().to_string()).status().unwrap();
+    assert!(sent.success());
+}
+
+/// Asks a run to stop once it runs; returns its exit code.
+fn stop_when_running(mut child: Child, run: &Path) -> Option<i32> {
+    wait_until_running(&mut child, run);
+    send(&child, "TERM");
     child.wait().unwrap().code()
+}
+
+fn config(folder: &Path) -> PathBuf {
+    let config = folder.join("long.toml");
+    std::fs::write(&config, with_small_networks(LONG)).unwrap();
+    config
+}
+
+#[test]
+fn a_closed_terminal_and_a_cluster_that_takes_the_machine_away_save_a_checkpoint() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = config(folder.path());
+    // A cluster warns, and terminates soon after: that is no second Ctrl-C.
+    for signals in [&["HUP"][..], &["USR1"], &["USR1", "HUP", "TERM"]] {
+        let run = folder.path().join(signals.concat());
+        let mut child = start(&config, &run, false);
+        wait_until_running(&mut child, &run);
+        signals.iter().for_each(|signal| send(&child, signal));
+        assert_eq!(child.wait().unwrap().code(), Some(0), "{signals:?}");
+        assert!(newest_step(&run) > 0);
+    }
+}
+
+#[test]
+fn a_run_under_nohup_survives_its_terminal() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = config(folder.path());
+    let run = folder.path().join("run");
+    let mut shell = Command::new("sh");
+    shell.args(["-c", "trap '' HUP; exec \"$@\"", "sh", env!("CARGO_BIN_EXE_clothcombo-train")]);
+    let mut child = shell.args(arguments(&config, &run)).spawn().unwrap();
+    wait_until_running(&mut child, &run);
+    send(&child, "HUP");
+    std::thread::sleep(Duration::from_millis(300));
+    assert!(child.try_wait().unwrap().is_none(), "it goes on");
+    assert_eq!(stop_when_running(child, &run), Some(0));
 }
 
 fn newest_step(run: &Path) -> u64 {
@@ -52,8 +102,7 @@ fn newest_step(run: &Path) -> u64 {
 #[test]
 fn terminate_saves_and_resume_continues() {
     let folder = tempfile::tempdir().unwrap();
-    let config = folder.path().join("long.toml");
-    std::fs::write(&config, with_small_networks(LONG)).unwrap();
+    let config = config(folder.path());
     let run = folder.path().join("run");
 
     assert_eq!(stop_when_running(start(&config, &run, false), &run), Some(0));

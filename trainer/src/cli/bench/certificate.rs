@@ -7,7 +7,7 @@ use crate::cli::loading::load_dataset;
 use crate::cli::model_arguments::ModelArguments;
 use crate::cli::output::print_report;
 use crate::cli::post_process::PostProcessArguments;
-use crate::cli::values::at_least_one;
+use crate::cli::values::{at_least_one, folder_to_make};
 use crate::cli::verbosity::progress_bar;
 use crate::config::Config;
 use crate::dataset::{Dataset, PreparedScene, SceneSample, prepare, sample_outfit};
@@ -59,7 +59,7 @@ pub struct Arguments {
     #[command(flatten)]
     post_process: PostProcessArguments,
     /// Writes body and garments (rest, draped, resolved) of every outfit as OBJ under this folder
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_parser = folder_to_make())]
     meshes: Option<PathBuf>,
     #[command(flatten)]
     device: DeviceArgument,

@@ -4,7 +4,7 @@ use crate::cli::device_argument::DeviceArgument;
 use crate::cli::loading::load_dataset;
 use crate::cli::output::print_report;
 use crate::cli::table::{Cell, Row, markdown, row};
-use crate::cli::values::{at_least_one, measuring_seconds, picture_file};
+use crate::cli::values::{at_least_one, folder_to_make, measuring_seconds, picture_file};
 use crate::cli::verbosity::print_status;
 use crate::config::{Config, load};
 use crate::picture::chart::{Bar, draw_bars};
@@ -70,7 +70,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE", value_parser = picture_file())]
     picture: Option<PathBuf>,
     /// Writes scene, networks and results of the only case or stage into a folder, for scripts/bench_torch.py
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_parser = folder_to_make())]
     export: Option<PathBuf>,
     /// With --export: measures nothing
     #[arg(long, requires = "export")]

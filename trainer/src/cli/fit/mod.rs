@@ -4,6 +4,8 @@ mod output;
 
 use super::fit_arguments::{Arms, FitArguments};
 use crate::cli::output::print_report;
+use crate::cli::values::file_to_make;
+use crate::cli::verbosity::spinner;
 use crate::dataset::load_body;
 use crate::system::paths::{lossy, lossy_option};
 use clap::Parser;
@@ -33,7 +35,7 @@ pub struct Arguments {
     #[arg(long, default_value = "mannequin")]
     body: String,
     /// OBJ to write, with its materials beside it
-    #[arg(short, long)]
+    #[arg(short, long, value_parser = file_to_make())]
     output: Option<PathBuf>,
     /// Writes the repaired triangles alone, as they enter training
     #[arg(long, requires = "output")]
@@ -92,7 +94,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     arguments.output.as_deref().map_or(Ok(()), |output| check_output(output, &arguments.garment))?;
     let body = load_body(&arguments.body, 0)?;
     let given = read(&arguments.garment)?;
-    let fitted = fit(&given.mesh, &body, &settings)
+    let fitted = spinner("fitting", || fit(&given.mesh, &body, &settings))
         .map_err(|e| miette!("{} on body '{}': {e}", arguments.garment.display(), body.name))?;
     let report = &fitted.report;
     if let Some(output) = &arguments.output {

@@ -35,6 +35,13 @@ pub enum OutputError {
         /// The folder.
         path: PathBuf,
     },
+    /// A file is where a folder is wanted.
+    #[error("{} is a file, not a folder", file.display())]
+    #[diagnostic(help("-o names the folder to be made: choose another name"))]
+    Obstacle {
+        /// The file.
+        file: PathBuf,
+    },
     /// Something else is among what is to be replaced.
     #[error("{} holds {file}, which was not written with the rest", path.display())]
     #[diagnostic(help("--replace removes the whole folder: move the file away, or choose another folder"))]

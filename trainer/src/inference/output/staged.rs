@@ -1,7 +1,7 @@
 //! A folder that appears whole or not at all.
 
 use super::OutputError;
-use crate::system::paths::first_missing_folder;
+use crate::system::paths::{first_missing_folder, obstacle};
 use std::collections::HashSet;
 use std::fs;
 use std::hash::{BuildHasher, RandomState};
@@ -109,6 +109,9 @@ impl Drop for Staged {
 
 /// Whether there is nothing at `target`, or what may be replaced.
 fn check_free(target: &Path, replace: bool, inputs: &[PathBuf]) -> Result<(), OutputError> {
+    if let Some(file) = obstacle(target) {
+        return Err(OutputError::Obstacle { file: file.into() });
+    }
     match fs::symlink_metadata(target).is_ok() && !is_empty_folder(target) {
         true if replace => check_own(target, inputs),
         true => Err(OutputError::Occupied { path: target.into() }),
@@ -220,7 +223,7 @@ mod tests {
         // A file obstructs it: what was made up to it is gone too.
         assert!(matches!(
             Staged::new(&place.path().join("a/note/c/out"), false, &[]),
-            Err(OutputError::Io { .. })
+            Err(OutputError::Obstacle { .. })
         ));
         assert_eq!(names(&place.path().join("a")), ["b", "note"]);
     }

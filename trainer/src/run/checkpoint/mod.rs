@@ -7,6 +7,7 @@
 //!                             model.safetensors  parameters for use, by name, for exchange
 //!                             model.bpk optimizer.bpk   exact parameters and Adam moments
 //!                             average.bpk        running average of the parameters, where optimizer.ema_decay asks for it
+//!                             data.json          names and digests of body, garments and clips
 //! checkpoints/latest          name of the newest whole checkpoint, for scripts
 //! checkpoints/best            name of the one with the best validation, for scripts
 //! ```
@@ -22,6 +23,8 @@ pub use state::{Best, CheckpointState};
 pub use trained::TrainedModel;
 
 use crate::config::{Config, load, to_toml};
+use crate::dataset::DataList;
+use crate::run::difference::{Difference, differences};
 use crate::run::folder::RunDir;
 use burn::module::Module;
 use burn::optim::ModuleOptimizer;
@@ -36,6 +39,7 @@ use std::path::{Path, PathBuf};
 const MODEL_EXCHANGE: &str = "model.safetensors";
 const MODEL_EXACT: &str = "model.bpk";
 const AVERAGE: &str = "average.bpk";
+const DATA: &str = "data.json";
 const OPTIMIZER: &str = "optimizer.bpk";
 const CONFIG: &str = "config.toml";
 const STATE: &str = "state.json";
@@ -49,6 +53,8 @@ pub struct Snapshot<'a> {
     pub average: Option<&'a ClothCombo>,
     /// Adam's moments.
     pub optimizer: &'a ModuleOptimizer,
+    /// What the data consists of.
+    pub data: &'a DataList,
 }
 
 /// A whole checkpoint on disk.
@@ -162,10 +168,21 @@ impl Checkpoint {
     ) -> Result<ClothCombo, CheckpointError> {
         let unusable = |reason: String| CheckpointError::Unusable { path: self.path.clone(), reason };
         let record = ModuleRecord::load(self.path.join(file)).map_err(|e| unusable(e.to_string()))?;
-        ClothCombo::new(&config.model, &self.state.dimensions(), 0, device)
-            .map_err(|e| unusable(e.to_string()))?
-            .try_load_record(record)
-            .map_err(|e| unusable(e.to_string()))
+        let model = ClothCombo::new(&config.model, &self.state.dimensions(), 0, device)
+            .map_err(|e| unusable(e.to_string()))?;
+        model.try_load_record(record).map_err(|error| match self.config() {
+            // The files are those that were written: it is the configuration that asks for other networks.
+            Ok(own) => match other_networks(config, &own) {
+                changes if changes.is_empty() => unusable(error.to_string()),
+                changes => CheckpointError::OtherNetworks { path: self.path.clone(), changes },
+            },
+            Err(error) => error,
+        })
+    }
+
+    /// What its data consisted of; `None` in a checkpoint of an early version.
+    pub fn data(&self) -> Option<DataList> {
+        serde_json::from_slice(&fs::read(self.path.join(DATA)).ok()?).ok()
     }
 
     /// `optimizer` with the stored moments.
@@ -188,6 +205,13 @@ impl Checkpoint {
     }
 }
 
+/// The keys of networks in which `config` differs from `own`.
+fn other_networks(config: &Config, own: &Config) -> Vec<Difference> {
+    let mut changes = differences(config, own);
+    changes.retain(|change| change.key.starts_with("model."));
+    changes
+}
+
 /// What `open` makes of a checkpoint folder, or of the newest one in a run or checkpoints folder that it accepts, of at most
 /// `step` steps.
 fn newest<T>(
@@ -198,7 +222,7 @@ fn newest<T>(
     if path.join(STATE).exists() {
         return open(path);
     }
-    let mut first_error = None;
+    let (mut first_error, mut count) = (None, 0);
     for folder in [path.to_owned(), path.join("checkpoints")] {
         let listed = retention::list(&folder).into_iter().rev();
         for (_, candidate) in listed.filter(|(number, _)| *number <= step) {
@@ -207,11 +231,16 @@ fn newest<T>(
                 Err(error) => {
                     tracing::warn!("passed over: {error}");
                     first_error.get_or_insert(error);
+                    count += 1;
                 }
             }
         }
     }
-    Err(first_error.unwrap_or_else(|| CheckpointError::Missing { path: path.to_owned() }))
+    Err(match first_error {
+        None => CheckpointError::Missing { path: path.to_owned() },
+        Some(error) if count == 1 => error,
+        Some(error) => CheckpointError::AllUnusable { path: path.to_owned(), count, reason: Box::new(error) },
+    })
 }
 
 /// A checkpoint's `state.json`, which must hold the checksums of `required`.
@@ -254,7 +283,10 @@ fn write(
     save_model(snapshot.model, &folder.join(MODEL_EXACT))?;
     snapshot.optimizer.save(folder.join(OPTIMIZER)).map_err(|e| e.to_string())?;
     fs::write(folder.join(CONFIG), to_toml(config).map_err(|e| e.to_string())?).map_err(text)?;
+    fs::write(folder.join(DATA), serde_json::to_vec(snapshot.data).map_err(|e| e.to_string())?)
+        .map_err(text)?;
     let mut files = REQUIRED.to_vec();
+    files.push(DATA);
     if let Some(average) = snapshot.average {
         save_model(average, &folder.join(AVERAGE))?;
         files.push(AVERAGE);

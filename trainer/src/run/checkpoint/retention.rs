@@ -17,14 +17,18 @@ pub(super) fn name(step: u64) -> String {
     format!("step-{step:08}")
 }
 
+/// The step of the checkpoint folder called `name`, if it is one.
+pub(super) fn step_of(name: &str) -> Option<u64> {
+    name.strip_prefix("step-")?.parse().ok()
+}
+
 /// All checkpoint folders in `folder` with their steps, ascending, whole or not.
 pub(super) fn list(folder: &Path) -> Vec<(u64, PathBuf)> {
     let entries = fs::read_dir(folder).into_iter().flatten().filter_map(Result::ok);
     let mut found: Vec<(u64, PathBuf)> = entries
         .filter_map(|entry| {
             let name = entry.file_name().into_string().ok()?;
-            let step = name.strip_prefix("step-")?.parse().ok()?;
-            Some((step, entry.path()))
+            Some((step_of(&name)?, entry.path()))
         })
         .collect();
     found.sort_unstable();

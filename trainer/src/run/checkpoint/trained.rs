@@ -1,6 +1,8 @@
 //! A trained model, apart from the run that made it.
 
-use super::{CONFIG, CheckpointError, CheckpointState, MODEL_EXCHANGE, newest, read_state, verify};
+use super::{
+    CONFIG, CheckpointError, CheckpointState, MODEL_EXCHANGE, newest, other_networks, read_state, verify,
+};
 use crate::config::{Config, PoseConfig, load};
 use crate::dataset::{Dataset, GarmentPurpose, purpose};
 use burn::store::{ModuleSnapshot, SafetensorsStore};
@@ -148,8 +150,25 @@ impl TrainedModel {
         dataset: &Dataset,
         device: &Device,
     ) -> Result<ClothCombo, CheckpointError> {
+        self.check_networks(config)?;
         self.check_data(config, dataset)?;
-        let adds_corrections = self.config.model.corrections == 0 && config.model.corrections > 0;
+        let networks = self.networks(device)?;
+        Ok(match self.adds_corrections(config) {
+            true => networks.with_corrections(&config.model, &mut Initializer::new(config.seed, device)),
+            false => networks,
+        })
+    }
+
+    fn adds_corrections(&self, config: &Config) -> bool {
+        self.config.model.corrections == 0 && config.model.corrections > 0
+    }
+
+    /// Whether a run of `config` could start from these networks, as far as its [model] section tells.
+    ///
+    /// # Errors
+    /// Names the keys that differ.
+    pub fn check_networks(&self, config: &Config) -> Result<(), CheckpointError> {
+        let adds_corrections = self.adds_corrections(config);
         let expected = match adds_corrections {
             true => ModelConfig {
                 correction_width: self.config.model.correction_width,
@@ -159,16 +178,11 @@ impl TrainedModel {
         };
         // How many steps are taken is a choice of inference, not of the networks.
         let expected = ModelConfig { correction_steps: self.config.model.correction_steps, ..expected };
-        if self.config.model != expected {
-            let reason =
-                "its [model] section differs from that of the configuration, which init_from does not allow";
-            return Err(CheckpointError::Foreign { path: self.folder.clone(), reason: reason.into() });
+        let changes = other_networks(&Config { model: expected, ..self.config.clone() }, &self.config);
+        match changes.is_empty() {
+            true => Ok(()),
+            false => Err(CheckpointError::OtherStart { path: self.folder.clone(), changes }),
         }
-        let networks = self.networks(device)?;
-        Ok(match adds_corrections {
-            true => networks.with_corrections(&config.model, &mut Initializer::new(config.seed, device)),
-            false => networks,
-        })
     }
 
     /// Checksum of the parameters: equal ones make equal embeddings.

@@ -2,7 +2,7 @@
 
 use super::history::SharedHistory;
 use crate::config::{Config, StageConfig, stage_starts, to_toml};
-use crate::dataset::LicenceLine;
+use crate::dataset::{DataCheck, LicenceLine};
 use crate::picture::chart::{ChartGrid, StageBoundary, Steps};
 use crate::picture::save_png;
 use crate::run::event::{Observer, TrainEvent};
@@ -12,7 +12,7 @@ use crate::run::report::{Page, RunState, charts, run_name};
 use crate::system::memory::Memory;
 use clothcombo_data::format::atomic;
 use miette::{IntoDiagnostic, Report, WrapErr};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// Writes the report of a run, and at every checkpoint its charts as a picture.
@@ -25,6 +25,7 @@ pub struct ReportObserver {
     steps: Steps,
     licences: Vec<LicenceLine>,
     memory: Option<MemoryEstimate>,
+    warned_files: usize,
     history: SharedHistory,
     every: Option<Duration>,
     written: Instant,
@@ -55,6 +56,7 @@ impl ReportObserver {
             steps: steps(config),
             licences,
             memory,
+            warned_files: warned_files(&run.data_check()),
             history,
             every: (every > 0.0).then(|| Duration::try_from_secs_f64(every).unwrap_or(Duration::MAX)),
             written: Instant::now(),
@@ -78,6 +80,7 @@ impl ReportObserver {
             device: &self.device,
             licences: &self.licences,
             memory: self.memory,
+            warned_files: self.warned_files,
             peak: Memory::now().map(|m| m.peak),
         };
         atomic::write(&self.path, page.html().as_bytes())
@@ -90,6 +93,12 @@ impl ReportObserver {
         let grid = ChartGrid { title: "Training".into(), legend: Steps::legend(), charts: charts.collect() };
         save_png(&grid.draw(), &self.curves).into_diagnostic()
     }
+}
+
+/// Number of files that the check of the data warned of; 0 where nothing was checked.
+fn warned_files(check: &Path) -> usize {
+    let read = std::fs::read(check).ok().and_then(|bytes| serde_json::from_slice::<DataCheck>(&bytes).ok());
+    read.map_or(0, |check| check.warnings.len())
 }
 
 /// The steps of a run that `config` asks for.

@@ -66,6 +66,8 @@ pub struct Page<'a> {
     pub licences: &'a [LicenceLine],
     /// Memory expected at the start.
     pub memory: Option<MemoryEstimate>,
+    /// Number of files of the data that `check.json` has warnings of.
+    pub warned_files: usize,
     /// Most memory used so far (bytes).
     pub peak: Option<u64>,
 }
@@ -124,6 +126,9 @@ impl Page<'_> {
         tiles.push(("device", escape(self.device)));
         tiles.push(("skipped steps", self.history.skipped.len().to_string()));
         tiles.push(("gradient spikes", self.history.spikes.len().to_string()));
+        if self.warned_files > 0 {
+            tiles.push(("data", format!("warnings about {} files", self.warned_files)));
+        }
         if let Some(peak) = self.peak {
             let estimated =
                 self.memory.map(|m| format!(" (estimated {})", gibibytes(m.peak()))).unwrap_or_default();

@@ -1,13 +1,15 @@
 //! How a run begins: anew, from a trained model, or from a checkpoint.
 
 use super::Session;
+use super::data_change::changed_data;
 use crate::config::Config;
+use crate::dataset::Dataset;
 use crate::dataset::sizes::DataSizes;
-use crate::dataset::{Dataset, is_fingerprint};
 use crate::evaluation::ValidationSet;
 use crate::inference::tensor_store::TensorStore;
 use crate::run::checkpoint::{Checkpoint, CheckpointState, TrainedModel};
-use crate::run::folder::{RunDir, differing_keys};
+use crate::run::difference::{differing_keys, listed};
+use crate::run::folder::RunDir;
 use crate::run::memory::largest_tensor;
 use crate::run::observer::moved;
 use crate::system::device::{check_largest, name};
@@ -18,7 +20,7 @@ use crate::training::schedule::Schedule;
 use burn::module::Module;
 use burn::tensor::Device;
 use clothcombo_model::ClothCombo;
-use miette::{IntoDiagnostic, Report, miette};
+use miette::{IntoDiagnostic, Report};
 use std::path::Path;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -66,23 +68,11 @@ impl Session {
     ) -> Result<Self, Report> {
         check_largest(device, largest_tensor(&config, &DataSizes::of(&dataset)))?;
         let device = device.clone().autodiff();
-        let expected = CheckpointState::of(&dataset, 0);
         let found = &checkpoint.state;
-        let dimensions = |s: &CheckpointState| (s.joints.clone(), s.shape_count, s.pose_features);
-        let same_data =
-            found.data == expected.data || !found.data.as_ref().is_some_and(|d| is_fingerprint(d));
-        if dimensions(found) != dimensions(&expected) || !same_data {
-            return Err(miette!(
-                help = "the body, garments or motions have changed since the run was started; restore them, or start a new run",
-                "the data no longer fits checkpoint {}",
-                checkpoint.path.display()
-            ));
-        }
-        if !found.data.as_ref().is_some_and(|d| is_fingerprint(d)) {
-            tracing::warn!(
-                "checkpoint {} cannot tell whether the data is still the same",
-                checkpoint.path.display()
-            );
+        let changed_data = changed_data(checkpoint, &dataset, run.allowed())?;
+        if !changed_data.is_empty() {
+            let changes = listed(changed_data.iter().map(|change| &change.text));
+            tracing::warn!("the run goes on with other data:{changes}");
         }
         if found.device_name() != name(&device) {
             tracing::warn!("device: {}", moved(found.device_name(), &name(&device)));
@@ -100,10 +90,12 @@ impl Session {
         // A score of other losses or scenes cannot be beaten by one of these.
         let scores = ["losses", "validation", "data", "seed"];
         let changed = differing_keys(&checkpoint.config()?, &config);
-        let is_comparable = !changed.iter().any(|key| scores.iter().any(|part| key.starts_with(part)));
+        let is_comparable = changed_data.is_empty()
+            && !changed.iter().any(|key| scores.iter().any(|part| key.starts_with(part)));
         let best = found.best.filter(|_| is_comparable);
         // What was changed may have fixed what went wrong before.
-        let incidents = if changed.is_empty() { found.incidents.clone() } else { Vec::new() };
+        let is_unchanged = changed.is_empty() && changed_data.is_empty();
+        let incidents = if is_unchanged { found.incidents.clone() } else { Vec::new() };
         let found = CheckpointState { best, incidents, ..found.clone() };
         Ok(Self::assemble(run, config, dataset, &device, learner, average, &found))
     }

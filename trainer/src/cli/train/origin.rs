@@ -1,0 +1,166 @@
+//! What a run begins with, checked before anything is made: nothing, a trained model, or a checkpoint of its own.
+
+use super::Arguments;
+use crate::cli::data_check::check_data;
+use crate::cli::loading::load_dataset_for;
+use crate::config::Config;
+use crate::dataset::{DataCheck, Dataset};
+use crate::run::checkpoint::{Checkpoint, CheckpointError, CheckpointState, TrainedModel};
+use crate::run::difference::AllowedChanges;
+use crate::run::folder::{RunDir, RunDirError};
+use crate::training::process_group::ProcessGroup;
+use crate::training::session::Session;
+use burn::tensor::Device;
+use miette::Report;
+use std::path::Path;
+use std::rc::Rc;
+use std::sync::Arc;
+
+/// What a run begins with.
+pub(super) enum Origin {
+    /// A new run, from a model or from nothing.
+    New(Option<Box<TrainedModel>>),
+    /// A run that goes on, from a checkpoint or, killed before its first, from the start.
+    Resumed(RunDir, Option<Box<Checkpoint>>),
+}
+
+/// The data of a run.
+pub(super) struct Loaded {
+    pub dataset: Arc<Dataset>,
+    /// What its files look like; `None` where they are those of the checkpoint.
+    pub check: Option<DataCheck>,
+}
+
+impl Origin {
+    /// What the run in `root` begins with.
+    ///
+    /// # Errors
+    /// When the folder, the model or the checkpoint cannot be used. Only the lock of an existing run has been touched then.
+    pub fn find(
+        arguments: &Arguments,
+        root: &Path,
+        config: &Config,
+        group: &ProcessGroup,
+    ) -> Result<Self, Report> {
+        let Some(path) = &arguments.resume else {
+            if group.is_rank_zero() {
+                RunDir::check_free(root)?;
+            }
+            return Ok(Self::New(start_model(config)?.map(Box::new)));
+        };
+        let allowed = &arguments.allow_config_change;
+        let run = match group.is_rank_zero() {
+            true => RunDir::resume(root, config, allowed)?,
+            false => {
+                let unknown = |key| RunDirError::UnknownKey { key };
+                RunDir::follow(root).allowing(AllowedChanges::new(allowed, &[config]).map_err(unknown)?)
+            }
+        };
+        let checkpoint = newest_or_none(path.as_deref().unwrap_or(root))?;
+        if checkpoint.is_none() {
+            start_model(config)?;
+        }
+        Ok(Self::Resumed(run, checkpoint.map(Box::new)))
+    }
+
+    /// Names of the joints that the networks see, where they are given.
+    fn joints(&self) -> Option<&[String]> {
+        let of = |state: &CheckpointState| state.joints.len();
+        match self {
+            Self::New(Some(model)) if of(&model.state) > 0 => Some(&model.state.joints),
+            Self::Resumed(_, Some(checkpoint)) if of(&checkpoint.state) > 0 => Some(&checkpoint.state.joints),
+            _ => None,
+        }
+    }
+
+    /// Checks and loads the data of `config`. Data that a checkpoint was made with was checked when its run began.
+    ///
+    /// # Errors
+    /// When it cannot be read or trained on; each garment, clip or body at fault is named.
+    pub fn load_data(&self, config: &Config, group: &ProcessGroup) -> Result<Loaded, Report> {
+        // One process tells; the others fail with it.
+        let check = || group.is_rank_zero().then(|| check_data(config)).transpose();
+        let Self::Resumed(_, Some(checkpoint)) = self else {
+            let check = check()?;
+            return Ok(Loaded { dataset: load_dataset_for(config, self.joints())?, check });
+        };
+        let dataset = load_dataset_for(config, self.joints())?;
+        let is_same = checkpoint.state.data.as_deref() == Some(dataset.fingerprint());
+        Ok(Loaded { check: if is_same { None } else { check()? }, dataset })
+    }
+
+    /// Makes the session and, when nothing can be wrong any more, the folder of a new run.
+    ///
+    /// # Errors
+    /// When the networks cannot be made for the data, or the folder cannot be written.
+    pub fn begin(
+        self,
+        root: &Path,
+        config: &Config,
+        dataset: &Arc<Dataset>,
+        device: &Device,
+        group: &Rc<ProcessGroup>,
+    ) -> Result<(RunDir, Session), Report> {
+        let new = |run: RunDir| Session::new(run, config.clone(), dataset.clone(), device);
+        match self {
+            Self::New(_) => {
+                let session = new(RunDir::follow(root))?.shared_in(group.clone())?;
+                let run = match group.is_rank_zero() {
+                    true => RunDir::create(root, config)?,
+                    false => RunDir::follow(root),
+                };
+                Ok((run, session))
+            }
+            Self::Resumed(run, checkpoint) => {
+                let session = match &checkpoint {
+                    Some(c) => Session::resume(run.clone(), config.clone(), dataset.clone(), device, c)?,
+                    None => new(run.clone())?,
+                };
+                let session = session.shared_in(group.clone())?;
+                // Every process has read the checkpoint before rank zero moves others aside.
+                group.barrier(false)?;
+                if group.is_rank_zero() {
+                    continue_run(&run, config, checkpoint.as_deref())?;
+                }
+                Ok((run, session))
+            }
+        }
+    }
+}
+
+/// The model that `config` starts from, if it names one: opened now, so that a wrong path is said before data is loaded.
+fn start_model(config: &Config) -> Result<Option<TrainedModel>, CheckpointError> {
+    let Some(path) = &config.init_from else { return Ok(None) };
+    let model = TrainedModel::open(Path::new(path)).map_err(|error| match error {
+        CheckpointError::Missing { path } => CheckpointError::NoStart { path },
+        other => other,
+    })?;
+    model.check_networks(config)?;
+    Ok(Some(model))
+}
+
+/// The checkpoint at `path`, or the newest whole one of the run there; `None` where the run was killed before its first.
+fn newest_or_none(path: &Path) -> Result<Option<Checkpoint>, CheckpointError> {
+    match Checkpoint::open(path) {
+        Ok(checkpoint) => Ok(Some(checkpoint)),
+        Err(CheckpointError::Missing { .. }) => {
+            tracing::warn!("{} holds no checkpoint yet: the run starts anew", path.display());
+            Ok(None)
+        }
+        Err(error) => Err(error),
+    }
+}
+
+/// Makes `config` the run's own and sets aside what the run did after `checkpoint`, with a warning about each.
+fn continue_run(run: &RunDir, config: &Config, checkpoint: Option<&Checkpoint>) -> Result<(), Report> {
+    let changed = run.adopt_config(config)?;
+    if !changed.is_empty() {
+        tracing::warn!("the run goes on with other values of {}", changed.join(", "));
+    }
+    let abandoned = checkpoint.map_or(Ok(0), |c| c.abandon_later(run))?;
+    if abandoned > 0 {
+        let folder = run.checkpoints();
+        tracing::warn!("{abandoned} later checkpoints are now {}/abandoned-step-…", folder.display());
+    }
+    Ok(())
+}
