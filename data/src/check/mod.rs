@@ -13,6 +13,7 @@ pub use motion::{MotionCheck, impossible_turn};
 pub use targets::{ManifestHints, Target, find_targets};
 
 use crate::asset::Body;
+use crate::asset::motion::holds_poses;
 use crate::folders::garment_folder::MANIFEST;
 use crate::format::NpzFile;
 use clothcombo_physics::Surface;
@@ -98,7 +99,7 @@ fn check_npz(file: &FileCheck, path: &Path) -> Result<FileCheck, String> {
         let (check, warnings) = body::check(path, &mut npz)?;
         let unusable = body::unusable(&check, path);
         Ok(FileCheck { body: Some(check), warnings, unusable, ..file.clone() })
-    } else if npz.contains("poses") {
+    } else if holds_poses(&npz) {
         let (check, warnings) = motion::check(path)?;
         Ok(FileCheck { motion: Some(check), warnings, ..file.clone() })
     } else if npz.contains("positions") && npz.contains("f") {
