@@ -169,7 +169,10 @@ fn no_motion_takes_the_place_of_the_body() {
 fn rates_that_no_motion_may_have_are_not_written() {
     let folder = tempfile::tempdir().unwrap();
     // 60 frames/s, of which every millionth frame is asked for.
-    let slow = AmassSettings { thinning: Thinning { frame_rate: 1e-9, static_threshold: 0.0 }, ..AmassSettings::default() };
+    let slow = AmassSettings {
+        thinning: Thinning { frame_rate: 1e-9, static_threshold: 0.0 },
+        ..AmassSettings::default()
+    };
     let files = [fixture("amass/CMU/02/jump_poses.npz")];
     let message = import_amass(&files, folder.path(), &slow, &mut no_progress()).unwrap_err().to_string();
     assert!(message.contains("expected 0.01 to 10000"), "{message}");

@@ -1,8 +1,8 @@
 //! Which axis of a motion file's world is up.
 
+use crate::asset::Pose;
 use crate::asset::motion::mean_up;
 use crate::asset::rotation::{Matrix3, axis_angle_from_matrix, matrix_from_axis_angle, product};
-use crate::asset::Pose;
 
 /// The axis that points up in the world of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -131,7 +131,9 @@ fn rotations(file: &mut NpzFile) -> Result<Rotations, FileError> {
         }
         _ => {
             let expected = match ALL_JOINTS.contains(&body) {
-                true => "[frames, 66 or more, three for each joint], or [frames, joints, 3] of 22 joints or more",
+                true => {
+                    "[frames, 66 or more, three for each joint], or [frames, joints, 3] of 22 joints or more"
+                }
                 false => "[frames, 63 or 69], or [frames, 21 or 23, 3]",
             };
             let shape = file.shape(body)?;
@@ -158,15 +160,15 @@ fn with_root(
     }
     let rows = values.chunks_exact(joints).zip(turns);
     let values = rows.flat_map(|(row, turn)| std::iter::once(turn).chain(row[replaced..].iter().copied()));
-    Ok(Rotations { joints: joints + 1 - replaced, values: values.collect(), keys: format!("{root} + {body}") })
+    Ok(Rotations {
+        joints: joints + 1 - replaced,
+        values: values.collect(),
+        keys: format!("{root} + {body}"),
+    })
 }
 
 /// Joints per frame and all rotations (axis-angle, rad) of an array; (N, 3, 3) are matrices if it `is_root`.
-fn read_joints(
-    file: &mut NpzFile,
-    key: &str,
-    is_root: bool,
-) -> Result<(usize, Vec<[f64; 3]>), FileError> {
+fn read_joints(file: &mut NpzFile, key: &str, is_root: bool) -> Result<(usize, Vec<[f64; 3]>), FileError> {
     let array = file.numbers(key, HINT)?;
     let vectors = || array.data.chunks_exact(3).map(|r| [r[0], r[1], r[2]]).collect();
     match array.shape[..] {
@@ -200,8 +202,7 @@ fn axis_angles(file: &NpzFile, key: &str, joints: usize, data: &[f64]) -> Result
 
 fn is_rotation(m: &Matrix3) -> bool {
     let dot = |a: usize, b: usize| (0..3).map(|k| m[a][k] * m[b][k]).sum::<f64>();
-    let orthonormal =
-        (0..3).all(|a| (0..3).all(|b| (dot(a, b) - f64::from(u8::from(a == b))).abs() < 1e-2));
+    let orthonormal = (0..3).all(|a| (0..3).all(|b| (dot(a, b) - f64::from(u8::from(a == b))).abs() < 1e-2));
     let [x, y, z] = *m;
     let determinant = x[0] * (y[1] * z[2] - y[2] * z[1]) - x[1] * (y[0] * z[2] - y[2] * z[0])
         + x[2] * (y[0] * z[1] - y[1] * z[0]);

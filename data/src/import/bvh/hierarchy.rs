@@ -61,6 +61,21 @@ impl<'a> Words<'a> {
         word.ok_or_else(|| self.error(format!("the file ends where {expected} should be")))
     }
 
+    /// A joint's name: the rest of the line up to a brace, as some rigs have spaces in it.
+    fn name(&mut self) -> Result<String, FileError> {
+        let first = self.next("a joint name")?;
+        let line = self.words.get(self.at - 1).map(|(line, _)| *line);
+        let mut name = first.to_string();
+        while let Some((_, word)) =
+            self.words.get(self.at).filter(|(at, word)| Some(*at) == line && *word != "{")
+        {
+            name.push(' ');
+            name.push_str(word);
+            self.at += 1;
+        }
+        Ok(name)
+    }
+
     fn peek(&self) -> Option<&'a str> {
         self.words.get(self.at).map(|(_, word)| *word)
     }
@@ -206,7 +221,7 @@ fn read_joint(
     if depth > DEEPEST_TREE {
         return Err(words.error(format!("the joint tree is deeper than {DEEPEST_TREE}")));
     }
-    let name = words.next("a joint name")?.to_string();
+    let name = words.name()?;
     words.expect("{")?;
     let offset = words.offset()?;
     let mut channels = Vec::new();

@@ -12,11 +12,11 @@ mod unpose;
 pub use info::{Gender, OutfitItem, SampleInfo};
 pub use unpose::{Unposing, upright};
 
-use super::up_axis::UpAxis;
 use super::motions::{Clip, NamedFile, named, write_motions};
 use super::overwrite::refuse_overwriting;
 use super::summary::{ImportError, Progress, Summary};
 use super::thinning::{Thinned, Thinning, thin};
+use super::up_axis::UpAxis;
 use crate::asset::{BindingSettings, Body, Category, Garment, Motion, Provenance};
 use crate::folders::{FolderGarment, save_garment_folder};
 use crate::format::{FileError, NpzWriter, PointCache, folder, obj};

@@ -97,7 +97,10 @@ fn rates_are_found_under_every_name_and_contradictions_are_told() {
 fn incomplete_layouts_name_the_key_and_what_is_missing() {
     for (arrays, part) in [
         (&[("poses", &[FRAMES, 63][..], &flat(0..21)[..])][..], "[3, 63]"),
-        (&[("body_pose", &[FRAMES, 63], &flat(0..21))], "without the root, and none of the keys global_orient"),
+        (
+            &[("body_pose", &[FRAMES, 63], &flat(0..21))],
+            "without the root, and none of the keys global_orient",
+        ),
         (&[("body_pose", &[FRAMES, 60], &flat(0..20)), ("Rh", &[FRAMES, 3], &flat(0..1))], "63 or 69"),
         (&[("body_pose", &[FRAMES, 63], &flat(0..21)), ("Rh", &[1, 3], &[0.0; 3])], "'Rh' has 1 frames"),
         (&[("poses", &[FRAMES * 66], &flat(0..22))], "expected [frames, 66 or more"),
