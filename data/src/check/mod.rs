@@ -2,14 +2,16 @@
 //!
 //! A file is unusable when training would refuse it; everything else worth knowing is a warning.
 
+mod anatomy;
 mod body;
 mod garment;
 mod motion;
 mod targets;
 
+pub use anatomy::impossible_turn;
 pub use body::BodyCheck;
 pub use garment::{GarmentCheck, layer_guess};
-pub use motion::{MotionCheck, impossible_turn};
+pub use motion::MotionCheck;
 pub use targets::{ManifestHints, Target, find_targets};
 
 use crate::asset::Body;

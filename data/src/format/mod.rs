@@ -3,6 +3,7 @@
 pub mod atomic;
 mod error;
 pub mod folder;
+mod foreign;
 mod gltf;
 mod load_mesh;
 pub mod mat;
@@ -16,6 +17,7 @@ mod stl;
 pub mod toml_file;
 
 pub use error::FileError;
+pub use foreign::way_out;
 pub use gltf::{SceneMesh, encode_glb, save_glb};
 pub use load_mesh::{MESH_EXTENSIONS, MeshFormat, is_mesh_path, load_mesh, load_tri_mesh, parse_mesh};
 pub use mat::{MatFile, MatValue};

@@ -15,6 +15,7 @@ use super::overwrite::refuse_overwriting;
 use super::summary::{ImportError, Progress, Summary};
 use super::thinning::{Thinned, Thinning, thin};
 use crate::asset::{Body, Motion, Pose, Provenance, skeleton::BODY_JOINT_COUNT};
+use crate::check::impossible_turn;
 use crate::format::{FileError, toml_file};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -76,10 +77,11 @@ pub(super) fn write_retargeted(
     let inputs = named(files.iter().map(|f| (f.clone(), stem(f))));
     let import = |file: &Path| {
         let Retargeted { poses, frame_rate, skeleton, remark } = retarget(file)?;
+        let warning = impossible_turn(&poses).map_or_else(String::new, |warning| format!("; {warning}"));
         let Thinned { poses, frame_rate, note } = thin(poses, frame_rate, &settings.thinning);
         let source = provenance_of(file, &settings.provenance);
         let motion = Motion { name: String::new(), frame_rate, poses, source };
-        Ok(Clip { motion, subject: String::new(), note: format!("{skeleton}, {note}{remark}") })
+        Ok(Clip { motion, subject: String::new(), note: format!("{skeleton}, {note}{remark}{warning}") })
     };
     write_motions(&inputs, settings.body_file.as_deref(), out, expected, &import, progress)
 }

@@ -2,7 +2,7 @@
 
 use crate::asset::motion::{MAX_ANGLE, check_frame_rate};
 use crate::asset::rotation::{self, Matrix3};
-use crate::format::FileError;
+use crate::format::{FileError, way_out};
 use std::fs;
 use std::path::Path;
 
@@ -109,6 +109,9 @@ impl Bvh {
     /// [`FileError`] naming file and line.
     pub fn load(path: &Path) -> Result<Self, FileError> {
         let bytes = fs::read(path).map_err(FileError::io(path))?;
+        if let (false, Some(way_out)) = (bytes.starts_with(b"HIERARCHY"), way_out(path)) {
+            return Err(FileError::content(path)(way_out));
+        }
         Self::parse(&String::from_utf8_lossy(&bytes), path)
     }
 

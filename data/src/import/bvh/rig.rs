@@ -93,7 +93,7 @@ impl Rig<'_> {
         path
     }
 
-    /// The last joint that two paths share; none if one of the joints is on the path of the other, and they are not the same.
+    /// The last joint that the paths to two joints share.
     fn fork(&self, a: Option<usize>, b: Option<usize>) -> Option<usize> {
         let (a, b) = (self.path(a?), self.path(b?));
         a.iter().zip(&b).take_while(|(x, y)| x == y).last().map(|(joint, _)| *joint)
