@@ -121,6 +121,11 @@ pub fn import_smpl_family(
             summary.notes.push(note);
         }
     }
+    if body.shape_count == 0 {
+        summary
+            .notes
+            .push("the body has no shape space: it is draped and trained on in its one shape".into());
+    }
     if was_inside_out {
         summary.notes.push(INSIDE_OUT.into());
     }
