@@ -254,7 +254,9 @@ fn body_of(trained: &TrainedModel, named: Option<&str>) -> Result<(Body, ShapeSp
         Some(name) => {
             let body = load_body(name, count.max(OTHER_COMPONENTS))?;
             if body.joint_count() < BODY_JOINT_COUNT {
-                return Err(DatasetError::FewJoints { name: body.name.clone(), joints: body.joint_count() }.into());
+                return Err(
+                    DatasetError::FewJoints { name: body.name.clone(), joints: body.joint_count() }.into()
+                );
             }
             let model_body = load_model_body(trained).ok();
             match ShapeSpace::new(&body, model_body, trained.config.data.shape_range) {
