@@ -5,7 +5,7 @@
 //! the pelvis of a body of their own. The turn to y up goes into the root. The heading stays in the root, as in every motion file
 //! here; whoever samples poses removes it.
 
-use super::motions::{Clip, NamedFile, named, stem, write_motions};
+use super::motions::{Clip, NamedFile, named, short, stem, write_motions};
 use super::summary::{ImportError, Progress, Summary};
 use super::thinning::{Thinned, Thinning, thin};
 use super::up_axis::{UpAxis, undecided};
@@ -143,7 +143,7 @@ fn clip_name(root: &Path, path: &Path) -> String {
 }
 
 fn import_file(path: &Path, up: Result<UpAxis, String>, settings: &AmassSettings) -> Result<Clip, String> {
-    let mut file = NpzFile::open(path).map_err(|e| short(e, path))?;
+    let mut file = NpzFile::open(path).map_err(|e| short(&e.to_string(), path))?;
     if !holds_poses(&file) {
         return Err(format!(
             "not a motion: no key 'poses', only {}",
@@ -154,7 +154,7 @@ fn import_file(path: &Path, up: Result<UpAxis, String>, settings: &AmassSettings
     let own_source = Provenance::read(&mut file);
     drop(file);
     let MotionFile { poses, rate, keys, joints, pickled, .. } = {
-        let file = MotionFile::read(path).map_err(|e| short(e, path))?;
+        let file = MotionFile::read(path).map_err(|e| short(&e.to_string(), path))?;
         MotionFile { rate: Some(("", file.frame_rate(settings.rate)?)), ..file }
     };
     let frame_rate = rate.map_or(f64::NAN, |(_, rate)| rate);
@@ -225,12 +225,6 @@ fn provenance(path: &Path, joints: usize) -> Provenance {
         author: "Mahmood et al. 2019 and the authors of the collection".into(),
         licence: "AMASS licence (non-commercial scientific research); see https://amass.is.tue.mpg.de".into(),
     }
-}
-
-/// The message without the path, which the summary shows beside it.
-fn short(error: FileError, path: &Path) -> String {
-    let (message, prefix) = (error.to_string(), format!("{}: ", path.display()));
-    message.strip_prefix(&prefix).unwrap_or(&message).to_string()
 }
 
 #[cfg(test)]

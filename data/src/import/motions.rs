@@ -76,7 +76,8 @@ pub(super) fn write_retargeted(
     }
     let inputs = named(files.iter().map(|f| (f.clone(), stem(f))));
     let import = |file: &Path| {
-        let Retargeted { poses, frame_rate, skeleton, remark } = retarget(file)?;
+        let Retargeted { poses, frame_rate, skeleton, remark } =
+            retarget(file).map_err(|e| short(&e, file))?;
         let warning = impossible_turn(&poses).map_or_else(String::new, |warning| format!("; {warning}"));
         let Thinned { poses, frame_rate, note } = thin(poses, frame_rate, &settings.thinning);
         let source = provenance_of(file, &settings.provenance);
@@ -139,6 +140,11 @@ pub(super) fn named(files: impl IntoIterator<Item = (PathBuf, String)>) -> Vec<N
 /// The file's name without its extension.
 pub(super) fn stem(path: &Path) -> String {
     path.file_stem().map_or_else(|| "motion".into(), |s| s.to_string_lossy().into_owned())
+}
+
+/// The message without the path, which the summary shows beside it.
+pub(super) fn short(message: &str, path: &Path) -> String {
+    message.strip_prefix(&format!("{}: ", path.display())).unwrap_or(message).to_string()
 }
 
 /// Where the motion of `file` comes from: what was given, with the file's name.

@@ -21,6 +21,7 @@ mod kill;
 mod memory;
 mod observability;
 mod own_garments;
+mod own_motions;
 mod resolve;
 mod run_safety;
 mod score;
