@@ -89,6 +89,16 @@ fn both_layouts_are_found_in_nested_folders_and_stand_up() {
 }
 
 #[test]
+fn the_up_axis_is_that_along_which_usable_motions_stand() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = AmassSettings { thinning: every_frame(), ..AmassSettings::default() };
+    let summary = import_amass(&[fixture("amass")], folder.path(), &settings, &mut no_progress()).unwrap();
+    assert_eq!(summary.taken.len(), 3, "{summary:?}");
+    assert!(summary.notes.iter().any(|note| note.contains("z is up, as the bodies stand")), "{summary:?}");
+    assert_expected(&Motion::load(&folder.path().join("ACCAD_s1_walk.npz")).unwrap(), "walk_all");
+}
+
+#[test]
 fn the_rate_is_reduced_and_standing_still_dropped() {
     let folder = tempfile::tempdir().unwrap();
     // At 30 frames/s, frames 0, 4, 8 and 12 remain; 8 is the same as 4.

@@ -12,6 +12,7 @@ pub use anatomy::impossible_turn;
 pub use body::BodyCheck;
 pub use garment::{GarmentCheck, layer_guess};
 pub use motion::MotionCheck;
+pub(crate) use motion::not_upright;
 pub use targets::{ManifestHints, Target, find_targets};
 
 use crate::asset::Body;

@@ -42,14 +42,14 @@ fn excesses(pose: &Pose) -> impl Iterator<Item = (usize, f64)> + '_ {
 }
 
 /// A warning about a body that stands along another axis than y.
-fn not_upright(poses: &[Pose]) -> Option<String> {
+pub(crate) fn not_upright(poses: &[Pose]) -> Option<String> {
     let [_, y, z] = mean_up(poses);
     if y < -0.5 {
-        return Some("the body stands on its head on average: is the file in the coordinates of a camera, with y down? \
-                     `clothcombo import amass --up y-down` turns it".into());
+        return Some("the body stands on its head on average: is y down in the file, as in the coordinates of a camera? (an npz: \
+                     `import amass --up y-down`)".into());
     }
-    (y.abs() < 0.3 && z > 0.7).then(|| {
-        "the body lies on its back on average: is z up in the file? `clothcombo import amass --up z` turns it".into()
+    (y.abs() < 0.3 && z.abs() > 0.7).then(|| {
+        "the body lies along z on average: is z up in the file? (an npz: `import amass --up z`)".into()
     })
 }
 

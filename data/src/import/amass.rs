@@ -9,7 +9,7 @@ use super::motions::{Clip, NamedFile, named, short, stem, write_motions};
 use super::summary::{ImportError, Progress, Summary};
 use super::thinning::{Thinned, Thinning, thin};
 use super::up_axis::{UpAxis, undecided};
-use crate::asset::motion::{MotionFile, holds_poses, mean_up};
+use crate::asset::motion::{MotionFile, check_frame_rate, holds_poses, mean_up};
 use crate::asset::{Motion, Provenance};
 use crate::check::impossible_turn;
 use crate::format::{FileError, NpzFile, folder};
@@ -64,7 +64,7 @@ pub fn import_amass(
             fs::canonicalize(out).ok().filter(|out| fs::canonicalize(input).ok().as_ref() != Some(out));
         let mut seen = HashSet::from_iter(below);
         find(input, &mut found, &mut seen, 0)?;
-        let axis = settings.up.map_or_else(|| standing_axis(&found), Ok);
+        let axis = settings.up.map_or_else(|| standing_axis(&found, settings.rate), Ok);
         if let (Ok(axis), None) = (&axis, settings.up) {
             notes.push(format!("{}: {} is up, as the bodies stand (--up)", input.display(), axis.name()));
         }
@@ -94,12 +94,18 @@ pub fn import_amass(
 
 /// The axis along which the bodies in `files`, which come from one source, stand on average, or why it is not plain. A clip of
 /// somebody who lies on the floor is thus read as its neighbours are.
-fn standing_axis(files: &[PathBuf]) -> Result<UpAxis, String> {
+fn standing_axis(files: &[PathBuf], rate: Option<f64>) -> Result<UpAxis, String> {
     let mut mean = [0.0; 3];
     let step = files.len().div_ceil(ASKED_FOR_UP).max(1);
     let readable = files.iter().step_by(step).filter_map(|file| MotionFile::read(file).ok());
+    // Only what can be imported has a say.
+    let usable = |file: &MotionFile| {
+        let has_rate = file.frame_rate(rate).is_ok_and(|rate| check_frame_rate(rate).is_ok());
+        has_rate && !file.poses.is_empty()
+    };
     let finite = |up: &[f64; 3]| up.iter().all(|x| x.is_finite());
-    let directions: Vec<[f64; 3]> = readable.map(|file| mean_up(&file.poses)).filter(finite).collect();
+    let directions: Vec<[f64; 3]> =
+        readable.filter(usable).map(|file| mean_up(&file.poses)).filter(finite).collect();
     for direction in &directions {
         (0..3).for_each(|axis| mean[axis] += direction[axis] / directions.len() as f64);
     }

@@ -15,6 +15,8 @@ use super::motions::{RetargetSettings, Retargeted, write_retargeted};
 use super::retarget::{JointMap, Retarget};
 use super::summary::{ImportError, Progress, Summary};
 use super::thinning::largest_turn;
+use super::up_axis::UpAxis;
+use crate::asset::rotation::{IDENTITY, Matrix3, apply, product, transpose};
 use crate::asset::{Body, Pose};
 use std::path::{Path, PathBuf};
 
@@ -25,8 +27,40 @@ const INSERTED_FRAME_ANGLE: f64 = 0.2;
 /// Retargets every frame of `bvh`, whose joints are those of `map`, to the 22 body joints of a skeleton whose T-pose joints are
 /// `joints`.
 pub fn retarget(bvh: &Bvh, map: JointMap, joints: &[[f64; 3]]) -> Vec<Pose> {
-    let retarget = Retarget::new(map, &bvh.rest_positions(), joints);
-    (0..bvh.frame_count()).map(|frame| retarget.pose(&bvh.world_rotations(frame))).collect()
+    let rest = bvh.rest_positions();
+    let (rest_turn, world_turn) = turns_to_y_up(bvh, &map, &rest);
+    let rest: Vec<[f64; 3]> = rest.into_iter().map(|p| apply(&rest_turn, p)).collect();
+    let retarget = Retarget::new(map, &rest, joints);
+    // A rotation carries the rest skeleton to the world: both may be turned.
+    let from_rest = transpose(&rest_turn);
+    let turned = |rotation: Matrix3| product(&product(&world_turn, &rotation), &from_rest);
+    let is_turned = rest_turn != IDENTITY || world_turn != IDENTITY;
+    (0..bvh.frame_count())
+        .map(|frame| {
+            let world = bvh.world_rotations(frame);
+            match is_turned {
+                true => retarget.pose(&world.into_iter().map(turned).collect::<Vec<_>>()),
+                false => retarget.pose(&world),
+            }
+        })
+        .collect()
+}
+
+/// Turns to y up of the rest skeleton and of the world. A skeleton that rests along z has z up (Blender writes such files); its world
+/// has z up as well, unless its root stands it up along y.
+fn turns_to_y_up(bvh: &Bvh, map: &JointMap, rest: &[[f64; 3]]) -> (Matrix3, Matrix3) {
+    let (Some(pelvis), Some(top)) = (map[0], map[15].or(map[12])) else { return (IDENTITY, IDENTITY) };
+    let up: [f64; 3] = std::array::from_fn(|a| rest[top][a] - rest[pelvis][a]);
+    if UpAxis::of(up.map(|x| x / up.iter().map(|x| x * x).sum::<f64>().sqrt())) != Some(UpAxis::Z) {
+        return (IDENTITY, IDENTITY);
+    }
+    let mut mean = [0.0; 3];
+    for frame in 0..bvh.frame_count() {
+        let direction = apply(&bvh.world_rotations(frame)[pelvis], up);
+        (0..3).for_each(|a| mean[a] += direction[a]);
+    }
+    let turn = UpAxis::Z.to_y_up();
+    (turn, if mean[1] > mean[2] { IDENTITY } else { turn })
 }
 
 /// The joints of the rig of `bvh`: those that `file` names, or those whose names are known.
@@ -102,7 +136,7 @@ fn read_file(file: &Path, body: &Body, joints: Option<&JointFile>) -> Result<Ret
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::asset::rotation::{apply, matrix_from_axis_angle};
+    use crate::asset::rotation::matrix_from_axis_angle;
     use crate::asset::skeleton::{BODY_JOINT_COUNT, BODY_JOINT_PARENTS};
     use crate::asset::{Motion, Provenance};
     use std::fmt::Write as _;
@@ -228,6 +262,25 @@ mod tests {
         let (rest, yaw) = poses[0].without_heading();
         assert!((yaw.abs() - std::f64::consts::PI).abs() < 1e-9);
         assert!(rest.rotations.iter().flatten().all(|x| x.abs() < 1e-9));
+    }
+
+    #[test]
+    fn a_skeleton_with_z_up_stands_in_a_world_with_either_axis_up() {
+        let joints = t_pose_joints();
+        // (x, y, z) in y up is (x, −z, y) in z up.
+        let z_up: Vec<[f64; 3]> = joints.iter().map(|p| [p[0], -p[2], p[1]]).collect();
+        let mut bent = [[0.0; 3]; BODY_JOINT_COUNT];
+        // About z, which is y in y up.
+        bent[18] = [60.0, 0.0, 0.0];
+        let mut stood_up = bent;
+        stood_up[0] = [0.0, -90.0, 0.0];
+        for frame in [bent, stood_up] {
+            let poses = poses_of(&synthetic(&z_up, &[frame]), &joints);
+            for (j, r) in poses[0].rotations.iter().enumerate() {
+                let expected = if j == 18 { [0.0, 60f64.to_radians(), 0.0] } else { [0.0; 3] };
+                assert!(r.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9), "{j}: {r:?}");
+            }
+        }
     }
 
     #[test]

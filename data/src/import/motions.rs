@@ -15,7 +15,7 @@ use super::overwrite::refuse_overwriting;
 use super::summary::{ImportError, Progress, Summary};
 use super::thinning::{Thinned, Thinning, thin};
 use crate::asset::{Body, Motion, Pose, Provenance, skeleton::BODY_JOINT_COUNT};
-use crate::check::impossible_turn;
+use crate::check::{impossible_turn, not_upright};
 use crate::format::{FileError, toml_file};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -78,7 +78,8 @@ pub(super) fn write_retargeted(
     let import = |file: &Path| {
         let Retargeted { poses, frame_rate, skeleton, remark } =
             retarget(file).map_err(|e| short(&e, file))?;
-        let warning = impossible_turn(&poses).map_or_else(String::new, |warning| format!("; {warning}"));
+        let warnings = [impossible_turn(&poses), not_upright(&poses)];
+        let warning: String = warnings.into_iter().flatten().map(|warning| format!("; {warning}")).collect();
         let Thinned { poses, frame_rate, note } = thin(poses, frame_rate, &settings.thinning);
         let source = provenance_of(file, &settings.provenance);
         let motion = Motion { name: String::new(), frame_rate, poses, source };

@@ -37,13 +37,14 @@ fn short_clips_train_and_validate_by_themselves_also_on_a_body_without_shapes() 
     let run = folder.path().join("run");
     let with = |settings: &[String]| {
         let mut command = start(&config, &run, 2);
-        settings.iter().for_each(|s| drop(command.args(["--set", s])));
-        command.output().unwrap()
+        command.args(settings.iter().flat_map(|s| ["--set", s.as_str()])).output().unwrap()
     };
     let output = with(&settings);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let split = std::fs::read_to_string(run.join("split.json")).unwrap_or_default();
-    assert!(split.is_empty() || split.contains("clip0"), "{split}");
+    let split: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(run.join("split.json")).unwrap()).unwrap();
+    assert_eq!(split["validation_windows"][0]["clip"], "clip0");
+    assert_eq!(split["training_clips"], serde_json::json!(["clip1", "clip2"]));
 
     // A single clip too short for any window is refused with a value that works, and leaves nothing behind.
     std::fs::remove_dir_all(&run).unwrap();
