@@ -8,7 +8,7 @@ use clothcombo_data::folders::load_motion_folder;
 use clothcombo_data::format::NpzFile;
 use clothcombo_data::generate::mannequin;
 use clothcombo_data::import::{
-    AmassSettings, RetargetSettings, Summary, Thinning, import_amass, import_deepmimic,
+    AmassSettings, RetargetSettings, Summary, Thinning, UpAxis, import_amass, import_deepmimic,
 };
 use fixture::{files_in, fixture, no_progress, truncations};
 use std::fs;
@@ -19,7 +19,7 @@ fn every_frame() -> Thinning {
 }
 
 fn amass(out: &Path, thinning: Thinning) -> Summary {
-    let settings = AmassSettings { thinning, z_up: true };
+    let settings = AmassSettings { thinning, up: Some(UpAxis::Z), rate: None };
     import_amass(&[fixture("amass")], out, &settings, &mut no_progress()).unwrap()
 }
 
@@ -89,6 +89,16 @@ fn both_layouts_are_found_in_nested_folders_and_stand_up() {
 }
 
 #[test]
+fn the_up_axis_is_that_along_which_usable_motions_stand() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = AmassSettings { thinning: every_frame(), ..AmassSettings::default() };
+    let summary = import_amass(&[fixture("amass")], folder.path(), &settings, &mut no_progress()).unwrap();
+    assert_eq!(summary.taken.len(), 3, "{summary:?}");
+    assert!(summary.notes.iter().any(|note| note.contains("z is up, as the bodies stand")), "{summary:?}");
+    assert_expected(&Motion::load(&folder.path().join("ACCAD_s1_walk.npz")).unwrap(), "walk_all");
+}
+
+#[test]
 fn the_rate_is_reduced_and_standing_still_dropped() {
     let folder = tempfile::tempdir().unwrap();
     // At 30 frames/s, frames 0, 4, 8 and 12 remain; 8 is the same as 4.
@@ -106,7 +116,7 @@ fn the_rate_is_reduced_and_standing_still_dropped() {
 #[test]
 fn a_wrong_up_axis_is_noticed_and_the_right_one_believed() {
     let folder = tempfile::tempdir().unwrap();
-    let settings = AmassSettings { thinning: every_frame(), z_up: false };
+    let settings = AmassSettings { thinning: every_frame(), up: Some(UpAxis::Y), rate: None };
     let files = [fixture("amass/CMU/02/jump_poses.npz")];
     let summary = import_amass(&files, folder.path(), &settings, &mut no_progress()).unwrap();
     assert!(summary.taken[0].1.contains("check the up axis"), "{summary:?}");
@@ -115,7 +125,7 @@ fn a_wrong_up_axis_is_noticed_and_the_right_one_believed() {
     let mut standing = Motion::load(&folder.path().join("jump.npz")).unwrap();
     standing.poses.iter_mut().for_each(|p| p.rotations[0] = [0.0, 0.3, 0.0]);
     standing.save(&y_up).unwrap();
-    let settings = AmassSettings { thinning: every_frame(), z_up: true };
+    let settings = AmassSettings { thinning: every_frame(), up: Some(UpAxis::Z), rate: None };
     let summary = import_amass(&[y_up], &folder.path().join("out"), &settings, &mut no_progress()).unwrap();
     assert!(summary.taken[0].1.contains("check the up axis"), "{summary:?}");
 }
@@ -169,7 +179,10 @@ fn no_motion_takes_the_place_of_the_body() {
 fn rates_that_no_motion_may_have_are_not_written() {
     let folder = tempfile::tempdir().unwrap();
     // 60 frames/s, of which every millionth frame is asked for.
-    let slow = AmassSettings { thinning: Thinning { frame_rate: 1e-9, static_threshold: 0.0 }, z_up: true };
+    let slow = AmassSettings {
+        thinning: Thinning { frame_rate: 1e-9, static_threshold: 0.0 },
+        ..AmassSettings::default()
+    };
     let files = [fixture("amass/CMU/02/jump_poses.npz")];
     let message = import_amass(&files, folder.path(), &slow, &mut no_progress()).unwrap_err().to_string();
     assert!(message.contains("expected 0.01 to 10000"), "{message}");

@@ -39,10 +39,11 @@ impl Draping {
         let count = garments.dims()[0];
         let on_every_row = |row: &Tensor<2>| {
             let [_, columns] = row.dims();
-            row.clone().expand([count, columns])
+            // A body without shape space has no column of its own.
+            (columns > 0).then(|| row.clone().expand([count, columns]))
         };
-        self.embedding
-            .forward(Tensor::cat(vec![garments, on_every_row(&body.shape), on_every_row(&body.pose)], 1))
+        let body = [&body.shape, &body.pose].into_iter().filter_map(on_every_row);
+        self.embedding.forward(Tensor::cat(std::iter::once(garments).chain(body).collect(), 1))
     }
 
     /// The part of D_s that depends on the vertex embedding z_v `[ΣV,d]` only.

@@ -15,6 +15,7 @@ use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 use thiserror::Error;
 
+mod joints;
 mod skinning;
 
 pub use skinning::{skin, transform, unskin};

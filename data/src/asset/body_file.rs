@@ -1,14 +1,14 @@
 //! Bodies in SMPL-family npz files.
 //!
 //! Read: `v_template`, `f`, `shapedirs`, `weights`, `kintree_table`, and either `J_template` with `J_shapedirs` or
-//! `J_regressor`; optionally `posedirs` and `joint_names`. Written: the same keys with `J_template` and `J_shapedirs`, plus
+//! `J_regressor`; optionally `posedirs` and `joint_names`. A rigged body without `shapedirs` has one shape. Written: the same keys with `J_template` and `J_shapedirs`, plus
 //! `source`, `author` and `licence`.
 
 use super::body::{Body, BodyParts};
 use super::provenance::Provenance;
 use super::skeleton::{self, BODY_JOINT_NAMES};
 use super::skin_weights::SparseSkinWeights;
-use crate::format::{FileError, NpzFile, NpzWriter};
+use crate::format::{Array, FileError, NpzFile, NpzWriter};
 use clothcombo_physics::mesh::is_inside_out;
 use std::path::Path;
 
@@ -70,20 +70,23 @@ impl Body {
         let parents = parents(&mut file)?;
         let joints = parents.len();
 
-        let directions = file.numbers_f32("shapedirs", HINT)?;
-        let components = match directions.shape[..] {
-            [v, 3, k] if v == vertices => k,
-            _ => {
-                return Err(file.wrong_shape(
-                    "shapedirs",
-                    &directions.shape,
-                    &format!("[{vertices}, 3, components]"),
-                ));
+        // A body without a shape space has no such array, or an empty one.
+        let (components, directions) = match file.contains("shapedirs") {
+            false => (0, Vec::new()),
+            true => {
+                let directions = file.numbers_f32("shapedirs", HINT)?;
+                match directions.shape[..] {
+                    [v, 3, k] if v == vertices => (k, directions.data),
+                    _ => {
+                        let expected = format!("[{vertices}, 3, components]");
+                        return Err(file.wrong_shape("shapedirs", &directions.shape, &expected));
+                    }
+                }
             }
         };
         let ours = file.contains("J_shapedirs");
         let shape_count = shape_part(joints, components, ours).min(settings.shape_components);
-        let shape_directions = first_columns(&directions.data, components, shape_count);
+        let shape_directions = first_columns(&directions, components, shape_count);
 
         let weights = file.numbers_f32("weights", HINT)?;
         if weights.shape != [vertices, joints] {
@@ -95,7 +98,10 @@ impl Body {
                 let found = [joint_template.len(), 3];
                 return Err(file.wrong_shape("J_template", &found, &format!("[{joints}, 3]")));
             }
-            let d = file.numbers("J_shapedirs", "J_template goes with J_shapedirs")?;
+            let d = match components == 0 && !ours {
+                true => Array { shape: vec![joints, 3, 0], data: Vec::new() },
+                false => file.numbers("J_shapedirs", "J_template goes with J_shapedirs")?,
+            };
             if d.shape != [joints, 3, components] {
                 return Err(file.wrong_shape(
                     "J_shapedirs",

@@ -10,6 +10,7 @@ pub mod pose;
 pub mod provenance;
 mod recover;
 pub mod rotation;
+mod shape_match;
 pub mod skeleton;
 pub mod skin_weights;
 
@@ -22,5 +23,6 @@ pub use motion::Motion;
 pub use pose::Pose;
 pub use provenance::Provenance;
 pub use recover::{KnownShape, RecoverError, RecoveredBody, recover_body};
+pub use shape_match::{ShapeMatch, match_shape};
 pub use skeleton::{BODY_JOINT_COUNT, BODY_JOINT_NAMES, BODY_JOINT_PARENTS};
 pub use skin_weights::SparseSkinWeights;

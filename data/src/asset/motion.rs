@@ -1,5 +1,10 @@
 //! A clip of poses and its npz file: `poses` (N, 66) axis-angle of the 22 body joints, `mocap_framerate`, `joint_names`,
-//! `source`, `author`, `licence`. AMASS files (more columns, other spelling of the rate) are read as well.
+//! `source`, `author`, `licence`. The layouts of other SMPL tools are read as well.
+
+mod layout;
+
+pub use layout::MotionFile;
+pub(crate) use layout::holds_poses;
 
 use super::pose::Pose;
 use super::provenance::Provenance;
@@ -42,69 +47,29 @@ pub struct Motion {
     pub source: Provenance,
 }
 
-const HINT: &str = "a motion has poses (frames, 66 or more) and mocap_framerate";
-const RATE_KEYS: [&str; 2] = ["mocap_framerate", "mocap_frame_rate"];
-
-/// Where the joints of the body are among those called `names`, of which there must be `count`. Names that are all unknown, or too
-/// few or many, say nothing: the order is SMPL's.
-fn places(names: &[String], count: usize) -> Result<[usize; BODY_JOINT_COUNT], &'static str> {
-    let own = BODY_JOINT_NAMES.map(|joint| names.iter().position(|name| name == joint));
-    if names.len() != count || own.iter().all(Option::is_none) {
-        return Ok(std::array::from_fn(|joint| joint));
-    }
-    match own.iter().position(Option::is_none) {
-        Some(missing) => Err(BODY_JOINT_NAMES[missing]),
-        None => Ok(own.map(Option::unwrap_or_default)),
-    }
-}
+const HINT: &str =
+    "a motion has poses (frames, 66 or more) and mocap_framerate, or the keys of another SMPL tool";
 
 impl Motion {
-    /// Reads a motion npz. Of more than 22 joints those of the body are kept: those that `joint_names` says, or else the first.
+    /// Reads a motion npz, in any of the layouts of [`MotionFile`]. Of more than 22 joints those of the body are kept: those that
+    /// `joint_names` says, or else the first.
     ///
     /// # Errors
     /// [`FileError`] naming file, key or frame.
     pub fn load(path: &Path) -> Result<Self, FileError> {
-        let (motion, columns) = Self::load_with_columns(path)?;
-        if columns > 3 * BODY_JOINT_COUNT && stands_along_z(&motion.poses) {
+        let file = MotionFile::read(path)?;
+        let frame_rate = file.frame_rate(None).map_err(FileError::content(path))?;
+        if file.joints > BODY_JOINT_COUNT && stands_along_z(&file.poses) {
             tracing::warn!(
                 "{}: the body lies on its back as in files with z up; `clothcombo import amass` turns those",
                 path.display()
             );
         }
-        Ok(motion)
-    }
-
-    /// As [`Self::load`], with the number of columns of `poses`, which tells the layouts apart.
-    ///
-    /// # Errors
-    /// As [`Self::load`].
-    pub fn load_with_columns(path: &Path) -> Result<(Self, usize), FileError> {
-        let mut file = NpzFile::open(path)?;
-        let poses = file.numbers("poses", HINT)?;
-        let columns = match poses.shape[..] {
-            [_, columns] if columns >= 3 * BODY_JOINT_COUNT && columns % 3 == 0 => columns,
-            _ => {
-                let expected = "[frames, 66 or more, three for each joint]";
-                return Err(file.wrong_shape("poses", &poses.shape, expected));
-            }
-        };
-        let key = if file.contains(RATE_KEYS[1]) { RATE_KEYS[1] } else { RATE_KEYS[0] };
-        let frame_rate = file.numbers(key, HINT)?.data.first().copied().unwrap_or(f64::NAN);
-        // Names that are no text (pickled ones), as none at all, say nothing.
-        let names = file.texts("joint_names")?.unwrap_or_default();
-        let places = places(&names, columns / 3).map_err(|joint| {
-            FileError::content(path)(format!(
-                "key 'joint_names' names no '{joint}'; the 22 joints of the body are named as in SMPL, in any order"
-            ))
-        })?;
-        let pose = |row: &[f64]| Pose {
-            rotations: places.map(|place| [row[3 * place], row[3 * place + 1], row[3 * place + 2]]).to_vec(),
-        };
-        let poses = poses.data.chunks_exact(columns).map(pose).collect();
         let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-        let motion = Self { name, frame_rate, poses, source: Provenance::read(&mut file) };
+        let source = Provenance::read(&mut NpzFile::open(path)?);
+        let motion = Self { name, frame_rate, poses: file.poses, source };
         motion.check().map_err(FileError::content(path))?;
-        Ok((motion, columns))
+        Ok(motion)
     }
 
     /// Checks frame rate and angles: what is read and what is written must pass.
@@ -155,12 +120,17 @@ impl Motion {
 
 /// Whether the body stands along z, as in files with z up.
 pub(crate) fn stands_along_z(poses: &[Pose]) -> bool {
-    along_z(poses) > 0.7
+    mean_up(poses)[2] > 0.7
 }
 
-/// Mean of the z component of the body's own vertical axis.
-pub(crate) fn along_z(poses: &[Pose]) -> f64 {
-    poses.iter().map(|p| matrix_from_axis_angle(p.rotation(0))[2][1]).sum::<f64>() / poses.len().max(1) as f64
+/// Mean direction of the body's own vertical axis in the world: of length 1 if it never turns over.
+pub(crate) fn mean_up(poses: &[Pose]) -> [f64; 3] {
+    let mut sum = [0.0; 3];
+    for pose in poses {
+        let root = matrix_from_axis_angle(pose.rotation(0));
+        (0..3).for_each(|axis| sum[axis] += root[axis][1]);
+    }
+    sum.map(|x| x / poses.len().max(1) as f64)
 }
 
 #[cfg(test)]

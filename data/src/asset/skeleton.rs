@@ -71,7 +71,7 @@ pub fn joint_names(joint_count: usize) -> Vec<String> {
             names.extend(["jaw", "left_eye_smplhf", "right_eye_smplhf"].map(String::from));
         }
         for side in ["left", "right"] {
-            for finger in ["index", "middle", "pinky", "ring", "thumb"] {
+            for finger in FINGERS {
                 names.extend((1..=3).map(|k| format!("{side}_{finger}{k}")));
             }
         }
@@ -82,6 +82,31 @@ pub fn joint_names(joint_count: usize) -> Vec<String> {
     names.truncate(joint_count);
     names
 }
+
+/// The ancestors of a joint of the SMPL family (SMPL, SMPL-H, SMPL-X), by name, from its parent on; none for another name.
+pub fn family_ancestors(name: &str) -> impl Iterator<Item = String> {
+    std::iter::successors(family_parent(name), |parent| family_parent(parent))
+}
+
+fn family_parent(name: &str) -> Option<String> {
+    if let Some(joint) = joint_index(name) {
+        return BODY_JOINT_PARENTS[joint].map(|parent| BODY_JOINT_NAMES[parent].to_owned());
+    }
+    if ["jaw", "left_eye_smplhf", "right_eye_smplhf"].contains(&name) {
+        return Some("head".into());
+    }
+    let (side, part) = name.split_once('_').filter(|(side, _)| ["left", "right"].contains(side))?;
+    let finger = part.strip_suffix(['1', '2', '3']).filter(|finger| FINGERS.contains(finger));
+    match (finger, part) {
+        (Some(finger), _) if part.ends_with('2') => Some(format!("{side}_{finger}1")),
+        (Some(finger), _) if part.ends_with('3') => Some(format!("{side}_{finger}2")),
+        (Some(_), _) | (None, "hand") => Some(format!("{side}_wrist")),
+        _ => None,
+    }
+}
+
+/// Fingers in the order of SMPL-H.
+const FINGERS: [&str; 5] = ["index", "middle", "pinky", "ring", "thumb"];
 
 /// The joint on the other side of the body (itself on the midline), for any SMPL-family joint count.
 pub fn mirrored_joint(joint: usize, joint_count: usize) -> usize {
@@ -107,6 +132,20 @@ mod tests {
             assert_eq!(joint == 0, parent.is_none());
             assert!(parent.is_none_or(|p| p < joint));
         }
+    }
+
+    #[test]
+    fn ancestors_lead_to_the_pelvis() {
+        for name in joint_names(55).into_iter().chain(joint_names(24)).skip(1) {
+            assert_eq!(
+                family_ancestors(&name).last().as_deref(),
+                (name != "pelvis").then_some("pelvis"),
+                "{name}"
+            );
+        }
+        let thumb: Vec<String> = family_ancestors("left_thumb3").take(3).collect();
+        assert_eq!(thumb, ["left_thumb2", "left_thumb1", "left_wrist"]);
+        assert_eq!(family_ancestors("tail").count(), 0);
     }
 
     #[test]

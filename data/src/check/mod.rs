@@ -2,18 +2,22 @@
 //!
 //! A file is unusable when training would refuse it; everything else worth knowing is a warning.
 
+mod anatomy;
 mod body;
 mod garment;
 mod motion;
 mod placement;
 mod targets;
 
+pub use anatomy::impossible_turn;
 pub use body::{BodyCheck, implausible_height};
 pub use garment::{GarmentCheck, layer_guess};
-pub use motion::{MotionCheck, impossible_turn};
+pub use motion::MotionCheck;
+pub(crate) use motion::not_upright;
 pub use targets::{ManifestHints, Target, find_targets};
 
 use crate::asset::Body;
+use crate::asset::motion::holds_poses;
 use crate::folders::garment_folder::MANIFEST;
 use crate::format::NpzFile;
 use clothcombo_physics::Surface;
@@ -105,7 +109,7 @@ fn check_npz(file: &FileCheck, path: &Path) -> Result<FileCheck, String> {
         let (check, warnings) = body::check(path, &mut npz)?;
         let unusable = body::unusable(&check, path);
         Ok(FileCheck { body: Some(check), warnings, unusable, ..file.clone() })
-    } else if npz.contains("poses") {
+    } else if holds_poses(&npz) {
         let (check, warnings) = motion::check(path)?;
         let unusable = motion::unusable(&check, path);
         Ok(FileCheck { motion: Some(check), warnings, unusable, ..file.clone() })

@@ -1,5 +1,7 @@
 //! A motion file.
 
+use super::impossible_turn;
+use crate::asset::motion::mean_up;
 use crate::asset::{BODY_JOINT_NAMES, Motion, Pose};
 use crate::generate::pose::JOINT_LIMITS;
 use serde::Serialize;
@@ -23,10 +25,6 @@ pub struct MotionCheck {
     pub largest_excess_degrees: f64,
 }
 
-/// Recorded motion exceeds the limits of single angles by tens of degrees in a frame or other; no joint does by this much
-/// (degrees).
-const IMPOSSIBLE: f64 = 90.0;
-
 /// Excess over a limit that is measurement noise (degrees).
 const TOLERANCE: f64 = 1.0;
 
@@ -43,11 +41,15 @@ fn excesses(pose: &Pose) -> impl Iterator<Item = (usize, f64)> + '_ {
     })
 }
 
-/// A warning about poses in which a joint turns as none does; `None` if there are none.
-pub fn impossible_turn<'a>(poses: impl IntoIterator<Item = &'a Pose>) -> Option<String> {
-    let excess = poses.into_iter().flat_map(excesses).map(|(_, excess)| excess).fold(0.0, f64::max);
-    (excess > IMPOSSIBLE).then(|| {
-        format!("joints turn up to {excess:.0}° beyond their range: other axes, or angles in degrees?")
+/// A warning about a body that stands along another axis than y.
+pub(crate) fn not_upright(poses: &[Pose]) -> Option<String> {
+    let [_, y, z] = mean_up(poses);
+    if y < -0.5 {
+        return Some("the body stands on its head on average: is y down in the file, as in the coordinates of a camera? (an npz: \
+                     `import amass --up y-down`)".into());
+    }
+    (y.abs() < 0.3 && z.abs() > 0.7).then(|| {
+        "the body lies along z on average: is z up in the file? (an npz: `import amass --up z`)".into()
     })
 }
 
@@ -92,5 +94,6 @@ pub(super) fn check(path: &Path) -> Result<(MotionCheck, Vec<String>), String> {
         }
         check.frames_outside_limits += usize::from(outside);
     }
-    Ok((check, impossible_turn(&motion.poses).into_iter().collect()))
+    let warnings = [impossible_turn(&motion.poses), not_upright(&motion.poses)];
+    Ok((check, warnings.into_iter().flatten().collect()))
 }

@@ -2,7 +2,7 @@
 
 use crate::asset::Category;
 use crate::folders::garment_folder::{MANIFEST, list_garment_folder, read_entries};
-use crate::format::{folder, is_mesh_path};
+use crate::format::{folder, is_mesh_path, way_out};
 use std::collections::HashSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -79,8 +79,11 @@ pub fn find_targets(paths: &[PathBuf]) -> Vec<Target> {
             Ok(_) => targets.push(file_target(path).unwrap_or_else(|| Target::Unusable {
                 path: path.clone(),
                 reason: format!(
-                    "{}: no known kind of file; garments are .obj, .ply, .stl, .gltf or .glb, bodies and motions .npz",
-                    path.display()
+                    "{}: {}",
+                    path.display(),
+                    way_out(path).unwrap_or_else(|| {
+                        "no known kind of file; garments are .obj, .ply, .stl, .gltf or .glb, bodies and motions .npz".into()
+                    })
                 ),
             })),
             Err(e) => {

@@ -1,6 +1,7 @@
 //! One entry that reads meshes of all formats: Wavefront OBJ, PLY, STL and glTF.
 
 use super::error::FileError;
+use super::foreign::way_out;
 use super::obj::ObjMesh;
 use super::polygon_mesh::{PolygonMesh, read_limited};
 use super::{gltf, ply, stl};
@@ -68,10 +69,9 @@ pub fn parse_mesh(bytes: &[u8], path: &Path) -> Result<PolygonMesh, FileError> {
         Some(MeshFormat::Ply) => ply::parse(bytes),
         Some(MeshFormat::Stl) => stl::parse(bytes),
         Some(MeshFormat::Gltf) => gltf::parse(bytes, path),
-        None => Err(
-            "neither its name nor its content is that of a mesh; known are .obj, .ply, .stl, .gltf and .glb"
-                .into(),
-        ),
+        None => Err(way_out(path).unwrap_or_else(|| {
+            "neither its name nor its content is that of a mesh; known are .obj, .ply, .stl, .gltf and .glb".into()
+        })),
     };
     content.and_then(PolygonMesh::checked).map_err(FileError::content(path))
 }

@@ -4,6 +4,7 @@ pub mod atomic;
 mod error;
 mod file_face;
 pub mod folder;
+mod foreign;
 mod gltf;
 mod load_mesh;
 pub mod mat;
@@ -18,6 +19,7 @@ pub mod toml_file;
 
 pub use error::FileError;
 pub use file_face::FileFace;
+pub use foreign::way_out;
 pub use gltf::{SceneMesh, encode_glb, save_glb};
 pub use load_mesh::{MESH_EXTENSIONS, MeshFormat, is_mesh_path, load_mesh, load_tri_mesh, parse_mesh};
 pub use mat::{MatFile, MatValue};

@@ -3,6 +3,7 @@
 //! Object arrays are Python pickles, that is, programs; they are listed but never read.
 
 use super::error::FileError;
+use super::foreign::way_out;
 use super::scalar::Scalar;
 use npyz::{DType, Endianness, NpyHeader, Order, TypeChar, TypeStr};
 use std::fmt::Display;
@@ -46,9 +47,11 @@ impl NpzFile {
         let file = File::open(path).map_err(FileError::io(path))?;
         let archive = ZipArchive::new(BufReader::new(file))
             .map_err(|e| {
-                FileError::content(path)(format!(
-                    "not an npz archive ({e}); npz files are zip archives made by numpy.savez, and pickles (.pkl) are never executed"
-                ))
+                FileError::content(path)(way_out(path).unwrap_or_else(|| {
+                    format!(
+                        "not an npz archive ({e}); npz files are zip archives made by numpy.savez, and pickles (.pkl) are never executed"
+                    )
+                }))
             })?;
         Ok(Self { path: path.into(), archive })
     }

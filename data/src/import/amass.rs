@@ -1,19 +1,19 @@
-//! AMASS: SMPL-H (`*_poses.npz`) and SMPL-X (`*_stageii.npz`) motions.
+//! SMPL motions as public tools write them: AMASS (`*_poses.npz`, `*_stageii.npz`), AIST++, SMPLify-X and their like.
 //!
-//! Mahmood et al., "AMASS: Archive of Motion Capture as Surface Shapes", 2019. The first 66 numbers of a row of `poses` are
-//! the root and the 21 body joints in either layout; hands, jaw, eyes, soft tissue, shape and translation are left out, because
-//! clothes are draped about the pelvis of a body of their own. The world's z axis is up there; the turn to y up goes into
-//! the root. The heading stays in the root, as in every motion file here; whoever samples poses removes it.
+//! Mahmood et al., "AMASS: Archive of Motion Capture as Surface Shapes", 2019. [`MotionFile`] reads the layouts. The root and the
+//! 21 body joints are kept; hands, jaw, eyes, soft tissue, shape and translation are left out, because clothes are draped about
+//! the pelvis of a body of their own. The turn to y up goes into the root. The heading stays in the root, as in every motion file
+//! here; whoever samples poses removes it.
 
-use super::motions::{Clip, NamedFile, named, stem, write_motions};
+use super::motions::{Clip, NamedFile, named, short, stem, write_motions};
 use super::summary::{ImportError, Progress, Summary};
 use super::thinning::{Thinned, Thinning, thin};
-use crate::asset::motion::{along_z, stands_along_z};
-use crate::asset::rotation::{Matrix3, axis_angle_from_matrix, matrix_from_axis_angle, product};
-use crate::asset::{Motion, Pose, Provenance};
+use super::up_axis::{UpAxis, undecided};
+use crate::asset::motion::{MotionFile, check_frame_rate, holds_poses, mean_up};
+use crate::asset::{Motion, Provenance};
 use crate::check::impossible_turn;
 use crate::format::{FileError, NpzFile, folder};
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -22,31 +22,26 @@ use std::path::{Path, PathBuf};
 pub struct AmassSettings {
     /// Which frames are kept.
     pub thinning: Thinning,
-    /// Whether z is up in the files, as AMASS and CLOTH3D have it, instead of y.
-    pub z_up: bool,
+    /// The axis that is up in the files; `None` takes the one along which the bodies below an input stand on average.
+    pub up: Option<UpAxis>,
+    /// Frame rate of files without one (frames/s); a file with another one is refused.
+    pub rate: Option<f64>,
 }
 
 impl Default for AmassSettings {
     fn default() -> Self {
         let thinning = Thinning { frame_rate: 30.0, static_threshold: 0.5f64.to_radians() };
-        Self { thinning, z_up: true }
+        Self { thinning, up: None, rate: None }
     }
 }
 
 const EXPECTED: &str = "AMASS motions (.npz)";
 const DEEPEST: usize = 32;
 
-/// Turns a z-up world into a y-up one: (x, y, z) becomes (x, z, −y).
-pub(super) const Y_UP_FROM_Z_UP: Matrix3 = [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]];
+/// So many files of a folder are asked for its up axis.
+const ASKED_FOR_UP: usize = 32;
 
-/// Turns the root of a pose from a z-up world into a y-up one.
-pub(super) fn turn_root_to_y_up(pose: &mut Pose) {
-    if let Some(root) = pose.rotations.first_mut() {
-        *root = axis_angle_from_matrix(&product(&Y_UP_FROM_Z_UP, &matrix_from_axis_angle(*root)));
-    }
-}
-
-/// Imports AMASS motions from files and, recursively, from folders as motion npz files in the folder `out`. A clip is called
+/// Imports SMPL motions from files and, recursively, from folders as motion npz files in the folder `out`. A clip is called
 /// after its path below the folder given (`CMU/01/01_01_poses.npz` in `AMASS` becomes `CMU_01_01_01`). Files that hold no
 /// motion are skipped with their reason.
 ///
@@ -59,6 +54,8 @@ pub fn import_amass(
     progress: Progress<'_>,
 ) -> Result<Summary, ImportError> {
     let mut files: Vec<NamedFile> = Vec::new();
+    let mut axes = HashMap::new();
+    let mut notes = Vec::new();
     progress("looking for motions", 0, 1);
     for input in inputs {
         let mut found = Vec::new();
@@ -67,6 +64,11 @@ pub fn import_amass(
             fs::canonicalize(out).ok().filter(|out| fs::canonicalize(input).ok().as_ref() != Some(out));
         let mut seen = HashSet::from_iter(below);
         find(input, &mut found, &mut seen, 0)?;
+        let axis = settings.up.map_or_else(|| standing_axis(&found, settings.rate), Ok);
+        if let (Ok(axis), None) = (&axis, settings.up) {
+            notes.push(format!("{}: {} is up, as the bodies stand (--up)", input.display(), axis.name()));
+        }
+        axes.extend(found.iter().map(|path| (path.clone(), axis.clone())));
         files.extend(found.into_iter().map(|path| NamedFile { name: clip_name(input, &path), path }));
     }
     progress("looking for motions", 1, 1);
@@ -76,15 +78,42 @@ pub fn import_amass(
         return Err(ImportError::Refused(format!("{where_}no {EXPECTED} found")));
     }
     let files = named(files.into_iter().map(|f| (f.path, f.name)));
-    let import = |file: &Path| import_file(file, settings);
+    let import = |file: &Path| {
+        let axis = axes.get(file).cloned().unwrap_or(Ok(UpAxis::Y));
+        import_file(file, axis, settings)
+    };
     let mut summary = write_motions(&files, None, out, EXPECTED, &import, progress)?;
+    summary.notes.extend(notes);
     summary.notes.push(format!(
-        "kept are the root and the 21 body joints; {}; a frame that differs from the last one kept by less than {:.2}° in \
-         every joint is dropped",
-        if settings.z_up { "the root was turned from z up to y up" } else { "y was taken as the up axis" },
+        "kept are the root, turned to y up, and the 21 body joints; a frame that differs from the last one kept by less than \
+         {:.2}° in every joint is dropped",
         settings.thinning.static_threshold.to_degrees()
     ));
     Ok(summary)
+}
+
+/// The axis along which the bodies in `files`, which come from one source, stand on average, or why it is not plain. A clip of
+/// somebody who lies on the floor is thus read as its neighbours are.
+fn standing_axis(files: &[PathBuf], rate: Option<f64>) -> Result<UpAxis, String> {
+    let mut mean = [0.0; 3];
+    let step = files.len().div_ceil(ASKED_FOR_UP).max(1);
+    let readable = files.iter().step_by(step).filter_map(|file| MotionFile::read(file).ok());
+    // Only what can be imported has a say.
+    let usable = |file: &MotionFile| {
+        let has_rate = file.frame_rate(rate).is_ok_and(|rate| check_frame_rate(rate).is_ok());
+        has_rate && !file.poses.is_empty()
+    };
+    let finite = |up: &[f64; 3]| up.iter().all(|x| x.is_finite());
+    let directions: Vec<[f64; 3]> =
+        readable.filter(usable).map(|file| mean_up(&file.poses)).filter(finite).collect();
+    for direction in &directions {
+        (0..3).for_each(|axis| mean[axis] += direction[axis] / directions.len() as f64);
+    }
+    // Files that cannot be read are refused one by one.
+    if directions.is_empty() {
+        return Ok(UpAxis::Y);
+    }
+    UpAxis::of(mean).ok_or_else(|| undecided(mean))
 }
 
 /// All `.npz` files below `path`, in order of their names. Links that lead back are followed once.
@@ -119,41 +148,46 @@ fn clip_name(root: &Path, path: &Path) -> String {
     folders.chain([stem.to_string()]).collect::<Vec<_>>().join("_")
 }
 
-fn import_file(path: &Path, settings: &AmassSettings) -> Result<Clip, String> {
-    let mut file = NpzFile::open(path).map_err(|e| short(e, path))?;
-    if !file.contains("poses") {
+fn import_file(path: &Path, up: Result<UpAxis, String>, settings: &AmassSettings) -> Result<Clip, String> {
+    let mut file = NpzFile::open(path).map_err(|e| short(&e.to_string(), path))?;
+    if !holds_poses(&file) {
         return Err(format!(
             "not a motion: no key 'poses', only {}",
             if file.keys().is_empty() { "no arrays at all".into() } else { file.keys().join(", ") }
         ));
     }
     let subject = gender(&mut file);
-    let layout = |columns: usize| match columns {
-        66 => "body joints only",
-        72 => "SMPL",
-        156 => "SMPL-H",
-        165 => "SMPL-X",
-        _ => "unknown layout",
-    };
+    let own_source = Provenance::read(&mut file);
     drop(file);
-    let (mut motion, columns) = Motion::load_with_columns(path).map_err(|e| short(e, path))?;
+    let MotionFile { poses, rate, keys, joints, pickled, .. } = {
+        let file = MotionFile::read(path).map_err(|e| short(&e.to_string(), path))?;
+        MotionFile { rate: Some(("", file.frame_rate(settings.rate)?)), ..file }
+    };
+    let frame_rate = rate.map_or(f64::NAN, |(_, rate)| rate);
+    let mut motion = Motion { name: stem(path), frame_rate, poses, source: own_source };
+    motion.check()?;
     if motion.poses.is_empty() {
         return Err("it has no frames".into());
     }
-    let rate = motion.frame_rate;
-    if settings.z_up {
-        motion.poses.iter_mut().for_each(turn_root_to_y_up);
-    }
-    let lying = mean_uprightness(&motion.poses);
+    let up = up?;
+    let (mean, uprightness) = (mean_up(&motion.poses), up.uprightness(&motion.poses));
+    // Somebody may lie on the floor; but not stand along another axis, or on the head.
+    let stands_elsewhere = uprightness < 0.2 && UpAxis::of(mean).is_some_and(|axis| axis != up);
+    motion.poses.iter_mut().for_each(|pose| up.turn_root_to_y_up(pose));
     let Thinned { poses, frame_rate, note } =
-        thin(std::mem::take(&mut motion.poses), rate, &settings.thinning);
-    let mut note = format!("{} ({columns} columns), {note}", layout(columns));
+        thin(std::mem::take(&mut motion.poses), frame_rate, &settings.thinning);
+    let mut note = format!("{} ({keys}, {joints} joints), {note}", layout(joints));
     if !subject.is_empty() {
         note.push_str(&format!(", {subject}"));
     }
-    let was_turned_wrongly = if settings.z_up { looks_y_up(&poses) } else { stands_along_z(&poses) };
-    if lying < -0.2 || (lying.abs() < 0.2 && was_turned_wrongly) {
-        note.push_str("; the body is not upright on average, check the up axis (--up)");
+    if !pickled.is_empty() {
+        note.push_str(&format!("; not read, Python pickles: {}", pickled.join(", ")));
+    }
+    if stands_elsewhere || uprightness < -0.2 {
+        note.push_str(&format!(
+            "; with {} up the body is not upright on average, check the up axis (--up)",
+            up.name()
+        ));
     }
     if let Some(turn) = impossible_turn(&poses) {
         note.push_str(&format!("; {turn}"));
@@ -161,20 +195,20 @@ fn import_file(path: &Path, settings: &AmassSettings) -> Result<Clip, String> {
     motion.poses = poses;
     motion.frame_rate = frame_rate;
     if motion.source == Provenance::default() {
-        motion.source = provenance(path);
+        motion.source = provenance(path, joints);
     }
     Ok(Clip { motion, subject, note })
 }
 
-/// Mean of the world's vertical component of the body's own vertical axis: 1 upright, 0 lying, −1 upside down.
-fn mean_uprightness(poses: &[Pose]) -> f64 {
-    poses.iter().map(|p| matrix_from_axis_angle(p.rotation(0))[1][1]).sum::<f64>() / poses.len().max(1) as f64
-}
-
-/// Whether undoing the turn from z up would make the body stand.
-fn looks_y_up(poses: &[Pose]) -> bool {
-    // Row 1 of Yᵀ·R is −row 2 of R.
-    along_z(poses) < -0.7
+/// What a skeleton of so many joints is called.
+fn layout(joints: usize) -> &'static str {
+    match joints {
+        22 => "body joints only",
+        24 => "SMPL",
+        52 => "SMPL-H",
+        55 => "SMPL-X",
+        _ => "unknown layout",
+    }
 }
 
 /// Text or bytes, also as Python prints bytes; empty if it is not there or something else.
@@ -184,21 +218,19 @@ fn gender(file: &mut NpzFile) -> String {
     text.trim().to_ascii_lowercase()
 }
 
-fn provenance(path: &Path) -> Provenance {
+/// AMASS's for its layouts; of other files nothing is known but the name.
+fn provenance(path: &Path, joints: usize) -> Provenance {
     // Collection, subject and clip are the last three parts of AMASS's paths.
     let parts: Vec<_> = path.iter().map(|p| p.to_string_lossy().into_owned()).collect();
     let below = parts[parts.len().saturating_sub(3)..].join("/");
+    if !matches!(joints, 52 | 55) {
+        return Provenance { source: stem(path), ..Provenance::default() };
+    }
     Provenance {
         source: format!("AMASS, {below}"),
         author: "Mahmood et al. 2019 and the authors of the collection".into(),
         licence: "AMASS licence (non-commercial scientific research); see https://amass.is.tue.mpg.de".into(),
     }
-}
-
-/// The message without the path, which the summary shows beside it.
-fn short(error: FileError, path: &Path) -> String {
-    let (message, prefix) = (error.to_string(), format!("{}: ", path.display()));
-    message.strip_prefix(&prefix).unwrap_or(&message).to_string()
 }
 
 #[cfg(test)]
@@ -215,25 +247,5 @@ mod tests {
         let names: Vec<String> =
             named([input("a"), input("b"), input("c")]).into_iter().map(|i| i.name).collect();
         assert_eq!(names, ["walk", "walk_2", "walk_3"]);
-    }
-
-    #[test]
-    fn a_body_standing_in_a_z_up_world_stands_in_a_y_up_one_and_keeps_its_heading() {
-        use std::f64::consts::FRAC_PI_2;
-        let mut pose = Pose::t_pose(22);
-        pose.rotations[0] = [FRAC_PI_2, 0.0, 0.0];
-        turn_root_to_y_up(&mut pose);
-        assert!(pose.rotations[0].iter().all(|x| x.abs() < 1e-12));
-        // Turned by 1 rad about the world's vertical.
-        let turned =
-            product(&matrix_from_axis_angle([0.0, 0.0, 1.0]), &matrix_from_axis_angle([FRAC_PI_2, 0.0, 0.0]));
-        pose.rotations[0] = axis_angle_from_matrix(&turned);
-        turn_root_to_y_up(&mut pose);
-        let expected = [0.0, 1.0, 0.0];
-        assert!(pose.rotations[0].iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12));
-        assert!(mean_uprightness(&[pose]) > 0.999);
-        let mut wrong = Pose::t_pose(22);
-        turn_root_to_y_up(&mut wrong);
-        assert!(looks_y_up(&[wrong]));
     }
 }

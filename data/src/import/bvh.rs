@@ -1,16 +1,22 @@
 //! Motion capture in BVH form, retargeted to the 22 SMPL body joints.
 //!
-//! The skeletons known are those in `NAMINGS`, named after collections that use them; see [`super::retarget`] for how they are matched.
+//! Joints are found by their names and their place in the tree ([`rig`]), or by a file ([`JointFile`]); see [`super::retarget`] for
+//! how they are matched.
 
 mod hierarchy;
+mod joint_file;
+mod joint_name;
+mod rig;
 
 pub use hierarchy::{Bvh, BvhJoint, Channel};
+pub use joint_file::JointFile;
 
 use super::motions::{RetargetSettings, Retargeted, write_retargeted};
-use super::retarget::Retarget;
+use super::retarget::{JointMap, Retarget};
 use super::summary::{ImportError, Progress, Summary};
 use super::thinning::largest_turn;
-use crate::asset::skeleton::BODY_JOINT_COUNT;
+use super::up_axis::UpAxis;
+use crate::asset::rotation::{IDENTITY, Matrix3, apply, product, transpose};
 use crate::asset::{Body, Pose};
 use std::path::{Path, PathBuf};
 
@@ -18,60 +24,63 @@ use std::path::{Path, PathBuf};
 /// step: some collections insert a T-pose there.
 const INSERTED_FRAME_ANGLE: f64 = 0.2;
 
-/// A skeleton naming: the BVH joint for each of the 22 body joints, empty where there is none (it then follows its parent).
-struct Naming {
-    name: &'static str,
-    joints: [&'static str; BODY_JOINT_COUNT],
+/// Retargets every frame of `bvh`, whose joints are those of `map`, to the 22 body joints of a skeleton whose T-pose joints are
+/// `joints`.
+pub fn retarget(bvh: &Bvh, map: JointMap, joints: &[[f64; 3]]) -> Vec<Pose> {
+    let rest = bvh.rest_positions();
+    let (rest_turn, world_turn) = turns_to_y_up(bvh, &map, &rest);
+    let rest: Vec<[f64; 3]> = rest.into_iter().map(|p| apply(&rest_turn, p)).collect();
+    let retarget = Retarget::new(map, &rest, joints);
+    // A rotation carries the rest skeleton to the world: both may be turned.
+    let from_rest = transpose(&rest_turn);
+    let turned = |rotation: Matrix3| product(&product(&world_turn, &rotation), &from_rest);
+    let is_turned = rest_turn != IDENTITY || world_turn != IDENTITY;
+    (0..bvh.frame_count())
+        .map(|frame| {
+            let world = bvh.world_rotations(frame);
+            match is_turned {
+                true => retarget.pose(&world.into_iter().map(turned).collect::<Vec<_>>()),
+                false => retarget.pose(&world),
+            }
+        })
+        .collect()
 }
 
-#[rustfmt::skip]
-const NAMINGS: [Naming; 3] = [
-    Naming {
-        name: "CMU",
-        joints: [
-            "Hips", "LeftUpLeg", "RightUpLeg", "LowerBack", "LeftLeg", "RightLeg", "Spine", "LeftFoot", "RightFoot",
-            "Spine1", "LeftToeBase", "RightToeBase", "Neck", "LeftShoulder", "RightShoulder", "Head", "LeftArm",
-            "RightArm", "LeftForeArm", "RightForeArm", "LeftHand", "RightHand",
-        ],
-    },
-    Naming {
-        name: "Boxing",
-        joints: [
-            "Hips", "LeftHip", "RightHip", "Ab", "LeftKnee", "RightKnee", "", "LeftAnkle", "RightAnkle", "Chest",
-            "LeftToes", "RightToes", "Neck", "LeftCollar", "RightCollar", "Head", "LeftShoulder", "RightShoulder",
-            "LeftElbow", "RightElbow", "LeftWrist", "RightWrist",
-        ],
-    },
-    Naming {
-        name: "mocapbank",
-        joints: [
-            "Hips", "LeftHip", "RightHip", "Chest", "LeftKnee", "RightKnee", "", "LeftAnkle", "RightAnkle", "Chest2",
-            "LeftToe", "RightToe", "Neck", "LeftCollar", "RightCollar", "Head", "LeftShoulder", "RightShoulder",
-            "LeftElbow", "RightElbow", "LeftWrist", "RightWrist",
-        ],
-    },
-];
-
-const TOES: [usize; 2] = [10, 11];
-
-/// Maps a file's joints to the body joints.
-fn naming_of(bvh: &Bvh) -> Option<(&'static Naming, [Option<usize>; BODY_JOINT_COUNT])> {
-    NAMINGS.iter().find_map(|naming| {
-        let map = naming.joints.map(|name| bvh.joint(name));
-        // Toes are often missing; they then follow the ankle.
-        let complete = (0..BODY_JOINT_COUNT)
-            .all(|j| map[j].is_some() || naming.joints[j].is_empty() || TOES.contains(&j));
-        complete.then_some((naming, map))
-    })
+/// Turns to y up of the rest skeleton and of the world. A skeleton that rests along z has z up (Blender writes such files); its world
+/// has z up as well, unless its root stands it up along y.
+fn turns_to_y_up(bvh: &Bvh, map: &JointMap, rest: &[[f64; 3]]) -> (Matrix3, Matrix3) {
+    let (Some(pelvis), Some(top)) = (map[0], map[15].or(map[12])) else { return (IDENTITY, IDENTITY) };
+    let up: [f64; 3] = std::array::from_fn(|a| rest[top][a] - rest[pelvis][a]);
+    if UpAxis::of(up.map(|x| x / up.iter().map(|x| x * x).sum::<f64>().sqrt())) != Some(UpAxis::Z) {
+        return (IDENTITY, IDENTITY);
+    }
+    let mut mean = [0.0; 3];
+    for frame in 0..bvh.frame_count() {
+        let direction = apply(&bvh.world_rotations(frame)[pelvis], up);
+        (0..3).for_each(|a| mean[a] += direction[a]);
+    }
+    let turn = UpAxis::Z.to_y_up();
+    (turn, if mean[1] > mean[2] { IDENTITY } else { turn })
 }
 
-/// Retargets every frame of `bvh` to the 22 body joints of a skeleton whose T-pose joints are `joints`.
-///
-/// Returns `None` if the file's joint names are not known.
-pub fn retarget(bvh: &Bvh, joints: &[[f64; 3]]) -> Option<Vec<Pose>> {
-    let (_, map) = naming_of(bvh)?;
-    let retarget = Retarget::new(map, &bvh.rest_positions(), joints);
-    Some((0..bvh.frame_count()).map(|frame| retarget.pose(&bvh.world_rotations(frame))).collect())
+/// The joints of the rig of `bvh`: those that `file` names, or those whose names are known.
+fn joint_map(bvh: &Bvh, file: Option<&JointFile>) -> Result<JointMap, String> {
+    if let Some(file) = file {
+        return file.resolve(bvh).map_err(|e| e.to_string());
+    }
+    let map = rig::resolve(bvh);
+    let missing = rig::missing(&map);
+    if missing.is_empty() {
+        return Ok(map);
+    }
+    let names: Vec<&str> = bvh.joints.iter().map(|joint| joint.name.as_str()).collect();
+    Err(format!(
+        "no joint of the rig is known as {}; name them in a file and pass it as --joints FILE. Its joints are: {}\nThe file, with what \
+         is known (\"\" follows its parent):\n{}",
+        missing.join(", "),
+        names.join(", "),
+        joint_file::template(bvh, &map)
+    ))
 }
 
 /// Whether the first frame does not belong to the motion.
@@ -86,33 +95,28 @@ fn first_frame_is_inserted(poses: &[Pose]) -> bool {
     jump > INSERTED_FRAME_ANGLE && jump > 10.0 * steps[steps.len() / 2]
 }
 
-/// Imports BVH files as motion npz files in the folder `out`, retargeted to `body`. Files that cannot be used are skipped with
-/// their reason.
+/// Imports BVH files as motion npz files in the folder `out`, retargeted to `body`. The file `joints` names the joints of rigs whose
+/// names are not known. Files that cannot be used are skipped with their reason.
 ///
 /// # Errors
-/// If no file can be used, or a result cannot be written.
+/// If `joints` cannot be used, no file can, or a result cannot be written.
 pub fn import_bvh(
     files: &[PathBuf],
     body: &Body,
     out: &Path,
     settings: &RetargetSettings,
+    joints: Option<&Path>,
     progress: Progress<'_>,
 ) -> Result<Summary, ImportError> {
-    let read = |file: &Path| read_file(file, body);
+    let joints = joints.map(JointFile::load).transpose()?;
+    let read = |file: &Path| read_file(file, body, joints.as_ref());
     write_retargeted(files, body, out, settings, "BVH files", &read, progress)
 }
 
-fn read_file(file: &Path, body: &Body) -> Result<Retargeted, String> {
+fn read_file(file: &Path, body: &Body, joints: Option<&JointFile>) -> Result<Retargeted, String> {
     let bvh = Bvh::load(file).map_err(|e| e.to_string())?;
-    let (Some(mut poses), Some((naming, _))) = (retarget(&bvh, &body.joint_template), naming_of(&bvh)) else {
-        let known: Vec<&str> = NAMINGS.iter().map(|n| n.name).collect();
-        let names: Vec<&str> = bvh.joints.iter().take(6).map(|j| j.name.as_str()).collect();
-        return Err(format!(
-            "joint names {}… follow none of the known skeletons ({})",
-            names.join(", "),
-            known.join(", ")
-        ));
-    };
+    let map = joint_map(&bvh, joints)?;
+    let mut poses = retarget(&bvh, map, &body.joint_template);
     let inserted = first_frame_is_inserted(&poses);
     if inserted {
         poses.remove(0);
@@ -120,7 +124,11 @@ fn read_file(file: &Path, body: &Body) -> Result<Retargeted, String> {
     Ok(Retargeted {
         poses,
         frame_rate: 1.0 / bvh.frame_time,
-        skeleton: format!("{} skeleton", naming.name),
+        skeleton: format!(
+            "{} of 22 body joints in a rig of {}",
+            map.iter().flatten().count(),
+            bvh.joints.len()
+        ),
         remark: if inserted { "; dropped frame 0, which jumps to frame 1" } else { "" },
     })
 }
@@ -128,15 +136,27 @@ fn read_file(file: &Path, body: &Body) -> Result<Retargeted, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::asset::rotation::{apply, matrix_from_axis_angle};
-    use crate::asset::skeleton::BODY_JOINT_PARENTS;
+    use crate::asset::rotation::matrix_from_axis_angle;
+    use crate::asset::skeleton::{BODY_JOINT_COUNT, BODY_JOINT_PARENTS};
     use crate::asset::{Motion, Provenance};
     use std::fmt::Write as _;
 
-    /// A mocapbank-like skeleton whose rest joints are `rest` (body order), with the given local rotations in degrees
+    #[rustfmt::skip]
+    const CMU: [&str; BODY_JOINT_COUNT] = [
+        "Hips", "LeftUpLeg", "RightUpLeg", "LowerBack", "LeftLeg", "RightLeg", "Spine", "LeftFoot", "RightFoot", "Spine1",
+        "LeftToeBase", "RightToeBase", "Neck", "LeftShoulder", "RightShoulder", "Head", "LeftArm", "RightArm", "LeftForeArm",
+        "RightForeArm", "LeftHand", "RightHand",
+    ];
+
+    fn poses_of(text: &str, joints: &[[f64; 3]]) -> Vec<Pose> {
+        let bvh = Bvh::parse(text, Path::new("t.bvh")).unwrap();
+        retarget(&bvh, joint_map(&bvh, None).unwrap(), joints)
+    }
+
+    /// A skeleton with CMU's names whose rest joints are `rest` (body order), with the given local rotations in degrees
     /// (z, x, y order) per body joint in each frame.
     fn synthetic(rest: &[[f64; 3]], frames: &[[[f64; 3]; BODY_JOINT_COUNT]]) -> String {
-        let names = NAMINGS[0].joints;
+        let names = CMU;
         fn joint(text: &mut String, names: &[&str], rest: &[[f64; 3]], j: usize, order: &mut Vec<usize>) {
             order.push(j);
             let parent = BODY_JOINT_PARENTS[j].map_or([0.0; 3], |p| rest[p]);
@@ -204,8 +224,7 @@ mod tests {
         turned[18] = [0.0, 0.0, 60.0];
         turned[4] = [0.0, 40.0, 0.0];
         let text = synthetic(&joints, &[[[0.0; 3]; BODY_JOINT_COUNT], turned]);
-        let bvh = Bvh::parse(&text, Path::new("t.bvh")).unwrap();
-        let poses = retarget(&bvh, &joints).unwrap();
+        let poses = poses_of(&text, &joints);
         assert!(poses[0].rotations.iter().flatten().all(|x| x.abs() < 1e-9), "{:?}", poses[0]);
         for (j, r) in poses[1].rotations.iter().enumerate() {
             let expected = match j {
@@ -226,7 +245,7 @@ mod tests {
             hanging[wrist] = std::array::from_fn(|a| hanging[elbow][a] + [0.0, -0.25, 0.0][a]);
         }
         let text = synthetic(&hanging, &[[[0.0; 3]; BODY_JOINT_COUNT]]);
-        let poses = retarget(&Bvh::parse(&text, Path::new("t.bvh")).unwrap(), &joints).unwrap();
+        let poses = poses_of(&text, &joints);
         let down = apply(&matrix_from_axis_angle(poses[0].rotations[16]), [1.0, 0.0, 0.0]);
         assert!((down[1] + 1.0).abs() < 1e-9);
         for j in [18, 19, 20, 21] {
@@ -239,10 +258,29 @@ mod tests {
         let joints = t_pose_joints();
         let back: Vec<[f64; 3]> = joints.iter().map(|p| [-p[0], p[1], -p[2]]).collect();
         let text = synthetic(&back, &[[[0.0; 3]; BODY_JOINT_COUNT]]);
-        let poses = retarget(&Bvh::parse(&text, Path::new("t.bvh")).unwrap(), &joints).unwrap();
+        let poses = poses_of(&text, &joints);
         let (rest, yaw) = poses[0].without_heading();
         assert!((yaw.abs() - std::f64::consts::PI).abs() < 1e-9);
         assert!(rest.rotations.iter().flatten().all(|x| x.abs() < 1e-9));
+    }
+
+    #[test]
+    fn a_skeleton_with_z_up_stands_in_a_world_with_either_axis_up() {
+        let joints = t_pose_joints();
+        // (x, y, z) in y up is (x, −z, y) in z up.
+        let z_up: Vec<[f64; 3]> = joints.iter().map(|p| [p[0], -p[2], p[1]]).collect();
+        let mut bent = [[0.0; 3]; BODY_JOINT_COUNT];
+        // About z, which is y in y up.
+        bent[18] = [60.0, 0.0, 0.0];
+        let mut stood_up = bent;
+        stood_up[0] = [0.0, -90.0, 0.0];
+        for frame in [bent, stood_up] {
+            let poses = poses_of(&synthetic(&z_up, &[frame]), &joints);
+            for (j, r) in poses[0].rotations.iter().enumerate() {
+                let expected = if j == 18 { [0.0, 60f64.to_radians(), 0.0] } else { [0.0; 3] };
+                assert!(r.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9), "{j}: {r:?}");
+            }
+        }
     }
 
     #[test]
@@ -254,7 +292,7 @@ mod tests {
         let imported = |provenance: Provenance| {
             let settings = RetargetSettings { provenance, ..RetargetSettings::default() };
             let (files, out) = ([clip.clone()], folder.path().join("out"));
-            import_bvh(&files, &body, &out, &settings, &mut |_, _, _| ()).unwrap();
+            import_bvh(&files, &body, &out, &settings, None, &mut |_, _, _| ()).unwrap();
             Motion::load(&out.join("walk.npz")).unwrap().source
         };
         let own = imported(Provenance::default());

@@ -10,6 +10,7 @@ use super::summary::{ImportError, Progress, Summary};
 use crate::asset::Body;
 use crate::asset::motion::{MAX_ANGLE, check_frame_rate};
 use crate::asset::rotation::{Matrix3, axis_angle_from_quaternion, matrix_from_axis_angle, product};
+use crate::format::way_out;
 use serde::Deserialize;
 use std::fs;
 use std::ops::RangeInclusive;
@@ -160,6 +161,9 @@ pub fn import_deepmimic(
 ) -> Result<Summary, ImportError> {
     let read = |file: &Path| -> Result<Retargeted, String> {
         let bytes = fs::read(file).map_err(|e| e.to_string())?;
+        if let Some(way_out) = way_out(file) {
+            return Err(way_out);
+        }
         let frames = parse(&String::from_utf8_lossy(&bytes))?;
         let retarget = Retarget::new(MAP, &rest_positions(), &body.joint_template);
         Ok(Retargeted {

@@ -10,6 +10,7 @@ pub mod retarget;
 pub mod smpl_family;
 mod summary;
 pub mod thinning;
+mod up_axis;
 
 pub use amass::{AmassSettings, import_amass};
 pub use bvh::import_bvh;
@@ -20,3 +21,4 @@ pub use overwrite::refuse_overwriting;
 pub use smpl_family::import_smpl_family;
 pub use summary::{ImportError, Progress, Summary};
 pub use thinning::Thinning;
+pub use up_axis::UpAxis;

@@ -15,6 +15,7 @@ use super::overwrite::refuse_overwriting;
 use super::summary::{ImportError, Progress, Summary};
 use super::thinning::{Thinned, Thinning, thin};
 use crate::asset::{Body, Motion, Pose, Provenance, skeleton::BODY_JOINT_COUNT};
+use crate::check::{impossible_turn, not_upright};
 use crate::format::{FileError, toml_file};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -75,11 +76,14 @@ pub(super) fn write_retargeted(
     }
     let inputs = named(files.iter().map(|f| (f.clone(), stem(f))));
     let import = |file: &Path| {
-        let Retargeted { poses, frame_rate, skeleton, remark } = retarget(file)?;
+        let Retargeted { poses, frame_rate, skeleton, remark } =
+            retarget(file).map_err(|e| short(&e, file))?;
+        let warnings = [impossible_turn(&poses), not_upright(&poses)];
+        let warning: String = warnings.into_iter().flatten().map(|warning| format!("; {warning}")).collect();
         let Thinned { poses, frame_rate, note } = thin(poses, frame_rate, &settings.thinning);
         let source = provenance_of(file, &settings.provenance);
         let motion = Motion { name: String::new(), frame_rate, poses, source };
-        Ok(Clip { motion, subject: String::new(), note: format!("{skeleton}, {note}{remark}") })
+        Ok(Clip { motion, subject: String::new(), note: format!("{skeleton}, {note}{remark}{warning}") })
     };
     write_motions(&inputs, settings.body_file.as_deref(), out, expected, &import, progress)
 }
@@ -137,6 +141,11 @@ pub(super) fn named(files: impl IntoIterator<Item = (PathBuf, String)>) -> Vec<N
 /// The file's name without its extension.
 pub(super) fn stem(path: &Path) -> String {
     path.file_stem().map_or_else(|| "motion".into(), |s| s.to_string_lossy().into_owned())
+}
+
+/// The message without the path, which the summary shows beside it.
+pub(super) fn short(message: &str, path: &Path) -> String {
+    message.strip_prefix(&format!("{}: ", path.display())).unwrap_or(message).to_string()
 }
 
 /// Where the motion of `file` comes from: what was given, with the file's name.

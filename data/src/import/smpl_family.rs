@@ -6,7 +6,7 @@ use super::overwrite::refuse_overwriting;
 use super::summary::{ImportError, Progress, Summary};
 use crate::asset::body_file::{BodyFileSettings, INSIDE_OUT, shape_part};
 use crate::asset::{Body, Provenance};
-use crate::format::{FileError, NpzFile, folder};
+use crate::format::{FileError, NpzFile, folder, way_out};
 use std::path::{Path, PathBuf};
 
 fn hint(models: &[PathBuf]) -> String {
@@ -121,6 +121,11 @@ pub fn import_smpl_family(
             summary.notes.push(note);
         }
     }
+    if body.shape_count == 0 {
+        summary
+            .notes
+            .push("the body has no shape space: it is draped and trained on in its one shape".into());
+    }
     if was_inside_out {
         summary.notes.push(INSIDE_OUT.into());
     }
@@ -147,14 +152,10 @@ fn refuse_what_is_no_npz(input: &Path) -> Result<(), FileError> {
         let message = format!("this is a folder; name one model file in it{}", hint(&models));
         return Err(FileError::content(input)(message));
     }
-    if folder::has_extension(input, "pkl") && input.is_file() {
-        return Err(FileError::content(input)(format!(
-            "a Python pickle is a program and is never run here; convert it once with scripts/smpl_pickle_to_npz.py {} model.npz, \
-             which takes the arrays only",
-            input.display()
-        )));
+    match way_out(input).filter(|_| input.is_file()) {
+        Some(way_out) => Err(FileError::content(input)(way_out)),
+        None => Ok(()),
     }
-    Ok(())
 }
 
 /// What the file says itself, or what is known of the published model.

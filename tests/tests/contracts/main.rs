@@ -11,6 +11,7 @@ mod frozen;
 mod graph;
 mod intersections;
 mod messy_garments;
+mod other_bodies;
 mod parallel_scenes;
 mod resume;
 mod score_oracle;

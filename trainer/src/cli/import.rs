@@ -6,8 +6,8 @@ use crate::dataset::load_body;
 use clap::{Args, Subcommand, ValueEnum};
 use clothcombo_data::asset::{Body, BodyFileSettings, Provenance};
 use clothcombo_data::import::{
-    AmassSettings, Cloth3dBodies, Cloth3dSettings, RetargetSettings, Thinning, import_amass, import_bvh,
-    import_cloth3d, import_deepmimic, import_smpl_family,
+    AmassSettings, Cloth3dBodies, Cloth3dSettings, RetargetSettings, Thinning, UpAxis, import_amass,
+    import_bvh, import_cloth3d, import_deepmimic, import_smpl_family,
 };
 use miette::{IntoDiagnostic, Report};
 use std::path::PathBuf;
@@ -17,7 +17,10 @@ use std::path::PathBuf;
 pub enum Source {
     /// Motion capture in BVH files
     #[command(
-        after_help = "Example:\n  clothcombo import bvh 01_01.bvh 01_03.bvh --body datasets/open/body.npz -o datasets/open/motions"
+        after_help = "Example:\n  clothcombo import bvh 01_01.bvh 01_03.bvh --body datasets/open/body.npz -o datasets/open/motions\n\n\
+            Known are the joint names of Mixamo, Rokoko, Xsens, Perception Neuron, OptiTrack, CMU, LAFAN1, Bandai-Namco, 3ds Max,\n\
+            Unreal, Blender and their like, with any prefix. For others --joints names the joints of the rig, one a line:\n  \
+            left_hip = \"LThigh\"\nWithout it, the refusal of a file prints one to fill in. FBX: export BVH (Blender, Maya, MotionBuilder)."
     )]
     Bvh(BvhArguments),
     /// Body model from an SMPL, SMPL-H or SMPL-X npz
@@ -26,9 +29,12 @@ pub enum Source {
         after_help = "Examples:\n  clothcombo import smplx SMPLX_NEUTRAL.npz -o datasets/smplx/body.npz\n  clothcombo import smplh smplh/female/model.npz -o datasets/smplh/female.npz\nSMPL's pickles: python3 scripts/smpl_pickle_to_npz.py basicModel_neutral.pkl smpl_neutral.npz, then import that."
     )]
     Smplx(SmplxArguments),
-    /// Motions of AMASS (SMPL-H *_poses.npz, SMPL-X *_stageii.npz)
+    /// Motions of AMASS and other SMPL tools (npz)
     #[command(
-        after_help = "Example:\n  clothcombo import amass AMASS/CMU AMASS/KIT -o datasets/amass/motions --frame-rate 30"
+        after_help = "Examples:\n  clothcombo import amass AMASS/CMU AMASS/KIT -o datasets/amass/motions --frame-rate 30\n  clothcombo import amass aist/*.npz --rate 60 -o datasets/aist/motions\n\n\
+            Read are poses, full_pose and smpl_poses (frames x 3J or frames x J x 3, 22 joints or more), and body_pose or pose_body\n\
+            with global_orient or root_orient, as rotation vectors or matrices; the rate is mocap_framerate, mocap_frame_rate, fps,\n\
+            framerate, frame_rate or rate. Pickled arrays are never executed."
     )]
     Amass(AmassArguments),
     /// Garments and poses of CLOTH3D and CLOTH3D++ sample folders
@@ -55,6 +61,9 @@ pub struct BvhArguments {
     /// Frames per second kept
     #[arg(long, default_value_t = 60.0, value_parser = positive)]
     frame_rate: f64,
+    /// TOML file that names the joint of the rig for each body joint, for rigs whose names are not known
+    #[arg(long, value_name = "FILE")]
+    joints: Option<PathBuf>,
     #[command(flatten)]
     provenance: ProvenanceArguments,
     /// Folder to write
@@ -116,10 +125,25 @@ impl ThinningArguments {
 /// The world's up axis.
 #[derive(Clone, Copy, ValueEnum)]
 pub enum Up {
-    /// y
+    /// The axis along which the bodies of an input stand on average; refused where that is not plain
+    Auto,
+    /// y, as in AIST++
     Y,
-    /// z
+    /// z, as in AMASS
     Z,
+    /// -y: the coordinates of a camera, as in 4D-Humans
+    YDown,
+}
+
+impl Up {
+    fn axis(self) -> Option<UpAxis> {
+        match self {
+            Self::Auto => None,
+            Self::Y => Some(UpAxis::Y),
+            Self::Z => Some(UpAxis::Z),
+            Self::YDown => Some(UpAxis::YDown),
+        }
+    }
 }
 
 /// Arguments of `import amass`.
@@ -130,8 +154,11 @@ pub struct AmassArguments {
     inputs: Vec<PathBuf>,
     #[command(flatten)]
     thinning: ThinningArguments,
+    /// Frame rate of files that do not say theirs (frames/s); a file that says another one is skipped
+    #[arg(long, value_name = "HZ", value_parser = positive)]
+    rate: Option<f64>,
     /// Which axis is up in the files
-    #[arg(long, value_enum, default_value = "z")]
+    #[arg(long, value_enum, default_value = "auto")]
     up: Up,
     /// Folder to write
     #[arg(short, long, value_parser = folder_to_make())]
@@ -200,7 +227,8 @@ pub fn run(source: &Source) -> Result<(), Report> {
                 provenance: a.provenance.provenance(),
                 body_file: Some(PathBuf::from(&a.body)),
             };
-            import_bvh(&a.files, &body, &a.output, &settings, &mut progress).into_diagnostic()?
+            import_bvh(&a.files, &body, &a.output, &settings, a.joints.as_deref(), &mut progress)
+                .into_diagnostic()?
         }
         Source::Smplx(a) => {
             let limit = if a.components == 0 { usize::MAX } else { a.components };
@@ -208,7 +236,7 @@ pub fn run(source: &Source) -> Result<(), Report> {
             import_smpl_family(&a.input, &a.output, &settings, &mut progress).into_diagnostic()?
         }
         Source::Amass(a) => {
-            let settings = AmassSettings { thinning: a.thinning.thinning(), z_up: matches!(a.up, Up::Z) };
+            let settings = AmassSettings { thinning: a.thinning.thinning(), up: a.up.axis(), rate: a.rate };
             import_amass(&a.inputs, &a.output, &settings, &mut progress).into_diagnostic()?
         }
         Source::Cloth3d(a) => {

@@ -156,7 +156,9 @@ pub struct PoseConfig {
     pub test_clips: Vec<String>,
     /// Share of every other clip that is never trained on, in windows spread over the clip, which every validation scores. One
     /// block of `held_out_block` in every `1 / held_out_share`, rounded, at most every second one. A clip shorter than half of
-    /// `held_out_block / held_out_share` is trained on whole.
+    /// `held_out_block / held_out_share` has no window. Where the windows hold out less than a quarter of the share, such short
+    /// clips are held out whole until the share is reached (chosen by a hash of their names, at most a third of all by time).
+    /// Where that holds none out, each clip has a window scaled to its length, of 0.1 s or more.
     pub held_out_share: f64,
     /// Length of such a window (s); long against the time in which a pose changes.
     pub held_out_block: f64,

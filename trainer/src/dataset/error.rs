@@ -99,12 +99,24 @@ pub enum DatasetError {
         /// The existing names.
         available: String,
     },
-    /// One side of the pose split is empty.
-    #[error("{}: {train} frames to train on and {held_out} held out", folder.display())]
+    /// No clip is left to train on.
+    #[error("{}: no clip to train on: {named} are named by data.poses.validation_clips or test_clips, the others have no frames", folder.display())]
     #[diagnostic(help(
-        "both must be positive: change data.poses.validation_clips, test_clips, held_out_share, held_out_block or \
-         held_out_margin"
+        "name fewer clips there, or add some: a run needs frames to train on beside those that it validates on"
     ))]
+    NoTrainedClip {
+        /// The motion folder.
+        folder: PathBuf,
+        /// Clips named for validation and test.
+        named: usize,
+    },
+    /// One side of the pose split is empty.
+    #[error(
+        "{}: {train} frames to train on and {held_out} held out to validate on; the clips are too few or too short to hold a part \
+         out of them",
+        folder.display()
+    )]
+    #[diagnostic(help("{remedy}"))]
     EmptySplit {
         /// The motion folder.
         folder: PathBuf,
@@ -112,6 +124,8 @@ pub enum DatasetError {
         train: usize,
         /// Held-out frames.
         held_out: usize,
+        /// What to set or add.
+        remedy: String,
     },
     /// Clips are weighted by their length in time, and some of these have none.
     #[error("{}: at frame rates from {lowest:?} to {highest:?} a second the clips' lengths in time cannot be compared", folder.display())]

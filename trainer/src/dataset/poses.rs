@@ -1,6 +1,7 @@
 //! Poses for training and validation: frames of motion clips, or the sampler within joint limits.
 
 mod frames;
+mod hold_out;
 
 use super::error::DatasetError;
 use crate::config::{PoseConfig, PoseEncoding};

@@ -76,7 +76,7 @@ pub struct SplitNames {
     pub test_garments: Vec<String>,
     /// Motion clips trained on, but for the windows held out of them and the margins around those.
     pub training_clips: Vec<String>,
-    /// Windows held out of those clips, scored during the run.
+    /// Windows held out of those clips, and short clips held out whole, scored during the run.
     pub validation_windows: Vec<Window>,
     /// Motion clips scored during the run, never trained on.
     pub validation_clips: Vec<String>,
@@ -85,7 +85,7 @@ pub struct SplitNames {
 }
 
 /// A number in [0, 1) that depends on the name alone.
-fn place(name: &str) -> f64 {
+pub(super) fn place(name: &str) -> f64 {
     let hash = blake3::hash(name.as_bytes());
     let first = u64::from_le_bytes(hash.as_bytes()[..8].try_into().expect("eight bytes"));
     (first >> 11) as f64 / (1u64 << 53) as f64

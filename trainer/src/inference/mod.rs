@@ -44,6 +44,7 @@ mod phase_times;
 pub mod reference;
 mod refine;
 mod report;
+mod shape_space;
 mod shipped;
 mod smooth;
 mod source;
@@ -70,11 +71,12 @@ use crate::dataset::{ActiveJoints, Preprocessor, load_body};
 use crate::run::checkpoint::TrainedModel;
 use crate::system::device::default_device;
 use burn::tensor::Device;
-use clothcombo_data::asset::{Body, Pose};
+use clothcombo_data::asset::{BODY_JOINT_COUNT, Body, Pose};
 use clothcombo_model::ClothCombo;
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use embedded::EmbeddedGarments;
 use frame::Frame;
+use shape_space::ShapeSpace;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -144,6 +146,7 @@ pub struct Draper {
     /// The same without corrections, for samples of the continuation path from the T-pose: that leaves fewer intersections (docs/resolve.md).
     uncorrected: ClothCombo,
     preprocessor: Preprocessor,
+    shape_space: ShapeSpace,
     joints: ActiveJoints,
     device: Device,
     settings: DraperSettings,
@@ -160,7 +163,7 @@ impl Draper {
             Some(path) => TrainedModel::open(path)?,
             None => shipped_model()?,
         };
-        let body = load_model_body(&trained, settings.body.as_deref())?;
+        let (body, shape_space) = body_of(&trained, settings.body.as_deref())?;
         let joints = ActiveJoints::named(&body, &trained.state.joints)
             .map_err(|missing| DraperError::Joints { body: body.name.clone(), missing })?;
         let device = settings.device.clone();
@@ -181,6 +184,7 @@ impl Draper {
             uncorrected: model.clone().with_correction_steps(0),
             model,
             preprocessor,
+            shape_space,
             joints,
             device,
             settings,
@@ -236,14 +240,46 @@ impl Draper {
     }
 }
 
-fn load_model_body(trained: &TrainedModel, named: Option<&str>) -> Result<Body, DraperError> {
+/// Shape components kept of a body whose shape space is not the model's, at least.
+const OTHER_COMPONENTS: usize = 16;
+
+/// The body that is dressed, with all joints that the networks know, and what its shape means to them. Joints are known by name:
+/// those that the body lacks are at rest, and what hangs on joints that the networks do not know goes to the nearest ancestor
+/// ([`ActiveJoints`]).
+fn body_of(trained: &TrainedModel, named: Option<&str>) -> Result<(Body, ShapeSpace), DraperError> {
+    let count = trained.state.shape_count;
+    let (body, shape_space) = match named {
+        None => (load_model_body(trained)?, ShapeSpace::Own),
+        Some(name) => {
+            let body = load_body(name, count.max(OTHER_COMPONENTS))?;
+            if body.joint_count() < BODY_JOINT_COUNT {
+                return Err(
+                    DatasetError::FewJoints { name: body.name.clone(), joints: body.joint_count() }.into()
+                );
+            }
+            let model_body = load_model_body(trained).ok();
+            match ShapeSpace::new(&body, model_body, trained.config.data.shape_range) {
+                // Of its own body the networks know so many components.
+                ShapeSpace::Own => (body.with_shape_components(count), ShapeSpace::Own),
+                other => (body, other),
+            }
+        }
+    };
+    let name = body.name.clone();
+    let body = body
+        .with_joints(&trained.state.joints)
+        .map_err(|missing| DraperError::Joints { body: name, missing })?;
+    Ok((body, shape_space))
+}
+
+/// The body the model was trained on.
+fn load_model_body(trained: &TrainedModel) -> Result<Body, DraperError> {
     let beside = trained.folder.join("body.npz");
     let own = &trained.config.data.body;
-    let name = match named {
-        Some(name) => name.to_owned(),
-        None if beside.is_file() => beside.display().to_string(),
-        None if own == "mannequin" => own.clone(),
-        None => {
+    let name = match own.as_str() {
+        _ if beside.is_file() => beside.display().to_string(),
+        "mannequin" => own.clone(),
+        _ => {
             // A run lies somewhere below the folder its paths are relative to.
             let places = std::iter::once(Path::new("")).chain(trained.folder.ancestors());
             let found = places.map(|place| place.join(own)).find(|path| path.is_file());

@@ -108,6 +108,7 @@ impl Draper {
 
     fn scene(&self, outfit: &Outfit, body: BodySample) -> PreparedScene {
         let encoding = self.trained.config.data.poses.encoding;
+        let shape = body.shape.clone();
         let builder = SceneBuilder {
             body: self.body(),
             joints: &self.joints,
@@ -121,8 +122,8 @@ impl Draper {
             repulsion_sample: 0,
         };
         let mut scene = builder.build(sample, outfit.prepared(), 1.0);
-        // A body with fewer components than the networks know has the others at their mean.
-        scene.bodies[0].shape.resize(self.trained.state.shape_count, 0.0);
+        let seen = self.shape_space.seen(self.body(), &shape, self.trained.state.shape_count);
+        scene.bodies[0].shape = seen.into_iter().map(|b| b as f32).collect();
         scene
     }
 

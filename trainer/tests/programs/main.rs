@@ -25,6 +25,7 @@ mod memory;
 mod observability;
 mod outputs;
 mod own_garments;
+mod own_motions;
 mod resolve;
 mod resume_changes;
 mod run_safety;

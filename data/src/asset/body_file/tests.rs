@@ -85,12 +85,49 @@ fn joints_come_from_the_regressor_and_a_missing_key_is_named() {
 }
 
 #[test]
+fn a_rigged_body_without_shape_space_is_read_and_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("rigged.npz");
+    let own = crate::generate::mannequin();
+    own.save(&path, &Provenance::default()).unwrap();
+    let with_shapes = std::fs::read(&path).unwrap();
+    let without = own.with_shape_components(0);
+    without.save(&path, &Provenance::default()).unwrap();
+    assert_ne!(std::fs::read(&path).unwrap(), with_shapes);
+    let empty = Body::load(&path, &BodyFileSettings::default()).unwrap();
+    // The same without the arrays: a template with joints, or a regressor.
+    let (v, j) = (empty.vertex_count(), empty.joint_count());
+    let parents = empty.parents.iter().map(|p| p.map_or(-1, |p| p as i64)).chain(0..j as i64);
+    let template: Vec<f32> = empty.template.as_flattened().iter().map(|x| *x as f32).collect();
+    for has_regressor in [false, true] {
+        let mut npz = NpzWriter::new();
+        npz.f32("v_template", &[v, 3], &template)
+            .u32("f", &[empty.faces.len(), 3], empty.faces.as_flattened())
+            .f32("weights", &[v, j], &empty.skin_weights.to_dense(j))
+            .i64("kintree_table", &[2, j], &parents.clone().collect::<Vec<_>>());
+        match has_regressor {
+            true => npz.f64("J_regressor", &[j, v], &vec![1.0 / v as f64; j * v]),
+            false => npz.f64("J_template", &[j, 3], empty.joint_template.as_flattened()),
+        };
+        npz.save(&path).unwrap();
+        let body = Body::load(&path, &BodyFileSettings::default()).unwrap();
+        assert_eq!((body.shape_count, body.joint_count(), body.vertex_count()), (0, j, v));
+        assert!(body.posed(&[], &crate::asset::Pose::t_pose(22)).is_ok());
+        let message = body.shaped(&[1.0]).unwrap_err().to_string();
+        assert!(message.contains("0 shape components"), "{message}");
+        if !has_regressor {
+            assert_eq!(body.joint_template, empty.joint_template);
+        }
+    }
+}
+
+#[test]
 fn a_pickle_is_not_opened() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("SMPL_NEUTRAL.pkl");
     std::fs::write(&path, b"\x80\x02}q\x00.").unwrap();
     let message = Body::load(&path, &BodyFileSettings::default()).unwrap_err().to_string();
-    assert!(message.contains("SMPL_NEUTRAL.pkl") && message.contains("pickles"), "{message}");
+    assert!(message.contains("SMPL_NEUTRAL.pkl") && message.contains("Python pickle"), "{message}");
     let missing = Body::load(&folder.path().join("none.npz"), &BodyFileSettings::default()).unwrap_err();
     assert!(missing.to_string().contains("none.npz"));
 }

@@ -2,7 +2,7 @@
 
 use crate::asset::motion::{MAX_ANGLE, check_frame_rate};
 use crate::asset::rotation::{self, Matrix3};
-use crate::format::FileError;
+use crate::format::{FileError, way_out};
 use std::fs;
 use std::path::Path;
 
@@ -61,6 +61,21 @@ impl<'a> Words<'a> {
         word.ok_or_else(|| self.error(format!("the file ends where {expected} should be")))
     }
 
+    /// A joint's name: the rest of the line up to a brace, as some rigs have spaces in it.
+    fn name(&mut self) -> Result<String, FileError> {
+        let first = self.next("a joint name")?;
+        let line = self.words.get(self.at - 1).map(|(line, _)| *line);
+        let mut name = first.to_string();
+        while let Some((_, word)) =
+            self.words.get(self.at).filter(|(at, word)| Some(*at) == line && *word != "{")
+        {
+            name.push(' ');
+            name.push_str(word);
+            self.at += 1;
+        }
+        Ok(name)
+    }
+
     fn peek(&self) -> Option<&'a str> {
         self.words.get(self.at).map(|(_, word)| *word)
     }
@@ -94,6 +109,9 @@ impl Bvh {
     /// [`FileError`] naming file and line.
     pub fn load(path: &Path) -> Result<Self, FileError> {
         let bytes = fs::read(path).map_err(FileError::io(path))?;
+        if let (false, Some(way_out)) = (bytes.starts_with(b"HIERARCHY"), way_out(path)) {
+            return Err(FileError::content(path)(way_out));
+        }
         Self::parse(&String::from_utf8_lossy(&bytes), path)
     }
 
@@ -206,7 +224,7 @@ fn read_joint(
     if depth > DEEPEST_TREE {
         return Err(words.error(format!("the joint tree is deeper than {DEEPEST_TREE}")));
     }
-    let name = words.next("a joint name")?.to_string();
+    let name = words.name()?;
     words.expect("{")?;
     let offset = words.offset()?;
     let mut channels = Vec::new();

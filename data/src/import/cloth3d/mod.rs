@@ -12,11 +12,11 @@ mod unpose;
 pub use info::{Gender, OutfitItem, SampleInfo};
 pub use unpose::{Unposing, upright};
 
-use super::amass::turn_root_to_y_up;
 use super::motions::{Clip, NamedFile, named, write_motions};
 use super::overwrite::refuse_overwriting;
 use super::summary::{ImportError, Progress, Summary};
 use super::thinning::{Thinned, Thinning, thin};
+use super::up_axis::UpAxis;
 use crate::asset::{BindingSettings, Body, Category, Garment, Motion, Provenance};
 use crate::folders::{FolderGarment, save_garment_folder};
 use crate::format::{FileError, NpzWriter, PointCache, folder, obj};
@@ -326,7 +326,7 @@ fn convert_cache(
 fn motion(info_mat: &Path, settings: &Cloth3dSettings) -> Result<Clip, String> {
     let info = SampleInfo::load(info_mat)?;
     let mut poses = info.poses;
-    poses.iter_mut().for_each(turn_root_to_y_up);
+    poses.iter_mut().for_each(|pose| UpAxis::Z.turn_root_to_y_up(pose));
     // Simulated frames are matched with poses by their numbers.
     let all = Thinning { frame_rate: FRAME_RATE, static_threshold: 0.0 };
     let thinning = if settings.caches { &all } else { &settings.thinning };

@@ -3,7 +3,7 @@
 use crate::asset::body::unskin;
 use crate::asset::rotation::{Matrix3, apply, matrix_from_axis_angle, product};
 use crate::asset::{Binding, BindingSettings, Body, Category, Garment, Pose};
-use crate::import::amass::Y_UP_FROM_Z_UP;
+use crate::import::UpAxis;
 use clothcombo_physics::TriMesh;
 
 /// How far the legs are apart in the rest pose of CLOTH3D: θ₁ = (0, 0, 0.15), θ₂ = (0, 0, −0.15) (rad).
@@ -79,6 +79,6 @@ impl Unposing {
 
 /// A rest garment's points from the file's frame (z up, turned by `zrot`) to y up, facing +z.
 pub fn upright(positions: &mut [[f64; 3]], zrot: f64) {
-    let turn: Matrix3 = product(&Y_UP_FROM_Z_UP, &matrix_from_axis_angle([0.0, 0.0, -zrot]));
+    let turn: Matrix3 = product(&UpAxis::Z.to_y_up(), &matrix_from_axis_angle([0.0, 0.0, -zrot]));
     positions.iter_mut().for_each(|p| *p = apply(&turn, *p));
 }

@@ -1,6 +1,7 @@
 //! Frames of motion clips, by what they are for.
 
 use super::HeldOut;
+use super::hold_out::{HeldOutFrames, Purpose, hold_out, remedy, runs_of};
 use crate::config::PoseConfig;
 use crate::dataset::DatasetError;
 use clothcombo_data::asset::{Motion, Pose, Provenance};
@@ -20,11 +21,11 @@ pub struct ClipSplit {
     pub validation: Vec<String>,
     /// Never trained on, and read by no run.
     pub test: Vec<String>,
-    /// Windows held out of the trained clips; scored by every validation of a run.
+    /// Windows held out of the trained clips, and short clips held out whole; scored by every validation of a run.
     pub windows: Vec<Window>,
 }
 
-/// A part of a trained clip that is not trained on.
+/// A part of a trained clip, or a whole clip, that is not trained on.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Window {
     /// The clip.
@@ -42,50 +43,6 @@ impl Window {
         };
         runs_of(purposes, Purpose::HeldOut).into_iter().map(window).collect()
     }
-}
-
-/// What a frame of a trained clip is for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Purpose {
-    Training,
-    HeldOut,
-    /// Too near to a held-out frame to train on.
-    Margin,
-}
-
-/// First frame, and the one after the last, of every run of frames that are for `wanted`.
-fn runs_of(purposes: &[Purpose], wanted: Purpose) -> Vec<[usize; 2]> {
-    let mut start = 0;
-    let mut runs = Vec::new();
-    for run in purposes.chunk_by(|a, b| a == b) {
-        let end = start + run.len();
-        if run[0] == wanted {
-            runs.push([start, end]);
-        }
-        start = end;
-    }
-    runs
-}
-
-/// The purposes of the frames of a clip.
-fn purposes(count: usize, frame_rate: f64, config: &PoseConfig) -> Vec<Purpose> {
-    let block = ((config.held_out_block * frame_rate).round() as usize).max(1);
-    let group = config.blocks_per_window();
-    let held_out = |frame: usize| frame / block % group == group / 2;
-    let mut purposes = vec![Purpose::Training; count];
-    // A trained frame is at least so many frames from any held-out one.
-    let distance = (config.held_out_margin * frame_rate).ceil() as usize;
-    let reach = distance.saturating_sub(1);
-    for frame in (0..count).filter(|frame| held_out(*frame)) {
-        purposes[frame] = Purpose::HeldOut;
-    }
-    for [start, end] in runs_of(&purposes, Purpose::HeldOut) {
-        let around = [start.saturating_sub(reach)..start, end..end.saturating_add(reach).min(count)];
-        for frame in around.into_iter().flatten().filter(|frame| !held_out(*frame)) {
-            purposes[frame] = Purpose::Margin;
-        }
-    }
-    purposes
 }
 
 /// Whether the name of a clip contains one of `names`.
@@ -130,9 +87,7 @@ pub(super) struct Frames {
 }
 
 impl Frames {
-    /// Every clip but those for validation and test is cut into blocks; one block in every `1 / held_out_share`, in the middle
-    /// of its group, is held out. A clip of less than about half a group has none. Frames within `held_out_margin` of a
-    /// held-out one are for nothing.
+    /// Clips are split by their names; of those that are trained on, frames are held out ([`hold_out`]).
     ///
     /// # Errors
     /// Naming `folder`, when a clip of the configuration is missing or named twice, nothing is left to train on, nothing is held
@@ -142,35 +97,52 @@ impl Frames {
         let (mut train, mut windows) = (Vec::new(), Vec::new());
         let (mut validation, mut test) = (Vec::new(), Vec::new());
         let mut names = ClipSplit::default();
+        let mut own: Vec<&Motion> = Vec::new();
         for clip in clips {
             if is_named(&clip.name, &config.test_clips) {
                 test.extend_from_slice(&clip.poses);
                 names.test.push(clip.name.clone());
-                continue;
-            }
-            if is_named(&clip.name, &config.validation_clips) {
+            } else if is_named(&clip.name, &config.validation_clips) {
                 validation.extend_from_slice(&clip.poses);
                 names.validation.push(clip.name.clone());
-                continue;
+            } else {
+                own.push(clip);
             }
-            names.training.push(clip.name.clone());
-            let purposes = purposes(clip.poses.len(), clip.frame_rate, config);
+        }
+        if own.iter().all(|clip| clip.poses.is_empty()) {
+            return Err(DatasetError::NoTrainedClip {
+                folder: folder.to_owned(),
+                named: clips.len() - own.len(),
+            });
+        }
+        let HeldOutFrames { purposes, note } = hold_out(&own, config);
+        if let Some(note) = note {
+            tracing::warn!("{}: {note}", folder.display());
+        }
+        for (clip, purposes) in own.iter().zip(&purposes) {
             let of = |wanted: Purpose| {
-                let frames = clip.poses.iter().zip(&purposes).filter(move |(_, purpose)| **purpose == wanted);
+                let frames = clip.poses.iter().zip(purposes).filter(move |(_, purpose)| **purpose == wanted);
                 frames.map(|(pose, _)| pose.clone())
             };
             windows.extend(of(Purpose::HeldOut));
-            names.windows.extend(Window::list(&clip.name, clip.frame_rate, &purposes));
+            names.windows.extend(Window::list(&clip.name, clip.frame_rate, purposes));
             let poses: Vec<Pose> = of(Purpose::Training).collect();
+            if purposes.iter().any(|purpose| *purpose != Purpose::HeldOut) || purposes.is_empty() {
+                names.training.push(clip.name.clone());
+            }
             if !poses.is_empty() {
                 let seconds = poses.len() as f64 / clip.frame_rate;
                 train.push(Clip { poses, seconds });
             }
         }
-        let trained: usize = train.iter().map(|clip| clip.poses.len()).sum();
-        if trained == 0 || windows.is_empty() {
-            let (folder, held_out) = (folder.to_owned(), windows.len());
-            return Err(DatasetError::EmptySplit { folder, train: trained, held_out });
+        if train.is_empty() || windows.is_empty() {
+            let count = |clip: &Clip| clip.poses.len();
+            return Err(DatasetError::EmptySplit {
+                folder: folder.to_owned(),
+                train: train.iter().map(count).sum(),
+                held_out: windows.len(),
+                remedy: remedy(&own, config),
+            });
         }
         let training = Training::new(train).map_err(|_| frame_rates(folder, clips))?;
         let sources = clips.iter().map(|clip| clip.source.clone()).collect();
