@@ -64,7 +64,7 @@ fn every_unit_up_axis_and_facing_is_found_and_the_garment_recovered() {
             let placement = Placement {
                 unit,
                 up,
-                facing_degrees: [0, 90, 180, 270][number % 4],
+                turn_degrees: [0.0, 90.0, 180.0, 270.0][number % 4],
                 origin: if on_floor { Origin::Floor } else { Origin::Pelvis },
                 translation: [0.0, if on_floor { floor } else { 0.0 }, 0.0],
                 arm_angle_degrees: 0.0,
@@ -96,7 +96,7 @@ fn a_garment_with_its_origin_elsewhere_is_moved_onto_the_body() {
     let file = polygons(centred, original.rest.faces().iter().map(<[u32; 3]>::as_slice));
     let fitted = fit(&file, &body, &FitSettings::default()).unwrap();
     let placement = fitted.report.placement;
-    assert_eq!((placement.unit, placement.up, placement.facing_degrees), (Unit::Cm, UpAxis::Y, 0));
+    assert_eq!((placement.unit, placement.up, placement.turn_degrees), (Unit::Cm, UpAxis::Y, 0.0));
     assert_eq!(placement.origin, Origin::Elsewhere);
     // Where exactly a loose shirt sits is a matter of a centimetre or two.
     let error = norm(sub(placement.translation, centre));
@@ -116,7 +116,7 @@ fn messy(original: &Garment, body: &Body, degrees: f64) -> Messy {
     let placement = Placement {
         unit: Unit::Cm,
         up: UpAxis::Z,
-        facing_degrees: 180,
+        turn_degrees: 180.0,
         origin: Origin::Floor,
         translation: [0.0, body.zero_body().bounds().0[1], 0.0],
         arm_angle_degrees: degrees,
@@ -234,7 +234,7 @@ fn lowered_arms_are_found_and_raised() {
         let file = messy(&original, &body, degrees).file;
         let fitted = fit(&file, &body, &FitSettings::default()).unwrap();
         let placement = fitted.report.placement;
-        assert_eq!((placement.unit, placement.up, placement.facing_degrees), (Unit::Cm, UpAxis::Z, 180));
+        assert_eq!((placement.unit, placement.up, placement.turn_degrees), (Unit::Cm, UpAxis::Z, 180.0));
         assert!(
             (placement.arm_angle_degrees - degrees).abs() < 8.0,
             "{degrees}: {}",

@@ -67,7 +67,7 @@ pub use shipped::shipped_model;
 pub use smooth::{Smoothing, smooth};
 pub use source::{GarmentCatalog, GivenGarment};
 
-use crate::dataset::{ActiveJoints, Preprocessor, load_body};
+use crate::dataset::{ActiveJoints, DatasetError, Preprocessor, load_body};
 use crate::run::checkpoint::TrainedModel;
 use crate::system::device::default_device;
 use burn::tensor::Device;
