@@ -87,8 +87,8 @@ fn main() {
                 let ok = median < 0.02;
                 if ok { good += 1 } else { wrong += 1 }
                 let p = f.report.placement;
-                println!("{i:3} {:24} {} {:5.1} mm p95 {:5.1} {:4.2} s | {truth} | found {} {} {} {:?} arms {:.0} {:.3?}",
-                    g.name, if ok { "ok   " } else { "WRONG" }, 1e3 * median, 1e3 * p95, seconds, p.unit, p.up, p.turn_degrees, p.origin, p.arm_angle_degrees, p.translation);
+                println!("{i:3} {:24} dy {:5.1} dz {:5.1} {} {:5.1} mm p95 {:5.1} {:4.2} s | {truth} | found {} {} {} {:?} arms {:.0} {:.3?}",
+                    g.name, 1e3 * (p.translation[1] - shift[1]), 1e3 * (p.translation[2] - shift[2]), if ok { "ok   " } else { "WRONG" }, 1e3 * median, 1e3 * p95, seconds, p.unit, p.up, p.turn_degrees, p.origin, p.arm_angle_degrees, p.translation);
             }
         }
     }

@@ -1,6 +1,9 @@
 //! The T-posed body as the placement search sees it: signed distances on grids, with arms that turn at the shoulders.
 
+use super::arm_pose::ArmPose;
 use crate::asset::{Body, skeleton};
+use crate::generate::garment::measures::BodyMeasures;
+use crate::generate::garment::Tube;
 use crate::mesh::DistanceGrid;
 use clothcombo_physics::vec3::{add, norm, scale, sub};
 use clothcombo_physics::{Topology, TriMesh};
@@ -13,11 +16,17 @@ const BAND: f64 = 0.25;
 /// Signed distance to the body with its arms lowered by any angle.
 ///
 /// Trunk and arms are closed surfaces of their own; the distance to their union is the least of the three.
+#[derive(Clone)]
 pub(super) struct BodyField {
+    /// The trunk as it is.
     trunk: DistanceGrid,
+    /// The trunk as taut cloth sees it.
+    form: DistanceGrid,
     arms: Vec<Arm>,
-    levels: [f64; 2],
-    pub rims: [f64; 2],
+    /// The whole body with arms at one angle, if that is known.
+    posed: Option<DistanceGrid>,
+    column: Option<Tube>,
+    pub levels: Levels,
     /// Lowest and highest corner of the zero body (m).
     pub low: [f64; 3],
     pub high: [f64; 3],
@@ -25,6 +34,19 @@ pub(super) struct BodyField {
     pub spine_z: f64,
 }
 
+/// Parts of the body on which cloth may lie differently: legs, hips, chest, shoulders and neck, arms.
+pub(super) const PARTS: usize = 5;
+
+/// Heights of the zero body (m).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Levels {
+    pub crotch: f64,
+    pub hip: f64,
+    pub waist: f64,
+    pub armpit: f64,
+}
+
+#[derive(Clone)]
 struct Arm {
     /// +1 for the left arm, −1 for the right one.
     side: f64,
@@ -82,43 +104,69 @@ impl BodyField {
             let (positions, faces, radius) = closed(&body.template, faces);
             (DistanceGrid::new(&positions, &faces, STEP, BAND), radius)
         };
-        let (mut trunk, (left, right)) = rayon::join(
+        let (trunk, (left, right)) = rayon::join(
             || distance(trunk).0,
             || rayon::join(|| arm(body, left, 0, &distance), || arm(body, right, 1, &distance)),
         );
-        let mut levels = [-0.1, 0.15];
-        let mut rims = [0.15, 0.35];
-        if let Ok(fit) = crate::generate::garment::fit::BodyFit::new(body)
-            && std::env::var("NOFORM").is_err()
-        {
-            let (bottom, top) = (fit.landmarks.crotch, fit.landmarks.armpit - 0.02);
-            rims = [fit.landmarks.waist - 0.03, fit.landmarks.armpit - 0.035];
-            levels = [fit.landmarks.crotch, fit.landmarks.waist];
-            trunk.unite(|p| if p[1] > bottom && p[1] < top { fit.column.value(p) } else { f64::MAX });
-            if std::env::var("FIT_DEBUG").is_ok() {
-                eprintln!("{:?}", fit.landmarks);
-            }
-        }
         let (low, high) = body.zero_body().bounds();
+        let measures = BodyMeasures::new(body).ok();
+        let height = |name: &str, share: f64| joint(body, name).map_or(low[1] + share * (high[1] - low[1]), |p| p[1]);
+        let levels = match &measures {
+            Some(BodyMeasures { landmarks: l, .. }) => Levels { crotch: l.crotch, hip: l.hip, waist: l.waist, armpit: l.armpit },
+            // A body that cannot be measured: by its joints, else by usual proportions.
+            None => Levels {
+                crotch: height("left_hip", 0.53) - 0.1,
+                hip: height("left_hip", 0.53),
+                waist: height("spine2", 0.63),
+                armpit: height("left_shoulder", 0.82) - 0.07,
+            },
+        };
+        let column = measures.map(|m| m.column);
+        let form = taut(trunk.clone(), column.as_ref(), &levels);
         let spine = ["pelvis", "spine1", "spine2", "spine3"].map(|name| joint(body, name));
         let spine: Vec<f64> = spine.into_iter().flatten().map(|p| p[2]).collect();
         let spine_z = spine.iter().sum::<f64>() / spine.len().max(1) as f64;
-        Self { rims, levels, trunk, arms: left.into_iter().chain(right).collect(), low, high, spine_z }
+        let arms = left.into_iter().chain(right).collect();
+        Self { trunk, form, arms, posed: None, column, levels, low, high, spine_z }
     }
 
-    /// Signed distance of `p` to the body (m), outside positive, at most the band of the grids.
+    /// The same for arms lowered by linear blend skinning, as exact at the shoulders as the body is: for this one angle.
+    pub fn posed(&self, posed: &ArmPose, faces: &[[u32; 3]]) -> Self {
+        let grid = DistanceGrid::new(&posed.positions, faces, STEP, BAND);
+        Self { posed: Some(taut(grid, self.column.as_ref(), &self.levels)), ..self.clone() }
+    }
+
+    /// Signed distance of `p` to the body as taut cloth sees it (m), outside positive, at most the band of the grids; and the
+    /// part of the body that is next to it, below [`PARTS`].
     pub fn gap(&self, p: [f64; 3], arms: ArmTurn) -> (f64, usize) {
-        let mut gap = self.trunk.distance(p);
-        let mut part = self.levels.iter().filter(|l| **l < p[1]).count();
+        let mut gap = self.form.distance(p);
+        let Levels { crotch, waist, armpit, .. } = self.levels;
+        let mut part = [crotch, waist, armpit].iter().filter(|level| **level < p[1]).count();
         for arm in &self.arms {
             let raised = arms.raised(p, arm.shoulder, arm.side);
-            let d = arm.distance.distance(raised).min(norm(sub(p, arm.shoulder)) - arm.radius);
-            if d < gap {
-                (gap, part) = (d, 3);
+            let distance = arm.distance.distance(raised).min(norm(sub(p, arm.shoulder)) - arm.radius);
+            if distance < gap {
+                (gap, part) = (distance, PARTS - 1);
             }
         }
-        (gap, part)
+        (self.posed.as_ref().map_or(gap, |posed| posed.distance(p)), part)
     }
+
+    /// Whether `p` is at least this deep (m) inside the body.
+    pub fn is_inside(&self, p: [f64; 3], arms: ArmTurn, depth: f64) -> bool {
+        let in_arm = |arm: &Arm| arm.distance.distance(arms.raised(p, arm.shoulder, arm.side)) < -depth;
+        self.trunk.distance(p) < -depth || self.arms.iter().any(in_arm)
+    }
+}
+
+/// A trunk whose outlines are convex between hips and armpits, as taut cloth spans it.
+fn taut(mut trunk: DistanceGrid, column: Option<&Tube>, levels: &Levels) -> DistanceGrid {
+    // Below the armpits, where no column runs into the shoulders.
+    let (bottom, top) = (levels.hip, levels.armpit - 0.02);
+    if let Some(column) = column {
+        trunk.unite(|p| if p[1] > bottom && p[1] < top { column.value(p) } else { f64::MAX });
+    }
+    trunk
 }
 
 fn arm(

@@ -4,6 +4,7 @@
 //! ever inside. Every sample is drawn from a mixture of the three; the distance at which the cloth lies, its ease, is the most
 //! likely one.
 
+use super::body_field::PARTS;
 use std::sync::LazyLock;
 
 /// Distances at which cloth may begin to lie on the body (m).
@@ -57,8 +58,6 @@ pub(super) fn log_likelihood(gaps: impl ExactSizeIterator<Item = (f64, usize)>, 
 
 static USUAL: LazyLock<f64> = LazyLock::new(|| env("USUAL", 0.01));
 
-/// Parts of the body on which cloth may lie differently: legs, hips, chest, arms.
-pub(super) const PARTS: usize = 4;
 
 /// The same for a garment that may be some centimetres away from its place.
 pub(super) fn rough_log_likelihood(gaps: impl ExactSizeIterator<Item = (f64, usize)>, evidence: f64) -> f64 {

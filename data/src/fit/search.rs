@@ -187,7 +187,7 @@ impl Search {
             let sum = rim.iter().fold([0.0; 3], |sum, p| add(sum, *p));
             let centre = sum.map(|x| x / rim.len().max(1) as f64);
             for height in 0..20 {
-                let y = self.field.rims[0] - 0.15 + 0.025 * f64::from(height);
+                let y = self.field.levels.waist - 0.18 + 0.025 * f64::from(height);
                 for forward in [0.0, 0.03] {
                     let translation = [-centre[0], y - centre[1], self.field.spine_z + forward - centre[2]];
                     let p = Placement { translation, origin: Origin::Elsewhere, ..*base };
@@ -271,7 +271,7 @@ impl Search {
             let points: Vec<[f64; 3]> = border.iter().map(|v| cloth.positions[*v as usize]).collect();
             let points = placement.apply(&points);
             let height = points.iter().map(|p| p[1]).sum::<f64>() / points.len().max(1) as f64;
-            let inside = points.iter().filter(|p| self.field.gap(**p, arms).0 < -0.012).count();
+            let inside = points.iter().filter(|p| self.field.is_inside(**p, arms, 0.012)).count();
             match 4 * inside > points.len() {
                 true => (Opening::Nothing, height),
                 false => (self.skeleton.opening(&points, arms), height),
@@ -289,7 +289,7 @@ impl Search {
         let arms = has(Opening::LeftArm) && has(Opening::RightArm);
         let is_around = count(Opening::Trunk) >= 2 || (has(Opening::Trunk) && others.into_iter().any(has)) || arms;
         // Only sleeves and armholes tell how arms hang.
-        let is_worn = is_around && (arms || has(Opening::Several) || candidate.placement.arm_angle_degrees == 0.0);
+        let is_worn = is_around && (arms || candidate.placement.arm_angle_degrees == 0.0);
         if candidate.is_worn && !is_worn {
             candidate.score -= UNWORN;
         }
@@ -329,7 +329,7 @@ impl Search {
     /// Log-density of the height of an upper rim (m): at the waist, or above the chest.
     fn rim_prior(&self, height: f64) -> f64 {
         let normal = |middle: f64, spread: f64| (-0.5 * ((height - middle) / spread).powi(2)).exp() / (spread * 2.5066);
-        let [waist, chest] = self.field.rims;
+        let (waist, chest) = (self.field.levels.waist - 0.03, self.field.levels.armpit - 0.035);
         (0.6 * normal(waist, 0.035) + 0.35 * normal(chest, 0.03) + 0.02).ln() - 5.0f64.ln()
     }
 

@@ -9,13 +9,14 @@
 mod cloth;
 mod cut;
 mod design;
-pub(crate) mod fit;
+mod fit;
 mod lower;
+pub(crate) mod measures;
 mod pattern;
 mod quality;
 mod random_design;
 mod settings;
-pub(crate) mod tube;
+mod tube;
 mod upper;
 
 use crate::asset::provenance::GENERATED;
@@ -35,6 +36,7 @@ pub use design::{
     UpperDesign,
 };
 pub use settings::{GarmentError, GarmentSettings};
+pub(crate) use tube::Tube;
 
 /// Generates garments for one body; measures the body once.
 #[derive(Debug)]

@@ -2,7 +2,8 @@
 
 use super::super::field::{smooth_min, smooth_step};
 use super::design::FlareDesign;
-use super::fit::{BodyFit, Landmarks};
+use super::fit::BodyFit;
+use super::measures::Landmarks;
 use super::tube::{Tube, angle};
 use std::f64::consts::TAU;
 
