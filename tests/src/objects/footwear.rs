@@ -1,8 +1,9 @@
 //! What is worn on one limb: socks, stockings, shoes, mittens, arm warmers.
 
 use super::Kind;
+use super::curve::Knot;
 use super::draw::Draw;
-use super::shape::{Knot, Shape};
+use super::shape::Shape;
 
 pub(super) const KINDS: [Kind; 9] = [
     Kind::new("ankle sock", ankle_sock),

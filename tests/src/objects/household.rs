@@ -97,7 +97,7 @@ fn capsule(draw: &mut Draw) -> Shape {
 }
 
 fn figure(draw: &mut Draw) -> Shape {
-    let triangles = draw.triangles / 6;
+    let triangles = draw.triangles.max(1500) / 6;
     let (thick, size) = (draw.between(0.8, 1.2), draw.between(0.9, 1.1));
     let mut shape = rod([0.0, -0.12, 0.0], [0.0, 0.48, 0.0], 0.15 * thick, triangles);
     shape.join(rod([0.0, 0.53, 0.0], [0.0, 0.77, 0.0], 0.085, triangles));

@@ -4,6 +4,7 @@
 //! in units that leave no doubt.
 
 mod boxes;
+mod curve;
 mod draw;
 mod footwear;
 mod hats;

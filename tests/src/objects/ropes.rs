@@ -1,8 +1,9 @@
 //! Ropes, rings and ribbons.
 
 use super::Kind;
+use super::curve::Knot;
 use super::draw::Draw;
-use super::shape::{Knot, Shape};
+use super::shape::Shape;
 use std::f64::consts::TAU;
 
 pub(super) const KINDS: [Kind; 6] = [
@@ -61,13 +62,12 @@ fn knotted_rope(draw: &mut Draw) -> Shape {
 fn ring(wide: f64, radius: f64, depth: f64, triangles: usize) -> Shape {
     let rows = (triangles as f64 / 2.0 * wide / radius).sqrt().min(triangles as f64 / 12.0) as usize;
     let columns = (triangles / 2 / rows).max(5);
-    let closed = Shape::grid([columns, rows], true, |u, v| {
+    Shape::grid([columns, rows], true, |u, v| {
         // The last row is the first one.
         let (s, c) = (TAU * if v == 1.0 { 0.0 } else { v }).sin_cos();
         let (b, a) = (TAU * u).sin_cos();
         [(wide + radius * a) * s, radius * b, depth * (wide + radius * a) * c]
-    });
-    closed.at([0.0; 3])
+    })
 }
 
 fn torus(draw: &mut Draw) -> Shape {

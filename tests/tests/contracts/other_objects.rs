@@ -25,8 +25,8 @@ fn refusal(object: &Object, body: &Body) -> Result<String, String> {
     let kind = format!("{error:?}");
     let kind = kind.split(|c: char| !c.is_alphanumeric()).next().unwrap_or_default().to_owned();
     let is_sentence = !text.trim().is_empty() && !text.contains('\n') && !text.contains(". ");
+    // Nothing as a debugger would write it, such as the variant's own name.
     let debug = ["panic", "unwrap", "Some(", "None", "{", "}", "NaN", kind.as_str()];
-    // `Closed` is a variant, "closed" an English word.
     match is_sentence && !debug.iter().any(|word| text.contains(word)) {
         true => Ok(kind),
         false => Err(format!("refused with '{text}'")),
@@ -59,11 +59,12 @@ fn no_object_is_fitted_to_the_shipped_body() {
     refuses_all(&Body::load(&file, &BodyFileSettings::default()).unwrap(), "the shipped body");
 }
 
-/// `CLOTHCOMBO_OBJECTS=folder cargo test ... objects_can_be_looked_at -- --ignored`
+/// As OBJ files in the folder `CLOTHCOMBO_OBJECTS`, or in `target/objects`.
 #[test]
 #[ignore = "writes files to look at"]
 fn objects_can_be_looked_at() {
-    let folder = std::env::var("CLOTHCOMBO_OBJECTS").unwrap_or_else(|_| "target/objects".into());
+    let beside = concat!(env!("CARGO_MANIFEST_DIR"), "/../target/objects");
+    let folder = std::env::var("CLOTHCOMBO_OBJECTS").unwrap_or_else(|_| beside.into());
     std::fs::create_dir_all(&folder).unwrap();
     let (cases, seed) = fuzz_cases(100);
     for Object { name, mesh } in objects(seed, cases) {
