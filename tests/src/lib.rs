@@ -1,5 +1,7 @@
 //! Fixtures for the contract tests: the smallest run that is still the real thing.
 
+pub mod objects;
+
 use burn::module::Module;
 use clothcombo_model::{ClothCombo, gradient_bucket};
 use clothcombo_trainer::config::{Config, OptimizerConfig, Trains, load};

@@ -12,6 +12,7 @@ mod graph;
 mod intersections;
 mod messy_garments;
 mod other_bodies;
+mod other_objects;
 mod parallel_scenes;
 mod resume;
 mod score_oracle;
