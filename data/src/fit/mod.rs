@@ -5,8 +5,11 @@
 mod anatomy;
 mod arm_pose;
 mod body_field;
+mod climb;
+mod cloth;
 mod coverage;
 mod error;
+mod judge;
 mod likelihood;
 mod placed;
 mod placement;
@@ -36,7 +39,8 @@ use clothcombo_physics::mesh::vertex_normals;
 use clothcombo_physics::vec3::{norm, sub};
 use clothcombo_physics::{Topology, TriMesh};
 use repair::{finish_seams, repair, turn_outward};
-use search::{Cloth, Search};
+use cloth::Cloth;
+use search::Search;
 use settings::{MOST_STRETCH, MOST_STRETCHED};
 
 pub static TRUTH: std::sync::Mutex<Option<Placement>> = std::sync::Mutex::new(None);
@@ -99,16 +103,14 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
     if !units.iter().any(|u| search.is_plausible_extent(extent * u.metres())) {
         return Err(FitError::Extent { extent, unit: settings.unit, reach: search.reach });
     }
-    let cloth = Cloth { positions: &sheet.positions, faces: &sheet.faces, borders: &topology.boundary_loops };
+    let cloth = Cloth::new(&sheet.positions, &sheet.faces, &topology.boundary_loops);
     let candidates = search.candidates(&cloth, extent, settings);
     if std::env::var("FIT_DEBUG").is_ok() {
         if let Some(t) = *TRUTH.lock().unwrap() {
-            search.debug(&t, &cloth);
-            let c = search.judge(t, &cloth, settings);
+            let c = search.judge(&cloth, settings).judged(t);
             eprintln!("TRUTH {:7.2} fit {:6.3} x{} worn {} best {:7.2}", c.score, c.fit, c.crossings, c.is_worn, candidates[0].score);
         }
         for c in candidates.iter().take(4) {
-            search.debug(&c.placement, &cloth);
             let p = &c.placement;
             eprintln!(
                 "   {:7.2} fit {:6.3} x{} worn {} | {} {} {} {:?} arms {:.1} t {:.3?}",

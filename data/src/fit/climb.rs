@@ -1,0 +1,45 @@
+//! Climbs from a placement to the best one near it.
+
+use super::judge::{Candidate, Judge};
+
+/// How steps shrink (m), and what counts on the way.
+pub(super) struct Steps {
+    pub from: f64,
+    pub to: f64,
+    pub is_sharp: bool,
+    pub is_fine: bool,
+}
+
+/// Slid along the three axes, and the arms turned, as long as that helps; what settings fix stays.
+pub(super) fn climbed(judge: &Judge, start: &Candidate, steps: &Steps) -> Candidate {
+    let turned = judge.turned(&start.placement, start.rim, steps.is_fine);
+    let mut best = judge.scored(start.placement, &turned, steps.is_sharp, Some(start));
+    let slides = judge.settings.offset.is_none();
+    let raises = best.placement.arm_angle_degrees != 0.0 && !judge.field.is_posed();
+    let mut step = steps.from;
+    while step > steps.to {
+        let mut is_better = false;
+        for axis in 0..4 {
+            for sign in [-1.0, 1.0] {
+                let mut trial = best.placement;
+                match axis {
+                    0..3 if slides => trial.translation[[1, 2, 0][axis]] += sign * step,
+                    3 if raises => {
+                        // A sleeve is half a metre long.
+                        let degrees = trial.arm_angle_degrees + sign * (2.0 * step).to_degrees();
+                        trial.arm_angle_degrees = degrees.clamp(3.0, 85.0);
+                    }
+                    _ => continue,
+                }
+                let trial = judge.scored(trial, &turned, steps.is_sharp, Some(start));
+                if trial.score > best.score {
+                    (best, is_better) = (trial, true);
+                }
+            }
+        }
+        if !is_better {
+            step *= 0.5;
+        }
+    }
+    best
+}

@@ -1,0 +1,178 @@
+//! What speaks for a placement: a log-posterior.
+//!
+//! It sums how likely the gaps between cloth and body are for clothes that are worn ([`likelihood`](super::likelihood)), how usual
+//! such a file is ([`Placement::log_prior`]), how its upper rim lies, and whether limbs pass through openings instead of cloth
+//! ([`anatomy`](super::anatomy)).
+
+use super::anatomy::{Opening, Skeleton};
+use super::body_field::{ArmTurn, BodyField};
+use super::cloth::Cloth;
+use super::likelihood::{log_likelihood, rough_log_likelihood};
+use super::placement::Placement;
+use super::settings::FitSettings;
+use crate::asset::Category;
+use clothcombo_physics::vec3::add;
+
+/// Independent samples a garment is worth, and its upper rim: neighbouring cloth lies alike.
+const EVIDENCE: f64 = 40.0;
+const RIM_EVIDENCE: f64 = 8.0;
+/// Log-prior against a garment through whose openings no limbs pass: it decides against any that fits otherwise.
+const UNWORN: f64 = 100.0;
+/// Log-prior against a bone that passes through cloth.
+const CROSSING: f64 = 8.0;
+/// Clothes are as wide on the left as on the right within this (m), or at least at no more than this cost.
+const SYMMETRY: f64 = 0.02;
+const ASYMMETRY_COST: f64 = 8.0;
+/// A border deeper inside the body than this (m), for a larger share of its length, goes around nothing.
+const DEPTH: f64 = 0.012;
+const SHARE: f64 = 0.25;
+
+/// A placement and what speaks for it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Candidate {
+    pub placement: Placement,
+    /// Log-likelihood of the gaps.
+    pub fit: f64,
+    /// Log-posterior up to a constant.
+    pub score: f64,
+    /// Bones that pass through cloth.
+    pub crossings: usize,
+    /// The border that is its upper rim, if the garment hangs from one.
+    pub rim: Option<usize>,
+    /// Whether limbs pass through its openings as through those of clothes.
+    pub is_worn: bool,
+    /// Whether it is a tube around the trunk with no other opening: a skirt or a strapless top.
+    pub is_tube: bool,
+}
+
+/// Judges placements of one garment on one body.
+#[derive(Clone, Copy)]
+pub(super) struct Judge<'a> {
+    pub field: &'a BodyField,
+    pub skeleton: &'a Skeleton,
+    pub cloth: &'a Cloth<'a>,
+    pub settings: &'a FitSettings,
+}
+
+/// Points scaled and turned, but not translated.
+pub(super) struct Turned {
+    pub points: Vec<[f64; 3]>,
+    pub rim: Vec<[f64; 3]>,
+    /// Middle between left and right (m).
+    middle: f64,
+}
+
+impl Judge<'_> {
+    /// The sample points under a placement's scale and turn, with the rim of its border.
+    pub fn turned(&self, placement: &Placement, rim: Option<usize>, is_fine: bool) -> Turned {
+        let untranslated = Placement { translation: [0.0; 3], ..*placement };
+        let samples = if is_fine { &self.cloth.fine } else { &self.cloth.coarse };
+        let points = untranslated.apply(&samples.0);
+        let rim = rim.map_or(Vec::new(), |border| untranslated.apply(&self.cloth.border_points(border)));
+        let end = |pick: fn(f64, f64) -> f64, start| points.iter().map(|p| p[0]).fold(start, pick);
+        let middle = 0.5 * (end(f64::min, f64::MAX) + end(f64::max, f64::MIN));
+        Turned { points, rim, middle }
+    }
+
+    /// By the blunt likelihood, in which a garment some centimetres from its place still counts, or by the sharp one. Openings
+    /// are taken from `like`.
+    pub fn scored(&self, placement: Placement, turned: &Turned, is_sharp: bool, like: Option<&Candidate>) -> Candidate {
+        let (arms, t) = (ArmTurn::new(placement.arm_angle_degrees), placement.translation);
+        let gaps = turned.points.iter().map(|p| self.field.gap(add(*p, t), arms));
+        let fit = match is_sharp {
+            true => log_likelihood(gaps, EVIDENCE),
+            false => rough_log_likelihood(gaps, EVIDENCE),
+        };
+        let aside = (turned.middle + t[0]) / SYMMETRY;
+        let symmetry = if is_sharp { (0.5 * aside * aside).min(ASYMMETRY_COST) } else { 0.0 };
+        let score = fit + placement.log_prior(self.settings) - symmetry + self.rim_score(&turned.rim, &placement);
+        let unknown = Candidate { placement, fit, score, crossings: 0, rim: None, is_worn: true, is_tube: false };
+        Candidate { placement, fit, score, ..like.copied().unwrap_or(unknown) }
+    }
+
+    /// What speaks for the upper rim: it lies on the body, all around, at the waist or above the chest.
+    fn rim_score(&self, rim: &[[f64; 3]], placement: &Placement) -> f64 {
+        if rim.is_empty() {
+            return 0.0;
+        }
+        let (arms, t) = (ArmTurn::new(placement.arm_angle_degrees), placement.translation);
+        let height = rim.iter().map(|p| p[1]).sum::<f64>() / rim.len() as f64 + t[1];
+        let gaps = rim.iter().map(|p| (self.field.gap(add(*p, t), arms).0, 0));
+        log_likelihood(gaps, RIM_EVIDENCE) + self.rim_prior(height)
+    }
+
+    /// Logarithm of the density of an upper rim's height against any height within a body (m).
+    fn rim_prior(&self, height: f64) -> f64 {
+        /// Shares of rims at the waist, above the chest and anywhere else.
+        const USUAL: [f64; 2] = [0.6, 0.35];
+        const ELSEWHERE: f64 = 0.02;
+        let normal = |middle: f64, spread: f64| {
+            (-0.5 * ((height - middle) / spread).powi(2)).exp() / (spread * std::f64::consts::TAU.sqrt())
+        };
+        let shares = match self.settings.category {
+            None => USUAL,
+            Some(Category::Skirt | Category::Trousers) => [1.0, 0.0],
+            Some(_) => [0.0, 1.0],
+        };
+        let levels = self.field.levels;
+        let density = shares[0] * normal(levels.waist - 0.03, 0.035) + shares[1] * normal(levels.armpit - 0.035, 0.03);
+        (density + ELSEWHERE).ln() - 5.0f64.ln()
+    }
+
+    /// What each border goes around, and its mean height (m). A border that runs through the body goes around nothing.
+    fn openings(&self, placement: &Placement) -> Vec<(Opening, f64)> {
+        let arms = ArmTurn::new(placement.arm_angle_degrees);
+        let of_border = |border: usize| {
+            let points = placement.apply(&self.cloth.border(border));
+            let count = points.len().max(1) as f64;
+            let height = points.iter().map(|p| p[1]).sum::<f64>() / count;
+            let inside = points.iter().filter(|p| self.field.is_inside(**p, arms, DEPTH)).count();
+            match inside as f64 > SHARE * count {
+                true => (Opening::Nothing, height),
+                false => (self.skeleton.opening(&points, arms), height),
+            }
+        };
+        (0..self.cloth.borders.len()).map(of_border).collect()
+    }
+
+    /// Whether limbs pass through its openings, and which rim it hangs from.
+    pub fn with_openings(&self, mut candidate: Candidate) -> Candidate {
+        let openings = self.openings(&candidate.placement);
+        let count = |wanted: Opening| openings.iter().filter(|(o, _)| *o == wanted).count();
+        let has = |wanted: Opening| count(wanted) > 0;
+        let limbs = [Opening::Neck, Opening::LeftArm, Opening::RightArm, Opening::LeftLeg, Opening::RightLeg, Opening::Several];
+        let arms = has(Opening::LeftArm) && has(Opening::RightArm);
+        let is_around = count(Opening::Trunk) >= 2 || (has(Opening::Trunk) && limbs.into_iter().any(has)) || arms;
+        // Only sleeves and armholes tell how arms hang.
+        let is_worn = is_around && (arms || candidate.placement.arm_angle_degrees == 0.0);
+        if candidate.is_worn && !is_worn {
+            candidate.score -= UNWORN;
+        }
+        candidate.is_worn = is_worn;
+        candidate.is_tube = count(Opening::Trunk) == 2 && !limbs.into_iter().any(has);
+        candidate.rim = None;
+        if !has(Opening::Neck) && !arms {
+            let trunk = openings.iter().enumerate().filter(|(_, (o, _))| *o == Opening::Trunk);
+            candidate.rim = trunk.max_by(|a, b| a.1.1.total_cmp(&b.1.1)).map(|(border, _)| border);
+        }
+        candidate
+    }
+
+    /// Whether bones pass through its cloth.
+    pub fn with_crossings(&self, mut candidate: Candidate) -> Candidate {
+        let arms = ArmTurn::new(candidate.placement.arm_angle_degrees);
+        let placed = candidate.placement.apply(self.cloth.positions);
+        candidate.crossings = self.skeleton.crossings(&placed, self.cloth.faces, arms);
+        candidate.score -= CROSSING * candidate.crossings as f64;
+        candidate
+    }
+
+    /// A placement as it stands, by everything.
+    pub fn judged(&self, placement: Placement) -> Candidate {
+        let openings = self.with_openings(self.scored(placement, &self.turned(&placement, None, true), true, None));
+        let turned = self.turned(&placement, openings.rim, true);
+        let scored = self.scored(placement, &turned, true, Some(&openings));
+        let score = scored.score - if openings.is_worn { 0.0 } else { UNWORN };
+        self.with_crossings(Candidate { score, ..scored })
+    }
+}
