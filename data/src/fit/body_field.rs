@@ -7,6 +7,7 @@ use crate::generate::garment::Tube;
 use crate::mesh::DistanceGrid;
 use clothcombo_physics::vec3::{add, norm, scale, sub};
 use clothcombo_physics::{Topology, TriMesh};
+use std::sync::Arc;
 
 /// Node spacing of the grids (m).
 const STEP: f64 = 0.02;
@@ -19,13 +20,12 @@ const BAND: f64 = 0.25;
 #[derive(Clone)]
 pub(super) struct BodyField {
     /// The trunk as it is.
-    trunk: DistanceGrid,
+    trunk: Arc<DistanceGrid>,
     /// The trunk as taut cloth sees it.
-    form: DistanceGrid,
-    arms: Vec<Arm>,
-    /// The whole body with arms at one angle, if that is known.
-    posed: Option<DistanceGrid>,
-    column: Option<Tube>,
+    form: Arc<DistanceGrid>,
+    arms: Arc<[Arm]>,
+    /// How much of the left (positive) or right (negative) arm's weight the body next to a point has, for arms at one angle.
+    arm_weights: Option<Arc<DistanceGrid>>,
     pub levels: Levels,
     /// Lowest and highest corner of the zero body (m).
     pub low: [f64; 3],
@@ -46,7 +46,6 @@ pub(super) struct Levels {
     pub armpit: f64,
 }
 
-#[derive(Clone)]
 struct Arm {
     /// +1 for the left arm, −1 for the right one.
     side: f64,
@@ -127,34 +126,67 @@ impl BodyField {
         let spine: Vec<f64> = spine.into_iter().flatten().map(|p| p[2]).collect();
         let spine_z = spine.iter().sum::<f64>() / spine.len().max(1) as f64;
         let arms = left.into_iter().chain(right).collect();
-        Self { trunk, form, arms, posed: None, column, levels, low, high, spine_z }
+        Self { trunk: trunk.into(), form: form.into(), arms, arm_weights: None, levels, low, high, spine_z }
     }
 
-    /// The same for arms lowered by linear blend skinning, as exact at the shoulders as the body is: for this one angle.
-    pub fn posed(&self, posed: &ArmPose, faces: &[[u32; 3]]) -> Self {
-        let grid = DistanceGrid::new(&posed.positions, faces, STEP, BAND);
-        Self { posed: Some(taut(grid, self.column.as_ref(), &self.levels)), ..self.clone() }
+    /// The same for arms lowered by linear blend skinning, for this one angle: cloth is raised to the T-pose by the weights of
+    /// the body next to it, and its distance taken there.
+    pub fn posed(&self, posed: &ArmPose, body: &Body) -> Self {
+        let sides = arm_sides(body);
+        let weight = |face: usize| {
+            let of_vertex = |v: &u32| {
+                let (joints, weights) = body.skin_weights.row(*v as usize);
+                let signed = joints.iter().zip(weights).filter_map(|(joint, weight)| {
+                    sides[usize::from(*joint)].map(|side| [1.0, -1.0][side] * f64::from(*weight))
+                });
+                signed.sum::<f64>()
+            };
+            body.faces[face].iter().map(of_vertex).sum::<f64>() / 3.0
+        };
+        let (_, weights) = DistanceGrid::with_attribute(&posed.positions, &body.faces, STEP, BAND, weight);
+        Self { arm_weights: Some(Arc::new(weights)), ..self.clone() }
     }
 
     /// Signed distance of `p` to the body as taut cloth sees it (m), outside positive, at most the band of the grids; and the
     /// part of the body that is next to it, below [`PARTS`].
     pub fn gap(&self, p: [f64; 3], arms: ArmTurn) -> (f64, usize) {
+        let (p, arms) = match &self.arm_weights {
+            Some(weights) => (self.raised(p, weights.distance(p), arms), ArmTurn::new(0.0)),
+            None => (p, arms),
+        };
         let mut gap = self.form.distance(p);
         let Levels { crotch, waist, armpit, .. } = self.levels;
         let mut part = [crotch, waist, armpit].iter().filter(|level| **level < p[1]).count();
-        for arm in &self.arms {
+        for arm in self.arms.iter() {
             let raised = arms.raised(p, arm.shoulder, arm.side);
             let distance = arm.distance.distance(raised).min(norm(sub(p, arm.shoulder)) - arm.radius);
             if distance < gap {
                 (gap, part) = (distance, PARTS - 1);
             }
         }
-        (self.posed.as_ref().map_or(gap, |posed| posed.distance(p)), part)
+        (gap, part)
+    }
+
+    /// Inverse of linear blend skinning by a weight of the left (positive) or right (negative) arm.
+    fn raised(&self, p: [f64; 3], weight: f64, arms: ArmTurn) -> [f64; 3] {
+        let side = weight.signum();
+        let Some(arm) = self.arms.iter().find(|arm| arm.side == side) else { return p };
+        let w = weight.abs();
+        // The blend of rest and rotation in the plane of the arms is a rotation times a scale.
+        let (cosine, sine) = (1.0 - w + w * arms.cosine, w * arms.sine);
+        let squared = cosine * cosine + sine * sine;
+        if squared < 1e-3 {
+            return p;
+        }
+        let blend = ArmTurn { sine: sine / squared, cosine: cosine / squared };
+        let mut raised = blend.raised(p, arm.shoulder, side);
+        raised[2] = p[2];
+        raised
     }
 
     /// Whether the arms are at one angle.
     pub fn is_posed(&self) -> bool {
-        self.posed.is_some()
+        self.arm_weights.is_some()
     }
 
     /// Whether `p` is at least this deep (m) inside the body.

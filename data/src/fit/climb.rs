@@ -15,7 +15,7 @@ pub(super) fn climbed(judge: &Judge, start: &Candidate, steps: &Steps) -> Candid
     let turned = judge.turned(&start.placement, start.rim, steps.is_fine);
     let mut best = judge.scored(start.placement, &turned, steps.is_sharp, Some(start));
     let slides = judge.settings.offset.is_none();
-    let raises = best.placement.arm_angle_degrees != 0.0 && !judge.field.is_posed();
+    let raises = best.placement.arm_angle_degrees != 0.0;
     let mut step = steps.from;
     while step > steps.to {
         let mut is_better = false;

@@ -175,10 +175,15 @@ impl<'a> Search<'a> {
     fn judge_again_posed(&self, judge: &Judge, ranked: &mut Vec<Candidate>) {
         for candidate in ranked.iter_mut().filter(|c| c.placement.arm_angle_degrees != 0.0).take(POSED) {
             let posed = ArmPose::new(self.body, candidate.placement.arm_angle_degrees);
-            let field = self.field.posed(&posed, &self.body.faces);
+            let field = self.field.posed(&posed, self.body);
             let judge = Judge { field: &field, ..*judge };
             let steps = Steps { from: 0.02, to: 0.0005, is_sharp: true, is_fine: true };
             *candidate = judge.judged(climbed(&judge, candidate, &steps).placement);
+            if std::env::var("FIT_DEBUG").is_ok() {
+                let t = super::TRUTH.lock().unwrap().unwrap();
+                let c = judge.judged(t);
+                eprintln!("   posed: truth {:.1} best {:.1} at {:?}", c.score, candidate.score, candidate.placement.translation);
+            }
         }
         sort(ranked);
     }

@@ -21,6 +21,17 @@ pub(crate) struct DistanceGrid {
 impl DistanceGrid {
     /// Nodes are `step` (m) apart; distances are clamped to `band` (m).
     pub fn new(positions: &[[f64; 3]], faces: &[[u32; 3]], step: f64, band: f64) -> Self {
+        Self::with_attribute(positions, faces, step, band, |_| 0.0).0
+    }
+
+    /// The same, and a grid of what the nearest face has, 0 beyond the band.
+    pub fn with_attribute(
+        positions: &[[f64; 3]],
+        faces: &[[u32; 3]],
+        step: f64,
+        band: f64,
+        attribute: impl Fn(usize) -> f64,
+    ) -> (Self, Self) {
         let (mut low, mut high) = ([f64::MAX; 3], [f64::MIN; 3]);
         for p in positions {
             for axis in 0..3 {
@@ -86,7 +97,9 @@ impl DistanceGrid {
             .zip(inside)
             .map(|(d, votes)| if votes >= 2 { -d.sqrt() as f32 } else { d.sqrt() as f32 })
             .collect();
-        Self { lattice, values, band }
+        let of_face = |f: &u32| if *f == u32::MAX { 0.0 } else { attribute(*f as usize) as f32 };
+        let attributes = nearest.iter().map(of_face).collect();
+        (Self { lattice, values, band }, Self { lattice, values: attributes, band: 0.0 })
     }
 
     /// Takes the smaller of the distance and `other` (m) at every node.
@@ -102,7 +115,7 @@ impl DistanceGrid {
         }
     }
 
-    /// Signed distance at `p` (m), clamped to the band.
+    /// Value at `p`: the signed distance (m), clamped to the band.
     pub fn distance(&self, p: [f64; 3]) -> f64 {
         let mut cell = [0; 3];
         let mut t = [0.0; 3];
