@@ -2,7 +2,6 @@
 
 use super::placement::Unit;
 use super::settings::{MAX_VERTICES, MIN_TRIANGLES, MOST_STRETCH};
-use super::sitting::Sitting;
 use thiserror::Error;
 
 /// Why a mesh is not fitted.
@@ -48,20 +47,17 @@ pub enum FitError {
         /// Where it lies.
         place: &'static str,
     },
-    /// No cloth around the trunk.
+    /// No placement is believed.
     #[error(
-        "touches no body: in the best placement there is cloth in {:.0} % of the directions around the trunk, {:.0} mm away on \
-         average", 100.0 * sitting.wrap, 1e3 * sitting.mean_distance
+        "no placement on this body looks worn; the best: {best}{}; hints, if it is a garment of the six categories: --unit, --up, \
+         --turn, --arms, --offset, --category, or --from-body with the body it was made on",
+        second.as_ref().map(|s| format!("; the second: {s}")).unwrap_or_default()
     )]
-    OffBody {
-        /// How it sits.
-        sitting: Sitting,
-    },
-    /// Mostly inside the body.
-    #[error("does not fit this body: {:.0} % of it lies inside in the best placement", 100.0 * sitting.inside)]
-    Inside {
-        /// How it sits.
-        sitting: Sitting,
+    Implausible {
+        /// The best reading and what speaks against it.
+        best: String,
+        /// The second best.
+        second: Option<String>,
     },
     /// Too small, or no garment in this placement.
     #[error(

@@ -17,7 +17,7 @@ use clothcombo_physics::vec3::add;
 const EVIDENCE: f64 = 40.0;
 const RIM_EVIDENCE: f64 = 8.0;
 /// Log-prior against a garment through whose openings no limbs pass: it decides against any that fits otherwise.
-const UNWORN: f64 = 100.0;
+pub(super) const UNWORN: f64 = 150.0;
 /// Log-prior against a bone that passes through cloth.
 const CROSSING: f64 = 8.0;
 /// Clothes are as wide on the left as on the right within this (m), or at least at no more than this cost.

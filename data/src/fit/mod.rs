@@ -20,6 +20,7 @@ mod search;
 mod settings;
 mod sheet;
 mod sitting;
+mod verdict;
 
 pub use coverage::off_trunk;
 pub use error::FitError;
@@ -42,8 +43,8 @@ use repair::{finish_seams, repair, turn_outward};
 use cloth::Cloth;
 use search::Search;
 use settings::{MOST_STRETCH, MOST_STRETCHED};
+use verdict::{Verdict, verdict};
 
-pub static TRUTH: std::sync::Mutex<Option<Placement>> = std::sync::Mutex::new(None);
 /// Least distance between a fitted vertex and the body (m): the ε of the paper's body collision loss.
 const CLEARANCE: f64 = 0.002;
 
@@ -105,21 +106,10 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
     }
     let cloth = Cloth::new(&sheet.positions, &sheet.faces, &topology.boundary_loops);
     let candidates = search.candidates(&cloth, extent, settings);
-    if std::env::var("FIT_DEBUG").is_ok() {
-        if let Some(t) = *TRUTH.lock().unwrap() {
-            let c = search.judge(&cloth, settings).judged(t);
-            eprintln!("TRUTH {:7.2} fit {:6.3} x{} worn {} best {:7.2}", c.score, c.fit, c.crossings, c.is_worn, candidates[0].score);
-        }
-        for c in candidates.iter().take(4) {
-            let p = &c.placement;
-            eprintln!(
-                "   {:7.2} fit {:6.3} x{} worn {} | {} {} {} {:?} arms {:.1} t {:.3?}",
-                c.score, c.fit, c.crossings, c.is_worn, p.unit, p.up, p.turn_degrees, p.origin, p.arm_angle_degrees, p.translation
-            );
-        }
-    }
-    let Some(placement) = candidates.first().map(|c| c.placement) else { return Err(FitError::Closed) };
-    let sitting = Sitting::default();
+    let Verdict { candidate, sitting, doubts } =
+        verdict(&candidates, &cloth.fine, settings, |placement| search.measured(&cloth, placement))?;
+    let placement = candidate.placement;
+    let rest_surface = search.into_surface();
     let metres = placement.unit.metres();
     let seams = finish_seams(&mut sheet, file, settings, metres);
     let follows = sheet.followed(file, metres);
@@ -130,9 +120,8 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
     let arms = ArmPose::new(body, placement.arm_angle_degrees);
     let mut positions =
         arms.to_t_pose(&placed, &sheet.faces, settings.category, body).map_err(FitError::Mesh)?;
-    if false { refuse_other_things(&positions, body, &sitting)?; }
+    refuse_other_things(&positions, body)?;
 
-    let rest_surface = ArmPose::new(body, 0.0).surface;
     turn_outward(&mut sheet, &positions, &topology, &rest_surface);
     let before = contact(&positions, &rest_surface);
     let unpushed = positions.clone();
@@ -161,6 +150,7 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
         file_faces: file.polygon_count(),
         placement,
         sitting,
+        doubts: doubts.iter().map(ToString::to_string).collect(),
         repairs: sheet.repairs,
         seams,
         dropped_pieces,
@@ -199,23 +189,14 @@ fn stretched(topology: &Topology, before: &[[f64; 3]], after: &[[f64; 3]]) -> f6
     topology.edges.iter().filter(is_long).count() as f64 / topology.edges.len().max(1) as f64
 }
 
-fn refuse_other_things(positions: &[[f64; 3]], body: &Body, sitting: &Sitting) -> Result<(), FitError> {
+fn refuse_other_things(positions: &[[f64; 3]], body: &Body) -> Result<(), FitError> {
     let (low, high) = body.zero_body().bounds();
     let [lowest, highest] = bounds(positions);
     let spans = |a: usize, slack: f64| lowest[a] < low[a] + slack && highest[a] > high[a] - slack;
     if spans(1, 0.04) && spans(0, 0.1) {
         return Err(FitError::Body);
     }
-    if let Some(place) = off_trunk(positions, body) {
-        return Err(FitError::OffTrunk { place });
-    }
-    if sitting.wrap < 0.5 || sitting.mean_distance > 0.3 {
-        return Err(FitError::OffBody { sitting: *sitting });
-    }
-    if sitting.inside > 0.45 {
-        return Err(FitError::Inside { sitting: *sitting });
-    }
-    Ok(())
+    off_trunk(positions, body).map_or(Ok(()), |place| Err(FitError::OffTrunk { place }))
 }
 
 fn pieces(mesh: &TriMesh, topology: &Topology) -> Vec<MeshPiece> {

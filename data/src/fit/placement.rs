@@ -181,6 +181,19 @@ impl Placement {
         unit + up + turn + arms + origin
     }
 
+    /// In words, short: what a reader compares.
+    pub(super) fn reading(&self) -> String {
+        let arms = match self.arm_angle_degrees {
+            0.0 => "T-pose".to_owned(),
+            degrees => format!("A-pose, arms {degrees:.0}° down"),
+        };
+        let [x, y, z] = self.translation;
+        format!(
+            "unit {}, up {}, turned {}°, {arms}, origin at {x:.3}, {y:.3}, {z:.3} m",
+            self.unit, self.up, self.turn_degrees
+        )
+    }
+
     /// The turn without scale and translation.
     pub fn turn(&self) -> Matrix3 {
         // Quarter turns are exact.

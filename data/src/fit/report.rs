@@ -174,6 +174,8 @@ pub struct FitReport {
     pub placement: Placement,
     /// How the garment sat there before anything was pushed.
     pub sitting: Sitting,
+    /// What speaks against the placement: readings nearly as good, each with the flags that settle it.
+    pub doubts: Vec<String>,
     /// All repairs, in the order they were made.
     pub repairs: Vec<Repair>,
     /// Seams that were joined, and those that stay open.
@@ -281,6 +283,9 @@ impl fmt::Display for FitReport {
             "result    {} vertices, {} triangles, edges {:.1} mm ({:.1}–{:.1})",
             m.vertices, m.triangles, m.edge_median_mm, m.edge_min_mm, m.edge_max_mm
         )?;
+        for doubt in &self.doubts {
+            writeln!(f, "warning   {doubt}")?;
+        }
         if let Some(misfit) = self.misfit() {
             writeln!(f, "warning   {misfit}")?;
         }

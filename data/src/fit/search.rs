@@ -6,11 +6,13 @@ use super::arm_pose::ArmPose;
 use super::body_field::BodyField;
 use super::climb::{Steps, climbed};
 use super::cloth::Cloth;
-use super::judge::{Candidate, Judge};
+use super::judge::{Candidate, Judge, UNWORN};
 use super::placement::{Origin, Placement, Unit, UpAxis};
 use super::settings::FitSettings;
+use super::sitting::Sitting;
 use crate::asset::Body;
 use crate::mesh::bounds;
+use clothcombo_physics::query::Surface;
 use clothcombo_physics::vec3::add;
 use rayon::prelude::*;
 
@@ -37,6 +39,7 @@ pub(super) struct Search<'a> {
     body: &'a Body,
     field: BodyField,
     skeleton: Skeleton,
+    surface: Surface<f64>,
     /// Largest extent of the body (m).
     pub reach: f64,
 }
@@ -44,12 +47,29 @@ pub(super) struct Search<'a> {
 impl<'a> Search<'a> {
     pub fn new(body: &'a Body) -> Self {
         let reach = body.zero_body().extent();
-        Self { body, field: BodyField::new(body), skeleton: Skeleton::new(body), reach }
+        let surface = Surface::new(body.template.clone(), body.faces.clone());
+        Self { body, field: BodyField::new(body), skeleton: Skeleton::new(body), surface, reach }
     }
 
     /// Whether a garment of this largest extent (m) can fit this body at all.
     pub fn is_plausible_extent(&self, extent: f64) -> bool {
         extent >= 0.1 * self.reach && extent <= 1.2 * self.reach
+    }
+
+    /// How a garment sits in its own arm pose, and its height (m).
+    pub fn measured(&self, cloth: &Cloth, placement: &Placement) -> (Sitting, f64) {
+        let points = placement.apply(&cloth.fine.0);
+        let [low, high] = bounds(&points);
+        let sitting = match placement.arm_angle_degrees {
+            0.0 => Sitting::new(&points, self.body, &self.surface),
+            degrees => Sitting::new(&points, self.body, &ArmPose::new(self.body, degrees).surface),
+        };
+        (sitting, high[1] - low[1])
+    }
+
+    /// The surface of the zero body in T-pose.
+    pub fn into_surface(self) -> Surface<f64> {
+        self.surface
     }
 
     /// The judge of a garment.
@@ -81,7 +101,7 @@ impl<'a> Search<'a> {
         let mut last: Vec<Candidate> = best
             .par_iter()
             .map(|c| judge.judged(climbed(&judge, c, &steps).placement))
-            .chain(self.usual(&bases, settings).into_par_iter().map(|p| judge.judged(p)))
+            .chain(self.usual(&bases, settings).into_par_iter().map(|p| self.judged_as_given(&judge, p)))
             .collect();
         sort(&mut last);
         self.judge_again_posed(&judge, &mut last);
@@ -171,6 +191,15 @@ impl<'a> Search<'a> {
         bases.iter().flat_map(at).collect()
     }
 
+    /// A file as it stands counts as worn if it lies around the trunk, however its borders run.
+    fn judged_as_given(&self, judge: &Judge, placement: Placement) -> Candidate {
+        let candidate = judge.judged(placement);
+        match candidate.is_worn || !self.measured(judge.cloth, &placement).0.is_snug() {
+            true => candidate,
+            false => Candidate { score: candidate.score + UNWORN, is_worn: true, ..candidate },
+        }
+    }
+
     /// The best in A-pose, on a body posed like that: the shoulders of the search's body are rigid.
     fn judge_again_posed(&self, judge: &Judge, ranked: &mut Vec<Candidate>) {
         for candidate in ranked.iter_mut().filter(|c| c.placement.arm_angle_degrees != 0.0).take(POSED) {
@@ -179,11 +208,6 @@ impl<'a> Search<'a> {
             let judge = Judge { field: &field, ..*judge };
             let steps = Steps { from: 0.02, to: 0.0005, is_sharp: true, is_fine: true };
             *candidate = judge.judged(climbed(&judge, candidate, &steps).placement);
-            if std::env::var("FIT_DEBUG").is_ok() {
-                let t = super::TRUTH.lock().unwrap().unwrap();
-                let c = judge.judged(t);
-                eprintln!("   posed: truth {:.1} best {:.1} at {:?}", c.score, candidate.score, candidate.placement.translation);
-            }
         }
         sort(ranked);
     }

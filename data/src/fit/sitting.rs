@@ -1,30 +1,55 @@
-//! How well a placed garment sits.
+//! How a placed garment sits on the body.
 
+use super::body_field::joint;
+use crate::asset::Body;
+use clothcombo_physics::query::{Distance, Surface};
 use serde::Serialize;
 
-/// How well a placed garment sits.
+/// Number of directions around the trunk.
+const SECTORS: usize = 8;
+/// Half the height around a joint of the spine in which cloth is looked for (m).
+const SLICE: f64 = 0.08;
+/// Cloth this deep in the body is inside it (m): less is a matter of the body's shape.
+const DEPTH: f64 = 0.003;
+
+/// How a placed garment sits on the body.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Sitting {
     /// Mean distance of the cloth to the body, inside or outside (m).
     pub mean_distance: f64,
+    /// Distance of the nearest twentieth of the cloth (m), negative inside.
+    pub nearest: f64,
     /// Share of the cloth inside the body, 0–1.
     pub inside: f64,
     /// Share of the directions around the trunk in which there is cloth, 0–1, at the best height.
     pub wrap: f64,
-    #[serde(skip)]
-    pub(super) cost: f64,
 }
 
 impl Sitting {
-    pub(super) fn is_good(&self) -> bool {
-        let is_close = self.inside < 0.12 && self.wrap >= 0.75 && self.mean_distance < 0.06;
-        // A wide skirt is far from the legs, but surrounds them and is nowhere inside.
-        let is_wide = self.inside < 0.01 && self.wrap == 1.0 && self.mean_distance < 0.25;
-        is_close || is_wide
+    /// Measures points of a garment (m) against the surface of the body.
+    pub(super) fn new(points: &[[f64; 3]], body: &Body, surface: &Surface<f64>) -> Self {
+        let mut gaps: Vec<f64> = points.iter().map(|p| surface.gap(*p, Distance::ClosestPoint).gap).collect();
+        gaps.sort_by(f64::total_cmp);
+        let count = gaps.len().max(1) as f64;
+        let spine = ["pelvis", "spine1", "spine2", "spine3"].iter().filter_map(|name| joint(body, name));
+        let wrap = |centre: [f64; 3]| {
+            let mut sectors = [false; SECTORS];
+            for p in points.iter().filter(|p| (p[1] - centre[1]).abs() < SLICE) {
+                let turn = (p[0] - centre[0]).atan2(p[2] - centre[2]) / std::f64::consts::TAU;
+                sectors[((turn.rem_euclid(1.0) * SECTORS as f64) as usize).min(SECTORS - 1)] = true;
+            }
+            sectors.iter().filter(|s| **s).count() as f64 / SECTORS as f64
+        };
+        Self {
+            mean_distance: gaps.iter().map(|g| g.abs()).sum::<f64>() / count,
+            nearest: gaps.get(gaps.len() / 20).copied().unwrap_or(f64::MAX),
+            inside: gaps.iter().filter(|g| **g < -DEPTH).count() as f64 / count,
+            wrap: spine.map(wrap).fold(0.0, f64::max),
+        }
     }
 
-    /// Whether the cloth follows the trunk, be it partly inside: made for another body, but no hat and no shoe.
-    pub(super) fn is_around_trunk(&self) -> bool {
-        self.wrap >= 0.75 && self.mean_distance < 0.02
+    /// Whether cloth that is not known to be worn lies on the trunk all around.
+    pub(super) fn is_snug(&self) -> bool {
+        self.inside < 0.12 && self.wrap >= 0.75 && self.mean_distance < 0.06
     }
 }

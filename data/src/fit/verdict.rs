@@ -1,0 +1,142 @@
+//! Which placement is taken, what else it could be, and when none is believed.
+
+use super::error::FitError;
+use super::judge::Candidate;
+use super::placement::{Origin, Placement};
+use super::samples::Samples;
+use super::settings::FitSettings;
+use super::sitting::Sitting;
+use clothcombo_physics::vec3::{norm, sub};
+use std::fmt;
+
+/// Another reading whose log-posterior is this near to the best is told.
+const NEAR_TIE: f64 = 6.0;
+/// Readings nearer to each other than this are the same (m).
+const SAME: f64 = 0.02;
+/// Largest share of a garment that may lie inside the body where it is worn.
+const MOST_INSIDE: f64 = 0.25;
+/// A garment touches the body: a twentieth of it is nearer than this (m).
+const FARTHEST: f64 = 0.08;
+/// Least height of a tube around the trunk (m): lower ones are belts.
+const LEAST_HEIGHT: f64 = 0.09;
+
+/// A doubt about a placement that was taken.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Doubt {
+    /// Another reading is nearly as good.
+    NearTie { taken: Placement, other: Placement, apart: f64 },
+    /// A tube may be a skirt or a strapless top.
+    Tube,
+}
+
+impl fmt::Display for Doubt {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NearTie { taken, other, apart } => {
+                let flags = differences(taken, other);
+                write!(
+                    f,
+                    "another placement, {:.0} mm away, fits nearly as well: {}; {} settles it",
+                    1e3 * apart,
+                    other.reading(),
+                    flags.join(" ")
+                )
+            }
+            Self::Tube => f.write_str(
+                "a tube with two openings may be a skirt at the waist or a strapless top at the chest; --category settles it",
+            ),
+        }
+    }
+}
+
+/// Flags by which the placement taken differs from another, as they fix the one taken.
+fn differences(taken: &Placement, other: &Placement) -> Vec<String> {
+    let mut flags = Vec::new();
+    if taken.unit != other.unit {
+        flags.push(format!("--unit {}", taken.unit));
+    }
+    if taken.up != other.up {
+        flags.push(format!("--up {}", taken.up));
+    }
+    if taken.turn_degrees != other.turn_degrees {
+        flags.push(format!("--turn {}", taken.turn_degrees));
+    }
+    if (taken.arm_angle_degrees == 0.0) != (other.arm_angle_degrees == 0.0) {
+        flags.push(format!("--arms {}", if taken.arm_angle_degrees == 0.0 { "t" } else { "a" }));
+    }
+    if flags.is_empty() {
+        let [x, y, z] = taken.translation;
+        flags.push(format!("--offset {x:.3},{y:.3},{z:.3}"));
+    }
+    flags
+}
+
+/// Why a candidate is not believed; `None` if it is.
+fn implausibility(candidate: &Candidate, sitting: &Sitting, height: f64) -> Option<String> {
+    let percent = |share: f64| 100.0 * share;
+    if !candidate.is_worn {
+        return Some("no opening goes around the trunk, the neck or both arms".into());
+    }
+    if candidate.crossings > 0 {
+        return Some(format!("{} bones of the body pass through the cloth", candidate.crossings));
+    }
+    if candidate.is_tube && height < LEAST_HEIGHT {
+        return Some(format!("a band of {:.0} mm around the trunk, such as a belt", 1e3 * height));
+    }
+    if sitting.inside > MOST_INSIDE {
+        return Some(format!("{:.0} % of it lies inside the body", percent(sitting.inside)));
+    }
+    if sitting.nearest > FARTHEST {
+        return Some(format!("it stays {:.0} mm away from the body", 1e3 * sitting.nearest));
+    }
+    None
+}
+
+/// A placement and the doubts about it.
+pub(super) struct Verdict {
+    pub candidate: Candidate,
+    pub sitting: Sitting,
+    pub doubts: Vec<Doubt>,
+}
+
+/// Takes the best of `candidates`, the best first. `measured` measures how one sits, and its height (m).
+pub(super) fn verdict(
+    candidates: &[Candidate],
+    samples: &Samples,
+    settings: &FitSettings,
+    measured: impl Fn(&Placement) -> (Sitting, f64),
+) -> Result<Verdict, FitError> {
+    let (mut believed, mut refused): (Vec<(Candidate, Sitting)>, Vec<(Placement, String)>) = Default::default();
+    for candidate in candidates.iter().take(8) {
+        // What is far worse than one that is believed is not looked at.
+        if believed.first().is_some_and(|(best, _)| candidate.score < best.score - NEAR_TIE) {
+            break;
+        }
+        let (sitting, height) = measured(&candidate.placement);
+        match implausibility(candidate, &sitting, height) {
+            None => believed.push((*candidate, sitting)),
+            Some(why) => refused.push((candidate.placement, why)),
+        }
+    }
+    let Some((candidate, sitting)) = believed.first().copied() else {
+        let mut readings = refused.into_iter().map(|(p, why)| format!("{} ({why})", p.reading()));
+        let best = readings.next().unwrap_or_else(|| "none".into());
+        return Err(FitError::Implausible { best, second: readings.next() });
+    };
+    let taken = candidate.placement;
+    let points = taken.apply(&samples.0);
+    let apart = |other: &Placement| {
+        let sum: f64 = other.apply(&samples.0).iter().zip(&points).map(|(a, b)| norm(sub(*a, *b))).sum();
+        sum / points.len().max(1) as f64
+    };
+    let mut doubts = Vec::new();
+    let other = believed[1..].iter().map(|(c, _)| (c.placement, apart(&c.placement))).find(|(_, d)| *d > SAME);
+    if let Some((other, apart)) = other {
+        doubts.push(Doubt::NearTie { taken, other, apart });
+    }
+    let is_usual = taken.origin != Origin::Elsewhere || settings.offset.is_some();
+    if candidate.is_tube && settings.category.is_none() && !is_usual {
+        doubts.push(Doubt::Tube);
+    }
+    Ok(Verdict { candidate, sitting, doubts })
+}
