@@ -7,81 +7,103 @@
 use super::body_field::PARTS;
 use std::sync::LazyLock;
 
-/// Distances at which cloth may begin to lie on the body (m).
+/// Distances at which cloth may begin to lie on the body, its ease (m).
 const EASES: [f64; 12] = [0.001, 0.003, 0.005, 0.0075, 0.010, 0.0125, 0.015, 0.018, 0.021, 0.025, 0.030, 0.036];
-/// Scale of what is nearer than that (m).
+/// How far beyond the ease it lies, on average (m).
+const SPREADS: [f64; 4] = [0.002, 0.004, 0.008, 0.016];
+const KINDS: usize = EASES.len() * SPREADS.len();
+/// How much nearer than the ease some of it is, on average (m).
 const NEARER: f64 = 0.0015;
-/// Scale of what lies there (m).
-const LYING: [f64; 4] = [0.002, 0.004, 0.008, 0.016];
 /// Mean distance where it hangs (m).
 const HANGING: f64 = 0.2;
 /// Mean depth where it is inside (m).
 const DEPTH: f64 = 0.01;
 /// Shares of what lies, hangs and is inside.
 const SHARES: [f64; 3] = [0.54, 0.40, 0.06];
-/// Clothes are made to lie this near (m): scale of the prior on the ease.
-const USUAL_EASE: f64 = 0.005;
+/// Scale of the prior on the ease (m): clothes are made to lie near.
+const USUAL_EASE: f64 = 0.01;
 
-/// Range and resolution of the table (m).
+/// Range and resolution of the tables (m).
 const LOW: f64 = -0.25;
 const HIGH: f64 = 0.25;
 const RESOLUTION: f64 = 0.001;
-const KINDS: usize = EASES.len() * LYING.len();
 const ROWS: usize = ((HIGH - LOW) / RESOLUTION) as usize + 1;
 
-static TABLE: LazyLock<Vec<[f32; KINDS]>> = LazyLock::new(|| {
-    (0..ROWS).map(|i| std::array::from_fn(|k| log_density(LOW + i as f64 * RESOLUTION, EASES[k % EASES.len()], LYING[k / EASES.len()]) as f32)).collect()
+/// Logarithms of the density of each gap for each ease and spread.
+static SHARP: LazyLock<Vec<[f32; KINDS]>> = LazyLock::new(|| {
+    let density = |gap, kind| sharp_log_density(gap, EASES[kind % EASES.len()], SPREADS[kind / EASES.len()]) as f32;
+    table(|gap| std::array::from_fn(|kind| density(gap, kind)))
 });
 
-/// Logarithm of the density of a gap (1/m).
-fn log_density(gap: f64, ease: f64, spread: f64) -> f64 {
-    let (nearer, hang, depth, share) = (env("NEARER", 0.0015), env("HANG", 0.2), env("DEPTH", 0.01), env("INS", 0.06));
-    let from = gap - ease;
-    let lying = (-from.max(0.0) / spread).exp() * (from.min(0.0) / nearer).exp() / (spread + nearer);
-    let [hanging, inside] = match gap >= 0.0 {
-        true => [(-gap / hang).exp() / hang, 0.0],
-        false => [0.0, (gap / depth).exp() / depth],
-    };
-    (SHARES[0] * lying + SHARES[1] * hanging + share * inside).max(1e-9).ln()
+/// The same for a garment some centimetres away from its place.
+static ROUGH: LazyLock<Vec<f32>> = LazyLock::new(|| table(|gap| rough_log_density(gap) as f32));
+
+fn table<T>(of_gap: impl Fn(f64) -> T) -> Vec<T> {
+    (0..ROWS).map(|row| of_gap(LOW + row as f64 * RESOLUTION)).collect()
 }
-
-/// Logarithm of the density of the gaps (m) at each part of the body, at the most likely ease and spread of each part.
-pub(super) fn log_likelihood(gaps: impl ExactSizeIterator<Item = (f64, usize)>, evidence: f64) -> f64 {
-    let count = gaps.len().max(1) as f64;
-    let mut sums = [[0.0f32; KINDS]; PARTS];
-    for (gap, part) in gaps {
-        sums[part].iter_mut().zip(&TABLE[row(gap)]).for_each(|(s, l)| *s += l);
-    }
-    let score = |(k, sum): (usize, &f32)| evidence * f64::from(*sum) / count - EASES[k % EASES.len()] / *USUAL;
-    sums.iter().map(|sums| sums.iter().enumerate().map(score).fold(f64::MIN, f64::max)).sum()
-}
-
-static USUAL: LazyLock<f64> = LazyLock::new(|| env("USUAL", 0.01));
-
-
-/// The same for a garment that may be some centimetres away from its place.
-pub(super) fn rough_log_likelihood(gaps: impl ExactSizeIterator<Item = (f64, usize)>, evidence: f64) -> f64 {
-    let count = gaps.len().max(1) as f64;
-    let sum: f64 = gaps.map(|(gap, _)| f64::from(ROUGH[row(gap)])).sum();
-    evidence * sum / count
-}
-
-static ROUGH: LazyLock<Vec<f32>> = LazyLock::new(|| {
-    (0..ROWS)
-        .map(|i| {
-            let gap = LOW + i as f64 * RESOLUTION;
-            let lying = (-0.5 * ((gap - 0.012) / 0.02).powi(2)).exp() / (0.02 * 2.5066);
-            let hanging = (-gap.max(0.0) / 0.1).exp() / 0.1;
-            let inside = (gap.min(0.0) / 0.02).exp() ;
-            (0.5 * lying + 0.5 * hanging * inside).max(1e-9).ln() as f32
-        })
-        .collect()
-});
 
 fn row(gap: f64) -> usize {
     ((gap - LOW) / RESOLUTION + 0.5).clamp(0.0, (ROWS - 1) as f64) as usize
 }
 
-pub(super) fn env(name: &str, default: f64) -> f64 {
-    std::env::var(name).ok().and_then(|s| s.parse().ok()).unwrap_or(default)
+/// Logarithm of the density of a gap (1/m).
+fn sharp_log_density(gap: f64, ease: f64, spread: f64) -> f64 {
+    let beyond = gap - ease;
+    let lying = (-beyond.max(0.0) / spread).exp() * (beyond.min(0.0) / NEARER).exp() / (spread + NEARER);
+    let [hanging, inside] = match gap >= 0.0 {
+        true => [(-gap / HANGING).exp() / HANGING, 0.0],
+        false => [0.0, (gap / DEPTH).exp() / DEPTH],
+    };
+    (SHARES[0] * lying + SHARES[1] * hanging + SHARES[2] * inside).max(1e-9).ln()
+}
+
+/// A wide bell around usual eases, and a tail on both sides.
+fn rough_log_density(gap: f64) -> f64 {
+    let lying = (-0.5 * ((gap - 0.012) / 0.02).powi(2)).exp() / (0.02 * std::f64::consts::TAU.sqrt());
+    let hanging = (-gap.max(0.0) / 0.1).exp() / 0.1;
+    let inside = (gap.min(0.0) / 0.02).exp();
+    (0.5 * lying + 0.5 * hanging * inside).max(1e-9).ln()
+}
+
+/// Logarithm of the density of gaps (m), each with its part of the body, at the most likely ease and spread of every part. The
+/// gaps together are worth `evidence` independent ones.
+pub(super) fn log_likelihood(gaps: impl ExactSizeIterator<Item = (f64, usize)>, evidence: f64) -> f64 {
+    let count = gaps.len().max(1) as f64;
+    let mut sums = [[0.0f32; KINDS]; PARTS];
+    for (gap, part) in gaps {
+        sums[part].iter_mut().zip(&SHARP[row(gap)]).for_each(|(s, l)| *s += l);
+    }
+    let score = |(kind, sum): (usize, &f32)| {
+        evidence * f64::from(*sum) / count - EASES[kind % EASES.len()] / USUAL_EASE
+    };
+    sums.iter().map(|sums| sums.iter().enumerate().map(score).fold(f64::MIN, f64::max)).sum()
+}
+
+/// The same for a garment that may be some centimetres away from its place.
+pub(super) fn rough_log_likelihood(gaps: impl ExactSizeIterator<Item = (f64, usize)>, evidence: f64) -> f64 {
+    let count = gaps.len().max(1) as f64;
+    evidence * gaps.map(|(gap, _)| f64::from(ROUGH[row(gap)])).sum::<f64>() / count
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cloth_at_one_distance_is_likelier_than_scattered_or_buried_cloth() {
+        let of = |gap: fn(f64) -> f64| {
+            let gaps: Vec<(f64, usize)> = (0..200).map(|i| (gap(f64::from(i) / 200.0), 1)).collect();
+            log_likelihood(gaps.into_iter(), 40.0)
+        };
+        let even = of(|t| 0.010 + 0.003 * t);
+        assert!(even > of(|t| 0.010 + 0.030 * t) + 10.0, "scattered");
+        assert!(even > of(|t| 0.010 - 0.020 * t) + 10.0, "buried");
+        assert!(even > of(|t| 0.030 + 0.003 * t) + 1.0, "as even, but farther away");
+    }
+
+    #[test]
+    fn each_part_of_the_body_has_its_own_ease() {
+        let gaps = |second: usize| (0..200).map(move |i| if i < 100 { (0.005, 0) } else { (0.02, second) });
+        assert!(log_likelihood(gaps(1), 40.0) > log_likelihood(gaps(0), 40.0) + 10.0);
+    }
 }
