@@ -7,6 +7,7 @@ mod arm_pose;
 mod body_field;
 mod coverage;
 mod error;
+mod from_body;
 mod likelihood;
 mod placed;
 mod placement;
@@ -20,6 +21,7 @@ mod sitting;
 
 pub use coverage::off_trunk;
 pub use error::FitError;
+pub use from_body::{Carried, SourceBody, SourcePlacement};
 pub use placed::is_on_body;
 pub use placement::{Origin, Placement, Unit, UpAxis};
 pub use repair::needs_repair;
@@ -100,23 +102,40 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
         return Err(FitError::Extent { extent, unit: settings.unit, reach: search.reach });
     }
     let cloth = Cloth { positions: &sheet.positions, faces: &sheet.faces, borders: &topology.boundary_loops };
-    let candidates = search.candidates(&cloth, extent, settings);
-    if std::env::var("FIT_DEBUG").is_ok() {
+    let mut source = settings.from_body.as_deref().map(|b| b.aligned(body, settings)).transpose()?;
+    let candidates = match &source {
+        Some(_) => Vec::new(),
+        None => search.candidates(&cloth, extent, settings),
+    };
+    if std::env::var("FIT_DEBUG").is_ok() && source.is_none() {
         if let Some(t) = *TRUTH.lock().unwrap() {
             search.debug(&t, &cloth);
             let c = search.judge(t, &cloth, settings);
-            eprintln!("TRUTH {:7.2} fit {:6.3} x{} worn {} best {:7.2}", c.score, c.fit, c.crossings, c.is_worn, candidates[0].score);
+            eprintln!(
+                "TRUTH {:7.2} fit {:6.3} x{} worn {} best {:7.2}",
+                c.score, c.fit, c.crossings, c.is_worn, candidates[0].score
+            );
         }
         for c in candidates.iter().take(4) {
             search.debug(&c.placement, &cloth);
             let p = &c.placement;
             eprintln!(
                 "   {:7.2} fit {:6.3} x{} worn {} | {} {} {} {:?} arms {:.1} t {:.3?}",
-                c.score, c.fit, c.crossings, c.is_worn, p.unit, p.up, p.turn_degrees, p.origin, p.arm_angle_degrees, p.translation
+                c.score,
+                c.fit,
+                c.crossings,
+                c.is_worn,
+                p.unit,
+                p.up,
+                p.turn_degrees,
+                p.origin,
+                p.arm_angle_degrees,
+                p.translation
             );
         }
     }
-    let Some(placement) = candidates.first().map(|c| c.placement) else { return Err(FitError::Closed) };
+    let known = source.as_ref().map(|s| s.placement).or(candidates.first().map(|c| c.placement));
+    let Some(mut placement) = known else { return Err(FitError::Closed) };
     let sitting = Sitting::default();
     let metres = placement.unit.metres();
     let seams = finish_seams(&mut sheet, file, settings, metres);
@@ -126,9 +145,20 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
     let topology = Topology::new(&mesh);
     let placed = placement.apply(&sheet.positions);
     let arms = ArmPose::new(body, placement.arm_angle_degrees);
-    let mut positions =
-        arms.to_t_pose(&placed, &sheet.faces, settings.category, body).map_err(FitError::Mesh)?;
-    if false { refuse_other_things(&positions, body, &sitting)?; }
+    let (mut positions, from_body) = match &mut source {
+        Some(source) => {
+            let (carried, how) = source.carry(&sheet.positions, &sheet.faces, settings.category, body)?;
+            placement = source.placement;
+            (carried, Some(how))
+        }
+        None => {
+            let raised = arms.to_t_pose(&placed, &sheet.faces, settings.category, body);
+            (raised.map_err(FitError::Mesh)?, None)
+        }
+    };
+    if false {
+        refuse_other_things(&positions, body, &sitting)?;
+    }
 
     let rest_surface = ArmPose::new(body, 0.0).surface;
     turn_outward(&mut sheet, &positions, &topology, &rest_surface);
@@ -158,6 +188,7 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
         file_vertices: file.positions.len(),
         file_faces: file.polygon_count(),
         placement,
+        from_body,
         sitting,
         repairs: sheet.repairs,
         seams,
