@@ -194,7 +194,7 @@ impl Aligned {
         });
         // The first one, unless another one is plainly meant.
         let (origin, placed, lies) = places
-            .reduce(|best, next| if next.2.badness() + 0.05 < best.2.badness() { next } else { best })
+            .reduce(|best, next| if next.2.cost < PLAIN * best.2.cost { next } else { best })
             .ok_or(FitError::Closed)?;
         self.placement.translation = origin;
         if let Some(what) = lies.implausible() {
@@ -235,12 +235,20 @@ struct Lies {
     deep: f64,
     /// Share of the vertices closer to the skin than [`CLOSE`].
     close: f64,
+    /// Mean distance to the skin (m), at most [`LOOSE`], inside counted [`INSIDE`] times.
+    cost: f64,
 }
 
 /// Cloth this far inside the body (m) is no tight fit any more.
 const DEEP: f64 = 0.025;
 /// Cloth this close to the skin (m) rests on it.
 const CLOSE: f64 = 0.05;
+/// Cloth farther away than this (m) is all alike: loose.
+const LOOSE: f64 = 0.15;
+/// How much worse cloth is inside the body than as far outside.
+const INSIDE: f64 = 5.0;
+/// Another origin is plainly meant where it costs less than this share.
+const PLAIN: f64 = 0.6;
 
 impl Lies {
     fn new(positions: &[[f64; 3]], source: &Surface<f64>) -> Self {
@@ -248,11 +256,9 @@ impl Lies {
         let share = |is: &dyn Fn(&f64) -> bool| {
             gaps.iter().filter(|g| is(g)).count() as f64 / gaps.len().max(1) as f64
         };
-        Self { deep: share(&|g| *g < -DEEP), close: share(&|g| g.abs() < CLOSE) }
-    }
-
-    fn badness(&self) -> f64 {
-        self.deep + (0.1 - self.close).max(0.0)
+        let cost = |g: &f64| if *g < 0.0 { -INSIDE * g } else { g.min(LOOSE) };
+        let cost = gaps.iter().map(cost).sum::<f64>() / gaps.len().max(1) as f64;
+        Self { deep: share(&|g| *g < -DEEP), close: share(&|g| g.abs() < CLOSE), cost }
     }
 
     fn implausible(&self) -> Option<String> {

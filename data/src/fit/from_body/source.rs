@@ -7,7 +7,7 @@ use clothcombo_physics::TriMesh;
 use clothcombo_physics::mesh::is_inside_out;
 use clothcombo_physics::vec3::scale;
 use std::fmt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// A shape parameter beyond this is a slip of the pen: 99.99 % of people lie within 4.
@@ -21,6 +21,7 @@ const MOST_VERTICES: usize = 2_000_000;
 #[derive(Clone)]
 pub struct SourceBody {
     pub(super) name: String,
+    path: PathBuf,
     pub(super) kind: SourceKind,
 }
 
@@ -91,7 +92,12 @@ impl SourceBody {
             true => SourceKind::Model(Box::new(SourceModel::load(path, numbers)?)),
             false => SourceKind::Mesh(Box::new(SourceMesh::load(path)?)),
         };
-        Ok(Self { name: text.to_owned(), kind })
+        Ok(Self { name: text.to_owned(), path: path.into(), kind })
+    }
+
+    /// The file that was read.
+    pub fn path(&self) -> &Path {
+        &self.path
     }
 }
 

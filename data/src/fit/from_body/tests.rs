@@ -64,7 +64,7 @@ fn publish(body: &Body, pelvis: [f64; 3], path: &Path) {
 /// A coarser body of this shape with its own vertices and two more joints, as SMPL has.
 fn decimated(body: &Body, beta: &[f64]) -> Body {
     let shaped = body.shaped(beta).unwrap();
-    let welded = weld(&shaped.positions, 0.018);
+    let welded = weld(&shaped.positions, 0.025);
     let faces: Vec<[u32; 3]> = body.faces.iter().map(|f| f.map(|v| welded.number[v as usize])).collect();
     let clean = clean_faces(&welded.positions, &faces, 1e-9);
     let (used, faces) = compact(clean.kept.iter().map(|f| faces[*f as usize]), welded.positions.len());
@@ -77,6 +77,7 @@ fn decimated(body: &Body, beta: &[f64]) -> Body {
             dense[origin * j..(origin + 1) * j].iter().copied().chain(vec![0.0; more])
         })
         .collect();
+    assert!(2 * used.len() < body.vertex_count(), "{} of {}", used.len(), body.vertex_count());
     let hands = [20, 21].map(|wrist| shaped.joints[wrist]);
     Body::new(BodyParts {
         name: "other".into(),
