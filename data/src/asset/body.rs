@@ -67,8 +67,6 @@ pub(super) struct FilePelvis {
     pub template: [f64; 3],
     /// Its displacement per unit of each shape component (m), `[3 × K]` row-major.
     pub shape_directions: Vec<f64>,
-    /// Whether the file says so itself, because it holds the body moved already.
-    pub is_recorded: bool,
 }
 
 impl Deref for Body {
@@ -179,8 +177,7 @@ impl Body {
         }
         let zero_body =
             TriMesh::new(parts.template.clone(), parts.faces.to_vec()).map_err(|e| wrong(e.to_string()))?;
-        let file_pelvis =
-            FilePelvis { template: pelvis, shape_directions: pelvis_directions, is_recorded: false };
+        let file_pelvis = FilePelvis { template: pelvis, shape_directions: pelvis_directions };
         Ok(Self { parts, zero_body, file_pelvis })
     }
 
@@ -191,7 +188,6 @@ impl Body {
         self.file_pelvis = FilePelvis {
             template: add(own.template, recorded.template),
             shape_directions: directions.collect(),
-            is_recorded: true,
         };
         self
     }
@@ -209,11 +205,6 @@ impl Body {
             let row = shape_directions.get(a * k..(a + 1) * k).unwrap_or_default();
             template[a] + row.iter().zip(beta).map(|(d, b)| d * b).sum::<f64>()
         })
-    }
-
-    /// Whether the body's file holds it with its pelvis at the origin, but records where that was before.
-    pub fn is_moved_in_file(&self) -> bool {
-        self.file_pelvis.is_recorded
     }
 
     /// The same body inside out: every face is turned over.

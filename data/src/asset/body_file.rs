@@ -213,7 +213,7 @@ fn recorded_pelvis(
         return Err(FileError::content(file.path())(message));
     }
     let shape_directions = first_columns(&directions.data, components, shape_count);
-    Ok(Some(FilePelvis { template: [x, y, z], shape_directions, is_recorded: true }))
+    Ok(Some(FilePelvis { template: [x, y, z], shape_directions }))
 }
 
 fn points(file: &mut NpzFile, key: &str) -> Result<Vec<[f64; 3]>, FileError> {

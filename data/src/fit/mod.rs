@@ -102,7 +102,7 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
         return Err(FitError::Extent { extent, unit: settings.unit, reach: search.reach });
     }
     let cloth = Cloth { positions: &sheet.positions, faces: &sheet.faces, borders: &topology.boundary_loops };
-    let mut source = settings.from_body.as_deref().map(|b| b.aligned(body, settings)).transpose()?;
+    let source = settings.from_body.as_deref().map(|b| b.aligned(body, settings)).transpose()?;
     let candidates = match &source {
         Some(_) => Vec::new(),
         None => search.candidates(&cloth, extent, settings),
@@ -135,7 +135,7 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
         }
     }
     let known = source.as_ref().map(|s| s.placement).or(candidates.first().map(|c| c.placement));
-    let Some(mut placement) = known else { return Err(FitError::Closed) };
+    let Some(placement) = known else { return Err(FitError::Closed) };
     let sitting = Sitting::default();
     let metres = placement.unit.metres();
     let seams = finish_seams(&mut sheet, file, settings, metres);
@@ -145,10 +145,9 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
     let topology = Topology::new(&mesh);
     let placed = placement.apply(&sheet.positions);
     let arms = ArmPose::new(body, placement.arm_angle_degrees);
-    let (mut positions, from_body) = match &mut source {
+    let (mut positions, from_body) = match &source {
         Some(source) => {
             let (carried, how) = source.carry(&sheet.positions, &sheet.faces, settings.category, body)?;
-            placement = source.placement;
             (carried, Some(how))
         }
         None => {

@@ -224,10 +224,7 @@ impl FitReport {
             Origin::Floor => {
                 format!("the file's origin is on the floor below the pelvis (moved by {y:.0} mm)")
             }
-            Origin::SourceBody => {
-                let through = self.from_body.as_ref().map(SourcePlacement::text).unwrap_or_default();
-                format!("{through}; its pelvis is {:.0}, {:.0}, {:.0} mm from the file's origin", -x, -y, -z)
-            }
+            Origin::SourceBody => self.from_body.as_ref().map(SourcePlacement::text).unwrap_or_default(),
             Origin::Elsewhere => {
                 format!(
                     "the file's origin is not the body's: moved by {x:.0}, {y:.0}, {z:.0} mm to where it fits"

@@ -44,7 +44,7 @@ pub struct FitArguments {
     join_seams: Option<f64>,
     /// The body that the garment was made on, in the same coordinates: BODY.npz, BODY.npz:SHAPE or a mesh. The garment is placed
     /// through it, and nothing is searched for. Example: --from-body SMPL_NEUTRAL.npz:1.2,-0.5. With a mesh, --unit, --up and --turn
-    /// are about both files; with an npz, they say how the garment's coordinates differ from the npz's
+    /// are about both files; with an npz, they and --offset say how the garment's coordinates differ from the npz's
     #[arg(long, value_name = "BODY")]
     from_body: Option<String>,
 }

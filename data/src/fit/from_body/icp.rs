@@ -31,6 +31,11 @@ impl Similarity {
         add(scale(rotation::apply(&self.rotation, p), self.scale), self.translation)
     }
 
+    /// A direction.
+    pub fn turned(&self, direction: [f64; 3]) -> [f64; 3] {
+        rotation::apply(&self.rotation, direction)
+    }
+
     /// The point that goes to `q`.
     pub fn inverse(&self, q: [f64; 3]) -> [f64; 3] {
         let back = rotation::transpose(&self.rotation);
@@ -38,18 +43,19 @@ impl Similarity {
     }
 }
 
-/// Refines `start` over some `rounds`: rigid first, from the middle on with one uniform scale.
+/// Refines `start` over some `rounds`: rigid first, from the middle on with one uniform scale unless that `is_rigid`.
 pub(super) fn registered(
     points: &[[f64; 3]],
     surface: &Surface<f64>,
     start: Similarity,
     rounds: usize,
+    is_rigid: bool,
 ) -> Similarity {
     // Built before it is shared.
     surface.closest_point();
     let mut motion = start;
     for round in 0..rounds {
-        let with_scale = 2 * round >= rounds;
+        let with_scale = !is_rigid && 2 * round >= rounds;
         let Some(next) = step(points, surface, &motion, with_scale) else { break };
         motion = next;
         motion.scale = motion.scale.clamp(start.scale / SCALE_RANGE, start.scale * SCALE_RANGE);
@@ -126,7 +132,7 @@ mod tests {
             .iter()
             .map(|p| add(scale(rotation::apply(&turn, *p), 1.0 / 1.04), [0.02, -0.01, 0.03]))
             .collect();
-        let found = registered(&points, &surface, Similarity::scaling(1.0, [0.0; 3]), 40);
+        let found = registered(&points, &surface, Similarity::scaling(1.0, [0.0; 3]), 40, false);
         let error = points
             .iter()
             .zip(&body.template)

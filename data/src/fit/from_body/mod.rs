@@ -8,11 +8,12 @@
 //! | npz of the target's model | inverse of the shape transfer ([`same_model`]) |
 //! | npz of another model | a similarity per bone, then the distance to the skin ([`other_model`]) |
 //! | mesh of the target's vertices | recovered pose and shape, then as the first ([`same_model`]) |
-//! | any mesh of a person | registration to the zero body, then the distance to the skin ([`registered`]) |
+//! | any mesh of a person | registration with the target's model, the distance to the skin, then as the first ([`registered`]) |
 
 mod bones;
 mod gaps;
 mod icp;
+mod model;
 mod other_model;
 mod registered;
 mod registration;
@@ -29,7 +30,7 @@ use super::placement::{Origin, Placement, Unit, UpAxis};
 use super::settings::FitSettings;
 use crate::asset::{Binding, BindingSettings, Body, BodyParts, Category, Garment};
 use clothcombo_physics::query::Distance;
-use clothcombo_physics::vec3::{norm, sub};
+use clothcombo_physics::vec3::{norm, scale, sub};
 use clothcombo_physics::{Surface, TriMesh};
 use other_model::OtherModel;
 use rayon::prelude::*;
@@ -43,13 +44,15 @@ use source::SourceKind;
 pub struct SourcePlacement {
     /// The body's file, with shape parameters where some were given.
     pub body: String,
-    /// Shape of the source body, given or recovered; empty for a mesh of another model.
+    /// Shape of the source body, given or recovered; for a mesh of another model the target's that looks most like it.
     pub shape: Vec<f64>,
     /// How the garment was carried.
     pub carried: Carried,
     /// Median distance of the source body's surface to the target's after the alignment (mm), before the garment's distances to
     /// the skin are restored; none where they have the same vertices.
     pub alignment_mm: Option<f64>,
+    /// Where the source body's pelvis is in the file's coordinates once they are in metres, y up; none where it was registered.
+    pub pelvis: Option<[f64; 3]>,
     /// Scale of the alignment beside the unit; 1 between bodies of the same vertices.
     pub scale: f64,
     /// Median distance between where the source body has the vertices (in the target's coordinates) and where the target has them (mm).
@@ -73,7 +76,7 @@ pub enum Carried {
 impl SourcePlacement {
     /// In words.
     pub fn text(&self) -> String {
-        let Self { body, shape, carried, alignment_mm, scale, moved_mm } = self;
+        let Self { body, shape, carried, alignment_mm, pelvis, scale, moved_mm } = self;
         let shape = match shape.is_empty() {
             true => String::new(),
             false => {
@@ -88,7 +91,9 @@ impl SourcePlacement {
         };
         let alignment =
             alignment_mm.map(|mm| format!("; surfaces {mm:.1} mm apart (median)")).unwrap_or_default();
-        format!("placed through body {body}{shape}: {how}{alignment}; median |Δ| {moved_mm:.1} mm")
+        let pelvis = pelvis.map(|p| p.map(|x| format!("{:.0}", 1e3 * x + 0.0)).join(", "));
+        let pelvis = pelvis.map(|p| format!(", its pelvis at {p} mm")).unwrap_or_default();
+        format!("placed through body {body}{shape}{pelvis}: {how}{alignment}; median |Δ| {moved_mm:.1} mm")
     }
 }
 
@@ -98,8 +103,6 @@ pub(super) struct Aligned {
     pub placement: Placement,
     name: String,
     shape: Vec<f64>,
-    /// Other translations that the file may mean (m).
-    origins: Vec<[f64; 3]>,
     carrier: Carrier,
 }
 
@@ -116,8 +119,9 @@ impl SourceBody {
     /// [`FitError::SourceBody`]: hints that contradict it, or no such alignment.
     pub(super) fn aligned(&self, body: &Body, settings: &FitSettings) -> Result<Aligned, FitError> {
         let wrong = |what: String| FitError::SourceBody { name: self.name.clone(), what };
+        let is_mesh = matches!(self.kind, SourceKind::Mesh(_));
         for (is_given, flag, says) in [
-            (settings.offset.is_some(), "--offset", "where the origin is"),
+            (settings.offset.is_some() && is_mesh, "--offset", "where the origin is"),
             (settings.arms_lowered.is_some(), "--arms", "how the arms are held"),
         ] {
             if is_given {
@@ -132,31 +136,23 @@ impl SourceBody {
                     up: settings.up.unwrap_or(UpAxis::Y),
                     turn_degrees: settings.turn_degrees.unwrap_or(0.0),
                     origin: Origin::SourceBody,
-                    translation: model.origins[0],
+                    translation: settings.offset.unwrap_or(scale(model.pelvis, -1.0)),
                     arm_angle_degrees: 0.0,
                 };
                 let carrier = match same_model::has_topology(body, &model.faces) {
                     true => Carrier::Same(SameModel::shaped(model.positions.clone())),
                     false => Carrier::Other(OtherModel::new(model, body).map_err(wrong)?),
                 };
-                let (shape, origins) = (model.shape.clone(), model.origins.clone());
-                Ok(Aligned { placement, name, shape, origins, carrier })
+                Ok(Aligned { placement, name, shape: model.shape.clone(), carrier })
             }
             SourceKind::Mesh(mesh) => {
                 // Vertices in another order, or of another model by chance, are a mesh like any other.
                 if let Some((placement, shape, same)) = same_model::recovered(mesh, body, settings) {
-                    let origins = vec![placement.translation];
-                    return Ok(Aligned { placement, name, shape, origins, carrier: Carrier::Same(same) });
+                    return Ok(Aligned { placement, name, shape, carrier: Carrier::Same(same) });
                 }
                 let (placement, registered) = registration::register(mesh, body, settings).map_err(wrong)?;
-                let origins = vec![placement.translation];
-                Ok(Aligned {
-                    placement,
-                    name,
-                    shape: Vec::new(),
-                    origins,
-                    carrier: Carrier::Registered(registered),
-                })
+                let shape = registered.shape.clone();
+                Ok(Aligned { placement, name, shape, carrier: Carrier::Registered(registered) })
             }
         }
     }
@@ -175,7 +171,7 @@ impl Aligned {
     /// # Errors
     /// [`FitError::SourceBody`] when it does not lie on the source body, [`FitError::Mesh`] when no mesh is left of it.
     pub fn carry(
-        &mut self,
+        &self,
         positions: &[[f64; 3]],
         faces: &[[u32; 3]],
         category: Option<Category>,
@@ -187,16 +183,8 @@ impl Aligned {
             Carrier::Registered(registered) => registered.surface(),
         };
         let source = Surface::new(source.0, source.1);
-        let places = self.origins.iter().map(|origin| {
-            let placed = Placement { translation: *origin, ..self.placement }.apply(positions);
-            let lies = Lies::new(&placed, &source);
-            (*origin, placed, lies)
-        });
-        // The first one, unless another one is plainly meant.
-        let (origin, placed, lies) = places
-            .reduce(|best, next| if next.2.cost < PLAIN * best.2.cost { next } else { best })
-            .ok_or(FitError::Closed)?;
-        self.placement.translation = origin;
+        let placed = self.placement.apply(positions);
+        let lies = Lies::new(&placed, &source);
         if let Some(what) = lies.implausible() {
             return Err(FitError::SourceBody { name: self.name.clone(), what });
         }
@@ -217,15 +205,16 @@ impl Aligned {
                 (carried, placed.clone(), Carried::Bones, Some(alignment), 1.0)
             }
             Carrier::Registered(registered) => {
-                let (carried, base) = registered.carry(&cloth, &source, body).map_err(FitError::Mesh)?;
+                let carried = registered.carry(&cloth, &source, body).map_err(FitError::Mesh)?;
                 let (alignment, scale) = (registered.alignment_mm, registered.motion.scale);
-                (carried, base, Carried::Registration, Some(alignment), scale)
+                (carried.positions, carried.unrestored, Carried::Registration, Some(alignment), scale)
             }
         };
         let mut moves: Vec<f64> = carried.iter().zip(&base).map(|(a, b)| norm(sub(*a, *b))).collect();
         let moved_mm = 1e3 * median(&mut moves);
         let (body, shape) = (self.name.clone(), self.shape.clone());
-        Ok((carried, SourcePlacement { body, shape, carried: how, alignment_mm, scale, moved_mm }))
+        let pelvis = (how != Carried::Registration).then(|| self.placement.translation.map(|x| 0.0 - x));
+        Ok((carried, SourcePlacement { body, shape, carried: how, alignment_mm, pelvis, scale, moved_mm }))
     }
 }
 
@@ -235,20 +224,17 @@ struct Lies {
     deep: f64,
     /// Share of the vertices closer to the skin than [`CLOSE`].
     close: f64,
-    /// Mean distance to the skin (m), at most [`LOOSE`], inside counted [`INSIDE`] times.
-    cost: f64,
 }
 
 /// Cloth this far inside the body (m) is no tight fit any more.
 const DEEP: f64 = 0.025;
 /// Cloth this close to the skin (m) rests on it.
 const CLOSE: f64 = 0.05;
-/// Cloth farther away than this (m) is all alike: loose.
-const LOOSE: f64 = 0.15;
-/// How much worse cloth is inside the body than as far outside.
-const INSIDE: f64 = 5.0;
-/// Another origin is plainly meant where it costs less than this share.
-const PLAIN: f64 = 0.6;
+
+/// A garment of which a larger share is deep inside was made on another body, or is in other coordinates.
+const MOST_DEEP: f64 = 0.1;
+/// So was one of which a smaller share is close to the skin.
+const LEAST_CLOSE: f64 = 0.1;
 
 impl Lies {
     fn new(positions: &[[f64; 3]], source: &Surface<f64>) -> Self {
@@ -256,21 +242,19 @@ impl Lies {
         let share = |is: &dyn Fn(&f64) -> bool| {
             gaps.iter().filter(|g| is(g)).count() as f64 / gaps.len().max(1) as f64
         };
-        let cost = |g: &f64| if *g < 0.0 { -INSIDE * g } else { g.min(LOOSE) };
-        let cost = gaps.iter().map(cost).sum::<f64>() / gaps.len().max(1) as f64;
-        Self { deep: share(&|g| *g < -DEEP), close: share(&|g| g.abs() < CLOSE), cost }
+        Self { deep: share(&|g| *g < -DEEP), close: share(&|g| g.abs() < CLOSE) }
     }
 
     fn implausible(&self) -> Option<String> {
         let where_it_is = match () {
-            () if self.deep > 0.25 => {
+            () if self.deep > MOST_DEEP => {
                 format!(
                     "{:.0} % of the garment is more than {:.0} mm inside it",
                     100.0 * self.deep,
                     1e3 * DEEP
                 )
             }
-            () if self.close < 0.05 => {
+            () if self.close < LEAST_CLOSE => {
                 format!(
                     "only {:.0} % of the garment is within {:.0} mm of its skin",
                     100.0 * self.close,
@@ -280,9 +264,9 @@ impl Lies {
             () => return None,
         };
         Some(format!(
-            "the garment does not lie on this body: {where_it_is}. The garment must be in the body file's coordinates, in its pose \
-             and shape: export both together, or say how the garment's differ by --unit, --up and --turn; an npz takes shape \
-             parameters as body.npz:1.2,-0.5"
+            "the garment does not lie on this body: {where_it_is}. It must be in the body file's coordinates, in its pose and shape: \
+             export both together, or say how the garment's coordinates differ by --unit, --up, --turn and, beside an npz, --offset; \
+             an npz takes shape parameters as body.npz:1.2,-0.5"
         ))
     }
 }

@@ -1,22 +1,31 @@
-//! From a mesh of a person to the zero body, once both are registered.
+//! From a mesh of a person to the zero body, once the target's model is registered to it.
 
 use super::icp::Similarity;
+use super::same_model::SameModel;
 use super::{Cloth, gaps, gaps_to};
 use crate::asset::Body;
-use crate::fit::arm_pose::ArmPose;
 use clothcombo_physics::Surface;
 use std::sync::Arc;
 
-/// A mesh of a person, registered to the zero body with its arms lowered as the mesh holds them.
+/// A mesh of a person, and the target's model in its shape and pose.
 pub(super) struct Registered {
     /// The mesh (m), y up.
     pub positions: Vec<[f64; 3]>,
     pub faces: Arc<[[u32; 3]]>,
-    /// From there to the target.
+    /// From there to the model.
     pub motion: Similarity,
-    pub arms: ArmPose,
+    pub model: SameModel,
+    /// Shape of the model.
+    pub shape: Vec<f64>,
     /// Median distance of the surfaces (mm).
     pub alignment_mm: f64,
+}
+
+/// A garment at rest on the zero body, with and without its distances to the skin restored (m).
+pub(super) struct CarriedCloth {
+    pub positions: Vec<[f64; 3]>,
+    /// Where the registration alone puts it.
+    pub unrestored: Vec<[f64; 3]>,
 }
 
 impl Registered {
@@ -26,26 +35,18 @@ impl Registered {
     }
 
     /// Carries cloth on `source`, its surface, to the zero body of `body`: by the registration, then by the distances to the skin, then
-    /// the arms up. Beside it the garment as the registration alone would have it.
+    /// back through pose and shape of the model.
     ///
     /// # Errors
-    /// When no mesh is left, or the arms cannot be raised.
-    #[allow(clippy::type_complexity)]
-    pub fn carry(
-        &self,
-        cloth: &Cloth,
-        source: &Surface<f64>,
-        body: &Body,
-    ) -> Result<(Vec<[f64; 3]>, Vec<[f64; 3]>), String> {
-        let raised =
-            |positions: &[[f64; 3]]| self.arms.to_t_pose(positions, cloth.faces, cloth.category, body);
+    /// When no mesh is left, or the pose cannot be undone.
+    pub fn carry(&self, cloth: &Cloth, source: &Surface<f64>, body: &Body) -> Result<CarriedCloth, String> {
+        let rest = |positions: &[[f64; 3]]| self.model.carry(&Cloth { positions, ..*cloth }, body);
         let mut moved: Vec<[f64; 3]> = cloth.positions.iter().map(|p| self.motion.apply(*p)).collect();
-        let base = raised(&moved)?;
-        let own = gaps_to(cloth.positions, source)
-            .into_iter()
-            .map(|gap| self.motion.scale * gap)
-            .collect::<Vec<_>>();
-        gaps::restore(&mut moved, cloth.faces, &own, &self.arms.surface);
-        Ok((raised(&moved)?, base))
+        let unrestored = rest(&moved)?;
+        let own: Vec<f64> =
+            gaps_to(cloth.positions, source).into_iter().map(|gap| self.motion.scale * gap).collect();
+        let (positions, faces) = self.model.surface(body);
+        gaps::restore(&mut moved, cloth.faces, &own, &Surface::new(positions, faces));
+        Ok(CarriedCloth { positions: rest(&moved)?, unrestored })
     }
 }

@@ -1,38 +1,56 @@
-//! Any mesh of a person, in any unit, with any axis up, facing anywhere, its arms level or lowered, registered to the zero body.
+//! Any mesh of a person, in any unit, with any axis up, facing anywhere, its arms level or lowered, its legs closed or
+//! spread, registered to the target's model: unit and stance, then a similarity, the angles of the limbs, and the shape.
 
 use super::icp::{Similarity, registered};
+use super::model::Model;
 use super::registered::Registered;
+use super::same_model::SameModel;
 use super::source::SourceMesh;
 use super::stance::{HEIGHTS, Stance, stances};
 use super::{gaps_to, median};
 use crate::asset::Body;
 use crate::asset::rotation;
-use crate::fit::arm_pose::ArmPose;
 use crate::fit::placement::Placement;
 use crate::fit::samples::Samples;
 use crate::fit::settings::FitSettings;
 use crate::mesh::bounds;
-use clothcombo_physics::Surface;
 use clothcombo_physics::vec3::{scale, sub};
+use clothcombo_physics::{Surface, TriMesh};
 
 /// Points that are registered.
 const POINTS: usize = 2500;
 /// Rounds in which stances are compared, and then the best one is refined.
 const ROUNDS: [usize; 2] = [8, 24];
-/// Steps by which the angle of the arms is refined (degrees).
-const ARM_STEPS: [f64; 4] = [8.0, 4.0, 2.0, 1.0];
+/// Steps by which the angles of arms and legs are refined (degrees).
+const STEPS: [f64; 4] = [8.0, 4.0, 2.0, 1.0];
+/// Most steps of one length.
+const MOST_STEPS: usize = 4;
+/// How far arms hang down and legs are spread (degrees).
+const RANGES: [[f64; 2]; 2] = [[0.0, 85.0], [-5.0, 30.0]];
+/// Rounds in which the shape is found.
+const SHAPE_ROUNDS: usize = 8;
 /// Surfaces farther apart than this (median, mm) are no two bodies in one pose.
 const FARTHEST_MM: f64 = 25.0;
 /// A stance whose distance is within this factor of the best one's is a near-tie.
 const NEAR_TIE: f64 = 1.15;
 
 /// A stance after registration.
+#[derive(Clone)]
 struct Trial {
     stance: Stance,
-    arms: ArmPose,
+    model: Model,
     motion: Similarity,
     /// Mean distance in both directions, of the nearer nine tenths (m).
     distance: f64,
+}
+
+impl Trial {
+    /// With its scale in the unit alone, about the origin, where the pelvis is.
+    fn unscaled(&self) -> Self {
+        let motion = &self.motion;
+        let translation = scale(motion.translation, 1.0 / motion.scale);
+        Self { motion: Similarity { scale: 1.0, translation, ..*motion }, ..self.clone() }
+    }
 }
 
 /// Registers a mesh: where it is put before, and the rest.
@@ -49,10 +67,9 @@ pub(super) fn register(
         points: Samples::new(surface.positions(), surface.faces(), POINTS).0,
         surface: Surface::from_mesh(surface),
     };
-    let mut trials: Vec<Trial> = stances(&source.points, body, settings)
-        .into_iter()
-        .map(|stance| source.tried(stance, body))
-        .collect();
+    let stances = stances(&source.points, body, settings).into_iter();
+    let mut trials =
+        stances.map(|stance| source.tried(stance, body)).collect::<Result<Vec<Trial>, String>>()?;
     if trials.is_empty() {
         let [low, high] = bounds(surface.positions());
         let [x, y, z] = sub(high, low);
@@ -64,12 +81,20 @@ pub(super) fn register(
     }
     trials.sort_by(|a, b| a.distance.total_cmp(&b.distance));
     let best = chosen(trials)?;
-    let best = source.refined(best, body);
+    let mut best = source.refined(best, body, &STEPS)?;
+    // People differ in size by their shape: only what no shape explains is scaled.
+    let unscaled = source.refined(source.reshaped(best.unscaled(), body, surface)?, body, &STEPS[2..])?;
+    let scaled = source.reshaped(best.clone(), body, surface)?;
+    best = if unscaled.distance < NEAR_TIE * scaled.distance { unscaled } else { scaled };
+    if !best.model.shape.is_empty() {
+        best = source.reshaped(best, body, surface)?;
+    }
+    best = source.refined(best, body, &STEPS[2..])?;
     let placement = best.stance.placement;
-    let placed = placement.apply(surface.positions());
     let moved: Vec<[f64; 3]> =
         placement.apply(&source.points).iter().map(|p| best.motion.apply(*p)).collect();
-    let mut distances: Vec<f64> = gaps_to(&moved, &best.arms.surface).into_iter().map(f64::abs).collect();
+    let mut distances: Vec<f64> =
+        gaps_to(&moved, &best.model.surface(body)).into_iter().map(f64::abs).collect();
     let alignment_mm = 1e3 * median(&mut distances);
     if !(alignment_mm <= FARTHEST_MM) {
         return Err(format!(
@@ -79,12 +104,18 @@ pub(super) fn register(
             body.name
         ));
     }
-    let placement = Placement { arm_angle_degrees: best.arms.degrees, ..placement };
-    let faces = surface.faces().into();
-    Ok((
-        placement,
-        Registered { positions: placed, faces, motion: best.motion, arms: best.arms, alignment_mm },
-    ))
+    let shaped = body.shaped(&best.model.shape).map_err(|e| e.to_string())?.positions;
+    let Trial { model, motion, .. } = best;
+    let placement = Placement { arm_angle_degrees: model.angles[0], ..placement };
+    let registered = Registered {
+        positions: placement.apply(surface.positions()),
+        faces: surface.faces().into(),
+        motion,
+        shape: model.shape,
+        model: SameModel::posed(shaped, model.positions, model.bones),
+        alignment_mm,
+    };
+    Ok((placement, registered))
 }
 
 /// The best of sorted trials; where the distances nearly tie, the feet decide.
@@ -124,36 +155,60 @@ struct Source {
 }
 
 impl Source {
-    fn tried(&self, stance: Stance, body: &Body) -> Trial {
-        let arms = ArmPose::new(body, stance.arms);
-        let [low, high] = bounds(&arms.positions);
+    fn tried(&self, stance: Stance, body: &Body) -> Result<Trial, String> {
+        let model = Model::new(body, &[], [stance.arms, 0.0])?;
+        let [low, high] = bounds(&model.positions);
         let factor = (high[1] - low[1]) / stance.height;
         let start = Similarity::scaling(factor, sub([0.0, low[1], 0.0], scale(stance.foot, factor)));
-        self.trial(stance, arms, start, ROUNDS[0])
+        Ok(self.trial(stance, model, start, ROUNDS[0], body))
     }
 
-    fn trial(&self, stance: Stance, arms: ArmPose, start: Similarity, rounds: usize) -> Trial {
+    fn trial(&self, stance: Stance, model: Model, start: Similarity, rounds: usize, body: &Body) -> Trial {
         let placed = stance.placement.apply(&self.points);
-        let motion = registered(&placed, &arms.surface, start, rounds);
-        let distance = self.distance(&placed, &stance.placement, &motion, &arms);
-        Trial { stance, arms, motion, distance }
+        let surface = model.surface(body);
+        // What the scale is decided by is left to the shape once there is one.
+        let motion = registered(&placed, &surface, start, rounds, !model.shape.is_empty());
+        let distance = self.distance(&placed, &stance.placement, &motion, &surface);
+        Trial { stance, model, motion, distance }
     }
 
-    /// Tries other angles of the arms, in ever smaller steps.
-    fn refined(&self, mut best: Trial, body: &Body) -> Trial {
-        for step in ARM_STEPS {
-            for sign in [-1.0, 1.0] {
-                let degrees = (best.arms.degrees + sign * step).clamp(0.0, 85.0);
-                let trial =
-                    self.trial(best.stance.clone(), ArmPose::new(body, degrees), best.motion, ROUNDS[0]);
-                if trial.distance < best.distance {
-                    best = trial;
+    /// Tries other angles of arms and legs, in ever smaller steps.
+    fn refined(&self, mut best: Trial, body: &Body, steps: &[f64]) -> Result<Trial, String> {
+        let at = |best: &Trial, angles: [f64; 2], rounds: usize| {
+            let model = Model::new(body, &best.model.shape, angles)?;
+            Ok::<_, String>(self.trial(best.stance.clone(), model, best.motion, rounds, body))
+        };
+        for step in steps {
+            for (limb, [least, most]) in RANGES.into_iter().enumerate() {
+                for sign in [-1.0, 1.0] {
+                    for _ in 0..MOST_STEPS {
+                        let mut angles = best.model.angles;
+                        angles[limb] = (angles[limb] + sign * step).clamp(least, most);
+                        let trial = at(&best, angles, ROUNDS[0])?;
+                        if trial.distance >= best.distance {
+                            break;
+                        }
+                        best = trial;
+                    }
                 }
             }
         }
-        let last =
-            self.trial(best.stance.clone(), ArmPose::new(body, best.arms.degrees), best.motion, ROUNDS[1]);
-        if last.distance <= best.distance { last } else { best }
+        let last = at(&best, best.model.angles, ROUNDS[1])?;
+        Ok(if last.distance <= best.distance { last } else { best })
+    }
+
+    /// With the shape that lies closest, and the rigid motion that goes with it.
+    fn reshaped(&self, mut trial: Trial, body: &Body, mesh: &TriMesh) -> Result<Trial, String> {
+        let placed = Surface::new(trial.stance.placement.apply(mesh.positions()), mesh.faces().into());
+        for _ in 0..SHAPE_ROUNDS {
+            let Some((shape, motion)) = trial.model.closer_shape(body, &placed, &trial.motion)? else {
+                break;
+            };
+            let model = Model::new(body, &shape, trial.model.angles)?;
+            trial = Trial { model, motion, ..trial };
+        }
+        let (model, motion) = (trial.model.clone(), trial.motion);
+        Ok(self.trial(trial.stance, model, motion, 0, body))
     }
 
     /// Mean distance from the points to the target and back (m), of the nearer nine tenths: medians do not see the arms.
@@ -162,14 +217,14 @@ impl Source {
         placed: &[[f64; 3]],
         placement: &Placement,
         motion: &Similarity,
-        arms: &ArmPose,
+        target: &Surface<f64>,
     ) -> f64 {
         let moved: Vec<[f64; 3]> = placed.iter().map(|p| motion.apply(*p)).collect();
-        let mut there: Vec<f64> = gaps_to(&moved, &arms.surface).into_iter().map(f64::abs).collect();
-        let step = (arms.positions.len() / POINTS).max(1);
+        let mut there: Vec<f64> = gaps_to(&moved, target).into_iter().map(f64::abs).collect();
+        let step = (target.positions.len() / POINTS).max(1);
         let back = rotation::transpose(&placement.turn());
         let metres = placement.unit.metres();
-        let in_file: Vec<[f64; 3]> = (arms.positions.iter().step_by(step))
+        let in_file: Vec<[f64; 3]> = (target.positions.iter().step_by(step))
             .map(|q| rotation::apply(&back, scale(motion.inverse(*q), 1.0 / metres)))
             .collect();
         let factor = metres * motion.scale;

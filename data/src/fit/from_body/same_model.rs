@@ -43,6 +43,11 @@ impl SameModel {
         Self { shaped: positions, posed: None, residual_mm: None }
     }
 
+    /// A shaped body `[V, 3]` in T-pose that `bones` carry to `positions` (m).
+    pub fn posed(shaped: Vec<[f64; 3]>, positions: Vec<[f64; 3]>, bones: Vec<[[f64; 4]; 3]>) -> Self {
+        Self { shaped, posed: Some(Posed { positions, bones }), residual_mm: None }
+    }
+
     pub fn is_posed(&self) -> bool {
         self.posed.is_some()
     }

@@ -5,7 +5,6 @@ use crate::format::{FileError, is_mesh_path, load_mesh};
 use crate::mesh::{WELD_SHARE, diagonal, triangulate, weld};
 use clothcombo_physics::TriMesh;
 use clothcombo_physics::mesh::is_inside_out;
-use clothcombo_physics::vec3::scale;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -41,8 +40,8 @@ pub(super) struct SourceModel {
     /// Joints (m) of this shape.
     pub joints: Vec<[f64; 3]>,
     pub faces: Arc<[[u32; 3]]>,
-    /// What is added to coordinates of the file (m) to have the pelvis at the origin; the likeliest first.
-    pub origins: Vec<[f64; 3]>,
+    /// Where the pelvis of this shape is in the coordinates of the file, or of the file that was imported (m).
+    pub pelvis: [f64; 3],
 }
 
 /// A mesh in the unit and axes of its file.
@@ -137,13 +136,10 @@ impl SourceModel {
         // As many components as the shape asks for, so that too many are refused by their own count.
         let body = Body::load(path, &BodyFileSettings { shape_components: usize::MAX })?;
         let shaped = body.shaped(&shape).map_err(|e| wrong(e.to_string()))?;
-        let mut origins = vec![scale(body.file_pelvis(&shape), -1.0)];
-        if body.is_moved_in_file() {
-            origins.push([0.0; 3]);
-        }
+        let pelvis = body.file_pelvis(&shape);
         let faces = body.faces.clone();
         let body = body.with_shape_components(0);
-        Ok(Self { body, shape, positions: shaped.positions, joints: shaped.joints, faces, origins })
+        Ok(Self { body, shape, positions: shaped.positions, joints: shaped.joints, faces, pelvis })
     }
 }
 

@@ -1,6 +1,5 @@
 use super::*;
 use crate::asset::{Pose, SparseSkinWeights};
-use crate::fit::arm_pose::{ArmPose, tests::lowered};
 use crate::fit::{Fitted, fit};
 use crate::format::{NpzWriter, PolygonMesh, obj};
 use crate::generate::garment::generated;
@@ -145,9 +144,13 @@ fn an_origin_above_the_pelvis_is_undone_exactly() {
         let garment = generated(&body, category, 5, 700);
         let made = polygons(&moved(garment.rest.positions(), pelvis), garment.rest.faces());
         let moved_already = polygons(garment.rest.positions(), garment.rest.faces());
-        // The imported file still knows its origin; what was made on it as it is now is recognised by where it lies.
-        for (mesh, source) in [(&made, &file), (&made, &imported), (&moved_already, &imported)] {
-            let fitted = fit(mesh, &body, &through(source, category)).unwrap();
+        // The imported file still knows its origin; a garment in the coordinates of the moved body says so.
+        let moved_hint = Some([0.0; 3]);
+        for (mesh, source, offset) in
+            [(&made, &file, None), (&made, &imported, None), (&moved_already, &imported, moved_hint)]
+        {
+            let settings = FitSettings { offset, ..through(source, category) };
+            let fitted = fit(mesh, &body, &settings).unwrap();
             let [median, p95] = errors(&fitted, &garment);
             assert!(median < 1e-6 && p95 < 1e-6, "{category} {source}: {median} {p95}");
             assert_eq!(fitted.report.placement.origin, Origin::SourceBody);
@@ -185,28 +188,33 @@ fn in_cm_z_up(positions: &[[f64; 3]], up: f64) -> Vec<[f64; 3]> {
 #[test]
 fn a_mesh_of_other_vertices_in_an_a_pose_is_registered() {
     let (body, folder) = (mannequin(), tempfile::tempdir().unwrap());
-    let other = decimated(&body, &[]);
-    let posed = ArmPose::new(&other, 40.0).positions;
-    let up = -posed.iter().map(|p| p[1]).fold(0.0, f64::min);
-    let file = at(&folder, "body.obj");
-    obj::save(Path::new(&file), &in_cm_z_up(&posed, up), &other.faces, &[]).unwrap();
-    for category in CATEGORIES {
-        let garment = generated(&body, category, 9, 700);
-        let made = in_cm_z_up(&lowered(&garment, &body, 40.0), up);
-        let mesh = polygons(&made, garment.rest.faces());
-        let fitted = fit(&mesh, &body, &through(&file, category)).unwrap();
-        let placement = fitted.report.placement;
-        let [median, p95] = errors(&fitted, &garment);
-        let how = fitted.report.from_body.clone().unwrap();
-        eprintln!(
-            "mesh {category}: median {:.2} p95 {:.2} mm; {placement:?} {}",
-            1e3 * median,
-            1e3 * p95,
-            how.text()
-        );
-        assert_eq!((placement.unit, placement.up), (Unit::Cm, UpAxis::Z));
-        assert!((placement.arm_angle_degrees - 40.0).abs() < 4.0 && how.carried == Carried::Registration);
-        assert!(median < 0.01, "{category}: {median} {p95}");
+    // The mean body with its legs together, and another one with its legs apart.
+    let cases: [(&[f64], f64, f64); 2] = [(&[], 0.0, 0.01), (&[0.6, -0.5, 0.4], 7.0, 0.015)];
+    for (number, (beta, legs, limit)) in cases.into_iter().enumerate() {
+        let other = decimated(&body, beta);
+        let posed = model::Model::new(&other, &[], [40.0, legs]).unwrap();
+        let up = -posed.positions.iter().map(|p| p[1]).fold(0.0, f64::min);
+        let file = at(&folder, &format!("body{number}.obj"));
+        obj::save(Path::new(&file), &in_cm_z_up(&posed.positions, up), &other.faces, &[]).unwrap();
+        for category in CATEGORIES {
+            let garment = generated(&body, category, 9, 700);
+            let pose = model::pose(&body, [40.0, legs]);
+            let made = in_cm_z_up(&worn(&garment, &body, beta, &pose), up);
+            let mesh = polygons(&made, garment.rest.faces());
+            let fitted = fit(&mesh, &body, &through(&file, category)).unwrap();
+            let placement = fitted.report.placement;
+            let [median, p95] = errors(&fitted, &garment);
+            let how = fitted.report.from_body.clone().unwrap();
+            eprintln!(
+                "mesh {category} {beta:?}: median {:.2} p95 {:.2} mm; {placement:?} {}",
+                1e3 * median,
+                1e3 * p95,
+                how.text()
+            );
+            assert_eq!((placement.unit, placement.up), (Unit::Cm, UpAxis::Z));
+            assert!((placement.arm_angle_degrees - 40.0).abs() < 4.0 && how.carried == Carried::Registration);
+            assert!(median < limit, "{category}: {median} {p95}");
+        }
     }
 }
 
@@ -264,7 +272,7 @@ fn what_is_no_body_and_what_contradicts_it_is_refused() {
         message.contains("ball.obj") && (message.contains("mm apart") || message.contains("not plain")),
         "{message}"
     );
-    let offset = FitSettings { offset: Some([0.0; 3]), ..on(&npz) };
+    let offset = FitSettings { offset: Some([0.0; 3]), ..on(&ball) };
     assert!(refused(garment.rest.positions(), &offset).contains("leave --offset out"));
     let message = refused(&moved(garment.rest.positions(), [0.0, 0.9, 0.0]), &on(&npz));
     assert!(message.contains("does not lie on this body"), "{message}");
