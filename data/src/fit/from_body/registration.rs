@@ -96,7 +96,7 @@ pub(super) fn register(
     let mut distances: Vec<f64> =
         gaps_to(&moved, &best.model.surface(body)).into_iter().map(f64::abs).collect();
     let alignment_mm = 1e3 * median(&mut distances);
-    if !(alignment_mm <= FARTHEST_MM) {
+    if alignment_mm.is_nan() || alignment_mm > FARTHEST_MM {
         return Err(format!(
             "it does not look like body '{}': after the alignment the surfaces are {alignment_mm:.0} mm apart (median; at most \
              {FARTHEST_MM} mm). It must be a whole person, standing, legs straight, arms level or lowered; --unit, --up and --turn say \
@@ -142,8 +142,13 @@ fn chosen(mut trials: Vec<Trial>) -> Result<Trial, String> {
         }
     };
     let best = trials.swap_remove(index);
-    if best.stance.says_back() && near > 1 {
-        return Err("its feet point backwards where the rest fits; say --up and --turn".into());
+    // With a hint there is but one stance.
+    if best.stance.says_back() && !trials.is_empty() {
+        let p = best.stance.placement;
+        return Err(format!(
+            "which way it faces is not plain: with --up {} --turn {} it fits best, but its feet point backwards; say which",
+            p.up, p.turn_degrees
+        ));
     }
     Ok(best)
 }

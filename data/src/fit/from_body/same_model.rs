@@ -163,8 +163,7 @@ fn axes(
         Some(unit) => unit,
         None => Unit::ALL.into_iter().min_by(|a, b| misfit(a).total_cmp(&misfit(b)))?,
     };
-    // Neither is what is no number.
-    if !(misfit(&unit) < 0.5) {
+    if misfit(&unit).is_nan() || misfit(&unit) > 0.5 {
         return None;
     }
     let ups = settings.up.map_or(UpAxis::ALL.to_vec(), |up| vec![up]);

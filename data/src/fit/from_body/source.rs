@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 /// A shape parameter beyond this is a slip of the pen: 99.99 % of people lie within 4.
 const LARGEST_PARAMETER: f64 = 10.0;
-/// Fewest vertices a mesh of a person has.
+/// Fewest vertices, and faces, that a mesh of a person has.
 const FEWEST_VERTICES: usize = 200;
 /// Most of them.
 const MOST_VERTICES: usize = 2_000_000;
@@ -157,6 +157,12 @@ impl SourceMesh {
         let cut = triangulate(&mesh.positions, mesh.polygons());
         let faces = cut.faces.iter().map(|f| f.map(|v| welded.number[v as usize]));
         let faces: Vec<[u32; 3]> = faces.filter(|[a, b, c]| a != b && b != c && c != a).collect();
+        if faces.len() < FEWEST_VERTICES {
+            return Err(wrong(format!(
+                "it has {} faces, too few for a body; export it as a surface",
+                faces.len()
+            )));
+        }
         let surface = TriMesh::new(welded.positions, faces).map_err(|e| wrong(e.to_string()))?;
         let surface = if is_inside_out(&surface) { surface.turned() } else { surface };
         Ok(Self { vertices: mesh.positions, surface })
