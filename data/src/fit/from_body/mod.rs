@@ -91,7 +91,7 @@ impl SourcePlacement {
         };
         let alignment =
             alignment_mm.map(|mm| format!("; surfaces {mm:.1} mm apart (median)")).unwrap_or_default();
-        let pelvis = pelvis.map(|p| p.map(|x| format!("{:.0}", 1e3 * x + 0.0)).join(", "));
+        let pelvis = pelvis.map(|p| p.map(|x| format!("{}", (1e3 * x).round() + 0.0)).join(", "));
         let pelvis = pelvis.map(|p| format!(", its pelvis at {p} mm")).unwrap_or_default();
         format!("placed through body {body}{shape}{pelvis}: {how}{alignment}; median |Δ| {moved_mm:.1} mm")
     }

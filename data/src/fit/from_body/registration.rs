@@ -31,6 +31,8 @@ const RANGES: [[f64; 2]; 2] = [[0.0, 85.0], [-5.0, 30.0]];
 const SHAPE_ROUNDS: usize = 8;
 /// Surfaces farther apart than this (median, mm) are no two bodies in one pose.
 const FARTHEST_MM: f64 = 25.0;
+/// Mean distance (m) from which on no refinement helps, and no stance is better than another.
+const HOPELESS: f64 = 0.08;
 /// A stance whose distance is within this factor of the best one's is a near-tie.
 const NEAR_TIE: f64 = 1.15;
 
@@ -80,6 +82,16 @@ pub(super) fn register(
         ));
     }
     trials.sort_by(|a, b| a.distance.total_cmp(&b.distance));
+    let unlike = |millimetres: f64| {
+        format!(
+            "it does not look like body '{}': after the alignment the surfaces are {millimetres:.0} mm apart (at most {FARTHEST_MM} mm). \
+             It must be a whole person, standing, legs straight, arms level or lowered; --unit, --up and --turn say how it stands",
+            body.name
+        )
+    };
+    if trials[0].distance > HOPELESS {
+        return Err(unlike(1e3 * trials[0].distance));
+    }
     let best = chosen(trials)?;
     let mut best = source.refined(best, body, &STEPS)?;
     // People differ in size by their shape: only what no shape explains is scaled.
@@ -97,12 +109,7 @@ pub(super) fn register(
         gaps_to(&moved, &best.model.surface(body)).into_iter().map(f64::abs).collect();
     let alignment_mm = 1e3 * median(&mut distances);
     if alignment_mm.is_nan() || alignment_mm > FARTHEST_MM {
-        return Err(format!(
-            "it does not look like body '{}': after the alignment the surfaces are {alignment_mm:.0} mm apart (median; at most \
-             {FARTHEST_MM} mm). It must be a whole person, standing, legs straight, arms level or lowered; --unit, --up and --turn say \
-             how it stands",
-            body.name
-        ));
+        return Err(unlike(alignment_mm));
     }
     let shaped = body.shaped(&best.model.shape).map_err(|e| e.to_string())?.positions;
     let Trial { model, motion, .. } = best;
