@@ -148,7 +148,9 @@ impl SourceMesh {
         let wrong = FileError::content::<String>(path);
         let mesh = load_mesh(path)?;
         let (count, size) = (mesh.positions.len(), diagonal(&mesh.positions));
-        if !(FEWEST_VERTICES..=MOST_VERTICES).contains(&count) || !(size > 0.0 && size.is_finite()) {
+        let is_plausible =
+            (FEWEST_VERTICES..=MOST_VERTICES).contains(&count) && size > 0.0 && size.is_finite();
+        if !is_plausible {
             return Err(wrong(format!(
                 "it has {count} vertices and a diagonal of {size}; a mesh of a person has {FEWEST_VERTICES} to {MOST_VERTICES} vertices"
             )));
