@@ -7,8 +7,7 @@
 use std::sync::LazyLock;
 
 /// Distances at which cloth may begin to lie on the body (m).
-const EASES: [f64; 12] =
-    [0.001, 0.003, 0.005, 0.0075, 0.010, 0.0125, 0.015, 0.018, 0.021, 0.025, 0.030, 0.036];
+const EASES: [f64; 12] = [0.001, 0.003, 0.005, 0.0075, 0.010, 0.0125, 0.015, 0.018, 0.021, 0.025, 0.030, 0.036];
 /// Scale of what is nearer than that (m).
 const NEARER: f64 = 0.0015;
 /// Scale of what lies there (m).
@@ -30,20 +29,12 @@ const KINDS: usize = EASES.len() * LYING.len();
 const ROWS: usize = ((HIGH - LOW) / RESOLUTION) as usize + 1;
 
 static TABLE: LazyLock<Vec<[f32; KINDS]>> = LazyLock::new(|| {
-    (0..ROWS)
-        .map(|i| {
-            std::array::from_fn(|k| {
-                log_density(LOW + i as f64 * RESOLUTION, EASES[k % EASES.len()], LYING[k / EASES.len()])
-                    as f32
-            })
-        })
-        .collect()
+    (0..ROWS).map(|i| std::array::from_fn(|k| log_density(LOW + i as f64 * RESOLUTION, EASES[k % EASES.len()], LYING[k / EASES.len()]) as f32)).collect()
 });
 
 /// Logarithm of the density of a gap (1/m).
 fn log_density(gap: f64, ease: f64, spread: f64) -> f64 {
-    let (nearer, hang, depth, share) =
-        (env("NEARER", 0.0015), env("HANG", 0.2), env("DEPTH", 0.01), env("INS", 0.06));
+    let (nearer, hang, depth, share) = (env("NEARER", 0.0015), env("HANG", 0.2), env("DEPTH", 0.01), env("INS", 0.06));
     let from = gap - ease;
     let lying = (-from.max(0.0) / spread).exp() * (from.min(0.0) / nearer).exp() / (spread + nearer);
     let [hanging, inside] = match gap >= 0.0 {
@@ -60,8 +51,7 @@ pub(super) fn log_likelihood(gaps: impl ExactSizeIterator<Item = (f64, usize)>, 
     for (gap, part) in gaps {
         sums[part].iter_mut().zip(&TABLE[row(gap)]).for_each(|(s, l)| *s += l);
     }
-    let score =
-        |(k, sum): (usize, &f32)| evidence * f64::from(*sum) / count - EASES[k % EASES.len()] / *USUAL;
+    let score = |(k, sum): (usize, &f32)| evidence * f64::from(*sum) / count - EASES[k % EASES.len()] / *USUAL;
     sums.iter().map(|sums| sums.iter().enumerate().map(score).fold(f64::MIN, f64::max)).sum()
 }
 
@@ -83,7 +73,7 @@ static ROUGH: LazyLock<Vec<f32>> = LazyLock::new(|| {
             let gap = LOW + i as f64 * RESOLUTION;
             let lying = (-0.5 * ((gap - 0.012) / 0.02).powi(2)).exp() / (0.02 * 2.5066);
             let hanging = (-gap.max(0.0) / 0.1).exp() / 0.1;
-            let inside = (gap.min(0.0) / 0.02).exp();
+            let inside = (gap.min(0.0) / 0.02).exp() ;
             (0.5 * lying + 0.5 * hanging * inside).max(1e-9).ln() as f32
         })
         .collect()

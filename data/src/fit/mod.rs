@@ -111,26 +111,14 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
         if let Some(t) = *TRUTH.lock().unwrap() {
             search.debug(&t, &cloth);
             let c = search.judge(t, &cloth, settings);
-            eprintln!(
-                "TRUTH {:7.2} fit {:6.3} x{} worn {} best {:7.2}",
-                c.score, c.fit, c.crossings, c.is_worn, candidates[0].score
-            );
+            eprintln!("TRUTH {:7.2} fit {:6.3} x{} worn {} best {:7.2}", c.score, c.fit, c.crossings, c.is_worn, candidates[0].score);
         }
         for c in candidates.iter().take(4) {
             search.debug(&c.placement, &cloth);
             let p = &c.placement;
             eprintln!(
                 "   {:7.2} fit {:6.3} x{} worn {} | {} {} {} {:?} arms {:.1} t {:.3?}",
-                c.score,
-                c.fit,
-                c.crossings,
-                c.is_worn,
-                p.unit,
-                p.up,
-                p.turn_degrees,
-                p.origin,
-                p.arm_angle_degrees,
-                p.translation
+                c.score, c.fit, c.crossings, c.is_worn, p.unit, p.up, p.turn_degrees, p.origin, p.arm_angle_degrees, p.translation
             );
         }
     }
@@ -155,9 +143,7 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
             (raised.map_err(FitError::Mesh)?, None)
         }
     };
-    if false {
-        refuse_other_things(&positions, body, &sitting)?;
-    }
+    if false { refuse_other_things(&positions, body, &sitting)?; }
 
     let rest_surface = ArmPose::new(body, 0.0).surface;
     turn_outward(&mut sheet, &positions, &topology, &rest_surface);

@@ -16,8 +16,7 @@ use clothcombo_physics::vec3::add;
 use rayon::prelude::*;
 
 /// Independent samples a garment is worth: neighbouring cloth lies alike.
-static RIM_EVIDENCE: std::sync::LazyLock<f64> =
-    std::sync::LazyLock::new(|| super::likelihood::env("RIME", 8.0));
+static RIM_EVIDENCE: std::sync::LazyLock<f64> = std::sync::LazyLock::new(|| super::likelihood::env("RIME", 8.0));
 const EVIDENCE: f64 = 40.0;
 /// Arm angles tried first (degrees).
 const ARM_ANGLES: [f64; 6] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0];
@@ -99,11 +98,8 @@ impl Search {
                 from_rims.sort_by(|a, b| b.score.total_cmp(&a.score));
                 from_rims.truncate(6);
                 from_rims.extend(started);
-                let mut worn: Vec<Candidate> = from_rims
-                    .into_iter()
-                    .map(|c| self.with_openings(c, cloth))
-                    .filter(|c| c.is_worn)
-                    .collect();
+                let mut worn: Vec<Candidate> =
+                    from_rims.into_iter().map(|c| self.with_openings(c, cloth)).filter(|c| c.is_worn).collect();
                 worn = self.distinct(worn);
                 worn.truncate(10);
                 worn.into_iter().map(|c| {
@@ -154,13 +150,7 @@ impl Search {
     }
 
     /// The best height for every arm angle.
-    fn started(
-        &self,
-        base: &Placement,
-        arms: &[f64],
-        coarse: &Samples,
-        settings: &FitSettings,
-    ) -> Vec<Candidate> {
+    fn started(&self, base: &Placement, arms: &[f64], coarse: &Samples, settings: &FitSettings) -> Vec<Candidate> {
         let points = base.apply(&coarse.0);
         let [low, high] = bounds(&points);
         let [x, z] = [0, 2].map(|a| 0.5 * (low[a] + high[a]));
@@ -170,8 +160,7 @@ impl Search {
             let at = |h: usize| {
                 let top = self.field.low[1] + 0.2 + (h / 3) as f64 * HEIGHT_STEP;
                 let forward = [0.0, 0.05, -0.05][h % 3];
-                let translation =
-                    settings.offset.unwrap_or([-x, top - high[1], self.field.spine_z - z + forward]);
+                let translation = settings.offset.unwrap_or([-x, top - high[1], self.field.spine_z - z + forward]);
                 let p = Placement { translation, arm_angle_degrees, origin: Origin::Elsewhere, ..*base };
                 self.roughly_scored(p, &points, settings)
             };
@@ -184,13 +173,7 @@ impl Search {
     }
 
     /// Each of the longest borders around the trunk, at every height.
-    fn started_from_rims(
-        &self,
-        base: &Placement,
-        coarse: &Samples,
-        cloth: &Cloth,
-        settings: &FitSettings,
-    ) -> Vec<Candidate> {
+    fn started_from_rims(&self, base: &Placement, coarse: &Samples, cloth: &Cloth, settings: &FitSettings) -> Vec<Candidate> {
         if settings.offset.is_some() || settings.arms_lowered == Some(true) {
             return Vec::new();
         }
@@ -199,14 +182,7 @@ impl Search {
         borders.sort_by_key(|b| std::cmp::Reverse(cloth.borders[*b].len()));
         let mut all = Vec::new();
         for &border in borders.iter().take(3) {
-            let of = Candidate {
-                placement: *base,
-                fit: 0.0,
-                score: 0.0,
-                crossings: 0,
-                rim: Some(border),
-                is_worn: true,
-            };
+            let of = Candidate { placement: *base, fit: 0.0, score: 0.0, crossings: 0, rim: Some(border), is_worn: true };
             let rim = self.rim_points(&of, cloth);
             let sum = rim.iter().fold([0.0; 3], |sum, p| add(sum, *p));
             let centre = sum.map(|x| x / rim.len().max(1) as f64);
@@ -243,32 +219,19 @@ impl Search {
         let arms = ArmTurn::new(placement.arm_angle_degrees);
         let gaps = points.iter().map(|p| self.field.gap(add(*p, placement.translation), arms));
         let fit = log_likelihood(gaps, EVIDENCE);
-        let middle = points.iter().map(|p| p[0]).fold(f64::MIN, f64::max)
-            + points.iter().map(|p| p[0]).fold(f64::MAX, f64::min);
+        let middle = points.iter().map(|p| p[0]).fold(f64::MIN, f64::max) + points.iter().map(|p| p[0]).fold(f64::MAX, f64::min);
         let aside = (0.5 * middle + placement.translation[0]) / SYMMETRY;
         let score = fit + placement.log_prior(settings) - (0.5 * aside * aside).min(8.0);
         Candidate { placement, fit, score, crossings: 0, rim: None, is_worn: true }
     }
 
     /// Slid along the three axes, and the arms turned, as long as that helps.
-    fn refined(
-        &self,
-        start: &Candidate,
-        samples: &Samples,
-        settings: &FitSettings,
-        cloth: &Cloth,
-        from: f64,
-        to: f64,
-    ) -> Candidate {
+    fn refined(&self, start: &Candidate, samples: &Samples, settings: &FitSettings, cloth: &Cloth, from: f64, to: f64) -> Candidate {
         let points = Placement { translation: [0.0; 3], ..start.placement }.apply(&samples.0);
         let rough = from > 0.02;
         let rim = self.rim_points(start, cloth);
         let scored = |placement: Placement| {
-            let mut c = if rough {
-                self.roughly_scored(placement, &points, settings)
-            } else {
-                self.scored_at(placement, &points, settings)
-            };
+            let mut c = if rough { self.roughly_scored(placement, &points, settings) } else { self.scored_at(placement, &points, settings) };
             c.rim = start.rim;
             c.score += self.rim_score(&rim, &placement);
             c
@@ -281,14 +244,9 @@ impl Search {
                 for sign in [-1.0, 1.0] {
                     let mut trial = best.placement;
                     match axis {
-                        3 if trial.arm_angle_degrees == 0.0 || settings.arms_lowered == Some(false) => {
-                            continue;
-                        }
+                        3 if trial.arm_angle_degrees == 0.0 || settings.arms_lowered == Some(false) => continue,
                         // A sleeve is half a metre long.
-                        3 => {
-                            trial.arm_angle_degrees =
-                                (trial.arm_angle_degrees + sign * (2.0 * step).to_degrees()).clamp(3.0, 85.0)
-                        }
+                        3 => trial.arm_angle_degrees = (trial.arm_angle_degrees + sign * (2.0 * step).to_degrees()).clamp(3.0, 85.0),
                         _ if settings.offset.is_some() => continue,
                         _ => trial.translation[axis] += sign * step,
                     }
@@ -327,20 +285,11 @@ impl Search {
         let openings = self.openings(&candidate.placement, cloth);
         let count = |wanted: Opening| openings.iter().filter(|(o, _)| *o == wanted).count();
         let has = |wanted: Opening| count(wanted) > 0;
-        let others = [
-            Opening::Neck,
-            Opening::LeftArm,
-            Opening::RightArm,
-            Opening::LeftLeg,
-            Opening::RightLeg,
-            Opening::Several,
-        ];
+        let others = [Opening::Neck, Opening::LeftArm, Opening::RightArm, Opening::LeftLeg, Opening::RightLeg, Opening::Several];
         let arms = has(Opening::LeftArm) && has(Opening::RightArm);
-        let is_around =
-            count(Opening::Trunk) >= 2 || (has(Opening::Trunk) && others.into_iter().any(has)) || arms;
+        let is_around = count(Opening::Trunk) >= 2 || (has(Opening::Trunk) && others.into_iter().any(has)) || arms;
         // Only sleeves and armholes tell how arms hang.
-        let is_worn =
-            is_around && (arms || has(Opening::Several) || candidate.placement.arm_angle_degrees == 0.0);
+        let is_worn = is_around && (arms || has(Opening::Several) || candidate.placement.arm_angle_degrees == 0.0);
         if candidate.is_worn && !is_worn {
             candidate.score -= UNWORN;
         }
@@ -368,8 +317,7 @@ impl Search {
     fn rim_points(&self, candidate: &Candidate, cloth: &Cloth) -> Vec<[f64; 3]> {
         let Some(border) = candidate.rim.map(|i| &cloth.borders[i]) else { return Vec::new() };
         let stride = border.len().div_ceil(60);
-        let points: Vec<[f64; 3]> =
-            border.iter().step_by(stride).map(|v| cloth.positions[*v as usize]).collect();
+        let points: Vec<[f64; 3]> = border.iter().step_by(stride).map(|v| cloth.positions[*v as usize]).collect();
         Placement { translation: [0.0; 3], ..candidate.placement }.apply(&points)
     }
 
@@ -380,9 +328,7 @@ impl Search {
 
     /// Log-density of the height of an upper rim (m): at the waist, or above the chest.
     fn rim_prior(&self, height: f64) -> f64 {
-        let normal = |middle: f64, spread: f64| {
-            (-0.5 * ((height - middle) / spread).powi(2)).exp() / (spread * 2.5066)
-        };
+        let normal = |middle: f64, spread: f64| (-0.5 * ((height - middle) / spread).powi(2)).exp() / (spread * 2.5066);
         let [waist, chest] = self.field.rims;
         (0.6 * normal(waist, 0.035) + 0.35 * normal(chest, 0.03) + 0.02).ln() - 5.0f64.ln()
     }
@@ -427,8 +373,7 @@ impl Search {
             let is_new = |kept: &Candidate| {
                 let (a, b) = (&kept.placement, &c.placement);
                 (a.unit, a.up, a.turn_degrees) != (b.unit, b.up, b.turn_degrees)
-                    || ((a.arm_angle_degrees - b.arm_angle_degrees).abs() > 8.0
-                        && (kept.fit - c.fit).abs() > 0.5)
+                    || ((a.arm_angle_degrees - b.arm_angle_degrees).abs() > 8.0 && (kept.fit - c.fit).abs() > 0.5)
                     || (0..3).any(|k| (a.translation[k] - b.translation[k]).abs() > 0.02)
             };
             if kept.iter().all(is_new) {
