@@ -57,6 +57,16 @@ pub struct BodyParts {
 pub struct Body {
     parts: BodyParts,
     zero_body: TriMesh,
+    file_pelvis: FilePelvis,
+}
+
+/// Where the pelvis stood before the body was moved to the origin.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct FilePelvis {
+    /// Of the zero body (m).
+    pub template: [f64; 3],
+    /// Its displacement per unit of each shape component (m), `[3 × K]` row-major.
+    pub shape_directions: Vec<f64>,
 }
 
 impl Deref for Body {
@@ -167,7 +177,34 @@ impl Body {
         }
         let zero_body =
             TriMesh::new(parts.template.clone(), parts.faces.to_vec()).map_err(|e| wrong(e.to_string()))?;
-        Ok(Self { parts, zero_body })
+        let file_pelvis = FilePelvis { template: pelvis, shape_directions: pelvis_directions };
+        Ok(Self { parts, zero_body, file_pelvis })
+    }
+
+    /// The same body, made of a file that holds it moved already: there its pelvis stood at `recorded`.
+    pub(super) fn with_recorded_pelvis(mut self, recorded: FilePelvis) -> Self {
+        let own = &self.file_pelvis;
+        let directions = own.shape_directions.iter().zip(&recorded.shape_directions).map(|(a, b)| a + b);
+        self.file_pelvis = FilePelvis {
+            template: add(own.template, recorded.template),
+            shape_directions: directions.collect(),
+        };
+        self
+    }
+
+    pub(super) fn recorded_pelvis(&self) -> &FilePelvis {
+        &self.file_pelvis
+    }
+
+    /// Where the pelvis of shape `beta` stands in the coordinates that the body was given in (m): for SMPL some 0.22 m and for
+    /// SMPL-X some 0.35 m below the origin. A short `beta` is continued with zeros. A file that [`Body::save`] wrote still knows it.
+    pub fn file_pelvis(&self, beta: &[f64]) -> [f64; 3] {
+        let FilePelvis { template, shape_directions, .. } = &self.file_pelvis;
+        let k = self.shape_count;
+        std::array::from_fn(|a| {
+            let row = shape_directions.get(a * k..(a + 1) * k).unwrap_or_default();
+            template[a] + row.iter().zip(beta).map(|(d, b)| d * b).sum::<f64>()
+        })
     }
 
     /// The same body inside out: every face is turned over.
@@ -185,6 +222,8 @@ impl Body {
                 self.shape_directions.chunks_exact(k).flat_map(|row| &row[..count]).copied().collect();
             self.joint_shape_directions =
                 self.joint_shape_directions.chunks_exact(k).flat_map(|row| &row[..count]).copied().collect();
+            let pelvis = &mut self.file_pelvis.shape_directions;
+            *pelvis = pelvis.chunks_exact(k).flat_map(|row| &row[..count]).copied().collect();
             self.shape_count = count;
         }
         self

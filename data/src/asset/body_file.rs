@@ -2,9 +2,10 @@
 //!
 //! Read: `v_template`, `f`, `shapedirs`, `weights`, `kintree_table`, and either `J_template` with `J_shapedirs` or
 //! `J_regressor`; optionally `posedirs` and `joint_names`. A rigged body without `shapedirs` has one shape. Written: the same keys with `J_template` and `J_shapedirs`, plus
-//! `source`, `author` and `licence`.
+//! `source`, `author` and `licence`, and `pelvis_template` with `pelvis_shapedirs`: where the pelvis was in the file the body came
+//! from, if that was not the origin.
 
-use super::body::{Body, BodyParts};
+use super::body::{Body, BodyParts, FilePelvis};
 use super::provenance::Provenance;
 use super::skeleton::{self, BODY_JOINT_NAMES};
 use super::skin_weights::SparseSkinWeights;
@@ -138,7 +139,8 @@ impl Body {
             }
         }
         let name = path.file_stem().map_or_else(|| "body".into(), |s| s.to_string_lossy().into_owned());
-        Body::new(BodyParts {
+        let recorded = recorded_pelvis(&mut file, components, shape_count)?;
+        let body = Body::new(BodyParts {
             name,
             faces: faces.into(),
             template,
@@ -151,7 +153,11 @@ impl Body {
             parents,
             joint_names,
         })
-        .map_err(FileError::content(path))
+        .map_err(FileError::content(path))?;
+        Ok(match recorded {
+            Some(pelvis) => body.with_recorded_pelvis(pelvis),
+            None => body,
+        })
     }
 
     /// Writes the body as npz (keys as [`Body::load`] reads them, `f32` throughout but for the joints).
@@ -175,8 +181,39 @@ impl Body {
         if let Some(p) = &self.pose_directions {
             npz.f32("posedirs", &[v, 3, 9 * (j - 1)], p);
         }
+        let pelvis = self.recorded_pelvis();
+        if pelvis.template != [0.0; 3] || pelvis.shape_directions.iter().any(|d| *d != 0.0) {
+            npz.f64("pelvis_template", &[3], &pelvis.template);
+            npz.f64("pelvis_shapedirs", &[3, k], &pelvis.shape_directions);
+        }
         npz.save(path)
     }
+}
+
+/// Where the pelvis was before [`Body::save`] wrote the body with its pelvis at the origin.
+fn recorded_pelvis(
+    file: &mut NpzFile,
+    components: usize,
+    shape_count: usize,
+) -> Result<Option<FilePelvis>, FileError> {
+    if !file.contains("pelvis_template") {
+        return Ok(None);
+    }
+    let template = file.numbers("pelvis_template", HINT)?;
+    let [x, y, z] = template.data[..] else {
+        return Err(file.wrong_shape("pelvis_template", &template.shape, "[3]"));
+    };
+    let directions = file.numbers("pelvis_shapedirs", "pelvis_template goes with pelvis_shapedirs")?;
+    if directions.shape != [3, components] {
+        return Err(file.wrong_shape("pelvis_shapedirs", &directions.shape, &format!("[3, {components}]")));
+    }
+    if let Some(x) = template.data.iter().chain(&directions.data).find(|x| !x.is_finite()) {
+        let message =
+            format!("keys 'pelvis_template' and 'pelvis_shapedirs' hold {x}; write finite numbers (m)");
+        return Err(FileError::content(file.path())(message));
+    }
+    let shape_directions = first_columns(&directions.data, components, shape_count);
+    Ok(Some(FilePelvis { template: [x, y, z], shape_directions }))
 }
 
 fn points(file: &mut NpzFile, key: &str) -> Result<Vec<[f64; 3]>, FileError> {

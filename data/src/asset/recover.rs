@@ -1,6 +1,6 @@
 //! Shape and pose of a body from a posed mesh of its vertices and the same body in T-pose.
 //!
-//! The shape is the linear least-squares solution on the T-pose. The bones are found by block coordinate descent on the
+//! The shape is the linear least-squares solution on the T-pose, or on the posed mesh in turns with the pose where there is none. The bones are found by block coordinate descent on the
 //! distance to linear blend skinning: one bone after the other gets the rotation and translation that fit best what the others leave
 //! of its vertices. The rotation of a covariance is taken by the iteration of Müller, Bender, Chentanez and Macklin, "A robust
 //! method to extract the rotational part of deformations" (MIG 2016).
@@ -17,6 +17,8 @@ use thiserror::Error;
 const FARTHEST: f64 = 0.03;
 /// Rounds over all bones.
 const ROUNDS: usize = 30;
+/// Rounds of pose and shape where the shape is not known.
+const SHAPE_ROUNDS: usize = 6;
 /// Bones have no say on vertices they carry less of than this.
 const LEAST_WEIGHT: f64 = 0.05;
 /// Weight of small shape numbers against close vertices (m²): decides only what the vertices leave open.
@@ -69,6 +71,8 @@ pub enum KnownShape<'a> {
     TPose(&'a [[f64; 3]]),
     /// Its shape parameters β.
     Parameters(&'a [f64]),
+    /// Nothing: found from the posed mesh, in turns with the pose.
+    Unknown,
 }
 
 /// Recovers shape and pose from `posed` `[V, 3]` (m).
@@ -87,17 +91,9 @@ pub fn recover_body(
             fitted_shape(body, rest)
         }
         KnownShape::Parameters(shape) => shape.to_vec(),
+        KnownShape::Unknown => shape_of_posed(body, posed)?,
     };
-    let bones = fitted_bones(body, &body.shaped(&shape)?.positions, posed);
-    let pose = Pose {
-        rotations: (0..body.joint_count())
-            .map(|j| match body.parents[j] {
-                Some(parent) => product(&transpose(&bones[parent].rotation), &bones[j].rotation),
-                None => bones[j].rotation,
-            })
-            .map(|local| axis_angle_from_matrix(&local))
-            .collect(),
-    };
+    let pose = fitted_pose(body, &shape, posed)?;
     let model = body.posed(&shape, &pose)?.positions;
     let count = model.len().max(1) as f64;
     let sum = posed.iter().zip(&model).fold([0.0; 3], |sum, (p, m)| add(sum, sub(*p, *m)));
@@ -128,9 +124,43 @@ fn check(body: &Body, which: &str, positions: &[[f64; 3]]) -> Result<(), Recover
     }
 }
 
+fn fitted_pose(body: &Body, shape: &[f64], posed: &[[f64; 3]]) -> Result<Pose, BodyError> {
+    let bones = fitted_bones(body, &body.shaped(shape)?.positions, posed);
+    let local = |j: usize| match body.parents[j] {
+        Some(parent) => product(&transpose(&bones[parent].rotation), &bones[j].rotation),
+        None => bones[j].rotation,
+    };
+    Ok(Pose { rotations: (0..body.joint_count()).map(|j| axis_angle_from_matrix(&local(j))).collect() })
+}
+
+/// The shape of a posed mesh. For given rotations the posed vertices are linear in the shape: pose and shape are fitted in turns.
+fn shape_of_posed(body: &Body, posed: &[[f64; 3]]) -> Result<Vec<f64>, BodyError> {
+    let k = body.shape_count;
+    let mut shape = vec![0.0; k];
+    for _ in 0..if k == 0 { 0 } else { SHAPE_ROUNDS } {
+        let pose = fitted_pose(body, &shape, posed)?;
+        let start = body.posed(&[], &pose)?.positions;
+        let mut directions = vec![0f32; 3 * k * start.len()];
+        for component in 0..k {
+            let mut unit = vec![0.0; k];
+            unit[component] = 1.0;
+            let moved = body.posed(&unit, &pose)?.positions;
+            for (i, (m, s)) in moved.as_flattened().iter().zip(start.as_flattened()).enumerate() {
+                directions[i * k + component] = (m - s) as f32;
+            }
+        }
+        shape = linear_shape(&start, &directions, k, posed);
+    }
+    Ok(shape)
+}
+
 /// The shape whose body lies closest to `rest`, wherever that stands.
 fn fitted_shape(body: &Body, rest: &[[f64; 3]]) -> Vec<f64> {
-    let k = body.shape_count;
+    linear_shape(&body.template, &body.shape_directions, body.shape_count, rest)
+}
+
+/// The k shape numbers for which `template` plus `directions` `[V × 3 × k]` lies closest to `rest`, wherever that stands.
+fn linear_shape(template: &[[f64; 3]], directions: &[f32], k: usize, rest: &[[f64; 3]]) -> Vec<f64> {
     if k == 0 {
         return Vec::new();
     }
@@ -139,10 +169,10 @@ fn fitted_shape(body: &Body, rest: &[[f64; 3]]) -> Vec<f64> {
     let mut gram = vec![vec![0.0; size]; size];
     let mut right = vec![0.0; size];
     let mut row = vec![0.0; size];
-    for (v, (p, t)) in rest.iter().zip(&body.template).enumerate() {
+    for (v, (p, t)) in rest.iter().zip(template).enumerate() {
         for a in 0..3 {
-            let directions = &body.shape_directions[(3 * v + a) * k..(3 * v + a + 1) * k];
-            row[..k].iter_mut().zip(directions).for_each(|(r, d)| *r = f64::from(*d));
+            let of_coordinate = &directions[(3 * v + a) * k..(3 * v + a + 1) * k];
+            row[..k].iter_mut().zip(of_coordinate).for_each(|(r, d)| *r = f64::from(*d));
             (0..3).for_each(|b| row[k + b] = if a == b { 1.0 } else { 0.0 });
             for i in 0..size {
                 right[i] += row[i] * (p[a] - t[a]);
@@ -293,6 +323,17 @@ mod tests {
         let posed = body.posed(&shape, &pose).unwrap().positions;
         let found = recover_body(&body, KnownShape::Parameters(&shape), &posed).unwrap();
         assert!(found.mean_distance < 2e-3 && found.shape == shape, "{}", found.mean_distance);
+    }
+
+    #[test]
+    fn shape_and_pose_are_found_from_the_posed_mesh_alone() {
+        let (body, shape, pose) = scene(7);
+        let posed = body.posed(&shape, &pose).unwrap().positions;
+        let found = recover_body(&body, KnownShape::Unknown, &posed).unwrap();
+        assert!(found.mean_distance < 3e-3, "{}", found.mean_distance);
+        for (a, b) in found.shape.iter().zip(&shape) {
+            assert!((a - b).abs() < 0.1, "{:?}", found.shape);
+        }
     }
 
     #[test]

@@ -188,11 +188,6 @@ impl BodyField {
         raised
     }
 
-    /// Whether the arms are at one angle.
-    pub fn is_posed(&self) -> bool {
-        self.arm_weights.is_some()
-    }
-
     /// Whether `p` is at least this deep (m) inside the body.
     pub fn is_inside(&self, p: [f64; 3], arms: ArmTurn, depth: f64) -> bool {
         let in_arm = |arm: &Arm| arm.distance.distance(arms.raised(p, arm.shoulder, arm.side)) < -depth;

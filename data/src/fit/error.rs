@@ -85,6 +85,14 @@ pub enum FitError {
          program"
     )]
     Sheets,
+    /// The body that the garment was made on does not say where it lies.
+    #[error("--from-body {name}: {what}")]
+    SourceBody {
+        /// Its file, with shape parameters where some were given.
+        name: String,
+        /// What is wrong, and what to do.
+        what: String,
+    },
     /// No mesh after the repairs.
     #[error("no mesh is left: {0}")]
     Mesh(String),

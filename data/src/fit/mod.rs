@@ -9,6 +9,7 @@ mod climb;
 mod cloth;
 mod coverage;
 mod error;
+mod from_body;
 mod judge;
 mod likelihood;
 mod placed;
@@ -24,7 +25,8 @@ mod verdict;
 
 pub use coverage::off_trunk;
 pub use error::FitError;
-pub use placed::is_on_body;
+pub use from_body::{Carried, SourceBody, SourcePlacement};
+pub use placed::{PlacementCheck, is_on_body};
 pub use placement::{Origin, Placement, Unit, UpAxis};
 pub use repair::needs_repair;
 pub use report::{BodyContact, Elements, FitReport, MeshPiece, Repair, RepairKind, SeamReport};
@@ -105,11 +107,16 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
         return Err(FitError::Extent { extent, unit: settings.unit, reach: search.reach });
     }
     let cloth = Cloth::new(&sheet.positions, &sheet.faces, &topology.boundary_loops);
-    let candidates = search.candidates(&cloth, extent, settings);
-    let Verdict { candidate, sitting, doubts } =
-        verdict(&candidates, &cloth.fine, settings, |placement| search.measured(&cloth, placement))?;
-    let placement = candidate.placement;
-    let rest_surface = search.into_surface();
+    let source = settings.from_body.as_deref().map(|b| b.aligned(body, settings)).transpose()?;
+    let (placement, doubts) = match &source {
+        Some(source) => (source.placement, Vec::new()),
+        None => {
+            let candidates = search.candidates(&cloth, extent, settings);
+            let measured = |placement: &Placement| search.measured(&cloth, placement);
+            let Verdict { placement, doubts } = verdict(&candidates, &cloth.fine, settings, measured)?;
+            (placement, doubts)
+        }
+    };
     let metres = placement.unit.metres();
     let seams = finish_seams(&mut sheet, file, settings, metres);
     let follows = sheet.followed(file, metres);
@@ -118,9 +125,23 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
     let topology = Topology::new(&mesh);
     let placed = placement.apply(&sheet.positions);
     let arms = ArmPose::new(body, placement.arm_angle_degrees);
-    let mut positions =
-        arms.to_t_pose(&placed, &sheet.faces, settings.category, body).map_err(FitError::Mesh)?;
+    let (mut positions, from_body) = match &source {
+        Some(source) => {
+            let (carried, how) = source.carry(&sheet.positions, &sheet.faces, settings.category, body)?;
+            (carried, Some(how))
+        }
+        None => {
+            let raised = arms.to_t_pose(&placed, &sheet.faces, settings.category, body);
+            (raised.map_err(FitError::Mesh)?, None)
+        }
+    };
     refuse_other_things(&positions, body)?;
+    let raised = Cloth::new(&positions, &sheet.faces, &topology.boundary_loops);
+    let sitting = match &source {
+        Some(_) => search.believed_as_given(&raised)?,
+        None => search.measured(&raised, &Placement::AS_GIVEN).0,
+    };
+    let rest_surface = search.into_surface();
 
     turn_outward(&mut sheet, &positions, &topology, &rest_surface);
     let before = contact(&positions, &rest_surface);
@@ -149,6 +170,7 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
         file_vertices: file.positions.len(),
         file_faces: file.polygon_count(),
         placement,
+        from_body,
         sitting,
         doubts: doubts.iter().map(ToString::to_string).collect(),
         repairs: sheet.repairs,

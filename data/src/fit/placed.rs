@@ -1,18 +1,56 @@
 //! Does a garment already lie on a body, in metres and T-pose, so that nothing has to be found out?
 
-use super::settings::MIN_TRIANGLES;
+use super::cloth::Cloth;
+use super::placement::{Placement, Unit, UpAxis};
+use super::search::Search;
+use super::settings::{FitSettings, MIN_TRIANGLES};
 use crate::asset::Body;
 use crate::mesh::outward_area;
 use clothcombo_physics::{Surface, Topology, TriMesh};
 
-/// Whether `mesh`, taken as it stands (metres, y up, pelvis at the origin, arms level), sits on the zero body of `body` as a
-/// garment does: most of it close to the surface or all around it, little of it inside, by the same judgement by which
-/// [`fit`](super::fit) takes a placement; and every piece of it with its faces outwards.
-pub fn is_on_body(mesh: &TriMesh, body: &Body) -> bool {
-    if mesh.face_count() < MIN_TRIANGLES {
-        return false;
+/// A file is taken as it stands unless another place is better by this log-posterior.
+const MARGIN: f64 = 8.0;
+
+/// Tells which meshes lie on a body as they stand.
+pub struct PlacementCheck<'a> {
+    body: &'a Body,
+    search: Search<'a>,
+}
+
+impl<'a> PlacementCheck<'a> {
+    /// Prepares the zero body.
+    pub fn new(body: &'a Body) -> Self {
+        Self { body, search: Search::new(body) }
     }
-    faces_outwards(mesh, body)
+
+    /// Whether `mesh`, taken as it stands (metres, y up, pelvis at the origin, arms level), is worn on the zero body and fits nowhere
+    /// clearly better, by the same judgement by which [`fit`](super::fit) takes a placement; and every piece of it has its faces
+    /// outwards.
+    pub fn is_on_body(&self, mesh: &TriMesh) -> bool {
+        let topology = Topology::new(mesh);
+        let cloth = Cloth::new(mesh.positions(), mesh.faces(), &topology.boundary_loops);
+        mesh.face_count() >= MIN_TRIANGLES
+            && self.search.believed_as_given(&cloth).is_ok()
+            && self.fits_best_as_given(&cloth, mesh.extent())
+            && faces_outwards(mesh, self.body)
+    }
+
+    fn fits_best_as_given(&self, cloth: &Cloth, extent: f64) -> bool {
+        let settings = FitSettings {
+            unit: Some(Unit::M),
+            up: Some(UpAxis::Y),
+            arms_lowered: Some(false),
+            ..FitSettings::default()
+        };
+        let given = self.search.judged_as_given(&self.search.judge(cloth, &settings), Placement::AS_GIVEN);
+        let best = self.search.candidates(cloth, extent, &settings).first().map_or(f64::MIN, |c| c.score);
+        best <= given.score + MARGIN
+    }
+}
+
+/// [`PlacementCheck::is_on_body`] for one mesh.
+pub fn is_on_body(mesh: &TriMesh, body: &Body) -> bool {
+    PlacementCheck::new(body).is_on_body(mesh)
 }
 
 /// Whether the area of every piece faces away from the body more than towards it.

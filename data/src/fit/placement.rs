@@ -123,6 +123,8 @@ pub enum Origin {
     Floor,
     /// Nowhere on the body: the garment was moved to where it fits.
     Elsewhere,
+    /// Where the body that the garment was made on has it.
+    SourceBody,
 }
 
 /// The similarity that brings a file onto the body: `p ↦ metres · R · p + translation`.

@@ -4,6 +4,7 @@ mod seams;
 
 pub use seams::SeamReport;
 
+use super::from_body::SourcePlacement;
 use super::placement::{Origin, Placement};
 use super::sitting::Sitting;
 use crate::asset::Category;
@@ -172,6 +173,8 @@ pub struct FitReport {
     pub file_faces: usize,
     /// Unit, axes, origin and arm pose.
     pub placement: Placement,
+    /// Through which body it was placed, if through one.
+    pub from_body: Option<SourcePlacement>,
     /// How the garment sat there before anything was pushed.
     pub sitting: Sitting,
     /// What speaks against the placement: readings nearly as good, each with the flags that settle it.
@@ -223,6 +226,7 @@ impl FitReport {
             Origin::Floor => {
                 format!("the file's origin is on the floor below the pelvis (moved by {y:.0} mm)")
             }
+            Origin::SourceBody => self.from_body.as_ref().map(SourcePlacement::text).unwrap_or_default(),
             Origin::Elsewhere => {
                 format!(
                     "the file's origin is not the body's: moved by {x:.0}, {y:.0}, {z:.0} mm to where it fits"

@@ -4,12 +4,14 @@
 use super::anatomy::Skeleton;
 use super::arm_pose::ArmPose;
 use super::body_field::BodyField;
+use super::error::FitError;
 use super::climb::{Steps, climbed};
 use super::cloth::Cloth;
 use super::judge::{Candidate, Judge, UNWORN};
 use super::placement::{Origin, Placement, Unit, UpAxis};
 use super::settings::FitSettings;
 use super::sitting::Sitting;
+use super::verdict::implausibility;
 use crate::asset::Body;
 use crate::mesh::bounds;
 use clothcombo_physics::query::Surface;
@@ -65,6 +67,20 @@ impl<'a> Search<'a> {
             degrees => Sitting::new(&points, self.body, &ArmPose::new(self.body, degrees).surface),
         };
         (sitting, high[1] - low[1])
+    }
+
+    /// How a garment sits that is in metres, T-pose and the body's frame.
+    ///
+    /// # Errors
+    /// [`FitError::Implausible`] if it is not worn there.
+    pub fn believed_as_given(&self, cloth: &Cloth) -> Result<Sitting, FitError> {
+        let settings = FitSettings::default();
+        let candidate = self.judged_as_given(&self.judge(cloth, &settings), Placement::AS_GIVEN);
+        let (sitting, height) = self.measured(cloth, &Placement::AS_GIVEN);
+        match implausibility(&candidate, &sitting, height) {
+            Some(why) => Err(FitError::Implausible { best: why, second: None }),
+            None => Ok(sitting),
+        }
     }
 
     /// The surface of the zero body in T-pose.
@@ -192,7 +208,7 @@ impl<'a> Search<'a> {
     }
 
     /// A file as it stands counts as worn if it lies around the trunk, however its borders run.
-    fn judged_as_given(&self, judge: &Judge, placement: Placement) -> Candidate {
+    pub fn judged_as_given(&self, judge: &Judge, placement: Placement) -> Candidate {
         let candidate = judge.judged(placement);
         match candidate.is_worn || !self.measured(judge.cloth, &placement).0.is_snug() {
             true => candidate,

@@ -1,8 +1,10 @@
 //! What is known about a file, and the limits of what fits.
 
+use super::from_body::SourceBody;
 use super::placement::{Unit, UpAxis};
 use crate::asset::Category;
 use std::str::FromStr;
+use std::sync::Arc;
 
 /// Most vertices a garment may have after welding.
 pub const MAX_VERTICES: usize = 1_000_000;
@@ -33,6 +35,9 @@ pub struct FitSettings {
     pub keep: Keep,
     /// Largest distance between borders that are joined (m); otherwise only borders that coincide are.
     pub join_seams: Option<f64>,
+    /// The body that the garment was made on: it is placed through that one, and nothing is searched for. Unit, up axis and turn then
+    /// say how garment *and* body mesh are written, or how the garment's coordinates differ from a body npz's.
+    pub from_body: Option<Arc<SourceBody>>,
 }
 
 /// Which of a file's surfaces are the garment.

@@ -72,7 +72,7 @@ fn differences(taken: &Placement, other: &Placement) -> Vec<String> {
 }
 
 /// Why a candidate is not believed; `None` if it is.
-fn implausibility(candidate: &Candidate, sitting: &Sitting, height: f64) -> Option<String> {
+pub(super) fn implausibility(candidate: &Candidate, sitting: &Sitting, height: f64) -> Option<String> {
     let percent = |share: f64| 100.0 * share;
     if !candidate.is_worn {
         return Some("no opening goes around the trunk, the neck or both arms".into());
@@ -94,8 +94,7 @@ fn implausibility(candidate: &Candidate, sitting: &Sitting, height: f64) -> Opti
 
 /// A placement and the doubts about it.
 pub(super) struct Verdict {
-    pub candidate: Candidate,
-    pub sitting: Sitting,
+    pub placement: Placement,
     pub doubts: Vec<Doubt>,
 }
 
@@ -106,19 +105,19 @@ pub(super) fn verdict(
     settings: &FitSettings,
     measured: impl Fn(&Placement) -> (Sitting, f64),
 ) -> Result<Verdict, FitError> {
-    let (mut believed, mut refused): (Vec<(Candidate, Sitting)>, Vec<(Placement, String)>) = Default::default();
+    let (mut believed, mut refused): (Vec<Candidate>, Vec<(Placement, String)>) = Default::default();
     for candidate in candidates.iter().take(8) {
         // What is far worse than one that is believed is not looked at.
-        if believed.first().is_some_and(|(best, _)| candidate.score < best.score - NEAR_TIE) {
+        if believed.first().is_some_and(|best| candidate.score < best.score - NEAR_TIE) {
             break;
         }
         let (sitting, height) = measured(&candidate.placement);
         match implausibility(candidate, &sitting, height) {
-            None => believed.push((*candidate, sitting)),
+            None => believed.push(*candidate),
             Some(why) => refused.push((candidate.placement, why)),
         }
     }
-    let Some((candidate, sitting)) = believed.first().copied() else {
+    let Some(candidate) = believed.first().copied() else {
         let mut readings = refused.into_iter().map(|(p, why)| format!("{} ({why})", p.reading()));
         let best = readings.next().unwrap_or_else(|| "none".into());
         return Err(FitError::Implausible { best, second: readings.next() });
@@ -130,7 +129,7 @@ pub(super) fn verdict(
         sum / points.len().max(1) as f64
     };
     let mut doubts = Vec::new();
-    let other = believed[1..].iter().map(|(c, _)| (c.placement, apart(&c.placement))).find(|(_, d)| *d > SAME);
+    let other = believed[1..].iter().map(|c| (c.placement, apart(&c.placement))).find(|(_, d)| *d > SAME);
     if let Some((other, apart)) = other {
         doubts.push(Doubt::NearTie { taken, other, apart });
     }
@@ -138,5 +137,5 @@ pub(super) fn verdict(
     if candidate.is_tube && settings.category.is_none() && !is_usual {
         doubts.push(Doubt::Tube);
     }
-    Ok(Verdict { candidate, sitting, doubts })
+    Ok(Verdict { placement: taken, doubts })
 }

@@ -51,7 +51,7 @@ const MODELS: [Model; 3] = [
 ];
 
 /// The arrays a body is made of.
-const TAKEN: [&str; 12] = [
+const TAKEN: [&str; 14] = [
     "v_template",
     "f",
     "shapedirs",
@@ -62,6 +62,8 @@ const TAKEN: [&str; 12] = [
     "J_template",
     "J_shapedirs",
     "joint_names",
+    "pelvis_template",
+    "pelvis_shapedirs",
     "source",
     "author",
 ];

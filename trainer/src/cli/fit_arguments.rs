@@ -2,9 +2,11 @@
 
 use clap::Args;
 use clothcombo_data::asset::Category;
-use clothcombo_data::fit::{FitSettings, Keep, Unit, UpAxis};
+use clothcombo_data::fit::{FitSettings, Keep, SourceBody, Unit, UpAxis};
+use clothcombo_data::format::FileError;
 use serde::Deserialize;
 use std::str::FromStr;
+use std::sync::Arc;
 
 /// Borders farther apart (m) are no seam.
 const WIDEST_SEAM: f64 = 0.1;
@@ -40,12 +42,20 @@ pub struct FitArguments {
     /// twentieth of their edges) always are
     #[arg(long, value_name = "DISTANCE", value_parser = seam_width)]
     join_seams: Option<f64>,
+    /// The body that the garment was made on, in the same coordinates: BODY.npz, BODY.npz:SHAPE or a mesh. The garment is placed
+    /// through it, and nothing is searched for. Example: --from-body SMPL_NEUTRAL.npz:1.2,-0.5. With a mesh, --unit, --up and --turn
+    /// are about both files; with an npz, they and --offset say how the garment's coordinates differ from the npz's
+    #[arg(long, value_name = "BODY")]
+    from_body: Option<String>,
 }
 
 impl FitArguments {
     /// The settings that say so.
-    pub fn settings(&self) -> FitSettings {
-        FitSettings {
+    ///
+    /// # Errors
+    /// When the body of `--from-body` cannot be read, naming its file.
+    pub fn settings(&self) -> Result<FitSettings, FileError> {
+        Ok(FitSettings {
             unit: self.unit.0,
             up: self.up.0,
             arms_lowered: self.arms.0.map(|arms| arms == Arms::A),
@@ -54,7 +64,8 @@ impl FitArguments {
             turn_degrees: self.turn,
             keep: self.keep,
             join_seams: self.join_seams,
-        }
+            from_body: self.from_body.as_deref().map(SourceBody::load).transpose()?.map(Arc::new),
+        })
     }
 }
 
@@ -72,14 +83,19 @@ pub struct GarmentEntry {
     turn: Option<f64>,
     keep: Option<String>,
     join_seams: Option<String>,
+    from_body: Option<String>,
 }
 
 impl GarmentEntry {
-    /// `all` with what is said here in its place.
+    /// `all` with what is said here in its place; `beside` finds a file that is named here.
     ///
     /// # Errors
     /// Naming the key.
-    pub fn settings(&self, all: &FitSettings) -> Result<FitSettings, String> {
+    pub fn settings(
+        &self,
+        all: &FitSettings,
+        beside: impl Fn(&str) -> String,
+    ) -> Result<FitSettings, String> {
         fn hint<T>(
             key: &str,
             text: &Option<String>,
@@ -90,7 +106,15 @@ impl GarmentEntry {
         let arms = hint("arms", &self.arms, Arms::from_str)?;
         let numbers = self.offset.map(|o| o.map(|x| x.to_string()).join(","));
         let turned = self.turn.map(|degrees| degrees.to_string());
+        let source = |text: &str| {
+            let found = match text.rsplit_once(':') {
+                Some((path, shape)) if beside(text) == text => format!("{}:{shape}", beside(path)),
+                _ => beside(text),
+            };
+            SourceBody::load(&found).map(Arc::new).map_err(|e| e.to_string())
+        };
         Ok(FitSettings {
+            from_body: hint("from_body", &self.from_body, source)?.or_else(|| all.from_body.clone()),
             unit: hint("unit", &self.unit, Unit::from_str)?.or(all.unit),
             up: hint("up", &self.up, UpAxis::from_str)?.or(all.up),
             arms_lowered: arms.map(|arms| arms == Arms::A).or(all.arms_lowered),
@@ -179,7 +203,8 @@ mod tests {
 
     fn parsed(arguments: &[&str]) -> Result<FitSettings, String> {
         let all = ["program"].iter().chain(arguments);
-        Program::try_parse_from(all).map(|p| p.fit.settings()).map_err(|e| e.to_string())
+        let program = Program::try_parse_from(all).map_err(|e| e.to_string())?;
+        program.fit.settings().map_err(|e| e.to_string())
     }
 
     #[test]
@@ -217,6 +242,7 @@ mod tests {
             turn_degrees: Some(-90.0),
             keep: Keep::Outer,
             join_seams: Some(0.005),
+            from_body: None,
         };
         assert_eq!(settings, Ok(expected));
     }
@@ -254,14 +280,17 @@ mod tests {
         let entry: GarmentEntry =
             toml::from_str("file = \"tee.obj\"\nunit = \"cm\"\nkeep = \"outer\"\noffset = [0.0, 1.0, 0.0]")
                 .unwrap();
-        let settings = entry.settings(&all).unwrap();
+        let settings = entry.settings(&all, str::to_owned).unwrap();
         assert_eq!(
             (settings.unit, settings.up, settings.keep),
             (Some(Unit::Cm), Some(UpAxis::Z), Keep::Outer)
         );
         assert_eq!(settings.offset, Some([0.0, 1.0, 0.0]));
         let wrong: GarmentEntry = toml::from_str("file = \"tee.obj\"\nup = \"north\"").unwrap();
-        assert!(wrong.settings(&all).unwrap_err().starts_with("up: 'north'"));
+        assert!(wrong.settings(&all, str::to_owned).unwrap_err().starts_with("up: 'north'"));
         assert!(toml::from_str::<GarmentEntry>("file = \"tee.obj\"\nsize = 4").is_err());
+        let missing: GarmentEntry = toml::from_str("file = \"tee.obj\"\nfrom_body = \"none.npz:1\"").unwrap();
+        let message = missing.settings(&all, |path| format!("folder/{path}")).unwrap_err();
+        assert!(message.starts_with("from_body: folder/none.npz"), "{message}");
     }
 }

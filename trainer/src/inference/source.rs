@@ -169,6 +169,8 @@ impl GarmentCatalog {
             return Ok(GivenGarment::new(loader.load(origin)?));
         };
         let made = loader.load(origin);
+        // Where it was made on another body, where it lies now says nothing.
+        let always_fit = always_fit.or(hints.from_body.is_some().then_some(true));
         let must_fit = always_fit.unwrap_or_else(|| {
             // A model is used with the borders that it was trained with; they are not joined anew.
             let lies = |rest: &TriMesh| {

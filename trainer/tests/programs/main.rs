@@ -15,6 +15,7 @@ mod drape_folders;
 mod drape_input;
 mod eval;
 mod fit;
+mod from_body;
 mod garment_files;
 mod generate;
 mod import_programs;

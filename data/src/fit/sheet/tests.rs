@@ -24,6 +24,7 @@ const CM_Z: FitSettings = FitSettings {
     turn_degrees: None,
     keep: Keep::All,
     join_seams: None,
+    from_body: None,
 };
 
 fn cm_z(positions: &[[f64; 3]]) -> Vec<[f64; 3]> {

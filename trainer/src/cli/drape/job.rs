@@ -97,7 +97,9 @@ impl Job {
         let SceneArguments { pose, motion, posed, t_pose, .. } = &self.scene;
         let pose = pose.iter().map(|pose| PathBuf::from(file_and_frame(pose).0));
         let scene = pose.chain([motion, posed, t_pose].into_iter().flatten().cloned());
-        self.garments.iter().map(|garment| PathBuf::from(&garment.name)).chain(scene)
+        let bodies = self.garments.iter().filter_map(|garment| garment.hints.from_body.as_deref());
+        let bodies = bodies.map(|body| body.path().to_owned());
+        self.garments.iter().map(|garment| PathBuf::from(&garment.name)).chain(bodies).chain(scene)
     }
 
     /// Reads pose, motion or meshes.

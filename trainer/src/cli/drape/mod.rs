@@ -38,8 +38,8 @@ use warnings::{log_repairs, warn_about_order, warn_about_shape};
         clothcombo drape --outfits outfits.toml -o out\n\n\
         A garment is a mesh file (.obj, .ply, .stl, .gltf, .glb) or the name of one in --dataset or in the model's own data.\n\
         What does not lie on the body in metres, y up and T-pose is fitted first (see `clothcombo fit`); every repair is in\n\
-        report.json. Hints about files (--unit, --up, --arms, --category, --offset, --turn, --keep, --join-seams) are about all\n\
-        of the call; a file with a hint is always fitted. Outputs keep the vertices and polygons of the given files, in their\n\
+        report.json. Hints about files (--unit, --up, --arms, --category, --offset, --turn, --keep, --join-seams, --from-body)\n\
+        are about all of the call; a file with a hint is always fitted. Outputs keep the vertices and polygons of the given files, in their\n\
         order: what --keep leaves out follows the cloth.\n\n\
         --outfits takes a TOML file:\n  \
         [[outfit]]\n  name = \"monday\"\n  garments = [{ file = \"tee.obj\", unit = \"cm\" }, \"coat.obj\"]   # hints, or a name alone\n  shape = [1.0]       # optional, as are pose, \
@@ -238,12 +238,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 }
 
 fn jobs(arguments: &Arguments) -> Result<Vec<Job>, Failure> {
+    let hints = arguments.hints.settings().into_diagnostic()?;
     match &arguments.outfits {
-        Some(file) => outfits::read(file, &arguments.scene, &arguments.hints.settings()),
+        Some(file) => outfits::read(file, &arguments.scene, &hints),
         None => Ok(vec![Job {
             name: "outfit".to_owned(),
             garments: (arguments.garments.iter())
-                .map(|name| WantedGarment { name: name.clone(), hints: arguments.hints.settings() })
+                .map(|name| WantedGarment { name: name.clone(), hints: hints.clone() })
                 .collect(),
             order: arguments.order.clone(),
             scene: arguments.scene.clone(),

@@ -90,8 +90,8 @@ pub(super) fn read(file: &Path, scene: &SceneArguments, hints: &FitSettings) -> 
             return Err(wrong("it has no garments".to_owned()));
         }
         let garments = entry.garments.into_iter().enumerate().map(|(number, value)| {
-            let wanted =
-                garment(value, hints).map_err(|what| wrong(format!("garment {}: {what}", number + 1)))?;
+            let wanted = garment(value, hints, beside)
+                .map_err(|what| wrong(format!("garment {}: {what}", number + 1)))?;
             Ok(WantedGarment { name: beside(&wanted.name), ..wanted })
         });
         let garments = garments.collect::<Result<Vec<_>, Failure>>()?;
@@ -113,13 +113,17 @@ pub(super) fn read(file: &Path, scene: &SceneArguments, hints: &FitSettings) -> 
 }
 
 /// A name, or a table with a file and hints.
-fn garment(value: toml::Value, hints: &FitSettings) -> Result<WantedGarment, String> {
+fn garment(
+    value: toml::Value,
+    hints: &FitSettings,
+    beside: impl Fn(&str) -> String,
+) -> Result<WantedGarment, String> {
     match value {
         toml::Value::String(name) => Ok(WantedGarment { name, hints: hints.clone() }),
         toml::Value::Table(table) => {
             let entry: GarmentEntry =
                 table.try_into().map_err(|e: toml::de::Error| e.message().to_owned())?;
-            Ok(WantedGarment { hints: entry.settings(hints)?, name: entry.file })
+            Ok(WantedGarment { hints: entry.settings(hints, beside)?, name: entry.file })
         }
         other => Err(format!(
             "it is of type {}, neither a name nor a table such as {{ file = \"tee.obj\", unit = \"cm\" }}",

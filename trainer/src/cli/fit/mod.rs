@@ -10,7 +10,7 @@ use crate::dataset::load_body;
 use crate::system::paths::{lossy, lossy_option};
 use clap::Parser;
 use clothcombo_data::fit::{FitReport, FitSettings, fit};
-use miette::{Report, miette};
+use miette::{IntoDiagnostic, Report, miette};
 use output::{Form, check_output, read, save};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -20,7 +20,8 @@ use std::path::{Path, PathBuf};
 #[command(
     after_help = "Examples:\n  clothcombo fit shirt.glb --body datasets/open/body.npz -o shirt.obj\n  \
         clothcombo fit coat.obj --unit cm --up z --json\n  \
-        clothcombo fit thick.obj --keep outer -o thin.obj\n\n\
+        clothcombo fit thick.obj --keep outer -o thin.obj\n  \
+        clothcombo fit dress.obj --from-body SMPL_NEUTRAL.npz:1.2,-0.5 --body datasets/open/body.npz -o dress_fitted.obj\n\n\
         Reads OBJ, PLY, STL and glTF. Without -o nothing is written: the report alone is printed.\n\n\
         The OBJ is in metres, y up, at rest on the zero body in T-pose, and needs no further repair: `check`, `drape` and training\n\
         take it as it is. It has the file's own faces (quads too), texture coordinates, groups, materials and order of vertices,\n\
@@ -56,7 +57,7 @@ pub struct Arguments {
 
 impl Arguments {
     fn settings(&self) -> Result<FitSettings, Report> {
-        let settings = self.hints.settings();
+        let settings = self.hints.settings().into_diagnostic()?;
         let arms = match self.pose.as_deref() {
             None => return Ok(settings),
             Some("auto") => None,
@@ -91,7 +92,10 @@ struct Output<'a> {
 /// When a file cannot be read or written, or the mesh is no garment of this body.
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let settings = arguments.settings()?;
-    arguments.output.as_deref().map_or(Ok(()), |output| check_output(output, &arguments.garment))?;
+    arguments
+        .output
+        .as_deref()
+        .map_or(Ok(()), |output| check_output(output, &arguments.garment, settings.from_body.as_deref()))?;
     let body = load_body(&arguments.body, 0)?;
     let given = read(&arguments.garment)?;
     let fitted = spinner("fitting", || fit(&given.mesh, &body, &settings))

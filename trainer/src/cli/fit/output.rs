@@ -1,6 +1,6 @@
 //! What `clothcombo fit` writes.
 
-use clothcombo_data::fit::Fitted;
+use clothcombo_data::fit::{Fitted, SourceBody};
 use clothcombo_data::format::obj::{MovedObj, RepairedForm, save_file_faces};
 use clothcombo_data::format::{
     FileError, FileFace, MeshFormat, PolygonMesh, atomic, obj, parse_mesh, read_mesh_file,
@@ -28,17 +28,24 @@ pub(super) enum Form {
     Whole,
 }
 
-/// Nothing but an OBJ is written, and never over the garment as it was given or its materials.
-pub(super) fn check_output(output: &Path, garment: &Path) -> Result<(), Report> {
+/// Nothing but an OBJ is written, and never over the garment as it was given, its materials or the body it was made on.
+pub(super) fn check_output(
+    output: &Path,
+    garment: &Path,
+    from_body: Option<&SourceBody>,
+) -> Result<(), Report> {
     if !output.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) {
         let help = format!("for example -o {}", output.with_extension("obj").display());
         return Err(miette!(help = help, "{}: the fitted garment is written as .obj", output.display()));
     }
-    let is_same = fs::canonicalize(output).ok().is_some_and(|o| fs::canonicalize(garment).ok() == Some(o));
-    match is_same {
-        true => Err(miette!(help = "give -o another name", "{} is the garment itself", output.display())),
-        false => Ok(()),
-    }
+    let place = fs::canonicalize(output).ok();
+    let is_same = |path: &Path| place.is_some() && fs::canonicalize(path).ok() == place;
+    let what = match from_body {
+        _ if is_same(garment) => "garment",
+        Some(body) if is_same(body.path()) => "body of --from-body",
+        _ => return Ok(()),
+    };
+    Err(miette!(help = "give -o another name", "{} is the {what} itself", output.display()))
 }
 
 /// Reads a garment file once, so that what is written is what was fitted.
