@@ -1,7 +1,7 @@
 //! Whether a garment lies where garments lie on the body; training on one that does not teaches nothing.
 
 use crate::asset::Body;
-use crate::fit::is_on_body;
+use crate::fit::PlacementCheck;
 use clothcombo_physics::TriMesh;
 
 /// A garment farther from the body than this is not on it (m).
@@ -16,7 +16,8 @@ const SMALLEST: f64 = 0.05;
 /// Why `mesh` does not lie on the zero body of `body` as a garment does, in words; `None` if it does. `gaps` are the signed
 /// distances of its vertices to the body (m), in ascending order.
 pub(super) fn misplacement(mesh: &TriMesh, body: &Body, gaps: &[f64]) -> Option<String> {
-    if is_on_body(mesh, body) {
+    let check = PlacementCheck::new(body);
+    if check.is_on_body(mesh) {
         return None;
     }
     let (least, name) = (gaps.first().copied()?, &body.name);
@@ -28,7 +29,7 @@ pub(super) fn misplacement(mesh: &TriMesh, body: &Body, gaps: &[f64]) -> Option<
         format!("{extent:.3} m large on a body of {height:.2} m: not in metres?")
     } else if least > OFF_BODY {
         format!("{least:.2} m away from body '{name}': another origin or unit?")
-    } else if is_on_body(&mesh.turned(), body) {
+    } else if check.is_on_body(&mesh.turned()) {
         "inside out: its faces look at the body".into()
     } else if inside > 0 {
         format!(

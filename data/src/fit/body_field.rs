@@ -13,8 +13,6 @@ use std::sync::Arc;
 const STEP: f64 = 0.02;
 /// Largest distance the grids tell (m): cloth farther away says nothing about where it belongs.
 const BAND: f64 = 0.25;
-/// Rounds of smoothing of the arm weights.
-const WEIGHT_BLUR: usize = 8;
 
 /// Signed distance to the body with its arms lowered by any angle.
 ///
@@ -145,9 +143,7 @@ impl BodyField {
             };
             body.faces[face].iter().map(of_vertex).sum::<f64>() / 3.0
         };
-        let (_, mut weights) = DistanceGrid::with_attribute(&posed.positions, &body.faces, STEP, BAND, weight);
-        // As smooth as the weights of a garment's binding.
-        weights.blur(WEIGHT_BLUR);
+        let (_, weights) = DistanceGrid::with_attribute(&posed.positions, &body.faces, STEP, BAND, weight);
         Self { arm_weights: Some(Arc::new(weights)), ..self.clone() }
     }
 

@@ -35,7 +35,7 @@ pub use sitting::Sitting;
 
 use crate::asset::{Body, Category, Garment};
 use crate::format::{FileFace, PolygonMesh};
-use crate::mesh::{Attachment, MeshMeasures, bounds, contact, push_out};
+use crate::mesh::{Attachment, MeshMeasures, bounds, contact, join_seams, push_out};
 use arm_pose::ArmPose;
 use clothcombo_physics::contact::{self_triangle_pairs, triangle_pairs};
 use clothcombo_physics::mesh::vertex_normals;
@@ -49,6 +49,9 @@ use verdict::{Verdict, verdict};
 
 /// Least distance between a fitted vertex and the body (m): the ε of the paper's body collision loss.
 const CLEARANCE: f64 = 0.002;
+
+/// Widest open seam that does not keep panels from being placed, as a share of the garment's extent.
+const SEAM: f64 = 0.01;
 
 /// A fitted garment and how it came about.
 #[derive(Clone, Debug)]
@@ -111,9 +114,7 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
     let (placement, doubts) = match &source {
         Some(source) => (source.placement, Vec::new()),
         None => {
-            let candidates = search.candidates(&cloth, extent, settings);
-            let measured = |placement: &Placement| search.measured(&cloth, placement);
-            let Verdict { placement, doubts } = verdict(&candidates, &cloth.fine, settings, measured)?;
+            let Verdict { placement, doubts } = place(&search, &cloth, extent, settings)?;
             (placement, doubts)
         }
     };
@@ -200,6 +201,19 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
     let garment = Garment { holding, ..Garment::new(category, rest) };
     let (vertex_of_file, vertex_origin) = (sheet.vertex_of_file, sheet.vertex_origin);
     Ok(Fitted { garment, report, vertex_of_file, follows, vertex_origin, file_faces })
+}
+
+/// Where the garment belongs. Panels whose seams are open are placed as if they were sewn.
+fn place(search: &Search, cloth: &Cloth, extent: f64, settings: &FitSettings) -> Result<Verdict, FitError> {
+    let of = |cloth: &Cloth| verdict(&search.candidates(cloth, extent, settings), search, cloth, settings);
+    let unsewn = match of(cloth) {
+        Err(error @ FitError::Implausible { .. }) => error,
+        other => return other,
+    };
+    let Some(sewn) = join_seams(cloth.positions, cloth.faces, Some(SEAM * extent)) else { return Err(unsewn) };
+    let Ok(mesh) = TriMesh::new(sewn.positions, sewn.faces) else { return Err(unsewn) };
+    let borders = Topology::new(&mesh).boundary_loops;
+    of(&Cloth::new(mesh.positions(), mesh.faces(), &borders)).map_err(|_| unsewn)
 }
 
 /// Share of the edges that became longer than [`MOST_STRETCH`] times what they were.

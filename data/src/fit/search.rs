@@ -4,6 +4,7 @@
 use super::anatomy::Skeleton;
 use super::arm_pose::ArmPose;
 use super::body_field::BodyField;
+use super::coverage::off_trunk;
 use super::error::FitError;
 use super::climb::{Steps, climbed};
 use super::cloth::Cloth;
@@ -67,6 +68,11 @@ impl<'a> Search<'a> {
             degrees => Sitting::new(&points, self.body, &ArmPose::new(self.body, degrees).surface),
         };
         (sitting, high[1] - low[1])
+    }
+
+    /// Where a garment lies that covers neither trunk nor hips.
+    pub fn off_trunk(&self, cloth: &Cloth, placement: &Placement) -> Option<&'static str> {
+        off_trunk(&placement.apply(&cloth.fine.0), self.body)
     }
 
     /// How a garment sits that is in metres, T-pose and the body's frame.

@@ -1,9 +1,10 @@
 //! Which placement is taken, what else it could be, and when none is believed.
 
+use super::cloth::Cloth;
 use super::error::FitError;
 use super::judge::Candidate;
 use super::placement::{Origin, Placement};
-use super::samples::Samples;
+use super::search::Search;
 use super::settings::FitSettings;
 use super::sitting::Sitting;
 use clothcombo_physics::vec3::{norm, sub};
@@ -98,26 +99,35 @@ pub(super) struct Verdict {
     pub doubts: Vec<Doubt>,
 }
 
-/// Takes the best of `candidates`, the best first. `measured` measures how one sits, and its height (m).
+/// Takes the best of `candidates`, the best first.
+///
+/// # Errors
+/// [`FitError::Implausible`] and [`FitError::OffTrunk`] if none is believed.
 pub(super) fn verdict(
     candidates: &[Candidate],
-    samples: &Samples,
+    search: &Search,
+    cloth: &Cloth,
     settings: &FitSettings,
-    measured: impl Fn(&Placement) -> (Sitting, f64),
 ) -> Result<Verdict, FitError> {
+    let samples = &cloth.fine;
     let (mut believed, mut refused): (Vec<Candidate>, Vec<(Placement, String)>) = Default::default();
     for candidate in candidates.iter().take(8) {
         // What is far worse than one that is believed is not looked at.
         if believed.first().is_some_and(|best| candidate.score < best.score - NEAR_TIE) {
             break;
         }
-        let (sitting, height) = measured(&candidate.placement);
+        let (sitting, height) = search.measured(cloth, &candidate.placement);
         match implausibility(candidate, &sitting, height) {
             None => believed.push(*candidate),
             Some(why) => refused.push((candidate.placement, why)),
         }
     }
     let Some(candidate) = believed.first().copied() else {
+        // A hat or a sock that lies where it is worn is called one.
+        let place = candidates.first().and_then(|best| search.off_trunk(cloth, &best.placement));
+        if let Some(place) = place {
+            return Err(FitError::OffTrunk { place });
+        }
         let mut readings = refused.into_iter().map(|(p, why)| format!("{} ({why})", p.reading()));
         let best = readings.next().unwrap_or_else(|| "none".into());
         return Err(FitError::Implausible { best, second: readings.next() });

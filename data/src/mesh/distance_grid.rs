@@ -115,23 +115,6 @@ impl DistanceGrid {
         }
     }
 
-    /// Averages each node with its neighbours along every axis, `times` times: a blur of √(times/2) steps.
-    pub fn blur(&mut self, times: usize) {
-        let nodes = self.lattice.nodes;
-        let stride = [1, nodes[0], nodes[0] * nodes[1]];
-        for _ in 0..times {
-            for axis in 0..3 {
-                let old = self.values.clone();
-                for at in 0..old.len() {
-                    let place = (at / stride[axis]) % nodes[axis];
-                    let before = if place > 0 { old[at - stride[axis]] } else { old[at] };
-                    let after = if place + 1 < nodes[axis] { old[at + stride[axis]] } else { old[at] };
-                    self.values[at] = 0.25 * before + 0.5 * old[at] + 0.25 * after;
-                }
-            }
-        }
-    }
-
     /// Value at `p`: the signed distance (m), clamped to the band.
     pub fn distance(&self, p: [f64; 3]) -> f64 {
         let mut cell = [0; 3];
