@@ -98,7 +98,6 @@ fn wrong_models_are_refused_with_file_and_key_and_leave_nothing_behind() {
     for (name, parts) in [
         ("without_v_template", ["'v_template' is missing", "keys present"]),
         ("without_f", ["'f' is missing", "keys present"]),
-        ("without_shapedirs", ["'shapedirs' is missing", "keys present"]),
         ("without_J_regressor", ["'J_regressor' is missing", "keys present"]),
         ("without_weights", ["'weights' is missing", "keys present"]),
         ("without_kintree_table", ["'kintree_table' is missing", "keys present"]),

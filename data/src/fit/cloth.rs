@@ -1,6 +1,7 @@
 //! A garment as the placement search sees it, in the file's coordinates.
 
 use super::samples::Samples;
+use clothcombo_physics::Topology;
 
 /// Sample points for the coarse and for the fine search.
 const COARSE: usize = 200;
@@ -14,14 +15,27 @@ pub(super) struct Cloth<'a> {
     pub faces: &'a [[u32; 3]],
     /// Vertices of each border, in order.
     pub borders: &'a [Vec<u32>],
+    /// Connected piece of each vertex.
+    pieces: &'a [u32],
     pub coarse: Samples,
     pub fine: Samples,
 }
 
 impl<'a> Cloth<'a> {
-    pub fn new(positions: &'a [[f64; 3]], faces: &'a [[u32; 3]], borders: &'a [Vec<u32>]) -> Self {
+    pub fn new(positions: &'a [[f64; 3]], faces: &'a [[u32; 3]], topology: &'a Topology) -> Self {
         let samples = |count| Samples::new(positions, faces, count);
-        Self { positions, faces, borders, coarse: samples(COARSE), fine: samples(FINE) }
+        let (borders, pieces) = (&topology.boundary_loops, &topology.component_of_vertex);
+        Self { positions, faces, borders, pieces, coarse: samples(COARSE), fine: samples(FINE) }
+    }
+
+    /// The connected piece that a border belongs to.
+    pub fn piece(&self, border: usize) -> u32 {
+        self.piece_of_vertex(self.borders[border][0])
+    }
+
+    /// The connected piece of a vertex.
+    pub fn piece_of_vertex(&self, vertex: u32) -> u32 {
+        self.pieces[vertex as usize]
     }
 
     /// Positions of a border's vertices.

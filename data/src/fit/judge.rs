@@ -43,6 +43,8 @@ pub(super) struct Candidate {
     pub is_worn: bool,
     /// Whether it is a tube around the trunk with no other opening: a skirt or a strapless top.
     pub is_tube: bool,
+    /// Mean distance of the upper rim to the body (m), 0 without one.
+    pub rim_distance: f64,
 }
 
 /// Judges placements of one garment on one body.
@@ -86,7 +88,7 @@ impl Judge<'_> {
         let aside = (turned.middle + t[0]) / SYMMETRY;
         let symmetry = if is_sharp { (0.5 * aside * aside).min(ASYMMETRY_COST) } else { 0.0 };
         let score = fit + placement.log_prior(self.settings) - symmetry + self.rim_score(&turned.rim, &placement);
-        let unknown = Candidate { placement, fit, score, crossings: 0, rim: None, is_worn: true, is_tube: false };
+        let unknown = Candidate { placement, fit, score, crossings: 0, rim: None, is_worn: true, is_tube: false, rim_distance: 0.0 };
         Candidate { placement, fit, score, ..like.copied().unwrap_or(unknown) }
     }
 
@@ -141,7 +143,9 @@ impl Judge<'_> {
         let count = |wanted: Opening| openings.iter().filter(|(o, _)| *o == wanted).count();
         let has = |wanted: Opening| count(wanted) > 0;
         let limbs = [Opening::Neck, Opening::LeftArm, Opening::RightArm, Opening::LeftLeg, Opening::RightLeg, Opening::Several];
-        let arms = has(Opening::LeftArm) && has(Opening::RightArm);
+        // Two sleeves that are not one piece are socks.
+        let piece = |wanted: Opening| openings.iter().position(|(o, _)| *o == wanted).map(|b| self.cloth.piece(b));
+        let arms = has(Opening::LeftArm) && piece(Opening::LeftArm) == piece(Opening::RightArm);
         let is_around = count(Opening::Trunk) >= 2 || (has(Opening::Trunk) && limbs.into_iter().any(has)) || arms;
         // Only sleeves and armholes tell how arms hang.
         let is_worn = is_around && (arms || candidate.placement.arm_angle_degrees == 0.0);
@@ -173,6 +177,9 @@ impl Judge<'_> {
         let turned = self.turned(&placement, openings.rim, true);
         let scored = self.scored(placement, &turned, true, Some(&openings));
         let score = scored.score - if openings.is_worn { 0.0 } else { UNWORN };
-        self.with_crossings(Candidate { score, ..scored })
+        let (arms, t) = (ArmTurn::new(placement.arm_angle_degrees), placement.translation);
+        let distances = turned.rim.iter().map(|p| self.field.gap(add(*p, t), arms).0.abs());
+        let rim_distance = distances.sum::<f64>() / turned.rim.len().max(1) as f64;
+        self.with_crossings(Candidate { score, rim_distance, ..scored })
     }
 }

@@ -109,7 +109,7 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
     if !units.iter().any(|u| search.is_plausible_extent(extent * u.metres())) {
         return Err(FitError::Extent { extent, unit: settings.unit, reach: search.reach });
     }
-    let cloth = Cloth::new(&sheet.positions, &sheet.faces, &topology.boundary_loops);
+    let cloth = Cloth::new(&sheet.positions, &sheet.faces, &topology);
     let source = settings.from_body.as_deref().map(|b| b.aligned(body, settings)).transpose()?;
     let (placement, doubts) = match &source {
         Some(source) => (source.placement, Vec::new()),
@@ -137,7 +137,7 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
         }
     };
     refuse_other_things(&positions, body)?;
-    let raised = Cloth::new(&positions, &sheet.faces, &topology.boundary_loops);
+    let raised = Cloth::new(&positions, &sheet.faces, &topology);
     let sitting = match &source {
         Some(_) => search.believed_as_given(&raised)?,
         None => search.measured(&raised, &Placement::AS_GIVEN).0,
@@ -212,8 +212,8 @@ fn place(search: &Search, cloth: &Cloth, extent: f64, settings: &FitSettings) ->
     };
     let Some(sewn) = join_seams(cloth.positions, cloth.faces, Some(SEAM * extent)) else { return Err(unsewn) };
     let Ok(mesh) = TriMesh::new(sewn.positions, sewn.faces) else { return Err(unsewn) };
-    let borders = Topology::new(&mesh).boundary_loops;
-    of(&Cloth::new(mesh.positions(), mesh.faces(), &borders)).map_err(|_| unsewn)
+    let topology = Topology::new(&mesh);
+    of(&Cloth::new(mesh.positions(), mesh.faces(), &topology)).map_err(|_| unsewn)
 }
 
 /// Share of the edges that became longer than [`MOST_STRETCH`] times what they were.

@@ -28,7 +28,7 @@ impl<'a> PlacementCheck<'a> {
     /// outwards.
     pub fn is_on_body(&self, mesh: &TriMesh) -> bool {
         let topology = Topology::new(mesh);
-        let cloth = Cloth::new(mesh.positions(), mesh.faces(), &topology.boundary_loops);
+        let cloth = Cloth::new(mesh.positions(), mesh.faces(), &topology);
         mesh.face_count() >= MIN_TRIANGLES
             && self.search.believed_as_given(&cloth).is_ok()
             && self.fits_best_as_given(&cloth, mesh.extent())

@@ -178,7 +178,7 @@ impl Placement {
         let origin = match (settings.offset, self.origin) {
             (Some(_), _) | (_, Origin::Pelvis) => 0.0,
             (_, Origin::Floor) => -0.5,
-            _ => -4.0,
+            _ => -6.0,
         };
         unit + up + turn + arms + origin
     }

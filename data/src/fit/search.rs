@@ -14,7 +14,7 @@ use super::settings::FitSettings;
 use super::sitting::Sitting;
 use super::verdict::implausibility;
 use crate::asset::Body;
-use crate::mesh::bounds;
+use crate::mesh::{bounds, outwardness};
 use clothcombo_physics::query::Surface;
 use clothcombo_physics::vec3::add;
 use rayon::prelude::*;
@@ -34,6 +34,8 @@ const FROM_RIMS: usize = 6;
 const CLIMBED: usize = 10;
 /// Candidates that are judged by everything.
 const JUDGED: usize = 12;
+/// Least share of a sheet's area that faces one way.
+const SHEET: f64 = 0.5;
 /// Candidates in A-pose worth a body of their own.
 const POSED: usize = 2;
 
@@ -216,10 +218,24 @@ impl<'a> Search<'a> {
     /// A file as it stands counts as worn if it lies around the trunk, however its borders run.
     pub fn judged_as_given(&self, judge: &Judge, placement: Placement) -> Candidate {
         let candidate = judge.judged(placement);
-        match candidate.is_worn || !self.measured(judge.cloth, &placement).0.is_snug() {
+        match candidate.is_worn || !self.is_sheet_around(judge.cloth, &placement) {
             true => candidate,
             false => Candidate { score: candidate.score + UNWORN, is_worn: true, ..candidate },
         }
+    }
+
+    /// Whether cloth lies snugly around the trunk with one of its sides outwards; half of a rope's surface faces the body.
+    fn is_sheet_around(&self, cloth: &Cloth, placement: &Placement) -> bool {
+        if !self.measured(cloth, placement).0.is_snug() {
+            return false;
+        }
+        let placed = placement.apply(cloth.positions);
+        let (mut net, mut total) = (vec![0.0; cloth.positions.len()], 0.0);
+        for (face, (cosine, area)) in cloth.faces.iter().zip(outwardness(&placed, cloth.faces, &self.surface)) {
+            net[cloth.piece_of_vertex(face[0]) as usize] += cosine * area;
+            total += area;
+        }
+        net.iter().map(|area: &f64| area.abs()).sum::<f64>() > SHEET * total
     }
 
     /// The best in A-pose, on a body posed like that: the shoulders of the search's body are rigid.

@@ -18,6 +18,8 @@ const SAME: f64 = 0.02;
 const MOST_INSIDE: f64 = 0.25;
 /// A garment touches the body: a twentieth of it is nearer than this (m).
 const FARTHEST: f64 = 0.08;
+/// A garment hangs from a rim that is no farther from the body than this, on average (m).
+const WIDEST_RIM: f64 = 0.05;
 /// Least height of a tube around the trunk (m): lower ones are belts.
 const LEAST_HEIGHT: f64 = 0.09;
 
@@ -80,6 +82,9 @@ pub(super) fn implausibility(candidate: &Candidate, sitting: &Sitting, height: f
     }
     if candidate.crossings > 0 {
         return Some(format!("{} bones of the body pass through the cloth", candidate.crossings));
+    }
+    if candidate.rim_distance > WIDEST_RIM {
+        return Some(format!("its upper rim stays {:.0} mm away from the body: nothing holds it", 1e3 * candidate.rim_distance));
     }
     if candidate.is_tube && height < LEAST_HEIGHT {
         return Some(format!("a band of {:.0} mm around the trunk, such as a belt", 1e3 * height));

@@ -30,8 +30,8 @@ fn quad_band() -> String {
     for row in 0..rows {
         for k in 0..around {
             let angle = f64::from(k) / f64::from(around) * std::f64::consts::TAU;
-            let y = 0.05 + 0.03 * f64::from(row);
-            text += &format!("v {} {} {}\n", 0.24 * angle.sin(), y, 0.2 * angle.cos());
+            let y = 0.03 * f64::from(row);
+            text += &format!("v {} {} {}\n", 0.2 * angle.sin(), y, 0.17 * angle.cos());
         }
     }
     for row in 0..rows - 1 {
