@@ -55,10 +55,15 @@ fn main() {
             continue;
         }
         let pinned = std::env::var("GIVEN").is_ok();
-        let (unit, up, turn, shift, arms) = if pinned { (Unit::M, UpAxis::Y, 0.0, [0.0; 3], 0.0) } else { (unit, up, turn, shift, arms) };
+        let (unit, up, turn, shift, arms) =
+            if pinned { (Unit::M, UpAxis::Y, 0.0, [0.0; 3], 0.0) } else { (unit, up, turn, shift, arms) };
         let posed = lowered(g, &body, arms);
         let placement = clothcombo_data::fit::Placement {
-            unit, up, turn_degrees: turn, translation: shift, arm_angle_degrees: arms,
+            unit,
+            up,
+            turn_degrees: turn,
+            translation: shift,
+            arm_angle_degrees: arms,
             origin: clothcombo_data::fit::Origin::Elsewhere,
         };
         let m = placement.turn();
@@ -72,23 +77,57 @@ fn main() {
         let result = fit(&mesh, &body, &FitSettings::default());
         let seconds = clock.elapsed().as_secs_f64();
         slowest = slowest.max(seconds);
-        let truth = format!("{unit} {up} {turn} arms {arms:.0} shift {:.3} {:.3} {:.3}", shift[0], shift[1], shift[2]);
+        let truth = format!(
+            "{unit} {up} {turn} arms {arms:.0} shift {:.3} {:.3} {:.3}",
+            shift[0], shift[1], shift[2]
+        );
         match result {
             Err(e) => {
                 refused += 1;
                 println!("{i:3} {:24} REFUSED {e} | {truth}", g.name);
             }
             Ok(f) => {
-                let mut d: Vec<f64> = f.vertex_of_file.iter().zip(g.rest.positions())
-                    .filter_map(|(v, p)| Some(norm(sub(f.garment.rest.positions()[(*v)? as usize], *p)))).collect();
+                let mut d: Vec<f64> = f
+                    .vertex_of_file
+                    .iter()
+                    .zip(g.rest.positions())
+                    .filter_map(|(v, p)| Some(norm(sub(f.garment.rest.positions()[(*v)? as usize], *p))))
+                    .collect();
                 d.sort_by(f64::total_cmp);
                 let (median, p95) = (d[d.len() / 2], d[d.len() * 95 / 100]);
                 let ok = median < 0.02;
-                if !f.report.doubts.is_empty() { warned += 1; println!("    {}", f.report.doubts.join(" | ")); }
-                if ok { good += 1 } else { wrong += 1 }
+                if !f.report.doubts.is_empty() {
+                    warned += 1;
+                    println!("    {}", f.report.doubts.join(" | "));
+                }
+                if ok {
+                    good += 1
+                } else {
+                    wrong += 1
+                }
                 let p = f.report.placement;
-                println!("{i:3} {:24} dy {:5.1} dz {:5.1} {} {:5.1} mm p95 {:5.1} {:4.2} s | {truth} | found {} {} {} {:?} arms {:.0} {:.3?}",
-                    g.name, 1e3 * (p.translation[1] - shift[1]), 1e3 * (p.translation[2] - shift[2]), if ok { "ok   " } else if f.report.doubts.is_empty() { "WRONG" } else { "warned" }, 1e3 * median, 1e3 * p95, seconds, p.unit, p.up, p.turn_degrees, p.origin, p.arm_angle_degrees, p.translation);
+                println!(
+                    "{i:3} {:24} dy {:5.1} dz {:5.1} {} {:5.1} mm p95 {:5.1} {:4.2} s | {truth} | found {} {} {} {:?} arms {:.0} {:.3?}",
+                    g.name,
+                    1e3 * (p.translation[1] - shift[1]),
+                    1e3 * (p.translation[2] - shift[2]),
+                    if ok {
+                        "ok   "
+                    } else if f.report.doubts.is_empty() {
+                        "WRONG"
+                    } else {
+                        "warned"
+                    },
+                    1e3 * median,
+                    1e3 * p95,
+                    seconds,
+                    p.unit,
+                    p.up,
+                    p.turn_degrees,
+                    p.origin,
+                    p.arm_angle_degrees,
+                    p.translation
+                );
             }
         }
     }
@@ -106,7 +145,8 @@ fn lowered(garment: &Garment, body: &Body, degrees: f64) -> Vec<[f64; 3]> {
     (garment.rest.positions().iter().zip(binding.skin_weights.chunks_exact(body.joint_count())))
         .map(|(p, w)| {
             bones.iter().zip(w).fold([0.0; 3], |sum, (b, w)| {
-                let q: [f64; 3] = std::array::from_fn(|r| b[r][0] * p[0] + b[r][1] * p[1] + b[r][2] * p[2] + b[r][3]);
+                let q: [f64; 3] =
+                    std::array::from_fn(|r| b[r][0] * p[0] + b[r][1] * p[1] + b[r][2] * p[2] + b[r][3]);
                 add(sum, scale(q, f64::from(*w)))
             })
         })

@@ -68,7 +68,9 @@ impl Skeleton {
     /// How many bones pass through cloth.
     pub fn crossings(&self, positions: &[[f64; 3]], faces: &[[u32; 3]], arms: ArmTurn) -> usize {
         let mut bones: Vec<Segment> = self.bones(arms).into_iter().flat_map(|(bones, _)| bones).collect();
-        bones.sort_by(|a, b| a.as_flattened().partial_cmp(b.as_flattened()).unwrap_or(std::cmp::Ordering::Equal));
+        bones.sort_by(|a, b| {
+            a.as_flattened().partial_cmp(b.as_flattened()).unwrap_or(std::cmp::Ordering::Equal)
+        });
         bones.dedup();
         let (mut low, mut high) = ([f64::MAX; 3], [f64::MIN; 3]);
         for p in bones.as_flattened() {

@@ -2,8 +2,8 @@
 
 use super::arm_pose::ArmPose;
 use crate::asset::{Body, skeleton};
-use crate::generate::garment::measures::BodyMeasures;
 use crate::generate::garment::Tube;
+use crate::generate::garment::measures::BodyMeasures;
 use crate::mesh::DistanceGrid;
 use clothcombo_physics::vec3::{add, norm, scale, sub};
 use clothcombo_physics::{Topology, TriMesh};
@@ -109,9 +109,12 @@ impl BodyField {
         );
         let (low, high) = body.zero_body().bounds();
         let measures = BodyMeasures::new(body).ok();
-        let height = |name: &str, share: f64| joint(body, name).map_or(low[1] + share * (high[1] - low[1]), |p| p[1]);
+        let height =
+            |name: &str, share: f64| joint(body, name).map_or(low[1] + share * (high[1] - low[1]), |p| p[1]);
         let levels = match &measures {
-            Some(BodyMeasures { landmarks: l, .. }) => Levels { crotch: l.crotch, hip: l.hip, waist: l.waist, armpit: l.armpit },
+            Some(BodyMeasures { landmarks: l, .. }) => {
+                Levels { crotch: l.crotch, hip: l.hip, waist: l.waist, armpit: l.armpit }
+            }
             // A body that cannot be measured: by its joints, else by usual proportions.
             None => Levels {
                 crotch: height("left_hip", 0.53) - 0.1,

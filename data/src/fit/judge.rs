@@ -78,7 +78,13 @@ impl Judge<'_> {
 
     /// By the blunt likelihood, in which a garment some centimetres from its place still counts, or by the sharp one. Openings
     /// are taken from `like`.
-    pub fn scored(&self, placement: Placement, turned: &Turned, is_sharp: bool, like: Option<&Candidate>) -> Candidate {
+    pub fn scored(
+        &self,
+        placement: Placement,
+        turned: &Turned,
+        is_sharp: bool,
+        like: Option<&Candidate>,
+    ) -> Candidate {
         let (arms, t) = (ArmTurn::new(placement.arm_angle_degrees), placement.translation);
         let gaps = turned.points.iter().map(|p| self.field.gap(add(*p, t), arms));
         let fit = match is_sharp {
@@ -87,8 +93,18 @@ impl Judge<'_> {
         };
         let aside = (turned.middle + t[0]) / SYMMETRY;
         let symmetry = if is_sharp { (0.5 * aside * aside).min(ASYMMETRY_COST) } else { 0.0 };
-        let score = fit + placement.log_prior(self.settings) - symmetry + self.rim_score(&turned.rim, &placement);
-        let unknown = Candidate { placement, fit, score, crossings: 0, rim: None, is_worn: true, is_tube: false, rim_distance: 0.0 };
+        let score =
+            fit + placement.log_prior(self.settings) - symmetry + self.rim_score(&turned.rim, &placement);
+        let unknown = Candidate {
+            placement,
+            fit,
+            score,
+            crossings: 0,
+            rim: None,
+            is_worn: true,
+            is_tube: false,
+            rim_distance: 0.0,
+        };
         Candidate { placement, fit, score, ..like.copied().unwrap_or(unknown) }
     }
 
@@ -117,7 +133,8 @@ impl Judge<'_> {
             Some(_) => [0.0, 1.0],
         };
         let levels = self.field.levels;
-        let density = shares[0] * normal(levels.waist - 0.03, 0.035) + shares[1] * normal(levels.armpit - 0.035, 0.03);
+        let density =
+            shares[0] * normal(levels.waist - 0.03, 0.035) + shares[1] * normal(levels.armpit - 0.035, 0.03);
         (density + ELSEWHERE).ln() - 5.0f64.ln()
     }
 
@@ -142,11 +159,22 @@ impl Judge<'_> {
         let openings = self.openings(&candidate.placement);
         let count = |wanted: Opening| openings.iter().filter(|(o, _)| *o == wanted).count();
         let has = |wanted: Opening| count(wanted) > 0;
-        let limbs = [Opening::Neck, Opening::LeftArm, Opening::RightArm, Opening::LeftLeg, Opening::RightLeg, Opening::Several];
-        // Two sleeves that are not one piece are socks.
-        let piece = |wanted: Opening| openings.iter().position(|(o, _)| *o == wanted).map(|b| self.cloth.piece(b));
-        let arms = has(Opening::LeftArm) && piece(Opening::LeftArm) == piece(Opening::RightArm);
-        let is_around = count(Opening::Trunk) >= 2 || (has(Opening::Trunk) && limbs.into_iter().any(has)) || arms;
+        let limbs = [
+            Opening::Neck,
+            Opening::LeftArm,
+            Opening::RightArm,
+            Opening::LeftLeg,
+            Opening::RightLeg,
+            Opening::Several,
+        ];
+        // Two sleeves that are not one piece are socks, and a tube with no other opening has no room for head and legs.
+        let piece =
+            |wanted: Opening| openings.iter().position(|(o, _)| *o == wanted).map(|b| self.cloth.piece(b));
+        let arms = openings.len() > 2
+            && has(Opening::LeftArm)
+            && piece(Opening::LeftArm) == piece(Opening::RightArm);
+        let is_around =
+            count(Opening::Trunk) >= 2 || (has(Opening::Trunk) && limbs.into_iter().any(has)) || arms;
         // Only sleeves and armholes tell how arms hang.
         let is_worn = is_around && (arms || candidate.placement.arm_angle_degrees == 0.0);
         if candidate.is_worn && !is_worn {
@@ -173,7 +201,8 @@ impl Judge<'_> {
 
     /// A placement as it stands, by everything.
     pub fn judged(&self, placement: Placement) -> Candidate {
-        let openings = self.with_openings(self.scored(placement, &self.turned(&placement, None, true), true, None));
+        let openings =
+            self.with_openings(self.scored(placement, &self.turned(&placement, None, true), true, None));
         let turned = self.turned(&placement, openings.rim, true);
         let scored = self.scored(placement, &turned, true, Some(&openings));
         let score = scored.score - if openings.is_worn { 0.0 } else { UNWORN };

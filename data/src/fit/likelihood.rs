@@ -8,7 +8,8 @@ use super::body_field::PARTS;
 use std::sync::LazyLock;
 
 /// Distances at which cloth may begin to lie on the body, its ease (m).
-const EASES: [f64; 12] = [0.001, 0.003, 0.005, 0.0075, 0.010, 0.0125, 0.015, 0.018, 0.021, 0.025, 0.030, 0.036];
+const EASES: [f64; 12] =
+    [0.001, 0.003, 0.005, 0.0075, 0.010, 0.0125, 0.015, 0.018, 0.021, 0.025, 0.030, 0.036];
 /// How far beyond the ease it lies, on average (m).
 const SPREADS: [f64; 4] = [0.002, 0.004, 0.008, 0.016];
 const KINDS: usize = EASES.len() * SPREADS.len();
@@ -31,7 +32,8 @@ const ROWS: usize = ((HIGH - LOW) / RESOLUTION) as usize + 1;
 
 /// Logarithms of the density of each gap for each ease and spread.
 static SHARP: LazyLock<Vec<[f32; KINDS]>> = LazyLock::new(|| {
-    let density = |gap, kind| sharp_log_density(gap, EASES[kind % EASES.len()], SPREADS[kind / EASES.len()]) as f32;
+    let density =
+        |gap, kind| sharp_log_density(gap, EASES[kind % EASES.len()], SPREADS[kind / EASES.len()]) as f32;
     table(|gap| std::array::from_fn(|kind| density(gap, kind)))
 });
 

@@ -37,12 +37,12 @@ use crate::asset::{Body, Category, Garment};
 use crate::format::{FileFace, PolygonMesh};
 use crate::mesh::{Attachment, MeshMeasures, bounds, contact, join_seams, push_out};
 use arm_pose::ArmPose;
+use cloth::Cloth;
 use clothcombo_physics::contact::{self_triangle_pairs, triangle_pairs};
 use clothcombo_physics::mesh::vertex_normals;
 use clothcombo_physics::vec3::{norm, sub};
 use clothcombo_physics::{Topology, TriMesh};
 use repair::{finish_seams, repair, turn_outward};
-use cloth::Cloth;
 use search::Search;
 use settings::{MOST_STRETCH, MOST_STRETCHED};
 use verdict::{Verdict, verdict};
@@ -210,7 +210,9 @@ fn place(search: &Search, cloth: &Cloth, extent: f64, settings: &FitSettings) ->
         Err(error @ FitError::Implausible { .. }) => error,
         other => return other,
     };
-    let Some(sewn) = join_seams(cloth.positions, cloth.faces, Some(SEAM * extent)) else { return Err(unsewn) };
+    let Some(sewn) = join_seams(cloth.positions, cloth.faces, Some(SEAM * extent)) else {
+        return Err(unsewn);
+    };
     let Ok(mesh) = TriMesh::new(sewn.positions, sewn.faces) else { return Err(unsewn) };
     let topology = Topology::new(&mesh);
     of(&Cloth::new(mesh.positions(), mesh.faces(), &topology)).map_err(|_| unsewn)

@@ -4,10 +4,10 @@
 use super::anatomy::Skeleton;
 use super::arm_pose::ArmPose;
 use super::body_field::BodyField;
-use super::coverage::off_trunk;
-use super::error::FitError;
 use super::climb::{Steps, climbed};
 use super::cloth::Cloth;
+use super::coverage::off_trunk;
+use super::error::FitError;
 use super::judge::{Candidate, Judge, UNWORN};
 use super::placement::{Origin, Placement, Unit, UpAxis};
 use super::settings::FitSettings;
@@ -112,7 +112,8 @@ impl<'a> Search<'a> {
         let mut bases = Vec::new();
         for unit in units {
             for &up in &ups {
-                let turned = turns.iter().map(|t| Placement { unit, up, turn_degrees: *t, ..Placement::AS_GIVEN });
+                let turned =
+                    turns.iter().map(|t| Placement { unit, up, turn_degrees: *t, ..Placement::AS_GIVEN });
                 bases.extend(turned);
             }
         }
@@ -172,7 +173,12 @@ impl<'a> Search<'a> {
         let mut all = Vec::new();
         for arm_angle_degrees in ARM_ANGLES.into_iter().filter(allowed) {
             let at = |translation: &[f64; 3]| {
-                let p = Placement { translation: *translation, arm_angle_degrees, origin: Origin::Elsewhere, ..*base };
+                let p = Placement {
+                    translation: *translation,
+                    arm_angle_degrees,
+                    origin: Origin::Elsewhere,
+                    ..*base
+                };
                 judge.scored(p, &turned, false, None)
             };
             all.extend(places.iter().map(at));
@@ -211,7 +217,9 @@ impl<'a> Search<'a> {
         }
         let floor = self.field.low[1];
         let places = [(Origin::Pelvis, 0.0), (Origin::Floor, floor)];
-        let at = |base: &Placement| places.map(|(origin, y)| Placement { origin, translation: [0.0, y, 0.0], ..*base });
+        let at = |base: &Placement| {
+            places.map(|(origin, y)| Placement { origin, translation: [0.0, y, 0.0], ..*base })
+        };
         bases.iter().flat_map(at).collect()
     }
 
@@ -231,7 +239,8 @@ impl<'a> Search<'a> {
         }
         let placed = placement.apply(cloth.positions);
         let (mut net, mut total) = (vec![0.0; cloth.positions.len()], 0.0);
-        for (face, (cosine, area)) in cloth.faces.iter().zip(outwardness(&placed, cloth.faces, &self.surface)) {
+        for (face, (cosine, area)) in cloth.faces.iter().zip(outwardness(&placed, cloth.faces, &self.surface))
+        {
             net[cloth.piece_of_vertex(face[0]) as usize] += cosine * area;
             total += area;
         }
@@ -263,7 +272,8 @@ fn distinct(ranked: Vec<Candidate>) -> Vec<Candidate> {
             let (a, b) = (&better.placement, &c.placement);
             let turned = (a.unit, a.up, a.turn_degrees) != (b.unit, b.up, b.turn_degrees);
             // Arms that change nothing are not seen.
-            let arms = (a.arm_angle_degrees - b.arm_angle_degrees).abs() > 8.0 && (better.fit - c.fit).abs() > 0.5;
+            let arms =
+                (a.arm_angle_degrees - b.arm_angle_degrees).abs() > 8.0 && (better.fit - c.fit).abs() > 0.5;
             turned || arms || (0..3).any(|k| (a.translation[k] - b.translation[k]).abs() > 0.02)
         };
         if kept.iter().all(is_new) {

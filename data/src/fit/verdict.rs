@@ -84,7 +84,10 @@ pub(super) fn implausibility(candidate: &Candidate, sitting: &Sitting, height: f
         return Some(format!("{} bones of the body pass through the cloth", candidate.crossings));
     }
     if candidate.rim_distance > WIDEST_RIM {
-        return Some(format!("its upper rim stays {:.0} mm away from the body: nothing holds it", 1e3 * candidate.rim_distance));
+        return Some(format!(
+            "its upper rim stays {:.0} mm away from the body: nothing holds it",
+            1e3 * candidate.rim_distance
+        ));
     }
     if candidate.is_tube && height < LEAST_HEIGHT {
         return Some(format!("a band of {:.0} mm around the trunk, such as a belt", 1e3 * height));

@@ -244,8 +244,7 @@ mod tests {
         let radius = 0.15;
         let field = |p: [f64; 3]| norm_squared(p).sqrt() - radius;
         let lattice = Lattice::covering([-0.2; 3], [0.2; 3], 0.01);
-        let (mut positions, faces) =
-            super::super::isosurface::extract(&lattice, &lattice.sample(field));
+        let (mut positions, faces) = super::super::isosurface::extract(&lattice, &lattice.sample(field));
         for p in &mut positions {
             *p = scale(*p, radius / norm_squared(*p).sqrt());
         }

@@ -31,7 +31,7 @@ fn quad_band() -> String {
         for k in 0..around {
             let angle = f64::from(k) / f64::from(around) * std::f64::consts::TAU;
             let y = 0.03 * f64::from(row);
-            text += &format!("v {} {} {}\n", 0.2 * angle.sin(), y, 0.17 * angle.cos());
+            text += &format!("v {} {} {}\n", 0.17 * angle.sin(), y, 0.14 * angle.cos());
         }
     }
     for row in 0..rows - 1 {
