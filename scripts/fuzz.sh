@@ -11,5 +11,7 @@ export CLOTHCOMBO_FUZZ_SEED=${SEED:-1}
 CLOTHCOMBO_FUZZ_CASES=$cases cargo test --release --workspace --test contracts config_fuzz:: -- --nocapture
 CLOTHCOMBO_FUZZ_CASES=$((cases / 20)) cargo test --release --workspace --test contracts checkpoint:: -- damaged --nocapture
 CLOTHCOMBO_FUZZ_CASES=$((cases / 200)) cargo test --release --workspace --test contracts messy_garments:: -- --nocapture
+CLOTHCOMBO_FUZZ_CASES=$((cases / 200)) cargo test --release --workspace --test contracts placement:: -- --nocapture
+CLOTHCOMBO_FUZZ_CASES=$((cases / 50)) cargo test --release --workspace --test contracts other_objects:: -- --nocapture
 scripts/kill_test.sh 20 TERM
 scripts/kill_test.sh 20 KILL

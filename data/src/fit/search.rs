@@ -135,10 +135,10 @@ impl<'a> Search<'a> {
 
     /// The best of one scale and turn.
     fn climbed_from(&self, base: &Placement, judge: &Judge) -> Vec<Candidate> {
-        let mut starts = self.from_rims(base, judge);
+        let mut starts = self.starts_by_rim(base, judge);
         sort(&mut starts);
         starts.truncate(FROM_RIMS);
-        let mut others = self.from_heights(base, judge);
+        let mut others = self.starts_by_height(base, judge);
         sort(&mut others);
         others.truncate(ROUGH);
         starts.extend(others);
@@ -154,7 +154,7 @@ impl<'a> Search<'a> {
 
     /// The middle of the garment in front of, at and behind the middle of the trunk, its top at every height, with every angle of
     /// the arms.
-    fn from_heights(&self, base: &Placement, judge: &Judge) -> Vec<Candidate> {
+    fn starts_by_height(&self, base: &Placement, judge: &Judge) -> Vec<Candidate> {
         let turned = judge.turned(base, None, false);
         let [low, high] = bounds(&turned.points);
         let [x, z] = [0, 2].map(|a| 0.5 * (low[a] + high[a]));
@@ -187,7 +187,7 @@ impl<'a> Search<'a> {
     }
 
     /// Each of the longest borders around the trunk, at every height.
-    fn from_rims(&self, base: &Placement, judge: &Judge) -> Vec<Candidate> {
+    fn starts_by_rim(&self, base: &Placement, judge: &Judge) -> Vec<Candidate> {
         if judge.settings.offset.is_some() || judge.settings.arms_lowered == Some(true) {
             return Vec::new();
         }
@@ -248,7 +248,7 @@ impl<'a> Search<'a> {
     }
 
     /// The best in A-pose, on a body posed like that: the shoulders of the search's body are rigid.
-    fn judge_again_posed(&self, judge: &Judge, ranked: &mut Vec<Candidate>) {
+    fn judge_again_posed(&self, judge: &Judge, ranked: &mut [Candidate]) {
         for candidate in ranked.iter_mut().filter(|c| c.placement.arm_angle_degrees != 0.0).take(POSED) {
             let posed = ArmPose::new(self.body, candidate.placement.arm_angle_degrees);
             let field = self.field.posed(&posed, self.body);

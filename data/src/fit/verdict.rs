@@ -19,7 +19,7 @@ const MOST_INSIDE: f64 = 0.25;
 /// A garment touches the body: a twentieth of it is nearer than this (m).
 const FARTHEST: f64 = 0.08;
 /// A garment hangs from a rim that is no farther from the body than this, on average (m).
-const WIDEST_RIM: f64 = 0.05;
+const WIDEST_RIM: f64 = 0.1;
 /// Least height of a tube around the trunk (m): lower ones are belts.
 const LEAST_HEIGHT: f64 = 0.09;
 

@@ -14,6 +14,7 @@ mod messy_garments;
 mod other_bodies;
 mod other_objects;
 mod parallel_scenes;
+mod placement;
 mod resume;
 mod score_oracle;
 mod single_garment_losses;
