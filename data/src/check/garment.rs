@@ -3,6 +3,7 @@
 use super::placement::misplacement;
 use super::targets::ManifestHints;
 use crate::asset::{Body, Category, Garment};
+use crate::fit::PlacementCheck;
 use crate::format::load_tri_mesh;
 use crate::mesh::MeshMeasures;
 use clothcombo_physics::Topology;
@@ -65,6 +66,7 @@ pub(super) fn check(
     hints: &ManifestHints,
     body: &Body,
     surface: &Surface<f64>,
+    placement: &PlacementCheck,
 ) -> Result<Checked, String> {
     let mesh = load_tri_mesh(path).map_err(|e| e.to_string())?;
     let area = mesh.area();
@@ -101,7 +103,7 @@ pub(super) fn check(
         .len(),
         self_triangle_pairs: self_triangle_pairs(mesh.positions(), mesh.faces()).len(),
     };
-    let misplaced = misplacement(&mesh, body, &gaps);
+    let misplaced = misplacement(&mesh, body, placement, &gaps);
     let warnings = warnings(&garment);
     Ok(Checked {
         garment,

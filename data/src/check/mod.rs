@@ -18,6 +18,7 @@ pub use targets::{ManifestHints, Target, find_targets};
 
 use crate::asset::Body;
 use crate::asset::motion::holds_poses;
+use crate::fit::PlacementCheck;
 use crate::folders::garment_folder::MANIFEST;
 use crate::format::NpzFile;
 use clothcombo_physics::Surface;
@@ -69,6 +70,7 @@ impl FileCheck {
 pub struct Checker {
     body: Body,
     surface: Surface<f64>,
+    placement: PlacementCheck,
 }
 
 impl Checker {
@@ -77,21 +79,24 @@ impl Checker {
         let surface = Surface::new(body.template.clone(), body.faces.clone());
         // Built once here, not by the first of many threads.
         surface.closest_point();
-        Self { body, surface }
+        let placement = PlacementCheck::new(&body);
+        Self { body, surface, placement }
     }
 
     /// Checks one file.
     pub fn check(&self, target: &Target) -> FileCheck {
         let file = FileCheck::new(target.path());
         let checked = match target {
-            Target::Garment { path, entry } => garment::check(path, entry, &self.body, &self.surface).map(
-                |garment::Checked { garment, warnings, misplaced }| FileCheck {
-                    garment: Some(garment),
-                    warnings,
-                    unusable: misplaced,
-                    ..file.clone()
-                },
-            ),
+            Target::Garment { path, entry } => {
+                garment::check(path, entry, &self.body, &self.surface, &self.placement).map(
+                    |garment::Checked { garment, warnings, misplaced }| FileCheck {
+                        garment: Some(garment),
+                        warnings,
+                        unusable: misplaced,
+                        ..file.clone()
+                    },
+                )
+            }
             Target::Npz { path } => check_npz(&file, path),
             Target::Unlisted { .. } => {
                 let warning = format!("not in the {MANIFEST} beside it, so no dataset takes it");

@@ -15,9 +15,13 @@ const SMALLEST: f64 = 0.05;
 
 /// Why `mesh` does not lie on the zero body of `body` as a garment does, in words; `None` if it does. `gaps` are the signed
 /// distances of its vertices to the body (m), in ascending order.
-pub(super) fn misplacement(mesh: &TriMesh, body: &Body, gaps: &[f64]) -> Option<String> {
-    let check = PlacementCheck::new(body);
-    if check.is_on_body(mesh) {
+pub(super) fn misplacement(
+    mesh: &TriMesh,
+    body: &Body,
+    check: &PlacementCheck,
+    gaps: &[f64],
+) -> Option<String> {
+    if check.is_on_body(mesh, body) {
         return None;
     }
     let (least, name) = (gaps.first().copied()?, &body.name);
@@ -29,7 +33,7 @@ pub(super) fn misplacement(mesh: &TriMesh, body: &Body, gaps: &[f64]) -> Option<
         format!("{extent:.3} m large on a body of {height:.2} m: not in metres?")
     } else if least > OFF_BODY {
         format!("{least:.2} m away from body '{name}': another origin or unit?")
-    } else if check.is_on_body(&mesh.turned()) {
+    } else if check.is_on_body(&mesh.turned(), body) {
         "inside out: its faces look at the body".into()
     } else if inside > 0 {
         format!(
@@ -52,13 +56,13 @@ mod tests {
     #[test]
     fn every_kind_of_misplacement_has_its_reason() {
         let body = mannequin();
-        let surface = Surface::from_mesh(&body.zero_body());
+        let (surface, check) = (Surface::from_mesh(&body.zero_body()), PlacementCheck::new(&body));
         let tee = generated(&body, Category::TShirt, 4, 300).rest;
         let reason = |mesh: &TriMesh| {
             let gap = |p: &[f64; 3]| surface.gap(*p, Distance::ClosestPoint).gap;
             let mut gaps: Vec<f64> = mesh.positions().iter().map(gap).collect();
             gaps.sort_by(f64::total_cmp);
-            misplacement(mesh, &body, &gaps)
+            misplacement(mesh, &body, &check, &gaps)
         };
         let moved = |change: fn([f64; 3]) -> [f64; 3]| {
             tee.with_positions(tee.positions().iter().map(|p| change(*p)).collect()).unwrap()

@@ -43,7 +43,7 @@ use clothcombo_physics::mesh::vertex_normals;
 use clothcombo_physics::vec3::{norm, sub};
 use clothcombo_physics::{Topology, TriMesh};
 use repair::{finish_seams, repair, turn_outward};
-use search::Search;
+use search::{Search, SearchBody};
 use settings::{MOST_STRETCH, MOST_STRETCHED};
 use verdict::{Verdict, verdict};
 
@@ -103,11 +103,12 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
         return Err(FitError::Closed);
     }
 
-    let search = Search::new(body);
+    let measured = SearchBody::new(body);
+    let search = Search::new(body, &measured);
     let extent = mesh.extent();
     let units = settings.unit.map_or(Unit::ALL.to_vec(), |u| vec![u]);
     if !units.iter().any(|u| search.is_plausible_extent(extent * u.metres())) {
-        return Err(FitError::Extent { extent, unit: settings.unit, reach: search.reach });
+        return Err(FitError::Extent { extent, unit: settings.unit, reach: search.reach() });
     }
     let cloth = Cloth::new(&sheet.positions, &sheet.faces, &topology);
     let source = settings.from_body.as_deref().map(|b| b.aligned(body, settings)).transpose()?;
@@ -139,20 +140,20 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
     refuse_other_things(&positions, body)?;
     let raised = Cloth::new(&positions, &sheet.faces, &topology);
     let sitting = match &source {
-        Some(_) => search.believed_as_given(&raised)?,
+        Some(_) => search.believed_as_given(&raised, &FitSettings::default())?.1,
         None => search.measured(&raised, &Placement::AS_GIVEN).0,
     };
-    let rest_surface = search.into_surface();
+    let rest_surface = search.surface();
 
-    turn_outward(&mut sheet, &positions, &topology, &rest_surface);
-    let before = contact(&positions, &rest_surface);
+    turn_outward(&mut sheet, &positions, &topology, rest_surface);
+    let before = contact(&positions, rest_surface);
     let unpushed = positions.clone();
-    push_out(&mut positions, &sheet.faces, &rest_surface, CLEARANCE);
+    push_out(&mut positions, &sheet.faces, rest_surface, CLEARANCE);
     let share = stretched(&topology, &unpushed, &positions);
     if share > MOST_STRETCHED {
         return Err(FitError::Stretched { share });
     }
-    let after = contact(&positions, &rest_surface);
+    let after = contact(&positions, rest_surface);
     let moves: Vec<f64> = positions.iter().zip(&unpushed).map(|(a, b)| norm(sub(*a, *b))).collect();
     let pushed = (0..moves.len()).filter(|v| moves[*v] > 0.0).map(|v| sheet.vertex_origin[v]).collect();
     sheet.note(RepairKind::PushedOut, Elements::Vertices(pushed));

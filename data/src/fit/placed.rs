@@ -1,63 +1,61 @@
 //! Does a garment already lie on a body, in metres and T-pose, so that nothing has to be found out?
 
 use super::cloth::Cloth;
-use super::placement::{Placement, Unit, UpAxis};
-use super::search::Search;
+use super::placement::{Unit, UpAxis};
+use super::search::{Search, SearchBody};
 use super::settings::{FitSettings, MIN_TRIANGLES};
 use crate::asset::Body;
 use crate::mesh::outward_area;
-use clothcombo_physics::{Surface, Topology, TriMesh};
+use clothcombo_physics::{Topology, TriMesh};
+use std::fmt;
 
 /// A file is taken as it stands unless another place is better by this log-posterior.
 const MARGIN: f64 = 8.0;
 
-/// Tells which meshes lie on a body as they stand.
-pub struct PlacementCheck<'a> {
-    body: &'a Body,
-    search: Search<'a>,
-}
+/// Tells which meshes lie on a body as they stand. The body is measured once, in a tenth of a second.
+pub struct PlacementCheck(SearchBody);
 
-impl<'a> PlacementCheck<'a> {
-    /// Prepares the zero body.
-    pub fn new(body: &'a Body) -> Self {
-        Self { body, search: Search::new(body) }
+impl PlacementCheck {
+    /// Measures the zero body of `body`.
+    pub fn new(body: &Body) -> Self {
+        Self(SearchBody::new(body))
     }
 
     /// Whether `mesh`, taken as it stands (metres, y up, pelvis at the origin, arms level), is worn on the zero body and fits nowhere
     /// clearly better, by the same judgement by which [`fit`](super::fit) takes a placement; and every piece of it has its faces
-    /// outwards.
-    pub fn is_on_body(&self, mesh: &TriMesh) -> bool {
+    /// outwards. `body` is the one that was measured.
+    pub fn is_on_body(&self, mesh: &TriMesh, body: &Body) -> bool {
+        if mesh.face_count() < MIN_TRIANGLES {
+            return false;
+        }
+        let search = Search::new(body, &self.0);
         let topology = Topology::new(mesh);
-        let cloth = Cloth::new(mesh.positions(), mesh.faces(), &topology);
-        mesh.face_count() >= MIN_TRIANGLES
-            && self.search.believed_as_given(&cloth).is_ok()
-            && self.fits_best_as_given(&cloth, mesh.extent())
-            && faces_outwards(mesh, self.body)
-    }
-
-    fn fits_best_as_given(&self, cloth: &Cloth, extent: f64) -> bool {
+        let outward = outward_area(mesh.positions(), mesh.faces(), &topology, search.surface());
+        if outward.into_iter().any(|area| area < 0.0) {
+            return false;
+        }
         let settings = FitSettings {
             unit: Some(Unit::M),
             up: Some(UpAxis::Y),
             arms_lowered: Some(false),
             ..FitSettings::default()
         };
-        let given = self.search.judged_as_given(&self.search.judge(cloth, &settings), Placement::AS_GIVEN);
-        let best = self.search.candidates(cloth, extent, &settings).first().map_or(f64::MIN, |c| c.score);
+        let cloth = Cloth::new(mesh.positions(), mesh.faces(), &topology);
+        let Ok((given, _)) = search.believed_as_given(&cloth, &settings) else { return false };
+        let best = search.candidates(&cloth, mesh.extent(), &settings).first().map_or(f64::MIN, |c| c.score);
         best <= given.score + MARGIN
+    }
+}
+
+impl fmt::Debug for PlacementCheck {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("PlacementCheck")
     }
 }
 
 /// [`PlacementCheck::is_on_body`] for one mesh.
 pub fn is_on_body(mesh: &TriMesh, body: &Body) -> bool {
-    PlacementCheck::new(body).is_on_body(mesh)
-}
-
-/// Whether the area of every piece faces away from the body more than towards it.
-fn faces_outwards(mesh: &TriMesh, body: &Body) -> bool {
-    let surface = Surface::from_mesh(&body.zero_body());
-    let outward = outward_area(mesh.positions(), mesh.faces(), &Topology::new(mesh), &surface);
-    outward.into_iter().all(|area| area >= 0.0)
+    PlacementCheck::new(body).is_on_body(mesh, body)
 }
 
 #[cfg(test)]

@@ -39,26 +39,43 @@ const SHEET: f64 = 0.5;
 /// Candidates in A-pose worth a body of their own.
 const POSED: usize = 2;
 
-/// The body as the search sees it.
-pub(super) struct Search<'a> {
-    body: &'a Body,
+/// What is measured on a body once, for all garments.
+pub(super) struct SearchBody {
     field: BodyField,
     skeleton: Skeleton,
     surface: Surface<f64>,
     /// Largest extent of the body (m).
-    pub reach: f64,
+    reach: f64,
+}
+
+impl SearchBody {
+    pub fn new(body: &Body) -> Self {
+        let surface = Surface::new(body.template.clone(), body.faces.clone());
+        let reach = body.zero_body().extent();
+        Self { field: BodyField::new(body), skeleton: Skeleton::new(body), surface, reach }
+    }
+}
+
+/// A search on one body.
+pub(super) struct Search<'a> {
+    body: &'a Body,
+    measured: &'a SearchBody,
 }
 
 impl<'a> Search<'a> {
-    pub fn new(body: &'a Body) -> Self {
-        let reach = body.zero_body().extent();
-        let surface = Surface::new(body.template.clone(), body.faces.clone());
-        Self { body, field: BodyField::new(body), skeleton: Skeleton::new(body), surface, reach }
+    /// `measured`: of the same body.
+    pub fn new(body: &'a Body, measured: &'a SearchBody) -> Self {
+        Self { body, measured }
+    }
+
+    /// Largest extent of the body (m).
+    pub fn reach(&self) -> f64 {
+        self.measured.reach
     }
 
     /// Whether a garment of this largest extent (m) can fit this body at all.
     pub fn is_plausible_extent(&self, extent: f64) -> bool {
-        extent >= 0.1 * self.reach && extent <= 1.2 * self.reach
+        extent >= 0.1 * self.measured.reach && extent <= 1.2 * self.measured.reach
     }
 
     /// How a garment sits in its own arm pose, and its height (m).
@@ -66,7 +83,7 @@ impl<'a> Search<'a> {
         let points = placement.apply(&cloth.fine.0);
         let [low, high] = bounds(&points);
         let sitting = match placement.arm_angle_degrees {
-            0.0 => Sitting::new(&points, self.body, &self.surface),
+            0.0 => Sitting::new(&points, self.body, &self.measured.surface),
             degrees => Sitting::new(&points, self.body, &ArmPose::new(self.body, degrees).surface),
         };
         (sitting, high[1] - low[1])
@@ -77,28 +94,31 @@ impl<'a> Search<'a> {
         off_trunk(&placement.apply(&cloth.fine.0), self.body)
     }
 
-    /// How a garment sits that is in metres, T-pose and the body's frame.
+    /// A garment that is in metres, T-pose and the body's frame: its candidate and how it sits.
     ///
     /// # Errors
-    /// [`FitError::Implausible`] if it is not worn there.
-    pub fn believed_as_given(&self, cloth: &Cloth) -> Result<Sitting, FitError> {
-        let settings = FitSettings::default();
-        let candidate = self.judged_as_given(&self.judge(cloth, &settings), Placement::AS_GIVEN);
+    /// [`FitError::Implausible`] if nobody wears it there.
+    pub fn believed_as_given(
+        &self,
+        cloth: &Cloth,
+        settings: &FitSettings,
+    ) -> Result<(Candidate, Sitting), FitError> {
+        let candidate = self.judged_as_given(&self.judge(cloth, settings), Placement::AS_GIVEN);
         let (sitting, height) = self.measured(cloth, &Placement::AS_GIVEN);
         match implausibility(&candidate, &sitting, height) {
             Some(why) => Err(FitError::Implausible { best: why, second: None }),
-            None => Ok(sitting),
+            None => Ok((candidate, sitting)),
         }
     }
 
     /// The surface of the zero body in T-pose.
-    pub fn into_surface(self) -> Surface<f64> {
-        self.surface
+    pub fn surface(&self) -> &'a Surface<f64> {
+        &self.measured.surface
     }
 
     /// The judge of a garment.
     pub fn judge<'b>(&'b self, cloth: &'b Cloth, settings: &'b FitSettings) -> Judge<'b> {
-        Judge { field: &self.field, skeleton: &self.skeleton, cloth, settings }
+        Judge { field: &self.measured.field, skeleton: &self.measured.skeleton, cloth, settings }
     }
 
     /// Distinct candidates, the best first. `extent`: largest extent of the file in its unit.
@@ -158,14 +178,14 @@ impl<'a> Search<'a> {
         let turned = judge.turned(base, None, false);
         let [low, high] = bounds(&turned.points);
         let [x, z] = [0, 2].map(|a| 0.5 * (low[a] + high[a]));
-        let heights = ((self.field.high[1] - self.field.low[1]) / HEIGHT_STEP) as usize;
+        let heights = ((self.measured.field.high[1] - self.measured.field.low[1]) / HEIGHT_STEP) as usize;
         let places: Vec<[f64; 3]> = match judge.settings.offset {
             Some(offset) => vec![offset],
             None => (0..heights)
                 .flat_map(|h| FORWARD.map(|forward| (h, forward)))
                 .map(|(h, forward)| {
-                    let top = self.field.low[1] + 0.2 + h as f64 * HEIGHT_STEP;
-                    [-x, top - high[1], self.field.spine_z - z + forward]
+                    let top = self.measured.field.low[1] + 0.2 + h as f64 * HEIGHT_STEP;
+                    [-x, top - high[1], self.measured.field.spine_z - z + forward]
                 })
                 .collect(),
         };
@@ -199,9 +219,10 @@ impl<'a> Search<'a> {
             let sum = turned.rim.iter().fold([0.0; 3], |sum, p| add(sum, *p));
             let centre = sum.map(|x| x / turned.rim.len().max(1) as f64);
             for height in 0..RIM_HEIGHTS {
-                let y = self.field.levels.waist - BELOW_WAIST + RIM_STEP * height as f64;
+                let y = self.measured.field.levels.waist - BELOW_WAIST + RIM_STEP * height as f64;
                 for forward in [0.0, 0.03] {
-                    let translation = [-centre[0], y - centre[1], self.field.spine_z + forward - centre[2]];
+                    let translation =
+                        [-centre[0], y - centre[1], self.measured.field.spine_z + forward - centre[2]];
                     let p = Placement { translation, origin: Origin::Elsewhere, ..*base };
                     all.push(judge.scored(p, &turned, false, None));
                 }
@@ -215,7 +236,7 @@ impl<'a> Search<'a> {
         if settings.offset.is_some() || settings.arms_lowered == Some(true) {
             return Vec::new();
         }
-        let floor = self.field.low[1];
+        let floor = self.measured.field.low[1];
         let places = [(Origin::Pelvis, 0.0), (Origin::Floor, floor)];
         let at = |base: &Placement| {
             places.map(|(origin, y)| Placement { origin, translation: [0.0, y, 0.0], ..*base })
@@ -239,7 +260,8 @@ impl<'a> Search<'a> {
         }
         let placed = placement.apply(cloth.positions);
         let (mut net, mut total) = (vec![0.0; cloth.positions.len()], 0.0);
-        for (face, (cosine, area)) in cloth.faces.iter().zip(outwardness(&placed, cloth.faces, &self.surface))
+        for (face, (cosine, area)) in
+            cloth.faces.iter().zip(outwardness(&placed, cloth.faces, &self.measured.surface))
         {
             net[cloth.piece_of_vertex(face[0]) as usize] += cosine * area;
             total += area;
@@ -251,7 +273,7 @@ impl<'a> Search<'a> {
     fn judge_again_posed(&self, judge: &Judge, ranked: &mut [Candidate]) {
         for candidate in ranked.iter_mut().filter(|c| c.placement.arm_angle_degrees != 0.0).take(POSED) {
             let posed = ArmPose::new(self.body, candidate.placement.arm_angle_degrees);
-            let field = self.field.posed(&posed, self.body);
+            let field = self.measured.field.posed(&posed, self.body);
             let judge = Judge { field: &field, ..*judge };
             let steps = Steps { from: 0.02, to: 0.0005, is_sharp: true, is_fine: true };
             *candidate = judge.judged(climbed(&judge, candidate, &steps).placement);

@@ -56,7 +56,7 @@ fn every_unit_up_axis_and_facing_is_found_and_the_garment_recovered() {
         garment(&body, Category::Top, 5),
     ];
     let floor = body.zero_body().bounds().0[1];
-    let (mut number, mut recovered) = (0, 0);
+    let mut number = 0;
     for up in UpAxis::ALL {
         for unit in Unit::ALL {
             let original = &garments[(number + number / 5) % garments.len()];
@@ -76,19 +76,26 @@ fn every_unit_up_axis_and_facing_is_found_and_the_garment_recovered() {
             let fitted = fit(&file, &body, &FitSettings::default()).unwrap();
             number += 1;
             let found = fitted.report.placement;
-            let is_found = (found.unit, found.up, found.turn_degrees)
-                == (placement.unit, placement.up, placement.turn_degrees)
-                && norm(sub(found.translation, placement.translation)) < 0.02;
-            // A skirt of the mannequin is as good back to front.
-            assert!(is_found || !fitted.report.doubts.is_empty(), "{}: {found:?}", original.name);
-            recovered += usize::from(is_found);
-            if is_found {
-                assert_eq!(fitted.garment.holding, original.holding);
-                assert!(fitted.report.repairs.is_empty(), "{:?}", fitted.report.repairs);
+            // Some skirts fit the mannequin as well back to front; that is told, and nothing else may differ.
+            if found.turn_degrees != placement.turn_degrees {
+                assert_eq!((found.turn_degrees - placement.turn_degrees).abs(), 180.0, "{}", original.name);
+                assert_eq!(Placement { turn_degrees: placement.turn_degrees, ..found }, placement);
+                assert!(
+                    fitted.report.doubts.iter().any(|doubt| doubt.contains("--turn")),
+                    "{}",
+                    original.name
+                );
+                assert_eq!(original.category, Category::Skirt);
+                continue;
             }
+            assert_eq!(found, placement, "{}", original.name);
+            let (median, far) = recovery(&fitted.garment, original);
+            assert!(median < 0.002 && far == 0.0, "{}: {median} {far}", original.name);
+            assert_eq!(fitted.garment.category, Category::guess(&original.rest, &body));
+            assert_eq!(fitted.garment.holding, original.holding);
+            assert!(fitted.report.repairs.is_empty(), "{:?}", fitted.report.repairs);
         }
     }
-    assert!(recovered >= number - 4, "{recovered} of {number}");
 }
 
 #[test]
@@ -247,7 +254,7 @@ fn lowered_arms_are_found_and_raised() {
             placement.arm_angle_degrees
         );
         let (median, _) = recovery(&fitted.garment, &original);
-        assert!(median < 0.02, "{degrees}: {median}");
+        assert!(median < 0.003, "{degrees}: {median}");
     }
 }
 
