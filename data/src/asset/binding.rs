@@ -135,10 +135,7 @@ fn nearest_body_vertices(garment: &Garment, body: &Body, own_leg: bool) -> Vec<u
         return points.iter().map(|p| all.nearest(*p).0 as usize).collect();
     }
     let crotch_side = |leg: usize| {
-        let names: Vec<usize> = LEG_JOINTS[leg]
-            .iter()
-            .filter_map(|n| body.joint_names.iter().position(|name| name == n))
-            .collect();
+        let names: Vec<usize> = LEG_JOINTS[leg].iter().filter_map(|n| body.joint(n)).collect();
         let of_leg = |v: &usize| {
             let (joints, weights) = body.skin_weights.row(*v);
             let share: f32 = joints

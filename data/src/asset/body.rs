@@ -6,7 +6,6 @@
 
 use super::pose::Pose;
 use super::rotation::{self, Matrix3, matrix_from_axis_angle};
-use super::skeleton;
 use super::skin_weights::SparseSkinWeights;
 use clothcombo_physics::mesh::TriMesh;
 use clothcombo_physics::vec3::{add, sub};
@@ -379,8 +378,8 @@ impl Body {
     pub fn collarbone_height(&self) -> f64 {
         let collars: Vec<f64> = ["left_collar", "right_collar"]
             .iter()
-            .filter_map(|n| self.joint_names.iter().position(|name| name == n).or(skeleton::joint_index(n)))
-            .filter_map(|j| self.joint_template.get(j).map(|p| p[1]))
+            .filter_map(|n| self.joint_place(n))
+            .map(|p| p[1])
             .collect();
         if collars.is_empty() {
             let top = self.template.iter().map(|p| p[1]).fold(0.0, f64::max);

@@ -50,8 +50,7 @@ impl Category {
     /// A guess from the rest shape on the zero body: which heights are covered, whether there is cloth between the legs,
     /// around the arms, and in front of the breastbone.
     pub fn guess(rest: &TriMesh, body: &Body) -> Self {
-        let joint =
-            |name: &str| super::skeleton::joint_index(name).and_then(|j| body.joint_template.get(j)).copied();
+        let joint = |name: &str| body.joint_place(name);
         let (Some(hip), Some(knee), Some(spine), Some(shoulder), Some(elbow)) = (
             joint("left_hip"),
             joint("left_knee"),

@@ -34,8 +34,16 @@ pub struct BodyCheck {
     pub inside_out: bool,
 }
 
-/// Measurements and warnings, or why the body cannot be used.
-pub(super) fn check(path: &Path, npz: &mut NpzFile) -> Result<(BodyCheck, Vec<String>), String> {
+/// What was found out about a body.
+pub(super) struct Checked {
+    pub body: BodyCheck,
+    pub warnings: Vec<String>,
+    /// Why training would refuse it, if so.
+    pub unusable: Option<String>,
+}
+
+/// Measurements and warnings, or why the body cannot be read.
+pub(super) fn check(path: &Path, npz: &mut NpzFile) -> Result<Checked, String> {
     let settings = BodyFileSettings { shape_components: usize::MAX };
     let (body, was_inside_out) = Body::load_turned(path, &settings).map_err(|e| e.to_string())?;
     // The loader normalises each row: the sums are those of the file.
@@ -60,30 +68,14 @@ pub(super) fn check(path: &Path, npz: &mut NpzFile) -> Result<(BodyCheck, Vec<St
         non_manifold_edges: topology.non_manifold_edges.len(),
         inside_out: was_inside_out,
     };
-    let warnings = warnings(&check);
-    Ok((check, warnings))
+    let unusable = body.implausibility().or_else(|| lacks_joints(check.joints));
+    let unusable = unusable.map(|reason| format!("{}: {reason}", path.display()));
+    Ok(Checked { warnings: warnings(&check), unusable, body: check })
 }
 
-/// Heights of a body in metres, from a small child to a giant.
-const HEIGHTS: std::ops::RangeInclusive<f64> = 0.4..=2.8;
-
-/// Why a body of this height (m) is none in metres, if so.
-pub fn implausible_height(height: f64) -> Option<String> {
-    (!HEIGHTS.contains(&height)).then(|| format!("{height:.2} m high: are the units metres and y up?"))
-}
-
-/// Why training would refuse the body, if it would.
-pub(super) fn unusable(check: &BodyCheck, path: &Path) -> Option<String> {
-    if let Some(reason) = implausible_height(check.height) {
-        return Some(format!("{}: {reason}", path.display()));
-    }
-    (check.joints < BODY_JOINT_COUNT).then(|| {
-        format!(
-            "{}: {} joints; poses turn the {BODY_JOINT_COUNT} body joints of SMPL",
-            path.display(),
-            check.joints
-        )
-    })
+fn lacks_joints(joints: usize) -> Option<String> {
+    (joints < BODY_JOINT_COUNT)
+        .then(|| format!("{joints} joints; poses turn the {BODY_JOINT_COUNT} body joints of SMPL"))
 }
 
 fn warnings(check: &BodyCheck) -> Vec<String> {

@@ -104,7 +104,16 @@ pub(super) fn check(
         self_triangle_pairs: self_triangle_pairs(mesh.positions(), mesh.faces()).len(),
     };
     let misplaced = misplacement(&mesh, body, placement, &gaps);
-    let warnings = warnings(&garment);
+    let mut warnings = warnings(&garment);
+    let pieces = placement.worn_pieces(&mesh, body);
+    if pieces > 1 {
+        warnings.push(format!(
+            "{pieces} of its pieces would be worn without the others: for an outfit, export one file per garment"
+        ));
+    }
+    if let Some(given) = hints.category {
+        warnings.extend(placement.contradiction(&mesh, body, given));
+    }
     Ok(Checked {
         garment,
         warnings,

@@ -10,10 +10,9 @@ mod placement;
 mod targets;
 
 pub use anatomy::impossible_turn;
-pub use body::{BodyCheck, implausible_height};
+pub use body::BodyCheck;
 pub use garment::{GarmentCheck, layer_guess};
-pub use motion::MotionCheck;
-pub(crate) use motion::not_upright;
+pub use motion::{MotionCheck, not_radians, not_upright};
 pub use targets::{ManifestHints, Target, find_targets};
 
 use crate::asset::Body;
@@ -70,7 +69,8 @@ impl FileCheck {
 pub struct Checker {
     body: Body,
     surface: Surface<f64>,
-    placement: PlacementCheck,
+    /// Or why the body is no standing person.
+    placement: Result<PlacementCheck, String>,
 }
 
 impl Checker {
@@ -79,7 +79,7 @@ impl Checker {
         let surface = Surface::new(body.template.clone(), body.faces.clone());
         // Built once here, not by the first of many threads.
         surface.closest_point();
-        let placement = PlacementCheck::new(&body);
+        let placement = PlacementCheck::new(&body).map_err(|e| e.to_string());
         Self { body, surface, placement }
     }
 
@@ -88,7 +88,8 @@ impl Checker {
         let file = FileCheck::new(target.path());
         let checked = match target {
             Target::Garment { path, entry } => {
-                garment::check(path, entry, &self.body, &self.surface, &self.placement).map(
+                let placement = self.placement.as_ref().map_err(Clone::clone);
+                placement.and_then(|p| garment::check(path, entry, &self.body, &self.surface, p)).map(
                     |garment::Checked { garment, warnings, misplaced }| FileCheck {
                         garment: Some(garment),
                         warnings,
@@ -111,9 +112,8 @@ impl Checker {
 fn check_npz(file: &FileCheck, path: &Path) -> Result<FileCheck, String> {
     let mut npz = NpzFile::open(path).map_err(|e| e.to_string())?;
     if npz.contains("v_template") {
-        let (check, warnings) = body::check(path, &mut npz)?;
-        let unusable = body::unusable(&check, path);
-        Ok(FileCheck { body: Some(check), warnings, unusable, ..file.clone() })
+        let body::Checked { body, warnings, unusable } = body::check(path, &mut npz)?;
+        Ok(FileCheck { body: Some(body), warnings, unusable, ..file.clone() })
     } else if holds_poses(&npz) {
         let (check, warnings) = motion::check(path)?;
         let unusable = motion::unusable(&check, path);

@@ -42,7 +42,7 @@ fn excesses(pose: &Pose) -> impl Iterator<Item = (usize, f64)> + '_ {
 }
 
 /// A warning about a body that stands along another axis than y.
-pub(crate) fn not_upright(poses: &[Pose]) -> Option<String> {
+pub fn not_upright(poses: &[Pose]) -> Option<String> {
     let [_, y, z] = mean_up(poses);
     if y < -0.5 {
         return Some("the body stands on its head on average: is y down in the file, as in the coordinates of a camera? (an npz: \
@@ -58,14 +58,21 @@ const NOT_RADIANS: f64 = 360.0;
 
 /// Why training would refuse the motion, if it would.
 pub(super) fn unusable(check: &MotionCheck, path: &Path) -> Option<String> {
-    let reason = match (check.frames, check.largest_excess_degrees) {
-        (1, _) => "a single frame is no motion; join still poses in one file".to_owned(),
-        (_, excess) if excess > NOT_RADIANS => {
-            format!("joints turn {excess:.0}° beyond their range: angles in degrees?")
-        }
-        _ => return None,
+    let reason = match check.frames {
+        1 => Some("a single frame is no motion; join still poses in one file".to_owned()),
+        _ => beyond_range(check.largest_excess_degrees),
     };
-    Some(format!("{}: {reason}", path.display()))
+    reason.map(|reason| format!("{}: {reason}", path.display()))
+}
+
+fn beyond_range(excess: f64) -> Option<String> {
+    (excess > NOT_RADIANS).then(|| format!("joints turn {excess:.0}° beyond their range: angles in degrees?"))
+}
+
+/// Why the angles of poses cannot be in radians, if so.
+pub fn not_radians<'a>(poses: impl IntoIterator<Item = &'a Pose>) -> Option<String> {
+    let largest = |pose| excesses(pose).map(|(_, excess)| excess).fold(0.0, f64::max);
+    beyond_range(poses.into_iter().map(largest).fold(0.0, f64::max))
 }
 
 /// Measurements and warnings, or why the motion cannot be used.

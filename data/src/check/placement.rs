@@ -1,7 +1,7 @@
 //! Whether a garment lies where garments lie on the body; training on one that does not teaches nothing.
 
 use crate::asset::Body;
-use crate::fit::PlacementCheck;
+use crate::fit::{PlacementCheck, is_double};
 use clothcombo_physics::TriMesh;
 
 /// A garment farther from the body than this is not on it (m).
@@ -23,6 +23,9 @@ pub(super) fn misplacement(
 ) -> Option<String> {
     if check.is_on_body(mesh, body) {
         return None;
+    }
+    if is_double(mesh.positions(), mesh.faces()) {
+        return Some("cloth of two sheets, with thickness or a lining, where a garment is one".into());
     }
     let (least, name) = (gaps.first().copied()?, &body.name);
     let (low, high) = body.zero_body().bounds();
@@ -56,7 +59,7 @@ mod tests {
     #[test]
     fn every_kind_of_misplacement_has_its_reason() {
         let body = mannequin();
-        let (surface, check) = (Surface::from_mesh(&body.zero_body()), PlacementCheck::new(&body));
+        let (surface, check) = (Surface::from_mesh(&body.zero_body()), PlacementCheck::new(&body).unwrap());
         let tee = generated(&body, Category::TShirt, 4, 300).rest;
         let reason = |mesh: &TriMesh| {
             let gap = |p: &[f64; 3]| surface.gap(*p, Distance::ClosestPoint).gap;

@@ -1,6 +1,6 @@
 //! Which parts of the body pass through the openings of a garment, and whether bones pass through its cloth.
 
-use super::body_field::{ArmTurn, joint};
+use super::body_field::ArmTurn;
 use crate::asset::Body;
 use clothcombo_physics::vec3::{add, cross, dot, scale, sub};
 
@@ -42,8 +42,8 @@ type Segment = [[f64; 3]; 2];
 impl Skeleton {
     pub fn new(body: &Body) -> Self {
         Self {
-            limbs: LIMBS.map(|names| names.iter().filter_map(|n| joint(body, n)).collect()),
-            shoulders: ["left_shoulder", "right_shoulder"].map(|n| joint(body, n)),
+            limbs: LIMBS.map(|names| names.iter().filter_map(|n| body.joint_place(n)).collect()),
+            shoulders: ["left_shoulder", "right_shoulder"].map(|n| body.joint_place(n)),
         }
     }
 
@@ -123,7 +123,9 @@ fn passes_through([a, b]: &Segment, [p, q, r]: &[[f64; 3]; 3]) -> i32 {
         return 0;
     }
     let direction = sub(*b, *a);
-    let side = |u: [f64; 3], v: [f64; 3]| dot(direction, cross(sub(u, *a), sub(v, *a))) > 0.0;
+    let turn = |u: [f64; 3], v: [f64; 3]| dot(direction, cross(sub(u, *a), sub(v, *a))) > 0.0;
+    // An edge has the same side in both of its triangles, also where the segment meets it.
+    let side = |u: [f64; 3], v: [f64; 3]| if u <= v { turn(u, v) } else { !turn(v, u) };
     let sides = [side(*p, *q), side(*q, *r), side(*r, *p)];
     if sides == [true; 3] || sides == [false; 3] { if to > from { 1 } else { -1 } } else { 0 }
 }

@@ -17,8 +17,7 @@ pub(super) struct ArmPose {
 const SHOULDERS: [&str; 2] = ["left_shoulder", "right_shoulder"];
 
 fn shoulders(body: &Body) -> Option<[usize; 2]> {
-    let index = |name: &str| body.joint_names.iter().position(|n| n == name);
-    Some([index(SHOULDERS[0])?, index(SHOULDERS[1])?])
+    Some([body.joint(SHOULDERS[0])?, body.joint(SHOULDERS[1])?])
 }
 
 impl ArmPose {

@@ -1,7 +1,7 @@
 //! The T-posed body as the placement search sees it: signed distances on grids, with arms that turn at the shoulders.
 
 use super::arm_pose::ArmPose;
-use crate::asset::{Body, skeleton};
+use crate::asset::Body;
 use crate::generate::garment::Tube;
 use crate::generate::garment::measures::BodyMeasures;
 use crate::mesh::DistanceGrid;
@@ -109,8 +109,9 @@ impl BodyField {
         );
         let (low, high) = body.zero_body().bounds();
         let measures = BodyMeasures::new(body).ok();
-        let height =
-            |name: &str, share: f64| joint(body, name).map_or(low[1] + share * (high[1] - low[1]), |p| p[1]);
+        let height = |name: &str, share: f64| {
+            body.joint_place(name).map_or(low[1] + share * (high[1] - low[1]), |p| p[1])
+        };
         let levels = match &measures {
             Some(BodyMeasures { landmarks: l, .. }) => {
                 Levels { crotch: l.crotch, hip: l.hip, waist: l.waist, armpit: l.armpit }
@@ -125,7 +126,7 @@ impl BodyField {
         };
         let column = measures.map(|m| m.column);
         let form = taut(trunk.clone(), column.as_ref(), &levels);
-        let spine = ["pelvis", "spine1", "spine2", "spine3"].map(|name| joint(body, name));
+        let spine = ["pelvis", "spine1", "spine2", "spine3"].map(|name| body.joint_place(name));
         let spine: Vec<f64> = spine.into_iter().flatten().map(|p| p[2]).collect();
         let spine_z = spine.iter().sum::<f64>() / spine.len().max(1) as f64;
         let arms = left.into_iter().chain(right).collect();
@@ -170,6 +171,16 @@ impl BodyField {
         (gap, part)
     }
 
+    /// A point next to an arm, raised with it to the T-pose; any other one as it is.
+    pub fn level(&self, p: [f64; 3], arms: ArmTurn) -> [f64; 3] {
+        let nearest = self.arms.iter().map(|arm| {
+            let raised = arms.raised(p, arm.shoulder, arm.side);
+            (arm.distance.distance(raised), raised)
+        });
+        let (distance, raised) = nearest.fold((f64::MAX, p), |a, b| if b.0 < a.0 { b } else { a });
+        if distance < self.form.distance(p) { raised } else { p }
+    }
+
     /// Inverse of linear blend skinning by a weight of the left (positive) or right (negative) arm.
     fn raised(&self, p: [f64; 3], weight: f64, arms: ArmTurn) -> [f64; 3] {
         let side = weight.signum();
@@ -210,7 +221,7 @@ fn arm(
     side: usize,
     distance: &dyn Fn(&[[u32; 3]]) -> (DistanceGrid, f64),
 ) -> Option<Arm> {
-    let shoulder = joint(body, SHOULDERS[side]).filter(|_| !faces.is_empty())?;
+    let shoulder = body.joint_place(SHOULDERS[side]).filter(|_| !faces.is_empty())?;
     let (distance, radius) = distance(faces);
     Some(Arm { side: [1.0, -1.0][side], shoulder, radius: 0.9 * radius, distance })
 }
@@ -218,17 +229,12 @@ fn arm(
 /// Names of the joints that lower the left and the right arm.
 const SHOULDERS: [&str; 2] = ["left_shoulder", "right_shoulder"];
 
-/// Where a joint of the zero body lies (m), by its SMPL name.
-pub(super) fn joint(body: &Body, name: &str) -> Option<[f64; 3]> {
-    let named = body.joint_names.iter().position(|n| n == name);
-    named.or(skeleton::joint_index(name)).and_then(|j| body.joint_template.get(j)).copied()
-}
-
 /// For every joint whether it belongs to the left (0) or right (1) arm, from the shoulder on.
 fn arm_sides(body: &Body) -> Vec<Option<usize>> {
     let mut sides: Vec<Option<usize>> = Vec::with_capacity(body.joint_count());
-    for (joint, name) in body.joint_names.iter().enumerate() {
-        let own = SHOULDERS.iter().position(|s| s == name);
+    let shoulders = SHOULDERS.map(|name| body.joint(name));
+    for joint in 0..body.joint_count() {
+        let own = shoulders.iter().position(|s| *s == Some(joint));
         sides.push(own.or(body.parents[joint].and_then(|parent| sides[parent])));
     }
     sides

@@ -8,13 +8,24 @@ pub(super) struct Steps {
     pub to: f64,
     pub is_sharp: bool,
     pub is_fine: bool,
+    pub moves: Moves,
+}
+
+/// What may change of a placement.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Moves {
+    All,
+    /// All but the height.
+    Level,
+    /// The arms only.
+    Arms,
 }
 
 /// Slid along the three axes, and the arms turned, as long as that helps; what settings fix stays.
 pub(super) fn climbed(judge: &Judge, start: &Candidate, steps: &Steps) -> Candidate {
     let turned = judge.turned(&start.placement, start.rim, steps.is_fine);
     let mut best = judge.scored(start.placement, &turned, steps.is_sharp, Some(start));
-    let slides = judge.settings.offset.is_none();
+    let slides = judge.settings.offset.is_none() && steps.moves != Moves::Arms;
     let raises = best.placement.arm_angle_degrees != 0.0;
     let mut step = steps.from;
     while step > steps.to {
@@ -23,7 +34,9 @@ pub(super) fn climbed(judge: &Judge, start: &Candidate, steps: &Steps) -> Candid
             for sign in [-1.0, 1.0] {
                 let mut trial = best.placement;
                 match axis {
-                    0..3 if slides => trial.translation[[1, 2, 0][axis]] += sign * step,
+                    0..3 if slides && (axis != 0 || steps.moves == Moves::All) => {
+                        trial.translation[[1, 2, 0][axis]] += sign * step
+                    }
                     3 if raises => {
                         // A sleeve is half a metre long.
                         let degrees = trial.arm_angle_degrees + sign * (2.0 * step).to_degrees();

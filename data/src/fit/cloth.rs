@@ -2,6 +2,7 @@
 
 use super::samples::Samples;
 use clothcombo_physics::Topology;
+use clothcombo_physics::vec3::{norm, sub};
 
 /// Sample points for the coarse and for the fine search.
 const COARSE: usize = 200;
@@ -15,6 +16,8 @@ pub(super) struct Cloth<'a> {
     pub faces: &'a [[u32; 3]],
     /// Vertices of each border, in order.
     pub borders: &'a [Vec<u32>],
+    /// Their lengths.
+    pub border_lengths: Vec<f64>,
     /// Connected piece of each vertex.
     pieces: &'a [u32],
     pub coarse: Samples,
@@ -25,7 +28,21 @@ impl<'a> Cloth<'a> {
     pub fn new(positions: &'a [[f64; 3]], faces: &'a [[u32; 3]], topology: &'a Topology) -> Self {
         let samples = |count| Samples::new(positions, faces, count);
         let (borders, pieces) = (&topology.boundary_loops, &topology.component_of_vertex);
-        Self { positions, faces, borders, pieces, coarse: samples(COARSE), fine: samples(FINE) }
+        let length = |border: &Vec<u32>| {
+            let next = border.iter().cycle().skip(1);
+            let edges = border.iter().zip(next).map(|(a, b)| [a, b].map(|v| positions[*v as usize]));
+            edges.map(|[a, b]| norm(sub(b, a))).sum()
+        };
+        let border_lengths = borders.iter().map(length).collect();
+        Self {
+            positions,
+            faces,
+            borders,
+            border_lengths,
+            pieces,
+            coarse: samples(COARSE),
+            fine: samples(FINE),
+        }
     }
 
     /// The connected piece that a border belongs to.

@@ -38,6 +38,9 @@ pub enum FitError {
         /// Largest extent of the body (m).
         reach: f64,
     },
+    /// The body to fit to is none that clothes can be placed on.
+    #[error("the body: {0}")]
+    ImplausibleBody(String),
     /// Reaches from head to feet and to both hands.
     #[error("not a garment: it reaches from the crown to the soles and to both hands, as a body does")]
     Body,
@@ -79,12 +82,23 @@ pub enum FitError {
         /// The same as a share of the diagonal.
         share: f64,
     },
+    /// Two pieces that lie in each other all over.
+    #[error(
+        "two sheets of cloth {distance:.4} apart in the file's unit ({:.1} % of its size), such as a lining or two garments in one \
+         file, where a garment is one sheet; --keep largest takes the largest piece", 100.0 * share
+    )]
+    Sheets {
+        /// Median distance of the pieces in the file's unit.
+        distance: f64,
+        /// The same as a share of the diagonal.
+        share: f64,
+    },
     /// Thick cloth whose sheets cannot be told apart.
     #[error(
         "cloth with thickness whose outer and inner sheet cannot be told apart: delete the inner sheet and the rims in a modelling \
          program"
     )]
-    Sheets,
+    MixedSheets,
     /// The body that the garment was made on does not say where it lies.
     #[error("--from-body {name}: {what}")]
     SourceBody {

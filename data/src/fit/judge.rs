@@ -41,10 +41,45 @@ pub(super) struct Candidate {
     pub rim: Option<usize>,
     /// Whether limbs pass through its openings as through those of clothes.
     pub is_worn: bool,
+    /// Connected pieces that would be worn without the others.
+    pub worn_pieces: usize,
+    /// Length of the longest border around the neck over that of the longest around the trunk; 0 if there are not both.
+    pub neck_over_hem: f64,
     /// Whether it is a tube around the trunk with no other opening: a skirt or a strapless top.
     pub is_tube: bool,
     /// Mean distance of the upper rim to the body (m), 0 without one.
     pub rim_distance: f64,
+}
+
+/// A border of a placed garment.
+struct Border {
+    /// What it goes around; one that runs through the body goes around nothing.
+    opening: Opening,
+    /// What is linked with it, also if it runs through the body.
+    linked: Opening,
+    /// Mean height (m).
+    height: f64,
+}
+
+/// Which limbs pass through openings of their own.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Limbs {
+    pub neck: bool,
+    /// Both.
+    pub arms: bool,
+    /// Both.
+    pub legs: bool,
+}
+
+impl Limbs {
+    fn new(openings: &[Border]) -> Self {
+        let has = |wanted: Opening| openings.iter().any(|b| b.opening == wanted);
+        Self {
+            neck: has(Opening::Neck),
+            arms: has(Opening::LeftArm) && has(Opening::RightArm),
+            legs: has(Opening::LeftLeg) && has(Opening::RightLeg),
+        }
+    }
 }
 
 /// Judges placements of one garment on one body.
@@ -102,6 +137,8 @@ impl Judge<'_> {
             crossings: 0,
             rim: None,
             is_worn: true,
+            worn_pieces: 1,
+            neck_over_hem: 0.0,
             is_tube: false,
             rim_distance: 0.0,
         };
@@ -119,11 +156,13 @@ impl Judge<'_> {
         log_likelihood(gaps, RIM_EVIDENCE) + self.rim_prior(height)
     }
 
-    /// Logarithm of the density of an upper rim's height against any height within a body (m).
+    /// Logarithm of the density of an upper rim's height over that of a height anywhere on hips or chest.
     fn rim_prior(&self, height: f64) -> f64 {
-        /// Shares of rims at the waist, above the chest and anywhere else.
+        /// Shares of rims at the waist and above the chest.
         const USUAL: [f64; 2] = [0.6, 0.35];
+        /// Density anywhere else, and anywhere on hips or chest (1/m).
         const ELSEWHERE: f64 = 0.02;
+        const UNIFORM: f64 = 5.0;
         let normal = |middle: f64, spread: f64| {
             (-0.5 * ((height - middle) / spread).powi(2)).exp() / (spread * std::f64::consts::TAU.sqrt())
         };
@@ -135,29 +174,35 @@ impl Judge<'_> {
         let levels = self.field.levels;
         let density =
             shares[0] * normal(levels.waist - 0.03, 0.035) + shares[1] * normal(levels.armpit - 0.035, 0.03);
-        (density + ELSEWHERE).ln() - 5.0f64.ln()
+        (density + ELSEWHERE).ln() - UNIFORM.ln()
     }
 
-    /// What each border goes around, and its mean height (m). A border that runs through the body goes around nothing.
-    fn openings(&self, placement: &Placement) -> Vec<(Opening, f64)> {
+    /// The borders of a placed garment.
+    fn openings(&self, placement: &Placement) -> Vec<Border> {
         let arms = ArmTurn::new(placement.arm_angle_degrees);
         let of_border = |border: usize| {
             let points = placement.apply(&self.cloth.border(border));
             let count = points.len().max(1) as f64;
-            let height = points.iter().map(|p| p[1]).sum::<f64>() / count;
             let inside = points.iter().filter(|p| self.field.is_inside(**p, arms, DEPTH)).count();
-            match inside as f64 > SHARE * count {
-                true => (Opening::Nothing, height),
-                false => (self.skeleton.opening(&points, arms), height),
+            let linked = self.skeleton.opening(&points, arms);
+            Border {
+                opening: if inside as f64 > SHARE * count { Opening::Nothing } else { linked },
+                linked,
+                height: points.iter().map(|p| p[1]).sum::<f64>() / count,
             }
         };
         (0..self.cloth.borders.len()).map(of_border).collect()
     }
 
-    /// Whether limbs pass through its openings, and which rim it hangs from.
+    /// Which limbs pass through openings of their own.
+    pub fn limbs(&self, placement: &Placement) -> Limbs {
+        Limbs::new(&self.openings(placement))
+    }
+
+    /// Whether limbs pass through its openings, and which rim it hangs from; the candidate's score does not count that yet.
     pub fn with_openings(&self, mut candidate: Candidate) -> Candidate {
         let openings = self.openings(&candidate.placement);
-        let count = |wanted: Opening| openings.iter().filter(|(o, _)| *o == wanted).count();
+        let count = |wanted: Opening| openings.iter().filter(|b| b.opening == wanted).count();
         let has = |wanted: Opening| count(wanted) > 0;
         let limbs = [
             Opening::Neck,
@@ -169,23 +214,41 @@ impl Judge<'_> {
         ];
         // Two sleeves that are not one piece are socks, and a tube with no other opening has no room for head and legs.
         let piece =
-            |wanted: Opening| openings.iter().position(|(o, _)| *o == wanted).map(|b| self.cloth.piece(b));
+            |wanted: Opening| openings.iter().position(|b| b.opening == wanted).map(|b| self.cloth.piece(b));
         let arms = openings.len() > 2
             && has(Opening::LeftArm)
             && piece(Opening::LeftArm) == piece(Opening::RightArm);
-        let is_around =
-            count(Opening::Trunk) >= 2 || (has(Opening::Trunk) && limbs.into_iter().any(has)) || arms;
+        let goes_around = |trunk: usize, has: &dyn Fn(Opening) -> bool| {
+            trunk >= 2 || (trunk > 0 && limbs.into_iter().any(has))
+        };
+        let is_around = goes_around(count(Opening::Trunk), &has) || arms;
         // Only sleeves and armholes tell how arms hang.
         let is_worn = is_around && (arms || candidate.placement.arm_angle_degrees == 0.0);
-        if candidate.is_worn && !is_worn {
+        if !is_worn {
             candidate.score -= UNWORN;
         }
         candidate.is_worn = is_worn;
+        let mut pieces: Vec<u32> = (0..openings.len()).map(|border| self.cloth.piece(border)).collect();
+        pieces.sort_unstable();
+        pieces.dedup();
+        let is_worn_alone = |piece: &u32| {
+            let own = openings.iter().enumerate().filter(|(b, _)| self.cloth.piece(*b) == *piece);
+            let own: Vec<Opening> = own.map(|(_, border)| border.opening).collect();
+            let trunk = own.iter().filter(|o| **o == Opening::Trunk).count();
+            goes_around(trunk, &|wanted| own.contains(&wanted))
+        };
+        candidate.worn_pieces = pieces.iter().filter(|p| is_worn_alone(p)).count();
+        let longest = |wanted: Opening| {
+            let of = openings.iter().zip(&self.cloth.border_lengths).filter(|(b, _)| b.linked == wanted);
+            of.map(|(_, length)| *length).fold(0.0, f64::max)
+        };
+        let hem = longest(Opening::Trunk);
+        candidate.neck_over_hem = if hem > 0.0 { longest(Opening::Neck) / hem } else { 0.0 };
         candidate.is_tube = count(Opening::Trunk) == 2 && !limbs.into_iter().any(has);
         candidate.rim = None;
         if !has(Opening::Neck) && !arms {
-            let trunk = openings.iter().enumerate().filter(|(_, (o, _))| *o == Opening::Trunk);
-            candidate.rim = trunk.max_by(|a, b| a.1.1.total_cmp(&b.1.1)).map(|(border, _)| border);
+            let trunk = openings.iter().enumerate().filter(|(_, b)| b.opening == Opening::Trunk);
+            candidate.rim = trunk.max_by(|a, b| a.1.height.total_cmp(&b.1.height)).map(|(border, _)| border);
         }
         candidate
     }

@@ -5,6 +5,7 @@
 mod anatomy;
 mod arm_pose;
 mod body_field;
+mod category;
 mod climb;
 mod cloth;
 mod coverage;
@@ -28,15 +29,17 @@ pub use error::FitError;
 pub use from_body::{Carried, SourceBody, SourcePlacement};
 pub use placed::{PlacementCheck, is_on_body};
 pub use placement::{Origin, Placement, Unit, UpAxis};
+pub(crate) use repair::is_double;
 pub use repair::needs_repair;
 pub use report::{BodyContact, Elements, FitReport, MeshPiece, Repair, RepairKind, SeamReport};
 pub use settings::{FitSettings, Keep, MAX_VERTICES, MIN_TRIANGLES};
 pub use sitting::Sitting;
 
-use crate::asset::{Body, Category, Garment};
+use crate::asset::{Body, Garment};
 use crate::format::{FileFace, PolygonMesh};
 use crate::mesh::{Attachment, MeshMeasures, bounds, contact, join_seams, push_out};
 use arm_pose::ArmPose;
+use category::{contradiction, guessed};
 use cloth::Cloth;
 use clothcombo_physics::contact::{self_triangle_pairs, triangle_pairs};
 use clothcombo_physics::mesh::vertex_normals;
@@ -103,7 +106,7 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
         return Err(FitError::Closed);
     }
 
-    let measured = SearchBody::new(body);
+    let measured = SearchBody::new(body)?;
     let search = Search::new(body, &measured);
     let extent = mesh.extent();
     let units = settings.unit.map_or(Unit::ALL.to_vec(), |u| vec![u]);
@@ -112,16 +115,15 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
     }
     let cloth = Cloth::new(&sheet.positions, &sheet.faces, &topology);
     let source = settings.from_body.as_deref().map(|b| b.aligned(body, settings)).transpose()?;
-    let (placement, doubts) = match &source {
+    let (placement, mut doubts) = match &source {
         Some(source) => (source.placement, Vec::new()),
         None => {
             let Verdict { placement, doubts } = place(&search, &cloth, extent, settings)?;
-            (placement, doubts)
+            (placement, doubts.iter().map(ToString::to_string).collect())
         }
     };
     let metres = placement.unit.metres();
     let seams = finish_seams(&mut sheet, file, settings, metres);
-    let follows = sheet.followed(file, metres);
     let mesh = TriMesh::new(sheet.positions.clone(), sheet.faces.clone())
         .map_err(|e| FitError::Mesh(e.to_string()))?;
     let topology = Topology::new(&mesh);
@@ -140,12 +142,19 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
     refuse_other_things(&positions, body)?;
     let raised = Cloth::new(&positions, &sheet.faces, &topology);
     let sitting = match &source {
-        Some(_) => search.believed_as_given(&raised, &FitSettings::default())?.1,
+        Some(source) => {
+            search
+                .believed_as_given(&raised, &FitSettings::default())
+                .map_err(|what| source.refusal(&what))?
+                .0
+        }
         None => search.measured(&raised, &Placement::AS_GIVEN).0,
     };
+    let limbs = search.judge(&raised, settings).limbs(&Placement::AS_GIVEN);
     let rest_surface = search.surface();
 
     turn_outward(&mut sheet, &positions, &topology, rest_surface);
+    let follows = sheet.followed(file, metres);
     let before = contact(&positions, rest_surface);
     let unpushed = positions.clone();
     push_out(&mut positions, &sheet.faces, rest_surface, CLEARANCE);
@@ -161,7 +170,8 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
     let rest = TriMesh::new(positions, sheet.faces.clone()).map_err(|e| FitError::Mesh(e.to_string()))?;
     // Faces have been turned.
     let topology = Topology::new(&rest);
-    let category = settings.category.unwrap_or_else(|| Category::guess(&rest, body));
+    let category = settings.category.unwrap_or_else(|| guessed(&rest, body, limbs));
+    doubts.extend(settings.category.and_then(|given| contradiction(given, limbs)));
     let holding = Garment::needs_holding(&rest, body);
     let of_file = |e: &[u32; 2]| e.map(|v| sheet.vertex_origin[v as usize]);
     let dropped_pieces = sheet.dropped_pieces.iter();
@@ -174,7 +184,7 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
         placement,
         from_body,
         sitting,
-        doubts: doubts.iter().map(ToString::to_string).collect(),
+        doubts,
         repairs: sheet.repairs,
         seams,
         dropped_pieces,

@@ -1,10 +1,12 @@
 //! Does a garment already lie on a body, in metres and T-pose, so that nothing has to be found out?
 
+use super::category::contradiction;
 use super::cloth::Cloth;
-use super::placement::{Unit, UpAxis};
+use super::error::FitError;
+use super::placement::{Placement, Unit, UpAxis};
 use super::search::{Search, SearchBody};
 use super::settings::{FitSettings, MIN_TRIANGLES};
-use crate::asset::Body;
+use crate::asset::{Body, Category};
 use crate::mesh::outward_area;
 use clothcombo_physics::{Topology, TriMesh};
 use std::fmt;
@@ -17,8 +19,28 @@ pub struct PlacementCheck(SearchBody);
 
 impl PlacementCheck {
     /// Measures the zero body of `body`.
-    pub fn new(body: &Body) -> Self {
-        Self(SearchBody::new(body))
+    ///
+    /// # Errors
+    /// [`FitError::ImplausibleBody`] if it is no standing person.
+    pub fn new(body: &Body) -> Result<Self, FitError> {
+        SearchBody::new(body).map(Self)
+    }
+
+    /// How many connected pieces of `mesh` would be worn without the others: more than one are an outfit.
+    pub fn worn_pieces(&self, mesh: &TriMesh, body: &Body) -> usize {
+        let topology = Topology::new(mesh);
+        let cloth = Cloth::new(mesh.positions(), mesh.faces(), &topology);
+        let settings = FitSettings::default();
+        Search::new(body, &self.0).judge(&cloth, &settings).judged(Placement::AS_GIVEN).worn_pieces
+    }
+
+    /// What speaks against the category of a mesh that lies where it is worn.
+    pub fn contradiction(&self, mesh: &TriMesh, body: &Body, category: Category) -> Option<String> {
+        let topology = Topology::new(mesh);
+        let cloth = Cloth::new(mesh.positions(), mesh.faces(), &topology);
+        let settings = FitSettings::default();
+        let limbs = Search::new(body, &self.0).judge(&cloth, &settings).limbs(&Placement::AS_GIVEN);
+        contradiction(category, limbs)
     }
 
     /// Whether `mesh`, taken as it stands (metres, y up, pelvis at the origin, arms level), is worn on the zero body and fits nowhere
@@ -41,9 +63,9 @@ impl PlacementCheck {
             ..FitSettings::default()
         };
         let cloth = Cloth::new(mesh.positions(), mesh.faces(), &topology);
-        let Ok((given, _)) = search.believed_as_given(&cloth, &settings) else { return false };
+        let Ok((_, given)) = search.believed_as_given(&cloth, &settings) else { return false };
         let best = search.candidates(&cloth, mesh.extent(), &settings).first().map_or(f64::MIN, |c| c.score);
-        best <= given.score + MARGIN
+        best <= given + MARGIN
     }
 }
 
@@ -55,13 +77,12 @@ impl fmt::Debug for PlacementCheck {
 
 /// [`PlacementCheck::is_on_body`] for one mesh.
 pub fn is_on_body(mesh: &TriMesh, body: &Body) -> bool {
-    PlacementCheck::new(body).is_on_body(mesh, body)
+    PlacementCheck::new(body).is_ok_and(|check| check.is_on_body(mesh, body))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::asset::Category;
     use crate::generate::garment::generated;
     use crate::generate::mannequin;
 

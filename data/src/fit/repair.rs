@@ -8,15 +8,20 @@ use super::sheet::{Corner, Sheet};
 use crate::format::PolygonMesh;
 use crate::mesh::{
     AREA_SHARE, JoinedSheet, Seam, WELD_SHARE, clean_faces, diagonal, join_faces, join_seams, open_seams,
-    orient, outer_sheet, outward_area, split_fans, thickness, triangulate, weld,
+    orient, outer_sheet, outward_area, sheets, split_fans, thickness, triangulate, weld,
 };
 use clothcombo_physics::mesh::is_inside_out;
+use clothcombo_physics::vec3::{norm, sub};
 use clothcombo_physics::{Surface, Topology, TriMesh};
 
 /// Borders at most this far apart (m) are named as an open seam.
 const OPEN_GAP: f64 = 0.01;
 /// They are at least this long (m).
 const OPEN_LENGTH: f64 = 0.06;
+/// A vertex whose shortest edge is this many times the median one does not belong to the mesh.
+const FAR: f64 = 20.0;
+/// Most such vertices.
+const MOST_FAR: usize = 8;
 /// The outer sheet of cloth with thickness has from one to the other share of the area.
 const OUTER_SHARE: [f64; 2] = [0.3, 0.7];
 
@@ -42,12 +47,26 @@ pub(super) fn repair(file: &PolygonMesh, settings: &FitSettings) -> Result<Sheet
 /// Whether a mesh that may lie on the body as it is should be fitted first: it has borders that coincide, or thickness.
 pub fn needs_repair(mesh: &TriMesh) -> bool {
     let (positions, faces) = (mesh.positions(), mesh.faces());
-    join_seams(positions, faces, None).is_some() || thickness(positions, faces).is_some()
+    join_seams(positions, faces, None).is_some() || is_double(positions, faces)
+}
+
+/// Whether the cloth lies in two sheets, where a garment is one.
+pub(crate) fn is_double(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> bool {
+    thickness(positions, faces).or_else(|| sheets(positions, faces)).is_some()
 }
 
 fn manifold(file: &PolygonMesh) -> Result<Sheet, FitError> {
+    let mut cut = triangulate(&file.positions, file.polygons());
+    let far = far_vertices(&file.positions, &cut.faces);
+    let stays: Vec<bool> =
+        cut.faces.iter().map(|f| f.iter().all(|v| far.binary_search(v).is_err())).collect();
+    let of_stays = || stays.iter().copied();
+    cut.faces = kept(cut.faces, of_stays());
+    cut.corners = kept(cut.corners, of_stays());
+    cut.polygon = kept(cut.polygon, of_stays());
     let mut used = vec![false; file.positions.len()];
-    file.polygons().flatten().for_each(|v| used[*v as usize] = true);
+    let of_faces = cut.faces.iter().flatten().chain(file.polygons().flatten());
+    of_faces.filter(|v| far.binary_search(v).is_err()).for_each(|v| used[*v as usize] = true);
     let used_vertices: Vec<u32> = (0..used.len() as u32).filter(|v| used[*v as usize]).collect();
     let used_positions: Vec<[f64; 3]> = used_vertices.iter().map(|v| file.positions[*v as usize]).collect();
     let diagonal = diagonal(&used_positions);
@@ -61,7 +80,6 @@ fn manifold(file: &PolygonMesh) -> Result<Sheet, FitError> {
     let mut compact = vec![u32::MAX; file.positions.len()];
     used_vertices.iter().zip(&welded.number).for_each(|(v, w)| compact[*v as usize] = *w);
 
-    let cut = triangulate(&file.positions, file.polygons());
     let renumbered: Vec<[u32; 3]> = cut.faces.iter().map(|f| f.map(|v| compact[v as usize])).collect();
     let clean = clean_faces(&welded.positions, &renumbered, AREA_SHARE * diagonal * diagonal);
     if clean.kept.len() < MIN_TRIANGLES {
@@ -77,8 +95,10 @@ fn manifold(file: &PolygonMesh) -> Result<Sheet, FitError> {
     let mut kept = vec![0u8; welded.origin.len()];
     made.origin.iter().for_each(|w| kept[*w as usize] = kept[*w as usize].saturating_add(1));
     let of_file = |e: &[u32; 2]| e.map(file_vertex);
-    let unused = (0..used.len() as u32).filter(|v| !used[*v as usize]);
+    let is_unused = |v: &u32| !used[*v as usize] && far.binary_search(v).is_err();
+    let unused = (0..used.len() as u32).filter(is_unused);
     let lost = (0..kept.len() as u32).filter(|w| kept[*w as usize] == 0).map(file_vertex);
+    sheet.note(RepairKind::DroppedFarVertices, Elements::Vertices(far.clone()));
     sheet.note(RepairKind::DroppedIsolatedVertices, Elements::Vertices(unused.chain(lost).collect()));
     let merged = welded.merged.iter().map(|v| used_vertices[*v as usize]).collect();
     sheet.note(RepairKind::WeldedVertices, Elements::Vertices(merged));
@@ -97,6 +117,31 @@ fn manifold(file: &PolygonMesh) -> Result<Sheet, FitError> {
     sheet.note(RepairKind::SplitVertices, Elements::Vertices(touching.map(file_vertex).collect()));
     sheet.number_as_file(file);
     Ok(sheet)
+}
+
+fn kept<T>(all: Vec<T>, stays: impl Iterator<Item = bool>) -> Vec<T> {
+    all.into_iter().zip(stays).filter_map(|(x, stays)| stays.then_some(x)).collect()
+}
+
+/// Vertices that no edge joins to the rest within [`FAR`] median edges, ascending: slips of a modelling program. Where there are
+/// more than a few, the mesh is coarse instead.
+fn far_vertices(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Vec<u32> {
+    let mut shortest = vec![f64::INFINITY; positions.len()];
+    let mut lengths = Vec::with_capacity(3 * faces.len());
+    for [a, b, c] in faces {
+        for [a, b] in [[a, b], [b, c], [c, a]] {
+            let length = norm(sub(positions[*a as usize], positions[*b as usize]));
+            lengths.push(length);
+            for v in [a, b] {
+                shortest[*v as usize] = length.min(shortest[*v as usize]);
+            }
+        }
+    }
+    lengths.sort_by(f64::total_cmp);
+    let Some(median) = lengths.get(lengths.len() / 2) else { return Vec::new() };
+    let is_far = |v: &u32| (FAR * median..f64::INFINITY).contains(&shortest[*v as usize]);
+    let far: Vec<u32> = (0..positions.len() as u32).filter(is_far).collect();
+    if far.len() > MOST_FAR { Vec::new() } else { far }
 }
 
 /// What was done to make a sheet of manifold pieces; vertices as they were before.
@@ -124,14 +169,23 @@ fn refuse_thickness(sheet: &Sheet) -> Result<(), FitError> {
             let share = thickness / diagonal(&sheet.positions);
             Err(FitError::Thickness { thickness, share })
         }
-        None => Ok(()),
+        None => match sheets(&sheet.positions, &sheet.faces) {
+            Some(distance) => {
+                Err(FitError::Sheets { distance, share: distance / diagonal(&sheet.positions) })
+            }
+            None => Ok(()),
+        },
     }
 }
 
-/// Keeps the outer sheet of cloth with thickness; cloth without it stays as it is.
+/// Keeps the outer sheet of cloth with thickness, or the larger one of two pieces that lie in each other; cloth without either
+/// stays as it is.
 fn keep_outer(sheet: &mut Sheet, file: &PolygonMesh) -> Result<(), FitError> {
     let faces = sheet.outward_faces();
     if thickness(&sheet.positions, &faces).is_none() {
+        if sheets(&sheet.positions, &faces).is_some() {
+            keep_largest(sheet, file);
+        }
         return Ok(());
     }
     let outer = outer_sheet(&sheet.positions, &faces);
@@ -141,7 +195,7 @@ fn keep_outer(sheet: &mut Sheet, file: &PolygonMesh) -> Result<(), FitError> {
     let all = area(&mut (0..faces.len()));
     let kept = area(&mut (0..faces.len()).filter(|f| is_outer[*f]));
     if !(OUTER_SHARE[0] * all..=OUTER_SHARE[1] * all).contains(&kept) {
-        return Err(FitError::Sheets);
+        return Err(FitError::MixedSheets);
     }
     let dropped = sheet.drop_faces(|f| is_outer[f], file);
     sheet.note(RepairKind::DroppedInnerSheet, Elements::Faces(dropped));

@@ -19,6 +19,8 @@ use std::fmt;
 pub enum RepairKind {
     /// Vertices no face uses, or only faces that were dropped, were left out.
     DroppedIsolatedVertices,
+    /// Vertices far from all others, with their faces.
+    DroppedFarVertices,
     /// Vertices at the place of another one became that one.
     WeldedVertices,
     /// Faces with more than three corners were cut into triangles.
@@ -49,6 +51,7 @@ impl RepairKind {
     /// In words.
     pub fn text(self) -> &'static str {
         match self {
+            Self::DroppedFarVertices => "dropped vertices far from all others",
             Self::DroppedIsolatedVertices => "dropped isolated vertices",
             Self::WeldedVertices => "welded duplicate vertices",
             Self::TriangulatedFaces => "triangulated faces",

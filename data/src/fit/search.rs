@@ -3,8 +3,8 @@
 
 use super::anatomy::Skeleton;
 use super::arm_pose::ArmPose;
-use super::body_field::BodyField;
-use super::climb::{Steps, climbed};
+use super::body_field::{ArmTurn, BodyField};
+use super::climb::{Moves, Steps, climbed};
 use super::cloth::Cloth;
 use super::coverage::off_trunk;
 use super::error::FitError;
@@ -36,6 +36,8 @@ const CLIMBED: usize = 10;
 const JUDGED: usize = 12;
 /// Least share of a sheet's area that faces one way.
 const SHEET: f64 = 0.5;
+/// How far up and down the height of a placement is doubted (m): a garment is back within 2 cm.
+const PROBE: f64 = 0.025;
 /// Candidates in A-pose worth a body of their own.
 const POSED: usize = 2;
 
@@ -49,10 +51,17 @@ pub(super) struct SearchBody {
 }
 
 impl SearchBody {
-    pub fn new(body: &Body) -> Self {
+    /// Measures the zero body.
+    ///
+    /// # Errors
+    /// [`FitError::ImplausibleBody`] if it is no standing person.
+    pub fn new(body: &Body) -> Result<Self, FitError> {
+        if let Some(reason) = body.implausibility() {
+            return Err(FitError::ImplausibleBody(reason));
+        }
         let surface = Surface::new(body.template.clone(), body.faces.clone());
         let reach = body.zero_body().extent();
-        Self { field: BodyField::new(body), skeleton: Skeleton::new(body), surface, reach }
+        Ok(Self { field: BodyField::new(body), skeleton: Skeleton::new(body), surface, reach })
     }
 }
 
@@ -89,26 +98,22 @@ impl<'a> Search<'a> {
         (sitting, high[1] - low[1])
     }
 
+    /// Sample points with the arms raised to the T-pose (m).
+    pub fn level(&self, cloth: &Cloth, placement: &Placement) -> Vec<[f64; 3]> {
+        let arms = ArmTurn::new(placement.arm_angle_degrees);
+        placement.apply(&cloth.fine.0).into_iter().map(|p| self.measured.field.level(p, arms)).collect()
+    }
+
     /// Where a garment lies that covers neither trunk nor hips.
     pub fn off_trunk(&self, cloth: &Cloth, placement: &Placement) -> Option<&'static str> {
         off_trunk(&placement.apply(&cloth.fine.0), self.body)
     }
 
-    /// A garment that is in metres, T-pose and the body's frame: its candidate and how it sits.
-    ///
-    /// # Errors
-    /// [`FitError::Implausible`] if nobody wears it there.
-    pub fn believed_as_given(
-        &self,
-        cloth: &Cloth,
-        settings: &FitSettings,
-    ) -> Result<(Candidate, Sitting), FitError> {
+    /// How a garment sits that is in metres, T-pose and the body's frame, and its score; or why nobody wears it there.
+    pub fn believed_as_given(&self, cloth: &Cloth, settings: &FitSettings) -> Result<(Sitting, f64), String> {
         let candidate = self.judged_as_given(&self.judge(cloth, settings), Placement::AS_GIVEN);
         let (sitting, height) = self.measured(cloth, &Placement::AS_GIVEN);
-        match implausibility(&candidate, &sitting, height) {
-            Some(why) => Err(FitError::Implausible { best: why, second: None }),
-            None => Ok((candidate, sitting)),
-        }
+        implausibility(&candidate, &sitting, height).map_or(Ok((sitting, candidate.score)), Err)
     }
 
     /// The surface of the zero body in T-pose.
@@ -142,11 +147,11 @@ impl<'a> Search<'a> {
         sort(&mut found);
         let mut best = distinct(found);
         best.truncate(JUDGED);
-        let steps = Steps { from: 0.01, to: 0.0005, is_sharp: true, is_fine: true };
+        let steps = Steps { from: 0.01, to: 0.0005, is_sharp: true, is_fine: true, moves: Moves::All };
         let mut last: Vec<Candidate> = best
             .par_iter()
             .map(|c| judge.judged(climbed(&judge, c, &steps).placement))
-            .chain(self.usual(&bases, settings).into_par_iter().map(|p| self.judged_as_given(&judge, p)))
+            .chain(self.usual(&bases, &judge).into_par_iter().map(|p| self.judged_as_given(&judge, p)))
             .collect();
         sort(&mut last);
         self.judge_again_posed(&judge, &mut last);
@@ -163,8 +168,8 @@ impl<'a> Search<'a> {
         others.truncate(ROUGH);
         starts.extend(others);
         let worn = starts.into_iter().map(|c| judge.with_openings(c)).filter(|c| c.is_worn).collect();
-        let roughly = Steps { from: 0.04, to: 0.01, is_sharp: false, is_fine: false };
-        let sharply = Steps { from: 0.019, to: 0.004, is_sharp: true, is_fine: false };
+        let roughly = Steps { from: 0.04, to: 0.01, is_sharp: false, is_fine: false, moves: Moves::All };
+        let sharply = Steps { from: 0.019, to: 0.004, is_sharp: true, is_fine: false, moves: Moves::All };
         let climb = |c: Candidate| {
             let rough = judge.with_openings(climbed(judge, &c, &roughly));
             judge.with_openings(climbed(judge, &rough, &sharply))
@@ -212,7 +217,8 @@ impl<'a> Search<'a> {
             return Vec::new();
         }
         let mut borders: Vec<usize> = (0..judge.cloth.borders.len()).collect();
-        borders.sort_by_key(|b| std::cmp::Reverse(judge.cloth.borders[*b].len()));
+        let length = |border: &usize| judge.cloth.border_lengths[*border];
+        borders.sort_by(|a, b| length(b).total_cmp(&length(a)));
         let mut all = Vec::new();
         for &border in borders.iter().take(3) {
             let turned = judge.turned(base, Some(border), false);
@@ -231,17 +237,63 @@ impl<'a> Search<'a> {
         all
     }
 
-    /// Files as they stand: their origin at one of the usual points, or where it is said to be.
-    fn usual(&self, bases: &[Placement], settings: &FitSettings) -> Vec<Placement> {
-        if settings.offset.is_some() || settings.arms_lowered == Some(true) {
-            return Vec::new();
-        }
+    /// Files as they stand: their origin at one of the usual points, or where it is said to be; arms level, and where the
+    /// garment fits arms that hang better.
+    fn usual(&self, bases: &[Placement], judge: &Judge) -> Vec<Placement> {
         let floor = self.measured.field.low[1];
-        let places = [(Origin::Pelvis, 0.0), (Origin::Floor, floor)];
-        let at = |base: &Placement| {
-            places.map(|(origin, y)| Placement { origin, translation: [0.0, y, 0.0], ..*base })
+        let places = match judge.settings.offset {
+            Some(offset) => vec![(Origin::Elsewhere, offset)],
+            None => vec![(Origin::Pelvis, [0.0; 3]), (Origin::Floor, [0.0, floor, 0.0])],
         };
-        bases.iter().flat_map(at).collect()
+        let lowered = judge.settings.arms_lowered;
+        let at = |base: &Placement| -> Vec<Placement> {
+            let stands = places.iter().map(|(origin, translation)| Placement {
+                origin: *origin,
+                translation: *translation,
+                ..*base
+            });
+            let level = stands.clone().filter(|_| lowered != Some(true));
+            let hanging = stands.filter(|_| lowered != Some(false)).filter_map(|p| self.with_arms(p, judge));
+            level.chain(hanging).collect()
+        };
+        bases.par_iter().flat_map_iter(at).collect()
+    }
+
+    /// The same with arms at the angle that fits best, if a garment that lies there has sleeves or armholes.
+    fn with_arms(&self, placement: Placement, judge: &Judge) -> Option<Placement> {
+        let turned = judge.turned(&placement, None, false);
+        let scored = |degrees: &f64| {
+            judge.scored(Placement { arm_angle_degrees: *degrees, ..placement }, &turned, true, None)
+        };
+        let angles = ARM_ANGLES.iter().filter(|degrees| **degrees != 0.0).map(scored);
+        let best = angles.max_by(|a, b| a.score.total_cmp(&b.score))?;
+        let steps = Steps { from: 0.06, to: 0.004, is_sharp: true, is_fine: false, moves: Moves::Arms };
+        let climbed = judge.with_openings(climbed(judge, &best, &steps));
+        climbed.is_worn.then_some(climbed.placement)
+    }
+
+    /// The best placement around a candidate, and how much worse (log-posterior) the better one of those a probe's height above
+    /// and below it is, when everything but the height is found anew.
+    pub fn probed(&self, cloth: &Cloth, settings: &FitSettings, candidate: Candidate) -> (Candidate, f64) {
+        let judge = self.judge(cloth, settings);
+        let degrees = candidate.placement.arm_angle_degrees;
+        let posed =
+            (degrees != 0.0).then(|| self.measured.field.posed(&ArmPose::new(self.body, degrees), self.body));
+        let judge = Judge { field: posed.as_ref().unwrap_or(judge.field), ..judge };
+        let around = |best: &Candidate, moves: Moves| -> Candidate {
+            let at = |dy: f64| {
+                let mut moved = *best;
+                moved.placement.translation[1] += dy;
+                let steps = Steps { from: 0.02, to: 0.001, is_sharp: true, is_fine: true, moves };
+                judge.judged(climbed(&judge, &moved, &steps).placement)
+            };
+            let (below, above) = rayon::join(|| at(-PROBE), || at(PROBE));
+            if below.score > above.score { below } else { above }
+        };
+        let start = judge.judged(candidate.placement);
+        let found = around(&start, Moves::All);
+        let best = if found.score > start.score { found } else { start };
+        (best, best.score - around(&best, Moves::Level).score)
     }
 
     /// A file as it stands counts as worn if it lies around the trunk, however its borders run.
@@ -275,7 +327,9 @@ impl<'a> Search<'a> {
             let posed = ArmPose::new(self.body, candidate.placement.arm_angle_degrees);
             let field = self.measured.field.posed(&posed, self.body);
             let judge = Judge { field: &field, ..*judge };
-            let steps = Steps { from: 0.02, to: 0.0005, is_sharp: true, is_fine: true };
+            let moves =
+                if candidate.placement.origin == Origin::Elsewhere { Moves::All } else { Moves::Arms };
+            let steps = Steps { from: 0.02, to: 0.0005, is_sharp: true, is_fine: true, moves };
             *candidate = judge.judged(climbed(&judge, candidate, &steps).placement);
         }
         sort(ranked);

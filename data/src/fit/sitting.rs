@@ -1,6 +1,5 @@
 //! How a placed garment sits on the body.
 
-use super::body_field::joint;
 use crate::asset::Body;
 use clothcombo_physics::query::{Distance, Surface};
 use serde::Serialize;
@@ -31,7 +30,7 @@ impl Sitting {
         let mut gaps: Vec<f64> = points.iter().map(|p| surface.gap(*p, Distance::ClosestPoint).gap).collect();
         gaps.sort_by(f64::total_cmp);
         let count = gaps.len().max(1) as f64;
-        let spine = ["pelvis", "spine1", "spine2", "spine3"].iter().filter_map(|name| joint(body, name));
+        let spine = ["pelvis", "spine1", "spine2", "spine3"].iter().filter_map(|name| body.joint_place(name));
         let wrap = |centre: [f64; 3]| {
             let mut sectors = [false; SECTORS];
             for p in points.iter().filter(|p| (p[1] - centre[1]).abs() < SLICE) {

@@ -3,7 +3,7 @@
 use super::cloth::Cloth;
 use super::error::FitError;
 use super::judge::Candidate;
-use super::placement::{Origin, Placement};
+use super::placement::{Origin, Placement, Unit};
 use super::search::Search;
 use super::settings::FitSettings;
 use super::sitting::Sitting;
@@ -12,6 +12,8 @@ use std::fmt;
 
 /// Another reading whose log-posterior is this near to the best is told.
 const NEAR_TIE: f64 = 6.0;
+/// A height that changes it by less is not known: one in fifty such garments lies elsewhere.
+const SAME_HEIGHT: f64 = 4.0;
 /// Readings nearer to each other than this are the same (m).
 const SAME: f64 = 0.02;
 /// Largest share of a garment that may lie inside the body where it is worn.
@@ -20,6 +22,8 @@ const MOST_INSIDE: f64 = 0.25;
 const FARTHEST: f64 = 0.08;
 /// A garment hangs from a rim that is no farther from the body than this, on average (m).
 const WIDEST_RIM: f64 = 0.1;
+/// A neck opening is no longer than this many times the hem.
+const WIDEST_NECK: f64 = 1.5;
 /// Least height of a tube around the trunk (m): lower ones are belts.
 const LEAST_HEIGHT: f64 = 0.09;
 
@@ -28,8 +32,12 @@ const LEAST_HEIGHT: f64 = 0.09;
 pub(super) enum Doubt {
     /// Another reading is nearly as good.
     NearTie { taken: Placement, other: Placement, apart: f64 },
+    /// Some centimetres higher or lower it fits nearly as well.
+    Height { taken: Placement },
     /// A tube may be a skirt or a strapless top.
     Tube,
+    /// Several pieces are worn on their own.
+    Outfit { pieces: usize },
 }
 
 impl fmt::Display for Doubt {
@@ -39,12 +47,23 @@ impl fmt::Display for Doubt {
                 let flags = differences(taken, other);
                 write!(
                     f,
-                    "another placement, {:.0} mm away, fits nearly as well: {}; {} settles it",
+                    "another placement, up to {:.0} mm away, fits nearly as well: {}; {} settles it",
                     1e3 * apart,
                     other.reading(),
                     flags.join(" ")
                 )
             }
+            Self::Height { taken } => {
+                let [x, y, z] = taken.translation;
+                write!(
+                    f,
+                    "its height is known to 3 cm only: look at it; --offset {x:.3},{y:.3},{z:.3} takes it, another y moves it"
+                )
+            }
+            Self::Outfit { pieces } => write!(
+                f,
+                "{pieces} of its pieces would be worn without the others: for an outfit, export one file per garment"
+            ),
             Self::Tube => f.write_str(
                 "a tube with two openings may be a skirt at the waist or a strapless top at the chest; --category settles it",
             ),
@@ -67,6 +86,10 @@ fn differences(taken: &Placement, other: &Placement) -> Vec<String> {
     if (taken.arm_angle_degrees == 0.0) != (other.arm_angle_degrees == 0.0) {
         flags.push(format!("--arms {}", if taken.arm_angle_degrees == 0.0 { "t" } else { "a" }));
     }
+    let moved = norm(sub(taken.translation, other.translation));
+    if flags.is_empty() && moved < SAME {
+        flags.push("--from-body with the body it was made on".into());
+    }
     if flags.is_empty() {
         let [x, y, z] = taken.translation;
         flags.push(format!("--offset {x:.3},{y:.3},{z:.3}"));
@@ -87,6 +110,12 @@ pub(super) fn implausibility(candidate: &Candidate, sitting: &Sitting, height: f
         return Some(format!(
             "its upper rim stays {:.0} mm away from the body: nothing holds it",
             1e3 * candidate.rim_distance
+        ));
+    }
+    if candidate.neck_over_hem > WIDEST_NECK {
+        return Some(format!(
+            "its neck opening is {:.1} times as long as its hem: upside down?",
+            candidate.neck_over_hem
         ));
     }
     if candidate.is_tube && height < LEAST_HEIGHT {
@@ -117,8 +146,9 @@ pub(super) fn verdict(
     cloth: &Cloth,
     settings: &FitSettings,
 ) -> Result<Verdict, FitError> {
-    let samples = &cloth.fine;
     let (mut believed, mut refused): (Vec<Candidate>, Vec<(Placement, String)>) = Default::default();
+    // Whether the best one lies on the body, though nobody wears it there.
+    let mut is_near = false;
     for candidate in candidates.iter().take(8) {
         // What is far worse than one that is believed is not looked at.
         if believed.first().is_some_and(|best| candidate.score < best.score - NEAR_TIE) {
@@ -127,33 +157,53 @@ pub(super) fn verdict(
         let (sitting, height) = search.measured(cloth, &candidate.placement);
         match implausibility(candidate, &sitting, height) {
             None => believed.push(*candidate),
-            Some(why) => refused.push((candidate.placement, why)),
+            Some(why) => {
+                is_near |=
+                    refused.is_empty() && sitting.inside < MOST_INSIDE && sitting.mean_distance < FARTHEST;
+                refused.push((candidate.placement, why));
+            }
         }
     }
     let Some(candidate) = believed.first().copied() else {
         // A hat or a sock that lies where it is worn is called one.
-        let place = candidates.first().and_then(|best| search.off_trunk(cloth, &best.placement));
-        if let Some(place) = place {
+        let is_metres = settings.unit.is_none_or(|unit| unit == Unit::M);
+        let is_free =
+            is_metres && (settings.up, settings.turn_degrees, settings.offset) == (None, None, None);
+        let best = candidates.first().filter(|_| is_near && is_free);
+        if let Some(place) = best.and_then(|best| search.off_trunk(cloth, &best.placement)) {
             return Err(FitError::OffTrunk { place });
         }
         let mut readings = refused.into_iter().map(|(p, why)| format!("{} ({why})", p.reading()));
         let best = readings.next().unwrap_or_else(|| "none".into());
         return Err(FitError::Implausible { best, second: readings.next() });
     };
+    let is_usual = candidate.placement.origin != Origin::Elsewhere || settings.offset.is_some();
+    let (candidate, least_loss) = match is_usual {
+        true => (candidate, f64::INFINITY),
+        false => search.probed(cloth, settings, candidate),
+    };
     let taken = candidate.placement;
-    let points = taken.apply(&samples.0);
+    let points = search.level(cloth, &taken);
     let apart = |other: &Placement| {
-        let sum: f64 = other.apply(&samples.0).iter().zip(&points).map(|(a, b)| norm(sub(*a, *b))).sum();
-        sum / points.len().max(1) as f64
+        let other = search.level(cloth, other);
+        let mut apart: Vec<f64> = other.iter().zip(&points).map(|(a, b)| norm(sub(*a, *b))).collect();
+        apart.sort_by(f64::total_cmp);
+        // Sleeves are a small part of a garment.
+        apart.get(apart.len() * 19 / 20).copied().unwrap_or(0.0)
     };
     let mut doubts = Vec::new();
     let other = believed[1..].iter().map(|c| (c.placement, apart(&c.placement))).find(|(_, d)| *d > SAME);
     if let Some((other, apart)) = other {
         doubts.push(Doubt::NearTie { taken, other, apart });
     }
-    let is_usual = taken.origin != Origin::Elsewhere || settings.offset.is_some();
+    if least_loss < SAME_HEIGHT {
+        doubts.push(Doubt::Height { taken });
+    }
     if candidate.is_tube && settings.category.is_none() && !is_usual {
         doubts.push(Doubt::Tube);
+    }
+    if candidate.worn_pieces > 1 {
+        doubts.push(Doubt::Outfit { pieces: candidate.worn_pieces });
     }
     Ok(Verdict { placement: taken, doubts })
 }

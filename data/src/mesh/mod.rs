@@ -30,5 +30,5 @@ pub use remesh::{Quality, RemeshTarget, remesh};
 pub use seams::{COINCIDE_SHARE, JoinedSheet, Seam, join_seams, median_border_edge, open_seams};
 #[cfg(test)]
 pub(crate) use thickness::tests::solidified;
-pub use thickness::{outer_sheet, thickness};
+pub use thickness::{outer_sheet, sheets, thickness};
 pub use triangle::{smallest_sine, triangle_normal};

@@ -13,8 +13,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::path::Path;
 
-/// A garment is back if half of its vertices are nearer than this to where they were (m).
-const BACK: f64 = 0.02;
+/// A garment is back if half of its vertices, and all but a twentieth, are nearer than this to where they were (m).
+const BACK: [f64; 2] = [0.02, 0.05];
 /// Largest shift of an origin (m), and range of arm angles (degrees).
 const SHIFT: f64 = 0.4;
 const ARMS: [f64; 2] = [20.0, 70.0];
@@ -87,21 +87,21 @@ fn garments_come_back_from_any_convention_or_are_doubted() {
         let mut off: Vec<f64> =
             became.filter_map(|(v, p)| Some(norm(sub(rest[(*v)? as usize], *p)))).collect();
         off.sort_by(f64::total_cmp);
-        let off = off[off.len() / 2];
+        let off = [off.len() / 2, off.len() * 19 / 20].map(|at| off[at]);
         let found = fitted.report.placement;
-        let text = format!("{}: {:.0} mm off; {wanted:?} read as {found:?}", garment.name, 1e3 * off);
-        match (off < BACK, fitted.report.doubts.is_empty()) {
+        let text = format!("{}: {off:.3?} m off; {wanted:?} read as {found:?}", garment.name);
+        match (off[0] < BACK[0] && off[1] < BACK[1], fitted.report.doubts.is_empty()) {
             (true, _) => back += 1,
             (false, false) => doubted += 1,
             (false, true) => silent.push(text),
         }
     }
     println!(
-        "{cases} garments of seed {seed}: {back} back within 20 mm, {doubted} doubted or refused, {} not",
+        "{cases} garments of seed {seed}: {back} back within {:.0} mm, {doubted} doubted or refused, {} not",
+        1e3 * BACK[0],
         silent.len()
     );
     println!("{}", silent.join("\n"));
-    // Loose dresses in A-pose come back some millimetres beyond the bound, unnoticed: about one garment in fifty.
-    assert!(silent.len() <= cases.div_ceil(20), "silently elsewhere:\n{}", silent.join("\n"));
+    assert!(silent.is_empty(), "silently elsewhere:\n{}", silent.join("\n"));
     assert!(10 * back >= 9 * cases, "{back} of {cases}");
 }

@@ -16,7 +16,7 @@ const FARTHEST_ORIGIN: f64 = 1e4;
 /// Hints about garment files; what is not given is found out.
 #[derive(Args, Clone, Debug)]
 pub struct FitArguments {
-    /// Unit of the file: m, dm, cm, mm, inch or auto
+    /// Unit of the file: m, dm, cm, mm, inch, foot or auto
     #[arg(long, default_value = "auto", value_parser = automatic::<Unit>)]
     unit: Automatic<Unit>,
     /// Axis of the file that points up: y, z, x or auto

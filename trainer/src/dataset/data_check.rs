@@ -6,7 +6,7 @@ use super::garment_source::GarmentSource;
 use crate::config::Config;
 use crate::system::paths::lossy;
 use clothcombo_data::asset::Body;
-use clothcombo_data::check::{Checker, FileCheck, ManifestHints, Target, implausible_height};
+use clothcombo_data::check::{Checker, FileCheck, ManifestHints, Target};
 use clothcombo_data::folders::{ListedGarment, list_motion_folder};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -107,12 +107,11 @@ fn motion(path: PathBuf) -> Checked {
 }
 
 fn body_fault(body: &Body, file: &str) -> Option<Fault> {
-    let (low, high) = body.zero_body().bounds();
-    implausible_height(high[1] - low[1]).map(|what| Fault {
+    body.implausibility().map(|what| Fault {
         name: body.name.clone(),
         file: file.into(),
         what,
-        remedy: "convert it to metres, y up".into(),
+        remedy: "convert it to metres, y up, facing +z".into(),
     })
 }
 

@@ -101,8 +101,7 @@ pub enum DraperError {
     /// A mesh is no garment of this body.
     #[error("{}: {reason}", path.display())]
     #[diagnostic(help(
-        "say what is known of the file: --unit, --up, --arms, --category, --offset, --turn, --keep, --join-seams (as for `clothcombo \
-         fit`); `clothcombo check` lists defects"
+        "hints about a file are those of `clothcombo fit --help`; `clothcombo check` lists defects"
     ))]
     Fit {
         /// The file.

@@ -5,7 +5,9 @@ use crate::config::Config;
 use crate::dataset::{DatasetError, GarmentLoader, GarmentSource};
 use crate::score::misplaced;
 use clothcombo_data::asset::{Body, Category, Garment, Provenance};
-use clothcombo_data::fit::{FitReport, FitSettings, fit, in_file_order, is_on_body, needs_repair};
+use clothcombo_data::fit::{
+    FitError, FitReport, FitSettings, PlacementCheck, fit, in_file_order, needs_repair,
+};
 use clothcombo_data::folders::list_garment_folder;
 use clothcombo_data::format::{PolygonMesh, load_mesh};
 use clothcombo_data::generate::GarmentGenerator;
@@ -13,6 +15,7 @@ use clothcombo_data::mesh::{Attachment, MeshMeasures, thickness};
 use clothcombo_physics::mesh::{Topology, TriMesh};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 /// A garment ready to be prepared for the networks.
 #[derive(Clone, Debug)]
@@ -49,6 +52,17 @@ impl GivenGarment {
         always_fit: Option<bool>,
         hints: &FitSettings,
     ) -> Result<Self, DraperError> {
+        Self::read_checked(path, body, always_fit, hints, &OnceLock::new())
+    }
+
+    /// The same with a check that is made where it is needed first.
+    fn read_checked(
+        path: &Path,
+        body: &Body,
+        always_fit: Option<bool>,
+        hints: &FitSettings,
+        placement: &OnceLock<Result<PlacementCheck, FitError>>,
+    ) -> Result<Self, DraperError> {
         let always_fit = always_fit.or((*hints != FitSettings::default()).then_some(true));
         let given = load_mesh(path).map_err(DatasetError::data)?;
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
@@ -56,8 +70,9 @@ impl GivenGarment {
             Some(true) => None,
             Some(false) => Some(given.to_tri_mesh(path).map_err(DatasetError::data)?),
             None => {
-                let lies =
-                    |mesh: &TriMesh| has_no_defects(mesh) && !needs_repair(mesh) && is_on_body(mesh, body);
+                let lies = |mesh: &TriMesh| {
+                    has_no_defects(mesh) && !needs_repair(mesh) && is_on_body(mesh, body, placement)
+                };
                 given.to_tri_mesh(path).ok().filter(lies)
             }
         };
@@ -90,6 +105,12 @@ fn check_place(path: &Path, rest: &TriMesh, body: &Body) -> Result<(), DraperErr
     }
 }
 
+/// Whether a mesh is one garment that is worn where it lies.
+fn is_on_body(mesh: &TriMesh, body: &Body, placement: &OnceLock<Result<PlacementCheck, FitError>>) -> bool {
+    let check = placement.get_or_init(|| PlacementCheck::new(body));
+    check.as_ref().is_ok_and(|check| check.is_on_body(mesh, body) && check.worn_pieces(mesh, body) < 2)
+}
+
 /// Whether every edge, face and vertex of a mesh is as it should be.
 fn has_no_defects(mesh: &TriMesh) -> bool {
     MeshMeasures::new(mesh, &Topology::new(mesh)).defects.counts().is_empty()
@@ -99,6 +120,8 @@ fn has_no_defects(mesh: &TriMesh) -> bool {
 pub struct GarmentCatalog {
     names: Vec<String>,
     sources: HashMap<String, GarmentSource>,
+    /// Of the one body that garments are asked for.
+    placement: OnceLock<Result<PlacementCheck, FitError>>,
 }
 
 impl GarmentCatalog {
@@ -108,7 +131,7 @@ impl GarmentCatalog {
     /// # Errors
     /// When one of `folders` cannot be listed.
     pub fn new(folders: &[PathBuf], config: &Config) -> Result<Self, DraperError> {
-        let mut catalog = Self { names: Vec::new(), sources: HashMap::new() };
+        let mut catalog = Self { names: Vec::new(), sources: HashMap::new(), placement: OnceLock::new() };
         for folder in folders {
             let listed = list_garment_folder(folder).map_err(DatasetError::data)?;
             catalog.extend(listed.into_iter().map(GarmentSource::File));
@@ -158,7 +181,7 @@ impl GarmentCatalog {
             || name.contains('/')
             || (path.extension().is_some() && !self.sources.contains_key(name));
         if is_path {
-            return GivenGarment::read(path, body, always_fit, hints);
+            return GivenGarment::read_checked(path, body, always_fit, hints, &self.placement);
         }
         let origin = self.sources.get(name).ok_or_else(|| DraperError::UnknownGarment {
             name: name.to_owned(),
@@ -176,12 +199,13 @@ impl GarmentCatalog {
             let lies = |rest: &TriMesh| {
                 has_no_defects(rest)
                     && thickness(rest.positions(), rest.faces()).is_none()
-                    && is_on_body(rest, body)
+                    && is_on_body(rest, body, &self.placement)
             };
             !made.as_ref().is_ok_and(|garment| lies(&garment.rest))
         });
         if must_fit {
-            let mut source = GivenGarment::read(&listed.path, body, Some(true), hints)?;
+            let mut source =
+                GivenGarment::read_checked(&listed.path, body, Some(true), hints, &self.placement)?;
             source.garment.name.clone_from(&listed.name);
             return Ok(source);
         }

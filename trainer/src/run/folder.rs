@@ -7,10 +7,11 @@ pub use error::RunDirError;
 use crate::config::{Config, load, to_toml};
 use crate::dataset::SplitNames;
 use crate::run::difference::{AllowedChanges, differences, differing_keys};
-use crate::run::lock::{LockError, RunLock};
+use crate::run::lock::{FILE, LockError, RunLock};
 use crate::system::files::check_writable;
 use crate::system::paths::{first_missing_folder, obstacle};
 use clothcombo_data::format::atomic;
+use std::ffi::OsStr;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -84,14 +85,20 @@ impl RunDir {
         check_writable(root).map_err(|e| io_error(root, e))
     }
 
-    /// Checks that no run lives in `root`.
+    /// Checks that nothing lives in `root`.
     ///
     /// # Errors
-    /// When one does.
+    /// When a run or something else does.
     fn refuse_occupied(root: &Path) -> Result<(), RunDirError> {
-        match root.join(CONFIG).exists() {
-            true => Err(RunDirError::Occupied { path: root.to_owned() }),
-            false => Ok(()),
+        if root.join(CONFIG).exists() {
+            return Err(RunDirError::Occupied { path: root.to_owned() });
+        }
+        // What a start leaves that was killed before there was a configuration.
+        let own = [FILE, CHECKPOINTS, SAMPLES].map(OsStr::new);
+        let entries = fs::read_dir(root).into_iter().flatten().flatten().map(|entry| entry.file_name());
+        match entries.filter(|name| !own.contains(&name.as_os_str())).min() {
+            Some(entry) => Err(RunDirError::Foreign { path: root.to_owned(), entry: entry.into() }),
+            None => Ok(()),
         }
     }
 
@@ -191,7 +198,7 @@ impl RunDir {
     }
     /// Sample pictures.
     pub fn samples(&self) -> PathBuf {
-        self.root.join("samples")
+        self.root.join(SAMPLES)
     }
     /// The sample picture after `step`.
     pub fn sample(&self, step: u64) -> PathBuf {
@@ -215,12 +222,14 @@ impl RunDir {
     }
     /// Checkpoints.
     pub fn checkpoints(&self) -> PathBuf {
-        self.root.join("checkpoints")
+        self.root.join(CHECKPOINTS)
     }
 }
 
 /// Name of the run's configuration.
 const CONFIG: &str = "config.toml";
+const CHECKPOINTS: &str = "checkpoints";
+const SAMPLES: &str = "samples";
 
 /// Removes files of `folder` that a killed process had not finished writing; nobody else writes there now.
 fn sweep(folder: &Path) {

@@ -7,7 +7,8 @@ use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-const FILE: &str = "lock";
+/// Its name in the run's folder.
+pub(super) const FILE: &str = "lock";
 
 /// Looks at a held lock before it counts as held: a program that only asks whether a run is alive holds it for an instant.
 const ATTEMPTS: u32 = 5;

@@ -1,9 +1,42 @@
-//! Bodies whose skeletons have other joints than asked for.
+//! Joints by their names, what they say about the stance of a body, and bodies whose skeletons have other joints than asked for.
 
 use super::Body;
-use crate::asset::skeleton::family_ancestors;
+use crate::asset::skeleton::{BODY_JOINT_COUNT, family_ancestors, joint_index};
+
+/// Heights of a body in metres, from a small child to a giant.
+const HEIGHTS: std::ops::RangeInclusive<f64> = 0.4..=2.8;
 
 impl Body {
+    /// The joint of this SMPL name; in a skeleton that names no joint so, the one that SMPL has at its place.
+    pub fn joint(&self, name: &str) -> Option<usize> {
+        let has_smpl_names = || self.joint_names.iter().any(|n| joint_index(n).is_some());
+        let named = self.joint_names.iter().position(|n| n == name);
+        named.or_else(|| joint_index(name).filter(|j| *j < self.joint_count() && !has_smpl_names()))
+    }
+
+    /// Where that joint of the zero body lies (m).
+    pub fn joint_place(&self, name: &str) -> Option<[f64; 3]> {
+        self.joint(name).and_then(|j| self.joint_template.get(j)).copied()
+    }
+
+    /// Why the zero body is no person who stands in a T-pose, in metres with y up and +x to the left; `None` if it is one.
+    pub fn implausibility(&self) -> Option<String> {
+        let (low, high) = self.zero_body.bounds();
+        let height = high[1] - low[1];
+        if !HEIGHTS.contains(&height) {
+            return Some(format!("{height:.2} m high: are the units metres and y up?"));
+        }
+        if self.joint_count() < BODY_JOINT_COUNT {
+            return None;
+        }
+        let joint = &self.joint_template;
+        let is_upright = joint[12][1] > joint[0][1] + 0.2 && joint[4][1] < joint[1][1] - 0.15;
+        let is_spread = joint[20][0] > joint[16][0] + 0.2 && joint[21][0] < joint[17][0] - 0.2;
+        (!is_upright || !is_spread).then(|| {
+            "its joints are not in a T-pose in metres with y up and the left arm along +x: is it turned or mirrored?".into()
+        })
+    }
+
     /// The same body with joints of these names. One that it lacks is added without weight where its nearest ancestor of the SMPL
     /// family is, and follows that: to a body without fingers, hands are as stiff as if their fingers were at rest.
     ///

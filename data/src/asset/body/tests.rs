@@ -22,7 +22,7 @@ pub(crate) fn random_parts(joints: usize, seed: u64) -> BodyParts {
         ),
         skin_weights: SparseSkinWeights::from_rows(rows),
         parents: (0..joints).map(|j| if j == 0 { None } else { Some((j - 1) / 2) }).collect(),
-        joint_names: skeleton::joint_names(joints),
+        joint_names: crate::asset::skeleton::joint_names(joints),
     }
 }
 

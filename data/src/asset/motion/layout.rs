@@ -25,6 +25,8 @@ const WITHOUT_ROOT: [&str; 2] = ["body_pose", "pose_body"];
 const ROOT: [&str; 3] = ["global_orient", "root_orient", "Rh"];
 /// Numbers of joints without the root, of SMPL-X and of SMPL.
 const BODY_WITHOUT_ROOT: [usize; 2] = [21, 23];
+/// Numbers of joints, the root among them, of SMPL, SMPL-H and SMPL-X, with and without hands, jaw and eyes.
+const KNOWN_JOINTS: [usize; 8] = [22, 23, 24, 25, 52, 53, 54, 55];
 /// Keys of the frame rate (frames/s).
 const RATES: [&str; 6] = ["mocap_framerate", "mocap_frame_rate", "fps", "framerate", "frame_rate", "rate"];
 /// Two rates whose ratio is this near to 1 are one rate: 29.97 is no 30, 120.00005 is 120.
@@ -63,6 +65,12 @@ impl MotionFile {
         let Rotations { joints, values, keys } = rotations(&mut file)?;
         // Names that are no text (pickled ones), as none at all, say nothing.
         let names = file.texts("joint_names")?.unwrap_or_default();
+        if names.is_empty() && !KNOWN_JOINTS.contains(&joints) {
+            return Err(FileError::content(path)(format!(
+                "key '{keys}' has {joints} joints of three numbers; SMPL has 24, SMPL-H 52, SMPL-X 55, without hands 22. Are these \
+                 quaternions, matrices or 6D rotations, or is the array transposed? Write axis-angle, or say the joints in 'joint_names'"
+            )));
+        }
         let places = places(&names, joints).map_err(|joint| {
             FileError::content(path)(format!(
                 "key 'joint_names' names no '{joint}'; the 22 joints of the body are named as in SMPL, in any order"

@@ -166,6 +166,14 @@ pub(super) struct Cloth<'a> {
 }
 
 impl Aligned {
+    /// What is wrong with a garment that is not worn where its body puts it.
+    pub fn refusal(&self, what: &str) -> FitError {
+        let what = format!(
+            "placed through it, nobody wears the garment: {what}. Was it made on this body, and are both in the same coordinates?"
+        );
+        FitError::SourceBody { name: self.name.clone(), what }
+    }
+
     /// Carries a garment, `[V, 3]` in the file's coordinates, to the zero body of `body` (m), and says how.
     ///
     /// # Errors

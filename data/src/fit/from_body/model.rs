@@ -38,7 +38,7 @@ pub(super) fn pose(body: &Body, angles: [f64; 2]) -> Pose {
     let mut pose = Pose::t_pose(body.joint_count());
     for (names, inwards) in LIMBS.iter().zip([angles[0], -angles[1]]) {
         for (name, sign) in names.iter().zip([-1.0, 1.0]) {
-            if let Some(j) = body.joint_names.iter().position(|n| n == name) {
+            if let Some(j) = body.joint(name) {
                 pose.rotations[j] = [0.0, 0.0, sign * inwards.to_radians()];
             }
         }

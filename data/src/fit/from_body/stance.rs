@@ -94,9 +94,7 @@ fn measured(placement: Placement, points: &[[f64; 3]], body: &Body) -> Stance {
 fn arm_angle(body: &Body, tip: f64, reach: f64) -> f64 {
     let [low, high] = bounds(&body.template);
     let height = high[1] - low[1];
-    let shoulder =
-        body.joint_names.iter().position(|n| n == "left_shoulder").and_then(|j| body.joint_template.get(j));
-    let Some([x, y, _]) = shoulder else { return 0.0 };
+    let Some([x, y, _]) = body.joint_place("left_shoulder") else { return 0.0 };
     let drop = (y - low[1]) / height - tip;
     drop.atan2((reach - x.abs() / height).max(0.01)).to_degrees().clamp(0.0, 85.0)
 }

@@ -8,8 +8,8 @@ use crate::generate::garment::generated;
 use crate::generate::mannequin;
 use crate::mesh::{MeshMeasures, solidified};
 use clothcombo_physics::contact::self_triangle_pairs;
-use clothcombo_physics::mesh::Hinge;
-use clothcombo_physics::vec3::{norm, sub};
+use clothcombo_physics::mesh::{Hinge, vertex_normals};
+use clothcombo_physics::vec3::{add_scaled, norm, sub};
 use clothcombo_physics::{Topology, TriMesh};
 use std::collections::HashSet;
 use std::path::Path;
@@ -232,11 +232,46 @@ fn thick_cloth_is_refused_kept_outside_and_written_with_its_thickness() {
 
         let again = thin.fitted.in_file_order(thin.fitted.garment.rest.positions());
         let moved = thin.fitted.report.contact.largest_move_mm;
-        for (p, q) in again.iter().zip(&positions) {
-            assert!(norm(sub(*p, *q)) < 1e-3 * (1.0 + 1.5 * moved), "{category}");
+        // Whichever side its faces look at, the inner sheet comes back inside.
+        let reversed: Vec<Vec<u32>> =
+            polygons.iter().map(|p| p.iter().rev().copied().collect::<Vec<u32>>()).collect();
+        let reversed = text(&cm_z(&positions), &reversed);
+        let turned = written(&reversed, &body, &FitSettings { keep: Keep::Outer, ..CM_Z }).fitted;
+        for again in [&again, &turned.in_file_order(turned.garment.rest.positions())] {
+            for (p, q) in again.iter().zip(&positions) {
+                assert!(norm(sub(*p, *q)) < 1e-3 * (1.0 + 1.5 * moved), "{category}");
+            }
         }
         let faces: Vec<[u32; 3]> = polygons.iter().flat_map(|p| crate::mesh::fan(p)).collect();
         let pairs = |positions: &[[f64; 3]]| self_triangle_pairs(positions, &faces).len();
         assert!(moved > 0.5 || pairs(&again) <= pairs(&positions), "{category}");
     }
+}
+
+#[test]
+fn a_lining_is_refused_however_its_faces_look() {
+    let body = mannequin();
+    let rest = generated(&body, Category::TShirt, 5, 500).rest;
+    let normals = vertex_normals(rest.positions(), rest.faces());
+    let lining = rest.positions().iter().zip(&normals).map(|(p, n)| add_scaled(*p, -0.004, *n));
+    let positions: Vec<[f64; 3]> = rest.positions().iter().copied().chain(lining).collect();
+    let count = rest.vertex_count() as u32;
+    let outer = rest.faces().iter().map(|f| f.to_vec());
+    let same = rest.faces().iter().map(|f| f.map(|v| v + count).to_vec());
+    let reversed = rest.faces().iter().map(|[a, b, c]| vec![a + count, c + count, b + count]);
+    let facing = rest.faces().iter().map(|[a, b, c]| vec![*a, *c, *b]);
+    {
+        let polygons: Vec<Vec<u32>> = outer.chain(same.clone()).collect();
+        let file = parse_mesh(text(&cm_z(&positions), &polygons).as_bytes(), Path::new("lined.obj")).unwrap();
+        let refused = fit(&file, &body, &CM_Z).unwrap_err();
+        assert!(refused.to_string().contains("--keep largest"), "{refused}");
+        let one = fit(&file, &body, &FitSettings { keep: Keep::Largest, ..CM_Z }).unwrap();
+        assert_eq!(one.garment.rest.face_count(), rest.face_count());
+    }
+    let polygons: Vec<Vec<u32>> = facing.chain(same).collect();
+    let file = parse_mesh(text(&cm_z(&positions), &polygons).as_bytes(), Path::new("facing.obj")).unwrap();
+    assert!(fit(&file, &body, &CM_Z).is_err(), "sheets that face each other");
+    let polygons: Vec<Vec<u32>> = rest.faces().iter().map(|f| f.to_vec()).chain(reversed).collect();
+    let file = parse_mesh(text(&cm_z(&positions), &polygons).as_bytes(), Path::new("away.obj")).unwrap();
+    assert!(fit(&file, &body, &CM_Z).is_err(), "sheets that face away");
 }

@@ -59,14 +59,10 @@ impl BodyMeasures {
                 "vertex {vertex} is more than {FARTHEST} m from its pelvis; is it in metres?"
             )));
         }
-        let joint = &body.joint_template;
-        let upright = joint[12][1] > joint[0][1] + 0.2 && joint[4][1] < joint[1][1] - 0.15;
-        let spread = joint[20][0] > joint[16][0] + 0.2 && joint[21][0] < joint[17][0] - 0.2;
-        if !upright || !spread {
-            return Err(unsuitable(
-                "its joints are not in a T-pose in metres with y up and the left arm along +x".to_string(),
-            ));
+        if let Some(reason) = body.implausibility() {
+            return Err(unsuitable(reason));
         }
+        let joint = &body.joint_template;
         let owner = dominant_joints(body);
         let points = |joints: &[usize]| -> Vec<[f64; 3]> {
             body.template.iter().zip(&owner).filter(|(_, j)| joints.contains(j)).map(|(p, _)| *p).collect()

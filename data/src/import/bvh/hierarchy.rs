@@ -39,6 +39,9 @@ pub struct Bvh {
     values: Vec<f64>,
 }
 
+/// No motion has longer frames (s): more is a rate.
+const LONGEST_FRAME: f64 = 2.0;
+
 /// Deeper trees than any skeleton are damage.
 const DEEPEST_TREE: usize = 256;
 
@@ -115,7 +118,7 @@ impl Bvh {
         Self::parse(&String::from_utf8_lossy(&bytes), path)
     }
 
-    /// Parses BVH text; `path` is for messages only. A last frame that is not whole is dropped.
+    /// Parses BVH text; `path` is for messages only.
     ///
     /// # Errors
     /// [`FileError`] naming file and line.
@@ -131,8 +134,7 @@ impl Bvh {
         read_joint(&mut words, &mut joints, None, 0)?;
         words.expect("MOTION")?;
         words.expect("Frames:")?;
-        // Real files are off by one: the frames that are there count.
-        words.number("the number of frames")?;
+        let announced = words.number("the number of frames")?;
         words.expect("Frame")?;
         words.expect("Time:")?;
         let frame_time = words.number("the frame time")?;
@@ -141,14 +143,35 @@ impl Bvh {
         }
         check_frame_rate(1.0 / frame_time)
             .map_err(|defect| words.error(format!("a frame time of {frame_time:?} s means {defect}")))?;
+        if frame_time > LONGEST_FRAME {
+            return Err(words.error(format!(
+                "a frame time of {frame_time:?}: it is in seconds, {:?} for {frame_time:?} frames per second",
+                1.0 / frame_time
+            )));
+        }
         let channel_count: usize = joints.iter().map(|j: &BvhJoint| j.channels.len()).sum();
-        let mut values = read_values(&mut words, &joints)?;
+        let values = read_values(&mut words, &joints)?;
         if channel_count == 0 || values.len() < channel_count {
             return Err(
                 words.error(format!("no whole frame: {} values for {channel_count} channels", values.len()))
             );
         }
-        values.truncate(values.len() / channel_count * channel_count);
+        let (frames, rest) = (values.len() / channel_count, values.len() % channel_count);
+        if rest > 0 {
+            return Err(words.error(format!(
+                "frame {frames} has {rest} of {channel_count} values; the header announces {announced} frames: is the file truncated?"
+            )));
+        }
+        // Real files are off by one: the frames that are there count.
+        if (frames as f64) < announced - 1.0 {
+            return Err(words.error(format!(
+                "the file ends after frame {}; the header announces {announced} frames: is the file truncated?",
+                frames - 1
+            )));
+        }
+        if joints.len() > 1 && joints[1..].iter().all(|joint| joint.offset == [0.0; 3]) {
+            return Err(words.error("every OFFSET is 0: the skeleton has no bones".into()));
+        }
         Ok(Self { joints, frame_time, channel_count, values })
     }
 
@@ -302,6 +325,10 @@ pub(crate) mod tests {
             (SMALL.replace("Frame Time: 0.0083333", "Frame Time: 0"), 18, "not positive"),
             (SMALL.replace("Frame Time: 0.0083333", "Frame Time: 1e-320"), 18, "expected 0.01 to 10000"),
             (SMALL.replace("Frame Time: 0.0083333", "Frame Time: 1e300"), 18, "expected 0.01 to 10000"),
+            (SMALL.replace("Frame Time: 0.0083333", "Frame Time: 120"), 18, "for 120.0 frames per second"),
+            (SMALL.replace("0 90 0 0 0 0\n", "0 90\n"), 20, "frame 1 has 5 of 9 values"),
+            (SMALL.replace("Frames: 1", "Frames: 40"), 20, "the header announces 40 frames"),
+            (SMALL.replace("OFFSET 0 2 0", "OFFSET 0 0 0"), 20, "every OFFSET is 0"),
             (SMALL.replace("90 0 0 0 90 0", "90 0 0 0 nan 0"), 19, "'nan'"),
             (SMALL.replace("90 0 0 0 90 0", "90 0 0 0 9e20 0"), 19, "joint 'Chest' turns by"),
             (SMALL.split("MOTION").next().unwrap().into(), 15, "the file ends"),

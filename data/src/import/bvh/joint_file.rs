@@ -12,6 +12,7 @@ use crate::format::FileError;
 use crate::import::retarget::JointMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use toml::de::DeTable;
 
 /// A file of joint names.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,15 +29,13 @@ impl JointFile {
     /// [`FileError`] naming file, line and key.
     pub fn load(path: &Path) -> Result<Self, FileError> {
         let text = fs::read_to_string(path).map_err(FileError::io(path))?;
-        let table: toml::Table =
-            text.parse().map_err(|e: toml::de::Error| FileError::content(path)(e.to_string().trim_end()))?;
-        let line_of = |key: &str| {
-            let is_key = |line: &str| line.trim_start_matches([' ', '\t', '"', '\'']).starts_with(key);
-            text.lines().position(is_key).map_or(1, |n| n + 1)
-        };
+        let table = DeTable::parse(&text).map_err(|e| FileError::content(path)(e.to_string().trim_end()))?;
+        let mut keys: Vec<_> = table.get_ref().iter().collect();
+        keys.sort_by_key(|(key, _)| key.span().start);
         let mut entries: Vec<(usize, String, usize)> = Vec::new();
-        for (key, value) in &table {
-            let line = line_of(key);
+        for (key, value) in keys {
+            let line = 1 + text[..key.span().start].matches('\n').count();
+            let key: &str = key.get_ref();
             let wrong = FileError::line(path, line);
             let joint = joint_index(key).ok_or_else(|| {
                 wrong(format!(
@@ -45,7 +44,8 @@ impl JointFile {
                     BODY_JOINT_NAMES.join(", ")
                 ))
             })?;
-            let name = value.as_str().ok_or_else(|| {
+            let name = value.get_ref().as_str().ok_or_else(|| {
+                let value = &text[value.span()];
                 wrong(format!(
                     "'{key}' is {value}, expected the name of a joint, for example {key} = \"Hips\""
                 ))
@@ -138,6 +138,7 @@ mod tests {
                 "pelvis = \"Hips\"\nleft_hipp = \"A\"\n",
                 &["map.toml:2: 'left_hipp'", "nearest are left_hip"][..],
             ),
+            ("left_hip = \"A\"\nleft_hip_ = \"B\"\n", &["map.toml:2: 'left_hip_'"]),
             ("pelvis = 3\n", &["map.toml:1: 'pelvis' is 3"]),
             ("left_hip = \"A\"\nright_hip = \"A\"\n", &["map.toml:2:", "'A' is named for left_hip"]),
             ("pelvis = ", &["map.toml: ", "line 1"]),

@@ -114,7 +114,7 @@ impl Rig<'_> {
         };
         let mut best = Assignment::default();
         for end in (0..self.meanings.len()).filter(|joint| !slots(*joint).is_empty()) {
-            let found = assign(&candidates(end), 0, deeper);
+            let found = assign(&candidates(end), deeper);
             if found.score() > best.score() {
                 best = found;
             }
@@ -136,20 +136,25 @@ impl Assignment {
     }
 }
 
-/// The best assignment of `candidates`, trunk first, to the slots from `first` on, in order.
-fn assign(candidates: &[(usize, Vec<usize>)], first: usize, deeper: bool) -> Assignment {
-    let Some(((joint, slots), rest)) = candidates.split_first() else { return Assignment::default() };
-    let mut best = assign(rest, first, deeper);
-    for (rank, slot) in slots.iter().enumerate().filter(|(_, slot)| **slot >= first) {
-        let mut taken = assign(rest, slot + 1, deeper);
-        taken.joints[*slot] = Some(*joint);
-        taken.likeliest += usize::from(rank == 0);
-        let prefers_deeper = deeper && *slot == 0;
-        if taken.score() > best.score() || (taken.score() == best.score() && !prefers_deeper) {
-            best = taken;
+/// The best assignment of `candidates`, trunk first, to the four slots in order.
+fn assign(candidates: &[(usize, Vec<usize>)], deeper: bool) -> Assignment {
+    // The best of the candidates looked at so far, from the end of the limb on, by the first slot that may be taken.
+    let mut best = [Assignment::default(); 5];
+    for (joint, slots) in candidates.iter().rev() {
+        let beyond = best;
+        for (first, best) in best.iter_mut().enumerate() {
+            for (rank, slot) in slots.iter().enumerate().filter(|(_, slot)| **slot >= first) {
+                let mut taken = beyond[slot + 1];
+                taken.joints[*slot] = Some(*joint);
+                taken.likeliest += usize::from(rank == 0);
+                let prefers_deeper = deeper && *slot == 0;
+                if taken.score() > best.score() || (taken.score() == best.score() && !prefers_deeper) {
+                    *best = taken;
+                }
+            }
         }
     }
-    best
+    best[0]
 }
 
 /// Three spine joints among those of a rig: evenly along the chain, the last one where the arms hang.

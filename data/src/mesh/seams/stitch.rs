@@ -151,7 +151,11 @@ impl Plan {
             positions[*root as usize] = mean(pulls);
         }
         let mut split_edges: HashMap<u32, Vec<u32>> = HashMap::new();
-        for (number, splits) in &mut self.splits {
+        // In a fixed order: a face may have several.
+        let mut numbers: Vec<u32> = self.splits.keys().copied().collect();
+        numbers.sort_unstable();
+        for number in &numbers {
+            let Some(splits) = self.splits.get_mut(number) else { continue };
             splits.sort_by(|a, b| a.0.total_cmp(&b.0));
             split_edges.entry(borders.edges[*number as usize].face).or_default().push(*number);
         }

@@ -6,11 +6,11 @@ mod labels;
 use crate::mesh::clean::diagonal;
 use clothcombo_physics::mesh::DisjointSets;
 use clothcombo_physics::query::ClosestPoint;
-use clothcombo_physics::vec3::norm;
+use clothcombo_physics::vec3::{norm, sub};
 use facing::{Opposite, centre_and_normal, opposite};
 use labels::{OUTER, label};
 use rayon::prelude::*;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 /// Cloth is thinner than this share of the diagonal: 25 mm for a garment of a metre.
 const MOST_SHARE: f64 = 0.025;
@@ -20,6 +20,8 @@ const SAMPLES: usize = 400;
 const THICK_SHARE: f64 = 0.7;
 /// A surface is nearly closed if its border is shorter than this many times the root of its area.
 const NEARLY_CLOSED: f64 = 0.2;
+/// A piece with a larger share of the area is no button or pocket.
+const LARGE_PIECE: f64 = 0.1;
 /// Thickness varies up to this many times the median.
 const VARIATION: f64 = 3.0;
 /// Pieces of the outer sheet with a smaller share of its area are bits of rims.
@@ -63,6 +65,50 @@ pub fn thickness(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Option<f64> {
     distances.get(distances.len() / 2).copied()
 }
 
+/// The median distance if `faces` are several pieces that lie in each other, however their faces look (in the unit of the
+/// positions): most of the area has another large piece next to it.
+pub fn sheets(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> Option<f64> {
+    let limit = MOST_SHARE * diagonal(positions);
+    let mut pieces = DisjointSets::new(positions.len());
+    faces.iter().for_each(|f| {
+        pieces.join(f[0], f[1]);
+        pieces.join(f[0], f[2]);
+    });
+    let area = |f: &[u32; 3]| norm(centre_and_normal(positions, *f).1);
+    let mut of_piece: BTreeMap<u32, (f64, Vec<[u32; 3]>)> = BTreeMap::new();
+    for f in faces {
+        let (total, list) = of_piece.entry(pieces.root(f[0])).or_default();
+        *total += area(f);
+        list.push(*f);
+    }
+    let all: f64 = of_piece.values().map(|(area, _)| area).sum();
+    let large: Vec<Vec<[u32; 3]>> =
+        of_piece.into_values().filter(|(area, _)| *area > LARGE_PIECE * all).map(|(_, list)| list).collect();
+    if large.len() < 2 || !(limit > 0.0 && limit.is_finite()) {
+        return None;
+    }
+    let surfaces: Vec<ClosestPoint> =
+        large.iter().map(|list| ClosestPoint::new(positions.to_vec(), list)).collect();
+    let (mut near, mut sampled, mut distances) = (0.0, 0.0, Vec::new());
+    for (own, list) in large.iter().enumerate() {
+        for f in list.iter().step_by((faces.len() / SAMPLES).max(1)) {
+            let centre = centre_and_normal(positions, *f).0;
+            let others = surfaces.iter().enumerate().filter(|(other, _)| *other != own);
+            let distance = others
+                .filter_map(|(_, s)| s.project_within(centre, limit))
+                .map(|p| p.distance_squared.sqrt())
+                .fold(f64::MAX, f64::min);
+            sampled += area(f);
+            if distance < limit {
+                near += area(f);
+                distances.push(distance);
+            }
+        }
+    }
+    distances.sort_by(f64::total_cmp);
+    distances.get(distances.len() / 2).copied().filter(|_| near >= THICK_SHARE * sampled)
+}
+
 /// Length of the border over the root of the area.
 fn border_share(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> f64 {
     let mut uses: HashMap<[u32; 2], u32> = HashMap::with_capacity(2 * faces.len());
@@ -71,9 +117,7 @@ fn border_share(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> f64 {
             *uses.entry([*a.min(b), *a.max(b)]).or_default() += 1;
         }
     }
-    let length = |[a, b]: &[u32; 2]| {
-        norm(clothcombo_physics::vec3::sub(positions[*a as usize], positions[*b as usize]))
-    };
+    let length = |[a, b]: &[u32; 2]| norm(sub(positions[*a as usize], positions[*b as usize]));
     let border: f64 = uses.iter().filter(|(_, n)| **n == 1).map(|(edge, _)| length(edge)).sum();
     let area: f64 = faces.iter().map(|f| 0.5 * norm(centre_and_normal(positions, *f).1)).sum();
     border / area.sqrt()

@@ -16,7 +16,6 @@ use crate::inference::output::{Show, Staged, write};
 use crate::inference::{Drape, DrapeProgress, Draper, DraperSettings, Moment, Outfit, Report, smooth};
 use crate::system::files::write_json;
 use clap::{ArgGroup, Parser, ValueEnum};
-use clothcombo_data::check::impossible_turn;
 use clothcombo_data::fit::FitSettings;
 use folders::{check_cache, user_cache};
 use indicatif::ProgressBar;
@@ -26,7 +25,7 @@ use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-use warnings::{log_repairs, warn_about_order, warn_about_shape};
+use warnings::{check_poses, log_repairs, warn_about_order, warn_about_shape};
 
 /// Drapes garments on a body, innermost first: OBJ, GLB, picture, viewer and a report with a certificate
 #[derive(Parser)]
@@ -194,9 +193,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         // The frames of a motion are alike in what may be wrong with them.
         scenes.states.first().map_or(Ok(()), |state| draper.check_body(state))?;
         warn_about_shape(&scenes.body.shape, draper.trained().config.data.shape_range);
-        if let Some(turn) = impossible_turn(scenes.states.iter().map(|state| &state.pose)) {
-            tracing::warn!("{}: {turn}", scenes.body.pose);
-        }
+        check_poses(&scenes)?;
         Ok((sources, scenes))
     };
     let read = |job| read(job).map_err(|failure| blame(job, failure));

@@ -1,7 +1,10 @@
 //! Warnings about inputs that can be draped.
 
+use super::job::Scenes;
 use crate::inference::GivenGarment;
-use clothcombo_data::asset::{Garment, infeasible_pair};
+use clothcombo_data::asset::{Garment, Pose, infeasible_pair};
+use clothcombo_data::check::{impossible_turn, not_radians, not_upright};
+use miette::{Report as Failure, miette};
 
 pub(super) fn warn_about_shape(shape: &[f64], [low, high]: [f64; 2]) {
     if let Some(value) = shape.iter().find(|value| !(low..=high).contains(*value)) {
@@ -27,7 +30,29 @@ pub(super) fn log_repairs(source: &GivenGarment) {
     for repair in &fit.repairs {
         tracing::info!("{name} repaired: {} ({})", repair.kind.text(), repair.count);
     }
+    for doubt in &fit.doubts {
+        tracing::warn!("{name}: {doubt}");
+    }
     if let Some(misfit) = fit.misfit() {
         tracing::warn!("{name} does not fit this body: {misfit} Look at the picture.");
     }
+}
+
+/// Warns about poses that no person takes.
+///
+/// # Errors
+/// If their angles cannot be in radians.
+pub(super) fn check_poses(scenes: &Scenes) -> Result<(), Failure> {
+    let poses: Vec<Pose> = scenes.states.iter().map(|state| state.pose.clone()).collect();
+    if let Some(why) = not_radians(&poses) {
+        return Err(miette!(
+            help = "convert them to radians; `clothcombo check` looks at motion files",
+            "{}: {why}",
+            scenes.body.pose
+        ));
+    }
+    for warning in [impossible_turn(&poses), not_upright(&poses)].into_iter().flatten() {
+        tracing::warn!("{}: {warning}", scenes.body.pose);
+    }
+    Ok(())
 }

@@ -107,14 +107,21 @@ pub(super) fn save(
     bytes.extend_from_slice(&moved.obj);
     if let Some(mtl) = &moved.mtl {
         let materials = output.with_file_name(format!("{name}.mtl"));
-        check_materials(&materials, &moved.libraries)?;
+        check_materials(&materials, output, &moved.libraries)?;
         atomic::write(&materials, mtl).map_err(FileError::io(&materials)).into_diagnostic()?;
     }
     atomic::write(output, &bytes).map_err(FileError::io(output)).into_diagnostic()
 }
 
-/// Refuses materials that would be written over those of the garment.
-fn check_materials(materials: &Path, libraries: &[PathBuf]) -> Result<(), Report> {
+/// Refuses materials that would be written over those of the garment, or over some that belong to no garment written here before.
+fn check_materials(materials: &Path, output: &Path, libraries: &[PathBuf]) -> Result<(), Report> {
+    if materials.exists() && !output.exists() {
+        return Err(miette!(
+            help = "give -o another name or folder, or move that file",
+            "{} is there already, and would be written over by the garment's materials",
+            materials.display()
+        ));
+    }
     let place = fs::canonicalize(materials).ok();
     match place.is_some() && libraries.iter().any(|library| fs::canonicalize(library).ok() == place) {
         true => Err(miette!(

@@ -26,6 +26,15 @@ pub enum RunDirError {
         /// The folder.
         path: PathBuf,
     },
+    /// The folder holds other things.
+    #[error("{} is no run folder and not empty: it holds {}", path.display(), entry.display())]
+    #[diagnostic(help("choose a new folder with --run-dir"))]
+    Foreign {
+        /// The folder.
+        path: PathBuf,
+        /// Something in it.
+        entry: PathBuf,
+    },
     /// There is nothing to resume.
     #[error("{} holds no run to resume", path.display())]
     #[diagnostic(help("start one without --resume"))]
