@@ -4,6 +4,7 @@
 
 mod anatomy;
 mod arm_pose;
+mod as_given;
 mod body_field;
 mod category;
 mod climb;

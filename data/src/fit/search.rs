@@ -8,19 +8,18 @@ use super::climb::{Moves, Steps, climbed};
 use super::cloth::Cloth;
 use super::coverage::off_trunk;
 use super::error::FitError;
-use super::judge::{Candidate, Judge, UNWORN};
+use super::judge::{Candidate, Judge};
 use super::placement::{Origin, Placement, Unit, UpAxis};
 use super::settings::FitSettings;
 use super::sitting::Sitting;
-use super::verdict::implausibility;
 use crate::asset::Body;
-use crate::mesh::{bounds, outwardness};
+use crate::mesh::bounds;
 use clothcombo_physics::query::Surface;
 use clothcombo_physics::vec3::add;
 use rayon::prelude::*;
 
 /// Arm angles tried first (degrees).
-const ARM_ANGLES: [f64; 6] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0];
+pub(super) const ARM_ANGLES: [f64; 6] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0];
 /// Heights tried first (m apart), and places in front of and behind the middle (m).
 const HEIGHT_STEP: f64 = 0.04;
 const FORWARD: [f64; 3] = [0.0, 0.05, -0.05];
@@ -34,8 +33,6 @@ const FROM_RIMS: usize = 6;
 const CLIMBED: usize = 10;
 /// Candidates that are judged by everything.
 const JUDGED: usize = 12;
-/// Least share of a sheet's area that faces one way.
-const SHEET: f64 = 0.5;
 /// How far up and down the height of a placement is doubted (m): a garment is back within 2 cm.
 const PROBE: f64 = 0.025;
 /// Candidates in A-pose worth a body of their own.
@@ -43,7 +40,7 @@ const POSED: usize = 2;
 
 /// What is measured on a body once, for all garments.
 pub(super) struct SearchBody {
-    field: BodyField,
+    pub(super) field: BodyField,
     skeleton: Skeleton,
     surface: Surface<f64>,
     /// Largest extent of the body (m).
@@ -67,8 +64,8 @@ impl SearchBody {
 
 /// A search on one body.
 pub(super) struct Search<'a> {
-    body: &'a Body,
-    measured: &'a SearchBody,
+    pub(super) body: &'a Body,
+    pub(super) measured: &'a SearchBody,
 }
 
 impl<'a> Search<'a> {
@@ -107,13 +104,6 @@ impl<'a> Search<'a> {
     /// Where a garment lies that covers neither trunk nor hips.
     pub fn off_trunk(&self, cloth: &Cloth, placement: &Placement) -> Option<&'static str> {
         off_trunk(&placement.apply(&cloth.fine.0), self.body)
-    }
-
-    /// How a garment sits that is in metres, T-pose and the body's frame, and its score; or why nobody wears it there.
-    pub fn believed_as_given(&self, cloth: &Cloth, settings: &FitSettings) -> Result<(Sitting, f64), String> {
-        let candidate = self.judged_as_given(&self.judge(cloth, settings), Placement::AS_GIVEN);
-        let (sitting, height) = self.measured(cloth, &Placement::AS_GIVEN);
-        implausibility(&candidate, &sitting, height).map_or(Ok((sitting, candidate.score)), Err)
     }
 
     /// The surface of the zero body in T-pose.
@@ -237,41 +227,6 @@ impl<'a> Search<'a> {
         all
     }
 
-    /// Files as they stand: their origin at one of the usual points, or where it is said to be; arms level, and where the
-    /// garment fits arms that hang better.
-    fn usual(&self, bases: &[Placement], judge: &Judge) -> Vec<Placement> {
-        let floor = self.measured.field.low[1];
-        let places = match judge.settings.offset {
-            Some(offset) => vec![(Origin::Elsewhere, offset)],
-            None => vec![(Origin::Pelvis, [0.0; 3]), (Origin::Floor, [0.0, floor, 0.0])],
-        };
-        let lowered = judge.settings.arms_lowered;
-        let at = |base: &Placement| -> Vec<Placement> {
-            let stands = places.iter().map(|(origin, translation)| Placement {
-                origin: *origin,
-                translation: *translation,
-                ..*base
-            });
-            let level = stands.clone().filter(|_| lowered != Some(true));
-            let hanging = stands.filter(|_| lowered != Some(false)).filter_map(|p| self.with_arms(p, judge));
-            level.chain(hanging).collect()
-        };
-        bases.par_iter().flat_map_iter(at).collect()
-    }
-
-    /// The same with arms at the angle that fits best, if a garment that lies there has sleeves or armholes.
-    fn with_arms(&self, placement: Placement, judge: &Judge) -> Option<Placement> {
-        let turned = judge.turned(&placement, None, false);
-        let scored = |degrees: &f64| {
-            judge.scored(Placement { arm_angle_degrees: *degrees, ..placement }, &turned, true, None)
-        };
-        let angles = ARM_ANGLES.iter().filter(|degrees| **degrees != 0.0).map(scored);
-        let best = angles.max_by(|a, b| a.score.total_cmp(&b.score))?;
-        let steps = Steps { from: 0.06, to: 0.004, is_sharp: true, is_fine: false, moves: Moves::Arms };
-        let climbed = judge.with_openings(climbed(judge, &best, &steps));
-        climbed.is_worn.then_some(climbed.placement)
-    }
-
     /// The best placement around a candidate, and how much worse (log-posterior) the better one of those a probe's height above
     /// and below it is, when everything but the height is found anew.
     pub fn probed(&self, cloth: &Cloth, settings: &FitSettings, candidate: Candidate) -> (Candidate, f64) {
@@ -294,31 +249,6 @@ impl<'a> Search<'a> {
         let found = around(&start, Moves::All);
         let best = if found.score > start.score { found } else { start };
         (best, best.score - around(&best, Moves::Level).score)
-    }
-
-    /// A file as it stands counts as worn if it lies around the trunk, however its borders run.
-    pub fn judged_as_given(&self, judge: &Judge, placement: Placement) -> Candidate {
-        let candidate = judge.judged(placement);
-        match candidate.is_worn || !self.is_sheet_around(judge.cloth, &placement) {
-            true => candidate,
-            false => Candidate { score: candidate.score + UNWORN, is_worn: true, ..candidate },
-        }
-    }
-
-    /// Whether cloth lies snugly around the trunk with one of its sides outwards; half of a rope's surface faces the body.
-    fn is_sheet_around(&self, cloth: &Cloth, placement: &Placement) -> bool {
-        if !self.measured(cloth, placement).0.is_snug() {
-            return false;
-        }
-        let placed = placement.apply(cloth.positions);
-        let (mut net, mut total) = (vec![0.0; cloth.positions.len()], 0.0);
-        for (face, (cosine, area)) in
-            cloth.faces.iter().zip(outwardness(&placed, cloth.faces, &self.measured.surface))
-        {
-            net[cloth.piece_of_vertex(face[0]) as usize] += cosine * area;
-            total += area;
-        }
-        net.iter().map(|area: &f64| area.abs()).sum::<f64>() > SHEET * total
     }
 
     /// The best in A-pose, on a body posed like that: the shoulders of the search's body are rigid.

@@ -1,0 +1,84 @@
+//! Files as they stand: their origin lies at one of the usual points, or where it is said to be, and nothing is searched for.
+
+use super::climb::{Moves, Steps, climbed};
+use super::cloth::Cloth;
+use super::judge::{Candidate, Judge, UNWORN};
+use super::placement::{Origin, Placement};
+use super::search::{ARM_ANGLES, Search};
+use super::settings::FitSettings;
+use super::sitting::Sitting;
+use super::verdict::implausibility;
+use crate::mesh::outwardness;
+use rayon::prelude::*;
+
+/// Least share of a sheet's area that faces one way.
+const SHEET: f64 = 0.5;
+
+impl Search<'_> {
+    /// How a garment sits that is in metres, T-pose and the body's frame, and its score; or why nobody wears it there.
+    pub fn believed_as_given(&self, cloth: &Cloth, settings: &FitSettings) -> Result<(Sitting, f64), String> {
+        let candidate = self.judged_as_given(&self.judge(cloth, settings), Placement::AS_GIVEN);
+        let (sitting, height) = self.measured(cloth, &Placement::AS_GIVEN);
+        implausibility(&candidate, &sitting, height).map_or(Ok((sitting, candidate.score)), Err)
+    }
+
+    /// Files as they stand: their origin at one of the usual points, or where it is said to be; arms level, and where the
+    /// garment fits arms that hang better.
+    pub fn usual(&self, bases: &[Placement], judge: &Judge) -> Vec<Placement> {
+        let floor = self.measured.field.low[1];
+        let places = match judge.settings.offset {
+            Some(offset) => vec![(Origin::Elsewhere, offset)],
+            None => vec![(Origin::Pelvis, [0.0; 3]), (Origin::Floor, [0.0, floor, 0.0])],
+        };
+        let lowered = judge.settings.arms_lowered;
+        let at = |base: &Placement| -> Vec<Placement> {
+            let stands = places.iter().map(|(origin, translation)| Placement {
+                origin: *origin,
+                translation: *translation,
+                ..*base
+            });
+            let level = stands.clone().filter(|_| lowered != Some(true));
+            let hanging = stands.filter(|_| lowered != Some(false)).filter_map(|p| self.with_arms(p, judge));
+            level.chain(hanging).collect()
+        };
+        bases.par_iter().flat_map_iter(at).collect()
+    }
+
+    /// The same with arms at the angle that fits best, if a garment that lies there has sleeves or armholes.
+    fn with_arms(&self, placement: Placement, judge: &Judge) -> Option<Placement> {
+        let turned = judge.turned(&placement, None, false);
+        let scored = |degrees: &f64| {
+            judge.scored(Placement { arm_angle_degrees: *degrees, ..placement }, &turned, true, None)
+        };
+        let angles = ARM_ANGLES.iter().filter(|degrees| **degrees != 0.0).map(scored);
+        let best = angles.max_by(|a, b| a.score.total_cmp(&b.score))?;
+        let steps = Steps { from: 0.06, to: 0.004, is_sharp: true, is_fine: false, moves: Moves::Arms };
+        let climbed = judge.with_openings(climbed(judge, &best, &steps));
+        climbed.is_worn.then_some(climbed.placement)
+    }
+
+    /// A file as it stands counts as worn if it lies around the trunk, however its borders run.
+    pub fn judged_as_given(&self, judge: &Judge, placement: Placement) -> Candidate {
+        let candidate = judge.judged(placement);
+        match candidate.is_worn || !self.is_sheet_around(judge.cloth, &placement) {
+            true => candidate,
+            false => Candidate { score: candidate.score + UNWORN, is_worn: true, ..candidate },
+        }
+    }
+
+    /// Whether cloth lies snugly around the trunk with one of its sides outwards; half of a rope's surface faces the body.
+    fn is_sheet_around(&self, cloth: &Cloth, placement: &Placement) -> bool {
+        if !self.measured(cloth, placement).0.is_snug() {
+            return false;
+        }
+        let placed = placement.apply(cloth.positions);
+        let (mut net, mut total) = (vec![0.0; cloth.positions.len()], 0.0);
+        for (face, (cosine, area)) in
+            cloth.faces.iter().zip(outwardness(&placed, cloth.faces, self.surface()))
+        {
+            net[cloth.piece_of_vertex(face[0]) as usize] += cosine * area;
+            total += area;
+        }
+        net.iter().map(|area: &f64| area.abs()).sum::<f64>() > SHEET * total
+    }
+}
