@@ -325,7 +325,7 @@ pub(crate) mod tests {
             (SMALL.replace("Frame Time: 0.0083333", "Frame Time: 0"), 18, "not positive"),
             (SMALL.replace("Frame Time: 0.0083333", "Frame Time: 1e-320"), 18, "expected 0.01 to 10000"),
             (SMALL.replace("Frame Time: 0.0083333", "Frame Time: 1e300"), 18, "expected 0.01 to 10000"),
-            (SMALL.replace("Frame Time: 0.0083333", "Frame Time: 120"), 18, "for 120.0 frames per second"),
+            (SMALL.replace("Frame Time: 0.0083333", "Frame Time: 30"), 18, "for 30.0 frames per second"),
             (SMALL.replace("0 90 0 0 0 0\n", "0 90\n"), 20, "frame 1 has 5 of 9 values"),
             (SMALL.replace("Frames: 1", "Frames: 40"), 20, "the header announces 40 frames"),
             (SMALL.replace("OFFSET 0 2 0", "OFFSET 0 0 0"), 20, "every OFFSET is 0"),
