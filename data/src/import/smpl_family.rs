@@ -82,9 +82,6 @@ pub fn import_smpl_family(
     refuse_overwriting([input], [out])?;
     progress("reading the model", 0, 2);
     let (body, was_inside_out) = Body::load_turned(input, settings)?;
-    if let Some(reason) = body.implausibility() {
-        return Err(FileError::content(input)(reason).into());
-    }
     let mut file = NpzFile::open(input)?;
     let model = MODELS.iter().find(|m| (m.vertices, m.joints) == (body.vertex_count(), body.joint_count()));
     let provenance = provenance(&mut file, model, input);
@@ -133,6 +130,9 @@ pub fn import_smpl_family(
     }
     if was_inside_out {
         summary.notes.push(INSIDE_OUT.into());
+    }
+    if let Some(reason) = body.implausibility() {
+        summary.notes.push(format!("no garment can be fitted to it, and training refuses it: {reason}"));
     }
     summary.notes.push(format!(
         "the pelvis joint was moved to the origin for every shape{}; hands rest flat",
