@@ -12,6 +12,7 @@ mod activation;
 mod adam;
 mod blend;
 mod composed;
+mod diffusion_mlp;
 #[cfg(feature = "flex")]
 mod gemm;
 #[cfg(feature = "gpu")]
@@ -19,23 +20,29 @@ mod gpu;
 mod gradient_features;
 mod host;
 mod math;
+mod modulated_siren;
 mod norm;
 mod operation;
 mod product;
+mod row_blocks;
 mod sine_modulation;
 mod skin_correction;
 mod split_columns;
 mod tensors;
 #[cfg(test)]
 mod tests;
+mod tile;
 mod transform_points;
 
 pub use activation::{Activation, activate, activate_packed, activate_packed_sum, activate_residual};
 pub use adam::{AdamFactors, adam_step};
 pub use blend::blend;
+pub use diffusion_mlp::{DiffusionMlpArguments, diffusion_mlp};
 pub use gradient_features::gradient_features;
+pub use modulated_siren::{SirenArguments, modulated_siren};
 pub use norm::{scale_by, squared_norm};
 pub use product::{product, product_add};
+pub use row_blocks::runs_on_host;
 pub use sine_modulation::sine_modulation;
 pub use skin_correction::skin_correction;
 pub use split_columns::split_columns;
