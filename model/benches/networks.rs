@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use burn::module::Module;
 use burn::tensor::{Device, Distribution, Tensor};
-use clothcombo_model::ops::{Activation, activate_residual, sine_modulation};
+use clothcombo_model::ops::{Activation, activate_residual, product, sine_modulation};
 use clothcombo_model::{
     BodyTensors, ClothCombo, Dimensions, GarmentArrays, GarmentTensors, Mode, ModelConfig, OutfitTensors,
 };
@@ -141,6 +141,21 @@ fn operations(criterion: &mut Criterion) {
     }
 }
 
+/// Multiplications and additions per second are 2·2000·W² by the time.
+fn products(criterion: &mut Criterion) {
+    let device = device().inner();
+    for width in [64, 128, 512] {
+        let tensor =
+            |rows: usize| Tensor::<2>::random([rows, width], Distribution::Normal(0.0, 1.0), &device);
+        let (rows, weight) = (tensor(2_000), tensor(width));
+        let mut group = criterion.benchmark_group(format!("product 2000x{width}x{width}"));
+        group.sample_size(10).measurement_time(Duration::from_secs(1));
+        group.bench_function("ours", |bencher| bencher.iter(|| product(rows.clone(), weight.clone())));
+        group.bench_function("burn's", |bencher| bencher.iter(|| rows.clone().matmul(weight.clone())));
+        group.finish();
+    }
+}
+
 fn device() -> Device {
     #[cfg(feature = "flex")]
     let device = Device::flex();
@@ -152,6 +167,7 @@ fn device() -> Device {
 fn main() {
     let mut criterion = Criterion::default().configure_from_args();
     operations(&mut criterion);
+    products(&mut criterion);
     networks(&mut criterion, 1_100, &config(64, 48, 4));
     networks(&mut criterion, 2_000, &config(128, 64, 4));
     if std::env::var_os("CLOTHCOMBO_BENCH_PAPER").is_some() {

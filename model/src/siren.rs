@@ -17,7 +17,10 @@ use burn::tensor::Tensor;
 use crate::config::ModelConfig;
 use crate::initializer::{Initializer, fan_in_bound};
 use crate::linear::Linear;
-use crate::ops::{Activation, activate_packed, activate_packed_sum, product, sine_modulation, split_columns};
+use crate::ops::{
+    Activation, SirenArguments, activate_packed, activate_packed_sum, modulated_siren, product, runs_on_host,
+    sine_modulation, split_columns,
+};
 use crate::packing::Packing;
 
 /// Sizes and frequencies of a [`ModulatedSiren`].
@@ -95,10 +98,14 @@ impl Modulator {
         product(vertex, self.vertex.val())
     }
 
-    /// The gates m_0 … m_{L−1}, each `[N, width]`.
-    fn gates(&self, vertex_product: Tensor<2>, garment: Tensor<2>, packing: &Packing) -> Vec<Tensor<2>> {
+    /// The part of all gates that depends on the garments only: `[M, garment_latent]` → `[M, L·width]`.
+    fn rows(&self, garment: Tensor<2>) -> Tensor<2> {
+        product(garment, self.garment.val()) + self.bias.val().unsqueeze()
+    }
+
+    /// The gates m_0 … m_{L−1}, each `[N,width]`.
+    fn gates(&self, vertex_product: Tensor<2>, rows: Tensor<2>, packing: &Packing) -> Vec<Tensor<2>> {
         let layers = self.hidden.len() + 1;
-        let rows = product(garment, self.garment.val()) + self.bias.val().unsqueeze();
         let rows = split_columns(rows, self.width, layers);
         let products = split_columns(vertex_product, self.width, layers);
         let mut gates: Vec<Tensor<2>> = Vec::with_capacity(layers);
@@ -165,7 +172,46 @@ impl ModulatedSiren {
         garment: Tensor<2>,
         packing: &Packing,
     ) -> Tensor<2> {
-        let gates = self.modulator.gates(vertex_product, garment, packing);
+        let rows = self.modulator.rows(garment);
+        // A single layer has no weights between layers to hand over.
+        if self.sine.len() > 1 && runs_on_host(&coordinates) {
+            return self.fused(coordinates, vertex_product, rows, packing);
+        }
+        self.layer_by_layer(coordinates, vertex_product, rows, packing)
+    }
+
+    /// All layers as one operation of the host.
+    fn fused(
+        &self,
+        coordinates: Tensor<2>,
+        vertex_product: Tensor<2>,
+        rows: Tensor<2>,
+        packing: &Packing,
+    ) -> Tensor<2> {
+        let (first, hidden) = self.sine.split_first().expect("a sine layer");
+        let arguments = SirenArguments {
+            coordinates,
+            vertex_product,
+            rows,
+            gate_weights: Tensor::cat(self.modulator.hidden.iter().map(Param::val).collect(), 0),
+            first_weight: first.weight.val(),
+            sine_weights: Tensor::cat(hidden.iter().map(|layer| layer.weight.val()).collect(), 0),
+            sine_biases: Tensor::cat(self.sine.iter().map(Linear::bias_row).collect(), 1),
+            output_weight: self.output.weight.val(),
+            output_bias: self.output.bias_row(),
+        };
+        modulated_siren(arguments, self.omega_first, self.omega_hidden, packing)
+    }
+
+    /// Every layer as operations of its own: what GPUs run, and the oracle of the fused form.
+    fn layer_by_layer(
+        &self,
+        coordinates: Tensor<2>,
+        vertex_product: Tensor<2>,
+        rows: Tensor<2>,
+        packing: &Packing,
+    ) -> Tensor<2> {
+        let gates = self.modulator.gates(vertex_product, rows, packing);
         let mut features = coordinates;
         for (layer, (sine, gate)) in self.sine.iter().zip(gates).enumerate() {
             let omega = if layer == 0 { self.omega_first } else { self.omega_hidden };

@@ -6,7 +6,10 @@ use burn::tensor::Tensor;
 use super::{ComplexMixing, SpectralDiffusion};
 use crate::initializer::{Initializer, fan_in_bound};
 use crate::linear::Linear;
-use crate::ops::{Activation, activate, activate_residual, gradient_features, product, product_add};
+use crate::ops::{
+    Activation, DiffusionMlpArguments, activate, activate_residual, diffusion_mlp, gradient_features,
+    product, product_add, runs_on_host,
+};
 use crate::tensors::GarmentTensors;
 
 /// The block's MLP on [x, x_diff, gradient features]: two hidden ReLU layers and a linear output, all as wide as the block.
@@ -68,18 +71,68 @@ impl DiffusionBlock {
 
     /// `[V,C]` → `[V,C]`.
     pub fn forward(&self, features: Tensor<2>, garment: &GarmentTensors) -> Tensor<2> {
+        let fused = runs_on_host(&features);
+        self.forward_in_form(features, garment, fused)
+    }
+
+    /// All steps at the vertices as one operation of the host, or each as its own.
+    pub(super) fn forward_in_form(
+        &self,
+        features: Tensor<2>,
+        garment: &GarmentTensors,
+        fused: bool,
+    ) -> Tensor<2> {
         let coefficients = product(garment.projection.clone(), features.clone());
         let coefficients = self.diffusion.diffuse(coefficients, garment.decay.clone());
 
-        // c and its two mixtures, expanded to both gradient axes of all vertices by one product.
         let real = product(coefficients.clone(), self.mixing.real.val());
         let imaginary = product(coefficients.clone(), self.mixing.imaginary.val());
-        let mixed = Tensor::cat(vec![coefficients.clone(), real, imaginary], 1);
+        let diffused = product(coefficients.clone(), self.mlp.diffused.val());
+        let mixed = [coefficients, real, imaginary];
+        match fused {
+            true => self.fused(features, mixed, diffused, garment),
+            false => self.step_by_step(features, mixed, diffused, garment),
+        }
+    }
+
+    /// All that happens at the vertices as one operation of the host.
+    fn fused(
+        &self,
+        features: Tensor<2>,
+        coefficients: [Tensor<2>; 3],
+        diffused: Tensor<2>,
+        garment: &GarmentTensors,
+    ) -> Tensor<2> {
+        let mlp = &self.mlp;
+        let layer = |layer: &Linear| [layer.weight.val(), layer.bias_row()];
+        diffusion_mlp(DiffusionMlpArguments {
+            features,
+            gradient_basis: garment.gradient_basis.clone(),
+            basis: garment.basis.clone(),
+            coefficients,
+            diffused,
+            gradient_weight: mlp.gradient.val(),
+            input_weight: mlp.input.val(),
+            bias: mlp.bias.val().unsqueeze(),
+            hidden: layer(&mlp.hidden),
+            output: layer(&mlp.output),
+        })
+    }
+
+    /// Every step as an operation of its own: what GPUs run, and the oracle of the fused form.
+    fn step_by_step(
+        &self,
+        features: Tensor<2>,
+        coefficients: [Tensor<2>; 3],
+        diffused: Tensor<2>,
+        garment: &GarmentTensors,
+    ) -> Tensor<2> {
+        // c and its two mixtures, expanded to both gradient axes of all vertices by one product.
+        let mixed = Tensor::cat(coefficients.into(), 1);
         let gradient = gradient_features(product(garment.gradient_basis.clone(), mixed));
 
         // Three products into one matrix: the first layer on [x, x_diff, gradient features].
         let sum = product(gradient, self.mlp.gradient.val());
-        let diffused = product(coefficients, self.mlp.diffused.val());
         let sum = product_add(garment.basis.clone(), diffused, sum);
         let sum = product_add(features.clone(), self.mlp.input.val(), sum);
         let hidden = activate(Activation::Relu, sum, self.mlp.bias.val().unsqueeze());

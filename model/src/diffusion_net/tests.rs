@@ -28,6 +28,31 @@ fn fast_form_equals_the_published_one_in_values_and_gradients() {
     assert_gradients_close(&fast, &plain, 1e-5);
 }
 
+/// Several blocks of rows and parts of the sums; a width that no vector divides.
+#[test]
+fn the_fused_form_equals_the_steps_one_by_one_in_values_and_gradients_for_any_number_of_threads() {
+    let garment = HostGarment::random(1700, 20, &[true], 1).tensors(&device());
+    let net = net(38);
+    let run = |fused: bool| {
+        let start = net.first.forward(garment.rest.clone());
+        let block = |features, block: &DiffusionBlock| block.forward_in_form(features, &garment, fused);
+        let output = net.last.forward(net.blocks.iter().fold(start, block));
+        (output.clone().inner(), parameter_gradients(&net, loss(output)))
+    };
+    let on_threads = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let (output, gradients) = pool.install(|| run(true));
+        (values(&output), gradients)
+    };
+    let (fused, plain) = (run(true), run(false));
+    assert_close(&fused.0, &plain.0, 1e-5);
+    assert_gradients_close(&fused.1, &plain.1, 1e-5);
+    let one = on_threads(1);
+    for threads in [2, 4] {
+        assert!(one == on_threads(threads), "{threads} threads");
+    }
+}
+
 #[test]
 fn features_follow_a_permutation_of_the_vertices() {
     let host = HostGarment::random(90, 10, &[true], 2);

@@ -1,37 +1,22 @@
-//! Matrix products in host memory: crate `gemm` on memory that is not zeroed first, partitioned among threads by the shape of
-//! the product. `gemm` itself splits large results into blocks, which is right for square matrices; ours are tall (a row a
-//! vertex) or small results of long sums (gradients of weights).
+//! Matrix products in host memory, written into memory that is not zeroed first and partitioned among threads by their shape:
+//! tall ones (a row a vertex) by rows, small results of long sums (gradients of weights) by columns.
 
 use std::mem::MaybeUninit;
 
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Flex, TensorMetadata};
-use gemm::Parallelism;
 use rayon::prelude::*;
+
+use super::tile::{OutputBlock, Panels, StridedMatrix};
 
 /// Multiplications and additions below which a second thread costs more than it saves.
 const PARALLEL_FROM: usize = 192 * 192 * 192;
-/// Results with more columns are partitioned by `gemm` itself, by blocks; narrower ones better by whole rows.
-const NARROW: usize = 256;
-/// Rows that are worth packing the right matrix once more.
-const ROWS_PER_PART: usize = 384;
-/// A product of this many terms an element is added up in parts, where the result is small. The parts depend on the
-/// sizes alone, so that the number of threads does not change the sums.
-const TERMS_PER_PART: usize = 512;
-/// Parts of a sum at most.
-const MAX_TERM_PARTS: usize = 8;
-
-/// First element, row and column step of a matrix in memory.
-#[derive(Clone, Copy)]
-struct StridedMatrix {
-    first: *const f32,
-    row_stride: isize,
-    column_stride: isize,
-}
-
-// SAFETY: only read, and the tensor it belongs to outlives every use.
-unsafe impl Send for StridedMatrix {}
-unsafe impl Sync for StridedMatrix {}
+/// Rows that one task multiplies: with their terms they fit the second-level cache.
+const ROWS_PER_BLOCK: usize = 96;
+/// Terms that are added up at once: a panel of so many stays in the first two levels of cache.
+const TERMS_PER_BLOCK: usize = 512;
+/// The same where the left factor is copied too.
+const TERMS_PER_COPY: usize = 192;
 
 impl StridedMatrix {
     /// The f32 elements of a matrix.
@@ -40,12 +25,6 @@ impl StridedMatrix {
         let [row_stride, column_stride] = [layout.strides()[0], layout.strides()[1]];
         let first = matrix.storage::<f32>()[layout.start_offset()..].as_ptr();
         Self { first, row_stride, column_stride }
-    }
-
-    /// The matrix from row `row` and column `column` on.
-    fn from(self, row: usize, column: usize) -> Self {
-        let offset = row as isize * self.row_stride + column as isize * self.column_stride;
-        Self { first: self.first.wrapping_offset(offset), ..self }
     }
 }
 
@@ -77,95 +56,116 @@ unsafe fn write(
     output: &mut [MaybeUninit<f32>],
     add: bool,
 ) {
-    let [rows, inner, columns] = [lhs.shape()[0], lhs.shape()[1], rhs.shape()[1]];
+    let size @ [rows, inner, columns] = [lhs.shape()[0], lhs.shape()[1], rhs.shape()[1]];
     assert_eq!(inner, rhs.shape()[0], "the inner sizes of a product differ");
-    let (lhs, rhs) = (StridedMatrix::of(lhs), StridedMatrix::of(rhs));
-    let work = rows.saturating_mul(inner).saturating_mul(columns);
-    let size = [rows, inner, columns];
-    // SAFETY (all branches): the steps are those of the tensors, whose elements all lie in their storage; the rest is
-    // the caller's promise.
-    if work < PARALLEL_FROM {
-        unsafe { call_gemm(lhs, rhs, output, size, add, Parallelism::None) };
-    } else if rows <= NARROW && columns <= NARROW && inner >= 2 * TERMS_PER_PART {
-        unsafe { write_by_terms(lhs, rhs, output, size, add) };
-    } else if columns <= NARROW && rows >= 2 * ROWS_PER_PART {
-        let part = rows.div_ceil(rayon::current_num_threads()).max(ROWS_PER_PART);
-        output.par_chunks_mut(part * columns).enumerate().for_each(|(i, output)| {
-            let size = [output.len() / columns, inner, columns];
-            unsafe { call_gemm(lhs.from(i * part, 0), rhs, output, size, add, Parallelism::None) };
-        });
-    } else {
-        unsafe { call_gemm(lhs, rhs, output, size, add, Parallelism::Rayon(0)) };
-    }
-}
-
-/// A small result of long sums, the gradient of a weight matrix: parts of the sums are computed in parallel.
-///
-/// # Safety
-/// As [`call_gemm`].
-unsafe fn write_by_terms(
-    lhs: StridedMatrix,
-    rhs: StridedMatrix,
-    output: &mut [MaybeUninit<f32>],
-    [rows, inner, columns]: [usize; 3],
-    add: bool,
-) {
-    let count = rows * columns;
-    let part = inner.div_ceil((inner / TERMS_PER_PART).clamp(1, MAX_TERM_PARTS));
-    let parts = inner.div_ceil(part);
-    let mut sums: Vec<f32> = Vec::with_capacity(count * parts);
-    sums.spare_capacity_mut()[..count * parts].par_chunks_mut(count).enumerate().for_each(|(i, sums)| {
-        let first = i * part;
-        let size = [rows, part.min(inner - first), columns];
-        // SAFETY: a block of the promised matrices.
-        unsafe { call_gemm(lhs.from(0, first), rhs.from(first, 0), sums, size, false, Parallelism::None) };
-    });
-    // SAFETY: every part was written.
-    unsafe { sums.set_len(count * parts) };
-    for (i, output) in output.iter_mut().enumerate() {
-        let sum = (0..parts).map(|p| sums[p * count + i]).sum::<f32>();
-        // SAFETY: initialised where something is added.
-        let before = if add { unsafe { output.assume_init() } } else { 0.0 };
-        output.write(before + sum);
-    }
-}
-
-/// `output = lhs·rhs`, plus what `output` holds if `add`; initialises all of it.
-///
-/// # Safety
-/// `lhs` is a matrix of `[rows, inner]` elements, `rhs` of `[inner, columns]`; `output` is initialised if `add`.
-unsafe fn call_gemm(
-    lhs: StridedMatrix,
-    rhs: StridedMatrix,
-    output: &mut [MaybeUninit<f32>],
-    [rows, inner, columns]: [usize; 3],
-    add: bool,
-    parallelism: Parallelism,
-) {
     assert_eq!(output.len(), rows * columns, "the output of a product has another size");
-    // SAFETY: promised; the output has the size of the product.
+    let (lhs, rhs) = (StridedMatrix::of(lhs), StridedMatrix::of(rhs));
+    let output = OutputBlock { first: output.as_mut_ptr().cast(), row_stride: columns };
+    let work = rows.saturating_mul(inner).saturating_mul(columns);
+    let threads = if work < PARALLEL_FROM { 1 } else { rayon::current_num_threads() };
+    // SAFETY: the steps are those of the tensors, whose elements all lie in their storage; the rest is the caller's promise.
     unsafe {
-        gemm::gemm(
-            rows,
-            columns,
-            inner,
-            output.as_mut_ptr().cast::<f32>(),
-            1,
-            columns as isize,
-            add,
-            lhs.first,
-            lhs.column_stride,
-            lhs.row_stride,
-            rhs.first,
-            rhs.column_stride,
-            rhs.row_stride,
-            1.0,
-            1.0,
-            false,
-            false,
-            false,
-            parallelism,
-        );
+        match inner > 2 * rows && inner > TERMS_PER_COPY {
+            true => write_long_sums(lhs, rhs, output, size, add, threads),
+            false => write_rows(lhs, rhs, output, size, add, threads),
+        }
+    }
+}
+
+/// A result of many rows: the right factor is rearranged once, and every task multiplies a block of rows.
+///
+/// # Safety
+/// `lhs` is a matrix of `[rows, inner]` elements, `rhs` of `[inner, columns]`; `output` of `[rows, columns]` is initialised if
+/// `add`.
+unsafe fn write_rows(
+    lhs: StridedMatrix,
+    rhs: StridedMatrix,
+    output: OutputBlock,
+    [rows, inner, columns]: [usize; 3],
+    add: bool,
+    threads: usize,
+) {
+    let mut panels = Panels::default();
+    // SAFETY: promised.
+    unsafe { panels.fill(rhs, inner, columns) };
+    let block = |block: usize| {
+        let first = block * ROWS_PER_BLOCK;
+        let count = ROWS_PER_BLOCK.min(rows - first);
+        let output = output.from(first, 0);
+        let mut copy = Vec::new();
+        for start in (0..inner).step_by(TERMS_PER_BLOCK) {
+            let terms = start..(start + TERMS_PER_BLOCK).min(inner);
+            // SAFETY: a block of the promised matrices; no other task has these rows.
+            unsafe {
+                let lhs = along_rows(lhs.from(first, start), count, terms.len(), &mut copy);
+                panels.multiply(lhs, count, terms, output, add || start > 0);
+            }
+        }
+    };
+    for_each(rows.div_ceil(ROWS_PER_BLOCK), threads, block);
+}
+
+/// A small result of long sums, the gradient of a weight matrix: every task computes a block of the result.
+///
+/// # Safety
+/// As [`write_rows`].
+unsafe fn write_long_sums(
+    lhs: StridedMatrix,
+    rhs: StridedMatrix,
+    output: OutputBlock,
+    [rows, inner, columns]: [usize; 3],
+    add: bool,
+    threads: usize,
+) {
+    // As many blocks as threads, of whole tiles: how the result is cut changes no bit.
+    let column_blocks = threads.min(columns.div_ceil(32));
+    let row_blocks = (threads / column_blocks).clamp(1, rows.div_ceil(24));
+    let (width, height) = (
+        columns.div_ceil(column_blocks).next_multiple_of(32),
+        rows.div_ceil(row_blocks).next_multiple_of(12),
+    );
+    let column_blocks = columns.div_ceil(width);
+    let block = |block: usize| {
+        let (row, column) = (block / column_blocks * height, block % column_blocks * width);
+        let (height, width) = (height.min(rows - row), width.min(columns - column));
+        let (mut panels, mut copy) = (Panels::default(), Vec::new());
+        for start in (0..inner).step_by(TERMS_PER_COPY) {
+            let terms = TERMS_PER_COPY.min(inner - start);
+            // SAFETY: a block of the promised matrices; no other task has this part of the output.
+            unsafe {
+                panels.fill(rhs.from(start, column), terms, width);
+                for first in (row..row + height).step_by(ROWS_PER_BLOCK) {
+                    let count = ROWS_PER_BLOCK.min(row + height - first);
+                    let lhs = along_rows(lhs.from(first, start), count, terms, &mut copy);
+                    panels.multiply(lhs, count, 0..terms, output.from(first, column), add || start > 0);
+                }
+            }
+        }
+    };
+    for_each(rows.div_ceil(height) * column_blocks, threads, block);
+}
+
+/// A block whose elements lie close together: itself, or a copy if its columns are contiguous instead of its rows.
+///
+/// # Safety
+/// `block` has `[rows, terms]` elements, and so many can be read from every column.
+unsafe fn along_rows(block: StridedMatrix, rows: usize, terms: usize, copy: &mut Vec<f32>) -> StridedMatrix {
+    if block.column_stride == 1 || rows == 1 {
+        return block;
+    }
+    assert_eq!(block.row_stride, 1, "neither rows nor columns of a left factor are contiguous");
+    copy.clear();
+    for term in 0..terms {
+        // SAFETY: a column of the block.
+        copy.extend_from_slice(unsafe { std::slice::from_raw_parts(block.from(0, term).first, rows) });
+    }
+    StridedMatrix::of_rows(copy, rows).transposed()
+}
+
+fn for_each(tasks: usize, threads: usize, run: impl Fn(usize) + Send + Sync) {
+    match threads {
+        1 => (0..tasks).for_each(run),
+        _ => (0..tasks).into_par_iter().for_each(run),
     }
 }
 

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 use super::composed::multiply_add;
 use super::tensors::Tensors;
+use super::tile::StridedMatrix;
 use crate::packing::Packing;
 
 #[cfg(feature = "flex")]
@@ -82,6 +83,11 @@ impl<'a> MatrixView<'a> {
 
     pub(super) fn rows(&self) -> usize {
         self.rows
+    }
+
+    /// The matrix as a factor of a product.
+    pub(super) fn strided(&self) -> StridedMatrix {
+        StridedMatrix { first: self.values.as_ptr(), row_stride: self.row_stride as isize, column_stride: 1 }
     }
 
     #[inline(always)]
@@ -173,30 +179,30 @@ pub(super) fn split_mut<'a>(
 pub(super) struct NewValues {
     values: Vec<f32>,
     lengths: Vec<usize>,
-    zeroed: AtomicUsize,
+    written: AtomicUsize,
 }
 
 /// A run of elements of [`NewValues`].
 pub(super) struct NewPart<'a> {
     memory: &'a mut [MaybeUninit<f32>],
-    zeroed: &'a AtomicUsize,
+    written: &'a AtomicUsize,
 }
 
 impl NewValues {
     /// Consecutive parts of the given lengths.
     pub(super) fn new(lengths: Vec<usize>) -> Self {
-        Self { values: Vec::with_capacity(lengths.iter().sum()), lengths, zeroed: AtomicUsize::new(0) }
+        Self { values: Vec::with_capacity(lengths.iter().sum()), lengths, written: AtomicUsize::new(0) }
     }
 
     /// The parts, to be written once.
     pub(super) fn parts(&mut self) -> Vec<NewPart<'_>> {
-        *self.zeroed.get_mut() = 0;
-        let zeroed = &self.zeroed;
+        *self.written.get_mut() = 0;
+        let written = &self.written;
         let mut memory = self.values.spare_capacity_mut();
         let next = |length: &usize| {
             let (part, rest) = std::mem::take(&mut memory).split_at_mut(*length);
             memory = rest;
-            NewPart { memory: part, zeroed }
+            NewPart { memory: part, written }
         };
         self.lengths.iter().map(next).collect()
     }
@@ -204,7 +210,7 @@ impl NewValues {
     /// The elements, once every part has been written.
     pub(super) fn finish(mut self) -> Vec<f32> {
         let count = self.lengths.iter().sum();
-        assert_eq!(*self.zeroed.get_mut(), count, "every part of a matrix is written");
+        assert_eq!(*self.written.get_mut(), count, "every part of a matrix is written");
         // SAFETY: parts do not overlap and each counts its elements once, when they have been written: all have been.
         unsafe { self.values.set_len(count) };
         self.values
@@ -212,10 +218,19 @@ impl NewValues {
 }
 
 impl<'a> NewPart<'a> {
+    /// Memory to be written.
+    ///
+    /// # Safety
+    /// The caller writes all of it.
+    pub(super) unsafe fn unwritten(self) -> &'a mut [MaybeUninit<f32>] {
+        self.written.fetch_add(self.memory.len(), Ordering::Relaxed);
+        self.memory
+    }
+
     #[inline(always)]
     pub(super) fn zeroed(self) -> &'a mut [f32] {
         self.memory.fill(MaybeUninit::new(0.0));
-        self.zeroed.fetch_add(self.memory.len(), Ordering::Relaxed);
+        self.written.fetch_add(self.memory.len(), Ordering::Relaxed);
         let length = self.memory.len();
         // SAFETY: the elements have just been written, and the borrow is the part's own.
         unsafe { std::slice::from_raw_parts_mut(self.memory.as_mut_ptr().cast::<f32>(), length) }

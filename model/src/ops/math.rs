@@ -9,7 +9,8 @@
 pub(super) fn sin_cos(x: f32) -> (f32, f32) {
     // Adding and subtracting 1.5·2²³ rounds to the nearest integer.
     const ROUND: f32 = 12_582_912.0;
-    let quotient = (x * std::f32::consts::FRAC_2_PI + ROUND) - ROUND;
+    let rounded = x * std::f32::consts::FRAC_2_PI + ROUND;
+    let quotient = rounded - ROUND;
     let remainder = quotient.mul_add(-1.570_312_5, x);
     let remainder = quotient.mul_add(-4.837_513e-4, remainder);
     let remainder = quotient.mul_add(-7.549_79e-8, remainder);
@@ -18,8 +19,9 @@ pub(super) fn sin_cos(x: f32) -> (f32, f32) {
     let sine = (sine * square).mul_add(remainder, remainder);
     let cosine = 2.443_315_7e-5_f32.mul_add(square, -1.388_731_6e-3).mul_add(square, 4.166_664_6e-2);
     let cosine = (cosine * square).mul_add(square, (-0.5_f32).mul_add(square, 1.0));
-    // Out-of-range values saturate: such arguments have no meaningful phase in f32 anyway.
-    let quadrant = quotient as i32;
+    // The last bits of the rounded sum are those of the integer; a conversion, which saturates, would not be vectorised. Beyond
+    // 2²² they are not, but such arguments have no meaningful phase in f32 anyway.
+    let quadrant = rounded.to_bits() as i32;
     let swapped = quadrant & 1 != 0;
     let (a, b) = if swapped { (cosine, sine) } else { (sine, cosine) };
     let sign = |bit: i32| ((bit & 2) << 30) as u32;
@@ -34,7 +36,8 @@ pub(super) fn sin_cos(x: f32) -> (f32, f32) {
 pub(super) fn exp(x: f32) -> f32 {
     const ROUND: f32 = 12_582_912.0;
     let clamped = x.clamp(-87.0, 88.0);
-    let power = clamped.mul_add(std::f32::consts::LOG2_E, ROUND) - ROUND;
+    let rounded = clamped.mul_add(std::f32::consts::LOG2_E, ROUND);
+    let power = rounded - ROUND;
     let rest = power.mul_add(-0.693_145_75, clamped);
     let rest = power.mul_add(-1.428_606_8e-6, rest);
     let series = 1.378_059_4e-3_f32
@@ -44,7 +47,8 @@ pub(super) fn exp(x: f32) -> f32 {
         .mul_add(rest, 4.999_998_5e-1)
         .mul_add(rest, 1.0)
         .mul_add(rest, 1.0);
-    let scale = f32::from_bits((((power as i32) + 127) << 23) as u32);
+    // The last bits of the rounded sum are those of the integer, and the shift drops the others.
+    let scale = f32::from_bits(rounded.to_bits().wrapping_add(127) << 23);
     let value = series * scale;
     if x < -87.0 { 0.0 } else { value }
 }

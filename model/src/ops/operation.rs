@@ -43,6 +43,12 @@ pub(super) trait TensorKernel {
 
 /// A kernel with one result and a derivative by its N arguments.
 pub(super) trait Operation<const N: usize>: TensorKernel + Clone + Debug + Send + 'static {
+    /// The same operation where its backward pass will follow: it may have further results, which that pass finds in
+    /// [`Saved::state`].
+    fn recorded(self) -> Self {
+        self
+    }
+
     /// What the backward pass reads, if the arguments marked in `tracked` need a gradient; nothing by default.
     fn saves(&self, _tracked: [bool; N]) -> Saves<N> {
         Saves { arguments: [false; N], result: false }
@@ -66,12 +72,15 @@ pub(super) struct Saves<const N: usize> {
 pub(super) struct Saved<B: Backend, const N: usize> {
     pub(super) arguments: [Option<FloatTensor<B>>; N],
     pub(super) result: Option<FloatTensor<B>>,
+    /// Further results of the [recorded](Operation::recorded) operation.
+    pub(super) state: Vec<FloatTensor<B>>,
 }
 
 impl<B: Backend, const N: usize> Saved<B, N> {
-    /// Saved arguments, saved result, gradient of the result: the arguments of most backward kernels.
+    /// Saved arguments, saved result, state, gradient of the result: the arguments of most backward kernels.
     pub(super) fn with(self, gradient: FloatTensor<B>) -> Tensors<B> {
-        Tensors(self.arguments.into_iter().flatten().chain(self.result).chain([gradient]).collect())
+        let forward = self.arguments.into_iter().flatten().chain(self.result).chain(self.state);
+        Tensors(forward.chain([gradient]).collect())
     }
 }
 
@@ -167,8 +176,10 @@ impl<B: FusedOps, C: CheckpointStrategy> FusedOps for Autodiff<B, C> {
             OpsKind::Tracked(prepared) => {
                 let saves = operation.saves(tracked);
                 let saved = std::array::from_fn(|i| saves.arguments[i].then(|| arguments.0[i].clone()));
-                let [result] = B::run(&operation, arguments).take();
-                let saved = Saved { arguments: saved, result: saves.result.then(|| result.clone()) };
+                let Tensors(mut results) = B::run(&operation.recorded(), arguments);
+                let state = results.split_off(1);
+                let [result] = Tensors::<B>(results).take();
+                let saved = Saved { arguments: saved, result: saves.result.then(|| result.clone()), state };
                 prepared.finish(saved, result)
             }
         };

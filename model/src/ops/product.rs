@@ -1,8 +1,8 @@
 //! Matrix products: on a GPU as in `gpu::product`, in host memory written straight into their place.
 //!
 //! burn's flex backend zeroes the memory of every product, copies it to aligned memory, and only then multiplies; for the
-//! narrow matrices of these networks (width 128) that takes a quarter of the time of the multiplication. Here the same one
-//! (crate `gemm`) writes into fresh memory, or adds to a matrix whose memory no other tensor shares.
+//! narrow matrices of these networks (width 128) that takes a quarter of the time of the multiplication. Here tiles of the
+//! result go from registers (`tile`) into fresh memory, or are added to a matrix whose memory no other tensor shares.
 
 #[cfg(feature = "gpu")]
 use super::gpu;

@@ -22,13 +22,18 @@ struct SirenCase {
 }
 
 fn case() -> SirenCase {
+    case_of(&SIZES, Packing::new([20, 33, 7]))
+}
+
+fn case_of(sizes: &SirenSizes, packing: Packing) -> SirenCase {
     let device = device();
+    let tensor = |rows, columns, range, seed| uniform(rows, columns, range, seed, &device).autodiff();
     SirenCase {
-        siren: seeded(11, |start| ModulatedSiren::new(&SIZES, start)),
-        coordinates: uniform(60, 3, 0.8, 1, &device),
-        vertex: uniform(60, 7, 2.0, 2, &device),
-        garment: uniform(3, 5, 2.0, 3, &device),
-        packing: Packing::new([20, 33, 7]),
+        siren: seeded(11, |start| ModulatedSiren::new(sizes, start)),
+        coordinates: tensor(packing.rows(), 3, 0.8, 1).require_grad(),
+        vertex: tensor(packing.rows(), 7, 2.0, 2).require_grad(),
+        garment: tensor(packing.count(), 5, 2.0, 3).require_grad(),
+        packing,
     }
 }
 
@@ -40,6 +45,13 @@ impl SirenCase {
     fn of(&self, siren: &ModulatedSiren) -> Tensor<2> {
         let product = siren.modulator.vertex_product(self.vertex.clone());
         siren.forward(self.coordinates.clone(), product, self.garment.clone(), &self.packing)
+    }
+
+    fn layer_by_layer(&self) -> Tensor<2> {
+        let modulator = &self.siren.modulator;
+        let (product, rows) =
+            (modulator.vertex_product(self.vertex.clone()), modulator.rows(self.garment.clone()));
+        self.siren.layer_by_layer(self.coordinates.clone(), product, rows, &self.packing)
     }
 
     /// The network as published: [previous gate, garment row, vertex row] concatenated and multiplied with whole weights.
@@ -79,6 +91,45 @@ fn split_latents_equal_the_concatenated_form_in_values_and_gradients() {
     let concatenated = parameter_gradients(&case.siren, loss(concatenated));
     assert!(concatenated.iter().all(|(_, gradient)| !gradient.is_empty()));
     assert_gradients_close(&split, &concatenated, 1e-5);
+}
+
+/// Widths that no vector divides, several blocks of rows per garment, several parts of the sums.
+#[test]
+fn the_fused_form_equals_the_layers_one_by_one_in_values_and_gradients_for_any_number_of_threads() {
+    for (width, layers, rows) in [(10, 2, vec![20, 33, 7]), (64, 6, vec![400, 1500, 1]), (130, 3, vec![97])] {
+        let case = case_of(&SirenSizes { width, layers, ..SIZES }, Packing::new(rows));
+        let gradients = |output: Tensor<2>| {
+            let all = loss(output).backward();
+            let of_inputs = [&case.coordinates, &case.vertex, &case.garment].map(|input| {
+                let gradient = input.grad(&all).expect("a gradient");
+                values(&gradient)
+            });
+            of_inputs
+        };
+        let run = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| {
+                let output = case.split();
+                let parameters = parameter_gradients(&case.siren, loss(output.clone()));
+                (values(&output), parameters, gradients(case.split()))
+            })
+        };
+        let (fused, plain) = (case.split(), case.layer_by_layer());
+        assert_close(&fused.clone().inner(), &plain.clone().inner(), 1e-5);
+        let (fused, plain) = (gradients(fused), gradients(plain));
+        for (input, (fused, plain)) in fused.iter().zip(&plain).enumerate() {
+            let scale = plain.iter().fold(0.0_f32, |scale, value| scale.max(value.abs()));
+            let worst = fused.iter().zip(plain).fold(0.0_f32, |worst, (a, b)| worst.max((a - b).abs()));
+            assert!(worst <= 1e-5 * scale, "input {input} at width {width}: {worst:e} of {scale:e}");
+        }
+        let fused = parameter_gradients(&case.siren, loss(case.split()));
+        let plain = parameter_gradients(&case.siren, loss(case.layer_by_layer()));
+        assert_gradients_close(&fused, &plain, 1e-5);
+        let one = run(1);
+        for threads in [2, 4] {
+            assert!(one == run(threads), "width {width} on {threads} threads");
+        }
+    }
 }
 
 #[test]
