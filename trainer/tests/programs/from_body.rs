@@ -86,7 +86,7 @@ fn a_garment_in_the_coordinates_of_a_published_body_is_fitted_exactly() {
     let other = format!("{npz}:1,2,x");
     for (source, more, word) in [
         (other.as_str(), &[][..], "'x', which is no number"),
-        (&file, &[], "does not look like body"),
+        (&file, &[], "no standing person"),
         (&npz, &["--arms", "a"], "leave --arms out"),
     ] {
         let message =
