@@ -100,11 +100,10 @@ fn the_fused_form_equals_the_layers_one_by_one_in_values_and_gradients_for_any_n
         let case = case_of(&SirenSizes { width, layers, ..SIZES }, Packing::new(rows));
         let gradients = |output: Tensor<2>| {
             let all = loss(output).backward();
-            let of_inputs = [&case.coordinates, &case.vertex, &case.garment].map(|input| {
+            [&case.coordinates, &case.vertex, &case.garment].map(|input| {
                 let gradient = input.grad(&all).expect("a gradient");
                 values(&gradient)
-            });
-            of_inputs
+            })
         };
         let run = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
