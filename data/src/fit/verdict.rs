@@ -20,6 +20,8 @@ const SAME: f64 = 0.02;
 const MOST_INSIDE: f64 = 0.25;
 /// A garment touches the body: a twentieth of it is nearer than this (m).
 const FARTHEST: f64 = 0.08;
+/// What lies on a part of the body is no farther from it, on average (m).
+const SNUG: f64 = 0.03;
 /// A garment hangs from a rim that is no farther from the body than this, on average (m).
 const WIDEST_RIM: f64 = 0.1;
 /// A neck opening is no longer than this many times the hem.
@@ -130,6 +132,16 @@ pub(super) fn implausibility(candidate: &Candidate, sitting: &Sitting, height: f
     None
 }
 
+/// Where a file as it stands lies snugly on head, arms or feet: a band around the head is none around the chest of another unit.
+fn lies_off_trunk(candidate: &Candidate, search: &Search, cloth: &Cloth) -> Option<&'static str> {
+    if candidate.placement.origin == Origin::Elsewhere {
+        return None;
+    }
+    let place = search.off_trunk(cloth, &candidate.placement)?;
+    let (sitting, _) = search.measured(cloth, &candidate.placement);
+    (sitting.inside < MOST_INSIDE && sitting.mean_distance < SNUG).then_some(place)
+}
+
 /// A placement and the doubts about it.
 pub(super) struct Verdict {
     pub placement: Placement,
@@ -182,6 +194,12 @@ pub(super) fn verdict(
         true => (candidate, f64::INFINITY),
         false => search.probed(cloth, settings, candidate),
     };
+    if candidate.is_tube
+        && !is_usual
+        && let Some(place) = candidates.iter().find_map(|c| lies_off_trunk(c, search, cloth))
+    {
+        return Err(FitError::OffTrunk { place });
+    }
     let taken = candidate.placement;
     let points = search.level(cloth, &taken);
     let apart = |other: &Placement| {
