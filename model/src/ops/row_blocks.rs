@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use burn::tensor::{DType, Tensor};
+use burn::tensor::{DType, Device, Tensor};
 use rayon::prelude::*;
 
 use super::host::{Chunk, MatrixView};
@@ -22,18 +22,14 @@ const MAX_PARTS: usize = 8;
 
 /// Whether operations of this kind can read a tensor: f32 in host memory.
 pub fn runs_on_host(tensor: &Tensor<2>) -> bool {
-    let device = tensor.device().inner();
-    let mut host = false;
-    #[cfg(feature = "flex")]
-    {
-        host |= device == burn::tensor::Device::flex();
-    }
-    #[cfg(feature = "ndarray")]
     #[allow(deprecated)]
-    {
-        host |= device == burn::tensor::Device::ndarray();
-    }
-    host && tensor.dtype() == DType::F32
+    let hosts: &[Device] = &[
+        #[cfg(feature = "flex")]
+        Device::flex(),
+        #[cfg(feature = "ndarray")]
+        Device::ndarray(),
+    ];
+    hosts.contains(&tensor.device().inner()) && tensor.dtype() == DType::F32
 }
 
 /// Why such an operation has no other form.
