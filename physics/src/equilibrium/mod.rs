@@ -41,12 +41,9 @@
 //! drives against one is held for up to ten steps, with the faces on both sides; its force still counts in the relative gradient,
 //! so that outfits seldom end as [`Stop::Converged`].
 
-mod advance;
 mod error;
-mod lbfgs;
+mod hessian;
 mod line_search;
-mod nonsmooth;
-mod preconditioner;
 mod problem;
 mod settings;
 mod solution;

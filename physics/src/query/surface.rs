@@ -3,6 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use crate::mesh::{TriMesh, is_closed, vertex_normals};
+use crate::query::near_faces::NearFaces;
 use crate::query::{ClosestPoint, SurfacePoint, UnionDistance, VertexIndex};
 use crate::real::Real;
 use crate::vec3;
@@ -32,6 +33,9 @@ pub struct Gap<T> {
     /// point ([`Distance::ClosestPoint`]).
     pub vertex: u32,
 }
+
+/// How far from a face its other side is asked for (m).
+const SHEET_MARGIN: f64 = 1e-8;
 
 /// Spacing of the numbers at a query point (m) above which nearest vertices are found in `f64`.
 const FAR_SPACING: f64 = 1e-4;
@@ -135,6 +139,60 @@ impl<T: Real> Surface<T> {
             Distance::NearestVertex => self.nearest_vertex_gap(p),
             Distance::ClosestPoint => self.closest_point_gap(p),
             Distance::Union => self.union_gap(p),
+        }
+    }
+
+    /// As [`gap`](Self::gap), for a point whose `near` faces are remembered from query to query. Beyond `reach` (m) the gap may be any
+    /// from there to the true one, with no gradient.
+    pub(crate) fn gap_near(&self, p: [T; 3], distance: Distance, reach: f64, near: &mut NearFaces) -> Gap<T> {
+        let q = vec3::to_f64(p);
+        let Some(tree) = self.tree(distance).filter(|_| vec3::is_finite(q)) else {
+            return self.gap(p, distance);
+        };
+        let clearance = near.clearance(q);
+        if clearance >= reach {
+            return Gap { gap: T::from_f64(clearance), gradient: vec3::zero(), vertex: 0 };
+        }
+        let Some(found) = near.project(tree, q, reach) else { return not_a_gap() };
+        let gap = signed_gap(p, &found, self.is_inside(q, &found, distance), tree);
+        near.set_distance(q, gap.gap.to_f64());
+        gap
+    }
+
+    /// Whether `p`, to which `found` is the closest point of the [`tree`](Self::tree), is inside.
+    fn is_inside(&self, p: [f64; 3], found: &SurfacePoint, distance: Distance) -> bool {
+        match distance == Distance::Union && self.is_closed() {
+            true => self.union_distance().is_inside(p, found),
+            false => found.is_behind(p),
+        }
+    }
+
+    /// The sides of a face within which `p` would be inside on either side, at most `band` (m) away: distance and direction as in
+    /// [`gap`](Self::gap), then of the other side. Such is what is inside another part of a face that is not all inside.
+    pub(crate) fn sheet_sides(
+        &self,
+        p: [f64; 3],
+        band: f64,
+        distance: Distance,
+    ) -> Option<[(f64, [f64; 3]); 2]> {
+        let tree = self.tree(distance)?;
+        let found = tree.project_within(p, 0.5 * band)?;
+        let (depth, direction) = found.signed(p, true);
+        // As far on the other side, and not on the face itself.
+        let beyond = vec3::add_scaled(p, 2.0 * (SHEET_MARGIN - depth), direction);
+        let other = tree.project_within(beyond, band)?;
+        let is_sheet = self.is_inside(beyond, &other, distance);
+        let (_, other) = other.signed(beyond, true);
+        // Seen from p, the other side is as far off as this one.
+        (is_sheet && vec3::dot(direction, other) < 0.0).then_some([(depth, direction), (-depth, other)])
+    }
+
+    /// The faces that a distance is measured to; none where it is measured to vertices.
+    pub(crate) fn tree(&self, distance: Distance) -> Option<&ClosestPoint> {
+        match distance {
+            Distance::NearestVertex => None,
+            Distance::Union if self.is_closed() => Some(self.union_distance().kept()),
+            Distance::ClosestPoint | Distance::Union => Some(self.closest_point()),
         }
     }
 
