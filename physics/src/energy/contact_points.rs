@@ -119,3 +119,32 @@ impl Corners {
         1.0 / self.count as f64
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::shapes;
+
+    #[test]
+    fn points_are_the_means_of_their_corners_and_stand_for_all_vertices_together() {
+        let mesh = shapes::irregular_grid(0.3, 0.2, 4, 3, 0.2, 1);
+        let topology = Topology::new(&mesh);
+        let points = ContactPoints::new(&mesh, &topology);
+        let (v, f, e) = (mesh.vertex_count(), mesh.face_count(), topology.edges.len());
+        for (samples, count) in [
+            (ContactSamples::Vertices, v),
+            (ContactSamples::Faces, v + f),
+            (ContactSamples::FacesAndEdges, v + f + e),
+        ] {
+            let at = points.at(mesh.positions(), samples);
+            assert_eq!((at.len(), points.count(samples)), (count, count));
+            assert!((points.share(samples) * count as f64 - v as f64).abs() < 1e-12);
+            for (point, p) in at.iter().enumerate() {
+                let corners = points.corners(point);
+                let sum = corners.iter().map(|v| mesh.positions()[v]).fold([0.0; 3], add);
+                let mean = scale(sum, corners.weight());
+                assert!(crate::vec3::distance_squared(mean, *p) < 1e-24);
+            }
+        }
+    }
+}

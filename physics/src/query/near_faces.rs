@@ -143,3 +143,61 @@ impl NearFaces {
 
 /// Cosine of the angle (1°) below which two directions are one.
 const SAME_DIRECTION: f64 = 0.99985;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::shapes::{self, SplitMix};
+    use crate::query::{Distance, Surface};
+    use crate::vec3::add_scaled;
+
+    #[test]
+    fn a_point_that_wanders_gets_the_answers_of_fresh_queries() {
+        // Two balls that intersect, so that there are creases, buried faces and a seam.
+        let ball = shapes::icosphere(0.1, 3);
+        let body = shapes::union(&[&ball, &shapes::mapped(&ball, |[x, y, z]| [x + 0.13, y, z])]);
+        let surface = Surface::<f64>::from_mesh(&body);
+        let mut random = SplitMix::new(11);
+        let mut direction = || std::array::from_fn::<f64, 3, _>(|_| random.symmetric());
+        let reach = 0.005;
+        for _ in 0..40 {
+            let mut p = add_scaled([0.065, 0.0, 0.0], 0.12, direction());
+            let mut near = NearFaces::default();
+            for step in 0..60 {
+                p = add_scaled(p, [1e-4, 1e-3, 1e-2][step % 3], direction());
+                let gap = surface.gap_near(p, Distance::Union, reach, &mut near);
+                let expected = surface.gap(p, Distance::Union);
+                if gap.gradient == [0.0; 3] {
+                    assert!(gap.gap >= reach && gap.gap <= expected.gap + 1e-12, "{gap:?} {expected:?}");
+                } else {
+                    assert!((gap.gap - expected.gap).abs() < 1e-12, "{gap:?} {expected:?}");
+                    assert!(norm(sub(gap.gradient, expected.gradient)) < 1e-6, "{gap:?} {expected:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn over_a_valley_both_slopes_are_minima_and_over_a_ridge_there_is_one() {
+        let bent = |slope: f64| {
+            let grid = shapes::grid(0.2, 0.2, 8, 8);
+            let mesh = shapes::mapped(&grid, |[x, y, _]| [x - 0.1, slope * (x - 0.1).abs(), 0.1 - y]);
+            ClosestPoint::new(mesh.positions().to_vec(), mesh.faces())
+        };
+        let minima = |surface: &ClosestPoint, p: [f64; 3], band: f64| {
+            let mut near = NearFaces::default();
+            near.project(surface, p, 0.05).unwrap();
+            near.minima(surface, p, band)
+        };
+        let p = [1e-4, 0.005, 0.003];
+        let found = minima(&bent(1.0), p, 1e-3);
+        assert_eq!(found.len(), 2);
+        // Of p = (x, y) over |x|: (y ∓ x)/√2.
+        for ((distance, _), expected) in found.iter().zip([p[1] - p[0], p[1] + p[0]]) {
+            assert!((distance - expected / 2f64.sqrt()).abs() < 1e-12);
+        }
+        assert!(dot(found[0].1, found[1].1).abs() < 1e-12);
+        assert_eq!(minima(&bent(1.0), p, 1e-5).len(), 1);
+        assert_eq!(minima(&bent(-1.0), p, 1e-3).len(), 1);
+    }
+}
