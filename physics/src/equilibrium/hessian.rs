@@ -3,20 +3,10 @@
 use faer::MatMut;
 
 use super::Problem;
-use super::problem::ON_CREASE;
 use crate::energy::{CurvatureSink, crease_reach};
 use crate::operators::SparseMatrix;
 use crate::operators::cholesky::Cholesky;
 use crate::rows::CompressedRows;
-
-/// How a step meets the creases of contact ([`crate::energy::Creases`]).
-#[derive(Clone, Copy)]
-pub(super) enum Crossing {
-    /// As if they were smooth over a width (m): it sees the other side from where it comes near.
-    Smooth(f64),
-    /// Along those that points lie on, whose forces are balanced already as far as they can be.
-    Never,
-}
 
 /// One triangle of a sparse symmetric matrix of 3×3 blocks, and its factor.
 ///
@@ -59,30 +49,24 @@ impl Hessian {
         Self { blocks, matrix, diagonal: Vec::new(), factor, factorisations: 0 }
     }
 
-    /// Takes the curvature of `problem` at `posed`, with creases as `crossed`, and adds to the `gradient` there what these do.
+    /// Takes the curvature of `problem` at `posed`, with creases as if they were smooth over `width` (m), and returns the `gradient` there
+    /// as changed by that.
     pub fn assemble(
         &mut self,
         problem: &Problem<'_>,
         posed: &[[f64; 3]],
-        gradient: &mut [[f64; 3]],
-        crossed: Crossing,
-    ) {
+        gradient: &[[f64; 3]],
+        width: f64,
+    ) -> Vec<[f64; 3]> {
         if !self.try_assemble(problem, posed) {
             *self = Self { factorisations: self.factorisations, ..Self::new(problem, posed) };
             self.try_assemble(problem, posed);
         }
+        let mut smooth = gradient.to_vec();
         let mut blocks = Blocks { hessian: self, fit: true };
-        match crossed {
-            Crossing::Smooth(width) => {
-                problem.creases(posed, crease_reach(width)).smooth(width, gradient, &mut blocks);
-            }
-            Crossing::Never => {
-                let creases = problem.creases(posed, ON_CREASE);
-                creases.smooth(ON_CREASE, &mut gradient.to_vec(), &mut blocks);
-                creases.balance(gradient);
-            }
-        }
+        problem.creases(posed, crease_reach(width)).smooth(width, &mut smooth, &mut blocks);
         self.diagonal = (0..self.matrix.rows()).map(|row| self.matrix.row(row).1[0]).collect();
+        smooth
     }
 
     fn try_assemble(&mut self, problem: &Problem<'_>, posed: &[[f64; 3]]) -> bool {

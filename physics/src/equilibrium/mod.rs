@@ -29,8 +29,8 @@
 //! [`Distance::Union`](crate::query::Distance::Union) is continuous. Against a jump nothing can be balanced: with the other
 //! distances the solver may stop as [`Stop::Stalled`]. No distance is smooth where two parts of the body are equally near: there the
 //! contact has a crease, on which cloth comes to rest and no gradient vanishes. In the relative gradient, the forces of both sides
-//! are combined so that least is left. Steps see creases smooth, over a tenth of their length, or, by turns where they are short, go
-//! along the creases that points already lie on (`energy/creases.rs`).
+//! are combined so that least is left. Steps see creases smooth, over a small part of their length. The solver knows the sides of a crease
+//! that a vertex has been on, in steps taken and in those found too long (`energy/creases.rs`).
 //!
 //! **Several garments.** The paper's layer terms jump in every few steps;
 //! [`LayerContact::ClosestPoint`](crate::energy::LayerContact::ClosestPoint) only jumps where a vertex is as near to a sheet that

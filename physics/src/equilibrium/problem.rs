@@ -12,7 +12,7 @@ pub struct Problem<'a> {
     energy: &'a SceneEnergy<f64>,
     /// The scene with one of its terms each, for the relative gradient.
     single_terms: Vec<SceneEnergy<f64>>,
-    /// The faces of the body near every contact point where it was last looked up.
+    /// The faces of the body near every contact point where it was last looked up, and the sides of creases that it has been on.
     memory: Mutex<BodyMemory>,
 }
 
@@ -89,11 +89,22 @@ impl<'a> Problem<'a> {
     /// As [`value`](Self::value).
     pub fn relative_gradient(&self, posed: &[[f64; 3]]) -> f64 {
         let (_, mut gradient) = self.value_and_gradient(posed);
+        self.look_around(posed);
         self.creases(posed, ON_CREASE).balance(&mut gradient);
         relative(norm(&gradient), self.force_scale(posed))
     }
 
-    /// Where contact with the body at `posed`, just evaluated, is with parts of it at most `band` (m) farther away than the nearest.
+    /// Forgets what former positions were near to.
+    pub(super) fn forget(&self) {
+        self.memory().clear();
+    }
+
+    /// Finds the creases that points in contact at `posed`, just evaluated, lie on.
+    pub(super) fn look_around(&self, posed: &[[f64; 3]]) {
+        self.energy.look_around(posed, &mut self.memory(), ON_CREASE);
+    }
+
+    /// Where contact with the body at `posed`, just evaluated, is known to have sides at most `band` (m) farther away than the nearest.
     pub(super) fn creases(&self, posed: &[[f64; 3]], band: f64) -> Creases<'_> {
         self.energy.creases(posed, &self.memory(), band)
     }

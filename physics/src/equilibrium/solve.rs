@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use super::hessian::{Crossing, Hessian};
+use super::hessian::Hessian;
 use super::line_search::search;
 use super::problem::{ON_CREASE, norm, relative};
 use super::{EquilibriumError, Problem, Progress, Solution, SolverSettings, Step, Stop};
@@ -14,23 +14,29 @@ const LOOK_EVERY: usize = 10;
 
 /// Levenberg's shift at first, at least and at most, in units of the mean diagonal entry. It follows the steps: what no term holds (a
 /// rigid motion, a fold that opens) and what the model leaves out would be a step of any length otherwise.
-const SHIFT: [f64; 3] = [1e-2, 1e-5, 1e-2];
+const SHIFT: [f64; 3] = [1e-2, 1e-6, 1e-2];
 
-/// Factors on the shift after a full step, and after one that had to be shortened.
+/// Factors on the shift after a full step that gained a good part of what its model promised, and after one that had to be shortened.
 const FACTORS: [f64; 2] = [0.3, 3.0];
 
-/// A larger shift than this is not tried where no step lowers the energy.
+/// From this share of the decrease that the slope predicts the gain is good: half of the half that it is if the model holds.
+const GOOD: f64 = 0.25;
+
+/// Where no step lowers the energy, most models that are tried, of more sides, narrower creases and a larger shift each.
+const MOST_MODELS: usize = 10;
+
+/// A larger shift than this is not tried.
 const LARGEST_SHIFT: f64 = 1.0;
 
-/// Width of the creases in the model (m), in units of the last step and at least and at most: the model sees across a crease as far as
-/// a step goes.
-const CREASE_WIDTH: (f64, [f64; 2]) = (0.1, [1e-6, 1e-3]);
+/// Width of the creases in the model (m), in units of the last step and at least and at most: the model sees across a crease a small
+/// part of how far a step goes.
+const CREASE_WIDTH: (f64, [f64; 2]) = (0.01, [1e-7, 1e-3]);
 
 /// Progress is judged over this many iterations.
 const WINDOW: usize = 10;
 
 /// Less than this share of all that was gained, in units of the tolerance, gained over [`WINDOW`] iterations, is no progress.
-const LEAST_GAIN: f64 = 0.01;
+const LEAST_GAIN: f64 = 1e-6;
 
 /// A state of the search.
 pub(super) struct State {
@@ -57,7 +63,9 @@ pub fn solve(
 ) -> Result<Solution, EquilibriumError> {
     settings.check()?;
     let clock = Instant::now();
+    problem.forget();
     let mut state = first_state(problem, start)?;
+    problem.look_around(start);
     let mut step = Step {
         iteration: 0,
         energy: state.energy,
@@ -70,8 +78,6 @@ pub fn solve(
     let mut hessian = Hessian::new(problem, start);
     let [mut shift, ..] = SHIFT;
     let mut reach = f64::INFINITY;
-    let (mut was_short, mut along) = (false, false);
-    let mut shortened = Vec::new();
     let mut history: Vec<Step> = Vec::new();
     let stop = loop {
         if step.iteration.is_multiple_of(LOOK_EVERY) && step.iteration > 0 {
@@ -89,7 +95,7 @@ pub fn solve(
                 break Stop::Converged;
             }
         }
-        if !is_progressing(&history, &shortened, settings.tolerance) {
+        if !is_progressing(&history, settings.tolerance) {
             break Stop::Settled;
         }
         if let Some(bound) = settings.escape_distance {
@@ -106,29 +112,34 @@ pub fn solve(
         }
 
         let (share, [least, most]) = CREASE_WIDTH;
-        let mut smooth = state.gradient.clone();
-        // By turns where steps are short: onto the creases, then along them.
-        along = was_short && !along;
-        let crossed = match along {
-            true => Crossing::Never,
-            false => Crossing::Smooth((share * reach).clamp(least, most)),
-        };
-        hessian.assemble(problem, &state.positions, &mut smooth, crossed);
+        let mut width = (share * reach).clamp(least, most);
+        let mut models = 0;
         let next = loop {
-            let direction = hessian.direction(&smooth, shift);
-            let found = direction.and_then(|d| {
+            let smooth = hessian.assemble(problem, &state.positions, &state.gradient, width);
+            let found = hessian.direction(&smooth, shift).and_then(|d| {
                 reach = longest(&d);
                 advance(problem, &state, &d, settings.step_bound / reach, &mut step.evaluations)
             });
+            models += 1;
             match found {
-                Some((length, next)) => {
-                    was_short = length < 1.0;
-                    shortened.push(was_short);
-                    shift = (shift * FACTORS[usize::from(was_short)]).clamp(SHIFT[1], SHIFT[2]);
+                Some((share, next)) => {
+                    let [longer, shorter] = FACTORS;
+                    let factor = if share >= GOOD {
+                        longer
+                    } else if share == 0.0 {
+                        shorter
+                    } else {
+                        1.0
+                    };
+                    shift = (shift * factor).clamp(SHIFT[1], SHIFT[2]);
                     break Some(next);
                 }
-                None if shift >= LARGEST_SHIFT => break None,
-                None => shift *= 10.0,
+                None if models == MOST_MODELS => break None,
+                // The trials have seen more sides of the creases.
+                None => {
+                    width *= FACTORS[0];
+                    shift = (shift * FACTORS[1]).min(LARGEST_SHIFT);
+                }
             }
         };
         let Some(next) = next else { break Stop::Stalled };
@@ -149,7 +160,8 @@ pub fn solve(
     Ok(Solution { positions: state.positions, stop, relative_gradient, history, factorisations })
 }
 
-/// The state along `direction`, at most `longest` of it, and how much of it that was; `None` where it does not go downhill.
+/// The state along `direction`, at most `longest` of it, and the share of the decrease predicted by the slope that a full step has, 0 for
+/// a shorter one; `None` where it does not go downhill.
 ///
 /// Whatever shortens a step (a filter against intersections) belongs here, before the search.
 fn advance(
@@ -170,7 +182,9 @@ fn advance(
         let (energy, gradient) = problem.value_and_gradient(&positions);
         State { positions, energy, gradient }
     };
-    search(state.energy, slope, longest.min(1.0), evaluate)
+    let (length, next) = search(state.energy, slope, longest.min(1.0), evaluate)?;
+    let share = if length < 1.0 { 0.0 } else { (next.energy - state.energy) / slope };
+    Some((share, next))
 }
 
 /// Whether the forces at `state`, compared with `scale`, balance within `tolerance`.
@@ -180,13 +194,12 @@ fn is_balanced(problem: &Problem<'_>, state: &State, scale: f64, tolerance: f64)
     relative(norm(&gradient), scale) <= tolerance
 }
 
-/// Whether the last [`WINDOW`] iterations gained a share of the energy that is worth while, or none of them was `shortened`.
-fn is_progressing(history: &[Step], shortened: &[bool], tolerance: f64) -> bool {
+/// Whether the last [`WINDOW`] iterations gained a share of the energy that is worth while.
+fn is_progressing(history: &[Step], tolerance: f64) -> bool {
     let Some(earlier) = history.len().checked_sub(WINDOW + 1) else { return true };
     let energy = |i: usize| history[i].energy;
     let last = history.len() - 1;
-    let is_free = !shortened[earlier..].contains(&true);
-    is_free || energy(earlier) - energy(last) > LEAST_GAIN * tolerance * (energy(0) - energy(last))
+    energy(earlier) - energy(last) > LEAST_GAIN * tolerance * (energy(0) - energy(last))
 }
 
 fn first_state(problem: &Problem<'_>, start: &[[f64; 3]]) -> Result<State, EquilibriumError> {

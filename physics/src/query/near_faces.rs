@@ -4,16 +4,28 @@
 //! a point to a face changes by at most as much as the point has moved (triangle inequality). So the faces that were near when a point
 //! was looked up, nearest first, are asked only as far down as one of them can still be the closest; and where one that was not
 //! near could be, the point is looked up anew. The answer is that of a fresh query, whatever was asked before.
+//!
+//! Also remembered are the sides of creases that the point has been on, for whoever has to know that there is another one
+//! (`energy/creases.rs`).
 
 use super::closest_point::{ClosestPoint, SurfacePoint};
 use super::triangle_point::TrianglePoint;
-use crate::vec3::{dot, norm, scale, sub};
+use crate::vec3::{dot, norm, sub};
 
 /// Faces this much farther away than the closest one are remembered (m): about an edge of a body.
 const SLACK: f64 = 0.01;
 
 /// Most faces that are remembered of one point.
 const MOST: usize = 32;
+
+/// Most sides that are remembered of one point.
+const MOST_SIDES: usize = 8;
+
+/// Cosine of the angle (1°) below which two directions are one.
+const SAME_DIRECTION: f64 = 0.99985;
+
+/// A distance this much less (m) is as large.
+const ROUNDING: f64 = 1e-9;
 
 /// What is remembered of one point.
 #[derive(Debug, Clone)]
@@ -26,19 +38,23 @@ pub(crate) struct NearFaces {
     beyond: f64,
     /// The signed distance was at least this there, if known (m).
     clear: f64,
-    /// The last point asked for, and whether it was inside.
-    last: ([f64; 3], bool),
+    /// The last point seen of every direction of the gradient, latest first.
+    seen: Vec<Side>,
+}
+
+/// The linear function that a distance follows near a point.
+#[derive(Debug, Clone, Copy)]
+struct Side {
+    /// The point (m).
+    at: [f64; 3],
+    /// Signed distance there (m).
+    distance: f64,
+    gradient: [f64; 3],
 }
 
 impl Default for NearFaces {
     fn default() -> Self {
-        Self {
-            at: [f64::NAN; 3],
-            faces: Vec::new(),
-            beyond: 0.0,
-            clear: f64::NEG_INFINITY,
-            last: ([f64::NAN; 3], false),
-        }
+        Self { at: [f64::NAN; 3], faces: Vec::new(), beyond: 0.0, clear: f64::NEG_INFINITY, seen: Vec::new() }
     }
 }
 
@@ -49,17 +65,35 @@ impl NearFaces {
         (self.clear - norm(sub(p, self.at))).max(f64::NEG_INFINITY)
     }
 
-    /// Remembers that `p`, just projected, is at a signed `distance`.
-    pub fn set_distance(&mut self, p: [f64; 3], distance: f64) {
-        self.last = (p, distance < 0.0);
+    /// Remembers the signed distance (m) of `p`, just projected, and its gradient.
+    pub fn see(&mut self, p: [f64; 3], distance: f64, gradient: [f64; 3]) {
         if p == self.at {
             self.clear = distance;
         }
+        if self.seen.first().is_none_or(|side| side.at != p) {
+            self.seen.retain(|side| !is_same_way(side.gradient, gradient));
+            self.seen.truncate(MOST_SIDES - 1);
+            self.seen.insert(0, Side { at: p, distance, gradient });
+        }
     }
 
-    /// Whether `p`, just asked for, is inside.
-    pub fn is_inside(&self, p: [f64; 3]) -> bool {
-        self.last.0 == p && self.last.1
+    /// The linear functions that the distance was seen to follow near `p`, just seen: value at `p` (m) and gradient, its own first, then
+    /// those that are at most `band` (m) larger there, least first. It is the least of them where it is concave; those of a ridge, where
+    /// it is not, are less at `p` than it is and none of them.
+    pub fn sides(&self, p: [f64; 3], band: f64) -> Vec<(f64, [f64; 3])> {
+        let Some(here) = self.seen.iter().find(|side| side.at == p) else { return Vec::new() };
+        let extended =
+            self.seen.iter().map(|side| (side.distance + dot(side.gradient, sub(p, side.at)), side));
+        let mut others: Vec<_> = extended
+            .filter(|(distance, side)| {
+                !is_same_way(side.gradient, here.gradient) && *distance >= here.distance - ROUNDING
+            })
+            .filter(|(distance, _)| *distance <= here.distance + band)
+            .map(|(distance, side)| (distance, side.gradient))
+            .collect();
+        others.sort_by(|a, b| a.0.total_cmp(&b.0));
+        others.insert(0, (here.distance, here.gradient));
+        others
     }
 
     /// The point of `surface` closest to a finite `p`. Points farther away than `reach` (m) are not remembered.
@@ -69,7 +103,8 @@ impl NearFaces {
         }
         let found = surface.project(p)?;
         let distance = found.distance_squared.sqrt();
-        *self = Self { at: p, beyond: distance, ..Self::default() };
+        let seen = std::mem::take(&mut self.seen);
+        *self = Self { at: p, beyond: distance, seen, ..Self::default() };
         if distance <= reach + SLACK {
             self.beyond = distance + SLACK;
             self.faces = surface.faces_within(p, self.beyond);
@@ -100,49 +135,11 @@ impl NearFaces {
         // False for NaN.
         if nearest <= self.beyond - moved { best } else { None }
     }
-
-    /// Where the distance from `p`, just projected, to the remembered faces is smallest locally, if that is at most `band` (m) more than
-    /// the least: distance and unit direction from there to `p`, nearest first.
-    pub fn minima(&self, surface: &ClosestPoint, p: [f64; 3], band: f64) -> Vec<(f64, [f64; 3])> {
-        let moved = norm(sub(p, self.at));
-        let mut found: Vec<(f64, u32, TrianglePoint)> = Vec::new();
-        let mut nearest = f64::INFINITY;
-        for &(distance, face) in &self.faces {
-            if distance - moved > nearest + band {
-                break;
-            }
-            let point = surface.on_face(face, p);
-            nearest = nearest.min(point.distance_squared.sqrt());
-            found.push((point.distance_squared.sqrt(), face, point));
-        }
-        found.retain(|(distance, ..)| *distance > 0.0 && *distance <= nearest + band);
-        found.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let mut minima: Vec<(f64, [f64; 3])> = Vec::new();
-        for (k, (distance, face, point)) in found.iter().enumerate() {
-            // On the border of a face it is a minimum only if no neighbour there comes nearer, and the neighbours' is the same.
-            let border = surface.face(*face);
-            let is_on = |v: &u32| (0..3).any(|c| border[c] == *v && point.barycentric[c] > 0.0);
-            let of_border = point.barycentric.iter().filter(|b| **b > 0.0).count();
-            let is_other = |(_, other, _): &(f64, u32, TrianglePoint)| {
-                surface.face(*other).iter().filter(|v| is_on(v)).count() < of_border
-            };
-            if of_border == 3 || found[..k].iter().all(is_other) {
-                minima.push((*distance, scale(sub(p, point.position), 1.0 / distance)));
-            }
-        }
-        // Minima that look the same way are one.
-        let mut apart: Vec<(f64, [f64; 3])> = Vec::new();
-        for minimum in minima {
-            if apart.iter().all(|(_, direction)| dot(*direction, minimum.1) < SAME_DIRECTION) {
-                apart.push(minimum);
-            }
-        }
-        apart
-    }
 }
 
-/// Cosine of the angle (1°) below which two directions are one.
-const SAME_DIRECTION: f64 = 0.99985;
+fn is_same_way(a: [f64; 3], b: [f64; 3]) -> bool {
+    dot(a, b) >= SAME_DIRECTION
+}
 
 #[cfg(test)]
 mod tests {
@@ -178,26 +175,33 @@ mod tests {
     }
 
     #[test]
-    fn over_a_valley_both_slopes_are_minima_and_over_a_ridge_there_is_one() {
+    fn over_a_valley_both_slopes_are_seen_and_over_a_ridge_only_one() {
         let bent = |slope: f64| {
             let grid = shapes::grid(0.2, 0.2, 8, 8);
             let mesh = shapes::mapped(&grid, |[x, y, _]| [x - 0.1, slope * (x - 0.1).abs(), 0.1 - y]);
-            ClosestPoint::new(mesh.positions().to_vec(), mesh.faces())
-        };
-        let minima = |surface: &ClosestPoint, p: [f64; 3], band: f64| {
-            let mut near = NearFaces::default();
-            near.project(surface, p, 0.05).unwrap();
-            near.minima(surface, p, band)
+            Surface::<f64>::from_mesh(&mesh)
         };
         let p = [1e-4, 0.005, 0.003];
-        let found = minima(&bent(1.0), p, 1e-3);
+        let seen_from = |surface: &Surface<f64>, band: f64, points: &[[f64; 3]]| {
+            let mut near = NearFaces::default();
+            points.iter().for_each(|p| {
+                surface.gap_near(*p, Distance::ClosestPoint, 0.05, &mut near);
+            });
+            near.sides(p, band)
+        };
+        let across = [[-3e-4, 0.0052, 0.003], p];
+        let valley = bent(1.0);
+        let found = seen_from(&valley, 1e-3, &across);
         assert_eq!(found.len(), 2);
         // Of p = (x, y) over |x|: (y ∓ x)/√2.
         for ((distance, _), expected) in found.iter().zip([p[1] - p[0], p[1] + p[0]]) {
             assert!((distance - expected / 2f64.sqrt()).abs() < 1e-12);
         }
         assert!(dot(found[0].1, found[1].1).abs() < 1e-12);
-        assert_eq!(minima(&bent(1.0), p, 1e-5).len(), 1);
-        assert_eq!(minima(&bent(-1.0), p, 1e-3).len(), 1);
+        // Farther off than asked for; where it was not looked; over a ridge.
+        assert_eq!(seen_from(&valley, 1e-5, &across).len(), 1);
+        assert_eq!(seen_from(&valley, 1e-3, &[p]).len(), 1);
+        assert!(seen_from(&valley, 1e-3, &across[..1]).is_empty());
+        assert_eq!(seen_from(&bent(-1.0), 1e-3, &across).len(), 1);
     }
 }

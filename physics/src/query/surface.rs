@@ -34,9 +34,6 @@ pub struct Gap<T> {
     pub vertex: u32,
 }
 
-/// How far from a face its other side is asked for (m).
-const SHEET_MARGIN: f64 = 1e-8;
-
 /// Spacing of the numbers at a query point (m) above which nearest vertices are found in `f64`.
 const FAR_SPACING: f64 = 1e-4;
 
@@ -155,7 +152,7 @@ impl<T: Real> Surface<T> {
         }
         let Some(found) = near.project(tree, q, reach) else { return not_a_gap() };
         let gap = signed_gap(p, &found, self.is_inside(q, &found, distance), tree);
-        near.set_distance(q, gap.gap.to_f64());
+        near.see(q, gap.gap.to_f64(), vec3::to_f64(gap.gradient));
         gap
     }
 
@@ -167,28 +164,8 @@ impl<T: Real> Surface<T> {
         }
     }
 
-    /// The sides of a face within which `p` would be inside on either side, at most `band` (m) away: distance and direction as in
-    /// [`gap`](Self::gap), then of the other side. Such is what is inside another part of a face that is not all inside.
-    pub(crate) fn sheet_sides(
-        &self,
-        p: [f64; 3],
-        band: f64,
-        distance: Distance,
-    ) -> Option<[(f64, [f64; 3]); 2]> {
-        let tree = self.tree(distance)?;
-        let found = tree.project_within(p, 0.5 * band)?;
-        let (depth, direction) = found.signed(p, true);
-        // As far on the other side, and not on the face itself.
-        let beyond = vec3::add_scaled(p, 2.0 * (SHEET_MARGIN - depth), direction);
-        let other = tree.project_within(beyond, band)?;
-        let is_sheet = self.is_inside(beyond, &other, distance);
-        let (_, other) = other.signed(beyond, true);
-        // Seen from p, the other side is as far off as this one.
-        (is_sheet && vec3::dot(direction, other) < 0.0).then_some([(depth, direction), (-depth, other)])
-    }
-
     /// The faces that a distance is measured to; none where it is measured to vertices.
-    pub(crate) fn tree(&self, distance: Distance) -> Option<&ClosestPoint> {
+    fn tree(&self, distance: Distance) -> Option<&ClosestPoint> {
         match distance {
             Distance::NearestVertex => None,
             Distance::Union if self.is_closed() => Some(self.union_distance().kept()),
