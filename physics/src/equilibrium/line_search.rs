@@ -6,8 +6,8 @@ use crate::vec3::is_finite;
 /// Armijo: the share of the decrease that the slope at the start predicts. Half of it is what the minimum along the line has.
 const DECREASE: f64 = 0.1;
 
-/// Most trials: what they ran against, the next model knows.
-const TRIALS: usize = 6;
+/// Most trials.
+const TRIALS: usize = 12;
 
 /// Tries lengths from `longest` downwards from a state of `energy` and derivative `slope < 0` along the line. A trial that is too long
 /// is followed by the minimum of the parabola through value and slope at the start and the value of the trial, between a tenth and

@@ -88,10 +88,18 @@ impl<'a> Problem<'a> {
     /// # Panics
     /// As [`value`](Self::value).
     pub fn relative_gradient(&self, posed: &[[f64; 3]]) -> f64 {
-        let (_, mut gradient) = self.value_and_gradient(posed);
+        let (_, gradient) = self.value_and_gradient(posed);
+        // Of the sides that are known, and of those around, which may replace some of them.
+        let known = self.residual(posed, &gradient);
         self.look_around(posed);
-        self.creases(posed, ON_CREASE).balance(&mut gradient);
-        relative(norm(&gradient), self.force_scale(posed))
+        relative(known.min(self.residual(posed, &gradient)), self.force_scale(posed))
+    }
+
+    /// Norm of the `gradient` at `posed`, just evaluated, that is left where the forces of all known sides of creases are combined.
+    pub(super) fn residual(&self, posed: &[[f64; 3]], gradient: &[[f64; 3]]) -> f64 {
+        let mut left = gradient.to_vec();
+        self.creases(posed, ON_CREASE).balance(&mut left);
+        norm(&left)
     }
 
     /// Forgets what former positions were near to.

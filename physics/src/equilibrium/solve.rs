@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use super::hessian::Hessian;
 use super::line_search::search;
-use super::problem::{ON_CREASE, norm, relative};
+use super::problem::{norm, relative};
 use super::{EquilibriumError, Problem, Progress, Solution, SolverSettings, Step, Stop};
 use crate::vec3::{add_scaled, distance_squared, dot, is_finite, norm_squared};
 
@@ -189,9 +189,7 @@ fn advance(
 
 /// Whether the forces at `state`, compared with `scale`, balance within `tolerance`.
 fn is_balanced(problem: &Problem<'_>, state: &State, scale: f64, tolerance: f64) -> bool {
-    let mut gradient = state.gradient.clone();
-    problem.creases(&state.positions, ON_CREASE).balance(&mut gradient);
-    relative(norm(&gradient), scale) <= tolerance
+    relative(problem.residual(&state.positions, &state.gradient), scale) <= tolerance
 }
 
 /// Whether the last [`WINDOW`] iterations gained a share of the energy that is worth while.

@@ -19,7 +19,7 @@ const SLACK: f64 = 0.01;
 const MOST: usize = 32;
 
 /// Most sides that are remembered of one point.
-const MOST_SIDES: usize = 8;
+const MOST_SIDES: usize = 16;
 
 /// Cosine of the angle (1°) below which two directions are one.
 const SAME_DIRECTION: f64 = 0.99985;
