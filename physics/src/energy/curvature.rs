@@ -1,5 +1,5 @@
-//! Curvature of the energies: a positive semidefinite approximation of their second derivatives, which preconditions the
-//! static solver.
+//! Curvature of the energies: a positive semidefinite approximation of their second derivatives, by which the
+//! static solver chooses its steps.
 //!
 //! An approximation is enough, because the solver's line search only trusts values and gradients; positive semidefinite,
 //! because only then is its step a descent direction. Every term states in its file what it keeps and what it leaves out
@@ -9,8 +9,8 @@
 pub trait CurvatureSink {
     /// Adds `block` at row `i`, column `j` of vertices, and, for `i ≠ j`, its transpose at row `j`, column `i`.
     ///
-    /// Off the diagonal, the vertex pairs a term adds to must not depend on positions, but for contact between garments
-    /// ([`SceneEnergy::couples_garments`](super::SceneEnergy::couples_garments)).
+    /// Off the diagonal, the vertex pairs a term adds to should not depend on positions, but for contact between garments: the solver
+    /// orders its matrix anew whenever a pair is new.
     fn add(&mut self, i: usize, j: usize, block: [[f64; 3]; 3]);
 }
 

@@ -7,7 +7,7 @@ use super::holding::Holding;
 use super::layer_collision::InnerLayer;
 use super::repulsion::Repulsion;
 use super::strain::{Needle, Strain};
-use super::{EnergyError, EnergySettings, GarmentTerm, Term};
+use super::{ContactPoints, EnergyError, EnergySettings, GarmentTerm, Term};
 use crate::mesh::{Topology, TriMesh};
 use crate::real::Real;
 
@@ -15,6 +15,7 @@ use crate::real::Real;
 #[derive(Debug)]
 pub struct GarmentEnergies<T: Real> {
     vertex_count: usize,
+    contact_points: ContactPoints,
     as_inner: InnerLayer,
     terms: Vec<(Term, Box<dyn GarmentTerm<T>>)>,
 }
@@ -48,17 +49,19 @@ impl<T: Real> GarmentEnergies<T> {
         let bending =
             Bending::with_median_edge(rest, &topology.hinges, material.bending_stiffness, median_edge);
         let needle = Needle { ratio: settings.needle_ratio, median_edge };
+        let contact_points = ContactPoints::new(rest, topology);
         let mut terms: Vec<(Term, Box<dyn GarmentTerm<T>>)> = vec![
             (Term::Strain, Box::new(Strain::with_needle(rest, material, needle))),
             (Term::Bending, Box::new(bending)),
             (Term::Gravity, Box::new(Gravity::new(rest, material, settings.gravity_acceleration))),
-            (Term::BodyCollision, Box::new(BodyCollision)),
+            (Term::BodyCollision, Box::new(BodyCollision(contact_points.clone()))),
             (Term::Repulsion, Box::new(Repulsion::new(topology))),
         ];
         if holding {
             terms.push((Term::Holding, Box::new(Holding::new(rest, settings.holding_fraction))));
         }
-        Ok(Self { vertex_count, as_inner: InnerLayer::new(rest, topology, median_edge), terms })
+        let as_inner = InnerLayer::new(rest, topology, median_edge);
+        Ok(Self { vertex_count, contact_points, as_inner, terms })
     }
 
     /// Number of vertices.
@@ -74,6 +77,11 @@ impl<T: Real> GarmentEnergies<T> {
     /// The energies of this garment, in the order of [`Term::ALL`].
     pub fn terms(&self) -> impl Iterator<Item = (Term, &dyn GarmentTerm<T>)> {
         self.terms.iter().map(|(term, energy)| (*term, energy.as_ref()))
+    }
+
+    /// Where it is kept off the body and other garments.
+    pub fn contact_points(&self) -> &ContactPoints {
+        &self.contact_points
     }
 
     /// As others see it that lie on it.

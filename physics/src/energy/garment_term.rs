@@ -19,7 +19,7 @@ pub struct GarmentState<'a, T> {
     pub holding_reference: &'a [[T; 3]],
     /// Reads the heights of the holding energy off posed positions `[V]`; `None`: off canonical ones.
     pub pull_back: Option<&'a [HeightRow]>,
-    /// Signed distance of every posed vertex to the body `[V]`; empty when no active term needs it.
+    /// Signed distance of every contact point to the body, those of the vertices first; empty when no active term needs it.
     pub gaps: &'a [Gap<T>],
     /// Constants of the scene.
     pub settings: &'a EnergySettings,

@@ -5,10 +5,10 @@
 //! | [`strain`] | posed garment | `area·thickness·(λ/2 tr(G)² + μ tr(G²))` (triangles) |
 //! | [`bending`] | posed garment | `k/2·α²` (interior edges) |
 //! | [`gravity`] | posed garment | `m·g·y` (vertices) |
-//! | [`body_collision`] | posed garment, body | `max(ε − d, 0)³` (vertices) |
+//! | [`body_collision`] | posed garment, body | `max(ε − d, 0)³` (vertices, and points between them) |
 //! | [`repulsion`] | posed garment | `−log d²` (close vertex pairs that share no edge), over `N` |
 //! | [`holding`] | posed garment, pulled back; paper: canonical garment | `(y − y_ref)²` (top tenth of the vertices) |
-//! | [`layer_collision`] | two posed garments | `max(ε − d, 0)³` (outer vertices, distance to the inner garment) |
+//! | [`layer_collision`] | two posed garments | `max(ε − d, 0)³` (the same points of the outer one, distance to the inner garment) |
 //! | [`layer_distance`] | two posed garments, body | `max(d_inner − d_outer, 0)³` (pairs over one body vertex) |
 //!
 //! Weights never live in a term: [`SceneEnergy`] multiplies them in. Elements are evaluated in `f64` whatever the scalar of
@@ -22,6 +22,8 @@
 pub mod bending;
 pub mod body_collision;
 mod cell_grid;
+mod contact_points;
+mod creases;
 mod curvature;
 mod difference_quotient;
 mod elements;
@@ -46,6 +48,8 @@ mod term;
 #[cfg(test)]
 pub(crate) mod tests;
 
+pub use contact_points::{ContactPoints, ContactSamples};
+pub(crate) use creases::{Creases, reach as crease_reach};
 pub use curvature::CurvatureSink;
 pub use elements::Weighted;
 pub use error::EnergyError;
@@ -53,7 +57,7 @@ pub use garment::GarmentEnergies;
 pub use garment_term::{GarmentState, GarmentTerm};
 pub use material::Material;
 pub use scene::{SceneEnergy, SceneGarment, SceneLayers};
-pub use scene_curvature::LayerTouch;
+pub(crate) use scene_sum::BodyMemory;
 pub use scene_sum::{SceneValue, weighted};
 pub use settings::{EnergySettings, LayerContact, LayerGate};
 pub use term::{Term, TermMap};

@@ -3,10 +3,11 @@
 use rayon::prelude::*;
 
 use super::elements::GRAIN;
-use super::layer_collision::PosedInnerLayer;
+use super::layer_collision::{OuterPoints, PosedInnerLayer};
 use super::layer_distance::{BodyBuckets, LayerGaps, layer_distance};
-use super::{GarmentState, SceneEnergy, SceneLayers, Term, TermMap, Weighted};
+use super::{EnergySettings, GarmentState, SceneEnergy, SceneLayers, Term, TermMap, Weighted};
 use crate::query::Gap;
+use crate::query::near_faces::NearFaces;
 use crate::real::Real;
 use crate::vec3;
 
@@ -54,7 +55,22 @@ impl<T: Real> Shared<'_, T> {
     }
 
     fn layer_gaps(&self) -> Option<LayerGaps<'_, T>> {
-        self.buckets.as_ref().map(|buckets| LayerGaps { gaps: &self.gaps, buckets })
+        let gaps = &self.gaps[..self.gaps.len().min(self.state.posed.len())];
+        self.buckets.as_ref().map(|buckets| LayerGaps { gaps, buckets })
+    }
+}
+
+/// What is remembered of the contact points of every garment, for positions that change little from call to call.
+pub(crate) type BodyMemory = Vec<Vec<NearFaces>>;
+
+/// The memory of every one of `count` garments, if there is one.
+pub(super) fn memories(memory: Option<&mut BodyMemory>, count: usize) -> Vec<Option<&mut Vec<NearFaces>>> {
+    match memory {
+        None => (0..count).map(|_| None).collect(),
+        Some(memory) => {
+            memory.resize_with(count, Vec::new);
+            memory.iter_mut().map(Some).collect()
+        }
     }
 }
 
@@ -74,7 +90,15 @@ impl<T: Real> SceneEnergy<T> {
     /// If a length is not that of the scene, or a scene does not pass [`check`](Self::check): these are errors of the
     /// calling code, not of its input.
     pub fn evaluate(&self, posed: &[[T; 3]], canonical: &[[T; 3]]) -> SceneValue<T> {
-        self.run(posed, canonical, Selection::Weighted, true)
+        self.run(posed, canonical, Selection::Weighted, true, None)
+    }
+
+    /// The same, for positions that are near those of earlier calls with the same `memory`.
+    ///
+    /// # Panics
+    /// As [`evaluate`](Self::evaluate).
+    pub(crate) fn evaluate_near(&self, posed: &[[T; 3]], memory: &mut BodyMemory) -> SceneValue<T> {
+        self.run(posed, &[], Selection::Weighted, true, Some(memory))
     }
 
     /// The same value, without gradients.
@@ -82,7 +106,7 @@ impl<T: Real> SceneEnergy<T> {
     /// # Panics
     /// As [`evaluate`](Self::evaluate).
     pub fn value(&self, posed: &[[T; 3]], canonical: &[[T; 3]]) -> SceneValue<T> {
-        self.run(posed, canonical, Selection::Weighted, false)
+        self.run(posed, canonical, Selection::Weighted, false, None)
     }
 
     /// All raw values, whatever the weights, without gradients: what a score reports. A garment that is not held has no
@@ -91,7 +115,7 @@ impl<T: Real> SceneEnergy<T> {
     /// # Panics
     /// As [`evaluate`](Self::evaluate).
     pub fn raw(&self, posed: &[[T; 3]], canonical: &[[T; 3]]) -> SceneValue<T> {
-        self.run(posed, canonical, Selection::All, false)
+        self.run(posed, canonical, Selection::All, false, None)
     }
 
     fn run(
@@ -100,6 +124,7 @@ impl<T: Real> SceneEnergy<T> {
         canonical: &[[T; 3]],
         selection: Selection,
         with_gradient: bool,
+        memory: Option<&mut BodyMemory>,
     ) -> SceneValue<T> {
         let count = self.vertex_count();
         assert_eq!(posed.len(), count, "posed positions of all garments of the scene");
@@ -116,9 +141,10 @@ impl<T: Real> SceneEnergy<T> {
         let shared: Vec<Shared<'_, T>> = self
             .ranges()
             .into_par_iter()
+            .zip(memories(memory, self.garments.len()))
             .enumerate()
-            .map(|(i, range)| {
-                self.share(i, &posed[range.clone()], canonical.get(range).unwrap_or(&[]), &is_active)
+            .map(|(i, (range, near))| {
+                self.share(i, &posed[range.clone()], canonical.get(range).unwrap_or(&[]), &is_active, near)
             })
             .collect();
 
@@ -191,6 +217,7 @@ impl<T: Real> SceneEnergy<T> {
         posed: &'a [[T; 3]],
         canonical: &'a [[T; 3]],
         is_active: &(impl Fn(Term, f64) -> bool + Sync),
+        near: Option<&mut Vec<NearFaces>>,
     ) -> Shared<'a, T> {
         let garment = &self.garments[i];
         let in_pair = |term: Term, is_side: fn(&SceneLayers, usize) -> bool| {
@@ -200,11 +227,9 @@ impl<T: Real> SceneEnergy<T> {
         let is_inner = in_pair(Term::LayerCollision, |pair, i| pair.inner == i);
         let needs_gaps = in_distance || is_active(Term::BodyCollision, garment.weights[Term::BodyCollision]);
 
-        let gaps: Vec<Gap<T>> = if needs_gaps {
-            let gap = |p: &[T; 3]| self.body.gap(*p, self.settings.distance);
-            posed.par_iter().with_min_len(GRAIN / 4).map(gap).collect()
-        } else {
-            Vec::new()
+        let gaps = match needs_gaps {
+            true => self.gaps(i, posed, in_distance, near),
+            false => Vec::new(),
         };
         let body_vertex_count = self.body.positions.len();
         let radius = self.settings.layer_distance_radius;
@@ -217,10 +242,38 @@ impl<T: Real> SceneEnergy<T> {
                 gaps: &[],
                 settings: &self.settings,
             },
-            buckets: in_distance.then(|| BodyBuckets::new(&gaps, body_vertex_count, radius)),
+            buckets: in_distance.then(|| BodyBuckets::new(&gaps[..posed.len()], body_vertex_count, radius)),
             gaps,
             as_inner: is_inner.then(|| garment.energies.as_inner().posed(posed, self.settings.layer_contact)),
         }
+    }
+
+    /// Signed distances of the contact points of garment `i` to the body; with a memory, `exact` ones only where they count as contact.
+    fn gaps(
+        &self,
+        i: usize,
+        posed: &[[T; 3]],
+        exact: bool,
+        near: Option<&mut Vec<NearFaces>>,
+    ) -> Vec<Gap<T>> {
+        let EnergySettings { distance, body_samples, body_collision_epsilon, .. } = self.settings;
+        let points = self.garments[i].energies.contact_points().at(posed, body_samples);
+        let points = points.par_iter().with_min_len(GRAIN / 4);
+        let Some(near) = near else {
+            return points.map(|p| self.body.gap(*p, distance)).collect();
+        };
+        near.resize_with(points.len(), NearFaces::default);
+        let reach = if exact { f64::INFINITY } else { body_collision_epsilon };
+        points.zip(near).map(|(p, near)| self.body.gap_near(*p, distance, reach, near)).collect()
+    }
+
+    /// The points of the outer garment of a pair that are kept off the inner one.
+    pub(super) fn outer_points<'a>(&'a self, pair: &SceneLayers, posed: &[[T; 3]]) -> OuterPoints<'a, T> {
+        OuterPoints::new(
+            self.garments[pair.outer].energies.contact_points(),
+            posed,
+            self.settings.layer_samples,
+        )
     }
 
     fn pair(
@@ -246,7 +299,7 @@ impl<T: Real> SceneEnergy<T> {
                     self.garments[pair.inner].energies.as_inner().evaluate(
                         inner.state.posed,
                         posed_inner,
-                        outer.state.posed,
+                        self.outer_points(pair, outer.state.posed),
                         &self.settings,
                         targets,
                     )

@@ -1,6 +1,6 @@
 //! The switches and constants of the energies.
 
-use super::{EnergyError, Material};
+use super::{ContactSamples, EnergyError, Material};
 use crate::query::Distance;
 
 /// How the signed distance of an outer vertex to an inner garment is measured.
@@ -41,8 +41,12 @@ pub struct EnergySettings {
     pub needle_ratio: f64,
     /// Margin ε between garment and body (m); paper: 0.002.
     pub body_collision_epsilon: f64,
+    /// Points of a garment that are kept off the body; paper: vertices.
+    pub body_samples: ContactSamples,
     /// Margin ε between two garments (m); paper: 0.002.
     pub layer_collision_epsilon: f64,
+    /// Points of the outer garment that are kept off the inner one; paper: vertices.
+    pub layer_samples: ContactSamples,
     /// How the distance to the body is measured; paper: nearest vertex.
     pub distance: Distance,
     /// Vertices of one garment repel each other below this distance (m); paper: 0.1.
@@ -77,7 +81,9 @@ impl Default for EnergySettings {
             material: Material::default(),
             needle_ratio: 1e-2,
             body_collision_epsilon: 0.002,
+            body_samples: ContactSamples::Vertices,
             layer_collision_epsilon: 0.002,
+            layer_samples: ContactSamples::Vertices,
             distance: Distance::NearestVertex,
             repulsion_radius: 0.1,
             repulsion_normalised: true,

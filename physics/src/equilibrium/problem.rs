@@ -1,10 +1,10 @@
 //! The energy of a scene as a function of posed positions alone.
 
 use super::EquilibriumError;
-use super::nonsmooth::{self, NonsmoothPoint};
-use crate::energy::{CurvatureSink, LayerTouch, SceneEnergy, Term};
+use crate::energy::{BodyMemory, Creases, CurvatureSink, SceneEnergy, Term};
 use crate::vec3::norm_squared;
 use std::collections::BTreeMap;
+use std::sync::{Mutex, MutexGuard};
 
 /// A scene to be brought into equilibrium.
 #[derive(Debug)]
@@ -12,6 +12,8 @@ pub struct Problem<'a> {
     energy: &'a SceneEnergy<f64>,
     /// The scene with one of its terms each, for the relative gradient.
     single_terms: Vec<SceneEnergy<f64>>,
+    /// The faces of the body near every contact point where it was last looked up, and the sides of creases that it has been on.
+    memory: Mutex<BodyMemory>,
 }
 
 impl<'a> Problem<'a> {
@@ -26,7 +28,7 @@ impl<'a> Problem<'a> {
             return Err(EquilibriumError::Canonical);
         }
         let single_terms = Term::ALL.into_iter().filter_map(|term| energy.only(term)).collect();
-        Ok(Self { energy, single_terms })
+        Ok(Self { energy, single_terms, memory: Mutex::default() })
     }
 
     /// Number of vertices.
@@ -87,59 +89,51 @@ impl<'a> Problem<'a> {
     /// As [`value`](Self::value).
     pub fn relative_gradient(&self, posed: &[[f64; 3]]) -> f64 {
         let (_, gradient) = self.value_and_gradient(posed);
-        relative(self.unbalanced_norm(posed, &gradient), self.force_scale(posed))
+        // Of the sides that are known, and of those around, which may replace some of them.
+        let known = self.residual(posed, &gradient);
+        self.look_around(posed);
+        relative(known.min(self.residual(posed, &gradient)), self.force_scale(posed))
     }
 
-    /// Norm of `gradient`, which is that at `posed`, without what balances at nonsmooth points.
-    pub(super) fn unbalanced_norm(&self, posed: &[[f64; 3]], gradient: &[[f64; 3]]) -> f64 {
-        let mut gradient = gradient.to_vec();
-        nonsmooth::balance(&self.nonsmooth_points(posed, &gradient, 0.0), &mut gradient);
-        norm(&gradient)
+    /// Norm of the `gradient` at `posed`, just evaluated, that is left where the forces of all known sides of creases are combined.
+    pub(super) fn residual(&self, posed: &[[f64; 3]], gradient: &[[f64; 3]]) -> f64 {
+        let mut left = gradient.to_vec();
+        self.creases(posed, ON_CREASE).balance(&mut left);
+        norm(&left)
     }
 
-    /// Vertices that rest on a nonsmooth point, see [`nonsmooth::nonsmooth_points`].
-    pub(super) fn nonsmooth_points(
-        &self,
-        posed: &[[f64; 3]],
-        gradient: &[[f64; 3]],
-        least: f64,
-    ) -> Vec<NonsmoothPoint> {
-        nonsmooth::nonsmooth_points(self.energy, posed, gradient, least)
+    /// Forgets what former positions were near to.
+    pub(super) fn forget(&self) {
+        self.memory().clear();
     }
 
-    /// Positions with the vertices that are driven against a nonsmooth point on it; `None` if there is no such vertex.
-    pub(super) fn onto_nonsmooth_points(
-        &self,
-        posed: &[[f64; 3]],
-        gradient: &[[f64; 3]],
-        least: f64,
-    ) -> Option<Vec<[f64; 3]>> {
-        let moved = nonsmooth::onto_nonsmooth_points(self.energy, posed, gradient, least);
-        let mut positions = posed.to_vec();
-        moved.iter().for_each(|(v, p)| positions[*v] = *p);
-        (!moved.is_empty()).then_some(positions)
+    /// Finds the creases that points in contact at `posed`, just evaluated, lie on.
+    pub(super) fn look_around(&self, posed: &[[f64; 3]]) {
+        self.energy.look_around(posed, &mut self.memory(), ON_CREASE);
     }
 
-    /// As [`SceneEnergy::couples_garments`].
-    pub(super) fn couples_garments(&self) -> bool {
-        self.energy.couples_garments()
-    }
-
-    /// As [`SceneEnergy::layer_touches`].
-    pub(super) fn layer_touches(&self, posed: &[[f64; 3]]) -> Vec<LayerTouch> {
-        self.energy.layer_touches(posed)
+    /// Where contact with the body at `posed`, just evaluated, is known to have sides at most `band` (m) farther away than the nearest.
+    pub(super) fn creases(&self, posed: &[[f64; 3]], band: f64) -> Creases<'_> {
+        self.energy.creases(posed, &self.memory(), band)
     }
 
     /// Passes a positive semidefinite approximation of the Hessian with respect to posed positions to `sink`.
     pub(super) fn curvature(&self, posed: &[[f64; 3]], sink: &mut dyn CurvatureSink) {
-        self.energy.curvature(posed, &[], sink);
+        self.energy.curvature_near(posed, &[], sink, Some(&mut self.memory()));
     }
 
     fn evaluate(&self, energy: &SceneEnergy<f64>, posed: &[[f64; 3]]) -> (f64, Vec<[f64; 3]>) {
-        let value = energy.evaluate(posed, &[]);
+        let value = energy.evaluate_near(posed, &mut self.memory());
         (value.total, value.posed_gradient)
     }
+
+    fn memory(&self) -> MutexGuard<'_, BodyMemory> {
+        self.memory.lock().expect("no evaluation panics")
+    }
 }
+
+/// Distances that differ by less (m) are equal: the point is on a crease.
+pub(super) const ON_CREASE: f64 = 1e-5;
 
 /// `|g|/scale`, 0 for no force at all.
 pub(super) fn relative(gradient_norm: f64, scale: f64) -> f64 {

@@ -19,23 +19,11 @@ pub struct SolverSettings {
     /// No vertex goes farther than this from its start (m), but for the step that leads there; `None`: no bound. Where the bound is
     /// passed the solver stops as [`super::Stop::Escaped`]. Default 1 m: what nothing holds falls for ever.
     pub escape_distance: Option<f64>,
-    /// Iterations between two factorisations of the preconditioner.
-    pub refactorise_every: usize,
-    /// Pairs of steps and gradient changes that the quasi-Newton matrix remembers.
-    pub memory: usize,
 }
 
 impl Default for SolverSettings {
     fn default() -> Self {
-        Self {
-            tolerance: 1e-4,
-            iterations: 2000,
-            time: None,
-            step_bound: 0.05,
-            escape_distance: Some(1.0),
-            refactorise_every: 10,
-            memory: 20,
-        }
+        Self { tolerance: 1e-4, iterations: 500, time: None, step_bound: 0.05, escape_distance: Some(1.0) }
     }
 }
 
@@ -54,9 +42,6 @@ impl SolverSettings {
             if !(value > 0.0 && value.is_finite()) {
                 return fail(setting, value, "finite and greater than 0");
             }
-        }
-        if self.refactorise_every == 0 {
-            return fail("refactorise_every", 0.0, "at least 1");
         }
         Ok(())
     }

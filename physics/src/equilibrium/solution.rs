@@ -11,9 +11,10 @@ pub enum Stop {
     Iterations,
     /// The time was used up.
     Time,
-    /// No step along the descent direction lowers the energy, even with a fresh preconditioner and an empty memory, or
-    /// the last 60 steps together gained less than a billionth of what all gained: some vertices rest against a jump of
-    /// the energy, or creep along nonsmooth points.
+    /// The last 10 steps together gained less than a millionth of the tolerance of what all gained (1e-10 with the usual one): the energy
+    /// stands still, though the forces of some vertices at creases of the contact do not balance.
+    Settled,
+    /// No step along the descent direction lowers the energy, however short: some vertices rest against a jump of the energy.
     Stalled,
     /// A vertex went farther from its start than allowed: nothing holds that part of the garment.
     Escaped,
@@ -28,6 +29,7 @@ impl Stop {
             Self::Converged => "converged",
             Self::Iterations => "iterations",
             Self::Time => "time",
+            Self::Settled => "settled",
             Self::Stalled => "stalled",
             Self::Escaped => "escaped",
             Self::Cancelled => "cancelled",
@@ -78,7 +80,7 @@ pub struct Solution {
     pub relative_gradient: f64,
     /// Start and every accepted step.
     pub history: Vec<Step>,
-    /// Factorisations of the preconditioner.
+    /// Factorisations of the matrix.
     pub factorisations: usize,
 }
 

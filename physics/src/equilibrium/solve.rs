@@ -3,29 +3,50 @@
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use super::advance::{Model, State, advance, longest};
-use super::lbfgs::Lbfgs;
-use super::nonsmooth::{NonsmoothPoint, balance};
-use super::preconditioner::Preconditioner;
+use super::hessian::Hessian;
+use super::line_search::search;
 use super::problem::{norm, relative};
 use super::{EquilibriumError, Problem, Progress, Solution, SolverSettings, Step, Stop};
-use crate::vec3::{distance_squared, is_finite, sub};
+use crate::vec3::{add_scaled, distance_squared, dot, is_finite, norm_squared};
 
-/// Iterations between two looks at the scale of the forces, which costs an evaluation of
-/// each term.
+/// Iterations between two looks at the scale of the forces, which costs an evaluation of each term.
 const LOOK_EVERY: usize = 10;
 
-/// The iteration from which on vertices are kept on nonsmooth points: before, they only pass.
-const FIRST_LOOK: usize = 10;
+/// Levenberg's shift at first, at least and at most, in units of the mean diagonal entry. It follows the steps: what no term holds (a
+/// rigid motion, a fold that opens) and what the model leaves out would be a step of any length otherwise.
+const SHIFT: [f64; 3] = [1e-2, 1e-6, 1e-2];
+
+/// Factors on the shift after a full step that gained a good part of what its model promised, and after one that had to be shortened.
+const FACTORS: [f64; 2] = [0.3, 3.0];
+
+/// From this share of the decrease that the slope predicts the gain is good: half of the half that it is if the model holds.
+const GOOD: f64 = 0.25;
+
+/// Where no step lowers the energy, most models that are tried, of more sides, narrower creases and a larger shift each.
+const MOST_MODELS: usize = 10;
+
+/// A larger shift than this is not tried.
+const LARGEST_SHIFT: f64 = 1.0;
+
+/// Width of the creases in the model (m), in units of the last step and at least and at most: the model sees across a crease a small
+/// part of how far a step goes.
+const CREASE_WIDTH: (f64, [f64; 2]) = (0.01, [1e-7, 1e-3]);
 
 /// Progress is judged over this many iterations.
-const WINDOW: usize = 60;
+const WINDOW: usize = 10;
 
-/// Less than this share of all that was gained, gained over [`WINDOW`] iterations, is no progress.
-const LEAST_GAIN: f64 = 1e-9;
+/// Less than this share of all that was gained, in units of the tolerance, gained over [`WINDOW`] iterations, is no progress.
+const LEAST_GAIN: f64 = 1e-6;
 
-/// Most times that vertices are held in one iteration.
-const MOST_HOLDS: usize = 8;
+/// A state of the search.
+pub(super) struct State {
+    /// Posed positions (m).
+    pub positions: Vec<[f64; 3]>,
+    /// Weighted sum of all energies there (J).
+    pub energy: f64,
+    /// Its gradient (N).
+    pub gradient: Vec<[f64; 3]>,
+}
 
 /// Lowers the energy of `problem` from posed positions `start` `[ΣV, 3]` (m) until it cannot or may not be lowered any
 /// more; [`Solution::stop`] says which. `observer` sees the start and every accepted step, and can end the search.
@@ -42,7 +63,9 @@ pub fn solve(
 ) -> Result<Solution, EquilibriumError> {
     settings.check()?;
     let clock = Instant::now();
+    problem.forget();
     let mut state = first_state(problem, start)?;
+    problem.look_around(start);
     let mut step = Step {
         iteration: 0,
         energy: state.energy,
@@ -52,59 +75,28 @@ pub fn solve(
         milliseconds: 0.0,
     };
     let mut force_scale = problem.force_scale(start);
-    let mut preconditioner: Option<Preconditioner> = None;
-    let mut memory = Lbfgs::new(settings.memory);
-    let mut age = 0;
-    // Vertices before nonsmooth points that made the last step short.
-    let mut blocking: Vec<usize> = Vec::new();
-    // Vertices at discontinuities: held until the next look.
-    let mut at_discontinuities: Vec<usize> = Vec::new();
-    // The positions before the last step, and the gradient there.
-    let mut last: Option<(Vec<[f64; 3]>, Vec<[f64; 3]>)> = None;
-    let mut history = Vec::new();
-
+    let mut hessian = Hessian::new(problem, start);
+    let [mut shift, ..] = SHIFT;
+    let mut reach = f64::INFINITY;
+    let mut history: Vec<Step> = Vec::new();
     let stop = loop {
         if step.iteration.is_multiple_of(LOOK_EVERY) && step.iteration > 0 {
             force_scale = problem.force_scale(&state.positions);
-            at_discontinuities.clear();
-        }
-        // Vertices of a smaller gradient than this may all be wrong together.
-        let least = 0.1 * settings.tolerance * force_scale / (state.positions.len() as f64).sqrt();
-        let looks_at_nonsmooth = step.iteration >= FIRST_LOOK;
-        if looks_at_nonsmooth
-            && let Some(positions) = problem.onto_nonsmooth_points(&state.positions, &state.gradient, least)
-        {
-            let (energy, gradient) = problem.value_and_gradient(&positions);
-            step.evaluations += 1;
-            if energy < state.energy && gradient.iter().all(|g| is_finite(*g)) {
-                state = State { positions, energy, gradient };
-                step = Step { energy, gradient_norm: norm(&state.gradient), ..step };
-            }
         }
         step.milliseconds = 1e3 * clock.elapsed().as_secs_f64();
         history.push(step);
         if observer(&Progress { step: &step, positions: &state.positions }).is_break() {
             break Stop::Cancelled;
         }
-        let mut nonsmooth: Vec<NonsmoothPoint> = match looks_at_nonsmooth {
-            true => problem.nonsmooth_points(&state.positions, &state.gradient, least),
-            false => Vec::new(),
-        };
-        let mut balanced = state.gradient.clone();
-        balance(&nonsmooth, &mut balanced);
-        let residual = norm(&balanced);
-        if let Some((positions, gradient)) = last.take() {
-            memory.push(difference(&state.positions, &positions), difference(&balanced, &gradient));
-        }
         // The scale of some iterations ago is only believed when it says no.
-        if relative(residual, force_scale) <= settings.tolerance {
+        if is_balanced(problem, &state, force_scale, settings.tolerance) {
             force_scale = problem.force_scale(&state.positions);
-            if relative(residual, force_scale) <= settings.tolerance {
+            if is_balanced(problem, &state, force_scale, settings.tolerance) {
                 break Stop::Converged;
             }
         }
-        if !is_progressing(&history) {
-            break Stop::Stalled;
+        if !is_progressing(&history, settings.tolerance) {
+            break Stop::Settled;
         }
         if let Some(bound) = settings.escape_distance {
             let is_far = |(p, q): (&[f64; 3], &[f64; 3])| distance_squared(*p, *q) > bound * bound;
@@ -119,73 +111,93 @@ pub fn solve(
             break Stop::Time;
         }
 
-        let preconditioner = preconditioner.get_or_insert_with(|| {
-            age = settings.refactorise_every;
-            Preconditioner::new(problem, start)
-        });
-        // They had the last step, the others have this one.
-        nonsmooth.extend(blocking.drain(..).map(|vertex| NonsmoothPoint::held(vertex, balanced[vertex])));
-        nonsmooth
-            .extend(at_discontinuities.iter().map(|&vertex| NonsmoothPoint::held(vertex, balanced[vertex])));
-        let (mut holds, mut nonsmooth_was_wrong) = (0, false);
+        let (share, [least, most]) = CREASE_WIDTH;
+        let mut width = (share * reach).clamp(least, most);
+        let mut models = 0;
         let next = loop {
-            if age >= settings.refactorise_every {
-                preconditioner.refresh(problem, &state.positions);
-                age = 0;
-            }
-            let model = Model { gradient: &balanced, nonsmooth: &nonsmooth, memory: &memory, preconditioner };
-            let blocked = match advance(problem, &state, &model, settings, &mut step.evaluations) {
-                Ok((next, slowed)) => {
-                    blocking = slowed;
+            let smooth = hessian.assemble(problem, &state.positions, &state.gradient, width);
+            let found = hessian.direction(&smooth, shift).and_then(|d| {
+                reach = longest(&d);
+                advance(problem, &state, &d, settings.step_bound / reach, &mut step.evaluations)
+            });
+            models += 1;
+            match found {
+                Some((share, next)) => {
+                    let [longer, shorter] = FACTORS;
+                    let factor = if share >= GOOD {
+                        longer
+                    } else if share == 0.0 {
+                        shorter
+                    } else {
+                        1.0
+                    };
+                    shift = (shift * factor).clamp(SHIFT[1], SHIFT[2]);
                     break Some(next);
                 }
-                Err(blocked) => blocked,
-            };
-            if !blocked.at_discontinuities.is_empty() && holds < MOST_HOLDS && !nonsmooth_was_wrong {
-                nonsmooth.extend(
-                    blocked
-                        .at_discontinuities
-                        .iter()
-                        .map(|&vertex| NonsmoothPoint::held(vertex, balanced[vertex])),
-                );
-                at_discontinuities.extend(blocked.at_discontinuities);
-                holds += 1;
-            } else if age > 0 || !memory.is_empty() {
-                memory.clear();
-                age = settings.refactorise_every;
-            } else if !blocked.turned.is_empty() && holds < MOST_HOLDS && !nonsmooth_was_wrong {
-                // A few vertices before a nonsmooth point hold up all others: for once without them.
-                nonsmooth.extend(
-                    blocked.turned.into_iter().map(|vertex| NonsmoothPoint::held(vertex, balanced[vertex])),
-                );
-                holds += 1;
-            } else if !nonsmooth.is_empty() && !nonsmooth_was_wrong {
-                // The model of the nonsmooth points was wrong somewhere: once without.
-                nonsmooth.clear();
-                balanced.clone_from(&state.gradient);
-                nonsmooth_was_wrong = true;
-            } else {
-                break None;
+                None if models == MOST_MODELS => break None,
+                // The trials have seen more sides of the creases.
+                None => {
+                    width *= FACTORS[0];
+                    shift = (shift * FACTORS[1]).min(LARGEST_SHIFT);
+                }
             }
         };
         let Some(next) = next else { break Stop::Stalled };
-        age += 1;
-        let moved = longest(&difference(&next.positions, &state.positions));
+        let moved = state.positions.iter().zip(&next.positions);
         step = Step {
             iteration: step.iteration + 1,
             energy: next.energy,
             gradient_norm: norm(&next.gradient),
-            displacement: moved,
+            displacement: moved.map(|(p, q)| distance_squared(*p, *q)).fold(0.0, f64::max).sqrt(),
             ..step
         };
-        last = Some((std::mem::replace(&mut state, next).positions, balanced));
+        state = next;
     };
-    let residual = problem.unbalanced_norm(&state.positions, &state.gradient);
-    let relative_gradient = relative(residual, problem.force_scale(&state.positions));
-    let exhausted = matches!(stop, Stop::Stalled | Stop::Iterations | Stop::Time);
+    let relative_gradient = problem.relative_gradient(&state.positions);
+    let exhausted = !matches!(stop, Stop::Converged | Stop::Escaped | Stop::Cancelled);
     let stop = if exhausted && relative_gradient <= settings.tolerance { Stop::Converged } else { stop };
-    let factorisations = preconditioner.map_or(0, |p| p.factorisations);
+    let factorisations = hessian.factorisations;
     Ok(Solution { positions: state.positions, stop, relative_gradient, history, factorisations })
+}
+
+/// The state along `direction`, at most `longest` of it, and the share of the decrease predicted by the slope that a full step has, 0 for
+/// a shorter one; `None` where it does not go downhill.
+///
+/// Whatever shortens a step (a filter against intersections) belongs here, before the search.
+fn advance(
+    problem: &Problem<'_>,
+    state: &State,
+    direction: &[[f64; 3]],
+    longest: f64,
+    evaluations: &mut usize,
+) -> Option<(f64, State)> {
+    let slope = product(direction, &state.gradient);
+    if !(slope < 0.0 && longest > 0.0) {
+        return None;
+    }
+    let evaluate = |length: f64| {
+        *evaluations += 1;
+        let moved = state.positions.iter().zip(direction);
+        let positions: Vec<[f64; 3]> = moved.map(|(p, d)| add_scaled(*p, length, *d)).collect();
+        let (energy, gradient) = problem.value_and_gradient(&positions);
+        State { positions, energy, gradient }
+    };
+    let (length, next) = search(state.energy, slope, longest.min(1.0), evaluate)?;
+    let share = if length < 1.0 { 0.0 } else { (next.energy - state.energy) / slope };
+    Some((share, next))
+}
+
+/// Whether the forces at `state`, compared with `scale`, balance within `tolerance`.
+fn is_balanced(problem: &Problem<'_>, state: &State, scale: f64, tolerance: f64) -> bool {
+    relative(problem.residual(&state.positions, &state.gradient), scale) <= tolerance
+}
+
+/// Whether the last [`WINDOW`] iterations gained a share of the energy that is worth while.
+fn is_progressing(history: &[Step], tolerance: f64) -> bool {
+    let Some(earlier) = history.len().checked_sub(WINDOW + 1) else { return true };
+    let energy = |i: usize| history[i].energy;
+    let last = history.len() - 1;
+    energy(earlier) - energy(last) > LEAST_GAIN * tolerance * (energy(0) - energy(last))
 }
 
 fn first_state(problem: &Problem<'_>, start: &[[f64; 3]]) -> Result<State, EquilibriumError> {
@@ -203,15 +215,12 @@ fn first_state(problem: &Problem<'_>, start: &[[f64; 3]]) -> Result<State, Equil
     Ok(State { positions: start.to_vec(), energy, gradient })
 }
 
-/// `a − b`.
-fn difference(a: &[[f64; 3]], b: &[[f64; 3]]) -> Vec<[f64; 3]> {
-    a.iter().zip(b).map(|(a, b)| sub(*a, *b)).collect()
+/// Scalar product over all coordinates, summed in order.
+fn product(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| dot(*a, *b)).sum()
 }
 
-/// Whether the last [`WINDOW`] iterations gained a share of the energy that is worth while.
-fn is_progressing(history: &[Step]) -> bool {
-    let Some(earlier) = history.len().checked_sub(WINDOW + 1) else { return true };
-    let energy = |i: usize| history[i].energy;
-    let last = history.len() - 1;
-    energy(earlier) - energy(last) > LEAST_GAIN * (energy(0) - energy(last))
+/// The longest of vectors.
+fn longest(x: &[[f64; 3]]) -> f64 {
+    x.iter().map(|x| norm_squared(*x)).fold(0.0, f64::max).sqrt()
 }

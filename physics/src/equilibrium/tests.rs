@@ -224,13 +224,13 @@ fn cloth_comes_to_rest_on_other_cloth() {
 fn the_number_of_threads_leaves_no_trace() {
     let (energy, rest) = skirt_on_cone(48, 14);
     let problem = Problem::new(&energy).unwrap();
-    let settings = SolverSettings { iterations: 25, ..SolverSettings::default() };
+    let settings = SolverSettings { iterations: 15, ..SolverSettings::default() };
     let with_threads = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
         pool.install(|| run(&problem, rest.positions(), &settings))
     };
     let one = with_threads(1);
-    assert_eq!(one.iterations(), 25);
+    assert_eq!(one.iterations(), 15);
     for threads in [2, 4] {
         let other = with_threads(threads);
         assert!(other.positions == one.positions, "{threads} threads");

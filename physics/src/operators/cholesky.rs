@@ -11,6 +11,8 @@ use crate::operators::SparseMatrix;
 
 /// `A = P L Lᵀ Pᵀ` with a fill-reducing ordering.
 ///
+/// Of the matrix only the entries on and above its diagonal are read; it may be without the others.
+///
 /// One thread only: garments are prepared side by side, and results must not depend on how many threads there are.
 pub(crate) struct Cholesky {
     symbolic: SymbolicCholesky<u32>,

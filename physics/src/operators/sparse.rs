@@ -102,6 +102,11 @@ impl SparseMatrix {
         &self.values
     }
 
+    /// Where the entries of a row begin among all.
+    pub(crate) fn start(&self, row: usize) -> usize {
+        self.offsets[row] as usize
+    }
+
     /// The stored entries, row by row; where they are stays as it is.
     pub(crate) fn values_mut(&mut self) -> &mut [f64] {
         &mut self.values

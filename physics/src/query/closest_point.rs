@@ -6,10 +6,10 @@
 
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::Vector;
-use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
+use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhNode};
 
 use super::pseudo_normal::PseudoNormals;
-use super::triangle_point::{Feature, box_distance_squared, closest_on_triangle};
+use super::triangle_point::{Feature, TrianglePoint, box_distance_squared, closest_on_triangle};
 use super::triangle_tree::TriangleTree;
 use crate::rows::{CompressedRows, faces_at_vertices};
 use crate::vec3;
@@ -115,15 +115,35 @@ impl ClosestPoint {
             },
         )?;
         let face = self.leaves[leaf as usize]?;
-        let found = closest_on_triangle(p, self.corners(face));
-        Some(SurfacePoint {
+        Some(self.surface_point(face, self.on_face(face, p)))
+    }
+
+    /// What was `found` on a face, with its pseudo-normal.
+    pub(super) fn surface_point(&self, face: u32, found: TrianglePoint) -> SurfacePoint {
+        SurfacePoint {
             position: found.position,
             distance_squared: found.distance_squared,
             face,
             barycentric: found.barycentric,
             feature: found.feature,
             normal: self.feature_normal(face, found.feature),
-        })
+        }
+    }
+
+    /// The point of a face closest to `p`.
+    pub(super) fn on_face(&self, face: u32, p: [f64; 3]) -> TrianglePoint {
+        closest_on_triangle(p, self.corners(face))
+    }
+
+    /// The faces at most `reach` (m) away from `p`, with their distances, in no particular order.
+    pub(super) fn faces_within(&self, p: [f64; 3], reach: f64) -> Vec<(f64, u32)> {
+        let is_near = |node: &BvhNode| {
+            box_distance_squared(p, node.mins().to_array(), node.maxs().to_array()) <= reach * reach
+        };
+        let near = self.bvh.leaves(is_near).filter_map(|leaf| self.leaves[leaf as usize]);
+        near.map(|face| (self.on_face(face, p).distance_squared.sqrt(), face))
+            .filter(|(d, _)| *d <= reach)
+            .collect()
     }
 
     /// Vertex indices of a face as numbered in [`SurfacePoint::face`].

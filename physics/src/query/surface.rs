@@ -3,6 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use crate::mesh::{TriMesh, is_closed, vertex_normals};
+use crate::query::near_faces::NearFaces;
 use crate::query::{ClosestPoint, SurfacePoint, UnionDistance, VertexIndex};
 use crate::real::Real;
 use crate::vec3;
@@ -135,6 +136,40 @@ impl<T: Real> Surface<T> {
             Distance::NearestVertex => self.nearest_vertex_gap(p),
             Distance::ClosestPoint => self.closest_point_gap(p),
             Distance::Union => self.union_gap(p),
+        }
+    }
+
+    /// As [`gap`](Self::gap), for a point whose `near` faces are remembered from query to query. Beyond `reach` (m) the gap may be any
+    /// from there to the true one, with no gradient.
+    pub(crate) fn gap_near(&self, p: [T; 3], distance: Distance, reach: f64, near: &mut NearFaces) -> Gap<T> {
+        let q = vec3::to_f64(p);
+        let Some(tree) = self.tree(distance).filter(|_| vec3::is_finite(q)) else {
+            return self.gap(p, distance);
+        };
+        let clearance = near.clearance(q);
+        if clearance >= reach {
+            return Gap { gap: T::from_f64(clearance), gradient: vec3::zero(), vertex: 0 };
+        }
+        let Some(found) = near.project(tree, q, reach) else { return not_a_gap() };
+        let gap = signed_gap(p, &found, self.is_inside(q, &found, distance), tree);
+        near.see(q, gap.gap.to_f64(), vec3::to_f64(gap.gradient));
+        gap
+    }
+
+    /// Whether `p`, to which `found` is the closest point of the [`tree`](Self::tree), is inside.
+    fn is_inside(&self, p: [f64; 3], found: &SurfacePoint, distance: Distance) -> bool {
+        match distance == Distance::Union && self.is_closed() {
+            true => self.union_distance().is_inside(p, found),
+            false => found.is_behind(p),
+        }
+    }
+
+    /// The faces that a distance is measured to; none where it is measured to vertices.
+    fn tree(&self, distance: Distance) -> Option<&ClosestPoint> {
+        match distance {
+            Distance::NearestVertex => None,
+            Distance::Union if self.is_closed() => Some(self.union_distance().kept()),
+            Distance::ClosestPoint | Distance::Union => Some(self.closest_point()),
         }
     }
 

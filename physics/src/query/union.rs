@@ -103,11 +103,15 @@ impl UnionDistance {
     /// without a face.
     pub fn project(&self, p: [f64; 3]) -> Option<(SurfacePoint, bool)> {
         let found = self.kept.project(p)?;
-        let is_inside = match self.is_sure[found.face as usize] {
+        Some((found, self.is_inside(p, &found)))
+    }
+
+    /// Whether `p` is inside, `found` being the closest point of the kept faces.
+    pub(super) fn is_inside(&self, p: [f64; 3], found: &SurfacePoint) -> bool {
+        match self.is_sure[found.face as usize] {
             true => dot(sub(p, found.position), found.normal) < 0.0,
             false => self.all.winding_number(p) >= 1,
-        };
-        Some((found, is_inside))
+        }
     }
 }
 

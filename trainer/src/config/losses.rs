@@ -1,7 +1,7 @@
 //! The eight losses: weights and the switches between the paper's printed form and the measured better one.
 
 use super::ramp::Ramp;
-use clothcombo_physics::energy::{EnergyError, EnergySettings, LayerGate, Material, Term};
+use clothcombo_physics::energy::{ContactSamples, EnergyError, EnergySettings, LayerGate, Material, Term};
 use clothcombo_physics::query::Distance;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -22,6 +22,29 @@ impl From<DistanceMode> for Distance {
         match mode {
             DistanceMode::NearestVertex => Distance::NearestVertex,
             DistanceMode::ClosestPoint => Distance::ClosestPoint,
+        }
+    }
+}
+
+/// Which points of a garment a collision is summed over; the sum is divided by how many there are for each vertex.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SamplesMode {
+    /// The vertices (the paper's): what is between them can intersect unnoticed.
+    #[default]
+    Vertices,
+    /// Also the centres of the faces.
+    Faces,
+    /// Also the midpoints of the edges.
+    FacesAndEdges,
+}
+
+impl From<SamplesMode> for ContactSamples {
+    fn from(mode: SamplesMode) -> Self {
+        match mode {
+            SamplesMode::Vertices => Self::Vertices,
+            SamplesMode::Faces => Self::Faces,
+            SamplesMode::FacesAndEdges => Self::FacesAndEdges,
         }
     }
 }
@@ -61,11 +84,18 @@ pub struct BodyCollisionLoss {
     pub epsilon: f64,
     /// How the distance is measured.
     pub distance: DistanceMode,
+    /// Points that should keep it.
+    pub samples: SamplesMode,
 }
 
 impl Default for BodyCollisionLoss {
     fn default() -> Self {
-        Self { weight: 250.0.into(), epsilon: 0.005, distance: DistanceMode::NearestVertex }
+        Self {
+            weight: 250.0.into(),
+            epsilon: 0.005,
+            distance: DistanceMode::NearestVertex,
+            samples: SamplesMode::Vertices,
+        }
     }
 }
 
@@ -119,6 +149,8 @@ pub struct LayerCollisionLoss {
     pub weight: Ramp,
     /// Gap that an outer vertex should keep to the inner garment (m).
     pub epsilon: f64,
+    /// Points of the outer garment that should keep it.
+    pub samples: SamplesMode,
     /// Count a pair only when it is really one above the other; the printed form explodes past an open hem.
     pub gated: bool,
     /// Largest tangential offset of a counted pair, in median edge lengths of the inner garment.
@@ -132,6 +164,7 @@ impl Default for LayerCollisionLoss {
         Self {
             weight: 250.0.into(),
             epsilon: 0.002,
+            samples: SamplesMode::Vertices,
             gated: true,
             gate_tangential_edges: 0.75,
             gate_depth: 0.05,
@@ -291,6 +324,8 @@ impl LossesConfig {
             },
             needle_ratio: self.strain.needle_ratio,
             body_collision_epsilon: self.body_collision.epsilon,
+            body_samples: self.body_collision.samples.into(),
+            layer_samples: gate.samples.into(),
             layer_collision_epsilon: gate.epsilon,
             distance: self.body_collision.distance.into(),
             repulsion_radius: self.repulsion.radius,

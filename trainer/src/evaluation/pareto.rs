@@ -7,8 +7,8 @@ use super::{Estimate, Evaluator, Metric, ModelUnderTest, Section, Table, drape_b
 use crate::dataset::PreparedScene;
 use crate::inference::networks::Networks;
 use crate::inference::reference::{ReferenceScene, wide};
-use crate::inference::refine;
 use crate::inference::tensor_store::DrapeError;
+use crate::inference::{RefineSteps, refine};
 use crate::picture::chart::{Chart, ChartGrid, Line};
 use crate::picture::png_bytes;
 use crate::run::validation::Method;
@@ -21,10 +21,10 @@ use serde_json::{Value, json};
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-/// Iterations of the solver from LBS + shape transfer.
-const SOLVER: [usize; 5] = [10, 30, 100, 300, 1000];
+/// Steps of the solver from LBS + shape transfer.
+const SOLVER: [usize; 7] = [1, 2, 4, 8, 16, 32, 64];
 /// Steps of the refinement of the networks' drape.
-const REFINEMENT: [usize; 3] = [10, 30, 100];
+const REFINEMENT: [usize; 4] = [1, 2, 4, 8];
 /// Repetitions of a fast method last this long (s).
 const SECONDS: f64 = 0.05;
 
@@ -149,15 +149,20 @@ fn solved(
     let (network, network_milliseconds) = of(Method::Network);
     for steps in REFINEMENT {
         let clock = Instant::now();
-        let (positions, _) = refine(&reference.energy, &network, steps).into_diagnostic()?;
+        let (positions, _) =
+            refine(&reference.energy, &network, RefineSteps::AtMost(steps)).into_diagnostic()?;
         let milliseconds = network_milliseconds + 1e3 * clock.elapsed().as_secs_f64();
-        states.push(State { method: format!("network + {steps} steps"), milliseconds, positions });
+        states.push(State {
+            method: format!("network + {steps} {}", if steps == 1 { "step" } else { "steps" }),
+            milliseconds,
+            positions,
+        });
     }
     let settings = SolverSettings::default();
     let mut iterations = SOLVER.into_iter().peekable();
     let mut add = |iterations: usize, milliseconds: f64, positions: &[[f64; 3]]| {
         states.push(State {
-            method: format!("solver, {iterations} iterations"),
+            method: format!("solver, {iterations} {}", if iterations == 1 { "step" } else { "steps" }),
             milliseconds: start_milliseconds + milliseconds,
             positions: positions.to_vec(),
         });

@@ -2,7 +2,9 @@
 
 use super::motion::RetryPolicy;
 use super::network_drape::NetworkDrape;
-use super::{BodyState, Certificate, Drape, Draper, DraperError, GarmentDrape, Outfit, elapsed, refine};
+use super::{
+    BodyState, Certificate, Drape, Draper, DraperError, GarmentDrape, Outfit, RefineSteps, elapsed, refine,
+};
 use crate::inference::reference::ReferenceScene;
 use clothcombo_physics::Surface;
 use clothcombo_physics::contact::resolve::{PathSample, Resolved, resolve_after, resolve_along};
@@ -41,7 +43,7 @@ impl Draper {
 
         let clock = Instant::now();
         let (before, refinement) = match self.settings.refine {
-            0 => (network.clone(), None),
+            RefineSteps::AtMost(0) => (network.clone(), None),
             steps => {
                 let mut energy = ReferenceScene::new(&self.trained.config.losses, &scene)?.energy;
                 energy.body = surface.clone();

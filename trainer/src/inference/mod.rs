@@ -61,7 +61,7 @@ pub use motion::DrapeProgress;
 pub use names::UniqueNames;
 pub use outfit::{MAX_GARMENTS, MAX_VERTICES, Outfit, OutfitGarment};
 pub use phase_times::PhaseTimes;
-pub use refine::{Refinement, refine};
+pub use refine::{RefineSteps, Refinement, refine};
 pub use report::{BodyReport, DrapedGarmentReport, FrameReport, ModelReport, Moment, Report, Stage};
 pub use shipped::shipped_model;
 pub use smooth::{Smoothing, smooth};
@@ -95,7 +95,7 @@ pub struct DraperSettings {
     /// Correction steps at most; `None`: as many as the model's configuration says.
     pub corrections: Option<usize>,
     /// Steps of the static solver after the networks; 0 switches refinement off.
-    pub refine: usize,
+    pub refine: RefineSteps,
     /// Whether the post-process resolves what still intersects.
     pub resolve: bool,
     /// How it does that.
@@ -111,7 +111,7 @@ impl Default for DraperSettings {
             cache_limit: 10 << 30,
             device: default_device(),
             corrections: None,
-            refine: 0,
+            refine: RefineSteps::AtMost(0),
             resolve: true,
             post_process,
         }

@@ -2,15 +2,43 @@
 
 use super::error::DraperError;
 use clothcombo_physics::energy::SceneEnergy;
-use clothcombo_physics::equilibrium::{Problem, SolverSettings, solve};
+use clothcombo_physics::equilibrium::{Problem, SolverSettings, Stop, solve};
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
+use std::str::FromStr;
+use std::time::{Duration, Instant};
 
 /// No vertex moves farther than this in one step [m]: less than the thickness of a limb, so that no vertex passes through
 /// one.
-const STEP_BOUND: f64 = 0.005;
+const STEP_BOUND: f64 = 0.02;
+/// With [`RefineSteps::Auto`], refinement ends with a step that lowers the energy by less than this share of all steps together…
+const LEAST_SHARE: f64 = 0.01;
+/// …or after this time.
+const MOST_TIME: Duration = Duration::from_secs(2);
 /// Refinement ends where a vertex has come farther than this from where the networks left it (m).
 const REACH: f64 = 0.05;
+
+/// How many steps a refinement takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RefineSteps {
+    /// At most so many; 0: no refinement.
+    AtMost(usize),
+    /// Until a step lowers the energy by less than 1 % of what all did together, or two seconds are over.
+    Auto,
+}
+
+impl FromStr for RefineSteps {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            number => {
+                number.parse().map(Self::AtMost).map_err(|_| "expected a number of steps, or auto".into())
+            }
+        }
+    }
+}
 
 /// What the refinement did.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -27,23 +55,32 @@ pub struct Refinement {
     pub largest_move_mm: f64,
 }
 
-/// Lowers `energy` from `start` `[ΣV, 3]` (m) for at most `steps` steps.
+/// Lowers `energy` from `start` `[ΣV, 3]` (m) for as many `steps`.
 ///
 /// # Errors
 /// When the energy at the start is not finite.
 pub fn refine(
     energy: &SceneEnergy<f64>,
     start: &[[f64; 3]],
-    steps: usize,
+    steps: RefineSteps,
 ) -> Result<(Vec<[f64; 3]>, Refinement), DraperError> {
     let settings = SolverSettings {
-        iterations: steps,
+        iterations: match steps {
+            RefineSteps::AtMost(steps) => steps,
+            RefineSteps::Auto => SolverSettings::default().iterations,
+        },
         step_bound: STEP_BOUND,
         escape_distance: Some(REACH),
         ..SolverSettings::default()
     };
     let problem = Problem::new(energy)?;
-    let solution = solve(&problem, start, &settings, &mut |_| ControlFlow::Continue(()))?;
+    let clock = Instant::now();
+    let mut energies: Vec<f64> = Vec::new();
+    let solution = solve(&problem, start, &settings, &mut |progress| {
+        energies.push(progress.step.energy);
+        let is_done = steps == RefineSteps::Auto && (is_enough(&energies) || clock.elapsed() > MOST_TIME);
+        if is_done { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    })?;
     let moved = solution
         .positions
         .iter()
@@ -51,10 +88,35 @@ pub fn refine(
         .map(|(p, q)| (0..3).map(|a| (p[a] - q[a]).powi(2)).sum::<f64>().sqrt());
     let done = Refinement {
         steps: solution.iterations(),
-        stop: solution.stop.name().to_owned(),
+        stop: match solution.stop {
+            Stop::Cancelled => "enough".to_owned(),
+            stop => stop.name().to_owned(),
+        },
         energy_before: solution.history[0].energy,
         energy_after: solution.energy(),
         largest_move_mm: 1e3 * moved.fold(0.0, f64::max),
     };
     Ok((solution.positions, done))
+}
+
+/// Whether the last of the steps between `energies` lowered them by less than [`LEAST_SHARE`] of what all did.
+fn is_enough(energies: &[f64]) -> bool {
+    match energies {
+        [first, .., before, last] => before - last < LEAST_SHARE * (first - last),
+        _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_are_a_number_or_auto_and_the_last_small_one_is_enough() {
+        assert_eq!("4".parse(), Ok(RefineSteps::AtMost(4)));
+        assert_eq!("auto".parse(), Ok(RefineSteps::Auto));
+        assert!("-1".parse::<RefineSteps>().is_err());
+        assert!(!is_enough(&[1.0]) && !is_enough(&[1.0, 0.5]) && !is_enough(&[1.0, 0.5, 0.4]));
+        assert!(is_enough(&[1.0, 0.5, 0.499]));
+    }
 }

@@ -12,6 +12,7 @@
 
 use rayon::prelude::*;
 
+use super::OuterPoints;
 use crate::energy::curvature::outer as dyad;
 use crate::energy::elements::GRAIN;
 use crate::energy::{CurvatureSink, EnergySettings, LayerGate, Weighted};
@@ -27,14 +28,14 @@ pub(super) struct InnerCloth {
     inside: Vec<f64>,
 }
 
-/// One outer vertex against the point of the inner surface that is closest to it.
+/// One outer point against the point of the inner surface that is closest to it.
 struct Contact {
     outer: usize,
     corners: [u32; 3],
     barycentric: [f64; 3],
     /// `∂d/∂x`.
     direction: [f64; 3],
-    /// `w` and its derivatives by the outer vertex and by the corners.
+    /// `w` and its derivatives by the outer point and by the corners.
     share: f64,
     share_gradients: [[f64; 3]; 4],
     /// `f`, `f′` and what `f″` has of a flat surface.
@@ -55,7 +56,7 @@ impl InnerCloth {
     pub fn evaluate<T: Real>(
         &self,
         closest: &ClosestPoint,
-        outer: &[[T; 3]],
+        outer: &OuterPoints<'_, T>,
         settings: &EnergySettings,
         targets: Option<[Weighted<'_, T>; 2]>,
     ) -> f64 {
@@ -65,7 +66,7 @@ impl InnerCloth {
                 let [value, slope, _] = contact.penalty;
                 let push = scale(contact.direction, contact.share * slope);
                 let [by_outer, by_corners @ ..] = contact.share_gradients;
-                outer_target.add(contact.outer, add_scaled(push, value, by_outer));
+                outer.points.add(&mut outer_target, contact.outer, add_scaled(push, value, by_outer));
                 for k in 0..3 {
                     let force = scale(push, -contact.barycentric[k]);
                     inner_target.add(contact.corners[k] as usize, add_scaled(force, value, by_corners[k]));
@@ -75,43 +76,27 @@ impl InnerCloth {
         contacts.iter().map(|contact| contact.share * contact.penalty[0]).sum()
     }
 
-    /// As [`InnerLayer::touches`](super::InnerLayer::touches).
-    pub fn touches<T: Real>(
-        &self,
-        closest: &ClosestPoint,
-        outer: &[[T; 3]],
-        settings: &EnergySettings,
-    ) -> Vec<(usize, [u32; 3], f64)> {
-        let (epsilon, gate) = (settings.layer_collision_epsilon, settings.layer_gate.unwrap_or_default());
-        let of = |(number, p): (usize, &[T; 3])| {
-            let p = to_f64(*p);
-            let found = closest.project_within(p, gate.depth.max(epsilon))?;
-            let contact = self.contact(closest, number, p, &found, epsilon, gate);
-            let penalty = contact.map_or(0.0, |contact| contact.share * contact.penalty[0]);
-            Some((number, closest.face(found.face), penalty))
-        };
-        outer.par_iter().with_min_len(GRAIN / 2).enumerate().filter_map(of).collect()
-    }
-
     /// `w·6(ε − d) a aᵀ` with `a = ∂d/∂(x, q)`: what the penalty has if the surface is flat.
     pub fn curvature<T: Real>(
         &self,
         closest: &ClosestPoint,
-        outer: &[[T; 3]],
+        outer: &OuterPoints<'_, T>,
         settings: &EnergySettings,
         [inner_offset, outer_offset]: [usize; 2],
         sink: &mut dyn CurvatureSink,
     ) {
         for contact in self.contacts(closest, outer, settings) {
-            let u = contact.direction;
-            let [a, b, c] = contact.corners.map(|v| inner_offset + v as usize);
-            let vertices = [outer_offset + contact.outer, a, b, c];
-            let [a, b, c] = contact.barycentric;
-            let parts = [1.0, -a, -b, -c];
             let stiffness = contact.share * contact.penalty[2];
-            for i in 0..4 {
-                for j in 0..=i {
-                    sink.add(vertices[i], vertices[j], dyad(stiffness * parts[i] * parts[j], u, u));
+            let corners = outer.points.corners(contact.outer);
+            // Every vertex with its share in how d changes along u.
+            let mut parts: [(usize, f64); 6] = [(0, 0.0); 6];
+            let own = corners.iter().map(|v| (outer_offset + v, corners.weight()));
+            let other = contact.corners.iter().zip(contact.barycentric);
+            let all = own.chain(other.map(|(v, b)| (inner_offset + *v as usize, -b)));
+            let count = all.zip(&mut parts).map(|(part, to)| *to = part).count();
+            for (k, (i, a)) in parts[..count].iter().enumerate() {
+                for (j, b) in &parts[..=k] {
+                    sink.add(*i, *j, dyad(stiffness * a * b, contact.direction, contact.direction));
                 }
             }
         }
@@ -120,7 +105,7 @@ impl InnerCloth {
     fn contacts<T: Real>(
         &self,
         closest: &ClosestPoint,
-        outer: &[[T; 3]],
+        outer: &OuterPoints<'_, T>,
         settings: &EnergySettings,
     ) -> Vec<Contact> {
         let (epsilon, gate) = (settings.layer_collision_epsilon, settings.layer_gate.unwrap_or_default());
@@ -129,7 +114,7 @@ impl InnerCloth {
             let found = closest.project_within(p, gate.depth.max(epsilon))?;
             self.contact(closest, outer, p, &found, epsilon, gate)
         };
-        outer.par_iter().with_min_len(GRAIN / 2).enumerate().filter_map(of).collect()
+        outer.at.par_iter().with_min_len(GRAIN / 2).enumerate().filter_map(of).collect()
     }
 
     fn contact(

@@ -1,6 +1,6 @@
 //! Layer collision: an outer garment stays outside an inner one (paper, equation for L_mc).
 //!
-//! `Σ max(ε − d, 0)³` over outer vertices. Both garments move, so the gradient reaches both. [`LayerContact`] says how `d` is
+//! `V/P Σ max(ε − d, 0)³` over the `P` contact points of an outer garment of `V` vertices (the paper's are the vertices). Both garments move, so the gradient reaches both. [`LayerContact`] says how `d` is
 //! measured: [`nearest_vertex`] is the paper's form, cheap enough for training; [`closest_point`] has no jumps where the nearest
 //! feature changes, and is what a solver with a line search needs.
 
@@ -9,7 +9,7 @@ pub mod nearest_vertex;
 
 use std::sync::Arc;
 
-use super::{CurvatureSink, EnergySettings, LayerContact, Weighted};
+use super::{ContactPoints, ContactSamples, CurvatureSink, EnergySettings, LayerContact, Weighted};
 use crate::mesh::{Topology, TriMesh};
 use crate::query::ClosestPoint;
 use crate::real::Real;
@@ -22,6 +22,23 @@ use nearest_vertex::{InnerVertices, PosedVertices};
 pub struct InnerLayer {
     vertices: InnerVertices,
     cloth: InnerCloth,
+}
+
+/// The contact points of an outer garment in its present position.
+#[derive(Debug)]
+pub struct OuterPoints<'a, T> {
+    points: &'a ContactPoints,
+    /// `[P, 3]` (m).
+    at: Vec<[T; 3]>,
+    /// What of a vertex each of them stands for.
+    share: f64,
+}
+
+impl<'a, T: Real> OuterPoints<'a, T> {
+    /// Of the garment of `points` at `posed` `[V, 3]` (m).
+    pub fn new(points: &'a ContactPoints, posed: &[[T; 3]], samples: ContactSamples) -> Self {
+        Self { points, at: points.at(posed, samples), share: points.share(samples) }
+    }
 }
 
 /// An inner garment in its present position: made once per evaluation, used by every pair that it is the inner one of.
@@ -60,36 +77,25 @@ impl InnerLayer {
         }
     }
 
-    /// Penalty (m³) of the vertices of `outer` against this garment at `inner` (both `[V, 3]` (m)); adds its weighted gradient to
-    /// `targets`, the inner garment's first.
+    /// Penalty (m³) of the points `outer` against this garment at `inner` `[V, 3]` (m); adds its weighted gradient to `targets`, the
+    /// inner garment's first.
     pub fn evaluate<T: Real>(
         &self,
         inner: &[[T; 3]],
         posed: &PosedInnerLayer<T>,
-        outer: &[[T; 3]],
+        outer: OuterPoints<'_, T>,
         settings: &EnergySettings,
         targets: Option<[Weighted<'_, T>; 2]>,
     ) -> f64 {
-        match posed {
-            PosedInnerLayer::Vertices(posed) => {
-                self.vertices.evaluate(inner, posed, outer, settings, targets)
+        let share = outer.share;
+        let targets = targets.map(|t| t.map(|t| Weighted { weight: share * t.weight, gradient: t.gradient }));
+        share
+            * match posed {
+                PosedInnerLayer::Vertices(posed) => {
+                    self.vertices.evaluate(inner, posed, &outer, settings, targets)
+                }
+                PosedInnerLayer::Cloth(closest) => self.cloth.evaluate(closest, &outer, settings, targets),
             }
-            PosedInnerLayer::Cloth(closest) => self.cloth.evaluate(closest, outer, settings, targets),
-        }
-    }
-
-    /// The outer vertices that are nearer than the gate, with the corners of the inner faces that they are nearest to, and their penalty
-    /// (m³); none by the nearest vertex.
-    pub(super) fn touches<T: Real>(
-        &self,
-        posed: &PosedInnerLayer<T>,
-        outer: &[[T; 3]],
-        settings: &EnergySettings,
-    ) -> Vec<(usize, [u32; 3], f64)> {
-        match posed {
-            PosedInnerLayer::Vertices(_) => Vec::new(),
-            PosedInnerLayer::Cloth(closest) => self.cloth.touches(closest, outer, settings),
-        }
     }
 
     /// Curvature of the penalty, for an inner and an outer garment whose vertices start at `offsets`. The paper's form has none: no
@@ -97,7 +103,7 @@ impl InnerLayer {
     pub(super) fn curvature<T: Real>(
         &self,
         posed: &PosedInnerLayer<T>,
-        outer: &[[T; 3]],
+        outer: &OuterPoints<'_, T>,
         settings: &EnergySettings,
         offsets: [usize; 2],
         sink: &mut dyn CurvatureSink,

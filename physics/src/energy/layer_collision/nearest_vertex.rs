@@ -14,6 +14,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use super::OuterPoints;
 use crate::energy::elements::GRAIN;
 use crate::energy::{EnergySettings, LayerGate, Weighted};
 use crate::mesh::TriMesh;
@@ -46,7 +47,7 @@ pub struct PosedVertices<T: Real> {
     area_normals: Vec<[f64; 3]>,
 }
 
-/// One outer vertex against its inner vertex.
+/// One outer point against its inner vertex.
 #[derive(Debug, Clone, Copy)]
 struct Contact {
     inner: u32,
@@ -101,12 +102,13 @@ impl InnerVertices {
         &self,
         inner: &[[T; 3]],
         posed: &PosedVertices<T>,
-        outer: &[[T; 3]],
+        outer: &OuterPoints<'_, T>,
         settings: &EnergySettings,
         targets: Option<[Weighted<'_, T>; 2]>,
     ) -> f64 {
         let (epsilon, gate) = (settings.layer_collision_epsilon, settings.layer_gate);
         let contacts: Vec<Contact> = outer
+            .at
             .par_iter()
             .with_min_len(GRAIN / 2)
             .map(|&p| self.contact(inner, posed, p, epsilon, gate).unwrap_or(NO_CONTACT))
@@ -120,9 +122,9 @@ impl InnerVertices {
                     continue;
                 }
                 let Some((normal, length)) = self.normal(posed, v) else { continue };
-                let offset = sub(to_f64(outer[j]), to_f64(inner[v]));
+                let offset = sub(to_f64(outer.at[j]), to_f64(inner[v]));
                 let push = scale(normal, contact.slope);
-                outer_target.add(j, push);
+                outer.points.add(&mut outer_target, j, push);
                 inner_target.add(v, scale(push, -1.0));
                 let across = crate::vec3::add_scaled(offset, -dot(normal, offset), normal);
                 if length > 0.0 {

@@ -4,7 +4,7 @@
 use super::scenes::{Scene, only, pulled_back, scene};
 use crate::energy::gradient_bound::gradient_bound;
 use crate::energy::gradient_check::{GradientCheck, check_gradient};
-use crate::energy::{EnergySettings, LayerContact, LayerGate, Term};
+use crate::energy::{ContactSamples, EnergySettings, LayerContact, LayerGate, Term};
 use crate::query::Distance;
 
 fn check(term: Term, settings: EnergySettings, seed: u64, what: &str) {
@@ -53,6 +53,14 @@ fn so_it_is_with_every_switch() {
         let layer_contact = LayerContact::ClosestPoint;
         let settings = EnergySettings { layer_gate: gate, layer_contact, ..default };
         check(Term::LayerCollision, settings, 3, "closest point");
+    }
+    for samples in [ContactSamples::Faces, ContactSamples::FacesAndEdges] {
+        let settings = EnergySettings { body_samples: samples, layer_samples: samples, ..default };
+        let closest_point = EnergySettings { layer_contact: LayerContact::ClosestPoint, ..settings };
+        check(Term::BodyCollision, settings, 3, "between vertices");
+        check(Term::LayerCollision, settings, 3, "between vertices");
+        check(Term::LayerDistance, settings, 3, "between vertices");
+        check(Term::LayerCollision, closest_point, 3, "closest point, between");
     }
     check(Term::Repulsion, EnergySettings { repulsion_normalised: false, ..default }, 3, "as printed");
     check(Term::Repulsion, EnergySettings { repulsion_subset: Some(16), ..default }, 3, "random subset");

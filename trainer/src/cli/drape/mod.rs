@@ -13,7 +13,9 @@ use crate::cli::output::print_json;
 use crate::cli::post_process::PostProcessArguments;
 use crate::cli::verbosity::{print_status, progress_bar};
 use crate::inference::output::{Show, Staged, write};
-use crate::inference::{Drape, DrapeProgress, Draper, DraperSettings, Moment, Outfit, Report, smooth};
+use crate::inference::{
+    Drape, DrapeProgress, Draper, DraperSettings, Moment, Outfit, RefineSteps, Report, smooth,
+};
 use crate::system::files::write_json;
 use clap::{ArgGroup, Parser, ValueEnum};
 use clothcombo_data::fit::FitSettings;
@@ -73,9 +75,10 @@ pub struct Arguments {
     /// networks' drape as it is [default: model.correction_steps of the model]
     #[arg(long, value_name = "STEPS")]
     corrections: Option<usize>,
-    /// Steps of the static solver from the networks' state, at most 5 mm each and 5 cm together
-    #[arg(long, default_value_t = 0, value_name = "STEPS")]
-    refine: usize,
+    /// Steps of the static solver from the networks' state, at most 2 cm each and 5 cm together; `auto`: until a step gains less than
+    /// 1 % of what all did, for at most two seconds
+    #[arg(long, default_value = "0", value_name = "STEPS|auto")]
+    refine: RefineSteps,
     /// Leaves out the post-process; the certificate still counts everything
     #[arg(long)]
     no_resolve: bool,

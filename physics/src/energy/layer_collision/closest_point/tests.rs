@@ -3,7 +3,7 @@
 
 use super::super::InnerLayer;
 use super::*;
-use crate::energy::LayerContact;
+use crate::energy::{ContactPoints, LayerContact};
 use crate::mesh::shapes::{self, SplitMix};
 use crate::query::brute_force;
 use crate::vec3::norm;
@@ -16,6 +16,12 @@ fn settings() -> EnergySettings {
 
 fn garment(mesh: &TriMesh) -> InnerLayer {
     InnerLayer::new(mesh, &Topology::new(mesh), mesh.median_edge_length())
+}
+
+/// Points without a garment.
+fn loose(points: &[[f64; 3]]) -> OuterPoints<'static, f64> {
+    let none = Box::leak(Box::new(ContactPoints::of_vertices(points.len())));
+    OuterPoints::new(none, points, Default::default())
 }
 
 #[test]
@@ -36,7 +42,8 @@ fn is_the_sum_over_the_exact_distances() {
     };
     let expected: f64 = outer.iter().map(|p| depth(p).max(0.0).powi(3)).sum();
     let (garment, p) = (garment(&inner), inner.positions());
-    let found = garment.evaluate(p, &garment.posed(p, LayerContact::ClosestPoint), &outer, &settings(), None);
+    let found =
+        garment.evaluate(p, &garment.posed(p, LayerContact::ClosestPoint), loose(&outer), &settings(), None);
     assert!(found > 0.0 && (found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
 }
 
@@ -46,7 +53,7 @@ fn largest_jump(inner: &TriMesh, from: [f64; 3], to: [f64; 3], contact: LayerCon
     let (garment, p) = (garment(inner), inner.positions());
     let posed = garment.posed(p, contact);
     let at = |i: usize| add_scaled(from, i as f64 / STEPS as f64, sub(to, from));
-    let energy = |i: usize| garment.evaluate(p, &posed, &[at(i)], &settings(), None);
+    let energy = |i: usize| garment.evaluate(p, &posed, loose(&[at(i)]), &settings(), None);
     let energies: Vec<f64> = (0..=STEPS).map(energy).collect();
     let jumps = energies.windows(2).map(|pair| (pair[1] - pair[0]).abs());
     jumps.fold(0.0, f64::max) / energies.iter().fold(0.0, |m: f64, e| m.max(*e))
@@ -97,11 +104,11 @@ fn curvature_is_exact_for_a_vertex_over_flat_cloth() {
     let vertex = inner.vertex_count();
     let p = [0.47, 0.53, 0.0007];
     let mut own = Own(vertex, [[0.0; 3]; 3]);
-    garment.curvature(&posed, &[p], &settings, [0, vertex], &mut own);
+    garment.curvature(&posed, &loose(&[p]), &settings, [0, vertex], &mut own);
     let gradient = |p: [f64; 3]| {
         let (mut of_inner, mut of_outer) = (vec![[0.0; 3]; vertex], vec![[0.0; 3]; 1]);
         let [a, b] = [&mut of_inner[..], &mut of_outer[..]].map(|g| Weighted { weight: 1.0, gradient: g });
-        garment.evaluate(inner.positions(), &posed, &[p], &settings, Some([a, b]));
+        garment.evaluate(inner.positions(), &posed, loose(&[p]), &settings, Some([a, b]));
         of_outer[0]
     };
     let step = 1e-7;

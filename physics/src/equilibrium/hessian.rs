@@ -1,0 +1,158 @@
+//! The Gauss–Newton matrix of a scene and its Cholesky factor.
+
+use faer::MatMut;
+
+use super::Problem;
+use crate::energy::{CurvatureSink, crease_reach};
+use crate::operators::SparseMatrix;
+use crate::operators::cholesky::Cholesky;
+use crate::rows::CompressedRows;
+
+/// One triangle of a sparse symmetric matrix of 3×3 blocks, and its factor.
+///
+/// Where blocks are and in which order to eliminate them is found once for a garment. Garments of an outfit touch each other elsewhere
+/// in every state: as long as all blocks have a place, it is kept, and found anew where one has none.
+pub(super) struct Hessian {
+    /// The vertices that every vertex has a block with, from itself on.
+    blocks: CompressedRows<u32>,
+    /// The same triangle over coordinates, without what is below the diagonal.
+    matrix: SparseMatrix,
+    /// The diagonal entries without the shift.
+    diagonal: Vec<f64>,
+    factor: Option<Cholesky>,
+    /// Successful factorisations.
+    pub factorisations: usize,
+}
+
+impl Hessian {
+    pub fn new(problem: &Problem<'_>, posed: &[[f64; 3]]) -> Self {
+        let count = problem.vertex_count();
+        let mut added = Pairs(Vec::new());
+        problem.curvature(posed, &mut added);
+        let mut pairs = added.0;
+        pairs.extend((0..count as u32).map(|v| [v, v]));
+        pairs.sort_unstable();
+        pairs.dedup();
+        let keyed = pairs.iter().map(|[row, column]| (*row as usize, *column));
+        let blocks = CompressedRows::grouped(count, keyed);
+        let mut triplets = Vec::with_capacity(9 * pairs.len());
+        for row in 0..count as u32 {
+            for r in 0..3 {
+                for &column in blocks.row(row as usize) {
+                    let first = if column == row { r } else { 0 };
+                    triplets.extend((first..3).map(|c| (3 * row + r, 3 * column + c, 0.0)));
+                }
+            }
+        }
+        let matrix = SparseMatrix::from_triplets(3 * count, 3 * count, triplets);
+        let factor = Cholesky::analysed(&matrix);
+        Self { blocks, matrix, diagonal: Vec::new(), factor, factorisations: 0 }
+    }
+
+    /// Takes the curvature of `problem` at `posed`, with creases as if they were smooth over `width` (m), and returns the `gradient` there
+    /// as changed by that.
+    pub fn assemble(
+        &mut self,
+        problem: &Problem<'_>,
+        posed: &[[f64; 3]],
+        gradient: &[[f64; 3]],
+        width: f64,
+    ) -> Vec<[f64; 3]> {
+        if !self.try_assemble(problem, posed) {
+            *self = Self { factorisations: self.factorisations, ..Self::new(problem, posed) };
+            self.try_assemble(problem, posed);
+        }
+        let mut smooth = gradient.to_vec();
+        let mut blocks = Blocks { hessian: self, fit: true };
+        problem.creases(posed, crease_reach(width)).smooth(width, &mut smooth, &mut blocks);
+        self.diagonal = (0..self.matrix.rows()).map(|row| self.matrix.row(row).1[0]).collect();
+        smooth
+    }
+
+    fn try_assemble(&mut self, problem: &Problem<'_>, posed: &[[f64; 3]]) -> bool {
+        self.matrix.values_mut().fill(0.0);
+        let mut blocks = Blocks { hessian: self, fit: true };
+        problem.curvature(posed, &mut blocks);
+        blocks.fit
+    }
+
+    /// `−(H + shift·mean·I)⁻¹ g`, `mean` being that of the diagonal; `None` where that is not positive definite.
+    pub fn direction(&mut self, gradient: &[[f64; 3]], shift: f64) -> Option<Vec<[f64; 3]>> {
+        let rows = self.matrix.rows();
+        let mean = self.diagonal.iter().sum::<f64>() / rows.max(1) as f64;
+        // Where no term is curved any length will do.
+        let mean = if mean > 0.0 { mean } else { 1.0 };
+        for row in 0..rows {
+            let at = self.matrix.start(row);
+            self.matrix.values_mut()[at] = self.diagonal[row] + shift * mean;
+        }
+        let factor = self.factor.as_mut()?;
+        if !factor.factorise(&self.matrix) {
+            return None;
+        }
+        self.factorisations += 1;
+        let mut direction: Vec<[f64; 3]> = gradient.iter().map(|g| g.map(|x| -x)).collect();
+        factor.solve_in_place(MatMut::from_column_major_slice_mut(direction.as_flattened_mut(), rows, 1));
+        Some(direction)
+    }
+
+    /// Where block `(row, column)`, `row ≤ column`, is among those of its row.
+    fn place(&self, [row, column]: [u32; 2]) -> Option<usize> {
+        self.blocks.row(row as usize).binary_search(&column).ok()
+    }
+
+    /// Adds to the block at a place.
+    #[inline(always)]
+    fn add(&mut self, [row, column]: [u32; 2], place: usize, block: [[f64; 3]; 3]) {
+        let is_diagonal = row == column;
+        for (r, line) in block.iter().enumerate() {
+            // Rows of a block on the diagonal start on it.
+            let start = self.matrix.start(3 * row as usize + r);
+            let values = self.matrix.values_mut();
+            match is_diagonal {
+                true => (r..3).for_each(|c| values[start + c - r] += line[c]),
+                false => (0..3).for_each(|c| values[start + 3 * place - r + c] += line[c]),
+            }
+        }
+    }
+}
+
+/// Which blocks are added, in order.
+struct Pairs(Vec<[u32; 2]>);
+
+impl CurvatureSink for Pairs {
+    fn add(&mut self, i: usize, j: usize, _: [[f64; 3]; 3]) {
+        if i != j {
+            self.0.push([i.min(j) as u32, i.max(j) as u32]);
+        }
+    }
+}
+
+/// Adds blocks to the matrix.
+struct Blocks<'a> {
+    hessian: &'a mut Hessian,
+    /// Whether all blocks had a place.
+    fit: bool,
+}
+
+impl CurvatureSink for Blocks<'_> {
+    #[inline]
+    fn add(&mut self, i: usize, j: usize, block: [[f64; 3]; 3]) {
+        let (pair, block) = match i <= j {
+            true => ([i as u32, j as u32], block),
+            false => ([j as u32, i as u32], transposed(block)),
+        };
+        if i == j {
+            return self.hessian.add(pair, 0, block);
+        }
+        let place = self.hessian.place(pair);
+        match place {
+            Some(place) => self.hessian.add(pair, place, block),
+            None => self.fit = false,
+        }
+    }
+}
+
+fn transposed(block: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
+    std::array::from_fn(|r| std::array::from_fn(|c| block[c][r]))
+}
