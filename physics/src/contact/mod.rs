@@ -8,6 +8,7 @@ mod penetration;
 mod report;
 pub mod resolve;
 mod self_collision;
+mod step_filter;
 #[cfg(test)]
 mod tests;
 
