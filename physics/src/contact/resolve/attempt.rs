@@ -18,7 +18,7 @@ const FURTHER_ATTEMPTS: usize = 3;
 /// …and most pairs that may be left there: more would only be torn further.
 const FEW: usize = 32;
 /// Pairs of garments with themselves that may be left where nothing else crosses.
-const FEW_OF_ITSELF: usize = 8;
+pub(super) const FEW_OF_ITSELF: usize = 8;
 /// How the last few crossings are tried once more: gap and rings, as shares of those asked for. A smaller gap is for many sheets in
 /// one crease, a larger one goes round what holds a few of them.
 const LAST: [(f64, usize); 2] = [(0.3, 1), (3.0, 2)];

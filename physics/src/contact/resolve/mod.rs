@@ -40,6 +40,7 @@ mod close_in;
 mod contact;
 mod count;
 mod detect;
+mod dressing;
 mod ease;
 mod error;
 mod fast_pass;
@@ -69,11 +70,11 @@ pub use certificate::{
     Certificate, Crossed, GarmentCertificate, LayerCertificate, PinchedPairs, RemainingPair,
 };
 pub use count::certify;
+pub use dressing::{Dressed, dress};
 pub use error::ResolveError;
 pub use fast_pass::fast_pass;
 pub use follow::{resolve_after, resolve_along};
 pub use garment::{Layer, RestGarment};
-pub use crate::contact::step_filter::FilterWork;
 pub use resolved::{GarmentWork, Resolved, Stage};
 pub use settings::ResolveSettings;
 pub use waypoint::{PathSample, Reached};
@@ -95,7 +96,7 @@ pub fn resolve(
     settings: &ResolveSettings,
 ) -> Result<Resolved, ResolveError> {
     let start = Instant::now();
-    if std::env::var("NOFAST").is_err() && let Some(found) = fast_pass(body, layers, settings)? {
+    if let Some(found) = fast_pass(body, layers, settings)? {
         return Ok(found);
     }
     let fast_time = start.elapsed();

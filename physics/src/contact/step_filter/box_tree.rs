@@ -158,7 +158,12 @@ impl BoxTree {
     }
 
     /// Calls `found` for every face whose box meets `bounds`.
-    pub fn faces_meeting(&self, bounds: &Bounds, stack: &mut Vec<(usize, usize)>, mut found: impl FnMut(u32)) {
+    pub fn faces_meeting(
+        &self,
+        bounds: &Bounds,
+        stack: &mut Vec<(usize, usize)>,
+        mut found: impl FnMut(u32),
+    ) {
         self.leaves_meeting(bounds, stack, |leaf| {
             let mut bits = self.levels[0][leaf].meeting(bounds);
             while bits != 0 {
@@ -247,9 +252,7 @@ fn sort(faces: &mut [u32], centre: impl Fn(u32) -> [f64; 3] + Copy, mut block: u
     let extent = vec3::sub(high, low);
     let axis = (0..3).fold(0, |best, k| if extent[k] > extent[best] { k } else { best });
     let middle = (faces.len().div_ceil(block) / 2).max(1) * block;
-    faces.select_nth_unstable_by(middle, |a, b| {
-        centre(*a)[axis].total_cmp(&centre(*b)[axis]).then(a.cmp(b))
-    });
+    faces.select_nth_unstable_by(middle, |a, b| centre(*a)[axis].total_cmp(&centre(*b)[axis]).then(a.cmp(b)));
     let (left, right) = faces.split_at_mut(middle);
     sort(left, centre, block);
     sort(right, centre, block);

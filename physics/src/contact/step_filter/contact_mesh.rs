@@ -31,7 +31,8 @@ impl ContactMesh {
             // The edges to larger vertices belong to the first face around `v` that has them.
             for (i, &f) in around.iter().enumerate() {
                 for k in 0..3 {
-                    let Some(other) = other_end(faces[f as usize], k, v as u32).filter(|&o| o > v as u32) else {
+                    let Some(other) = other_end(faces[f as usize], k, v as u32).filter(|&o| o > v as u32)
+                    else {
                         continue;
                     };
                     if !around[..i].iter().any(|&g| faces[g as usize].contains(&other)) {

@@ -17,16 +17,16 @@ mod separation;
 #[cfg(test)]
 mod tests;
 
-use box_tree::BoxTree;
 pub(crate) use box_tree::Bounds;
+use box_tree::BoxTree;
 pub(crate) use contact_mesh::{ContactMesh, ElementPair};
 pub(crate) use separation::closest_on_edges;
 
 use crate::query::triangle_pair::mesh_triangles_intersect;
 use crate::vec3::{add, add_scaled, sub};
 use rayon::prelude::*;
-use serde::Serialize;
 use separation::{Corners, stay_apart, triangles_stay_apart};
+use serde::Serialize;
 
 /// Halvings of a refused motion before it ends.
 const HALVINGS: u8 = 3;
@@ -60,6 +60,18 @@ pub struct FilterWork {
     pub candidates: usize,
     /// Pairs of elements that were looked at.
     pub element_tests: usize,
+}
+
+impl FilterWork {
+    /// What both did.
+    pub(crate) fn and(self, other: Self) -> Self {
+        Self {
+            steps: self.steps + other.steps,
+            drawn_back: self.drawn_back + other.drawn_back,
+            candidates: self.candidates + other.candidates,
+            element_tests: self.element_tests + other.element_tests,
+        }
+    }
 }
 
 impl<'a> StepFilter<'a> {
@@ -123,7 +135,11 @@ impl<'a> StepFilter<'a> {
             let mut back: Vec<u32> = refused.iter().flat_map(|pair| pair.vertices).collect();
             if back.is_empty() {
                 let made = self.made_by(&passing, to);
-                back = made.iter().flat_map(|&(f, g)| [f, g]).flat_map(|f| self.mesh.faces[f as usize]).collect();
+                back = made
+                    .iter()
+                    .flat_map(|&(f, g)| [f, g])
+                    .flat_map(|f| self.mesh.faces[f as usize])
+                    .collect();
             }
             if back.is_empty() {
                 break;
@@ -182,11 +198,9 @@ impl<'a> StepFilter<'a> {
     /// Those of `pairs` that intersect, ascending. Exact.
     fn intersecting(&self, pairs: &[(u32, u32)], positions: &[[f64; 3]]) -> FacePairs {
         let faces = &self.mesh.faces;
-        let intersect = |&(f, g): &(u32, u32)| {
-            mesh_triangles_intersect(positions, faces[f as usize], faces[g as usize])
-        };
-        let mut found: FacePairs =
-            pairs.par_iter().with_min_len(CHUNK).copied().filter(intersect).collect();
+        let intersect =
+            |&(f, g): &(u32, u32)| mesh_triangles_intersect(positions, faces[f as usize], faces[g as usize]);
+        let mut found: FacePairs = pairs.par_iter().with_min_len(CHUNK).copied().filter(intersect).collect();
         found.sort_unstable();
         found
     }
@@ -194,7 +208,9 @@ impl<'a> StepFilter<'a> {
     /// Elements of triangles that intersect, and may come apart.
     fn exempt(&self, is_moved: &[bool]) -> Vec<(bool, [u32; 4])> {
         let mut exempt = Vec::new();
-        for &(f, g) in self.intersections.iter().filter(|(f, g)| is_moved[*f as usize] || is_moved[*g as usize]) {
+        for &(f, g) in
+            self.intersections.iter().filter(|(f, g)| is_moved[*f as usize] || is_moved[*g as usize])
+        {
             let (one, other) = (self.mesh.faces[f as usize], self.mesh.faces[g as usize]);
             for (a, b) in [(one, other), (other, one)] {
                 let over = a.map(|v| ElementPair { vertices: [v, b[0], b[1], b[2]], has_face: true });
@@ -236,7 +252,8 @@ impl<'a> StepFilter<'a> {
                 }
                 self.mesh.element_pairs(f, g, |pair| {
                     tests += 1;
-                    let [x, y]: [Corners; 2] = [from, to].map(|state| pair.vertices.map(|v| state[v as usize]));
+                    let [x, y]: [Corners; 2] =
+                        [from, to].map(|state| pair.vertices.map(|v| state[v as usize]));
                     if !stay_apart(&pair, &x, &y, margin) {
                         refused.push(pair);
                     }
@@ -255,7 +272,8 @@ impl<'a> StepFilter<'a> {
         for pair in passing {
             let [first, second] = self.mesh.faces_of(pair);
             for &f in &first {
-                let around = second.iter().filter(|&&g| g != f && !(self.mesh.is_body(f) && self.mesh.is_body(g)));
+                let around =
+                    second.iter().filter(|&&g| g != f && !(self.mesh.is_body(f) && self.mesh.is_body(g)));
                 pairs.extend(around.map(|&g| (f.min(g), f.max(g))));
             }
         }

@@ -58,7 +58,14 @@ pub(crate) fn stay_apart(pair: &ElementPair, x: &Corners, y: &Corners, margin: f
     is_separated(pair, scale(gap, 1.0 / distance), x, y, least, HALVINGS)
 }
 
-fn is_separated(pair: &ElementPair, start: [f64; 3], x: &Corners, y: &Corners, least: f64, halvings: u32) -> bool {
+fn is_separated(
+    pair: &ElementPair,
+    start: [f64; 3],
+    x: &Corners,
+    y: &Corners,
+    least: f64,
+    halvings: u32,
+) -> bool {
     let direction = |corners: &Corners| {
         let gap = gap_vector(pair.has_face, corners);
         let distance = norm(gap);
@@ -217,10 +224,9 @@ mod tests {
                 passed += 1;
                 for i in 0..=64 {
                     let t = f64::from(i) / 64.0;
-                    let between =
-                        |p: &[[f64; 3]; 3], q: &[[f64; 3]; 3]| std::array::from_fn(|k| {
-                            add_scaled(p[k], t, sub(q[k], p[k]))
-                        });
+                    let between = |p: &[[f64; 3]; 3], q: &[[f64; 3]; 3]| {
+                        std::array::from_fn(|k| add_scaled(p[k], t, sub(q[k], p[k])))
+                    };
                     let (one, other) = (between(&a, &c), between(&b, &d));
                     assert!(!crate::contact::triangles_intersect(&one, &other));
                 }

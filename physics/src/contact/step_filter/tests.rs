@@ -1,8 +1,8 @@
 //! Steps of random meshes, looked at again at many times.
 
 use super::*;
-use crate::mesh::shapes::{self, SplitMix};
 use crate::mesh::TriMesh;
+use crate::mesh::shapes::{self, SplitMix};
 use crate::vec3::{norm, scale};
 
 /// Sheets over each other and over a ball, apart, of random shape.
@@ -34,9 +34,7 @@ fn all_intersections(mesh: &ContactMesh, positions: &[[f64; 3]]) -> FacePairs {
     let faces = mesh.faces.len() as u32;
     let pairs = (0..mesh.cloth_faces as u32).flat_map(|f| (f + 1..faces).map(move |g| (f, g)));
     pairs
-        .filter(|&(f, g)| {
-            mesh_triangles_intersect(positions, mesh.faces[f as usize], mesh.faces[g as usize])
-        })
+        .filter(|&(f, g)| mesh_triangles_intersect(positions, mesh.faces[f as usize], mesh.faces[g as usize]))
         .collect()
 }
 

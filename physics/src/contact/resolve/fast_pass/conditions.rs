@@ -1,15 +1,16 @@
 //! Where an outfit is wrong, and what has to hold there.
 
 use super::FastPass;
-use crate::contact::resolve::contact::{Contact, Plane, along_line, is_tiny, normal_of};
-use crate::contact::resolve::over::{Order, SAME_PART, STEEP, Over, order, part_along, sheet_normal};
+use crate::contact::ORDER_RADIUS;
+use crate::contact::resolve::contact::{Contact, Plane, along_line, is_tiny, normal_of, overlap};
+use crate::contact::resolve::over::{Order, Over, SAME_PART, STEEP, order, part_along, sheet_normal};
 use crate::contact::step_filter::{Bounds, ElementPair, closest_on_edges};
-use crate::vec3::{add, add_scaled, cross, dot, norm, normalized, sub};
+use crate::vec3::{add, add_scaled, cross, dot, norm, normalized, scale, sub};
 use rayon::prelude::*;
 
 /// What is nearer than this is kept apart (m).
 const NEAR: f64 = 0.003;
-/// Elements that are deeper in each other than this (m) are told by the sheets around them, not by their own planes.
+/// Elements of garments that are deeper in each other than this (m) are told by the sheets around them, not by their own planes.
 const DEEP: f64 = 0.012;
 /// How far under an inner garment an outer one is still brought over it (m): half a thin limb.
 const REACH: f64 = 0.025;
@@ -37,7 +38,10 @@ impl FastPass<'_> {
             let other = if self.filter.mesh.is_body(g) { f } else { g };
             [f, other].into_iter().flat_map(|f| outfit.faces[f as usize])
         };
-        let mut seeds: Vec<u32> = self.parted().flat_map(cloth_of).collect();
+        let mut seeds: Vec<u32> = self.parted().chain(self.parted_folds()).flat_map(cloth_of).collect();
+        if self.is_thorough {
+            seeds.extend(self.wrong_side());
+        }
         loop {
             let region = outfit.neighbourhood(&seeds, super::RINGS);
             let new: Vec<u32> = region.iter().copied().filter(|&v| !found.is_in[v as usize]).collect();
@@ -65,21 +69,42 @@ impl FastPass<'_> {
         }
     }
 
+    /// All vertices on the wrong side of the body or of an inner garment, and the corners of the sheets over them.
+    pub(super) fn wrong_side(&self) -> Vec<u32> {
+        if self.outward.is_empty() {
+            return Vec::new();
+        }
+        let wrong = |v: u32| {
+            let (plane, over) = self.look(v);
+            let is_inside = plane.is_some_and(|p| p.distance < 0.0 && !p.is_held);
+            let sheets: Vec<u32> =
+                over.iter().filter(|over| over.height < 0.0).flat_map(|over| over.face).collect();
+            let own = (is_inside || !sheets.is_empty()).then_some(v);
+            own.into_iter().chain(sheets)
+        };
+        (0..self.input.len() as u32).into_par_iter().with_min_len(64).flat_map_iter(wrong).collect()
+    }
+
     /// What the body leaves to vertex `v`, and which sheets of inner garments it has to stay over.
     fn look(&self, v: u32) -> (Option<Plane>, Vec<Over>) {
-        let p = self.positions[v as usize];
+        let (p, away) = (self.positions[v as usize], self.outward[v as usize]);
         let plane = self.body.look(p).and_then(|view| view.plane).filter(|plane| plane.distance < NEAR);
-        (plane, self.sheets_over(v))
+        // More than half way through a limb the nearest way out is its other side: cloth goes back to its own.
+        let is_through = plane.is_some_and(|plane| plane.distance < 0.0 && dot(plane.normal, away) < 0.0);
+        let own = if is_through { self.body.exit(p, away, self.settings.farthest) } else { None };
+        (own.or(plane), self.sheets_over(v))
     }
 
     /// Of every inner garment the outermost sheet that lies less than [`REACH`] over vertex `v`.
     fn sheets_over(&self, v: u32) -> Vec<Over> {
-        let (p, away, garment) = (self.positions[v as usize], self.outward[v as usize], self.outfit.garment_of(v));
+        let (p, away, garment) =
+            (self.positions[v as usize], self.outward[v as usize], self.outfit.garment_of(v));
         if away == [0.0; 3] || garment == 0 {
             return Vec::new();
         }
         let mut outermost: Vec<Option<(f64, u32, [f64; 3])>> = vec![None; garment];
-        self.filter.cloth_faces_meeting(&Bounds::around([p, add_scaled(p, REACH, away)], 0.0), |f| {
+        let reach = if self.is_thorough { ORDER_RADIUS } else { REACH };
+        self.filter.cloth_faces_meeting(&Bounds::around([p, add_scaled(p, reach, away)], 0.0), |f| {
             let g = self.outfit.garment_of_face(f);
             if g >= garment {
                 return;
@@ -89,8 +114,9 @@ impl FastPass<'_> {
                 return;
             }
             let Some((above, at)) = along_line(p, away, &self.corners(f)) else { return };
-            let is_farther = outermost[g].is_none_or(|(most, known, _)| above > most || above == most && f < known);
-            if (0.0..=REACH).contains(&above) && is_farther {
+            let is_farther =
+                outermost[g].is_none_or(|(most, known, _)| above > most || above == most && f < known);
+            if (0.0..=reach).contains(&above) && is_farther {
                 outermost[g] = Some((above, f, at));
             }
         });
@@ -123,19 +149,57 @@ impl FastPass<'_> {
             })
             .collect();
         let gap = self.settings.gap;
-        for &(f, g) in self.parted().filter(|(_, g)| !mesh.is_body(*g)) {
+        let mut parting = Vec::new();
+        for &(f, g) in self.parted() {
+            if mesh.is_body(g) {
+                self.part_from_body(f, g, &mut parting);
+                continue;
+            }
             let (outer, inner) = (mesh.faces[f.max(g) as usize], mesh.faces[f.min(g) as usize]);
             if let Order::Along(away) = order(outer, inner, true, &self.outward) {
-                part_along(away, outer, inner, &self.positions, 0.5 * gap, REACH, &mut contacts);
+                part_along(away, outer, inner, &self.positions, 0.5 * gap, REACH, &mut parting);
             }
         }
+        self.remembered.extend(parting);
+        contacts.extend(&self.remembered);
         contacts.extend(defects.over.iter().map(|over| over.contact(gap)));
         // The body last, so that it has the last word.
         for (v, plane) in &defects.planes {
-            let wanted = if plane.is_held { plane.distance.clamp(0.0, gap) } else { self.wanted(plane.distance) };
+            let wanted =
+                if plane.is_held { plane.distance.clamp(0.0, gap) } else { self.wanted(plane.distance) };
             contacts.push(Contact::vertex(*v, plane, wanted));
         }
         contacts
+    }
+
+    /// The part of a face that lies over a face of the body has to come out of it.
+    fn part_from_body(&self, f: u32, g: u32, found: &mut Vec<Contact>) {
+        let (face, upper, lower) = (self.outfit.faces[f as usize], self.corners(f), self.corners(g));
+        if is_tiny(&lower) {
+            return;
+        }
+        let (normal, gap) = (normal_of(&lower), 0.5 * self.settings.gap);
+        if self.is_other_side(f, normal) {
+            return;
+        }
+        let ground = dot(normal, lower[0]);
+        for corner in overlap(&upper, &lower, normal).iter().filter(|corner| corner.height < gap) {
+            found.push(Contact::face_point(
+                face,
+                corner.at_upper,
+                normal,
+                ground + gap.min(corner.height + REACH),
+            ));
+        }
+    }
+
+    /// Whether a face of the body with this `normal` is on the other side of a limb that face `f` has gone into.
+    fn is_other_side(&self, f: u32, normal: [f64; 3]) -> bool {
+        let seen = |&v: &u32| {
+            let plane = self.body.look(self.positions[v as usize]).and_then(|view| view.plane);
+            plane.is_some_and(|plane| plane.distance > 0.0 && dot(plane.normal, normal) > 0.0)
+        };
+        dot(normal, self.direction(f)) < 0.0 && !self.outfit.faces[f as usize].iter().any(seen)
     }
 
     /// How far apart what is `height` apart (m) has to get: what is too near gets the gap, the rest only keeps from coming too near.
@@ -150,7 +214,13 @@ impl FastPass<'_> {
         // Along which direction the second lies under the first.
         let (over, away) = match self.body_face(g) {
             Some(face) if self.body.is_pinched(face) => return,
-            Some(_) => (f, normal_of(&self.corners(g))),
+            Some(_) => {
+                let normal = normal_of(&self.corners(g));
+                if self.is_other_side(f, normal) {
+                    return;
+                }
+                (f, Some(normal))
+            }
             None => {
                 let (over, under) = (f.max(g), f.min(g));
                 let is_outer = self.outfit.garment_of_face(over) != self.outfit.garment_of_face(under);
@@ -158,7 +228,9 @@ impl FastPass<'_> {
                     return;
                 }
                 match order(mesh.faces[over as usize], mesh.faces[under as usize], is_outer, &self.outward) {
-                    Order::Along(away) => (over, away),
+                    Order::Along(away) => (over, Some(away)),
+                    // Sheets of one garment stay on the side of each other that they are on.
+                    Order::Unknown if !is_outer && !self.intersect(f, g) => (over, None),
                     Order::Unknown => return,
                 }
             }
@@ -174,47 +246,94 @@ impl FastPass<'_> {
         });
     }
 
+    fn intersect(&self, f: u32, g: u32) -> bool {
+        self.filter.intersections.binary_search(&(f.min(g), f.max(g))).is_ok()
+    }
+
+    /// The side of a plane with this `normal` on which an element has to be: over the other element along `away` or under it; where
+    /// that is not known, where it is by its `height`. None where the plane is too steep to tell.
+    fn side(
+        &self,
+        normal: [f64; 3],
+        (is_over, away): (bool, Option<[f64; 3]>),
+        height: f64,
+        least: f64,
+    ) -> Option<f64> {
+        let Some(away) = away else { return Some(height.signum()) };
+        let slope = dot(normal, away);
+        (slope.abs() >= least).then_some(if (slope > 0.0) == is_over { 1.0 } else { -1.0 })
+    }
+
     /// The vertex of `pair` over its face along `away`, or under it.
-    fn over_face(&self, pair: &ElementPair, is_over: bool, away: [f64; 3]) -> Option<Contact> {
+    fn over_face(&self, pair: &ElementPair, is_over: bool, away: Option<[f64; 3]>) -> Option<Contact> {
         let [p, a, b, c] = pair.vertices.map(|v| self.positions[v as usize]);
         if is_tiny(&[a, b, c]) {
             return None;
         }
         let normal = normal_of(&[a, b, c]);
-        let slope = dot(normal, away);
-        if slope.abs() < STEEP {
-            return None;
-        }
-        let up = if (slope > 0.0) == is_over { normal } else { normal.map(|x| -x) };
-        let height = dot(up, sub(p, a));
-        if !(-DEEP..NEAR).contains(&height) {
+        let height = dot(normal, sub(p, a));
+        let side = self.side(normal, (is_over, away), height, STEEP)?;
+        let (up, height) = (scale(normal, side), side * height);
+        if !(-self.deepest(pair)..NEAR).contains(&height) {
             return None;
         }
         let (_, at) = along_line(p, normal, &[a, b, c])?;
         let [v, rest @ ..] = pair.vertices;
-        self.contact([v, rest[0], rest[1], rest[2]], [1.0, -at[0], -at[1], -at[2]], up, height)
+        self.contact(
+            [v, rest[0], rest[1], rest[2]],
+            [1.0, -at[0], -at[1], -at[2]],
+            up,
+            height,
+            away.is_none(),
+        )
     }
 
     /// The first edge of `pair` over its second along `away`, or under it.
-    fn over_edge(&self, pair: &ElementPair, is_over: bool, away: [f64; 3]) -> Option<Contact> {
+    fn over_edge(&self, pair: &ElementPair, is_over: bool, away: Option<[f64; 3]>) -> Option<Contact> {
         let [p, q, r, s] = pair.vertices.map(|v| self.positions[v as usize]);
         let [t, u] = closest_on_edges([p, q], [r, s]);
         let is_inner = |t: f64| t > 0.0 && t < 1.0;
         let normal = normalized(cross(sub(q, p), sub(s, r)));
-        let slope = dot(normal, away);
-        if !is_inner(t) || !is_inner(u) || slope.abs() < ALONG {
+        if !is_inner(t) || !is_inner(u) || normal == [0.0; 3] {
             return None;
         }
-        let up = if (slope > 0.0) == is_over { normal } else { normal.map(|x| -x) };
         let weights = [1.0 - t, t, u - 1.0, -u];
-        let height = (0..4).map(|k| weights[k] * dot(up, [p, q, r, s][k])).sum::<f64>();
-        (-DEEP..NEAR).contains(&height).then(|| self.contact(pair.vertices, weights, up, height)).flatten()
+        let height = (0..4).map(|k| weights[k] * dot(normal, [p, q, r, s][k])).sum::<f64>();
+        let side = self.side(normal, (is_over, away), height, ALONG)?;
+        let (up, height) = (scale(normal, side), side * height);
+        (-self.deepest(pair)..NEAR)
+            .contains(&height)
+            .then(|| self.contact(pair.vertices, weights, up, height, away.is_none()))
+            .flatten()
+    }
+
+    /// How deep in each other (m) elements are still told by their own planes: vertices know better how deep they are in the body.
+    fn deepest(&self, pair: &ElementPair) -> f64 {
+        let is_body = |v: &u32| *v as usize >= self.input.len();
+        if pair.vertices.iter().any(is_body) { self.settings.gap } else { DEEP }
     }
 
     /// A condition on four vertices, of which those of the body are where they are.
-    fn contact(&self, vertices: [u32; 4], weights: [f64; 4], normal: [f64; 3], height: f64) -> Option<Contact> {
+    fn contact(
+        &self,
+        vertices: [u32; 4],
+        weights: [f64; 4],
+        normal: [f64; 3],
+        height: f64,
+        keeps: bool,
+    ) -> Option<Contact> {
         let cloth = self.input.len() as u32;
-        let mut contact = Contact { vertices: [0; 6], weights: [0.0; 6], count: 0, normal, target: self.wanted(height) };
+        let mut contact = Contact {
+            vertices: [0; 6],
+            weights: [0.0; 6],
+            count: 0,
+            normal,
+            target: if keeps {
+                height.min(self.settings.trigger * self.settings.gap)
+            } else {
+                self.wanted(height)
+            },
+        };
         for (v, w) in vertices.into_iter().zip(weights) {
             if v < cloth {
                 contact.vertices[usize::from(contact.count)] = v;

@@ -1,9 +1,10 @@
 //! The fast pass: what the networks leave, slight penetrations, is parted where it is, in some ten milliseconds.
 //!
 //! Triangles that intersect, found exactly, and vertices on the wrong side around them tell where; conditions there and on what is
-//! near ([`conditions`]) are met by a few smooth sweeps over two rings of neighbours ([`relax`]). The first round moves freely, the
-//! others through the step filter, so that they make no new intersection. It ends when nothing intersects, or when a round no
-//! longer removes a fifth of what does: the rest is for the continuation path.
+//! near ([`conditions`]) are met by a few smooth sweeps over two rings of neighbours ([`relax`]). Rounds move freely as long as they
+//! help: cloth that lies deeper than one triangle could not come out through the step filter. The last ones are filtered, so that
+//! they make no new intersection. What parted triangles once is asked for in all later rounds. It ends when nothing intersects, or
+//! when rounds no longer help: the rest is for the next stage.
 
 mod conditions;
 #[cfg(test)]
@@ -11,8 +12,12 @@ mod tests;
 
 use std::time::Instant;
 
+use super::attempt::FEW_OF_ITSELF;
 use super::body::with_drawn;
+use super::certificate::Certificate;
+use super::contact::Contact;
 use super::count::certified;
+use super::folds::folds;
 use super::garment::check;
 use super::obstacle::BodyObstacle;
 use super::outfit::Outfit;
@@ -20,8 +25,9 @@ use super::over::outward;
 use super::relax::{LastPasses, no_farther, relax};
 use super::resolved::Stage;
 use super::{GarmentWork, Layer, ResolveError, ResolveSettings, Resolved};
-use crate::contact::step_filter::{ContactMesh, StepFilter};
+use crate::contact::step_filter::{ContactMesh, FacePairs, StepFilter};
 use crate::query::Surface;
+use crate::vec3::{add, add_scaled, scale, sub};
 
 /// Rings of neighbours around a defect that move along.
 const RINGS: usize = 2;
@@ -29,14 +35,22 @@ const RINGS: usize = 2;
 const SWEEPS: usize = 10;
 /// Rounds at most; stalling ends it long before.
 const ROUNDS: usize = 20;
-/// A round that leaves more than this share of the intersections is the last one.
+/// A round that leaves more than this share of the intersections hardly helps.
 const STALLED: f64 = 0.8;
+/// After so many rounds that hardly helped steps are filtered…
+const FREE_STALLS: usize = 3;
+/// …and after so many the outfit is left to the next stage.
+const STALLS: usize = 5;
+/// How far sheets of one garment are parted, as a share of the gap.
+const FOLD_GAP: f64 = 0.25;
+/// A share of vertices under an inner garment from which whole parts lie on the wrong side without intersecting anything.
+pub(super) const ORDER_VIOLATIONS: f64 = 1e-2;
 /// What elements stay apart in a filtered step, as a share of the gap.
 const FILTER_MARGIN: f64 = 0.05;
 
 /// Takes `layers`, innermost first, out of `body` and out of each other where they lie hardly in: the result if no garment
-/// intersects the body or another one any more, no more triangles of garments intersect others of their own, and no cloth is torn;
-/// else none. Deterministic for any number of threads; a clean input comes back to the bit.
+/// intersects the body or another one any more, at most half as many triangles of garments intersect others of their own, and no
+/// cloth is torn; else none. Deterministic for any number of threads; a clean input comes back to the bit.
 ///
 /// # Errors
 /// Those of [`super::resolve`].
@@ -52,10 +66,9 @@ pub fn fast_pass(
         let body_time = start.elapsed();
         let outfit = Outfit::new(layers);
         let mesh = contact_mesh(&outfit, &drawn);
-        let mut pass = FastPass::new(&outfit, &drawn, &mesh, settings);
-        let own_before = pass.own();
+        let mut pass = FastPass::new(&outfit, &drawn, &mesh, settings, false);
         let rounds = pass.run();
-        if pass.between() > 0 || pass.own() > own_before {
+        if pass.between() > 0 || pass.own().count() > pass.folds.len() {
             return None;
         }
         let positions: Vec<Vec<[f64; 3]>> =
@@ -63,6 +76,10 @@ pub fn fast_pass(
         let certifying = Instant::now();
         let certificate = certified(&drawn, layers, &positions);
         let certificate_time = certifying.elapsed();
+        let most_folds = match mends_folds(settings) {
+            true => FEW_OF_ITSELF.max(pass.folds.len() / 2),
+            false => pass.folds.len(),
+        };
         let work = GarmentWork { rounds, ..GarmentWork::default() };
         let mut resolved = Resolved {
             positions,
@@ -75,50 +92,87 @@ pub fn fast_pass(
             ..Resolved::default()
         };
         resolved.compare_since(layers, start);
-        (resolved.certificate.is_clear() && resolved.certificate.tears() == 0).then_some(resolved)
+        is_good(&resolved.certificate, most_folds).then_some(resolved)
     }))
 }
 
+/// Whether folds of the input are mended, not only those that were made: strict limits leave them.
+fn mends_folds(settings: &ResolveSettings) -> bool {
+    settings.self_contact && settings.loosened > 1.0
+}
+
+/// Whether nothing is left for another stage: neither what intersects, nor more than `most_folds` pairs of garments with themselves,
+/// nor whole parts on the wrong side, nor torn cloth.
+fn is_good(certificate: &Certificate, most_folds: usize) -> bool {
+    certificate.is_clear()
+        && certificate.self_triangle_pairs <= most_folds
+        && certificate.vertices_inside == 0
+        && certificate.order_violations <= ORDER_VIOLATIONS
+        && certificate.tears() == 0
+}
+
 /// The faces of an outfit and of what of the body is near it.
-fn contact_mesh(outfit: &Outfit<'_>, body: &BodyObstacle<'_>) -> ContactMesh {
+pub(super) fn contact_mesh(outfit: &Outfit<'_>, body: &BodyObstacle<'_>) -> ContactMesh {
     let start = outfit.vertex_count() as u32;
     let near = body.tree.part().iter().map(|&f| body.surface.faces[f as usize].map(|v| v + start));
     ContactMesh::new(outfit.vertex_count() + body.surface.positions.len(), &outfit.faces, near)
 }
 
 /// An outfit on its way.
-struct FastPass<'a> {
+pub(super) struct FastPass<'a> {
     outfit: &'a Outfit<'a>,
     body: &'a BodyObstacle<'a>,
     settings: &'a ResolveSettings,
-    filter: StepFilter<'a>,
+    pub(super) filter: StepFilter<'a>,
     input: Vec<[f64; 3]>,
+    /// The shape that displacements are measured from: the input, with its crumples smoothed.
+    shape: Vec<[f64; 3]>,
     /// Vertices of the garments, then those of the body.
-    positions: Vec<[f64; 3]>,
+    pub(super) positions: Vec<[f64; 3]>,
     /// Directions away from the body.
     outward: Vec<[f64; 3]>,
+    /// Whether vertices on the wrong side are looked for everywhere: rest meshes lie inside each other without an intersection.
+    is_thorough: bool,
+    /// Pairs of the input's garments with themselves, ascending.
+    folds: FacePairs,
+    /// Conditions that parted triangles so far: without them their neighbours would pull them in again.
+    remembered: Vec<Contact>,
 }
 
 impl<'a> FastPass<'a> {
-    fn new(
+    pub(super) fn new(
         outfit: &'a Outfit<'a>,
         body: &'a BodyObstacle<'a>,
         mesh: &'a ContactMesh,
         settings: &'a ResolveSettings,
+        is_thorough: bool,
     ) -> Self {
         let input: Vec<[f64; 3]> = outfit.layers.iter().flat_map(|l| l.positions).copied().collect();
         let positions = [input.as_slice(), &body.surface.positions].concat();
         let filter = StepFilter::new(mesh, &positions);
-        Self { outfit, body, settings, filter, input, positions, outward: Vec::new() }
+        let (shape, folds) = (input.clone(), Vec::new());
+        let (outward, remembered) = (Vec::new(), Vec::new());
+        let mut pass = Self {
+            outfit,
+            body,
+            settings,
+            filter,
+            input,
+            shape,
+            positions,
+            outward,
+            folds,
+            remembered,
+            is_thorough,
+        };
+        pass.folds = pass.own().copied().collect();
+        pass
     }
 
     /// Rounds until nothing intersects or a round hardly helps; how many it took.
-    fn run(&mut self) -> usize {
-        let mut left = self.between();
-        if std::env::var("TALK").is_ok() {
-            eprintln!("  start {left} own {}", self.own());
-        }
-        if left == 0 {
+    pub(super) fn run(&mut self) -> usize {
+        let mut left = self.left();
+        if left == [0, 0] && !self.is_thorough {
             return 0;
         }
         let away = |v: u32| {
@@ -126,53 +180,37 @@ impl<'a> FastPass<'a> {
             view.and_then(|view| view.plane).map_or([0.0; 3], |plane| plane.normal)
         };
         self.outward = outward(self.outfit, &self.input, away);
-        let mut is_free = true;
+        left = self.left();
+        let mut stalls = 0;
         for round in 1..=ROUNDS {
-            self.round(is_free);
-            let before = std::mem::replace(&mut left, self.between());
-            if left == 0 {
+            self.round(stalls < FREE_STALLS);
+            let before = std::mem::replace(&mut left, self.left());
+            let hardly = |k: usize| left[k] as f64 >= STALLED * before[k] as f64;
+            stalls += usize::from(hardly(0) && hardly(1));
+            if left == [0, 0] || stalls == STALLS {
                 return round;
-            }
-            if left as f64 > STALLED * before as f64 {
-                if !is_free {
-                    return round;
-                }
-                is_free = false;
             }
         }
         ROUNDS
     }
 
     fn round(&mut self, is_free: bool) {
-        let t = Instant::now();
         let defects = self.defects();
-        let t_defects = t.elapsed();
-        let t = Instant::now();
-        let contacts = self.conditions(&defects);
-        let t_conditions = t.elapsed();
-        let t = Instant::now();
+        let mut contacts = self.conditions(&defects);
         let mut to = self.positions.clone();
         let cloth = &mut to[..self.input.len()];
         let region = &defects.region;
+        contacts.extend(self.part_folds(cloth));
         let (stretch, most) = (self.settings.stretch, self.settings.farthest);
-        relax(self.outfit, cloth, &self.input, region, &contacts, stretch, (SWEEPS, LastPasses::FEW));
+        relax(self.outfit, cloth, &self.shape, region, &contacts, stretch, (SWEEPS, LastPasses::FEW));
         for &v in region {
             cloth[v as usize] = no_farther(self.input[v as usize], cloth[v as usize], most);
         }
-        let t_relax = t.elapsed();
-        let t = Instant::now();
         match is_free {
             true => self.filter.step_freely(&self.positions, &to),
             false => self.filter.step(&self.positions, &mut to, None, FILTER_MARGIN * self.settings.gap),
         }
         self.positions = to;
-        if std::env::var("TALK").is_ok() {
-            eprintln!(
-                "  round {is_free}: region {} contacts {} defects {:.1} conditions {:.1} relax {:.1} step {:.1} ms; left {} own {} {:?}",
-                defects.region.len(), contacts.len(), 1e3 * t_defects.as_secs_f64(), 1e3 * t_conditions.as_secs_f64(),
-                1e3 * t_relax.as_secs_f64(), 1e3 * t.elapsed().as_secs_f64(), self.between(), self.own(), self.filter.work
-            );
-        }
     }
 
     /// Pairs that are left of garments with the body and with each other, but for pinched ones.
@@ -180,9 +218,56 @@ impl<'a> FastPass<'a> {
         self.parted().count()
     }
 
+    /// Pairs that should go: [`between`](Self::between), and of garments with themselves.
+    fn left(&self) -> [usize; 2] {
+        let wrong = if self.is_thorough { self.wrong_side().len() } else { 0 };
+        [self.between() + wrong, self.parted_folds().count()]
+    }
+
     /// Pairs that are left of garments with themselves.
-    fn own(&self) -> usize {
-        self.filter.intersections.iter().filter(|pair| self.is_own(pair)).count()
+    fn own(&self) -> impl Iterator<Item = &(u32, u32)> {
+        self.filter.intersections.iter().filter(|pair| self.is_own(pair))
+    }
+
+    /// Pairs of garments with themselves that are to be parted.
+    fn parted_folds(&self) -> impl Iterator<Item = &(u32, u32)> {
+        let is_known = |pair| self.folds.binary_search(pair).is_ok();
+        let is_asked = move |pair| mends_folds(self.settings) || !is_known(pair);
+        self.own().filter(move |pair| is_asked(pair) && !(self.is_pinch(pair.0) && self.is_pinch(pair.1)))
+    }
+
+    /// Conditions that part folds, which are pairs of one garment after the other. Crumples are smoothed: those of the input for good,
+    /// of others what was done to them is taken back.
+    fn part_folds(&mut self, positions: &mut [[f64; 3]]) -> Vec<Contact> {
+        let all: Vec<(u32, u32)> = self.parted_folds().copied().collect();
+        let outfit = self.outfit;
+        let mut contacts = Vec::new();
+        for pairs in all.chunk_by(|a, b| outfit.garment_of_face(a.0) == outfit.garment_of_face(b.0)) {
+            let g = outfit.garment_of_face(pairs[0].0);
+            let (first, start) = (outfit.faces_of_garment(g).start, outfit.vertices(g).start);
+            let local: Vec<(u32, u32)> = pairs.iter().map(|(f, g)| (f - first, g - first)).collect();
+            let part = outfit.part(&self.positions, g);
+            let found = folds(outfit.layers[g].garment, part, &local, FOLD_GAP * self.settings.gap);
+            contacts.extend(found.contacts.into_iter().map(|contact| contact.shifted(start)));
+            let is_of_input = pairs.iter().any(|pair| self.folds.binary_search(pair).is_ok());
+            for v in found.crumpled.into_iter().map(|v| v + start) {
+                let ring = outfit.ring(v);
+                let share = 1.0 / ring.len().max(1) as f64;
+                let mean = |of: &dyn Fn(usize) -> [f64; 3]| {
+                    outfit.ring(v).fold([0.0; 3], |sum, n| add_scaled(sum, share, of(n as usize)))
+                };
+                let v = v as usize;
+                if is_of_input {
+                    let by = scale(sub(mean(&|n| self.positions[n]), self.positions[v]), 0.5);
+                    positions[v] = add(self.positions[v], by);
+                    self.shape[v] = add(self.shape[v], by);
+                } else {
+                    let by = mean(&|n| sub(self.positions[n], self.shape[n]));
+                    positions[v] = add(self.shape[v], by);
+                }
+            }
+        }
+        contacts
     }
 
     fn is_own(&self, &(f, g): &(u32, u32)) -> bool {
