@@ -41,6 +41,8 @@ const STALLED: f64 = 0.8;
 const FREE_STALLS: usize = 3;
 /// …and after so many the outfit is left to the next stage.
 const STALLS: usize = 5;
+/// More intersections than this after a round that hardly helped are not for the fast pass.
+const MANY: usize = 200;
 /// How far sheets of one garment are parted, as a share of the gap.
 const FOLD_GAP: f64 = 0.25;
 /// A share of vertices under an inner garment from which whole parts lie on the wrong side without intersecting anything.
@@ -187,7 +189,8 @@ impl<'a> FastPass<'a> {
             let before = std::mem::replace(&mut left, self.left());
             let hardly = |k: usize| left[k] as f64 >= STALLED * before[k] as f64;
             stalls += usize::from(hardly(0) && hardly(1));
-            if left == [0, 0] || stalls == STALLS {
+            let is_hopeless = stalls > 0 && left[0] > MANY && !self.is_thorough;
+            if left == [0, 0] || stalls == STALLS || is_hopeless {
                 return round;
             }
         }
