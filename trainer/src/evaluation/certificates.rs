@@ -6,10 +6,12 @@ use crate::inference::networks::Networks;
 use crate::inference::tensor_store::DrapeError;
 use clothcombo_data::asset::{Garment, infeasible_pair};
 use clothcombo_physics::contact::resolve::{
-    Certificate, Layer, PathSample, ResolveError, ResolveSettings, Resolved, RestGarment, Stage,
-    certify, resolve_along,
+    Certificate, Layer, PathSample, ResolveError, ResolveSettings, Resolved, RestGarment, Stage, certify,
+    resolve_along,
 };
-use clothcombo_physics::contact::{CountedBody, FilterWork, LayerOrder, Report, ReportGarment, Selection, all_layers};
+use clothcombo_physics::contact::{
+    CountedBody, FilterWork, LayerOrder, Report, ReportGarment, Selection, all_layers,
+};
 use clothcombo_physics::query::{Distance, Surface};
 use clothcombo_physics::transform::apply;
 use miette::Diagnostic;
