@@ -291,7 +291,7 @@ mod tests {
             let (ours, others) = (boxes(count, 1), boxes(3 * count / 2, 2));
             let (own, other) = (tree(&ours), tree(&others));
             for share in [1, 3, 40] {
-                let is_moved = |f: u32| f % share == 0;
+                let is_moved = |f: u32| f.is_multiple_of(share);
                 let mut found = own.pairs(is_moved);
                 found.sort_unstable();
                 let number = |n: usize| 0..n as u32;

@@ -281,7 +281,7 @@ impl<'a> FastPass<'a> {
     fn parted(&self) -> impl Iterator<Item = &(u32, u32)> {
         let is_counted = |&&(f, g): &&(u32, u32)| match self.body_face(g) {
             Some(face) => !self.body.is_pinched(face),
-            None => !self.is_own(&(f, g)) && !(self.is_pinch(f) && self.is_pinch(g)),
+            None => !(self.is_own(&(f, g)) || self.is_pinch(f) && self.is_pinch(g)),
         };
         self.filter.intersections.iter().filter(is_counted)
     }
