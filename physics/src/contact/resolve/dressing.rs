@@ -6,7 +6,6 @@
 use std::time::{Duration, Instant};
 
 use super::body::with_drawn;
-use super::count::certified;
 use super::fast_pass::{FastPass, ORDER_VIOLATIONS, contact_mesh};
 use super::garment::{at, check};
 use super::outfit::Outfit;
@@ -84,9 +83,9 @@ impl Dressed {
             let mesh = contact_mesh(&outfit, &drawn);
             let mut pass = FastPass::new(&outfit, &drawn, &mesh, settings, true);
             self.rounds += pass.run();
-            self.positions = (0..outfit.len()).map(|g| outfit.part(&pass.positions, g).to_vec()).collect();
+            self.positions = pass.garments();
             self.filter = self.filter.and(pass.filter.work);
-            self.certificate = certified(&drawn, layers, &self.positions);
+            self.certificate = pass.certificate(&self.positions);
             self.blocked = blocked(&self.certificate);
         });
     }

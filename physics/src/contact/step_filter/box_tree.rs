@@ -32,6 +32,14 @@ impl Bounds {
         Self { low: low.map(|x| below(x - margin)), high: high.map(|x| above(x + margin)) }
     }
 
+    /// This box, `margin` (m) wider on every side.
+    fn widened(self, margin: f64) -> Self {
+        Self {
+            low: self.low.map(|x| below(f64::from(x) - margin)),
+            high: self.high.map(|x| above(f64::from(x) + margin)),
+        }
+    }
+
     fn merged(self, other: Self) -> Self {
         Self {
             low: std::array::from_fn(|k| self.low[k].min(other.low[k])),
@@ -118,10 +126,10 @@ impl BoxTree {
         Self { order: faces, levels }
     }
 
-    /// Gives every face the box that `bounds` says.
-    pub fn fit(&mut self, bounds: impl Fn(u32) -> Bounds) {
+    /// Gives every face that `is_moved` the box that `bounds` says.
+    pub fn fit(&mut self, bounds: impl Fn(u32) -> Bounds, is_moved: impl Fn(u32) -> bool) {
         for (leaf, faces) in self.levels[0].iter_mut().zip(self.order.chunks(WIDTH)) {
-            for (lane, &face) in faces.iter().enumerate().filter(|(_, face)| **face != NONE) {
+            for (lane, &face) in faces.iter().enumerate().filter(|(_, f)| **f != NONE && is_moved(**f)) {
                 leaf.set(lane, bounds(face));
             }
         }
@@ -182,23 +190,29 @@ impl BoxTree {
         self.order.chunks(WIDTH).map(|faces| faces.iter().any(|&f| f != NONE && is_moved(f))).collect()
     }
 
-    /// Pairs of faces of this tree whose boxes meet, of which one `is_moved`; each once, the smaller number first.
-    pub fn pairs(&self, is_moved: impl Fn(u32) -> bool + Copy + Sync) -> Vec<(u32, u32)> {
+    /// Pairs of faces of this tree whose boxes are no farther apart than `reach` (m) along any axis, of which one `is_moved`; each
+    /// once, the smaller number first.
+    pub fn pairs(&self, reach: f64, is_moved: impl Fn(u32) -> bool + Copy + Sync) -> Vec<(u32, u32)> {
         let moved = self.moved_leaves(is_moved);
-        self.pairs_of(&moved, self, is_moved, |leaf, other| other >= leaf || !moved[other])
+        self.pairs_of((&moved, reach), self, is_moved, |leaf, other| other >= leaf || !moved[other])
             .into_iter()
             .map(|(f, g)| (f.min(g), f.max(g)))
             .collect()
     }
 
-    /// Pairs (face of this tree that `is_moved`, face of `other`) whose boxes meet.
-    pub fn pairs_with(&self, other: &Self, is_moved: impl Fn(u32) -> bool + Copy + Sync) -> Vec<(u32, u32)> {
-        self.pairs_of(&self.moved_leaves(is_moved), other, is_moved, |_, _| true)
+    /// Pairs (face of this tree that `is_moved`, face of `other`) whose boxes are no farther apart than `reach` (m) along any axis.
+    pub fn pairs_with(
+        &self,
+        other: &Self,
+        reach: f64,
+        is_moved: impl Fn(u32) -> bool + Copy + Sync,
+    ) -> Vec<(u32, u32)> {
+        self.pairs_of((&self.moved_leaves(is_moved), reach), other, is_moved, |_, _| true)
     }
 
     fn pairs_of(
         &self,
-        moved: &[bool],
+        (moved, reach): (&[bool], f64),
         other: &Self,
         is_moved: impl Fn(u32) -> bool + Copy + Sync,
         is_asked: impl Fn(usize, usize) -> bool + Sync,
@@ -209,12 +223,12 @@ impl BoxTree {
             let (mut pairs, mut stack) = (Vec::new(), Vec::new());
             for &leaf in chunk {
                 let node = &self.levels[0][leaf];
-                other.leaves_meeting(&node.union(), &mut stack, |near| {
+                other.leaves_meeting(&node.union().widened(reach), &mut stack, |near| {
                     if !is_asked(leaf, near) {
                         return;
                     }
                     for (lane, &f) in self.leaf_faces(leaf).iter().enumerate().filter(|(_, f)| **f != NONE) {
-                        let mut bits = other.levels[0][near].meeting(&node.get(lane));
+                        let mut bits = other.levels[0][near].meeting(&node.get(lane).widened(reach));
                         if is_same && leaf == near {
                             // Each pair of a leaf once.
                             bits &= !0 << (lane + 1);
@@ -277,7 +291,7 @@ mod tests {
     fn tree(boxes: &[Bounds]) -> BoxTree {
         let centre = |f: u32| boxes[f as usize].low.map(f64::from);
         let mut tree = BoxTree::new((0..boxes.len() as u32).collect(), centre);
-        tree.fit(|f| boxes[f as usize]);
+        tree.fit(|f| boxes[f as usize], |_| true);
         tree
     }
 
@@ -292,7 +306,7 @@ mod tests {
             let (own, other) = (tree(&ours), tree(&others));
             for share in [1, 3, 40] {
                 let is_moved = |f: u32| f.is_multiple_of(share);
-                let mut found = own.pairs(is_moved);
+                let mut found = own.pairs(0.0, is_moved);
                 found.sort_unstable();
                 let number = |n: usize| 0..n as u32;
                 let pairs = number(count).flat_map(|f| (f + 1..count as u32).map(move |g| (f, g)));
@@ -301,7 +315,7 @@ mod tests {
                     .filter(|&(f, g)| meet(&ours[f as usize], &ours[g as usize]))
                     .collect();
                 assert_eq!(found, expected);
-                let mut found = own.pairs_with(&other, is_moved);
+                let mut found = own.pairs_with(&other, 0.0, is_moved);
                 found.sort_unstable();
                 let pairs = number(count).flat_map(|f| number(others.len()).map(move |g| (f, g)));
                 let expected: Vec<(u32, u32)> = pairs

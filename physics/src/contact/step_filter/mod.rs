@@ -39,10 +39,9 @@ pub(crate) type FacePairs = Vec<(u32, u32)>;
 /// A mesh in motion, and which of its triangles intersect.
 pub(crate) struct StepFilter<'a> {
     pub mesh: &'a ContactMesh,
+    /// Boxes of faces hold them where they are, and where the last step that moved them came from.
     cloth: BoxTree,
     body: BoxTree,
-    /// The margin that the boxes of a body at rest were made with (m).
-    body_margin: Option<f64>,
     /// Triangles that intersect, the smaller number first, ascending.
     pub intersections: FacePairs,
     /// What it did.
@@ -85,8 +84,10 @@ impl<'a> StepFilter<'a> {
         let cloth = BoxTree::new((0..mesh.cloth_faces as u32).collect(), centre);
         let body = BoxTree::new((mesh.cloth_faces as u32..faces).collect(), centre);
         let work = FilterWork::default();
-        let mut filter = Self { mesh, cloth, body, body_margin: None, intersections: Vec::new(), work };
-        let candidates = filter.candidates(&[positions], &|_| true, 0.0);
+        let mut filter = Self { mesh, cloth, body, intersections: Vec::new(), work };
+        let all = vec![true; mesh.faces.len()];
+        filter.fit(&[positions], &all);
+        let candidates = filter.candidates(&|_| true, 0.0);
         filter.intersections = filter.intersecting(&candidates, positions);
         filter
     }
@@ -94,7 +95,8 @@ impl<'a> StepFilter<'a> {
     /// Takes the step from `from` to `to` without a look on the way.
     pub fn step_freely(&mut self, from: &[[f64; 3]], to: &[[f64; 3]]) {
         let is_moved = self.moved_faces(from, to);
-        let candidates = self.candidates(&[to], &|f| is_moved[f as usize], 0.0);
+        self.fit(&[to], &is_moved);
+        let candidates = self.candidates(&|f| is_moved[f as usize], 0.0);
         let found = self.intersecting(&candidates, to);
         self.intersections.retain(|&(f, g)| !is_moved[f as usize] && !is_moved[g as usize]);
         self.intersections.extend(found);
@@ -119,7 +121,8 @@ impl<'a> StepFilter<'a> {
             None => self.moved_faces(from, to),
         };
         let states: Vec<&[[f64; 3]]> = [from, &wanted].into_iter().chain(carried).collect();
-        let candidates = self.candidates(&states, &|f| is_moved[f as usize], 0.5 * margin);
+        self.fit(&states, &is_moved);
+        let candidates = self.candidates(&|f| is_moved[f as usize], margin);
         let exempt = self.exempt(&is_moved);
         let mut passing: Vec<ElementPair> = Vec::new();
         let mut drawn = vec![0_u8; to.len()];
@@ -164,33 +167,34 @@ impl<'a> StepFilter<'a> {
         self.mesh.faces.iter().map(moves).collect()
     }
 
-    /// Pairs of faces, one of which `is_moved`, whose boxes around all `states`, each `margin` wider (m), meet.
-    pub fn candidates(
-        &mut self,
-        states: &[&[[f64; 3]]],
-        is_moved: &(impl Fn(u32) -> bool + Sync),
-        margin: f64,
-    ) -> FacePairs {
-        let mesh = self.mesh;
+    /// Makes the boxes of faces that moved anew, around all `states`.
+    fn fit(&mut self, states: &[&[[f64; 3]]], is_moved: &[bool]) {
         let bounds = |f: u32| {
-            let face = mesh.faces[f as usize];
-            Bounds::around(states.iter().flat_map(|state| face.map(|v| state[v as usize])), margin)
+            let face = self.mesh.faces[f as usize];
+            Bounds::around(states.iter().flat_map(|state| face.map(|v| state[v as usize])), 0.0)
         };
-        let is_at_rest = !(mesh.cloth_faces..mesh.faces.len()).any(|f| is_moved(f as u32));
-        self.cloth.fit(bounds);
-        if !is_at_rest || self.body_margin != Some(margin) {
-            self.body.fit(bounds);
-            self.body_margin = is_at_rest.then_some(margin);
+        let is_moved = |f: u32| is_moved[f as usize];
+        self.cloth.fit(bounds, is_moved);
+        if self.moves_body(&is_moved) {
+            self.body.fit(bounds, is_moved);
         }
-        let mut pairs = self.cloth.pairs(is_moved);
-        pairs.extend(match is_at_rest {
-            true => self.cloth.pairs_with(&self.body, is_moved),
-            false => self.cloth.pairs_with(&self.body, |_| true),
+    }
+
+    fn moves_body(&self, is_moved: &impl Fn(u32) -> bool) -> bool {
+        (self.mesh.cloth_faces..self.mesh.faces.len()).any(|f| is_moved(f as u32))
+    }
+
+    /// Pairs of faces, one of which `is_asked` for, whose boxes are no farther apart than `reach` (m) along any axis.
+    pub fn candidates(&self, is_asked: &(impl Fn(u32) -> bool + Sync), reach: f64) -> FacePairs {
+        let mut pairs = self.cloth.pairs(reach, is_asked);
+        pairs.extend(match self.moves_body(is_asked) {
+            true => self.cloth.pairs_with(&self.body, reach, |_| true),
+            false => self.cloth.pairs_with(&self.body, reach, is_asked),
         });
         pairs
     }
 
-    /// Calls `found` for every face of the cloth whose box met `bounds` where candidates were last asked for.
+    /// Calls `found` for every face of the cloth whose box meets `bounds`.
     pub fn cloth_faces_meeting(&self, bounds: &Bounds, found: impl FnMut(u32)) {
         self.cloth.faces_meeting(bounds, &mut Vec::new(), found);
     }

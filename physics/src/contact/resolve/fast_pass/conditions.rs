@@ -88,7 +88,7 @@ impl FastPass<'_> {
     /// What the body leaves to vertex `v`, and which sheets of inner garments it has to stay over.
     fn look(&self, v: u32) -> (Option<Plane>, Vec<Over>) {
         let (p, away) = (self.positions[v as usize], self.outward[v as usize]);
-        let plane = self.body.look(p).and_then(|view| view.plane).filter(|plane| plane.distance < NEAR);
+        let plane = self.planes[v as usize].filter(|plane| plane.distance < NEAR);
         // More than half way through a limb the nearest way out is its other side: cloth goes back to its own.
         let is_through = plane.is_some_and(|plane| plane.distance < 0.0 && dot(plane.normal, away) < 0.0);
         let own = if is_through { self.body.exit(p, away, self.settings.farthest) } else { None };
@@ -138,7 +138,7 @@ impl FastPass<'_> {
         let is_in = &defects.is_in;
         let mesh = self.filter.mesh;
         let is_near = |f: u32| !mesh.is_body(f) && mesh.faces[f as usize].iter().any(|&v| is_in[v as usize]);
-        let candidates = self.filter.candidates(&[&self.positions], &is_near, 0.5 * NEAR);
+        let candidates = self.filter.candidates(&is_near, NEAR);
         let this = &*self;
         let mut contacts: Vec<Contact> = candidates
             .par_chunks(256)
@@ -196,8 +196,8 @@ impl FastPass<'_> {
     /// Whether a face of the body with this `normal` is on the other side of a limb that face `f` has gone into.
     fn is_other_side(&self, f: u32, normal: [f64; 3]) -> bool {
         let seen = |&v: &u32| {
-            let plane = self.body.look(self.positions[v as usize]).and_then(|view| view.plane);
-            plane.is_some_and(|plane| plane.distance > 0.0 && dot(plane.normal, normal) > 0.0)
+            let plane = &self.planes[v as usize];
+            plane.as_ref().is_some_and(|plane| plane.distance > 0.0 && dot(plane.normal, normal) > 0.0)
         };
         dot(normal, self.direction(f)) < 0.0 && !self.outfit.faces[f as usize].iter().any(seen)
     }

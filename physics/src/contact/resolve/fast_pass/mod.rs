@@ -15,10 +15,10 @@ use std::time::Instant;
 use super::attempt::FEW_OF_ITSELF;
 use super::body::with_drawn;
 use super::certificate::Certificate;
-use super::contact::Contact;
-use super::count::certified;
+use super::contact::{Contact, Plane};
+use super::count::{certified_around, counted, is_near};
 use super::folds::folds;
-use super::garment::check;
+use super::garment::{at, check};
 use super::obstacle::BodyObstacle;
 use super::outfit::Outfit;
 use super::over::outward;
@@ -26,8 +26,10 @@ use super::relax::{LastPasses, no_farther, relax};
 use super::resolved::Stage;
 use super::{GarmentWork, Layer, ResolveError, ResolveSettings, Resolved};
 use crate::contact::step_filter::{ContactMesh, FacePairs, StepFilter};
+use crate::contact::{ReportBody, Triangle, TriangleTree};
 use crate::query::Surface;
 use crate::vec3::{add, add_scaled, scale, sub};
+use rayon::prelude::*;
 
 /// Rings of neighbours around a defect that move along.
 const RINGS: usize = 2;
@@ -73,10 +75,9 @@ pub fn fast_pass(
         if pass.between() > 0 || pass.own().count() > pass.folds.len() {
             return None;
         }
-        let positions: Vec<Vec<[f64; 3]>> =
-            (0..outfit.len()).map(|g| outfit.part(&pass.positions, g).to_vec()).collect();
+        let positions = pass.garments();
         let certifying = Instant::now();
-        let certificate = certified(&drawn, layers, &positions);
+        let certificate = pass.certificate(&positions);
         let certificate_time = certifying.elapsed();
         let most_folds = match mends_folds(settings) {
             true => FEW_OF_ITSELF.max(pass.folds.len() / 2),
@@ -131,6 +132,8 @@ pub(super) struct FastPass<'a> {
     shape: Vec<[f64; 3]>,
     /// Vertices of the garments, then those of the body.
     pub(super) positions: Vec<[f64; 3]>,
+    /// What the body leaves to every vertex of the garments where it is.
+    planes: Vec<Option<Plane>>,
     /// Directions away from the body.
     outward: Vec<[f64; 3]>,
     /// Whether vertices on the wrong side are looked for everywhere: rest meshes lie inside each other without an intersection.
@@ -154,6 +157,8 @@ impl<'a> FastPass<'a> {
         let filter = StepFilter::new(mesh, &positions);
         let (shape, folds) = (input.clone(), Vec::new());
         let (outward, remembered) = (Vec::new(), Vec::new());
+        let look = |p: &[f64; 3]| body.look(*p)?.plane;
+        let planes = input.par_iter().with_min_len(128).map(look).collect();
         let mut pass = Self {
             outfit,
             body,
@@ -162,6 +167,7 @@ impl<'a> FastPass<'a> {
             input,
             shape,
             positions,
+            planes,
             outward,
             folds,
             remembered,
@@ -177,10 +183,7 @@ impl<'a> FastPass<'a> {
         if left == [0, 0] && !self.is_thorough {
             return 0;
         }
-        let away = |v: u32| {
-            let view = self.body.look(self.positions[v as usize]);
-            view.and_then(|view| view.plane).map_or([0.0; 3], |plane| plane.normal)
-        };
+        let away = |v: u32| self.planes[v as usize].map_or([0.0; 3], |plane| plane.normal);
         self.outward = outward(self.outfit, &self.input, away);
         left = self.left();
         let mut stalls = 0;
@@ -213,7 +216,27 @@ impl<'a> FastPass<'a> {
             true => self.filter.step_freely(&self.positions, &to),
             false => self.filter.step(&self.positions, &mut to, None, FILTER_MARGIN * self.settings.gap),
         }
-        self.positions = to;
+        let (before, body) = (std::mem::replace(&mut self.positions, to), self.body);
+        let moved = self.planes.par_iter_mut().zip(&before).zip(&self.positions).with_min_len(128);
+        moved.filter(|((_, from), to)| from != to).for_each(|((plane, _), to)| {
+            *plane = body.look(*to).and_then(|view| view.plane);
+        });
+    }
+
+    /// Positions of every garment.
+    pub(super) fn garments(&self) -> Vec<Vec<[f64; 3]>> {
+        (0..self.outfit.len()).map(|g| self.outfit.part(&self.positions, g).to_vec()).collect()
+    }
+
+    /// The certificate of the garments, which are at `positions` now: what is known is not looked for again.
+    pub(super) fn certificate(&self, positions: &[Vec<[f64; 3]>]) -> Certificate {
+        let now = at(self.outfit.layers, positions);
+        if !is_near(self.outfit.layers, positions) {
+            return certified_around(self.body.surface, &now);
+        }
+        let mut found = counted(self, &now);
+        found.count_narrow(self.body);
+        found
     }
 
     /// Pairs that are left of garments with the body and with each other, but for pinched ones.
@@ -298,5 +321,50 @@ impl<'a> FastPass<'a> {
 
     fn corners(&self, f: u32) -> [[f64; 3]; 3] {
         self.filter.mesh.faces[f as usize].map(|v| self.positions[v as usize])
+    }
+}
+
+/// All intersections are known exactly, and where every vertex lies.
+impl ReportBody for FastPass<'_> {
+    fn tree(&self) -> &TriangleTree<'_> {
+        &self.body.tree
+    }
+
+    fn distance(&self, p: [f64; 3]) -> Option<(f64, [f64; 3])> {
+        self.body.distance(p)
+    }
+
+    fn distances(&self, garment: usize, _: &[[f64; 3]]) -> Vec<Option<(f64, [f64; 3])>> {
+        let vertices = self.outfit.vertices(garment);
+        let planes = &self.planes[vertices.start as usize..vertices.end as usize];
+        planes.iter().map(|plane| plane.as_ref().map(Plane::seen)).collect()
+    }
+
+    fn known_pairs(&self, garment: usize, with: Option<usize>) -> Option<Vec<(u32, u32)>> {
+        let of = |f: u32| (!self.filter.mesh.is_body(f)).then(|| self.outfit.garment_of_face(f));
+        let first = |g: usize| self.outfit.faces_of_garment(g).start;
+        // The inner garment comes first in the pairs of the filter, the body last.
+        let is_own = with == Some(garment);
+        let local = |&(f, g): &(u32, u32)| match with {
+            None => (of(f) == Some(garment))
+                .then_some(())
+                .and_then(|()| Some((f - first(garment), self.body_face(g)?))),
+            Some(inner) if of(f) == Some(inner) && of(g) == Some(garment) => {
+                let (f, g) = (f - first(inner), g - first(garment));
+                Some(if is_own { (f, g) } else { (g, f) })
+            }
+            Some(_) => None,
+        };
+        let mut pairs: Vec<(u32, u32)> = self.filter.intersections.iter().filter_map(local).collect();
+        pairs.sort_unstable();
+        Some(pairs)
+    }
+
+    fn is_pinched(&self, face: u32) -> bool {
+        self.body.is_pinched(face)
+    }
+
+    fn is_pinched_at(&self, triangle: &Triangle) -> bool {
+        self.body.is_pinch_at(triangle)
     }
 }
