@@ -73,6 +73,7 @@ pub use count::certify;
 pub use dressing::{Dressed, dress};
 pub use error::ResolveError;
 pub use fast_pass::fast_pass;
+use fast_pass::passed_near;
 pub use follow::{resolve_after, resolve_along};
 pub use garment::{Layer, RestGarment};
 pub use resolved::{GarmentWork, Resolved, Stage};
@@ -82,7 +83,9 @@ pub use waypoint::{PathSample, Reached};
 use std::time::Instant;
 
 use crate::query::Surface;
-use attempt::resolved_further;
+use attempt::resolved_near;
+use body::with_drawn;
+use garment::check;
 
 /// Takes `layers`, innermost first, out of `body` and out of each other. Deterministic for any number of threads (without a
 /// time limit in the settings); a clean input comes back to the bit.
@@ -96,10 +99,16 @@ pub fn resolve(
     settings: &ResolveSettings,
 ) -> Result<Resolved, ResolveError> {
     let start = Instant::now();
-    if let Some(found) = fast_pass(body, layers, settings)? {
-        return Ok(found);
-    }
-    let fast_time = start.elapsed();
-    let found = resolved_further(body, layers, settings, Instant::now(), |_, found| Ok(found));
-    found.map(|found: Resolved| Resolved { fast_time, ..found })
+    settings.check()?;
+    check(body, layers)?;
+    with_drawn(body, layers, |drawn| {
+        let body_time = start.elapsed();
+        if let Some(found) = passed_near(&drawn, layers, settings, (start, body_time)) {
+            return Ok(found);
+        }
+        let fast_time = start.elapsed();
+        let times = (Instant::now(), body_time);
+        let found = resolved_near(drawn, layers, settings, times, |_, found| Ok(found));
+        found.map(|found: Resolved| Resolved { fast_time, ..found })
+    })
 }

@@ -109,14 +109,15 @@ pub(crate) struct BoxTree {
 }
 
 impl BoxTree {
-    /// A tree of `faces`, which `centre` says where they are (m); its boxes are empty until it is fitted.
-    pub fn new(mut faces: Vec<u32>, centre: impl Fn(u32) -> [f64; 3] + Copy) -> Self {
+    /// A tree of faces, given with where they are (m); its boxes are empty until it is fitted.
+    pub fn new(mut faces: Vec<([f64; 3], u32)>) -> Self {
         let leaves = faces.len().div_ceil(WIDTH);
         let mut block = WIDTH;
         while block * WIDTH < faces.len() {
             block *= WIDTH;
         }
-        sort(&mut faces, centre, block);
+        sort(&mut faces, block);
+        let mut faces: Vec<u32> = faces.into_iter().map(|(_, f)| f).collect();
         faces.resize(leaves * WIDTH, NONE);
         let mut levels = vec![vec![Node::EMPTY; leaves]];
         while levels[levels.len() - 1].len() > 1 {
@@ -250,7 +251,7 @@ impl BoxTree {
 }
 
 /// Orders `faces` so that blocks of `block`, of an eighth of it and so on lie close together.
-fn sort(faces: &mut [u32], centre: impl Fn(u32) -> [f64; 3] + Copy, mut block: usize) {
+fn sort(faces: &mut [([f64; 3], u32)], mut block: usize) {
     while block >= faces.len() && block > 1 {
         block /= WIDTH;
     }
@@ -258,18 +259,17 @@ fn sort(faces: &mut [u32], centre: impl Fn(u32) -> [f64; 3] + Copy, mut block: u
         return;
     }
     let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for &f in &*faces {
-        let c = centre(f);
+    for (c, _) in &*faces {
         low = std::array::from_fn(|k| low[k].min(c[k]));
         high = std::array::from_fn(|k| high[k].max(c[k]));
     }
     let extent = vec3::sub(high, low);
     let axis = (0..3).fold(0, |best, k| if extent[k] > extent[best] { k } else { best });
     let middle = (faces.len().div_ceil(block) / 2).max(1) * block;
-    faces.select_nth_unstable_by(middle, |a, b| centre(*a)[axis].total_cmp(&centre(*b)[axis]).then(a.cmp(b)));
+    faces.select_nth_unstable_by(middle, |(a, f), (b, g)| a[axis].total_cmp(&b[axis]).then(f.cmp(g)));
     let (left, right) = faces.split_at_mut(middle);
-    sort(left, centre, block);
-    sort(right, centre, block);
+    sort(left, block);
+    sort(right, block);
 }
 
 #[cfg(test)]
@@ -289,8 +289,7 @@ mod tests {
     }
 
     fn tree(boxes: &[Bounds]) -> BoxTree {
-        let centre = |f: u32| boxes[f as usize].low.map(f64::from);
-        let mut tree = BoxTree::new((0..boxes.len() as u32).collect(), centre);
+        let mut tree = BoxTree::new((0..).zip(boxes).map(|(f, b)| (b.low.map(f64::from), f)).collect());
         tree.fit(|f| boxes[f as usize], |_| true);
         tree
     }

@@ -76,13 +76,12 @@ impl FilterWork {
 impl<'a> StepFilter<'a> {
     /// Of `mesh` at `positions`.
     pub fn new(mesh: &'a ContactMesh, positions: &[[f64; 3]]) -> Self {
-        let centre = |f: u32| {
-            let [a, b, c] = mesh.faces[f as usize].map(|v| positions[v as usize]);
-            add(add(a, b), c)
+        let centre = |f: usize| {
+            let [a, b, c] = mesh.faces[f].map(|v| positions[v as usize]);
+            (add(add(a, b), c), f as u32)
         };
-        let faces = mesh.faces.len() as u32;
-        let cloth = BoxTree::new((0..mesh.cloth_faces as u32).collect(), centre);
-        let body = BoxTree::new((mesh.cloth_faces as u32..faces).collect(), centre);
+        let cloth = BoxTree::new((0..mesh.cloth_faces).map(centre).collect());
+        let body = BoxTree::new((mesh.cloth_faces..mesh.faces.len()).map(centre).collect());
         let work = FilterWork::default();
         let mut filter = Self { mesh, cloth, body, intersections: Vec::new(), work };
         let all = vec![true; mesh.faces.len()];

@@ -10,7 +10,7 @@ mod conditions;
 #[cfg(test)]
 mod tests;
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use super::attempt::FEW_OF_ITSELF;
 use super::body::with_drawn;
@@ -68,35 +68,45 @@ pub fn fast_pass(
     let start = Instant::now();
     Ok(with_drawn(body, layers, |drawn| {
         let body_time = start.elapsed();
-        let outfit = Outfit::new(layers);
-        let mesh = contact_mesh(&outfit, &drawn);
-        let mut pass = FastPass::new(&outfit, &drawn, &mesh, settings, false);
-        let rounds = pass.run();
-        if pass.between() > 0 || pass.own().count() > pass.folds.len() {
-            return None;
-        }
-        let positions = pass.garments();
-        let certifying = Instant::now();
-        let certificate = pass.certificate(&positions);
-        let certificate_time = certifying.elapsed();
-        let most_folds = match mends_folds(settings) {
-            true => FEW_OF_ITSELF.max(pass.folds.len() / 2),
-            false => pass.folds.len(),
-        };
-        let work = GarmentWork { rounds, ..GarmentWork::default() };
-        let mut resolved = Resolved {
-            positions,
-            certificate,
-            garments: vec![work; layers.len()],
-            stage: Stage::FastPass,
-            filter: pass.filter.work,
-            body_time,
-            certificate_time,
-            ..Resolved::default()
-        };
-        resolved.compare_since(layers, start);
-        is_good(&resolved.certificate, most_folds).then_some(resolved)
+        passed_near(&drawn, layers, settings, (start, body_time))
     }))
+}
+
+/// [`fast_pass`] on a body that is prepared near `layers`, which took `body_time`; all of it began at `start`.
+pub(super) fn passed_near(
+    drawn: &BodyObstacle<'_>,
+    layers: &[Layer<'_>],
+    settings: &ResolveSettings,
+    (start, body_time): (Instant, Duration),
+) -> Option<Resolved> {
+    let outfit = Outfit::new(layers);
+    let mesh = contact_mesh(&outfit, drawn);
+    let mut pass = FastPass::new(&outfit, drawn, &mesh, settings, false);
+    let rounds = pass.run();
+    if pass.between() > 0 || pass.own().count() > pass.folds.len() {
+        return None;
+    }
+    let positions = pass.garments();
+    let certifying = Instant::now();
+    let certificate = pass.certificate(&positions);
+    let certificate_time = certifying.elapsed();
+    let most_folds = match mends_folds(settings) {
+        true => FEW_OF_ITSELF.max(pass.folds.len() / 2),
+        false => pass.folds.len(),
+    };
+    let work = GarmentWork { rounds, ..GarmentWork::default() };
+    let mut resolved = Resolved {
+        positions,
+        certificate,
+        garments: vec![work; layers.len()],
+        stage: Stage::FastPass,
+        filter: pass.filter.work,
+        body_time,
+        certificate_time,
+        ..Resolved::default()
+    };
+    resolved.compare_since(layers, start);
+    is_good(&resolved.certificate, most_folds).then_some(resolved)
 }
 
 /// Whether folds of the input are mended, not only those that were made: strict limits leave them.
