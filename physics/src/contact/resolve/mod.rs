@@ -40,7 +40,6 @@ mod close_in;
 mod contact;
 mod count;
 mod detect;
-mod dressing;
 mod ease;
 mod error;
 mod fast_pass;
@@ -70,7 +69,6 @@ pub use certificate::{
     Certificate, Crossed, GarmentCertificate, LayerCertificate, PinchedPairs, RemainingPair,
 };
 pub use count::certify;
-pub use dressing::{Dressed, dress};
 pub use error::ResolveError;
 pub use fast_pass::fast_pass;
 use fast_pass::passed_near;

@@ -61,18 +61,6 @@ pub struct FilterWork {
     pub element_tests: usize,
 }
 
-impl FilterWork {
-    /// What both did.
-    pub(crate) fn and(self, other: Self) -> Self {
-        Self {
-            steps: self.steps + other.steps,
-            drawn_back: self.drawn_back + other.drawn_back,
-            candidates: self.candidates + other.candidates,
-            element_tests: self.element_tests + other.element_tests,
-        }
-    }
-}
-
 impl<'a> StepFilter<'a> {
     /// Of `mesh` at `positions`.
     pub fn new(mesh: &'a ContactMesh, positions: &[[f64; 3]]) -> Self {

@@ -1,7 +1,6 @@
 //! Where an outfit is wrong, and what has to hold there.
 
 use super::FastPass;
-use crate::contact::ORDER_RADIUS;
 use crate::contact::resolve::contact::{Contact, Plane, along_line, is_tiny, normal_of, overlap};
 use crate::contact::resolve::over::{Order, Over, SAME_PART, STEEP, order, part_along, sheet_normal};
 use crate::contact::step_filter::{Bounds, ElementPair, closest_on_edges};
@@ -39,9 +38,6 @@ impl FastPass<'_> {
             [f, other].into_iter().flat_map(|f| outfit.faces[f as usize])
         };
         let mut seeds: Vec<u32> = self.parted().chain(self.parted_folds()).flat_map(cloth_of).collect();
-        if self.is_thorough {
-            seeds.extend(self.wrong_side());
-        }
         loop {
             let region = outfit.neighbourhood(&seeds, super::RINGS);
             let new: Vec<u32> = region.iter().copied().filter(|&v| !found.is_in[v as usize]).collect();
@@ -69,22 +65,6 @@ impl FastPass<'_> {
         }
     }
 
-    /// All vertices on the wrong side of the body or of an inner garment, and the corners of the sheets over them.
-    pub(super) fn wrong_side(&self) -> Vec<u32> {
-        if self.outward.is_empty() {
-            return Vec::new();
-        }
-        let wrong = |v: u32| {
-            let (plane, over) = self.look(v);
-            let is_inside = plane.is_some_and(|p| p.distance < 0.0 && !p.is_held);
-            let sheets: Vec<u32> =
-                over.iter().filter(|over| over.height < 0.0).flat_map(|over| over.face).collect();
-            let own = (is_inside || !sheets.is_empty()).then_some(v);
-            own.into_iter().chain(sheets)
-        };
-        (0..self.input.len() as u32).into_par_iter().with_min_len(64).flat_map_iter(wrong).collect()
-    }
-
     /// What the body leaves to vertex `v`, and which sheets of inner garments it has to stay over.
     fn look(&self, v: u32) -> (Option<Plane>, Vec<Over>) {
         let (p, away) = (self.positions[v as usize], self.outward[v as usize]);
@@ -103,8 +83,7 @@ impl FastPass<'_> {
             return Vec::new();
         }
         let mut outermost: Vec<Option<(f64, u32, [f64; 3])>> = vec![None; garment];
-        let reach = if self.is_thorough { ORDER_RADIUS } else { REACH };
-        self.filter.cloth_faces_meeting(&Bounds::around([p, add_scaled(p, reach, away)], 0.0), |f| {
+        self.filter.cloth_faces_meeting(&Bounds::around([p, add_scaled(p, REACH, away)], 0.0), |f| {
             let g = self.outfit.garment_of_face(f);
             if g >= garment {
                 return;
@@ -116,7 +95,7 @@ impl FastPass<'_> {
             let Some((above, at)) = along_line(p, away, &self.corners(f)) else { return };
             let is_farther =
                 outermost[g].is_none_or(|(most, known, _)| above > most || above == most && f < known);
-            if (0.0..=reach).contains(&above) && is_farther {
+            if (0.0..=REACH).contains(&above) && is_farther {
                 outermost[g] = Some((above, f, at));
             }
         });

@@ -48,7 +48,7 @@ const MANY: usize = 200;
 /// How far sheets of one garment are parted, as a share of the gap.
 const FOLD_GAP: f64 = 0.25;
 /// A share of vertices under an inner garment from which whole parts lie on the wrong side without intersecting anything.
-pub(super) const ORDER_VIOLATIONS: f64 = 1e-2;
+const ORDER_VIOLATIONS: f64 = 1e-2;
 /// What elements stay apart in a filtered step, as a share of the gap.
 const FILTER_MARGIN: f64 = 0.05;
 
@@ -81,7 +81,7 @@ pub(super) fn passed_near(
 ) -> Option<Resolved> {
     let outfit = Outfit::new(layers);
     let mesh = contact_mesh(&outfit, drawn);
-    let mut pass = FastPass::new(&outfit, drawn, &mesh, settings, false);
+    let mut pass = FastPass::new(&outfit, drawn, &mesh, settings);
     let rounds = pass.run();
     if pass.between() > 0 || pass.own().count() > pass.folds.len() {
         return None;
@@ -125,29 +125,27 @@ fn is_good(certificate: &Certificate, most_folds: usize) -> bool {
 }
 
 /// The faces of an outfit and of what of the body is near it.
-pub(super) fn contact_mesh(outfit: &Outfit<'_>, body: &BodyObstacle<'_>) -> ContactMesh {
+fn contact_mesh(outfit: &Outfit<'_>, body: &BodyObstacle<'_>) -> ContactMesh {
     let start = outfit.vertex_count() as u32;
     let near = body.tree.part().iter().map(|&f| body.surface.faces[f as usize].map(|v| v + start));
     ContactMesh::new(outfit.vertex_count() + body.surface.positions.len(), &outfit.faces, near)
 }
 
 /// An outfit on its way.
-pub(super) struct FastPass<'a> {
+struct FastPass<'a> {
     outfit: &'a Outfit<'a>,
     body: &'a BodyObstacle<'a>,
     settings: &'a ResolveSettings,
-    pub(super) filter: StepFilter<'a>,
+    filter: StepFilter<'a>,
     input: Vec<[f64; 3]>,
     /// The shape that displacements are measured from: the input, with its crumples smoothed.
     shape: Vec<[f64; 3]>,
     /// Vertices of the garments, then those of the body.
-    pub(super) positions: Vec<[f64; 3]>,
+    positions: Vec<[f64; 3]>,
     /// What the body leaves to every vertex of the garments where it is.
     planes: Vec<Option<Plane>>,
     /// Directions away from the body.
     outward: Vec<[f64; 3]>,
-    /// Whether vertices on the wrong side are looked for everywhere: rest meshes lie inside each other without an intersection.
-    is_thorough: bool,
     /// Pairs of the input's garments with themselves, ascending.
     folds: FacePairs,
     /// Conditions that parted triangles so far: without them their neighbours would pull them in again.
@@ -155,12 +153,11 @@ pub(super) struct FastPass<'a> {
 }
 
 impl<'a> FastPass<'a> {
-    pub(super) fn new(
+    fn new(
         outfit: &'a Outfit<'a>,
         body: &'a BodyObstacle<'a>,
         mesh: &'a ContactMesh,
         settings: &'a ResolveSettings,
-        is_thorough: bool,
     ) -> Self {
         let input: Vec<[f64; 3]> = outfit.layers.iter().flat_map(|l| l.positions).copied().collect();
         let positions = [input.as_slice(), &body.surface.positions].concat();
@@ -181,28 +178,26 @@ impl<'a> FastPass<'a> {
             outward,
             folds,
             remembered,
-            is_thorough,
         };
         pass.folds = pass.own().copied().collect();
         pass
     }
 
     /// Rounds until nothing intersects or a round hardly helps; how many it took.
-    pub(super) fn run(&mut self) -> usize {
+    fn run(&mut self) -> usize {
         let mut left = self.left();
-        if left == [0, 0] && !self.is_thorough {
+        if left == [0, 0] {
             return 0;
         }
         let away = |v: u32| self.planes[v as usize].map_or([0.0; 3], |plane| plane.normal);
         self.outward = outward(self.outfit, &self.input, away);
-        left = self.left();
         let mut stalls = 0;
         for round in 1..=ROUNDS {
             self.round(stalls < FREE_STALLS);
             let before = std::mem::replace(&mut left, self.left());
             let hardly = |k: usize| left[k] as f64 >= STALLED * before[k] as f64;
             stalls += usize::from(hardly(0) && hardly(1));
-            let is_hopeless = stalls > 0 && left[0] > MANY && !self.is_thorough;
+            let is_hopeless = stalls > 0 && left[0] > MANY;
             if left == [0, 0] || stalls == STALLS || is_hopeless {
                 return round;
             }
@@ -236,12 +231,12 @@ impl<'a> FastPass<'a> {
     }
 
     /// Positions of every garment.
-    pub(super) fn garments(&self) -> Vec<Vec<[f64; 3]>> {
+    fn garments(&self) -> Vec<Vec<[f64; 3]>> {
         (0..self.outfit.len()).map(|g| self.outfit.part(&self.positions, g).to_vec()).collect()
     }
 
     /// The certificate of the garments, which are at `positions` now: what is known is not looked for again.
-    pub(super) fn certificate(&self, positions: &[Vec<[f64; 3]>]) -> Certificate {
+    fn certificate(&self, positions: &[Vec<[f64; 3]>]) -> Certificate {
         let now = at(self.outfit.layers, positions);
         if !is_near(self.outfit.layers, positions) {
             return certified_around(self.body.surface, &now);
@@ -258,8 +253,7 @@ impl<'a> FastPass<'a> {
 
     /// Pairs that should go: [`between`](Self::between), and of garments with themselves.
     fn left(&self) -> [usize; 2] {
-        let wrong = if self.is_thorough { self.wrong_side().len() } else { 0 };
-        [self.between() + wrong, self.parted_folds().count()]
+        [self.between(), self.parted_folds().count()]
     }
 
     /// Pairs that are left of garments with themselves.
