@@ -3,7 +3,7 @@
 //! Triangles that intersect, found exactly, and vertices on the wrong side around them tell where; conditions there and on what is
 //! near ([`conditions`]) are met by a few smooth sweeps over two rings of neighbours ([`relax`]). Rounds move freely as long as they
 //! help: cloth that lies deeper than one triangle could not come out through the step filter. The last ones are filtered, so that
-//! they make no new intersection. What parted triangles or folds once is asked for in all later rounds. It ends when nothing intersects, or
+//! they make no new intersection. What parted triangles once is asked for in all later rounds. It ends when nothing intersects, or
 //! when rounds no longer help: the rest is for the next stage.
 
 mod conditions;
@@ -211,9 +211,7 @@ impl<'a> FastPass<'a> {
         let mut to = self.positions.clone();
         let cloth = &mut to[..self.input.len()];
         let region = &defects.region;
-        let folds = self.part_folds(cloth);
-        contacts.extend(&folds);
-        self.remembered.extend(folds);
+        contacts.extend(self.part_folds(cloth));
         let (stretch, most) = (self.settings.stretch, self.settings.farthest);
         relax(self.outfit, cloth, &self.shape, region, &contacts, stretch, (SWEEPS, LastPasses::FEW));
         for &v in region {
@@ -268,8 +266,8 @@ impl<'a> FastPass<'a> {
         self.own().filter(move |pair| is_asked(pair) && !(self.is_pinch(pair.0) && self.is_pinch(pair.1)))
     }
 
-    /// Conditions that part folds, which are pairs of one garment after the other. Crumples are smoothed: those of the input
-    /// for good, of others what was done to them is taken back.
+    /// Conditions that part folds, which are pairs of one garment after the other. Crumples are smoothed: those of the input for good,
+    /// of others what was done to them is taken back.
     fn part_folds(&mut self, positions: &mut [[f64; 3]]) -> Vec<Contact> {
         let all: Vec<(u32, u32)> = self.parted_folds().copied().collect();
         let outfit = self.outfit;
@@ -281,9 +279,7 @@ impl<'a> FastPass<'a> {
             let part = outfit.part(&self.positions, g);
             let found = folds(outfit.layers[g].garment, part, &local, FOLD_GAP * self.settings.gap);
             contacts.extend(found.contacts.into_iter().map(|contact| contact.shifted(start)));
-            let of_input = pairs.iter().filter(|pair| self.folds.binary_search(pair).is_ok());
-            let of_input: Vec<[u32; 3]> =
-                of_input.flat_map(|&(f, g)| [f, g].map(|f| outfit.faces[f as usize])).collect();
+            let is_of_input = pairs.iter().any(|pair| self.folds.binary_search(pair).is_ok());
             for v in found.crumpled.into_iter().map(|v| v + start) {
                 let ring = outfit.ring(v);
                 let share = 1.0 / ring.len().max(1) as f64;
@@ -291,7 +287,7 @@ impl<'a> FastPass<'a> {
                     outfit.ring(v).fold([0.0; 3], |sum, n| add_scaled(sum, share, of(n as usize)))
                 };
                 let v = v as usize;
-                if of_input.as_flattened().contains(&(v as u32)) {
+                if is_of_input {
                     let by = scale(sub(mean(&|n| self.positions[n]), self.positions[v]), 0.5);
                     positions[v] = add(self.positions[v], by);
                     self.shape[v] = add(self.shape[v], by);
