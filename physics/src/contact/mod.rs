@@ -8,6 +8,7 @@ mod penetration;
 mod report;
 pub mod resolve;
 mod self_collision;
+mod step_filter;
 #[cfg(test)]
 mod tests;
 
@@ -24,3 +25,4 @@ pub use report::{
     TrianglePairs, all_layers,
 };
 pub use self_collision::self_collision;
+pub use step_filter::FilterWork;

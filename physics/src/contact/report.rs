@@ -24,6 +24,17 @@ pub trait ReportBody: Sync {
     /// Signed distance of a point to it (m), and the direction away from it; `None` where it is not to be counted.
     fn distance(&self, p: [f64; 3]) -> Option<(f64, [f64; 3])>;
 
+    /// [`distance`](Self::distance) of all vertices of a garment, given by its number.
+    fn distances(&self, _garment: usize, positions: &[[f64; 3]]) -> Vec<Option<(f64, [f64; 3])>> {
+        positions.par_iter().with_min_len(128).map(|p| self.distance(*p)).collect()
+    }
+
+    /// The intersecting pairs of a garment, as [`TriangleTree`] finds them, if they are known: with another one under it, or with
+    /// itself, given by its number, or with the body.
+    fn known_pairs(&self, _garment: usize, _with: Option<usize>) -> Option<Vec<(u32, u32)>> {
+        None
+    }
+
     /// Whether pairs with this face of it are pinched: no cloth could avoid them.
     fn is_pinched(&self, _face: u32) -> bool {
         false
@@ -123,7 +134,9 @@ impl TrianglePairs {
         contours: impl Fn(&[(u32, u32)]) -> Vec<Contour>,
     ) -> Self {
         let (pinched, pairs): (Vec<_>, Vec<_>) = all.into_iter().partition(is_pinched);
-        let contour_length = contours(&pairs).iter().map(|c| c.length).sum();
+        // Contours need trees, which are only made where something needs them.
+        let contour_length =
+            if pairs.is_empty() { 0.0 } else { contours(&pairs).iter().map(|c| c.length).sum() };
         Self { pairs, pinched, contour_length }
     }
 
@@ -190,7 +203,7 @@ impl Report {
     /// Counts what is selected of `garments`, inner to outer, on `body`. The same for any number of threads.
     pub fn count(body: &impl ReportBody, garments: &[ReportGarment<'_>], selection: &Selection<'_>) -> Self {
         let counted: Vec<CountedGarment<'_>> =
-            garments.iter().map(|garment| CountedGarment::new(*garment, body)).collect();
+            garments.iter().enumerate().map(|(g, garment)| CountedGarment::new(g, *garment, body)).collect();
         let is_inner = |g: usize| selection.layers.iter().any(|(inner, _)| *inner == g);
         let surfaces: Vec<Option<InnerSurface<'_>>> = match selection.order {
             LayerOrder::NearestVertex => counted.iter().map(|_| None).collect(),
@@ -220,7 +233,11 @@ impl Report {
             garments: counted.iter().map(|g| g.report(body, selection.triangles)).collect(),
             layers: selection.layers.iter().map(layer).collect(),
             body_itself: match selection.body_itself {
-                true => pairs_with_itself(body.tree(), |_| false).numbers(),
+                true => {
+                    let tree = body.tree();
+                    let all = tree.self_pairs();
+                    TrianglePairs::new(all, |_| false, |pairs| self_contours(tree, pairs)).numbers()
+                }
                 false => Intersections::default(),
             },
         }
@@ -246,17 +263,18 @@ impl Report {
 
 /// A garment that is being counted.
 struct CountedGarment<'a> {
+    number: usize,
     garment: ReportGarment<'a>,
     /// Made where triangles are asked for.
     tree: OnceCell<TriangleTree<'a>>,
-    /// [`ReportBody::distance`] of every vertex.
+    /// [`ReportBody::distances`].
     distances: Vec<Option<(f64, [f64; 3])>>,
 }
 
 impl<'a> CountedGarment<'a> {
-    fn new(garment: ReportGarment<'a>, body: &impl ReportBody) -> Self {
-        let vertices = garment.positions.par_iter().with_min_len(128);
-        Self { garment, tree: OnceCell::new(), distances: vertices.map(|p| body.distance(*p)).collect() }
+    fn new(number: usize, garment: ReportGarment<'a>, body: &impl ReportBody) -> Self {
+        let distances = body.distances(number, garment.positions);
+        Self { number, garment, tree: OnceCell::new(), distances }
     }
 
     fn tree(&self) -> &TriangleTree<'a> {
@@ -270,21 +288,36 @@ impl<'a> CountedGarment<'a> {
             ..GarmentReport::default()
         };
         if with_triangles {
-            let (tree, of_body) = (self.tree(), body.tree());
-            let all = tree.pairs_with(of_body);
-            report.with_body =
-                TrianglePairs::new(all, |(_, b)| body.is_pinched(*b), |pairs| contours(tree, of_body, pairs));
-            report.with_itself =
-                pairs_with_itself(tree, |(f, g)| [f, g].into_iter().all(|f| is_pinched(body, tree, *f)));
+            let known = body.known_pairs(self.number, None);
+            report.with_body = TrianglePairs::new(
+                known.unwrap_or_else(|| self.tree().pairs_with(body.tree())),
+                |(_, b)| body.is_pinched(*b),
+                |pairs| contours(self.tree(), body.tree(), pairs),
+            );
+            let known = body.known_pairs(self.number, Some(self.number));
+            report.with_itself = TrianglePairs::new(
+                known.unwrap_or_else(|| self.tree().self_pairs()),
+                |(f, g)| self.is_pinched(body, *f) && self.is_pinched(body, *g),
+                |pairs| self_contours(self.tree(), pairs),
+            );
         }
         report
     }
 
     /// Pairs with a garment under it.
     fn pairs_with(&self, under: &Self, body: &impl ReportBody) -> TrianglePairs {
-        let (over, under) = (self.tree(), under.tree());
-        let pinched = |(f, g): &(u32, u32)| is_pinched(body, over, *f) && is_pinched(body, under, *g);
-        TrianglePairs::new(over.pairs_with(under), pinched, |pairs| contours(over, under, pairs))
+        let known = body.known_pairs(self.number, Some(under.number));
+        TrianglePairs::new(
+            known.unwrap_or_else(|| self.tree().pairs_with(under.tree())),
+            |(f, g)| self.is_pinched(body, *f) && under.is_pinched(body, *g),
+            |pairs| contours(self.tree(), under.tree(), pairs),
+        )
+    }
+
+    /// Whether one of its faces lies where the body is pinched.
+    fn is_pinched(&self, body: &impl ReportBody, face: u32) -> bool {
+        let ReportGarment { positions, faces } = self.garment;
+        body.is_pinched_at(&faces[face as usize].map(|v| positions[v as usize]))
     }
 
     /// Heights of its vertices near a garment under it (m), negative under that; `surface` is that of the other for the
@@ -304,12 +337,4 @@ impl<'a> CountedGarment<'a> {
         let facing = topology.facing(self.garment.positions, self.garment.faces, outward);
         InnerSurface::new(topology, self.tree(), facing)
     }
-}
-
-fn pairs_with_itself(tree: &TriangleTree<'_>, is_pinched: impl Fn(&(u32, u32)) -> bool) -> TrianglePairs {
-    TrianglePairs::new(tree.self_pairs(), is_pinched, |pairs| self_contours(tree, pairs))
-}
-
-fn is_pinched(body: &impl ReportBody, tree: &TriangleTree<'_>, face: u32) -> bool {
-    tree.triangle(face).is_some_and(|triangle| body.is_pinched_at(&triangle))
 }

@@ -6,10 +6,12 @@ use crate::inference::networks::Networks;
 use crate::inference::tensor_store::DrapeError;
 use clothcombo_data::asset::{Garment, infeasible_pair};
 use clothcombo_physics::contact::resolve::{
-    Certificate, Layer, PathSample, ResolveError, ResolveSettings, Resolved, RestGarment, certify,
+    Certificate, Layer, PathSample, ResolveError, ResolveSettings, Resolved, RestGarment, Stage, certify,
     resolve_along,
 };
-use clothcombo_physics::contact::{CountedBody, LayerOrder, Report, ReportGarment, Selection, all_layers};
+use clothcombo_physics::contact::{
+    CountedBody, FilterWork, LayerOrder, Report, ReportGarment, Selection, all_layers,
+};
 use clothcombo_physics::query::{Distance, Surface};
 use clothcombo_physics::transform::apply;
 use miette::Diagnostic;
@@ -240,6 +242,12 @@ pub struct OutfitResult {
     pub largest_move_mm: f64,
     /// Share of vertices that moved.
     pub moved: f64,
+    /// The stage that cleared it, or went farthest.
+    pub stage: Stage,
+    /// What the step filter did.
+    pub filter: FilterWork,
+    /// Time of the fast pass where it was not enough (ms); where it was, the other times are its.
+    pub fast_milliseconds: f64,
     /// Rounds per garment, of all attempts but those of the continuation path and of relaxing strain.
     pub rounds: Vec<usize>,
     /// Steps from the T-pose that were tried; 0 where the drape could be resolved as it was.
@@ -281,6 +289,9 @@ impl OutfitResult {
             strain_added: resolved.certificate.strain_added,
             largest_move_mm: 1e3 * works.iter().map(|w| w.largest_move).fold(0.0, f64::max),
             moved: moved as f64 / vertices.iter().sum::<usize>().max(1) as f64,
+            stage: resolved.stage,
+            filter: resolved.filter,
+            fast_milliseconds: ms(resolved.fast_time),
             rounds: works.iter().map(|w| w.rounds).collect(),
             steps: resolved.steps,
             milliseconds: works.iter().map(|w| ms(w.time)).collect(),

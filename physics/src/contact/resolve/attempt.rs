@@ -18,7 +18,7 @@ const FURTHER_ATTEMPTS: usize = 3;
 /// …and most pairs that may be left there: more would only be torn further.
 const FEW: usize = 32;
 /// Pairs of garments with themselves that may be left where nothing else crosses.
-const FEW_OF_ITSELF: usize = 8;
+pub(super) const FEW_OF_ITSELF: usize = 8;
 /// How the last few crossings are tried once more: gap and rings, as shares of those asked for. A smaller gap is for many sheets in
 /// one crease, a larger one goes round what holds a few of them.
 const LAST: [(f64, usize); 2] = [(0.3, 1), (3.0, 2)];
@@ -34,22 +34,35 @@ pub(super) fn resolved_further<E>(
 ) -> Result<Resolved, E> {
     let preparing = Instant::now();
     with_drawn(body, layers, |drawn| {
-        let mut simple = simply_resolved(&drawn, layers, settings, preparing);
-        if simple.certificate.is_clear() {
-            simple.go_on(body, layers, settings, start);
-            simple.compare_since(layers, start);
-            return Ok(simple);
-        }
-        let relieving = Instant::now();
-        with_body(drawn, layers.len(), |room| {
-            let mut found = resolved(room, layers, settings, simple, (start, relieving));
-            found.go_on(body, layers, settings, start);
-            found.compare_since(layers, start);
-            let mut found = further(room, found)?;
-            found.ease(room, layers, settings, start, ease::TIMES);
-            found.compare_since(layers, start);
-            Ok(found)
-        })
+        let body_time = preparing.elapsed();
+        resolved_near(drawn, layers, settings, (start, body_time), further)
+    })
+}
+
+/// [`resolved_further`] with a body that is prepared near `layers`, which took `body_time`.
+pub(super) fn resolved_near<E>(
+    drawn: BodyObstacle<'_>,
+    layers: &[Layer<'_>],
+    settings: &ResolveSettings,
+    (start, body_time): (Instant, Duration),
+    further: impl FnOnce(&Body<'_>, Resolved) -> Result<Resolved, E>,
+) -> Result<Resolved, E> {
+    let body = drawn.surface;
+    let mut simple = simply_resolved(&drawn, layers, settings, body_time);
+    if simple.certificate.is_clear() {
+        simple.go_on(body, layers, settings, start);
+        simple.compare_since(layers, start);
+        return Ok(simple);
+    }
+    let relieving = Instant::now();
+    with_body(drawn, layers.len(), |room| {
+        let mut found = resolved(room, layers, settings, simple, (start, relieving));
+        found.go_on(body, layers, settings, start);
+        found.compare_since(layers, start);
+        let mut found = further(room, found)?;
+        found.ease(room, layers, settings, start, ease::TIMES);
+        found.compare_since(layers, start);
+        Ok(found)
     })
 }
 
@@ -62,7 +75,7 @@ fn resolved_once(
 ) -> Resolved {
     let preparing = Instant::now();
     with_drawn(body, layers, |drawn| {
-        let simple = simply_resolved(&drawn, layers, settings, preparing);
+        let simple = simply_resolved(&drawn, layers, settings, preparing.elapsed());
         if simple.certificate.is_clear() {
             return simple;
         }
@@ -71,14 +84,13 @@ fn resolved_once(
     })
 }
 
-/// [`super::resolve`] on a body that does not give way, in preparation since `preparing`: enough for most garments.
+/// [`super::resolve`] on a body that does not give way, prepared in `body_time`: enough for most garments.
 fn simply_resolved(
     drawn: &BodyObstacle<'_>,
     layers: &[Layer<'_>],
     settings: &ResolveSettings,
-    preparing: Instant,
+    body_time: Duration,
 ) -> Resolved {
-    let body_time = preparing.elapsed();
     let now = Instant::now();
     // Wider limits are for what is left when the body has given way.
     let settings = ResolveSettings { loosened: 1.0, ..*settings };

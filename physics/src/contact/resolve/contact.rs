@@ -22,6 +22,11 @@ impl Plane {
         let offset = dot(normal, found.position);
         Self { normal, offset, distance, is_held }
     }
+
+    /// Signed distance of the point that asked (m), and the direction away from the obstacle.
+    pub fn seen(&self) -> (f64, [f64; 3]) {
+        (self.distance, self.normal)
+    }
 }
 
 /// `Σ weight·(vertex·normal) ≥ target` over up to six vertices.

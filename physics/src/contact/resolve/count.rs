@@ -35,6 +35,13 @@ pub(super) fn certified_around(body: &Surface<f64>, layers: &[Layer<'_>]) -> Cer
 
 /// [`certified_around`] near a `body` that is prepared; where that gives way is as it was noted.
 pub(super) fn certificate(body: &BodyObstacle<'_>, layers: &[Layer<'_>]) -> Certificate {
+    let mut found = counted(body, layers);
+    found.count_narrow(body);
+    found
+}
+
+/// [`certificate`] without what depends on where the body gives way; `body` may know some of what is to be counted.
+pub(super) fn counted(body: &impl ReportBody, layers: &[Layer<'_>]) -> Certificate {
     let garments: Vec<ReportGarment<'_>> = layers
         .iter()
         .map(|layer| ReportGarment { positions: layer.positions, faces: &layer.garment.faces })
@@ -47,9 +54,7 @@ pub(super) fn certificate(body: &BodyObstacle<'_>, layers: &[Layer<'_>]) -> Cert
         body_itself: false,
     };
     let strains = layers.iter().map(|layer| layer.garment.strain_energy(layer.positions));
-    let mut found = Certificate::new(&Report::count(body, &garments, &selection), strains);
-    found.count_narrow(body);
-    found
+    Certificate::new(&Report::count(body, &garments, &selection), strains)
 }
 
 impl ReportBody for BodyObstacle<'_> {
@@ -58,7 +63,7 @@ impl ReportBody for BodyObstacle<'_> {
     }
 
     fn distance(&self, p: [f64; 3]) -> Option<(f64, [f64; 3])> {
-        self.look(p)?.plane.map(|plane| (plane.distance, plane.normal))
+        self.look(p)?.plane.map(|plane| plane.seen())
     }
 
     fn is_pinched(&self, face: u32) -> bool {

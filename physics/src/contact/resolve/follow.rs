@@ -17,7 +17,9 @@ use super::strides::Strides;
 use super::taken_back::{shares, taken_back};
 use super::unfold::Folds;
 use super::way::{Way, placed};
-use super::{Certificate, Layer, PathSample, Reached, ResolveError, ResolveSettings, Resolved};
+use super::{
+    Certificate, Layer, PathSample, Reached, ResolveError, ResolveSettings, Resolved, Stage, fast_pass,
+};
 use crate::query::Surface;
 use crate::transform::Transform;
 
@@ -45,6 +47,10 @@ pub fn resolve_along<E: From<ResolveError>>(
     settings.check()?;
     check(body, layers)?;
     check(body, &placed(layers, skinned)?)?;
+    if let Some(found) = fast_pass(body, layers, settings)? {
+        return Ok(found);
+    }
+    let (fast_time, start) = (start.elapsed(), Instant::now());
     let mut stages = Stages::to(layers);
     let mut checked_at = |share: f64| Ok::<_, E>(checked(stage_at(share)?, layers)?);
     let mut along = |layers: &[Layer<'_>], folds: &mut Option<Folds>| {
@@ -74,6 +80,10 @@ pub fn resolve_along<E: From<ResolveError>>(
         });
     }
     resolved.compare_since(layers, start);
+    resolved.fast_time = fast_time;
+    if resolved.steps > 0 {
+        resolved.stage = Stage::Path;
+    }
     Ok(resolved)
 }
 

@@ -1,6 +1,7 @@
 //! The post-process: takes draped garments out of the body and out of each other, and proves what it reached.
 //!
-//! All garments of an outfit are resolved together, so that an inner one gives way to an outer one.
+//! All garments of an outfit are resolved together, so that an inner one gives way to an outer one. First of all the fast pass
+//! ([`fast_pass()`]) parts what is only slightly wrong. What it does not clear goes on:
 //!
 //! 1. **Vertices.** The closest point of the body (of the union of its parts, [`crate::query::UnionDistance`]) leaves a vertex a
 //!    half-space. Along its own direction away from the body it sees the sheets of inner garments, and has to stay over the
@@ -41,6 +42,7 @@ mod count;
 mod detect;
 mod ease;
 mod error;
+mod fast_pass;
 mod folds;
 mod follow;
 mod garment;
@@ -68,16 +70,19 @@ pub use certificate::{
 };
 pub use count::certify;
 pub use error::ResolveError;
+pub use fast_pass::fast_pass;
+use fast_pass::passed_near;
 pub use follow::{resolve_after, resolve_along};
 pub use garment::{Layer, RestGarment};
-pub use resolved::{GarmentWork, Resolved};
+pub use resolved::{GarmentWork, Resolved, Stage};
 pub use settings::ResolveSettings;
 pub use waypoint::{PathSample, Reached};
 
 use std::time::Instant;
 
 use crate::query::Surface;
-use attempt::resolved_further;
+use attempt::resolved_near;
+use body::with_drawn;
 use garment::check;
 
 /// Takes `layers`, innermost first, out of `body` and out of each other. Deterministic for any number of threads (without a
@@ -91,7 +96,17 @@ pub fn resolve(
     layers: &[Layer<'_>],
     settings: &ResolveSettings,
 ) -> Result<Resolved, ResolveError> {
+    let start = Instant::now();
     settings.check()?;
     check(body, layers)?;
-    resolved_further(body, layers, settings, Instant::now(), |_, found| Ok(found))
+    with_drawn(body, layers, |drawn| {
+        let body_time = start.elapsed();
+        if let Some(found) = passed_near(&drawn, layers, settings, (start, body_time)) {
+            return Ok(found);
+        }
+        let fast_time = start.elapsed();
+        let times = (Instant::now(), body_time);
+        let found = resolved_near(drawn, layers, settings, times, |_, found| Ok(found));
+        found.map(|found: Resolved| Resolved { fast_time, ..found })
+    })
 }

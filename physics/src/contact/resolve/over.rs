@@ -10,14 +10,14 @@ use super::contact::{Contact, along_line, is_tiny, normal_of, overlap};
 use super::outfit::Outfit;
 use crate::contact::{Triangle, TriangleTree};
 use crate::mesh::vertex_normals;
-use crate::vec3::{add, add_scaled, cross, dot, neg, norm, normalized, scale, sub};
+use crate::vec3::{add, add_scaled, dot, neg, norm, normalized, scale, sub};
 
 /// A sheet whose own direction away from the body differs more than this from the vertex's (cosine) lies over another part of
 /// the body: a sleeve is not over the side of the chest.
-const SAME_PART: f64 = 0.5;
+pub(super) const SAME_PART: f64 = 0.5;
 /// A sheet steeper than this (cosine between its normal and the direction away from the body) is left along that direction
 /// instead of its normal.
-const STEEP: f64 = 0.5;
+pub(super) const STEEP: f64 = 0.5;
 
 /// Two sheets look at each other where their directions away from the body have a cosine below this.
 const FACING: f64 = -0.3;
@@ -96,15 +96,18 @@ fn look(
     }
     let (above, f, barycentric) = found?;
     let face = outfit.faces[(first + f) as usize];
-    let [a, b, c] = face.map(|v| positions[v as usize]);
-    let normal = normalized(cross(sub(b, a), sub(c, a)));
-    let slope = dot(normal, away);
-    let normal = match slope {
-        s if s > STEEP => normal,
-        s if s < -STEEP => neg(normal),
-        _ => away,
-    };
+    let normal = sheet_normal(&face.map(|v| positions[v as usize]), away);
     Some(Over { vertex, face, barycentric, normal, height: -above * dot(normal, away) })
+}
+
+/// Along which direction what lies over a sheet leaves it: its normal on the side of `away`, or that where the sheet is steep.
+pub(super) fn sheet_normal(sheet: &Triangle, away: [f64; 3]) -> [f64; 3] {
+    let normal = normal_of(sheet);
+    match dot(normal, away) {
+        slope if slope > STEEP => normal,
+        slope if slope < -STEEP => neg(normal),
+        _ => away,
+    }
 }
 
 /// How two crossing triangles have to lie, by their directions away from the body.

@@ -3,7 +3,10 @@
 use std::time::{Duration, Instant};
 
 use super::Layer;
+use serde::Serialize;
+
 use super::certificate::Certificate;
+use crate::contact::step_filter::FilterWork;
 use crate::vec3;
 
 /// Garments that were resolved.
@@ -18,10 +21,29 @@ pub struct Resolved {
     /// Steps that were tried: from the T-pose, by [`super::resolve_along`] (0 where the drape could be mended as it was), or from the
     /// frame before, by [`super::resolve_after`].
     pub steps: usize,
+    /// What cleared it, or went farthest.
+    pub stage: Stage,
+    /// What the step filter did.
+    pub filter: FilterWork,
+    /// Time of the fast pass, where it was not enough; else its time is that of the garments.
+    pub fast_time: Duration,
     /// Time to prepare the body.
     pub body_time: Duration,
     /// Time for the certificate.
     pub certificate_time: Duration,
+}
+
+/// Stages of the post-process, each for what the one before it leaves.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Stage {
+    /// [`super::fast_pass`].
+    FastPass,
+    /// The relaxation of the drape as it is.
+    #[default]
+    Relaxation,
+    /// The continuation path.
+    Path,
 }
 
 /// What was done to one garment.

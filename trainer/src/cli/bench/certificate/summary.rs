@@ -3,6 +3,7 @@
 use crate::cli::table::{Row, row, table};
 use crate::evaluation::certificates::OutfitResult;
 use crate::run::spread::Spread;
+use clothcombo_physics::contact::resolve::Stage;
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -15,10 +16,11 @@ const WITHIN: [f64; 5] = [0.1, 1.0, 10.0, 60.0, 600.0];
 /// Groups of outfits: key in JSON, name in tables, what belongs to it.
 type Group = (&'static str, &'static str, fn(&OutfitResult) -> bool);
 
-const GROUPS: [Group; 4] = [
+const GROUPS: [Group; 5] = [
     ("all", "all", |_| true),
     ("wearable", "in a feasible order", |r| r.is_feasible),
     ("in_one_go", "no path needed", |r| r.steps == 0),
+    ("fast_pass", "cleared by the fast pass", |r| r.stage == Stage::FastPass),
     ("hardly_pinched", "on a hardly pinched body", |r| r.before.pinched_pairs < HARDLY_PINCHED),
 ];
 
@@ -50,7 +52,10 @@ fn clear_within(results: &[OutfitResult], seconds: f64) -> f64 {
 
 /// The whole time of an outfit, for the body and for certificates too (ms).
 fn time_of(result: &OutfitResult) -> f64 {
-    result.body_milliseconds + result.milliseconds.iter().sum::<f64>() + result.certificate_milliseconds
+    result.fast_milliseconds
+        + result.body_milliseconds
+        + result.milliseconds.iter().sum::<f64>()
+        + result.certificate_milliseconds
 }
 
 /// That time shared out to the garments by vertices (ms).
@@ -82,6 +87,9 @@ struct Summary {
     milliseconds_per_8000_vertices: Option<Spread>,
     body_milliseconds: Option<Spread>,
     certificate_milliseconds: Option<Spread>,
+    fast_milliseconds_in_vain: Option<Spread>,
+    element_tests: Option<Spread>,
+    drawn_back: Option<Spread>,
     #[serde(skip)]
     largest_move_mm: Option<Spread>,
 }
@@ -109,6 +117,12 @@ impl Summary {
             milliseconds_per_8000_vertices: spread(per_8000_vertices),
             body_milliseconds: spread(|r| vec![r.body_milliseconds]),
             certificate_milliseconds: spread(|r| vec![r.certificate_milliseconds]),
+            fast_milliseconds_in_vain: spread(|r| match r.stage {
+                Stage::FastPass => Vec::new(),
+                _ => vec![r.fast_milliseconds],
+            }),
+            element_tests: spread(|r| vec![r.filter.element_tests as f64]),
+            drawn_back: spread(|r| vec![r.filter.drawn_back as f64]),
             largest_move_mm: spread(|r| vec![r.largest_move_mm]),
         }
     }
@@ -146,6 +160,9 @@ pub(super) fn tables(results: &[OutfitResult], layers: usize) -> String {
         ("ms per 8,000 vertices", all.milliseconds_per_8000_vertices),
         ("ms for the body", all.body_milliseconds),
         ("ms for the certificate", all.certificate_milliseconds),
+        ("ms of the fast pass where it was not enough", all.fast_milliseconds_in_vain),
+        ("element tests of the step filter", all.element_tests),
+        ("vertices drawn back by the step filter", all.drawn_back),
         ("largest move [mm]", all.largest_move_mm),
     ];
     let spread = |(what, spread): (&str, Option<Spread>)| {

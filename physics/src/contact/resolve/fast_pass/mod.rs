@@ -1,0 +1,374 @@
+//! The fast pass: what the networks leave, slight penetrations, is parted where it is, in some ten milliseconds.
+//!
+//! Triangles that intersect, found exactly, and vertices on the wrong side around them tell where; conditions there and on what is
+//! near ([`conditions`]) are met by a few smooth sweeps over two rings of neighbours ([`relax`]). Rounds move freely as long as they
+//! help: cloth that lies deeper than one triangle could not come out through the step filter. The last ones are filtered, so that
+//! they make no new intersection. What parted triangles once is asked for in all later rounds. It ends when nothing intersects, or
+//! when rounds no longer help: the rest is for the next stage.
+
+mod conditions;
+#[cfg(test)]
+mod tests;
+
+use std::time::{Duration, Instant};
+
+use super::attempt::FEW_OF_ITSELF;
+use super::body::with_drawn;
+use super::certificate::Certificate;
+use super::contact::{Contact, Plane};
+use super::count::{certified_around, counted, is_near};
+use super::folds::folds;
+use super::garment::{at, check};
+use super::obstacle::BodyObstacle;
+use super::outfit::Outfit;
+use super::over::outward;
+use super::relax::{LastPasses, no_farther, relax};
+use super::resolved::Stage;
+use super::{GarmentWork, Layer, ResolveError, ResolveSettings, Resolved};
+use crate::contact::step_filter::{ContactMesh, FacePairs, StepFilter};
+use crate::contact::{ReportBody, Triangle, TriangleTree};
+use crate::query::Surface;
+use crate::vec3::{add, add_scaled, scale, sub};
+use rayon::prelude::*;
+
+/// Rings of neighbours around a defect that move along.
+const RINGS: usize = 2;
+/// Sweeps of the relaxation in a round.
+const SWEEPS: usize = 10;
+/// Rounds at most; stalling ends it long before.
+const ROUNDS: usize = 20;
+/// A round that leaves more than this share of the intersections hardly helps.
+const STALLED: f64 = 0.8;
+/// After so many rounds that hardly helped steps are filtered…
+const FREE_STALLS: usize = 3;
+/// …and after so many the outfit is left to the next stage.
+const STALLS: usize = 5;
+/// More intersections than this after a round that hardly helped are not for the fast pass.
+const MANY: usize = 200;
+/// How far sheets of one garment are parted, as a share of the gap.
+const FOLD_GAP: f64 = 0.25;
+/// A share of vertices under an inner garment from which whole parts lie on the wrong side without intersecting anything.
+const ORDER_VIOLATIONS: f64 = 1e-2;
+/// What elements stay apart in a filtered step, as a share of the gap.
+const FILTER_MARGIN: f64 = 0.05;
+
+/// Takes `layers`, innermost first, out of `body` and out of each other where they lie hardly in: the result if no garment
+/// intersects the body or another one any more, at most half as many triangles of garments intersect others of their own, and no
+/// cloth is torn; else none. Deterministic for any number of threads; a clean input comes back to the bit.
+///
+/// # Errors
+/// Those of [`super::resolve`].
+pub fn fast_pass(
+    body: &Surface<f64>,
+    layers: &[Layer<'_>],
+    settings: &ResolveSettings,
+) -> Result<Option<Resolved>, ResolveError> {
+    settings.check()?;
+    check(body, layers)?;
+    let start = Instant::now();
+    Ok(with_drawn(body, layers, |drawn| {
+        let body_time = start.elapsed();
+        passed_near(&drawn, layers, settings, (start, body_time))
+    }))
+}
+
+/// [`fast_pass`] on a body that is prepared near `layers`, which took `body_time`; all of it began at `start`.
+pub(super) fn passed_near(
+    drawn: &BodyObstacle<'_>,
+    layers: &[Layer<'_>],
+    settings: &ResolveSettings,
+    (start, body_time): (Instant, Duration),
+) -> Option<Resolved> {
+    let outfit = Outfit::new(layers);
+    let mesh = contact_mesh(&outfit, drawn);
+    let mut pass = FastPass::new(&outfit, drawn, &mesh, settings);
+    let rounds = pass.run();
+    if pass.between() > 0 || pass.own().count() > pass.folds.len() {
+        return None;
+    }
+    let positions = pass.garments();
+    let certifying = Instant::now();
+    let certificate = pass.certificate(&positions);
+    let certificate_time = certifying.elapsed();
+    let most_folds = match mends_folds(settings) {
+        true => FEW_OF_ITSELF.max(pass.folds.len() / 2),
+        false => pass.folds.len(),
+    };
+    let work = GarmentWork { rounds, ..GarmentWork::default() };
+    let mut resolved = Resolved {
+        positions,
+        certificate,
+        garments: vec![work; layers.len()],
+        stage: Stage::FastPass,
+        filter: pass.filter.work,
+        body_time,
+        certificate_time,
+        ..Resolved::default()
+    };
+    resolved.compare_since(layers, start);
+    is_good(&resolved.certificate, most_folds).then_some(resolved)
+}
+
+/// Whether folds of the input are mended, not only those that were made: strict limits leave them.
+fn mends_folds(settings: &ResolveSettings) -> bool {
+    settings.self_contact && settings.loosened > 1.0
+}
+
+/// Whether nothing is left for another stage: neither what intersects, nor more than `most_folds` pairs of garments with themselves,
+/// nor whole parts on the wrong side, nor torn cloth.
+fn is_good(certificate: &Certificate, most_folds: usize) -> bool {
+    certificate.is_clear()
+        && certificate.self_triangle_pairs <= most_folds
+        && certificate.vertices_inside == 0
+        && certificate.order_violations <= ORDER_VIOLATIONS
+        && certificate.tears() == 0
+}
+
+/// The faces of an outfit and of what of the body is near it.
+fn contact_mesh(outfit: &Outfit<'_>, body: &BodyObstacle<'_>) -> ContactMesh {
+    let start = outfit.vertex_count() as u32;
+    let near = body.tree.part().iter().map(|&f| body.surface.faces[f as usize].map(|v| v + start));
+    ContactMesh::new(outfit.vertex_count() + body.surface.positions.len(), &outfit.faces, near)
+}
+
+/// An outfit on its way.
+struct FastPass<'a> {
+    outfit: &'a Outfit<'a>,
+    body: &'a BodyObstacle<'a>,
+    settings: &'a ResolveSettings,
+    filter: StepFilter<'a>,
+    input: Vec<[f64; 3]>,
+    /// The shape that displacements are measured from: the input, with its crumples smoothed.
+    shape: Vec<[f64; 3]>,
+    /// Vertices of the garments, then those of the body.
+    positions: Vec<[f64; 3]>,
+    /// What the body leaves to every vertex of the garments where it is.
+    planes: Vec<Option<Plane>>,
+    /// Directions away from the body.
+    outward: Vec<[f64; 3]>,
+    /// Pairs of the input's garments with themselves, ascending.
+    folds: FacePairs,
+    /// Conditions that parted triangles so far: without them their neighbours would pull them in again.
+    remembered: Vec<Contact>,
+}
+
+impl<'a> FastPass<'a> {
+    fn new(
+        outfit: &'a Outfit<'a>,
+        body: &'a BodyObstacle<'a>,
+        mesh: &'a ContactMesh,
+        settings: &'a ResolveSettings,
+    ) -> Self {
+        let input: Vec<[f64; 3]> = outfit.layers.iter().flat_map(|l| l.positions).copied().collect();
+        let positions = [input.as_slice(), &body.surface.positions].concat();
+        let filter = StepFilter::new(mesh, &positions);
+        let (shape, folds) = (input.clone(), Vec::new());
+        let (outward, remembered) = (Vec::new(), Vec::new());
+        let look = |p: &[f64; 3]| body.look(*p)?.plane;
+        let planes = input.par_iter().with_min_len(128).map(look).collect();
+        let mut pass = Self {
+            outfit,
+            body,
+            settings,
+            filter,
+            input,
+            shape,
+            positions,
+            planes,
+            outward,
+            folds,
+            remembered,
+        };
+        pass.folds = pass.own().copied().collect();
+        pass
+    }
+
+    /// Rounds until nothing intersects or a round hardly helps; how many it took.
+    fn run(&mut self) -> usize {
+        let mut left = self.left();
+        if left == [0, 0] {
+            return 0;
+        }
+        let away = |v: u32| self.planes[v as usize].map_or([0.0; 3], |plane| plane.normal);
+        self.outward = outward(self.outfit, &self.input, away);
+        let mut stalls = 0;
+        for round in 1..=ROUNDS {
+            self.round(stalls < FREE_STALLS);
+            let before = std::mem::replace(&mut left, self.left());
+            let hardly = |k: usize| left[k] as f64 >= STALLED * before[k] as f64;
+            stalls += usize::from(hardly(0) && hardly(1));
+            let is_hopeless = stalls > 0 && left[0] > MANY;
+            if left == [0, 0] || stalls == STALLS || is_hopeless {
+                return round;
+            }
+        }
+        ROUNDS
+    }
+
+    fn round(&mut self, is_free: bool) {
+        let defects = self.defects();
+        let mut contacts = self.conditions(&defects);
+        let mut to = self.positions.clone();
+        let cloth = &mut to[..self.input.len()];
+        let region = &defects.region;
+        contacts.extend(self.part_folds(cloth));
+        let (stretch, most) = (self.settings.stretch, self.settings.farthest);
+        relax(self.outfit, cloth, &self.shape, region, &contacts, stretch, (SWEEPS, LastPasses::FEW));
+        for &v in region {
+            cloth[v as usize] = no_farther(self.input[v as usize], cloth[v as usize], most);
+        }
+        match is_free {
+            true => self.filter.step_freely(&self.positions, &to),
+            false => self.filter.step(&self.positions, &mut to, None, FILTER_MARGIN * self.settings.gap),
+        }
+        let (before, body) = (std::mem::replace(&mut self.positions, to), self.body);
+        let moved = self.planes.par_iter_mut().zip(&before).zip(&self.positions).with_min_len(128);
+        moved.filter(|((_, from), to)| from != to).for_each(|((plane, _), to)| {
+            *plane = body.look(*to).and_then(|view| view.plane);
+        });
+    }
+
+    /// Positions of every garment.
+    fn garments(&self) -> Vec<Vec<[f64; 3]>> {
+        (0..self.outfit.len()).map(|g| self.outfit.part(&self.positions, g).to_vec()).collect()
+    }
+
+    /// The certificate of the garments, which are at `positions` now: what is known is not looked for again.
+    fn certificate(&self, positions: &[Vec<[f64; 3]>]) -> Certificate {
+        let now = at(self.outfit.layers, positions);
+        if !is_near(self.outfit.layers, positions) {
+            return certified_around(self.body.surface, &now);
+        }
+        let mut found = counted(self, &now);
+        found.count_narrow(self.body);
+        found
+    }
+
+    /// Pairs that are left of garments with the body and with each other, but for pinched ones.
+    fn between(&self) -> usize {
+        self.parted().count()
+    }
+
+    /// Pairs that should go: [`between`](Self::between), and of garments with themselves.
+    fn left(&self) -> [usize; 2] {
+        [self.between(), self.parted_folds().count()]
+    }
+
+    /// Pairs that are left of garments with themselves.
+    fn own(&self) -> impl Iterator<Item = &(u32, u32)> {
+        self.filter.intersections.iter().filter(|pair| self.is_own(pair))
+    }
+
+    /// Pairs of garments with themselves that are to be parted.
+    fn parted_folds(&self) -> impl Iterator<Item = &(u32, u32)> {
+        let is_known = |pair| self.folds.binary_search(pair).is_ok();
+        let is_asked = move |pair| mends_folds(self.settings) || !is_known(pair);
+        self.own().filter(move |pair| is_asked(pair) && !(self.is_pinch(pair.0) && self.is_pinch(pair.1)))
+    }
+
+    /// Conditions that part folds, which are pairs of one garment after the other. Crumples are smoothed: those of the input for good,
+    /// of others what was done to them is taken back.
+    fn part_folds(&mut self, positions: &mut [[f64; 3]]) -> Vec<Contact> {
+        let all: Vec<(u32, u32)> = self.parted_folds().copied().collect();
+        let outfit = self.outfit;
+        let mut contacts = Vec::new();
+        for pairs in all.chunk_by(|a, b| outfit.garment_of_face(a.0) == outfit.garment_of_face(b.0)) {
+            let g = outfit.garment_of_face(pairs[0].0);
+            let (first, start) = (outfit.faces_of_garment(g).start, outfit.vertices(g).start);
+            let local: Vec<(u32, u32)> = pairs.iter().map(|(f, g)| (f - first, g - first)).collect();
+            let part = outfit.part(&self.positions, g);
+            let found = folds(outfit.layers[g].garment, part, &local, FOLD_GAP * self.settings.gap);
+            contacts.extend(found.contacts.into_iter().map(|contact| contact.shifted(start)));
+            let is_of_input = pairs.iter().any(|pair| self.folds.binary_search(pair).is_ok());
+            for v in found.crumpled.into_iter().map(|v| v + start) {
+                let ring = outfit.ring(v);
+                let share = 1.0 / ring.len().max(1) as f64;
+                let mean = |of: &dyn Fn(usize) -> [f64; 3]| {
+                    outfit.ring(v).fold([0.0; 3], |sum, n| add_scaled(sum, share, of(n as usize)))
+                };
+                let v = v as usize;
+                if is_of_input {
+                    let by = scale(sub(mean(&|n| self.positions[n]), self.positions[v]), 0.5);
+                    positions[v] = add(self.positions[v], by);
+                    self.shape[v] = add(self.shape[v], by);
+                } else {
+                    let by = mean(&|n| sub(self.positions[n], self.shape[n]));
+                    positions[v] = add(self.shape[v], by);
+                }
+            }
+        }
+        contacts
+    }
+
+    fn is_own(&self, &(f, g): &(u32, u32)) -> bool {
+        !self.filter.mesh.is_body(g) && self.outfit.garment_of_face(f) == self.outfit.garment_of_face(g)
+    }
+
+    /// The pairs of [`between`](Self::between).
+    fn parted(&self) -> impl Iterator<Item = &(u32, u32)> {
+        let is_counted = |&&(f, g): &&(u32, u32)| match self.body_face(g) {
+            Some(face) => !self.body.is_pinched(face),
+            None => !(self.is_own(&(f, g)) || self.is_pinch(f) && self.is_pinch(g)),
+        };
+        self.filter.intersections.iter().filter(is_counted)
+    }
+
+    /// The number that the body has for face `f`, if it is one of its.
+    fn body_face(&self, f: u32) -> Option<u32> {
+        let at = f.checked_sub(self.filter.mesh.cloth_faces as u32)?;
+        Some(self.body.tree.part()[at as usize])
+    }
+
+    fn is_pinch(&self, f: u32) -> bool {
+        self.body.is_pinch_at(&self.corners(f))
+    }
+
+    fn corners(&self, f: u32) -> [[f64; 3]; 3] {
+        self.filter.mesh.faces[f as usize].map(|v| self.positions[v as usize])
+    }
+}
+
+/// All intersections are known exactly, and where every vertex lies.
+impl ReportBody for FastPass<'_> {
+    fn tree(&self) -> &TriangleTree<'_> {
+        &self.body.tree
+    }
+
+    fn distance(&self, p: [f64; 3]) -> Option<(f64, [f64; 3])> {
+        self.body.distance(p)
+    }
+
+    fn distances(&self, garment: usize, _: &[[f64; 3]]) -> Vec<Option<(f64, [f64; 3])>> {
+        let vertices = self.outfit.vertices(garment);
+        let planes = &self.planes[vertices.start as usize..vertices.end as usize];
+        planes.iter().map(|plane| plane.as_ref().map(Plane::seen)).collect()
+    }
+
+    fn known_pairs(&self, garment: usize, with: Option<usize>) -> Option<Vec<(u32, u32)>> {
+        let of = |f: u32| (!self.filter.mesh.is_body(f)).then(|| self.outfit.garment_of_face(f));
+        let first = |g: usize| self.outfit.faces_of_garment(g).start;
+        // The inner garment comes first in the pairs of the filter, the body last.
+        let is_own = with == Some(garment);
+        let local = |&(f, g): &(u32, u32)| match with {
+            None => (of(f) == Some(garment))
+                .then_some(())
+                .and_then(|()| Some((f - first(garment), self.body_face(g)?))),
+            Some(inner) if of(f) == Some(inner) && of(g) == Some(garment) => {
+                let (f, g) = (f - first(inner), g - first(garment));
+                Some(if is_own { (f, g) } else { (g, f) })
+            }
+            Some(_) => None,
+        };
+        let mut pairs: Vec<(u32, u32)> = self.filter.intersections.iter().filter_map(local).collect();
+        pairs.sort_unstable();
+        Some(pairs)
+    }
+
+    fn is_pinched(&self, face: u32) -> bool {
+        self.body.is_pinched(face)
+    }
+
+    fn is_pinched_at(&self, triangle: &Triangle) -> bool {
+        self.body.is_pinch_at(triangle)
+    }
+}
