@@ -19,5 +19,6 @@ pub use closest_point::{ClosestPoint, SurfacePoint};
 pub use closest_vertex::VertexIndex;
 pub use surface::{Distance, Gap, Surface};
 pub use triangle_point::Feature;
+pub(crate) use triangle_point::closest_on_triangle;
 pub use union::{FaceSide, UnionDistance};
 pub use winding_number::{winding_number, winding_numbers};
