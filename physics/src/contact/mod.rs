@@ -8,7 +8,7 @@ mod penetration;
 mod report;
 pub mod resolve;
 mod self_collision;
-mod step_filter;
+pub(crate) mod step_filter;
 #[cfg(test)]
 mod tests;
 

@@ -37,6 +37,11 @@ impl ContactPoints {
         Self { vertices, faces: Vec::new(), edges: Vec::new() }
     }
 
+    /// The faces of the garment.
+    pub(crate) fn faces(&self) -> &[[u32; 3]] {
+        &self.faces
+    }
+
     /// How many points there are.
     pub fn count(&self, samples: ContactSamples) -> usize {
         self.vertices

@@ -32,12 +32,17 @@
 //! are combined so that least is left. Steps see creases smooth, over a small part of their length. The solver knows the sides of a crease
 //! that a vertex has been on, in steps taken and in those found too long (`energy/creases.rs`).
 //!
+//! **Intersections.** With [`SolverSettings::margin`], a step filter shortens every step where it would make triangles intersect that
+//! do not (`contact/step_filter`); the direction that is left has to be one of descent. So nothing intersects at the end that did not at
+//! the start.
+//!
 //! **Several garments.** The paper's layer terms jump in every few steps;
 //! [`LayerContact::ClosestPoint`](crate::energy::LayerContact::ClosestPoint) only jumps where a vertex is as near to a sheet that
 //! it lies over as to one that it lies under, both of the same garment. No force acts across such a discontinuity, and creases between
 //! garments are not known to the solver: outfits seldom end as [`Stop::Converged`].
 
 mod error;
+mod filtered_steps;
 mod hessian;
 mod line_search;
 mod problem;

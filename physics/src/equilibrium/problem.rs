@@ -36,6 +36,16 @@ impl<'a> Problem<'a> {
         self.energy.vertex_count()
     }
 
+    /// The scene.
+    pub(super) fn energy(&self) -> &'a SceneEnergy<f64> {
+        self.energy
+    }
+
+    /// Vertices of the body (m).
+    pub(super) fn body(&self) -> &'a [[f64; 3]] {
+        &self.energy.body.positions
+    }
+
     /// Weighted sum of all energies at `posed` `[ΣV, 3]` (m).
     ///
     /// # Panics

@@ -19,11 +19,20 @@ pub struct SolverSettings {
     /// No vertex goes farther than this from its start (m), but for the step that leads there; `None`: no bound. Where the bound is
     /// passed the solver stops as [`super::Stop::Escaped`]. Default 1 m: what nothing holds falls for ever.
     pub escape_distance: Option<f64>,
+    /// Steps make no triangles intersect, and leave elements this far apart (m), or half as far as they are; `None`: nobody looks.
+    pub margin: Option<f64>,
 }
 
 impl Default for SolverSettings {
     fn default() -> Self {
-        Self { tolerance: 1e-4, iterations: 500, time: None, step_bound: 0.05, escape_distance: Some(1.0) }
+        Self {
+            tolerance: 1e-4,
+            iterations: 500,
+            time: None,
+            step_bound: 0.05,
+            escape_distance: Some(1.0),
+            margin: None,
+        }
     }
 }
 
@@ -38,7 +47,10 @@ impl SolverSettings {
             return fail("tolerance", self.tolerance, "finite and not negative");
         }
         let escape = self.escape_distance.unwrap_or(1.0);
-        for (setting, value) in [("step_bound", self.step_bound), ("escape_distance", escape)] {
+        let margin = self.margin.unwrap_or(1.0);
+        for (setting, value) in
+            [("step_bound", self.step_bound), ("escape_distance", escape), ("margin", margin)]
+        {
             if !(value > 0.0 && value.is_finite()) {
                 return fail(setting, value, "finite and greater than 0");
             }

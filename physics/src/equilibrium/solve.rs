@@ -3,11 +3,12 @@
 use std::ops::ControlFlow;
 use std::time::Instant;
 
+use super::filtered_steps::{FilteredSteps, contact_mesh};
 use super::hessian::Hessian;
 use super::line_search::search;
 use super::problem::{norm, relative};
 use super::{EquilibriumError, Problem, Progress, Solution, SolverSettings, Step, Stop};
-use crate::vec3::{add_scaled, distance_squared, dot, is_finite, norm_squared};
+use crate::vec3::{add_scaled, distance_squared, dot, is_finite, norm_squared, sub};
 
 /// Iterations between two looks at the scale of the forces, which costs an evaluation of each term.
 const LOOK_EVERY: usize = 10;
@@ -76,6 +77,8 @@ pub fn solve(
     };
     let mut force_scale = problem.force_scale(start);
     let mut hessian = Hessian::new(problem, start);
+    let mesh = settings.margin.map(|margin| (contact_mesh(problem.energy()), margin));
+    let mut filter = mesh.as_ref().map(|(mesh, margin)| FilteredSteps::new(mesh, problem, start, *margin));
     let [mut shift, ..] = SHIFT;
     let mut reach = f64::INFINITY;
     let mut history: Vec<Step> = Vec::new();
@@ -118,7 +121,11 @@ pub fn solve(
             let smooth = hessian.assemble(problem, &state.positions, &state.gradient, width);
             let found = hessian.direction(&smooth, shift).and_then(|d| {
                 reach = longest(&d);
-                advance(problem, &state, &d, settings.step_bound / reach, &mut step.evaluations)
+                let line = Line { problem, state: &state, longest: (settings.step_bound / reach).min(1.0) };
+                match filter.as_mut() {
+                    Some(filter) => line.advance_filtered(&d, filter, &mut step.evaluations),
+                    None => line.advance(&d, &mut step.evaluations),
+                }
             });
             models += 1;
             match found {
@@ -160,31 +167,63 @@ pub fn solve(
     Ok(Solution { positions: state.positions, stop, relative_gradient, history, factorisations })
 }
 
-/// The state along `direction`, at most `longest` of it, and the share of the decrease predicted by the slope that a full step has, 0 for
-/// a shorter one; `None` where it does not go downhill.
-///
-/// Whatever shortens a step (a filter against intersections) belongs here, before the search.
-fn advance(
-    problem: &Problem<'_>,
-    state: &State,
-    direction: &[[f64; 3]],
+/// Where the search for a next state begins.
+struct Line<'a> {
+    problem: &'a Problem<'a>,
+    state: &'a State,
+    /// At most so much of a direction, itself at most once.
     longest: f64,
-    evaluations: &mut usize,
-) -> Option<(f64, State)> {
-    let slope = product(direction, &state.gradient);
-    if !(slope < 0.0 && longest > 0.0) {
-        return None;
+}
+
+impl Line<'_> {
+    /// The state along `direction`, and the share of the decrease predicted by the slope that a full step has, 0 for a shorter one; `None`
+    /// where it does not go downhill.
+    fn advance(&self, direction: &[[f64; 3]], evaluations: &mut usize) -> Option<(f64, State)> {
+        let slope = product(direction, &self.state.gradient);
+        if !(slope < 0.0 && self.longest > 0.0) {
+            return None;
+        }
+        let evaluate = |length: f64| {
+            *evaluations += 1;
+            let positions = self.at(direction, length);
+            let (energy, gradient) = self.problem.value_and_gradient(&positions);
+            State { positions, energy, gradient }
+        };
+        let (length, next) = search(self.state.energy, slope, self.longest, evaluate)?;
+        let share = if length < 1.0 { 0.0 } else { (next.energy - self.state.energy) / slope };
+        Some((share, next))
     }
-    let evaluate = |length: f64| {
-        *evaluations += 1;
-        let moved = state.positions.iter().zip(direction);
-        let positions: Vec<[f64; 3]> = moved.map(|(p, d)| add_scaled(*p, length, *d)).collect();
-        let (energy, gradient) = problem.value_and_gradient(&positions);
-        State { positions, energy, gradient }
-    };
-    let (length, next) = search(state.energy, slope, longest.min(1.0), evaluate)?;
-    let share = if length < 1.0 { 0.0 } else { (next.energy - state.energy) / slope };
-    Some((share, next))
+
+    /// The same along what `filter` leaves of `direction`, with which the cloth then moves.
+    fn advance_filtered(
+        &self,
+        direction: &[[f64; 3]],
+        filter: &mut FilteredSteps<'_>,
+        evaluations: &mut usize,
+    ) -> Option<(f64, State)> {
+        let from = &self.state.positions;
+        let wanted = self.at(direction, self.longest);
+        let mut to = wanted.clone();
+        let before = filter.take(from, &mut to);
+        let is_short = to != wanted || self.longest < 1.0;
+        let left: Vec<[f64; 3]> = to.iter().zip(from).map(|(to, from)| sub(*to, *from)).collect();
+        let found = Line { longest: 1.0, ..*self }.advance(&left, evaluations);
+        filter.take_back(before);
+        let (share, next) = found?;
+        // Part of a step takes elements that intersect already elsewhere than all of it.
+        let mut to = next.positions.clone();
+        let before = filter.take(from, &mut to);
+        if to != next.positions {
+            filter.take_back(before);
+            return None;
+        }
+        Some((if is_short { 0.0 } else { share }, next))
+    }
+
+    fn at(&self, direction: &[[f64; 3]], length: f64) -> Vec<[f64; 3]> {
+        let moved = self.state.positions.iter().zip(direction);
+        moved.map(|(p, d)| add_scaled(*p, length, *d)).collect()
+    }
 }
 
 /// Whether the forces at `state`, compared with `scale`, balance within `tolerance`.

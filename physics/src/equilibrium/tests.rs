@@ -3,7 +3,9 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use super::{EquilibriumError, Problem, Solution, SolverSettings, Stop, solve};
+use super::filtered_steps::contact_mesh;
+use super::{EquilibriumError, Problem, Progress, Solution, SolverSettings, Stop, solve};
+use crate::contact::step_filter::StepFilter;
 use crate::energy::tests::scenes::{jittered, paper_weights, scene_garment};
 use crate::energy::{EnergySettings, LayerContact, SceneEnergy, SceneLayers, Term, TermMap};
 use crate::mesh::{TriMesh, shapes};
@@ -341,6 +343,44 @@ fn a_garment_is_held_at_the_height_that_its_skinning_says() {
     let mut held = energy.clone();
     held.garments[0].pull_back = None;
     assert_eq!(Problem::new(&held).unwrap_err(), EquilibriumError::Canonical);
+}
+
+#[test]
+fn a_filtered_step_makes_no_intersection() {
+    let (mut falling, rest) = skirt_on_cone(24, 6);
+    // Nothing but the filter keeps the skirt from falling through the cone; then it starts across the cone's surface.
+    for (collision, by) in [(0.0, 0.0), (STIFF_CONTACT, 0.04)] {
+        falling.garments[0].weights[Term::BodyCollision] = collision;
+        let lowered: Vec<[f64; 3]> = rest.positions().iter().map(|[x, y, z]| [*x, y - by, *z]).collect();
+        let problem = Problem::new(&falling).unwrap();
+        let mesh = contact_mesh(&falling);
+        let pairs = |cloth: &[[f64; 3]]| {
+            StepFilter::new(&mesh, &[cloth, &falling.body.positions].concat()).intersections
+        };
+        let most_pairs = |margin: Option<f64>| {
+            let settings = SolverSettings { iterations: 30, margin, ..SolverSettings::default() };
+            let mut before = pairs(&lowered);
+            let (start, mut is_kept) = (before.len(), true);
+            let mut look = |progress: &Progress<'_>| {
+                let now = pairs(progress.positions);
+                is_kept &= now.iter().all(|pair| before.binary_search(pair).is_ok());
+                before = now;
+                ControlFlow::Continue(())
+            };
+            let solution = solve(&problem, &lowered, &settings, &mut look).unwrap();
+            assert_monotone(&solution);
+            assert!(solution.iterations() > 2, "{:?}", solution.stop);
+            (start, is_kept, pairs(&solution.positions).len())
+        };
+        let (start, is_kept, end) = most_pairs(Some(5e-5));
+        assert!(is_kept, "{start} {end}");
+        if collision == 0.0 {
+            assert_eq!((start, end), (0, 0));
+            assert!(!most_pairs(None).1, "nothing was in the way");
+        } else {
+            assert!(start > 10 && end < start, "{start} {end}");
+        }
+    }
 }
 
 #[test]

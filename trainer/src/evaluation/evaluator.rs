@@ -36,8 +36,8 @@ pub struct SceneCounts {
     pub(super) variants: usize,
     /// Outfits that are timed.
     pub(super) timed: usize,
-    /// Scenes of speed against error.
-    pub(super) pareto: usize,
+    /// Scenes of speed against error: of one garment, and outfits.
+    pub(super) pareto: [usize; 2],
     /// Scenes per stress test.
     pub(super) stress_tests: usize,
     /// Whether pictures are drawn.
@@ -60,7 +60,7 @@ impl SceneCounts {
             continuation_steps: count(32, 0),
             variants: count(100, 8),
             timed: count(20, 3),
-            pareto: count(10, 2),
+            pareto: [count(10, 2), count(6, 1)],
             stress_tests: count(3, 1),
             gallery: !quick,
         }

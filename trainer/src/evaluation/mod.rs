@@ -73,7 +73,7 @@ const PARTS: [Part; 10] = [
     Part { name: "Table 3: layers", scenes: layers::scene_count, sections: layers::sections },
     Part { name: "Table 4: ablations", scenes: variants::scene_count, sections: variants::sections },
     Part { name: "Table 5: times", scenes: |e| e.counts.timed, sections: drape_times::sections },
-    Part { name: "speed against error", scenes: |e| e.counts.pareto, sections: pareto::sections },
+    Part { name: "speed against error", scenes: pareto::scene_count, sections: pareto::sections },
     Part { name: "numerical choices", scenes: |_| 0, sections: numerics::sections },
     Part { name: "stress tests", scenes: stress_tests::scene_count, sections: stress_tests::sections },
     Part { name: "pictures", scenes: gallery::picture_count, sections: gallery::sections },

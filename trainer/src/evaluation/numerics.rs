@@ -38,7 +38,7 @@ pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
         let sample = evaluator.model.sample([14, i], &garments, 1 + i % 3, HeldOut::Windows);
         evaluator.model.prepare(&sample)
     };
-    let scenes = (0..evaluator.counts.pareto).map(scene).collect::<Result<Vec<_>, _>>()?;
+    let scenes = (0..evaluator.counts.pareto[0]).map(scene).collect::<Result<Vec<_>, _>>()?;
     let count = config.model.eigen_count;
     let mut variants = vec![
         (format!("network as trained, {count} eigenpairs"), model.clone(), dataset.clone()),

@@ -1,9 +1,9 @@
-//! Speed against error: time per drape against energy above the converged minimum and distance to it.
+//! Speed against error: time per drape against energy above the converged minimum, distance to it and intersections.
 
 use super::equilibrium_error::StateError;
 use super::page::Picture;
 use super::table::{Column, median_with_interval, plain};
-use super::{Estimate, Evaluator, Metric, ModelUnderTest, Section, Table, drape_by, median_ms};
+use super::{Estimate, Evaluator, Metric, Section, Table, drape_by, median_ms};
 use crate::dataset::PreparedScene;
 use crate::inference::networks::Networks;
 use crate::inference::reference::{ReferenceScene, wide};
@@ -23,8 +23,14 @@ use std::time::Instant;
 
 /// Steps of the solver from LBS + shape transfer.
 const SOLVER: [usize; 7] = [1, 2, 4, 8, 16, 32, 64];
-/// Steps of the refinement of the networks' drape.
+/// Steps of the refinement of the networks' drape, without corrections and with all.
 const REFINEMENT: [usize; 4] = [1, 2, 4, 8];
+/// Garments of an outfit.
+const LAYERS: usize = 3;
+/// Random stream of the scenes; outfits have the next.
+const STREAM: usize = 7;
+/// What networks without corrections are called.
+const UNCORRECTED: &str = "network, uncorrected";
 /// Repetitions of a fast method last this long (s).
 const SECONDS: f64 = 0.05;
 
@@ -37,17 +43,23 @@ struct MethodSample {
     /// Percent are of the excess of LBS.
     #[serde(flatten)]
     error: StateError,
-    /// Strain (J).
+    /// Strain of all garments (J).
     strain: f64,
+    /// Exact pairs of triangles with the body.
+    body_pairs: f64,
+    /// The same between garments.
+    layer_pairs: f64,
 }
 
 /// What is estimated of a method.
-const METRICS: [Metric<MethodSample>; 5] = [
+const METRICS: [Metric<MethodSample>; 7] = [
     ("milliseconds", |s| s.milliseconds),
     ("excess", |s| s.error.excess),
     ("excess_percent", |s| s.error.excess_percent),
     ("distance_mm", |s| s.error.distance_mm),
     ("strain", |s| s.strain),
+    ("body_pairs", |s| s.body_pairs),
+    ("layer_pairs", |s| s.layer_pairs),
 ];
 
 /// A state of the garments, and how long it took.
@@ -57,39 +69,25 @@ struct State {
     positions: Vec<[f64; 3]>,
 }
 
-/// Scenes of one garment draped by all methods. The networks are timed with all threads, one scene at a time; the solver and the
-/// refinement on one thread per scene.
+pub fn scene_count(evaluator: &Evaluator<'_>) -> usize {
+    evaluator.counts.pareto.iter().sum()
+}
+
+/// Scenes of one garment and of an outfit draped by all methods. The networks are timed with all threads, one scene at a time; the
+/// solver and the refinement on one thread per scene.
 pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
-    let Evaluator { model, counts, .. } = *evaluator;
-    let draped = |index: usize| {
-        let scene = model.prepare(&model.sample_outfit([7, index], 1))?;
-        let states = fast_methods(evaluator, &scene)?;
-        Ok::<_, Report>((scene, states))
-    };
-    let draped = (0..counts.pareto).map(draped).collect::<Result<Vec<_>, _>>()?;
-    let solved = map_single_threaded(draped, None, |(scene, states)| {
-        let solved = solved(model, &scene, states);
-        evaluator.scene_done();
-        solved
-    })?;
-    let (samples, are_equilibria): (Vec<_>, Vec<bool>) = solved.into_iter().unzip();
-    let converged = are_equilibria.into_iter().filter(|is_equilibrium| *is_equilibrium).count();
-    let points = points(&samples);
-    let table = table(&points, counts.pareto).with_note(format!(
-        "Medians [95 % interval of the mean]. Excess and distance: to the lowest state that the solver found from LBS + shape \
-         transfer or from the network, {converged} of {} of them equilibria. Networks on {} threads, solver and refinement on one.",
-        counts.pareto,
-        rayon::current_num_threads()
-    ));
-    let charts = charts(&points);
-    let numbers = json!({
-        "scenes": counts.pareto,
-        // How many of the reference solutions did (relative gradient within the solver's tolerance).
-        "converged": converged,
-        "points": points,
-        "samples": samples,
-    });
-    let mut section = Section::new("pareto", "Speed against error", "", numbers, vec![table]);
+    let [scenes, outfits] = evaluator.counts.pareto;
+    let single_garments = Comparison::new(evaluator, STREAM, 1, scenes)?;
+    let outfits = Comparison::new(evaluator, STREAM + 1, LAYERS, outfits)?;
+    let tables = vec![
+        single_garments.table("Speed against error, one garment"),
+        outfits.table(&format!("Speed against error, {LAYERS} garments")),
+    ];
+    let mut charts = single_garments.charts("one garment");
+    charts.extend(outfits.charts(&format!("{LAYERS} garments")));
+    let charts = ChartGrid { title: "Speed against error".to_owned(), legend: Vec::new(), charts };
+    let numbers = json!({ "single_garments": single_garments, "outfits": outfits });
+    let mut section = Section::new("pareto", "Speed against error", "", numbers, tables);
     section.pictures.push(Picture {
         file: "pareto.png".into(),
         caption: "Medians; down and to the left is better.".into(),
@@ -97,6 +95,87 @@ pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
         svg: Some(charts.svg()),
     });
     Ok(vec![section])
+}
+
+/// All methods on scenes of equally many garments.
+#[derive(Serialize)]
+struct Comparison {
+    scenes: usize,
+    /// How many of the reference solutions are equilibria (relative gradient within the solver's tolerance).
+    converged: usize,
+    /// One per method, with estimates over all scenes.
+    points: Vec<Value>,
+    samples: Vec<Vec<MethodSample>>,
+}
+
+impl Comparison {
+    fn new(evaluator: &Evaluator<'_>, stream: usize, layers: usize, scenes: usize) -> Result<Self, Report> {
+        let draped = |index: usize| {
+            let scene = evaluator.model.prepare(&evaluator.model.sample_outfit([stream, index], layers))?;
+            let states = fast_methods(evaluator, &scene)?;
+            Ok::<_, Report>((scene, states))
+        };
+        let draped = (0..scenes).map(draped).collect::<Result<Vec<_>, _>>()?;
+        let solved = map_single_threaded(draped, None, |(scene, states)| {
+            let solved = solved(evaluator, &scene, states);
+            evaluator.scene_done();
+            solved
+        })?;
+        let (samples, are_equilibria): (Vec<_>, Vec<bool>) = solved.into_iter().unzip();
+        let converged = are_equilibria.into_iter().filter(|is_equilibrium| *is_equilibrium).count();
+        Ok(Self { scenes, converged, points: points(&samples), samples })
+    }
+
+    fn table(&self, title: &str) -> Table {
+        let columns: [Column<'_>; 9] = [
+            ("method", "/method", plain),
+            ("time [ms]", "/milliseconds", median_with_interval),
+            ("excess energy [J]", "/excess", median_with_interval),
+            ("excess [% of LBS]", "/excess_percent", median_with_interval),
+            ("distance [mm]", "/distance_mm", median_with_interval),
+            ("strain [J]", "/strain", median_with_interval),
+            ("pairs with the body", "/body_pairs", median_with_interval),
+            ("pairs between garments", "/layer_pairs", median_with_interval),
+            // No other method is both faster and nearer to the minimum in energy, by medians.
+            ("on the front", "/on_front", plain),
+        ];
+        Table::new(title, &self.points, &columns).with_note(format!(
+            "Medians [95 % interval of the mean] of {} scenes. Excess and distance: to the lowest state that the solver found from \
+             LBS + shape transfer or from the network, {} of {} of them equilibria. Networks on {} threads, solver and refinement on \
+             one.",
+            self.scenes,
+            self.converged,
+            self.scenes,
+            rayon::current_num_threads()
+        ))
+    }
+
+    /// Excess energy, distance and intersections over time, all medians.
+    fn charts(&self, of: &str) -> Vec<Chart> {
+        let families = [
+            ("LBS", "LBS"),
+            ("network, uncorrected +", "refinement of the uncorrected network"),
+            ("network", "network, post-process, refinement"),
+            ("solver", "solver from LBS + shape transfer"),
+        ];
+        let family_of = |name: &str| families.iter().position(|(prefix, _)| name.starts_with(prefix));
+        let chart = |title: &str, value: &dyn Fn(&Value) -> f64| {
+            let line = |index: usize| {
+                let family = self.points.iter().filter(|p| family_of(&plain(&p["method"])) == Some(index));
+                let mut points: Vec<_> = family.map(|p| (median(p, "milliseconds"), value(p))).collect();
+                // More steps may take no longer; a line that turns back is drawn with spikes.
+                points.sort_by(|a, b| a.0.total_cmp(&b.0));
+                Line { name: families[index].1.to_owned(), points }
+            };
+            let lines: Vec<Line> = (0..families.len()).map(line).collect();
+            Chart::of_lines(&format!("{title} over time (ms), {of}"), &lines)
+        };
+        vec![
+            chart("excess energy (%)", &|p| median(p, "excess_percent")),
+            chart("distance (mm)", &|p| median(p, "distance_mm")),
+            chart("intersecting pairs", &|p| median(p, "body_pairs") + median(p, "layer_pairs")),
+        ]
+    }
 }
 
 /// Skinning, networks, networks with post-process.
@@ -114,7 +193,7 @@ fn fast_methods(evaluator: &Evaluator<'_>, scene: &PreparedScene) -> Result<Vec<
     }
     for corrections in 0..model.model.correction_steps {
         let name = match corrections {
-            0 => "network, uncorrected".to_owned(),
+            0 => UNCORRECTED.to_owned(),
             1 => "network, 1 correction".to_owned(),
             _ => format!("network, {corrections} corrections"),
         };
@@ -134,35 +213,37 @@ fn fast_methods(evaluator: &Evaluator<'_>, scene: &PreparedScene) -> Result<Vec<
 /// Adds refinement and solver to the fast methods, and measures all of them against the lowest state found; also whether
 /// that state is an equilibrium.
 fn solved(
-    model: &ModelUnderTest,
+    evaluator: &Evaluator<'_>,
     scene: &PreparedScene,
     mut states: Vec<State>,
 ) -> Result<(Vec<MethodSample>, bool), Report> {
-    let reference = ReferenceScene::new(&model.config.losses, scene).into_diagnostic()?;
+    let reference = ReferenceScene::new(&evaluator.model.config.losses, scene).into_diagnostic()?;
     let problem = Problem::new(&reference.energy).into_diagnostic()?;
-    let of = |method: Method| {
-        let state = states.iter().find(|state| state.method == method.name()).expect("it is a fast method");
-        (state.positions.clone(), state.milliseconds)
+    let of = |name: &str| {
+        let state = states.iter().find(|state| state.method == name)?;
+        Some((state.positions.clone(), state.milliseconds))
     };
-    let (lbs, _) = of(Method::Lbs);
-    let (_, start_milliseconds) = of(Method::LbsWithShapeTransfer);
-    let (network, network_milliseconds) = of(Method::Network);
-    for steps in REFINEMENT {
-        let clock = Instant::now();
-        let (positions, _) =
-            refine(&reference.energy, &network, RefineSteps::AtMost(steps)).into_diagnostic()?;
-        let milliseconds = network_milliseconds + 1e3 * clock.elapsed().as_secs_f64();
-        states.push(State {
-            method: format!("network + {steps} {}", if steps == 1 { "step" } else { "steps" }),
-            milliseconds,
-            positions,
-        });
+    let fast = |method: Method| of(method.name()).expect("it is a fast method");
+    let (lbs, _) = fast(Method::Lbs);
+    let (_, start_milliseconds) = fast(Method::LbsWithShapeTransfer);
+    let (network, network_milliseconds) = fast(Method::Network);
+    let uncorrected = of(UNCORRECTED).map(|(drape, time)| (UNCORRECTED, drape, time));
+    let drapes = uncorrected.into_iter().chain([("network", network.clone(), network_milliseconds)]);
+    for (name, drape, milliseconds) in drapes {
+        for steps in REFINEMENT {
+            let clock = Instant::now();
+            let (positions, _) =
+                refine(&reference.energy, &drape, RefineSteps::AtMost(steps)).into_diagnostic()?;
+            let milliseconds = milliseconds + 1e3 * clock.elapsed().as_secs_f64();
+            let method = format!("{name} + {}", counted_steps(steps));
+            states.push(State { method, milliseconds, positions });
+        }
     }
     let settings = SolverSettings::default();
     let mut iterations = SOLVER.into_iter().peekable();
     let mut add = |iterations: usize, milliseconds: f64, positions: &[[f64; 3]]| {
         states.push(State {
-            method: format!("solver, {iterations} {}", if iterations == 1 { "step" } else { "steps" }),
+            method: format!("solver, {}", counted_steps(iterations)),
             milliseconds: start_milliseconds + milliseconds,
             positions: positions.to_vec(),
         });
@@ -180,14 +261,25 @@ fn solved(
         solve(&problem, &network, &settings, &mut |_| ControlFlow::Continue(())).into_diagnostic()?;
     let minimum = if from_network.energy() < from_start.energy() { &from_network } else { &from_start };
     let excess_of_lbs = problem.value(&lbs) - minimum.energy();
-    let sample = |State { method, milliseconds, positions }: State| MethodSample {
-        method,
-        milliseconds,
-        error: StateError::new(problem.value(&positions), &positions, minimum, excess_of_lbs),
-        strain: reference.energy.raw(&positions, &positions).garments[0][Term::Strain].unwrap_or(0.0),
+    let sample = |State { method, milliseconds, positions }: State| {
+        let raw = reference.energy.raw(&positions, &positions).garments;
+        let packed: Vec<[f32; 3]> = positions.iter().map(|p| p.map(|x| x as f32)).collect();
+        let certificate = evaluator.post_process.of(scene, &packed).certificate().into_diagnostic()?;
+        Ok::<_, Report>(MethodSample {
+            method,
+            milliseconds,
+            error: StateError::new(problem.value(&positions), &positions, minimum, excess_of_lbs),
+            strain: raw.iter().map(|terms| terms[Term::Strain].unwrap_or(0.0)).sum(),
+            body_pairs: certificate.body_triangle_pairs as f64,
+            layer_pairs: certificate.layer_triangle_pairs as f64,
+        })
     };
     let is_equilibrium = minimum.relative_gradient <= settings.tolerance;
-    Ok((states.into_iter().map(sample).collect(), is_equilibrium))
+    Ok((states.into_iter().map(sample).collect::<Result<_, _>>()?, is_equilibrium))
+}
+
+fn counted_steps(steps: usize) -> String {
+    format!("{steps} {}", if steps == 1 { "step" } else { "steps" })
 }
 
 /// One per method, with estimates over all scenes.
@@ -210,46 +302,4 @@ fn points(samples: &[Vec<MethodSample>]) -> Vec<Value> {
 
 fn median(point: &Value, metric: &str) -> f64 {
     point[metric]["median"].as_f64().unwrap_or(f64::NAN)
-}
-
-fn table(points: &[Value], scenes: usize) -> Table {
-    let columns: [Column<'_>; 7] = [
-        ("method", "/method", plain),
-        ("time [ms]", "/milliseconds", median_with_interval),
-        ("excess energy [J]", "/excess", median_with_interval),
-        ("excess [% of LBS]", "/excess_percent", median_with_interval),
-        ("distance [mm]", "/distance_mm", median_with_interval),
-        ("strain [J]", "/strain", median_with_interval),
-        // No other method is both faster and nearer to the minimum in energy, by medians.
-        ("on the front", "/on_front", plain),
-    ];
-    Table::new(format!("Speed against error over {scenes} scenes of one garment"), points, &columns)
-}
-
-/// Excess energy and distance over time, both medians.
-fn charts(points: &[Value]) -> ChartGrid {
-    let families = [
-        ("LBS", "LBS"),
-        ("network", "network, post-process, refinement"),
-        ("solver", "solver from LBS + shape transfer"),
-    ];
-    let chart = |title: &str, metric: &str| {
-        let line = |(prefix, name): (&str, &str)| {
-            let family = points.iter().filter(|point| plain(&point["method"]).starts_with(prefix));
-            let mut points: Vec<_> =
-                family.map(|point| (median(point, "milliseconds"), median(point, metric))).collect();
-            // More steps may take no longer; a line that turns back is drawn with spikes.
-            points.sort_by(|a, b| a.0.total_cmp(&b.0));
-            Line { name: name.to_owned(), points }
-        };
-        Chart::of_lines(title, &families.map(line))
-    };
-    ChartGrid {
-        title: "Speed against error".to_owned(),
-        legend: Vec::new(),
-        charts: vec![
-            chart("excess energy (%) over time (ms)", "excess_percent"),
-            chart("distance (mm) over time (ms)", "distance_mm"),
-        ],
-    }
 }

@@ -82,7 +82,7 @@ pub(super) fn passed_near(
     let outfit = Outfit::new(layers);
     let mesh = contact_mesh(&outfit, drawn);
     let mut pass = FastPass::new(&outfit, drawn, &mesh, settings);
-    let rounds = pass.run();
+    let rounds = pass.run(start);
     if pass.between() > 0 || pass.own().count() > pass.folds.len() {
         return None;
     }
@@ -183,8 +183,8 @@ impl<'a> FastPass<'a> {
         pass
     }
 
-    /// Rounds until nothing intersects or a round hardly helps; how many it took.
-    fn run(&mut self) -> usize {
+    /// Rounds until nothing intersects, a round hardly helps, or what began at `start` has had its time; how many it took.
+    fn run(&mut self, start: Instant) -> usize {
         let mut left = self.left();
         if left == [0, 0] {
             return 0;
@@ -193,6 +193,9 @@ impl<'a> FastPass<'a> {
         self.outward = outward(self.outfit, &self.input, away);
         let mut stalls = 0;
         for round in 1..=ROUNDS {
+            if self.settings.is_late(start, self.outfit.len()) {
+                return round - 1;
+            }
             self.round(stalls < FREE_STALLS);
             let before = std::mem::replace(&mut left, self.left());
             let hardly = |k: usize| left[k] as f64 >= STALLED * before[k] as f64;
