@@ -9,16 +9,15 @@ const DECREASE: f64 = 0.1;
 /// Most trials.
 const TRIALS: usize = 12;
 
-/// Tries lengths from `longest` downwards from a state of `energy` and derivative `slope < 0` along the line. A trial that is too long
+/// Tries lengths from 1 downwards from a state of `energy` and derivative `slope < 0` along the line. A trial that is too long
 /// is followed by the minimum of the parabola through value and slope at the start and the value of the trial, between a tenth and
 /// half of its length. Returns step length and state; `None` if no trial had the decrease.
 pub(super) fn search(
     energy: f64,
     slope: f64,
-    longest: f64,
     mut evaluate: impl FnMut(f64) -> State,
 ) -> Option<(f64, State)> {
-    let mut length = longest;
+    let mut length = 1.0;
     for _ in 0..TRIALS {
         let trial = evaluate(length);
         // Written so that NaN is too far; the second condition keeps the energy falling where the product rounds to nothing.

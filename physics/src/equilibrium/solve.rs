@@ -121,10 +121,12 @@ pub fn solve(
             let smooth = hessian.assemble(problem, &state.positions, &state.gradient, width);
             let found = hessian.direction(&smooth, shift).and_then(|d| {
                 reach = longest(&d);
-                let line = Line { problem, state: &state, longest: (settings.step_bound / reach).min(1.0) };
+                let length = (settings.step_bound / reach).min(1.0);
+                let moved = state.positions.iter().zip(&d).map(|(p, d)| add_scaled(*p, length, *d));
+                let line = Line { problem, state: &state, to: moved.collect(), is_whole: length == 1.0 };
                 match filter.as_mut() {
-                    Some(filter) => line.advance_filtered(&d, filter, &mut step.evaluations),
-                    None => line.advance(&d, &mut step.evaluations),
+                    Some(filter) => line.advance_filtered(filter, &mut step.evaluations),
+                    None => line.advance(&mut step.evaluations),
                 }
             });
             models += 1;
@@ -167,62 +169,67 @@ pub fn solve(
     Ok(Solution { positions: state.positions, stop, relative_gradient, history, factorisations })
 }
 
-/// Where the search for a next state begins.
+/// Where a search for the next state begins, and where it goes at most.
 struct Line<'a> {
     problem: &'a Problem<'a>,
     state: &'a State,
-    /// At most so much of a direction, itself at most once.
-    longest: f64,
+    to: Vec<[f64; 3]>,
+    /// Whether that is as far as the model goes.
+    is_whole: bool,
 }
 
 impl Line<'_> {
-    /// The state along `direction`, and the share of the decrease predicted by the slope that a full step has, 0 for a shorter one; `None`
-    /// where it does not go downhill.
-    fn advance(&self, direction: &[[f64; 3]], evaluations: &mut usize) -> Option<(f64, State)> {
-        let slope = product(direction, &self.state.gradient);
-        if !(slope < 0.0 && self.longest > 0.0) {
+    /// A lower state on the line, and the share of the decrease predicted by the slope that it has, 0 where it is not as far as the model
+    /// goes; `None` where the line does not go downhill.
+    fn advance(&self, evaluations: &mut usize) -> Option<(f64, State)> {
+        let Self { state, .. } = self;
+        let moves: Vec<[f64; 3]> = self.to.iter().zip(&state.positions).map(|(q, p)| sub(*q, *p)).collect();
+        let slope = product(&moves, &state.gradient);
+        if slope.is_nan() || slope >= 0.0 {
             return None;
         }
         let evaluate = |length: f64| {
             *evaluations += 1;
-            let positions = self.at(direction, length);
+            let part =
+                || state.positions.iter().zip(&moves).map(|(p, d)| add_scaled(*p, length, *d)).collect();
+            let positions = if length == 1.0 { self.to.clone() } else { part() };
             let (energy, gradient) = self.problem.value_and_gradient(&positions);
             State { positions, energy, gradient }
         };
-        let (length, next) = search(self.state.energy, slope, self.longest, evaluate)?;
-        let share = if length < 1.0 { 0.0 } else { (next.energy - self.state.energy) / slope };
+        let (length, next) = search(state.energy, slope, evaluate)?;
+        let share = if length == 1.0 && self.is_whole { (next.energy - state.energy) / slope } else { 0.0 };
         Some((share, next))
     }
 
-    /// The same along what `filter` leaves of `direction`, with which the cloth then moves.
+    /// The same on what `filter` leaves of the line, which then has made the step.
     fn advance_filtered(
-        &self,
-        direction: &[[f64; 3]],
+        self,
         filter: &mut FilteredSteps<'_>,
         evaluations: &mut usize,
     ) -> Option<(f64, State)> {
         let from = &self.state.positions;
-        let wanted = self.at(direction, self.longest);
-        let mut to = wanted.clone();
+        let mut to = self.to.clone();
         let before = filter.take(from, &mut to);
-        let is_short = to != wanted || self.longest < 1.0;
-        let left: Vec<[f64; 3]> = to.iter().zip(from).map(|(to, from)| sub(*to, *from)).collect();
-        let found = Line { longest: 1.0, ..*self }.advance(&left, evaluations);
-        filter.take_back(before);
-        let (share, next) = found?;
-        // Part of a step takes elements that intersect already elsewhere than all of it.
-        let mut to = next.positions.clone();
-        let before = filter.take(from, &mut to);
-        if to != next.positions {
-            filter.take_back(before);
-            return None;
+        let line = Line { is_whole: self.is_whole && to == self.to, to, ..self };
+        let found = line.advance(evaluations);
+        match found {
+            Some((_, next)) if next.positions != line.to => {
+                // Part of a step takes elements that intersect already elsewhere than all of it.
+                filter.take_back(before.clone());
+                let mut to = next.positions.clone();
+                filter.take(from, &mut to);
+                if to != next.positions {
+                    filter.take_back(before);
+                    return None;
+                }
+                Some((0.0, next))
+            }
+            None => {
+                filter.take_back(before);
+                None
+            }
+            found => found,
         }
-        Some((if is_short { 0.0 } else { share }, next))
-    }
-
-    fn at(&self, direction: &[[f64; 3]], length: f64) -> Vec<[f64; 3]> {
-        let moved = self.state.positions.iter().zip(direction);
-        moved.map(|(p, d)| add_scaled(*p, length, *d)).collect()
     }
 }
 
