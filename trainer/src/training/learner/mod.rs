@@ -16,7 +16,7 @@ use scene::SceneStep;
 use std::ops::AddAssign;
 use std::time::{Duration, Instant};
 use tracing::trace_span;
-use workers::Workers;
+use workers::{Workers, among_workers};
 
 pub use scene::drape_states;
 
@@ -165,7 +165,7 @@ impl Learner {
         let mut sum = GradientsAccumulator::<ClothCombo>::new();
         for parallel in jobs.chunks(self.parallel_scenes) {
             let parts = match parallel {
-                [job] => vec![step.compute(&self.model, job)?],
+                [job] => vec![among_workers(|| step.compute(&self.model, job))?],
                 several => step.compute_in_parallel(&self.model, several, &mut self.workers)?,
             };
             output.times +=
@@ -192,8 +192,9 @@ impl Learner {
         let start = Instant::now();
         if self.clip == ClipScope::Step {
             let _span = trace_span!("clip").entered();
+            let gradients = &mut output.gradients;
             output.gradient_norm =
-                norm_of(clip_global_norm(&self.model, &mut output.gradients, self.max_norm, 1.0));
+                among_workers(|| norm_of(clip_global_norm(&self.model, gradients, self.max_norm, 1.0)));
         }
         output.times.update += start.elapsed();
     }
@@ -205,7 +206,8 @@ impl Learner {
         if !output.skipped && !output.gradients.is_empty() {
             let _span = trace_span!("optimiser").entered();
             let gradients = std::mem::take(&mut output.gradients);
-            let model = self.optimizer.step(learning_rate, self.model.clone(), gradients);
+            let model = self.model.clone();
+            let model = among_workers(|| self.optimizer.step(learning_rate, model, gradients));
             self.model = if trains.freezes() { model } else { model.clamp_diffusion_times() };
         }
         output.times.update += start.elapsed();

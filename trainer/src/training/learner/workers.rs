@@ -45,6 +45,13 @@ impl Workers {
     }
 }
 
+/// The result of `work`, on one of the threads that parallel operations run on: each of them would else be handed over from this one,
+/// which sleeps until it is done. A small step has hundreds.
+pub fn among_workers<R: Send>(work: impl FnOnce() -> R + Send) -> R {
+    let listener = dispatcher::get_default(Clone::clone);
+    rayon::scope(|_| dispatcher::with_default(&listener, work))
+}
+
 /// Starts the first job in the first pool, and so on, and waits for all.
 fn run_at_once<J: FnOnce() + Send>(pools: &[ThreadPool], mut jobs: impl Iterator<Item = J>) {
     if let (Some((pool, pools)), Some(job)) = (pools.split_first(), jobs.next()) {
@@ -59,6 +66,15 @@ fn run_at_once<J: FnOnce() + Send>(pools: &[ThreadPool], mut jobs: impl Iterator
 mod tests {
     use super::*;
     use std::sync::Barrier;
+
+    #[test]
+    fn work_among_workers_is_heard_by_who_listens_here() {
+        let heard = dispatcher::get_default(|d| d.clone());
+        let (index, listener) =
+            among_workers(|| (rayon::current_thread_index(), dispatcher::get_default(Clone::clone)));
+        assert!(index.is_some() && rayon::current_thread_index().is_none());
+        assert_eq!(format!("{listener:?}"), format!("{heard:?}"));
+    }
 
     #[test]
     fn results_come_in_order_from_threads_that_run_at_once() {
