@@ -2,6 +2,7 @@
 
 use clap::{Parser, Subcommand};
 use clothcombo_trainer::cli;
+use clothcombo_trainer::system::workers::among_workers;
 use std::process::ExitCode;
 
 /// Learned draping of multi-layered clothing: data in, garments on bodies out.
@@ -48,14 +49,14 @@ fn main() -> ExitCode {
         Verb::Bench(bench) => cli::bench::run(bench),
         Verb::Check(arguments) => cli::check::run(arguments),
         Verb::Config(verb) => cli::config::run(verb),
-        Verb::Drape(arguments) => cli::drape::run(arguments),
+        Verb::Drape(arguments) => among_workers(|| cli::drape::run(arguments)),
         Verb::Eval(arguments) => cli::eval::run(arguments),
         Verb::Fit(arguments) => cli::fit::run(arguments),
         Verb::Generate(arguments) => cli::generate::run(arguments),
         Verb::Import(source) => cli::import::run(source),
         Verb::Prepare(arguments) => cli::prepare::run(arguments),
         Verb::Replay(arguments) => cli::replay::run(arguments),
-        Verb::Resolve(arguments) => cli::resolve::run(arguments),
+        Verb::Resolve(arguments) => among_workers(|| cli::resolve::run(arguments)),
         Verb::Runs(arguments) => cli::runs::run(arguments),
         Verb::Score(arguments) => cli::score::run(arguments),
     })

@@ -11,3 +11,4 @@ pub mod paths;
 pub mod prefetch;
 pub mod single_threaded;
 pub mod stop;
+pub mod workers;

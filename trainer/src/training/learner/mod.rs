@@ -1,12 +1,12 @@
 //! Networks and optimiser: forward, backward, clip, step.
 
 mod scene;
-mod workers;
 
 use crate::config::{ClipScope, OptimizerConfig, Trains};
 use crate::dataset::PreparedScene;
 use crate::inference::tensor_store::{DrapeError, KnownEmbeddings, TensorStore};
 use crate::system::device::{is_processor, scenes_at_once};
+use crate::system::workers::{Workers, among_workers};
 use burn::module::Module;
 use burn::optim::{GradientsAccumulator, GradientsParams, ModuleOptimizer};
 use burn::tensor::Tensor;
@@ -16,7 +16,6 @@ use scene::SceneStep;
 use std::ops::AddAssign;
 use std::time::{Duration, Instant};
 use tracing::trace_span;
-use workers::{Workers, among_workers};
 
 pub use scene::drape_states;
 

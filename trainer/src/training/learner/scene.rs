@@ -1,12 +1,12 @@
 //! Loss and gradients of one scene, and of several in parallel.
 
-use super::workers::Workers;
 use super::{StepInput, StepOutput, StepTimes, norm_of};
 use crate::config::{ClipScope, Trains};
 use crate::dataset::{PreparedBody, PreparedScene};
 use crate::inference::contact_features::contact_features;
 use crate::inference::draped::to_host;
 use crate::inference::tensor_store::{DrapeError, TensorStore};
+use crate::system::workers::Workers;
 use burn::module::Module;
 use burn::optim::GradientsParams;
 use burn::tensor::Tensor;
