@@ -7,6 +7,8 @@ use std::ops::Range;
 
 use pulp::{Scalar128b, Simd};
 
+use super::host::vectorised;
+
 /// First element, row and column step of a matrix in memory.
 #[derive(Clone, Copy)]
 pub(super) struct StridedMatrix {
@@ -112,19 +114,24 @@ impl Panels {
         (self.inner, self.columns) = (inner, columns);
         self.values.clear();
         self.values.reserve(inner * columns.next_multiple_of(lanes));
-        let mut at = 0;
-        while at < columns {
-            let wanted = (columns - at).min(2 * lanes);
-            let width = wanted.next_multiple_of(lanes);
-            // SAFETY: the panel lies in the matrix; its memory has been reserved and is written.
-            unsafe {
-                let start = self.values.len();
-                let panel = self.values.as_mut_ptr().add(start);
-                write_panel(panel, matrix.from(0, at), inner, wanted, width);
-                self.values.set_len(start + inner * width);
-            }
-            at += wanted;
-        }
+        vectorised(
+            #[inline(always)]
+            || {
+                let mut at = 0;
+                while at < columns {
+                    let wanted = (columns - at).min(2 * lanes);
+                    let width = wanted.next_multiple_of(lanes);
+                    // SAFETY: the panel lies in the matrix; its memory has been reserved and is written.
+                    unsafe {
+                        let start = self.values.len();
+                        let panel = self.values.as_mut_ptr().add(start);
+                        write_panel(panel, matrix.from(0, at), inner, wanted, width);
+                        self.values.set_len(start + inner * width);
+                    }
+                    at += wanted;
+                }
+            },
+        );
     }
 
     /// `output = lhs·(rows `terms` of the right factor)`, plus what `output` holds if `add`.
@@ -201,6 +208,7 @@ impl Panels {
 ///
 /// # Safety
 /// `matrix` has that size, `panel` is memory for `[inner, width]`.
+#[inline(always)]
 unsafe fn write_panel(panel: *mut f32, matrix: StridedMatrix, inner: usize, columns: usize, width: usize) {
     // SAFETY (all): elements of matrix and panel.
     unsafe {
@@ -229,6 +237,7 @@ unsafe fn write_panel(panel: *mut f32, matrix: StridedMatrix, inner: usize, colu
 }
 
 /// Rows of a known length, which are moved without a call.
+#[inline(always)]
 unsafe fn copy_rows<const C: usize>(panel: *mut f32, matrix: StridedMatrix, rows: usize) {
     for row in 0..rows {
         // SAFETY: rows of matrix and panel.

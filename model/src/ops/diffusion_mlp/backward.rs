@@ -102,19 +102,19 @@ impl Pass<'_> {
             let sum = |lhs: StridedMatrix, rows: usize, panels: &Panels, sums: &mut [f32]| {
                 panels.multiply(lhs.transposed(), rows, 0..count, to(sums), true);
             };
-            panels.fill(gradient, count, width);
-            sum(matrix(second), width, panels, of_output);
+            // What comes from memory is read in its order before it is a transposed factor.
             weight_output.multiply(gradient, count, 0..width, to(a), false);
             masked(second, a, bias);
             add_to(of_hidden_bias, bias);
-            panels.fill(matrix(a), count, width);
-            sum(matrix(first), width, panels, of_hidden);
+            panels.fill(gradient, count, width);
+            sum(matrix(second), width, panels, of_output);
             weight_hidden.multiply(matrix(a), count, 0..width, to(b), false);
             masked(first, b, bias);
             add_to(of_bias, bias);
+            panels.fill(matrix(a), count, width);
+            sum(matrix(first), width, panels, of_hidden);
             panels.fill(matrix(b), count, width);
             sum(features, width, panels, of_input);
-            sum(matrix(gradient_features), width, panels, of_gradient_weight);
             sum(self.basis.strided().from(start, 0), eigen, panels, of_diffused);
             let of_features = of_features.unwritten().as_mut_ptr().cast::<f32>();
             for (index, row) in block.rows.clone().enumerate() {
@@ -129,6 +129,7 @@ impl Pass<'_> {
                 #[inline(always)]
                 || mixed_gradients([x, y, real, imaginary, gradient_features], a, [of_x, of_y, of_x1, of_y1]),
             );
+            sum(matrix(gradient_features), width, panels, of_gradient_weight);
             let [along_x, along_y] = axes(&self.gradient_basis, start);
             panels.fill(matrix(of_x), count, width);
             sum(along_x, eigen, panels, of_c);

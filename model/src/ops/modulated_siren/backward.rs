@@ -160,12 +160,15 @@ impl Pass<'_> {
                     let sums = OutputBlock::of_rows(&mut of_sines[layer * width * width..], width);
                     panels.multiply(factor, width, 0..count, sums, true);
                 }
+                if layer + 1 < layers {
+                    // Not where the layer above is done: these gates have been read in their order since, and are at hand.
+                    panels.fill(StridedMatrix::of_rows(gates_above, width), count, width);
+                    let factor = StridedMatrix::of_rows(gate, width).transposed();
+                    let of_weight = OutputBlock::of_rows(&mut of_gates[layer * width * width..], width);
+                    panels.multiply(factor, width, 0..count, of_weight, true);
+                }
                 if layer > 0 {
                     let of_gate = StridedMatrix::of_rows(gates_below, width);
-                    panels.fill(of_gate, count, width);
-                    let factor = StridedMatrix::of_rows(state(&self.gates, layer - 1), width).transposed();
-                    let of_weight = &mut of_gates[(layer - 1) * width * width..];
-                    panels.multiply(factor, width, 0..count, OutputBlock::of_rows(of_weight, width), true);
                     let output = OutputBlock::of_rows(gates_above, width);
                     self.weights.gates[layer - 1].multiply(of_gate, count, 0..width, output, false);
                     let output = OutputBlock::of_rows(above, width);
