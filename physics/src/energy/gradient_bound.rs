@@ -10,7 +10,7 @@
 //! | strain | `Σ_T 2V·S·(λ√2 + 2μ)·(S² + M)·√3/h` | `‖P‖ ≤ ‖F‖·‖S‖`, with `‖F‖ ≤ S = √6·ℓ/h`, and `h` the height of the rest triangle, which the regularisation keeps above a ratio of its longest edge (without it there is no bound); `M` is the norm of the rest metric |
 //! | bending | `Σ_H 58·k·ℓ/τ` | `|∂α/∂c|·φ ≤ 1.1·ℓ/τ` and `|∂φ/∂c| ≤ 2.2·ℓ/τ` for `φ = t²(6 − 8t + 3t²)`, `t = s²/τ²` below τ, `α ≤ π`; the ends of the edge carry up to four times that |
 //! | gravity | `m_v·g` | it is that everywhere |
-//! | body collision | `3(ε + D)²` | unit normals, `d ≥ −D` |
+//! | body collision | `3(ε + D)²·s` | unit normals, `d ≥ −D`; `s` is what of the contact points a vertex has, 1 where they are the vertices |
 //! | repulsion | `2(N − 1)·factor/δ` | a pair pulls with at most `2/δ`; over `N` vertices the default is below `2/δ` for any garment |
 //! | holding | `2·max|y − y_ref|·|r|` | a parabola along the row `r` that reads the height off; `|r| = 1` on canonical positions |
 //! | layer collision, nearest vertex | `3M(ε + D)²·(1 + 3·n·ℓ·D/τ)` | `M` outer vertices at most share an inner one, whose normal turns by at most `ℓ/τ` per face |
@@ -19,7 +19,10 @@
 
 use super::bending;
 use super::garment_term::HeightRow;
-use super::{EnergySettings, LayerContact, SceneEnergy, Term, layer_collision, repulsion};
+use super::{
+    ContactPoints, ContactSamples, EnergySettings, LayerContact, SceneEnergy, Term, layer_collision,
+    repulsion,
+};
 use crate::mesh::{Topology, TriMesh};
 use crate::real::Real;
 use crate::vec3::{distance_squared, norm, sub, to_f64};
@@ -53,6 +56,7 @@ pub fn gradient_bound<T: Real>(
             canonical: canonical[range].iter().map(|p| to_f64(*p)).collect(),
             reference: garment.holding_reference.iter().map(|p| to_f64(*p)).collect(),
             pull_back: garment.pull_back.as_deref(),
+            contact_points: garment.energies.contact_points(),
         });
     }
     let settings = &scene.settings;
@@ -63,7 +67,7 @@ pub fn gradient_bound<T: Real>(
             let nearest = scene.body.positions.get(scene.body.nearest_vertex(p) as usize);
             nearest.map_or(0.0, |q| distance_squared(to_f64(p), to_f64(*q)).sqrt())
         };
-        g.posed.iter().map(distance).fold(0.0, f64::max)
+        g.contact_points.at(&g.posed, settings.body_samples).iter().map(distance).fold(0.0, f64::max)
     };
     // A garment may be the inner one of some pairs and the outer one of others: their gradients add up.
     let over_pairs = |bound: &dyn Fn(&Deformed<'_>, &Deformed<'_>) -> f64| {
@@ -73,7 +77,11 @@ pub fn gradient_bound<T: Real>(
         Term::Strain => of_garments(&|g| g.strain(settings)),
         Term::Bending => of_garments(&|g| g.bending(settings)),
         Term::Gravity => of_garments(&|g| g.gravity(settings)),
-        Term::BodyCollision => of_garments(&|g| 3.0 * (settings.body_collision_epsilon + to_body(g)).powi(2)),
+        Term::BodyCollision => of_garments(&|g| {
+            g.contact_share(settings.body_samples)
+                * 3.0
+                * (settings.body_collision_epsilon + to_body(g)).powi(2)
+        }),
         Term::Repulsion => of_garments(&|g| {
             let count = g.rest.vertex_count() as f64;
             let factor = if settings.repulsion_normalised { 1.0 / count } else { 1.0 };
@@ -100,11 +108,23 @@ struct Deformed<'a> {
     canonical: Vec<[f64; 3]>,
     reference: Vec<[f64; 3]>,
     pull_back: Option<&'a [HeightRow]>,
+    contact_points: &'a ContactPoints,
 }
 
 impl Deformed<'_> {
     fn distance(&self, a: u32, b: u32) -> f64 {
         norm(sub(self.posed[a as usize], self.posed[b as usize]))
+    }
+
+    /// The most that a vertex has of the contact points around it, in those that a vertex stands for on average.
+    fn contact_share(&self, samples: ContactSamples) -> f64 {
+        let points = self.contact_points;
+        let mut shares = vec![0.0; self.rest.vertex_count()];
+        for point in 0..points.count(samples) {
+            let corners = points.corners(point);
+            corners.iter().for_each(|v| shares[v] += points.share(samples) * corners.weight());
+        }
+        shares.into_iter().fold(0.0, f64::max)
     }
 
     /// Longest deformed edge of a face.
@@ -179,7 +199,8 @@ impl Deformed<'_> {
         let aside = |gate: super::LayerGate| (gate.tangential_edges * self.median_edge).hypot(gate.depth);
         let index = crate::query::VertexIndex::new(&self.posed);
         let distance = |p: &[f64; 3]| norm(sub(*p, self.posed[index.nearest(*p).0 as usize]));
-        let farthest = outer.posed.iter().map(distance).fold(0.0, f64::max);
+        let points = outer.contact_points.at(&outer.posed, settings.layer_samples);
+        let farthest = points.iter().map(distance).fold(0.0, f64::max);
         let reach = settings.layer_gate.map_or(farthest, |gate| farthest.min(aside(gate)));
         let floor = layer_collision::nearest_vertex::COLLAPSE_FLOOR * self.median_edge * self.median_edge;
         let longest = (0..self.rest.face_count() as u32).map(|f| self.longest(f)).fold(0.0, f64::max);

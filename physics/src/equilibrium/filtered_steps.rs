@@ -36,7 +36,7 @@ impl<'a> FilteredSteps<'a> {
         let from = [from, self.body].concat();
         let count = to.len();
         to.extend_from_slice(self.body);
-        self.filter.step(&from, to, None, self.margin);
+        self.filter.step(&from, to, self.margin);
         to.truncate(count);
         before
     }

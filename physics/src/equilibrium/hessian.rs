@@ -20,8 +20,6 @@ pub(super) struct Hessian {
     /// The diagonal entries without the shift.
     diagonal: Vec<f64>,
     factor: Option<Cholesky>,
-    /// Successful factorisations.
-    pub factorisations: usize,
 }
 
 impl Hessian {
@@ -46,7 +44,7 @@ impl Hessian {
         }
         let matrix = SparseMatrix::from_triplets(3 * count, 3 * count, triplets);
         let factor = Cholesky::analysed(&matrix);
-        Self { blocks, matrix, diagonal: Vec::new(), factor, factorisations: 0 }
+        Self { blocks, matrix, diagonal: Vec::new(), factor }
     }
 
     /// Takes the curvature of `problem` at `posed`, with creases as if they were smooth over `width` (m), and returns the `gradient` there
@@ -59,7 +57,7 @@ impl Hessian {
         width: f64,
     ) -> Vec<[f64; 3]> {
         if !self.try_assemble(problem, posed) {
-            *self = Self { factorisations: self.factorisations, ..Self::new(problem, posed) };
+            *self = Self::new(problem, posed);
             self.try_assemble(problem, posed);
         }
         let mut smooth = gradient.to_vec();
@@ -90,7 +88,6 @@ impl Hessian {
         if !factor.factorise(&self.matrix) {
             return None;
         }
-        self.factorisations += 1;
         let mut direction: Vec<[f64; 3]> = gradient.iter().map(|g| g.map(|x| -x)).collect();
         factor.solve_in_place(MatMut::from_column_major_slice_mut(direction.as_flattened_mut(), rows, 1));
         Some(direction)

@@ -80,8 +80,6 @@ pub struct Solution {
     pub relative_gradient: f64,
     /// Start and every accepted step.
     pub history: Vec<Step>,
-    /// Factorisations of the matrix.
-    pub factorisations: usize,
 }
 
 impl Solution {

@@ -165,8 +165,7 @@ pub fn solve(
     let relative_gradient = problem.relative_gradient(&state.positions);
     let exhausted = !matches!(stop, Stop::Converged | Stop::Escaped | Stop::Cancelled);
     let stop = if exhausted && relative_gradient <= settings.tolerance { Stop::Converged } else { stop };
-    let factorisations = hessian.factorisations;
-    Ok(Solution { positions: state.positions, stop, relative_gradient, history, factorisations })
+    Ok(Solution { positions: state.positions, stop, relative_gradient, history })
 }
 
 /// Where a search for the next state begins, and where it goes at most.

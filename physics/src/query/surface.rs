@@ -146,8 +146,10 @@ impl<T: Real> Surface<T> {
         let Some(tree) = self.tree(distance).filter(|_| vec3::is_finite(q)) else {
             return self.gap(p, distance);
         };
+        // Other distances jump where the body overlaps itself or ends, however far away it is.
+        let is_continuous = distance == Distance::Union && self.is_closed();
         let clearance = near.clearance(q);
-        if clearance >= reach {
+        if is_continuous && clearance >= reach {
             return Gap { gap: T::from_f64(clearance), gradient: vec3::zero(), vertex: 0 };
         }
         let Some(found) = near.project(tree, q, reach) else { return not_a_gap() };

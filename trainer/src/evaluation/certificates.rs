@@ -246,7 +246,7 @@ pub struct OutfitResult {
     pub stage: Stage,
     /// What the step filter did.
     pub filter: FilterWork,
-    /// Time of the fast pass where it was not enough (ms); where it was, the other times are its.
+    /// What of the time the fast pass took where it was not enough (ms); 0 where it was.
     pub fast_milliseconds: f64,
     /// Rounds per garment, of all attempts but those of the continuation path and of relaxing strain.
     pub rounds: Vec<usize>,

@@ -93,6 +93,8 @@ fn paper_collisions(scene: &SceneEnergy<f32>) -> SceneEnergy<f32> {
         distance: printed.distance,
         layer_contact: printed.layer_contact,
         layer_gate: printed.layer_gate,
+        body_samples: printed.body_samples,
+        layer_samples: printed.layer_samples,
         ..scene.settings
     };
     paper.garments.iter_mut().for_each(|garment| garment.weights = only(Term::BodyCollision));

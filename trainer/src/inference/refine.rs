@@ -6,10 +6,9 @@ use clothcombo_physics::equilibrium::{Problem, SolverSettings, Stop, solve};
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 use std::str::FromStr;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-/// No vertex moves farther than this in one step [m]: less than the thickness of a limb, so that no vertex passes through
-/// one.
+/// No vertex moves farther than this in one step (m): about as far as the faces of the body near it stay the same.
 const STEP_BOUND: f64 = 0.02;
 /// With [`RefineSteps::Auto`], refinement ends with a step that lowers the energy by less than this share of all steps together…
 const LEAST_SHARE: f64 = 0.01;
@@ -72,16 +71,16 @@ pub fn refine(
             RefineSteps::Auto => SolverSettings::default().iterations,
         },
         step_bound: STEP_BOUND,
+        time: (steps == RefineSteps::Auto).then_some(MOST_TIME),
         escape_distance: Some(REACH),
         margin: Some(MARGIN),
         ..SolverSettings::default()
     };
     let problem = Problem::new(energy)?;
-    let clock = Instant::now();
     let mut energies: Vec<f64> = Vec::new();
     let solution = solve(&problem, start, &settings, &mut |progress| {
         energies.push(progress.step.energy);
-        let is_done = steps == RefineSteps::Auto && (is_enough(&energies) || clock.elapsed() > MOST_TIME);
+        let is_done = steps == RefineSteps::Auto && is_enough(&energies);
         if is_done { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })?;
     let moved = solution

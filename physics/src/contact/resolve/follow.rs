@@ -50,7 +50,7 @@ pub fn resolve_along<E: From<ResolveError>>(
     if let Some(found) = fast_pass(body, layers, settings)? {
         return Ok(found);
     }
-    let (fast_time, start) = (start.elapsed(), Instant::now());
+    let fast_time = start.elapsed();
     let mut stages = Stages::to(layers);
     let mut checked_at = |share: f64| Ok::<_, E>(checked(stage_at(share)?, layers)?);
     let mut along = |layers: &[Layer<'_>], folds: &mut Option<Folds>| {

@@ -104,9 +104,8 @@ pub fn resolve(
         if let Some(found) = passed_near(&drawn, layers, settings, (start, body_time)) {
             return Ok(found);
         }
-        let fast_time = start.elapsed();
-        let times = (Instant::now(), body_time);
-        let found = resolved_near(drawn, layers, settings, times, |_, found| Ok(found));
+        let fast_time = start.elapsed() - body_time;
+        let found = resolved_near(drawn, layers, settings, (start, body_time), |_, found| Ok(found));
         found.map(|found: Resolved| Resolved { fast_time, ..found })
     })
 }

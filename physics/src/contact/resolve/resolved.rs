@@ -25,7 +25,7 @@ pub struct Resolved {
     pub stage: Stage,
     /// What the step filter did.
     pub filter: FilterWork,
-    /// Time of the fast pass, where it was not enough; else its time is that of the garments.
+    /// How much of the time of the garments the fast pass took where it was not enough; zero where it was.
     pub fast_time: Duration,
     /// Time to prepare the body.
     pub body_time: Duration,

@@ -21,7 +21,7 @@ impl Bounds {
     const EMPTY: Self = Self { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] };
 
     /// The box around `points`, `margin` (m) wider on every side.
-    pub fn around(points: impl IntoIterator<Item = [f64; 3]>, margin: f64) -> Self {
+    pub fn around(points: impl IntoIterator<Item = [f64; 3]>) -> Self {
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         for p in points {
             for k in 0..3 {
@@ -29,7 +29,7 @@ impl Bounds {
                 high[k] = high[k].max(p[k]);
             }
         }
-        Self { low: low.map(|x| below(x - margin)), high: high.map(|x| above(x + margin)) }
+        Self { low: low.map(below), high: high.map(above) }
     }
 
     /// This box, `margin` (m) wider on every side.
@@ -283,7 +283,7 @@ mod tests {
         (0..count)
             .map(|_| {
                 let p = point();
-                Bounds::around([p, vec3::add_scaled(p, 0.1, point())], 0.01)
+                Bounds::around([p, vec3::add_scaled(p, 0.1, point())]).widened(0.01)
             })
             .collect()
     }
@@ -330,7 +330,7 @@ mod tests {
         let mut random = SplitMix::new(3);
         for _ in 0..1000 {
             let p = std::array::from_fn::<f64, 3, _>(|_| random.symmetric());
-            let found = Bounds::around([p], 0.0);
+            let found = Bounds::around([p]);
             assert!((0..3).all(|k| f64::from(found.low[k]) <= p[k] && p[k] <= f64::from(found.high[k])));
         }
         assert_eq!(below(1.0), 1.0);

@@ -2,8 +2,7 @@
 //!
 //! A pair of elements (a vertex and a face, two edges) may move as long as a moving plane keeps it apart throughout
 //! ([`separation`]). Triangles begin to intersect only where such a pair meets, so that what is apart at the start stays apart at
-//! every time of the step. What is refused is drawn back, first to the motion that carries everything (skinning), then to none:
-//! rest is always safe, so that the filter ends.
+//! every time of the step. What is refused is drawn back, in the end to no motion: rest is always safe, so that the filter ends.
 //!
 //! Triangles that intersect already would otherwise be held for ever: their elements may pass each other, as long as no other
 //! triangles intersect at the end of the step.
@@ -22,7 +21,7 @@ use box_tree::BoxTree;
 pub(crate) use contact_mesh::{ContactMesh, ElementPair};
 pub(crate) use separation::closest_on_edges;
 
-use crate::query::triangle_pair::mesh_triangles_intersect;
+use crate::query::triangle_pair::{has_area, mesh_triangles_intersect};
 use crate::vec3::{add, add_scaled, sub};
 use rayon::prelude::*;
 use separation::{Corners, stay_apart, triangles_stay_apart};
@@ -88,29 +87,18 @@ impl<'a> StepFilter<'a> {
         self.intersections.retain(|&(f, g)| !is_moved[f as usize] && !is_moved[g as usize]);
         self.intersections.extend(found);
         self.intersections.sort_unstable();
+        self.intersections.dedup();
     }
 
     /// Shortens the step from `from` to `to` until it makes no intersection. Elements stay `margin` apart (m), or half as far as
-    /// they are where that is less; what is refused is drawn back to where it is `carried` first, then to where it was.
-    pub fn step(
-        &mut self,
-        from: &[[f64; 3]],
-        to: &mut [[f64; 3]],
-        carried: Option<&[[f64; 3]]>,
-        margin: f64,
-    ) {
+    /// they are where that is less.
+    pub fn step(&mut self, from: &[[f64; 3]], to: &mut [[f64; 3]], margin: f64) {
         let wanted = to.to_vec();
-        let is_moved: Vec<bool> = match carried {
-            Some(carried) => {
-                let all = self.moved_faces(from, carried);
-                all.iter().zip(self.moved_faces(from, to)).map(|(a, b)| *a || b).collect()
-            }
-            None => self.moved_faces(from, to),
-        };
-        let states: Vec<&[[f64; 3]]> = [from, &wanted].into_iter().chain(carried).collect();
-        self.fit(&states, &is_moved);
+        let is_moved = self.moved_faces(from, to);
+        self.fit(&[from, &wanted], &is_moved);
         let candidates = self.candidates(&|f| is_moved[f as usize], margin);
         let exempt = self.exempt(&is_moved);
+        let flat = self.flat(&candidates, from);
         let mut passing: Vec<ElementPair> = Vec::new();
         let mut drawn = vec![0_u8; to.len()];
         let mut is_asked = vec![true; to.len()];
@@ -124,7 +112,7 @@ impl<'a> StepFilter<'a> {
             passing.extend(free);
             let mut back: Vec<u32> = refused.iter().flat_map(|pair| pair.vertices).collect();
             if back.is_empty() {
-                let made = self.made_by(&passing, to);
+                let made = self.made_by(&passing, &flat, to);
                 back = made
                     .iter()
                     .flat_map(|&(f, g)| [f, g])
@@ -139,8 +127,8 @@ impl<'a> StepFilter<'a> {
             is_asked.fill(false);
             for v in back.into_iter().map(|v| v as usize) {
                 self.work.drawn_back += usize::from(drawn[v] == 0);
-                drawn[v] += 1;
-                to[v] = drawn_back(from[v], wanted[v], carried.map(|carried| carried[v]), drawn[v]);
+                drawn[v] = drawn[v].saturating_add(1);
+                to[v] = drawn_back(from[v], wanted[v], drawn[v]);
                 is_asked[v] = true;
             }
         }
@@ -158,7 +146,7 @@ impl<'a> StepFilter<'a> {
     fn fit(&mut self, states: &[&[[f64; 3]]], is_moved: &[bool]) {
         let bounds = |f: u32| {
             let face = self.mesh.faces[f as usize];
-            Bounds::around(states.iter().flat_map(|state| face.map(|v| state[v as usize])), 0.0)
+            Bounds::around(states.iter().flat_map(|state| face.map(|v| state[v as usize])))
         };
         let is_moved = |f: u32| is_moved[f as usize];
         self.cloth.fit(bounds, is_moved);
@@ -257,9 +245,17 @@ impl<'a> StepFilter<'a> {
         (chunks.into_iter().flat_map(|(refused, _)| refused).collect(), tests)
     }
 
-    /// Triangles around elements that passed each other which intersect at `positions` and did not before.
-    fn made_by(&self, passing: &[ElementPair], positions: &[[f64; 3]]) -> FacePairs {
-        let mut pairs: FacePairs = Vec::new();
+    /// Those of `pairs` with a triangle that has no area at `positions`: it intersects nothing there, but what lies across it does as
+    /// soon as it has some, and no elements meet.
+    fn flat(&self, pairs: &[(u32, u32)], positions: &[[f64; 3]]) -> FacePairs {
+        let is_flat = |f: &[u32; 3]| !has_area(&f.map(|v| positions[v as usize]));
+        let is_flat: Vec<bool> = self.mesh.faces.par_iter().map(is_flat).collect();
+        pairs.iter().copied().filter(|(f, g)| is_flat[*f as usize] || is_flat[*g as usize]).collect()
+    }
+
+    /// Triangles around elements that passed each other, and those of `flat`, which intersect at `positions` and did not before.
+    fn made_by(&self, passing: &[ElementPair], flat: &[(u32, u32)], positions: &[[f64; 3]]) -> FacePairs {
+        let mut pairs: FacePairs = flat.to_vec();
         for pair in passing {
             let [first, second] = self.mesh.faces_of(pair);
             for &f in &first {
@@ -275,15 +271,10 @@ impl<'a> StepFilter<'a> {
     }
 }
 
-/// A motion that was refused `times` times: what it adds to the carried motion is halved until it ends, then that is.
-fn drawn_back(from: [f64; 3], wanted: [f64; 3], carried: Option<[f64; 3]>, times: u8) -> [f64; 3] {
-    let part = |a: [f64; 3], b: [f64; 3], halvings: u8| match halvings > HALVINGS {
-        true => a,
-        false => add_scaled(a, 0.5_f64.powi(i32::from(halvings)), sub(b, a)),
-    };
-    match carried {
-        Some(carried) if times <= HALVINGS + 1 => part(carried, wanted, times),
-        Some(carried) => part(from, carried, times - HALVINGS - 1),
-        None => part(from, wanted, times),
+/// A motion that was refused `times` times: it is halved until it ends.
+fn drawn_back(from: [f64; 3], wanted: [f64; 3], times: u8) -> [f64; 3] {
+    match times > HALVINGS {
+        true => from,
+        false => add_scaled(from, 0.5_f64.powi(i32::from(times)), sub(wanted, from)),
     }
 }

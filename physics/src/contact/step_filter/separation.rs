@@ -54,7 +54,8 @@ pub(crate) fn stay_apart(pair: &ElementPair, x: &Corners, y: &Corners, margin: f
     if distance < TOUCHING {
         return false;
     }
-    let least = margin.min(0.5 * distance);
+    // Steps do not lead to where elements touch.
+    let least = margin.min(0.5 * distance).max((2.0 * TOUCHING).min(0.999 * distance));
     is_separated(pair, scale(gap, 1.0 / distance), x, y, least, HALVINGS)
 }
 

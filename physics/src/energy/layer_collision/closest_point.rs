@@ -86,7 +86,7 @@ impl InnerCloth {
         sink: &mut dyn CurvatureSink,
     ) {
         for contact in self.contacts(closest, outer, settings) {
-            let stiffness = contact.share * contact.penalty[2];
+            let stiffness = outer.share * contact.share * contact.penalty[2];
             let corners = outer.points.corners(contact.outer);
             // Every vertex with its share in how d changes along u.
             let mut parts: [(usize, f64); 6] = [(0, 0.0); 6];

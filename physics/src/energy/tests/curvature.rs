@@ -2,7 +2,7 @@
 //! out.
 
 use super::scenes::{Scene, only, random, scene};
-use crate::energy::{CurvatureSink, EnergySettings, LayerContact, Term};
+use crate::energy::{ContactSamples, CurvatureSink, EnergySettings, LayerContact, Term};
 use crate::mesh::shapes;
 use crate::query::Distance;
 use rand::RngExt;
@@ -98,5 +98,41 @@ fn exact_without_tension_without_folds_and_over_flat_ground() {
             .map(|(h, (p, m))| (h - (p - m) / (2.0 * step)).powi(2))
             .sum();
         assert!(error.sqrt() < 1e-5 * size, "{term}: {} of {size}", error.sqrt());
+    }
+}
+
+#[test]
+fn between_vertices_contact_is_as_stiff_as_its_gradient_says() {
+    let sheet = |size: f64, lift: f64, seed| {
+        let flat = shapes::irregular_grid(size, size, 6, 6, 0.25, seed);
+        // The smaller one over the middle of the larger one: on its border the contact has a kink.
+        shapes::mapped(&flat, |[x, y, z]| [x - 0.5 * size, y - 0.5 * size, z + lift])
+    };
+    let ground = shapes::mapped(&shapes::grid(4.0, 4.0, 2, 2), |[x, y, z]| [x - 2.0, y - 2.0, z - 0.001]);
+    for samples in [ContactSamples::Vertices, ContactSamples::Faces, ContactSamples::FacesAndEdges] {
+        for term in [Term::BodyCollision, Term::LayerCollision] {
+            let settings = EnergySettings {
+                distance: Distance::ClosestPoint,
+                layer_contact: LayerContact::ClosestPoint,
+                body_samples: samples,
+                layer_samples: samples,
+                ..EnergySettings::default()
+            };
+            let rest = vec![sheet(0.3, 0.0, 1), sheet(0.2, 0.001, 2)];
+            let scene = super::scenes::scene_of::<f64>(rest, &ground, settings, only(term), 0.0, 1);
+            // Up and down: sheets that stay level have no other curvature.
+            let x: Vec<[f64; 3]> =
+                directions(scene.posed.len(), 3).into_iter().map(|[_, _, z]| [0.0, 0.0, z]).collect();
+            let step = 1e-6;
+            let slope = |sign: f64| {
+                let moved =
+                    scene.posed.iter().zip(&x).map(|(p, d)| crate::vec3::add_scaled(*p, sign * step, *d));
+                let moved: Vec<[f64; 3]> = moved.collect();
+                scalar(&scene.energy.evaluate(&moved, &scene.canonical).posed_gradient, &x)
+            };
+            let exact = (slope(1.0) - slope(-1.0)) / (2.0 * step);
+            let found = scalar(&x, &product(&scene, &scene.posed, &x));
+            assert!(exact > 0.0 && (found / exact - 1.0).abs() < 0.02, "{term} {samples:?}: {found} {exact}");
+        }
     }
 }

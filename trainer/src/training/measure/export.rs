@@ -6,7 +6,7 @@ use crate::dataset::PreparedScene;
 use crate::system::files::write_json;
 use burn::store::{ModuleSnapshot, SafetensorsStore};
 use clothcombo_data::format::NpzWriter;
-use clothcombo_physics::energy::{SceneEnergy, Term, TermMap};
+use clothcombo_physics::energy::{ContactSamples, SceneEnergy, Term, TermMap};
 use clothcombo_physics::mesh::Topology;
 use clothcombo_physics::operators::{SparseMatrix, surface_gradient};
 use clothcombo_physics::query::Distance;
@@ -165,5 +165,16 @@ fn settings(energy: &SceneEnergy<f32>) -> Value {
         },
         "repulsion_per_vertex": s.repulsion_normalised,
         "repulsion_subset": s.repulsion_subset,
+        "body_samples": between_vertices(s.body_samples),
+        "layer_samples": between_vertices(s.layer_samples),
     })
+}
+
+/// Contact points other than vertices by name; none where those are all.
+fn between_vertices(samples: ContactSamples) -> Option<&'static str> {
+    match samples {
+        ContactSamples::Vertices => None,
+        ContactSamples::Faces => Some("faces"),
+        ContactSamples::FacesAndEdges => Some("faces_and_edges"),
+    }
 }

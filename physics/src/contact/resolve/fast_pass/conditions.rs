@@ -83,7 +83,7 @@ impl FastPass<'_> {
             return Vec::new();
         }
         let mut outermost: Vec<Option<(f64, u32, [f64; 3])>> = vec![None; garment];
-        self.filter.cloth_faces_meeting(&Bounds::around([p, add_scaled(p, REACH, away)], 0.0), |f| {
+        self.filter.cloth_faces_meeting(&Bounds::around([p, add_scaled(p, REACH, away)]), |f| {
             let g = self.outfit.garment_of_face(f);
             if g >= garment {
                 return;

@@ -222,7 +222,7 @@ impl<'a> FastPass<'a> {
         }
         match is_free {
             true => self.filter.step_freely(&self.positions, &to),
-            false => self.filter.step(&self.positions, &mut to, None, FILTER_MARGIN * self.settings.gap),
+            false => self.filter.step(&self.positions, &mut to, FILTER_MARGIN * self.settings.gap),
         }
         let (before, body) = (std::mem::replace(&mut self.positions, to), self.body);
         let moved = self.planes.par_iter_mut().zip(&before).zip(&self.positions).with_min_len(128);
@@ -242,9 +242,7 @@ impl<'a> FastPass<'a> {
         if !is_near(self.outfit.layers, positions) {
             return certified_around(self.body.surface, &now);
         }
-        let mut found = counted(self, &now);
-        found.count_narrow(self.body);
-        found
+        counted(self, &now)
     }
 
     /// Pairs that are left of garments with the body and with each other, but for pinched ones.

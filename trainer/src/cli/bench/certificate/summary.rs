@@ -52,10 +52,7 @@ fn clear_within(results: &[OutfitResult], seconds: f64) -> f64 {
 
 /// The whole time of an outfit, for the body and for certificates too (ms).
 fn time_of(result: &OutfitResult) -> f64 {
-    result.fast_milliseconds
-        + result.body_milliseconds
-        + result.milliseconds.iter().sum::<f64>()
-        + result.certificate_milliseconds
+    result.body_milliseconds + result.milliseconds.iter().sum::<f64>() + result.certificate_milliseconds
 }
 
 /// That time shared out to the garments by vertices (ms).
