@@ -24,9 +24,6 @@ const MOST_SIDES: usize = 16;
 /// Cosine of the angle (1°) below which two directions are one.
 const SAME_DIRECTION: f64 = 0.99985;
 
-/// Radius of a thin limb (m): what is seen of it is extrapolated along a plane.
-const LIMB_RADIUS: f64 = 0.03;
-
 /// A distance this much less (m) is as large.
 const ROUNDING: f64 = 1e-9;
 
@@ -81,14 +78,14 @@ impl NearFaces {
     }
 
     /// The linear functions that the distance was seen to follow near `p`, just seen: value at `p` (m) and gradient, its own first, then
-    /// those that are at most `band` (m) larger there, least first, as far as the surface may be taken for a plane. It is the least of them where it is concave; those of a ridge, where
+    /// those that are at most `band` (m) larger there, least first. It is the least of them where it is concave; those of a ridge, where
     /// it is not, are less at `p` than it is and none of them.
     pub fn sides(&self, p: [f64; 3], band: f64) -> Vec<(f64, [f64; 3])> {
         let Some(here) = self.seen.iter().find(|side| side.at == p) else { return Vec::new() };
-        // Farther on a limb has bent away by more than the band.
-        let reach = (2.0 * LIMB_RADIUS * band).sqrt();
-        let near = self.seen.iter().filter(|side| norm(sub(p, side.at)) <= reach);
-        let extended = near.map(|side| (side.distance + dot(side.gradient, sub(p, side.at)), side));
+        // However far away it was seen, also where it is known to have bent away since: without those of the last steps the forces at
+        // creases of limbs do not balance, and the search goes on to the same energy.
+        let extended =
+            self.seen.iter().map(|side| (side.distance + dot(side.gradient, sub(p, side.at)), side));
         let mut others: Vec<_> = extended
             .filter(|(distance, side)| {
                 !is_same_way(side.gradient, here.gradient) && *distance >= here.distance - ROUNDING
