@@ -1,4 +1,4 @@
-//! Where contact is felt: at the vertices of a garment, and between them.
+//! Where contact is evaluated: at the vertices of a garment, and between them.
 
 use super::{CurvatureSink, Weighted};
 use crate::mesh::{Topology, TriMesh};

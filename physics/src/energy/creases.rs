@@ -40,9 +40,9 @@ struct Crease<'a> {
 }
 
 impl<T: Real> SceneEnergy<T> {
-    /// The creases near which points at `posed` lie, of which `memory` has just seen the energy; of sides that are at most `band` (m)
-    /// farther away than the nearest.
-    pub(crate) fn creases(&self, posed: &[[T; 3]], memory: &BodyMemory, band: f64) -> Creases<'_> {
+    /// The creases near which points at `posed` lie, of which `memory` has just seen the energy; of sides `within` a band (m)
+    /// beyond the nearest, and seen no farther than a reach (m) away.
+    pub(crate) fn creases(&self, posed: &[[T; 3]], memory: &BodyMemory, within: [f64; 2]) -> Creases<'_> {
         let mut creases = Vec::new();
         let (epsilon, samples) = (self.settings.body_collision_epsilon, self.settings.body_samples);
         for ((garment, range), near) in self.garments.iter().zip(self.ranges()).zip(memory) {
@@ -52,7 +52,7 @@ impl<T: Real> SceneEnergy<T> {
                 continue;
             }
             for (point, (p, near)) in points.at(&posed[range], samples).iter().zip(near).enumerate() {
-                let sides = near.sides(to_f64(*p), band);
+                let sides = near.sides(to_f64(*p), within);
                 let excess = sides.first().map_or(0.0, |(distance, _)| epsilon - distance);
                 if sides.len() > 1 && excess > 0.0 {
                     let force = 3.0 * weight * excess * excess;

@@ -26,7 +26,7 @@ pub(super) fn contact_mesh(energy: &SceneEnergy<f64>) -> ContactMesh {
 
 impl<'a> FilteredSteps<'a> {
     pub fn new(mesh: &'a ContactMesh, problem: &Problem<'a>, start: &[[f64; 3]], margin: f64) -> Self {
-        let body = problem.body();
+        let body = &problem.energy().body.positions;
         Self { filter: StepFilter::new(mesh, &[start, body].concat()), body, margin }
     }
 

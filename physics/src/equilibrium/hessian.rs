@@ -62,7 +62,7 @@ impl Hessian {
         }
         let mut smooth = gradient.to_vec();
         let mut blocks = Blocks { hessian: self, fit: true };
-        problem.creases(posed, crease_reach(width)).smooth(width, &mut smooth, &mut blocks);
+        problem.creases(posed, [crease_reach(width), f64::INFINITY]).smooth(width, &mut smooth, &mut blocks);
         self.diagonal = (0..self.matrix.rows()).map(|row| self.matrix.row(row).1[0]).collect();
         smooth
     }

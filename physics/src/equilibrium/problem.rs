@@ -41,11 +41,6 @@ impl<'a> Problem<'a> {
         self.energy
     }
 
-    /// Vertices of the body (m).
-    pub(super) fn body(&self) -> &'a [[f64; 3]] {
-        &self.energy.body.positions
-    }
-
     /// Weighted sum of all energies at `posed` `[ΣV, 3]` (m).
     ///
     /// # Panics
@@ -108,7 +103,7 @@ impl<'a> Problem<'a> {
     /// Norm of the `gradient` at `posed`, just evaluated, that is left where the forces of all known sides of creases are combined.
     pub(super) fn residual(&self, posed: &[[f64; 3]], gradient: &[[f64; 3]]) -> f64 {
         let mut left = gradient.to_vec();
-        self.creases(posed, ON_CREASE).balance(&mut left);
+        self.creases(posed, [ON_CREASE, SEEN_HERE]).balance(&mut left);
         norm(&left)
     }
 
@@ -122,9 +117,10 @@ impl<'a> Problem<'a> {
         self.energy.look_around(posed, &mut self.memory(), ON_CREASE);
     }
 
-    /// Where contact with the body at `posed`, just evaluated, is known to have sides at most `band` (m) farther away than the nearest.
-    pub(super) fn creases(&self, posed: &[[f64; 3]], band: f64) -> Creases<'_> {
-        self.energy.creases(posed, &self.memory(), band)
+    /// Where contact with the body at `posed`, just evaluated, is known to have sides `within` a band (m) beyond the
+    /// nearest, seen no farther than a reach (m) away.
+    pub(super) fn creases(&self, posed: &[[f64; 3]], within: [f64; 2]) -> Creases<'_> {
+        self.energy.creases(posed, &self.memory(), within)
     }
 
     /// Passes a positive semidefinite approximation of the Hessian with respect to posed positions to `sink`.
@@ -144,6 +140,10 @@ impl<'a> Problem<'a> {
 
 /// Distances that differ by less (m) are equal: the point is on a crease.
 pub(super) const ON_CREASE: f64 = 1e-5;
+
+/// No farther than this (m) from where it was seen a side is taken to be where its tangent plane is: over this length a limb of 3 cm
+/// radius bends away by [`ON_CREASE`].
+const SEEN_HERE: f64 = 8e-4;
 
 /// `|g|/scale`, 0 for no force at all.
 pub(super) fn relative(gradient_norm: f64, scale: f64) -> f64 {

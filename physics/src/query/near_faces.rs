@@ -78,14 +78,12 @@ impl NearFaces {
     }
 
     /// The linear functions that the distance was seen to follow near `p`, just seen: value at `p` (m) and gradient, its own first, then
-    /// those that are at most `band` (m) larger there, least first. It is the least of them where it is concave; those of a ridge, where
+    /// those that are at most `band` (m) larger there, least first, and were seen no farther than `reach` (m) away. It is the least of them where it is concave; those of a ridge, where
     /// it is not, are less at `p` than it is and none of them.
-    pub fn sides(&self, p: [f64; 3], band: f64) -> Vec<(f64, [f64; 3])> {
+    pub fn sides(&self, p: [f64; 3], [band, reach]: [f64; 2]) -> Vec<(f64, [f64; 3])> {
         let Some(here) = self.seen.iter().find(|side| side.at == p) else { return Vec::new() };
-        // However far away it was seen, also where it is known to have bent away since: without those of the last steps the forces at
-        // creases of limbs do not balance, and the search goes on to the same energy.
-        let extended =
-            self.seen.iter().map(|side| (side.distance + dot(side.gradient, sub(p, side.at)), side));
+        let near = self.seen.iter().filter(|side| norm(sub(p, side.at)) <= reach);
+        let extended = near.map(|side| (side.distance + dot(side.gradient, sub(p, side.at)), side));
         let mut others: Vec<_> = extended
             .filter(|(distance, side)| {
                 !is_same_way(side.gradient, here.gradient) && *distance >= here.distance - ROUNDING
@@ -189,7 +187,7 @@ mod tests {
             points.iter().for_each(|p| {
                 surface.gap_near(*p, Distance::ClosestPoint, 0.05, &mut near);
             });
-            near.sides(p, band)
+            near.sides(p, [band, f64::INFINITY])
         };
         let across = [[-3e-4, 0.0052, 0.003], p];
         let valley = bent(1.0);

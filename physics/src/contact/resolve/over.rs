@@ -4,6 +4,8 @@
 //! then asks for the wrong way. The direction away from the body is the same for all layers over a place, so that every vertex
 //! looks along it: of all sheets of the inner garment there, the outermost counts.
 
+use std::ops::RangeInclusive;
+
 use rayon::prelude::*;
 
 use super::contact::{Contact, along_line, is_tiny, normal_of, overlap};
@@ -14,7 +16,7 @@ use crate::vec3::{add, add_scaled, dot, neg, norm, normalized, scale, sub};
 
 /// A sheet whose own direction away from the body differs more than this from the vertex's (cosine) lies over another part of
 /// the body: a sleeve is not over the side of the chest.
-pub(super) const SAME_PART: f64 = 0.5;
+const SAME_PART: f64 = 0.5;
 /// A sheet steeper than this (cosine between its normal and the direction away from the body) is left along that direction
 /// instead of its normal.
 pub(super) const STEEP: f64 = 0.5;
@@ -81,27 +83,52 @@ fn look(
     let low = std::array::from_fn(|k| from[k].min(to[k]));
     let high = std::array::from_fn(|k| from[k].max(to[k]));
     let first = outfit.faces_of_garment(inner).start;
-    let mut found: Option<(f64, u32, [f64; 3])> = None;
+    let mut outermost = OutermostSheet { from: p, away, heights: -watch..=reach, found: None };
     for f in tree.faces_in_box(low, high) {
-        let face = outfit.faces[(first + f) as usize];
+        outermost.offer(first + f, outfit.faces[(first + f) as usize], positions, outward);
+    }
+    outermost.over(vertex, outfit, positions)
+}
+
+/// Of the sheets of one garment that a vertex sees along its direction away from the body, the outermost.
+pub(super) struct OutermostSheet {
+    /// The vertex (m).
+    pub from: [f64; 3],
+    /// Its direction away from the body.
+    pub away: [f64; 3],
+    /// How far along that direction a sheet may be (m).
+    pub heights: RangeInclusive<f64>,
+    /// Height (m), number and place of the outermost face so far.
+    pub found: Option<(f64, u32, [f64; 3])>,
+}
+
+impl OutermostSheet {
+    /// Looks at face number `f`, unless it lies over another part of the body.
+    pub fn offer(&mut self, f: u32, face: [u32; 3], positions: &[[f64; 3]], outward: &[[f64; 3]]) {
         let sheet = face.iter().fold([0.0; 3], |sum, &v| add(sum, outward[v as usize]));
-        if dot(sheet, away) < SAME_PART * norm(sheet) {
-            continue;
+        if dot(sheet, self.away) < SAME_PART * norm(sheet) {
+            return;
         }
-        let Some((above, at)) = along_line(p, away, &face.map(|v| positions[v as usize])) else { continue };
-        let is_farther = found.is_none_or(|(most, known, _)| above > most || (above == most && f < known));
-        if (-watch..=reach).contains(&above) && is_farther {
-            found = Some((above, f, at));
+        let corners = face.map(|v| positions[v as usize]);
+        let Some((above, at)) = along_line(self.from, self.away, &corners) else { return };
+        let is_farther =
+            self.found.is_none_or(|(most, known, _)| above > most || (above == most && f < known));
+        if self.heights.contains(&above) && is_farther {
+            self.found = Some((above, f, at));
         }
     }
-    let (above, f, barycentric) = found?;
-    let face = outfit.faces[(first + f) as usize];
-    let normal = sheet_normal(&face.map(|v| positions[v as usize]), away);
-    Some(Over { vertex, face, barycentric, normal, height: -above * dot(normal, away) })
+
+    /// What `vertex` has to stay over.
+    pub fn over(self, vertex: u32, outfit: &Outfit<'_>, positions: &[[f64; 3]]) -> Option<Over> {
+        let (above, f, barycentric) = self.found?;
+        let face = outfit.faces[f as usize];
+        let normal = sheet_normal(&face.map(|v| positions[v as usize]), self.away);
+        Some(Over { vertex, face, barycentric, normal, height: -above * dot(normal, self.away) })
+    }
 }
 
 /// Along which direction what lies over a sheet leaves it: its normal on the side of `away`, or that where the sheet is steep.
-pub(super) fn sheet_normal(sheet: &Triangle, away: [f64; 3]) -> [f64; 3] {
+fn sheet_normal(sheet: &Triangle, away: [f64; 3]) -> [f64; 3] {
     let normal = normal_of(sheet);
     match dot(normal, away) {
         slope if slope > STEEP => normal,
@@ -161,6 +188,23 @@ pub(super) fn part_along(
     for corner in overlap(&upper, &lower, normal).iter().filter(|c| c.height < gap) {
         let target = gap.min(corner.height + longest_step);
         found.push(Contact::face_points((first, corner.at_upper), (second, corner.at_lower), normal, target));
+    }
+}
+
+/// The part of a face that lies over triangle `ground` of the body has to come `gap` out of it, at most `longest_step` at once.
+pub(super) fn part_from_body(
+    face: [u32; 3],
+    positions: &[[f64; 3]],
+    ground: &Triangle,
+    (gap, longest_step): (f64, f64),
+    found: &mut Vec<Contact>,
+) {
+    let (upper, normal) = (face.map(|v| positions[v as usize]), normal_of(ground));
+    // Of the ground under a corner, as a height along the normal.
+    let level = dot(normal, ground[0]);
+    for corner in overlap(&upper, ground, normal).iter().filter(|corner| corner.height < gap) {
+        let target = level + gap.min(corner.height + longest_step);
+        found.push(Contact::face_point(face, corner.at_upper, normal, target));
     }
 }
 

@@ -98,7 +98,7 @@ impl<'a> StepFilter<'a> {
         self.fit(&[from, &wanted], &is_moved);
         let candidates = self.candidates(&|f| is_moved[f as usize], margin);
         let exempt = self.exempt(&is_moved);
-        let flat = self.flat(&candidates, from);
+        let flat = self.flat(&candidates, from, &is_moved);
         let mut passing: Vec<ElementPair> = Vec::new();
         let mut drawn = vec![0_u8; to.len()];
         let mut is_asked = vec![true; to.len()];
@@ -245,11 +245,13 @@ impl<'a> StepFilter<'a> {
         (chunks.into_iter().flat_map(|(refused, _)| refused).collect(), tests)
     }
 
-    /// Those of `pairs` with a triangle that has no area at `positions`: it intersects nothing there, but what lies across it does as
-    /// soon as it has some, and no elements meet.
-    fn flat(&self, pairs: &[(u32, u32)], positions: &[[f64; 3]]) -> FacePairs {
-        let is_flat = |f: &[u32; 3]| !has_area(&f.map(|v| positions[v as usize]));
-        let is_flat: Vec<bool> = self.mesh.faces.par_iter().map(is_flat).collect();
+    /// Those of `pairs` with a triangle that moves and has no area at `positions`: it intersects nothing there, but what lies across
+    /// it does as soon as it has some, and no elements meet.
+    fn flat(&self, pairs: &[(u32, u32)], positions: &[[f64; 3]], is_moved: &[bool]) -> FacePairs {
+        let is_flat = |(face, is_moved): (&[u32; 3], &bool)| {
+            *is_moved && !has_area(&face.map(|v| positions[v as usize]))
+        };
+        let is_flat: Vec<bool> = self.mesh.faces.par_iter().zip(is_moved).map(is_flat).collect();
         pairs.iter().copied().filter(|(f, g)| is_flat[*f as usize] || is_flat[*g as usize]).collect()
     }
 

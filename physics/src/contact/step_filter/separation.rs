@@ -42,9 +42,11 @@ pub(crate) fn closest_on_edges([p, q]: [[f64; 3]; 2], [r, s]: [[f64; 3]; 2]) -> 
 const HALVINGS: u32 = 3;
 /// Elements nearer than this (m) have no direction from one to the other that rounding leaves right: they may only move as one.
 const TOUCHING: f64 = 1e-9;
+/// A step leads no nearer than this (m), however little room there is: some times what rounding to f32 moves a vertex of a person.
+const NEAREST: f64 = 1e-6;
 
 /// Whether the elements of `pair` stay apart on the way from `x` to `y`: by `margin`, or half the distance they have at the start
-/// where that is less.
+/// where that is less, but not less than [`NEAREST`].
 pub(crate) fn stay_apart(pair: &ElementPair, x: &Corners, y: &Corners, margin: f64) -> bool {
     if x == y || is_along_axis(pair.first(), x, y, margin) {
         return true;
@@ -54,8 +56,7 @@ pub(crate) fn stay_apart(pair: &ElementPair, x: &Corners, y: &Corners, margin: f
     if distance < TOUCHING {
         return false;
     }
-    // Steps do not lead to where elements touch.
-    let least = margin.min(0.5 * distance).max((2.0 * TOUCHING).min(0.999 * distance));
+    let least = margin.min(0.5 * distance).max(NEAREST.min(0.999 * distance));
     is_separated(pair, scale(gap, 1.0 / distance), x, y, least, HALVINGS)
 }
 

@@ -75,8 +75,8 @@ pub struct Arguments {
     /// networks' drape as it is [default: model.correction_steps of the model]
     #[arg(long, value_name = "STEPS")]
     corrections: Option<usize>,
-    /// Steps of the static solver from the networks' state, at most 2 cm each and 5 cm together; `auto`: until a step gains less than
-    /// 1 % of what all did, for at most two seconds
+    /// Steps of the static solver from the networks' state, at most 2 cm each, until a vertex is 5 cm from there; `auto`: until a step
+    /// gains less than 1 % of what all did, for at most two seconds
     #[arg(long, default_value = "0", value_name = "STEPS|auto")]
     refine: RefineSteps,
     /// Leaves out the post-process; the certificate still counts everything

@@ -165,16 +165,7 @@ fn settings(energy: &SceneEnergy<f32>) -> Value {
         },
         "repulsion_per_vertex": s.repulsion_normalised,
         "repulsion_subset": s.repulsion_subset,
-        "body_samples": between_vertices(s.body_samples),
-        "layer_samples": between_vertices(s.layer_samples),
+        "body_samples_between_vertices": s.body_samples != ContactSamples::Vertices,
+        "layer_samples_between_vertices": s.layer_samples != ContactSamples::Vertices,
     })
-}
-
-/// Contact points other than vertices by name; none where those are all.
-fn between_vertices(samples: ContactSamples) -> Option<&'static str> {
-    match samples {
-        ContactSamples::Vertices => None,
-        ContactSamples::Faces => Some("faces"),
-        ContactSamples::FacesAndEdges => Some("faces_and_edges"),
-    }
 }

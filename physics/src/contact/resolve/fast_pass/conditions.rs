@@ -1,10 +1,10 @@
 //! Where an outfit is wrong, and what has to hold there.
 
 use super::FastPass;
-use crate::contact::resolve::contact::{Contact, Plane, along_line, is_tiny, normal_of, overlap};
-use crate::contact::resolve::over::{Order, Over, SAME_PART, STEEP, order, part_along, sheet_normal};
+use crate::contact::resolve::contact::{Contact, Plane, along_line, is_tiny, normal_of};
+use crate::contact::resolve::over::{Order, OutermostSheet, Over, STEEP, order, part_along, part_from_body};
 use crate::contact::step_filter::{Bounds, ElementPair, closest_on_edges};
-use crate::vec3::{add, add_scaled, cross, dot, norm, normalized, scale, sub};
+use crate::vec3::{add, add_scaled, cross, dot, normalized, scale, sub};
 use rayon::prelude::*;
 
 /// What is nearer than this is kept apart (m).
@@ -82,29 +82,14 @@ impl FastPass<'_> {
         if away == [0.0; 3] || garment == 0 {
             return Vec::new();
         }
-        let mut outermost: Vec<Option<(f64, u32, [f64; 3])>> = vec![None; garment];
+        let outermost = |_| OutermostSheet { from: p, away, heights: 0.0..=REACH, found: None };
+        let mut outermost: Vec<OutermostSheet> = (0..garment).map(outermost).collect();
         self.filter.cloth_faces_meeting(&Bounds::around([p, add_scaled(p, REACH, away)]), |f| {
-            let g = self.outfit.garment_of_face(f);
-            if g >= garment {
-                return;
-            }
-            let sheet = self.direction(f);
-            if dot(sheet, away) < SAME_PART * norm(sheet) {
-                return;
-            }
-            let Some((above, at)) = along_line(p, away, &self.corners(f)) else { return };
-            let is_farther =
-                outermost[g].is_none_or(|(most, known, _)| above > most || above == most && f < known);
-            if (0.0..=REACH).contains(&above) && is_farther {
-                outermost[g] = Some((above, f, at));
+            if let Some(outermost) = outermost.get_mut(self.outfit.garment_of_face(f)) {
+                outermost.offer(f, self.outfit.faces[f as usize], &self.positions, &self.outward);
             }
         });
-        let over = |(above, f, barycentric): (f64, u32, [f64; 3])| {
-            let normal = sheet_normal(&self.corners(f), away);
-            let face = self.outfit.faces[f as usize];
-            Over { vertex: v, face, barycentric, normal, height: -above * dot(normal, away) }
-        };
-        outermost.into_iter().flatten().map(over).collect()
+        outermost.into_iter().filter_map(|sheet| sheet.over(v, self.outfit, &self.positions)).collect()
     }
 
     /// The direction away from the body of a face of a garment, not normalised.
@@ -153,22 +138,10 @@ impl FastPass<'_> {
 
     /// The part of a face that lies over a face of the body has to come out of it.
     fn part_from_body(&self, f: u32, g: u32, found: &mut Vec<Contact>) {
-        let (face, upper, lower) = (self.outfit.faces[f as usize], self.corners(f), self.corners(g));
-        if is_tiny(&lower) {
-            return;
-        }
-        let (normal, gap) = (normal_of(&lower), 0.5 * self.settings.gap);
-        if self.is_other_side(f, normal) {
-            return;
-        }
-        let ground = dot(normal, lower[0]);
-        for corner in overlap(&upper, &lower, normal).iter().filter(|corner| corner.height < gap) {
-            found.push(Contact::face_point(
-                face,
-                corner.at_upper,
-                normal,
-                ground + gap.min(corner.height + REACH),
-            ));
+        let ground = self.corners(g);
+        if !is_tiny(&ground) && !self.is_other_side(f, normal_of(&ground)) {
+            let face = self.outfit.faces[f as usize];
+            part_from_body(face, &self.positions, &ground, (0.5 * self.settings.gap, REACH), found);
         }
     }
 

@@ -22,11 +22,11 @@ fn scene(random: &mut SplitMix, layers: usize, bulge: f64) -> (Surface<f64>, Vec
     (Surface::from_mesh(&trunk), tubes)
 }
 
-fn passed(body: &Surface<f64>, worn: &[TriMesh]) -> Option<Resolved> {
-    let garments: Vec<RestGarment> = worn.iter().map(RestGarment::new).collect();
+fn passed(body: &Surface<f64>, meshes: &[TriMesh]) -> Option<Resolved> {
+    let garments: Vec<RestGarment> = meshes.iter().map(RestGarment::new).collect();
     let layers: Vec<Layer<'_>> = garments
         .iter()
-        .zip(worn)
+        .zip(meshes)
         .map(|(garment, mesh)| Layer { garment, positions: mesh.positions() })
         .collect();
     let found = fast_pass(body, &layers, &ResolveSettings::default()).unwrap();

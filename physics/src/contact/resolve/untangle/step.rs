@@ -1,8 +1,8 @@
 //! One round: what crossings and wrong sides ask for, and the relaxation that meets it.
 
-use super::super::contact::{Contact, is_tiny, normal_of, overlap};
+use super::super::contact::{Contact, is_tiny, normal_of};
 use super::super::folds::folds;
-use super::super::over::{Order, order, part_along};
+use super::super::over::{Order, order, part_along, part_from_body};
 use super::super::relax::{LastPasses, no_farther, relax};
 use super::Untangling;
 use crate::vec3::{add, add_scaled, dot, norm, scale, sub};
@@ -92,7 +92,6 @@ impl Untangling<'_> {
     /// The part of a face over a face of the body has to come out of it.
     fn part_from_body(&self, f: u32, other: u32, gap: f64, found: &mut Vec<Contact>) {
         let face = self.outfit.faces[f as usize];
-        let upper = face.map(|v| self.positions[v as usize]);
         let Some(lower) = self.body.tree.triangle(other).filter(|t| !is_tiny(t)) else { return };
         let normal = normal_of(&lower);
         // A face on the other side of the limb asks for the way through it.
@@ -103,12 +102,7 @@ impl Untangling<'_> {
         if dot(normal, away) < 0.0 && dot(normal, seen) <= 0.0 {
             return;
         }
-        // The ground under the corner, as a height along the normal.
-        let ground = dot(normal, lower[0]);
-        for corner in overlap(&upper, &lower, normal).iter().filter(|c| c.height < 0.5 * gap) {
-            let target = ground + (0.5 * gap).min(corner.height + LONGEST_STEP);
-            found.push(Contact::face_point(face, corner.at_upper, normal, target));
-        }
+        part_from_body(face, &self.positions, &lower, (0.5 * gap, LONGEST_STEP), found);
     }
 
     /// Conditions that part crossings of garments with themselves, and crumpled vertices, which are smoothed.
