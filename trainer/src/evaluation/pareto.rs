@@ -155,7 +155,8 @@ impl Comparison {
         let families = [
             ("LBS", "LBS"),
             ("network, uncorrected +", "refinement of the uncorrected network"),
-            ("network", "network, post-process, refinement"),
+            ("network + post-process", "network + post-process"),
+            ("network", "network, corrections, refinement"),
             ("solver", "solver from LBS + shape transfer"),
         ];
         let family_of = |name: &str| families.iter().position(|(prefix, _)| name.starts_with(prefix));
@@ -233,7 +234,7 @@ fn solved(
         for steps in REFINEMENT {
             let clock = Instant::now();
             let (positions, _) =
-                refine(&reference.energy, &drape, RefineSteps::AtMost(steps)).into_diagnostic()?;
+                refine(&reference.energy, &drape, RefineSteps::AtMost(steps), false).into_diagnostic()?;
             let milliseconds = milliseconds + 1e3 * clock.elapsed().as_secs_f64();
             let method = format!("{name} + {}", counted_steps(steps));
             states.push(State { method, milliseconds, positions });

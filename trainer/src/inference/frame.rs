@@ -47,7 +47,8 @@ impl Draper {
             steps => {
                 let mut energy = ReferenceScene::new(&self.trained.config.losses, &scene)?.energy;
                 energy.body = surface.clone();
-                let (positions, done) = refine(&energy.pulled_back(&transforms), &network, steps)?;
+                let (positions, done) =
+                    refine(&energy.pulled_back(&transforms), &network, steps, !self.settings.resolve)?;
                 (positions, Some(done))
             }
         };
