@@ -43,7 +43,7 @@ fn main() -> ExitCode {
     clothcombo_trainer::system::allocator::keep_freed_memory();
     clothcombo_trainer::system::device::prefer_processor();
     clothcombo_trainer::system::closed_pipe::end_quietly();
-    let arguments = Arguments::parse();
+    let arguments: Arguments = cli::parse().unwrap_or_else(|error| error.exit());
     arguments.verbosity.apply("info");
     cli::exit_code(match &arguments.verb {
         Verb::Bench(bench) => cli::bench::run(bench),

@@ -203,6 +203,14 @@ fn check_specific(specific: &[NamedModel], dataset: &Dataset) -> Result<(), Repo
     let knows = |name: &str| (0..dataset.garments.len()).any(|g| dataset.garments.info(g).name == name);
     for other in specific {
         let names = other.model.names(&other.model.garments());
+        if names.len() != 1 {
+            return Err(miette!(
+                help = "train it on one garment: data.garments = [{{ folder = \"…\", only = [\"NAME\"] }}]",
+                "{}: a garment-specific model is trained on one garment, not on {}",
+                other.name,
+                names.len()
+            ));
+        }
         if let Some(stranger) = names.iter().find(|name| !knows(name)) {
             return Err(miette!(
                 help = "train the garment-specific model on a garment of the configuration's own data",

@@ -31,7 +31,24 @@ mod verbosity;
 pub use verbosity::Verbosity;
 
 use crate::system::closed_pipe::print_stderr;
+use clap::{Command, Parser};
 use miette::Report;
+
+/// The arguments of a program. A negative number is a value of any flag, so that the flag says what it takes.
+///
+/// # Errors
+/// Those of clap, also for help and version.
+pub fn parse<A: Parser>() -> Result<A, clap::Error> {
+    fn with_negative_numbers(command: Command) -> Command {
+        let takes_values = |argument: &clap::Arg| argument.get_action().takes_values();
+        command
+            .mut_args(|a| if takes_values(&a) { a.allow_negative_numbers(true) } else { a })
+            .mut_subcommands(with_negative_numbers)
+    }
+    let mut command = with_negative_numbers(A::command());
+    let matches = command.try_get_matches_from_mut(std::env::args_os())?;
+    A::from_arg_matches(&matches).map_err(|error| error.format(&mut command))
+}
 
 /// Exit code of a program that ended with `result`; an error is printed once, with its place and hint.
 pub fn exit_code(result: Result<(), Report>) -> std::process::ExitCode {

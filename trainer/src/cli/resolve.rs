@@ -14,7 +14,7 @@ use clap::Parser;
 use clothcombo_data::format::obj::MovedObj;
 use clothcombo_data::format::{MeshFormat, load_mesh};
 use clothcombo_physics::contact::resolve::{
-    Certificate, Layer, ResolveSettings, Resolved, RestGarment, certify, resolve,
+    Certificate, Layer, ResolveError, ResolveSettings, Resolved, RestGarment, certify, resolve,
 };
 use clothcombo_physics::mesh::TriMesh;
 use clothcombo_physics::query::Surface;
@@ -123,9 +123,17 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         .zip(&garments)
         .map(|(garment, read)| Layer { garment, positions: read.draped.positions() })
         .collect();
+    let named = |error: ResolveError| {
+        let path = error.garment().map(|garment| garments[garment].path.display().to_string());
+        let report = Report::from_err(error);
+        match path {
+            Some(path) => report.wrap_err(path),
+            None => report,
+        }
+    };
     let certificate_before =
-        spinner("counting intersections", || certify(&surface, &layers)).into_diagnostic()?;
-    let resolved = spinner("resolving", || resolve(&surface, &layers, &settings)).into_diagnostic()?;
+        spinner("counting intersections", || certify(&surface, &layers)).map_err(named)?;
+    let resolved = spinner("resolving", || resolve(&surface, &layers, &settings)).map_err(named)?;
     let scored = |positions: &dyn Fn(usize) -> Vec<[f64; 3]>| -> Result<Score, Report> {
         let all: Vec<Vec<[f64; 3]>> = (0..garments.len()).map(positions).collect();
         let draped: Vec<DrapedGarment> = garments

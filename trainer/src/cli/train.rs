@@ -116,7 +116,7 @@ pub fn main() -> ExitCode {
         Ok(group) => Rc::new(group),
         Err(error) => return exit_code(Err(error.into())),
     };
-    let arguments = match Arguments::try_parse() {
+    let arguments = match super::parse::<Arguments>() {
         Ok(arguments) => arguments,
         Err(message) => {
             if group.is_rank_zero() {

@@ -1,7 +1,7 @@
 //! Reading a configuration: file, then `--set` overrides, then consistency; errors show the place.
 
 use super::Config;
-use super::renamed::with_new_name;
+use super::reworded::reworded;
 use super::sources::{Place, Sources};
 use miette::{Diagnostic, NamedSource, SourceSpan};
 use serde::Deserialize;
@@ -107,7 +107,7 @@ pub fn parse(text: &str, path: &Path, overrides: &[String]) -> Result<Config, Co
         for setting in overrides {
             let bad = |message: String| ConfigError::BadOverride { setting: shortened(setting), message };
             apply(&mut tree, setting).map_err(bad)?;
-            config = tree.clone().try_into().map_err(|e: toml::de::Error| bad(with_new_name(e.message())))?;
+            config = tree.clone().try_into().map_err(|e: toml::de::Error| bad(reworded(e.message())))?;
         }
         let base = config.base.take();
         // What is typed is relative to where it is typed.

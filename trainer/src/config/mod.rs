@@ -11,7 +11,7 @@ mod optimizer;
 mod output;
 mod paths;
 mod ramp;
-mod renamed;
+mod reworded;
 mod schema;
 mod sources;
 mod stages;

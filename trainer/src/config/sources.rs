@@ -1,7 +1,7 @@
 //! The texts that a configuration is made of, its own and those it extends, as one tree in which every value knows its place.
 
 use super::load::ConfigError;
-use super::renamed::with_new_name;
+use super::reworded::reworded;
 use miette::{NamedSource, SourceSpan};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -87,7 +87,7 @@ impl Sources {
     /// What is wrong with a text, with its place.
     pub fn invalid(&self, error: &toml::de::Error) -> ConfigError {
         let Place { source_code, span } = self.place(error.span());
-        ConfigError::Invalid { message: with_new_name(error.message()), source_code, span }
+        ConfigError::Invalid { message: reworded(error.message()), source_code, span }
     }
 
     /// Where the value `key` (for example `stages[0].layers`) stands, or the innermost section of it that is there; the

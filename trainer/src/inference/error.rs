@@ -185,6 +185,17 @@ pub enum DraperError {
         /// Where it is (m).
         position: [f64; 3],
     },
+    /// A garment that was not fitted has a face twice.
+    #[error("post-process: garment '{garment}', face {face} (from 0) has the vertices of face {first}")]
+    #[diagnostic(help("leave --fit never out, so that the mesh is repaired, or remove the face"))]
+    DoubledFace {
+        /// The garment.
+        garment: String,
+        /// The face.
+        face: u32,
+        /// The earlier one.
+        first: u32,
+    },
     /// The post-process refused its input.
     #[error("post-process: {0}")]
     Resolve(ResolveError),

@@ -103,10 +103,13 @@ impl Outfit {
 
     /// `error` with the garment's name where the post-process knows only its number.
     pub(super) fn named(&self, error: DraperError) -> DraperError {
+        let name = |garment: usize| self.garments.get(garment).map_or_else(String::new, |g| g.name.clone());
         match error {
             DraperError::Resolve(ResolveError::Position { garment, vertex, position }) => {
-                let garment = self.garments.get(garment).map_or_else(String::new, |piece| piece.name.clone());
-                DraperError::Far { garment, vertex, position }
+                DraperError::Far { garment: name(garment), vertex, position }
+            }
+            DraperError::Resolve(ResolveError::DoubledFace { garment, face, first }) => {
+                DraperError::DoubledFace { garment: name(garment), face, first }
             }
             other => other,
         }

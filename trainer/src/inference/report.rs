@@ -78,6 +78,9 @@ pub struct FrameReport {
     pub seconds: f64,
     /// Wall time.
     pub milliseconds: PhaseTimes,
+    /// What the refinement did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub refinement: Option<Refinement>,
     /// What is left.
     pub certificate: Certificate,
 }
@@ -152,14 +155,15 @@ impl Report {
         let (certificate_before, (before, after)) = rayon::join(
             || first.certificate_before(draper, outfit),
             || {
-                let score = |stage| first.score(draper, outfit, stage);
-                rayon::join(|| score(Stage::BeforeResolve), || score(Stage::Result))
+                let score = |which| first.score(draper, outfit, which);
+                rayon::join(|| score(ScoredPositions::BeforeResolve), || score(ScoredPositions::Result))
             },
         );
         let frames = drapes.iter().zip(moments).map(|(drape, moment)| FrameReport {
             frame: moment.frame,
             seconds: moment.seconds,
             milliseconds: drape.milliseconds,
+            refinement: drape.refinement.clone(),
             certificate: drape.certificate.clone(),
         });
         let trained = draper.trained();
@@ -186,9 +190,9 @@ impl Report {
     }
 }
 
-/// Which state of a drape is meant.
+/// Which positions of a drape are scored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stage {
+pub enum ScoredPositions {
     /// What came to the post-process.
     BeforeResolve,
     /// The result.
@@ -200,7 +204,7 @@ impl Drape {
     ///
     /// # Errors
     /// When a value overflows.
-    pub fn score(&self, draper: &Draper, outfit: &Outfit, stage: Stage) -> Result<Score, DraperError> {
+    pub fn score(&self, draper: &Draper, outfit: &Outfit, which: ScoredPositions) -> Result<Score, DraperError> {
         let refused = |e: &dyn std::fmt::Display| DatasetError::Data(e.to_string());
         let body = TriMesh::new(self.body.clone(), draper.body().faces.to_vec()).map_err(|e| refused(&e))?;
         let garments: Vec<DrapedGarment> = outfit
@@ -210,9 +214,9 @@ impl Drape {
             .map(|(garment, drape)| DrapedGarment {
                 name: &garment.name,
                 rest: &garment.prepared.garment.rest,
-                positions: match stage {
-                    Stage::BeforeResolve => &drape.before,
-                    Stage::Result => &drape.positions,
+                positions: match which {
+                    ScoredPositions::BeforeResolve => &drape.before,
+                    ScoredPositions::Result => &drape.positions,
                 },
                 canonical: None,
             })

@@ -30,6 +30,20 @@ pub enum ResolveError {
         found: usize,
     },
 
+    /// A face lies on another one: both sides of the sheet would be kept off each other.
+    #[error(
+        "garment {garment}: face {face} has the vertices of face {first}; hint: remove one of them, or let `clothcombo fit` \
+         repair the mesh (indices count from 0)"
+    )]
+    DoubledFace {
+        /// The garment.
+        garment: usize,
+        /// The face.
+        face: u32,
+        /// The earlier one of the same vertices.
+        first: u32,
+    },
+
     /// Skinning transforms of other garments.
     #[error(
         "the garments have {expected} vertices, but there are {found} skinning transforms; hint: give one for each vertex, garment after garment"
@@ -60,4 +74,16 @@ pub enum ResolveError {
         "the body has no triangle within a kilometre of the origin; hint: check its mesh, which is in metres"
     )]
     EmptyBody,
+}
+
+impl ResolveError {
+    /// The garment it is about.
+    pub fn garment(&self) -> Option<usize> {
+        match *self {
+            Self::Count { garment, .. } | Self::DoubledFace { garment, .. } | Self::Position { garment, .. } => {
+                Some(garment)
+            }
+            Self::Setting { .. } | Self::Transforms { .. } | Self::EmptyBody => None,
+        }
+    }
 }

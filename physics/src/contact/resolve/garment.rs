@@ -7,6 +7,7 @@ use crate::mesh::{Topology, TriMesh};
 use crate::query::Surface;
 use crate::rows::{CompressedRows, faces_at_vertices};
 use crate::vec3::{self, norm, sub};
+use std::collections::HashMap;
 
 /// Positions farther from the origin than this are refused (m): the exact predicates would hold, but no distance would.
 const FARTHEST: f64 = 1e3;
@@ -22,6 +23,8 @@ pub struct RestGarment {
     pub(super) edges_of_faces: Vec<[u32; 3]>,
     pub(super) layer: LayerTopology,
     faces_at: CompressedRows<u32>,
+    /// The first face with the vertices of an earlier one, and that one.
+    doubled: Option<[u32; 2]>,
     strain: Strain,
 }
 
@@ -42,7 +45,8 @@ impl RestGarment {
         let edge_lengths = topology.edges.iter().map(|&[a, b]| norm(sub(at(a), at(b)))).collect();
         let faces_at = faces_at_vertices(rest.vertex_count(), &faces, 0..faces.len() as u32);
         let strain = Strain::new(rest, &Material::default(), EnergySettings::default().needle_ratio);
-        Self { faces, topology, edge_lengths, edges_of_faces, layer, faces_at, strain }
+        let doubled = doubled_face(&faces);
+        Self { faces, topology, edge_lengths, edges_of_faces, layer, faces_at, doubled, strain }
     }
 
     /// Number of vertices.
@@ -67,6 +71,16 @@ impl RestGarment {
     pub fn strain_energy(&self, positions: &[[f64; 3]]) -> f64 {
         self.strain.evaluate(positions, None)
     }
+}
+
+/// The first face with the vertices of an earlier one, and that one.
+fn doubled_face(faces: &[[u32; 3]]) -> Option<[u32; 2]> {
+    let mut seen = HashMap::with_capacity(faces.len());
+    faces.iter().zip(0..).find_map(|(face, number)| {
+        let mut corners = *face;
+        corners.sort_unstable();
+        Some([number, seen.insert(corners, number)?])
+    })
 }
 
 /// One garment of an outfit.
@@ -99,6 +113,9 @@ pub(super) fn check(body: &Surface<f64>, layers: &[Layer<'_>]) -> Result<(), Res
         let (expected, found) = (layer.garment.vertex_count(), layer.positions.len());
         if expected != found {
             return Err(ResolveError::Count { garment, expected, found });
+        }
+        if let Some([face, first]) = layer.garment.doubled {
+            return Err(ResolveError::DoubledFace { garment, face, first });
         }
         if let Some(vertex) = layer.positions.iter().position(|p| !is_near(p)) {
             return Err(ResolveError::Position { garment, vertex, position: layer.positions[vertex] });

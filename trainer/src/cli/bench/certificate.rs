@@ -45,7 +45,7 @@ pub struct Arguments {
     #[arg(long, default_value_t = 6, value_parser = clap::value_parser!(u8).range(1..=12))]
     layers: u8,
     /// These garments in every order instead of random ones: outfit i has order i mod n! on the body of outfit i / n!
-    #[arg(long, value_delimiter = ',', value_name = "NAME,NAME,…")]
+    #[arg(long, value_delimiter = ',', value_name = "NAME,NAME,…", conflicts_with = "layers")]
     orders: Vec<String>,
     /// Only these outfits, by number from 0
     #[arg(long, value_delimiter = ',')]

@@ -56,7 +56,7 @@ pub struct Arguments {
     #[arg(long, value_delimiter = ',', default_values_t = [1])]
     bodies: Vec<usize>,
     /// Also times a step on this many outfits (accumulate), which are computed in parallel
-    #[arg(long, value_name = "OUTFITS", default_value_t = 1)]
+    #[arg(long, value_name = "OUTFITS", default_value_t = 1, value_parser = at_least_one)]
     accumulate: usize,
     /// Training steps that are profiled
     #[arg(long, default_value_t = 10, value_parser = at_least_one)]

@@ -80,7 +80,7 @@ pub struct Arguments {
     #[arg(long, default_value = "0", value_name = "STEPS|auto")]
     refine: RefineSteps,
     /// Leaves out the post-process; the certificate still counts everything
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["gap_mm", "time_limit"])]
     no_resolve: bool,
     #[command(flatten)]
     post_process: PostProcessArguments,

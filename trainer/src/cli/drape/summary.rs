@@ -52,7 +52,7 @@ fn times(report: &Report) -> String {
     table(&garments.chain([row(&all, &report.milliseconds)]).collect::<Vec<_>>())
 }
 
-/// Scores, and what the layers were before, are those of a motion's first frame.
+/// Scores, the refinement and what the layers were before are those of a motion's first frame.
 fn of_first_frame(report: &Report, what: &str) -> String {
     if report.frames.len() > 1 { format!("{what}, first frame") } else { what.to_owned() }
 }
@@ -129,7 +129,8 @@ fn certificate(report: &Report) -> String {
     }
     if let Some(done) = &report.refinement {
         text += &format!(
-            "\nrefined: {} steps ({}), energy {} to {} J, largest move {:.1} mm",
+            "\n{}: {} steps ({}), energy {} to {} J, largest move {:.1} mm",
+            of_first_frame(report, "refined"),
             done.steps,
             done.stop,
             number(done.energy_before),

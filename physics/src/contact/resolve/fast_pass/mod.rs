@@ -7,6 +7,7 @@
 //! when rounds no longer help: the rest is for the next stage.
 
 mod conditions;
+mod known;
 #[cfg(test)]
 mod tests;
 
@@ -16,9 +17,8 @@ use super::attempt::FEW_OF_ITSELF;
 use super::body::with_drawn;
 use super::certificate::Certificate;
 use super::contact::{Contact, Plane};
-use super::count::{certified_around, counted, is_near};
 use super::folds::folds;
-use super::garment::{at, check};
+use super::garment::check;
 use super::obstacle::BodyObstacle;
 use super::outfit::Outfit;
 use super::over::outward;
@@ -26,7 +26,6 @@ use super::relax::{LastPasses, no_farther, relax};
 use super::resolved::Stage;
 use super::{GarmentWork, Layer, ResolveError, ResolveSettings, Resolved};
 use crate::contact::step_filter::{ContactMesh, FacePairs, StepFilter};
-use crate::contact::{ReportBody, Triangle, TriangleTree};
 use crate::query::Surface;
 use crate::vec3::{add, add_scaled, scale, sub};
 use rayon::prelude::*;
@@ -236,15 +235,6 @@ impl<'a> FastPass<'a> {
         (0..self.outfit.len()).map(|g| self.outfit.part(&self.positions, g).to_vec()).collect()
     }
 
-    /// The certificate of the garments, which are at `positions` now: what is known is not looked for again.
-    fn certificate(&self, positions: &[Vec<[f64; 3]>]) -> Certificate {
-        let now = at(self.outfit.layers, positions);
-        if !is_near(self.outfit.layers, positions) {
-            return certified_around(self.body.surface, &now);
-        }
-        counted(self, &now)
-    }
-
     /// Pairs that are left of garments with the body and with each other, but for pinched ones.
     fn between(&self) -> usize {
         self.parted().count()
@@ -326,50 +316,5 @@ impl<'a> FastPass<'a> {
 
     fn corners(&self, f: u32) -> [[f64; 3]; 3] {
         self.filter.mesh.faces[f as usize].map(|v| self.positions[v as usize])
-    }
-}
-
-/// All intersections are known exactly, and where every vertex lies.
-impl ReportBody for FastPass<'_> {
-    fn tree(&self) -> &TriangleTree<'_> {
-        &self.body.tree
-    }
-
-    fn distance(&self, p: [f64; 3]) -> Option<(f64, [f64; 3])> {
-        self.body.distance(p)
-    }
-
-    fn distances(&self, garment: usize, _: &[[f64; 3]]) -> Vec<Option<(f64, [f64; 3])>> {
-        let vertices = self.outfit.vertices(garment);
-        let planes = &self.planes[vertices.start as usize..vertices.end as usize];
-        planes.iter().map(|plane| plane.as_ref().map(Plane::seen)).collect()
-    }
-
-    fn known_pairs(&self, garment: usize, with: Option<usize>) -> Option<Vec<(u32, u32)>> {
-        let of = |f: u32| (!self.filter.mesh.is_body(f)).then(|| self.outfit.garment_of_face(f));
-        let first = |g: usize| self.outfit.faces_of_garment(g).start;
-        // The inner garment comes first in the pairs of the filter, the body last.
-        let is_own = with == Some(garment);
-        let local = |&(f, g): &(u32, u32)| match with {
-            None => (of(f) == Some(garment))
-                .then_some(())
-                .and_then(|()| Some((f - first(garment), self.body_face(g)?))),
-            Some(inner) if of(f) == Some(inner) && of(g) == Some(garment) => {
-                let (f, g) = (f - first(inner), g - first(garment));
-                Some(if is_own { (f, g) } else { (g, f) })
-            }
-            Some(_) => None,
-        };
-        let mut pairs: Vec<(u32, u32)> = self.filter.intersections.iter().filter_map(local).collect();
-        pairs.sort_unstable();
-        Some(pairs)
-    }
-
-    fn is_pinched(&self, face: u32) -> bool {
-        self.body.is_pinched(face)
-    }
-
-    fn is_pinched_at(&self, triangle: &Triangle) -> bool {
-        self.body.is_pinch_at(triangle)
     }
 }
