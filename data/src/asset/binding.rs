@@ -166,7 +166,8 @@ fn nearest_body_vertices(garment: &Garment, body: &Body, own_leg: bool) -> Vec<u
         .collect()
 }
 
-/// `iterations` times: every row moves half of the distance to the mean of its one-ring. Rows only mix along edges of the garment.
+/// `iterations` times: every row moves half of the distance to the mean of its one-ring. Rows only mix along edges of
+/// the garment.
 fn smooth(values: &mut Vec<f32>, columns: usize, topology: &Topology, iterations: usize) {
     let mut next = values.clone();
     for _ in 0..iterations {

@@ -195,8 +195,9 @@ impl Body {
         &self.file_pelvis
     }
 
-    /// Where the pelvis of shape `beta` stands in the coordinates that the body was given in (m): for SMPL some 0.22 m and for
-    /// SMPL-X some 0.35 m below the origin. A short `beta` is continued with zeros. A file that [`Body::save`] wrote still knows it.
+    /// Where the pelvis of shape `beta` stands in the coordinates that the body was given in (m): for SMPL some 0.22 m
+    /// and for SMPL-X some 0.35 m below the origin. A short `beta` is continued with zeros. A file that [`Body::save`]
+    /// wrote still knows it.
     pub fn file_pelvis(&self, beta: &[f64]) -> [f64; 3] {
         let FilePelvis { template, shape_directions, .. } = &self.file_pelvis;
         let k = self.shape_count;

@@ -1,9 +1,9 @@
 //! Bodies in SMPL-family npz files.
 //!
 //! Read: `v_template`, `f`, `shapedirs`, `weights`, `kintree_table`, and either `J_template` with `J_shapedirs` or
-//! `J_regressor`; optionally `posedirs` and `joint_names`. A rigged body without `shapedirs` has one shape. Written: the same keys with `J_template` and `J_shapedirs`, plus
-//! `source`, `author` and `licence`, and `pelvis_template` with `pelvis_shapedirs`: where the pelvis was in the file the body came
-//! from, if that was not the origin.
+//! `J_regressor`; optionally `posedirs` and `joint_names`. A rigged body without `shapedirs` has one shape. Written:
+//! the same keys with `J_template` and `J_shapedirs`, plus `source`, `author` and `licence`, and `pelvis_template` with
+//! `pelvis_shapedirs`: where the pelvis was in the file the body came from, if that was not the origin.
 
 use super::body::{Body, BodyParts, FilePelvis};
 use super::provenance::Provenance;
@@ -42,8 +42,8 @@ pub(crate) fn shape_part(joints: usize, components: usize, ours: bool) -> usize 
 }
 
 impl Body {
-    /// Reads a body from an SMPL-family npz. The body is moved so that its pelvis stands at the origin (see [`Body`]). Where it is
-    /// closed and inside out, its faces are turned, and a warning says so.
+    /// Reads a body from an SMPL-family npz. The body is moved so that its pelvis stands at the origin (see [`Body`]).
+    /// Where it is closed and inside out, its faces are turned, and a warning says so.
     ///
     /// # Errors
     /// [`FileError`] naming file and key.

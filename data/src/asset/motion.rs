@@ -18,7 +18,8 @@ use std::path::Path;
 /// leave the range of their types.
 pub const FRAME_RATES: RangeInclusive<f64> = 0.01..=10_000.0;
 
-/// Largest component of a rotation vector in a motion (rad): over a thousand turns, where f32 still tells a thousandth of a radian.
+/// Largest component of a rotation vector in a motion (rad): over a thousand turns, where f32 still tells a thousandth
+/// of a radian.
 pub const MAX_ANGLE: f64 = 1e4;
 
 /// Refuses a frame rate (frames/s) out of [`FRAME_RATES`].

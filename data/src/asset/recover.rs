@@ -1,9 +1,10 @@
 //! Shape and pose of a body from a posed mesh of its vertices and the same body in T-pose.
 //!
-//! The shape is the linear least-squares solution on the T-pose, or on the posed mesh in turns with the pose where there is none. The bones are found by block coordinate descent on the
-//! distance to linear blend skinning: one bone after the other gets the rotation and translation that fit best what the others leave
-//! of its vertices. The rotation of a covariance is taken by the iteration of Müller, Bender, Chentanez and Macklin, "A robust
-//! method to extract the rotational part of deformations" (MIG 2016).
+//! The shape is the linear least-squares solution on the T-pose, or on the posed mesh in turns with the pose where
+//! there is none. The bones are found by block coordinate descent on the distance to linear blend skinning: one bone
+//! after the other gets the rotation and translation that fit best what the others leave of its vertices. The rotation
+//! of a covariance is taken by the iteration of Müller, Bender, Chentanez and Macklin, "A robust method to extract the
+//! rotational part of deformations" (MIG 2016).
 
 use super::body::{Body, BodyError, transform};
 use super::pose::Pose;

@@ -30,8 +30,8 @@ pub struct ShapeMatch {
     pub mean_distance: f64,
 }
 
-/// The shape of `body`, with numbers in `range`, that looks most like the surface `positions` `[V, 3]` (m) with `faces`: a body in
-/// T-pose, its pelvis at the origin.
+/// The shape of `body`, with numbers in `range`, that looks most like the surface `positions` `[V, 3]` (m) with
+/// `faces`: a body in T-pose, its pelvis at the origin.
 pub fn match_shape(
     body: &Body,
     range: [f64; 2],

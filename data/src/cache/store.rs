@@ -120,7 +120,8 @@ impl ArrayCache {
         for shelf in fs::read_dir(root).map_err(failed)? {
             let shelf = shelf.map_err(failed)?.path();
             let Ok(files) = fs::read_dir(&shelf) else { continue };
-            // Files of earlier forms of the cache are never read again. One that another process removes meanwhile counts nothing.
+            // Files of earlier forms of the cache are never read again. One that another process removes meanwhile
+            // counts nothing.
             let records = files.flatten().filter(|f| f.path().extension().is_some_and(|e| e == EXTENSION));
             used += records.filter_map(|f| f.metadata().ok()).map(|m| m.len()).sum::<u64>();
         }

@@ -1,10 +1,10 @@
 //! Turns that no joint makes: the mark of a broken import, not of an athlete.
 //!
-//! Recorded people leave the clinical ranges of single angles all the time, by tens of degrees. What tells a wrong mapping or other
-//! axes is coarser: knees and elbows that bend backwards or sideways, and joints that turn through nearly half a circle. Every
-//! rotation is split into swing, by which the bone leaves its direction at rest, and twist about the bone. In 9,000 frames of
-//! gymnastics, boxing and dance the bend of knees and elbows stays within 54° of its plane, and no joint comes within 15° of a
-//! bound of [`RANGES`].
+//! Recorded people leave the clinical ranges of single angles all the time, by tens of degrees. What tells a wrong
+//! mapping or other axes is coarser: knees and elbows that bend backwards or sideways, and joints that turn through
+//! nearly half a circle. Every rotation is split into swing, by which the bone leaves its direction at rest, and twist
+//! about the bone. In 9,000 frames of gymnastics, boxing and dance the bend of knees and elbows stays within 54° of its
+//! plane, and no joint comes within 15° of a bound of [`RANGES`].
 
 use crate::asset::rotation::{apply, matrix_from_axis_angle, quaternion_from_axis_angle};
 use crate::asset::{BODY_JOINT_COUNT, BODY_JOINT_NAMES, Pose};

@@ -1,8 +1,8 @@
 //! What speaks for a placement: a log-posterior.
 //!
-//! It sums how likely the gaps between cloth and body are for clothes that are worn ([`likelihood`](super::likelihood)), how usual
-//! such a file is ([`Placement::log_prior`]), how its upper rim lies, and whether limbs pass through openings instead of cloth
-//! ([`anatomy`](super::anatomy)).
+//! It sums how likely the gaps between cloth and body are for clothes that are worn
+//! ([`likelihood`](super::likelihood)), how usual such a file is ([`Placement::log_prior`]), how its upper rim lies,
+//! and whether limbs pass through openings instead of cloth ([`anatomy`](super::anatomy)).
 
 use super::anatomy::{Opening, Skeleton};
 use super::body_field::{ArmTurn, BodyField};

@@ -43,9 +43,9 @@ impl PlacementCheck {
         contradiction(category, limbs)
     }
 
-    /// Whether `mesh`, taken as it stands (metres, y up, pelvis at the origin, arms level), is worn on the zero body and fits nowhere
-    /// clearly better, by the same judgement by which [`fit`](super::fit) takes a placement; and every piece of it has its faces
-    /// outwards. `body` is the one that was measured.
+    /// Whether `mesh`, taken as it stands (metres, y up, pelvis at the origin, arms level), is worn on the zero body
+    /// and fits nowhere clearly better, by the same judgement by which [`fit`](super::fit) takes a placement; and every
+    /// piece of it has its faces outwards. `body` is the one that was measured.
     pub fn is_on_body(&self, mesh: &TriMesh, body: &Body) -> bool {
         if mesh.face_count() < MIN_TRIANGLES {
             return false;

@@ -178,7 +178,8 @@ impl Placement {
         let origin = match (settings.offset, self.origin) {
             (Some(_), _) | (_, Origin::Pelvis) => 0.0,
             (_, Origin::Floor) => -0.5,
-            // A place known to a centimetre or two in each direction, of a metre: three free numbers fit a little better anywhere.
+            // A place known to a centimetre or two in each direction, of a metre: three free numbers fit a little
+            // better anywhere.
             _ => -12.0,
         };
         unit + up + turn + arms + origin

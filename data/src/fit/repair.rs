@@ -1,5 +1,5 @@
-//! Repairs that need no body: from the polygons of a file to triangles of manifold pieces that agree on a direction, of one sheet,
-//! with their seams joined.
+//! Repairs that need no body: from the polygons of a file to triangles of manifold pieces that agree on a direction, of
+//! one sheet, with their seams joined.
 
 use super::error::FitError;
 use super::report::{Elements, MeshPiece, RepairKind, SeamReport};

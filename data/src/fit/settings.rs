@@ -35,8 +35,9 @@ pub struct FitSettings {
     pub keep: Keep,
     /// Largest distance between borders that are joined (m); otherwise only borders that coincide are.
     pub join_seams: Option<f64>,
-    /// The body that the garment was made on: it is placed through that one, and nothing is searched for. Unit, up axis and turn then
-    /// say how garment *and* body mesh are written, or how the garment's coordinates differ from a body npz's.
+    /// The body that the garment was made on: it is placed through that one, and nothing is searched for. Unit, up axis
+    /// and turn then say how garment *and* body mesh are written, or how the garment's coordinates differ from a body
+    /// npz's.
     pub from_body: Option<Arc<SourceBody>>,
 }
 

@@ -37,8 +37,8 @@ const FORMATS: [(&[&str], &str, &str, &str); 8] = [
     (&["asf", "amc"], "an Acclaim skeleton", "another file", "BVH (amc2bvh, or Blender)"),
 ];
 
-/// Why a file of a known format that is not read is refused, and the way out; `None` for formats that nobody knows, or that are read.
-/// Of pickles, too: they are programs, and never run.
+/// Why a file of a known format that is not read is refused, and the way out; `None` for formats that nobody knows, or
+/// that are read. Of pickles, too: they are programs, and never run.
 pub fn way_out(path: &Path) -> Option<String> {
     if ["pkl", "pickle", "pt", "pth"].into_iter().any(|extension| has_extension(path, extension)) {
         return Some(format!(

@@ -203,8 +203,8 @@ pub fn save_polygons<'a>(
     atomic::write(path, text.as_bytes()).map_err(FileError::io(path))
 }
 
-/// As [`save`], with faces that came of a file's faces, and the texture coordinates that belong to that file's vertices, if it has
-/// any. `polygons` are the file's, corners 0-based.
+/// As [`save`], with faces that came of a file's faces, and the texture coordinates that belong to that file's
+/// vertices, if it has any. `polygons` are the file's, corners 0-based.
 ///
 /// # Errors
 /// If the file cannot be written.

@@ -1,7 +1,7 @@
 //! Motion capture in BVH form, retargeted to the 22 SMPL body joints.
 //!
-//! Joints are found by their names and their place in the tree ([`rig`]), or by a file ([`JointFile`]); see [`super::retarget`] for
-//! how they are matched.
+//! Joints are found by their names and their place in the tree ([`rig`]), or by a file ([`JointFile`]); see
+//! [`super::retarget`] for how they are matched.
 
 mod hierarchy;
 mod joint_file;
@@ -46,8 +46,8 @@ pub fn retarget(bvh: &Bvh, map: JointMap, joints: &[[f64; 3]]) -> Vec<Pose> {
         .collect()
 }
 
-/// Turns to y up of the rest skeleton and of the world. A skeleton that rests along z has z up (Blender writes such files); its world
-/// has z up as well, unless its root stands it up along y.
+/// Turns to y up of the rest skeleton and of the world. A skeleton that rests along z has z up (Blender writes such
+/// files); its world has z up as well, unless its root stands it up along y.
 fn turns_to_y_up(bvh: &Bvh, map: &JointMap, rest: &[[f64; 3]]) -> (Matrix3, Matrix3) {
     let (Some(pelvis), Some(top)) = (map[0], map[15].or(map[12])) else { return (IDENTITY, IDENTITY) };
     let up: [f64; 3] = std::array::from_fn(|a| rest[top][a] - rest[pelvis][a]);
@@ -95,8 +95,8 @@ fn first_frame_is_inserted(poses: &[Pose]) -> bool {
     jump > INSERTED_FRAME_ANGLE && jump > 10.0 * steps[steps.len() / 2]
 }
 
-/// Imports BVH files as motion npz files in the folder `out`, retargeted to `body`. The file `joints` names the joints of rigs whose
-/// names are not known. Files that cannot be used are skipped with their reason.
+/// Imports BVH files as motion npz files in the folder `out`, retargeted to `body`. The file `joints` names the joints
+/// of rigs whose names are not known. Files that cannot be used are skipped with their reason.
 ///
 /// # Errors
 /// If `joints` cannot be used, no file can, or a result cannot be written.

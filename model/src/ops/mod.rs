@@ -1,10 +1,11 @@
 //! Operations the networks are made of, fused where burn's own are slow.
 //!
-//! Each file holds one operation: what it computes, composed of the operations of any backend, as kernels of a GPU (`gpu`), and
-//! in one pass over host memory (vectorised for the CPU found at run time, parallel over fixed row chunks, hence bit-identical for any number of
-//! threads), and its hand-written backward pass. `modulated_siren` and `diffusion_mlp` are several layers at once and run in host
-//! memory only. Below them lie `operation` (how a backend runs and records one), `host` (loops over rows), `row_blocks`
-//! (several layers in one such loop), `composed`, `math`, `gemm` and `tile`, which know no operation.
+//! Each file holds one operation: what it computes, composed of the operations of any backend, as kernels of a GPU
+//! (`gpu`), and in one pass over host memory (vectorised for the CPU found at run time, parallel over fixed row chunks,
+//! hence bit-identical for any number of threads), and its hand-written backward pass. `modulated_siren` and
+//! `diffusion_mlp` are several layers at once and run in host memory only. Below them lie `operation` (how a backend
+//! runs and records one), `host` (loops over rows), `row_blocks` (several layers in one such loop), `composed`, `math`,
+//! `gemm` and `tile`, which know no operation.
 
 // Without a backend in host memory nothing runs the host kernels.
 #![cfg_attr(not(any(feature = "flex", feature = "ndarray")), allow(dead_code, unused_imports))]

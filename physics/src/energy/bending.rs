@@ -9,11 +9,12 @@
 //! lowers it. The gradient there is that of one side.
 //!
 //! **Degenerate triangles** have no normal, and near them the angle turns arbitrarily fast: in a compressed fold, where
-//! triangles collapse, a step of a micrometre turned a hinge over, forces of hundreds of newtons stood against each other, and
-//! no descent settled. Each hinge is therefore scaled by `φ(s²/τ²)` for both of its triangles, `φ(t) = t²(6 − 8t + 3t²)` below 1
-//! and 1 above, `s` being twice the deformed area and τ a twentieth of its rest value (at least 1e-3 squared median edges).
-//! Both ends of φ are flat: the angle jumps where the area vanishes. A triangle that keeps a twentieth of its area, and is not a speck beside
-//! the others of its mesh, has the printed energy, one without area none, and the gradient is bounded and the exact derivative everywhere.
+//! triangles collapse, a step of a micrometre turned a hinge over, forces of hundreds of newtons stood against each
+//! other, and no descent settled. Each hinge is therefore scaled by `φ(s²/τ²)` for both of its triangles, `φ(t) = t²(6
+//! − 8t + 3t²)` below 1 and 1 above, `s` being twice the deformed area and τ a twentieth of its rest value (at least
+//! 1e-3 squared median edges). Both ends of φ are flat: the angle jumps where the area vanishes. A triangle that keeps
+//! a twentieth of its area, and is not a speck beside the others of its mesh, has the printed energy, one without area
+//! none, and the gradient is bounded and the exact derivative everywhere.
 
 use super::curvature::outer;
 use super::elements::{Response, sum_elements};

@@ -1,9 +1,10 @@
 //! Body collision: a cubic penalty on points of a garment closer to the body than a margin (paper, equation for L_c).
 //!
-//! `V/P Σ max(ε − d, 0)³` over the `P` contact points of a garment of `V` vertices ([`ContactSamples`](super::ContactSamples); the
-//! paper's are the vertices), `d` being the signed distance to the body ([`crate::query::Distance`] says which one). The body is
-//! fixed; where the nearest vertex changes, `d` jumps a little, and the gradient is that of the vertex in use. A body vertex without a
-//! normal (no face, or faces that cancel) has no side and takes no part.
+//! `V/P Σ max(ε − d, 0)³` over the `P` contact points of a garment of `V` vertices
+//! ([`ContactSamples`](super::ContactSamples); the paper's are the vertices), `d` being the signed distance to the body
+//! ([`crate::query::Distance`] says which one). The body is fixed; where the nearest vertex changes, `d` jumps a
+//! little, and the gradient is that of the vertex in use. A body vertex without a normal (no face, or faces that
+//! cancel) has no side and takes no part.
 
 use super::curvature::outer;
 use super::{ContactPoints, CurvatureSink, GarmentState, GarmentTerm, Weighted};

@@ -5,8 +5,8 @@ use crate::mesh::{Topology, TriMesh};
 use crate::real::Real;
 use crate::vec3::{add, scale};
 
-/// Which points of a garment the collisions are summed over. The sum is divided by how many there are for each vertex, so that its
-/// weight means the same.
+/// Which points of a garment the collisions are summed over. The sum is divided by how many there are for each vertex,
+/// so that its weight means the same.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum ContactSamples {
     /// Vertices: the paper's form. What is between them can intersect unnoticed.

@@ -1,17 +1,19 @@
 //! Where contact with the body is not smooth.
 //!
-//! Between a torso and an arm the distance is the least of the distances `d_k` to both, and has a crease where they are equal. The
-//! energy is convex across it: cloth that is pressed into a crease comes to rest on it, where the gradient knows one side only and does
-//! not vanish. The minimum is where *some* convex combination of the forces of all sides balances the rest (Clarke's subdifferential).
-//! So it is on a face that is buried in another part of the body, with the inside on both of its sides.
+//! Between a torso and an arm the distance is the least of the distances `d_k` to both, and has a crease where they are
+//! equal. The energy is convex across it: cloth that is pressed into a crease comes to rest on it, where the gradient
+//! knows one side only and does not vanish. The minimum is where *some* convex combination of the forces of all sides
+//! balances the rest (Clarke's subdifferential). So it is on a face that is buried in another part of the body, with
+//! the inside on both of its sides.
 //!
-//! The sides are those that the point has been on (`NearFaces`): what a step has run against, the next one knows. They are the cutting
-//! planes of bundle methods (Lemaréchal, "Bundle methods in nonsmooth optimization", 1978), for every point apart.
+//! The sides are those that the point has been on (`NearFaces`): what a step has run against, the next one knows. They
+//! are the cutting planes of bundle methods (Lemaréchal, "Bundle methods in nonsmooth optimization", 1978), for every
+//! point apart.
 //!
 //! [`Creases::smooth`] gives a solver the model of the smooth minimum `−w log Σ exp(−d_k/w)` of width `w`: the derivative
-//! `n = Σ λ_k n_k` with weights `λ_k ~ exp(−d_k/w)`, and the curvature `−(Σ λ_k n_k n_kᵀ − n nᵀ)/w`, which the penalty turns positive. A
-//! step then goes along the crease and not across. [`Creases::balance`] takes the convex combinations that leave least: what counts as
-//! convergence. The energy itself stays as it is.
+//! `n = Σ λ_k n_k` with weights `λ_k ~ exp(−d_k/w)`, and the curvature `−(Σ λ_k n_k n_kᵀ − n nᵀ)/w`, which the penalty
+//! turns positive. A step then goes along the crease and not across. [`Creases::balance`] takes the convex combinations
+//! that leave least: what counts as convergence. The energy itself stays as it is.
 
 use super::curvature::{CurvatureSink, Scaled, outer};
 use super::scene_sum::BodyMemory;
@@ -105,7 +107,8 @@ impl Creases<'_> {
         }
     }
 
-    /// Replaces the forces of the nearest sides in `gradient` by the convex combinations of those of all sides that make it least.
+    /// Replaces the forces of the nearest sides in `gradient` by the convex combinations of those of all sides that
+    /// make it least.
     pub fn balance(&self, gradient: &mut [[f64; 3]]) {
         let first = |crease: &Crease<'_>| {
             let mut weights = vec![0.0; crease.sides.len()];

@@ -9,8 +9,8 @@
 pub trait CurvatureSink {
     /// Adds `block` at row `i`, column `j` of vertices, and, for `i ≠ j`, its transpose at row `j`, column `i`.
     ///
-    /// Off the diagonal, the vertex pairs a term adds to should not depend on positions, but for contact between garments: the solver
-    /// orders its matrix anew whenever a pair is new.
+    /// Off the diagonal, the vertex pairs a term adds to should not depend on positions, but for contact between
+    /// garments: the solver orders its matrix anew whenever a pair is new.
     fn add(&mut self, i: usize, j: usize, block: [[f64; 3]; 3]);
 }
 

@@ -5,13 +5,13 @@
 //! smallest error estimate is taken; the estimate includes the rounding of the value and never looks at the gradient that
 //! is being tested.
 //!
-//! **Nonsmooth points.** Nearest vertices, the repulsion's radius and the gates change in jumps, and the angle of a hinge is
-//! not smooth at π: there is no derivative there. A line is excused from the central check only if the jump is *shown*: the gradient, or
-//! the part of the value that the gradient does not explain (the residual of the trapezoid rule), must differ between the
-//! two ends of the line and fail to shrink with its length. Of a differentiable function both shrink at least linearly,
-//! even if the gradient is wrong. On such a line both sides are checked instead, each with quotients that stay on it. At
-//! the point itself no derivative exists; what the term returns there is the gradient of one of its sides, and bounded by
-//! [`super::gradient_bound`] like any other.
+//! **Nonsmooth points.** Nearest vertices, the repulsion's radius and the gates change in jumps, and the angle of a
+//! hinge is not smooth at π: there is no derivative there. A line is excused from the central check only if the jump is
+//! *shown*: the gradient, or the part of the value that the gradient does not explain (the residual of the trapezoid
+//! rule), must differ between the two ends of the line and fail to shrink with its length. Of a differentiable function
+//! both shrink at least linearly, even if the gradient is wrong. On such a line both sides are checked instead, each
+//! with quotients that stay on it. At the point itself no derivative exists; what the term returns there is the
+//! gradient of one of its sides, and bounded by [`super::gradient_bound`] like any other.
 
 use crate::vec3;
 

@@ -30,9 +30,9 @@ use crate::vec3::{distance_squared, norm, sub, to_f64};
 /// Room for rounding in `f32`.
 const ROUNDING: f64 = 1.001;
 
-/// A bound on every entry of the gradient of `term` (weight 1) in `scene`, whose garments have the rest shapes `rest`, at
-/// `posed` and `canonical` (`[ΣV, 3]` (m)); see the module for the formulas. Infinite where there is none, NaN if a position is not
-/// finite.
+/// A bound on every entry of the gradient of `term` (weight 1) in `scene`, whose garments have the rest shapes `rest`,
+/// at `posed` and `canonical` (`[ΣV, 3]` (m)); see the module for the formulas. Infinite where there is none, NaN if a
+/// position is not finite.
 ///
 /// # Panics
 /// If `rest` has not one mesh per garment, or the positions are not those of the scene.

@@ -15,9 +15,10 @@
 //! the positions (only the pair loop of the repulsion and the distances to vertices work in the caller's scalar), and sums are
 //! `f64` and run in a fixed order: results are bit-identical for any number of threads.
 //!
-//! A ninth term is one new file, its name in [`Term`], its weight in the configuration, a bound of its gradient for the suite of
-//! degenerate cases, and one line where [`GarmentEnergies`] (or, for a pair of garments, [`SceneEnergy`]) lists what it evaluates. A term that
-//! reads distances to the body is also named in `scene_sum.rs`. The finite-difference test walks the list.
+//! A ninth term is one new file, its name in [`Term`], its weight in the configuration, a bound of its gradient for the
+//! suite of degenerate cases, and one line where [`GarmentEnergies`] (or, for a pair of garments, [`SceneEnergy`])
+//! lists what it evaluates. A term that reads distances to the body is also named in `scene_sum.rs`. The
+//! finite-difference test walks the list.
 
 pub mod bending;
 pub mod body_collision;

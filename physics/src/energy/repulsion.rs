@@ -3,12 +3,13 @@
 //! `Σ −log d²` over unordered pairs of vertices that no edge joins and that are closer than a radius. The paper's weights
 //! and magnitudes need this sum divided by the number of vertices, which is the default; the printed form is a switch.
 //!
-//! **Near d = 0** the logarithm has no value. Below [`CONTACT_DISTANCE`] it continues as the line in `d²` that touches it
-//! there, `−log δ² + 1 − d²/δ²`: continuously differentiable, bounded, gradient at most `2/δ`; two vertices at one point
-//! have no direction to part in and get none from each other. **At the radius** the printed term jumps from 4.6 to 0; this
-//! is kept, and the gradient is that of the pairs inside. [`EnergySettings::repulsion_continuous`] drops the jump without
-//! touching the gradient: pairs inside count `−log d²/r²`. Training, which follows gradients, cannot tell the two forms apart; a line
-//! search can, because in the printed form every pair that comes closer than the radius stops it.
+//! **Near d = 0** the logarithm has no value. Below [`CONTACT_DISTANCE`] it continues as the line in `d²` that touches
+//! it there, `−log δ² + 1 − d²/δ²`: continuously differentiable, bounded, gradient at most `2/δ`; two vertices at one
+//! point have no direction to part in and get none from each other. **At the radius** the printed term jumps from 4.6
+//! to 0; this is kept, and the gradient is that of the pairs inside. [`EnergySettings::repulsion_continuous`] drops the
+//! jump without touching the gradient: pairs inside count `−log d²/r²`. Training, which follows gradients, cannot tell
+//! the two forms apart; a line search can, because in the printed form every pair that comes closer than the radius
+//! stops it.
 //!
 //! **No all-pairs work.** Vertices are sorted into cells of half or a quarter of the radius; those of one cell share a list of
 //! candidates, which the inner loop runs through in fixed lanes, with the widest vectors the processor has (the operations

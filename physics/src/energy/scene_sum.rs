@@ -248,7 +248,8 @@ impl<T: Real> SceneEnergy<T> {
         }
     }
 
-    /// Signed distances of the contact points of garment `i` to the body; with a memory, `exact` ones only where they count as contact.
+    /// Signed distances of the contact points of garment `i` to the body; with a memory, `exact` ones only where they
+    /// count as contact.
     fn gaps(
         &self,
         i: usize,

@@ -30,10 +30,11 @@ pub struct Strain {
 /// A triangle with a smaller ratio of height to longest edge has no area: corners on a line round to heights of about 1e-16.
 const NO_HEIGHT: f64 = 1e-12;
 
-/// How much of the stiffness of tension its [curvature](GarmentTerm::curvature) has. Cloth that is pulled over a body can slide around it:
-/// the stiffness of its tension against turning is cancelled by the curvature of the body under it, which the contact's leaves out.
-/// All of it made the steps of the static solver five to ten times too short in the end, none of it makes them too long at first
-/// (iterations to within 1 mJ of the minimum from skinning, median of 13 scenes: 29 with 1, 15 with 0.3, more than 40 with 0).
+/// How much of the stiffness of tension its [curvature](GarmentTerm::curvature) has. Cloth that is pulled over a body
+/// can slide around it: the stiffness of its tension against turning is cancelled by the curvature of the body under
+/// it, which the contact's leaves out. All of it made the steps of the static solver five to ten times too short in the
+/// end, none of it makes them too long at first (iterations to within 1 mJ of the minimum from skinning, median of 13
+/// scenes: 29 with 1, 15 with 0.3, more than 40 with 0).
 pub const TENSION_SHARE: f64 = 0.3;
 
 /// Which rest triangles are too flat to be measured as they are.
@@ -193,7 +194,8 @@ impl<T: Real> GarmentTerm<T> for Strain {
         self.evaluate(state.posed, target)
     }
 
-    /// Gauss–Newton in `G`, and a share ([`TENSION_SHARE`]) of the stress that pulls: what pushes (compression) has negative curvature.
+    /// Gauss–Newton in `G`, and a share ([`TENSION_SHARE`]) of the stress that pulls: what pushes (compression) has
+    /// negative curvature.
     fn curvature(&self, state: &GarmentState<'_, T>, sink: &mut dyn CurvatureSink) {
         for triangle in &self.triangles {
             triangle.curvature(state.posed, self.mu, self.lambda, sink);

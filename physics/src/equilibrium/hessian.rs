@@ -10,8 +10,8 @@ use crate::rows::CompressedRows;
 
 /// One triangle of a sparse symmetric matrix of 3×3 blocks, and its factor.
 ///
-/// Where blocks are and in which order to eliminate them is found once for a garment. Garments of an outfit touch each other elsewhere
-/// in every state: as long as all blocks have a place, it is kept, and found anew where one has none.
+/// Where blocks are and in which order to eliminate them is found once for a garment. Garments of an outfit touch each
+/// other elsewhere in every state: as long as all blocks have a place, it is kept, and found anew where one has none.
 pub(super) struct Hessian {
     /// The vertices that every vertex has a block with, from itself on.
     blocks: CompressedRows<u32>,
@@ -47,8 +47,8 @@ impl Hessian {
         Self { blocks, matrix, diagonal: Vec::new(), factor }
     }
 
-    /// Takes the curvature of `problem` at `posed`, with creases as if they were smooth over `width` (m), and returns the `gradient` there
-    /// as changed by that.
+    /// Takes the curvature of `problem` at `posed`, with creases as if they were smooth over `width` (m), and returns
+    /// the `gradient` there as changed by that.
     pub fn assemble(
         &mut self,
         problem: &Problem<'_>,

@@ -9,9 +9,9 @@ const DECREASE: f64 = 0.1;
 /// Most trials.
 const TRIALS: usize = 12;
 
-/// Tries lengths from 1 downwards from a state of `energy` and derivative `slope < 0` along the line. A trial that is too long
-/// is followed by the minimum of the parabola through value and slope at the start and the value of the trial, between a tenth and
-/// half of its length. Returns step length and state; `None` if no trial had the decrease.
+/// Tries lengths from 1 downwards from a state of `energy` and derivative `slope < 0` along the line. A trial that is
+/// too long is followed by the minimum of the parabola through value and slope at the start and the value of the trial,
+/// between a tenth and half of its length. Returns step length and state; `None` if no trial had the decrease.
 pub(super) fn search(
     energy: f64,
     slope: f64,

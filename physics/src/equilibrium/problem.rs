@@ -100,7 +100,8 @@ impl<'a> Problem<'a> {
         relative(known.min(self.residual(posed, &gradient)), self.force_scale(posed))
     }
 
-    /// Norm of the `gradient` at `posed`, just evaluated, that is left where the forces of all known sides of creases are combined.
+    /// Norm of the `gradient` at `posed`, just evaluated, that is left where the forces of all known sides of creases
+    /// are combined.
     pub(super) fn residual(&self, posed: &[[f64; 3]], gradient: &[[f64; 3]]) -> f64 {
         let mut left = gradient.to_vec();
         self.creases(posed, [ON_CREASE, SEEN_HERE]).balance(&mut left);
@@ -141,8 +142,8 @@ impl<'a> Problem<'a> {
 /// Distances that differ by less (m) are equal: the point is on a crease.
 pub(super) const ON_CREASE: f64 = 1e-5;
 
-/// No farther than this (m) from where it was seen a side is taken to be where its tangent plane is: over this length a limb of 3 cm
-/// radius bends away by [`ON_CREASE`].
+/// No farther than this (m) from where it was seen a side is taken to be where its tangent plane is: over this length a
+/// limb of 3 cm radius bends away by [`ON_CREASE`].
 const SEEN_HERE: f64 = 8e-4;
 
 /// `|g|/scale`, 0 for no force at all.

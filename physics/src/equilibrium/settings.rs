@@ -16,10 +16,12 @@ pub struct SolverSettings {
     /// No vertex moves farther than this in one step (m). Default 5 cm: a garment stays in its valley instead of jumping
     /// through the body.
     pub step_bound: f64,
-    /// No vertex goes farther than this from its start (m), but for the step that leads there; `None`: no bound. Where the bound is
-    /// passed the solver stops as [`super::Stop::Escaped`]. Default 1 m: what nothing holds falls for ever.
+    /// No vertex goes farther than this from its start (m), but for the step that leads there; `None`: no bound. Where
+    /// the bound is passed the solver stops as [`super::Stop::Escaped`]. Default 1 m: what nothing holds falls for
+    /// ever.
     pub escape_distance: Option<f64>,
-    /// Steps make no triangles intersect, and leave elements this far apart (m), or half as far as they are; `None`: nobody looks.
+    /// Steps make no triangles intersect, and leave elements this far apart (m), or half as far as they are; `None`:
+    /// nobody looks.
     pub margin: Option<f64>,
 }
 

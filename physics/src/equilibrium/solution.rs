@@ -11,8 +11,9 @@ pub enum Stop {
     Iterations,
     /// The time was used up.
     Time,
-    /// The last 10 steps together gained less than a millionth of the tolerance of what all gained (1e-10 with the usual one): the energy
-    /// stands still, though the forces of some vertices at creases of the contact do not balance.
+    /// The last 10 steps together gained less than a millionth of the tolerance of what all gained (1e-10 with the
+    /// usual one): the energy stands still, though the forces of some vertices at creases of the contact do not
+    /// balance.
     Settled,
     /// No step along the descent direction lowers the energy, however short: some vertices rest against a jump of the energy.
     Stalled,

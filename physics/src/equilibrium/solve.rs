@@ -13,11 +13,13 @@ use crate::vec3::{add_scaled, distance_squared, dot, is_finite, norm_squared, su
 /// Iterations between two looks at the scale of the forces, which costs an evaluation of each term.
 const LOOK_EVERY: usize = 10;
 
-/// Levenberg's shift at first, at least and at most, in units of the mean diagonal entry. It follows the steps: what no term holds (a
-/// rigid motion, a fold that opens) and what the model leaves out would be a step of any length otherwise.
+/// Levenberg's shift at first, at least and at most, in units of the mean diagonal entry. It follows the steps: what no
+/// term holds (a rigid motion, a fold that opens) and what the model leaves out would be a step of any length
+/// otherwise.
 const SHIFT: [f64; 3] = [1e-2, 1e-6, 1e-2];
 
-/// Factors on the shift after a full step that gained a good part of what its model promised, and after one that had to be shortened.
+/// Factors on the shift after a full step that gained a good part of what its model promised, and after one that had to
+/// be shortened.
 const FACTORS: [f64; 2] = [0.3, 3.0];
 
 /// From this share of the decrease that the slope predicts the gain is good: half of the half that it is if the model holds.
@@ -29,8 +31,8 @@ const MOST_MODELS: usize = 10;
 /// A larger shift than this is not tried.
 const LARGEST_SHIFT: f64 = 1.0;
 
-/// Width of the creases in the model (m), in units of the last step and at least and at most: the model sees across a crease a small
-/// part of how far a step goes.
+/// Width of the creases in the model (m), in units of the last step and at least and at most: the model sees across a
+/// crease a small part of how far a step goes.
 const CREASE_WIDTH: (f64, [f64; 2]) = (0.01, [1e-7, 1e-3]);
 
 /// Progress is judged over this many iterations.
@@ -178,8 +180,8 @@ struct Line<'a> {
 }
 
 impl Line<'_> {
-    /// A lower state on the line, and the share of the decrease predicted by the slope that it has, 0 where it is not as far as the model
-    /// goes; `None` where the line does not go downhill.
+    /// A lower state on the line, and the share of the decrease predicted by the slope that it has, 0 where it is not
+    /// as far as the model goes; `None` where the line does not go downhill.
     fn advance(&self, evaluations: &mut usize) -> Option<(f64, State)> {
         let Self { state, .. } = self;
         let moves: Vec<[f64; 3]> = self.to.iter().zip(&state.positions).map(|(q, p)| sub(*q, *p)).collect();

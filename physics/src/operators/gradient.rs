@@ -21,9 +21,10 @@ pub struct SurfaceGradient {
 /// `A` are the edges to them projected into the tangent plane.
 ///
 /// DiffusionNet uses the absolute `ε = 10⁻⁵`. With edges of a centimetre `AᵀA` is about `10⁻⁴`, so that would damp the
-/// gradient by several per cent and tie it to the unit of length. Here `ε` is relative and zero unless it is needed: just
-/// large enough that the smaller eigenvalue of `AᵀA + εI` is at least 10⁻⁶ of the larger. A linear function on a flat mesh has its
-/// exact gradient, and a vertex whose edges are collinear still has a bounded one. Unreferenced vertices have empty rows.
+/// gradient by several per cent and tie it to the unit of length. Here `ε` is relative and zero unless it is needed:
+/// just large enough that the smaller eigenvalue of `AᵀA + εI` is at least 10⁻⁶ of the larger. A linear function on a
+/// flat mesh has its exact gradient, and a vertex whose edges are collinear still has a bounded one. Unreferenced
+/// vertices have empty rows.
 pub fn surface_gradient(mesh: &TriMesh, topology: &Topology) -> SurfaceGradient {
     let vertex_count = mesh.vertex_count();
     let frames = tangent_frames(mesh);

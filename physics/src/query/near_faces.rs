@@ -1,9 +1,10 @@
 //! The faces near a query point that moves a little between queries.
 //!
-//! A solver asks for the distance of the same points to the same surface in every step, and they have hardly moved. The distance of
-//! a point to a face changes by at most as much as the point has moved (triangle inequality). So the faces that were near when a point
-//! was looked up, nearest first, are asked only as far down as one of them can still be the closest; and where one that was not
-//! near could be, the point is looked up anew. The answer is that of a fresh query, whatever was asked before.
+//! A solver asks for the distance of the same points to the same surface in every step, and they have hardly moved. The
+//! distance of a point to a face changes by at most as much as the point has moved (triangle inequality). So the faces
+//! that were near when a point was looked up, nearest first, are asked only as far down as one of them can still be the
+//! closest; and where one that was not near could be, the point is looked up anew. The answer is that of a fresh query,
+//! whatever was asked before.
 //!
 //! Also remembered are the sides of creases that the point has been on, for whoever has to know that there is another one
 //! (`energy/creases.rs`).
@@ -77,9 +78,10 @@ impl NearFaces {
         }
     }
 
-    /// The linear functions that the distance was seen to follow near `p`, just seen: value at `p` (m) and gradient, its own first, then
-    /// those that are at most `band` (m) larger there, least first, and were seen no farther than `reach` (m) away. It is the least of them where it is concave; those of a ridge, where
-    /// it is not, are less at `p` than it is and none of them.
+    /// The linear functions that the distance was seen to follow near `p`, just seen: value at `p` (m) and gradient,
+    /// its own first, then those that are at most `band` (m) larger there, least first, and were seen no farther than
+    /// `reach` (m) away. It is the least of them where it is concave; those of a ridge, where it is not, are less at
+    /// `p` than it is and none of them.
     pub fn sides(&self, p: [f64; 3], [band, reach]: [f64; 2]) -> Vec<(f64, [f64; 3])> {
         let Some(here) = self.seen.iter().find(|side| side.at == p) else { return Vec::new() };
         let near = self.seen.iter().filter(|side| norm(sub(p, side.at)) <= reach);

@@ -139,8 +139,8 @@ impl<T: Real> Surface<T> {
         }
     }
 
-    /// As [`gap`](Self::gap), for a point whose `near` faces are remembered from query to query. Beyond `reach` (m) the gap may be any
-    /// from there to the true one, with no gradient.
+    /// As [`gap`](Self::gap), for a point whose `near` faces are remembered from query to query. Beyond `reach` (m) the
+    /// gap may be any from there to the true one, with no gradient.
     pub(crate) fn gap_near(&self, p: [T; 3], distance: Distance, reach: f64, near: &mut NearFaces) -> Gap<T> {
         let q = vec3::to_f64(p);
         let Some(tree) = self.tree(distance).filter(|_| vec3::is_finite(q)) else {

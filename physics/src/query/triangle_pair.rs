@@ -251,8 +251,8 @@ fn surely_parted_at_corner(a: &Triangle, b: &Triangle) -> bool {
     of_a.iter().all(|edge| is_over(edge, 1.0)) && of_b.iter().all(|edge| is_over(edge, -1.0))
 }
 
-/// Whether `apex` lies beyond the edge of `a` between corners 1 and 2, seen from corner 0 and beyond any rounding, as in all of a mesh
-/// but its folds. `false` says nothing.
+/// Whether `apex` lies beyond the edge of `a` between corners 1 and 2, seen from corner 0 and beyond any rounding, as
+/// in all of a mesh but its folds. `false` says nothing.
 #[inline]
 fn surely_on_both_sides(a: &Triangle, apex: [f64; 3]) -> bool {
     // The cosine between the two heights, of vectors that are each right to a few roundings.

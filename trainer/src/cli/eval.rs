@@ -23,8 +23,8 @@ use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 /// The paper's tables for a trained model, speed against error, stress tests, pictures
 ///
-/// Writes eval.json, eval.md and report.html, one page that needs no network. Scenes are sampled from the seed. Training, validation
-/// and test set (the latter read by no run) are reported one by one.
+/// Writes eval.json, eval.md and report.html, one page that needs no network. Scenes are sampled from the seed.
+/// Training, validation and test set (the latter read by no run) are reported one by one.
 #[derive(Parser)]
 #[command(after_help = "Examples:\n  clothcombo eval -o report\n  \
         clothcombo eval --checkpoint runs/open --quick -o report\n  \

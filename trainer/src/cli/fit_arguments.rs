@@ -34,17 +34,18 @@ pub struct FitArguments {
     /// Turn about the vertical, counter-clockwise seen from above, after the up axis is up
     #[arg(long, value_name = "DEGREES", allow_hyphen_values = true, value_parser = turn)]
     turn: Option<f64>,
-    /// Surfaces that are the garment: all (cloth with thickness is refused), largest (the largest connected piece), outer (the outer
-    /// sheet of cloth with thickness, without its rims)
+    /// Surfaces that are the garment: all (cloth with thickness is refused), largest (the largest connected piece),
+    /// outer (the outer sheet of cloth with thickness, without its rims)
     #[arg(long, value_name = "SURFACES", default_value = "all", value_parser = Keep::from_str)]
     keep: Keep,
     /// Joins borders that run along each other at most this far apart, for example 5mm or 0.005; those that coincide (within a
     /// twentieth of their edges) always are
     #[arg(long, value_name = "DISTANCE", value_parser = seam_width)]
     join_seams: Option<f64>,
-    /// The body that the garment was made on, in the same coordinates: BODY.npz, BODY.npz:SHAPE or a mesh. The garment is placed
-    /// through it, and nothing is searched for. Example: --from-body SMPL_NEUTRAL.npz:1.2,-0.5. With a mesh, --unit, --up and --turn
-    /// are about both files; with an npz, they and --offset say how the garment's coordinates differ from the npz's
+    /// The body that the garment was made on, in the same coordinates: BODY.npz, BODY.npz:SHAPE or a mesh. The garment
+    /// is placed through it, and nothing is searched for. Example: --from-body SMPL_NEUTRAL.npz:1.2,-0.5. With a mesh,
+    /// --unit, --up and --turn are about both files; with an npz, they and --offset say how the garment's coordinates
+    /// differ from the npz's
     #[arg(long, value_name = "BODY")]
     from_body: Option<String>,
 }

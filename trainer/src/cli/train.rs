@@ -48,8 +48,8 @@ pub struct Arguments {
     /// Overrides one value, for example losses.strain.weight=2.0 or stages.0.steps=500; repeatable
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Continues a run from its newest whole checkpoint, or from the checkpoint PATH; PATH may also be the run folder. It continues
-    /// to the bit only on the device the checkpoint is from, with as many threads
+    /// Continues a run from its newest whole checkpoint, or from the checkpoint PATH; PATH may also be the run folder.
+    /// It continues to the bit only on the device the checkpoint is from, with as many threads
     #[arg(long, value_name = "PATH", num_args = 0..=1)]
     resume: Option<Option<PathBuf>>,
     /// With --resume: keys whose values may differ from the run's own, separated by commas; a section allows all in it. data,

@@ -16,7 +16,8 @@ pub struct GuardConfig {
     /// only counted. Each costs as much disk as the weights.
     pub kept_incidents: usize,
     /// A step whose gradient norm is more than this many times the median of the last 100 counts as a spike; 0 counts
-    /// none. Spikes are listed in `RUN/log.txt` and counted in the progress line. Clipping makes spikes harmless; many of them say that something in the data is hard.
+    /// none. Spikes are listed in `RUN/log.txt` and counted in the progress line. Clipping makes spikes harmless; many
+    /// of them say that something in the data is hard.
     pub spike_factor: f64,
     /// Test hook: makes steps fail on purpose, to prove that they are caught and can be replayed. Never set it in a run
     /// that matters.

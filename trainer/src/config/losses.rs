@@ -63,8 +63,9 @@ pub struct PlainLoss {
 pub struct StrainLoss {
     /// Factor on the raw value.
     pub weight: Ramp,
-    /// Rest triangles flatter than this ratio of height to longest edge count as if they had it: a needle is else a spring of
-    /// unbounded stiffness, whose gradient hides all others. At most 0.5. 0 is the paper's printed form, and that of `clothcombo score`.
+    /// Rest triangles flatter than this ratio of height to longest edge count as if they had it: a needle is else a
+    /// spring of unbounded stiffness, whose gradient hides all others. At most 0.5. 0 is the paper's printed form, and
+    /// that of `clothcombo score`.
     pub needle_ratio: f64,
 }
 
@@ -224,10 +225,10 @@ pub struct LossesConfig {
     /// Collision and layer-collision weights are multiplied by this over the garment's vertex count: the sums run over
     /// vertices and the paper's weights belong to about 8,000 of them. 0 switches it off.
     pub reference_vertices: f64,
-    /// Weight, beside the loss of the outfit, of the losses that every garment of it has when it is draped as a single garment, before
-    /// untangling. Counts where all networks are trained at once: what is gained for outfits need not be lost for
-    /// single garments. A scene in which nothing can touch has the same losses twice, 1 + `single_garments` times in all. 0, the
-    /// default, is the paper's.
+    /// Weight, beside the loss of the outfit, of the losses that every garment of it has when it is draped as a single
+    /// garment, before untangling. Counts where all networks are trained at once: what is gained for outfits need not
+    /// be lost for single garments. A scene in which nothing can touch has the same losses twice, 1 + `single_garments`
+    /// times in all. 0, the default, is the paper's.
     // Configurations of earlier runs are sealed in their checkpoints, and have this key by its earlier name.
     #[serde(alias = "alone")]
     pub single_garments: Ramp,

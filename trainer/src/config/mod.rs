@@ -42,8 +42,8 @@ use std::path::PathBuf;
 pub struct Config {
     /// Everything random follows from this number: the same seed gives the same run, bit for bit. At most 2⁶³ − 1.
     pub seed: u64,
-    /// Folder that relative paths are relative to, where it exists; else the working folder. A run writes down the folder in which
-    /// it was started, and so resumes from anywhere.
+    /// Folder that relative paths are relative to, where it exists; else the working folder. A run writes down the
+    /// folder in which it was started, and so resumes from anywhere.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub base: Option<PathBuf>,
     /// Run, checkpoint or model folder whose parameters the networks start with, to train a model further on other data or

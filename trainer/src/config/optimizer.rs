@@ -28,10 +28,10 @@ pub struct OptimizerConfig {
     /// Largest norm of the gradient over all parameters together; 0 switches clipping off. 1 is the paper's: a garment
     /// caught in an armpit has a gradient a thousand times the usual one.
     pub clip_norm: f64,
-    /// Which gradient is clipped: that of each `"scene"` before the mean over the scenes of a step (`accumulate`), or the mean,
-    /// once per `"step"`. Default: `"scene"`, since a scene with a garment caught in an armpit otherwise takes the whole step, and
-    /// the scenes beside it teach nothing; the mean of clipped gradients is no longer than `clip_norm` either. `"step"` is the
-    /// paper's. With one scene per step both are the same.
+    /// Which gradient is clipped: that of each `"scene"` before the mean over the scenes of a step (`accumulate`), or
+    /// the mean, once per `"step"`. Default: `"scene"`, since a scene with a garment caught in an armpit otherwise
+    /// takes the whole step, and the scenes beside it teach nothing; the mean of clipped gradients is no longer than
+    /// `clip_norm` either. `"step"` is the paper's. With one scene per step both are the same.
     pub clip: ClipScope,
     /// Decay per step of the running average of the weights, in [0, 1); 0 keeps none. With an average, validation,
     /// pictures and the exported model use it, training does not. 0.999 removes most of the noise that single scenes leave

@@ -1,4 +1,5 @@
-//! Messages of the parser that say more to a user in other words: keys that are gone or have another name, values of another kind.
+//! Messages of the parser that say more to a user in other words: keys that are gone or have another name, values of
+//! another kind.
 
 /// What the parser says, and what is said instead.
 const REWORDED: [(&str, &str); 3] = [

@@ -182,8 +182,9 @@ impl Dataset {
         self.list.get_or_init(|| DataList::of(self))
     }
 
-    /// A fingerprint of what outfits in held-out windows are sampled from: garments, body, and the frames of the windows. Two models
-    /// for which it is the same can be asked about the same outfits, whatever else their poses were split into.
+    /// A fingerprint of what outfits in held-out windows are sampled from: garments, body, and the frames of the
+    /// windows. Two models for which it is the same can be asked about the same outfits, whatever else their poses were
+    /// split into.
     pub fn fingerprint_of_windows(&self) -> String {
         poses_key(self.assets(), &[self.poses.held_out(HeldOut::Windows)]).to_string()
     }

@@ -1,5 +1,5 @@
-//! The data of a run. In: a configuration. Out: body, garments and poses ([`Dataset`]), samples of scenes as pure functions of seed and
-//! step, and prepared scenes with their energies.
+//! The data of a run. In: a configuration. Out: body, garments and poses ([`Dataset`]), samples of scenes as pure
+//! functions of seed and step, and prepared scenes with their energies.
 
 mod active_joints;
 mod contents;

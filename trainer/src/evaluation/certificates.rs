@@ -37,7 +37,8 @@ pub struct PostProcessor<'a> {
     dataset: &'a Dataset,
     losses: &'a LossesConfig,
     networks: Option<&'a Networks<'a>>,
-    /// What drapes poses between the T-pose and the scene: without corrections, which leaves fewer intersections (docs/resolve.md).
+    /// What drapes poses between the T-pose and the scene: without corrections, which leaves fewer intersections
+    /// (docs/resolve.md).
     uncorrected: Option<Networks<'a>>,
     known: Mutex<HashMap<usize, Arc<RestGarment>>>,
 }

@@ -1,8 +1,8 @@
 //! How far a drape is from the equilibrium of its scene: energy above the minimum, and distance to the minimiser.
 //!
-//! The reference is the state of lowest energy that the static solver of `clothcombo_physics` finds from linear blend skinning with
-//! shape transfer and, if there are networks, from their drape and from what the post-process makes of it. All methods are
-//! measured by one function of posed positions ([`crate::inference::reference`]).
+//! The reference is the state of lowest energy that the static solver of `clothcombo_physics` finds from linear blend
+//! skinning with shape transfer and, if there are networks, from their drape and from what the post-process makes of
+//! it. All methods are measured by one function of posed positions ([`crate::inference::reference`]).
 
 use crate::inference::Draped;
 use crate::inference::reference::{ReferenceScene, wide};

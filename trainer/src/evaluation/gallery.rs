@@ -112,8 +112,8 @@ fn unlike(mut bodies: Vec<BodySample>) -> Vec<BodySample> {
 }
 
 impl ModelUnderTest {
-    /// The `n`-th garment of the first of `categories` that has one: test garments come first, then validation garments. Garment 0 where
-    /// there is none of them.
+    /// The `n`-th garment of the first of `categories` that has one: test garments come first, then validation
+    /// garments. Garment 0 where there is none of them.
     fn pick(&self, categories: &[Category], n: usize) -> usize {
         let split = &self.dataset.split;
         let all = || split.test.iter().chain(&split.validation).chain(&split.training).copied();

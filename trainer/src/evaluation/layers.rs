@@ -1,4 +1,5 @@
-//! Table 3: what several layers cost each garment, and how many vertices violate the layer order before and after the post-process.
+//! Table 3: what several layers cost each garment, and how many vertices violate the layer order before and after the
+//! post-process.
 
 use super::certificates::{Counts, OutfitResult};
 use super::table::{Column, number, percent, percent_with_interval, plain, proportion};
@@ -10,8 +11,8 @@ use clothcombo_physics::energy::{Term, TermMap};
 use miette::{IntoDiagnostic, Report};
 use serde_json::{Value, json};
 
-/// Estimated before the post-process. Strain (J): mean over the garments of an outfit, which are no independent scenes. Violations:
-/// share of outer vertices, by the closest surface point.
+/// Estimated before the post-process. Strain (J): mean over the garments of an outfit, which are no independent scenes.
+/// Violations: share of outer vertices, by the closest surface point.
 const BEFORE: [Metric<Outfit>; 5] = [
     ("strain_of_single_garments", |outfit| mean(outfit.strain.iter().map(|[single, _]| *single))),
     ("strain_in_outfit", |outfit| mean(outfit.strain.iter().map(|[_, layered]| *layered))),
@@ -121,7 +122,8 @@ fn statistics(layers: usize, outfits: &[&Outfit]) -> Value {
         "scenes": outfits.len(),
         // Those that went through the post-process.
         "resolved": results.len(),
-        // Strain of each layer over that of the single garment, innermost first; and median over the outfits of the ratio of each.
+        // Strain of each layer over that of the single garment, innermost first; and median over the outfits of the
+        // ratio of each.
         "strain": (0..layers).map(ratio).collect::<Vec<_>>(),
         "strain_median": (0..layers).map(median_ratio).collect::<Vec<_>>(),
         "before": Estimate::of_metrics(outfits, &BEFORE),

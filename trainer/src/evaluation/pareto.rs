@@ -73,8 +73,8 @@ pub fn scene_count(evaluator: &Evaluator<'_>) -> usize {
     evaluator.counts.pareto.iter().sum()
 }
 
-/// Scenes of one garment and of an outfit draped by all methods. The networks are timed with all threads, one scene at a time; the
-/// solver and the refinement on one thread per scene.
+/// Scenes of one garment and of an outfit draped by all methods. The networks are timed with all threads, one scene at
+/// a time; the solver and the refinement on one thread per scene.
 pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
     let [scenes, outfits] = evaluator.counts.pareto;
     let single_garments = Comparison::new(evaluator, STREAM, 1, scenes)?;

@@ -1,7 +1,8 @@
 //! Correction steps at inference: from linear blend skinning over the networks' drape to a state of less energy.
 //!
-//! Every state on the path is accepted garment by garment, as far as it lowers the energy ([`crate::inference::descent`]), in the form
-//! without jumps that drapes are measured by ([`crate::inference::reference`]):
+//! Every state on the path is accepted garment by garment, as far as it lowers the energy
+//! ([`crate::inference::descent`]), in the form without jumps that drapes are measured by
+//! ([`crate::inference::reference`]):
 //!
 //! 1. skinning of the start by the initial weights W;
 //! 2. the networks' drape: Δx and ΔW together; where a garment does not take it, Δx with W, and then ΔW as far as it helps

@@ -143,7 +143,8 @@ impl BodyState {
 pub struct Draper {
     trained: TrainedModel,
     model: ClothCombo,
-    /// The same without corrections, for samples of the continuation path from the T-pose: that leaves fewer intersections (docs/resolve.md).
+    /// The same without corrections, for samples of the continuation path from the T-pose: that leaves fewer
+    /// intersections (docs/resolve.md).
     uncorrected: ClothCombo,
     preprocessor: Preprocessor,
     shape_space: ShapeSpace,

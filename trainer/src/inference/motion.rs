@@ -31,8 +31,8 @@ impl RetryPolicy {
 /// How far [`Draper::drape_motion`] is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum DrapeProgress {
-    /// The post-process looks at a pose at this share of the continuation path to the frame: from the one before it, or, where that leaves
-    /// crossings, from the T-pose.
+    /// The post-process looks at a pose at this share of the continuation path to the frame: from the one before it,
+    /// or, where that leaves crossings, from the T-pose.
     Continuation(f64),
     /// One more frame is draped.
     Draped,
@@ -41,10 +41,11 @@ pub enum DrapeProgress {
 }
 
 impl Draper {
-    /// Drapes `outfit` on each of `bodies`, the frames of a motion. What the networks make is averaged over `radius` frames to each
-    /// side before the post-process; 0 takes each frame as it is. The post-process carries on from frame to frame; where a frame is
-    /// left with crossings or torn cloth, and the one after it with less and no crossings, it carries on backwards from that one as
-    /// well. `progress` is called on the path to each frame, after it, and before each that is draped once more.
+    /// Drapes `outfit` on each of `bodies`, the frames of a motion. What the networks make is averaged over `radius`
+    /// frames to each side before the post-process; 0 takes each frame as it is. The post-process carries on from frame
+    /// to frame; where a frame is left with crossings or torn cloth, and the one after it with less and no crossings,
+    /// it carries on backwards from that one as well. `progress` is called on the path to each frame, after it, and
+    /// before each that is draped once more.
     ///
     /// # Errors
     /// When shape or pose do not fit the body model, or the networks diverge.

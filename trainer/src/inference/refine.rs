@@ -16,7 +16,8 @@ const LEAST_SHARE: f64 = 0.01;
 const MOST_TIME: Duration = Duration::from_secs(2);
 /// Refinement ends where a vertex has come farther than this from where the networks left it (m).
 const REACH: f64 = 0.05;
-/// What a step leaves between the elements of triangles (m) where it may make no intersection: a twentieth of the post-process's gap.
+/// What a step leaves between the elements of triangles (m) where it may make no intersection: a twentieth of the
+/// post-process's gap.
 const MARGIN: f64 = 5e-5;
 
 /// How many steps a refinement takes.
@@ -56,8 +57,9 @@ pub struct Refinement {
     pub largest_move_mm: f64,
 }
 
-/// Lowers `energy` from `start` `[ΣV, 3]` (m) for as many `steps`. Where it `is_last`, no triangles intersect then that did not at the
-/// start; such steps cost several times as much and get less far, which is a waste where the post-process follows.
+/// Lowers `energy` from `start` `[ΣV, 3]` (m) for as many `steps`. Where it `is_last`, no triangles intersect then that
+/// did not at the start; such steps cost several times as much and get less far, which is a waste where the
+/// post-process follows.
 ///
 /// # Errors
 /// When the energy at the start is not finite.

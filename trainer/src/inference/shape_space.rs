@@ -1,8 +1,8 @@
 //! What the shape of a body means to networks that were trained on another one.
 //!
-//! A shape parameter means something in the space of its own body model only. The networks see the shape of *their* body: where
-//! another body is dressed, the shape of theirs that looks most like it. What is geometry (surface, skinning, shape transfer) comes
-//! from the body itself.
+//! A shape parameter means something in the space of its own body model only. The networks see the shape of *their*
+//! body: where another body is dressed, the shape of theirs that looks most like it. What is geometry (surface,
+//! skinning, shape transfer) comes from the body itself.
 
 use clothcombo_data::asset::{Body, ShapeMatch, match_shape};
 use std::sync::{Mutex, PoisonError};

@@ -97,7 +97,8 @@ impl GivenGarment {
     }
 }
 
-/// Whether a mesh that is taken as it is lies somewhere near the zero body: if not, it intersects nothing, and looks like a good drape.
+/// Whether a mesh that is taken as it is lies somewhere near the zero body: if not, it intersects nothing, and looks
+/// like a good drape.
 fn check_place(path: &Path, rest: &TriMesh, body: &Body) -> Result<(), DraperError> {
     match misplaced(rest, &body.zero_body()) {
         Some(what) => Err(DraperError::Place { path: path.into(), what }),

@@ -1,5 +1,5 @@
-//! Pictures. In: positions, faces and numbers. Out: shaded renders of bodies and garments, labelled sheets of them, charts; all made
-//! without a GPU.
+//! Pictures. In: positions, faces and numbers. Out: shaded renders of bodies and garments, labelled sheets of them,
+//! charts; all made without a GPU.
 //!
 //! Nothing here knows a network or a dataset: positions and faces come in as plain slices, pictures go out as
 //! [`image::RgbImage`], and [`save_png`] writes them whole or not at all. Input that cannot be drawn (a vertex that

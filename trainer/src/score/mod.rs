@@ -122,8 +122,8 @@ pub struct LayerScore {
     pub layer_distance: f64,
     /// Pairs of triangles that share a point. Exact.
     pub triangle_pairs: usize,
-    /// Share of the outer vertices within 5 cm of the inner garment that violate the order of the layers: their gap to the nearest
-    /// inner vertex is negative (the paper's form).
+    /// Share of the outer vertices within 5 cm of the inner garment that violate the order of the layers: their gap to
+    /// the nearest inner vertex is negative (the paper's form).
     pub order_violations_nearest_vertex: f64,
 }
 

@@ -9,9 +9,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub struct StopFlag(Arc<AtomicBool>);
 
 impl StopFlag {
-    /// A flag that Ctrl-C, SIGTERM, SIGHUP and SIGUSR1 set. A second Ctrl-C or SIGTERM ends the program at once; what comes before
-    /// them, a terminal that closes or a cluster that is about to take the machine away, does not count. SIGHUP stays ignored where
-    /// it was at the start, as under `nohup`.
+    /// A flag that Ctrl-C, SIGTERM, SIGHUP and SIGUSR1 set. A second Ctrl-C or SIGTERM ends the program at once; what
+    /// comes before them, a terminal that closes or a cluster that is about to take the machine away, does not count.
+    /// SIGHUP stays ignored where it was at the start, as under `nohup`.
     ///
     /// # Errors
     /// When the system refuses a signal handler.

@@ -45,8 +45,8 @@ impl Workers {
     }
 }
 
-/// The result of `work`, on one of the threads that parallel operations run on: each of them would else be handed over from this one,
-/// which sleeps until it is done. A small step has hundreds.
+/// The result of `work`, on one of the threads that parallel operations run on: each of them would else be handed over
+/// from this one, which sleeps until it is done. A small step has hundreds.
 pub fn among_workers<R: Send>(work: impl FnOnce() -> R + Send) -> R {
     let listener = dispatcher::get_default(Clone::clone);
     rayon::scope(|_| dispatcher::with_default(&listener, work))

@@ -1,4 +1,5 @@
-//! Garments that were made on a body with its origin elsewhere, through `clothcombo fit` and `clothcombo drape` with `--from-body`.
+//! Garments that were made on a body with its origin elsewhere, through `clothcombo fit` and `clothcombo drape` with
+//! `--from-body`.
 
 use crate::common::holds;
 use crate::drape::{at, drape, failure, report};

@@ -243,8 +243,8 @@ fn rate(file: &mut NpzFile) -> Result<Option<(&'static str, f64)>, FileError> {
     Ok(found)
 }
 
-/// Where the joints of the body are among those called `names`, of which there must be `count`. Names that are all unknown, or too
-/// few or many, say nothing: the order is SMPL's.
+/// Where the joints of the body are among those called `names`, of which there must be `count`. Names that are all
+/// unknown, or too few or many, say nothing: the order is SMPL's.
 fn places(names: &[String], count: usize) -> Result<[usize; BODY_JOINT_COUNT], &'static str> {
     let own = BODY_JOINT_NAMES.map(|joint| names.iter().position(|name| name == joint));
     if names.len() != count || own.iter().all(Option::is_none) {

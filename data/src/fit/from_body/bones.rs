@@ -1,7 +1,8 @@
 //! Similarities that carry the bones of one body to those of another, by SMPL's names of the joints.
 //!
-//! Trunks stand upright in every T-pose, and where a rig has its spine joints is a matter of taste: the trunk is one part, scaled by
-//! the height from the hips to the shoulders. Limbs turn with their bones and are scaled by their lengths.
+//! Trunks stand upright in every T-pose, and where a rig has its spine joints is a matter of taste: the trunk is one
+//! part, scaled by the height from the hips to the shoulders. Limbs turn with their bones and are scaled by their
+//! lengths.
 
 use crate::asset::Body;
 use crate::asset::rotation::{IDENTITY, Matrix3, apply, matrix_from_axis_angle};

@@ -55,7 +55,8 @@ pub struct SourcePlacement {
     pub pelvis: Option<[f64; 3]>,
     /// Scale of the alignment beside the unit; 1 between bodies of the same vertices.
     pub scale: f64,
-    /// Median distance between where the source body has the vertices (in the target's coordinates) and where the target has them (mm).
+    /// Median distance between where the source body has the vertices (in the target's coordinates) and where the
+    /// target has them (mm).
     pub moved_mm: f64,
 }
 
@@ -292,7 +293,8 @@ fn median(numbers: &mut [f64]) -> f64 {
     numbers.get(numbers.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// `body` with these vertices, joints and one shape component, whose bindings cost no more than that. Without a direction it has none.
+/// `body` with these vertices, joints and one shape component, whose bindings cost no more than that. Without a
+/// direction it has none.
 fn one_shape_body(
     body: &Body,
     template: Vec<[f64; 3]>,

@@ -58,8 +58,9 @@ impl Model {
         Surface::new(self.positions.clone(), body.faces.clone())
     }
 
-    /// The shape in the same pose that lies closest to `mesh`, which `motion` brings here, and the motion that goes with it, of the same
-    /// scale: one Gauss–Newton step, since for a given pose vertices are linear in the shape. None where the body has one shape only.
+    /// The shape in the same pose that lies closest to `mesh`, which `motion` brings here, and the motion that goes
+    /// with it, of the same scale: one Gauss–Newton step, since for a given pose vertices are linear in the shape. None
+    /// where the body has one shape only.
     ///
     /// # Errors
     /// As [`Self::new`].

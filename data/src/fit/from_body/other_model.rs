@@ -29,8 +29,8 @@ impl OtherModel {
         (self.body.template.clone(), self.body.faces.clone())
     }
 
-    /// Carries cloth on `source`, its surface, to the zero body of `target`; and the median distance of the surfaces after the bones
-    /// were matched (mm).
+    /// Carries cloth on `source`, its surface, to the zero body of `target`; and the median distance of the surfaces
+    /// after the bones were matched (mm).
     ///
     /// # Errors
     /// When no mesh is left.

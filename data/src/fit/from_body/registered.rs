@@ -34,8 +34,8 @@ impl Registered {
         (self.positions.clone(), self.faces.clone())
     }
 
-    /// Carries cloth on `source`, its surface, to the zero body of `body`: by the registration, then by the distances to the skin, then
-    /// back through pose and shape of the model.
+    /// Carries cloth on `source`, its surface, to the zero body of `body`: by the registration, then by the distances
+    /// to the skin, then back through pose and shape of the model.
     ///
     /// # Errors
     /// When no mesh is left, or the pose cannot be undone.

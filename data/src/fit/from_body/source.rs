@@ -67,8 +67,8 @@ impl fmt::Debug for SourceBody {
 }
 
 impl SourceBody {
-    /// Reads `MESH`, `BODY.npz` or `BODY.npz:SHAPE`, the shape as numbers with commas between them. A path may hold colons itself:
-    /// what exists as a file is one.
+    /// Reads `MESH`, `BODY.npz` or `BODY.npz:SHAPE`, the shape as numbers with commas between them. A path may hold
+    /// colons itself: what exists as a file is one.
     ///
     /// # Errors
     /// [`FileError`] naming the file, and what is wrong with it or with the numbers.

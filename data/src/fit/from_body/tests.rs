@@ -37,7 +37,8 @@ fn errors(fitted: &Fitted, garment: &Garment) -> [f64; 2] {
     [distances[distances.len() / 2], distances[distances.len() * 95 / 100]]
 }
 
-/// Writes a body as its publisher does: in coordinates in which its pelvis is at `pelvis`, with a joint regressor where it has shapes.
+/// Writes a body as its publisher does: in coordinates in which its pelvis is at `pelvis`, with a joint regressor where
+/// it has shapes.
 fn publish(body: &Body, pelvis: [f64; 3], path: &Path) {
     let (v, j, k) = (body.vertex_count(), body.joint_count(), body.shape_count);
     let parents = body.parents.iter().map(|p| p.map_or(-1, |p| p as i64)).chain(0..j as i64);

@@ -127,8 +127,8 @@ pub(super) fn with_materials(bytes: &[u8], folder: &Path, name: &str) -> MovedOb
     MovedObj { obj, mtl, libraries }
 }
 
-/// All material libraries, seen from `folder`, that can be read of those in `names`: one name with spaces, or several. Their paths
-/// are added to `paths`.
+/// All material libraries, seen from `folder`, that can be read of those in `names`: one name with spaces, or several.
+/// Their paths are added to `paths`.
 fn libraries_of(names: &str, folder: &Path, paths: &mut Vec<PathBuf>) -> Vec<u8> {
     let mut read = |name: &str| {
         let path = folder.join(portable(name));

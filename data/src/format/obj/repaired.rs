@@ -18,9 +18,10 @@ pub struct RepairedForm<'a> {
 }
 
 impl MovedObj {
-    /// The file of `bytes`, read from `path`, as repairs left it, to be written as `NAME.obj` and `NAME.mtl`. Texture coordinates,
-    /// groups, materials and the colours of vertices stay; faces and vertices that were dropped are left out, with lines and
-    /// points if any was; a face that was cut becomes several, in the same place; normals are left out.
+    /// The file of `bytes`, read from `path`, as repairs left it, to be written as `NAME.obj` and `NAME.mtl`. Texture
+    /// coordinates, groups, materials and the colours of vertices stay; faces and vertices that were dropped are left
+    /// out, with lines and points if any was; a face that was cut becomes several, in the same place; normals are left
+    /// out.
     ///
     /// # Errors
     /// Numbers of vertices and faces in the file, if it has fewer than `form` speaks of.

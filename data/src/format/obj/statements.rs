@@ -53,8 +53,8 @@ fn first_line(bytes: &[u8]) -> (&[u8], &[u8], &[u8]) {
     (line, end, after)
 }
 
-/// The file with every statement on a line of its own and no mark of the byte order: what can be changed line by line. A file that
-/// is so already stays as it is, to the byte.
+/// The file with every statement on a line of its own and no mark of the byte order: what can be changed line by line.
+/// A file that is so already stays as it is, to the byte.
 pub(super) fn one_per_line(bytes: &[u8]) -> Vec<u8> {
     let mut out = Vec::with_capacity(bytes.len());
     for Statement { text, end, .. } in statements(bytes) {

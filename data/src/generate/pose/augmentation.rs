@@ -37,9 +37,9 @@ impl PoseAugmentation {
         Self { mirror: 0.0, interpolation: 0.0, limb_swap: 0.0, scale: [1.0, 1.0], noise_degrees: 0.0 }
     }
 
-    /// A variation of the body joints of `pose`, perhaps mixed with `other` or with limbs from it. Noise and scale carry no component beyond
-    /// its joint limit, or beyond the recorded value where the recording itself exceeds the limit. Joints past
-    /// the 22 body joints are mirrored but otherwise kept.
+    /// A variation of the body joints of `pose`, perhaps mixed with `other` or with limbs from it. Noise and scale
+    /// carry no component beyond its joint limit, or beyond the recorded value where the recording itself exceeds the
+    /// limit. Joints past the 22 body joints are mirrored but otherwise kept.
     pub fn apply<R: Rng + ?Sized>(&self, pose: &Pose, other: &Pose, rng: &mut R) -> Pose {
         let mirrored =
             |pose: &Pose, sample: f64| if sample < self.mirror { pose.mirrored() } else { pose.clone() };

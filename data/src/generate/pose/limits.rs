@@ -1,9 +1,9 @@
 //! Ranges of motion of the 22 body joints.
 //!
-//! The table bounds each component of a joint's axis-angle vector, relative to the T-pose; it is written for the middle and the left
-//! side, the right side is its mirror image (the y and z components change sign). Magnitudes follow clinical ranges of motion
-//! (American Academy of Orthopaedic Surgeons, "Joint Motion", 1965), rounded, and kept a little inside where the skin of a
-//! linear-blend body would fold into itself.
+//! The table bounds each component of a joint's axis-angle vector, relative to the T-pose; it is written for the middle
+//! and the left side, the right side is its mirror image (the y and z components change sign). Magnitudes follow
+//! clinical ranges of motion (American Academy of Orthopaedic Surgeons, "Joint Motion", 1965), rounded, and kept a
+//! little inside where the skin of a linear-blend body would fold into itself.
 
 use crate::asset::{BODY_JOINT_COUNT, Pose};
 

@@ -1,8 +1,9 @@
 //! How far the parts of a posed body run through each other.
 //!
-//! Retargeted motion and mixed limbs put hands into thighs and forearms into the belly; no garment can be draped there. Linear blend
-//! skinning also folds the skin at every elbow and armpit, which says nothing about the pose, so only parts at least
-//! three joints apart are looked at: a forearm and the trunk, a hand and a thigh, a knee and the other knee.
+//! Retargeted motion and mixed limbs put hands into thighs and forearms into the belly; no garment can be draped there.
+//! Linear blend skinning also folds the skin at every elbow and armpit, which says nothing about the pose, so only
+//! parts at least three joints apart are looked at: a forearm and the trunk, a hand and a thigh, a knee and the other
+//! knee.
 
 use crate::asset::{BODY_JOINT_COUNT, Body, BodyError, Pose};
 use crate::generate::parts::dominant_joints;

@@ -1,9 +1,9 @@
 //! CLOTH3D and CLOTH3D++ sample folders: garments on the zero body, poses as motions, and what was simulated.
 //!
-//! Bertiche et al., "CLOTH3D: Clothed 3D Humans", 2020. A folder holds `info.mat`, a rest mesh `<Garment>.obj` for every key of its
-//! `outfit`, and the simulated vertices `<Garment>.pc16`. The rest meshes stand in a z-up world, turned by `zrot`, on an SMPL body
-//! of the sample's gender and shape with its legs apart and its root joint at the origin; here they are brought to the zero
-//! body in T-pose.
+//! Bertiche et al., "CLOTH3D: Clothed 3D Humans", 2020. A folder holds `info.mat`, a rest mesh `<Garment>.obj` for
+//! every key of its `outfit`, and the simulated vertices `<Garment>.pc16`. The rest meshes stand in a z-up world,
+//! turned by `zrot`, on an SMPL body of the sample's gender and shape with its legs apart and its root joint at the
+//! origin; here they are brought to the zero body in T-pose.
 
 mod info;
 mod manifest;
@@ -60,8 +60,9 @@ impl Default for Cloth3dSettings {
 /// Of the simulations (frames/s).
 const FRAME_RATE: f64 = 30.0;
 
-/// Imports samples to `out`: `garments/*.obj` with `garments.toml`, `motions/*.npz` with `motions.toml`, `cloth3d.toml` with what the
-/// samples say of themselves, and, if asked for, `sequences/*.npz`. `inputs` are sample folders, or folders of them.
+/// Imports samples to `out`: `garments/*.obj` with `garments.toml`, `motions/*.npz` with `motions.toml`, `cloth3d.toml`
+/// with what the samples say of themselves, and, if asked for, `sequences/*.npz`. `inputs` are sample folders, or
+/// folders of them.
 ///
 /// # Errors
 /// [`ImportError`] if there is no sample, none of its garments can be used, or a result cannot be written.

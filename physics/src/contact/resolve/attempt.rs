@@ -19,8 +19,8 @@ const FURTHER_ATTEMPTS: usize = 3;
 const FEW: usize = 32;
 /// Pairs of garments with themselves that may be left where nothing else crosses.
 pub(super) const FEW_OF_ITSELF: usize = 8;
-/// How the last few crossings are tried once more: gap and rings, as shares of those asked for. A smaller gap is for many sheets in
-/// one crease, a larger one goes round what holds a few of them.
+/// How the last few crossings are tried once more: gap and rings, as shares of those asked for. A smaller gap is for
+/// many sheets in one crease, a larger one goes round what holds a few of them.
 const LAST: [(f64, usize); 2] = [(0.3, 1), (3.0, 2)];
 
 /// [`super::resolve`] for valid arguments, of which all began at `start`. Where something is left to do after the first attempt,
@@ -131,9 +131,10 @@ fn resolved(
 }
 
 impl Resolved {
-    /// Where few crossings are left on `body`, or none but those of garments with themselves, attempts that begin where the one before
-    /// ended: cloth that is nearly sorted out is the better shape to return to and to measure lengths from than the drape it came
-    /// from. None where limits are strict (`settings.loosened`). `start`: when all of it began.
+    /// Where few crossings are left on `body`, or none but those of garments with themselves, attempts that begin where
+    /// the one before ended: cloth that is nearly sorted out is the better shape to return to and to measure lengths
+    /// from than the drape it came from. None where limits are strict (`settings.loosened`). `start`: when all of it
+    /// began.
     pub(super) fn go_on(
         &mut self,
         body: &Surface<f64>,
@@ -160,8 +161,8 @@ impl Resolved {
         }
     }
 
-    /// Where few crossings are left in the end, tries to mend them with other gaps. None where limits are strict. Returns whether that
-    /// was better. `start`: when all of it began.
+    /// Where few crossings are left in the end, tries to mend them with other gaps. None where limits are strict.
+    /// Returns whether that was better. `start`: when all of it began.
     pub(super) fn mend_last(
         &mut self,
         body: &Surface<f64>,
@@ -185,8 +186,8 @@ impl Resolved {
         is_better
     }
 
-    /// Where nothing crosses but garments themselves, lays out what of them is folded, beside where they are `skinned`, and begins
-    /// once more from there. Returns whether that was better. `start`: when all of it began.
+    /// Where nothing crosses but garments themselves, lays out what of them is folded, beside where they are `skinned`,
+    /// and begins once more from there. Returns whether that was better. `start`: when all of it began.
     pub(super) fn lay_out(
         &mut self,
         body: &Surface<f64>,

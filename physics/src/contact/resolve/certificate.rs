@@ -231,8 +231,8 @@ impl Certificate {
         self.between() == 0
     }
 
-    /// How many times over the strain energy has risen by half of what it was: 0 where cloth is merely pulled straight, more where
-    /// it is torn out of shape, which shows.
+    /// How many times over the strain energy has risen by half of what it was: 0 where cloth is merely pulled straight,
+    /// more where it is torn out of shape, which shows.
     pub fn tears(&self) -> usize {
         self.strain_added.map_or(0, |added| (added / TEAR) as usize)
     }

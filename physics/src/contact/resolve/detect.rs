@@ -34,8 +34,8 @@ impl Crossings {
         self.body.len() + self.layers.len()
     }
 
-    /// Looks at the faces that are dirty. `trees` are those of the garments, `far` the distances of vertices to the body; garments
-    /// with themselves, and where the body is pinched, only count if asked for.
+    /// Looks at the faces that are dirty. `trees` are those of the garments, `far` the distances of vertices to the
+    /// body; garments with themselves, and where the body is pinched, only count if asked for.
     pub fn update(
         &mut self,
         outfit: &Outfit<'_>,

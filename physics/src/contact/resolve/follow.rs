@@ -1,10 +1,10 @@
 //! Garments taken along, step by step, from a pose in which their order is plain to one in which it is not.
 //!
-//! In a pose with bent limbs the drape alone does not tell where cloth belongs: a knee has gone through a skirt, a sleeve through
-//! the side of the chest, and the nearest way out is the wrong one. In the T-pose nothing of that has happened. On a way from there
-//! each step is short: what was resolved before is carried along by skinning and by what the drape changes, crossings are
-//! shallow, and the nearest way out is right. Where a step leaves more crossings than there were, a shorter one is
-//! tried.
+//! In a pose with bent limbs the drape alone does not tell where cloth belongs: a knee has gone through a skirt, a
+//! sleeve through the side of the chest, and the nearest way out is the wrong one. In the T-pose nothing of that has
+//! happened. On a way from there each step is short: what was resolved before is carried along by skinning and by what
+//! the drape changes, crossings are shallow, and the nearest way out is right. Where a step leaves more crossings than
+//! there were, a shorter one is tried.
 
 use std::time::Instant;
 

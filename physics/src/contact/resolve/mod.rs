@@ -26,8 +26,8 @@
 //!
 //! **Easing.** Where the strain energy has risen, cloth gives back what it can without crossing anything ([`ease`]).
 //!
-//! **Folds of the drape.** What only a network folds into itself is laid out by [`resolve_along`] before all this ([`unfold`]), and
-//! what of it is left in the end once more.
+//! **Folds of the drape.** What only a network folds into itself is laid out by [`resolve_along`] before all this
+//! ([`unfold`]), and what of it is left in the end once more.
 //!
 //! **Bent limbs.** Where crossings are left, [`resolve_along`] takes the garments from the T-pose, where their order is plain,
 //! step by step to the pose ([`follow`], [`way`]); in short steps cloth keeps the sides it was on before ([`sides`]). Where that

@@ -175,8 +175,8 @@ fn facing_surface(
     tree.faces_in_box(low, high).filter_map(looks_back).min_by(|a, b| a.abs().total_cmp(&b.abs()))
 }
 
-/// How far from vertex `v` at `p`, inside another part, the nearest surface is that does not look where it looks, `n`: for what has
-/// just gone in at a slant, and sees no surface straight behind it.
+/// How far from vertex `v` at `p`, inside another part, the nearest surface is that does not look where it looks, `n`:
+/// for what has just gone in at a slant, and sees no surface straight behind it.
 fn nearest_facing(
     tree: &TriangleTree<'_>,
     faces: &[[u32; 3]],
@@ -261,8 +261,8 @@ mod tests {
         }
     }
 
-    /// Vertices that have just gone in at a slant see no surface straight behind them: the nearest one counts, so that they do not
-    /// give way all at once.
+    /// Vertices that have just gone in at a slant see no surface straight behind them: the nearest one counts, so that
+    /// they do not give way all at once.
     #[test]
     fn what_has_just_gone_in_gives_way_a_little() {
         let steps = |apart: f64| {

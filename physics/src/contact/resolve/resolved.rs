@@ -18,8 +18,8 @@ pub struct Resolved {
     pub certificate: Certificate,
     /// What was done, per garment.
     pub garments: Vec<GarmentWork>,
-    /// Steps that were tried: from the T-pose, by [`super::resolve_along`] (0 where the drape could be mended as it was), or from the
-    /// frame before, by [`super::resolve_after`].
+    /// Steps that were tried: from the T-pose, by [`super::resolve_along`] (0 where the drape could be mended as it
+    /// was), or from the frame before, by [`super::resolve_after`].
     pub steps: usize,
     /// What cleared it, or went farthest.
     pub stage: Stage,

@@ -44,8 +44,9 @@ pub struct ResolveSettings {
     /// Whether crossings of a garment with itself are mended where possible; otherwise nothing is laid out either. Default
     /// yes.
     pub self_contact: bool,
-    /// Wall time, times the number of garments, after which no other attempt is begun; one that has begun has as much for itself,
-    /// looked at between its rounds, and what begins where another attempt ended counts from the start of all. A limit that is hit makes the result depend on the machine. Default none.
+    /// Wall time, times the number of garments, after which no other attempt is begun; one that has begun has as much
+    /// for itself, looked at between its rounds, and what begins where another attempt ended counts from the start of
+    /// all. A limit that is hit makes the result depend on the machine. Default none.
     pub time: Option<Duration>,
 }
 

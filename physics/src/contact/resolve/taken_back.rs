@@ -101,8 +101,8 @@ mod tests {
         }
     }
 
-    /// Two sheets over a ball. The drape has put the outer one 20 cm too low around the middle, through the inner one and the ball:
-    /// farther than a vertex may go.
+    /// Two sheets over a ball. The drape has put the outer one 20 cm too low around the middle, through the inner one
+    /// and the ball: farther than a vertex may go.
     #[test]
     fn a_drape_that_cannot_be_sorted_out_goes_back_around_what_is_wrong_and_nowhere_else() {
         let (inner, outer) = (sheet(0.10), sheet(0.13));

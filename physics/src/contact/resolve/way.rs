@@ -145,8 +145,8 @@ impl Way<'_, '_> {
         check(self.end.drawn.surface, &placed(self.layers, &place.reached.draped)?)?;
         check(self.end.drawn.surface, &placed(self.layers, &place.reached.positions)?)?;
         let (mut from, mut step, mut steps) = (0.0, longest, 0);
-        // How many steps in a row went well, and how many of the shortest did not since nothing crossed: most crossings that such a
-        // step leaves are mended in the next.
+        // How many steps in a row went well, and how many of the shortest did not since nothing crossed: most crossings
+        // that such a step leaves are mended in the next.
         let (mut well, mut failures) = (0, 0);
         let most_failures = (self.settings.steps / FAILURES).max(1);
         while steps < self.settings.steps && !self.is_late() {
@@ -180,8 +180,8 @@ impl Way<'_, '_> {
         Ok((None, steps))
     }
 
-    /// Untangles garments at `stage`, `step` of the way after `place`: as at the start of a way, and, where that leaves crossings,
-    /// with the sides that they had before, each as far as the strides allow.
+    /// Untangles garments at `stage`, `step` of the way after `place`: as at the start of a way, and, where that leaves
+    /// crossings, with the sides that they had before, each as far as the strides allow.
     fn arrive(
         &self,
         place: &Place,
@@ -240,8 +240,8 @@ fn with_all_own(mut found: Untangled, layers: &[Layer<'_>], settings: &ResolveSe
     found
 }
 
-/// Untangles the garments at `stage` by `untangle`, from each of `starts` until it `is_enough`; the best. The body gives way about
-/// as `before`.
+/// Untangles the garments at `stage` by `untangle`, from each of `starts` until it `is_enough`; the best. The body
+/// gives way about as `before`.
 fn on_stage(
     layers: &[Layer<'_>],
     stage: &PathSample,

@@ -1,6 +1,7 @@
 //! Bounding boxes of moving triangles in a tree of eight children a node, refitted in O(F) and never rebuilt.
 //!
-//! Boxes are `f32`, rounded outward, eight of them side by side: one comparison of a box with a node is six comparisons of eight lanes.
+//! Boxes are `f32`, rounded outward, eight of them side by side: one comparison of a box with a node is six comparisons
+//! of eight lanes.
 
 use crate::vec3;
 use rayon::prelude::*;
@@ -191,8 +192,8 @@ impl BoxTree {
         self.order.chunks(WIDTH).map(|faces| faces.iter().any(|&f| f != NONE && is_moved(f))).collect()
     }
 
-    /// Pairs of faces of this tree whose boxes are no farther apart than `reach` (m) along any axis, of which one `is_moved`; each
-    /// once, the smaller number first.
+    /// Pairs of faces of this tree whose boxes are no farther apart than `reach` (m) along any axis, of which one
+    /// `is_moved`; each once, the smaller number first.
     pub fn pairs(&self, reach: f64, is_moved: impl Fn(u32) -> bool + Copy + Sync) -> Vec<(u32, u32)> {
         let moved = self.moved_leaves(is_moved);
         self.pairs_of((&moved, reach), self, is_moved, |leaf, other| other >= leaf || !moved[other])
@@ -201,7 +202,8 @@ impl BoxTree {
             .collect()
     }
 
-    /// Pairs (face of this tree that `is_moved`, face of `other`) whose boxes are no farther apart than `reach` (m) along any axis.
+    /// Pairs (face of this tree that `is_moved`, face of `other`) whose boxes are no farther apart than `reach` (m)
+    /// along any axis.
     pub fn pairs_with(
         &self,
         other: &Self,

@@ -9,8 +9,8 @@ pub(crate) struct ContactMesh {
     pub faces: Vec<[u32; 3]>,
     /// Faces of the cloth; those behind them are of the body.
     pub cloth_faces: usize,
-    /// What a face stands for, so that every pair of elements is looked at once: bit `k` its corner `k`, bit `3 + k` its edge from
-    /// corner `k` to the next.
+    /// What a face stands for, so that every pair of elements is looked at once: bit `k` its corner `k`, bit `3 + k`
+    /// its edge from corner `k` to the next.
     owned: Vec<u8>,
     /// Faces around every vertex, ascending.
     faces_at: CompressedRows<u32>,

@@ -7,8 +7,8 @@
 //! Triangles that intersect already would otherwise be held for ever: their elements may pass each other, as long as no other
 //! triangles intersect at the end of the step.
 //!
-//! Compare the moving planes of Offset Geometric Contact (Chen, Hsu, Liu, Macklin, Yang and Yuksel, SIGGRAPH 2025), which bound each
-//! vertex for itself.
+//! Compare the moving planes of Offset Geometric Contact (Chen, Hsu, Liu, Macklin, Yang and Yuksel, SIGGRAPH 2025),
+//! which bound each vertex for itself.
 
 mod box_tree;
 mod contact_mesh;
@@ -245,8 +245,8 @@ impl<'a> StepFilter<'a> {
         (chunks.into_iter().flat_map(|(refused, _)| refused).collect(), tests)
     }
 
-    /// Those of `pairs` with a triangle that moves and has no area at `positions`: it intersects nothing there, but what lies across
-    /// it does as soon as it has some, and no elements meet.
+    /// Those of `pairs` with a triangle that moves and has no area at `positions`: it intersects nothing there, but
+    /// what lies across it does as soon as it has some, and no elements meet.
     fn flat(&self, pairs: &[(u32, u32)], positions: &[[f64; 3]], is_moved: &[bool]) -> FacePairs {
         let is_flat = |(face, is_moved): (&[u32; 3], &bool)| {
             *is_moved && !has_area(&face.map(|v| positions[v as usize]))

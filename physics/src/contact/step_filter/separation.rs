@@ -42,7 +42,8 @@ pub(crate) fn closest_on_edges([p, q]: [[f64; 3]; 2], [r, s]: [[f64; 3]; 2]) -> 
 const HALVINGS: u32 = 3;
 /// Elements nearer than this (m) have no direction from one to the other that rounding leaves right: they may only move as one.
 const TOUCHING: f64 = 1e-9;
-/// A step leads no nearer than this (m), however little room there is: some times what rounding to f32 moves a vertex of a person.
+/// A step leads no nearer than this (m), however little room there is: some times what rounding to f32 moves a vertex
+/// of a person.
 const NEAREST: f64 = 1e-6;
 
 /// Whether the elements of `pair` stay apart on the way from `x` to `y`: by `margin`, or half the distance they have at the start
@@ -115,8 +116,8 @@ fn is_along_axis(first: usize, x: &Corners, y: &Corners, margin: f64) -> bool {
     })
 }
 
-/// Whether the plane of one of two triangles, as it turns, keeps the other `margin` away all the way from `x` to `y`: true of most
-/// sheets that lie over each other, and it says so of all their elements at once. `false` says nothing.
+/// Whether the plane of one of two triangles, as it turns, keeps the other `margin` away all the way from `x` to `y`:
+/// true of most sheets that lie over each other, and it says so of all their elements at once. `false` says nothing.
 pub(crate) fn triangles_stay_apart(x: [&[[f64; 3]; 3]; 2], y: [&[[f64; 3]; 3]; 2], margin: f64) -> bool {
     [[0, 1], [1, 0]].into_iter().any(|[of, other]| {
         let Some(n0) = unit_normal(x[of]) else { return false };

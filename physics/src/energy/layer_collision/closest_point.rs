@@ -164,7 +164,8 @@ fn penalty(d: f64, epsilon: f64, depth: f64) -> [f64; 3] {
     [cube * fade, slope * fade + cube * fade_slope, 6.0 * excess * fade]
 }
 
-/// Derivatives of `Σ values·barycentric` of the point `found` of the triangle `q` that is closest to `p`, by `p` and by the corners.
+/// Derivatives of `Σ values·barycentric` of the point `found` of the triangle `q` that is closest to `p`, by `p` and by
+/// the corners.
 fn interpolated_gradients(
     values: [f64; 3],
     q: [[f64; 3]; 3],

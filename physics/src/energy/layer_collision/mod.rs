@@ -1,7 +1,8 @@
 //! Layer collision: an outer garment stays outside an inner one (paper, equation for L_mc).
 //!
-//! `V/P Σ max(ε − d, 0)³` over the `P` contact points of an outer garment of `V` vertices (the paper's are the vertices). Both garments move, so the gradient reaches both. [`LayerContact`] says how `d` is
-//! measured: [`nearest_vertex`] is the paper's form, cheap enough for training; [`closest_point`] has no jumps where the nearest
+//! `V/P Σ max(ε − d, 0)³` over the `P` contact points of an outer garment of `V` vertices (the paper's are the
+//! vertices). Both garments move, so the gradient reaches both. [`LayerContact`] says how `d` is measured:
+//! [`nearest_vertex`] is the paper's form, cheap enough for training; [`closest_point`] has no jumps where the nearest
 //! feature changes, and is what a solver with a line search needs.
 
 pub mod closest_point;
@@ -77,8 +78,8 @@ impl InnerLayer {
         }
     }
 
-    /// Penalty (m³) of the points `outer` against this garment at `inner` `[V, 3]` (m); adds its weighted gradient to `targets`, the
-    /// inner garment's first.
+    /// Penalty (m³) of the points `outer` against this garment at `inner` `[V, 3]` (m); adds its weighted gradient to
+    /// `targets`, the inner garment's first.
     pub fn evaluate<T: Real>(
         &self,
         inner: &[[T; 3]],
@@ -98,8 +99,8 @@ impl InnerLayer {
             }
     }
 
-    /// Curvature of the penalty, for an inner and an outer garment whose vertices start at `offsets`. The paper's form has none: no
-    /// solver gets far with it.
+    /// Curvature of the penalty, for an inner and an outer garment whose vertices start at `offsets`. The paper's form
+    /// has none: no solver gets far with it.
     pub(super) fn curvature<T: Real>(
         &self,
         posed: &PosedInnerLayer<T>,

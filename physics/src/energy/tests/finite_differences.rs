@@ -1,5 +1,5 @@
-//! Every gradient against difference quotients in `f64`, on random scenes and for every switch. The suite of degenerate cases runs
-//! through the same check in the workspace's `tests` crate.
+//! Every gradient against difference quotients in `f64`, on random scenes and for every switch. The suite of degenerate
+//! cases runs through the same check in the workspace's `tests` crate.
 
 use super::scenes::{Scene, only, pulled_back, scene};
 use crate::energy::gradient_bound::gradient_bound;

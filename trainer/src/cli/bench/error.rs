@@ -112,8 +112,8 @@ fn check_model(arguments: &Arguments, trained: &TrainedModel) -> Result<(), Repo
     }
 }
 
-/// Samples `count` of the validation scenes of `layers` garments: of as many as the configuration has, or of `count` where that is
-/// more.
+/// Samples `count` of the validation scenes of `layers` garments: of as many as the configuration has, or of `count`
+/// where that is more.
 fn sample_scenes(
     dataset: &Dataset,
     config: &Config,
@@ -148,7 +148,8 @@ fn drape(
     let bar = progress_bar(scenes.len(), "draping {bar:30} {pos}/{len} · {eta} left");
     let drapes = scenes.iter().map(|scene| {
         let drape = networks.drape(scene)?;
-        // A single garment is near enough to its equilibrium to start from. Forces cannot resolve an outfit that intersects itself.
+        // A single garment is near enough to its equilibrium to start from. Forces cannot resolve an outfit that
+        // intersects itself.
         let resolved = match scene.garments.len() {
             1 => None,
             _ => Some(post_processor.of(scene, &drape.posed).resolved(&post_process)?.positions.concat()),

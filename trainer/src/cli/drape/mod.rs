@@ -75,8 +75,8 @@ pub struct Arguments {
     /// networks' drape as it is [default: model.correction_steps of the model]
     #[arg(long, value_name = "STEPS")]
     corrections: Option<usize>,
-    /// Steps of the static solver from the networks' state, at most 2 cm each, until a vertex is 5 cm from there; `auto`: until a step
-    /// gains less than 1 % of what all did, for at most two seconds
+    /// Steps of the static solver from the networks' state, at most 2 cm each, until a vertex is 5 cm from there;
+    /// `auto`: until a step gains less than 1 % of what all did, for at most two seconds
     #[arg(long, default_value = "0", value_name = "STEPS|auto")]
     refine: RefineSteps,
     /// Leaves out the post-process; the certificate still counts everything
@@ -84,8 +84,8 @@ pub struct Arguments {
     no_resolve: bool,
     #[command(flatten)]
     post_process: PostProcessArguments,
-    /// Smooths a motion over this many frames to each side, before the post-process and, where that makes no intersection, after it;
-    /// 0 takes every frame as it is [default: 2 for frames at most 0.05 s apart, else 0]
+    /// Smooths a motion over this many frames to each side, before the post-process and, where that makes no
+    /// intersection, after it; 0 takes every frame as it is [default: 2 for frames at most 0.05 s apart, else 0]
     #[arg(long, num_args = 0..=1, default_missing_value = "2", value_name = "FRAMES",
           value_parser = clap::value_parser!(u16).range(..=100))]
     smooth: Option<u16>,

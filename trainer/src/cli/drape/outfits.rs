@@ -31,8 +31,9 @@ struct Entry {
     every: Option<u32>,
 }
 
-/// Reads the outfits of `file`. What an outfit does not say about the body is taken from `scene`, and what it does not say about a
-/// garment from `hints`; paths are relative to the file's folder, or to the working folder where there is no such file.
+/// Reads the outfits of `file`. What an outfit does not say about the body is taken from `scene`, and what it does not
+/// say about a garment from `hints`; paths are relative to the file's folder, or to the working folder where there is
+/// no such file.
 pub(super) fn read(file: &Path, scene: &SceneArguments, hints: &FitSettings) -> Result<Vec<Job>, Failure> {
     let text = std::fs::read_to_string(file)
         .into_diagnostic()

@@ -41,8 +41,8 @@ pub struct Arguments {
     /// Writes the repaired triangles alone, as they enter training
     #[arg(long, requires = "output")]
     triangles: bool,
-    /// Writes all vertices and faces of the file: what --keep left out follows the sheet that was kept, as thick as it was. Such a
-    /// file is for looking at, not for training
+    /// Writes all vertices and faces of the file: what --keep left out follows the sheet that was kept, as thick as it
+    /// was. Such a file is for looking at, not for training
     #[arg(long, requires_all = ["output", "keep"], conflicts_with = "triangles")]
     with_thickness: bool,
     #[command(flatten)]

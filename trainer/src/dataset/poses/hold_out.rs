@@ -40,12 +40,13 @@ pub(super) fn runs_of(purposes: &[Purpose], wanted: Purpose) -> Vec<[usize; 2]> 
     runs
 }
 
-/// Every clip is cut into blocks; one block in every `1 / held_out_share`, in the middle of its group, is held out. A clip of less
-/// than about half a group has none. Frames within `held_out_margin` of a held-out one are for nothing.
+/// Every clip is cut into blocks; one block in every `1 / held_out_share`, in the middle of its group, is held out. A
+/// clip of less than about half a group has none. Frames within `held_out_margin` of a held-out one are for nothing.
 ///
-/// Where that holds out less than a quarter of the share, clips without a window are held out whole, in the order of a hash of
-/// their names, until the share is reached: at most a third of the time of all. Where a third is too little for any, every clip has
-/// a window in its middle, with block and margin scaled down to its length, as long as the block is 0.1 s or more.
+/// Where that holds out less than a quarter of the share, clips without a window are held out whole, in the order of a
+/// hash of their names, until the share is reached: at most a third of the time of all. Where a third is too little for
+/// any, every clip has a window in its middle, with block and margin scaled down to its length, as long as the block is
+/// 0.1 s or more.
 pub(super) fn hold_out(clips: &[&Motion], config: &PoseConfig) -> HeldOutFrames {
     let mut purposes: Vec<Vec<Purpose>> = clips
         .iter()

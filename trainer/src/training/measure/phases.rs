@@ -34,9 +34,9 @@ pub const PHASES: [&str; 14] = [
 /// Seconds by span name.
 pub type SpanSeconds = BTreeMap<&'static str, f64>;
 
-/// Runs `work` and returns how long each span of the project was entered, on this thread and on those that `work` hands its
-/// subscriber to. The time of a span excludes that of the spans within it. `settle` runs at the end of each: it waits for a device
-/// that computes on its own, whose time would else be in the next span that reads a result.
+/// Runs `work` and returns how long each span of the project was entered, on this thread and on those that `work` hands
+/// its subscriber to. The time of a span excludes that of the spans within it. `settle` runs at the end of each: it
+/// waits for a device that computes on its own, whose time would else be in the next span that reads a result.
 pub fn record_phases<R>(
     settle: impl Fn() + Send + Sync + 'static,
     work: impl FnOnce() -> R,

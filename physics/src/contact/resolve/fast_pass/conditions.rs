@@ -154,7 +154,8 @@ impl FastPass<'_> {
         dot(normal, self.direction(f)) < 0.0 && !self.outfit.faces[f as usize].iter().any(seen)
     }
 
-    /// How far apart what is `height` apart (m) has to get: what is too near gets the gap, the rest only keeps from coming too near.
+    /// How far apart what is `height` apart (m) has to get: what is too near gets the gap, the rest only keeps from
+    /// coming too near.
     fn wanted(&self, height: f64) -> f64 {
         let least = self.settings.trigger * self.settings.gap;
         if height < least { self.settings.gap } else { least }
@@ -202,8 +203,8 @@ impl FastPass<'_> {
         self.filter.intersections.binary_search(&(f.min(g), f.max(g))).is_ok()
     }
 
-    /// The side of a plane with this `normal` on which an element has to be: over the other element along `away` or under it; where
-    /// that is not known, where it is by its `height`. None where the plane is too steep to tell.
+    /// The side of a plane with this `normal` on which an element has to be: over the other element along `away` or
+    /// under it; where that is not known, where it is by its `height`. None where the plane is too steep to tell.
     fn side(
         &self,
         normal: [f64; 3],
@@ -259,7 +260,8 @@ impl FastPass<'_> {
             .flatten()
     }
 
-    /// How deep in each other (m) elements are still told by their own planes: vertices know better how deep they are in the body.
+    /// How deep in each other (m) elements are still told by their own planes: vertices know better how deep they are
+    /// in the body.
     fn deepest(&self, pair: &ElementPair) -> f64 {
         let is_body = |v: &u32| *v as usize >= self.input.len();
         if pair.vertices.iter().any(is_body) { self.settings.gap } else { DEEP }

@@ -1,10 +1,10 @@
 //! The fast pass: what the networks leave, slight penetrations, is parted where it is, in some ten milliseconds.
 //!
-//! Triangles that intersect, found exactly, and vertices on the wrong side around them tell where; conditions there and on what is
-//! near ([`conditions`]) are met by a few smooth sweeps over two rings of neighbours ([`relax`]). Rounds move freely as long as they
-//! help: cloth that lies deeper than one triangle could not come out through the step filter. The last ones are filtered, so that
-//! they make no new intersection. What parted triangles once is asked for in all later rounds. It ends when nothing intersects, or
-//! when rounds no longer help: the rest is for the next stage.
+//! Triangles that intersect, found exactly, and vertices on the wrong side around them tell where; conditions there and
+//! on what is near ([`conditions`]) are met by a few smooth sweeps over two rings of neighbours ([`relax`]). Rounds
+//! move freely as long as they help: cloth that lies deeper than one triangle could not come out through the step
+//! filter. The last ones are filtered, so that they make no new intersection. What parted triangles once is asked for
+//! in all later rounds. It ends when nothing intersects, or when rounds no longer help: the rest is for the next stage.
 
 mod conditions;
 mod known;
@@ -113,8 +113,8 @@ fn mends_folds(settings: &ResolveSettings) -> bool {
     settings.self_contact && settings.loosened > 1.0
 }
 
-/// Whether nothing is left for another stage: neither what intersects, nor more than `most_folds` pairs of garments with themselves,
-/// nor whole parts on the wrong side, nor torn cloth.
+/// Whether nothing is left for another stage: neither what intersects, nor more than `most_folds` pairs of garments
+/// with themselves, nor whole parts on the wrong side, nor torn cloth.
 fn is_good(certificate: &Certificate, most_folds: usize) -> bool {
     certificate.is_clear()
         && certificate.self_triangle_pairs <= most_folds
@@ -257,8 +257,8 @@ impl<'a> FastPass<'a> {
         self.own().filter(move |pair| is_asked(pair) && !(self.is_pinch(pair.0) && self.is_pinch(pair.1)))
     }
 
-    /// Conditions that part folds, which are pairs of one garment after the other. Crumples are smoothed: those of the input for good,
-    /// of others what was done to them is taken back.
+    /// Conditions that part folds, which are pairs of one garment after the other. Crumples are smoothed: those of the
+    /// input for good, of others what was done to them is taken back.
     fn part_folds(&mut self, positions: &mut [[f64; 3]]) -> Vec<Contact> {
         let all: Vec<(u32, u32)> = self.parted_folds().copied().collect();
         let outfit = self.outfit;

@@ -20,8 +20,8 @@ const CREASE: f64 = 0.06;
 const LEFT: f64 = 0.5;
 /// Fewest and most rings of neighbours for these distances.
 const RINGS: (usize, usize) = (2, 40);
-/// What is laid out may raise the strain energy of a garment by this share: a fold that holds more is none to take away. The cloth
-/// under a bust that a network folds up over it holds 15 to 30 % in a tight garment…
+/// What is laid out may raise the strain energy of a garment by this share: a fold that holds more is none to take
+/// away. The cloth under a bust that a network folds up over it holds 15 to 30 % in a tight garment…
 pub(super) const STRAINED: f64 = 0.5;
 /// …but a place where the body is pinched only by this one: there is hardly any room to lay cloth out in.
 const STRAINED_WHERE_PINCHED: f64 = 0.1;
