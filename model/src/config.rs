@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::ModelError;
+use crate::ops::Precision;
 
 /// Which garments of an outfit interact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -84,6 +85,9 @@ pub struct ModelConfig {
     /// garment any more. Training takes every network once. By default one step per network; 0 leaves what the paper's
     /// networks make as it is.
     pub correction_steps: Option<usize>,
+    /// Numbers that the DiffusionNet blocks and the modulated SIRENs multiply in on a processor, in both passes. Weights, sums and
+    /// everything else are f32.
+    pub precision: Precision,
 }
 
 impl Default for ModelConfig {
@@ -111,6 +115,7 @@ impl Default for ModelConfig {
             corrections: 0,
             correction_width: 96,
             correction_steps: None,
+            precision: Precision::F32,
         }
     }
 }

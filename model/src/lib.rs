@@ -52,6 +52,7 @@ pub use linear::Linear;
 pub use linear_blend_skinning::linear_blend_skinning;
 pub use mlp::ResidualMlp;
 pub use mode::Mode;
+pub use ops::Precision;
 pub use packing::Packing;
 pub use siren::{ModulatedSiren, Modulator, SirenSizes};
 pub use skinning::Skinning;

@@ -6,7 +6,7 @@ use crate::testing::{
 
 fn net(width: usize) -> DiffusionNet {
     let device = device();
-    let mut net = seeded(5, |start| DiffusionNet::new(3, width, 6, start));
+    let mut net = seeded(5, |start| DiffusionNet::new(3, width, 6, Precision::F32, start));
     // Away from the starting times, so that diffusion matters.
     for (index, block) in net.blocks.iter_mut().enumerate() {
         let times = (0..width).map(|channel| 0.002 * (channel + index) as f32 - 0.001).collect::<Vec<_>>();
@@ -88,7 +88,7 @@ fn gradients_match_finite_differences() {
 fn a_time_at_its_lower_bound_still_learns() {
     let device = device();
     let garment = HostGarment::random(60, 12, &[true], 4).tensors(&device);
-    let net = seeded(6, |start| DiffusionNet::new(1, 6, 6, start));
+    let net = seeded(6, |start| DiffusionNet::new(1, 6, 6, Precision::F32, start));
     let gradients = parameter_gradients(&net, loss(net.forward(&garment)));
     let (_, time) = gradients.iter().find(|(name, _)| name == "blocks.0.diffusion.time").expect("name");
     assert!(time.iter().any(|gradient| gradient.abs() > 0.0));

@@ -6,6 +6,7 @@ use burn::tensor::Tensor;
 
 use super::host::{HostBackend, MatrixView};
 use super::operation::{ArgumentGradients, FusedOps, Operation, Saved, Saves, TensorKernel, apply};
+use super::right_factor::Precision;
 use super::row_blocks::HOST_ONLY;
 use super::tensors::Tensors;
 use super::tile::StridedMatrix;
@@ -37,11 +38,12 @@ pub struct DiffusionMlpArguments {
     pub output: [Tensor<2>; 2],
 }
 
-/// `x + MLP(x, Φ·diffused, gradient features)` `[V,C]`, where the tensors [lie in host memory](super::runs_on_host).
+/// `x + MLP(x, Φ·diffused, gradient features)` `[V,C]`, where the tensors [lie in host memory](super::runs_on_host); products in
+/// `precision`.
 ///
 /// With `x0 x1 x2` and `y0 y1 y2` for the three `coefficients` expanded to both axes, the gradient features are
 /// `tanh(x0 (x1 − y2) + y0 (y1 + x2))`.
-pub fn diffusion_mlp(arguments: DiffusionMlpArguments) -> Tensor<2> {
+pub fn diffusion_mlp(arguments: DiffusionMlpArguments, precision: Precision) -> Tensor<2> {
     let a = arguments;
     let [coefficients, real, imaginary] = a.coefficients;
     let [hidden_weight, hidden_bias] = a.hidden;
@@ -62,7 +64,7 @@ pub fn diffusion_mlp(arguments: DiffusionMlpArguments) -> Tensor<2> {
         output_weight,
         output_bias,
     ];
-    apply(DiffusionMlp { recorded: false }, arguments)
+    apply(DiffusionMlp { precision, recorded: false }, arguments)
 }
 
 /// Matrices `[V,C]` that the backward pass reads: x0, y0, x1 − y2, y1 + x2, gradient features, both hidden layers.
@@ -71,6 +73,7 @@ const STATES: usize = 7;
 /// Arguments in the order of [`DiffusionMlpArguments`].
 #[derive(Clone, Debug)]
 struct DiffusionMlp {
+    precision: Precision,
     /// Whether what the backward pass reads is a result too.
     recorded: bool,
 }
@@ -81,13 +84,13 @@ impl TensorKernel for DiffusionMlp {
     }
 
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
-        forward::run::<B>(self.recorded, arguments.take())
+        forward::run::<B>(self, arguments.take())
     }
 }
 
 impl Operation<14> for DiffusionMlp {
     fn recorded(self) -> Self {
-        Self { recorded: true }
+        Self { recorded: true, ..self }
     }
 
     /// Features, bases and the four weights.
@@ -101,7 +104,8 @@ impl Operation<14> for DiffusionMlp {
         saved: Saved<B, 14>,
         gradient: FloatTensor<B>,
     ) -> ArgumentGradients<B, 14> {
-        let mut gradients = B::run(&DiffusionMlpGradients, saved.with(gradient)).0.into_iter();
+        let mut gradients =
+            B::run(&DiffusionMlpGradients(self.precision), saved.with(gradient)).0.into_iter();
         std::array::from_fn(|argument| if matches!(argument, 1 | 2) { None } else { gradients.next() })
     }
 }
@@ -109,7 +113,7 @@ impl Operation<14> for DiffusionMlp {
 /// Gradients of all arguments but the bases, from features, bases, weights, what the forward pass recorded and the gradient of
 /// the result.
 #[derive(Clone, Debug)]
-struct DiffusionMlpGradients;
+struct DiffusionMlpGradients(Precision);
 
 impl TensorKernel for DiffusionMlpGradients {
     fn composed<B: Backend>(&self, _: Tensors<B>) -> Tensors<B> {
@@ -117,7 +121,7 @@ impl TensorKernel for DiffusionMlpGradients {
     }
 
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
-        backward::run::<B>(arguments.take())
+        backward::run::<B>(self.0, arguments.take())
     }
 }
 

@@ -10,6 +10,7 @@ use burn::tensor::TensorData;
 use rayon::prelude::*;
 
 use super::composed::multiply_add;
+use super::right_factor::Precision;
 use super::tensors::Tensors;
 use super::tile::StridedMatrix;
 use crate::packing::Packing;
@@ -50,11 +51,13 @@ pub(super) trait HostBackend: Backend {
         None
     }
 
-    /// `lhs·rhs`, plus the addend if there is one, in the memory of the addend if no other tensor shares it.
+    /// `lhs·rhs`, plus the addend if there is one, in the memory of the addend if no other tensor shares it; multiplied in the
+    /// precision, if the backend can.
     fn product(
         lhs: FloatTensor<Self>,
         rhs: FloatTensor<Self>,
         addend: Option<FloatTensor<Self>>,
+        _precision: Precision,
     ) -> FloatTensor<Self> {
         multiply_add::<Self>(lhs, rhs, addend)
     }

@@ -9,9 +9,9 @@ use burn::tensor::Tensor;
 
 use super::host::{HostBackend, MatrixView};
 use super::operation::{ArgumentGradients, FusedOps, Operation, Saved, Saves, TensorKernel, apply};
-use super::row_blocks::{HOST_ONLY, panels, square_panels, transposed_panels};
+use super::right_factor::{Precision, RightFactor};
+use super::row_blocks::{HOST_ONLY, factor, square_factors, transposed_factor};
 use super::tensors::Tensors;
-use super::tile::Panels;
 use crate::packing::Packing;
 
 mod backward;
@@ -39,18 +39,19 @@ pub struct SirenArguments {
     pub output_bias: Tensor<2>,
 }
 
-/// Values `[N,O]`, where the tensors [lie in host memory](super::runs_on_host).
+/// Values `[N,O]`, where the tensors [lie in host memory](super::runs_on_host). Layers between units multiply in `precision`, the
+/// first and the last one in f32.
 pub fn modulated_siren(
     arguments: SirenArguments,
-    omega_first: f64,
-    omega_hidden: f64,
+    [omega_first, omega_hidden]: [f64; 2],
     packing: &Packing,
+    precision: Precision,
 ) -> Tensor<2> {
     let a = arguments;
     let layers = a.gate_weights.dims()[0] / a.gate_weights.dims()[1] + 1;
     let mut omegas = vec![omega_hidden as f32; layers];
     omegas[0] = omega_first as f32;
-    let operation = ModulatedSirenLayers { omegas, packing: packing.clone(), recorded: false };
+    let operation = ModulatedSirenLayers { omegas, packing: packing.clone(), precision, recorded: false };
     let arguments = [
         a.coordinates,
         a.vertex_product,
@@ -71,32 +72,38 @@ struct ModulatedSirenLayers {
     /// w0 of every layer.
     omegas: Vec<f32>,
     packing: Packing,
+    precision: Precision,
     /// Whether phases and gates are results too.
     recorded: bool,
 }
 
 /// Right factors of the products of a pass.
 struct Weights {
-    gates: Vec<Panels>,
-    first: Panels,
-    sines: Vec<Panels>,
-    output: Panels,
+    gates: Vec<RightFactor>,
+    first: RightFactor,
+    sines: Vec<RightFactor>,
+    output: RightFactor,
 }
 
 impl Weights {
     /// Of the weights between gates, of the first sine layer, of the others and of the output layer.
-    fn new([gates, first, sines, output]: [MatrixView<'_>; 4], transposed: bool) -> Self {
-        let panels = if transposed { transposed_panels } else { panels };
+    fn new(
+        [gates, first, sines, output]: [MatrixView<'_>; 4],
+        transposed: bool,
+        precision: Precision,
+    ) -> Self {
+        let factor = if transposed { transposed_factor } else { factor };
         Self {
-            gates: square_panels(gates, transposed),
-            first: panels(first),
-            sines: square_panels(sines, transposed),
-            output: panels(output),
+            gates: square_factors(gates, transposed, precision),
+            // Coordinates turn into phases of several periods here, and values into positions.
+            first: factor(first, Precision::F32),
+            sines: square_factors(sines, transposed, precision),
+            output: factor(output, Precision::F32),
         }
     }
 
     /// Of sine layer `layer`, counted from 0.
-    fn sine(&self, layer: usize) -> &Panels {
+    fn sine(&self, layer: usize) -> &RightFactor {
         layer.checked_sub(1).map_or(&self.first, |hidden| &self.sines[hidden])
     }
 }

@@ -17,6 +17,7 @@ use super::composed::add_optional;
 use super::composed::multiply_add;
 use super::host::HostBackend;
 use super::operation::{ArgumentGradients, FusedOps, Operation, Saved, Saves, TensorKernel, apply};
+use super::right_factor::Precision;
 use super::tensors::Tensors;
 
 /// `lhs·rhs`: `[N,K]`, `[K,C]` → `[N,C]`.
@@ -24,7 +25,15 @@ use super::tensors::Tensors;
 /// # Panics
 /// If the inner sizes differ.
 pub fn product(lhs: Tensor<2>, rhs: Tensor<2>) -> Tensor<2> {
-    apply(MatrixProduct, [lhs, rhs])
+    product_in(Precision::F32, lhs, rhs)
+}
+
+/// The same, multiplied in `precision` where the tensors [lie in host memory](super::runs_on_host); its gradients too.
+///
+/// # Panics
+/// If the inner sizes differ.
+pub fn product_in(precision: Precision, lhs: Tensor<2>, rhs: Tensor<2>) -> Tensor<2> {
+    apply(MatrixProduct { precision }, [lhs, rhs])
 }
 
 /// `lhs·rhs + addend`: `[N,K]`, `[K,C]`, `[N,C]` → `[N,C]`; in the memory of `addend` if no other tensor shares it.
@@ -32,12 +41,14 @@ pub fn product(lhs: Tensor<2>, rhs: Tensor<2>) -> Tensor<2> {
 /// # Panics
 /// If the sizes disagree.
 pub fn product_add(lhs: Tensor<2>, rhs: Tensor<2>, addend: Tensor<2>) -> Tensor<2> {
-    apply(MatrixProduct, [lhs, rhs, addend])
+    apply(MatrixProduct { precision: Precision::F32 }, [lhs, rhs, addend])
 }
 
 /// The factors, then the addend if there is one.
 #[derive(Clone, Copy, Debug)]
-struct MatrixProduct;
+struct MatrixProduct {
+    precision: Precision,
+}
 
 impl TensorKernel for MatrixProduct {
     fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
@@ -53,7 +64,7 @@ impl TensorKernel for MatrixProduct {
 
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
         let ([lhs, rhs], addend) = arguments.take_optional();
-        [B::product(lhs, rhs, addend)].into()
+        [B::product(lhs, rhs, addend, self.precision)].into()
     }
 }
 

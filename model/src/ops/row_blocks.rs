@@ -7,7 +7,7 @@ use burn::tensor::{DType, Device, Tensor};
 use rayon::prelude::*;
 
 use super::host::{Chunk, MatrixView};
-use super::tile::Panels;
+use super::right_factor::{Precision, RightFactor};
 use crate::packing::Packing;
 
 /// Rows of a block at most. Fewer would read the weights and add to their gradients, which often lie in the third-level cache
@@ -47,33 +47,42 @@ pub(super) fn row_blocks(packing: &Packing) -> Vec<Chunk> {
 }
 
 /// The right factor of a product with `matrix`.
-pub(super) fn panels(matrix: MatrixView<'_>) -> Panels {
-    panels_of_rows(matrix, 0..matrix.rows(), false)
+pub(super) fn factor(matrix: MatrixView<'_>, precision: Precision) -> RightFactor {
+    factor_of_rows(matrix, 0..matrix.rows(), false, precision)
 }
 
 /// The right factor of a product with the transpose of `matrix`.
-pub(super) fn transposed_panels(matrix: MatrixView<'_>) -> Panels {
-    panels_of_rows(matrix, 0..matrix.rows(), true)
+pub(super) fn transposed_factor(matrix: MatrixView<'_>, precision: Precision) -> RightFactor {
+    factor_of_rows(matrix, 0..matrix.rows(), true, precision)
 }
 
 /// The right factors of products with square matrices that lie one below the other.
-pub(super) fn square_panels(matrices: MatrixView<'_>, transposed: bool) -> Vec<Panels> {
+pub(super) fn square_factors(
+    matrices: MatrixView<'_>,
+    transposed: bool,
+    precision: Precision,
+) -> Vec<RightFactor> {
     let width = matrices.columns();
     let starts = (0..matrices.rows()).step_by(width);
-    starts.map(|start| panels_of_rows(matrices, start..start + width, transposed)).collect()
+    starts.map(|start| factor_of_rows(matrices, start..start + width, transposed, precision)).collect()
 }
 
-fn panels_of_rows(matrix: MatrixView<'_>, rows: Range<usize>, transposed: bool) -> Panels {
+fn factor_of_rows(
+    matrix: MatrixView<'_>,
+    rows: Range<usize>,
+    transposed: bool,
+    precision: Precision,
+) -> RightFactor {
     let (block, columns) = (matrix.strided().from(rows.start, 0), matrix.columns());
-    let mut panels = Panels::default();
+    let mut factor = RightFactor::default();
     // SAFETY: rows of the matrix.
     unsafe {
         match transposed {
-            true => panels.fill(block.transposed(), columns, rows.len()),
-            false => panels.fill(block, rows.len(), columns),
+            true => factor.fill(block.transposed(), [columns, rows.len()], precision),
+            false => factor.fill(block, [rows.len(), columns], precision),
         }
     }
-    panels
+    factor
 }
 
 /// Sums over blocks, K vectors of the given lengths, to which `add` adds what one block contributes; S is memory that a task

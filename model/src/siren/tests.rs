@@ -11,6 +11,7 @@ const SIZES: SirenSizes = SirenSizes {
     vertex_latent: 7,
     omega_first: 30.0,
     omega_hidden: 1.0,
+    precision: Precision::F32,
 };
 
 struct SirenCase {
@@ -165,4 +166,35 @@ fn weights_start_within_the_bounds_of_the_concatenated_layers() {
     assert!((0.25..=1.0 / 3.0).contains(&largest(siren.sine[0].weight.val())));
     let hidden = (6.0 / width as f32).sqrt();
     assert!((0.9 * hidden..=hidden).contains(&largest(siren.sine[1].weight.val())));
+}
+
+#[test]
+fn bf16_is_near_f32_in_values_and_gradients_and_the_same_for_any_number_of_threads() {
+    let sizes = SirenSizes { width: 64, layers: 5, ..SIZES };
+    let packing = Packing::new([400, 77]);
+    let of = |precision| case_of(&SirenSizes { precision, ..sizes }, packing.clone());
+    let (exact, case) = (of(Precision::F32), of(Precision::Bf16));
+    let run = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let output = case.split();
+            (values(&output), parameter_gradients(&case.siren, loss(output)))
+        })
+    };
+    let (output, gradients) = run(1);
+    assert!((output.clone(), gradients.clone()) == run(3));
+    let plain = values(&exact.split());
+    let of_parameters = parameter_gradients(&exact.siren, loss(exact.split()));
+    let differ = Precision::Bf16.rounds();
+    let relative = |a: &[f32], b: &[f32]| {
+        let norm = |x: &mut dyn Iterator<Item = f32>| x.map(|x| f64::from(x).powi(2)).sum::<f64>().sqrt();
+        norm(&mut a.iter().zip(b).map(|(a, b)| a - b)) / norm(&mut b.iter().copied())
+    };
+    // Roundings of 2⁻⁹ at most, through five layers and back.
+    let is_near = |error: f64| error < 2e-2 && (error > 0.0) == differ;
+    assert!(is_near(relative(&output, &plain)), "{}", relative(&output, &plain));
+    for ((name, gradient), (_, expected)) in gradients.iter().zip(&of_parameters) {
+        let error = relative(gradient, expected);
+        assert!(error < 2e-2, "{name}: {error}");
+    }
 }

@@ -8,7 +8,10 @@ const REWORDED: [(&str, &str); 3] = [
         "unknown field `held_out_clips`: it is now data.poses.validation_clips (scored by every validation of the run) and \
          data.poses.test_clips (read by `clothcombo eval` only)",
     ),
-    ("duplicate field `single_garments`", "losses.alone is the old name of losses.single_garments, which is set as well"),
+    (
+        "duplicate field `single_garments`",
+        "losses.alone is the old name of losses.single_garments, which is set as well",
+    ),
     ("invalid type: unit variant, expected string only", "it must be a name in quotes"),
 ];
 

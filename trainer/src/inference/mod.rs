@@ -62,7 +62,9 @@ pub use names::UniqueNames;
 pub use outfit::{MAX_GARMENTS, MAX_VERTICES, Outfit, OutfitGarment};
 pub use phase_times::PhaseTimes;
 pub use refine::{RefineSteps, Refinement, refine};
-pub use report::{BodyReport, DrapedGarmentReport, FrameReport, ModelReport, Moment, Report, ScoredPositions};
+pub use report::{
+    BodyReport, DrapedGarmentReport, FrameReport, ModelReport, Moment, Report, ScoredPositions,
+};
 pub use shipped::shipped_model;
 pub use smooth::{Smoothing, smooth};
 pub use source::{GarmentCatalog, GivenGarment};

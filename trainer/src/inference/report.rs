@@ -204,7 +204,12 @@ impl Drape {
     ///
     /// # Errors
     /// When a value overflows.
-    pub fn score(&self, draper: &Draper, outfit: &Outfit, which: ScoredPositions) -> Result<Score, DraperError> {
+    pub fn score(
+        &self,
+        draper: &Draper,
+        outfit: &Outfit,
+        which: ScoredPositions,
+    ) -> Result<Score, DraperError> {
         let refused = |e: &dyn std::fmt::Display| DatasetError::Data(e.to_string());
         let body = TriMesh::new(self.body.clone(), draper.body().faces.to_vec()).map_err(|e| refused(&e))?;
         let garments: Vec<DrapedGarment> = outfit

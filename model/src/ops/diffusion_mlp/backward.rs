@@ -4,20 +4,21 @@ use burn::backend::tensor::FloatTensor;
 
 use super::{STATES, axes};
 use crate::ops::host::{Chunk, HostBackend, MatrixView, NewPart, NewValues, vectorised};
-use crate::ops::row_blocks::{add_to, map_lanes, row_blocks, sum_over_blocks, transposed_panels};
+use crate::ops::right_factor::{Precision, RightFactor};
+use crate::ops::row_blocks::{add_to, map_lanes, row_blocks, sum_over_blocks, transposed_factor};
 use crate::ops::tensors::Tensors;
-use crate::ops::tile::{OutputBlock, Panels, StridedMatrix};
+use crate::ops::tile::{OutputBlock, StridedMatrix};
 use crate::packing::Packing;
 
 /// Arguments: features, both bases, weights (gradient features, features, second layer, output), states, gradient of the
 /// result.
-pub(super) fn run<B: HostBackend>(arguments: [FloatTensor<B>; 9]) -> Tensors<B> {
+pub(super) fn run<B: HostBackend>(precision: Precision, arguments: [FloatTensor<B>; 9]) -> Tensors<B> {
     let held = arguments.map(B::hold);
     let [features, gradient_basis, basis, gradient_weight, input, hidden, output, states, gradient] =
         held.each_ref().map(B::view);
     let (width, eigen) = (features.columns(), basis.columns());
-    let weights = [gradient_weight, input, hidden, output].map(transposed_panels);
-    let pass = Pass { features, gradient_basis, basis, states, gradient, weights };
+    let weights = [gradient_weight, input, hidden, output].map(|weight| transposed_factor(weight, precision));
+    let pass = Pass { features, gradient_basis, basis, states, gradient, weights, precision };
     let blocks = row_blocks(&Packing::new([features.rows()]));
     let lengths = blocks.iter().map(|block| block.rows.len() * width).collect();
     let mut of_features = NewValues::new(lengths);
@@ -40,7 +41,7 @@ pub(super) fn run<B: HostBackend>(arguments: [FloatTensor<B>; 9]) -> Tensors<B> 
 #[derive(Default)]
 struct Scratch {
     matrices: [Vec<f32>; 5],
-    panels: Panels,
+    factor: RightFactor,
     bias: Vec<f32>,
 }
 
@@ -51,7 +52,8 @@ struct Pass<'a> {
     states: MatrixView<'a>,
     gradient: MatrixView<'a>,
     /// Transposed: of the gradient features, of the features, of the second layer, of the output.
-    weights: [Panels; 4],
+    weights: [RightFactor; 4],
+    precision: Precision,
 }
 
 impl Pass<'_> {
@@ -78,7 +80,7 @@ impl Pass<'_> {
             of_output,
             of_output_bias,
         ] = sums;
-        let Scratch { matrices, panels, bias } = scratch;
+        let Scratch { matrices, factor, bias } = scratch;
         matrices.iter_mut().for_each(|matrix| matrix.resize(size, 0.0));
         bias.resize(width, 0.0);
         let [a, b, of_x, of_y, of_x1] = matrices;
@@ -99,23 +101,23 @@ impl Pass<'_> {
         // SAFETY (all products): every matrix has `count` rows of the columns it is multiplied with, sums the size of the
         // product; the gradient of the features is written before it is added to.
         unsafe {
-            let sum = |lhs: StridedMatrix, rows: usize, panels: &Panels, sums: &mut [f32]| {
-                panels.multiply(lhs.transposed(), rows, 0..count, to(sums), true);
+            let sum = |lhs: StridedMatrix, rows: usize, factor: &RightFactor, sums: &mut [f32]| {
+                factor.multiply(lhs.transposed(), rows, 0..count, to(sums), true);
             };
             // What comes from memory is read in its order before it is a transposed factor.
             weight_output.multiply(gradient, count, 0..width, to(a), false);
             masked(second, a, bias);
             add_to(of_hidden_bias, bias);
-            panels.fill(gradient, count, width);
-            sum(matrix(second), width, panels, of_output);
+            factor.fill(gradient, [count, width], self.precision);
+            sum(matrix(second), width, factor, of_output);
             weight_hidden.multiply(matrix(a), count, 0..width, to(b), false);
             masked(first, b, bias);
             add_to(of_bias, bias);
-            panels.fill(matrix(a), count, width);
-            sum(matrix(first), width, panels, of_hidden);
-            panels.fill(matrix(b), count, width);
-            sum(features, width, panels, of_input);
-            sum(self.basis.strided().from(start, 0), eigen, panels, of_diffused);
+            factor.fill(matrix(a), [count, width], self.precision);
+            sum(matrix(first), width, factor, of_hidden);
+            factor.fill(matrix(b), [count, width], self.precision);
+            sum(features, width, factor, of_input);
+            sum(self.basis.strided().from(start, 0), eigen, factor, of_diffused);
             let of_features = of_features.unwritten().as_mut_ptr().cast::<f32>();
             for (index, row) in block.rows.clone().enumerate() {
                 let from = self.gradient.row(row).as_ptr();
@@ -129,18 +131,18 @@ impl Pass<'_> {
                 #[inline(always)]
                 || mixed_gradients([x, y, real, imaginary, gradient_features], a, [of_x, of_y, of_x1, of_y1]),
             );
-            sum(matrix(gradient_features), width, panels, of_gradient_weight);
+            sum(matrix(gradient_features), width, factor, of_gradient_weight);
             let [along_x, along_y] = axes(&self.gradient_basis, start);
-            panels.fill(matrix(of_x), count, width);
-            sum(along_x, eigen, panels, of_c);
-            panels.fill(matrix(of_y), count, width);
-            sum(along_y, eigen, panels, of_c);
-            panels.fill(matrix(of_x1), count, width);
-            sum(along_x, eigen, panels, of_real);
-            sum(along_y, eigen, panels, subtracted);
-            panels.fill(matrix(of_y1), count, width);
-            sum(along_y, eigen, panels, of_real);
-            sum(along_x, eigen, panels, of_imaginary);
+            factor.fill(matrix(of_x), [count, width], self.precision);
+            sum(along_x, eigen, factor, of_c);
+            factor.fill(matrix(of_y), [count, width], self.precision);
+            sum(along_y, eigen, factor, of_c);
+            factor.fill(matrix(of_x1), [count, width], self.precision);
+            sum(along_x, eigen, factor, of_real);
+            sum(along_y, eigen, factor, subtracted);
+            factor.fill(matrix(of_y1), [count, width], self.precision);
+            sum(along_y, eigen, factor, of_real);
+            sum(along_x, eigen, factor, of_imaginary);
         }
     }
 }

@@ -4,33 +4,39 @@ use std::mem::MaybeUninit;
 
 use burn::backend::tensor::FloatTensor;
 
-use super::{STATES, axes};
+use super::{DiffusionMlp, STATES, axes};
 use crate::ops::host::{Chunk, HostBackend, MatrixView, NewValues, for_each, vectorised};
 use crate::ops::math::tanh;
-use crate::ops::row_blocks::{map_lanes, panels, row_blocks};
+use crate::ops::right_factor::RightFactor;
+use crate::ops::row_blocks::{factor, map_lanes, row_blocks};
 use crate::ops::tensors::Tensors;
-use crate::ops::tile::{OutputBlock, Panels, StridedMatrix};
+use crate::ops::tile::{OutputBlock, StridedMatrix};
 use crate::packing::Packing;
 
 /// The result; then, if it is `recorded`, the states of every block of rows one after the other.
-pub(super) fn run<B: HostBackend>(recorded: bool, arguments: [FloatTensor<B>; 14]) -> Tensors<B> {
+pub(super) fn run<B: HostBackend>(operation: &DiffusionMlp, arguments: [FloatTensor<B>; 14]) -> Tensors<B> {
+    let DiffusionMlp { precision, recorded } = *operation;
+    let factor = |matrix| factor(matrix, precision);
     let held = arguments.map(B::hold);
     let views = held.each_ref().map(B::view);
     let [features, gradient_basis, basis, c, real, imaginary, diffused, gradient, input, bias, ..] = views;
     let [.., hidden, hidden_bias, output, output_bias] = views;
     let width = features.columns();
     let negative: Vec<f32> = (0..imaginary.rows()).flat_map(|row| imaginary.row(row)).map(|c| -c).collect();
-    let mut negative_imaginary = Panels::default();
+    let mut negative_imaginary = RightFactor::default();
     // SAFETY: the copy has the same size.
-    unsafe { negative_imaginary.fill(StridedMatrix::of_rows(&negative, width), imaginary.rows(), width) };
+    unsafe {
+        let matrix = StridedMatrix::of_rows(&negative, width);
+        negative_imaginary.fill(matrix, [imaginary.rows(), width], precision);
+    }
     let pass = Pass {
         features,
         gradient_basis,
         basis,
-        coefficients: [c, real, imaginary].map(panels),
+        coefficients: [c, real, imaginary].map(factor),
         negative_imaginary,
-        diffused: panels(diffused),
-        weights: [gradient, input, hidden, output].map(panels),
+        diffused: factor(diffused),
+        weights: [gradient, input, hidden, output].map(factor),
         biases: [bias, hidden_bias, output_bias].map(|bias| bias.row(0)),
     };
     let blocks = row_blocks(&Packing::new([features.rows()]));
@@ -63,11 +69,11 @@ struct Pass<'a> {
     features: MatrixView<'a>,
     gradient_basis: MatrixView<'a>,
     basis: MatrixView<'a>,
-    coefficients: [Panels; 3],
-    negative_imaginary: Panels,
-    diffused: Panels,
+    coefficients: [RightFactor; 3],
+    negative_imaginary: RightFactor,
+    diffused: RightFactor,
     /// Of the gradient features, of the features, of the second layer, of the output.
-    weights: [Panels; 4],
+    weights: [RightFactor; 4],
     /// Of the first layer, of the second, of the output.
     biases: [&'a [f32]; 3],
 }
@@ -90,9 +96,10 @@ impl Pass<'_> {
         // SAFETY: every matrix has `count` rows of its columns, and is written before it is read.
         unsafe {
             let written = |state: usize| std::slice::from_raw_parts_mut(place(state).first, size);
-            let product = |lhs: StridedMatrix, rhs: &Panels, terms: usize, to: OutputBlock, add: bool| {
-                rhs.multiply(lhs, count, 0..terms, to, add);
-            };
+            let product =
+                |lhs: StridedMatrix, rhs: &RightFactor, terms: usize, to: OutputBlock, add: bool| {
+                    rhs.multiply(lhs, count, 0..terms, to, add);
+                };
             product(x, c, eigen, place(0), false);
             product(y, c, eigen, place(1), false);
             product(x, real, eigen, place(2), false);

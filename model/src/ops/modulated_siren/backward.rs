@@ -7,9 +7,10 @@ use burn::backend::tensor::FloatTensor;
 use super::{ModulatedSirenLayers, Weights};
 use crate::ops::host::{Chunk, HostBackend, MatrixView, NewPart, NewValues, vectorised};
 use crate::ops::math::sin_cos;
+use crate::ops::right_factor::{Precision, RightFactor};
 use crate::ops::row_blocks::{add_to, map_lanes, row_blocks, sum_over_blocks};
 use crate::ops::tensors::Tensors;
-use crate::ops::tile::{OutputBlock, Panels, StridedMatrix};
+use crate::ops::tile::{OutputBlock, StridedMatrix};
 
 /// Arguments: coordinates, weights (between gates, first, sines, output), phases, gates, gradient of the values.
 pub(super) fn run<B: HostBackend>(
@@ -27,7 +28,8 @@ pub(super) fn run<B: HostBackend>(
         gradient,
         phases,
         gates,
-        weights: Weights::new([gate_weights, first, sine_weights, output], true),
+        weights: Weights::new([gate_weights, first, sine_weights, output], true, operation.precision),
+        precision: operation.precision,
         omegas: &operation.omegas,
         width,
     };
@@ -57,7 +59,7 @@ struct Scratch {
     /// Gradients of gates, which become those of their arguments: of this layer and of the one above.
     gates: [Vec<f32>; 2],
     features: Vec<f32>,
-    panels: Panels,
+    factor: RightFactor,
     /// Sums over the rows of one block: of the gates' arguments and of the phases.
     sums: [Vec<f32>; 2],
 }
@@ -68,6 +70,7 @@ struct Pass<'a> {
     phases: MatrixView<'a>,
     gates: MatrixView<'a>,
     weights: Weights,
+    precision: Precision,
     omegas: &'a [f32],
     width: usize,
 }
@@ -84,7 +87,7 @@ impl Pass<'_> {
         let (count, width, layers) = (block.rows.len(), self.width, self.omegas.len());
         let (inputs, outputs) = (self.coordinates.columns(), self.gradient.columns());
         let size = count * width;
-        let Scratch { phases, gates, features, panels, sums: block_sums } = scratch;
+        let Scratch { phases, gates, features, factor: right, sums: block_sums } = scratch;
         for matrix in phases.iter_mut().chain(gates.iter_mut()).chain([&mut *features]) {
             matrix.resize(size, 0.0);
         }
@@ -152,20 +155,20 @@ impl Pass<'_> {
             unsafe {
                 let factor = StridedMatrix::of_rows(features, width).transposed();
                 if layer + 1 == layers {
-                    panels.fill(gradient, count, outputs);
+                    right.fill(gradient, [count, outputs], Precision::F32);
                     let sums = OutputBlock::of_rows(of_output, outputs);
-                    panels.multiply(factor, width, 0..count, sums, true);
+                    right.multiply(factor, width, 0..count, sums, true);
                 } else {
-                    panels.fill(StridedMatrix::of_rows(above, width), count, width);
+                    right.fill(StridedMatrix::of_rows(above, width), [count, width], self.precision);
                     let sums = OutputBlock::of_rows(&mut of_sines[layer * width * width..], width);
-                    panels.multiply(factor, width, 0..count, sums, true);
+                    right.multiply(factor, width, 0..count, sums, true);
                 }
                 if layer + 1 < layers {
                     // Not where the layer above is done: these gates have been read in their order since, and are at hand.
-                    panels.fill(StridedMatrix::of_rows(gates_above, width), count, width);
+                    right.fill(StridedMatrix::of_rows(gates_above, width), [count, width], self.precision);
                     let factor = StridedMatrix::of_rows(gate, width).transposed();
                     let of_weight = OutputBlock::of_rows(&mut of_gates[layer * width * width..], width);
-                    panels.multiply(factor, width, 0..count, of_weight, true);
+                    right.multiply(factor, width, 0..count, of_weight, true);
                 }
                 if layer > 0 {
                     let of_gate = StridedMatrix::of_rows(gates_below, width);
@@ -181,9 +184,9 @@ impl Pass<'_> {
         }
         // SAFETY: as above; all elements are written.
         unsafe {
-            panels.fill(StridedMatrix::of_rows(below, width), count, width);
+            right.fill(StridedMatrix::of_rows(below, width), [count, width], Precision::F32);
             let of_weight = OutputBlock::of_rows(of_first, width);
-            panels.multiply(coordinates.transposed(), inputs, 0..count, of_weight, true);
+            right.multiply(coordinates.transposed(), inputs, 0..count, of_weight, true);
             let of_coordinates = of_coordinates.unwritten().as_mut_ptr().cast();
             let of_coordinates = OutputBlock { first: of_coordinates, row_stride: inputs };
             let of_phase = StridedMatrix::of_rows(below, width);

@@ -80,9 +80,9 @@ impl ResolveError {
     /// The garment it is about.
     pub fn garment(&self) -> Option<usize> {
         match *self {
-            Self::Count { garment, .. } | Self::DoubledFace { garment, .. } | Self::Position { garment, .. } => {
-                Some(garment)
-            }
+            Self::Count { garment, .. }
+            | Self::DoubledFace { garment, .. }
+            | Self::Position { garment, .. } => Some(garment),
             Self::Setting { .. } | Self::Transforms { .. } | Self::EmptyBody => None,
         }
     }
