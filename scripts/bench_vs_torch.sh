@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Training and draping beside PyTorch, the tables of docs/performance.md: forward, forward + backward, whole step, losses,
-# drape latency and peak memory at widths 64, 128 and 512 with 1, 3 and 6 garments. Nothing else should run meanwhile;
-# about half an hour on two cores, most of it at width 512.
+# Training and draping beside PyTorch: forward, forward + backward, whole step, losses, drape latency and peak memory, by
+# default at widths 64, 128 and 512 with 1, 3 and 6 garments (half an hour on two cores); docs/performance.md has the rows of
+# --widths 128,512 --layers 3 (seven minutes). Nothing else should run meanwhile.
 #
 #   scripts/bench_vs_torch.sh [options of bench_torch.py] > tables.md
 #

@@ -85,8 +85,8 @@ pub struct ModelConfig {
     /// garment any more. Training takes every network once. By default one step per network; 0 leaves what the paper's
     /// networks make as it is.
     pub correction_steps: Option<usize>,
-    /// Numbers that the DiffusionNet blocks and the modulated SIRENs multiply in on a processor, in both passes. Weights, sums and
-    /// everything else are f32.
+    /// Numbers that are multiplied at every vertex of DiffusionNet's blocks and of the modulated SIRENs (but for coordinates and
+    /// output), in both passes, on a processor with the `flex` backend. Weights, sums and everything else are f32.
     pub precision: Precision,
 }
 

@@ -75,6 +75,14 @@ pub(super) fn check(
         return Err(format!("{}: no area: all {triangles} triangles are collapsed", path.display()));
     }
     let topology = Topology::new(&mesh);
+    let measures = MeshMeasures::new(&mesh, &topology);
+    if let Some(triangle) = measures.defects.doubled_triangles.first() {
+        return Err(format!(
+            "{}: triangle {triangle} (from 0) has the vertices of an earlier one; hint: `clothcombo fit` leaves such \
+             triangles out",
+            path.display()
+        ));
+    }
     let mut gaps: Vec<f64> = mesh
         .positions()
         .par_iter()
@@ -85,7 +93,7 @@ pub(super) fn check(
     let median = gaps[gaps.len() / 2];
     let category = hints.category.unwrap_or_else(|| Category::guess(&mesh, body));
     let garment = GarmentCheck {
-        mesh: MeshMeasures::new(&mesh, &topology),
+        mesh: measures,
         category,
         category_guessed: hints.category.is_none(),
         layer: hints.layer.unwrap_or_else(|| layer_guess(median, category)),

@@ -33,8 +33,10 @@ pub struct MeshDefects {
     pub non_manifold_edges: Vec<[u32; 2]>,
     /// Edges through which both triangles run in one direction, so that one of them faces inward.
     pub flipped_edges: Vec<[u32; 2]>,
-    /// Triangles without area, or with the vertices of an earlier one.
+    /// Triangles without area.
     pub degenerate_triangles: Vec<u32>,
+    /// Triangles with the vertices of an earlier one.
+    pub doubled_triangles: Vec<u32>,
     /// Vertices at the place of an earlier one (within 10⁻⁵ of the diagonal).
     pub duplicate_vertices: Vec<u32>,
     /// Vertices of no triangle.
@@ -48,6 +50,7 @@ impl MeshDefects {
             (self.non_manifold_edges.len(), "non-manifold edges"),
             (self.flipped_edges.len(), "flipped edges"),
             (self.degenerate_triangles.len(), "degenerate triangles"),
+            (self.doubled_triangles.len(), "doubled triangles"),
             (self.duplicate_vertices.len(), "duplicate vertices"),
             (self.isolated_vertices.len(), "isolated vertices"),
         ]
@@ -69,8 +72,6 @@ impl MeshMeasures {
         lengths.sort_by(f64::total_cmp);
         let diagonal = diagonal(positions);
         let clean = clean_faces(positions, mesh.faces(), AREA_SHARE * diagonal * diagonal);
-        let mut degenerate_triangles = [clean.degenerate, clean.repeated].concat();
-        degenerate_triangles.sort_unstable();
         let duplicate_vertices =
             if diagonal > 0.0 { weld(positions, WELD_SHARE * diagonal).merged } else { Vec::new() };
         let flipped_edges = topology
@@ -93,7 +94,8 @@ impl MeshMeasures {
             defects: MeshDefects {
                 non_manifold_edges: topology.non_manifold_edges.clone(),
                 flipped_edges,
-                degenerate_triangles,
+                degenerate_triangles: clean.degenerate,
+                doubled_triangles: clean.repeated,
                 duplicate_vertices,
                 isolated_vertices: topology.unreferenced.clone(),
             },
@@ -127,13 +129,16 @@ mod tests {
         positions.extend([[2.0, 0.0, 0.0], [3.0, 0.0, 0.0], [4.0, 0.0, 0.0]]);
         let n = positions.len() as u32;
         faces.push([n - 3, n - 2, n - 1]);
+        let [a, b, c] = faces[5];
+        faces.push([c, b, a]);
         let broken = TriMesh::new(positions, faces).unwrap();
         let defects = MeshMeasures::new(&broken, &Topology::new(&broken)).defects;
         assert_eq!(defects.non_manifold_edges.len(), 1);
         assert!(!defects.flipped_edges.is_empty());
         assert_eq!(defects.degenerate_triangles, [13]);
+        assert_eq!(defects.doubled_triangles, [14]);
         assert_eq!(defects.duplicate_vertices, [12]);
         assert_eq!(defects.isolated_vertices, [12, 14]);
-        assert_eq!(defects.counts().len(), 5);
+        assert_eq!(defects.counts().len(), 6);
     }
 }

@@ -1,8 +1,8 @@
 //! Products of bf16 numbers with f32 sums, on processors that multiply such pairs (AVX512-BF16): twice the rate of f32.
 //!
-//! Both factors are rounded to the nearest bf16, a relative error of at most 2⁻⁹; their products are exact in f32, and sums are
-//! f32. Terms go in pairs, two bf16 in the place of one f32. An element of the result is the sum of its pairs in their order,
-//! whatever tile it lies in. Subnormal numbers count as zero.
+//! Both factors are rounded to the nearest bf16, a relative error of at most 2⁻⁸; sums are f32, and subnormal numbers count as
+//! zero. Terms go in pairs, two bf16 in the place of one f32. An element of the result is the sum of its pairs in their order,
+//! whatever tile it lies in.
 
 use std::arch::x86_64::{
     __m256bh, __m256i, __m512, __m512bh, __m512i, __mmask16, _mm512_add_ps, _mm512_cvtepu16_epi32,
@@ -98,9 +98,11 @@ impl PairPanels {
 
 /// The elements of a vector that are among the first `count`.
 #[inline(always)]
-fn first(count: usize) -> __mmask16 {
-    u16::MAX >> (LANES - LANES.min(count))
+const fn first(count: usize) -> __mmask16 {
+    if count < LANES { (1 << count) - 1 } else { __mmask16::MAX }
 }
+
+const _: () = assert!(first(0) == 0 && first(15) == 0x7fff && first(16) == 0xffff);
 
 /// Two vectors rounded to the nearest bf16, ties to even, element beside element.
 #[inline]

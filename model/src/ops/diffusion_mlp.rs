@@ -6,7 +6,7 @@ use burn::tensor::Tensor;
 
 use super::host::{HostBackend, MatrixView};
 use super::operation::{ArgumentGradients, FusedOps, Operation, Saved, Saves, TensorKernel, apply};
-use super::right_factor::Precision;
+use super::precision::Precision;
 use super::row_blocks::HOST_ONLY;
 use super::tensors::Tensors;
 use super::tile::StridedMatrix;

@@ -7,7 +7,8 @@ use burn::backend::tensor::FloatTensor;
 use burn::backend::{Flex, TensorMetadata};
 use rayon::prelude::*;
 
-use super::right_factor::{Precision, RightFactor};
+use super::precision::Precision;
+use super::right_factor::RightFactor;
 use super::tile::{OutputBlock, StridedMatrix};
 
 /// Multiplications and additions below which a second thread costs more than it saves.
@@ -159,8 +160,12 @@ unsafe fn write_long_sums(
 /// # Safety
 /// `block` has `[rows, terms]` elements, and so many can be read from every column.
 unsafe fn along_rows(block: StridedMatrix, rows: usize, terms: usize, copy: &mut Vec<f32>) -> StridedMatrix {
-    if block.column_stride == 1 || rows == 1 {
+    if block.column_stride == 1 {
         return block;
+    }
+    if rows == 1 {
+        // There is no step to another row.
+        return StridedMatrix { row_stride: 1, ..block };
     }
     assert_eq!(block.row_stride, 1, "neither rows nor columns of a left factor are contiguous");
     copy.clear();
@@ -184,9 +189,19 @@ mod tests {
     use burn::backend::ops::FloatTensorOps;
     use burn::tensor::{TensorData, bf16};
 
-    /// Rows, terms, columns: small, tall, long sums, both wide; sizes that no block divides.
-    const SIZES: [[usize; 3]; 6] =
-        [[7, 5, 3], [1931, 97, 65], [65, 4099, 33], [257, 2051, 40], [300, 301, 299], [33, 2500, 300]];
+    /// Rows, terms, columns: small, tall, long sums, both wide; sizes that no block divides, and several blocks of terms.
+    const SIZES: [[usize; 3]; 10] = [
+        [7, 5, 3],
+        [1931, 97, 65],
+        [65, 4099, 33],
+        [257, 2051, 40],
+        [300, 301, 299],
+        [33, 2500, 300],
+        [300, 1027, 33],
+        [40, 31, 32],
+        [41, 48, 17],
+        [1, 16, 16],
+    ];
 
     fn values(count: usize, seed: u64) -> Vec<f32> {
         let mut state = seed;
@@ -215,12 +230,16 @@ mod tests {
             // The left factor of a weight's gradient is a transposed view.
             let turned: Vec<f32> = (0..inner * rows).map(|i| a[(i % rows) * inner + i / rows]).collect();
             let turned = Flex::float_swap_dims(matrix(&turned, inner, rows), 0, 1);
+            // The right one of the gradient of a factor is too.
+            let turned_rhs: Vec<f32> =
+                (0..inner * columns).map(|i| b[(i % inner) * columns + i / inner]).collect();
+            let turned_rhs = Flex::float_swap_dims(matrix(&turned_rhs, columns, inner), 0, 1);
             let run = |threads: usize| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 pool.install(|| {
                     let mut sum = c.clone();
                     add_product(&turned, &rhs, &mut sum, precision);
-                    [product(&lhs, &rhs, precision), sum]
+                    [product(&lhs, &turned_rhs, precision), sum]
                 })
             };
             let found = run(1);

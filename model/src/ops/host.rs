@@ -10,7 +10,7 @@ use burn::tensor::TensorData;
 use rayon::prelude::*;
 
 use super::composed::multiply_add;
-use super::right_factor::Precision;
+use super::precision::Precision;
 use super::tensors::Tensors;
 use super::tile::StridedMatrix;
 use crate::packing::Packing;

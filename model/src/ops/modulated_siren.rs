@@ -9,7 +9,8 @@ use burn::tensor::Tensor;
 
 use super::host::{HostBackend, MatrixView};
 use super::operation::{ArgumentGradients, FusedOps, Operation, Saved, Saves, TensorKernel, apply};
-use super::right_factor::{Precision, RightFactor};
+use super::precision::Precision;
+use super::right_factor::RightFactor;
 use super::row_blocks::{HOST_ONLY, factor, square_factors, transposed_factor};
 use super::tensors::Tensors;
 use crate::packing::Packing;

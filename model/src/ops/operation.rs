@@ -24,7 +24,7 @@ use burn::tensor::Tensor;
 use super::host::HostBackend;
 use super::tensors::Tensors;
 
-/// A function of tensors in three forms, which agree to rounding (products on matrix units: to 2⁻¹⁵ of a term).
+/// A function of tensors in three forms, which agree to rounding (products on matrix units: to 2⁻¹⁵ of a term; in bf16: to 2⁻⁷).
 pub(super) trait TensorKernel {
     /// Composed of a backend's own operations.
     fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B>;

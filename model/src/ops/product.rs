@@ -17,7 +17,7 @@ use super::composed::add_optional;
 use super::composed::multiply_add;
 use super::host::HostBackend;
 use super::operation::{ArgumentGradients, FusedOps, Operation, Saved, Saves, TensorKernel, apply};
-use super::right_factor::Precision;
+use super::precision::Precision;
 use super::tensors::Tensors;
 
 /// `lhs·rhs`: `[N,K]`, `[K,C]` → `[N,C]`.
@@ -28,7 +28,7 @@ pub fn product(lhs: Tensor<2>, rhs: Tensor<2>) -> Tensor<2> {
     product_in(Precision::F32, lhs, rhs)
 }
 
-/// The same, multiplied in `precision` where the tensors [lie in host memory](super::runs_on_host); its gradients too.
+/// The same, multiplied in `precision` by the flex backend; its gradients too.
 ///
 /// # Panics
 /// If the inner sizes differ.

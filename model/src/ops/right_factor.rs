@@ -2,34 +2,10 @@
 
 use std::ops::Range;
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
 #[cfg(target_arch = "x86_64")]
-use super::bf16::{self, PairPanels};
+use super::bf16::PairPanels;
+use super::precision::Precision;
 use super::tile::{OutputBlock, Panels, StridedMatrix};
-
-/// Numbers that large matrices are multiplied in on a processor. Sums, weights and everything else are f32.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Precision {
-    /// f32.
-    #[default]
-    F32,
-    /// bf16 where the processor multiplies it (AVX512-BF16), at twice the rate; else f32. A GPU has numbers of its own.
-    Bf16,
-}
-
-impl Precision {
-    /// Whether factors are rounded to bf16 on this processor.
-    pub fn rounds(self) -> bool {
-        #[cfg(target_arch = "x86_64")]
-        let is_available = bf16::is_available();
-        #[cfg(not(target_arch = "x86_64"))]
-        let is_available = false;
-        self == Self::Bf16 && is_available
-    }
-}
 
 /// The right factor of a product.
 #[derive(Default)]

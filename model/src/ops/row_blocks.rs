@@ -7,7 +7,8 @@ use burn::tensor::{DType, Device, Tensor};
 use rayon::prelude::*;
 
 use super::host::{Chunk, MatrixView};
-use super::right_factor::{Precision, RightFactor};
+use super::precision::Precision;
+use super::right_factor::RightFactor;
 use crate::packing::Packing;
 
 /// Rows of a block at most. Fewer would read the weights and add to their gradients, which often lie in the third-level cache

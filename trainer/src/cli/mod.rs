@@ -34,7 +34,7 @@ use crate::system::closed_pipe::print_stderr;
 use clap::{Command, Parser};
 use miette::Report;
 
-/// The arguments of a program. A negative number is a value of any flag, so that the flag says what it takes.
+/// The arguments of a program. A negative number is a value and no flag, so that what takes it says what it may be.
 ///
 /// # Errors
 /// Those of clap, also for help and version.

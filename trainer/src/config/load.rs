@@ -1,7 +1,7 @@
 //! Reading a configuration: file, then `--set` overrides, then consistency; errors show the place.
 
 use super::Config;
-use super::reworded::reworded;
+use super::reworded::{present_name, reworded};
 use super::sources::{Place, Sources};
 use miette::{Diagnostic, NamedSource, SourceSpan};
 use serde::Deserialize;
@@ -163,7 +163,7 @@ fn apply(tree: &mut toml::Value, setting: &str) -> Result<(), String> {
         node = match node {
             toml::Value::Table(table) => {
                 if last {
-                    table.insert(part.to_owned(), value);
+                    table.insert(present_name(part).to_owned(), value);
                     return Ok(());
                 }
                 table.entry(part).or_insert_with(|| toml::Value::Table(toml::Table::new()))
@@ -250,6 +250,19 @@ mod tests {
             let text = e.unwrap_err().to_string();
             assert!(text.contains("data.poses.validation_clips") && text.contains("test_clips"), "{text}");
         }
+    }
+
+    #[test]
+    fn earlier_names_of_keys_are_read_from_files_and_overrides() {
+        let early = format!("{SMALL}\n[losses]\nalone = 0.25\n")
+            .replace("steps = 10", "steps = 10\nscenes_per_step = 2");
+        let in_file = load(written(&early).path(), &[]).unwrap();
+        let settings = ["losses.alone=0.25".to_owned(), "stages.0.scenes_per_step=2".to_owned()];
+        for config in [in_file, load(written(SMALL).path(), &settings).unwrap()] {
+            assert_eq!((config.losses.single_garments, config.stages[0].bodies), (0.25.into(), 2));
+        }
+        let list = load(written(SMALL).path(), &["losses.body_collision.samples=[]".to_owned()]);
+        assert!(list.unwrap_err().to_string().contains("one name"));
     }
 
     #[test]

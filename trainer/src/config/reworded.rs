@@ -1,19 +1,22 @@
-//! Messages of the parser that say more to a user in other words: keys that are gone or have another name, values of
-//! another kind.
+//! Names of keys that changed, and messages of the parser that say more to a user in other words.
+
+/// Earlier names of keys that files may still have (`serde`'s aliases), and the present ones.
+const EARLIER: [(&str, &str); 2] = [("alone", "single_garments"), ("scenes_per_step", "bodies")];
 
 /// What the parser says, and what is said instead.
-const REWORDED: [(&str, &str); 3] = [
+const REWORDED: [(&str, &str); 2] = [
     (
         "unknown field `held_out_clips`",
         "unknown field `held_out_clips`: it is now data.poses.validation_clips (scored by every validation of the run) and \
          data.poses.test_clips (read by `clothcombo eval` only)",
     ),
-    (
-        "duplicate field `single_garments`",
-        "losses.alone is the old name of losses.single_garments, which is set as well",
-    ),
-    ("invalid type: unit variant, expected string only", "it must be a name in quotes"),
+    ("invalid type: unit variant, expected string only", "it must be one name"),
 ];
+
+/// The present name of a key.
+pub(super) fn present_name(key: &str) -> &str {
+    EARLIER.iter().find(|(earlier, _)| *earlier == key).map_or(key, |(_, present)| present)
+}
 
 /// The message of a parser in words that help.
 pub(super) fn reworded(message: &str) -> String {

@@ -185,9 +185,11 @@ pub enum DraperError {
         /// Where it is (m).
         position: [f64; 3],
     },
-    /// A garment that was not fitted has a face twice.
+    /// A garment that is taken as it is has a face twice.
     #[error("post-process: garment '{garment}', face {face} (from 0) has the vertices of face {first}")]
-    #[diagnostic(help("leave --fit never out, so that the mesh is repaired, or remove the face"))]
+    #[diagnostic(help(
+        "let the mesh be repaired: `clothcombo fit` does it, and drape where --fit is not never"
+    ))]
     DoubledFace {
         /// The garment.
         garment: String,

@@ -9,6 +9,7 @@ use crate::system::device::name;
 use crate::system::paths::{lossy, lossy_option};
 use clothcombo_data::asset::Category;
 use clothcombo_data::fit::FitReport;
+use clothcombo_model::Precision;
 use clothcombo_physics::contact::resolve::Certificate;
 use clothcombo_physics::mesh::TriMesh;
 use serde::Serialize;
@@ -24,6 +25,8 @@ pub struct ModelReport {
     pub step: u64,
     /// BLAKE3 checksum of its parameters.
     pub checksum: String,
+    /// Numbers that a processor multiplied in (`model.precision`, as far as this one can).
+    pub precision: Precision,
 }
 
 /// The body.
@@ -174,6 +177,7 @@ impl Report {
                 folder: trained.folder.clone(),
                 step: trained.state.step,
                 checksum: trained.checksum().to_owned(),
+                precision: trained.config.model.precision.effective(),
             },
             body,
             garments: garment_reports(outfit, drapes),

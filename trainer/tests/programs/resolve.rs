@@ -176,6 +176,13 @@ fn files_that_cannot_be_used_are_named() {
     let output = case.command(&["tee.obj"], &["--gap", "51"]).output().unwrap();
     assert!(output.status.code() == Some(2), "{output:?}");
     assert!(String::from_utf8_lossy(&output.stderr).contains("at most 50 mm"), "{output:?}");
+    let output = case.command(&["tee.obj"], &["--gap", "-1"]).output().unwrap();
+    assert!(output.status.code() == Some(2), "{output:?}");
+    assert!(String::from_utf8_lossy(&output.stderr).contains("greater than 0"), "{output:?}");
+    let doubled = quad_tube(0.149, 40, 12);
+    let face = doubled.lines().find(|line| line.starts_with("f ")).unwrap();
+    case.write("doubled.obj", &format!("{doubled}{face}\n"));
+    case.must_fail(&["tee.obj", "doubled.obj"], &[], &["doubled.obj", "face 0", "clothcombo fit"]);
     case.write("beside.obj", &with_vertices(&quad_tube(0.149, 40, 12), |[x, y, z]| [x + 2.0, y, z]));
     case.must_fail(&["beside.obj"], &[], &["beside.obj", "beside the body", "x from"]);
     case.write("large.obj", &with_vertices(&quad_tube(0.149, 40, 12), |p| p.map(|x| 1e3 * x)));

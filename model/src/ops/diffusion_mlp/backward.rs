@@ -4,7 +4,8 @@ use burn::backend::tensor::FloatTensor;
 
 use super::{STATES, axes};
 use crate::ops::host::{Chunk, HostBackend, MatrixView, NewPart, NewValues, vectorised};
-use crate::ops::right_factor::{Precision, RightFactor};
+use crate::ops::precision::Precision;
+use crate::ops::right_factor::RightFactor;
 use crate::ops::row_blocks::{add_to, map_lanes, row_blocks, sum_over_blocks, transposed_factor};
 use crate::ops::tensors::Tensors;
 use crate::ops::tile::{OutputBlock, StridedMatrix};

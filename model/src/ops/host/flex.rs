@@ -9,7 +9,7 @@ use burn::tensor::DType;
 use super::{HostBackend, MatrixView};
 use crate::ops::composed::multiply_add;
 use crate::ops::gemm;
-use crate::ops::right_factor::Precision;
+use crate::ops::precision::Precision;
 
 /// Where the elements lie once the tensor has been made contiguous; `None` if they are not f32.
 fn contiguous(tensor: &mut FloatTensor<Flex>) -> Option<Range<usize>> {

@@ -16,7 +16,7 @@ use crate::vec3;
 /// Counts what intersects what. `layers` from the body outwards. The same for any number of threads.
 ///
 /// # Errors
-/// When positions do not fit their garment or are not finite, or the body has no surface.
+/// When positions do not fit their garment or are not finite, a garment has a face twice, or the body has no surface.
 pub fn certify(body: &Surface<f64>, layers: &[Layer<'_>]) -> Result<Certificate, ResolveError> {
     check(body, layers)?;
     Ok(certified_around(body, layers))

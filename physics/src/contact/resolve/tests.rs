@@ -349,11 +349,13 @@ fn wrong_input_is_named() {
     assert_eq!(found.unwrap_err(), ResolveError::EmptyBody);
     let cloth = sheet(0.3, 4, 0.2);
     let [a, b, c] = cloth.faces()[7];
-    let faces = [cloth.faces(), &[[c, a, b]]].concat();
-    let doubled = TriMesh::new(cloth.positions().to_vec(), faces).unwrap();
-    let scene = Scene::new(&shapes::icosphere(0.1, 2), &[cloth, doubled]);
-    let found = resolve(&scene.body, &scene.layers(), &ResolveSettings::default());
-    assert_eq!(found.unwrap_err(), ResolveError::DoubledFace { garment: 1, face: 32, first: 7 });
+    for again in [[c, a, b], [a, c, b]] {
+        let faces = [cloth.faces(), &[again]].concat();
+        let doubled = TriMesh::new(cloth.positions().to_vec(), faces).unwrap();
+        let scene = Scene::new(&shapes::icosphere(0.1, 2), &[cloth.clone(), doubled]);
+        let found = resolve(&scene.body, &scene.layers(), &ResolveSettings::default());
+        assert_eq!(found.unwrap_err(), ResolveError::DoubledFace { garment: 1, face: 32, first: 7 });
+    }
 }
 
 #[test]

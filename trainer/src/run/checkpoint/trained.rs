@@ -185,7 +185,7 @@ impl TrainedModel {
         }
     }
 
-    /// Checksum of the parameters: equal ones make equal embeddings.
+    /// Checksum of the parameters.
     pub fn checksum(&self) -> &str {
         self.state.checksums.get(MODEL_EXCHANGE).map_or("", String::as_str)
     }

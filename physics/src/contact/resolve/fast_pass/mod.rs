@@ -6,8 +6,8 @@
 //! filter. The last ones are filtered, so that they make no new intersection. What parted triangles once is asked for
 //! in all later rounds. It ends when nothing intersects, or when rounds no longer help: the rest is for the next stage.
 
+mod certificate;
 mod conditions;
-mod known;
 #[cfg(test)]
 mod tests;
 
