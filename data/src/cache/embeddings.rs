@@ -2,7 +2,8 @@
 
 use super::{ArrayCache, CacheError, Key, KeyBuilder};
 
-/// The key of the embedding of a mesh by the networks whose parameters have the checksum `model`; `rounds`: they multiply in bf16.
+/// The key of the embedding of a mesh by the networks whose parameters have the checksum `model`; `rounds`: they
+/// multiply in bf16.
 pub fn embedding_key(mesh: Key, model: &str, eigen_count: usize, rounds: bool) -> Key {
     let key = KeyBuilder::new("embedding").key(mesh).text(model).number(eigen_count as u64);
     key.number(u64::from(rounds)).finish()

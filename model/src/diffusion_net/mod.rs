@@ -39,7 +39,8 @@ pub struct DiffusionNet {
 }
 
 impl DiffusionNet {
-    /// A network from 3 coordinates through `blocks` blocks of `width` channels, which multiply in `precision`, to `outputs` features.
+    /// A network from 3 coordinates through `blocks` blocks of `width` channels, which multiply in `precision`, to
+    /// `outputs` features.
     pub fn new(
         blocks: usize,
         width: usize,

@@ -74,11 +74,11 @@ fn bf16_is_near_f32_in_values_and_gradients_and_the_same_for_any_number_of_threa
     let error = relative_error(&output, &plain);
     // Roundings of 2⁻⁸ at most, through three blocks and back.
     assert!(error < 2e-2 && (error > 0.0) == Precision::Bf16.rounds(), "{error}");
-    for ((name, gradient), (_, expected)) in gradients.iter().zip(&of_parameters) {
-        let error = relative_error(gradient, expected);
-        eprintln!("{name}: {error}");
-    }
-    panic!();
+    // Sums over the vertices cancel in part, and units near 0 close.
+    let whole =
+        |gradients: Vec<(String, Vec<f32>)>| gradients.into_iter().flat_map(|(_, g)| g).collect::<Vec<_>>();
+    let error = relative_error(&whole(gradients), &whole(of_parameters));
+    assert!(error < 5e-2, "{error}");
 }
 
 #[test]

@@ -198,8 +198,8 @@ unsafe fn write_pairs_of_rows(matrix: StridedMatrix, rows: usize, terms: usize, 
     }
 }
 
-/// The product of pairs `[rows, K]`, or turned `[K, rows]`, with one panel `[K, PANEL]`, of whose columns as many as `columns` are
-/// wanted, tile by tile.
+/// The product of pairs `[rows, K]`, or turned `[K, rows]`, with one panel `[K, PANEL]`, of whose columns as many as
+/// `columns` are wanted, tile by tile.
 ///
 /// # Safety
 /// As [`PairPanels::multiply`].

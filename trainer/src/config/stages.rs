@@ -66,7 +66,7 @@ pub struct StageConfig {
     #[serde(default = "one", alias = "scenes_per_step")]
     pub bodies: usize,
     /// Scenes with garments of their own whose gradients are averaged before one update (gradient accumulation). They are
-    /// computed in parallel: on two cores a step with 2 takes 1.3 to 1.9 times as long as one with 1. The gradient is
+    /// computed in parallel: on two cores a step with 2 takes 1.5 to 1.9 times as long as one with 1. The gradient is
     /// less noisy. Processes of one run share the scenes.
     #[serde(default = "one")]
     pub accumulate: usize,

@@ -89,9 +89,8 @@ use garment::check;
 /// time limit in the settings); a clean input comes back to the bit.
 ///
 /// # Errors
-/// When a setting is out of range, positions do not fit their garment or are not finite, a garment has a face twice, or the body has
-/// no surface.
-/// Crossings that cannot be mended are no error: the certificate lists them.
+/// When a setting is out of range, positions do not fit their garment or are not finite, a garment has a face twice, or
+/// the body has no surface. Crossings that cannot be mended are no error: the certificate lists them.
 pub fn resolve(
     body: &Surface<f64>,
     layers: &[Layer<'_>],
