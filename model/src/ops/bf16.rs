@@ -215,7 +215,7 @@ unsafe fn strip<const TURNED: bool>(
     let mut row = 0;
     macro_rules! tiles {
         ($rows:expr) => {
-            while row + $rows <= rows {
+            while rows - row >= $rows {
                 let output = output.from(row, 0);
                 // SAFETY: rows below `rows`.
                 unsafe {

@@ -205,8 +205,8 @@ fn check_specific(specific: &[NamedModel], dataset: &Dataset) -> Result<(), Repo
         let names = other.model.names(&other.model.garments());
         if names.len() != 1 {
             return Err(miette!(
-                help = "train it on one garment: data.garments = [{{ folder = \"…\", only = [\"NAME\"] }}]",
-                "{}: a garment-specific model is trained on one garment, not on {}",
+                help = "train it on one garment: data.garments = [{ folder = \"…\", only = [\"NAME\"] }]",
+                "{}: a garment-specific model has one garment, the data of this one has {}",
                 other.name,
                 names.len()
             ));
