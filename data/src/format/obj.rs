@@ -98,7 +98,7 @@ impl ObjMesh {
 
     /// Polygons as triangle fans from their first corner.
     pub fn triangles(&self) -> Vec<[u32; 3]> {
-        self.polygons.iter().flat_map(|p| fan(p)).collect()
+        self.polygons.iter().flat_map(|p| fan(p, 0)).collect()
     }
 
     /// The triangles of one group.
@@ -106,7 +106,7 @@ impl ObjMesh {
         let Some(index) = self.groups.iter().position(|g| g == group) else { return Vec::new() };
         let of_group =
             self.polygons.iter().zip(&self.group_of_polygon).filter(|(_, g)| **g as usize == index);
-        of_group.flat_map(|(p, _)| fan(p)).collect()
+        of_group.flat_map(|(p, _)| fan(p, 0)).collect()
     }
 
     /// The vertices of one group, ascending, each once.

@@ -3,7 +3,7 @@
 //! What a file holds too much of is refused before memory is taken for it.
 
 use super::error::FileError;
-use crate::mesh::fan;
+use crate::mesh::{Cuts, fan};
 use clothcombo_physics::mesh::TriMesh;
 use std::path::Path;
 use std::{fs, io};
@@ -85,12 +85,14 @@ impl PolygonMesh {
         Ok(self)
     }
 
-    /// The polygons as fans of triangles; `path` is for messages only.
+    /// The polygons as fans of triangles around their first corners, or where an earlier one over the same corners
+    /// begins; `path` is for messages only.
     ///
     /// # Errors
     /// [`FileError`] if a face names a vertex twice or the faces make no mesh.
     pub fn to_tri_mesh(&self, path: &Path) -> Result<TriMesh, FileError> {
         let mut faces = Vec::with_capacity(self.corners.len().saturating_sub(2 * self.ends.len()));
+        let mut cuts = Cuts::default();
         for (face, polygon) in self.polygons().enumerate() {
             if let Some(vertex) = repeated(polygon) {
                 let message = format!(
@@ -103,7 +105,7 @@ impl PolygonMesh {
                     None => FileError::content(path)(message),
                 });
             }
-            faces.extend(fan(polygon));
+            faces.extend(fan(polygon, cuts.first(polygon, || 0)));
         }
         TriMesh::new(self.positions.clone(), faces).map_err(FileError::content(path))
     }

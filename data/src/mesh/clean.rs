@@ -39,9 +39,28 @@ pub fn diagonal(positions: &[[f64; 3]]) -> f64 {
     if positions.is_empty() { 0.0 } else { norm(sub(high, low)) }
 }
 
-/// A polygon as triangles around its first corner.
-pub fn fan(polygon: &[u32]) -> impl Iterator<Item = [u32; 3]> + '_ {
-    polygon.get(1..).unwrap_or_default().windows(2).map(|w| [polygon[0], w[0], w[1]])
+/// A polygon as triangles around its corner `first`.
+pub fn fan(polygon: &[u32], first: usize) -> impl Iterator<Item = [u32; 3]> + '_ {
+    let count = polygon.len();
+    (1..count.saturating_sub(1)).map(move |i| [0, i, i + 1].map(|k| polygon[(first + k) % count]))
+}
+
+/// Where polygons of more than three corners were cut: another one over the same corners, however it begins and runs, is cut into
+/// the same triangles, so that [`clean_faces`] finds it.
+#[derive(Debug, Default)]
+pub struct Cuts(HashMap<Vec<u32>, u32>);
+
+impl Cuts {
+    /// The corner of `polygon` to cut it from: that of an earlier one, or `own`.
+    pub fn first(&mut self, polygon: &[u32], own: impl FnOnce() -> usize) -> usize {
+        if polygon.len() < 4 {
+            return 0;
+        }
+        let mut corners = polygon.to_vec();
+        corners.sort_unstable();
+        let vertex = *self.0.entry(corners).or_insert_with(|| polygon[own()]);
+        polygon.iter().position(|v| *v == vertex).unwrap_or(0)
+    }
 }
 
 /// A quad is cut by its second diagonal where the first one folds it, or the second leaves a smallest angle with a sine this many
@@ -64,7 +83,7 @@ pub fn triangulate<'a>(
     positions: &[[f64; 3]],
     polygons: impl IntoIterator<Item = &'a [u32]>,
 ) -> Triangulated {
-    let mut result = Triangulated::default();
+    let (mut result, mut cuts) = (Triangulated::default(), Cuts::default());
     for (number, polygon) in polygons.into_iter().enumerate() {
         let count = polygon.len() as u32;
         let fan_around = |first: u32| {
@@ -80,7 +99,8 @@ pub fn triangulate<'a>(
             normals.windows(2).any(|pair| dot(pair[0], pair[1]) < 0.0)
         };
         let is_better = || worst(1) > WORTH_ANOTHER * worst(0) || is_folded(0);
-        let first = u32::from(count == 4 && is_better() && !is_folded(1));
+        let own = || usize::from(count == 4 && is_better() && !is_folded(1));
+        let first = cuts.first(polygon, own) as u32;
         for triangle in fan_around(first) {
             result.faces.push(triangle.map(|k| polygon[k as usize]));
             result.corners.push(triangle);
@@ -197,6 +217,29 @@ mod tests {
         assert_eq!(triangulate(&dart, [&[0u32, 1, 2, 3][..]]).faces, [[1, 2, 3], [1, 3, 0]]);
         let square = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.1, 1.0, 0.0], [0.0, 1.0, 0.0]];
         assert_eq!(triangulate(&square, [&[0u32, 1, 2, 3][..]]).faces, [[0, 1, 2], [0, 2, 3]]);
+    }
+
+    #[test]
+    fn polygons_over_the_same_corners_are_cut_into_the_same_triangles() {
+        let corners: Vec<[f64; 3]> =
+            (0..5).map(|k| f64::from(k) * 1.2).map(|angle| [angle.cos(), angle.sin(), 0.0]).collect();
+        for count in [4, 5] {
+            let polygon: Vec<u32> = (0..count).collect();
+            for start in 0..count as usize {
+                let mut again = polygon.clone();
+                again.rotate_left(start);
+                let reversed: Vec<u32> = again.iter().rev().copied().collect();
+                for again in [again, reversed] {
+                    let cut = triangulate(&corners, [polygon.as_slice(), &again]);
+                    let each = count - 2;
+                    let clean = clean_faces(&corners, &cut.faces, 1e-10);
+                    assert_eq!(clean.repeated, (each..2 * each).collect::<Vec<_>>(), "{again:?}");
+                    for (face, corners) in cut.faces.iter().zip(&cut.corners).skip(each as usize) {
+                        assert_eq!(corners.map(|k| again[k as usize]), *face);
+                    }
+                }
+            }
+        }
     }
 
     #[test]

@@ -16,8 +16,8 @@ mod triangle;
 
 pub use attachment::{Attachment, attach};
 pub use clean::{
-    AREA_SHARE, CleanFaces, Triangulated, WELD_SHARE, Welded, bounds, clean_faces, compact, diagonal, fan,
-    triangulate, weld,
+    AREA_SHARE, CleanFaces, Cuts, Triangulated, WELD_SHARE, Welded, bounds, clean_faces, compact, diagonal,
+    fan, triangulate, weld,
 };
 pub(crate) use distance_grid::DistanceGrid;
 pub use editable::EditableMesh;

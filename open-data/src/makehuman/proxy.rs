@@ -82,7 +82,7 @@ impl Proxy {
                     let worst = |pair: &[[u32; 3]; 2]| sine(&pair[0]).min(sine(&pair[1]));
                     faces.extend(if worst(&one) >= worst(&two) { one } else { two });
                 }
-                _ => faces.extend(fan(polygon)),
+                _ => faces.extend(fan(polygon, 0)),
             }
         }
         faces

@@ -181,8 +181,16 @@ fn files_that_cannot_be_used_are_named() {
     assert!(String::from_utf8_lossy(&output.stderr).contains("greater than 0"), "{output:?}");
     let doubled = quad_tube(0.149, 40, 12);
     let face = doubled.lines().find(|line| line.starts_with("f ")).unwrap();
-    case.write("doubled.obj", &format!("{doubled}{face}\n"));
-    case.must_fail(&["tee.obj", "doubled.obj"], &[], &["doubled.obj", "face 0", "clothcombo fit"]);
+    // The same quad from another corner, and the other way round.
+    let mut corners: Vec<&str> = face.split(' ').skip(1).collect();
+    for reverse in [false, true] {
+        corners.rotate_left(1);
+        if reverse {
+            corners.reverse();
+        }
+        case.write("doubled.obj", &format!("{doubled}f {}\n", corners.join(" ")));
+        case.must_fail(&["tee.obj", "doubled.obj"], &[], &["doubled.obj", "of face", "clothcombo fit"]);
+    }
     case.write("beside.obj", &with_vertices(&quad_tube(0.149, 40, 12), |[x, y, z]| [x + 2.0, y, z]));
     case.must_fail(&["beside.obj"], &[], &["beside.obj", "beside the body", "x from"]);
     case.write("large.obj", &with_vertices(&quad_tube(0.149, 40, 12), |p| p.map(|x| 1e3 * x)));

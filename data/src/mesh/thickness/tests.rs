@@ -27,7 +27,7 @@ pub(crate) fn solidified(outer: &TriMesh, thickness: f64) -> (Vec<[f64; 3]>, Vec
 }
 
 pub(crate) fn triangles(polygons: &[Vec<u32>]) -> Vec<[u32; 3]> {
-    polygons.iter().flat_map(|p| crate::mesh::fan(p)).collect()
+    polygons.iter().flat_map(|p| crate::mesh::fan(p, 0)).collect()
 }
 
 #[test]
