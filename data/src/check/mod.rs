@@ -13,7 +13,7 @@ pub use anatomy::impossible_turn;
 pub use body::BodyCheck;
 pub use garment::{GarmentCheck, layer_guess};
 pub use motion::{MotionCheck, not_radians, not_upright};
-pub use targets::{ManifestHints, Target, find_targets};
+pub use targets::{ManifestHints, Target, find_targets, only_body};
 
 use crate::asset::Body;
 use crate::asset::motion::holds_poses;

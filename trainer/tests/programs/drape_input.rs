@@ -73,6 +73,7 @@ fn wrong_input_names_itself_and_leaves_nothing() {
             vec!["17 shape numbers", "mannequin"],
         ),
         (vec!["--garments", TEE, "--pose", "none.npz"], vec!["none.npz"]),
+        (vec!["--garments", TEE, "--pose", "flying"], vec!["--pose flying", "standing, walking, reaching"]),
         (vec!["--garments", TEE, "--pose", &beyond], vec!["arms.npz has 4 frames, no frame 9"]),
         (vec!["--garments", TEE, "--motion", &motion, "--frames", "2..9"], vec!["4 frames"]),
         (vec!["--garments", TEE, "--posed", &cube], vec!["cube.obj", "4 vertices"]),
@@ -195,7 +196,9 @@ fn a_model_is_three_files_and_a_damaged_or_missing_one_is_named() {
     assert!(failure(&mut run(&["-o", "d"]), 1).contains("model.safetensors does not match its checksum"));
     fs::remove_dir_all(&models).unwrap();
     let message = failure(&mut run(&["-o", "d"]), 1);
-    assert!(message.contains("no trained model") && message.contains("--checkpoint"), "{message}");
+    for words in ["no trained model", "--checkpoint", "CLOTHCOMBO_MODELS"] {
+        assert!(message.contains(words), "{words}: {message}");
+    }
 }
 
 #[test]

@@ -78,7 +78,8 @@ fn a_quick_evaluation_holds_every_table_of_the_paper() {
     let output = arguments(&["--ablation", &format!("twin={}", run.display())]);
     assert!(output.status.success(), "{}", said(&output));
 
-    let eval: Value = serde_json::from_slice(&fs::read(report.join("eval.json")).unwrap()).unwrap();
+    let read = || serde_json::from_slice::<Value>(&fs::read(report.join("eval.json")).unwrap()).unwrap();
+    let eval = read();
     let evaluation = &eval["evaluation"];
     // Every set by itself: none mixes garments or poses that validation looked at with those that no run read.
     for key in ["training_garments", "validation_garments", "test_garments", "validation_clips", "test_clips"]
@@ -170,6 +171,11 @@ fn a_quick_evaluation_holds_every_table_of_the_paper() {
     );
     let markdown = fs::read_to_string(report.join("eval.md")).unwrap();
     assert!(markdown.contains("pareto.png") && report.join("pareto.png").is_file());
+
+    // A part by itself.
+    assert!(arguments(&["--only", "numerics"]).status.success());
+    let part = &read()["evaluation"];
+    assert!(part["numerics"].is_array() && part["methods"].is_null() && part["pareto"].is_null(), "{part}");
 
     // An evaluation is replaced, anything else is not.
     fs::write(folder.path().join("report").join("note.txt"), "mine").unwrap();
