@@ -34,7 +34,7 @@ const FORMATS: [(&[&str], &str, &str, &str); 8] = [
         "another file",
         "BVH, after solving it for a skeleton (Mokka, MotionBuilder), or fit SMPL to it (SOMA, MoSh++)",
     ),
-    (&["asf", "amc"], "an Acclaim skeleton", "another file", "BVH (amc2bvh, or Blender)"),
+    (&["asf", "amc"], "an Acclaim skeleton or motion", "another file", "`clothcombo import amc` reads it"),
 ];
 
 /// Why a file of a known format that is not read is refused, and the way out; `None` for formats that nobody knows, or

@@ -154,6 +154,9 @@ pub struct PoseConfig {
     /// Clips whose name contains one of these are for the final test: never trained on, and read by no validation, no choice
     /// of the best checkpoint and no picture of a run. `clothcombo eval` reads them.
     pub test_clips: Vec<String>,
+    /// Names of `validation_clips` and `test_clips` that may fit no clip, for recordings that not everybody has; any other name
+    /// that fits none is an error.
+    pub optional_clips: Vec<String>,
     /// Share of every other clip that is never trained on, in windows spread over the clip, which every validation scores. One
     /// block of `held_out_block` in every `1 / held_out_share`, rounded, at most every second one. A clip shorter than half of
     /// `held_out_block / held_out_share` has no window. Where the windows hold out less than a quarter of the share, such short
@@ -183,6 +186,7 @@ impl Default for PoseConfig {
             motions: None,
             validation_clips: Vec::new(),
             test_clips: Vec::new(),
+            optional_clips: Vec::new(),
             held_out_share: 0.1,
             held_out_block: 2.0,
             held_out_margin: 1.0,
@@ -229,6 +233,14 @@ impl PoseConfig {
                 key,
                 "names clips, but there are no motions",
                 "name their folder: data.poses.motions",
+            );
+        }
+        let is_held_out = |name: &String| named.iter().any(|(_, clips)| clips.contains(name));
+        if let Some(name) = self.optional_clips.iter().find(|name| !is_held_out(name)) {
+            return says(
+                "optional_clips",
+                &format!("has {name:?}, which is none of the names of validation_clips and test_clips"),
+                "name it in one of them as well",
             );
         }
         if self.max_self_intersection.is_nan() || self.max_self_intersection < 0.0 {

@@ -70,7 +70,9 @@ pub enum DatasetError {
     },
     /// A held-out name fits no clip.
     #[error("data.poses.{key} names {name:?}, which fits no clip in {}", folder.display())]
-    #[diagnostic(help("the clips are: {clips}"))]
+    #[diagnostic(help(
+        "a name that may fit none belongs in data.poses.optional_clips as well; the clips are: {clips}"
+    ))]
     UnknownClip {
         /// The key.
         key: &'static str,

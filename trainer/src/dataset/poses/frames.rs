@@ -50,11 +50,13 @@ fn is_named(clip: &str, names: &[String]) -> bool {
     names.iter().any(|name| clip.contains(name.as_str()))
 }
 
-/// Whether every name of the configuration fits a clip, and no clip is for two things.
+/// Whether every name of the configuration that is not optional fits a clip, and no clip is for two things.
 fn check_names(clips: &[Motion], config: &PoseConfig, folder: &Path) -> Result<(), DatasetError> {
     let sets = [("validation_clips", &config.validation_clips), ("test_clips", &config.test_clips)];
     for (key, names) in sets {
-        let fits = |name: &&String| clips.iter().any(|clip| clip.name.contains(name.as_str()));
+        let fits = |name: &&String| {
+            config.optional_clips.contains(name) || clips.iter().any(|clip| clip.name.contains(name.as_str()))
+        };
         if let Some(name) = names.iter().find(|name| !fits(name)) {
             return Err(DatasetError::UnknownClip {
                 key,
