@@ -34,9 +34,9 @@ pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
         return Ok(Vec::new());
     }
     let model = evaluator.model;
-    let shirt = shortest_shirt(model)?;
     let legs = |n| model.pick(&[Category::Trousers, Category::Skirt], n);
     let skirt = |n| model.pick(&[Category::Skirt, Category::Dress], n);
+    let shirt = shirt_over(model, skirt(0))?;
     let over = |n| model.pick(&[Category::OpenShirt, Category::Dress], n);
     let t_pose = Pose::t_pose(model.dataset.body.joint_count());
     let mean = BodySample { shape: vec![0.0; model.dataset.shape_count], pose: t_pose };
@@ -128,23 +128,24 @@ impl ModelUnderTest {
     }
 }
 
-/// Of the test garments that are T-shirts, else tops, the one whose hem is highest: a thigh that is raised lifts a skirt's hem
-/// above that of a long shirt, which then seems to be worn over it.
-fn shortest_shirt(model: &ModelUnderTest) -> Result<usize, Report> {
+/// Of the T-shirts and tops, test garments where there are some, the shortest one that reaches below the upper rim of `skirt`: a
+/// thigh that is raised lifts a skirt's hem above that of a long shirt, which then seems to be worn over it.
+fn shirt_over(model: &ModelUnderTest, skirt: usize) -> Result<usize, Report> {
+    let heights = |g: usize| {
+        let (low, high) = model.dataset.garments.garment(g)?.garment.rest.bounds();
+        Ok::<_, Report>([low[1], high[1]])
+    };
     let is_test = |g: &usize| model.dataset.split.test.contains(g);
     let mut shirts = model.all_of(Category::TShirt);
     shirts.extend(model.all_of(Category::Top));
     if shirts.iter().any(is_test) {
         shirts.retain(is_test);
     }
-    let mut best = (f64::NEG_INFINITY, 0);
-    for shirt in shirts {
-        let hem = model.dataset.garments.garment(shirt)?.garment.rest.bounds().0[1];
-        if hem > best.0 {
-            best = (hem, shirt);
-        }
-    }
-    Ok(best.1)
+    let rim = heights(skirt)?[1];
+    let hems =
+        shirts.iter().map(|&shirt| Ok((heights(shirt)?[0], shirt))).collect::<Result<Vec<_>, Report>>()?;
+    let shortest = hems.iter().filter(|(hem, _)| *hem < rim).max_by(|a, b| a.0.total_cmp(&b.0));
+    Ok(shortest.or(hems.first()).map_or(0, |(_, shirt)| *shirt))
 }
 
 /// Outfits from left to right; seen from the front, then from the back. Where all of them hold the same garments a colour

@@ -285,9 +285,9 @@ mod tests {
         assert!(count(&[], Some(20.0), baseline) > count(&[], None, baseline) + 150);
         let layers = [stage(200.0, "layers")];
         assert!(count(&layers, None, boundary) > count(&[], None, boundary) + 50);
-        // The second stage has no baseline of its own.
+        // The second stage has no baseline of its own; the first one's stands in words too, where it is the last.
         let [whole, half] = [&[][..], &layers].map(|more| count(more, Some(20.0), baseline) as f64);
-        assert!((0.35..0.65).contains(&(half / whole)), "{half} of {whole}");
+        assert!((0.25..0.6).contains(&(half / whole)), "{half} of {whole}");
     }
 
     #[test]

@@ -91,12 +91,12 @@ impl MemoryEstimate {
         let freezes = config.stages.iter().any(|s| s.trains.freezes());
         let met = v.single_scenes + v.unseen_scenes + v.layered_scenes * v.layers.iter().sum::<usize>() / 2;
         let met = 1.0 - (-(met as f64) / sizes.vertices.len().max(1) as f64).exp();
-        let embeddings = met + f64::from(u8::from(freezes));
-        let of_tensors = |v: usize| sizes.device_bytes(config, v, embeddings);
-        let all_tensors = sizes.sum(of_tensors);
+        let frozen = f64::from(u8::from(freezes));
+        let of_tensors = |v: usize| sizes.device_bytes(config, v, met + frozen);
+        let all_tensors = sizes.sum(|v| sizes.device_bytes(config, v, 1.0 + frozen));
         let of_step = bytes_of(layers.min(sizes.vertices.len()), &of_tensors);
         let left = if is_processor && streams { limit - garments } else { u64::MAX };
-        let tensors = all_tensors.min(left.min(limits.device as u64).max(of_step));
+        let tensors = sizes.sum(of_tensors).min(left.min(limits.device as u64).max(of_step));
 
         let bodies = config.stages.iter().map(|s| s.bodies * s.accumulate).max().unwrap_or(1);
         let body = BODY_VERTEX * sizes.body_vertices + BODY_TRIANGLE * sizes.body_faces;
