@@ -8,4 +8,4 @@ pub mod pose;
 
 pub use garment::{GarmentDesign, GarmentError, GarmentGenerator, GarmentSettings};
 pub use mannequin::mannequin;
-pub use pose::{PoseAugmentation, PoseSampler, SelfContact};
+pub use pose::{LimbDensity, PoseAugmentation, PoseSampler, SelfContact, uniform_pose};
