@@ -9,7 +9,7 @@ mod motion;
 mod placement;
 mod targets;
 
-pub use anatomy::impossible_turn;
+pub use anatomy::{impossible_turn, is_possible};
 pub use body::BodyCheck;
 pub use garment::{GarmentCheck, layer_guess};
 pub use motion::{MotionCheck, not_radians, not_upright};

@@ -8,4 +8,4 @@ pub mod pose;
 
 pub use garment::{GarmentDesign, GarmentError, GarmentGenerator, GarmentSettings};
 pub use mannequin::mannequin;
-pub use pose::{POSE_NAMES, PoseAugmentation, PoseSampler, SelfContact, named_pose};
+pub use pose::{LimbDensity, POSE_NAMES, PoseAugmentation, PoseSampler, SelfContact, named_pose, uniform_pose};

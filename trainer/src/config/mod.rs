@@ -18,8 +18,8 @@ mod stages;
 mod validation;
 
 pub use data::{
-    CacheConfig, DataConfig, GarmentSourceConfig, GenerateConfig, MOST_GARMENTS, PoseConfig, PoseEncoding,
-    SplitConfig, StartConfig,
+    CacheConfig, DataConfig, GarmentSourceConfig, GenerateConfig, MOST_GARMENTS, PoseBankConfig, PoseConfig,
+    PoseEncoding, SplitConfig, StartConfig,
 };
 pub use guard::{GuardConfig, InjectConfig, Injected};
 pub use load::{ConfigError, load, parse, to_toml};

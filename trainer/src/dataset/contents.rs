@@ -135,7 +135,7 @@ impl Dataset {
             asked if asked <= body.shape_count => asked,
             asked => return Err(DatasetError::ShapeComponents { asked, available: body.shape_count }),
         };
-        let poses = PoseLibrary::new(&config.data.poses, &body)?;
+        let poses = PoseLibrary::new(&config.data.poses, &body)?.with_bank(config);
         let memory = MemoryBudget::new(config.data.memory_limits());
         let garments = GarmentStore::load(config, body.clone(), joints, &memory, progress)?;
         let names: Vec<&str> = (0..garments.len()).map(|i| garments.info(i).name.as_str()).collect();

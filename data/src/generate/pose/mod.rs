@@ -3,6 +3,7 @@
 mod augmentation;
 mod figure;
 mod folded;
+mod limb_density;
 mod limits;
 mod named;
 mod sampler;
@@ -10,6 +11,7 @@ mod self_contact;
 
 pub use augmentation::PoseAugmentation;
 pub use folded::folded_poses;
+pub use limb_density::{LimbDensity, uniform_pose};
 pub use limits::{JOINT_LIMITS, JointLimits, is_within_limits, limited};
 pub use named::{POSE_NAMES, named_pose};
 pub use sampler::PoseSampler;

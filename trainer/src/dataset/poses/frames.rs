@@ -170,6 +170,15 @@ impl Frames {
         self.training.clips.iter().map(|clip| clip.poses.as_slice())
     }
 
+    /// The frames trained on, each with how likely [`sample_training`](Self::sample_training) is to draw it, relative to the
+    /// others.
+    pub fn weighted(&self) -> impl Iterator<Item = (&Pose, f64)> {
+        self.training.clips.iter().flat_map(|clip| {
+            let weight = clip.share() / clip.poses.len() as f64;
+            clip.poses.iter().map(move |pose| (pose, weight))
+        })
+    }
+
     /// A frame to train on.
     pub fn sample_training(&self, rng: &mut ChaCha8Rng) -> &Pose {
         self.training.draw(rng)
@@ -192,6 +201,14 @@ struct Clip {
     seconds: f64,
 }
 
+impl Clip {
+    /// Its share grows with the square root of its length in time: neighbouring frames are alike, so that by frames alone a long
+    /// clip, or one of a high frame rate, would crowd out the others.
+    fn share(&self) -> f64 {
+        self.seconds.sqrt()
+    }
+}
+
 /// Clips that are trained on, none of them empty.
 struct Training {
     clips: Vec<Clip>,
@@ -199,10 +216,8 @@ struct Training {
 }
 
 impl Training {
-    /// The share of a clip grows with the square root of its length in time: neighbouring frames are alike, so that by frames
-    /// alone a long clip, or one of a high frame rate, would crowd out the others.
     fn new(clips: Vec<Clip>) -> Result<Self, weighted::Error> {
-        let shares = WeightedIndex::new(clips.iter().map(|clip| clip.seconds.sqrt()))?;
+        let shares = WeightedIndex::new(clips.iter().map(Clip::share))?;
         Ok(Self { clips, shares })
     }
 
