@@ -40,6 +40,7 @@ impl DataSizes {
     /// # Errors
     /// [`DatasetError`] naming the file at fault.
     pub fn of_named(config: &Config) -> Result<Self, DatasetError> {
+        DatasetError::check_inputs(config)?;
         let body = load_body(&config.data.body, config.data.shape_components)?;
         Self::of_listed(&GarmentSource::list(&config.data.garments)?, &body)
     }
