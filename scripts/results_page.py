@@ -6,6 +6,7 @@ chooses the columns; the rest of the page is written by hand. A table that the r
 
     clothcombo eval -o report && scripts/results_page.py report
     scripts/figures.py --report report          # its pictures
+    scripts/results_page.py --check report      # any report: whether its tables have these columns
 """
 
 import pathlib
@@ -92,7 +93,11 @@ def refreshed(page: str, report: str) -> str:
 
 
 def main() -> None:
-    if len(sys.argv) != 2:
+    if sys.argv[1:2] == ["--check"] and len(sys.argv) == 3:
+        report = (pathlib.Path(sys.argv[2]) / "eval.md").read_text()
+        found = [title for title in COLUMNS if report_rows(report, title)]
+        sys.exit(None if len(found) > len(COLUMNS) / 2 else f"only {len(found)} of {len(COLUMNS)} tables are there: {found}")
+    if len(sys.argv) != 2 or sys.argv[1].startswith("-"):
         sys.exit(__doc__)
     folder = pathlib.Path(sys.argv[1])
     page = DOCS / "results.md"

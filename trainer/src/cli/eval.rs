@@ -11,7 +11,7 @@ use crate::inference::shipped_model;
 use crate::run::checkpoint::TrainedModel;
 use crate::run::report::html::utc;
 use crate::system::device::name;
-use crate::system::files::{write_file, write_json};
+use crate::system::files::{check_writable, write_file, write_json};
 use crate::system::paths::obstacle;
 use burn::tensor::Device;
 use clap::Parser;
@@ -94,12 +94,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let specific = named_models(arguments, &arguments.specific, &model, &device)?;
     check_specific(&specific, &model.dataset)?;
     check_ablations(&ablations, &model)?;
-    let unwritable = || format!("{}", folder.display());
-    fs::create_dir_all(folder).into_diagnostic().wrap_err_with(unwritable)?;
-    // Now, not after all the work.
-    let probe = folder.join(".clothcombo-probe");
-    let written = fs::write(&probe, "").and_then(|()| fs::remove_file(&probe));
-    written.into_diagnostic().wrap_err_with(unwritable)?;
+    // Now, not after all the work; nothing is made before that.
+    check_writable(folder).into_diagnostic().wrap_err_with(|| format!("{}", folder.display()))?;
 
     let counts = SceneCounts::new(arguments.quick);
     let bar = progress_bar(0, "{bar:30} {pos}/{len} · {elapsed} · {msg}");

@@ -26,6 +26,7 @@ pub use load::{ConfigError, load, parse, to_toml};
 pub use losses::{DistanceMode, LossesConfig};
 pub use optimizer::{ClipScope, OptimizerConfig};
 pub use output::OutputConfig;
+pub use paths::MissingInput;
 pub use ramp::{Ramp, RampShape};
 pub use schema::schema;
 pub use stages::{StageConfig, Trains, stage_starts};

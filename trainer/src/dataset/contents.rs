@@ -126,6 +126,7 @@ impl Dataset {
         joints: Option<&[String]>,
         progress: &(dyn Fn(usize, usize, &str) + Sync),
     ) -> Result<Self, DatasetError> {
+        DatasetError::check_inputs(config)?;
         let body = Arc::new(load_body(&config.data.body, config.data.shape_components)?);
         if body.joint_count() < BODY_JOINT_COUNT {
             return Err(DatasetError::FewJoints { name: body.name.clone(), joints: body.joint_count() });

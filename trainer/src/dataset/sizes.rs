@@ -43,6 +43,7 @@ impl DataSizes {
     /// # Errors
     /// [`DatasetError`] naming the file at fault.
     pub fn of_named(config: &Config) -> Result<Self, DatasetError> {
+        DatasetError::check_inputs(config)?;
         let body = load_body(&config.data.body, config.data.shape_components)?;
         let mut sources = GarmentSource::list(&config.data.garments)?;
         // Without a cache all of them are loaded.

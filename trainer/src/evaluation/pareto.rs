@@ -194,6 +194,9 @@ fn fast_methods(evaluator: &Evaluator<'_>, scene: &PreparedScene) -> Result<Vec<
     for method in [Method::Lbs, Method::LbsWithShapeTransfer] {
         states.push(timed(method.name().to_owned(), method, networks)?);
     }
+    let milliseconds = median_ms(SECONDS, || networks.forward(scene))?;
+    let positions = wide(&networks.forward(scene)?.posed);
+    states.push(State { method: "network, forward pass".to_owned(), milliseconds, positions });
     for corrections in 0..model.model.correction_steps {
         let name = match corrections {
             0 => UNCORRECTED.to_owned(),

@@ -118,6 +118,17 @@ pub enum DraperError {
         /// What tells it.
         what: String,
     },
+    /// A garment that is no file cannot be placed as one.
+    #[error(
+        "{name} is made by the generator, on this body: --offset, --turn and --from-body are about files"
+    )]
+    #[diagnostic(help(
+        "leave them out, or say them in a file of outfits (--outfits) for the garments that they are about"
+    ))]
+    Generated {
+        /// The garment.
+        name: String,
+    },
     /// A garment is too fine.
     #[error(
         "garment '{name}' has {vertices} vertices, more than {} can be draped at once",

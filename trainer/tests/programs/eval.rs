@@ -1,6 +1,6 @@
 //! `clothcombo eval` on a model of a few steps: every table is there, and what cannot work is said before the work.
 
-use crate::common::{TINY, clothcombo, holds, said, start};
+use crate::common::{TINY, clothcombo, holds, said, start, tiny};
 use clothcombo_data::asset::{Motion, Pose, Provenance};
 use serde_json::Value;
 use std::fs;
@@ -50,6 +50,24 @@ fn with_every_set(folder: &Path) -> PathBuf {
     let file = folder.join("sets.toml");
     fs::write(&file, config).unwrap();
     file
+}
+
+#[cfg(unix)]
+#[test]
+fn a_killed_evaluation_leaves_nothing() {
+    use std::io::{BufRead, BufReader};
+    let folder = tempfile::tempdir().unwrap();
+    let (run, report) = (folder.path().join("run"), folder.path().join("deep/report"));
+    assert!(start(&tiny(folder.path(), ""), &run, 2).status().unwrap().success());
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_clothcombo"));
+    let command = command.args(["eval", "--quick", "--checkpoint"]).arg(&run).arg("-o").arg(&report);
+    let mut eval = command.stderr(std::process::Stdio::piped()).spawn().unwrap();
+    // The first part has begun.
+    let lines = BufReader::new(eval.stderr.take().unwrap()).lines();
+    assert!(lines.map_while(Result::ok).any(|line| line.contains(" s  ")));
+    eval.kill().unwrap();
+    eval.wait().unwrap();
+    assert!(!folder.path().join("deep").exists());
 }
 
 fn names(list: &Value) -> Vec<&str> {

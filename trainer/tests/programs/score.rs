@@ -206,6 +206,14 @@ fn files_that_cannot_be_read_are_named_with_the_line() {
     case.write("rest/flat.obj", flat);
     case.write("draped/flat.obj", flat);
     case.must_fail(&["rest/flat.obj"], &["draped/flat.obj"], &["flat", "no area"]);
+    for kind in ["rest", "draped"] {
+        case.write(&format!("{kind}/doubled.obj"), &(quad_box(0.12, [-0.2, 0.2]) + "f 2 1 5\n"));
+    }
+    case.must_fail(
+        &["rest/doubled.obj"],
+        &["draped/doubled.obj"],
+        &["'doubled'", "has the vertices of face", "clothcombo fit"],
+    );
 }
 
 #[test]

@@ -9,7 +9,6 @@ mod warnings;
 
 use crate::cli::device_argument::DeviceArgument;
 use crate::cli::fit_arguments::FitArguments;
-use crate::cli::interrupted::remove_on_signals;
 use crate::cli::output::print_json;
 use crate::cli::post_process::PostProcessArguments;
 use crate::cli::verbosity::{print_status, progress_bar};
@@ -42,7 +41,7 @@ use warnings::{check_poses, log_repairs, warn_about_order, warn_about_shape};
         A garment is a mesh file (.obj, .ply, .stl, .gltf, .glb) or the name of one in --dataset or in the model's own data.\n\
         What does not lie on the body in metres, y up and T-pose is fitted first (see `clothcombo fit`); every repair is in\n\
         report.json. Hints about files (--unit, --up, --arms, --category, --offset, --turn, --keep, --join-seams, --from-body)\n\
-        are about all of the call; a file with a hint is always fitted. Outputs keep the vertices and polygons of the given files, in their\n\
+        are about all of the call; a file with a hint is always fitted, the file of a name with --offset, --turn or --from-body. Outputs keep the vertices and polygons of the given files, in their\n\
         order: what --keep leaves out follows the cloth.\n\n\
         --outfits takes a TOML file:\n  \
         [[outfit]]\n  name = \"monday\"\n  garments = [{ file = \"tee.obj\", unit = \"cm\" }, \"coat.obj\"]   # hints, or a name alone\n  shape = [1.0]       # optional, as are pose, \
@@ -162,7 +161,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     check_cache(settings.cache.as_deref(), &arguments.output)?;
     let inputs: Vec<PathBuf> = jobs.iter().flat_map(Job::files).chain(arguments.inputs()).collect();
     let mut staged = Staged::new(&arguments.output, arguments.replace, &inputs)?;
-    remove_on_signals(staged.folder());
     let clock = Instant::now();
     let draper = Draper::load(arguments.checkpoint.as_deref(), &settings)?;
     let catalog = draper.catalog(&dataset.garments)?;
