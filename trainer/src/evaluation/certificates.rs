@@ -2,6 +2,7 @@
 
 use crate::config::LossesConfig;
 use crate::dataset::{Dataset, PreparedScene, prepare};
+use crate::inference::contact_features::LayerInteraction;
 use crate::inference::networks::Networks;
 use crate::inference::tensor_store::DrapeError;
 use clothcombo_data::asset::{Garment, infeasible_pair};
@@ -82,7 +83,8 @@ impl<'a> PostProcessor<'a> {
         }
         let scene = prepare(self.dataset, self.losses, sample, 1.0).map_err(DrapeError::from)?;
         let skinned = skinned(&scene);
-        let draped = self.networks.map(|networks| networks.forward(&scene)).transpose()?;
+        let draped =
+            self.networks.map(|networks| networks.forward(&scene, LayerInteraction::Together)).transpose()?;
         Ok(PathSample {
             body: Arc::new(scene.exact_body()),
             draped: wide(&scene, draped.as_ref().map_or(&skinned, |draped| &draped.posed)),

@@ -5,6 +5,7 @@ use super::page::Picture;
 use super::table::{Column, median_with_interval, plain};
 use super::{Estimate, Evaluator, Metric, Section, Table, drape_by, median_ms};
 use crate::dataset::PreparedScene;
+use crate::inference::contact_features::LayerInteraction;
 use crate::inference::networks::Networks;
 use crate::inference::reference::{ReferenceScene, wide};
 use crate::inference::tensor_store::DrapeError;
@@ -194,8 +195,8 @@ fn fast_methods(evaluator: &Evaluator<'_>, scene: &PreparedScene) -> Result<Vec<
     for method in [Method::Lbs, Method::LbsWithShapeTransfer] {
         states.push(timed(method.name().to_owned(), method, networks)?);
     }
-    let milliseconds = median_ms(SECONDS, || networks.forward(scene))?;
-    let positions = wide(&networks.forward(scene)?.posed);
+    let milliseconds = median_ms(SECONDS, || networks.forward(scene, LayerInteraction::Together))?;
+    let positions = wide(&networks.forward(scene, LayerInteraction::Together)?.posed);
     states.push(State { method: "network, forward pass".to_owned(), milliseconds, positions });
     for corrections in 0..model.model.correction_steps {
         let name = match corrections {

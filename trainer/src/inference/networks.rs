@@ -45,9 +45,13 @@ impl<'a> Networks<'a> {
     ///
     /// # Errors
     /// When the scene's numbers are not finite.
-    pub fn forward(&self, scene: &PreparedScene) -> Result<Draped, DrapeError> {
-        self.on_first_body(scene, Mode::Layered, |on_body| {
-            forward_on(&self.model, on_body, LayerInteraction::Together).1
+    pub fn forward(
+        &self,
+        scene: &PreparedScene,
+        interaction: LayerInteraction,
+    ) -> Result<Draped, DrapeError> {
+        self.on_first_body(scene, interaction.mode(), |on_body| {
+            forward_on(&self.model, on_body, interaction).1
         })
     }
 
