@@ -4,7 +4,7 @@
 #
 #   scripts/check_scripts.sh RUN REPORT     a run with two checkpoints, and a report of clothcombo eval
 #
-# PYTHON names an interpreter with numpy, scipy and blake3 (default python3).
+# PYTHON names an interpreter with numpy, scipy, blake3 and pillow (default python3).
 set -uo pipefail
 [ $# -eq 2 ] || { sed -n '2,/^set /{/^set /d;s/^# \{0,1\}//;p}' "$0"; exit 2; }
 run=$(realpath "$1") report=$(realpath "$2")
@@ -60,6 +60,7 @@ check bench_energies.sh scripts/bench_energies.sh --no-torch --sizes 500 --round
 check bench_operators.py bench_operators
 check bench_vs_torch.sh scripts/bench_vs_torch.sh --read --widths 16 --layers 2 --vertices 200
 check check_backends.sh scripts/check_backends.sh -h
+check figures.py "$PYTHON" scripts/figures.py --help
 check gpu_check.sh gpu_check
 check kill_test.sh scripts/kill_test.sh 1
 check open_data.sh scripts/open_data.sh --help
