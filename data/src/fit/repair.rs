@@ -18,6 +18,8 @@ use clothcombo_physics::{Surface, Topology, TriMesh};
 const OPEN_GAP: f64 = 0.01;
 /// They are at least this long (m).
 const OPEN_LENGTH: f64 = 0.06;
+/// A border of this extent (m) that joining seams leaves is a gap in them, not an opening for a limb.
+const LARGEST_HOLE: f64 = 0.06;
 /// A vertex whose shortest edge is this many times the median one does not belong to the mesh.
 const FAR: f64 = 20.0;
 /// Most such vertices.
@@ -239,12 +241,17 @@ pub(super) fn finish_seams(
     settings: &FitSettings,
     metres: f64,
 ) -> Vec<SeamReport> {
+    let mut gaps = Vec::new();
     if let Some(distance) = settings.join_seams {
+        let before = sheet.holes(LARGEST_HOLE / metres);
         join(sheet, file, Some(distance / metres));
+        gaps = sheet.holes(LARGEST_HOLE / metres);
+        gaps.retain(|hole| before.iter().all(|known| known.vertices != hole.vertices));
     }
     let open = open_seams(&sheet.positions, &sheet.faces, OPEN_GAP / metres, OPEN_LENGTH / metres);
     let open = open.iter().map(|seam| SeamReport::new(&sheet.named(seam), metres, false));
-    sheet.seams.iter().map(|seam| SeamReport::new(seam, metres, true)).chain(open).collect()
+    let gaps = gaps.iter().map(|hole| SeamReport::new(&hole.as_seam(), metres, false));
+    sheet.seams.iter().map(|seam| SeamReport::new(seam, metres, true)).chain(open).chain(gaps).collect()
 }
 
 /// Turns every piece whose area faces the body more than away from it, and reports all faces that differ from the file.

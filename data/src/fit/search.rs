@@ -2,13 +2,13 @@
 //! [`Judge`], from coarse to fine.
 
 use super::anatomy::Skeleton;
-use super::arm_pose::ArmPose;
-use super::body_field::{ArmTurn, BodyField};
+use super::body_field::{BodyField, LimbTurn};
 use super::climb::{Moves, Steps, climbed};
 use super::cloth::Cloth;
 use super::coverage::off_trunk;
 use super::error::FitError;
 use super::judge::{Candidate, Judge};
+use super::limb_pose::LimbPose;
 use super::placement::{Origin, Placement, Unit, UpAxis};
 use super::settings::FitSettings;
 use super::sitting::Sitting;
@@ -17,6 +17,7 @@ use crate::mesh::bounds;
 use clothcombo_physics::query::Surface;
 use clothcombo_physics::vec3::add;
 use rayon::prelude::*;
+use std::sync::OnceLock;
 
 /// Arm angles tried first (degrees).
 pub(super) const ARM_ANGLES: [f64; 6] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0];
@@ -37,12 +38,18 @@ const JUDGED: usize = 12;
 const PROBE: f64 = 0.025;
 /// Candidates in A-pose worth a body of their own.
 const POSED: usize = 2;
+/// Angles of each leg tried first (degrees), the one for whose weights a body is made, and for how many candidates.
+const LEG_ANGLES: [f64; 7] = [2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0];
+const LEGS_APART: f64 = 6.0;
+const SPREAD: usize = 4;
 
 /// What is measured on a body once, for all garments.
 pub(super) struct SearchBody {
     pub(super) field: BodyField,
     skeleton: Skeleton,
     surface: Surface<f64>,
+    /// With the legs apart; made when it is first needed.
+    apart: OnceLock<BodyField>,
     /// Largest extent of the body (m).
     reach: f64,
 }
@@ -58,7 +65,14 @@ impl SearchBody {
         }
         let surface = Surface::new(body.template.clone(), body.faces.clone());
         let reach = body.zero_body().extent();
-        Ok(Self { field: BodyField::new(body), skeleton: Skeleton::new(body), surface, reach })
+        let (field, skeleton, apart) = (BodyField::new(body), Skeleton::new(body), OnceLock::new());
+        Ok(Self { field, skeleton, surface, apart, reach })
+    }
+
+    /// The field of `body`, which was measured, with its legs [`LEGS_APART`].
+    fn apart(&self, body: &Body) -> &BodyField {
+        let placement = Placement { leg_angle_degrees: LEGS_APART, ..Placement::AS_GIVEN };
+        self.apart.get_or_init(|| self.field.posed(&LimbPose::of(body, &placement), body))
     }
 }
 
@@ -88,17 +102,17 @@ impl<'a> Search<'a> {
     pub fn measured(&self, cloth: &Cloth, placement: &Placement) -> (Sitting, f64) {
         let points = placement.apply(&cloth.fine.0);
         let [low, high] = bounds(&points);
-        let sitting = match placement.arm_angle_degrees {
-            0.0 => Sitting::new(&points, self.body, &self.measured.surface),
-            degrees => Sitting::new(&points, self.body, &ArmPose::new(self.body, degrees).surface),
+        let sitting = match has_limbs_at_rest(placement) {
+            true => Sitting::new(&points, self.body, &self.measured.surface),
+            false => Sitting::new(&points, self.body, &LimbPose::of(self.body, placement).surface),
         };
         (sitting, high[1] - low[1])
     }
 
     /// Sample points with the arms raised to the T-pose (m).
     pub fn level(&self, cloth: &Cloth, placement: &Placement) -> Vec<[f64; 3]> {
-        let arms = ArmTurn::new(placement.arm_angle_degrees);
-        placement.apply(&cloth.fine.0).into_iter().map(|p| self.measured.field.level(p, arms)).collect()
+        let turn = LimbTurn::of(placement);
+        placement.apply(&cloth.fine.0).into_iter().map(|p| self.measured.field.level(p, turn.arms)).collect()
     }
 
     /// Where a garment lies that covers neither trunk nor hips.
@@ -118,7 +132,20 @@ impl<'a> Search<'a> {
 
     /// Distinct candidates, the best first. `extent`: largest extent of the file in its unit.
     pub fn candidates(&self, cloth: &Cloth, extent: f64, settings: &FitSettings) -> Vec<Candidate> {
+        self.found(cloth, extent, settings, true)
+    }
+
+    /// The same without bodies made for their limbs, to compare sizes by.
+    pub fn quick_candidates(&self, cloth: &Cloth, extent: f64, settings: &FitSettings) -> Vec<Candidate> {
+        self.found(cloth, extent, settings, false)
+    }
+
+    fn found(&self, cloth: &Cloth, extent: f64, settings: &FitSettings, is_posed: bool) -> Vec<Candidate> {
         let judge = self.judge(cloth, settings);
+        let leg_angle_degrees = settings.legs_degrees.unwrap_or(0.0);
+        let straight = Placement { leg_angle_degrees, ..Placement::AS_GIVEN };
+        let posed = self.posed_field(&straight);
+        let judge = Judge { field: posed.as_ref().unwrap_or(judge.field), ..judge };
         let units = Unit::ALL.into_iter().filter(|u| {
             settings.unit.is_none_or(|s| s == *u) && self.is_plausible_extent(extent * u.metres())
         });
@@ -127,8 +154,7 @@ impl<'a> Search<'a> {
         let mut bases = Vec::new();
         for unit in units {
             for &up in &ups {
-                let turned =
-                    turns.iter().map(|t| Placement { unit, up, turn_degrees: *t, ..Placement::AS_GIVEN });
+                let turned = turns.iter().map(|t| Placement { unit, up, turn_degrees: *t, ..straight });
                 bases.extend(turned);
             }
         }
@@ -144,7 +170,10 @@ impl<'a> Search<'a> {
             .chain(self.usual(&bases, &judge).into_par_iter().map(|p| self.judged_as_given(&judge, p)))
             .collect();
         sort(&mut last);
-        self.judge_again_posed(&judge, &mut last);
+        if is_posed {
+            self.judge_again_posed(&judge, &mut last);
+            self.spread_legs(&judge, &mut last);
+        }
         distinct(last)
     }
 
@@ -231,9 +260,7 @@ impl<'a> Search<'a> {
     /// and below it is, when everything but the height is found anew.
     pub fn probed(&self, cloth: &Cloth, settings: &FitSettings, candidate: Candidate) -> (Candidate, f64) {
         let judge = self.judge(cloth, settings);
-        let degrees = candidate.placement.arm_angle_degrees;
-        let posed =
-            (degrees != 0.0).then(|| self.measured.field.posed(&ArmPose::new(self.body, degrees), self.body));
+        let posed = self.posed_field(&candidate.placement);
         let judge = Judge { field: posed.as_ref().unwrap_or(judge.field), ..judge };
         let around = |best: &Candidate, moves: Moves| -> Candidate {
             let at = |dy: f64| {
@@ -254,16 +281,55 @@ impl<'a> Search<'a> {
     /// The best in A-pose, on a body posed like that: the shoulders of the search's body are rigid.
     fn judge_again_posed(&self, judge: &Judge, ranked: &mut [Candidate]) {
         for candidate in ranked.iter_mut().filter(|c| c.placement.arm_angle_degrees != 0.0).take(POSED) {
-            let posed = ArmPose::new(self.body, candidate.placement.arm_angle_degrees);
-            let field = self.measured.field.posed(&posed, self.body);
-            let judge = Judge { field: &field, ..*judge };
-            let moves =
-                if candidate.placement.origin == Origin::Elsewhere { Moves::All } else { Moves::Arms };
-            let steps = Steps { from: 0.02, to: 0.0005, is_sharp: true, is_fine: true, moves };
-            *candidate = judge.judged(climbed(&judge, candidate, &steps).placement);
+            *candidate = self.climbed_posed(judge, candidate);
         }
         sort(ranked);
     }
+
+    /// The best with its legs apart, where a garment with leg openings lies better so: only those tell.
+    fn spread_legs(&self, judge: &Judge, ranked: &mut [Candidate]) {
+        // Waist and two legs.
+        if judge.settings.legs_degrees.is_some() || judge.cloth.borders.len() < 3 {
+            return;
+        }
+        let at = |c: &Candidate, degrees: f64| Placement { leg_angle_degrees: degrees, ..c.placement };
+        let apart = Judge { field: self.measured.apart(self.body), ..*judge };
+        let has_legs = |c: &&mut Candidate| apart.limbs(&at(c, LEGS_APART)).legs;
+        let spread = |candidate: &mut Candidate| {
+            let turned = apart.turned(&candidate.placement, None, true);
+            let scored = |degrees: &f64| apart.scored(at(candidate, *degrees), &turned, true, None);
+            let best = LEG_ANGLES.iter().map(scored).max_by(|a, b| a.score.total_cmp(&b.score));
+            let Some(start) = best.map(|best| apart.with_openings(best)) else { return };
+            let near = if start.placement.arm_angle_degrees == 0.0 { &apart } else { judge };
+            let found = self.climbed_posed(near, &start);
+            if found.score > candidate.score {
+                // Its weights are those of its own pose.
+                *candidate = self.climbed_posed(judge, &found);
+            }
+        };
+        ranked.iter_mut().filter(has_legs).take(SPREAD).collect::<Vec<_>>().into_par_iter().for_each(spread);
+        sort(ranked);
+    }
+
+    /// The best near a candidate on a body in its pose.
+    fn climbed_posed(&self, judge: &Judge, candidate: &Candidate) -> Candidate {
+        let is_posed = judge.field.is_posed(&candidate.placement);
+        let posed = if is_posed { None } else { self.posed_field(&candidate.placement) };
+        let judge = Judge { field: posed.as_ref().unwrap_or(judge.field), ..*judge };
+        let moves = if candidate.placement.origin == Origin::Elsewhere { Moves::All } else { Moves::Limbs };
+        let steps = Steps { from: 0.02, to: 0.0005, is_sharp: true, is_fine: true, moves };
+        judge.judged(climbed(&judge, candidate, &steps).placement)
+    }
+
+    /// The body in a garment's pose; none at rest.
+    fn posed_field(&self, placement: &Placement) -> Option<BodyField> {
+        let is_posed = !has_limbs_at_rest(placement);
+        is_posed.then(|| self.measured.field.posed(&LimbPose::of(self.body, placement), self.body))
+    }
+}
+
+fn has_limbs_at_rest(placement: &Placement) -> bool {
+    (placement.arm_angle_degrees, placement.leg_angle_degrees) == (0.0, 0.0)
 }
 
 fn sort(candidates: &mut [Candidate]) {

@@ -4,8 +4,11 @@ use super::report::{Elements, MeshPiece, Repair, RepairKind};
 use crate::format::{FileFace, PolygonMesh};
 use crate::mesh::{Attachment, Seam, attach};
 use clothcombo_physics::query::VertexIndex;
-use clothcombo_physics::vec3::{cross, norm, norm_squared, sub};
+use clothcombo_physics::vec3::{cross, norm, norm_squared, normalized, sub};
 use clothcombo_physics::{Topology, TriMesh};
+
+/// An opening narrower than this share of its length is a slit: limbs are round.
+const SLIT: f64 = 0.25;
 
 /// A corner of a triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,6 +22,23 @@ pub(super) struct Corner {
 impl Corner {
     pub fn own(number: u32) -> Self {
         Self { number, is_own: true }
+    }
+}
+
+/// A border that no limb passes through: short, or a slit.
+pub(super) struct Hole {
+    /// Vertices of the file, ascending.
+    pub vertices: Vec<u32>,
+    /// Its longest extent, and how far it reaches from that.
+    length: f64,
+    width: f64,
+}
+
+impl Hole {
+    /// As a seam that stays open.
+    pub fn as_seam(&self) -> Seam {
+        let ends = [0, self.vertices.len() - 1].map(|end| self.vertices[end]);
+        Seam { length: self.length, gap: self.width, widest: self.width, ends, is_joined: false }
     }
 }
 
@@ -180,6 +200,28 @@ impl Sheet {
     /// A seam by vertices of the file.
     pub fn named(&self, seam: &Seam) -> Seam {
         Seam { ends: seam.ends.map(|v| self.vertex_origin[v as usize]), ..*seam }
+    }
+
+    /// Borders with an extent of at most `longest` (in the file's unit), and slits.
+    pub fn holes(&self, longest: f64) -> Vec<Hole> {
+        let Ok(mesh) = TriMesh::new(self.positions.clone(), self.faces.clone()) else { return Vec::new() };
+        let holes = Topology::new(&mesh).boundary_loops.into_iter().map(|border| {
+            let distance = |a: u32, b: u32| norm(sub(self.positions[b as usize], self.positions[a as usize]));
+            let farthest = |from: u32| {
+                let of = border.iter().map(|v| (*v, distance(from, *v)));
+                of.fold((from, 0.0), |best, v| if v.1 > best.1 { v } else { best })
+            };
+            let end = farthest(border[0]).0;
+            let (other, length) = farthest(end);
+            let along = normalized(sub(self.positions[other as usize], self.positions[end as usize]));
+            let aside =
+                |v: &u32| norm(cross(along, sub(self.positions[*v as usize], self.positions[end as usize])));
+            let width = border.iter().map(aside).fold(0.0, f64::max);
+            let mut vertices: Vec<u32> = border.iter().map(|v| self.vertex_origin[*v as usize]).collect();
+            vertices.sort_unstable();
+            Hole { vertices, length, width }
+        });
+        holes.filter(|hole| hole.length < longest || hole.width < SLIT * hole.length).collect()
     }
 
     /// Area of a face (in the square of the file's unit).

@@ -1,6 +1,7 @@
 //! Which placement is taken, what else it could be, and when none is believed.
 
 use super::cloth::Cloth;
+use super::diagnosis::{Size, size_doubt};
 use super::error::FitError;
 use super::judge::Candidate;
 use super::placement::{Origin, Placement, Unit};
@@ -10,10 +11,8 @@ use super::sitting::Sitting;
 use clothcombo_physics::vec3::{norm, sub};
 use std::fmt;
 
-/// Another reading whose log-posterior is this near to the best is told.
+/// Another reading, or height, whose log-posterior is this near to the best is told.
 const NEAR_TIE: f64 = 6.0;
-/// A height that changes it by less is not known: one in fifty such garments lies elsewhere.
-const SAME_HEIGHT: f64 = 4.0;
 /// Readings nearer to each other than this are the same (m).
 const SAME: f64 = 0.02;
 /// Largest share of a garment that may lie inside the body where it is worn.
@@ -26,6 +25,8 @@ const SNUG: f64 = 0.03;
 const WIDEST_RIM: f64 = 0.1;
 /// A neck opening is no longer than this many times the hem.
 const WIDEST_NECK: f64 = 1.5;
+/// Limbs that are held otherwise explain that much more (log-posterior), or are doubted.
+const LIMB_EVIDENCE: f64 = 12.0;
 /// Least height of a tube around the trunk (m): lower ones are belts.
 const LEAST_HEIGHT: f64 = 0.09;
 
@@ -40,6 +41,16 @@ pub(super) enum Doubt {
     Tube,
     /// Several pieces are worn on their own.
     Outfit { pieces: usize },
+    /// It does not look worn, but hints say where it is.
+    Odd { why: String },
+    /// It would fit much better at another size.
+    Size(Size),
+    /// The body's arms miss the sleeves.
+    Arms,
+    /// Its front is where the file has its back, or the other way round.
+    Turned,
+    /// Arms or legs were found to be held otherwise by little evidence.
+    Limbs { taken: Placement },
 }
 
 impl fmt::Display for Doubt {
@@ -66,6 +77,22 @@ impl fmt::Display for Doubt {
                 f,
                 "{pieces} of its pieces would be worn without the others: for an outfit, export one file per garment"
             ),
+            Self::Odd { why } => write!(f, "it does not look worn there: {why}; the hints are taken all the same"),
+            Self::Size(size) => write!(f, "{size}: is it of another size, or in another unit (--unit)?"),
+            Self::Arms => f.write_str(
+                "arms of the body pass through the cloth of its sleeves, which were made for arms held otherwise or of another body: --arms \
+                 or --from-body settles it",
+            ),
+            Self::Turned => f.write_str(
+                "turned by 180°, as it lies better on the body so, though no neckline shows where its front is; --turn 0 keeps it",
+            ),
+            Self::Limbs { taken } => {
+                let (limbs, flag, angle) = match taken.arm_angle_degrees {
+                    0.0 => ("legs", "--legs 0", taken.leg_angle_degrees),
+                    angle => ("arms", "--arms t", angle),
+                };
+                write!(f, "little of it tells that its {limbs} are {angle:.0}° from the rest pose; {flag} if they are not")
+            }
             Self::Tube => f.write_str(
                 "a tube with two openings may be a skirt at the waist or a strapless top at the chest; --category settles it",
             ),
@@ -88,6 +115,9 @@ fn differences(taken: &Placement, other: &Placement) -> Vec<String> {
     if (taken.arm_angle_degrees == 0.0) != (other.arm_angle_degrees == 0.0) {
         flags.push(format!("--arms {}", if taken.arm_angle_degrees == 0.0 { "t" } else { "a" }));
     }
+    if (taken.leg_angle_degrees == 0.0) != (other.leg_angle_degrees == 0.0) {
+        flags.push(format!("--legs {:.0}", taken.leg_angle_degrees));
+    }
     let moved = norm(sub(taken.translation, other.translation));
     if flags.is_empty() && moved < SAME {
         flags.push("--from-body with the body it was made on".into());
@@ -100,13 +130,24 @@ fn differences(taken: &Placement, other: &Placement) -> Vec<String> {
 }
 
 /// Why a candidate is not believed; `None` if it is.
-pub(super) fn implausibility(candidate: &Candidate, sitting: &Sitting, height: f64) -> Option<String> {
+pub(super) fn implausibility(
+    candidate: &Candidate,
+    sitting: &Sitting,
+    height: f64,
+    off_trunk: Option<&str>,
+) -> Option<String> {
     let percent = |share: f64| 100.0 * share;
     if !candidate.is_worn {
         return Some("no opening goes around the trunk, the neck or both arms".into());
     }
-    if candidate.crossings > 0 {
-        return Some(format!("{} bones of the body pass through the cloth", candidate.crossings));
+    if candidate.is_unfounded_turn {
+        return Some("turned by 180°, though its neckline does not show its front there".into());
+    }
+    // Sleeves made for other arms miss these ones where a file says where it is; a place that was searched for must do without.
+    let missed = if candidate.placement.origin == Origin::Elsewhere { candidate.crossings.arms } else { 0 };
+    let crossings = candidate.crossings.others + missed;
+    if crossings > 0 {
+        return Some(format!("{crossings} bones of the body pass through the cloth"));
     }
     if candidate.rim_distance > WIDEST_RIM {
         return Some(format!(
@@ -129,7 +170,7 @@ pub(super) fn implausibility(candidate: &Candidate, sitting: &Sitting, height: f
     if sitting.nearest > FARTHEST {
         return Some(format!("it stays {:.0} mm away from the body", 1e3 * sitting.nearest));
     }
-    None
+    off_trunk.map(str::to_owned)
 }
 
 /// Where a file as it stands lies snugly on head, arms or feet: a band around the head is none around the chest of another unit.
@@ -148,6 +189,40 @@ pub(super) struct Verdict {
     pub doubts: Vec<Doubt>,
 }
 
+/// The best readings, the best first.
+pub(super) struct Readings {
+    pub believed: Vec<Candidate>,
+    refused: Vec<(Candidate, String)>,
+    /// Whether the best one lies on the body as it stands, though nobody wears it there.
+    is_near: bool,
+}
+
+impl Readings {
+    pub fn new(candidates: &[Candidate], search: &Search, cloth: &Cloth) -> Self {
+        let (mut believed, mut refused): (Vec<Candidate>, Vec<(Candidate, String)>) = Default::default();
+        let mut is_near = false;
+        for candidate in candidates.iter().take(8) {
+            // What is far worse than one that is believed is not looked at.
+            if believed.first().is_some_and(|best| candidate.score < best.score - NEAR_TIE) {
+                break;
+            }
+            let (sitting, height) = search.measured(cloth, &candidate.placement);
+            let off_trunk = search.off_trunk(cloth, &candidate.placement);
+            match implausibility(candidate, &sitting, height, off_trunk) {
+                None => believed.push(*candidate),
+                Some(why) => {
+                    is_near |= refused.is_empty()
+                        && candidate.placement.origin != Origin::Elsewhere
+                        && sitting.inside < MOST_INSIDE
+                        && sitting.mean_distance < FARTHEST;
+                    refused.push((*candidate, why));
+                }
+            }
+        }
+        Self { believed, refused, is_near }
+    }
+}
+
 /// Takes the best of `candidates`, the best first.
 ///
 /// # Errors
@@ -158,37 +233,30 @@ pub(super) fn verdict(
     cloth: &Cloth,
     settings: &FitSettings,
 ) -> Result<Verdict, FitError> {
-    let (mut believed, mut refused): (Vec<Candidate>, Vec<(Placement, String)>) = Default::default();
-    // Whether the best one lies on the body, though nobody wears it there.
-    let mut is_near = false;
-    for candidate in candidates.iter().take(8) {
-        // What is far worse than one that is believed is not looked at.
-        if believed.first().is_some_and(|best| candidate.score < best.score - NEAR_TIE) {
-            break;
-        }
-        let (sitting, height) = search.measured(cloth, &candidate.placement);
-        match implausibility(candidate, &sitting, height) {
-            None => believed.push(*candidate),
-            Some(why) => {
-                is_near |=
-                    refused.is_empty() && sitting.inside < MOST_INSIDE && sitting.mean_distance < FARTHEST;
-                refused.push((candidate.placement, why));
+    let Readings { believed, refused, is_near } = Readings::new(candidates, search, cloth);
+    let mut doubts = Vec::new();
+    let Some(candidate) = believed.first().or(refused.first().map(|(best, _)| best)).copied() else {
+        return Err(FitError::Implausible { best: "none".into(), second: None });
+    };
+    if let (true, Some((best, why))) = (believed.is_empty(), refused.first()) {
+        if !settings.says_place() {
+            // A hat or a sock that lies where it is worn is called one.
+            let is_metres = best.placement.unit == Unit::M;
+            if let (true, Some(place)) = (is_near && is_metres, search.off_trunk(cloth, &best.placement)) {
+                return Err(FitError::OffTrunk { place });
             }
+            let mut readings = refused.iter().map(|(c, why)| format!("{} ({why})", c.placement.reading()));
+            let best = readings.next().unwrap_or_default();
+            return Err(FitError::Implausible { best, second: readings.next() });
+        }
+        doubts.push(Doubt::Odd { why: why.clone() });
+    }
+    if let Some(size) = size_doubt(search, cloth, settings, &candidate) {
+        match settings.says_place() || !size.is_refused() {
+            true => doubts.push(Doubt::Size(size)),
+            false => return Err(FitError::Size { size }),
         }
     }
-    let Some(candidate) = believed.first().copied() else {
-        // A hat or a sock that lies where it is worn is called one.
-        let is_metres = settings.unit.is_none_or(|unit| unit == Unit::M);
-        let is_free =
-            is_metres && (settings.up, settings.turn_degrees, settings.offset) == (None, None, None);
-        let best = candidates.first().filter(|_| is_near && is_free);
-        if let Some(place) = best.and_then(|best| search.off_trunk(cloth, &best.placement)) {
-            return Err(FitError::OffTrunk { place });
-        }
-        let mut readings = refused.into_iter().map(|(p, why)| format!("{} ({why})", p.reading()));
-        let best = readings.next().unwrap_or_else(|| "none".into());
-        return Err(FitError::Implausible { best, second: readings.next() });
-    };
     let is_usual = candidate.placement.origin != Origin::Elsewhere || settings.offset.is_some();
     let (candidate, least_loss) = match is_usual {
         true => (candidate, f64::INFINITY),
@@ -209,12 +277,11 @@ pub(super) fn verdict(
         // Sleeves are a small part of a garment.
         apart.get(apart.len() * 19 / 20).copied().unwrap_or(0.0)
     };
-    let mut doubts = Vec::new();
-    let other = believed[1..].iter().map(|c| (c.placement, apart(&c.placement))).find(|(_, d)| *d > SAME);
+    let other = believed.iter().skip(1).map(|c| (c.placement, apart(&c.placement))).find(|(_, d)| *d > SAME);
     if let Some((other, apart)) = other {
         doubts.push(Doubt::NearTie { taken, other, apart });
     }
-    if least_loss < SAME_HEIGHT {
+    if least_loss < NEAR_TIE {
         doubts.push(Doubt::Height { taken });
     }
     if candidate.is_tube && settings.category.is_none() && !is_usual {
@@ -222,6 +289,20 @@ pub(super) fn verdict(
     }
     if candidate.worn_pieces > 1 {
         doubts.push(Doubt::Outfit { pieces: candidate.worn_pieces });
+    }
+    if candidate.crossings.arms > 0 {
+        doubts.push(Doubt::Arms);
+    }
+    if taken.turn_degrees == 180.0 && settings.turn_degrees.is_none() && candidate.neck_drop.is_none() {
+        doubts.push(Doubt::Turned);
+    }
+    // Those that are hinted at are alike in all candidates.
+    let held = |c: &Candidate| (c.placement.arm_angle_degrees != 0.0, c.placement.leg_angle_degrees != 0.0);
+    let otherwise = candidates.iter().find(|c| held(c) != held(&candidate));
+    if held(&candidate) != (false, false)
+        && otherwise.is_some_and(|other| other.score > candidate.score - LIMB_EVIDENCE)
+    {
+        doubts.push(Doubt::Limbs { taken });
     }
     Ok(Verdict { placement: taken, doubts })
 }
