@@ -50,6 +50,11 @@ impl FitSettings {
         let names = self.unit.is_some() || self.up.is_some() || self.category.is_some();
         names || numbers || self.arms_lowered.is_some() || self.offset.is_some() || self.from_body.is_some()
     }
+
+    /// Whether they say where a garment belongs: such a garment is never taken where it lies.
+    pub fn is_placed(&self) -> bool {
+        self.offset.is_some() || self.turn_degrees.is_some() || self.from_body.is_some()
+    }
 }
 
 /// Which of a file's surfaces are the garment.
