@@ -63,7 +63,7 @@ fn wrong_input_names_itself_and_leaves_nothing() {
     let apart = at(&folder, "apart.obj");
     let sleeve = tube(0.2, 0.4, 24, 6);
     let beside = mapped(&sleeve, |[x, y, z]| [x + 1.5, y, z]);
-    let pair = union(&sleeve, &beside);
+    let pair = union(&[&sleeve, &beside]);
     obj::save(Path::new(&apart), pair.positions(), pair.faces(), &[]).unwrap();
     let cases: Vec<(Vec<&str>, Vec<&str>)> = vec![
         (vec!["--garments", &apart, "--fit", "never"], vec!["apart.obj", "one of its 2 pieces"]),
