@@ -69,6 +69,13 @@ impl<'a> Cloth<'a> {
         self.topology.component_of_vertex[vertex as usize]
     }
 
+    /// Whether no piece has more than two openings: hats, socks and sleeves have not.
+    pub fn is_tubes(&self) -> bool {
+        let mut openings = vec![0; self.topology.component_count];
+        (0..self.borders.len()).for_each(|border| openings[self.piece(border) as usize] += 1);
+        openings.iter().all(|count| *count <= 2)
+    }
+
     /// Positions of a border's vertices.
     pub fn border(&self, border: usize) -> Vec<[f64; 3]> {
         self.borders[border].iter().map(|v| self.positions[*v as usize]).collect()

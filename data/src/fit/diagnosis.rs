@@ -15,7 +15,7 @@ use std::fmt;
 
 /// Ratio of one size tried to the next, and how many are tried on either side.
 const SIZE_STEP: f64 = 1.2;
-const SIZES: i32 = 6;
+const SIZES: i32 = 8;
 /// Another size explains that much more (log-posterior), or nothing is said.
 const SIZE_EVIDENCE: f64 = 12.0;
 /// Clothes that are worn are not this many times as large or small as those that fit.
@@ -171,7 +171,7 @@ fn half(cloth: &Cloth) -> Option<FitError> {
 }
 
 /// The piece that lies beside the body when one of the largest is worn.
-pub(super) fn beside(search: &Search, cloth: &Cloth, settings: &FitSettings) -> Option<FitError> {
+fn beside(search: &Search, cloth: &Cloth, settings: &FitSettings) -> Option<FitError> {
     let piece = |face: &[u32; 3]| cloth.piece_of_vertex(face[0]);
     let mut counts = vec![0; cloth.topology.component_count];
     cloth.faces.iter().for_each(|face| counts[piece(face) as usize] += 1);

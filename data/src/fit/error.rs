@@ -29,8 +29,8 @@ pub enum FitError {
     Closed,
     /// As large as no garment of this body.
     #[error(
-        "not a garment of this body: its largest extent is {extent} in the file's unit{}; the body is {reach:.2} m large",
-         unit.map(|u| format!(", {} m for {u}", extent * u.metres())).unwrap_or_default()
+        "not a garment of this body: its largest extent is {extent:.4} in the file's unit{}; the body is {reach:.2} m large",
+         unit.map(|u| format!(", {:.2} m for {u}", extent * u.metres())).unwrap_or_default()
     )]
     Extent {
         /// Largest extent in the file's unit.
@@ -47,7 +47,7 @@ pub enum FitError {
     #[error("not a garment: it reaches from the crown to the soles and to both hands, as a body does")]
     Body,
     /// Covers neither trunk nor hips, as each of the six categories does.
-    #[error("not one of the six garment categories: {place}")]
+    #[error("not one of the six garment categories: {place}; if it is one, --category says which")]
     OffTrunk {
         /// Where it lies.
         place: &'static str,

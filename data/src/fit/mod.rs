@@ -10,6 +10,7 @@ mod climb;
 mod cloth;
 mod coverage;
 mod diagnosis;
+mod doubt;
 mod error;
 mod from_body;
 mod judge;
@@ -50,13 +51,14 @@ use clothcombo_physics::contact::{self_triangle_pairs, triangle_pairs};
 use clothcombo_physics::mesh::vertex_normals;
 use clothcombo_physics::vec3::{norm, sub};
 use clothcombo_physics::{Topology, TriMesh};
-use diagnosis::{beside, diagnosed};
+use diagnosis::diagnosed;
+use doubt::Doubt;
 use limb_pose::LimbPose;
 use pieces::refuse_stray_pieces;
-use repair::{finish_seams, repair, turn_outward};
+use repair::{finish_seams, gaps, repair, turn_outward};
 use search::{Search, SearchBody};
 use settings::{MOST_STRETCH, MOST_STRETCHED};
-use verdict::{Doubt, Verdict, verdict};
+use verdict::{Verdict, verdict};
 
 /// Least distance between a fitted vertex and the body (m): the ε of the paper's body collision loss.
 const CLEARANCE: f64 = 0.002;
@@ -121,7 +123,7 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
     let units = settings.unit.map_or(Unit::ALL.to_vec(), |u| vec![u]);
     if !units.iter().any(|u| search.is_plausible_extent(extent * u.metres())) {
         let too_large = FitError::Extent { extent, unit: settings.unit, reach: search.reach() };
-        return Err(beside(&search, &cloth, settings).unwrap_or(too_large));
+        return Err(diagnosed(&search, &cloth, settings).unwrap_or(too_large));
     }
     let source = settings.from_body.as_deref().map(|b| b.aligned(body, settings)).transpose()?;
     let (placement, mut doubts) = match &source {
@@ -132,7 +134,8 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
         }
     };
     let metres = placement.unit.metres();
-    let seams = finish_seams(&mut sheet, file, settings, metres);
+    let borders = sheet.borders();
+    let mut seams = finish_seams(&mut sheet, file, settings, metres);
     let mesh = TriMesh::new(sheet.positions.clone(), sheet.faces.clone())
         .map_err(|e| FitError::Mesh(e.to_string()))?;
     let topology = Topology::new(&mesh);
@@ -148,7 +151,14 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
             (straight.map_err(FitError::Mesh)?, None)
         }
     };
-    refuse_other_things(&positions, body)?;
+    refuse_bodies(&positions, body)?;
+    if let Some(place) = off_trunk(&positions, body) {
+        let error = FitError::OffTrunk { place };
+        match settings.category.is_some() || settings.offset.is_some() {
+            true => doubts.push(error.to_string()),
+            false => return Err(error),
+        }
+    }
     let raised = Cloth::new(&positions, &sheet.faces, &topology);
     if let Some(source) = &source {
         match search.believed_as_given(&raised, &FitSettings::default()) {
@@ -160,6 +170,9 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
     let sitting = search.measured(&raised, &Placement::AS_GIVEN).0;
     let judge = search.judge(&raised, settings);
     let limbs = judge.limbs(&Placement::AS_GIVEN);
+    if settings.join_seams.is_some() {
+        seams.extend(gaps(&sheet, &borders, &judge.is_linked(&Placement::AS_GIVEN), metres));
+    }
     refuse_stray_pieces(&positions, &topology, search.surface(), &judge.worn_pieces(&Placement::AS_GIVEN))?;
     let rest_surface = search.surface();
 
@@ -228,21 +241,30 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
     Ok(Fitted { garment, report, vertex_of_file, follows, vertex_origin, file_faces })
 }
 
-/// Where the garment belongs. Panels whose seams are open are placed as if they were sewn.
+/// Where the garment belongs: legs that stand apart are looked for, and open seams taken as sewn, only if it is worn nowhere else.
 fn place(search: &Search, cloth: &Cloth, extent: f64, settings: &FitSettings) -> Result<Verdict, FitError> {
     let of = |cloth: &Cloth| verdict(&search.candidates(cloth, extent, settings), search, cloth, settings);
-    let unsewn = match of(cloth) {
-        Err(error @ (FitError::Implausible { .. } | FitError::OffTrunk { .. })) => error,
-        other => return other,
+    let as_given = of(cloth);
+    let is_worn = match &as_given {
+        Ok(verdict) => !verdict.is_odd(),
+        Err(error) => !matches!(error, FitError::Implausible { .. } | FitError::OffTrunk { .. }),
     };
+    if is_worn {
+        return as_given;
+    }
+    let apart = search.candidates_apart(cloth, extent, settings);
+    if let Some(verdict) = verdict(&apart, search, cloth, settings).ok().filter(|v| !v.is_odd()) {
+        return Ok(verdict);
+    }
     let sewn = join_seams(cloth.positions, cloth.faces, Some(SEAM * extent));
     if let Some(mesh) = sewn.and_then(|sewn| TriMesh::new(sewn.positions, sewn.faces).ok()) {
         let topology = Topology::new(&mesh);
-        if let Ok(verdict) = of(&Cloth::new(mesh.positions(), mesh.faces(), &topology)) {
+        let sewn = of(&Cloth::new(mesh.positions(), mesh.faces(), &topology));
+        if let Some(verdict) = sewn.ok().filter(|v| !v.is_odd()) {
             return Ok(verdict);
         }
     }
-    Err(diagnosed(search, cloth, settings).unwrap_or(unsewn))
+    as_given.map_err(|error| diagnosed(search, cloth, settings).unwrap_or(error))
 }
 
 /// Share of the edges that became longer than [`MOST_STRETCH`] times what they were.
@@ -254,14 +276,14 @@ fn stretched(topology: &Topology, before: &[[f64; 3]], after: &[[f64; 3]]) -> f6
     topology.edges.iter().filter(is_long).count() as f64 / topology.edges.len().max(1) as f64
 }
 
-fn refuse_other_things(positions: &[[f64; 3]], body: &Body) -> Result<(), FitError> {
+fn refuse_bodies(positions: &[[f64; 3]], body: &Body) -> Result<(), FitError> {
     let (low, high) = body.zero_body().bounds();
     let [lowest, highest] = bounds(positions);
     let spans = |a: usize, slack: f64| lowest[a] < low[a] + slack && highest[a] > high[a] - slack;
     if spans(1, 0.04) && spans(0, 0.1) {
         return Err(FitError::Body);
     }
-    off_trunk(positions, body).map_or(Ok(()), |place| Err(FitError::OffTrunk { place }))
+    Ok(())
 }
 
 fn pieces(mesh: &TriMesh, topology: &Topology) -> Vec<MeshPiece> {

@@ -81,6 +81,11 @@ impl Judge<'_> {
         Limbs::new(&self.openings(placement))
     }
 
+    /// For every border whether a limb passes through it.
+    pub fn is_linked(&self, placement: &Placement) -> Vec<bool> {
+        self.openings(placement).iter().map(|border| border.linked != Opening::Nothing).collect()
+    }
+
     /// Whether limbs pass through its openings, and which rim it hangs from; the candidate's score does not count that yet.
     pub fn with_openings(&self, mut candidate: Candidate) -> Candidate {
         let openings = self.openings(&candidate.placement);

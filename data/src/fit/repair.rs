@@ -4,7 +4,7 @@
 use super::error::FitError;
 use super::report::{Elements, MeshPiece, RepairKind, SeamReport};
 use super::settings::{FitSettings, Keep, MAX_VERTICES, MIN_TRIANGLES};
-use super::sheet::{Corner, Sheet};
+use super::sheet::{Corner, Sheet, SheetBorder};
 use crate::format::PolygonMesh;
 use crate::mesh::{
     AREA_SHARE, JoinedSheet, Seam, WELD_SHARE, clean_faces, diagonal, join_faces, join_seams, open_seams,
@@ -18,8 +18,6 @@ use clothcombo_physics::{Surface, Topology, TriMesh};
 const OPEN_GAP: f64 = 0.01;
 /// They are at least this long (m).
 const OPEN_LENGTH: f64 = 0.06;
-/// A border of this extent (m) that joining seams leaves is a gap in them, not an opening for a limb.
-const LARGEST_HOLE: f64 = 0.06;
 /// A vertex whose shortest edge is this many times the median one does not belong to the mesh.
 const FAR: f64 = 20.0;
 /// Most such vertices.
@@ -241,17 +239,27 @@ pub(super) fn finish_seams(
     settings: &FitSettings,
     metres: f64,
 ) -> Vec<SeamReport> {
-    let mut gaps = Vec::new();
     if let Some(distance) = settings.join_seams {
-        let before = sheet.holes(LARGEST_HOLE / metres);
         join(sheet, file, Some(distance / metres));
-        gaps = sheet.holes(LARGEST_HOLE / metres);
-        gaps.retain(|hole| before.iter().all(|known| known.vertices != hole.vertices));
     }
     let open = open_seams(&sheet.positions, &sheet.faces, OPEN_GAP / metres, OPEN_LENGTH / metres);
     let open = open.iter().map(|seam| SeamReport::new(&sheet.named(seam), metres, false));
-    let gaps = gaps.iter().map(|hole| SeamReport::new(&hole.as_seam(), metres, false));
-    sheet.seams.iter().map(|seam| SeamReport::new(seam, metres, true)).chain(open).chain(gaps).collect()
+    sheet.seams.iter().map(|seam| SeamReport::new(seam, metres, true)).chain(open).collect()
+}
+
+/// Borders that are not among those of `before` and that no limb passes through: gaps in seams that were joined.
+pub(super) fn gaps(
+    sheet: &Sheet,
+    before: &[SheetBorder],
+    is_linked: &[bool],
+    metres: f64,
+) -> Vec<SeamReport> {
+    let borders = sheet.borders();
+    let is_gap = |(border, is_linked): &(&SheetBorder, &bool)| {
+        !**is_linked && before.iter().all(|known| known.vertices != border.vertices)
+    };
+    let gaps = borders.iter().zip(is_linked).filter(is_gap);
+    gaps.map(|(gap, _)| SeamReport::new(&gap.as_seam(), metres, false)).collect()
 }
 
 /// Turns every piece whose area faces the body more than away from it, and reports all faces that differ from the file.

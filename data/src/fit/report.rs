@@ -231,9 +231,7 @@ impl FitReport {
             }
             Origin::SourceBody => self.from_body.as_ref().map(SourcePlacement::text).unwrap_or_default(),
             Origin::Elsewhere => {
-                format!(
-                    "the file's origin is not the body's: moved by {x:.0}, {y:.0}, {z:.0} mm to where it fits"
-                )
+                format!("the file's origin is not the body's: moved by {x:.0}, {y:.0}, {z:.0} mm")
             }
         };
         let arms = match p.arm_angle_degrees {

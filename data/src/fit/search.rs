@@ -1,6 +1,8 @@
 //! Finds where a garment belongs on the body: unit, axes, origin, turn and arm pose are hypotheses, scored together by a
 //! [`Judge`], from coarse to fine.
 
+mod limbs;
+
 use super::anatomy::Skeleton;
 use super::body_field::{BodyField, LimbTurn};
 use super::climb::{Moves, Steps, climbed};
@@ -16,6 +18,7 @@ use crate::asset::Body;
 use crate::mesh::bounds;
 use clothcombo_physics::query::Surface;
 use clothcombo_physics::vec3::add;
+use limbs::has_limbs_at_rest;
 use rayon::prelude::*;
 use std::sync::OnceLock;
 
@@ -36,12 +39,6 @@ const CLIMBED: usize = 10;
 const JUDGED: usize = 12;
 /// How far up and down the height of a placement is doubted (m): a garment is back within 2 cm.
 const PROBE: f64 = 0.025;
-/// Candidates in A-pose worth a body of their own.
-const POSED: usize = 2;
-/// Angles of each leg tried first (degrees), the one for whose weights a body is made, and for how many candidates.
-const LEG_ANGLES: [f64; 7] = [2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0];
-const LEGS_APART: f64 = 6.0;
-const SPREAD: usize = 4;
 
 /// What is measured on a body once, for all garments.
 pub(super) struct SearchBody {
@@ -67,12 +64,6 @@ impl SearchBody {
         let reach = body.zero_body().extent();
         let (field, skeleton, apart) = (BodyField::new(body), Skeleton::new(body), OnceLock::new());
         Ok(Self { field, skeleton, surface, apart, reach })
-    }
-
-    /// The field of `body`, which was measured, with its legs [`LEGS_APART`].
-    fn apart(&self, body: &Body) -> &BodyField {
-        let placement = Placement { leg_angle_degrees: LEGS_APART, ..Placement::AS_GIVEN };
-        self.apart.get_or_init(|| self.field.posed(&LimbPose::of(body, &placement), body))
     }
 }
 
@@ -277,59 +268,6 @@ impl<'a> Search<'a> {
         let best = if found.score > start.score { found } else { start };
         (best, best.score - around(&best, Moves::Level).score)
     }
-
-    /// The best in A-pose, on a body posed like that: the shoulders of the search's body are rigid.
-    fn judge_again_posed(&self, judge: &Judge, ranked: &mut [Candidate]) {
-        for candidate in ranked.iter_mut().filter(|c| c.placement.arm_angle_degrees != 0.0).take(POSED) {
-            *candidate = self.climbed_posed(judge, candidate);
-        }
-        sort(ranked);
-    }
-
-    /// The best with its legs apart, where a garment with leg openings lies better so: only those tell.
-    fn spread_legs(&self, judge: &Judge, ranked: &mut [Candidate]) {
-        // Waist and two legs.
-        if judge.settings.legs_degrees.is_some() || judge.cloth.borders.len() < 3 {
-            return;
-        }
-        let at = |c: &Candidate, degrees: f64| Placement { leg_angle_degrees: degrees, ..c.placement };
-        let apart = Judge { field: self.measured.apart(self.body), ..*judge };
-        let has_legs = |c: &&mut Candidate| apart.limbs(&at(c, LEGS_APART)).legs;
-        let spread = |candidate: &mut Candidate| {
-            let turned = apart.turned(&candidate.placement, None, true);
-            let scored = |degrees: &f64| apart.scored(at(candidate, *degrees), &turned, true, None);
-            let best = LEG_ANGLES.iter().map(scored).max_by(|a, b| a.score.total_cmp(&b.score));
-            let Some(start) = best.map(|best| apart.with_openings(best)) else { return };
-            let near = if start.placement.arm_angle_degrees == 0.0 { &apart } else { judge };
-            let found = self.climbed_posed(near, &start);
-            if found.score > candidate.score {
-                // Its weights are those of its own pose.
-                *candidate = self.climbed_posed(judge, &found);
-            }
-        };
-        ranked.iter_mut().filter(has_legs).take(SPREAD).collect::<Vec<_>>().into_par_iter().for_each(spread);
-        sort(ranked);
-    }
-
-    /// The best near a candidate on a body in its pose.
-    fn climbed_posed(&self, judge: &Judge, candidate: &Candidate) -> Candidate {
-        let is_posed = judge.field.is_posed(&candidate.placement);
-        let posed = if is_posed { None } else { self.posed_field(&candidate.placement) };
-        let judge = Judge { field: posed.as_ref().unwrap_or(judge.field), ..*judge };
-        let moves = if candidate.placement.origin == Origin::Elsewhere { Moves::All } else { Moves::Limbs };
-        let steps = Steps { from: 0.02, to: 0.0005, is_sharp: true, is_fine: true, moves };
-        judge.judged(climbed(&judge, candidate, &steps).placement)
-    }
-
-    /// The body in a garment's pose; none at rest.
-    fn posed_field(&self, placement: &Placement) -> Option<BodyField> {
-        let is_posed = !has_limbs_at_rest(placement);
-        is_posed.then(|| self.measured.field.posed(&LimbPose::of(self.body, placement), self.body))
-    }
-}
-
-fn has_limbs_at_rest(placement: &Placement) -> bool {
-    (placement.arm_angle_degrees, placement.leg_angle_degrees) == (0.0, 0.0)
 }
 
 fn sort(candidates: &mut [Candidate]) {

@@ -7,9 +7,6 @@ use clothcombo_physics::query::VertexIndex;
 use clothcombo_physics::vec3::{cross, norm, norm_squared, normalized, sub};
 use clothcombo_physics::{Topology, TriMesh};
 
-/// An opening narrower than this share of its length is a slit: limbs are round.
-const SLIT: f64 = 0.25;
-
 /// A corner of a triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Corner {
@@ -25,8 +22,8 @@ impl Corner {
     }
 }
 
-/// A border that no limb passes through: short, or a slit.
-pub(super) struct Hole {
+/// A border of the sheet.
+pub(super) struct SheetBorder {
     /// Vertices of the file, ascending.
     pub vertices: Vec<u32>,
     /// Its longest extent, and how far it reaches from that.
@@ -34,7 +31,7 @@ pub(super) struct Hole {
     width: f64,
 }
 
-impl Hole {
+impl SheetBorder {
     /// As a seam that stays open.
     pub fn as_seam(&self) -> Seam {
         let ends = [0, self.vertices.len() - 1].map(|end| self.vertices[end]);
@@ -202,10 +199,10 @@ impl Sheet {
         Seam { ends: seam.ends.map(|v| self.vertex_origin[v as usize]), ..*seam }
     }
 
-    /// Borders with an extent of at most `longest` (in the file's unit), and slits.
-    pub fn holes(&self, longest: f64) -> Vec<Hole> {
+    /// All borders, in the order of [`Topology::boundary_loops`].
+    pub fn borders(&self) -> Vec<SheetBorder> {
         let Ok(mesh) = TriMesh::new(self.positions.clone(), self.faces.clone()) else { return Vec::new() };
-        let holes = Topology::new(&mesh).boundary_loops.into_iter().map(|border| {
+        let borders = Topology::new(&mesh).boundary_loops.into_iter().map(|border| {
             let distance = |a: u32, b: u32| norm(sub(self.positions[b as usize], self.positions[a as usize]));
             let farthest = |from: u32| {
                 let of = border.iter().map(|v| (*v, distance(from, *v)));
@@ -219,9 +216,9 @@ impl Sheet {
             let width = border.iter().map(aside).fold(0.0, f64::max);
             let mut vertices: Vec<u32> = border.iter().map(|v| self.vertex_origin[*v as usize]).collect();
             vertices.sort_unstable();
-            Hole { vertices, length, width }
+            SheetBorder { vertices, length, width }
         });
-        holes.filter(|hole| hole.length < longest || hole.width < SLIT * hole.length).collect()
+        borders.collect()
     }
 
     /// Area of a face (in the square of the file's unit).

@@ -1,7 +1,8 @@
 //! Which placement is taken, what else it could be, and when none is believed.
 
 use super::cloth::Cloth;
-use super::diagnosis::{Size, size_doubt};
+use super::diagnosis::size_doubt;
+use super::doubt::{Doubt, SAME};
 use super::error::FitError;
 use super::judge::Candidate;
 use super::placement::{Origin, Placement, Unit};
@@ -9,12 +10,9 @@ use super::search::Search;
 use super::settings::FitSettings;
 use super::sitting::Sitting;
 use clothcombo_physics::vec3::{norm, sub};
-use std::fmt;
 
 /// Another reading, or height, whose log-posterior is this near to the best is told.
 const NEAR_TIE: f64 = 6.0;
-/// Readings nearer to each other than this are the same (m).
-const SAME: f64 = 0.02;
 /// Largest share of a garment that may lie inside the body where it is worn.
 const MOST_INSIDE: f64 = 0.25;
 /// A garment touches the body: a twentieth of it is nearer than this (m).
@@ -29,105 +27,6 @@ const WIDEST_NECK: f64 = 1.5;
 const LIMB_EVIDENCE: f64 = 12.0;
 /// Least height of a tube around the trunk (m): lower ones are belts.
 const LEAST_HEIGHT: f64 = 0.09;
-
-/// A doubt about a placement that was taken.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum Doubt {
-    /// Another reading is nearly as good.
-    NearTie { taken: Placement, other: Placement, apart: f64 },
-    /// Some centimetres higher or lower it fits nearly as well.
-    Height { taken: Placement },
-    /// A tube may be a skirt or a strapless top.
-    Tube,
-    /// Several pieces are worn on their own.
-    Outfit { pieces: usize },
-    /// It does not look worn, but hints say where it is.
-    Odd { why: String },
-    /// It would fit much better at another size.
-    Size(Size),
-    /// The body's arms miss the sleeves.
-    Arms,
-    /// Its front is where the file has its back, or the other way round.
-    Turned,
-    /// Arms or legs were found to be held otherwise by little evidence.
-    Limbs { taken: Placement },
-}
-
-impl fmt::Display for Doubt {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NearTie { taken, other, apart } => {
-                let flags = differences(taken, other);
-                write!(
-                    f,
-                    "another placement, up to {:.0} mm away, fits nearly as well: {}; {} settles it",
-                    1e3 * apart,
-                    other.reading(),
-                    flags.join(" ")
-                )
-            }
-            Self::Height { taken } => {
-                let [x, y, z] = taken.translation;
-                write!(
-                    f,
-                    "its height is known to 3 cm only: look at it; --offset {x:.3},{y:.3},{z:.3} takes it, another y moves it"
-                )
-            }
-            Self::Outfit { pieces } => write!(
-                f,
-                "{pieces} of its pieces would be worn without the others: for an outfit, export one file per garment"
-            ),
-            Self::Odd { why } => write!(f, "it does not look worn there: {why}; the hints are taken all the same"),
-            Self::Size(size) => write!(f, "{size}: is it of another size, or in another unit (--unit)?"),
-            Self::Arms => f.write_str(
-                "arms of the body pass through the cloth of its sleeves, which were made for arms held otherwise or of another body: --arms \
-                 or --from-body settles it",
-            ),
-            Self::Turned => f.write_str(
-                "turned by 180°, as it lies better on the body so, though no neckline shows where its front is; --turn 0 keeps it",
-            ),
-            Self::Limbs { taken } => {
-                let (limbs, flag, angle) = match taken.arm_angle_degrees {
-                    0.0 => ("legs", "--legs 0", taken.leg_angle_degrees),
-                    angle => ("arms", "--arms t", angle),
-                };
-                write!(f, "little of it tells that its {limbs} are {angle:.0}° from the rest pose; {flag} if they are not")
-            }
-            Self::Tube => f.write_str(
-                "a tube with two openings may be a skirt at the waist or a strapless top at the chest; --category settles it",
-            ),
-        }
-    }
-}
-
-/// Flags by which the placement taken differs from another, as they fix the one taken.
-fn differences(taken: &Placement, other: &Placement) -> Vec<String> {
-    let mut flags = Vec::new();
-    if taken.unit != other.unit {
-        flags.push(format!("--unit {}", taken.unit));
-    }
-    if taken.up != other.up {
-        flags.push(format!("--up {}", taken.up));
-    }
-    if taken.turn_degrees != other.turn_degrees {
-        flags.push(format!("--turn {}", taken.turn_degrees));
-    }
-    if (taken.arm_angle_degrees == 0.0) != (other.arm_angle_degrees == 0.0) {
-        flags.push(format!("--arms {}", if taken.arm_angle_degrees == 0.0 { "t" } else { "a" }));
-    }
-    if (taken.leg_angle_degrees == 0.0) != (other.leg_angle_degrees == 0.0) {
-        flags.push(format!("--legs {:.0}", taken.leg_angle_degrees));
-    }
-    let moved = norm(sub(taken.translation, other.translation));
-    if flags.is_empty() && moved < SAME {
-        flags.push("--from-body with the body it was made on".into());
-    }
-    if flags.is_empty() {
-        let [x, y, z] = taken.translation;
-        flags.push(format!("--offset {x:.3},{y:.3},{z:.3}"));
-    }
-    flags
-}
 
 /// Why a candidate is not believed; `None` if it is.
 pub(super) fn implausibility(
@@ -175,7 +74,7 @@ pub(super) fn implausibility(
 
 /// Where a file as it stands lies snugly on head, arms or feet: a band around the head is none around the chest of another unit.
 fn lies_off_trunk(candidate: &Candidate, search: &Search, cloth: &Cloth) -> Option<&'static str> {
-    if candidate.placement.origin == Origin::Elsewhere {
+    if candidate.placement.origin == Origin::Elsewhere || !cloth.is_tubes() {
         return None;
     }
     let place = search.off_trunk(cloth, &candidate.placement)?;
@@ -187,6 +86,13 @@ fn lies_off_trunk(candidate: &Candidate, search: &Search, cloth: &Cloth) -> Opti
 pub(super) struct Verdict {
     pub placement: Placement,
     pub doubts: Vec<Doubt>,
+}
+
+impl Verdict {
+    /// Whether it is taken because hints say so, though it does not look worn.
+    pub fn is_odd(&self) -> bool {
+        self.doubts.iter().any(|doubt| matches!(doubt, Doubt::Odd { .. }))
+    }
 }
 
 /// The best readings, the best first.
@@ -242,7 +148,9 @@ pub(super) fn verdict(
         if !settings.says_place() {
             // A hat or a sock that lies where it is worn is called one.
             let is_metres = best.placement.unit == Unit::M;
-            if let (true, Some(place)) = (is_near && is_metres, search.off_trunk(cloth, &best.placement)) {
+            if let (true, Some(place)) =
+                (is_near && is_metres && cloth.is_tubes(), search.off_trunk(cloth, &best.placement))
+            {
                 return Err(FitError::OffTrunk { place });
             }
             let mut readings = refused.iter().map(|(c, why)| format!("{} ({why})", c.placement.reading()));

@@ -91,8 +91,12 @@ fn sleeves_over_the_hands_and_for_other_arms_are_no_contradiction_and_hints_are_
 fn legs_apart_are_found_or_taken_as_they_are_said_to_be() {
     let body = shipped_body();
     let trousers = generated(&body, Category::Trousers, 7001, 900);
-    for (degrees, legs_degrees, limit) in [(5.0, None, 0.004), (8.0, Some(8.0), 1e-3)] {
-        let positions = posed(&trousers, &body, [0.0, degrees]);
+    let elsewhere = [0.0, -0.235, -0.02];
+    for (degrees, legs_degrees, origin, limit) in
+        [(5.0, None, [0.0; 3], 0.004), (8.0, Some(8.0), [0.0; 3], 1e-3), (10.0, None, elsewhere, 0.01)]
+    {
+        let mut positions = posed(&trousers, &body, [0.0, degrees]);
+        positions.iter_mut().for_each(|p| *p = add(*p, origin));
         let file = polygons(positions.clone(), trousers.rest.faces().iter().map(<[u32; 3]>::as_slice));
         assert!(!is_on_body(&trousers.rest.with_positions(positions).unwrap(), &body), "{degrees}");
         let fitted = fit(&file, &body, &FitSettings { legs_degrees, ..FitSettings::default() }).unwrap();
@@ -110,11 +114,11 @@ fn legs_apart_are_found_or_taken_as_they_are_said_to_be() {
 fn a_garment_of_another_size_is_refused_with_the_factor_that_fits() {
     let body = shipped_body();
     let tee = generated(&body, Category::TShirt, 9, 700).rest;
-    for factor in [0.4335, 2.3] {
+    for (factor, unit) in [(0.3, None), (0.4335, None), (2.3, None), (2.8, Some(Unit::M))] {
         let positions = tee.positions().iter().map(|p| scale(*p, factor)).collect();
         let file = polygons(positions, tee.faces().iter().map(<[u32; 3]>::as_slice));
-        let error =
-            fit(&file, &body, &FitSettings::default()).map(|fitted| fitted.report.to_string()).unwrap_err();
+        let settings = FitSettings { unit, ..FitSettings::default() };
+        let error = fit(&file, &body, &settings).map(|fitted| fitted.report.to_string()).unwrap_err();
         let FitError::Size { size } = error else { panic!("{factor}: {error}") };
         assert!((size.factor * factor - 1.0).abs() < 0.15, "{factor}: {size}");
     }
