@@ -13,6 +13,7 @@ mod diagnosis;
 mod doubt;
 mod error;
 mod from_body;
+pub mod hints;
 mod judge;
 mod likelihood;
 mod limb_pose;

@@ -2,13 +2,14 @@
 
 mod output;
 
-use super::fit_arguments::{Arms, FitArguments};
+use super::fit_arguments::FitArguments;
 use crate::cli::output::print_report;
 use crate::cli::values::file_to_make;
 use crate::cli::verbosity::spinner;
 use crate::dataset::load_body;
 use crate::system::paths::{lossy, lossy_option};
 use clap::Parser;
+use clothcombo_data::fit::hints::Arms;
 use clothcombo_data::fit::{FitReport, FitSettings, fit};
 use miette::{IntoDiagnostic, Report, miette};
 use output::{Form, check_output, read, save};
