@@ -12,7 +12,6 @@ use clothcombo_data::cache::{
 };
 use clothcombo_model::{GarmentEmbedding, GarmentTensors};
 use clothcombo_physics::contact::resolve::RestGarment;
-use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
@@ -38,21 +37,43 @@ pub(super) struct EmbeddedGarment {
     pub milliseconds: GarmentTimes,
 }
 
-/// Every garment a draper has met, by content.
+/// Vertices of all garments that are kept: at the paper's sizes each takes 4 kB, see [`MAX_VERTICES`](super::MAX_VERTICES).
+const MOST_KEPT: usize = 2 * super::MAX_VERTICES;
+
+/// The garments a draper has met last, by content, in the order of their last use.
 #[derive(Default)]
-pub(super) struct EmbeddedGarments(Mutex<HashMap<Key, EmbeddedGarment>>);
+pub(super) struct EmbeddedGarments(Mutex<Vec<(Key, EmbeddedGarment)>>);
 
 impl EmbeddedGarments {
+    fn known(&self, key: Key) -> Option<EmbeddedGarment> {
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let place = kept.iter().position(|(of, _)| *of == key)?;
+        let found = kept.remove(place);
+        let garment = found.1.clone();
+        kept.push(found);
+        Some(garment)
+    }
+
+    fn keep(&self, key: Key, garment: EmbeddedGarment) {
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        kept.push((key, garment));
+        let vertices = |kept: &[(Key, EmbeddedGarment)]| -> usize {
+            kept.iter().map(|(_, garment)| garment.prepared.vertex_count()).sum()
+        };
+        while kept.len() > 1 && vertices(&kept) > MOST_KEPT {
+            kept.remove(0);
+        }
+    }
+
     /// The garment as the networks need it, made if it was not met before.
     pub fn get(&self, draper: &Draper, source: &GivenGarment) -> Result<EmbeddedGarment, DraperError> {
         let garment = &source.garment;
         let mesh = mesh_key(&garment.rest);
         let key = KeyBuilder::new("embedded").key(mesh).text(garment.category.name());
         let key = key.number(u64::from(garment.holding)).finish();
-        let known = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(found) = known().get(&key) {
+        if let Some(found) = self.known(key) {
             let milliseconds = GarmentTimes::default();
-            return Ok(EmbeddedGarment { was_known: true, milliseconds, ..found.clone() });
+            return Ok(EmbeddedGarment { was_known: true, milliseconds, ..found });
         }
         let clock = Instant::now();
         let preprocessor = &draper.preprocessor;
@@ -66,7 +87,7 @@ impl EmbeddedGarments {
         let (embedding, was_known) = embedding(draper, &tensors, mesh)?;
         let milliseconds = GarmentTimes { preparation, embedding: elapsed(clock) };
         let found = EmbeddedGarment { prepared, rest, tensors, embedding, was_known, milliseconds };
-        known().insert(key, found.clone());
+        self.keep(key, found.clone());
         Ok(found)
     }
 }
