@@ -12,12 +12,13 @@ use miette::Report;
 use numpy::{PyArray2, PyArray3};
 use pyo3::prelude::*;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// An outfit on one body, or on the frames of a motion.
 #[pyclass(frozen, module = "clothcombo._native")]
 pub struct Drape {
     pub draper: Draper,
-    pub outfit: Outfit,
+    pub outfit: Arc<Outfit>,
     pub drapes: Vec<FrameDrape>,
     pub bodies: Bodies,
     pub smoothing: Option<Smoothing>,

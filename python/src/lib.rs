@@ -23,7 +23,7 @@ mod _native {
     #[pymodule_export]
     use crate::measure::{certificate, check, fit_garment, resolve, score};
     #[pymodule_export]
-    use crate::model::Model;
+    use crate::model::{Model, Outfit};
     #[pymodule_export]
     use crate::scene::{Scene, default_losses, evaluate_f32, evaluate_f64};
     use pyo3::prelude::*;

@@ -11,8 +11,8 @@ use clothcombo_data::format::PolygonMesh;
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use clothcombo_physics::mesh::MeshError;
 use clothcombo_trainer::inference::{
-    Bodies, Draper, DraperSettings, FrameRange, GarmentCatalog, GivenGarment, Outfit, RefineSteps,
-    log_repairs, warn_about_order,
+    Bodies, Draper, DraperSettings, FrameRange, GarmentCatalog, GivenGarment, Outfit as PreparedOutfit,
+    RefineSteps, log_repairs, warn_about_order,
 };
 use clothcombo_trainer::system::paths::user_cache;
 use miette::{IntoDiagnostic, Report};
@@ -47,6 +47,13 @@ impl MotionInput<'_> {
             }
         }
     }
+}
+
+/// Garments of a model, ready to be draped on any body.
+#[pyclass(frozen, module = "clothcombo._native")]
+pub struct Outfit {
+    draper: Draper,
+    outfit: Arc<PreparedOutfit>,
 }
 
 /// A garment as given: a name, a mesh unless the name is that of a file or of a known garment, and hints as JSON.
@@ -153,11 +160,43 @@ impl Model {
         self.draper.trained().folder.clone()
     }
 
-    #[expect(clippy::too_many_arguments, reason = "the keyword arguments of the package's `Model.drape`")]
+    /// Reads, places and embeds garments, innermost first.
+    fn outfit(&self, py: Python<'_>, garments: Vec<GarmentInput<'_>>, fit: Option<bool>) -> PyResult<Outfit> {
+        let wanted = garments.into_iter().map(WantedGarment::new).collect::<PyResult<Vec<_>>>()?;
+        let files: Vec<PathBuf> = wanted.iter().filter_map(WantedGarment::file).collect();
+        call(py, &files, || {
+            let found = wanted.into_iter().map(|garment| garment.find(&self.catalog, &self.draper, fit));
+            let sources = found.collect::<Result<Vec<_>, Report>>()?;
+            PreparedOutfit::check(&sources)?;
+            sources.iter().for_each(log_repairs);
+            warn_about_order(&sources);
+            let outfit = Arc::new(self.draper.outfit(sources)?);
+            Ok::<_, Report>(Outfit { draper: self.draper.clone(), outfit })
+        })
+    }
+
+    fn __repr__(&self) -> String {
+        let trained = self.draper.trained();
+        format!(
+            "Model({:?}, step {}, body {:?})",
+            trained.folder,
+            trained.state.step,
+            self.draper.body().name
+        )
+    }
+}
+
+#[pymethods]
+impl Outfit {
+    #[getter]
+    fn names(&self) -> Vec<String> {
+        self.outfit.names().map(str::to_owned).collect()
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "the keyword arguments of the package's `Outfit.drape`")]
     fn drape(
         &self,
         py: Python<'_>,
-        garments: Vec<GarmentInput<'_>>,
         shape: Vec<f64>,
         pose: Option<PoseInput<'_>>,
         motion: Option<MotionInput<'_>>,
@@ -165,7 +204,6 @@ impl Model {
         every: usize,
         posed: Option<PyReadonlyArray2<'_, f64>>,
         t_pose: Option<PyReadonlyArray2<'_, f64>>,
-        fit: Option<bool>,
         corrections: Option<usize>,
         refine: RefineInput,
         resolve: bool,
@@ -173,7 +211,6 @@ impl Model {
         time_limit: Option<f64>,
         smooth: Option<u16>,
     ) -> PyResult<Drape> {
-        let wanted = garments.into_iter().map(WantedGarment::new).collect::<PyResult<Vec<_>>>()?;
         let refine = match refine {
             RefineInput::Steps(steps) => RefineSteps::AtMost(steps),
             RefineInput::Text(text) => {
@@ -191,18 +228,10 @@ impl Model {
         let posed = posed.as_ref().map(|p| rows(p).map(<[_]>::to_vec)).transpose()?;
         let t_pose = t_pose.as_ref().map(|p| rows(p).map(<[_]>::to_vec)).transpose()?;
         let range = FrameRange { first: frames.0, end: frames.1 };
-        let mut files: Vec<PathBuf> = wanted.iter().filter_map(WantedGarment::file).collect();
-        files.extend(motion.as_ref().and_then(|motion| motion.as_ref().err().cloned()));
+        let files: Vec<PathBuf> = motion.iter().filter_map(|motion| motion.as_ref().err().cloned()).collect();
         call(py, &files, || {
             let draper = self.draper.with(&settings)?;
             let body = draper.body();
-            let sources: Vec<GivenGarment> = wanted
-                .into_iter()
-                .map(|garment| garment.find(&self.catalog, &draper, fit))
-                .collect::<Result<_, _>>()?;
-            Outfit::check(&sources)?;
-            sources.iter().for_each(log_repairs);
-            warn_about_order(&sources);
             let bodies = match (motion, posed) {
                 (Some(motion), _) => {
                     let motion = match motion {
@@ -227,19 +256,9 @@ impl Model {
                 }
             };
             bodies.check(&draper)?;
-            let outfit = draper.outfit(sources)?;
+            let outfit = self.outfit.clone();
             let (drapes, smoothing) = draper.drape_bodies(&outfit, &bodies, smooth, |_| ())?;
             Ok::<_, Report>(Drape { draper, outfit, drapes, bodies, smoothing })
         })
-    }
-
-    fn __repr__(&self) -> String {
-        let trained = self.draper.trained();
-        format!(
-            "Model({:?}, step {}, body {:?})",
-            trained.folder,
-            trained.state.step,
-            self.draper.body().name
-        )
     }
 }

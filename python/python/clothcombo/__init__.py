@@ -11,13 +11,13 @@ warning is a `UserWarning`.
 
 from . import _native
 from ._body import Body
-from ._drape import Drape, DrapedGarment, Garment, Model, fit
+from ._drape import Drape, DrapedGarment, Garment, Model, Outfit, fit
 from ._errors import Error, FileError
 from ._measure import Resolved, certificate, check, resolve, score
 from ._scene import TERMS, Scene, default_losses
 
 __version__ = _native.__version__
 __all__ = [
-    "Body", "Drape", "DrapedGarment", "Error", "FileError", "Garment", "Model", "Resolved", "Scene", "TERMS",
+    "Body", "Drape", "DrapedGarment", "Error", "FileError", "Garment", "Model", "Outfit", "Resolved", "Scene", "TERMS",
     "certificate", "check", "default_losses", "fit", "resolve", "score",
 ]

@@ -88,6 +88,13 @@ class Model:
         cache: Union[File, Literal[False], None] = None,
         folders: Iterable[File] = (),
     ) -> Model: ...
+    def outfit(
+        self,
+        garments: Iterable[Union[Mesh, Garment]],
+        *,
+        order: Optional[Sequence[int]] = None,
+        fit: Literal["auto", "always", "never"] = "auto",
+    ) -> Outfit: ...
     def drape(
         self,
         garments: Iterable[Union[Mesh, Garment]],
@@ -101,6 +108,26 @@ class Model:
         t_pose: Optional[ArrayLike] = None,
         order: Optional[Sequence[int]] = None,
         fit: Literal["auto", "always", "never"] = "auto",
+        corrections: Optional[int] = None,
+        refine: Union[int, Literal["auto"]] = 0,
+        resolve: bool = True,
+        gap_mm: float = 1.0,
+        time_limit: Optional[float] = None,
+        smooth: Optional[int] = None,
+    ) -> Drape: ...
+
+class Outfit:
+    names: list[str]
+    def drape(
+        self,
+        *,
+        shape: ArrayLike = (),
+        pose: Optional[Pose] = None,
+        motion: Union[File, tuple[ArrayLike, float], None] = None,
+        frames: tuple[int, Optional[int]] = (0, None),
+        every: int = 1,
+        posed: Optional[ArrayLike] = None,
+        t_pose: Optional[ArrayLike] = None,
         corrections: Optional[int] = None,
         refine: Union[int, Literal["auto"]] = 0,
         resolve: bool = True,

@@ -55,39 +55,60 @@ class Model:
     def body(self):
         return Body(self._native.body)
 
-    def drape(
-        self, garments, *, shape=(), pose=None, motion=None, frames=(0, None), every=1, posed=None, t_pose=None, order=None,
-        fit="auto", corrections=None, refine=0, resolve=True, gap_mm=1.0, time_limit=None, smooth=None,
-    ):
-        """Drapes garments, innermost first, as `clothcombo drape` does.
+    def outfit(self, garments, *, order=None, fit="auto"):
+        """Garments, innermost first, read, placed and embedded once, to be draped on many bodies.
 
-        `garments`: (positions, faces) pairs, files, names, or `Garment`s. `shape`: parameters. `pose`: rotation vectors [J, 3]
-        (radians), a name, or FILE.npz:FRAME; `motion`: a file, or (poses [T, J, 3], frames per second), of which `frames`
-        (first, end) and `every` take a part; `posed`: the vertices [B, 3] of the posed body, whose shape is `shape` or that of
-        the vertices `t_pose`. `order`: numbers of the garments, innermost first. `fit`: "auto", "always" or "never".
-        `corrections`, `refine` (steps or "auto"), `resolve`, `gap_mm`, `time_limit` (s for a garment) and `smooth` (frames)
-        are the flags of that name.
+        `garments`: (positions, faces) pairs, files, names, or `Garment`s. `order`: their numbers, innermost first. `fit`: "auto",
+        "always" or "never".
         """
         chosen = {"auto": None, "always": True, "never": False}
         if fit not in chosen:
             raise Error(f"fit is {fit!r}; hint: auto, always or never")
-        if sum(x is not None for x in (pose, motion, posed)) > 1 or (t_pose is not None and posed is None):
-            raise Error("more than one of pose, motion and posed, or t_pose without posed; hint: give one body")
         wanted = [_garment(x, i) for i, x in enumerate(garments)]
         if order is not None:
             if sorted(order) != list(range(len(wanted))):
                 raise Error(f"order {list(order)} is no order of {len(wanted)} garments; hint: name each once, from 0")
             wanted = [wanted[i] for i in order]
+        return Outfit(self._native.outfit(wanted, chosen[fit]))
+
+    def drape(self, garments, *, order=None, fit="auto", **arguments):
+        """Drapes garments, innermost first, as `clothcombo drape` does: `outfit(garments, …).drape(…)`."""
+        return self.outfit(garments, order=order, fit=fit).drape(**arguments)
+
+    def __repr__(self):
+        return repr(self._native)
+
+
+class Outfit:
+    """Garments of a model, innermost first, ready to be draped; `names` are theirs."""
+
+    def __init__(self, native):
+        self._native = native
+        self.names = native.names
+
+    def drape(
+        self, *, shape=(), pose=None, motion=None, frames=(0, None), every=1, posed=None, t_pose=None, corrections=None,
+        refine=0, resolve=True, gap_mm=1.0, time_limit=None, smooth=None,
+    ):
+        """Drapes them on one body or on the frames of a motion.
+
+        `shape`: parameters. `pose`: rotation vectors [J, 3] (radians), a name, or FILE.npz:FRAME; `motion`: a file, or (poses
+        [T, J, 3], frames per second), of which `frames` (first, end) and `every` take a part; `posed`: the vertices [B, 3] of
+        the posed body, whose shape is `shape` or that of the vertices `t_pose`. `corrections`, `refine` (steps or "auto"),
+        `resolve`, `gap_mm`, `time_limit` (s for a garment) and `smooth` (frames) are the flags of that name.
+        """
+        if sum(x is not None for x in (pose, motion, posed)) > 1 or (t_pose is not None and posed is None):
+            raise Error("more than one of pose, motion and posed, or t_pose without posed; hint: give one body")
         first, end = frames
         native = self._native.drape(
-            wanted, numbers(shape, "shape"), _pose(pose), _motion(motion), (first, end), every,
+            numbers(shape, "shape"), _pose(pose), _motion(motion), (first, end), every,
             None if posed is None else _positions(posed, "posed"), None if t_pose is None else _positions(t_pose, "t_pose"),
-            chosen[fit], corrections, refine, resolve, gap_mm, time_limit, smooth,
+            corrections, refine, resolve, gap_mm, time_limit, smooth,
         )
         return Drape(native)
 
     def __repr__(self):
-        return repr(self._native)
+        return f"Outfit({self.names})"
 
 
 class DrapedGarment:
@@ -98,32 +119,32 @@ class DrapedGarment:
     `mesh_positions` (the result); `transforms` [W, 3, 4] skin it in the first frame. `held`, `category`.
     """
 
-    def __init__(self, drape, index):
-        self._drape, self._index = drape, index
-        self.name = drape._native.names[index]
-        self.held, self.category = drape._native.kind(index)
+    def __init__(self, native, index):
+        self._native, self._index = native, index
+        self.name = native.names[index]
+        self.held, self.category = native.kind(index)
 
     def _frames(self, array):
-        return array if self._drape.is_motion else array[0]
+        return array if self._native.is_motion else array[0]
 
     def _stage(self, name):
-        return self._frames(self._drape._native.stage(self._index, name))
+        return self._frames(self._native.stage(self._index, name))
 
     @cached_property
     def positions(self):
-        return self._frames(self._drape._native.given(self._index))
+        return self._frames(self._native.given(self._index))
 
     @cached_property
     def faces(self):
-        return self._drape._native.given_faces(self._index)
+        return self._native.given_faces(self._index)
 
     @cached_property
     def mesh_rest(self):
-        return self._drape._native.mesh(self._index)[0]
+        return self._native.mesh(self._index)[0]
 
     @cached_property
     def mesh_faces(self):
-        return self._drape._native.mesh(self._index)[1]
+        return self._native.mesh(self._index)[1]
 
     @cached_property
     def mesh_positions(self):
@@ -139,7 +160,7 @@ class DrapedGarment:
 
     @cached_property
     def transforms(self):
-        return self._drape._native.transforms(self._index).reshape(-1, 3, 4)
+        return self._native.transforms(self._index).reshape(-1, 3, 4)
 
     def __repr__(self):
         return f"DrapedGarment({self.name!r}, {self.positions.shape[-2]} vertices)"
@@ -155,7 +176,7 @@ class Drape:
     def __init__(self, native):
         self._native = native
         self.is_motion, self.seconds = native.is_motion, native.seconds
-        self.garments = [DrapedGarment(self, i) for i in range(len(native.names))]
+        self.garments = [DrapedGarment(native, i) for i in range(len(native.names))]
 
     @cached_property
     def body(self):
