@@ -159,7 +159,6 @@ pub fn certificate<'py>(
 
 /// Positions of every garment after the post-process, and its certificate.
 #[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "the keyword arguments of the package's `resolve`")]
 pub fn resolve<'py>(
     py: Python<'py>,
     body: MeshInput<'_>,
