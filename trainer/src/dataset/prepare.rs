@@ -3,6 +3,7 @@
 use super::active_joints::ActiveJoints;
 use super::contents::Dataset;
 use super::error::DatasetError;
+use super::pose_features::joint_features;
 use super::prepared_garment::PreparedGarment;
 use super::sampling::{BodySample, SceneSample};
 use super::skinning::skinning_transforms;
@@ -23,6 +24,8 @@ pub struct PreparedBody {
     pub pose: Vec<f32>,
     /// World transforms of the active joints relative to the T-pose.
     pub bones: Vec<[[f64; 4]; 3]>,
+    /// What each active joint knows of the pose around it, `[J, 30]`.
+    pub joint_features: Vec<f32>,
     /// Canonical start positions of all garments, `[ΣV, 3]`.
     pub start: Vec<[f32; 3]>,
     /// The losses of this scene.
@@ -174,6 +177,7 @@ impl SceneBuilder<'_> {
         PreparedBody {
             shape: body.shape.iter().map(|v| *v as f32).collect(),
             pose: (self.features)(&body.pose, &self.joints.indices),
+            joint_features: joint_features(&bones, &self.joints.parents),
             bones,
             start: starts.concat(),
             energy: Arc::new(energy),
