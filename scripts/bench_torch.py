@@ -4,7 +4,7 @@
 Called by scripts/bench_vs_torch.sh and gpu_check.sh. For every case `clothcombo bench step` writes out a scene and its
 networks; PyTorch (torch_networks.py, torch_losses.py) loads both, and its positions, loss and gradient norm of every network
 must agree with ours before anything is timed. Then both sides run in turn with the same number of threads; medians over all
-rounds are printed. A run with switches that are not implemented here is refused, and they are named.
+rounds are printed. A run with switches that are not implemented is refused, and they are named.
 
     python3 scripts/bench_torch.py --ours target/release/clothcombo --widths 128 --layers 1,3
     python3 scripts/bench_torch.py --config configs/paper.toml --stage 1 --set model.width=64 --check
@@ -34,24 +34,24 @@ import tempfile
 import time
 
 import numpy as np
-import torch
 
-import torch_losses as losses
-from torch_networks import ClothCombo, read_safetensors
+from exported_scene import GARMENT_TERMS, ExportedScene
+
+try:
+    import torch
+
+    import torch_losses as losses
+    from torch_networks import ClothCombo
+
+    torch.sparse.check_sparse_tensor_invariants.disable()  # said explicitly, which silences a warning
+except ImportError as error:
+    torch, missing = None, error
 
 # Networks by the names of ours, and what their parameters are called in torch_networks.py.
 NETWORKS = {
     "garment_encoder": ["encoder"], "draping": ["embedding", "displacement"], "skinning": ["skinning"],
     "untangling": ["force", "untangling"], "corrections": [],
 }
-# What the networks and losses here heed of `model` and `settings`.
-MODEL = {
-    "width", "embedding", "diffusion_blocks", "diffusion_width", "eigen_count", "mlp_layers", "siren_layers", "siren_width",
-    "omega_first", "omega_hidden", "skinning_layers", "skinning_width", "displacement_scale", "untangling_scale",
-    "skinning_scale", "zero_sum_skinning", "vertex_embedding", "corrections", "correction_width",
-    "correction_steps", "graph", "skinning_joints",
-}
-torch.sparse.check_sparse_tensor_invariants.disable()  # said explicitly, which silences a warning
 PARTS = {
     "forward": "forward_ms",
     "forward + backward": "forward_backward_ms",
@@ -103,33 +103,15 @@ class Outfit:
         self.moves = bool(self.touched.any())
 
 
-def not_implemented(about):
-    """Switches of an exported run that this script would ignore. One that it has never heard of must be off."""
-    model, settings = about["model"], about["settings"]
-    found = [f"model.{key} = {value}" for key, value in model.items() if key not in MODEL and value]
-    found += [f"{key} = {value}" for key, value in settings.items() if key not in losses.SETTINGS | {"distance": 0} and value]
-    if about["trains"] not in ("single", "all"):
-        found.append(f"stages.trains = {about['trains']}")
-    if not model["vertex_embedding"]:
-        found.append("model.vertex_embedding = false")
-    if settings["distance"] != "nearest_vertex":
-        found.append(f"losses.body_collision.distance = {settings['distance']}")
-    weights = [part["weights"] for part in about["garments"] + about["layers"]]
-    terms = {term for part in weights for term in part} - set(losses.GARMENT_TERMS + losses.LAYER_TERMS)
-    return found + [f"losses.{term}" for term in sorted(terms)]
-
-
 class Scene:
     """Networks, losses and optimiser of one exported case."""
 
     def __init__(self, folder):
-        with open(f"{folder}/scene.json") as file:
-            self.about = json.load(file)
-        if unknown := not_implemented(self.about):
-            raise SystemExit("the PyTorch side does not implement " + ", ".join(unknown))
-        arrays = self.arrays = np.load(f"{folder}/scene.npz")
+        read = ExportedScene(folder)
+        self.about, self.arrays = read.about, read.arrays
+        arrays = self.arrays
         self.outfit = Outfit(arrays, self.about)
-        parameters = read_safetensors(f"{folder}/model.safetensors")
+        parameters = {name: torch.from_numpy(array) for name, array in read.parameters.items()}
         self.parameters = sum(p.numel() for p in parameters.values())
         self.model = ClothCombo(parameters, self.about["model"]).to(self.outfit.rest.device)
         optimizer = self.about["optimizer"]
@@ -156,7 +138,7 @@ class Scene:
         for i, garment in enumerate(self.garments):
             about = self.about["garments"][i]
             for term, weight in about["weights"].items():
-                if term in losses.GARMENT_TERMS and (term != "holding" or about["held"]):
+                if term in GARMENT_TERMS and (term != "holding" or about["held"]):
                     total = total + weight * garment.term(term, x[i], y[i], self.body)
         for pair in self.about["layers"] if layers else []:
             inner, outer, weights = pair["inner"], pair["outer"], pair["weights"]
@@ -303,6 +285,8 @@ def compare(options, case):
         start = time.perf_counter()
         ours(options, case, folder)
         exported = time.perf_counter()
+        if options.read:
+            return print(ExportedScene(folder).check())
         scene = Scene(folder)
         settle()
         prepared = time.perf_counter()
@@ -371,6 +355,7 @@ def main():
     parser.add_argument("--stage", default="0", help="with --config: which one, from 0")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="overrides one value; repeatable")
     parser.add_argument("--check", action="store_true", help="only compare positions, loss and gradients")
+    parser.add_argument("--read", action="store_true", help="only read what is exported, which needs no torch")
     parser.add_argument("--torch-device", choices=["cpu", "cuda"], default="cpu", help="where PyTorch computes")
     parser.add_argument("--tf32", action="store_true", help="also time PyTorch with TF32 matrix products, on a GPU")
     parser.add_argument("--device", help="where we compute, as of clothcombo bench step --device")
@@ -381,16 +366,23 @@ def main():
     parser.add_argument("--json", help="file that collects the cases of several runs, one a line")
     parser.add_argument("--peak-of", help=argparse.SUPPRESS)
     options = parser.parse_args()
-    torch.set_num_threads(options.threads)
-    losses.set_device(options.torch_device)
-    if options.peak_of:
-        return print(peak_mib(options.peak_of))
     made_up = [
         ["--widths", str(width), "--layers", str(layers), "--vertices", str(options.vertices)]
         for width in options.widths for layers in options.layers
     ]
+    wanted = [["--config", options.config, "--stage", options.stage]] if options.config else made_up
+    if options.read:
+        for case in wanted:
+            compare(options, case)
+        return
+    if torch is None:
+        sys.exit(f"{missing}; --read needs numpy alone")
+    torch.set_num_threads(options.threads)
+    losses.set_device(options.torch_device)
+    if options.peak_of:
+        return print(peak_mib(options.peak_of))
     cases = []
-    for case in [["--config", options.config, "--stage", options.stage]] if options.config else made_up:
+    for case in wanted:
         cases.append(compare(options, case))
         if options.json:
             with open(options.json, "a") as file:

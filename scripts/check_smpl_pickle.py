@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Checks scripts/smpl_pickle_to_npz.py on pickles made as SMPL's are, and on ones that would do harm.
+"""Checks scripts/smpl_pickle_to_npz.py on pickles made as SMPL's are, and on ones that would do harm; and motion_pickle_to_npz.py
+on motions as three sources pickle them.
 
 usage: scripts/check_smpl_pickle.py
 
@@ -16,7 +17,8 @@ import types
 import numpy as np
 import scipy.sparse
 
-CONVERTER = os.path.join(os.path.dirname(os.path.abspath(__file__)), "smpl_pickle_to_npz.py")
+SCRIPTS = os.path.dirname(os.path.abspath(__file__))
+CONVERTER = os.path.join(SCRIPTS, "smpl_pickle_to_npz.py")
 
 
 def fake_module(name, **classes):
@@ -48,6 +50,32 @@ class OldStyle(pickle._Pickler):
         module, name = getattr(obj, "__module__", None), name or obj.__qualname__
         self.write(b"c" + renamed.get(module, module).encode() + b"\n" + name.encode() + b"\n")
         self.memoize(obj)
+
+
+def check_motions(folder):
+    poses, trans = rng(7, 72), rng(7, 3)
+    several = {"poses": [poses, poses[:5]], "trans": [trans, trans[:5]], "sequence": "street", "genders": ["m", "f"]}
+    simulated = {"a/walk": {"pose_aa": poses, "trans_orig": trans, "fps": 30}, "b/run": {"pose_aa": poses[:4], "fps": 60.0}}
+    for name, content, expected in [
+        ("one", {"smpl_poses": poses, "smpl_trans": trans, "smpl_scaling": np.ones(1)}, {"": ("smpl_poses", 7, None)}),
+        ("several", several, {"_0": ("poses", 7, None), "_1": ("poses", 5, None)}),
+        ("simulated", simulated, {"_walk": ("poses", 7, 30), "_run": ("poses", 4, 60)}),
+    ]:
+        source, target = os.path.join(folder, name + ".pkl"), os.path.join(folder, name + ".npz")
+        with open(source, "wb") as f:
+            pickle.dump(content, f, 5 if name == "simulated" else 2)
+        result = subprocess.run([sys.executable, os.path.join(SCRIPTS, "motion_pickle_to_npz.py"), source, target], capture_output=True, text=True)
+        assert result.returncode == 0, result.stderr
+        for part, (key, frames, rate) in expected.items():
+            with np.load(os.path.join(folder, name + part + ".npz"), allow_pickle=False) as found:
+                assert (found[key] == poses[:frames]).all() and (rate is None or found["fps"] == rate), (name, part)
+    result = subprocess.run([sys.executable, os.path.join(SCRIPTS, "motion_pickle_to_npz.py"), CONVERTER, target], capture_output=True, text=True)
+    assert result.returncode == 1 and "Traceback" not in result.stderr, result
+    print("motions of three sources: exact")
+
+
+def rng(*shape):
+    return np.random.default_rng(2).normal(size=shape)
 
 
 def main():
@@ -106,6 +134,7 @@ def main():
             result = convert(lambda f: f.write(data))
             assert result.returncode == 1 and "smpl.pkl" in result.stderr and "Traceback" not in result.stderr, (what, result)
         print("five damaged files: a sentence each")
+        check_motions(folder)
 
 
 if __name__ == "__main__":

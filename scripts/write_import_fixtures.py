@@ -473,11 +473,79 @@ def write_deepmimic():
         f.write('{"Loop": "wrap", "Frames": [[0.1, 0, 0.4, 0, 1, 0')
 
 
+# --- Acclaim -----------------------------------------------------------------------------------------------------------
+
+def write_acclaim():
+    """A skeleton with the names of the CMU database, and where its limbs point. Joints are turned from the leaves to the root,
+    each with all that hangs on it, about axes fixed at rest."""
+    own = np.random.default_rng(7)
+    bones = {}
+
+    def bone(name, parent, direction, length, axis=(0, 0, 0), dof=""):
+        bones[name] = (parent, np.array(direction, float) / np.linalg.norm(direction), length, axis, dof.split())
+
+    for name, parent in (("lowerback", "root"), ("upperback", "lowerback"), ("thorax", "upperback"), ("lowerneck", "thorax"),
+                         ("upperneck", "lowerneck"), ("head", "upperneck")):
+        bone(name, parent, (0, 1, 0), 2, dof="rx ry rz")
+    for s, x in (("l", 1), ("r", -1)):
+        bone(s + "hipjoint", "root", (0.6 * x, -0.8, 0), 2.5)
+        bone(s + "femur", s + "hipjoint", (0.34 * x, -0.94, 0), 7, (0, 0, 20 * x), "rx ry rz")
+        bone(s + "tibia", s + "femur", (0.34 * x, -0.94, 0), 7.5, (0, 0, 20 * x), "rx")
+        bone(s + "foot", s + "tibia", (0, -0.2, 1), 2, (-90, 0, 20 * x), "rx rz")
+        bone(s + "toes", s + "foot", (0, 0, 1), 1, (-90, 0, 20 * x), "rx")
+        bone(s + "clavicle", "thorax", (0.9 * x, 0.4, 0), 3.5, dof="ry rz")
+        bone(s + "humerus", s + "clavicle", (x, 0, 0), 5, (180, -30 * x, -90 * x), "rx ry rz")
+        bone(s + "radius", s + "humerus", (x, 0, 0), 3.5, (180, -30 * x, -90 * x), "rx")
+        bone(s + "wrist", s + "radius", (x, 0, 0), 2, (0, 90 * x, 90 * x), "ry")
+        bone(s + "hand", s + "wrist", (x, 0, 0), 1, (0, 90 * x, 90 * x), "rx rz")
+    with open(path("acclaim", "07", "07.asf"), "w") as f:
+        f.write("# made by scripts/write_import_fixtures.py\n:version 1.10\n:name made\n:units\n  mass 1.0\n  length 0.45\n  angle deg\n"
+                ":documentation\n  begin of nothing\n:root\n  order TX TY TZ RX RY RZ\n  axis XYZ\n  position 0 0 0\n  orientation 0 0 0\n:bonedata\n")
+        for name, (_, d, length, axis, dof) in bones.items():
+            f.write("  begin\n    name %s\n    direction %.9g %.9g %.9g\n    length %g\n    axis %g %g %g XYZ\n" % (name, *d, length, *axis))
+            if dof:
+                f.write("    dof %s\n    limits %s\n" % (" ".join(dof), "\n           ".join(["(-170 170)"] * len(dof))))
+            f.write("  end\n")
+        f.write(":hierarchy\n  begin\n")
+        for parent in ["root", *bones]:
+            children = [name for name, b in bones.items() if b[0] == parent]
+            f.write("    %s\n" % " ".join([parent, *children]) if children else "")
+        f.write("  end\n")
+
+    def about(axis, degrees):
+        return rotation(np.radians(degrees) * np.array(axis))
+
+    def subtree(top):
+        return [top] + [n for name, b in bones.items() if b[0] == top for n in subtree(name)]
+
+    pointing = []
+    limbs = [s + part for s in "lr" for part in ("femur", "tibia", "humerus", "radius")]
+    with open(path("acclaim", "07", "07_01.amc"), "w") as f:
+        f.write("#!OML:ASF made.ASF\n:FULLY-SPECIFIED\n:DEGREES\n")
+        for frame in range(5):
+            root = own.uniform(-25, 25, 3)
+            values = {name: own.uniform(-40, 40, len(b[4])) for name, b in bones.items() if b[4]}
+            f.write("%d\nroot 1 17 -3 %s\n" % (frame + 1, " ".join("%.9f" % x for x in root)))
+            for name, row in values.items():
+                f.write("%s %s\n" % (name, " ".join("%.9f" % x for x in row)))
+            direction = {name: b[1] for name, b in bones.items()}
+            for name in list(bones)[::-1] + ["root"]:
+                axis, dof = bones[name][3:] if name != "root" else ((0, 0, 0), ["rx", "ry", "rz"])
+                fixed = about([0, 0, 1], axis[2]) @ about([0, 1, 0], axis[1]) @ about([1, 0, 0], axis[0])
+                for d, value in zip(dof, values.get(name, []) if name != "root" else root):
+                    turn = about(fixed[:, "xyz".index(d[1])], value)
+                    for moved in subtree(name)[name == "root":]:
+                        direction[moved] = turn @ direction[moved]
+            pointing.append([direction[name] for name in limbs])
+    np.savez_compressed(path("expected_acclaim.npz"), bones=np.array(pointing))
+
+
 if __name__ == "__main__":
     write_models()
     write_amass()
     write_cloth3d()
     write_kinds()
     write_deepmimic()
+    write_acclaim()
     total = sum(os.path.getsize(os.path.join(d, f)) for d, _, files in os.walk(OUT) for f in files)
     print("%s: %d files, %.0f kB" % (OUT, sum(len(f) for _, _, f in os.walk(OUT)), total / 1000))

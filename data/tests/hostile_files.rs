@@ -6,10 +6,9 @@ mod hostile;
 
 use clothcombo_data::asset::{BindingSettings, Body, BodyFileSettings, Motion};
 use clothcombo_data::format::{MatFile, NpzFile, PointCache};
-use clothcombo_data::import::bvh::Bvh;
 use clothcombo_data::import::{
-    AmassSettings, Cloth3dBodies, Cloth3dSettings, RetargetSettings, Summary, Thinning, import_amass,
-    import_cloth3d, import_deepmimic, import_smpl_family,
+    AmassSettings, Cloth3dBodies, Cloth3dSettings, RetargetSettings, Summary, Thinning, acclaim, bvh,
+    import_amass, import_cloth3d, import_deepmimic, import_smpl_family,
 };
 use fixture::{fixture, no_progress};
 use hostile::{damaged, survive};
@@ -140,9 +139,27 @@ fn motions_of_others() {
     const WALK: &[u8] = include_bytes!("hostile/walk.bvh");
     survive("walk.bvh", &[WALK.to_vec()], 0.2..1.0, 16 * MEGABYTE, damaged, |bytes| {
         // As the importer reads it: any bytes.
-        reason(Bvh::parse(&String::from_utf8_lossy(bytes), Path::new("walk.bvh")))
+        reason(bvh::parse(&String::from_utf8_lossy(bytes), Path::new("walk.bvh")))
     });
     let body = Body::load(&fixture("cloth3d_bodies/body_neutral.npz"), &BodyFileSettings::default()).unwrap();
+    for name in ["07.asf", "07_01.amc"] {
+        let slot = Slot::new(name);
+        let [skeleton, motion] = ["07.asf", "07_01.amc"].map(|file| fixture("acclaim/07").join(file));
+        survive(
+            name,
+            &[bytes_of(&format!("acclaim/07/{name}"))],
+            0.2..1.0,
+            16 * MEGABYTE,
+            damaged,
+            |bytes| {
+                let file = slot.with(bytes);
+                match name.ends_with("asf") {
+                    true => reason(acclaim::load(file, &motion, 120.0)),
+                    false => reason(acclaim::load(&skeleton, file, 120.0)),
+                }
+            },
+        );
+    }
     let slot = Slot::new("spin.txt");
     let seeds = [bytes_of("deepmimic/humanoid3d_random.txt")];
     survive("spin.txt", &seeds, 0.2..1.0, 16 * MEGABYTE, damaged, |bytes| {

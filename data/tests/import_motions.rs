@@ -1,14 +1,15 @@
-//! AMASS and DeepMimic motions written by `scripts/write_import_fixtures.py`, and what it expects of them.
+//! AMASS, DeepMimic and Acclaim motions written by `scripts/write_import_fixtures.py`, and what it expects of them.
 
 mod fixture;
 
 use clothcombo_data::asset::rotation::matrix_from_axis_angle;
-use clothcombo_data::asset::{Motion, Pose};
+use clothcombo_data::asset::{Body, Motion, Pose};
 use clothcombo_data::folders::load_motion_folder;
 use clothcombo_data::format::NpzFile;
 use clothcombo_data::generate::mannequin;
 use clothcombo_data::import::{
-    AmassSettings, RetargetSettings, Summary, Thinning, UpAxis, import_amass, import_deepmimic,
+    AmassSettings, AmcSettings, RetargetSettings, Summary, Thinning, UpAxis, import_amass, import_amc,
+    import_deepmimic,
 };
 use fixture::{files_in, fixture, no_progress, truncations};
 use std::fs;
@@ -221,8 +222,28 @@ fn deepmimic_limbs_point_where_the_character_points_them() {
     assert!(skipped[0].contains("frame 0 has 8 numbers") && skipped[1].contains("EOF"), "{skipped:?}");
     let motion = Motion::load(&folder.path().join("humanoid3d_random.npz")).unwrap();
     assert!((motion.frame_rate - 30.0).abs() < 0.01);
-    let expected = NpzFile::open(&fixture("expected_deepmimic.npz")).unwrap().numbers("bones", "").unwrap();
-    // Left thigh, shank, upper arm, forearm, then the right ones.
+    assert_limbs_point(&motion, &body, "expected_deepmimic.npz");
+}
+
+#[test]
+fn acclaim_limbs_point_where_the_actor_points_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let body = mannequin();
+    let settings = AmcSettings {
+        retarget: RetargetSettings { thinning: every_frame(), ..RetargetSettings::default() },
+        ..AmcSettings::default()
+    };
+    let subjects = [fixture("acclaim")];
+    let summary = import_amc(&subjects, &body, folder.path(), &settings, None, &mut no_progress()).unwrap();
+    assert!(summary.taken[0].1.contains("22 of 22 body joints in a rig of 27"), "{summary:?}");
+    let motion = Motion::load(&folder.path().join("07_01.npz")).unwrap();
+    assert_eq!((motion.frame_rate, motion.poses.len()), (120.0, 5));
+    assert_limbs_point(&motion, &body, "expected_acclaim.npz");
+}
+
+/// Left thigh, shank, upper arm and forearm, then the right ones, have the expected directions in every frame.
+fn assert_limbs_point(motion: &Motion, body: &Body, expected: &str) {
+    let expected = NpzFile::open(&fixture(expected)).unwrap().numbers("bones", "").unwrap();
     const BONES: [(usize, usize); 8] =
         [(1, 4), (4, 7), (16, 18), (18, 20), (2, 5), (5, 8), (17, 19), (19, 21)];
     assert_eq!(expected.shape, [motion.poses.len(), BONES.len(), 3]);

@@ -1,4 +1,4 @@
-//! What is expensive to compute from a garment, kept on disk under the hash of everything it was computed from.
+//! What is expensive to compute, kept on disk under the hash of everything it was computed from.
 //!
 //! A key is the BLAKE3 hash of the inputs and of the version of the computation: a changed mesh, setting or version is another
 //! key, so nothing ever has to be invalidated. Records appear whole (temporary name, then rename) and are never changed
@@ -8,11 +8,13 @@
 mod bindings;
 mod embeddings;
 mod operators;
+mod poses;
 mod record;
 mod store;
 
 pub use bindings::{binding_key, body_key, get_binding, get_largest_weights, put_binding};
 pub use embeddings::{StoredEmbedding, embedding_key, get_embedding, put_embedding};
 pub use operators::{get_operators, mesh_key, operators_key, put_operators};
+pub use poses::{get_poses, put_poses};
 pub use record::{Element, Record, StoredArray};
 pub use store::{ArrayCache, CacheError, Key, KeyBuilder};

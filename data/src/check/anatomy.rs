@@ -130,6 +130,11 @@ fn impossible(joint: usize, rotation: [f64; 3]) -> Option<(Kind, f64)> {
     (swing < TWIST_IS_KNOWN && twist > *most_twist).then_some((Kind::Twists, twist))
 }
 
+/// Whether no joint of a pose but the pelvis turns as none does.
+pub fn is_possible(pose: &Pose) -> bool {
+    (1..BODY_JOINT_COUNT).all(|joint| impossible(joint, pose.rotation(joint)).is_none())
+}
+
 /// A warning about joints that turn as none does, in more than a stray frame: joint, frame, angle and the likely cause; `None` if
 /// there are none.
 pub fn impossible_turn<'a>(poses: impl IntoIterator<Item = &'a Pose>) -> Option<String> {

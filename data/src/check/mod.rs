@@ -9,11 +9,11 @@ mod motion;
 mod placement;
 mod targets;
 
-pub use anatomy::impossible_turn;
+pub use anatomy::{impossible_turn, is_possible};
 pub use body::BodyCheck;
 pub use garment::{GarmentCheck, layer_guess};
 pub use motion::{MotionCheck, not_radians, not_upright};
-pub use targets::{ManifestHints, Target, find_targets};
+pub use targets::{ManifestHints, Target, find_targets, only_body};
 
 use crate::asset::Body;
 use crate::asset::motion::holds_poses;

@@ -1,5 +1,6 @@
 //! Which files a list of paths means.
 
+use super::is_body_file;
 use crate::asset::Category;
 use crate::folders::garment_folder::{MANIFEST, list_garment_folder, read_entries};
 use crate::format::{folder, is_mesh_path, way_out};
@@ -92,6 +93,15 @@ pub fn find_targets(paths: &[PathBuf]) -> Vec<Target> {
         }
     }
     targets
+}
+
+/// The one body among `targets`; none where there are several.
+pub fn only_body(targets: &[Target]) -> Option<&Path> {
+    let mut bodies = targets.iter().filter_map(|target| match target {
+        Target::Npz { path } if is_body_file(path) => Some(path.as_path()),
+        _ => None,
+    });
+    bodies.next().filter(|_| bodies.next().is_none())
 }
 
 fn file_target(path: &Path) -> Option<Target> {

@@ -41,6 +41,13 @@ pub struct FitSettings {
     pub from_body: Option<Arc<SourceBody>>,
 }
 
+impl FitSettings {
+    /// Whether they say where a garment belongs: such a garment is never taken where it lies.
+    pub fn is_placed(&self) -> bool {
+        self.offset.is_some() || self.turn_degrees.is_some() || self.from_body.is_some()
+    }
+}
+
 /// Which of a file's surfaces are the garment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Keep {

@@ -34,7 +34,7 @@ const FORMATS: [(&[&str], &str, &str, &str); 8] = [
         "another file",
         "BVH, after solving it for a skeleton (Mokka, MotionBuilder), or fit SMPL to it (SOMA, MoSh++)",
     ),
-    (&["asf", "amc"], "an Acclaim skeleton", "another file", "BVH (amc2bvh, or Blender)"),
+    (&["asf", "amc"], "an Acclaim skeleton or motion", "another file", "`clothcombo import amc` reads it"),
 ];
 
 /// Why a file of a known format that is not read is refused, and the way out; `None` for formats that nobody knows, or
@@ -42,8 +42,8 @@ const FORMATS: [(&[&str], &str, &str, &str); 8] = [
 pub fn way_out(path: &Path) -> Option<String> {
     if ["pkl", "pickle", "pt", "pth"].into_iter().any(|extension| has_extension(path, extension)) {
         return Some(format!(
-            "a Python pickle is a program and is never executed here. Of a body model take the arrays with scripts/smpl_pickle_to_npz.py {} \
-             model.npz; of a motion that you trust, save poses and rate in Python: numpy.savez('motion.npz', poses=..., fps=...)",
+            "a Python pickle is a program and is never executed here; these scripts take its arrays and execute nothing: of a motion, \
+             scripts/motion_pickle_to_npz.py {0} motion.npz; of a body model, scripts/smpl_pickle_to_npz.py {0} model.npz",
             path.display()
         ));
     }
@@ -68,6 +68,7 @@ mod tests {
             ("a.dae", "glTF"),
             ("a.c3d", "BVH"),
             ("a.pkl", "smpl_pickle_to_npz.py a.pkl"),
+            ("a.pkl", "motion_pickle_to_npz.py a.pkl motion.npz"),
         ] {
             let found = way_out(Path::new(name)).unwrap();
             assert!(found.contains(part), "{found}");

@@ -91,7 +91,7 @@ mod tests {
     use crate::folders::{load_garment_folder, load_motion_folder};
     use crate::format::{MatFile, PointCache};
     use crate::generate::mannequin;
-    use crate::import::bvh::Bvh;
+    use crate::import::bvh;
     use std::error::Error;
 
     /// Whoever prints an error prints its sources below it: a text that has them already must not name them as such.
@@ -103,7 +103,7 @@ mod tests {
             load_mesh(&missing).unwrap_err().into(),
             Body::load(&missing, &BodyFileSettings::default()).unwrap_err().into(),
             Motion::load(&missing).unwrap_err().into(),
-            Bvh::load(&missing).unwrap_err().into(),
+            bvh::load(&missing).unwrap_err().into(),
             MatFile::load(&missing).unwrap_err().into(),
             PointCache::load(&missing).unwrap_err().into(),
             load_garment_folder(&missing, &mannequin()).unwrap_err().into(),

@@ -51,7 +51,7 @@ impl ObjMesh {
         let mut number_of_group = HashMap::from([(String::new(), 0)]);
         for Statement { line, text, .. } in statements(bytes) {
             let text = String::from_utf8_lossy(&text);
-            let mut words = text.split('#').next().unwrap_or_default().split_ascii_whitespace();
+            let mut words = without_comment(&text).split_ascii_whitespace();
             let wrong = FileError::line(path, line);
             match words.next() {
                 Some("v") => {
@@ -126,12 +126,27 @@ impl ObjMesh {
     }
 }
 
+/// How programs of Microsoft's C library write what is no number, after its dot.
+const NO_NUMBERS: [&str; 5] = ["#IND", "#QNAN", "#SNAN", "#INF", "#J"];
+
+/// A statement without the comment behind it; the `#` of `-1.#IND` is part of a number.
+fn without_comment(text: &str) -> &str {
+    let is_comment = |(at, _): &(usize, &str)| {
+        let (before, after) = text.split_at(*at);
+        !(before.ends_with("1.") && NO_NUMBERS.iter().any(|kind| after.starts_with(kind)))
+    };
+    text.match_indices('#').find(is_comment).map_or(text, |(at, _)| &text[..at])
+}
+
 fn vertex<'a>(mut words: impl Iterator<Item = &'a str>) -> Result<[f64; 3], String> {
     let mut position = [0.0f64; 3];
     for (axis, x) in position.iter_mut().enumerate() {
         let word =
             words.next().ok_or_else(|| format!("a vertex needs 3 coordinates, this one has {axis}"))?;
-        *x = word.parse().map_err(|_| format!("'{word}' is not a number"))?;
+        *x = match word.contains('#') {
+            true => f64::NAN,
+            false => word.parse().map_err(|_| format!("'{word}' is not a number"))?,
+        };
         if !x.is_finite() {
             return Err(format!("vertex coordinate '{word}' is not finite"));
         }
@@ -269,7 +284,10 @@ mod tests {
         let cases = [
             ("v 0 nan 0\nf 1 1 1\n", 1, "not finite"),
             (&format!("{SQUARE}v 0 inf 0\n"), 6, "not finite"),
+            (&format!("{SQUARE}v 0 -1.#IND 0\n"), 6, "'-1.#IND' is not finite"),
+            (&format!("{SQUARE}v 0 0 1.#QNAN0 # none\n"), 6, "'1.#QNAN0' is not finite"),
             (&format!("{SQUARE}v 1 2\n"), 6, "3 coordinates"),
+            (&format!("{SQUARE}v 1 2. #IND\n"), 6, "3 coordinates"),
             (&format!("{SQUARE}v 1 2 x\n"), 6, "'x' is not a number"),
             (&format!("{SQUARE}\nf 1 2 9\n"), 7, "vertex 9, but the file has 4"),
             (&format!("{SQUARE}f 1 2 -5\n"), 6, "vertex -5"),

@@ -8,4 +8,6 @@ pub mod pose;
 
 pub use garment::{GarmentDesign, GarmentError, GarmentGenerator, GarmentSettings};
 pub use mannequin::mannequin;
-pub use pose::{PoseAugmentation, PoseSampler, SelfContact};
+pub use pose::{
+    LimbDensity, POSE_NAMES, PoseAugmentation, PoseSampler, SelfContact, named_pose, uniform_pose,
+};

@@ -5,6 +5,7 @@
 //! the pelvis of a body of their own. The turn to y up goes into the root. The heading stays in the root, as in every motion file
 //! here; whoever samples poses removes it.
 
+use super::find_files::find_files;
 use super::motions::{Clip, NamedFile, named, short, stem, write_motions};
 use super::summary::{ImportError, Progress, Summary};
 use super::thinning::{Thinned, Thinning, thin};
@@ -12,9 +13,8 @@ use super::up_axis::{UpAxis, undecided};
 use crate::asset::motion::{MotionFile, check_frame_rate, holds_poses, mean_up};
 use crate::asset::{Motion, Provenance};
 use crate::check::impossible_turn;
-use crate::format::{FileError, NpzFile, folder};
-use std::collections::{HashMap, HashSet};
-use std::fs;
+use crate::format::NpzFile;
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 /// How motions are imported.
@@ -36,7 +36,6 @@ impl Default for AmassSettings {
 }
 
 const EXPECTED: &str = "AMASS motions (.npz)";
-const DEEPEST: usize = 32;
 
 /// So many files of a folder are asked for its up axis.
 const ASKED_FOR_UP: usize = 32;
@@ -58,12 +57,7 @@ pub fn import_amass(
     let mut notes = Vec::new();
     progress("looking for motions", 0, 1);
     for input in inputs {
-        let mut found = Vec::new();
-        // What was imported before is no input, unless it is asked for.
-        let below =
-            fs::canonicalize(out).ok().filter(|out| fs::canonicalize(input).ok().as_ref() != Some(out));
-        let mut seen = HashSet::from_iter(below);
-        find(input, &mut found, &mut seen, 0)?;
+        let found = find_files(input, "npz", out)?;
         let axis = settings.up.map_or_else(|| standing_axis(&found, settings.rate), Ok);
         if let (Ok(axis), None) = (&axis, settings.up) {
             notes.push(format!("{}: {} is up, as the bodies stand (--up)", input.display(), axis.name()));
@@ -114,29 +108,6 @@ fn standing_axis(files: &[PathBuf], rate: Option<f64>) -> Result<UpAxis, String>
         return Ok(UpAxis::Y);
     }
     UpAxis::of(mean).ok_or_else(|| undecided(mean))
-}
-
-/// All `.npz` files below `path`, in order of their names. Links that lead back are followed once.
-fn find(
-    path: &Path,
-    found: &mut Vec<PathBuf>,
-    seen: &mut HashSet<PathBuf>,
-    depth: usize,
-) -> Result<(), FileError> {
-    let failed = FileError::io(path);
-    if !fs::metadata(path).map_err(&failed)?.is_dir() {
-        found.push(path.into());
-        return Ok(());
-    }
-    if depth > DEEPEST || !seen.insert(fs::canonicalize(path).map_err(&failed)?) {
-        return Ok(());
-    }
-    for entry in folder::entries(path)? {
-        if entry.is_dir() || folder::has_extension(&entry, "npz") {
-            find(&entry, found, seen, depth + 1)?;
-        }
-    }
-    Ok(())
 }
 
 /// The path below `root` with underscores, without what every file of AMASS ends in.

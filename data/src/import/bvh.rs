@@ -1,99 +1,16 @@
-//! Motion capture in BVH form, retargeted to the 22 SMPL body joints.
-//!
-//! Joints are found by their names and their place in the tree ([`rig`]), or by a file ([`JointFile`]); see
-//! [`super::retarget`] for how they are matched.
+//! Motion capture in BVH form, retargeted to the 22 SMPL body joints; see [`super::rig`].
 
 mod hierarchy;
-mod joint_file;
-mod joint_name;
-mod rig;
 
-pub use hierarchy::{Bvh, BvhJoint, Channel};
-pub use joint_file::JointFile;
+#[cfg(test)]
+pub(super) use hierarchy::tests::SMALL;
+pub use hierarchy::{load, parse};
 
-use super::motions::{RetargetSettings, Retargeted, write_retargeted};
-use super::retarget::{JointMap, Retarget};
+use super::motions::{RetargetSettings, write_retargeted};
+use super::rig::{JointFile, retargeted};
 use super::summary::{ImportError, Progress, Summary};
-use super::thinning::largest_turn;
-use super::up_axis::UpAxis;
-use crate::asset::rotation::{IDENTITY, Matrix3, apply, product, transpose};
-use crate::asset::{Body, Pose};
+use crate::asset::Body;
 use std::path::{Path, PathBuf};
-
-/// A first frame is dropped that jumps to the second one by more than this angle (rad) and by more than ten times the usual
-/// step: some collections insert a T-pose there.
-const INSERTED_FRAME_ANGLE: f64 = 0.2;
-
-/// Retargets every frame of `bvh`, whose joints are those of `map`, to the 22 body joints of a skeleton whose T-pose joints are
-/// `joints`.
-pub fn retarget(bvh: &Bvh, map: JointMap, joints: &[[f64; 3]]) -> Vec<Pose> {
-    let rest = bvh.rest_positions();
-    let (rest_turn, world_turn) = turns_to_y_up(bvh, &map, &rest);
-    let rest: Vec<[f64; 3]> = rest.into_iter().map(|p| apply(&rest_turn, p)).collect();
-    let retarget = Retarget::new(map, &rest, joints);
-    // A rotation carries the rest skeleton to the world: both may be turned.
-    let from_rest = transpose(&rest_turn);
-    let turned = |rotation: Matrix3| product(&product(&world_turn, &rotation), &from_rest);
-    let is_turned = rest_turn != IDENTITY || world_turn != IDENTITY;
-    (0..bvh.frame_count())
-        .map(|frame| {
-            let world = bvh.world_rotations(frame);
-            match is_turned {
-                true => retarget.pose(&world.into_iter().map(turned).collect::<Vec<_>>()),
-                false => retarget.pose(&world),
-            }
-        })
-        .collect()
-}
-
-/// Turns to y up of the rest skeleton and of the world. A skeleton that rests along z has z up (Blender writes such
-/// files); its world has z up as well, unless its root stands it up along y.
-fn turns_to_y_up(bvh: &Bvh, map: &JointMap, rest: &[[f64; 3]]) -> (Matrix3, Matrix3) {
-    let (Some(pelvis), Some(top)) = (map[0], map[15].or(map[12])) else { return (IDENTITY, IDENTITY) };
-    let up: [f64; 3] = std::array::from_fn(|a| rest[top][a] - rest[pelvis][a]);
-    if UpAxis::of(up.map(|x| x / up.iter().map(|x| x * x).sum::<f64>().sqrt())) != Some(UpAxis::Z) {
-        return (IDENTITY, IDENTITY);
-    }
-    let mut mean = [0.0; 3];
-    for frame in 0..bvh.frame_count() {
-        let direction = apply(&bvh.world_rotations(frame)[pelvis], up);
-        (0..3).for_each(|a| mean[a] += direction[a]);
-    }
-    let turn = UpAxis::Z.to_y_up();
-    (turn, if mean[1] > mean[2] { IDENTITY } else { turn })
-}
-
-/// The joints of the rig of `bvh`: those that `file` names, or those whose names are known.
-fn joint_map(bvh: &Bvh, file: Option<&JointFile>) -> Result<JointMap, String> {
-    if let Some(file) = file {
-        return file.resolve(bvh).map_err(|e| e.to_string());
-    }
-    let map = rig::resolve(bvh);
-    let missing = rig::missing(&map);
-    if missing.is_empty() {
-        return Ok(map);
-    }
-    let names: Vec<&str> = bvh.joints.iter().map(|joint| joint.name.as_str()).collect();
-    Err(format!(
-        "no joint of the rig is known as {}; name them in a file and pass it as --joints FILE. Its joints are: {}\nThe file, with what \
-         is known (\"\" follows its parent):\n{}",
-        missing.join(", "),
-        names.join(", "),
-        joint_file::template(bvh, &map)
-    ))
-}
-
-/// Whether the first frame does not belong to the motion.
-fn first_frame_is_inserted(poses: &[Pose]) -> bool {
-    if poses.len() < 3 {
-        return false;
-    }
-    let mut steps: Vec<f64> =
-        poses.windows(2).skip(1).take(200).map(|w| largest_turn(&w[0], &w[1], 1)).collect();
-    steps.sort_by(f64::total_cmp);
-    let jump = largest_turn(&poses[0], &poses[1], 1);
-    jump > INSERTED_FRAME_ANGLE && jump > 10.0 * steps[steps.len() / 2]
-}
 
 /// Imports BVH files as motion npz files in the folder `out`, retargeted to `body`. The file `joints` names the joints
 /// of rigs whose names are not known. Files that cannot be used are skipped with their reason.
@@ -109,36 +26,17 @@ pub fn import_bvh(
     progress: Progress<'_>,
 ) -> Result<Summary, ImportError> {
     let joints = joints.map(JointFile::load).transpose()?;
-    let read = |file: &Path| read_file(file, body, joints.as_ref());
+    let read = |file: &Path| retargeted(&load(file).map_err(|e| e.to_string())?, joints.as_ref(), body);
     write_retargeted(files, body, out, settings, "BVH files", &read, progress)
-}
-
-fn read_file(file: &Path, body: &Body, joints: Option<&JointFile>) -> Result<Retargeted, String> {
-    let bvh = Bvh::load(file).map_err(|e| e.to_string())?;
-    let map = joint_map(&bvh, joints)?;
-    let mut poses = retarget(&bvh, map, &body.joint_template);
-    let inserted = first_frame_is_inserted(&poses);
-    if inserted {
-        poses.remove(0);
-    }
-    Ok(Retargeted {
-        poses,
-        frame_rate: 1.0 / bvh.frame_time,
-        skeleton: format!(
-            "{} of 22 body joints in a rig of {}",
-            map.iter().flatten().count(),
-            bvh.joints.len()
-        ),
-        remark: if inserted { "; dropped frame 0, which jumps to frame 1" } else { "" },
-    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::asset::rotation::matrix_from_axis_angle;
+    use crate::asset::rotation::{apply, matrix_from_axis_angle};
     use crate::asset::skeleton::{BODY_JOINT_COUNT, BODY_JOINT_PARENTS};
-    use crate::asset::{Motion, Provenance};
+    use crate::asset::{Motion, Pose, Provenance};
+    use crate::import::rig::{joint_map, retarget};
     use std::fmt::Write as _;
 
     #[rustfmt::skip]
@@ -149,7 +47,7 @@ mod tests {
     ];
 
     fn poses_of(text: &str, joints: &[[f64; 3]]) -> Vec<Pose> {
-        let bvh = Bvh::parse(text, Path::new("t.bvh")).unwrap();
+        let bvh = parse(text, Path::new("t.bvh")).unwrap();
         retarget(&bvh, joint_map(&bvh, None).unwrap(), joints)
     }
 
@@ -299,19 +197,5 @@ mod tests {
         assert_eq!((own.source.as_str(), own.author.as_str(), own.licence.as_str()), ("walk", "", ""));
         let given = Provenance { source: "my studio".into(), author: "me".into(), licence: "CC0".into() };
         assert_eq!(imported(given.clone()), Provenance { source: "my studio (walk)".into(), ..given });
-    }
-
-    #[test]
-    fn an_inserted_first_frame_is_found_and_a_smooth_start_is_not() {
-        let pose = |angle: f64| {
-            let mut pose = Pose::t_pose(22);
-            pose.rotations[16] = [0.0, 0.0, angle];
-            pose
-        };
-        let smooth: Vec<Pose> = (0..50).map(|i| pose(1.0 + 0.01 * i as f64)).collect();
-        assert!(!first_frame_is_inserted(&smooth));
-        let mut inserted = smooth.clone();
-        inserted.insert(0, pose(0.0));
-        assert!(first_frame_is_inserted(&inserted));
     }
 }

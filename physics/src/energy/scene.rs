@@ -69,7 +69,7 @@ impl<T: Real> SceneEnergy<T> {
     }
 
     /// The same scene with [`EnergySettings::continuous`] and without the layer distance, whose pairs change with the nearest
-    /// body vertex: what states of a scene are compared by.
+    /// body vertex: what states of a scene are compared by. Continuous for one garment; the layer collision keeps a jump.
     #[must_use]
     pub fn continuous(mut self) -> Self {
         self.settings = self.settings.continuous();

@@ -105,9 +105,10 @@ impl EnergySettings {
         Self { layer_gate: None, needle_ratio: 0.0, ..Self::default() }
     }
 
-    /// The same energies without their jumps, which no step can be judged across and no force can balance: the distance to the
-    /// outside of the body, whose parts may intersect when posed; all pairs in the repulsion, from which the constant of each is
-    /// taken off; the distance to the closest point of an inner garment.
+    /// The same energies without most of their jumps, which no step can be judged across and no force can balance: the distance
+    /// to the outside of the body, whose parts may intersect when posed; all pairs in the repulsion, from which the constant of
+    /// each is taken off; the distance to the closest point of an inner garment, which still jumps between two of its sheets
+    /// ([`layer_collision`](super::layer_collision)).
     #[must_use]
     pub fn continuous(self) -> Self {
         Self {

@@ -1,5 +1,6 @@
 //! A triangle mesh that has been checked once, so that nothing downstream has to.
 
+use std::collections::HashMap;
 use thiserror::Error;
 
 use crate::vec3;
@@ -139,6 +140,17 @@ impl TriMesh {
     /// Number of faces `F`.
     pub fn face_count(&self) -> usize {
         self.faces.len()
+    }
+
+    /// The first face with the vertices of an earlier one, in any order, and that one: cloth that lies on itself, which contact
+    /// would keep apart.
+    pub fn doubled_face(&self) -> Option<[u32; 2]> {
+        let mut seen = HashMap::with_capacity(self.faces.len());
+        self.faces.iter().zip(0..).find_map(|(face, number)| {
+            let mut corners = *face;
+            corners.sort_unstable();
+            Some([number, seen.insert(corners, number)?])
+        })
     }
 
     /// The three corners of face `face`.

@@ -3,6 +3,7 @@
 use burn::module::Module;
 use clothcombo_tests::Untrained;
 use clothcombo_trainer::config::Trains;
+use clothcombo_trainer::inference::contact_features::LayerInteraction;
 use clothcombo_trainer::inference::networks::Networks;
 
 /// Whether D_m moves a single garment, and whether the gradient of its loss trains D_m.
@@ -13,8 +14,8 @@ fn acts_on_a_single_garment(graph: &str) -> (bool, bool) {
     assert_eq!((scene[0].garments.len(), scene[0].contacts.len()), (1, 0));
 
     let networks = Networks::new(run.model.valid(), &run.tensors);
-    let [drape, single] =
-        [networks.drape(&scene[0]), networks.drape_single_garments(&scene[0])].map(Result::unwrap);
+    let interactions = [LayerInteraction::Together, LayerInteraction::SingleGarments];
+    let [drape, single] = interactions.map(|interaction| networks.forward(&scene[0], interaction).unwrap());
     let (_, gradient) = run.loss_and_gradient(scene, Trains::Untangling);
     (drape.canonical != single.canonical, gradient.iter().any(|g| *g != 0.0))
 }

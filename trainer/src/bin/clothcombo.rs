@@ -2,6 +2,7 @@
 
 use clap::{Parser, Subcommand};
 use clothcombo_trainer::cli;
+use clothcombo_trainer::system::limits::{SystemMemory, report_limits};
 use clothcombo_trainer::system::workers::among_workers;
 use std::process::ExitCode;
 
@@ -39,12 +40,17 @@ enum Verb {
     Score(cli::score::Arguments),
 }
 
+#[global_allocator]
+static MEMORY: SystemMemory = SystemMemory;
+
 fn main() -> ExitCode {
+    report_limits();
     clothcombo_trainer::system::allocator::keep_freed_memory();
     clothcombo_trainer::system::device::prefer_processor();
     clothcombo_trainer::system::closed_pipe::end_quietly();
     let arguments: Arguments = cli::parse().unwrap_or_else(|error| error.exit());
     arguments.verbosity.apply("info");
+    cli::clear_up_on_signals();
     cli::exit_code(match &arguments.verb {
         Verb::Bench(bench) => cli::bench::run(bench),
         Verb::Check(arguments) => cli::check::run(arguments),

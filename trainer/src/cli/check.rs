@@ -6,7 +6,7 @@ use crate::cli::verbosity::progress_bar;
 use crate::dataset::load_body;
 use clap::Parser;
 use clothcombo_data::check::{
-    BodyCheck, Checker, FileCheck, GarmentCheck, MotionCheck, Target, find_targets, is_body_file,
+    BodyCheck, Checker, FileCheck, GarmentCheck, MotionCheck, find_targets, only_body,
 };
 use miette::{Report, miette};
 use rayon::prelude::*;
@@ -45,7 +45,9 @@ struct Output<'a> {
 /// When the body cannot be read, or any file is unusable; each is named.
 pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let targets = find_targets(&arguments.paths);
-    let body_name = arguments.body.clone().unwrap_or_else(|| only_body(&targets));
+    let only =
+        || only_body(&targets).map_or_else(|| "mannequin".to_owned(), |path| path.display().to_string());
+    let body_name = arguments.body.clone().unwrap_or_else(only);
     let checker = Checker::new(load_body(&body_name, 0)?);
     let bar = progress_bar(targets.len(), "checking {bar:40} {pos}/{len} · {eta} left");
     let check = |target| {
@@ -67,19 +69,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
             files.len(),
             unusable.join("\n")
         )),
-    }
-}
-
-/// The one body among the files, else the mannequin.
-fn only_body(targets: &[Target]) -> String {
-    let npz = targets.iter().filter_map(|t| match t {
-        Target::Npz { path } if is_body_file(path) => Some(path.display().to_string()),
-        _ => None,
-    });
-    let bodies: Vec<String> = npz.collect();
-    match &bodies[..] {
-        [one] => one.clone(),
-        _ => "mannequin".into(),
     }
 }
 

@@ -1,5 +1,6 @@
 //! `clothcombo config`: what a configuration may say, and what one comes to.
 
+use crate::cli::data_check::check_data;
 use crate::cli::device_argument::DeviceArgument;
 use crate::cli::loading::load_dataset;
 use crate::cli::memory_table::print_memory;
@@ -29,7 +30,7 @@ pub enum Verb {
 #[command(after_help = "Examples:\n  clothcombo config check configs/smoke.toml\n  \
         clothcombo config check configs/open.toml --no-timing\n  \
         clothcombo config check configs/paper.toml --garments 4300 --vertices 8000 --shape-components 300\n\n\
-        Memory is estimated from the number of vertices of every garment, and the time from a few real steps of every stage \
+        The data is checked as training checks it. Memory is estimated from the number of vertices of every garment, and the time from a few real steps of every stage \
         on this machine; both need the data. --no-timing looks at the file alone; --garments and --vertices state the memory \
         for a dataset that is not at hand.")]
 pub struct CheckArguments {
@@ -39,7 +40,7 @@ pub struct CheckArguments {
     /// Overrides one value; repeatable
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Do not load the data and time steps
+    /// Do not check and load the data, and time no steps
     #[arg(long)]
     no_timing: bool,
     /// Steps timed per stage
@@ -83,6 +84,7 @@ fn check(arguments: &CheckArguments) -> Result<(), Report> {
         return Ok(());
     }
     let device = arguments.device.open()?;
+    check_data(&config)?;
     print_memory(&config, &DataSizes::of_named(&config)?)?;
     let dataset = load_dataset(&config)?;
     let times = time_stages(&config, &dataset, &device, arguments.timed_steps)?;

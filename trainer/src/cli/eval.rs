@@ -6,15 +6,16 @@ use crate::cli::loading::load_dataset;
 use crate::cli::verbosity::{print_status, progress_bar};
 use crate::config::{Config, load};
 use crate::dataset::Dataset;
-use crate::evaluation::{Evaluation, ModelUnderTest, NamedModel, Page, SceneCounts};
+use crate::evaluation::{Evaluation, ModelUnderTest, NamedModel, PART_KEYS, Page, SceneCounts};
 use crate::inference::shipped_model;
 use crate::run::checkpoint::TrainedModel;
 use crate::run::report::html::utc;
 use crate::system::device::name;
-use crate::system::files::{write_file, write_json};
+use crate::system::files::{check_writable, write_file, write_json};
 use crate::system::paths::obstacle;
 use burn::tensor::Device;
 use clap::Parser;
+use clap::builder::PossibleValuesParser;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use serde_json::{Value, json};
 use std::fs;
@@ -46,6 +47,9 @@ pub struct Arguments {
     /// A few scenes per part and no gallery: minutes instead of a quarter of an hour
     #[arg(long)]
     quick: bool,
+    /// Only these parts of the report
+    #[arg(long, value_delimiter = ',', value_name = "PARTS", value_parser = PossibleValuesParser::new(PART_KEYS))]
+    only: Vec<String>,
     /// A model trained on the same data with a part left out, for the ablation table; repeatable
     #[arg(long, value_name = "NAME=DIR", value_parser = named)]
     ablation: Vec<(String, PathBuf)>,
@@ -90,27 +94,25 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let specific = named_models(arguments, &arguments.specific, &model, &device)?;
     check_specific(&specific, &model.dataset)?;
     check_ablations(&ablations, &model)?;
-    let unwritable = || format!("{}", folder.display());
-    fs::create_dir_all(folder).into_diagnostic().wrap_err_with(unwritable)?;
-    // Now, not after all the work.
-    let probe = folder.join(".clothcombo-probe");
-    let written = fs::write(&probe, "").and_then(|()| fs::remove_file(&probe));
-    written.into_diagnostic().wrap_err_with(unwritable)?;
+    // Now, not after all the work; nothing is made before that.
+    check_writable(folder).into_diagnostic().wrap_err_with(|| format!("{}", folder.display()))?;
 
     let counts = SceneCounts::new(arguments.quick);
     let bar = progress_bar(0, "{bar:30} {pos}/{len} · {elapsed} · {msg}");
     let clock = Instant::now();
-    let evaluation = Evaluation::run(&model, &ablations, &specific, counts, &|part| match part {
-        Some((part, scenes)) => {
-            bar.set_length(scenes as u64);
-            bar.set_message(part.to_owned());
-            // Off a terminal there is no bar.
-            if bar.is_hidden() {
-                print_status(&format!("{:6.0} s  {part}", clock.elapsed().as_secs_f64()));
+    let is_wanted = |key: &str| arguments.only.is_empty() || arguments.only.iter().any(|only| only == key);
+    let evaluation =
+        Evaluation::run(&model, &ablations, &specific, counts, &is_wanted, &|part| match part {
+            Some((part, scenes)) => {
+                bar.set_length(scenes as u64);
+                bar.set_message(part.to_owned());
+                // Off a terminal there is no bar.
+                if bar.is_hidden() {
+                    print_status(&format!("{:6.0} s  {part}", clock.elapsed().as_secs_f64()));
+                }
             }
-        }
-        None => bar.inc(1),
-    })?;
+            None => bar.inc(1),
+        })?;
     bar.finish_and_clear();
     let numbers = evaluation.numbers();
     let page = page(&trained, evaluation, &device, clock.elapsed().as_secs_f64());

@@ -1,6 +1,6 @@
 //! `clothcombo generate`: garments from nothing but a body.
 
-use super::garment_sheet::{PER_ROW, garment_sheet};
+use super::garment_sheet::{PER_CATEGORY, garment_sheet};
 use crate::cli::values::{count, folder_to_make, picture_file};
 use crate::cli::verbosity::{print_status, progress_bar};
 use crate::dataset::load_body;
@@ -196,7 +196,7 @@ impl<'a> GarmentMaker<'a> {
         let mut counts = HashMap::new();
         let is_shown = |garment: &&WantedGarment| {
             let count: &mut usize = counts.entry(garment.category).or_default();
-            let is_shown = *count < PER_ROW && garment.path.exists();
+            let is_shown = *count < PER_CATEGORY && garment.path.exists();
             *count += usize::from(is_shown);
             is_shown
         };

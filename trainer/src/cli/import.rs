@@ -6,8 +6,8 @@ use crate::dataset::load_body;
 use clap::{Args, Subcommand, ValueEnum};
 use clothcombo_data::asset::{Body, BodyFileSettings, Provenance};
 use clothcombo_data::import::{
-    AmassSettings, Cloth3dBodies, Cloth3dSettings, RetargetSettings, Thinning, UpAxis, import_amass,
-    import_bvh, import_cloth3d, import_deepmimic, import_smpl_family,
+    AmassSettings, AmcSettings, Cloth3dBodies, Cloth3dSettings, RetargetSettings, Thinning, UpAxis,
+    import_amass, import_amc, import_bvh, import_cloth3d, import_deepmimic, import_smpl_family,
 };
 use miette::{IntoDiagnostic, Report};
 use std::path::PathBuf;
@@ -23,6 +23,14 @@ pub enum Source {
             left_hip = \"LThigh\"\nWithout it, the refusal of a file prints one to fill in. FBX: export BVH (Blender, Maya, MotionBuilder)."
     )]
     Bvh(BvhArguments),
+    /// Motion capture in ASF/AMC files, as the CMU Graphics Lab Motion Capture Database has it
+    #[command(
+        visible_alias = "asf",
+        after_help = "Examples:\n  clothcombo import amc cmu/subjects --body datasets/open/body.npz -o datasets/open/motions\n  clothcombo import amc walk.amc --skeleton actor.asf --rate 60 -o motions\n\n\
+            The skeleton is the .asf in the folder of each .amc: the only one, or the one that its name begins with. Joints are known\n\
+            by their names, as in BVH; for others --joints names the joints of the rig, one a line:\n  left_hip = \"lfemur\""
+    )]
+    Amc(AmcArguments),
     /// Body model from an SMPL, SMPL-H or SMPL-X npz
     #[command(
         visible_aliases = ["smpl", "smplh"],
@@ -60,6 +68,34 @@ pub struct BvhArguments {
     body: String,
     /// Frames per second kept
     #[arg(long, default_value_t = 60.0, value_parser = positive)]
+    frame_rate: f64,
+    /// TOML file that names the joint of the rig for each body joint, for rigs whose names are not known
+    #[arg(long, value_name = "FILE")]
+    joints: Option<PathBuf>,
+    #[command(flatten)]
+    provenance: ProvenanceArguments,
+    /// Folder to write
+    #[arg(short, long, value_parser = folder_to_make())]
+    output: PathBuf,
+}
+
+/// Arguments of `import amc`.
+#[derive(Args)]
+pub struct AmcArguments {
+    /// AMC files, or folders that are searched for them
+    #[arg(required = true)]
+    inputs: Vec<PathBuf>,
+    /// Skeleton (.asf) of all motions [default: the one in the folder of each]
+    #[arg(long, value_name = "FILE")]
+    skeleton: Option<PathBuf>,
+    /// Frame rate of the motions, whose files do not say it (frames/s)
+    #[arg(long, value_name = "HZ", default_value_t = 120.0, value_parser = positive)]
+    rate: f64,
+    /// Body whose skeleton the motions are moved to: "mannequin" or a body npz
+    #[arg(long, default_value = "mannequin")]
+    body: String,
+    /// Frames per second kept
+    #[arg(long, visible_alias = "fps", default_value_t = 60.0, value_parser = positive)]
     frame_rate: f64,
     /// TOML file that names the joint of the rig for each body joint, for rigs whose names are not known
     #[arg(long, value_name = "FILE")]
@@ -228,6 +264,17 @@ pub fn run(source: &Source) -> Result<(), Report> {
                 body_file: Some(PathBuf::from(&a.body)),
             };
             import_bvh(&a.files, &body, &a.output, &settings, a.joints.as_deref(), &mut progress)
+                .into_diagnostic()?
+        }
+        Source::Amc(a) => {
+            let body = load_body(&a.body, 0)?;
+            let retarget = RetargetSettings {
+                thinning: Thinning { frame_rate: a.frame_rate, static_threshold: 0.0 },
+                provenance: a.provenance.provenance(),
+                body_file: Some(PathBuf::from(&a.body)),
+            };
+            let settings = AmcSettings { retarget, rate: a.rate, skeleton: a.skeleton.clone() };
+            import_amc(&a.inputs, &body, &a.output, &settings, a.joints.as_deref(), &mut progress)
                 .into_diagnostic()?
         }
         Source::Smplx(a) => {

@@ -1,18 +1,16 @@
-//! Ctrl-C and SIGTERM while results are written: nothing half done is left behind.
+//! Ctrl-C and SIGTERM while results are made: nothing half done is left behind.
 
+use clothcombo_data::format::atomic::remove_temporary;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
-use std::fs;
-use std::path::Path;
 
-/// Removes `temporary` and ends the program with 130 when a signal comes. Without a thread or a handler, which a system may
-/// refuse, the folder stays, and its name says that it is temporary.
-pub fn remove_on_signals(temporary: &Path) {
-    let temporary = temporary.to_owned();
+/// Removes what is not finished and ends the program with 130 when a signal comes. Without a thread or a handler, which a
+/// system may refuse, it stays, and its name says that it is temporary.
+pub fn clear_up_on_signals() {
     if let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) {
         let wait = move || {
             if signals.forever().next().is_some() {
-                let _ = fs::remove_dir_all(&temporary);
+                remove_temporary();
                 std::process::exit(130);
             }
         };

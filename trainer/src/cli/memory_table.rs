@@ -49,6 +49,7 @@ pub fn print_memory(config: &Config, sizes: &DataSizes) -> Result<(), Report> {
         on_host(operators, |m| m.operators),
         on_host("scenes prepared in advance", |m| m.scenes),
         on_host("at the start: garments being prepared", |m| m.preparation),
+        on_host("pictures", |m| m.pictures),
         on_device(&format!("tensors and embeddings kept, of {}", gibibytes(gpu.all_tensors)), |m| m.tensors),
         on_device("Adam's moments, copies of the parameters", |m| m.parameters),
         on_device(&format!("the largest step ({})", largest_step(config)), |m| m.step),
@@ -85,10 +86,10 @@ fn parameter_count(config: &Config, sizes: &DataSizes) -> Result<usize, Report> 
 /// What a run that starts says.
 pub fn memory_line(m: &MemoryEstimate) -> String {
     let of_host = format!(
-        "{} in use, {} for garments, {} for prepared scenes",
+        "{} for the program, {} for garments, {} for prepared scenes and pictures",
         gibibytes(m.program),
         gibibytes(m.garments + m.operators),
-        gibibytes(m.scenes)
+        gibibytes(m.scenes + m.pictures)
     );
     let of_device = format!(
         "{} for their tensors, {} for the largest step, {} for parameters",

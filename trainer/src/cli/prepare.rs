@@ -1,17 +1,17 @@
 //! `clothcombo prepare`: fills the cache of a configuration before training.
 
 use crate::cli::data_check::check_data;
-use crate::cli::loading::under_preparation_bar;
+use crate::cli::loading::{make_pose_bank, under_preparation_bar};
 use crate::cli::verbosity::print_status;
 use crate::config::load;
-use crate::dataset::{GarmentStore, load_body};
+use crate::dataset::{GarmentStore, PoseLibrary, load_body};
 use clap::Parser;
 use miette::Report;
 use std::path::PathBuf;
 use std::str::FromStr;
 use std::sync::Arc;
 
-/// Computes operators and bindings of all garments of a configuration into its cache (data.cache.folder)
+/// Computes operators and bindings of all garments of a configuration, and its bank of poses, into its cache (data.cache.folder)
 #[derive(Parser)]
 #[command(after_help = "Examples:\n  clothcombo prepare --config configs/open.toml --set \
         data.cache.folder=\"datasets/cache/prepared\"\n  clothcombo prepare --config big.toml --shard 0/4    # one of four \
@@ -53,10 +53,16 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let config = load(&arguments.config, &arguments.overrides)?;
     check_data(&config)?;
     let body = Arc::new(load_body(&config.data.body, config.data.shape_components)?);
-    let (garments, bytes) =
-        under_preparation_bar(|progress| GarmentStore::prepare(&config, body, arguments.shard.0, progress))?;
+    let (garments, bytes) = under_preparation_bar(|progress| {
+        GarmentStore::prepare(&config, body.clone(), arguments.shard.0, progress)
+    })?;
+    let mut poses = String::new();
+    if let (Some(bank), 0) = (&config.data.poses.bank, arguments.shard.0[0]) {
+        make_pose_bank(&PoseLibrary::new(&config.data.poses, &body)?.with_bank(&config));
+        poses = format!(" · {} training poses", bank.size);
+    }
     let mib = bytes as f64 / f64::from(1 << 20);
-    print_status(&format!("{garments} garments prepared · {mib:.1} MiB in the cache"));
+    print_status(&format!("{garments} garments prepared{poses} · {mib:.1} MiB in the cache"));
     Ok(())
 }
 

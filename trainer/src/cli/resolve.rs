@@ -1,6 +1,5 @@
 //! `clothcombo resolve`: anyone's garments taken out of anyone's body, and out of each other.
 
-use crate::cli::interrupted::remove_on_signals;
 use crate::cli::output::print_report;
 use crate::cli::post_process::PostProcessArguments;
 use crate::cli::table::{row, table};
@@ -113,7 +112,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let inputs: Vec<PathBuf> =
         [&arguments.body].into_iter().chain(&arguments.garments).chain(&arguments.rest).cloned().collect();
     let staged = Staged::new(&arguments.output, arguments.replace, &inputs)?;
-    remove_on_signals(staged.folder());
     let body = load_body(&arguments.body)?;
     let garments = load_garments(arguments, &body)?;
     let surface = Surface::from_mesh(&body);

@@ -4,6 +4,7 @@ mod origin;
 
 use super::exit_code;
 use crate::cli::device_argument::DeviceArgument;
+use crate::cli::loading::make_pose_bank;
 use crate::cli::memory_table::{memory_line, memory_warning};
 use crate::cli::verbosity::{Verbosity, is_quiet, print_status};
 use crate::config::{Config, load};
@@ -149,6 +150,7 @@ fn run(arguments: &Arguments, group: &Rc<ProcessGroup>) -> Result<(), Report> {
     let device = arguments.device.open()?;
     let Loaded { dataset, check } = origin.load_data(&config, group)?;
     print_data(&dataset);
+    make_pose_bank(&dataset.poses);
     let (run, mut session) = origin.begin(&root, &config, &dataset, &device, group)?;
     if !group.is_rank_zero() {
         return train(&mut session, &mut [], &stop);

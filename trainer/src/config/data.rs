@@ -154,6 +154,9 @@ pub struct PoseConfig {
     /// Clips whose name contains one of these are for the final test: never trained on, and read by no validation, no choice
     /// of the best checkpoint and no picture of a run. `clothcombo eval` reads them.
     pub test_clips: Vec<String>,
+    /// Names of `validation_clips` and `test_clips` that may fit no clip, for recordings that not everybody has; any other name
+    /// that fits none is an error.
+    pub optional_clips: Vec<String>,
     /// Share of every other clip that is never trained on, in windows spread over the clip, which every validation scores. One
     /// block of `held_out_block` in every `1 / held_out_share`, rounded, at most every second one. A clip shorter than half of
     /// `held_out_block / held_out_share` has no window. Where the windows hold out less than a quarter of the share, such short
@@ -171,10 +174,51 @@ pub struct PoseConfig {
     /// of the curves of intersection that is let pass. 0.1 leaves a hand that brushes a thigh and takes out a forearm
     /// in the belly, where no garment can be draped. 10 or more looks at no pose and costs nothing.
     pub max_self_intersection: f64,
+    /// Training poses are made once and kept in the cache instead of being drawn at every step. Without it they are recorded
+    /// ones, augmented.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bank: Option<PoseBankConfig>,
     /// Encoding of the pose as network input.
     pub encoding: PoseEncoding,
     /// Turn every pose to face +z: gravity and contact are blind to heading. Off feeds the full root rotation.
     pub remove_heading: bool,
+}
+
+/// A bank of training poses and what it consists of; the shares sum to 1. None intersects itself beyond
+/// `max_self_intersection`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct PoseBankConfig {
+    /// Number of poses; 20,000 take about 6 ms each to make on one core, and 10 MB.
+    pub size: usize,
+    /// Share of recorded poses, augmented if `augmentation` is on.
+    pub recorded: f64,
+    /// Share of poses whose trunk, legs and arms come each from a kernel density over what was recorded of them.
+    pub recombined: f64,
+    /// Share of poses that are uniform within the limits of every joint.
+    pub uniform: f64,
+}
+
+impl Default for PoseBankConfig {
+    fn default() -> Self {
+        Self { size: 20_000, recorded: 0.5, recombined: 0.3, uniform: 0.2 }
+    }
+}
+
+impl PoseBankConfig {
+    /// What is inconsistent: what and hint.
+    fn problem(&self) -> Option<(&'static str, &'static str)> {
+        let shares = [self.recorded, self.recombined, self.uniform];
+        if self.size == 0 || self.size > MOST_BANK_POSES {
+            return Some(("needs a size of 1 to 10000000 poses", "for example { size = 20000 }"));
+        }
+        let is_whole =
+            shares.iter().all(|share| *share >= 0.0) && (shares.iter().sum::<f64>() - 1.0).abs() < 1e-6;
+        (!is_whole).then_some((
+            "needs shares of recorded, recombined and uniform poses that sum to 1",
+            "for example { recorded = 0.5, recombined = 0.3, uniform = 0.2 }",
+        ))
+    }
 }
 
 impl Default for PoseConfig {
@@ -183,11 +227,13 @@ impl Default for PoseConfig {
             motions: None,
             validation_clips: Vec::new(),
             test_clips: Vec::new(),
+            optional_clips: Vec::new(),
             held_out_share: 0.1,
             held_out_block: 2.0,
             held_out_margin: 1.0,
             augmentation: true,
             max_self_intersection: 0.1,
+            bank: None,
             encoding: PoseEncoding::RotationMatrix,
             remove_heading: true,
         }
@@ -231,6 +277,22 @@ impl PoseConfig {
                 "name their folder: data.poses.motions",
             );
         }
+        let is_held_out = |name: &String| named.iter().any(|(_, clips)| clips.contains(name));
+        if let Some(name) = self.optional_clips.iter().find(|name| !is_held_out(name)) {
+            return says(
+                "optional_clips",
+                &format!("has {name:?}, which is none of the names of validation_clips and test_clips"),
+                "name it in one of them as well",
+            );
+        }
+        if let Some(bank) = &self.bank {
+            if self.motions.is_none() {
+                return says("bank", "needs recorded poses", "name their folder: data.poses.motions");
+            }
+            if let Some((what, hint)) = bank.problem() {
+                return says("bank", what, hint);
+            }
+        }
         if self.max_self_intersection.is_nan() || self.max_self_intersection < 0.0 {
             return says(
                 "max_self_intersection",
@@ -269,6 +331,9 @@ impl Default for StartConfig {
 
 /// Garments a generator is asked for at most.
 pub const MOST_GARMENTS: usize = 1_000_000;
+
+/// Poses a bank has at most: 5 GB.
+const MOST_BANK_POSES: usize = 10_000_000;
 
 impl DataConfig {
     /// Memory for what can be made again (bytes); garments of a run without a cache cannot.

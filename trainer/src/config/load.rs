@@ -100,7 +100,7 @@ pub fn parse(text: &str, path: &Path, overrides: &[String]) -> Result<Config, Co
     let tree = toml::de::Deserializer::from(sources.tree()?);
     let mut config = Config::deserialize(tree).map_err(|error| sources.invalid(&error))?;
     let of_the_files = config.problem();
-    config = config.with_absolute_paths();
+    config = config.with_absolute_paths(|key| sources.folder_of(key));
     if !overrides.is_empty() {
         let mut tree: toml::Value = toml::Value::try_from(&config)
             .map_err(|e| ConfigError::BadOverride { setting: String::new(), message: e.to_string() })?;
@@ -111,7 +111,7 @@ pub fn parse(text: &str, path: &Path, overrides: &[String]) -> Result<Config, Co
         }
         let base = config.base.take();
         // What is typed is relative to where it is typed.
-        config = Config { base, ..config.with_absolute_paths() };
+        config = Config { base, ..config.with_absolute_paths(|_| None) };
     }
     match config.problem() {
         None => Ok(config),

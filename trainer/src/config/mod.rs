@@ -18,14 +18,15 @@ mod stages;
 mod validation;
 
 pub use data::{
-    CacheConfig, DataConfig, GarmentSourceConfig, GenerateConfig, MOST_GARMENTS, PoseConfig, PoseEncoding,
-    SplitConfig, StartConfig,
+    CacheConfig, DataConfig, GarmentSourceConfig, GenerateConfig, MOST_GARMENTS, PoseBankConfig, PoseConfig,
+    PoseEncoding, SplitConfig, StartConfig,
 };
 pub use guard::{GuardConfig, InjectConfig, Injected};
 pub use load::{ConfigError, load, parse, to_toml};
 pub use losses::{DistanceMode, LossesConfig};
 pub use optimizer::{ClipScope, OptimizerConfig};
 pub use output::OutputConfig;
+pub use paths::MissingInput;
 pub use ramp::{Ramp, RampShape};
 pub use schema::schema;
 pub use stages::{StageConfig, Trains, stage_starts};

@@ -93,6 +93,10 @@ impl Sources {
     /// Where the value `key` (for example `stages[0].layers`) stands, or the innermost section of it that is there; the
     /// extending configuration as a whole, if none is.
     pub fn place_of(&self, key: &str) -> Place {
+        self.place(self.span_of(key))
+    }
+
+    fn span_of(&self, key: &str) -> Option<Range<usize>> {
         let tree = self.tree().ok();
         let mut found = None;
         let mut node = tree.as_ref().map(Spanned::get_ref).map(Node::Table);
@@ -107,13 +111,24 @@ impl Sources {
             found = Some(value.span());
             node = Some(Node::Value(value.get_ref()));
         }
-        self.place(found)
+        found
+    }
+
+    fn source(&self, span: Option<&Range<usize>>) -> &Source {
+        let begin = span.map_or(0, |span| span.start);
+        self.0.iter().rev().find(|source| source.start <= begin).unwrap_or(&self.0[0])
+    }
+
+    /// The folder of the text that the value `key` stands in; none without a working folder.
+    pub fn folder_of(&self, key: &str) -> Option<PathBuf> {
+        let found = self.span_of(key);
+        let path = std::path::absolute(&self.source(found.as_ref()).path).ok()?;
+        path.parent().map(Path::to_owned)
     }
 
     /// The text that `span` lies in, and where in it.
     fn place(&self, span: Option<Range<usize>>) -> Place {
-        let begin = span.as_ref().map_or(0, |span| span.start);
-        let source = self.0.iter().rev().find(|source| source.start <= begin).unwrap_or(&self.0[0]);
+        let source = self.source(span.as_ref());
         let text = &source.padded[source.start..];
         let inside = |place: usize| place.saturating_sub(source.start).min(text.len());
         let name = source.path.display().to_string();

@@ -126,6 +126,7 @@ impl Dataset {
         joints: Option<&[String]>,
         progress: &(dyn Fn(usize, usize, &str) + Sync),
     ) -> Result<Self, DatasetError> {
+        DatasetError::check_inputs(config)?;
         let body = Arc::new(load_body(&config.data.body, config.data.shape_components)?);
         if body.joint_count() < BODY_JOINT_COUNT {
             return Err(DatasetError::FewJoints { name: body.name.clone(), joints: body.joint_count() });
@@ -135,7 +136,7 @@ impl Dataset {
             asked if asked <= body.shape_count => asked,
             asked => return Err(DatasetError::ShapeComponents { asked, available: body.shape_count }),
         };
-        let poses = PoseLibrary::new(&config.data.poses, &body)?;
+        let poses = PoseLibrary::new(&config.data.poses, &body)?.with_bank(config);
         let memory = MemoryBudget::new(config.data.memory_limits());
         let garments = GarmentStore::load(config, body.clone(), joints, &memory, progress)?;
         let names: Vec<&str> = (0..garments.len()).map(|i| garments.info(i).name.as_str()).collect();

@@ -60,6 +60,7 @@ impl DataCheck {
     /// # Errors
     /// [`DatasetError`] when there is no body to check against, or a folder cannot be listed.
     pub fn run(config: &Config, progress: &(dyn Fn(usize, usize) + Sync)) -> Result<Self, DatasetError> {
+        DatasetError::check_inputs(config)?;
         let sources = GarmentSource::list(&config.data.garments)?;
         let mut files: Vec<Checked> = sources.into_iter().filter_map(garment).collect();
         if let Some(folder) = &config.data.poses.motions {

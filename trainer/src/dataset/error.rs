@@ -1,5 +1,6 @@
 //! Why the data of a run cannot be used.
 
+use crate::config::{Config, MissingInput};
 use crate::system::memory::gibibytes;
 use clothcombo_data::asset::BODY_JOINT_COUNT;
 use miette::Diagnostic;
@@ -13,6 +14,15 @@ pub enum DatasetError {
     /// A file is missing or wrong; the message names it and says how to fix it.
     #[error("{0}")]
     Data(String),
+    /// A file or folder that the configuration names is not there.
+    #[error("{} = {:?}: there is no such file or folder, neither beside the configuration nor in {}", input.key, input.value, input.folder.display())]
+    #[diagnostic(help(
+        "paths are relative to the folder of the configuration that names them, or to that in which the program was started"
+    ))]
+    Missing {
+        /// What is missing.
+        input: MissingInput,
+    },
     /// A garment cannot be prepared.
     #[error("garment {name}: {reason}")]
     #[diagnostic(help("`clothcombo check` lists every defect of a garment file"))]
@@ -70,7 +80,9 @@ pub enum DatasetError {
     },
     /// A held-out name fits no clip.
     #[error("data.poses.{key} names {name:?}, which fits no clip in {}", folder.display())]
-    #[diagnostic(help("the clips are: {clips}"))]
+    #[diagnostic(help(
+        "a name that may fit none belongs in data.poses.optional_clips as well; the clips are: {clips}"
+    ))]
     UnknownClip {
         /// The key.
         key: &'static str,
@@ -172,6 +184,14 @@ pub enum DatasetError {
 }
 
 impl DatasetError {
+    /// Whether every file and folder of the data that `config` names is there.
+    ///
+    /// # Errors
+    /// [`Missing`](Self::Missing), naming the first that is not.
+    pub(crate) fn check_inputs(config: &Config) -> Result<(), Self> {
+        config.missing_input().map_or(Ok(()), |input| Err(Self::Missing { input }))
+    }
+
     /// Wraps an error of the data crate, whose message already names file and remedy; causes are appended.
     pub(crate) fn data(error: impl StdError) -> Self {
         let mut text = error.to_string();

@@ -68,7 +68,7 @@ impl GarmentSource {
     }
 
     /// Name of the garment, unique within a source.
-    fn name(&self) -> String {
+    pub(super) fn name(&self) -> String {
         match self {
             Self::File(listed) => listed.name.clone(),
             Self::Generated { category, seed, .. } => GarmentGenerator::name(*category, *seed),

@@ -1,10 +1,12 @@
 //! Poses for training and validation: frames of motion clips, or the sampler within joint limits.
 
+mod bank;
 mod frames;
 mod hold_out;
 
 use super::error::DatasetError;
 use crate::config::{PoseConfig, PoseEncoding};
+use bank::Bank;
 use clothcombo_data::asset::{Body, Pose, Provenance};
 use clothcombo_data::folders::load_motion_folder;
 use clothcombo_data::generate::{PoseAugmentation, PoseSampler, SelfContact};
@@ -24,6 +26,7 @@ pub struct PoseLibrary {
     self_intersecting: Option<SelfIntersecting>,
     encoding: PoseEncoding,
     remove_heading: bool,
+    bank: Option<Bank>,
 }
 
 /// Keeps bodies that run through themselves out of training.
@@ -111,6 +114,7 @@ impl PoseLibrary {
             self_intersecting: None,
             encoding: config.encoding,
             remove_heading: config.remove_heading,
+            bank: None,
         };
         dataset.self_intersecting = dataset.survey_self_intersections();
         if let Some(s) = &dataset.self_intersecting {
@@ -202,23 +206,46 @@ impl PoseLibrary {
         }
     }
 
-    /// A pose for training, augmented, scaled by the progressive schedule, as the networks see it. A pose that intersects itself
-    /// beyond the limit is drawn again; if many in a row do, the least intersecting of them is taken.
+    /// A pose for training, scaled by the progressive schedule, as the networks see it: from the bank if there is one, else
+    /// augmented. A pose that intersects itself beyond the limit is drawn again; if many in a row do, the least intersecting of
+    /// them is taken.
     pub fn sample_training(&self, scale: f64, rng: &mut ChaCha8Rng) -> Pose {
-        let mut pose = self.draw_unfiltered(scale, rng);
-        let Some(filter) = &self.filter else { return pose };
-        let mut length = filter.measure(&pose);
-        for _ in 1..ATTEMPTS {
-            if length <= filter.limit {
+        match &self.bank {
+            Some(bank) => {
+                let poses = bank.poses(self, &|_, _| ());
+                poses[rng.random_range(0..poses.len())].scaled(scale)
+            }
+            None => self.least_intersecting(ATTEMPTS, |_| true, &mut || self.draw_unfiltered(scale, rng)),
+        }
+    }
+
+    /// The first of at most `attempts` poses of `draw` that is possible and intersects itself no more than the limit, or the one
+    /// that comes nearest to it.
+    fn least_intersecting(
+        &self,
+        attempts: usize,
+        is_possible: fn(&Pose) -> bool,
+        draw: &mut dyn FnMut() -> Pose,
+    ) -> Pose {
+        let limit = self.filter.as_ref().map_or(f64::MAX, |filter| filter.limit);
+        let measured = |pose: Pose| {
+            let length = match is_possible(&pose) {
+                true => self.filter.as_ref().map_or(0.0, |filter| filter.measure(&pose)),
+                false => f64::INFINITY,
+            };
+            (pose, length)
+        };
+        let mut best = measured(draw());
+        for _ in 1..attempts {
+            if best.1 <= limit {
                 break;
             }
-            let other = self.draw_unfiltered(scale, rng);
-            let other_length = filter.measure(&other);
-            if other_length < length {
-                (pose, length) = (other, other_length);
+            let other = measured(draw());
+            if other.1 < best.1 {
+                best = other;
             }
         }
-        pose
+        best.0
     }
 
     fn draw_unfiltered(&self, scale: f64, rng: &mut ChaCha8Rng) -> Pose {

@@ -1,5 +1,6 @@
 //! What of its data a run's memory depends on.
 
+use super::split::{GarmentPurpose, purpose};
 use super::{Dataset, DatasetError, GarmentSource, PreparedGarment, load_body};
 use crate::config::Config;
 use clothcombo_data::asset::{BODY_JOINT_COUNT, Body};
@@ -8,7 +9,7 @@ use rayon::prelude::*;
 /// What of its data a run's memory depends on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DataSizes {
-    /// Vertices of every garment.
+    /// Vertices of every garment that a run reads: not of those that are kept for the final test.
     pub vertices: Vec<usize>,
     /// Joints the networks see.
     pub joints: usize,
@@ -31,7 +32,9 @@ const GARMENT_INFO: usize = 1536;
 impl DataSizes {
     /// Those of data that is loaded.
     pub fn of(dataset: &Dataset) -> Self {
-        let vertices = (0..dataset.garments.len()).map(|i| dataset.garments.info(i).vertices).collect();
+        let split = &dataset.split;
+        let read = split.training.iter().chain(&split.validation);
+        let vertices = read.map(|i| dataset.garments.info(*i).vertices).collect();
         Self { joints: dataset.joints().len(), ..Self::of_body(vertices, &dataset.body) }
     }
 
@@ -40,8 +43,14 @@ impl DataSizes {
     /// # Errors
     /// [`DatasetError`] naming the file at fault.
     pub fn of_named(config: &Config) -> Result<Self, DatasetError> {
+        DatasetError::check_inputs(config)?;
         let body = load_body(&config.data.body, config.data.shape_components)?;
-        Self::of_listed(&GarmentSource::list(&config.data.garments)?, &body)
+        let mut sources = GarmentSource::list(&config.data.garments)?;
+        // Without a cache all of them are loaded.
+        if config.data.cache.folder.is_some() {
+            sources.retain(|source| purpose(&source.name(), &config.data) != GarmentPurpose::Test);
+        }
+        Self::of_listed(&sources, &body)
     }
 
     /// Those of listed garments on `body`.
@@ -92,9 +101,10 @@ impl DataSizes {
     }
 
     /// Memory of its tensors and, `embeddings` times over, of its embedding (bytes).
-    pub(crate) fn device_bytes(&self, config: &Config, vertices: usize, embeddings: usize) -> usize {
+    pub(crate) fn device_bytes(&self, config: &Config, vertices: usize, embeddings: f64) -> usize {
+        let embedding = 4 * config.model.embedding * (vertices + 1);
         tensor_bytes(vertices, config.model.eigen_count, self.joints)
-            + 4 * embeddings * config.model.embedding * (vertices + 1)
+            + (embeddings * embedding as f64) as usize
     }
 
     /// Memory of the body and the list of garments (bytes).

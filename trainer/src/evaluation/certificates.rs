@@ -2,6 +2,7 @@
 
 use crate::config::LossesConfig;
 use crate::dataset::{Dataset, PreparedScene, prepare};
+use crate::inference::contact_features::LayerInteraction;
 use crate::inference::networks::Networks;
 use crate::inference::tensor_store::DrapeError;
 use clothcombo_data::asset::{Garment, infeasible_pair};
@@ -37,17 +38,13 @@ pub struct PostProcessor<'a> {
     dataset: &'a Dataset,
     losses: &'a LossesConfig,
     networks: Option<&'a Networks<'a>>,
-    /// What drapes poses between the T-pose and the scene: without corrections, which leaves fewer intersections
-    /// (docs/resolve.md).
-    uncorrected: Option<Networks<'a>>,
     known: Mutex<HashMap<usize, Arc<RestGarment>>>,
 }
 
 impl<'a> PostProcessor<'a> {
     /// For scenes of `dataset`, draped by `networks`; without them by skinning.
     pub fn new(dataset: &'a Dataset, losses: &'a LossesConfig, networks: Option<&'a Networks<'a>>) -> Self {
-        let uncorrected = networks.map(Networks::uncorrected);
-        Self { dataset, losses, networks, uncorrected, known: Mutex::default() }
+        Self { dataset, losses, networks, known: Mutex::default() }
     }
 
     /// A drape of `scene` from the packed positions of all garments on its first body.
@@ -71,30 +68,29 @@ impl<'a> PostProcessor<'a> {
     /// # Errors
     /// When the networks do not take it.
     pub fn drape(&self, scene: &PreparedScene) -> Result<Vec<[f32; 3]>, DrapeError> {
-        draped_by(self.networks, scene)
+        match self.networks {
+            Some(networks) => Ok(networks.drape(scene)?.posed),
+            None => Ok(skinned(scene)),
+        }
     }
 
-    /// `scene` in a pose between the T-pose and its own.
+    /// `scene` in a pose between the T-pose and its own, draped by the forward pass alone: that leaves fewer intersections than
+    /// with corrections (docs/resolve.md).
     fn stage(&self, scene: &PreparedScene, share: f64) -> Result<PathSample, PostProcessError> {
         let mut sample = scene.sample.clone();
         for body in &mut sample.bodies {
             body.pose = body.pose.scaled_keeping_heading(share);
         }
         let scene = prepare(self.dataset, self.losses, sample, 1.0).map_err(DrapeError::from)?;
+        let skinned = skinned(&scene);
+        let draped =
+            self.networks.map(|networks| networks.forward(&scene, LayerInteraction::Together)).transpose()?;
         Ok(PathSample {
             body: Arc::new(scene.exact_body()),
-            draped: wide(&scene, &draped_by(self.uncorrected.as_ref(), &scene)?),
-            skinned: wide(&scene, &skinned(&scene)),
+            draped: wide(&scene, draped.as_ref().map_or(&skinned, |draped| &draped.posed)),
+            skinned: wide(&scene, &skinned),
             transforms: scene.skinning_transforms(),
         })
-    }
-}
-
-/// Packed positions of `scene`: draped by `networks`, without them by skinning.
-fn draped_by(networks: Option<&Networks<'_>>, scene: &PreparedScene) -> Result<Vec<[f32; 3]>, DrapeError> {
-    match networks {
-        Some(networks) => Ok(networks.drape(scene)?.posed),
-        None => Ok(skinned(scene)),
     }
 }
 

@@ -140,11 +140,11 @@ impl SceneError {
         &self.runs[self.reference]
     }
 
-    /// Whether the networks end above skinning with shape transfer, by more than the rounding of positions in f32; `None`
-    /// without networks.
+    /// Whether the networks end above skinning, with or without shape transfer, by more than the rounding of positions in f32;
+    /// `None` without networks.
     pub fn is_above_skinning(&self) -> Option<bool> {
         let energy = |name: &str| Some(self.methods.iter().find(|m| m.method == name)?.error.energy);
-        let (network, skinning) = (energy(NETWORK)?, energy(START)?);
+        let (network, skinning) = (energy(NETWORK)?, energy(START)?.min(energy(Method::Lbs.name())?));
         Some(network - skinning > ROUNDING * skinning.abs().max(1.0))
     }
 }

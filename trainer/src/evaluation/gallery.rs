@@ -34,9 +34,9 @@ pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
         return Ok(Vec::new());
     }
     let model = evaluator.model;
-    let shirt = |n| model.pick(&[Category::TShirt, Category::Top], n);
     let legs = |n| model.pick(&[Category::Trousers, Category::Skirt], n);
     let skirt = |n| model.pick(&[Category::Skirt, Category::Dress], n);
+    let shirt = shirt_over(model, skirt(0))?;
     let over = |n| model.pick(&[Category::OpenShirt, Category::Dress], n);
     let t_pose = Pose::t_pose(model.dataset.body.joint_count());
     let mean = BodySample { shape: vec![0.0; model.dataset.shape_count], pose: t_pose };
@@ -44,11 +44,11 @@ pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
     let bodies = unlike((0..CANDIDATES).map(body).collect());
     let in_t_pose = |b: &BodySample| BodySample { pose: mean.pose.clone(), ..b.clone() };
     let of_mean_shape = |b: &BodySample| BodySample { shape: mean.shape.clone(), ..b.clone() };
-    let three @ [a, b, c] = [shirt(0), skirt(0), over(0)];
+    let three @ [a, b, c] = [shirt, skirt(0), over(0)];
     let orders = [[a, b, c], [a, c, b], [b, a, c], [b, c, a], [c, a, b]];
     // Numbered as the legend lists them.
     let number = |g| three.iter().position(|other| *other == g).map_or(0, |i| i + 1).to_string();
-    let stack = [legs(0), shirt(0), skirt(0), over(0), over(1)];
+    let stack = [legs(0), shirt, skirt(0), over(0), over(1)];
     let outer = |n: usize| if n.is_multiple_of(2) { over(n / 2) } else { skirt(n / 2) };
     let numbered = |what: &str| (1..=COLUMNS).map(|i| format!("{what} {i}")).collect::<Vec<_>>();
 
@@ -81,13 +81,13 @@ pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
             "outer",
             "Different garments over the same two.",
             numbered("outer garment"),
-            (0..COLUMNS).map(|n| (vec![legs(0), shirt(0), outer(n)], bodies[1].clone())).collect(),
+            (0..COLUMNS).map(|n| (vec![legs(0), shirt, outer(n)], bodies[1].clone())).collect(),
         ),
     ];
     let picture = |(name, caption, columns, outfits): (&str, &str, _, Vec<Outfit>)| {
         let png = png_bytes(&sheet(evaluator, &outfits, columns)?).into_diagnostic()?;
         evaluator.scene_done();
-        Ok::<_, Report>(Picture { file: format!("{name}.png"), caption: caption.to_owned(), png, svg: None })
+        Ok::<_, Report>(Picture { file: format!("{name}.png"), caption: caption.to_owned(), png, html: None })
     };
     let text = "After the post-process. Names in the legend stand for garments, colours without names for layers from inner to outer.";
     let mut section = Section::new("gallery", "Gallery", text, Value::Null, Vec::new());
@@ -115,15 +115,37 @@ impl ModelUnderTest {
     /// The `n`-th garment of the first of `categories` that has one: test garments come first, then validation
     /// garments. Garment 0 where there is none of them.
     fn pick(&self, categories: &[Category], n: usize) -> usize {
-        let split = &self.dataset.split;
-        let all = || split.test.iter().chain(&split.validation).chain(&split.training).copied();
-        let of = |category: &Category| {
-            let garments = &self.dataset.garments;
-            all().filter(|&g| garments.info(g).category == *category).collect::<Vec<usize>>()
-        };
-        let found = categories.iter().map(of).find(|garments| !garments.is_empty()).unwrap_or_default();
+        let found = categories.iter().map(|category| self.all_of(*category));
+        let found = found.into_iter().find(|garments| !garments.is_empty()).unwrap_or_default();
         found.get(n % found.len().max(1)).copied().unwrap_or(0)
     }
+
+    /// All garments of `category`, those of the test set first, then those of validation.
+    fn all_of(&self, category: Category) -> Vec<usize> {
+        let split = &self.dataset.split;
+        let all = split.test.iter().chain(&split.validation).chain(&split.training).copied();
+        all.filter(|&g| self.dataset.garments.info(g).category == category).collect()
+    }
+}
+
+/// Of the T-shirts and tops, test garments where there are some, the shortest one that reaches below the upper rim of `skirt`: a
+/// thigh that is raised lifts a skirt's hem above that of a long shirt, which then seems to be worn over it.
+fn shirt_over(model: &ModelUnderTest, skirt: usize) -> Result<usize, Report> {
+    let heights = |g: usize| {
+        let (low, high) = model.dataset.garments.garment(g)?.garment.rest.bounds();
+        Ok::<_, Report>([low[1], high[1]])
+    };
+    let is_test = |g: &usize| model.dataset.split.test.contains(g);
+    let mut shirts = model.all_of(Category::TShirt);
+    shirts.extend(model.all_of(Category::Top));
+    if shirts.iter().any(is_test) {
+        shirts.retain(is_test);
+    }
+    let rim = heights(skirt)?[1];
+    let hems =
+        shirts.iter().map(|&shirt| Ok((heights(shirt)?[0], shirt))).collect::<Result<Vec<_>, Report>>()?;
+    let shortest = hems.iter().filter(|(hem, _)| *hem < rim).max_by(|a, b| a.0.total_cmp(&b.0));
+    Ok(shortest.or(hems.first()).map_or(0, |(_, shirt)| *shirt))
 }
 
 /// Outfits from left to right; seen from the front, then from the back. Where all of them hold the same garments a colour

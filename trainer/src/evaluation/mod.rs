@@ -59,6 +59,8 @@ pub struct Evaluation {
 
 /// A part of an evaluation.
 struct Part {
+    /// What `--only` calls it.
+    key: &'static str,
     name: &'static str,
     /// Number of its scenes.
     scenes: fn(&Evaluator<'_>) -> usize,
@@ -67,20 +69,61 @@ struct Part {
 }
 
 const PARTS: [Part; 10] = [
-    Part { name: "sets", scenes: |_| 0, sections: sets::sections },
-    Part { name: "Table 2: methods", scenes: methods::scene_count, sections: methods::sections },
-    Part { name: "Table 1: embeddings", scenes: embeddings::scene_count, sections: embeddings::sections },
-    Part { name: "Table 3: layers", scenes: layers::scene_count, sections: layers::sections },
-    Part { name: "Table 4: ablations", scenes: variants::scene_count, sections: variants::sections },
-    Part { name: "Table 5: times", scenes: |e| e.counts.timed, sections: drape_times::sections },
-    Part { name: "speed against error", scenes: pareto::scene_count, sections: pareto::sections },
-    Part { name: "numerical choices", scenes: |_| 0, sections: numerics::sections },
-    Part { name: "stress tests", scenes: stress_tests::scene_count, sections: stress_tests::sections },
-    Part { name: "pictures", scenes: gallery::picture_count, sections: gallery::sections },
+    Part { key: "sets", name: "sets", scenes: |_| 0, sections: sets::sections },
+    Part {
+        key: "methods",
+        name: "Table 2: methods",
+        scenes: methods::scene_count,
+        sections: methods::sections,
+    },
+    Part {
+        key: "embeddings",
+        name: "Table 1: embeddings",
+        scenes: embeddings::scene_count,
+        sections: embeddings::sections,
+    },
+    Part { key: "layers", name: "Table 3: layers", scenes: layers::scene_count, sections: layers::sections },
+    Part {
+        key: "ablations",
+        name: "Table 4: ablations",
+        scenes: variants::scene_count,
+        sections: variants::sections,
+    },
+    Part {
+        key: "times",
+        name: "Table 5: times",
+        scenes: |e| e.counts.timed,
+        sections: drape_times::sections,
+    },
+    Part {
+        key: "pareto",
+        name: "speed against error",
+        scenes: pareto::scene_count,
+        sections: pareto::sections,
+    },
+    Part { key: "numerics", name: "numerical choices", scenes: |_| 0, sections: numerics::sections },
+    Part {
+        key: "stress",
+        name: "stress tests",
+        scenes: stress_tests::scene_count,
+        sections: stress_tests::sections,
+    },
+    Part { key: "gallery", name: "pictures", scenes: gallery::picture_count, sections: gallery::sections },
 ];
 
+/// Names of the parts of an evaluation, in their order.
+pub const PART_KEYS: [&str; PARTS.len()] = {
+    let mut keys = [""; PARTS.len()];
+    let mut part = 0;
+    while part < PARTS.len() {
+        keys[part] = PARTS[part].key;
+        part += 1;
+    }
+    keys
+};
+
 impl Evaluation {
-    /// Measures `model`. `ablations` are models trained with a part left out on the same data; `specific` ones were trained on a
+    /// Measures `model` by the parts whose keys `is_wanted`. `ablations` are models trained with a part left out on the same data; `specific` ones were trained on a
     /// single garment that `model` knows too.
     ///
     /// # Errors
@@ -90,6 +133,7 @@ impl Evaluation {
         ablations: &[NamedModel],
         specific: &[NamedModel],
         counts: SceneCounts,
+        is_wanted: &dyn Fn(&str) -> bool,
         progress: Progress<'_>,
     ) -> Result<Self, Report> {
         let networks = model.networks();
@@ -103,9 +147,10 @@ impl Evaluation {
             counts,
             progress,
         };
-        let scenes = PARTS.iter().map(|part| (part.scenes)(&evaluator)).sum();
+        let parts = || PARTS.iter().filter(|part| is_wanted(part.key));
+        let scenes = parts().map(|part| (part.scenes)(&evaluator)).sum();
         let mut sections = Vec::new();
-        for part in &PARTS {
+        for part in parts() {
             progress(Some((part.name, scenes)));
             sections.extend((part.sections)(&evaluator)?);
         }

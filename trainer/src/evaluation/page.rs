@@ -46,8 +46,8 @@ pub struct Picture {
     pub caption: String,
     /// The file.
     pub png: Vec<u8>,
-    /// The same as an element of the page, where it is a chart.
-    pub svg: Option<String>,
+    /// The same as elements of the page, where it is charts.
+    pub html: Option<String>,
 }
 
 /// Everything, to be read.
@@ -92,7 +92,7 @@ impl Page {
             let tables: String = section.tables.iter().map(Table::html).collect();
             let picture = |picture: &Picture| {
                 let caption = escape(&picture.caption);
-                let shown = picture.svg.clone().unwrap_or_else(|| {
+                let shown = picture.html.clone().unwrap_or_else(|| {
                     let png = STANDARD.encode(&picture.png);
                     format!("<img alt=\"{caption}\" src=\"data:image/png;base64,{png}\">")
                 });
@@ -109,7 +109,7 @@ impl Page {
         let sections: String = self.sections.iter().map(section).collect();
         format!(
             "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
-             <meta name=\"viewport\" content=\"width=device-width\"><title>{title}</title><style>{STYLE}{}</style></head>\n\
+             <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"><title>{title}</title><style>{}{STYLE}</style></head>\n\
              <body><header><h1>{title}</h1>{facts}</header>\n{sections}</body></html>\n",
             svg::STYLE,
             title = escape(&self.title)

@@ -5,6 +5,7 @@ use super::page::Picture;
 use super::table::{Column, median_with_interval, plain};
 use super::{Estimate, Evaluator, Metric, Section, Table, drape_by, median_ms};
 use crate::dataset::PreparedScene;
+use crate::inference::contact_features::LayerInteraction;
 use crate::inference::networks::Networks;
 use crate::inference::reference::{ReferenceScene, wide};
 use crate::inference::tensor_store::DrapeError;
@@ -29,6 +30,14 @@ const REFINEMENT: [usize; 4] = [1, 2, 4, 8];
 const LAYERS: usize = 3;
 /// Random stream of the scenes; outfits have the next.
 const STREAM: usize = 7;
+/// How the methods of a line begin, and what it is called.
+const FAMILIES: [(&str, &str); 5] = [
+    ("LBS", "LBS"),
+    ("network, uncorrected +", "refinement of the uncorrected network"),
+    ("network + post-process", "network + post-process"),
+    ("network", "network, corrections, refinement"),
+    ("solver", "solver from LBS + shape transfer"),
+];
 /// What networks without corrections are called.
 const UNCORRECTED: &str = "network, uncorrected";
 /// Repetitions of a fast method last this long (s).
@@ -85,14 +94,15 @@ pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
     ];
     let mut charts = single_garments.charts("one garment");
     charts.extend(outfits.charts(&format!("{LAYERS} garments")));
-    let charts = ChartGrid { title: "Speed against error".to_owned(), legend: Vec::new(), charts };
+    let legend = Line::legend(&FAMILIES.map(|(_, name)| Line { name: name.to_owned(), points: Vec::new() }));
+    let charts = ChartGrid { title: "Speed against error".to_owned(), legend, charts };
     let numbers = json!({ "single_garments": single_garments, "outfits": outfits });
     let mut section = Section::new("pareto", "Speed against error", "", numbers, tables);
     section.pictures.push(Picture {
         file: "pareto.png".into(),
         caption: "Medians; down and to the left is better.".into(),
         png: png_bytes(&charts.draw()).into_diagnostic()?,
-        svg: Some(charts.svg()),
+        html: Some(charts.html()),
     });
     Ok(vec![section])
 }
@@ -152,27 +162,20 @@ impl Comparison {
 
     /// Excess energy, distance and intersections over time, all medians.
     fn charts(&self, of: &str) -> Vec<Chart> {
-        let families = [
-            ("LBS", "LBS"),
-            ("network, uncorrected +", "refinement of the uncorrected network"),
-            ("network + post-process", "network + post-process"),
-            ("network", "network, corrections, refinement"),
-            ("solver", "solver from LBS + shape transfer"),
-        ];
-        let family_of = |name: &str| families.iter().position(|(prefix, _)| name.starts_with(prefix));
-        let chart = |title: &str, value: &dyn Fn(&Value) -> f64| {
+        let family_of = |name: &str| FAMILIES.iter().position(|(prefix, _)| name.starts_with(prefix));
+        let chart = |quantity: &str, value: &dyn Fn(&Value) -> f64| {
             let line = |index: usize| {
                 let family = self.points.iter().filter(|p| family_of(&plain(&p["method"])) == Some(index));
                 let mut points: Vec<_> = family.map(|p| (median(p, "milliseconds"), value(p))).collect();
                 // More steps may take no longer; a line that turns back is drawn with spikes.
                 points.sort_by(|a, b| a.0.total_cmp(&b.0));
-                Line { name: families[index].1.to_owned(), points }
+                Line { name: FAMILIES[index].1.to_owned(), points }
             };
-            let lines: Vec<Line> = (0..families.len()).map(line).collect();
-            Chart::of_lines(&format!("{title} over time (ms), {of}"), &lines)
+            let lines: Vec<Line> = (0..FAMILIES.len()).map(line).collect();
+            Chart::of_lines(of, ["time (ms)", quantity], &lines)
         };
         vec![
-            chart("excess energy (%)", &|p| median(p, "excess_percent")),
+            chart("excess energy (% of LBS)", &|p| median(p, "excess_percent")),
             chart("distance (mm)", &|p| median(p, "distance_mm")),
             chart("intersecting pairs", &|p| median(p, "body_pairs") + median(p, "layer_pairs")),
         ]
@@ -192,6 +195,9 @@ fn fast_methods(evaluator: &Evaluator<'_>, scene: &PreparedScene) -> Result<Vec<
     for method in [Method::Lbs, Method::LbsWithShapeTransfer] {
         states.push(timed(method.name().to_owned(), method, networks)?);
     }
+    let milliseconds = median_ms(SECONDS, || networks.forward(scene, LayerInteraction::Together))?;
+    let positions = wide(&networks.forward(scene, LayerInteraction::Together)?.posed);
+    states.push(State { method: "network, forward pass".to_owned(), milliseconds, positions });
     for corrections in 0..model.model.correction_steps {
         let name = match corrections {
             0 => UNCORRECTED.to_owned(),

@@ -1,15 +1,15 @@
-//! Correction steps at inference: from linear blend skinning over the networks' drape to a state of less energy.
+//! What becomes of the networks' drape: from linear blend skinning over it and the correction steps to a state of less energy.
 //!
 //! Every state on the path is accepted garment by garment, as far as it lowers the energy
-//! ([`crate::inference::descent`]), in the form without jumps that drapes are measured by
-//! ([`crate::inference::reference`]):
+//! ([`crate::inference::descent`]), in the form that drapes are measured by ([`crate::inference::reference`]):
 //!
-//! 1. skinning of the start by the initial weights W;
+//! 1. skinning by the initial weights W, of the start (with shape transfer) or of the rest garments: whichever has less energy;
 //! 2. the networks' drape: Δx and ΔW together; where a garment does not take it, Δx with W, and then ΔW as far as it helps
 //!    (networks that were trained with canonical holding slide waistbands by ΔW);
 //! 3. the correction networks in turn, with the skin weights that every garment has by now, until no garment moves.
 //!
-//! So no garment ends above skinning, and more steps never raise its energy.
+//! So no outfit ends above either skinning, no garment above what it began with, and more steps never raise its energy: with no
+//! correction step at all, too.
 
 use super::contact_features::{LayerInteraction, contact_features};
 use super::descent::{BACKTRACKING, Descent, WHOLE};
@@ -20,8 +20,8 @@ use clothcombo_model::{
     BodyTensors, ClothCombo, DrapeState, DrapeStates, OutfitTensors, linear_blend_skinning,
 };
 
-/// The state that the correction steps of `model` lead to from `states`, whose last one is `uncorrected`: that itself where the
-/// model takes no such step. `watch` sees every state that was accepted, skinning first.
+/// The state that the networks' drape, the last of `states` and `uncorrected` on the host, and the correction steps of `model`
+/// lead to. `watch` sees every state that was accepted, skinning first.
 pub(crate) fn corrected(
     model: &ClothCombo,
     on_body: &OnBody<'_>,
@@ -31,18 +31,16 @@ pub(crate) fn corrected(
     watch: &mut dyn FnMut(&Descent<'_>),
 ) -> Draped {
     let OnBody { scene, outfit, embeddings, body, start } = on_body;
-    let networks = model.corrections.len();
-    if networks == 0 || model.correction_steps == 0 {
-        return uncorrected;
-    }
     let device = start.device();
     let energy = interaction.energy(scene).continuous().pulled_back(&scene.skinning_transforms());
-    let mut descent = Descent::new(&energy, skinned(start.clone(), outfit.skin_weights.clone(), body));
+    let skinnings = [start, &outfit.rest].map(|x| skinned(x.clone(), outfit.skin_weights.clone(), body));
+    let mut descent = Descent::from_best(&energy, skinnings);
     watch(&descent);
     states.skin_weights = take_networks(&mut descent, &uncorrected, &states.skin_weights, outfit, body);
     watch(&descent);
+    let networks = model.corrections.len();
     let mut idle = 0;
-    for _ in 0..model.correction_steps {
+    for _ in 0..if networks > 0 { model.correction_steps } else { 0 } {
         states.replace_last(descent.state().upload(&device));
         let posed = &descent.state().posed;
         let features = contact_features(scene, &scene.bodies[0], interaction.contacts(scene), posed, &device);

@@ -32,6 +32,23 @@ impl<'a> Descent<'a> {
         Self { energy, state, energies, total }
     }
 
+    /// Starts from the one of `candidates` in which the outfit has least energy. A garment that has less in another one goes
+    /// there, where that raises nobody's energy. So the outfit starts with no more energy than in any of them, and so does every
+    /// garment that is part of no pair.
+    ///
+    /// # Panics
+    /// If there is none.
+    pub fn from_best(energy: &'a SceneEnergy<f32>, candidates: impl IntoIterator<Item = Draped>) -> Self {
+        let mut starts: Vec<Self> = candidates.into_iter().map(|state| Self::new(energy, state)).collect();
+        let lowest = (0..starts.len()).min_by(|&a, &b| starts[a].total.total_cmp(&starts[b].total));
+        let mut best = starts.remove(lowest.expect("a state to start from"));
+        for other in starts {
+            let gains: Vec<bool> = other.energies.iter().zip(&best.energies).map(|(o, b)| o < b).collect();
+            best.advance_some(&other.state, &WHOLE, |garment| gains[garment]);
+        }
+        best
+    }
+
     /// Where it is.
     pub fn state(&self) -> &Draped {
         &self.state
@@ -229,6 +246,22 @@ mod tests {
         assert_eq!(descent.state().posed, stretched(&rest, &[1.1, 1.05]).posed);
         assert_eq!(descent.advance_some(&stretched(&rest, &[1.0, 1.0]), &WHOLE, |i| i == 0), [1.0, 0.0]);
         assert_eq!(descent.state().posed, stretched(&rest, &[1.0, 1.05]).posed);
+    }
+
+    #[test]
+    fn a_descent_starts_with_the_better_state_of_every_garment() {
+        let (energy, rest) = scene(&[0.1, 0.12], &[]);
+        let candidates = [stretched(&rest, &[1.1, 1.3]), stretched(&rest, &[1.2, 1.1])];
+        for order in [[0, 1], [1, 0]] {
+            let descent = Descent::from_best(&energy, order.map(|i| candidates[i].clone()));
+            assert_eq!(descent.state().posed, stretched(&rest, &[1.1, 1.1]).posed);
+        }
+        // Where the two are a pair, the outfit has no more energy than in either state.
+        let (energy, rest) = scene(&[0.13, 0.12], &[[0, 1]]);
+        let candidates = [[0.8, 1.0], [1.0, 1.2], [0.9, 1.1]].map(|by| stretched(&rest, &by));
+        let totals = candidates.each_ref().map(|state| Descent::new(&energy, state.clone()).total());
+        let descent = Descent::from_best(&energy, candidates);
+        assert!(totals.iter().all(|total| descent.total() <= *total), "{totals:?}");
     }
 
     #[test]

@@ -18,8 +18,8 @@ pub enum DraperError {
     /// No model was named and none is shipped.
     #[error("no trained model: none was named, and there is none in {}", searched.join(", "))]
     #[diagnostic(help(
-        "train one (clothcombo-train --config configs/smoke.toml takes about five minutes) and pass --checkpoint RUN, \
-         or a folder with model.safetensors, config.toml and state.json"
+        "the project's checkout has one: name it with --checkpoint CHECKOUT/models/default, set CLOTHCOMBO_MODELS=CHECKOUT/models, \
+         or copy the folder models beside this program; --checkpoint also takes a run of clothcombo-train"
     ))]
     NoModel {
         /// Where it was looked for.
@@ -117,6 +117,17 @@ pub enum DraperError {
         path: PathBuf,
         /// What tells it.
         what: String,
+    },
+    /// A garment that is no file cannot be placed as one.
+    #[error(
+        "{name} is made by the generator, on this body: --offset, --turn and --from-body are about files"
+    )]
+    #[diagnostic(help(
+        "leave them out, or say them in a file of outfits (--outfits) for the garments that they are about"
+    ))]
+    Generated {
+        /// The garment.
+        name: String,
     },
     /// A garment is too fine.
     #[error(

@@ -1,7 +1,7 @@
 //! One drape: networks, refinement, post-process.
 
 use super::motion::RetryPolicy;
-use super::network_drape::NetworkDrape;
+use super::network_drape::{NetworkDrape, Networks};
 use super::{
     BodyState, Certificate, Drape, Draper, DraperError, GarmentDrape, Outfit, RefineSteps, elapsed, refine,
 };
@@ -120,7 +120,13 @@ impl Draper {
                     1.0 => Ok(final_sample()),
                     _ => {
                         let place = add_scaled(state.place, share, sub(body.place, state.place));
-                        self.stage(&self.model, outfit, body, state.pose.between(&body.pose, share), place)
+                        self.stage(
+                            Networks::Accepted,
+                            outfit,
+                            body,
+                            state.pose.between(&body.pose, share),
+                            place,
+                        )
                     }
                 }
             };
@@ -132,7 +138,7 @@ impl Draper {
         let from_t_pose = |share: f64| {
             watch(share);
             let pose = body.pose.scaled_keeping_heading(share);
-            let stage = self.stage(&self.uncorrected, outfit, body, pose, body.place)?;
+            let stage = self.stage(Networks::ForwardPass, outfit, body, pose, body.place)?;
             Ok::<_, DraperError>(match share {
                 // The surface is known here only.
                 1.0 => PathSample { draped: stage.draped, ..final_sample() },

@@ -145,9 +145,6 @@ impl BodyState {
 pub struct Draper {
     trained: TrainedModel,
     model: ClothCombo,
-    /// The same without corrections, for samples of the continuation path from the T-pose: that leaves fewer
-    /// intersections (docs/resolve.md).
-    uncorrected: ClothCombo,
     preprocessor: Preprocessor,
     shape_space: ShapeSpace,
     joints: ActiveJoints,
@@ -184,7 +181,6 @@ impl Draper {
         let settings = settings.clone();
         Ok(Self {
             trained,
-            uncorrected: model.clone().with_correction_steps(0),
             model,
             preprocessor,
             shape_space,
@@ -234,7 +230,7 @@ impl Draper {
     /// # Errors
     /// When shape or pose do not fit the body model, or the networks diverge.
     pub fn drape(&self, outfit: &Outfit, body: &BodyState) -> Result<Drape, DraperError> {
-        let made = self.network_drape(&self.model, outfit, body)?;
+        let made = self.network_drape(outfit, body)?;
         self.drape_frame(outfit, Frame { body, last: None }, made, &mut |_| ())
     }
 

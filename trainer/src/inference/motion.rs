@@ -88,7 +88,7 @@ impl Draper {
                 let last = PreviousFrame { body: &bodies[frame + 1], drape: after, retry: RetryPolicy::ALL };
                 let mut watch = |share| progress(DrapeProgress::Continuation(share));
                 let body = &bodies[frame];
-                let mut made = self.network_drape(&self.model, outfit, body)?;
+                let mut made = self.network_drape(outfit, body)?;
                 made.network = own.garments.iter().flat_map(|garment| &garment.network).copied().collect();
                 let mut again =
                     self.drape_frame(outfit, Frame { body, last: Some(last) }, made, &mut watch)?;

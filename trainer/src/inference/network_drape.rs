@@ -3,12 +3,11 @@
 use super::{BodyState, Draper, DraperError, Outfit, PhaseTimes, elapsed};
 use crate::dataset::{BodySample, PreparedScene, SceneBuilder, SceneSample};
 use crate::inference::contact_features::LayerInteraction;
-use crate::inference::networks::drape_on;
+use crate::inference::networks::{NetworkTimes, drape_on, forward_on};
 use crate::inference::on_body::OnBody;
 use crate::inference::tensor_store::body_tensors;
 use clothcombo_data::asset::rotation::{Matrix3, apply, matrix_from_axis_angle};
 use clothcombo_data::asset::{Pose, PosedBody};
-use clothcombo_model::ClothCombo;
 use clothcombo_physics::contact::resolve::PathSample;
 use clothcombo_physics::query::Surface;
 use clothcombo_physics::transform::{self, Transform};
@@ -37,11 +36,29 @@ pub(super) struct NetworkDrape {
 /// Shape parameters are standard deviations: with a larger one there is no body any more.
 const MOST_SHAPE: f64 = 20.0;
 
+/// How much of the networks is asked.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Networks {
+    /// The forward pass, judged beside skinning, and the correction steps.
+    Accepted,
+    /// The forward pass alone: for samples of the continuation path from the T-pose, that leaves fewer intersections
+    /// (docs/resolve.md).
+    ForwardPass,
+}
+
 impl Draper {
-    /// Poses the body and lets `model` drape `outfit` on it.
+    /// Poses the body and lets the networks drape `outfit` on it.
     pub(super) fn network_drape(
         &self,
-        model: &ClothCombo,
+        outfit: &Outfit,
+        body: &BodyState,
+    ) -> Result<NetworkDrape, DraperError> {
+        self.drape_by(Networks::Accepted, outfit, body)
+    }
+
+    fn drape_by(
+        &self,
+        networks: Networks,
         outfit: &Outfit,
         body: &BodyState,
     ) -> Result<NetworkDrape, DraperError> {
@@ -64,7 +81,15 @@ impl Draper {
 
         let (outfit_tensors, embeddings) = (&outfit.tensors, &outfit.embeddings);
         let on_body = OnBody { scene: &scene, outfit: outfit_tensors, embeddings, body: &tensors, start };
-        let (draped, times) = drape_on(model, &on_body, LayerInteraction::Together);
+        let clock = Instant::now();
+        let together = LayerInteraction::Together;
+        let (draped, times) = match networks {
+            Networks::Accepted => drape_on(&self.model, &on_body, together),
+            Networks::ForwardPass => {
+                let (_, draped) = forward_on(&self.model, &on_body, together);
+                (draped, NetworkTimes { forward: clock.elapsed(), ..NetworkTimes::default() })
+            }
+        };
 
         // The body may be turned about the vertical: what the networks made turns with it, to where everything else happens.
         let turn = matrix_from_axis_angle([0.0, yaw, 0.0]);
@@ -88,7 +113,7 @@ impl Draper {
     /// The same in `pose` and place, a sample of the continuation path to `body`, for the post-process.
     pub(super) fn stage(
         &self,
-        model: &ClothCombo,
+        networks: Networks,
         outfit: &Outfit,
         body: &BodyState,
         pose: Pose,
@@ -96,7 +121,7 @@ impl Draper {
     ) -> Result<PathSample, DraperError> {
         // A surface is known at the end only.
         let sample = BodyState { shape: body.shape.clone(), pose, surface: None, place };
-        let made = self.network_drape(model, outfit, &sample)?;
+        let made = self.drape_by(networks, outfit, &sample)?;
         let parts = |packed| outfit.split(packed).into_iter().map(<[_]>::to_vec).collect();
         Ok(PathSample {
             body: made.surface,

@@ -8,7 +8,7 @@ use super::on_body::OnBody;
 use super::tensor_store::{DrapeError, KnownEmbeddings, TensorStore};
 use crate::dataset::PreparedScene;
 use burn::tensor::Tensor;
-use clothcombo_model::{ClothCombo, Mode};
+use clothcombo_model::{ClothCombo, DrapeStates, Mode};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -25,11 +25,6 @@ impl<'a> Networks<'a> {
         Self { model, tensors, embeddings: Arc::new(tensors.kept_embeddings()) }
     }
 
-    /// The same without corrections.
-    pub fn uncorrected(&self) -> Self {
-        self.with_correction_steps(0)
-    }
-
     /// The same with at most `steps` correction steps.
     pub fn with_correction_steps(&self, steps: usize) -> Self {
         let model = self.model.clone().with_correction_steps(steps);
@@ -43,6 +38,20 @@ impl<'a> Networks<'a> {
     pub fn drape(&self, scene: &PreparedScene) -> Result<Draped, DrapeError> {
         self.on_first_body(scene, Mode::Layered, |on_body| {
             drape_on(&self.model, on_body, LayerInteraction::Together).0
+        })
+    }
+
+    /// What the forward pass alone makes of `scene`, taken as it is.
+    ///
+    /// # Errors
+    /// When the scene's numbers are not finite.
+    pub fn forward(
+        &self,
+        scene: &PreparedScene,
+        interaction: LayerInteraction,
+    ) -> Result<Draped, DrapeError> {
+        self.on_first_body(scene, interaction.mode(), |on_body| {
+            forward_on(&self.model, on_body, interaction).1
         })
     }
 
@@ -67,8 +76,8 @@ impl<'a> Networks<'a> {
         Ok(drape(&OnBody { scene, outfit: &outfit, embeddings: &embeddings, body: &body, start }))
     }
 
-    /// The energy of every garment of `scene`, with the pairs that it is part of, at the states that the correction steps take
-    /// from skinning on (J).
+    /// The energy of every garment of `scene`, with the pairs that it is part of, at the states that are accepted from skinning
+    /// on (J).
     ///
     /// # Errors
     /// When the scene's numbers are not finite.
@@ -111,11 +120,23 @@ impl<'a> Networks<'a> {
 pub struct NetworkTimes {
     /// The forward pass.
     pub forward: Duration,
-    /// The correction steps.
+    /// The correction steps, and judging all states.
     pub corrections: Duration,
 }
 
-/// Lets `model` drape an outfit, all its garments together or each as a single garment, and correct the result.
+/// The forward pass of `model` on an outfit, all its garments together or each as a single garment, and its last state.
+pub fn forward_on(
+    model: &ClothCombo,
+    on_body: &OnBody<'_>,
+    interaction: LayerInteraction,
+) -> (DrapeStates, Draped) {
+    let OnBody { outfit, embeddings, body, start, .. } = on_body;
+    let states = model.forward(outfit, embeddings, body, start.clone(), interaction.mode());
+    let last = Draped::of(states.last());
+    (states, last)
+}
+
+/// Lets `model` drape an outfit; the result is judged beside skinning, and corrected.
 pub fn drape_on(
     model: &ClothCombo,
     on_body: &OnBody<'_>,
@@ -131,11 +152,9 @@ fn drape_watched(
     interaction: LayerInteraction,
     watch: &mut dyn FnMut(&Descent<'_>),
 ) -> (Draped, NetworkTimes) {
-    let OnBody { outfit, embeddings, body, start, .. } = on_body;
     let clock = Instant::now();
-    let states = model.forward(outfit, embeddings, body, start.clone(), interaction.mode());
     // On the host before the clock is read: devices compute behind the caller's back.
-    let uncorrected = Draped::of(states.last());
+    let (states, uncorrected) = forward_on(model, on_body, interaction);
     let forward = clock.elapsed();
     let found = corrected(model, on_body, states, uncorrected, interaction, watch);
     (found, NetworkTimes { forward, corrections: clock.elapsed() - forward })

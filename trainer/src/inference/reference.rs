@@ -1,9 +1,9 @@
 //! The scene that the static solver brings into equilibrium: what drapes are measured against.
 //!
-//! Its energy is that of the losses of the configuration with the weights they end with, in f64 and in the form without jumps
-//! ([`SceneEnergy::continuous`]); and garments are held by their posed positions, whatever the configuration says. Training uses
-//! the cheaper forms. Where two sheets of an inner garment are equally near, one on each side, the contact between garments still
-//! jumps.
+//! Its energy is that of the losses of the configuration with the weights they end with, in f64 and in the form of
+//! [`SceneEnergy::continuous`]; and garments are held by their posed positions, whatever the configuration says. Training uses
+//! the cheaper forms. Of one garment this energy has no jumps. Where two sheets of an inner garment are equally near, one on each
+//! side, the contact between garments jumps, by up to 0.4 J.
 
 use crate::config::LossesConfig;
 use crate::dataset::PreparedScene;

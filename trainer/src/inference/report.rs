@@ -101,7 +101,10 @@ pub struct Report {
     pub body: BodyReport,
     /// The garments, innermost first.
     pub garments: Vec<DrapedGarmentReport>,
-    /// Score of the first frame before the post-process.
+    /// Number of the one frame of a motion that `before`, `after`, `certificate_before` and `refinement` are of: the first.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scored_frame: Option<usize>,
+    /// Score before the post-process.
     pub before: Score,
     /// And of the result.
     pub after: Score,
@@ -110,9 +113,9 @@ pub struct Report {
     /// What is left: of a motion, numbers of pairs are sums over the frames, depths and strain the worst frame's, and the
     /// lists are those of `frames`.
     pub certificate: Certificate,
-    /// The same of what came to the post-process in the first frame, without the list of pairs.
+    /// The same of what came to the post-process, without the list of pairs.
     pub certificate_before: Certificate,
-    /// What the refinement of the first frame did.
+    /// What the refinement did.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub refinement: Option<Refinement>,
     /// What temporal smoothing did.
@@ -181,6 +184,7 @@ impl Report {
             },
             body,
             garments: garment_reports(outfit, drapes),
+            scored_frame: moments.first().map(|moment| moment.frame),
             before: before?,
             after: after?,
             milliseconds,

@@ -164,8 +164,8 @@ impl GarmentCatalog {
     }
 
     /// The garment of a file or, where there is no such file, of that name. A named one from a file is fitted like any other
-    /// file where it does not lie on this body: it may have been made for another one. `hints` are about files; they do not make
-    /// a named garment be fitted that lies on the body already.
+    /// file where it does not lie on this body, it may have been made for another one, or where `hints` say where it belongs
+    /// ([`FitSettings::is_placed`]). Other hints are about how files are written: a named garment that lies on the body needs none.
     ///
     /// # Errors
     /// Naming the file or the unknown name.
@@ -188,13 +188,16 @@ impl GarmentCatalog {
             name: name.to_owned(),
             known: self.names.clone(),
         })?;
+        if let (GarmentSource::Generated { .. }, true) = (origin, hints.is_placed()) {
+            return Err(DraperError::Generated { name: name.to_owned() });
+        }
         let loader = GarmentLoader::new(body, std::slice::from_ref(origin))?;
         let GarmentSource::File(listed) = origin else {
             return Ok(GivenGarment::new(loader.load(origin)?));
         };
         let made = loader.load(origin);
-        // Where it was made on another body, where it lies now says nothing.
-        let always_fit = always_fit.or(hints.from_body.is_some().then_some(true));
+        // Then where it lies now says nothing.
+        let always_fit = always_fit.or(hints.is_placed().then_some(true));
         let must_fit = always_fit.unwrap_or_else(|| {
             // A model is used with the borders that it was trained with; they are not joined anew.
             let lies = |rest: &TriMesh| {

@@ -37,7 +37,7 @@ impl<'a> TemporalFilter<'a> {
     fn make(&mut self) -> Result<(), DraperError> {
         let radius = self.weights.len() / 2;
         for frame in self.next + self.made.len()..self.bodies.len().min(self.next + radius + 1) {
-            let made = self.draper.network_drape(&self.draper.model, self.outfit, &self.bodies[frame])?;
+            let made = self.draper.network_drape(self.outfit, &self.bodies[frame])?;
             if radius > 0 {
                 self.offsets.insert(frame, offsets(&made));
             }

@@ -6,7 +6,7 @@ use crate::run::checkpoint::{Checkpoint, CheckpointError};
 use crate::run::lock::RunLock;
 use crate::run::observer::best_so_far;
 use crate::run::report::run_name;
-use crate::run::validation::Method;
+use crate::run::validation::{Method, ratio};
 use crate::system::paths::lossy;
 use serde::Serialize;
 use serde_json::Value;
@@ -193,7 +193,7 @@ impl RunSummary {
                     self.order_violations = network["order_violations_nearest_vertex"].as_f64();
                 } else if group["group"] == ValidationGroup::Single.name() {
                     let strain = |m: &Value| m["raw"]["strain"]["mean"].as_f64();
-                    self.strain_ratio = strain(network).zip(strain(skinning)).map(|(a, b)| a / b);
+                    self.strain_ratio = strain(network).zip(strain(skinning)).and_then(|(a, b)| ratio(a, b));
                     self.inside = network["inside"].as_f64();
                 }
             }

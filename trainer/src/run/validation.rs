@@ -40,6 +40,11 @@ impl Method {
     }
 }
 
+/// `value` as a share of `whole`; none of nothing.
+pub(super) fn ratio(value: f64, whole: f64) -> Option<f64> {
+    Some(value / whole).filter(|ratio| whole > 0.0 && ratio.is_finite())
+}
+
 /// One method over all scenes of a group.
 #[derive(Clone, Debug, Serialize)]
 pub struct MethodScore {
@@ -127,14 +132,12 @@ impl fmt::Display for ValidationReport {
             }
             let Some((last, others)) = group.methods.split_last() else { continue };
             for baseline in others {
-                writeln!(
-                    f,
-                    "  {} against {}: strain × {:.3}, total × {:.3}",
-                    last.method,
-                    baseline.method,
-                    last.raw[Term::Strain.name()].mean / baseline.raw[Term::Strain.name()].mean,
-                    last.total.mean / baseline.total.mean
-                )?;
+                let strain = |method: &MethodScore| method.raw[Term::Strain.name()].mean;
+                let [strain, total] =
+                    [(strain(last), strain(baseline)), (last.total.mean, baseline.total.mean)].map(
+                        |(value, whole)| ratio(value, whole).map_or("–".into(), |r| format!("× {r:.3}")),
+                    );
+                writeln!(f, "  {} against {}: strain {strain}, total {total}", last.method, baseline.method)?;
             }
         }
         Ok(())

@@ -106,6 +106,19 @@ pub enum ScoreError {
         /// What is wrong with them.
         reason: MeshError,
     },
+    /// A face lies on another one.
+    #[error("garment '{garment}': face {face} has the vertices of face {first}")]
+    #[diagnostic(help(
+        "remove one of them, or let `clothcombo fit` repair the rest mesh (triangles count from 0, after polygons were cut)"
+    ))]
+    DoubledFace {
+        /// Its name.
+        garment: String,
+        /// The face.
+        face: u32,
+        /// The earlier one of the same vertices.
+        first: u32,
+    },
     /// A garment without energies.
     #[error("garment '{garment}': {reason}")]
     Energy {

@@ -240,6 +240,9 @@ fn scene_garment(
     settings: &EnergySettings,
 ) -> Result<SceneGarment<f64>, ScoreError> {
     let name = || garment.name.to_owned();
+    if let Some([face, first]) = garment.rest.doubled_face() {
+        return Err(ScoreError::DoubledFace { garment: name(), face, first });
+    }
     garment
         .rest
         .with_positions(garment.positions.to_vec())

@@ -5,6 +5,7 @@ pub mod closed_pipe;
 pub mod device;
 pub mod exact;
 pub mod files;
+pub mod limits;
 pub mod lru_cache;
 pub mod memory;
 pub mod paths;

@@ -28,12 +28,6 @@ pub fn obstacle(folder: &Path) -> Option<&Path> {
     folder.ancestors().find(|path| path.exists()).filter(|path| !path.is_dir())
 }
 
-/// The outermost folder that would have to be made for `path` to lie in; none if all are there.
-pub fn first_missing_folder(path: &Path) -> Option<&Path> {
-    let folders = path.ancestors().skip(1).filter(|folder| !folder.as_os_str().is_empty());
-    folders.take_while(|folder| !folder.exists()).last()
-}
-
 /// A path for JSON, which must be UTF-8 where names of files need not.
 ///
 /// # Errors
@@ -80,14 +74,12 @@ mod tests {
     }
 
     #[test]
-    fn what_blocks_a_folder_and_what_is_missing_is_found() {
+    fn what_blocks_a_folder_is_found() {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         fs::write(at("file"), "x").unwrap();
         assert_eq!(obstacle(&at("file")), Some(at("file").as_path()));
         assert_eq!(obstacle(&at("file/a/b")), Some(at("file").as_path()));
         assert_eq!((obstacle(&at("a/b")), obstacle(Path::new("a"))), (None, None));
-        assert_eq!(first_missing_folder(&at("a/b/c")), Some(at("a").as_path()));
-        assert_eq!((first_missing_folder(&at("a")), first_missing_folder(Path::new("a"))), (None, None));
     }
 }

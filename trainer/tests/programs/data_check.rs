@@ -62,6 +62,38 @@ fn changed(folder: &Path, from: &str, to: &str, change: impl Fn([f64; 3]) -> [f6
     std::fs::write(manifest, format!("{text}\n[[garment]]\nfile = {to:?}\n")).unwrap();
 }
 
+#[test]
+fn files_lie_beside_the_configuration_or_are_named_with_their_key() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = dataset(folder.path());
+    let place = folder.path().display().to_string();
+    let text = std::fs::read_to_string(&config).unwrap().replace(&format!("{place}/garments"), "garments");
+    std::fs::write(&config, text.replace(&format!("{place}/motions"), "motions")).unwrap();
+    let elsewhere = tempfile::tempdir().unwrap();
+    let train = |run: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_clothcombo-train"));
+        let command =
+            command.arg("--config").arg(&config).args(["--run-dir", run, "--quiet"]).env("NO_COLOR", "1");
+        command.current_dir(elsewhere.path()).output().unwrap()
+    };
+    let output = train("run");
+    assert!(output.status.success(), "{}", said(&output));
+    // The run goes on from anywhere.
+    let mut resume = Command::new(env!("CARGO_BIN_EXE_clothcombo-train"));
+    let run = elsewhere.path().join("run");
+    let output = resume.arg("--resume").arg(&run).arg("--quiet").current_dir("/").output().unwrap();
+    assert!(output.status.success(), "{}", said(&output));
+    std::fs::rename(folder.path().join("motions"), folder.path().join("moved")).unwrap();
+    let place = elsewhere.path().canonicalize().unwrap().display().to_string();
+    assert_fails(
+        &train("other"),
+        1,
+        &["data.poses.motions = \"motions\"", "beside the configuration", &place],
+    );
+    let check = clothcombo(&["config", "check", &config.display().to_string()]);
+    assert_fails(&check, 1, &["data.poses.motions = \"motions\"", "beside the configuration"]);
+}
+
 fn train(config: &Path, run: &Path) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_clothcombo-train"));
     command.arg("--config").arg(config).arg("--run-dir").arg(run).env("NO_COLOR", "1").output().unwrap()
@@ -76,19 +108,25 @@ fn all_that_is_wrong_stands_in_one_table_and_nothing_is_made() {
     changed(folder.path(), tee, "low.obj", |[x, y, z]| [x, y - 0.235, z], false);
     changed(folder.path(), tee, "beside.obj", |[x, y, z]| [x, y, z + 3.0], false);
     changed(folder.path(), tee, "inside_out.obj", |p| p, true);
+    changed(folder.path(), tee, "doubled.obj", |p| p, false);
+    let doubled = folder.path().join("garments/doubled.obj");
+    let text = std::fs::read_to_string(&doubled).unwrap();
+    let face = text.lines().find(|line| line.starts_with("f ")).unwrap();
+    std::fs::write(&doubled, format!("{text}{face}\n")).unwrap();
     changed(folder.path(), tee, "broken.obj", |p| p, false);
     std::fs::write(folder.path().join("garments/broken.obj"), "v 0 0 0\nv 1 0 nan\n").unwrap();
     motion(folder.path(), "still", 1);
     std::fs::write(folder.path().join("motions/cut.npz"), "PK").unwrap();
     let run = folder.path().join("deep/runs/run");
     let output = train(&config, &run);
-    assert_fails(&output, 1, &["7 of 11 files of the data cannot be trained on"]);
+    assert_fails(&output, 1, &["8 of 12 files of the data cannot be trained on"]);
     let message = said(&output);
     for (name, word) in [
         ("centimetres ", "not in metres"),
         ("low ", "% of its vertices lie inside"),
         ("beside ", "away from body 'mannequin'"),
         ("inside_out ", "inside out"),
+        ("doubled ", "has the vertices of an earlier one"),
         ("broken ", "line 2: vertex coordinate"),
         ("still ", "single frame"),
         ("cut ", "cut.npz"),
@@ -99,11 +137,13 @@ fn all_that_is_wrong_stands_in_one_table_and_nothing_is_made() {
     assert!(message.contains("clothcombo fit") && message.contains("--body mannequin"), "{message}");
     assert!(!message.contains("t_shirt_000007 "), "{message}");
     assert!(!folder.path().join("deep").exists() && !folder.path().join("cache").exists());
-    // Two other verbs refuse it in the same words.
-    let prepare = clothcombo(&["prepare", "--config", &config.display().to_string()]);
-    assert_fails(&prepare, 1, &["7 of 11 files"]);
+    // Other verbs refuse it in the same words.
+    for verb in [&["prepare", "--config"][..], &["config", "check"]] {
+        let refused = clothcombo(&[verb, &[&config.display().to_string()]].concat());
+        assert_fails(&refused, 1, &["8 of 12 files"]);
+    }
     let check = clothcombo(&["check", &folder.path().display().to_string()]);
-    assert_fails(&check, 1, &["7 of 11 files are unusable"]);
+    assert_fails(&check, 1, &["8 of 12 files are unusable"]);
     assert!(!folder.path().join("cache").exists());
 }
 

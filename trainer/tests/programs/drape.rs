@@ -265,6 +265,7 @@ fn a_motion_is_one_animated_scene() {
     let frames: Vec<_> =
         report["frames"].as_array().unwrap().iter().map(|f| f["frame"].as_u64().unwrap()).collect();
     assert_eq!(frames, [1, 3, 5, 7]);
+    assert_eq!(report["scored_frame"], 1, "scores are of one frame, and say so");
     let smoothing = &report["smoothing"];
     let sum: u64 = ["whole", "partly", "left"].iter().map(|k| smoothing[k].as_u64().unwrap()).sum();
     assert_eq!(sum, 4);

@@ -73,6 +73,7 @@ fn wrong_input_names_itself_and_leaves_nothing() {
             vec!["17 shape numbers", "mannequin"],
         ),
         (vec!["--garments", TEE, "--pose", "none.npz"], vec!["none.npz"]),
+        (vec!["--garments", TEE, "--pose", "flying"], vec!["--pose flying", "standing, walking, reaching"]),
         (vec!["--garments", TEE, "--pose", &beyond], vec!["arms.npz has 4 frames, no frame 9"]),
         (vec!["--garments", TEE, "--motion", &motion, "--frames", "2..9"], vec!["4 frames"]),
         (vec!["--garments", TEE, "--posed", &cube], vec!["cube.obj", "4 vertices"]),
@@ -195,7 +196,9 @@ fn a_model_is_three_files_and_a_damaged_or_missing_one_is_named() {
     assert!(failure(&mut run(&["-o", "d"]), 1).contains("model.safetensors does not match its checksum"));
     fs::remove_dir_all(&models).unwrap();
     let message = failure(&mut run(&["-o", "d"]), 1);
-    assert!(message.contains("no trained model") && message.contains("--checkpoint"), "{message}");
+    for words in ["no trained model", "--checkpoint", "CLOTHCOMBO_MODELS"] {
+        assert!(message.contains(words), "{words}: {message}");
+    }
 }
 
 #[test]
@@ -276,4 +279,39 @@ fn a_signal_ends_a_drape_and_leaves_nothing_behind() {
     assert!(sent.success());
     assert_eq!(drape.wait().unwrap().code(), Some(130));
     assert_eq!(left(), 1, "something beside the motion is left");
+}
+
+#[test]
+fn a_named_garment_goes_where_the_hints_say_or_they_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = at(&folder, "out");
+    for hint in [["--offset", "0,0.05,0"], ["--turn", "10"]] {
+        let message = failure(drape(&["--garments", TEE, "-o", &out]).args(hint), 1);
+        assert!(message.contains("made by the generator") && message.contains("--outfits"), "{message}");
+    }
+    drape(&["--garments", TEE, "-o", &at(&folder, "made")]).assert().success();
+    let dataset = at(&folder, "garments");
+    fs::create_dir(&dataset).unwrap();
+    fs::copy(Path::new(&at(&folder, "made")).join(format!("{TEE}.obj")), Path::new(&dataset).join("own.obj"))
+        .unwrap();
+    let mut named = drape(&["--garments", "own", "--dataset", &dataset, "-o", &out]);
+    named.args(["--offset", "0,0,0", "--turn", "-0"]).assert().success();
+    assert!(report(Path::new(&out))["garments"][0]["fit"].is_object(), "it was taken where it lay");
+}
+
+#[test]
+fn what_begins_like_a_negative_number_is_refused_as_a_value() {
+    let folder = tempfile::tempdir().unwrap();
+    let (motion, out) = (at(&folder, "arms.npz"), at(&folder, "out"));
+    save_motion(Path::new(&motion), 4);
+    let arguments = ["--garments", TEE, "--motion", &motion, "-o", &out];
+    for (flag, value, words) in [
+        ("--frames", "-1..3", "no range of frames"),
+        ("--join-seams", "-5mm", "--join-seams"),
+        ("--order", "-1,0", "it must not be negative"),
+        ("--shape", "-1,x", "it is no number"),
+    ] {
+        let message = failure(drape(&arguments).args([flag, value]), 2);
+        assert!(message.contains(words) && !message.contains("unexpected argument"), "{message}");
+    }
 }

@@ -1,6 +1,6 @@
 //! `clothcombo eval` on a model of a few steps: every table is there, and what cannot work is said before the work.
 
-use crate::common::{TINY, clothcombo, holds, said, start};
+use crate::common::{TINY, clothcombo, holds, said, start, tiny};
 use clothcombo_data::asset::{Motion, Pose, Provenance};
 use serde_json::Value;
 use std::fs;
@@ -52,6 +52,24 @@ fn with_every_set(folder: &Path) -> PathBuf {
     file
 }
 
+#[cfg(unix)]
+#[test]
+fn a_killed_evaluation_leaves_nothing() {
+    use std::io::{BufRead, BufReader};
+    let folder = tempfile::tempdir().unwrap();
+    let (run, report) = (folder.path().join("run"), folder.path().join("deep/report"));
+    assert!(start(&tiny(folder.path(), ""), &run, 2).status().unwrap().success());
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_clothcombo"));
+    let command = command.args(["eval", "--quick", "--checkpoint"]).arg(&run).arg("-o").arg(&report);
+    let mut eval = command.stderr(std::process::Stdio::piped()).spawn().unwrap();
+    // The first part has begun.
+    let lines = BufReader::new(eval.stderr.take().unwrap()).lines();
+    assert!(lines.map_while(Result::ok).any(|line| line.contains(" s  ")));
+    eval.kill().unwrap();
+    eval.wait().unwrap();
+    assert!(!folder.path().join("deep").exists());
+}
+
 fn names(list: &Value) -> Vec<&str> {
     list.as_array().unwrap().iter().map(|name| name.as_str().unwrap()).collect()
 }
@@ -78,7 +96,8 @@ fn a_quick_evaluation_holds_every_table_of_the_paper() {
     let output = arguments(&["--ablation", &format!("twin={}", run.display())]);
     assert!(output.status.success(), "{}", said(&output));
 
-    let eval: Value = serde_json::from_slice(&fs::read(report.join("eval.json")).unwrap()).unwrap();
+    let read = || serde_json::from_slice::<Value>(&fs::read(report.join("eval.json")).unwrap()).unwrap();
+    let eval = read();
     let evaluation = &eval["evaluation"];
     // Every set by itself: none mixes garments or poses that validation looked at with those that no run read.
     for key in ["training_garments", "validation_garments", "test_garments", "validation_clips", "test_clips"]
@@ -170,6 +189,11 @@ fn a_quick_evaluation_holds_every_table_of_the_paper() {
     );
     let markdown = fs::read_to_string(report.join("eval.md")).unwrap();
     assert!(markdown.contains("pareto.png") && report.join("pareto.png").is_file());
+
+    // A part by itself.
+    assert!(arguments(&["--only", "numerics"]).status.success());
+    let part = &read()["evaluation"];
+    assert!(part["numerics"].is_array() && part["methods"].is_null() && part["pareto"].is_null(), "{part}");
 
     // An evaluation is replaced, anything else is not.
     fs::write(folder.path().join("report").join("note.txt"), "mine").unwrap();

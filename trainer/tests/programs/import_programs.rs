@@ -19,7 +19,7 @@ fn import(verb: &str) -> Command {
 
 #[test]
 fn every_importer_has_help_with_an_example() {
-    for verb in ["bvh", "smplx", "smpl", "smplh", "amass", "cloth3d", "deepmimic"] {
+    for verb in ["bvh", "amc", "asf", "smplx", "smpl", "smplh", "amass", "cloth3d", "deepmimic"] {
         import(verb).arg("--help").assert().success().stdout(contains("\n  clothcombo import "));
     }
 }
@@ -73,9 +73,19 @@ fn a_model_its_motions_and_its_garments_come_in() {
         .arg(folder.path().join("motions"))
         .assert()
         .success();
-    // Both importers' clips stand in one manifest.
+    import("amc")
+        .arg(fixture("acclaim"))
+        .args(["--fps", "60", "-o"])
+        .arg(folder.path().join("motions"))
+        .assert()
+        .success()
+        .stdout(contains(
+            "taken    07_01: 22 of 22 body joints in a rig of 27, 3 of 5 frames at 120 frames/s",
+        ));
+    // The importers' clips stand in one manifest.
     let manifest = fs::read_to_string(folder.path().join("motions/motions.toml")).unwrap();
-    assert!(manifest.contains("ACCAD_s1_walk.npz") && manifest.contains("licence = \"Zlib\""), "{manifest}");
+    assert!(manifest.contains("ACCAD_s1_walk.npz") && manifest.contains("07_01.npz"), "{manifest}");
+    assert!(manifest.contains("licence = \"Zlib\""), "{manifest}");
 }
 
 #[test]
@@ -86,6 +96,8 @@ fn mistakes_are_one_sentence_and_an_exit_code() {
         ("smplx", "wrong/without_weights.npz", "key 'weights' is missing"),
         ("amass", "mat", "no AMASS motions (.npz) found"),
         ("deepmimic", "deepmimic/dog.txt", "frame 0 has 8 numbers"),
+        ("amc", "amass/CMU/LICENSE.txt", "no skeleton (.asf) beside it"),
+        ("bvh", "acclaim/07/07_01.amc", "`clothcombo import amc` reads it"),
     ] {
         let mut command = import(verb);
         let output = command.env("NO_COLOR", "1").arg(fixture(input)).arg("-o").arg(&out).output().unwrap();

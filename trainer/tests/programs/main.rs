@@ -22,6 +22,8 @@ mod import_programs;
 mod incidents;
 mod interrupt;
 mod kill;
+#[cfg(target_os = "linux")]
+mod limits;
 mod memory;
 mod observability;
 mod outputs;

@@ -53,7 +53,9 @@ impl Case {
         let mut command = Command::cargo_bin("clothcombo").unwrap();
         command.env("NO_COLOR", "1").current_dir(self.folder.path());
         command.args(["score", "--body", "body.obj", "--rest"]).args(rest);
-        command.arg("--draped").args(draped).args(extra);
+        // Two names of one flag.
+        let flag = if extra.is_empty() { "--garments" } else { "--draped" };
+        command.arg(flag).args(draped).args(extra);
         command
     }
 
@@ -204,6 +206,14 @@ fn files_that_cannot_be_read_are_named_with_the_line() {
     case.write("rest/flat.obj", flat);
     case.write("draped/flat.obj", flat);
     case.must_fail(&["rest/flat.obj"], &["draped/flat.obj"], &["flat", "no area"]);
+    for kind in ["rest", "draped"] {
+        case.write(&format!("{kind}/doubled.obj"), &(quad_box(0.12, [-0.2, 0.2]) + "f 2 1 5\n"));
+    }
+    case.must_fail(
+        &["rest/doubled.obj"],
+        &["draped/doubled.obj"],
+        &["'doubled'", "has the vertices of face", "clothcombo fit"],
+    );
 }
 
 #[test]

@@ -12,7 +12,8 @@ fn bodies() -> Vec<BodyState> {
     let pose = |angle: f64| {
         let mut pose = Pose::t_pose(22);
         pose.rotations[16] = [0.0, 0.0, angle];
-        BodyState::new(vec![0.5], pose)
+        // Small, so that skinning is under the skin and the few steps of training are accepted.
+        BodyState::new(vec![-2.0], pose)
     };
     [0.0, -0.4, -0.1, -0.6, -0.5].map(pose).into()
 }

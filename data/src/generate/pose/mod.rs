@@ -1,13 +1,18 @@
-//! Random poses: sampled within the limits of human joints, or varied from recorded ones.
+//! Poses: sampled within the limits of human joints, varied from recorded ones, or known by a name.
 
 mod augmentation;
+mod figure;
 mod folded;
+mod limb_density;
 mod limits;
+mod named;
 mod sampler;
 mod self_contact;
 
 pub use augmentation::PoseAugmentation;
 pub use folded::folded_poses;
+pub use limb_density::{LimbDensity, uniform_pose};
 pub use limits::{JOINT_LIMITS, JointLimits, is_within_limits, limited};
+pub use named::{POSE_NAMES, named_pose};
 pub use sampler::PoseSampler;
 pub use self_contact::SelfContact;

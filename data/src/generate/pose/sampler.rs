@@ -1,12 +1,11 @@
 //! Random poses that look like people: a few activities, each a few correlated factors, with noise on every joint.
 
+use super::figure::{Figure, LEFT};
 use super::limits::limited;
+use crate::asset::Pose;
 use crate::asset::rotation::{axis_angle_from_quaternion, quaternion_from_axis_angle, quaternion_product};
-use crate::asset::{BODY_JOINT_COUNT, Pose};
 use rand::{Rng, RngExt};
 use std::f64::consts::PI;
-
-const LEFT: usize = 0;
 
 /// Samples poses within [`super::JOINT_LIMITS`]: standing, walking, sitting, reaching, arms raised and bending.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,31 +20,6 @@ impl Default for PoseSampler {
     fn default() -> Self {
         Self { noise_degrees: 4.0, random_heading: false }
     }
-}
-
-/// Angles of one side of the body in degrees, as for the left side.
-#[derive(Debug, Clone, Copy, Default)]
-struct Side {
-    hip_flexion: f64,
-    hip_abduction: f64,
-    hip_turn: f64,
-    knee: f64,
-    toes_down: f64,
-    /// 0 is the T-pose, 75 hangs, −80 points up.
-    arm_lowered: f64,
-    arm_forward: f64,
-    arm_twist: f64,
-    elbow: f64,
-    shrug: f64,
-}
-
-#[derive(Debug, Clone, Copy, Default)]
-struct Figure {
-    sides: [Side; 2],
-    /// Whole trunk: forward, turn, sideways.
-    trunk: [f64; 3],
-    head: [f64; 3],
-    pelvis: [f64; 3],
 }
 
 fn normal<R: Rng + ?Sized>(rng: &mut R, mean: f64, deviation: f64) -> f64 {
@@ -205,44 +179,6 @@ fn hands_together<R: Rng + ?Sized>(figure: &mut Figure, rng: &mut R) {
         side.arm_forward = forward + normal(rng, 0.0, 4.0);
         side.elbow = elbow + normal(rng, 0.0, 6.0);
         side.arm_twist = between(rng, -10.0, 25.0);
-    }
-}
-
-impl Figure {
-    fn pose(&self) -> Pose {
-        let mut pose = Pose::t_pose(BODY_JOINT_COUNT);
-        let radians = |v: [f64; 3]| v.map(f64::to_radians);
-        pose.rotations[0] = radians(self.pelvis);
-        // The trunk's motion spreads over the spine, most of the turn high up.
-        for (joint, share) in [(3, [0.36, 0.26, 0.34]), (6, [0.34, 0.34, 0.33]), (9, [0.30, 0.40, 0.33])] {
-            pose.rotations[joint] = radians(std::array::from_fn(|a| share[a] * self.trunk[a]));
-        }
-        pose.rotations[12] = radians(self.head.map(|x| 0.5 * x));
-        pose.rotations[15] = pose.rotations[12];
-        for (i, side) in self.sides.iter().enumerate() {
-            let sign = if i == LEFT { 1.0 } else { -1.0 };
-            let mut set = |joint: usize, v: [f64; 3]| {
-                pose.rotations[joint + i] = [v[0], sign * v[1], sign * v[2]].map(f64::to_radians);
-            };
-            set(1, [-side.hip_flexion, side.hip_turn, side.hip_abduction]);
-            set(4, [side.knee, 0.0, 0.0]);
-            set(7, [side.toes_down - 0.15 * side.knee, 0.0, 0.0]);
-            set(13, [0.0, -0.12 * side.arm_forward.max(0.0), side.shrug]);
-            set(18, [0.3 * side.arm_twist, -side.elbow, 0.0]);
-            set(20, [0.0, 0.0, 0.1 * side.arm_twist]);
-            // First the twist about the arm, then down, then forward about the side axis of the body.
-            let turn = |v: [f64; 3]| quaternion_from_axis_angle(v.map(f64::to_radians));
-            let lowered = side.arm_lowered;
-            // A horizontal arm moves forward by a turn about the vertical, a hanging one about the side axis.
-            let hanging = (lowered / 75.0).clamp(-1.0, 1.0);
-            let forward = turn([-side.arm_forward * hanging, -side.arm_forward * (1.0 - hanging.abs()), 0.0]);
-            let arm = quaternion_product(
-                forward,
-                quaternion_product(turn([0.0, 0.0, -lowered]), turn([side.arm_twist, 0.0, 0.0])),
-            );
-            set(16, axis_angle_from_quaternion(arm).map(f64::to_degrees));
-        }
-        pose
     }
 }
 

@@ -1,43 +1,10 @@
 //! Biovision hierarchy (BVH) motion capture: a joint tree with rest offsets, and channel values per frame.
 
-use crate::asset::motion::{MAX_ANGLE, check_frame_rate};
-use crate::asset::rotation::{self, Matrix3};
+use crate::asset::motion::check_frame_rate;
 use crate::format::{FileError, way_out};
+use crate::import::rig::{Channel, Recording, RigJoint, check_angle};
 use std::fs;
 use std::path::Path;
-
-/// One motion channel: which axis, and whether it moves or turns.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Channel {
-    /// 0, 1, 2 for x, y, z.
-    pub axis: usize,
-    /// Turn (degrees) or move (file units).
-    pub rotates: bool,
-}
-
-/// One joint of the tree.
-#[derive(Clone, Debug, PartialEq)]
-pub struct BvhJoint {
-    /// Name in the file.
-    pub name: String,
-    /// Parent, before this one in the list.
-    pub parent: Option<usize>,
-    /// Rest offset from the parent (file units).
-    pub offset: [f64; 3],
-    /// Its channels in file order.
-    pub channels: Vec<Channel>,
-}
-
-/// A parsed file.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Bvh {
-    /// Joints, parents first.
-    pub joints: Vec<BvhJoint>,
-    /// Seconds per frame.
-    pub frame_time: f64,
-    channel_count: usize,
-    values: Vec<f64>,
-}
 
 /// No motion has longer frames (s): more is a rate.
 const LONGEST_FRAME: f64 = 2.0;
@@ -105,133 +72,83 @@ impl<'a> Words<'a> {
     }
 }
 
-impl Bvh {
-    /// Reads a file.
-    ///
-    /// # Errors
-    /// [`FileError`] naming file and line.
-    pub fn load(path: &Path) -> Result<Self, FileError> {
-        let bytes = fs::read(path).map_err(FileError::io(path))?;
-        if let (false, Some(way_out)) = (bytes.starts_with(b"HIERARCHY"), way_out(path)) {
-            return Err(FileError::content(path)(way_out));
-        }
-        Self::parse(&String::from_utf8_lossy(&bytes), path)
+/// Reads a BVH file.
+///
+/// # Errors
+/// [`FileError`] naming file and line.
+pub fn load(path: &Path) -> Result<Recording, FileError> {
+    let bytes = fs::read(path).map_err(FileError::io(path))?;
+    if let (false, Some(way_out)) = (bytes.starts_with(b"HIERARCHY"), way_out(path)) {
+        return Err(FileError::content(path)(way_out));
     }
-
-    /// Parses BVH text; `path` is for messages only.
-    ///
-    /// # Errors
-    /// [`FileError`] naming file and line.
-    pub fn parse(text: &str, path: &Path) -> Result<Self, FileError> {
-        let lines = text.lines().enumerate();
-        let words = lines
-            .flat_map(|(n, line)| line.split_ascii_whitespace().map(move |word| (n + 1, word)))
-            .collect();
-        let mut words = Words { words, at: 0, path };
-        words.expect("HIERARCHY")?;
-        words.expect("ROOT")?;
-        let mut joints = Vec::new();
-        read_joint(&mut words, &mut joints, None, 0)?;
-        words.expect("MOTION")?;
-        words.expect("Frames:")?;
-        let announced = words.number("the number of frames")?;
-        words.expect("Frame")?;
-        words.expect("Time:")?;
-        let frame_time = words.number("the frame time")?;
-        if frame_time <= 0.0 {
-            return Err(words.error(format!("frame time {frame_time} is not positive")));
-        }
-        check_frame_rate(1.0 / frame_time)
-            .map_err(|defect| words.error(format!("a frame time of {frame_time:?} s means {defect}")))?;
-        if frame_time > LONGEST_FRAME {
-            return Err(words.error(format!(
-                "a frame time of {frame_time:?}: it is in seconds, {:?} for {frame_time:?} frames per second",
-                1.0 / frame_time
-            )));
-        }
-        let channel_count: usize = joints.iter().map(|j: &BvhJoint| j.channels.len()).sum();
-        let values = read_values(&mut words, &joints)?;
-        if channel_count == 0 || values.len() < channel_count {
-            return Err(
-                words.error(format!("no whole frame: {} values for {channel_count} channels", values.len()))
-            );
-        }
-        let (frames, rest) = (values.len() / channel_count, values.len() % channel_count);
-        if rest > 0 {
-            return Err(words.error(format!(
-                "frame {frames} has {rest} of {channel_count} values; the header announces {announced} frames: is the file truncated?"
-            )));
-        }
-        // Real files are off by one: the frames that are there count.
-        if (frames as f64) < announced - 1.0 {
-            return Err(words.error(format!(
-                "the file ends after frame {}; the header announces {announced} frames: is the file truncated?",
-                frames - 1
-            )));
-        }
-        if joints.len() > 1 && joints[1..].iter().all(|joint| joint.offset == [0.0; 3]) {
-            return Err(words.error("every OFFSET is 0: the skeleton has no bones".into()));
-        }
-        Ok(Self { joints, frame_time, channel_count, values })
-    }
-
-    /// Number of whole frames in the file.
-    pub fn frame_count(&self) -> usize {
-        self.values.len() / self.channel_count.max(1)
-    }
-
-    /// Index of a joint by name.
-    pub fn joint(&self, name: &str) -> Option<usize> {
-        self.joints.iter().position(|j| j.name == name)
-    }
-
-    /// Rest position of every joint: offsets summed from the root, no rotation.
-    pub fn rest_positions(&self) -> Vec<[f64; 3]> {
-        let mut rest: Vec<[f64; 3]> = Vec::with_capacity(self.joints.len());
-        for joint in &self.joints {
-            let parent = joint.parent.map_or([0.0; 3], |p| rest[p]);
-            rest.push(std::array::from_fn(|a| parent[a] + joint.offset[a]));
-        }
-        rest
-    }
-
-    /// World rotation of every joint in one frame: channel rotations multiplied in file order, down the tree. A frame past the
-    /// end is at rest.
-    pub fn world_rotations(&self, frame: usize) -> Vec<Matrix3> {
-        let start = frame.saturating_mul(self.channel_count);
-        let values = self.values.get(start..start.saturating_add(self.channel_count)).unwrap_or_default();
-        let mut values = values.iter();
-        let mut world: Vec<Matrix3> = Vec::with_capacity(self.joints.len());
-        for joint in &self.joints {
-            let mut rotation = joint.parent.map_or(rotation::IDENTITY, |p| world[p]);
-            for channel in &joint.channels {
-                let value = values.next().copied().unwrap_or(0.0);
-                if channel.rotates {
-                    let mut turn = [0.0; 3];
-                    turn[channel.axis] = value.to_radians();
-                    rotation = rotation::product(&rotation, &rotation::matrix_from_axis_angle(turn));
-                }
-            }
-            world.push(rotation);
-        }
-        world
-    }
+    parse(&String::from_utf8_lossy(&bytes), path)
 }
 
-/// The channel values of all frames. Angles no motion has are refused: their sines mean nothing.
-fn read_values(words: &mut Words, joints: &[BvhJoint]) -> Result<Vec<f64>, FileError> {
-    let limit = MAX_ANGLE.to_degrees();
+/// Parses BVH text; `path` is for messages only.
+///
+/// # Errors
+/// [`FileError`] naming file and line.
+pub fn parse(text: &str, path: &Path) -> Result<Recording, FileError> {
+    let lines = text.lines().enumerate();
+    let words =
+        lines.flat_map(|(n, line)| line.split_ascii_whitespace().map(move |word| (n + 1, word))).collect();
+    let mut words = Words { words, at: 0, path };
+    words.expect("HIERARCHY")?;
+    words.expect("ROOT")?;
+    let mut joints = Vec::new();
+    read_joint(&mut words, &mut joints, None, 0)?;
+    words.expect("MOTION")?;
+    words.expect("Frames:")?;
+    let announced = words.number("the number of frames")?;
+    words.expect("Frame")?;
+    words.expect("Time:")?;
+    let frame_time = words.number("the frame time")?;
+    if frame_time <= 0.0 {
+        return Err(words.error(format!("frame time {frame_time} is not positive")));
+    }
+    check_frame_rate(1.0 / frame_time)
+        .map_err(|defect| words.error(format!("a frame time of {frame_time:?} s means {defect}")))?;
+    if frame_time > LONGEST_FRAME {
+        return Err(words.error(format!(
+            "a frame time of {frame_time:?}: it is in seconds, {:?} for {frame_time:?} frames per second",
+            1.0 / frame_time
+        )));
+    }
+    let channel_count: usize = joints.iter().map(|j: &RigJoint| j.channels.len()).sum();
+    let values = read_values(&mut words, &joints)?;
+    if channel_count == 0 || values.len() < channel_count {
+        return Err(
+            words.error(format!("no whole frame: {} values for {channel_count} channels", values.len()))
+        );
+    }
+    let (frames, rest) = (values.len() / channel_count, values.len() % channel_count);
+    if rest > 0 {
+        return Err(words.error(format!(
+            "frame {frames} has {rest} of {channel_count} values; the header announces {announced} frames: is the file truncated?"
+        )));
+    }
+    // Real files are off by one: the frames that are there count.
+    if (frames as f64) < announced - 1.0 {
+        return Err(words.error(format!(
+            "the file ends after frame {}; the header announces {announced} frames: is the file truncated?",
+            frames - 1
+        )));
+    }
+    if joints.len() > 1 && joints[1..].iter().all(|joint| joint.offset == [0.0; 3]) {
+        return Err(words.error("every OFFSET is 0: the skeleton has no bones".into()));
+    }
+    Ok(Recording::new(joints, 1.0 / frame_time, values))
+}
+
+/// The channel values of all frames.
+fn read_values(words: &mut Words, joints: &[RigJoint]) -> Result<Vec<f64>, FileError> {
     let channels: Vec<(&str, bool)> =
         joints.iter().flat_map(|j| j.channels.iter().map(|c| (j.name.as_str(), c.rotates))).collect();
     let mut values = Vec::with_capacity(words.words.len().saturating_sub(words.at));
     while words.peek().is_some() {
         let value = words.number("a channel value")?;
-        if let Some((name, true)) = channels.get(values.len() % channels.len().max(1))
-            && value.abs() > limit
-        {
-            return Err(words.error(format!(
-                "joint '{name}' turns by {value:?} degrees, more than the {limit:.0} of any motion; is the file damaged?"
-            )));
+        if let Some((name, true)) = channels.get(values.len() % channels.len().max(1)) {
+            check_angle(name, value).map_err(|defect| words.error(defect))?;
         }
         values.push(value);
     }
@@ -240,7 +157,7 @@ fn read_values(words: &mut Words, joints: &[BvhJoint]) -> Result<Vec<f64>, FileE
 
 fn read_joint(
     words: &mut Words,
-    joints: &mut Vec<BvhJoint>,
+    joints: &mut Vec<RigJoint>,
     parent: Option<usize>,
     depth: usize,
 ) -> Result<(), FileError> {
@@ -270,7 +187,7 @@ fn read_joint(
         }
     }
     let index = joints.len();
-    joints.push(BvhJoint { name, parent, offset, channels });
+    joints.push(RigJoint { name, parent, offset, axes: None, channels });
     loop {
         match words.next("'}'")? {
             "}" => return Ok(()),
@@ -289,11 +206,12 @@ fn read_joint(
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use crate::asset::rotation;
 
     pub(crate) const SMALL: &str = "HIERARCHY\nROOT Hips\n{\n OFFSET 0 1 0\n CHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation Xrotation\n JOINT Chest\n {\n  OFFSET 0 2 0\n  CHANNELS 3 Zrotation Xrotation Yrotation\n  End Site\n  {\n   OFFSET 0 1 0\n  }\n }\n}\nMOTION\nFrames: 1\nFrame Time: 0.0083333\n0 0 0 90 0 0 0 90 0\n5 5 5 0 90 0 0 0 0\n";
 
-    fn parse(text: &str) -> Result<Bvh, String> {
-        Bvh::parse(text, Path::new("walk.bvh")).map_err(|e| e.to_string())
+    fn parse(text: &str) -> Result<Recording, String> {
+        super::parse(text, Path::new("walk.bvh")).map_err(|e| e.to_string())
     }
 
     #[test]

@@ -7,7 +7,6 @@ use crate::mesh::{Topology, TriMesh};
 use crate::query::Surface;
 use crate::rows::{CompressedRows, faces_at_vertices};
 use crate::vec3::{self, norm, sub};
-use std::collections::HashMap;
 
 /// Positions farther from the origin than this are refused (m): the exact predicates would hold, but no distance would.
 const FARTHEST: f64 = 1e3;
@@ -45,7 +44,7 @@ impl RestGarment {
         let edge_lengths = topology.edges.iter().map(|&[a, b]| norm(sub(at(a), at(b)))).collect();
         let faces_at = faces_at_vertices(rest.vertex_count(), &faces, 0..faces.len() as u32);
         let strain = Strain::new(rest, &Material::default(), EnergySettings::default().needle_ratio);
-        let doubled = doubled_face(&faces);
+        let doubled = rest.doubled_face();
         Self { faces, topology, edge_lengths, edges_of_faces, layer, faces_at, doubled, strain }
     }
 
@@ -71,16 +70,6 @@ impl RestGarment {
     pub fn strain_energy(&self, positions: &[[f64; 3]]) -> f64 {
         self.strain.evaluate(positions, None)
     }
-}
-
-/// The first face with the vertices of an earlier one, and that one.
-fn doubled_face(faces: &[[u32; 3]]) -> Option<[u32; 2]> {
-    let mut seen = HashMap::with_capacity(faces.len());
-    faces.iter().zip(0..).find_map(|(face, number)| {
-        let mut corners = *face;
-        corners.sort_unstable();
-        Some([number, seen.insert(corners, number)?])
-    })
 }
 
 /// One garment of an outfit.

@@ -21,7 +21,7 @@ pub(crate) struct Bounds {
 impl Bounds {
     const EMPTY: Self = Self { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] };
 
-    /// The box around `points`, `margin` (m) wider on every side.
+    /// The box around `points`.
     pub fn around(points: impl IntoIterator<Item = [f64; 3]>) -> Self {
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         for p in points {

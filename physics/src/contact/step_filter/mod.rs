@@ -91,7 +91,7 @@ impl<'a> StepFilter<'a> {
     }
 
     /// Shortens the step from `from` to `to` until it makes no intersection. Elements stay `margin` apart (m), or half as far as
-    /// they are where that is less.
+    /// they are where that is less; a step ends no nearer than a micrometre, and no nearer than it starts where that is less.
     pub fn step(&mut self, from: &[[f64; 3]], to: &mut [[f64; 3]], margin: f64) {
         let wanted = to.to_vec();
         let is_moved = self.moved_faces(from, to);

@@ -40,16 +40,18 @@ pub(crate) fn closest_on_edges([p, q]: [[f64; 3]; 2], [r, s]: [[f64; 3]; 2]) -> 
 
 /// How often a motion is halved where no single plane is found.
 const HALVINGS: u32 = 3;
-/// Elements nearer than this (m) have no direction from one to the other that rounding leaves right: they may only move as one.
+/// Elements nearer than this (m) have no direction from one to the other that rounding leaves right: they stay where they are.
 const TOUCHING: f64 = 1e-9;
-/// A step leads no nearer than this (m), however little room there is: some times what rounding to f32 moves a vertex
-/// of a person.
+/// A step ends no nearer than this (m), however little room there is: ten times what rounding to f32, or to the digits of an
+/// OBJ file, moves a vertex of a person.
 const NEAREST: f64 = 1e-6;
+/// What f64 rounds the distance between elements of a person by, some times (m).
+const ROUNDING: f64 = 1e-14;
 
-/// Whether the elements of `pair` stay apart on the way from `x` to `y`: by `margin`, or half the distance they have at the start
-/// where that is less, but not less than [`NEAREST`].
+/// Whether the elements of `pair` stay apart from `x` to `y`: on the way by `margin`, or half the distance they have at the start
+/// where that is less; at the end no less than [`NEAREST`] either, and where they start nearer, no nearer than they start.
 pub(crate) fn stay_apart(pair: &ElementPair, x: &Corners, y: &Corners, margin: f64) -> bool {
-    if x == y || is_along_axis(pair.first(), x, y, margin) {
+    if x == y || is_along_axis(pair.first(), x, y, margin.max(NEAREST)) {
         return true;
     }
     let gap = gap_vector(pair.has_face, x);
@@ -57,8 +59,9 @@ pub(crate) fn stay_apart(pair: &ElementPair, x: &Corners, y: &Corners, margin: f
     if distance < TOUCHING {
         return false;
     }
-    let least = margin.min(0.5 * distance).max(NEAREST.min(0.999 * distance));
-    is_separated(pair, scale(gap, 1.0 / distance), x, y, least, HALVINGS)
+    let least = margin.min(0.5 * distance);
+    norm(gap_vector(pair.has_face, y)) >= NEAREST.min(distance - ROUNDING)
+        && is_separated(pair, scale(gap, 1.0 / distance), x, y, least, HALVINGS)
 }
 
 fn is_separated(
@@ -193,6 +196,42 @@ mod tests {
             }
         }
         assert!((1000..3900).contains(&passed), "{passed}");
+    }
+
+    /// Steps that press elements together bring them no nearer than a micrometre, and those that start nearer no nearer than
+    /// that: rounded to f32 they are still apart.
+    #[test]
+    fn elements_keep_what_rounding_needs() {
+        let place = [0.7, 1.6, 0.3];
+        for (start, kept) in [(3e-6, NEAREST), (8e-7, 8e-7), (4e-7, 4e-7)] {
+            for has_face in [true, false] {
+                let below = [[0.0, 0.0, 0.0], [0.02, 0.0, 0.0], [0.0, 0.02, 0.0]];
+                let x: Corners = match has_face {
+                    true => [[5e-3, 5e-3, start], below[0], below[1], below[2]],
+                    false => [[5e-3, -0.01, start], [5e-3, 0.01, start], below[0], below[1]],
+                };
+                let pair = ElementPair { vertices: [0, 1, 2, 3], has_face };
+                let mut x = x.map(|p| add(p, place));
+                for step in 0..1500 {
+                    // A turn about the vertical with the pressure, so that distances are rounded.
+                    let mut y = x.map(|p| add(p, scale([1e-3, -1e-3, 0.0], f64::from(step % 3 - 1))));
+                    y[..pair.first()].iter_mut().for_each(|p| p[2] -= 1e-3 * start);
+                    match stay_apart(&pair, &x, &y, 5e-5) {
+                        true => x = y,
+                        false => y[..pair.first()].iter_mut().zip(&x).for_each(|(p, q)| p[2] = q[2]),
+                    }
+                }
+                let distance = norm(gap_vector(has_face, &x));
+                assert!(distance >= kept - 1e-10 && distance < kept + 1.1e-3 * start, "{start}: {distance}");
+                let rounded = x.map(|p| p.map(|x| f64::from(x as f32)));
+                assert!(rounded[..pair.first()].iter().all(|p| p[2] > rounded[3][2]), "{rounded:?}");
+            }
+        }
+        // Touching elements stay where they are, even as one.
+        let x = [[0.2, 0.2, 1e-10], [0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let pair = ElementPair { vertices: [0, 1, 2, 3], has_face: true };
+        assert!(stay_apart(&pair, &x, &x, 5e-5));
+        assert!(!stay_apart(&pair, &x, &x.map(|p| add(p, [0.1, 0.0, 0.0])), 5e-5));
     }
 
     #[test]

@@ -2,8 +2,8 @@
 //!
 //! `V/P Σ max(ε − d, 0)³` over the `P` contact points of an outer garment of `V` vertices (the paper's are the
 //! vertices). Both garments move, so the gradient reaches both. [`LayerContact`] says how `d` is measured:
-//! [`nearest_vertex`] is the paper's form, cheap enough for training; [`closest_point`] has no jumps where the nearest
-//! feature changes, and is what a solver with a line search needs.
+//! [`nearest_vertex`] is the paper's form, cheap enough for training; [`closest_point`] does not jump along a sheet or at its
+//! hem, which a solver with a line search needs. Both jump between two sheets of the inner garment.
 
 pub mod closest_point;
 pub mod nearest_vertex;

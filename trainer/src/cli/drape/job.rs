@@ -6,6 +6,7 @@ use clap::Args;
 use clothcombo_data::asset::{KnownShape, Motion, Pose, recover_body};
 use clothcombo_data::fit::FitSettings;
 use clothcombo_data::format::load_mesh;
+use clothcombo_data::generate::{POSE_NAMES, named_pose};
 use miette::{Report as Failure, miette};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -16,7 +17,7 @@ pub(super) struct SceneArguments {
     /// Shape parameters; missing ones are 0
     #[arg(long, value_delimiter = ',', allow_hyphen_values = true, value_name = "NUMBERS")]
     pub shape: Vec<f64>,
-    /// Pose: a frame of a motion file, FILE.npz or FILE.npz:FRAME; default: the T-pose
+    /// Pose: standing, walking, reaching, or a frame of a motion file, FILE.npz or FILE.npz:FRAME; default: the T-pose
     #[arg(long, value_name = "POSE", conflicts_with_all = ["motion", "posed"])]
     pub pose: Option<String>,
     /// Motion file (npz with poses and mocap_framerate, y up; `import amass` makes them of AMASS files): drapes every frame
@@ -164,6 +165,23 @@ fn file_and_frame(text: &str) -> (&str, &str) {
 
 fn one_pose(text: &str) -> Result<Pose, Failure> {
     let (path, frame) = file_and_frame(text);
+    if !Path::new(path).exists() {
+        // A word without a dot or a slash is a name, not a file that happens to be missing.
+        let is_name = !text.contains('/') && Path::new(path).extension().is_none();
+        match named_pose(text) {
+            Some(pose) => return Ok(pose),
+            None if is_name => {
+                return Err(miette!(
+                    help = format!(
+                        "its names: {}; or give a frame of a motion file, FILE.npz:FRAME",
+                        POSE_NAMES.join(", ")
+                    ),
+                    "--pose {text}: neither a file nor the name of a pose"
+                ));
+            }
+            None => {}
+        }
+    }
     let frame = frame.parse().map_err(|_| miette!("--pose {text}: {frame:?} is no number of a frame"))?;
     let motion = Motion::load(Path::new(path)).map_err(DatasetError::data)?;
     motion.poses.get(frame).cloned().ok_or_else(|| no_frame(Path::new(path), frame, motion.poses.len()))

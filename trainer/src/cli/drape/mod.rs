@@ -1,5 +1,6 @@
 //! `clothcombo drape`: any body, any garments, in order.
 
+mod dataset;
 mod folders;
 mod job;
 mod outfits;
@@ -8,7 +9,6 @@ mod warnings;
 
 use crate::cli::device_argument::DeviceArgument;
 use crate::cli::fit_arguments::FitArguments;
-use crate::cli::interrupted::remove_on_signals;
 use crate::cli::output::print_json;
 use crate::cli::post_process::PostProcessArguments;
 use crate::cli::verbosity::{print_status, progress_bar};
@@ -19,6 +19,7 @@ use crate::inference::{
 use crate::system::files::write_json;
 use clap::{ArgGroup, Parser, ValueEnum};
 use clothcombo_data::fit::FitSettings;
+use dataset::DatasetFolders;
 use folders::{check_cache, user_cache};
 use indicatif::ProgressBar;
 use job::{Job, Scenes, WantedGarment, ordered};
@@ -40,16 +41,16 @@ use warnings::{check_poses, log_repairs, warn_about_order, warn_about_shape};
         A garment is a mesh file (.obj, .ply, .stl, .gltf, .glb) or the name of one in --dataset or in the model's own data.\n\
         What does not lie on the body in metres, y up and T-pose is fitted first (see `clothcombo fit`); every repair is in\n\
         report.json. Hints about files (--unit, --up, --arms, --category, --offset, --turn, --keep, --join-seams, --from-body)\n\
-        are about all of the call; a file with a hint is always fitted. Outputs keep the vertices and polygons of the given files, in their\n\
+        are about all of the call; a file with a hint is always fitted, the file of a name with --offset, --turn or --from-body. Outputs keep the vertices and polygons of the given files, in their\n\
         order: what --keep leaves out follows the cloth.\n\n\
         --outfits takes a TOML file:\n  \
         [[outfit]]\n  name = \"monday\"\n  garments = [{ file = \"tee.obj\", unit = \"cm\" }, \"coat.obj\"]   # hints, or a name alone\n  shape = [1.0]       # optional, as are pose, \
         motion, frames, every")]
 pub struct Arguments {
-    /// Run, checkpoint folder or model.safetensors; default: the model in the folder models
+    /// Run, checkpoint folder or model.safetensors; default: the model in the folder models, or in that of CLOTHCOMBO_MODELS
     #[arg(long, value_name = "PATH")]
     checkpoint: Option<PathBuf>,
-    /// Body: "mannequin" or a body npz; default: the one the model was trained on
+    /// Body: "mannequin" or a body npz; default: the one body in --dataset, else the one the model was trained on
     #[arg(long, value_name = "BODY")]
     body: Option<String>,
     #[command(flatten)]
@@ -63,7 +64,7 @@ pub struct Arguments {
     /// Several outfits in one process, from a TOML file; each garment is embedded once
     #[arg(long, value_name = "FILE")]
     outfits: Option<PathBuf>,
-    /// Folder whose garments may be named; repeatable
+    /// Folder whose garments may be named, those in folders within it too; repeatable
     #[arg(long, value_name = "FOLDER")]
     dataset: Vec<PathBuf>,
     /// Whether mesh files are fitted to the body
@@ -155,14 +156,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     {
         return Err(miette!(help = "give --motion FILE, or leave --smooth out", "--smooth without a motion"));
     }
-    let settings = settings(arguments)?;
+    let dataset = DatasetFolders::find(&arguments.dataset)?;
+    let settings = settings(arguments, dataset.body)?;
     check_cache(settings.cache.as_deref(), &arguments.output)?;
     let inputs: Vec<PathBuf> = jobs.iter().flat_map(Job::files).chain(arguments.inputs()).collect();
     let mut staged = Staged::new(&arguments.output, arguments.replace, &inputs)?;
-    remove_on_signals(staged.folder());
     let clock = Instant::now();
     let draper = Draper::load(arguments.checkpoint.as_deref(), &settings)?;
-    let catalog = draper.catalog(&arguments.dataset)?;
+    let catalog = draper.catalog(&dataset.garments)?;
     tracing::info!(
         "model {} (step {}), body {}: loaded in {:.1} s",
         draper.trained().folder.display(),
@@ -252,13 +253,13 @@ fn jobs(arguments: &Arguments) -> Result<Vec<Job>, Failure> {
     }
 }
 
-fn settings(arguments: &Arguments) -> Result<DraperSettings, Failure> {
+fn settings(arguments: &Arguments, body: Option<String>) -> Result<DraperSettings, Failure> {
     let cache = match arguments.no_cache {
         true => None,
         false => arguments.cache.clone().or_else(user_cache),
     };
     Ok(DraperSettings {
-        body: arguments.body.clone(),
+        body: arguments.body.clone().or(body),
         cache,
         device: arguments.device.open()?,
         corrections: arguments.corrections,

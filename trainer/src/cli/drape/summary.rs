@@ -3,6 +3,7 @@
 use crate::cli::table::{Cell, number, row, table};
 use crate::inference::{PhaseTimes, Report};
 use crate::score::Score;
+use clothcombo_physics::contact::resolve::Certificate;
 
 const TERMS: [(&str, &str); 5] = [
     ("strain", "strain [J]"),
@@ -59,19 +60,24 @@ fn of_first_frame(report: &Report, what: &str) -> String {
 
 fn scores(report: &Report) -> String {
     let first = of_first_frame(report, "score");
-    let row = |score: &Score, state: &str, index: usize| {
-        let garment = &score.garments[index];
+    let after = report.frames.first().map_or(&report.certificate, |frame| &frame.certificate);
+    // Pairs as the certificate counts them.
+    let row = |score: &Score, certificate: &Certificate, state: &str, index: usize| {
+        let (garment, pairs) = (&score.garments[index], &certificate.garments[index]);
         let mut row = row![first => garment.name, "state" => state];
         row.extend(TERMS.map(|(term, heading)| (heading.to_owned(), garment.raw.get(term).text())));
         row.extend(row! {
-            "inside [%]" => 100.0 * garment.penetration.vertices_inside,
-            "depth [mm]" => garment.penetration.max_depth_mm,
-            "body pairs" => garment.penetration.body_triangle_pairs,
-            "self pairs" => garment.penetration.self_triangle_pairs,
+            "inside, nearest vertex [%]" => 100.0 * garment.penetration.vertices_inside,
+            "depth, nearest vertex [mm]" => garment.penetration.max_depth_mm,
+            "body pairs" => pairs.body_triangle_pairs,
+            "layer pairs" => pairs.layer_triangle_pairs,
+            "self pairs" => pairs.self_triangle_pairs,
         });
         row
     };
-    let both = |i| [row(&report.before, "before", i), row(&report.after, "after", i)];
+    let both = |i| {
+        [row(&report.before, &report.certificate_before, "before", i), row(&report.after, after, "after", i)]
+    };
     table(&(0..report.garments.len()).flat_map(both).collect::<Vec<_>>())
 }
 
@@ -93,8 +99,12 @@ fn layers(report: &Report) -> String {
 
 fn certificate(report: &Report) -> String {
     let found = &report.certificate;
+    let of_all = match report.frames.len() {
+        0 | 1 => String::new(),
+        frames => format!(" of all {frames} frames"),
+    };
     let mut text = format!(
-        "certificate: {} pairs with the body, {} between layers, {} of garments with themselves; {:.1} mm of contours, \
+        "certificate{of_all}: {} pairs with the body, {} between layers, {} of garments with themselves; {:.1} mm of contours, \
          largest depth {:.2} mm",
         found.body_triangle_pairs,
         found.layer_triangle_pairs,
@@ -110,7 +120,9 @@ fn certificate(report: &Report) -> String {
     }
     let pinched = found.pinched.count();
     if pinched > 0 {
-        text += &format!("\nwhere the body lies inside itself: {pinched} pairs that no cloth can avoid");
+        text += &format!(
+            "\nnot counted: {pinched} pairs where the body lies inside itself, which no cloth can avoid"
+        );
     }
     if let Some(done) = &report.smoothing {
         text += &format!(

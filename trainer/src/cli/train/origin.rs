@@ -11,7 +11,7 @@ use crate::run::folder::{RunDir, RunDirError};
 use crate::training::process_group::ProcessGroup;
 use crate::training::session::Session;
 use burn::tensor::Device;
-use miette::Report;
+use miette::{Report, miette};
 use std::path::Path;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -57,8 +57,9 @@ impl Origin {
             }
         };
         let checkpoint = newest_or_none(path.as_deref().unwrap_or(root))?;
-        if checkpoint.is_none() {
-            start_model(config)?;
+        match &checkpoint {
+            Some(checkpoint) => check_steps(root, checkpoint, config)?,
+            None => drop(start_model(config)?),
         }
         Ok(Self::Resumed(run, checkpoint.map(Box::new)))
     }
@@ -126,6 +127,19 @@ impl Origin {
             }
         }
     }
+}
+
+/// Refuses a run that has more steps than `config` asks for: nothing of it would fit what is asked.
+fn check_steps(root: &Path, checkpoint: &Checkpoint, config: &Config) -> Result<(), Report> {
+    let (done, asked) = (checkpoint.state.step, config.total_steps());
+    if done <= asked {
+        return Ok(());
+    }
+    Err(miette!(
+        help = "ask for at least as many steps, resume an earlier checkpoint of it, or start another run",
+        "{} has {done} steps, more than the {asked} of the configuration; nothing was changed",
+        root.display()
+    ))
 }
 
 /// The model that `config` starts from, if it names one: opened now, so that a wrong path is said before data is loaded.

@@ -50,11 +50,13 @@ fn is_named(clip: &str, names: &[String]) -> bool {
     names.iter().any(|name| clip.contains(name.as_str()))
 }
 
-/// Whether every name of the configuration fits a clip, and no clip is for two things.
+/// Whether every name of the configuration that is not optional fits a clip, and no clip is for two things.
 fn check_names(clips: &[Motion], config: &PoseConfig, folder: &Path) -> Result<(), DatasetError> {
     let sets = [("validation_clips", &config.validation_clips), ("test_clips", &config.test_clips)];
     for (key, names) in sets {
-        let fits = |name: &&String| clips.iter().any(|clip| clip.name.contains(name.as_str()));
+        let fits = |name: &&String| {
+            config.optional_clips.contains(name) || clips.iter().any(|clip| clip.name.contains(name.as_str()))
+        };
         if let Some(name) = names.iter().find(|name| !fits(name)) {
             return Err(DatasetError::UnknownClip {
                 key,
@@ -168,6 +170,15 @@ impl Frames {
         self.training.clips.iter().map(|clip| clip.poses.as_slice())
     }
 
+    /// The frames trained on, each with how likely [`sample_training`](Self::sample_training) is to draw it, relative to the
+    /// others.
+    pub fn weighted(&self) -> impl Iterator<Item = (&Pose, f64)> {
+        self.training.clips.iter().flat_map(|clip| {
+            let weight = clip.share() / clip.poses.len() as f64;
+            clip.poses.iter().map(move |pose| (pose, weight))
+        })
+    }
+
     /// A frame to train on.
     pub fn sample_training(&self, rng: &mut ChaCha8Rng) -> &Pose {
         self.training.draw(rng)
@@ -190,6 +201,14 @@ struct Clip {
     seconds: f64,
 }
 
+impl Clip {
+    /// Its share grows with the square root of its length in time: neighbouring frames are alike, so that by frames alone a long
+    /// clip, or one of a high frame rate, would crowd out the others.
+    fn share(&self) -> f64 {
+        self.seconds.sqrt()
+    }
+}
+
 /// Clips that are trained on, none of them empty.
 struct Training {
     clips: Vec<Clip>,
@@ -197,10 +216,8 @@ struct Training {
 }
 
 impl Training {
-    /// The share of a clip grows with the square root of its length in time: neighbouring frames are alike, so that by frames
-    /// alone a long clip, or one of a high frame rate, would crowd out the others.
     fn new(clips: Vec<Clip>) -> Result<Self, weighted::Error> {
-        let shares = WeightedIndex::new(clips.iter().map(|clip| clip.seconds.sqrt()))?;
+        let shares = WeightedIndex::new(clips.iter().map(Clip::share))?;
         Ok(Self { clips, shares })
     }
 

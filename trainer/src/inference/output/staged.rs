@@ -1,7 +1,8 @@
 //! A folder that appears whole or not at all.
 
 use super::OutputError;
-use crate::system::paths::{first_missing_folder, obstacle};
+use crate::system::paths::obstacle;
+use clothcombo_data::format::atomic::Temporary;
 use std::collections::HashSet;
 use std::fs;
 use std::hash::{BuildHasher, RandomState};
@@ -15,12 +16,9 @@ const LIST: &str = ".clothcombo-files";
 #[derive(Debug)]
 pub struct Staged {
     target: PathBuf,
-    temporary: PathBuf,
+    temporary: Temporary,
     replace: bool,
     inputs: Vec<PathBuf>,
-    /// The outermost folder that was made for this one to lie in, if any was.
-    made: Option<PathBuf>,
-    is_committed: bool,
 }
 
 impl Staged {
@@ -36,10 +34,10 @@ impl Staged {
         check_free(&target, replace, inputs)?;
         let number = RandomState::new().hash_one(0);
         let temporary = target.with_file_name(format!(".{}.{number:016x}.tmp", name.to_string_lossy()));
-        let made = first_missing_folder(&temporary).map(Path::to_owned);
-        let staged = Self { target, temporary, replace, inputs: inputs.to_vec(), made, is_committed: false };
-        fs::create_dir_all(&staged.temporary)
-            .map_err(|reason| OutputError::Io { path: staged.temporary.clone(), reason })?;
+        let temporary = Temporary::new(temporary);
+        let staged = Self { target, temporary, replace, inputs: inputs.to_vec() };
+        fs::create_dir_all(staged.folder())
+            .map_err(|reason| OutputError::Io { path: staged.folder().into(), reason })?;
         Ok(staged)
     }
 
@@ -54,7 +52,7 @@ impl Staged {
 
     /// Where to write.
     pub fn folder(&self) -> &Path {
-        &self.temporary
+        self.temporary.path()
     }
 
     /// Gives the folder its name. What was there before is removed only after that; what has come there since the start is
@@ -62,48 +60,35 @@ impl Staged {
     ///
     /// # Errors
     /// When it cannot be renamed, or not as was asked; what was there before is left as it was.
-    pub fn commit(mut self) -> Result<(), OutputError> {
+    pub fn commit(self) -> Result<(), OutputError> {
         let failed = |reason: io::Error| OutputError::Io { path: self.target.clone(), reason };
-        let list: String = files(&self.temporary).map_err(failed)?.iter().map(|f| format!("{f}\n")).collect();
-        fs::write(self.temporary.join(LIST), list).map_err(failed)?;
+        let folder = self.folder();
+        let list: String = files(folder).map_err(failed)?.iter().map(|f| format!("{f}\n")).collect();
+        fs::write(folder.join(LIST), list).map_err(failed)?;
         if let Err(reason) = check_free(&self.target, self.replace, &self.inputs) {
             let instead = free_name(&self.target);
-            fs::rename(&self.temporary, &instead).map_err(failed)?;
-            self.is_committed = true;
+            fs::rename(folder, &instead).map_err(failed)?;
+            self.temporary.keep();
             return Err(OutputError::Meanwhile { reason: Box::new(reason), instead });
         }
-        let earlier = self.temporary.with_extension("old");
+        let earlier = folder.with_extension("old");
         let had_earlier = self.target.exists();
         if had_earlier {
             fs::rename(&self.target, &earlier).map_err(failed)?;
         }
-        if let Err(reason) = fs::rename(&self.temporary, &self.target) {
+        if let Err(reason) = fs::rename(folder, &self.target) {
             if had_earlier {
                 // The first error is the one worth telling.
                 let _ = fs::rename(&earlier, &self.target);
             }
             return Err(failed(reason));
         }
-        self.is_committed = true;
+        self.temporary.keep();
         if had_earlier {
             fs::remove_dir_all(&earlier)
                 .map_err(|reason| OutputError::Io { path: earlier.clone(), reason })?;
         }
         Ok(())
-    }
-}
-
-impl Drop for Staged {
-    fn drop(&mut self) {
-        if !self.is_committed {
-            // Nothing can be done about a folder that cannot be removed; its name says that it is temporary.
-            let _ = fs::remove_dir_all(&self.temporary);
-            let Some(first) = &self.made else { return };
-            for folder in self.temporary.ancestors().skip(1).take_while(|folder| folder.starts_with(first)) {
-                // One that something else has come into stays.
-                let _ = fs::remove_dir(folder);
-            }
-        }
     }
 }
 

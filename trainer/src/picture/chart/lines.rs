@@ -14,16 +14,25 @@ pub struct Line {
     pub points: Vec<(f64, f64)>,
 }
 
+impl Line {
+    /// Keys of `lines`, for all charts that show them in this order.
+    pub fn legend(lines: &[Self]) -> Vec<Key> {
+        lines.iter().enumerate().map(|(i, line)| Key::line(&attributes("line", i), &line.name)).collect()
+    }
+}
+
+fn attributes(class: &str, index: usize) -> String {
+    format!(r#"class="{class}" stroke="{}""#, css_colour(layer_colour(index)))
+}
+
 impl Chart {
-    /// Quantities that share both axes, which are logarithmic where the values spread widely.
-    pub fn of_lines(title: &str, lines: &[Line]) -> Self {
+    /// Quantities that share both axes, which are logarithmic where the values spread widely; `axis_titles`: of the horizontal
+    /// and the vertical one. [`Line::legend`] says which is which.
+    pub fn of_lines(title: &str, axis_titles: [&str; 2], lines: &[Line]) -> Self {
         let drawable = |point: &&(f64, f64)| point.0.is_finite() && point.1.is_finite();
         let points = || lines.iter().flat_map(|line| &line.points).filter(drawable);
         let axes = [Axis::fitting(points().map(|p| p.0)), Axis::fitting(points().map(|p| p.1))];
-        let attributes =
-            |class: &str, index| format!(r#"class="{class}" stroke="{}""#, css_colour(layer_colour(index)));
-        let keys = lines.iter().enumerate().map(|(i, line)| Key::line(&attributes("line", i), &line.name));
-        let mut chart = Self::new(title, "", axes, keys.collect());
+        let mut chart = Self::new(title, "", axes, Vec::new()).with_axis_titles(axis_titles);
         for (index, line) in lines.iter().enumerate() {
             let points: Vec<(f64, f64)> = line.points.iter().filter(drawable).copied().collect();
             chart.line(&attributes("line", index), &points);
@@ -49,9 +58,18 @@ mod tests {
             name: format!("{factor} ms"),
             points: vec![(1e3, factor), (2e3, 2.0 * factor), (2e4, 20.0 * factor), (f64::NAN, 1.0)],
         };
-        let charts = vec![Chart::of_lines("vertices", &[line(1.0), line(3.0)]), Chart::of_lines("none", &[])];
-        assert!(!charts[0].svg().contains("no data") && charts[1].svg().contains("no data"));
-        let picture = ChartGrid { title: "growth".into(), legend: Vec::new(), charts }.draw();
+        let lines = [line(1.0), line(3.0)];
+        let of = |title, lines: &[Line]| Chart::of_lines(title, ["vertices", "time (ms)"], lines);
+        let charts = vec![of("growth", &lines), of("none", &[])];
+        let svg = charts[0].svg();
+        assert!(!svg.contains("no data") && charts[1].svg().contains("no data"));
+        assert!(
+            svg.contains(">vertices</text>") && svg.contains(">time (ms)</text>") && !svg.contains("1 ms")
+        );
+        let grid = ChartGrid { title: "growth".into(), legend: Line::legend(&lines), charts };
+        let html = grid.html();
+        assert_eq!((html.matches("1 ms</span>").count(), html.matches("<figure>").count()), (1, 2));
+        let picture = grid.draw();
         for index in 0..2 {
             let colour = Rgb(layer_colour(index));
             let right: usize =

@@ -8,7 +8,7 @@ mod steps;
 pub use bars::{Bar, draw_bars};
 pub use lines::Line;
 pub(crate) use steps::median_of_last;
-pub use steps::{StageBoundary, Steps};
+pub use steps::{Baseline, StageBoundary, Steps};
 
 use super::svg::{draw_elements, escape, fitted, text_width, write_text};
 use axis::Axis;
@@ -26,6 +26,8 @@ const TOP: f64 = 26.0;
 const BOTTOM: f64 = 22.0;
 /// Space between the edge and text.
 const MARGIN: f64 = 8.0;
+/// Space for the title of an axis.
+const AXIS_TITLE: f64 = 13.0;
 /// Font sizes, and the height of a line.
 const TITLE_SIZE: f64 = 12.0;
 const TEXT_SIZE: f64 = 10.0;
@@ -42,9 +44,13 @@ pub struct Chart {
     /// Where the marks end, as SVG text.
     latest: String,
     axes: [Axis; 2],
+    /// Below the horizontal axis and beside the vertical one; none if empty.
+    axis_titles: [String; 2],
     legend: Vec<Key>,
     /// Where the vertical axis ends.
     top: f64,
+    /// Where the axes meet.
+    origin: [f64; 2],
     marks: String,
 }
 
@@ -52,14 +58,21 @@ impl Chart {
     fn new(title: &str, unit: &str, axes: [Axis; 2], legend: Vec<Key>) -> Self {
         let top = TOP + legend_height(&legend, SIZE[0]);
         let [title, unit] = [title, unit].map(str::to_owned);
-        Self { title, unit, latest: String::new(), axes, legend, top, marks: String::new() }
+        let (latest, axis_titles, marks) = (String::new(), [const { String::new() }; 2], String::new());
+        Self { title, unit, latest, axes, axis_titles, legend, top, origin: [LEFT, SIZE[1] - BOTTOM], marks }
+    }
+
+    /// The same with titles of the axes, before anything is drawn.
+    fn with_axis_titles(self, titles: [&str; 2]) -> Self {
+        let origin = [LEFT + AXIS_TITLE, SIZE[1] - BOTTOM - AXIS_TITLE];
+        Self { axis_titles: titles.map(str::to_owned), origin, ..self }
     }
 
     /// Where a point stands; one outside the axes stands at their ends.
     fn place(&self, (x, y): (f64, f64)) -> [f64; 2] {
-        let [right, bottom] = [SIZE[0] - RIGHT, SIZE[1] - BOTTOM];
+        let (right, [left, bottom]) = (SIZE[0] - RIGHT, self.origin);
         let [x, y] = [self.axes[0].share(x), self.axes[1].share(y)];
-        [LEFT + x * (right - LEFT), bottom - y * (bottom - self.top)]
+        [left + x * (right - left), bottom - y * (bottom - self.top)]
     }
 
     /// Adds a line through `points` with the given attributes.
@@ -88,19 +101,29 @@ impl Chart {
 
     fn elements(&self) -> String {
         let mut svg = String::new();
-        let [right, bottom] = [SIZE[0] - RIGHT, SIZE[1] - BOTTOM];
+        let (right, [left, bottom]) = (SIZE[0] - RIGHT, self.origin);
         let [x, y] = &self.axes;
         for tick in y.ticks(TICKS) {
             let at = bottom - y.share(tick) * (bottom - self.top);
-            let _ = write!(svg, r#"<path class="grid" d="M{LEFT} {at:.1}H{right}"/>"#);
-            write_text(&mut svg, "y", [LEFT - 6.0, at + 3.5], TEXT_SIZE, &y.label(tick));
+            let _ = write!(svg, r#"<path class="grid" d="M{left} {at:.1}H{right}"/>"#);
+            write_text(&mut svg, "y", [left - 6.0, at + 3.5], TEXT_SIZE, &y.label(tick));
         }
         for tick in x.ticks(TICKS) {
-            let at = LEFT + x.share(tick) * (right - LEFT);
+            let at = left + x.share(tick) * (right - left);
             let _ = write!(svg, r#"<path class="grid" d="M{at:.1} {}V{bottom}"/>"#, self.top);
             write_text(&mut svg, "x", [at, bottom + 14.0], TEXT_SIZE, &x.label(tick));
         }
-        let _ = write!(svg, r#"<path class="frame" d="M{LEFT} {}V{bottom}H{right}"/>"#, self.top);
+        let _ = write!(svg, r#"<path class="frame" d="M{left} {}V{bottom}H{right}"/>"#, self.top);
+        let [below, beside] = &self.axis_titles;
+        let middle = [0.5 * (left + right), 0.5 * (self.top + bottom)];
+        if !below.is_empty() {
+            write_text(&mut svg, "x", [middle[0], SIZE[1] - 6.0], TEXT_SIZE, below);
+        }
+        if !beside.is_empty() {
+            let _ = write!(svg, r#"<g transform="translate({MARGIN} {:.1}) rotate(-90)">"#, middle[1]);
+            write_text(&mut svg, "x", [0.0, 6.0], TEXT_SIZE, beside);
+            svg += "</g>";
+        }
         svg += &self.marks;
         let unit = if self.unit.is_empty() { String::new() } else { format!("({})", self.unit) };
         let after =
@@ -140,9 +163,14 @@ impl Key {
     }
 
     /// The swatch as an element of a page.
-    pub fn svg(&self) -> String {
+    fn svg(&self) -> String {
         element(Self::SWATCH, &self.name, &self.swatch)
     }
+}
+
+/// Keys as elements of a page.
+pub(crate) fn legend_html(keys: &[Key]) -> String {
+    keys.iter().map(|key| format!("<span>{}{}</span> ", key.svg(), escape(&key.name))).collect()
 }
 
 /// Corners of the swatches of a legend as wide as `width`, relative to the first, with a margin on both sides.
@@ -192,9 +220,11 @@ pub struct ChartGrid {
 }
 
 impl ChartGrid {
-    /// As an element of a page.
-    pub fn svg(&self) -> String {
-        element(self.size(), &self.title, &self.elements())
+    /// As elements of a page, which puts as many charts side by side as it has space for.
+    pub fn html(&self) -> String {
+        let figures: String =
+            self.charts.iter().map(|chart| format!("<figure>{}</figure>", chart.svg())).collect();
+        format!("<p class=\"legend\">{}</p><div class=\"grid-of\">{figures}</div>", legend_html(&self.legend))
     }
 
     /// As a picture.
@@ -245,7 +275,8 @@ mod tests {
     #[test]
     fn charts_fill_a_grid() {
         for (number, columns, rows) in [(1, 1, 1), (2, 2, 1), (3, 3, 1), (4, 2, 2), (9, 3, 3), (10, 3, 4)] {
-            let chart = |_| Chart::of_lines("a", &[Line { name: "b".into(), points: vec![(1.0, 2.0)] }]);
+            let chart =
+                |_| Chart::of_lines("a", ["b", "c"], &[Line { name: "b".into(), points: vec![(1.0, 2.0)] }]);
             let grid = ChartGrid {
                 title: "run".into(),
                 legend: Vec::new(),

@@ -22,6 +22,15 @@ pub struct StageBoundary {
     pub name: String,
 }
 
+/// The mean of a quantity with linear blend skinning alone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Baseline {
+    /// The mean.
+    pub value: f64,
+    /// Whether it is of scenes like those of the steps, so that a ratio means something.
+    pub is_comparable: bool,
+}
+
 /// The steps of a run.
 #[derive(Clone, Debug)]
 pub struct Steps {
@@ -51,22 +60,47 @@ impl Steps {
         ]
     }
 
-    /// The median of a quantity in a band from the 5th to the 95th percentile, its `baseline` with linear blend skinning
-    /// alone, and where stages begin. `points` are (step, value), ascending.
-    pub fn curve(&self, title: &str, unit: &str, points: &[(f64, f64)], baseline: Option<f64>) -> Chart {
+    /// The median of a quantity in a band from the 5th to the 95th percentile, the `baselines` of the stages, and where
+    /// stages begin. `points` are (step, value), ascending.
+    pub fn curve(
+        &self,
+        title: &str,
+        unit: &str,
+        points: &[(f64, f64)],
+        baselines: &[Option<Baseline>],
+    ) -> Chart {
         let bins = self.bins(points);
         let line = |value: fn(&Bin) -> f64| bins.iter().map(|b| (b.step, value(b))).collect::<Vec<_>>();
         let [low, median, high] = [line(|b| b.low), line(|b| b.median), line(|b| b.high)];
-        let baseline = baseline.filter(|value| value.is_finite());
-        let values = low.iter().chain(&high).map(|point| point.1).chain(baseline);
+        let largest = high.iter().map(|point| point.1.abs()).fold(0.0, f64::max);
+        let rounded = |baseline: Baseline| match baseline.value {
+            // What rounding leaves of a zero.
+            value if value.abs() < f64::from(f32::EPSILON) * largest => Baseline { value: 0.0, ..baseline },
+            _ => baseline,
+        };
+        let drawable = |baseline: &Option<Baseline>| baseline.filter(|b| b.value.is_finite()).map(rounded);
+        let baselines: Vec<_> = baselines.iter().map(drawable).collect();
+        let lines = baselines.iter().flatten().map(|baseline| baseline.value);
+        let values = low.iter().chain(&high).map(|point| point.1).chain(lines);
         let mut chart = self.chart(title, unit, Axis::fitting(values), Vec::new());
         chart.area(r#"class="band""#, &high, &low);
-        if let Some(value) = baseline {
-            chart.line(r#"class="baseline""#, &[(0.0, value), (self.total as f64, value)]);
+        for (range, baseline) in self.stage_ranges().zip(&baselines) {
+            if let Some(Baseline { value, .. }) = baseline {
+                chart.line(r#"class="baseline""#, &range.map(|step| (step, *value)));
+            }
         }
         chart.line(r#"class="curve""#, &median);
-        chart.latest = latest_text(points, baseline);
+        // That of the stage in which the points end.
+        let last = points.last().map_or(0.0, |point| point.0);
+        let stage = self.stages.iter().rposition(|stage| stage.step <= last).unwrap_or(0);
+        chart.latest = latest_text(points, baselines.get(stage).copied().flatten());
         chart
+    }
+
+    /// First step and end of every stage.
+    fn stage_ranges(&self) -> impl Iterator<Item = [f64; 2]> {
+        let ends = self.stages.iter().skip(1).map(|stage| stage.step).chain([self.total.max(1) as f64]);
+        self.stages.iter().zip(ends).map(|(stage, end)| [stage.step, end])
     }
 
     /// Shares of a whole, stacked in the order given. All of them have the same steps.
@@ -96,9 +130,8 @@ impl Steps {
         let end = self.total.max(1) as f64;
         let mut chart = Chart::new(title, unit, [Axis::linear(0.0, end), values], legend);
         chart.top += STAGE_LINE;
-        let ends = self.stages.iter().skip(1).map(|stage| stage.step).chain([end]);
-        for (StageBoundary { step, name }, end) in self.stages.iter().zip(ends) {
-            let [x, bottom] = chart.place((*step, f64::NEG_INFINITY));
+        for (StageBoundary { name, .. }, [step, end]) in self.stages.iter().zip(self.stage_ranges()) {
+            let [x, bottom] = chart.place((step, f64::NEG_INFINITY));
             let [next, top] = chart.place((end, f64::INFINITY));
             let line = format!("M{x:.1} {top}V{bottom}");
             let tooltip = escape(name);
@@ -154,12 +187,12 @@ fn latest(points: &[(f64, f64)]) -> Option<f64> {
 }
 
 /// The latest value, beside the baseline.
-fn latest_text(points: &[(f64, f64)], baseline: Option<f64>) -> String {
+fn latest_text(points: &[(f64, f64)], baseline: Option<Baseline>) -> String {
     let Some(value) = latest(points) else { return "no data".to_owned() };
     let mut text = number_text(value, 3);
-    if let Some(baseline) = baseline {
+    if let Some(Baseline { value: baseline, is_comparable }) = baseline {
         text += r#"<tspan class="lbs" dx="5">"#;
-        if value >= 0.0 && baseline > 0.0 {
+        if is_comparable && value > 0.0 && baseline > 0.0 {
             text += &format!("{} × ", number_text(value / baseline, 2));
         }
         text += &format!("LBS + shape {}</tspan>", number_text(baseline, 3));
@@ -216,13 +249,14 @@ mod tests {
             vec![(0.0, 1e-320), (1.0, 4.0)],
         ];
         for points in cases {
-            for baseline in [None, Some(0.0), Some(-3.0), Some(2.0), Some(f64::NAN)] {
+            for value in [None, Some(0.0), Some(-3.0), Some(2.0), Some(f64::NAN)] {
                 let stages = vec![
                     StageBoundary { step: 0.0, name: "one & two".into() },
                     StageBoundary { step: f64::NAN, name: "never".into() },
                 ];
                 let steps = Steps { total: 10, stages };
-                let curve = steps.curve("a < b", "J", &points, baseline);
+                let baselines = [value.map(|value| Baseline { value, is_comparable: true }), None];
+                let curve = steps.curve("a < b", "J", &points, &baselines);
                 let svg = curve.svg();
                 assert!(svg.contains("a &lt; b") && svg.contains("one &amp; two"));
                 assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
@@ -236,17 +270,50 @@ mod tests {
     fn curve_baseline_and_stage_leave_their_colours_in_the_picture() {
         let points: Vec<(f64, f64)> =
             (0..400).map(|k| (f64::from(k), 50.0 * (-0.01 * f64::from(k)).exp())).collect();
-        let count = |stages: &[StageBoundary], baseline, colour: [u8; 3]| {
-            let steps = Steps { total: 400, stages: stages.to_vec() };
-            let charts = vec![steps.curve("strain", "J", &points, baseline)];
+        let stage = |step, name: &str| StageBoundary { step, name: name.into() };
+        let first = [stage(0.0, "single")];
+        let count = |more: &[StageBoundary], baseline: Option<f64>, colour: [u8; 3]| {
+            let steps = Steps { total: 400, stages: [&first, more].concat() };
+            let baselines = [baseline.map(|value| Baseline { value, is_comparable: true })];
+            let charts = vec![steps.curve("strain", "J", &points, &baselines)];
             let picture = ChartGrid { title: "run".into(), legend: Vec::new(), charts }.draw();
             let near = |p: &&image::Rgb<u8>| p.0.iter().zip(colour).all(|(a, b)| a.abs_diff(b) < 40);
             picture.pixels().filter(near).count()
         };
-        let stage = StageBoundary { step: 200.0, name: "layers".into() };
         let (curve, baseline, boundary) = ([36, 84, 148], [214, 104, 36], [140, 120, 160]);
         assert!(count(&[], None, curve) > 300);
         assert!(count(&[], Some(20.0), baseline) > count(&[], None, baseline) + 150);
-        assert!(count(&[stage], None, boundary) > count(&[], None, boundary) + 50);
+        let layers = [stage(200.0, "layers")];
+        assert!(count(&layers, None, boundary) > count(&[], None, boundary) + 50);
+        // The second stage has no baseline of its own; the first one's stands in words too, where it is the last.
+        let [whole, half] = [&[][..], &layers].map(|more| count(more, Some(20.0), baseline) as f64);
+        assert!((0.25..0.6).contains(&(half / whole)), "{half} of {whole}");
+    }
+
+    #[test]
+    fn a_ratio_is_of_like_things_and_never_to_zero() {
+        let steps = Steps {
+            total: 40,
+            stages: vec![
+                StageBoundary { step: 0.0, name: "single".into() },
+                StageBoundary { step: 20.0, name: "layers".into() },
+            ],
+        };
+        let curve = |end: u32, value: f64, first: f64, second: Option<(f64, bool)>| {
+            let points: Vec<(f64, f64)> = (0..end).map(|step| (f64::from(step), value)).collect();
+            let second = second.map(|(value, is_comparable)| Baseline { value, is_comparable });
+            let first = Some(Baseline { value: first, is_comparable: true });
+            steps.curve("strain", "J", &points, &[first, second]).latest
+        };
+        assert!(curve(20, 1.0, 2.0, Some((8.0, true))).contains("0.5 × LBS + shape 2<"));
+        assert!(curve(40, 1.0, 2.0, Some((8.0, true))).contains("0.12 × LBS + shape 8<"));
+        // Outfits of other sizes have other sums, and nothing is a share of nothing.
+        for (value, first, second) in
+            [(1.0, 2.0, Some((8.0, false))), (1.0, 2.0, Some((1e-15, true))), (0.0, 2.0, Some((8.0, true)))]
+        {
+            let text = curve(40, value, first, second);
+            assert!(text.contains("LBS + shape") && !text.contains('×'), "{text}");
+        }
+        assert_eq!(curve(40, 1.0, 2.0, None), "1");
     }
 }

@@ -30,7 +30,7 @@ use burn::module::Module;
 use burn::optim::ModuleOptimizer;
 use burn::store::{ModuleRecord, ModuleSnapshot, SafetensorsStore};
 use burn::tensor::Device;
-use clothcombo_data::format::atomic;
+use clothcombo_data::format::atomic::{self, Temporary};
 use clothcombo_model::ClothCombo;
 use std::fs::{self, File};
 use std::io;
@@ -80,21 +80,17 @@ impl Checkpoint {
         let folder = run.checkpoints();
         let name = retention::name(state.step);
         let path = folder.join(&name);
-        let temporary = folder.join(format!("{name}{}", retention::TEMPORARY));
+        let temporary = Temporary::new(folder.join(format!("{name}{}", retention::TEMPORARY)));
         let failed = |reason: String| CheckpointError::Write { path: path.clone(), reason };
         let io_failed = |e: io::Error| failed(e.to_string());
 
         retention::sweep(&folder);
-        let written = write(&temporary, config, &mut state, snapshot);
-        if let Err(reason) = written {
-            // The first error is the one worth telling; space is given back for what can be done about it.
-            let _ = fs::remove_dir_all(&temporary);
-            return Err(failed(reason));
-        }
+        write(temporary.path(), config, &mut state, snapshot).map_err(failed)?;
         if path.exists() {
             fs::remove_dir_all(&path).map_err(io_failed)?;
         }
-        fs::rename(&temporary, &path).map_err(io_failed)?;
+        fs::rename(temporary.path(), &path).map_err(io_failed)?;
+        temporary.keep();
         File::open(&folder).and_then(|d| d.sync_all()).map_err(io_failed)?;
         atomic::write(&folder.join("latest"), name.as_bytes()).map_err(io_failed)?;
         let best = state.best.map(|b| b.step);

@@ -23,8 +23,10 @@ pub struct MemoryEstimate {
     pub tensors: u64,
     /// Device: copies of the parameters beside the networks: Adam's moments, those of frozen networks, a running average.
     pub parameters: u64,
+    /// Host: the drawing of curves and samples. The allocator keeps it beside what steps use.
+    pub pictures: u64,
     /// Device: what the largest scene, or several in parallel, keep of networks and energies for the backward pass; or the
-    /// update of the parameters, the scenes of a validation or a picture, where one of these takes more.
+    /// update of the parameters or the scenes of a validation, where one of these takes more.
     pub step: u64,
     /// What the garments of the whole dataset would take on the host, if all were kept.
     pub all_garments: u64,
@@ -40,12 +42,16 @@ const MOMENTS: u64 = 2;
 /// and what is being written.
 const UPDATE_COPIES: u64 = 3;
 /// The program itself.
-const PROGRAM: u64 = 48 << 20;
-/// Bytes that drawing curves and samples takes, when no step is computed.
-const PICTURES: u64 = 24 << 20;
+const PROGRAM: u64 = 20 << 20;
+/// Curves: a picture of two million pixels, and the canvas it is drawn on.
+const CURVES: u64 = 16 << 20;
+/// A row of samples on its sheet, with the canvas and the renders it is put together from.
+const SAMPLE_ROW: u64 = 6 << 20;
 /// Bytes per vertex and per triangle of a posed body ready for queries.
 const BODY_VERTEX: usize = 90;
 const BODY_TRIANGLE: usize = 100;
+/// Bodies of a validation besides, as a share: in f64, for exact distances; fitted.
+const EXACT_BODIES: f64 = 1.5;
 /// Bytes per vertex of a garment in a prepared scene.
 const SCENE_VERTEX: usize = 32;
 /// Bytes per vertex and eigenpair while operators are computed, and per vertex besides; fitted.
@@ -81,19 +87,26 @@ impl MemoryEstimate {
         let limit = (limits.total as u64).max(in_use);
         let garments = if streams { all_garments.min(limit) } else { all_garments };
 
-        // Embeddings of frozen networks, and of those that are validated.
+        // Embeddings by frozen networks, of all garments; and of those that a validation meets.
         let freezes = config.stages.iter().any(|s| s.trains.freezes());
-        let embeddings = 1 + usize::from(freezes);
-        let of_tensors = |v: usize| sizes.device_bytes(config, v, embeddings);
-        let all_tensors = sizes.sum(of_tensors);
+        let met = v.single_scenes + v.unseen_scenes + v.layered_scenes * v.layers.iter().sum::<usize>() / 2;
+        let met = 1.0 - (-(met as f64) / sizes.vertices.len().max(1) as f64).exp();
+        let frozen = f64::from(u8::from(freezes));
+        let of_tensors = |v: usize| sizes.device_bytes(config, v, met + frozen);
+        let all_tensors = sizes.sum(|v| sizes.device_bytes(config, v, 1.0 + frozen));
         let of_step = bytes_of(layers.min(sizes.vertices.len()), &of_tensors);
         let left = if is_processor && streams { limit - garments } else { u64::MAX };
-        let tensors = all_tensors.min(left.min(limits.device as u64).max(of_step));
+        let tensors = sizes.sum(of_tensors).min(left.min(limits.device as u64).max(of_step));
 
         let bodies = config.stages.iter().map(|s| s.bodies * s.accumulate).max().unwrap_or(1);
         let body = BODY_VERTEX * sizes.body_vertices + BODY_TRIANGLE * sizes.body_faces;
         let scenes = (body * (SCENES_AHEAD + 2) * bodies) as u64 + bytes_of(ahead, &|v| SCENE_VERTEX * v);
-        let validation = (body * validated_scenes) as u64 + bytes_of(validated, &|v| SCENE_VERTEX * v);
+        let validated_bodies = (EXACT_BODIES * (body * validated_scenes) as f64) as u64;
+        let validation = validated_bodies + bytes_of(validated, &|v| SCENE_VERTEX * v);
+        let sample_rows: usize = [v.single_scenes, v.layered_scenes]
+            .iter()
+            .map(|scenes| config.output.sample_scenes.min(*scenes))
+            .sum();
         let prepared = |v: usize| v * (PREPARED_PAIR * config.model.eigen_count + PREPARED_VERTEX);
 
         let of_stage = |s: &StageConfig| {
@@ -113,7 +126,8 @@ impl MemoryEstimate {
             preparation: bytes_of(threads.min(sizes.vertices.len()), &prepared),
             tensors,
             parameters: network * copies,
-            step: activations.max(UPDATE_COPIES * network).max(validation).max(PICTURES),
+            pictures: CURVES + SAMPLE_ROW * sample_rows as u64,
+            step: activations.max(UPDATE_COPIES * network).max(validation.saturating_sub(scenes)),
             all_garments,
             all_tensors,
             is_processor,
@@ -129,7 +143,7 @@ impl MemoryEstimate {
     /// On the host, but for what is on the device.
     pub fn host(&self) -> u64 {
         let loaded = self.program + self.garments + self.operators;
-        loaded + self.scenes.max(self.preparation.saturating_sub(self.garments))
+        loaded + self.pictures + self.scenes.max(self.preparation.saturating_sub(self.garments))
     }
 
     /// On the device.

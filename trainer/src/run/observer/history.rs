@@ -1,6 +1,5 @@
 //! What a run has logged so far, read back and kept up to date: the source of curves and report.
 
-use crate::dataset::ValidationGroup;
 use crate::run::event::{Observer, StepRecord, TrainEvent};
 use crate::run::folder::RunDir;
 use crate::run::validation::Method;
@@ -29,8 +28,8 @@ const SCALARS: [&str; 8] = [
 pub struct History {
     /// Steps of the curves, by quantity: the raw energies and [`SCALARS`].
     points: BTreeMap<&'static str, Vec<(f64, f64)>>,
-    /// Raw energies on the validation scenes of the skinning that the networks start from.
-    pub baselines: BTreeMap<&'static str, f64>,
+    /// Raw energies of the skinning that the networks start from, mean per scene, by validation group and term.
+    pub baselines: BTreeMap<(String, &'static str), f64>,
     /// Validations: step and report, as in `validation.jsonl`.
     pub validations: Vec<(u64, Value)>,
     /// Step and score of the best one.
@@ -47,14 +46,6 @@ pub struct History {
 
 /// A history that several observers look at.
 pub type SharedHistory = Rc<RefCell<History>>;
-
-/// Terms whose baseline is taken from a validation group: layer terms from the layered outfits, the others from single
-/// garments.
-fn terms_of(group: &str) -> impl Iterator<Item = &'static str> {
-    let layered = group == ValidationGroup::Layered.name();
-    let wanted = layered || group == ValidationGroup::Single.name();
-    Term::ALL.into_iter().filter(move |t| wanted && t.is_layer_term() == layered).map(Term::name)
-}
 
 impl History {
     /// What the logs of `run` hold.
@@ -106,9 +97,10 @@ impl History {
             for group in report["groups"].as_array().into_iter().flatten() {
                 let methods = group["methods"].as_array().map_or(&[][..], Vec::as_slice);
                 let Some(baseline) = Method::start_of(methods) else { continue };
-                for name in terms_of(group["group"].as_str().unwrap_or_default()) {
-                    if let Some(v) = baseline["raw"][name]["mean"].as_f64() {
-                        self.baselines.insert(name, v);
+                let name = group["group"].as_str().unwrap_or_default();
+                for term in Term::ALL.into_iter().map(Term::name) {
+                    if let Some(value) = baseline["raw"][term]["mean"].as_f64() {
+                        self.baselines.insert((name.to_owned(), term), value);
                     }
                 }
             }

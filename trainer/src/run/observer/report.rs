@@ -8,7 +8,7 @@ use crate::picture::save_png;
 use crate::run::event::{Observer, TrainEvent};
 use crate::run::folder::RunDir;
 use crate::run::memory::MemoryEstimate;
-use crate::run::report::{Page, RunState, charts, run_name};
+use crate::run::report::{Page, RunState, StageBaseline, charts, run_name};
 use crate::system::memory::Memory;
 use clothcombo_data::format::atomic;
 use miette::{IntoDiagnostic, Report, WrapErr};
@@ -23,6 +23,7 @@ pub struct ReportObserver {
     config: String,
     device: String,
     steps: Steps,
+    baselines: Vec<StageBaseline>,
     licences: Vec<LicenceLine>,
     memory: Option<MemoryEstimate>,
     warned_files: usize,
@@ -54,6 +55,7 @@ impl ReportObserver {
             config: to_toml(config).into_diagnostic()?,
             device,
             steps: steps(config),
+            baselines: StageBaseline::of_stages(config),
             licences,
             memory,
             warned_files: warned_files(&run.data_check()),
@@ -73,6 +75,7 @@ impl ReportObserver {
             name: &self.name,
             state,
             steps: &self.steps,
+            baselines: &self.baselines,
             made: SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs()),
             speed: (done > 0).then(|| done as f64 / start.elapsed().as_secs_f64()),
             history: &history,
@@ -89,7 +92,8 @@ impl ReportObserver {
     }
 
     fn draw_curves(&self) -> Result<(), Report> {
-        let charts = charts(&self.history.borrow(), &self.steps).into_iter().map(|(_, chart)| chart);
+        let charts =
+            charts(&self.history.borrow(), &self.steps, &self.baselines).into_iter().map(|(_, chart)| chart);
         let grid = ChartGrid { title: "Training".into(), legend: Steps::legend(), charts: charts.collect() };
         save_png(&grid.draw(), &self.curves).into_diagnostic()
     }

@@ -1,14 +1,51 @@
 //! The charts of a run: a quantity each, over the steps.
 
-use crate::picture::chart::{Chart, Steps};
+use crate::config::Config;
+use crate::dataset::ValidationGroup;
+use crate::picture::chart::{Baseline, Chart, Steps};
 use crate::run::event::StepRecord;
 use crate::run::observer::History;
+use clothcombo_physics::energy::Term;
+
+/// What the steps of a stage are compared with: skinning of as many garments as they have.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StageBaseline {
+    group: ValidationGroup,
+    /// Whether the scenes of the group have as many garments as those of the stage; else energies are of other sums.
+    has_as_many_garments: bool,
+}
+
+impl StageBaseline {
+    /// Of every stage of `config`.
+    pub fn of_stages(config: &Config) -> Vec<Self> {
+        let of_stage = |layers: [usize; 2]| match layers {
+            [_, 1] => Self { group: ValidationGroup::Single, has_as_many_garments: true },
+            _ => Self {
+                group: ValidationGroup::Layered,
+                has_as_many_garments: layers == config.validation.layers,
+            },
+        };
+        config.stages.iter().map(|stage| of_stage(stage.layers)).collect()
+    }
+
+    fn of(self, history: &History, term: &'static str) -> Option<Baseline> {
+        // Single garments have no energies between layers.
+        let is_there = self.group != ValidationGroup::Single
+            || Term::ALL.iter().all(|other| other.name() != term || !other.is_layer_term());
+        let value = history.baselines.get(&(self.group.name().to_owned(), term)).filter(|_| is_there)?;
+        Some(Baseline { value: *value, is_comparable: self.has_as_many_garments })
+    }
+}
 
 /// Name and chart of every quantity.
-pub(crate) fn charts(history: &History, steps: &Steps) -> Vec<(&'static str, Chart)> {
+pub(crate) fn charts(
+    history: &History,
+    steps: &Steps,
+    stages: &[StageBaseline],
+) -> Vec<(&'static str, Chart)> {
     let draw = |name: &'static str, title: &str, unit: &str| {
-        let baseline = history.baselines.get(name).copied();
-        (name, steps.curve(title, unit, history.points(name), baseline))
+        let baselines: Vec<_> = stages.iter().map(|stage| stage.of(history, name)).collect();
+        (name, steps.curve(title, unit, history.points(name), &baselines))
     };
     let mut charts =
         vec![draw("loss", "loss", "weighted J"), draw("grad_norm", "gradient norm", "before clipping")];

@@ -3,11 +3,12 @@
 mod charts;
 pub mod html;
 
+pub use charts::StageBaseline;
 pub(super) use charts::charts;
 
 use crate::dataset::LicenceLine;
 use crate::picture::chart::axis::number_text;
-use crate::picture::chart::{Steps, median_of_last};
+use crate::picture::chart::{Steps, legend_html, median_of_last};
 use crate::picture::svg;
 use crate::run::memory::MemoryEstimate;
 use crate::run::observer::History;
@@ -52,6 +53,8 @@ pub struct Page<'a> {
     pub state: RunState,
     /// The steps of the run and its stages.
     pub steps: &'a Steps,
+    /// What every stage is compared with.
+    pub baselines: &'a [StageBaseline],
     /// When this page was made (s since 1970).
     pub made: u64,
     /// Steps per second of this session.
@@ -84,7 +87,7 @@ impl Page<'_> {
         let _ = writeln!(
             out,
             "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
-                <meta name=\"viewport\" content=\"width=device-width\">{}<title>{} – {}</title><style>{STYLE}{}</style></head>\n<body>",
+                <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">{}<title>{} – {}</title><style>{}{STYLE}</style></head>\n<body>",
             // A page that is still being written looks for its next version.
             if self.state == RunState::Running { "<meta http-equiv=\"refresh\" content=\"30\">" } else { "" },
             escape(self.name),
@@ -149,11 +152,8 @@ impl Page<'_> {
     }
 
     fn curves(&self) -> String {
-        let keys: String = Steps::legend()
-            .iter()
-            .map(|key| format!("<span>{}{}</span> ", key.svg(), escape(&key.name)))
-            .collect();
-        let figures: String = charts(self.history, self.steps)
+        let keys = legend_html(&Steps::legend());
+        let figures: String = charts(self.history, self.steps, self.baselines)
             .iter()
             .map(|(name, chart)| format!("<figure id=\"chart-{name}\">{}</figure>\n", chart.svg()))
             .collect();

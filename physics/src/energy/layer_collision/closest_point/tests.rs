@@ -73,6 +73,15 @@ fn has_no_jumps_along_the_cloth_and_past_a_hem() {
     assert!(largest_jump(&inner, from, to, LayerContact::NearestVertex) > 0.5);
 }
 
+/// The limit that the module names: over one sheet and under another of the same garment.
+#[test]
+fn jumps_between_two_sheets() {
+    let sheets = [0.15, 0.14].map(|radius| shapes::tube(radius, 0.4, 40, 16));
+    let inner = shapes::union(&sheets.each_ref());
+    let jump = largest_jump(&inner, [0.148, 0.2, 0.0], [0.142, 0.2, 0.0], LayerContact::ClosestPoint);
+    assert!(jump > 0.5, "{jump}");
+}
+
 #[test]
 fn deep_cloth_fades_out_smoothly() {
     let depth = LayerGate::default().depth;

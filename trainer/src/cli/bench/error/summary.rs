@@ -87,7 +87,7 @@ impl Summary {
             text += &format!("starts that end in different minima: {} of {count}\n", solver.minima_differ);
         }
         if let Some(above) = self.above_skinning {
-            text += &format!("networks above skinning with shape transfer: {above} of {count}\n");
+            text += &format!("networks above skinning: {above} of {count}\n");
         }
         text += &format!("\nmean of every energy, weighted [J]\n{}", self.term_table());
         if !self.strain_ratios.is_empty() {

@@ -134,4 +134,11 @@ fn clips_are_in_one_set_and_misnamed_ones_are_told() {
         let error = split(&validation, &test).err().unwrap().to_string();
         assert!(error.contains(expected), "{error}");
     }
+    // A name that is optional may fit no clip; one that fits some holds them out.
+    let optional = |name: &str| {
+        let names = vec![name.to_owned()];
+        let config = PoseConfig { test_clips: names.clone(), optional_clips: names, ..PoseConfig::default() };
+        Frames::split(&clips, &config, Path::new("motions")).unwrap().clips.test
+    };
+    assert_eq!((optional("fly"), optional("jump")), (Vec::new(), vec!["jump".to_owned()]));
 }

@@ -4,8 +4,8 @@
 //! hang elsewhere: leg and arm joints lie on one path each, in order, and pelvis, spine, neck and head on the paths between them.
 //! The spine is what lies between pelvis and arms, whatever its joints are called and however many they are.
 
-use super::hierarchy::Bvh;
 use super::joint_name::{Meaning, Part, Side, without_common_prefix};
+use super::recording::Recording;
 use crate::asset::skeleton::BODY_JOINT_NAMES;
 use crate::import::retarget::JointMap;
 
@@ -21,16 +21,16 @@ const HEAD: usize = 15;
 const REQUIRED: [usize; 13] = [0, 1, 2, 4, 5, 7, 8, 16, 17, 18, 19, 20, 21];
 
 struct Rig<'a> {
-    bvh: &'a Bvh,
+    recording: &'a Recording,
     meanings: Vec<Meaning>,
 }
 
-/// The joint of `bvh` for each body joint, as far as it is found. Collarbones, toes, and spine joints beyond the first may be
+/// The joint of `recording` for each body joint, as far as it is found. Collarbones, toes, and spine joints beyond the first may be
 /// missing: they follow their parents.
-pub fn resolve(bvh: &Bvh) -> JointMap {
-    let names: Vec<&str> = bvh.joints.iter().map(|joint| joint.name.as_str()).collect();
+pub fn resolve(recording: &Recording) -> JointMap {
+    let names: Vec<&str> = recording.joints.iter().map(|joint| joint.name.as_str()).collect();
     let meanings = without_common_prefix(&names).into_iter().map(Meaning::of).collect();
-    Rig { bvh, meanings }.map()
+    Rig { recording, meanings }.map()
 }
 
 /// Names of the body joints that `map` lacks, and that are needed.
@@ -88,7 +88,7 @@ impl Rig<'_> {
     /// The joints from the root to `joint`, itself included.
     fn path(&self, joint: usize) -> Vec<usize> {
         let mut path: Vec<usize> =
-            std::iter::successors(Some(joint), |joint| self.bvh.joints[*joint].parent).collect();
+            std::iter::successors(Some(joint), |joint| self.recording.joints[*joint].parent).collect();
         path.reverse();
         path
     }

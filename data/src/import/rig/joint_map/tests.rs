@@ -1,25 +1,21 @@
 use super::*;
-use crate::import::bvh::BvhJoint;
+use crate::import::rig::{Recording, RigJoint};
 
 /// A rig of `parent > child > …` lines; the first name of a line is there already.
-fn rig(lines: &[&str]) -> Bvh {
-    let mut text =
-        String::from("HIERARCHY\nROOT r { OFFSET 0 0 0 CHANNELS 3 Zrotation Xrotation Yrotation }\n");
-    text.push_str("MOTION\nFrames: 1\nFrame Time: 0.1\n0 0 0\n");
-    let mut bvh = Bvh::parse(&text, std::path::Path::new("rig.bvh")).unwrap();
-    bvh.joints.clear();
+fn rig(lines: &[&str]) -> Recording {
+    let mut rig = Recording::new(Vec::new(), 10.0, Vec::new());
     for line in lines {
         let mut parent: Option<usize> = None;
         for name in line.split(" > ") {
-            let known = bvh.joint(name);
+            let known = rig.joint(name);
             parent = Some(known.unwrap_or_else(|| {
                 let (name, channels) = (name.to_owned(), Vec::new());
-                bvh.joints.push(BvhJoint { name, parent, offset: [0.0; 3], channels });
-                bvh.joints.len() - 1
+                rig.joints.push(RigJoint { name, parent, offset: [0.0; 3], axes: None, channels });
+                rig.joints.len() - 1
             }));
         }
     }
-    bvh
+    rig
 }
 
 /// Both sides of a line with `{}` for the side.
@@ -27,8 +23,8 @@ fn both(line: &str, sides: [&str; 2]) -> [String; 2] {
     sides.map(|side| line.replace("{}", side))
 }
 
-fn names(bvh: &Bvh) -> [Option<&str>; 22] {
-    resolve(bvh).map(|joint| joint.map(|joint| bvh.joints[joint].name.as_str()))
+fn names(rig: &Recording) -> [Option<&str>; 22] {
+    resolve(rig).map(|joint| joint.map(|joint| rig.joints[joint].name.as_str()))
 }
 
 /// Trunk, leg and arm of a rig, and what spine, neck, hip, knee, ankle, toes, collar, shoulder, elbow and wrist are called in it.
@@ -106,9 +102,9 @@ fn rigs_of_capture_software_are_resolved() {
     for (title, sides, [trunk, leg, arm], spine, limbs) in RIGS {
         let lines: Vec<String> =
             [[trunk.to_owned(), trunk.to_owned()], both(leg, sides), both(arm, sides)].concat();
-        let bvh = rig(&lines.iter().map(String::as_str).collect::<Vec<_>>());
-        let found = names(&bvh);
-        assert!(missing(&resolve(&bvh)).is_empty(), "{title}: {found:?}");
+        let recording = rig(&lines.iter().map(String::as_str).collect::<Vec<_>>());
+        let found = names(&recording);
+        assert!(missing(&resolve(&recording)).is_empty(), "{title}: {found:?}");
         assert_eq!(found[0], leg.split(" > ").next(), "{title}");
         assert_eq!([3, 6, 9].map(|joint: usize| found[joint].unwrap_or("")), spine, "{title}");
         for (joints, side) in

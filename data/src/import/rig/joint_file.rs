@@ -5,8 +5,8 @@
 //! left_hip = "LThigh"
 //! ```
 
-use super::hierarchy::Bvh;
-use super::rig;
+use super::joint_map;
+use super::recording::Recording;
 use crate::asset::skeleton::{BODY_JOINT_COUNT, BODY_JOINT_NAMES, joint_index};
 use crate::format::FileError;
 use crate::import::retarget::JointMap;
@@ -64,15 +64,15 @@ impl JointFile {
         Ok(Self { path: path.into(), entries })
     }
 
-    /// The joints of `bvh` by these names.
+    /// The joints of `recording` by these names.
     ///
     /// # Errors
     /// [`FileError`] naming file, line and name of a joint that the rig has not, or what is missing.
-    pub fn resolve(&self, bvh: &Bvh) -> Result<JointMap, FileError> {
+    pub fn resolve(&self, recording: &Recording) -> Result<JointMap, FileError> {
         let mut map: JointMap = [None; BODY_JOINT_COUNT];
         for (joint, name, line) in &self.entries {
-            map[*joint] = Some(bvh.joint(name).ok_or_else(|| {
-                let names: Vec<&str> = bvh.joints.iter().map(|j| j.name.as_str()).collect();
+            map[*joint] = Some(recording.joint(name).ok_or_else(|| {
+                let names: Vec<&str> = recording.joints.iter().map(|j| j.name.as_str()).collect();
                 FileError::line(&self.path, *line)(format!(
                     "the rig has no joint '{name}' (for {}); nearest are {}",
                     BODY_JOINT_NAMES[*joint],
@@ -80,17 +80,17 @@ impl JointFile {
                 ))
             })?);
         }
-        match rig::missing(&map)[..] {
+        match joint_map::missing(&map)[..] {
             [] => Ok(map),
             ref missing => Err(FileError::content(&self.path)(format!("it names no {}", missing.join(", ")))),
         }
     }
 }
 
-/// What a file for `bvh` looks like, with the joints that are known.
-pub fn template(bvh: &Bvh, map: &JointMap) -> String {
+/// What a file for `recording` looks like, with the joints that are known.
+pub fn template(recording: &Recording, map: &JointMap) -> String {
     let line = |(joint, found): (&&str, &Option<usize>)| match found {
-        Some(found) => format!("{joint} = {:?}\n", bvh.joints[*found].name),
+        Some(found) => format!("{joint} = {:?}\n", recording.joints[*found].name),
         None => format!("{joint} = \"\"\n"),
     };
     BODY_JOINT_NAMES.iter().zip(map).map(line).collect()
@@ -122,7 +122,7 @@ fn edit_distance(a: &str, b: &str) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::import::bvh::hierarchy::tests::SMALL;
+    use crate::import::bvh::{self, SMALL};
 
     fn load(text: &str) -> Result<JointFile, String> {
         let folder = tempfile::tempdir().unwrap();
@@ -146,12 +146,12 @@ mod tests {
             let message = load(text).unwrap_err();
             assert!(parts.iter().all(|part| message.contains(part)), "{message}");
         }
-        let bvh = Bvh::parse(SMALL, Path::new("walk.bvh")).unwrap();
-        let message = load("\npelvis = \"Hipps\"\n").unwrap().resolve(&bvh).unwrap_err().to_string();
+        let recording = bvh::parse(SMALL, Path::new("walk.bvh")).unwrap();
+        let message = load("\npelvis = \"Hipps\"\n").unwrap().resolve(&recording).unwrap_err().to_string();
         assert!(message.contains("map.toml:2: the rig has no joint 'Hipps'"), "{message}");
         assert!(message.contains("nearest are Hips, Chest"), "{message}");
         let message =
-            load("pelvis = \"Hips\"\nhead = \"\"\n").unwrap().resolve(&bvh).unwrap_err().to_string();
+            load("pelvis = \"Hips\"\nhead = \"\"\n").unwrap().resolve(&recording).unwrap_err().to_string();
         assert!(message.contains("it names no left_hip, right_hip"), "{message}");
     }
 
