@@ -13,7 +13,7 @@ use crate::draping::Draping;
 use crate::error::ModelError;
 use crate::garment_encoder::{GarmentEmbedding, GarmentEncoder};
 use crate::initializer::Initializer;
-use crate::local_pose::LocalPose;
+use crate::surroundings::Surroundings;
 use crate::mode::Mode;
 use crate::skinning::Skinning;
 use crate::tensors::{GarmentTensors, OutfitTensors, stack_rows};
@@ -32,7 +32,7 @@ pub struct ClothCombo {
     /// S.
     pub skinning: Skinning,
     /// The pose around every vertex; the paper has none.
-    pub local_pose: Option<LocalPose>,
+    pub surroundings: Option<Surroundings>,
     /// F_f and D_m.
     pub untangling: Untangling,
     /// Correct what the others do, one after the other; the paper has none.
@@ -82,7 +82,7 @@ impl ClothCombo {
             draping: Draping::new(config, dimensions, start),
             skinning: Skinning::new(config, dimensions, start),
             untangling: Untangling::new(config, start),
-            local_pose: (config.local_pose > 0).then(|| LocalPose::new(config, dimensions, start)),
+            surroundings: (config.surroundings > 0).then(|| Surroundings::new(config, dimensions, start)),
             corrections: Vec::new(),
             correction_steps: 0,
         }

@@ -63,8 +63,8 @@ impl ClothCombo {
         let span = trace_span!("draping").entered();
         let draping_embedding = self.draping.embed(embeddings.garment.clone(), body);
         let mut products = [embeddings.draping_product.clone(), embeddings.skinning_product.clone()];
-        if let Some(local_pose) = &self.local_pose {
-            products = local_pose.add_to(&local_pose.codes(body), outfit, products);
+        if let Some(surroundings) = &self.surroundings {
+            products = surroundings.add_to(&surroundings.codes(body), outfit, products);
         }
         let [draping_product, skinning_product] = products;
         let displacement = self.draping.displace(

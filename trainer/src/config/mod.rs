@@ -86,6 +86,11 @@ impl Config {
         self.stages.iter().map(|s| s.steps).sum()
     }
 
+    /// How thick a garment is for those above it (m), if the networks ask: the distance that the layer collision keeps.
+    pub fn layer_thickness(&self) -> Option<f64> {
+        (self.model.surroundings > 0).then_some(self.losses.layer_collision.epsilon)
+    }
+
     /// Seed of the scenes that are scored.
     pub fn validation_seed(&self) -> u64 {
         self.validation.seed.unwrap_or(self.seed)

@@ -111,7 +111,8 @@ impl TensorStore {
         let garments =
             scene.sample.garments.iter().zip(&scene.garments).map(|(&g, garment)| self.garment(g, garment));
         let garments = garments.collect::<Result<Vec<_>, _>>()?;
-        Ok(OutfitTensors::new(&garments.iter().map(Arc::as_ref).collect::<Vec<_>>(), &scene.contacts)?)
+        let garments = garments.iter().map(Arc::as_ref).collect::<Vec<_>>();
+        Ok(OutfitTensors::new(&garments, &scene.contacts)?.with_thickness_below(&scene.thickness_below)?)
     }
 
     /// An empty store of embeddings for [`embed`](Self::embed), of one scene: all of them are kept for as long as it lives.

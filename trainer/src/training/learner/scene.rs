@@ -128,7 +128,9 @@ impl<'a> SceneStep<'a> {
             // Every correction learns from the state it leads to.
             let learned = match trains {
                 Trains::Corrections => &states.corrected[..],
-                Trains::Single | Trains::Untangling | Trains::All => std::slice::from_ref(states.last()),
+                Trains::Single | Trains::Draping | Trains::Untangling | Trains::All => {
+                    std::slice::from_ref(states.last())
+                }
             };
             let outputs =
                 learned.iter().map(|state| losses.add(state, &body.energy, share / learned.len() as f64));
@@ -173,6 +175,7 @@ fn with_frozen(model: &ClothCombo, frozen: Option<&ClothCombo>, trains: Trains) 
     let frozen = || frozen.expect("kept at the first step of a stage that freezes").clone();
     match trains {
         Trains::Single | Trains::All => model.clone(),
+        Trains::Draping => ClothCombo { garment_encoder: frozen().garment_encoder, ..model.clone() },
         Trains::Untangling => ClothCombo { untangling: model.untangling.clone(), ..frozen() },
         Trains::Corrections => ClothCombo { corrections: model.corrections.clone(), ..frozen() },
     }
