@@ -36,6 +36,8 @@ pub(super) fn misplacement(
         format!("{extent:.3} m large on a body of {height:.2} m: not in metres?")
     } else if least > OFF_BODY {
         format!("{least:.2} m away from body '{name}': another origin or unit?")
+    } else if let Some(piece) = check.stray_piece(mesh, body) {
+        format!("{piece}: export one file per garment")
     } else if check.is_on_body(&mesh.turned(), body) {
         "inside out: its faces look at the body".into()
     } else if inside > 0 {
@@ -70,12 +72,20 @@ mod tests {
         let moved = |change: fn([f64; 3]) -> [f64; 3]| {
             tee.with_positions(tee.positions().iter().map(|p| change(*p)).collect()).unwrap()
         };
+        let beside = |mesh: &TriMesh| {
+            let moved = |[x, y, z]: &[f64; 3]| [x + 1.6, *y, *z];
+            let positions = mesh.positions().iter().copied().chain(mesh.positions().iter().map(moved));
+            let shift = mesh.vertex_count() as u32;
+            let copy = mesh.faces().iter().map(|f| f.map(|v| v + shift));
+            TriMesh::new(positions.collect(), mesh.faces().iter().copied().chain(copy).collect()).unwrap()
+        };
         assert_eq!(reason(&tee), None);
         for (mesh, word) in [
             (moved(|p| p.map(|x| 100.0 * x)), "not in metres"),
             (moved(|p| p.map(|x| 0.001 * x)), "not in metres"),
             (moved(|[x, y, z]| [x, y, z + 2.0]), "away from body"),
             (moved(|[x, y, z]| [x, y - 0.235, z]), "% of its vertices lie inside"),
+            (beside(&tee), "one of its 2 pieces"),
             (tee.turned(), "inside out"),
         ] {
             let reason = reason(&mesh).unwrap_or_default();

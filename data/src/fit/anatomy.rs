@@ -1,6 +1,7 @@
 //! Which parts of the body pass through the openings of a garment, and whether bones pass through its cloth.
 
-use super::body_field::ArmTurn;
+use super::body_field::LimbTurn;
+use super::limb_pose::LIMBS as TURNED;
 use crate::asset::Body;
 use clothcombo_physics::vec3::{add, cross, dot, scale, sub};
 
@@ -31,30 +32,46 @@ pub(super) enum Opening {
     Nothing,
 }
 
-/// The bones of the zero body with level arms, from the pelvis to the five ends.
+/// The bones of the zero body, from the pelvis to the five ends.
 pub(super) struct Skeleton {
     limbs: [Vec<[f64; 3]>; 5],
-    shoulders: [Option<[f64; 3]>; 2],
+    /// Of left and right arm, left and right leg the joint that turns it.
+    roots: [Option<[f64; 3]>; 4],
 }
 
 type Segment = [[f64; 3]; 2];
+
+/// Bones that pass through cloth.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Crossings {
+    pub arms: usize,
+    pub others: usize,
+}
+
+impl Crossings {
+    /// The same where arms are bones like any other.
+    pub fn anywhere(self) -> Self {
+        Self { arms: 0, others: self.arms + self.others }
+    }
+}
 
 impl Skeleton {
     pub fn new(body: &Body) -> Self {
         Self {
             limbs: LIMBS.map(|names| names.iter().filter_map(|n| body.joint_place(n)).collect()),
-            shoulders: ["left_shoulder", "right_shoulder"].map(|n| body.joint_place(n)),
+            roots: std::array::from_fn(|limb| body.joint_place(TURNED[limb / 2][limb % 2])),
         }
     }
 
-    /// Bones of every limb, the arms lowered, and the ray beyond its end.
-    fn bones(&self, arms: ArmTurn) -> [(Vec<Segment>, Option<Segment>); 5] {
+    /// Bones of every limb, turned, and the ray beyond its end.
+    fn bones(&self, turn: LimbTurn) -> [(Vec<Segment>, Option<Segment>); 5] {
         std::array::from_fn(|limb| {
             let mut points = self.limbs[limb].clone();
-            if let (1 | 2, Some(shoulder)) = (limb, self.shoulders[(limb + 1) % 2]) {
-                let from = points.iter().position(|p| *p == shoulder).unwrap_or(points.len());
-                let side = if limb == 1 { 1.0 } else { -1.0 };
-                points[from..].iter_mut().for_each(|p| *p = arms.lowered(*p, shoulder, side));
+            if let (1.., Some(root)) = (limb, limb.checked_sub(1).and_then(|limb| self.roots[limb])) {
+                let from = points.iter().position(|p| *p == root).unwrap_or(points.len());
+                let side = if limb % 2 == 1 { 1.0 } else { -1.0 };
+                let turn = if limb < 3 { turn.arms } else { turn.legs };
+                points[from..].iter_mut().for_each(|p| *p = turn.lowered(*p, root, side));
             }
             let bones: Vec<Segment> = points.windows(2).map(|pair| [pair[0], pair[1]]).collect();
             let beyond = bones.last().map(|[a, b]| {
@@ -65,18 +82,20 @@ impl Skeleton {
         })
     }
 
-    /// How many bones pass through cloth.
-    pub fn crossings(&self, positions: &[[f64; 3]], faces: &[[u32; 3]], arms: ArmTurn) -> usize {
-        let mut bones: Vec<Segment> = self.bones(arms).into_iter().flat_map(|(bones, _)| bones).collect();
-        bones.sort_by(|a, b| {
+    /// How many bones pass through cloth: those of the arms, which sleeves made for other arms miss, and all others.
+    pub fn crossings(&self, positions: &[[f64; 3]], faces: &[[u32; 3]], turn: LimbTurn) -> Crossings {
+        let limbs = self.bones(turn);
+        let mut bones: Vec<(Segment, bool)> = Vec::new();
+        for (limb, (chain, _)) in limbs.iter().enumerate() {
+            // Upper arm and forearm are the last ones.
+            let arm = if matches!(limb, 1 | 2) { chain.len().saturating_sub(2) } else { chain.len() };
+            bones.extend(chain.iter().enumerate().map(|(k, bone)| (*bone, k >= arm)));
+        }
+        bones.sort_by(|(a, _), (b, _)| {
             a.as_flattened().partial_cmp(b.as_flattened()).unwrap_or(std::cmp::Ordering::Equal)
         });
         bones.dedup();
-        let (mut low, mut high) = ([f64::MAX; 3], [f64::MIN; 3]);
-        for p in bones.as_flattened() {
-            (0..3).for_each(|k| (low[k], high[k]) = (low[k].min(p[k]), high[k].max(p[k])));
-        }
-        let crossed = |bone: &&Segment| {
+        let crossed = |bone: &Segment| {
             faces.iter().any(|f| {
                 let corners = f.map(|v| positions[v as usize]);
                 let is_near = (0..3).all(|k| {
@@ -86,13 +105,14 @@ impl Skeleton {
                 is_near && passes_through(bone, &corners) != 0
             })
         };
-        bones.iter().filter(crossed).count()
+        let count = |is_arm| bones.iter().filter(|(bone, is)| *is == is_arm && crossed(bone)).count();
+        Crossings { arms: count(true), others: count(false) }
     }
 
     /// What a closed border goes around: the limbs whose ends its spanning surface separates from the other ends.
-    pub fn opening(&self, border: &[[f64; 3]], arms: ArmTurn) -> Opening {
+    pub fn opening(&self, border: &[[f64; 3]], turn: LimbTurn) -> Opening {
         let centre = scale(border.iter().fold([0.0; 3], |s, p| add(s, *p)), 1.0 / border.len().max(1) as f64);
-        let through = self.bones(arms).map(|(bones, beyond)| {
+        let through = self.bones(turn).map(|(bones, beyond)| {
             let segments = bones.iter().chain(&beyond);
             segments
                 .map(|segment| {

@@ -6,7 +6,6 @@ use super::judge::{Candidate, Judge, UNWORN};
 use super::placement::{Origin, Placement};
 use super::search::{ARM_ANGLES, Search};
 use super::settings::FitSettings;
-use super::sitting::Sitting;
 use super::verdict::implausibility;
 use crate::mesh::outwardness;
 use rayon::prelude::*;
@@ -15,11 +14,12 @@ use rayon::prelude::*;
 const SHEET: f64 = 0.5;
 
 impl Search<'_> {
-    /// How a garment sits that is in metres, T-pose and the body's frame, and its score; or why nobody wears it there.
-    pub fn believed_as_given(&self, cloth: &Cloth, settings: &FitSettings) -> Result<(Sitting, f64), String> {
+    /// How a garment is judged that is in metres, T-pose and the body's frame; or why nobody wears it there.
+    pub fn believed_as_given(&self, cloth: &Cloth, settings: &FitSettings) -> Result<Candidate, String> {
         let candidate = self.judged_as_given(&self.judge(cloth, settings), Placement::AS_GIVEN);
         let (sitting, height) = self.measured(cloth, &Placement::AS_GIVEN);
-        implausibility(&candidate, &sitting, height).map_or(Ok((sitting, candidate.score)), Err)
+        implausibility(&candidate, &sitting, height, self.off_trunk(cloth, &Placement::AS_GIVEN))
+            .map_or(Ok(candidate), Err)
     }
 
     /// Files as they stand: their origin at one of the usual points, or where it is said to be; arms level, and where the
@@ -52,9 +52,9 @@ impl Search<'_> {
         };
         let angles = ARM_ANGLES.iter().filter(|degrees| **degrees != 0.0).map(scored);
         let best = angles.max_by(|a, b| a.score.total_cmp(&b.score))?;
-        let steps = Steps { from: 0.06, to: 0.004, is_sharp: true, is_fine: false, moves: Moves::Arms };
+        let steps = Steps { from: 0.06, to: 0.004, is_sharp: true, is_fine: false, moves: Moves::Limbs };
         let climbed = judge.with_openings(climbed(judge, &best, &steps));
-        climbed.is_worn.then_some(climbed.placement)
+        (climbed.is_worn || judge.settings.arms_lowered == Some(true)).then_some(climbed.placement)
     }
 
     /// A file as it stands counts as worn if it lies around the trunk, however its borders run.
@@ -62,7 +62,11 @@ impl Search<'_> {
         let candidate = judge.judged(placement);
         match candidate.is_worn || !self.is_sheet_around(judge.cloth, &placement) {
             true => candidate,
-            false => Candidate { score: candidate.score + UNWORN, is_worn: true, ..candidate },
+            false => {
+                // It has no sleeves that arms could miss.
+                let crossings = candidate.crossings.anywhere();
+                Candidate { score: candidate.score + UNWORN, is_worn: true, crossings, ..candidate }
+            }
         }
     }
 

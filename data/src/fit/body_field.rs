@@ -1,6 +1,7 @@
-//! The T-posed body as the placement search sees it: signed distances on grids, with arms that turn at the shoulders.
+//! The T-posed body as the placement search sees it: signed distances on grids, with limbs that turn at shoulders and hips.
 
-use super::arm_pose::ArmPose;
+use super::limb_pose::{LIMBS, LimbPose};
+use super::placement::Placement;
 use crate::asset::Body;
 use crate::generate::garment::Tube;
 use crate::generate::garment::measures::BodyMeasures;
@@ -24,8 +25,10 @@ pub(super) struct BodyField {
     /// The trunk as taut cloth sees it.
     form: Arc<DistanceGrid>,
     arms: Arc<[Arm]>,
-    /// How much of the left (positive) or right (negative) arm's weight the body next to a point has, for arms at one angle.
-    arm_weights: Option<Arc<DistanceGrid>>,
+    /// Left and right hip (m).
+    hips: Option<[[f64; 3]; 2]>,
+    /// How much of the left (positive) or right (negative) arm's and leg's weight the body next to a point has, in one pose.
+    weights: [Option<Arc<DistanceGrid>>; 2],
     pub levels: Levels,
     /// Lowest and highest corner of the zero body (m).
     pub low: [f64; 3],
@@ -55,27 +58,41 @@ struct Arm {
     distance: DistanceGrid,
 }
 
-/// Sine and cosine of the angle by which arms hang below the horizontal.
+/// How arms hang below the horizontal and legs are turned outwards.
 #[derive(Clone, Copy)]
-pub(super) struct ArmTurn {
+pub(super) struct LimbTurn {
+    pub arms: Turn,
+    pub legs: Turn,
+}
+
+impl LimbTurn {
+    pub fn of(placement: &Placement) -> Self {
+        // The left leg is turned outwards as the left arm is raised.
+        Self { arms: Turn::new(placement.arm_angle_degrees), legs: Turn::new(-placement.leg_angle_degrees) }
+    }
+}
+
+/// Sine and cosine of an angle by which the left limb is lowered, the right one mirrored.
+#[derive(Clone, Copy)]
+pub(super) struct Turn {
     sine: f64,
     cosine: f64,
 }
 
-impl ArmTurn {
-    pub fn new(degrees: f64) -> Self {
+impl Turn {
+    fn new(degrees: f64) -> Self {
         let (sine, cosine) = degrees.to_radians().sin_cos();
         Self { sine, cosine }
     }
 
-    /// A point of the lowered arm of this side, raised to the T-pose.
+    /// A point of the lowered limb of this side, turned back to the T-pose about its joint.
     fn raised(self, p: [f64; 3], shoulder: [f64; 3], side: f64) -> [f64; 3] {
         let [x, y, z] = sub(p, shoulder);
         let sine = side * self.sine;
         add(shoulder, [self.cosine * x - sine * y, sine * x + self.cosine * y, z])
     }
 
-    /// The inverse of [`ArmTurn::raised`].
+    /// The inverse of [`Turn::raised`].
     pub fn lowered(self, p: [f64; 3], shoulder: [f64; 3], side: f64) -> [f64; 3] {
         Self { sine: -self.sine, ..self }.raised(p, shoulder, side)
     }
@@ -83,7 +100,7 @@ impl ArmTurn {
 
 impl BodyField {
     pub fn new(body: &Body) -> Self {
-        let side_of_joint = arm_sides(body);
+        let side_of_joint = sides(body, LIMBS[0]);
         let side = |face: &[u32; 3]| {
             let mut share = [0.0; 2];
             for v in face {
@@ -130,33 +147,37 @@ impl BodyField {
         let spine: Vec<f64> = spine.into_iter().flatten().map(|p| p[2]).collect();
         let spine_z = spine.iter().sum::<f64>() / spine.len().max(1) as f64;
         let arms = left.into_iter().chain(right).collect();
-        Self { trunk: trunk.into(), form: form.into(), arms, arm_weights: None, levels, low, high, spine_z }
+        let [left, right] = LIMBS[1].map(|name| body.joint_place(name));
+        let hips = left.zip(right).map(<[_; 2]>::from);
+        let (trunk, form, weights) = (trunk.into(), form.into(), [None, None]);
+        Self { trunk, form, arms, hips, weights, levels, low, high, spine_z }
     }
 
-    /// The same for arms lowered by linear blend skinning, for this one angle: cloth is raised to the T-pose by the weights of
+    /// The same for limbs that linear blend skinning turned, in this one pose: cloth is turned back to the T-pose by the weights of
     /// the body next to it, and its distance taken there.
-    pub fn posed(&self, posed: &ArmPose, body: &Body) -> Self {
-        let sides = arm_sides(body);
-        let weight = |face: usize| {
-            let of_vertex = |v: &u32| {
-                let (joints, weights) = body.skin_weights.row(*v as usize);
-                let signed = joints.iter().zip(weights).filter_map(|(joint, weight)| {
-                    sides[usize::from(*joint)].map(|side| [1.0, -1.0][side] * f64::from(*weight))
-                });
-                signed.sum::<f64>()
-            };
-            body.faces[face].iter().map(of_vertex).sum::<f64>() / 3.0
-        };
-        let (_, weights) = DistanceGrid::with_attribute(&posed.positions, &body.faces, STEP, BAND, weight);
-        Self { arm_weights: Some(Arc::new(weights)), ..self.clone() }
+    pub fn posed(&self, posed: &LimbPose, body: &Body) -> Self {
+        let weights = std::array::from_fn(|limb| {
+            let is_turned = posed.angles[limb] != 0.0;
+            is_turned.then(|| Arc::new(limb_weights(body, &posed.positions, LIMBS[limb])))
+        });
+        Self { weights, ..self.clone() }
+    }
+
+    /// Whether it has the weights of all limbs that a placement turns.
+    pub fn is_posed(&self, placement: &Placement) -> bool {
+        let angles = [placement.arm_angle_degrees, placement.leg_angle_degrees];
+        self.weights.iter().zip(angles).all(|(weights, angle)| weights.is_some() == (angle != 0.0))
     }
 
     /// Signed distance of `p` to the body as taut cloth sees it (m), outside positive, at most the band of the grids; and the
     /// part of the body that is next to it, below [`PARTS`].
-    pub fn gap(&self, p: [f64; 3], arms: ArmTurn) -> (f64, usize) {
-        let (p, arms) = match &self.arm_weights {
-            Some(weights) => (self.raised(p, weights.distance(p), arms), ArmTurn::new(0.0)),
-            None => (p, arms),
+    pub fn gap(&self, p: [f64; 3], turn: LimbTurn) -> (f64, usize) {
+        let arm = self.weights[0].as_ref().map_or(0.0, |grid| grid.distance(p));
+        let p = self.legs_together(p, turn.legs);
+        let shoulder = self.arms.iter().find(|limb| limb.side == arm.signum()).map(|limb| limb.shoulder);
+        let (p, arms) = match (&self.weights[0], shoulder) {
+            (Some(_), Some(shoulder)) => (turned_back(p, arm, turn.arms, shoulder), Turn::new(0.0)),
+            _ => (p, turn.arms),
         };
         let mut gap = self.form.distance(p);
         let Levels { crotch, waist, armpit, .. } = self.levels;
@@ -172,7 +193,7 @@ impl BodyField {
     }
 
     /// A point next to an arm, raised with it to the T-pose; any other one as it is.
-    pub fn level(&self, p: [f64; 3], arms: ArmTurn) -> [f64; 3] {
+    pub fn level(&self, p: [f64; 3], arms: Turn) -> [f64; 3] {
         let nearest = self.arms.iter().map(|arm| {
             let raised = arms.raised(p, arm.shoulder, arm.side);
             (arm.distance.distance(raised), raised)
@@ -181,28 +202,49 @@ impl BodyField {
         if distance < self.form.distance(p) { raised } else { p }
     }
 
-    /// Inverse of linear blend skinning by a weight of the left (positive) or right (negative) arm.
-    fn raised(&self, p: [f64; 3], weight: f64, arms: ArmTurn) -> [f64; 3] {
-        let side = weight.signum();
-        let Some(arm) = self.arms.iter().find(|arm| arm.side == side) else { return p };
-        let w = weight.abs();
-        // The blend of rest and rotation in the plane of the arms is a rotation times a scale.
-        let (cosine, sine) = (1.0 - w + w * arms.cosine, w * arms.sine);
-        let squared = cosine * cosine + sine * sine;
-        if squared < 1e-3 {
-            return p;
-        }
-        let blend = ArmTurn { sine: sine / squared, cosine: cosine / squared };
-        let mut raised = blend.raised(p, arm.shoulder, side);
-        raised[2] = p[2];
-        raised
+    fn legs_together(&self, p: [f64; 3], legs: Turn) -> [f64; 3] {
+        let (Some(hips), Some(weights)) = (&self.hips, &self.weights[1]) else { return p };
+        let weight = weights.distance(p);
+        turned_back(p, weight, legs, hips[usize::from(weight < 0.0)])
     }
 
     /// Whether `p` is at least this deep (m) inside the body.
-    pub fn is_inside(&self, p: [f64; 3], arms: ArmTurn, depth: f64) -> bool {
-        let in_arm = |arm: &Arm| arm.distance.distance(arms.raised(p, arm.shoulder, arm.side)) < -depth;
+    pub fn is_inside(&self, p: [f64; 3], turn: LimbTurn, depth: f64) -> bool {
+        let p = self.legs_together(p, turn.legs);
+        let in_arm = |arm: &Arm| arm.distance.distance(turn.arms.raised(p, arm.shoulder, arm.side)) < -depth;
         self.trunk.distance(p) < -depth || self.arms.iter().any(in_arm)
     }
+}
+
+/// Inverse of linear blend skinning by a weight of the left (positive) or right (negative) limb, which turns about `joint`.
+fn turned_back(p: [f64; 3], weight: f64, turn: Turn, joint: [f64; 3]) -> [f64; 3] {
+    let w = weight.abs();
+    // The blend of rest and rotation in the plane of the limbs is a rotation times a scale.
+    let (cosine, sine) = (1.0 - w + w * turn.cosine, w * turn.sine);
+    let squared = cosine * cosine + sine * sine;
+    if squared < 1e-3 {
+        return p;
+    }
+    let blend = Turn { sine: sine / squared, cosine: cosine / squared };
+    let mut back = blend.raised(p, joint, weight.signum());
+    back[2] = p[2];
+    back
+}
+
+/// The signed weight that the body's surface next to each point has of the left (positive) and right (negative) of two limbs.
+fn limb_weights(body: &Body, posed: &[[f64; 3]], from: [&str; 2]) -> DistanceGrid {
+    let sides = sides(body, from);
+    let weight = |face: usize| {
+        let of_vertex = |v: &u32| {
+            let (joints, weights) = body.skin_weights.row(*v as usize);
+            let signed = joints.iter().zip(weights).filter_map(|(joint, weight)| {
+                sides[usize::from(*joint)].map(|side| [1.0, -1.0][side] * f64::from(*weight))
+            });
+            signed.sum::<f64>()
+        };
+        body.faces[face].iter().map(of_vertex).sum::<f64>() / 3.0
+    };
+    DistanceGrid::with_attribute(posed, &body.faces, STEP, BAND, weight).1
 }
 
 /// A trunk whose outlines are convex between hips and armpits, as taut cloth spans it.
@@ -221,20 +263,17 @@ fn arm(
     side: usize,
     distance: &dyn Fn(&[[u32; 3]]) -> (DistanceGrid, f64),
 ) -> Option<Arm> {
-    let shoulder = body.joint_place(SHOULDERS[side]).filter(|_| !faces.is_empty())?;
+    let shoulder = body.joint_place(LIMBS[0][side]).filter(|_| !faces.is_empty())?;
     let (distance, radius) = distance(faces);
     Some(Arm { side: [1.0, -1.0][side], shoulder, radius: 0.9 * radius, distance })
 }
 
-/// Names of the joints that lower the left and the right arm.
-const SHOULDERS: [&str; 2] = ["left_shoulder", "right_shoulder"];
-
-/// For every joint whether it belongs to the left (0) or right (1) arm, from the shoulder on.
-fn arm_sides(body: &Body) -> Vec<Option<usize>> {
+/// For every joint whether it belongs to the left (0) or right (1) of two limbs, from these joints on.
+fn sides(body: &Body, from: [&str; 2]) -> Vec<Option<usize>> {
     let mut sides: Vec<Option<usize>> = Vec::with_capacity(body.joint_count());
-    let shoulders = SHOULDERS.map(|name| body.joint(name));
+    let from = from.map(|name| body.joint(name));
     for joint in 0..body.joint_count() {
-        let own = shoulders.iter().position(|s| *s == Some(joint));
+        let own = from.iter().position(|s| *s == Some(joint));
         sides.push(own.or(body.parents[joint].and_then(|parent| sides[parent])));
     }
     sides
@@ -275,7 +314,6 @@ fn closed(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> (Vec<[f64; 3]>, Vec<[u3
 
 #[cfg(test)]
 mod tests {
-    use super::super::arm_pose::ArmPose;
     use super::*;
     use crate::generate::mannequin;
     use clothcombo_physics::query::Distance;
@@ -285,7 +323,8 @@ mod tests {
         let body = mannequin();
         let field = BodyField::new(&body);
         for degrees in [0.0, 45.0] {
-            let (turn, posed) = (ArmTurn::new(degrees), ArmPose::new(&body, degrees));
+            let placement = Placement { arm_angle_degrees: degrees, ..Placement::AS_GIVEN };
+            let (turn, posed) = (LimbTurn::of(&placement), LimbPose::of(&body, &placement));
             let mut errors: Vec<f64> = (0..3000)
                 .map(|i| {
                     let t = [0.754_877_666, 0.569_840_291, 0.438_579_021].map(|s| (s * f64::from(i)).fract());
@@ -301,7 +340,7 @@ mod tests {
 
     #[test]
     fn lowering_undoes_raising() {
-        let turn = ArmTurn::new(33.0);
+        let turn = Turn::new(33.0);
         let (p, shoulder) = ([0.4, 0.1, 0.3], [0.2, 0.5, 0.0]);
         let there = turn.lowered(p, shoulder, -1.0);
         assert!(norm(sub(turn.raised(there, shoulder, -1.0), p)) < 1e-12);

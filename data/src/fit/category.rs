@@ -1,14 +1,15 @@
 //! The category of a garment whose openings are known: limbs that pass through them decide where its shape is ambiguous.
 
-use super::judge::Limbs;
+use super::openings::Limbs;
 use crate::asset::{Body, Category};
 use clothcombo_physics::TriMesh;
 
 /// By shape and limbs.
 pub(super) fn guessed(rest: &TriMesh, body: &Body, limbs: Limbs) -> Category {
     match (Category::guess(rest, body), limbs) {
-        (Category::Skirt, Limbs { neck: false, legs: true, .. }) => Category::Trousers,
+        (_, Limbs { neck: false, arms: false, legs: true }) => Category::Trousers,
         (Category::Trousers | Category::Skirt, Limbs { neck: true, legs: false, .. }) => Category::Dress,
+        (Category::Trousers, Limbs { neck: false, legs: false, .. }) => Category::Skirt,
         (guess, _) => guess,
     }
 }

@@ -2,6 +2,9 @@
 
 use super::judge::{Candidate, Judge};
 
+/// Farthest that a leg is turned outwards in a garment's rest pose (degrees).
+const MOST_APART: f64 = 25.0;
+
 /// How steps shrink (m), and what counts on the way.
 pub(super) struct Steps {
     pub from: f64,
@@ -17,20 +20,21 @@ pub(super) enum Moves {
     All,
     /// All but the height.
     Level,
-    /// The arms only.
-    Arms,
+    /// Arms and legs only.
+    Limbs,
 }
 
-/// Slid along the three axes, and the arms turned, as long as that helps; what settings fix stays.
+/// Slid along the three axes, and arms and legs turned, as long as that helps; what settings fix stays.
 pub(super) fn climbed(judge: &Judge, start: &Candidate, steps: &Steps) -> Candidate {
     let turned = judge.turned(&start.placement, start.rim, steps.is_fine);
     let mut best = judge.scored(start.placement, &turned, steps.is_sharp, Some(start));
-    let slides = judge.settings.offset.is_none() && steps.moves != Moves::Arms;
+    let slides = judge.settings.offset.is_none() && steps.moves != Moves::Limbs;
     let raises = best.placement.arm_angle_degrees != 0.0;
+    let spreads = best.placement.leg_angle_degrees != 0.0 && judge.settings.legs_degrees.is_none();
     let mut step = steps.from;
     while step > steps.to {
         let mut is_better = false;
-        for axis in 0..4 {
+        for axis in 0..5 {
             for sign in [-1.0, 1.0] {
                 let mut trial = best.placement;
                 match axis {
@@ -41,6 +45,11 @@ pub(super) fn climbed(judge: &Judge, start: &Candidate, steps: &Steps) -> Candid
                         // A sleeve is half a metre long.
                         let degrees = trial.arm_angle_degrees + sign * (2.0 * step).to_degrees();
                         trial.arm_angle_degrees = degrees.clamp(3.0, 85.0);
+                    }
+                    4 if spreads => {
+                        // A leg is twice as long.
+                        let degrees = trial.leg_angle_degrees + sign * step.to_degrees();
+                        trial.leg_angle_degrees = degrees.clamp(0.5, MOST_APART);
                     }
                     _ => continue,
                 }

@@ -1,6 +1,7 @@
 //! A garment as the placement search sees it, in the file's coordinates.
 
 use super::samples::Samples;
+use crate::mesh::bounds;
 use clothcombo_physics::Topology;
 use clothcombo_physics::vec3::{norm, sub};
 
@@ -18,8 +19,7 @@ pub(super) struct Cloth<'a> {
     pub borders: &'a [Vec<u32>],
     /// Their lengths.
     pub border_lengths: Vec<f64>,
-    /// Connected piece of each vertex.
-    pieces: &'a [u32],
+    pub topology: &'a Topology,
     pub coarse: Samples,
     pub fine: Samples,
 }
@@ -27,7 +27,7 @@ pub(super) struct Cloth<'a> {
 impl<'a> Cloth<'a> {
     pub fn new(positions: &'a [[f64; 3]], faces: &'a [[u32; 3]], topology: &'a Topology) -> Self {
         let samples = |count| Samples::new(positions, faces, count);
-        let (borders, pieces) = (&topology.boundary_loops, &topology.component_of_vertex);
+        let borders = &topology.boundary_loops;
         let length = |border: &Vec<u32>| {
             let next = border.iter().cycle().skip(1);
             let edges = border.iter().zip(next).map(|(a, b)| [a, b].map(|v| positions[*v as usize]));
@@ -39,10 +39,24 @@ impl<'a> Cloth<'a> {
             faces,
             borders,
             border_lengths,
-            pieces,
+            topology,
             coarse: samples(COARSE),
             fine: samples(FINE),
         }
+    }
+
+    /// The same at other positions, such as another size.
+    pub fn moved<'b>(&self, positions: &'b [[f64; 3]]) -> Cloth<'b>
+    where
+        'a: 'b,
+    {
+        Cloth::new(positions, self.faces, self.topology)
+    }
+
+    /// Largest extent in the file's unit.
+    pub fn extent(&self) -> f64 {
+        let [low, high] = bounds(self.positions);
+        (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max)
     }
 
     /// The connected piece that a border belongs to.
@@ -52,7 +66,14 @@ impl<'a> Cloth<'a> {
 
     /// The connected piece of a vertex.
     pub fn piece_of_vertex(&self, vertex: u32) -> u32 {
-        self.pieces[vertex as usize]
+        self.topology.component_of_vertex[vertex as usize]
+    }
+
+    /// Whether no piece has more than two openings: hats, socks and sleeves have not.
+    pub fn is_tubes(&self) -> bool {
+        let mut openings = vec![0; self.topology.component_count];
+        (0..self.borders.len()).for_each(|border| openings[self.piece(border) as usize] += 1);
+        openings.iter().all(|count| *count <= 2)
     }
 
     /// Positions of a border's vertices.

@@ -1,5 +1,7 @@
 //! Why a mesh is no garment of a body.
 
+use super::diagnosis::Size;
+use super::pieces::StrayPiece;
 use super::placement::Unit;
 use super::settings::{MAX_VERTICES, MIN_TRIANGLES, MOST_STRETCH};
 use thiserror::Error;
@@ -27,8 +29,8 @@ pub enum FitError {
     Closed,
     /// As large as no garment of this body.
     #[error(
-        "not a garment of this body: its largest extent is {extent} in the file's unit{}; the body is {reach:.2} m large",
-         unit.map(|u| format!(", {} m for {u}", extent * u.metres())).unwrap_or_default()
+        "not a garment of this body: its largest extent is {extent:.4} in the file's unit{}; the body is {reach:.2} m large",
+         unit.map(|u| format!(", {:.2} m for {u}", extent * u.metres())).unwrap_or_default()
     )]
     Extent {
         /// Largest extent in the file's unit.
@@ -45,10 +47,37 @@ pub enum FitError {
     #[error("not a garment: it reaches from the crown to the soles and to both hands, as a body does")]
     Body,
     /// Covers neither trunk nor hips, as each of the six categories does.
-    #[error("not one of the six garment categories: {place}")]
+    #[error("not one of the six garment categories: {place}; if it is one, --category says which")]
     OffTrunk {
         /// Where it lies.
         place: &'static str,
+    },
+    /// A connected piece lies beside the body, or far from it.
+    #[error(
+        "{piece}: delete it or move it onto the body, or --keep largest leaves it out; export one file per garment"
+    )]
+    StrayPiece {
+        /// Which piece, and where it lies.
+        piece: StrayPiece,
+    },
+    /// It is worn at another size only.
+    #[error("not of this body's size: {size}; if it is to be worn so, say how: --unit, --offset, --category")]
+    Size {
+        /// What it measures, and what would fit.
+        size: Size,
+    },
+    /// One half of a garment.
+    #[error(
+        "half a garment: all of it lies on one side of {axis} = {at:.4}, and {:.0} % of a border runs there; apply the mirror modifier, or \
+         export both halves", 100.0 * share
+    )]
+    Half {
+        /// Axis of the file across which it is cut.
+        axis: char,
+        /// Where it is cut, in the file's unit.
+        at: f64,
+        /// Share of the border's length on the cut.
+        share: f64,
     },
     /// No placement is believed.
     #[error(

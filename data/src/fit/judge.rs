@@ -4,8 +4,8 @@
 //! ([`likelihood`](super::likelihood)), how usual such a file is ([`Placement::log_prior`]), how its upper rim lies,
 //! and whether limbs pass through openings instead of cloth ([`anatomy`](super::anatomy)).
 
-use super::anatomy::{Opening, Skeleton};
-use super::body_field::{ArmTurn, BodyField};
+use super::anatomy::{Crossings, Skeleton};
+use super::body_field::{BodyField, LimbTurn};
 use super::cloth::Cloth;
 use super::likelihood::{log_likelihood, rough_log_likelihood};
 use super::placement::Placement;
@@ -20,12 +20,16 @@ const RIM_EVIDENCE: f64 = 8.0;
 pub(super) const UNWORN: f64 = 150.0;
 /// Log-prior against a bone that passes through cloth.
 const CROSSING: f64 = 8.0;
+/// Log-prior against an opening through which nothing passes.
+const IDLE: f64 = 8.0;
+/// A neckline lower by this (m) in front than behind, or the other way round, shows where the front is; log-odds of that.
+const NECK_DROP: f64 = 0.01;
+const NECKLINE: f64 = 3.0;
+/// Log-prior against half a turn of a garment whose neckline does not show that: files have their front in front.
+const BACK_TO_FRONT: f64 = 25.0;
 /// Clothes are as wide on the left as on the right within this (m), or at least at no more than this cost.
 const SYMMETRY: f64 = 0.02;
 const ASYMMETRY_COST: f64 = 8.0;
-/// A border deeper inside the body than this (m), for a larger share of its length, goes around nothing.
-const DEPTH: f64 = 0.012;
-const SHARE: f64 = 0.25;
 
 /// A placement and what speaks for it.
 #[derive(Clone, Copy, Debug)]
@@ -36,7 +40,7 @@ pub(super) struct Candidate {
     /// Log-posterior up to a constant.
     pub score: f64,
     /// Bones that pass through cloth.
-    pub crossings: usize,
+    pub crossings: Crossings,
     /// The border that is its upper rim, if the garment hangs from one.
     pub rim: Option<usize>,
     /// Whether limbs pass through its openings as through those of clothes.
@@ -49,37 +53,12 @@ pub(super) struct Candidate {
     pub is_tube: bool,
     /// Mean distance of the upper rim to the body (m), 0 without one.
     pub rim_distance: f64,
-}
-
-/// A border of a placed garment.
-struct Border {
-    /// What it goes around; one that runs through the body goes around nothing.
-    opening: Opening,
-    /// What is linked with it, also if it runs through the body.
-    linked: Opening,
-    /// Mean height (m).
-    height: f64,
-}
-
-/// Which limbs pass through openings of their own.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Limbs {
-    pub neck: bool,
-    /// Both.
-    pub arms: bool,
-    /// Both.
-    pub legs: bool,
-}
-
-impl Limbs {
-    fn new(openings: &[Border]) -> Self {
-        let has = |wanted: Opening| openings.iter().any(|b| b.opening == wanted);
-        Self {
-            neck: has(Opening::Neck),
-            arms: has(Opening::LeftArm) && has(Opening::RightArm),
-            legs: has(Opening::LeftLeg) && has(Opening::RightLeg),
-        }
-    }
+    /// Openings wide enough for a limb through which none passes.
+    pub idle_openings: usize,
+    /// How much lower the cloth ends in front of the neck than behind it (m); none of a garment without neck or armholes.
+    pub neck_drop: Option<f64>,
+    /// Whether it is turned by 180° though its neckline does not show that.
+    pub is_unfounded_turn: bool,
 }
 
 /// Judges placements of one garment on one body.
@@ -120,8 +99,8 @@ impl Judge<'_> {
         is_sharp: bool,
         like: Option<&Candidate>,
     ) -> Candidate {
-        let (arms, t) = (ArmTurn::new(placement.arm_angle_degrees), placement.translation);
-        let gaps = turned.points.iter().map(|p| self.field.gap(add(*p, t), arms));
+        let (turn, t) = (LimbTurn::of(&placement), placement.translation);
+        let gaps = turned.points.iter().map(|p| self.field.gap(add(*p, t), turn));
         let fit = match is_sharp {
             true => log_likelihood(gaps, EVIDENCE),
             false => rough_log_likelihood(gaps, EVIDENCE),
@@ -134,13 +113,16 @@ impl Judge<'_> {
             placement,
             fit,
             score,
-            crossings: 0,
+            crossings: Crossings::default(),
             rim: None,
             is_worn: true,
             worn_pieces: 1,
             neck_over_hem: 0.0,
             is_tube: false,
             rim_distance: 0.0,
+            idle_openings: 0,
+            neck_drop: None,
+            is_unfounded_turn: false,
         };
         Candidate { placement, fit, score, ..like.copied().unwrap_or(unknown) }
     }
@@ -150,9 +132,9 @@ impl Judge<'_> {
         if rim.is_empty() {
             return 0.0;
         }
-        let (arms, t) = (ArmTurn::new(placement.arm_angle_degrees), placement.translation);
+        let (turn, t) = (LimbTurn::of(placement), placement.translation);
         let height = rim.iter().map(|p| p[1]).sum::<f64>() / rim.len() as f64 + t[1];
-        let gaps = rim.iter().map(|p| (self.field.gap(add(*p, t), arms).0, 0));
+        let gaps = rim.iter().map(|p| (self.field.gap(add(*p, t), turn).0, 0));
         log_likelihood(gaps, RIM_EVIDENCE) + self.rim_prior(height)
     }
 
@@ -177,101 +159,31 @@ impl Judge<'_> {
         (density + ELSEWHERE).ln() - UNIFORM.ln()
     }
 
-    /// The borders of a placed garment.
-    fn openings(&self, placement: &Placement) -> Vec<Border> {
-        let arms = ArmTurn::new(placement.arm_angle_degrees);
-        let of_border = |border: usize| {
-            let points = placement.apply(&self.cloth.border(border));
-            let count = points.len().max(1) as f64;
-            let inside = points.iter().filter(|p| self.field.is_inside(**p, arms, DEPTH)).count();
-            let linked = self.skeleton.opening(&points, arms);
-            Border {
-                opening: if inside as f64 > SHARE * count { Opening::Nothing } else { linked },
-                linked,
-                height: points.iter().map(|p| p[1]).sum::<f64>() / count,
-            }
-        };
-        (0..self.cloth.borders.len()).map(of_border).collect()
-    }
-
-    /// Which limbs pass through openings of their own.
-    pub fn limbs(&self, placement: &Placement) -> Limbs {
-        Limbs::new(&self.openings(placement))
-    }
-
-    /// Whether limbs pass through its openings, and which rim it hangs from; the candidate's score does not count that yet.
-    pub fn with_openings(&self, mut candidate: Candidate) -> Candidate {
-        let openings = self.openings(&candidate.placement);
-        let count = |wanted: Opening| openings.iter().filter(|b| b.opening == wanted).count();
-        let has = |wanted: Opening| count(wanted) > 0;
-        let limbs = [
-            Opening::Neck,
-            Opening::LeftArm,
-            Opening::RightArm,
-            Opening::LeftLeg,
-            Opening::RightLeg,
-            Opening::Several,
-        ];
-        // Two sleeves that are not one piece are socks, and a tube with no other opening has no room for head and legs.
-        let piece =
-            |wanted: Opening| openings.iter().position(|b| b.opening == wanted).map(|b| self.cloth.piece(b));
-        let arms = openings.len() > 2
-            && has(Opening::LeftArm)
-            && piece(Opening::LeftArm) == piece(Opening::RightArm);
-        let goes_around = |trunk: usize, has: &dyn Fn(Opening) -> bool| {
-            trunk >= 2 || (trunk > 0 && limbs.into_iter().any(has))
-        };
-        let is_around = goes_around(count(Opening::Trunk), &has) || arms;
-        // Only sleeves and armholes tell how arms hang.
-        let is_worn = is_around && (arms || candidate.placement.arm_angle_degrees == 0.0);
-        if !is_worn {
-            candidate.score -= UNWORN;
-        }
-        candidate.is_worn = is_worn;
-        let mut pieces: Vec<u32> = (0..openings.len()).map(|border| self.cloth.piece(border)).collect();
-        pieces.sort_unstable();
-        pieces.dedup();
-        let is_worn_alone = |piece: &u32| {
-            let own = openings.iter().enumerate().filter(|(b, _)| self.cloth.piece(*b) == *piece);
-            let own: Vec<Opening> = own.map(|(_, border)| border.opening).collect();
-            let trunk = own.iter().filter(|o| **o == Opening::Trunk).count();
-            goes_around(trunk, &|wanted| own.contains(&wanted))
-        };
-        candidate.worn_pieces = pieces.iter().filter(|p| is_worn_alone(p)).count();
-        let longest = |wanted: Opening| {
-            let of = openings.iter().zip(&self.cloth.border_lengths).filter(|(b, _)| b.linked == wanted);
-            of.map(|(_, length)| *length).fold(0.0, f64::max)
-        };
-        let hem = longest(Opening::Trunk);
-        candidate.neck_over_hem = if hem > 0.0 { longest(Opening::Neck) / hem } else { 0.0 };
-        candidate.is_tube = count(Opening::Trunk) == 2 && !limbs.into_iter().any(has);
-        candidate.rim = None;
-        if !has(Opening::Neck) && !arms {
-            let trunk = openings.iter().enumerate().filter(|(_, b)| b.opening == Opening::Trunk);
-            candidate.rim = trunk.max_by(|a, b| a.1.height.total_cmp(&b.1.height)).map(|(border, _)| border);
-        }
-        candidate
-    }
-
-    /// Whether bones pass through its cloth.
-    pub fn with_crossings(&self, mut candidate: Candidate) -> Candidate {
-        let arms = ArmTurn::new(candidate.placement.arm_angle_degrees);
-        let placed = candidate.placement.apply(self.cloth.positions);
-        candidate.crossings = self.skeleton.crossings(&placed, self.cloth.faces, arms);
-        candidate.score -= CROSSING * candidate.crossings as f64;
-        candidate
-    }
-
     /// A placement as it stands, by everything.
     pub fn judged(&self, placement: Placement) -> Candidate {
         let openings =
             self.with_openings(self.scored(placement, &self.turned(&placement, None, true), true, None));
         let turned = self.turned(&placement, openings.rim, true);
         let scored = self.scored(placement, &turned, true, Some(&openings));
-        let score = scored.score - if openings.is_worn { 0.0 } else { UNWORN };
-        let (arms, t) = (ArmTurn::new(placement.arm_angle_degrees), placement.translation);
-        let distances = turned.rim.iter().map(|p| self.field.gap(add(*p, t), arms).0.abs());
+        let (turn, t) = (LimbTurn::of(&placement), placement.translation);
+        let distances = turned.rim.iter().map(|p| self.field.gap(add(*p, t), turn).0.abs());
         let rim_distance = distances.sum::<f64>() / turned.rim.len().max(1) as f64;
-        self.with_crossings(Candidate { score, rim_distance, ..scored })
+        let placed = placement.apply(self.cloth.positions);
+        let crossings = self.skeleton.crossings(&placed, self.cloth.faces, turn);
+        let shown = self.shown_front(&scored);
+        let is_turned = self.settings.turn_degrees.is_none() && placement.turn_degrees == 180.0;
+        let is_unfounded_turn = is_turned && scored.neck_drop.is_some() && shown < 1.0;
+        let against = if scored.is_worn { 0.0 } else { UNWORN }
+            + CROSSING * (crossings.arms + crossings.others) as f64
+            + IDLE * scored.idle_openings as f64
+            + if is_unfounded_turn { BACK_TO_FRONT } else { 0.0 }
+            - NECKLINE * shown;
+        let score = scored.score - against;
+        Candidate { score, rim_distance, crossings, is_unfounded_turn, ..scored }
+    }
+
+    /// Whether the neckline shows the front where it is, from -1 to 1.
+    fn shown_front(&self, candidate: &Candidate) -> f64 {
+        candidate.neck_drop.map_or(0.0, |drop| (drop / NECK_DROP).clamp(-1.0, 1.0))
     }
 }

@@ -3,17 +3,21 @@
 //! Nothing is changed silently: [`FitReport`] lists what was assumed and every element that was touched.
 
 mod anatomy;
-mod arm_pose;
 mod as_given;
 mod body_field;
 mod category;
 mod climb;
 mod cloth;
 mod coverage;
+mod diagnosis;
+mod doubt;
 mod error;
 mod from_body;
 mod judge;
 mod likelihood;
+mod limb_pose;
+mod openings;
+mod pieces;
 mod placed;
 mod placement;
 mod repair;
@@ -26,8 +30,10 @@ mod sitting;
 mod verdict;
 
 pub use coverage::off_trunk;
+pub use diagnosis::Size;
 pub use error::FitError;
 pub use from_body::{Carried, SourceBody, SourcePlacement};
+pub use pieces::{StrayPiece, stray_pieces};
 pub use placed::{PlacementCheck, is_on_body};
 pub use placement::{Origin, Placement, Unit, UpAxis};
 pub(crate) use repair::is_double;
@@ -39,14 +45,17 @@ pub use sitting::Sitting;
 use crate::asset::{Body, Garment};
 use crate::format::{FileFace, PolygonMesh};
 use crate::mesh::{Attachment, MeshMeasures, bounds, contact, join_seams, push_out};
-use arm_pose::ArmPose;
 use category::{contradiction, guessed};
 use cloth::Cloth;
 use clothcombo_physics::contact::{self_triangle_pairs, triangle_pairs};
 use clothcombo_physics::mesh::vertex_normals;
 use clothcombo_physics::vec3::{norm, sub};
 use clothcombo_physics::{Topology, TriMesh};
-use repair::{finish_seams, repair, turn_outward};
+use diagnosis::diagnosed;
+use doubt::Doubt;
+use limb_pose::LimbPose;
+use pieces::refuse_stray_pieces;
+use repair::{finish_seams, gaps, repair, turn_outward};
 use search::{Search, SearchBody};
 use settings::{MOST_STRETCH, MOST_STRETCHED};
 use verdict::{Verdict, verdict};
@@ -110,11 +119,12 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
     let measured = SearchBody::new(body)?;
     let search = Search::new(body, &measured);
     let extent = mesh.extent();
+    let cloth = Cloth::new(&sheet.positions, &sheet.faces, &topology);
     let units = settings.unit.map_or(Unit::ALL.to_vec(), |u| vec![u]);
     if !units.iter().any(|u| search.is_plausible_extent(extent * u.metres())) {
-        return Err(FitError::Extent { extent, unit: settings.unit, reach: search.reach() });
+        let too_large = FitError::Extent { extent, unit: settings.unit, reach: search.reach() };
+        return Err(diagnosed(&search, &cloth, settings).unwrap_or(too_large));
     }
-    let cloth = Cloth::new(&sheet.positions, &sheet.faces, &topology);
     let source = settings.from_body.as_deref().map(|b| b.aligned(body, settings)).transpose()?;
     let (placement, mut doubts) = match &source {
         Some(source) => (source.placement, Vec::new()),
@@ -124,34 +134,46 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
         }
     };
     let metres = placement.unit.metres();
-    let seams = finish_seams(&mut sheet, file, settings, metres);
+    let borders = sheet.borders();
+    let mut seams = finish_seams(&mut sheet, file, settings, metres);
     let mesh = TriMesh::new(sheet.positions.clone(), sheet.faces.clone())
         .map_err(|e| FitError::Mesh(e.to_string()))?;
     let topology = Topology::new(&mesh);
     let placed = placement.apply(&sheet.positions);
-    let arms = ArmPose::new(body, placement.arm_angle_degrees);
     let (mut positions, from_body) = match &source {
         Some(source) => {
             let (carried, how) = source.carry(&sheet.positions, &sheet.faces, settings.category, body)?;
             (carried, Some(how))
         }
         None => {
-            let raised = arms.to_t_pose(&placed, &sheet.faces, settings.category, body);
-            (raised.map_err(FitError::Mesh)?, None)
+            let pose = LimbPose::of(body, &placement);
+            let straight = pose.to_t_pose(&placed, &sheet.faces, settings.category, body);
+            (straight.map_err(FitError::Mesh)?, None)
         }
     };
-    refuse_other_things(&positions, body)?;
+    refuse_bodies(&positions, body)?;
+    if let Some(place) = off_trunk(&positions, body) {
+        let error = FitError::OffTrunk { place };
+        match settings.category.is_some() || settings.offset.is_some() {
+            true => doubts.push(error.to_string()),
+            false => return Err(error),
+        }
+    }
     let raised = Cloth::new(&positions, &sheet.faces, &topology);
-    let sitting = match &source {
-        Some(source) => {
-            search
-                .believed_as_given(&raised, &FitSettings::default())
-                .map_err(|what| source.refusal(&what))?
-                .0
+    if let Some(source) = &source {
+        match search.believed_as_given(&raised, &FitSettings::default()) {
+            Err(odd) => doubts.push(source.doubt(&odd)),
+            Ok(worn) if worn.crossings.arms > 0 => doubts.push(Doubt::Arms.to_string()),
+            Ok(_) => {}
         }
-        None => search.measured(&raised, &Placement::AS_GIVEN).0,
-    };
-    let limbs = search.judge(&raised, settings).limbs(&Placement::AS_GIVEN);
+    }
+    let sitting = search.measured(&raised, &Placement::AS_GIVEN).0;
+    let judge = search.judge(&raised, settings);
+    let limbs = judge.limbs(&Placement::AS_GIVEN);
+    if settings.join_seams.is_some() {
+        seams.extend(gaps(&sheet, &borders, &judge.is_linked(&Placement::AS_GIVEN), metres));
+    }
+    refuse_stray_pieces(&positions, &topology, search.surface(), &judge.worn_pieces(&Placement::AS_GIVEN))?;
     let rest_surface = search.surface();
 
     turn_outward(&mut sheet, &positions, &topology, rest_surface);
@@ -161,7 +183,11 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
     push_out(&mut positions, &sheet.faces, rest_surface, CLEARANCE);
     let share = stretched(&topology, &unpushed, &positions);
     if share > MOST_STRETCHED {
-        return Err(FitError::Stretched { share });
+        let error = FitError::Stretched { share };
+        match settings.says_place() {
+            true => doubts.push(error.to_string()),
+            false => return Err(error),
+        }
     }
     let after = contact(&positions, rest_surface);
     let moves: Vec<f64> = positions.iter().zip(&unpushed).map(|(a, b)| norm(sub(*a, *b))).collect();
@@ -172,7 +198,7 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
     // Faces have been turned.
     let topology = Topology::new(&rest);
     let category = settings.category.unwrap_or_else(|| guessed(&rest, body, limbs));
-    doubts.extend(settings.category.and_then(|given| contradiction(given, limbs)));
+    doubts.extend(contradiction(category, limbs));
     let holding = Garment::needs_holding(&rest, body);
     let of_file = |e: &[u32; 2]| e.map(|v| sheet.vertex_origin[v as usize]);
     let dropped_pieces = sheet.dropped_pieces.iter();
@@ -215,19 +241,30 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
     Ok(Fitted { garment, report, vertex_of_file, follows, vertex_origin, file_faces })
 }
 
-/// Where the garment belongs. Panels whose seams are open are placed as if they were sewn.
+/// Where the garment belongs: legs that stand apart are looked for, and open seams taken as sewn, only if it is worn nowhere else.
 fn place(search: &Search, cloth: &Cloth, extent: f64, settings: &FitSettings) -> Result<Verdict, FitError> {
     let of = |cloth: &Cloth| verdict(&search.candidates(cloth, extent, settings), search, cloth, settings);
-    let unsewn = match of(cloth) {
-        Err(error @ FitError::Implausible { .. }) => error,
-        other => return other,
+    let as_given = of(cloth);
+    let is_worn = match &as_given {
+        Ok(verdict) => !verdict.is_odd(),
+        Err(error) => !matches!(error, FitError::Implausible { .. } | FitError::OffTrunk { .. }),
     };
-    let Some(sewn) = join_seams(cloth.positions, cloth.faces, Some(SEAM * extent)) else {
-        return Err(unsewn);
-    };
-    let Ok(mesh) = TriMesh::new(sewn.positions, sewn.faces) else { return Err(unsewn) };
-    let topology = Topology::new(&mesh);
-    of(&Cloth::new(mesh.positions(), mesh.faces(), &topology)).map_err(|_| unsewn)
+    if is_worn {
+        return as_given;
+    }
+    let apart = search.candidates_apart(cloth, extent, settings);
+    if let Some(verdict) = verdict(&apart, search, cloth, settings).ok().filter(|v| !v.is_odd()) {
+        return Ok(verdict);
+    }
+    let sewn = join_seams(cloth.positions, cloth.faces, Some(SEAM * extent));
+    if let Some(mesh) = sewn.and_then(|sewn| TriMesh::new(sewn.positions, sewn.faces).ok()) {
+        let topology = Topology::new(&mesh);
+        let sewn = of(&Cloth::new(mesh.positions(), mesh.faces(), &topology));
+        if let Some(verdict) = sewn.ok().filter(|v| !v.is_odd()) {
+            return Ok(verdict);
+        }
+    }
+    as_given.map_err(|error| diagnosed(search, cloth, settings).unwrap_or(error))
 }
 
 /// Share of the edges that became longer than [`MOST_STRETCH`] times what they were.
@@ -239,14 +276,14 @@ fn stretched(topology: &Topology, before: &[[f64; 3]], after: &[[f64; 3]]) -> f6
     topology.edges.iter().filter(is_long).count() as f64 / topology.edges.len().max(1) as f64
 }
 
-fn refuse_other_things(positions: &[[f64; 3]], body: &Body) -> Result<(), FitError> {
+fn refuse_bodies(positions: &[[f64; 3]], body: &Body) -> Result<(), FitError> {
     let (low, high) = body.zero_body().bounds();
     let [lowest, highest] = bounds(positions);
     let spans = |a: usize, slack: f64| lowest[a] < low[a] + slack && highest[a] > high[a] - slack;
     if spans(1, 0.04) && spans(0, 0.1) {
         return Err(FitError::Body);
     }
-    off_trunk(positions, body).map_or(Ok(()), |place| Err(FitError::OffTrunk { place }))
+    Ok(())
 }
 
 fn pieces(mesh: &TriMesh, topology: &Topology) -> Vec<MeshPiece> {

@@ -3,6 +3,7 @@
 use super::category::contradiction;
 use super::cloth::Cloth;
 use super::error::FitError;
+use super::pieces::stray_pieces;
 use super::placement::{Placement, Unit, UpAxis};
 use super::search::{Search, SearchBody};
 use super::settings::{FitSettings, MIN_TRIANGLES};
@@ -31,7 +32,17 @@ impl PlacementCheck {
         let topology = Topology::new(mesh);
         let cloth = Cloth::new(mesh.positions(), mesh.faces(), &topology);
         let settings = FitSettings::default();
-        Search::new(body, &self.0).judge(&cloth, &settings).judged(Placement::AS_GIVEN).worn_pieces
+        Search::new(body, &self.0).judge(&cloth, &settings).worn_pieces(&Placement::AS_GIVEN).len()
+    }
+
+    /// Which connected piece of a mesh, as it stands, lies beside the body, in words.
+    pub fn stray_piece(&self, mesh: &TriMesh, body: &Body) -> Option<String> {
+        let topology = Topology::new(mesh);
+        let cloth = Cloth::new(mesh.positions(), mesh.faces(), &topology);
+        let (search, settings) = (Search::new(body, &self.0), FitSettings::default());
+        let worn = search.judge(&cloth, &settings).worn_pieces(&Placement::AS_GIVEN);
+        let stray = stray_pieces(mesh.positions(), &topology, search.surface(), &worn);
+        stray.first().map(ToString::to_string)
     }
 
     /// What speaks against the category of a mesh that lies where it is worn.
@@ -63,9 +74,13 @@ impl PlacementCheck {
             ..FitSettings::default()
         };
         let cloth = Cloth::new(mesh.positions(), mesh.faces(), &topology);
-        let Ok((_, given)) = search.believed_as_given(&cloth, &settings) else { return false };
+        let worn = search.judge(&cloth, &settings).worn_pieces(&Placement::AS_GIVEN);
+        if !stray_pieces(mesh.positions(), &topology, search.surface(), &worn).is_empty() {
+            return false;
+        }
+        let Ok(given) = search.believed_as_given(&cloth, &settings) else { return false };
         let best = search.candidates(&cloth, mesh.extent(), &settings).first().map_or(f64::MIN, |c| c.score);
-        best <= given + MARGIN
+        best <= given.score + MARGIN
     }
 }
 

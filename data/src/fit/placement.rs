@@ -142,6 +142,8 @@ pub struct Placement {
     pub translation: [f64; 3],
     /// How far the arms of the garment hang below the horizontal (degrees); 0 is a T-pose.
     pub arm_angle_degrees: f64,
+    /// How far each leg of the garment is turned outwards from where the body has it at rest (degrees).
+    pub leg_angle_degrees: f64,
 }
 
 impl Placement {
@@ -153,6 +155,7 @@ impl Placement {
         origin: Origin::Pelvis,
         translation: [0.0; 3],
         arm_angle_degrees: 0.0,
+        leg_angle_degrees: 0.0,
     };
 
     /// Logarithm of how usual such a file is, up to a constant; what `settings` say has no say.
@@ -167,12 +170,18 @@ impl Placement {
             (_, UpAxis::Z) => -0.5,
             _ => -2.0,
         };
-        let turn = match settings.turn_degrees {
-            None if self.turn_degrees != 0.0 => -2.0,
-            _ => 0.0,
+        let turn = match (settings.turn_degrees, self.turn_degrees) {
+            (Some(_), _) | (_, 0.0) => 0.0,
+            // Back to front is the least usual one.
+            (_, 180.0) => -5.0,
+            _ => -2.0,
         };
         let arms = match settings.arms_lowered {
             None if self.arm_angle_degrees != 0.0 => -1.5,
+            _ => 0.0,
+        };
+        let legs = match settings.legs_degrees {
+            None if self.leg_angle_degrees != 0.0 => -1.5,
             _ => 0.0,
         };
         let origin = match (settings.offset, self.origin) {
@@ -182,7 +191,7 @@ impl Placement {
             // better anywhere.
             _ => -12.0,
         };
-        unit + up + turn + arms + origin
+        unit + up + turn + arms + legs + origin
     }
 
     /// In words, short: what a reader compares.
@@ -191,9 +200,13 @@ impl Placement {
             0.0 => "T-pose".to_owned(),
             degrees => format!("A-pose, arms {degrees:.0}° down"),
         };
+        let legs = match self.leg_angle_degrees {
+            0.0 => String::new(),
+            degrees => format!(", legs {degrees:.0}° apart"),
+        };
         let [x, y, z] = self.translation;
         format!(
-            "unit {}, up {}, turned {}°, {arms}, origin at {x:.3}, {y:.3}, {z:.3} m",
+            "unit {}, up {}, turned {}°, {arms}{legs}, origin at {x:.3}, {y:.3}, {z:.3} m",
             self.unit, self.up, self.turn_degrees
         )
     }
@@ -230,8 +243,7 @@ mod tests {
                     up,
                     turn_degrees,
                     origin: Origin::Pelvis,
-                    translation: [0.0; 3],
-                    arm_angle_degrees: 0.0,
+                    ..Placement::AS_GIVEN
                 };
                 let m = placement.turn();
                 let square = rotation::product(&m, &rotation::transpose(&m));

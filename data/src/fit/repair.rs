@@ -4,7 +4,7 @@
 use super::error::FitError;
 use super::report::{Elements, MeshPiece, RepairKind, SeamReport};
 use super::settings::{FitSettings, Keep, MAX_VERTICES, MIN_TRIANGLES};
-use super::sheet::{Corner, Sheet};
+use super::sheet::{Corner, Sheet, SheetBorder};
 use crate::format::PolygonMesh;
 use crate::mesh::{
     AREA_SHARE, JoinedSheet, Seam, WELD_SHARE, clean_faces, diagonal, join_faces, join_seams, open_seams,
@@ -245,6 +245,21 @@ pub(super) fn finish_seams(
     let open = open_seams(&sheet.positions, &sheet.faces, OPEN_GAP / metres, OPEN_LENGTH / metres);
     let open = open.iter().map(|seam| SeamReport::new(&sheet.named(seam), metres, false));
     sheet.seams.iter().map(|seam| SeamReport::new(seam, metres, true)).chain(open).collect()
+}
+
+/// Borders that are not among those of `before` and that no limb passes through: gaps in seams that were joined.
+pub(super) fn gaps(
+    sheet: &Sheet,
+    before: &[SheetBorder],
+    is_linked: &[bool],
+    metres: f64,
+) -> Vec<SeamReport> {
+    let borders = sheet.borders();
+    let is_gap = |(border, is_linked): &(&SheetBorder, &bool)| {
+        !**is_linked && before.iter().all(|known| known.vertices != border.vertices)
+    };
+    let gaps = borders.iter().zip(is_linked).filter(is_gap);
+    gaps.map(|(gap, _)| SeamReport::new(&gap.as_seam(), metres, false)).collect()
 }
 
 /// Turns every piece whose area faces the body more than away from it, and reports all faces that differ from the file.

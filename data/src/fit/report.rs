@@ -231,26 +231,29 @@ impl FitReport {
             }
             Origin::SourceBody => self.from_body.as_ref().map(SourcePlacement::text).unwrap_or_default(),
             Origin::Elsewhere => {
-                format!(
-                    "the file's origin is not the body's: moved by {x:.0}, {y:.0}, {z:.0} mm to where it fits"
-                )
+                format!("the file's origin is not the body's: moved by {x:.0}, {y:.0}, {z:.0} mm")
             }
         };
         let arms = match p.arm_angle_degrees {
             0.0 => "T-pose".to_string(),
             a => format!("A-pose: the arms hang {a:.0}° below the horizontal; raised to the T-pose"),
         };
+        let legs = match p.leg_angle_degrees {
+            0.0 => None,
+            apart => Some(format!("each leg is turned outwards by {apart:.0}°; brought to the rest pose")),
+        };
         let facing = match p.turn_degrees {
             0.0 => "front".to_string(),
             turn => format!("turned by {turn}° about the vertical"),
         };
-        vec![
+        let lines = [
             format!("unit {} (1 = {} m)", p.unit, p.unit.metres()),
             format!("up axis {}, {facing}", p.up),
             origin,
             arms,
             format!("category {}", self.category),
-        ]
+        ];
+        lines.into_iter().chain(legs).collect()
     }
 }
 

@@ -1,14 +1,16 @@
 //! Finds where a garment belongs on the body: unit, axes, origin, turn and arm pose are hypotheses, scored together by a
 //! [`Judge`], from coarse to fine.
 
+mod limbs;
+
 use super::anatomy::Skeleton;
-use super::arm_pose::ArmPose;
-use super::body_field::{ArmTurn, BodyField};
+use super::body_field::{BodyField, LimbTurn};
 use super::climb::{Moves, Steps, climbed};
 use super::cloth::Cloth;
 use super::coverage::off_trunk;
 use super::error::FitError;
 use super::judge::{Candidate, Judge};
+use super::limb_pose::LimbPose;
 use super::placement::{Origin, Placement, Unit, UpAxis};
 use super::settings::FitSettings;
 use super::sitting::Sitting;
@@ -16,7 +18,9 @@ use crate::asset::Body;
 use crate::mesh::bounds;
 use clothcombo_physics::query::Surface;
 use clothcombo_physics::vec3::add;
+use limbs::has_limbs_at_rest;
 use rayon::prelude::*;
+use std::sync::OnceLock;
 
 /// Arm angles tried first (degrees).
 pub(super) const ARM_ANGLES: [f64; 6] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0];
@@ -35,14 +39,14 @@ const CLIMBED: usize = 10;
 const JUDGED: usize = 12;
 /// How far up and down the height of a placement is doubted (m): a garment is back within 2 cm.
 const PROBE: f64 = 0.025;
-/// Candidates in A-pose worth a body of their own.
-const POSED: usize = 2;
 
 /// What is measured on a body once, for all garments.
 pub(super) struct SearchBody {
     pub(super) field: BodyField,
     skeleton: Skeleton,
     surface: Surface<f64>,
+    /// With the legs apart; made when it is first needed.
+    apart: OnceLock<BodyField>,
     /// Largest extent of the body (m).
     reach: f64,
 }
@@ -58,7 +62,8 @@ impl SearchBody {
         }
         let surface = Surface::new(body.template.clone(), body.faces.clone());
         let reach = body.zero_body().extent();
-        Ok(Self { field: BodyField::new(body), skeleton: Skeleton::new(body), surface, reach })
+        let (field, skeleton, apart) = (BodyField::new(body), Skeleton::new(body), OnceLock::new());
+        Ok(Self { field, skeleton, surface, apart, reach })
     }
 }
 
@@ -88,17 +93,17 @@ impl<'a> Search<'a> {
     pub fn measured(&self, cloth: &Cloth, placement: &Placement) -> (Sitting, f64) {
         let points = placement.apply(&cloth.fine.0);
         let [low, high] = bounds(&points);
-        let sitting = match placement.arm_angle_degrees {
-            0.0 => Sitting::new(&points, self.body, &self.measured.surface),
-            degrees => Sitting::new(&points, self.body, &ArmPose::new(self.body, degrees).surface),
+        let sitting = match has_limbs_at_rest(placement) {
+            true => Sitting::new(&points, self.body, &self.measured.surface),
+            false => Sitting::new(&points, self.body, &LimbPose::of(self.body, placement).surface),
         };
         (sitting, high[1] - low[1])
     }
 
     /// Sample points with the arms raised to the T-pose (m).
     pub fn level(&self, cloth: &Cloth, placement: &Placement) -> Vec<[f64; 3]> {
-        let arms = ArmTurn::new(placement.arm_angle_degrees);
-        placement.apply(&cloth.fine.0).into_iter().map(|p| self.measured.field.level(p, arms)).collect()
+        let turn = LimbTurn::of(placement);
+        placement.apply(&cloth.fine.0).into_iter().map(|p| self.measured.field.level(p, turn.arms)).collect()
     }
 
     /// Where a garment lies that covers neither trunk nor hips.
@@ -118,7 +123,20 @@ impl<'a> Search<'a> {
 
     /// Distinct candidates, the best first. `extent`: largest extent of the file in its unit.
     pub fn candidates(&self, cloth: &Cloth, extent: f64, settings: &FitSettings) -> Vec<Candidate> {
+        self.found(cloth, extent, settings, true)
+    }
+
+    /// The same without bodies made for their limbs, to compare sizes by.
+    pub fn quick_candidates(&self, cloth: &Cloth, extent: f64, settings: &FitSettings) -> Vec<Candidate> {
+        self.found(cloth, extent, settings, false)
+    }
+
+    fn found(&self, cloth: &Cloth, extent: f64, settings: &FitSettings, is_posed: bool) -> Vec<Candidate> {
         let judge = self.judge(cloth, settings);
+        let leg_angle_degrees = settings.legs_degrees.unwrap_or(0.0);
+        let straight = Placement { leg_angle_degrees, ..Placement::AS_GIVEN };
+        let posed = self.posed_field(&straight);
+        let judge = Judge { field: posed.as_ref().unwrap_or(judge.field), ..judge };
         let units = Unit::ALL.into_iter().filter(|u| {
             settings.unit.is_none_or(|s| s == *u) && self.is_plausible_extent(extent * u.metres())
         });
@@ -127,8 +145,7 @@ impl<'a> Search<'a> {
         let mut bases = Vec::new();
         for unit in units {
             for &up in &ups {
-                let turned =
-                    turns.iter().map(|t| Placement { unit, up, turn_degrees: *t, ..Placement::AS_GIVEN });
+                let turned = turns.iter().map(|t| Placement { unit, up, turn_degrees: *t, ..straight });
                 bases.extend(turned);
             }
         }
@@ -144,7 +161,10 @@ impl<'a> Search<'a> {
             .chain(self.usual(&bases, &judge).into_par_iter().map(|p| self.judged_as_given(&judge, p)))
             .collect();
         sort(&mut last);
-        self.judge_again_posed(&judge, &mut last);
+        if is_posed {
+            self.judge_again_posed(&judge, &mut last);
+            self.spread_legs(&judge, &mut last);
+        }
         distinct(last)
     }
 
@@ -231,9 +251,7 @@ impl<'a> Search<'a> {
     /// and below it is, when everything but the height is found anew.
     pub fn probed(&self, cloth: &Cloth, settings: &FitSettings, candidate: Candidate) -> (Candidate, f64) {
         let judge = self.judge(cloth, settings);
-        let degrees = candidate.placement.arm_angle_degrees;
-        let posed =
-            (degrees != 0.0).then(|| self.measured.field.posed(&ArmPose::new(self.body, degrees), self.body));
+        let posed = self.posed_field(&candidate.placement);
         let judge = Judge { field: posed.as_ref().unwrap_or(judge.field), ..judge };
         let around = |best: &Candidate, moves: Moves| -> Candidate {
             let at = |dy: f64| {
@@ -249,20 +267,6 @@ impl<'a> Search<'a> {
         let found = around(&start, Moves::All);
         let best = if found.score > start.score { found } else { start };
         (best, best.score - around(&best, Moves::Level).score)
-    }
-
-    /// The best in A-pose, on a body posed like that: the shoulders of the search's body are rigid.
-    fn judge_again_posed(&self, judge: &Judge, ranked: &mut [Candidate]) {
-        for candidate in ranked.iter_mut().filter(|c| c.placement.arm_angle_degrees != 0.0).take(POSED) {
-            let posed = ArmPose::new(self.body, candidate.placement.arm_angle_degrees);
-            let field = self.measured.field.posed(&posed, self.body);
-            let judge = Judge { field: &field, ..*judge };
-            let moves =
-                if candidate.placement.origin == Origin::Elsewhere { Moves::All } else { Moves::Arms };
-            let steps = Steps { from: 0.02, to: 0.0005, is_sharp: true, is_fine: true, moves };
-            *candidate = judge.judged(climbed(&judge, candidate, &steps).placement);
-        }
-        sort(ranked);
     }
 }
 

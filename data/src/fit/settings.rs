@@ -25,6 +25,8 @@ pub struct FitSettings {
     pub up: Option<UpAxis>,
     /// Whether the arms are lowered (A-pose) or not (T-pose).
     pub arms_lowered: Option<bool>,
+    /// How far each leg is turned outwards from the rest pose of the body (degrees).
+    pub legs_degrees: Option<f64>,
     /// Category; otherwise guessed from the shape.
     pub category: Option<Category>,
     /// Where the file's origin lies on the body, from the pelvis of the zero body (m, x to the left, y up, z forward).
@@ -42,6 +44,13 @@ pub struct FitSettings {
 }
 
 impl FitSettings {
+    /// Whether it says anything about where and how the garment is worn: that is taken, and what looks odd there is a warning.
+    pub(super) fn says_place(&self) -> bool {
+        let numbers = [self.turn_degrees, self.legs_degrees].into_iter().any(|hint| hint.is_some());
+        let names = self.unit.is_some() || self.up.is_some() || self.category.is_some();
+        names || numbers || self.arms_lowered.is_some() || self.offset.is_some() || self.from_body.is_some()
+    }
+
     /// Whether they say where a garment belongs: such a garment is never taken where it lies.
     pub fn is_placed(&self) -> bool {
         self.offset.is_some() || self.turn_degrees.is_some() || self.from_body.is_some()

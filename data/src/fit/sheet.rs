@@ -4,7 +4,7 @@ use super::report::{Elements, MeshPiece, Repair, RepairKind};
 use crate::format::{FileFace, PolygonMesh};
 use crate::mesh::{Attachment, Seam, attach};
 use clothcombo_physics::query::VertexIndex;
-use clothcombo_physics::vec3::{cross, norm, norm_squared, sub};
+use clothcombo_physics::vec3::{cross, norm, norm_squared, normalized, sub};
 use clothcombo_physics::{Topology, TriMesh};
 
 /// A corner of a triangle.
@@ -19,6 +19,23 @@ pub(super) struct Corner {
 impl Corner {
     pub fn own(number: u32) -> Self {
         Self { number, is_own: true }
+    }
+}
+
+/// A border of the sheet.
+pub(super) struct SheetBorder {
+    /// Vertices of the file, ascending.
+    pub vertices: Vec<u32>,
+    /// Its longest extent, and how far it reaches from that.
+    length: f64,
+    width: f64,
+}
+
+impl SheetBorder {
+    /// As a seam that stays open.
+    pub fn as_seam(&self) -> Seam {
+        let ends = [0, self.vertices.len() - 1].map(|end| self.vertices[end]);
+        Seam { length: self.length, gap: self.width, widest: self.width, ends, is_joined: false }
     }
 }
 
@@ -180,6 +197,28 @@ impl Sheet {
     /// A seam by vertices of the file.
     pub fn named(&self, seam: &Seam) -> Seam {
         Seam { ends: seam.ends.map(|v| self.vertex_origin[v as usize]), ..*seam }
+    }
+
+    /// All borders, in the order of [`Topology::boundary_loops`].
+    pub fn borders(&self) -> Vec<SheetBorder> {
+        let Ok(mesh) = TriMesh::new(self.positions.clone(), self.faces.clone()) else { return Vec::new() };
+        let borders = Topology::new(&mesh).boundary_loops.into_iter().map(|border| {
+            let distance = |a: u32, b: u32| norm(sub(self.positions[b as usize], self.positions[a as usize]));
+            let farthest = |from: u32| {
+                let of = border.iter().map(|v| (*v, distance(from, *v)));
+                of.fold((from, 0.0), |best, v| if v.1 > best.1 { v } else { best })
+            };
+            let end = farthest(border[0]).0;
+            let (other, length) = farthest(end);
+            let along = normalized(sub(self.positions[other as usize], self.positions[end as usize]));
+            let aside =
+                |v: &u32| norm(cross(along, sub(self.positions[*v as usize], self.positions[end as usize])));
+            let width = border.iter().map(aside).fold(0.0, f64::max);
+            let mut vertices: Vec<u32> = border.iter().map(|v| self.vertex_origin[*v as usize]).collect();
+            vertices.sort_unstable();
+            SheetBorder { vertices, length, width }
+        });
+        borders.collect()
     }
 
     /// Area of a face (in the square of the file's unit).

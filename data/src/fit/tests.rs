@@ -1,4 +1,6 @@
-use super::arm_pose::tests::lowered;
+mod hints;
+
+use super::limb_pose::tests::posed;
 use super::*;
 use crate::asset::Category;
 use crate::asset::rotation;
@@ -68,7 +70,7 @@ fn every_unit_up_axis_and_facing_is_found_and_the_garment_recovered() {
                 turn_degrees: [0.0, 90.0, 180.0, 270.0][number % 4],
                 origin: if on_floor { Origin::Floor } else { Origin::Pelvis },
                 translation: [0.0, if on_floor { floor } else { 0.0 }, 0.0],
-                arm_angle_degrees: 0.0,
+                ..Placement::AS_GIVEN
             };
             let file = polygons(
                 unplaced(original.rest.positions(), &placement),
@@ -125,8 +127,11 @@ struct Messy {
 }
 
 fn messy(original: &Garment, body: &Body, degrees: f64) -> Messy {
-    let posed =
-        if degrees == 0.0 { original.rest.positions().to_vec() } else { lowered(original, body, degrees) };
+    let posed = if degrees == 0.0 {
+        original.rest.positions().to_vec()
+    } else {
+        posed(original, body, [degrees, 0.0])
+    };
     let placement = Placement {
         unit: Unit::Cm,
         up: UpAxis::Z,
@@ -134,6 +139,7 @@ fn messy(original: &Garment, body: &Body, degrees: f64) -> Messy {
         origin: Origin::Floor,
         translation: [0.0, body.zero_body().bounds().0[1], 0.0],
         arm_angle_degrees: degrees,
+        leg_angle_degrees: 0.0,
     };
     let flat = unplaced(&posed, &placement);
     let hinges = Topology::new(&original.rest).hinges;

@@ -1,6 +1,8 @@
 //! Which placement is taken, what else it could be, and when none is believed.
 
 use super::cloth::Cloth;
+use super::diagnosis::size_doubt;
+use super::doubt::{Doubt, SAME};
 use super::error::FitError;
 use super::judge::Candidate;
 use super::placement::{Origin, Placement, Unit};
@@ -8,14 +10,9 @@ use super::search::Search;
 use super::settings::FitSettings;
 use super::sitting::Sitting;
 use clothcombo_physics::vec3::{norm, sub};
-use std::fmt;
 
-/// Another reading whose log-posterior is this near to the best is told.
+/// Another reading, or height, whose log-posterior is this near to the best is told.
 const NEAR_TIE: f64 = 6.0;
-/// A height that changes it by less is not known: one in fifty such garments lies elsewhere.
-const SAME_HEIGHT: f64 = 4.0;
-/// Readings nearer to each other than this are the same (m).
-const SAME: f64 = 0.02;
 /// Largest share of a garment that may lie inside the body where it is worn.
 const MOST_INSIDE: f64 = 0.25;
 /// A garment touches the body: a twentieth of it is nearer than this (m).
@@ -26,87 +23,30 @@ const SNUG: f64 = 0.03;
 const WIDEST_RIM: f64 = 0.1;
 /// A neck opening is no longer than this many times the hem.
 const WIDEST_NECK: f64 = 1.5;
+/// Limbs that are held otherwise explain that much more (log-posterior), or are doubted.
+const LIMB_EVIDENCE: f64 = 12.0;
 /// Least height of a tube around the trunk (m): lower ones are belts.
 const LEAST_HEIGHT: f64 = 0.09;
 
-/// A doubt about a placement that was taken.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum Doubt {
-    /// Another reading is nearly as good.
-    NearTie { taken: Placement, other: Placement, apart: f64 },
-    /// Some centimetres higher or lower it fits nearly as well.
-    Height { taken: Placement },
-    /// A tube may be a skirt or a strapless top.
-    Tube,
-    /// Several pieces are worn on their own.
-    Outfit { pieces: usize },
-}
-
-impl fmt::Display for Doubt {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NearTie { taken, other, apart } => {
-                let flags = differences(taken, other);
-                write!(
-                    f,
-                    "another placement, up to {:.0} mm away, fits nearly as well: {}; {} settles it",
-                    1e3 * apart,
-                    other.reading(),
-                    flags.join(" ")
-                )
-            }
-            Self::Height { taken } => {
-                let [x, y, z] = taken.translation;
-                write!(
-                    f,
-                    "its height is known to 3 cm only: look at it; --offset {x:.3},{y:.3},{z:.3} takes it, another y moves it"
-                )
-            }
-            Self::Outfit { pieces } => write!(
-                f,
-                "{pieces} of its pieces would be worn without the others: for an outfit, export one file per garment"
-            ),
-            Self::Tube => f.write_str(
-                "a tube with two openings may be a skirt at the waist or a strapless top at the chest; --category settles it",
-            ),
-        }
-    }
-}
-
-/// Flags by which the placement taken differs from another, as they fix the one taken.
-fn differences(taken: &Placement, other: &Placement) -> Vec<String> {
-    let mut flags = Vec::new();
-    if taken.unit != other.unit {
-        flags.push(format!("--unit {}", taken.unit));
-    }
-    if taken.up != other.up {
-        flags.push(format!("--up {}", taken.up));
-    }
-    if taken.turn_degrees != other.turn_degrees {
-        flags.push(format!("--turn {}", taken.turn_degrees));
-    }
-    if (taken.arm_angle_degrees == 0.0) != (other.arm_angle_degrees == 0.0) {
-        flags.push(format!("--arms {}", if taken.arm_angle_degrees == 0.0 { "t" } else { "a" }));
-    }
-    let moved = norm(sub(taken.translation, other.translation));
-    if flags.is_empty() && moved < SAME {
-        flags.push("--from-body with the body it was made on".into());
-    }
-    if flags.is_empty() {
-        let [x, y, z] = taken.translation;
-        flags.push(format!("--offset {x:.3},{y:.3},{z:.3}"));
-    }
-    flags
-}
-
 /// Why a candidate is not believed; `None` if it is.
-pub(super) fn implausibility(candidate: &Candidate, sitting: &Sitting, height: f64) -> Option<String> {
+pub(super) fn implausibility(
+    candidate: &Candidate,
+    sitting: &Sitting,
+    height: f64,
+    off_trunk: Option<&str>,
+) -> Option<String> {
     let percent = |share: f64| 100.0 * share;
     if !candidate.is_worn {
         return Some("no opening goes around the trunk, the neck or both arms".into());
     }
-    if candidate.crossings > 0 {
-        return Some(format!("{} bones of the body pass through the cloth", candidate.crossings));
+    if candidate.is_unfounded_turn {
+        return Some("turned by 180°, though its neckline does not show its front there".into());
+    }
+    // Sleeves made for other arms miss these ones where a file says where it is; a place that was searched for must do without.
+    let missed = if candidate.placement.origin == Origin::Elsewhere { candidate.crossings.arms } else { 0 };
+    let crossings = candidate.crossings.others + missed;
+    if crossings > 0 {
+        return Some(format!("{crossings} bones of the body pass through the cloth"));
     }
     if candidate.rim_distance > WIDEST_RIM {
         return Some(format!(
@@ -129,12 +69,12 @@ pub(super) fn implausibility(candidate: &Candidate, sitting: &Sitting, height: f
     if sitting.nearest > FARTHEST {
         return Some(format!("it stays {:.0} mm away from the body", 1e3 * sitting.nearest));
     }
-    None
+    off_trunk.map(str::to_owned)
 }
 
 /// Where a file as it stands lies snugly on head, arms or feet: a band around the head is none around the chest of another unit.
 fn lies_off_trunk(candidate: &Candidate, search: &Search, cloth: &Cloth) -> Option<&'static str> {
-    if candidate.placement.origin == Origin::Elsewhere {
+    if candidate.placement.origin == Origin::Elsewhere || !cloth.is_tubes() {
         return None;
     }
     let place = search.off_trunk(cloth, &candidate.placement)?;
@@ -148,6 +88,47 @@ pub(super) struct Verdict {
     pub doubts: Vec<Doubt>,
 }
 
+impl Verdict {
+    /// Whether it is taken because hints say so, though it does not look worn.
+    pub fn is_odd(&self) -> bool {
+        self.doubts.iter().any(|doubt| matches!(doubt, Doubt::Odd { .. }))
+    }
+}
+
+/// The best readings, the best first.
+pub(super) struct Readings {
+    pub believed: Vec<Candidate>,
+    refused: Vec<(Candidate, String)>,
+    /// Whether the best one lies on the body as it stands, though nobody wears it there.
+    is_near: bool,
+}
+
+impl Readings {
+    pub fn new(candidates: &[Candidate], search: &Search, cloth: &Cloth) -> Self {
+        let (mut believed, mut refused): (Vec<Candidate>, Vec<(Candidate, String)>) = Default::default();
+        let mut is_near = false;
+        for candidate in candidates.iter().take(8) {
+            // What is far worse than one that is believed is not looked at.
+            if believed.first().is_some_and(|best| candidate.score < best.score - NEAR_TIE) {
+                break;
+            }
+            let (sitting, height) = search.measured(cloth, &candidate.placement);
+            let off_trunk = search.off_trunk(cloth, &candidate.placement);
+            match implausibility(candidate, &sitting, height, off_trunk) {
+                None => believed.push(*candidate),
+                Some(why) => {
+                    is_near |= refused.is_empty()
+                        && candidate.placement.origin != Origin::Elsewhere
+                        && sitting.inside < MOST_INSIDE
+                        && sitting.mean_distance < FARTHEST;
+                    refused.push((*candidate, why));
+                }
+            }
+        }
+        Self { believed, refused, is_near }
+    }
+}
+
 /// Takes the best of `candidates`, the best first.
 ///
 /// # Errors
@@ -158,37 +139,32 @@ pub(super) fn verdict(
     cloth: &Cloth,
     settings: &FitSettings,
 ) -> Result<Verdict, FitError> {
-    let (mut believed, mut refused): (Vec<Candidate>, Vec<(Placement, String)>) = Default::default();
-    // Whether the best one lies on the body, though nobody wears it there.
-    let mut is_near = false;
-    for candidate in candidates.iter().take(8) {
-        // What is far worse than one that is believed is not looked at.
-        if believed.first().is_some_and(|best| candidate.score < best.score - NEAR_TIE) {
-            break;
-        }
-        let (sitting, height) = search.measured(cloth, &candidate.placement);
-        match implausibility(candidate, &sitting, height) {
-            None => believed.push(*candidate),
-            Some(why) => {
-                is_near |=
-                    refused.is_empty() && sitting.inside < MOST_INSIDE && sitting.mean_distance < FARTHEST;
-                refused.push((candidate.placement, why));
+    let Readings { believed, refused, is_near } = Readings::new(candidates, search, cloth);
+    let mut doubts = Vec::new();
+    let Some(candidate) = believed.first().or(refused.first().map(|(best, _)| best)).copied() else {
+        return Err(FitError::Implausible { best: "none".into(), second: None });
+    };
+    if let (true, Some((best, why))) = (believed.is_empty(), refused.first()) {
+        if !settings.says_place() {
+            // A hat or a sock that lies where it is worn is called one.
+            let is_metres = best.placement.unit == Unit::M;
+            if let (true, Some(place)) =
+                (is_near && is_metres && cloth.is_tubes(), search.off_trunk(cloth, &best.placement))
+            {
+                return Err(FitError::OffTrunk { place });
             }
+            let mut readings = refused.iter().map(|(c, why)| format!("{} ({why})", c.placement.reading()));
+            let best = readings.next().unwrap_or_default();
+            return Err(FitError::Implausible { best, second: readings.next() });
+        }
+        doubts.push(Doubt::Odd { why: why.clone() });
+    }
+    if let Some(size) = size_doubt(search, cloth, settings, &candidate) {
+        match settings.says_place() || !size.is_refused() {
+            true => doubts.push(Doubt::Size(size)),
+            false => return Err(FitError::Size { size }),
         }
     }
-    let Some(candidate) = believed.first().copied() else {
-        // A hat or a sock that lies where it is worn is called one.
-        let is_metres = settings.unit.is_none_or(|unit| unit == Unit::M);
-        let is_free =
-            is_metres && (settings.up, settings.turn_degrees, settings.offset) == (None, None, None);
-        let best = candidates.first().filter(|_| is_near && is_free);
-        if let Some(place) = best.and_then(|best| search.off_trunk(cloth, &best.placement)) {
-            return Err(FitError::OffTrunk { place });
-        }
-        let mut readings = refused.into_iter().map(|(p, why)| format!("{} ({why})", p.reading()));
-        let best = readings.next().unwrap_or_else(|| "none".into());
-        return Err(FitError::Implausible { best, second: readings.next() });
-    };
     let is_usual = candidate.placement.origin != Origin::Elsewhere || settings.offset.is_some();
     let (candidate, least_loss) = match is_usual {
         true => (candidate, f64::INFINITY),
@@ -209,12 +185,11 @@ pub(super) fn verdict(
         // Sleeves are a small part of a garment.
         apart.get(apart.len() * 19 / 20).copied().unwrap_or(0.0)
     };
-    let mut doubts = Vec::new();
-    let other = believed[1..].iter().map(|c| (c.placement, apart(&c.placement))).find(|(_, d)| *d > SAME);
+    let other = believed.iter().skip(1).map(|c| (c.placement, apart(&c.placement))).find(|(_, d)| *d > SAME);
     if let Some((other, apart)) = other {
         doubts.push(Doubt::NearTie { taken, other, apart });
     }
-    if least_loss < SAME_HEIGHT {
+    if least_loss < NEAR_TIE {
         doubts.push(Doubt::Height { taken });
     }
     if candidate.is_tube && settings.category.is_none() && !is_usual {
@@ -222,6 +197,20 @@ pub(super) fn verdict(
     }
     if candidate.worn_pieces > 1 {
         doubts.push(Doubt::Outfit { pieces: candidate.worn_pieces });
+    }
+    if candidate.crossings.arms > 0 {
+        doubts.push(Doubt::Arms);
+    }
+    if taken.turn_degrees == 180.0 && settings.turn_degrees.is_none() && candidate.neck_drop.is_none() {
+        doubts.push(Doubt::Turned);
+    }
+    // Those that are hinted at are alike in all candidates.
+    let held = |c: &Candidate| (c.placement.arm_angle_degrees != 0.0, c.placement.leg_angle_degrees != 0.0);
+    let otherwise = candidates.iter().find(|c| held(c) != held(&candidate));
+    if held(&candidate) != (false, false)
+        && otherwise.is_some_and(|other| other.score > candidate.score - LIMB_EVIDENCE)
+    {
+        doubts.push(Doubt::Limbs { taken });
     }
     Ok(Verdict { placement: taken, doubts })
 }

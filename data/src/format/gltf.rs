@@ -1,18 +1,20 @@
 //! glTF 2.0, JSON (`.gltf`) and binary (`.glb`): the triangles of the default scene, merged, with their node transforms.
 //!
 //! Own reader of the few parts a mesh needs, so that every accessor is checked against its buffer before it is followed.
-//! Materials, animations and morph targets are read over; a skinned mesh is taken as its vertices are written. Sparse and
-//! compressed accessors are refused by name.
+//! What changes the shape is applied: morph targets at their weights, then skins in the pose of their joint nodes; quantised and
+//! sparse accessors are read, compressed ones refused by name. Materials and animations are read over.
 
 mod buffers;
 mod document;
+mod skin;
 mod write;
 
 pub use write::{SceneMesh, encode_glb, save_glb};
 
 use super::polygon_mesh::{PolygonMesh, check_count};
-use buffers::Buffers;
+use buffers::{Buffers, DECOMPRESS};
 use document::{Document, Node, Primitive};
+use skin::Joints;
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -20,32 +22,34 @@ type Affine = [[f64; 4]; 3];
 
 const IDENTITY: Affine = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
 
-/// Extensions that change how positions are stored.
-const COMPRESSIONS: [&str; 4] = [
-    "KHR_draco_mesh_compression",
-    "EXT_meshopt_compression",
-    "KHR_meshopt_compression",
-    "KHR_mesh_quantization",
-];
+/// Extensions that compress meshes.
+const COMPRESSIONS: [&str; 3] =
+    ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"];
 
 /// Reads a glTF file; external buffers lie in the folder of `path`.
 pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<PolygonMesh, String> {
     let (json, chunk) = if bytes.starts_with(b"glTF") { binary_chunks(bytes)? } else { (bytes, None) };
     let document: Document = serde_json::from_slice(json).map_err(|e| format!("glTF JSON: {e}"))?;
     if let Some(name) = document.extensions_required.iter().find(|e| COMPRESSIONS.contains(&e.as_str())) {
-        return Err(format!("needs the extension {name}; export it without mesh compression"));
+        return Err(format!("needs the extension {name}: {DECOMPRESS}"));
     }
     let mut buffers = Buffers::new(&document, chunk, path.parent().unwrap_or(Path::new("")));
     let mut mesh = PolygonMesh::default();
-    for (mesh_index, place) in placed_meshes(&document)? {
+    let (placed, worlds) = placed_meshes(&document)?;
+    for PlacedMesh { mesh: mesh_index, node, place } in placed {
         let source = document
             .meshes
             .get(mesh_index)
             .ok_or_else(|| format!("a node names mesh {mesh_index} of {}", document.meshes.len()))?;
+        let node = node.map(|node| &document.nodes[node]);
+        let weights = node.and_then(|node| node.weights.as_ref()).unwrap_or(&source.weights);
+        let skin = node.and_then(|node| node.skin);
+        let joints = skin.map(|skin| Joints::new(&document, &mut buffers, skin, &worlds)).transpose()?;
+        let shape = Shape { weights, place: &place, joints: joints.as_ref() };
         // Primitives of one mesh often share their vertices: first vertex and number of those of an accessor.
         let mut vertices: HashMap<usize, (u32, u32)> = HashMap::new();
         for (number, primitive) in source.primitives.iter().enumerate() {
-            add_primitive(primitive, &document, &mut buffers, &place, &mut vertices, &mut mesh)
+            add_primitive(primitive, &document, &mut buffers, &shape, &mut vertices, &mut mesh)
                 .map_err(|message| format!("mesh {mesh_index}, primitive {number}: {message}"))?;
         }
     }
@@ -82,11 +86,21 @@ fn binary_chunks(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), String> {
     Ok((json.ok_or("a .glb without its JSON chunk")?, binary))
 }
 
-/// The meshes of the default scene with their world transforms; without scenes those of all root nodes, without nodes all.
-fn placed_meshes(document: &Document) -> Result<Vec<(usize, Affine)>, String> {
+/// A mesh of the scene.
+struct PlacedMesh {
+    mesh: usize,
+    node: Option<usize>,
+    place: Affine,
+}
+
+/// The meshes of the default scene with their world transforms, and those of all nodes; without scenes those of all root nodes,
+/// without nodes all.
+fn placed_meshes(document: &Document) -> Result<(Vec<PlacedMesh>, Vec<Affine>), String> {
     let nodes = &document.nodes;
+    let mut worlds = vec![IDENTITY; nodes.len()];
     if nodes.is_empty() {
-        return Ok((0..document.meshes.len()).map(|m| (m, IDENTITY)).collect());
+        let all = (0..document.meshes.len()).map(|mesh| PlacedMesh { mesh, node: None, place: IDENTITY });
+        return Ok((all.collect(), worlds));
     }
     let roots: Vec<usize> = match document.scenes.get(document.scene.unwrap_or(0)) {
         Some(scene) => scene.nodes.clone(),
@@ -109,13 +123,15 @@ fn placed_meshes(document: &Document) -> Result<Vec<(usize, Affine)>, String> {
             return Err(format!("node {index} is reached twice; nodes must form a tree"));
         }
         let world = product(&parent, &local_transform(node));
+        worlds[index] = world;
         if let Some(mesh) = node.mesh {
             // The specification: the node transform of a skinned mesh is ignored.
-            placed.push((mesh, if node.skin.is_some() { IDENTITY } else { world }));
+            let place = if node.skin.is_some() { IDENTITY } else { world };
+            placed.push(PlacedMesh { mesh, node: Some(index), place });
         }
         stack.extend(node.children.iter().rev().map(|c| (*c, world)));
     }
-    Ok(placed)
+    Ok((placed, worlds))
 }
 
 fn local_transform(node: &Node) -> Affine {
@@ -153,11 +169,47 @@ fn is_mirrored(m: &Affine) -> bool {
     determinant < 0.0
 }
 
+/// What happens to the vertices of a mesh.
+struct Shape<'a> {
+    /// Of its morph targets.
+    weights: &'a [f64],
+    place: &'a Affine,
+    joints: Option<&'a Joints>,
+}
+
+impl Shape<'_> {
+    /// The vertices of a primitive where the scene has them.
+    fn positions(
+        &self,
+        primitive: &Primitive,
+        accessor: usize,
+        document: &Document,
+        buffers: &mut Buffers,
+    ) -> Result<Vec<[f64; 3]>, String> {
+        let mut positions: Vec<[f64; 3]> = buffers.numbers(document, accessor)?;
+        for (target, weight) in primitive.targets.iter().zip(self.weights).filter(|(_, w)| **w != 0.0) {
+            let Some(moves) = target.get("POSITION") else { continue };
+            let moves: Vec<[f64; 3]> = buffers.numbers(document, *moves)?;
+            if moves.len() != positions.len() {
+                return Err(format!("a morph target has {} of {} vertices", moves.len(), positions.len()));
+            }
+            for (p, m) in positions.iter_mut().zip(moves) {
+                (0..3).for_each(|k| p[k] += weight * m[k]);
+            }
+        }
+        if let Some(joints) = self.joints {
+            joints.skin(primitive, document, buffers, &mut positions)?;
+        }
+        positions.iter_mut().for_each(|p| *p = transform(self.place, *p));
+        Ok(positions)
+    }
+}
+
 fn add_primitive(
     primitive: &Primitive,
     document: &Document,
     buffers: &mut Buffers,
-    place: &Affine,
+    shape: &Shape,
     vertices: &mut HashMap<usize, (u32, u32)>,
     mesh: &mut PolygonMesh,
 ) -> Result<(), String> {
@@ -171,7 +223,7 @@ fn add_primitive(
         Some(known) => *known,
         None => {
             let base = mesh.positions.len();
-            let positions = buffers.positions(document, accessor)?;
+            let positions = shape.positions(primitive, accessor, document, buffers)?;
             check_count("vertices", base + positions.len())?;
             let own = (base as u32, positions.len() as u32);
             let texture = primitive.attributes.get("TEXCOORD_0");
@@ -186,7 +238,7 @@ fn add_primitive(
                 None if !mesh.texture.is_empty() => mesh.texture.resize(base + positions.len(), [0.0; 2]),
                 None => {}
             }
-            mesh.positions.extend(positions.into_iter().map(|p| transform(place, p)));
+            mesh.positions.extend(positions);
             vertices.insert(accessor, own);
             own
         }
@@ -212,7 +264,7 @@ fn add_primitive(
         other => return Err(format!("unknown primitive mode {other}")),
     };
     check_count("faces", mesh.polygon_count() + triangles.len())?;
-    let turned = is_mirrored(place);
+    let turned = is_mirrored(shape.place);
     for [a, b, c] in triangles {
         let t = [a + base, b + base, c + base];
         mesh.push(&if turned { [t[0], t[2], t[1]] } else { t });

@@ -98,7 +98,7 @@ fn object(kind: &Kind, number: usize, draw: &mut Draw) -> Object {
         turn_degrees: draw.any(&[0.0, 90.0, 180.0, 270.0]),
         origin: Origin::Pelvis,
         translation: [0.0; 3],
-        arm_angle_degrees: 0.0,
+        ..Placement::AS_GIVEN
     };
     let back = rotation::transpose(&placement.turn());
     let of_file = |p: &[f64; 3]| rotation::apply(&back, p.map(|x| x / placement.unit.metres()));

@@ -6,7 +6,7 @@
 use clothcombo_data::asset::{Binding, BindingSettings, Body, BodyFileSettings, Category, Garment, Pose};
 use clothcombo_data::fit::{FitSettings, Origin, Placement, Unit, UpAxis, fit};
 use clothcombo_data::format::PolygonMesh;
-use clothcombo_data::generate::{GarmentGenerator, GarmentSettings};
+use clothcombo_data::generate::{GarmentGenerator, GarmentSettings, mannequin};
 use clothcombo_physics::vec3::{add, norm, scale, sub};
 use clothcombo_tests::fuzz_cases;
 use rand::{RngExt, SeedableRng};
@@ -48,6 +48,7 @@ fn convention(rng: &mut ChaCha8Rng) -> Placement {
         turn_degrees: 90.0 * f64::from(rng.random_range(0..4)),
         origin: Origin::Elsewhere,
         translation: scale(direction, shift),
+        leg_angle_degrees: 0.0,
         arm_angle_degrees: if rng.random::<bool>() { rng.random_range(ARMS[0]..ARMS[1]) } else { 0.0 },
     }
 }
@@ -104,4 +105,33 @@ fn garments_come_back_from_any_convention_or_are_doubted() {
     println!("{}", silent.join("\n"));
     assert!(silent.is_empty(), "silently elsewhere:\n{}", silent.join("\n"));
     assert!(10 * back >= 9 * cases, "{back} of {cases}");
+}
+
+#[test]
+fn garments_of_another_body_keep_limbs_front_and_category_or_say_so() {
+    let body = Path::new(env!("CARGO_MANIFEST_DIR")).join("../models/default/body.npz");
+    let (body, made_on) = (Body::load(&body, &BodyFileSettings::default()).unwrap(), mannequin());
+    let generator = GarmentGenerator::new(&made_on).unwrap();
+    let settings = GarmentSettings { target_vertices: 900, ..GarmentSettings::default() };
+    for (category, design) in [
+        (Category::Dress, 5),
+        (Category::Top, 12),
+        (Category::Top, 18),
+        (Category::Skirt, 15),
+        (Category::Skirt, 21),
+        (Category::Trousers, 16),
+    ] {
+        let garment = generator.generate(category, design, &settings).unwrap();
+        let mesh = file(&garment, &made_on, &Placement::AS_GIVEN);
+        let report = fit(&mesh, &body, &FitSettings::default()).unwrap().report;
+        let Placement { turn_degrees, arm_angle_degrees, leg_angle_degrees, .. } = report.placement;
+        let is_kept = (turn_degrees, arm_angle_degrees, leg_angle_degrees) == (0.0, 0.0, 0.0)
+            && report.category == garment.category;
+        let is_told = |word: &str| report.doubts.iter().any(|doubt| doubt.contains(word));
+        assert!(
+            is_kept || is_told("turned by 180°") || is_told("rest pose") || is_told("--category"),
+            "{report}"
+        );
+        assert!(turn_degrees == 0.0 || is_told("--turn"), "{report}");
+    }
 }

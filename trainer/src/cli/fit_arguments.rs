@@ -10,6 +10,8 @@ use std::sync::Arc;
 
 /// Borders farther apart (m) are no seam.
 const WIDEST_SEAM: f64 = 0.1;
+/// No garment is made with its legs farther apart (degrees, each).
+const WIDEST_STANCE: f64 = 60.0;
 /// No file's origin is farther from the body (m).
 const FARTHEST_ORIGIN: f64 = 1e4;
 
@@ -25,6 +27,9 @@ pub struct FitArguments {
     /// Arms of the garment: level (t), lowered (a), or auto
     #[arg(long, default_value = "auto", value_parser = automatic::<Arms>)]
     arms: Automatic<Arms>,
+    /// How far each leg of the garment is turned outwards from the rest pose of the body; found out if not given
+    #[arg(long, value_name = "DEGREES", allow_hyphen_values = true, value_parser = legs)]
+    legs: Option<f64>,
     /// Category: dress, top, t_shirt, open_shirt, skirt or trousers; guessed from the shape if not given
     #[arg(long)]
     category: Option<Category>,
@@ -60,6 +65,7 @@ impl FitArguments {
             unit: self.unit.0,
             up: self.up.0,
             arms_lowered: self.arms.0.map(|arms| arms == Arms::A),
+            legs_degrees: self.legs,
             category: self.category,
             offset: self.offset,
             turn_degrees: self.turn,
@@ -79,6 +85,7 @@ pub struct GarmentEntry {
     unit: Option<String>,
     up: Option<String>,
     arms: Option<String>,
+    legs: Option<f64>,
     category: Option<String>,
     offset: Option<[f64; 3]>,
     turn: Option<f64>,
@@ -106,7 +113,7 @@ impl GarmentEntry {
         }
         let arms = hint("arms", &self.arms, Arms::from_str)?;
         let numbers = self.offset.map(|o| o.map(|x| x.to_string()).join(","));
-        let turned = self.turn.map(|degrees| degrees.to_string());
+        let [turned, apart] = [self.turn, self.legs].map(|hint| hint.map(|degrees| degrees.to_string()));
         let source = |text: &str| {
             let found = match text.rsplit_once(':') {
                 Some((path, shape)) if beside(text) == text => format!("{}:{shape}", beside(path)),
@@ -119,6 +126,7 @@ impl GarmentEntry {
             unit: hint("unit", &self.unit, Unit::from_str)?.or(all.unit),
             up: hint("up", &self.up, UpAxis::from_str)?.or(all.up),
             arms_lowered: arms.map(|arms| arms == Arms::A).or(all.arms_lowered),
+            legs_degrees: hint("legs", &apart, legs)?.or(all.legs_degrees),
             category: hint("category", &self.category, Category::from_str)?.or(all.category),
             offset: hint("offset", &numbers, offset)?.or(all.offset),
             turn_degrees: hint("turn", &turned, turn)?.or(all.turn_degrees),
@@ -174,6 +182,11 @@ fn turn(text: &str) -> Result<f64, String> {
     degrees.ok_or_else(|| format!("'{text}' is no angle from -360 to 360 degrees"))
 }
 
+fn legs(text: &str) -> Result<f64, String> {
+    let degrees = text.parse::<f64>().ok().filter(|degrees| degrees.abs() <= WIDEST_STANCE);
+    degrees.ok_or_else(|| format!("'{text}' is no angle from -{WIDEST_STANCE} to {WIDEST_STANCE} degrees"))
+}
+
 /// A length in metres, or with a unit.
 fn seam_width(text: &str) -> Result<f64, String> {
     let text = text.trim();
@@ -223,6 +236,8 @@ mod tests {
             "z",
             "--arms",
             "a",
+            "--legs",
+            "7.5",
             "--category",
             "top",
             "--offset",
@@ -238,6 +253,7 @@ mod tests {
             unit: Some(Unit::Cm),
             up: Some(UpAxis::Z),
             arms_lowered: Some(true),
+            legs_degrees: Some(7.5),
             category: Some(Category::Top),
             offset: Some([-0.1, 0.95, 0.0]),
             turn_degrees: Some(-90.0),
@@ -269,6 +285,7 @@ mod tests {
             (["--offset", "nan,0,0"], "farther"),
             (["--turn", "900"], "360"),
             (["--arms", "up"], "t, a"),
+            (["--legs", "wide"], "60"),
         ] {
             let message = parsed(&arguments).unwrap_err();
             assert!(message.contains(part) && message.contains(arguments[0]), "{message}");

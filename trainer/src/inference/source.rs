@@ -6,12 +6,13 @@ use crate::dataset::{DatasetError, GarmentLoader, GarmentSource};
 use crate::score::misplaced;
 use clothcombo_data::asset::{Body, Category, Garment, Provenance};
 use clothcombo_data::fit::{
-    FitError, FitReport, FitSettings, PlacementCheck, fit, in_file_order, needs_repair,
+    FitError, FitReport, FitSettings, PlacementCheck, fit, in_file_order, needs_repair, stray_pieces,
 };
 use clothcombo_data::folders::list_garment_folder;
 use clothcombo_data::format::{PolygonMesh, load_mesh};
 use clothcombo_data::generate::GarmentGenerator;
 use clothcombo_data::mesh::{Attachment, MeshMeasures, thickness};
+use clothcombo_physics::Surface;
 use clothcombo_physics::mesh::{Topology, TriMesh};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -97,13 +98,17 @@ impl GivenGarment {
     }
 }
 
-/// Whether a mesh that is taken as it is lies somewhere near the zero body: if not, it intersects nothing, and looks
-/// like a good drape.
+/// Whether every piece of a mesh that is taken as it is lies near the zero body: if not, it intersects nothing, and looks like a
+/// good drape.
 fn check_place(path: &Path, rest: &TriMesh, body: &Body) -> Result<(), DraperError> {
-    match misplaced(rest, &body.zero_body()) {
-        Some(what) => Err(DraperError::Place { path: path.into(), what }),
-        None => Ok(()),
-    }
+    let zero = body.zero_body();
+    let what = misplaced(rest, &zero).or_else(|| {
+        let (topology, surface) = (Topology::new(rest), Surface::from_mesh(&zero));
+        // Whether limbs pass through the pieces is not asked of cloth that is taken as it is.
+        let all: Vec<u32> = (0..topology.component_count as u32).collect();
+        stray_pieces(rest.positions(), &topology, &surface, &all).first().map(ToString::to_string)
+    });
+    what.map_or(Ok(()), |what| Err(DraperError::Place { path: path.into(), what }))
 }
 
 /// Whether a mesh is one garment that is worn where it lies.

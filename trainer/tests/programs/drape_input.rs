@@ -4,7 +4,7 @@ use crate::common::holds;
 use crate::drape::{SKIRT, TEE, at, drape, failure, report, run_folder, save_motion};
 use assert_cmd::Command;
 use clothcombo_data::format::{load_mesh, load_tri_mesh, obj};
-use clothcombo_physics::mesh::shapes::{icosphere, mapped};
+use clothcombo_physics::mesh::shapes::{icosphere, mapped, tube, union};
 use std::fs;
 use std::path::Path;
 
@@ -60,7 +60,13 @@ fn wrong_input_names_itself_and_leaves_nothing() {
         path
     };
     let (huge, far) = (ball("huge.obj", 1e3, 0.0), ball("far.obj", 1.0, 100.0));
+    let apart = at(&folder, "apart.obj");
+    let sleeve = tube(0.2, 0.4, 24, 6);
+    let beside = mapped(&sleeve, |[x, y, z]| [x + 1.5, y, z]);
+    let pair = union(&[&sleeve, &beside]);
+    obj::save(Path::new(&apart), pair.positions(), pair.faces(), &[]).unwrap();
     let cases: Vec<(Vec<&str>, Vec<&str>)> = vec![
+        (vec!["--garments", &apart, "--fit", "never"], vec!["apart.obj", "one of its 2 pieces"]),
         (vec!["--garments", &band], vec!["broken.obj:2:", "not finite"]),
         (vec!["--garments", &cube], vec!["cube.obj", "triangles"]),
         (vec!["--garments", "none.obj"], vec!["none.obj"]),

@@ -124,6 +124,7 @@ impl SourceBody {
         for (is_given, flag, says) in [
             (settings.offset.is_some() && is_mesh, "--offset", "where the origin is"),
             (settings.arms_lowered.is_some(), "--arms", "how the arms are held"),
+            (settings.legs_degrees.is_some(), "--legs", "how the legs are held"),
         ] {
             if is_given {
                 return Err(wrong(format!("the body says {says}; leave {flag} out")));
@@ -138,7 +139,7 @@ impl SourceBody {
                     turn_degrees: settings.turn_degrees.unwrap_or(0.0),
                     origin: Origin::SourceBody,
                     translation: settings.offset.unwrap_or(scale(model.pelvis, -1.0)),
-                    arm_angle_degrees: 0.0,
+                    ..Placement::AS_GIVEN
                 };
                 let carrier = match same_model::has_topology(body, &model.faces) {
                     true => Carrier::Same(SameModel::shaped(model.positions.clone())),
@@ -167,12 +168,12 @@ pub(super) struct Cloth<'a> {
 }
 
 impl Aligned {
-    /// What is wrong with a garment that is not worn where its body puts it.
-    pub fn refusal(&self, what: &str) -> FitError {
-        let what = format!(
-            "placed through it, nobody wears the garment: {what}. Was it made on this body, and are both in the same coordinates?"
-        );
-        FitError::SourceBody { name: self.name.clone(), what }
+    /// What is odd about a garment where its body puts it.
+    pub fn doubt(&self, what: &str) -> String {
+        format!(
+            "placed through {}, the garment looks odd: {what}: was it made on this body, and are both in the same coordinates?",
+            self.name
+        )
     }
 
     /// Carries a garment, `[V, 3]` in the file's coordinates, to the zero body of `body` (m), and says how.

@@ -1,7 +1,8 @@
 //! The target's model with a shape, its arms lowered and its legs spread: what a mesh of a person is compared with.
 
+use super::super::limb_pose::limb_pose;
 use super::icp::Similarity;
-use crate::asset::{Body, Pose, rotation};
+use crate::asset::{Body, rotation};
 use clothcombo_physics::Surface;
 use clothcombo_physics::vec3::{add, cross, dot, sub};
 use faer::linalg::solvers::Solve;
@@ -19,9 +20,6 @@ const PRIOR: f64 = 0.02;
 /// Share of the samples that have a say.
 const TRIM: f64 = 0.85;
 
-/// Joints of arms and of legs that are turned.
-const LIMBS: [[&str; 2]; 2] = [["left_shoulder", "right_shoulder"], ["left_hip", "right_hip"]];
-
 /// A shaped and posed body.
 #[derive(Clone)]
 pub(super) struct Model {
@@ -33,24 +31,11 @@ pub(super) struct Model {
     pub bones: Vec<[[f64; 4]; 3]>,
 }
 
-/// The pose in which arms hang down and legs are spread by these angles (degrees).
-pub(super) fn pose(body: &Body, angles: [f64; 2]) -> Pose {
-    let mut pose = Pose::t_pose(body.joint_count());
-    for (names, inwards) in LIMBS.iter().zip([angles[0], -angles[1]]) {
-        for (name, sign) in names.iter().zip([-1.0, 1.0]) {
-            if let Some(j) = body.joint(name) {
-                pose.rotations[j] = [0.0, 0.0, sign * inwards.to_radians()];
-            }
-        }
-    }
-    pose
-}
-
 impl Model {
     /// # Errors
     /// When the shape has more numbers than the body.
     pub fn new(body: &Body, shape: &[f64], angles: [f64; 2]) -> Result<Self, String> {
-        let posed = body.posed(shape, &pose(body, angles)).map_err(|e| e.to_string())?;
+        let posed = body.posed(shape, &limb_pose(body, angles)).map_err(|e| e.to_string())?;
         Ok(Self { angles, shape: shape.to_vec(), positions: posed.positions, bones: posed.bones })
     }
 

@@ -113,7 +113,8 @@ pub(super) fn register(
     }
     let shaped = body.shaped(&best.model.shape).map_err(|e| e.to_string())?.positions;
     let Trial { model, motion, .. } = best;
-    let placement = Placement { arm_angle_degrees: model.angles[0], ..placement };
+    let [arm_angle_degrees, leg_angle_degrees] = model.angles;
+    let placement = Placement { arm_angle_degrees, leg_angle_degrees, ..placement };
     let registered = Registered {
         positions: placement.apply(surface.positions()),
         faces: surface.faces().into(),

@@ -1,3 +1,4 @@
+use super::super::limb_pose::limb_pose;
 use super::*;
 use crate::asset::{Pose, SparseSkinWeights};
 use crate::fit::{Fitted, fit};
@@ -199,7 +200,7 @@ fn a_mesh_of_other_vertices_in_an_a_pose_is_registered() {
         obj::save(Path::new(&file), &in_cm_z_up(&posed.positions, up), &other.faces, &[]).unwrap();
         for category in CATEGORIES {
             let garment = generated(&body, category, 9, 700);
-            let pose = model::pose(&body, [40.0, legs]);
+            let pose = limb_pose(&body, [40.0, legs]);
             let made = in_cm_z_up(&worn(&garment, &body, beta, &pose), up);
             let mesh = polygons(&made, garment.rest.faces());
             let fitted = fit(&mesh, &body, &through(&file, category)).unwrap();

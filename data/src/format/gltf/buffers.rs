@@ -1,6 +1,6 @@
 //! The bytes behind glTF accessors: the binary chunk, `data:` URIs, files beside the document.
 
-use super::document::{Accessor, Document};
+use super::document::{Accessor, Document, SparsePart};
 use crate::format::polygon_mesh::{check_count, read_limited};
 use crate::format::scalar::Scalar;
 use base64::Engine;
@@ -10,11 +10,36 @@ use percent_encoding::percent_decode_str;
 use std::borrow::Cow;
 use std::path::{Component, Path, PathBuf};
 
+/// The extension by which positions may be integers.
+const QUANTISATION: &str = "KHR_mesh_quantization";
+
 /// Component types of the specification.
-const U8: u32 = 5121;
-const U16: u32 = 5123;
-const U32: u32 = 5125;
-const F32: u32 = 5126;
+fn scalar(component_type: u32) -> Option<Scalar> {
+    Some(match component_type {
+        5120 => Scalar::I8,
+        5121 => Scalar::U8,
+        5122 => Scalar::I16,
+        5123 => Scalar::U16,
+        5125 => Scalar::U32,
+        5126 => Scalar::F32,
+        _ => return None,
+    })
+}
+
+/// What a normalised number is divided by.
+fn largest(scalar: Scalar) -> f64 {
+    match scalar {
+        Scalar::I8 => 127.0,
+        Scalar::U8 => 255.0,
+        Scalar::I16 => 32767.0,
+        Scalar::U16 => 65535.0,
+        _ => 1.0,
+    }
+}
+
+/// The way out for compressed files.
+pub(super) const DECOMPRESS: &str = "compressed meshes are not read; export without compression (Blender: glTF export, Data, \
+                                     Compression off; or `gltf-transform copy IN OUT`)";
 
 /// Buffers of a document, loaded when first asked for.
 pub(super) struct Buffers<'a> {
@@ -29,48 +54,88 @@ impl<'a> Buffers<'a> {
         Self { chunk, folder: folder.into(), loaded }
     }
 
-    /// A VEC3 of floats.
-    pub fn positions(&mut self, document: &Document, accessor: usize) -> Result<Vec<[f64; 3]>, String> {
+    /// `N` numbers per item: floats; integers where the document is quantised, and as joints and weights.
+    pub fn numbers<const N: usize>(
+        &mut self,
+        document: &Document,
+        accessor: usize,
+    ) -> Result<Vec<[f64; N]>, String> {
         let item = get_accessor(document, accessor)?;
-        if item.component_type != F32 || item.kind != "VEC3" {
-            return Err(format!("accessor {accessor} is no VEC3 of floats, as positions must be"));
-        }
+        let kind = match N {
+            2 => "VEC2",
+            3 => "VEC3",
+            4 => "VEC4",
+            _ => "MAT4",
+        };
+        let is_quantised = document.extensions_used.iter().any(|name| name == QUANTISATION);
+        let may_be = |scalar: &Scalar| *scalar == Scalar::F32 || N == 4 || is_quantised;
+        let Some(scalar) = scalar(item.component_type).filter(may_be).filter(|_| item.kind == kind) else {
+            return Err(format!("accessor {accessor} is no {kind} of floats, as it must be here"));
+        };
+        let divisor = if item.normalized { largest(scalar) } else { 1.0 };
+        let size = scalar.bytes();
+        let parse = |raw: &[u8]| -> [f64; N] {
+            let number = |k: usize| scalar.read(&raw[k * size..(k + 1) * size], false) / divisor;
+            // The lowest number of a signed type is below -1.
+            std::array::from_fn(|k| if item.normalized { number(k).max(-1.0) } else { number(k) })
+        };
         check_count("vertices", item.count)?;
-        let mut positions = Vec::new();
-        self.for_each(document, accessor, item, 12, |raw| {
-            positions.push(std::array::from_fn(|a| Scalar::F32.read(&raw[4 * a..4 * a + 4], false)));
-        })?;
-        Ok(positions)
+        let mut numbers = Vec::new();
+        match (&item.sparse, item.buffer_view) {
+            (Some(_), None) => numbers.resize(item.count, [0.0; N]),
+            _ => self.for_each(document, accessor, item, N * size, |raw| numbers.push(parse(raw)))?,
+        }
+        if let Some(sparse) = &item.sparse {
+            let part = |part: &SparsePart, component_type: u32, kind: &str| Accessor {
+                buffer_view: Some(part.buffer_view),
+                byte_offset: part.byte_offset,
+                component_type,
+                count: sparse.count,
+                kind: kind.to_owned(),
+                normalized: false,
+                sparse: None,
+            };
+            check_count("sparse items", sparse.count)?;
+            let (Some(indices), Some(values_there)) = (&sparse.indices, &sparse.values) else {
+                return Err(format!("accessor {accessor} is sparse without indices or values"));
+            };
+            let indices = part(indices, indices.component_type.unwrap_or_default(), "SCALAR");
+            let indices = self.unsigned(document, accessor, &indices)?;
+            let mut values = Vec::new();
+            let of_values = part(values_there, item.component_type, kind);
+            self.for_each(document, accessor, &of_values, N * size, |raw| values.push(parse(raw)))?;
+            for (index, value) in indices.into_iter().zip(values) {
+                *numbers.get_mut(index as usize).ok_or_else(|| {
+                    format!("accessor {accessor} changes item {index}, but has {}", item.count)
+                })? = value;
+            }
+        }
+        Ok(numbers)
     }
 
-    /// `count` times a VEC2 of finite floats; `None` for anything else.
+    /// `count` finite texture coordinates; `None` for anything else.
     pub fn texture(&mut self, document: &Document, accessor: usize, count: usize) -> Option<Vec<[f64; 2]>> {
-        let item = get_accessor(document, accessor).ok()?;
-        if item.component_type != F32 || item.kind != "VEC2" || item.count != count {
-            return None;
-        }
-        let mut texture: Vec<[f64; 2]> = Vec::new();
-        let read = self.for_each(document, accessor, item, 8, |raw| {
-            texture.push(std::array::from_fn(|a| Scalar::F32.read(&raw[4 * a..4 * a + 4], false)));
-        });
-        read.ok().filter(|()| texture.as_flattened().iter().all(|x| x.is_finite())).map(|()| texture)
+        let texture: Vec<[f64; 2]> = self.numbers(document, accessor).ok()?;
+        let is_finite = texture.as_flattened().iter().all(|x| x.is_finite());
+        Some(texture).filter(|texture| texture.len() == count && is_finite)
     }
 
     /// A SCALAR of unsigned integers.
     pub fn indices(&mut self, document: &Document, accessor: usize) -> Result<Vec<u32>, String> {
         let item = get_accessor(document, accessor)?;
-        let scalar = match (item.component_type, item.kind.as_str()) {
-            (U8, "SCALAR") => Scalar::U8,
-            (U16, "SCALAR") => Scalar::U16,
-            (U32, "SCALAR") => Scalar::U32,
-            _ => {
-                return Err(format!(
-                    "accessor {accessor} is no SCALAR of unsigned integers, as indices must be"
-                ));
-            }
+        if item.sparse.is_some() {
+            return Err(format!("accessor {accessor} is sparse, which indices are not"));
+        }
+        self.unsigned(document, accessor, item)
+    }
+
+    fn unsigned(&mut self, document: &Document, number: usize, item: &Accessor) -> Result<Vec<u32>, String> {
+        let scalar = scalar(item.component_type).filter(|_| item.kind == "SCALAR");
+        let Some(scalar) = scalar.filter(|s| matches!(s, Scalar::U8 | Scalar::U16 | Scalar::U32)) else {
+            return Err(format!("accessor {number} is no SCALAR of unsigned integers, as indices must be"));
         };
         let mut indices = Vec::new();
-        self.for_each(document, accessor, item, scalar.bytes(), |raw| {
+        self.for_each(document, number, item, scalar.bytes(), |raw| {
             indices.push(scalar.read(raw, false) as u32);
         })?;
         Ok(indices)
@@ -85,12 +150,9 @@ impl<'a> Buffers<'a> {
         size: usize,
         mut visit: impl FnMut(&[u8]),
     ) -> Result<(), String> {
-        if accessor.sparse.is_some() {
-            return Err(format!("accessor {number} is sparse; export the mesh without sparse accessors"));
-        }
         let view_index = accessor
             .buffer_view
-            .ok_or_else(|| format!("accessor {number} has no buffer view; compressed meshes are not read"))?;
+            .ok_or_else(|| format!("accessor {number} has no buffer view: {DECOMPRESS}"))?;
         let view = (document.buffer_views.get(view_index))
             .ok_or_else(|| format!("accessor {number} names buffer view {view_index}, which is not there"))?;
         let stride = view.byte_stride.unwrap_or(size);

@@ -7,6 +7,7 @@ use std::collections::HashMap;
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct Document {
     pub extensions_required: Vec<String>,
+    pub extensions_used: Vec<String>,
     pub scene: Option<usize>,
     pub scenes: Vec<Scene>,
     pub nodes: Vec<Node>,
@@ -14,6 +15,14 @@ pub(super) struct Document {
     pub accessors: Vec<Accessor>,
     pub buffer_views: Vec<BufferView>,
     pub buffers: Vec<Buffer>,
+    pub skins: Vec<Skin>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(rename_all = "camelCase", default)]
+pub(super) struct Skin {
+    pub joints: Vec<usize>,
+    pub inverse_bind_matrices: Option<usize>,
 }
 
 #[derive(Debug, Default, Deserialize)]
@@ -28,6 +37,8 @@ pub(super) struct Node {
     pub children: Vec<usize>,
     pub mesh: Option<usize>,
     pub skin: Option<usize>,
+    /// Of the morph targets, before those of the mesh.
+    pub weights: Option<Vec<f64>>,
     pub matrix: Option<[f64; 16]>,
     pub translation: [f64; 3],
     /// Quaternion x, y, z, w.
@@ -41,6 +52,7 @@ impl Default for Node {
             children: Vec::new(),
             mesh: None,
             skin: None,
+            weights: None,
             matrix: None,
             translation: [0.0; 3],
             rotation: [0.0, 0.0, 0.0, 1.0],
@@ -53,6 +65,8 @@ impl Default for Node {
 #[serde(default)]
 pub(super) struct Mesh {
     pub primitives: Vec<Primitive>,
+    /// Of the morph targets.
+    pub weights: Vec<f64>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -61,6 +75,9 @@ pub(super) struct Primitive {
     pub attributes: HashMap<String, usize>,
     pub indices: Option<usize>,
     pub mode: Option<u32>,
+    /// Morph targets: accessors of displacements.
+    #[serde(default)]
+    pub targets: Vec<HashMap<String, usize>>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -73,7 +90,27 @@ pub(super) struct Accessor {
     pub count: usize,
     #[serde(rename = "type")]
     pub kind: String,
-    pub sparse: Option<serde::de::IgnoredAny>,
+    #[serde(default)]
+    pub normalized: bool,
+    pub sparse: Option<Sparse>,
+}
+
+/// Items that differ from those of the buffer view, or from zero.
+#[derive(Debug, Deserialize)]
+pub(super) struct Sparse {
+    pub count: usize,
+    pub indices: Option<SparsePart>,
+    pub values: Option<SparsePart>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct SparsePart {
+    pub buffer_view: usize,
+    #[serde(default)]
+    pub byte_offset: usize,
+    /// Of indices only.
+    pub component_type: Option<u32>,
 }
 
 #[derive(Debug, Deserialize)]

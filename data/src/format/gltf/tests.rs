@@ -147,3 +147,71 @@ fn texture_coordinates_are_read_by_vertex_with_v_up() {
         assert!(textured(&wrong).texture.is_empty(), "{wrong}");
     }
 }
+
+/// One triangle at `accessor`, in a buffer that begins with its corners as floats, and what else is said of it.
+fn triangle(
+    accessor: &str,
+    primitive: &str,
+    node: &str,
+    more: &str,
+    binary: &[u8],
+) -> Result<PolygonMesh, String> {
+    let json = format!(
+        r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"mesh":0{node}}},{{"scale":[0.01,0.01,0.01],"translation":[0,1,0]}}],
+        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0{primitive}],"weights":[0.5]}}],
+        "accessors":[{{"count":3,"type":"VEC3",{accessor}}},
+                     {{"bufferView":1,"componentType":5126,"count":3,"type":"VEC3"}},
+                     {{"bufferView":1,"componentType":5121,"count":3,"type":"VEC4"}},
+                     {{"bufferView":2,"componentType":5121,"normalized":true,"count":3,"type":"VEC4"}}],
+        "bufferViews":[{{"buffer":0,"byteLength":36}},{{"buffer":0,"byteOffset":36,"byteLength":36}},
+                       {{"buffer":0,"byteOffset":72,"byteLength":12}},{{"buffer":0,"byteLength":36,"byteStride":8}}],
+        "buffers":[{{"byteLength":84}}]{more}}}"#
+    );
+    parse(&glb(&json, binary), Path::new("x.glb"))
+}
+
+#[test]
+fn what_changes_a_shape_is_applied() {
+    let corners = [[0.0f32, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
+    let floats =
+        |numbers: &[[f32; 3]]| numbers.iter().flatten().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
+    let plain = r#""bufferView":0,"componentType":5126"#;
+
+    // A morph target of displacements, at the mesh's weight and at the node's.
+    let morphed = [floats(&corners), floats(&[[0.0, 0.0, 2.0]; 3]), vec![0; 12]].concat();
+    let target = r#"},"targets":[{"POSITION":1}]}"#;
+    let at = |node: &str| triangle(plain, target, node, "", &morphed).unwrap().positions[1];
+    assert_eq!(
+        [at(""), at(r#","weights":[1]"#), at(r#","weights":[0]"#)],
+        [[2., 0., 1.], [2., 0., 2.], [2., 0., 0.]]
+    );
+
+    // Integers, normalised ones from -1 to 1.
+    let shorts: Vec<u8> = [[0i16, 0, 0, 0], [32767, 0, -32768, 0], [0, 16384, 0, 0]]
+        .iter()
+        .flatten()
+        .flat_map(|x| x.to_le_bytes())
+        .chain(vec![0; 60])
+        .collect();
+    let quantised = r#""bufferView":3,"componentType":5122,"normalized":true"#;
+    let used =
+        r#","extensionsUsed":["KHR_mesh_quantization"],"extensionsRequired":["KHR_mesh_quantization"]"#;
+    let read = triangle(quantised, "}}", "", used, &shorts).unwrap().positions;
+    assert_eq!((read[1], (read[2][1] - 0.5).abs() < 1e-4), ([1.0, 0.0, -1.0], true));
+
+    // Two of three items differ from zero: indices at 72, values where the corners are.
+    let sparse = [floats(&corners), vec![0; 36], vec![1, 2, 0, 0], vec![0; 8]].concat();
+    let accessor = r#""componentType":5126,"sparse":{"count":2,"indices":{"bufferView":2,"componentType":5121},
+                      "values":{"bufferView":0,"byteOffset":12}}"#;
+    assert_eq!(
+        triangle(accessor, "}}", "", "", &sparse).unwrap().positions,
+        corners.map(|p| p.map(f64::from))
+    );
+
+    // A skin whose one joint is the second node.
+    let skinned = [floats(&corners), vec![0; 36], [255u8, 0, 0, 0].repeat(3)].concat();
+    let attributes = r#","JOINTS_0":2,"WEIGHTS_0":3}}"#;
+    let skin = r#","skins":[{"joints":[1]}]"#;
+    let read = triangle(plain, attributes, r#","skin":0"#, skin, &skinned).unwrap().positions;
+    assert!((read[1][0] - 0.02).abs() < 1e-12 && (read[2][1] - 1.04).abs() < 1e-12, "{read:?}");
+}

@@ -40,9 +40,10 @@ use warnings::{check_poses, log_repairs, warn_about_order, warn_about_shape};
         clothcombo drape --outfits outfits.toml -o out\n\n\
         A garment is a mesh file (.obj, .ply, .stl, .gltf, .glb) or the name of one in --dataset or in the model's own data.\n\
         What does not lie on the body in metres, y up and T-pose is fitted first (see `clothcombo fit`); every repair is in\n\
-        report.json. Hints about files (--unit, --up, --arms, --category, --offset, --turn, --keep, --join-seams, --from-body)\n\
-        are about all of the call; a file with a hint is always fitted, the file of a name with --offset, --turn or --from-body. Outputs keep the vertices and polygons of the given files, in their\n\
-        order: what --keep leaves out follows the cloth.\n\n\
+        report.json. Hints about files (--unit, --up, --arms, --legs, --category, --offset, --turn, --keep, --join-seams,\n\
+        --from-body) are about all of the call; a file with a hint is always fitted, the file of a name with --offset, --turn\n\
+        or --from-body. Outputs keep the vertices and polygons of the given files, in their order: what --keep leaves out\n\
+        follows the cloth.\n\n\
         --outfits takes a TOML file:\n  \
         [[outfit]]\n  name = \"monday\"\n  garments = [{ file = \"tee.obj\", unit = \"cm\" }, \"coat.obj\"]   # hints, or a name alone\n  shape = [1.0]       # optional, as are pose, \
         motion, frames, every")]

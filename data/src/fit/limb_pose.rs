@@ -1,40 +1,49 @@
-//! Bodies with lowered arms, and garments back from there to the T-pose.
+//! Bodies with lowered arms and legs apart, and garments back from there to the T-pose.
 
+use super::placement::Placement;
 use crate::asset::{Binding, BindingSettings, Body, Category, Garment, Pose, body};
 use clothcombo_physics::TriMesh;
 use clothcombo_physics::query::Surface;
 
-/// The zero body with its arms this far below the horizontal.
+/// The zero body with its arms this far below the horizontal, and each leg this far outwards (degrees).
 #[derive(Debug)]
-pub(super) struct ArmPose {
-    pub degrees: f64,
+pub(super) struct LimbPose {
+    pub angles: [f64; 2],
     pub pose: Pose,
     pub positions: Vec<[f64; 3]>,
     pub surface: Surface<f64>,
 }
 
-/// Names of the joints that lower the arms.
-const SHOULDERS: [&str; 2] = ["left_shoulder", "right_shoulder"];
+/// Joints of arms and of legs that are turned, left and right.
+pub(super) const LIMBS: [[&str; 2]; 2] = [["left_shoulder", "right_shoulder"], ["left_hip", "right_hip"]];
 
-fn shoulders(body: &Body) -> Option<[usize; 2]> {
-    Some([body.joint(SHOULDERS[0])?, body.joint(SHOULDERS[1])?])
-}
-
-impl ArmPose {
-    /// Turns both shoulders about the axis through the body; a body without shoulders stays as it is.
-    pub fn new(body: &Body, degrees: f64) -> Self {
-        let mut pose = Pose::t_pose(body.joint_count());
-        let mut positions = body.template.clone();
-        if let Some([left, right]) = shoulders(body).filter(|_| degrees != 0.0) {
-            pose.rotations[left] = [0.0, 0.0, -degrees.to_radians()];
-            pose.rotations[right] = [0.0, 0.0, degrees.to_radians()];
-            // The pose has exactly the body's joints and no shape numbers: nothing to refuse.
-            if let Ok(posed) = body.posed(&[], &pose) {
-                positions = posed.positions;
+/// The pose in which arms hang down and legs are apart by these angles (degrees); joints that a body lacks stay as they are.
+pub(super) fn limb_pose(body: &Body, angles: [f64; 2]) -> Pose {
+    let mut pose = Pose::t_pose(body.joint_count());
+    for (names, inwards) in LIMBS.iter().zip([angles[0], -angles[1]]) {
+        for (name, sign) in names.iter().zip([-1.0, 1.0]) {
+            if let Some(j) = body.joint(name) {
+                pose.rotations[j] = [0.0, 0.0, sign * inwards.to_radians()];
             }
         }
+    }
+    pose
+}
+
+impl LimbPose {
+    /// In a garment's pose.
+    pub fn of(body: &Body, placement: &Placement) -> Self {
+        let angles = [placement.arm_angle_degrees, placement.leg_angle_degrees];
+        let pose = limb_pose(body, angles);
+        let mut positions = body.template.clone();
+        // The pose has exactly the body's joints and no shape numbers: nothing to refuse.
+        if angles != [0.0; 2]
+            && let Ok(posed) = body.posed(&[], &pose)
+        {
+            positions = posed.positions;
+        }
         let surface = Surface::new(positions.clone(), body.faces.clone());
-        Self { degrees, pose, positions, surface }
+        Self { angles, pose, positions, surface }
     }
 
     /// Carries a garment on this body to the zero body: inverts the linear blend skinning of its binding. The binding depends
@@ -46,7 +55,7 @@ impl ArmPose {
         category: Option<Category>,
         body: &Body,
     ) -> Result<Vec<[f64; 3]>, String> {
-        if self.degrees == 0.0 {
+        if self.angles == [0.0; 2] {
             return Ok(positions.to_vec());
         }
         // Shapes are not needed here, and copying them would cost more than everything else.
@@ -67,7 +76,9 @@ impl ArmPose {
                 .zip(binding.skin_weights.chunks_exact(body.joint_count()))
                 .map(|(p, weights)| unskin(*p, weights, &bones))
                 .collect::<Option<_>>()
-                .ok_or("the arms cannot be raised: a blended bone transform has no inverse")?;
+                .ok_or(
+                    "arms and legs cannot be brought to the T-pose: a blended bone transform has no inverse",
+                )?;
         }
         Ok(rest)
     }
@@ -105,9 +116,9 @@ pub(super) mod tests {
     use crate::generate::garment::generated;
     use crate::generate::mannequin;
 
-    /// A generated shirt skinned to lowered arms as draping does.
-    pub(crate) fn lowered(garment: &Garment, body: &Body, degrees: f64) -> Vec<[f64; 3]> {
-        let pose = ArmPose::new(body, degrees).pose;
+    /// A generated garment skinned to lowered arms and legs apart as draping does.
+    pub(crate) fn posed(garment: &Garment, body: &Body, angles: [f64; 2]) -> Vec<[f64; 3]> {
+        let pose = limb_pose(body, angles);
         let bones = body.bone_transforms(&body.joint_template, &pose);
         let binding = Binding::new(garment, body, &BindingSettings::default());
         (garment.rest.positions().iter().zip(binding.skin_weights.chunks_exact(body.joint_count())))
@@ -119,8 +130,8 @@ pub(super) mod tests {
     fn sleeves_come_back_from_an_a_pose() {
         let body = mannequin();
         let shirt = generated(&body, Category::TShirt, 3, 700);
-        let arms = ArmPose::new(&body, 40.0);
-        let posed = lowered(&shirt, &body, 40.0);
+        let arms = LimbPose::of(&body, &Placement { arm_angle_degrees: 40.0, ..Placement::AS_GIVEN });
+        let posed = posed(&shirt, &body, [40.0, 0.0]);
         let back = arms.to_t_pose(&posed, shirt.rest.faces(), Some(shirt.category), &body).unwrap();
         let mut errors: Vec<f64> = back
             .iter()

@@ -1,0 +1,197 @@
+//! Why a mesh is not worn as it is, told by what would be: one of its pieces, or all of it at another size.
+
+use super::cloth::Cloth;
+use super::error::FitError;
+use super::judge::Candidate;
+use super::pieces::stray_pieces;
+use super::placement::{Origin, Unit, UpAxis};
+use super::search::Search;
+use super::settings::FitSettings;
+use super::verdict::Readings;
+use crate::mesh::compact;
+use clothcombo_physics::vec3::{norm, scale, sub};
+use clothcombo_physics::{Topology, TriMesh};
+use std::fmt;
+
+/// Ratio of one size tried to the next, and how many are tried on either side.
+const SIZE_STEP: f64 = 1.2;
+const SIZES: i32 = 8;
+/// Another size explains that much more (log-posterior), or nothing is said.
+const SIZE_EVIDENCE: f64 = 12.0;
+/// Clothes that are worn are not this many times as large or small as those that fit.
+const OTHER_SIZE: f64 = 1.6;
+/// Cloth farther from the body on average (m), or with a larger share inside it, may be of another size.
+const LOOSE: f64 = 0.05;
+const TIGHT: f64 = 0.05;
+/// Pieces that are looked at by themselves.
+const MOST_PIECES: usize = 3;
+/// A border this near to a plane, as a share of the extent, and with this share of its length, is cut by it.
+const ON_CUT: f64 = 1e-3;
+const CUT: [f64; 2] = [0.25, 0.95];
+/// The rest of that border reaches this far from the plane, as a share of the extent: a hem does not.
+const BEYOND_CUT: f64 = 0.1;
+
+/// A garment of another size.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Size {
+    /// Its largest extent (m), in this unit.
+    pub extent: f64,
+    /// Unit in which that is.
+    pub unit: Unit,
+    /// Factor at which it would fit.
+    pub factor: f64,
+}
+
+impl Size {
+    /// Whether nobody of this body's size wears it.
+    pub(super) fn is_refused(&self) -> bool {
+        self.factor.max(1.0 / self.factor) > OTHER_SIZE
+    }
+}
+
+impl fmt::Display for Size {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { extent, unit, factor } = self;
+        write!(
+            f,
+            "it measures {extent:.2} m from end to end (unit {unit}), and fits much better scaled by {factor:.2}"
+        )
+    }
+}
+
+/// What is wrong with a mesh that looks worn nowhere, if that can be told.
+pub(super) fn diagnosed(search: &Search, cloth: &Cloth, settings: &FitSettings) -> Option<FitError> {
+    half(cloth).or_else(|| beside(search, cloth, settings)).or_else(|| {
+        let ups = settings.up.map_or(vec![UpAxis::Y, UpAxis::Z], |up| vec![up]);
+        let units = settings.unit.map_or(vec![Unit::M, Unit::Cm, Unit::Mm], |unit| vec![unit]);
+        let of = |unit: &Unit| {
+            let sizes = ups.iter().filter_map(|up| {
+                let known = FitSettings {
+                    unit: Some(*unit),
+                    up: Some(*up),
+                    turn_degrees: Some(0.0),
+                    legs_degrees: Some(0.0),
+                    ..settings.clone()
+                };
+                other_size(search, cloth, &known)
+            });
+            sizes.max_by(|a, b| a.1.total_cmp(&b.1))
+        };
+        let (size, _) = units.iter().find_map(of)?;
+        let is_cause = size.factor.max(1.0 / size.factor) >= SIZE_STEP;
+        is_cause.then_some(FitError::Size { size })
+    })
+}
+
+/// A size at which a garment that lies loosely or tightly where it was found fits much better.
+pub(super) fn size_doubt(
+    search: &Search,
+    cloth: &Cloth,
+    settings: &FitSettings,
+    taken: &Candidate,
+) -> Option<Size> {
+    if taken.placement.origin == Origin::Pelvis || settings.offset.is_some() {
+        return None;
+    }
+    let (sitting, _) = search.measured(cloth, &taken.placement);
+    if sitting.mean_distance < LOOSE && sitting.inside < TIGHT {
+        return None;
+    }
+    let p = &taken.placement;
+    // What is taken for its front may be its side at another size.
+    let turns = match (settings.turn_degrees, p.turn_degrees) {
+        (None, turn) if turn != 0.0 => vec![0.0, turn],
+        (_, turn) => vec![turn],
+    };
+    let gain = |turn: f64| {
+        let known = FitSettings {
+            unit: Some(p.unit),
+            up: Some(p.up),
+            turn_degrees: Some(turn),
+            legs_degrees: Some(p.leg_angle_degrees),
+            ..settings.clone()
+        };
+        // What is known has no say there.
+        let score = taken.score - p.log_prior(settings) + p.log_prior(&known);
+        other_size(search, cloth, &known).map(|(size, found)| (size, found - score))
+    };
+    let (size, gain) = turns.into_iter().filter_map(gain).max_by(|a, b| a.1.total_cmp(&b.1))?;
+    (gain > SIZE_EVIDENCE).then_some(size)
+}
+
+/// The size at which a file of known unit, axis and turn is worn best, other than its own, and how well (log-posterior). A tube
+/// fits somewhere at any size: it must lie there as it stands.
+fn other_size(search: &Search, cloth: &Cloth, known: &FitSettings) -> Option<(Size, f64)> {
+    let unit = known.unit?;
+    let extent = cloth.extent();
+    let at = |factor: f64| {
+        let positions: Vec<[f64; 3]> = cloth.positions.iter().map(|p| scale(*p, factor)).collect();
+        if !search.is_plausible_extent(factor * extent * unit.metres()) {
+            return None;
+        }
+        let scaled = cloth.moved(&positions);
+        let candidates = search.quick_candidates(&scaled, factor * extent, known);
+        let best = *Readings::new(&candidates, search, &scaled).believed.first()?;
+        let is_told = !best.is_tube || best.placement.origin != Origin::Elsewhere;
+        is_told.then_some((Size { extent: extent * unit.metres(), unit, factor }, best.score))
+    };
+    let better = |a: &(Size, f64), b: &(Size, f64)| a.1.total_cmp(&b.1);
+    let steps = (-SIZES..=SIZES).filter(|k| *k != 0);
+    let best = steps.filter_map(|k| at(SIZE_STEP.powi(k))).max_by(better)?;
+    let finer = [-0.5, -0.25, 0.25, 0.5].into_iter().filter_map(|k| at(best.0.factor * SIZE_STEP.powf(k)));
+    finer.chain([best]).max_by(better)
+}
+
+/// Whether a garment is cut in half by a plane of the file's axes: all of it lies on one side, and a border runs there and elsewhere.
+fn half(cloth: &Cloth) -> Option<FitError> {
+    let near = ON_CUT * cloth.extent();
+    for (axis, name) in ['x', 'y', 'z'].into_iter().enumerate() {
+        let along = || cloth.positions.iter().map(|p| p[axis]);
+        for at in [along().fold(f64::MAX, f64::min), along().fold(f64::MIN, f64::max)] {
+            for border in cloth.borders {
+                let next = border.iter().cycle().skip(1);
+                let (mut on, mut all, mut reach) = (0.0, 0.0, 0.0f64);
+                for (a, b) in border.iter().zip(next) {
+                    let [a, b] = [a, b].map(|v| cloth.positions[*v as usize]);
+                    let length = norm(sub(b, a));
+                    all += length;
+                    reach = reach.max((a[axis] - at).abs());
+                    if (a[axis] - at).abs() < near && (b[axis] - at).abs() < near {
+                        on += length;
+                    }
+                }
+                let share = on / f64::max(all, f64::MIN_POSITIVE);
+                if (CUT[0]..CUT[1]).contains(&share) && reach > BEYOND_CUT * cloth.extent() {
+                    return Some(FitError::Half { axis: name, at, share });
+                }
+            }
+        }
+    }
+    None
+}
+
+/// The piece that lies beside the body when one of the largest is worn.
+fn beside(search: &Search, cloth: &Cloth, settings: &FitSettings) -> Option<FitError> {
+    let piece = |face: &[u32; 3]| cloth.piece_of_vertex(face[0]);
+    let mut counts = vec![0; cloth.topology.component_count];
+    cloth.faces.iter().for_each(|face| counts[piece(face) as usize] += 1);
+    let mut largest: Vec<u32> =
+        (0..counts.len() as u32).filter(|piece| counts[*piece as usize] > 0).collect();
+    if largest.len() < 2 {
+        return None;
+    }
+    largest.sort_by_key(|piece| std::cmp::Reverse(counts[*piece as usize]));
+    largest.into_iter().take(MOST_PIECES).find_map(|alone| {
+        let of_piece = cloth.faces.iter().filter(|face| piece(face) == alone).copied();
+        let (used, faces) = compact(of_piece, cloth.positions.len());
+        let mesh = TriMesh::new(used.iter().map(|v| cloth.positions[*v as usize]).collect(), faces).ok()?;
+        let topology = Topology::new(&mesh);
+        let alone = Cloth::new(mesh.positions(), mesh.faces(), &topology);
+        let candidates = search.candidates(&alone, mesh.extent(), settings);
+        let placement = Readings::new(&candidates, search, &alone).believed.first()?.placement;
+        let worn = search.judge(cloth, settings).worn_pieces(&placement);
+        let placed = placement.apply(cloth.positions);
+        let stray = stray_pieces(&placed, cloth.topology, search.surface(), &worn);
+        stray.into_iter().next().map(|piece| FitError::StrayPiece { piece })
+    })
+}

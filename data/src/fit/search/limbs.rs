@@ -1,0 +1,103 @@
+//! Candidates whose arms hang or whose legs stand apart: judged on bodies posed like them.
+
+use super::super::body_field::BodyField;
+use super::super::climb::{Moves, Steps, climbed};
+use super::super::cloth::Cloth;
+use super::super::judge::{Candidate, Judge};
+use super::super::limb_pose::LimbPose;
+use super::super::placement::{Origin, Placement};
+use super::super::settings::FitSettings;
+use super::{Search, SearchBody, distinct, sort};
+use crate::asset::Body;
+use rayon::prelude::*;
+
+/// Candidates in A-pose worth a body of their own.
+const POSED: usize = 2;
+/// Angles of each leg tried first (degrees), the one for whose weights a body is made, and for how many candidates.
+const LEG_ANGLES: [f64; 7] = [2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0];
+const LEGS_APART: f64 = 6.0;
+const SPREAD: usize = 4;
+/// Angles of each leg (degrees) at which garments are looked for that are worn nowhere else.
+const STANCES: [f64; 2] = [5.0, 10.0];
+/// Openings of a garment for legs.
+const WAIST_AND_LEGS: usize = 3;
+
+impl SearchBody {
+    /// The field of `body`, which was measured, with its legs [`LEGS_APART`].
+    fn apart(&self, body: &Body) -> &BodyField {
+        let placement = Placement { leg_angle_degrees: LEGS_APART, ..Placement::AS_GIVEN };
+        self.apart.get_or_init(|| self.field.posed(&LimbPose::of(body, &placement), body))
+    }
+}
+
+impl Search<'_> {
+    /// The best whose legs stand apart, each by an angle that is found out.
+    pub fn candidates_apart(&self, cloth: &Cloth, extent: f64, settings: &FitSettings) -> Vec<Candidate> {
+        if settings.legs_degrees.is_some() || cloth.borders.len() < WAIST_AND_LEGS {
+            return Vec::new();
+        }
+        let judge = self.judge(cloth, settings);
+        let from = |degrees: f64| {
+            let known = FitSettings { legs_degrees: Some(degrees), ..settings.clone() };
+            let mut found = self.quick_candidates(cloth, extent, &known);
+            found.truncate(SPREAD);
+            found.into_par_iter().map(|c| self.climbed_posed(&judge, &c)).collect::<Vec<_>>()
+        };
+        let mut all: Vec<Candidate> = STANCES.into_iter().flat_map(from).collect();
+        sort(&mut all);
+        distinct(all)
+    }
+
+    /// The best in A-pose, on a body posed like that: the shoulders of the search's body are rigid.
+    pub(super) fn judge_again_posed(&self, judge: &Judge, ranked: &mut [Candidate]) {
+        for candidate in ranked.iter_mut().filter(|c| c.placement.arm_angle_degrees != 0.0).take(POSED) {
+            *candidate = self.climbed_posed(judge, candidate);
+        }
+        sort(ranked);
+    }
+
+    /// The best with its legs apart, where a garment with leg openings lies better so: only those tell.
+    pub(super) fn spread_legs(&self, judge: &Judge, ranked: &mut [Candidate]) {
+        if judge.settings.legs_degrees.is_some() || judge.cloth.borders.len() < WAIST_AND_LEGS {
+            return;
+        }
+        let at = |c: &Candidate, degrees: f64| Placement { leg_angle_degrees: degrees, ..c.placement };
+        let apart = Judge { field: self.measured.apart(self.body), ..*judge };
+        let has_legs =
+            |c: &&mut Candidate| LEG_ANGLES.iter().any(|degrees| apart.limbs(&at(c, *degrees)).legs);
+        let spread = |candidate: &mut Candidate| {
+            let turned = apart.turned(&candidate.placement, None, true);
+            let scored = |degrees: &f64| apart.scored(at(candidate, *degrees), &turned, true, None);
+            let best = LEG_ANGLES.iter().map(scored).max_by(|a, b| a.score.total_cmp(&b.score));
+            let Some(start) = best.map(|best| apart.with_openings(best)) else { return };
+            let near = if start.placement.arm_angle_degrees == 0.0 { &apart } else { judge };
+            let found = self.climbed_posed(near, &start);
+            if found.score > candidate.score {
+                // Its weights are those of its own pose.
+                *candidate = self.climbed_posed(judge, &found);
+            }
+        };
+        ranked.iter_mut().filter(has_legs).take(SPREAD).collect::<Vec<_>>().into_par_iter().for_each(spread);
+        sort(ranked);
+    }
+
+    /// The best near a candidate on a body in its pose.
+    fn climbed_posed(&self, judge: &Judge, candidate: &Candidate) -> Candidate {
+        let is_posed = judge.field.is_posed(&candidate.placement);
+        let posed = if is_posed { None } else { self.posed_field(&candidate.placement) };
+        let judge = Judge { field: posed.as_ref().unwrap_or(judge.field), ..*judge };
+        let moves = if candidate.placement.origin == Origin::Elsewhere { Moves::All } else { Moves::Limbs };
+        let steps = Steps { from: 0.02, to: 0.0005, is_sharp: true, is_fine: true, moves };
+        judge.judged(climbed(&judge, candidate, &steps).placement)
+    }
+
+    /// The body in a garment's pose; none at rest.
+    pub(super) fn posed_field(&self, placement: &Placement) -> Option<BodyField> {
+        let is_posed = !has_limbs_at_rest(placement);
+        is_posed.then(|| self.measured.field.posed(&LimbPose::of(self.body, placement), self.body))
+    }
+}
+
+pub(super) fn has_limbs_at_rest(placement: &Placement) -> bool {
+    (placement.arm_angle_degrees, placement.leg_angle_degrees) == (0.0, 0.0)
+}
