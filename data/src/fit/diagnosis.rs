@@ -43,9 +43,14 @@ pub struct Size {
 }
 
 impl Size {
+    /// How many times too large or too small it is.
+    fn ratio(&self) -> f64 {
+        self.factor.max(1.0 / self.factor)
+    }
+
     /// Whether nobody of this body's size wears it.
     pub(super) fn is_refused(&self) -> bool {
-        self.factor.max(1.0 / self.factor) > OTHER_SIZE
+        self.ratio() > OTHER_SIZE
     }
 }
 
@@ -78,8 +83,7 @@ pub(super) fn diagnosed(search: &Search, cloth: &Cloth, settings: &FitSettings) 
             sizes.max_by(|a, b| a.1.total_cmp(&b.1))
         };
         let (size, _) = units.iter().find_map(of)?;
-        let is_cause = size.factor.max(1.0 / size.factor) >= SIZE_STEP;
-        is_cause.then_some(FitError::Size { size })
+        (size.ratio() >= SIZE_STEP).then_some(FitError::Size { size })
     })
 }
 

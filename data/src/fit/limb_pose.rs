@@ -1,7 +1,8 @@
 //! Bodies with lowered arms and legs apart, and garments back from there to the T-pose.
 
 use super::placement::Placement;
-use crate::asset::{Binding, BindingSettings, Body, Category, Garment, Pose, body};
+use crate::asset::body::unskin;
+use crate::asset::{Binding, BindingSettings, Body, Category, Garment, Pose};
 use clothcombo_physics::TriMesh;
 use clothcombo_physics::query::Surface;
 
@@ -74,7 +75,7 @@ impl LimbPose {
             rest = positions
                 .iter()
                 .zip(binding.skin_weights.chunks_exact(body.joint_count()))
-                .map(|(p, weights)| unskin(*p, weights, &bones))
+                .map(|(p, row)| unskin(*p, bones.iter().zip(row).map(|(bone, w)| (bone, f64::from(*w)))))
                 .collect::<Option<_>>()
                 .ok_or(
                     "arms and legs cannot be brought to the T-pose: a blended bone transform has no inverse",
@@ -84,35 +85,9 @@ impl LimbPose {
     }
 }
 
-/// Inverse of the blended transform applied to `p`.
-fn unskin(p: [f64; 3], weights: &[f32], bones: &[[[f64; 4]; 3]]) -> Option<[f64; 3]> {
-    let mut m = [[0.0; 4]; 3];
-    for (bone, w) in bones.iter().zip(weights).filter(|(_, w)| **w != 0.0) {
-        for a in 0..3 {
-            for b in 0..4 {
-                m[a][b] += f64::from(*w) * bone[a][b];
-            }
-        }
-    }
-    let cofactor = |r: usize, c: usize| {
-        let (r1, r2, c1, c2) = ((r + 1) % 3, (r + 2) % 3, (c + 1) % 3, (c + 2) % 3);
-        m[r1][c1] * m[r2][c2] - m[r1][c2] * m[r2][c1]
-    };
-    let determinant: f64 = (0..3).map(|c| m[0][c] * cofactor(0, c)).sum();
-    if determinant.abs() < 1e-3 {
-        return None;
-    }
-    let d: [f64; 3] = std::array::from_fn(|a| p[a] - m[a][3]);
-    let inverse: [[f64; 4]; 3] = std::array::from_fn(|r| {
-        std::array::from_fn(|c| if c < 3 { cofactor(c, r) / determinant } else { 0.0 })
-    });
-    Some(body::transform(&inverse, d))
-}
-
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::asset::body::skin;
     use crate::generate::garment::generated;
     use crate::generate::mannequin;
 
@@ -121,9 +96,7 @@ pub(super) mod tests {
         let pose = limb_pose(body, angles);
         let bones = body.bone_transforms(&body.joint_template, &pose);
         let binding = Binding::new(garment, body, &BindingSettings::default());
-        (garment.rest.positions().iter().zip(binding.skin_weights.chunks_exact(body.joint_count())))
-            .map(|(p, w)| skin(*p, bones.iter().zip(w).map(|(b, w)| (b, f64::from(*w)))))
-            .collect()
+        binding.skinned(garment.rest.positions(), &bones)
     }
 
     #[test]

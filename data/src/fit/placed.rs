@@ -3,7 +3,8 @@
 use super::category::contradiction;
 use super::cloth::Cloth;
 use super::error::FitError;
-use super::pieces::stray_pieces;
+use super::judge::Judge;
+use super::pieces::{StrayPiece, stray_pieces};
 use super::placement::{Placement, Unit, UpAxis};
 use super::search::{Search, SearchBody};
 use super::settings::{FitSettings, MIN_TRIANGLES};
@@ -27,31 +28,29 @@ impl PlacementCheck {
         SearchBody::new(body).map(Self)
     }
 
-    /// How many connected pieces of `mesh` would be worn without the others: more than one are an outfit.
-    pub fn worn_pieces(&self, mesh: &TriMesh, body: &Body) -> usize {
+    /// What `look` sees in a mesh as it stands.
+    fn look<T>(&self, mesh: &TriMesh, body: &Body, look: impl FnOnce(&Search, &Cloth, &Judge) -> T) -> T {
         let topology = Topology::new(mesh);
         let cloth = Cloth::new(mesh.positions(), mesh.faces(), &topology);
-        let settings = FitSettings::default();
-        Search::new(body, &self.0).judge(&cloth, &settings).worn_pieces(&Placement::AS_GIVEN).len()
+        let (search, settings) = (Search::new(body, &self.0), FitSettings::default());
+        look(&search, &cloth, &search.judge(&cloth, &settings))
+    }
+
+    /// How many connected pieces of `mesh` would be worn without the others: more than one are an outfit.
+    pub fn worn_pieces(&self, mesh: &TriMesh, body: &Body) -> usize {
+        self.look(mesh, body, |_, _, judge| judge.worn_pieces(&Placement::AS_GIVEN).len())
     }
 
     /// Which connected piece of a mesh, as it stands, lies beside the body, in words.
     pub fn stray_piece(&self, mesh: &TriMesh, body: &Body) -> Option<String> {
-        let topology = Topology::new(mesh);
-        let cloth = Cloth::new(mesh.positions(), mesh.faces(), &topology);
-        let (search, settings) = (Search::new(body, &self.0), FitSettings::default());
-        let worn = search.judge(&cloth, &settings).worn_pieces(&Placement::AS_GIVEN);
-        let stray = stray_pieces(mesh.positions(), &topology, search.surface(), &worn);
-        stray.first().map(ToString::to_string)
+        self.look(mesh, body, |search, cloth, judge| {
+            stray(search, cloth, judge).map(|piece| piece.to_string())
+        })
     }
 
     /// What speaks against the category of a mesh that lies where it is worn.
     pub fn contradiction(&self, mesh: &TriMesh, body: &Body, category: Category) -> Option<String> {
-        let topology = Topology::new(mesh);
-        let cloth = Cloth::new(mesh.positions(), mesh.faces(), &topology);
-        let settings = FitSettings::default();
-        let limbs = Search::new(body, &self.0).judge(&cloth, &settings).limbs(&Placement::AS_GIVEN);
-        contradiction(category, limbs)
+        self.look(mesh, body, |_, _, judge| contradiction(category, judge.limbs(&Placement::AS_GIVEN)))
     }
 
     /// Whether `mesh`, taken as it stands (metres, y up, pelvis at the origin, arms level), is worn on the zero body
@@ -74,14 +73,19 @@ impl PlacementCheck {
             ..FitSettings::default()
         };
         let cloth = Cloth::new(mesh.positions(), mesh.faces(), &topology);
-        let worn = search.judge(&cloth, &settings).worn_pieces(&Placement::AS_GIVEN);
-        if !stray_pieces(mesh.positions(), &topology, search.surface(), &worn).is_empty() {
+        if stray(&search, &cloth, &search.judge(&cloth, &settings)).is_some() {
             return false;
         }
         let Ok(given) = search.believed_as_given(&cloth, &settings) else { return false };
         let best = search.candidates(&cloth, mesh.extent(), &settings).first().map_or(f64::MIN, |c| c.score);
         best <= given.score + MARGIN
     }
+}
+
+/// A connected piece of cloth, as it stands, that lies beside the body.
+fn stray(search: &Search, cloth: &Cloth, judge: &Judge) -> Option<StrayPiece> {
+    let worn = judge.worn_pieces(&Placement::AS_GIVEN);
+    stray_pieces(cloth.positions, cloth.topology, search.surface(), &worn).into_iter().next()
 }
 
 impl fmt::Debug for PlacementCheck {

@@ -46,9 +46,8 @@ pub struct FitSettings {
 impl FitSettings {
     /// Whether it says anything about where and how the garment is worn: that is taken, and what looks odd there is a warning.
     pub(super) fn says_place(&self) -> bool {
-        let numbers = [self.turn_degrees, self.legs_degrees].into_iter().any(|hint| hint.is_some());
-        let names = self.unit.is_some() || self.up.is_some() || self.category.is_some();
-        names || numbers || self.arms_lowered.is_some() || self.offset.is_some() || self.from_body.is_some()
+        let of_the_file = self.unit.is_some() || self.up.is_some() || self.category.is_some();
+        of_the_file || self.arms_lowered.is_some() || self.legs_degrees.is_some() || self.is_placed()
     }
 
     /// Whether they say where a garment belongs: such a garment is never taken where it lies.
