@@ -5,12 +5,15 @@ use super::body::Body;
 use super::garment::Garment;
 use clothcombo_physics::mesh::Topology;
 use clothcombo_physics::query::{ClosestPoint, Feature};
-use rayon::prelude::*;
 use std::collections::HashMap;
 
 /// Averaging steps over the body, half towards the mean of the ring each: at edges of a centimetre the hem of what is below fades
 /// over some three centimetres, as cloth over it would.
 const FADE: usize = 10;
+
+/// Body farther from the garment than this (m) is not below it, however it faces it: the legs in a wide skirt are up to 13 cm
+/// away.
+const FARTHEST: f64 = 0.15;
 
 /// Where a garment lies on the zero body.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,8 +25,8 @@ pub struct Footprint {
 }
 
 impl Footprint {
-    /// Of a garment that lies on the zero body. A body vertex is covered if the point of the garment closest to it does not lie on
-    /// a hem.
+    /// Of a garment that lies on the zero body. A body vertex is covered if the point of the garment closest to it is near
+    /// and does not lie on a hem.
     pub fn new(garment: &Garment, body: &Body) -> Self {
         let (positions, faces) = (garment.rest.positions(), garment.rest.faces());
         let mut uses = HashMap::<[u32; 2], u32>::new();
@@ -37,7 +40,7 @@ impl Footprint {
         uses.keys().flatten().for_each(|v| on_hem[*v as usize] = true);
         let surface = ClosestPoint::new(positions.to_vec(), faces);
         let is_covered = |p: &[f64; 3]| {
-            let Some(found) = surface.project(*p) else { return false };
+            let Some(found) = surface.project_within(*p, FARTHEST) else { return false };
             let corners = faces[found.face as usize];
             match found.feature {
                 Feature::Face => true,
@@ -48,7 +51,7 @@ impl Footprint {
                 }
             }
         };
-        let covered = body.template.par_iter().map(|p| if is_covered(p) { 1.0 } else { 0.0 });
+        let covered = body.template.iter().map(|p| f32::from(u8::from(is_covered(p))));
         let mut covered: Vec<f32> = covered.collect();
         smooth(&mut covered, 1, &Topology::new(&body.zero_body()), FADE);
         let nearest = nearest_body_vertices(garment, body, true);

@@ -29,16 +29,7 @@ pub struct SceneGarment<T: Real> {
 }
 
 impl<T: Real> SceneGarment<T> {
-    /// Thickness of what is worn below a contact point (m): the mean over the vertices it lies between.
-    pub(super) fn thickness_at(&self, point: usize) -> f64 {
-        if self.thickness_below.is_empty() {
-            return 0.0;
-        }
-        let corners = self.energies.contact_points().corners(point);
-        corners.iter().map(|v| Real::to_f64(self.thickness_below[v])).sum::<f64>() * corners.weight()
-    }
-
-    /// The largest of them (m).
+    /// The largest thickness of what is worn below (m).
     pub(super) fn most_thickness(&self) -> f64 {
         self.thickness_below.iter().fold(0.0, |most, t| most.max(Real::to_f64(*t)))
     }

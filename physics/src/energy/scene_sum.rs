@@ -239,6 +239,7 @@ impl<T: Real> SceneEnergy<T> {
                 canonical,
                 holding_reference: &garment.holding_reference,
                 pull_back: garment.pull_back.as_deref(),
+                thickness_below: &garment.thickness_below,
                 gaps: &[],
                 settings: &self.settings,
             },
@@ -248,7 +249,7 @@ impl<T: Real> SceneEnergy<T> {
         }
     }
 
-    /// Signed distances of the contact points of garment `i` to the body and what is worn below them; with a memory, `exact` ones only where they
+    /// Signed distances of the contact points of garment `i` to the body; with a memory, `exact` ones only where they
     /// count as contact.
     fn gaps(
         &self,
@@ -260,14 +261,13 @@ impl<T: Real> SceneEnergy<T> {
         let EnergySettings { distance, body_samples, body_collision_epsilon, .. } = self.settings;
         let garment = &self.garments[i];
         let points = garment.energies.contact_points().at(posed, body_samples);
-        let points = points.par_iter().enumerate().with_min_len(GRAIN / 4);
-        let over = |point, gap: Gap<T>| Gap { gap: gap.gap - T::from_f64(garment.thickness_at(point)), ..gap };
+        let points = points.par_iter().with_min_len(GRAIN / 4);
         let Some(near) = near else {
-            return points.map(|(i, p)| over(i, self.body.gap(*p, distance))).collect();
+            return points.map(|p| self.body.gap(*p, distance)).collect();
         };
         near.resize_with(points.len(), NearFaces::default);
         let reach = if exact { f64::INFINITY } else { body_collision_epsilon + garment.most_thickness() };
-        points.zip(near).map(|((i, p), near)| over(i, self.body.gap_near(*p, distance, reach, near))).collect()
+        points.zip(near).map(|(p, near)| self.body.gap_near(*p, distance, reach, near)).collect()
     }
 
     /// The points of the outer garment of a pair that are kept off the inner one.

@@ -106,6 +106,13 @@ impl Config {
             if let Some((key, what, hint)) = stage.problem() {
                 return Some((format!("stages[{i}].{key}"), what, hint));
             }
+            if stage.below > 0 && self.model.surroundings == 0 {
+                return Some((
+                    format!("stages[{i}].below"),
+                    "the networks do not see what is worn below".into(),
+                    "set model.surroundings, for example to 64, or below = 0".into(),
+                ));
+            }
             if stage.trains == Trains::Corrections && self.model.corrections == 0 {
                 return Some((
                     format!("stages[{i}].trains"),

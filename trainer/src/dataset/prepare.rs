@@ -59,6 +59,23 @@ impl PreparedScene {
         skinning_transforms(&self.garments, &self.bodies[0].bones)
     }
 
+    /// The energy on `body` of every garment by itself, what is worn below it being part of the body.
+    pub fn energy_of_singles(&self, body: &PreparedBody) -> SceneEnergy<f32> {
+        let mut energy = body.energy.without_layers();
+        if !self.thickness_below.is_empty() {
+            let below = self.parts(&self.thickness_below);
+            let garments = energy.garments.iter_mut().zip(below);
+            garments.for_each(|(garment, below)| garment.thickness_below = below.to_vec());
+        }
+        energy
+    }
+
+    /// Thickness of what of that is no garment of the scene `[ΣV]` (m); empty where nothing is.
+    pub fn thickness_of_unseen(&self) -> Vec<f32> {
+        let garments = &self.bodies[0].energy.garments;
+        garments.iter().flat_map(|garment| &garment.thickness_below).copied().collect()
+    }
+
     /// The first body in f64, for exact distances and intersections.
     pub fn exact_body(&self) -> Surface<f64> {
         let body = &self.bodies[0].energy.body;

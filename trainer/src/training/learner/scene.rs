@@ -123,7 +123,7 @@ impl<'a> SceneStep<'a> {
         for body in &scene.bodies {
             let states = drape_states(&networks, tensors, scene, body, (&outfit, &embeddings), trains)?;
             if single_weight > 0.0 {
-                losses.add(&states.single, &Arc::new(body.energy.without_layers()), single_weight);
+                losses.add(&states.single, &Arc::new(scene.energy_of_singles(body)), single_weight);
             }
             // Every correction learns from the state it leads to.
             let learned = match trains {
