@@ -13,9 +13,9 @@ use crate::draping::Draping;
 use crate::error::ModelError;
 use crate::garment_encoder::{GarmentEmbedding, GarmentEncoder};
 use crate::initializer::Initializer;
-use crate::surroundings::Surroundings;
 use crate::mode::Mode;
 use crate::skinning::Skinning;
+use crate::surroundings::Surroundings;
 use crate::tensors::{GarmentTensors, OutfitTensors, stack_rows};
 use crate::untangling::Untangling;
 

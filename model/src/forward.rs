@@ -76,8 +76,7 @@ impl ClothCombo {
         let canonical = displacement + start.clone();
         drop(span);
         let span = trace_span!("skinning").entered();
-        let skin_weights =
-            self.skinning.weights(outfit, skinning_product, draping_embedding.clone());
+        let skin_weights = self.skinning.weights(outfit, skinning_product, draping_embedding.clone());
         let single = posed(canonical, &skin_weights, body);
         drop(span);
         let layered = (mode == Mode::Layered && self.untangling.acts_on(outfit)).then(|| {

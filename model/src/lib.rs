@@ -27,13 +27,13 @@ mod gradient;
 mod initializer;
 mod linear;
 mod linear_blend_skinning;
-mod surroundings;
 mod mlp;
 mod mode;
 pub mod ops;
 mod packing;
 mod siren;
 mod skinning;
+mod surroundings;
 mod tensors;
 #[cfg(test)]
 mod testing;
@@ -51,12 +51,14 @@ pub use gradient::{clip_global_norm, gradient_bucket, gradients_of_bucket};
 pub use initializer::Initializer;
 pub use linear::Linear;
 pub use linear_blend_skinning::linear_blend_skinning;
-pub use surroundings::Surroundings;
 pub use mlp::ResidualMlp;
 pub use mode::Mode;
 pub use ops::Precision;
 pub use packing::Packing;
 pub use siren::{ModulatedSiren, Modulator, SirenSizes};
 pub use skinning::Skinning;
-pub use tensors::{BodyTensors, ContactFeatureTensors, GarmentArrays, GarmentTensors, JOINT_FEATURES, OutfitTensors};
+pub use surroundings::Surroundings;
+pub use tensors::{
+    BodyTensors, ContactFeatureTensors, GarmentArrays, GarmentTensors, JOINT_FEATURES, OutfitTensors,
+};
 pub use untangling::Untangling;

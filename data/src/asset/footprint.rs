@@ -62,7 +62,9 @@ impl Footprint {
     pub fn thickness_of<'a>(&self, below: impl Iterator<Item = &'a Self>, each: f64) -> Vec<f32> {
         let mut sum = vec![0.0; self.nearest.len()];
         for other in below {
-            sum.iter_mut().zip(&self.nearest).for_each(|(sum, v)| *sum += each as f32 * other.covered[*v as usize]);
+            sum.iter_mut()
+                .zip(&self.nearest)
+                .for_each(|(sum, v)| *sum += each as f32 * other.covered[*v as usize]);
         }
         sum
     }

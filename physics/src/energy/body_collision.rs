@@ -24,8 +24,11 @@ impl BodyCollision {
     ) -> impl Iterator<Item = (usize, f64, [f64; 3])> {
         let margin =
             |point| state.settings.body_collision_epsilon + self.0.mean(state.thickness_below, point);
-        let excess =
-            state.gaps.iter().enumerate().map(move |(p, gap)| (p, margin(p) - gap.gap.to_f64(), gap.gradient));
+        let excess = state
+            .gaps
+            .iter()
+            .enumerate()
+            .map(move |(p, gap)| (p, margin(p) - gap.gap.to_f64(), gap.gradient));
         // Written so that a NaN distance gives a NaN energy.
         let is_in_contact =
             |(_, excess, gradient): &(usize, f64, [T; 3])| !(*excess <= 0.0 || *gradient == [T::zero(); 3]);

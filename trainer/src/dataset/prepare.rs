@@ -141,7 +141,8 @@ impl SceneBuilder<'_> {
     ) -> PreparedScene {
         let contacts = contacts(self.graph, &garments);
         // What is there as geometry pushes as geometry.
-        let unseen = |garment: &Arc<PreparedGarment>| match self.layer_thickness.filter(|_| !below.is_empty()) {
+        let unseen = |garment: &Arc<PreparedGarment>| match self.layer_thickness.filter(|_| !below.is_empty())
+        {
             Some(each) => garment.thickness_of(&below.iter().collect::<Vec<_>>(), self.body, each),
             None => Vec::new(),
         };

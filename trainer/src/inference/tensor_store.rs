@@ -206,6 +206,7 @@ pub fn body_tensors(
     dimensions: &Dimensions,
     device: &Device,
 ) -> Result<(BodyTensors, Tensor<2>), ModelError> {
-    let tensors = BodyTensors::new(&body.shape, &body.pose, &body.bones, &body.joint_features, dimensions, device)?;
+    let tensors =
+        BodyTensors::new(&body.shape, &body.pose, &body.bones, &body.joint_features, dimensions, device)?;
     Ok((tensors, to_device(&body.start, device)))
 }
