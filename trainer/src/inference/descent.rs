@@ -181,6 +181,7 @@ mod tests {
                 GarmentEnergies::new(tube, &Topology::new(tube), &settings, false).expect("a garment"),
             ),
             holding_reference: Vec::new(),
+            thickness_below: Vec::new(),
             pull_back: None,
             weights: only(Term::Strain, 1.0),
         };

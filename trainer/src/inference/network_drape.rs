@@ -140,13 +140,15 @@ impl Draper {
             features: &|pose, joints| encoding.features(pose, joints),
             losses: &self.trained.config.losses,
             graph: self.trained.config.model.graph,
+            layer_thickness: self.trained.config.layer_thickness(),
         };
         let sample = SceneSample {
             garments: (0..outfit.garments.len()).collect(),
+            below: Vec::new(),
             bodies: vec![body],
             repulsion_sample: 0,
         };
-        let mut scene = builder.build(sample, outfit.prepared(), 1.0);
+        let mut scene = builder.build(sample, outfit.prepared(), &[], 1.0);
         let seen = self.shape_space.seen(self.body(), &shape, self.trained.state.shape_count);
         scene.bodies[0].shape = seen.into_iter().map(|b| b as f32).collect();
         scene

@@ -261,6 +261,7 @@ fn scene_garment(
         energies: Arc::new(energies),
         holding_reference: if is_held { garment.rest.positions().to_vec() } else { Vec::new() },
         pull_back: None,
+        thickness_below: Vec::new(),
         weights,
     })
 }
