@@ -116,6 +116,7 @@ impl Scene {
             energies: energies.clone(),
             holding_reference: reference.iter().flatten().map(|p| from_f64(*p)).collect(),
             pull_back: None,
+            thickness_below: Vec::new(),
             weights,
         });
         let energy = SceneEnergy {
