@@ -134,7 +134,7 @@ impl ClothCombo {
     /// The same networks with new correction networks in place of any they have; untrained, these correct nothing.
     pub fn with_corrections(mut self, config: &ModelConfig, start: &mut Initializer) -> Self {
         self.corrections = (0..config.corrections).map(|_| Correction::new(config, start)).collect();
-        self.correction_steps = config.correction_steps.unwrap_or(config.corrections);
+        self.correction_steps = config.usual_correction_steps();
         self
     }
 

@@ -131,6 +131,11 @@ impl ModelConfig {
         Self { corrections: 0, correction_steps: None, ..self.clone() }
     }
 
+    /// Correction steps at inference where nobody asks for another number.
+    pub fn usual_correction_steps(&self) -> usize {
+        self.correction_steps.unwrap_or(self.corrections)
+    }
+
     /// Checks that every size is at least one and every scale and frequency is usable.
     ///
     /// # Errors

@@ -140,6 +140,17 @@ impl Layers {
     }
 }
 
+/// The files that are read, and what reads them, of a body, garments and their rest meshes.
+fn layers(
+    body: &MeshInput<'_>,
+    garments: &[MeshInput<'_>],
+    rest: &[MeshInput<'_>],
+) -> PyResult<(Vec<PathBuf>, impl FnOnce() -> Result<Layers, Report> + Send)> {
+    let files = files([body].into_iter().chain(garments).chain(rest));
+    let (body, garments, rest) = (body.taken("body")?, taken("garment", garments)?, taken("rest", rest)?);
+    Ok((files, || Layers::new(body, garments, rest)))
+}
+
 /// Exact counts of what intersects what.
 #[pyfunction]
 pub fn certificate<'py>(
@@ -148,10 +159,9 @@ pub fn certificate<'py>(
     garments: Vec<MeshInput<'_>>,
     rest: Vec<MeshInput<'_>>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let files = files([&body].into_iter().chain(&garments).chain(&rest));
-    let (body, garments, rest) = (body.taken("body")?, taken("garment", &garments)?, taken("rest", &rest)?);
+    let (files, read) = layers(&body, &garments, &rest)?;
     let found = call(py, &files, || {
-        let scene = Layers::new(body, garments, rest)?;
+        let scene = read()?;
         certify(&scene.surface, &scene.layers()).map_err(|error| scene.named(error))
     })?;
     from_json(py, &found)
@@ -168,11 +178,10 @@ pub fn resolve<'py>(
     time_limit: Option<f64>,
     keep_self: bool,
 ) -> PyResult<(Vec<Bound<'py, PyArray2<f64>>>, Bound<'py, PyAny>)> {
-    let files = files([&body].into_iter().chain(&garments).chain(&rest));
-    let (body, garments, rest) = (body.taken("body")?, taken("garment", &garments)?, taken("rest", &rest)?);
+    let (files, read) = layers(&body, &garments, &rest)?;
     let settings = ResolveSettings { self_contact: !keep_self, ..resolve_settings(gap_mm, time_limit)? };
     let resolved = call(py, &files, || {
-        let scene = Layers::new(body, garments, rest)?;
+        let scene = read()?;
         resolve_layers(&scene.surface, &scene.layers(), &settings).map_err(|error| scene.named(error))
     })?;
     let certificate = from_json(py, &resolved.certificate)?;

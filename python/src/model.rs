@@ -11,8 +11,8 @@ use clothcombo_data::format::PolygonMesh;
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use clothcombo_physics::mesh::MeshError;
 use clothcombo_trainer::inference::{
-    Bodies, Draper, DraperSettings, FrameRange, GarmentCatalog, GivenGarment, Outfit as PreparedOutfit,
-    RefineSteps, log_repairs, warn_about_order,
+    Bodies, Draper, DraperSettings, FrameRange, GarmentCatalog, GivenGarment, MOST_RADIUS,
+    Outfit as PreparedOutfit, RefineSteps, log_repairs, warn_about_order,
 };
 use clothcombo_trainer::system::paths::user_cache;
 use miette::{IntoDiagnostic, Report};
@@ -119,9 +119,6 @@ pub fn resolve_settings(gap_mm: f64, time_limit: Option<f64>) -> PyResult<Resolv
     Ok(settings)
 }
 
-/// Most frames to each side that are smoothed over.
-const MOST_SMOOTHED: u16 = 100;
-
 #[pymethods]
 impl Model {
     #[staticmethod]
@@ -217,8 +214,8 @@ impl Outfit {
                 text.parse().map_err(|what| refused_text(format!("refine is {text:?}; hint: {what}")))?
             }
         };
-        if let Some(radius) = smooth.filter(|radius| *radius > MOST_SMOOTHED) {
-            return Err(refused_text(format!("smooth is {radius}; hint: at most {MOST_SMOOTHED} frames")));
+        if let Some(radius) = smooth.filter(|radius| *radius > MOST_RADIUS) {
+            return Err(refused_text(format!("smooth is {radius}; hint: at most {MOST_RADIUS} frames")));
         }
         let post_process = resolve_settings(gap_mm, time_limit)?;
         let settings =

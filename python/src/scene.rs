@@ -2,6 +2,7 @@
 
 use crate::arrays::{MeshInput, from_json, moved, rows, to_value};
 use crate::call::{call, refused, refused_text};
+use clothcombo_physics::contact::resolve::FARTHEST;
 use clothcombo_physics::energy::{
     EnergyError, GarmentEnergies, SceneEnergy, SceneGarment, SceneLayers, SceneValue, Term, TermMap,
 };
@@ -312,9 +313,6 @@ impl Scene {
         })
     }
 }
-
-/// Positions farther from the origin are a fault of the caller (m).
-const FARTHEST: f64 = 1e3;
 
 type Evaluated<'py, T> =
     (f64, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<T>>, Option<Bound<'py, PyArray2<T>>>);

@@ -5,7 +5,7 @@ use super::body::Body;
 use super::garment::Garment;
 use clothcombo_physics::mesh::Topology;
 use clothcombo_physics::query::{ClosestPoint, Feature};
-use std::collections::HashMap;
+use std::collections::HashSet;
 
 /// Averaging steps over the body, half towards the mean of the ring each: at edges of a centimetre the hem of what is below fades
 /// over some three centimetres, as cloth over it would.
@@ -29,15 +29,11 @@ impl Footprint {
     /// and does not lie on a hem.
     pub fn new(garment: &Garment, body: &Body) -> Self {
         let (positions, faces) = (garment.rest.positions(), garment.rest.faces());
-        let mut uses = HashMap::<[u32; 2], u32>::new();
-        for [a, b, c] in faces {
-            for [a, b] in [[a, b], [b, c], [c, a]] {
-                *uses.entry([*a.min(b), *a.max(b)]).or_default() += 1;
-            }
-        }
-        uses.retain(|_, count| *count == 1);
+        let hems = Topology::new(&garment.rest).boundary_loops;
+        let edges = hems.iter().flat_map(|hem| hem.iter().zip(hem.iter().cycle().skip(1)));
+        let edges: HashSet<[u32; 2]> = edges.map(|(a, b)| [*a.min(b), *a.max(b)]).collect();
         let mut on_hem = vec![false; positions.len()];
-        uses.keys().flatten().for_each(|v| on_hem[*v as usize] = true);
+        hems.iter().flatten().for_each(|v| on_hem[*v as usize] = true);
         let surface = ClosestPoint::new(positions.to_vec(), faces);
         let is_covered = |p: &[f64; 3]| {
             let Some(found) = surface.project_within(*p, FARTHEST) else { return false };
@@ -47,7 +43,7 @@ impl Footprint {
                 Feature::Vertex(k) => !on_hem[corners[k] as usize],
                 Feature::Edge(k) => {
                     let (a, b) = (corners[k], corners[(k + 1) % 3]);
-                    !uses.contains_key(&[a.min(b), a.max(b)])
+                    !edges.contains(&[a.min(b), a.max(b)])
                 }
             }
         };
@@ -67,11 +63,6 @@ impl Footprint {
                 .for_each(|(sum, v)| *sum += each as f32 * other.covered[*v as usize]);
         }
         sum
-    }
-
-    /// About how much memory it takes (bytes).
-    pub fn bytes(&self) -> usize {
-        4 * (self.nearest.len() + self.covered.len())
     }
 }
 

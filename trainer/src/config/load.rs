@@ -266,6 +266,19 @@ mod tests {
     }
 
     #[test]
+    fn garments_below_need_networks_that_see_them() {
+        let load = |settings: &[&str]| {
+            load(written(SMALL).path(), &settings.iter().map(|s| (*s).to_owned()).collect::<Vec<_>>())
+        };
+        let unseen = load(&["stages.0.below=2"]).unwrap_err().to_string();
+        assert!(unseen.contains("do not see what is worn below"), "{unseen}");
+        assert_eq!(
+            load(&["stages.0.below=2", "model.surroundings=8"]).unwrap().layer_thickness(),
+            Some(0.002)
+        );
+    }
+
+    #[test]
     fn a_configuration_extends_another() {
         let folder = tempfile::tempdir().unwrap();
         let file = |name: &str, text: &str| {

@@ -6,12 +6,14 @@ use super::source::GivenGarment;
 use super::tensor_store::garment_tensors;
 use super::{Draper, elapsed};
 use crate::dataset::PreparedGarment;
+use crate::system::lru_cache::{KeptBytes, LruCache, MemoryBudget, Residence};
 use burn::tensor::{Tensor, TensorData};
 use clothcombo_data::cache::{
     Key, KeyBuilder, StoredEmbedding, embedding_key, get_embedding, mesh_key, put_embedding,
 };
 use clothcombo_model::{GarmentEmbedding, GarmentTensors};
 use clothcombo_physics::contact::resolve::RestGarment;
+use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
@@ -37,32 +39,29 @@ pub(super) struct EmbeddedGarment {
     pub milliseconds: GarmentTimes,
 }
 
-/// Vertices of all garments that are kept: at the paper's sizes each takes 4 kB, see [`MAX_VERTICES`](super::MAX_VERTICES).
-const MOST_KEPT: usize = 2 * super::MAX_VERTICES;
+/// Memory of a vertex of a garment at the paper's sizes (bytes): 2 kB are operators, as much the embedding.
+const PER_VERTEX: usize = 4096;
 
-/// The garments a draper has met last, by content, in the order of their last use.
-#[derive(Default)]
-pub(super) struct EmbeddedGarments(Mutex<Vec<(Key, EmbeddedGarment)>>);
+/// The garments a draper has met last, by content: as many as two of the largest.
+pub(super) struct EmbeddedGarments {
+    /// Of every garment it has met, the place in `kept`.
+    met: Mutex<HashMap<Key, usize>>,
+    kept: LruCache<EmbeddedGarment>,
+}
+
+impl Default for EmbeddedGarments {
+    fn default() -> Self {
+        let bytes = 2 * super::MAX_VERTICES * PER_VERTEX;
+        let memory = MemoryBudget::new(KeptBytes { total: bytes, device: bytes });
+        Self { met: Mutex::default(), kept: LruCache::new(&memory, Residence::Device) }
+    }
+}
 
 impl EmbeddedGarments {
-    fn known(&self, key: Key) -> Option<EmbeddedGarment> {
-        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let place = kept.iter().position(|(of, _)| *of == key)?;
-        let found = kept.remove(place);
-        let garment = found.1.clone();
-        kept.push(found);
-        Some(garment)
-    }
-
-    fn keep(&self, key: Key, garment: EmbeddedGarment) {
-        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        kept.push((key, garment));
-        let vertices = |kept: &[(Key, EmbeddedGarment)]| -> usize {
-            kept.iter().map(|(_, garment)| garment.prepared.vertex_count()).sum()
-        };
-        while kept.len() > 1 && vertices(&kept) > MOST_KEPT {
-            kept.remove(0);
-        }
+    fn place(&self, key: Key) -> usize {
+        let mut met = self.met.lock().unwrap_or_else(PoisonError::into_inner);
+        let next = met.len();
+        *met.entry(key).or_insert(next)
     }
 
     /// The garment as the networks need it, made if it was not met before.
@@ -71,9 +70,10 @@ impl EmbeddedGarments {
         let mesh = mesh_key(&garment.rest);
         let key = KeyBuilder::new("embedded").key(mesh).text(garment.category.name());
         let key = key.number(u64::from(garment.holding)).finish();
-        if let Some(found) = self.known(key) {
+        let place = self.place(key);
+        if let Some(found) = self.kept.get(place) {
             let milliseconds = GarmentTimes::default();
-            return Ok(EmbeddedGarment { was_known: true, milliseconds, ..found });
+            return Ok(EmbeddedGarment { was_known: true, milliseconds, ..(*found).clone() });
         }
         let clock = Instant::now();
         let preprocessor = &draper.preprocessor;
@@ -87,7 +87,8 @@ impl EmbeddedGarments {
         let (embedding, was_known) = embedding(draper, &tensors, mesh)?;
         let milliseconds = GarmentTimes { preparation, embedding: elapsed(clock) };
         let found = EmbeddedGarment { prepared, rest, tensors, embedding, was_known, milliseconds };
-        self.keep(key, found.clone());
+        let bytes = PER_VERTEX * found.prepared.vertex_count();
+        self.kept.insert(place, found.clone(), bytes);
         Ok(found)
     }
 }

@@ -69,7 +69,7 @@ pub use report::{
     BodyReport, DrapedGarmentReport, FrameReport, ModelReport, Moment, Report, ScoredPositions,
 };
 pub use shipped::shipped_model;
-pub use smooth::{Smoothing, smooth};
+pub use smooth::{MOST_RADIUS, Smoothing, smooth};
 pub use source::{GarmentCatalog, GivenGarment};
 pub use warnings::{log_repairs, warn_about_order};
 
@@ -172,7 +172,7 @@ impl Draper {
         let joints = ActiveJoints::named(&body, &trained.state.joints)
             .map_err(|missing| DraperError::Joints { body: body.name.clone(), missing })?;
         let device = settings.device.clone();
-        let model = corrected(trained.networks(&device)?, &trained, settings.corrections)?;
+        let model = with_steps(trained.networks(&device)?, &trained, settings.corrections)?;
         let mut preprocessor = Preprocessor::new(&trained.config, Arc::new(body));
         if let Some(folder) = &settings.cache {
             preprocessor = preprocessor.with_cache_in(folder, settings.cache_limit);
@@ -196,7 +196,7 @@ impl Draper {
     /// When it asks for corrections that the model does not have.
     pub fn with(&self, settings: &DraperSettings) -> Result<Self, DraperError> {
         let DraperSettings { corrections, refine, resolve, post_process, .. } = settings.clone();
-        let model = corrected(self.model.clone(), &self.trained, corrections)?;
+        let model = with_steps(self.model.clone(), &self.trained, corrections)?;
         let settings = DraperSettings { corrections, refine, resolve, post_process, ..self.settings.clone() };
         Ok(Self { model, settings, ..self.clone() })
     }
@@ -250,17 +250,15 @@ impl Draper {
 }
 
 /// `model` with at most so many correction steps; `None`: as its configuration says.
-fn corrected(
+fn with_steps(
     model: ClothCombo,
     trained: &TrainedModel,
     corrections: Option<usize>,
 ) -> Result<ClothCombo, DraperError> {
     match corrections {
         Some(steps) if steps > 0 && model.corrections.is_empty() => Err(DraperError::NoCorrections { steps }),
-        Some(steps) => Ok(model.with_correction_steps(steps)),
-        None => {
-            let usual = &trained.config.model;
-            Ok(model.with_correction_steps(usual.correction_steps.unwrap_or(usual.corrections)))
+        asked => {
+            Ok(model.with_correction_steps(asked.unwrap_or(trained.config.model.usual_correction_steps())))
         }
     }
 }

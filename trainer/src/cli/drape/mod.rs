@@ -13,7 +13,8 @@ use crate::cli::post_process::PostProcessArguments;
 use crate::cli::verbosity::{print_status, progress_bar};
 use crate::inference::output::{Show, Staged, write_with_report};
 use crate::inference::{
-    Bodies, DrapeProgress, Draper, DraperSettings, Outfit, RefineSteps, Report, log_repairs, warn_about_order,
+    Bodies, DrapeProgress, Draper, DraperSettings, MOST_RADIUS, Outfit, RefineSteps, Report, log_repairs,
+    warn_about_order,
 };
 use crate::system::files::write_json;
 use crate::system::paths::user_cache;
@@ -87,7 +88,7 @@ pub struct Arguments {
     /// Smooths a motion over this many frames to each side, before the post-process and, where that makes no
     /// intersection, after it; 0 takes every frame as it is [default: 2 for frames at most 0.05 s apart, else 0]
     #[arg(long, num_args = 0..=1, default_missing_value = "2", value_name = "FRAMES",
-          value_parser = clap::value_parser!(u16).range(..=100))]
+          value_parser = clap::value_parser!(u16).range(..=i64::from(MOST_RADIUS)))]
     smooth: Option<u16>,
     /// Folder that keeps embeddings between runs; default: clothcombo in the user's cache folder
     #[arg(long, value_name = "FOLDER")]
