@@ -2,8 +2,9 @@
 
 use super::place::{misplaced, oversized, rescaled};
 use super::{DrapedGarment, MeshSize, Score, ScoreDistance, ScoreError, score};
-use clothcombo_data::format::load_tri_mesh;
-use clothcombo_physics::mesh::{TriMesh, is_inside_out};
+use clothcombo_data::format::{load_body_mesh, load_tri_mesh};
+use clothcombo_physics::mesh::{Topology, TriMesh, is_inside_out};
+use clothcombo_physics::vec3::{norm, sub};
 use std::path::{Path, PathBuf};
 
 /// The files of a scene; polygons are cut into triangles.
@@ -58,7 +59,8 @@ pub fn score_files(files: &MeshFiles, distance: ScoreDistance) -> Result<Score, 
 
 /// A posed body in metres. One that is inside out, its faces towards its inside, is turned, and said so.
 pub(crate) fn load_body(path: &Path) -> Result<TriMesh, ScoreError> {
-    let body = load_tri_mesh(path)?;
+    let body = load_body_mesh(path)?;
+    warn_about_openings(path, &body);
     if let Some(what) = oversized(&body) {
         return Err(ScoreError::BodySize { path: path.into(), what });
     }
@@ -67,6 +69,24 @@ pub(crate) fn load_body(path: &Path) -> Result<TriMesh, ScoreError> {
     }
     tracing::warn!("{}: the body is inside out; its faces were turned", path.display());
     Ok(body.turned())
+}
+
+/// A longer border (m) is no hole for an eye: half a body, or a garment, has no inside.
+const WIDE_OPENING: f64 = 0.2;
+
+fn warn_about_openings(path: &Path, body: &TriMesh) {
+    let at = |v: &u32| body.positions()[*v as usize];
+    let length = |border: &Vec<u32>| -> f64 {
+        let next = border.iter().cycle().skip(1);
+        border.iter().zip(next).map(|(a, b)| norm(sub(at(b), at(a)))).sum()
+    };
+    let longest = Topology::new(body).boundary_loops.iter().map(length).fold(0.0, f64::max);
+    if longest > WIDE_OPENING {
+        tracing::warn!(
+            "{}: the body is open along a border of {longest:.2} m: is it a whole body? What is inside there cannot be told",
+            path.display()
+        );
+    }
 }
 
 /// Name, rest mesh and draped mesh of a garment, which have the same faces; in the unit and place of `body`.
