@@ -66,7 +66,8 @@ impl fmt::Display for Size {
 
 /// What is wrong with a mesh that looks worn nowhere, if that can be told.
 pub(super) fn diagnosed(search: &Search, cloth: &Cloth, settings: &FitSettings) -> Option<FitError> {
-    half(cloth).or_else(|| beside(search, cloth, settings)).or_else(|| {
+    let told = half(cloth).or_else(|| beside(search, cloth, settings));
+    told.or_else(|| upside_down(search, cloth, settings)).or_else(|| {
         let ups = settings.up.map_or(vec![UpAxis::Y, UpAxis::Z], |up| vec![up]);
         let units = settings.unit.map_or(vec![Unit::M, Unit::Cm, Unit::Mm], |unit| vec![unit]);
         let of = |unit: &Unit| {
@@ -163,6 +164,21 @@ fn half(cloth: &Cloth) -> Option<FitError> {
         }
     }
     None
+}
+
+/// The other end of an axis, if that must point up; tubes are worn either way round.
+fn upside_down(search: &Search, cloth: &Cloth, settings: &FitSettings) -> Option<FitError> {
+    if settings.up.is_some() {
+        return None;
+    }
+    let believed = UpAxis::DOWN.into_iter().filter_map(|up| {
+        let known = FitSettings { up: Some(up), ..settings.clone() };
+        let candidates = search.candidates(cloth, cloth.extent(), &known);
+        let best = *Readings::new(&candidates, search, cloth).believed.first()?;
+        (!best.is_tube).then_some((up, best.score))
+    });
+    let (up, _) = believed.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    Some(FitError::UpsideDown { up })
 }
 
 /// The piece that lies beside the body when one of the largest is worn.

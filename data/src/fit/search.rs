@@ -140,7 +140,7 @@ impl<'a> Search<'a> {
         let units = Unit::ALL.into_iter().filter(|u| {
             settings.unit.is_none_or(|s| s == *u) && self.is_plausible_extent(extent * u.metres())
         });
-        let ups: Vec<UpAxis> = settings.up.map_or(UpAxis::ALL.to_vec(), |up| vec![up]);
+        let ups: Vec<UpAxis> = settings.up.map_or(UpAxis::USUAL.to_vec(), |up| vec![up]);
         let turns = settings.turn_degrees.map_or(vec![0.0, 90.0, 180.0, 270.0], |turn| vec![turn]);
         let mut bases = Vec::new();
         for unit in units {

@@ -45,10 +45,10 @@ pub(super) fn implausibility(
         return Some("turned by 180°, though its neckline does not show its front there".into());
     }
     // Sleeves made for other arms miss these ones where a file says where it is; a place that was searched for must do without.
-    let missed = if candidate.placement.origin == Origin::Elsewhere { candidate.crossings.arms } else { 0 };
-    let crossings = candidate.crossings.others + missed;
-    if crossings > 0 {
-        return Some(format!("{crossings} bones of the body pass through the cloth"));
+    let missed = if candidate.placement.origin == Origin::Elsewhere { candidate.piercing.arms } else { 0 };
+    let piercing = candidate.piercing.others + missed;
+    if piercing > 0 {
+        return Some(format!("{piercing} bones of the body pass through the cloth"));
     }
     if candidate.rim_distance > WIDEST_RIM {
         return Some(format!(
@@ -200,7 +200,7 @@ pub(super) fn verdict(
     if candidate.worn_pieces > 1 {
         doubts.push(Doubt::Outfit { pieces: candidate.worn_pieces });
     }
-    if candidate.crossings.arms > 0 {
+    if candidate.piercing.arms > 0 {
         doubts.push(Doubt::Arms);
     }
     if taken.turn_degrees == 180.0 && settings.turn_degrees.is_none() && candidate.neck_drop.is_none() {

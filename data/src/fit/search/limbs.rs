@@ -61,8 +61,7 @@ impl Search<'_> {
         }
         let at = |c: &Candidate, degrees: f64| Placement { leg_angle_degrees: degrees, ..c.placement };
         let apart = Judge { field: &self.measured.apart, ..*judge };
-        let has_legs =
-            |c: &&Candidate| LEG_ANGLES.iter().any(|degrees| apart.limbs(&at(c, *degrees)).legs);
+        let has_legs = |c: &&Candidate| LEG_ANGLES.iter().any(|degrees| apart.limbs(&at(c, *degrees)).legs);
         let spread = |candidate: &Candidate| {
             let turned = apart.turned(&candidate.placement, None, true);
             let scored = |degrees: &f64| apart.scored(at(candidate, *degrees), &turned, true, None);

@@ -85,8 +85,29 @@ fn a_vertex_far_from_all_others_is_named_and_set_aside() {
 }
 
 #[test]
+fn loose_triangles_are_refused_at_once() {
+    let shirt = garment(&mannequin(), Category::TShirt, 8).rest;
+    let corner =
+        |(n, v): (usize, &u32)| add(shirt.positions()[*v as usize], [1e-3 * (n % 7) as f64, 0.0, 0.0]);
+    let positions: Vec<[f64; 3]> = shirt.faces().iter().flatten().enumerate().map(corner).collect();
+    let faces: Vec<[u32; 3]> =
+        (0..shirt.face_count() as u32).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
+    let file = polygons(positions, faces.iter().map(<[u32; 3]>::as_slice));
+    let error = fit(&file, &mannequin(), &FitSettings::default()).unwrap_err();
+    assert!(matches!(error, FitError::Scattered { .. }), "{error}");
+}
+
+#[test]
 fn a_garment_upside_down_is_refused_or_doubted() {
     let body = mannequin();
+    // Trousers stand on one end only, and are told so.
+    let trousers = garment(&body, Category::Trousers, 7).rest;
+    let upside: Vec<[f64; 3]> = trousers.positions().iter().map(|[x, y, z]| [-x, -y, *z]).collect();
+    let file = polygons(upside, trousers.faces().iter().map(<[u32; 3]>::as_slice));
+    let error = fit(&file, &body, &FitSettings::default()).unwrap_err();
+    assert_eq!(error, FitError::UpsideDown { up: UpAxis::MinusY }, "{error}");
+    let said = FitSettings { up: Some(UpAxis::MinusY), ..FitSettings::default() };
+    assert_eq!(fit(&file, &body, &said).unwrap().report.category, Category::Trousers);
     let shirt = garment(&body, Category::TShirt, 8).rest;
     let upside: Vec<[f64; 3]> = shirt.positions().iter().map(|[x, y, z]| [-x, -y, *z]).collect();
     let file = polygons(upside, shirt.faces().iter().map(<[u32; 3]>::as_slice));
