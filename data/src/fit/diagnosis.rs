@@ -66,8 +66,8 @@ impl fmt::Display for Size {
 
 /// What is wrong with a mesh that looks worn nowhere, if that can be told.
 pub(super) fn diagnosed(search: &Search, cloth: &Cloth, settings: &FitSettings) -> Option<FitError> {
-    let told = half(cloth).or_else(|| beside(search, cloth, settings));
-    told.or_else(|| upside_down(search, cloth, settings)).or_else(|| {
+    let told = upside_down(search, cloth, settings).or_else(|| half(cloth));
+    told.or_else(|| beside(search, cloth, settings)).or_else(|| {
         let ups = settings.up.map_or(vec![UpAxis::Y, UpAxis::Z], |up| vec![up]);
         let units = settings.unit.map_or(vec![Unit::M, Unit::Cm, Unit::Mm], |unit| vec![unit]);
         let of = |unit: &Unit| {
@@ -134,8 +134,9 @@ fn other_size(search: &Search, cloth: &Cloth, known: &FitSettings) -> Option<(Si
         is_told.then_some((Size { extent: extent * unit.metres(), unit, factor }, best.score))
     };
     let better = |a: &(Size, f64), b: &(Size, f64)| a.1.total_cmp(&b.1);
-    let steps = (-SIZES..=SIZES).filter(|k| *k != 0);
-    steps.filter_map(|k| at(SIZE_STEP.powi(k))).max_by(better)
+    // One that is nearer to its own explains what the next one would be told for.
+    let steps = (-SIZES..=SIZES).filter(|k| *k != 0).map(f64::from).chain([-0.75, 0.75]);
+    steps.filter_map(|k| at(SIZE_STEP.powf(k))).max_by(better)
 }
 
 /// Whether a garment is cut in half by a plane of the file's axes: all of it lies on one side, and a border runs there and elsewhere.

@@ -121,6 +121,19 @@ fn arms_say_nothing_about_trousers() {
 }
 
 #[test]
+fn what_is_upside_down_is_told_with_the_flag() {
+    let body = shipped_body();
+    let trousers = generated(&body, Category::Trousers, 14, 1500).rest;
+    let upside: Vec<[f64; 3]> = trousers.positions().iter().map(|[x, y, z]| [-x, -y, *z]).collect();
+    let file = polygons(upside, trousers.faces().iter().map(<[u32; 3]>::as_slice));
+    let error =
+        fit(&file, &body, &FitSettings::default()).map(|fitted| fitted.report.to_string()).unwrap_err();
+    assert_eq!(error, FitError::UpsideDown { up: UpAxis::MinusY }, "{error}");
+    let said = FitSettings { up: Some(UpAxis::MinusY), ..FitSettings::default() };
+    assert_eq!(fit(&file, &body, &said).unwrap().report.category, Category::Trousers);
+}
+
+#[test]
 fn wide_trousers_are_of_another_size_whatever_else_they_may_be() {
     let body = shipped_body();
     let trousers = generated(&body, Category::Trousers, 7001, 500).rest;

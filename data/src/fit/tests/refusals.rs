@@ -100,14 +100,6 @@ fn loose_triangles_are_refused_at_once() {
 #[test]
 fn a_garment_upside_down_is_refused_or_doubted() {
     let body = mannequin();
-    // Trousers stand on one end only, and are told so.
-    let trousers = garment(&body, Category::Trousers, 7).rest;
-    let upside: Vec<[f64; 3]> = trousers.positions().iter().map(|[x, y, z]| [-x, -y, *z]).collect();
-    let file = polygons(upside, trousers.faces().iter().map(<[u32; 3]>::as_slice));
-    let error = fit(&file, &body, &FitSettings::default()).unwrap_err();
-    assert_eq!(error, FitError::UpsideDown { up: UpAxis::MinusY }, "{error}");
-    let said = FitSettings { up: Some(UpAxis::MinusY), ..FitSettings::default() };
-    assert_eq!(fit(&file, &body, &said).unwrap().report.category, Category::Trousers);
     let shirt = garment(&body, Category::TShirt, 8).rest;
     let upside: Vec<[f64; 3]> = shirt.positions().iter().map(|[x, y, z]| [-x, -y, *z]).collect();
     let file = polygons(upside, shirt.faces().iter().map(<[u32; 3]>::as_slice));
