@@ -14,8 +14,8 @@ pub struct FitArguments {
     /// Unit of the file: m, dm, cm, mm, inch, foot or auto
     #[arg(long, default_value = "auto", value_parser = automatic::<Unit>)]
     unit: Automatic<Unit>,
-    /// Axis of the file that points up: y, z, x or auto
-    #[arg(long, default_value = "auto", value_parser = automatic::<UpAxis>)]
+    /// Axis of the file that points up: y, z, x, where files are upside down -y, -z, -x, or auto (the first three)
+    #[arg(long, default_value = "auto", allow_hyphen_values = true, value_parser = automatic::<UpAxis>)]
     up: Automatic<UpAxis>,
     /// Arms of the garment: level (t), lowered (a), or auto
     #[arg(long, default_value = "auto", value_parser = automatic::<Arms>)]
@@ -109,7 +109,7 @@ mod tests {
             "--unit",
             "cm",
             "--up",
-            "z",
+            "-z",
             "--arms",
             "a",
             "--legs",
@@ -127,7 +127,7 @@ mod tests {
         ]);
         let expected = FitSettings {
             unit: Some(Unit::Cm),
-            up: Some(UpAxis::Z),
+            up: Some(UpAxis::MinusZ),
             arms_lowered: Some(true),
             legs_degrees: Some(7.5),
             category: Some(Category::Top),

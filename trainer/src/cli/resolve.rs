@@ -114,7 +114,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let inputs: Vec<PathBuf> =
         [&arguments.body].into_iter().chain(&arguments.garments).chain(&arguments.rest).cloned().collect();
     let staged = Staged::new(&arguments.output, arguments.replace, &inputs)?;
-    let body = checked_body(NamedMesh::load(&arguments.body)?)?;
+    let body = checked_body(NamedMesh::load_body(&arguments.body)?)?;
     let garments = load_garments(arguments, &body)?;
     let surface = Surface::from_mesh(&body);
     let rest: Vec<RestGarment> = garments.iter().map(|g| RestGarment::new(&g.rest)).collect();

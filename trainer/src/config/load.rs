@@ -118,6 +118,13 @@ pub fn parse(text: &str, path: &Path, overrides: &[String]) -> Result<Config, Co
         Some(problem) => {
             let is_in_a_file = of_the_files.as_ref() == Some(&problem);
             let (place, what, hint) = problem;
+            let sets = |setting: &&String| {
+                setting.split('=').next().is_some_and(|key| place.starts_with(key.trim()))
+            };
+            if let (false, Some(setting)) = (is_in_a_file, overrides.iter().rev().find(sets)) {
+                let message = format!("{place} {what}; hint: {hint}");
+                return Err(ConfigError::BadOverride { setting: shortened(setting), message });
+            }
             let Place { source_code, span } = sources.place_of(&place);
             let span = span.filter(|_| is_in_a_file);
             Err(ConfigError::Inconsistent { place, what, hint, source_code, span })

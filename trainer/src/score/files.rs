@@ -2,8 +2,9 @@
 
 use super::place::{misplaced, oversized, rescaled};
 use super::{DrapedGarment, MeshSize, Score, ScoreDistance, ScoreError, score};
-use clothcombo_data::format::load_tri_mesh;
-use clothcombo_physics::mesh::{TriMesh, is_inside_out};
+use clothcombo_data::format::{load_body_mesh, load_tri_mesh};
+use clothcombo_physics::mesh::{Topology, TriMesh, is_inside_out};
+use clothcombo_physics::vec3::{norm, sub};
 use std::path::{Path, PathBuf};
 
 /// A mesh, and what messages call it: its file, or a name.
@@ -22,6 +23,14 @@ impl NamedMesh {
     /// Naming file and line.
     pub fn load(path: &Path) -> Result<Self, ScoreError> {
         Ok(Self { path: path.into(), mesh: load_tri_mesh(path)? })
+    }
+
+    /// Reads a body's mesh file; of a scene of several meshes the one named "body".
+    ///
+    /// # Errors
+    /// Naming file and line.
+    pub fn load_body(path: &Path) -> Result<Self, ScoreError> {
+        Ok(Self { path: path.into(), mesh: load_body_mesh(path)? })
     }
 
     fn size(&self) -> MeshSize {
@@ -69,7 +78,7 @@ pub fn score_files(files: &MeshFiles, distance: ScoreDistance) -> Result<Score, 
     let load = |paths: &[PathBuf]| -> Result<Vec<_>, ScoreError> {
         paths.iter().map(|path| NamedMesh::load(path)).collect()
     };
-    let body = NamedMesh::load(body)?;
+    let body = NamedMesh::load_body(body)?;
     score_meshes(
         SceneMeshes { body, rest: load(rest)?, draped: load(draped)?, canonical: load(canonical)? },
         distance,
@@ -119,6 +128,7 @@ fn check_counts(rest: usize, draped: usize, canonical: usize) -> Result<(), Scor
 /// When it is not in metres.
 pub fn checked_body(body: NamedMesh) -> Result<TriMesh, ScoreError> {
     let NamedMesh { path, mesh } = body;
+    warn_about_openings(&path, &mesh);
     if let Some(what) = oversized(&mesh) {
         return Err(ScoreError::BodySize { path, what });
     }
@@ -127,6 +137,24 @@ pub fn checked_body(body: NamedMesh) -> Result<TriMesh, ScoreError> {
     }
     tracing::warn!("{}: the body is inside out; its faces were turned", path.display());
     Ok(mesh.turned())
+}
+
+/// A longer border (m) is no hole for an eye: half a body, or a garment, has no inside.
+const WIDE_OPENING: f64 = 0.2;
+
+fn warn_about_openings(path: &Path, body: &TriMesh) {
+    let at = |v: &u32| body.positions()[*v as usize];
+    let length = |border: &Vec<u32>| -> f64 {
+        let next = border.iter().cycle().skip(1);
+        border.iter().zip(next).map(|(a, b)| norm(sub(at(b), at(a)))).sum()
+    };
+    let longest = Topology::new(body).boundary_loops.iter().map(length).fold(0.0, f64::max);
+    if longest > WIDE_OPENING {
+        tracing::warn!(
+            "{}: the body is open along a border of {longest:.2} m: is it a whole body? What is inside there cannot be told",
+            path.display()
+        );
+    }
 }
 
 /// The name of a garment whose rest mesh and draped mesh have the same faces, and are in the unit and place of `body`.
