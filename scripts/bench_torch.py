@@ -50,7 +50,7 @@ except ImportError as error:
 # Networks by the names of ours, and what their parameters are called in torch_networks.py.
 NETWORKS = {
     "garment_encoder": ["encoder"], "draping": ["embedding", "displacement"], "skinning": ["skinning"],
-    "untangling": ["force", "untangling"], "corrections": [],
+    "untangling": ["force", "untangling"],
 }
 PARTS = {
     "forward": "forward_ms",

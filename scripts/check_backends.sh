@@ -73,8 +73,8 @@ agreement() {
 
 training() {
     local run=$work/$1 stage tiny=()
-    for stage in 0 1 2 3; do tiny+=(--set "stages.$stage.steps=5"); done
-    for key in width embedding diffusion_width siren_width skinning_width correction_width eigen_count; do
+    for stage in 0 1 2; do tiny+=(--set "stages.$stage.steps=5"); done
+    for key in width embedding diffusion_width siren_width skinning_width eigen_count; do
         tiny+=(--set "model.$key=16")
     done
     "$train" --config configs/smoke.toml --device "$1" --run-dir "$run" --quiet "${tiny[@]}" \

@@ -16,10 +16,9 @@ import numpy as np
 MODEL = {
     "width", "embedding", "diffusion_blocks", "diffusion_width", "eigen_count", "mlp_layers", "siren_layers", "siren_width",
     "omega_first", "omega_hidden", "skinning_layers", "skinning_width", "displacement_scale", "untangling_scale",
-    "skinning_scale", "zero_sum_skinning", "vertex_embedding", "corrections", "correction_width",
-    "correction_steps", "graph", "skinning_joints",
+    "skinning_scale", "zero_sum_skinning", "vertex_embedding",
+    "graph", "skinning_joints",
 }
-ONE_VALUE = {"precision": "f32"}
 # What the PyTorch losses heed, with the values of a scene that says nothing.
 SETTINGS = {
     "thickness": 4.7e-4, "density": 426.0, "mu": 2.36e4, "lambda": 4.44e4, "bending_stiffness": 3.96e-5, "gravity": 9.81,
@@ -47,7 +46,7 @@ def read_safetensors(path):
 def not_implemented(about):
     """Switches of an exported run that the peer would ignore. One that it has never heard of must be off."""
     model, settings = about["model"], about["settings"]
-    found = [f"model.{key} = {value}" for key, value in model.items() if key not in MODEL and value and ONE_VALUE.get(key) != value]
+    found = [f"model.{key} = {value}" for key, value in model.items() if key not in MODEL and value]
     found += [f"{key} = {value}" for key, value in settings.items() if key not in SETTINGS | {"distance": 0} and value]
     if about["trains"] not in ("single", "all"):
         found.append(f"stages.trains = {about['trains']}")

@@ -103,7 +103,7 @@ def shares(case):
     """Milliseconds of a step by what computes them. What the losses take beyond their own time is moved data."""
     phases, losses = dict(case["profile"]["phases_ms"]), case["costs"]["losses_ms"]
     groups = {
-        "networks": ["embedding", "vertex products", "draping", "skinning", "untangling", "contact features", "corrections"],
+        "networks": ["embedding", "vertex products", "draping", "skinning", "untangling"],
         "backward": ["backward"], "update": ["clip", "optimiser"], "wait for scene": ["data wait"], "other": ["other"],
     }
     found = {name: sum(phases[part] for part in parts) for name, parts in groups.items()}

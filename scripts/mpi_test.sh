@@ -20,7 +20,7 @@ if [ "$(id -u)" -eq 0 ]; then
 fi
 mpi=(mpirun --oversubscribe -n "$processes")
 short=(--quiet --config configs/smoke.toml
-    --set stages.0.steps=8 --set stages.1.steps=6 --set stages.2.steps=6 --set stages.3.steps=4
+    --set stages.0.steps=8 --set stages.1.steps=6 --set stages.2.steps=6
     --set validation.single_scenes=1 --set validation.layered_scenes=1)
 for stage in 0 1 2 3; do
     short+=(--set "stages.$stage.accumulate=$processes")

@@ -31,7 +31,7 @@ COLUMNS = {
         "intersection-free then",
     ],
     "Ablations": ["strain", "layer collision", "layer-order violations"],
-    "Time per garment": ["embedding", "single draping", "untangling", "corrections", "post-process"],
+    "Time per garment": ["embedding", "single draping", "untangling", "acceptance", "post-process"],
     "Speed against error, one garment": ["time", "excess energy", "distance", "strain", "pairs with"],
     "Speed against error, 3 garments": ["time", "excess energy", "distance", "strain", "pairs with", "pairs between"],
 }

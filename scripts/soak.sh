@@ -11,16 +11,12 @@ steps=${1:-20000}
 run=${2:-runs/soak}
 single=$((steps * 7 / 10))
 untangling=$((steps * 2 / 10))
-all=$((steps / 20))
-corrections=$((steps - single - untangling - all))
+all=$((steps - single - untangling))
 settings=(
     --set "stages.0.steps=$single" --set "stages.1.steps=$untangling" --set "stages.2.steps=$all"
-    --set "stages.3.steps=$corrections"
     # The paper's 1e-4 times ten.
     --set "stages.0.learning_rate=1e-3" --set "stages.1.learning_rate=1e-3" --set "stages.2.learning_rate=1e-3"
-    --set "stages.3.learning_rate=1e-3"
     --set "stages.0.pose_scale=1.2" --set "stages.1.pose_scale=1.2" --set "stages.2.pose_scale=1.2"
-    --set "stages.3.pose_scale=1.2"
     --set "data.shape_range=[-3.0, 3.0]" --set "validation.every=$((steps / 10))"
 )
 export RAYON_NUM_THREADS=${RAYON_NUM_THREADS:-1}

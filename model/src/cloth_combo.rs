@@ -7,7 +7,6 @@ use burn::tensor::{Device, Tensor};
 use tracing::trace_span;
 
 use crate::config::{Dimensions, ModelConfig};
-use crate::correction::Correction;
 use crate::diffusion_net::MINIMUM_TIME;
 use crate::draping::Draping;
 use crate::error::ModelError;
@@ -19,9 +18,9 @@ use crate::surroundings::Surroundings;
 use crate::tensors::{GarmentTensors, OutfitTensors, stack_rows};
 use crate::untangling::Untangling;
 
-/// The four networks, and those that correct what they do.
+/// The four networks.
 ///
-/// Parameters (the names in a safetensors file): `garment_encoder`, `draping`, `skinning`, `untangling`, `corrections.{0…}`, each
+/// Parameters (the names in a safetensors file): `garment_encoder`, `draping`, `skinning`, `surroundings`, `untangling`, each
 /// documented at its type.
 #[derive(Module, Debug)]
 pub struct ClothCombo {
@@ -35,11 +34,6 @@ pub struct ClothCombo {
     pub surroundings: Option<Surroundings>,
     /// F_f and D_m.
     pub untangling: Untangling,
-    /// Correct what the others do, one after the other; the paper has none.
-    pub corrections: Vec<Correction>,
-    /// Correction steps at inference ([`ModelConfig::correction_steps`]).
-    #[module(skip)]
-    pub correction_steps: usize,
 }
 
 /// Embeddings of the garments of an outfit, with everything that follows from them alone.
@@ -83,10 +77,7 @@ impl ClothCombo {
             skinning: Skinning::new(config, dimensions, start),
             untangling: Untangling::new(config, start),
             surroundings: (config.surroundings > 0).then(|| Surroundings::new(config, dimensions, start)),
-            corrections: Vec::new(),
-            correction_steps: 0,
-        }
-        .with_corrections(config, start))
+        })
     }
 
     /// Embeds one garment (E_c).
@@ -129,19 +120,6 @@ impl ClothCombo {
             self.untangling.vertex_product(vertex.clone())
         });
         Ok(Embeddings { vertex, garment, draping_product, skinning_product, untangling_product })
-    }
-
-    /// The same networks with new correction networks in place of any they have; untrained, these correct nothing.
-    pub fn with_corrections(mut self, config: &ModelConfig, start: &mut Initializer) -> Self {
-        self.corrections = (0..config.corrections).map(|_| Correction::new(config, start)).collect();
-        self.correction_steps = config.usual_correction_steps();
-        self
-    }
-
-    /// The same networks with at most `steps` correction steps at inference.
-    pub fn with_correction_steps(mut self, steps: usize) -> Self {
-        self.correction_steps = steps;
-        self
     }
 
     /// Raises diffusion times that an optimiser step pushed below the smallest one in use.

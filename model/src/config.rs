@@ -4,7 +4,6 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::ModelError;
-use crate::ops::Precision;
 
 /// Which garments of an outfit interact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -74,24 +73,13 @@ pub struct ModelConfig {
     /// connected graph; `D_m` then moves every garment, a single one too. In `"full"` a layer collision without gate
     /// (`losses.layer_collision.gated`) pushes distant garments apart.
     pub graph: Graph,
-    /// Give the vertex embedding `z_v` to `D_s`, `S`, `D_m` and the corrections. `false` is the ablation of the paper's
+    /// Give the vertex embedding `z_v` to `D_s`, `S` and `D_m`. `false` is the ablation of the paper's
     /// Table 4: the garment embedding `z̄_v` replaces it at every vertex.
     pub vertex_embedding: bool,
     /// Length of the code of the pose around a joint, which every vertex reads through its skin weights, beside the thickness
     /// of what is worn below it; 0 is the paper, which has neither: its networks see the pose only through `z_s`, one row per
     /// garment.
     pub surroundings: usize,
-    /// Correction networks that garments go through at the end; 0 is the paper, which has none.
-    pub corrections: usize,
-    /// Width of the correction networks.
-    pub correction_width: usize,
-    /// Correction steps of a drape at most: the networks take turns, round after round, until no step lowers the energy of a
-    /// garment any more. Training takes every network once. By default one step per network; 0 leaves what the paper's
-    /// networks make as it is.
-    pub correction_steps: Option<usize>,
-    /// Numbers that are multiplied at every vertex of DiffusionNet's blocks and of the modulated SIRENs (but for coordinates and
-    /// output), in both passes, on a processor with the `flex` backend. Weights, sums and everything else are f32.
-    pub precision: Precision,
 }
 
 impl Default for ModelConfig {
@@ -117,25 +105,11 @@ impl Default for ModelConfig {
             graph: Graph::Near,
             vertex_embedding: true,
             surroundings: 0,
-            corrections: 0,
-            correction_width: 96,
-            correction_steps: None,
-            precision: Precision::F32,
         }
     }
 }
 
 impl ModelConfig {
-    /// The same without correction networks: all that a model has of the paper's.
-    pub fn without_corrections(&self) -> Self {
-        Self { corrections: 0, correction_steps: None, ..self.clone() }
-    }
-
-    /// Correction steps at inference where nobody asks for another number.
-    pub fn usual_correction_steps(&self) -> usize {
-        self.correction_steps.unwrap_or(self.corrections)
-    }
-
     /// Checks that every size is at least one and every scale and frequency is usable.
     ///
     /// # Errors
@@ -151,14 +125,10 @@ impl ModelConfig {
             ("siren_width", self.siren_width, 1),
             ("skinning_layers", self.skinning_layers, 1),
             ("skinning_width", self.skinning_width, 1),
-            ("correction_width", self.correction_width, 1),
         ];
         for (key, value, minimum) in sizes {
             check(value >= minimum, key, value, &format!("at least {minimum}"))?;
         }
-        let steps = self.correction_steps.unwrap_or(0);
-        let expected = "left out without correction networks (corrections = 0)";
-        check(steps == 0 || self.corrections > 0, "correction_steps", steps, expected)?;
         for (key, value) in [("omega_first", self.omega_first), ("omega_hidden", self.omega_hidden)] {
             check(value.is_finite() && value > 0.0, key, value, "a positive number")?;
         }

@@ -4,10 +4,9 @@ use burn::tensor::Tensor;
 use tracing::trace_span;
 
 use crate::cloth_combo::{ClothCombo, Embeddings};
-use crate::correction::Conditioning;
 use crate::linear_blend_skinning::linear_blend_skinning;
 use crate::mode::Mode;
-use crate::tensors::{BodyTensors, ContactFeatureTensors, OutfitTensors};
+use crate::tensors::{BodyTensors, OutfitTensors};
 
 /// Positions of the garments of an outfit.
 #[derive(Clone, Debug)]
@@ -21,15 +20,11 @@ pub struct DrapeState {
 /// All states that the networks take an outfit through on one body, in order.
 #[derive(Clone, Debug)]
 pub struct DrapeStates {
-    /// What displacements are added to `[ΣV,3]` (m).
-    pub start: Tensor<2>,
     /// x_s and V_s, after single draping.
     pub single: DrapeState,
     /// x_m and V_m, after untangling; absent where a pass ends before, or where [untangling does not
     /// act](crate::Untangling::acts_on).
     pub layered: Option<DrapeState>,
-    /// After every correction step.
-    pub corrected: Vec<DrapeState>,
     /// Corrected skin weights W + ΔW `[ΣV,J]`.
     pub skin_weights: Tensor<2>,
     /// Draping embeddings z_s `[M,width]`.
@@ -39,12 +34,7 @@ pub struct DrapeStates {
 impl DrapeStates {
     /// The last state.
     pub fn last(&self) -> &DrapeState {
-        self.corrected.last().or(self.layered.as_ref()).unwrap_or(&self.single)
-    }
-
-    /// Exchanges the last state, from which the next correction step starts.
-    pub fn replace_last(&mut self, state: DrapeState) {
-        *self.corrected.last_mut().or(self.layered.as_mut()).unwrap_or(&mut self.single) = state;
+        self.layered.as_ref().unwrap_or(&self.single)
     }
 }
 
@@ -73,7 +63,7 @@ impl ClothCombo {
             draping_embedding.clone(),
             &outfit.packing,
         );
-        let canonical = displacement + start.clone();
+        let canonical = displacement + start;
         drop(span);
         let span = trace_span!("skinning").entered();
         let skin_weights = self.skinning.weights(outfit, skinning_product, draping_embedding.clone());
@@ -88,33 +78,7 @@ impl ClothCombo {
             let displacement = self.untangling.displace(outfit, canonical.clone(), draping, product);
             posed(canonical + displacement, &skin_weights, body)
         });
-        DrapeStates { start, single, layered, corrected: Vec::new(), skin_weights, draping_embedding }
-    }
-
-    /// Takes one more correction step, from the last of `states`, whose contact features are `features`. The correction
-    /// networks take turns.
-    ///
-    /// Only the parameters of the network whose turn it is get a gradient: the state, its features and everything that led
-    /// there count as given, whatever device they come from.
-    ///
-    /// # Panics
-    /// Without correction networks.
-    pub fn correct(
-        &self,
-        outfit: &OutfitTensors,
-        embeddings: &Embeddings,
-        body: &BodyTensors,
-        states: &mut DrapeStates,
-        features: ContactFeatureTensors,
-    ) {
-        let _span = trace_span!("corrections").entered();
-        let network = &self.corrections[states.corrected.len() % self.corrections.len()];
-        let [vertex, draping, skin_weights] =
-            [&embeddings.vertex, &states.draping_embedding, &states.skin_weights].map(|t| t.clone().detach());
-        let given = Conditioning { vertex: &vertex, draping: &draping, packing: &outfit.packing };
-        let displacement = states.last().canonical.clone().detach() - states.start.clone();
-        let canonical = network.correct(displacement, features, &given) + states.start.clone();
-        states.corrected.push(posed(canonical, &skin_weights, body));
+        DrapeStates { single, layered, skin_weights, draping_embedding }
     }
 }
 

@@ -46,7 +46,7 @@ impl GarmentEncoder {
     pub(crate) fn new(config: &ModelConfig, start: &mut Initializer) -> Self {
         let (blocks, width) = (config.diffusion_blocks, config.diffusion_width);
         Self {
-            diffusion_net: DiffusionNet::new(blocks, width, config.embedding, config.precision, start),
+            diffusion_net: DiffusionNet::new(blocks, width, config.embedding, start),
             has_vertex_embedding: config.vertex_embedding,
         }
     }

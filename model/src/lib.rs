@@ -7,7 +7,6 @@
 //! S    skinning          x, z_s, z_v → skin weight correction ΔW
 //! F_f  untangling        z_s^i, z_s^j → force f^ij
 //! D_m  untangling        x_s, f^i, z_s, z_v → displacement Δx_m                        (modulated SIREN)
-//!      corrections       contact features, z_s, z_v → corrected displacement          (not in the paper)
 //! ```
 //!
 //! No files and no energies here: arrays come in as host slices ([`GarmentTensors`], [`BodyTensors`]), positions go out as
@@ -17,7 +16,6 @@
 mod adam;
 mod cloth_combo;
 mod config;
-mod correction;
 pub mod diffusion_net;
 mod draping;
 mod error;
@@ -42,7 +40,6 @@ mod untangling;
 pub use adam::FusedAdam;
 pub use cloth_combo::{ClothCombo, Embeddings};
 pub use config::{Dimensions, Graph, ModelConfig, SkinningJoints};
-pub use correction::Correction;
 pub use draping::Draping;
 pub use error::ModelError;
 pub use forward::{DrapeState, DrapeStates};
@@ -53,12 +50,9 @@ pub use linear::Linear;
 pub use linear_blend_skinning::linear_blend_skinning;
 pub use mlp::ResidualMlp;
 pub use mode::Mode;
-pub use ops::Precision;
 pub use packing::Packing;
 pub use siren::{ModulatedSiren, Modulator, SirenSizes};
 pub use skinning::Skinning;
 pub use surroundings::Surroundings;
-pub use tensors::{
-    BodyTensors, ContactFeatureTensors, GarmentArrays, GarmentTensors, JOINT_FEATURES, OutfitTensors,
-};
+pub use tensors::{BodyTensors, GarmentArrays, GarmentTensors, JOINT_FEATURES, OutfitTensors};
 pub use untangling::Untangling;

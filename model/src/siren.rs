@@ -18,8 +18,8 @@ use crate::config::ModelConfig;
 use crate::initializer::{Initializer, fan_in_bound};
 use crate::linear::Linear;
 use crate::ops::{
-    Activation, Precision, SirenArguments, activate_packed, activate_packed_sum, modulated_siren, product,
-    product_in, runs_on_host, sine_modulation, split_columns,
+    Activation, SirenArguments, activate_packed, activate_packed_sum, modulated_siren, product, runs_on_host,
+    sine_modulation, split_columns,
 };
 use crate::packing::Packing;
 
@@ -38,8 +38,6 @@ pub struct SirenSizes {
     pub omega_first: f64,
     /// w0 of the others.
     pub omega_hidden: f64,
-    /// Of the products between units.
-    pub precision: Precision,
 }
 
 impl SirenSizes {
@@ -52,7 +50,6 @@ impl SirenSizes {
             vertex_latent: config.embedding,
             omega_first: config.omega_first,
             omega_hidden: config.omega_hidden,
-            precision: config.precision,
         }
     }
 }
@@ -73,8 +70,6 @@ pub struct Modulator {
     pub hidden: Vec<Param<Tensor<2>>>,
     #[module(skip)]
     width: usize,
-    #[module(skip)]
-    precision: Precision,
 }
 
 impl Modulator {
@@ -95,13 +90,12 @@ impl Modulator {
             bias: start.uniform_columns([columns], &bounds),
             hidden: (1..sizes.layers).map(|_| start.uniform([sizes.width, sizes.width], bound)).collect(),
             width: sizes.width,
-            precision: sizes.precision,
         }
     }
 
     /// The part of all gates that depends on the vertices only: `[N, vertex_latent]` → `[N, L·width]`.
     pub fn vertex_product(&self, vertex: Tensor<2>) -> Tensor<2> {
-        product_in(self.precision, vertex, self.vertex.val())
+        product(vertex, self.vertex.val())
     }
 
     /// The part of all gates that depends on the garments only: `[M, garment_latent]` → `[M, L·width]`.
@@ -207,7 +201,7 @@ impl ModulatedSiren {
             output_bias: self.output.bias_row(),
         };
         let omegas = [self.omega_first, self.omega_hidden];
-        modulated_siren(arguments, omegas, packing, self.modulator.precision)
+        modulated_siren(arguments, omegas, packing)
     }
 
     /// Every layer as operations of its own: what GPUs run, and the oracle of the fused form.

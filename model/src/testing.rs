@@ -166,13 +166,6 @@ impl HostGarment {
     }
 }
 
-/// `‖a − b‖ / ‖b‖`.
-pub(crate) fn relative_error(a: &[f32], b: &[f32]) -> f64 {
-    let norm =
-        |values: &mut dyn Iterator<Item = f32>| values.map(|x| f64::from(x).powi(2)).sum::<f64>().sqrt();
-    norm(&mut a.iter().zip(b).map(|(a, b)| a - b)) / norm(&mut b.iter().copied())
-}
-
 /// Gradients of every parameter of a module under one loss, in visit order, with their names.
 pub(crate) fn parameter_gradients<M: Module>(module: &M, loss: Tensor<1>) -> Vec<(String, Vec<f32>)> {
     struct CollectGradients<'a> {

@@ -10,7 +10,6 @@
 //! | [`operators`] | the DiffusionNet precompute: mass, Laplacian, gradients, eigenbasis |
 //! | [`energy`] | the eight energies, their gradients, and the weighted sum over a scene |
 //! | [`contact`] | penetration of the body, order of layers, exact intersections and their contours |
-//! | [`contact_features`] | where every vertex of an outfit lies against the other layers: input of the correction networks |
 //! | [`equilibrium`] | static drape: direct minimisation of the same energies from any start |
 //! | [`query`] | nearest vertex, closest surface point, winding numbers, triangle intersections |
 //! | [`transform`] | affine maps, as skinning blends them |
@@ -19,7 +18,6 @@
 #[cfg(feature = "autodiff")]
 pub mod autodiff;
 pub mod contact;
-pub mod contact_features;
 pub mod energy;
 pub mod equilibrium;
 pub mod mesh;

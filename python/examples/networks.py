@@ -5,8 +5,7 @@ one training step on the physical losses of clothcombo.torch.
     clothcombo bench step --widths 16 --layers 2 --vertices 200 --export scene --export-only
     python3 python/examples/networks.py scene
 
-The module is scripts/torch_networks.py; `--config` instead of sizes exports a scene of your own configuration. Without the
-correction networks, which are no part of the paper.
+The module is scripts/torch_networks.py; `--config` instead of sizes exports a scene of your own configuration.
 """
 
 import sys

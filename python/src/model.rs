@@ -124,19 +124,19 @@ impl Model {
     #[staticmethod]
     fn load(
         py: Python<'_>,
-        path: PathBuf,
+        path: Option<PathBuf>,
         body: Option<String>,
         cache: Option<PathBuf>,
         no_cache: bool,
         folders: Vec<PathBuf>,
     ) -> PyResult<Self> {
-        let mut files = vec![path.clone()];
+        let mut files: Vec<PathBuf> = path.iter().cloned().collect();
         files.extend(body.clone().filter(|name| name != "mannequin").map(PathBuf::from));
         files.extend(folders.clone());
         let cache = if no_cache { None } else { cache.or_else(user_cache) };
         call(py, &files, || {
             let settings = DraperSettings { body, cache, ..DraperSettings::default() };
-            let draper = Draper::load(Some(&path), &settings)?;
+            let draper = Draper::load(path.as_deref(), &settings)?;
             let catalog = draper.catalog(&folders)?;
             Ok::<_, Report>(Self { draper, catalog })
         })
@@ -201,7 +201,6 @@ impl Outfit {
         every: usize,
         posed: Option<PyReadonlyArray2<'_, f64>>,
         t_pose: Option<PyReadonlyArray2<'_, f64>>,
-        corrections: Option<usize>,
         refine: RefineInput,
         resolve: bool,
         gap_mm: f64,
@@ -218,8 +217,7 @@ impl Outfit {
             return Err(refused_text(format!("smooth is {radius}; hint: at most {MOST_RADIUS} frames")));
         }
         let post_process = resolve_settings(gap_mm, time_limit)?;
-        let settings =
-            DraperSettings { corrections, refine, resolve, post_process, ..self.draper.settings().clone() };
+        let settings = DraperSettings { refine, resolve, post_process, ..self.draper.settings().clone() };
         let pose = pose.map(|pose| pose.pose()).transpose()?;
         let motion = motion.map(|motion| motion.motion()).transpose()?;
         let posed = posed.as_ref().map(|p| rows(p).map(<[_]>::to_vec)).transpose()?;
@@ -227,7 +225,7 @@ impl Outfit {
         let range = FrameRange { first: frames.0, end: frames.1 };
         let files: Vec<PathBuf> = motion.iter().filter_map(|motion| motion.as_ref().err().cloned()).collect();
         call(py, &files, || {
-            let draper = self.draper.with(&settings)?;
+            let draper = self.draper.with(&settings);
             let body = draper.body();
             let bodies = match (motion, posed) {
                 (Some(motion), _) => {

@@ -42,7 +42,7 @@ def test_three_garments_are_draped_as_by_the_program(model, meshes, program, tmp
 def test_garments_come_as_arrays_files_names_and_with_hints(model, meshes, tmp_path):
     shirt = tmp_path / "shirt.obj"
     write_obj(shirt, (100 * meshes[0][0], meshes[0][1]))
-    quick = dict(pose="reaching", resolve=False, corrections=0)
+    quick = dict(pose="reaching", resolve=False)
     named = model.drape([NAMES[0]], **quick).garments[0]
     as_arrays = model.drape([meshes[0]], **quick).garments[0]
     in_cm = model.drape([clothcombo.Garment(shirt, unit="cm")], **quick).garments[0]
@@ -127,7 +127,7 @@ def test_files_that_are_not_there_are_an_os_error(model, tmp_path):
 def test_a_motion_and_a_posed_surface_are_draped_and_saved(model, tmp_path):
     poses = np.zeros((3, 22, 3))
     poses[:, 16, 2] = [-0.3, -0.4, -0.5]
-    drape = model.drape([NAMES[1]], motion=(poses, 30.0), corrections=0, resolve=False)
+    drape = model.drape([NAMES[1]], motion=(poses, 30.0), resolve=False)
     assert drape.body.shape == (3, *model.body((), None)[0].shape) and drape.seconds == pytest.approx([0, 1 / 30, 2 / 30])
     assert drape.garments[0].positions.shape[0] == 3
     drape.save(tmp_path / "out")
@@ -135,10 +135,10 @@ def test_a_motion_and_a_posed_surface_are_draped_and_saved(model, tmp_path):
     with pytest.raises(clothcombo.Error, match="is there and is not empty"):
         drape.save(tmp_path / "out")
     with pytest.warns(UserWarning, match="shape parameter"):
-        one = model.drape([NAMES[1]], pose=poses[1], shape=[4.0], corrections=0, resolve=False)
+        one = model.drape([NAMES[1]], pose=poses[1], shape=[4.0], resolve=False)
     vertices, joints = model.body([4.0], poses[1])
     assert np.abs(one.body - vertices).max() < 1e-6 and len(joints) == len(model.body.joint_names)
-    again = model.drape([NAMES[1]], posed=vertices, t_pose=model.body([4.0])[0], corrections=0, resolve=False)
+    again = model.drape([NAMES[1]], posed=vertices, t_pose=model.body([4.0])[0], resolve=False)
     assert np.abs(again.garments[0].positions - one.garments[0].positions).max() < 5e-3
 
 
@@ -153,7 +153,7 @@ def test_drapes_leak_nothing(model, meshes):
 
     def drapes(count):
         for i in range(count):
-            outfit.drape(shape=[0.001 * i], corrections=0, resolve=False).garments[0].positions
+            outfit.drape(shape=[0.001 * i], resolve=False).garments[0].positions
         gc.collect()
         return resident_mb()
 

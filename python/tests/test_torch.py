@@ -97,7 +97,7 @@ def test_a_tensor_is_read_in_place_and_a_network_learns():
 
 
 def test_the_networks_are_those_of_the_program(program, tmp_path):
-    sizes = ["--widths", "16", "--layers", "2", "--vertices", "200", "--set", "model.corrections=0"]
+    sizes = ["--widths", "16", "--layers", "2", "--vertices", "200"]
     command = [program, "bench", "step", *sizes, "--export", str(tmp_path / "scene"), "--export-only"]
     subprocess.run(command, check=True, capture_output=True)
     sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))

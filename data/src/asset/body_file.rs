@@ -48,7 +48,16 @@ impl Body {
     /// # Errors
     /// [`FileError`] naming file and key.
     pub fn load(path: &Path, settings: &BodyFileSettings) -> Result<Self, FileError> {
-        let (body, was_inside_out) = Self::load_turned(path, settings)?;
+        Self::read(NpzFile::open(path)?, settings)
+    }
+
+    /// As [`Self::load`], from an open archive.
+    ///
+    /// # Errors
+    /// [`FileError`] naming file and key.
+    pub fn read(file: NpzFile, settings: &BodyFileSettings) -> Result<Self, FileError> {
+        let path = file.path().to_owned();
+        let (body, was_inside_out) = Self::read_turned(file, settings)?;
         if was_inside_out {
             tracing::warn!("{}: {INSIDE_OUT}", path.display());
         }
@@ -56,15 +65,15 @@ impl Body {
     }
 
     /// As [`Self::load`], with whether the body was inside out instead of the warning.
-    pub(crate) fn load_turned(path: &Path, settings: &BodyFileSettings) -> Result<(Self, bool), FileError> {
-        let body = Self::load_as_written(path, settings)?;
+    pub(crate) fn read_turned(file: NpzFile, settings: &BodyFileSettings) -> Result<(Self, bool), FileError> {
+        let body = Self::read_as_written(file, settings)?;
         let is_inside_out = is_inside_out(&body.zero_body());
         Ok((if is_inside_out { body.turned() } else { body }, is_inside_out))
     }
 
-    fn load_as_written(path: &Path, settings: &BodyFileSettings) -> Result<Self, FileError> {
+    fn read_as_written(mut file: NpzFile, settings: &BodyFileSettings) -> Result<Self, FileError> {
+        let path = &file.path().to_owned();
         let wrong = FileError::content(path);
-        let mut file = NpzFile::open(path)?;
         let template = points(&mut file, "v_template")?;
         let vertices = template.len();
         let faces = faces(&mut file, vertices)?;

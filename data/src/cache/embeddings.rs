@@ -2,11 +2,9 @@
 
 use super::{ArrayCache, CacheError, Key, KeyBuilder};
 
-/// The key of the embedding of a mesh by the networks whose parameters have the checksum `model`; `rounds`: they
-/// multiply in bf16.
-pub fn embedding_key(mesh: Key, model: &str, eigen_count: usize, rounds: bool) -> Key {
-    let key = KeyBuilder::new("embedding").key(mesh).text(model).number(eigen_count as u64);
-    key.number(u64::from(rounds)).finish()
+/// The key of the embedding of a mesh by the networks whose parameters have the checksum `model`.
+pub fn embedding_key(mesh: Key, model: &str, eigen_count: usize) -> Key {
+    KeyBuilder::new("embedding").key(mesh).text(model).number(eigen_count as u64).finish()
 }
 
 /// An embedding as it is stored: V vertices, width d.
@@ -50,16 +48,15 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let cache = ArrayCache::open(folder.path(), 1 << 20).unwrap();
         let mesh = mesh_key(&grid(0.1, 0.1, 2, 2));
-        let key = embedding_key(mesh, "abc", 16, false);
+        let key = embedding_key(mesh, "abc", 16);
         let embedding =
             StoredEmbedding { vertex: (0..27).map(|i| i as f32).collect(), garment: vec![0.5; 3] };
         assert_eq!(get_embedding(&cache, key, 9), None);
         put_embedding(&cache, key, &embedding).unwrap();
         assert_eq!(get_embedding(&cache, key, 9), Some(embedding));
         assert_eq!(get_embedding(&cache, key, 8), None);
-        assert_ne!(embedding_key(mesh, "abd", 16, false), key);
-        assert_ne!(embedding_key(mesh, "abc", 17, false), key);
-        assert_ne!(embedding_key(mesh, "abc", 16, true), key);
-        assert_ne!(embedding_key(mesh_key(&grid(0.1, 0.1, 2, 3)), "abc", 16, false), key);
+        assert_ne!(embedding_key(mesh, "abd", 16), key);
+        assert_ne!(embedding_key(mesh, "abc", 17), key);
+        assert_ne!(embedding_key(mesh_key(&grid(0.1, 0.1, 2, 3)), "abc", 16), key);
     }
 }

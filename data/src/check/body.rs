@@ -45,7 +45,8 @@ pub(super) struct Checked {
 /// Measurements and warnings, or why the body cannot be read.
 pub(super) fn check(path: &Path, npz: &mut NpzFile) -> Result<Checked, String> {
     let settings = BodyFileSettings { shape_components: usize::MAX };
-    let (body, was_inside_out) = Body::load_turned(path, &settings).map_err(|e| e.to_string())?;
+    let file = NpzFile::open(path).map_err(|e| e.to_string())?;
+    let (body, was_inside_out) = Body::read_turned(file, &settings).map_err(|e| e.to_string())?;
     // The loader normalises each row: the sums are those of the file.
     let weights = npz.numbers_f32("weights", "").map_err(|e| e.to_string())?.data;
     let sums = weights

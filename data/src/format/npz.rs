@@ -8,7 +8,7 @@ use super::scalar::Scalar;
 use npyz::{DType, Endianness, NpyHeader, Order, TypeChar, TypeStr};
 use std::fmt::Display;
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{BufReader, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
 use zip::ZipArchive;
 
@@ -28,8 +28,13 @@ pub struct Array<T> {
 /// An open npz archive.
 pub struct NpzFile {
     path: PathBuf,
-    archive: ZipArchive<BufReader<File>>,
+    archive: ZipArchive<Box<dyn Source>>,
 }
+
+/// What an archive is read from.
+trait Source: Read + Seek + Send {}
+
+impl<T: Read + Seek + Send> Source for T {}
 
 struct RawArray {
     kind: TypeStr,
@@ -45,7 +50,19 @@ impl NpzFile {
     /// If the file cannot be opened or is not a zip archive.
     pub fn open(path: &Path) -> Result<Self, FileError> {
         let file = File::open(path).map_err(FileError::io(path))?;
-        let archive = ZipArchive::new(BufReader::new(file))
+        Self::read(path, Box::new(BufReader::new(file)))
+    }
+
+    /// Opens an archive in memory, which messages call `path`.
+    ///
+    /// # Errors
+    /// If it is not a zip archive.
+    pub fn of_bytes(path: &Path, bytes: &'static [u8]) -> Result<Self, FileError> {
+        Self::read(path, Box::new(Cursor::new(bytes)))
+    }
+
+    fn read(path: &Path, source: Box<dyn Source>) -> Result<Self, FileError> {
+        let archive = ZipArchive::new(source)
             .map_err(|e| {
                 FileError::content(path)(way_out(path).unwrap_or_else(|| {
                     format!(

@@ -81,7 +81,7 @@ pub fn import_smpl_family(
     refuse_what_is_no_npz(input)?;
     refuse_overwriting([input], [out])?;
     progress("reading the model", 0, 2);
-    let (body, was_inside_out) = Body::load_turned(input, settings)?;
+    let (body, was_inside_out) = Body::read_turned(NpzFile::open(input)?, settings)?;
     let mut file = NpzFile::open(input)?;
     let model = MODELS.iter().find(|m| (m.vertices, m.joints) == (body.vertex_count(), body.joint_count()));
     let provenance = provenance(&mut file, model, input);

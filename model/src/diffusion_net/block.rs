@@ -7,8 +7,8 @@ use super::{ComplexMixing, SpectralDiffusion};
 use crate::initializer::{Initializer, fan_in_bound};
 use crate::linear::Linear;
 use crate::ops::{
-    Activation, DiffusionMlpArguments, Precision, activate, activate_residual, diffusion_mlp,
-    gradient_features, product, product_add, runs_on_host,
+    Activation, DiffusionMlpArguments, activate, activate_residual, diffusion_mlp, gradient_features,
+    product, product_add, runs_on_host,
 };
 use crate::tensors::GarmentTensors;
 
@@ -58,17 +58,14 @@ pub struct DiffusionBlock {
     pub mixing: ComplexMixing,
     /// Pointwise network.
     pub mlp: BlockMlp,
-    #[module(skip)]
-    precision: Precision,
 }
 
 impl DiffusionBlock {
-    pub(crate) fn new(width: usize, precision: Precision, start: &mut Initializer) -> Self {
+    pub(crate) fn new(width: usize, start: &mut Initializer) -> Self {
         Self {
             diffusion: SpectralDiffusion::new(width, start),
             mixing: ComplexMixing::new(width, start),
             mlp: BlockMlp::new(width, start),
-            precision,
         }
     }
 
@@ -120,7 +117,7 @@ impl DiffusionBlock {
             hidden: layer(&mlp.hidden),
             output: layer(&mlp.output),
         };
-        diffusion_mlp(arguments, self.precision)
+        diffusion_mlp(arguments)
     }
 
     /// Every step as an operation of its own: what GPUs run, and the oracle of the fused form.

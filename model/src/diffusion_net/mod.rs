@@ -22,7 +22,6 @@ use burn::tensor::Tensor;
 
 use crate::initializer::Initializer;
 use crate::linear::Linear;
-use crate::ops::Precision;
 use crate::tensors::GarmentTensors;
 
 /// Vertex features from rest positions.
@@ -39,18 +38,12 @@ pub struct DiffusionNet {
 }
 
 impl DiffusionNet {
-    /// A network from 3 coordinates through `blocks` blocks of `width` channels, which multiply in `precision`, to
+    /// A network from 3 coordinates through `blocks` blocks of `width` channels to
     /// `outputs` features.
-    pub fn new(
-        blocks: usize,
-        width: usize,
-        outputs: usize,
-        precision: Precision,
-        start: &mut Initializer,
-    ) -> Self {
+    pub fn new(blocks: usize, width: usize, outputs: usize, start: &mut Initializer) -> Self {
         Self {
             first: Linear::new(3, width, start),
-            blocks: (0..blocks).map(|_| DiffusionBlock::new(width, precision, start)).collect(),
+            blocks: (0..blocks).map(|_| DiffusionBlock::new(width, start)).collect(),
             last: Linear::new(width, outputs, start),
         }
     }

@@ -6,7 +6,6 @@ use burn::tensor::Tensor;
 
 use super::host::{HostBackend, MatrixView};
 use super::operation::{ArgumentGradients, FusedOps, Operation, Saved, Saves, TensorKernel, apply};
-use super::precision::Precision;
 use super::row_blocks::HOST_ONLY;
 use super::tensors::Tensors;
 use super::tile::StridedMatrix;
@@ -38,12 +37,11 @@ pub struct DiffusionMlpArguments {
     pub output: [Tensor<2>; 2],
 }
 
-/// `x + MLP(x, Φ·diffused, gradient features)` `[V,C]`, where the tensors [lie in host memory](super::runs_on_host); products in
-/// `precision`.
+/// `x + MLP(x, Φ·diffused, gradient features)` `[V,C]`, where the tensors [lie in host memory](super::runs_on_host).
 ///
 /// With `x0 x1 x2` and `y0 y1 y2` for the three `coefficients` expanded to both axes, the gradient features are
 /// `tanh(x0 (x1 − y2) + y0 (y1 + x2))`.
-pub fn diffusion_mlp(arguments: DiffusionMlpArguments, precision: Precision) -> Tensor<2> {
+pub fn diffusion_mlp(arguments: DiffusionMlpArguments) -> Tensor<2> {
     let a = arguments;
     let [coefficients, real, imaginary] = a.coefficients;
     let [hidden_weight, hidden_bias] = a.hidden;
@@ -64,7 +62,7 @@ pub fn diffusion_mlp(arguments: DiffusionMlpArguments, precision: Precision) -> 
         output_weight,
         output_bias,
     ];
-    apply(DiffusionMlp { precision, recorded: false }, arguments)
+    apply(DiffusionMlp { recorded: false }, arguments)
 }
 
 /// Matrices `[V,C]` that the backward pass reads: x0, y0, x1 − y2, y1 + x2, gradient features, both hidden layers.
@@ -73,7 +71,6 @@ const STATES: usize = 7;
 /// Arguments in the order of [`DiffusionMlpArguments`].
 #[derive(Clone, Debug)]
 struct DiffusionMlp {
-    precision: Precision,
     /// Whether what the backward pass reads is a result too.
     recorded: bool,
 }
@@ -90,7 +87,7 @@ impl TensorKernel for DiffusionMlp {
 
 impl Operation<14> for DiffusionMlp {
     fn recorded(self) -> Self {
-        Self { recorded: true, ..self }
+        Self { recorded: true }
     }
 
     /// Features, bases and the four weights.
@@ -104,8 +101,7 @@ impl Operation<14> for DiffusionMlp {
         saved: Saved<B, 14>,
         gradient: FloatTensor<B>,
     ) -> ArgumentGradients<B, 14> {
-        let mut gradients =
-            B::run(&DiffusionMlpGradients(self.precision), saved.with(gradient)).0.into_iter();
+        let mut gradients = B::run(&DiffusionMlpGradients, saved.with(gradient)).0.into_iter();
         std::array::from_fn(|argument| if matches!(argument, 1 | 2) { None } else { gradients.next() })
     }
 }
@@ -113,7 +109,7 @@ impl Operation<14> for DiffusionMlp {
 /// Gradients of all arguments but the bases, from features, bases, weights, what the forward pass recorded and the gradient of
 /// the result.
 #[derive(Clone, Debug)]
-struct DiffusionMlpGradients(Precision);
+struct DiffusionMlpGradients;
 
 impl TensorKernel for DiffusionMlpGradients {
     fn composed<B: Backend>(&self, _: Tensors<B>) -> Tensors<B> {
@@ -121,7 +117,7 @@ impl TensorKernel for DiffusionMlpGradients {
     }
 
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
-        backward::run::<B>(self.0, arguments.take())
+        backward::run::<B>(arguments.take())
     }
 }
 

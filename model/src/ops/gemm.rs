@@ -7,9 +7,7 @@ use burn::backend::tensor::FloatTensor;
 use burn::backend::{Flex, TensorMetadata};
 use rayon::prelude::*;
 
-use super::precision::Precision;
-use super::right_factor::RightFactor;
-use super::tile::{OutputBlock, StridedMatrix};
+use super::tile::{OutputBlock, RightFactor, StridedMatrix};
 
 /// Multiplications and additions below which a second thread costs more than it saves.
 const PARALLEL_FROM: usize = 192 * 192 * 192;
@@ -30,27 +28,22 @@ impl StridedMatrix {
     }
 }
 
-/// `lhs·rhs` of f32 matrices, none of them empty, row by row; multiplied in `precision`.
-pub(super) fn product(lhs: &FloatTensor<Flex>, rhs: &FloatTensor<Flex>, precision: Precision) -> Vec<f32> {
+/// `lhs·rhs` of f32 matrices, none of them empty, row by row.
+pub(super) fn product(lhs: &FloatTensor<Flex>, rhs: &FloatTensor<Flex>) -> Vec<f32> {
     let count = lhs.shape()[0] * rhs.shape()[1];
     let mut values = Vec::with_capacity(count);
     // SAFETY: nothing is added; all elements of the product are written.
     unsafe {
-        write(lhs, rhs, &mut values.spare_capacity_mut()[..count], false, precision);
+        write(lhs, rhs, &mut values.spare_capacity_mut()[..count], false);
         values.set_len(count);
     }
     values
 }
 
 /// Adds `lhs·rhs` to `sum`, whose rows lie one after another.
-pub(super) fn add_product(
-    lhs: &FloatTensor<Flex>,
-    rhs: &FloatTensor<Flex>,
-    sum: &mut [f32],
-    precision: Precision,
-) {
+pub(super) fn add_product(lhs: &FloatTensor<Flex>, rhs: &FloatTensor<Flex>, sum: &mut [f32]) {
     // SAFETY: the elements are initialised and stay so: only floats are written.
-    unsafe { write(lhs, rhs, &mut *(std::ptr::from_mut(sum) as *mut [MaybeUninit<f32>]), true, precision) };
+    unsafe { write(lhs, rhs, &mut *(std::ptr::from_mut(sum) as *mut [MaybeUninit<f32>]), true) };
 }
 
 /// `output = lhs·rhs`, plus what `output` holds if `add`; initialises all of it.
@@ -62,7 +55,6 @@ unsafe fn write(
     rhs: &FloatTensor<Flex>,
     output: &mut [MaybeUninit<f32>],
     add: bool,
-    precision: Precision,
 ) {
     let size @ [rows, inner, columns] = [lhs.shape()[0], lhs.shape()[1], rhs.shape()[1]];
     assert_eq!(inner, rhs.shape()[0], "the inner sizes of a product differ");
@@ -74,8 +66,8 @@ unsafe fn write(
     // SAFETY: the steps are those of the tensors, whose elements all lie in their storage; the rest is the caller's promise.
     unsafe {
         match inner > 2 * rows && inner > TERMS_PER_COPY {
-            true => write_long_sums(lhs, rhs, output, size, add, threads, precision),
-            false => write_rows(lhs, rhs, output, size, add, threads, precision),
+            true => write_long_sums(lhs, rhs, output, size, add, threads),
+            false => write_rows(lhs, rhs, output, size, add, threads),
         }
     }
 }
@@ -92,11 +84,10 @@ unsafe fn write_rows(
     [rows, inner, columns]: [usize; 3],
     add: bool,
     threads: usize,
-    precision: Precision,
 ) {
     let mut right = RightFactor::default();
     // SAFETY: promised.
-    unsafe { right.fill(rhs, [inner, columns], precision) };
+    unsafe { right.fill(rhs, [inner, columns]) };
     let block = |block: usize| {
         let first = block * ROWS_PER_BLOCK;
         let count = ROWS_PER_BLOCK.min(rows - first);
@@ -125,7 +116,6 @@ unsafe fn write_long_sums(
     [rows, inner, columns]: [usize; 3],
     add: bool,
     threads: usize,
-    precision: Precision,
 ) {
     // As many blocks as threads, of whole tiles: how the result is cut changes no bit.
     let column_blocks = threads.min(columns.div_ceil(32));
@@ -143,7 +133,7 @@ unsafe fn write_long_sums(
             let terms = TERMS_PER_COPY.min(inner - start);
             // SAFETY: a block of the promised matrices; no other task has this part of the output.
             unsafe {
-                right.fill(rhs.from(start, column), [terms, width], precision);
+                right.fill(rhs.from(start, column), [terms, width]);
                 for first in (row..row + height).step_by(ROWS_PER_BLOCK) {
                     let count = ROWS_PER_BLOCK.min(row + height - first);
                     let lhs = along_rows(lhs.from(first, start), count, terms, &mut copy);
@@ -187,7 +177,7 @@ fn for_each(tasks: usize, threads: usize, run: impl Fn(usize) + Send + Sync) {
 mod tests {
     use super::*;
     use burn::backend::ops::FloatTensorOps;
-    use burn::tensor::{TensorData, bf16};
+    use burn::tensor::TensorData;
 
     /// Rows, terms, columns: small, tall, long sums, both wide; sizes that no block divides, and several blocks of terms.
     const SIZES: [[usize; 3]; 10] = [
@@ -216,15 +206,9 @@ mod tests {
         FloatTensor::<Flex>::from_data(TensorData::new(values.to_vec(), [rows, columns]))
     }
 
-    /// What a factor counts as.
-    fn factor(value: f32, precision: Precision) -> f64 {
-        if precision.rounds() { bf16::from_f32(value).to_f64() } else { value.into() }
-    }
-
     #[test]
     fn every_partition_matches_sums_in_double_precision_for_any_number_of_threads() {
-        let cases = SIZES.into_iter().flat_map(|size| [(size, Precision::F32), (size, Precision::Bf16)]);
-        for ([rows, inner, columns], precision) in cases {
+        for [rows, inner, columns] in SIZES {
             let (a, b, c) = (values(rows * inner, 1), values(inner * columns, 2), values(rows * columns, 3));
             let (lhs, rhs) = (matrix(&a, rows, inner), matrix(&b, inner, columns));
             // The left factor of a weight's gradient is a transposed view.
@@ -238,8 +222,8 @@ mod tests {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 pool.install(|| {
                     let mut sum = c.clone();
-                    add_product(&turned, &rhs, &mut sum, precision);
-                    [product(&lhs, &turned_rhs, precision), sum]
+                    add_product(&turned, &rhs, &mut sum);
+                    [product(&lhs, &turned_rhs), sum]
                 })
             };
             let found = run(1);
@@ -248,7 +232,7 @@ mod tests {
             }
             for i in 0..rows {
                 for j in 0..columns {
-                    let of = |value| factor(value, precision);
+                    let of = |value: f32| f64::from(value);
                     let exact: f64 = (0..inner).map(|k| of(a[i * inner + k]) * of(b[k * columns + j])).sum();
                     let at = i * columns + j;
                     let tolerance = 1e-6 * inner as f64;
@@ -260,14 +244,10 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_a_number_stays_visible_and_what_is_too_large_becomes_infinite() {
-        for precision in [Precision::F32, Precision::Bf16] {
-            let lhs = matrix(&[1.0, f32::NAN, f32::MAX, 1.0, 2.0, 3.0], 2, 3);
-            let found = product(&lhs, &matrix(&[2.0, 1.0, 4.0], 3, 1), precision);
-            assert!(found[0].is_nan());
-            assert_eq!(found[1], 16.0, "in the other row");
-            let large = product(&matrix(&[f32::MAX], 1, 1), &matrix(&[1.0], 1, 1), precision);
-            assert_eq!(large[0], if precision.rounds() { f32::INFINITY } else { f32::MAX });
-        }
+    fn what_is_not_a_number_stays_visible() {
+        let lhs = matrix(&[1.0, f32::NAN, f32::MAX, 1.0, 2.0, 3.0], 2, 3);
+        let found = product(&lhs, &matrix(&[2.0, 1.0, 4.0], 3, 1));
+        assert!(found[0].is_nan());
+        assert_eq!(found[1], 16.0, "in the other row");
     }
 }

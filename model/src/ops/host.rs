@@ -10,7 +10,6 @@ use burn::tensor::TensorData;
 use rayon::prelude::*;
 
 use super::composed::multiply_add;
-use super::precision::Precision;
 use super::tensors::Tensors;
 use super::tile::StridedMatrix;
 use crate::packing::Packing;
@@ -51,13 +50,11 @@ pub(super) trait HostBackend: Backend {
         None
     }
 
-    /// `lhs·rhs`, plus the addend if there is one, in the memory of the addend if no other tensor shares it; multiplied in the
-    /// precision, if the backend can.
+    /// `lhs·rhs`, plus the addend if there is one, in the memory of the addend if no other tensor shares it.
     fn product(
         lhs: FloatTensor<Self>,
         rhs: FloatTensor<Self>,
         addend: Option<FloatTensor<Self>>,
-        _precision: Precision,
     ) -> FloatTensor<Self> {
         multiply_add::<Self>(lhs, rhs, addend)
     }

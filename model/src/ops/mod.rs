@@ -5,15 +5,13 @@
 //! hence bit-identical for any number of threads), and its hand-written backward pass. `modulated_siren` and
 //! `diffusion_mlp` are several layers at once and run in host memory only. Below them lie `operation` (how a backend
 //! runs and records one), `host` (loops over rows), `row_blocks` (several layers in one such loop), `composed`, `math`,
-//! `gemm`, `right_factor`, `tile` and `bf16`, which know no operation.
+//! `gemm` and `tile`, which know no operation.
 
 // Without a backend in host memory nothing runs the host kernels.
 #![cfg_attr(not(any(feature = "flex", feature = "ndarray")), allow(dead_code, unused_imports))]
 
 mod activation;
 mod adam;
-#[cfg(target_arch = "x86_64")]
-mod bf16;
 mod blend;
 mod composed;
 mod diffusion_mlp;
@@ -27,9 +25,7 @@ mod math;
 mod modulated_siren;
 mod norm;
 mod operation;
-mod precision;
 mod product;
-mod right_factor;
 mod row_blocks;
 mod sine_modulation;
 mod skin_correction;
@@ -47,8 +43,7 @@ pub use diffusion_mlp::{DiffusionMlpArguments, diffusion_mlp};
 pub use gradient_features::gradient_features;
 pub use modulated_siren::{SirenArguments, modulated_siren};
 pub use norm::{scale_by, squared_norm};
-pub use precision::Precision;
-pub use product::{product, product_add, product_in};
+pub use product::{product, product_add};
 pub use row_blocks::runs_on_host;
 pub use sine_modulation::sine_modulation;
 pub use skin_correction::skin_correction;

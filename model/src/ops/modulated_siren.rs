@@ -9,10 +9,9 @@ use burn::tensor::Tensor;
 
 use super::host::{HostBackend, MatrixView};
 use super::operation::{ArgumentGradients, FusedOps, Operation, Saved, Saves, TensorKernel, apply};
-use super::precision::Precision;
-use super::right_factor::RightFactor;
 use super::row_blocks::{HOST_ONLY, factor, square_factors, transposed_factor};
 use super::tensors::Tensors;
+use super::tile::RightFactor;
 use crate::packing::Packing;
 
 mod backward;
@@ -40,19 +39,17 @@ pub struct SirenArguments {
     pub output_bias: Tensor<2>,
 }
 
-/// Values `[N,O]`, where the tensors [lie in host memory](super::runs_on_host). Layers between units multiply in `precision`, the
-/// first and the last one in f32.
+/// Values `[N,O]`, where the tensors [lie in host memory](super::runs_on_host).
 pub fn modulated_siren(
     arguments: SirenArguments,
     [omega_first, omega_hidden]: [f64; 2],
     packing: &Packing,
-    precision: Precision,
 ) -> Tensor<2> {
     let a = arguments;
     let layers = a.gate_weights.dims()[0] / a.gate_weights.dims()[1] + 1;
     let mut omegas = vec![omega_hidden as f32; layers];
     omegas[0] = omega_first as f32;
-    let operation = ModulatedSirenLayers { omegas, packing: packing.clone(), precision, recorded: false };
+    let operation = ModulatedSirenLayers { omegas, packing: packing.clone(), recorded: false };
     let arguments = [
         a.coordinates,
         a.vertex_product,
@@ -73,7 +70,6 @@ struct ModulatedSirenLayers {
     /// w0 of every layer.
     omegas: Vec<f32>,
     packing: Packing,
-    precision: Precision,
     /// Whether phases and gates are results too.
     recorded: bool,
 }
@@ -88,18 +84,13 @@ struct Weights {
 
 impl Weights {
     /// Of the weights between gates, of the first sine layer, of the others and of the output layer.
-    fn new(
-        [gates, first, sines, output]: [MatrixView<'_>; 4],
-        transposed: bool,
-        precision: Precision,
-    ) -> Self {
+    fn new([gates, first, sines, output]: [MatrixView<'_>; 4], transposed: bool) -> Self {
         let factor = if transposed { transposed_factor } else { factor };
         Self {
-            gates: square_factors(gates, transposed, precision),
-            // Coordinates turn into phases of several periods here, and values into positions.
-            first: factor(first, Precision::F32),
-            sines: square_factors(sines, transposed, precision),
-            output: factor(output, Precision::F32),
+            gates: square_factors(gates, transposed),
+            first: factor(first),
+            sines: square_factors(sines, transposed),
+            output: factor(output),
         }
     }
 

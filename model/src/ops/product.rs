@@ -17,7 +17,6 @@ use super::composed::add_optional;
 use super::composed::multiply_add;
 use super::host::HostBackend;
 use super::operation::{ArgumentGradients, FusedOps, Operation, Saved, Saves, TensorKernel, apply};
-use super::precision::Precision;
 use super::tensors::Tensors;
 
 /// `lhs·rhs`: `[N,K]`, `[K,C]` → `[N,C]`.
@@ -25,15 +24,7 @@ use super::tensors::Tensors;
 /// # Panics
 /// If the inner sizes differ.
 pub fn product(lhs: Tensor<2>, rhs: Tensor<2>) -> Tensor<2> {
-    product_in(Precision::F32, lhs, rhs)
-}
-
-/// The same, multiplied in `precision` by the flex backend; its gradients too.
-///
-/// # Panics
-/// If the inner sizes differ.
-pub fn product_in(precision: Precision, lhs: Tensor<2>, rhs: Tensor<2>) -> Tensor<2> {
-    apply(MatrixProduct { precision }, [lhs, rhs])
+    apply(MatrixProduct, [lhs, rhs])
 }
 
 /// `lhs·rhs + addend`: `[N,K]`, `[K,C]`, `[N,C]` → `[N,C]`; in the memory of `addend` if no other tensor shares it.
@@ -41,14 +32,12 @@ pub fn product_in(precision: Precision, lhs: Tensor<2>, rhs: Tensor<2>) -> Tenso
 /// # Panics
 /// If the sizes disagree.
 pub fn product_add(lhs: Tensor<2>, rhs: Tensor<2>, addend: Tensor<2>) -> Tensor<2> {
-    apply(MatrixProduct { precision: Precision::F32 }, [lhs, rhs, addend])
+    apply(MatrixProduct, [lhs, rhs, addend])
 }
 
 /// The factors, then the addend if there is one.
 #[derive(Clone, Copy, Debug)]
-struct MatrixProduct {
-    precision: Precision,
-}
+struct MatrixProduct;
 
 impl TensorKernel for MatrixProduct {
     fn composed<B: Backend>(&self, arguments: Tensors<B>) -> Tensors<B> {
@@ -64,7 +53,7 @@ impl TensorKernel for MatrixProduct {
 
     fn on_host<B: HostBackend>(&self, arguments: Tensors<B>) -> Tensors<B> {
         let ([lhs, rhs], addend) = arguments.take_optional();
-        [B::product(lhs, rhs, addend, self.precision)].into()
+        [B::product(lhs, rhs, addend)].into()
     }
 }
 

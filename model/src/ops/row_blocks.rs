@@ -7,8 +7,7 @@ use burn::tensor::{DType, Device, Tensor};
 use rayon::prelude::*;
 
 use super::host::{Chunk, MatrixView};
-use super::precision::Precision;
-use super::right_factor::RightFactor;
+use super::tile::RightFactor;
 use crate::packing::Packing;
 
 /// Rows of a block at most. Fewer would read the weights and add to their gradients, which often lie in the third-level cache
@@ -48,39 +47,30 @@ pub(super) fn row_blocks(packing: &Packing) -> Vec<Chunk> {
 }
 
 /// The right factor of a product with `matrix`.
-pub(super) fn factor(matrix: MatrixView<'_>, precision: Precision) -> RightFactor {
-    factor_of_rows(matrix, 0..matrix.rows(), false, precision)
+pub(super) fn factor(matrix: MatrixView<'_>) -> RightFactor {
+    factor_of_rows(matrix, 0..matrix.rows(), false)
 }
 
 /// The right factor of a product with the transpose of `matrix`.
-pub(super) fn transposed_factor(matrix: MatrixView<'_>, precision: Precision) -> RightFactor {
-    factor_of_rows(matrix, 0..matrix.rows(), true, precision)
+pub(super) fn transposed_factor(matrix: MatrixView<'_>) -> RightFactor {
+    factor_of_rows(matrix, 0..matrix.rows(), true)
 }
 
 /// The right factors of products with square matrices that lie one below the other.
-pub(super) fn square_factors(
-    matrices: MatrixView<'_>,
-    transposed: bool,
-    precision: Precision,
-) -> Vec<RightFactor> {
+pub(super) fn square_factors(matrices: MatrixView<'_>, transposed: bool) -> Vec<RightFactor> {
     let width = matrices.columns();
     let starts = (0..matrices.rows()).step_by(width);
-    starts.map(|start| factor_of_rows(matrices, start..start + width, transposed, precision)).collect()
+    starts.map(|start| factor_of_rows(matrices, start..start + width, transposed)).collect()
 }
 
-fn factor_of_rows(
-    matrix: MatrixView<'_>,
-    rows: Range<usize>,
-    transposed: bool,
-    precision: Precision,
-) -> RightFactor {
+fn factor_of_rows(matrix: MatrixView<'_>, rows: Range<usize>, transposed: bool) -> RightFactor {
     let (block, columns) = (matrix.strided().from(rows.start, 0), matrix.columns());
     let mut factor = RightFactor::default();
     // SAFETY: rows of the matrix.
     unsafe {
         match transposed {
-            true => factor.fill(block.transposed(), [columns, rows.len()], precision),
-            false => factor.fill(block, [rows.len(), columns], precision),
+            true => factor.fill(block.transposed(), [columns, rows.len()]),
+            false => factor.fill(block, [rows.len(), columns]),
         }
     }
     factor

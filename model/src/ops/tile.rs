@@ -98,18 +98,18 @@ impl InstructionSet {
 /// The right factor of a product, its columns in panels of two vectors (the last one of one, if that is enough) that lie one
 /// after another.
 #[derive(Default)]
-pub(super) struct Panels {
+pub(super) struct RightFactor {
     values: Vec<f32>,
     inner: usize,
     columns: usize,
 }
 
-impl Panels {
+impl RightFactor {
     /// Becomes a matrix of `[inner, columns]` elements, in the memory it has.
     ///
     /// # Safety
     /// `matrix` has that size.
-    pub(super) unsafe fn fill(&mut self, matrix: StridedMatrix, inner: usize, columns: usize) {
+    pub(super) unsafe fn fill(&mut self, matrix: StridedMatrix, [inner, columns]: [usize; 2]) {
         let lanes = InstructionSet::detect().lanes();
         (self.inner, self.columns) = (inner, columns);
         self.values.clear();

@@ -4,12 +4,10 @@
 //! constants, so the same tensors serve training and inference.
 
 mod body;
-mod contact_features;
 mod garment;
 mod outfit;
 
 pub use body::{BodyTensors, JOINT_FEATURES};
-pub use contact_features::ContactFeatureTensors;
 pub use garment::{GarmentArrays, GarmentTensors};
 pub use outfit::OutfitTensors;
 pub(crate) use outfit::{ForceEdges, stack_rows};

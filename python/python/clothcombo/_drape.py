@@ -2,15 +2,12 @@
 
 import os
 from functools import cached_property
-from pathlib import Path
 
 from . import _native
 from ._arrays import garment as _garment, motion as _motion, numbers, pose as _pose, positions as _positions
 from ._body import Body
 from ._errors import Error
 from ._measure import TERMS_OF_SCORE
-
-SHIPPED = Path(__file__).parent / "models" / "default"
 
 
 class Garment:
@@ -38,10 +35,9 @@ class Model:
         `body`: "mannequin" or an npz; default: the body the model was trained on. `cache`: folder that keeps embeddings; default:
         clothcombo in the user's cache folder; False keeps none. `folders` of garments that may be named.
         """
-        path = SHIPPED if path is None else path
         kept = None if cache is None or cache is False else os.fspath(cache)
         body = None if body is None else os.fspath(body)
-        return cls(_native.Model.load(os.fspath(path), body, kept, cache is False, [os.fspath(f) for f in folders]))
+        return cls(_native.Model.load(None if path is None else os.fspath(path), body, kept, cache is False, [os.fspath(f) for f in folders]))
 
     @property
     def garments(self):
@@ -87,14 +83,14 @@ class Outfit:
         self.names = native.names
 
     def drape(
-        self, *, shape=(), pose=None, motion=None, frames=(0, None), every=1, posed=None, t_pose=None, corrections=None,
+        self, *, shape=(), pose=None, motion=None, frames=(0, None), every=1, posed=None, t_pose=None,
         refine=0, resolve=True, gap_mm=1.0, time_limit=None, smooth=None,
     ):
         """Drapes them on one body or on the frames of a motion.
 
         `shape`: parameters. `pose`: rotation vectors [J, 3] (radians), a name, or FILE.npz:FRAME; `motion`: a file, or (poses
         [T, J, 3], frames per second), of which `frames` (first, end) and `every` take a part; `posed`: the vertices [B, 3] of
-        the posed body, whose shape is `shape` or that of the vertices `t_pose`. `corrections`, `refine` (steps or "auto"),
+        the posed body, whose shape is `shape` or that of the vertices `t_pose`. `refine` (steps or "auto"),
         `resolve`, `gap_mm`, `time_limit` (s for a garment) and `smooth` (frames) are the flags of that name.
         """
         if sum(x is not None for x in (pose, motion, posed)) > 1 or (t_pose is not None and posed is None):
@@ -103,7 +99,7 @@ class Outfit:
         native = self._native.drape(
             numbers(shape, "shape"), _pose(pose), _motion(motion), (first, end), every,
             None if posed is None else _positions(posed, "posed"), None if t_pose is None else _positions(t_pose, "t_pose"),
-            corrections, refine, resolve, gap_mm, time_limit, smooth,
+            refine, resolve, gap_mm, time_limit, smooth,
         )
         return Drape(native)
 

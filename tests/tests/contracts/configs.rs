@@ -43,7 +43,6 @@ fn the_configuration_of_the_paper_has_the_papers_values() {
         skinning_joints: SkinningJoints::All,
         graph: Graph::Full,
         vertex_embedding: true,
-        corrections: 0,
         ..ModelConfig::default()
     };
     assert_eq!(config.model, paper);

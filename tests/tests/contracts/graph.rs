@@ -3,7 +3,7 @@
 use burn::module::Module;
 use clothcombo_tests::Untrained;
 use clothcombo_trainer::config::Trains;
-use clothcombo_trainer::inference::contact_features::LayerInteraction;
+use clothcombo_trainer::inference::layer_interaction::LayerInteraction;
 use clothcombo_trainer::inference::networks::Networks;
 
 /// Whether D_m moves a single garment, and whether the gradient of its loss trains D_m.

@@ -1,10 +1,10 @@
 //! Contracts between the crates: one binary, because linking burn takes longer than most of these tests.
 
+mod acceptance;
 mod checkpoint;
 mod clipping;
 mod config_fuzz;
 mod configs;
-mod corrections;
 mod degenerate_cases;
 mod device;
 mod frozen;

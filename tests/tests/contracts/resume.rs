@@ -106,12 +106,6 @@ fn with_an_average_warm_up_a_curriculum_and_several_scenes_a_step() {
 }
 
 #[test]
-fn stopped_while_corrections_learn() {
-    let overrides = ["model.corrections=2", "stages.2.trains=\"corrections\"", "stages.2.accumulate=2"];
-    parts_equal_the_whole(&overrides, &[40, 53], &["model.safetensors"]);
-}
-
-#[test]
 fn skipped_steps_are_remembered() {
     let overrides =
         ["guard.inject={ every = 7, what = \"position\" }", "guard.kept_incidents=1", "validation.every=10"];
@@ -141,11 +135,6 @@ fn a_run_starts_from_another_ones_parameters() {
     };
     let session = further("second", &["seed=9"]).unwrap();
     assert!(parameters(&session.save().unwrap()) == parameters(&first.join("checkpoints/step-00000005")));
-
-    // Corrections may be new, and change nothing yet.
-    let corrected = further("corrected", &["model.corrections=2"]).unwrap().save().unwrap();
-    let model = TrainedModel::open(&corrected).unwrap().networks(&default_device()).unwrap();
-    assert_eq!(model.corrections.len(), 2);
 
     let refused = further("third", &["model.width=24"]).err().expect("other sizes do not fit");
     assert!(refused.to_string().contains("init_from"), "{refused}");

@@ -1,6 +1,6 @@
 //! Everything around training: making and importing data, scoring drapes, measuring.
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use clothcombo_trainer::cli;
 use clothcombo_trainer::system::limits::{SystemMemory, report_limits};
 use clothcombo_trainer::system::workers::among_workers;
@@ -25,6 +25,7 @@ enum Verb {
     #[command(subcommand)]
     Bench(cli::bench::Bench),
     Check(cli::check::Arguments),
+    Completions(cli::manual::Completions),
     #[command(subcommand)]
     Config(cli::config::Verb),
     Drape(Box<cli::drape::Arguments>),
@@ -33,6 +34,7 @@ enum Verb {
     Generate(cli::generate::Arguments),
     #[command(subcommand)]
     Import(cli::import::Source),
+    Manual(cli::manual::Manual),
     Prepare(cli::prepare::Arguments),
     Replay(cli::replay::Arguments),
     Resolve(cli::resolve::Arguments),
@@ -54,12 +56,14 @@ fn main() -> ExitCode {
     cli::exit_code(match &arguments.verb {
         Verb::Bench(bench) => cli::bench::run(bench),
         Verb::Check(arguments) => cli::check::run(arguments),
+        Verb::Completions(arguments) => cli::manual::complete(arguments, Arguments::command()),
         Verb::Config(verb) => cli::config::run(verb),
         Verb::Drape(arguments) => among_workers(|| cli::drape::run(arguments)),
         Verb::Eval(arguments) => cli::eval::run(arguments),
         Verb::Fit(arguments) => cli::fit::run(arguments),
         Verb::Generate(arguments) => cli::generate::run(arguments),
         Verb::Import(source) => cli::import::run(source),
+        Verb::Manual(arguments) => cli::manual::write(arguments, Arguments::command()),
         Verb::Prepare(arguments) => cli::prepare::run(arguments),
         Verb::Replay(arguments) => cli::replay::run(arguments),
         Verb::Resolve(arguments) => among_workers(|| cli::resolve::run(arguments)),

@@ -128,7 +128,6 @@ fn trains(trains: Trains) -> &'static str {
         Trains::Draping => "draping and skinning, on the frozen embedding",
         Trains::Untangling => "untangling, on the frozen first stage",
         Trains::All => "both phases",
-        Trains::Corrections => "corrections, on everything else frozen",
     }
 }
 

@@ -86,8 +86,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         Some(path) => TrainedModel::open(path)?,
         None => shipped_model()?,
     };
-    let file = arguments.config.clone().unwrap_or_else(|| trained.config_file());
-    let config = load(&file, &arguments.overrides)?;
+    let config = match &arguments.config {
+        Some(file) => load(file, &arguments.overrides)?,
+        None => trained.config_with(&arguments.overrides)?,
+    };
     let device = arguments.device.open()?;
     let model = model(arguments, &trained, config, &device)?;
     let ablations = named_models(arguments, &arguments.ablation, &model, &device)?;

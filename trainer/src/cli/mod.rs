@@ -14,6 +14,7 @@ pub mod generate;
 pub mod import;
 mod interrupted;
 mod loading;
+pub mod manual;
 mod memory_table;
 mod model_arguments;
 mod output;

@@ -33,10 +33,10 @@ impl ModelArguments {
     /// # Errors
     /// Names the file or key at fault.
     pub fn config(&self, trained: Option<&TrainedModel>) -> Result<Config, ConfigError> {
-        let usual = || match trained {
-            Some(trained) => trained.config_file(),
-            None => Path::new("configs").join("open.toml"),
-        };
-        load(&self.config.clone().unwrap_or_else(usual), &self.overrides)
+        match (&self.config, trained) {
+            (Some(file), _) => load(file, &self.overrides),
+            (None, Some(trained)) => trained.config_with(&self.overrides),
+            (None, None) => load(&Path::new("configs").join("open.toml"), &self.overrides),
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! How much the programs say: the same flags for every verb.
 
 use crate::system::closed_pipe::print_stderr;
-use clap::{ArgAction, Args};
+use clap::{ArgAction, Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -14,6 +14,15 @@ const TICK: Duration = Duration::from_millis(200);
 /// Belongs to the process, like the log.
 static QUIET: AtomicBool = AtomicBool::new(false);
 
+/// How log lines are written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, ValueEnum)]
+enum LogFormat {
+    #[default]
+    Text,
+    /// One JSON object a line
+    Json,
+}
+
 /// How much is said.
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub struct Verbosity {
@@ -23,6 +32,9 @@ pub struct Verbosity {
     /// More log lines; twice for debugging (RUST_LOG overrides both)
     #[arg(long, short, global = true, action = ArgAction::Count)]
     verbose: u8,
+    /// How log lines are written
+    #[arg(long, global = true, value_name = "FORMAT", default_value = "text")]
+    log_format: LogFormat,
 }
 
 impl Verbosity {
@@ -51,13 +63,16 @@ impl Verbosity {
         // What it warns of, characters that the font of the pictures lacks, is seen in the pictures as boxes.
         let filter = filter.add_directive("usvg=error".parse().expect("it is a directive"));
         // A second call (tests run several sessions in one process) keeps the first subscriber.
-        let _ = tracing_subscriber::fmt()
+        let log = tracing_subscriber::fmt()
             .with_env_filter(filter)
             .with_ansi(std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none())
             .with_writer(std::io::stderr)
             // A log that cannot be written is no reason to stop: by default it is one to panic.
-            .log_internal_errors(false)
-            .try_init();
+            .log_internal_errors(false);
+        let _ = match self.log_format {
+            LogFormat::Text => log.try_init(),
+            LogFormat::Json => log.json().try_init(),
+        };
     }
 }
 

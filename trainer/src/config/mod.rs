@@ -48,8 +48,7 @@ pub struct Config {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub base: Option<PathBuf>,
     /// Run, checkpoint or model folder whose parameters the networks start with, to train a model further on other data or
-    /// another schedule; absent: random ones. Sizes of the networks, body, joints and pose encoding must be its own, but a model
-    /// without correction networks may be given some. Give such
+    /// another schedule; absent: random ones. Sizes of the networks, body, joints and pose encoding must be its own. Give such
     /// a run a seed of its own: scenes follow from seed and step, and that of the model would bring its scenes again.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub init_from: Option<String>,
@@ -113,13 +112,6 @@ impl Config {
                     "set model.surroundings, for example to 64, or below = 0".into(),
                 ));
             }
-            if stage.trains == Trains::Corrections && self.model.corrections == 0 {
-                return Some((
-                    format!("stages[{i}].trains"),
-                    "there are no correction networks to train".into(),
-                    "give the networks some with model.corrections, for example 3".into(),
-                ));
-            }
         }
         if self.data.garments.is_empty() {
             return at("data.garments", "there are no garments", "add a [[data.garments]] table");
@@ -157,7 +149,7 @@ impl Config {
 
 /// Networks that no machine holds, as (place, what, hint): a slip of the finger must not end in an allocation that fails.
 fn model_problem(model: &ModelConfig) -> Option<(String, String, String)> {
-    let widths: [(&str, usize, usize); 12] = [
+    let widths: [(&str, usize, usize); 10] = [
         ("width", model.width, 16_384),
         ("embedding", model.embedding, 16_384),
         ("diffusion_width", model.diffusion_width, 16_384),
@@ -168,8 +160,6 @@ fn model_problem(model: &ModelConfig) -> Option<(String, String, String)> {
         ("mlp_layers", model.mlp_layers, 256),
         ("siren_layers", model.siren_layers, 256),
         ("skinning_layers", model.skinning_layers, 256),
-        ("corrections", model.corrections, 256),
-        ("correction_width", model.correction_width, 16_384),
     ];
     let (key, _, most) = widths.into_iter().find(|(_, value, most)| value > most)?;
     Some((

@@ -18,8 +18,6 @@ pub enum Trains {
     Untangling,
     /// The networks of both phases end to end.
     All,
-    /// The correction networks on everything else, frozen.
-    Corrections,
 }
 
 impl Trains {
@@ -27,13 +25,13 @@ impl Trains {
     pub fn mode(self) -> Mode {
         match self {
             Self::Single | Self::Draping => Mode::Single,
-            Self::Untangling | Self::All | Self::Corrections => Mode::Layered,
+            Self::Untangling | Self::All => Mode::Layered,
         }
     }
 
     /// Whether some networks stay as they are: the embedding among them.
     pub fn freezes(self) -> bool {
-        matches!(self, Self::Draping | Self::Untangling | Self::Corrections)
+        matches!(self, Self::Draping | Self::Untangling)
     }
 }
 

@@ -50,14 +50,24 @@ pub struct Dataset {
 /// # Errors
 /// When the file is not a body model.
 pub fn load_body(name: &str, shape_components: usize) -> Result<Body, DatasetError> {
-    let settings = match shape_components {
-        0 => BodyFileSettings { shape_components: usize::MAX },
-        limit => BodyFileSettings { shape_components: limit },
-    };
     match name {
-        "mannequin" => Ok(mannequin().with_shape_components(settings.shape_components)),
-        path => Body::load(Path::new(path), &settings).map_err(DatasetError::data),
+        "mannequin" => Ok(mannequin().with_shape_components(limit(shape_components))),
+        path => read_body(NpzFile::open(Path::new(path)).map_err(DatasetError::data)?, shape_components),
     }
+}
+
+/// As [`load_body`], from an open archive.
+///
+/// # Errors
+/// When it is no body.
+pub fn read_body(file: NpzFile, shape_components: usize) -> Result<Body, DatasetError> {
+    let settings = BodyFileSettings { shape_components: limit(shape_components) };
+    Body::read(file, &settings).map_err(DatasetError::data)
+}
+
+/// Shape components to be read at most; 0: all.
+fn limit(shape_components: usize) -> usize {
+    if shape_components == 0 { usize::MAX } else { shape_components }
 }
 
 /// Assets of one author under one licence.

@@ -20,7 +20,7 @@ mod skinning;
 mod split;
 
 pub use active_joints::ActiveJoints;
-pub use contents::{Dataset, LicenceLine, is_fingerprint, load_body};
+pub use contents::{Dataset, LicenceLine, is_fingerprint, load_body, read_body};
 pub use data_check::{DataCheck, Fault, FileWarnings};
 pub use data_list::{DataChange, DataList};
 pub use error::DatasetError;

@@ -1,7 +1,6 @@
 //! A garment with everything that does not change during training.
 
 use clothcombo_data::asset::{Body, Footprint, Garment};
-use clothcombo_physics::contact_features::Rings;
 use clothcombo_physics::energy::GarmentEnergies;
 use rayon::prelude::*;
 use std::sync::{Arc, OnceLock};
@@ -13,8 +12,6 @@ pub struct PreparedGarment {
     pub garment: Garment,
     /// Constants of its energies.
     pub energies: Arc<GarmentEnergies<f32>>,
-    /// Neighbourhoods over which its contact features are gathered.
-    pub rings: Rings,
     /// Initial skin weights of the active joints, `[V, J]`.
     pub skin_weights: Vec<f32>,
     /// Shape displacement per unit β, `[V, 3, K]` (m), K being the shape components of the body; empty without shape transfer.

@@ -9,7 +9,6 @@ use clothcombo_data::cache::{
     ArrayCache, CacheError, Key, binding_key, body_key, get_binding, get_largest_weights, get_operators,
     operators_key, put_binding, put_operators,
 };
-use clothcombo_physics::contact_features::Rings;
 use clothcombo_physics::energy::{EnergySettings, GarmentEnergies};
 use clothcombo_physics::mesh::{Topology, TriMesh};
 use clothcombo_physics::operators::SurfaceOperators;
@@ -194,7 +193,6 @@ impl Preprocessor {
             skin_weights: joints.restrict(&binding.skin_weights),
             shape_directions: binding.shape_directions,
             energies: Arc::new(energies),
-            rings: Rings::new(&topology),
             footprint: OnceLock::new(),
             garment,
         })

@@ -2,7 +2,7 @@
 
 use crate::config::LossesConfig;
 use crate::dataset::{Dataset, PreparedScene, prepare};
-use crate::inference::contact_features::LayerInteraction;
+use crate::inference::layer_interaction::LayerInteraction;
 use crate::inference::networks::Networks;
 use crate::inference::tensor_store::DrapeError;
 use clothcombo_data::asset::{Garment, infeasible_pair};
@@ -74,8 +74,8 @@ impl<'a> PostProcessor<'a> {
         }
     }
 
-    /// `scene` in a pose between the T-pose and its own, draped by the forward pass alone: that leaves fewer intersections than
-    /// with corrections (docs/resolve.md).
+    /// `scene` in a pose between the T-pose and its own, draped by the forward pass alone: that leaves fewer intersections
+    /// than the accepted state (docs/resolve.md).
     fn stage(&self, scene: &PreparedScene, share: f64) -> Result<PathSample, PostProcessError> {
         let mut sample = scene.sample.clone();
         for body in &mut sample.bodies {

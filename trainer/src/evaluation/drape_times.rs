@@ -3,7 +3,7 @@
 use super::table::{Column, median_and_p95, plain};
 use super::{Evaluator, Section, Table};
 use crate::inference::Draped;
-use crate::inference::contact_features::LayerInteraction;
+use crate::inference::layer_interaction::LayerInteraction;
 use crate::inference::networks::drape_on;
 use crate::inference::on_body::OnBody;
 use crate::run::spread::Spread;
@@ -17,7 +17,7 @@ const PHASES: [Column<'_>; 6] = [
     ("embedding, once", "/milliseconds/embedding", median_and_p95),
     ("single draping", "/milliseconds/single", median_and_p95),
     ("untangling", "/milliseconds/untangling", median_and_p95),
-    ("corrections", "/milliseconds/corrections", median_and_p95),
+    ("acceptance", "/milliseconds/acceptance", median_and_p95),
     ("post-process", "/milliseconds/post_process", median_and_p95),
     ("body of the post-process, once", "/milliseconds/body", median_and_p95),
 ];
@@ -60,7 +60,7 @@ pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
             // The body's preparation is part of the garments' time only where a continuation path needs it again.
             let post_process = resolved.garments.iter().map(|g| g.time).sum();
             let untangling = networks.forward.saturating_sub(single);
-            let phases = [embedding, single, untangling, networks.corrections, post_process];
+            let phases = [embedding, single, untangling, networks.acceptance, post_process];
             let phases = phases.map(per_garment).into_iter().chain([milliseconds(resolved.body_time)]);
             times.iter_mut().zip(phases).for_each(|(times, time)| times.push(time));
             vertices += scene.garments.iter().map(|garment| garment.vertex_count()).sum::<usize>();
@@ -70,7 +70,7 @@ pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
     }
     let vertices = vertices as f64 / garments.max(1) as f64;
     let threads = rayon::current_num_threads();
-    let [embedding, single, untangling, corrections, post_process, body] = times.map(Spread::of);
+    let [embedding, single, untangling, acceptance, post_process, body] = times.map(Spread::of);
     let numbers = json!({
         "name": "this model",
         "outfits": outfits,
@@ -81,7 +81,7 @@ pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
             "embedding": embedding,
             "single": single,
             "untangling": untangling,
-            "corrections": corrections,
+            "acceptance": acceptance,
             "post_process": post_process,
             "body": body,
         },

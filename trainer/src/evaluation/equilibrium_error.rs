@@ -111,15 +111,13 @@ pub struct Drapes {
     pub layered: Vec<[f64; 3]>,
     /// After the post-process, if it was run.
     pub resolved: Option<Vec<[f64; 3]>>,
-    /// After other numbers of correction steps than the model's own.
-    pub steps: Vec<(usize, Vec<[f64; 3]>)>,
 }
 
 impl Drapes {
     /// Of networks, and what the post-process made of it.
     pub fn new(single_garments: &Draped, layered: &Draped, resolved: Option<Vec<[f64; 3]>>) -> Self {
         let [single_garments, layered] = [single_garments, layered].map(|draped| wide(&draped.posed));
-        Self { single_garments, layered, resolved, steps: Vec::new() }
+        Self { single_garments, layered, resolved }
     }
 }
 
@@ -182,14 +180,15 @@ pub fn scene_error(
     let minimum = &solutions[reference].1;
     let gained = solutions[0].1.history[0].energy - minimum.energy();
 
-    let measure = |method: String, positions: &[[f64; 3]]| {
+    let measure = |(method, positions): &(&str, Vec<[f64; 3]>)| {
         let (energy, terms) = problem.terms(positions);
-        MethodError { method, error: StateError::new(energy, positions, minimum, gained), terms }
+        MethodError {
+            method: (*method).to_owned(),
+            error: StateError::new(energy, positions, minimum, gained),
+            terms,
+        }
     };
-    let steps = network.iter().flat_map(|drapes| &drapes.steps);
-    let steps = steps.map(|(steps, positions)| (format!("network, {steps} corrections"), positions));
-    let named = states.iter().map(|(method, positions)| ((*method).to_owned(), positions));
-    let methods = named.chain(steps).map(|(method, positions)| measure(method, positions)).collect();
+    let methods = states.iter().map(measure).collect();
     let differ = |s: &Solution| s.energy() - minimum.energy() > SAME_MINIMUM * gained;
     Ok(SceneError {
         scene: number,

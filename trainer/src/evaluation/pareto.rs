@@ -5,8 +5,7 @@ use super::page::Picture;
 use super::table::{Column, median_with_interval, plain};
 use super::{Estimate, Evaluator, Metric, Section, Table, drape_by, median_ms};
 use crate::dataset::PreparedScene;
-use crate::inference::contact_features::LayerInteraction;
-use crate::inference::networks::Networks;
+use crate::inference::layer_interaction::LayerInteraction;
 use crate::inference::reference::{ReferenceScene, wide};
 use crate::inference::tensor_store::DrapeError;
 use crate::inference::{RefineSteps, refine};
@@ -24,22 +23,19 @@ use std::time::Instant;
 
 /// Steps of the solver from LBS + shape transfer.
 const SOLVER: [usize; 7] = [1, 2, 4, 8, 16, 32, 64];
-/// Steps of the refinement of the networks' drape, without corrections and with all.
+/// Steps of the refinement of the networks' drape.
 const REFINEMENT: [usize; 4] = [1, 2, 4, 8];
 /// Garments of an outfit.
 const LAYERS: usize = 3;
 /// Random stream of the scenes; outfits have the next.
 const STREAM: usize = 7;
 /// How the methods of a line begin, and what it is called.
-const FAMILIES: [(&str, &str); 5] = [
+const FAMILIES: [(&str, &str); 4] = [
     ("LBS", "LBS"),
-    ("network, uncorrected +", "refinement of the uncorrected network"),
     ("network + post-process", "network + post-process"),
-    ("network", "network, corrections, refinement"),
+    ("network", "network, refinement"),
     ("solver", "solver from LBS + shape transfer"),
 ];
-/// What networks without corrections are called.
-const UNCORRECTED: &str = "network, uncorrected";
 /// Repetitions of a fast method last this long (s).
 const SECONDS: f64 = 0.05;
 
@@ -184,29 +180,21 @@ impl Comparison {
 
 /// Skinning, networks, networks with post-process.
 fn fast_methods(evaluator: &Evaluator<'_>, scene: &PreparedScene) -> Result<Vec<State>, Report> {
-    let Evaluator { model, networks, post_process, settings, .. } = evaluator;
+    let Evaluator { networks, post_process, settings, .. } = evaluator;
     // The garment is embedded in the first, unmeasured drape, as for the next frame of a motion.
-    let timed = |name: String, method: Method, networks: &Networks<'_>| -> Result<State, DrapeError> {
+    let timed = |method: Method| -> Result<State, DrapeError> {
         let milliseconds = median_ms(SECONDS, || drape_by(networks, &[method], scene))?;
         let positions = wide(&drape_by(networks, &[method], scene)?[0].posed);
-        Ok(State { method: name, milliseconds, positions })
+        Ok(State { method: method.name().to_owned(), milliseconds, positions })
     };
     let mut states = Vec::new();
     for method in [Method::Lbs, Method::LbsWithShapeTransfer] {
-        states.push(timed(method.name().to_owned(), method, networks)?);
+        states.push(timed(method)?);
     }
     let milliseconds = median_ms(SECONDS, || networks.forward(scene, LayerInteraction::Together))?;
     let positions = wide(&networks.forward(scene, LayerInteraction::Together)?.posed);
     states.push(State { method: "network, forward pass".to_owned(), milliseconds, positions });
-    for corrections in 0..model.model.correction_steps {
-        let name = match corrections {
-            0 => UNCORRECTED.to_owned(),
-            1 => "network, 1 correction".to_owned(),
-            _ => format!("network, {corrections} corrections"),
-        };
-        states.push(timed(name, Method::Network, &networks.with_correction_steps(corrections))?);
-    }
-    let network = timed(Method::Network.name().to_owned(), Method::Network, networks)?;
+    let network = timed(Method::Network)?;
     let draped = networks.drape(scene)?;
     // Once: it may take seconds.
     let clock = Instant::now();
@@ -226,25 +214,19 @@ fn solved(
 ) -> Result<(Vec<MethodSample>, bool), Report> {
     let reference = ReferenceScene::new(&evaluator.model.config.losses, scene).into_diagnostic()?;
     let problem = Problem::new(&reference.energy).into_diagnostic()?;
-    let of = |name: &str| {
-        let state = states.iter().find(|state| state.method == name)?;
-        Some((state.positions.clone(), state.milliseconds))
+    let fast = |method: Method| {
+        let state = states.iter().find(|state| state.method == method.name()).expect("it is a fast method");
+        (state.positions.clone(), state.milliseconds)
     };
-    let fast = |method: Method| of(method.name()).expect("it is a fast method");
     let (lbs, _) = fast(Method::Lbs);
     let (_, start_milliseconds) = fast(Method::LbsWithShapeTransfer);
     let (network, network_milliseconds) = fast(Method::Network);
-    let uncorrected = of(UNCORRECTED).map(|(drape, time)| (UNCORRECTED, drape, time));
-    let drapes = uncorrected.into_iter().chain([("network", network.clone(), network_milliseconds)]);
-    for (name, drape, milliseconds) in drapes {
-        for steps in REFINEMENT {
-            let clock = Instant::now();
-            let (positions, _) =
-                refine(&reference.energy, &drape, RefineSteps::AtMost(steps), false).into_diagnostic()?;
-            let milliseconds = milliseconds + 1e3 * clock.elapsed().as_secs_f64();
-            let method = format!("{name} + {}", counted_steps(steps));
-            states.push(State { method, milliseconds, positions });
-        }
+    for steps in REFINEMENT {
+        let clock = Instant::now();
+        let (positions, _) =
+            refine(&reference.energy, &network, RefineSteps::AtMost(steps), false).into_diagnostic()?;
+        let milliseconds = network_milliseconds + 1e3 * clock.elapsed().as_secs_f64();
+        states.push(State { method: format!("network + {}", counted_steps(steps)), milliseconds, positions });
     }
     let settings = SolverSettings::default();
     let mut iterations = SOLVER.into_iter().peekable();

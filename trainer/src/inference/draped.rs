@@ -17,11 +17,6 @@ impl Draped {
     pub fn of(state: &DrapeState) -> Self {
         Self { canonical: to_host(state.canonical.clone()), posed: to_host(state.posed.clone()) }
     }
-
-    /// The same on `device`.
-    pub(crate) fn upload(&self, device: &Device) -> DrapeState {
-        DrapeState { canonical: to_device(&self.canonical, device), posed: to_device(&self.posed, device) }
-    }
 }
 
 /// Positions as a tensor `[N, 3]`.

@@ -101,8 +101,7 @@ fn embedding(
 ) -> Result<(GarmentEmbedding, bool), DraperError> {
     let Some(cache) = draper.preprocessor.cache() else { return Ok((draper.model.encode(tensors), false)) };
     let model = &draper.trained.config.model;
-    let (checksum, rounds) = (draper.trained.checksum(), model.precision.rounds());
-    let key = embedding_key(mesh, checksum, draper.preprocessor.eigen_count, rounds);
+    let key = embedding_key(mesh, draper.trained.checksum(), draper.preprocessor.eigen_count);
     let (vertices, width) = (tensors.vertex_count(), model.embedding);
     if let Some(StoredEmbedding { vertex, garment }) = get_embedding(cache, key, vertices)
         && garment.len() == width

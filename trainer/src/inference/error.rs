@@ -16,25 +16,12 @@ use thiserror::Error;
 /// Why something cannot be draped.
 #[derive(Debug, Error, Diagnostic)]
 pub enum DraperError {
-    /// No model was named and none is shipped.
-    #[error("no trained model: none was named, and there is none in {}", searched.join(", "))]
+    /// No model was named, and the program was built without one.
+    #[error("no trained model: none was named, and this program was built without one")]
     #[diagnostic(help(
-        "the project's checkout has one: name it with --checkpoint CHECKOUT/models/default, set CLOTHCOMBO_MODELS=CHECKOUT/models, \
-         or copy the folder models beside this program; --checkpoint also takes a run of clothcombo-train"
+        "name one with --checkpoint: a run of clothcombo-train, or models/default of the project's checkout"
     ))]
-    NoModel {
-        /// Where it was looked for.
-        searched: Vec<String>,
-    },
-    /// Several models are shipped.
-    #[error("several trained models in {}: {}", folder.display(), names.join(", "))]
-    #[diagnostic(help("name one with --checkpoint, for example --checkpoint {}/{}", folder.display(), names[0]))]
-    SeveralModels {
-        /// The folder.
-        folder: PathBuf,
-        /// Their names.
-        names: Vec<String>,
-    },
+    NoModel,
     /// The model cannot be read.
     #[error(transparent)]
     #[diagnostic(transparent)]
@@ -51,15 +38,6 @@ pub enum DraperError {
     NoBody {
         /// The path in the model's configuration.
         body: String,
-    },
-    /// Correction steps were asked for from a model that has no correction networks.
-    #[error("{steps} correction steps, but the model has no correction networks")]
-    #[diagnostic(help(
-        "leave --corrections out; a [model] with corrections = 3 and a stage that trains them adds some"
-    ))]
-    NoCorrections {
-        /// Steps asked for.
-        steps: usize,
     },
     /// The body lacks joints the networks were trained on.
     #[error("body '{body}' has no joint {}", missing.join(", "))]

@@ -25,15 +25,15 @@
 //! positions come back in the frame of the given pose.
 
 mod acceleration;
+mod acceptance;
 mod bodies;
-pub mod contact_features;
-mod correct;
 pub mod descent;
 mod drape;
 pub(crate) mod draped;
 mod embedded;
 mod error;
 mod frame;
+pub mod layer_interaction;
 mod motion;
 mod names;
 mod network_drape;
@@ -98,8 +98,6 @@ pub struct DraperSettings {
     pub cache_limit: u64,
     /// The compute device, without automatic differentiation.
     pub device: Device,
-    /// Correction steps at most; `None`: as many as the model's configuration says.
-    pub corrections: Option<usize>,
     /// Steps of the static solver after the networks; 0 switches refinement off.
     pub refine: RefineSteps,
     /// Whether the post-process resolves what still intersects.
@@ -116,7 +114,6 @@ impl Default for DraperSettings {
             cache: None,
             cache_limit: 10 << 30,
             device: default_device(),
-            corrections: None,
             refine: RefineSteps::AtMost(0),
             resolve: true,
             post_process,
@@ -172,7 +169,7 @@ impl Draper {
         let joints = ActiveJoints::named(&body, &trained.state.joints)
             .map_err(|missing| DraperError::Joints { body: body.name.clone(), missing })?;
         let device = settings.device.clone();
-        let model = with_steps(trained.networks(&device)?, &trained, settings.corrections)?;
+        let model = trained.networks(&device)?;
         let mut preprocessor = Preprocessor::new(&trained.config, Arc::new(body));
         if let Some(folder) = &settings.cache {
             preprocessor = preprocessor.with_cache_in(folder, settings.cache_limit);
@@ -190,15 +187,13 @@ impl Draper {
         })
     }
 
-    /// The same model and body with the corrections, refinement and post-process of `settings`; body, cache and device stay.
-    ///
-    /// # Errors
-    /// When it asks for corrections that the model does not have.
-    pub fn with(&self, settings: &DraperSettings) -> Result<Self, DraperError> {
-        let DraperSettings { corrections, refine, resolve, post_process, .. } = settings.clone();
-        let model = with_steps(self.model.clone(), &self.trained, corrections)?;
-        let settings = DraperSettings { corrections, refine, resolve, post_process, ..self.settings.clone() };
-        Ok(Self { model, settings, ..self.clone() })
+    /// The same model and body with the refinement and post-process of `settings`; body, cache and device stay.
+    pub fn with(&self, settings: &DraperSettings) -> Self {
+        let DraperSettings { refine, resolve, post_process, .. } = settings.clone();
+        Self {
+            settings: DraperSettings { refine, resolve, post_process, ..self.settings.clone() },
+            ..self.clone()
+        }
     }
 
     /// The body model.
@@ -249,20 +244,6 @@ impl Draper {
     }
 }
 
-/// `model` with at most so many correction steps; `None`: as its configuration says.
-fn with_steps(
-    model: ClothCombo,
-    trained: &TrainedModel,
-    corrections: Option<usize>,
-) -> Result<ClothCombo, DraperError> {
-    match corrections {
-        Some(steps) if steps > 0 && model.corrections.is_empty() => Err(DraperError::NoCorrections { steps }),
-        asked => {
-            Ok(model.with_correction_steps(asked.unwrap_or(trained.config.model.usual_correction_steps())))
-        }
-    }
-}
-
 /// Shape components kept of a body whose shape space is not the model's, at least.
 const OTHER_COMPONENTS: usize = 16;
 
@@ -272,7 +253,7 @@ const OTHER_COMPONENTS: usize = 16;
 fn body_of(trained: &TrainedModel, named: Option<&str>) -> Result<(Body, ShapeSpace), DraperError> {
     let count = trained.state.shape_count;
     let (body, shape_space) = match named {
-        None => (load_model_body(trained)?, ShapeSpace::Own),
+        None => (model_body(trained)?, ShapeSpace::Own),
         Some(name) => {
             let body = load_body(name, count.max(OTHER_COMPONENTS))?;
             if body.joint_count() < BODY_JOINT_COUNT {
@@ -280,7 +261,7 @@ fn body_of(trained: &TrainedModel, named: Option<&str>) -> Result<(Body, ShapeSp
                     DatasetError::FewJoints { name: body.name.clone(), joints: body.joint_count() }.into()
                 );
             }
-            let model_body = load_model_body(trained).ok();
+            let model_body = model_body(trained).ok();
             match ShapeSpace::new(&body, model_body, trained.config.data.shape_range) {
                 // Of its own body the networks know so many components.
                 ShapeSpace::Own => (body.with_shape_components(count), ShapeSpace::Own),
@@ -296,20 +277,8 @@ fn body_of(trained: &TrainedModel, named: Option<&str>) -> Result<(Body, ShapeSp
 }
 
 /// The body the model was trained on.
-fn load_model_body(trained: &TrainedModel) -> Result<Body, DraperError> {
-    let beside = trained.folder.join("body.npz");
-    let own = &trained.config.data.body;
-    let name = match own.as_str() {
-        _ if beside.is_file() => beside.display().to_string(),
-        "mannequin" => own.clone(),
-        _ => {
-            // A run lies somewhere below the folder its paths are relative to.
-            let places = std::iter::once(Path::new("")).chain(trained.folder.ancestors());
-            let found = places.map(|place| place.join(own)).find(|path| path.is_file());
-            found.ok_or_else(|| DraperError::NoBody { body: own.clone() })?.display().to_string()
-        }
-    };
-    Ok(load_body(&name, trained.state.shape_count)?)
+fn model_body(trained: &TrainedModel) -> Result<Body, DraperError> {
+    trained.body()?.ok_or_else(|| DraperError::NoBody { body: trained.config.data.body.clone() })
 }
 
 fn elapsed(clock: Instant) -> f64 {

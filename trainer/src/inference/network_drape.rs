@@ -2,7 +2,7 @@
 
 use super::{BodyState, Draper, DraperError, Outfit, PhaseTimes, elapsed};
 use crate::dataset::{BodySample, PreparedScene, SceneBuilder, SceneSample};
-use crate::inference::contact_features::LayerInteraction;
+use crate::inference::layer_interaction::LayerInteraction;
 use crate::inference::networks::{NetworkTimes, drape_on, forward_on};
 use crate::inference::on_body::OnBody;
 use crate::inference::tensor_store::body_tensors;
@@ -39,7 +39,7 @@ const MOST_SHAPE: f64 = 20.0;
 /// How much of the networks is asked.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Pass {
-    /// The forward pass, judged beside skinning, and the correction steps.
+    /// The forward pass, judged beside skinning.
     Accepted,
     /// The forward pass alone: for samples of the continuation path from the T-pose, that leaves fewer intersections
     /// (docs/resolve.md).
@@ -99,7 +99,7 @@ impl Draper {
         let milliseconds = PhaseTimes {
             posing,
             networks: ms(times.forward),
-            corrections: ms(times.corrections),
+            acceptance: ms(times.acceptance),
             ..PhaseTimes::default()
         };
         Ok(NetworkDrape { scene, surface, heading, transforms, skinned, network, milliseconds })

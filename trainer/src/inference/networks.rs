@@ -1,9 +1,9 @@
 //! The networks at inference: a prepared scene in, positions on the host out.
 
-use super::contact_features::LayerInteraction;
-use super::correct::{corrected, skinned};
+use super::acceptance::{accepted, skinned};
 use super::descent::Descent;
 use super::draped::Draped;
+use super::layer_interaction::LayerInteraction;
 use super::on_body::OnBody;
 use super::tensor_store::{DrapeError, KnownEmbeddings, TensorStore};
 use crate::dataset::PreparedScene;
@@ -23,12 +23,6 @@ impl<'a> Networks<'a> {
     /// Wraps a model without automatic differentiation.
     pub fn new(model: ClothCombo, tensors: &'a TensorStore) -> Self {
         Self { model, tensors, embeddings: Arc::new(tensors.kept_embeddings()) }
-    }
-
-    /// The same with at most `steps` correction steps.
-    pub fn with_correction_steps(&self, steps: usize) -> Self {
-        let model = self.model.clone().with_correction_steps(steps);
-        Self { model, tensors: self.tensors, embeddings: self.embeddings.clone() }
     }
 
     /// Drapes the garments of `scene` together on its first body.
@@ -124,8 +118,8 @@ impl<'a> Networks<'a> {
 pub struct NetworkTimes {
     /// The forward pass.
     pub forward: Duration,
-    /// The correction steps, and judging all states.
-    pub corrections: Duration,
+    /// Judging its result beside skinning.
+    pub acceptance: Duration,
 }
 
 /// The forward pass of `model` on an outfit, all its garments together or each as a single garment, and its last state.
@@ -140,7 +134,7 @@ pub fn forward_on(
     (states, last)
 }
 
-/// Lets `model` drape an outfit; the result is judged beside skinning, and corrected.
+/// Lets `model` drape an outfit; the result is judged beside skinning.
 pub fn drape_on(
     model: &ClothCombo,
     on_body: &OnBody<'_>,
@@ -149,7 +143,7 @@ pub fn drape_on(
     drape_watched(model, on_body, interaction, &mut |_| ())
 }
 
-/// The same; `watch` sees every state that the correction steps accept.
+/// The same; `watch` sees every state that is accepted.
 fn drape_watched(
     model: &ClothCombo,
     on_body: &OnBody<'_>,
@@ -158,8 +152,8 @@ fn drape_watched(
 ) -> (Draped, NetworkTimes) {
     let clock = Instant::now();
     // On the host before the clock is read: devices compute behind the caller's back.
-    let (states, uncorrected) = forward_on(model, on_body, interaction);
+    let (states, proposed) = forward_on(model, on_body, interaction);
     let forward = clock.elapsed();
-    let found = corrected(model, on_body, states, uncorrected, interaction, watch);
-    (found, NetworkTimes { forward, corrections: clock.elapsed() - forward })
+    let found = accepted(on_body, &proposed, &states.skin_weights, interaction, watch);
+    (found, NetworkTimes { forward, acceptance: clock.elapsed() - forward })
 }

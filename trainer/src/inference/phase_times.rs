@@ -14,8 +14,8 @@ pub struct PhaseTimes {
     pub posing: f64,
     /// The forward pass: single draping, skinning and untangling.
     pub networks: f64,
-    /// The correction steps.
-    pub corrections: f64,
+    /// Judging what they made beside skinning.
+    pub acceptance: f64,
     /// The static solver, if asked for.
     pub refine: f64,
     /// The post-process, without its certificate.
@@ -31,7 +31,7 @@ impl AddAssign for PhaseTimes {
             (&mut self.embedding, other.embedding),
             (&mut self.posing, other.posing),
             (&mut self.networks, other.networks),
-            (&mut self.corrections, other.corrections),
+            (&mut self.acceptance, other.acceptance),
             (&mut self.refine, other.refine),
             (&mut self.resolve, other.resolve),
             (&mut self.certificate, other.certificate),
@@ -49,7 +49,7 @@ impl PhaseTimes {
             ("embedding", self.embedding),
             ("posing", self.posing),
             ("networks", self.networks),
-            ("corrections", self.corrections),
+            ("acceptance", self.acceptance),
             ("refine", self.refine),
             ("resolve", self.resolve),
             ("certificate", self.certificate),

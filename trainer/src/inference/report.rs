@@ -9,7 +9,6 @@ use crate::system::device::name;
 use crate::system::paths::{lossy, lossy_option};
 use clothcombo_data::asset::Category;
 use clothcombo_data::fit::FitReport;
-use clothcombo_model::Precision;
 use clothcombo_physics::contact::resolve::Certificate;
 use clothcombo_physics::mesh::TriMesh;
 use serde::Serialize;
@@ -25,8 +24,6 @@ pub struct ModelReport {
     pub step: u64,
     /// BLAKE3 checksum of its parameters.
     pub checksum: String,
-    /// Numbers that a processor multiplied in (`model.precision`, as far as this one can).
-    pub precision: Precision,
 }
 
 /// The body.
@@ -180,7 +177,6 @@ impl Report {
                 folder: trained.folder.clone(),
                 step: trained.state.step,
                 checksum: trained.checksum().to_owned(),
-                precision: trained.config.model.precision.effective(),
             },
             body,
             garments: garment_reports(outfit, drapes),
@@ -254,7 +250,7 @@ fn garment_reports(outfit: &Outfit, drapes: &[Drape]) -> Vec<DrapedGarmentReport
             times += PhaseTimes {
                 posing: share * shared.posing,
                 networks: share * shared.networks,
-                corrections: share * shared.corrections,
+                acceptance: share * shared.acceptance,
                 refine: share * shared.refine,
                 resolve: drape.garments[index].resolve_ms + share * (shared.resolve - own),
                 certificate: share * shared.certificate,

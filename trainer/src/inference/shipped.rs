@@ -1,83 +1,52 @@
-//! The model that is used when none is named.
+//! The model that is used when none is named: it is part of the program.
 
 use super::error::DraperError;
+#[cfg(feature = "built-in-model")]
+use crate::run::checkpoint::ModelFiles;
 use crate::run::checkpoint::TrainedModel;
-use std::fs;
-use std::path::{Path, PathBuf};
 
-/// Folder of models, beside the working folder or the program.
-const MODELS: &str = "models";
-/// Environment variable that names another folder of models, which is then the only one.
-const VARIABLE: &str = "CLOTHCOMBO_MODELS";
-/// Taken first where there are several.
-const PREFERRED: &str = "default";
+/// `models/default` of the checkout that the program was built from.
+#[cfg(feature = "built-in-model")]
+static FILES: ModelFiles = ModelFiles {
+    state: include_str!("../../../models/default/state.json"),
+    config: include_str!("../../../models/default/config.toml"),
+    parameters: include_bytes!("../../../models/default/model.safetensors"),
+    body: include_bytes!("../../../models/default/body.npz"),
+};
 
-/// Opens the shipped model: `models/default`, or the only folder in `models`, in the working folder or above the program;
-/// the environment variable `CLOTHCOMBO_MODELS` names another place for `models`.
+/// Opens the shipped model.
 ///
 /// # Errors
-/// When there is none, or several of which none is called `default`.
+/// When the program was built without it (feature `built-in-model`).
 pub fn shipped_model() -> Result<TrainedModel, DraperError> {
-    let places = places();
-    for place in &places {
-        if let Some(folder) = choose(place)? {
-            return Ok(TrainedModel::open(&folder)?);
-        }
-    }
-    Err(DraperError::NoModel { searched: places.iter().map(|p| p.display().to_string()).collect() })
+    #[cfg(feature = "built-in-model")]
+    return Ok(TrainedModel::built_in(&FILES)?);
+    #[cfg(not(feature = "built-in-model"))]
+    Err(DraperError::NoModel)
 }
 
-fn places() -> Vec<PathBuf> {
-    if let Some(named) = std::env::var_os(VARIABLE).filter(|v| !v.is_empty()) {
-        return vec![named.into()];
-    }
-    let mut places = vec![PathBuf::from(MODELS)];
-    let program = std::env::current_exe().ok();
-    // PREFIX/bin/clothcombo and target/release/clothcombo.
-    places
-        .extend(program.iter().flat_map(|p| p.ancestors().skip(1).take(3)).map(|folder| folder.join(MODELS)));
-    places
-}
-
-fn choose(place: &Path) -> Result<Option<PathBuf>, DraperError> {
-    let Ok(entries) = fs::read_dir(place) else { return Ok(None) };
-    let mut found: Vec<PathBuf> =
-        entries.flatten().map(|e| e.path()).filter(|p| p.join("state.json").is_file()).collect();
-    found.sort();
-    if let Some(preferred) = found.iter().find(|p| p.ends_with(PREFERRED)) {
-        return Ok(Some(preferred.clone()));
-    }
-    match &found[..] {
-        [] => Ok(None),
-        [one] => Ok(Some(one.clone())),
-        several => {
-            let name = |p: &PathBuf| p.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            Err(DraperError::SeveralModels {
-                folder: place.into(),
-                names: several.iter().map(name).collect(),
-            })
-        }
-    }
-}
-
-#[cfg(test)]
+#[cfg(all(test, feature = "built-in-model"))]
 mod tests {
     use super::*;
+    use crate::system::device::default_device;
+    use burn::module::Module;
+    use std::path::Path;
 
     #[test]
-    fn one_is_taken_default_is_preferred_and_several_are_named() {
-        let folder = tempfile::tempdir().unwrap();
-        let make = |name: &str| {
-            fs::create_dir_all(folder.path().join(name)).unwrap();
-            fs::write(folder.path().join(name).join("state.json"), "{}").unwrap();
+    fn the_model_of_the_program_is_that_of_the_checkout() {
+        let built_in = shipped_model().unwrap();
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../models/default");
+        let opened = TrainedModel::open(&folder).unwrap();
+        assert_eq!(built_in.checksum(), opened.checksum());
+        assert_eq!(built_in.config.model, opened.config.model);
+        let device = default_device();
+        let [a, b] = [&built_in, &opened].map(|trained| trained.networks(&device).unwrap());
+        assert_eq!(a.num_params(), b.num_params());
+        let weight = |model: &clothcombo_model::ClothCombo| {
+            model.draping.displacement.output.weight.val().into_data().try_to_vec::<f32>().unwrap()
         };
-        assert_eq!(choose(folder.path()).unwrap(), None);
-        make("small");
-        assert!(choose(folder.path()).unwrap().unwrap().ends_with("small"));
-        make("large");
-        let message = choose(folder.path()).unwrap_err().to_string();
-        assert!(message.contains("large, small"), "{message}");
-        make(PREFERRED);
-        assert!(choose(folder.path()).unwrap().unwrap().ends_with(PREFERRED));
+        assert_eq!(weight(&a), weight(&b));
+        let [a, b] = [&built_in, &opened].map(|trained| trained.body().unwrap().unwrap());
+        assert!(a.vertex_count() == b.vertex_count() && a.joint_names == b.joint_names);
     }
 }

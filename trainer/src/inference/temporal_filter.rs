@@ -1,6 +1,6 @@
 //! Temporal filter: what the networks make of the frames of a motion, averaged over neighbouring frames.
 //!
-//! A network knows one pose at a time, and a correction is taken or not: from frame to frame a drape may jump by a millimetre
+//! A network knows one pose at a time, and a proposal is taken or not: from frame to frame a drape may jump by a millimetre
 //! where the body hardly moves. What is averaged is as in [`super::smooth`]; the post-process comes after it.
 
 use super::network_drape::NetworkDrape;

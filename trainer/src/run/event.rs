@@ -20,8 +20,7 @@ pub struct StepRecord {
     /// Share of the full pose.
     pub pose_scale: f64,
     /// Weighted sum that was minimised, mean over the step's bodies: that of `weighted` and, where
-    /// `losses.single_garments` counts, the losses of the single garments. Where corrections learn, it is the mean over
-    /// what each of them leads to, and the energies below are those of the last.
+    /// `losses.single_garments` counts, the losses of the single garments.
     pub loss: f64,
     /// Raw energies, summed over garments or pairs, mean over the step's bodies; terms that were not evaluated are
     /// left out.

@@ -46,7 +46,7 @@ fn an_export_holds_all_parameters_and_our_results() {
     let norms = &scene["expected"]["gradient_norms"];
     let of = |network: &str| norms[network].as_f64().unwrap_or_else(|| panic!("{network}"));
     let networks = ["garment_encoder", "draping", "skinning", "untangling"].map(of);
-    assert!(networks.iter().all(|norm| *norm > 0.0) && of("corrections") == 0.0, "{norms}");
+    assert!(networks.iter().all(|norm| *norm > 0.0), "{norms}");
     let total = scene["expected"]["gradient_norm"].as_f64().unwrap();
     let together = networks.iter().map(|norm| norm * norm).sum::<f64>().sqrt();
     assert!((total - together).abs() <= 1e-9 * total, "{total} {together}");

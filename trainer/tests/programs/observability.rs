@@ -1,6 +1,7 @@
 //! Report, event files, table of runs, and what the programs print.
 
 use crate::common::{clothcombo, holds, said, start, tiny};
+use std::fs;
 use std::path::Path;
 use std::process::Command;
 
@@ -191,6 +192,21 @@ fn spikes_of_the_gradient_are_counted_and_stand_in_the_log_alone() {
 #[test]
 fn the_schema_is_json_and_the_plan_names_its_stages() {
     let schema = clothcombo(&["config", "schema"]);
+    // The one that editors find through the first line of a configuration is the same: `clothcombo config schema > configs/schema.json`.
+    let configs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../configs");
+    assert!(
+        fs::read(configs.join("schema.json")).unwrap() == schema.stdout,
+        "configs/schema.json is not of this program"
+    );
+    for file in fs::read_dir(&configs).unwrap().map(|entry| entry.unwrap().path()) {
+        if file.extension().is_some_and(|e| e == "toml") {
+            assert!(
+                fs::read_to_string(&file).unwrap().starts_with("#:schema schema.json\n"),
+                "{}",
+                file.display()
+            );
+        }
+    }
     let schema: serde_json::Value = serde_json::from_slice(&schema.stdout).unwrap();
     assert!(schema["properties"]["stages"].is_object());
     let folder = tempfile::tempdir().unwrap();
@@ -211,4 +227,28 @@ fn the_schema_is_json_and_the_plan_names_its_stages() {
     std::fs::write(&config, "seed = 1\nstagse = []\n").unwrap();
     let wrong = clothcombo(&["config", "check", &path]);
     assert!(wrong.status.code() == Some(1) && holds(&said(&wrong), "stagse"));
+}
+
+#[test]
+fn shells_and_man_know_both_programs_and_logs_can_be_json() {
+    for shell in ["bash", "zsh", "fish"] {
+        let text = String::from_utf8(clothcombo(&["completions", shell]).stdout).unwrap();
+        assert!(text.contains("no-resolve") && text.contains("allow-config-change"), "{shell}");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let pages = folder.path().join("man1");
+    assert!(clothcombo(&["manual", "-o", &pages.display().to_string()]).status.success());
+    for page in ["clothcombo.1", "clothcombo-drape.1", "clothcombo-train.1"] {
+        assert!(fs::read_to_string(pages.join(page)).unwrap().contains("SYNOPSIS"), "{page}");
+    }
+    let config = tiny(folder.path(), "");
+    let checked =
+        clothcombo(&["config", "check", &config.display().to_string(), "--log-format", "json", "-vv"]);
+    let log = said(&checked);
+    let lines: Vec<&str> = log.lines().filter(|line| line.starts_with('{')).collect();
+    assert!(!lines.is_empty(), "{log}");
+    for line in lines {
+        let line: serde_json::Value = serde_json::from_str(line).unwrap();
+        assert!(line["level"].is_string() && line["fields"]["message"].is_string(), "{line}");
+    }
 }

@@ -175,7 +175,7 @@ fn a_body_that_is_inside_out_is_turned() {
     let path = folder.path().join("body.npz");
     let load = |faces| {
         write_tetrahedron(&path, faces, [-1.0, 0.0]);
-        Body::load_turned(&path, &BodyFileSettings::default()).unwrap()
+        Body::read_turned(NpzFile::open(&path).unwrap(), &BodyFileSettings::default()).unwrap()
     };
     let (body, was_inside_out) = load(OUTWARDS);
     assert!(!was_inside_out && !is_inside_out(&body.zero_body()));

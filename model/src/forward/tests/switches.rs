@@ -98,19 +98,14 @@ fn skinning_on_all_joints_corrects_joints_that_the_garment_does_not_use() {
 /// The plain form: z̄_v written into every row of z_v.
 #[test]
 fn without_vertex_embedding_every_network_sees_the_garment_embedding_instead() {
-    let corrections =
-        |scene: &mut Scene| scene.model.corrections = scene_with_corrections(true).model.corrections;
     let contacts = OutfitTensors::all_pairs(3);
-    let mut ablated = scene_with(&contacts, |config| config.vertex_embedding = false);
-    let mut whole = super::scene(&contacts);
-    corrections(&mut ablated);
-    corrections(&mut whole);
+    let ablated = scene_with(&contacts, |config| config.vertex_embedding = false);
+    let whole = super::scene(&contacts);
 
     let states = |scene: &Scene, embeddings: Embeddings| {
-        let states = scene.corrected(&scene.model, &embeddings);
-        let corrected = states.last().posed.clone();
+        let states = scene.drape_on(&scene.model, &embeddings, &scene.body);
         let layered = states.layered.expect("three garments that can touch").posed;
-        [states.single.posed, states.skin_weights, layered, corrected]
+        [states.single.posed, states.skin_weights, layered]
     };
     let found = states(&ablated, ablated.embeddings(&ablated.model));
     let plain = whole.garments.iter().map(|garment| {
@@ -130,7 +125,7 @@ fn without_vertex_embedding_every_network_sees_the_garment_embedding_instead() {
         assert!(difference > 1e-4, "z_v changes nothing: {difference:e}");
     }
     let [found, expected] = [(&ablated, found), (&whole, expected)].map(|(scene, states)| {
-        let sum = states.into_iter().map(loss).reduce(|a, b| a + b).expect("four states");
+        let sum = states.into_iter().map(loss).reduce(|a, b| a + b).expect("three states");
         parameter_gradients(&scene.model, sum)
     });
     assert_gradients_close(&found, &expected, 2e-5);

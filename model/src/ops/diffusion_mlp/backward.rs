@@ -4,22 +4,20 @@ use burn::backend::tensor::FloatTensor;
 
 use super::{STATES, axes};
 use crate::ops::host::{Chunk, HostBackend, MatrixView, NewPart, NewValues, vectorised};
-use crate::ops::precision::Precision;
-use crate::ops::right_factor::RightFactor;
 use crate::ops::row_blocks::{add_to, map_lanes, row_blocks, sum_over_blocks, transposed_factor};
 use crate::ops::tensors::Tensors;
-use crate::ops::tile::{OutputBlock, StridedMatrix};
+use crate::ops::tile::{OutputBlock, RightFactor, StridedMatrix};
 use crate::packing::Packing;
 
 /// Arguments: features, both bases, weights (gradient features, features, second layer, output), states, gradient of the
 /// result.
-pub(super) fn run<B: HostBackend>(precision: Precision, arguments: [FloatTensor<B>; 9]) -> Tensors<B> {
+pub(super) fn run<B: HostBackend>(arguments: [FloatTensor<B>; 9]) -> Tensors<B> {
     let held = arguments.map(B::hold);
     let [features, gradient_basis, basis, gradient_weight, input, hidden, output, states, gradient] =
         held.each_ref().map(B::view);
     let (width, eigen) = (features.columns(), basis.columns());
-    let weights = [gradient_weight, input, hidden, output].map(|weight| transposed_factor(weight, precision));
-    let pass = Pass { features, gradient_basis, basis, states, gradient, weights, precision };
+    let weights = [gradient_weight, input, hidden, output].map(transposed_factor);
+    let pass = Pass { features, gradient_basis, basis, states, gradient, weights };
     let blocks = row_blocks(&Packing::new([features.rows()]));
     let lengths = blocks.iter().map(|block| block.rows.len() * width).collect();
     let mut of_features = NewValues::new(lengths);
@@ -54,7 +52,6 @@ struct Pass<'a> {
     gradient: MatrixView<'a>,
     /// Transposed: of the gradient features, of the features, of the second layer, of the output.
     weights: [RightFactor; 4],
-    precision: Precision,
 }
 
 impl Pass<'_> {
@@ -109,14 +106,14 @@ impl Pass<'_> {
             weight_output.multiply(gradient, count, 0..width, to(a), false);
             masked(second, a, bias);
             add_to(of_hidden_bias, bias);
-            factor.fill(gradient, [count, width], self.precision);
+            factor.fill(gradient, [count, width]);
             sum(matrix(second), width, factor, of_output);
             weight_hidden.multiply(matrix(a), count, 0..width, to(b), false);
             masked(first, b, bias);
             add_to(of_bias, bias);
-            factor.fill(matrix(a), [count, width], self.precision);
+            factor.fill(matrix(a), [count, width]);
             sum(matrix(first), width, factor, of_hidden);
-            factor.fill(matrix(b), [count, width], self.precision);
+            factor.fill(matrix(b), [count, width]);
             sum(features, width, factor, of_input);
             sum(self.basis.strided().from(start, 0), eigen, factor, of_diffused);
             let of_features = of_features.unwritten().as_mut_ptr().cast::<f32>();
@@ -134,14 +131,14 @@ impl Pass<'_> {
             );
             sum(matrix(gradient_features), width, factor, of_gradient_weight);
             let [along_x, along_y] = axes(&self.gradient_basis, start);
-            factor.fill(matrix(of_x), [count, width], self.precision);
+            factor.fill(matrix(of_x), [count, width]);
             sum(along_x, eigen, factor, of_c);
-            factor.fill(matrix(of_y), [count, width], self.precision);
+            factor.fill(matrix(of_y), [count, width]);
             sum(along_y, eigen, factor, of_c);
-            factor.fill(matrix(of_x1), [count, width], self.precision);
+            factor.fill(matrix(of_x1), [count, width]);
             sum(along_x, eigen, factor, of_real);
             sum(along_y, eigen, factor, subtracted);
-            factor.fill(matrix(of_y1), [count, width], self.precision);
+            factor.fill(matrix(of_y1), [count, width]);
             sum(along_y, eigen, factor, of_real);
             sum(along_x, eigen, factor, of_imaginary);
         }

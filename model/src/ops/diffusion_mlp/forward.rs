@@ -7,16 +7,14 @@ use burn::backend::tensor::FloatTensor;
 use super::{DiffusionMlp, STATES, axes};
 use crate::ops::host::{Chunk, HostBackend, MatrixView, NewValues, for_each, vectorised};
 use crate::ops::math::tanh;
-use crate::ops::right_factor::RightFactor;
 use crate::ops::row_blocks::{factor, map_lanes, row_blocks};
 use crate::ops::tensors::Tensors;
-use crate::ops::tile::{OutputBlock, StridedMatrix};
+use crate::ops::tile::{OutputBlock, RightFactor, StridedMatrix};
 use crate::packing::Packing;
 
 /// The result; then, if it is `recorded`, the states of every block of rows one after the other.
 pub(super) fn run<B: HostBackend>(operation: &DiffusionMlp, arguments: [FloatTensor<B>; 14]) -> Tensors<B> {
-    let DiffusionMlp { precision, recorded } = *operation;
-    let factor = |matrix| factor(matrix, precision);
+    let DiffusionMlp { recorded } = *operation;
     let held = arguments.map(B::hold);
     let views = held.each_ref().map(B::view);
     let [features, gradient_basis, basis, c, real, imaginary, diffused, gradient, input, bias, ..] = views;
@@ -27,7 +25,7 @@ pub(super) fn run<B: HostBackend>(operation: &DiffusionMlp, arguments: [FloatTen
     // SAFETY: the copy has the same size.
     unsafe {
         let matrix = StridedMatrix::of_rows(&negative, width);
-        negative_imaginary.fill(matrix, [imaginary.rows(), width], precision);
+        negative_imaginary.fill(matrix, [imaginary.rows(), width]);
     }
     let pass = Pass {
         features,

@@ -9,7 +9,6 @@ use burn::tensor::DType;
 use super::{HostBackend, MatrixView};
 use crate::ops::composed::multiply_add;
 use crate::ops::gemm;
-use crate::ops::precision::Precision;
 
 /// Where the elements lie once the tensor has been made contiguous; `None` if they are not f32.
 fn contiguous(tensor: &mut FloatTensor<Flex>) -> Option<Range<usize>> {
@@ -66,22 +65,21 @@ impl HostBackend for Flex {
         lhs: FloatTensor<Self>,
         rhs: FloatTensor<Self>,
         addend: Option<FloatTensor<Self>>,
-        precision: Precision,
     ) -> FloatTensor<Self> {
         let (rows, columns) = (lhs.shape()[0], rhs.shape()[1]);
         if rows * lhs.shape()[1] * columns == 0 {
             return multiply_add::<Self>(lhs, rhs, addend);
         }
         let Some(mut sum) = addend else {
-            return Self::matrix(gemm::product(&lhs, &rhs, precision), columns);
+            return Self::matrix(gemm::product(&lhs, &rhs), columns);
         };
         assert_eq!(sum.shape().as_slice(), [rows, columns], "the addend of a product has another size");
         if let Some(values) = Self::own_values_mut(&mut sum) {
-            gemm::add_product(&lhs, &rhs, values, precision);
+            gemm::add_product(&lhs, &rhs, values);
             return sum;
         }
         let mut values = Self::values(&mut sum).expect("f32").to_vec();
-        gemm::add_product(&lhs, &rhs, &mut values, precision);
+        gemm::add_product(&lhs, &rhs, &mut values);
         Self::matrix(values, columns)
     }
 }

@@ -7,11 +7,9 @@ use burn::backend::tensor::FloatTensor;
 use super::{ModulatedSirenLayers, Weights};
 use crate::ops::host::{Chunk, HostBackend, MatrixView, NewPart, NewValues, vectorised};
 use crate::ops::math::sin_cos;
-use crate::ops::precision::Precision;
-use crate::ops::right_factor::RightFactor;
 use crate::ops::row_blocks::{add_to, map_lanes, row_blocks, sum_over_blocks};
 use crate::ops::tensors::Tensors;
-use crate::ops::tile::{OutputBlock, StridedMatrix};
+use crate::ops::tile::{OutputBlock, RightFactor, StridedMatrix};
 
 /// Arguments: coordinates, weights (between gates, first, sines, output), phases, gates, gradient of the values.
 pub(super) fn run<B: HostBackend>(
@@ -29,8 +27,7 @@ pub(super) fn run<B: HostBackend>(
         gradient,
         phases,
         gates,
-        weights: Weights::new([gate_weights, first, sine_weights, output], true, operation.precision),
-        precision: operation.precision,
+        weights: Weights::new([gate_weights, first, sine_weights, output], true),
         omegas: &operation.omegas,
         width,
     };
@@ -71,7 +68,6 @@ struct Pass<'a> {
     phases: MatrixView<'a>,
     gates: MatrixView<'a>,
     weights: Weights,
-    precision: Precision,
     omegas: &'a [f32],
     width: usize,
 }
@@ -156,17 +152,17 @@ impl Pass<'_> {
             unsafe {
                 let factor = StridedMatrix::of_rows(features, width).transposed();
                 if layer + 1 == layers {
-                    right.fill(gradient, [count, outputs], Precision::F32);
+                    right.fill(gradient, [count, outputs]);
                     let sums = OutputBlock::of_rows(of_output, outputs);
                     right.multiply(factor, width, 0..count, sums, true);
                 } else {
-                    right.fill(StridedMatrix::of_rows(above, width), [count, width], self.precision);
+                    right.fill(StridedMatrix::of_rows(above, width), [count, width]);
                     let sums = OutputBlock::of_rows(&mut of_sines[layer * width * width..], width);
                     right.multiply(factor, width, 0..count, sums, true);
                 }
                 if layer + 1 < layers {
                     // Not where the layer above is done: these gates have been read in their order since, and are at hand.
-                    right.fill(StridedMatrix::of_rows(gates_above, width), [count, width], self.precision);
+                    right.fill(StridedMatrix::of_rows(gates_above, width), [count, width]);
                     let factor = StridedMatrix::of_rows(gate, width).transposed();
                     let of_weight = OutputBlock::of_rows(&mut of_gates[layer * width * width..], width);
                     right.multiply(factor, width, 0..count, of_weight, true);
@@ -185,7 +181,7 @@ impl Pass<'_> {
         }
         // SAFETY: as above; all elements are written.
         unsafe {
-            right.fill(StridedMatrix::of_rows(below, width), [count, width], Precision::F32);
+            right.fill(StridedMatrix::of_rows(below, width), [count, width]);
             let of_weight = OutputBlock::of_rows(of_first, width);
             right.multiply(coordinates.transposed(), inputs, 0..count, of_weight, true);
             let of_coordinates = of_coordinates.unwritten().as_mut_ptr().cast();

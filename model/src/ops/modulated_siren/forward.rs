@@ -27,7 +27,7 @@ pub(super) fn run<B: HostBackend>(
         rows,
         biases: biases.row(0),
         output_bias: output_bias.row(0),
-        weights: Weights::new([gate_weights, first, sine_weights, output], false, operation.precision),
+        weights: Weights::new([gate_weights, first, sine_weights, output], false),
         omegas: &operation.omegas,
         width,
     };

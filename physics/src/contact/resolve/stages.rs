@@ -2,8 +2,7 @@
 //!
 //! A step that is halved comes by the same places again, and so does a second way.
 //!
-//! The drape at the end may be more than what is known of the stages: networks may have corrected it, a solver may have refined
-//! it. What it differs by from the stage at 1 is faded in along the way, in the frames of the skinning transforms.
+//! The drape at the end may be more than what is known of the stages: a solver may have refined it. What it differs by from the stage at 1 is faded in along the way, in the frames of the skinning transforms.
 
 use super::{Layer, PathSample};
 use crate::transform::{into_frame, out_of_frame};

@@ -8,8 +8,6 @@
 pub mod closest_point;
 pub mod nearest_vertex;
 
-use std::sync::Arc;
-
 use super::{ContactPoints, ContactSamples, CurvatureSink, EnergySettings, LayerContact, Weighted};
 use crate::mesh::{Topology, TriMesh};
 use crate::query::ClosestPoint;
@@ -55,11 +53,6 @@ impl InnerLayer {
     pub(super) fn new(rest: &TriMesh, topology: &Topology, median_edge: f64) -> Self {
         let vertices = InnerVertices::with_median_edge(rest, median_edge);
         Self { vertices, cloth: InnerCloth::new(rest, topology) }
-    }
-
-    /// Faces `[F, 3]`, shared by all surfaces of the garment.
-    pub(crate) fn faces(&self) -> &Arc<[[u32; 3]]> {
-        self.vertices.faces()
     }
 
     /// Median edge of the rest shape (m).

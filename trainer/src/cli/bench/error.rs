@@ -12,7 +12,6 @@ use crate::config::{Config, ValidationConfig};
 use crate::dataset::{Dataset, DatasetError, PreparedScene, ValidationGroup, prepare, sample_validation};
 use crate::evaluation::certificates::PostProcessor;
 use crate::evaluation::equilibrium_error::{Drapes, SceneError, scene_error};
-use crate::inference::DraperError;
 use crate::inference::networks::Networks;
 use crate::inference::reference::ReferenceScene;
 use crate::inference::tensor_store::TensorStore;
@@ -55,9 +54,6 @@ pub struct Arguments {
     /// Scenes solved in parallel, each on one core; default: all cores
     #[arg(long)]
     jobs: Option<usize>,
-    /// Also measures the networks after these numbers of correction steps, for example 0,1,2,4,8
-    #[arg(long, value_name = "STEPS", value_delimiter = ',', requires = "checkpoint")]
-    corrections: Vec<usize>,
     #[command(flatten)]
     device: DeviceArgument,
     /// Print JSON instead of a table
@@ -81,8 +77,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     };
     settings.check().into_diagnostic()?;
     let trained = arguments.model.open()?;
-    if let Some(trained) = &trained {
-        check_model(arguments, trained)?;
+    if trained.is_some() {
+        check_model(arguments)?;
     }
     // Before the data: a device that is not there is known at once.
     let device = trained.as_ref().map(|_| arguments.device.open()).transpose()?;
@@ -90,26 +86,21 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let dataset = load_dataset(&config)?;
     let seed = arguments.seed.unwrap_or_else(|| config.validation_seed());
     let scenes = sample_scenes(&dataset, &config, [arguments.scenes, arguments.layers], seed)?;
-    let drape = |(trained, device)| drape(arguments, (trained, device), &config, &dataset, &scenes);
+    let drape = |(trained, device)| drape((trained, device), &config, &dataset, &scenes);
     let drapes = trained.as_ref().zip(device.as_ref()).map(drape).transpose()?;
     let errors = solve_all(arguments, &config, &scenes, drapes.as_deref(), &settings)?;
     print_report(arguments.json, &Summary::new(errors, &settings), Summary::tables)
 }
 
 /// Refuses what the networks of the checkpoint cannot follow.
-fn check_model(arguments: &Arguments, trained: &TrainedModel) -> Result<(), Report> {
+fn check_model(arguments: &Arguments) -> Result<(), Report> {
     if let Some(setting) = arguments.model.overrides.iter().find(|s| s.starts_with("model.")) {
         return Err(miette!(
-            help = "the networks are those of the checkpoint; --corrections sets the correction steps",
+            help = "the networks are those of the checkpoint",
             "--set {setting} would change nothing with --checkpoint"
         ));
     }
-    match arguments.corrections.iter().find(|steps| **steps > 0) {
-        Some(&steps) if trained.config.model.corrections == 0 => {
-            Err(DraperError::NoCorrections { steps }.into())
-        }
-        _ => Ok(()),
-    }
+    Ok(())
 }
 
 /// Samples `count` of the validation scenes of `layers` garments: of as many as the configuration has, or of `count`
@@ -134,7 +125,6 @@ fn sample_scenes(
 }
 
 fn drape(
-    arguments: &Arguments,
     (trained, device): (&TrainedModel, &Device),
     config: &Config,
     dataset: &Arc<Dataset>,
@@ -154,11 +144,7 @@ fn drape(
             1 => None,
             _ => Some(post_processor.of(scene, &drape.posed).resolved(&post_process)?.positions.concat()),
         };
-        let mut drapes = Drapes::new(&networks.drape_single_garments(scene)?, &drape, resolved);
-        for &steps in &arguments.corrections {
-            let drape = networks.with_correction_steps(steps).drape(scene)?;
-            drapes.steps.push((steps, drape.posed.iter().map(|p| p.map(f64::from)).collect()));
-        }
+        let drapes = Drapes::new(&networks.drape_single_garments(scene)?, &drape, resolved);
         bar.inc(1);
         Ok(drapes)
     });

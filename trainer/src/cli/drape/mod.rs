@@ -47,7 +47,7 @@ use std::time::{Duration, Instant};
         [[outfit]]\n  name = \"monday\"\n  garments = [{ file = \"tee.obj\", unit = \"cm\" }, \"coat.obj\"]   # hints, or a name alone\n  shape = [1.0]       # optional, as are pose, \
         motion, frames, every")]
 pub struct Arguments {
-    /// Run, checkpoint folder or model.safetensors; default: the model in the folder models, or in that of CLOTHCOMBO_MODELS
+    /// Run, checkpoint folder or model.safetensors; default: the shipped model, which is part of the program
     #[arg(long, value_name = "PATH")]
     checkpoint: Option<PathBuf>,
     /// Body: "mannequin" or a body npz; default: the one body in --dataset, else the one the model was trained on
@@ -72,10 +72,6 @@ pub struct Arguments {
     fit: Fit,
     #[command(flatten)]
     hints: FitArguments,
-    /// Correction steps at most, each taken as far as it lowers the energy; the correction networks take turns. 0 leaves the
-    /// networks' drape as it is [default: model.correction_steps of the model]
-    #[arg(long, value_name = "STEPS")]
-    corrections: Option<usize>,
     /// Steps of the static solver from the networks' state, at most 2 cm each, until a vertex is 5 cm from there;
     /// `auto`: until a step gains less than 1 % of what all did, for at most two seconds
     #[arg(long, default_value = "0", value_name = "STEPS|auto")]
@@ -249,7 +245,6 @@ fn settings(arguments: &Arguments, body: Option<String>) -> Result<DraperSetting
         body: arguments.body.clone().or(body),
         cache,
         device: arguments.device.open()?,
-        corrections: arguments.corrections,
         refine: arguments.refine,
         resolve: !arguments.no_resolve,
         post_process: arguments.post_process.settings(),

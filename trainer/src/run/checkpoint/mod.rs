@@ -20,7 +20,7 @@ mod trained;
 
 pub use error::CheckpointError;
 pub use state::{Best, CheckpointState};
-pub use trained::TrainedModel;
+pub use trained::{ModelFiles, TrainedModel};
 
 use crate::config::{Config, load, to_toml};
 use crate::dataset::DataList;
@@ -197,10 +197,10 @@ impl Checkpoint {
     }
 }
 
-/// The keys of networks in which `config` differs from `own`. The numbers that they multiply in make no other networks.
+/// The keys of networks in which `config` differs from `own`.
 fn other_networks(config: &Config, own: &Config) -> Vec<Difference> {
     let mut changes = differences(config, own);
-    changes.retain(|change| change.key.starts_with("model.") && change.key != "model.precision");
+    changes.retain(|change| change.key.starts_with("model."));
     changes
 }
 

@@ -1,28 +1,64 @@
 //! A trained model, apart from the run that made it.
 
 use super::{
-    CONFIG, CheckpointError, CheckpointState, MODEL_EXCHANGE, newest, other_networks, read_state, verify,
+    CONFIG, CheckpointError, CheckpointState, MODEL_EXCHANGE, STATE, newest, other_networks, read_state,
+    verify,
 };
-use crate::config::{Config, PoseConfig, load};
-use crate::dataset::{ClipSplit, Dataset, GarmentPurpose, purpose};
+use crate::config::{Config, ConfigError, PoseConfig, load, parse};
+use crate::dataset::{ClipSplit, Dataset, DatasetError, GarmentPurpose, load_body, purpose, read_body};
 use burn::store::{ModuleSnapshot, SafetensorsStore};
 use burn::tensor::Device;
-use clothcombo_model::{ClothCombo, Initializer, ModelConfig};
+use clothcombo_data::asset::Body;
+use clothcombo_data::format::NpzFile;
+use clothcombo_model::ClothCombo;
 use std::path::{Path, PathBuf};
+
+/// The body beside a model.
+const BODY: &str = "body.npz";
+
+/// The files of a model that is part of the program.
+#[derive(Debug)]
+pub struct ModelFiles {
+    /// `state.json`.
+    pub state: &'static str,
+    /// `config.toml`.
+    pub config: &'static str,
+    /// `model.safetensors`.
+    pub parameters: &'static [u8],
+    /// `body.npz`.
+    pub body: &'static [u8],
+}
 
 /// Trained networks for use, not for training on: `model.safetensors`, `config.toml` and `state.json` of a checkpoint,
 /// whatever else lies beside them. A model that is handed on needs no more than these three files.
 #[derive(Clone, Debug)]
 pub struct TrainedModel {
-    /// Its folder.
+    /// Its folder; of a model that is part of the program, what it is called.
     pub folder: PathBuf,
     /// What it says about itself.
     pub state: CheckpointState,
     /// The configuration it was trained with.
     pub config: Config,
+    built_in: Option<&'static ModelFiles>,
 }
 
 impl TrainedModel {
+    /// Opens a model that is part of the program.
+    ///
+    /// # Errors
+    /// When its files are damaged or of another version.
+    pub fn built_in(files: &'static ModelFiles) -> Result<Self, CheckpointError> {
+        let folder = PathBuf::from("built in");
+        let unusable = |what: String| CheckpointError::Unusable {
+            path: folder.clone(),
+            reason: format!("{STATE} {what}"),
+        };
+        let state = CheckpointState::read(files.state).map_err(unusable)?;
+        // Paths in it are relative to the working folder.
+        let config = parse(files.config, Path::new(CONFIG), &[])?;
+        Ok(Self { folder, state, config, built_in: Some(files) })
+    }
+
     /// Opens a run, a checkpoints folder, one checkpoint, or a `model.safetensors` with its two companions.
     ///
     /// # Errors
@@ -37,13 +73,47 @@ impl TrainedModel {
             let state = read_state(folder, &files)?;
             files.iter().try_for_each(|file| verify(folder, &state, file))?;
             let config = load(&folder.join(CONFIG), &[])?;
-            Ok(Self { folder: folder.to_owned(), state, config })
+            Ok(Self { folder: folder.to_owned(), state, config, built_in: None })
         })
     }
 
-    /// Where its configuration lies.
-    pub fn config_file(&self) -> PathBuf {
-        self.folder.join(CONFIG)
+    /// Its configuration, with `overrides`.
+    ///
+    /// # Errors
+    /// When an override is wrong.
+    pub fn config_with(&self, overrides: &[String]) -> Result<Config, ConfigError> {
+        match self.built_in {
+            Some(files) => parse(files.config, Path::new(CONFIG), overrides),
+            None => load(&self.folder.join(CONFIG), overrides),
+        }
+    }
+
+    /// The body it was trained on; `None` where that is not there.
+    ///
+    /// # Errors
+    /// When its file is damaged.
+    pub fn body(&self) -> Result<Option<Body>, DatasetError> {
+        let count = self.state.shape_count;
+        let beside = self.folder.join(BODY);
+        let own = &self.config.data.body;
+        let name = match own.as_str() {
+            "mannequin" => own.clone(),
+            _ if self.built_in.is_some() => {
+                let bytes = self.built_in.map_or(&[][..], |files| files.body);
+                let file = NpzFile::of_bytes(Path::new(BODY), bytes).map_err(DatasetError::data)?;
+                return read_body(file, count).map(Some);
+            }
+            _ if beside.is_file() => beside.display().to_string(),
+            _ => {
+                // A run lies somewhere below the folder its paths are relative to.
+                let places = std::iter::once(Path::new("")).chain(self.folder.ancestors());
+                match places.map(|place| place.join(own)).find(|path| path.is_file()) {
+                    Some(found) => found.display().to_string(),
+                    None => return Ok(None),
+                }
+            }
+        };
+        load_body(&name, count).map(Some)
     }
 
     /// The networks, on `device`.
@@ -54,7 +124,10 @@ impl TrainedModel {
         let unusable = |reason: String| CheckpointError::Unusable { path: self.folder.clone(), reason };
         let mut model = ClothCombo::new(&self.config.model, &self.state.dimensions(), 0, device)
             .map_err(|e| unusable(e.to_string()))?;
-        let mut store = SafetensorsStore::from_file(self.folder.join(MODEL_EXCHANGE));
+        let mut store = match self.built_in {
+            Some(files) => SafetensorsStore::from_bytes(Some(files.parameters.to_vec())),
+            None => SafetensorsStore::from_file(self.folder.join(MODEL_EXCHANGE)),
+        };
         let applied = model.load_from(&mut store).map_err(|e| unusable(format!("{MODEL_EXCHANGE}: {e}")))?;
         match applied.errors.first() {
             Some(error) => Err(unusable(format!("{MODEL_EXCHANGE}: {error}"))),
@@ -142,7 +215,7 @@ impl TrainedModel {
         Ok(())
     }
 
-    /// The networks as the start of a run of `config` on `dataset`; with untrained correction networks if those are new.
+    /// The networks as the start of a run of `config` on `dataset`.
     ///
     /// # Errors
     /// When data or sizes of the networks are not the model's own.
@@ -154,15 +227,7 @@ impl TrainedModel {
     ) -> Result<ClothCombo, CheckpointError> {
         self.check_networks(config)?;
         self.check_data(config, dataset)?;
-        let networks = self.networks(device)?;
-        Ok(match self.adds_corrections(config) {
-            true => networks.with_corrections(&config.model, &mut Initializer::new(config.seed, device)),
-            false => networks,
-        })
-    }
-
-    fn adds_corrections(&self, config: &Config) -> bool {
-        self.config.model.corrections == 0 && config.model.corrections > 0
+        self.networks(device)
     }
 
     /// Whether a run of `config` could start from these networks, as far as its [model] section tells.
@@ -170,17 +235,8 @@ impl TrainedModel {
     /// # Errors
     /// Names the keys that differ.
     pub fn check_networks(&self, config: &Config) -> Result<(), CheckpointError> {
-        let adds_corrections = self.adds_corrections(config);
-        let expected = match adds_corrections {
-            true => ModelConfig {
-                correction_width: self.config.model.correction_width,
-                ..config.model.without_corrections()
-            },
-            false => config.model.clone(),
-        };
-        // How many steps are taken is a choice of inference, not of the networks.
-        let expected = ModelConfig { correction_steps: self.config.model.correction_steps, ..expected };
-        let changes = other_networks(&Config { model: expected, ..self.config.clone() }, &self.config);
+        let changes =
+            other_networks(&Config { model: config.model.clone(), ..self.config.clone() }, &self.config);
         match changes.is_empty() {
             true => Ok(()),
             false => Err(CheckpointError::OtherStart { path: self.folder.clone(), changes }),

@@ -16,8 +16,6 @@ const PER_MODULATOR_LAYER: f64 = 1.0;
 const PER_SKINNING_LAYER: f64 = 2.0;
 /// z_v: of every garment, and packed.
 const PER_EMBEDDING: f64 = 2.0;
-/// A correction network of four hidden layers; fitted.
-const PER_CORRECTION: f64 = 12.0;
 /// Per joint: weights, corrections, blended transforms.
 const PER_JOINT: f64 = 5.0;
 /// For the energies; fitted.
@@ -66,9 +64,6 @@ fn per_vertex(config: &Config, stage: &StageConfig, joints: usize) -> f64 {
         // The first stage is not trained: it keeps nothing for a backward pass.
         Trains::Untangling => (sine, 2.0 * modulator),
         Trains::All => (2.0 * sine + skinning, 2.0 * modulator),
-        Trains::Corrections => {
-            (PER_CORRECTION * (m.corrections * m.correction_width) as f64, 2.0 * modulator)
-        }
     };
     of_garments + stage.bodies as f64 * (of_body + PER_VERTEX)
 }

@@ -17,8 +17,6 @@ use std::ops::AddAssign;
 use std::time::{Duration, Instant};
 use tracing::trace_span;
 
-pub use scene::drape_states;
-
 /// Trains the networks.
 pub struct Learner {
     model: ClothCombo,

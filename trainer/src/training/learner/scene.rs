@@ -2,17 +2,13 @@
 
 use super::{StepInput, StepOutput, StepTimes, norm_of};
 use crate::config::{ClipScope, Trains};
-use crate::dataset::{PreparedBody, PreparedScene};
-use crate::inference::contact_features::contact_features;
-use crate::inference::draped::to_host;
-use crate::inference::tensor_store::{DrapeError, TensorStore};
+use crate::dataset::PreparedScene;
+use crate::inference::tensor_store::DrapeError;
 use crate::system::workers::Workers;
 use burn::module::Module;
 use burn::optim::GradientsParams;
 use burn::tensor::Tensor;
-use clothcombo_model::{
-    ClothCombo, DrapeState, DrapeStates, Embeddings, GarmentEmbedding, OutfitTensors, clip_global_norm,
-};
+use clothcombo_model::{ClothCombo, DrapeState, GarmentEmbedding, clip_global_norm};
 use clothcombo_physics::autodiff::{SceneLossOutput, scene_loss};
 use clothcombo_physics::energy::SceneEnergy;
 use std::sync::Arc;
@@ -121,53 +117,19 @@ impl<'a> SceneStep<'a> {
         let single_weight = if trains == Trains::All { scene.single_garments * share } else { 0.0 };
         let mut losses = Losses::default();
         for body in &scene.bodies {
-            let states = drape_states(&networks, tensors, scene, body, (&outfit, &embeddings), trains)?;
+            let (of_body, start) = trace_span!("tensors").in_scope(|| tensors.body(body))?;
+            let states = networks.forward(&outfit, &embeddings, &of_body, start, mode);
             if single_weight > 0.0 {
                 losses.add(&states.single, &Arc::new(scene.energy_of_singles(body)), single_weight);
             }
-            // Every correction learns from the state it leads to.
-            let learned = match trains {
-                Trains::Corrections => &states.corrected[..],
-                Trains::Single | Trains::Draping | Trains::Untangling | Trains::All => {
-                    std::slice::from_ref(states.last())
-                }
-            };
-            let outputs =
-                learned.iter().map(|state| losses.add(state, &body.energy, share / learned.len() as f64));
-            let last = outputs.last();
-            losses.bodies.extend(last);
+            let output = losses.add(states.last(), &body.energy, share);
+            losses.bodies.push(output);
         }
         if trains == Trains::Untangling && !networks.untangling.acts_on(&outfit) {
             losses.terms.clear();
         }
         Ok(losses)
     }
-}
-
-/// The states that a stage which trains `trains` takes a scene through on one of its bodies.
-///
-/// # Errors
-/// When the body's numbers are not finite.
-pub fn drape_states(
-    networks: &ClothCombo,
-    tensors: &TensorStore,
-    scene: &PreparedScene,
-    prepared: &PreparedBody,
-    (outfit, embeddings): (&OutfitTensors, &Embeddings),
-    trains: Trains,
-) -> Result<DrapeStates, DrapeError> {
-    let (body, start) = trace_span!("tensors").in_scope(|| tensors.body(prepared))?;
-    let mut states = networks.forward(outfit, embeddings, &body, start, trains.mode());
-    if trains == Trains::Corrections {
-        for _ in 0..networks.corrections.len() {
-            let features = trace_span!("contact features").in_scope(|| {
-                let posed = states.last().posed.clone().detach();
-                contact_features(scene, prepared, &scene.contacts, &to_host(posed.clone()), &posed.device())
-            });
-            networks.correct(outfit, embeddings, &body, &mut states, features);
-        }
-    }
-    Ok(states)
 }
 
 /// The networks of a step: those that learn from `model`, those that the stage freezes from `frozen`.
@@ -177,7 +139,6 @@ fn with_frozen(model: &ClothCombo, frozen: Option<&ClothCombo>, trains: Trains) 
         Trains::Single | Trains::All => model.clone(),
         Trains::Draping => ClothCombo { garment_encoder: frozen().garment_encoder, ..model.clone() },
         Trains::Untangling => ClothCombo { untangling: model.untangling.clone(), ..frozen() },
-        Trains::Corrections => ClothCombo { corrections: model.corrections.clone(), ..frozen() },
     }
 }
 

@@ -9,7 +9,7 @@ use crate::inference::tensor_store::{DrapeError, TensorStore};
 use crate::run::spread::Spread;
 use crate::system::device::is_processor;
 use crate::system::memory::Memory;
-use crate::training::learner::{Learner, StepInput, drape_states, new_optimizer};
+use crate::training::learner::{Learner, StepInput, new_optimizer};
 use crate::training::process_group::RankPartition;
 use crate::training::scenes::prefetch;
 use crate::training::schedule::Schedule;
@@ -202,8 +202,8 @@ impl BenchmarkRun {
         outfit: &OutfitTensors,
         embeddings: &Embeddings,
     ) -> Result<[Tensor<2>; 2], DrapeError> {
-        let states =
-            drape_states(model, &self.tensors, scene, &scene.bodies[0], (outfit, embeddings), self.trains())?;
+        let (body, start) = self.tensors.body(&scene.bodies[0])?;
+        let states = model.forward(outfit, embeddings, &body, start, self.trains().mode());
         let DrapeState { posed, canonical } = states.last().clone();
         Ok([posed, canonical])
     }

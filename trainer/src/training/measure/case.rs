@@ -50,7 +50,6 @@ impl Case {
             Trains::Draping => "draping",
             Trains::Untangling => "untangling",
             Trains::All => "all",
-            Trains::Corrections => "corrections",
         };
         // Garments that reach the same parts of the body come first, so that even two layers touch.
         let text = format!(

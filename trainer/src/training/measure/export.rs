@@ -15,7 +15,7 @@ use serde_json::{Map, Value, json};
 use std::path::Path;
 
 /// Prefixes of the parameters' names, network by network.
-pub const NETWORKS: [&str; 5] = ["garment_encoder", "draping", "skinning", "untangling", "corrections"];
+pub const NETWORKS: [&str; 4] = ["garment_encoder", "draping", "skinning", "untangling"];
 
 /// Writes the first scene of the stage, on the first of its bodies, into `folder`: `model.safetensors` (parameters by their
 /// documented names), `scene.npz` (body, garments, operators, and the positions our networks find) and `scene.json` (sizes,
