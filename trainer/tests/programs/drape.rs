@@ -281,8 +281,19 @@ fn a_motion_is_one_animated_scene() {
     assert_eq!(document["accessors"][input]["count"], 4);
     assert!((document["accessors"][input]["max"][0].as_f64().unwrap() - 0.6).abs() < 1e-6, "0.2 s a frame");
 
-    for frame in [1, 3, 5, 7] {
+    // Point caches have the vertices of the OBJ files, frame by frame.
+    let mdd = fs::read(out.join(format!("{TEE}.mdd"))).unwrap();
+    let words: Vec<[u8; 4]> = mdd.as_chunks::<4>().0.to_vec();
+    let [frames, points] = [0, 1].map(|i| i32::from_be_bytes(words[i]) as usize);
+    let numbers: Vec<f32> = words[2..].iter().map(|word| f32::from_be_bytes(*word)).collect();
+    assert_eq!((frames, numbers.len()), (4, 4 + 12 * points));
+    assert_eq!(fs::metadata(out.join(format!("{TEE}.pc2"))).unwrap().len() as usize, 32 + 48 * points);
+
+    for (number, frame) in [1, 3, 5, 7].into_iter().enumerate() {
         let mesh = load_tri_mesh(&out.join(format!("frames/{frame:05}/{TEE}.obj"))).unwrap();
+        let cached = &numbers[4 + 3 * points * number..][..3 * points];
+        let written = mesh.positions().as_flattened();
+        assert!(cached.iter().zip(written).all(|(a, b)| (f64::from(*a) - b).abs() < 1e-6));
         let body = load_tri_mesh(&out.join(format!("frames/{frame:05}/body.obj"))).unwrap();
         assert!(triangle_pairs(mesh.positions(), mesh.faces(), body.positions(), body.faces()).is_empty());
     }

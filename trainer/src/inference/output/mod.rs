@@ -3,6 +3,7 @@
 //! ```text
 //! OUT/body.obj  OUT/NAME.obj …       the body, and every garment with the vertices and polygons it was given with
 //! OUT/frames/00012/…                 the same for every frame of a motion, if asked for
+//! OUT/NAME.pc2, NAME.mdd …           the vertices of these OBJ files in every frame of a motion, as point caches
 //! OUT/scene.glb                      body and garments as named, coloured meshes; a motion as morph targets
 //! OUT/picture.png                    front, back and three-quarter
 //! OUT/layers.png                     the same of each garment alone, where there is more than one
@@ -19,7 +20,7 @@ pub use staged::Staged;
 use super::{BodyReport, Drape, Draper, DraperError, GivenGarment, Moment, Outfit, Report, Smoothing};
 use crate::picture::{BODY_COLOUR, PictureError, layer_colour};
 use clothcombo_data::format::obj::{self, MovedObj};
-use clothcombo_data::format::{FileError, SceneMesh, save_glb};
+use clothcombo_data::format::{FileError, PointFrames, SceneMesh, save_glb};
 use miette::Diagnostic;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -162,6 +163,7 @@ pub fn write(folder: &Path, show: &Show) -> Result<WriteTimes, OutputError> {
         run().map(|_| 1e3 * clock.elapsed().as_secs_f64())
     }
     let meshes = || timed(|| write_meshes(folder, show));
+    let caches = || timed(|| write_caches(folder, show));
     let scene = || timed(|| write_scene(&folder.join("scene.glb"), show));
     let picture = || {
         timed(|| {
@@ -173,9 +175,30 @@ pub fn write(folder: &Path, show: &Show) -> Result<WriteTimes, OutputError> {
         })
     };
     let page = || timed(|| viewer::save(&folder.join("viewer.html"), show));
-    let ((meshes, scene), (picture, page)) =
-        rayon::join(|| rayon::join(meshes, scene), || rayon::join(picture, page));
-    Ok(vec![("obj", meshes?), ("glb", scene?), ("picture", picture?), ("viewer", page?)])
+    let ((meshes, (scene, caches)), (picture, page)) =
+        rayon::join(|| rayon::join(meshes, || rayon::join(scene, caches)), || rayon::join(picture, page));
+    let (caches, scene) = (caches?, scene?);
+    Ok(vec![("obj", meshes?), ("glb", scene), ("caches", caches), ("picture", picture?), ("viewer", page?)])
+}
+
+/// The vertices of the OBJ files in every frame of a motion.
+fn write_caches(folder: &Path, show: &Show) -> Result<(), OutputError> {
+    if show.moments.is_empty() {
+        return Ok(());
+    }
+    let save = |name: &str, positions: &dyn Fn(&Drape) -> Vec<[f64; 3]>| {
+        let mut frames = PointFrames::default();
+        for (drape, moment) in show.drapes.iter().zip(show.moments) {
+            frames.push(moment.seconds, &positions(drape));
+        }
+        frames.save_pc2(&folder.join(format!("{name}.pc2")))?;
+        frames.save_mdd(&folder.join(format!("{name}.mdd")))
+    };
+    save("body", &|drape| drape.body.clone())?;
+    for (layer, garment) in show.outfit.garments.iter().enumerate() {
+        save(&garment.name, &|drape| garment.source.in_given_order(&drape.garments[layer].positions))?;
+    }
+    Ok(())
 }
 
 fn write_meshes(folder: &Path, show: &Show) -> Result<(), OutputError> {
