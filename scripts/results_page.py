@@ -45,6 +45,9 @@ PLAIN = {
     "Speed against error, 3 garments",
 }
 
+# Tables that a report lacks where there are no clips, and no ablated models.
+OPTIONAL = {title for title in COLUMNS if title.startswith("Training garments, held-out windows")} | {"Ablations"}
+
 
 def cells(line: str) -> list[str]:
     return [cell.strip() for cell in line.strip("|").split("|")]
@@ -95,8 +98,8 @@ def refreshed(page: str, report: str) -> str:
 def main() -> None:
     if sys.argv[1:2] == ["--check"] and len(sys.argv) == 3:
         report = (pathlib.Path(sys.argv[2]) / "eval.md").read_text()
-        found = [title for title in COLUMNS if report_rows(report, title)]
-        sys.exit(None if len(found) > len(COLUMNS) / 2 else f"only {len(found)} of {len(COLUMNS)} tables are there: {found}")
+        missing = [title for title in COLUMNS if title not in OPTIONAL and not report_rows(report, title)]
+        sys.exit(f"tables that the report lacks: {missing}" if missing else None)
     if len(sys.argv) != 2 or sys.argv[1].startswith("-"):
         sys.exit(__doc__)
     folder = pathlib.Path(sys.argv[1])

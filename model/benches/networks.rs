@@ -61,6 +61,7 @@ fn networks(criterion: &mut Criterion, vertices: usize, config: &ModelConfig) {
         &random(DIMENSIONS.shape, 2.0),
         &random(DIMENSIONS.pose, 1.0),
         &vec![bone; DIMENSIONS.joints],
+        &random(30 * DIMENSIONS.joints, 1.0),
         &DIMENSIONS,
         &device,
     )

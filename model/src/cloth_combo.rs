@@ -15,6 +15,7 @@ use crate::garment_encoder::{GarmentEmbedding, GarmentEncoder};
 use crate::initializer::Initializer;
 use crate::mode::Mode;
 use crate::skinning::Skinning;
+use crate::surroundings::Surroundings;
 use crate::tensors::{GarmentTensors, OutfitTensors, stack_rows};
 use crate::untangling::Untangling;
 
@@ -30,6 +31,8 @@ pub struct ClothCombo {
     pub draping: Draping,
     /// S.
     pub skinning: Skinning,
+    /// The pose around every vertex; the paper has none.
+    pub surroundings: Option<Surroundings>,
     /// F_f and D_m.
     pub untangling: Untangling,
     /// Correct what the others do, one after the other; the paper has none.
@@ -79,6 +82,7 @@ impl ClothCombo {
             draping: Draping::new(config, dimensions, start),
             skinning: Skinning::new(config, dimensions, start),
             untangling: Untangling::new(config, start),
+            surroundings: (config.surroundings > 0).then(|| Surroundings::new(config, dimensions, start)),
             corrections: Vec::new(),
             correction_steps: 0,
         }
@@ -130,7 +134,7 @@ impl ClothCombo {
     /// The same networks with new correction networks in place of any they have; untrained, these correct nothing.
     pub fn with_corrections(mut self, config: &ModelConfig, start: &mut Initializer) -> Self {
         self.corrections = (0..config.corrections).map(|_| Correction::new(config, start)).collect();
-        self.correction_steps = config.correction_steps.unwrap_or(config.corrections);
+        self.correction_steps = config.usual_correction_steps();
         self
     }
 

@@ -77,6 +77,10 @@ pub struct ModelConfig {
     /// Give the vertex embedding `z_v` to `D_s`, `S`, `D_m` and the corrections. `false` is the ablation of the paper's
     /// Table 4: the garment embedding `z̄_v` replaces it at every vertex.
     pub vertex_embedding: bool,
+    /// Length of the code of the pose around a joint, which every vertex reads through its skin weights, beside the thickness
+    /// of what is worn below it; 0 is the paper, which has neither: its networks see the pose only through `z_s`, one row per
+    /// garment.
+    pub surroundings: usize,
     /// Correction networks that garments go through at the end; 0 is the paper, which has none.
     pub corrections: usize,
     /// Width of the correction networks.
@@ -112,6 +116,7 @@ impl Default for ModelConfig {
             skinning_joints: SkinningJoints::Bound,
             graph: Graph::Near,
             vertex_embedding: true,
+            surroundings: 0,
             corrections: 0,
             correction_width: 96,
             correction_steps: None,
@@ -124,6 +129,11 @@ impl ModelConfig {
     /// The same without correction networks: all that a model has of the paper's.
     pub fn without_corrections(&self) -> Self {
         Self { corrections: 0, correction_steps: None, ..self.clone() }
+    }
+
+    /// Correction steps at inference where nobody asks for another number.
+    pub fn usual_correction_steps(&self) -> usize {
+        self.correction_steps.unwrap_or(self.corrections)
     }
 
     /// Checks that every size is at least one and every scale and frequency is usable.

@@ -62,17 +62,21 @@ impl ClothCombo {
     ) -> DrapeStates {
         let span = trace_span!("draping").entered();
         let draping_embedding = self.draping.embed(embeddings.garment.clone(), body);
+        let mut products = [embeddings.draping_product.clone(), embeddings.skinning_product.clone()];
+        if let Some(surroundings) = &self.surroundings {
+            products = surroundings.add_to(&surroundings.codes(body), outfit, products);
+        }
+        let [draping_product, skinning_product] = products;
         let displacement = self.draping.displace(
             outfit.rest.clone(),
-            embeddings.draping_product.clone(),
+            draping_product,
             draping_embedding.clone(),
             &outfit.packing,
         );
         let canonical = displacement + start.clone();
         drop(span);
         let span = trace_span!("skinning").entered();
-        let skin_weights =
-            self.skinning.weights(outfit, embeddings.skinning_product.clone(), draping_embedding.clone());
+        let skin_weights = self.skinning.weights(outfit, skinning_product, draping_embedding.clone());
         let single = posed(canonical, &skin_weights, body);
         drop(span);
         let layered = (mode == Mode::Layered && self.untangling.acts_on(outfit)).then(|| {

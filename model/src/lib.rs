@@ -33,6 +33,7 @@ pub mod ops;
 mod packing;
 mod siren;
 mod skinning;
+mod surroundings;
 mod tensors;
 #[cfg(test)]
 mod testing;
@@ -56,5 +57,8 @@ pub use ops::Precision;
 pub use packing::Packing;
 pub use siren::{ModulatedSiren, Modulator, SirenSizes};
 pub use skinning::Skinning;
-pub use tensors::{BodyTensors, ContactFeatureTensors, GarmentArrays, GarmentTensors, OutfitTensors};
+pub use surroundings::Surroundings;
+pub use tensors::{
+    BodyTensors, ContactFeatureTensors, GarmentArrays, GarmentTensors, JOINT_FEATURES, OutfitTensors,
+};
 pub use untangling::Untangling;

@@ -128,7 +128,7 @@ const LEG_JOINTS: [&[&str]; 2] = [
 
 /// Nearest body vertex of each garment vertex; with `own_leg` a trouser leg looks only at its own leg (and the trunk): at the
 /// inner thigh the other leg can be nearer.
-fn nearest_body_vertices(garment: &Garment, body: &Body, own_leg: bool) -> Vec<usize> {
+pub(super) fn nearest_body_vertices(garment: &Garment, body: &Body, own_leg: bool) -> Vec<usize> {
     let points = garment.rest.positions();
     if garment.category != Category::Trousers || !own_leg {
         let all = VertexIndex::new(&body.template);
@@ -168,7 +168,7 @@ fn nearest_body_vertices(garment: &Garment, body: &Body, own_leg: bool) -> Vec<u
 
 /// `iterations` times: every row moves half of the distance to the mean of its one-ring. Rows only mix along edges of
 /// the garment.
-fn smooth(values: &mut Vec<f32>, columns: usize, topology: &Topology, iterations: usize) {
+pub(super) fn smooth(values: &mut Vec<f32>, columns: usize, topology: &Topology, iterations: usize) {
     let mut next = values.clone();
     for _ in 0..iterations {
         for (v, row) in next.chunks_exact_mut(columns.max(1)).enumerate() {

@@ -74,7 +74,10 @@ impl Motion {
     }
 
     /// Checks frame rate and angles: what is read and what is written must pass.
-    pub(crate) fn check(&self) -> Result<(), String> {
+    ///
+    /// # Errors
+    /// Naming the frame and joint that do not.
+    pub fn check(&self) -> Result<(), String> {
         check_frame_rate(self.frame_rate)?;
         let name = |joint: usize| BODY_JOINT_NAMES.get(joint).copied().unwrap_or("of no body");
         for (frame, pose) in self.poses.iter().enumerate() {

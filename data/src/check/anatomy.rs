@@ -94,10 +94,10 @@ impl Kind {
     fn cause(self) -> &'static str {
         match self {
             Self::Backwards | Self::Sideways => {
-                "are left and right swapped, or joints mapped to others (`import bvh --joints`)?"
+                "are left and right swapped, or joints mapped to others (`--joints` of the import)?"
             }
             Self::Swings | Self::Twists => {
-                "are the angles in degrees, the axes other ones, or joints mapped to others (`import bvh --joints`)?"
+                "are the angles in degrees, the axes other ones, or joints mapped to others (`--joints` of the import)?"
             }
         }
     }

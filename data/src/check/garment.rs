@@ -3,7 +3,7 @@
 use super::placement::misplacement;
 use super::targets::ManifestHints;
 use crate::asset::{Body, Category, Garment};
-use crate::fit::PlacementCheck;
+use crate::fit::{PlacementCheck, contact_warnings};
 use crate::format::load_tri_mesh;
 use crate::mesh::MeshMeasures;
 use clothcombo_physics::Topology;
@@ -135,14 +135,7 @@ fn warnings(garment: &GarmentCheck) -> Vec<String> {
     if garment.mesh.boundary_loops == 0 {
         warnings.push("closed: a garment has openings".into());
     }
-    if garment.inside > 0 || garment.body_triangle_pairs > 0 {
-        warnings.push(format!(
-            "{} vertices inside the body at rest, {} intersecting triangle pairs",
-            garment.inside, garment.body_triangle_pairs
-        ));
-    }
-    if garment.self_triangle_pairs > 0 {
-        warnings.push(format!("{} self-intersecting triangle pairs", garment.self_triangle_pairs));
-    }
+    let GarmentCheck { inside, body_triangle_pairs, self_triangle_pairs, .. } = *garment;
+    warnings.extend(contact_warnings(inside, body_triangle_pairs, self_triangle_pairs));
     warnings
 }

@@ -61,6 +61,7 @@ impl CaseScene {
             let energies = GarmentEnergies::new(rest, &Topology::new(rest), settings, g.garment.holding)?;
             Ok(SceneGarment {
                 energies: Arc::new(energies),
+                thickness_below: Vec::new(),
                 holding_reference: rest.positions().iter().map(|p| vec3::from_f64(*p)).collect(),
                 pull_back: None,
                 weights,

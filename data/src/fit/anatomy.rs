@@ -43,12 +43,12 @@ type Segment = [[f64; 3]; 2];
 
 /// Bones that pass through cloth.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Crossings {
+pub(super) struct PiercingBones {
     pub arms: usize,
     pub others: usize,
 }
 
-impl Crossings {
+impl PiercingBones {
     /// The same where arms are bones like any other.
     pub fn anywhere(self) -> Self {
         Self { arms: 0, others: self.arms + self.others }
@@ -71,7 +71,7 @@ impl Skeleton {
                 let from = points.iter().position(|p| *p == root).unwrap_or(points.len());
                 let side = if limb % 2 == 1 { 1.0 } else { -1.0 };
                 let turn = if limb < 3 { turn.arms } else { turn.legs };
-                points[from..].iter_mut().for_each(|p| *p = turn.lowered(*p, root, side));
+                points[from..].iter_mut().for_each(|p| *p = turn.applied(*p, root, side));
             }
             let bones: Vec<Segment> = points.windows(2).map(|pair| [pair[0], pair[1]]).collect();
             let beyond = bones.last().map(|[a, b]| {
@@ -83,7 +83,7 @@ impl Skeleton {
     }
 
     /// How many bones pass through cloth: those of the arms, which sleeves made for other arms miss, and all others.
-    pub fn crossings(&self, positions: &[[f64; 3]], faces: &[[u32; 3]], turn: LimbTurn) -> Crossings {
+    pub fn piercing(&self, positions: &[[f64; 3]], faces: &[[u32; 3]], turn: LimbTurn) -> PiercingBones {
         let limbs = self.bones(turn);
         let mut bones: Vec<(Segment, bool)> = Vec::new();
         for (limb, (chain, _)) in limbs.iter().enumerate() {
@@ -106,7 +106,7 @@ impl Skeleton {
             })
         };
         let count = |is_arm| bones.iter().filter(|(bone, is)| *is == is_arm && crossed(bone)).count();
-        Crossings { arms: count(true), others: count(false) }
+        PiercingBones { arms: count(true), others: count(false) }
     }
 
     /// What a closed border goes around: the limbs whose ends its spanning surface separates from the other ends.

@@ -64,8 +64,8 @@ impl Search<'_> {
             true => candidate,
             false => {
                 // It has no sleeves that arms could miss.
-                let crossings = candidate.crossings.anywhere();
-                Candidate { score: candidate.score + UNWORN, is_worn: true, crossings, ..candidate }
+                let piercing = candidate.piercing.anywhere();
+                Candidate { score: candidate.score + UNWORN, is_worn: true, piercing, ..candidate }
             }
         }
     }

@@ -85,16 +85,16 @@ impl Turn {
         Self { sine, cosine }
     }
 
-    /// A point of the lowered limb of this side, turned back to the T-pose about its joint.
-    fn raised(self, p: [f64; 3], shoulder: [f64; 3], side: f64) -> [f64; 3] {
-        let [x, y, z] = sub(p, shoulder);
+    /// A point of the turned limb of this side, turned back to the T-pose about its joint.
+    fn undone(self, p: [f64; 3], joint: [f64; 3], side: f64) -> [f64; 3] {
+        let [x, y, z] = sub(p, joint);
         let sine = side * self.sine;
-        add(shoulder, [self.cosine * x - sine * y, sine * x + self.cosine * y, z])
+        add(joint, [self.cosine * x - sine * y, sine * x + self.cosine * y, z])
     }
 
-    /// The inverse of [`Turn::raised`].
-    pub fn lowered(self, p: [f64; 3], shoulder: [f64; 3], side: f64) -> [f64; 3] {
-        Self { sine: -self.sine, ..self }.raised(p, shoulder, side)
+    /// The inverse of [`Turn::undone`].
+    pub fn applied(self, p: [f64; 3], joint: [f64; 3], side: f64) -> [f64; 3] {
+        Self { sine: -self.sine, ..self }.undone(p, joint, side)
     }
 }
 
@@ -183,7 +183,7 @@ impl BodyField {
         let Levels { crotch, waist, armpit, .. } = self.levels;
         let mut part = [crotch, waist, armpit].iter().filter(|level| **level < p[1]).count();
         for arm in self.arms.iter() {
-            let raised = arms.raised(p, arm.shoulder, arm.side);
+            let raised = arms.undone(p, arm.shoulder, arm.side);
             let distance = arm.distance.distance(raised).min(norm(sub(p, arm.shoulder)) - arm.radius);
             if distance < gap {
                 (gap, part) = (distance, PARTS - 1);
@@ -195,7 +195,7 @@ impl BodyField {
     /// A point next to an arm, raised with it to the T-pose; any other one as it is.
     pub fn level(&self, p: [f64; 3], arms: Turn) -> [f64; 3] {
         let nearest = self.arms.iter().map(|arm| {
-            let raised = arms.raised(p, arm.shoulder, arm.side);
+            let raised = arms.undone(p, arm.shoulder, arm.side);
             (arm.distance.distance(raised), raised)
         });
         let (distance, raised) = nearest.fold((f64::MAX, p), |a, b| if b.0 < a.0 { b } else { a });
@@ -211,7 +211,7 @@ impl BodyField {
     /// Whether `p` is at least this deep (m) inside the body.
     pub fn is_inside(&self, p: [f64; 3], turn: LimbTurn, depth: f64) -> bool {
         let p = self.legs_together(p, turn.legs);
-        let in_arm = |arm: &Arm| arm.distance.distance(turn.arms.raised(p, arm.shoulder, arm.side)) < -depth;
+        let in_arm = |arm: &Arm| arm.distance.distance(turn.arms.undone(p, arm.shoulder, arm.side)) < -depth;
         self.trunk.distance(p) < -depth || self.arms.iter().any(in_arm)
     }
 }
@@ -226,7 +226,7 @@ fn turned_back(p: [f64; 3], weight: f64, turn: Turn, joint: [f64; 3]) -> [f64; 3
         return p;
     }
     let blend = Turn { sine: sine / squared, cosine: cosine / squared };
-    let mut back = blend.raised(p, joint, weight.signum());
+    let mut back = blend.undone(p, joint, weight.signum());
     back[2] = p[2];
     back
 }
@@ -339,12 +339,12 @@ mod tests {
     }
 
     #[test]
-    fn lowering_undoes_raising() {
+    fn a_turn_is_undone() {
         let turn = Turn::new(33.0);
         let (p, shoulder) = ([0.4, 0.1, 0.3], [0.2, 0.5, 0.0]);
-        let there = turn.lowered(p, shoulder, -1.0);
-        assert!(norm(sub(turn.raised(there, shoulder, -1.0), p)) < 1e-12);
-        let hand = turn.lowered([0.8, 0.5, 0.0], shoulder, 1.0);
+        let there = turn.applied(p, shoulder, -1.0);
+        assert!(norm(sub(turn.undone(there, shoulder, -1.0), p)) < 1e-12);
+        let hand = turn.applied([0.8, 0.5, 0.0], shoulder, 1.0);
         assert!(hand[1] < 0.5 && hand[0] > 0.2, "a lowered left hand is below the shoulder: {hand:?}");
     }
 }

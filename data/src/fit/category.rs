@@ -14,7 +14,7 @@ pub(super) fn guessed(rest: &TriMesh, body: &Body, limbs: Limbs) -> Category {
     }
 }
 
-/// What speaks against a category that was given.
+/// What speaks against a category, given or guessed.
 pub(super) fn contradiction(category: Category, limbs: Limbs) -> Option<String> {
     let is_for_legs = matches!(category, Category::Trousers | Category::Skirt);
     let what = match limbs {

@@ -2,8 +2,11 @@
 
 use super::judge::{Candidate, Judge};
 
-/// Farthest that a leg is turned outwards in a garment's rest pose (degrees).
-const MOST_APART: f64 = 25.0;
+/// Lowered arms of a garment hang between these angles (degrees): nearer to the horizontal they are level, and cloth hangs from
+/// shoulders, not straight down.
+const LOWERED: [f64; 2] = [3.0, 85.0];
+/// How far a leg is turned outwards in a garment's rest pose (degrees), if it is.
+const APART: [f64; 2] = [0.5, 25.0];
 
 /// How steps shrink (m), and what counts on the way.
 pub(super) struct Steps {
@@ -44,12 +47,12 @@ pub(super) fn climbed(judge: &Judge, start: &Candidate, steps: &Steps) -> Candid
                     3 if raises => {
                         // A sleeve is half a metre long.
                         let degrees = trial.arm_angle_degrees + sign * (2.0 * step).to_degrees();
-                        trial.arm_angle_degrees = degrees.clamp(3.0, 85.0);
+                        trial.arm_angle_degrees = degrees.clamp(LOWERED[0], LOWERED[1]);
                     }
                     4 if spreads => {
                         // A leg is twice as long.
                         let degrees = trial.leg_angle_degrees + sign * step.to_degrees();
-                        trial.leg_angle_degrees = degrees.clamp(0.5, MOST_APART);
+                        trial.leg_angle_degrees = degrees.clamp(APART[0], APART[1]);
                     }
                     _ => continue,
                 }

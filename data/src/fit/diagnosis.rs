@@ -21,7 +21,7 @@ const SIZE_EVIDENCE: f64 = 12.0;
 /// Clothes that are worn are not this many times as large or small as those that fit.
 const OTHER_SIZE: f64 = 1.6;
 /// Cloth farther from the body on average (m), or with a larger share inside it, may be of another size.
-const LOOSE: f64 = 0.05;
+const LOOSE: f64 = 0.035;
 const TIGHT: f64 = 0.05;
 /// Pieces that are looked at by themselves.
 const MOST_PIECES: usize = 3;
@@ -59,14 +59,15 @@ impl fmt::Display for Size {
         let Self { extent, unit, factor } = self;
         write!(
             f,
-            "it measures {extent:.2} m from end to end (unit {unit}), and fits much better scaled by {factor:.2}"
+            "it measures {extent:.2} m from end to end (unit {unit}), and fits much better scaled by about {factor:.2}"
         )
     }
 }
 
 /// What is wrong with a mesh that looks worn nowhere, if that can be told.
 pub(super) fn diagnosed(search: &Search, cloth: &Cloth, settings: &FitSettings) -> Option<FitError> {
-    half(cloth).or_else(|| beside(search, cloth, settings)).or_else(|| {
+    let told = upside_down(search, cloth, settings).or_else(|| half(cloth));
+    told.or_else(|| beside(search, cloth, settings)).or_else(|| {
         let ups = settings.up.map_or(vec![UpAxis::Y, UpAxis::Z], |up| vec![up]);
         let units = settings.unit.map_or(vec![Unit::M, Unit::Cm, Unit::Mm], |unit| vec![unit]);
         let of = |unit: &Unit| {
@@ -94,7 +95,7 @@ pub(super) fn size_doubt(
     settings: &FitSettings,
     taken: &Candidate,
 ) -> Option<Size> {
-    if taken.placement.origin == Origin::Pelvis || settings.offset.is_some() {
+    if settings.offset.is_some() {
         return None;
     }
     let (sitting, _) = search.measured(cloth, &taken.placement);
@@ -102,25 +103,18 @@ pub(super) fn size_doubt(
         return None;
     }
     let p = &taken.placement;
-    // What is taken for its front may be its side at another size.
-    let turns = match (settings.turn_degrees, p.turn_degrees) {
-        (None, turn) if turn != 0.0 => vec![0.0, turn],
-        (_, turn) => vec![turn],
+    let known = FitSettings {
+        unit: Some(p.unit),
+        up: Some(p.up),
+        turn_degrees: Some(p.turn_degrees),
+        // Legs that are too wide are found apart.
+        legs_degrees: settings.legs_degrees.or(Some(0.0)),
+        ..settings.clone()
     };
-    let gain = |turn: f64| {
-        let known = FitSettings {
-            unit: Some(p.unit),
-            up: Some(p.up),
-            turn_degrees: Some(turn),
-            legs_degrees: Some(p.leg_angle_degrees),
-            ..settings.clone()
-        };
-        // What is known has no say there.
-        let score = taken.score - p.log_prior(settings) + p.log_prior(&known);
-        other_size(search, cloth, &known).map(|(size, found)| (size, found - score))
-    };
-    let (size, gain) = turns.into_iter().filter_map(gain).max_by(|a, b| a.1.total_cmp(&b.1))?;
-    (gain > SIZE_EVIDENCE).then_some(size)
+    // What is known has no say there.
+    let score = taken.score - p.log_prior(settings) + p.log_prior(&known);
+    let (size, found) = other_size(search, cloth, &known)?;
+    (found - score > SIZE_EVIDENCE).then_some(size)
 }
 
 /// The size at which a file of known unit, axis and turn is worn best, other than its own, and how well (log-posterior). A tube
@@ -140,10 +134,9 @@ fn other_size(search: &Search, cloth: &Cloth, known: &FitSettings) -> Option<(Si
         is_told.then_some((Size { extent: extent * unit.metres(), unit, factor }, best.score))
     };
     let better = |a: &(Size, f64), b: &(Size, f64)| a.1.total_cmp(&b.1);
-    let steps = (-SIZES..=SIZES).filter(|k| *k != 0);
-    let best = steps.filter_map(|k| at(SIZE_STEP.powi(k))).max_by(better)?;
-    let finer = [-0.5, -0.25, 0.25, 0.5].into_iter().filter_map(|k| at(best.0.factor * SIZE_STEP.powf(k)));
-    finer.chain([best]).max_by(better)
+    // One that is nearer to its own explains what the next one would be told for.
+    let steps = (-SIZES..=SIZES).filter(|k| *k != 0).map(f64::from).chain([-0.75, 0.75]);
+    steps.filter_map(|k| at(SIZE_STEP.powf(k))).max_by(better)
 }
 
 /// Whether a garment is cut in half by a plane of the file's axes: all of it lies on one side, and a border runs there and elsewhere.
@@ -172,6 +165,21 @@ fn half(cloth: &Cloth) -> Option<FitError> {
         }
     }
     None
+}
+
+/// The other end of an axis, if that must point up; tubes are worn either way round.
+fn upside_down(search: &Search, cloth: &Cloth, settings: &FitSettings) -> Option<FitError> {
+    if settings.up.is_some() {
+        return None;
+    }
+    let believed = UpAxis::DOWN.into_iter().filter_map(|up| {
+        let known = FitSettings { up: Some(up), ..settings.clone() };
+        let candidates = search.candidates(cloth, cloth.extent(), &known);
+        let best = *Readings::new(&candidates, search, cloth).believed.first()?;
+        (!best.is_tube).then_some((up, best.score))
+    });
+    let (up, _) = believed.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    Some(FitError::UpsideDown { up })
 }
 
 /// The piece that lies beside the body when one of the largest is worn.

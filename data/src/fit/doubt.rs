@@ -27,8 +27,8 @@ pub(super) enum Doubt {
     Arms,
     /// Its front is where the file has its back, or the other way round.
     Turned,
-    /// Arms or legs were found to be held otherwise by little evidence.
-    Limbs { taken: Placement },
+    /// Arms or legs were found to be held otherwise by little evidence (log-posterior).
+    Limbs { taken: Placement, margin: f64 },
 }
 
 impl fmt::Display for Doubt {
@@ -64,12 +64,15 @@ impl fmt::Display for Doubt {
             Self::Turned => f.write_str(
                 "turned by 180°, as it lies better on the body so, though no neckline shows where its front is; --turn 0 keeps it",
             ),
-            Self::Limbs { taken } => {
+            Self::Limbs { taken, margin } => {
                 let (limbs, flag, angle) = match taken.arm_angle_degrees {
                     0.0 => ("legs", "--legs 0", taken.leg_angle_degrees),
                     angle => ("arms", "--arms t", angle),
                 };
-                write!(f, "little of it tells that its {limbs} are {angle:.0}° from the rest pose; {flag} if they are not")
+                write!(
+                    f,
+                    "little tells that its {limbs} are {angle:.0}° from the rest pose (log-odds {margin:.1}); {flag} if they are not"
+                )
             }
             Self::Tube => f.write_str(
                 "a tube with two openings may be a skirt at the waist or a strapless top at the chest; --category settles it",

@@ -2,7 +2,7 @@
 
 use super::diagnosis::Size;
 use super::pieces::StrayPiece;
-use super::placement::Unit;
+use super::placement::{Unit, UpAxis};
 use super::settings::{MAX_VERTICES, MIN_TRIANGLES, MOST_STRETCH};
 use thiserror::Error;
 
@@ -19,6 +19,16 @@ pub enum FitError {
     #[error("not a garment: {triangles} triangles with an area, a garment has at least {MIN_TRIANGLES}")]
     TooFewTriangles {
         /// After cleaning.
+        triangles: usize,
+    },
+    /// Hardly any of its triangles are connected.
+    #[error(
+        "not a garment: {pieces} loose pieces of {triangles} triangles, where cloth is connected; do its faces name the right vertices?"
+    )]
+    Scattered {
+        /// Connected pieces.
+        pieces: usize,
+        /// Of all of them.
         triangles: usize,
     },
     /// No opening.
@@ -53,9 +63,7 @@ pub enum FitError {
         place: &'static str,
     },
     /// A connected piece lies beside the body, or far from it.
-    #[error(
-        "{piece}: delete it or move it onto the body, or --keep largest leaves it out; export one file per garment"
-    )]
+    #[error("{piece}: {}", piece.hint())]
     StrayPiece {
         /// Which piece, and where it lies.
         piece: StrayPiece,
@@ -65,6 +73,12 @@ pub enum FitError {
     Size {
         /// What it measures, and what would fit.
         size: Size,
+    },
+    /// It is worn when the file is turned upside down.
+    #[error("upside down: with --up {up} it would be worn, and nowhere as it is")]
+    UpsideDown {
+        /// The axis that points up then.
+        up: UpAxis,
     },
     /// One half of a garment.
     #[error(

@@ -4,7 +4,7 @@
 //! ([`likelihood`](super::likelihood)), how usual such a file is ([`Placement::log_prior`]), how its upper rim lies,
 //! and whether limbs pass through openings instead of cloth ([`anatomy`](super::anatomy)).
 
-use super::anatomy::{Crossings, Skeleton};
+use super::anatomy::{PiercingBones, Skeleton};
 use super::body_field::{BodyField, LimbTurn};
 use super::cloth::Cloth;
 use super::likelihood::{log_likelihood, rough_log_likelihood};
@@ -19,7 +19,7 @@ const RIM_EVIDENCE: f64 = 8.0;
 /// Log-prior against a garment through whose openings no limbs pass: it decides against any that fits otherwise.
 pub(super) const UNWORN: f64 = 150.0;
 /// Log-prior against a bone that passes through cloth.
-const CROSSING: f64 = 8.0;
+const PIERCED: f64 = 8.0;
 /// Log-prior against an opening through which nothing passes.
 const IDLE: f64 = 8.0;
 /// A neckline lower by this (m) in front than behind, or the other way round, shows where the front is; log-odds of that.
@@ -40,7 +40,7 @@ pub(super) struct Candidate {
     /// Log-posterior up to a constant.
     pub score: f64,
     /// Bones that pass through cloth.
-    pub crossings: Crossings,
+    pub piercing: PiercingBones,
     /// The border that is its upper rim, if the garment hangs from one.
     pub rim: Option<usize>,
     /// Whether limbs pass through its openings as through those of clothes.
@@ -113,7 +113,7 @@ impl Judge<'_> {
             placement,
             fit,
             score,
-            crossings: Crossings::default(),
+            piercing: PiercingBones::default(),
             rim: None,
             is_worn: true,
             worn_pieces: 1,
@@ -169,17 +169,17 @@ impl Judge<'_> {
         let distances = turned.rim.iter().map(|p| self.field.gap(add(*p, t), turn).0.abs());
         let rim_distance = distances.sum::<f64>() / turned.rim.len().max(1) as f64;
         let placed = placement.apply(self.cloth.positions);
-        let crossings = self.skeleton.crossings(&placed, self.cloth.faces, turn);
+        let piercing = self.skeleton.piercing(&placed, self.cloth.faces, turn);
         let shown = self.shown_front(&scored);
         let is_turned = self.settings.turn_degrees.is_none() && placement.turn_degrees == 180.0;
         let is_unfounded_turn = is_turned && scored.neck_drop.is_some() && shown < 1.0;
         let against = if scored.is_worn { 0.0 } else { UNWORN }
-            + CROSSING * (crossings.arms + crossings.others) as f64
+            + PIERCED * (piercing.arms + piercing.others) as f64
             + IDLE * scored.idle_openings as f64
             + if is_unfounded_turn { BACK_TO_FRONT } else { 0.0 }
             - NECKLINE * shown;
         let score = scored.score - against;
-        Candidate { score, rim_distance, crossings, is_unfounded_turn, ..scored }
+        Candidate { score, rim_distance, piercing, is_unfounded_turn, ..scored }
     }
 
     /// Whether the neckline shows the front where it is, from -1 to 1.

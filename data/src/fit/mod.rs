@@ -13,6 +13,7 @@ mod diagnosis;
 mod doubt;
 mod error;
 mod from_body;
+pub mod hints;
 mod judge;
 mod likelihood;
 mod limb_pose;
@@ -38,7 +39,9 @@ pub use placed::{PlacementCheck, is_on_body};
 pub use placement::{Origin, Placement, Unit, UpAxis};
 pub(crate) use repair::is_double;
 pub use repair::needs_repair;
-pub use report::{BodyContact, Elements, FitReport, MeshPiece, Repair, RepairKind, SeamReport};
+pub use report::{
+    BodyContact, Elements, FitReport, MeshPiece, Repair, RepairKind, SeamReport, contact_warnings,
+};
 pub use settings::{FitSettings, Keep, MAX_VERTICES, MIN_TRIANGLES};
 pub use sitting::Sitting;
 
@@ -57,7 +60,7 @@ use limb_pose::LimbPose;
 use pieces::refuse_stray_pieces;
 use repair::{finish_seams, gaps, repair, turn_outward};
 use search::{Search, SearchBody};
-use settings::{MOST_STRETCH, MOST_STRETCHED};
+use settings::{LEAST_PIECE, MOST_STRETCH, MOST_STRETCHED};
 use verdict::{Verdict, verdict};
 
 /// Least distance between a fitted vertex and the body (m): the ε of the paper's body collision loss.
@@ -115,6 +118,10 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
     if topology.boundary_loops.is_empty() {
         return Err(FitError::Closed);
     }
+    let (pieces_found, triangles) = (topology.component_count, mesh.face_count());
+    if LEAST_PIECE * pieces_found > triangles {
+        return Err(FitError::Scattered { pieces: pieces_found, triangles });
+    }
 
     let measured = SearchBody::new(body)?;
     let search = Search::new(body, &measured);
@@ -134,7 +141,7 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
         }
     };
     let metres = placement.unit.metres();
-    let borders = sheet.borders();
+    let borders = settings.join_seams.map(|_| sheet.borders(&topology));
     let mut seams = finish_seams(&mut sheet, file, settings, metres);
     let mesh = TriMesh::new(sheet.positions.clone(), sheet.faces.clone())
         .map_err(|e| FitError::Mesh(e.to_string()))?;
@@ -153,25 +160,33 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
     };
     refuse_bodies(&positions, body)?;
     if let Some(place) = off_trunk(&positions, body) {
-        let error = FitError::OffTrunk { place };
-        match settings.category.is_some() || settings.offset.is_some() {
-            true => doubts.push(error.to_string()),
-            false => return Err(error),
+        if let Some(source) = &source {
+            return Err(
+                source.not_on_it(&format!("carried over, {}", place.replacen("it", "the garment", 1)))
+            );
         }
+        // Unit and axes alone do not make a hat a garment of the trunk.
+        let is_said = settings.category.is_some() || settings.offset.is_some();
+        take_or_refuse(is_said, FitError::OffTrunk { place }, &mut doubts)?;
     }
     let raised = Cloth::new(&positions, &sheet.faces, &topology);
     if let Some(source) = &source {
         match search.believed_as_given(&raised, &FitSettings::default()) {
             Err(odd) => doubts.push(source.doubt(&odd)),
-            Ok(worn) if worn.crossings.arms > 0 => doubts.push(Doubt::Arms.to_string()),
+            Ok(worn) if worn.piercing.arms > 0 => doubts.push(Doubt::Arms.to_string()),
             Ok(_) => {}
         }
     }
     let sitting = search.measured(&raised, &Placement::AS_GIVEN).0;
     let judge = search.judge(&raised, settings);
     let limbs = judge.limbs(&Placement::AS_GIVEN);
-    if settings.join_seams.is_some() {
-        seams.extend(gaps(&sheet, &borders, &judge.is_linked(&Placement::AS_GIVEN), metres));
+    if let Some(before) = borders {
+        seams.extend(gaps(
+            &sheet.borders(&topology),
+            &before,
+            &judge.is_linked(&Placement::AS_GIVEN),
+            metres,
+        ));
     }
     refuse_stray_pieces(&positions, &topology, search.surface(), &judge.worn_pieces(&Placement::AS_GIVEN))?;
     let rest_surface = search.surface();
@@ -183,11 +198,7 @@ pub fn fit(file: &PolygonMesh, body: &Body, settings: &FitSettings) -> Result<Fi
     push_out(&mut positions, &sheet.faces, rest_surface, CLEARANCE);
     let share = stretched(&topology, &unpushed, &positions);
     if share > MOST_STRETCHED {
-        let error = FitError::Stretched { share };
-        match settings.says_place() {
-            true => doubts.push(error.to_string()),
-            false => return Err(error),
-        }
+        take_or_refuse(settings.says_place(), FitError::Stretched { share }, &mut doubts)?;
     }
     let after = contact(&positions, rest_surface);
     let moves: Vec<f64> = positions.iter().zip(&unpushed).map(|(a, b)| norm(sub(*a, *b))).collect();
@@ -252,6 +263,15 @@ fn place(search: &Search, cloth: &Cloth, extent: f64, settings: &FitSettings) ->
     if is_worn {
         return as_given;
     }
+    if settings.arms_lowered == Some(true) {
+        // That says nothing about a garment that no arm passes through.
+        let known = FitSettings { arms_lowered: None, ..settings.clone() };
+        let found = place(search, cloth, extent, &known);
+        let judge = search.judge(cloth, &known);
+        if let Some(verdict) = found.ok().filter(|v| !v.is_odd() && !judge.limbs(&v.placement).arms) {
+            return Ok(verdict);
+        }
+    }
     let apart = search.candidates_apart(cloth, extent, settings);
     if let Some(verdict) = verdict(&apart, search, cloth, settings).ok().filter(|v| !v.is_odd()) {
         return Ok(verdict);
@@ -274,6 +294,15 @@ fn stretched(topology: &Topology, before: &[[f64; 3]], after: &[[f64; 3]]) -> f6
         now > MOST_STRETCH * rest
     };
     topology.edges.iter().filter(is_long).count() as f64 / topology.edges.len().max(1) as f64
+}
+
+/// What refuses a garment is a warning where hints say that it is worn so.
+fn take_or_refuse(is_said: bool, error: FitError, doubts: &mut Vec<String>) -> Result<(), FitError> {
+    match is_said {
+        true => doubts.push(error.to_string()),
+        false => return Err(error),
+    }
+    Ok(())
 }
 
 fn refuse_bodies(positions: &[[f64; 3]], body: &Body) -> Result<(), FitError> {

@@ -24,6 +24,18 @@ pub struct StrayPiece {
     pub distance: f64,
 }
 
+impl StrayPiece {
+    /// What to do about it.
+    pub(super) fn hint(&self) -> &'static str {
+        match self.pieces {
+            1 => "is --offset, or the body of --from-body, the right one?",
+            _ => {
+                "delete it or move it onto the body, or --keep largest leaves it out; export one file per garment"
+            }
+        }
+    }
+}
+
 impl fmt::Display for StrayPiece {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { first_vertex, vertices, pieces, distance } = self;

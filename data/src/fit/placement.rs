@@ -64,11 +64,21 @@ pub enum UpAxis {
     Z,
     /// Seen in some scanners' files.
     X,
+    /// Upside down: as images count their rows.
+    MinusY,
+    /// See [`UpAxis::MinusY`].
+    MinusZ,
+    /// See [`UpAxis::MinusY`].
+    MinusX,
 }
 
 impl UpAxis {
     /// All of them, the usual ones first.
-    pub const ALL: [Self; 3] = [Self::Y, Self::Z, Self::X];
+    pub const ALL: [Self; 6] = [Self::Y, Self::Z, Self::X, Self::MinusY, Self::MinusZ, Self::MinusX];
+    /// Those that are looked for. Upside down much that is no garment looks like one: the others must be given.
+    pub const USUAL: [Self; 3] = [Self::Y, Self::Z, Self::X];
+    /// Those that are not.
+    pub const DOWN: [Self; 3] = [Self::MinusY, Self::MinusZ, Self::MinusX];
 
     /// The rotation that turns this axis up.
     pub fn to_y_up(self) -> Matrix3 {
@@ -76,15 +86,21 @@ impl UpAxis {
             Self::Y => rotation::IDENTITY,
             Self::Z => [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]],
             Self::X => [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
+            Self::MinusY => [[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]],
+            Self::MinusZ => [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]],
+            Self::MinusX => [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
         }
     }
 
-    /// `y`, `z` or `x`.
+    /// `y`, `z`, `x`, `-y`, `-z` or `-x`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Y => "y",
             Self::Z => "z",
             Self::X => "x",
+            Self::MinusY => "-y",
+            Self::MinusZ => "-z",
+            Self::MinusX => "-x",
         }
     }
 }
@@ -259,6 +275,9 @@ mod tests {
                     UpAxis::X => [100.0, 0.0, 0.0],
                     UpAxis::Y => [0.0, 100.0, 0.0],
                     UpAxis::Z => [0.0, 0.0, 100.0],
+                    UpAxis::MinusX => [-100.0, 0.0, 0.0],
+                    UpAxis::MinusY => [0.0, -100.0, 0.0],
+                    UpAxis::MinusZ => [0.0, 0.0, -100.0],
                 };
                 assert_eq!(placement.apply(&[axis]), [[0.0, 1.0, 0.0]]);
             }
@@ -271,6 +290,8 @@ mod tests {
             assert_eq!(unit.name().parse(), Ok(unit));
         }
         assert!("furlong".parse::<Unit>().unwrap_err().contains("inch"));
-        assert_eq!("z".parse(), Ok(UpAxis::Z));
+        for up in UpAxis::ALL {
+            assert_eq!(up.name().parse(), Ok(up));
+        }
     }
 }

@@ -249,12 +249,11 @@ pub(super) fn finish_seams(
 
 /// Borders that are not among those of `before` and that no limb passes through: gaps in seams that were joined.
 pub(super) fn gaps(
-    sheet: &Sheet,
+    borders: &[SheetBorder],
     before: &[SheetBorder],
     is_linked: &[bool],
     metres: f64,
 ) -> Vec<SeamReport> {
-    let borders = sheet.borders();
     let is_gap = |(border, is_linked): &(&SheetBorder, &bool)| {
         !**is_linked && before.iter().all(|known| known.vertices != border.vertices)
     };

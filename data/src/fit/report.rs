@@ -167,6 +167,15 @@ pub struct BodyContact {
     pub self_triangle_pairs: usize,
 }
 
+/// What speaks against a garment at rest whose vertices lie inside the body, or whose triangles intersect it or each other.
+pub fn contact_warnings(inside: usize, body_pairs: usize, self_pairs: usize) -> Vec<String> {
+    let body =
+        || format!("{inside} vertices inside the body at rest, {body_pairs} intersecting triangle pairs");
+    let own = || format!("{self_pairs} self-intersecting triangle pairs");
+    let of_body = (inside > 0 || body_pairs > 0).then(body);
+    of_body.into_iter().chain((self_pairs > 0).then(own)).collect()
+}
+
 /// Everything that was assumed, repaired and measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FitReport {
@@ -218,6 +227,16 @@ impl FitReport {
                 100.0 * inside
             )
         })
+    }
+
+    /// Everything that should be looked at; the last ones are those of `check` about the fitted mesh.
+    pub fn warnings(&self) -> Vec<String> {
+        let c = &self.contact;
+        let edges =
+            self.unrepaired_edges.iter().map(|[a, b]| format!("edge {a}–{b} still has more than two faces"));
+        let defects = self.mesh.defects.counts().into_iter().map(|(count, name)| format!("{count} {name}"));
+        let contact = contact_warnings(c.inside_after, c.body_triangle_pairs, c.self_triangle_pairs);
+        edges.chain(self.doubts.iter().cloned()).chain(self.misfit()).chain(defects).chain(contact).collect()
     }
 
     /// The assumptions in words, one a line.
@@ -276,9 +295,6 @@ impl fmt::Display for FitReport {
         for repair in &self.repairs {
             writeln!(f, "repaired  {}: {} ({})", repair.kind.text(), repair.count, repair.elements)?;
         }
-        for [a, b] in &self.unrepaired_edges {
-            writeln!(f, "warning   edge {a}–{b} still has more than two faces")?;
-        }
         write_seams(f, &self.seams, true)?;
         write_seams(f, &self.seams, false)?;
         for piece in &self.dropped_pieces {
@@ -293,14 +309,8 @@ impl fmt::Display for FitReport {
             "result    {} vertices, {} triangles, edges {:.1} mm ({:.1}–{:.1})",
             m.vertices, m.triangles, m.edge_median_mm, m.edge_min_mm, m.edge_max_mm
         )?;
-        for doubt in &self.doubts {
-            writeln!(f, "warning   {doubt}")?;
-        }
-        if let Some(misfit) = self.misfit() {
-            writeln!(f, "warning   {misfit}")?;
-        }
-        for (count, name) in m.defects.counts() {
-            writeln!(f, "warning   {count} {name} remain")?;
+        for warning in self.warnings() {
+            writeln!(f, "warning   {warning}")?;
         }
         writeln!(
             f,

@@ -18,9 +18,8 @@ use crate::asset::Body;
 use crate::mesh::bounds;
 use clothcombo_physics::query::Surface;
 use clothcombo_physics::vec3::add;
-use limbs::has_limbs_at_rest;
+use limbs::{has_limbs_at_rest, with_legs_apart};
 use rayon::prelude::*;
-use std::sync::OnceLock;
 
 /// Arm angles tried first (degrees).
 pub(super) const ARM_ANGLES: [f64; 6] = [0.0, 15.0, 30.0, 45.0, 60.0, 75.0];
@@ -45,8 +44,8 @@ pub(super) struct SearchBody {
     pub(super) field: BodyField,
     skeleton: Skeleton,
     surface: Surface<f64>,
-    /// With the legs apart; made when it is first needed.
-    apart: OnceLock<BodyField>,
+    /// The field of the body with its legs apart; made here, since the body is shared by threads afterwards.
+    apart: BodyField,
     /// Largest extent of the body (m).
     reach: f64,
 }
@@ -62,7 +61,8 @@ impl SearchBody {
         }
         let surface = Surface::new(body.template.clone(), body.faces.clone());
         let reach = body.zero_body().extent();
-        let (field, skeleton, apart) = (BodyField::new(body), Skeleton::new(body), OnceLock::new());
+        let (field, skeleton) = (BodyField::new(body), Skeleton::new(body));
+        let apart = with_legs_apart(&field, body);
         Ok(Self { field, skeleton, surface, apart, reach })
     }
 }
@@ -140,7 +140,7 @@ impl<'a> Search<'a> {
         let units = Unit::ALL.into_iter().filter(|u| {
             settings.unit.is_none_or(|s| s == *u) && self.is_plausible_extent(extent * u.metres())
         });
-        let ups: Vec<UpAxis> = settings.up.map_or(UpAxis::ALL.to_vec(), |up| vec![up]);
+        let ups: Vec<UpAxis> = settings.up.map_or(UpAxis::USUAL.to_vec(), |up| vec![up]);
         let turns = settings.turn_degrees.map_or(vec![0.0, 90.0, 180.0, 270.0], |turn| vec![turn]);
         let mut bases = Vec::new();
         for unit in units {
@@ -284,7 +284,8 @@ fn distinct(ranked: Vec<Candidate>) -> Vec<Candidate> {
             // Arms that change nothing are not seen.
             let arms =
                 (a.arm_angle_degrees - b.arm_angle_degrees).abs() > 8.0 && (better.fit - c.fit).abs() > 0.5;
-            turned || arms || (0..3).any(|k| (a.translation[k] - b.translation[k]).abs() > 0.02)
+            let legs = (a.leg_angle_degrees == 0.0) != (b.leg_angle_degrees == 0.0);
+            turned || arms || legs || (0..3).any(|k| (a.translation[k] - b.translation[k]).abs() > 0.02)
         };
         if kept.iter().all(is_new) {
             kept.push(c);

@@ -13,6 +13,8 @@ pub const MAX_VERTICES: usize = 1_000_000;
 pub(super) const MOST_STRETCH: f64 = 1.5;
 /// Share of its edges from which a stretched garment does not fit.
 pub(super) const MOST_STRETCHED: f64 = 0.1;
+/// Triangles that a connected piece of cloth has on average, at least.
+pub(super) const LEAST_PIECE: usize = 4;
 /// Fewest triangles that can be a garment.
 pub const MIN_TRIANGLES: usize = 20;
 

@@ -199,10 +199,9 @@ impl Sheet {
         Seam { ends: seam.ends.map(|v| self.vertex_origin[v as usize]), ..*seam }
     }
 
-    /// All borders, in the order of [`Topology::boundary_loops`].
-    pub fn borders(&self) -> Vec<SheetBorder> {
-        let Ok(mesh) = TriMesh::new(self.positions.clone(), self.faces.clone()) else { return Vec::new() };
-        let borders = Topology::new(&mesh).boundary_loops.into_iter().map(|border| {
+    /// All borders, in the order of `topology`, which is the sheet's.
+    pub fn borders(&self, topology: &Topology) -> Vec<SheetBorder> {
+        let borders = topology.boundary_loops.iter().map(|border| {
             let distance = |a: u32, b: u32| norm(sub(self.positions[b as usize], self.positions[a as usize]));
             let farthest = |from: u32| {
                 let of = border.iter().map(|v| (*v, distance(from, *v)));

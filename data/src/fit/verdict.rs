@@ -15,6 +15,8 @@ use clothcombo_physics::vec3::{norm, sub};
 const NEAR_TIE: f64 = 6.0;
 /// Largest share of a garment that may lie inside the body where it is worn.
 const MOST_INSIDE: f64 = 0.25;
+/// Candidates that are looked at, the best first.
+const READ: usize = 8;
 /// A garment touches the body: a twentieth of it is nearer than this (m).
 const FARTHEST: f64 = 0.08;
 /// What lies on a part of the body is no farther from it, on average (m).
@@ -43,10 +45,10 @@ pub(super) fn implausibility(
         return Some("turned by 180°, though its neckline does not show its front there".into());
     }
     // Sleeves made for other arms miss these ones where a file says where it is; a place that was searched for must do without.
-    let missed = if candidate.placement.origin == Origin::Elsewhere { candidate.crossings.arms } else { 0 };
-    let crossings = candidate.crossings.others + missed;
-    if crossings > 0 {
-        return Some(format!("{crossings} bones of the body pass through the cloth"));
+    let missed = if candidate.placement.origin == Origin::Elsewhere { candidate.piercing.arms } else { 0 };
+    let piercing = candidate.piercing.others + missed;
+    if piercing > 0 {
+        return Some(format!("{piercing} bones of the body pass through the cloth"));
     }
     if candidate.rim_distance > WIDEST_RIM {
         return Some(format!(
@@ -107,7 +109,7 @@ impl Readings {
     pub fn new(candidates: &[Candidate], search: &Search, cloth: &Cloth) -> Self {
         let (mut believed, mut refused): (Vec<Candidate>, Vec<(Candidate, String)>) = Default::default();
         let mut is_near = false;
-        for candidate in candidates.iter().take(8) {
+        for candidate in candidates.iter().take(READ) {
             // What is far worse than one that is believed is not looked at.
             if believed.first().is_some_and(|best| candidate.score < best.score - NEAR_TIE) {
                 break;
@@ -198,7 +200,7 @@ pub(super) fn verdict(
     if candidate.worn_pieces > 1 {
         doubts.push(Doubt::Outfit { pieces: candidate.worn_pieces });
     }
-    if candidate.crossings.arms > 0 {
+    if candidate.piercing.arms > 0 {
         doubts.push(Doubt::Arms);
     }
     if taken.turn_degrees == 180.0 && settings.turn_degrees.is_none() && candidate.neck_drop.is_none() {
@@ -207,10 +209,9 @@ pub(super) fn verdict(
     // Those that are hinted at are alike in all candidates.
     let held = |c: &Candidate| (c.placement.arm_angle_degrees != 0.0, c.placement.leg_angle_degrees != 0.0);
     let otherwise = candidates.iter().find(|c| held(c) != held(&candidate));
-    if held(&candidate) != (false, false)
-        && otherwise.is_some_and(|other| other.score > candidate.score - LIMB_EVIDENCE)
-    {
-        doubts.push(Doubt::Limbs { taken });
+    let margin = otherwise.map_or(f64::MAX, |other| candidate.score - other.score);
+    if held(&candidate) != (false, false) && margin < LIMB_EVIDENCE {
+        doubts.push(Doubt::Limbs { taken, margin });
     }
     Ok(Verdict { placement: taken, doubts })
 }

@@ -55,6 +55,32 @@ impl Temporary {
         mem::forget(self);
     }
 
+    /// Gives this folder the name `target`. A folder that has it is set aside first and removed last, so that one of them is there
+    /// whatever happens.
+    ///
+    /// # Errors
+    /// When it cannot be renamed; what was there before is left as it was. When what was there cannot be removed.
+    pub fn replace(self, target: &Path) -> io::Result<()> {
+        let earlier = self.0.with_extension("old");
+        let had_earlier = target.exists();
+        if had_earlier {
+            if earlier.exists() {
+                // Of a process that was killed before it removed it.
+                fs::remove_dir_all(&earlier)?;
+            }
+            fs::rename(target, &earlier)?;
+        }
+        if let Err(reason) = fs::rename(&self.0, target) {
+            if had_earlier {
+                // The first error is the one worth telling.
+                let _ = fs::rename(&earlier, target);
+            }
+            return Err(reason);
+        }
+        self.keep();
+        if had_earlier { fs::remove_dir_all(&earlier) } else { Ok(()) }
+    }
+
     fn forget(&self) -> Option<(PathBuf, Option<PathBuf>)> {
         let mut all = TEMPORARY.lock().unwrap_or_else(PoisonError::into_inner);
         let own = all.iter().position(|(path, _)| *path == self.0)?;
@@ -91,7 +117,7 @@ fn remove(path: &Path, made: Option<&Path>) {
 }
 
 /// The outermost folder that would have to be made for `path` to lie in; none if all are there.
-pub fn first_missing_folder(path: &Path) -> Option<&Path> {
+fn first_missing_folder(path: &Path) -> Option<&Path> {
     let folders = path.ancestors().skip(1).filter(|folder| !folder.as_os_str().is_empty());
     folders.take_while(|folder| !folder.exists()).last()
 }
@@ -115,10 +141,17 @@ mod tests {
         fs::write(abandoned.path().join("part"), "x").unwrap();
         drop(abandoned);
         assert!(!at("d").exists());
-        let kept = Temporary::new(at("d/e/whole"));
-        fs::create_dir_all(kept.path()).unwrap();
-        kept.keep();
-        assert!(at("d/e/whole").is_dir());
+        for part in ["1", "2"] {
+            let kept = Temporary::new(at("d/e/half"));
+            fs::create_dir_all(kept.path()).unwrap();
+            fs::write(kept.path().join(part), part).unwrap();
+            kept.replace(&at("d/e/whole")).unwrap();
+        }
+        assert!(at("d/e/whole/2").exists() && !at("d/e/whole/1").exists());
+        assert_eq!(fs::read_dir(at("d/e")).unwrap().count(), 1);
+        // What cannot be replaced stays.
+        assert!(Temporary::new(at("d/e/none")).replace(&at("d/e/whole")).is_err());
+        assert!(at("d/e/whole/2").exists());
     }
 
     #[test]

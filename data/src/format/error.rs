@@ -8,7 +8,7 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum FileError {
     /// The system refuses.
-    #[error("{}: {reason}", path.display())]
+    #[error("{}: {reason}{}", path.display(), advice(reason))]
     Io {
         /// File or folder.
         path: PathBuf,
@@ -33,6 +33,17 @@ pub enum FileError {
         /// The place in it, what is wrong, and what to do.
         message: String,
     },
+}
+
+/// What to do about an error of the system that its text does not tell.
+fn advice(reason: &io::Error) -> &'static str {
+    match reason.kind() {
+        io::ErrorKind::FileTooLarge => "; hint: raise the limit on the size of files (ulimit -f)",
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
+            "; hint: make room on the disk, or write elsewhere"
+        }
+        _ => "",
+    }
 }
 
 impl FileError {

@@ -13,7 +13,7 @@ pub use write::{SceneMesh, encode_glb, save_glb};
 
 use super::polygon_mesh::{PolygonMesh, check_count};
 use buffers::{Buffers, DECOMPRESS};
-use document::{Document, Node, Primitive};
+use document::{Document, Header, Node, Primitive};
 use skin::Joints;
 use std::collections::HashMap;
 use std::path::Path;
@@ -26,16 +26,59 @@ const IDENTITY: Affine = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0,
 const COMPRESSIONS: [&str; 3] =
     ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"];
 
-/// Reads a glTF file; external buffers lie in the folder of `path`.
-pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<PolygonMesh, String> {
+/// Copies of a mesh, of which the document without the extension has one.
+const INSTANCING: &str = "EXT_mesh_gpu_instancing";
+
+/// How the names of extensions begin that do not change where a mesh is.
+const HARMLESS: [&str; 8] = [
+    "KHR_materials_",
+    "KHR_texture_",
+    "EXT_texture_",
+    "KHR_lights_",
+    "EXT_lights_",
+    "KHR_mesh_quantization",
+    "KHR_animation_pointer",
+    "KHR_xmp",
+];
+
+/// Why a document cannot be read as it is meant: what it needs is not known.
+fn unknown_extension(document: &Document) -> Option<String> {
+    let required = || document.extensions_required.iter();
+    if let Some(name) = required().find(|name| COMPRESSIONS.contains(&name.as_str())) {
+        return Some(format!("needs the extension {name}: {DECOMPRESS}"));
+    }
+    if document.extensions_used.iter().chain(required()).any(|name| name == INSTANCING) {
+        return Some(format!("has instances ({INSTANCING}); make them real before the export"));
+    }
+    let unknown = required().find(|name| HARMLESS.iter().all(|known| !name.starts_with(known)));
+    unknown.map(|name| format!("needs the extension {name}, which is not known; export without it"))
+}
+
+/// Reads a glTF file; external buffers lie in the folder of `path`. Of several meshes `only` names the one that is read.
+pub(super) fn parse(bytes: &[u8], path: &Path, only: Option<&str>) -> Result<PolygonMesh, String> {
     let (json, chunk) = if bytes.starts_with(b"glTF") { binary_chunks(bytes)? } else { (bytes, None) };
+    // The first version has other types everywhere.
+    let header: Header = serde_json::from_slice(json).map_err(|e| format!("glTF JSON: {e}"))?;
+    if header.asset.version.starts_with("1.") {
+        return Err(format!("glTF version {}; only version 2 is known", header.asset.version));
+    }
     let document: Document = serde_json::from_slice(json).map_err(|e| format!("glTF JSON: {e}"))?;
-    if let Some(name) = document.extensions_required.iter().find(|e| COMPRESSIONS.contains(&e.as_str())) {
-        return Err(format!("needs the extension {name}: {DECOMPRESS}"));
+    if let Some(why) = unknown_extension(&document) {
+        return Err(why);
     }
     let mut buffers = Buffers::new(&document, chunk, path.parent().unwrap_or(Path::new("")));
     let mut mesh = PolygonMesh::default();
-    let (placed, worlds) = placed_meshes(&document)?;
+    let (mut placed, worlds) = placed_meshes(&document)?;
+    if let (Some(name), 2..) = (only, placed.len()) {
+        let count = placed.len();
+        placed.retain(|mesh| mesh.is_named(name, &document));
+        if placed.len() != 1 {
+            return Err(format!(
+                "of its {count} meshes {} are named '{name}', where one must be; export that one alone",
+                placed.len()
+            ));
+        }
+    }
     for PlacedMesh { mesh: mesh_index, node, place } in placed {
         let source = document
             .meshes
@@ -93,6 +136,14 @@ struct PlacedMesh {
     place: Affine,
 }
 
+impl PlacedMesh {
+    fn is_named(&self, name: &str, document: &Document) -> bool {
+        let mesh = document.meshes.get(self.mesh).map(|mesh| &mesh.name);
+        let node = self.node.map(|node| &document.nodes[node].name);
+        mesh.into_iter().chain(node).any(|found| found.eq_ignore_ascii_case(name))
+    }
+}
+
 /// The meshes of the default scene with their world transforms, and those of all nodes; without scenes those of all root nodes,
 /// without nodes all.
 fn placed_meshes(document: &Document) -> Result<(Vec<PlacedMesh>, Vec<Affine>), String> {
@@ -102,9 +153,10 @@ fn placed_meshes(document: &Document) -> Result<(Vec<PlacedMesh>, Vec<Affine>), 
         let all = (0..document.meshes.len()).map(|mesh| PlacedMesh { mesh, node: None, place: IDENTITY });
         return Ok((all.collect(), worlds));
     }
-    let roots: Vec<usize> = match document.scenes.get(document.scene.unwrap_or(0)) {
-        Some(scene) => scene.nodes.clone(),
-        None => {
+    let roots: Vec<usize> = match (document.scene, document.scenes.get(document.scene.unwrap_or(0))) {
+        (_, Some(scene)) => scene.nodes.clone(),
+        (Some(scene), None) => return Err(format!("scene {scene} of {} is named", document.scenes.len())),
+        (None, None) => {
             let mut is_child = vec![false; nodes.len()];
             for child in nodes.iter().flat_map(|n| &n.children) {
                 if let Some(slot) = is_child.get_mut(*child) {

@@ -64,11 +64,15 @@ pub fn load_mesh(path: &Path) -> Result<PolygonMesh, FileError> {
 /// # Errors
 /// As [`load_mesh`].
 pub fn parse_mesh(bytes: &[u8], path: &Path) -> Result<PolygonMesh, FileError> {
+    parse_named(bytes, path, None)
+}
+
+fn parse_named(bytes: &[u8], path: &Path, only: Option<&str>) -> Result<PolygonMesh, FileError> {
     let content = match MeshFormat::detect(path, bytes) {
         Some(MeshFormat::Obj) => return Ok(ObjMesh::parse_bytes(bytes, path)?.into_polygon_mesh()),
         Some(MeshFormat::Ply) => ply::parse(bytes),
         Some(MeshFormat::Stl) => stl::parse(bytes),
-        Some(MeshFormat::Gltf) => gltf::parse(bytes, path),
+        Some(MeshFormat::Gltf) => gltf::parse(bytes, path, only),
         None => Err(way_out(path).unwrap_or_else(|| {
             "neither its name nor its content is that of a mesh; known are .obj, .ply, .stl, .gltf and .glb".into()
         })),
@@ -82,6 +86,14 @@ pub fn parse_mesh(bytes: &[u8], path: &Path) -> Result<PolygonMesh, FileError> {
 /// As [`load_mesh`], and if a face names a vertex twice.
 pub fn load_tri_mesh(path: &Path) -> Result<TriMesh, FileError> {
     load_mesh(path)?.to_tri_mesh(path)
+}
+
+/// The same of a body: of a glTF scene with several meshes the one that is named `body`.
+///
+/// # Errors
+/// As [`load_tri_mesh`], and if a scene has several meshes, and not one of that name.
+pub fn load_body_mesh(path: &Path) -> Result<TriMesh, FileError> {
+    parse_named(&read_limited(path)?, path, Some("body"))?.to_tri_mesh(path)
 }
 
 #[cfg(test)]

@@ -46,6 +46,9 @@ impl ObjMesh {
 
     /// As [`Self::parse`]. Names and comments may be in any encoding; numbers are ASCII.
     pub(super) fn parse_bytes(bytes: &[u8], path: &Path) -> Result<Self, FileError> {
+        if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
+            return Err(FileError::content(path)("UTF-16 text; save it as UTF-8 or ASCII"));
+        }
         let mut mesh = Self { groups: vec![String::new()], ..Self::default() };
         let mut group = 0;
         let mut number_of_group = HashMap::from([(String::new(), 0)]);

@@ -4,7 +4,7 @@
 
 use super::error::FileError;
 use crate::mesh::{Cuts, fan};
-use clothcombo_physics::mesh::TriMesh;
+use clothcombo_physics::mesh::{MeshError, TriMesh};
 use std::path::Path;
 use std::{fs, io};
 
@@ -34,6 +34,30 @@ impl PolygonMesh {
     /// Vertices without polygons yet.
     pub fn with_positions(positions: Vec<[f64; 3]>) -> Self {
         Self { positions, ..Self::default() }
+    }
+
+    /// A mesh in memory: `faces` of so many `corners` each, counted from 0.
+    ///
+    /// # Errors
+    /// [`MeshError`] for what no mesh file holds either: no face, a position that is not finite, a vertex that is not there.
+    pub fn from_faces(positions: Vec<[f64; 3]>, faces: &[u32], corners: usize) -> Result<Self, MeshError> {
+        let vertex_count = positions.len();
+        if faces.is_empty() {
+            return Err(MeshError::NoFaces);
+        }
+        if let Some(vertex) = positions.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
+            return Err(MeshError::NonFinitePosition { vertex, position: positions[vertex] });
+        }
+        if let Some(place) = faces.iter().position(|&v| v as usize >= vertex_count) {
+            return Err(MeshError::IndexOutOfRange {
+                face: place / corners,
+                vertex: faces[place],
+                vertex_count,
+            });
+        }
+        let mut mesh = Self::with_positions(positions);
+        faces.chunks_exact(corners).for_each(|face| mesh.push(face));
+        Ok(mesh)
     }
 
     /// Appends a polygon.

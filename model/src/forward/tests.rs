@@ -47,7 +47,8 @@ fn bones(shift: f64) -> Vec<[[f64; 4]; 3]> {
 fn body(shift: f64) -> BodyTensors {
     let shape: Vec<f32> = (0..DIMENSIONS.shape).map(|i| i as f32 - 1.5 + shift as f32).collect();
     let pose: Vec<f32> = (0..DIMENSIONS.pose).map(|i| 0.2 * i as f32 - 0.5 + shift as f32).collect();
-    BodyTensors::new(&shape, &pose, &bones(shift), &DIMENSIONS, &device()).expect("valid body")
+    BodyTensors::new(&shape, &pose, &bones(shift), &[0.1; 30 * DIMENSIONS.joints], &DIMENSIONS, &device())
+        .expect("valid body")
 }
 
 fn model(seed: u64) -> ClothCombo {
@@ -338,7 +339,17 @@ fn wrong_sizes_are_named() {
     let garment = host.tensors(&device);
     assert!(matches!(OutfitTensors::new(&[&garment], &[(0, 1)]), Err(ModelError::Outfit { garment: 1, .. })));
     assert!(matches!(OutfitTensors::new(&[&garment], &[(0, 0)]), Err(ModelError::Outfit { .. })));
-    assert!(BodyTensors::new(&[0.0; 3], &[0.0; 6], &bones(0.0), &DIMENSIONS, &device).is_err());
+    assert!(
+        BodyTensors::new(
+            &[0.0; 3],
+            &[0.0; 6],
+            &bones(0.0),
+            &[0.1; 30 * DIMENSIONS.joints],
+            &DIMENSIONS,
+            &device
+        )
+        .is_err()
+    );
     let config = ModelConfig { width: 0, ..config() };
     assert!(matches!(
         ClothCombo::new(&config, &DIMENSIONS, 0, &device),

@@ -8,7 +8,7 @@ mod contact_features;
 mod garment;
 mod outfit;
 
-pub use body::BodyTensors;
+pub use body::{BodyTensors, JOINT_FEATURES};
 pub use contact_features::ContactFeatureTensors;
 pub use garment::{GarmentArrays, GarmentTensors};
 pub use outfit::OutfitTensors;

@@ -5,7 +5,7 @@ use std::ops::Range;
 use burn::tensor::{Device, Tensor};
 
 use super::{GarmentTensors, matrix};
-use crate::error::ModelError;
+use crate::error::{ModelError, check_array};
 use crate::packing::Packing;
 
 /// Which garments press on which: one row per ordered pair.
@@ -32,6 +32,8 @@ pub struct OutfitTensors {
     pub skin_weights: Tensor<2>,
     /// Active joints of each garment, 0 or 1 `[M,J]`.
     pub joint_mask: Tensor<2>,
+    /// Thickness of what is worn below each vertex `[ΣV,1]` (cm, so that the numbers are about one); absent where nothing is.
+    pub thickness_below: Option<Tensor<2>>,
     pub(crate) packing: Packing,
     pub(crate) edges: Option<ForceEdges>,
 }
@@ -74,9 +76,25 @@ impl OutfitTensors {
             rest: stack(|garment| &garment.rest),
             skin_weights: stack(|garment| &garment.skin_weights),
             joint_mask: stack(|garment| &garment.joint_mask),
+            thickness_below: None,
             packing,
             edges,
         })
+    }
+
+    /// The same with the thickness of what is worn below each vertex `[ΣV]` (m); empty where nothing is.
+    ///
+    /// # Errors
+    /// Another number of vertices, or a number that is not finite.
+    pub fn with_thickness_below(self, thickness: &[f32]) -> Result<Self, ModelError> {
+        if thickness.is_empty() {
+            return Ok(Self { thickness_below: None, ..self });
+        }
+        let rows = self.vertex_count();
+        check_array("thickness below", thickness, rows, "[ΣV]")?;
+        let centimetres = thickness.iter().map(|t| t * 100.0).collect();
+        let tensor = matrix(centimetres, rows, 1, &self.rest.device());
+        Ok(Self { thickness_below: Some(tensor), ..self })
     }
 
     /// Every pair (i, j), i < j, of `count` garments.

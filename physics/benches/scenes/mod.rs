@@ -185,6 +185,7 @@ impl Scene {
             .map(|(energies, dressed)| SceneGarment {
                 energies: energies.clone(),
                 holding_reference: narrowed(dressed.rest.positions()),
+                thickness_below: Vec::new(),
                 pull_back: None,
                 weights,
             })

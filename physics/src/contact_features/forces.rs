@@ -21,8 +21,15 @@ pub(super) fn relaxing(
     rings: &Rings,
     posed: &[[f32; 3]],
 ) -> [Vec<[f64; 3]>; SCALES] {
-    let state =
-        GarmentState { posed, canonical: &[], holding_reference: &[], pull_back: None, gaps: &[], settings };
+    let state = GarmentState {
+        posed,
+        canonical: &[],
+        holding_reference: &[],
+        pull_back: None,
+        thickness_below: &[],
+        gaps: &[],
+        settings,
+    };
     let mut gradient = vec![zero(); posed.len()];
     let elastic = |term: &Term| matches!(term, Term::Strain | Term::Bending);
     for (term, energy) in garment.energies.terms().filter(|(term, _)| elastic(term)) {

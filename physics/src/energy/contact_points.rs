@@ -86,6 +86,16 @@ impl ContactPoints {
         }
     }
 
+    /// The mean of `values` `[V]` over the corners of a point; 0 where there are none.
+    #[inline(always)]
+    pub(super) fn mean<T: Real>(&self, values: &[T], point: usize) -> f64 {
+        if values.is_empty() {
+            return 0.0;
+        }
+        let corners = self.corners(point);
+        corners.iter().map(|v| values[v].to_f64()).sum::<f64>() * corners.weight()
+    }
+
     /// `gradient[corners] += weight·g` for the gradient `g` at a point.
     #[inline(always)]
     pub(super) fn add<T: Real>(&self, target: &mut Weighted<'_, T>, point: usize, g: [f64; 3]) {

@@ -55,6 +55,7 @@ impl<T: Real> SceneEnergy<T> {
             }
             for (point, (p, near)) in points.at(&posed[range], samples).iter().zip(near).enumerate() {
                 let sides = near.sides(to_f64(*p), within);
+                let epsilon = epsilon + points.mean(&garment.thickness_below, point);
                 let excess = sides.first().map_or(0.0, |(distance, _)| epsilon - distance);
                 if sides.len() > 1 && excess > 0.0 {
                     let force = 3.0 * weight * excess * excess;
@@ -69,9 +70,9 @@ impl<T: Real> SceneEnergy<T> {
     pub(crate) fn look_around(&self, posed: &[[T; 3]], memory: &mut BodyMemory, radius: f64) {
         let EnergySettings { body_collision_epsilon: epsilon, body_samples, distance, .. } = self.settings;
         for ((garment, range), near) in self.garments.iter().zip(self.ranges()).zip(memory) {
-            for (p, near) in
-                garment.energies.contact_points().at(&posed[range], body_samples).iter().zip(near)
-            {
+            let points = garment.energies.contact_points();
+            for (point, (p, near)) in points.at(&posed[range], body_samples).iter().zip(near).enumerate() {
+                let epsilon = epsilon + points.mean(&garment.thickness_below, point);
                 let mut see = |p| self.body.gap_near(p, distance, epsilon, near).gap.to_f64();
                 if see(*p) >= epsilon {
                     continue;

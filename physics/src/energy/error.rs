@@ -51,6 +51,20 @@ pub enum EnergyError {
         found: usize,
     },
 
+    /// What is worn below a garment does not fit the garment.
+    #[error(
+        "garment {garment} has {expected} vertices but {found} thicknesses of what is worn below; hint: pass one per vertex, \
+         or none"
+    )]
+    ThicknessBelow {
+        /// Index of the garment in the scene.
+        garment: usize,
+        /// Vertices of the garment.
+        expected: usize,
+        /// Thicknesses given.
+        found: usize,
+    },
+
     /// A pair of layers that does not exist.
     #[error(
         "layer pair {pair} joins garments {inner} and {outer} of a scene with {garments}; hint: garments are numbered \

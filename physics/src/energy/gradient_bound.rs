@@ -57,6 +57,7 @@ pub fn gradient_bound<T: Real>(
             reference: garment.holding_reference.iter().map(|p| to_f64(*p)).collect(),
             pull_back: garment.pull_back.as_deref(),
             contact_points: garment.energies.contact_points(),
+            thickness_below: garment.most_thickness(),
         });
     }
     let settings = &scene.settings;
@@ -67,7 +68,8 @@ pub fn gradient_bound<T: Real>(
             let nearest = scene.body.positions.get(scene.body.nearest_vertex(p) as usize);
             nearest.map_or(0.0, |q| distance_squared(to_f64(p), to_f64(*q)).sqrt())
         };
-        g.contact_points.at(&g.posed, settings.body_samples).iter().map(distance).fold(0.0, f64::max)
+        let points = g.contact_points.at(&g.posed, settings.body_samples);
+        points.iter().map(distance).fold(0.0, f64::max) + g.thickness_below
     };
     // A garment may be the inner one of some pairs and the outer one of others: their gradients add up.
     let over_pairs = |bound: &dyn Fn(&Deformed<'_>, &Deformed<'_>) -> f64| {
@@ -109,6 +111,7 @@ struct Deformed<'a> {
     reference: Vec<[f64; 3]>,
     pull_back: Option<&'a [HeightRow]>,
     contact_points: &'a ContactPoints,
+    thickness_below: f64,
 }
 
 impl Deformed<'_> {

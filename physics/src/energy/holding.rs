@@ -108,6 +108,7 @@ mod tests {
             canonical: canonical.positions(),
             holding_reference: rest.positions(),
             pull_back,
+            thickness_below: &[],
             gaps: &[],
             settings,
         }

@@ -21,11 +21,19 @@ pub struct SceneGarment<T: Real> {
     /// Heights before skinning as functions of posed positions `[V]`, which the holding energy then acts on
     /// ([`super::holding`]); `None`: it acts on canonical positions (the paper's form).
     pub pull_back: Option<Vec<HeightRow>>,
+    /// Thickness of what is worn below each vertex `[V]` (m) without being in the scene: the body is that much thicker there.
+    /// Empty: nothing is.
+    pub thickness_below: Vec<T>,
     /// Weight of every term; entries of layer terms are ignored.
     pub weights: TermMap<f64>,
 }
 
 impl<T: Real> SceneGarment<T> {
+    /// The largest thickness of what is worn below (m).
+    pub(super) fn most_thickness(&self) -> f64 {
+        self.thickness_below.iter().fold(0.0, |most, t| most.max(Real::to_f64(*t)))
+    }
+
     /// Whether `term` of this garment acts on canonical positions (before skinning).
     pub(super) fn is_canonical(&self, term: Term) -> bool {
         term == Term::Holding && self.pull_back.is_none()
@@ -101,6 +109,10 @@ impl<T: Real> SceneEnergy<T> {
             let (expected, found) = (g.energies.vertex_count(), g.holding_reference.len());
             if found != expected && g.energies.has_holding() {
                 return Err(EnergyError::HoldingReference { garment, expected, found });
+            }
+            let found = g.thickness_below.len();
+            if found != expected && found != 0 {
+                return Err(EnergyError::ThicknessBelow { garment, expected, found });
             }
         }
         let garments = self.garments.len();

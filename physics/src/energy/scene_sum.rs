@@ -239,6 +239,7 @@ impl<T: Real> SceneEnergy<T> {
                 canonical,
                 holding_reference: &garment.holding_reference,
                 pull_back: garment.pull_back.as_deref(),
+                thickness_below: &garment.thickness_below,
                 gaps: &[],
                 settings: &self.settings,
             },
@@ -258,13 +259,14 @@ impl<T: Real> SceneEnergy<T> {
         near: Option<&mut Vec<NearFaces>>,
     ) -> Vec<Gap<T>> {
         let EnergySettings { distance, body_samples, body_collision_epsilon, .. } = self.settings;
-        let points = self.garments[i].energies.contact_points().at(posed, body_samples);
+        let garment = &self.garments[i];
+        let points = garment.energies.contact_points().at(posed, body_samples);
         let points = points.par_iter().with_min_len(GRAIN / 4);
         let Some(near) = near else {
             return points.map(|p| self.body.gap(*p, distance)).collect();
         };
         near.resize_with(points.len(), NearFaces::default);
-        let reach = if exact { f64::INFINITY } else { body_collision_epsilon };
+        let reach = if exact { f64::INFINITY } else { body_collision_epsilon + garment.most_thickness() };
         points.zip(near).map(|(p, near)| self.body.gap_near(*p, distance, reach, near)).collect()
     }
 

@@ -94,7 +94,7 @@ fn object(kind: &Kind, number: usize, draw: &mut Draw) -> Object {
     };
     let placement = Placement {
         unit: draw.any(kind.units),
-        up: draw.any(&UpAxis::ALL),
+        up: draw.any(&UpAxis::USUAL),
         turn_degrees: draw.any(&[0.0, 90.0, 180.0, 270.0]),
         origin: Origin::Pelvis,
         translation: [0.0; 3],

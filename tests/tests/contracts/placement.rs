@@ -44,7 +44,7 @@ fn convention(rng: &mut ChaCha8Rng) -> Placement {
     let shift = rng.random_range(0.0..SHIFT) / norm(direction);
     Placement {
         unit: Unit::ALL[rng.random_range(0..Unit::ALL.len())],
-        up: UpAxis::ALL[rng.random_range(0..UpAxis::ALL.len())],
+        up: UpAxis::USUAL[rng.random_range(0..UpAxis::USUAL.len())],
         turn_degrees: 90.0 * f64::from(rng.random_range(0..4)),
         origin: Origin::Elsewhere,
         translation: scale(direction, shift),

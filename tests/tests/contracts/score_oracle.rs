@@ -73,6 +73,7 @@ fn all_eight_energies_equal_the_oracle() {
                 GarmentEnergies::<f64>::new(rest, &Topology::new(rest), &settings, true).unwrap(),
             ),
             holding_reference: rest.positions().to_vec(),
+            thickness_below: Vec::new(),
             pull_back: None,
             weights: TermMap::filled(1.0),
         });

@@ -125,6 +125,7 @@ fn print_plan(config: &Config) {
 fn trains(trains: Trains) -> &'static str {
     match trains {
         Trains::Single => "embedding, draping and skinning",
+        Trains::Draping => "draping and skinning, on the frozen embedding",
         Trains::Untangling => "untangling, on the frozen first stage",
         Trains::All => "both phases",
         Trains::Corrections => "corrections, on everything else frozen",

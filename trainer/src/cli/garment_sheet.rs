@@ -1,4 +1,4 @@
-//! A contact sheet: garments on the body they were made for, by category, in rows of equally many.
+//! A contact sheet: garments on the body they were made for, by category.
 
 use crate::picture::{BODY_COLOUR, Camera, Figure, Sheet, SheetRow, View, layer_colour, render_with_camera};
 use clothcombo_data::asset::{Body, Category, Garment};
@@ -6,12 +6,12 @@ use image::RgbImage;
 
 /// Most garments of a category.
 pub const PER_CATEGORY: usize = 8;
-/// Fewest and most garments in a row.
-const COLUMNS: [usize; 2] = [4, 8];
+/// Garments in a row.
+const COLUMNS: usize = 8;
 /// Sides of one picture (pixels).
 const CELL: [u32; 2] = [190, 200];
 
-/// Up to [`PER_CATEGORY`] garments of each category, seen from the front left; as many of them as fill rows evenly.
+/// Up to [`PER_CATEGORY`] garments of each category, seen from the front left.
 pub fn garment_sheet(body: &Body, garments: &[Garment]) -> RgbImage {
     let of = |category| garments.iter().filter(move |g: &&Garment| g.category == category).take(PER_CATEGORY);
     let mut cells: Vec<(Category, RgbImage)> = Vec::new();
@@ -41,8 +41,7 @@ pub fn garment_sheet(body: &Body, garments: &[Garment]) -> RgbImage {
             (category, render_with_camera(&figures, &camera, CELL))
         }));
     }
-    let columns = columns(cells.len());
-    let rows = cells.chunks_exact(columns.max(1)).map(|row| {
+    let rows = cells.chunks(COLUMNS).map(|row| {
         let mut names: Vec<String> =
             row.iter().map(|(category, _)| category.name().replace('_', " ")).collect();
         names.dedup();
@@ -55,30 +54,10 @@ pub fn garment_sheet(body: &Body, garments: &[Garment]) -> RgbImage {
     Sheet { rows: rows.collect(), ..Sheet::default() }.compose()
 }
 
-/// Garments in a row, of `count`: what shows most of them in full rows, and of that the widest.
-fn columns(count: usize) -> usize {
-    let [fewest, most] = COLUMNS;
-    match count {
-        _ if count <= most => count,
-        _ => (fewest..=most).max_by_key(|columns| (count / columns * columns, *columns)).unwrap_or(most),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use clothcombo_data::generate::{GarmentGenerator, GarmentSettings, mannequin};
-
-    #[test]
-    fn rows_are_full_and_leave_out_few() {
-        let rows = |count: usize| (columns(count), count / columns(count));
-        assert_eq!([1, 7, 8, 12, 48].map(rows), [(1, 1), (7, 1), (8, 1), (6, 2), (8, 6)]);
-        assert_eq!(columns(0), 0);
-        for count in 1..=48 {
-            let (columns, rows) = rows(count);
-            assert!(columns <= 8 && count - columns * rows <= 3, "{count}: {rows} rows of {columns}");
-        }
-    }
 
     #[test]
     fn every_cell_is_as_large_as_the_others() {
@@ -90,5 +69,8 @@ mod tests {
         let [one, two] = [&garments[..1], &garments].map(|some| garment_sheet(&body, some).dimensions());
         assert_eq!((one.1, one.0 < two.0), (two.1, true));
         assert!(garment_sheet(&body, &[]).width() < CELL[0]);
+        // Nine are a whole row and one more.
+        let nine: Vec<Garment> = garments.iter().cycle().take(9).cloned().collect();
+        assert!(garment_sheet(&body, &nine).height() >= 2 * CELL[1]);
     }
 }

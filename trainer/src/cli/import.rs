@@ -57,40 +57,9 @@ pub enum Source {
     Deepmimic(DeepmimicArguments),
 }
 
-/// Arguments of `import bvh`.
+/// What all recordings of a rig need to be moved to a body.
 #[derive(Args)]
-pub struct BvhArguments {
-    /// BVH files
-    #[arg(required = true)]
-    files: Vec<PathBuf>,
-    /// Body whose skeleton the motions are moved to: "mannequin" or a body npz
-    #[arg(long, default_value = "mannequin")]
-    body: String,
-    /// Frames per second kept
-    #[arg(long, default_value_t = 60.0, value_parser = positive)]
-    frame_rate: f64,
-    /// TOML file that names the joint of the rig for each body joint, for rigs whose names are not known
-    #[arg(long, value_name = "FILE")]
-    joints: Option<PathBuf>,
-    #[command(flatten)]
-    provenance: ProvenanceArguments,
-    /// Folder to write
-    #[arg(short, long, value_parser = folder_to_make())]
-    output: PathBuf,
-}
-
-/// Arguments of `import amc`.
-#[derive(Args)]
-pub struct AmcArguments {
-    /// AMC files, or folders that are searched for them
-    #[arg(required = true)]
-    inputs: Vec<PathBuf>,
-    /// Skeleton (.asf) of all motions [default: the one in the folder of each]
-    #[arg(long, value_name = "FILE")]
-    skeleton: Option<PathBuf>,
-    /// Frame rate of the motions, whose files do not say it (frames/s)
-    #[arg(long, value_name = "HZ", default_value_t = 120.0, value_parser = positive)]
-    rate: f64,
+struct RigArguments {
     /// Body whose skeleton the motions are moved to: "mannequin" or a body npz
     #[arg(long, default_value = "mannequin")]
     body: String,
@@ -105,6 +74,42 @@ pub struct AmcArguments {
     /// Folder to write
     #[arg(short, long, value_parser = folder_to_make())]
     output: PathBuf,
+}
+
+impl RigArguments {
+    fn settings(&self) -> RetargetSettings {
+        RetargetSettings {
+            thinning: Thinning { frame_rate: self.frame_rate, static_threshold: 0.0 },
+            provenance: self.provenance.provenance(),
+            body_file: Some(PathBuf::from(&self.body)),
+        }
+    }
+}
+
+/// Arguments of `import bvh`.
+#[derive(Args)]
+pub struct BvhArguments {
+    /// BVH files
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
+    #[command(flatten)]
+    rig: RigArguments,
+}
+
+/// Arguments of `import amc`.
+#[derive(Args)]
+pub struct AmcArguments {
+    /// AMC files, or folders that are searched for them
+    #[arg(required = true)]
+    inputs: Vec<PathBuf>,
+    /// Skeleton (.asf) of all motions [default: the one in the folder of each]
+    #[arg(long, value_name = "FILE")]
+    skeleton: Option<PathBuf>,
+    /// Frame rate of the motions, whose files do not say it (frames/s)
+    #[arg(long, value_name = "HZ", default_value_t = 120.0, value_parser = positive)]
+    rate: f64,
+    #[command(flatten)]
+    rig: RigArguments,
 }
 
 /// Where motions come from, for their files and the manifest.
@@ -256,26 +261,16 @@ pub fn run(source: &Source) -> Result<(), Report> {
         bar.set_message(what.to_owned());
     };
     let summary = match source {
-        Source::Bvh(a) => {
-            let body = load_body(&a.body, 0)?;
-            let settings = RetargetSettings {
-                thinning: Thinning { frame_rate: a.frame_rate, static_threshold: 0.0 },
-                provenance: a.provenance.provenance(),
-                body_file: Some(PathBuf::from(&a.body)),
-            };
-            import_bvh(&a.files, &body, &a.output, &settings, a.joints.as_deref(), &mut progress)
-                .into_diagnostic()?
+        Source::Bvh(BvhArguments { files, rig }) => {
+            let body = load_body(&rig.body, 0)?;
+            let joints = rig.joints.as_deref();
+            import_bvh(files, &body, &rig.output, &rig.settings(), joints, &mut progress).into_diagnostic()?
         }
-        Source::Amc(a) => {
-            let body = load_body(&a.body, 0)?;
-            let retarget = RetargetSettings {
-                thinning: Thinning { frame_rate: a.frame_rate, static_threshold: 0.0 },
-                provenance: a.provenance.provenance(),
-                body_file: Some(PathBuf::from(&a.body)),
-            };
-            let settings = AmcSettings { retarget, rate: a.rate, skeleton: a.skeleton.clone() };
-            import_amc(&a.inputs, &body, &a.output, &settings, a.joints.as_deref(), &mut progress)
-                .into_diagnostic()?
+        Source::Amc(AmcArguments { inputs, skeleton, rate, rig }) => {
+            let body = load_body(&rig.body, 0)?;
+            let settings = AmcSettings { retarget: rig.settings(), rate: *rate, skeleton: skeleton.clone() };
+            let joints = rig.joints.as_deref();
+            import_amc(inputs, &body, &rig.output, &settings, joints, &mut progress).into_diagnostic()?
         }
         Source::Smplx(a) => {
             let limit = if a.components == 0 { usize::MAX } else { a.components };

@@ -7,7 +7,9 @@ use crate::cli::verbosity::spinner;
 use crate::inference::UniqueNames;
 use crate::inference::output::Staged;
 use crate::picture::{DressedRow, draw_dressed, save_png};
-use crate::score::{DrapedGarment, Score, ScoreDistance, ScoreError, load_body, load_garment, score};
+use crate::score::{
+    DrapedGarment, NamedMesh, Score, ScoreDistance, ScoreError, checked_body, checked_garment, score,
+};
 use crate::system::paths::lossy;
 use clap::Parser;
 use clothcombo_data::format::obj::MovedObj;
@@ -112,7 +114,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     let inputs: Vec<PathBuf> =
         [&arguments.body].into_iter().chain(&arguments.garments).chain(&arguments.rest).cloned().collect();
     let staged = Staged::new(&arguments.output, arguments.replace, &inputs)?;
-    let body = load_body(&arguments.body)?;
+    let body = checked_body(NamedMesh::load_body(&arguments.body)?)?;
     let garments = load_garments(arguments, &body)?;
     let surface = Surface::from_mesh(&body);
     let rest: Vec<RestGarment> = garments.iter().map(|g| RestGarment::new(&g.rest)).collect();
@@ -182,9 +184,15 @@ fn load_garments(arguments: &Arguments, body: &TriMesh) -> Result<Vec<Garment>, 
     let mut garments: Vec<Garment> = Vec::with_capacity(draped.len());
     let mut names = UniqueNames::default();
     for (i, path) in draped.iter().enumerate() {
-        let (name, rest, draped) = load_garment(rest.get(i).unwrap_or(path), path, body)?;
+        let (rest, draped) = (NamedMesh::load(rest.get(i).unwrap_or(path))?, NamedMesh::load(path)?);
+        let name = checked_garment(&rest, &draped, body)?;
         // Two files of one name from two folders must not overwrite each other.
-        garments.push(Garment { path: path.clone(), name: names.take(&name), rest, draped });
+        garments.push(Garment {
+            path: path.clone(),
+            name: names.take(&name),
+            rest: rest.mesh,
+            draped: draped.mesh,
+        });
     }
     Ok(garments)
 }

@@ -13,7 +13,7 @@ use std::path::PathBuf;
     after_help = "Files are OBJ meshes in metres, y up; quads and polygons are cut into triangles. A draped mesh has the\n\
                   vertices and faces of its rest mesh.\n\n\
                   Example (inner to outer):\n  clothcombo score --body body.obj --rest rest/tee.obj rest/coat.obj \
-                  --garments draped/tee.obj draped/coat.obj --json"
+                  --draped draped/tee.obj draped/coat.obj --json"
 )]
 pub struct Arguments {
     /// The posed body
@@ -23,7 +23,7 @@ pub struct Arguments {
     #[arg(long, num_args = 1.., required = true, value_name = "OBJ")]
     rest: Vec<PathBuf>,
     /// Draped meshes, in the same order
-    #[arg(long, visible_alias = "garments", num_args = 1.., required = true, value_name = "OBJ")]
+    #[arg(long, num_args = 1.., required = true, value_name = "OBJ")]
     draped: Vec<PathBuf>,
     /// The meshes before skinning, in the same order: adds the holding energy against the rest meshes
     #[arg(long, num_args = 1.., value_name = "OBJ")]

@@ -40,7 +40,7 @@ use std::rc::Rc;
         clothcombo-train --resume runs/wide/checkpoints/step-00004000\n  \
         clothcombo-train --resume runs/wide --set stages.2.steps=9000 --allow-config-change stages\n\n\
         Ctrl-C, SIGTERM, SIGHUP or SIGUSR1 saves a checkpoint and exits 0; a second Ctrl-C or SIGTERM ends at once. Relative paths in \
-        a configuration are relative to the folder in which the run is started; it resumes from any."
+        a configuration lie beside it if they are there, else in the folder in which the run is started; it resumes\n        from any."
 )]
 pub struct Arguments {
     /// Configuration file (TOML); optional with --resume --run-dir, which use the run's own

@@ -184,8 +184,8 @@ pub struct PoseConfig {
     pub remove_heading: bool,
 }
 
-/// A bank of training poses and what it consists of; the shares sum to 1. None intersects itself beyond
-/// `max_self_intersection`.
+/// A bank of training poses and what it consists of; the shares sum to 1. Each is drawn again until it
+/// intersects itself no more than `max_self_intersection`, at most 64 times; then the least intersecting one stays.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PoseBankConfig {

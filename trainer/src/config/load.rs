@@ -118,6 +118,13 @@ pub fn parse(text: &str, path: &Path, overrides: &[String]) -> Result<Config, Co
         Some(problem) => {
             let is_in_a_file = of_the_files.as_ref() == Some(&problem);
             let (place, what, hint) = problem;
+            let sets = |setting: &&String| {
+                setting.split('=').next().is_some_and(|key| place.starts_with(key.trim()))
+            };
+            if let (false, Some(setting)) = (is_in_a_file, overrides.iter().rev().find(sets)) {
+                let message = format!("{place} {what}; hint: {hint}");
+                return Err(ConfigError::BadOverride { setting: shortened(setting), message });
+            }
             let Place { source_code, span } = sources.place_of(&place);
             let span = span.filter(|_| is_in_a_file);
             Err(ConfigError::Inconsistent { place, what, hint, source_code, span })
@@ -263,6 +270,19 @@ mod tests {
         }
         let list = load(written(SMALL).path(), &["losses.body_collision.samples=[]".to_owned()]);
         assert!(list.unwrap_err().to_string().contains("one name"));
+    }
+
+    #[test]
+    fn garments_below_need_networks_that_see_them() {
+        let load = |settings: &[&str]| {
+            load(written(SMALL).path(), &settings.iter().map(|s| (*s).to_owned()).collect::<Vec<_>>())
+        };
+        let unseen = load(&["stages.0.below=2"]).unwrap_err().to_string();
+        assert!(unseen.contains("do not see what is worn below"), "{unseen}");
+        assert_eq!(
+            load(&["stages.0.below=2", "model.surroundings=8"]).unwrap().layer_thickness(),
+            Some(0.002)
+        );
     }
 
     #[test]

@@ -287,7 +287,7 @@ impl LossesConfig {
     }
 
     /// What is wrong, as (key, what, hint).
-    pub(super) fn problem(&self) -> Option<(String, String, String)> {
+    pub fn problem(&self) -> Option<(String, String, String)> {
         let weights = Term::ALL.into_iter().map(|t| (format!("losses.{}.weight", t.name()), self.weight(t)));
         let mut weights = weights.chain([("losses.single_garments".to_owned(), &self.single_garments)]);
         let is_weight = |w: f64| w >= 0.0 && w.is_finite();

@@ -86,6 +86,11 @@ impl Config {
         self.stages.iter().map(|s| s.steps).sum()
     }
 
+    /// How thick a garment is for those above it (m), if the networks ask: the distance that the layer collision keeps.
+    pub fn layer_thickness(&self) -> Option<f64> {
+        (self.model.surroundings > 0).then_some(self.losses.layer_collision.epsilon)
+    }
+
     /// Seed of the scenes that are scored.
     pub fn validation_seed(&self) -> u64 {
         self.validation.seed.unwrap_or(self.seed)
@@ -100,6 +105,13 @@ impl Config {
         for (i, stage) in self.stages.iter().enumerate() {
             if let Some((key, what, hint)) = stage.problem() {
                 return Some((format!("stages[{i}].{key}"), what, hint));
+            }
+            if stage.below > 0 && self.model.surroundings == 0 {
+                return Some((
+                    format!("stages[{i}].below"),
+                    "the networks do not see what is worn below".into(),
+                    "set model.surroundings, for example to 64, or below = 0".into(),
+                ));
             }
             if stage.trains == Trains::Corrections && self.model.corrections == 0 {
                 return Some((

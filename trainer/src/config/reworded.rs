@@ -21,5 +21,15 @@ pub(super) fn present_name(key: &str) -> &str {
 /// The message of a parser in words that help.
 pub(super) fn reworded(message: &str) -> String {
     let known = REWORDED.iter().find(|(theirs, _)| message.contains(theirs));
-    known.map_or(message, |(_, ours)| ours).to_owned()
+    let message = known.map_or(message, |(_, ours)| ours);
+    // Names of types are the code's.
+    let words: Vec<&str> = message.split(' ').collect();
+    let said = |at: usize| match (at.checked_sub(1).map(|before| words[before]), words[at]) {
+        (Some("struct"), _) => None,
+        (_, "struct") => Some("a table"),
+        (_, "u64" | "u32" | "usize") => Some("a whole number"),
+        (_, "f64" | "f32") => Some("a number"),
+        (_, word) => Some(word),
+    };
+    (0..words.len()).filter_map(said).collect::<Vec<_>>().join(" ")
 }

@@ -11,6 +11,9 @@ use serde::{Deserialize, Serialize};
 pub enum Trains {
     /// Embedding, draping and skinning, on single garments (the paper's pre-training).
     Single,
+    /// Draping and skinning on single garments; the embedding stays as it is, is computed once for every garment and costs nothing
+    /// more, which halves a step.
+    Draping,
     /// The untangling network on the frozen first stage.
     Untangling,
     /// The networks of both phases end to end.
@@ -23,14 +26,14 @@ impl Trains {
     /// How far the forward pass goes.
     pub fn mode(self) -> Mode {
         match self {
-            Self::Single => Mode::Single,
+            Self::Single | Self::Draping => Mode::Single,
             Self::Untangling | Self::All | Self::Corrections => Mode::Layered,
         }
     }
 
-    /// Whether the first stage stays as it is.
+    /// Whether some networks stay as they are: the embedding among them.
     pub fn freezes(self) -> bool {
-        matches!(self, Self::Untangling | Self::Corrections)
+        matches!(self, Self::Draping | Self::Untangling | Self::Corrections)
     }
 }
 
@@ -57,6 +60,10 @@ pub struct StageConfig {
     /// Fewest and most layers of a scene; each step draws a number between them, all equally likely.
     #[serde(default = "one_layer")]
     pub layers: [usize; 2],
+    /// Garments below those of a scene at most, of which only the thickness counts (`model.surroundings`): a scene of an outfit of
+    /// one to so many garments and one more, and a place in it, are drawn. 0, the default, drapes all on the bare body.
+    #[serde(default)]
+    pub below: usize,
     /// Fraction of the stage over which the most layers of a scene grow from the fewest to the most of `layers`, in equal
     /// parts. 0, the default, allows the most at once; 0.5 lets pairs settle before whole outfits pull at the networks.
     #[serde(default)]
@@ -135,7 +142,7 @@ impl StageConfig {
             says("steps", "is more than a trillion", "the paper trains some hundred thousand")
         } else if low == 0 || low > high {
             says("layers", "is not a range [fewest, most] of at least one layer", "for example [1, 6]")
-        } else if self.trains == Trains::Single && high > 1 {
+        } else if self.trains.mode() == Mode::Single && high > 1 {
             says(
                 "layers",
                 "single-garment training has one layer",
@@ -143,7 +150,7 @@ impl StageConfig {
             )
         } else if self.trains == Trains::Untangling && low < 2 {
             says("layers", "a single garment has nothing to untangle", "use at least 2 layers")
-        } else if high > MOST_LAYERS {
+        } else if high + self.below > MOST_LAYERS {
             says("layers", "are more garments than anyone wears", "the paper goes up to 6, 32 are allowed")
         } else if !(0.0..=1.0).contains(&self.layer_curriculum) {
             says("layer_curriculum", "is not a fraction of the stage", "for example 0.5; 0 switches it off")

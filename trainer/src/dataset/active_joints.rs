@@ -7,6 +7,8 @@ use clothcombo_data::asset::Body;
 pub struct ActiveJoints {
     /// Indices into the body's joints, ascending.
     pub indices: Vec<usize>,
+    /// Of every active joint the nearest active joint above it, as a position in `indices`.
+    pub parents: Vec<Option<usize>>,
     /// Of every joint of the body: the position in `indices` of the joint that takes its weight.
     taken_by: Vec<usize>,
 }
@@ -42,7 +44,12 @@ impl ActiveJoints {
 
     fn of(body: &Body, indices: Vec<usize>) -> Self {
         let taken_by = heirs(&body.parents, &indices);
-        Self { indices, taken_by }
+        let position = |joint: usize| indices.iter().position(|&j| j == joint);
+        let above = |&joint: &usize| {
+            std::iter::successors(body.parents[joint], |&j| body.parents[j]).find_map(position)
+        };
+        let parents = indices.iter().map(above).collect();
+        Self { indices, parents, taken_by }
     }
 
     /// Number of active joints.

@@ -30,6 +30,8 @@ pub struct Dataset {
     pub poses: PoseLibrary,
     /// Which garments of a scene have layer losses with each other (`model.graph`).
     pub graph: Graph,
+    /// How thick a garment is for those above it (m), if the networks ask.
+    pub layer_thickness: Option<f64>,
     /// Memory for what is kept of garments and can be made again: garments of a streamed dataset, tensors, embeddings. A
     /// device with memory of its own has a budget of its own.
     pub memory: Arc<MemoryBudget>,
@@ -148,6 +150,7 @@ impl Dataset {
             split,
             poses,
             graph: config.model.graph,
+            layer_thickness: config.layer_thickness(),
             memory,
             shape_count,
             shape_range: config.data.shape_range,

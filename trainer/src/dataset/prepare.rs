@@ -3,6 +3,7 @@
 use super::active_joints::ActiveJoints;
 use super::contents::Dataset;
 use super::error::DatasetError;
+use super::pose_features::joint_features;
 use super::prepared_garment::PreparedGarment;
 use super::sampling::{BodySample, SceneSample};
 use super::skinning::skinning_transforms;
@@ -23,6 +24,8 @@ pub struct PreparedBody {
     pub pose: Vec<f32>,
     /// World transforms of the active joints relative to the T-pose.
     pub bones: Vec<[[f64; 4]; 3]>,
+    /// What each active joint knows of the pose around it, `[J, 30]`.
+    pub joint_features: Vec<f32>,
     /// Canonical start positions of all garments, `[ΣV, 3]`.
     pub start: Vec<[f32; 3]>,
     /// The losses of this scene.
@@ -37,6 +40,8 @@ pub struct PreparedScene {
     pub garments: Vec<Arc<PreparedGarment>>,
     /// Pairs (inner, outer) of positions in `garments` that interact: those of [`contacts`].
     pub contacts: Vec<(usize, usize)>,
+    /// Thickness of what is worn below every vertex `[ΣV]` (m); empty where nothing is, or the networks do not ask.
+    pub thickness_below: Vec<f32>,
     /// Bodies.
     pub bodies: Vec<PreparedBody>,
     /// Weight of the losses of single garments, in addition to those of the outfit.
@@ -52,6 +57,23 @@ impl PreparedScene {
     /// Initial skinning of every vertex on the first body, canonical → posed, `[ΣV]`.
     pub fn skinning_transforms(&self) -> Vec<Transform> {
         skinning_transforms(&self.garments, &self.bodies[0].bones)
+    }
+
+    /// The energy on `body` of every garment by itself, what is worn below it being part of the body.
+    pub fn energy_of_singles(&self, body: &PreparedBody) -> SceneEnergy<f32> {
+        let mut energy = body.energy.without_layers();
+        if !self.thickness_below.is_empty() {
+            let below = self.parts(&self.thickness_below);
+            let garments = energy.garments.iter_mut().zip(below);
+            garments.for_each(|(garment, below)| garment.thickness_below = below.to_vec());
+        }
+        energy
+    }
+
+    /// Thickness of what of that is no garment of the scene `[ΣV]` (m); empty where nothing is.
+    pub fn thickness_of_unseen(&self) -> Vec<f32> {
+        let garments = &self.bodies[0].energy.garments;
+        garments.iter().flat_map(|garment| &garment.thickness_below).copied().collect()
     }
 
     /// The first body in f64, for exact distances and intersections.
@@ -74,16 +96,19 @@ pub fn prepare(
     sample: SceneSample,
     run_progress: f64,
 ) -> Result<PreparedScene, DatasetError> {
-    let garments =
-        sample.garments.iter().map(|&g| dataset.garments.garment(g)).collect::<Result<Vec<_>, _>>()?;
+    let read = |indices: &[usize]| -> Result<Vec<Arc<PreparedGarment>>, DatasetError> {
+        indices.iter().map(|&g| dataset.garments.garment(g)).collect()
+    };
+    let (garments, below) = (read(&sample.garments)?, read(&sample.below)?);
     let builder = SceneBuilder {
         body: &dataset.body,
         joints: dataset.joints(),
         features: &|pose, joints| dataset.poses.features(pose, joints),
         losses,
         graph: dataset.graph,
+        layer_thickness: dataset.layer_thickness,
     };
-    Ok(builder.build(sample, garments, run_progress))
+    Ok(builder.build(sample, garments, &below, run_progress))
 }
 
 /// Everything but the garments and the bodies that a scene is prepared with.
@@ -98,10 +123,12 @@ pub struct SceneBuilder<'a> {
     pub losses: &'a LossesConfig,
     /// Which garments have layer losses with each other.
     pub graph: Graph,
+    /// How thick a garment is for those above it (m), if the networks ask.
+    pub layer_thickness: Option<f64>,
 }
 
 impl SceneBuilder<'_> {
-    /// Prepares `sample`, of `garments`; loss weights are taken at `run_progress`.
+    /// Prepares `sample`, of `garments` worn over those `below`; loss weights are taken at `run_progress`.
     ///
     /// # Panics
     /// If a shape or pose is longer than the body allows.
@@ -109,20 +136,32 @@ impl SceneBuilder<'_> {
         &self,
         sample: SceneSample,
         garments: Vec<Arc<PreparedGarment>>,
+        below: &[Arc<PreparedGarment>],
         run_progress: f64,
     ) -> PreparedScene {
         let contacts = contacts(self.graph, &garments);
+        // What is there as geometry pushes as geometry.
+        let unseen = |garment: &Arc<PreparedGarment>| match self.layer_thickness.filter(|_| !below.is_empty())
+        {
+            Some(each) => garment.thickness_of(&below.iter().collect::<Vec<_>>(), self.body, each),
+            None => Vec::new(),
+        };
+        let unseen: Vec<Vec<f32>> = garments.iter().map(unseen).collect();
+        let each = self.layer_thickness;
+        let thickness_below =
+            each.map_or_else(Vec::new, |each| thickness_below(&garments, below, self.body, each));
         let settings =
             EnergySettings { repulsion_sample: sample.repulsion_sample, ..self.losses.energy_settings() };
         let bodies = sample
             .bodies
             .iter()
-            .map(|body| self.on_body(&garments, &contacts, body, &settings, run_progress))
+            .map(|body| self.on_body(&garments, &unseen, &contacts, body, &settings, run_progress))
             .collect();
         PreparedScene {
             sample,
             garments,
             contacts,
+            thickness_below,
             bodies,
             single_garments: self.losses.single_garments.at(run_progress),
         }
@@ -131,6 +170,7 @@ impl SceneBuilder<'_> {
     fn on_body(
         &self,
         garments: &[Arc<PreparedGarment>],
+        unseen: &[Vec<f32>],
         contacts: &[(usize, usize)],
         body: &BodySample,
         settings: &EnergySettings,
@@ -150,14 +190,16 @@ impl SceneBuilder<'_> {
         let scene_garments = garments
             .iter()
             .zip(&starts)
+            .zip(unseen)
             .zip(weights.garments)
-            .map(|((g, start), weights)| SceneGarment {
+            .map(|(((g, start), below), weights)| SceneGarment {
                 energies: g.energies.clone(),
                 holding_reference: match losses.holding.relative {
                     true => start.clone(),
                     false => g.garment.rest.positions().iter().map(|p| p.map(|v| v as f32)).collect(),
                 },
                 pull_back: None,
+                thickness_below: below.clone(),
                 weights,
             })
             .collect();
@@ -174,11 +216,30 @@ impl SceneBuilder<'_> {
         PreparedBody {
             shape: body.shape.iter().map(|v| *v as f32).collect(),
             pose: (self.features)(&body.pose, &self.joints.indices),
+            joint_features: joint_features(&bones, &self.joints.parents),
             bones,
             start: starts.concat(),
             energy: Arc::new(energy),
         }
     }
+}
+
+/// Thickness (m) of what is worn below every vertex of `garments`, inner → outer `[ΣV]`: of those `below` them all and of those
+/// nearer to the body, `each` as thick; empty where nothing is.
+pub fn thickness_below(
+    garments: &[Arc<PreparedGarment>],
+    below: &[Arc<PreparedGarment>],
+    body: &Body,
+    each: f64,
+) -> Vec<f32> {
+    if garments.len() + below.len() < 2 {
+        return Vec::new();
+    }
+    let inside: Vec<_> = below.iter().chain(garments).collect();
+    let of = |(i, garment): (usize, &Arc<PreparedGarment>)| {
+        garment.thickness_of(&inside[..below.len() + i], body, each)
+    };
+    garments.iter().enumerate().flat_map(of).collect()
 }
 
 /// Pairs (inner, outer) of `garments`, inner → outer, that interact: all in the full graph, else those whose rest boxes are near

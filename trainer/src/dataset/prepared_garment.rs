@@ -1,10 +1,10 @@
 //! A garment with everything that does not change during training.
 
-use clothcombo_data::asset::Garment;
+use clothcombo_data::asset::{Body, Footprint, Garment};
 use clothcombo_physics::contact_features::Rings;
 use clothcombo_physics::energy::GarmentEnergies;
 use rayon::prelude::*;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// A garment with everything that does not change during training, but for DiffusionNet's operators
 /// ([`GarmentStore::operators`](super::GarmentStore::operators)), which only the device needs.
@@ -19,6 +19,7 @@ pub struct PreparedGarment {
     pub skin_weights: Vec<f32>,
     /// Shape displacement per unit β, `[V, 3, K]` (m), K being the shape components of the body; empty without shape transfer.
     pub shape_directions: Vec<f32>,
+    pub(super) footprint: OnceLock<Footprint>,
 }
 
 /// Constants of the energies per vertex (bytes), and its neighbourhoods; measured on garments of 8,000 vertices.
@@ -48,6 +49,16 @@ impl PreparedGarment {
                 })
             })
             .collect()
+    }
+
+    /// Where it lies on `body`, the one it was made for; computed when first asked for.
+    fn footprint(&self, body: &Body) -> &Footprint {
+        self.footprint.get_or_init(|| Footprint::new(&self.garment, body))
+    }
+
+    /// Thickness (m) of what is worn below each vertex `[V]`, where every garment of `below` is `each` thick (m).
+    pub fn thickness_of(&self, below: &[&Arc<Self>], body: &Body, each: f64) -> Vec<f32> {
+        self.footprint(body).thickness_of(below.iter().map(|garment| garment.footprint(body)), each)
     }
 
     /// About how much memory it takes (bytes).

@@ -195,6 +195,7 @@ impl Preprocessor {
             shape_directions: binding.shape_directions,
             energies: Arc::new(energies),
             rings: Rings::new(&topology),
+            footprint: OnceLock::new(),
             garment,
         })
     }

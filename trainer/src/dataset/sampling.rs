@@ -26,6 +26,8 @@ pub struct BodySample {
 pub struct SceneSample {
     /// Indices into the dataset, inner → outer.
     pub garments: Vec<usize>,
+    /// Garments worn below all of them that are not draped: only their thickness counts.
+    pub below: Vec<usize>,
     /// Bodies.
     pub bodies: Vec<BodySample>,
     /// Number of the random sample of pairs that the repulsion looks at (`losses.repulsion.subset`): another one in every
@@ -66,7 +68,7 @@ fn shape(dataset: &Dataset, rng: &mut ChaCha8Rng) -> Vec<f64> {
 
 /// A scene that is scored: always by the same sample of pairs.
 fn scored(garments: Vec<usize>, body: BodySample) -> SceneSample {
-    SceneSample { garments, bodies: vec![body], repulsion_sample: 0 }
+    SceneSample { garments, below: Vec::new(), bodies: vec![body], repulsion_sample: 0 }
 }
 
 /// Streams of the further scenes of a step lie this far apart; a run has fewer steps.
@@ -77,7 +79,16 @@ pub fn sample_training(dataset: &Dataset, seed: u64, step: u64, scene: usize, pl
     let mut rng = generator(seed, step + scene as u64 * FURTHER_SCENE);
     let [low, high] = plan.stage.layers_at(plan.progress);
     let layers = rng.random_range(low..=high);
-    let garments = garments(&dataset.split.training, layers, &mut rng);
+    // The place of the garments in an outfit: as many below as there would be.
+    let below = match plan.stage.below {
+        0 => 0,
+        most => {
+            let outfit = rng.random_range(1..=most + 1);
+            rng.random_range(0..outfit)
+        }
+    };
+    let mut garments = garments(&dataset.split.training, below + layers, &mut rng);
+    let below = garments.drain(..below).collect();
     let scale = plan.stage.pose_scale.at(plan.progress);
     let bodies = (0..plan.stage.bodies)
         .map(|_| BodySample {
@@ -85,7 +96,7 @@ pub fn sample_training(dataset: &Dataset, seed: u64, step: u64, scene: usize, pl
             pose: dataset.poses.sample_training(scale, &mut rng),
         })
         .collect();
-    SceneSample { garments, bodies, repulsion_sample: rng.random() }
+    SceneSample { garments, below, bodies, repulsion_sample: rng.random() }
 }
 
 /// Its block of streams lies behind those of the validation groups.

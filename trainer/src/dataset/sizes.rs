@@ -2,14 +2,14 @@
 
 use super::split::{GarmentPurpose, purpose};
 use super::{Dataset, DatasetError, GarmentSource, PreparedGarment, load_body};
-use crate::config::Config;
+use crate::config::{Config, DataConfig};
 use clothcombo_data::asset::{BODY_JOINT_COUNT, Body};
 use rayon::prelude::*;
 
 /// What of its data a run's memory depends on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DataSizes {
-    /// Vertices of every garment that a run reads: not of those that are kept for the final test.
+    /// Vertices of every garment that a run reads: with a cache not of those that are kept for the final test.
     pub vertices: Vec<usize>,
     /// Joints the networks see.
     pub joints: usize,
@@ -26,14 +26,20 @@ pub struct DataSizes {
 /// SMPL-X: vertices, triangles, joints.
 const SMPL_X: [usize; 3] = [10_475, 20_908, 55];
 
+/// Whether garments that are kept for the final test are loaded, too: without a cache all are.
+fn reads_tests(config: &DataConfig) -> bool {
+    config.cache.folder.is_none()
+}
+
 /// Bytes of what is known of a garment without reading it: name, provenance, keys, where its file is.
 const GARMENT_INFO: usize = 1536;
 
 impl DataSizes {
-    /// Those of data that is loaded.
-    pub fn of(dataset: &Dataset) -> Self {
+    /// Those of data that `config` names and that is loaded.
+    pub fn of(dataset: &Dataset, config: &DataConfig) -> Self {
         let split = &dataset.split;
-        let read = split.training.iter().chain(&split.validation);
+        let tests = if reads_tests(config) { &split.test[..] } else { &[] };
+        let read = split.training.iter().chain(&split.validation).chain(tests);
         let vertices = read.map(|i| dataset.garments.info(*i).vertices).collect();
         Self { joints: dataset.joints().len(), ..Self::of_body(vertices, &dataset.body) }
     }
@@ -46,8 +52,7 @@ impl DataSizes {
         DatasetError::check_inputs(config)?;
         let body = load_body(&config.data.body, config.data.shape_components)?;
         let mut sources = GarmentSource::list(&config.data.garments)?;
-        // Without a cache all of them are loaded.
-        if config.data.cache.folder.is_some() {
+        if !reads_tests(&config.data) {
             sources.retain(|source| purpose(&source.name(), &config.data) != GarmentPurpose::Test);
         }
         Self::of_listed(&sources, &body)

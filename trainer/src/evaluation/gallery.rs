@@ -181,7 +181,12 @@ fn resolved(
     garments: &[usize],
     body: &BodySample,
 ) -> Result<(PreparedScene, Draped), Report> {
-    let sample = SceneSample { garments: garments.to_vec(), bodies: vec![body.clone()], repulsion_sample: 0 };
+    let sample = SceneSample {
+        garments: garments.to_vec(),
+        below: Vec::new(),
+        bodies: vec![body.clone()],
+        repulsion_sample: 0,
+    };
     let scene = evaluator.model.prepare(&sample)?;
     let draped = evaluator.networks.drape(&scene)?;
     let resolved = evaluator.post_process.of(&scene, &draped.posed).resolved(&ResolveSettings::default())?;

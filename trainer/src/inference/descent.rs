@@ -2,8 +2,8 @@
 //!
 //! A network may make worse what is unlike anything that it was trained on. The losses need no ground truth, so that
 //! this is seen at inference. A proposal is a new state of all garments; every garment goes a share of the distance
-//! there, the first of some with which *no garment's energy rises, nor their sum*. The energy of a garment is that of
-//! its own terms and of every pair it is part of: what it wins against a neighbour counts, and what that loses is its
+//! there, the first of some with which *no garment's energy rises, nor the sum of those that pairs connect*. The energy of a garment
+//! is that of its own terms and of every pair it is part of: what it wins against a neighbour counts, and what that loses is its
 //! own to see. So the energy of every garment and that of the outfit fall or stay from state to state, and a garment
 //! that a proposal would harm does not keep those from moving that it has nothing to do with.
 
@@ -21,15 +21,24 @@ pub struct Descent<'a> {
     energy: &'a SceneEnergy<f32>,
     state: Draped,
     energies: Vec<f64>,
+    /// What every garment has of the outfit's energy: half of that of its pairs.
+    shares_of_total: Vec<f64>,
     /// Of the whole outfit, in which every pair counts once.
     total: f64,
+    /// For every garment the first of those that pairs connect it with.
+    group: Vec<usize>,
 }
 
 impl<'a> Descent<'a> {
     /// Starts from `state`.
     pub fn new(energy: &'a SceneEnergy<f32>, state: Draped) -> Self {
-        let (energies, total) = measured(energy, &state);
-        Self { energy, state, energies, total }
+        let Measured { energies, shares_of_total, total } = measured(energy, &state);
+        let mut group: Vec<usize> = (0..energies.len()).collect();
+        for pair in &energy.layers {
+            let [from, to] = [pair.inner, pair.outer].map(|garment| group[garment]);
+            group.iter_mut().filter(|g| **g == from.max(to)).for_each(|g| *g = from.min(to));
+        }
+        Self { energy, state, energies, shares_of_total, total, group }
     }
 
     /// Starts from the one of `candidates` in which the outfit has least energy. A garment that has less in another one goes
@@ -94,18 +103,28 @@ impl<'a> Descent<'a> {
         let share = |taken: usize| shares.get(taken).copied().unwrap_or(0.0);
         while taken.iter().any(|s| *s < shares.len()) {
             let trial = self.between(proposal, |i| share(taken[i]));
-            let (energies, total) = measured(self.energy, &trial);
+            let Measured { energies, shares_of_total, total } = measured(self.energy, &trial);
             let moves = |i: usize| taken[i] < shares.len();
             let rose = (0..taken.len()).filter(|&i| energies[i] > self.energies[i]);
             let mut shorter: BTreeSet<usize> = rose.flat_map(|i| self.shortened(i, moves)).collect();
-            if shorter.is_empty() && total > self.total {
-                // What garments win from each other counts twice for them, what they pay for it once.
-                shorter.extend((0..taken.len()).filter(|&i| moves(i)));
+            if shorter.is_empty() {
+                // What garments win from each other counts twice for them, what they pay for it once. Those that no chain of
+                // pairs connects have nothing to do with each other.
+                let of = |totals: &[f64]| -> Vec<f64> {
+                    let mut sums = vec![0.0; taken.len()];
+                    self.group.iter().zip(totals).for_each(|(group, energy)| sums[*group] += energy);
+                    sums
+                };
+                let (new, old) = (of(&shares_of_total), of(&self.shares_of_total));
+                shorter.extend(
+                    (0..taken.len()).filter(|&i| moves(i) && new[self.group[i]] > old[self.group[i]]),
+                );
             }
             if shorter.is_empty() {
                 // Infinite energies neither rise nor fall.
                 if energies.iter().zip(&self.energies).any(|(new, old)| new < old) {
                     (self.state, self.energies, self.total) = (trial, energies, total);
+                    self.shares_of_total = shares_of_total;
                     return taken.into_iter().map(share).collect();
                 }
                 break;
@@ -147,18 +166,32 @@ impl<'a> Descent<'a> {
     }
 }
 
+/// Energies of a state (J); infinite where they are not finite.
+struct Measured {
+    energies: Vec<f64>,
+    shares_of_total: Vec<f64>,
+    total: f64,
+}
+
 /// Weighted energy of every garment, its own terms and those of every pair that it is part of; and of the outfit.
-fn measured(energy: &SceneEnergy<f32>, state: &Draped) -> (Vec<f64>, f64) {
+fn measured(energy: &SceneEnergy<f32>, state: &Draped) -> Measured {
     let value = energy.value(&state.posed, &state.canonical);
     let own = energy.garments.iter().zip(&value.garments);
     let mut energies: Vec<f64> = own.map(|(garment, raw)| weighted(&garment.weights, raw)).collect();
+    let mut shares = energies.clone();
     for (pair, raw) in energy.layers.iter().zip(&value.layers) {
         let shared = weighted(&pair.weights, raw);
-        energies[pair.inner] += shared;
-        energies[pair.outer] += shared;
+        for garment in [pair.inner, pair.outer] {
+            energies[garment] += shared;
+            shares[garment] += 0.5 * shared;
+        }
     }
     let bounded = |e: f64| if e.is_finite() { e } else { f64::INFINITY };
-    (energies.into_iter().map(bounded).collect(), bounded(value.total))
+    Measured {
+        energies: energies.into_iter().map(bounded).collect(),
+        shares_of_total: shares.into_iter().map(bounded).collect(),
+        total: bounded(value.total),
+    }
 }
 
 #[cfg(test)]
@@ -181,6 +214,7 @@ mod tests {
                 GarmentEnergies::new(tube, &Topology::new(tube), &settings, false).expect("a garment"),
             ),
             holding_reference: Vec::new(),
+            thickness_below: Vec::new(),
             pull_back: None,
             weights: only(Term::Strain, 1.0),
         };
@@ -299,6 +333,12 @@ mod tests {
         assert_eq!(descent.advance(&apart, &WHOLE), [0.0, 0.0]);
         descent.advance(&apart, &BACKTRACKING);
         assert!(descent.total() <= total);
+        // A third tube that no pair connects goes all the way.
+        let (mut three, rest) = scene(&[0.12, 0.12, 0.2], &[[0, 1]]);
+        three.layers[0].weights = energy.layers[0].weights;
+        let mut descent = Descent::new(&three, stretched(&rest, &[1.0, 1.0, 1.1]));
+        let proposal = stretched(&rest, &[0.96, 1.04, 1.09]);
+        assert_eq!(descent.advance(&proposal, &WHOLE), [0.0, 0.0, 1.0]);
     }
 
     #[test]

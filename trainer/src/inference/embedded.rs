@@ -6,6 +6,7 @@ use super::source::GivenGarment;
 use super::tensor_store::garment_tensors;
 use super::{Draper, elapsed};
 use crate::dataset::PreparedGarment;
+use crate::system::lru_cache::{KeptBytes, LruCache, MemoryBudget, Residence};
 use burn::tensor::{Tensor, TensorData};
 use clothcombo_data::cache::{
     Key, KeyBuilder, StoredEmbedding, embedding_key, get_embedding, mesh_key, put_embedding,
@@ -38,21 +39,41 @@ pub(super) struct EmbeddedGarment {
     pub milliseconds: GarmentTimes,
 }
 
-/// Every garment a draper has met, by content.
-#[derive(Default)]
-pub(super) struct EmbeddedGarments(Mutex<HashMap<Key, EmbeddedGarment>>);
+/// Memory of a vertex of a garment at the paper's sizes (bytes): 2 kB are operators, as much the embedding.
+const PER_VERTEX: usize = 4096;
+
+/// The garments a draper has met last, by content: as many as two of the largest.
+pub(super) struct EmbeddedGarments {
+    /// Of every garment it has met, the place in `kept`.
+    met: Mutex<HashMap<Key, usize>>,
+    kept: LruCache<EmbeddedGarment>,
+}
+
+impl Default for EmbeddedGarments {
+    fn default() -> Self {
+        let bytes = 2 * super::MAX_VERTICES * PER_VERTEX;
+        let memory = MemoryBudget::new(KeptBytes { total: bytes, device: bytes });
+        Self { met: Mutex::default(), kept: LruCache::new(&memory, Residence::Device) }
+    }
+}
 
 impl EmbeddedGarments {
+    fn place(&self, key: Key) -> usize {
+        let mut met = self.met.lock().unwrap_or_else(PoisonError::into_inner);
+        let next = met.len();
+        *met.entry(key).or_insert(next)
+    }
+
     /// The garment as the networks need it, made if it was not met before.
     pub fn get(&self, draper: &Draper, source: &GivenGarment) -> Result<EmbeddedGarment, DraperError> {
         let garment = &source.garment;
         let mesh = mesh_key(&garment.rest);
         let key = KeyBuilder::new("embedded").key(mesh).text(garment.category.name());
         let key = key.number(u64::from(garment.holding)).finish();
-        let known = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(found) = known().get(&key) {
+        let place = self.place(key);
+        if let Some(found) = self.kept.get(place) {
             let milliseconds = GarmentTimes::default();
-            return Ok(EmbeddedGarment { was_known: true, milliseconds, ..found.clone() });
+            return Ok(EmbeddedGarment { was_known: true, milliseconds, ..(*found).clone() });
         }
         let clock = Instant::now();
         let preprocessor = &draper.preprocessor;
@@ -66,7 +87,8 @@ impl EmbeddedGarments {
         let (embedding, was_known) = embedding(draper, &tensors, mesh)?;
         let milliseconds = GarmentTimes { preparation, embedding: elapsed(clock) };
         let found = EmbeddedGarment { prepared, rest, tensors, embedding, was_known, milliseconds };
-        known().insert(key, found.clone());
+        let bytes = PER_VERTEX * found.prepared.vertex_count();
+        self.kept.insert(place, found.clone(), bytes);
         Ok(found)
     }
 }

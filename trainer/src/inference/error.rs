@@ -4,6 +4,7 @@ use crate::dataset::DatasetError;
 use crate::run::checkpoint::CheckpointError;
 use clothcombo_data::asset::BodyError;
 use clothcombo_data::fit::FitError;
+use clothcombo_data::generate::POSE_NAMES;
 use clothcombo_model::ModelError;
 use clothcombo_physics::contact::resolve::ResolveError;
 use clothcombo_physics::energy::EnergyError;
@@ -85,6 +86,63 @@ pub enum DraperError {
     NotFinite {
         /// Shape or pose.
         what: &'static str,
+    },
+    /// A motion without the frame that is asked for.
+    #[error("{of} has {count} frames, no frame {frame}")]
+    #[diagnostic(help("frames count from 0"))]
+    NoFrame {
+        /// The motion.
+        of: String,
+        /// The frame.
+        frame: usize,
+        /// Its frames.
+        count: usize,
+    },
+    /// A pose that is neither a file nor a known name.
+    #[error("--pose {text}: neither a file nor the name of a pose")]
+    #[diagnostic(help(
+        "its names: {}; or give a frame of a motion file, FILE.npz:FRAME",
+        POSE_NAMES.join(", ")
+    ))]
+    UnknownPose {
+        /// What was asked for.
+        text: String,
+    },
+    /// A frame that is no number.
+    #[error("--pose {text}: {frame:?} is no number of a frame")]
+    FrameNumber {
+        /// What was asked for.
+        text: String,
+        /// Its frame.
+        frame: String,
+    },
+    /// A mesh that is no pose of the body model.
+    #[error("{of}: {reason}")]
+    #[diagnostic(help(
+        "the mesh must be a pose of the body model: the same vertices in the same order, metres, y up; and its shape known, by \
+         --t-pose or --shape"
+    ))]
+    Recover {
+        /// The mesh.
+        of: String,
+        /// Why not.
+        reason: String,
+    },
+    /// Angles in another unit.
+    #[error("{of}: {why}")]
+    #[diagnostic(help("convert them to radians; `clothcombo check` looks at motion files"))]
+    NotRadians {
+        /// The pose or motion.
+        of: String,
+        /// What tells it.
+        why: String,
+    },
+    /// Hints about a garment that is taken as it is.
+    #[error("{name}: --fit never takes garments as they are, so that nothing can be said about their files")]
+    #[diagnostic(help("leave --fit never out"))]
+    Unfitted {
+        /// The garment.
+        name: String,
     },
     /// Neither a file nor a known name.
     #[error("no garment {name:?}: it is no file, and {}", match known.len() {

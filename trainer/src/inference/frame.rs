@@ -1,7 +1,7 @@
 //! One drape: networks, refinement, post-process.
 
 use super::motion::RetryPolicy;
-use super::network_drape::{NetworkDrape, Networks};
+use super::network_drape::{NetworkDrape, Pass};
 use super::{
     BodyState, Certificate, Drape, Draper, DraperError, GarmentDrape, Outfit, RefineSteps, elapsed, refine,
 };
@@ -120,13 +120,7 @@ impl Draper {
                     1.0 => Ok(final_sample()),
                     _ => {
                         let place = add_scaled(state.place, share, sub(body.place, state.place));
-                        self.stage(
-                            Networks::Accepted,
-                            outfit,
-                            body,
-                            state.pose.between(&body.pose, share),
-                            place,
-                        )
+                        self.stage(Pass::Accepted, outfit, body, state.pose.between(&body.pose, share), place)
                     }
                 }
             };
@@ -138,7 +132,7 @@ impl Draper {
         let from_t_pose = |share: f64| {
             watch(share);
             let pose = body.pose.scaled_keeping_heading(share);
-            let stage = self.stage(Networks::ForwardPass, outfit, body, pose, body.place)?;
+            let stage = self.stage(Pass::ForwardPass, outfit, body, pose, body.place)?;
             Ok::<_, DraperError>(match share {
                 // The surface is known here only.
                 1.0 => PathSample { draped: stage.draped, ..final_sample() },

@@ -25,6 +25,7 @@
 //! positions come back in the frame of the given pose.
 
 mod acceleration;
+mod bodies;
 pub mod contact_features;
 mod correct;
 pub mod descent;
@@ -50,8 +51,10 @@ mod smooth;
 mod source;
 mod temporal_filter;
 pub mod tensor_store;
+mod warnings;
 
 pub use acceleration::{Acceleration, acceleration};
+pub use bodies::{Bodies, FrameRange, file_and_frame, read_pose};
 pub use clothcombo_physics::contact::resolve::Certificate;
 pub use drape::{Drape, GarmentDrape};
 pub use draped::Draped;
@@ -66,8 +69,9 @@ pub use report::{
     BodyReport, DrapedGarmentReport, FrameReport, ModelReport, Moment, Report, ScoredPositions,
 };
 pub use shipped::shipped_model;
-pub use smooth::{Smoothing, smooth};
+pub use smooth::{MOST_RADIUS, Smoothing, smooth};
 pub use source::{GarmentCatalog, GivenGarment};
+pub use warnings::{log_repairs, warn_about_order};
 
 use crate::dataset::{ActiveJoints, DatasetError, Preprocessor, load_body};
 use crate::run::checkpoint::TrainedModel;
@@ -141,16 +145,17 @@ impl BodyState {
     }
 }
 
-/// A trained model with a body, ready to drape.
+/// A trained model with a body, ready to drape. Clones share both, and the garments they have met.
+#[derive(Clone)]
 pub struct Draper {
-    trained: TrainedModel,
+    trained: Arc<TrainedModel>,
     model: ClothCombo,
-    preprocessor: Preprocessor,
-    shape_space: ShapeSpace,
-    joints: ActiveJoints,
+    preprocessor: Arc<Preprocessor>,
+    shape_space: Arc<ShapeSpace>,
+    joints: Arc<ActiveJoints>,
     device: Device,
     settings: DraperSettings,
-    embedded: EmbeddedGarments,
+    embedded: Arc<EmbeddedGarments>,
 }
 
 impl Draper {
@@ -167,28 +172,33 @@ impl Draper {
         let joints = ActiveJoints::named(&body, &trained.state.joints)
             .map_err(|missing| DraperError::Joints { body: body.name.clone(), missing })?;
         let device = settings.device.clone();
-        let mut model = trained.networks(&device)?;
-        if let Some(steps) = settings.corrections {
-            if steps > 0 && model.corrections.is_empty() {
-                return Err(DraperError::NoCorrections { steps });
-            }
-            model = model.with_correction_steps(steps);
-        }
+        let model = with_steps(trained.networks(&device)?, &trained, settings.corrections)?;
         let mut preprocessor = Preprocessor::new(&trained.config, Arc::new(body));
         if let Some(folder) = &settings.cache {
             preprocessor = preprocessor.with_cache_in(folder, settings.cache_limit);
         }
         let settings = settings.clone();
         Ok(Self {
-            trained,
+            trained: Arc::new(trained),
             model,
-            preprocessor,
-            shape_space,
-            joints,
+            preprocessor: Arc::new(preprocessor),
+            shape_space: Arc::new(shape_space),
+            joints: Arc::new(joints),
             device,
             settings,
-            embedded: EmbeddedGarments::default(),
+            embedded: Arc::default(),
         })
+    }
+
+    /// The same model and body with the corrections, refinement and post-process of `settings`; body, cache and device stay.
+    ///
+    /// # Errors
+    /// When it asks for corrections that the model does not have.
+    pub fn with(&self, settings: &DraperSettings) -> Result<Self, DraperError> {
+        let DraperSettings { corrections, refine, resolve, post_process, .. } = settings.clone();
+        let model = with_steps(self.model.clone(), &self.trained, corrections)?;
+        let settings = DraperSettings { corrections, refine, resolve, post_process, ..self.settings.clone() };
+        Ok(Self { model, settings, ..self.clone() })
     }
 
     /// The body model.
@@ -236,6 +246,20 @@ impl Draper {
 
     fn dimensions(&self) -> clothcombo_model::Dimensions {
         self.trained.state.dimensions()
+    }
+}
+
+/// `model` with at most so many correction steps; `None`: as its configuration says.
+fn with_steps(
+    model: ClothCombo,
+    trained: &TrainedModel,
+    corrections: Option<usize>,
+) -> Result<ClothCombo, DraperError> {
+    match corrections {
+        Some(steps) if steps > 0 && model.corrections.is_empty() => Err(DraperError::NoCorrections { steps }),
+        asked => {
+            Ok(model.with_correction_steps(asked.unwrap_or(trained.config.model.usual_correction_steps())))
+        }
     }
 }
 

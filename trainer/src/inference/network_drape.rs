@@ -38,7 +38,7 @@ const MOST_SHAPE: f64 = 20.0;
 
 /// How much of the networks is asked.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Networks {
+pub(super) enum Pass {
     /// The forward pass, judged beside skinning, and the correction steps.
     Accepted,
     /// The forward pass alone: for samples of the continuation path from the T-pose, that leaves fewer intersections
@@ -53,15 +53,10 @@ impl Draper {
         outfit: &Outfit,
         body: &BodyState,
     ) -> Result<NetworkDrape, DraperError> {
-        self.drape_by(Networks::Accepted, outfit, body)
+        self.drape_by(Pass::Accepted, outfit, body)
     }
 
-    fn drape_by(
-        &self,
-        networks: Networks,
-        outfit: &Outfit,
-        body: &BodyState,
-    ) -> Result<NetworkDrape, DraperError> {
+    fn drape_by(&self, pass: Pass, outfit: &Outfit, body: &BodyState) -> Result<NetworkDrape, DraperError> {
         let clock = Instant::now();
         let (shape, posed) = self.posed(body)?;
         let mut surface = match &body.surface {
@@ -83,9 +78,9 @@ impl Draper {
         let on_body = OnBody { scene: &scene, outfit: outfit_tensors, embeddings, body: &tensors, start };
         let clock = Instant::now();
         let together = LayerInteraction::Together;
-        let (draped, times) = match networks {
-            Networks::Accepted => drape_on(&self.model, &on_body, together),
-            Networks::ForwardPass => {
+        let (draped, times) = match pass {
+            Pass::Accepted => drape_on(&self.model, &on_body, together),
+            Pass::ForwardPass => {
                 let (_, draped) = forward_on(&self.model, &on_body, together);
                 (draped, NetworkTimes { forward: clock.elapsed(), ..NetworkTimes::default() })
             }
@@ -113,7 +108,7 @@ impl Draper {
     /// The same in `pose` and place, a sample of the continuation path to `body`, for the post-process.
     pub(super) fn stage(
         &self,
-        networks: Networks,
+        pass: Pass,
         outfit: &Outfit,
         body: &BodyState,
         pose: Pose,
@@ -121,7 +116,7 @@ impl Draper {
     ) -> Result<PathSample, DraperError> {
         // A surface is known at the end only.
         let sample = BodyState { shape: body.shape.clone(), pose, surface: None, place };
-        let made = self.drape_by(networks, outfit, &sample)?;
+        let made = self.drape_by(pass, outfit, &sample)?;
         let parts = |packed| outfit.split(packed).into_iter().map(<[_]>::to_vec).collect();
         Ok(PathSample {
             body: made.surface,
@@ -140,13 +135,15 @@ impl Draper {
             features: &|pose, joints| encoding.features(pose, joints),
             losses: &self.trained.config.losses,
             graph: self.trained.config.model.graph,
+            layer_thickness: self.trained.config.layer_thickness(),
         };
         let sample = SceneSample {
             garments: (0..outfit.garments.len()).collect(),
+            below: Vec::new(),
             bodies: vec![body],
             repulsion_sample: 0,
         };
-        let mut scene = builder.build(sample, outfit.prepared(), 1.0);
+        let mut scene = builder.build(sample, outfit.prepared(), &[], 1.0);
         let seen = self.shape_space.seen(self.body(), &shape, self.trained.state.shape_count);
         scene.bodies[0].shape = seen.into_iter().map(|b| b as f32).collect();
         scene

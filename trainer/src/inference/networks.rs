@@ -70,7 +70,11 @@ impl<'a> Networks<'a> {
         mode: Mode,
         drape: impl Fn(&OnBody<'_>) -> T,
     ) -> Result<T, DrapeError> {
-        let outfit = self.tensors.outfit(scene)?;
+        let mut outfit = self.tensors.outfit(scene)?;
+        if mode == Mode::Single {
+            // Each as if there were no other.
+            outfit = outfit.with_thickness_below(&scene.thickness_of_unseen())?;
+        }
         let embeddings = self.tensors.embed(&self.model, scene, &outfit, &self.embeddings, mode)?;
         let (body, start) = self.tensors.body(&scene.bodies[0])?;
         Ok(drape(&OnBody { scene, outfit: &outfit, embeddings: &embeddings, body: &body, start }))

@@ -44,6 +44,7 @@ impl ReferenceScene {
             garments.push(SceneGarment {
                 energies: Arc::new(energies),
                 holding_reference: wide(&narrow.holding_reference),
+                thickness_below: narrow.thickness_below.iter().map(|t| f64::from(*t)).collect(),
                 pull_back: None,
                 weights: narrow.weights,
             });

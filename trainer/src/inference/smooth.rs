@@ -13,6 +13,9 @@ use serde::{Deserialize, Serialize};
 /// Shares of the smoothing that are tried, in this order.
 const SHARES: [f64; 3] = [1.0, 0.5, 0.25];
 
+/// Most frames to each side: at 60 frames a second all that moves in three seconds would be averaged.
+pub const MOST_RADIUS: u16 = 100;
+
 /// What smoothing did.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Smoothing {

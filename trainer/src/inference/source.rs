@@ -64,9 +64,23 @@ impl GivenGarment {
         hints: &FitSettings,
         placement: &OnceLock<Result<PlacementCheck, FitError>>,
     ) -> Result<Self, DraperError> {
-        let always_fit = always_fit.or((*hints != FitSettings::default()).then_some(true));
         let given = load_mesh(path).map_err(DatasetError::data)?;
+        let mut source = Self::placed(given, path, body, always_fit, hints, placement)?;
+        source.path = Some(path.into());
+        Ok(source)
+    }
+
+    /// The garment of a mesh; `path` says in errors where it comes from.
+    fn placed(
+        given: PolygonMesh,
+        path: &Path,
+        body: &Body,
+        always_fit: Option<bool>,
+        hints: &FitSettings,
+        placement: &OnceLock<Result<PlacementCheck, FitError>>,
+    ) -> Result<Self, DraperError> {
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let always_fit = always_fit.or((*hints != FitSettings::default()).then_some(true));
         let placed = match always_fit {
             Some(true) => None,
             Some(false) => Some(given.to_tri_mesh(path).map_err(DatasetError::data)?),
@@ -83,18 +97,26 @@ impl GivenGarment {
             let holding = Garment::needs_holding(&rest, body);
             let follows = (0..rest.vertex_count() as u32).map(Attachment::to_vertex).collect();
             let garment = Garment { name, category, rest, holding, source: Provenance::default() };
-            return Ok(Self { garment, given, path: Some(path.into()), fit: None, follows });
+            return Ok(Self { garment, given, path: None, fit: None, follows });
         }
         let fitted =
             fit(&given, body, hints).map_err(|reason| DraperError::Fit { path: path.into(), reason })?;
         let follows = fitted.follows;
         let garment = Garment { name, ..fitted.garment };
-        Ok(Self { garment, given, path: Some(path.into()), fit: Some(fitted.report), follows })
+        Ok(Self { garment, given, path: None, fit: Some(fitted.report), follows })
     }
 
     /// Positions of the garment's vertices as positions of the given ones, in their order.
     pub fn in_given_order(&self, positions: &[[f64; 3]]) -> Vec<[f64; 3]> {
         in_file_order(&self.follows, positions, self.garment.rest.faces())
+    }
+}
+
+/// Refuses hints about a garment that is taken as it is.
+fn check_hints(name: &str, always_fit: Option<bool>, hints: &FitSettings) -> Result<(), DraperError> {
+    match always_fit == Some(false) && *hints != FitSettings::default() {
+        true => Err(DraperError::Unfitted { name: name.to_owned() }),
+        false => Ok(()),
     }
 }
 
@@ -168,6 +190,25 @@ impl GarmentCatalog {
         &self.names
     }
 
+    /// The garment of a mesh in memory, which is treated as a file of that `name` is.
+    ///
+    /// # Errors
+    /// Naming it, when it is no garment of this body.
+    pub fn place(
+        &self,
+        name: &str,
+        mesh: PolygonMesh,
+        body: &Body,
+        always_fit: Option<bool>,
+        hints: &FitSettings,
+    ) -> Result<GivenGarment, DraperError> {
+        check_hints(name, always_fit, hints)?;
+        let mut source =
+            GivenGarment::placed(mesh, Path::new(name), body, always_fit, hints, &self.placement)?;
+        source.garment.name = name.to_owned();
+        Ok(source)
+    }
+
     /// The garment of a file or, where there is no such file, of that name. A named one from a file is fitted like any other
     /// file where it does not lie on this body, it may have been made for another one, or where `hints` say where it belongs
     /// ([`FitSettings::is_placed`]). Other hints are about how files are written: a named garment that lies on the body needs none.
@@ -181,6 +222,7 @@ impl GarmentCatalog {
         always_fit: Option<bool>,
         hints: &FitSettings,
     ) -> Result<GivenGarment, DraperError> {
+        check_hints(name, always_fit, hints)?;
         let path = Path::new(name);
         // A word without a dot or a slash is a name, not a file that happens to be missing.
         let is_path = path.is_file()

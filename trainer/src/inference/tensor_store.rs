@@ -111,7 +111,8 @@ impl TensorStore {
         let garments =
             scene.sample.garments.iter().zip(&scene.garments).map(|(&g, garment)| self.garment(g, garment));
         let garments = garments.collect::<Result<Vec<_>, _>>()?;
-        Ok(OutfitTensors::new(&garments.iter().map(Arc::as_ref).collect::<Vec<_>>(), &scene.contacts)?)
+        let garments = garments.iter().map(Arc::as_ref).collect::<Vec<_>>();
+        Ok(OutfitTensors::new(&garments, &scene.contacts)?.with_thickness_below(&scene.thickness_below)?)
     }
 
     /// An empty store of embeddings for [`embed`](Self::embed), of one scene: all of them are kept for as long as it lives.
@@ -205,6 +206,7 @@ pub fn body_tensors(
     dimensions: &Dimensions,
     device: &Device,
 ) -> Result<(BodyTensors, Tensor<2>), ModelError> {
-    let tensors = BodyTensors::new(&body.shape, &body.pose, &body.bones, dimensions, device)?;
+    let tensors =
+        BodyTensors::new(&body.shape, &body.pose, &body.bones, &body.joint_features, dimensions, device)?;
     Ok((tensors, to_device(&body.start, device)))
 }

@@ -10,7 +10,7 @@ use crate::run::difference::{AllowedChanges, differences, differing_keys};
 use crate::run::lock::{FILE, LockError, RunLock};
 use crate::system::files::check_writable;
 use crate::system::paths::obstacle;
-use clothcombo_data::format::atomic::{self, first_missing_folder};
+use clothcombo_data::format::atomic::{self, Temporary};
 use std::ffi::OsStr;
 use std::fs;
 use std::io;
@@ -33,18 +33,12 @@ impl RunDir {
     /// # Errors
     /// When the folder already holds a run, is in use or cannot be written; nothing that was made is left then.
     pub fn create(root: &Path, config: &Config) -> Result<Self, RunDirError> {
-        let made = first_missing_folder(&root.join(CONFIG)).map(Path::to_owned);
+        // What was there stays, and so does a folder that another process uses by now.
+        let made = (!root.exists()).then(|| Temporary::new(root.to_owned()));
         let created = Self::create_in(root, config);
-        // A folder that another process uses by now is not ours.
-        let is_ours = !matches!(created, Err(RunDirError::Occupied { .. } | RunDirError::InUse { .. }));
-        if let (Err(_), true, Some(first)) = (&created, is_ours, made) {
-            if root.starts_with(&first) {
-                let _ = fs::remove_dir_all(root);
-            }
-            // One that something else has come into stays.
-            root.ancestors().skip(1).take_while(|folder| folder.starts_with(&first)).for_each(|folder| {
-                let _ = fs::remove_dir(folder);
-            });
+        let is_others = matches!(created, Err(RunDirError::Occupied { .. } | RunDirError::InUse { .. }));
+        if let (true, Some(made)) = (created.is_ok() || is_others, made) {
+            made.keep();
         }
         created
     }

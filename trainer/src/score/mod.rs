@@ -11,8 +11,9 @@ mod place;
 mod tests;
 
 pub use error::{MeshSize, ScoreError};
-pub use files::{MeshFiles, score_files};
-pub(crate) use files::{load_body, load_garment};
+pub use files::{
+    MeshFiles, NamedMesh, SceneMeshes, checked_body, checked_garment, score_files, score_meshes,
+};
 pub(crate) use place::misplaced;
 
 use crate::config::LossesConfig;
@@ -260,6 +261,7 @@ fn scene_garment(
         energies: Arc::new(energies),
         holding_reference: if is_held { garment.rest.positions().to_vec() } else { Vec::new() },
         pull_back: None,
+        thickness_below: Vec::new(),
         weights,
     })
 }

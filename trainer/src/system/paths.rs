@@ -23,6 +23,11 @@ pub fn destination(path: &Path) -> io::Result<PathBuf> {
     Ok(found)
 }
 
+/// `clothcombo` in the user's folder for what programs may compute anew.
+pub fn user_cache() -> Option<PathBuf> {
+    Some(dirs::cache_dir()?.join("clothcombo"))
+}
+
 /// What blocks `folder`: something that is no folder, in its place or in that of one it lies in.
 pub fn obstacle(folder: &Path) -> Option<&Path> {
     folder.ancestors().find(|path| path.exists()).filter(|path| !path.is_dir())

@@ -103,6 +103,9 @@ pub struct Incident {
 pub struct IncidentScene {
     /// Inner → outer.
     pub garments: Vec<IncidentGarment>,
+    /// Garments below them of which only the thickness counted.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub below: Vec<IncidentGarment>,
     /// Bodies the garments were draped on.
     pub bodies: Vec<IncidentBody>,
     /// Number of the random sample of pairs that the repulsion looked at.
@@ -307,10 +310,10 @@ fn describe(dataset: &Dataset, scenes: &[PreparedScene], output: &StepOutput) ->
         Term::ALL.into_iter().filter_map(|t| Some((t.name().to_owned(), Exact(values[t]?)))).collect()
     };
     let of_scene = |(scene, outputs): (&PreparedScene, &Vec<_>)| {
-        let garments = scene.sample.garments.iter().map(|&index| {
+        let garment = |&index: &usize| {
             let info = dataset.garments.info(index);
             IncidentGarment { index, name: info.name.clone(), vertices: info.vertices }
-        });
+        };
         let bodies = scene.sample.bodies.iter().zip(outputs).map(
             |(body, output): (&BodySample, &clothcombo_physics::autodiff::SceneLossOutput)| {
                 let value = output.value();
@@ -324,7 +327,8 @@ fn describe(dataset: &Dataset, scenes: &[PreparedScene], output: &StepOutput) ->
             },
         );
         IncidentScene {
-            garments: garments.collect(),
+            garments: scene.sample.garments.iter().map(garment).collect(),
+            below: scene.sample.below.iter().map(garment).collect(),
             bodies: bodies.collect(),
             repulsion_sample: scene.sample.repulsion_sample,
         }
@@ -335,7 +339,7 @@ fn describe(dataset: &Dataset, scenes: &[PreparedScene], output: &StepOutput) ->
 impl IncidentScene {
     /// The scene as it was sampled.
     fn to_sample(&self, dataset: &Dataset, path: &Path) -> Result<SceneSample, IncidentError> {
-        let garments = self.garments.iter().map(|garment| {
+        let index = |garment: &IncidentGarment| {
             let changed = |reason: String| IncidentError::DataChanged { name: garment.name.clone(), reason };
             let is_it = |i: usize| dataset.garments.info(i).name == garment.name;
             let index = Some(garment.index)
@@ -346,7 +350,7 @@ impl IncidentScene {
                 found if found == garment.vertices => Ok(index),
                 found => Err(changed(format!("has {found} vertices now, it had {}", garment.vertices))),
             }
-        });
+        };
         let wrong = |reason: &str| IncidentError::Unusable { path: path.to_owned(), reason: reason.into() };
         let bodies = self.bodies.iter().map(|body| {
             let pose = Pose { rotations: body.pose.iter().map(|r| r.map(|v| v.0)).collect() };
@@ -360,7 +364,8 @@ impl IncidentScene {
             }
         });
         Ok(SceneSample {
-            garments: garments.collect::<Result<_, _>>()?,
+            garments: self.garments.iter().map(index).collect::<Result<_, _>>()?,
+            below: self.below.iter().map(index).collect::<Result<_, _>>()?,
             bodies: bodies.collect::<Result<_, _>>()?,
             repulsion_sample: self.repulsion_sample,
         })

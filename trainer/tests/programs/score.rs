@@ -53,9 +53,7 @@ impl Case {
         let mut command = Command::cargo_bin("clothcombo").unwrap();
         command.env("NO_COLOR", "1").current_dir(self.folder.path());
         command.args(["score", "--body", "body.obj", "--rest"]).args(rest);
-        // Two names of one flag.
-        let flag = if extra.is_empty() { "--garments" } else { "--draped" };
-        command.arg(flag).args(draped).args(extra);
+        command.arg("--draped").args(draped).args(extra);
         command
     }
 

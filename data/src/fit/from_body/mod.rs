@@ -168,6 +168,16 @@ pub(super) struct Cloth<'a> {
 }
 
 impl Aligned {
+    /// A garment that does not lie on its body.
+    pub fn not_on_it(&self, where_it_is: &str) -> FitError {
+        let what = format!(
+            "the garment does not lie on this body: {where_it_is}. It must be in the body file's coordinates, in its pose and shape: \
+             export both together, or say how the garment's coordinates differ by --unit, --up, --turn and, beside an npz, --offset; \
+             an npz takes shape parameters as body.npz:1.2,-0.5"
+        );
+        FitError::SourceBody { name: self.name.clone(), what }
+    }
+
     /// What is odd about a garment where its body puts it.
     pub fn doubt(&self, what: &str) -> String {
         format!(
@@ -195,8 +205,8 @@ impl Aligned {
         let source = Surface::new(source.0, source.1);
         let placed = self.placement.apply(positions);
         let lies = Lies::new(&placed, &source);
-        if let Some(what) = lies.implausible() {
-            return Err(FitError::SourceBody { name: self.name.clone(), what });
+        if let Some(where_it_is) = lies.implausible() {
+            return Err(self.not_on_it(&where_it_is));
         }
         let cloth = Cloth { positions: &placed, faces, category };
         let (carried, base, how, alignment_mm, scale) = match &self.carrier {
@@ -256,28 +266,13 @@ impl Lies {
     }
 
     fn implausible(&self) -> Option<String> {
-        let where_it_is = match () {
-            () if self.deep > MOST_DEEP => {
-                format!(
-                    "{:.0} % of the garment is more than {:.0} mm inside it",
-                    100.0 * self.deep,
-                    1e3 * DEEP
-                )
-            }
-            () if self.close < LEAST_CLOSE => {
-                format!(
-                    "only {:.0} % of the garment is within {:.0} mm of its skin",
-                    100.0 * self.close,
-                    1e3 * CLOSE
-                )
-            }
-            () => return None,
-        };
-        Some(format!(
-            "the garment does not lie on this body: {where_it_is}. It must be in the body file's coordinates, in its pose and shape: \
-             export both together, or say how the garment's coordinates differ by --unit, --up, --turn and, beside an npz, --offset; \
-             an npz takes shape parameters as body.npz:1.2,-0.5"
-        ))
+        if self.deep > MOST_DEEP {
+            let (share, depth) = (100.0 * self.deep, 1e3 * DEEP);
+            return Some(format!("{share:.0} % of the garment is more than {depth:.0} mm inside it"));
+        }
+        let (share, reach) = (100.0 * self.close, 1e3 * CLOSE);
+        (self.close < LEAST_CLOSE)
+            .then(|| format!("only {share:.0} % of the garment is within {reach:.0} mm of its skin"))
     }
 }
 

@@ -166,7 +166,7 @@ fn axes(
     if misfit(&unit).is_nan() || misfit(&unit) > 0.5 {
         return None;
     }
-    let ups = settings.up.map_or(UpAxis::ALL.to_vec(), |up| vec![up]);
+    let ups = settings.up.map_or(UpAxis::USUAL.to_vec(), |up| vec![up]);
     let turns = settings.turn_degrees.map_or(vec![0.0, 90.0, 180.0, 270.0], |turn| vec![turn]);
     let candidates = ups.iter().flat_map(|up| {
         turns.iter().map(|turn| Placement {

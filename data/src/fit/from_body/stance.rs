@@ -37,7 +37,7 @@ impl Stance {
 
 /// All stances in which the points may be a person: of a plausible height, wider than deep.
 pub(super) fn stances(points: &[[f64; 3]], body: &Body, settings: &FitSettings) -> Vec<Stance> {
-    let ups = settings.up.map_or(UpAxis::ALL.to_vec(), |up| vec![up]);
+    let ups = settings.up.map_or(UpAxis::USUAL.to_vec(), |up| vec![up]);
     let turns = settings.turn_degrees.map_or(vec![0.0, 90.0, 180.0, 270.0], |turn| vec![turn]);
     let mut all = Vec::new();
     for up in ups {

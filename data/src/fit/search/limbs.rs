@@ -7,7 +7,7 @@ use super::super::judge::{Candidate, Judge};
 use super::super::limb_pose::LimbPose;
 use super::super::placement::{Origin, Placement};
 use super::super::settings::FitSettings;
-use super::{Search, SearchBody, distinct, sort};
+use super::{Search, distinct, sort};
 use crate::asset::Body;
 use rayon::prelude::*;
 
@@ -22,12 +22,10 @@ const STANCES: [f64; 2] = [5.0, 10.0];
 /// Openings of a garment for legs.
 const WAIST_AND_LEGS: usize = 3;
 
-impl SearchBody {
-    /// The field of `body`, which was measured, with its legs [`LEGS_APART`].
-    fn apart(&self, body: &Body) -> &BodyField {
-        let placement = Placement { leg_angle_degrees: LEGS_APART, ..Placement::AS_GIVEN };
-        self.apart.get_or_init(|| self.field.posed(&LimbPose::of(body, &placement), body))
-    }
+/// The field of `body` with its legs [`LEGS_APART`].
+pub(super) fn with_legs_apart(field: &BodyField, body: &Body) -> BodyField {
+    let placement = Placement { leg_angle_degrees: LEGS_APART, ..Placement::AS_GIVEN };
+    field.posed(&LimbPose::of(body, &placement), body)
 }
 
 impl Search<'_> {
@@ -56,28 +54,27 @@ impl Search<'_> {
         sort(ranked);
     }
 
-    /// The best with its legs apart, where a garment with leg openings lies better so: only those tell.
-    pub(super) fn spread_legs(&self, judge: &Judge, ranked: &mut [Candidate]) {
+    /// Adds the best with their legs apart, where a garment with leg openings lies better so: only those tell.
+    pub(super) fn spread_legs(&self, judge: &Judge, ranked: &mut Vec<Candidate>) {
         if judge.settings.legs_degrees.is_some() || judge.cloth.borders.len() < WAIST_AND_LEGS {
             return;
         }
         let at = |c: &Candidate, degrees: f64| Placement { leg_angle_degrees: degrees, ..c.placement };
-        let apart = Judge { field: self.measured.apart(self.body), ..*judge };
-        let has_legs =
-            |c: &&mut Candidate| LEG_ANGLES.iter().any(|degrees| apart.limbs(&at(c, *degrees)).legs);
-        let spread = |candidate: &mut Candidate| {
+        let apart = Judge { field: &self.measured.apart, ..*judge };
+        let has_legs = |c: &&Candidate| LEG_ANGLES.iter().any(|degrees| apart.limbs(&at(c, *degrees)).legs);
+        let spread = |candidate: &Candidate| {
             let turned = apart.turned(&candidate.placement, None, true);
             let scored = |degrees: &f64| apart.scored(at(candidate, *degrees), &turned, true, None);
             let best = LEG_ANGLES.iter().map(scored).max_by(|a, b| a.score.total_cmp(&b.score));
-            let Some(start) = best.map(|best| apart.with_openings(best)) else { return };
+            let start = apart.with_openings(best?);
             let near = if start.placement.arm_angle_degrees == 0.0 { &apart } else { judge };
             let found = self.climbed_posed(near, &start);
-            if found.score > candidate.score {
-                // Its weights are those of its own pose.
-                *candidate = self.climbed_posed(judge, &found);
-            }
+            // Its weights are those of its own pose.
+            (found.score > candidate.score).then(|| self.climbed_posed(judge, &found))
         };
-        ranked.iter_mut().filter(has_legs).take(SPREAD).collect::<Vec<_>>().into_par_iter().for_each(spread);
+        let together: Vec<&Candidate> = ranked.iter().filter(has_legs).take(SPREAD).collect();
+        let found: Vec<Candidate> = together.into_par_iter().filter_map(spread).collect();
+        ranked.extend(found);
         sort(ranked);
     }
 

@@ -111,6 +111,43 @@ fn legs_apart_are_found_or_taken_as_they_are_said_to_be() {
 }
 
 #[test]
+fn arms_say_nothing_about_trousers() {
+    let body = shipped_body();
+    let trousers = generated(&body, Category::Trousers, 7001, 500).rest;
+    let file = polygons(trousers.positions().to_vec(), trousers.faces().iter().map(<[u32; 3]>::as_slice));
+    let settings = FitSettings { arms_lowered: Some(true), ..FitSettings::default() };
+    let report = fit(&file, &body, &settings).unwrap().report;
+    assert_eq!((report.placement, &report.doubts[..]), (Placement::AS_GIVEN, &[][..]));
+}
+
+#[test]
+fn what_is_upside_down_is_told_with_the_flag() {
+    let body = shipped_body();
+    let trousers = generated(&body, Category::Trousers, 14, 1500).rest;
+    let upside: Vec<[f64; 3]> = trousers.positions().iter().map(|[x, y, z]| [-x, -y, *z]).collect();
+    let file = polygons(upside, trousers.faces().iter().map(<[u32; 3]>::as_slice));
+    let error =
+        fit(&file, &body, &FitSettings::default()).map(|fitted| fitted.report.to_string()).unwrap_err();
+    assert_eq!(error, FitError::UpsideDown { up: UpAxis::MinusY }, "{error}");
+    let said = FitSettings { up: Some(UpAxis::MinusY), ..FitSettings::default() };
+    assert_eq!(fit(&file, &body, &said).unwrap().report.category, Category::Trousers);
+}
+
+#[test]
+fn wide_trousers_are_of_another_size_whatever_else_they_may_be() {
+    let body = shipped_body();
+    let trousers = generated(&body, Category::Trousers, 7001, 500).rest;
+    let positions = trousers.positions().iter().map(|p| scale(*p, 1.5)).collect();
+    let file = polygons(positions, trousers.faces().iter().map(<[u32; 3]>::as_slice));
+    let report = fit(&file, &body, &FitSettings::default()).unwrap().report;
+    assert!(report.doubts.iter().any(|doubt| doubt.contains("scaled by about 0.")), "{:?}", report.doubts);
+    let pairs = report.contact.body_triangle_pairs;
+    let is_told =
+        report.warnings().iter().any(|w| w.contains(&format!("{pairs} intersecting triangle pairs")));
+    assert_eq!(is_told, pairs > 0, "{:?}", report.warnings());
+}
+
+#[test]
 fn a_garment_of_another_size_is_refused_with_the_factor_that_fits() {
     let body = shipped_body();
     let tee = generated(&body, Category::TShirt, 9, 700).rest;

@@ -85,6 +85,19 @@ fn a_vertex_far_from_all_others_is_named_and_set_aside() {
 }
 
 #[test]
+fn loose_triangles_are_refused_at_once() {
+    let shirt = garment(&mannequin(), Category::TShirt, 8).rest;
+    let corner =
+        |(n, v): (usize, &u32)| add(shirt.positions()[*v as usize], [1e-3 * (n % 7) as f64, 0.0, 0.0]);
+    let positions: Vec<[f64; 3]> = shirt.faces().iter().flatten().enumerate().map(corner).collect();
+    let faces: Vec<[u32; 3]> =
+        (0..shirt.face_count() as u32).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
+    let file = polygons(positions, faces.iter().map(<[u32; 3]>::as_slice));
+    let error = fit(&file, &mannequin(), &FitSettings::default()).unwrap_err();
+    assert!(matches!(error, FitError::Scattered { .. }), "{error}");
+}
+
+#[test]
 fn a_garment_upside_down_is_refused_or_doubted() {
     let body = mannequin();
     let shirt = garment(&body, Category::TShirt, 8).rest;

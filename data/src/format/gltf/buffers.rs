@@ -54,7 +54,7 @@ impl<'a> Buffers<'a> {
         Self { chunk, folder: folder.into(), loaded }
     }
 
-    /// `N` numbers per item: floats; integers where the document is quantised, and as joints and weights.
+    /// `N` numbers per item: floats; integers where the document is quantised, and as joints, weights and texture coordinates.
     pub fn numbers<const N: usize>(
         &mut self,
         document: &Document,
@@ -68,7 +68,10 @@ impl<'a> Buffers<'a> {
             _ => "MAT4",
         };
         let is_quantised = document.extensions_used.iter().any(|name| name == QUANTISATION);
-        let may_be = |scalar: &Scalar| *scalar == Scalar::F32 || N == 4 || is_quantised;
+        // Texture coordinates may be normalised without an extension.
+        let is_share =
+            |scalar: &Scalar| N == 2 && item.normalized && matches!(scalar, Scalar::U8 | Scalar::U16);
+        let may_be = |scalar: &Scalar| *scalar == Scalar::F32 || N == 4 || is_quantised || is_share(scalar);
         let Some(scalar) = scalar(item.component_type).filter(may_be).filter(|_| item.kind == kind) else {
             return Err(format!("accessor {accessor} is no {kind} of floats, as it must be here"));
         };

@@ -3,6 +3,19 @@
 use serde::Deserialize;
 use std::collections::HashMap;
 
+/// What tells the version.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Header {
+    pub asset: Asset,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Asset {
+    pub version: String,
+}
+
 #[derive(Debug, Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(super) struct Document {
@@ -34,6 +47,7 @@ pub(super) struct Scene {
 #[derive(Debug, Deserialize)]
 #[serde(default)]
 pub(super) struct Node {
+    pub name: String,
     pub children: Vec<usize>,
     pub mesh: Option<usize>,
     pub skin: Option<usize>,
@@ -49,6 +63,7 @@ pub(super) struct Node {
 impl Default for Node {
     fn default() -> Self {
         Self {
+            name: String::new(),
             children: Vec::new(),
             mesh: None,
             skin: None,
@@ -64,6 +79,7 @@ impl Default for Node {
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 pub(super) struct Mesh {
+    pub name: String,
     pub primitives: Vec<Primitive>,
     /// Of the morph targets.
     pub weights: Vec<f64>,

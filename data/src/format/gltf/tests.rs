@@ -3,6 +3,10 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use std::fs;
 
+fn parse(bytes: &[u8], path: &Path) -> Result<PolygonMesh, String> {
+    super::parse(bytes, path, None)
+}
+
 /// Four corners of a unit square and indices of two triangles, padded to whole words.
 fn payload() -> Vec<u8> {
     let mut bytes = Vec::new();
@@ -89,6 +93,10 @@ fn what_is_wrong_is_named() {
         (r#"{"mesh":0}"#, r#"{"mesh":0,"children":[0]}"#, "reached twice"),
         (r#""mode":6"#, r#""mode":9"#, "mode 9"),
         (r#""asset""#, r#""extensionsRequired":["KHR_draco_mesh_compression"],"asset""#, "draco"),
+        (r#""asset""#, r#""extensionsRequired":["FOO_shape"],"asset""#, "FOO_shape, which is not known"),
+        (r#""asset""#, r#""extensionsUsed":["EXT_mesh_gpu_instancing"],"asset""#, "make them real"),
+        (r#""scene":0"#, r#""scene":7"#, "scene 7 of 1"),
+        (r#""version":"2.0""#, r#""version":"1.0""#, "glTF version 1.0"),
         (r#"{"byteLength":80}"#, r#"{"uri":"../secret.bin","byteLength":80}"#, "beside the document"),
         (r#"{"byteLength":80}"#, r#"{"uri":"none.bin","byteLength":80}"#, "none.bin"),
         (r#"{"byteLength":80}"#, r#"{"uri":"data:;base64,!!","byteLength":80}"#, "base64"),
@@ -123,6 +131,16 @@ fn an_index_past_its_own_vertices_reads_no_other_primitives_ones() {
 }
 
 #[test]
+fn of_several_meshes_the_one_that_is_named_is_read() {
+    let json = document("").replacen(r#"{"mesh":0}"#, r#"{"mesh":0,"name":"Body"}"#, 1);
+    let of = |only| super::parse(&glb(&json, &payload()), Path::new("x.glb"), only);
+    assert_eq!(of(None).unwrap().positions.len(), 8);
+    assert_eq!(of(Some("body")).unwrap().positions.len(), 4);
+    let message = of(Some("coat")).unwrap_err();
+    assert!(message.contains("of its 2 meshes 0 are named 'coat'"), "{message}");
+}
+
+#[test]
 fn texture_coordinates_are_read_by_vertex_with_v_up() {
     let accessor = r#"{"bufferView":0,"componentType":5126,"count":4,"type":"VEC2"}"#;
     let textured = |accessor: &str| {
@@ -140,6 +158,9 @@ fn texture_coordinates_are_read_by_vertex_with_v_up() {
     assert_eq!(mesh.texture[..4], [[0.0, 1.0], [0.0, 0.0], [0.0, 1.0], [1.0, 0.0]]);
     // The second mesh has none of its own.
     assert_eq!(mesh.texture[4..], [[0.0; 2]; 4]);
+    // Normalised integers need no extension.
+    let shares = r#"{"bufferView":1,"componentType":5121,"normalized":true,"count":4,"type":"VEC2"}"#;
+    assert_eq!(textured(shares).texture[..2], [[0.0, 254.0 / 255.0], [2.0 / 255.0, 1.0]]);
     // What is no texture coordinate for every vertex is read over.
     for wrong in
         [accessor.replace('4', "3"), accessor.replace("VEC2", "VEC3"), accessor.replace("5126", "5121")]

@@ -79,7 +79,7 @@ fn parse(skeleton: &str, motion: &str) -> Result<Recording, String> {
     Ok(Recording::new(bones.joints(), 120.0, values))
 }
 
-/// Where the bones of `names`, whose ends no joint marks, and of those before the joints of `names` end, the root at 0.
+/// Where the joints are in a frame, by their bones, the root at 0.
 fn joints(recording: &Recording, frame: usize) -> Vec<(&str, [f64; 3])> {
     let world = recording.world_rotations(frame);
     let mut at: Vec<[f64; 3]> = Vec::new();

@@ -72,6 +72,9 @@ impl<'a> Words<'a> {
     }
 }
 
+/// What some editors begin a text with.
+const BYTE_ORDER_MARK: char = '\u{feff}';
+
 /// Reads a BVH file.
 ///
 /// # Errors
@@ -89,7 +92,7 @@ pub fn load(path: &Path) -> Result<Recording, FileError> {
 /// # Errors
 /// [`FileError`] naming file and line.
 pub fn parse(text: &str, path: &Path) -> Result<Recording, FileError> {
-    let lines = text.lines().enumerate();
+    let lines = text.trim_start_matches(BYTE_ORDER_MARK).lines().enumerate();
     let words =
         lines.flat_map(|(n, line)| line.split_ascii_whitespace().map(move |word| (n + 1, word))).collect();
     let mut words = Words { words, at: 0, path };

@@ -56,11 +56,15 @@ impl Rig<'_> {
             let arm = self.limb(side, |part| if let Part::Arm(n) = part { Some(n) } else { None }, false);
             joints.into_iter().zip(arm).for_each(|(joint, found)| map[joint] = found);
         }
-        let Some(crotch) = self.fork(map[1], map[2]) else { return map };
+        // Where one joint of a limb is not known, the next one hangs from the same fork.
+        let first = |joints: [usize; 4]| joints.into_iter().find_map(|joint| map[joint]);
+        let [[left_leg, right_leg], [left_arm, right_arm]] =
+            [LEGS, ARMS].map(|sides| sides.map(|(_, joints)| first(joints)));
+        let Some(crotch) = self.fork(left_leg, right_leg) else { return map };
         let named = self.path(crotch).into_iter().rev().find(|joint| self.is(*joint, Part::Pelvis));
         let pelvis = named.unwrap_or(crotch);
         map[PELVIS] = Some(pelvis);
-        let Some(chest) = self.fork(map[13].or(map[16]), map[14].or(map[17])) else { return map };
+        let Some(chest) = self.fork(left_arm, right_arm) else { return map };
         let Some(base) = self.fork(Some(pelvis), Some(chest)) else { return map };
         let is_trunk = |joint: &usize| !self.is(*joint, Part::Neck) && !self.is(*joint, Part::Head);
         let spine: Vec<usize> = self

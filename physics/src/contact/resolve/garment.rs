@@ -9,7 +9,7 @@ use crate::rows::{CompressedRows, faces_at_vertices};
 use crate::vec3::{self, norm, sub};
 
 /// Positions farther from the origin than this are refused (m): the exact predicates would hold, but no distance would.
-const FARTHEST: f64 = 1e3;
+pub const FARTHEST: f64 = 1e3;
 
 /// Everything about a garment that its positions do not change: made once, used for every frame and body.
 #[derive(Debug)]

@@ -73,7 +73,7 @@ pub use error::ResolveError;
 pub use fast_pass::fast_pass;
 use fast_pass::passed_near;
 pub use follow::{resolve_after, resolve_along};
-pub use garment::{Layer, RestGarment};
+pub use garment::{FARTHEST, Layer, RestGarment};
 pub use resolved::{GarmentWork, Resolved, Stage};
 pub use settings::ResolveSettings;
 pub use waypoint::{PathSample, Reached};

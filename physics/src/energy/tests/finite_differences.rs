@@ -67,6 +67,33 @@ fn so_it_is_with_every_switch() {
     check(Term::Holding, EnergySettings { holding_fraction: 0.4, ..default }, 3, "40 % held");
 }
 
+/// What is worn below makes the body thicker, by another amount at every vertex.
+#[test]
+fn cloth_over_what_is_worn_below_keeps_a_margin_that_has_grown() {
+    for samples in [ContactSamples::Vertices, ContactSamples::FacesAndEdges] {
+        let settings = EnergySettings { body_samples: samples, ..EnergySettings::default() };
+        let over = |term: Term, thickness: &dyn Fn(usize) -> f64| {
+            let mut scene: Scene<f64> = scene(settings, only(term), 3);
+            for garment in &mut scene.energy.garments {
+                garment.thickness_below = (0..garment.energies.vertex_count()).map(thickness).collect();
+            }
+            scene
+        };
+        let value = |scene: &Scene<f64>| scene.energy.evaluate(&scene.posed, &scene.canonical).total;
+        let uneven = |v: usize| 1e-3 * (v % 5) as f64;
+        check_scene(over(Term::BodyCollision, &uneven), Term::BodyCollision, 3, "worn below");
+        // The same thickness everywhere is a larger margin.
+        let margin = settings.body_collision_epsilon + 3e-3;
+        let wider = EnergySettings { body_collision_epsilon: margin, ..settings };
+        let wider = value(&scene(wider, only(Term::BodyCollision), 3));
+        let even = value(&over(Term::BodyCollision, &|_| 3e-3));
+        assert!(even > 0.0 && (even - wider).abs() < 1e-12 * wider, "{even} {wider}");
+        // The layer distance reads which garment is over which off the body as it is.
+        let bare = value(&over(Term::LayerDistance, &|_| 0.0));
+        assert!(bare > 0.0 && value(&over(Term::LayerDistance, &uneven)) == bare);
+    }
+}
+
 #[test]
 fn holding_pulled_back_by_bent_skinning_has_its_gradient_at_posed_positions() {
     for seed in [1, 2] {

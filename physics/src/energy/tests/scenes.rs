@@ -57,7 +57,13 @@ pub fn scene_garment<T: Real>(
 ) -> SceneGarment<T> {
     let energies =
         GarmentEnergies::new(rest, &Topology::new(rest), settings, is_held).expect("valid garment");
-    SceneGarment { energies: Arc::new(energies), holding_reference: narrowed(rest), pull_back: None, weights }
+    SceneGarment {
+        energies: Arc::new(energies),
+        holding_reference: narrowed(rest),
+        pull_back: None,
+        thickness_below: Vec::new(),
+        weights,
+    }
 }
 
 /// Positions in the scalar of a scene.

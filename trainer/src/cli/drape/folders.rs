@@ -2,7 +2,7 @@
 
 use crate::system::paths::destination;
 use miette::{IntoDiagnostic, Report as Failure, miette};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Refuses a cache in the folder that is to be made.
 pub(super) fn check_cache(cache: Option<&Path>, output: &Path) -> Result<(), Failure> {
@@ -17,11 +17,6 @@ pub(super) fn check_cache(cache: Option<&Path>, output: &Path) -> Result<(), Fai
         )),
         false => Ok(()),
     }
-}
-
-/// `clothcombo` in the folder for what programs may compute anew.
-pub(super) fn user_cache() -> Option<PathBuf> {
-    Some(dirs::cache_dir()?.join("clothcombo"))
 }
 
 #[cfg(all(test, unix))]

@@ -1,15 +1,13 @@
 //! One outfit to be draped, and the bodies it is draped on.
 
 use crate::dataset::DatasetError;
-use crate::inference::{BodyReport, BodyState, Draper, GivenGarment, Moment};
+use crate::inference::{Bodies, Draper, FrameRange, GivenGarment, file_and_frame, read_pose};
 use clap::Args;
-use clothcombo_data::asset::{KnownShape, Motion, Pose, recover_body};
+use clothcombo_data::asset::{KnownShape, Motion, Pose};
 use clothcombo_data::fit::FitSettings;
 use clothcombo_data::format::load_mesh;
-use clothcombo_data::generate::{POSE_NAMES, named_pose};
 use miette::{Report as Failure, miette};
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 
 /// Shape, pose or motion of the body.
 #[derive(Args, Clone, Debug, Default)]
@@ -37,31 +35,6 @@ pub(super) struct SceneArguments {
     pub t_pose: Option<PathBuf>,
 }
 
-/// Frames `[first, end)`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct FrameRange {
-    first: usize,
-    end: Option<usize>,
-}
-
-impl FromStr for FrameRange {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("'{text}' is no range of frames such as 0..120, 30.. or ..60");
-        let (first, end) = text.split_once("..").ok_or_else(wrong)?;
-        let number = |part: &str, empty| match part {
-            "" => Ok(empty),
-            digits => digits.parse::<usize>().map(Some).map_err(|_| wrong()),
-        };
-        let range = Self { first: number(first, Some(0))?.unwrap_or(0), end: number(end, None)? };
-        match range.end.is_some_and(|end| end <= range.first) {
-            true => Err(format!("'{text}' holds no frame")),
-            false => Ok(range),
-        }
-    }
-}
-
 /// A garment that is asked for.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct WantedGarment {
@@ -84,14 +57,6 @@ pub(super) struct Job {
     pub scene: SceneArguments,
 }
 
-/// The bodies of a job.
-pub(super) struct Scenes {
-    pub states: Vec<BodyState>,
-    /// When they are, if they are a motion.
-    pub moments: Vec<Moment>,
-    pub body: BodyReport,
-}
-
 impl Job {
     /// Files that are read, names of garments among them.
     pub fn files(&self) -> impl Iterator<Item = PathBuf> {
@@ -104,117 +69,30 @@ impl Job {
     }
 
     /// Reads pose, motion or meshes.
-    pub fn scenes(&self, draper: &Draper) -> Result<Scenes, Failure> {
+    pub fn bodies(&self, draper: &Draper) -> Result<Bodies, Failure> {
         let (body, scene) = (draper.body(), &self.scene);
-        let report = |pose: String| BodyReport {
-            name: body.name.clone(),
-            shape: scene.shape.clone(),
-            pose,
-            vertices: body.vertex_count(),
-            triangles: body.faces.len(),
-            recovered_within_mm: None,
-        };
+        let read = |path: &Path| Ok::<_, Failure>(load_mesh(path).map_err(DatasetError::data)?.positions);
         if let Some(path) = &scene.motion {
             let motion = Motion::load(path).map_err(DatasetError::data)?;
-            let range = scene.frames.unwrap_or(FrameRange { first: 0, end: None });
-            let end = range.end.unwrap_or(motion.poses.len());
-            if range.first >= motion.poses.len() || end > motion.poses.len() {
-                return Err(no_frame(path, range.first.max(end.saturating_sub(1)), motion.poses.len()));
-            }
-            let frames = (range.first..end).step_by(scene.every.unwrap_or(1) as usize);
-            let (states, moments) = frames
-                .map(|frame| {
-                    let seconds = frame as f64 / motion.frame_rate;
-                    (
-                        BodyState::new(scene.shape.clone(), motion.poses[frame].clone()),
-                        Moment { frame, seconds },
-                    )
-                })
-                .unzip();
-            return Ok(Scenes { states, moments, body: report(path.display().to_string()) });
+            let (frames, every) = (scene.frames.unwrap_or_default(), scene.every.unwrap_or(1) as usize);
+            let name = path.display().to_string();
+            return Ok(Bodies::in_motion(body, &scene.shape, &motion, &name, frames, every)?);
         }
         if let Some(path) = &scene.posed {
-            return posed_body(draper, scene, path);
+            let surface = read(path)?;
+            let rest = scene.t_pose.as_deref().map(read).transpose()?;
+            let known = match &rest {
+                Some(rest) => KnownShape::TPose(rest),
+                None => KnownShape::Parameters(&scene.shape),
+            };
+            return Ok(Bodies::of_surface(body, surface, known, &path.display().to_string())?);
         }
         let (pose, name) = match &scene.pose {
-            None => (Pose::t_pose(0), "T-pose".to_owned()),
-            Some(text) => (one_pose(text)?, text.clone()),
+            None => (Pose::t_pose(0), "T-pose"),
+            Some(text) => (read_pose(text)?, text.as_str()),
         };
-        let states = vec![BodyState::new(scene.shape.clone(), pose)];
-        Ok(Scenes { states, moments: Vec::new(), body: report(name) })
+        Ok(Bodies::in_pose(body, &scene.shape, pose, name))
     }
-}
-
-fn no_frame(path: &Path, frame: usize, count: usize) -> Failure {
-    miette!(help = "frames count from 0", "{} has {count} frames, no frame {frame}", path.display())
-}
-
-/// `FILE.npz` or `FILE.npz:FRAME`.
-fn file_and_frame(text: &str) -> (&str, &str) {
-    match text.rsplit_once(':') {
-        // What is no number is one that was meant as one where the rest is a file.
-        Some((path, frame))
-            if !Path::new(text).exists()
-                && (frame.bytes().all(|b| b.is_ascii_digit()) || Path::new(path).is_file()) =>
-        {
-            (path, frame)
-        }
-        _ => (text, "0"),
-    }
-}
-
-fn one_pose(text: &str) -> Result<Pose, Failure> {
-    let (path, frame) = file_and_frame(text);
-    if !Path::new(path).exists() {
-        // A word without a dot or a slash is a name, not a file that happens to be missing.
-        let is_name = !text.contains('/') && Path::new(path).extension().is_none();
-        match named_pose(text) {
-            Some(pose) => return Ok(pose),
-            None if is_name => {
-                return Err(miette!(
-                    help = format!(
-                        "its names: {}; or give a frame of a motion file, FILE.npz:FRAME",
-                        POSE_NAMES.join(", ")
-                    ),
-                    "--pose {text}: neither a file nor the name of a pose"
-                ));
-            }
-            None => {}
-        }
-    }
-    let frame = frame.parse().map_err(|_| miette!("--pose {text}: {frame:?} is no number of a frame"))?;
-    let motion = Motion::load(Path::new(path)).map_err(DatasetError::data)?;
-    motion.poses.get(frame).cloned().ok_or_else(|| no_frame(Path::new(path), frame, motion.poses.len()))
-}
-
-fn posed_body(draper: &Draper, scene: &SceneArguments, posed: &Path) -> Result<Scenes, Failure> {
-    let body = draper.body();
-    let read = |path: &Path| Ok::<_, Failure>(load_mesh(path).map_err(DatasetError::data)?.positions);
-    let surface = read(posed)?;
-    let rest = scene.t_pose.as_deref().map(read).transpose()?;
-    let known = match &rest {
-        Some(rest) => KnownShape::TPose(rest),
-        None => KnownShape::Parameters(&scene.shape),
-    };
-    let found = recover_body(body, known, &surface).map_err(|e| {
-        miette!(
-            help = "the mesh must be a pose of the body model: the same vertices in the same order, metres, y up; \
-                    and its shape known, by --t-pose or --shape",
-            "{}: {e}",
-            posed.display()
-        )
-    })?;
-    let report = BodyReport {
-        name: body.name.clone(),
-        shape: found.shape.clone(),
-        pose: posed.display().to_string(),
-        vertices: body.vertex_count(),
-        triangles: body.faces.len(),
-        recovered_within_mm: Some(1e3 * found.mean_distance),
-    };
-    let state =
-        BodyState { shape: found.shape, pose: found.pose, surface: Some(surface), place: found.place };
-    Ok(Scenes { states: vec![state], moments: Vec::new(), body: report })
 }
 
 /// `sources` in the order of `numbers`.
@@ -240,22 +118,4 @@ pub(super) fn ordered(
     }
     let mut sources: Vec<Option<GivenGarment>> = sources.into_iter().map(Some).collect();
     Ok(numbers.iter().filter_map(|n| sources[*n].take()).collect())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn ranges_of_frames_are_half_open_and_never_empty() {
-        let range = |text: &str| text.parse::<FrameRange>().map(|r| (r.first, r.end));
-        assert_eq!(range("3..9"), Ok((3, Some(9))));
-        assert_eq!(
-            (range("3.."), range("..9"), range("..")),
-            (Ok((3, None)), Ok((0, Some(9))), Ok((0, None)))
-        );
-        for wrong in ["", "7", "9..3", "4..4", "a..b", "-1..4"] {
-            assert!(range(wrong).is_err(), "{wrong}");
-        }
-    }
 }

@@ -5,30 +5,29 @@ mod folders;
 mod job;
 mod outfits;
 mod summary;
-mod warnings;
 
 use crate::cli::device_argument::DeviceArgument;
 use crate::cli::fit_arguments::FitArguments;
 use crate::cli::output::print_json;
 use crate::cli::post_process::PostProcessArguments;
 use crate::cli::verbosity::{print_status, progress_bar};
-use crate::inference::output::{Show, Staged, write};
+use crate::inference::output::{Show, Staged, write_with_report};
 use crate::inference::{
-    Drape, DrapeProgress, Draper, DraperSettings, Moment, Outfit, RefineSteps, Report, smooth,
+    Bodies, DrapeProgress, Draper, DraperSettings, MOST_RADIUS, Outfit, RefineSteps, Report, log_repairs,
+    warn_about_order,
 };
 use crate::system::files::write_json;
+use crate::system::paths::user_cache;
 use clap::{ArgGroup, Parser, ValueEnum};
-use clothcombo_data::fit::FitSettings;
 use dataset::DatasetFolders;
-use folders::{check_cache, user_cache};
+use folders::check_cache;
 use indicatif::ProgressBar;
-use job::{Job, Scenes, WantedGarment, ordered};
+use job::{Job, WantedGarment, ordered};
 use miette::{IntoDiagnostic, Report as Failure, miette};
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-use warnings::{check_poses, log_repairs, warn_about_order, warn_about_shape};
 
 /// Drapes garments on a body, innermost first: OBJ, GLB, picture, viewer and a report with a certificate
 #[derive(Parser)]
@@ -89,7 +88,7 @@ pub struct Arguments {
     /// Smooths a motion over this many frames to each side, before the post-process and, where that makes no
     /// intersection, after it; 0 takes every frame as it is [default: 2 for frames at most 0.05 s apart, else 0]
     #[arg(long, num_args = 0..=1, default_missing_value = "2", value_name = "FRAMES",
-          value_parser = clap::value_parser!(u16).range(..=100))]
+          value_parser = clap::value_parser!(u16).range(..=i64::from(MOST_RADIUS)))]
     smooth: Option<u16>,
     /// Folder that keeps embeddings between runs; default: clothcombo in the user's cache folder
     #[arg(long, value_name = "FOLDER")]
@@ -143,9 +142,6 @@ impl Fit {
     }
 }
 
-/// Frames this near to each other show the same cloth (s); a little more than 0.05, for rounding.
-const CLOSE_FRAMES: f64 = 0.050_001;
-
 /// Runs the verb.
 ///
 /// # Errors
@@ -178,47 +174,37 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         1 => failure,
         _ => failure.wrap_err(format!("outfit {}", job.name)),
     };
-    let find = |garment: &WantedGarment| {
-        let WantedGarment { name, hints } = garment;
-        match arguments.fit == Fit::Never && *hints != FitSettings::default() {
-            true => Err(miette!(
-                help = "leave --fit never out",
-                "{name}: --fit never takes garments as they are, so that nothing can be said about their files"
-            )),
-            false => Ok(catalog.find(name, draper.body(), arguments.fit.decided(), hints)?),
-        }
-    };
     let read = |job: &Job| {
-        let sources = job.garments.iter().map(find).collect::<Result<Vec<_>, Failure>>()?;
+        let find = |garment: &WantedGarment| {
+            catalog.find(&garment.name, draper.body(), arguments.fit.decided(), &garment.hints)
+        };
+        let sources = job.garments.iter().map(find).collect::<Result<Vec<_>, _>>()?;
         let sources = ordered(sources, job.order.as_deref())?;
         Outfit::check(&sources)?;
         sources.iter().for_each(log_repairs);
         warn_about_order(&sources);
-        let scenes = job.scenes(&draper)?;
-        // The frames of a motion are alike in what may be wrong with them.
-        scenes.states.first().map_or(Ok(()), |state| draper.check_body(state))?;
-        warn_about_shape(&scenes.body.shape, draper.trained().config.data.shape_range);
-        check_poses(&scenes)?;
-        Ok((sources, scenes))
+        let bodies = job.bodies(&draper)?;
+        bodies.check(&draper)?;
+        Ok((sources, bodies))
     };
     let read = |job| read(job).map_err(|failure| blame(job, failure));
     let wanted = jobs.iter().map(read).collect::<Result<Vec<_>, Failure>>()?;
     // A name says only now which file it stands for.
     let files = wanted.iter().flat_map(|(sources, _)| sources).filter_map(|source| source.path.clone());
     staged.keep(files.chain([draper.trained().folder.clone()]))?;
-    let bar = match wanted.iter().map(|(_, scenes)| scenes.states.len()).sum() {
+    let bar = match wanted.iter().map(|(_, bodies)| bodies.states.len()).sum() {
         1 => progress_bar(1, "{spinner} draping · {elapsed}{prefix}{msg}"),
         drapes => progress_bar(drapes, "drapes {bar:30} {pos}/{len} · {eta} left{prefix}{msg}"),
     };
     bar.enable_steady_tick(Duration::from_millis(200));
     let mut reports = Vec::new();
-    for (job, (sources, scenes)) in jobs.iter().zip(wanted) {
+    for (job, (sources, bodies)) in jobs.iter().zip(wanted) {
         let folder = match jobs.len() {
             1 => staged.folder().to_owned(),
             _ => staged.folder().join(&job.name),
         };
         let outfit = draper.outfit(sources).map_err(|e| blame(job, e.into()))?;
-        let report = drape_job(arguments, &draper, &outfit, job, &scenes, &folder, &bar);
+        let report = drape_job(arguments, &draper, &outfit, job, &bodies, &folder, &bar);
         reports.push((job.name.as_str(), report.map_err(|failure| blame(job, failure))?));
     }
     bar.finish_and_clear();
@@ -271,31 +257,17 @@ fn settings(arguments: &Arguments, body: Option<String>) -> Result<DraperSetting
     })
 }
 
-/// Frames to each side over which a motion is smoothed: where nothing else is asked for, two of frames that are
-/// [close](CLOSE_FRAMES), so that only what trembles is averaged.
-fn smoothing_radius(asked: Option<u16>, moments: &[Moment]) -> usize {
-    let is_close = |pair: &[Moment]| pair[1].seconds - pair[0].seconds <= CLOSE_FRAMES;
-    let usual = if moments.windows(2).all(is_close) { 2 } else { 0 };
-    asked.map_or(usual, usize::from)
-}
-
 fn drape_job(
     arguments: &Arguments,
     draper: &Draper,
     outfit: &Outfit,
     job: &Job,
-    scenes: &Scenes,
+    bodies: &Bodies,
     folder: &Path,
     bar: &ProgressBar,
 ) -> Result<Report, Failure> {
-    let radius = smoothing_radius(arguments.smooth, &scenes.moments);
-    let mut drapes = drape_all(draper, outfit, scenes, radius, bar)?;
-    let smoothing = match radius {
-        radius if radius > 0 && !scenes.moments.is_empty() => {
-            Some(smooth(draper, outfit, &mut drapes, radius)?)
-        }
-        _ => None,
-    };
+    let (drapes, smoothing) = draper.drape_bodies(outfit, bodies, arguments.smooth, show_progress(bar))?;
+    bar.set_prefix("");
     let title = match job.name.as_str() {
         "outfit" => outfit.names().collect::<Vec<_>>().join(", "),
         name => name.to_owned(),
@@ -304,31 +276,15 @@ fn drape_job(
         draper,
         outfit,
         drapes: &drapes,
-        moments: &scenes.moments,
+        moments: &bodies.moments,
         title: &title,
         all_frames: arguments.all_frames,
     };
-    std::fs::create_dir_all(folder).into_diagnostic()?;
-    let (written, report) = rayon::join(
-        || write(folder, &show),
-        || Report::new(draper, outfit, &drapes, &scenes.moments, scenes.body.clone(), smoothing),
-    );
-    let report = report?;
-    for (file, milliseconds) in written? {
-        tracing::debug!("{file} in {milliseconds:.0} ms");
-    }
-    write_json(&folder.join("report.json"), &report)?;
-    Ok(report)
+    Ok(write_with_report(folder, &show, &bodies.report, smoothing)?)
 }
 
-fn drape_all(
-    draper: &Draper,
-    outfit: &Outfit,
-    scenes: &Scenes,
-    radius: usize,
-    bar: &ProgressBar,
-) -> Result<Vec<Drape>, Failure> {
-    let drapes = draper.drape_motion(outfit, &scenes.states, radius, |progress| match progress {
+fn show_progress(bar: &ProgressBar) -> impl FnMut(DrapeProgress) {
+    |progress| match progress {
         DrapeProgress::Continuation(share) if share < 1.0 => {
             bar.set_message(format!(
                 " · resolving intersections, {:.0} % of the continuation path",
@@ -344,9 +300,7 @@ fn drape_all(
             bar.set_message("");
             bar.set_prefix(format!(" · number {} once more, from the one after it", frame + 1));
         }
-    })?;
-    bar.set_prefix("");
-    Ok(drapes)
+    }
 }
 
 fn print(arguments: &Arguments, reports: &[(&str, Report)]) -> Result<(), Failure> {
@@ -364,21 +318,4 @@ fn print(arguments: &Arguments, reports: &[(&str, Report)]) -> Result<(), Failur
         }
     }
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn frames_far_from_each_other_are_only_smoothed_if_asked_for() {
-        let moments = |rate: f64| -> Vec<Moment> {
-            (0..5).map(|frame| Moment { frame, seconds: frame as f64 / rate }).collect()
-        };
-        assert_eq!(
-            [60.0, 30.0, 20.0, 19.0, 3.0].map(|rate| smoothing_radius(None, &moments(rate))),
-            [2, 2, 2, 0, 0]
-        );
-        assert_eq!([0, 3].map(|asked| smoothing_radius(Some(asked), &moments(3.0))), [0, 3]);
-    }
 }

@@ -1,8 +1,8 @@
 //! A TOML file of outfits.
 
 use super::job::{Job, SceneArguments, WantedGarment};
-use crate::cli::fit_arguments::GarmentEntry;
 use clothcombo_data::fit::FitSettings;
+use clothcombo_data::fit::hints::GarmentEntry;
 use miette::{IntoDiagnostic, Report as Failure, WrapErr, miette};
 use serde::Deserialize;
 use std::collections::HashSet;

@@ -2,13 +2,14 @@
 
 mod output;
 
-use super::fit_arguments::{Arms, FitArguments};
+use super::fit_arguments::FitArguments;
 use crate::cli::output::print_report;
 use crate::cli::values::file_to_make;
 use crate::cli::verbosity::spinner;
 use crate::dataset::load_body;
 use crate::system::paths::{lossy, lossy_option};
 use clap::Parser;
+use clothcombo_data::fit::hints::Arms;
 use clothcombo_data::fit::{FitReport, FitSettings, fit};
 use miette::{IntoDiagnostic, Report, miette};
 use output::{Form, check_output, read, save};
@@ -23,8 +24,8 @@ use std::path::{Path, PathBuf};
         clothcombo fit thick.obj --keep outer -o thin.obj\n  \
         clothcombo fit dress.obj --from-body SMPL_NEUTRAL.npz:1.2,-0.5 --body datasets/open/body.npz -o dress_fitted.obj\n\n\
         Reads OBJ, PLY, STL and glTF. Without -o nothing is written: the report alone is printed.\n\n\
-        The OBJ is in metres, y up, at rest on the zero body in T-pose, and needs no further repair: `check`, `drape` and training\n\
-        take it as it is. It has the file's own faces (quads too), texture coordinates, groups, materials and order of vertices,\n\
+        The OBJ is in metres, y up, at rest on the zero body in T-pose. What `check` would say of it are the report's warnings.\n\
+        It has the file's own faces (quads too), texture coordinates, groups, materials and order of vertices,\n\
         except where that would be wrong: vertices and faces that were dropped are left out, vertices that were welded or joined\n\
         are one, and faces whose parts were dropped, cut or split are triangles. --triangles writes the triangles alone,\n\
         --with-thickness all of the file's vertices and faces, with both sheets of thick cloth."
@@ -82,6 +83,7 @@ struct Output<'a> {
     body: &'a str,
     #[serde(serialize_with = "lossy_option")]
     output: Option<&'a Path>,
+    warnings: Vec<String>,
     #[serde(flatten)]
     report: &'a FitReport,
 }
@@ -109,8 +111,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
         comments.extend(report.assumptions().into_iter().map(|a| format!("assumed: {a}")));
         save(output, &given, &fitted, arguments.form(), &comments)?;
     }
-    let output =
-        Output { garment: &arguments.garment, body: &body.name, output: arguments.output.as_deref(), report };
+    let output = Output {
+        garment: &arguments.garment,
+        body: &body.name,
+        output: arguments.output.as_deref(),
+        warnings: report.warnings(),
+        report,
+    };
     print_report(arguments.json, &output, |output| match output.output {
         Some(file) => format!("{report}\nwritten   {}\n", file.display()),
         None => format!("{report}\n"),

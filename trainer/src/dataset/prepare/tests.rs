@@ -38,10 +38,11 @@ fn distant_garments_are_a_pair_in_the_full_graph_only() {
             features: &|pose, joints| PoseEncoding::RotationMatrix.features(pose, joints),
             losses: &losses,
             graph,
+            layer_thickness: None,
         };
         let bodies = vec![BodySample { shape: Vec::new(), pose: Pose::t_pose(body.joint_count()) }];
-        let sample = SceneSample { garments: vec![0, 1, 2], bodies, repulsion_sample: 0 };
-        let scene = builder.build(sample, garments.clone(), 1.0);
+        let sample = SceneSample { garments: vec![0, 1, 2], bodies, below: Vec::new(), repulsion_sample: 0 };
+        let scene = builder.build(sample, garments.clone(), &[], 1.0);
         let layers = &scene.bodies[0].energy.layers;
         assert!(layers.iter().all(|layer| layer.weights[Term::LayerCollision] > 0.0));
         assert_eq!(scene.contacts, layers.iter().map(|layer| (layer.inner, layer.outer)).collect::<Vec<_>>());

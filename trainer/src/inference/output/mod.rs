@@ -16,7 +16,7 @@ mod viewer;
 
 pub use staged::Staged;
 
-use super::{Drape, Draper, DraperError, GivenGarment, Moment, Outfit};
+use super::{BodyReport, Drape, Draper, DraperError, GivenGarment, Moment, Outfit, Report, Smoothing};
 use crate::picture::{BODY_COLOUR, PictureError, layer_colour};
 use clothcombo_data::format::obj::{self, MovedObj};
 use clothcombo_data::format::{FileError, SceneMesh, save_glb};
@@ -126,6 +126,31 @@ pub struct Show<'a> {
 
 /// Times of writing (ms), by file.
 pub type WriteTimes = Vec<(&'static str, f64)>;
+
+/// Writes everything into `folder`, which is made if it is not there.
+///
+/// # Errors
+/// When a file cannot be written, or a state cannot be measured.
+pub fn write_with_report(
+    folder: &Path,
+    show: &Show,
+    body: &BodyReport,
+    smoothing: Option<Smoothing>,
+) -> Result<Report, OutputError> {
+    let refused = |reason| OutputError::Io { path: folder.into(), reason };
+    std::fs::create_dir_all(folder).map_err(refused)?;
+    let (written, report) = rayon::join(
+        || write(folder, show),
+        || Report::new(show.draper, show.outfit, show.drapes, show.moments, body.clone(), smoothing),
+    );
+    let report = report?;
+    for (file, milliseconds) in written? {
+        tracing::debug!("{file} in {milliseconds:.0} ms");
+    }
+    let json = serde_json::to_vec_pretty(&report).map_err(|e| refused(e.into()))?;
+    std::fs::write(folder.join("report.json"), json).map_err(refused)?;
+    Ok(report)
+}
 
 /// Writes everything but the report into `folder`.
 ///

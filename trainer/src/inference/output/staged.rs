@@ -71,24 +71,7 @@ impl Staged {
             self.temporary.keep();
             return Err(OutputError::Meanwhile { reason: Box::new(reason), instead });
         }
-        let earlier = folder.with_extension("old");
-        let had_earlier = self.target.exists();
-        if had_earlier {
-            fs::rename(&self.target, &earlier).map_err(failed)?;
-        }
-        if let Err(reason) = fs::rename(folder, &self.target) {
-            if had_earlier {
-                // The first error is the one worth telling.
-                let _ = fs::rename(&earlier, &self.target);
-            }
-            return Err(failed(reason));
-        }
-        self.temporary.keep();
-        if had_earlier {
-            fs::remove_dir_all(&earlier)
-                .map_err(|reason| OutputError::Io { path: earlier.clone(), reason })?;
-        }
-        Ok(())
+        self.temporary.replace(&self.target).map_err(failed)
     }
 }
 

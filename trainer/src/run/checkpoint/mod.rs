@@ -86,11 +86,7 @@ impl Checkpoint {
 
         retention::sweep(&folder);
         write(temporary.path(), config, &mut state, snapshot).map_err(failed)?;
-        if path.exists() {
-            fs::remove_dir_all(&path).map_err(io_failed)?;
-        }
-        fs::rename(temporary.path(), &path).map_err(io_failed)?;
-        temporary.keep();
+        temporary.replace(&path).map_err(io_failed)?;
         File::open(&folder).and_then(|d| d.sync_all()).map_err(io_failed)?;
         atomic::write(&folder.join("latest"), name.as_bytes()).map_err(io_failed)?;
         let best = state.best.map(|b| b.step);

@@ -62,7 +62,7 @@ fn per_vertex(config: &Config, stage: &StageConfig, joints: usize) -> f64 {
         PER_SKINNING_LAYER * (m.skinning_layers * m.skinning_width) as f64 + PER_JOINT * joints as f64;
     // Of all bodies of a scene, and of the garments whatever the body.
     let (of_body, of_garments) = match stage.trains {
-        Trains::Single => (sine + skinning, modulator),
+        Trains::Single | Trains::Draping => (sine + skinning, modulator),
         // The first stage is not trained: it keeps nothing for a backward pass.
         Trains::Untangling => (sine, 2.0 * modulator),
         Trains::All => (2.0 * sine + skinning, 2.0 * modulator),

@@ -123,12 +123,14 @@ impl<'a> SceneStep<'a> {
         for body in &scene.bodies {
             let states = drape_states(&networks, tensors, scene, body, (&outfit, &embeddings), trains)?;
             if single_weight > 0.0 {
-                losses.add(&states.single, &Arc::new(body.energy.without_layers()), single_weight);
+                losses.add(&states.single, &Arc::new(scene.energy_of_singles(body)), single_weight);
             }
             // Every correction learns from the state it leads to.
             let learned = match trains {
                 Trains::Corrections => &states.corrected[..],
-                Trains::Single | Trains::Untangling | Trains::All => std::slice::from_ref(states.last()),
+                Trains::Single | Trains::Draping | Trains::Untangling | Trains::All => {
+                    std::slice::from_ref(states.last())
+                }
             };
             let outputs =
                 learned.iter().map(|state| losses.add(state, &body.energy, share / learned.len() as f64));
@@ -173,6 +175,7 @@ fn with_frozen(model: &ClothCombo, frozen: Option<&ClothCombo>, trains: Trains) 
     let frozen = || frozen.expect("kept at the first step of a stage that freezes").clone();
     match trains {
         Trains::Single | Trains::All => model.clone(),
+        Trains::Draping => ClothCombo { garment_encoder: frozen().garment_encoder, ..model.clone() },
         Trains::Untangling => ClothCombo { untangling: model.untangling.clone(), ..frozen() },
         Trains::Corrections => ClothCombo { corrections: model.corrections.clone(), ..frozen() },
     }

@@ -47,6 +47,7 @@ impl Case {
         let skinning_width = width.min(128);
         let trains = match trains {
             Trains::Single => "single",
+            Trains::Draping => "draping",
             Trains::Untangling => "untangling",
             Trains::All => "all",
             Trains::Corrections => "corrections",

@@ -31,7 +31,7 @@ impl Session {
     /// # Errors
     /// When the networks cannot be made, or the model they start from does not fit.
     pub fn new(run: RunDir, config: Config, dataset: Arc<Dataset>, device: &Device) -> Result<Self, Report> {
-        check_largest(device, largest_tensor(&config, &DataSizes::of(&dataset)))?;
+        check_largest(device, largest_tensor(&config, &DataSizes::of(&dataset, &config.data)))?;
         let device = device.clone().autodiff();
         let model = match &config.init_from {
             None => ClothCombo::new(&config.model, &dataset.dimensions(), config.seed, &device)
@@ -66,7 +66,7 @@ impl Session {
         device: &Device,
         checkpoint: &Checkpoint,
     ) -> Result<Self, Report> {
-        check_largest(device, largest_tensor(&config, &DataSizes::of(&dataset)))?;
+        check_largest(device, largest_tensor(&config, &DataSizes::of(&dataset, &config.data)))?;
         let device = device.clone().autodiff();
         let found = &checkpoint.state;
         let changed_data = changed_data(checkpoint, &dataset, run.allowed())?;

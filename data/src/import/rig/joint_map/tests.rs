@@ -133,6 +133,9 @@ fn joints_in_the_wrong_place_of_the_tree_are_not_taken() {
     let map = resolve(&rig(&lines));
     assert_eq!(missing(&map), ["left_knee"]);
     assert_eq!(missing(&resolve(&rig(&["a > b > c"]))).len(), 15);
+    // One limb joint of a strange name hides no other joint.
+    let strange = [lines[0], "Hips > Foo > LeftLeg > LeftFoot", lines[2], lines[4], lines[5]];
+    assert_eq!(missing(&resolve(&rig(&strange))), ["left_hip"]);
 }
 
 #[test]

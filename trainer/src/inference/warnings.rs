@@ -1,10 +1,10 @@
 //! Warnings about inputs that can be draped.
 
-use super::job::Scenes;
-use crate::inference::GivenGarment;
+use super::bodies::Bodies;
+use super::error::DraperError;
+use super::source::GivenGarment;
 use clothcombo_data::asset::{Garment, Pose, infeasible_pair};
 use clothcombo_data::check::{impossible_turn, not_radians, not_upright};
-use miette::{Report as Failure, miette};
 
 pub(super) fn warn_about_shape(shape: &[f64], [low, high]: [f64; 2]) {
     if let Some(value) = shape.iter().find(|value| !(low..=high).contains(*value)) {
@@ -12,7 +12,8 @@ pub(super) fn warn_about_shape(shape: &[f64], [low, high]: [f64; 2]) {
     }
 }
 
-pub(super) fn warn_about_order(sources: &[GivenGarment]) {
+/// Warns of garments that cannot lie over those under them.
+pub fn warn_about_order(sources: &[GivenGarment]) {
     let order: Vec<&Garment> = sources.iter().map(|source| &source.garment).collect();
     if let Some([inner, outer]) = infeasible_pair(&order) {
         tracing::warn!(
@@ -23,7 +24,8 @@ pub(super) fn warn_about_order(sources: &[GivenGarment]) {
     }
 }
 
-pub(super) fn log_repairs(source: &GivenGarment) {
+/// Logs what fitting assumed and repaired; warns where it has doubts.
+pub fn log_repairs(source: &GivenGarment) {
     let Some(fit) = &source.fit else { return };
     let name = &source.garment.name;
     tracing::info!("{name} fitted: {}", fit.assumptions().join("; "));
@@ -39,20 +41,14 @@ pub(super) fn log_repairs(source: &GivenGarment) {
 }
 
 /// Warns about poses that no person takes.
-///
-/// # Errors
-/// If their angles cannot be in radians.
-pub(super) fn check_poses(scenes: &Scenes) -> Result<(), Failure> {
-    let poses: Vec<Pose> = scenes.states.iter().map(|state| state.pose.clone()).collect();
+pub(super) fn check_poses(bodies: &Bodies) -> Result<(), DraperError> {
+    let poses: Vec<Pose> = bodies.states.iter().map(|state| state.pose.clone()).collect();
+    let of = &bodies.report.pose;
     if let Some(why) = not_radians(&poses) {
-        return Err(miette!(
-            help = "convert them to radians; `clothcombo check` looks at motion files",
-            "{}: {why}",
-            scenes.body.pose
-        ));
+        return Err(DraperError::NotRadians { of: of.clone(), why });
     }
     for warning in [impossible_turn(&poses), not_upright(&poses)].into_iter().flatten() {
-        tracing::warn!("{}: {warning}", scenes.body.pose);
+        tracing::warn!("{of}: {warning}");
     }
     Ok(())
 }
