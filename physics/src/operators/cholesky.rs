@@ -45,9 +45,8 @@ impl Cholesky {
         let [mut forward, mut inverse] = [vec![0; n], vec![0; n]];
         let stack = MemStack::new(&mut memory);
         amd::order_maybe_unsorted(&mut forward, &mut inverse, graph, Default::default(), stack).ok()?;
-        let [forward, inverse] = [forward, inverse].map(|order| -> Vec<u32> {
-            order.iter().flat_map(|v| [3 * v, 3 * v + 1, 3 * v + 2]).collect()
-        });
+        let [forward, inverse] = [forward, inverse]
+            .map(|order| -> Vec<u32> { order.iter().flat_map(|v| [3 * v, 3 * v + 1, 3 * v + 2]).collect() });
         let ordering = PermRef::new_checked(&forward, &inverse, 3 * n);
         Self::ordered(matrix, SymmetricOrdering::Custom(ordering))
     }

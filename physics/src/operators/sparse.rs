@@ -41,7 +41,10 @@ impl SparseMatrix {
     }
 
     /// Zeros that are stored at these columns, ascending, of every row of a square matrix.
-    pub(crate) fn zeros<R: Iterator<Item = u32>>(columns_count: usize, rows: impl Iterator<Item = R>) -> Self {
+    pub(crate) fn zeros<R: Iterator<Item = u32>>(
+        columns_count: usize,
+        rows: impl Iterator<Item = R>,
+    ) -> Self {
         let (mut offsets, mut columns) = (vec![0], Vec::new());
         for row in rows {
             columns.extend(row);
