@@ -53,7 +53,7 @@ const ORDER_VIOLATIONS: f64 = 1e-2;
 const FILTER_MARGIN: f64 = 0.05;
 
 /// Takes `layers`, innermost first, out of `body` and out of each other where they lie hardly in: the result if no garment
-/// intersects the body or another one any more, at most half as many triangles of garments intersect others of their own, and no cloth is
+/// intersects the body or another one any more, at most eight triangles of garments intersect others of their own, and no cloth is
 /// torn; else none. Deterministic for any number of threads; a clean input comes back to the bit.
 ///
 /// # Errors
@@ -86,7 +86,7 @@ pub(super) fn passed_near(
     let mut pass = FastPass::new(&outfit, drawn, &mesh, settings);
     let rounds = pass.run(start);
     let most_folds = match mends_folds(settings) {
-        true => FEW_OF_ITSELF.max(pass.folds.len() / 2),
+        true => FEW_OF_ITSELF,
         false => pass.folds.len(),
     };
     if pass.between() > 0 || pass.parted_folds().count() > most_folds || pass.own().count() > pass.folds.len()
