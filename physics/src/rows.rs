@@ -46,6 +46,16 @@ impl<T: Copy> CompressedRows<T> {
         self.offsets.len() - 1
     }
 
+    /// Where each row begins among all items, and one entry more.
+    pub fn offsets(&self) -> &[u32] {
+        &self.offsets
+    }
+
+    /// The items of all rows.
+    pub fn items(&self) -> &[T] {
+        &self.items
+    }
+
     /// Where the items of row `i` are among those of all rows.
     #[inline(always)]
     pub fn range(&self, i: usize) -> Range<usize> {

@@ -11,7 +11,7 @@ use crate::rows::CompressedRows;
 /// One triangle of a sparse symmetric matrix of 3×3 blocks, and its factor.
 ///
 /// Where blocks are and in which order to eliminate them is found once for a garment. Garments of an outfit touch each
-/// other elsewhere in every state: as long as all blocks have a place, it is kept, and found anew where one has none.
+/// other elsewhere in every state: blocks that have no place get one, and none is given up.
 pub(super) struct Hessian {
     /// The vertices that every vertex has a block with, from itself on.
     blocks: CompressedRows<u32>,
@@ -24,27 +24,40 @@ pub(super) struct Hessian {
 
 impl Hessian {
     pub fn new(problem: &Problem<'_>, posed: &[[f64; 3]]) -> Self {
-        let count = problem.vertex_count();
         let mut added = Pairs(Vec::new());
         problem.curvature(posed, &mut added);
-        let mut pairs = added.0;
-        pairs.extend((0..count as u32).map(|v| [v, v]));
-        pairs.sort_unstable();
+        added.0.extend((0..problem.vertex_count() as u32).map(|v| [v, v]));
+        Self::with_blocks(problem.vertex_count(), added.0)
+    }
+
+    /// Of `count` vertices with blocks for `pairs`, which may come twice.
+    fn with_blocks(count: usize, mut pairs: Vec<[u32; 2]>) -> Self {
+        // Stable: it merges what is sorted already.
+        pairs.sort();
         pairs.dedup();
         let keyed = pairs.iter().map(|[row, column]| (*row as usize, *column));
         let blocks = CompressedRows::grouped(count, keyed);
-        let mut triplets = Vec::with_capacity(9 * pairs.len());
-        for row in 0..count as u32 {
-            for r in 0..3 {
-                for &column in blocks.row(row as usize) {
-                    let first = if column == row { r } else { 0 };
-                    triplets.extend((first..3).map(|c| (3 * row + r, 3 * column + c, 0.0)));
-                }
-            }
-        }
-        let matrix = SparseMatrix::from_triplets(3 * count, 3 * count, triplets);
-        let factor = Cholesky::analysed(&matrix);
+        let rows = (0..3 * count).map(|row| {
+            let (vertex, r) = (row / 3, row % 3);
+            blocks.row(vertex).iter().flat_map(move |&column| {
+                let first = if column as usize == vertex { r as u32 } else { 0 };
+                (first..3).map(move |c| 3 * column + c)
+            })
+        });
+        let matrix = SparseMatrix::zeros(3 * count, rows);
+        let factor = Cholesky::analysed_in_blocks(&matrix, &blocks);
         Self { blocks, matrix, diagonal: Vec::new(), factor }
+    }
+
+    /// Makes room for more blocks; those that have a place keep one. Cloth that slides touches there again.
+    fn grow(&mut self, missing: Vec<[u32; 2]>) {
+        let count = self.blocks.len();
+        let known = (0..count).flat_map(|row| self.blocks.row(row).iter().map(move |&c| [row as u32, c]));
+        let mut pairs: Vec<[u32; 2]> = known.collect();
+        let mut missing = missing;
+        missing.sort_unstable();
+        pairs.extend(missing);
+        *self = Self::with_blocks(count, pairs);
     }
 
     /// Takes the curvature of `problem` at `posed`, with creases as if they were smooth over `width` (m), and returns
@@ -56,22 +69,24 @@ impl Hessian {
         gradient: &[[f64; 3]],
         width: f64,
     ) -> Vec<[f64; 3]> {
-        if !self.try_assemble(problem, posed) {
-            *self = Self::new(problem, posed);
-            self.try_assemble(problem, posed);
+        let missing = self.add_curvature(problem, posed);
+        if !missing.is_empty() {
+            self.grow(missing);
+            self.add_curvature(problem, posed);
         }
         let mut smooth = gradient.to_vec();
-        let mut blocks = Blocks { hessian: self, fit: true };
+        let mut blocks = Blocks { hessian: self, missing: Vec::new() };
         problem.creases(posed, [crease_reach(width), f64::INFINITY]).smooth(width, &mut smooth, &mut blocks);
         self.diagonal = (0..self.matrix.rows()).map(|row| self.matrix.row(row).1[0]).collect();
         smooth
     }
 
-    fn try_assemble(&mut self, problem: &Problem<'_>, posed: &[[f64; 3]]) -> bool {
+    /// Takes the curvature at `posed` alone; returns the blocks that have no place.
+    fn add_curvature(&mut self, problem: &Problem<'_>, posed: &[[f64; 3]]) -> Vec<[u32; 2]> {
         self.matrix.values_mut().fill(0.0);
-        let mut blocks = Blocks { hessian: self, fit: true };
+        let mut blocks = Blocks { hessian: self, missing: Vec::new() };
         problem.curvature(posed, &mut blocks);
-        blocks.fit
+        blocks.missing
     }
 
     /// `−(H + shift·mean·I)⁻¹ g`, `mean` being that of the diagonal; `None` where that is not positive definite.
@@ -128,8 +143,8 @@ impl CurvatureSink for Pairs {
 /// Adds blocks to the matrix.
 struct Blocks<'a> {
     hessian: &'a mut Hessian,
-    /// Whether all blocks had a place.
-    fit: bool,
+    /// Blocks without a place.
+    missing: Vec<[u32; 2]>,
 }
 
 impl CurvatureSink for Blocks<'_> {
@@ -145,7 +160,7 @@ impl CurvatureSink for Blocks<'_> {
         let place = self.hessian.place(pair);
         match place {
             Some(place) => self.hessian.add(pair, place, block),
-            None => self.fit = false,
+            None => self.missing.push(pair),
         }
     }
 }

@@ -40,6 +40,20 @@ impl SparseMatrix {
         Self { columns_count, offsets, columns, values }
     }
 
+    /// Zeros that are stored at these columns, ascending, of every row of a square matrix.
+    pub(crate) fn zeros<R: Iterator<Item = u32>>(
+        columns_count: usize,
+        rows: impl Iterator<Item = R>,
+    ) -> Self {
+        let (mut offsets, mut columns) = (vec![0], Vec::new());
+        for row in rows {
+            columns.extend(row);
+            offsets.push(columns.len() as u32);
+        }
+        let values = vec![0.0; columns.len()];
+        Self { columns_count, offsets, columns, values }
+    }
+
     /// Number of rows.
     pub fn rows(&self) -> usize {
         self.offsets.len() - 1

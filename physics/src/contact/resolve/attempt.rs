@@ -51,6 +51,7 @@ pub(super) fn resolved_near<E>(
     let mut simple = simply_resolved(&drawn, layers, settings, body_time);
     if simple.certificate.is_clear() {
         simple.go_on(body, layers, settings, start);
+        simple.ease(&drawn, layers, settings, start, ease::TIMES);
         simple.compare_since(layers, start);
         return Ok(simple);
     }
@@ -58,9 +59,12 @@ pub(super) fn resolved_near<E>(
     with_body(drawn, layers.len(), |room| {
         let mut found = resolved(room, layers, settings, simple, (start, relieving));
         found.go_on(body, layers, settings, start);
+        if found.certificate.is_clear() {
+            found.ease(&room.drawn, layers, settings, start, ease::TIMES);
+        }
         found.compare_since(layers, start);
         let mut found = further(room, found)?;
-        found.ease(room, layers, settings, start, ease::TIMES);
+        found.ease(&room.drawn, layers, settings, start, ease::TIMES);
         found.compare_since(layers, start);
         Ok(found)
     })

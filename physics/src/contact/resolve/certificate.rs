@@ -1,7 +1,5 @@
 //! What is left, counted exactly.
 
-use std::collections::HashSet;
-
 use serde::{Deserialize, Serialize};
 
 use super::Layer;
@@ -245,20 +243,6 @@ impl Certificate {
     /// What is wrong: fewer is better, in this order.
     pub(super) fn defects(&self) -> (usize, usize) {
         (self.between(), self.self_triangle_pairs)
-    }
-
-    /// Whether there are more pairs than in `other`, pinched ones or between garments and with the body, or more than `own` of
-    /// garments with themselves.
-    pub(super) fn is_worse(&self, other: &Self, own: usize) -> bool {
-        self.between() > other.between()
-            || self.self_triangle_pairs > own
-            || self.pinched.count() > other.pinched.count()
-    }
-
-    /// Pairs that are not in `other`.
-    pub(super) fn remaining_beside<'a>(&'a self, other: &'a Self) -> impl Iterator<Item = &'a RemainingPair> {
-        let known: HashSet<&RemainingPair> = other.remaining.iter().collect();
-        self.remaining.iter().filter(move |pair| !known.contains(pair))
     }
 
     /// Strain energy of all garments (J).

@@ -76,7 +76,7 @@ pub fn resolve_along<E: From<ResolveError>>(
     if (is_mended || is_laid_out) && resolved.is_strained(layers) {
         // So far strain was measured from what was laid out, and not since the last attempts.
         with_drawn(body, layers, |drawn| {
-            with_body(drawn, layers.len(), |room| resolved.ease(room, layers, settings, start, TIMES));
+            with_body(drawn, layers.len(), |room| resolved.ease(&room.drawn, layers, settings, start, TIMES));
         });
     }
     resolved.compare_since(layers, start);
@@ -155,10 +155,10 @@ pub fn resolve_after<E: From<ResolveError>>(
         let mut resolved = settled(body, layers, found, settings, strides.room, start);
         resolved.body_time = body_time;
         resolved.go_on(body.drawn.surface, layers, settings, start);
-        resolved.ease(body, layers, settings, start, TIMES_IN_FRAME);
+        resolved.ease(&body.drawn, layers, settings, start, TIMES_IN_FRAME);
         resolved.compare_since(layers, start);
         if resolved.certificate.tears() > 0 {
-            resolved.ease(body, layers, settings, start, TIMES - TIMES_IN_FRAME);
+            resolved.ease(&body.drawn, layers, settings, start, TIMES - TIMES_IN_FRAME);
             resolved.compare_since(layers, start);
         }
         resolved.steps = steps;

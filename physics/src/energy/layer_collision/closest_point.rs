@@ -3,8 +3,9 @@
 //!
 //! `f(d) = max(ε − d, 0)³` near the surface. Cloth that is deeper than the gate under another is over some other part of it, and
 //! no force can tell where it belongs: from half of that depth on `f` fades to nothing. Past a hem an open surface has no
-//! sides, and `d` changes its sign at once: `w` is 0 on the border and where more than two faces meet, 1 at all other vertices,
-//! and linear on the faces.
+//! sides, and `d` changes its sign at once: `w = s²(3 − 2s)`, `s` being 0 on the border and where more than two faces meet, 1 at
+//! all other vertices, and linear on the faces. So the force fades out as well: with `w = s` it would end at the border at
+//! once, and cloth that it drives past the hem would come to rest there against a kink that no solver gets over.
 //!
 //! **It still jumps** where two sheets of the inner garment (a fold, the panels of an open front) are equally near and the point
 //! lies over one and under the other: `f` is 0 on one side and `(ε + |d|)³` on the other. In dressed outfits such a jump of
@@ -28,7 +29,7 @@ use crate::vec3::{add, add_scaled, dot, norm_squared, scale, sub, to_f64};
 /// What stays the same of an inner garment.
 #[derive(Debug, Clone)]
 pub(super) struct InnerCloth {
-    /// `w` per vertex.
+    /// `s` per vertex.
     inside: Vec<f64>,
 }
 
@@ -137,17 +138,18 @@ impl InnerCloth {
         }
         let corners = closest.face(found.face);
         let values = corners.map(|v| self.inside[v as usize]);
-        let share = dot(values, found.barycentric);
+        let [share, slope] = smooth_step(dot(values, found.barycentric));
         if share == 0.0 {
             return None;
         }
+        let gradients = interpolated_gradients(values, closest.corners(found.face), found, p);
         Some(Contact {
             outer,
             corners,
             barycentric: found.barycentric,
             direction,
             share,
-            share_gradients: interpolated_gradients(values, closest.corners(found.face), found, p),
+            share_gradients: gradients.map(|gradient| scale(gradient, slope)),
             penalty,
         })
     }
@@ -163,9 +165,13 @@ fn penalty(d: f64, epsilon: f64, depth: f64) -> [f64; 3] {
     if d >= -0.5 * depth {
         return [cube, slope, 6.0 * excess];
     }
-    let t = 2.0 * (d + depth) / depth;
-    let (fade, fade_slope) = (t * t * (3.0 - 2.0 * t), 12.0 * t * (1.0 - t) / depth);
-    [cube * fade, slope * fade + cube * fade_slope, 6.0 * excess * fade]
+    let [fade, fade_slope] = smooth_step(2.0 * (d + depth) / depth);
+    [cube * fade, slope * fade + cube * fade_slope * 2.0 / depth, 6.0 * excess * fade]
+}
+
+/// `t²(3 − 2t)`, which goes from 0 to 1 with `t` and is flat at both ends, and its derivative.
+fn smooth_step(t: f64) -> [f64; 2] {
+    [t * t * (3.0 - 2.0 * t), 6.0 * t * (1.0 - t)]
 }
 
 /// Derivatives of `Σ values·barycentric` of the point `found` of the triangle `q` that is closest to `p`, by `p` and by

@@ -17,6 +17,7 @@ use super::attempt::FEW_OF_ITSELF;
 use super::body::with_drawn;
 use super::certificate::Certificate;
 use super::contact::{Contact, Plane};
+use super::ease::{Easing, contact_mesh};
 use super::folds::folds;
 use super::garment::check;
 use super::obstacle::BodyObstacle;
@@ -24,7 +25,7 @@ use super::outfit::Outfit;
 use super::over::outward;
 use super::relax::{LastPasses, no_farther, relax};
 use super::resolved::Stage;
-use super::{GarmentWork, Layer, ResolveError, ResolveSettings, Resolved};
+use super::{GarmentWork, Layer, ResolveError, ResolveSettings, Resolved, ease};
 use crate::contact::step_filter::{ContactMesh, FacePairs, StepFilter};
 use crate::query::Surface;
 use crate::vec3::{add, add_scaled, scale, sub};
@@ -52,8 +53,8 @@ const ORDER_VIOLATIONS: f64 = 1e-2;
 const FILTER_MARGIN: f64 = 0.05;
 
 /// Takes `layers`, innermost first, out of `body` and out of each other where they lie hardly in: the result if no garment
-/// intersects the body or another one any more, at most half as many triangles of garments intersect others of their own, and no
-/// cloth is torn; else none. Deterministic for any number of threads; a clean input comes back to the bit.
+/// intersects the body or another one any more, at most eight triangles of garments intersect others of their own, and no cloth is
+/// torn; else none. Deterministic for any number of threads; a clean input comes back to the bit.
 ///
 /// # Errors
 /// Those of [`super::resolve`].
@@ -79,20 +80,24 @@ pub(super) fn passed_near(
     (start, body_time): (Instant, Duration),
 ) -> Option<Resolved> {
     let outfit = Outfit::new(layers);
-    let mesh = contact_mesh(&outfit, drawn);
+    let surface = drawn.surface;
+    let near = drawn.tree.part().iter().map(|&f| &surface.faces[f as usize]);
+    let mesh = contact_mesh(&outfit, surface.positions.len(), near);
     let mut pass = FastPass::new(&outfit, drawn, &mesh, settings);
     let rounds = pass.run(start);
-    if pass.between() > 0 || pass.own().count() > pass.folds.len() {
+    let most_folds = match mends_folds(settings) {
+        true => FEW_OF_ITSELF,
+        false => pass.folds.len(),
+    };
+    if pass.between() > 0 || pass.parted_folds().count() > most_folds || pass.own().count() > pass.folds.len()
+    {
         return None;
     }
+    pass.ease(start);
     let positions = pass.garments();
     let certifying = Instant::now();
     let certificate = pass.certificate(&positions);
     let certificate_time = certifying.elapsed();
-    let most_folds = match mends_folds(settings) {
-        true => FEW_OF_ITSELF.max(pass.folds.len() / 2),
-        false => pass.folds.len(),
-    };
     let work = GarmentWork { rounds, ..GarmentWork::default() };
     let mut resolved = Resolved {
         positions,
@@ -121,13 +126,6 @@ fn is_good(certificate: &Certificate, most_folds: usize) -> bool {
         && certificate.vertices_inside == 0
         && certificate.order_violations <= ORDER_VIOLATIONS
         && certificate.tears() == 0
-}
-
-/// The faces of an outfit and of what of the body is near it.
-fn contact_mesh(outfit: &Outfit<'_>, body: &BodyObstacle<'_>) -> ContactMesh {
-    let start = outfit.vertex_count() as u32;
-    let near = body.tree.part().iter().map(|&f| body.surface.faces[f as usize].map(|v| v + start));
-    ContactMesh::new(outfit.vertex_count() + body.surface.positions.len(), &outfit.faces, near)
 }
 
 /// An outfit on its way.
@@ -223,8 +221,25 @@ impl<'a> FastPass<'a> {
             true => self.filter.step_freely(&self.positions, &to),
             false => self.filter.step(&self.positions, &mut to, FILTER_MARGIN * self.settings.gap),
         }
-        let (before, body) = (std::mem::replace(&mut self.positions, to), self.body);
-        let moved = self.planes.par_iter_mut().zip(&before).zip(&self.positions).with_min_len(128);
+        let before = std::mem::replace(&mut self.positions, to);
+        self.look_again(&before);
+    }
+
+    /// Cloth gives back what it was strained by. Strict limits leave it.
+    fn ease(&mut self, start: Instant) {
+        if self.settings.loosened > 1.0 {
+            let before = self.positions.clone();
+            let is_late = || self.settings.is_late(start, self.outfit.len());
+            let easing = Easing::new(self.outfit, self.settings);
+            easing.ease(&mut self.filter, &mut self.positions, ease::TIMES, is_late);
+            self.look_again(&before);
+        }
+    }
+
+    /// Looks at the body again from vertices that are not where they were `before`.
+    fn look_again(&mut self, before: &[[f64; 3]]) {
+        let body = self.body;
+        let moved = self.planes.par_iter_mut().zip(before).zip(&self.positions).with_min_len(128);
         moved.filter(|((_, from), to)| from != to).for_each(|((plane, _), to)| {
             *plane = body.look(*to).and_then(|view| view.plane);
         });

@@ -73,6 +73,25 @@ fn has_no_jumps_along_the_cloth_and_past_a_hem() {
     assert!(largest_jump(&inner, from, to, LayerContact::NearestVertex) > 0.5);
 }
 
+/// Cloth under a hem that others push past it rests there: no force may end at once.
+#[test]
+fn the_force_fades_out_towards_a_hem() {
+    let inner = shapes::tube(0.15, 0.4, 40, 16);
+    let (garment, p) = (garment(&inner), inner.positions());
+    let posed = garment.posed(p, LayerContact::ClosestPoint);
+    let hem = p.iter().fold(f64::INFINITY, |low: f64, p| low.min(p[1]));
+    // 5 mm under the cloth, so many metres above the hem.
+    let energy =
+        |height: f64| garment.evaluate(p, &posed, loose(&[[0.1445, hem + height, 0.003]]), &settings(), None);
+    let step = 1e-8;
+    let force = |height: f64| (energy(height + step) - energy(height - step)) / (2.0 * step);
+    let largest = (1..50).map(|i| force(5e-4 * f64::from(i)).abs()).fold(0.0, f64::max);
+    assert!(largest > 0.0);
+    for height in [1e-5, -1e-5] {
+        assert!(force(height).abs() < 0.01 * largest, "{height}: {} {largest}", force(height));
+    }
+}
+
 /// The limit that the module names: over one sheet and under another of the same garment.
 #[test]
 fn jumps_between_two_sheets() {
