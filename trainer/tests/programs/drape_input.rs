@@ -201,7 +201,9 @@ fn a_model_is_three_files_and_a_damaged_or_missing_one_is_named() {
     assert!(damaged.contains("model.safetensors does not match its checksum"));
     // The shipped model is part of the program: a folder with nothing in it is enough.
     fs::remove_dir_all(&models).unwrap();
-    run(&["-o", "d", "--no-resolve"]).assert().success();
+    let mut shipped = Command::cargo_bin("clothcombo").unwrap();
+    let garments = ["drape", "--no-cache", "--no-resolve", "--garments", "skirt_000005", "-o", "d"];
+    shipped.current_dir(folder.path()).args(garments).assert().success();
     assert_eq!(report(&folder.path().join("d"))["model"]["folder"], "built in");
 }
 
