@@ -9,6 +9,7 @@ use std::process::ExitCode;
 /// Learned draping of multi-layered clothing: data in, garments on bodies out.
 #[derive(Parser)]
 #[command(
+    name = "clothcombo",
     version,
     about,
     after_help = "Train with clothcombo-train. Every verb has its own --help with examples."

@@ -33,6 +33,7 @@ use std::rc::Rc;
 /// Trains ClothCombo's four networks from a configuration file.
 #[derive(Parser)]
 #[command(
+    name = "clothcombo-train",
     version,
     after_help = "Examples:\n  clothcombo-train --config configs/smoke.toml\n  \
         clothcombo-train --config configs/open.toml --run-dir runs/wide --set model.width=128\n  \
