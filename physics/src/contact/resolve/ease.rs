@@ -193,7 +193,7 @@ mod tests {
     use super::*;
     use crate::mesh::shapes::{self, SplitMix};
     use crate::query::Surface;
-    use crate::vec3::{add, norm, scale, sub};
+    use crate::vec3::{add, norm, scale};
 
     const RADIUS: f64 = 0.1;
 
