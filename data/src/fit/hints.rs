@@ -3,6 +3,7 @@
 use super::{FitSettings, Keep, SourceBody, Unit, UpAxis};
 use crate::asset::Category;
 use serde::Deserialize;
+use std::fmt::Display;
 use std::str::FromStr;
 use std::sync::Arc;
 
@@ -10,6 +11,8 @@ use std::sync::Arc;
 const WIDEST_SEAM: f64 = 0.1;
 /// No garment is made with its legs farther apart (degrees, each).
 const WIDEST_STANCE: f64 = 60.0;
+/// Once around (degrees).
+const FULL_TURN: f64 = 360.0;
 /// No file's origin is farther from the body (m).
 const FARTHEST_ORIGIN: f64 = 1e4;
 
@@ -48,9 +51,11 @@ impl GarmentEntry {
         ) -> Result<Option<T>, String> {
             text.as_deref().map(parse).transpose().map_err(|e| format!("{key}: {e}"))
         }
+        fn degrees(key: &str, given: Option<f64>, most: f64) -> Result<Option<f64>, String> {
+            given.map(|g| angle(g, most, g)).transpose().map_err(|e| format!("{key}: {e}"))
+        }
         let arms = hint("arms", &self.arms, Arms::from_str)?;
-        let numbers = self.offset.map(|o| o.map(|x| x.to_string()).join(","));
-        let [turned, apart] = [self.turn, self.legs].map(|hint| hint.map(|degrees| degrees.to_string()));
+        let offset = self.offset.map(|numbers| within_reach(numbers, format_args!("{numbers:?}")));
         let source = |text: &str| {
             let found = match text.rsplit_once(':') {
                 Some((path, shape)) if beside(text) == text => format!("{}:{shape}", beside(path)),
@@ -63,10 +68,10 @@ impl GarmentEntry {
             unit: hint("unit", &self.unit, Unit::from_str)?.or(all.unit),
             up: hint("up", &self.up, UpAxis::from_str)?.or(all.up),
             arms_lowered: arms.map(|arms| arms == Arms::A).or(all.arms_lowered),
-            legs_degrees: hint("legs", &apart, legs)?.or(all.legs_degrees),
+            legs_degrees: degrees("legs", self.legs, WIDEST_STANCE)?.or(all.legs_degrees),
             category: hint("category", &self.category, Category::from_str)?.or(all.category),
-            offset: hint("offset", &numbers, offset)?.or(all.offset),
-            turn_degrees: hint("turn", &turned, turn)?.or(all.turn_degrees),
+            offset: offset.transpose().map_err(|e| format!("offset: {e}"))?.or(all.offset),
+            turn_degrees: degrees("turn", self.turn, FULL_TURN)?.or(all.turn_degrees),
             keep: hint("keep", &self.keep, Keep::from_str)?.unwrap_or(all.keep),
             join_seams: hint("join_seams", &self.join_seams, seam_width)?.or(all.join_seams),
         })
@@ -102,6 +107,11 @@ pub fn offset(text: &str) -> Result<[f64; 3], String> {
     let wrong = || format!("'{text}' is not three numbers in metres such as 0,0.95,0");
     let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse::<f64>()).collect();
     let numbers: [f64; 3] = numbers.map_err(|_| wrong())?.try_into().map_err(|_| wrong())?;
+    within_reach(numbers, text)
+}
+
+/// `numbers` (m), called `text`.
+fn within_reach(numbers: [f64; 3], text: impl Display) -> Result<[f64; 3], String> {
     // Neither is what is no number.
     match numbers.iter().all(|x| x.abs() <= FARTHEST_ORIGIN) {
         true => Ok(numbers),
@@ -114,8 +124,7 @@ pub fn offset(text: &str) -> Result<[f64; 3], String> {
 /// # Errors
 /// When it is none.
 pub fn turn(text: &str) -> Result<f64, String> {
-    let degrees = text.parse::<f64>().ok().filter(|degrees| degrees.abs() <= 360.0);
-    degrees.ok_or_else(|| format!("'{text}' is no angle from -360 to 360 degrees"))
+    angle(text.parse().unwrap_or(f64::NAN), FULL_TURN, text)
 }
 
 /// The angle of a leg (degrees).
@@ -123,8 +132,15 @@ pub fn turn(text: &str) -> Result<f64, String> {
 /// # Errors
 /// When no leg is turned so far.
 pub fn legs(text: &str) -> Result<f64, String> {
-    let degrees = text.parse::<f64>().ok().filter(|degrees| degrees.abs() <= WIDEST_STANCE);
-    degrees.ok_or_else(|| format!("'{text}' is no angle from -{WIDEST_STANCE} to {WIDEST_STANCE} degrees"))
+    angle(text.parse().unwrap_or(f64::NAN), WIDEST_STANCE, text)
+}
+
+/// `degrees`, called `text`, of at most so many to each side.
+fn angle(degrees: f64, most: f64, text: impl Display) -> Result<f64, String> {
+    match degrees.abs() <= most {
+        true => Ok(degrees),
+        false => Err(format!("'{text}' is no angle from -{most} to {most} degrees")),
+    }
 }
 
 /// A length in metres, or with a unit; in metres.
@@ -178,6 +194,13 @@ mod tests {
         let wrong: GarmentEntry = toml::from_str("file = \"tee.obj\"\nup = \"north\"").unwrap();
         assert!(wrong.settings(&all, str::to_owned).unwrap_err().starts_with("up: 'north'"));
         assert!(toml::from_str::<GarmentEntry>("file = \"tee.obj\"\nsize = 4").is_err());
+        for (key, wrong) in
+            [("offset", "offset = [0.0, 2e4, 0.0]"), ("legs", "legs = 70.0"), ("turn", "turn = nan")]
+        {
+            let entry: GarmentEntry = toml::from_str(&format!("file = \"tee.obj\"\n{wrong}")).unwrap();
+            let message = entry.settings(&all, str::to_owned).unwrap_err();
+            assert!(message.starts_with(&format!("{key}: '")), "{message}");
+        }
         let missing: GarmentEntry = toml::from_str("file = \"tee.obj\"\nfrom_body = \"none.npz:1\"").unwrap();
         let message = missing.settings(&all, |path| format!("folder/{path}")).unwrap_err();
         assert!(message.starts_with("from_body: folder/none.npz"), "{message}");
