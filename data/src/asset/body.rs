@@ -4,6 +4,7 @@
 //! linear blend skinning. Here every body stands with its pelvis joint at the origin *for every shape*: the pelvis of the
 //! template and of each shape direction is subtracted when the body is made, which moves SMPL bodies by a translation.
 
+use super::body_chart::BodyChart;
 use super::pose::Pose;
 use super::rotation::{self, Matrix3, matrix_from_axis_angle};
 use super::skin_weights::SparseSkinWeights;
@@ -11,7 +12,7 @@ use clothcombo_physics::mesh::TriMesh;
 use clothcombo_physics::vec3::{add, sub};
 use rayon::prelude::*;
 use std::ops::{Deref, DerefMut};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use thiserror::Error;
 
 mod joints;
@@ -56,6 +57,7 @@ pub struct BodyParts {
 pub struct Body {
     parts: BodyParts,
     zero_body: TriMesh,
+    chart: OnceLock<Arc<BodyChart>>,
     file_pelvis: FilePelvis,
 }
 
@@ -177,7 +179,7 @@ impl Body {
         let zero_body =
             TriMesh::new(parts.template.clone(), parts.faces.to_vec()).map_err(|e| wrong(e.to_string()))?;
         let file_pelvis = FilePelvis { template: pelvis, shape_directions: pelvis_directions };
-        Ok(Self { parts, zero_body, file_pelvis })
+        Ok(Self { parts, zero_body, chart: OnceLock::new(), file_pelvis })
     }
 
     /// The same body, made of a file that holds it moved already: there its pelvis stood at `recorded`.
@@ -211,6 +213,7 @@ impl Body {
     pub(super) fn turned(mut self) -> Self {
         self.zero_body = self.zero_body.turned();
         self.parts.faces = self.zero_body.faces().into();
+        self.chart = OnceLock::new();
         self
     }
 
@@ -227,6 +230,11 @@ impl Body {
             self.shape_count = count;
         }
         self
+    }
+
+    /// Neighbours and normals of the zero body; computed when first asked for.
+    pub(super) fn chart(&self) -> &BodyChart {
+        self.chart.get_or_init(|| Arc::new(BodyChart::new(&self.zero_body)))
     }
 
     /// Number of vertices V.

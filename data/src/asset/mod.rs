@@ -2,10 +2,12 @@
 
 pub mod binding;
 pub mod body;
+mod body_chart;
 pub mod body_file;
 pub mod category;
 mod footprint;
 pub mod garment;
+mod layer_order;
 pub mod motion;
 pub mod pose;
 pub mod provenance;
@@ -21,6 +23,7 @@ pub use body_file::BodyFileSettings;
 pub use category::Category;
 pub use footprint::Footprint;
 pub use garment::{Garment, infeasible_pair};
+pub use layer_order::order_layers;
 pub use motion::Motion;
 pub use pose::Pose;
 pub use provenance::Provenance;

@@ -9,7 +9,7 @@ use super::sampling::{BodySample, SceneSample};
 use super::skinning::skinning_transforms;
 use crate::config::LossesConfig;
 use crate::dataset::objective::scene_weights;
-use clothcombo_data::asset::{Body, Pose};
+use clothcombo_data::asset::{self, Body, Pose};
 use clothcombo_model::{Graph, OutfitTensors, Packing};
 use clothcombo_physics::energy::{EnergySettings, SceneEnergy, SceneGarment, SceneLayers};
 use clothcombo_physics::query::Surface;
@@ -26,7 +26,7 @@ pub struct PreparedBody {
     pub bones: Vec<[[f64; 4]; 3]>,
     /// What each active joint knows of the pose around it, `[J, 30]`.
     pub joint_features: Vec<f32>,
-    /// Canonical start positions of all garments, `[ΣV, 3]`.
+    /// Canonical start positions of all garments, in their order, `[ΣV, 3]`.
     pub start: Vec<[f32; 3]>,
     /// The losses of this scene.
     pub energy: Arc<SceneEnergy<f32>>,
@@ -107,6 +107,7 @@ pub fn prepare(
         losses,
         graph: dataset.graph,
         layer_thickness: dataset.layer_thickness,
+        ordered: dataset.ordered,
     };
     Ok(builder.build(sample, garments, &below, run_progress))
 }
@@ -125,6 +126,18 @@ pub struct SceneBuilder<'a> {
     pub graph: Graph,
     /// How thick a garment is for those above it (m), if the networks ask.
     pub layer_thickness: Option<f64>,
+    /// Whether garments are put in order before they are draped.
+    pub ordered: bool,
+}
+
+/// How the garments of a scene lie over each other, the same on every body.
+struct Arrangement {
+    /// Thickness below each vertex of each garment of what is no garment of the scene (m); empty where nothing is.
+    unseen: Vec<Vec<f32>>,
+    /// Pairs (inner, outer) that interact.
+    contacts: Vec<(usize, usize)>,
+    /// Displacements that put them in order `[ΣV]` (m); empty where they are not.
+    ordering: Vec<[f32; 3]>,
 }
 
 impl SceneBuilder<'_> {
@@ -152,15 +165,20 @@ impl SceneBuilder<'_> {
             each.map_or_else(Vec::new, |each| thickness_below(&garments, below, self.body, each));
         let settings =
             EnergySettings { repulsion_sample: sample.repulsion_sample, ..self.losses.energy_settings() };
+        let ordering = match self.ordered && !contacts.is_empty() {
+            true => order_layers(&garments, self.body, self.losses.layer_collision.epsilon),
+            false => Vec::new(),
+        };
+        let arrangement = Arrangement { unseen, contacts, ordering };
         let bodies = sample
             .bodies
             .iter()
-            .map(|body| self.on_body(&garments, &unseen, &contacts, body, &settings, run_progress))
+            .map(|body| self.on_body(&garments, &arrangement, body, &settings, run_progress))
             .collect();
         PreparedScene {
             sample,
             garments,
-            contacts,
+            contacts: arrangement.contacts,
             thickness_below,
             bodies,
             single_garments: self.losses.single_garments.at(run_progress),
@@ -170,8 +188,7 @@ impl SceneBuilder<'_> {
     fn on_body(
         &self,
         garments: &[Arc<PreparedGarment>],
-        unseen: &[Vec<f32>],
-        contacts: &[(usize, usize)],
+        Arrangement { unseen, contacts, ordering }: &Arrangement,
         body: &BodySample,
         settings: &EnergySettings,
         run_progress: f64,
@@ -213,12 +230,14 @@ impl SceneBuilder<'_> {
         if losses.holding.posed {
             energy = energy.pulled_back(&skinning_transforms(garments, &bones));
         }
+        let mut start = starts.concat();
+        start.as_flattened_mut().iter_mut().zip(ordering.as_flattened()).for_each(|(x, by)| *x += by);
         PreparedBody {
             shape: body.shape.iter().map(|v| *v as f32).collect(),
             pose: (self.features)(&body.pose, &self.joints.indices),
             joint_features: joint_features(&bones, &self.joints.parents),
             bones,
-            start: starts.concat(),
+            start,
             energy: Arc::new(energy),
         }
     }
@@ -240,6 +259,12 @@ pub fn thickness_below(
         garment.thickness_of(&inside[..below.len() + i], body, each)
     };
     garments.iter().enumerate().flat_map(of).collect()
+}
+
+/// Displacements that put `garments`, inner → outer, in order at rest, `spacing` (m) apart `[ΣV]` (m).
+fn order_layers(garments: &[Arc<PreparedGarment>], body: &Body, spacing: f64) -> Vec<[f32; 3]> {
+    let footprints: Vec<_> = garments.iter().map(|garment| garment.footprint(body)).collect();
+    asset::order_layers(&footprints, body, spacing).concat()
 }
 
 /// Pairs (inner, outer) of `garments`, inner → outer, that interact: all in the full graph, else those whose rest boxes are near

@@ -49,7 +49,7 @@ impl PreparedGarment {
     }
 
     /// Where it lies on `body`, the one it was made for; computed when first asked for.
-    fn footprint(&self, body: &Body) -> &Footprint {
+    pub(super) fn footprint(&self, body: &Body) -> &Footprint {
         self.footprint.get_or_init(|| Footprint::new(&self.garment, body))
     }
 

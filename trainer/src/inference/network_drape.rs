@@ -136,6 +136,7 @@ impl Draper {
             losses: &self.trained.config.losses,
             graph: self.trained.config.model.graph,
             layer_thickness: self.trained.config.layer_thickness(),
+            ordered: self.trained.config.start.ordered,
         };
         let sample = SceneSample {
             garments: (0..outfit.garments.len()).collect(),
