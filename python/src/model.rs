@@ -201,16 +201,17 @@ impl Outfit {
         every: usize,
         posed: Option<PyReadonlyArray2<'_, f64>>,
         t_pose: Option<PyReadonlyArray2<'_, f64>>,
-        refine: RefineInput,
+        refine: Option<RefineInput>,
         resolve: bool,
         gap_mm: f64,
         time_limit: Option<f64>,
         smooth: Option<u16>,
     ) -> PyResult<Drape> {
         let refine = match refine {
-            RefineInput::Steps(steps) => RefineSteps::AtMost(steps),
-            RefineInput::Text(text) => {
-                text.parse().map_err(|what| refused_text(format!("refine is {text:?}; hint: {what}")))?
+            None => None,
+            Some(RefineInput::Steps(steps)) => Some(RefineSteps::AtMost(steps)),
+            Some(RefineInput::Text(text)) => {
+                Some(text.parse().map_err(|what| refused_text(format!("refine is {text:?}; hint: {what}")))?)
             }
         };
         if let Some(radius) = smooth.filter(|radius| *radius > MOST_RADIUS) {

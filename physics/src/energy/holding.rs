@@ -2,7 +2,7 @@
 //!
 //! `Σ H·(y − y_ref)²` over vertices, `H` being 1 for the top tenth of the vertices at rest and `y` a height before skinning.
 //! The paper reads `y` off the canonical positions `x + Δx`. These do not say where the garment is once the skin weights are
-//! learned as well: ΔW can slide a waistband down for nothing. So training, corrections, refinement and the reference read it
+//! learned as well: ΔW can slide a waistband down for nothing. So training, refinement and the reference read it
 //! off the posed positions, pulled back by the skinning that the garment started with: `y = (T₀⁻¹ x̂)_y`, with `T₀` blended
 //! by the *initial* weights and held fixed. The gradient is then `T₀⁻ᵀ e_y 2(y − y_ref)` at posed positions. With
 //! `Δx` alone (ΔW = 0) both are the same. [`super::SceneGarment::pull_back`] chooses.

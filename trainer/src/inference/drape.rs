@@ -13,8 +13,8 @@ pub struct GarmentDrape {
     pub skinned: Vec<[f64; 3]>,
     /// What the networks made of it, in a motion averaged over frames if that was asked for `[V, 3]` (m).
     pub network: Vec<[f64; 3]>,
-    /// What came to the post-process: of the networks, or refined `[V, 3]` (m).
-    pub before: Vec<[f64; 3]>,
+    /// What the post-process made of that, before the refinement `[V, 3]` (m).
+    pub resolved: Vec<[f64; 3]>,
     /// The result `[V, 3]` (m).
     pub positions: Vec<[f64; 3]>,
     /// Blended skinning transform of every vertex, canonical → posed.
@@ -53,7 +53,7 @@ impl Drape {
     pub(super) fn reached(&self) -> Reached {
         let garments = || self.garments.iter();
         Reached {
-            draped: garments().map(|g| g.before.clone()).collect(),
+            draped: garments().map(|g| g.network.clone()).collect(),
             positions: garments().map(|g| g.positions.clone()).collect(),
             transforms: garments().flat_map(|g| g.transforms.iter().copied()).collect(),
             crossings: self.certificate.crossings(),
@@ -65,8 +65,8 @@ impl Drape {
         self.surface = None;
     }
 
-    fn before(&self) -> Vec<&[[f64; 3]]> {
-        self.garments.iter().map(|g| g.before.as_slice()).collect()
+    fn network(&self) -> Vec<&[[f64; 3]]> {
+        self.garments.iter().map(|g| g.network.as_slice()).collect()
     }
 
     /// What intersected before the post-process.
@@ -75,13 +75,13 @@ impl Drape {
         draper: &Draper,
         outfit: &Outfit,
     ) -> Result<Certificate, DraperError> {
-        Ok(certify(&self.surface(draper), &outfit.layers(&self.before()))?)
+        Ok(certify(&self.surface(draper), &outfit.layers(&self.network()))?)
     }
 
     /// Brings the positions to what files hold, and counts what intersects there.
     pub(super) fn settle(&mut self, draper: &Draper, outfit: &Outfit) -> Result<(), DraperError> {
         self.garments.iter_mut().for_each(|garment| round(&mut garment.positions));
-        let before = self.before();
+        let before = self.network();
         let after: Vec<&[[f64; 3]]> = self.garments.iter().map(|g| g.positions.as_slice()).collect();
         let certified = certify(&self.surface(draper), &outfit.layers(&after));
         let mut certificate = certified.map_err(|error| outfit.named(error.into()))?;

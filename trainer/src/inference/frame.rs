@@ -1,4 +1,4 @@
-//! One drape: networks, refinement, post-process.
+//! One drape: networks, post-process, refinement.
 
 use super::motion::RetryPolicy;
 use super::network_drape::{NetworkDrape, Pass};
@@ -15,6 +15,7 @@ use std::time::Instant;
 #[derive(Clone, Copy)]
 pub(super) struct Frame<'a> {
     pub body: &'a BodyState,
+    pub refine: RefineSteps,
     /// Where the post-process carries on from, if anywhere.
     pub last: Option<PreviousFrame<'a>>,
 }
@@ -30,6 +31,11 @@ pub(super) struct PreviousFrame<'a> {
 }
 
 impl Draper {
+    /// Steps of the refinement of each of so many frames.
+    pub(super) fn refine_steps(&self, frames: usize) -> RefineSteps {
+        self.settings.refine.unwrap_or_else(|| RefineSteps::default_of(frames))
+    }
+
     /// Drapes `outfit` on `frame`, of which the networks have `made` this. `watch` is called for every pose that the post-process
     /// looks at, with its share of the path there.
     pub(super) fn drape_frame(
@@ -42,20 +48,7 @@ impl Draper {
         let NetworkDrape { scene, surface, heading, transforms, skinned, network, mut milliseconds } = made;
 
         let clock = Instant::now();
-        let (before, refinement) = match self.settings.refine {
-            RefineSteps::AtMost(0) => (network.clone(), None),
-            steps => {
-                let mut energy = ReferenceScene::new(&self.trained.config.losses, &scene)?.energy;
-                energy.body = surface.clone();
-                let (positions, done) =
-                    refine(&energy.pulled_back(&transforms), &network, steps, !self.settings.resolve)?;
-                (positions, Some(done))
-            }
-        };
-        milliseconds.refine = elapsed(clock);
-
-        let clock = Instant::now();
-        let parts = outfit.split(&before);
+        let parts = outfit.split(&network);
         let (resolved, times) = match self.settings.resolve {
             true => {
                 let final_sample = || PathSample {
@@ -72,16 +65,28 @@ impl Draper {
         };
         milliseconds.resolve = elapsed(clock);
 
-        let (skinned, network) = (outfit.split(&skinned), outfit.split(&network));
+        let clock = Instant::now();
+        let (refined, refinement) = match frame.refine {
+            RefineSteps::AtMost(0) => (resolved.concat(), None),
+            steps => {
+                let mut energy = ReferenceScene::new(&self.trained.config.losses, &scene)?.energy;
+                energy.body = surface.clone();
+                let (positions, done) = refine(&energy.pulled_back(&transforms), &resolved.concat(), steps)?;
+                (positions, Some(done))
+            }
+        };
+        milliseconds.refine = elapsed(clock);
+
+        let (skinned, refined) = (outfit.split(&skinned), outfit.split(&refined));
         let transforms = outfit.split(&transforms);
         let garments = resolved
             .into_iter()
             .enumerate()
-            .map(|(g, positions)| GarmentDrape {
+            .map(|(g, resolved)| GarmentDrape {
                 skinned: skinned[g].to_vec(),
-                network: network[g].to_vec(),
-                before: parts[g].to_vec(),
-                positions,
+                network: parts[g].to_vec(),
+                positions: refined[g].to_vec(),
+                resolved,
                 transforms: transforms[g].to_vec(),
                 resolve_ms: times[g],
             })
@@ -105,7 +110,7 @@ impl Draper {
     fn resolved(
         &self,
         outfit: &Outfit,
-        Frame { body, last }: Frame<'_>,
+        Frame { body, last, .. }: Frame<'_>,
         watch: &mut dyn FnMut(f64),
         surface: &Surface<f64>,
         parts: &[&[[f64; 3]]],

@@ -20,7 +20,7 @@
 //! ```
 //!
 //! [`Draper::outfit`] does what depends on the garments alone (binding, operators, embedding), once per garment and process,
-//! and once per machine with a cache; [`Draper::drape`] does what depends on the body: networks, optional refinement,
+//! and once per machine with a cache; [`Draper::drape`] does what depends on the body: networks, post-process,
 //! post-process; [`Draper::drape_motion`] does it for the frames of a motion. The networks see the pose without its heading;
 //! positions come back in the frame of the given pose.
 
@@ -98,8 +98,8 @@ pub struct DraperSettings {
     pub cache_limit: u64,
     /// The compute device, without automatic differentiation.
     pub device: Device,
-    /// Steps of the static solver after the networks; 0 switches refinement off.
-    pub refine: RefineSteps,
+    /// Steps of the static solver after networks and post-process, 0 for none; default: [`RefineSteps::default_of`].
+    pub refine: Option<RefineSteps>,
     /// Whether the post-process resolves what still intersects.
     pub resolve: bool,
     /// How it does that.
@@ -114,7 +114,7 @@ impl Default for DraperSettings {
             cache: None,
             cache_limit: 10 << 30,
             device: default_device(),
-            refine: RefineSteps::AtMost(0),
+            refine: None,
             resolve: true,
             post_process,
         }
@@ -236,7 +236,8 @@ impl Draper {
     /// When shape or pose do not fit the body model, or the networks diverge.
     pub fn drape(&self, outfit: &Outfit, body: &BodyState) -> Result<Drape, DraperError> {
         let made = self.network_drape(outfit, body)?;
-        self.drape_frame(outfit, Frame { body, last: None }, made, &mut |_| ())
+        let refine = self.refine_steps(1);
+        self.drape_frame(outfit, Frame { body, refine, last: None }, made, &mut |_| ())
     }
 
     fn dimensions(&self) -> clothcombo_model::Dimensions {

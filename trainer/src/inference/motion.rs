@@ -58,11 +58,12 @@ impl Draper {
     ) -> Result<Vec<Drape>, DraperError> {
         let mut drapes: Vec<Drape> = Vec::with_capacity(bodies.len());
         let (mut retry, mut frames_without_retry) = (RetryPolicy::NONE, 0);
+        let refine = self.refine_steps(bodies.len());
         let filtered = TemporalFilter::new(self, outfit, bodies, radius);
         for ((frame, body), made) in bodies.iter().enumerate().zip(filtered) {
             let last = drapes.last().map(|drape| PreviousFrame { body: &bodies[frame - 1], drape, retry });
             let mut watch = |share| progress(DrapeProgress::Continuation(share));
-            let mut drape = self.drape_frame(outfit, Frame { body, last }, made?, &mut watch)?;
+            let mut drape = self.drape_frame(outfit, Frame { body, refine, last }, made?, &mut watch)?;
             if !retry.is_met(&drape.certificate) {
                 (retry, frames_without_retry) =
                     (RetryPolicy::after(&drape.certificate), FRAMES_WITHOUT_RETRY);
@@ -91,7 +92,7 @@ impl Draper {
                 let mut made = self.network_drape(outfit, body)?;
                 made.network = own.garments.iter().flat_map(|garment| &garment.network).copied().collect();
                 let mut again =
-                    self.drape_frame(outfit, Frame { body, last: Some(last) }, made, &mut watch)?;
+                    self.drape_frame(outfit, Frame { body, refine, last: Some(last) }, made, &mut watch)?;
                 again.slim();
                 if again.certificate.flaws() < own.certificate.flaws() {
                     std::mem::swap(own, &mut again);

@@ -101,7 +101,7 @@ pub struct Report {
     /// Number of the one frame of a motion that `before`, `after`, `certificate_before` and `refinement` are of: the first.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scored_frame: Option<usize>,
-    /// Score before the post-process.
+    /// Score of the networks' drape.
     pub before: Score,
     /// And of the result.
     pub after: Score,
@@ -110,7 +110,7 @@ pub struct Report {
     /// What is left: of a motion, numbers of pairs are sums over the frames, depths and strain the worst frame's, and the
     /// lists are those of `frames`.
     pub certificate: Certificate,
-    /// The same of what came to the post-process, without the list of pairs.
+    /// The same of the networks' drape, without the list of pairs.
     pub certificate_before: Certificate,
     /// What the refinement did.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -159,7 +159,7 @@ impl Report {
             || first.certificate_before(draper, outfit),
             || {
                 let score = |which| first.score(draper, outfit, which);
-                rayon::join(|| score(ScoredPositions::BeforeResolve), || score(ScoredPositions::Result))
+                rayon::join(|| score(ScoredPositions::Network), || score(ScoredPositions::Result))
             },
         );
         let frames = drapes.iter().zip(moments).map(|(drape, moment)| FrameReport {
@@ -197,8 +197,8 @@ impl Report {
 /// Which positions of a drape are scored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ScoredPositions {
-    /// What came to the post-process.
-    BeforeResolve,
+    /// Of the networks.
+    Network,
     /// The result.
     Result,
 }
@@ -224,7 +224,7 @@ impl Drape {
                 name: &garment.name,
                 rest: &garment.prepared.garment.rest,
                 positions: match which {
-                    ScoredPositions::BeforeResolve => &drape.before,
+                    ScoredPositions::Network => &drape.network,
                     ScoredPositions::Result => &drape.positions,
                 },
                 canonical: None,

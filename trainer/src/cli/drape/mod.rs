@@ -72,10 +72,11 @@ pub struct Arguments {
     fit: Fit,
     #[command(flatten)]
     hints: FitArguments,
-    /// Steps of the static solver from the networks' state, at most 2 cm each, until a vertex is 5 cm from there;
-    /// `auto`: until a step gains less than 1 % of what all did, for at most two seconds
-    #[arg(long, default_value = "0", value_name = "STEPS|auto")]
-    refine: RefineSteps,
+    /// Steps of the static solver after networks and post-process that make no intersection, at most 2 cm each, until a vertex
+    /// is 5 cm from there; 0: none; `auto`: until a step gains less than 1 % of what all did, for at most two seconds [default: 4
+    /// for one pose, 0 for a motion]
+    #[arg(long, value_name = "STEPS|auto")]
+    refine: Option<RefineSteps>,
     /// Leaves out the post-process; the certificate still counts everything
     #[arg(long, conflicts_with_all = ["gap_mm", "time_limit"])]
     no_resolve: bool,

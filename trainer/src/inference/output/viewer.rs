@@ -93,7 +93,11 @@ fn stages<'a>(show: &Show<'a>) -> Result<Vec<Stage<'a>>, DraperError> {
             ("networks", drape.garments.iter().map(|g| g.network.as_slice()).collect(), None),
         ];
         if drape.refinement.is_some() {
-            states.push(("refined", drape.garments.iter().map(|g| g.before.as_slice()).collect(), None));
+            states.push((
+                "post-process",
+                drape.garments.iter().map(|g| g.resolved.as_slice()).collect(),
+                None,
+            ));
         }
         let result = drape.garments.iter().map(|g| g.positions.as_slice()).collect();
         states.push(("result", result, Some(&drape.certificate)));
