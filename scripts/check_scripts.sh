@@ -39,12 +39,6 @@ score_oracle() {
     "$programs/clothcombo" score "$@" --json >"$work/score.json" && "$PYTHON" scripts/score_oracle.py "$@" --compare "$work/score.json"
 }
 
-average_models() {
-    local checkpoints=("$run"/checkpoints/step-*)
-    "$PYTHON" scripts/average_models.py "${checkpoints[0]}" "${checkpoints[-1]}" "$work/mean" &&
-        "$programs/clothcombo" drape --checkpoint "$work/mean" --garments t_shirt_000003 -o "$work/drape" --no-cache
-}
-
 bench_operators() {
     cargo build --release --workspace --example operators && "$PYTHON" scripts/bench_operators.py \
         --vertices 300 --eigen-count 16 --repeats 1 --program "$programs/examples/operators"
@@ -55,7 +49,6 @@ gpu_check() {
         DEVICE=flex STAGES="1 2 5" scripts/gpu_check.sh "$work/gpu"
 }
 
-check average_models.py average_models
 check bench_energies.sh scripts/bench_energies.sh --no-torch --sizes 500 --rounds 1 --seconds 0.01
 check bench_operators.py bench_operators
 check bench_vs_torch.sh scripts/bench_vs_torch.sh --read --widths 16 --layers 2 --vertices 200

@@ -21,7 +21,6 @@ COLUMNS = {
     "Training garments, held-out windows: energies [J], means": [
         "total", "strain", "bending", "collision (as", "collision (paper",
     ],
-    "Training garments, held-out windows: contact": ["vertices inside", "pairs with the body", "self-intersecting pairs"],
     "Training garments, held-out windows: energies [J] with correct and wrong embeddings": [
         "correct", "different", "zero", "paper: correct", "paper: different", "paper: zero",
     ],

@@ -17,7 +17,7 @@ fn main() -> std::process::ExitCode {
 }
 
 fn run() -> Result<(), Report> {
-    // Without a path the model in the folder `models` is taken.
+    // Without a path the model that the program carries is taken.
     let model = std::env::args().nth(1).map(PathBuf::from);
     let draper = Draper::load(model.as_deref(), &DraperSettings::default())?;
 
