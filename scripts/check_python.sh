@@ -26,7 +26,7 @@ echo "$(basename "$wheel"): $((bytes / 1000)) kB"
 [ "$bytes" -le 25000000 ] || { echo "the wheel is larger than 25 MB" >&2; exit 1; }
 
 "${PYTHON:-python3}" -m venv "$work/test"
-pip test "$wheel" pytest
+pip test "$wheel" pytest pygltflib
 [ -z "${SITE:-}" ] || echo "$SITE" >"$(echo "$work"/test/lib/python*/site-packages)/site.pth"
 program=$(realpath "${CARGO_TARGET_DIR:-target}")/release/clothcombo
 cd python/tests

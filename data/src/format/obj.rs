@@ -5,9 +5,11 @@
 mod moved;
 mod repaired;
 mod statements;
+mod texture;
 
 pub use moved::MovedObj;
 pub use repaired::RepairedForm;
+pub use texture::texture_of_triangles;
 
 use super::atomic;
 use super::error::FileError;

@@ -4,7 +4,8 @@ use super::page::Picture;
 use super::sample_picture::picture_of;
 use super::{Evaluator, ModelUnderTest, Section};
 use crate::dataset::{BodySample, HeldOut, PreparedScene, SceneSample};
-use crate::inference::Draped;
+use crate::inference::reference::ReferenceScene;
+use crate::inference::{Draped, RefineSteps, refine};
 use crate::picture::{LegendEntry, Sheet, SheetRow, View, layer_colour, png_bytes};
 use clothcombo_data::asset::{Category, Pose};
 use clothcombo_physics::contact::resolve::ResolveSettings;
@@ -89,7 +90,7 @@ pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
         evaluator.scene_done();
         Ok::<_, Report>(Picture { file: format!("{name}.png"), caption: caption.to_owned(), png, html: None })
     };
-    let text = "After the post-process. Names in the legend stand for garments, colours without names for layers from inner to outer.";
+    let text = "After post-process and refinement. Names in the legend stand for garments, colours without names for layers from inner to outer.";
     let mut section = Section::new("gallery", "Gallery", text, Value::Null, Vec::new());
     section.pictures = sheets.into_iter().map(picture).collect::<Result<_, _>>()?;
     Ok(vec![section])
@@ -161,7 +162,7 @@ fn sheet(evaluator: &Evaluator<'_>, outfits: &[Outfit], columns: Vec<String>) ->
             let found = same.and_then(|all| all.iter().position(|g| *g == garments[layer]));
             layer_colour(found.unwrap_or(layer))
         };
-        let (scene, draped) = resolved(evaluator, garments, body)?;
+        let (scene, draped) = finished(evaluator, garments, body)?;
         for (row, view) in rows.iter_mut().zip(VIEWS) {
             row.cells.push(picture_of(&scene, &draped, view, &colour));
         }
@@ -175,8 +176,8 @@ fn sheet(evaluator: &Evaluator<'_>, outfits: &[Outfit], columns: Vec<String>) ->
     Ok(Sheet { title: String::new(), columns, rows: rows.to_vec() }.compose())
 }
 
-/// An outfit draped and resolved.
-fn resolved(
+/// An outfit draped, resolved and refined.
+fn finished(
     evaluator: &Evaluator<'_>,
     garments: &[usize],
     body: &BodySample,
@@ -190,7 +191,10 @@ fn resolved(
     let scene = evaluator.model.prepare(&sample)?;
     let draped = evaluator.networks.drape(&scene)?;
     let resolved = evaluator.post_process.of(&scene, &draped.posed).resolved(&ResolveSettings::default())?;
-    let posed = resolved.positions.concat().into_iter().map(|p| p.map(|v| v as f32)).collect();
+    let reference = ReferenceScene::new(&evaluator.model.config.losses, &scene).into_diagnostic()?;
+    let (refined, _) = refine(&reference.energy, &resolved.positions.concat(), RefineSteps::default_of(1))
+        .into_diagnostic()?;
+    let posed = refined.into_iter().map(|p| p.map(|v| v as f32)).collect();
     Ok((scene, Draped { posed, ..draped }))
 }
 

@@ -9,6 +9,7 @@ use clothcombo_data::fit::{
     FitError, FitReport, FitSettings, PlacementCheck, fit, in_file_order, needs_repair, stray_pieces,
 };
 use clothcombo_data::folders::list_garment_folder;
+use clothcombo_data::format::obj::texture_of_triangles;
 use clothcombo_data::format::{PolygonMesh, load_mesh};
 use clothcombo_data::generate::GarmentGenerator;
 use clothcombo_data::mesh::{Attachment, MeshMeasures, thickness};
@@ -104,6 +105,22 @@ impl GivenGarment {
         let follows = fitted.follows;
         let garment = Garment { name, ..fitted.garment };
         Ok(Self { garment, given, path: None, fit: Some(fitted.report), follows })
+    }
+
+    /// The OBJ file it was read from, if it was one.
+    pub fn obj_path(&self) -> Option<&Path> {
+        self.path.as_deref().filter(|path| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")))
+    }
+
+    /// Texture coordinates (u to the right, v upwards) of the corners of the garment's faces `[F, 3, 2]`: those of the OBJ file it was
+    /// read from, if that has some and its vertices and faces are still the garment's.
+    pub fn texture(&self) -> Option<Vec<[[f32; 2]; 3]>> {
+        let path = self.obj_path()?;
+        let vertex_of = |follows: &Attachment| {
+            (*follows == Attachment::to_vertex(follows.corners[0])).then_some(follows.corners[0])
+        };
+        let vertices: Vec<u32> = self.follows.iter().map(vertex_of).collect::<Option<_>>()?;
+        texture_of_triangles(&std::fs::read(path).ok()?, &vertices, self.garment.rest.faces())
     }
 
     /// Positions of the garment's vertices as positions of the given ones, in their order.

@@ -56,7 +56,7 @@ fn the_viewer_draws_every_layer_and_stage_in_chromium() {
     assert_eq!(data(&whole, "triangles"), counts.iter().sum::<u64>().to_string());
     assert_eq!(
         (data(&whole, "frame"), data(&whole, "frames")),
-        ("2".into(), "3".into()),
+        ("3".into(), "4".into()),
         "the result is shown first"
     );
     let body = see("layers=0&frame=0&colour=gap");

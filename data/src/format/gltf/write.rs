@@ -11,6 +11,7 @@ use crate::format::atomic;
 use crate::format::error::FileError;
 use clothcombo_physics::vertex_normals;
 use serde_json::{Value, json};
+use std::collections::HashMap;
 use std::path::Path;
 
 /// One mesh of a scene.
@@ -24,6 +25,8 @@ pub struct SceneMesh<'a> {
     pub faces: &'a [[u32; 3]],
     /// Positions `[V, 3]` (m) of every frame, at least one.
     pub frames: Vec<&'a [[f64; 3]]>,
+    /// Texture coordinates (u to the right, v upwards) of the corners of every face `[F, 3, 2]`, if it has any.
+    pub texture: Option<Vec<[[f32; 2]; 3]>>,
 }
 
 /// Writes [`encode_glb`] to `path`, whole or not at all.
@@ -69,6 +72,9 @@ fn check(mesh: &SceneMesh, frames: usize) -> Result<(), String> {
     }
     if let Some(corner) = mesh.faces.iter().flatten().find(|v| **v as usize >= vertices) {
         return wrong(format!("a face with vertex {corner}"), format!("vertices below {vertices}"));
+    }
+    if let Some(texture) = mesh.texture.as_ref().filter(|texture| texture.len() != mesh.faces.len()) {
+        return wrong(format!("texture of {} faces", texture.len()), format!("{}", mesh.faces.len()));
     }
     Ok(())
 }
@@ -144,18 +150,38 @@ impl File {
         [self.scalars(&seconds), self.scalars(&weights)]
     }
 
+    fn texture(&mut self, values: &[[f32; 2]]) -> usize {
+        let view = self.view(values.iter().flatten().map(|x| x.to_le_bytes()), Some(VERTICES));
+        self.accessor(
+            json!({ "bufferView": view, "componentType": FLOAT, "count": values.len(), "type": "VEC2" }),
+        )
+    }
+
     fn add(&mut self, mesh: &SceneMesh, moves: bool) {
+        let seams =
+            mesh.texture.as_ref().map(|texture| Seams::new(mesh.frames[0].len(), mesh.faces, texture));
+        let split = |values: Vec<[f32; 3]>| match &seams {
+            Some(seams) => seams.vertex.iter().map(|v| values[*v as usize]).collect(),
+            None => values,
+        };
+        let normals = |positions| split(normals(positions, mesh.faces));
+        let narrow = |positions| split(narrow(positions));
         let base = narrow(mesh.frames[0]);
-        let base_normals = normals(mesh.frames[0], mesh.faces);
+        let base_normals = normals(mesh.frames[0]);
         let position = self.vectors(&base, true);
         let normal = self.vectors(&base_normals, false);
-        let indices = self.view(mesh.faces.iter().flatten().map(|v| v.to_le_bytes()), Some(INDICES));
+        let mut attributes = json!({ "POSITION": position, "NORMAL": normal });
+        if let Some(seams) = &seams {
+            attributes["TEXCOORD_0"] = json!(self.texture(&seams.texture));
+        }
+        let faces = seams.as_ref().map_or(mesh.faces, |seams| &seams.faces);
+        let indices = self.view(faces.iter().flatten().map(|v| v.to_le_bytes()), Some(INDICES));
         let indices = self.accessor(json!({
             "bufferView": indices, "componentType": UNSIGNED_INT, "count": 3 * mesh.faces.len(), "type": "SCALAR",
         }));
         let number = self.meshes.len();
         let mut primitive = json!({
-            "attributes": { "POSITION": position, "NORMAL": normal }, "indices": indices, "material": number,
+            "attributes": attributes, "indices": indices, "material": number,
         });
         let node = json!({ "name": mesh.name, "mesh": number });
         let mut document = json!({ "name": mesh.name });
@@ -164,7 +190,7 @@ impl File {
                 .iter()
                 .map(|frame| {
                     let position = self.vectors(&differences(&narrow(frame), &base), true);
-                    let turned = differences(&normals(frame, mesh.faces), &base_normals);
+                    let turned = differences(&normals(frame), &base_normals);
                     json!({ "POSITION": position, "NORMAL": self.vectors(&turned, false) })
                 })
                 .collect();
@@ -228,6 +254,39 @@ impl File {
     }
 }
 
+/// A mesh cut where faces disagree about the texture coordinates of a vertex: the format has one pair a vertex.
+struct Seams {
+    /// Which vertex of the mesh each is: first all in their order, then further copies.
+    vertex: Vec<u32>,
+    /// Its texture coordinates, v downwards as the format has it.
+    texture: Vec<[f32; 2]>,
+    faces: Vec<[u32; 3]>,
+}
+
+impl Seams {
+    fn new(vertices: usize, faces: &[[u32; 3]], texture: &[[[f32; 2]; 3]]) -> Self {
+        let mut vertex: Vec<u32> = (0..vertices as u32).collect();
+        let mut coordinates = vec![None; vertices];
+        let mut copies = HashMap::new();
+        let mut number = |v: u32, [right, up]: [f32; 2]| {
+            let pair = [right, 1.0 - up];
+            if *coordinates[v as usize].get_or_insert(pair) == pair {
+                return v;
+            }
+            *copies.entry((v, pair.map(f32::to_bits))).or_insert_with(|| {
+                vertex.push(v);
+                coordinates.push(Some(pair));
+                vertex.len() as u32 - 1
+            })
+        };
+        let of_face = |(face, corners): (&[u32; 3], &[[f32; 2]; 3])| {
+            std::array::from_fn(|k| number(face[k], corners[k]))
+        };
+        let faces = faces.iter().zip(texture).map(of_face).collect();
+        Self { vertex, texture: coordinates.into_iter().map(Option::unwrap_or_default).collect(), faces }
+    }
+}
+
 fn narrow(positions: &[[f64; 3]]) -> Vec<[f32; 3]> {
     positions.iter().map(|p| p.map(|x| x as f32)).collect()
 }
@@ -268,7 +327,11 @@ mod tests {
     fn floats(document: &Value, binary: &[u8], number: usize) -> Vec<f32> {
         let accessor = &document["accessors"][number];
         let view = &document["bufferViews"][accessor["bufferView"].as_u64().unwrap() as usize];
-        let width = if accessor["type"] == "VEC3" { 3 } else { 1 };
+        let width = match accessor["type"].as_str().unwrap() {
+            "VEC3" => 3,
+            "VEC2" => 2,
+            _ => 1,
+        };
         let start = view["byteOffset"].as_u64().unwrap() as usize;
         let count = accessor["count"].as_u64().unwrap() as usize * width;
         assert_eq!(view["byteLength"].as_u64().unwrap() as usize, 4 * count);
@@ -285,12 +348,14 @@ mod tests {
                 colour: [200, 190, 180],
                 faces: ball.faces(),
                 frames: vec![ball.positions()],
+                texture: None,
             },
             SceneMesh {
                 name: "tee",
                 colour: [10, 20, 200],
                 faces: sheet.faces(),
                 frames: vec![sheet.positions()],
+                texture: None,
             },
         ];
         let folder = tempfile::tempdir().unwrap();
@@ -318,6 +383,7 @@ mod tests {
             colour: [255, 0, 0],
             faces: sheet.faces(),
             frames: frames.iter().map(|f| f.as_slice()).collect(),
+            texture: None,
         };
         let bytes =
             encode_glb(&[mesh.clone(), SceneMesh { name: "coat", ..mesh }], &[2.0, 2.5, 3.5]).unwrap();
@@ -353,11 +419,54 @@ mod tests {
     }
 
     #[test]
+    fn a_texture_cuts_the_mesh_along_its_seams_only() {
+        let sheet = grid(0.2, 0.1, 2, 1);
+        // The left half reads its own coordinates, the right half others: the two vertices between them are there twice.
+        let of_corner = |half: f32, v: u32| sheet.positions()[v as usize].map(|x| x as f32 + half);
+        let texture = |face: &[u32; 3]| {
+            let left = face.iter().any(|v| sheet.positions()[*v as usize][0] == sheet.bounds().0[0]);
+            face.map(|v| of_corner(if left { 0.0 } else { 0.5 }, v)).map(|[u, v, _]| [u, v])
+        };
+        let texture: Vec<_> = sheet.faces().iter().map(texture).collect();
+        let mesh = SceneMesh {
+            name: "tee",
+            colour: [0; 3],
+            faces: sheet.faces(),
+            frames: vec![sheet.positions(), sheet.positions()],
+            texture: Some(texture.clone()),
+        };
+        let bytes = encode_glb(&[mesh], &[0.0, 1.0]).unwrap();
+        let (document, binary) = document(&bytes);
+        let attributes = &document["meshes"][0]["primitives"][0]["attributes"];
+        let read = |name: &str| floats(&document, binary, attributes[name].as_u64().unwrap() as usize);
+        let (positions, coordinates) = (read("POSITION"), read("TEXCOORD_0"));
+        assert_eq!((positions.len() / 3, coordinates.len() / 2), (6 + 2, 6 + 2));
+        let target = &document["meshes"][0]["primitives"][0]["targets"][0]["POSITION"];
+        assert_eq!(floats(&document, binary, target.as_u64().unwrap() as usize), vec![0.0; 3 * 8]);
+        let indices = document["meshes"][0]["primitives"][0]["indices"].as_u64().unwrap() as usize;
+        let at = document["bufferViews"]
+            [document["accessors"][indices]["bufferView"].as_u64().unwrap() as usize]["byteOffset"]
+            .as_u64()
+            .unwrap() as usize;
+        for (corner, (vertex, expected)) in
+            sheet.faces().iter().flatten().zip(texture.iter().flatten()).enumerate()
+        {
+            let index = words(binary, at + 4 * corner) as usize;
+            assert_eq!(coordinates[2 * index..2 * index + 2], [expected[0], 1.0 - expected[1]]);
+            assert_eq!(
+                positions[3 * index..3 * index + 3],
+                sheet.positions()[*vertex as usize].map(|x| x as f32)
+            );
+        }
+    }
+
+    #[test]
     fn what_does_not_fit_is_named() {
         let sheet = grid(0.3, 0.2, 2, 2);
         let mut broken = sheet.positions().to_vec();
         broken[3][1] = f64::NAN;
-        let mesh = |frames| SceneMesh { name: "tee", colour: [0; 3], faces: sheet.faces(), frames };
+        let mesh =
+            |frames| SceneMesh { name: "tee", colour: [0; 3], faces: sheet.faces(), frames, texture: None };
         let whole = sheet.positions();
         let message = |mesh: SceneMesh, times: &[f64]| encode_glb(&[mesh], times).unwrap_err();
         assert!(message(mesh(vec![whole, &broken]), &[0.0, 1.0]).contains("'tee', frame 1: vertex 3"));

@@ -3,6 +3,7 @@
 use super::super::file_face::FileFace;
 use super::moved::{MovedObj, behind_coordinates, with_materials};
 use super::statements::{Statement, statements};
+use super::texture::texture_of;
 use std::io::Write as _;
 use std::path::Path;
 
@@ -88,14 +89,6 @@ fn count_vertices(bytes: &[u8]) -> u32 {
         text.split(|b| b.is_ascii_whitespace()).find(|word| !word.is_empty()) == Some(b"v".as_slice())
     };
     statements(bytes).filter(|s| is_vertex(&s.text)).count() as u32
-}
-
-/// Number of the texture coordinates in `12/3`, from 1; negative ones count back from the `so_far` that were there before.
-fn texture_of(word: &[u8], so_far: i64) -> Option<i64> {
-    let part = word.split(|b| *b == b'/').nth(1)?;
-    let number: i64 = std::str::from_utf8(part).ok()?.parse().ok()?;
-    let number = if number < 0 { so_far.checked_add(number)?.checked_add(1)? } else { number };
-    (number > 0).then_some(number)
 }
 
 #[cfg(test)]

@@ -259,8 +259,7 @@ fn as_given(
     name: &str,
     comments: &[String],
 ) -> Result<Option<MovedObj>, String> {
-    let is_obj = |path: &&PathBuf| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"));
-    let Some(path) = source.path.as_ref().filter(is_obj) else { return Ok(None) };
+    let Some(path) = source.obj_path() else { return Ok(None) };
     let bytes = std::fs::read(path).map_err(|e| format!("{}: {e}", path.display()))?;
     let mut moved = MovedObj::new(path, &bytes, positions, name).map_err(|found| {
         let read = positions.len();
@@ -281,6 +280,7 @@ fn write_scene(path: &Path, show: &Show) -> Result<(), OutputError> {
         colour: BODY_COLOUR,
         faces: &show.draper.body().faces,
         frames: show.drapes.iter().map(|d| d.body.as_slice()).collect(),
+        texture: None,
     }];
     for (layer, garment) in show.outfit.garments.iter().enumerate() {
         meshes.push(SceneMesh {
@@ -288,6 +288,7 @@ fn write_scene(path: &Path, show: &Show) -> Result<(), OutputError> {
             colour: layer_colour(layer),
             faces: garment.prepared.garment.rest.faces(),
             frames: show.drapes.iter().map(|d| d.garments[layer].positions.as_slice()).collect(),
+            texture: garment.source.texture(),
         });
     }
     let times: Vec<f64> = show.moments.iter().map(|m| m.seconds).collect();
