@@ -2,7 +2,7 @@
 
 use super::values::{gap_mm, seconds};
 use clap::Args;
-use clothcombo_physics::contact::resolve::ResolveSettings;
+use clothcombo_physics::contact::resolve::{Certificate, ResolveSettings};
 use std::time::Duration;
 
 /// What the post-process is to do.
@@ -22,4 +22,15 @@ impl PostProcessArguments {
     pub fn settings(&self) -> ResolveSettings {
         ResolveSettings { gap: 1e-3 * self.gap_mm, time: self.time_limit, ..ResolveSettings::default() }
     }
+}
+
+/// Says that the budget ended the post-process, if it did.
+pub fn stopped(certificate: &Certificate) -> Option<String> {
+    certificate.is_stopped.then(|| {
+        format!(
+            "stopped after its budget, {} pairs left; hint: another order of the garments, fewer of them, or a pose in which the \
+             body overlaps itself less",
+            certificate.between()
+        )
+    })
 }

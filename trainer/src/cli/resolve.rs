@@ -1,7 +1,7 @@
 //! `clothcombo resolve`: anyone's garments taken out of anyone's body, and out of each other.
 
 use crate::cli::output::print_report;
-use crate::cli::post_process::PostProcessArguments;
+use crate::cli::post_process::{PostProcessArguments, stopped};
 use crate::cli::table::{row, table};
 use crate::cli::verbosity::spinner;
 use crate::inference::UniqueNames;
@@ -303,5 +303,6 @@ fn text(report: &ResolveReport) -> String {
             "file" => garment.output.display().to_string(),
         }
     });
-    format!("{}\n{}", table(&rows), table(&garments.collect::<Vec<_>>()))
+    let stopped = stopped(&report.certificate).map_or_else(String::new, |text| format!("\n{text}\n"));
+    format!("{}\n{}{stopped}", table(&rows), table(&garments.collect::<Vec<_>>()))
 }

@@ -86,6 +86,7 @@ impl Drape {
         let certified = certify(&self.surface(draper), &outfit.layers(&after));
         let mut certificate = certified.map_err(|error| outfit.named(error.into()))?;
         certificate.compare_strain(&outfit.layers(&before));
+        certificate.is_stopped = self.certificate.is_stopped;
         self.certificate = certificate;
         Ok(())
     }

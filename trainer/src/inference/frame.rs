@@ -49,7 +49,7 @@ impl Draper {
 
         let clock = Instant::now();
         let parts = outfit.split(&network);
-        let (resolved, times) = match self.settings.resolve {
+        let (resolved, times, certificate) = match self.settings.resolve {
             true => {
                 let final_sample = || PathSample {
                     body: surface.clone(),
@@ -59,9 +59,12 @@ impl Draper {
                 };
                 let done = self.resolved(outfit, frame, watch, &surface, &parts, &final_sample);
                 let done = done.map_err(|error| outfit.named(error))?;
-                (done.positions, done.garments.iter().map(|g| 1e3 * g.time.as_secs_f64()).collect())
+                let times = done.garments.iter().map(|g| 1e3 * g.time.as_secs_f64()).collect();
+                (done.positions, times, done.certificate)
             }
-            false => (parts.iter().map(|p| p.to_vec()).collect(), vec![0.0; parts.len()]),
+            false => {
+                (parts.iter().map(|p| p.to_vec()).collect(), vec![0.0; parts.len()], Certificate::default())
+            }
         };
         milliseconds.resolve = elapsed(clock);
 
@@ -97,7 +100,7 @@ impl Draper {
             garments,
             milliseconds,
             refinement,
-            certificate: Certificate::default(),
+            certificate,
             surface: Some(surface),
         };
         let clock = Instant::now();

@@ -3,6 +3,7 @@
 use std::time::{Duration, Instant};
 
 use super::body::{Body, with_body, with_drawn};
+use super::budget::Budget;
 use super::close_in::ClosingIn;
 use super::count::certified;
 use super::garment::at;
@@ -16,75 +17,86 @@ use crate::query::Surface;
 /// Most attempts that begin where another one ended…
 const FURTHER_ATTEMPTS: usize = 3;
 /// …and most pairs that may be left there: more would only be torn further.
-const FEW: usize = 32;
+pub(super) const FEW: usize = 32;
+/// Most pairs for which the body gives way before a path is tried: more are hardly ever cleared by that.
+const MOST_TO_YIELD: usize = 64;
 /// Pairs of garments with themselves that may be left where nothing else crosses.
 pub(super) const FEW_OF_ITSELF: usize = 8;
 /// How the last few crossings are tried once more: gap and rings, as shares of those asked for. A smaller gap is for
 /// many sheets in one crease, a larger one goes round what holds a few of them.
 const LAST: [(f64, usize); 2] = [(0.3, 1), (3.0, 2)];
 
-/// [`super::resolve`] for valid arguments, of which all began at `start`. Where something is left to do after the first attempt,
-/// `further` may go on from there: it gets the body and what was reached.
+/// [`super::resolve`] for valid arguments. Where something is left to do after the first attempt, `further` may go on from there: it
+/// gets the body and what was reached. The body only gives way before that where few enough pairs are left.
 pub(super) fn resolved_further<E>(
     body: &Surface<f64>,
     layers: &[Layer<'_>],
     settings: &ResolveSettings,
-    start: Instant,
+    budget: &Budget,
     further: impl FnOnce(&Body<'_>, Resolved) -> Result<Resolved, E>,
 ) -> Result<Resolved, E> {
     let preparing = Instant::now();
     with_drawn(body, layers, |drawn| {
         let body_time = preparing.elapsed();
-        resolved_near(drawn, layers, settings, (start, body_time), further)
+        let most = if settings.steps > 0 { MOST_TO_YIELD } else { usize::MAX };
+        resolved_near(drawn, layers, settings, (budget, body_time), most, further)
     })
 }
 
-/// [`resolved_further`] with a body that is prepared near `layers`, which took `body_time`.
+/// [`resolved_further`] with a body that is prepared near `layers`, which took `body_time`; it gives way where at most so many pairs
+/// (`most`) are left.
 pub(super) fn resolved_near<E>(
     drawn: BodyObstacle<'_>,
     layers: &[Layer<'_>],
     settings: &ResolveSettings,
-    (start, body_time): (Instant, Duration),
+    (budget, body_time): (&Budget, Duration),
+    most: usize,
     further: impl FnOnce(&Body<'_>, Resolved) -> Result<Resolved, E>,
 ) -> Result<Resolved, E> {
     let body = drawn.surface;
-    let mut simple = simply_resolved(&drawn, layers, settings, body_time);
+    let mut simple = simply_resolved(&drawn, layers, settings, (budget, body_time));
     if simple.certificate.is_clear() {
-        simple.go_on(body, layers, settings, start);
-        simple.ease(&drawn, layers, settings, start, ease::TIMES);
-        simple.compare_since(layers, start);
+        simple.go_on(body, layers, settings, budget);
+        simple.ease(&drawn, layers, settings, budget, ease::TIMES);
+        simple.compare_since(layers, budget);
         return Ok(simple);
     }
     let relieving = Instant::now();
     with_body(drawn, layers.len(), |room| {
-        let mut found = resolved(room, layers, settings, simple, (start, relieving));
-        found.go_on(body, layers, settings, start);
+        let mut found = match simple.certificate.between() <= most {
+            true => resolved(room, layers, settings, simple, (budget, relieving)),
+            false => {
+                simple.certificate.count_narrow(&room.drawn);
+                simple
+            }
+        };
+        found.go_on(body, layers, settings, budget);
         if found.certificate.is_clear() {
-            found.ease(&room.drawn, layers, settings, start, ease::TIMES);
+            found.ease(&room.drawn, layers, settings, budget, ease::TIMES);
         }
-        found.compare_since(layers, start);
+        found.compare_since(layers, budget);
         let mut found = further(room, found)?;
-        found.ease(&room.drawn, layers, settings, start, ease::TIMES);
-        found.compare_since(layers, start);
+        found.ease(&room.drawn, layers, settings, budget, ease::TIMES);
+        found.compare_since(layers, budget);
         Ok(found)
     })
 }
 
-/// [`super::resolve`] without what follows the first attempts; all of it began at `start`.
+/// [`super::resolve`] without what follows the first attempts.
 fn resolved_once(
     body: &Surface<f64>,
     layers: &[Layer<'_>],
     settings: &ResolveSettings,
-    start: Instant,
+    budget: &Budget,
 ) -> Resolved {
     let preparing = Instant::now();
     with_drawn(body, layers, |drawn| {
-        let simple = simply_resolved(&drawn, layers, settings, preparing.elapsed());
+        let simple = simply_resolved(&drawn, layers, settings, (budget, preparing.elapsed()));
         if simple.certificate.is_clear() {
             return simple;
         }
         let relieving = Instant::now();
-        with_body(drawn, layers.len(), |body| resolved(body, layers, settings, simple, (start, relieving)))
+        with_body(drawn, layers.len(), |body| resolved(body, layers, settings, simple, (budget, relieving)))
     })
 }
 
@@ -93,35 +105,35 @@ fn simply_resolved(
     drawn: &BodyObstacle<'_>,
     layers: &[Layer<'_>],
     settings: &ResolveSettings,
-    body_time: Duration,
+    (budget, body_time): (&Budget, Duration),
 ) -> Resolved {
     let now = Instant::now();
     // Wider limits are for what is left when the body has given way.
     let settings = ResolveSettings { loosened: 1.0, ..*settings };
-    let mut resolved = judged(drawn, layers, untangled(drawn, layers, &settings));
+    let mut resolved = judged(drawn, layers, untangled(drawn, layers, &settings, budget));
     resolved.body_time = body_time;
     resolved.compare(layers, now.elapsed() - resolved.certificate_time);
     resolved
 }
 
 /// [`super::resolve`] on a body that gives way, prepared since `relieving`; `simple` is what was reached before it did, and stays where
-/// it is better, or where all that began at `start` has had its time.
+/// it is better, or where the `budget` is spent.
 fn resolved(
     body: &Body<'_>,
     layers: &[Layer<'_>],
     settings: &ResolveSettings,
     mut simple: Resolved,
-    (start, relieving): (Instant, Instant),
+    (budget, relieving): (&Budget, Instant),
 ) -> Resolved {
     simple.certificate.count_narrow(&body.drawn);
-    if settings.is_late(start, layers.len()) {
+    if budget.is_spent() {
         return simple;
     }
     let obstacle = body.obstacle();
     let body_time = simple.body_time + relieving.elapsed();
     let now = Instant::now();
-    let found = untangled(obstacle, layers, settings);
-    let mut found = settled(body, layers, found, settings, Room::AMPLE, start);
+    let found = untangled(obstacle, layers, settings, budget);
+    let mut found = settled(body, layers, found, settings, Room::AMPLE, budget);
     let own: Duration = simple.garments.iter().map(|work| work.time).sum();
     let time = own + now.elapsed() - found.certificate_time;
     let certificate_time = simple.certificate_time + found.certificate_time;
@@ -137,24 +149,23 @@ fn resolved(
 impl Resolved {
     /// Where few crossings are left on `body`, or none but those of garments with themselves, attempts that begin where
     /// the one before ended: cloth that is nearly sorted out is the better shape to return to and to measure lengths
-    /// from than the drape it came from. None where limits are strict (`settings.loosened`). `start`: when all of it
-    /// began.
+    /// from than the drape it came from. None where limits are strict (`settings.loosened`).
     pub(super) fn go_on(
         &mut self,
         body: &Surface<f64>,
         layers: &[Layer<'_>],
         settings: &ResolveSettings,
-        start: Instant,
+        budget: &Budget,
     ) {
         let mut now = self.positions.clone();
         let attempts = if settings.loosened > 1.0 { FURTHER_ATTEMPTS } else { 0 };
         for _ in 0..attempts {
             let left = self.certificate.between();
             let is_smooth = !settings.self_contact || self.certificate.self_triangle_pairs <= FEW_OF_ITSELF;
-            if left == 0 && is_smooth || left > FEW || settings.is_late(start, layers.len()) {
+            if left == 0 && is_smooth || left > FEW || budget.is_spent() {
                 break;
             }
-            let found = resolved_once(body, &at(layers, &now), settings, start);
+            let found = resolved_once(body, &at(layers, &now), settings, budget);
             self.add_work(&found);
             let is_stuck = found.positions == now;
             now.clone_from(&found.positions);
@@ -166,24 +177,24 @@ impl Resolved {
     }
 
     /// Where few crossings are left in the end, tries to mend them with other gaps. None where limits are strict.
-    /// Returns whether that was better. `start`: when all of it began.
+    /// Returns whether that was better.
     pub(super) fn mend_last(
         &mut self,
         body: &Surface<f64>,
         layers: &[Layer<'_>],
         settings: &ResolveSettings,
-        start: Instant,
+        budget: &Budget,
     ) -> bool {
         let mut is_better = false;
         let attempts = if settings.loosened > 1.0 { &LAST[..] } else { &[] };
         for (gap, rings) in attempts {
             let left = self.certificate.between();
-            if left == 0 || left > FEW || settings.is_late(start, layers.len()) {
+            if left == 0 || left > FEW || budget.is_spent() {
                 break;
             }
             let settings =
                 ResolveSettings { gap: gap * settings.gap, rings: rings * settings.rings, ..*settings };
-            let found = resolved_once(body, &at(layers, &self.positions), &settings, start);
+            let found = resolved_once(body, &at(layers, &self.positions), &settings, budget);
             self.add_work(&found);
             is_better |= self.prefer(found.positions, found.certificate);
         }
@@ -191,17 +202,17 @@ impl Resolved {
     }
 
     /// Where nothing crosses but garments themselves, lays out what of them is folded, beside where they are `skinned`,
-    /// and begins once more from there. Returns whether that was better. `start`: when all of it began.
+    /// and begins once more from there. Returns whether that was better.
     pub(super) fn lay_out(
         &mut self,
         body: &Surface<f64>,
         layers: &[Layer<'_>],
         skinned: &[Vec<[f64; 3]>],
         settings: &ResolveSettings,
-        start: Instant,
+        budget: &Budget,
     ) -> bool {
         let is_smooth = self.certificate.self_triangle_pairs <= FEW_OF_ITSELF;
-        if is_smooth || !self.certificate.is_clear() || settings.is_late(start, layers.len()) {
+        if is_smooth || !self.certificate.is_clear() || budget.is_spent() {
             return false;
         }
         let now = at(layers, &self.positions);
@@ -210,25 +221,24 @@ impl Resolved {
             return false;
         }
         let laid_out = folds.laid_out(&now, skinned);
-        let mut found = resolved_once(body, &at(layers, &laid_out), settings, start);
-        found.go_on(body, layers, settings, start);
+        let mut found = resolved_once(body, &at(layers, &laid_out), settings, budget);
+        found.go_on(body, layers, settings, budget);
         self.add_work(&found);
         self.prefer(found.positions, found.certificate)
     }
 }
 
-/// What untangling left, brought back to the body as it is drawn where it can be, with its certificate. All of it began at
-/// `start`.
+/// What untangling left, brought back to the body as it is drawn where it can be, with its certificate.
 pub(super) fn settled(
     body: &Body<'_>,
     layers: &[Layer<'_>],
     found: Untangled,
     settings: &ResolveSettings,
     room: Room,
-    start: Instant,
+    budget: &Budget,
 ) -> Resolved {
     let mut resolved = judged(&body.drawn, layers, found);
-    ClosingIn { body, layers, room, start }.improve(&mut resolved, settings);
+    ClosingIn { body, layers, room, budget }.improve(&mut resolved, settings);
     resolved
 }
 

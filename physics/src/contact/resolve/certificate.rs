@@ -36,6 +36,10 @@ pub struct Certificate {
     /// Rise of the strain energy by the post-process, as a share of the energy before; `None` where there was none before, or
     /// nothing was done.
     pub strain_added: Option<f64>,
+    /// Whether the post-process had spent its budget (`ResolveSettings::total_rounds`, `ResolveSettings::time`) when pairs with the
+    /// body or between garments were left.
+    #[serde(default)]
+    pub is_stopped: bool,
     /// Pairs where the body lies inside itself.
     pub pinched: PinchedPairs,
     /// Every pair that is left, pinched ones included.
@@ -191,6 +195,7 @@ impl Certificate {
         self.max_depth_mm = self.max_depth_mm.max(more.max_depth_mm);
         self.mean_depth_mm = self.mean_depth_mm.max(more.mean_depth_mm);
         self.order_violations = self.order_violations.max(more.order_violations);
+        self.is_stopped |= more.is_stopped;
         self.strain_added = match (self.strain_added, more.strain_added) {
             (Some(a), Some(b)) => Some(a.max(b)),
             (a, b) => a.or(b),

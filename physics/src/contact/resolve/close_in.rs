@@ -1,9 +1,8 @@
 //! Where cloth lies in room that the body only made for it, tries to do without: the body gives way no more than where it lies
 //! inside itself.
 
-use std::time::Instant;
-
 use super::body::Body;
+use super::budget::Budget;
 use super::count::certified;
 use super::garment::at;
 use super::outfit::Outfit;
@@ -23,16 +22,14 @@ pub(super) struct ClosingIn<'a, 'b> {
     /// The garments as they were before all of it.
     pub layers: &'a [Layer<'a>],
     pub room: Room,
-    /// When all of it began.
-    pub start: Instant,
+    pub budget: &'a Budget,
 }
 
 impl ClosingIn<'_, '_> {
     /// Takes what comes of it if fewer pairs are left than in the `best` so far.
     pub fn improve(&self, best: &mut Resolved, settings: &ResolveSettings) {
         for share in GAPS {
-            if best.certificate.narrow_triangle_pairs == 0 || settings.is_late(self.start, self.layers.len())
-            {
+            if best.certificate.narrow_triangle_pairs == 0 || self.budget.is_spent() {
                 return;
             }
             let gap = share * settings.gap;
@@ -46,7 +43,7 @@ impl ClosingIn<'_, '_> {
         let apart = (best.certificate.layer_triangle_pairs == 0).then(|| best.positions.clone());
         let now = at(self.layers, &best.positions);
         let none = self.room.with_share(0.0);
-        let closer = self.body.with_room(none, |obstacle| untangled(obstacle, &now, settings));
+        let closer = self.body.with_room(none, |obstacle| untangled(obstacle, &now, settings, self.budget));
         let certificate = certified(&self.body.drawn, self.layers, &closer.positions);
         best.prefer(closer.positions, certificate);
         if let Some(apart) = apart.filter(|_| !best.certificate.is_clear()) {
@@ -58,12 +55,12 @@ impl ClosingIn<'_, '_> {
     fn slowly(&self, best: &mut Resolved, mut now: Vec<Vec<[f64; 3]>>, settings: &ResolveSettings) {
         let outfit = Outfit::new(self.layers);
         let (mut share, mut step, mut with_body) = (1.0, STEPS.0, usize::MAX);
-        while share > 0.0 && step >= STEPS.1 && !settings.is_late(self.start, self.layers.len()) {
+        while share > 0.0 && step >= STEPS.1 && !self.budget.is_spent() {
             let next = f64::max(share - step, 0.0);
             let sides = Sides::of(&outfit, &now.concat(), None);
             let before = at(self.layers, &now);
             let found = self.body.with_room(self.room.with_share(next), |obstacle| {
-                untangled_keeping(Some(&sides), obstacle, &before, settings)
+                untangled_keeping(Some(&sides), obstacle, &before, settings, self.budget)
             });
             let certificate = certified(&self.body.drawn, self.layers, &found.positions);
             if certificate.layer_triangle_pairs == 0 && found.with_body <= with_body {

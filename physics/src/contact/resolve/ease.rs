@@ -4,6 +4,7 @@
 //! round needs the next may not. Where the strain energy has risen in the end, edges are taken back towards their rest lengths
 //! by small moves. Each of them passes the step filter, so that it makes no intersection, and is taken if the energy is lower.
 
+use super::budget::Budget;
 use super::certificate::strain_joule;
 use super::count::certified;
 use super::garment::{at, triangles};
@@ -35,17 +36,17 @@ impl Resolved {
     }
 
     /// Lowers the strain energy where it has risen from that of `layers`, by at most so many moves (`times`) of what was moved
-    /// before, none of which makes an intersection. Strict limits (`settings.loosened`) allow none of this. `start`: when all of
-    /// it began.
+    /// before, none of which makes an intersection. Strict limits (`settings.loosened`) allow none of this, nor does a `budget` of which
+    /// the time is over.
     pub(super) fn ease(
         &mut self,
         drawn: &BodyObstacle<'_>,
         layers: &[Layer<'_>],
         settings: &ResolveSettings,
-        start: Instant,
+        budget: &Budget,
         times: usize,
     ) {
-        let is_late = || settings.is_late(start, layers.len());
+        let is_late = || budget.is_late();
         if settings.loosened <= 1.0 || !self.is_strained(layers) || is_late() {
             return;
         }
@@ -230,7 +231,13 @@ mod tests {
         assert_eq!(certificate.pairs(), 0);
         let mut resolved = Resolved { positions: crumpled, certificate, ..Resolved::default() };
         with_drawn(&body, &layers, |drawn| {
-            resolved.ease(&drawn, &layers, &ResolveSettings::default(), Instant::now(), TIMES);
+            resolved.ease(
+                &drawn,
+                &layers,
+                &ResolveSettings::default(),
+                &Budget::new(&ResolveSettings::default(), 1),
+                TIMES,
+            );
         });
         let after = garment.strain_energy(&resolved.positions[0]);
         assert!(after < 0.1 * before, "{before} {after}");
@@ -255,7 +262,7 @@ mod tests {
             let certificate = certify(&body, &at(&layers, &positions)).unwrap();
             let mut resolved = Resolved { positions, certificate, ..Resolved::default() };
             with_drawn(&body, &layers, |drawn| {
-                resolved.ease(&drawn, &layers, &settings, Instant::now(), TIMES);
+                resolved.ease(&drawn, &layers, &settings, &Budget::new(&settings, 1), TIMES);
             });
             assert_eq!(resolved.positions[0] != *now, is_eased);
         }

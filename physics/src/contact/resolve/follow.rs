@@ -6,10 +6,9 @@
 //! the drape changes, crossings are shallow, and the nearest way out is right. Where a step leaves more crossings than
 //! there were, a shorter one is tried.
 
-use std::time::Instant;
-
 use super::attempt::{resolved_further, settled};
 use super::body::{Body, with_body, with_drawn};
+use super::budget::Budget;
 use super::ease::{TIMES, TIMES_IN_FRAME};
 use super::garment::{at, check};
 use super::stages::Stages;
@@ -43,18 +42,19 @@ pub fn resolve_along<E: From<ResolveError>>(
     settings: &ResolveSettings,
     mut stage_at: impl FnMut(f64) -> Result<PathSample, E>,
 ) -> Result<Resolved, E> {
-    let start = Instant::now();
+    let budget = &Budget::new(settings, layers.len());
     settings.check()?;
     check(body, layers)?;
     check(body, &placed(layers, skinned)?)?;
     if let Some(found) = fast_pass(body, layers, settings)? {
         return Ok(found);
     }
-    let fast_time = start.elapsed();
+    let fast_time = budget.elapsed();
+    budget.shorten_for(body);
     let mut stages = Stages::to(layers);
     let mut checked_at = |share: f64| Ok::<_, E>(checked(stage_at(share)?, layers)?);
     let mut along = |layers: &[Layer<'_>], folds: &mut Option<Folds>| {
-        taken_along(body, layers, folds, settings, start, &mut |share| stages.at(share, &mut checked_at))
+        taken_along(body, layers, folds, settings, budget, &mut |share| stages.at(share, &mut checked_at))
     };
     // Strict limits leave a drape as it is, as far as it can be left.
     let may_lay_out = settings.loosened > 1.0 && settings.self_contact;
@@ -67,19 +67,21 @@ pub fn resolve_along<E: From<ResolveError>>(
         }
     };
     let is_laid_out = folds.is_some_and(|folds| !folds.is_empty());
-    if is_laid_out && !resolved.certificate.is_clear() && !settings.is_late(start, layers.len()) {
+    if is_laid_out && !resolved.certificate.is_clear() && !budget.is_spent() {
         resolved = resolved.or_by(along(layers, &mut None)?, Certificate::defects);
     }
-    let is_mended = resolved.mend_last(body, layers, settings, start);
+    let is_mended = resolved.mend_last(body, layers, settings, budget);
     // What a drape as it came has of its folds, and what was folded on the way.
-    let is_laid_out = may_lay_out && resolved.lay_out(body, layers, skinned, settings, start) || is_laid_out;
+    let is_laid_out = may_lay_out && resolved.lay_out(body, layers, skinned, settings, budget) || is_laid_out;
     if (is_mended || is_laid_out) && resolved.is_strained(layers) {
         // So far strain was measured from what was laid out, and not since the last attempts.
         with_drawn(body, layers, |drawn| {
-            with_body(drawn, layers.len(), |room| resolved.ease(&room.drawn, layers, settings, start, TIMES));
+            with_body(drawn, layers.len(), |room| {
+                resolved.ease(&room.drawn, layers, settings, budget, TIMES)
+            });
         });
     }
-    resolved.compare_since(layers, start);
+    resolved.compare_since(layers, budget);
     resolved.fast_time = fast_time;
     if resolved.steps > 0 {
         resolved.stage = Stage::Path;
@@ -94,16 +96,15 @@ fn taken_along<E: From<ResolveError>>(
     layers: &[Layer<'_>],
     folds: &mut Option<Folds>,
     settings: &ResolveSettings,
-    start: Instant,
+    budget: &Budget,
     stage_at: &mut impl FnMut(f64) -> Result<PathSample, E>,
 ) -> Result<Resolved, E> {
-    resolved_further(body, layers, settings, start, |room, mut best| {
-        let is_late = || settings.is_late(start, layers.len());
+    resolved_further(body, layers, settings, budget, |room, mut best| {
         let is_strained = best.certificate.strain_added.is_some_and(|added| added > STRAINED);
-        if best.certificate.is_clear() && !is_strained || settings.steps == 0 || is_late() {
+        if best.certificate.is_clear() && !is_strained || settings.steps == 0 || budget.is_spent() {
             return Ok(best);
         }
-        let way = Way { layers, end: room, settings, start, strides: Strides::FROM_T_POSE };
+        let way = Way { layers, end: room, settings, budget, strides: Strides::FROM_T_POSE };
         let t_pose = stage_at(0.0)?;
         if let Some(folds) = folds {
             folds.add(&Folds::of(&t_pose.body, &at(layers, &t_pose.draped), &t_pose.skinned));
@@ -117,7 +118,7 @@ fn taken_along<E: From<ResolveError>>(
         let mut stage_at = |share: f64| stage_at(share).map(laid_out);
         way.improve(&mut best, t_pose.clone(), &mut stage_at)?;
         // Where most of what crosses is pinched it is the body, not the drape, that leaves no way out.
-        if best.certificate.between() > best.certificate.pinched.count() && !is_late() {
+        if best.certificate.between() > best.certificate.pinched.count() && !budget.is_spent() {
             let shares = shares(&best.certificate, layers, &t_pose.draped);
             let nearer = taken_back(t_pose.clone(), &shares);
             if nearer.draped != t_pose.draped {
@@ -142,24 +143,24 @@ pub fn resolve_after<E: From<ResolveError>>(
     settings: &ResolveSettings,
     mut stage_at: impl FnMut(f64) -> Result<PathSample, E>,
 ) -> Result<Option<Resolved>, E> {
-    let start = Instant::now();
+    let budget = &Budget::new(settings, layers.len());
     settings.check()?;
     check(body, layers)?;
     check_transforms(&before.transforms, layers)?;
     let carry_on = |body: &Body<'_>| {
-        let body_time = start.elapsed();
+        let body_time = budget.elapsed();
         let strides = if before.crossings == 0 { Strides::OF_FRAME } else { Strides::OF_CROSSED_FRAME };
-        let way = Way { layers, end: body, settings, start, strides };
+        let way = Way { layers, end: body, settings, budget, strides };
         let (followed, steps) = way.follow(before, |share| Ok::<_, E>(checked(stage_at(share)?, layers)?))?;
         let Some(found) = followed else { return Ok(None) };
-        let mut resolved = settled(body, layers, found, settings, strides.room, start);
+        let mut resolved = settled(body, layers, found, settings, strides.room, budget);
         resolved.body_time = body_time;
-        resolved.go_on(body.drawn.surface, layers, settings, start);
-        resolved.ease(&body.drawn, layers, settings, start, TIMES_IN_FRAME);
-        resolved.compare_since(layers, start);
+        resolved.go_on(body.drawn.surface, layers, settings, budget);
+        resolved.ease(&body.drawn, layers, settings, budget, TIMES_IN_FRAME);
+        resolved.compare_since(layers, budget);
         if resolved.certificate.tears() > 0 {
-            resolved.ease(&body.drawn, layers, settings, start, TIMES - TIMES_IN_FRAME);
-            resolved.compare_since(layers, start);
+            resolved.ease(&body.drawn, layers, settings, budget, TIMES - TIMES_IN_FRAME);
+            resolved.compare_since(layers, budget);
         }
         resolved.steps = steps;
         Ok(Some(resolved))

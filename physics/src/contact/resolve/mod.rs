@@ -35,6 +35,7 @@
 
 mod attempt;
 mod body;
+mod budget;
 mod certificate;
 mod close_in;
 mod contact;
@@ -78,11 +79,10 @@ pub use resolved::{GarmentWork, Resolved, Stage};
 pub use settings::ResolveSettings;
 pub use waypoint::{PathSample, Reached};
 
-use std::time::Instant;
-
 use crate::query::Surface;
 use attempt::resolved_near;
 use body::with_drawn;
+use budget::Budget;
 use garment::check;
 
 /// Takes `layers`, innermost first, out of `body` and out of each other. Deterministic for any number of threads (without a
@@ -96,16 +96,18 @@ pub fn resolve(
     layers: &[Layer<'_>],
     settings: &ResolveSettings,
 ) -> Result<Resolved, ResolveError> {
-    let start = Instant::now();
+    let budget = &Budget::new(settings, layers.len());
     settings.check()?;
     check(body, layers)?;
     with_drawn(body, layers, |drawn| {
-        let body_time = start.elapsed();
-        if let Some(found) = passed_near(&drawn, layers, settings, (start, body_time)) {
+        let body_time = budget.elapsed();
+        if let Some(found) = passed_near(&drawn, layers, settings, (budget, body_time)) {
             return Ok(found);
         }
-        let fast_time = start.elapsed() - body_time;
-        let found = resolved_near(drawn, layers, settings, (start, body_time), |_, found| Ok(found));
+        let fast_time = budget.elapsed() - body_time;
+        budget.shorten_for(body);
+        let found =
+            resolved_near(drawn, layers, settings, (budget, body_time), usize::MAX, |_, found| Ok(found));
         found.map(|found: Resolved| Resolved { fast_time, ..found })
     })
 }

@@ -1,10 +1,11 @@
 //! What the post-process reached, and how it is judged.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::Layer;
 use serde::Serialize;
 
+use super::budget::Budget;
 use super::certificate::Certificate;
 use crate::contact::step_filter::FilterWork;
 use crate::vec3;
@@ -23,6 +24,8 @@ pub struct Resolved {
     pub steps: usize,
     /// What cleared it, or went farthest.
     pub stage: Stage,
+    /// Rounds of detection and relaxation of all stages but the fast pass.
+    pub rounds: usize,
     /// What the step filter did.
     pub filter: FilterWork,
     /// How much of the time of the garments the fast pass took where it was not enough; zero where it was.
@@ -74,6 +77,7 @@ impl Resolved {
         }
         self.add_work(&other);
         self.steps += other.steps;
+        self.rounds += other.rounds;
         for (work, further) in self.garments.iter_mut().zip(&other.garments) {
             work.time += further.time;
         }
@@ -98,9 +102,11 @@ impl Resolved {
         is_better
     }
 
-    /// [`compare`](Self::compare) for work that began at `start`, without the time for the body and for certificates.
-    pub(super) fn compare_since(&mut self, layers: &[Layer<'_>], start: Instant) {
-        self.compare(layers, start.elapsed().saturating_sub(self.body_time + self.certificate_time));
+    /// [`compare`](Self::compare) for all work of `budget`, without the time for the body and for certificates.
+    pub(super) fn compare_since(&mut self, layers: &[Layer<'_>], budget: &Budget) {
+        self.compare(layers, budget.elapsed().saturating_sub(self.body_time + self.certificate_time));
+        self.rounds = budget.spent();
+        self.certificate.is_stopped = budget.is_spent() && !self.certificate.is_clear();
     }
 
     /// Tells moves and strain from `layers`, and that all of it took `time`.

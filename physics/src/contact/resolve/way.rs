@@ -1,10 +1,10 @@
 //! A way that garments are taken, step by step: which steps are tried, and what is done at each.
 
 use std::sync::OnceLock;
-use std::time::Instant;
 
-use super::attempt::settled;
+use super::attempt::{FEW, settled};
 use super::body::{Body, with_body_after, with_drawn};
+use super::budget::Budget;
 use super::garment::{at, check};
 use super::obstacle::BodyObstacle;
 use super::outfit::Outfit;
@@ -17,9 +17,9 @@ use crate::contact::self_triangle_pairs;
 use crate::transform::{into_frame, out_of_frame};
 use crate::vec3::{add, scale, sub};
 
-/// The rest of the way is one step where, since nothing crossed, of the steps that are allowed one in so many was as short as may
-/// be, and left more crossings all the same.
-const FAILURES: usize = 16;
+/// The rest of the way is one step where, since nothing crossed, so many steps as short as may be left more crossings all the
+/// same: on ways that end clear it is one at most.
+const FAILURES: usize = 3;
 /// Steps without further crossings after which a longer one is tried.
 const GOOD_STEPS: usize = 4;
 /// How much of what the post-process changed is kept in a long step, so that old changes fade…
@@ -37,8 +37,7 @@ pub(super) struct Way<'a, 'b> {
     /// The body at 1.
     pub end: &'a Body<'b>,
     pub settings: &'a ResolveSettings,
-    /// When it began.
-    pub start: Instant,
+    pub budget: &'a Budget,
     pub strides: Strides,
 }
 
@@ -91,6 +90,9 @@ impl Way<'_, '_> {
         t_pose: PathSample,
         stage_at: impl FnMut(f64) -> Result<PathSample, E>,
     ) -> Result<(), E> {
+        if self.budget.is_nearly_spent() {
+            return Ok(());
+        }
         let (layers, settings) = (self.layers, self.settings);
         let start = std::slice::from_ref(&t_pose.draped);
         let first = on_stage(
@@ -99,17 +101,20 @@ impl Way<'_, '_> {
             start,
             (self.strides.room, None),
             |_| true,
-            |obstacle, start| with_all_own(untangled(obstacle, start, settings), layers, settings),
+            |obstacle, start| {
+                with_all_own(untangled(obstacle, start, settings, self.budget), layers, settings)
+            },
         );
         let crossings = first.untangled.crossings;
         if crossings > 0 && crossings >= best.certificate.crossings() {
             return Ok(());
         }
-        let (followed, steps) = self.go(Place::new(t_pose, first, None), stage_at)?;
+        let most = best.certificate.crossings().max(FEW);
+        let (followed, steps) = self.go(Place::new(t_pose, first, None), most, stage_at)?;
         best.steps += steps;
         let Some(found) = followed else { return Ok(()) };
-        let mut along = settled(self.end, layers, found, settings, self.strides.room, self.start);
-        along.go_on(self.end.drawn.surface, layers, settings, self.start);
+        let mut along = settled(self.end, layers, found, settings, self.strides.room, self.budget);
+        along.go_on(self.end.drawn.surface, layers, settings, self.budget);
         best.add_work(&along);
         let [now, then] = [&along, &*best].map(|resolved| &resolved.certificate);
         match now.is_clear() {
@@ -133,12 +138,14 @@ impl Way<'_, '_> {
         stage_at: impl FnMut(f64) -> Result<PathSample, E>,
     ) -> Result<(Option<Untangled>, usize), E> {
         let sides = OnceLock::new();
-        self.go(Place { reached, gave_way: None, own: None, sides, sides_before: None }, stage_at)
+        self.go(Place { reached, gave_way: None, own: None, sides, sides_before: None }, usize::MAX, stage_at)
     }
 
+    /// None, too, where more than `most` pairs intersect on the way.
     fn go<E: From<ResolveError>>(
         &self,
         mut place: Place,
+        most: usize,
         mut stage_at: impl FnMut(f64) -> Result<PathSample, E>,
     ) -> Result<(Option<Untangled>, usize), E> {
         let Strides { longest, shortest, keeping, .. } = self.strides;
@@ -148,9 +155,9 @@ impl Way<'_, '_> {
         // How many steps in a row went well, and how many of the shortest did not since nothing crossed: most crossings
         // that such a step leaves are mended in the next.
         let (mut well, mut failures) = (0, 0);
-        let most_failures = (self.settings.steps / FAILURES).max(1);
-        while steps < self.settings.steps && !self.is_late() {
-            let is_last = failures >= most_failures || steps + 1 == self.settings.steps;
+        while steps < self.settings.steps && !self.budget.is_spent() {
+            let is_last =
+                failures >= FAILURES || steps + 1 == self.settings.steps || self.budget.is_nearly_spent();
             let is_shortest = is_last || step <= shortest * (1.0 + 1e-9);
             let at = if is_last || step > 1.0 - from - 1e-9 { 1.0 } else { from + step };
             let stage = stage_at(at)?;
@@ -160,6 +167,8 @@ impl Way<'_, '_> {
             if is_worse && !is_shortest {
                 // Of the step that was tried: the last one may be shorter than it might have been.
                 (step, well) = (f64::max(0.5 * (at - from), shortest), 0);
+            } else if arrived.untangled.crossings > most {
+                break;
             } else if at == 1.0 {
                 return Ok((Some(arrived.untangled), steps));
             } else {
@@ -208,13 +217,14 @@ impl Way<'_, '_> {
             |found: &Untangled| found.crossings == 0 && !place.crosses_less_than(found, step <= keeping);
         let layers = self.layers;
         Ok(on_stage(layers, stage, &starts, gives_way, is_enough, |obstacle, start| {
-            let at_will = || with_all_own(untangled(obstacle, start, &settings), layers, &settings);
+            let at_will =
+                || with_all_own(untangled(obstacle, start, &settings, self.budget), layers, &settings);
             let first = (step > keeping || is_free && !keeps_first).then(at_will);
             match first {
                 Some(found) if step > keeping || found.crossings == 0 => return found,
                 _ => (),
             }
-            let kept = untangled_keeping(Some(place.sides(layers)), obstacle, start, &settings);
+            let kept = untangled_keeping(Some(place.sides(layers)), obstacle, start, &settings, self.budget);
             let is_asked = is_free && kept.crossings > 0;
             // Cloth that went through itself is in the way of the next steps.
             let rank = |found: &Untangled| found.crossings + found.own;
@@ -223,10 +233,6 @@ impl Way<'_, '_> {
                 _ => kept,
             }
         }))
-    }
-
-    fn is_late(&self) -> bool {
-        self.settings.is_late(self.start, self.layers.len())
     }
 }
 

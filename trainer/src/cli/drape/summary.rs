@@ -1,5 +1,6 @@
 //! The report of a drape as tables for the terminal.
 
+use crate::cli::post_process::stopped;
 use crate::cli::table::{Cell, number, row, table};
 use crate::inference::{PhaseTimes, Report};
 use crate::score::Score;
@@ -117,6 +118,9 @@ fn certificate(report: &Report) -> String {
         // Without the sign of what rounds to nothing.
         let percent = (1e3 * strain).round() / 10.0 + 0.0;
         text += &format!(", strain {percent:+.1} %{worst}");
+    }
+    if let Some(stopped) = stopped(found) {
+        text += &format!("\n{stopped}");
     }
     let pinched = found.pinched.count();
     if pinched > 0 {

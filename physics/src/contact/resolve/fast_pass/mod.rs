@@ -15,6 +15,7 @@ use std::time::{Duration, Instant};
 
 use super::attempt::FEW_OF_ITSELF;
 use super::body::with_drawn;
+use super::budget::Budget;
 use super::certificate::Certificate;
 use super::contact::{Contact, Plane};
 use super::ease::{Easing, contact_mesh};
@@ -65,26 +66,26 @@ pub fn fast_pass(
 ) -> Result<Option<Resolved>, ResolveError> {
     settings.check()?;
     check(body, layers)?;
-    let start = Instant::now();
+    let budget = &Budget::new(settings, layers.len());
     Ok(with_drawn(body, layers, |drawn| {
-        let body_time = start.elapsed();
-        passed_near(&drawn, layers, settings, (start, body_time))
+        let body_time = budget.elapsed();
+        passed_near(&drawn, layers, settings, (budget, body_time))
     }))
 }
 
-/// [`fast_pass`] on a body that is prepared near `layers`, which took `body_time`; all of it began at `start`.
+/// [`fast_pass`] on a body that is prepared near `layers`, which took `body_time`.
 pub(super) fn passed_near(
     drawn: &BodyObstacle<'_>,
     layers: &[Layer<'_>],
     settings: &ResolveSettings,
-    (start, body_time): (Instant, Duration),
+    (budget, body_time): (&Budget, Duration),
 ) -> Option<Resolved> {
     let outfit = Outfit::new(layers);
     let surface = drawn.surface;
     let near = drawn.tree.part().iter().map(|&f| &surface.faces[f as usize]);
     let mesh = contact_mesh(&outfit, surface.positions.len(), near);
     let mut pass = FastPass::new(&outfit, drawn, &mesh, settings);
-    let rounds = pass.run(start);
+    let rounds = pass.run(budget);
     let most_folds = match mends_folds(settings) {
         true => FEW_OF_ITSELF,
         false => pass.folds.len(),
@@ -93,7 +94,7 @@ pub(super) fn passed_near(
     {
         return None;
     }
-    pass.ease(start);
+    pass.ease(budget);
     let positions = pass.garments();
     let certifying = Instant::now();
     let certificate = pass.certificate(&positions);
@@ -109,7 +110,7 @@ pub(super) fn passed_near(
         certificate_time,
         ..Resolved::default()
     };
-    resolved.compare_since(layers, start);
+    resolved.compare_since(layers, budget);
     is_good(&resolved.certificate, most_folds).then_some(resolved)
 }
 
@@ -180,8 +181,8 @@ impl<'a> FastPass<'a> {
         pass
     }
 
-    /// Rounds until nothing intersects, a round hardly helps, or what began at `start` has had its time; how many it took.
-    fn run(&mut self, start: Instant) -> usize {
+    /// Rounds until nothing intersects, a round hardly helps, or the `budget` is spent; how many it took.
+    fn run(&mut self, budget: &Budget) -> usize {
         let mut left = self.left();
         if left == [0, 0] {
             return 0;
@@ -190,7 +191,7 @@ impl<'a> FastPass<'a> {
         self.outward = outward(self.outfit, &self.input, away);
         let mut stalls = 0;
         for round in 1..=ROUNDS {
-            if self.settings.is_late(start, self.outfit.len()) {
+            if budget.is_spent() {
                 return round - 1;
             }
             self.round(stalls < FREE_STALLS);
@@ -226,10 +227,10 @@ impl<'a> FastPass<'a> {
     }
 
     /// Cloth gives back what it was strained by. Strict limits leave it.
-    fn ease(&mut self, start: Instant) {
+    fn ease(&mut self, budget: &Budget) {
         if self.settings.loosened > 1.0 {
             let before = self.positions.clone();
-            let is_late = || self.settings.is_late(start, self.outfit.len());
+            let is_late = || budget.is_late();
             let easing = Easing::new(self.outfit, self.settings);
             easing.ease(&mut self.filter, &mut self.positions, ease::TIMES, is_late);
             self.look_again(&before);

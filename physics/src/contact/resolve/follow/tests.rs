@@ -45,7 +45,8 @@ fn a_rising_knee_takes_the_sheet_along() {
     let settings = ResolveSettings::default();
     let follow = |end: &Body<'_>| {
         let strides = Strides::FROM_T_POSE;
-        let way = Way { layers: &layers, end, settings: &settings, start: Instant::now(), strides };
+        let way =
+            Way { layers: &layers, end, settings: &settings, budget: &Budget::new(&settings, 1), strides };
         let first = stage_at(0.0).unwrap();
         let positions = first.draped.clone();
         let (followed, steps) = way.follow(untouched(first, positions), &stage_at).unwrap();
@@ -106,6 +107,26 @@ fn what_can_be_mended_at_once_is_not_followed_and_what_is_late_is_given_up() {
     let settings = ResolveSettings { time: Some(Duration::ZERO), ..settings };
     let late = resolve_after(first, &shallow.body, &layers, &settings, &stage_at).unwrap();
     assert!(late.is_none());
+}
+
+#[test]
+fn what_its_budget_does_not_clear_says_so() {
+    let (sheet, stage_at) = rising(0.6);
+    let garment = RestGarment::new(&sheet);
+    // The sheet goes through the middle of the knee.
+    let stage = stage_at(0.6).unwrap();
+    let layers = [Layer { garment: &garment, positions: &stage.draped[0] }];
+    let resolved = |total_rounds| {
+        let settings = ResolveSettings { total_rounds, ..ResolveSettings::default() };
+        let on_the_way = |share| stage_at(0.6 * share);
+        resolve_along(&stage.body, &layers, &stage.skinned, &settings, on_the_way).unwrap()
+    };
+    let stopped = resolved(1);
+    assert!(stopped.certificate.is_stopped && !stopped.certificate.is_clear());
+    assert_eq!((stopped.rounds, stopped.steps), (1, 0));
+    let clear = resolved(1000);
+    assert!(clear.certificate.is_clear() && !clear.certificate.is_stopped);
+    assert!(clear.rounds > 1 && clear.steps > 0);
 }
 
 #[test]

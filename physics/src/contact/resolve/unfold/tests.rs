@@ -1,7 +1,8 @@
 //! Sheets with folds.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
+use super::super::budget::Budget;
 use super::super::{ResolveSettings, Resolved, RestGarment, certify};
 use super::places::STRAINED;
 use super::*;
@@ -149,7 +150,7 @@ fn what_a_result_still_has_of_a_fold_is_laid_out_and_resolved() {
     let certificate = certify(&body, &layers).unwrap();
     let folded = Resolved { positions: vec![draped.clone()], certificate, ..Resolved::default() };
     let lay_out = |resolved: &mut Resolved, settings: &ResolveSettings| {
-        resolved.lay_out(&body, &layers, &skinned, settings, Instant::now())
+        resolved.lay_out(&body, &layers, &skinned, settings, &Budget::new(settings, 1))
     };
     let late = ResolveSettings { time: Some(Duration::ZERO), ..ResolveSettings::default() };
     let mut kept = folded.clone();

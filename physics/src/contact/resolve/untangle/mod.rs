@@ -2,10 +2,9 @@
 
 mod step;
 
-use std::time::Instant;
-
 use rayon::prelude::*;
 
+use super::budget::Budget;
 use super::contact::{Contact, Plane};
 use super::detect::Crossings;
 use super::obstacle::BodyObstacle;
@@ -32,6 +31,7 @@ pub(super) struct Untangling<'a> {
     outfit: &'a Outfit<'a>,
     body: &'a BodyObstacle<'a>,
     settings: &'a ResolveSettings,
+    budget: &'a Budget,
     /// Limits of the present attempt, as in the settings.
     farthest: f64,
     stretch: f64,
@@ -83,7 +83,7 @@ impl<'a> Untangling<'a> {
         outfit: &'a Outfit<'a>,
         body: &'a BodyObstacle<'a>,
         settings: &'a ResolveSettings,
-        sides: Option<&'a Sides>,
+        (budget, sides): (&'a Budget, Option<&'a Sides>),
     ) -> Self {
         let input: Vec<[f64; 3]> = outfit.layers.iter().flat_map(|l| l.positions).copied().collect();
         let count = input.len();
@@ -91,6 +91,7 @@ impl<'a> Untangling<'a> {
             outfit,
             body,
             settings,
+            budget,
             farthest: settings.farthest,
             stretch: settings.stretch,
             shape: input.clone(),
@@ -120,17 +121,16 @@ impl<'a> Untangling<'a> {
     /// Rounds of detection and relaxation until nothing is wrong or nothing gets better; how many it took. Where crossings
     /// are left, a second attempt with wider limits is kept if it ends with none.
     pub fn run(&mut self) -> usize {
-        let start = Instant::now();
         self.detect();
         self.known_folds.clone_from(&self.crossings.own);
-        let rounds = self.attempt(start);
-        if self.crossings.between() == 0 || self.settings.loosened <= 1.0 || self.is_late(start) {
+        let rounds = self.attempt();
+        if self.crossings.between() == 0 || self.settings.loosened <= 1.0 || self.budget.is_spent() {
             return rounds;
         }
         let (positions, shape) = (self.positions.clone(), self.shape.clone());
         self.farthest *= self.settings.loosened;
         self.stretch = 1.0 + (self.stretch - 1.0) * self.settings.loosened;
-        let more = self.attempt(start);
+        let more = self.attempt();
         if self.crossings.between() > 0 || self.crossings.own.len() > self.known_folds.len() {
             self.move_to(&positions);
             self.shape = shape;
@@ -140,7 +140,7 @@ impl<'a> Untangling<'a> {
     }
 
     /// Rounds within the limits as they are. The crossings are those of the positions afterwards.
-    fn attempt(&mut self, start: Instant) -> usize {
+    fn attempt(&mut self) -> usize {
         let mut best = Best::default();
         let patience = match (self.sides, self.settings.is_patient) {
             (Some(_), _) => PATIENCE_WITH_SIDES,
@@ -154,19 +154,16 @@ impl<'a> Untangling<'a> {
                 return round;
             }
             best.look(self.defects(), &self.positions);
-            if round == self.settings.rounds || best.stale > patience || self.is_late(start) {
+            if round == self.settings.rounds || best.stale > patience || self.budget.is_spent() {
                 self.move_to(&best.positions);
                 self.detect();
                 return round;
             }
+            self.budget.spend_round();
             self.step(round);
             self.detect();
         }
         self.settings.rounds
-    }
-
-    fn is_late(&self, start: Instant) -> bool {
-        self.settings.is_late(start, self.outfit.len())
     }
 
     /// Pairs that are left, and vertices on the wrong side.
@@ -284,8 +281,9 @@ pub(super) fn untangled(
     body: &BodyObstacle<'_>,
     layers: &[Layer<'_>],
     settings: &ResolveSettings,
+    budget: &Budget,
 ) -> Untangled {
-    untangled_keeping(None, body, layers, settings)
+    untangled_keeping(None, body, layers, settings, budget)
 }
 
 /// [`untangled`] where the order of sheets is known from a step before.
@@ -294,9 +292,10 @@ pub(super) fn untangled_keeping(
     body: &BodyObstacle<'_>,
     layers: &[Layer<'_>],
     settings: &ResolveSettings,
+    budget: &Budget,
 ) -> Untangled {
     let outfit = Outfit::new(layers);
-    let mut untangling = Untangling::new(&outfit, body, settings, sides);
+    let mut untangling = Untangling::new(&outfit, body, settings, (budget, sides));
     let rounds = untangling.run();
     let positions = (0..outfit.len()).map(|g| outfit.part(&untangling.positions, g).to_vec()).collect();
     Untangled {
