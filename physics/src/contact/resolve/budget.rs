@@ -63,7 +63,7 @@ impl Budget {
 
     /// Whether only the last rounds are left: what is under way had better come to its end.
     pub fn is_nearly_spent(&self) -> bool {
-        self.spent() >= self.rounds.get() - self.rounds.get() / LAST
+        self.spent() >= self.rounds.get() - self.rounds.get() / LAST || self.is_late()
     }
 
     /// Wall time since it began.

@@ -106,7 +106,7 @@ impl Resolved {
     pub(super) fn compare_since(&mut self, layers: &[Layer<'_>], budget: &Budget) {
         self.compare(layers, budget.elapsed().saturating_sub(self.body_time + self.certificate_time));
         self.rounds = budget.spent();
-        self.certificate.is_stopped = budget.is_spent() && !self.certificate.is_clear();
+        self.certificate.is_stopped = budget.is_nearly_spent() && !self.certificate.is_clear();
     }
 
     /// Tells moves and strain from `layers`, and that all of it took `time`.
