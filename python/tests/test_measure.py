@@ -1,11 +1,15 @@
 import json
 import subprocess
+from pathlib import Path
 
 import clothcombo
 import numpy as np
 import pytest
 from shapes import closed_tube, tube
 from test_drape import write_obj
+
+# The body of the model that the package carries.
+BODY = Path(__file__).parents[2] / "models/default/body.npz"
 
 
 @pytest.fixture
@@ -58,7 +62,7 @@ def test_files_are_checked_and_garments_fitted(model, meshes, tmp_path):
     write_obj(tmp_path / "shirt.obj", (100 * meshes[0][0], meshes[0][1]))
     write_obj(tmp_path / "shirt_in_metres.obj", meshes[0])
     (tmp_path / "broken.obj").write_text("v 0 0\n")
-    found = {file["path"].split("/")[-1]: file for file in clothcombo.check(tmp_path, body=model.folder / "body.npz")}
+    found = {file["path"].split("/")[-1]: file for file in clothcombo.check(tmp_path, body=BODY)}
     assert "unusable" not in found["shirt_in_metres.obj"] and found["shirt_in_metres.obj"]["garment"]["category"] == "t_shirt"
     assert "unusable" in found["broken.obj"]
     x, f, report = clothcombo.fit(tmp_path / "shirt.obj", model.body)
