@@ -1,4 +1,4 @@
-//! The zero body as a chart: what lies over it is told by the body vertex below and the height over it.
+//! The zero body as a chart: a point over it has the nearest body vertex and the height over that as its coordinates.
 
 use super::binding::smooth;
 use clothcombo_physics::mesh::{Topology, TriMesh, vertex_normals};

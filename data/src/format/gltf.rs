@@ -6,6 +6,7 @@
 
 mod buffers;
 mod document;
+mod seams;
 mod skin;
 mod write;
 

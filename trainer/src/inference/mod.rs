@@ -21,7 +21,7 @@
 //!
 //! [`Draper::outfit`] does what depends on the garments alone (binding, operators, embedding), once per garment and process,
 //! and once per machine with a cache; [`Draper::drape`] does what depends on the body: networks, post-process,
-//! post-process; [`Draper::drape_motion`] does it for the frames of a motion. The networks see the pose without its heading;
+//! refinement; [`Draper::drape_motion`] does it for the frames of a motion. The networks see the pose without its heading;
 //! positions come back in the frame of the given pose.
 
 mod acceleration;

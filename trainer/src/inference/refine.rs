@@ -1,4 +1,4 @@
-//! Steps of the static solver that make no intersection: they end what the networks and the post-process leave of strain and gaps.
+//! Steps of the static solver that make no intersection and lower the energy that networks and post-process leave.
 
 use super::error::DraperError;
 use clothcombo_physics::energy::SceneEnergy;
@@ -29,8 +29,7 @@ pub enum RefineSteps {
 }
 
 impl RefineSteps {
-    /// For so many frames: four steps for one, which are most of what more gain in about the time of the post-process; none for
-    /// a motion, where they take three times as long as everything else.
+    /// For so many frames: four steps for one, which gain most of what eight do; none for a motion, whose time they treble.
     pub fn default_of(frames: usize) -> Self {
         Self::AtMost(if frames == 1 { 4 } else { 0 })
     }

@@ -9,6 +9,7 @@ use clothcombo_data::fit::{
     FitError, FitReport, FitSettings, PlacementCheck, fit, in_file_order, needs_repair, stray_pieces,
 };
 use clothcombo_data::folders::list_garment_folder;
+use clothcombo_data::format::folder::has_extension;
 use clothcombo_data::format::obj::texture_of_triangles;
 use clothcombo_data::format::{PolygonMesh, load_mesh};
 use clothcombo_data::generate::GarmentGenerator;
@@ -109,7 +110,7 @@ impl GivenGarment {
 
     /// The OBJ file it was read from, if it was one.
     pub fn obj_path(&self) -> Option<&Path> {
-        self.path.as_deref().filter(|path| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")))
+        self.path.as_deref().filter(|path| has_extension(path, "obj"))
     }
 
     /// Texture coordinates (u to the right, v upwards) of the corners of the garment's faces `[F, 3, 2]`: those of the OBJ file it was

@@ -46,7 +46,7 @@ pub struct ResolveSettings {
     pub self_contact: bool,
     /// Most rounds of detection and relaxation of an outfit, over all attempts and all steps of a path together; a quarter of
     /// them on a body of which more than 1,000 pairs of triangles intersect each other. Where they are used up, the best state
-    /// so far is taken. Default 1,200: about half a minute for 4,000 vertices on one core.
+    /// so far is taken. Default 1,200: half a minute to a minute for 4,000 vertices on one core.
     pub total_rounds: usize,
     /// Wall time, times the number of garments, with the same effect, which makes the result depend on the machine. Default
     /// none.
