@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Several processes are one run: 24 steps over all four stages by `mpirun -n 2`, each process with one outfit per step, give
+# Several processes are one run: 24 steps over all three stages by `mpirun -n 2`, each process with one outfit per step, give
 # the parameters (relative 1e-5) of one process that accumulates both outfits; an error in one process ends all of them with
 # one message. Needs an MPI library with its headers (Debian: libopenmpi-dev openmpi-bin), libclang (libclang-dev) and python3.
 # About a minute after the build.
@@ -20,9 +20,9 @@ if [ "$(id -u)" -eq 0 ]; then
 fi
 mpi=(mpirun --oversubscribe -n "$processes")
 short=(--quiet --config configs/smoke.toml
-    --set stages.0.steps=8 --set stages.1.steps=6 --set stages.2.steps=6
+    --set stages.0.steps=8 --set stages.1.steps=8 --set stages.2.steps=8
     --set validation.single_scenes=1 --set validation.layered_scenes=1)
-for stage in 0 1 2 3; do
+for stage in 0 1 2; do
     short+=(--set "stages.$stage.accumulate=$processes")
 done
 
