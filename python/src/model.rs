@@ -93,13 +93,17 @@ impl WantedGarment {
         fit: Option<bool>,
     ) -> Result<GivenGarment, Report> {
         let hints = self.hints()?;
-        match self.mesh {
-            None => Ok(catalog.find(&self.name, draper.body(), fit, &hints)?),
+        let material = self.entry.material;
+        material.check().map_err(|what| Report::msg(format!("{}: {what}", self.name)))?;
+        let mut source = match self.mesh {
+            None => catalog.find(&self.name, draper.body(), fit, &hints)?,
             Some(mesh) => {
                 let mesh = crate::arrays::named(&self.name, mesh)?;
-                Ok(catalog.place(&self.name, mesh, draper.body(), fit, &hints)?)
+                catalog.place(&self.name, mesh, draper.body(), fit, &hints)?
             }
-        }
+        };
+        source.set_material(material);
+        Ok(source)
     }
 }
 
@@ -166,6 +170,7 @@ impl Model {
             let sources = found.collect::<Result<Vec<_>, Report>>()?;
             PreparedOutfit::check(&sources)?;
             sources.iter().for_each(log_repairs);
+            self.draper.log_materials(&sources);
             warn_about_order(&sources);
             let outfit = Arc::new(self.draper.outfit(sources)?);
             Ok::<_, Report>(Outfit { draper: self.draper.clone(), outfit })

@@ -2,9 +2,11 @@
 
 use crate::arrays::{MeshInput, from_json, moved, rows, to_value};
 use crate::call::{call, refused, refused_text};
+use clothcombo_data::asset::GarmentMaterial;
 use clothcombo_physics::contact::resolve::FARTHEST;
 use clothcombo_physics::energy::{
-    EnergyError, GarmentEnergies, SceneEnergy, SceneGarment, SceneLayers, SceneValue, Term, TermMap,
+    EnergyError, EnergySettings, GarmentEnergies, SceneEnergy, SceneGarment, SceneLayers, SceneValue, Term,
+    TermMap,
 };
 use clothcombo_physics::mesh::{Topology, TriMesh};
 use clothcombo_physics::query::Surface;
@@ -33,6 +35,8 @@ struct Garments {
     /// For a held garment, where its canonical positions are without any learned displacement.
     references: Vec<Option<Vec<[f64; 3]>>>,
     losses: LossesConfig,
+    /// What each is made of, where that is not the losses' material.
+    materials: Vec<GarmentMaterial>,
     /// Inner and outer garment of every pair.
     layers: Vec<(usize, usize)>,
     single: OnceLock<Vec<Arc<GarmentEnergies<f32>>>>,
@@ -83,6 +87,8 @@ impl Garments {
             let settings = self.losses.energy_settings();
             let made = (0..self.rest.len()).into_par_iter().map(|i| {
                 let rest = &self.rest[i];
+                let settings =
+                    EnergySettings { material: self.materials[i].over(&settings.material), ..settings };
                 let held = self.references[i].is_some();
                 let energies = GarmentEnergies::new(rest, &Topology::new(rest), &settings, held);
                 energies.map(Arc::new).into_diagnostic().wrap_err_with(|| format!("garment {i}"))
@@ -163,6 +169,7 @@ impl Scene {
         skinning: Option<PyReadonlyArray2<'_, f64>>,
         layers: Option<Vec<(usize, usize)>>,
         losses: &str,
+        materials: &str,
         is_double: bool,
     ) -> PyResult<Self> {
         let count = garments.len();
@@ -177,6 +184,17 @@ impl Scene {
         if let Some((key, what, hint)) = losses.problem() {
             return Err(refused_text(format!("{key} {what}\nhelp: {hint}")));
         }
+        let mut materials: Vec<GarmentMaterial> = to_value(materials, "materials")?;
+        if materials.len() > count {
+            let given = materials.len();
+            return Err(refused_text(format!(
+                "{given} materials for {count} garments; hint: at most one for each"
+            )));
+        }
+        for (i, material) in materials.iter().enumerate() {
+            material.check().map_err(|what| refused_text(format!("garment {i}: {what}")))?;
+        }
+        materials.resize(count, GarmentMaterial::default());
         let files: Vec<PathBuf> = garments.iter().chain([&body]).filter_map(MeshInput::file).collect();
         let garments = garments.iter().enumerate().map(|(i, mesh)| mesh.taken(&format!("garment {i}")));
         let (garments, body) = (garments.collect::<PyResult<Vec<_>>>()?, body.taken("body")?);
@@ -206,7 +224,7 @@ impl Scene {
             });
             let references = references.collect::<Result<_, Report>>()?;
             let (single, double) = (OnceLock::new(), OnceLock::new());
-            let garments = Garments { rest, references, losses, layers, single, double };
+            let garments = Garments { rest, references, losses, materials, layers, single, double };
             if let Some(found) = skinning.as_ref().filter(|t| t.len() != garments.vertex_count()) {
                 let (found, expected) = (found.len(), garments.vertex_count());
                 return Err(Report::msg(format!(

@@ -60,13 +60,13 @@ impl Footprint {
         Self { nearest: nearest.into_iter().map(|v| v as u32).collect(), covered, height }
     }
 
-    /// Thickness (m) of what is worn `below` the garment, each of which is `each` thick (m), at its vertices `[V]`.
-    pub fn thickness_of<'a>(&self, below: impl Iterator<Item = &'a Self>, each: f64) -> Vec<f32> {
+    /// Thickness (m) of what is worn `below` the garment, each with its own (m), at its vertices `[V]`.
+    pub fn thickness_of<'a>(&self, below: impl Iterator<Item = (&'a Self, f64)>) -> Vec<f32> {
         let mut sum = vec![0.0; self.nearest.len()];
-        for other in below {
+        for (other, thickness) in below {
             sum.iter_mut()
                 .zip(&self.nearest)
-                .for_each(|(sum, v)| *sum += each as f32 * other.covered[*v as usize]);
+                .for_each(|(sum, v)| *sum += thickness as f32 * other.covered[*v as usize]);
         }
         sum
     }
@@ -96,7 +96,7 @@ pub(super) mod tests {
         let inner = Footprint::new(&band(0.2, hips - 0.05, hips + 0.15), &body);
         let outer = band(0.25, hips - 0.2, hips + 0.3);
         let footprint = Footprint::new(&outer, &body);
-        let below = footprint.thickness_of([&inner, &inner].into_iter(), 0.004);
+        let below = footprint.thickness_of([(&inner, 0.001), (&inner, 0.007)].into_iter());
         let mut between = 0;
         for (p, h) in outer.rest.positions().iter().zip(&below) {
             let height = p[1] - hips;
@@ -109,6 +109,6 @@ pub(super) mod tests {
             between += usize::from((0.001..0.007).contains(h));
         }
         assert!(between > 0, "no fading");
-        assert!(footprint.thickness_of([].into_iter(), 0.004).iter().all(|h| *h == 0.0));
+        assert!(footprint.thickness_of([].into_iter()).iter().all(|h| *h == 0.0));
     }
 }

@@ -2,6 +2,7 @@
 
 use super::body::Body;
 use super::category::Category;
+use super::garment_material::GarmentMaterial;
 use super::provenance::Provenance;
 use clothcombo_physics::mesh::TriMesh;
 
@@ -16,6 +17,8 @@ pub struct Garment {
     pub rest: TriMesh,
     /// Whether the holding loss keeps its upper rim in place.
     pub holding: bool,
+    /// What it is made of, where that is not what the others are made of.
+    pub material: GarmentMaterial,
     /// Where it comes from.
     pub source: Provenance,
 }
@@ -26,7 +29,14 @@ const LIFTED: f64 = 0.05;
 impl Garment {
     /// A garment without a name or a source whose rim is not held.
     pub fn new(category: Category, rest: TriMesh) -> Self {
-        Self { name: String::new(), category, rest, holding: false, source: Provenance::default() }
+        Self {
+            name: String::new(),
+            category,
+            rest,
+            holding: false,
+            material: GarmentMaterial::default(),
+            source: Provenance::default(),
+        }
     }
 
     /// Whether the garment can lie over `inner`. Cloth around each leg cannot lie over cloth that hangs between the legs, such

@@ -1,7 +1,7 @@
 //! What a user says about a garment file, read from text.
 
 use super::{FitSettings, Keep, SourceBody, Unit, UpAxis};
-use crate::asset::Category;
+use crate::asset::{Category, GarmentMaterial};
 use serde::Deserialize;
 use std::fmt::Display;
 use std::str::FromStr;
@@ -32,6 +32,9 @@ pub struct GarmentEntry {
     keep: Option<String>,
     join_seams: Option<String>,
     from_body: Option<String>,
+    /// What the garment is made of.
+    #[serde(default)]
+    pub material: GarmentMaterial,
 }
 
 impl GarmentEntry {

@@ -7,6 +7,7 @@
 //! category = "top"           # dress | top | t_shirt | open_shirt | skirt | trousers; default: guessed from the shape
 //! layer = [1, 3]             # lowest and highest layer it may be in
 //! holding = true             # default: the collarbone rule
+//! material = { thickness = 0.003 }   # what it is made of, where that is not the configuration's (GarmentMaterial)
 //! source = "…"
 //! author = "…"
 //! licence = "CC0-1.0"
@@ -17,7 +18,7 @@ mod write;
 
 pub use write::{garment_folder_files, refuse_unlisted, save_garment, save_garment_folder, save_manifest};
 
-use crate::asset::{Body, Category, Garment, Provenance};
+use crate::asset::{Body, Category, Garment, GarmentMaterial, Provenance};
 use crate::format::{FileError, folder, is_mesh_path, load_tri_mesh, toml_file};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -58,6 +59,8 @@ pub struct ManifestEntry {
     pub(crate) layer: Option<[u32; 2]>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) holding: Option<bool>,
+    #[serde(default, skip_serializing_if = "GarmentMaterial::is_empty")]
+    material: GarmentMaterial,
     #[serde(default, skip_serializing_if = "String::is_empty")]
     source: String,
     #[serde(default, skip_serializing_if = "String::is_empty")]
@@ -79,6 +82,8 @@ pub struct ListedGarment {
     pub holding: Option<bool>,
     /// Lowest and highest layer it may be in, if the manifest says so.
     pub layer: Option<[u32; 2]>,
+    /// What it is made of, where the manifest says so.
+    pub material: GarmentMaterial,
     /// Where it comes from.
     pub source: Provenance,
 }
@@ -100,8 +105,8 @@ impl ListedGarment {
         let rest = load_tri_mesh(&self.path)?;
         let category = self.category.unwrap_or_else(|| Category::guess(&rest, body));
         let holding = self.holding.unwrap_or_else(|| Garment::needs_holding(&rest, body));
-        let garment =
-            Garment { name: self.name.clone(), category, rest, holding, source: self.source.clone() };
+        let (name, source) = (self.name.clone(), self.source.clone());
+        let garment = Garment { name, category, rest, holding, material: self.material, source };
         Ok(FolderGarment { garment, layer: self.layer, path: self.path.clone() })
     }
 }
@@ -140,6 +145,7 @@ pub fn list_garment_folder(folder: &Path) -> Result<Vec<ListedGarment>, FileErro
         {
             return Err(wrong(format!("layer = [{low}, {high}] should be [lowest, highest]")));
         }
+        entry.material.check().map_err(wrong)?;
         let stem = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
         let name = entry.name.clone().unwrap_or(stem);
         if let Some(other) = names.insert(name.clone(), entry.file.clone()) {
@@ -153,6 +159,7 @@ pub fn list_garment_folder(folder: &Path) -> Result<Vec<ListedGarment>, FileErro
             category: entry.category,
             holding: entry.holding,
             layer: entry.layer,
+            material: entry.material,
             source: Provenance { source: entry.source, author: entry.author, licence: entry.licence },
         });
     }
@@ -192,6 +199,7 @@ impl ManifestEntry {
             category: Some(garment.category),
             layer: *layer,
             holding: Some(garment.holding),
+            material: garment.material,
             source,
             author,
             licence,
@@ -237,7 +245,8 @@ mod tests {
         let body = mannequin();
         let source = Provenance { source: "s".into(), author: "a \"b\"".into(), licence: "CC0-1.0".into() };
         let ring = Garment::new(Category::Skirt, tube(0.2, 0.3, 16, 4));
-        let garment = Garment { name: "ring".into(), holding: true, source, ..ring };
+        let material = "thickness=0.003".parse().unwrap();
+        let garment = Garment { name: "ring".into(), holding: true, material, source, ..ring };
         let folder = tempfile::tempdir().unwrap();
         let saved = FolderGarment { garment, layer: Some([1, 3]), path: PathBuf::new() };
         let written = save_garment_folder(folder.path(), std::slice::from_ref(&saved)).unwrap();
@@ -246,6 +255,7 @@ mod tests {
         let [one] = &loaded[..] else { panic!() };
         assert_eq!((one.layer, &one.garment.source), (saved.layer, &saved.garment.source));
         assert_eq!((one.garment.category, one.garment.holding), (Category::Skirt, true));
+        assert_eq!(one.garment.material, material);
         assert_eq!(one.garment.rest.faces(), saved.garment.rest.faces());
         for (a, b) in
             one.garment.rest.positions().iter().flatten().zip(saved.garment.rest.positions().iter().flatten())
@@ -294,6 +304,11 @@ mod tests {
         for (manifest, parts) in [
             (format!("{entry}colour = \"red\"\n"), ["garments.toml", "line 3", "`colour`"]),
             (format!("{entry}category = \"socks\"\n"), ["garments.toml", "line 3", "open_shirt"]),
+            (format!("{entry}material = {{ weight = 1.0 }}\n"), ["garments.toml", "line 3", "`weight`"]),
+            (
+                format!("{entry}material = {{ thickness = 3.0 }}\n"),
+                ["garments.toml", "garment 1", "in metres"],
+            ),
             ("[[garment]]\nfile = \"none.obj\"\n".into(), ["garments.toml", "none.obj", "garment 1"]),
             (format!("{entry}{entry}"), ["garment 2", "'a'", "of 'a.obj'"]),
             (format!("{entry}layer = [3, 1]\n"), ["garment 1", "[3, 1]", "lowest"]),

@@ -180,7 +180,7 @@ fn take(
     let path = PathBuf::from(format!("{name}.obj"));
     Taken {
         garment: FolderGarment {
-            garment: Garment { name, category, rest, holding, source },
+            garment: Garment { name, holding, source, ..Garment::new(category, rest) },
             layer: None,
             path,
         },

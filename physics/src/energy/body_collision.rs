@@ -13,7 +13,11 @@ use crate::vec3::{scale, to_f64};
 
 /// The collision penalty between one garment and the body.
 #[derive(Debug, Clone)]
-pub(super) struct BodyCollision(pub ContactPoints);
+pub(super) struct BodyCollision {
+    pub points: ContactPoints,
+    /// Of the garment (m).
+    pub thickness: f64,
+}
 
 impl BodyCollision {
     /// The points closer to the body, and what is worn between, than the margin by an excess (m), with the derivative of their
@@ -22,8 +26,8 @@ impl BodyCollision {
         &self,
         state: &GarmentState<'_, T>,
     ) -> impl Iterator<Item = (usize, f64, [f64; 3])> {
-        let margin =
-            |point| state.settings.body_collision_epsilon + self.0.mean(state.thickness_below, point);
+        let epsilon = state.settings.body_margin(self.thickness);
+        let margin = move |point| epsilon + self.points.mean(state.thickness_below, point);
         let excess = state
             .gaps
             .iter()
@@ -39,13 +43,13 @@ impl BodyCollision {
 impl<T: Real> GarmentTerm<T> for BodyCollision {
     /// Energy (m³).
     fn evaluate(&self, state: &GarmentState<'_, T>, target: Option<Weighted<'_, T>>) -> f64 {
-        let share = self.0.share(state.settings.body_samples);
+        let share = self.points.share(state.settings.body_samples);
         let mut target = target.map(|t| Weighted { weight: t.weight * share, gradient: t.gradient });
         let mut energy = 0.0;
         for (point, excess, gradient) in self.in_contact(state) {
             energy += excess * excess * excess;
             if let Some(target) = &mut target {
-                self.0.add(target, point, scale(gradient, -3.0 * excess * excess));
+                self.points.add(target, point, scale(gradient, -3.0 * excess * excess));
             }
         }
         share * energy
@@ -53,9 +57,9 @@ impl<T: Real> GarmentTerm<T> for BodyCollision {
 
     /// `6(ε − d) n nᵀ` at every contact point: what the penalty has if the surface under it is flat.
     fn curvature(&self, state: &GarmentState<'_, T>, sink: &mut dyn CurvatureSink) {
-        let share = self.0.share(state.settings.body_samples);
+        let share = self.points.share(state.settings.body_samples);
         for (point, excess, normal) in self.in_contact(state) {
-            self.0.add_curvature(sink, point, outer(share * 6.0 * excess, normal, normal));
+            self.points.add_curvature(sink, point, outer(share * 6.0 * excess, normal, normal));
         }
     }
 }

@@ -46,16 +46,17 @@ impl<T: Real> SceneEnergy<T> {
     /// beyond the nearest, and seen no farther than a reach (m) away.
     pub(crate) fn creases(&self, posed: &[[T; 3]], memory: &BodyMemory, within: [f64; 2]) -> Creases<'_> {
         let mut creases = Vec::new();
-        let (epsilon, samples) = (self.settings.body_collision_epsilon, self.settings.body_samples);
+        let samples = self.settings.body_samples;
         for ((garment, range), near) in self.garments.iter().zip(self.ranges()).zip(memory) {
             let (points, offset) = (garment.energies.contact_points(), range.start);
             let weight = garment.weights[Term::BodyCollision] * points.share(samples);
             if weight <= 0.0 {
                 continue;
             }
+            let margin = garment.body_margin(&self.settings);
             for (point, (p, near)) in points.at(&posed[range], samples).iter().zip(near).enumerate() {
                 let sides = near.sides(to_f64(*p), within);
-                let epsilon = epsilon + points.mean(&garment.thickness_below, point);
+                let epsilon = margin + points.mean(&garment.thickness_below, point);
                 let excess = sides.first().map_or(0.0, |(distance, _)| epsilon - distance);
                 if sides.len() > 1 && excess > 0.0 {
                     let force = 3.0 * weight * excess * excess;
@@ -68,11 +69,12 @@ impl<T: Real> SceneEnergy<T> {
 
     /// Shows `memory` what is around points in contact at `posed` (m), `radius` (m) away along axes and diagonals.
     pub(crate) fn look_around(&self, posed: &[[T; 3]], memory: &mut BodyMemory, radius: f64) {
-        let EnergySettings { body_collision_epsilon: epsilon, body_samples, distance, .. } = self.settings;
+        let EnergySettings { body_samples, distance, .. } = self.settings;
         for ((garment, range), near) in self.garments.iter().zip(self.ranges()).zip(memory) {
             let points = garment.energies.contact_points();
+            let margin = garment.body_margin(&self.settings);
             for (point, (p, near)) in points.at(&posed[range], body_samples).iter().zip(near).enumerate() {
-                let epsilon = epsilon + points.mean(&garment.thickness_below, point);
+                let epsilon = margin + points.mean(&garment.thickness_below, point);
                 let mut see = |p| self.body.gap_near(p, distance, epsilon, near).gap.to_f64();
                 if see(*p) >= epsilon {
                     continue;

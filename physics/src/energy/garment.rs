@@ -7,7 +7,7 @@ use super::holding::Holding;
 use super::layer_collision::InnerLayer;
 use super::repulsion::Repulsion;
 use super::strain::{Needle, Strain};
-use super::{ContactPoints, EnergyError, EnergySettings, GarmentTerm, Term};
+use super::{ContactPoints, EnergyError, EnergySettings, GarmentTerm, Material, Term};
 use crate::mesh::{Topology, TriMesh};
 use crate::real::Real;
 
@@ -15,13 +15,14 @@ use crate::real::Real;
 #[derive(Debug)]
 pub struct GarmentEnergies<T: Real> {
     vertex_count: usize,
+    material: Material,
     contact_points: ContactPoints,
     as_inner: InnerLayer,
     terms: Vec<(Term, Box<dyn GarmentTerm<T>>)>,
 }
 
 impl<T: Real> GarmentEnergies<T> {
-    /// Prepares the energies of a garment with rest shape `rest`; `holding`: whether it hangs from nothing and is held.
+    /// Prepares the energies of a garment with rest shape `rest`, made of the settings' material; `holding`: whether it hangs from nothing and is held.
     ///
     /// # Errors
     /// [`EnergyError::Setting`] for a setting out of range, [`EnergyError::TopologyMismatch`] for the topology of another
@@ -44,29 +45,37 @@ impl<T: Real> GarmentEnergies<T> {
         if !(area.is_finite() && area > 0.0) {
             return Err(EnergyError::NoArea { faces: rest.face_count() });
         }
-        let material = &settings.material;
+        let material = settings.material;
         let median_edge = rest.median_edge_length();
         let bending =
             Bending::with_median_edge(rest, &topology.hinges, material.bending_stiffness, median_edge);
         let needle = Needle { ratio: settings.needle_ratio, median_edge };
         let contact_points = ContactPoints::new(rest, topology);
         let mut terms: Vec<(Term, Box<dyn GarmentTerm<T>>)> = vec![
-            (Term::Strain, Box::new(Strain::with_needle(rest, material, needle))),
+            (Term::Strain, Box::new(Strain::with_needle(rest, &material, needle))),
             (Term::Bending, Box::new(bending)),
-            (Term::Gravity, Box::new(Gravity::new(rest, material, settings.gravity_acceleration))),
-            (Term::BodyCollision, Box::new(BodyCollision(contact_points.clone()))),
+            (Term::Gravity, Box::new(Gravity::new(rest, &material, settings.gravity_acceleration))),
+            (
+                Term::BodyCollision,
+                Box::new(BodyCollision { points: contact_points.clone(), thickness: material.thickness }),
+            ),
             (Term::Repulsion, Box::new(Repulsion::new(topology))),
         ];
         if holding {
             terms.push((Term::Holding, Box::new(Holding::new(rest, settings.holding_fraction))));
         }
         let as_inner = InnerLayer::new(rest, topology, median_edge);
-        Ok(Self { vertex_count, contact_points, as_inner, terms })
+        Ok(Self { vertex_count, material, contact_points, as_inner, terms })
     }
 
     /// Number of vertices.
     pub fn vertex_count(&self) -> usize {
         self.vertex_count
+    }
+
+    /// What it is made of.
+    pub fn material(&self) -> &Material {
+        &self.material
     }
 
     /// Whether the garment is held.

@@ -20,8 +20,8 @@
 use super::bending;
 use super::garment_term::HeightRow;
 use super::{
-    ContactPoints, ContactSamples, EnergySettings, LayerContact, SceneEnergy, Term, layer_collision,
-    repulsion,
+    ContactPoints, ContactSamples, EnergySettings, LayerContact, Material, SceneEnergy, Term,
+    layer_collision, repulsion,
 };
 use crate::mesh::{Topology, TriMesh};
 use crate::real::Real;
@@ -58,6 +58,7 @@ pub fn gradient_bound<T: Real>(
             pull_back: garment.pull_back.as_deref(),
             contact_points: garment.energies.contact_points(),
             thickness_below: garment.most_thickness(),
+            material: *garment.energies.material(),
         });
     }
     let settings = &scene.settings;
@@ -77,12 +78,12 @@ pub fn gradient_bound<T: Real>(
     };
     let bound = match term {
         Term::Strain => of_garments(&|g| g.strain(settings)),
-        Term::Bending => of_garments(&|g| g.bending(settings)),
+        Term::Bending => of_garments(&|g| g.bending()),
         Term::Gravity => of_garments(&|g| g.gravity(settings)),
         Term::BodyCollision => of_garments(&|g| {
             g.contact_share(settings.body_samples)
                 * 3.0
-                * (settings.body_collision_epsilon + to_body(g)).powi(2)
+                * (settings.body_margin(g.material.thickness) + to_body(g)).powi(2)
         }),
         Term::Repulsion => of_garments(&|g| {
             let count = g.rest.vertex_count() as f64;
@@ -112,6 +113,7 @@ struct Deformed<'a> {
     pull_back: Option<&'a [HeightRow]>,
     contact_points: &'a ContactPoints,
     thickness_below: f64,
+    material: Material,
 }
 
 impl Deformed<'_> {
@@ -146,7 +148,7 @@ impl Deformed<'_> {
     }
 
     fn strain(&self, settings: &EnergySettings) -> f64 {
-        let material = &settings.material;
+        let material = &self.material;
         let stiffness = material.lambda * 2f64.sqrt() + 2.0 * material.mu;
         let faces = self.rest.faces().iter().enumerate().map(|(f, face)| {
             let [a, b, c] = self.rest.corners(f);
@@ -167,21 +169,21 @@ impl Deformed<'_> {
         self.largest_sum(faces)
     }
 
-    fn bending(&self, settings: &EnergySettings) -> f64 {
+    fn bending(&self) -> f64 {
         let floor = bending::COLLAPSE_FLOOR * self.median_edge * self.median_edge;
         let collapse = |f: u32| (bending::COLLAPSE_RATIO * 2.0 * self.rest.face_area(f as usize)).max(floor);
         let topology = Topology::new(self.rest);
         let hinges = topology.hinges.iter().map(|h| {
             let length = self.longest(h.faces[0]).max(self.longest(h.faces[1]));
             let collapse = collapse(h.faces[0]).min(collapse(h.faces[1]));
-            let bound = 58.0 * settings.material.bending_stiffness * length / collapse;
+            let bound = 58.0 * self.material.bending_stiffness * length / collapse;
             ([h.edge[0], h.edge[1], h.opposite[0], h.opposite[1]], bound)
         });
         self.largest_sum(hinges)
     }
 
     fn gravity(&self, settings: &EnergySettings) -> f64 {
-        let weight = settings.material.thickness * settings.material.density * settings.gravity_acceleration;
+        let weight = self.material.thickness * self.material.density * settings.gravity_acceleration;
         let faces = self.rest.faces().iter().enumerate();
         self.largest_sum(faces.map(|(f, face)| (*face, self.rest.face_area(f) * weight / 3.0)))
     }
@@ -208,7 +210,8 @@ impl Deformed<'_> {
         let floor = layer_collision::nearest_vertex::COLLAPSE_FLOOR * self.median_edge * self.median_edge;
         let longest = (0..self.rest.face_count() as u32).map(|f| self.longest(f)).fold(0.0, f64::max);
         let turning = self.rest.faces().iter().map(|face| (*face, 3.0 * longest * reach / floor));
-        let push = 3.0 * (settings.layer_collision_epsilon + reach).powi(2);
+        let pair = settings.for_pair([self.material.thickness, outer.material.thickness]);
+        let push = 3.0 * (pair.layer_collision_epsilon + reach).powi(2);
         outer.posed.len() as f64 * push * (1.0 + self.largest_sum(turning))
     }
 }

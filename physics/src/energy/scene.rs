@@ -34,6 +34,11 @@ impl<T: Real> SceneGarment<T> {
         self.thickness_below.iter().fold(0.0, |most, t| most.max(Real::to_f64(*t)))
     }
 
+    /// Margin between it and the body, or what is worn between them (m).
+    pub(super) fn body_margin(&self, settings: &EnergySettings) -> f64 {
+        settings.body_margin(self.energies.material().thickness)
+    }
+
     /// Whether `term` of this garment acts on canonical positions (before skinning).
     pub(super) fn is_canonical(&self, term: Term) -> bool {
         term == Term::Holding && self.pull_back.is_none()
@@ -60,11 +65,18 @@ pub struct SceneEnergy<T: Real> {
     pub garments: Vec<SceneGarment<T>>,
     /// The pairs that the layer terms are about.
     pub layers: Vec<SceneLayers>,
-    /// Constants and switches. Material, gravity and the share of held vertices must be those the energies were made with.
+    /// Constants and switches. Gravity and the share of held vertices must be those the energies were made with; the material is
+    /// that of [`GarmentEnergies::material`].
     pub settings: EnergySettings,
 }
 
 impl<T: Real> SceneEnergy<T> {
+    /// The settings of the collision of a pair.
+    pub(super) fn settings_of(&self, pair: &SceneLayers) -> EnergySettings {
+        let thickness = |garment: usize| self.garments[garment].energies.material().thickness;
+        self.settings.for_pair([thickness(pair.inner), thickness(pair.outer)])
+    }
+
     /// Number of vertices of all garments.
     pub fn vertex_count(&self) -> usize {
         self.garments.iter().map(|g| g.energies.vertex_count()).sum()

@@ -43,7 +43,8 @@ impl<T: Real> SceneEnergy<T> {
             let surface = as_inner.posed(&posed[inner.clone()], self.settings.layer_contact);
             let points = self.outer_points(pair, &posed[outer.clone()]);
             let mut sink = Scaled { sink, offset: 0, weight: pair.weights[Term::LayerCollision] };
-            as_inner.curvature(&surface, &points, &self.settings, [inner.start, outer.start], &mut sink);
+            let settings = self.settings_of(pair);
+            as_inner.curvature(&surface, &points, &settings, [inner.start, outer.start], &mut sink);
         }
     }
 

@@ -249,8 +249,7 @@ impl<T: Real> SceneEnergy<T> {
         }
     }
 
-    /// Signed distances of the contact points of garment `i` to the body; with a memory, `exact` ones only where they
-    /// count as contact.
+    /// Signed distances of the contact points of garment `i` to the body; unless `exact`, only where they count as contact.
     fn gaps(
         &self,
         i: usize,
@@ -258,15 +257,16 @@ impl<T: Real> SceneEnergy<T> {
         exact: bool,
         near: Option<&mut Vec<NearFaces>>,
     ) -> Vec<Gap<T>> {
-        let EnergySettings { distance, body_samples, body_collision_epsilon, .. } = self.settings;
+        let EnergySettings { distance, body_samples, .. } = self.settings;
         let garment = &self.garments[i];
         let points = garment.energies.contact_points().at(posed, body_samples);
         let points = points.par_iter().with_min_len(GRAIN / 4);
+        let margin = garment.body_margin(&self.settings) + garment.most_thickness();
+        let reach = if exact { f64::INFINITY } else { margin };
         let Some(near) = near else {
-            return points.map(|p| self.body.gap(*p, distance)).collect();
+            return points.map(|p| self.body.gap_within(*p, distance, reach)).collect();
         };
         near.resize_with(points.len(), NearFaces::default);
-        let reach = if exact { f64::INFINITY } else { body_collision_epsilon + garment.most_thickness() };
         points.zip(near).map(|(p, near)| self.body.gap_near(*p, distance, reach, near)).collect()
     }
 
@@ -303,7 +303,7 @@ impl<T: Real> SceneEnergy<T> {
                         inner.state.posed,
                         posed_inner,
                         self.outer_points(pair, outer.state.posed),
-                        &self.settings,
+                        &self.settings_of(pair),
                         targets,
                     )
                 }),

@@ -34,7 +34,7 @@ impl Default for LayerGate {
 /// Everything that the energies leave open, apart from their weights.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EnergySettings {
-    /// The cloth of all garments.
+    /// The cloth of garments that say nothing else.
     pub material: Material,
     /// Rest triangles flatter than this ratio of height to longest edge are measured by the strain as if they had it: else a
     /// needle is a spring of unbounded stiffness. 0: as printed in the paper, which has no floor.
@@ -118,6 +118,19 @@ impl EnergySettings {
             layer_contact: LayerContact::ClosestPoint,
             ..self
         }
+    }
+
+    /// Margin between the body and a garment of `thickness` (m): ε, and half the thickness where that is more, since positions are
+    /// those of the middle of the cloth.
+    pub fn body_margin(&self, thickness: f64) -> f64 {
+        self.body_collision_epsilon.max(0.5 * thickness)
+    }
+
+    /// The settings for two garments of these thicknesses (m), whose middles are kept half their sum apart where that is more
+    /// than ε.
+    pub(super) fn for_pair(&self, thickness: [f64; 2]) -> Self {
+        let [inner, outer] = thickness;
+        Self { layer_collision_epsilon: self.layer_collision_epsilon.max(0.5 * (inner + outer)), ..*self }
     }
 
     /// Checks every value.

@@ -49,8 +49,8 @@ pub struct Surface<T: Real> {
     /// Area-weighted unit vertex normals `[V, 3]`; zero where undefined.
     pub normals: Vec<[T; 3]>,
     vertex_index: OnceLock<VertexIndex<T>>,
-    closest_point: OnceLock<ClosestPoint>,
-    union_distance: OnceLock<UnionDistance>,
+    closest_point: OnceLock<Arc<ClosestPoint>>,
+    union_distance: OnceLock<Arc<UnionDistance>>,
     is_closed: OnceLock<bool>,
 }
 
@@ -75,6 +75,17 @@ impl<T: Real> Surface<T> {
         Self::new(positions, mesh.faces().into())
     }
 
+    /// The same surface in `f64`, with the trees that it has: they are `f64` already.
+    pub fn widened(&self) -> Surface<f64> {
+        let positions = self.positions.iter().map(|p| vec3::to_f64(*p)).collect();
+        Surface {
+            closest_point: self.closest_point.clone(),
+            union_distance: self.union_distance.clone(),
+            is_closed: self.is_closed.clone(),
+            ..Surface::new(positions, self.faces.clone())
+        }
+    }
+
     /// The kd-tree over the vertices.
     pub fn vertex_index(&self) -> &VertexIndex<T> {
         self.vertex_index.get_or_init(|| VertexIndex::new(&self.positions))
@@ -83,7 +94,8 @@ impl<T: Real> Surface<T> {
     /// The closest-point tree over the faces.
     pub fn closest_point(&self) -> &ClosestPoint {
         self.closest_point.get_or_init(|| {
-            ClosestPoint::new(self.positions.iter().map(|p| vec3::to_f64(*p)).collect(), &self.faces)
+            let positions = self.positions.iter().map(|p| vec3::to_f64(*p)).collect();
+            Arc::new(ClosestPoint::new(positions, &self.faces))
         })
     }
 
@@ -91,7 +103,7 @@ impl<T: Real> Surface<T> {
     pub fn union_distance(&self) -> &UnionDistance {
         self.union_distance.get_or_init(|| {
             let positions: Vec<_> = self.positions.iter().map(|p| vec3::to_f64(*p)).collect();
-            UnionDistance::new(&positions, &self.faces)
+            Arc::new(UnionDistance::new(&positions, &self.faces))
         })
     }
 
@@ -137,6 +149,24 @@ impl<T: Real> Surface<T> {
             Distance::ClosestPoint => self.closest_point_gap(p),
             Distance::Union => self.union_gap(p),
         }
+    }
+
+    /// As [`gap`](Self::gap), where only contact counts: outside and beyond `reach` (m) the gap may be any from there to the true
+    /// one, with no gradient.
+    pub(crate) fn gap_within(&self, p: [T; 3], distance: Distance, reach: f64) -> Gap<T> {
+        let q = vec3::to_f64(p);
+        if distance == Distance::Union && self.is_closed() && vec3::is_finite(q) {
+            let union = self.union_distance();
+            match union.kept().project_within(q, reach) {
+                Some(found) => return signed_gap(p, &found, union.is_inside(q, &found), union.kept()),
+                // A winding number costs less than a distance.
+                None if union.winding_number(q) < 1 => {
+                    return Gap { gap: T::from_f64(reach), gradient: vec3::zero(), vertex: 0 };
+                }
+                None => (),
+            }
+        }
+        self.gap(p, distance)
     }
 
     /// As [`gap`](Self::gap), for a point whose `near` faces are remembered from query to query. Beyond `reach` (m) the
@@ -246,6 +276,28 @@ mod tests {
                 assert_eq!(vertex, brute_force::nearest(mesh.positions(), p).0);
             }
         }
+    }
+
+    #[test]
+    fn within_reach_and_inside_a_gap_is_that_of_all_faces() {
+        let ball = shapes::icosphere(0.1, 3);
+        let body = shapes::union(&[&ball, &shapes::mapped(&ball, |[x, y, z]| [x + 0.13, y, z])]);
+        let surface = Surface::<f64>::from_mesh(&body);
+        let wide = Surface::<f32>::from_mesh(&body).widened();
+        let (mut inside, mut beyond) = (0, 0);
+        for p in SplitMix::new(21).points(2000, 0.3) {
+            let exact = surface.gap(p, Distance::Union);
+            let found = surface.gap_within(p, Distance::Union, 0.03);
+            if exact.gap >= 0.03 {
+                assert_eq!((found.gap, found.gradient), (0.03, [0.0; 3]));
+                beyond += 1;
+            } else {
+                assert_eq!(found, exact);
+                inside += usize::from(exact.gap < -0.03);
+            }
+            assert!((wide.gap(p, Distance::Union).gap - exact.gap).abs() < 1e-7);
+        }
+        assert!(inside > 50 && beyond > 500, "{inside} {beyond}");
     }
 
     #[test]

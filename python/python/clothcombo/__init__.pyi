@@ -150,6 +150,7 @@ class Scene:
         references: Optional[Sequence[Optional[ArrayLike]]] = None,
         transforms: Optional[ArrayLike] = None,
         layers: Optional[Sequence[tuple[int, int]]] = None,
+        materials: Optional[Sequence[Optional[dict[str, float]]]] = None,
         dtype: Any = ...,
     ) -> None: ...
     def on_body(self, vertices: ArrayLike, transforms: Optional[ArrayLike] = None) -> Scene: ...

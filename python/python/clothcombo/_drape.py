@@ -15,7 +15,9 @@ class Garment:
 
     `source` is a mesh file (OBJ, PLY, STL, glTF), the name of a built-in garment, or positions [V, 3] and faces [F, 3] or [F, 4].
     Hints as of `clothcombo fit`: `unit`, `up`, `arms`, `legs` (degrees), `category`, `offset` (m), `turn` (degrees), `keep`,
-    `join_seams` ("5mm"), `from_body`. A garment with a hint is always fitted.
+    `join_seams` ("5mm"), `from_body`. A garment with a hint is always fitted. `material` is a dict of `thickness` (m), `density`
+    (kg/m³), `lambda`, `mu` (Pa) and `bending_stiffness` (J/rad²) where they are not those that the model was trained with: the
+    networks do not see them; refinement, post-process and energies do.
     """
 
     def __init__(self, source, name=None, **hints):

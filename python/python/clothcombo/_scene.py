@@ -26,11 +26,13 @@ class Scene:
     {"subset": 0}, "material": {"density": 300.0}}; the values are `default_losses()`. `held`: which garments the holding energy
     keeps up, against `references` (canonical positions without learned displacement; default: rest); it reads canonical
     positions, or, with `transforms` [ΣV, 3, 4] (initial skinning of every vertex), posed ones pulled back. `layers`: pairs (inner,
-    outer); default: all.
+    outer); default: all. `materials`: what each garment is made of where that is not the losses' "material", e.g. [None,
+    {"thickness": 0.003}]; garments are kept half their thickness off the body and each other where that is more than the margin.
     """
 
     def __init__(
-        self, garments, body, *, losses=None, held=None, references=None, transforms=None, layers=None, dtype=np.float32
+        self, garments, body, *, losses=None, held=None, references=None, transforms=None, layers=None, materials=None,
+        dtype=np.float32,
     ):
         garments = meshes(garments, "garment")
         held = [False] * len(garments) if held is None else [bool(x) for x in held]
@@ -39,6 +41,7 @@ class Scene:
         ]
         self._native = _native.Scene(
             garments, mesh(body, "body"), held, references, _rows(transforms), layers, json.dumps(plain(losses or {})),
+            json.dumps([plain(material or {}) for material in materials or []]),
             np.dtype(dtype) == np.float64,
         )
         self.vertex_counts = self._native.vertex_counts

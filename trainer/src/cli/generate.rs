@@ -182,13 +182,10 @@ impl<'a> GarmentMaker<'a> {
     /// Reads a garment that exists.
     fn load(&self, WantedGarment { category, seed, path }: &WantedGarment) -> Result<Garment, Report> {
         let rest = obj::load(path).into_diagnostic()?;
-        Ok(Garment {
-            name: GarmentGenerator::name(*category, *seed),
-            category: *category,
-            holding: Garment::needs_holding(&rest, self.body),
-            rest,
-            source: self.generator.provenance(*seed, &self.settings),
-        })
+        let name = GarmentGenerator::name(*category, *seed);
+        let source = self.generator.provenance(*seed, &self.settings);
+        let holding = Garment::needs_holding(&rest, self.body);
+        Ok(Garment { name, holding, source, ..Garment::new(*category, rest) })
     }
 
     /// The first garments of each category.

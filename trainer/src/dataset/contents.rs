@@ -225,6 +225,10 @@ impl Dataset {
                 .text(info.category.name())
                 .number(u64::from(info.holding))
                 .key(info.mesh);
+            // Data of one material has the key that it had before garments could have their own.
+            if !info.material.is_empty() {
+                key = key.text("material").text(&info.material.to_string());
+            }
         }
         key
     }

@@ -15,7 +15,7 @@ use crate::dataset::DataSizes;
 use crate::system::allocator::return_freed_memory;
 use crate::system::lru_cache::{LruCache, MemoryBudget, Residence};
 use crate::system::memory::available;
-use clothcombo_data::asset::{Binding, Body, Category, Garment, Provenance};
+use clothcombo_data::asset::{Binding, Body, Category, Garment, GarmentMaterial, Provenance};
 use clothcombo_data::cache::{ArrayCache, Key, mesh_key};
 use clothcombo_physics::operators::SurfaceOperators;
 use rayon::prelude::*;
@@ -32,6 +32,8 @@ pub struct GarmentInfo {
     pub category: Category,
     /// Whether the holding loss keeps its upper rim in place.
     pub holding: bool,
+    /// What it is made of, where that is not the configuration's.
+    pub material: GarmentMaterial,
     /// Where it comes from.
     pub source: Provenance,
     /// Number of vertices.
@@ -212,8 +214,9 @@ impl Streamed {
                 (garment.rest, binding)
             }
         };
-        let GarmentInfo { name, category, holding, source, .. } = info.clone();
-        self.preprocessor.finish(Garment { name, category, rest, holding, source }, binding, joints)
+        let GarmentInfo { name, category, holding, material, source, .. } = info.clone();
+        let garment = Garment { name, category, rest, holding, material, source };
+        self.preprocessor.finish(garment, binding, joints)
     }
 
     fn operators(&self, index: usize, info: &GarmentInfo) -> Result<SurfaceOperators, DatasetError> {
@@ -269,6 +272,7 @@ fn index_garments(
             name: garment.name.clone(),
             category: garment.category,
             holding: garment.holding,
+            material: garment.material,
             source: garment.source.clone(),
             vertices,
             mesh: mesh_key(&garment.rest),

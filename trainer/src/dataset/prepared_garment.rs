@@ -53,9 +53,11 @@ impl PreparedGarment {
         self.footprint.get_or_init(|| Footprint::new(&self.garment, body))
     }
 
-    /// Thickness (m) of what is worn below each vertex `[V]`, where every garment of `below` is `each` thick (m).
+    /// Thickness (m) of what is worn below each vertex `[V]`, where every garment of `below` is at least `each` thick (m).
     pub fn thickness_of(&self, below: &[&Arc<Self>], body: &Body, each: f64) -> Vec<f32> {
-        self.footprint(body).thickness_of(below.iter().map(|garment| garment.footprint(body)), each)
+        let thickness = |garment: &Self| each.max(garment.energies.material().thickness);
+        let below = below.iter().map(|garment| (garment.footprint(body), thickness(garment)));
+        self.footprint(body).thickness_of(below)
     }
 
     /// About how much memory it takes (bytes).

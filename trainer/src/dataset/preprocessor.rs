@@ -187,7 +187,9 @@ impl Preprocessor {
         joints: &ActiveJoints,
     ) -> Result<PreparedGarment, DatasetError> {
         let topology = Topology::new(&garment.rest);
-        let energies = GarmentEnergies::new(&garment.rest, &topology, &self.energy, garment.holding)
+        let material = garment.material.over(&self.energy.material);
+        let settings = EnergySettings { material, ..self.energy };
+        let energies = GarmentEnergies::new(&garment.rest, &topology, &settings, garment.holding)
             .map_err(|e| DatasetError::Garment { name: garment.name.clone(), reason: e.to_string() })?;
         Ok(PreparedGarment {
             skin_weights: joints.restrict(&binding.skin_weights),

@@ -69,7 +69,7 @@ impl EmbeddedGarments {
         let garment = &source.garment;
         let mesh = mesh_key(&garment.rest);
         let key = KeyBuilder::new("embedded").key(mesh).text(garment.category.name());
-        let key = key.number(u64::from(garment.holding)).finish();
+        let key = key.number(u64::from(garment.holding)).text(&garment.material.to_string()).finish();
         let place = self.place(key);
         if let Some(found) = self.kept.get(place) {
             let milliseconds = GarmentTimes::default();
@@ -79,7 +79,7 @@ impl EmbeddedGarments {
         let preprocessor = &draper.preprocessor;
         let binding = preprocessor.binding(garment, mesh);
         let prepared = Arc::new(preprocessor.finish(garment.clone(), binding, &draper.joints)?);
-        let rest = Arc::new(RestGarment::new(&garment.rest));
+        let rest = Arc::new(RestGarment::of_material(&garment.rest, prepared.energies.material()));
         let operators = preprocessor.operators(&garment.name, &garment.rest, mesh)?;
         let tensors = garment_tensors(&prepared, &operators, &draper.dimensions(), &draper.device)?;
         let preparation = elapsed(clock);

@@ -7,9 +7,10 @@
 
 use crate::config::LossesConfig;
 use crate::dataset::PreparedScene;
-use clothcombo_physics::energy::{EnergyError, GarmentEnergies, SceneEnergy, SceneGarment, SceneLayers};
+use clothcombo_physics::energy::{
+    EnergyError, EnergySettings, GarmentEnergies, SceneEnergy, SceneGarment, SceneLayers,
+};
 use clothcombo_physics::mesh::Topology;
-use clothcombo_physics::query::Surface;
 use clothcombo_physics::transform::apply;
 use std::sync::Arc;
 
@@ -39,6 +40,7 @@ impl ReferenceScene {
         let mut garments = Vec::new();
         for (garment, narrow) in scene.garments.iter().zip(&body.energy.garments) {
             let mesh = &garment.garment.rest;
+            let settings = EnergySettings { material: *narrow.energies.material(), ..settings };
             let energies =
                 GarmentEnergies::new(mesh, &Topology::new(mesh), &settings, garment.garment.holding)?;
             garments.push(SceneGarment {
@@ -53,11 +55,10 @@ impl ReferenceScene {
         let layers = body.energy.layers.iter();
         let layers =
             layers.map(|l| SceneLayers { inner: l.inner, outer: l.outer, weights: l.weights }).collect();
-        let surface = &body.energy.body;
         let skinned = |positions: &[[f64; 3]]| -> Vec<[f64; 3]> {
             transforms.iter().zip(positions).map(|(t, p)| apply(t, *p)).collect()
         };
-        let body = Arc::new(Surface::new(wide(&surface.positions), surface.faces.clone()));
+        let body = Arc::new(body.energy.body.widened());
         Ok(Self {
             garments: scene.garments.iter().map(|g| g.garment.name.clone()).collect(),
             energy: SceneEnergy { body, garments, layers, settings }.continuous().pulled_back(&transforms),

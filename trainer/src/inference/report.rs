@@ -7,7 +7,7 @@ use crate::dataset::DatasetError;
 use crate::score::{DrapedGarment, Score, ScoreDistance, score};
 use crate::system::device::name;
 use crate::system::paths::{lossy, lossy_option};
-use clothcombo_data::asset::Category;
+use clothcombo_data::asset::{Category, GarmentMaterial};
 use clothcombo_data::fit::FitReport;
 use clothcombo_physics::contact::resolve::Certificate;
 use clothcombo_physics::mesh::TriMesh;
@@ -60,6 +60,9 @@ pub struct DrapedGarmentReport {
     pub triangles: usize,
     /// Category.
     pub category: Category,
+    /// What it is made of, where that is not what the model was trained on.
+    #[serde(skip_serializing_if = "GarmentMaterial::is_empty")]
+    pub material: GarmentMaterial,
     /// What fitting assumed and repaired; none if the garment lay on the body as it was.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fit: Option<FitReport>,
@@ -264,6 +267,7 @@ fn garment_reports(outfit: &Outfit, drapes: &[Drape]) -> Vec<DrapedGarmentReport
             vertices,
             triangles: garment.prepared.garment.rest.face_count(),
             category: garment.prepared.garment.category,
+            material: garment.prepared.garment.material,
             fit: garment.source.fit.clone(),
             embedding_known: garment.embedding_known,
             milliseconds: times,

@@ -4,7 +4,7 @@ use super::error::DraperError;
 use crate::config::Config;
 use crate::dataset::{DatasetError, GarmentLoader, GarmentSource};
 use crate::score::misplaced;
-use clothcombo_data::asset::{Body, Category, Garment, Provenance};
+use clothcombo_data::asset::{Body, Category, Garment, GarmentMaterial};
 use clothcombo_data::fit::{
     FitError, FitReport, FitSettings, PlacementCheck, fit, in_file_order, needs_repair, stray_pieces,
 };
@@ -98,7 +98,7 @@ impl GivenGarment {
             let category = Category::guess(&rest, body);
             let holding = Garment::needs_holding(&rest, body);
             let follows = (0..rest.vertex_count() as u32).map(Attachment::to_vertex).collect();
-            let garment = Garment { name, category, rest, holding, source: Provenance::default() };
+            let garment = Garment { name, holding, ..Garment::new(category, rest) };
             return Ok(Self { garment, given, path: None, fit: None, follows });
         }
         let fitted =
@@ -106,6 +106,13 @@ impl GivenGarment {
         let follows = fitted.follows;
         let garment = Garment { name, ..fitted.garment };
         Ok(Self { garment, given, path: None, fit: Some(fitted.report), follows })
+    }
+
+    /// Says what it is made of, if `material` says anything: instead of what its folder says.
+    pub fn set_material(&mut self, material: GarmentMaterial) {
+        if !material.is_empty() {
+            self.garment.material = material;
+        }
     }
 
     /// The OBJ file it was read from, if it was one.
@@ -276,6 +283,7 @@ impl GarmentCatalog {
             let mut source =
                 GivenGarment::read_checked(&listed.path, body, Some(true), hints, &self.placement)?;
             source.garment.name.clone_from(&listed.name);
+            source.set_material(listed.material);
             return Ok(source);
         }
         let garment = made?;

@@ -1,5 +1,6 @@
 //! Warnings about inputs that can be draped.
 
+use super::Draper;
 use super::bodies::Bodies;
 use super::error::DraperError;
 use super::source::GivenGarment;
@@ -21,6 +22,27 @@ pub fn warn_about_order(sources: &[GivenGarment]) {
             outer.name,
             inner.name
         );
+    }
+}
+
+impl Draper {
+    /// Logs which garments are not made of what the model was trained on.
+    pub fn log_materials(&self, sources: &[GivenGarment]) {
+        let trained = &self.trained.config.losses.material;
+        let differ = |source: &&GivenGarment| !source.garment.material.is_empty();
+        for source in sources.iter().filter(differ) {
+            tracing::info!(
+                "{} is made of {}; the networks, which do not see it, were trained with thickness={}, density={}, lambda={}, \
+                 mu={}, bending_stiffness={}",
+                source.garment.name,
+                source.garment.material,
+                trained.thickness,
+                trained.density,
+                trained.lambda,
+                trained.mu,
+                trained.bending_stiffness
+            );
+        }
     }
 }
 

@@ -24,6 +24,7 @@ mod interrupt;
 mod kill;
 #[cfg(target_os = "linux")]
 mod limits;
+mod materials;
 mod memory;
 mod observability;
 mod outputs;

@@ -128,13 +128,9 @@ impl<'a> GarmentGenerator<'a> {
     }
 
     fn garment(&self, category: Category, seed: u64, settings: &GarmentSettings, rest: TriMesh) -> Garment {
-        Garment {
-            name: Self::name(category, seed),
-            category,
-            holding: Garment::needs_holding(&rest, self.body),
-            rest,
-            source: self.provenance(seed, settings),
-        }
+        let (name, source) = (Self::name(category, seed), self.provenance(seed, settings));
+        let holding = Garment::needs_holding(&rest, self.body);
+        Garment { name, holding, source, ..Garment::new(category, rest) }
     }
 
     /// One mesh of a design; the error says which check it failed.

@@ -263,13 +263,10 @@ fn unposed_garment(
         }
         known => known,
     };
-    Ok(Garment {
-        name: format!("{}_{}", sample.name, item.name),
-        category,
-        holding: Garment::needs_holding(&rest, target),
-        rest,
-        source: provenance(&format!("{}, {}", sample.name, item.name)),
-    })
+    let name = format!("{}_{}", sample.name, item.name);
+    let source = provenance(&format!("{}, {}", sample.name, item.name));
+    let holding = Garment::needs_holding(&rest, target);
+    Ok(Garment { name, holding, source, ..Garment::new(category, rest) })
 }
 
 fn category(name: &str) -> Option<Category> {

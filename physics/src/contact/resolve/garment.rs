@@ -28,8 +28,13 @@ pub struct RestGarment {
 }
 
 impl RestGarment {
-    /// From the undeformed garment.
+    /// From the undeformed garment, of the default material.
     pub fn new(rest: &TriMesh) -> Self {
+        Self::of_material(rest, &Material::default())
+    }
+
+    /// From the undeformed garment and what it is made of.
+    pub fn of_material(rest: &TriMesh, material: &Material) -> Self {
         let topology = Topology::new(rest);
         let faces = rest.faces().to_vec();
         let edge_between = |[a, b]: [u32; 2]| -> u32 {
@@ -43,7 +48,7 @@ impl RestGarment {
         let at = |v: u32| rest.positions()[v as usize];
         let edge_lengths = topology.edges.iter().map(|&[a, b]| norm(sub(at(a), at(b)))).collect();
         let faces_at = faces_at_vertices(rest.vertex_count(), &faces, 0..faces.len() as u32);
-        let strain = Strain::new(rest, &Material::default(), EnergySettings::default().needle_ratio);
+        let strain = Strain::new(rest, material, EnergySettings::default().needle_ratio);
         let doubled = rest.doubled_face();
         Self { faces, topology, edge_lengths, edges_of_faces, layer, faces_at, doubled, strain }
     }
@@ -63,7 +68,7 @@ impl RestGarment {
         self.faces_at.row(v as usize)
     }
 
-    /// Strain energy at `positions` `[V, 3]` (J), of the default material.
+    /// Strain energy at `positions` `[V, 3]` (J).
     ///
     /// # Panics
     /// When there are fewer positions than vertices.

@@ -5,4 +5,5 @@ mod curvature;
 mod determinism;
 mod finite_differences;
 mod invariance;
+mod materials;
 pub(crate) mod scenes;

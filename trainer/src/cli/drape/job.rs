@@ -3,7 +3,7 @@
 use crate::dataset::DatasetError;
 use crate::inference::{Bodies, Draper, FrameRange, GivenGarment, file_and_frame, read_pose};
 use clap::Args;
-use clothcombo_data::asset::{KnownShape, Motion, Pose};
+use clothcombo_data::asset::{GarmentMaterial, KnownShape, Motion, Pose};
 use clothcombo_data::fit::FitSettings;
 use clothcombo_data::format::load_mesh;
 use miette::{Report as Failure, miette};
@@ -42,6 +42,8 @@ pub(super) struct WantedGarment {
     pub name: String,
     /// What is known about it.
     pub hints: FitSettings,
+    /// What it is made of, where that is said.
+    pub material: GarmentMaterial,
 }
 
 /// One outfit to be draped.

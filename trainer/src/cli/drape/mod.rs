@@ -13,12 +13,13 @@ use crate::cli::post_process::PostProcessArguments;
 use crate::cli::verbosity::{print_status, progress_bar};
 use crate::inference::output::{Show, Staged, write_with_report};
 use crate::inference::{
-    Bodies, DrapeProgress, Draper, DraperSettings, MOST_RADIUS, Outfit, RefineSteps, Report, log_repairs,
-    warn_about_order,
+    Bodies, DrapeProgress, Draper, DraperError, DraperSettings, MOST_RADIUS, Outfit, RefineSteps, Report,
+    log_repairs, warn_about_order,
 };
 use crate::system::files::write_json;
 use crate::system::paths::user_cache;
 use clap::{ArgGroup, Parser, ValueEnum};
+use clothcombo_data::asset::GarmentMaterial;
 use dataset::DatasetFolders;
 use folders::check_cache;
 use indicatif::ProgressBar;
@@ -27,6 +28,7 @@ use miette::{IntoDiagnostic, Report as Failure, miette};
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 use std::time::{Duration, Instant};
 
 /// Drapes garments on a body, innermost first: OBJ, GLB, picture, viewer and a report with a certificate
@@ -44,7 +46,7 @@ use std::time::{Duration, Instant};
         or --from-body. Outputs keep the vertices and polygons of the given files, in their order: what --keep leaves out\n\
         follows the cloth.\n\n\
         --outfits takes a TOML file:\n  \
-        [[outfit]]\n  name = \"monday\"\n  garments = [{ file = \"tee.obj\", unit = \"cm\" }, \"coat.obj\"]   # hints, or a name alone\n  shape = [1.0]       # optional, as are pose, \
+        [[outfit]]\n  name = \"monday\"\n  garments = [{ file = \"tee.obj\", unit = \"cm\" }, \"coat.obj\"]   # hints, or a name alone\n  # { file = \"coat.obj\", material = { thickness = 0.003 } } is of another material\n  shape = [1.0]       # optional, as are pose, \
         motion, frames, every")]
 pub struct Arguments {
     /// Run, checkpoint folder or model.safetensors; default: the shipped model, which is part of the program
@@ -72,6 +74,11 @@ pub struct Arguments {
     fit: Fit,
     #[command(flatten)]
     hints: FitArguments,
+    /// What the garments are made of, where that is not what the model was trained on: of thickness (m), density (kg/m³),
+    /// lambda, mu (Pa) and bending_stiffness (J/rad²). The networks do not see it; refinement, post-process and energies do.
+    /// Example: --material thickness=0.003,density=150
+    #[arg(long, value_name = "KEY=VALUE,…", value_parser = GarmentMaterial::from_str)]
+    material: Option<GarmentMaterial>,
     /// Steps of the static solver after networks and post-process that make no intersection, at most 2 cm each, until a vertex
     /// is 5 cm from there; 0: none; `auto`: until a step gains less than 1 % of what all did, for at most two seconds [default: 4
     /// for one pose, 0 for a motion]
@@ -173,12 +180,16 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let read = |job: &Job| {
         let find = |garment: &WantedGarment| {
-            catalog.find(&garment.name, draper.body(), arguments.fit.decided(), &garment.hints)
+            let fit = arguments.fit.decided();
+            let mut source = catalog.find(&garment.name, draper.body(), fit, &garment.hints)?;
+            source.set_material(garment.material);
+            Ok::<_, DraperError>(source)
         };
         let sources = job.garments.iter().map(find).collect::<Result<Vec<_>, _>>()?;
         let sources = ordered(sources, job.order.as_deref())?;
         Outfit::check(&sources)?;
         sources.iter().for_each(log_repairs);
+        draper.log_materials(&sources);
         warn_about_order(&sources);
         let bodies = job.bodies(&draper)?;
         bodies.check(&draper)?;
@@ -224,12 +235,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 fn jobs(arguments: &Arguments) -> Result<Vec<Job>, Failure> {
     let hints = arguments.hints.settings().into_diagnostic()?;
+    let material = arguments.material.unwrap_or_default();
     match &arguments.outfits {
-        Some(file) => outfits::read(file, &arguments.scene, &hints),
+        Some(file) => outfits::read(file, &arguments.scene, &hints, material),
         None => Ok(vec![Job {
             name: "outfit".to_owned(),
             garments: (arguments.garments.iter())
-                .map(|name| WantedGarment { name: name.clone(), hints: hints.clone() })
+                .map(|name| WantedGarment { name: name.clone(), hints: hints.clone(), material })
                 .collect(),
             order: arguments.order.clone(),
             scene: arguments.scene.clone(),

@@ -1,6 +1,7 @@
 //! A TOML file of outfits.
 
 use super::job::{Job, SceneArguments, WantedGarment};
+use clothcombo_data::asset::GarmentMaterial;
 use clothcombo_data::fit::FitSettings;
 use clothcombo_data::fit::hints::GarmentEntry;
 use miette::{IntoDiagnostic, Report as Failure, WrapErr, miette};
@@ -34,7 +35,12 @@ struct Entry {
 /// Reads the outfits of `file`. What an outfit does not say about the body is taken from `scene`, and what it does not
 /// say about a garment from `hints`; paths are relative to the file's folder, or to the working folder where there is
 /// no such file.
-pub(super) fn read(file: &Path, scene: &SceneArguments, hints: &FitSettings) -> Result<Vec<Job>, Failure> {
+pub(super) fn read(
+    file: &Path,
+    scene: &SceneArguments,
+    hints: &FitSettings,
+    material: GarmentMaterial,
+) -> Result<Vec<Job>, Failure> {
     let text = std::fs::read_to_string(file)
         .into_diagnostic()
         .wrap_err_with(|| format!("cannot read {}", file.display()))?;
@@ -91,7 +97,7 @@ pub(super) fn read(file: &Path, scene: &SceneArguments, hints: &FitSettings) -> 
             return Err(wrong("it has no garments".to_owned()));
         }
         let garments = entry.garments.into_iter().enumerate().map(|(number, value)| {
-            let wanted = garment(value, hints, beside)
+            let wanted = garment(value, (hints, material), beside)
                 .map_err(|what| wrong(format!("garment {}: {what}", number + 1)))?;
             Ok(WantedGarment { name: beside(&wanted.name), ..wanted })
         });
@@ -116,15 +122,17 @@ pub(super) fn read(file: &Path, scene: &SceneArguments, hints: &FitSettings) -> 
 /// A name, or a table with a file and hints.
 fn garment(
     value: toml::Value,
-    hints: &FitSettings,
+    (hints, material): (&FitSettings, GarmentMaterial),
     beside: impl Fn(&str) -> String,
 ) -> Result<WantedGarment, String> {
     match value {
-        toml::Value::String(name) => Ok(WantedGarment { name, hints: hints.clone() }),
+        toml::Value::String(name) => Ok(WantedGarment { name, hints: hints.clone(), material }),
         toml::Value::Table(table) => {
             let entry: GarmentEntry =
                 table.try_into().map_err(|e: toml::de::Error| e.message().to_owned())?;
-            Ok(WantedGarment { hints: entry.settings(hints, beside)?, name: entry.file })
+            entry.material.check()?;
+            let material = if entry.material.is_empty() { material } else { entry.material };
+            Ok(WantedGarment { hints: entry.settings(hints, beside)?, name: entry.file, material })
         }
         other => Err(format!(
             "it is of type {}, neither a name nor a table such as {{ file = \"tee.obj\", unit = \"cm\" }}",
@@ -165,7 +173,8 @@ mod tests {
         let file = folder.path().join("outfits.toml");
         std::fs::write(&file, text).unwrap();
         let scene = SceneArguments { shape: vec![0.5], every: Some(3), ..SceneArguments::default() };
-        read(&file, &scene, &FitSettings::default()).map_err(|e| e.to_string())
+        let material = GarmentMaterial { density: Some(300.0), ..GarmentMaterial::default() };
+        read(&file, &scene, &FitSettings::default(), material).map_err(|e| e.to_string())
     }
 
     #[test]
@@ -186,13 +195,15 @@ mod tests {
     #[test]
     fn a_garment_may_come_with_hints() {
         let jobs = read_text(
-            "[[outfit]]\ngarments = [{ file = \"tee.obj\", unit = \"cm\", keep = \"outer\" }, \"coat\"]\nmotion = \"walk.npz\"\n",
+            "[[outfit]]\ngarments = [{ file = \"tee.obj\", unit = \"cm\", keep = \"outer\", material = { mu = 9.0 } }, \"coat\"]\nmotion = \"walk.npz\"\n",
         )
         .unwrap();
         let [tee, coat] = &jobs[0].garments[..] else { panic!("{jobs:?}") };
         assert!(tee.name.ends_with("/tee.obj"));
         assert_eq!((tee.hints.unit, tee.hints.keep), (Some(Unit::Cm), Keep::Outer));
         assert_eq!(coat.hints, FitSettings::default());
+        assert_eq!((tee.material.mu, tee.material.density), (Some(9.0), None));
+        assert_eq!(coat.material.density, Some(300.0));
     }
 
     #[test]
@@ -234,6 +245,10 @@ mod tests {
             ("[[outfit]]\ngarments = [{ unit = \"cm\" }]\n", "file"),
             ("[[outfit]]\ngarments = [{ file = \"a\", size = 4 }]\n", "size"),
             ("[[outfit]]\ngarments = [\"b\", { file = \"a\", unit = \"ell\" }]\n", "garment 2: unit: 'ell'"),
+            (
+                "[[outfit]]\ngarments = [{ file = \"a\", material = { thickness = 3.0 } }]\n",
+                "garment 1: material.thickness",
+            ),
             ("outfit = []\n", "no outfit"),
             ("[[outfit]]\ngarments = [\"a\"]\n", "no outfit of"),
         ] {

@@ -1,7 +1,7 @@
 use super::*;
 use crate::config::PoseEncoding;
 use crate::dataset::Preprocessor;
-use clothcombo_data::asset::{Binding, BindingSettings, Category, Garment, Provenance};
+use clothcombo_data::asset::{Binding, BindingSettings, Category, Garment};
 use clothcombo_data::generate::mannequin;
 use clothcombo_physics::energy::Term;
 use clothcombo_physics::mesh::shapes::grid;
@@ -12,7 +12,7 @@ fn patch(preprocessor: &Preprocessor, joints: &ActiveJoints, low: f64) -> Arc<Pr
     let positions = flat.positions().iter().map(|[x, y, z]| [*x, y + low, z + 0.15]).collect();
     let rest = flat.with_positions(positions).unwrap();
     let (name, category) = (format!("patch at {low}"), Category::Top);
-    let garment = Garment { name, category, rest, holding: false, source: Provenance::default() };
+    let garment = Garment { name, ..Garment::new(category, rest) };
     let binding = Binding::new(&garment, &preprocessor.body, &preprocessor.binding);
     Arc::new(preprocessor.finish(garment, binding, joints).unwrap())
 }
