@@ -24,7 +24,7 @@ pub(crate) use separation::closest_on_edges;
 use crate::query::triangle_pair::{has_area, mesh_triangles_intersect};
 use crate::vec3::{add, add_scaled, sub};
 use rayon::prelude::*;
-use separation::{Corners, stay_apart, triangles_stay_apart};
+use separation::{Corners, TrianglePair, stay_apart, triangles_stay_apart};
 use serde::Serialize;
 
 /// Halvings of a refused motion before it ends.
@@ -225,14 +225,13 @@ impl<'a> StepFilter<'a> {
                 if !pair.as_flattened().iter().any(|&v| is_asked[v as usize]) {
                     continue;
                 }
-                let [start, end] = [from, to].map(|state| pair.map(|face| face.map(|v| state[v as usize])));
-                if triangles_stay_apart(start.each_ref(), end.each_ref(), margin) {
+                let (start, end) = (corners_of_faces(from, pair), corners_of_faces(to, pair));
+                if triangles_stay_apart(&start, &end, margin) {
                     continue;
                 }
                 self.mesh.element_pairs(f, g, |pair| {
                     tests += 1;
-                    let [x, y]: [Corners; 2] =
-                        [from, to].map(|state| pair.vertices.map(|v| state[v as usize]));
+                    let (x, y) = (corners_of(from, &pair), corners_of(to, &pair));
                     if !stay_apart(&pair, &x, &y, margin) {
                         refused.push(pair);
                     }
@@ -271,6 +270,28 @@ impl<'a> StepFilter<'a> {
         pairs.retain(|pair| self.intersections.binary_search(pair).is_err());
         self.intersecting(&pairs, positions)
     }
+}
+
+/// Corners of two faces. A loop: `map` over arrays of this size calls `memcpy` for every part.
+#[inline(always)]
+fn corners_of_faces(state: &[[f64; 3]], faces: [[u32; 3]; 2]) -> TrianglePair {
+    let mut corners = [[[0.0; 3]; 3]; 2];
+    for (corners, face) in corners.iter_mut().zip(faces) {
+        for (corner, v) in corners.iter_mut().zip(face) {
+            *corner = state[v as usize];
+        }
+    }
+    corners
+}
+
+/// Corners of a pair of elements.
+#[inline(always)]
+fn corners_of(state: &[[f64; 3]], pair: &ElementPair) -> Corners {
+    let mut corners = [[0.0; 3]; 4];
+    for (corner, v) in corners.iter_mut().zip(pair.vertices) {
+        *corner = state[v as usize];
+    }
+    corners
 }
 
 /// A motion that was refused `times` times: it is halved until it ends.
