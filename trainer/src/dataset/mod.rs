@@ -31,8 +31,8 @@ pub use prepare::{PreparedBody, PreparedScene, SceneBuilder, contacts, prepare, 
 pub use prepared_garment::PreparedGarment;
 pub use preprocessor::Preprocessor;
 pub use sampling::{
-    BodySample, Plan, SceneSample, ValidationGroup, round_robin, sample_evaluation, sample_outfit,
-    sample_training, sample_validation,
+    BodySample, Plan, SceneSample, ValidationGroup, round_robin, sample_evaluation, sample_training,
+    sample_validation,
 };
 pub use sizes::{DataSizes, tensor_bytes};
 pub use skinning::skinning_transforms;
