@@ -27,7 +27,7 @@ pub use error::DatasetError;
 pub use garment_source::{GarmentLoader, GarmentSource};
 pub use garment_store::{GarmentInfo, GarmentStore};
 pub use poses::{ClipSplit, FrameCounts, HeldOut, PoseLibrary, SelfIntersecting, Window};
-pub use prepare::{PreparedBody, PreparedScene, SceneBuilder, contacts, prepare, thickness_below};
+pub use prepare::{Arrangement, PreparedBody, PreparedScene, SceneBuilder, prepare};
 pub use prepared_garment::PreparedGarment;
 pub use preprocessor::Preprocessor;
 pub use sampling::{

@@ -11,7 +11,7 @@ use crate::cli::fit_arguments::FitArguments;
 use crate::cli::output::print_json;
 use crate::cli::post_process::PostProcessArguments;
 use crate::cli::verbosity::{print_status, progress_bar};
-use crate::inference::output::{Show, Staged, write_with_report};
+use crate::inference::output::{Show, Staged, write};
 use crate::inference::{
     Bodies, DrapeProgress, Draper, DraperSettings, MOST_RADIUS, Outfit, RefineSteps, Report, log_repairs,
     warn_about_order,
@@ -176,7 +176,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             catalog.find(&garment.name, draper.body(), arguments.fit.decided(), &garment.hints)
         };
         let sources = job.garments.iter().map(find).collect::<Result<Vec<_>, _>>()?;
-        let sources = ordered(sources, job.order.as_deref())?;
         Outfit::check(&sources)?;
         sources.iter().for_each(log_repairs);
         warn_about_order(&sources);
@@ -226,14 +225,12 @@ fn jobs(arguments: &Arguments) -> Result<Vec<Job>, Failure> {
     let hints = arguments.hints.settings().into_diagnostic()?;
     match &arguments.outfits {
         Some(file) => outfits::read(file, &arguments.scene, &hints),
-        None => Ok(vec![Job {
-            name: "outfit".to_owned(),
-            garments: (arguments.garments.iter())
-                .map(|name| WantedGarment { name: name.clone(), hints: hints.clone() })
-                .collect(),
-            order: arguments.order.clone(),
-            scene: arguments.scene.clone(),
-        }]),
+        None => {
+            let wanted = |name: &String| WantedGarment { name: name.clone(), hints: hints.clone() };
+            let garments = arguments.garments.iter().map(wanted).collect();
+            let garments = ordered(garments, arguments.order.as_deref())?;
+            Ok(vec![Job { name: "outfit".to_owned(), garments, scene: arguments.scene.clone() }])
+        }
     }
 }
 
@@ -271,12 +268,13 @@ fn drape_job(
     let show = Show {
         draper,
         outfit,
+        bodies,
         drapes: &drapes,
-        moments: &bodies.moments,
+        smoothing: smoothing.as_ref(),
         title: &title,
         all_frames: arguments.all_frames,
     };
-    Ok(write_with_report(folder, &show, &bodies.report, smoothing)?)
+    Ok(write(folder, &show)?)
 }
 
 fn show_progress(bar: &ProgressBar) -> impl FnMut(DrapeProgress) {
