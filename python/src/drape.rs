@@ -3,7 +3,7 @@
 use crate::arrays::{array, array_of_frames, from_json};
 use crate::call::{call, refused_text};
 use clothcombo_physics::contact::resolve::Certificate;
-use clothcombo_trainer::inference::output::{Show, Staged, write_with_report};
+use clothcombo_trainer::inference::output::{Show, Staged, write};
 use clothcombo_trainer::inference::{
     Bodies, Drape as FrameDrape, Draper, GarmentDrape, Outfit, OutfitGarment, Report as DrapeReport,
     ScoredPositions, Smoothing,
@@ -125,10 +125,7 @@ impl Drape {
 
     fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let Self { draper, outfit, drapes, bodies, smoothing } = self;
-        let report = call(py, &[], || {
-            let body = bodies.report.clone();
-            DrapeReport::new(draper, outfit, drapes, &bodies.moments, body, smoothing.clone())
-        })?;
+        let report = call(py, &[], || DrapeReport::new(draper, outfit, drapes, bodies, smoothing.clone()))?;
         from_json(py, &report)
     }
 
@@ -140,9 +137,9 @@ impl Drape {
             let read: Vec<PathBuf> = read.chain([draper.trained().folder.clone()]).collect();
             let staged = Staged::new(&folder, replace, &read)?;
             let title = outfit.names().collect::<Vec<_>>().join(", ");
-            let moments = &bodies.moments;
-            let show = Show { draper, outfit, drapes, moments, title: &title, all_frames };
-            write_with_report(staged.folder(), &show, &bodies.report, smoothing.clone())?;
+            let smoothing = smoothing.as_ref();
+            let show = Show { draper, outfit, bodies, drapes, smoothing, title: &title, all_frames };
+            write(staged.folder(), &show)?;
             Ok::<_, Report>(staged.commit()?)
         })
     }

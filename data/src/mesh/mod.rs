@@ -27,7 +27,7 @@ pub use manifold::{Joined, SplitMesh, join_faces, orient, outward_area, outwardn
 pub use measures::{MeshDefects, MeshMeasures};
 pub use push_out::{Contact, contact, one_rings, push_out};
 pub use remesh::{Quality, RemeshTarget, remesh};
-pub use seams::{COINCIDE_SHARE, JoinedSheet, Seam, join_seams, median_border_edge, open_seams};
+pub use seams::{COINCIDE_SHARE, JoinedSheet, Seam, join_seams, open_seams};
 #[cfg(test)]
 pub(crate) use thickness::tests::solidified;
 pub use thickness::{outer_sheet, sheets, thickness};

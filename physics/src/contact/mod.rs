@@ -25,4 +25,3 @@ pub use report::{
     TrianglePairs, all_layers,
 };
 pub use self_collision::self_collision;
-pub use step_filter::FilterWork;

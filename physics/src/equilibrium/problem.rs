@@ -3,7 +3,6 @@
 use super::EquilibriumError;
 use crate::energy::{BodyMemory, Creases, CurvatureSink, SceneEnergy, Term};
 use crate::vec3::norm_squared;
-use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard};
 
 /// A scene to be brought into equilibrium.
@@ -47,29 +46,6 @@ impl<'a> Problem<'a> {
     /// If `posed` does not have one entry per vertex.
     pub fn value(&self, posed: &[[f64; 3]]) -> f64 {
         self.energy.value(posed, &[]).total
-    }
-
-    /// The same sum, and what every term adds to it (J), by its name.
-    ///
-    /// # Panics
-    /// As [`value`](Self::value).
-    pub fn terms(&self, posed: &[[f64; 3]]) -> (f64, BTreeMap<&'static str, f64>) {
-        let value = self.energy.value(posed, &[]);
-        let mut terms = BTreeMap::new();
-        let weights = self
-            .energy
-            .garments
-            .iter()
-            .map(|g| &g.weights)
-            .chain(self.energy.layers.iter().map(|l| &l.weights));
-        for (weights, raw) in weights.zip(value.garments.iter().chain(&value.layers)) {
-            for (term, raw) in raw.iter() {
-                if let Some(raw) = raw {
-                    *terms.entry(term.name()).or_default() += weights[term] * raw;
-                }
-            }
-        }
-        (value.total, terms)
     }
 
     /// The same, with its gradient `[ΣV, 3]`.

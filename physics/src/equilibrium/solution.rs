@@ -51,12 +51,8 @@ pub struct Step {
     pub iteration: usize,
     /// Weighted sum of all energies (J); never above the one before.
     pub energy: f64,
-    /// Euclidean norm of its gradient over all coordinates (N).
-    pub gradient_norm: f64,
     /// Largest displacement of a vertex in this step (m).
     pub displacement: f64,
-    /// Evaluations of value and gradient so far.
-    pub evaluations: usize,
     /// Wall time so far (ms).
     pub milliseconds: f64,
 }

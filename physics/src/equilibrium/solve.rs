@@ -6,7 +6,7 @@ use std::time::Instant;
 use super::filtered_steps::{FilteredSteps, contact_mesh};
 use super::hessian::Hessian;
 use super::line_search::search;
-use super::problem::{norm, relative};
+use super::problem::relative;
 use super::{EquilibriumError, Problem, Progress, Solution, SolverSettings, Step, Stop};
 use crate::vec3::{add_scaled, distance_squared, dot, is_finite, norm_squared, sub};
 
@@ -69,14 +69,7 @@ pub fn solve(
     problem.forget();
     let mut state = first_state(problem, start)?;
     problem.look_around(start);
-    let mut step = Step {
-        iteration: 0,
-        energy: state.energy,
-        gradient_norm: norm(&state.gradient),
-        displacement: 0.0,
-        evaluations: 1,
-        milliseconds: 0.0,
-    };
+    let mut step = Step { iteration: 0, energy: state.energy, displacement: 0.0, milliseconds: 0.0 };
     let mut force_scale = problem.force_scale(start);
     let mut hessian = Hessian::new(problem, start);
     let mesh = settings.margin.map(|margin| (contact_mesh(problem.energy()), margin));
@@ -127,8 +120,8 @@ pub fn solve(
                 let moved = state.positions.iter().zip(&d).map(|(p, d)| add_scaled(*p, length, *d));
                 let line = Line { problem, state: &state, to: moved.collect(), is_whole: length == 1.0 };
                 match filter.as_mut() {
-                    Some(filter) => line.advance_filtered(filter, &mut step.evaluations),
-                    None => line.advance(&mut step.evaluations),
+                    Some(filter) => line.advance_filtered(filter),
+                    None => line.advance(),
                 }
             });
             models += 1;
@@ -158,7 +151,6 @@ pub fn solve(
         step = Step {
             iteration: step.iteration + 1,
             energy: next.energy,
-            gradient_norm: norm(&next.gradient),
             displacement: moved.map(|(p, q)| distance_squared(*p, *q)).fold(0.0, f64::max).sqrt(),
             ..step
         };
@@ -182,7 +174,7 @@ struct Line<'a> {
 impl Line<'_> {
     /// A lower state on the line, and the share of the decrease predicted by the slope that it has, 0 where it is not
     /// as far as the model goes; `None` where the line does not go downhill.
-    fn advance(&self, evaluations: &mut usize) -> Option<(f64, State)> {
+    fn advance(&self) -> Option<(f64, State)> {
         let Self { state, .. } = self;
         let moves: Vec<[f64; 3]> = self.to.iter().zip(&state.positions).map(|(q, p)| sub(*q, *p)).collect();
         let slope = product(&moves, &state.gradient);
@@ -190,7 +182,6 @@ impl Line<'_> {
             return None;
         }
         let evaluate = |length: f64| {
-            *evaluations += 1;
             let part =
                 || state.positions.iter().zip(&moves).map(|(p, d)| add_scaled(*p, length, *d)).collect();
             let positions = if length == 1.0 { self.to.clone() } else { part() };
@@ -203,16 +194,12 @@ impl Line<'_> {
     }
 
     /// The same on what `filter` leaves of the line, which then has made the step.
-    fn advance_filtered(
-        self,
-        filter: &mut FilteredSteps<'_>,
-        evaluations: &mut usize,
-    ) -> Option<(f64, State)> {
+    fn advance_filtered(self, filter: &mut FilteredSteps<'_>) -> Option<(f64, State)> {
         let from = &self.state.positions;
         let mut to = self.to.clone();
         let before = filter.take(from, &mut to);
         let line = Line { is_whole: self.is_whole && to == self.to, to, ..self };
-        let found = line.advance(evaluations);
+        let found = line.advance();
         match found {
             Some((_, next)) if next.positions != line.to => {
                 // Part of a step takes elements that intersect already elsewhere than all of it.

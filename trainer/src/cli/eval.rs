@@ -3,6 +3,7 @@
 use crate::cli::data_check::check_data;
 use crate::cli::device_argument::DeviceArgument;
 use crate::cli::loading::load_dataset;
+use crate::cli::values::folder_to_make;
 use crate::cli::verbosity::{print_status, progress_bar};
 use crate::config::{Config, load};
 use crate::dataset::Dataset;
@@ -29,6 +30,7 @@ use std::time::{Instant, SystemTime, UNIX_EPOCH};
 #[derive(Parser)]
 #[command(after_help = "Examples:\n  clothcombo eval -o report\n  \
         clothcombo eval --checkpoint runs/open --quick -o report\n  \
+        clothcombo eval --only certificates --outfits 50 --meshes outfits -o report\n  \
         clothcombo eval --checkpoint runs/all --ablation \"without z_v=runs/without-z_v\" -o report\n  \
         clothcombo eval --specific \"only VNeckTop=runs/vnecktop\" -o report")]
 pub struct Arguments {
@@ -47,6 +49,13 @@ pub struct Arguments {
     /// A few scenes per part and no gallery: minutes instead of a quarter of an hour
     #[arg(long)]
     quick: bool,
+    /// Random outfits of 1 to 6 garments whose certificates are counted before and after the post-process; seconds to a minute
+    /// each
+    #[arg(long, default_value_t = 0, value_name = "COUNT")]
+    outfits: usize,
+    /// Writes body and garments (rest, draped, resolved) of each of these outfits as OBJ under this folder
+    #[arg(long, value_name = "DIR", requires = "outfits", value_parser = folder_to_make())]
+    meshes: Option<PathBuf>,
     /// Only these parts of the report
     #[arg(long, value_delimiter = ',', value_name = "PARTS", value_parser = PossibleValuesParser::new(PART_KEYS))]
     only: Vec<String>,
@@ -99,12 +108,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Report> {
     // Now, not after all the work; nothing is made before that.
     check_writable(folder).into_diagnostic().wrap_err_with(|| format!("{}", folder.display()))?;
 
-    let counts = SceneCounts::new(arguments.quick);
+    let counts = SceneCounts::new(arguments.quick, arguments.outfits);
     let bar = progress_bar(0, "{bar:30} {pos}/{len} · {elapsed} · {msg}");
     let clock = Instant::now();
     let is_wanted = |key: &str| arguments.only.is_empty() || arguments.only.iter().any(|only| only == key);
+    let meshes = arguments.meshes.as_deref();
     let evaluation =
-        Evaluation::run(&model, &ablations, &specific, counts, &is_wanted, &|part| match part {
+        Evaluation::run(&model, &ablations, &specific, counts, meshes, &is_wanted, &|part| match part {
             Some((part, scenes)) => {
                 bar.set_length(scenes as u64);
                 bar.set_message(part.to_owned());

@@ -1,7 +1,7 @@
 //! What a run will need of memory, as a table and in a line.
 
 use crate::cli::table::{row, table};
-use crate::config::{Config, PoseEncoding};
+use crate::config::Config;
 use crate::dataset::DataSizes;
 use crate::run::memory::MemoryEstimate;
 use crate::system::device::default_device;
@@ -73,12 +73,8 @@ fn largest_step(config: &Config) -> String {
 
 /// Number of parameters of the networks of `config` for data of these sizes.
 fn parameter_count(config: &Config, sizes: &DataSizes) -> Result<usize, Report> {
-    let per_joint = match config.data.poses.encoding {
-        PoseEncoding::RotationMatrix => 9,
-        PoseEncoding::AxisAngle => 3,
-    };
-    let dimensions =
-        Dimensions { joints: sizes.joints, shape: sizes.shape_components, pose: per_joint * sizes.joints };
+    let pose = config.data.poses.encoding.per_joint() * sizes.joints;
+    let dimensions = Dimensions { joints: sizes.joints, shape: sizes.shape_components, pose };
     let model = ClothCombo::new(&config.model, &dimensions, config.seed, &default_device());
     Ok(model.into_diagnostic()?.num_params())
 }

@@ -16,7 +16,6 @@ mod interrupted;
 mod loading;
 pub mod manual;
 mod memory_table;
-mod model_arguments;
 mod output;
 mod post_process;
 pub mod prepare;

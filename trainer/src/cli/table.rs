@@ -1,7 +1,5 @@
 //! Tables for the terminal and for Markdown.
 
-use crate::run::spread::Spread;
-
 /// A row of a table: headings with the cells below them.
 pub(crate) type Row = Vec<(String, String)>;
 
@@ -51,12 +49,6 @@ impl<T: Cell> Cell for Option<T> {
 impl<T: Cell + ?Sized> Cell for &T {
     fn text(&self) -> String {
         (*self).text()
-    }
-}
-
-impl Cell for Spread {
-    fn text(&self) -> String {
-        [self.mean, self.median, self.p95].map(number).join(" / ")
     }
 }
 

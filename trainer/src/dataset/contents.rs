@@ -254,7 +254,7 @@ impl Dataset {
     /// Input sizes of networks that are trained on it.
     pub fn dimensions(&self) -> Dimensions {
         let joints = self.joints().len();
-        Dimensions { joints, shape: self.shape_count, pose: joints * self.poses.features_per_joint() }
+        Dimensions { joints, shape: self.shape_count, pose: joints * self.poses.encoding.per_joint() }
     }
 
     /// Joints the networks see.

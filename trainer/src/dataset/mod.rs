@@ -27,12 +27,12 @@ pub use error::DatasetError;
 pub use garment_source::{GarmentLoader, GarmentSource};
 pub use garment_store::{GarmentInfo, GarmentStore};
 pub use poses::{ClipSplit, FrameCounts, HeldOut, PoseLibrary, SelfIntersecting, Window};
-pub use prepare::{PreparedBody, PreparedScene, SceneBuilder, contacts, prepare, thickness_below};
+pub use prepare::{Arrangement, PreparedBody, PreparedScene, SceneBuilder, prepare};
 pub use prepared_garment::PreparedGarment;
 pub use preprocessor::Preprocessor;
 pub use sampling::{
-    BodySample, Plan, SceneSample, ValidationGroup, round_robin, sample_evaluation, sample_outfit,
-    sample_training, sample_validation,
+    BodySample, Plan, SceneSample, ValidationGroup, round_robin, sample_evaluation, sample_training,
+    sample_validation,
 };
 pub use sizes::{DataSizes, tensor_bytes};
 pub use skinning::skinning_transforms;

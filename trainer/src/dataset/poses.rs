@@ -24,7 +24,8 @@ pub struct PoseLibrary {
     augmentation: Option<PoseAugmentation>,
     filter: Option<Filter>,
     self_intersecting: Option<SelfIntersecting>,
-    encoding: PoseEncoding,
+    /// How the networks see a pose.
+    pub encoding: PoseEncoding,
     remove_heading: bool,
     bank: Option<Bank>,
 }
@@ -283,16 +284,6 @@ impl PoseLibrary {
     /// The pose as the networks and the body see it: heading removed when the configuration says so.
     pub fn facing_forward(&self, pose: &Pose) -> Pose {
         if self.remove_heading { pose.without_heading().0 } else { pose.clone() }
-    }
-
-    /// Numbers per joint of the pose feature.
-    pub fn features_per_joint(&self) -> usize {
-        self.encoding.per_joint()
-    }
-
-    /// Network input of `pose`: the features of `joints`, in order.
-    pub fn features(&self, pose: &Pose, joints: &[usize]) -> Vec<f32> {
-        self.encoding.features(pose, joints)
     }
 }
 

@@ -7,9 +7,9 @@ use super::pose_features::joint_features;
 use super::prepared_garment::PreparedGarment;
 use super::sampling::{BodySample, SceneSample};
 use super::skinning::skinning_transforms;
-use crate::config::LossesConfig;
+use crate::config::{LossesConfig, PoseEncoding};
 use crate::dataset::objective::scene_weights;
-use clothcombo_data::asset::{self, Body, Pose};
+use clothcombo_data::asset::{self, Body};
 use clothcombo_model::{Graph, OutfitTensors, Packing};
 use clothcombo_physics::energy::{EnergySettings, SceneEnergy, SceneGarment, SceneLayers};
 use clothcombo_physics::query::Surface;
@@ -103,13 +103,13 @@ pub fn prepare(
     let builder = SceneBuilder {
         body: &dataset.body,
         joints: dataset.joints(),
-        features: &|pose, joints| dataset.poses.features(pose, joints),
+        encoding: dataset.poses.encoding,
         losses,
         graph: dataset.graph,
         layer_thickness: dataset.layer_thickness,
         ordered: dataset.ordered,
     };
-    Ok(builder.build(sample, garments, &below, run_progress))
+    Ok(builder.build(sample, &builder.arrange(garments, &below), run_progress))
 }
 
 /// Everything but the garments and the bodies that a scene is prepared with.
@@ -118,8 +118,8 @@ pub struct SceneBuilder<'a> {
     pub body: &'a Body,
     /// The joints the networks see.
     pub joints: &'a ActiveJoints,
-    /// Network input of a pose for some joints.
-    pub features: &'a (dyn Fn(&Pose, &[usize]) -> Vec<f32> + Sync),
+    /// How the networks see a pose.
+    pub encoding: PoseEncoding,
     /// The losses.
     pub losses: &'a LossesConfig,
     /// Which garments have layer losses with each other.
@@ -130,28 +130,26 @@ pub struct SceneBuilder<'a> {
     pub ordered: bool,
 }
 
-/// How the garments of a scene lie over each other, the same on every body.
-struct Arrangement {
+/// Garments, inner → outer, and how they lie over each other: the same on every body.
+pub struct Arrangement {
+    garments: Vec<Arc<PreparedGarment>>,
     /// Thickness below each vertex of each garment of what is no garment of the scene (m); empty where nothing is.
     unseen: Vec<Vec<f32>>,
     /// Pairs (inner, outer) that interact.
-    contacts: Vec<(usize, usize)>,
+    pub contacts: Vec<(usize, usize)>,
+    /// Thickness of what is worn below every vertex `[ΣV]` (m); empty where nothing is, or the networks do not ask.
+    pub thickness_below: Vec<f32>,
     /// Displacements that put them in order `[ΣV]` (m); empty where they are not.
     ordering: Vec<[f32; 3]>,
 }
 
 impl SceneBuilder<'_> {
-    /// Prepares `sample`, of `garments` worn over those `below`; loss weights are taken at `run_progress`.
-    ///
-    /// # Panics
-    /// If a shape or pose is longer than the body allows.
-    pub fn build(
+    /// Arranges `garments` worn over those `below`.
+    pub fn arrange(
         &self,
-        sample: SceneSample,
         garments: Vec<Arc<PreparedGarment>>,
         below: &[Arc<PreparedGarment>],
-        run_progress: f64,
-    ) -> PreparedScene {
+    ) -> Arrangement {
         let contacts = contacts(self.graph, &garments);
         // What is there as geometry pushes as geometry.
         let unseen = |garment: &Arc<PreparedGarment>| match self.layer_thickness.filter(|_| !below.is_empty())
@@ -163,23 +161,27 @@ impl SceneBuilder<'_> {
         let each = self.layer_thickness;
         let thickness_below =
             each.map_or_else(Vec::new, |each| thickness_below(&garments, below, self.body, each));
-        let settings =
-            EnergySettings { repulsion_sample: sample.repulsion_sample, ..self.losses.energy_settings() };
         let ordering = match self.ordered && !contacts.is_empty() {
             true => order_layers(&garments, self.body, self.losses.layer_collision.epsilon),
             false => Vec::new(),
         };
-        let arrangement = Arrangement { unseen, contacts, ordering };
-        let bodies = sample
-            .bodies
-            .iter()
-            .map(|body| self.on_body(&garments, &arrangement, body, &settings, run_progress))
-            .collect();
+        Arrangement { garments, unseen, contacts, thickness_below, ordering }
+    }
+
+    /// Prepares `sample` of the garments of `arrangement`; loss weights are taken at `run_progress`.
+    ///
+    /// # Panics
+    /// If a shape or pose is longer than the body allows.
+    pub fn build(&self, sample: SceneSample, arrangement: &Arrangement, run_progress: f64) -> PreparedScene {
+        let settings =
+            EnergySettings { repulsion_sample: sample.repulsion_sample, ..self.losses.energy_settings() };
+        let on_body = |body| self.on_body(arrangement, body, &settings, run_progress);
+        let bodies = sample.bodies.iter().map(on_body).collect();
         PreparedScene {
             sample,
-            garments,
-            contacts: arrangement.contacts,
-            thickness_below,
+            garments: arrangement.garments.clone(),
+            contacts: arrangement.contacts.clone(),
+            thickness_below: arrangement.thickness_below.clone(),
             bodies,
             single_garments: self.losses.single_garments.at(run_progress),
         }
@@ -187,8 +189,7 @@ impl SceneBuilder<'_> {
 
     fn on_body(
         &self,
-        garments: &[Arc<PreparedGarment>],
-        Arrangement { unseen, contacts, ordering }: &Arrangement,
+        Arrangement { garments, unseen, contacts, ordering, .. }: &Arrangement,
         body: &BodySample,
         settings: &EnergySettings,
         run_progress: f64,
@@ -234,7 +235,7 @@ impl SceneBuilder<'_> {
         start.as_flattened_mut().iter_mut().zip(ordering.as_flattened()).for_each(|(x, by)| *x += by);
         PreparedBody {
             shape: body.shape.iter().map(|v| *v as f32).collect(),
-            pose: (self.features)(&body.pose, &self.joints.indices),
+            pose: self.encoding.features(&body.pose, &self.joints.indices),
             joint_features: joint_features(&bones, &self.joints.parents),
             bones,
             start,
@@ -245,7 +246,7 @@ impl SceneBuilder<'_> {
 
 /// Thickness (m) of what is worn below every vertex of `garments`, inner → outer `[ΣV]`: of those `below` them all and of those
 /// nearer to the body, `each` as thick; empty where nothing is.
-pub fn thickness_below(
+fn thickness_below(
     garments: &[Arc<PreparedGarment>],
     below: &[Arc<PreparedGarment>],
     body: &Body,
@@ -269,7 +270,7 @@ fn order_layers(garments: &[Arc<PreparedGarment>], body: &Body, spacing: f64) ->
 
 /// Pairs (inner, outer) of `garments`, inner → outer, that interact: all in the full graph, else those whose rest boxes are near
 /// enough for them ever to touch.
-pub fn contacts(graph: Graph, garments: &[Arc<PreparedGarment>]) -> Vec<(usize, usize)> {
+fn contacts(graph: Graph, garments: &[Arc<PreparedGarment>]) -> Vec<(usize, usize)> {
     let mut pairs = OutfitTensors::all_pairs(garments.len());
     if graph == Graph::Near {
         pairs.retain(|&(i, j)| are_near(&garments[i], &garments[j]));

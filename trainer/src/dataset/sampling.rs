@@ -99,23 +99,7 @@ pub fn sample_training(dataset: &Dataset, seed: u64, step: u64, scene: usize, pl
     SceneSample { garments, below, bodies, repulsion_sample: rng.random() }
 }
 
-/// Its block of streams lies behind those of the validation groups.
-const OUTFIT_STREAM: u64 = VALIDATION_STREAM + (16 << 32);
-
-/// Outfit `index`: 1 to `most` garments (one more from each outfit to the next) of the whole dataset, held-out ones among
-/// them, in random order, on a body in a pose of a validation clip, or of a held-out window where there are none. The test
-/// clips stay unread: the post-process is tuned on these outfits.
-pub fn sample_outfit(dataset: &Dataset, seed: u64, index: u64, most: usize) -> SceneSample {
-    let mut rng = generator(seed, OUTFIT_STREAM + index);
-    let all: Vec<usize> = (0..dataset.garments.len()).collect();
-    let garments = garments(&all, 1 + index as usize % most.max(1), &mut rng);
-    let clips = HeldOut::ValidationClips;
-    let poses = if dataset.poses.has(clips) { clips } else { HeldOut::Windows };
-    let pose = dataset.poses.sample_held_out(poses, &mut rng);
-    scored(garments, BodySample { shape: shape(dataset, &mut rng), pose })
-}
-
-/// Scenes of an evaluation lie behind the outfits.
+/// Scenes of an evaluation lie behind the validation groups.
 const EVALUATION_STREAM: u64 = VALIDATION_STREAM + (32 << 32);
 
 /// Scene `index` of block `stream` of an evaluation's random streams: `layers` garments of `pool` in random order, on a body in a

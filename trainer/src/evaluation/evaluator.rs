@@ -1,8 +1,8 @@
 //! What the parts of an evaluation share.
 
-use super::certificates::PostProcessor;
 use super::drape_metrics::{DrapeMetrics, measure};
 use super::model_under_test::ModelUnderTest;
+use super::post_processor::PostProcessor;
 use super::scene_evaluation::evaluate;
 use crate::dataset::{PreparedScene, SceneSample};
 use crate::inference::Draped;
@@ -10,6 +10,7 @@ use crate::inference::networks::Networks;
 use crate::inference::tensor_store::DrapeError;
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use serde::Serialize;
+use std::path::Path;
 
 /// How many scenes every part gets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -32,6 +33,8 @@ pub struct SceneCounts {
     pub(super) many_layers: [usize; 2],
     /// Most steps of the post-process on its continuation path from the T-pose.
     pub(super) continuation_steps: usize,
+    /// Random outfits whose certificates are counted.
+    pub(super) outfits: usize,
     /// Scenes per further model.
     pub(super) variants: usize,
     /// Outfits that are timed.
@@ -45,8 +48,9 @@ pub struct SceneCounts {
 }
 
 impl SceneCounts {
-    /// The whole evaluation, or, if `quick`, just enough to see that everything works.
-    pub fn new(quick: bool) -> Self {
+    /// The whole evaluation, or, if `quick`, just enough to see that everything works; with certificates of `outfits` random
+    /// outfits.
+    pub fn new(quick: bool, outfits: usize) -> Self {
         let count = |full: usize, few: usize| if quick { few } else { full };
         Self {
             single_garments: count(500, 24),
@@ -58,6 +62,7 @@ impl SceneCounts {
             layered: [count(24, 2), count(12, 1)],
             many_layers: [count(8, 1), count(2, 1)],
             continuation_steps: count(32, 0),
+            outfits,
             variants: count(100, 8),
             timed: count(20, 3),
             pareto: [count(10, 2), count(6, 1)],
@@ -90,6 +95,8 @@ pub struct Evaluator<'a> {
     /// Models trained on a single garment.
     pub specific: &'a [NamedModel],
     pub counts: SceneCounts,
+    /// Folder that random outfits are saved under.
+    pub meshes: Option<&'a Path>,
     pub progress: Progress<'a>,
 }
 

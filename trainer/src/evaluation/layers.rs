@@ -1,12 +1,12 @@
 //! Table 3: what several layers cost each garment, and how many vertices violate the layer order before and after the
 //! post-process.
 
-use super::certificates::{Counts, OutfitResult};
 use super::table::{Column, number, percent, percent_with_interval, plain, proportion};
 use super::{Estimate, Evaluator, Metric, Proportion, Ratio, Section, Table, drape_by};
 use crate::inference::Draped;
 use crate::run::validation::Method;
 use crate::system::single_threaded::map_single_threaded;
+use clothcombo_physics::contact::resolve::{Certificate, Resolved};
 use clothcombo_physics::energy::{Term, TermMap};
 use miette::{IntoDiagnostic, Report};
 use serde_json::{Value, json};
@@ -22,9 +22,9 @@ const BEFORE: [Metric<Outfit>; 5] = [
 ];
 
 /// Estimated after it. Time per garment, means of outfits, each on one thread.
-const AFTER: [Metric<OutfitResult>; 2] = [
-    ("order_violations", |result| result.after.order_violations),
-    ("milliseconds", |result| mean(result.milliseconds.iter().copied())),
+pub const AFTER: [Metric<Resolved>; 2] = [
+    ("order_violations", |resolved| resolved.certificate.order_violations),
+    ("milliseconds", |resolved| mean(resolved.garments.iter().map(|g| 1e3 * g.time.as_secs_f64()))),
 ];
 
 fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
@@ -37,9 +37,9 @@ struct Outfit {
     /// Strain of every garment by itself and in the outfit (J).
     strain: Vec<[f64; 2]>,
     violations_of_single_garments: f64,
-    before: Counts,
+    before: Certificate,
     /// If it went through the post-process.
-    result: Option<OutfitResult>,
+    after: Option<Resolved>,
 }
 
 /// Numbers of layers, and how many outfits have them: all, and those that go through the post-process.
@@ -78,10 +78,6 @@ fn evaluate(
         let strain = |raw: &TermMap<Option<f64>>| raw[Term::Strain].unwrap_or(0.0);
         let single_garments = post_process.of(&scene, &drapes[0].posed);
         let draped = post_process.of(&scene, &drapes[1].posed);
-        let result = match index < resolved {
-            true => Some(OutfitResult::new(index, &draped, settings)?.0),
-            false => None,
-        };
         let outfit = Outfit {
             is_feasible: draped.is_feasible(),
             strain: raw(&drapes[0])
@@ -90,16 +86,13 @@ fn evaluate(
                 .map(|(s, l)| [strain(s), strain(l)])
                 .collect(),
             violations_of_single_garments: single_garments.certificate().into_diagnostic()?.order_violations,
-            before: match &result {
-                Some(result) => result.before,
-                None => draped.counts().into_diagnostic()?,
-            },
-            result,
+            before: draped.certificate().into_diagnostic()?,
+            after: (index < resolved).then(|| draped.resolved(settings)).transpose()?,
         };
         evaluator.scene_done();
         Ok(outfit)
     };
-    let outfits = map_single_threaded((0..scenes).collect(), None, outfit)?;
+    let outfits = map_single_threaded((0..scenes).collect(), outfit)?;
     let all: Vec<&Outfit> = outfits.iter().collect();
     let feasible: Vec<&Outfit> = outfits.iter().filter(|outfit| outfit.is_feasible).collect();
     let mut result = statistics(layers, &all);
@@ -109,7 +102,7 @@ fn evaluate(
 }
 
 fn statistics(layers: usize, outfits: &[&Outfit]) -> Value {
-    let results: Vec<&OutfitResult> = outfits.iter().filter_map(|outfit| outfit.result.as_ref()).collect();
+    let resolved: Vec<&Resolved> = outfits.iter().filter_map(|outfit| outfit.after.as_ref()).collect();
     let strain_of = |layer: usize, which: usize| -> Vec<f64> {
         outfits.iter().map(|outfit| outfit.strain[layer][which]).collect()
     };
@@ -121,20 +114,20 @@ fn statistics(layers: usize, outfits: &[&Outfit]) -> Value {
     json!({
         "scenes": outfits.len(),
         // Those that went through the post-process.
-        "resolved": results.len(),
+        "resolved": resolved.len(),
         // Strain of each layer over that of the single garment, innermost first; and median over the outfits of the
         // ratio of each.
         "strain": (0..layers).map(ratio).collect::<Vec<_>>(),
         "strain_median": (0..layers).map(median_ratio).collect::<Vec<_>>(),
         "before": Estimate::of_metrics(outfits, &BEFORE),
-        "after": Estimate::of_metrics(&results, &AFTER),
+        "after": Estimate::of_metrics(&resolved, &AFTER),
         // No intersection with the body or between garments, before and after the post-process.
         "intersection_free": [
             Proportion::new(outfits.iter().map(|outfit| outfit.before.is_clear())),
-            Proportion::new(results.iter().map(|result| result.after.is_clear())),
+            Proportion::new(resolved.iter().map(|r| r.certificate.is_clear())),
         ],
         // Rise of the strain energy by the post-process, median share.
-        "strain_added": Estimate::of(results.iter().filter_map(|r| r.strain_added)).spread.median,
+        "strain_added": Estimate::of(resolved.iter().filter_map(|r| r.certificate.strain_added)).spread.median,
     })
 }
 

@@ -5,11 +5,11 @@
 //! pictures. Its scenes are a pure function of the seed, their random stream and their number
 //! ([`crate::dataset::sample_evaluation`]): two models of the same data get the same garments on the same bodies.
 
-pub mod certificates;
+mod certificates;
 mod drape_metrics;
 mod drape_times;
 mod embeddings;
-pub mod equilibrium_error;
+mod equilibrium_error;
 mod estimate;
 mod evaluator;
 mod gallery;
@@ -19,6 +19,7 @@ mod model_under_test;
 mod numerics;
 mod page;
 mod pareto;
+mod post_processor;
 pub mod sample_picture;
 mod scene_evaluation;
 mod score;
@@ -35,16 +36,17 @@ pub use page::Page;
 pub use timing::median_ms;
 pub use validation::ValidationSet;
 
-use certificates::PostProcessor;
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use drape_metrics::{DrapeMetrics, PAPER_COLLISION, estimates};
 use estimate::{Estimate, Metric, Proportion, Ratio};
 use evaluator::Evaluator;
 use miette::Report;
 use page::Section;
+use post_processor::PostProcessor;
 use scene_evaluation::drape_by;
 use serde_json::{Value, json};
 use sets::{GarmentSet, Scenes};
+use std::path::Path;
 use table::Table;
 
 /// Everything that was measured of a model.
@@ -68,7 +70,7 @@ struct Part {
     sections: fn(&Evaluator<'_>) -> Result<Vec<Section>, Report>,
 }
 
-const PARTS: [Part; 10] = [
+const PARTS: [Part; 11] = [
     Part { key: "sets", name: "sets", scenes: |_| 0, sections: sets::sections },
     Part {
         key: "methods",
@@ -83,6 +85,12 @@ const PARTS: [Part; 10] = [
         sections: embeddings::sections,
     },
     Part { key: "layers", name: "Table 3: layers", scenes: layers::scene_count, sections: layers::sections },
+    Part {
+        key: "certificates",
+        name: "certificates of random outfits",
+        scenes: |e| e.counts.outfits,
+        sections: certificates::sections,
+    },
     Part {
         key: "ablations",
         name: "Table 4: ablations",
@@ -123,8 +131,8 @@ pub const PART_KEYS: [&str; PARTS.len()] = {
 };
 
 impl Evaluation {
-    /// Measures `model` by the parts whose keys `is_wanted`. `ablations` are models trained with a part left out on the same data; `specific` ones were trained on a
-    /// single garment that `model` knows too.
+    /// Measures `model` by the parts whose keys `is_wanted`. `ablations` are models trained with a part left out on the same
+    /// data; `specific` ones were trained on a single garment that `model` knows too. Random outfits are saved under `meshes`.
     ///
     /// # Errors
     /// When a scene cannot be draped or resolved, or a chart not drawn.
@@ -133,6 +141,7 @@ impl Evaluation {
         ablations: &[NamedModel],
         specific: &[NamedModel],
         counts: SceneCounts,
+        meshes: Option<&Path>,
         is_wanted: &dyn Fn(&str) -> bool,
         progress: Progress<'_>,
     ) -> Result<Self, Report> {
@@ -140,11 +149,12 @@ impl Evaluation {
         let evaluator = Evaluator {
             model,
             networks: &networks,
-            post_process: PostProcessor::new(&model.dataset, &model.config.losses, Some(&networks)),
+            post_process: PostProcessor::new(model, &networks),
             settings: ResolveSettings { steps: counts.continuation_steps, ..ResolveSettings::default() },
             ablations,
             specific,
             counts,
+            meshes,
             progress,
         };
         let parts = || PARTS.iter().filter(|part| is_wanted(part.key));

@@ -14,10 +14,11 @@ use crate::picture::png_bytes;
 use crate::run::validation::Method;
 use crate::system::single_threaded::map_single_threaded;
 use clothcombo_physics::energy::Term;
-use clothcombo_physics::equilibrium::{Problem, SolverSettings, solve};
+use clothcombo_physics::equilibrium::{Problem, SolverSettings, Stop, solve};
 use miette::{IntoDiagnostic, Report};
 use serde::Serialize;
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
@@ -109,8 +110,10 @@ pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
 #[derive(Serialize)]
 struct Comparison {
     scenes: usize,
-    /// How many of the reference solutions are equilibria (relative gradient within the solver's tolerance).
+    /// How many of the reference solutions are equilibria.
     converged: usize,
+    /// How often each reason ended the solver there.
+    stops: BTreeMap<&'static str, usize>,
     /// One per method, with estimates over all scenes.
     points: Vec<Value>,
     samples: Vec<Vec<MethodSample>>,
@@ -124,14 +127,16 @@ impl Comparison {
             Ok::<_, Report>((scene, states))
         };
         let draped = (0..scenes).map(draped).collect::<Result<Vec<_>, _>>()?;
-        let solved = map_single_threaded(draped, None, |(scene, states)| {
+        let solved = map_single_threaded(draped, |(scene, states)| {
             let solved = solved(evaluator, &scene, states);
             evaluator.scene_done();
             solved
         })?;
-        let (samples, are_equilibria): (Vec<_>, Vec<bool>) = solved.into_iter().unzip();
-        let converged = are_equilibria.into_iter().filter(|is_equilibrium| *is_equilibrium).count();
-        Ok(Self { scenes, converged, points: points(&samples), samples })
+        let (samples, reasons): (Vec<_>, Vec<Stop>) = solved.into_iter().unzip();
+        let mut stops = BTreeMap::new();
+        reasons.iter().for_each(|stop| *stops.entry(stop.name()).or_default() += 1);
+        let converged = reasons.iter().filter(|stop| **stop == Stop::Converged).count();
+        Ok(Self { scenes, converged, stops, points: points(&samples), samples })
     }
 
     fn table(&self, title: &str) -> Table {
@@ -207,13 +212,13 @@ fn fast_methods(evaluator: &Evaluator<'_>, scene: &PreparedScene) -> Result<Vec<
     Ok(states)
 }
 
-/// Adds refinement and solver to the fast methods, and measures all of them against the lowest state found; also whether
-/// that state is an equilibrium.
+/// Adds refinement and solver to the fast methods, and measures all of them against the lowest state found; also why the
+/// solver stopped there.
 fn solved(
     evaluator: &Evaluator<'_>,
     scene: &PreparedScene,
     mut states: Vec<State>,
-) -> Result<(Vec<MethodSample>, bool), Report> {
+) -> Result<(Vec<MethodSample>, Stop), Report> {
     let reference = ReferenceScene::new(&evaluator.model.config.losses, scene).into_diagnostic()?;
     let problem = Problem::new(&reference.energy).into_diagnostic()?;
     let fast = |method: &str| {
@@ -270,8 +275,7 @@ fn solved(
             layer_pairs: certificate.layer_triangle_pairs as f64,
         })
     };
-    let is_equilibrium = minimum.relative_gradient <= settings.tolerance;
-    Ok((states.into_iter().map(sample).collect::<Result<_, _>>()?, is_equilibrium))
+    Ok((states.into_iter().map(sample).collect::<Result<_, _>>()?, minimum.stop))
 }
 
 fn counted_steps(steps: usize) -> String {

@@ -1,6 +1,5 @@
 //! Stress tests: bodies, poses and stacks far outside of the training data, through networks and post-process.
 
-use super::certificates::OutfitResult;
 use super::table::{Column, number, percent, plain};
 use super::{Evaluator, Section, Table, drape_by};
 use crate::dataset::{BodySample, PreparedScene, SceneSample};
@@ -11,6 +10,7 @@ use crate::run::validation::Method;
 use crate::system::single_threaded::map_single_threaded;
 use clothcombo_data::asset::Pose;
 use clothcombo_data::generate::pose::folded_poses;
+use clothcombo_physics::contact::resolve::Resolved;
 use clothcombo_physics::energy::Term;
 use miette::Report;
 use serde_json::{Value, json};
@@ -54,13 +54,13 @@ pub fn sections(evaluator: &Evaluator<'_>) -> Result<Vec<Section>, Report> {
     let (cases, scenes) = (cases(), counts.stress_tests);
     let outcome = |(case, index): (usize, usize)| {
         let sample = model.sample_outfit([8, 1000 * case + index], cases[case].layers);
-        let outcome = outcome(evaluator, &model.prepare(&cases[case].applied_to(sample))?, index)?;
+        let outcome = outcome(evaluator, &model.prepare(&cases[case].applied_to(sample))?)?;
         evaluator.scene_done();
         Ok(outcome)
     };
     // Those with the most layers, which take longest, come last and are begun first.
     let items = (0..cases.len()).flat_map(|case| (0..scenes).map(move |index| (case, index))).rev();
-    let mut outcomes = map_single_threaded(items.collect(), None, outcome)?;
+    let mut outcomes = map_single_threaded(items.collect(), outcome)?;
     let of_case = |case: Case| statistics(&case.name, &outcomes.split_off(outcomes.len() - scenes));
     let tests: Vec<Value> = cases.into_iter().map(of_case).collect();
     let columns: [Column<'_>; 9] = [
@@ -91,7 +91,7 @@ impl Case {
     }
 }
 
-fn outcome(evaluator: &Evaluator<'_>, scene: &PreparedScene, index: usize) -> Result<Outcome, Report> {
+fn outcome(evaluator: &Evaluator<'_>, scene: &PreparedScene) -> Result<Outcome, Report> {
     let draped = match evaluator.networks.drape(scene) {
         Ok(draped) => draped,
         Err(DrapeError::Dataset(error)) => return Err(error.into()),
@@ -116,9 +116,9 @@ fn outcome(evaluator: &Evaluator<'_>, scene: &PreparedScene, index: usize) -> Re
         ..Outcome::default()
     };
     let before = evaluator.post_process.of(scene, &draped.posed);
-    Ok(match OutfitResult::new(index, &before, &evaluator.settings) {
-        Ok((result, _)) => {
-            Outcome { resolved: Some((result.after.is_clear(), result.after.max_depth_mm)), ..outcome }
+    Ok(match before.resolved(&evaluator.settings) {
+        Ok(Resolved { certificate, .. }) => {
+            Outcome { resolved: Some((certificate.is_clear(), certificate.max_depth_mm)), ..outcome }
         }
         Err(error) => Outcome { refused: Some(error.to_string()), ..outcome },
     })

@@ -1,6 +1,6 @@
 //! How smoothly a motion moves: accelerations of the garments' vertices beside those of linear blend skinning.
 
-use super::report::Moment;
+use super::Moment;
 use super::{Drape, GarmentDrape};
 use crate::run::spread::Spread;
 use serde::{Deserialize, Serialize};

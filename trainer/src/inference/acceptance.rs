@@ -16,22 +16,18 @@ use super::on_body::OnBody;
 use burn::tensor::Tensor;
 use clothcombo_model::{BodyTensors, DrapeState, OutfitTensors, linear_blend_skinning};
 
-/// The state that the networks' drape `proposed` leads to, whose skin weights are `skin_weights` `[ΣV, J]`. `watch` sees every
-/// state that was accepted, skinning first.
+/// The state that the networks' drape `proposed` leads to, whose skin weights are `skin_weights` `[ΣV, J]`.
 pub(crate) fn accepted(
     on_body: &OnBody<'_>,
     proposed: &Draped,
     skin_weights: &Tensor<2>,
     interaction: LayerInteraction,
-    watch: &mut dyn FnMut(&Descent<'_>),
 ) -> Draped {
     let OnBody { scene, outfit, body, start, .. } = on_body;
     let energy = interaction.energy(scene).continuous().pulled_back(&scene.skinning_transforms());
     let skinnings = [start, &outfit.rest].map(|x| skinned(x.clone(), outfit.skin_weights.clone(), body));
     let mut descent = Descent::from_best(&energy, skinnings);
-    watch(&descent);
     take_networks(&mut descent, proposed, skin_weights, outfit, body);
-    watch(&descent);
     descent.into_state()
 }
 

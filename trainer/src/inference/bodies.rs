@@ -2,10 +2,11 @@
 
 use super::error::DraperError;
 use super::warnings::{check_poses, warn_about_shape};
-use super::{BodyReport, BodyState, Drape, DrapeProgress, Draper, Moment, Outfit, Smoothing, smooth};
+use super::{BodyState, Drape, DrapeProgress, Draper, Outfit, Smoothing, smooth};
 use crate::dataset::DatasetError;
 use clothcombo_data::asset::{Body, KnownShape, Motion, Pose, recover_body};
 use clothcombo_data::generate::named_pose;
+use serde::Serialize;
 use std::path::Path;
 use std::str::FromStr;
 
@@ -18,6 +19,33 @@ pub struct Bodies {
     pub moments: Vec<Moment>,
     /// What a report says of them.
     pub report: BodyReport,
+}
+
+/// A draped frame and when it is.
+#[derive(Clone, Copy, Debug)]
+pub struct Moment {
+    /// Number in the motion.
+    pub frame: usize,
+    /// Time (s).
+    pub seconds: f64,
+}
+
+/// What a report says of the body.
+#[derive(Clone, Debug, Serialize)]
+pub struct BodyReport {
+    /// Its name.
+    pub name: String,
+    /// Shape parameters β.
+    pub shape: Vec<f64>,
+    /// Where the pose comes from.
+    pub pose: String,
+    /// Vertices.
+    pub vertices: usize,
+    /// Triangles.
+    pub triangles: usize,
+    /// For a body recovered from meshes: mean distance of its vertices to theirs (mm).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub recovered_within_mm: Option<f64>,
 }
 
 /// Frames `[first, end)`; the default is all.
@@ -110,7 +138,8 @@ impl Bodies {
         // The frames of a motion are alike in what may be wrong with them.
         self.states.first().map_or(Ok(()), |state| draper.check_body(state))?;
         warn_about_shape(&self.report.shape, draper.trained().config.data.shape_range);
-        check_poses(self)
+        let poses: Vec<Pose> = self.states.iter().map(|state| state.pose.clone()).collect();
+        check_poses(&poses, &self.report.pose)
     }
 }
 

@@ -13,8 +13,8 @@ pub struct GarmentDrape {
     pub skinned: Vec<[f64; 3]>,
     /// What the networks made of it, in a motion averaged over frames if that was asked for `[V, 3]` (m).
     pub network: Vec<[f64; 3]>,
-    /// What the post-process made of that, before the refinement `[V, 3]` (m).
-    pub resolved: Vec<[f64; 3]>,
+    /// What the post-process made of that, where a refinement follows `[V, 3]` (m).
+    pub resolved: Option<Vec<[f64; 3]>>,
     /// The result `[V, 3]` (m).
     pub positions: Vec<[f64; 3]>,
     /// Blended skinning transform of every vertex, canonical → posed.

@@ -81,7 +81,7 @@ impl EmbeddedGarments {
         let prepared = Arc::new(preprocessor.finish(garment.clone(), binding, &draper.joints)?);
         let rest = Arc::new(RestGarment::of_material(&garment.rest, prepared.energies.material()));
         let operators = preprocessor.operators(&garment.name, &garment.rest, mesh)?;
-        let tensors = garment_tensors(&prepared, &operators, &draper.dimensions(), &draper.device)?;
+        let tensors = garment_tensors(&prepared, &operators, &draper.dimensions(), &draper.settings.device)?;
         let preparation = elapsed(clock);
         let clock = Instant::now();
         let (embedding, was_known) = embedding(draper, &tensors, mesh)?;
@@ -107,7 +107,7 @@ fn embedding(
         && garment.len() == width
     {
         let upload = |values: Vec<f32>, rows: usize| {
-            Tensor::from_data(TensorData::new(values, [rows, width]), &draper.device)
+            Tensor::from_data(TensorData::new(values, [rows, width]), &draper.settings.device)
         };
         return Ok((
             GarmentEmbedding { vertex: upload(vertex, vertices), garment: upload(garment, 1) },

@@ -6,7 +6,6 @@ use super::{
     BodyState, Certificate, Drape, Draper, DraperError, GarmentDrape, Outfit, RefineSteps, elapsed, refine,
 };
 use crate::inference::reference::ReferenceScene;
-use clothcombo_physics::Surface;
 use clothcombo_physics::contact::resolve::{PathSample, Resolved, resolve_after, resolve_along};
 use clothcombo_physics::vec3::{add_scaled, sub};
 use std::time::Instant;
@@ -45,55 +44,42 @@ impl Draper {
         made: NetworkDrape,
         watch: &mut dyn FnMut(f64),
     ) -> Result<Drape, DraperError> {
-        let NetworkDrape { scene, surface, heading, transforms, skinned, network, mut milliseconds } = made;
-
+        let mut milliseconds = made.milliseconds;
         let clock = Instant::now();
-        let parts = outfit.split(&network);
         let (resolved, times, certificate) = match self.settings.resolve {
             true => {
-                let final_sample = || PathSample {
-                    body: surface.clone(),
-                    draped: parts.iter().map(|p| p.to_vec()).collect(),
-                    skinned: outfit.split(&skinned).into_iter().map(<[_]>::to_vec).collect(),
-                    transforms: transforms.clone(),
-                };
-                let done = self.resolved(outfit, frame, watch, &surface, &parts, &final_sample);
-                let done = done.map_err(|error| outfit.named(error))?;
+                let done = self.resolved(outfit, frame, &made, watch).map_err(|error| outfit.named(error))?;
                 let times = done.garments.iter().map(|g| 1e3 * g.time.as_secs_f64()).collect();
                 (done.positions, times, done.certificate)
             }
             false => {
-                (parts.iter().map(|p| p.to_vec()).collect(), vec![0.0; parts.len()], Certificate::default())
+                (outfit.to_parts(&made.network), vec![0.0; outfit.garments.len()], Certificate::default())
             }
         };
         milliseconds.resolve = elapsed(clock);
 
         let clock = Instant::now();
-        let (refined, refinement) = match frame.refine {
-            RefineSteps::AtMost(0) => (resolved.concat(), None),
+        let (positions, resolved, refinement) = match frame.refine {
+            RefineSteps::AtMost(0) => (resolved, None, None),
             steps => {
-                let mut energy = ReferenceScene::new(&self.trained.config.losses, &scene)?.energy;
-                energy.body = surface.clone();
-                let (positions, done) = refine(&energy.pulled_back(&transforms), &resolved.concat(), steps)?;
-                (positions, Some(done))
+                let mut energy = ReferenceScene::new(&self.trained.config.losses, &made.scene)?.energy;
+                energy.body = made.surface.clone();
+                let energy = energy.pulled_back(&made.transforms);
+                let (refined, done) = refine(&energy, &resolved.concat(), steps)?;
+                (outfit.to_parts(&refined), Some(resolved), Some(done))
             }
         };
         milliseconds.refine = elapsed(clock);
 
-        let (skinned, refined) = (outfit.split(&skinned), outfit.split(&refined));
-        let transforms = outfit.split(&transforms);
-        let garments = resolved
-            .into_iter()
-            .enumerate()
-            .map(|(g, resolved)| GarmentDrape {
-                skinned: skinned[g].to_vec(),
-                network: parts[g].to_vec(),
-                positions: refined[g].to_vec(),
-                resolved,
-                transforms: transforms[g].to_vec(),
-                resolve_ms: times[g],
-            })
-            .collect();
+        let NetworkDrape { surface, heading, transforms, skinned, network, .. } = made;
+        let [skinned, network] = [skinned, network].map(|packed| outfit.to_parts(&packed));
+        let mut resolved = resolved.into_iter().flatten();
+        let garments =
+            skinned.into_iter().zip(network).zip(positions).zip(outfit.to_parts(&transforms)).zip(times);
+        let garments = garments.map(|((((skinned, network), positions), transforms), resolve_ms)| {
+            GarmentDrape { skinned, network, resolved: resolved.next(), positions, transforms, resolve_ms }
+        });
+        let garments = garments.collect();
         let mut drape = Drape {
             body: surface.positions.clone(),
             heading,
@@ -114,18 +100,17 @@ impl Draper {
         &self,
         outfit: &Outfit,
         Frame { body, last, .. }: Frame<'_>,
+        made: &NetworkDrape,
         watch: &mut dyn FnMut(f64),
-        surface: &Surface<f64>,
-        parts: &[&[[f64; 3]]],
-        final_sample: &dyn Fn() -> PathSample,
     ) -> Result<Resolved, DraperError> {
-        let (layers, settings) = (outfit.layers(parts), &self.settings.post_process);
+        let (surface, settings) = (&*made.surface, &self.settings.post_process);
+        let layers = outfit.layers(&outfit.split(&made.network));
         let mut carried = None;
         if let Some(PreviousFrame { body: state, drape, retry }) = last {
             let between = |share: f64| {
                 watch(share);
                 match share {
-                    1.0 => Ok(final_sample()),
+                    1.0 => Ok(made.sample(outfit)),
                     _ => {
                         let place = add_scaled(state.place, share, sub(body.place, state.place));
                         self.stage(Pass::Accepted, outfit, body, state.pose.between(&body.pose, share), place)
@@ -143,11 +128,11 @@ impl Draper {
             let stage = self.stage(Pass::ForwardPass, outfit, body, pose, body.place)?;
             Ok::<_, DraperError>(match share {
                 // The surface is known here only.
-                1.0 => PathSample { draped: stage.draped, ..final_sample() },
+                1.0 => PathSample { draped: stage.draped, ..made.sample(outfit) },
                 _ => stage,
             })
         };
-        let anew = resolve_along(surface, &layers, &final_sample().skinned, settings, from_t_pose)?;
+        let anew = resolve_along(surface, &layers, &outfit.to_parts(&made.skinned), settings, from_t_pose)?;
         // What carries on does not pop.
         Ok(match carried {
             Some(carried) => carried.or(anew),

@@ -54,7 +54,7 @@ pub mod tensor_store;
 mod warnings;
 
 pub use acceleration::{Acceleration, acceleration};
-pub use bodies::{Bodies, FrameRange, file_and_frame, read_pose};
+pub use bodies::{Bodies, BodyReport, FrameRange, Moment, file_and_frame, read_pose};
 pub use clothcombo_physics::contact::resolve::Certificate;
 pub use drape::{Drape, GarmentDrape};
 pub use draped::Draped;
@@ -65,9 +65,7 @@ pub use names::UniqueNames;
 pub use outfit::{MAX_GARMENTS, MAX_VERTICES, Outfit, OutfitGarment};
 pub use phase_times::PhaseTimes;
 pub use refine::{RefineSteps, Refinement, refine};
-pub use report::{
-    BodyReport, DrapedGarmentReport, FrameReport, ModelReport, Moment, Report, ScoredPositions,
-};
+pub use report::{DrapedGarmentReport, FrameReport, ModelReport, Report, ScoredPositions};
 pub use shipped::shipped_model;
 pub use smooth::{MOST_RADIUS, Smoothing, smooth};
 pub use source::{GarmentCatalog, GivenGarment};
@@ -82,6 +80,7 @@ use clothcombo_model::ClothCombo;
 use clothcombo_physics::contact::resolve::ResolveSettings;
 use embedded::EmbeddedGarments;
 use frame::Frame;
+use network_drape::Pass;
 use shape_space::ShapeSpace;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -150,7 +149,6 @@ pub struct Draper {
     preprocessor: Arc<Preprocessor>,
     shape_space: Arc<ShapeSpace>,
     joints: Arc<ActiveJoints>,
-    device: Device,
     settings: DraperSettings,
     embedded: Arc<EmbeddedGarments>,
 }
@@ -168,21 +166,18 @@ impl Draper {
         let (body, shape_space) = body_of(&trained, settings.body.as_deref())?;
         let joints = ActiveJoints::named(&body, &trained.state.joints)
             .map_err(|missing| DraperError::Joints { body: body.name.clone(), missing })?;
-        let device = settings.device.clone();
-        let model = trained.networks(&device)?;
+        let model = trained.networks(&settings.device)?;
         let mut preprocessor = Preprocessor::new(&trained.config, Arc::new(body));
         if let Some(folder) = &settings.cache {
             preprocessor = preprocessor.with_cache_in(folder, settings.cache_limit);
         }
-        let settings = settings.clone();
         Ok(Self {
             trained: Arc::new(trained),
             model,
             preprocessor: Arc::new(preprocessor),
             shape_space: Arc::new(shape_space),
             joints: Arc::new(joints),
-            device,
-            settings,
+            settings: settings.clone(),
             embedded: Arc::default(),
         })
     }
@@ -235,7 +230,7 @@ impl Draper {
     /// # Errors
     /// When shape or pose do not fit the body model, or the networks diverge.
     pub fn drape(&self, outfit: &Outfit, body: &BodyState) -> Result<Drape, DraperError> {
-        let made = self.network_drape(outfit, body)?;
+        let made = self.network_drape(Pass::Accepted, outfit, body)?;
         let refine = self.refine_steps(1);
         self.drape_frame(outfit, Frame { body, refine, last: None }, made, &mut |_| ())
     }

@@ -36,6 +36,18 @@ pub(super) struct NetworkDrape {
 /// Shape parameters are standard deviations: with a larger one there is no body any more.
 const MOST_SHAPE: f64 = 20.0;
 
+impl NetworkDrape {
+    /// It as a sample of a continuation path.
+    pub fn sample(&self, outfit: &Outfit) -> PathSample {
+        PathSample {
+            body: self.surface.clone(),
+            draped: outfit.to_parts(&self.network),
+            skinned: outfit.to_parts(&self.skinned),
+            transforms: self.transforms.clone(),
+        }
+    }
+}
+
 /// How much of the networks is asked.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Pass {
@@ -50,13 +62,10 @@ impl Draper {
     /// Poses the body and lets the networks drape `outfit` on it.
     pub(super) fn network_drape(
         &self,
+        pass: Pass,
         outfit: &Outfit,
         body: &BodyState,
     ) -> Result<NetworkDrape, DraperError> {
-        self.drape_by(Pass::Accepted, outfit, body)
-    }
-
-    fn drape_by(&self, pass: Pass, outfit: &Outfit, body: &BodyState) -> Result<NetworkDrape, DraperError> {
         let clock = Instant::now();
         let (shape, posed) = self.posed(body)?;
         let mut surface = match &body.surface {
@@ -71,7 +80,7 @@ impl Draper {
             false => (body.pose.clone(), 0.0),
         };
         let scene = self.scene(outfit, BodySample { shape, pose: facing });
-        let (tensors, start) = body_tensors(&scene.bodies[0], &self.dimensions(), &self.device)?;
+        let (tensors, start) = body_tensors(&scene.bodies[0], &self.dimensions(), &self.settings.device)?;
         let posing = elapsed(clock);
 
         let (outfit_tensors, embeddings) = (&outfit.tensors, &outfit.embeddings);
@@ -116,35 +125,32 @@ impl Draper {
     ) -> Result<PathSample, DraperError> {
         // A surface is known at the end only.
         let sample = BodyState { shape: body.shape.clone(), pose, surface: None, place };
-        let made = self.drape_by(pass, outfit, &sample)?;
-        let parts = |packed| outfit.split(packed).into_iter().map(<[_]>::to_vec).collect();
-        Ok(PathSample {
-            body: made.surface,
-            draped: parts(&made.network),
-            skinned: parts(&made.skinned),
-            transforms: made.transforms,
-        })
+        Ok(self.network_drape(pass, outfit, &sample)?.sample(outfit))
+    }
+
+    /// What prepares scenes as the model was trained on them.
+    pub(super) fn scene_builder(&self) -> SceneBuilder<'_> {
+        let config = &self.trained.config;
+        SceneBuilder {
+            body: self.body(),
+            joints: &self.joints,
+            encoding: config.data.poses.encoding,
+            losses: &config.losses,
+            graph: config.model.graph,
+            layer_thickness: config.layer_thickness(),
+            ordered: config.start.ordered,
+        }
     }
 
     fn scene(&self, outfit: &Outfit, body: BodySample) -> PreparedScene {
-        let encoding = self.trained.config.data.poses.encoding;
         let shape = body.shape.clone();
-        let builder = SceneBuilder {
-            body: self.body(),
-            joints: &self.joints,
-            features: &|pose, joints| encoding.features(pose, joints),
-            losses: &self.trained.config.losses,
-            graph: self.trained.config.model.graph,
-            layer_thickness: self.trained.config.layer_thickness(),
-            ordered: self.trained.config.start.ordered,
-        };
         let sample = SceneSample {
             garments: (0..outfit.garments.len()).collect(),
             below: Vec::new(),
             bodies: vec![body],
             repulsion_sample: 0,
         };
-        let mut scene = builder.build(sample, outfit.prepared(), &[], 1.0);
+        let mut scene = self.scene_builder().build(sample, &outfit.arrangement, 1.0);
         let seen = self.shape_space.seen(self.body(), &shape, self.trained.state.shape_count);
         scene.bodies[0].shape = seen.into_iter().map(|b| b as f32).collect();
         scene

@@ -1,7 +1,6 @@
 //! The networks at inference: a prepared scene in, positions on the host out.
 
 use super::acceptance::{accepted, skinned};
-use super::descent::Descent;
 use super::draped::Draped;
 use super::layer_interaction::LayerInteraction;
 use super::on_body::OnBody;
@@ -74,20 +73,6 @@ impl<'a> Networks<'a> {
         Ok(drape(&OnBody { scene, outfit: &outfit, embeddings: &embeddings, body: &body, start }))
     }
 
-    /// The energy of every garment of `scene`, with the pairs that it is part of, at the states that are accepted from skinning
-    /// on (J).
-    ///
-    /// # Errors
-    /// When the scene's numbers are not finite.
-    pub fn energies(&self, scene: &PreparedScene) -> Result<Vec<Vec<f64>>, DrapeError> {
-        self.on_first_body(scene, Mode::Layered, |on_body| {
-            let mut energies = Vec::new();
-            let mut watch = |descent: &Descent<'_>| energies.push(descent.energies().to_vec());
-            drape_watched(&self.model, on_body, LayerInteraction::Together, &mut watch);
-            energies
-        })
-    }
-
     /// Linear blend skinning of the start state, which has learned nothing.
     ///
     /// # Errors
@@ -140,20 +125,10 @@ pub fn drape_on(
     on_body: &OnBody<'_>,
     interaction: LayerInteraction,
 ) -> (Draped, NetworkTimes) {
-    drape_watched(model, on_body, interaction, &mut |_| ())
-}
-
-/// The same; `watch` sees every state that is accepted.
-fn drape_watched(
-    model: &ClothCombo,
-    on_body: &OnBody<'_>,
-    interaction: LayerInteraction,
-    watch: &mut dyn FnMut(&Descent<'_>),
-) -> (Draped, NetworkTimes) {
     let clock = Instant::now();
     // On the host before the clock is read: devices compute behind the caller's back.
     let (states, proposed) = forward_on(model, on_body, interaction);
     let forward = clock.elapsed();
-    let found = accepted(on_body, &proposed, &states.skin_weights, interaction, watch);
+    let found = accepted(on_body, &proposed, &states.skin_weights, interaction);
     (found, NetworkTimes { forward, acceptance: clock.elapsed() - forward })
 }

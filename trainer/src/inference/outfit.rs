@@ -5,7 +5,7 @@ use super::embedded::{EmbeddedGarment, GarmentTimes};
 use super::error::DraperError;
 use super::names::UniqueNames;
 use super::source::GivenGarment;
-use crate::dataset::{PreparedGarment, contacts, thickness_below};
+use crate::dataset::{Arrangement, PreparedGarment};
 use clothcombo_model::{Embeddings, Mode, OutfitTensors};
 use clothcombo_physics::contact::resolve::{Layer, ResolveError, RestGarment};
 use std::sync::Arc;
@@ -37,6 +37,7 @@ pub struct OutfitGarment {
 pub struct Outfit {
     /// The garments.
     pub garments: Vec<OutfitGarment>,
+    pub(super) arrangement: Arrangement,
     pub(super) tensors: OutfitTensors,
     pub(super) embeddings: Embeddings,
 }
@@ -48,12 +49,11 @@ impl Outfit {
         sources: Vec<GivenGarment>,
         embedded: Vec<EmbeddedGarment>,
     ) -> Result<Self, DraperError> {
-        let prepared: Vec<Arc<PreparedGarment>> = embedded.iter().map(|e| e.prepared.clone()).collect();
-        let contacts = contacts(draper.trained.config.model.graph, &prepared);
+        let prepared = embedded.iter().map(|e| e.prepared.clone()).collect();
+        let arrangement = draper.scene_builder().arrange(prepared, &[]);
         let tensors = embedded.iter().map(|e| &e.tensors).collect::<Vec<_>>();
-        let each = draper.trained.config.layer_thickness();
-        let below = each.map_or_else(Vec::new, |each| thickness_below(&prepared, &[], draper.body(), each));
-        let tensors = OutfitTensors::new(&tensors, &contacts)?.with_thickness_below(&below)?;
+        let tensors = OutfitTensors::new(&tensors, &arrangement.contacts)?
+            .with_thickness_below(&arrangement.thickness_below)?;
         let embeddings = embedded.iter().map(|e| e.embedding.clone()).collect::<Vec<_>>();
         let embeddings = draper.model.pack(&tensors, &embeddings, Mode::Layered)?;
         let mut names = UniqueNames::default();
@@ -65,7 +65,8 @@ impl Outfit {
             embedding_known: embedded.was_known,
             milliseconds: embedded.milliseconds,
         };
-        Ok(Self { garments: sources.into_iter().zip(embedded).map(garment).collect(), tensors, embeddings })
+        let garments = sources.into_iter().zip(embedded).map(garment).collect();
+        Ok(Self { garments, arrangement, tensors, embeddings })
     }
 
     /// Whether `garments` are few and small enough to be an outfit: what [`Draper::outfit`] would say, at once.
@@ -88,13 +89,14 @@ impl Outfit {
         self.garments.iter().map(|p| p.name.as_str())
     }
 
-    pub(super) fn prepared(&self) -> Vec<Arc<PreparedGarment>> {
-        self.garments.iter().map(|p| p.prepared.clone()).collect()
-    }
-
     /// The part of each garment of a packed `[ΣV]` array.
     pub(super) fn split<'a, T>(&self, packed: &'a [T]) -> Vec<&'a [T]> {
         self.tensors.packing().parts(packed)
+    }
+
+    /// The same, each by itself.
+    pub(super) fn to_parts<T: Copy>(&self, packed: &[T]) -> Vec<Vec<T>> {
+        self.split(packed).into_iter().map(<[_]>::to_vec).collect()
     }
 
     /// Layers for the post-process, at the positions of each garment.

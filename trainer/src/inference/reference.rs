@@ -16,12 +16,8 @@ use std::sync::Arc;
 
 /// A scene on its first body in f64, ready to be solved.
 pub struct ReferenceScene {
-    /// Names of the garments, inner → outer.
-    pub garments: Vec<String>,
     /// Energy of posed positions.
     pub energy: SceneEnergy<f64>,
-    /// Linear blend skinning of the rest garments, `[ΣV, 3]`.
-    pub skinned_rest: Vec<[f64; 3]>,
     /// Linear blend skinning of the start state (with shape transfer), `[ΣV, 3]`.
     pub skinned_start: Vec<[f64; 3]>,
 }
@@ -35,7 +31,6 @@ impl ReferenceScene {
         let settings = losses.energy_settings().continuous();
         let body = &scene.bodies[0];
         let start = wide(&body.start);
-        let mut rest = Vec::with_capacity(start.len());
         let transforms = scene.skinning_transforms();
         let mut garments = Vec::new();
         for (garment, narrow) in scene.garments.iter().zip(&body.energy.garments) {
@@ -50,20 +45,14 @@ impl ReferenceScene {
                 pull_back: None,
                 weights: narrow.weights,
             });
-            rest.extend_from_slice(mesh.positions());
         }
         let layers = body.energy.layers.iter();
         let layers =
             layers.map(|l| SceneLayers { inner: l.inner, outer: l.outer, weights: l.weights }).collect();
-        let skinned = |positions: &[[f64; 3]]| -> Vec<[f64; 3]> {
-            transforms.iter().zip(positions).map(|(t, p)| apply(t, *p)).collect()
-        };
         let body = Arc::new(body.energy.body.widened());
         Ok(Self {
-            garments: scene.garments.iter().map(|g| g.garment.name.clone()).collect(),
             energy: SceneEnergy { body, garments, layers, settings }.continuous().pulled_back(&transforms),
-            skinned_rest: skinned(&rest),
-            skinned_start: skinned(&start),
+            skinned_start: transforms.iter().zip(&start).map(|(t, p)| apply(t, *p)).collect(),
         })
     }
 }

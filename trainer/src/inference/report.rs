@@ -2,7 +2,7 @@
 
 use super::acceleration::{Acceleration, acceleration};
 use super::refine::Refinement;
-use super::{Drape, Draper, DraperError, Outfit, PhaseTimes, Smoothing};
+use super::{Bodies, BodyReport, Drape, Draper, DraperError, Outfit, PhaseTimes, Smoothing};
 use crate::dataset::DatasetError;
 use crate::score::{DrapedGarment, Score, ScoreDistance, score};
 use crate::system::device::name;
@@ -24,24 +24,6 @@ pub struct ModelReport {
     pub step: u64,
     /// BLAKE3 checksum of its parameters.
     pub checksum: String,
-}
-
-/// The body.
-#[derive(Clone, Debug, Serialize)]
-pub struct BodyReport {
-    /// Its name.
-    pub name: String,
-    /// Shape parameters β.
-    pub shape: Vec<f64>,
-    /// Where the pose comes from.
-    pub pose: String,
-    /// Vertices.
-    pub vertices: usize,
-    /// Triangles.
-    pub triangles: usize,
-    /// For a body recovered from meshes: mean distance of its vertices to theirs (mm).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub recovered_within_mm: Option<f64>,
 }
 
 /// One garment. The time of what treats all garments at once is shared by number of vertices.
@@ -129,17 +111,8 @@ pub struct Report {
     pub frames: Vec<FrameReport>,
 }
 
-/// A draped frame and when it is.
-#[derive(Clone, Copy, Debug)]
-pub struct Moment {
-    /// Number in the motion.
-    pub frame: usize,
-    /// Time (s).
-    pub seconds: f64,
-}
-
 impl Report {
-    /// Puts the report of `drapes` (at least one) together; `moments` are theirs if they are a motion, else empty.
+    /// Puts the report of `drapes`, which are on `bodies`, together.
     ///
     /// # Errors
     /// When a score overflows: a garment has exploded.
@@ -147,11 +120,10 @@ impl Report {
         draper: &Draper,
         outfit: &Outfit,
         drapes: &[Drape],
-        moments: &[Moment],
-        body: BodyReport,
+        bodies: &Bodies,
         smoothing: Option<Smoothing>,
     ) -> Result<Self, DraperError> {
-        let first = &drapes[0];
+        let (first, moments) = (&drapes[0], &bodies.moments);
         let mut milliseconds = PhaseTimes::default();
         drapes.iter().for_each(|drape| milliseconds += drape.milliseconds);
         for garment in &outfit.garments {
@@ -181,7 +153,7 @@ impl Report {
                 step: trained.state.step,
                 checksum: trained.checksum().to_owned(),
             },
-            body,
+            body: bodies.report.clone(),
             garments: garment_reports(outfit, drapes),
             scored_frame: moments.first().map(|moment| moment.frame),
             before: before?,

@@ -55,57 +55,7 @@ impl GivenGarment {
         always_fit: Option<bool>,
         hints: &FitSettings,
     ) -> Result<Self, DraperError> {
-        Self::read_checked(path, body, always_fit, hints, &OnceLock::new())
-    }
-
-    /// The same with a check that is made where it is needed first.
-    fn read_checked(
-        path: &Path,
-        body: &Body,
-        always_fit: Option<bool>,
-        hints: &FitSettings,
-        placement: &OnceLock<Result<PlacementCheck, FitError>>,
-    ) -> Result<Self, DraperError> {
-        let given = load_mesh(path).map_err(DatasetError::data)?;
-        let mut source = Self::placed(given, path, body, always_fit, hints, placement)?;
-        source.path = Some(path.into());
-        Ok(source)
-    }
-
-    /// The garment of a mesh; `path` says in errors where it comes from.
-    fn placed(
-        given: PolygonMesh,
-        path: &Path,
-        body: &Body,
-        always_fit: Option<bool>,
-        hints: &FitSettings,
-        placement: &OnceLock<Result<PlacementCheck, FitError>>,
-    ) -> Result<Self, DraperError> {
-        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let always_fit = always_fit.or((*hints != FitSettings::default()).then_some(true));
-        let placed = match always_fit {
-            Some(true) => None,
-            Some(false) => Some(given.to_tri_mesh(path).map_err(DatasetError::data)?),
-            None => {
-                let lies = |mesh: &TriMesh| {
-                    has_no_defects(mesh) && !needs_repair(mesh) && is_on_body(mesh, body, placement)
-                };
-                given.to_tri_mesh(path).ok().filter(lies)
-            }
-        };
-        if let Some(rest) = placed {
-            check_place(path, &rest, body)?;
-            let category = Category::guess(&rest, body);
-            let holding = Garment::needs_holding(&rest, body);
-            let follows = (0..rest.vertex_count() as u32).map(Attachment::to_vertex).collect();
-            let garment = Garment { name, holding, ..Garment::new(category, rest) };
-            return Ok(Self { garment, given, path: None, fit: None, follows });
-        }
-        let fitted =
-            fit(&given, body, hints).map_err(|reason| DraperError::Fit { path: path.into(), reason })?;
-        let follows = fitted.follows;
-        let garment = Garment { name, ..fitted.garment };
-        Ok(Self { garment, given, path: None, fit: Some(fitted.report), follows })
+        Placement { body, always_fit, hints, check: &OnceLock::new() }.read(path)
     }
 
     /// Says what it is made of, if `material` says anything: instead of what its folder says.
@@ -137,11 +87,66 @@ impl GivenGarment {
     }
 }
 
-/// Refuses hints about a garment that is taken as it is.
-fn check_hints(name: &str, always_fit: Option<bool>, hints: &FitSettings) -> Result<(), DraperError> {
-    match always_fit == Some(false) && *hints != FitSettings::default() {
-        true => Err(DraperError::Unfitted { name: name.to_owned() }),
-        false => Ok(()),
+/// How the mesh of a garment is brought to a body.
+#[derive(Clone, Copy)]
+struct Placement<'a> {
+    body: &'a Body,
+    /// Whether it is fitted, where that is decided beforehand.
+    always_fit: Option<bool>,
+    hints: &'a FitSettings,
+    /// Made where it is needed first.
+    check: &'a OnceLock<Result<PlacementCheck, FitError>>,
+}
+
+impl Placement<'_> {
+    /// Refuses hints about a garment `name` that is taken as it is.
+    fn check_hints(&self, name: &str) -> Result<(), DraperError> {
+        match self.always_fit == Some(false) && *self.hints != FitSettings::default() {
+            true => Err(DraperError::Unfitted { name: name.to_owned() }),
+            false => Ok(()),
+        }
+    }
+
+    /// The garment of a mesh file.
+    fn read(self, path: &Path) -> Result<GivenGarment, DraperError> {
+        let source = self.place(load_mesh(path).map_err(DatasetError::data)?, path)?;
+        Ok(GivenGarment { path: Some(path.into()), ..source })
+    }
+
+    /// The garment of a mesh; `path` says in errors where it comes from.
+    fn place(self, given: PolygonMesh, path: &Path) -> Result<GivenGarment, DraperError> {
+        let Self { body, always_fit, hints, .. } = self;
+        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let always_fit = always_fit.or((*hints != FitSettings::default()).then_some(true));
+        let placed = match always_fit {
+            Some(true) => None,
+            Some(false) => Some(given.to_tri_mesh(path).map_err(DatasetError::data)?),
+            None => {
+                let lies =
+                    |mesh: &TriMesh| has_no_defects(mesh) && !needs_repair(mesh) && self.is_on_body(mesh);
+                given.to_tri_mesh(path).ok().filter(lies)
+            }
+        };
+        if let Some(rest) = placed {
+            check_place(path, &rest, body)?;
+            let category = Category::guess(&rest, body);
+            let holding = Garment::needs_holding(&rest, body);
+            let garment = Garment { name, holding, ..Garment::new(category, rest) };
+            return Ok(GivenGarment { given, ..GivenGarment::new(garment) });
+        }
+        let fitted =
+            fit(&given, body, hints).map_err(|reason| DraperError::Fit { path: path.into(), reason })?;
+        let follows = fitted.follows;
+        let garment = Garment { name, ..fitted.garment };
+        Ok(GivenGarment { garment, given, path: None, fit: Some(fitted.report), follows })
+    }
+
+    /// Whether a mesh is one garment that is worn where it lies.
+    fn is_on_body(&self, mesh: &TriMesh) -> bool {
+        let check = self.check.get_or_init(|| PlacementCheck::new(self.body));
+        check
+            .as_ref()
+            .is_ok_and(|check| check.is_on_body(mesh, self.body) && check.worn_pieces(mesh, self.body) < 2)
     }
 }
 
@@ -156,12 +161,6 @@ fn check_place(path: &Path, rest: &TriMesh, body: &Body) -> Result<(), DraperErr
         stray_pieces(rest.positions(), &topology, &surface, &all).first().map(ToString::to_string)
     });
     what.map_or(Ok(()), |what| Err(DraperError::Place { path: path.into(), what }))
-}
-
-/// Whether a mesh is one garment that is worn where it lies.
-fn is_on_body(mesh: &TriMesh, body: &Body, placement: &OnceLock<Result<PlacementCheck, FitError>>) -> bool {
-    let check = placement.get_or_init(|| PlacementCheck::new(body));
-    check.as_ref().is_ok_and(|check| check.is_on_body(mesh, body) && check.worn_pieces(mesh, body) < 2)
 }
 
 /// Whether every edge, face and vertex of a mesh is as it should be.
@@ -227,9 +226,9 @@ impl GarmentCatalog {
         always_fit: Option<bool>,
         hints: &FitSettings,
     ) -> Result<GivenGarment, DraperError> {
-        check_hints(name, always_fit, hints)?;
-        let mut source =
-            GivenGarment::placed(mesh, Path::new(name), body, always_fit, hints, &self.placement)?;
+        let placement = Placement { body, always_fit, hints, check: &self.placement };
+        placement.check_hints(name)?;
+        let mut source = placement.place(mesh, Path::new(name))?;
         source.garment.name = name.to_owned();
         Ok(source)
     }
@@ -247,14 +246,15 @@ impl GarmentCatalog {
         always_fit: Option<bool>,
         hints: &FitSettings,
     ) -> Result<GivenGarment, DraperError> {
-        check_hints(name, always_fit, hints)?;
+        let placement = Placement { body, always_fit, hints, check: &self.placement };
+        placement.check_hints(name)?;
         let path = Path::new(name);
         // A word without a dot or a slash is a name, not a file that happens to be missing.
         let is_path = path.is_file()
             || name.contains('/')
             || (path.extension().is_some() && !self.sources.contains_key(name));
         if is_path {
-            return GivenGarment::read_checked(path, body, always_fit, hints, &self.placement);
+            return placement.read(path);
         }
         let origin = self.sources.get(name).ok_or_else(|| DraperError::UnknownGarment {
             name: name.to_owned(),
@@ -275,13 +275,12 @@ impl GarmentCatalog {
             let lies = |rest: &TriMesh| {
                 has_no_defects(rest)
                     && thickness(rest.positions(), rest.faces()).is_none()
-                    && is_on_body(rest, body, &self.placement)
+                    && placement.is_on_body(rest)
             };
             !made.as_ref().is_ok_and(|garment| lies(&garment.rest))
         });
         if must_fit {
-            let mut source =
-                GivenGarment::read_checked(&listed.path, body, Some(true), hints, &self.placement)?;
+            let mut source = Placement { always_fit: Some(true), ..placement }.read(&listed.path)?;
             source.garment.name.clone_from(&listed.name);
             source.set_material(listed.material);
             return Ok(source);

@@ -1,7 +1,6 @@
 //! Warnings about inputs that can be draped.
 
 use super::Draper;
-use super::bodies::Bodies;
 use super::error::DraperError;
 use super::source::GivenGarment;
 use clothcombo_data::asset::{Garment, Pose, infeasible_pair};
@@ -63,13 +62,11 @@ pub fn log_repairs(source: &GivenGarment) {
 }
 
 /// Warns about poses that no person takes.
-pub(super) fn check_poses(bodies: &Bodies) -> Result<(), DraperError> {
-    let poses: Vec<Pose> = bodies.states.iter().map(|state| state.pose.clone()).collect();
-    let of = &bodies.report.pose;
-    if let Some(why) = not_radians(&poses) {
-        return Err(DraperError::NotRadians { of: of.clone(), why });
+pub(super) fn check_poses(poses: &[Pose], of: &str) -> Result<(), DraperError> {
+    if let Some(why) = not_radians(poses) {
+        return Err(DraperError::NotRadians { of: of.to_owned(), why });
     }
-    for warning in [impossible_turn(&poses), not_upright(&poses)].into_iter().flatten() {
+    for warning in [impossible_turn(poses), not_upright(poses)].into_iter().flatten() {
         tracing::warn!("{of}: {warning}");
     }
     Ok(())

@@ -105,14 +105,9 @@ pub enum TrainEvent<'a> {
         best: Option<Best>,
     },
     /// A checkpoint is about to be written: logs that must reach as far as it are to be flushed now.
-    CheckpointDue {
-        /// Steps done.
-        step: u64,
-    },
+    CheckpointDue,
     /// A checkpoint is complete on disk.
     CheckpointSaved {
-        /// Steps done.
-        step: u64,
         /// Its folder.
         path: &'a Path,
     },

@@ -5,7 +5,7 @@ use rayon::ThreadPoolBuilder;
 use std::num::NonZero;
 use std::sync::Mutex;
 
-/// The results of `work` on `items`, in their order; `jobs` at a time, by default as many as there are cores.
+/// The results of `work` on `items`, in their order; as many at a time as there are cores.
 ///
 /// Threads of their own rather than rayon's: one of rayon's that waits for an item in a pool of one thread takes up the next
 /// item meanwhile, until all run at once and no time means anything.
@@ -14,12 +14,19 @@ use std::sync::Mutex;
 /// The first one of `work`, by the order of the items; and when the system refuses a thread.
 pub fn map_single_threaded<I: Send, O: Send>(
     items: Vec<I>,
-    jobs: Option<usize>,
+    work: impl Fn(I) -> Result<O, Report> + Sync,
+) -> Result<Vec<O>, Report> {
+    map(items, std::thread::available_parallelism().map_or(1, NonZero::get), work)
+}
+
+/// The same, `jobs` at a time.
+fn map<I: Send, O: Send>(
+    items: Vec<I>,
+    jobs: usize,
     work: impl Fn(I) -> Result<O, Report> + Sync,
 ) -> Result<Vec<O>, Report> {
     let count = items.len();
-    let cores = std::thread::available_parallelism().map_or(1, NonZero::get);
-    let jobs = jobs.unwrap_or(cores).clamp(1, count.max(1));
+    let jobs = jobs.clamp(1, count.max(1));
     // A pool of one thread for each: energies share their work among the threads of the pool they are called in.
     let pool = || ThreadPoolBuilder::new().num_threads(1).build().into_diagnostic();
     let pools = (0..jobs).map(|_| pool()).collect::<Result<Vec<_>, _>>()?;
@@ -54,7 +61,7 @@ mod tests {
     fn no_more_run_at_once_than_asked_for_and_each_on_one_thread() {
         for jobs in [1, 2, 3] {
             let (running, most) = (AtomicUsize::new(0), AtomicUsize::new(0));
-            let results = map_single_threaded((0..12).collect(), Some(jobs), |i| {
+            let results = map((0..12).collect(), jobs, |i| {
                 most.fetch_max(running.fetch_add(1, SeqCst) + 1, SeqCst);
                 std::thread::sleep(Duration::from_millis(5));
                 running.fetch_sub(1, SeqCst);
@@ -68,10 +75,8 @@ mod tests {
 
     #[test]
     fn the_first_failure_by_order_is_returned() {
-        let results = map_single_threaded(vec![1, 2, 3, 4], Some(2), |i| {
-            if i % 2 == 0 { Err(miette!("item {i}")) } else { Ok(i) }
-        });
+        let results = map(vec![1, 2, 3, 4], 2, |i| if i % 2 == 0 { Err(miette!("item {i}")) } else { Ok(i) });
         assert_eq!(results.unwrap_err().to_string(), "item 2");
-        assert!(map_single_threaded(Vec::<u8>::new(), None, Ok).unwrap().is_empty());
+        assert!(map_single_threaded(Vec::<u8>::new(), Ok).unwrap().is_empty());
     }
 }

@@ -92,10 +92,6 @@ impl Session {
     pub fn schedule(&self) -> &Schedule {
         &self.schedule
     }
-    /// The configuration.
-    pub fn config(&self) -> &Config {
-        &self.config
-    }
     /// The dataset.
     pub fn dataset(&self) -> &Arc<Dataset> {
         &self.dataset
@@ -136,11 +132,6 @@ impl Session {
         }
         self.best = Some(Best { step: self.step, score: score.into() });
         true
-    }
-
-    /// The best validation so far.
-    pub fn best(&self) -> Option<Best> {
-        self.best
     }
 
     /// Draws the sample picture of the current step and returns its path.

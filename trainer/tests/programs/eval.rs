@@ -166,6 +166,11 @@ fn a_quick_evaluation_holds_every_table_of_the_paper() {
             let least = scene.as_array().unwrap().iter().map(|s| s["excess"].as_f64().unwrap());
             assert!(least.fold(f64::INFINITY, f64::min) >= -1e-9, "{scene}");
         }
+        // Every solution stopped for one of the reasons.
+        let comparison = &evaluation["pareto"][scenes];
+        let stops = comparison["stops"].as_object().unwrap();
+        assert_eq!(stops.values().filter_map(Value::as_u64).sum::<u64>(), comparison["scenes"], "{stops:?}");
+        assert_eq!(stops.get("converged").unwrap_or(&0.into()), &comparison["converged"]);
     }
     let numerics = evaluation["numerics"].as_array().unwrap();
     assert_eq!(numerics.len(), 7);
@@ -192,6 +197,30 @@ fn a_quick_evaluation_holds_every_table_of_the_paper() {
     assert!(arguments(&["--only", "numerics"]).status.success());
     let part = &read()["evaluation"];
     assert!(part["numerics"].is_array() && part["methods"].is_null() && part["pareto"].is_null(), "{part}");
+
+    // Random outfits are another part, for which their number is given; their meshes can be looked at.
+    assert!(evaluation["certificates"].is_null(), "{evaluation}");
+    let meshes = folder.path().join("meshes");
+    let outfits = ["--only", "certificates", "--outfits", "3", "--meshes", meshes.to_str().unwrap()];
+    let output = arguments(&outfits);
+    assert!(output.status.success(), "{}", said(&output));
+    let certificates = &read()["evaluation"]["certificates"];
+    let outfits = certificates["outfits"].as_array().unwrap();
+    let garments = |outfit: &Value| names(&outfit["garments"]).len();
+    assert_eq!(outfits.iter().map(garments).collect::<Vec<_>>(), [1, 2, 3]);
+    let count_after = |holds: &dyn Fn(&Value) -> bool| outfits.iter().filter(|o| holds(o)).count() as u64;
+    let is_clear =
+        |o: &Value| o["after"]["body_triangle_pairs"] == 0 && o["after"]["layer_triangle_pairs"] == 0;
+    let groups = certificates["groups"].as_array().unwrap();
+    let group = |name: &str| groups.iter().find(|group| group["name"] == name);
+    assert_eq!(group("all").unwrap()["outfits"], 3);
+    assert_eq!(group("all").unwrap()["intersection_free"][1]["count"], count_after(&is_clear));
+    assert!(group("2 garments").is_some() && group("4 garments").is_none(), "{groups:?}");
+    let feasible = group("feasible orders").map_or(0, |group| group["outfits"].as_u64().unwrap());
+    assert_eq!(feasible, count_after(&|outfit| outfit["is_feasible"] == true));
+    for state in ["rest", "draped", "resolved"] {
+        assert_eq!(fs::read_dir(meshes.join("0001").join(state)).unwrap().count(), 2);
+    }
 
     // An evaluation is replaced, anything else is not.
     fs::write(folder.path().join("report").join("note.txt"), "mine").unwrap();

@@ -1,8 +1,6 @@
 //! The programs as their users run them: one binary, because linking burn takes longer than most of these tests.
 
 mod bad_input;
-mod bench_certificate;
-mod bench_error;
 mod bench_stability;
 mod bench_step;
 mod caches;

@@ -85,10 +85,5 @@ pub fn open_seams(positions: &[[f64; 3]], faces: &[[u32; 3]], reach: f64, least:
     seams
 }
 
-/// Median length of the border's edges, in the unit of the positions; 0 without a border.
-pub fn median_border_edge(positions: &[[f64; 3]], faces: &[[u32; 3]]) -> f64 {
-    Borders::new(positions, faces, 0.0).median_length()
-}
-
 #[cfg(test)]
 mod tests;

@@ -16,9 +16,7 @@ use super::strides::Strides;
 use super::taken_back::{shares, taken_back};
 use super::unfold::Folds;
 use super::way::{Way, placed};
-use super::{
-    Certificate, Layer, PathSample, Reached, ResolveError, ResolveSettings, Resolved, Stage, fast_pass,
-};
+use super::{Certificate, Layer, PathSample, Reached, ResolveError, ResolveSettings, Resolved, fast_pass};
 use crate::query::Surface;
 use crate::transform::Transform;
 
@@ -49,7 +47,6 @@ pub fn resolve_along<E: From<ResolveError>>(
     if let Some(found) = fast_pass(body, layers, settings)? {
         return Ok(found);
     }
-    let fast_time = budget.elapsed();
     budget.shorten_for(body);
     let mut stages = Stages::to(layers);
     let mut checked_at = |share: f64| Ok::<_, E>(checked(stage_at(share)?, layers)?);
@@ -82,10 +79,6 @@ pub fn resolve_along<E: From<ResolveError>>(
         });
     }
     resolved.compare_since(layers, budget);
-    resolved.fast_time = fast_time;
-    if resolved.steps > 0 {
-        resolved.stage = Stage::Path;
-    }
     Ok(resolved)
 }
 

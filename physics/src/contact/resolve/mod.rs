@@ -75,7 +75,7 @@ pub use fast_pass::fast_pass;
 use fast_pass::passed_near;
 pub use follow::{resolve_after, resolve_along};
 pub use garment::{FARTHEST, Layer, RestGarment};
-pub use resolved::{GarmentWork, Resolved, Stage};
+pub use resolved::{GarmentWork, Resolved};
 pub use settings::ResolveSettings;
 pub use waypoint::{PathSample, Reached};
 
@@ -104,10 +104,7 @@ pub fn resolve(
         if let Some(found) = passed_near(&drawn, layers, settings, (budget, body_time)) {
             return Ok(found);
         }
-        let fast_time = budget.elapsed() - body_time;
         budget.shorten_for(body);
-        let found =
-            resolved_near(drawn, layers, settings, (budget, body_time), usize::MAX, |_, found| Ok(found));
-        found.map(|found: Resolved| Resolved { fast_time, ..found })
+        resolved_near(drawn, layers, settings, (budget, body_time), usize::MAX, |_, found| Ok(found))
     })
 }

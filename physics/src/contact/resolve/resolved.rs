@@ -3,11 +3,9 @@
 use std::time::Duration;
 
 use super::Layer;
-use serde::Serialize;
 
 use super::budget::Budget;
 use super::certificate::Certificate;
-use crate::contact::step_filter::FilterWork;
 use crate::vec3;
 
 /// Garments that were resolved.
@@ -22,31 +20,12 @@ pub struct Resolved {
     /// Steps that were tried: from the T-pose, by [`super::resolve_along`] (0 where the drape could be mended as it
     /// was), or from the frame before, by [`super::resolve_after`].
     pub steps: usize,
-    /// What cleared it, or went farthest.
-    pub stage: Stage,
     /// Rounds of detection and relaxation of all stages but the fast pass.
     pub rounds: usize,
-    /// What the step filter did.
-    pub filter: FilterWork,
-    /// How much of the time of the garments the fast pass took where it was not enough; zero where it was.
-    pub fast_time: Duration,
     /// Time to prepare the body.
     pub body_time: Duration,
     /// Time for the certificate.
     pub certificate_time: Duration,
-}
-
-/// Stages of the post-process, each for what the one before it leaves.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Stage {
-    /// [`super::fast_pass`].
-    FastPass,
-    /// The relaxation of the drape as it is.
-    #[default]
-    Relaxation,
-    /// The continuation path.
-    Path,
 }
 
 /// What was done to one garment.

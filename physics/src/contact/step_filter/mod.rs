@@ -25,7 +25,6 @@ use crate::query::triangle_pair::{has_area, mesh_triangles_intersect};
 use crate::vec3::{add, add_scaled, sub};
 use rayon::prelude::*;
 use separation::{Corners, TrianglePair, stay_apart, triangles_stay_apart};
-use serde::Serialize;
 
 /// Halvings of a refused motion before it ends.
 const HALVINGS: u8 = 3;
@@ -43,21 +42,6 @@ pub(crate) struct StepFilter<'a> {
     body: BoxTree,
     /// Triangles that intersect, the smaller number first, ascending.
     pub intersections: FacePairs,
-    /// What it did.
-    pub work: FilterWork,
-}
-
-/// What a filter did.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct FilterWork {
-    /// Steps that were filtered.
-    pub steps: usize,
-    /// Vertices that were drawn back, over all steps.
-    pub drawn_back: usize,
-    /// Pairs of faces whose swept boxes met.
-    pub candidates: usize,
-    /// Pairs of elements that were looked at.
-    pub element_tests: usize,
 }
 
 impl<'a> StepFilter<'a> {
@@ -69,8 +53,7 @@ impl<'a> StepFilter<'a> {
         };
         let cloth = BoxTree::new((0..mesh.cloth_faces).map(centre).collect());
         let body = BoxTree::new((mesh.cloth_faces..mesh.faces.len()).map(centre).collect());
-        let work = FilterWork::default();
-        let mut filter = Self { mesh, cloth, body, intersections: Vec::new(), work };
+        let mut filter = Self { mesh, cloth, body, intersections: Vec::new() };
         let all = vec![true; mesh.faces.len()];
         filter.fit(&[positions], &all);
         let candidates = filter.candidates(&|_| true, 0.0);
@@ -102,11 +85,8 @@ impl<'a> StepFilter<'a> {
         let mut passing: Vec<ElementPair> = Vec::new();
         let mut drawn = vec![0_u8; to.len()];
         let mut is_asked = vec![true; to.len()];
-        self.work.steps += 1;
-        self.work.candidates += candidates.len();
         loop {
-            let (refused, tests) = self.refused(&candidates, from, to, &is_asked, margin);
-            self.work.element_tests += tests;
+            let refused = self.refused(&candidates, from, to, &is_asked, margin);
             let (free, refused): (Vec<_>, Vec<_>) =
                 refused.into_iter().partition(|pair| exempt.binary_search(&pair.key()).is_ok());
             passing.extend(free);
@@ -126,7 +106,6 @@ impl<'a> StepFilter<'a> {
             back.dedup();
             is_asked.fill(false);
             for v in back.into_iter().map(|v| v as usize) {
-                self.work.drawn_back += usize::from(drawn[v] == 0);
                 drawn[v] = drawn[v].saturating_add(1);
                 to[v] = drawn_back(from[v], wanted[v], drawn[v]);
                 is_asked[v] = true;
@@ -207,8 +186,7 @@ impl<'a> StepFilter<'a> {
         exempt
     }
 
-    /// Pairs of elements of `candidates` that do not stay apart, and how many were looked at; only those with a vertex that
-    /// `is_asked` about.
+    /// Pairs of elements of `candidates` that do not stay apart; only those with a vertex that `is_asked` about.
     fn refused(
         &self,
         candidates: &[(u32, u32)],
@@ -216,10 +194,10 @@ impl<'a> StepFilter<'a> {
         to: &[[f64; 3]],
         is_asked: &[bool],
         margin: f64,
-    ) -> (Vec<ElementPair>, usize) {
+    ) -> Vec<ElementPair> {
         let faces = &self.mesh.faces;
         let of_chunk = |chunk: &[(u32, u32)]| {
-            let (mut refused, mut tests) = (Vec::new(), 0);
+            let mut refused = Vec::new();
             for &(f, g) in chunk {
                 let pair = [faces[f as usize], faces[g as usize]];
                 if !pair.as_flattened().iter().any(|&v| is_asked[v as usize]) {
@@ -230,18 +208,15 @@ impl<'a> StepFilter<'a> {
                     continue;
                 }
                 self.mesh.element_pairs(f, g, |pair| {
-                    tests += 1;
                     let (x, y) = (corners_of(from, &pair), corners_of(to, &pair));
                     if !stay_apart(&pair, &x, &y, margin) {
                         refused.push(pair);
                     }
                 });
             }
-            (refused, tests)
+            refused
         };
-        let chunks: Vec<(Vec<ElementPair>, usize)> = candidates.par_chunks(CHUNK).map(of_chunk).collect();
-        let tests = chunks.iter().map(|(_, tests)| tests).sum();
-        (chunks.into_iter().flat_map(|(refused, _)| refused).collect(), tests)
+        candidates.par_chunks(CHUNK).flat_map_iter(of_chunk).collect()
     }
 
     /// Those of `pairs` with a triangle that moves and has no area at `positions`: it intersects nothing there, but

@@ -1,8 +1,6 @@
 //! `clothcombo bench`: measurements that a user can repeat.
 
 pub mod backends;
-pub mod certificate;
-pub mod error;
 pub mod stability;
 pub mod step;
 
@@ -14,14 +12,10 @@ use miette::Report;
 pub enum Bench {
     /// Whether all compute devices of this build agree on loss and gradients, and how fast they are
     Backends(backends::Arguments),
-    /// The post-process on random outfits: exact intersections that are left, changes, time
-    Certificate(certificate::Arguments),
-    /// Energy above the equilibrium and distance to it, for skinning and a trained network, on random scenes
-    Error(error::Arguments),
     /// Every energy on every degenerate case: finite, bounded, a true gradient, the same in both precisions
     Stability(stability::Arguments),
     /// Where the time of a training step goes: parts, single networks, losses, memory
-    Step(step::Arguments),
+    Step(Box<step::Arguments>),
 }
 
 /// Runs the bench.
@@ -31,8 +25,6 @@ pub enum Bench {
 pub fn run(bench: &Bench) -> Result<(), Report> {
     match bench {
         Bench::Backends(arguments) => backends::run(arguments),
-        Bench::Certificate(arguments) => certificate::run(arguments),
-        Bench::Error(arguments) => error::run(arguments),
         Bench::Stability(arguments) => stability::run(arguments),
         Bench::Step(arguments) => step::run(arguments),
     }

@@ -1,7 +1,7 @@
 //! One outfit to be draped, and the bodies it is draped on.
 
 use crate::dataset::DatasetError;
-use crate::inference::{Bodies, Draper, FrameRange, GivenGarment, file_and_frame, read_pose};
+use crate::inference::{Bodies, Draper, FrameRange, file_and_frame, read_pose};
 use clap::Args;
 use clothcombo_data::asset::{GarmentMaterial, KnownShape, Motion, Pose};
 use clothcombo_data::fit::FitSettings;
@@ -53,21 +53,19 @@ pub(super) struct Job {
     pub name: String,
     /// Innermost first.
     pub garments: Vec<WantedGarment>,
-    /// Another order.
-    pub order: Option<Vec<usize>>,
     /// The body.
     pub scene: SceneArguments,
 }
 
 impl Job {
-    /// Files that are read, names of garments among them.
+    /// Files that are read beside those of the garments.
     pub fn files(&self) -> impl Iterator<Item = PathBuf> {
         let SceneArguments { pose, motion, posed, t_pose, .. } = &self.scene;
         let pose = pose.iter().map(|pose| PathBuf::from(file_and_frame(pose).0));
         let scene = pose.chain([motion, posed, t_pose].into_iter().flatten().cloned());
         let bodies = self.garments.iter().filter_map(|garment| garment.hints.from_body.as_deref());
         let bodies = bodies.map(|body| body.path().to_owned());
-        self.garments.iter().map(|garment| PathBuf::from(&garment.name)).chain(bodies).chain(scene)
+        bodies.chain(scene)
     }
 
     /// Reads pose, motion or meshes.
@@ -97,27 +95,26 @@ impl Job {
     }
 }
 
-/// `sources` in the order of `numbers`.
+/// `garments` in the order of `numbers`.
 pub(super) fn ordered(
-    sources: Vec<GivenGarment>,
+    garments: Vec<WantedGarment>,
     numbers: Option<&[usize]>,
-) -> Result<Vec<GivenGarment>, Failure> {
-    let Some(numbers) = numbers else { return Ok(sources) };
+) -> Result<Vec<WantedGarment>, Failure> {
+    let Some(numbers) = numbers else { return Ok(garments) };
     let mut sorted = numbers.to_vec();
     sorted.sort_unstable();
-    if !sorted.iter().copied().eq(0..sources.len()) {
-        let example: Vec<String> = (0..sources.len()).rev().map(|n| n.to_string()).collect();
+    if !sorted.iter().copied().eq(0..garments.len()) {
+        let example: Vec<String> = (0..garments.len()).rev().map(|n| n.to_string()).collect();
         return Err(miette!(
             help = format!(
                 "name each of the {} garments once, for example --order {}",
-                sources.len(),
+                garments.len(),
                 example.join(",")
             ),
             "--order {} is no order of {} garments",
             numbers.iter().map(usize::to_string).collect::<Vec<_>>().join(","),
-            sources.len()
+            garments.len()
         ));
     }
-    let mut sources: Vec<Option<GivenGarment>> = sources.into_iter().map(Some).collect();
-    Ok(numbers.iter().filter_map(|n| sources[*n].take()).collect())
+    Ok(numbers.iter().map(|n| garments[*n].clone()).collect())
 }

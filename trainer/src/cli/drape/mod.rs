@@ -11,7 +11,7 @@ use crate::cli::fit_arguments::FitArguments;
 use crate::cli::output::print_json;
 use crate::cli::post_process::PostProcessArguments;
 use crate::cli::verbosity::{print_status, progress_bar};
-use crate::inference::output::{Show, Staged, write_with_report};
+use crate::inference::output::{Show, Staged, write};
 use crate::inference::{
     Bodies, DrapeProgress, Draper, DraperError, DraperSettings, MOST_RADIUS, Outfit, RefineSteps, Report,
     log_repairs, warn_about_order,
@@ -186,7 +186,6 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             Ok::<_, DraperError>(source)
         };
         let sources = job.garments.iter().map(find).collect::<Result<Vec<_>, _>>()?;
-        let sources = ordered(sources, job.order.as_deref())?;
         Outfit::check(&sources)?;
         sources.iter().for_each(log_repairs);
         draper.log_materials(&sources);
@@ -238,14 +237,13 @@ fn jobs(arguments: &Arguments) -> Result<Vec<Job>, Failure> {
     let material = arguments.material.unwrap_or_default();
     match &arguments.outfits {
         Some(file) => outfits::read(file, &arguments.scene, &hints, material),
-        None => Ok(vec![Job {
-            name: "outfit".to_owned(),
-            garments: (arguments.garments.iter())
-                .map(|name| WantedGarment { name: name.clone(), hints: hints.clone(), material })
-                .collect(),
-            order: arguments.order.clone(),
-            scene: arguments.scene.clone(),
-        }]),
+        None => {
+            let wanted =
+                |name: &String| WantedGarment { name: name.clone(), hints: hints.clone(), material };
+            let garments = arguments.garments.iter().map(wanted).collect();
+            let garments = ordered(garments, arguments.order.as_deref())?;
+            Ok(vec![Job { name: "outfit".to_owned(), garments, scene: arguments.scene.clone() }])
+        }
     }
 }
 
@@ -283,12 +281,13 @@ fn drape_job(
     let show = Show {
         draper,
         outfit,
+        bodies,
         drapes: &drapes,
-        moments: &bodies.moments,
+        smoothing: smoothing.as_ref(),
         title: &title,
         all_frames: arguments.all_frames,
     };
-    Ok(write_with_report(folder, &show, &bodies.report, smoothing)?)
+    Ok(write(folder, &show)?)
 }
 
 fn show_progress(bar: &ProgressBar) -> impl FnMut(DrapeProgress) {

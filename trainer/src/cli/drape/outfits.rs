@@ -1,6 +1,6 @@
 //! A TOML file of outfits.
 
-use super::job::{Job, SceneArguments, WantedGarment};
+use super::job::{Job, SceneArguments, WantedGarment, ordered};
 use clothcombo_data::asset::GarmentMaterial;
 use clothcombo_data::fit::FitSettings;
 use clothcombo_data::fit::hints::GarmentEntry;
@@ -101,8 +101,9 @@ pub(super) fn read(
                 .map_err(|what| wrong(format!("garment {}: {what}", number + 1)))?;
             Ok(WantedGarment { name: beside(&wanted.name), ..wanted })
         });
-        let garments = garments.collect::<Result<Vec<_>, Failure>>()?;
-        Ok(Job { name, garments, order: entry.order, scene: own })
+        let garments = ordered(garments.collect::<Result<_, Failure>>()?, entry.order.as_deref())
+            .wrap_err_with(|| format!("outfit {name}"))?;
+        Ok(Job { name, garments, scene: own })
     });
     let jobs = jobs.collect::<Result<Vec<_>, _>>()?;
     if jobs.is_empty() {

@@ -1,7 +1,6 @@
 use super::*;
-use crate::config::PoseEncoding;
 use crate::dataset::Preprocessor;
-use clothcombo_data::asset::{Binding, BindingSettings, Category, Garment};
+use clothcombo_data::asset::{Binding, BindingSettings, Category, Garment, Pose};
 use clothcombo_data::generate::mannequin;
 use clothcombo_physics::energy::Term;
 use clothcombo_physics::mesh::shapes::grid;
@@ -35,7 +34,7 @@ fn distant_garments_are_a_pair_in_the_full_graph_only() {
         let builder = SceneBuilder {
             body: &body,
             joints: &joints,
-            features: &|pose, joints| PoseEncoding::RotationMatrix.features(pose, joints),
+            encoding: PoseEncoding::RotationMatrix,
             losses: &losses,
             graph,
             layer_thickness: None,
@@ -43,7 +42,7 @@ fn distant_garments_are_a_pair_in_the_full_graph_only() {
         };
         let bodies = vec![BodySample { shape: Vec::new(), pose: Pose::t_pose(body.joint_count()) }];
         let sample = SceneSample { garments: vec![0, 1, 2], bodies, below: Vec::new(), repulsion_sample: 0 };
-        let scene = builder.build(sample, garments.clone(), &[], 1.0);
+        let scene = builder.build(sample, &builder.arrange(garments.clone(), &[]), 1.0);
         let layers = &scene.bodies[0].energy.layers;
         assert!(layers.iter().all(|layer| layer.weights[Term::LayerCollision] > 0.0));
         assert_eq!(scene.contacts, layers.iter().map(|layer| (layer.inner, layer.outer)).collect::<Vec<_>>());

@@ -17,7 +17,7 @@ mod viewer;
 
 pub use staged::Staged;
 
-use super::{BodyReport, Drape, Draper, DraperError, GivenGarment, Moment, Outfit, Report, Smoothing};
+use super::{Bodies, Drape, Draper, DraperError, GivenGarment, Outfit, Report, Smoothing};
 use crate::picture::{BODY_COLOUR, PictureError, layer_colour};
 use clothcombo_data::format::obj::{self, MovedObj};
 use clothcombo_data::format::{FileError, PointFrames, SceneMesh, save_glb};
@@ -115,34 +115,28 @@ pub struct Show<'a> {
     pub draper: &'a Draper,
     /// The garments.
     pub outfit: &'a Outfit,
+    /// What it was draped on.
+    pub bodies: &'a Bodies,
     /// One drape, or the frames of a motion.
     pub drapes: &'a [Drape],
-    /// When the frames are; empty for one drape that is no motion.
-    pub moments: &'a [Moment],
+    /// What temporal smoothing did to them.
+    pub smoothing: Option<&'a Smoothing>,
     /// Headline of picture and viewer.
     pub title: &'a str,
     /// Whether every frame of a motion gets its OBJ files, not only the first.
     pub all_frames: bool,
 }
 
-/// Times of writing (ms), by file.
-pub type WriteTimes = Vec<(&'static str, f64)>;
-
 /// Writes everything into `folder`, which is made if it is not there.
 ///
 /// # Errors
 /// When a file cannot be written, or a state cannot be measured.
-pub fn write_with_report(
-    folder: &Path,
-    show: &Show,
-    body: &BodyReport,
-    smoothing: Option<Smoothing>,
-) -> Result<Report, OutputError> {
+pub fn write(folder: &Path, show: &Show) -> Result<Report, OutputError> {
     let refused = |reason| OutputError::Io { path: folder.into(), reason };
     std::fs::create_dir_all(folder).map_err(refused)?;
     let (written, report) = rayon::join(
-        || write(folder, show),
-        || Report::new(show.draper, show.outfit, show.drapes, show.moments, body.clone(), smoothing),
+        || write_files(folder, show),
+        || Report::new(show.draper, show.outfit, show.drapes, show.bodies, show.smoothing.cloned()),
     );
     let report = report?;
     for (file, milliseconds) in written? {
@@ -153,11 +147,8 @@ pub fn write_with_report(
     Ok(report)
 }
 
-/// Writes everything but the report into `folder`.
-///
-/// # Errors
-/// When a file cannot be written, or a state cannot be measured for the viewer's heat maps.
-pub fn write(folder: &Path, show: &Show) -> Result<WriteTimes, OutputError> {
+/// Writes everything but the report into `folder`; returns the time of each kind of file (ms).
+fn write_files(folder: &Path, show: &Show) -> Result<[(&'static str, f64); 5], OutputError> {
     fn timed<T>(run: impl FnOnce() -> Result<T, OutputError>) -> Result<f64, OutputError> {
         let clock = Instant::now();
         run().map(|_| 1e3 * clock.elapsed().as_secs_f64())
@@ -178,17 +169,17 @@ pub fn write(folder: &Path, show: &Show) -> Result<WriteTimes, OutputError> {
     let ((meshes, (scene, caches)), (picture, page)) =
         rayon::join(|| rayon::join(meshes, || rayon::join(scene, caches)), || rayon::join(picture, page));
     let (caches, scene) = (caches?, scene?);
-    Ok(vec![("obj", meshes?), ("glb", scene), ("caches", caches), ("picture", picture?), ("viewer", page?)])
+    Ok([("obj", meshes?), ("glb", scene), ("caches", caches), ("picture", picture?), ("viewer", page?)])
 }
 
 /// The vertices of the OBJ files in every frame of a motion.
 fn write_caches(folder: &Path, show: &Show) -> Result<(), OutputError> {
-    if show.moments.is_empty() {
+    if show.bodies.moments.is_empty() {
         return Ok(());
     }
     let save = |name: &str, positions: &dyn Fn(&Drape) -> Vec<[f64; 3]>| {
         let mut frames = PointFrames::default();
-        for (drape, moment) in show.drapes.iter().zip(show.moments) {
+        for (drape, moment) in show.drapes.iter().zip(&show.bodies.moments) {
             frames.push(moment.seconds, &positions(drape));
         }
         frames.save_pc2(&folder.join(format!("{name}.pc2")))?;
@@ -206,7 +197,7 @@ fn write_meshes(folder: &Path, show: &Show) -> Result<(), OutputError> {
         tracing::warn!("{loss}");
     }
     if show.all_frames {
-        for (drape, moment) in show.drapes.iter().zip(show.moments) {
+        for (drape, moment) in show.drapes.iter().zip(&show.bodies.moments) {
             write_frame(&folder.join(format!("frames/{:05}", moment.frame)), show, drape)?;
         }
     }
@@ -291,7 +282,7 @@ fn write_scene(path: &Path, show: &Show) -> Result<(), OutputError> {
             texture: garment.source.texture(),
         });
     }
-    let times: Vec<f64> = show.moments.iter().map(|m| m.seconds).collect();
+    let times: Vec<f64> = show.bodies.moments.iter().map(|m| m.seconds).collect();
     Ok(save_glb(path, &meshes, &times)?)
 }
 

@@ -29,6 +29,7 @@ fn row<'a>(show: &'a Show, frame: usize) -> DressedRow<'a> {
     let garments = show.outfit.garments.iter().zip(&drape.garments);
     DressedRow {
         label: show
+            .bodies
             .moments
             .get(frame)
             .map_or(String::new(), |m| format!("frame {}, {:.2} s", m.frame, m.seconds)),

@@ -52,7 +52,7 @@ fn page(show: &Show) -> Result<String, OutputError> {
             stages.iter().map(|stage| (stage.garments[layer], stage.heat[layer].clone())).for_each(s)
         }));
     }
-    let moves = !show.moments.is_empty();
+    let moves = !show.bodies.moments.is_empty();
     let scene = json!({
         "title": show.title,
         "moves": moves,
@@ -87,18 +87,13 @@ struct Stage<'a> {
 
 /// The frames of a motion, or the stages of a single drape.
 fn stages<'a>(show: &Show<'a>) -> Result<Vec<Stage<'a>>, DraperError> {
-    if let ([drape], []) = (show.drapes, show.moments) {
+    if let ([drape], []) = (show.drapes, &show.bodies.moments[..]) {
         let mut states: Vec<(&str, Vec<&[[f64; 3]]>, Option<&Certificate>)> = vec![
             ("linear blend skinning", drape.garments.iter().map(|g| g.skinned.as_slice()).collect(), None),
             ("networks", drape.garments.iter().map(|g| g.network.as_slice()).collect(), None),
         ];
-        if drape.refinement.is_some() {
-            states.push((
-                "post-process",
-                drape.garments.iter().map(|g| g.resolved.as_slice()).collect(),
-                None,
-            ));
-        }
+        let resolved: Option<_> = drape.garments.iter().map(|g| g.resolved.as_deref()).collect();
+        states.extend(resolved.map(|resolved| ("post-process", resolved, None)));
         let result = drape.garments.iter().map(|g| g.positions.as_slice()).collect();
         states.push(("result", result, Some(&drape.certificate)));
         let stages = states.into_par_iter().map(|(name, garments, certificate)| {
@@ -117,10 +112,10 @@ fn stages<'a>(show: &Show<'a>) -> Result<Vec<Stage<'a>>, DraperError> {
         .into_par_iter()
         .step_by(every)
         .map(|frame| {
-            let (drape, moment) = (&show.drapes[frame], show.moments[frame]);
+            let (drape, moment) = (&show.drapes[frame], show.bodies.moments[frame]);
             let name = format!("frame {} · {:.2} s", moment.frame, moment.seconds);
             let garments = drape.garments.iter().map(|g| g.positions.as_slice()).collect();
-            let time = moment.seconds - show.moments[0].seconds;
+            let time = moment.seconds - show.bodies.moments[0].seconds;
             stage(show, drape, name, time, garments, Some(&drape.certificate))
         })
         .collect()

@@ -71,13 +71,11 @@ impl Observer for LogObserver {
                 Some(score) => self.line(format_args!("validation after step {step}: score {score:.4}")),
                 None => self.line(format_args!("validation after step {step}")),
             },
-            TrainEvent::CheckpointSaved { path, .. } => {
-                self.line(format_args!("checkpoint {}", path.display()))
-            }
+            TrainEvent::CheckpointSaved { path } => self.line(format_args!("checkpoint {}", path.display())),
             TrainEvent::Interrupted { step } => self.line(format_args!("stopped after step {step}")),
             TrainEvent::GaveUp { step } => self.line(format_args!("gave up after step {step}")),
             TrainEvent::Finished { step } => self.line(format_args!("finished after step {step}")),
-            TrainEvent::Step(_) | TrainEvent::CheckpointDue { .. } | TrainEvent::SampleDrawn { .. } => Ok(()),
+            TrainEvent::Step(_) | TrainEvent::CheckpointDue | TrainEvent::SampleDrawn { .. } => Ok(()),
         }
     }
 }

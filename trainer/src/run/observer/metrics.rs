@@ -85,7 +85,7 @@ impl Observer for MetricsObserver {
                     .line(&json!({ "step": step, "score": score, "best": best, "groups": groups }))?;
                 self.validation.flush()
             }
-            TrainEvent::CheckpointDue { .. }
+            TrainEvent::CheckpointDue
             | TrainEvent::Interrupted { .. }
             | TrainEvent::GaveUp { .. }
             | TrainEvent::Finished { .. } => self.metrics.flush(),

@@ -138,8 +138,8 @@ impl Observer for ProgressObserver {
                 ));
             }
             // Dozens of them are usual where poses are hard, and clipping makes them harmless: counted, and listed in the log.
-            TrainEvent::Spike { .. } | TrainEvent::CheckpointDue { .. } => {}
-            TrainEvent::CheckpointSaved { path, .. } => {
+            TrainEvent::Spike { .. } | TrainEvent::CheckpointDue => {}
+            TrainEvent::CheckpointSaved { path } => {
                 if !self.terminal {
                     self.print_line(&format!("checkpoint {}", path.display()));
                 }

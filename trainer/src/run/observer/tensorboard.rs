@@ -210,7 +210,7 @@ impl TensorBoardObserver {
                 self.events.flush()
             }
             TrainEvent::SampleDrawn { path } => self.picture(path),
-            TrainEvent::CheckpointDue { .. }
+            TrainEvent::CheckpointDue
             | TrainEvent::Interrupted { .. }
             | TrainEvent::GaveUp { .. }
             | TrainEvent::Finished { .. } => self.events.flush(),

@@ -73,10 +73,10 @@ impl Session {
         let is_time = self.owes_checkpoint && !skipped;
         if at.last_of_stage || is_time || is_best || stopping {
             self.owes_checkpoint = false;
-            emit(observers, &TrainEvent::CheckpointDue { step })?;
+            emit(observers, &TrainEvent::CheckpointDue)?;
             // A save that failed would fail again.
             self.saved_step = step;
-            emit(observers, &TrainEvent::CheckpointSaved { step, path: &self.save()? })?;
+            emit(observers, &TrainEvent::CheckpointSaved { path: &self.save()? })?;
         }
         Ok(())
     }

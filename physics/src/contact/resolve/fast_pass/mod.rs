@@ -25,7 +25,6 @@ use super::obstacle::BodyObstacle;
 use super::outfit::Outfit;
 use super::over::outward;
 use super::relax::{LastPasses, no_farther, relax};
-use super::resolved::Stage;
 use super::{GarmentWork, Layer, ResolveError, ResolveSettings, Resolved, ease};
 use crate::contact::step_filter::{ContactMesh, FacePairs, StepFilter};
 use crate::query::Surface;
@@ -104,8 +103,6 @@ pub(super) fn passed_near(
         positions,
         certificate,
         garments: vec![work; layers.len()],
-        stage: Stage::FastPass,
-        filter: pass.filter.work,
         body_time,
         certificate_time,
         ..Resolved::default()

@@ -1,0 +1,131 @@
+//! The post-process of an evaluation's scenes.
+
+use super::ModelUnderTest;
+use crate::dataset::PreparedScene;
+use crate::inference::layer_interaction::LayerInteraction;
+use crate::inference::networks::Networks;
+use crate::inference::tensor_store::DrapeError;
+use clothcombo_data::asset::{Garment, infeasible_pair};
+use clothcombo_physics::contact::resolve::{
+    Certificate, Layer, PathSample, ResolveError, ResolveSettings, Resolved, RestGarment, certify,
+    resolve_along,
+};
+use clothcombo_physics::query::Surface;
+use clothcombo_physics::transform::apply;
+use miette::Diagnostic;
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+use thiserror::Error;
+
+/// Why a drape cannot be post-processed.
+#[derive(Debug, Error, Diagnostic)]
+pub enum PostProcessError {
+    /// A pose of the continuation path cannot be draped.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Drape(#[from] DrapeError),
+    /// The drape is no valid scene.
+    #[error(transparent)]
+    Resolve(#[from] ResolveError),
+}
+
+/// What the post-process needs besides a drape: the data, who drapes other poses, and constants of garments.
+pub struct PostProcessor<'a> {
+    model: &'a ModelUnderTest,
+    networks: &'a Networks<'a>,
+    known: Mutex<HashMap<usize, Arc<RestGarment>>>,
+}
+
+impl<'a> PostProcessor<'a> {
+    /// For scenes of `model`, draped by its `networks`.
+    pub fn new(model: &'a ModelUnderTest, networks: &'a Networks<'a>) -> Self {
+        Self { model, networks, known: Mutex::default() }
+    }
+
+    /// A drape of `scene` from the packed positions of all garments on its first body.
+    pub fn of<'s>(&'s self, scene: &'s PreparedScene, packed: &[[f32; 3]]) -> DrapedScene<'s> {
+        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        let garment = scene.sample.garments.iter().zip(&scene.garments);
+        let rest = garment.map(|(&g, garment)| {
+            known.entry(g).or_insert_with(|| Arc::new(RestGarment::new(&garment.garment.rest))).clone()
+        });
+        DrapedScene {
+            post_processor: self,
+            scene,
+            body: scene.exact_body(),
+            garments: rest.collect(),
+            positions: wide(scene, packed),
+        }
+    }
+
+    /// `scene` in a pose between the T-pose and its own, draped by the forward pass alone: that leaves fewer intersections
+    /// than the accepted state (docs/resolve.md).
+    fn stage(&self, scene: &PreparedScene, share: f64) -> Result<PathSample, PostProcessError> {
+        let mut sample = scene.sample.clone();
+        for body in &mut sample.bodies {
+            body.pose = body.pose.scaled_keeping_heading(share);
+        }
+        let scene = self.model.prepare(&sample).map_err(DrapeError::from)?;
+        Ok(PathSample {
+            body: Arc::new(scene.exact_body()),
+            draped: wide(&scene, &self.networks.forward(&scene, LayerInteraction::Together)?.posed),
+            skinned: wide(&scene, &skinned(&scene)),
+            transforms: scene.skinning_transforms(),
+        })
+    }
+}
+
+/// Packed positions per garment.
+fn wide(scene: &PreparedScene, packed: &[[f32; 3]]) -> Vec<Vec<[f64; 3]>> {
+    let wide = |part: &[[f32; 3]]| part.iter().map(|p| p.map(f64::from)).collect();
+    scene.parts(packed).into_iter().map(wide).collect()
+}
+
+/// Linear blend skinning of the start state on the host, packed: what the networks start from.
+fn skinned(scene: &PreparedScene) -> Vec<[f32; 3]> {
+    let start = scene.bodies[0].start.iter().map(|p| p.map(f64::from));
+    scene.skinning_transforms().iter().zip(start).map(|(t, p)| apply(t, p).map(|x| x as f32)).collect()
+}
+
+/// A scene's body and garments as the post-process takes them.
+pub struct DrapedScene<'a> {
+    post_processor: &'a PostProcessor<'a>,
+    scene: &'a PreparedScene,
+    /// The posed body.
+    pub body: Surface<f64>,
+    /// Constants of the garments, inner → outer.
+    garments: Vec<Arc<RestGarment>>,
+    /// Their positions.
+    pub positions: Vec<Vec<[f64; 3]>>,
+}
+
+impl DrapedScene<'_> {
+    fn layers(&self) -> Vec<Layer<'_>> {
+        let pairs = self.garments.iter().zip(&self.positions);
+        pairs.map(|(garment, positions)| Layer { garment, positions }).collect()
+    }
+
+    /// Resolves it, if need be on a continuation path from the T-pose.
+    ///
+    /// # Errors
+    /// When it is no valid scene, or another pose cannot be draped.
+    pub fn resolved(&self, settings: &ResolveSettings) -> Result<Resolved, PostProcessError> {
+        let stage_at = |share: f64| self.post_processor.stage(self.scene, share);
+        let skinned = wide(self.scene, &skinned(self.scene));
+        resolve_along(&self.body, &self.layers(), &skinned, settings, stage_at)
+    }
+
+    /// Whether the order of the garments is feasible ([`infeasible_pair`]).
+    pub fn is_feasible(&self) -> bool {
+        let order: Vec<&Garment> = self.scene.garments.iter().map(|w| &w.garment).collect();
+        infeasible_pair(&order).is_none()
+    }
+
+    /// What intersects before anything is done.
+    ///
+    /// # Errors
+    /// When it is no valid scene.
+    pub fn certificate(&self) -> Result<Certificate, ResolveError> {
+        certify(&self.body, &self.layers())
+    }
+}
