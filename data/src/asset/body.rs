@@ -4,11 +4,10 @@
 //! linear blend skinning. Here every body stands with its pelvis joint at the origin *for every shape*: the pelvis of the
 //! template and of each shape direction is subtracted when the body is made, which moves SMPL bodies by a translation.
 
-use super::body_chart::BodyChart;
 use super::pose::Pose;
 use super::rotation::{self, Matrix3, matrix_from_axis_angle};
 use super::skin_weights::SparseSkinWeights;
-use clothcombo_physics::mesh::TriMesh;
+use clothcombo_physics::mesh::{Topology, TriMesh};
 use clothcombo_physics::vec3::{add, sub};
 use rayon::prelude::*;
 use std::ops::{Deref, DerefMut};
@@ -57,7 +56,7 @@ pub struct BodyParts {
 pub struct Body {
     parts: BodyParts,
     zero_body: TriMesh,
-    chart: OnceLock<Arc<BodyChart>>,
+    topology: OnceLock<Arc<Topology>>,
     file_pelvis: FilePelvis,
 }
 
@@ -179,7 +178,7 @@ impl Body {
         let zero_body =
             TriMesh::new(parts.template.clone(), parts.faces.to_vec()).map_err(|e| wrong(e.to_string()))?;
         let file_pelvis = FilePelvis { template: pelvis, shape_directions: pelvis_directions };
-        Ok(Self { parts, zero_body, chart: OnceLock::new(), file_pelvis })
+        Ok(Self { parts, zero_body, topology: OnceLock::new(), file_pelvis })
     }
 
     /// The same body, made of a file that holds it moved already: there its pelvis stood at `recorded`.
@@ -213,7 +212,7 @@ impl Body {
     pub(super) fn turned(mut self) -> Self {
         self.zero_body = self.zero_body.turned();
         self.parts.faces = self.zero_body.faces().into();
-        self.chart = OnceLock::new();
+        self.topology = OnceLock::new();
         self
     }
 
@@ -232,9 +231,9 @@ impl Body {
         self
     }
 
-    /// Neighbours and normals of the zero body; computed when first asked for.
-    pub(super) fn chart(&self) -> &BodyChart {
-        self.chart.get_or_init(|| Arc::new(BodyChart::new(&self.zero_body)))
+    /// Neighbours of the vertices of the zero body.
+    pub(super) fn topology(&self) -> &Topology {
+        self.topology.get_or_init(|| Arc::new(Topology::new(&self.zero_body)))
     }
 
     /// Number of vertices V.

@@ -1,12 +1,15 @@
 //! Which part of the body a garment covers, and how thick what is worn below another garment is.
 
-use super::binding::nearest_body_vertices;
+use super::binding::{nearest_body_vertices, smooth};
 use super::body::Body;
 use super::garment::Garment;
 use clothcombo_physics::mesh::Topology;
 use clothcombo_physics::query::{ClosestPoint, Feature};
-use clothcombo_physics::vec3::{dot, sub};
 use std::collections::HashSet;
+
+/// Averaging steps over the body, half towards the mean of the ring each: at edges of a centimetre the hem of what is below fades
+/// over some three centimetres, as cloth over it would.
+const FADE: usize = 10;
 
 /// Body farther from the garment than this (m) is not below it, however it faces it: the legs in a wide skirt are up to 13 cm
 /// away.
@@ -16,11 +19,9 @@ const FARTHEST: f64 = 0.15;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Footprint {
     /// The body vertex nearest to each vertex of the garment `[V]`.
-    pub(super) nearest: Vec<u32>,
+    nearest: Vec<u32>,
     /// How far each vertex of the body is covered by the garment, from 0 to 1, fading at hems.
     covered: Vec<f32>,
-    /// How far over each vertex of the body the garment lies along its normal (m); absent where it does not.
-    pub(super) height: Vec<Option<f32>>,
 }
 
 impl Footprint {
@@ -34,30 +35,23 @@ impl Footprint {
         let mut on_hem = vec![false; positions.len()];
         hems.iter().flatten().for_each(|v| on_hem[*v as usize] = true);
         let surface = ClosestPoint::new(positions.to_vec(), faces);
-        let chart = body.chart();
-        let height_over = |p: &[f64; 3], normal: &[f64; 3]| {
-            let found = surface.project_within(*p, FARTHEST)?;
+        let is_covered = |p: &[f64; 3]| {
+            let Some(found) = surface.project_within(*p, FARTHEST) else { return false };
             let corners = faces[found.face as usize];
-            let is_covered = match found.feature {
+            match found.feature {
                 Feature::Face => true,
                 Feature::Vertex(k) => !on_hem[corners[k] as usize],
                 Feature::Edge(k) => {
                     let (a, b) = (corners[k], corners[(k + 1) % 3]);
                     !edges.contains(&[a.min(b), a.max(b)])
                 }
-            };
-            is_covered.then(|| dot(sub(found.position, *p), *normal) as f32)
+            }
         };
-        let over = body.template.iter().zip(&chart.normals);
-        let mut height: Vec<Option<f32>> = over.map(|(p, normal)| height_over(p, normal)).collect();
-        let mut covered: Vec<f32> = height.iter().map(|h| f32::from(u8::from(h.is_some()))).collect();
-        chart.fade(&mut covered);
+        let covered = body.template.iter().map(|p| f32::from(u8::from(is_covered(p))));
+        let mut covered: Vec<f32> = covered.collect();
+        smooth(&mut covered, 1, body.topology(), FADE);
         let nearest = nearest_body_vertices(garment, body, true);
-        // A hem lies over something too.
-        for (p, &b) in positions.iter().zip(&nearest) {
-            height[b].get_or_insert_with(|| dot(sub(*p, body.template[b]), chart.normals[b]) as f32);
-        }
-        Self { nearest: nearest.into_iter().map(|v| v as u32).collect(), covered, height }
+        Self { nearest: nearest.into_iter().map(|v| v as u32).collect(), covered }
     }
 
     /// Thickness (m) of what is worn `below` the garment, each with its own (m), at its vertices `[V]`.

@@ -2,13 +2,11 @@
 
 pub mod binding;
 pub mod body;
-mod body_chart;
 pub mod body_file;
 pub mod category;
 mod footprint;
 pub mod garment;
 mod garment_material;
-mod layer_order;
 pub mod motion;
 pub mod pose;
 pub mod provenance;
@@ -25,7 +23,6 @@ pub use category::Category;
 pub use footprint::Footprint;
 pub use garment::{Garment, infeasible_pair};
 pub use garment_material::GarmentMaterial;
-pub use layer_order::order_layers;
 pub use motion::Motion;
 pub use pose::Pose;
 pub use provenance::Provenance;

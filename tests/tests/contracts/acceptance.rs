@@ -49,7 +49,7 @@ fn no_state_raises_the_energy_of_a_garment_and_all_outfits_end_below_skinning() 
 #[test]
 fn a_garment_drapes_in_an_outfit_that_it_does_not_touch_as_a_single_garment_does() {
     let folder = tempfile::tempdir().unwrap();
-    let run = Untrained::new(folder.path(), &["start.ordered=false"]);
+    let run = Untrained::new(folder.path(), &[]);
     let scene = run.scenes(run.step_with_contacts(20)).remove(0);
     let networks = Networks::new(wild(run.model.clone()).valid(), &run.tensors);
     let outfit = |garments: &[usize]| {

@@ -316,8 +316,6 @@ pub struct StartConfig {
     pub skirt_smoothing_iterations: usize,
     /// Add the body's smoothed shape displacement to the rest garment before draping.
     pub shape_transfer: bool,
-    /// Put the garments of an outfit in their order over the rest body before draping, by least squares of the heights.
-    pub ordered: bool,
 }
 
 impl Default for StartConfig {
@@ -327,7 +325,6 @@ impl Default for StartConfig {
             smoothing_iterations: 30,
             skirt_smoothing_iterations: 100,
             shape_transfer: true,
-            ordered: true,
         }
     }
 }

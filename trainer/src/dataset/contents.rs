@@ -32,8 +32,6 @@ pub struct Dataset {
     pub graph: Graph,
     /// How thick a garment is for those above it (m), if the networks ask.
     pub layer_thickness: Option<f64>,
-    /// Whether garments are put in order before they are draped.
-    pub ordered: bool,
     /// Memory for what is kept of garments and can be made again: garments of a streamed dataset, tensors, embeddings. A
     /// device with memory of its own has a budget of its own.
     pub memory: Arc<MemoryBudget>,
@@ -163,7 +161,6 @@ impl Dataset {
             poses,
             graph: config.model.graph,
             layer_thickness: config.layer_thickness(),
-            ordered: config.start.ordered,
             memory,
             shape_count,
             shape_range: config.data.shape_range,

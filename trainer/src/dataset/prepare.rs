@@ -9,7 +9,7 @@ use super::sampling::{BodySample, SceneSample};
 use super::skinning::skinning_transforms;
 use crate::config::{LossesConfig, PoseEncoding};
 use crate::dataset::objective::scene_weights;
-use clothcombo_data::asset::{self, Body};
+use clothcombo_data::asset::Body;
 use clothcombo_model::{Graph, OutfitTensors, Packing};
 use clothcombo_physics::energy::{EnergySettings, SceneEnergy, SceneGarment, SceneLayers};
 use clothcombo_physics::query::Surface;
@@ -107,7 +107,6 @@ pub fn prepare(
         losses,
         graph: dataset.graph,
         layer_thickness: dataset.layer_thickness,
-        ordered: dataset.ordered,
     };
     Ok(builder.build(sample, &builder.arrange(garments, &below), run_progress))
 }
@@ -126,8 +125,6 @@ pub struct SceneBuilder<'a> {
     pub graph: Graph,
     /// How thick a garment is for those above it (m), if the networks ask.
     pub layer_thickness: Option<f64>,
-    /// Whether garments are put in order before they are draped.
-    pub ordered: bool,
 }
 
 /// Garments, inner → outer, and how they lie over each other: the same on every body.
@@ -139,8 +136,6 @@ pub struct Arrangement {
     pub contacts: Vec<(usize, usize)>,
     /// Thickness of what is worn below every vertex `[ΣV]` (m); empty where nothing is, or the networks do not ask.
     pub thickness_below: Vec<f32>,
-    /// Displacements that put them in order `[ΣV]` (m); empty where they are not.
-    ordering: Vec<[f32; 3]>,
 }
 
 impl SceneBuilder<'_> {
@@ -161,11 +156,7 @@ impl SceneBuilder<'_> {
         let each = self.layer_thickness;
         let thickness_below =
             each.map_or_else(Vec::new, |each| thickness_below(&garments, below, self.body, each));
-        let ordering = match self.ordered && !contacts.is_empty() {
-            true => order_layers(&garments, self.body, self.losses.layer_collision.epsilon),
-            false => Vec::new(),
-        };
-        Arrangement { garments, unseen, contacts, thickness_below, ordering }
+        Arrangement { garments, unseen, contacts, thickness_below }
     }
 
     /// Prepares `sample` of the garments of `arrangement`; loss weights are taken at `run_progress`.
@@ -189,7 +180,7 @@ impl SceneBuilder<'_> {
 
     fn on_body(
         &self,
-        Arrangement { garments, unseen, contacts, ordering, .. }: &Arrangement,
+        Arrangement { garments, unseen, contacts, .. }: &Arrangement,
         body: &BodySample,
         settings: &EnergySettings,
         run_progress: f64,
@@ -231,8 +222,7 @@ impl SceneBuilder<'_> {
         if losses.holding.posed {
             energy = energy.pulled_back(&skinning_transforms(garments, &bones));
         }
-        let mut start = starts.concat();
-        start.as_flattened_mut().iter_mut().zip(ordering.as_flattened()).for_each(|(x, by)| *x += by);
+        let start = starts.concat();
         PreparedBody {
             shape: body.shape.iter().map(|v| *v as f32).collect(),
             pose: self.encoding.features(&body.pose, &self.joints.indices),
@@ -260,12 +250,6 @@ fn thickness_below(
         garment.thickness_of(&inside[..below.len() + i], body, each)
     };
     garments.iter().enumerate().flat_map(of).collect()
-}
-
-/// Displacements that put `garments`, inner → outer, in order at rest, `spacing` (m) apart `[ΣV]` (m).
-fn order_layers(garments: &[Arc<PreparedGarment>], body: &Body, spacing: f64) -> Vec<[f32; 3]> {
-    let footprints: Vec<_> = garments.iter().map(|garment| garment.footprint(body)).collect();
-    asset::order_layers(&footprints, body, spacing).concat()
 }
 
 /// Pairs (inner, outer) of `garments`, inner → outer, that interact: all in the full graph, else those whose rest boxes are near

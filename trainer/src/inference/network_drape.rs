@@ -138,7 +138,6 @@ impl Draper {
             losses: &config.losses,
             graph: config.model.graph,
             layer_thickness: config.layer_thickness(),
-            ordered: config.start.ordered,
         }
     }
 

@@ -238,8 +238,7 @@ fn jobs(arguments: &Arguments) -> Result<Vec<Job>, Failure> {
     match &arguments.outfits {
         Some(file) => outfits::read(file, &arguments.scene, &hints, material),
         None => {
-            let wanted =
-                |name: &String| WantedGarment { name: name.clone(), hints: hints.clone(), material };
+            let wanted = |name: &String| WantedGarment { name: name.clone(), hints: hints.clone(), material };
             let garments = arguments.garments.iter().map(wanted).collect();
             let garments = ordered(garments, arguments.order.as_deref())?;
             Ok(vec![Job { name: "outfit".to_owned(), garments, scene: arguments.scene.clone() }])

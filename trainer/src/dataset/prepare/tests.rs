@@ -38,7 +38,6 @@ fn distant_garments_are_a_pair_in_the_full_graph_only() {
             losses: &losses,
             graph,
             layer_thickness: None,
-            ordered: true,
         };
         let bodies = vec![BodySample { shape: Vec::new(), pose: Pose::t_pose(body.joint_count()) }];
         let sample = SceneSample { garments: vec![0, 1, 2], bodies, below: Vec::new(), repulsion_sample: 0 };
