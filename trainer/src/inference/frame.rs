@@ -71,23 +71,25 @@ impl Draper {
         };
         milliseconds.refine = elapsed(clock);
 
-        let NetworkDrape { surface, heading, transforms, skinned, network, .. } = made;
-        let [skinned, network] = [skinned, network].map(|packed| outfit.to_parts(&packed));
+        let [skinned, network] = [&made.skinned, &made.network].map(|packed| outfit.split(packed));
+        let transforms = outfit.split(&made.transforms);
         let mut resolved = resolved.into_iter().flatten();
-        let garments =
-            skinned.into_iter().zip(network).zip(positions).zip(outfit.to_parts(&transforms)).zip(times);
-        let garments = garments.map(|((((skinned, network), positions), transforms), resolve_ms)| {
-            GarmentDrape { skinned, network, resolved: resolved.next(), positions, transforms, resolve_ms }
+        let garments = positions.into_iter().enumerate().map(|(g, positions)| GarmentDrape {
+            skinned: skinned[g].to_vec(),
+            network: network[g].to_vec(),
+            resolved: resolved.next(),
+            positions,
+            transforms: transforms[g].to_vec(),
+            resolve_ms: times[g],
         });
-        let garments = garments.collect();
         let mut drape = Drape {
-            body: surface.positions.clone(),
-            heading,
-            garments,
+            body: made.surface.positions.clone(),
+            heading: made.heading,
+            garments: garments.collect(),
             milliseconds,
             refinement,
             certificate,
-            surface: Some(surface),
+            surface: Some(made.surface),
         };
         let clock = Instant::now();
         drape.settle(self, outfit)?;
