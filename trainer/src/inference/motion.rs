@@ -94,7 +94,7 @@ impl Draper {
                 let mut again =
                     self.drape_frame(outfit, Frame { body, refine, last: Some(last) }, made, &mut watch)?;
                 again.slim();
-                if again.certificate.flaws() < own.certificate.flaws() {
+                if again.certificate.defects() < own.certificate.defects() {
                     std::mem::swap(own, &mut again);
                 }
                 own.milliseconds += again.milliseconds;
@@ -119,7 +119,7 @@ fn carry_back<T, E>(
         let (own, after) = frames.split_at_mut(frame + 1);
         let (own, after) = (&mut own[frame], &after[0]);
         let (now, next) = (certificate(own), certificate(after));
-        if next.flaws() < now.flaws() && next.crossings() == 0 {
+        if !RetryPolicy::NONE.is_met(now) && next.defects() < now.defects() && next.crossings() == 0 {
             again(frame, own, after)?;
         }
     }

@@ -139,7 +139,7 @@ fn resolved(
     let certificate_time = simple.certificate_time + found.certificate_time;
     let rounds = |resolved: &Resolved| resolved.garments.first().map_or(0, |work| work.rounds);
     let all_rounds = rounds(&simple) + rounds(&found);
-    found.prefer(simple.positions, simple.certificate);
+    found.prefer(layers, simple.positions, simple.certificate);
     found.garments.iter_mut().for_each(|work| work.rounds = all_rounds);
     (found.body_time, found.certificate_time) = (body_time, certificate_time);
     found.compare(layers, time);
@@ -169,7 +169,7 @@ impl Resolved {
             self.add_work(&found);
             let is_stuck = found.positions == now;
             now.clone_from(&found.positions);
-            self.prefer(found.positions, found.certificate);
+            self.prefer(layers, found.positions, found.certificate);
             if is_stuck {
                 break;
             }
@@ -196,7 +196,7 @@ impl Resolved {
                 ResolveSettings { gap: gap * settings.gap, rings: rings * settings.rings, ..*settings };
             let found = resolved_once(body, &at(layers, &self.positions), &settings, budget);
             self.add_work(&found);
-            is_better |= self.prefer(found.positions, found.certificate);
+            is_better |= self.prefer(layers, found.positions, found.certificate);
         }
         is_better
     }
@@ -224,7 +224,7 @@ impl Resolved {
         let mut found = resolved_once(body, &at(layers, &laid_out), settings, budget);
         found.go_on(body, layers, settings, budget);
         self.add_work(&found);
-        self.prefer(found.positions, found.certificate)
+        self.prefer(layers, found.positions, found.certificate)
     }
 }
 

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Layer;
 use super::obstacle::BodyObstacle;
+use super::{Defects, Layer};
 use crate::contact::{Report, TrianglePairs};
 
 /// Proof of the state of dressed garments: every number comes from exact predicates over all pairs of triangles, or (depths)
@@ -240,14 +240,14 @@ impl Certificate {
         self.strain_added.map_or(0, |added| (added / TEAR) as usize)
     }
 
-    /// What shows: cloth that crosses, and cloth that is torn out of shape.
-    pub fn flaws(&self) -> usize {
-        self.crossings().saturating_add(self.tears())
-    }
-
-    /// What is wrong: fewer is better, in this order.
-    pub(super) fn defects(&self) -> (usize, usize) {
-        (self.between(), self.self_triangle_pairs)
+    /// What is wrong.
+    pub fn defects(&self) -> Defects {
+        Defects {
+            intersections: self.crossings(),
+            narrow: self.narrow_triangle_pairs,
+            tears: self.tears(),
+            self_intersections: self.self_triangle_pairs,
+        }
     }
 
     /// Strain energy of all garments (J).

@@ -45,7 +45,7 @@ impl ClosingIn<'_, '_> {
         let none = self.room.with_share(0.0);
         let closer = self.body.with_room(none, |obstacle| untangled(obstacle, &now, settings, self.budget));
         let certificate = certified(&self.body.drawn, self.layers, &closer.positions);
-        best.prefer(closer.positions, certificate);
+        best.prefer(self.layers, closer.positions, certificate);
         if let Some(apart) = apart.filter(|_| !best.certificate.is_clear()) {
             self.slowly(best, apart, settings);
         }
@@ -69,7 +69,7 @@ impl ClosingIn<'_, '_> {
             } else {
                 step *= 0.5;
             }
-            best.prefer(found.positions, certificate);
+            best.prefer(self.layers, found.positions, certificate);
         }
     }
 }

@@ -16,9 +16,7 @@ use super::strides::Strides;
 use super::taken_back::{shares, taken_back};
 use super::unfold::Folds;
 use super::way::{Way, placed};
-use super::{
-    Certificate, Layer, PathSample, Reached, ResolveError, ResolveSettings, Resolved, Stage, fast_pass,
-};
+use super::{Layer, PathSample, Reached, ResolveError, ResolveSettings, Resolved, Stage, fast_pass};
 use crate::query::Surface;
 use crate::transform::Transform;
 
@@ -68,7 +66,7 @@ pub fn resolve_along<E: From<ResolveError>>(
     };
     let is_laid_out = folds.is_some_and(|folds| !folds.is_empty());
     if is_laid_out && !resolved.certificate.is_clear() && !budget.is_spent() {
-        resolved = resolved.or_by(along(layers, &mut None)?, Certificate::defects);
+        resolved = resolved.or(along(layers, &mut None)?);
     }
     let is_mended = resolved.mend_last(body, layers, settings, budget);
     // What a drape as it came has of its folds, and what was folded on the way.

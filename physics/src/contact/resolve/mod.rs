@@ -40,6 +40,7 @@ mod certificate;
 mod close_in;
 mod contact;
 mod count;
+mod defects;
 mod detect;
 mod ease;
 mod error;
@@ -70,6 +71,7 @@ pub use certificate::{
     Certificate, Crossed, GarmentCertificate, LayerCertificate, PinchedPairs, RemainingPair,
 };
 pub use count::certify;
+pub use defects::Defects;
 pub use error::ResolveError;
 pub use fast_pass::fast_pass;
 use fast_pass::passed_near;

@@ -63,16 +63,10 @@ pub struct GarmentWork {
 }
 
 impl Resolved {
-    /// The better of two results for the same drape: the one with fewer [`Certificate::flaws`], of equal ones the one with fewer
-    /// pairs that are narrow, then `self`. It counts the work of both.
+    /// The better of two results for the same drape, `self` if they are equally good. It counts the work of both.
     #[must_use]
-    pub fn or(self, other: Self) -> Self {
-        self.or_by(other, |c| (c.flaws(), c.between()))
-    }
-
-    /// [`or`](Self::or) where the one of lower `rank` is the better one.
-    pub(super) fn or_by<K: Ord>(mut self, mut other: Self, rank: impl Fn(&Certificate) -> K) -> Self {
-        if rank(&other.certificate) < rank(&self.certificate) {
+    pub fn or(mut self, mut other: Self) -> Self {
+        if other.certificate.defects() < self.certificate.defects() {
             std::mem::swap(&mut self, &mut other);
         }
         self.add_work(&other);
@@ -93,8 +87,15 @@ impl Resolved {
         self.certificate_time += attempt.certificate_time;
     }
 
-    /// Takes another state of the garments if it is better; whether it is.
-    pub(super) fn prefer(&mut self, positions: Vec<Vec<[f64; 3]>>, certificate: Certificate) -> bool {
+    /// Takes another state of the garments, which were `layers` before the post-process, if it is better; whether it is.
+    pub(super) fn prefer(
+        &mut self,
+        layers: &[Layer<'_>],
+        positions: Vec<Vec<[f64; 3]>>,
+        mut certificate: Certificate,
+    ) -> bool {
+        self.certificate.compare_strain(layers);
+        certificate.compare_strain(layers);
         let is_better = certificate.defects() < self.certificate.defects();
         if is_better {
             (self.positions, self.certificate) = (positions, certificate);

@@ -116,17 +116,7 @@ impl Way<'_, '_> {
         let mut along = settled(self.end, layers, found, settings, self.strides.room, self.budget);
         along.go_on(self.end.drawn.surface, layers, settings, self.budget);
         best.add_work(&along);
-        let [now, then] = [&along, &*best].map(|resolved| &resolved.certificate);
-        match now.is_clear() {
-            // Cloth that was torn out of what it crossed may cross itself less, but it is torn.
-            true if !then.is_clear() || now.strain_joule() < then.strain_joule() => {
-                (best.positions, best.certificate) = (along.positions, along.certificate);
-            }
-            true => (),
-            false => {
-                best.prefer(along.positions, along.certificate);
-            }
-        }
+        best.prefer(layers, along.positions, along.certificate);
         Ok(())
     }
 
@@ -226,10 +216,8 @@ impl Way<'_, '_> {
             }
             let kept = untangled_keeping(Some(place.sides(layers)), obstacle, start, &settings, self.budget);
             let is_asked = is_free && kept.crossings > 0;
-            // Cloth that went through itself is in the way of the next steps.
-            let rank = |found: &Untangled| found.crossings + found.own;
             match first.or_else(|| is_asked.then(at_will)) {
-                Some(found) if rank(&found) < rank(&kept) => found,
+                Some(found) if found.defects() < kept.defects() => found,
                 _ => kept,
             }
         }))
@@ -262,8 +250,7 @@ fn on_stage(
         let mut best: Option<Untangled> = None;
         for start in starts {
             let now = untangle(body.obstacle(), &at(layers, start));
-            let rank = |found: &Untangled| (found.crossings, found.own);
-            if best.as_ref().is_none_or(|best| rank(&now) < rank(best)) {
+            if best.as_ref().is_none_or(|best| now.defects() < best.defects()) {
                 best = Some(now);
             }
             if best.as_ref().is_some_and(&is_enough) {

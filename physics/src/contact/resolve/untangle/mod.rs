@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::budget::Budget;
 use super::contact::{Contact, Plane};
+use super::defects::Defects;
 use super::detect::Crossings;
 use super::obstacle::BodyObstacle;
 use super::outfit::Outfit;
@@ -56,9 +57,6 @@ pub(super) struct Untangling<'a> {
     /// What tells the order of sheets, where it was known a step before; otherwise the directions away from the body do.
     sides: Option<&'a Sides>,
 }
-
-/// How wrong a state is: fewer is better, in this order.
-type Defects = (usize, usize);
 
 /// The best state so far.
 #[derive(Default)]
@@ -170,7 +168,11 @@ impl<'a> Untangling<'a> {
     fn defects(&self) -> Defects {
         let wrong = self.planes.iter().flatten().filter(|p| self.is_violated(p, ROUNDS_FOR_GAPS)).count()
             + self.over.iter().filter(|o| o.height < 0.0).count();
-        (self.crossings.count() + wrong, wrong)
+        Defects {
+            intersections: self.crossings.between() + wrong,
+            self_intersections: self.crossings.own.len(),
+            ..Defects::default()
+        }
     }
 
     /// Up to which distance half-spaces and sheets are remembered (m).
@@ -275,6 +277,12 @@ pub(super) struct Untangled {
     pub with_body: usize,
     /// Pairs of garments with themselves; on a way pinched ones too.
     pub own: usize,
+}
+
+impl Untangled {
+    pub fn defects(&self) -> Defects {
+        Defects { intersections: self.crossings, self_intersections: self.own, ..Defects::default() }
+    }
 }
 
 pub(super) fn untangled(
