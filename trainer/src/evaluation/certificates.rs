@@ -88,7 +88,6 @@ impl<'a> PostProcessor<'a> {
         Ok(PathSample {
             body: Arc::new(scene.exact_body()),
             draped: wide(&scene, draped.as_ref().map_or(&skinned, |draped| &draped.posed)),
-            skinned: wide(&scene, &skinned),
             transforms: scene.skinning_transforms(),
         })
     }
@@ -124,8 +123,7 @@ impl DrapedScene<'_> {
     /// When it is no valid scene, or another pose cannot be draped.
     pub fn resolved(&self, settings: &ResolveSettings) -> Result<Resolved, PostProcessError> {
         let stage_at = |share: f64| self.post_processor.stage(self.scene, share);
-        let skinned = wide(self.scene, &skinned(self.scene));
-        resolve_along(&self.body, &self.layers(&self.positions), &skinned, settings, stage_at)
+        resolve_along(&self.body, &self.layers(&self.positions), settings, stage_at)
     }
 
     /// Whether the order of the garments is feasible ([`infeasible_pair`]).

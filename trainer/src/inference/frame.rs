@@ -54,7 +54,6 @@ impl Draper {
                 let final_sample = || PathSample {
                     body: surface.clone(),
                     draped: parts.iter().map(|p| p.to_vec()).collect(),
-                    skinned: outfit.split(&skinned).into_iter().map(<[_]>::to_vec).collect(),
                     transforms: transforms.clone(),
                 };
                 let done = self.resolved(outfit, frame, watch, &surface, &parts, &final_sample);
@@ -147,7 +146,7 @@ impl Draper {
                 _ => stage,
             })
         };
-        let anew = resolve_along(surface, &layers, &final_sample().skinned, settings, from_t_pose)?;
+        let anew = resolve_along(surface, &layers, settings, from_t_pose)?;
         // What carries on does not pop.
         Ok(match carried {
             Some(carried) => carried.or(anew),

@@ -118,12 +118,7 @@ impl Draper {
         let sample = BodyState { shape: body.shape.clone(), pose, surface: None, place };
         let made = self.drape_by(pass, outfit, &sample)?;
         let parts = |packed| outfit.split(packed).into_iter().map(<[_]>::to_vec).collect();
-        Ok(PathSample {
-            body: made.surface,
-            draped: parts(&made.network),
-            skinned: parts(&made.skinned),
-            transforms: made.transforms,
-        })
+        Ok(PathSample { body: made.surface, draped: parts(&made.network), transforms: made.transforms })
     }
 
     fn scene(&self, outfit: &Outfit, body: BodySample) -> PreparedScene {

@@ -65,7 +65,7 @@ impl Resolved {
         if eased != self.positions {
             let clock = Instant::now();
             self.certificate = certified(drawn, layers, &eased);
-            self.certificate_time += clock.elapsed();
+            budget.count_certificate(clock);
             self.positions = eased;
         }
     }

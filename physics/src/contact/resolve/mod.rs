@@ -22,16 +22,12 @@
 //! hardly any cloth fits between two parts, the body gives way ([`relief`]) where crossings are left otherwise; in the
 //! end garments are brought out of it again where they can.
 //!
-//! **Once more.** Where few crossings are left, what was reached is resolved like a new drape, in the end with other gaps.
+//! **Once more.** Where few crossings are left, what was reached is resolved like a new drape.
 //!
 //! **Easing.** Where the strain energy has risen, cloth gives back what it can without crossing anything ([`ease`]).
 //!
-//! **Folds of the drape.** What only a network folds into itself is laid out by [`resolve_along`] before all this
-//! ([`unfold`]), and what of it is left in the end once more.
-//!
 //! **Bent limbs.** Where crossings are left, [`resolve_along`] takes the garments from the T-pose, where their order is plain,
-//! step by step to the pose ([`follow`], [`way`]); in short steps cloth keeps the sides it was on before ([`sides`]). Where that
-//! leaves some, it does so again with drapes that lie nearer to where they began ([`taken_back`]).
+//! step by step to the pose ([`follow`], [`way`]); in short steps cloth keeps the sides it was on before ([`sides`]).
 
 mod attempt;
 mod body;
@@ -59,10 +55,8 @@ mod settings;
 mod sides;
 mod stages;
 mod strides;
-mod taken_back;
 #[cfg(test)]
 mod tests;
-mod unfold;
 mod untangle;
 mod way;
 mod waypoint;
@@ -82,10 +76,7 @@ pub use settings::ResolveSettings;
 pub use waypoint::{PathSample, Reached};
 
 use crate::query::Surface;
-use attempt::resolved_near;
-use body::with_drawn;
-use budget::Budget;
-use garment::check;
+use attempt::resolved_further;
 
 /// Takes `layers`, innermost first, out of `body` and out of each other. Deterministic for any number of threads (without a
 /// time limit in the settings); a clean input comes back to the bit.
@@ -98,18 +89,5 @@ pub fn resolve(
     layers: &[Layer<'_>],
     settings: &ResolveSettings,
 ) -> Result<Resolved, ResolveError> {
-    let budget = &Budget::new(settings, layers.len());
-    settings.check()?;
-    check(body, layers)?;
-    with_drawn(body, layers, |drawn| {
-        let body_time = budget.elapsed();
-        if let Some(found) = passed_near(&drawn, layers, settings, (budget, body_time)) {
-            return Ok(found);
-        }
-        let fast_time = budget.elapsed() - body_time;
-        budget.shorten_for(body);
-        let found =
-            resolved_near(drawn, layers, settings, (budget, body_time), usize::MAX, |_, found| Ok(found));
-        found.map(|found: Resolved| Resolved { fast_time, ..found })
-    })
+    resolved_further(body, layers, settings, usize::MAX, |_, found, _| Ok(found))
 }

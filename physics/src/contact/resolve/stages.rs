@@ -96,7 +96,6 @@ mod tests {
         PathSample {
             body: Arc::new(Surface::from_mesh(&shapes::tetrahedron())),
             draped: vec![rest.iter().map(|p| turn(*p)).collect()],
-            skinned: Vec::new(),
             transforms: vec![[[c, 0.0, s, 0.0], [0.0, 1.0, 0.0, 0.0], [-s, 0.0, c, 0.0]]; rest.len()],
         }
     }

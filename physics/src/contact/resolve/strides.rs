@@ -29,8 +29,6 @@ impl Strides {
         free: 1.0 / 32.0,
         room: Room::DEEP,
     };
-    /// The same with drapes that are taken back: where those help they do so at once.
-    pub const TAKEN_BACK: Self = Self { shortest: 1.0 / 16.0, ..Self::FROM_T_POSE };
     /// From one frame of a motion to the next.
     pub const OF_FRAME: Self = Self {
         longest: 1.0,

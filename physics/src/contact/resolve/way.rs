@@ -115,7 +115,6 @@ impl Way<'_, '_> {
         let Some(found) = followed else { return Ok(()) };
         let mut along = settled(self.end, layers, found, settings, self.strides.room, self.budget);
         along.go_on(self.end.drawn.surface, layers, settings, self.budget);
-        best.add_work(&along);
         best.prefer(layers, along.positions, along.certificate);
         Ok(())
     }

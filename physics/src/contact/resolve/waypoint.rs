@@ -12,8 +12,6 @@ pub struct PathSample {
     pub body: Arc<Surface<f64>>,
     /// The drape on it, `[V, 3]` per garment (m).
     pub draped: Vec<Vec<[f64; 3]>>,
-    /// What that began from: the garments as skinning alone puts them.
-    pub skinned: Vec<Vec<[f64; 3]>>,
     /// Skinning transforms of all vertices, garment after garment, from one and the same state.
     pub transforms: Vec<Transform>,
 }

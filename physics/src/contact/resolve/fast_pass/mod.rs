@@ -11,7 +11,7 @@ mod conditions;
 #[cfg(test)]
 mod tests;
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use super::attempt::FEW_OF_ITSELF;
 use super::body::with_drawn;
@@ -26,7 +26,7 @@ use super::outfit::Outfit;
 use super::over::outward;
 use super::relax::{LastPasses, no_farther, relax};
 use super::resolved::Stage;
-use super::{GarmentWork, Layer, ResolveError, ResolveSettings, Resolved, ease};
+use super::{Layer, ResolveError, ResolveSettings, Resolved, ease};
 use crate::contact::step_filter::{ContactMesh, FacePairs, StepFilter};
 use crate::query::Surface;
 use crate::vec3::{add, add_scaled, scale, sub};
@@ -67,18 +67,19 @@ pub fn fast_pass(
     settings.check()?;
     check(body, layers)?;
     let budget = &Budget::new(settings, layers.len());
+    let preparing = Instant::now();
     Ok(with_drawn(body, layers, |drawn| {
-        let body_time = budget.elapsed();
-        passed_near(&drawn, layers, settings, (budget, body_time))
+        budget.count_body(preparing);
+        passed_near(&drawn, layers, settings, budget)
     }))
 }
 
-/// [`fast_pass`] on a body that is prepared near `layers`, which took `body_time`.
+/// [`fast_pass`] on a body that is prepared near `layers`.
 pub(super) fn passed_near(
     drawn: &BodyObstacle<'_>,
     layers: &[Layer<'_>],
     settings: &ResolveSettings,
-    (budget, body_time): (&Budget, Duration),
+    budget: &Budget,
 ) -> Option<Resolved> {
     let outfit = Outfit::new(layers);
     let surface = drawn.surface;
@@ -98,19 +99,12 @@ pub(super) fn passed_near(
     let positions = pass.garments();
     let certifying = Instant::now();
     let certificate = pass.certificate(&positions);
-    let certificate_time = certifying.elapsed();
-    let work = GarmentWork { rounds, ..GarmentWork::default() };
-    let mut resolved = Resolved {
-        positions,
-        certificate,
-        garments: vec![work; layers.len()],
-        stage: Stage::FastPass,
-        filter: pass.filter.work,
-        body_time,
-        certificate_time,
-        ..Resolved::default()
-    };
+    budget.count_certificate(certifying);
+    let filter = pass.filter.work;
+    let mut resolved =
+        Resolved { positions, certificate, stage: Stage::FastPass, filter, ..Resolved::default() };
     resolved.compare_since(layers, budget);
+    resolved.garments.iter_mut().for_each(|work| work.rounds = rounds);
     is_good(&resolved.certificate, most_folds).then_some(resolved)
 }
 

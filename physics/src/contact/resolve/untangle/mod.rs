@@ -116,29 +116,28 @@ impl<'a> Untangling<'a> {
         untangling
     }
 
-    /// Rounds of detection and relaxation until nothing is wrong or nothing gets better; how many it took. Where crossings
-    /// are left, a second attempt with wider limits is kept if it ends with none.
-    pub fn run(&mut self) -> usize {
+    /// Rounds of detection and relaxation until nothing is wrong or nothing gets better. Where crossings are left, a second attempt
+    /// with wider limits is kept if it ends with none.
+    pub fn run(&mut self) {
         self.detect();
         self.known_folds.clone_from(&self.crossings.own);
-        let rounds = self.attempt();
+        self.attempt();
         if self.crossings.between() == 0 || self.settings.loosened <= 1.0 || self.budget.is_spent() {
-            return rounds;
+            return;
         }
         let (positions, shape) = (self.positions.clone(), self.shape.clone());
         self.farthest *= self.settings.loosened;
         self.stretch = 1.0 + (self.stretch - 1.0) * self.settings.loosened;
-        let more = self.attempt();
+        self.attempt();
         if self.crossings.between() > 0 || self.crossings.own.len() > self.known_folds.len() {
             self.move_to(&positions);
             self.shape = shape;
             self.detect();
         }
-        rounds + more
     }
 
     /// Rounds within the limits as they are. The crossings are those of the positions afterwards.
-    fn attempt(&mut self) -> usize {
+    fn attempt(&mut self) {
         let mut best = Best::default();
         let patience = match (self.sides, self.settings.is_patient) {
             (Some(_), _) => PATIENCE_WITH_SIDES,
@@ -149,19 +148,18 @@ impl<'a> Untangling<'a> {
             let is_violated = self.planes.iter().flatten().any(|p| self.is_violated(p, round))
                 || self.over.iter().any(|o| o.height < self.least(round));
             if !is_violated && self.crossings.count() == 0 {
-                return round;
+                return;
             }
             best.look(self.defects(), &self.positions);
             if round == self.settings.rounds || best.stale > patience || self.budget.is_spent() {
-                self.move_to(&best.positions);
-                self.detect();
-                return round;
+                break;
             }
             self.budget.spend_round();
             self.step(round);
             self.detect();
         }
-        self.settings.rounds
+        self.move_to(&best.positions);
+        self.detect();
     }
 
     /// Pairs that are left, and vertices on the wrong side.
@@ -270,7 +268,6 @@ impl<'a> Untangling<'a> {
 #[derive(Clone, Default)]
 pub(super) struct Untangled {
     pub positions: Vec<Vec<[f64; 3]>>,
-    pub rounds: usize,
     /// Pairs with the body where it is drawn and between garments, but for pinched ones.
     pub crossings: usize,
     /// Pairs with the body, where it gives way too.
@@ -304,11 +301,10 @@ pub(super) fn untangled_keeping(
 ) -> Untangled {
     let outfit = Outfit::new(layers);
     let mut untangling = Untangling::new(&outfit, body, settings, (budget, sides));
-    let rounds = untangling.run();
+    untangling.run();
     let positions = (0..outfit.len()).map(|g| outfit.part(&untangling.positions, g).to_vec()).collect();
     Untangled {
         positions,
-        rounds,
         crossings: untangling.crossings(),
         with_body: untangling.body_crossings(),
         own: untangling.own_crossings(),

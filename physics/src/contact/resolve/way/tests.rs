@@ -11,7 +11,6 @@ fn changes_turn_with_the_skinning_and_fade() {
     let stage = |drape: [f64; 3], transform| PathSample {
         body: Arc::new(Surface::from_mesh(&shapes::tetrahedron())),
         draped: vec![vec![drape]],
-        skinned: vec![vec![drape]],
         transforms: vec![transform],
     };
     let PathSample { draped, transforms, .. } = stage([1.0, 0.0, 0.0], IDENTITY);
