@@ -13,9 +13,10 @@ use super::untangle::{Untangled, untangled};
 use super::{Layer, ResolveError, ResolveSettings, Resolved, ease, passed_near};
 use crate::query::Surface;
 
-/// Most attempts that begin where another one ended…
-const FURTHER_ATTEMPTS: usize = 3;
-/// …and most pairs that may be left there: more would only be torn further.
+/// How what is left is tried once more: gap and rings, as multiples of those asked for. A smaller gap is for many sheets in one
+/// crease, a larger one goes round what holds a few of them.
+const AGAIN: [(f64, usize); 3] = [(1.0, 1), (0.3, 1), (3.0, 2)];
+/// Most pairs that may be left for that: more would only be torn further.
 pub(super) const FEW: usize = 32;
 /// Pairs of garments with themselves that may be left where nothing else crosses.
 pub(super) const FEW_OF_ITSELF: usize = 8;
@@ -126,21 +127,17 @@ impl Resolved {
         settings: &ResolveSettings,
         budget: &Budget,
     ) {
-        let mut now = self.positions.clone();
-        let attempts = if settings.loosened > 1.0 { FURTHER_ATTEMPTS } else { 0 };
-        for _ in 0..attempts {
+        let attempts = if settings.loosened > 1.0 { &AGAIN[..] } else { &[] };
+        for (gap, rings) in attempts {
             let left = self.certificate.between();
             let is_smooth = !settings.self_contact || self.certificate.self_triangle_pairs <= FEW_OF_ITSELF;
             if left == 0 && is_smooth || left > FEW || budget.is_spent() {
                 break;
             }
-            let found = resolved_once(body, &at(layers, &now), settings, budget);
-            let is_stuck = found.positions == now;
-            now.clone_from(&found.positions);
+            let settings =
+                ResolveSettings { gap: gap * settings.gap, rings: rings * settings.rings, ..*settings };
+            let found = resolved_once(body, &at(layers, &self.positions), &settings, budget);
             self.prefer(layers, found.positions, found.certificate);
-            if is_stuck {
-                break;
-            }
         }
     }
 }

@@ -13,8 +13,6 @@ pub(super) struct Strides {
     pub keeping: f64,
     /// Whether it does so at first, and otherwise where that leaves crossings; or the other way round.
     pub keeps_first: bool,
-    /// The shortest one in which it need not, where nothing crosses before.
-    pub free: f64,
     /// Where the body gives way, from step to step by little more or less.
     pub room: Room,
 }
@@ -26,18 +24,11 @@ impl Strides {
         shortest: 1.0 / 512.0,
         keeping: 1.0 / 32.0,
         keeps_first: true,
-        free: 1.0 / 32.0,
         room: Room::DEEP,
     };
     /// From one frame of a motion to the next.
-    pub const OF_FRAME: Self = Self {
-        longest: 1.0,
-        shortest: 1.0 / 128.0,
-        keeping: 1.0,
-        keeps_first: false,
-        free: 0.0,
-        room: Room::AMPLE,
-    };
+    pub const OF_FRAME: Self =
+        Self { longest: 1.0, shortest: 1.0 / 128.0, keeping: 1.0, keeps_first: false, room: Room::AMPLE };
     /// The same from a frame that was not clear.
     pub const OF_CROSSED_FRAME: Self = Self { shortest: 1.0 / 4.0, ..Self::OF_FRAME };
 }

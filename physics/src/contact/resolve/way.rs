@@ -13,7 +13,6 @@ use super::sides::Sides;
 use super::strides::Strides;
 use super::untangle::{Untangled, untangled, untangled_keeping};
 use super::{Layer, PathSample, Reached, ResolveError, ResolveSettings, Resolved};
-use crate::contact::self_triangle_pairs;
 use crate::transform::{into_frame, out_of_frame};
 use crate::vec3::{add, scale, sub};
 
@@ -28,8 +27,6 @@ const KEPT: f64 = 0.95;
 const FADING: f64 = 1.0 / 16.0;
 /// How much more the body may give way, or less, on a whole way (m): about as fast as limbs move.
 const GIVING_WAY: f64 = 0.5;
-/// Crossings of garments with themselves may become more by this share, and by so many, in a short step.
-const OWN: (f64, usize) = (0.125, 4);
 
 /// Where garments are to be taken.
 pub(super) struct Way<'a, 'b> {
@@ -46,8 +43,6 @@ struct Place {
     reached: Reached,
     /// How far the body gave way there, per vertex (m); none where that is not known.
     gave_way: Option<Vec<f64>>,
-    /// Crossings of garments with themselves; none where they were not counted.
-    own: Option<usize>,
     /// Told when they are first asked for.
     sides: OnceLock<Sides>,
     /// Those of the place before, if they were asked for.
@@ -57,20 +52,14 @@ struct Place {
 impl Place {
     fn new(stage: PathSample, Arrived { untangled, gave_way }: Arrived, sides_before: Option<Sides>) -> Self {
         let PathSample { draped, transforms, .. } = stage;
-        let Untangled { positions, crossings, own, .. } = untangled;
+        let Untangled { positions, crossings, .. } = untangled;
         let reached = Reached { draped, positions, transforms, crossings };
-        Self { reached, gave_way: Some(gave_way), own: Some(own), sides: OnceLock::new(), sides_before }
+        Self { reached, gave_way: Some(gave_way), sides: OnceLock::new(), sides_before }
     }
 
     fn sides(&self, layers: &[Layer<'_>]) -> &Sides {
         let positions = || self.reached.positions.concat();
         self.sides.get_or_init(|| Sides::of(&Outfit::new(layers), &positions(), self.sides_before.as_ref()))
-    }
-
-    /// Whether less crosses here than `now`; garments with themselves only count in a step that `is_short`.
-    fn crosses_less_than(&self, now: &Untangled, is_short: bool) -> bool {
-        let is_crumpled = |own: usize| now.own > own + OWN.1 && now.own as f64 > (1.0 + OWN.0) * own as f64;
-        now.crossings > self.reached.crossings || is_short && self.own.is_some_and(is_crumpled)
     }
 }
 
@@ -94,17 +83,10 @@ impl Way<'_, '_> {
             return Ok(());
         }
         let (layers, settings) = (self.layers, self.settings);
-        let start = std::slice::from_ref(&t_pose.draped);
-        let first = on_stage(
-            layers,
-            &t_pose,
-            start,
-            (self.strides.room, None),
-            |_| true,
-            |obstacle, start| {
-                with_all_own(untangled(obstacle, start, settings, self.budget), layers, settings)
-            },
-        );
+        let first =
+            on_stage(layers, &t_pose, &t_pose.draped, (self.strides.room, None), |obstacle, start| {
+                untangled(obstacle, start, settings, self.budget)
+            });
         let crossings = first.untangled.crossings;
         if crossings > 0 && crossings >= best.certificate.crossings() {
             return Ok(());
@@ -127,7 +109,7 @@ impl Way<'_, '_> {
         stage_at: impl FnMut(f64) -> Result<PathSample, E>,
     ) -> Result<(Option<Untangled>, usize), E> {
         let sides = OnceLock::new();
-        self.go(Place { reached, gave_way: None, own: None, sides, sides_before: None }, usize::MAX, stage_at)
+        self.go(Place { reached, gave_way: None, sides, sides_before: None }, usize::MAX, stage_at)
     }
 
     /// None, too, where more than `most` pairs intersect on the way.
@@ -137,7 +119,7 @@ impl Way<'_, '_> {
         most: usize,
         mut stage_at: impl FnMut(f64) -> Result<PathSample, E>,
     ) -> Result<(Option<Untangled>, usize), E> {
-        let Strides { longest, shortest, keeping, .. } = self.strides;
+        let Strides { longest, shortest, .. } = self.strides;
         check(self.end.drawn.surface, &placed(self.layers, &place.reached.draped)?)?;
         check(self.end.drawn.surface, &placed(self.layers, &place.reached.positions)?)?;
         let (mut from, mut step, mut steps) = (0.0, longest, 0);
@@ -152,7 +134,7 @@ impl Way<'_, '_> {
             let stage = stage_at(at)?;
             steps += 1;
             let arrived = self.arrive(&place, &stage, at - from, is_shortest, is_last)?;
-            let is_worse = place.crosses_less_than(&arrived.untangled, at - from <= keeping);
+            let is_worse = arrived.untangled.crossings > place.reached.crossings;
             if is_worse && !is_shortest {
                 // Of the step that was tried: the last one may be shorter than it might have been.
                 (step, well) = (f64::max(0.5 * (at - from), shortest), 0);
@@ -192,30 +174,21 @@ impl Way<'_, '_> {
         let loosened = if is_shortest { self.settings.loosened } else { 1.0 };
         let settings =
             ResolveSettings { is_shallow: !is_last, is_patient: is_shortest, loosened, ..*self.settings };
-        let fading = KEPT.powf((step / FADING).min(1.0));
-        let kept: &[f64] = if is_shortest { &[fading, 1.0] } else { &[fading] };
-        let starts: Vec<_> = kept.iter().map(|kept| carried(&place.reached, stage, *kept)).collect();
-        for start in &starts {
-            check(&stage.body, &placed(self.layers, start)?)?;
-        }
-        let Strides { keeping, keeps_first, free, .. } = self.strides;
-        let is_free = step >= free || place.reached.crossings > 0;
+        let kept = KEPT.powf((step / FADING).min(1.0));
+        let start = carried(&place.reached, stage, kept);
+        check(&stage.body, &placed(self.layers, &start)?)?;
+        let Strides { keeping, keeps_first, room, .. } = self.strides;
         let before = place.gave_way.as_ref().map(|steps| Before { steps, most: GIVING_WAY * step });
-        let gives_way = (self.strides.room, before);
-        let is_enough =
-            |found: &Untangled| found.crossings == 0 && !place.crosses_less_than(found, step <= keeping);
         let layers = self.layers;
-        Ok(on_stage(layers, stage, &starts, gives_way, is_enough, |obstacle, start| {
-            let at_will =
-                || with_all_own(untangled(obstacle, start, &settings, self.budget), layers, &settings);
-            let first = (step > keeping || is_free && !keeps_first).then(at_will);
+        Ok(on_stage(layers, stage, &start, (room, before), |obstacle, start| {
+            let first =
+                (step > keeping || !keeps_first).then(|| untangled(obstacle, start, &settings, self.budget));
             match first {
                 Some(found) if step > keeping || found.crossings == 0 => return found,
                 _ => (),
             }
             let kept = untangled_keeping(Some(place.sides(layers)), obstacle, start, &settings, self.budget);
-            let is_asked = is_free && kept.crossings > 0;
-            match first.or_else(|| is_asked.then(at_will)) {
+            match first {
                 Some(found) if found.defects() < kept.defects() => found,
                 _ => kept,
             }
@@ -223,40 +196,19 @@ impl Way<'_, '_> {
     }
 }
 
-/// With crossings of garments with themselves counted where the body is pinched, too, as they are where cloth keeps its sides.
-fn with_all_own(mut found: Untangled, layers: &[Layer<'_>], settings: &ResolveSettings) -> Untangled {
-    if settings.self_contact {
-        let garments = layers.iter().zip(&found.positions);
-        let own = garments.map(|(layer, now)| self_triangle_pairs(now, &layer.garment.faces).len());
-        found.own = own.sum();
-    }
-    found
-}
-
-/// Untangles the garments at `stage` by `untangle`, from each of `starts` until it `is_enough`; the best. The body
-/// gives way about as `before`.
+/// Untangles the garments at `stage` by `untangle`, from `start`. The body gives way about as `before`.
 fn on_stage(
     layers: &[Layer<'_>],
     stage: &PathSample,
-    starts: &[Vec<Vec<[f64; 3]>>],
+    start: &[Vec<[f64; 3]>],
     (room, before): (Room, Option<Before<'_>>),
-    is_enough: impl Fn(&Untangled) -> bool,
-    mut untangle: impl FnMut(&BodyObstacle<'_>, &[Layer<'_>]) -> Untangled,
+    untangle: impl FnOnce(&BodyObstacle<'_>, &[Layer<'_>]) -> Untangled,
 ) -> Arrived {
-    let mut places = at(layers, &stage.draped);
-    places.extend(starts.iter().flat_map(|start| at(layers, start)));
+    let start = at(layers, start);
+    let places = [at(layers, &stage.draped), start.clone()].concat();
     let arrive = |body: &Body<'_>| {
-        let mut best: Option<Untangled> = None;
-        for start in starts {
-            let now = untangle(body.obstacle(), &at(layers, start));
-            if best.as_ref().is_none_or(|best| now.defects() < best.defects()) {
-                best = Some(now);
-            }
-            if best.as_ref().is_some_and(&is_enough) {
-                break;
-            }
-        }
-        Arrived { untangled: best.unwrap_or_default(), gave_way: body.steps() }
+        let untangled = untangle(body.obstacle(), &start);
+        Arrived { untangled, gave_way: body.steps() }
     };
     with_drawn(&stage.body, &places, |drawn| with_body_after(room, before, drawn, layers.len(), arrive))
 }
