@@ -8,7 +8,8 @@ use std::collections::HashMap;
 
 use super::RestGarment;
 use super::contact::{Contact, is_tiny, normal_of, overlap};
-use crate::vec3::{cross, dot, neg, sub};
+use super::outfit::Outfit;
+use crate::vec3::{add, cross, dot, neg, scale, sub};
 
 /// Rings around a crossing that are counted to tell the smaller side.
 const COUNTED_RINGS: usize = 10;
@@ -23,7 +24,7 @@ pub(super) struct Folds {
 }
 
 /// Looks at `pairs` of crossing faces (each ascending) at `positions`; sheets are parted by `gap`.
-pub(super) fn folds(garment: &RestGarment, positions: &[[f64; 3]], pairs: &[(u32, u32)], gap: f64) -> Folds {
+fn folds(garment: &RestGarment, positions: &[[f64; 3]], pairs: &[(u32, u32)], gap: f64) -> Folds {
     let mut found = Folds::default();
     let faces = &garment.faces;
     let sheets = Sheets::new(garment, pairs);
@@ -55,6 +56,44 @@ pub(super) fn folds(garment: &RestGarment, positions: &[[f64; 3]], pairs: &[(u32
     found.crumpled.sort_unstable();
     found.crumpled.dedup();
     found
+}
+
+/// Conditions that part `pairs` of faces at `positions`, each of one garment, one garment after the other, and the vertices of
+/// crumples. Those are smoothed (in positions and shape): for good in a garment with a pair that is `known` from the input; in
+/// others what was done to them is taken back.
+pub(super) fn part_folds(
+    outfit: &Outfit<'_>,
+    (pairs, known): (&[(u32, u32)], &[(u32, u32)]),
+    gap: f64,
+    positions: &[[f64; 3]],
+    (smoothed, shape): (&mut [[f64; 3]], &mut [[f64; 3]]),
+) -> (Vec<Contact>, Vec<u32>) {
+    let (mut contacts, mut crumpled) = (Vec::new(), Vec::new());
+    for pairs in pairs.chunk_by(|a, b| outfit.garment_of_face(a.0) == outfit.garment_of_face(b.0)) {
+        let g = outfit.garment_of_face(pairs[0].0);
+        let (first, start) = (outfit.faces_of_garment(g).start, outfit.vertices(g).start);
+        let local: Vec<(u32, u32)> = pairs.iter().map(|(f, g)| (f - first, g - first)).collect();
+        let found = folds(outfit.layers[g].garment, outfit.part(positions, g), &local, gap);
+        contacts.extend(found.contacts.into_iter().map(|contact| contact.shifted(start)));
+        let is_of_input = pairs.iter().any(|pair| known.binary_search(pair).is_ok());
+        for v in found.crumpled.into_iter().map(|v| v + start) {
+            crumpled.push(v);
+            let ring = outfit.ring(v);
+            let share = 1.0 / ring.len().max(1) as f64;
+            let v = v as usize;
+            if is_of_input {
+                let mean = scale(ring.fold([0.0; 3], |sum, n| add(sum, positions[n as usize])), share);
+                let by = scale(sub(mean, positions[v]), 0.5);
+                smoothed[v] = add(positions[v], by);
+                shape[v] = add(shape[v], by);
+            } else {
+                let by = |n: u32| sub(positions[n as usize], shape[n as usize]);
+                let mean = scale(ring.fold([0.0; 3], |sum, n| add(sum, by(n))), share);
+                smoothed[v] = add(shape[v], mean);
+            }
+        }
+    }
+    (contacts, crumpled)
 }
 
 /// Faces of the crossings that hang together.

@@ -19,7 +19,7 @@ use super::budget::Budget;
 use super::certificate::Certificate;
 use super::contact::{Contact, Plane};
 use super::ease::{Easing, contact_mesh};
-use super::folds::folds;
+use super::folds::part_folds;
 use super::garment::check;
 use super::obstacle::BodyObstacle;
 use super::outfit::Outfit;
@@ -29,7 +29,6 @@ use super::resolved::Stage;
 use super::{Layer, ResolveError, ResolveSettings, Resolved, ease};
 use crate::contact::step_filter::{ContactMesh, FacePairs, StepFilter};
 use crate::query::Surface;
-use crate::vec3::{add, add_scaled, scale, sub};
 use rayon::prelude::*;
 
 /// Rings of neighbours around a defect that move along.
@@ -206,7 +205,10 @@ impl<'a> FastPass<'a> {
         let mut to = self.positions.clone();
         let cloth = &mut to[..self.input.len()];
         let region = &defects.region;
-        contacts.extend(self.part_folds(cloth));
+        let folds: Vec<(u32, u32)> = self.parted_folds().copied().collect();
+        let (pairs, shape) = ((folds.as_slice(), self.folds.as_slice()), self.shape.as_mut_slice());
+        let gap = FOLD_GAP * self.settings.gap;
+        contacts.extend(part_folds(self.outfit, pairs, gap, &self.positions, (cloth, shape)).0);
         let (stretch, most) = (self.settings.stretch, self.settings.farthest);
         relax(self.outfit, cloth, &self.shape, region, &contacts, stretch, (SWEEPS, LastPasses::FEW));
         for &v in region {
@@ -265,40 +267,6 @@ impl<'a> FastPass<'a> {
         let is_known = |pair| self.folds.binary_search(pair).is_ok();
         let is_asked = move |pair| mends_folds(self.settings) || !is_known(pair);
         self.own().filter(move |pair| is_asked(pair) && !(self.is_pinch(pair.0) && self.is_pinch(pair.1)))
-    }
-
-    /// Conditions that part folds, which are pairs of one garment after the other. Crumples are smoothed: those of the
-    /// input for good, of others what was done to them is taken back.
-    fn part_folds(&mut self, positions: &mut [[f64; 3]]) -> Vec<Contact> {
-        let all: Vec<(u32, u32)> = self.parted_folds().copied().collect();
-        let outfit = self.outfit;
-        let mut contacts = Vec::new();
-        for pairs in all.chunk_by(|a, b| outfit.garment_of_face(a.0) == outfit.garment_of_face(b.0)) {
-            let g = outfit.garment_of_face(pairs[0].0);
-            let (first, start) = (outfit.faces_of_garment(g).start, outfit.vertices(g).start);
-            let local: Vec<(u32, u32)> = pairs.iter().map(|(f, g)| (f - first, g - first)).collect();
-            let part = outfit.part(&self.positions, g);
-            let found = folds(outfit.layers[g].garment, part, &local, FOLD_GAP * self.settings.gap);
-            contacts.extend(found.contacts.into_iter().map(|contact| contact.shifted(start)));
-            let is_of_input = pairs.iter().any(|pair| self.folds.binary_search(pair).is_ok());
-            for v in found.crumpled.into_iter().map(|v| v + start) {
-                let ring = outfit.ring(v);
-                let share = 1.0 / ring.len().max(1) as f64;
-                let mean = |of: &dyn Fn(usize) -> [f64; 3]| {
-                    outfit.ring(v).fold([0.0; 3], |sum, n| add_scaled(sum, share, of(n as usize)))
-                };
-                let v = v as usize;
-                if is_of_input {
-                    let by = scale(sub(mean(&|n| self.positions[n]), self.positions[v]), 0.5);
-                    positions[v] = add(self.positions[v], by);
-                    self.shape[v] = add(self.shape[v], by);
-                } else {
-                    let by = mean(&|n| sub(self.positions[n], self.shape[n]));
-                    positions[v] = add(self.shape[v], by);
-                }
-            }
-        }
-        contacts
     }
 
     fn is_own(&self, &(f, g): &(u32, u32)) -> bool {
